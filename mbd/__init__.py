@@ -1,0 +1,143 @@
+"""Dynamics of multibody systems: bodies and joints in words, exact equations, machine code, switching constraints.
+
+Names are loaded when they are first used, so that ``import mbd`` itself is quick.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from mbd.assembly import assemble as assemble
+    from mbd.bodies import (
+        Link as Link,
+        PointMass as PointMass,
+        RigidBody as RigidBody,
+        box as box,
+        cylinder as cylinder,
+        disk as disk,
+        rod as rod,
+        segment as segment,
+        sphere as sphere,
+    )
+    from mbd.constraints import (
+        Bilateral as Bilateral,
+        Controller as Controller,
+        Event as Event,
+        Penalty as Penalty,
+        Plane as Plane,
+        Unilateral as Unilateral,
+        When as When,
+        distance as distance,
+        extension as extension,
+        flexion as flexion,
+        height as height,
+        measure as measure,
+        separation as separation,
+        touchdown as touchdown,
+    )
+    from mbd.equations.lagrangian import Coordinate as Coordinate, Lagrangian as Lagrangian
+    from mbd.errors import (
+        AssemblyError as AssemblyError,
+        CapabilityError as CapabilityError,
+        MbdError as MbdError,
+        ModelError as ModelError,
+        SimulationError as SimulationError,
+        TraceError as TraceError,
+        UnknownNameError as UnknownNameError,
+    )
+    from mbd.forces import (
+        Applied as Applied,
+        Damper as Damper,
+        Motor as Motor,
+        Potential as Potential,
+        Samples as Samples,
+        Spring as Spring,
+        TorsionSpring as TorsionSpring,
+    )
+    from mbd.integrators import HHT as HHT, GeneralizedAlpha as GeneralizedAlpha, Newmark as Newmark
+    from mbd.joints import (
+        Cylindrical as Cylindrical,
+        Planar as Planar,
+        Prismatic as Prismatic,
+        Revolute as Revolute,
+        Screw as Screw,
+        Translation as Translation,
+        Universal as Universal,
+        Weld as Weld,
+    )
+    from mbd.joints.losses import (
+        Coulomb as Coulomb,
+        Dissipation as Dissipation,
+        Quadratic as Quadratic,
+        Tabulated as Tabulated,
+        Viscous as Viscous,
+    )
+    from mbd.model import Model as Model, on_slope as on_slope
+    from mbd.simulation import simulate as simulate
+    from mbd.state import State as State
+    from mbd.tape.functions import (
+        acos as acos,
+        asin as asin,
+        atan as atan,
+        atan2 as atan2,
+        cos as cos,
+        cosh as cosh,
+        exp as exp,
+        log as log,
+        maximum as maximum,
+        minimum as minimum,
+        sign as sign,
+        sin as sin,
+        sinh as sinh,
+        sqrt as sqrt,
+        tan as tan,
+        tanh as tanh,
+        where as where,
+    )
+    from mbd.trajectory import Trajectory as Trajectory, load as load
+
+__version__ = "0.1.0"
+
+_HOMES = {
+    "mbd.assembly": "assemble",
+    "mbd.bodies": "Link PointMass RigidBody box cylinder disk rod segment sphere",
+    "mbd.constraints": "Bilateral Controller Event Penalty Plane Unilateral When "
+    "distance extension flexion height measure separation touchdown",
+    "mbd.equations.lagrangian": "Coordinate Lagrangian",
+    "mbd.errors": "AssemblyError CapabilityError MbdError ModelError SimulationError TraceError UnknownNameError",
+    "mbd.forces": "Applied Damper Motor Potential Samples Spring TorsionSpring",
+    "mbd.integrators": "HHT GeneralizedAlpha Newmark",
+    "mbd.joints": "Cylindrical Planar Prismatic Revolute Screw Translation Universal Weld",
+    "mbd.joints.losses": "Coulomb Dissipation Quadratic Tabulated Viscous",
+    "mbd.model": "Model on_slope",
+    "mbd.simulation": "simulate",
+    "mbd.state": "State",
+    "mbd.tape.functions": "acos asin atan atan2 cos cosh exp log maximum minimum sign sin sinh sqrt tan tanh where",
+    "mbd.trajectory": "Trajectory load",
+}
+"""The public names, by the module they live in; the block above tells the same to editors and type checkers."""
+
+_HOME = {name: module for module, names in _HOMES.items() for name in names.split()}
+
+__all__ = ["__version__", *_HOME]
+
+
+def __getattr__(name: str) -> Any:
+    """A public name, from its module (PEP 562)."""
+    if name in _HOME:
+        import importlib
+
+        value = globals()[name] = getattr(importlib.import_module(_HOME[name]), name)
+        return value
+    if name.startswith("__"):
+        raise AttributeError(f"module 'mbd' has no attribute {name!r}")
+    import difflib
+
+    close = difflib.get_close_matches(name, _HOME, n=3, cutoff=0.6)
+    guess = f"did you mean {' or '.join(repr(one) for one in close)}?" if close else f"it has {', '.join(_HOME)}"
+    raise AttributeError(f"mbd has no {name!r}; {guess}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_HOME})

@@ -1,0 +1,140 @@
+"""Steps of a walker, read from the events of a run.
+
+A step goes from one touchdown to the next of another foot; a foot is a contact that holds a place on the ground.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from mbd.results.record import EventRecord
+    from mbd.trajectory import Trajectory
+
+__all__ = ["Gait", "Step", "gait", "mirrored"]
+
+
+@dataclass(frozen=True)
+class Step:
+    """From one touchdown to the next.
+
+    time : of the touchdown that ends it [s]; foot : that touches down; period [s]; length : between the two places on
+    the ground [m]; loss : energy taken by all impacts of the step, its own touchdown included [J]
+    deviation : largest difference of the state just after this touchdown from the one before, sides exchanged
+    [rad, rad/s, m/s]: zero for a walk that repeats itself; NaN where there is nothing to compare with
+    """
+
+    time: float
+    foot: str
+    period: float
+    length: float
+    loss: float
+    deviation: float
+
+    @property
+    def speed(self) -> float:
+        """length/period [m/s]."""
+        return self.length / self.period
+
+
+@dataclass(frozen=True)
+class Gait:
+    """The steps of a run."""
+
+    steps: tuple[Step, ...]
+
+    def __len__(self) -> int:
+        return len(self.steps)
+
+    def __getitem__(self, number: int) -> Step:
+        return self.steps[number]
+
+    def __repr__(self) -> str:
+        return self.table()
+
+    def table(self, most: int = 24) -> str:
+        """The steps as lines of text; of a long walk the first and the last."""
+        titles = ("step", "time [s]", "period [s]", "length [m]", "speed [m/s]", "loss [J]", "deviation")
+        lines = ["".join(f"{title:>12}" for title in titles) + "  foot"]
+        shown = list(enumerate(self.steps, start=1))
+        hidden = len(shown) - most
+        for number, step in shown if hidden <= 0 else shown[: most // 2]:
+            lines.append(_line(number, step))
+        if hidden > 0:
+            lines.append(f"{'…':>12} {hidden} more")
+            lines += [_line(number, step) for number, step in shown[-(most - most // 2) :]]
+        return "\n".join(lines)
+
+    def as_json(self) -> list[dict[str, Any]]:
+        """One dictionary a step; None for what is not defined."""
+        return [
+            {
+                "time": step.time, "foot": step.foot, "period": step.period, "length": step.length,
+                "speed": step.speed, "loss": step.loss,
+                "deviation": step.deviation if np.isfinite(step.deviation) else None,
+            }
+            for step in self.steps
+        ]  # fmt: skip
+
+
+def _line(number: int, step: Step) -> str:
+    deviation = f"{step.deviation:.2e}" if np.isfinite(step.deviation) else "–"
+    values = f"{step.time:>12.5f}{step.period:>12.6f}{step.length:>12.6f}{step.speed:>12.5f}{step.loss:>12.5f}"
+    return f"{number:>12}{values}{deviation:>12}  {step.foot}"
+
+
+def gait(run: Trajectory) -> Gait:
+    """The steps of a walker; none for a mechanism without feet that alternate."""
+    feet = {contact.name: contact for contact in run.facts.contacts if contact.place}
+    strikes: list[EventRecord] = []
+    for event in run.events:
+        if event.kind == "closed" and event.name in feet and (not strikes or strikes[-1].name != event.name):
+            strikes.append(event)
+    if len(strikes) < 2:
+        return Gait(())
+    places = {event.row: run.columns.anchors[event.row, list(feet[event.name].place)] for event in strikes}
+    states = _states(run, [event.row for event in strikes])
+    pairs = mirrored(states.keys())
+    impacts = run.energy.work.get("impacts", np.zeros(len(run)))
+    steps = []
+    for number, (before, after) in enumerate(pairwise(strikes)):
+        lost = float(impacts[before.row] - impacts[after.row])
+        change = [abs(states[mine][number + 1] - states[other][number]) for mine, other in pairs]
+        length = float(np.linalg.norm(places[after.row] - places[before.row]))
+        deviation = max(change, default=float("nan"))
+        steps.append(Step(after.time, after.name, after.time - before.time, length, lost, deviation))
+    return Gait(tuple(steps))
+
+
+def _states(run: Trajectory, rows: Sequence[int]) -> dict[str, Any]:
+    """Angles and rates just after the touchdowns, by name; unsided lengths are left out, for a walker moves on."""
+    facts = run.facts
+    sided = {name for pair in mirrored(name for name, _ in facts.coordinates) for name in pair if _swap(name) != name}
+    found: dict[str, Any] = {}
+    for name, unit in facts.coordinates[: facts.coordinate_count]:
+        if name in sided or (unit == "rad" and sided):
+            found[name] = run[name][list(rows)]
+        if f"{name}.rate" in run:
+            found[f"{name}.rate"] = run[f"{name}.rate"][list(rows)]
+    return found
+
+
+def _swap(name: str) -> str:
+    """The name with left and right exchanged."""
+    exchange = {"left": "right", "right": "left"}
+    return " ".join(exchange.get(word, word) for word in name.split(" "))
+
+
+def mirrored(names: Any) -> list[tuple[str, str]]:
+    """(name, its mirror image) for every name whose mirror image is also one.
+
+    >>> mirrored(["left hip.angle", "right hip.angle", "trunk.x"])
+    [('left hip.angle', 'right hip.angle'), ('right hip.angle', 'left hip.angle'), ('trunk.x', 'trunk.x')]
+    """
+    known = list(names)
+    return [(name, _swap(name)) for name in known if _swap(name) in known]

@@ -1,0 +1,331 @@
+"""A consistent start: named values held, the rest completed, every conflict named."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mbd.arrays import Matrix, Vector
+from mbd.compile.mechanism import Mechanism, rate_names
+from mbd.equations.equations import Equations
+from mbd.errors import AssemblyError, UnknownNameError, nearest
+from mbd.kernel.active_set import ActiveSetManager
+from mbd.compile.mechanisms import mechanism_of
+from mbd.state import State
+
+__all__ = ["assemble"]
+
+TOLERANCE = 1e-9
+"""Largest row residual [m, rad, m/s, rad/s] of a start, relative to 1 or the speed, that counts as consistent."""
+BELOW = 1e-6
+"""Depth [m, rad] below which an open contact is told to start inside the ground."""
+LIFTED = 1e-8
+"""Height [m, rad] above which an open contact is armed from the start."""
+
+
+@dataclass
+class _Assembly:
+    mechanism: Mechanism
+    manager: ActiveSetManager
+    parameters: Vector
+    q: Vector
+    y: Vector
+    flags: Vector
+    anchors: Vector
+
+    @property
+    def equations(self) -> Equations:
+        return self.mechanism.equations
+
+
+def _places(values: Mapping[str, float], names: Mapping[str, int], kind: str) -> tuple[dict[int, float], list[str]]:
+    found: dict[int, float] = {}
+    faults = []
+    for name, value in values.items():
+        if name not in names:
+            faults.append(nearest(name, names, kind))
+        elif not np.isfinite(value):
+            faults.append(f"the {kind} {name!r} must be a finite number, not {value!r}")
+        else:
+            found[names[name]] = float(value)
+    return found, faults
+
+
+def assemble(
+    model: Any,
+    position: Mapping[str, float] | None = None,
+    velocity: Mapping[str, float] | None = None,
+    closed: Iterable[str] = (),
+    open: Iterable[str] = (),
+    parameters: Mapping[str, float] | None = None,
+    project: bool = False,
+    backend: str = "auto",
+) -> State:
+    """A consistent start of a model: named values held exactly, the rest completed.
+
+    Positions satisfy ``h(q, t₀) = 0`` of every active row; values that are not named move least from their defaults
+    in the metric of the mass matrix. Then velocities satisfy ``B v + h_t = 0``.
+
+    Parameters
+    ----------
+    model : a `Model` or `Lagrangian`
+    position : {'left hip.angle': 0.2} coordinates [m, rad], and first-order states
+    velocity : {'left hip.angle': −1.1} or {'left hip.rate': …} rates by coordinate or rate name [m/s, rad/s]
+    closed : names of contacts that start closed
+    open : names of contacts that start open even if they touch or lie below their surface; ignored until risen
+    parameters : values that differ from the model's, by name
+    project : move named values too, to the nearest consistent ones; `State.moved` tells how far
+    backend : see `mbd.simulate`
+
+    Returns
+    -------
+    State
+        with `moved`: how far each coordinate is from the value asked for, or from its default.
+
+    Raises
+    ------
+    UnknownNameError
+        for wrong names, with the nearest valid ones.
+    AssemblyError
+        if the named values contradict rows (both residuals of each are given), if nothing determines the motion of a
+        coordinate, if rows depend on each other, or if an open contact starts inside its surface.
+    ModelError
+        if the model itself has faults.
+    """
+    mechanism = mechanism_of(model, backend)
+    manager = ActiveSetManager(mechanism.equations)
+    position, velocity, changed = dict(position or {}), dict(velocity or {}), dict(parameters or {})
+    opened = (open,) if isinstance(open, str) else tuple(open)
+    closed = (closed,) if isinstance(closed, str) else tuple(closed)
+    equations = mechanism.equations
+    coordinates = {coordinate.name: k for k, coordinate in enumerate(equations.coordinates)}
+    states = {state.name: k + len(equations.velocity_names) for k, state in enumerate(equations.states)}
+    held_q, faults = _places({k: v for k, v in position.items() if k not in states}, coordinates, "coordinate")
+    held_v, more = _places(velocity, rate_names(equations), "rate")
+    faults += more
+    for name in [*closed, *opened]:
+        if name not in manager.names:
+            faults.append(nearest(name, manager.names, "contact"))
+    faults += [f"contact {name!r} is named both closed and open" for name in set(closed) & set(opened)]
+    if faults:
+        raise UnknownNameError(faults)
+    q = np.array([held_q.get(k, c.default) for k, c in enumerate(equations.coordinates)], dtype=float)
+    y = np.zeros(equations.n_v + equations.n_z)
+    for k, state in enumerate(equations.states):
+        y[equations.n_v + k] = float(position.get(state.name, state.default))
+    for k, value in held_v.items():
+        y[k] = value
+    work = _Assembly(
+        mechanism, manager, mechanism.parameters(changed), q, y, manager.flags(closed), np.zeros(mechanism.layout.n_anchors)
+    )
+    wanted_q, wanted_y = q.copy(), y.copy()
+    free_q = np.ones(len(q), bool) if project else np.array([k not in held_q for k in range(len(q))])
+    free_v = np.ones(equations.n_v, bool) if project else np.array([k not in held_v for k in range(equations.n_v)])
+    rows = _position_rows(work)
+    misfit = _close_positions(work, rows, free_q)
+    _capture(work)
+    speed_misfit = _close_velocities(work, free_v)
+    bad = _conflicts(work, rows, misfit, speed_misfit)
+    if bad:
+        raise AssemblyError(bad)
+    faults = _undetermined(work) + _below(work, set(opened))
+    if faults:
+        raise AssemblyError(faults)
+    moved = _moved(equations, work, wanted_q, wanted_y, held_q, held_v)
+    return State(
+        0.0, work.q, work.y[: equations.n_v].copy(), work.y[equations.n_v :].copy(), manager.mode(work.flags),
+        _armed(work, set(opened)), work.anchors, tuple(coordinates), equations.velocity_names, moved, dict(changed),
+    )  # fmt: skip
+
+
+def _position_rows(work: _Assembly) -> list[int]:
+    """Active rows that fix positions: bilateral ones and the gaps of closed contacts; anchors adapt to the position."""
+    normals = {contact.rows[0] for contact in work.manager.contacts if contact.rows}
+    rows = work.equations.rows
+    return [k for k in work.manager.active_rows(work.flags) if rows[k].contact < 0 or k in normals]
+
+
+def _involved(B: Matrix, free: Matrix) -> Any:
+    """The free coordinates that the rows act on; the others stay where they are."""
+    size = float(np.max(np.abs(B), initial=0.0))
+    return np.flatnonzero(free & (np.max(np.abs(B), axis=0, initial=0.0) > 1e-12 * size))
+
+
+def _weighted(M: Matrix) -> Matrix:
+    """The mass matrix made definite, so that coordinates without inertia move at almost no cost."""
+    size = float(np.max(np.abs(np.diag(M)), initial=0.0)) or 1.0
+    return np.asarray(M + 1e-9 * size * np.eye(len(M)))
+
+
+def _least_change(M: Matrix, B: Matrix, residual: Vector, pull: Vector) -> Vector:
+    """The change d with B d = −residual nearest to `pull` in the M-norm; least squares where rows depend."""
+    inverse = np.linalg.inv(_weighted(M))
+    flow = inverse @ B.T
+    multiplier = np.linalg.lstsq(B @ flow, residual + B @ pull, rcond=1e-12)[0]
+    return np.asarray(pull - flow @ multiplier)
+
+
+def _close_positions(work: _Assembly, rows: Sequence[int], free: Matrix) -> Vector:
+    """Newton on the free coordinates; the remaining residual of each row."""
+    if not rows:
+        return np.zeros(0)
+    n_v = work.equations.n_v
+    start, before, picked = work.q.copy(), np.inf, list(rows)
+    for iteration in range(200):
+        terms = work.mechanism.acceleration_terms(0.0, work.q, work.y, work.parameters, work.anchors)
+        h = terms.h[picked]
+        size = float(np.max(np.abs(h)))
+        places = _involved(terms.B[picked][:, :n_v], free)
+        if not np.isfinite(size) or not len(places):
+            return h
+        B = terms.B[np.ix_(picked, places)]
+        M = terms.M[:n_v, :n_v][np.ix_(places, places)]
+        near = size < 1e-3 or iteration > 20
+        pull = (start - work.q)[places] if near and iteration < 100 else np.zeros(len(places))
+        change = _least_change(M, B, h, pull)
+        limit = max(1.0, float(np.max(np.abs(change))) / 0.5)
+        if size < 1e-13 and float(np.max(np.abs(change))) < 1e-12:
+            return h
+        if iteration > 60 and size > 0.5 * before and size < 1e-12:
+            return h
+        before = size
+        x = np.zeros(n_v)
+        x[places] = change / limit
+        block = work.mechanism.block(0.0, work.q, work.y, work.anchors)
+        if work.mechanism.vector:
+            work.q = work.q + x
+        else:
+            block[work.mechanism.layout.x : work.mechanism.layout.v] = x
+            out = np.zeros(len(work.q))
+            work.mechanism.common["compose"](block, work.parameters, out)
+            work.q = out
+    terms = work.mechanism.acceleration_terms(0.0, work.q, work.y, work.parameters, work.anchors)
+    return np.asarray(terms.h[picked])
+
+
+def _capture(work: _Assembly) -> None:
+    terms = work.mechanism.acceleration_terms(0.0, work.q, work.y, work.parameters, work.anchors)
+    for contact, flag in zip(work.manager.contacts, work.flags, strict=True):
+        if flag:
+            for anchor in contact.anchors:
+                work.anchors[anchor] = terms.captured[anchor]
+
+
+def _close_velocities(work: _Assembly, free: Matrix) -> Vector:
+    """Complete the free velocities; the remaining rate of each active row."""
+    picked = list(work.manager.active_rows(work.flags))
+    if not picked:
+        return np.zeros(0)
+    n_v = work.equations.n_v
+    terms = work.mechanism.acceleration_terms(0.0, work.q, work.y, work.parameters, work.anchors)
+    places = _involved(terms.B[picked][:, :n_v], free)
+    if len(places):
+        B = terms.B[np.ix_(picked, places)]
+        M = terms.M[:n_v, :n_v][np.ix_(places, places)]
+        work.y[places] += _least_change(M, B, terms.rate[picked], np.zeros(len(places)))
+        terms = work.mechanism.acceleration_terms(0.0, work.q, work.y, work.parameters, work.anchors)
+    return np.asarray(terms.rate[picked])
+
+
+def _conflicts(work: _Assembly, rows: Sequence[int], misfit: Vector, speed_misfit: Vector) -> list[str]:
+    """Every row that the named values contradict, with both residuals."""
+    equations = work.equations
+    active = list(work.manager.active_rows(work.flags))
+    speed = 1.0 + float(np.max(np.abs(work.y[: equations.n_v]), initial=0.0))
+    h = dict(zip(rows, misfit, strict=True))
+    rate = dict(zip(active, speed_misfit, strict=True))
+    found = []
+    for k in active:
+        row = equations.rows[k]
+        position, velocity = float(h.get(k, 0.0)), float(rate[k])
+        if abs(position) > TOLERANCE or abs(velocity) > TOLERANCE * speed or not np.isfinite(position + velocity):
+            found.append(
+                f"the start contradicts {row.owner!r} ({row.part}): position residual {position:.6g} {row.unit}, velocity "
+                f"residual {velocity:.6g} {row.unit}/s; name fewer values, or assemble(..., project=True) to move them all"
+            )
+    return found
+
+
+def _undetermined(work: _Assembly) -> list[str]:
+    """Coordinates whose acceleration neither mass nor rows determine, and rows that depend on others."""
+    equations = work.equations
+    picked = list(work.manager.active_rows(work.flags))
+    terms = work.mechanism.acceleration_terms(0.0, work.q, work.y, work.parameters, work.anchors)
+    n, m = len(terms.f), len(picked)
+    matrix = np.block([[terms.M, terms.R[:, picked]], [terms.B[picked], np.zeros((m, m))]])
+    if not np.isfinite(matrix).all() or not np.isfinite(terms.f).all():
+        return ["a force, mass or constraint is not finite at the start; check the parameters and functions used"]
+    scale = np.sqrt(np.max(np.abs(matrix), axis=1))
+    scale[scale == 0.0] = 1.0
+    _, sizes, right = np.linalg.svd(matrix / np.outer(scale, scale))
+    faults = []
+    for direction in right[sizes < 1e-12 * max(sizes[0], 1e-300)]:
+        weights = np.abs(direction / scale)
+        place = int(np.argmax(weights))
+        if np.max(weights[:n], initial=0.0) > 1e-6 * weights[place]:
+            name = equations.velocity_names[int(np.argmax(weights[: equations.n_v]))].removesuffix(".rate")
+            faults.append(
+                f"nothing determines the motion of {name!r}: no mass or inertia resists it and no constraint holds it; "
+                "give the bodies it moves a mass, or lock it"
+            )
+        else:
+            rows = [equations.rows[picked[k]] for k in np.flatnonzero(weights[n:] > 1e-6 * weights[place])]
+            names = ", ".join(f"{row.owner!r} ({row.part})" for row in rows)
+            faults.append(f"redundant constraints: the rows {names} depend on each other; leave one of them out")
+    return faults
+
+
+def _gaps(work: _Assembly) -> Vector:
+    out = np.zeros(work.mechanism.sizes["guards"])
+    block = work.mechanism.block(0.0, work.q, work.y, work.anchors)
+    work.mechanism.common["guards"](block, work.parameters, out)
+    return out
+
+
+def _below(work: _Assembly, opened: set[str]) -> list[str]:
+    """Open contacts that start inside their surface without having been named open."""
+    faults = []
+    values, count = _gaps(work), len(work.manager.contacts)
+    for c, contact in enumerate(work.manager.contacts):
+        named_off = isinstance(contact.only_while, str) and contact.only_while not in work.manager.mode(work.flags)
+        off = named_off or (contact.only_while is not None and values[3 * count + c] <= 0.0)
+        if values[c] < -BELOW and not work.flags[c] and contact.name not in opened and not off:
+            faults.append(
+                f"{contact.name!r} starts {-values[c]:.6g} {contact.unit} inside its surface; raise the mechanism, name it "
+                f"in closed=[…] to set it on the surface, or in open=[…] to ignore it until it has risen"
+            )
+    return faults
+
+
+def _armed(work: _Assembly, opened: set[str]) -> frozenset[str]:
+    """Open contacts that may close from the start.
+
+    One that touches (|g| below 1e-8) and waits for another by `When` is a trailing foot: ignored until it has risen.
+    """
+    armed = set()
+    values = _gaps(work)
+    for c, contact in enumerate(work.manager.contacts):
+        lifted = values[c] > LIFTED
+        trailing = contact.opens_on == "when" or contact.name in opened
+        if not work.flags[c] and (lifted or (not trailing and values[c] > -BELOW)):
+            armed.add(contact.name)
+    return frozenset(armed)
+
+
+def _moved(
+    equations: Equations, work: _Assembly, q: Vector, y: Vector, held_q: Mapping[int, float], held_v: Mapping[int, float]
+) -> dict[str, float]:
+    """How far named values, and unnamed ones from their defaults, were moved."""
+    moved = {}
+    for k, coordinate in enumerate(equations.coordinates):
+        change = float(work.q[k] - q[k])
+        if change != 0.0 and (k in held_q or abs(change) > 1e-15):
+            moved[coordinate.name] = change
+    for k, name in enumerate(equations.velocity_names):
+        change = float(work.y[k] - y[k])
+        if change != 0.0 and (k in held_v or abs(change) > 1e-15):
+            moved[name] = change
+    return moved

@@ -1,0 +1,154 @@
+"""Bodies and the frames on them."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from mbd.bodies.algebra import IDENTITY, constant_rotation, product
+from mbd.bodies.mass import MassProperties
+from mbd.bodies.values import Vector3, number, triple, unit_vector
+from mbd.errors import ModelError, nearest
+from mbd.scope import Rotation, Scope, Triple
+from mbd.tape.node import Scalar
+
+__all__ = ["Body", "Frame", "Parameter"]
+
+Parameter = Callable[[str], Scalar]
+"""Gives the value of a field of a body, a number or a run-time input."""
+
+
+class Body(ABC):
+    """Something that moves as a whole, with named frames; a body's axes lie in its `origin` frame.
+
+    A new kind of body is a frozen dataclass with a `name`, its `fields`, its `landmarks` and its mass.
+    """
+
+    name: str
+
+    @abstractmethod
+    def fields(self) -> dict[str, float]:
+        """Its physical quantities by field: {'mass': 0.5, 'length': 0.4, …}; each is a run-time parameter."""
+
+    @abstractmethod
+    def landmarks(self, parameter: Parameter) -> dict[str, Triple]:
+        """Positions of its own frames in body axes [m], from its fields."""
+
+    @abstractmethod
+    def mass_properties(self, scope: Scope) -> MassProperties:
+        """Mass, centre and inertia as run-time scalars."""
+
+    def faults(self) -> list[str]:
+        """What is physically impossible about it, one sentence each."""
+        return []
+
+    def parameter(self, scope: Scope) -> Parameter:
+        """The run-time inputs of its fields."""
+        values = self.fields()
+        return lambda field: scope.parameter(self.name, field, values[field])
+
+    def parameters(self) -> dict[str, float]:
+        """Run-time parameters by full name: {'left thigh.mass': 0.5, …}."""
+        return {f"{self.name}.{field}": value for field, value in self.fields().items()}
+
+    @property
+    def frames(self) -> dict[str, Frame]:
+        """Its own frames by name."""
+        places = self.landmarks(self.fields().__getitem__)
+        return {name: Frame(self, name, triple(place, name), landmark=name) for name, place in places.items()}
+
+    def frame(self, name: str) -> Frame:
+        """One of its own frames: 'origin', 'center', …"""
+        frames = self.frames
+        if name not in frames:
+            raise ModelError(f"body '{self.name}': " + nearest(name, frames, "frame"))
+        return frames[name]
+
+    @property
+    def origin(self) -> Frame:
+        """The frame in which the body is described."""
+        return self.frame("origin")
+
+    @property
+    def center(self) -> Frame:
+        """The frame at the centre of mass."""
+        return self.frame("center")
+
+    def point(self, x: float, y: float, z: float = 0.0, name: str | None = None) -> Frame:
+        """A frame at a point of the body, parallel to its axes.
+
+        Its coordinates are run-time parameters 'body.name.x', …; without a name they make the name.
+
+        Parameters
+        ----------
+        x, y, z : place in body axes [m]
+        name : such as 'toe', by which results are asked for: 'left foot.toe.y'
+        """
+        offset = triple((x, y, z), f"a point of '{self.name}'")
+        if name is None:
+            name = f"point({offset[0]:.12g}, {offset[1]:.12g}, {offset[2]:.12g})"
+        elif name in self.frames:
+            raise ModelError(f"body '{self.name}' has a frame '{name}' already; give the point another name")
+        return Frame(self, name, offset)
+
+
+@dataclass(frozen=True, repr=False)
+class Frame:
+    """A place on a body, with axes.
+
+    Parameters
+    ----------
+    body : the body that carries it
+    name : its name on the body; `full_name` is 'left shank.end'
+    offset : its place in body axes as described [m]
+    rotation : its axes as columns in body axes; None where they are the body's
+    landmark : name of the body's own frame whose place it shares, None for a point with its own coordinates
+    """
+
+    body: Body
+    name: str
+    offset: Vector3 = (0.0, 0.0, 0.0)
+    rotation: tuple[Vector3, Vector3, Vector3] | None = None
+    landmark: str | None = None
+
+    def __repr__(self) -> str:
+        return f"<{self.full_name}>"
+
+    @property
+    def full_name(self) -> str:
+        """'left shank.end'."""
+        return f"{self.body.name}.{self.name}"
+
+    def placement(self, scope: Scope) -> tuple[Rotation, Triple]:
+        """R, p of the frame in body axes at the body's origin; lengths are run-time inputs, zeros fold."""
+        R: Rotation = IDENTITY if self.rotation is None else self.rotation
+        if self.landmark is not None:
+            return R, self.body.landmarks(self.body.parameter(scope))[self.landmark]
+        x, y, z = (scope.parameter(self.full_name, f, value) for f, value in zip("xyz", self.offset, strict=True))
+        return R, (x, y, z)
+
+    def parameters(self) -> dict[str, float]:
+        """Its own coordinates by full name; none for a landmark, which follows its body's fields."""
+        if self.landmark is not None:
+            return {}
+        return {f"{self.full_name}.{field}": value for field, value in zip("xyz", self.offset, strict=True)}
+
+    def turned(self, angle: float, axis: Any = (0.0, 0.0, 1.0), name: str | None = None) -> Frame:
+        """A frame at the same place with its axes turned about an axis of this frame.
+
+        Parameters
+        ----------
+        angle : right-handed about `axis` [rad]; fixed when the model is built
+        axis : direction in this frame; z by default
+        """
+        about = unit_vector(axis, f"axis of a frame turned from '{self.full_name}'")
+        turn = number(angle, f"angle of a frame turned from '{self.full_name}'")
+        R: Any = product(self.rotation or IDENTITY, constant_rotation(about, turn))
+        return Frame(self.body, name or f"{self.name} turned {turn:.12g}", self.offset, R, self.landmark)
+
+    @property
+    def is_planar(self) -> bool:
+        """Whether its z axis is the body's."""
+        return self.rotation is None or self.rotation[2] == (0.0, 0.0, 1.0)

@@ -1,0 +1,31 @@
+"""The ground: what everything is connected to in the end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from mbd.bodies.algebra import ZERO
+from mbd.bodies.base import Body, Parameter
+from mbd.bodies.mass import MassProperties
+from mbd.scope import Scope, Triple
+
+__all__ = ["Ground"]
+
+
+@dataclass(frozen=True)
+class Ground(Body):
+    """The frame that does not move: x forward, y up, z to the right of the walker."""
+
+    name: str = "ground"
+
+    def fields(self) -> dict[str, float]:
+        """None."""
+        return {}
+
+    def landmarks(self, parameter: Parameter) -> dict[str, Triple]:
+        """`origin`."""
+        return {"origin": ZERO}
+
+    def mass_properties(self, scope: Scope) -> MassProperties:
+        """Zero: the ground does not move, so its mass enters nowhere."""
+        return MassProperties()

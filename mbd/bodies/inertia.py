@@ -1,0 +1,115 @@
+"""Mass properties of simple solids and of the segments of a human body.
+
+Each helper gives a `Solid` (mass, center, inertia), from which bodies are made:
+``Link("rod", length=1.0, **rod(2.0, 1.0).link)``, ``RigidBody("box", **box(2.0, (1, 2, 3)).body)``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from mbd.bodies.values import Vector3, number, triple
+from mbd.errors import ModelError, nearest
+
+__all__ = ["SEGMENTS", "Solid", "box", "cylinder", "disk", "rod", "segment", "sphere"]
+
+
+@dataclass(frozen=True)
+class Solid:
+    """Mass m [kg], centre of mass [m], principal moments about the centre (Ixx, Iyy, Izz) [kg m²]."""
+
+    mass: float
+    center: Vector3
+    inertia: Vector3
+
+    @property
+    def link(self) -> dict[str, Any]:
+        """Arguments of `Link`: mass, center (metres below the start), inertia."""
+        return {"mass": self.mass, "center": -self.center[1] + 0.0, "inertia": self.inertia}
+
+    @property
+    def body(self) -> dict[str, Any]:
+        """Arguments of `RigidBody`: mass, inertia, center."""
+        return {"mass": self.mass, "inertia": self.inertia, "center": self.center}
+
+
+def rod(mass: float, length: float) -> Solid:
+    """A thin uniform rod along −y from its start: ``Izz = Ixx = m L²/12``, Iyy = 0.
+
+    >>> rod(3.0, 2.0)
+    Solid(mass=3.0, center=(0.0, -1.0, 0.0), inertia=(1.0, 0.0, 1.0))
+    """
+    m, L = number(mass, "mass of a rod"), number(length, "length of a rod")
+    across = m * L * L / 12.0
+    return Solid(m, (0.0, -L / 2.0, 0.0), (across, 0.0, across))
+
+
+def box(mass: float, sides: Any) -> Solid:
+    """A uniform box about its centre, sides (a, b, c) along x, y, z: ``Ixx = m (b² + c²)/12``, …"""
+    m, (a, b, c) = number(mass, "mass of a box"), triple(sides, "sides of a box")
+    x, y, z = m * a * a / 12.0, m * b * b / 12.0, m * c * c / 12.0
+    return Solid(m, (0.0, 0.0, 0.0), (y + z, x + z, x + y))
+
+
+def sphere(mass: float, radius: float) -> Solid:
+    """A uniform ball: ``I = 2 m r²/5``."""
+    m, r = number(mass, "mass of a sphere"), number(radius, "radius of a sphere")
+    moment = 0.4 * m * r * r
+    return Solid(m, (0.0, 0.0, 0.0), (moment, moment, moment))
+
+
+def cylinder(mass: float, radius: float, length: float, axis: str = "z") -> Solid:
+    """A uniform cylinder about its centre: ``m r²/2`` about its axis, ``m (3 r² + L²)/12`` across."""
+    m, r, L = number(mass, "mass of a cylinder"), number(radius, "its radius"), number(length, "its length")
+    if axis not in ("x", "y", "z"):
+        raise ModelError(f"the axis of a cylinder is 'x', 'y' or 'z', got {axis!r}")
+    along, across = m * r * r / 2.0, m * (3.0 * r * r + L * L) / 12.0
+    x, y, z = (along if axis == name else across for name in "xyz")
+    return Solid(m, (0.0, 0.0, 0.0), (x, y, z))
+
+
+def disk(mass: float, radius: float, axis: str = "z") -> Solid:
+    """A thin uniform disk about its centre: ``m r²/2`` about its axis, half of it across."""
+    return cylinder(mass, radius, 0.0, axis)
+
+
+SEGMENTS: dict[str, tuple[float, float, float]] = {
+    "hand": (0.006, 0.506, 0.297),
+    "forearm": (0.016, 0.430, 0.303),
+    "upper arm": (0.028, 0.436, 0.322),
+    "foot": (0.0145, 0.500, 0.475),
+    "shank": (0.0465, 0.433, 0.302),
+    "thigh": (0.100, 0.433, 0.323),
+    "foot and shank": (0.061, 0.606, 0.416),
+    "leg": (0.161, 0.447, 0.326),
+    "HAT": (0.678, 0.626, 0.496),
+}
+"""Mass over body mass; centre of mass from the proximal end and radius of gyration about it, over segment length.
+
+D. A. Winter, Biomechanics and Motor Control of Human Movement, 4th ed., Wiley 2009, table 4.1. Ends: thigh from
+greater trochanter to femoral condyles, shank to medial malleolus, foot from lateral malleolus to the head of
+metatarsal II, leg from greater trochanter to medial malleolus, HAT (head, arms, trunk) from greater trochanter to
+glenohumeral joint.
+"""
+
+
+def segment(name: str, body_mass: float, length: float) -> Solid:
+    """A segment of the human body as a link along −y from its proximal end.
+
+    ``m = c_m M``, centre ``c_c L`` from the proximal end, ``Izz = Ixx = m (c_r L)²``; the moment about the long axis is
+    left out of Winter's table and taken as zero, as for a rod.
+
+    Parameters
+    ----------
+    name : 'thigh', 'shank', 'foot', 'HAT', …: see `SEGMENTS`
+    body_mass : M of the whole person [kg]
+    length : of the segment [m]
+    """
+    if name not in SEGMENTS:
+        raise ModelError(nearest(name, SEGMENTS, "body segment").replace("The model has", "The table has"))
+    M, L = number(body_mass, "body mass"), number(length, f"length of '{name}'")
+    fraction, center, gyration = SEGMENTS[name]
+    m = fraction * M
+    across = m * (gyration * L) ** 2
+    return Solid(m, (0.0, -center * L, 0.0), (across, 0.0, across))

@@ -1,0 +1,90 @@
+"""A straight link, the bone of walkers and linkages."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from mbd.bodies.algebra import ZERO
+from mbd.bodies.base import Body, Frame, Parameter
+from mbd.bodies.mass import (
+    Inertia,
+    MassProperties,
+    inertia_faults,
+    inertia_fields,
+    inertia_matrix,
+    inertia_of,
+    mass_faults,
+)
+from mbd.bodies.values import name_of, number
+from mbd.scope import Scope, Triple
+
+__all__ = ["Link"]
+
+
+@dataclass(frozen=True, init=False)
+class Link(Body):
+    """A straight link that lies along −y of its own axes, so that at angle zero it hangs.
+
+    ``start = (0, 0, 0)``, ``end = (0, −length, 0)``, centre of mass ``(0, −center, 0)``.
+
+    Parameters
+    ----------
+    name : its name
+    mass : m [kg]
+    length : from start to end [m]
+    center : from the start to the centre of mass [m]; kept as `center_distance`, since `center` is the frame there
+    inertia : about the centre of mass [kg m²]: a number about z, or three or six as for `RigidBody`
+    """
+
+    name: str
+    mass: float
+    length: float
+    center_distance: float
+    inertia: Inertia
+
+    def __init__(self, name: str, mass: float, length: float, center: float, inertia: Any = 0.0) -> None:
+        put = object.__setattr__
+        put(self, "name", name_of(name, "Link"))
+        put(self, "mass", number(mass, f"mass of '{name}'"))
+        put(self, "length", number(length, f"length of '{name}'"))
+        put(self, "center_distance", number(center, f"center of '{name}'"))
+        put(self, "inertia", inertia_of(inertia, f"inertia of '{name}'"))
+
+    def fields(self) -> dict[str, float]:
+        """`mass`, `length`, `center`, `inertia` or `inertia.xx` …"""
+        return {
+            "mass": self.mass,
+            "length": self.length,
+            "center": self.center_distance,
+            **inertia_fields(self.inertia),
+        }
+
+    def landmarks(self, parameter: Parameter) -> dict[str, Triple]:
+        """`origin` and `start` at one end, `end` at the other, `center` between."""
+        end, center = -parameter("length"), -parameter("center")
+        return {"origin": ZERO, "start": ZERO, "end": (0.0, end, 0.0), "center": (0.0, center, 0.0)}
+
+    @property
+    def start(self) -> Frame:
+        """The frame at the upper end."""
+        return self.frame("start")
+
+    @property
+    def end(self) -> Frame:
+        """The frame at the lower end."""
+        return self.frame("end")
+
+    def mass_properties(self, scope: Scope) -> MassProperties:
+        """m, centre, I."""
+        parameter = self.parameter(scope)
+        return MassProperties(
+            parameter("mass"), self.landmarks(parameter)["center"], inertia_matrix(self.inertia, parameter)
+        )
+
+    def faults(self) -> list[str]:
+        """A negative mass or length, an impossible inertia."""
+        faults = mass_faults(self.name, self.mass) + inertia_faults(self.name, self.inertia, self.mass)
+        if self.length < 0.0:
+            faults.append(f"body '{self.name}': length {self.length:g} m is negative; turn the joint's frame instead")
+        return faults

@@ -1,0 +1,101 @@
+"""Mass, centre of mass and inertia, as scalars for the derivation and as numbers for the check."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from mbd.bodies.algebra import IDENTITY, ZERO
+from mbd.bodies.values import number, numbers
+from mbd.errors import ModelError
+from mbd.scope import Rotation, Triple
+from mbd.tape.node import Scalar
+
+__all__ = [
+    "Inertia", "MassProperties", "inertia_faults", "inertia_fields", "inertia_matrix", "inertia_of", "mass_faults",
+]  # fmt: skip
+
+Inertia: TypeAlias = float | tuple[float, ...]
+"""About the centre of mass in body axes [kg m²]: a number (about z), (Ixx, Iyy, Izz), or these and (Ixy, Ixz, Iyz)."""
+
+_ELEMENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
+
+
+@dataclass(frozen=True)
+class MassProperties:
+    """What a body weighs: mass m [kg], centre of mass [m], inertia matrix about the centre, body axes [kg m²]."""
+
+    mass: Scalar = 0.0
+    center: Triple = ZERO
+    inertia: Rotation = tuple(ZERO for _ in IDENTITY)  # type: ignore[assignment]
+
+
+def inertia_of(value: Any, what: str) -> Inertia:
+    """The inertia as users may give it, checked for its shape.
+
+    >>> inertia_of((1, 2, 3), "inertia")
+    (1.0, 2.0, 3.0)
+    """
+    if np.ndim(value) == 0:
+        return number(value, what)
+    result = numbers(value, what)
+    if len(result) not in (3, 6):
+        raise ModelError(
+            f"{what} must be a number (about z), (Ixx, Iyy, Izz) or (Ixx, Iyy, Izz, Ixy, Ixz, Iyz); "
+            f"got {len(result)} numbers"
+        )
+    return result
+
+
+def inertia_fields(inertia: Inertia) -> dict[str, float]:
+    """The run-time parameters of an inertia: 'inertia', or 'inertia.xx', 'inertia.yy', …"""
+    if isinstance(inertia, float):
+        return {"inertia": inertia}
+    return {f"inertia.{element}": value for element, value in zip(_ELEMENTS, inertia, strict=False)}
+
+
+def inertia_matrix(inertia: Inertia, parameter: Callable[[str], Scalar]) -> Rotation:
+    """The symmetric inertia matrix; Ixy, Ixz, Iyz are its elements (``Ixy = −∫ x y dm``)."""
+    if isinstance(inertia, float):
+        return ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, parameter("inertia")))
+    I = dict.fromkeys(_ELEMENTS, 0.0) | {  # noqa: E741
+        field.removeprefix("inertia."): parameter(field) for field in inertia_fields(inertia)
+    }
+    return ((I["xx"], I["xy"], I["xz"]), (I["xy"], I["yy"], I["yz"]), (I["xz"], I["yz"], I["zz"]))
+
+
+def inertia_faults(owner: str, inertia: Inertia, mass: float) -> list[str]:
+    """What no body can have: a negative moment, or principal moments that break the triangle inequality.
+
+    An inertia with exactly Ixx = Iyy = 0 is planar, meant for motion in x–y, and only its Izz is judged.
+    """
+    values = inertia_fields(inertia)
+    matrix = np.array(inertia_matrix(inertia, values.__getitem__), dtype=float)
+    largest = float(np.abs(matrix).max())
+    if matrix[0, 0] == 0.0 and matrix[1, 1] == 0.0 and not matrix[[0, 0, 1], [1, 2, 2]].any():
+        moments = np.array([matrix[2, 2]])
+    else:
+        moments = np.linalg.eigvalsh(matrix)
+    faults = []
+    if moments.min() < -1e-12 * largest:
+        faults.append(
+            f"body '{owner}': its inertia has the negative principal moment {moments.min():.6g} kg m²; "
+            "moments about the centre of mass are ≥ 0"
+        )
+    elif len(moments) == 3 and moments[2] > (moments[0] + moments[1]) * (1.0 + 1e-9):
+        a, b, c = moments
+        faults.append(
+            f"body '{owner}': principal moments {a:.6g}, {b:.6g}, {c:.6g} kg m² break the triangle inequality "
+            f"({c:.6g} > {a:.6g} + {b:.6g}); give moments about the centre, or a single number for planar motion"
+        )
+    if mass == 0.0 and largest > 0.0:
+        faults.append(f"body '{owner}': an inertia without a mass; give the mass, or inertia 0")
+    return faults
+
+
+def mass_faults(owner: str, mass: float) -> list[str]:
+    """The sentence about a negative mass."""
+    return [] if mass >= 0.0 else [f"body '{owner}': mass {mass:g} kg is negative; give a mass ≥ 0"]

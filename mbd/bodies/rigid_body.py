@@ -1,0 +1,68 @@
+"""A rigid body in space."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from mbd.bodies.algebra import ZERO
+from mbd.bodies.base import Body, Parameter
+from mbd.bodies.mass import (
+    Inertia,
+    MassProperties,
+    inertia_faults,
+    inertia_fields,
+    inertia_matrix,
+    inertia_of,
+    mass_faults,
+)
+from mbd.bodies.values import Vector3, name_of, number, triple
+from mbd.scope import Scope, Triple
+
+__all__ = ["RigidBody"]
+
+
+@dataclass(frozen=True, init=False)
+class RigidBody(Body):
+    """A rigid body, ``T = ½ m |v_c|² + ½ ωᵀ I ω`` with v_c the velocity of its centre of mass.
+
+    Parameters
+    ----------
+    name : its name
+    mass : m [kg]
+    inertia : I about the centre of mass in body axes [kg m²]: a number (about z, for planar motion),
+        (Ixx, Iyy, Izz), or (Ixx, Iyy, Izz, Ixy, Ixz, Iyz), the elements of the matrix
+    center : place of the centre of mass in body axes [m]; kept as `center_offset`, since `center` is the frame there
+    """
+
+    name: str
+    mass: float
+    inertia: Inertia
+    center_offset: Vector3
+
+    def __init__(self, name: str, mass: float, inertia: Any, center: Any = ZERO) -> None:
+        put = object.__setattr__
+        put(self, "name", name_of(name, "RigidBody"))
+        put(self, "mass", number(mass, f"mass of '{name}'"))
+        put(self, "inertia", inertia_of(inertia, f"inertia of '{name}'"))
+        put(self, "center_offset", triple(center, f"center of '{name}'"))
+
+    def fields(self) -> dict[str, float]:
+        """`mass`, `center.x` …, `inertia` or `inertia.xx` …"""
+        x, y, z = self.center_offset
+        return {"mass": self.mass, "center.x": x, "center.y": y, "center.z": z, **inertia_fields(self.inertia)}
+
+    def landmarks(self, parameter: Parameter) -> dict[str, Triple]:
+        """`origin` and `center`."""
+        return {"origin": ZERO, "center": (parameter("center.x"), parameter("center.y"), parameter("center.z"))}
+
+    def mass_properties(self, scope: Scope) -> MassProperties:
+        """m, centre, I."""
+        parameter = self.parameter(scope)
+        return MassProperties(
+            parameter("mass"), self.landmarks(parameter)["center"], inertia_matrix(self.inertia, parameter)
+        )
+
+    def faults(self) -> list[str]:
+        """A negative mass, an impossible inertia."""
+        return mass_faults(self.name, self.mass) + inertia_faults(self.name, self.inertia, self.mass)

@@ -1,0 +1,72 @@
+"""What users give, checked at the border: finite numbers, triples, axes, names."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Any, TypeAlias
+
+from mbd.errors import ModelError
+
+__all__ = ["Vector3", "name_of", "number", "numbers", "triple", "unit_vector"]
+
+Vector3: TypeAlias = tuple[float, float, float]
+"""Three plain numbers, known when the model is described."""
+
+
+def name_of(name: Any, what: str) -> str:
+    """A name: a non-empty string without a dot, because dots part names ('left knee.angle')."""
+    if not isinstance(name, str) or not name.strip():
+        raise ModelError(f"{what} needs a name as its first argument, such as {what}('left knee', …); got {name!r}")
+    if "." in name:
+        raise ModelError(f"{what} {name!r}: a name holds no dot, since dots part names as in 'left knee.angle'")
+    return name
+
+
+def number(value: Any, what: str) -> float:
+    """A finite float.
+
+    >>> number(2, "mass of 'rod'")
+    2.0
+    """
+    if isinstance(value, bool | str | bytes):
+        raise ModelError(f"{what} must be a number, got {value!r}")
+    try:
+        result = float(value)
+    except (TypeError, ValueError):
+        raise ModelError(f"{what} must be a number, got {value!r}") from None
+    if not math.isfinite(result):
+        raise ModelError(f"{what} must be finite, got {value!r}")
+    return result
+
+
+def numbers(values: Any, what: str) -> tuple[float, ...]:
+    """A tuple of finite floats."""
+    if isinstance(values, str) or not isinstance(values, Iterable):
+        raise ModelError(f"{what} must be a sequence of numbers, got {values!r}")
+    return tuple(number(value, what) for value in values)
+
+
+def triple(values: Any, what: str) -> Vector3:
+    """Three finite floats; two are taken as x and y.
+
+    >>> triple((1, 2), "offset")
+    (1.0, 2.0, 0.0)
+    """
+    result = numbers(values, what)
+    if len(result) not in (2, 3):
+        raise ModelError(f"{what} must have three components (or two, x and y), got {values!r}")
+    return (result[0], result[1], result[2] if len(result) == 3 else 0.0)
+
+
+def unit_vector(values: Any, what: str) -> Vector3:
+    """The direction of a triple; exact for axes along x, y, z.
+
+    >>> unit_vector((0, 0, -2), "axis")
+    (0.0, 0.0, -1.0)
+    """
+    x, y, z = triple(values, what)
+    size = math.hypot(x, y, z)
+    if size == 0.0:
+        raise ModelError(f"{what} must not be zero; give a direction such as (0, 0, 1)")
+    return (x / size + 0.0, y / size + 0.0, z / size + 0.0)

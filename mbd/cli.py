@@ -1,0 +1,291 @@
+"""The command line: ``mbd run kneed-walker``, ``mbd check my_model.py``, ``mbd examples``, ``mbd info``."""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import inspect
+import runpy
+import sys
+import time
+import traceback
+import webbrowser
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mbd.errors import MbdError, ModelError, SimulationError, UnknownNameError, nearest
+
+if TYPE_CHECKING:
+    from mbd.trajectory import Trajectory
+
+__all__ = ["Script", "examples", "find", "main"]
+
+Progress = Callable[[float, float], None]
+
+TOLD = (
+    MbdError, OSError, ArithmeticError, AssertionError, AttributeError, ImportError, LookupError, NameError,
+    RuntimeError, SyntaxError, TypeError, ValueError,
+)  # fmt: skip
+"""Errors of users' scripts that are told in a sentence; ``--debug`` shows where they came from."""
+
+OPTIONS = ("dt", "tol", "contact", "impact", "locate", "parameters", "store", "observers")
+"""Names that a script may define to pass them on to `simulate`."""
+
+
+# scripts and examples ---------------------------------------------------------------------------------------------
+
+
+def folder() -> Path:
+    """Where the examples are: inside an installed package, or beside it in a source checkout."""
+    package = Path(__file__).resolve().parent
+    inside = package / "examples"
+    return inside if inside.is_dir() else package.parent / "examples"
+
+
+def examples() -> dict[str, Path]:
+    """The packaged examples by name: 'kneed-walker' for kneed_walker.py."""
+    files = sorted(folder().glob("*.py")) if folder().is_dir() else []
+    return {file.stem.replace("_", "-"): file for file in files if not file.stem.startswith("_")}
+
+
+def find(name: str) -> Path:
+    """The file of a script, given as a path, or of an example, given by name."""
+    path = Path(name)
+    if path.is_file():
+        return path
+    if path.suffix == ".py" or len(path.parts) > 1:
+        raise FileNotFoundError(f"no script at '{name}'")
+    known = examples()
+    wanted = name.replace("_", "-")
+    if wanted not in known:
+        raise UnknownNameError(
+            nearest(name, known, "example").replace("The model has", "There are") + "; or give a file"
+        )
+    return known[wanted]
+
+
+@dataclass(frozen=True)
+class Script:
+    """A script that has been executed: either its `main`, or the names of a run."""
+
+    path: Path
+    names: dict[str, Any] = field(repr=False)
+
+    @classmethod
+    def load(cls, name: str) -> Script:
+        """Execute a script or example, but not what it keeps under ``if __name__ == "__main__"``."""
+        path = find(name)
+        sys.path.insert(0, str(path.resolve().parent))
+        try:
+            return cls(path, runpy.run_path(str(path), run_name="mbd_script"))
+        finally:
+            sys.path.pop(0)
+
+    def require(self, *wanted: str) -> None:
+        """All of these names, or an error that lists the missing ones."""
+        missing = [name for name in wanted if name not in self.names]
+        if missing:
+            has = "model, start, integrator, dt (or tol) and until, or a function main() that returns a run"
+            raise ModelError(f"{self.path.name} does not define {', '.join(missing)}; a script defines {has}")
+
+    def run(self, progress: Progress | None, changes: dict[str, Any]) -> Trajectory:
+        """Simulate what the script describes.
+
+        Parameters
+        ----------
+        progress : called with the simulated time and the end time [s]
+        changes : values that replace the script's own: dt, until
+        """
+        from mbd.trajectory import Trajectory
+
+        if "main" in self.names:
+            if changes:
+                raise ModelError(f"{self.path.name} has a main(), which chooses {', '.join(changes)} itself")
+            function = self.names["main"]
+            takes = "progress" in inspect.signature(function).parameters
+            run = function(progress=progress) if takes else function()
+            if not isinstance(run, Trajectory):
+                raise ModelError(
+                    f"main() of {self.path.name} must return the run of mbd.simulate, got {type(run).__name__}"
+                )
+            return run
+        self.require("model", "start", "integrator", *({"until"} - changes.keys()))
+        options = {name: self.names[name] for name in (*OPTIONS, "until") if name in self.names} | changes
+        if "dt" not in options and "tol" not in options:
+            self.require("dt")
+        from mbd import simulate
+
+        names = self.names
+        found: Trajectory = simulate(names["model"], names["start"], names["integrator"], progress=progress, **options)
+        return found
+
+
+# commands ---------------------------------------------------------------------------------------------------------
+
+
+@contextmanager
+def progress_bar() -> Iterator[Progress | None]:
+    """Simulated time and time left on a terminal, at most five times a second; nothing elsewhere."""
+    if not sys.stderr.isatty() or find_spec("tqdm") is None:
+        yield None
+        return
+    from tqdm import tqdm
+
+    shape = "{percentage:3.0f}% |{bar:30}| {n:.2f} of {total:.2f} s  [{elapsed} < {remaining}]"
+    with tqdm(bar_format=shape, mininterval=0.2, leave=False, file=sys.stderr) as bar:
+
+        def show(t: float, until: float) -> None:
+            if bar.total is None and until < float("inf"):
+                bar.reset(total=until)
+            bar.update(t - bar.n)
+
+        yield show
+
+
+def run_command(arguments: argparse.Namespace) -> int:
+    """``mbd run``: simulate, print a summary, write plots, page, run and record."""
+    began = time.perf_counter()
+    script = Script.load(arguments.script)
+    loaded = time.perf_counter()
+    changes = {name: value for name in ("dt", "until") if (value := getattr(arguments, name)) is not None}
+    failure: SimulationError | None = None
+    with progress_bar() as progress:
+        try:
+            run = script.run(progress, changes)
+        except SimulationError as error:
+            if error.run is None:
+                raise
+            run, failure = error.run, error
+    simulated = time.perf_counter()
+    name = script.path.stem.replace("_", "-")
+    out = Path(arguments.out) if arguments.out else Path("mbd-runs") / name
+    wall = {"load": loaded - began, "simulate": simulated - loaded, "total": simulated - began}
+    _tell(run, out, wall, arguments.open)
+    if failure is not None:
+        raise failure
+    return 0 if run.success else 1
+
+
+def _tell(run: Trajectory, out: Path, wall: dict[str, float], show: bool) -> None:
+    from mbd.analysis.gait import gait
+    from mbd.view.report import write
+
+    print(run)
+    steps = gait(run)
+    if len(steps):
+        print(f"\n{steps}")
+    print(f"\n{run.energy}")
+    print("\nwall time    " + ", ".join(f"{stage} {seconds:.3f} s" for stage, seconds in wall.items()))
+    plots = find_spec("matplotlib") is not None
+    if not plots:
+        print("no plots: matplotlib is not installed; try pip install 'mbd[plot]'")
+    paths = write(run, out, wall, plots)
+    print("wrote        " + "\n             ".join(str(path) for path in paths))
+    if show:
+        webbrowser.open((out / "page.html").resolve().as_uri())
+
+
+def check_command(arguments: argparse.Namespace) -> int:
+    """``mbd check``: every fault of a script's model."""
+    script = Script.load(arguments.script)
+    script.require("model")
+    model = script.names["model"]
+    faults = model.check()
+    for fault in faults:
+        print(f"- {fault}")
+    print(
+        f"{model!r}: {len(faults)} fault{'s' if len(faults) != 1 else ''}" if faults else f"{model!r}: no faults found"
+    )
+    return 1 if faults else 0
+
+
+def examples_command(arguments: argparse.Namespace) -> int:
+    """``mbd examples``: names and first lines."""
+    known = examples()
+    width = max(map(len, known), default=0)
+    for name, path in known.items():
+        text = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
+        print(f"{name:<{width}}  {text.partition(chr(10))[0]}")
+    print("run one with: mbd run NAME" if known else f"no examples in {folder()}")
+    return 0
+
+
+def info_command(arguments: argparse.Namespace) -> int:
+    """``mbd info``: versions, machine, backend and cache."""
+    from mbd.compile.backend import backend
+    from mbd.compile.cache import default_cache
+    from mbd.view.report import machine, versions
+
+    chosen = backend()
+    rows = {name: version or "not installed" for name, version in versions().items()}
+    rows |= {name: str(value) for name, value in machine().items()}
+    rows["backend"] = chosen.name + (f" ({chosen.note})" if chosen.note else "")
+    rows["code cache"] = str(default_cache().directory or "off")
+    rows["examples"] = f"{len(examples())} in {folder()}"
+    for name, value in rows.items():
+        print(f"{name:<14}{value}")
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    import mbd
+
+    parser = argparse.ArgumentParser(prog="mbd", description="Simulate multibody mechanisms described in Python.")
+    parser.add_argument("--version", action="version", version=f"mbd {mbd.__version__}")
+    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+
+    def command(name: str, function: Callable[[argparse.Namespace], int], text: str) -> argparse.ArgumentParser:
+        made = commands.add_parser(name, help=text, description=text)
+        made.add_argument("--debug", action="store_true", help="show the whole traceback of an error")
+        made.set_defaults(function=function)
+        return made
+
+    run = command("run", run_command, "simulate a script or an example; write plots, page, run file and record")
+    run.add_argument("script", metavar="SCRIPT-or-EXAMPLE", help="a Python file, or a name that 'mbd examples' lists")
+    run.add_argument("--out", metavar="DIR", help="folder for the results (default: mbd-runs/NAME)")
+    run.add_argument("--open", action="store_true", help="open the page in a browser")
+    run.add_argument("--dt", type=float, metavar="SECONDS", help="another step size than the script's")
+    run.add_argument("--until", type=float, metavar="SECONDS", help="another end time than the script's")
+    check = command("check", check_command, "report every fault of a script's model")
+    check.add_argument("script", metavar="SCRIPT-or-EXAMPLE", help="a Python file that defines model, or an example")
+    command("examples", examples_command, "list the examples")
+    command("info", info_command, "print versions, machine, backend and cache")
+    return parser
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run a command; returns the exit code: 0, or 1 after an error that was told."""
+    arguments = _parser().parse_args(argv)
+    try:
+        code: int = arguments.function(arguments)
+    except TOLD as error:
+        if arguments.debug:
+            raise
+        print(
+            f"error: {_where(error, getattr(arguments, 'script', ''))}{error or type(error).__name__}", file=sys.stderr
+        )
+        return 1
+    except KeyboardInterrupt:
+        print("stopped", file=sys.stderr)
+        return 130
+    return code
+
+
+def _where(error: BaseException, script: str) -> str:
+    """'line 12 of walker.py: KeyError: ' where an error of Python itself came from; '' for an error of mbd."""
+    if isinstance(error, MbdError | OSError) or not script:
+        return ""
+    if isinstance(error, SyntaxError):
+        return "SyntaxError: "
+    name = find(script).name
+    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if Path(frame.filename).name == name]
+    place = f"line {frames[-1].lineno} of {name}: " if frames else ""
+    return f"{place}{type(error).__name__}: "
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,120 @@
+"""Machine code or plain Python: the one place that decides."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib.util import find_spec
+from typing import Protocol
+
+from mbd.arrays import Vector
+from mbd.compile.cache import ObjectCache
+from mbd.compile.layout import Layout
+from mbd.compile.python import ScalarFunction
+from mbd.errors import CapabilityError, UnknownNameError, nearest
+from mbd.tape.node import Node
+
+__all__ = ["Backend", "Function", "Functions", "Twins", "backend", "make_functions"]
+
+
+class Function(Protocol):
+    """A program that can be called.
+
+    address : of its machine code, 0 if it is plain Python
+    size : number of outputs
+    """
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def address(self) -> int: ...
+    @property
+    def size(self) -> int: ...
+    def __call__(self, block: Vector, parameters: Vector, out: Vector) -> None: ...
+
+
+class Functions(Protocol):
+    """The functions of a model by name; more may be added at any time. They live as long as this does."""
+
+    def add(self, programs: Mapping[str, Sequence[Node]]) -> None: ...
+    def __getitem__(self, name: str) -> Function: ...
+    def __contains__(self, name: object) -> bool: ...
+    def __iter__(self) -> Iterator[str]: ...
+    def __len__(self) -> int: ...
+
+
+class Twins:
+    """`Functions` in plain Python."""
+
+    def __init__(self, layout: Layout) -> None:
+        self.layout = layout
+        self._functions: dict[str, ScalarFunction] = {}
+
+    def add(self, programs: Mapping[str, Sequence[Node]]) -> None:
+        for name, outputs in programs.items():
+            self._functions[name] = ScalarFunction(name, outputs, self.layout)
+
+    def __getitem__(self, name: str) -> ScalarFunction:
+        function = self._functions.get(name)
+        if function is None:
+            raise UnknownNameError(nearest(name, self._functions, "function"))
+        return function
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._functions
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._functions)
+
+    def __len__(self) -> int:
+        return len(self._functions)
+
+
+@dataclass(frozen=True)
+class Backend:
+    """A way of running programs.
+
+    name : 'llvm' or 'python'
+    note : why it was chosen, if that needs saying
+    """
+
+    name: str
+    note: str = ""
+    _create: Callable[[Layout], Functions] = field(default=Twins, repr=False)
+
+    def functions(self, layout: Layout) -> Functions:
+        """An empty collection of functions with this layout."""
+        return self._create(layout)
+
+
+def backend(kind: str = "auto", opt: int | None = None, cache: ObjectCache | None = None) -> Backend:
+    """The backend called 'llvm' or 'python'; 'auto' is machine code where llvmlite is installed.
+
+    Parameters
+    ----------
+    opt : optimization level of the machine code, see `mbd.compile.llvm`
+    cache : where object files are kept; that of the user by default
+    """
+    if kind == "python":
+        return Backend("python")
+    if kind not in ("llvm", "auto"):
+        raise UnknownNameError(nearest(kind, ("llvm", "python", "auto"), "backend"))
+    if find_spec("llvmlite") is None:
+        if kind == "llvm":
+            raise CapabilityError("backend 'llvm' needs the package llvmlite: pip install llvmlite, or use 'python'")
+        return Backend("python", "llvmlite is not installed: plain Python runs some 250 times slower than machine code")
+    try:
+        from mbd.compile import llvm
+    except (ImportError, OSError) as error:
+        if kind == "llvm":
+            raise CapabilityError(f"llvmlite is installed but does not load ({error}); use backend 'python'") from error
+        return Backend("python", f"llvmlite is installed but does not load ({error}): plain Python runs instead")
+    level = llvm.OPT if opt is None else opt
+    return Backend("llvm", "", lambda layout: llvm.Library(layout, level, cache))
+
+
+def make_functions(programs: Mapping[str, Sequence[Node]], layout: Layout, kind: str = "auto") -> Functions:
+    """The functions of some programs in the backend of that kind."""
+    functions = backend(kind).functions(layout)
+    functions.add(programs)
+    return functions

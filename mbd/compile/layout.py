@@ -1,0 +1,88 @@
+"""Where every input of a compiled function lies.
+
+Every compiled function has one signature, ``f(block, parameters, out)``, three arrays of float64:
+
+block       ``[t, c_C, c_K | q | x | v, z | a, ż | λ | anchors | switches]``
+parameters  ``[p | tables]``
+out         whatever the program lists
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from mbd.equations.equations import Equations
+
+__all__ = ["Layout"]
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Offsets into the block; (v, z) and (a, ż) stand together, as the integrators treat them alike."""
+
+    n_q: int
+    n_v: int
+    n_z: int
+    n_rows: int
+    n_anchors: int
+    n_contacts: int
+    n_parameters: int
+    table_offsets: tuple[int, ...] = ()
+
+    @classmethod
+    def of(cls, equations: Equations) -> Layout:
+        """The layout of a set of equations, tables behind the parameters."""
+        offset, offsets = len(equations.parameters), []
+        for table in equations.tables:
+            offsets.append(offset)
+            offset += 5 * len(table.breaks)
+        anchors = sum(len(contact.anchors) for contact in equations.contacts)
+        return cls(
+            equations.n_q, equations.n_v, equations.n_z, len(equations.rows), anchors, len(equations.contacts),
+            len(equations.parameters), tuple(offsets),
+        )  # fmt: skip
+
+    @property
+    def n(self) -> int:
+        """Number of rates: n_v + n_z."""
+        return self.n_v + self.n_z
+
+    @property
+    def q(self) -> int:
+        return 3
+
+    @property
+    def x(self) -> int:
+        return 3 + self.n_q
+
+    @property
+    def v(self) -> int:
+        return self.x + self.n_v
+
+    @property
+    def a(self) -> int:
+        return self.v + self.n
+
+    @property
+    def lam(self) -> int:
+        return self.a + self.n
+
+    @property
+    def anchor(self) -> int:
+        return self.lam + self.n_rows
+
+    @property
+    def switch(self) -> int:
+        return self.anchor + self.n_anchors
+
+    @property
+    def size(self) -> int:
+        return self.switch + self.n_contacts
+
+    def place(self, kind: str, index: int) -> int:
+        """Offset of an input in the block."""
+        starts = {
+            "t": 0, "c": 1, "q": self.q, "x": self.x, "v": self.v, "z": self.v + self.n_v, "a": self.a,
+            "s": self.a + self.n_v, "lam": self.lam, "anchor": self.anchor, "switch": self.switch,
+        }  # fmt: skip
+        return starts[kind] + index

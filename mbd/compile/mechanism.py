@@ -1,0 +1,168 @@
+"""A mechanism as callable numbers: the compiled programs of its equations, made when they are needed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from mbd.arrays import Vector
+from mbd.compile.backend import Backend, Functions
+from mbd.compile.backend import backend as choose_backend
+from mbd.compile.layout import Layout
+from mbd.equations import programs
+from mbd.equations.equations import Equations
+from mbd.errors import UnknownNameError, nearest
+
+__all__ = ["AccelerationTerms", "Mechanism", "ModeCode", "rate_names"]
+
+
+@dataclass(frozen=True)
+class ModeCode:
+    """Code of one contact mode: Newton tangent with residual, and residual alone."""
+
+    rows: tuple[int, ...]
+    penalties: tuple[int, ...]
+    tangent: Any
+    residual: Any
+
+
+@dataclass(frozen=True)
+class AccelerationTerms:
+    """The parts of ``M a + f + R λ = 0``, ``h``, ``ḣ``, ``ḧ = B a + bias`` over all rows, and what closing contacts hold.
+
+    M (n, n), f (n,), R (n, n_rows), B (n_rows, n), h, rate, bias (n_rows,), captured (n_anchors,), kinetic [J].
+    """
+
+    M: Vector
+    f: Vector
+    R: Vector
+    B: Vector
+    h: Vector
+    rate: Vector
+    bias: Vector
+    captured: Vector
+    kinetic: float
+
+
+class Mechanism:
+    """The programs of a set of equations in one backend.
+
+    Common programs (accelerations, guards, magnitudes) are made at once; those of a contact mode
+    the first time that mode occurs. Parameters stay run-time inputs.
+    """
+
+    def __init__(self, equations: Equations, backend: str = "auto") -> None:
+        started = perf_counter()
+        self.equations = equations
+        self.backend: Backend = choose_backend(backend)
+        common = {
+            "accelerations": programs.accelerations(equations),
+            "guards": programs.guards(equations),
+            "scales": programs.scales(equations),
+        }
+        composed = programs.compose(equations)
+        if composed is not None:
+            common["compose"] = composed
+        self.layout = Layout.of(equations)
+        self.common: Functions = self.backend.functions(self.layout)
+        self.common.add(common)
+        self.vector = composed is None
+        self.named: dict[str, Any] = {}
+        self._modes: dict[tuple[tuple[int, ...], tuple[int, ...], bool], ModeCode] = {}
+        self.seconds = perf_counter() - started
+
+    def mode(self, rows: Sequence[int], penalties: Sequence[int], stabilized: bool) -> ModeCode:
+        """Code of the mode with these rows and penalty contacts, made on first use."""
+        key = (tuple(rows), tuple(penalties), stabilized)
+        if key not in self._modes:
+            started = perf_counter()
+            tangent, residual = f"tangent_{len(self._modes)}", f"residual_{len(self._modes)}"
+            self.common.add(
+                {
+                    tangent: programs.newton(self.equations, rows, penalties, stabilized),
+                    residual: programs.residual(self.equations, rows, penalties, stabilized),
+                }
+            )
+            self._modes[key] = ModeCode(key[0], key[1], self.common[tangent], self.common[residual])
+            self.seconds += perf_counter() - started
+        return self._modes[key]
+
+    @property
+    def modes(self) -> int:
+        """How many contact modes have code."""
+        return len(self._modes)
+
+    def parameters(self, values: Mapping[str, float] | None = None) -> Vector:
+        """The parameter vector, with some values replaced by name; tables follow.
+
+        Raises
+        ------
+        UnknownNameError
+            for a name that is not a run-time parameter, with the nearest one.
+        """
+        names = [parameter.name for parameter in self.equations.parameters]
+        p = [parameter.value for parameter in self.equations.parameters]
+        for name, value in (values or {}).items():
+            if name not in names:
+                raise UnknownNameError(nearest(name, names, "run-time parameter"))
+            p[names.index(name)] = float(value)
+        for table in self.equations.tables:
+            p += table.flat
+        return np.array(p, dtype=float)
+
+    def block(self, t: float, q: Vector, y: Vector, anchors: Vector, penalties: Sequence[int] = ()) -> Vector:
+        """The block of inputs at a state, without accelerations and multipliers."""
+        layout = self.layout
+        block = np.zeros(layout.size)
+        block[0] = t
+        block[layout.q : layout.x] = q
+        block[layout.v : layout.a] = y
+        if len(anchors):
+            block[layout.anchor : layout.switch] = anchors
+        for contact in penalties:
+            block[layout.switch + contact] = 1.0
+        return block
+
+    def acceleration_terms(
+        self, t: float, q: Vector, y: Vector, parameters: Vector, anchors: Vector, penalties: Sequence[int] = ()
+    ) -> AccelerationTerms:
+        """M, f, R, B, h, ḣ, bias at a state."""
+        layout = self.layout
+        n, rows = layout.n, layout.n_rows
+        out = np.zeros(self.sizes["accelerations"])
+        self.common["accelerations"](self.block(t, q, y, anchors, penalties), parameters, out)
+        cuts = np.cumsum([n * n, n, n * rows, rows * n, rows, rows, rows, layout.n_anchors])
+        M, f, R, B, h, rate, bias, captured, kinetic = np.split(out, cuts)
+        return AccelerationTerms(
+            M.reshape(n, n), f, R.reshape(n, rows), B.reshape(rows, n), h, rate, bias, captured, float(kinetic[0])
+        )
+
+    @property
+    def sizes(self) -> dict[str, int]:
+        """Length of the output of each common program."""
+        layout = self.layout
+        n, rows = layout.n, layout.n_rows
+        return {
+            "accelerations": n * n + n + 2 * n * rows + 3 * rows + layout.n_anchors + 1,
+            "guards": 4 * layout.n_contacts + 2 * len(self.equations.guards),
+            "scales": n + 2 * rows,
+            "compose": layout.n_q,
+        }
+
+
+def rate_names(equations: Equations) -> dict[str, int]:
+    """Every spelling of a velocity: 'left hip.angle.rate' and, for a joint of one coordinate, 'left hip.rate'."""
+    names = {name: k for k, name in enumerate(equations.velocity_names)}
+    owners: dict[str, list[int]] = {}
+    for name, k in list(names.items()):
+        base = name.removesuffix(".rate")
+        names.setdefault(base, k)
+        owners.setdefault(base.rpartition(".")[0], []).append(k)
+    for owner, places in owners.items():
+        if owner and len(places) == 1:
+            names.setdefault(f"{owner}.rate", places[0])
+    return names

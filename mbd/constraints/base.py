@@ -1,0 +1,92 @@
+"""The promises of measures (where) and constraints (what law)."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+
+from mbd.forces.quantities import Mention
+from mbd.scope import Scope
+from mbd.tape.node import Scalar
+
+__all__ = ["Constraint", "Measure"]
+
+
+class Measure(ABC):
+    """Where: a signed distance or angle g of the posture, with ``g ≥ 0`` open where it serves a contact.
+
+    A new measure is a frozen dataclass; it knows the geometry and nothing of laws or of when they act.
+    """
+
+    @abstractmethod
+    def gap(self, scope: Scope) -> Scalar:
+        """g [unit], scaled so that ``|∇g| = 1`` at contact where it is a distance."""
+
+    @property
+    @abstractmethod
+    def unit(self) -> str:
+        """'m' or 'rad'."""
+
+    @abstractmethod
+    def mentions(self) -> list[Mention]:
+        """The frames, joints and named quantities it refers to."""
+
+    def captured(self, scope: Scope) -> Sequence[Scalar]:
+        """Quantities whose values are held from the instant of closing, the anchors; by default none."""
+        return ()
+
+    def tangents(self, scope: Scope, anchors: Sequence[Scalar]) -> Sequence[tuple[str, Scalar]]:
+        """(part, residual) of the rows that hold a sticking contact; zero at the anchors. None without a tangent.
+
+        Parameters
+        ----------
+        anchors : one for each of `captured`
+        """
+        return ()
+
+    @property
+    def has_tangents(self) -> bool:
+        """Whether it can stick."""
+        return False
+
+    @property
+    def title(self) -> str:
+        """What it measures, in a word: 'distance'."""
+        return type(self).__name__.lower()
+
+    @property
+    def reaction(self) -> str:
+        """What its multiplier is called in results: 'force', or 'tension'."""
+        return "force"
+
+    def faults(self, owner: str) -> list[str]:
+        """What is geometrically impossible about it, one sentence each."""
+        return []
+
+
+class Constraint(ABC):
+    """A law on a measure; a new constraint is a frozen dataclass with a `name`."""
+
+    name: str
+
+    @property
+    @abstractmethod
+    def kind(self) -> str:
+        """'bilateral', 'unilateral', 'penalty' or 'event'."""
+
+    @abstractmethod
+    def mentions(self) -> list[Mention]:
+        """The frames, joints and named quantities it refers to."""
+
+    @property
+    def others(self) -> tuple[str, ...]:
+        """Names of the other constraints it refers to."""
+        return ()
+
+    def parameters(self) -> dict[str, float]:
+        """Run-time parameters by full name."""
+        return {}
+
+    def faults(self) -> list[str]:
+        """What is physically impossible about it, one sentence each."""
+        return []

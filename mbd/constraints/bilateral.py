@@ -1,0 +1,73 @@
+"""A constraint that always acts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from mbd.bodies.values import name_of
+from mbd.constraints.base import Constraint, Measure
+from mbd.constraints.measures import JointMeasure
+from mbd.errors import ModelError
+from mbd.forces.base import joint_of
+from mbd.forces.quantities import Mention, arguments_of, mentioned, quantity_of, scalar, value_parameters
+from mbd.joints.base import Joint
+from mbd.scope import Scope
+from mbd.tape.node import Scalar
+
+__all__ = ["Bilateral"]
+
+
+@dataclass(frozen=True)
+class Bilateral(Constraint):
+    """``h = g(q, t) − value(t) = 0`` at all times: a rod, a slot, a prescribed motion.
+
+    Parameters
+    ----------
+    name : its name
+    subject : a measure, or a joint whose one coordinate is prescribed
+    value : a number (the run-time parameter 'name.value'), a function, a sympy expression or `Samples`
+    arguments : what a function is called with, in order; the time by default
+    """
+
+    name: str
+    subject: Any
+    value: Any = 0.0
+    arguments: Any = ("t",)
+
+    def __post_init__(self) -> None:
+        name_of(self.name, "Bilateral")
+        if isinstance(self.subject, Joint):
+            joint_of(self.subject, f"joint of Bilateral '{self.name}'")
+        elif not isinstance(self.subject, Measure):
+            raise ModelError(
+                f"Bilateral '{self.name}' needs a joint or a measure such as mbd.distance(a, b), got {self.subject!r}"
+            )
+        object.__setattr__(self, "value", quantity_of(self.value, f"value of '{self.name}'"))
+        object.__setattr__(self, "arguments", arguments_of(self.arguments, f"Bilateral '{self.name}'"))
+
+    @property
+    def measure(self) -> Measure:
+        """The measure it holds."""
+        return JointMeasure(self.subject) if isinstance(self.subject, Joint) else self.subject
+
+    @property
+    def kind(self) -> str:
+        """'bilateral'."""
+        return "bilateral"
+
+    def residual(self, scope: Scope) -> Scalar:
+        """h = g − value [m or rad]."""
+        return self.measure.gap(scope) - scalar(self.value, self.arguments, scope, self.name, "value")
+
+    def mentions(self) -> list[Mention]:
+        """What its measure and its value depend on."""
+        return [*self.measure.mentions(), *mentioned(self.arguments)]
+
+    def parameters(self) -> dict[str, float]:
+        """`value` where it is a number, and arguments given as numbers."""
+        return value_parameters(self.value, self.arguments, self.name, "value")
+
+    def faults(self) -> list[str]:
+        """Those of its measure."""
+        return self.measure.faults(self.name)

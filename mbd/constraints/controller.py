@@ -1,0 +1,56 @@
+"""Decisions in plain Python at sample instants and events."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from mbd.bodies.values import name_of, number
+from mbd.errors import ModelError
+
+__all__ = ["Controller"]
+
+Update = Callable[[float, Mapping[str, float], Any], Any]
+"""``update(time, values, state)`` → the parameters to write {name: value}, or (that, next state)."""
+
+
+@dataclass(frozen=True)
+class Controller:
+    """A function that is called at sample instants and events, and writes parameters: the state machine of a knee.
+
+    Its instants are step boundaries. It keeps nothing itself: its state travels through its arguments.
+
+    Parameters
+    ----------
+    name : its name
+    update : ``update(time, values, state)`` gives the parameters to write {name: value}, or (that, next state)
+    period : time between samples [s]; None for events only
+    on : names of contacts and events at which it is called
+    reads : names of the quantities in `values`
+    writes : names of the parameters that it may write
+    state : what the first call receives
+    """
+
+    name: str
+    update: Update
+    period: float | None = None
+    on: tuple[str, ...] = ()
+    reads: tuple[str, ...] = ()
+    writes: tuple[str, ...] = ()
+    state: Any = field(default=None, hash=False)
+
+    def __post_init__(self) -> None:
+        name_of(self.name, "Controller")
+        put = object.__setattr__
+        for names in ("on", "reads", "writes"):
+            value = getattr(self, names)
+            put(self, names, (value,) if isinstance(value, str) else tuple(value))
+        if not callable(self.update):
+            raise ModelError(f"Controller '{self.name}' needs update(time, values, state), got {self.update!r}")
+        if self.period is not None:
+            put(self, "period", number(self.period, f"period of '{self.name}'"))
+            if self.period <= 0.0:
+                raise ModelError(f"period of Controller '{self.name}' must be positive, got {self.period:g}")
+        elif not self.on:
+            raise ModelError(f"Controller '{self.name}' is never called: give a period or on=('left foot', …)")

@@ -1,0 +1,56 @@
+"""A user's own event."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from mbd.bodies.values import name_of
+from mbd.constraints.base import Constraint, Measure
+from mbd.constraints.unilateral import measure_of
+from mbd.errors import ModelError
+from mbd.forces.quantities import Mention
+
+__all__ = ["Event"]
+
+
+@dataclass(frozen=True)
+class Event(Constraint):
+    """Something that happens as a measure crosses zero.
+
+    Parameters
+    ----------
+    name : its name, under which it stands in the run
+    guard : the measure
+    reset : named values to set, {'hip.rate': 0.0}, or a function that makes them from named values; None for no change
+    terminal : whether the run ends there
+    direction : −1 as the guard falls through zero, +1 as it rises, 0 both
+    """
+
+    name: str
+    guard: Measure
+    reset: Any = field(default=None, hash=False)
+    terminal: bool = False
+    direction: int = 0
+
+    def __post_init__(self) -> None:
+        name_of(self.name, "Event")
+        measure_of(self.guard, f"Event '{self.name}'")
+        if not (self.reset is None or isinstance(self.reset, Mapping) or callable(self.reset)):
+            raise ModelError(f"reset of Event '{self.name}' maps names to values, got {self.reset!r}")
+        if self.direction not in (-1, 0, 1):
+            raise ModelError(f"direction of Event '{self.name}' is -1, 0 or 1, got {self.direction!r}")
+
+    @property
+    def kind(self) -> str:
+        """'event'."""
+        return "event"
+
+    def mentions(self) -> list[Mention]:
+        """What its guard depends on, and the names that it resets."""
+        return [*self.guard.mentions(), *(self.reset if isinstance(self.reset, Mapping) else ())]
+
+    def faults(self) -> list[str]:
+        """Those of its guard."""
+        return self.guard.faults(self.name)

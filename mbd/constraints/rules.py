@@ -1,0 +1,50 @@
+"""When a constraint acts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from mbd.constraints.base import Measure
+from mbd.errors import ModelError
+
+__all__ = ["When", "condition_of", "releases_of"]
+
+
+@dataclass(frozen=True)
+class When:
+    """As another contact closes, this one opens; this replaces opening on pull.
+
+    Parameters
+    ----------
+    other : name of the other contact
+    after_impact : False: it opens before the impact of the other and takes no impulse from it (McGeer's rule);
+        True: it stays shut through the impact and opens after it
+    """
+
+    other: str
+    after_impact: bool = False
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.other, str):
+            raise ModelError(f"When needs the name of another contact, such as When('right foot'), got {self.other!r}")
+
+
+def releases_of(value: Any, what: str) -> tuple[When, ...]:
+    """The `release=` of a contact: None, one `When`, or several."""
+    several = () if value is None else (value,) if isinstance(value, When) else value
+    if isinstance(several, str) or not isinstance(several, Iterable):
+        raise ModelError(f"release of '{what}' is mbd.When('name of another contact'), got {value!r}")
+    result = tuple(several)
+    for rule in result:
+        if not isinstance(rule, When):
+            raise ModelError(f"release of '{what}' is mbd.When('name of another contact'), got {rule!r}")
+    return result
+
+
+def condition_of(value: Any, what: str) -> str | Measure | None:
+    """The `only_while=` of a contact: a name, a measure that must be positive, or None."""
+    if value is None or isinstance(value, str | Measure):
+        return value
+    raise ModelError(f"only_while of '{what}' is the name of a contact, or a measure, got {value!r}")

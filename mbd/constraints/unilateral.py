@@ -1,0 +1,104 @@
+"""A contact by Lagrange multipliers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from mbd.bodies.values import name_of, number
+from mbd.constraints.base import Constraint, Measure
+from mbd.constraints.rules import When, condition_of, releases_of
+from mbd.errors import CapabilityError, ModelError
+from mbd.forces.quantities import Mention
+
+__all__ = ["Unilateral"]
+
+
+@dataclass(frozen=True)
+class Unilateral(Constraint):
+    """``0 ≤ g ⟂ p ≥ 0``: a foot on the ground, a locking knee.
+
+    While it is closed ``g = 0`` and p = −λ pushes; it closes with an impact ``γ⁺ = −e γ⁻`` and opens when p would pull,
+    or by its release rule.
+
+    Parameters
+    ----------
+    name : its name
+    measure : where
+    restitution : e of Newton's law, 0 (plastic) to 1
+    friction : None: it sticks where the measure has tangents; 0: it slides freely
+    release : `When` another contact closes (or several of them), instead of on pull
+    only_while : name of a contact that must be closed, or a measure that must be positive, for this one to be watched
+    """
+
+    name: str
+    measure: Measure
+    restitution: float = 0.0
+    friction: float | None = None
+    release: When | tuple[When, ...] | None = None
+    only_while: str | Measure | None = None
+
+    def __post_init__(self) -> None:
+        name_of(self.name, "Unilateral")
+        measure_of(self.measure, f"Unilateral '{self.name}'")
+        put = object.__setattr__
+        put(self, "restitution", number(self.restitution, f"restitution of '{self.name}'"))
+        if self.friction is not None:
+            put(self, "friction", number(self.friction, f"friction of '{self.name}'"))
+            if self.friction > 0.0:
+                raise CapabilityError(
+                    f"Unilateral '{self.name}': sliding with a friction coefficient ({self.friction:g}) is not solved "
+                    "by this version; use friction=None (it sticks) or friction=0 (it slides freely)"
+                )
+        put(self, "release", releases_of(self.release, self.name) or None)
+        put(self, "only_while", condition_of(self.only_while, self.name))
+
+    @property
+    def kind(self) -> str:
+        """'unilateral'."""
+        return "unilateral"
+
+    @property
+    def releases(self) -> tuple[When, ...]:
+        """The rules that open it; empty where it opens on pull."""
+        return releases_of(self.release, self.name)
+
+    @property
+    def opens_on(self) -> str:
+        """'pull' or 'when'."""
+        return "when" if self.release else "pull"
+
+    @property
+    def sticks(self) -> bool:
+        """Whether tangent rows hold it while it is closed."""
+        return self.friction is None and self.measure.has_tangents
+
+    @property
+    def others(self) -> tuple[str, ...]:
+        """The contacts of its rules."""
+        names = [rule.other for rule in self.releases]
+        return (*names, self.only_while) if isinstance(self.only_while, str) else tuple(names)
+
+    def mentions(self) -> list[Mention]:
+        """What its measures depend on."""
+        condition = self.only_while.mentions() if isinstance(self.only_while, Measure) else []
+        return [*self.measure.mentions(), *condition]
+
+    def faults(self) -> list[str]:
+        """An impossible restitution or friction, a rule that names itself."""
+        faults = self.measure.faults(self.name)
+        if not 0.0 <= self.restitution <= 1.0:
+            faults.append(f"'{self.name}': restitution {self.restitution:g} is not between 0 and 1")
+        if self.friction is not None and self.friction < 0.0:
+            faults.append(f"'{self.name}': friction {self.friction:g} is negative; give 0, or None to stick")
+        if any(rule.other == self.name for rule in self.releases):
+            faults.append(f"'{self.name}': release=When('{self.name}') names itself; name the contact that opens it")
+        if self.only_while == self.name:
+            faults.append(f"'{self.name}': only_while='{self.name}' names itself; name another contact")
+        return faults
+
+
+def measure_of(value: object, what: str) -> Measure:
+    """A measure, checked at the border."""
+    if not isinstance(value, Measure):
+        raise ModelError(f"{what} needs a measure such as mbd.touchdown(shank.end) or mbd.flexion(knee), got {value!r}")
+    return value

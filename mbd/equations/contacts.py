@@ -1,0 +1,134 @@
+"""Rows, contacts and guards: what holds, what opens and closes, and what is watched."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from mbd.constraints.base import Measure
+from mbd.constraints.bilateral import Bilateral
+from mbd.constraints.event import Event
+from mbd.constraints.penalty import Penalty
+from mbd.constraints.unilateral import Unilateral
+from mbd.equations.dynamics import Dynamics, Work
+from mbd.equations.effects import penalty_effect
+from mbd.equations.equations import Contact, Effect, Guard, Row
+from mbd.equations.surroundings import Surroundings
+from mbd.joints.base import Joint, row_unit
+from mbd.tape.derivatives import live
+from mbd.tape.node import Node, Scalar
+
+__all__ = ["Laws", "laws"]
+
+
+@dataclass
+class Laws:
+    """The constraints of a model as expressions; `faults` tells what cannot hold."""
+
+    rows: list[Row] = field(default_factory=list)
+    contacts: list[Contact] = field(default_factory=list)
+    guards: list[Guard] = field(default_factory=list)
+    effects: list[Effect] = field(default_factory=list)
+    faults: list[str] = field(default_factory=list)
+
+
+def laws(
+    scope: Surroundings,
+    dynamics: Dynamics,
+    bilaterals: Sequence[Bilateral],
+    contacts: Sequence[Unilateral | Penalty],
+    events: Sequence[Event],
+) -> Laws:
+    """Cut joints, then bilateral constraints, then contacts and events, each in the order of the model."""
+    found = Laws()
+    for joint in scope.cuts:
+        for part, value in joint.rows(*scope.relative(joint), scope):
+            _row(found, scope, joint.name, part, value, unit=row_unit(part), may_fold=True)
+    for constraint in bilaterals:
+        _row(found, scope, constraint.name, "", constraint.residual(scope), unit=constraint.measure.unit)
+    for number, contact in enumerate(contacts):
+        if isinstance(contact, Penalty):
+            _penalty(found, scope, dynamics, contact, number)
+        else:
+            _unilateral(found, scope, contact, number)
+    for event in events:
+        found.guards.append(_guard(scope, event))
+    return found
+
+
+def _row(
+    found: Laws,
+    scope: Surroundings,
+    owner: str,
+    part: str,
+    value: Scalar,
+    *,
+    unit: str,
+    contact: int = -1,
+    may_fold: bool = False,
+) -> int:
+    """Add a row and give its number, or −1 for one that holds by itself."""
+    node = scope.tape.lift(value)
+    title = f"'{owner}'" + (f", row '{part}'" if part else "")
+    if node.is_constant:
+        if not node.is_zero:
+            found.faults.append(f"{title} is the constant {node.data:.6g} {unit}, whatever the motion; it can never be 0")
+        elif not may_fold:
+            found.faults.append(f"{title} is 0 whatever the motion, so it constrains nothing; remove it")
+        return -1
+    rates = [other for other in live([node]) if other.op == "input" and other.data[0] in ("v", "a", "lam", "z")]
+    if rates:
+        found.faults.append(f"{title} depends on velocities or states; a constraint may depend on positions and t only")
+    found.rows.append(Row(owner, part, node, scope.rates([node])[0], contact, unit))
+    return len(found.rows) - 1
+
+
+def _unilateral(found: Laws, scope: Surroundings, law: Unilateral, number: int) -> None:
+    """A normal row, and tangent rows that hold the place of touchdown where it sticks."""
+    gap = scope.tape.lift(law.measure.gap(scope))
+    unit = law.measure.unit
+    numbers = [_row(found, scope, law.name, "normal", gap, unit=unit, contact=number)]
+    captured, anchors = _anchored(found, scope, law.measure if law.sticks else None)
+    if law.sticks:
+        held = [scope.tape.input("anchor", k) for k in anchors]
+        for part, value in law.measure.tangents(scope, held):
+            numbers.append(_row(found, scope, law.name, part, value, unit="m", contact=number, may_fold=True))
+    condition = law.only_while
+    found.contacts.append(
+        Contact(
+            law.name, law.kind, gap, scope.rates([gap])[0], tuple(k for k in numbers if k >= 0), captured, anchors,
+            opens_on=law.opens_on, when=tuple((rule.other, rule.after_impact) for rule in law.releases),
+            only_while=scope.tape.lift(condition.gap(scope)) if isinstance(condition, Measure) else condition,
+            restitution=law.restitution, unit=unit,
+        )
+    )  # fmt: skip
+
+
+def _anchored(found: Laws, scope: Surroundings, measure: Measure | None) -> tuple[tuple[Node, ...], tuple[int, ...]]:
+    """What a contact stores as it closes, and the numbers of its anchors."""
+    captured = () if measure is None else tuple(scope.tape.lift(value) for value in measure.captured(scope))
+    first = sum(len(contact.anchors) for contact in found.contacts)
+    return captured, tuple(range(first, first + len(captured)))
+
+
+def _penalty(found: Laws, scope: Surroundings, dynamics: Dynamics, law: Penalty, number: int) -> None:
+    """A force law on a gap: −p ∂g/∂q on the left-hand side while it acts."""
+    gap = scope.tape.lift(law.measure.gap(scope))
+    if gap.is_constant:
+        found.faults.append(f"the gap of '{law.name}' is the constant {gap.data:.6g}, whatever the motion")
+    rate = scope.rates([gap])[0]
+    force = scope.tape.lift(law.force(gap, rate, scope))
+    generalized = (*dynamics.generalized(Work([gap], [-force])), *[scope.tape.zero] * len(scope.states))
+    found.contacts.append(
+        Contact(
+            law.name, law.kind, gap, rate, force=force, generalized=generalized, opens_on=law.opens_on,
+            unit=law.measure.unit,
+        )
+    )  # fmt: skip
+    found.effects.append(penalty_effect(law.name, number, gap, rate, force, generalized))
+
+
+def _guard(scope: Surroundings, event: Event) -> Guard:
+    """A user's event; its measure may depend on velocities."""
+    value = scope.tape.lift(event.guard.gap(scope))
+    return Guard(event.name, value, scope.changes([value])[0], event.direction, event.terminal, event.reset)

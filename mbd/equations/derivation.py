@@ -1,0 +1,115 @@
+"""From a model in words to its equations of motion."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
+
+from mbd.equations.changes import partials, rates
+from mbd.equations.contacts import laws
+from mbd.equations.dynamics import Dynamics, Work
+from mbd.equations.effects import Cause, causes, effect_of, weight_of
+from mbd.equations.equations import Equations
+from mbd.equations.figure import figure_of
+from mbd.equations.outputs import Outputs
+from mbd.equations.results import offer_results
+from mbd.equations.surroundings import Surroundings
+from mbd.errors import ModelError
+from mbd.tape.node import Node
+
+if TYPE_CHECKING:
+    from mbd.model import Model
+    from mbd.topology.plan import Plan
+
+__all__ = ["FrontDoor", "derive"]
+
+
+@runtime_checkable
+class FrontDoor(Protocol):
+    """Anything that knows its own equations of motion, such as `Lagrangian`."""
+
+    def equations_of_motion(self) -> Equations:
+        """The equations."""
+
+
+def derive(model: Model | FrontDoor) -> Equations:
+    """The equations of motion ``M a + f + Bᵀ λ = 0``, ``h = 0`` of a model.
+
+    Parameters
+    ----------
+    model : a `Model`, or another front door; all its faults are raised together as a `ModelError`
+    """
+    if isinstance(model, FrontDoor):
+        return model.equations_of_motion()
+    from mbd.topology.plan import plan
+
+    model.require_valid()
+    return _derived(model, plan(model))
+
+
+def _derived(model: Model, plan: Plan) -> Equations:
+    """Kinematics, causes of forces, balance, constraints, results."""
+    scope = Surroundings(model.ground, plan.edges, plan.cut, model.gravity, model.tunable)
+    scope.offer_frames(model.frames.values())
+    moving = list(scope.bodies.values())
+    masses = {body.body.name: body.body.mass_properties(scope) for body in moving}
+    dynamics = Dynamics(moving, masses, scope.placement, scope.inputs)
+    found = causes(scope, (*plan.edges, *plan.cut), model.forces)
+    work = sum((cause.work for cause in found), Work())
+    rests = _state_balance(scope, found)
+    constraints = laws(scope, dynamics, model.bilaterals, model.contacts, model.events)
+    if constraints.faults:
+        raise ModelError(constraints.faults)
+    weight = weight_of(scope, dynamics)
+    stored = [weight, *found] if weight.acts else found
+    zero = scope.tape.zero
+    effects = (*(effect_of(cause, dynamics, len(rests), zero) for cause in stored), *constraints.effects)
+    potential = zero
+    for cause in stored:
+        potential = potential if cause.potential is None else potential + cause.potential
+    balance = [*dynamics.balance(work), *rests]
+    outputs = Outputs(scope.tape, scope.quantities)
+    equations = Equations(
+        name=model.name, tape=scope.tape, coordinates=scope.coordinates,
+        states=tuple(coordinate for coordinate, _ in scope.states), parameters=scope.parameters.found,
+        balance=tuple(balance), rows=tuple(constraints.rows), contacts=tuple(constraints.contacts),
+        guards=tuple(constraints.guards), effects=effects, kinetic=dynamics.kinetic(), potential=potential,
+        compose=None if all(joint.is_vector for joint in plan.edges) else scope.composed,
+        output=outputs, output_names=outputs.names,
+        velocity_names=tuple(f"{coordinate.name}.rate" for coordinate in scope.coordinates), notes=plan.notes,
+        figure=figure_of(model), geometry=TreeGeometry(scope, dynamics, work, rests),
+    )  # fmt: skip
+    offer_results(outputs, scope, dynamics, work, equations, model, {joint.name for joint in plan.floating})
+    return equations
+
+
+def _state_balance(scope: Surroundings, found: Sequence[Cause]) -> list[Node]:
+    """ż − s of every first-order state."""
+    given = {state.index: rate for cause in found for state, rate in cause.rates}
+    missing = [coordinate.name for coordinate, node in scope.states if node.index not in given]
+    if missing:
+        raise ModelError([f"the state '{name}' has no rate; its force must list it in Action.rates" for name in missing])
+    return [scope.tape.input("s", k) - given[node.index] for k, (_, node) in enumerate(scope.states)]
+
+
+@dataclass(frozen=True)
+class TreeGeometry:
+    """`mbd.equations.equations.Geometry` of a tree of bodies."""
+
+    scope: Surroundings
+    dynamics: Dynamics
+    work: Work
+    rests: Sequence[Node]
+
+    def balance_with(self, values: Sequence[Node], multipliers: Sequence[Node]) -> list[Node]:
+        """The balance with forces on these values in the same reverse sweep."""
+        return [*self.dynamics.balance(self.work + Work(list(values), list(multipliers))), *self.rests]
+
+    def partials(self, outputs: Sequence[Node]) -> list[dict[Node, Node]]:
+        """∂node/∂x_j of the places and rotations inside the outputs."""
+        return partials(self.scope.placement, outputs)
+
+    def rates(self, outputs: Sequence[Node]) -> dict[Node, Node]:
+        """d node/dt of the places and rotations inside the outputs."""
+        return rates(self.scope.placement, outputs)

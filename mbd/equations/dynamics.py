@@ -1,0 +1,141 @@
+"""The balance of forces: one reverse sweep along the bodies' velocities.
+
+``r = Σ_bodies ∂v_Cᵀ/∂v · m (a_C − g) + ∂ωᵀ/∂v · (I α + ω × I ω) + forces on bodies + forces on coordinates``
+
+The velocities are linear in v, so differentiating them in reverse with forces as adjoints is the principle of virtual
+power; the sweep itself is the recursion of forces from the tips of the tree to the ground.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from mbd.bodies.algebra import cross, dot, rotate, scaled, total
+from mbd.bodies.mass import MassProperties
+from mbd.equations.changes import Pull, pulls
+from mbd.equations.inputs import Inputs
+from mbd.equations.kinematics import Moving, Twist, twists
+from mbd.equations.placement import Placement
+from mbd.scope import Triple
+from mbd.tape.derivatives import vjp
+from mbd.tape.node import Node, Scalar
+
+__all__ = ["Dynamics", "Work"]
+
+
+@dataclass
+class Work:
+    """Generalized forces by their virtual work, positive on the left-hand side.
+
+    values, multipliers : Σ multiplier · δvalue of functions of t and q ⊕ x (potentials, rows, gaps)
+    velocities, forces : Σ force · δvelocity of functions of the velocities (losses, motors, applied forces)
+    """
+
+    values: list[Node] = field(default_factory=list)
+    multipliers: list[Scalar] = field(default_factory=list)
+    velocities: list[Node] = field(default_factory=list)
+    forces: list[Scalar] = field(default_factory=list)
+
+    def on_value(self, value: Node, multiplier: Scalar) -> None:
+        """Add multiplier · δvalue."""
+        self.values.append(value)
+        self.multipliers.append(multiplier)
+
+    def on_velocity(self, velocity: Node, force: Scalar) -> None:
+        """Add force · δvelocity."""
+        self.velocities.append(velocity)
+        self.forces.append(force)
+
+    def __add__(self, other: Work) -> Work:
+        return Work(
+            self.values + other.values, self.multipliers + other.multipliers,
+            self.velocities + other.velocities, self.forces + other.forces,
+        )  # fmt: skip
+
+
+class Dynamics:
+    """Masses on a tree of moving bodies."""
+
+    def __init__(
+        self, bodies: Sequence[Moving], masses: Mapping[str, MassProperties], placement: Placement, inputs: Inputs
+    ) -> None:
+        self._bodies, self._masses, self._placement, self._inputs = bodies, masses, placement, inputs
+        self._tape = placement.tape
+        self._twists = twists(bodies)
+        self._inertia = [pull for body in bodies if body.parent is not None for pull in self._inertia_of(body)]
+
+    def balance(self, work: Work) -> list[Node]:
+        """M a + f of the bodies and of other forces (length n_v)."""
+        pulls_on, direct = self._read(work)
+        return self._gather([*self._inertia, *pulls_on], direct)
+
+    def generalized(self, work: Work) -> list[Node]:
+        """The forces alone, without the bodies' inertia and weight (length n_v)."""
+        pulls_on, direct = self._read(work)
+        return self._gather(pulls_on, direct)
+
+    def joint_wrench(self, body: Moving, work: Work) -> tuple[Triple, Triple]:
+        """Force and torque that a body needs at its joint, in body axes: the residual conjugate to a virtual motion.
+
+        The body and everything beyond it are moved rigidly by six increments at the joint; forces on coordinates
+        (springs, losses, motors, stops of the joint itself) do no work on them.
+        """
+        increments = [self._tape.input("virtual", k) for k in range(6)]
+        turn, shift = increments[:3], increments[3:]
+        extra = {body.body.name: Twist((turn[0], turn[1], turn[2]), (shift[0], shift[1], shift[2]))}
+        pulls_on, _ = self._read(work)
+        tx, ty, tz, fx, fy, fz = self._sweep([*self._inertia, *pulls_on], twists(self._bodies, extra), increments)
+        return (fx, fy, fz), (tx, ty, tz)
+
+    def _inertia_of(self, body: Moving) -> list[Pull]:
+        """Force m (a_C − g) at the centre, torque I α + ω × I ω."""
+        mass = self._masses[body.body.name]
+        force = scaled(mass.mass, body.acceleration_at(mass.center))
+        momentum = rotate(mass.inertia, body.angular_velocity)
+        torque = total(rotate(mass.inertia, body.angular_acceleration), cross(body.angular_velocity, momentum))
+        return [Pull(body, mass.center, force, torque)]
+
+    def _read(self, work: Work) -> tuple[list[Pull], list[Node]]:
+        """Forces on bodies, and forces on coordinates."""
+        x, v = self._inputs.x, self._inputs.v
+        still, on_x = pulls(self._placement, work.values, work.multipliers, x, motion=False)
+        moving, on_v = pulls(self._placement, work.velocities, work.forces, v, motion=True)
+        on_x, on_v = on_x or [self._tape.zero] * len(x), on_v or [self._tape.zero] * len(v)
+        return still + moving, [a + b for a, b in zip(on_x, on_v, strict=True)]
+
+    def _gather(self, forces: Sequence[Pull], direct: Sequence[Node]) -> list[Node]:
+        swept = self._sweep(forces, self._twists, self._inputs.v)
+        return [a + b for a, b in zip(swept, direct, strict=True)]
+
+    def _sweep(self, forces: Sequence[Pull], motion: Mapping[str, Twist], inputs: Sequence[Node]) -> list[Node]:
+        """The reverse sweep."""
+        velocities: list[Scalar] = []
+        adjoints: list[Scalar] = []
+        for pull in forces:
+            twist = motion[pull.carrier.body.name]
+            velocities += [*total(twist.linear, cross(twist.angular, pull.place)), *twist.angular]
+            adjoints += [*pull.force, *pull.torque]
+        lift = self._tape.lift
+        outputs = [lift(velocity) for velocity in velocities]
+        return vjp(outputs, adjoints, inputs) if outputs else [self._tape.zero] * len(inputs)
+
+    def kinetic(self) -> Node:
+        """T = Σ ½ m v_C² + ½ ω·I ω [J]."""
+        energy: Scalar = 0.0
+        for body in self._bodies:
+            if body.parent is None:
+                continue
+            mass, twist = self._masses[body.body.name], self._twists[body.body.name]
+            v = total(twist.linear, cross(twist.angular, mass.center))
+            energy = energy + 0.5 * (mass.mass * dot(v, v) + dot(twist.angular, rotate(mass.inertia, twist.angular)))
+        return self._tape.lift(energy)
+
+    def weight_energy(self, gravity: Triple) -> Node:
+        """−Σ m g·p_C [J]."""
+        energy: Scalar = 0.0
+        for body in self._bodies:
+            if body.parent is not None and any(not self._tape.lift(part).is_zero for part in gravity):
+                mass = self._masses[body.body.name]
+                energy = energy - mass.mass * dot(gravity, self._placement.point(body, mass.center).position)
+        return self._tape.lift(energy)

@@ -1,0 +1,128 @@
+"""The causes of forces, each with its own virtual work: weight, joint springs and losses, and forces."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+
+from mbd.equations.changes import motion_seeds
+from mbd.equations.dynamics import Dynamics, Work
+from mbd.equations.equations import Effect
+from mbd.equations.surroundings import Surroundings
+from mbd.forces.base import Action, Force
+from mbd.joints.base import Joint
+from mbd.tape.derivatives import jvp
+from mbd.tape.node import Node, Scalar
+
+__all__ = ["Cause", "causes", "effect_of", "penalty_effect", "weight_of"]
+
+
+@dataclass
+class Cause:
+    """What one effect does.
+
+    work : its virtual work, positive on the left-hand side; power : what it gives to the mechanism [W], None if nothing
+    potential : stored energy [J]; rates : ż of its first-order states
+    """
+
+    name: str
+    kind: str
+    work: Work = field(default_factory=Work)
+    power: Node | None = None
+    potential: Node | None = None
+    rates: tuple[tuple[Node, Scalar], ...] = ()
+
+    @property
+    def acts(self) -> bool:
+        """Whether anything of it is left after folding."""
+        parts = [*self.work.multipliers, *self.work.forces]
+        return bool(self.rates) or any(not isinstance(part, float) and not part.is_zero for part in parts)
+
+
+def causes(scope: Surroundings, joints: Iterable[Joint], forces: Iterable[Force]) -> list[Cause]:
+    """Springs and losses of all joints, then the forces, without what folds away."""
+    found: list[Cause] = []
+    for joint in joints:
+        found += [_joint_spring(joint, scope), _joint_loss(joint, scope)]
+    found += [_force(force, scope) for force in forces]
+    return [cause for cause in found if cause.acts]
+
+
+def _joint_spring(joint: Joint, scope: Surroundings) -> Cause:
+    """``½ k (q − rest)²``; nothing for a stiffness that folds."""
+    cause = Cause(f"{joint.name} spring", "potential")
+    if len(joint.labels) == 1 and not scope.parameter(cause.name, "stiffness", joint.stiffness).is_zero:
+        _store(cause, joint.elastic_energy(scope.joint(joint.name).coordinates, scope), scope)
+    return cause
+
+
+def _joint_loss(joint: Joint, scope: Surroundings) -> Cause:
+    """``∂D/∂q̇`` on each rate."""
+    cause = Cause(f"{joint.name} loss", "loss")
+    if joint.losses():
+        rates = scope.joint(joint.name).rates
+        pairs = list(zip(rates, joint.resistance(rates, scope), strict=True))
+        _apply(cause, [(rate, -scope.tape.lift(force)) for rate, force in pairs], scope)
+    return cause
+
+
+def _force(force: Force, scope: Surroundings) -> Cause:
+    """The action of a force."""
+    action: Action = force.act(scope)
+    cause = Cause(force.name, force.kind, rates=action.rates)
+    _apply(cause, action.pairs, scope)
+    if action.potential is not None:
+        _store(cause, action.potential, scope)
+    if action.dissipation is not None:
+        _dissipate(cause, scope.tape.lift(action.dissipation), scope)
+    return cause
+
+
+def _store(cause: Cause, energy: Scalar, scope: Surroundings) -> None:
+    """V: +∂V/∂q on the left-hand side."""
+    cause.potential = scope.tape.lift(energy)
+    cause.work.on_value(cause.potential, 0.0 if cause.potential.is_constant else scope.tape.one)
+
+
+def _apply(cause: Cause, pairs: Iterable[tuple[Scalar, Scalar]], scope: Surroundings) -> None:
+    """(velocity, force) pairs: −force on the left-hand side, power force · velocity."""
+    lift = scope.tape.lift
+    for velocity, force in pairs:
+        cause.work.on_velocity(lift(velocity), -lift(force))
+        power = lift(force * velocity)
+        cause.power = power if cause.power is None else cause.power + power
+
+
+def _dissipate(cause: Cause, D: Node, scope: Surroundings) -> None:
+    """D(v): +∂D/∂v on the left-hand side, power −v · ∂D/∂v."""
+    cause.work.on_velocity(D, scope.tape.one)
+    loss = -jvp([D], motion_seeds(scope.placement, [D], scope.inputs.v))[0]
+    cause.power = loss if cause.power is None else cause.power + loss
+
+
+def weight_of(scope: Surroundings, dynamics: Dynamics) -> Cause:
+    """Gravity, which enters the balance as an acceleration of the ground, as an effect of its own."""
+    cause = Cause("gravity", "gravity")
+    x, y, z = scope.gravity
+    _store(cause, dynamics.weight_energy((x, y, z)), scope)
+    return cause
+
+
+def effect_of(cause: Cause, dynamics: Dynamics, n_z: int, zero: Node) -> Effect:
+    """The record of a cause; its generalized forces are made when they are asked for."""
+    power = cause.power
+    return Effect(
+        cause.name, cause.kind, _lazily(dynamics, cause.work, n_z, zero),
+        None if power is not None and power.is_zero else power, cause.potential,
+    )  # fmt: skip
+
+
+def penalty_effect(
+    name: str, contact: int, gap: Node, rate: Node, force: Node, generalized: Sequence[Node]
+) -> Effect:
+    """A penalty contact as an effect; its power is force · ġ while it acts."""
+    return Effect(name, "penalty", lambda: generalized, force * rate, contact=contact)
+
+
+def _lazily(dynamics: Dynamics, work: Work, n_z: int, zero: Node) -> Callable[[], Sequence[Node]]:
+    return lambda: (*dynamics.generalized(work), *[zero] * n_z)

@@ -1,0 +1,188 @@
+"""The equations of motion as values: what both front doors produce and every later stage reads.
+
+``r(t, q, v, a, λ) = M(q) a + f(t, q, v) + B(q, t)ᵀ λ = 0``, ``h(q, t) = 0``, ``ż = s(t, q, v, z)``.
+
+Inputs on the tape, as (kind, index)
+    ('t', 0)       time
+    ('c', 0), ('c', 1)   tangent factors c_C = ∂v₁/∂v̇₁ and c_K = ∂q₁/∂v̇₁
+    ('q', i)       coordinates at the centre of the chart; ('x', i) local increment: everything is evaluated at q ⊕ x
+    ('v', i), ('a', i)   velocities, accelerations
+    ('z', i), ('s', i)   first-order states and their rates ż
+    ('lam', k)     multiplier of row k of `rows`
+    ('anchor', k)  value held since a contact closed (point of touchdown)
+    ('switch', c)  1.0 while penalty contact number c acts, else 0.0
+    ('p', k)       parameter k
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+from mbd.tape.node import Node, Table, Tape
+
+__all__ = ["Contact", "Coordinate", "Effect", "Equations", "Geometry", "Guard", "Parameter", "Row"]
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """One entry of q (or of z): name as users write it, unit, default initial value."""
+
+    name: str
+    unit: str
+    default: float = 0.0
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A run-time input: 'left thigh.mass' and its value in the description."""
+
+    name: str
+    value: float
+
+
+@dataclass(frozen=True)
+class Row:
+    """One scalar constraint ``h = 0``.
+
+    owner : name of the joint or constraint; part : which of its rows ('x', 'normal', 'tangent', …)
+    value : h on the tape; rate : ḣ = B v + h_t on the tape
+    contact : number of the contact it belongs to, −1 for bilateral rows
+    unit : of h, 'm' or 'rad'
+    """
+
+    owner: str
+    part: str
+    value: Node
+    rate: Node
+    contact: int = -1
+    unit: str = "m"
+
+
+@dataclass(frozen=True)
+class Contact:
+    """A constraint that opens and closes.
+
+    kind : 'unilateral' (rows of Lagrange multipliers, normal first) or 'penalty' (a force law)
+    gap, gap_rate : g and ġ on the tape, g ≥ 0 is open
+    rows : its rows in `Equations.rows`
+    captured, anchors : quantities stored into anchors k when it closes
+    force : penalty force, ≥ 0 pushing; generalized : its contribution to f while it acts (length n_v + n_z)
+    opens_on : 'pull' (multiplier or force would attract), 'gap' (penalty: g > 0 again) or 'when'
+    when : (name of the other contact, after_impact) pairs that open it as the other closes
+    only_while : name of a contact that must be closed, or a node that must be positive, or None
+    restitution : e of Newton's law
+    unit : of the gap
+    """
+
+    name: str
+    kind: str
+    gap: Node
+    gap_rate: Node
+    rows: tuple[int, ...] = ()
+    captured: tuple[Node, ...] = ()
+    anchors: tuple[int, ...] = ()
+    force: Node | None = None
+    generalized: tuple[Node, ...] = ()
+    opens_on: str = "pull"
+    when: tuple[tuple[str, bool], ...] = ()
+    only_while: Node | str | None = None
+    restitution: float = 0.0
+    unit: str = "m"
+
+
+@dataclass(frozen=True)
+class Guard:
+    """A user's event: fires when `value` crosses zero (direction −1 falling, +1 rising, 0 both)."""
+
+    name: str
+    value: Node
+    rate: Node
+    direction: int = 0
+    terminal: bool = False
+    reset: Any = None
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One cause of forces: a loss, a spring, a motor, a penalty stop, gravity.
+
+    kind : 'gravity', 'potential', 'loss', 'applied', 'penalty'
+    generalized : makes its part of f (length n_v + n_z), positive on the left-hand side
+    power : rate of work it does on the mechanism [W]; None where `potential` accounts for it
+    potential : its stored energy [J] or None
+    contact : the penalty contact whose switch it follows, −1 otherwise
+    """
+
+    name: str
+    kind: str
+    generalized: Callable[[], Sequence[Node]]
+    power: Node | None = None
+    potential: Node | None = None
+    contact: int = -1
+
+
+class Geometry(Protocol):
+    """What a derivation knows of its own expressions: shorter ways to derivatives that the tape alone could also take."""
+
+    def balance_with(self, values: Sequence[Node], multipliers: Sequence[Node]) -> list[Node]:
+        """balance + Σ_k multiplier_k ∂value_k/∂x (length n_v + n_z), for values that depend on t and q ⊕ x only."""
+
+    def partials(self, outputs: Sequence[Node]) -> list[dict[Node, Node]]:
+        """For each x_j, ∂node/∂x_j of the nodes inside `outputs` (positions, rotations) where it is known."""
+
+    def rates(self, outputs: Sequence[Node]) -> dict[Node, Node]:
+        """d node/dt of the nodes inside `outputs` where it is known."""
+
+
+@dataclass
+class Equations:
+    """Everything derived from a model, as expressions on one tape.
+
+    balance : the n_v + n_z components of ``r`` without rows and penalties (``ż − s`` for the states)
+    kinetic, potential : T and V; V includes gravity and every effect with a potential
+    output : any named result as a node ('left hip.angle', 'left shank.end.x', 'left knee.reaction_force.x', …)
+    output_names : the names that `output` certainly knows
+    """
+
+    name: str
+    tape: Tape
+    coordinates: tuple[Coordinate, ...]
+    states: tuple[Coordinate, ...]
+    parameters: tuple[Parameter, ...]
+    balance: tuple[Node, ...]
+    rows: tuple[Row, ...]
+    contacts: tuple[Contact, ...]
+    guards: tuple[Guard, ...]
+    effects: tuple[Effect, ...]
+    kinetic: Node
+    potential: Node
+    compose: tuple[Node, ...] | None
+    output: Callable[[str], Node]
+    output_names: Callable[[], Sequence[str]]
+    velocity_names: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    figure: Callable[[], Any] | None = field(default=None, repr=False)
+    geometry: Geometry | None = field(default=None, repr=False)
+
+    @property
+    def n_q(self) -> int:
+        return len(self.coordinates)
+
+    @property
+    def n_v(self) -> int:
+        return len(self.velocity_names)
+
+    @property
+    def n_z(self) -> int:
+        return len(self.states)
+
+    @property
+    def tables(self) -> list[Table]:
+        return self.tape.tables
+
+    @property
+    def bilateral(self) -> tuple[int, ...]:
+        """Numbers of the rows that are always active."""
+        return tuple(k for k, row in enumerate(self.rows) if row.contact < 0)

@@ -1,0 +1,50 @@
+"""The stick figure of a model: which frames of each body to join by lines."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from mbd.bodies.base import Frame
+from mbd.bodies.link import Link
+
+if TYPE_CHECKING:
+    from mbd.model import Model
+
+__all__ = ["Segments", "figure_of"]
+
+Segments = list[tuple[str, tuple[str, ...]]]
+"""(body, its frames in the order of a line); one frame alone is a point. Places are the results 'body.frame.x', …"""
+
+
+def figure_of(model: Model) -> Callable[[], Segments]:
+    """The figure, made when it is asked for: a link from start to end, other bodies through the frames in use."""
+    return lambda: _segments(model)
+
+
+def _segments(model: Model) -> Segments:
+    used: dict[str, list[Frame]] = {name: [] for name in model.bodies}
+    joints = [frame for joint in model.joints for frame in (joint.child, joint.parent)]
+    for frame in [*joints, *(mention for mention in model.mentions() if isinstance(mention, Frame))]:
+        used[frame.body.name].append(frame)
+    found: Segments = []
+    for body in model.bodies.values():
+        frames = _distinct(used[body.name])
+        if body is model.ground:
+            found += [(body.name, (frame.name,)) for frame in frames]
+        elif isinstance(body, Link):
+            found.append((body.name, ("start", "end")))
+            found += [(body.name, ("start", frame.name)) for frame in frames if frame.offset[0] or frame.offset[2]]
+        else:
+            names = [frame.name for frame in frames] or ["origin"]
+            bare = len(names) == 1 and any(body.center.offset)
+            found.append((body.name, (*names, "center") if bare else tuple(names)))
+    return found
+
+
+def _distinct(frames: list[Frame]) -> list[Frame]:
+    """One frame for each place."""
+    places: dict[tuple[float, ...], Frame] = {}
+    for frame in frames:
+        places.setdefault(frame.offset, frame)
+    return list(places.values())

@@ -1,0 +1,65 @@
+"""Named results: a table from names to expressions that are made when they are asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+
+from mbd.errors import UnknownNameError, nearest
+from mbd.tape.node import Node, Scalar, Tape
+
+__all__ = ["AXES", "Outputs"]
+
+AXES = "xyz"
+"""Components of a vector result: 'left shank.end.x', …"""
+
+
+class Outputs:
+    """Results by name; each is traced at its first use and kept.
+
+    base : results that are offered here too
+    """
+
+    def __init__(self, tape: Tape, base: Outputs | None = None) -> None:
+        self._tape = tape
+        self._makers: dict[str, Callable[[], Scalar]] = {} if base is None else dict(base._makers)
+        self._made: dict[str, Node] = {}
+
+    def add(self, name: str, make: Callable[[], Scalar]) -> None:
+        """Offer a scalar; the first offer of a name stays."""
+        self._makers.setdefault(name, make)
+
+    def value(self, name: str, value: Scalar) -> None:
+        """Offer a scalar that is already known."""
+        self.add(name, lambda: value)
+
+    def triple(self, name: str, make: Callable[[], Sequence[Scalar]], suffixes: Sequence[str] = AXES) -> None:
+        """Offer the components 'name.x', 'name.y', 'name.z' of a vector that is made once."""
+        made: list[Scalar] = []
+
+        def component(k: int) -> Scalar:
+            if not made:
+                made.extend(make())
+            return made[k]
+
+        for k, suffix in enumerate(suffixes):
+            self.add(f"{name}.{suffix}", lambda k=k: component(k))  # type: ignore[misc]
+
+    def __call__(self, name: str) -> Node:
+        """The node of a result; an unknown name is answered with the nearest known ones."""
+        node = self._made.get(name)
+        if node is None:
+            make = self._makers.get(name)
+            if make is None:
+                raise UnknownNameError(nearest(name, self._makers, "result"))
+            node = self._made[name] = self._tape.lift(make())
+        return node
+
+    def names(self) -> Sequence[str]:
+        """Everything that can be asked for."""
+        return tuple(self._makers)
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._makers
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._makers)

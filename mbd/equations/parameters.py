@@ -1,0 +1,48 @@
+"""Parameters of a derivation: run-time inputs by name, with exact 0 and ±1 folded into the structure."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+from mbd.equations.equations import Parameter
+from mbd.tape.node import Node, Tape
+
+__all__ = ["ParameterTable"]
+
+STRUCTURAL = (0.0, 1.0, -1.0)
+"""Values that fold away when the equations are built, unless their name is tunable."""
+
+
+class ParameterTable:
+    """The parameters met so far, numbered by first use."""
+
+    def __init__(self, tape: Tape, tunable: Collection[str] = ()) -> None:
+        self._tape = tape
+        self._tunable = frozenset(tunable)
+        self._nodes: dict[str, Node] = {}
+        self._found: list[Parameter] = []
+
+    def node(self, name: str, value: float) -> Node:
+        """The input of a parameter, or a constant where its value is structural."""
+        known = self._nodes.get(name)
+        if known is not None:
+            return known
+        value = float(value)
+        if value in STRUCTURAL and name not in self._tunable:
+            node = self._tape.constant(value)
+        else:
+            node = self._tape.input("p", len(self._found))
+            self._found.append(Parameter(name, value))
+        self._nodes[name] = node
+        return node
+
+    @property
+    def found(self) -> tuple[Parameter, ...]:
+        """The run-time inputs in the order of their numbers."""
+        return tuple(self._found)
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._nodes
+
+    def __getitem__(self, name: str) -> Node:
+        return self._nodes[name]

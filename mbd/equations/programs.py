@@ -1,0 +1,217 @@
+"""Programs: the lists of numbers that integrators, impacts and events ask of a set of equations.
+
+With N = n_v + n_z rates, m active rows in ascending number, R rows and nC contacts in all:
+
+=================  ==================================================================================
+`newton`           K ((N+m) × (N+m), row-major) | r (N) | h (m) | ḣ (m, stabilized only)
+`residual`         r (N) | h (m) | ḣ (m, stabilized only)
+`accelerations`    M (N × N) | f (N) | ∂r/∂λ (N × R) | B (R × N) | h (R) | ḣ (R) | γ (R) | captured | T
+`guards`           g (nC) | ġ (nC) | penalty force (nC) | only_while (nC) | event values | event rates
+`scales`           magnitudes of r (N) | of h (R) | of ḣ (R), term by term before cancellation
+`compose`          q ⊕ x, or None where it is q + x
+=================  ==================================================================================
+
+All are values: functions from equations to nodes, which the compile stage turns into code.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from mbd.equations.equations import Equations
+from mbd.equations.inputs import Inputs
+from mbd.tape.derivatives import gradient, jvp, jvps, live, substitute, vjp
+from mbd.tape.node import Node, Tape
+
+__all__ = [
+    "accelerations", "balance_with", "compose", "constraint_jacobian", "guards", "mass_matrix", "newton", "residual",
+    "scales",
+]  # fmt: skip
+
+
+def newton(equations: Equations, rows: Sequence[int], penalties: Sequence[int], stabilized: bool) -> list[Node]:
+    """Tangent and residual of one Newton iteration of the Newmark family.
+
+    ``K = [S  ∂r/∂λ; B̃  0]`` with ``S = M + c_C C_t + c_K K_t`` from one forward sweep a column, and
+    ``B̃ = B`` (index 3) or ``B + (c_K/c_C) ∂ḣ/∂x`` (stabilized); the columns of first-order states are zero in B̃.
+    """
+    inputs = Inputs.of(equations)
+    rows = sorted(rows)
+    r = balance_with(equations, rows, penalties)
+    h = [equations.rows[k].value for k in rows]
+    B = constraint_jacobian(equations, rows)
+    bottom, hv = B, []
+    if stabilized and rows:
+        hv = [equations.rows[k].rate for k in rows]
+        ratio = inputs.c[1] / inputs.c[0]
+        changes = _jacobian_rates(equations, B, hv)
+        bottom = [[b + ratio * g for b, g in zip(*pair, strict=True)] for pair in zip(B, changes, strict=True)]
+    S = _tangent(equations, r)
+    right = _row_forces(equations, r, rows, B)
+    zero = equations.tape.zero
+    n, n_z, m = inputs.n, equations.n_z, len(rows)
+    out: list[Node] = []
+    for i in range(n):
+        out += [S[j][i] for j in range(n)] + [right[k][i] for k in range(m)]
+    for k in range(m):
+        out += [*bottom[k], *([zero] * (n_z + m))]
+    return out + r + h + hv
+
+
+def residual(equations: Equations, rows: Sequence[int], penalties: Sequence[int], stabilized: bool) -> list[Node]:
+    """r | h | ḣ of one contact mode."""
+    rows = sorted(rows)
+    hv = [equations.rows[k].rate for k in rows] if stabilized else []
+    return balance_with(equations, rows, penalties) + [equations.rows[k].value for k in rows] + hv
+
+
+def accelerations(equations: Equations) -> list[Node]:
+    """What assembly, impacts and restarts need, over all rows and with penalties behind their switches.
+
+    ``r = M a + f + (∂r/∂λ) λ``, ``ḣ = B v + h_t``, ``ḧ = B a + γ``; `captured` are the values that closing contacts
+    store, in the order of contacts and anchors; T is the kinetic energy.
+    """
+    inputs = Inputs.of(equations)
+    tape = equations.tape
+    rows = range(len(equations.rows))
+    r = _switched_balance(equations)
+    rest: dict[Node, float] = {node: 0.0 for node in (*inputs.a, *inputs.s, *inputs.lam)}
+    f = substitute(r, rest)
+    M = _transposed(mass_matrix(equations, r))
+    B = constraint_jacobian(equations, rows)
+    right = _row_forces(equations, r, rows, B)
+    hv = [row.rate for row in equations.rows]
+    padding = [tape.zero] * equations.n_z
+    out = [entry for line in M for entry in line] + f
+    out += [right[k][i] for i in range(inputs.n) for k in rows]
+    out += [entry for line in B for entry in [*line, *padding]]
+    out += [row.value for row in equations.rows] + hv + _time_rates(equations, hv)
+    out += [value for contact in equations.contacts for value in contact.captured]
+    return [*out, equations.kinetic]
+
+
+def guards(equations: Equations) -> list[Node]:
+    """What is watched at the end of a step; 1.0 stands where no measure is asked by `only_while`."""
+    tape, contacts = equations.tape, equations.contacts
+    out = [contact.gap for contact in contacts] + [contact.gap_rate for contact in contacts]
+    out += [tape.zero if contact.force is None else contact.force for contact in contacts]
+    out += [contact.only_while if isinstance(contact.only_while, Node) else tape.one for contact in contacts]
+    return out + [guard.value for guard in equations.guards] + [guard.rate for guard in equations.guards]
+
+
+def scales(equations: Equations) -> list[Node]:
+    """Σ|terms| of r, h and ḣ: how large they are before cancellation, which bounds their round-off."""
+    r = _switched_balance(equations)
+    h = [row.value for row in equations.rows]
+    hv = [row.rate for row in equations.rows]
+    return _magnitudes(equations.tape, [*r, *h, *hv])
+
+
+def compose(equations: Equations) -> list[Node] | None:
+    """q ⊕ x, or None where every coordinate adds."""
+    return None if equations.compose is None else list(equations.compose)
+
+
+# parts --------------------------------------------------------------------------------------------------------------
+def balance_with(equations: Equations, rows: Iterable[int], penalties: Iterable[int]) -> list[Node]:
+    """``r = M a + f + Bᵀλ`` with these rows active and these penalty contacts acting."""
+    return _balance(equations, rows, [(c, equations.tape.one) for c in penalties])
+
+
+def _switched_balance(equations: Equations) -> list[Node]:
+    """r with every row, and every penalty behind its switch."""
+    switches = [(c, equations.tape.input("switch", c)) for c in range(len(equations.contacts))]
+    return _balance(equations, range(len(equations.rows)), switches)
+
+
+def _balance(equations: Equations, rows: Iterable[int], penalties: Iterable[tuple[int, Node]]) -> list[Node]:
+    """balance + Σ λ_k ∂h_k/∂x − Σ switch_c F_c ∂g_c/∂x."""
+    inputs = Inputs.of(equations)
+    work = [(equations.rows[k].value, inputs.lam[k]) for k in rows]
+    for c, switch in penalties:
+        contact = equations.contacts[c]
+        if contact.force is not None:
+            work.append((contact.gap, -(switch * contact.force)))
+    if not work:
+        return list(equations.balance)
+    values, multipliers = [value for value, _ in work], [multiplier for _, multiplier in work]
+    if equations.geometry is not None:
+        return equations.geometry.balance_with(values, multipliers)
+    added = vjp(values, multipliers, inputs.x) + [equations.tape.zero] * equations.n_z
+    return [r + extra for r, extra in zip(equations.balance, added, strict=True)]
+
+
+def constraint_jacobian(equations: Equations, rows: Sequence[int]) -> list[list[Node]]:
+    """B = ∂h/∂x of the rows, one list of n_v entries a row."""
+    inputs = Inputs.of(equations)
+    h = [equations.rows[k].value for k in rows]
+    if equations.geometry is None:
+        return [gradient(value, inputs.x) for value in h]
+    known = equations.geometry.partials(h)
+    return _transposed(jvps(h, [{x: 1.0, **known[j]} for j, x in enumerate(inputs.x)])) if h else []
+
+
+def mass_matrix(equations: Equations, balance: Sequence[Node] | None = None) -> list[list[Node]]:
+    """M = ∂r/∂(a, ż), column by column."""
+    inputs = Inputs.of(equations)
+    r = equations.balance if balance is None else balance
+    return jvps(r, [{rate: 1.0} for rate in (*inputs.a, *inputs.s)])
+
+
+def _tangent(equations: Equations, r: Sequence[Node]) -> list[list[Node]]:
+    """The columns of S: directions (1, c_C, c_K) in (a_j, v_j, x_j), and (1, c_C) in (ż_j, z_j)."""
+    inputs = Inputs.of(equations)
+    c_C, c_K = inputs.c
+    known = [{} for _ in inputs.x] if equations.geometry is None else equations.geometry.partials(r)
+    directions: list[dict[Node, Node | float]] = []
+    for j, (x, v, a) in enumerate(zip(inputs.x, inputs.v, inputs.a, strict=True)):
+        directions.append({a: 1.0, v: c_C, x: c_K, **{node: c_K * slope for node, slope in known[j].items()}})
+    directions += [{s: 1.0, z: c_C} for s, z in zip(inputs.s, inputs.z, strict=True)]
+    return jvps(r, directions)
+
+
+def _row_forces(
+    equations: Equations, r: Sequence[Node], rows: Sequence[int], B: Sequence[Sequence[Node]]
+) -> list[list[Node]]:
+    """∂r/∂λ, column by column: Bᵀ, and more where forces depend on multipliers."""
+    inputs = Inputs.of(equations)
+    if any(node.op == "input" and node.data[0] == "lam" for node in live(equations.balance)):
+        return jvps(r, [{inputs.lam[k]: 1.0} for k in rows])
+    padding = [equations.tape.zero] * equations.n_z
+    return [[*line, *padding] for line in B]
+
+
+def _jacobian_rates(
+    equations: Equations, B: Sequence[Sequence[Node]], hv: Sequence[Node]
+) -> Sequence[Sequence[Node]]:
+    """∂ḣ/∂x of each row; where coordinates add it is dB/dt, which reuses what B is made of."""
+    inputs = Inputs.of(equations)
+    if equations.compose is not None:
+        return [gradient(rate, inputs.x) for rate in hv]
+    flat = _time_rates(equations, [entry for line in B for entry in line])
+    return [flat[k * equations.n_v : (k + 1) * equations.n_v] for k in range(len(B))]
+
+
+def _time_rates(equations: Equations, values: Sequence[Node]) -> list[Node]:
+    """d/dt of functions of t and q ⊕ x."""
+    inputs = Inputs.of(equations)
+    known = {} if equations.geometry is None else equations.geometry.rates(values)
+    return jvp(values, {inputs.t: 1.0, **dict(zip(inputs.x, inputs.v, strict=True)), **known})
+
+
+def _transposed(columns: Sequence[Sequence[Node]]) -> list[list[Node]]:
+    return [list(line) for line in zip(*columns, strict=True)]
+
+
+def _magnitudes(tape: Tape, outputs: Sequence[Node]) -> list[Node]:
+    """|x| through sums and products: Σ|terms| where terms are added, |x| of everything else."""
+    size: dict[int, Node] = {}
+    for node in live(outputs):
+        parts = [size[arg.index] for arg in node.args]
+        if node.op in ("add", "sub"):
+            size[node.index] = parts[0] + parts[1]
+        elif node.op in ("mul", "div"):
+            size[node.index] = parts[0] * parts[1] if node.op == "mul" else parts[0] / abs(node.args[1])
+        else:
+            size[node.index] = parts[0] if node.op == "neg" else abs(node)
+    return [size[node.index] for node in outputs]

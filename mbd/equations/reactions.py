@@ -1,0 +1,106 @@
+"""Reactions in joints: on the child by the parent, at the joint, in ground axes.
+
+For a joint of the tree the child and everything beyond it are moved rigidly by virtual increments at the joint; the
+residual of the balance conjugate to them is the force and torque that the joint must give. What acts along the free
+directions of the joint (its springs, losses, motors, stops) is not part of the reaction. A cut joint gives
+``−(∂h/∂ε)ᵀ λ`` of its own rows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from mbd.bodies.algebra import IDENTITY, cross, difference, dot, rotate, scaled, total, transpose
+from mbd.equations.dynamics import Dynamics, Work
+from mbd.equations.equations import Row
+from mbd.equations.kinematics import Moving
+from mbd.equations.surroundings import Surroundings
+from mbd.joints.base import Joint
+from mbd.scope import Rotation, Triple
+from mbd.tape.derivatives import substitute, vjp
+from mbd.tape.node import Node, Scalar
+
+__all__ = ["Wrench", "reaction"]
+
+
+class Wrench(NamedTuple):
+    """A force [N] and a torque [N m]."""
+
+    force: Triple
+    torque: Triple
+
+
+def reaction(joint: Joint, scope: Surroundings, dynamics: Dynamics, work: Work, rows: Sequence[Row]) -> Wrench:
+    """The reaction of a joint; `work` holds every force, with all rows and penalties."""
+    if any(cut.name == joint.name for cut in scope.cuts):
+        return _of_cut_joint(joint, scope, rows)
+    body = scope.bodies[joint.child.body.name]
+    force, torque = _without_free(body, Wrench(*dynamics.joint_wrench(body, work)))
+    R = scope.placement.axes(body).rotation
+    force, torque = rotate(R, force), rotate(R, torque)
+    if joint.is_reversed:
+        arm = difference(scope.frame(joint.child).position, scope.frame(joint.parent).position)
+        return Wrench(scaled(-1.0, force), scaled(-1.0, total(torque, cross(arm, force))))
+    return Wrench(force, torque)
+
+
+def _without_free(body: Moving, wrench: Wrench) -> Wrench:
+    """The part that does no work on the joint's coordinates, body axes.
+
+    A multiple of each free direction, torques for the turning ones and forces for the sliding ones, is taken off.
+    """
+    back = transpose(body.turn)
+    free = [(column.angular, rotate(back, column.linear)) for column in body.columns]
+    along = [(angular, None) if _is_turn(angular) else (None, linear) for angular, linear in free]
+    gram: list[list[Scalar]] = []
+    for angular, linear in free:
+        gram.append([dot(angular, turn) if turn is not None else dot(linear, shift) for turn, shift in along])  # type: ignore[arg-type]
+    works = [dot(angular, wrench.torque) + dot(linear, wrench.force) for angular, linear in free]
+    force, torque = wrench
+    for (turn, shift), share in zip(along, _solved(gram, works), strict=True):
+        if turn is not None:
+            torque = difference(torque, scaled(share, turn))
+        elif shift is not None:
+            force = difference(force, scaled(share, shift))
+    return Wrench(force, torque)
+
+
+def _is_turn(angular: Triple) -> bool:
+    return any(part != 0.0 if isinstance(part, float) else not part.is_zero for part in angular)
+
+
+def _solved(matrix: list[list[Scalar]], right: list[Scalar]) -> list[Scalar]:
+    """Gauss elimination without pivots, for the few free directions of one joint."""
+    n = len(right)
+    A, b = [list(line) for line in matrix], list(right)
+    for k in range(n):
+        for i in range(k + 1, n):
+            factor = A[i][k] / A[k][k]
+            A[i] = [A[i][j] - factor * A[k][j] for j in range(n)]
+            b[i] = b[i] - factor * b[k]
+    for k in reversed(range(n)):
+        for j in range(k + 1, n):
+            b[k] = b[k] - A[k][j] * b[j]
+        b[k] = b[k] / A[k][k]
+    return b
+
+
+def _of_cut_joint(joint: Joint, scope: Surroundings, rows: Sequence[Row]) -> Wrench:
+    """From the multipliers of the joint's own rows."""
+    tape = scope.tape
+    fresh = [tape.input("virtual", k) for k in range(12)]
+    R_fresh: Rotation = tuple(tuple(fresh[3 * i + k] for k in range(3)) for i in range(3))  # type: ignore[assignment]
+    p_fresh: Triple = (fresh[9], fresh[10], fresh[11])
+    numbers = {row.part: k for k, row in enumerate(rows) if row.owner == joint.name and row.contact < 0}
+    named = [(part, tape.lift(value)) for part, value in joint.rows(R_fresh, p_fresh, scope) if part in numbers]
+    bars = vjp([value for _, value in named], [tape.input("lam", numbers[part]) for part, _ in named], fresh)
+    R, p = scope.relative(joint)
+    placed = dict(zip(fresh, [tape.lift(part) for part in (*R[0], *R[1], *R[2], *p)], strict=True))
+    bars = substitute(bars, placed)
+    force = (bars[9], bars[10], bars[11])
+    torque: Triple = (0.0, 0.0, 0.0)
+    for k in range(3):  # δR = δθ × R, column by column
+        torque = total(torque, cross((R[0][k], R[1][k], R[2][k]), (bars[k], bars[3 + k], bars[6 + k])))
+    axes = scope.frame(joint.parent).rotation
+    return Wrench(scaled(-1.0, rotate(axes, force)), scaled(-1.0, rotate(axes, torque)))

@@ -1,0 +1,130 @@
+"""The named results of a model of bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Sequence
+from typing import TYPE_CHECKING
+
+from mbd.constraints.bilateral import Bilateral
+from mbd.constraints.measures import JointMeasure
+from mbd.equations.dynamics import Dynamics, Work
+from mbd.equations.equations import Contact, Effect, Equations, Row
+from mbd.equations.outputs import Outputs
+from mbd.equations.reactions import Wrench, reaction
+from mbd.equations.surroundings import Surroundings
+from mbd.forces.base import Force
+from mbd.forces.motor import Motor
+from mbd.joints.base import Joint
+from mbd.tape.node import Scalar, Tape
+
+if TYPE_CHECKING:
+    from mbd.model import Model
+
+__all__ = ["offer_results"]
+
+
+def offer_results(
+    outputs: Outputs,
+    scope: Surroundings,
+    dynamics: Dynamics,
+    work: Work,
+    equations: Equations,
+    model: Model,
+    hidden: Collection[str],
+) -> None:
+    """Everything that a run can be asked for besides what words may ask for.
+
+    work : the forces without rows and penalties; hidden : names of joints that no user made
+    """
+    tape, rows, contacts = scope.tape, equations.rows, equations.contacts
+    _offer_rows(outputs, tape, rows, model.bilaterals)
+    _offer_contacts(outputs, tape, rows, contacts)
+    _offer_effects(outputs, tape, equations.effects)
+    _offer_motors(outputs, scope, model.forces)
+    for name, energy in ("kinetic_energy", equations.kinetic), ("potential_energy", equations.potential):
+        outputs.value(name, energy)
+    whole = Work() + work
+    for k, row in enumerate(rows):
+        whole.on_value(row.value, tape.input("lam", k))
+    for number, contact in enumerate(contacts):
+        if contact.force is not None:
+            whole.on_value(contact.gap, -(tape.input("switch", number) * contact.force))
+    _offer_joints(outputs, scope, dynamics, whole, rows, hidden)
+
+
+def _offer_joints(
+    outputs: Outputs, scope: Surroundings, dynamics: Dynamics, work: Work, rows: Sequence[Row], hidden: Collection[str]
+) -> None:
+    """Accelerations and reactions of the joints; `hidden` are those that no user made."""
+    known: dict[str, Wrench] = {}
+
+    def wrench(joint: Joint) -> Wrench:
+        if joint.name not in known:
+            known[joint.name] = reaction(joint, scope, dynamics, work, rows)
+        return known[joint.name]
+
+    for joint in (*scope.tree, *scope.cuts):
+        for k, label in enumerate(joint.labels):
+            name = f"{joint.name}.{label.name}.acceleration"
+            outputs.add(name, lambda n=joint.name, k=k: _acceleration(scope, n, k))  # type: ignore[misc]
+        if len(joint.labels) == 1:
+            outputs.add(f"{joint.name}.acceleration", lambda n=joint.name: _acceleration(scope, n, 0))  # type: ignore[misc]
+        if joint.name not in hidden:
+            outputs.triple(f"{joint.name}.reaction_force", lambda joint=joint: wrench(joint).force)  # type: ignore[misc]
+            outputs.triple(f"{joint.name}.reaction_torque", lambda joint=joint: wrench(joint).torque)  # type: ignore[misc]
+
+
+def _acceleration(scope: Surroundings, joint: str, place: int) -> Scalar:
+    return scope.changes([scope.tape.lift(scope.joint(joint).rates[place])])[0]
+
+
+def _offer_rows(outputs: Outputs, tape: Tape, rows: Sequence[Row], bilaterals: Iterable[Bilateral]) -> None:
+    """Multiplier and residual of each bilateral row; tension of rods, force or torque that drives a joint."""
+    words = {constraint.name: constraint for constraint in bilaterals}
+    for k, row in enumerate(rows):
+        if row.contact >= 0:
+            continue
+        multiplier = tape.input("lam", k)
+        name = f"{row.owner}.{row.part}" if row.part else row.owner
+        outputs.value(f"{name}.multiplier", multiplier)
+        outputs.value(f"{name}.residual", row.value)
+        measure = words[row.owner].measure if row.owner in words else None
+        if isinstance(measure, JointMeasure):
+            outputs.value(f"{name}.{'torque' if row.unit == 'rad' else 'force'}", -multiplier)
+        elif measure is not None and measure.reaction == "tension":
+            outputs.value(f"{name}.tension", multiplier)
+            outputs.value(f"{name}.force", multiplier)
+
+
+def _offer_contacts(outputs: Outputs, tape: Tape, rows: Sequence[Row], contacts: Iterable[Contact]) -> None:
+    """Force (≥ 0 pushes), friction (of the ground on the body), gap and its rate."""
+    for number, contact in enumerate(contacts):
+        outputs.value(f"{contact.name}.gap", contact.gap)
+        outputs.value(f"{contact.name}.gap_rate", contact.gap_rate)
+        if contact.force is not None:
+            outputs.value(f"{contact.name}.force", tape.input("switch", number) * contact.force)
+        for k in contact.rows:
+            push = -tape.input("lam", k)
+            if rows[k].part == "normal":
+                outputs.value(f"{contact.name}.force", push)
+            else:
+                outputs.value(f"{contact.name}.friction", push)
+                outputs.value(f"{contact.name}.friction.{rows[k].part}", push)
+
+
+def _offer_effects(outputs: Outputs, tape: Tape, effects: Iterable[Effect]) -> None:
+    """Power of what does work, energy of what stores it."""
+    for effect in effects:
+        switch = tape.one if effect.contact < 0 else tape.input("switch", effect.contact)
+        if effect.power is not None:
+            outputs.value(f"{effect.name}.power", switch * effect.power)
+        if effect.potential is not None:
+            outputs.value(f"{effect.name}.energy", effect.potential)
+
+
+def _offer_motors(outputs: Outputs, scope: Surroundings, forces: Iterable[Force]) -> None:
+    """Torque (or force) of motors."""
+    for force in forces:
+        if isinstance(force, Motor):
+            ((_, torque),) = force.act(scope).pairs
+            outputs.value(f"{force.name}.{'torque' if force.joint.labels[0].unit == 'rad' else 'force'}", torque)

@@ -1,0 +1,188 @@
+"""The derivation as words see it: parameters, tables, states, motions of frames and joints, and named quantities."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Sequence
+
+from mbd.bodies.algebra import IDENTITY, difference, product, rotate, transpose
+from mbd.bodies.base import Body, Frame
+from mbd.equations.changes import rates
+from mbd.equations.equations import Coordinate
+from mbd.equations.inputs import Inputs
+from mbd.equations.kinematics import Edge, Moving, ground_motion, moving_body
+from mbd.equations.outputs import AXES, Outputs
+from mbd.equations.parameters import ParameterTable
+from mbd.equations.placement import Placement
+from mbd.errors import UnknownNameError, nearest
+from mbd.joints.base import Joint
+from mbd.scope import FrameMotion, JointMotion, Rotation, Triple
+from mbd.tape.derivatives import jvp
+from mbd.tape.node import Node, Scalar, Table, Tape
+
+__all__ = ["Surroundings"]
+
+
+class Surroundings:
+    """`mbd.scope.Scope` over a spanning tree.
+
+    Parameters
+    ----------
+    tree : the joints that generate coordinates, each after the one that moves its parent
+    cuts : the joints that become rows
+    gravity : (x, y, z) [m/s²]; run-time parameters 'gravity.x', …
+    tunable : names of parameters that stay inputs even at an exact 0 or ±1
+
+    Attributes
+    ----------
+    bodies : by name, the ground first
+    placement : everything in ground axes
+    quantities : named results that words may ask for
+    """
+
+    def __init__(
+        self, ground: Body, tree: Sequence[Joint], cuts: Sequence[Joint], gravity: Triple, tunable: Collection[str]
+    ) -> None:
+        self.tape = Tape()
+        self.parameters = ParameterTable(self.tape, tunable)
+        self.tree, self.cuts = tuple(tree), tuple(cuts)
+        size = sum(len(joint.labels) for joint in tree)
+        self.inputs = Inputs.sized(self.tape, size, size)
+        self.gravity = tuple(self.parameters.node(f"gravity.{a}", g) for a, g in zip(AXES, gravity, strict=True))
+        self.states: list[tuple[Coordinate, Node]] = []
+        self._tables: dict[str, Table] = {}
+        self._joints: dict[str, JointMotion] = {}
+        self.bodies = self._grown(ground)
+        values = [node for joint in tree for node in self._tree_motion(joint).coordinates]
+        self.composed = tuple(self.tape.lift(value) for value in values)
+        self.placement = Placement(self.tape, list(self.bodies.values()), self.composed)
+        self.quantities = Outputs(self.tape)
+        self._offer_quantities()
+
+    # the tree -------------------------------------------------------------------------------------------------------
+    def _grown(self, ground: Body) -> dict[str, Moving]:
+        """The recursion over the tree."""
+        x, y, z = self.gravity
+        bodies = {ground.name: ground_motion(ground, (x, y, z))}
+        self._edges: dict[str, Edge] = {}
+        first = 0
+        for joint in self.tree:
+            edge = self._edges[joint.name] = self._edge(joint, first)
+            child = joint.child.body
+            bodies[child.name] = moving_body(child, bodies[joint.parent.body.name], edge, self)
+            first += len(joint.labels)
+        return bodies
+
+    def _edge(self, joint: Joint, first: int) -> Edge:
+        own, inputs = slice(first, first + len(joint.labels)), self.inputs
+        values = tuple(self.tape.lift(value) for value in joint.compose(inputs.q[own], inputs.x[own]))
+        return Edge(joint, first, values, inputs.v[own], inputs.a[own], inputs.x[own])
+
+    def _tree_motion(self, joint: Joint) -> JointMotion:
+        edge = self._edges[joint.name]
+        return JointMotion(edge.values, edge.rates)
+
+    @property
+    def coordinates(self) -> tuple[Coordinate, ...]:
+        """The entries of q."""
+        return tuple(Coordinate(f"{j.name}.{label.name}", label.unit) for j in self.tree for label in j.labels)
+
+    # what words ask -------------------------------------------------------------------------------------------------
+    @property
+    def time(self) -> Node:
+        """t [s]."""
+        return self.inputs.t
+
+    def parameter(self, owner: str, field: str, value: float) -> Node:
+        """The run-time input named ``owner.field``."""
+        return self.parameters.node(f"{owner}.{field}", value)
+
+    def table(self, owner: str, breaks: Sequence[float], coefficients: Sequence[Sequence[float]]) -> Table:
+        """A piecewise cubic, one for each owner."""
+        if owner not in self._tables:
+            self._tables[owner] = self.tape.table(owner, breaks, coefficients)
+        return self._tables[owner]
+
+    def frame(self, frame: Frame) -> FrameMotion:
+        """Motion of a frame, in ground axes."""
+        body = self._body(frame.body.name)
+        R, place = frame.placement(self)
+        axes = self.placement.axes(body).rotation
+        point = self.placement.point(body, place)
+        rotation = axes if R is IDENTITY else product(axes, R)
+        return FrameMotion(
+            point.position, rotation, self.placement.velocity(point), self.placement.angular_velocity(body)
+        )
+
+    def joint(self, name: str) -> JointMotion:
+        """Coordinates and rates of a joint; those of a cut joint are read off its frames."""
+        if name in self._edges:
+            edge = self._edges[name]
+            return JointMotion(edge.values, edge.rates)
+        known = self._joints.get(name)
+        if known is None:
+            joint = next((joint for joint in self.cuts if joint.name == name), None)
+            if joint is None:
+                raise UnknownNameError(nearest(name, [j.name for j in (*self.tree, *self.cuts)], "joint"))
+            values = [self.tape.lift(value) for value in joint.recover(*self.relative(joint), self)]
+            known = self._joints[name] = JointMotion(tuple(values), tuple(self.rates(values)))
+        return known
+
+    def named(self, name: str) -> Node:
+        """A named quantity of the configuration or the velocity."""
+        return self.quantities(name)
+
+    def state(self, owner: str, field: str, initial: float) -> Node:
+        """A first-order state; registered on first use."""
+        name = f"{owner}.{field}"
+        for coordinate, node in self.states:
+            if coordinate.name == name:
+                return node
+        node = self.tape.input("z", len(self.states))
+        self.states.append((Coordinate(name, "", initial), node))
+        self.quantities.value(name, node)
+        return node
+
+    # geometry -------------------------------------------------------------------------------------------------------
+    def relative(self, joint: Joint) -> tuple[Rotation, Triple]:
+        """R, p of a joint's child frame in its parent frame."""
+        parent, child = self.frame(joint.parent), self.frame(joint.child)
+        back = transpose(parent.rotation)
+        return product(back, child.rotation), rotate(back, difference(child.position, parent.position))
+
+    def rates(self, values: Sequence[Node]) -> list[Node]:
+        """d/dt of functions of t and q ⊕ x."""
+        seeds: dict[Node, Scalar] = {self.time: 1.0, **dict(zip(self.inputs.x, self.inputs.v, strict=True))}
+        return jvp(values, seeds | rates(self.placement, values))
+
+    def changes(self, values: Sequence[Node]) -> list[Node]:
+        """d/dt of functions of t, q ⊕ x, v and z."""
+        inputs = self.inputs
+        seeds: dict[Node, Scalar] = {self.time: 1.0, **dict(zip(inputs.x, inputs.v, strict=True))}
+        seeds |= dict(zip(inputs.v, inputs.a, strict=True))
+        seeds |= {node: self.tape.input("s", k) for k, (_, node) in enumerate(self.states)}
+        return jvp(values, seeds | rates(self.placement, values))
+
+    def offer_frames(self, frames: Iterable[Frame]) -> None:
+        """Name the components of frames' places and velocities, and register their parameters."""
+        for frame in frames:
+            frame.placement(self)
+            self.quantities.triple(frame.full_name, lambda frame=frame: self.frame(frame).position)  # type: ignore[misc]
+            self.quantities.triple(
+                frame.full_name, lambda frame=frame: self.frame(frame).velocity, [f"v{axis}" for axis in AXES]  # type: ignore[misc]
+            )
+
+    def _offer_quantities(self) -> None:
+        """Time, coordinates and rates of every joint."""
+        self.quantities.value("t", self.time)
+        for joint in (*self.tree, *self.cuts):
+            for k, label in enumerate(joint.labels):
+                name = f"{joint.name}.{label.name}"
+                self.quantities.add(name, lambda n=joint.name, k=k: self.joint(n).coordinates[k])  # type: ignore[misc]
+                self.quantities.add(f"{name}.rate", lambda n=joint.name, k=k: self.joint(n).rates[k])  # type: ignore[misc]
+            if len(joint.labels) == 1:
+                self.quantities.add(f"{joint.name}.rate", lambda n=joint.name: self.joint(n).rates[0])  # type: ignore[misc]
+
+    def _body(self, name: str) -> Moving:
+        if name not in self.bodies:
+            raise UnknownNameError(nearest(name, self.bodies, "body"))
+        return self.bodies[name]

@@ -1,0 +1,80 @@
+"""A force or torque applied to a frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from mbd.bodies.base import Frame
+from mbd.bodies.values import name_of
+from mbd.errors import ModelError
+from mbd.forces.base import Action, Force, frame_of
+from mbd.forces.quantities import Mention, arguments_of, is_single, mentioned, triple_at, triple_of, value_parameters
+from mbd.scope import Scope
+from mbd.tape.node import Scalar
+
+__all__ = ["Applied"]
+
+
+@dataclass(frozen=True)
+class Applied(Force):
+    """A force at the origin of a frame and a torque on its body, in ground axes: power ``F·v + T·ω``.
+
+    Parameters
+    ----------
+    name : its name
+    frame : where it acts
+    force : three components [N] (two are x and y), each a number, a function, a sympy expression or `Samples`;
+        or one function or `Samples` that gives them all
+    torque : the same [N m]; a single quantity acts about z
+    arguments : what functions are called with, in order: names of quantities ('t', 'left hip.angle'), frames (their
+        positions), joints (their coordinates), or (label, number) for a run-time parameter of the function
+
+    Numbers are the run-time parameters 'name.force.x', 'name.torque.z', …
+    """
+
+    name: str
+    frame: Frame
+    force: Any = None
+    torque: Any = None
+    arguments: Any = ("t",)
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        name_of(self.name, "Applied")
+        frame_of(self.frame, f"frame of Applied '{self.name}'")
+        if self.force is None and self.torque is None:
+            raise ModelError(f"Applied '{self.name}' does nothing: give force=(x, y, z), torque=(x, y, z), or both")
+        if self.force is not None:
+            put(self, "force", triple_of(self.force, f"force of '{self.name}'"))
+        if self.torque is not None:
+            torque = (0.0, 0.0, self.torque) if is_single(self.torque) else self.torque
+            put(self, "torque", triple_of(torque, f"torque of '{self.name}'"))
+        put(self, "arguments", arguments_of(self.arguments, f"Applied '{self.name}'"))
+
+    @property
+    def kind(self) -> str:
+        """'applied'."""
+        return "applied"
+
+    def mentions(self) -> list[Mention]:
+        """Its frame, and what its functions are called with."""
+        return [self.frame, *mentioned(self.arguments)]
+
+    def parameters(self) -> dict[str, float]:
+        """Components given as numbers, and arguments given as numbers."""
+        return value_parameters(self.force, self.arguments, self.name, "force") | value_parameters(
+            self.torque, self.arguments, self.name, "torque"
+        )
+
+    def act(self, scope: Scope) -> Action:
+        """Force on velocity, torque on angular velocity."""
+        motion = scope.frame(self.frame)
+        pairs: list[tuple[Scalar, Scalar]] = []
+        for field, value, velocity in (
+            ("force", self.force, motion.velocity),
+            ("torque", self.torque, motion.angular_velocity),
+        ):
+            if value is not None:
+                pairs += zip(velocity, triple_at(value, self.arguments, scope, self.name, field), strict=True)
+        return Action(pairs=tuple(pairs))

@@ -1,0 +1,78 @@
+"""The promise every force makes."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+from mbd.bodies.base import Frame
+from mbd.errors import ModelError
+from mbd.forces.quantities import Mention
+from mbd.joints.base import Joint
+from mbd.scope import Scope
+from mbd.tape.node import Node, Scalar
+
+__all__ = ["Action", "Force", "frame_of", "joint_of"]
+
+
+@dataclass(frozen=True)
+class Action:
+    """What a force does to the mechanism.
+
+    Parameters
+    ----------
+    pairs : (velocity, force) with the virtual power ``Σ force · velocity``; velocities are linear in v, and the
+        forces are held fixed when generalized forces are formed
+    potential : V, stored energy [J]; ∂V/∂q enters f
+    dissipation : D(v) [W]; ∂D/∂v enters f
+    rates : (state z, its rate ż) of first-order states of the force
+    """
+
+    pairs: tuple[tuple[Scalar, Scalar], ...] = ()
+    potential: Scalar | None = None
+    dissipation: Scalar | None = None
+    rates: tuple[tuple[Node, Scalar], ...] = ()
+
+
+class Force(ABC):
+    """A cause of motion besides joints and constraints; a new force is a frozen dataclass with a `name`."""
+
+    name: str
+
+    @abstractmethod
+    def act(self, scope: Scope) -> Action:
+        """Its action, recorded on the tape."""
+
+    @property
+    @abstractmethod
+    def kind(self) -> str:
+        """'potential', 'loss' or 'applied': the column of the energy ledger."""
+
+    @abstractmethod
+    def mentions(self) -> list[Mention]:
+        """The frames, joints and named quantities it refers to."""
+
+    @abstractmethod
+    def parameters(self) -> dict[str, float]:
+        """Run-time parameters by full name."""
+
+    def faults(self) -> list[str]:
+        """What is physically impossible about it, one sentence each."""
+        return []
+
+
+def frame_of(value: object, what: str) -> Frame:
+    """A frame, checked at the border."""
+    if not isinstance(value, Frame):
+        raise ModelError(f"{what} must be a frame such as thigh.end or model.ground.origin, got {value!r}")
+    return value
+
+
+def joint_of(value: object, what: str) -> Joint:
+    """A joint with one coordinate, checked at the border."""
+    if not isinstance(value, Joint):
+        raise ModelError(f"{what} must be a joint such as the Revolute it acts on, got {value!r}")
+    if len(value.labels) != 1:
+        names = ", ".join(repr(name) for name in value.coordinate_names) or "none"
+        raise ModelError(f"{what} must have one coordinate; '{value.name}' has {names}")
+    return value

@@ -1,0 +1,76 @@
+"""A damper between two points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from mbd.bodies.algebra import difference, dot, norm
+from mbd.bodies.base import Frame
+from mbd.bodies.values import name_of
+from mbd.forces.base import Action, Force, frame_of
+from mbd.forces.quantities import Mention, is_number
+from mbd.joints.losses.base import Loss, loss_of
+from mbd.joints.losses.viscous import Viscous
+from mbd.scope import Scope
+
+__all__ = ["Damper"]
+
+
+@dataclass(frozen=True)
+class Damper(Force):
+    """A damper along the line between two points, which must not meet.
+
+    ``F = F(ḋ)``, d = |p_b − p_a|, ``ḋ = (p_b − p_a)·(v_b − v_a)/d``; it pulls while d grows.
+
+    Parameters
+    ----------
+    name : its name
+    a, b : its end frames
+    loss : a number c [N s/m], which is Viscous(c), or any loss (an orifice, a table)
+    """
+
+    name: str
+    a: Frame
+    b: Frame
+    loss: Any
+
+    def __post_init__(self) -> None:
+        name_of(self.name, "Damper")
+        frame_of(self.a, f"first end of Damper '{self.name}'")
+        frame_of(self.b, f"second end of Damper '{self.name}'")
+        loss = Viscous(self.loss) if is_number(self.loss) else loss_of(self.loss, self.name)
+        object.__setattr__(self, "loss", loss if loss is not None else loss_of("None", self.name))
+
+    @property
+    def law(self) -> Loss:
+        """Its loss."""
+        law: Loss = self.loss
+        return law
+
+    @property
+    def kind(self) -> str:
+        """'loss'."""
+        return "loss"
+
+    def mentions(self) -> list[Mention]:
+        """Its ends."""
+        return [self.a, self.b]
+
+    def parameters(self) -> dict[str, float]:
+        """Those of its loss: 'name.coefficient', …"""
+        return self.law.parameters(self.name)
+
+    def faults(self) -> list[str]:
+        """Those of its loss, ends that are one."""
+        faults = self.law.faults(self.name)
+        if self.a.body is self.b.body:
+            faults.append(f"damper '{self.name}': both ends are on '{self.a.body.name}', so it does nothing")
+        return faults
+
+    def act(self, scope: Scope) -> Action:
+        """−F(ḋ) on ḋ."""
+        a, b = scope.frame(self.a), scope.frame(self.b)
+        arm = difference(b.position, a.position)
+        rate = dot(arm, difference(b.velocity, a.velocity)) / norm(arm)
+        return Action(pairs=((rate, -self.law.force(rate, scope, self.name)),))

@@ -1,0 +1,200 @@
+"""Quantities that users give: numbers, functions of named things, expressions, or samples in time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from mbd.bodies.base import Frame
+from mbd.bodies.values import number, numbers
+from mbd.errors import ModelError
+from mbd.joints.base import Joint
+from mbd.scope import Scope
+from mbd.tape.interpolation import Pieces, linear, monotone
+from mbd.tape.node import Scalar
+from mbd.tape.tracing import Argument, traced, traced_scalar
+
+__all__ = [
+    "ArgumentSpec", "Mention", "Samples", "arguments_of", "is_number", "is_single", "mentioned", "quantity_of",
+    "resolved", "scalar", "triple_at", "triple_of", "value_parameters",
+]  # fmt: skip
+
+Mention: TypeAlias = Frame | Joint | str
+"""What a word refers to: a frame, a joint, or the name of a quantity."""
+
+ArgumentSpec: TypeAlias = tuple[tuple[str, Mention | float], ...]
+"""(label, what it stands for): the name of a quantity, a frame (its position), a joint (its coordinates), a number."""
+
+
+@dataclass(frozen=True, init=False)
+class Samples:
+    """A signal sampled in time, constant before its first sample and after its last.
+
+    Parameters
+    ----------
+    time : (n,) increasing [s]
+    values : (n,) samples, or (n, k) of k components
+    kind : 'cubic' keeps the shape of the samples with a continuous slope, 'linear' joins them by straight lines
+    """
+
+    time: tuple[float, ...]
+    values: tuple[Any, ...]
+    kind: str = "cubic"
+
+    def __init__(self, time: Any, values: Any, kind: str = "cubic") -> None:
+        table = np.asarray(values, dtype=float)
+        object.__setattr__(self, "time", numbers(time, "times of Samples"))
+        if kind not in ("cubic", "linear"):
+            raise ModelError(f"kind of Samples is 'cubic' or 'linear', got {kind!r}")
+        if table.ndim not in (1, 2) or len(table) != len(self.time):
+            raise ModelError(
+                f"Samples needs as many values as times; got {len(self.time)} times and values of shape {table.shape}"
+            )
+        rows: Any = table.tolist()
+        object.__setattr__(self, "values", tuple(rows if table.ndim == 1 else map(tuple, rows)))
+        object.__setattr__(self, "kind", kind)
+        for part in self.components:
+            part.pieces()
+
+    @property
+    def components(self) -> tuple[Samples, ...]:
+        """Each component as a signal of its own."""
+        if not isinstance(self.values[0], tuple):
+            return (self,)
+        return tuple(Samples(self.time, column, self.kind) for column in zip(*self.values, strict=True))
+
+    def pieces(self) -> Pieces:
+        """Breaks and rows of coefficients as the tape stores them."""
+        through = linear if self.kind == "linear" else monotone
+        return through(self.time, self.values, "constant", "Samples")
+
+    def signal(self, scope: Scope, owner: str) -> Scalar:
+        """Its value at the time t."""
+        return scope.tape.lookup(scope.table(owner, *self.pieces()), scope.time)
+
+
+def is_number(value: Any) -> bool:
+    """Whether a quantity is a plain number."""
+    return isinstance(value, int | float | np.floating | np.integer) and not isinstance(value, bool)
+
+
+def is_single(value: Any) -> bool:
+    """Whether a quantity has one component for certain; that of a function shows when it is traced."""
+    if isinstance(value, Samples):
+        return len(value.components) == 1
+    return is_number(value) or (hasattr(value, "free_symbols") and not hasattr(value, "shape"))
+
+
+def quantity_of(value: Any, what: str) -> Any:
+    """A quantity as users may give it, checked at the border; numbers become floats."""
+    if is_number(value):
+        return number(value, what)
+    if isinstance(value, Samples):
+        if len(value.components) != 1:
+            raise ModelError(f"{what}: samples of one component are expected, got {len(value.components)}")
+        return value
+    if callable(value) or hasattr(value, "free_symbols"):
+        return value
+    raise ModelError(f"{what} must be a number, a function, a sympy expression or mbd.Samples, got {value!r}")
+
+
+def triple_of(value: Any, what: str) -> Any:
+    """Three components (two are x and y), each a quantity; or one function or table that gives them all."""
+    if isinstance(value, Samples):
+        parts = value.components
+    elif isinstance(value, Sequence | np.ndarray) and not isinstance(value, str):
+        parts = tuple(value)
+    elif callable(value):
+        return value
+    elif hasattr(value, "free_symbols") and hasattr(value, "shape"):
+        parts = tuple(value)
+    else:
+        raise ModelError(f"{what} must be three components, a function or mbd.Samples; got {value!r}")
+    if len(parts) not in (2, 3):
+        raise ModelError(f"{what} must have three components (or two, x and y), got {len(parts)}")
+    whole = parts if len(parts) == 3 else (*parts, 0.0)
+    return tuple(quantity_of(part, f"{what}, component {axis}") for part, axis in zip(whole, "xyz", strict=True))
+
+
+def arguments_of(values: Any, what: str) -> ArgumentSpec:
+    """Arguments as users may give them: names, frames, joints, ``(label, one of these or a number)``, or a mapping."""
+    entries = list(values.items()) if isinstance(values, Mapping) else [values] if isinstance(values, str) else values
+    result: list[tuple[str, Mention | float]] = []
+    for entry in entries:
+        label, value = entry if isinstance(entry, tuple) and len(entry) == 2 else (None, entry)
+        if isinstance(value, Frame | Joint | str):
+            result.append((str(label or _label(value)), value))
+        elif is_number(value) and label is not None:
+            result.append((str(label), number(value, f"{what}, argument {label!r}")))
+        else:
+            raise ModelError(
+                f"{what}: an argument is a name such as 't' or 'left hip.angle', a frame, a joint, or a pair (label, "
+                f"number) that becomes a parameter; got {entry!r}"
+            )
+    return tuple(result)
+
+
+def _label(value: Mention) -> str:
+    if isinstance(value, str):
+        return value
+    return value.full_name if isinstance(value, Frame) else value.name
+
+
+def mentioned(arguments: ArgumentSpec) -> list[Mention]:
+    """The frames, joints and names among the arguments."""
+    return [value for _, value in arguments if isinstance(value, Frame | Joint | str)]
+
+
+def resolved(arguments: ArgumentSpec, scope: Scope, owner: str) -> list[Argument]:
+    """The scalars and triples that the arguments stand for."""
+    result: list[Argument] = []
+    for label, value in arguments:
+        if isinstance(value, Frame):
+            result.append((label, scope.frame(value).position))
+        elif isinstance(value, Joint):
+            coordinates = scope.joint(value.name).coordinates
+            result.append((label, coordinates[0] if len(coordinates) == 1 else coordinates))
+        elif isinstance(value, str):
+            result.append((label, scope.time if value == "t" else scope.named(value)))
+        else:
+            result.append((label, scope.parameter(owner, label, value)))
+    return result
+
+
+def scalar(value: Any, arguments: ArgumentSpec, scope: Scope, owner: str, field: str) -> Scalar:
+    """A quantity on the tape; a number is the run-time parameter 'owner.field'."""
+    if is_number(value):
+        return scope.parameter(owner, field, float(value))
+    if isinstance(value, Samples):
+        return value.signal(scope, f"{owner}.{field}")
+    return traced_scalar(value, resolved(arguments, scope, owner), f"{field} of '{owner}'", scope.tape)
+
+
+def triple_at(value: Any, arguments: ArgumentSpec, scope: Scope, owner: str, field: str) -> tuple[Scalar, ...]:
+    """Three components on the tape; numbers are the parameters 'owner.field.x', …, a single torque acts about z."""
+    if isinstance(value, tuple):
+        return tuple(
+            scalar(part, arguments, scope, owner, f"{field}.{axis}") for part, axis in zip(value, "xyz", strict=True)
+        )
+    result = traced(value, resolved(arguments, scope, owner), f"{field} of '{owner}'", scope.tape)
+    if field == "torque" and not isinstance(result, tuple):
+        return (0.0, 0.0, result)
+    if not isinstance(result, tuple) or len(result) not in (2, 3):
+        came = f"{len(result)} numbers" if isinstance(result, tuple) else "one number"
+        raise ModelError(f"{field} of '{owner}': three components (or two, x and y) are expected, {came} came")
+    return result if len(result) == 3 else (*result, 0.0)
+
+
+def value_parameters(value: Any, arguments: ArgumentSpec, owner: str, field: str) -> dict[str, float]:
+    """Run-time parameters of a quantity, of three components, and of its arguments, by full name."""
+    result = {f"{owner}.{label}": given for label, given in arguments if isinstance(given, float)}
+    if isinstance(value, tuple):
+        for part, axis in zip(value, "xyz", strict=True):
+            if is_number(part):
+                result[f"{owner}.{field}.{axis}"] = float(part)
+    elif is_number(value):
+        result[f"{owner}.{field}"] = float(value)
+    return result

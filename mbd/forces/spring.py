@@ -1,0 +1,74 @@
+"""A spring between two points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from mbd.bodies.algebra import difference, dot, norm
+from mbd.bodies.base import Frame
+from mbd.bodies.values import name_of, number
+from mbd.forces.base import Action, Force, frame_of
+from mbd.forces.quantities import Mention
+from mbd.scope import Scope
+
+__all__ = ["Spring"]
+
+
+@dataclass(frozen=True)
+class Spring(Force):
+    """A linear spring between two points: ``V = ½ k (|p_b − p_a| − length)²``.
+
+    With the length an exact 0 there is no root: ``V = ½ k |p_b − p_a|²``. With a length, the points must not meet.
+
+    Parameters
+    ----------
+    name : its name
+    a, b : its end frames
+    stiffness : k [N/m]
+    length : unstretched [m]
+    """
+
+    name: str
+    a: Frame
+    b: Frame
+    stiffness: float
+    length: float = 0.0
+
+    def __post_init__(self) -> None:
+        name_of(self.name, "Spring")
+        frame_of(self.a, f"first end of Spring '{self.name}'")
+        frame_of(self.b, f"second end of Spring '{self.name}'")
+        object.__setattr__(self, "stiffness", number(self.stiffness, f"stiffness of '{self.name}'"))
+        object.__setattr__(self, "length", number(self.length, f"length of '{self.name}'"))
+
+    @property
+    def kind(self) -> str:
+        """'potential'."""
+        return "potential"
+
+    def mentions(self) -> list[Mention]:
+        """Its ends."""
+        return [self.a, self.b]
+
+    def parameters(self) -> dict[str, float]:
+        """`stiffness` and `length`."""
+        return {f"{self.name}.stiffness": self.stiffness, f"{self.name}.length": self.length}
+
+    def faults(self) -> list[str]:
+        """A negative length, ends that are one."""
+        faults = []
+        if self.length < 0.0:
+            faults.append(f"spring '{self.name}': length {self.length:g} m is negative; give the unstretched length")
+        if self.a.body is self.b.body:
+            faults.append(f"spring '{self.name}': both ends are on '{self.a.body.name}', so it does nothing")
+        return faults
+
+    def act(self, scope: Scope) -> Action:
+        """Its potential."""
+        arm = difference(scope.frame(self.b).position, scope.frame(self.a).position)
+        k = scope.parameter(self.name, "stiffness", self.stiffness)
+        length = scope.parameter(self.name, "length", self.length)
+        if length.is_zero:
+            return Action(potential=0.5 * k * dot(arm, arm))
+        stretch = norm(arm) - length
+        return Action(potential=0.5 * k * stretch * stretch)

@@ -1,0 +1,19 @@
+"""Integration schemes behind one stepping interface."""
+
+from mbd.integrators.base import Advance, Integrator, Point, StepReport, StepResult, System, Terms
+from mbd.integrators.generalized_alpha import GeneralizedAlpha
+from mbd.integrators.hht import HHT
+from mbd.integrators.newmark import Newmark
+
+__all__ = [
+    "Advance",
+    "GeneralizedAlpha",
+    "HHT",
+    "Integrator",
+    "Newmark",
+    "Point",
+    "StepReport",
+    "StepResult",
+    "System",
+    "Terms",
+]

@@ -1,0 +1,86 @@
+"""One step of HHT in the classical averaged form."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mbd.arrays import Vector
+from mbd.integrators.base import Point, StepReport, StepResult, System, Terms
+from mbd.state import Mode, State
+
+if TYPE_CHECKING:
+    from mbd.integrators.hht import HHT
+
+from mbd.integrators.family import EPS, MAX_ITERATIONS, NewmarkMemory
+
+__all__ = ["AveragedStep"]
+
+
+class AveragedStep:
+    """``M(q₁) a₁ + (1−α)(f + Bᵀλ)₁ + α (f + Bᵀλ)₀ = 0``, ``h(q₁) = 0`` with Newmark's formulas for q₁, v₁.
+
+    Forces are averaged over the step, the mass matrix is not, which costs one order unless M is constant.
+    """
+
+    def __init__(
+        self, scheme: HHT, system: System, state: State, dt: float, mode: Mode, memory: NewmarkMemory
+    ) -> None:
+        self.scheme, self.system, self.state, self.dt, self.mode, self.memory = scheme, system, state, dt, mode, memory
+
+    def _evaluate(self, t: float, x: Vector, y: Vector, rate: Vector, lam: Vector, c: tuple[float, float]) -> Terms:
+        return self.system.evaluate(Point(t, self.state.q, x, y, rate, lam), self.mode, c)
+
+    def run(self) -> StepResult:
+        """Newton on (a₁, λ₁); the part α M a₁ enters with the mass matrix of the iterate."""
+        k, dt, memory = self.scheme.coefficients, self.dt, self.memory
+        alpha, n_v = self.scheme.alpha, len(self.state.v)
+        c_C, c_K = k.gamma * dt, k.beta * dt * dt
+        y0 = np.concatenate([self.state.v, self.state.z])
+        a0 = memory.aux
+        none = np.zeros(n_v)
+        old = self._evaluate(self.state.time, none, y0, a0, memory.lam, (0.0, 0.0))
+        force0 = old.r - np.asarray(old.S) @ a0
+        a1, lam = a0.copy(), memory.lam.copy()
+        t1, error, before = self.state.time + dt, np.inf, np.inf
+        for iteration in range(MAX_ITERATIONS):
+            y1 = y0 + dt * ((1.0 - k.gamma) * a0 + k.gamma * a1)
+            x = dt * self.state.v + dt * dt * ((0.5 - k.beta) * a0[:n_v] + k.beta * a1[:n_v])
+            terms = self._evaluate(t1, x, y1, a1, lam, (c_C, c_K))
+            mass = np.asarray(self._evaluate(t1, x, y1, a1, lam, (0.0, 0.0)).S)
+            r = (1.0 - alpha) * terms.r + alpha * (mass @ a1 + force0)
+            scale = np.max(np.abs(mass) @ np.abs(a1)) + np.max(np.abs(force0), initial=0.0) + 1e-280
+            error = float(np.max(np.abs(r)) / (self.scheme.tolerance * scale))
+            error = max(error, float(np.max(np.abs(terms.h), initial=0.0)) / (64.0 * EPS))
+            if not np.isfinite(error):
+                return self._failed(iteration, error, "a force or a row is not finite")
+            if error <= 1.0 or (iteration >= 2 and error > 0.5 * before and error < 1e3):
+                return self._done(t1, x, y1, a1, lam, StepReport(True, iteration, error))
+            before = error
+            m = len(terms.h)
+            S = (1.0 - alpha) * np.asarray(terms.S) + alpha * mass
+            matrix, right = S, -r
+            if m:
+                R = (1.0 - alpha) * np.asarray(terms.R)
+                matrix = np.block([[S, R], [np.asarray(terms.H), np.zeros((m, m))]])
+                right = np.concatenate([-r, -terms.h / c_K])
+            change = np.linalg.solve(matrix, right)
+            a1, lam = a1 + change[: len(r)], lam + change[len(r) :]
+        return self._failed(MAX_ITERATIONS, error, "Newton did not converge")
+
+    def _failed(self, iterations: int, error: float, why: str) -> StepResult:
+        return StepResult(self.state, self.memory, StepReport(False, iterations, error, why))
+
+    def _done(
+        self, t1: float, x: Vector, y1: Vector, a1: Vector, lam: Vector, report: StepReport
+    ) -> StepResult:
+        old, memory, dt, n_v = self.state, self.memory, self.dt, len(self.state.v)
+        after = NewmarkMemory(a1, a1, lam, (a1 - memory.rate) / dt, (lam - memory.lam) / dt, np.zeros(n_v), dt)
+        own = getattr(self.system, "compose", None)
+        q1 = own(old.q, x) if own is not None else old.q + x
+        state = State(
+            t1, q1, y1[:n_v], y1[n_v:], old.mode, old.armed, old.anchors, old.names, old.velocity_names, {},
+            old.parameters,
+        )  # fmt: skip
+        return StepResult(state, after, report)

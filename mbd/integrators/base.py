@@ -1,0 +1,161 @@
+"""The stepping interface: what an integrator sees of a mechanism, and what it promises.
+
+Integrators know nothing but numbers. Anything with an `evaluate` can stand in for a walker.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+
+from mbd.arrays import Matrix, Vector
+from mbd.state import Mode, State
+
+__all__ = ["Advance", "Integrator", "Point", "StepReport", "StepResult", "System", "Terms", "consistent_rates"]
+
+
+@dataclass(frozen=True)
+class Point:
+    """Where the balance is evaluated: at q ⊕ x.
+
+    t [s]; q (n_q,) centre of the chart; x (n_v,) local increment; y (n,) = (v, z); rate (n,) = (v̇, ż);
+    lam (m,) multipliers of the active rows.
+    """
+
+    t: float
+    q: Vector
+    x: Vector
+    y: Vector
+    rate: Vector
+    lam: Vector
+
+
+@dataclass(frozen=True)
+class Terms:
+    """The balance ``r(t, q, v, v̇, λ) = M v̇ + f + Bᵀλ`` and its rows at a point.
+
+    Attributes
+    ----------
+    r : (n,) balance, for first-order states ż − s
+    S : (n, n) = M + c_C ∂r/∂y + c_K ∂r/∂x, or None if no tangent was asked for
+    h, rate : (m,) row values and their rates ḣ = B v + h_t
+    R : (n, m) ∂r/∂λ, equal to Bᵀ unless forces depend on multipliers
+    H : (m, n) row tangent: B for index 3, B + (c_K/c_C) ∂ḣ/∂x for the stabilized form; zero columns for z
+    scale_r, scale_h, scale_rate : magnitudes term by term before cancellation; None: taken from the values
+    """
+
+    r: Vector
+    S: Matrix | None = None
+    h: Vector = field(default_factory=lambda: np.zeros(0))
+    rate: Vector = field(default_factory=lambda: np.zeros(0))
+    R: Matrix | None = None
+    H: Matrix | None = None
+    scale_r: Vector | None = None
+    scale_h: Vector | None = None
+    scale_rate: Vector | None = None
+
+
+class System(Protocol):
+    """A mechanism as numbers. `accelerations` is needed only where rows are active."""
+
+    def evaluate(self, point: Point, mode: Mode, tangent: tuple[float, float] | None) -> Terms:
+        """Terms at a point; with ``tangent = (c_C, c_K)`` also S, R and H."""
+
+
+def consistent_rates(system: System, t: float, q: Vector, y: Vector, mode: Mode) -> tuple[Vector, Vector]:
+    """(v̇, ż) and λ that satisfy the balance and the rows at acceleration level.
+
+    A system with active rows offers ``accelerations(t, q, y, mode)``; otherwise r is solved for the rates,
+    in which it is affine: ``S`` at zero factors is M.
+    """
+    own = getattr(system, "accelerations", None)
+    if own is not None:
+        rate, lam = own(t, q, y, mode)
+        return rate, lam
+    n = len(y)
+    point = Point(t, q, np.zeros(n), y, np.zeros(n), np.zeros(0))
+    terms = system.evaluate(point, mode, (0.0, 0.0))
+    return -np.linalg.solve(np.asarray(terms.S), terms.r), np.zeros(0)
+
+
+@dataclass(frozen=True)
+class StepReport:
+    """How a step went: converged or why not, Newton iterations, largest residual over its tolerance."""
+
+    converged: bool
+    iterations: int = 0
+    residual: float = 0.0
+    message: str = ""
+
+
+@dataclass(frozen=True)
+class StepResult:
+    """State and memory after a step, and its report; the rates and multipliers that users see are in the memory."""
+
+    state: State
+    memory: Any
+    report: StepReport
+
+
+@dataclass(frozen=True)
+class Advance:
+    """Many steps: where they ended, how many, and the report of the last (`rejected`: a guard refused the next)."""
+
+    state: State
+    memory: Any
+    steps: int
+    report: StepReport
+    rejected: bool = False
+
+
+class Integrator(ABC):
+    """A scheme: parameters only, never state.
+
+    A subclass gives `order`, `start` and `step`; that suffices to run every model, with events, impacts and
+    restarts handled outside. The memory is any value; ``memory.rate`` (n,) and ``memory.lam`` (m,) are read
+    as accelerations and multipliers of the results (without them they come from `consistent_rates`).
+    """
+
+    @abstractmethod
+    def order(self, system: System | None = None) -> int:
+        """The order of accuracy in dt that the scheme promises for this system."""
+
+    @abstractmethod
+    def start(self, system: System, state: State, mode: Mode, dt: float) -> Any:
+        """Memory at a consistent state; called again after every switch. dt is the step that will follow [s]."""
+
+    @abstractmethod
+    def step(self, system: System, state: State, dt: float, mode: Mode, memory: Any) -> StepResult:
+        """One step of size dt. Inputs are never mutated; a step that fails says so in its report."""
+
+    def advance(
+        self,
+        system: System,
+        state: State,
+        dt: float,
+        until: float,
+        mode: Mode,
+        memory: Any,
+        guards: Callable[[State], bool] | None = None,
+    ) -> Advance:
+        """Steps of dt until `until`; stops before the first that fails or that `guards(state)` rejects."""
+        report = StepReport(True)
+        start, count = state.time, 0
+        while state.time < until - 1e-9 * dt:
+            target = min(start + (count + 1) * dt, until)
+            result = self.step(system, state, target - state.time, mode, memory)
+            report = result.report
+            if not report.converged:
+                return Advance(state, memory, count, report)
+            if guards is not None and not guards(result.state):
+                return Advance(state, memory, count, report, rejected=True)
+            state, memory, count = result.state, result.memory, count + 1
+        return Advance(state, memory, count, report)
+
+    def check(self, rows: int) -> str | None:
+        """Why this scheme cannot integrate a mechanism with that many rows, or None."""
+        return None

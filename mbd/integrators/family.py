@@ -1,0 +1,270 @@
+"""The Newmark family: Newmark, HHT and generalized-α as one scheme with four numbers.
+
+True accelerations v̇ satisfy the balance and the rows at t₁; an auxiliary a carries the algorithmic average
+(Arnold & Brüls 2007, Multibody Syst. Dyn. 18:185, eqs. 5–7)::
+
+    (1−α_m) a₁ + α_m a₀ = (1−α_f) v̇₁ + α_f v̇₀
+    q₁ = q₀ ⊕ [ dt v₀ + dt² ((½−β) a₀ + β a₁) + U ],   v₁ = v₀ + dt ((1−γ) a₀ + γ a₁)
+
+First-order states follow the velocity formula with their own rates. With rows: index 3 enforces h(q₁) = 0;
+the stabilized form (Gear, Gupta & Leimkuhler 1985) enforces ḣ = 0 as well, by a position correction U that is
+normal to the rows in the metric of the Newton matrix.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+
+from mbd.arrays import Vector
+from mbd.errors import CapabilityError
+from mbd.integrators.base import Integrator, Point, StepReport, StepResult, System, Terms, consistent_rates
+from mbd.state import Mode, State
+
+__all__ = ["Coefficients", "DEFAULT_TOLERANCE", "Formulation", "NewmarkFamily", "NewmarkMemory", "Starting"]
+
+EPS = float(np.finfo(float).eps)
+DEFAULT_TOLERANCE = 1e-11
+"""Residual of the balance over the sum of its terms at which Newton stops; far below any step error."""
+MAX_ITERATIONS = 25
+
+Formulation: TypeAlias = Literal["ggl", "index3"]
+Starting: TypeAlias = Literal["jerk", "consistent"]
+
+
+@dataclass(frozen=True)
+class Coefficients:
+    """α_m, α_f, β, γ."""
+
+    alpha_m: float
+    alpha_f: float
+    beta: float
+    gamma: float
+
+    @property
+    def second_order(self) -> bool:
+        """γ = ½ + α_f − α_m."""
+        return abs(self.gamma - 0.5 - self.alpha_f + self.alpha_m) < 1e-12
+
+    @property
+    def undamped(self) -> bool:
+        """Spectral radius 1 at infinite frequency (ρ∞ = 1): nothing damps the round-off of the multipliers."""
+        return abs(self.rho_inf - 1.0) < 1e-9
+
+    @property
+    def rho_inf(self) -> float:
+        """Spectral radius of the amplification matrix as ω dt → ∞."""
+        beta, gamma = self.beta, self.gamma
+        roots = [-self.alpha_f / (1.0 - self.alpha_f)] if self.alpha_f else []
+        roots += list(np.roots([beta, 0.5 + gamma - 2.0 * beta, 0.5 - gamma + beta]))
+        return float(max(abs(root) for root in roots))
+
+
+@dataclass(frozen=True)
+class NewmarkMemory:
+    """What the scheme keeps between steps.
+
+    rate (n,) true v̇ and ż; aux (n,) the auxiliary a for steps of size `step`; lam (m,) multipliers;
+    slope, lam_slope: their last rates of change, which predict the next step; shift (n_v,) the position correction.
+    """
+
+    rate: Vector
+    aux: Vector
+    lam: Vector
+    slope: Vector
+    lam_slope: Vector
+    shift: Vector
+    step: float
+
+
+class NewmarkFamily(Integrator):
+    """Base of the family: immutable values that print, compare and pickle by their parameters.
+
+    Parameters
+    ----------
+    formulation : 'ggl' (default: position and velocity level) or 'index3' (position level only)
+    start : 'jerk' (default: a₀ = v̇₀ + (α_m−α_f) dt j₀) or 'consistent' (a₀ = v̇₀, the textbook form)
+    tolerance : of the balance, relative to the sum of its terms, at which Newton stops
+    """
+
+    formulation: Formulation
+    starting: Starting
+    tolerance: float
+
+    def __init__(self, formulation: Formulation, start: Starting, tolerance: float, **own: Any) -> None:
+        if formulation not in ("ggl", "index3"):
+            raise CapabilityError(f"formulation is 'ggl' or 'index3', not {formulation!r}")
+        if start not in ("jerk", "consistent"):
+            raise CapabilityError(f"start is 'jerk' or 'consistent', not {start!r}")
+        if not 0.0 < tolerance < 1e-3:
+            raise CapabilityError(f"tolerance must lie between 0 and 1e-3, not {tolerance!r}")
+        values = {**own, "formulation": formulation, "starting": start, "tolerance": float(tolerance)}
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+
+    def __setattr__(self, name: str, value: object) -> None:
+        raise AttributeError(f"an integrator is a value; make a new {type(self).__name__} to change {name!r}")
+
+    def __eq__(self, other: object) -> bool:
+        return type(self) is type(other) and vars(self) == vars(other)
+
+    def __hash__(self) -> int:
+        return hash((type(self), *sorted(vars(self).items())))
+
+    def __repr__(self) -> str:
+        defaults = {"formulation": "ggl", "starting": "jerk", "tolerance": DEFAULT_TOLERANCE, "form": "endpoint"}
+        shown = [(k, v) for k, v in vars(self).items() if defaults.get(k) != v]
+        words = ", ".join(f"{'start' if k == 'starting' else k}={v!r}" for k, v in shown)
+        return f"{type(self).__name__}({words})"
+
+    @property
+    @abstractmethod
+    def coefficients(self) -> Coefficients:
+        """α_m, α_f, β, γ of the scheme."""
+
+    @property
+    def stabilized(self) -> bool:
+        return self.formulation == "ggl"
+
+    @property
+    def exact(self) -> bool:
+        """Without damping Newton iterates to round-off: a loose tolerance would bias energy over long runs."""
+        return self.coefficients.undamped
+
+    def order(self, system: System | None = None) -> int:
+        """2 if γ = ½ + α_f − α_m, else 1."""
+        return 2 if self.coefficients.second_order else 1
+
+    def check(self, rows: int) -> str | None:
+        """Undamped index 3 is refused: nothing damps its multipliers, whose error grows without bound."""
+        if rows and self.formulation == "index3" and self.coefficients.undamped:
+            return (
+                f"{self!r} has no damping at infinite frequency, and with formulation='index3' its multipliers grow "
+                "without bound; use formulation='ggl', HHT(alpha=0.05) or GeneralizedAlpha(rho_inf=0.9)"
+            )
+        return None
+
+    def start(self, system: System, state: State, mode: Mode, dt: float) -> NewmarkMemory:
+        """a₀ = v̇₀ + (α_m−α_f) dt j₀ with the jerk j₀ from one difference of consistent accelerations."""
+        y = np.concatenate([state.v, state.z])
+        n_v = len(state.v)
+        rate, lam = consistent_rates(system, state.time, state.q, y, mode)
+        ahead = dt / 16.0
+        q = _compose(system, state.q, ahead * (state.v + 0.5 * ahead * rate[:n_v]))
+        later, lam_later = consistent_rates(system, state.time + ahead, q, y + ahead * rate, mode)
+        slope, lam_slope = (later - rate) / ahead, (lam_later - lam) / ahead
+        c = self.coefficients
+        jerk = (c.alpha_m - c.alpha_f) * dt if self.starting == "jerk" else 0.0
+        return NewmarkMemory(rate, rate + jerk * slope, lam, slope, lam_slope, np.zeros(n_v), dt)
+
+    def step(self, system: System, state: State, dt: float, mode: Mode, memory: NewmarkMemory) -> StepResult:
+        """One step by Newton's method; the readable twin of the compiled kernel."""
+        return _Step(self, system, state, dt, mode, memory).run()
+
+
+def _compose(system: System, q: Vector, x: Vector) -> Vector:
+    own = getattr(system, "compose", None)
+    return own(q, x) if own is not None else q + x
+
+
+class _Step:
+    """The unknowns of one step while Newton iterates."""
+
+    def __init__(
+        self, scheme: NewmarkFamily, system: System, state: State, dt: float, mode: Mode, memory: NewmarkMemory
+    ) -> None:
+        self.scheme, self.system, self.state, self.dt, self.mode, self.memory = scheme, system, state, dt, mode, memory
+        k = self.k = scheme.coefficients
+        c = (1.0 - k.alpha_f) / (1.0 - k.alpha_m)
+        self.c_C, self.c_K = k.gamma * dt * c, k.beta * dt * dt * c
+        stretch = dt / memory.step
+        self.a0 = memory.rate + stretch * (memory.aux - memory.rate)
+        y0 = np.concatenate([state.v, state.z])
+        self.n_v = len(state.v)
+        self.rate = memory.rate + dt * memory.slope
+        self.lam = memory.lam + dt * memory.lam_slope
+        self.shift = memory.shift * stretch**3
+        a1 = self._aux()
+        self.y = y0 + dt * ((1.0 - k.gamma) * self.a0 + k.gamma * a1)
+        n_v = self.n_v
+        self.x = dt * state.v + dt * dt * ((0.5 - k.beta) * self.a0[:n_v] + k.beta * a1[:n_v]) + self.shift
+
+    def _aux(self) -> Vector:
+        k = self.k
+        return ((1 - k.alpha_f) * self.rate + k.alpha_f * self.memory.rate - k.alpha_m * self.a0) / (1 - k.alpha_m)
+
+    def _error(self, terms: Terms) -> float:
+        """Largest residual over its tolerance, each block apart."""
+        tolerance = 4.0 * EPS if self.scheme.exact else self.scheme.tolerance
+        fastest = float(np.max(np.abs(self.rate[: self.n_v]), initial=0.0))
+        size = np.abs(terms.S) @ np.abs(self.rate) if terms.S is not None else np.abs(terms.r)
+        scale_r = np.full(len(terms.r), np.max(size, initial=0.0)) if terms.scale_r is None else terms.scale_r
+        parts = [np.abs(terms.r) / (tolerance * np.maximum(scale_r, 1e-280))]
+        if len(terms.h):
+            floor = 16.0 * EPS * (np.ones(len(terms.h)) if terms.scale_h is None else terms.scale_h)
+            parts.append(np.abs(terms.h) / (np.maximum(floor, tolerance * self.c_K * fastest) + 1e-300))
+            if self.scheme.stabilized:
+                scale = np.ones(len(terms.h)) if terms.scale_rate is None else terms.scale_rate
+                limit = np.maximum(16.0 * EPS * scale, tolerance * self.c_C * fastest)
+                parts.append(np.abs(terms.rate) / (limit + 1e-300))
+        return float(np.max(np.concatenate(parts)))
+
+    def run(self) -> StepResult:
+        """Newton: evaluate, judge every block, correct accelerations, multipliers and the position shift."""
+        t1 = self.state.time + self.dt
+        before, error = np.inf, np.inf
+        for iteration in range(MAX_ITERATIONS):
+            point = Point(t1, self.state.q, self.x, self.y, self.rate, self.lam)
+            terms = self.system.evaluate(point, self.mode, (self.c_C, self.c_K))
+            error = self._error(terms)
+            if not np.isfinite(error):
+                return self._result(t1, StepReport(False, iteration, error, "a force or a row is not finite"))
+            floor = 1e4 if self.scheme.exact else 1e4 * EPS / self.scheme.tolerance
+            if error <= 1.0 or (iteration >= 2 and error > 0.5 * before and error <= max(1.0, floor)):
+                return self._result(t1, StepReport(True, iteration, error))
+            before = error
+            try:
+                self._correct(terms)
+            except np.linalg.LinAlgError:
+                return self._result(t1, StepReport(False, iteration, error, "the Newton matrix is singular"))
+        return self._result(t1, StepReport(False, MAX_ITERATIONS, error, "Newton did not converge"))
+
+    def _correct(self, terms: Terms) -> None:
+        n, m, n_v = len(terms.r), len(terms.h), self.n_v
+        assert terms.S is not None
+        if not m:
+            change = np.linalg.solve(terms.S, -terms.r)
+        else:
+            matrix = np.block([[terms.S, terms.R], [terms.H, np.zeros((m, m))]])
+            stabilized = self.scheme.stabilized
+            goal = terms.rate / self.c_C if stabilized else terms.h / self.c_K
+            right = np.zeros((n + m, 2))
+            right[:, 0] = np.concatenate([-terms.r, -goal])
+            right[n:, 1] = -(terms.h - self.c_K / self.c_C * terms.rate - terms.H[:, :n_v] @ self.shift)
+            solved = np.linalg.solve(matrix, right)
+            change = solved[:n, 0]
+            self.lam = self.lam + solved[n:, 0]
+            if stabilized:
+                self.x = self.x + solved[:n_v, 1] - self.shift
+                self.shift = solved[:n_v, 1]
+        self.rate = self.rate + change
+        self.y = self.y + self.c_C * change
+        self.x = self.x + self.c_K * change[:n_v]
+
+    def _result(self, t1: float, report: StepReport) -> StepResult:
+        if not report.converged:
+            return StepResult(self.state, self.memory, report)
+        memory, dt, n_v = self.memory, self.dt, self.n_v
+        after = NewmarkMemory(
+            self.rate, self._aux(), self.lam, (self.rate - memory.rate) / dt, (self.lam - memory.lam) / dt, self.shift, dt
+        )
+        old = self.state
+        state = State(
+            t1, _compose(self.system, old.q, self.x), self.y[:n_v], self.y[n_v:], old.mode, old.armed, old.anchors,
+            old.names, old.velocity_names, {}, old.parameters,
+        )  # fmt: skip
+        return StepResult(state, after, report)
+

@@ -1,0 +1,48 @@
+"""The generalized-α scheme (Chung & Hulbert 1993, J. Appl. Mech. 60:371)."""
+
+from __future__ import annotations
+
+from mbd.errors import CapabilityError
+from mbd.integrators.family import DEFAULT_TOLERANCE, Coefficients, Formulation, NewmarkFamily, Starting
+
+__all__ = ["GeneralizedAlpha"]
+
+
+class GeneralizedAlpha(NewmarkFamily):
+    """The generalized-α scheme: the least low-frequency damping for a wanted damping of the fast modes.
+
+    α_m = (2ρ−1)/(ρ+1), α_f = ρ/(ρ+1), γ = ½ + α_f − α_m, β = ¼(γ+½)² with ρ = ρ∞.
+
+    Parameters
+    ----------
+    rho_inf : ρ∞ ∈ [0, 1], amplitude kept per step at infinite frequency (default 0.9); 1 damps nothing
+
+    Raises
+    ------
+    CapabilityError
+        for ρ∞ outside [0, 1].
+
+    >>> GeneralizedAlpha(rho_inf=1.0).coefficients
+    Coefficients(alpha_m=0.5, alpha_f=0.5, beta=0.25, gamma=0.5)
+    """
+
+    rho_inf: float
+
+    def __init__(
+        self,
+        rho_inf: float = 0.9,
+        *,
+        formulation: Formulation = "ggl",
+        start: Starting = "jerk",
+        tolerance: float = DEFAULT_TOLERANCE,
+    ) -> None:
+        if not 0.0 <= rho_inf <= 1.0:
+            raise CapabilityError(f"GeneralizedAlpha needs rho_inf between 0 and 1, not {rho_inf!r}; 0.9 is common")
+        super().__init__(formulation, start, tolerance, rho_inf=float(rho_inf))
+
+    @property
+    def coefficients(self) -> Coefficients:
+        rho = self.rho_inf
+        alpha_m, alpha_f = (2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0)
+        gamma = 0.5 + alpha_f - alpha_m
+        return Coefficients(alpha_m, alpha_f, 0.25 * (gamma + 0.5) ** 2, gamma)

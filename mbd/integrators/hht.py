@@ -1,0 +1,76 @@
+"""Hilber, Hughes & Taylor's scheme (1977, Earthq. Eng. Struct. Dyn. 5:283)."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from mbd.errors import CapabilityError
+from mbd.integrators.averaged import AveragedStep
+from mbd.integrators.base import StepResult, System
+from mbd.integrators.family import (
+    DEFAULT_TOLERANCE,
+    Coefficients,
+    Formulation,
+    NewmarkFamily,
+    NewmarkMemory,
+    Starting,
+)
+from mbd.state import Mode, State
+
+__all__ = ["HHT"]
+
+
+class HHT(NewmarkFamily):
+    """The HHT scheme: α_m = 0, α_f = α, γ = ½ + α, β = (1+α)²/4.
+
+    Parameters
+    ----------
+    alpha : α ∈ [0, 1/3], numerical damping of the fast modes; ρ∞ = (1−α)/(1+α) (default 0.05)
+    form : 'endpoint' (default): balance and rows hold at t₁, order 2. 'averaged': the classical form that
+        averages f and Bᵀλ over the step but not M(q); order 1 unless M is constant.
+
+    Raises
+    ------
+    CapabilityError
+        for α outside [0, 1/3].
+
+    >>> HHT(alpha=0.05).coefficients
+    Coefficients(alpha_m=0.0, alpha_f=0.05, beta=0.275625, gamma=0.55)
+    """
+
+    alpha: float
+    form: Literal["endpoint", "averaged"]
+
+    def __init__(
+        self,
+        alpha: float = 0.05,
+        form: Literal["endpoint", "averaged"] = "endpoint",
+        *,
+        formulation: Formulation | None = None,
+        start: Starting = "jerk",
+        tolerance: float = DEFAULT_TOLERANCE,
+    ) -> None:
+        if not 0.0 <= alpha <= 1.0 / 3.0:
+            raise CapabilityError(f"HHT needs alpha between 0 and 1/3, not {alpha!r}; 0.05 is common")
+        if form not in ("endpoint", "averaged"):
+            raise CapabilityError(f"form is 'endpoint' or 'averaged', not {form!r}")
+        if form == "averaged" and formulation == "ggl":
+            raise CapabilityError("HHT(form='averaged') enforces rows at position level; use formulation='index3'")
+        chosen: Formulation = formulation or ("index3" if form == "averaged" else "ggl")
+        super().__init__(chosen, start, tolerance, alpha=float(alpha), form=form)
+
+    @property
+    def coefficients(self) -> Coefficients:
+        return Coefficients(0.0, self.alpha, 0.25 * (1.0 + self.alpha) ** 2, 0.5 + self.alpha)
+
+    def order(self, system: System | None = None) -> int:
+        """2; the averaged form has 1 unless the system says that its mass matrix is constant."""
+        if self.form == "averaged" and self.alpha > 0.0 and not getattr(system, "constant_mass", False):
+            return 1
+        return super().order(system)
+
+    def step(self, system: System, state: State, dt: float, mode: Mode, memory: NewmarkMemory) -> StepResult:
+        """One step; see `NewmarkFamily.step` and, for the averaged form, `AveragedStep`."""
+        if self.form == "averaged":
+            return AveragedStep(self, system, state, dt, mode, memory).run()
+        return super().step(system, state, dt, mode, memory)

@@ -1,0 +1,51 @@
+"""Newmark's scheme (Newmark 1959, J. Eng. Mech. Div. ASCE 85:67)."""
+
+from __future__ import annotations
+
+from mbd.errors import CapabilityError
+from mbd.integrators.family import DEFAULT_TOLERANCE, Coefficients, Formulation, NewmarkFamily, Starting
+
+__all__ = ["Newmark"]
+
+
+class Newmark(NewmarkFamily):
+    """Newmark's scheme: α_m = α_f = 0.
+
+    Parameters
+    ----------
+    beta : β > 0 (default ¼, the trapezoidal rule; 1/6 is linear acceleration)
+    gamma : γ (default ½); order 2 only for ½, above it first-order damping
+
+    Raises
+    ------
+    CapabilityError
+        for γ < ½ (unstable) or β ≤ 0.
+
+    >>> Newmark().order()
+    2
+    >>> Newmark(beta=0.3025, gamma=0.6).order()
+    1
+    """
+
+    beta: float
+    gamma: float
+
+    def __init__(
+        self,
+        beta: float = 0.25,
+        gamma: float = 0.5,
+        *,
+        formulation: Formulation = "ggl",
+        start: Starting = "jerk",
+        tolerance: float = DEFAULT_TOLERANCE,
+    ) -> None:
+        if not gamma >= 0.5 or not beta > 0.0:
+            raise CapabilityError(
+                f"Newmark needs gamma ≥ 1/2 (below it every step is unstable) and beta > 0, not beta={beta!r}, "
+                f"gamma={gamma!r}; Newmark(0.25, 0.5) is the trapezoidal rule"
+            )
+        super().__init__(formulation, start, tolerance, beta=float(beta), gamma=float(gamma))
+
+    @property
+    def coefficients(self) -> Coefficients:
+        return Coefficients(0.0, 0.0, self.beta, self.gamma)

@@ -1,0 +1,170 @@
+"""The promise every joint makes: one definition, two uses (tree edge and cut edge)."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+from mbd.bodies.base import Frame
+from mbd.bodies.values import name_of, number
+from mbd.errors import ModelError, nearest
+from mbd.joints.losses.base import Loss, loss_of
+from mbd.scope import Rotation, Scope, Triple
+from mbd.tape.node import Scalar
+
+__all__ = ["Joint", "JointLoss", "Label", "row_unit"]
+
+JointLoss = Loss | Mapping[str, Loss] | None
+"""A loss on every coordinate of a joint, or by label of its coordinates."""
+
+
+class Label(NamedTuple):
+    """A coordinate of a joint: its name ('angle') and unit ('rad' or 'm')."""
+
+    name: str
+    unit: str
+
+
+def row_unit(label: str) -> str:
+    """The unit of a row of `Joint.rows`: 'rad' for 'turn …', which hold directions, 'm' for places."""
+    return "rad" if label.startswith("turn") else "m"
+
+
+class Joint(ABC):
+    """A joint between a frame of the parent body and a frame of the child body.
+
+    The relative motion is ``child = parent · (R(q), p(q))``. As a tree edge the joint generates its
+    coordinates through `transform` and `subspace`; as a cut edge it gives `rows`, and `recover`
+    reads the coordinates off the two frames. Both uses describe the same mechanics.
+
+    A new joint is a frozen dataclass with the fields below; `stiffness` and `rest` are fields only of joints with one
+    coordinate, whose linear spring has the energy ``½ k (q − rest)²``. It calls `settle` when it is made.
+    """
+
+    name: str
+    parent: Frame
+    child: Frame
+    loss: JointLoss
+    stiffness: float = 0.0
+    rest: float = 0.0
+
+    @property
+    @abstractmethod
+    def labels(self) -> tuple[Label, ...]:
+        """The coordinates, in order."""
+
+    @abstractmethod
+    def transform(self, q: Sequence[Scalar], scope: Scope) -> tuple[Rotation, Triple]:
+        """R, p of the child frame in the parent frame."""
+
+    @abstractmethod
+    def subspace(self, q: Sequence[Scalar], scope: Scope) -> Sequence[tuple[Triple, Triple]]:
+        """For each coordinate, (angular, linear) velocity of the child frame per unit rate, in child axes."""
+
+    @abstractmethod
+    def rows(self, R: Rotation, p: Triple, scope: Scope) -> Sequence[tuple[str, Scalar]]:
+        """(label, residual) of every constraint that the joint puts on the relative placement R, p of its frames.
+
+        Labels 'x', 'y', 'z', 'across …', 'along' are places [m], 'turn …' directions [rad] (see `row_unit`).
+        """
+
+    @abstractmethod
+    def recover(self, R: Rotation, p: Triple, scope: Scope) -> Sequence[Scalar]:
+        """The coordinates of a placement that satisfies `rows`; angles between −π and π."""
+
+    @property
+    @abstractmethod
+    def is_planar(self) -> bool:
+        """Whether it turns about z only and shifts in x–y only."""
+
+    @property
+    def is_reversed(self) -> bool:
+        """Whether it is seen from its child (see `mbd.joints.reversed.Reversed`)."""
+        return False
+
+    def compose(self, q: Sequence[Scalar], x: Sequence[Scalar]) -> Sequence[Scalar]:
+        """q ⊕ x, the coordinates after a local increment x; + for every joint whose coordinates form a vector."""
+        return [a + b for a, b in zip(q, x, strict=True)]
+
+    @property
+    def is_vector(self) -> bool:
+        """Whether ⊕ is +."""
+        return True
+
+    # effects of the joint itself ---------------------------------------------------------------------------------
+    def losses(self) -> list[tuple[int, str, Loss]]:
+        """(place of the coordinate, owner of the parameters, loss): (0, 'left knee loss', Viscous(0.1))."""
+        if isinstance(self.loss, Mapping):
+            places = {label.name: place for place, label in enumerate(self.labels)}
+            return [(places[label], f"{self.name} loss.{label}", loss) for label, loss in self.loss.items()]
+        if self.loss is None:
+            return []
+        return [(place, f"{self.name} loss", self.loss) for place in range(len(self.labels))]
+
+    def resistance(self, rates: Sequence[Scalar], scope: Scope) -> list[Scalar]:
+        """Generalized force ∂D/∂q̇ of its losses for each coordinate, positive on the left-hand side [N m or N]."""
+        forces: list[Scalar] = [0.0] * len(self.labels)
+        for place, owner, loss in self.losses():
+            forces[place] = forces[place] + loss.force(rates[place], scope, owner)
+        return forces
+
+    def elastic_energy(self, q: Sequence[Scalar], scope: Scope) -> Scalar:
+        """½ k (q − rest)² of its spring [J]; an exact 0 for joints that have none."""
+        if len(self.labels) != 1:
+            return 0.0
+        owner = f"{self.name} spring"
+        stretch = q[0] - scope.parameter(owner, "rest", self.rest)
+        return 0.5 * scope.parameter(owner, "stiffness", self.stiffness) * stretch * stretch
+
+    def parameters(self) -> dict[str, float]:
+        """Run-time parameters by full name: 'left knee loss.coefficient', 'left knee spring.stiffness', …"""
+        result: dict[str, float] = {}
+        if len(self.labels) == 1:
+            result = {f"{self.name} spring.stiffness": self.stiffness, f"{self.name} spring.rest": self.rest}
+        for _, owner, loss in self.losses():
+            result |= loss.parameters(owner)
+        return result
+
+    def faults(self) -> list[str]:
+        """What is physically impossible about it, one sentence each."""
+        faults = [fault for _, owner, loss in self.losses() for fault in loss.faults(owner)]
+        if self.stiffness < 0.0:
+            faults.append(f"joint '{self.name}': stiffness {self.stiffness:g} is negative; give a value ≥ 0")
+        if self.parent.body is self.child.body:
+            faults.append(
+                f"joint '{self.name}' connects '{self.parent.body.name}' to itself; give a frame of another body"
+            )
+        return list(dict.fromkeys(faults))
+
+    @property
+    def coordinate_names(self) -> tuple[str, ...]:
+        """'left knee.angle', …"""
+        return tuple(f"{self.name}.{label.name}" for label in self.labels)
+
+    def settle(self) -> None:
+        """Check the fields at the border; every joint calls this when it is made."""
+        kind, put = type(self).__name__, object.__setattr__
+        name_of(self.name, kind)
+        for side in ("parent", "child"):
+            value: Any = getattr(self, side)
+            if not isinstance(value, Frame):
+                raise ModelError(
+                    f"{kind} '{self.name}': its {side} must be a frame such as thigh.end or model.ground.origin, "
+                    f"got {value!r}"
+                )
+        if isinstance(self.loss, Mapping):
+            known = [label.name for label in self.labels]
+            for label in self.loss:
+                if label not in known:
+                    raise ModelError(f"loss of '{self.name}': " + nearest(label, known, "coordinate"))
+            put(self, "loss", {label: loss_of(loss, f"{self.name}.{label}") for label, loss in self.loss.items()})
+        elif loss_of(self.loss, self.name) is not None and len({label.unit for label in self.labels}) != 1:
+            labels = ", ".join(f"'{label.name}' [{label.unit}]" for label in self.labels)
+            raise ModelError(
+                f"{kind} '{self.name}': one loss cannot serve its coordinates ({labels or 'it has none'}); "
+                "say on which each acts, such as loss={'angle': mbd.Viscous(0.1)}"
+            )
+        if len(self.labels) == 1:
+            put(self, "stiffness", number(self.stiffness, f"stiffness of '{self.name}'"))
+            put(self, "rest", number(self.rest, f"rest of '{self.name}'"))

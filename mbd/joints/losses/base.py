@@ -1,0 +1,103 @@
+"""The promise every loss makes."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any
+
+from mbd.bodies.algebra import derivatives_at
+from mbd.errors import ModelError
+from mbd.scope import Scope
+from mbd.tape.node import Scalar
+
+__all__ = ["DissipationFunction", "Loss", "LossSum", "loss_of"]
+
+
+class Loss(ABC):
+    """Friction or damping of one rate v, a force F(v) with ``F(v) v ≥ 0`` that opposes the motion.
+
+    F is positive on the left-hand side of ``M a + f + Bᵀλ = 0``: the mechanism feels −F. Losses add with ``+``.
+    A new loss is a frozen dataclass that gives `force`, or a `DissipationFunction` that gives D(v).
+    """
+
+    @abstractmethod
+    def force(self, rate: Scalar, scope: Scope, owner: str) -> Scalar:
+        """F(v) [N or N m] at a rate v [m/s or rad/s]; parameters are named 'owner.field'."""
+
+    @abstractmethod
+    def fields(self) -> dict[str, float]:
+        """Its physical quantities by field; each is a run-time parameter 'owner.field'."""
+
+    def faults(self, owner: str) -> list[str]:
+        """Why it would not dissipate, one sentence each; by default, negative fields."""
+        return [
+            f"'{owner}': {field} {value:g} is negative, so it would feed energy in; give a value ≥ 0"
+            for field, value in self.fields().items()
+            if value < 0.0
+        ]
+
+    def parameters(self, owner: str) -> dict[str, float]:
+        """Run-time parameters by full name: {'left knee loss.coefficient': 0.1}."""
+        return {f"{owner}.{field}": value for field, value in self.fields().items()}
+
+    def __add__(self, other: Loss) -> Loss:
+        if not isinstance(other, Loss):
+            return NotImplemented
+        return LossSum((*_parts(self), *_parts(other)))
+
+
+class DissipationFunction(Loss):
+    """A loss given by Rayleigh's function D(v): ``F = ∂D/∂v``, dissipated power ``F v``."""
+
+    @abstractmethod
+    def dissipation(self, rate: Scalar, scope: Scope, owner: str) -> Scalar:
+        """D(v) [W], smallest at v = 0."""
+
+    def force(self, rate: Scalar, scope: Scope, owner: str) -> Scalar:
+        """``F = ∂D/∂v``."""
+        _, (slope,) = derivatives_at(lambda v: self.dissipation(v, scope, owner), [rate], scope.tape)
+        return slope
+
+
+@dataclass(frozen=True)
+class LossSum(Loss):
+    """Several losses on one rate, ``F = Σ F_i``.
+
+    Their parameters are told apart by kind: 'knee loss.viscous.coefficient'.
+    """
+
+    losses: tuple[Loss, ...]
+
+    def named(self, owner: str) -> list[tuple[str, Loss]]:
+        """Each part with the owner of its parameters."""
+        kinds = [type(loss).__name__.lower() for loss in self.losses]
+        counts = [kinds[: k + 1].count(kind) for k, kind in enumerate(kinds)]
+        names = [kind if count == 1 else f"{kind} {count}" for kind, count in zip(kinds, counts, strict=True)]
+        return [(f"{owner}.{name}", loss) for name, loss in zip(names, self.losses, strict=True)]
+
+    def force(self, rate: Scalar, scope: Scope, owner: str) -> Scalar:
+        """The sum of the forces."""
+        result: Scalar = 0.0
+        for name, loss in self.named(owner):
+            result = result + loss.force(rate, scope, name)
+        return result
+
+    def fields(self) -> dict[str, float]:
+        """The fields of its parts: 'viscous.coefficient', …"""
+        return {f"{name}.{field}"[1:]: value for name, loss in self.named("") for field, value in loss.fields().items()}
+
+    def faults(self, owner: str) -> list[str]:
+        """The faults of its parts."""
+        return [fault for name, loss in self.named(owner) for fault in loss.faults(name)]
+
+
+def _parts(loss: Loss) -> tuple[Loss, ...]:
+    return loss.losses if isinstance(loss, LossSum) else (loss,)
+
+
+def loss_of(value: Any, owner: str) -> Loss | None:
+    """A loss as given to a joint, checked at the border."""
+    if value is None or isinstance(value, Loss):
+        return value
+    raise ModelError(f"loss of '{owner}' must be a loss such as mbd.Viscous(0.1), got {value!r}")

@@ -1,0 +1,52 @@
+"""A user's own dissipation function."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from mbd.bodies.algebra import derivatives_at
+from mbd.joints.losses.base import DissipationFunction
+from mbd.scope import Scope
+from mbd.tape.node import Scalar, Tape
+from mbd.tape.tracing import traced_scalar
+
+__all__ = ["Dissipation"]
+
+
+@dataclass(frozen=True)
+class Dissipation(DissipationFunction):
+    """``F = ∂D/∂v`` of a user's D(v): a Python function of one scalar, or a sympy expression of one symbol ``rate``.
+
+    Parameters
+    ----------
+    function : D(v) [W], with ``D'(v) v ≥ 0``; the model's check tries it at rates of both signs
+    """
+
+    function: Any
+
+    def fields(self) -> dict[str, float]:
+        """None: what the function contains is its own."""
+        return {}
+
+    def dissipation(self, rate: Scalar, scope: Scope, owner: str) -> Scalar:
+        """D(v)."""
+        return self._value(rate, owner, scope.tape)
+
+    def _value(self, rate: Scalar, owner: str, tape: Tape) -> Scalar:
+        return traced_scalar(self.function, [("rate", rate)], f"dissipation function of '{owner}'", tape)
+
+    def faults(self, owner: str) -> list[str]:
+        """Rates at which it would feed energy in, or has no value."""
+        for size in (1e-3, 0.1, 1.0, 10.0):
+            for rate in (size, -size):
+                tape = Tape()
+                _, (slope,) = derivatives_at(lambda v, tape=tape: self._value(v, owner, tape), [rate], tape)
+                power = slope.data * rate if slope.is_constant else math.nan
+                if not power >= 0.0:
+                    return [
+                        f"'{owner}': its dissipation function gives the power {power:g} W at the rate {rate:g}; "
+                        "a loss takes energy out, D'(v) v ≥ 0"
+                    ]
+        return []

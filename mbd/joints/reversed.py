@@ -1,0 +1,113 @@
+"""A joint seen from its child."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from mbd.bodies.algebra import cross, difference, rotate, scaled, transpose
+from mbd.bodies.base import Frame
+from mbd.joints.base import Joint, JointLoss, Label
+from mbd.scope import Rotation, Scope, Triple
+from mbd.tape.node import Scalar
+
+__all__ = ["Reversed"]
+
+
+@dataclass(frozen=True)
+class Reversed(Joint):
+    """A joint as a tree edge that is walked from its child to its parent; its coordinates keep their meaning.
+
+    With R, p of the joint, ``R' = Rᵀ``, ``p' = −Rᵀ p``; with its velocity (ω, v) in child axes the parent frame moves,
+    seen from the child, with ``ω' = −R ω``, ``v' = (R ω) × p − R v`` in parent axes.
+
+    Parameters
+    ----------
+    joint : the joint as the user described it
+    """
+
+    joint: Joint
+
+    @property
+    def name(self) -> str:  # type: ignore[override]
+        """The name of the joint."""
+        return self.joint.name
+
+    @property
+    def parent(self) -> Frame:  # type: ignore[override]
+        """The joint's child frame."""
+        return self.joint.child
+
+    @property
+    def child(self) -> Frame:  # type: ignore[override]
+        """The joint's parent frame."""
+        return self.joint.parent
+
+    @property
+    def loss(self) -> JointLoss:  # type: ignore[override]
+        """The joint's loss."""
+        return self.joint.loss
+
+    @property
+    def stiffness(self) -> float:  # type: ignore[override]
+        """The joint's stiffness."""
+        return self.joint.stiffness
+
+    @property
+    def rest(self) -> float:  # type: ignore[override]
+        """The joint's rest."""
+        return self.joint.rest
+
+    @property
+    def labels(self) -> tuple[Label, ...]:
+        """The joint's coordinates."""
+        return self.joint.labels
+
+    @property
+    def is_planar(self) -> bool:
+        """As the joint."""
+        return self.joint.is_planar
+
+    @property
+    def is_reversed(self) -> bool:
+        """True."""
+        return True
+
+    @property
+    def is_vector(self) -> bool:
+        """As the joint."""
+        return self.joint.is_vector
+
+    def compose(self, q: Sequence[Scalar], x: Sequence[Scalar]) -> Sequence[Scalar]:
+        """As the joint."""
+        return self.joint.compose(q, x)
+
+    def parameters(self) -> dict[str, float]:
+        """As the joint."""
+        return self.joint.parameters()
+
+    def transform(self, q: Sequence[Scalar], scope: Scope) -> tuple[Rotation, Triple]:
+        """The inverse placement."""
+        return _inverse(*self.joint.transform(q, scope))
+
+    def subspace(self, q: Sequence[Scalar], scope: Scope) -> Sequence[tuple[Triple, Triple]]:
+        """The inverse motion."""
+        R, p = self.joint.transform(q, scope)
+        result = []
+        for angular, linear in self.joint.subspace(q, scope):
+            turn = rotate(R, angular)
+            result.append((scaled(-1.0, turn), difference(cross(turn, p), rotate(R, linear))))
+        return result
+
+    def rows(self, R: Rotation, p: Triple, scope: Scope) -> Sequence[tuple[str, Scalar]]:
+        """The joint's rows on the inverse placement."""
+        return self.joint.rows(*_inverse(R, p), scope)
+
+    def recover(self, R: Rotation, p: Triple, scope: Scope) -> Sequence[Scalar]:
+        """The joint's coordinates of the inverse placement."""
+        return self.joint.recover(*_inverse(R, p), scope)
+
+
+def _inverse(R: Rotation, p: Triple) -> tuple[Rotation, Triple]:
+    back = transpose(R)
+    return back, scaled(-1.0, rotate(back, p))

@@ -1,0 +1,89 @@
+"""A nut on a thread."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import KW_ONLY, dataclass
+
+from mbd.bodies.algebra import axis_rotation, dot, scaled
+from mbd.bodies.base import Frame
+from mbd.bodies.values import Vector3, number, unit_vector
+from mbd.errors import ModelError
+from mbd.joints.base import Joint, JointLoss, Label
+from mbd.joints.parts import Z, across_rows, align_rows, sine_cosine
+from mbd.scope import Rotation, Scope, Triple
+from mbd.tape.functions import cos, sin
+from mbd.tape.node import Scalar
+
+__all__ = ["Screw"]
+
+
+@dataclass(frozen=True)
+class Screw(Joint):
+    """A nut on a thread: ``R = exp(angle [axis]×)``, ``p = pitch · angle/2π · axis``.
+
+    Parameters
+    ----------
+    name, parent, child : its name and its two frames
+    pitch : advance per turn [m], negative for a left-handed thread
+    axis : direction in the parent frame; z by default
+    loss : friction torque of the rate [N m]
+    stiffness, rest : of a torsion spring [N m/rad, rad]
+
+    Coordinates: `angle` [rad], over any number of turns.
+    """
+
+    name: str
+    parent: Frame
+    child: Frame
+    pitch: float
+    axis: Vector3 = Z
+    _: KW_ONLY
+    loss: JointLoss = None
+    stiffness: float = 0.0
+    rest: float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "axis", unit_vector(self.axis, f"axis of '{self.name}'"))
+        object.__setattr__(self, "pitch", number(self.pitch, f"pitch of '{self.name}'"))
+        if self.pitch == 0.0:
+            raise ModelError(f"Screw '{self.name}': a thread of pitch 0 is a hinge; use mbd.Revolute")
+        self.settle()
+
+    @property
+    def labels(self) -> tuple[Label, ...]:
+        """`angle`."""
+        return (Label("angle", "rad"),)
+
+    @property
+    def is_planar(self) -> bool:
+        """False: it turns about the direction in which it shifts."""
+        return False
+
+    def parameters(self) -> dict[str, float]:
+        """`pitch`, and those of spring and loss."""
+        return {f"{self.name}.pitch": self.pitch, **super().parameters()}
+
+    def advance(self, scope: Scope) -> Scalar:
+        """Shift per angle, pitch/2π [m/rad]."""
+        return scope.parameter(self.name, "pitch", self.pitch) * (0.5 / math.pi)
+
+    def transform(self, q: Sequence[Scalar], scope: Scope) -> tuple[Rotation, Triple]:
+        """A turn about the axis and the shift that goes with it."""
+        return axis_rotation(self.axis, q[0]), scaled(self.advance(scope) * q[0], self.axis)
+
+    def subspace(self, q: Sequence[Scalar], scope: Scope) -> Sequence[tuple[Triple, Triple]]:
+        """ω = axis, v = pitch/2π · axis."""
+        return [(self.axis, scaled(self.advance(scope), self.axis))]
+
+    def rows(self, R: Rotation, p: Triple, scope: Scope) -> Sequence[tuple[str, Scalar]]:
+        """No place across the axis, the axes align, and sin(turn − turn that belongs to the shift) = 0."""
+        sine, cosine = sine_cosine(R, self.axis)
+        (angle,) = self.recover(R, p, scope)
+        thread = sine * cos(angle) - cosine * sin(angle)
+        return [*across_rows(p, self.axis), *align_rows(R, self.axis), ("turn about", thread)]
+
+    def recover(self, R: Rotation, p: Triple, scope: Scope) -> Sequence[Scalar]:
+        """The angle that belongs to the shift, which counts full turns too."""
+        return [dot(self.axis, p) / self.advance(scope)]

@@ -1,0 +1,60 @@
+"""No motion at all."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from mbd.bodies.algebra import IDENTITY, ZERO
+from mbd.bodies.base import Frame
+from mbd.joints.base import Joint, Label
+from mbd.joints.parts import place_rows, turn_rows
+from mbd.scope import Rotation, Scope, Triple
+from mbd.tape.node import Scalar
+
+__all__ = ["Weld"]
+
+
+@dataclass(frozen=True)
+class Weld(Joint):
+    """Two frames that are one: ``R = 1``, ``p = 0``; without coordinates, hence without a loss.
+
+    Parameters
+    ----------
+    name, parent, child : its name and its two frames
+    """
+
+    name: str
+    parent: Frame
+    child: Frame
+
+    loss = None
+
+    def __post_init__(self) -> None:
+        self.settle()
+
+    @property
+    def labels(self) -> tuple[Label, ...]:
+        """None."""
+        return ()
+
+    @property
+    def is_planar(self) -> bool:
+        """True."""
+        return True
+
+    def transform(self, q: Sequence[Scalar], scope: Scope) -> tuple[Rotation, Triple]:
+        """Nothing."""
+        return IDENTITY, ZERO
+
+    def subspace(self, q: Sequence[Scalar], scope: Scope) -> Sequence[tuple[Triple, Triple]]:
+        """Nothing."""
+        return []
+
+    def rows(self, R: Rotation, p: Triple, scope: Scope) -> Sequence[tuple[str, Scalar]]:
+        """The points coincide, no turn."""
+        return [*place_rows(p), *turn_rows(R)]
+
+    def recover(self, R: Rotation, p: Triple, scope: Scope) -> Sequence[Scalar]:
+        """Nothing."""
+        return []

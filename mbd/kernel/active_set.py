@@ -1,0 +1,93 @@
+"""The active-set manager: constraints register, it keeps who is closed and by which rule each opens."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbd.equations.equations import Contact, Equations, Guard
+from mbd.state import Mode
+
+__all__ = ["ActiveSetManager", "ContactTables"]
+
+Integers = NDArray[np.int64]
+
+
+class ContactTables(dict[str, Integers | NDArray[np.float64]]):
+    """The rules of all contacts as arrays, under the names of the kernel's fields."""
+
+
+class ActiveSetManager:
+    """Switches bilateral rows, unilateral contacts and penalty contacts on and off.
+
+    Bilateral rows are always active. A contact registers with its gap, its rows or force law, and its rules;
+    the manager turns the rules into tables for the kernel, which judges every step by them, and turns the
+    kernel's closed flags into a `Mode` and into lists of active rows.
+    """
+
+    def __init__(self, equations: Equations) -> None:
+        self.contacts: list[Contact] = []
+        self.guards: list[Guard] = []
+        self._row_contact = [row.contact for row in equations.rows]
+        for contact in equations.contacts:
+            self.register(contact)
+        for guard in equations.guards:
+            self.guards.append(guard)
+
+    def register(self, contact: Contact) -> int:
+        """Add a contact; its number."""
+        self.contacts.append(contact)
+        return len(self.contacts) - 1
+
+    @property
+    def names(self) -> list[str]:
+        return [contact.name for contact in self.contacts]
+
+    def flags(self, closed: Iterable[str]) -> Integers:
+        """1 for each closed contact, in order of registration."""
+        closed = set(closed)
+        return np.array([int(contact.name in closed) for contact in self.contacts], dtype=np.int64)
+
+    def mode(self, flags: Sequence[int] | Integers) -> Mode:
+        """The closed contacts by name."""
+        return Mode(frozenset(c.name for c, flag in zip(self.contacts, flags, strict=True) if flag))
+
+    def active_rows(self, flags: Sequence[int] | Integers) -> tuple[int, ...]:
+        """Numbers of the rows that act: bilateral ones and those of closed unilateral contacts, ascending."""
+        return tuple(k for k, contact in enumerate(self._row_contact) if contact < 0 or flags[contact])
+
+    def penalties(self, flags: Sequence[int] | Integers) -> tuple[int, ...]:
+        """Numbers of the penalty contacts that act."""
+        return tuple(c for c, contact in enumerate(self.contacts) if contact.kind == "penalty" and flags[c])
+
+    def tables(self) -> ContactTables:
+        """Rules as arrays; see `mbd.kernel.fields`."""
+        number = {contact.name: c for c, contact in enumerate(self.contacts)}
+        opens = {"pull": 0, "gap": 1, "when": 2}
+        starts, targets, afters = [0], [], []
+        anchors = [0]
+        while_kind, while_target = [], []
+        for contact in self.contacts:
+            for other, after in contact.when:
+                targets.append(number[other])
+                afters.append(int(after))
+            starts.append(len(targets))
+            anchors.append(anchors[-1] + len(contact.anchors))
+            named = isinstance(contact.only_while, str)
+            while_kind.append(0 if contact.only_while is None else 1 if named else 2)
+            while_target.append(number[str(contact.only_while)] if named else -1)
+        normals = [contact.rows[0] if contact.rows else -1 for contact in self.contacts]
+        integers = {
+            "row_contact": self._row_contact,
+            "row_normal": [int(k in normals) for k in range(len(self._row_contact))],
+            "kind": [int(contact.kind == "penalty") for contact in self.contacts],
+            "opens": [opens[contact.opens_on] for contact in self.contacts],
+            "normal": normals, "when_start": starts, "when_target": targets, "when_after": afters,
+            "while_kind": while_kind, "while_target": while_target, "anchor_start": anchors,
+            "direction": [guard.direction for guard in self.guards],
+        }  # fmt: skip
+        tables = ContactTables({name: np.array(values, dtype=np.int64) for name, values in integers.items()})
+        tables["restitution"] = np.array([contact.restitution for contact in self.contacts], dtype=float)
+        return tables

@@ -1,0 +1,393 @@
+"""Many steps with switching: step, judge, accept or switch, observe."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mbd.kernel.fields import (
+    BASE,
+    CHATTER,
+    CLOSE,
+    CROSS,
+    DONE,
+    EVENT,
+    EVENTS,
+    FULL,
+    GRID,
+    LAST_SWITCH,
+    LOG_CLOSED,
+    LOG_EVENT,
+    LOG_OPENED,
+    LOGGED,
+    MODE,
+    NEW_MODE,
+    NOW,
+    OPEN_PULL,
+    PAUSE,
+    RESTART,
+    RESTARTS,
+    ROWS,
+    SINCE_STORE,
+    STEPS,
+    STORED,
+    SWITCHES,
+    WATCH,
+)  # fmt: skip
+from mbd.kernel.guards import gap_scale, gap_tolerance, is_watched, judge, locate, try_step, update_armed, watch
+from mbd.kernel.hooks import scheme_accept, scheme_start
+from mbd.kernel.restart import (
+    active_rows,
+    capture,
+    complementarity,
+    consistent,
+    evaluate,
+    impact,
+    load_accelerations,
+)  # fmt: skip
+
+__all__ = ["advance"]
+
+
+def store_row(K: Any) -> None:
+    """One row of results: t, q, (v, z), (v̇, ż), λ, closed."""
+    o = K.state[STORED] * K.width
+    K.store[o] = K.clock[NOW]
+    o += 1
+    for i in range(K.n_q):
+        K.store[o + i] = K.q[i]
+    o += K.n_q
+    for i in range(K.n):
+        K.store[o + i] = K.y[i]
+        K.store[o + K.n + i] = K.rate[i]
+    o += 2 * K.n
+    for k in range(K.n_rows):
+        K.store[o + k] = K.lam[k]
+    o += K.n_rows
+    for c in range(K.n_contacts):
+        K.store[o + c] = float(K.closed[c])
+    K.state[STORED] += 1
+    K.state[SINCE_STORE] = 0
+
+
+def log_event(K: Any, kind: int, index: int, loss: float) -> None:
+    """One line of the event log: t, kind, index, energy loss, row of results, impulses of its rows."""
+    o = K.state[LOGGED] * K.event_width
+    K.log[o] = K.clock[NOW]
+    K.log[o + 1] = float(kind)
+    K.log[o + 2] = float(index)
+    K.log[o + 3] = loss
+    K.log[o + 4] = float(K.state[STORED])
+    for k in range(K.n_rows):
+        mine = kind == LOG_CLOSED and K.row_contact[k] == index and K.kind[index] == 0
+        K.log[o + 5 + k] = -K.impulse[k] if mine else 0.0
+    K.state[LOGGED] += 1
+    K.counts[EVENTS] += 1
+
+
+def find_mode(K: Any) -> int:
+    """Number of the mode of the closed contacts, −1 if its code is not made yet."""
+    for mode in range(K.mode_count[0]):
+        same = True
+        for c in range(K.n_contacts):
+            if K.mode_closed[mode * K.n_contacts + c] != K.closed[c]:
+                same = False
+                break
+        if same:
+            return mode
+    return -1
+
+
+def settle(K: Any) -> int:
+    """Consistent accelerations and multipliers; contacts that would pull open, touching ones that press close."""
+    evaluate(K, K.clock[NOW], K.q, K.y)
+    load_accelerations(K)
+    for c in range(K.n_contacts):
+        K.active[c] = 1 if (K.closed[c] == 1 and K.kind[c] == 0) else 0
+        K.free[c] = 0
+        if K.kind[c] == 0:
+            if (K.closed[c] == 1 and K.opens[c] == 0) or (K.closed[c] == 0 and K.touched[c] == 1):
+                K.free[c] = 1
+    status = complementarity(K)
+    if status != 0:
+        return status
+    for i in range(K.n):
+        K.rate[i] = K.jump[i]
+    for k in range(K.n_rows):
+        K.lam[k] = K.impulse[k]
+    for c in range(K.n_contacts):
+        K.touched[c] = 0
+        if K.kind[c] == 0 and K.active[c] != K.closed[c]:
+            K.closed[c] = K.active[c]
+            if K.active[c] == 1:
+                capture(K, c)
+                log_event(K, LOG_CLOSED, c, 0.0)
+            else:
+                K.armed[c] = 1
+                log_event(K, LOG_OPENED, c, 0.0)
+        K.active[c] = 0
+    return 0
+
+
+def restart(K: Any) -> int:
+    """Make the state consistent in its mode and start the scheme from it."""
+    status = settle(K)
+    if status != 0:
+        return status
+    K.counts[RESTARTS] += 1
+    K.state[ROWS] = active_rows(K, K.closed)
+    status = scheme_start(K)
+    if status != 0:
+        return status
+    K.state[ROWS] = active_rows(K, K.closed)
+    K.state[MODE] = find_mode(K)
+    K.clock[BASE] = K.clock[NOW]
+    K.state[GRID] = 0
+    if K.n_contacts + K.n_guards > 0:
+        watch(K, K.clock[NOW], K.q, K.y, K.rate, K.lam, K.guards0)
+    return 0
+
+
+def accept(K: Any, h: float, t1: float) -> None:
+    """The candidate becomes the accepted state; guards follow."""
+    scheme_accept(K, h)
+    K.clock[NOW] = t1
+    for i in range(4 * K.n_contacts + 2 * K.n_guards):
+        K.guards0[i] = K.guards1[i]
+    update_armed(K)
+
+
+def take_over(K: Any, t1: float) -> None:
+    """The candidate becomes the accepted state ahead of a restart, with consistent rates in the old mode."""
+    for i in range(K.n_q):
+        K.q[i] = K.q1[i]
+    for i in range(K.n):
+        K.y[i] = K.y1[i]
+        K.rate[i] = K.rate1[i]
+    for k in range(K.n_rows):
+        K.lam[k] = K.lam1[k]
+    K.clock[NOW] = t1
+    for i in range(4 * K.n_contacts + 2 * K.n_guards):
+        K.guards0[i] = K.guards1[i]
+    if consistent(K, t1, K.q, K.y) == 0:
+        for i in range(K.n):
+            K.rate[i] = K.jump[i]
+        for k in range(K.n_rows):
+            K.lam[k] = K.impulse[k]
+
+
+def gather_closing(K: Any) -> float:
+    """Mark the contacts that close at this instant in K.closing; the fastest closing speed of unilateral ones.
+
+    Contacts that touch and approach close together with the fired one, whatever their order.
+    """
+    nC = K.n_contacts
+    fastest = 0.0
+    for c in range(nC):
+        K.closing[c] = 0
+        if K.closed[c] == 1:
+            continue
+        fired = K.fired[0] == CLOSE and K.fired[1] == c
+        near = abs(K.guards0[c]) <= 1e-10 * gap_scale(K, c)
+        ready = K.armed[c] == 1 and is_watched(K, c, K.guards0)
+        approach = -K.guards0[nC + c]
+        if fired or (near and ready and K.kind[c] == 0 and approach > 1e-9):
+            K.closing[c] = 1
+            if K.kind[c] == 0:
+                fastest = max(fastest, approach)
+    return fastest
+
+
+def release_for(K: Any, after: int) -> None:
+    """Open the contacts whose rule names one that closes now."""
+    for c in range(K.n_contacts):
+        if K.closed[c] == 1 and K.opens[c] == 2:
+            for place in range(K.when_start[c], K.when_start[c + 1]):
+                target = K.when_target[place]
+                if K.when_after[place] == after and K.closing[target] == 1 and K.kind[target] == 0:
+                    K.closed[c] = 0
+                    K.armed[c] = 0
+                    log_event(K, LOG_OPENED, c, 0.0)
+                    break
+
+
+def close_by_impact(K: Any, fastest: float) -> int:
+    """Impact of all closing unilateral contacts, the releases it causes, anchors and log."""
+    n = K.n
+    slow = fastest < K.rest_speed
+    if not slow:
+        release_for(K, 0)
+    status = impact(K, slow)
+    if status != 0:
+        return status
+    o_B = n * n + n + n * K.n_rows
+    o_rate = o_B + n * K.n_rows + K.n_rows
+    for c in range(K.n_contacts):
+        if K.kind[c] != 0 or (K.closed[c] == 0 and K.closing[c] == 0):
+            continue
+        if K.closing[c] == 1:
+            work = 0.0  # −½ Λ (γ⁻ + γ⁺) over its rows: its share of the kinetic energy lost
+            for k in range(K.n_rows):
+                if K.row_contact[k] == c:
+                    rate = K.acc[o_rate + k]
+                    for j in range(n):
+                        rate += 0.5 * K.acc[o_B + k * n + j] * K.jump[j]
+                    work += K.impulse[k] * rate
+            log_event(K, LOG_CLOSED, c, work)
+            if K.active[c] == 1:
+                capture(K, c)
+                K.closed[c] = 1
+            else:
+                K.armed[c] = 1
+        elif K.active[c] == 0:
+            K.closed[c] = 0
+            K.armed[c] = 1
+            log_event(K, LOG_OPENED, c, 0.0)
+    if not slow:
+        release_for(K, 1)
+    return 0
+
+
+def mark_touching(K: Any) -> None:
+    """Contacts at g = 0 and ġ = 0 are left to their acceleration."""
+    evaluate(K, K.clock[NOW], K.q, K.y)
+    o_rate = K.n * K.n + K.n + 2 * K.n * K.n_rows + K.n_rows
+    for c in range(K.n_contacts):
+        K.touched[c] = 0
+        near = abs(K.guards0[c]) <= 1e-10 * gap_scale(K, c)
+        if K.kind[c] == 0 and K.closed[c] == 0 and K.armed[c] == 1 and near and is_watched(K, c, K.guards0):
+            still = True
+            for k in range(K.n_rows):
+                if K.row_contact[k] == c and abs(K.acc[o_rate + k]) > 1e-9:
+                    still = False
+            K.touched[c] = 1 if still else 0
+
+
+def switch(K: Any) -> int:
+    """What the fired guard does to the closed contacts and the velocities; the state is at its instant."""
+    kind = K.fired[0]
+    index = K.fired[1]
+    for c in range(K.n_contacts):
+        K.closing[c] = 0
+        K.active[c] = 0
+    if kind == CLOSE:
+        fastest = gather_closing(K)
+        hard = False
+        for c in range(K.n_contacts):
+            if K.closing[c] == 1:
+                if K.kind[c] == 0:
+                    hard = True
+                else:
+                    K.closed[c] = 1
+                    log_event(K, LOG_CLOSED, c, 0.0)
+        if hard:
+            status = close_by_impact(K, fastest)
+            if status != 0:
+                return status
+    elif kind != CROSS and kind != WATCH:
+        K.closed[index] = 0
+        K.armed[index] = 1 if kind == OPEN_PULL or K.opens[index] == 1 else 0
+        log_event(K, LOG_OPENED, index, 0.0)
+    if kind == WATCH:
+        K.armed[index] = 1 if K.guards0[index] > gap_tolerance(K, index) else 0
+    else:
+        mark_touching(K)
+    return 0
+
+
+def same_instant(K: Any) -> bool:
+    """Count switches without progress in time; true when there were too many."""
+    now = K.clock[NOW]
+    if now - K.clock[LAST_SWITCH] <= 1e-10 * K.dt:
+        K.state[SWITCHES] += 1
+    else:
+        K.state[SWITCHES] = 0
+    K.clock[LAST_SWITCH] = now
+    return bool(K.state[SWITCHES] > K.max_switches)
+
+
+def handle_event(K: Any) -> int:
+    """Take the located event: rows before and after, impact, restart. Negative: nothing for the caller to do."""
+    kind = K.fired[0]
+    index = K.fired[1]
+    take_over(K, K.clock[NOW] + K.pick[2])
+    if same_instant(K):
+        return CHATTER
+    if kind == WATCH:
+        K.state[RESTART] = 2
+        return switch(K) - 1
+    store_row(K)
+    if kind == CROSS:
+        log_event(K, LOG_EVENT, index, 0.0)
+        K.side[index] = -K.side[index]
+        K.state[RESTART] = 1
+        return EVENT if K.notify[K.n_contacts + index] == 1 else -1
+    status = switch(K)
+    if status != 0:
+        return status
+    status = restart(K)
+    if status != 0:
+        return status
+    store_row(K)
+    for c in range(K.n_contacts):
+        if K.notify[c] == 1 and (K.closing[c] == 1 or (kind != CLOSE and c == index)):
+            return EVENT
+    return -1
+
+
+def advance(K: Any) -> int:
+    """Step until `until`, a full store, a mode without code, an event to report, or a failure."""
+    steps = 0
+    while True:
+        if K.state[STORED] + 4 > K.capacity or K.state[LOGGED] + 3 * K.n_contacts + 6 > K.event_capacity:
+            return FULL
+        if K.state[RESTART] > 0:
+            visible = K.state[RESTART] == 1
+            status = restart(K)
+            if status != 0:
+                return status
+            K.state[RESTART] = 0
+            if visible:
+                store_row(K)
+        t = K.clock[NOW]
+        if t >= K.until - 1e-12 * K.dt:
+            if K.state[SINCE_STORE] > 0:
+                store_row(K)
+            return DONE
+        if K.state[MODE] < 0:
+            K.state[MODE] = find_mode(K)
+            if K.state[MODE] < 0:
+                return NEW_MODE
+        if steps >= K.chunk:
+            return PAUSE
+        steps += 1
+        t1 = K.clock[BASE] + (K.state[GRID] + 1) * K.dt
+        if t1 > K.until - 1e-6 * K.dt:
+            t1 = K.until
+        h = t1 - t
+        status = try_step(K, h, t1)
+        if status != 0:
+            return status
+        K.counts[STEPS] += 1
+        fired = False
+        if K.n_contacts + K.n_guards > 0:
+            for c in range(K.n_contacts + K.n_guards):
+                K.active[c] = 0
+            if judge(K, h):
+                status = locate(K, h)
+                if status != 0:
+                    return status
+                fired = K.fired[0] >= 0
+        if fired:
+            status = handle_event(K)
+            if status >= 0:
+                return status
+            continue
+        if h < 1e-3 * K.dt:
+            take_over(K, t1)
+            K.state[RESTART] = 2
+        else:
+            accept(K, h, t1)
+            K.state[GRID] += 1
+        K.state[SINCE_STORE] += 1
+        if K.state[SINCE_STORE] >= K.stride:
+            store_row(K)

@@ -1,0 +1,69 @@
+"""The one tuple of numbers that stepping and switching work on, and the codes they speak.
+
+`Kernel` holds integers, reals and flat arrays; the compiled form receives the same fields as addresses.
+"""
+
+from __future__ import annotations
+
+from collections import namedtuple
+
+__all__ = ["FIELDS", "INTEGERS", "INTEGER_ARRAYS", "REALS", "REAL_ARRAYS", "Kernel"]
+
+INTEGERS = (
+    "n_q", "n_v", "n", "n_rows", "n_anchors", "n_contacts", "n_guards",  # sizes; n = n_v + n_z rates
+    "o_q", "o_x", "o_v", "o_a", "o_lam", "o_anchor", "o_switch",  # offsets into the block
+    "vector",  # 1: q ⊕ x is q + x
+    "stabilized",  # 1: velocity level with position correction, 0: index 3
+    "jerk",  # 1: a₀ starts from the jerk, 0: a₀ = v̇₀
+    "exact",  # 1: iterate until round-off
+    "max_iterations", "max_switches", "linear",  # linear: event instants by one linear interpolation
+    "width", "capacity", "stride", "event_width", "event_capacity",  # storage
+    "chunk",  # steps before control returns
+)  # fmt: skip
+REALS = ("alpha_m", "alpha_f", "beta", "gamma", "tolerance", "rest_speed", "dt", "until")
+REAL_ARRAYS = (
+    "params", "block",
+    "out",  # of the function called last
+    "acc",  # of the accelerations program
+    "clock",  # time, base time of the grid, step size of aux, time of the last switch
+    "q", "y", "rate", "aux", "slope", "lam", "lam_slope", "shift", "anchors",  # accepted state
+    "q1", "y1", "rate1", "aux1", "lam1", "shift1",  # candidate of the step under judgement
+    "kkt", "rhs", "work",  # linear algebra
+    "force", "bias", "jump", "impulse",  # complementarity: right-hand sides, velocity or acceleration, multipliers
+    "guards0", "guards1",  # guard values at the accepted state and at the candidate
+    "scale",  # magnitudes of r, h, ḣ term by term
+    "side",  # sign of each user guard since it last crossed
+    "restitution",
+    "pick",  # the fired guard: estimate, bracket, sizes
+    "store", "log", "detail",
+)  # fmt: skip
+INTEGER_ARRAYS = (
+    "row_contact", "row_normal", "unit",  # contact of each row; 1 for its normal row; unit block of each balance component
+    "kind", "opens", "normal",  # contact: 0 unilateral, 1 penalty; 0 on pull, 1 on gap, 2 by When; its normal row
+    "when_start", "when_target", "when_after",  # who opens it
+    "while_kind", "while_target",  # 0 always, 1 while a contact is closed, 2 while a measure is positive
+    "anchor_start", "direction", "notify", "terminal",
+    "closed", "armed", "touched", "active", "free", "closing",  # contacts
+    "mode_closed", "mode_code", "mode_count",  # known modes
+    "rows", "pivots", "columns", "fired", "state", "counts",
+)  # fmt: skip
+FIELDS = (*INTEGERS, *REALS, *REAL_ARRAYS, *INTEGER_ARRAYS, "code", "hooks")
+
+Kernel = namedtuple("Kernel", FIELDS)  # type: ignore[misc]
+
+# places in `state`
+MODE, ROWS, GRID, RESTART, STORED, LOGGED, SWITCHES, SINCE_STORE, BLOCKED, FRESH = range(10)
+# places in `counts`
+(STEPS, ITERATIONS, TANGENTS, RESIDUALS, FACTORIZATIONS, EVENTS, RESTARTS, IMPACTS, LOCATIONS, STAGNATIONS, DEEPEST) = range(11)
+# places in `clock`
+NOW, BASE, AUX_STEP, LAST_SWITCH = range(4)
+# functions in `code`; modes follow in pairs (tangent, residual)
+ACCELERATIONS, GUARDS, SCALES, COMPOSE, FIRST_MODE = range(5)
+# what advance returns
+DONE, FULL, NEW_MODE, EVENT, PAUSE = range(5)
+(NOT_FINITE, NOT_CONVERGED, SINGULAR, STAGNATED, CHATTER, NO_IMPACT, DEPENDENT, CONFLICT, NO_LOCATION) = range(10, 19)
+# kinds of fired guards
+CLOSE, OPEN_PULL, OPEN_GAP, OPEN_FORCE, CROSS, WATCH = range(6)
+# kinds in the log
+LOG_CLOSED, LOG_OPENED, LOG_EVENT = range(3)
+EPS = 2.220446049250313e-16

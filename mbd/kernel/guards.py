@@ -1,0 +1,370 @@
+"""Judging a step: which guard fired first, and at which instant exactly.
+
+A watched gap fires when it falls through zero, also when it dips below zero and returns within
+the step (cubic Hermite interpolant, then the dip itself is stepped to). A contact that is not
+armed is ignored until its gap has risen above zero. Closed contacts fire by their release rule.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mbd.kernel.fields import (
+    CLOSE,
+    CROSS,
+    EPS,
+    GUARDS,
+    LOCATIONS,
+    NO_LOCATION,
+    NOW,
+    OPEN_FORCE,
+    OPEN_GAP,
+    OPEN_PULL,
+    WATCH,
+)  # fmt: skip
+from mbd.kernel.hooks import call, scheme_step
+from mbd.kernel.restart import compose, consistent, fill_block
+
+__all__ = ["gap_scale", "judge", "locate", "try_step", "update_armed", "watch"]
+
+GRAZE = 6
+
+
+def watch(K: Any, t: float, q: Any, y: Any, rate: Any, lam: Any, values: Any) -> None:
+    """Gaps, gap rates, penalty forces, conditions and user guards at a state."""
+    fill_block(K, t, q, y)
+    for i in range(K.n):
+        K.block[K.o_a + i] = rate[i]
+    for k in range(K.n_rows):
+        K.block[K.o_lam + k] = lam[k]
+    call(K, GUARDS, values)
+
+
+def try_step(K: Any, h: float, t1: float) -> int:
+    """A candidate at t1 = t + h with its guards; a step far below dt follows the Taylor polynomial."""
+    if h >= 1e-3 * K.dt:
+        status = scheme_step(K, h, t1)
+        if status != 0:
+            return status
+    else:
+        fill_block(K, K.clock[NOW], K.q, K.y)
+        for i in range(K.n_v):
+            K.block[K.o_x + i] = h * (K.y[i] + 0.5 * h * (K.rate[i] + h * K.slope[i] / 3.0))
+        compose(K, K.q1)
+        for i in range(K.n):
+            K.y1[i] = K.y[i] + h * (K.rate[i] + 0.5 * h * K.slope[i])
+        status = consistent(K, t1, K.q1, K.y1)
+        if status != 0:
+            return status
+        for i in range(K.n):
+            K.rate1[i] = K.jump[i]
+            K.aux1[i] = K.jump[i]
+        for k in range(K.n_rows):
+            K.lam1[k] = K.impulse[k]
+    if K.n_contacts + K.n_guards > 0:
+        watch(K, t1, K.q1, K.y1, K.rate1, K.lam1, K.guards1)
+    return 0
+
+
+def is_watched(K: Any, c: int, values: Any) -> bool:
+    """Whether an open contact may close."""
+    if K.while_kind[c] == 0:
+        return True
+    if K.while_kind[c] == 1:
+        return bool(K.closed[K.while_target[c]] == 1)
+    return bool(values[3 * K.n_contacts + c] > 0.0)
+
+
+def gap_scale(K: Any, c: int) -> float:
+    """Size of the terms a gap is made of [m, rad]; 1 for a penalty contact."""
+    row = K.normal[c]
+    size = K.scale[K.n + row] if row >= 0 else 1.0
+    return float(max(size, 1e-3))
+
+
+def gap_tolerance(K: Any, c: int) -> float:
+    """Round-off of the gap."""
+    return 16.0 * EPS * gap_scale(K, c)
+
+
+def update_armed(K: Any) -> None:
+    """A contact is armed once its gap has risen above zero while it is watched; not watched, it is not armed."""
+    for c in range(K.n_contacts):
+        if K.closed[c] == 0:
+            if not is_watched(K, c, K.guards0):
+                K.armed[c] = 0
+            elif K.armed[c] == 0 and K.guards0[c] > 1e-8 * gap_scale(K, c):
+                K.armed[c] = 1
+
+
+def hermite_turn(g0: float, g1: float, d0: float, d1: float, rising: bool) -> float:
+    """Place in (0, 1) of the interior maximum (rising) or minimum of the cubic Hermite interpolant; −1 if none."""
+    a = 3.0 * (d0 + d1 - 2.0 * (g1 - g0))
+    b = 2.0 * (3.0 * (g1 - g0) - 2.0 * d0 - d1)
+    root = b * b - 4.0 * a * d0
+    if root < 0.0:
+        return -1.0
+    root = root**0.5
+    for sign in (-1.0, 1.0):
+        far = b + root if b >= 0.0 else b - root
+        place = -2.0 * d0 / far if sign < 0.0 and far != 0.0 else (-far / (2.0 * a) if a != 0.0 else -1.0)
+        if 0.0 < place < 1.0:
+            curvature = 2.0 * a * place + b
+            if (curvature < 0.0) == rising:
+                return place
+    return -1.0
+
+
+def hermite(g0: float, g1: float, d0: float, d1: float, s: float) -> float:
+    """Cubic Hermite interpolant at s in [0, 1]; d are rates times the step."""
+    u = 1.0 - s
+    return g0 * (1.0 + 2.0 * s) * u * u + g1 * s * s * (3.0 - 2.0 * s) + d0 * s * u * u - d1 * s * s * u
+
+
+def consider(K: Any, kind: int, index: int, estimate: float, low: float) -> None:
+    """Keep the candidate that fires first; all in fractions of the step."""
+    if estimate < K.pick[0]:
+        K.pick[0] = estimate
+        K.pick[1] = low
+        K.fired[0] = kind
+        K.fired[1] = index
+
+
+def crossing(value0: float, value1: float) -> float:
+    """Fraction at which a straight line through two values of opposite sign is zero."""
+    change = value0 - value1
+    if change == 0.0:
+        return 0.5
+    return min(max(value0 / change, 0.0), 1.0)
+
+
+def judge(K: Any, h: float) -> bool:
+    """Whether a guard fired between the accepted state and the candidate; the earliest in K.fired, K.pick."""
+    nC = K.n_contacts
+    K.fired[0] = -1
+    K.pick[0] = 2.0
+    for c in range(nC):
+        if K.active[c] == 1:  # already found to be no event in this step
+            continue
+        g0 = K.guards0[c]
+        g1 = K.guards1[c]
+        d0 = K.guards0[nC + c] * h
+        d1 = K.guards1[nC + c] * h
+        tiny = gap_tolerance(K, c)
+        if K.closed[c] == 0:
+            if K.while_kind[c] == 2 and K.guards0[3 * nC + c] <= 0.0 < K.guards1[3 * nC + c]:
+                consider(K, WATCH, c, crossing(K.guards0[3 * nC + c], K.guards1[3 * nC + c]), 0.0)
+                continue
+            if K.armed[c] == 0 or not is_watched(K, c, K.guards0):
+                continue
+            if g1 < -tiny:
+                if g0 > tiny:
+                    consider(K, CLOSE, c, crossing(g0, g1), 0.0)
+                else:
+                    top = hermite_turn(g0, g1, d0, d1, True)
+                    if top > 0.0 and hermite(g0, g1, d0, d1, top) > tiny:
+                        consider(K, CLOSE, c, top + (1.0 - top) * crossing(hermite(g0, g1, d0, d1, top), g1), top)
+                    else:
+                        consider(K, CLOSE, c, 0.0, 0.0)
+            elif g0 > tiny and d0 < 0.0 < d1:
+                bottom = hermite_turn(g0, g1, d0, d1, False)
+                if bottom > 0.0 and hermite(g0, g1, d0, d1, bottom) < -1e-3 * d0:
+                    consider(K, GRAZE, c, bottom, 0.0)
+        elif K.kind[c] == 0:
+            if K.opens[c] == 0 and K.lam1[K.normal[c]] > 0.0:
+                consider(K, OPEN_PULL, c, crossing(-K.lam[K.normal[c]], -K.lam1[K.normal[c]]), 0.0)
+        elif K.opens[c] == 1:
+            if g1 > tiny:
+                consider(K, OPEN_GAP, c, crossing(g0, g1), 0.0)
+        elif K.guards1[2 * nC + c] < 0.0:
+            consider(K, OPEN_FORCE, c, crossing(K.guards0[2 * nC + c], K.guards1[2 * nC + c]), 0.0)
+    for e in range(K.n_guards):
+        v0 = K.guards0[4 * nC + e]
+        v1 = K.guards1[4 * nC + e]
+        if K.side[e] * v1 < 0.0 and K.active[nC + e] == 0 and (K.direction[e] == 0 or K.direction[e] * v1 > 0.0):
+            consider(K, CROSS, e, crossing(v0, v1) if v0 * v1 < 0.0 else 0.0, 0.0)
+    return bool(K.fired[0] >= 0)
+
+
+def guard_value(K: Any, kind: int, index: int, t1: float) -> float:
+    """The fired guard at the candidate, counted so that it is ≥ 0 before and < 0 after its event."""
+    nC = K.n_contacts
+    if kind == CLOSE:
+        return float(K.guards1[index])
+    if kind == OPEN_GAP:
+        return float(-K.guards1[index])
+    if kind == OPEN_FORCE:
+        return float(K.guards1[2 * nC + index])
+    if kind == WATCH:
+        return float(-K.guards1[3 * nC + index])
+    if kind == CROSS:
+        return float(K.side[index] * K.guards1[4 * nC + index])
+    if consistent(K, t1, K.q1, K.y1) != 0:
+        return float(-K.lam1[K.normal[index]])
+    return float(-K.impulse[K.normal[index]])
+
+
+def stay(K: Any) -> None:
+    """The candidate becomes the accepted state itself: an event at the very start of the step."""
+    for i in range(K.n_q):
+        K.q1[i] = K.q[i]
+    for i in range(K.n):
+        K.y1[i] = K.y[i]
+        K.rate1[i] = K.rate[i]
+        K.aux1[i] = K.aux[i]
+    for k in range(K.n_rows):
+        K.lam1[k] = K.lam[k]
+    for i in range(4 * K.n_contacts + 2 * K.n_guards):
+        K.guards1[i] = K.guards0[i]
+
+
+def dip(K: Any, h: float) -> int:
+    """Step to the lowest point of a grazing gap; a real dip becomes a closing, else the guard keeps quiet."""
+    t = K.clock[NOW]
+    c = K.fired[1]
+    nC = K.n_contacts
+    low = 0.0
+    high = h
+    rate_low = K.guards0[nC + c]
+    rate_high = K.guards1[nC + c]
+    place = K.pick[0] * h
+    for _ in range(30):
+        status = try_step(K, place, t + place)
+        if status != 0:
+            return status
+        if K.guards1[c] < -gap_tolerance(K, c):
+            K.fired[0] = CLOSE
+            K.pick[0] = place
+            K.pick[1] = 0.0
+            return 0
+        rate = K.guards1[nC + c]
+        if rate == 0.0 or high - low < 1e-7 * h:
+            break
+        if rate < 0.0:
+            low = place
+            rate_low = rate
+        else:
+            high = place
+            rate_high = rate
+        place = low + (high - low) * min(max(rate_low / (rate_low - rate_high), 0.02), 0.98)
+    K.active[c] = 1
+    K.fired[0] = -1
+    return try_step(K, h, t + h)
+
+
+def locate(K: Any, h: float) -> int:
+    """Move the candidate to the instant of the first event of the step; K.pick[2] its distance from the start.
+
+    Bracketing (Illinois variant of the false position) on steps of varying size from the same accepted state,
+    until the guard is at round-off. K.fired[0] < 0 afterwards: there was no event, the candidate is the full step.
+    """
+    t = K.clock[NOW]
+    end = h
+    for _ in range(4 * (K.n_contacts + K.n_guards) + 4):
+        kind = K.fired[0]
+        index = K.fired[1]
+        if kind == GRAZE:
+            status = dip(K, end)
+            if status != 0:
+                return status
+            if K.fired[0] < 0:
+                if not judge(K, end):
+                    K.pick[2] = end
+                    return 0
+                continue
+            kind = CLOSE
+            end = K.pick[0]
+            estimate = 0.5
+            low = 0.0
+        else:
+            estimate = K.pick[0]
+            low = K.pick[1] * end
+        status = bracket(K, kind, index, low, end, estimate)
+        if status != 0:
+            return status
+        if K.fired[0] < 0:
+            status = try_step(K, end, t + end)
+            if status != 0:
+                return status
+            if not judge(K, end):
+                K.pick[2] = end
+                return 0
+            continue
+        found = K.pick[2]
+        if found <= 0.0:
+            return 0
+        # did another guard fire before this one? (this one is at round-off and may look fired itself)
+        place = index if kind != CROSS else K.n_contacts + index
+        quiet = K.active[place]
+        K.active[place] = 1
+        other = judge(K, found)
+        K.active[place] = quiet
+        if not other:
+            K.fired[0] = kind
+            K.fired[1] = index
+            K.pick[2] = found
+            return 0
+        end = found
+    return NO_LOCATION
+
+
+def bracket(K: Any, kind: int, index: int, low: float, high: float, estimate: float) -> int:
+    """Root of the fired guard between two distances from the accepted state."""
+    t = K.clock[NOW]
+    K.counts[LOCATIONS] += 1
+    f_high = guard_value(K, kind, index, t + high)
+    if f_high >= 0.0:
+        if kind == OPEN_PULL:  # only the multiplier of the step was negative, not that of the motion
+            K.active[index] = 1
+            K.fired[0] = -1
+        K.pick[2] = high
+        return 0
+    if low > 0.0:
+        status = try_step(K, low, t + low)
+        if status != 0:
+            return status
+    else:
+        stay(K)
+    f_low = guard_value(K, kind, index, t + low)
+    if f_low <= 0.0:
+        if low > 0.0:
+            low = 0.0
+            stay(K)
+        K.pick[2] = low
+        return 0
+    tiny = 0.0
+    if kind == CLOSE or kind == OPEN_GAP:
+        tiny = 0.25 * gap_tolerance(K, index)
+    elif kind != WATCH:
+        tiny = 1e-15 * max(f_low, -f_high)
+    side = 0
+    place = low
+    for trial in range(80):
+        place = low + (high - low) * f_low / (f_low - f_high)
+        if trial == 0 and kind == CLOSE and low == 0.0 and 0.0 < estimate < 1.0 and K.linear == 0:
+            place = high * estimate
+        if not (low < place < high):
+            place = 0.5 * (low + high)
+        status = try_step(K, place, t + place)
+        if status != 0:
+            return status
+        value = guard_value(K, kind, index, t + place)
+        if K.linear == 1 or abs(value) <= tiny or high - low <= 4.0 * EPS * max(abs(t), high):
+            break
+        if value < 0.0:
+            high = place
+            f_high = value
+            if side == -1:
+                f_low *= 0.5
+            side = -1
+        else:
+            low = place
+            f_low = value
+            if side == 1:
+                f_high *= 0.5
+            side = 1
+        if side != 0 and trial % 12 == 11:
+            f_low = f_high = 1.0
+            f_high = -1.0
+    K.pick[2] = place
+    return 0

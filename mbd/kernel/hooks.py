@@ -1,0 +1,31 @@
+"""What differs between the interpreted and the compiled kernel: calling model code, and the scheme.
+
+Interpreted, model functions are Python callables and the scheme is any integrator's own `step`;
+compiled, functions are called by address and the scheme is the Newmark family (see `build`).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+__all__ = ["call", "scheme_accept", "scheme_start", "scheme_step"]
+
+
+def call(K: Any, number: int, out: Any) -> None:
+    """Evaluate model function `number` on the block and parameters."""
+    K.code[number](K.block, K.params, out)
+
+
+def scheme_step(K: Any, h: float, t1: float) -> int:
+    """Fill the candidate with the state at t1 = t + h; 0 or a failure code."""
+    return int(K.hooks.step(K, h, t1))
+
+
+def scheme_accept(K: Any, h: float) -> None:
+    """Make the candidate the accepted state."""
+    K.hooks.accept(K, h)
+
+
+def scheme_start(K: Any) -> int:
+    """Start the scheme from the accepted, consistent state."""
+    return int(K.hooks.start(K))

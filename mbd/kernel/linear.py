@@ -1,0 +1,138 @@
+"""Dense linear algebra on small flat matrices: LU with partial pivoting, elimination with complete pivoting.
+
+Hand-written because it runs inside the compiled kernel, where below about 28 unknowns it beats a library call.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+__all__ = ["eliminate", "factor", "solve"]
+
+
+def factor(A: Any, n: int, pivots: Any) -> int:
+    """LU factors of the row-major n×n matrix A, in place; 0, or 1 + the column without a pivot."""
+    for k in range(n):
+        p = k
+        big = abs(A[k * n + k])
+        for i in range(k + 1, n):
+            size = abs(A[i * n + k])
+            if size > big:
+                big = size
+                p = i
+        pivots[k] = p
+        if not (big > 1e-300 and big < 1e300):
+            return k + 1
+        if p != k:
+            for j in range(n):
+                swap = A[k * n + j]
+                A[k * n + j] = A[p * n + j]
+                A[p * n + j] = swap
+        inverse = 1.0 / A[k * n + k]
+        for i in range(k + 1, n):
+            if A[i * n + k] != 0.0:
+                left = A[i * n + k] * inverse
+                A[i * n + k] = left
+                for j in range(k + 1, n):
+                    A[i * n + j] -= left * A[k * n + j]
+    return 0
+
+
+def solve(A: Any, n: int, pivots: Any, b: Any) -> None:
+    """b ← A⁻¹ b with the factors of `factor`."""
+    for k in range(n):
+        p = pivots[k]
+        if p != k:
+            swap = b[k]
+            b[k] = b[p]
+            b[p] = swap
+    for i in range(1, n):
+        total = b[i]
+        for j in range(i):
+            total -= A[i * n + j] * b[j]
+        b[i] = total
+    for k in range(n):
+        i = n - 1 - k
+        total = b[i]
+        for j in range(i + 1, n):
+            total -= A[i * n + j] * b[j]
+        b[i] = total / A[i * n + i]
+
+
+def eliminate(A: Any, n: int, b: Any, columns: Any, work: Any, rank_tolerance: float) -> int:
+    """Solve A x = b by complete pivoting after equilibration; x in b, free unknowns 0.
+
+    Returns the rank; a negative value −1−rank if the leftover equations conflict.
+    `work` needs 3 n places: row scales, column scales, solution. The number of the unknown
+    eliminated k-th is left in columns[k], those beyond the rank being the dependent ones.
+    """
+    for i in range(n):
+        big = 0.0
+        for j in range(n):
+            big = max(big, abs(A[i * n + j]))
+        work[i] = 1.0 / big if big > 0.0 else 1.0
+        for j in range(n):
+            A[i * n + j] *= work[i]
+        b[i] *= work[i]
+        columns[i] = i
+    for j in range(n):
+        big = 0.0
+        for i in range(n):
+            big = max(big, abs(A[i * n + j]))
+        work[n + j] = 1.0 / big if big > 0.0 else 1.0
+        for i in range(n):
+            A[i * n + j] *= work[n + j]
+    size = 0.0
+    for i in range(n):
+        size = max(size, abs(b[i]))
+    rank = n
+    for k in range(n):
+        p = k
+        c = k
+        big = 0.0
+        for i in range(k, n):
+            for j in range(k, n):
+                if abs(A[i * n + j]) > big:
+                    big = abs(A[i * n + j])
+                    p = i
+                    c = j
+        if not big > rank_tolerance:
+            rank = k
+            break
+        if p != k:
+            for j in range(n):
+                swap = A[k * n + j]
+                A[k * n + j] = A[p * n + j]
+                A[p * n + j] = swap
+            swap = b[k]
+            b[k] = b[p]
+            b[p] = swap
+        if c != k:
+            for i in range(n):
+                swap = A[i * n + k]
+                A[i * n + k] = A[i * n + c]
+                A[i * n + c] = swap
+            place = columns[k]
+            columns[k] = columns[c]
+            columns[c] = place
+        for i in range(k + 1, n):
+            left = A[i * n + k] / A[k * n + k]
+            if left != 0.0:
+                for j in range(k + 1, n):
+                    A[i * n + j] -= left * A[k * n + j]
+                b[i] -= left * b[k]
+    conflict = False
+    for i in range(rank, n):
+        if abs(b[i]) > 1e-8 * (size + 1e-300):
+            conflict = True
+    for k in range(rank):
+        i = rank - 1 - k
+        total = b[i]
+        for j in range(i + 1, rank):
+            total -= A[i * n + j] * b[j]
+        b[i] = total / A[i * n + i]
+    for j in range(n):
+        work[2 * n + columns[j]] = b[j] if j < rank else 0.0
+    for j in range(n):
+        b[j] = work[2 * n + j] * work[n + j]
+    return -1 - rank if conflict else rank

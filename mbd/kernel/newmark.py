@@ -1,0 +1,232 @@
+"""One implicit step of the Newmark family, and its start (Arnold & Brüls 2007, Multibody Syst. Dyn. 18:185).
+
+Newton on (v̇₁, ż₁, λ) with the exact tangent S = M + c_C C_t + c_K K_t; the stabilized form adds the position
+correction U in the metric of the same matrix (Gear, Gupta & Leimkuhler 1985). First-order states z follow the
+velocity formulas of the scheme with their own rate ż, which is of order 2 as well (Jansen, Whiting & Hulbert 2000).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mbd.kernel.fields import (
+    AUX_STEP,
+    BLOCKED,
+    EPS,
+    FACTORIZATIONS,
+    ITERATIONS,
+    MODE,
+    NOT_CONVERGED,
+    NOT_FINITE,
+    NOW,
+    RESIDUALS,
+    ROWS,
+    SINGULAR,
+    STAGNATED,
+    STAGNATIONS,
+    TANGENTS,
+)  # fmt: skip
+from mbd.kernel.hooks import call
+from mbd.kernel.linear import factor, solve
+from mbd.kernel.restart import compose, consistent, fill_block, refresh_scales
+
+__all__ = ["newmark_accept", "newmark_start", "newmark_step"]
+
+
+def newmark_start(K: Any) -> int:
+    """Memory of the scheme at a consistent state: a₀ = v̇₀ + (α_m − α_f) dt j₀, j₀ by a difference (or a₀ = v̇₀)."""
+    n = K.n
+    step = K.dt / 16.0
+    t = K.clock[NOW]
+    fill_block(K, t, K.q, K.y)
+    for i in range(K.n_v):  # a little later on the Taylor parabola
+        K.block[K.o_x + i] = step * (K.y[i] + 0.5 * step * K.rate[i])
+    compose(K, K.q1)
+    for i in range(n):
+        K.y1[i] = K.y[i] + step * K.rate[i]
+    status = consistent(K, t + step, K.q1, K.y1)
+    for i in range(n):
+        K.slope[i] = (K.jump[i] - K.rate[i]) / step if status == 0 else 0.0
+        K.aux[i] = K.rate[i] + (K.jerk * (K.alpha_m - K.alpha_f) * K.dt) * K.slope[i]
+        K.shift[i] = 0.0
+    for k in range(K.n_rows):
+        K.lam_slope[k] = (K.impulse[k] - K.lam[k]) / step if status == 0 else 0.0
+    K.clock[AUX_STEP] = K.dt
+    fill_block(K, t, K.q, K.y)
+    refresh_scales(K)
+    return 0
+
+
+def residual_size(K: Any, o_r: int, m: int, c_C: float, c_K: float, tolerance: float) -> float:
+    """Largest residual over its tolerance: balance, h and (stabilized) ḣ, each block apart; −1 if not finite."""
+    size = 0.0
+    finite = 0.0
+    fastest = 0.0
+    for i in range(K.n):
+        r = abs(K.out[o_r + i])
+        finite += r
+        size = max(size, r / (tolerance * K.scale[i]))
+    for i in range(K.n_v):
+        fastest = max(fastest, abs(K.block[K.o_a + i]))
+    o_h = o_r + K.n
+    for k in range(m):
+        row = K.rows[k]
+        h = abs(K.out[o_h + k])
+        finite += h
+        size = max(size, h / (max(16.0 * EPS * K.scale[K.n + row], tolerance * c_K * fastest) + 1e-300))
+        if K.stabilized == 1:
+            rate = abs(K.out[o_h + m + k])
+            finite += rate
+            floor = 16.0 * EPS * K.scale[K.n + K.n_rows + row]
+            size = max(size, rate / (max(floor, tolerance * c_C * fastest) + 1e-300))
+    if not finite < 1e300:
+        return -1.0
+    return size
+
+
+def newmark_step(K: Any, h: float, t1: float) -> int:
+    """Candidate state (q1, y1, rate1, aux1, lam1) after a step of size h; the accepted state is untouched."""
+    n = K.n
+    n_v = K.n_v
+    m = K.state[ROWS]
+    size = n + m
+    mean_f = 1.0 - K.alpha_f
+    mean_m = 1.0 - K.alpha_m
+    c = mean_f / mean_m
+    c_C = K.gamma * h * c
+    c_K = K.beta * h * h * c
+    block = K.block
+    stretch = h / K.clock[AUX_STEP]
+    mode = K.state[MODE]
+    block[0] = t1
+    block[1] = c_C
+    block[2] = c_K
+    for i in range(K.n_q):
+        block[K.o_q + i] = K.q[i]
+    for k in range(K.n_rows):
+        block[K.o_lam + k] = K.lam[k] + h * K.lam_slope[k]
+    for k in range(K.n_anchors):
+        block[K.o_anchor + k] = K.anchors[k]
+    for i in range(n):
+        a0 = K.rate[i] + stretch * (K.aux[i] - K.rate[i])
+        rate = K.rate[i] + h * K.slope[i]
+        a1 = (mean_f * rate + K.alpha_f * K.rate[i] - K.alpha_m * a0) / mean_m
+        block[K.o_a + i] = rate
+        block[K.o_v + i] = K.y[i] + h * ((1.0 - K.gamma) * a0 + K.gamma * a1)
+        if i < n_v:
+            K.shift1[i] = K.shift[i] * (stretch * stretch * stretch)
+            block[K.o_x + i] = h * K.y[i] + h * h * ((0.5 - K.beta) * a0 + K.beta * a1) + K.shift1[i]
+    tolerance = 4.0 * EPS if K.exact == 1 else K.tolerance
+    before = 1e300
+    fresh = False
+    accepted = False
+    status = NOT_CONVERGED
+    for iteration in range(K.max_iterations):
+        tangent = iteration == 0 or not fresh
+        if tangent:
+            call(K, K.mode_code[2 * mode], K.out)
+            K.counts[TANGENTS] += 1
+            o_r = size * size
+        else:
+            call(K, K.mode_code[2 * mode + 1], K.out)
+            K.counts[RESIDUALS] += 1
+            o_r = 0
+        error = residual_size(K, o_r, m, c_C, c_K, tolerance)
+        if error < 0.0:
+            status = NOT_FINITE
+            break
+        K.detail[1] = error
+        if error <= 1.0:
+            accepted = True
+            break
+        if iteration >= 2 and error > 0.5 * before:
+            refresh_scales(K)
+            error = residual_size(K, o_r, m, c_C, c_K, tolerance)
+            if error <= 1.0:
+                accepted = True
+                break
+            if residual_size(K, o_r, m, 0.0, 0.0, 256.0 * EPS) <= 16.0:
+                K.counts[STAGNATIONS] += 1
+                accepted = True
+                break
+            if iteration >= 6 and K.exact == 0 and residual_size(K, o_r, m, 0.0, 0.0, 1e5 * EPS) <= 1e3:
+                status = STAGNATED
+                break
+        if not tangent and error > 0.1 * before:
+            fresh = False  # the old tangent has done its work: renew it at the same iterate
+            before = 1e300
+            continue
+        before = error
+        # right-hand sides before the factors overwrite the tangent
+        o_h = o_r + n
+        for i in range(n):
+            K.rhs[i] = -K.out[o_r + i]
+        for k in range(m):
+            if K.stabilized == 1:
+                K.rhs[n + k] = -K.out[o_h + m + k] / c_C
+                h_next = K.out[o_h + k] - (c_K / c_C) * K.out[o_h + m + k]
+                if tangent:
+                    for j in range(n_v):
+                        h_next -= K.out[(n + k) * size + j] * K.shift1[j]
+                K.work[n + k] = -h_next
+            else:
+                K.rhs[n + k] = -K.out[o_h + k] / c_K
+        if tangent:
+            for k in range(size * size):
+                K.kkt[k] = K.out[k]
+            column = factor(K.kkt, size, K.pivots)
+            K.counts[FACTORIZATIONS] += 1
+            if column != 0:
+                K.state[BLOCKED] = column - 1
+                status = SINGULAR
+                break
+        solve(K.kkt, size, K.pivots, K.rhs)
+        K.counts[ITERATIONS] += 1
+        for i in range(n):
+            change = K.rhs[i]
+            block[K.o_a + i] += change
+            block[K.o_v + i] += c_C * change
+            if i < n_v:
+                block[K.o_x + i] += c_K * change
+        for k in range(m):
+            block[K.o_lam + K.rows[k]] += K.rhs[n + k]
+        if K.stabilized == 1 and m > 0:
+            for i in range(n):
+                K.work[i] = 0.0
+            solve(K.kkt, size, K.pivots, K.work)
+            for i in range(n_v):
+                shift = K.work[i] if tangent else K.shift1[i] + K.work[i]
+                block[K.o_x + i] += shift - K.shift1[i]
+                K.shift1[i] = shift
+        fresh = True
+    if not accepted:
+        K.detail[0] = t1
+        K.detail[2] = h
+        return status
+    for i in range(n):
+        a0 = K.rate[i] + stretch * (K.aux[i] - K.rate[i])
+        K.rate1[i] = block[K.o_a + i]
+        K.y1[i] = block[K.o_v + i]
+        K.aux1[i] = (mean_f * K.rate1[i] + K.alpha_f * K.rate[i] - K.alpha_m * a0) / mean_m
+    for k in range(K.n_rows):
+        K.lam1[k] = block[K.o_lam + k]
+    compose(K, K.q1)
+    return 0
+
+
+def newmark_accept(K: Any, h: float) -> None:
+    """The candidate becomes the accepted state."""
+    for i in range(K.n_q):
+        K.q[i] = K.q1[i]
+    inverse = 1.0 / h
+    for i in range(K.n):
+        K.y[i] = K.y1[i]
+        K.slope[i] = (K.rate1[i] - K.rate[i]) * inverse
+        K.rate[i] = K.rate1[i]
+        K.aux[i] = K.aux1[i]
+        if i < K.n_v:
+            K.shift[i] = K.shift1[i]
+    for k in range(K.n_rows):
+        K.lam_slope[k] = (K.lam1[k] - K.lam[k]) * inverse
+        K.lam[k] = K.lam1[k]
+    K.clock[AUX_STEP] = h

@@ -1,0 +1,217 @@
+"""The model: what is connected to what."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any, TypeVar
+
+from mbd.bodies.base import Body, Frame
+from mbd.bodies.ground import Ground
+from mbd.bodies.values import Vector3, name_of, number, triple
+from mbd.constraints.base import Constraint
+from mbd.constraints.bilateral import Bilateral
+from mbd.constraints.controller import Controller
+from mbd.constraints.event import Event
+from mbd.constraints.penalty import Penalty
+from mbd.constraints.unilateral import Unilateral
+from mbd.errors import ModelError, UnknownNameError, nearest
+from mbd.forces.base import Force
+from mbd.forces.quantities import Mention
+from mbd.joints.base import Joint
+
+__all__ = ["Model", "on_slope"]
+
+Word = TypeVar("Word")
+
+
+def on_slope(slope: float, g: float = 9.81) -> Vector3:
+    """Gravity in axes that lie on a slope: ``(g sin γ, −g cos γ, 0)``, so that +x walks downhill.
+
+    Angles published from the vertical become angles from the slope's normal by adding γ.
+
+    Parameters
+    ----------
+    slope : γ [rad], positive where +x goes down
+    g : [m/s²]
+    """
+    gamma, size = number(slope, "slope"), number(g, "g")
+    return (size * math.sin(gamma), -size * math.cos(gamma), 0.0)
+
+
+class Model:
+    """A mechanism in words: bodies connected by joints, under forces and constraints.
+
+    Parameters
+    ----------
+    name : its name
+    gravity : in ground axes [m/s²]
+    cut : which joints become rows instead of coordinates: 'auto' and 'loops' cut what closes a loop, 'all' cuts
+        every joint (absolute coordinates), a list of names cuts those
+    tunable : names of parameters that stay run-time inputs although they are 0 or ±1
+
+    Examples
+    --------
+    >>> from mbd.bodies import Link
+    >>> from mbd.joints import Revolute
+    >>> model = Model("pendulum")
+    >>> rod = Link("rod", mass=1.0, length=1.0, center=0.5, inertia=1 / 12)
+    >>> model.connect(Revolute("pin", model.ground.origin, rod.start))
+    >>> model.check()
+    []
+    """
+
+    def __init__(
+        self,
+        name: str,
+        gravity: Any = (0.0, -9.81, 0.0),
+        cut: str | Iterable[str] = "auto",
+        tunable: Iterable[str] = (),
+    ) -> None:
+        self.name = name_of(name, "Model")
+        self.gravity = triple(gravity, f"gravity of '{name}'")
+        self.cut: str | tuple[str, ...] = cut if isinstance(cut, str) else tuple(cut)
+        self.tunable = (tunable,) if isinstance(tunable, str) else tuple(tunable)
+        self.ground = Ground()
+        self.joints: list[Joint] = []
+        self.forces: list[Force] = []
+        self.constraints: list[Constraint] = []
+        self.controllers: list[Controller] = []
+
+    # the three verbs ----------------------------------------------------------------------------------------------
+    def connect(self, *joints: Joint) -> None:
+        """Add joints, and with them the bodies that they connect."""
+        example = "connect takes joints such as mbd.Revolute('knee', thigh.end, shank.start)"
+        self.joints += _all_are(Joint, joints, example)
+
+    def constrain(self, *constraints: Constraint) -> None:
+        """Add constraints and events."""
+        example = "constrain takes constraints such as mbd.Unilateral('foot', mbd.touchdown(shank.end))"
+        self.constraints += _all_are(Constraint, constraints, example)
+
+    def apply(self, *forces: Force | Controller) -> None:
+        """Add forces and controllers."""
+        example = "apply takes forces such as mbd.Motor('drive', hip, torque=1.0), and controllers"
+        known = _all_are((Force, Controller), forces, example)
+        self.forces += [word for word in known if isinstance(word, Force)]
+        self.controllers += [word for word in known if isinstance(word, Controller)]
+
+    # what it contains ---------------------------------------------------------------------------------------------
+    @property
+    def bodies(self) -> dict[str, Body]:
+        """The ground and the bodies in the order in which joints first named them; then bodies named elsewhere."""
+        result: dict[str, Body] = {self.ground.name: self.ground}
+        for frame in self.points():
+            result.setdefault(frame.body.name, frame.body)
+        return result
+
+    @property
+    def frames(self) -> dict[str, Frame]:
+        """Every named frame by full name: those of the bodies, and the points that words refer to."""
+        result = {frame.full_name: frame for body in self.bodies.values() for frame in body.frames.values()}
+        for frame in self.points():
+            result.setdefault(frame.full_name, frame)
+        return result
+
+    @property
+    def bilaterals(self) -> list[Bilateral]:
+        """Constraints that always act."""
+        return [word for word in self.constraints if isinstance(word, Bilateral)]
+
+    @property
+    def contacts(self) -> list[Unilateral | Penalty]:
+        """Constraints that open and close, in order."""
+        return [word for word in self.constraints if isinstance(word, Unilateral | Penalty)]
+
+    @property
+    def events(self) -> list[Event]:
+        """The user's own events."""
+        return [word for word in self.constraints if isinstance(word, Event)]
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Every run-time parameter and its value in this description: {'left thigh.mass': 0.5, …}."""
+        result = {f"gravity.{axis}": value for axis, value in zip("xyz", self.gravity, strict=True)}
+        words: list[Body | Frame | Joint | Force | Constraint] = [*self.bodies.values(), *self.points(), *self.joints]
+        for word in (*words, *self.forces, *self.constraints):
+            result |= word.parameters()
+        return result
+
+    def mentions(self) -> list[Mention]:
+        """The frames, joints and named quantities that forces and constraints refer to."""
+        words: list[Force | Constraint] = [*self.forces, *self.constraints]
+        return [mention for word in words for mention in word.mentions()]
+
+    def points(self) -> list[Frame]:
+        """The frames that joints, forces and constraints refer to."""
+        frames = [frame for joint in self.joints for frame in (joint.parent, joint.child)]
+        return frames + [mention for mention in self.mentions() if isinstance(mention, Frame)]
+
+    def without(self, *names: str) -> Model:
+        """A copy that lacks some joints, losses ('left knee loss'), springs, forces or constraints, or 'gravity'."""
+        model = copy.copy(self)
+        known = {"gravity"}
+        for kind in ("joints", "forces", "constraints", "controllers"):
+            words = getattr(self, kind)
+            known |= {word.name for word in words}
+            setattr(model, kind, [word for word in words if word.name not in names])
+        for place, joint in enumerate(model.joints):
+            bare: dict[str, Any] = {"loss": None} if joint.loss is not None else {}
+            spring: dict[str, Any] = {"stiffness": 0.0} if joint.stiffness != 0.0 else {}
+            for effect, change in (f"{joint.name} loss", bare), (f"{joint.name} spring", spring):
+                known |= {effect} if change else set()
+                if effect in names and change:
+                    model.joints[place] = replace(model.joints[place], **change)  # type: ignore[type-var]
+        if "gravity" in names:
+            model.gravity = (0.0, 0.0, 0.0)
+        for name in names:
+            if name not in known:
+                raise UnknownNameError("without: " + nearest(name, known, "joint, loss, force or constraint"))
+        return model
+
+    # what follows from it -----------------------------------------------------------------------------------------
+    def check(self) -> list[str]:
+        """Every fault of the description, one sentence each; empty where there is none."""
+        from mbd.topology.check import faults
+
+        return faults(self)
+
+    def require_valid(self) -> None:
+        """Raise a `ModelError` with every fault, if there is one."""
+        found = self.check()
+        if found:
+            raise ModelError(found)
+
+    def describe(self) -> str:
+        """The mechanism in a page of text."""
+        from mbd.topology.describe import description
+
+        return description(self)
+
+    def equations(self, latex: bool = False) -> str:
+        """The equations of motion, printed as text or LaTeX."""
+        from mbd.equations import derive
+        from mbd.equations.printing import report
+
+        return report(derive(self), latex)
+
+    def cost(self) -> Any:
+        """Operations of each effect."""
+        from mbd.equations.cost import cost
+
+        return cost(self)
+
+    def __repr__(self) -> str:
+        counts = {"bodies": len(self.bodies) - 1, "joints": len(self.joints), "forces": len(self.forces)}
+        counts["constraints"] = len(self.constraints)
+        return f"Model({self.name!r}: " + ", ".join(f"{count} {kind}" for kind, count in counts.items()) + ")"
+
+
+def _all_are(kind: Any, words: Iterable[Word], sentence: str) -> list[Word]:
+    given = list(words)
+    for word in given:
+        if not isinstance(word, kind):
+            raise ModelError(f"{sentence}; got {word!r}")
+    return given

@@ -1,0 +1,247 @@
+"""Named quantities of a run, evaluated from its states or read from a file."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbd.arrays import Matrix, Vector
+from mbd.errors import UnknownNameError, nearest
+from mbd.results.interpolation import Grid, Places
+from mbd.results.record import Record, Rows
+
+if TYPE_CHECKING:
+    from mbd.equations.equations import Equations
+    from mbd.tape.node import Node, Scalar
+
+__all__ = ["AXES", "Alias", "Columns", "ModelColumns", "StoredColumns", "gather"]
+
+AXES = (".x", ".y", ".z")
+"""Endings of the components of a vector."""
+
+Alias = tuple[str, int]
+"""A named quantity that is itself part of the state: ('q', 0), ('v', 3), …"""
+
+STATE = ("q", "v", "z", "a", "s", "lam")
+
+
+class Columns(ABC):
+    """The named scalars of a run, at its stored rows or between them."""
+
+    def __init__(self, record: Record) -> None:
+        self.record = record
+        self.grid = Grid(record.time)
+
+    @property
+    @abstractmethod
+    def names(self) -> tuple[str, ...]:
+        """The scalars that are certainly known."""
+
+    @abstractmethod
+    def knows(self, name: str) -> bool:
+        """Whether there is a scalar of that name."""
+
+    @abstractmethod
+    def at_rows(self, names: Sequence[str]) -> list[Vector]:
+        """Each scalar at every stored row."""
+
+    @abstractmethod
+    def at_places(self, names: Sequence[str], places: Places) -> list[Vector]:
+        """Each scalar between the rows."""
+
+    @property
+    @abstractmethod
+    def anchors(self) -> Matrix:
+        """The values that closed contacts hold, at every stored row."""
+
+    @property
+    @abstractmethod
+    def q_rate(self) -> Matrix:
+        """q̇ at every stored row (R, n_q)."""
+
+    @abstractmethod
+    def identity(self, name: str) -> tuple[Alias | None, Hashable]:
+        """The scalar's place in the state if it is part of it, and a key that equal quantities share."""
+
+    @property
+    def vectors(self) -> tuple[str, ...]:
+        """Names that stand for three components: 'left shank.end' for 'left shank.end.x', '.y', '.z'."""
+        known = set(self.names)
+        stems = [name[:-2] for name in self.names if name.endswith(".x")]
+        return tuple(s for s in stems if s not in known and all(s + axis in known for axis in AXES))
+
+    def components(self, name: str) -> tuple[str, ...]:
+        """The scalars behind a name: itself, or the three components of a vector."""
+        if self.knows(name):
+            return (name,)
+        parts = tuple(name + axis for axis in AXES)
+        if all(self.knows(part) for part in parts):
+            return parts
+        raise UnknownNameError(nearest(name, (*self.names, *self.vectors), "result"))
+
+
+class ModelColumns(Columns):
+    """Quantities evaluated by the model's own equations."""
+
+    def __init__(self, record: Record, equations: Equations) -> None:
+        super().__init__(record)
+        self.equations = equations
+        self._names: tuple[str, ...] | None = None
+        self._nodes: dict[str, Node] = {}
+        self._anchors: Matrix | None = None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        if self._names is None:
+            self._names = tuple(self.equations.output_names())
+        return self._names
+
+    def knows(self, name: str) -> bool:
+        if name not in self._nodes:
+            try:
+                self._nodes[name] = self.equations.output(name)
+            except (UnknownNameError, KeyError):
+                return False
+        return True
+
+    def node(self, name: str) -> Node:
+        """The quantity as an expression."""
+        if not self.knows(name):
+            raise UnknownNameError(nearest(name, (*self.names, *self.vectors), "result"))
+        return self._nodes[name]
+
+    @property
+    def rows(self) -> Rows:
+        """The stored states."""
+        return self.record.rows(self.anchors)
+
+    def at_rows(self, names: Sequence[str]) -> list[Vector]:
+        return self.evaluate([self.node(name) for name in names], self.rows)
+
+    def at_places(self, names: Sequence[str], places: Places) -> list[Vector]:
+        return self.evaluate([self.node(name) for name in names], self.between(places))
+
+    def between(self, places: Places) -> Rows:
+        """The states between the stored rows."""
+        return self.grid.between(self.rows, places, self.q_rate)
+
+    @property
+    def q_rate(self) -> Matrix:
+        """q̇ = ∂(q ⊕ x)/∂x · v at x = 0; v itself where ⊕ is +."""
+        compose = self.equations.compose
+        if compose is None:
+            return self.record.v
+        from mbd.tape.derivatives import jvp
+
+        tape = self.equations.tape
+        seeds: dict[Node, Scalar] = {tape.input("x", k): tape.input("v", k) for k in range(self.equations.n_v)}
+        return np.column_stack(self.evaluate(jvp(compose, seeds), self.rows))
+
+    def evaluate(self, nodes: Sequence[Node], rows: Rows) -> list[Vector]:
+        """Each expression at each row, (R,)."""
+        if not nodes:
+            return []
+        from mbd.compile.python import array_function
+
+        unique = list({node.index: node for node in nodes}.values())
+        values = array_function(unique)(self._inputs(rows), self.record.parameters_at(rows.source))
+        found = {node.index: value for node, value in zip(unique, values, strict=True)}
+        return [found[node.index] for node in nodes]
+
+    @staticmethod
+    def _inputs(rows: Rows) -> Mapping[str, NDArray[Any]]:
+        """The inputs of expressions, at the center of each chart (x = 0)."""
+        return {
+            "t": rows.time, "q": rows.q, "v": rows.v, "z": rows.z, "a": rows.a, "s": rows.s, "lam": rows.lam,
+            "anchor": rows.anchors, "switch": rows.closed,
+        }  # fmt: skip
+
+    @property
+    def anchors(self) -> Matrix:
+        """What each contact captured in the row where it closed, held until it opens."""
+        if self._anchors is None:
+            contacts = self.equations.contacts
+            held = np.zeros((len(self.record.time), sum(len(contact.anchors) for contact in contacts)))
+            rows = self.record.rows(held)
+            for number, contact in enumerate(contacts):
+                closed = self.record.closed[:, number].astype(bool)
+                if not contact.anchors or not closed.any():
+                    continue
+                fresh = closed.copy()
+                fresh[1:] &= ~closed[:-1]
+                captured = np.column_stack(self.evaluate(contact.captured, rows.part(fresh)))
+                held[np.ix_(closed, np.array(contact.anchors))] = captured[np.cumsum(fresh)[closed] - 1]
+            self._anchors = held
+        return self._anchors
+
+    def identity(self, name: str) -> tuple[Alias | None, Hashable]:
+        node = self.node(name)
+        key = node.index
+        if node.op == "add" and {arg.data[0] for arg in node.args if arg.op == "input"} == {"q", "x"}:
+            node = next(arg for arg in node.args if arg.data[0] == "q")  # q ⊕ 0
+        part = node.data[0] if node.op == "input" else ""
+        return ((part, node.data[1]) if part in STATE else None), key
+
+
+class StoredColumns(Columns):
+    """Quantities read from a file: each name with its values at the stored rows, or its place in the state.
+
+    Between the rows, parts of the state are interpolated like in a live run; other quantities by cubic Hermite with
+    three-point slopes.
+    """
+
+    def __init__(
+        self, record: Record, aliases: Mapping[str, Alias], values: Mapping[str, Vector], order: Sequence[str],
+        anchors: Matrix, q_rate: Matrix,
+    ) -> None:  # fmt: skip
+        super().__init__(record)
+        self._aliases, self._values, self._order = dict(aliases), dict(values), tuple(order)
+        self._anchors, self._rates = anchors, q_rate
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return self._order
+
+    def knows(self, name: str) -> bool:
+        return name in self._aliases or name in self._values
+
+    @property
+    def anchors(self) -> Matrix:
+        return self._anchors
+
+    @property
+    def q_rate(self) -> Matrix:
+        return self._rates
+
+    def identity(self, name: str) -> tuple[Alias | None, Hashable]:
+        return self._aliases.get(name), id(self._values.get(name))
+
+    def at_rows(self, names: Sequence[str]) -> list[Vector]:
+        return [self._read(name, self.record) for name in names]
+
+    def _read(self, name: str, state: Any) -> Vector:
+        if name in self._aliases:
+            part, index = self._aliases[name]
+            return np.asarray(getattr(state, part)[:, index])
+        return np.broadcast_to(self._values[name], (len(self.record.time),))
+
+    def at_places(self, names: Sequence[str], places: Places) -> list[Vector]:
+        state = self.grid.between(self.record.rows(self._anchors), places, self._rates)
+        found = []
+        for name in names:
+            if name in self._aliases:
+                found.append(self._read(name, state))
+            else:
+                column = self._read(name, self.record)
+                found.append(places.blend(column, self.grid.slopes(column)))
+        return found
+
+
+def gather(columns: Columns, read: Callable[[Sequence[str]], list[Vector]], name: str) -> Vector | Matrix:
+    """A scalar as (R,), a vector as (R, 3)."""
+    found = read(columns.components(name))
+    return found[0] if len(found) == 1 else np.column_stack(found)

@@ -1,0 +1,146 @@
+"""Values between stored rows: cubic Hermite within a smooth segment, never across a switch.
+
+On an interval of length h, with θ from 0 to 1,
+``y(θ) = (1+2θ)(1−θ)² y₀ + θ(1−θ)² h ẏ₀ + θ²(3−2θ) y₁ − θ²(1−θ) h ẏ₁``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mbd.arrays import Matrix, Vector
+from mbd.errors import TrajectoryError
+from mbd.results.record import Rows
+
+__all__ = ["Grid", "Places", "Side", "hermite", "hermite_rate"]
+
+Side = Literal["left", "right"]
+
+Index = NDArray[np.intp]
+
+TOUCH = 1e-12
+"""Times this close to the ends of a run, relative to its largest time, count as the ends [-]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Where times lie: between rows `lower` and `upper`, at the fraction `theta` of the interval `step` [s].
+
+    A time that meets a row has lower = upper, theta = 0 and step = 0.
+    """
+
+    time: Vector
+    lower: Index
+    upper: Index
+    theta: Vector
+    step: Vector
+
+    def blend(self, values: Matrix, rates: Matrix) -> Matrix:
+        """Cubic Hermite interpolation of a column or of several."""
+        return hermite(self, values[self.lower], rates[self.lower], values[self.upper], rates[self.upper])
+
+
+def _columns(places: Places, like: Matrix) -> tuple[Any, Any]:
+    shape = (-1,) + (1,) * (like.ndim - 1)
+    return places.theta.reshape(shape), places.step.reshape(shape)
+
+
+def hermite(places: Places, y0: Matrix, rate0: Matrix, y1: Matrix, rate1: Matrix) -> Matrix:
+    """y(θ) of the module's formula."""
+    x, h = _columns(places, y0)
+    left = (1 - x) ** 2 * ((1 + 2 * x) * y0 + x * h * rate0)
+    right = x**2 * ((3 - 2 * x) * y1 - (1 - x) * h * rate1)
+    return np.asarray(left + right)
+
+
+def hermite_rate(places: Places, y0: Matrix, rate0: Matrix, y1: Matrix, rate1: Matrix) -> Matrix:
+    """dy/dt of the module's formula; the stored rate where a time meets a row."""
+    x, h = _columns(places, y0)
+    chord = np.divide(y1 - y0, h, out=np.zeros_like(y0), where=h > 0)
+    inside = 6 * x * (1 - x) * chord + (1 - x) * (1 - 3 * x) * rate0 - x * (2 - 3 * x) * rate1
+    return np.asarray(np.where(h > 0, inside, rate0))
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """The times of the stored rows; two equal neighbours are the two sides of a switch."""
+
+    time: Vector
+
+    @property
+    def cuts(self) -> Index:
+        """First row of each smooth segment, and the number of rows."""
+        jumps = np.flatnonzero(np.diff(self.time) <= 0.0) + 1
+        return np.concatenate([[0], jumps, [len(self.time)]]).astype(np.intp)
+
+    def places(self, times: ArrayLike, side: Side = "right") -> Places:
+        """Where times lie; at a switch, the row after it (`side="right"`) or before it (`"left"`)."""
+        if side not in ("left", "right"):
+            raise TrajectoryError(f"side is 'left' (before a switch) or 'right' (after it), got {side!r}")
+        wanted = np.atleast_1d(np.asarray(times, dtype=np.float64)).ravel()
+        first, last = float(self.time[0]), float(self.time[-1])
+        slack = TOUCH * max(abs(first), abs(last))
+        outside = ~((wanted >= first - slack) & (wanted <= last + slack))
+        if outside.any():
+            bad = wanted[outside][0]
+            raise TrajectoryError(f"t = {bad:g} s is outside the run, which covers {first:g} s to {last:g} s")
+        wanted = np.clip(wanted, first, last)
+        if side == "right":
+            lower = np.searchsorted(self.time, wanted, side="right") - 1
+            upper = np.minimum(lower + 1, len(self.time) - 1)
+            lower = np.where(upper == lower, upper, lower)
+            exact = self.time[lower] == wanted
+            upper = np.where(exact, lower, upper)
+        else:
+            upper = np.searchsorted(self.time, wanted, side="left")
+            lower = np.maximum(upper - 1, 0)
+            exact = self.time[upper] == wanted
+            lower = np.where(exact, upper, lower)
+        step = self.time[upper] - self.time[lower]
+        theta = np.divide(wanted - self.time[lower], step, out=np.zeros_like(wanted), where=step > 0)
+        return Places(wanted, lower.astype(np.intp), upper.astype(np.intp), theta, step)
+
+    def middles(self) -> tuple[Index, Places]:
+        """The rows that begin an interval of positive length, and the middles of these intervals."""
+        lower = np.flatnonzero(np.diff(self.time) > 0.0).astype(np.intp)
+        step = self.time[lower + 1] - self.time[lower]
+        return lower, Places(self.time[lower] + step / 2, lower, lower + 1, np.full(len(lower), 0.5), step)
+
+    def slopes(self, values: Matrix) -> Matrix:
+        """Rates of change by three-point differences within each smooth segment."""
+        rates = np.zeros_like(values, dtype=np.float64)
+        if values.size == 0:
+            return rates
+        cuts = self.cuts
+        for start, stop in pairwise(cuts):
+            if stop - start >= 2:
+                order: Literal[1, 2] = 2 if stop - start > 2 else 1
+                rates[start:stop] = np.gradient(values[start:stop], self.time[start:stop], axis=0, edge_order=order)
+        return rates
+
+    def between(self, rows: Rows, places: Places, q_rate: Matrix) -> Rows:
+        """The states at places between the rows.
+
+        q by Hermite with q̇, v with v̇, z with ż; accelerations and ż are the slopes of those
+        curves; multipliers by Hermite with three-point slopes; contacts and anchors as they hold in the interval.
+        """
+        low, high = places.lower, places.upper
+        ends = (rows.v[low], rows.a[low], rows.v[high], rows.a[high])
+        states = (rows.z[low], rows.s[low], rows.z[high], rows.s[high])
+        return Rows(
+            places.time,
+            places.blend(rows.q, q_rate),
+            hermite(places, *ends),
+            hermite(places, *states),
+            hermite_rate(places, *ends),
+            hermite_rate(places, *states),
+            places.blend(rows.lam, self.slopes(rows.lam)),
+            rows.closed[low],
+            rows.anchors[low],
+            rows.source[low],
+        )

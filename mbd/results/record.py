@@ -1,0 +1,141 @@
+"""What a simulation hands over: its stored rows, its events, and how it was made."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbd.arrays import Matrix, Vector
+
+if TYPE_CHECKING:
+    from mbd.equations.equations import Equations
+
+__all__ = ["EventRecord", "Record", "Rows"]
+
+
+def _nothing() -> Vector:
+    return np.zeros(0)
+
+
+@dataclass(frozen=True, eq=False)
+class EventRecord:
+    """Something that happened at an instant.
+
+    Parameters
+    ----------
+    time : instant [s]
+    kind : 'closed' or 'opened' (a contact), 'event' (a user's own, or a fall)
+    name : of the contact or event
+    impulse : impulses of the contact's rows at the instant, normal first, pushing ≥ 0 [N s or N m s]
+    energy_loss : kinetic energy that the impact of this instant took [J], with the first event of the instant
+    row : the stored row just after it (the right side); the row before is the left side
+    """
+
+    time: float
+    kind: str
+    name: str
+    impulse: Vector = field(default_factory=_nothing)
+    energy_loss: float = 0.0
+    row: int = 0
+
+    def __repr__(self) -> str:
+        extra = ""
+        if self.impulse.size:
+            extra += f", impulse {', '.join(f'{value:.4g}' for value in self.impulse)}"
+        if self.energy_loss:
+            extra += f", energy loss {self.energy_loss:.4g} J"
+        return f"<{self.time:.6f} s: {self.name!r} {self.kind}{extra}>"
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """States of the mechanism, one a row, from which any named quantity can be evaluated.
+
+    time (R,) [s]; q (R, n_q), v and a (R, n_v), z and s (R, n_z); lam (R, n_rows), zero where a row is open;
+    closed (R, n_contacts); anchors (R, n_anchors); source (R,): the stored row whose parameters hold here
+    """
+
+    time: Vector
+    q: Matrix
+    v: Matrix
+    z: Matrix
+    a: Matrix
+    s: Matrix
+    lam: Matrix
+    closed: NDArray[np.uint8]
+    anchors: Matrix
+    source: NDArray[np.intp]
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def part(self, chosen: slice | NDArray[np.bool_]) -> Rows:
+        """Some of the rows."""
+        return Rows(**{item.name: getattr(self, item.name)[chosen] for item in fields(self)})
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """A run as numbers; `Trajectory` gives it names.
+
+    Rows just before and just after a switch are both stored, with equal times.
+
+    Parameters
+    ----------
+    equations : what was integrated; None in a run read from a file
+    parameters : values of the run-time parameters, then of the tables
+    parameter_names : names of the run-time parameters
+    time, q, v, z, a, s, lam, closed : see `Rows`; a are the true accelerations v̇
+    events : in order of time
+    stats : counts and wall times
+    success, message, failure : whether the run reached its end, a sentence, a capsule to replay the failing step
+    final : the `State` to go on from
+    settings : how the run was made: integrator, dt, until, contact, locate, versions
+    parameter_changes : (row, parameters) pairs: values that hold from that row on
+    """
+
+    equations: Equations | None
+    parameters: Vector
+    parameter_names: Sequence[str]
+    time: Vector
+    q: Matrix
+    v: Matrix
+    z: Matrix
+    a: Matrix
+    s: Matrix
+    lam: Matrix
+    closed: NDArray[np.uint8]
+    events: Sequence[EventRecord] = ()
+    stats: dict[str, Any] = field(default_factory=dict)
+    success: bool = True
+    message: str = ""
+    failure: Any = None
+    final: Any = None
+    settings: dict[str, Any] = field(default_factory=dict)
+    parameter_changes: Sequence[tuple[int, Vector]] = ()
+
+    def __post_init__(self) -> None:
+        count = len(self.time)
+        for name in ("q", "v", "z", "a", "s", "lam", "closed"):
+            shape = getattr(self, name).shape
+            if len(shape) != 2 or shape[0] != count:
+                raise ValueError(f"a record of {count} rows needs {name} of shape ({count}, n), got {shape}")
+
+    def rows(self, anchors: Matrix) -> Rows:
+        """The stored states, with the values that closed contacts hold."""
+        return Rows(
+            self.time, self.q, self.v, self.z, self.a, self.s, self.lam, self.closed, anchors,
+            np.arange(len(self.time), dtype=np.intp),
+        )  # fmt: skip
+
+    def parameters_at(self, source: NDArray[np.intp]) -> Vector | Matrix:
+        """The parameters that hold in stored rows: one vector if they never change, else a row each."""
+        if not self.parameter_changes:
+            return self.parameters
+        starts = np.array([row for row, _ in self.parameter_changes])
+        values = np.stack([self.parameters, *(vector for _, vector in self.parameter_changes)])
+        return np.asarray(values[np.searchsorted(starts, source, side="right")])

@@ -1,0 +1,176 @@
+"""A run as one file: numpy's ``.npz`` with JSON for everything that is not an array; nothing is pickled."""
+
+from __future__ import annotations
+
+import json
+import os
+import zipfile
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbd.errors import TrajectoryError
+from mbd.results.columns import Alias, Columns, StoredColumns
+from mbd.results.facts import Facts
+from mbd.results.ledger import Ledger, Part
+from mbd.results.record import EventRecord, Record
+from mbd.results.states import pack, unpack
+from mbd.results.violation import Violation
+
+if TYPE_CHECKING:
+    from mbd.trajectory import Trajectory
+
+__all__ = ["Archive", "load", "plain", "save"]
+
+FORMAT, VERSION = "mbd run", 1
+
+SUFFIX = ".mbd.npz"
+"""Added to a path without an extension."""
+
+ROWS = ("time", "q", "v", "z", "a", "s", "lam", "closed", "parameters")
+
+Arrays = dict[str, NDArray[Any]]
+
+
+@dataclass(frozen=True, eq=False)
+class Archive:
+    """What a file holds besides the record."""
+
+    columns: StoredColumns
+    ledger: Ledger
+    violation: Violation
+    facts: Facts
+
+
+def plain(value: Any) -> Any:
+    """A number, list or text for JSON in place of a numpy value; the printed form of anything else."""
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    return repr(value)
+
+
+def save(run: Trajectory, path: str | Path, names: Sequence[str] | None = None) -> Path:
+    """Write a run; see `Trajectory.save`."""
+    target = Path(path)
+    if not target.suffix:
+        target = target.with_name(target.name + SUFFIX)
+    record = run.record
+    arrays: Arrays = {name: getattr(record, name) for name in ROWS}
+    arrays["anchors"], arrays["q_rate"] = run.columns.anchors, run.columns.q_rate
+    meta: dict[str, Any] = {
+        "format": FORMAT, "version": VERSION, "facts": run.facts.as_json(),
+        "parameter_names": list(record.parameter_names), "stats": record.stats, "settings": record.settings,
+        "success": record.success, "message": record.message, "failure": record.failure and str(record.failure),
+        "events": [_event(event) for event in record.events], "violation": asdict(run.violation),
+        "changes": [row for row, _ in record.parameter_changes], "final": pack(record.final, arrays),
+    }  # fmt: skip
+    for number, (_, values) in enumerate(record.parameter_changes):
+        arrays[f"change {number}"] = values
+    meta["aliases"], meta["values"], meta["names"] = _columns(run.columns, names, arrays)
+    meta["parts"] = _ledger(run.energy, arrays)
+    text = json.dumps(meta, default=plain)
+    arrays["meta"] = np.frombuffer(text.encode(), dtype=np.uint8)
+    _write(target, arrays)
+    return target
+
+
+def _write(target: Path, arrays: Arrays) -> None:
+    """Write beside the target, then rename, so that a reader never sees half a file."""
+    target.parent.mkdir(parents=True, exist_ok=True)
+    partial = target.with_name(f".{target.name}.{os.getpid()}")
+    try:
+        with partial.open("wb") as file:
+            np.savez_compressed(file, allow_pickle=False, **arrays)
+        partial.replace(target)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def _event(event: EventRecord) -> dict[str, Any]:
+    return {
+        "time": event.time, "kind": event.kind, "name": event.name, "impulse": event.impulse,
+        "energy_loss": event.energy_loss, "row": event.row,
+    }  # fmt: skip
+
+
+def _columns(
+    columns: Columns, names: Sequence[str] | None, arrays: Arrays
+) -> tuple[dict[str, Alias], dict[str, int], list[str]]:
+    """Each wanted scalar as a place in the state or as a numbered array; equal expressions are stored once."""
+    wanted = columns.names if names is None else [part for name in names for part in columns.components(name)]
+    aliases, values = {}, {}
+    keys: dict[Any, int] = {}
+    fresh: list[str] = []
+    for name in dict.fromkeys(wanted):
+        alias, key = columns.identity(name)
+        if alias is not None:
+            aliases[name] = alias
+            continue
+        if key not in keys:
+            keys[key] = len(keys)
+            fresh.append(name)
+        values[name] = keys[key]
+    for number, value in enumerate(columns.at_rows(fresh)):
+        constant = len(value) > 0 and bool(np.all(value == value[0]))
+        arrays[f"value {number}"] = np.array(value[:1]) if constant else value
+    return aliases, values, list(dict.fromkeys(wanted))
+
+
+def _ledger(ledger: Ledger, arrays: Arrays) -> list[tuple[str, str]]:
+    arrays["kinetic"], arrays["potential"] = ledger.kinetic, ledger.potential
+    for number, part in enumerate(ledger.parts):
+        arrays[f"part {number}"] = part.energy
+    return [(part.name, part.kind) for part in ledger.parts]
+
+
+def load(path: str | Path) -> Trajectory:
+    """Read a run; see `mbd.load`."""
+    from mbd.trajectory import Trajectory
+
+    source = Path(path)
+    arrays, meta = _read(source)
+    record = _record(arrays, meta)
+    values = {name: arrays[f"value {number}"] for name, number in meta["values"].items()}
+    aliases = {name: (part, index) for name, (part, index) in meta["aliases"].items()}
+    parts = tuple(Part(name, kind, arrays[f"part {k}"]) for k, (name, kind) in enumerate(meta["parts"]))
+    columns = StoredColumns(record, aliases, values, meta["names"], arrays["anchors"], arrays["q_rate"])
+    ledger = Ledger(record.time, arrays["kinetic"], arrays["potential"], parts)
+    return Trajectory(record, Archive(columns, ledger, Violation(**meta["violation"]), Facts.read(meta["facts"])))
+
+
+def _read(source: Path) -> tuple[Arrays, dict[str, Any]]:
+    if not source.is_file():
+        raise FileNotFoundError(f"no run file at '{source}'")
+    refusal = f"'{source}' is not a run of mbd; expected a file written by run.save(…)"
+    if not zipfile.is_zipfile(source):
+        raise TrajectoryError(refusal)
+    try:
+        with np.load(source, allow_pickle=False) as file:
+            arrays = {name: file[name] for name in file.files}
+        meta = json.loads(arrays["meta"].tobytes())
+    except (KeyError, ValueError, zipfile.BadZipFile) as error:
+        raise TrajectoryError(refusal) from error
+    if not isinstance(meta, dict) or meta.get("format") != FORMAT:
+        raise TrajectoryError(refusal)
+    if meta["version"] > VERSION:
+        raise TrajectoryError(f"'{source}' was written by a newer mbd (format {meta['version']}, here {VERSION})")
+    return arrays, meta
+
+
+def _record(arrays: Arrays, meta: Mapping[str, Any]) -> Record:
+    events = tuple(
+        EventRecord(**{**event, "impulse": np.asarray(event["impulse"], dtype=np.float64)}) for event in meta["events"]
+    )
+    changes = tuple((row, arrays[f"change {number}"]) for number, row in enumerate(meta["changes"]))
+    return Record(
+        equations=None, parameter_names=tuple(meta["parameter_names"]), events=events, stats=meta["stats"],
+        success=meta["success"], message=meta["message"], failure=meta["failure"],
+        final=unpack(meta["final"], arrays), settings=meta["settings"], parameter_changes=changes,
+        **{name: arrays[name] for name in ROWS},
+    )  # fmt: skip

@@ -1,0 +1,74 @@
+"""A run in a few lines: as text, and as a table for notebooks."""
+
+from __future__ import annotations
+
+from collections import Counter
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from mbd.trajectory import Trajectory
+
+__all__ = ["facts", "html", "text"]
+
+SHOWN_EVENTS = 8
+"""Events listed in a notebook before the rest is counted."""
+
+
+def facts(run: Trajectory) -> list[tuple[str, str]]:
+    """(title, value) pairs: what was run, how it ended, how well it did, what it cost."""
+    time = run.time
+    found = [("outcome", ("success" if run.success else "failure") + (f": {run.message}" if run.message else ""))]
+    if len(time):
+        found.append(("time", f"{time[0]:g} s to {time[-1]:g} s in {len(time)} stored rows"))
+    settings = [f"{run.settings[key]}" for key in ("integrator",) if key in run.settings]
+    settings += [f"{key} = {run.settings[key]}" for key in ("dt", "tol") if run.settings.get(key) is not None]
+    if settings:
+        found.append(("integrator", ", ".join(settings)))
+    if len(time):
+        energy = run.energy
+        relative = f"{energy.drift:.2g} of the swing of kinetic energy"
+        found.append(("energy", f"change {energy.change:.4g} J; numerical {energy.numerical[-1]:.2g} J ({relative})"))
+        found.append(("constraints", str(run.violation)))
+    found.append(("events", counts(run) or "none"))
+    if run.stats:
+        found.append(("cost", ", ".join(f"{key.replace('_', ' ')} {_number(v)}" for key, v in run.stats.items())))
+    return found
+
+
+def counts(run: Trajectory) -> str:
+    """'3 × left foot closed, …' in the order of first occurrence."""
+    return ", ".join(f"{n} × {what}" for what, n in Counter(f"{e.name} {e.kind}" for e in run.events).items())
+
+
+def _number(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def text(run: Trajectory) -> str:
+    """The printed form of a run."""
+    lines = [f"Trajectory of {run.name!r}"]
+    lines += [f"  {title:<12} {value}" for title, value in facts(run)]
+    return "\n".join(lines)
+
+
+def html(run: Trajectory) -> str:
+    """The notebook's form of a run."""
+    rows = "".join(
+        f"<tr><th style='text-align:left'>{escape(title)}</th><td style='text-align:left'>{escape(value)}</td></tr>"
+        for title, value in facts(run)
+    )
+    shown = run.events[:SHOWN_EVENTS]
+    events = "".join(
+        f"<tr><td>{event.time:.6f} s</td><td style='text-align:left'>{escape(event.name)}</td><td>{escape(event.kind)}"
+        f"</td><td>{f'{event.energy_loss:.4g} J' if event.energy_loss else ''}</td></tr>"
+        for event in shown
+    )
+    more = f"<p>… and {len(run.events) - len(shown)} more</p>" if len(run.events) > len(shown) else ""
+    table = (
+        f"<details><summary>events</summary><table><tr><th>time</th><th>name</th><th>kind</th><th>energy loss</th></tr>"
+        f"{events}</table>{more}</details>"
+        if shown
+        else ""
+    )
+    return f"<div><b>Trajectory of {escape(repr(run.name))}</b><table>{rows}</table>{table}</div>"

@@ -1,0 +1,38 @@
+"""Units of named results, from their names."""
+
+from __future__ import annotations
+
+from mbd.results.facts import Facts
+
+__all__ = ["unit"]
+
+ENDINGS = {
+    "angle": "rad", "displacement": "m", "length": "m", "speed": "m/s", "reaction_force": "N", "reaction_torque": "N m",
+    "force": "N", "friction": "N", "tension": "N", "torque": "N m", "power": "W", "energy": "J",
+    "x": "m", "y": "m", "z": "m", "vx": "m/s", "vy": "m/s", "vz": "m/s", "ax": "m/s²", "ay": "m/s²", "az": "m/s²",
+}  # fmt: skip
+"""Unit by the last word of a name."""
+
+
+def unit(name: str, facts: Facts) -> str:
+    """The unit of a result; '' where the name does not tell.
+
+    A coordinate has its own unit, its rate and acceleration that unit per second and per second squared; a contact's
+    gap has the contact's, and the force of a contact in radians is a torque.
+    """
+    own = dict(facts.coordinates)
+    if name in own:
+        return own[name]
+    stem, _, last = name.rpartition(".")
+    contact = next((item for item in facts.contacts if item.name == stem), None)
+    if contact is not None and last == "gap":
+        return contact.unit
+    if contact is not None and last == "force":
+        return "N m" if contact.unit == "rad" else "N"
+    if last in ("rate", "acceleration"):
+        power = "/s" if last == "rate" else "/s²"
+        base = own.get(stem) or next((value for key, value in own.items() if key.rpartition(".")[0] == stem), "")
+        return base + power if base else ""
+    if last in ("x", "y", "z") and stem.rpartition(".")[2] in ("reaction_force", "reaction_torque", "force", "torque"):
+        return ENDINGS[stem.rpartition(".")[2]]
+    return ENDINGS.get(last, "")

@@ -1,0 +1,50 @@
+"""How far the active constraints of a run are from holding."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mbd.results.columns import ModelColumns
+
+__all__ = ["Violation", "violation"]
+
+
+@dataclass(frozen=True)
+class Violation:
+    """Largest |h| of the active rows over a run, by unit, and where it occurred.
+
+    length [m], angle [rad], rate: largest |ḣ| [m/s or rad/s]; worst : owner and part of the row with the largest |h|,
+    '' without rows
+    """
+
+    length: float = 0.0
+    angle: float = 0.0
+    rate: float = 0.0
+    worst: str = ""
+
+    def __str__(self) -> str:
+        if not self.worst:
+            return "no constraint rows"
+        sizes = [f"{self.length:.2g} m"] if self.length or not self.angle else []
+        sizes += [f"{self.angle:.2g} rad"] if self.angle else []
+        return f"{' and '.join(sizes)} ({self.worst}), {self.rate:.2g} /s in rate"
+
+
+def violation(columns: ModelColumns) -> Violation:
+    """max |h| and max |ḣ| over the stored rows, each constraint row only while it is active."""
+    rows = columns.equations.rows
+    if not rows:
+        return Violation()
+    values = columns.evaluate([row.value for row in rows] + [row.rate for row in rows], columns.rows)
+    largest: dict[str, float] = {}
+    fastest, worst, highest = 0.0, "", -1.0
+    for number, row in enumerate(rows):
+        active = columns.record.closed[:, row.contact].astype(bool) if row.contact >= 0 else np.True_
+        size = float(np.max(np.abs(values[number]), initial=0.0, where=active))
+        largest[row.unit] = max(largest.get(row.unit, 0.0), size)
+        fastest = max(fastest, float(np.max(np.abs(values[len(rows) + number]), initial=0.0, where=active)))
+        if size > highest:
+            highest, worst = size, f"{row.owner}.{row.part}" if row.part else row.owner
+    return Violation(largest.get("m", 0.0), largest.get("rad", 0.0), fastest, worst)

@@ -1,0 +1,71 @@
+"""What words may ask while their equations are being derived.
+
+A joint, force or constraint describes its mechanics as plain Python on scalars; the
+derivation hands it a `Scope`, through which it sees parameters, motions and named quantities.
+All vectors are triples of scalars in ground axes, rotations are rows of a 3×3 matrix.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol, TypeAlias
+
+from mbd.tape.node import Node, Scalar, Table, Tape
+
+if TYPE_CHECKING:
+    from mbd.bodies.base import Frame
+
+__all__ = ["FrameMotion", "JointMotion", "Rotation", "Scope", "Triple"]
+
+Triple: TypeAlias = tuple[Scalar, Scalar, Scalar]
+Rotation: TypeAlias = tuple[Triple, Triple, Triple]
+
+
+@dataclass(frozen=True)
+class FrameMotion:
+    """Where a frame is and how it moves, in ground axes.
+
+    position [m], rotation (columns are the frame's axes), velocity [m/s], angular_velocity [rad/s].
+    """
+
+    position: Triple
+    rotation: Rotation
+    velocity: Triple
+    angular_velocity: Triple
+
+
+@dataclass(frozen=True)
+class JointMotion:
+    """Coordinates of a joint and their rates, in the order of `Joint.labels`; for a cut joint they are recovered."""
+
+    coordinates: tuple[Scalar, ...]
+    rates: tuple[Scalar, ...]
+
+
+class Scope(Protocol):
+    """The derivation as words see it."""
+
+    tape: Tape
+
+    @property
+    def time(self) -> Node:
+        """t [s]."""
+
+    def parameter(self, owner: str, field: str, value: float) -> Node:
+        """The run-time input named ``owner.field``; an exact 0 or ±1 is structural and folds, unless tunable."""
+
+    def table(self, owner: str, breaks: Sequence[float], coefficients: Sequence[Sequence[float]]) -> Table:
+        """A piecewise cubic stored beside the parameters; evaluate it with ``scope.tape.lookup(table, x)``."""
+
+    def frame(self, frame: Frame) -> FrameMotion:
+        """Motion of a frame of any body, or of the ground."""
+
+    def joint(self, name: str) -> JointMotion:
+        """Coordinates and rates of a joint."""
+
+    def named(self, name: str) -> Node:
+        """Any named quantity: 't', 'left hip.angle', 'left hip.rate', 'left shank.end.x', 'left shank.end.vx', …"""
+
+    def state(self, owner: str, field: str, initial: float) -> Node:
+        """A first-order state z of the owner (registered on first use); its rate is given in `Action.rates`."""

@@ -1,0 +1,166 @@
+"""Between the calls of the kernel: controllers, resets of users' events, and instants that must be step boundaries."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mbd.compile.mechanism import Mechanism, rate_names
+from mbd.compile.python import scalar_function
+from mbd.equations.equations import Guard
+from mbd.errors import SimulationError, UnknownNameError, nearest
+from mbd.kernel import fields as F
+from mbd.tape.derivatives import live
+
+if TYPE_CHECKING:
+    from mbd.simulation.run import Run
+
+__all__ = ["Boundaries", "Named", "apply_reset"]
+
+
+class Named(Mapping[str, float]):
+    """Any named quantity at the present state of a run, evaluated when it is asked for."""
+
+    def __init__(self, run: Run) -> None:
+        self._run = run
+
+    def __getitem__(self, name: str) -> float:
+        run = self._run
+        mechanism, v = run.mechanism, run.values
+        known = mechanism.named.get(name)
+        if known is None:
+            known = mechanism.named[name] = scalar_function([mechanism.equations.output(name)], mechanism.layout, "named")
+        layout, flags = mechanism.layout, v["closed"][: v["n_contacts"]]
+        block = mechanism.block(
+            run.now, v["q"][: v["n_q"]], v["y"][: v["n"]], v["anchors"][: v["n_anchors"]], run.manager.penalties(flags)
+        )
+        block[layout.a : layout.lam] = v["rate"][: v["n"]]
+        block[layout.lam : layout.anchor] = v["lam"][: v["n_rows"]]
+        out = np.zeros(1)
+        known(block, v["params"], out)
+        return float(out[0])
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._run.mechanism.equations.output_names())
+
+    def __len__(self) -> int:
+        return len(self._run.mechanism.equations.output_names())
+
+
+def apply_reset(run: Run, guard: Guard) -> None:
+    """Set the coordinates and rates that a user's event resets; rows must still hold."""
+    wanted = guard.reset(run.named()) if callable(guard.reset) else guard.reset
+    equations, v = run.mechanism.equations, run.values
+    positions = {coordinate.name: k for k, coordinate in enumerate(equations.coordinates)}
+    rates = {name: k for name, k in rate_names(equations).items() if name not in positions}
+    states = {state.name: equations.n_v + k for k, state in enumerate(equations.states)}
+    for name, value in dict(wanted).items():
+        number = value(run.named()) if callable(value) else float(value)
+        if name in positions:
+            v["q"][positions[name]] = number
+        elif name in rates:
+            v["y"][rates[name]] = number
+        elif name in states:
+            v["y"][states[name]] = number
+        else:
+            raise UnknownNameError(f"reset of {guard.name!r}: " + nearest(name, [*positions, *rates, *states], "quantity"))
+    flags = v["closed"][: v["n_contacts"]]
+    rows = list(run.manager.active_rows(flags))
+    terms = run.mechanism.acceleration_terms(
+        run.now, v["q"][: v["n_q"]], v["y"][: v["n"]], v["params"], v["anchors"][: v["n_anchors"]]
+    )
+    off = [k for k in rows if abs(terms.h[k]) > 1e-6 or abs(terms.rate[k]) > 1e-6 * (1.0 + np.max(np.abs(v["y"])))]
+    if off:
+        names = ", ".join(repr(equations.rows[k].owner) for k in off)
+        raise SimulationError(f"the reset of {guard.name!r} at t = {run.now:.6g} s breaks {names}; reset velocities too")
+
+
+class Boundaries:
+    """Instants at which a step must end: samples of controllers, jumps and kinks of signals in time."""
+
+    def __init__(self, controllers: Sequence[Any], mechanism: Mechanism, begin: float, dt: float, end: float) -> None:
+        self.controllers = tuple(controllers)
+        self.states = {controller.name: controller.state for controller in self.controllers}
+        self.begin_time = begin
+        self.samples = {c.name: 0 for c in self.controllers if c.period is not None}
+        self.breaks = [time for time in signal_breaks(mechanism, 4.0 * dt) if begin < time < end]
+        self.place = 0
+
+    def _sample(self, controller: Any) -> float:
+        return float(self.begin_time + self.samples[controller.name] * controller.period)
+
+    def begin(self, run: Run) -> None:
+        """The first call of every sampled controller."""
+        for controller in self.controllers:
+            if controller.period is not None:
+                self._call(run, controller)
+                self.samples[controller.name] = 1
+
+    def next(self, end: float) -> float:
+        """Where the kernel must stop next; just before a break, so that the step sees its left side."""
+        target = end
+        if self.place < len(self.breaks):
+            target = min(target, float(np.nextafter(self.breaks[self.place], -np.inf)))
+        for controller in self.controllers:
+            if controller.period is not None:
+                target = min(target, self._sample(controller))
+        return target
+
+    def arrive(self, run: Run, target: float, end: float) -> bool:
+        """Do what is due at a boundary; False at the end of the run."""
+        if target >= end:
+            return False
+        if self.place < len(self.breaks) and self.breaks[self.place] <= target * (1.0 + 4.0 * F.EPS) + 1e-300:
+            run.values["clock"][F.NOW] = self.breaks[self.place]
+            self.place += 1
+            run.values["state"][F.RESTART] = 1
+        for controller in self.controllers:
+            if controller.period is not None and self._sample(controller) <= target:
+                self._call(run, controller)
+                self.samples[controller.name] += 1
+        return True
+
+    def call(self, run: Run, name: str) -> None:
+        """Call the controllers that listen to an event."""
+        for controller in self.controllers:
+            if name in controller.on:
+                self._call(run, controller)
+
+    def _call(self, run: Run, controller: Any) -> None:
+        named = run.named()
+        answer = controller.update(run.now, {name: named[name] for name in controller.reads}, self.states[controller.name])
+        if isinstance(answer, tuple):
+            answer, self.states[controller.name] = answer
+        written = dict(answer or {})
+        wrong = [name for name in written if name not in controller.writes]
+        if wrong:
+            raise UnknownNameError(f"Controller {controller.name!r}: " + nearest(wrong[0], controller.writes, "entry of writes"))
+        bad = [name for name, value in written.items() if not np.isfinite(value)]
+        if bad:
+            raise SimulationError(f"Controller {controller.name!r} wrote {written[bad[0]]!r} to {bad[0]!r} at t = {run.now:.6g} s")
+        if written:
+            run.change_parameters(written)
+
+
+def signal_breaks(mechanism: Mechanism, spacing: float) -> list[float]:
+    """Times at which a tabulated signal of time jumps or kinks, if they lie farther apart than `spacing`."""
+    equations = mechanism.equations
+    nodes = live([*equations.balance, *(row.value for row in equations.rows)])
+    found: set[float] = set()
+    for node in nodes:
+        if node.op == "table" and node.args[0].op == "input" and node.args[0].data[0] == "t":
+            table = node.data[0]
+            breaks, rows = table.breaks, table.coefficients
+            for k in range(1, len(breaks)):
+                width = breaks[k] - breaks[k - 1]
+                a, b, c, d = rows[k - 1]
+                value, slope = a + width * (b + width * (c + width * d)), b + width * (2 * c + 3 * d * width)
+                size = abs(value) + abs(rows[k][0]) + 1e-300
+                steep = abs(slope) + abs(rows[k][1]) + size / width
+                jumps = abs(value - rows[k][0]) > 1e-9 * size
+                kinks = abs(slope - rows[k][1]) > 1e-9 * steep
+                if jumps or (kinks and width > spacing):
+                    found.add(breaks[k])
+    return sorted(found)

@@ -1,0 +1,114 @@
+"""What a failed run says: time, rows, sizes, names, and what to try."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from mbd.kernel import fields as F
+from mbd.simulation.stepper import Stepper
+from mbd.tape.evaluate import evaluate
+from mbd.tape.node import Node
+
+__all__ = ["explanation"]
+
+
+def explanation(stepper: Stepper, status: int) -> str:
+    """A sentence for a failure status of the kernel."""
+    values = stepper.values
+    now = float(values["clock"][F.NOW])
+    time = float(values["detail"][0]) if values["detail"][0] > now else now
+    closed = sorted(stepper.manager.mode(values["closed"][: values["n_contacts"]]).closed)
+    where = f"t = {time:.9g} s (last accepted {now:.9g} s)"
+    with_closed = f" with {', '.join(map(repr, closed))} closed" if closed else ""
+    residual = float(values["detail"][1])
+    if status == F.NOT_FINITE:
+        return f"{where}: {_not_finite(stepper)}{with_closed}; nothing after the last accepted step is kept"
+    if status == F.NOT_CONVERGED:
+        own = f" ({stepper.scheme.report.message})" if not stepper.compiled and stepper.scheme.report.message else ""
+        return (
+            f"{where}: Newton stalled at {residual:.3g} times the tolerance after {values['max_iterations']} "
+            f"iterations{own}{with_closed}; try a smaller dt or softer stiffness"
+        )
+    if status == F.STAGNATED:
+        floor = residual * values["tolerance"]
+        return (
+            f"{where}: stagnated at round-off: residual {residual * values['tolerance']:.3g} of the forces, attainable "
+            f"{floor:.3g}{with_closed}; use a larger tolerance= of the integrator or a larger dt"
+        )
+    if status == F.SINGULAR:
+        return f"{where}: the Newton matrix is singular at {_unknown(stepper)}{with_closed}; rows depend on each other there"
+    if status == F.CHATTER:
+        return (
+            f"{where}: more than {values['max_switches']} switches at one instant: {_last_events(stepper)}; contacts release "
+            "and close again without motion; give one of them a release rule, friction or a penalty law"
+        )
+    if status == F.NO_IMPACT:
+        return f"{where}: no impulses satisfy the impact law of all contacts that close{with_closed}; penalty contacts can"
+    if status in (F.DEPENDENT, F.CONFLICT):
+        what = "depend on each other" if status == F.DEPENDENT else "conflict"
+        return f"{where}: rows {what} at {_unknown(stepper)}{with_closed}; leave one out, or hold fewer contacts closed"
+    return f"{where}: the instant of an event could not be isolated{with_closed}; try a smaller dt"
+
+
+def _unknown(stepper: Stepper) -> str:
+    """The coordinate or row behind a column of the KKT matrix."""
+    equations, values = stepper.mechanism.equations, stepper.values
+    column, n = int(values["state"][F.BLOCKED]), values["n"]
+    if column < equations.n_v:
+        return f"the motion of {equations.velocity_names[column].removesuffix('.rate')!r}"
+    if column < n:
+        return f"the state {equations.states[column - equations.n_v].name!r}"
+    row = equations.rows[int(values["rows"][min(column - n, values["n_rows"] - 1)])]
+    return f"{row.owner!r} ({row.part})"
+
+
+def _last_events(stepper: Stepper) -> str:
+    values = stepper.values
+    width, count = values["event_width"], int(values["state"][F.LOGGED])
+    lines = values["log"].reshape(-1, width)[max(count - 6, 0) : count]
+    words = ("closed", "opened", "event")
+    names = [*stepper.manager.names]
+    shown = [f"{names[int(line[2])]!r} {words[int(line[1])]}" for line in lines if int(line[1]) < 2]
+    return ", ".join(shown) or "no contact changed"
+
+
+def _not_finite(stepper: Stepper) -> str:
+    """The first cause whose force is not finite where the step failed."""
+    equations, values = stepper.mechanism.equations, stepper.values
+    inputs = _inputs(stepper, values["block"])
+    for effect in equations.effects:
+        if not _finite(list(effect.generalized()), inputs):
+            return f"the force of {effect.name!r} is not finite{_moved_by(stepper, effect, inputs)}"
+    for row in equations.rows:
+        if not _finite([row.value, row.rate], inputs):
+            return f"the constraint {row.owner!r} ({row.part}) is not finite"
+    if not _finite(list(equations.balance), inputs):
+        return "the inertia forces are not finite (velocities have run away)"
+    return "a derivative of a force or constraint is not finite"
+
+
+def _moved_by(stepper: Stepper, effect: Any, inputs: dict[Any, float]) -> str:
+    """The coordinates that the force acts on."""
+    equations = stepper.mechanism.equations
+    forces = evaluate(list(effect.generalized()), inputs)
+    names = [name.removesuffix(".rate") for name in equations.velocity_names]
+    hit = [name for name, force in zip(names, forces, strict=False) if not np.isfinite(force)]
+    return f" (it acts on {', '.join(map(repr, hit))})" if hit else ""
+
+
+def _finite(nodes: list[Node], inputs: dict[Any, float]) -> bool:
+    return bool(np.isfinite(evaluate(nodes, inputs)).all())
+
+
+def _inputs(stepper: Stepper, block: Any) -> dict[Any, float]:
+    """Tape inputs at the block."""
+    layout = stepper.mechanism.layout
+    sizes = {
+        "t": 1, "c": 2, "q": layout.n_q, "x": layout.n_v, "v": layout.n_v, "z": layout.n_z, "a": layout.n_v,
+        "s": layout.n_z, "lam": layout.n_rows, "anchor": layout.n_anchors, "switch": layout.n_contacts,
+    }  # fmt: skip
+    inputs = {(kind, k): float(block[layout.place(kind, k)]) for kind, size in sizes.items() for k in range(size)}
+    inputs |= {("p", k): float(stepper.values["params"][k]) for k in range(layout.n_parameters)}
+    return inputs

@@ -1,0 +1,174 @@
+"""Any integrator behind the interpreted kernel: a mechanism as a `System`, and the hooks that drive `step`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from mbd.arrays import Vector
+from mbd.compile.mechanism import Mechanism
+from mbd.integrators.base import Integrator, Point, StepReport, Terms
+from mbd.kernel.active_set import ActiveSetManager
+from mbd.kernel.fields import ITERATIONS, NOT_CONVERGED, NOT_FINITE, NOW
+from mbd.state import Mode, State
+
+__all__ = ["MechanismSystem", "PlainScheme"]
+
+
+class MechanismSystem:
+    """A mechanism as the numbers an integrator sees; bound to parameters and to the anchors held now."""
+
+    def __init__(
+        self, mechanism: Mechanism, manager: ActiveSetManager, parameters: Vector, anchors: Vector, stabilized: bool
+    ) -> None:
+        self.mechanism, self.manager = mechanism, manager
+        self.parameters, self.anchors, self.stabilized = parameters, anchors, stabilized
+        layout = mechanism.layout
+        self.n_q, self.n_v, self.n_z = layout.n_q, layout.n_v, layout.n_z
+
+    def _active(self, mode: Mode) -> tuple[tuple[int, ...], tuple[int, ...]]:
+        flags = self.manager.flags(mode.closed)
+        return self.manager.active_rows(flags), self.manager.penalties(flags)
+
+    def evaluate(self, point: Point, mode: Mode, tangent: tuple[float, float] | None) -> Terms:
+        """Terms of `Terms` at a point of the mechanism."""
+        rows, penalties = self._active(mode)
+        code = self.mechanism.mode(rows, penalties, self.stabilized)
+        n, m = self.mechanism.layout.n, len(rows)
+        block = self._block(point, rows, penalties)
+        scale = np.zeros(n + 2 * self.mechanism.layout.n_rows)
+        self.mechanism.common["scales"](block, self.parameters, scale)
+        picked = list(rows)
+        r_size, h_size, rate_size = np.split(scale, [n, n + self.mechanism.layout.n_rows])
+        tail = n + (2 if self.stabilized else 1) * m
+        if tangent is None:
+            out = np.zeros(tail)
+            code.residual(block, self.parameters, out)
+            matrix = None
+        else:
+            factors = tangent if tangent[0] > 0.0 else (1.0, 0.0)
+            block[1:3] = factors
+            out = np.zeros((n + m) ** 2 + tail)
+            code.tangent(block, self.parameters, out)
+            matrix, out = out[: (n + m) ** 2].reshape(n + m, n + m), out[(n + m) ** 2 :]
+            if tangent != factors:  # S is affine in the factors: M is its value at (0, 0)
+                other = np.zeros((n + m) ** 2 + tail)
+                block[1:3] = (2.0, 0.0)
+                code.tangent(block, self.parameters, other)
+                matrix = 2.0 * matrix - other[: (n + m) ** 2].reshape(n + m, n + m)
+        return Terms(
+            out[:n],
+            None if matrix is None else matrix[:n, :n],
+            out[n : n + m],
+            out[n + m :] if self.stabilized else np.zeros(m),
+            None if matrix is None else matrix[:n, n:],
+            None if matrix is None else matrix[n:, :n],
+            _by_unit(r_size, self.mechanism),
+            h_size[picked],
+            rate_size[picked],
+        )
+
+    def _block(self, point: Point, rows: Sequence[int], penalties: Sequence[int]) -> Vector:
+        layout = self.mechanism.layout
+        block = self.mechanism.block(point.t, point.q, point.y, self.anchors, penalties)
+        block[layout.x : layout.v] = point.x
+        block[layout.a : layout.lam] = point.rate
+        block[[layout.lam + k for k in rows]] = point.lam
+        return block
+
+    def accelerations(self, t: float, q: Vector, y: Vector, mode: Mode) -> tuple[Vector, Vector]:
+        """Consistent (v̇, ż) and λ of the active rows."""
+        rows, penalties = self._active(mode)
+        terms = self.mechanism.acceleration_terms(t, q, y, self.parameters, self.anchors, penalties)
+        n, m, picked = len(terms.f), len(rows), list(rows)
+        matrix = np.block([[terms.M, terms.R[:, picked]], [terms.B[picked], np.zeros((m, m))]])
+        solved = np.linalg.solve(matrix, -np.concatenate([terms.f, terms.bias[picked]]))
+        return solved[:n], solved[n:]
+
+    def compose(self, q: Vector, x: Vector) -> Vector:
+        """q ⊕ x."""
+        if self.mechanism.vector:
+            return np.asarray(q + x)
+        block = self.mechanism.block(0.0, q, np.zeros(self.mechanism.layout.n), self.anchors)
+        block[self.mechanism.layout.x : self.mechanism.layout.v] = x
+        out = np.zeros(self.mechanism.layout.n_q)
+        self.mechanism.common["compose"](block, self.parameters, out)
+        return out
+
+
+def _by_unit(scale: Vector, mechanism: Mechanism) -> Vector:
+    """Forces and torques as blocks of their own, as the kernel judges them."""
+    units = unit_blocks(mechanism)
+    result = np.maximum(scale, 1e-280)
+    for unit in (0, 1):
+        chosen = units == unit
+        if chosen.any():
+            result[chosen] = result[chosen].max()
+    return result
+
+
+def unit_blocks(mechanism: Mechanism) -> Any:
+    """0 for balance components that are forces, 1 for torques, 2 for others, each judged alone."""
+    numbers = {"m": 0, "rad": 1}
+    equations = mechanism.equations
+    units = [numbers.get(c.unit, 2) for c in equations.coordinates][: equations.n_v]
+    units += [2] * (equations.n_v - len(units) + equations.n_z)
+    return np.array(units, dtype=np.int64)
+
+
+class PlainScheme:
+    """Hooks of the interpreted kernel: an integrator's `start` and `step` on the kernel's arrays."""
+
+    def __init__(self, integrator: Integrator, system: MechanismSystem, manager: ActiveSetManager) -> None:
+        self.integrator, self.system, self.manager = integrator, system, manager
+        self.memory: Any = None
+        self.pending: Any = None
+        self.report = StepReport(True)
+
+    def _state(self, K: Any) -> tuple[State, Mode, list[int]]:
+        mode = self.manager.mode(K.closed)
+        n_v = K.n_v
+        state = State(float(K.clock[NOW]), K.q.copy(), K.y[:n_v].copy(), K.y[n_v:].copy(), mode)
+        return state, mode, list(self.manager.active_rows(K.closed))
+
+    def start(self, K: Any) -> int:
+        """Memory at the accepted state, whose rates are consistent; sizes of the residual for the guards."""
+        state, mode, _ = self._state(K)
+        self.memory = self.integrator.start(self.system, state, mode, float(K.dt))
+        K.slope[:] = getattr(self.memory, "slope", 0.0)
+        from mbd.kernel.restart import fill_block, refresh_scales
+
+        fill_block(K, K.clock[NOW], K.q, K.y)
+        refresh_scales(K)
+        return 0
+
+    def step(self, K: Any, h: float, t1: float) -> int:
+        """A candidate from the integrator's own step."""
+        state, mode, rows = self._state(K)
+        result = self.integrator.step(self.system, state, t1 - state.time, mode, self.memory)
+        self.report = result.report
+        K.counts[ITERATIONS] += result.report.iterations
+        if not result.report.converged:
+            K.detail[0], K.detail[1], K.detail[2] = t1, result.report.residual, h
+            return NOT_CONVERGED if np.isfinite(result.report.residual) else NOT_FINITE
+        y = np.concatenate([result.state.v, result.state.z])
+        if not (np.isfinite(y).all() and np.isfinite(result.state.q).all()):
+            K.detail[0] = t1
+            return NOT_FINITE
+        self.pending = result.memory
+        rate, lam = getattr(result.memory, "rate", None), getattr(result.memory, "lam", None)
+        if rate is None or lam is None:
+            rate, lam = self.system.accelerations(t1, result.state.q, y, mode)
+        K.q1[:], K.y1[:], K.rate1[:], K.aux1[:] = result.state.q, y, rate, rate
+        K.lam1[:] = 0.0
+        K.lam1[rows] = lam
+        return 0
+
+    def accept(self, K: Any, h: float) -> None:
+        """The candidate becomes the accepted state, its memory the memory."""
+        self.memory = self.pending
+        K.slope[:] = (K.rate1 - K.rate) / h
+        K.lam_slope[:] = (K.lam1 - K.lam) / h
+        K.q[:], K.y[:], K.rate[:], K.aux[:], K.lam[:] = K.q1, K.y1, K.rate1, K.aux1, K.lam1

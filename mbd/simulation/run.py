@@ -1,0 +1,256 @@
+"""One run: the kernel called again and again, and what happens in Python between the calls."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from mbd.arrays import Vector
+from mbd.compile.mechanism import Mechanism
+from mbd.integrators.base import Integrator
+from mbd.kernel import fields as F
+from mbd.kernel.active_set import ActiveSetManager
+from mbd.simulation.control import Boundaries, Named, apply_reset
+from mbd.simulation.failures import explanation
+from mbd.simulation.stepper import Stepper
+from mbd.state import State
+from mbd.trajectory import EventRecord, Record, Trajectory
+
+__all__ = ["Run"]
+
+ROWS_AT_ONCE = 1 << 14
+"""Rows of results that the kernel may fill before it hands them over."""
+STEPS_AT_ONCE = {True: 20000, False: 200}
+"""Steps between two looks at the clock, compiled and interpreted: some 20 ms."""
+SHOW_EVERY = 0.1
+"""Wall time between two calls of progress and observers [s]."""
+KINDS = ("closed", "opened", "event")
+
+
+class Run:
+    """Drives the kernel from a state to the end of a run and keeps what it stores."""
+
+    def __init__(
+        self,
+        model: Any,
+        mechanism: Mechanism,
+        manager: ActiveSetManager,
+        integrator: Integrator,
+        start: State,
+        dt: float,
+        end: float,
+        stop: str | None,
+        changed: Mapping[str, float],
+        options: dict[str, Any],
+        settings: dict[str, Any],
+    ) -> None:
+        self.began = perf_counter()
+        self.mechanism, self.manager, self.start, self.end, self.stop = mechanism, manager, start, end, stop
+        self.settings, self.changed, self.dt = settings, dict(changed), dt
+        rows = int(min(ROWS_AT_ONCE, (end - start.time) / dt / options.get("store", 1) + 64))
+        parameters = mechanism.parameters(changed)
+        self.first_parameters = parameters.copy()
+        compiled_options = {**options, "capacity": rows + 8}
+        self.stepper = Stepper(mechanism, manager, integrator, parameters, dt, compiled_options)
+        self.values = self.stepper.values
+        self.values["chunk"] = STEPS_AT_ONCE[self.stepper.compiled]
+        self.pieces: list[Vector] = []
+        self.events: list[EventRecord] = []
+        self.parameter_changes: list[tuple[int, Vector]] = []
+        self.stored, self.warnings = 0, list[str]()
+        self.observers: Sequence[Callable[[float, State], None]] = ()
+        self.progress: Callable[[float, float], None] | None = None
+        self.boundaries = Boundaries(getattr(model, "controllers", ()), mechanism, start.time, dt, end)
+        self._begin(start)
+
+    def observe(
+        self, observers: Sequence[Callable[[float, State], None]], progress: Callable[[float, float], None] | None
+    ) -> None:
+        """Who is told how far the run is."""
+        self.observers, self.progress = observers, progress
+
+    # the start ----------------------------------------------------------------------------------------------------
+    def _begin(self, start: State) -> None:
+        v, equations = self.values, self.mechanism.equations
+        v["q"][: v["n_q"]] = start.q
+        v["y"][: v["n"]] = np.concatenate([start.v, start.z])
+        if len(start.anchors):
+            v["anchors"][:] = start.anchors
+        n_contacts, n_guards = v["n_contacts"], v["n_guards"]
+        v["closed"][:n_contacts] = self.manager.flags(start.mode.closed)
+        armed = start.armed if start.armed is not None else set(self.manager.names) - start.mode.closed
+        v["armed"][:n_contacts] = self.manager.flags(armed)
+        v["clock"][F.NOW] = v["clock"][F.BASE] = start.time
+        v["clock"][F.LAST_SWITCH] = -np.inf
+        v["state"][F.RESTART], v["state"][F.MODE] = 1, -1
+        ends = {self.stop} | {name for controller in self.boundaries.controllers for name in controller.on}
+        for c, contact in enumerate(self.manager.contacts):
+            v["notify"][c] = int(contact.name in ends)
+        for e, guard in enumerate(self.manager.guards):
+            wanted = guard.terminal or guard.reset is not None or guard.name in ends
+            v["notify"][n_contacts + e] = int(wanted)
+        guards = self._guard_values()
+        for c in range(n_contacts):
+            close, slow = abs(guards[c]) <= 1e-8, abs(guards[n_contacts + c]) <= 1e-9
+            v["touched"][c] = int(v["armed"][c] == 1 and v["kind"][c] == 0 and close and slow)
+        for e in range(n_guards):
+            self._set_side(e, guards)
+        del equations
+
+    def _guard_values(self) -> Vector:
+        v = self.values
+        block = self.mechanism.block(
+            v["clock"][F.NOW], v["q"][: v["n_q"]], v["y"][: v["n"]], v["anchors"][: v["n_anchors"]]
+        )
+        out = np.zeros(max(self.mechanism.sizes["guards"], 1))
+        if self.mechanism.sizes["guards"]:
+            self.mechanism.common["guards"](block, v["params"], out)
+        return out
+
+    def _set_side(self, e: int, guards: Vector) -> None:
+        """The sign from which a user's guard will cross next; at zero its rate decides."""
+        n_contacts, n_guards = self.values["n_contacts"], self.values["n_guards"]
+        value, rate = guards[4 * n_contacts + e], guards[4 * n_contacts + n_guards + e]
+        decider = value if abs(value) > 1e-9 else rate
+        self.values["side"][e] = 1.0 if decider > 0.0 else -1.0
+
+    # the run ------------------------------------------------------------------------------------------------------
+    def complete(self) -> tuple[Trajectory, str]:
+        """Run to the end; the trajectory, and what went wrong ('' if nothing did)."""
+        problem, message = "", ""
+        shown = 0.0
+        self.boundaries.begin(self)
+        try:
+            while True:
+                target = self.boundaries.next(self.end)
+                status = self.stepper.advance(target)
+                known = len(self.events)
+                self._collect()
+                if status == F.NEW_MODE:
+                    self.stepper.add_mode()
+                elif status == F.DONE:
+                    if not self.boundaries.arrive(self, target, self.end):
+                        message = f"reached t = {self.end:g} s"
+                        break
+                elif status == F.EVENT:
+                    ended = self._react(self.events[known:])
+                    if ended:
+                        message = f"ended by {ended!r} at t = {self.now:.6g} s"
+                        break
+                elif status not in (F.FULL, F.PAUSE):
+                    problem = explanation(self.stepper, status)
+                    break
+                if perf_counter() - shown > SHOW_EVERY:
+                    shown = perf_counter()
+                    self._show()
+        except KeyboardInterrupt:
+            problem = f"interrupted at t = {self.now:.6g} s; everything until then is kept"
+        self._collect()
+        if self.stop and not problem and not message.startswith("ended"):
+            message = f"{self.stop!r} did not happen before t = {self.end:g} s"
+        self._show(finished=True)
+        return self._trajectory(problem, message), problem
+
+    @property
+    def now(self) -> float:
+        return float(self.values["clock"][F.NOW])
+
+    def _show(self, finished: bool = False) -> None:
+        if self.progress is not None:
+            self.progress(self.now, self.now if finished else self.end)
+        for observer in self.observers:
+            observer(self.now, self.state())
+
+    def _collect(self) -> None:
+        """Take over the rows and events that the kernel has stored."""
+        v = self.values
+        count, logged = int(v["state"][F.STORED]), int(v["state"][F.LOGGED])
+        lines = v["log"].reshape(-1, v["event_width"])[:logged]
+        guards = [guard.name for guard in self.manager.guards]
+        for line in lines:
+            kind = KINDS[int(line[1])]
+            index, impulse = int(line[2]), np.zeros(0)
+            name = guards[index] if kind == "event" else self.manager.names[index]
+            if kind == "closed":
+                impulse = line[[5 + k for k in self.manager.contacts[index].rows]].copy()
+            self.events.append(EventRecord(float(line[0]), kind, name, impulse, float(line[3]), self.stored + int(line[4])))
+        if count:
+            self.pieces.append(v["store"].reshape(-1, v["width"])[:count].copy())
+        self.stored += count
+        v["state"][F.STORED] = v["state"][F.LOGGED] = 0
+
+    def _react(self, happened: Sequence[EventRecord]) -> str:
+        """Resets, controllers and endings of the events just logged; the name of the event that ends the run."""
+        guards = {guard.name: e for e, guard in enumerate(self.manager.guards)}
+        ended = ""
+        for event in happened:
+            if event.kind == "opened":
+                continue
+            guard = self.manager.guards[guards[event.name]] if event.kind == "event" else None
+            if guard is not None and guard.reset is not None:
+                apply_reset(self, guard)
+                self._set_side(guards[event.name], self._guard_values())
+            self.boundaries.call(self, event.name)
+            if event.name == self.stop or (guard is not None and guard.terminal):
+                ended = event.name
+        return ended
+
+    def change_parameters(self, values: Mapping[str, float]) -> None:
+        """New parameter values from now on; the scheme restarts from them."""
+        self.changed.update(values)
+        self.values["params"][: len(self.first_parameters)] = self.mechanism.parameters(self.changed)
+        self.parameter_changes.append((self.stored + int(self.values["state"][F.STORED]), self.values["params"].copy()))
+        self.values["state"][F.RESTART] = 1
+
+    def named(self) -> Named:
+        """Named quantities at the present state."""
+        return Named(self)
+
+    # the result ---------------------------------------------------------------------------------------------------
+    def state(self) -> State:
+        """The accepted state."""
+        v = self.values
+        names = np.array(self.manager.names)
+        armed = frozenset(str(name) for name in names[v["armed"][: len(names)] == 1])
+        y = v["y"][: v["n"]].copy()
+        n_v = v["n_v"]
+        return State(
+            self.now, v["q"][: v["n_q"]].copy(), y[:n_v], y[n_v:], self.manager.mode(v["closed"][: len(names)]), armed,
+            v["anchors"][: v["n_anchors"]].copy(), self.start.names, self.start.velocity_names, {}, dict(self.changed),
+        )  # fmt: skip
+
+    def _trajectory(self, problem: str, message: str) -> Trajectory:
+        v, equations = self.values, self.mechanism.equations
+        table = np.concatenate(self.pieces) if self.pieces else np.zeros((0, v["width"]))
+        n_q, n_v, n, rows = v["n_q"], v["n_v"], v["n"], v["n_rows"]
+        cuts = np.cumsum([1, n_q, n_v, n - n_v, n_v, n - n_v, rows])
+        time, q, velocity, z, a, s, lam, closed = np.split(table, cuts, axis=1)
+        record = Record(
+            equations=equations, parameters=self.first_parameters,
+            parameter_names=[parameter.name for parameter in equations.parameters], time=time[:, 0], q=q, v=velocity, z=z,
+            a=a, s=s, lam=lam, closed=closed.astype(np.uint8), events=self.events, stats=self._statistics(),
+            success=not problem, message=problem or message, failure=self._capsule(problem), final=self.state(),
+            settings=self.settings, parameter_changes=self.parameter_changes,
+        )  # fmt: skip
+        return Trajectory(record)
+
+    def _statistics(self) -> dict[str, Any]:
+        counts = self.values["counts"]
+        names = (
+            "steps", "iterations", "tangents", "residuals", "factorizations", "events", "restarts", "impacts", "locations",
+            "stagnations",
+        )  # fmt: skip
+        numbers: dict[str, Any] = {name: int(counts[place]) for place, name in enumerate(names)}
+        numbers["modes"] = len(self.stepper.modes)
+        numbers["compiled"] = self.stepper.compiled
+        numbers["derive_and_compile_seconds"] = self.mechanism.seconds
+        numbers["wall_seconds"] = perf_counter() - self.began
+        return numbers
+
+    def _capsule(self, problem: str) -> dict[str, Any] | None:
+        if not problem:
+            return None
+        return {"message": problem, "time": self.now, "state": self.state(), "dt": self.dt, "settings": self.settings}

@@ -1,0 +1,165 @@
+"""The kernel's arrays for one run, and the call into the kernel, compiled or interpreted."""
+
+from __future__ import annotations
+
+import struct
+from typing import Any
+
+import numpy as np
+
+from mbd.arrays import Vector
+from mbd.compile.mechanism import Mechanism
+from mbd.integrators.base import Integrator
+from mbd.integrators.family import MAX_ITERATIONS, NewmarkFamily
+from mbd.kernel import fields as F
+from mbd.kernel.active_set import ActiveSetManager
+from mbd.simulation.plain import MechanismSystem, PlainScheme, unit_blocks
+
+__all__ = ["Stepper", "is_compiled"]
+
+EVENT_CAPACITY = 512
+MODE_CAPACITY = 16
+
+
+def is_compiled(mechanism: Mechanism, integrator: Integrator) -> bool:
+    """Whether the compiled kernel can run this scheme: machine code exists and it is the endpoint Newmark family."""
+    own_step = getattr(integrator, "form", "endpoint") == "endpoint" and isinstance(integrator, NewmarkFamily)
+    plain_step = own_step and type(integrator).step in (NewmarkFamily.step, _hht_step())
+    return plain_step and mechanism.common["accelerations"].address != 0
+
+
+def _hht_step() -> Any:
+    from mbd.integrators.hht import HHT
+
+    return HHT.step
+
+
+class Stepper:
+    """One run's numbers: everything the kernel reads and writes.
+
+    The accepted state, its guards and the stored rows live in flat arrays; `advance` calls the
+    kernel, which returns when something needs Python: a full store, a new mode, an event, a failure.
+    """
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        manager: ActiveSetManager,
+        integrator: Integrator,
+        parameters: Vector,
+        dt: float,
+        options: dict[str, Any],
+    ) -> None:
+        self.mechanism, self.manager, self.integrator = mechanism, manager, integrator
+        self.compiled = is_compiled(mechanism, integrator)
+        self.stabilized = getattr(integrator, "stabilized", True)
+        layout = mechanism.layout
+        self.values: dict[str, Any] = {}
+        self._sizes(dt, options)
+        self._arrays(parameters, manager)
+        self.system = MechanismSystem(mechanism, manager, self.values["params"], self.values["anchors"], self.stabilized)
+        self.scheme = PlainScheme(integrator, self.system, manager)
+        self.functions: list[Any] = [mechanism.common[name] for name in ("accelerations", "guards", "scales")]
+        self.functions.append(None if mechanism.vector else mechanism.common["compose"])
+        self.modes: list[Any] = []
+        self.kernel: Any = None
+        self._table: Any = None
+        assert layout.n == self.values["n"]
+
+    def _sizes(self, dt: float, options: dict[str, Any]) -> None:
+        layout, values = self.mechanism.layout, self.values
+        n_contacts, n_guards = layout.n_contacts, len(self.manager.guards)
+        values.update(
+            n_q=layout.n_q, n_v=layout.n_v, n=layout.n, n_rows=layout.n_rows, n_anchors=layout.n_anchors,
+            n_contacts=n_contacts, n_guards=n_guards, o_q=layout.q, o_x=layout.x, o_v=layout.v, o_a=layout.a,
+            o_lam=layout.lam, o_anchor=layout.anchor, o_switch=layout.switch, vector=int(self.mechanism.vector),
+            stabilized=int(self.stabilized), max_iterations=MAX_ITERATIONS,
+            max_switches=int(options.get("max_switches", 20 + 4 * n_contacts)),
+            linear=int(options.get("locate") == "linear"), width=1 + layout.n_q + 2 * layout.n + layout.n_rows + n_contacts,
+            capacity=int(options["capacity"]), stride=int(options.get("store", 1)), event_width=5 + layout.n_rows,
+            event_capacity=max(EVENT_CAPACITY, 8 * n_contacts + 16), chunk=int(options.get("chunk", 1)), hooks=0,
+            rest_speed=float(options.get("rest_speed", 1e-6)), dt=dt, until=0.0,
+            alpha_m=0.0, alpha_f=0.0, beta=0.25, gamma=0.5, tolerance=1e-11, jerk=1, exact=0,
+        )  # fmt: skip
+        if isinstance(self.integrator, NewmarkFamily):
+            c = self.integrator.coefficients
+            values.update(
+                alpha_m=c.alpha_m, alpha_f=c.alpha_f, beta=c.beta, gamma=c.gamma, tolerance=self.integrator.tolerance,
+                jerk=int(self.integrator.starting == "jerk"), exact=int(self.integrator.exact),
+            )  # fmt: skip
+
+    def _arrays(self, parameters: Vector, manager: ActiveSetManager) -> None:
+        v = self.values
+        n, n_q, rows, contacts, guards = v["n"], v["n_q"], v["n_rows"], v["n_contacts"], v["n_guards"]
+        size = n + rows
+        reals = {
+            "block": self.mechanism.layout.size, "out": size * size + n + 2 * rows, "acc": self.mechanism.sizes["accelerations"],
+            "clock": 4, "q": n_q, "y": n, "rate": n, "aux": n, "slope": n, "lam": rows, "lam_slope": rows, "shift": n,
+            "anchors": v["n_anchors"], "q1": n_q, "y1": n, "rate1": n, "aux1": n, "lam1": rows, "shift1": n,
+            "kkt": size * size, "rhs": size, "work": 3 * size, "force": n, "bias": rows, "jump": n, "impulse": rows,
+            "guards0": 4 * contacts + 2 * guards, "guards1": 4 * contacts + 2 * guards, "scale": n + 2 * rows,
+            "side": guards, "pick": 8, "store": v["capacity"] * v["width"], "log": v["event_capacity"] * v["event_width"],
+            "detail": 8,
+        }  # fmt: skip
+        integers = {
+            "unit": n, "notify": contacts + guards, "terminal": contacts + guards, "closed": contacts, "armed": contacts,
+            "touched": contacts, "active": contacts + guards, "free": contacts, "closing": contacts,
+            "mode_closed": MODE_CAPACITY * contacts, "mode_code": 2 * MODE_CAPACITY, "mode_count": 1, "rows": rows,
+            "pivots": size, "columns": size, "fired": 2, "state": 16, "counts": 16,
+        }  # fmt: skip
+        for name, length in reals.items():
+            v[name] = np.zeros(max(length, 1))[:length] if length else np.zeros(1)
+        for name, length in integers.items():
+            v[name] = np.zeros(max(length, 1), dtype=np.int64)
+        for name, table in manager.tables().items():
+            v[name] = table if len(table) else np.zeros(1, dtype=table.dtype)
+        v["unit"] = unit_blocks(self.mechanism)
+        v["params"] = np.ascontiguousarray(parameters, dtype=float) if len(parameters) else np.zeros(1)
+        if not v["n_anchors"]:
+            v["anchors"] = np.zeros(0)
+
+    def add_mode(self) -> None:
+        """Make code for the contacts closed now."""
+        v = self.values
+        flags = v["closed"][: v["n_contacts"]]
+        code = self.mechanism.mode(self.manager.active_rows(flags), self.manager.penalties(flags), self.stabilized)
+        count, contacts = int(v["mode_count"][0]), v["n_contacts"]
+        if 2 * (count + 1) > len(v["mode_code"]):
+            v["mode_code"] = np.concatenate([v["mode_code"], np.zeros_like(v["mode_code"])])
+            v["mode_closed"] = np.concatenate([v["mode_closed"], np.zeros_like(v["mode_closed"])])
+        v["mode_closed"][count * contacts : (count + 1) * contacts] = flags
+        v["mode_code"][2 * count : 2 * count + 2] = len(self.functions), len(self.functions) + 1
+        self.functions += [code.tangent, code.residual]
+        self.modes.append(code)
+        v["mode_count"][0] = count + 1
+        self.kernel = self._table = None
+
+    def advance(self, until: float) -> int:
+        """Run the kernel until it returns; its status."""
+        self.values["until"] = until
+        return self._advance_compiled() if self.compiled else self._advance_plain()
+
+    def _advance_plain(self) -> int:
+        from mbd.kernel.advance import advance
+
+        values = {**self.values, "code": self.functions, "hooks": self.scheme}
+        with np.errstate(all="ignore"):
+            return int(advance(F.Kernel(**{name: values[name] for name in F.FIELDS})))
+
+    def _advance_compiled(self) -> int:
+        from mbd.kernel.build import entry
+
+        if self._table is None:
+            addresses = [0 if function is None else function.address for function in self.functions]
+            self._code = np.array(addresses, dtype=np.int64)
+            self._table = np.zeros(len(F.FIELDS), dtype=np.int64)
+        for place, name in enumerate(F.FIELDS):
+            if name == "code":
+                self._table[place] = self._code.ctypes.data
+            elif name in F.REALS:
+                self._table[place] = struct.unpack("q", struct.pack("d", self.values[name]))[0]
+            elif name in F.INTEGERS or name == "hooks":
+                self._table[place] = self.values[name]
+            else:
+                self._table[place] = self.values[name].ctypes.data
+        return entry()(self._table.ctypes.data)

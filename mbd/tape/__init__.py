@@ -1,0 +1,1 @@
+"""The scalar expression graph on which all mechanics is traced, folded and differentiated."""

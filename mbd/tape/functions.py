@@ -1,0 +1,109 @@
+"""Functions of scalars: they record traced values on the tape, and work on floats and arrays as numpy's do."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from mbd.errors import TraceError
+from mbd.tape.node import BINARY, UNARY, Node
+
+__all__ = [
+    "NUMPY", "acos", "asin", "atan", "atan2", "cos", "cosh", "exp", "log", "maximum", "minimum", "on_numpy", "sign",
+    "sin", "sinh", "sqrt", "tan", "tanh", "where",
+]  # fmt: skip
+
+_ARRAY = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "atan2": "arctan2", "min": "minimum", "max": "maximum"}
+"""numpy's names where they differ."""
+
+
+def _on_arrays(op: str, *values: Any) -> Any:
+    """The function on arrays of floats or of traced values."""
+    import numpy as np
+
+    name = _ARRAY.get(op, op)
+    if any(np.asarray(value).dtype == object for value in values):
+        return on_numpy(name, values)
+    return getattr(np, name)(*values)
+
+
+def on_numpy(name: str, values: Sequence[Any]) -> Any:
+    """The numpy function called `name` of traced values or arrays of them."""
+    import numpy as np
+
+    function = NUMPY.get(name)
+    if function is None:
+        raise TraceError(f"numpy.{name} is not recorded; known are {', '.join(sorted(NUMPY))}")
+    if any(getattr(value, "ndim", 0) for value in values):
+        return np.frompyfunc(function, len(values), 1)(*[np.asarray(value, dtype=object) for value in values])
+    return function(*[value if isinstance(value, Node) else float(value) for value in values])
+
+
+def _unary(op: str, what: str) -> Callable[[Any], Any]:
+    def function(x: Any) -> Any:
+        if isinstance(x, Node):
+            return x.tape.unary(op, x)
+        return _on_arrays(op, x) if getattr(x, "ndim", 0) else UNARY[op](x)
+
+    function.__name__ = function.__qualname__ = op
+    function.__doc__ = f"{what} of a traced scalar, a float, or an array."
+    return function
+
+
+def _binary(op: str, name: str, what: str) -> Callable[[Any, Any], Any]:
+    def function(x: Any, y: Any) -> Any:
+        if getattr(x, "ndim", 0) or getattr(y, "ndim", 0):
+            return _on_arrays(op, x, y)
+        tape = x.tape if isinstance(x, Node) else y.tape if isinstance(y, Node) else None
+        return BINARY[op](x, y) if tape is None else tape.binary(op, x, y)
+
+    function.__name__ = function.__qualname__ = name
+    function.__doc__ = f"{what} of two traced scalars, floats, or arrays."
+    return function
+
+
+sin = _unary("sin", "Sine (argument in radians)")
+cos = _unary("cos", "Cosine (argument in radians)")
+tan = _unary("tan", "Tangent (argument in radians)")
+asin = _unary("asin", "Inverse sine [rad]")
+acos = _unary("acos", "Inverse cosine [rad]")
+atan = _unary("atan", "Inverse tangent [rad]")
+sinh = _unary("sinh", "Hyperbolic sine")
+cosh = _unary("cosh", "Hyperbolic cosine")
+tanh = _unary("tanh", "Hyperbolic tangent")
+exp = _unary("exp", "Exponential")
+log = _unary("log", "Natural logarithm")
+sqrt = _unary("sqrt", "Square root")
+sign = _unary("sign", "Sign, −1, 0 or 1,")
+atan2 = _binary("atan2", "atan2", "Angle of the point (y, x), in that order [rad],")
+minimum = _binary("min", "minimum", "The smaller")
+maximum = _binary("max", "maximum", "The larger")
+
+
+def where(condition: Any, yes: Any, no: Any) -> Any:
+    """`yes` where the condition holds, else `no`: the traced form of an ``if``.
+
+    Both branches are evaluated; the one that is not taken may be infinite or not a number.
+
+    >>> where(1.0 < 2.0, 3.0, 4.0)
+    3.0
+    """
+    for value in (condition, yes, no):
+        if isinstance(value, Node):
+            return value.tape.where(condition, yes, no)
+    if any(getattr(value, "ndim", 0) for value in (condition, yes, no)):
+        import numpy as np
+
+        return np.where(condition, yes, no)
+    return yes if condition else no
+
+
+NUMPY: dict[str, Callable[..., Any]] = {
+    "sqrt": sqrt, "sin": sin, "cos": cos, "tan": tan, "arcsin": asin, "arccos": acos, "arctan": atan, "sinh": sinh,
+    "cosh": cosh, "tanh": tanh, "exp": exp, "log": log, "sign": sign, "absolute": abs, "arctan2": atan2,
+    "minimum": minimum, "maximum": maximum, "square": lambda x: x * x, "negative": lambda x: -x,
+    "add": lambda x, y: x + y, "subtract": lambda x, y: x - y, "multiply": lambda x, y: x * y,
+    "divide": lambda x, y: x / y, "power": lambda x, y: x**y, "less": lambda x, y: x < y,
+    "less_equal": lambda x, y: x <= y, "greater": lambda x, y: x > y, "greater_equal": lambda x, y: x >= y,
+}  # fmt: skip
+"""The recorded function behind each numpy ufunc name."""

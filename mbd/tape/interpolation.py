@@ -1,0 +1,101 @@
+"""Samples to piecewise cubics: the breaks and coefficients of a `Table`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Literal, NamedTuple, TypeAlias
+
+from mbd.errors import ModelError
+
+__all__ = ["Beyond", "Pieces", "linear", "monotone"]
+
+Beyond: TypeAlias = Literal["constant", "linear"]
+"""How a table goes on outside its samples: at the last value, or along the last slope."""
+
+Coefficients: TypeAlias = tuple[float, float, float, float]
+
+
+class Pieces(NamedTuple):
+    """n breaks and n rows of cubic coefficients, as `Tape.table` takes them: ``table(name, *pieces)``."""
+
+    breaks: tuple[float, ...]
+    coefficients: tuple[Coefficients, ...]
+
+
+def linear(xs: Sequence[float], ys: Sequence[float], beyond: Beyond = "constant", what: str = "table") -> Pieces:
+    """Straight lines through the samples.
+
+    Parameters
+    ----------
+    xs, ys : n ≥ 2 samples, xs increasing
+    beyond : how it goes on outside
+    what : the user's object, for errors
+
+    >>> linear([0.0, 2.0], [1.0, 5.0]).coefficients
+    ((1.0, 0.0, 0.0, 0.0), (1.0, 2.0, 0.0, 0.0), (5.0, 0.0, 0.0, 0.0))
+    """
+    x, y = _checked(xs, ys, what)
+    rows = [(y[k], (y[k + 1] - y[k]) / (x[k + 1] - x[k]), 0.0, 0.0) for k in range(len(x) - 1)]
+    return _continued(x, y, rows, rows[0][1], rows[-1][1], beyond)
+
+
+def monotone(xs: Sequence[float], ys: Sequence[float], beyond: Beyond = "linear", what: str = "table") -> Pieces:
+    """Shape-preserving cubics through the samples (Fritsch & Butland 1984; `scipy.interpolate.PchipInterpolator`).
+
+    No overshoot: where the samples rise the curve rises, and its slope is continuous.
+
+    Parameters
+    ----------
+    xs, ys : n ≥ 2 samples, xs increasing
+    beyond : how it goes on outside
+    what : the user's object, for errors
+    """
+    from scipy.interpolate import PchipInterpolator
+
+    x, y = _checked(xs, ys, what)
+    curve = PchipInterpolator(x, y)
+    rows: list[Coefficients] = [tuple(float(c) for c in reversed(column)) for column in curve.c.T]  # type: ignore[misc]
+    first, last = (float(slope) for slope in curve.derivative()([x[0], x[-1]]))
+    return _continued(x, y, rows, first, last, beyond)
+
+
+def _continued(
+    x: list[float], y: list[float], rows: list[Coefficients], first: float, last: float, beyond: Beyond
+) -> Pieces:
+    """The inner pieces with one more on either side, of slopes `first` and `last` or constant."""
+    if beyond not in ("constant", "linear"):
+        raise ModelError(f"beyond = {beyond!r} is not known; use 'constant' or 'linear'")
+    width = x[1] - x[0]
+    before: Coefficients = (y[0], 0.0, 0.0, 0.0)
+    after: Coefficients = (y[-1], 0.0, 0.0, 0.0)
+    if beyond == "linear":
+        before = (y[0] - first * width, first, 0.0, 0.0)
+        after = (y[-1], last, 0.0, 0.0)
+    return Pieces((x[0] - width, *x), (before, *rows, after))
+
+
+def _checked(xs: Sequence[float], ys: Sequence[float], what: str) -> tuple[list[float], list[float]]:
+    """The samples as floats; every fault is an error that says which sample."""
+    x, y = [float(value) for value in xs], [float(value) for value in ys]
+    faults = []
+    if len(x) != len(y):
+        faults.append(f"{what}: {len(x)} abscissae and {len(y)} ordinates; give as many of one as of the other")
+    if len(x) < 2:
+        faults.append(f"{what}: at least two samples are needed, {len(x)} came")
+    for kind, values in ("abscissa", x), ("ordinate", y):
+        bad = [k for k, value in enumerate(values) if not math.isfinite(value)]
+        if bad:
+            more = f" and {len(bad) - 1} more" if len(bad) > 1 else ""
+            faults.append(
+                f"{what}: {kind} number {bad[0]} is {values[bad[0]]}{more}; remove missing samples or fill them first"
+            )
+    back = [k for k in range(len(x) - 1) if x[k + 1] <= x[k]]
+    if back:
+        k = back[0]
+        faults.append(
+            f"{what}: abscissae must increase, but number {k} is {x[k]:g} and number {k + 1} is {x[k + 1]:g}; sort them"
+        )
+    if faults:
+        raise ModelError(faults)
+    return x, y

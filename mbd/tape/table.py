@@ -1,0 +1,51 @@
+"""Piecewise cubics of one variable, stored beside the parameters."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Sequence
+
+__all__ = ["Table"]
+
+
+class Table:
+    """A piecewise cubic of one variable, stored beside the parameters and looked up at run time.
+
+    ``value(x) = Σ_k coefficients[i, k] (x − breaks[i])^k`` on interval i; outside, the first and last pieces go on,
+    so give the first and last piece the extrapolation wanted (`mbd.tape.interpolation` does).
+
+    Parameters
+    ----------
+    name : the user's name of it
+    breaks : n increasing abscissae
+    coefficients : n rows of 4; row i belongs to ``[breaks[i], breaks[i+1])``, row 0 also to the left of it
+    index : its place among the tables of its tape
+    """
+
+    __slots__ = ("breaks", "coefficients", "index", "name")
+
+    def __init__(
+        self, name: str, breaks: Sequence[float], coefficients: Sequence[Sequence[float]], index: int = 0
+    ) -> None:
+        self.name, self.index = name, index
+        self.breaks = tuple(float(x) for x in breaks)
+        self.coefficients = tuple(tuple(float(c) for c in row) for row in coefficients)
+
+    @property
+    def flat(self) -> list[float]:
+        """Storage of ``5 n`` numbers: breaks, then the rows of coefficients."""
+        return [*self.breaks, *(c for row in self.coefficients for c in row)]
+
+    def value(self, x: float, order: int = 0) -> float:
+        """The `order`-th derivative at x (plain reference).
+
+        >>> Table("ramp", [0.0, 1.0], [[0.0, 2.0, 0.0, 0.0], [2.0, 0.0, 0.0, 0.0]]).value(0.25)
+        0.5
+        """
+        piece = max(bisect_right(self.breaks, x) - 1, 0)
+        s, row = x - self.breaks[piece], self.coefficients[piece]
+        total = 0.0
+        for k in range(3, order - 1, -1):
+            total = total * s + math.perm(k, order) * row[k]
+        return total

@@ -1,0 +1,219 @@
+"""Every fault of a description at once, by name, with what to try."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from mbd.bodies.base import Body, Frame
+from mbd.bodies.ground import Ground
+from mbd.bodies.point_mass import PointMass
+from mbd.errors import ModelError, nearest
+from mbd.forces.base import Force
+from mbd.joints.base import Joint
+from mbd.topology.graph import disconnected
+from mbd.topology.plan import cut_names, is_planar
+
+if TYPE_CHECKING:
+    from mbd.constraints.base import Constraint
+    from mbd.model import Model
+
+__all__ = ["faults", "quantities"]
+
+
+def faults(model: Model) -> list[str]:
+    """All faults of a model, one sentence each."""
+    if not model.joints:
+        return [
+            f"model '{model.name}' has no joints; connect a body to the ground, such as "
+            "model.connect(mbd.Revolute('hip', model.ground.origin, thigh.start))"
+        ]
+    words: list[Body | Joint | Force | Constraint] = [*model.bodies.values(), *model.joints]
+    words += [*model.forces, *model.constraints]
+    found = [fault for word in words for fault in word.faults()]
+    found += name_faults(model)
+    found += reach_faults(model)
+    found += mention_faults(model)
+    found += rule_faults(model)
+    found += choice_faults(model)
+    found += massless_faults(model)
+    return list(dict.fromkeys(found))
+
+
+def quantities(model: Model) -> list[str]:
+    """Names that functions, measures and controllers may ask for: 't', coordinates, rates, places, velocities."""
+    names = ["t"]
+    for joint in model.joints:
+        for coordinate in joint.coordinate_names:
+            names += [coordinate, f"{coordinate}.rate"]
+        if len(joint.labels) == 1:
+            names.append(f"{joint.name}.rate")
+    for frame in model.frames:
+        names += [f"{frame}.{part}" for part in ("x", "y", "z", "vx", "vy", "vz")]
+    return names
+
+
+# names ----------------------------------------------------------------------------------------------------------
+def name_faults(model: Model) -> list[str]:
+    """Two things of one name."""
+    found = []
+    bodies: dict[str, list[Body]] = {}
+    for body in _all_bodies(model):
+        known = bodies.setdefault(body.name, [])
+        if not any(body is other or (isinstance(body, Ground) and isinstance(other, Ground)) for other in known):
+            known.append(body)
+    for name, several in bodies.items():
+        if len(several) > 1:
+            found.append(f"{len(several)} different bodies are named '{name}'; rename them, or use one object")
+    kinds: dict[str, Counter[str]] = {}
+    words: list[Joint | Force | Constraint] = [*model.joints, *model.forces, *model.constraints]
+    for name, kind in (
+        *((name, "body") for name in bodies),
+        *((word.name, type(word).__name__) for word in (*words, *model.controllers)),
+        *((f"{joint.name} loss", "loss of a joint") for joint in model.joints if joint.loss is not None),
+        *((f"{joint.name} spring", "spring of a joint") for joint in model.joints if joint.stiffness != 0.0),
+    ):
+        kinds.setdefault(name, Counter())[kind] += 1
+    for name, counts in kinds.items():
+        if counts.total() > 1:
+            several_kinds = ", ".join(f"{count} × {kind}" for kind, count in counts.items())
+            found.append(f"the name '{name}' is used {counts.total()} times ({several_kinds}); give each its own name")
+    places: dict[str, Frame] = {}
+    for frame in model.points():
+        if places.setdefault(frame.full_name, frame).parameters() != frame.parameters():
+            found.append(f"two different points are named '{frame.full_name}'; give each its own name")
+    return found
+
+
+def _all_bodies(model: Model) -> Iterable[Body]:
+    yield model.ground
+    for frame in model.points():
+        yield frame.body
+
+
+# what hangs together ----------------------------------------------------------------------------------------------
+def reach_faults(model: Model) -> list[str]:
+    """Bodies without a chain of joints to the ground."""
+    lost = disconnected(model)
+    found = []
+    for name in lost:
+        joints = [joint for joint in model.joints if name in (joint.parent.body.name, joint.child.body.name)]
+        if joints:
+            by = ", ".join(f"'{joint.name}'" for joint in joints)
+            found.append(
+                f"body '{name}' is connected by {by}, but no chain of joints leads to the ground; connect one of these "
+                "bodies to model.ground.origin, with mbd.Planar or mbd.Translation if it moves freely"
+            )
+        else:
+            users = ", ".join(f"'{word.name}'" for word in _users(model, name))
+            found.append(
+                f"body '{name}', which {users} refers to, is not connected by any joint; connect it, "
+                "or use a frame of a body of this model"
+            )
+    return found
+
+
+def _users(model: Model, body: str) -> list[Force | Constraint]:
+    words: list[Force | Constraint] = [*model.forces, *model.constraints]
+    return [w for w in words if any(isinstance(m, Frame) and m.body.name == body for m in w.mentions())]
+
+
+def mention_faults(model: Model) -> list[str]:
+    """Joints that were never connected, names of quantities that do not exist."""
+    found = []
+    joints = {joint.name for joint in model.joints}
+    known = set(quantities(model))
+    words: list[Force | Constraint] = [*model.forces, *model.constraints]
+    for word in words:
+        for mention in word.mentions():
+            if isinstance(mention, Joint) and mention.name not in joints:
+                found.append(
+                    f"'{word.name}' refers to the joint '{mention.name}', which is not connected; "
+                    "pass it to model.connect as well"
+                )
+            if isinstance(mention, str) and mention not in known:
+                found.append(f"'{word.name}': " + nearest(mention, known, "quantity"))
+    for controller in model.controllers:
+        found += [
+            f"'{controller.name}' reads: " + nearest(name, known, "quantity")
+            for name in controller.reads
+            if name not in known
+        ]
+    return found
+
+
+def rule_faults(model: Model) -> list[str]:
+    """Names in When, only_while and the controllers' on= and writes= that do not exist."""
+    contacts = [word.name for word in model.contacts]
+    instants = contacts + [event.name for event in model.events]
+    parameters = model.parameters
+    found = []
+    for word in model.constraints:
+        unknown = [other for other in word.others if other not in contacts]
+        found += [f"'{word.name}': " + nearest(other, contacts, "contact") for other in unknown]
+    for controller in model.controllers:
+        for name in controller.on:
+            if name not in instants:
+                found.append(f"'{controller.name}' on: " + nearest(name, instants, "contact or event"))
+        for name in controller.writes:
+            if name not in parameters:
+                found.append(f"'{controller.name}' writes: " + nearest(name, parameters, "parameter"))
+    return found
+
+
+def choice_faults(model: Model) -> list[str]:
+    """Names in cut= and tunable= that do not exist."""
+    parameters = model.parameters
+    found = ["tunable: " + nearest(name, parameters, "parameter") for name in model.tunable if name not in parameters]
+    try:
+        cut_names(model)
+    except ModelError as error:
+        found += error.faults
+    return found
+
+
+# what nothing determines ------------------------------------------------------------------------------------------
+def massless_faults(model: Model) -> list[str]:
+    """Bodies whose motion nothing determines, as far as the description shows it; assembly finds the others.
+
+    A massless body at the end of the tree may move freely; a point mass all of whose joints turn about its own point
+    may spin. Bodies and joints that a constraint refers to are left to the assembly.
+    """
+    bound = {m.body.name if isinstance(m, Frame) else m.name for m in _constrained(model) if not isinstance(m, str)}
+    planar, found = is_planar(model), []
+    held: dict[str, list[Joint]] = {}
+    for joint in model.joints:
+        for frame in (joint.parent, joint.child):
+            held.setdefault(frame.body.name, []).append(joint)
+    for body in model.bodies.values():
+        joints = held.get(body.name, [])
+        free = [joint for joint in joints if joint.labels and joint.name not in bound]
+        if isinstance(body, Ground) or body.name in bound or not joints or len(free) < len(joints):
+            continue
+        one_axis = planar or len(joints) == 1
+        if isinstance(body, PointMass) and one_axis and all(_spins(joint, body) for joint in joints):
+            names = ", ".join(f"'{joint.name}'" for joint in joints)
+            found.append(
+                f"point mass '{body.name}' may spin about its own point, where {names} holds it, and nothing "
+                "determines that motion; weld it to its neighbour (mbd.Weld), or shift it with mbd.Translation"
+            )
+        elif len(joints) == 1 and not any(_weights(body)):
+            found.append(
+                f"body '{body.name}' has neither mass nor inertia and '{joints[0].name}' lets it move, so nothing "
+                "determines its motion; give it a mass, or weld it"
+            )
+    return found
+
+
+def _constrained(model: Model) -> list[Frame | Joint | str]:
+    return [mention for word in model.constraints for mention in word.mentions()]
+
+
+def _spins(joint: Joint, body: Body) -> bool:
+    frame = joint.parent if joint.parent.body is body else joint.child
+    return frame.offset == (0.0, 0.0, 0.0) and any(label.unit == "rad" for label in joint.labels)
+
+
+def _weights(body: Body) -> list[float]:
+    return [value for field, value in body.fields().items() if field.startswith(("mass", "inertia"))]

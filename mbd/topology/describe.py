@@ -1,0 +1,95 @@
+"""A model in a page of text."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from mbd.bodies.base import Frame
+from mbd.constraints.base import Measure
+from mbd.constraints.bilateral import Bilateral
+from mbd.constraints.penalty import Penalty
+from mbd.constraints.unilateral import Unilateral
+from mbd.errors import ModelError
+from mbd.topology.plan import plan
+
+if TYPE_CHECKING:
+    from mbd.bodies.base import Body
+    from mbd.constraints.base import Constraint
+    from mbd.joints.base import Joint
+    from mbd.model import Model
+
+__all__ = ["description"]
+
+UNITS = {"mass": "kg", "length": "m", "center": "m", "inertia": "kg m²"}
+
+
+def description(model: Model) -> str:
+    """Bodies, joints, forces, constraints, coordinates and faults."""
+    g = ", ".join(f"{value:.6g}" for value in model.gravity)
+    lines = [f"{model.name}: gravity ({g}) m/s²"]
+    lines += _section("bodies", [_body(body) for body in model.bodies.values() if body is not model.ground])
+    lines += _section("joints", [_joint(joint) for joint in model.joints])
+    lines += _section("forces", [f"{force.name}: {type(force).__name__}, {force.kind}" for force in model.forces])
+    lines += _section("constraints", [_constraint(word) for word in model.constraints])
+    lines += _section("controllers", [controller.name for controller in model.controllers])
+    found = model.check()
+    if not found:
+        lines += _section("coordinates", _choice(model))
+    lines += _section("faults", found)
+    return "\n".join(lines)
+
+
+def _section(title: str, entries: Iterable[str]) -> list[str]:
+    listed = list(entries)
+    return [f"{title}:", *(f"  {entry}" for entry in listed)] if listed else []
+
+
+def _body(body: Body) -> str:
+    values = [f"{field} {value:.6g} {UNITS.get(field.split('.')[0], '')}" for field, value in body.fields().items()]
+    return f"{body.name}: {type(body).__name__}, " + ", ".join(values)
+
+
+def _joint(joint: Joint) -> str:
+    coordinates = ", ".join(
+        f"{name} [{label.unit}]" for name, label in zip(joint.coordinate_names, joint.labels, strict=True)
+    )
+    said = f"{joint.name}: {type(joint).__name__} {joint.parent.full_name} → {joint.child.full_name}"
+    said += f", {coordinates}" if coordinates else ""
+    said += f", loss {joint.loss}" if joint.loss is not None else ""
+    return said + (f", stiffness {joint.stiffness:.6g}, rest {joint.rest:.6g}" if joint.stiffness else "")
+
+
+def _constraint(word: Constraint) -> str:
+    said = f"{word.name}: {type(word).__name__}"
+    if isinstance(word, Unilateral):
+        said += f", {_measure(word.measure)}" + (", sticks" if word.sticks else "")
+        rules = [f"'{rule.other}' closes{' (after the impact)' if rule.after_impact else ''}" for rule in word.releases]
+        said += ", opens " + ("as " + " or ".join(rules) if rules else "on pull")
+        if word.only_while is not None:
+            other = word.only_while
+            said += f", only while {_measure(other)} > 0" if isinstance(other, Measure) else f", only while '{other}'"
+    if isinstance(word, Bilateral):
+        said += f", {_measure(word.measure)} = {word.value}"
+    if isinstance(word, Penalty):
+        said += f", {_measure(word.measure)}, stiffness {word.stiffness:.6g}, damping {word.damping:.6g}"
+    return said
+
+
+def _measure(measure: Measure) -> str:
+    names = [m if isinstance(m, str) else m.full_name if isinstance(m, Frame) else m.name for m in measure.mentions()]
+    return f"{measure.title} of " + ", ".join(f"'{name}'" for name in names)
+
+
+def _choice(model: Model) -> list[str]:
+    try:
+        chosen = plan(model)
+    except ModelError as error:
+        return list(error.faults)
+    kind = "planar" if chosen.planar else "spatial"
+    return [
+        f"{chosen.dof} of the tree: {', '.join(chosen.coordinate_names) or 'none'}",
+        f"cut joints: {', '.join(joint.name for joint in chosen.cut) or 'none'}",
+        f"mobility {chosen.mobility} by the {kind} count of Grübler",
+        *chosen.notes,
+    ]

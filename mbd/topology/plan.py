@@ -1,0 +1,157 @@
+"""Which joints generate coordinates and which are cut."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from mbd.bodies.base import Body, Frame
+from mbd.bodies.ground import Ground
+from mbd.bodies.point_mass import PointMass
+from mbd.errors import CapabilityError, ModelError, nearest
+from mbd.joints.base import Joint
+from mbd.joints.planar import Planar
+from mbd.joints.reversed import Reversed
+from mbd.joints.translation import Translation
+from mbd.topology.graph import graph_of, mobility, spanning_tree
+
+if TYPE_CHECKING:
+    from mbd.model import Model
+
+__all__ = ["Plan", "plan"]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How coordinates are chosen; the choice never changes the physics.
+
+    Attributes
+    ----------
+    edges : joints of the tree, each after the one that leads to its parent body; the child is always the new body
+        (a joint that the user described the other way round stands here as `Reversed`)
+    cut : joints that become rows, as the user described them
+    floating : those of `edges` that were added because cutting left a body without a path, named '<body> floating'
+    planar : whether all moves in x–y and turns about z
+    mobility : Grübler's count
+    notes : what a user should know about the choice
+    """
+
+    edges: tuple[Joint, ...]
+    cut: tuple[Joint, ...]
+    floating: tuple[Joint, ...]
+    planar: bool
+    mobility: int
+    notes: tuple[str, ...] = ()
+
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """The moving bodies, in the order of `edges`."""
+        return tuple(joint.child.body for joint in self.edges)
+
+    @property
+    def coordinate_names(self) -> tuple[str, ...]:
+        """The generalized coordinates, in order."""
+        return tuple(name for joint in self.edges for name in joint.coordinate_names)
+
+    @property
+    def dof(self) -> int:
+        """Number of coordinates of the tree."""
+        return len(self.coordinate_names)
+
+    def path(self, body: Body | str) -> tuple[Joint, ...]:
+        """The joints of the tree from the ground to a body."""
+        name = body if isinstance(body, str) else body.name
+        leads = {joint.child.body.name: joint for joint in self.edges}
+        found: list[Joint] = []
+        while name in leads:
+            found.append(leads[name])
+            name = leads[name].parent.body.name
+        return tuple(reversed(found))
+
+
+def plan(model: Model) -> Plan:
+    """The tree, the cut joints and the floating bodies of a model whose `cut` is 'auto', 'loops', 'all' or names."""
+    wanted = cut_names(model)
+    planar = is_planar(model)
+    graph = graph_of(model, without=wanted)
+    tree, closing, reached = spanning_tree(graph, model.ground.name)
+    edges = _oriented(tree, [model.ground.name])
+    floating: list[Joint] = []
+    for body in model.bodies.values():
+        if body.name in reached:
+            continue
+        floats = floating_joint(model, body, planar)
+        more, closes, found = spanning_tree(graph, body.name)
+        floating.append(floats)
+        edges += [floats, *_oriented(more, [body.name])]
+        closing += closes
+        reached += found
+    names = {joint.name for joint in closing} | wanted
+    notes = [f"'{joint.parent.body.name}' … '{joint.child.body.name}': loop cut at '{joint.name}'" for joint in closing]
+    notes += [f"'{joint.child.body.name}' floats" for joint in floating]
+    return Plan(
+        tuple(edges),
+        tuple(joint for joint in model.joints if joint.name in names),
+        tuple(floating),
+        planar,
+        mobility(len(model.bodies) - 1, model.joints, planar),
+        tuple(notes),
+    )
+
+
+def cut_names(model: Model) -> set[str]:
+    """Names of the joints that the user wants cut, besides those that close a loop."""
+    names = [joint.name for joint in model.joints]
+    if isinstance(model.cut, str):
+        if model.cut == "all":
+            return set(names)
+        if model.cut in ("auto", "loops"):
+            return set()
+        raise ModelError(f"cut is 'auto', 'loops', 'all' or a list of names of joints, got {model.cut!r}")
+    for name in model.cut:
+        if name not in names:
+            raise ModelError("cut: " + nearest(name, names, "joint"))
+    return set(model.cut)
+
+
+def is_planar(model: Model) -> bool:
+    """Whether every joint turns about z only and shifts in x–y only."""
+    return all(joint.is_planar and joint.parent.is_planar and joint.child.is_planar for joint in model.joints)
+
+
+def floating_joint(model: Model, body: Body, planar: bool) -> Joint:
+    """The joint by which a body floats against the ground, without constraining it."""
+    name, origin = f"{body.name} floating", model.ground.origin
+    if isinstance(body, PointMass) and not _is_turned(model, body):
+        return Translation(name, origin, body.origin, axes="xy" if planar else "xyz")
+    if planar:
+        return Planar(name, origin, body.origin)
+    raise CapabilityError(
+        f"cut={model.cut!r} lets the body '{body.name}' float in space, which needs a joint with free rotation that "
+        "this version does not have; use cut='auto', or cut joints that leave every body a path to the ground"
+    )
+
+
+def _is_turned(model: Model, body: Body) -> bool:
+    """Whether a joint without an angle holds the body's axes to those of a moving body or of a turned frame."""
+    for joint in model.joints:
+        for own, other in (joint.parent, joint.child), (joint.child, joint.parent):
+            holds = own.body is body and all(label.unit != "rad" for label in joint.labels)
+            if holds and not (_is_level(own) and _is_level(other) and isinstance(other.body, Ground)):
+                return True
+    return False
+
+
+def _is_level(frame: Frame) -> bool:
+    return frame.rotation is None
+
+
+def _oriented(tree: Sequence[Joint], roots: Sequence[str]) -> list[Joint]:
+    """The joints of a tree so that each leads from a known body to a new one."""
+    known, result = set(roots), list[Joint]()
+    for joint in tree:
+        forward = joint.parent.body.name in known
+        result.append(joint if forward else Reversed(joint))
+        known |= {joint.parent.body.name, joint.child.body.name}
+    return result

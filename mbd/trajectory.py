@@ -1,0 +1,275 @@
+"""A run by name: what `simulate` returns and `load` reads."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mbd.arrays import Matrix, Vector
+from mbd.errors import TrajectoryError
+from mbd.results.columns import Columns, ModelColumns, gather
+from mbd.results.facts import Facts
+from mbd.results.interpolation import Side
+from mbd.results.record import EventRecord, Record
+
+if TYPE_CHECKING:
+    from mbd.results.ledger import Ledger
+    from mbd.results.storage import Archive
+    from mbd.results.violation import Violation
+
+__all__ = ["EventRecord", "Record", "Moments", "Trajectory", "load"]
+
+
+class Trajectory:
+    """The motion of a model, asked for by name.
+
+    ``run["left hip.angle"]`` is an (R,) array over `run.time`; ``run["left shank.end"]`` is (R, 3). Rows just before
+    and just after a switch are both stored, with equal times.
+
+    Parameters
+    ----------
+    record : the run as numbers
+    archive : the named columns of a run read from a file; None evaluates them with the model's equations
+    """
+
+    def __init__(self, record: Record, archive: Archive | None = None) -> None:
+        self.record = record
+        self._archive = archive
+        self._known: dict[str, Vector | Matrix] = {}
+
+    @cached_property
+    def columns(self) -> Columns:
+        """Where named quantities come from."""
+        if self._archive is not None:
+            return self._archive.columns
+        return self._model_columns
+
+    @cached_property
+    def _model_columns(self) -> ModelColumns:
+        if self.record.equations is None:
+            raise TrajectoryError("this run has neither equations nor stored columns")
+        return ModelColumns(self.record, self.record.equations)
+
+    # values -----------------------------------------------------------------------------------------------------
+    @property
+    def time(self) -> Vector:
+        """Times of the stored rows (R,) [s]."""
+        return self.record.time
+
+    @property
+    def t(self) -> Vector:
+        """`time`, under the name of ``scipy.integrate.solve_ivp``."""
+        return self.record.time
+
+    def __getitem__(self, name: str) -> Any:
+        """A named quantity at every stored row: (R,), or (R, 3) for a vector."""
+        if name not in self._known:
+            value = gather(self.columns, self.columns.at_rows, name)
+            value.flags.writeable = False
+            self._known[name] = value
+        return self._known[name]
+
+    def __contains__(self, name: object) -> bool:
+        return isinstance(name, str) and (self.columns.knows(name) or name in self.columns.vectors)
+
+    def __len__(self) -> int:
+        return len(self.record.time)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Every named scalar of the run; ``name.x``, ``name.y``, ``name.z`` are also one vector ``name``."""
+        return self.columns.names
+
+    def _ipython_key_completions_(self) -> list[str]:
+        return [*self.columns.names, *self.columns.vectors]
+
+    def at(self, times: ArrayLike, side: Side = "right") -> Moments:
+        """Named quantities at any times of the run.
+
+        The state is interpolated by cubic Hermite polynomials (q with v, v with v̇) within the smooth segment that holds
+        the time, never across a switch, and quantities are evaluated from it.
+
+        Parameters
+        ----------
+        times : one time or several [s]
+        side : at a switch, the values after it ('right') or before it ('left')
+
+        Then ``run.at([0.1, 0.2])["left hip.angle"]``.
+        """
+        return Moments(self.columns, times, side)
+
+    # what happened ----------------------------------------------------------------------------------------------
+    @property
+    def events(self) -> list[EventRecord]:
+        """What happened, in order: `time`, `kind` ('closed', 'opened', 'event'), `name`, `impulse`, `energy_loss`."""
+        return list(self.record.events)
+
+    @cached_property
+    def energy(self) -> Ledger:
+        """The energy ledger: kinetic, potential, and every part that changed them, with what is numerical apart."""
+        if self._archive is not None:
+            return self._archive.ledger
+        from mbd.analysis.energy import ledger
+
+        return ledger(self._model_columns)
+
+    @cached_property
+    def violation(self) -> Violation:
+        """How far the active constraints are from holding."""
+        if self._archive is not None:
+            return self._archive.violation
+        from mbd.results.violation import violation
+
+        return violation(self._model_columns)
+
+    @property
+    def stats(self) -> dict[str, Any]:
+        """Counts and wall times."""
+        return self.record.stats
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """How the run was made."""
+        return self.record.settings
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Values of the run-time parameters at the start, by name."""
+        values = self.record.parameters[: len(self.record.parameter_names)]
+        return dict(zip(self.record.parameter_names, map(float, values), strict=True))
+
+    @property
+    def success(self) -> bool:
+        """Whether the run went as far as it was asked to."""
+        return self.record.success
+
+    @property
+    def message(self) -> str:
+        """How the run ended, in a sentence."""
+        return self.record.message
+
+    @property
+    def failure(self) -> Any:
+        """What is needed to replay the step that failed; None after a success."""
+        return self.record.failure
+
+    @property
+    def status(self) -> int:
+        """0: reached its end time, 1: an event ended it, −1: it failed (as in ``scipy.integrate.solve_ivp``)."""
+        if not self.record.success:
+            return -1
+        last = self.record.events[-1] if self.record.events else None
+        return int(last is not None and last.kind == "event" and last.time >= self.record.time[-1])
+
+    @property
+    def final(self) -> Any:
+        """The state at the end, to go on from."""
+        return self.record.final
+
+    @cached_property
+    def facts(self) -> Facts:
+        """Names and units of the model."""
+        if self._archive is not None:
+            return self._archive.facts
+        return Facts.of(self._model_columns.equations)
+
+    @property
+    def name(self) -> str:
+        """Name of the model."""
+        return self.facts.model
+
+    # pictures and files -----------------------------------------------------------------------------------------
+    def plot(self, *names: str, path: str | Path | None = None) -> Any:
+        """Time histories, one panel per kind of quantity, with the events marked.
+
+        Without names the model's coordinates. Returns the matplotlib figure, also saved when a path is given.
+        """
+        from mbd.view.plots import histories
+
+        return histories(self, *names, path=path)
+
+    def page(self, path: str | Path) -> Path:
+        """One self-contained HTML file with the animated mechanism, its contacts, energies and events."""
+        from mbd.view.page import write
+
+        return write(self, path)
+
+    def save(self, path: str | Path, names: Sequence[str] | None = None) -> Path:
+        """The run as one ``.npz`` file, with every named quantity (or those listed), readable without the model.
+
+        Read it with `mbd.load`.
+        """
+        from mbd.results.storage import save
+
+        return save(self, path, names)
+
+    def to_dataframe(self, names: Sequence[str] | None = None) -> Any:
+        """A pandas table with `time` as index and a column per name (all of `names` by default)."""
+        from mbd.results.tables import dataframe
+
+        return dataframe(self, names)
+
+    def to_xarray(self, names: Sequence[str] | None = None) -> Any:
+        """An xarray dataset over `time`; vectors asked for by name have a further dimension `axis`."""
+        from mbd.results.tables import dataset
+
+        return dataset(self, names)
+
+    def __repr__(self) -> str:
+        from mbd.results.summary import text
+
+        return text(self)
+
+    def _repr_html_(self) -> str:
+        from mbd.results.summary import html
+
+        return html(self)
+
+
+class Moments(Mapping[str, Any]):
+    """Named quantities of a run at chosen times: ``run.at(0.3)["left hip.angle"]``.
+
+    One time gives a float, or (3,) for a vector; k times give (k,) or (k, 3).
+    """
+
+    def __init__(self, columns: Columns, times: ArrayLike, side: Side) -> None:
+        self.time = np.asarray(times, dtype=np.float64)
+        self.side = side
+        self._columns = columns
+        self._places = columns.grid.places(self.time, side)
+
+    def __getitem__(self, name: str) -> Any:
+        found = gather(self._columns, lambda names: self._columns.at_places(names, self._places), name)
+        shaped = found.reshape(self.time.shape + found.shape[1:])
+        return shaped if shaped.ndim else float(shaped)
+
+    def read(self, *names: str) -> dict[str, Vector]:
+        """Several scalars at once, each (k,); faster than one after the other."""
+        scalars = [scalar for name in names for scalar in self._columns.components(name)]
+        return dict(zip(scalars, self._columns.at_places(scalars, self._places), strict=True))
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._columns.names)
+
+    def __len__(self) -> int:
+        return len(self._columns.names)
+
+    def __repr__(self) -> str:
+        times = self.time.ravel()
+        span = f"t = {times[0]:g} s" if times.size == 1 else f"{times.size} times"
+        return f"<values at {span}, side={self.side!r}: {len(self)} names>"
+
+
+def load(path: str | Path) -> Trajectory:
+    """A run read from a file that `Trajectory.save` wrote; its names, plots and pages need no model."""
+    from mbd.results.storage import load as read
+
+    return read(path)

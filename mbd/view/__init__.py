@@ -1,0 +1,1 @@
+"""Pictures of a run: plots on paper, pages in a browser."""

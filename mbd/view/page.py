@@ -1,0 +1,181 @@
+"""One self-contained HTML file that plays a run: no network, no libraries, our own small script."""
+
+from __future__ import annotations
+
+import json
+import re
+from html import escape
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mbd.results.summary import facts
+from mbd.results.units import unit
+from mbd.view.plots import QUANTITIES, SPENT, stretches
+from mbd.view.scene import Instants, Scene, scene
+from mbd.view.style import CYCLE
+
+if TYPE_CHECKING:
+    from mbd.trajectory import Trajectory
+
+__all__ = ["content", "write"]
+
+RATE = 60.0
+"""Most pictures per second of run [1/s]."""
+
+LEAST, MOST = 240, 6000
+"""Fewest and most pictures of a page, for very short and very long runs."""
+
+FINE = 5000.0
+"""Steps into which a range of values is divided; finer than a pixel."""
+
+
+SCRIPTS = ("data.js", "stage.js", "charts.js", "controls.js")
+"""Parts of the page's script, joined into one function."""
+
+
+def write(run: Trajectory, path: str | Path) -> Path:
+    """Write the page of a run; see `Trajectory.page`."""
+    target = Path(path)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    target.write_text(html(run), encoding="utf-8")
+    return target
+
+
+def html(run: Trajectory) -> str:
+    """The page as text."""
+    folder = resources.files("mbd.view") / "player"
+
+    def text(name: str) -> str:
+        return folder.joinpath(name).read_text(encoding="utf-8")
+
+    data = json.dumps(content(run), separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    parts = {
+        "<!--title-->": escape(run.name),
+        "/*style*/": text("page.css"),
+        "/*data*/": data,
+        "/*script*/": "".join(text(name) for name in SCRIPTS),
+    }
+    return re.sub("|".join(map(re.escape, parts)), lambda mark: parts[mark.group()], text("page.html"))
+
+
+def content(run: Trajectory) -> dict[str, Any]:
+    """Everything the page draws, as plain lists; series are packed by `packed`."""
+    duration = float(run.time[-1] - run.time[0])
+    picture = scene(run, int(np.clip(round(RATE * duration), LEAST, MOST)))
+    return {
+        "name": run.name,
+        "time": [round(float(t), 9) for t in picture.instants.time],
+        **_geometry(picture),
+        "contacts": [
+            {"name": contact.name, "side": side(contact.name), "closed": stretches(run.time, run.record.closed[:, k])}
+            for k, contact in enumerate(run.facts.contacts)
+        ],
+        "events": [
+            {"time": event.time, "kind": event.kind, "name": event.name, "side": side(event.name), "loss": loss}
+            for event, loss in zip(run.events, losses(run), strict=True)
+        ],
+        "charts": _charts(run, picture.instants),
+        "facts": facts(run),
+    }
+
+
+def losses(run: Trajectory) -> list[float | None]:
+    """The energy loss of each event [J]."""
+    return [finite(event.energy_loss) for event in run.events]
+
+
+def side(name: str) -> str:
+    """'left', 'right' or ''."""
+    words = name.replace(".", " ").split()
+    return next((word for word in ("left", "right") if word in words), "")
+
+
+def finite(value: float) -> float | None:
+    """A number JSON can hold, rounded to nine figures."""
+    return float(f"{value:.9g}") if np.isfinite(value) else None
+
+
+def packed(values: ArrayLike, step: float) -> dict[str, Any]:
+    """A series as whole multiples of `step`: the first, then differences; one number if it never changes."""
+    numbers = np.asarray(values, dtype=np.float64)
+    whole = np.rint(np.nan_to_num(numbers / step)).astype(np.int64)
+    constant = len(whole) > 0 and bool(np.all(whole == whole[0]))
+    return {"step": step, "d": [int(whole[0])] if constant else np.diff(whole, prepend=0).tolist()}
+
+
+def _step(*series: ArrayLike) -> float:
+    """A round step that divides the common range of some series finely enough."""
+    both = np.concatenate([np.ravel(np.asarray(values, dtype=np.float64)) for values in series])
+    both = both[np.isfinite(both)]
+    span = float(np.max(np.abs(both), initial=0.0))
+    return float(f"{span / FINE:.1g}") if span > 0.0 else 1.0
+
+
+def _geometry(picture: Scene) -> dict[str, Any]:
+    axes = 3 if picture.spatial else 2
+    used = picture.positions[:, :, :axes]
+    size = float(np.max(np.ptp(used, axis=1))) if used.size else 0.0
+    size = size or float(np.max(np.abs(used), initial=0.0)) or 1.0
+    step = float(f"{size / FINE:.1g}")
+    heaviest = max(picture.masses.values(), default=1.0)
+    return {
+        "spatial": picture.spatial,
+        "points": [
+            {"name": name, "at": [packed(used[:, k, axis], step) for axis in range(axes)]}
+            for k, name in enumerate(picture.points)
+        ],
+        "segments": [
+            {
+                "body": body, "side": side(body), "points": list(members),
+                "mass": finite(picture.masses.get(body, 0.0) / heaviest),
+            }
+            for body, members in picture.segments
+        ],
+        "grounds": [
+            {"normal": [finite(x) for x in ground.normal], "offset": finite(ground.offset)}
+            for ground in picture.grounds
+        ],
+        "touches": [
+            {
+                "side": side(touch.contact), "where": [finite(round(float(x), 6)) for x in touch.where[:axes]],
+                "begin": touch.begin, "end": touch.end,
+            }
+            for touch in picture.touches
+        ],
+    }  # fmt: skip
+
+
+def _charts(run: Trajectory, instants: Instants) -> list[dict[str, Any]]:
+    """The energies, then the coordinates and their rates by unit."""
+    ledger = run.energy
+    floor = float(np.min(ledger.potential))
+    spent = [part for part in ledger.parts if part.kind in SPENT and np.any(part.energy)]
+    gone = -sum((part.energy for part in spent), np.zeros(len(ledger.time)))
+    series = [
+        ("total", "ink", ledger.total - floor),
+        ("kinetic", CYCLE[2], ledger.kinetic),
+        ("potential", CYCLE[3], ledger.potential - floor),
+        *([("lost", CYCLE[4], gone)] if spent else []),
+    ]
+    columns = [(name, shade, instants.blend(run, column)) for name, shade, column in series]
+    charts = [_chart("energy", "J", columns)]
+    coordinates = [name for name, _ in run.facts.coordinates]
+    rates = [f"{name}.rate" for name in coordinates[: run.facts.coordinate_count] if f"{name}.rate" in run]
+    values = dict(zip([*coordinates, *rates], instants.read(run, [*coordinates, *rates]).T, strict=True))
+    groups: dict[str, list[str]] = {}
+    for name in values:
+        groups.setdefault(unit(name, run.facts), []).append(name)
+    for kind, names in groups.items():
+        lines = [(name, CYCLE[k % len(CYCLE)], values[name]) for k, name in enumerate(names)]
+        charts.append(_chart(QUANTITIES.get(kind, "value"), kind, lines))
+    return charts
+
+
+def _chart(title: str, kind: str, lines: list[tuple[str, str, Any]]) -> dict[str, Any]:
+    step = _step(*(values for _, _, values in lines))
+    packs = [{"name": name, "color": shade, "values": packed(values, step)} for name, shade, values in lines]
+    return {"title": title, "unit": kind, "series": packs}

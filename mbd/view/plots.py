@@ -1,0 +1,184 @@
+"""Plots of a run with matplotlib; nothing here needs a display.
+
+Every function returns the figure; with `path` it is saved, and no window manager is asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mbd.results.tables import library
+from mbd.results.units import unit
+from mbd.view.style import CYCLE, NEUTRAL, color, rules
+
+if TYPE_CHECKING:
+    from mbd.results.ledger import Ledger
+    from mbd.trajectory import Trajectory
+
+__all__ = ["contacts", "energy", "histories", "phase_portrait"]
+
+MANY = 60
+"""Events beyond this number are left to the contact bars, so that lines do not hide the curves."""
+
+SPENT = ("loss", "impact", "penalty")
+"""Kinds of parts that are stacked as energy gone; other parts move the ceiling of the stack."""
+
+QUANTITIES = {
+    "rad": "angle", "m": "length", "rad/s": "angular rate", "m/s": "speed", "rad/s²": "angular acceleration",
+    "m/s²": "acceleration", "N": "force", "N m": "torque", "J": "energy", "W": "power",
+}  # fmt: skip
+
+
+@contextmanager
+def _drawing(path: str | Path | None, width: float, height: float) -> Iterator[Any]:
+    """A figure in the package's style, laid out and saved at the end."""
+    matplotlib = library("matplotlib", "plot", "plotting")
+    with matplotlib.rc_context(rules()):
+        if path is None:
+            from matplotlib import pyplot
+
+            figure: Any = pyplot.figure(figsize=(width, height), layout="constrained")
+        else:
+            from matplotlib.figure import Figure
+
+            figure = Figure(figsize=(width, height), layout="constrained")
+        yield figure
+        if path is not None:
+            Path(path).parent.mkdir(parents=True, exist_ok=True)
+            figure.savefig(path)
+
+
+def histories(run: Trajectory, *names: str, path: str | Path | None = None) -> Any:
+    """Quantities over time, one panel per unit, events as thin lines, contacts as bars below.
+
+    A vector's name draws its three components. Without names: the coordinates of the model.
+    """
+    wanted = names or tuple(name for name, _ in run.facts.coordinates)
+    scalars = list(dict.fromkeys(part for name in wanted for part in run.columns.components(name)))
+    values = dict(zip(scalars, run.columns.at_rows(scalars), strict=True))
+    panels: dict[str, list[str]] = {}
+    for name in scalars:
+        panels.setdefault(unit(name, run.facts), []).append(name)
+    bars = len(run.facts.contacts)
+    heights = [2.1 + 0.17 * ((len(group) - 1) // 4) for group in panels.values()]
+    heights += [0.25 + 0.2 * bars] if bars else []
+    with _drawing(path, 7.4, 0.7 + sum(heights)) as figure:
+        grid = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
+        for axes, (kind, group) in zip(grid, panels.items(), strict=False):
+            for number, name in enumerate(group):
+                style = ("-", "--")[number // len(CYCLE) % 2]
+                axes.plot(run.time, values[name], style, color=CYCLE[number % len(CYCLE)], label=name)
+            axes.set_ylabel(f"{QUANTITIES.get(kind, 'value')} [{kind}]" if kind else "value")
+            _mark(axes, run)
+            _legend(axes, len(group))
+        if bars:
+            _bars(grid[-1], run)
+        grid[-1].set_xlabel("time [s]")
+        if len(run) and run.time[-1] > run.time[0]:
+            grid[-1].set_xlim(run.time[0], run.time[-1])
+        figure.suptitle(run.name, x=0.01, ha="left", fontweight="bold")
+    return figure
+
+
+def _legend(axes: Any, count: int) -> None:
+    """Names above the panel, where they cover nothing."""
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=min(count, 4), borderaxespad=0.2)
+
+
+def _mark(axes: Any, run: Trajectory) -> None:
+    """A thin line where a contact closed or a user's event happened."""
+    marked = [event for event in run.events if event.kind != "opened"]
+    for event in marked if len(marked) <= MANY else ():
+        shade = color(event.name) if event.kind == "closed" else "black"
+        axes.axvline(event.time, color=shade, linewidth=0.7, alpha=0.35, linestyle=":", zorder=0.5)
+
+
+def _bars(axes: Any, run: Trajectory) -> None:
+    """One bar per stretch of time in which a contact is closed."""
+    names = [contact.name for contact in run.facts.contacts]
+    for row, name in enumerate(names):
+        spans = stretches(run.time, run.record.closed[:, row])
+        axes.broken_barh([(a, b - a) for a, b in spans], (row - 0.32, 0.64), color=color(name), alpha=0.85, linewidth=0)
+    axes.set_yticks(range(len(names)), names)
+    axes.set_ylim(len(names) - 0.4, -0.6)
+    axes.tick_params(axis="y", length=0)
+    axes.grid(False, axis="y")
+    axes.spines["left"].set_visible(False)
+
+
+def stretches(time: Any, closed: Any) -> list[tuple[float, float]]:
+    """(begin, end) of each stretch of rows in which a contact is closed [s]."""
+    padded = np.concatenate([[0], np.asarray(closed, dtype=np.int8), [0]])
+    change = np.flatnonzero(np.diff(padded))
+    return [(float(time[a]), float(time[b - 1])) for a, b in zip(change[::2], change[1::2], strict=True)]
+
+
+def contacts(run: Trajectory, path: str | Path | None = None) -> Any:
+    """Which contacts are closed when."""
+    with _drawing(path, 7.4, 0.9 + 0.28 * max(len(run.facts.contacts), 1)) as figure:
+        axes = figure.subplots()
+        _bars(axes, run)
+        axes.set_xlabel("time [s]")
+        axes.set_title(f"{run.name}: closed contacts")
+    return figure
+
+
+def energy(ledger: Ledger, path: str | Path | None = None) -> Any:
+    """Kinetic and potential energy stacked with what was lost, below the ceiling of what was put in; and the remainder.
+
+    ``T + (V − V_min) + Σ lost = E(0) − V_min + Σ put in + numerical``: where the stack leaves the line, the integrator
+    made or lost energy. The lower panel shows that difference alone.
+    """
+    time, floor = ledger.time, float(np.min(ledger.potential, initial=np.inf))
+    spent = [part for part in ledger.parts if part.kind in SPENT and np.any(part.energy)]
+    given = [part for part in ledger.parts if part.kind not in SPENT]
+    layers = [ledger.kinetic, ledger.potential - floor, *(-part.energy for part in spent)]
+    labels = ["kinetic", "potential (above its least)", *(f"lost: {part.name}" for part in spent)]
+    ceiling = ledger.total[0] - floor + sum((part.energy for part in given), np.zeros(len(time)))
+    with _drawing(path, 7.4, 4.4) as figure:
+        upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[3.0, 1.0])
+        shades = [CYCLE[0], CYCLE[5], CYCLE[1], CYCLE[4], CYCLE[3], CYCLE[2], CYCLE[6], CYCLE[7]]
+        colors = [shades[k % len(shades)] for k in range(len(layers))]
+        upper.stackplot(time, *layers, labels=labels, colors=colors, alpha=0.8, linewidth=0)
+        upper.plot(time, ceiling, color="black", linewidth=1.0, label="start + put in" if given else "start")
+        upper.set_ylabel("energy [J]")
+        _legend(upper, 4 if len(layers) > 2 else 3)
+        lower.plot(time, ledger.numerical, color=NEUTRAL)
+        lower.set_ylabel("numerical [J]")
+        lower.set_xlabel("time [s]")
+        if len(time) and time[-1] > time[0]:
+            lower.set_xlim(time[0], time[-1])
+    return figure
+
+
+def phase_portrait(run: Trajectory, *coordinates: str, path: str | Path | None = None) -> Any:
+    """Rate against coordinate; jumps at switches are dotted, the start is a dot.
+
+    Without names: every coordinate in radians, or every coordinate if there is none.
+    """
+    known = dict(run.facts.coordinates[: run.facts.coordinate_count])
+    angles = tuple(name for name, kind in known.items() if kind == "rad")
+    wanted: Sequence[str] = coordinates or angles or tuple(known)
+    cuts = run.columns.grid.cuts
+    with _drawing(path, 5.6, 4.6) as figure:
+        axes = figure.subplots()
+        for number, name in enumerate(wanted):
+            place, rate = run[name], run[f"{name}.rate"]
+            shade = CYCLE[number % len(CYCLE)]
+            axes.plot([], [], color=shade, label=name)
+            axes.plot(place[:1], rate[:1], "o", color=shade, markersize=5)
+            for start, stop in pairwise(cuts):
+                axes.plot(place[start:stop], rate[start:stop], color=shade)
+                axes.plot(place[stop - 1 : stop + 1], rate[stop - 1 : stop + 1], ":", color=shade, linewidth=1.0)
+        kinds = {unit(name, run.facts) for name in wanted}
+        kind = kinds.pop() if len(kinds) == 1 else ""
+        axes.set_xlabel(f"{QUANTITIES.get(kind, 'coordinate')} [{kind}]" if kind else "coordinate")
+        axes.set_ylabel(f"rate [{kind}/s]" if kind else "rate")
+        _legend(axes, min(len(wanted), 3))
+    return figure

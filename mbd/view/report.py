@@ -1,0 +1,104 @@
+"""What is kept of a run on disk: plots, page, the run itself, and a record of how it came about."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from importlib import metadata
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mbd.analysis.gait import gait
+from mbd.results.storage import SUFFIX, plain
+from mbd.results.summary import facts
+
+if TYPE_CHECKING:
+    from mbd.trajectory import Trajectory
+
+__all__ = ["machine", "record", "versions", "write"]
+
+LIBRARIES = ("numpy", "scipy", "sympy", "networkx", "llvmlite", "numba", "matplotlib")
+
+
+def versions() -> dict[str, str | None]:
+    """Versions of mbd, Python and the libraries it uses; None for one that is not installed."""
+    import mbd
+
+    found: dict[str, str | None] = {"mbd": mbd.__version__, "python": platform.python_version()}
+    for name in LIBRARIES:
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            found[name] = None
+    return found
+
+
+def machine() -> dict[str, Any]:
+    """System, architecture, processor and number of processors."""
+    return {
+        "system": platform.platform(terse=True),
+        "architecture": platform.machine(),
+        "processor": _processor(),
+        "processors": os.cpu_count(),
+    }
+
+
+def _processor() -> str:
+    """The processor's name, as the system tells it."""
+    listing = Path("/proc/cpuinfo")
+    if listing.is_file():
+        for line in listing.read_text(encoding="utf-8", errors="replace").splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.processor() or platform.machine()
+
+
+def record(run: Trajectory, wall: Mapping[str, float]) -> dict[str, Any]:
+    """Everything needed to tell later how a run came about and how it went, for JSON.
+
+    Parameters
+    ----------
+    wall : wall times by stage [s]
+    """
+    return {
+        "model": run.name,
+        "success": run.success,
+        "message": run.message,
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+        "versions": versions(),
+        "machine": machine(),
+        "settings": run.settings,
+        "parameters": run.parameters,
+        "statistics": run.stats,
+        "wall_times": {name: round(seconds, 6) for name, seconds in wall.items()},
+        "summary": dict(facts(run)),
+        "energy": run.energy.sums | {"change": run.energy.change},
+        "events": len(run.events),
+        "steps": gait(run).as_json(),
+    }
+
+
+def write(run: Trajectory, folder: str | Path, wall: Mapping[str, float], plots: bool = True) -> list[Path]:
+    """Write plots (PNG), page (HTML), the run (npz) and its record (JSON) into a folder; returns the paths."""
+    place = Path(folder)
+    place.mkdir(parents=True, exist_ok=True)
+    paths = [run.page(place / "page.html"), run.save(place / f"run{SUFFIX}")]
+    if plots:
+        from mbd.view.plots import phase_portrait
+
+        run.plot(path=place / "coordinates.png")
+        run.energy.plot(path=place / "energy.png")
+        paths += [place / "coordinates.png", place / "energy.png"]
+        if run.facts.coordinate_count:
+            phase_portrait(run, path=place / "phase.png")
+            paths.append(place / "phase.png")
+        forces = [name for name in (f"{contact.name}.force" for contact in run.facts.contacts) if name in run]
+        if forces:
+            run.plot(*forces, path=place / "forces.png")
+            paths.append(place / "forces.png")
+    text = json.dumps(record(run, wall), indent=2, default=plain)
+    (place / "record.json").write_text(text + "\n", encoding="utf-8")
+    return [*paths, place / "record.json"]

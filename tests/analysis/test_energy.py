@@ -1,0 +1,131 @@
+"""The energy ledger and the step table."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mbd.analysis.gait import gait, mirrored
+from mbd.equations.equations import Row
+from mbd.errors import UnknownNameError
+from mbd.trajectory import Trajectory
+from tests.view.stand_ins import Sheet, ball, oscillator, record, walker
+
+
+def test_the_parts_sum_to_the_change_of_energy():
+    for run in (oscillator(), ball(), walker()):
+        ledger = run.energy
+        assert sum(ledger.sums.values()) == pytest.approx(ledger.change, abs=1e-12)
+        np.testing.assert_allclose(ledger.total, ledger.kinetic + ledger.potential)
+
+
+def test_work_is_integrated_better_than_a_second_order_scheme_needs():
+    errors = [float(np.max(np.abs(oscillator(dt).energy.numerical))) for dt in (0.08, 0.04, 0.02)]
+    assert all(3.7 < np.log2(a / b) < 4.6 for a, b in zip(errors, errors[1:], strict=False))
+    assert oscillator(0.01).energy.drift < 1e-8
+
+
+def test_a_damper_takes_and_a_force_gives():
+    ledger = oscillator().energy
+    assert np.all(np.diff(ledger["damper"]) <= 0.0) and ledger.sums["damper"] < 0.0
+    assert {part.name: part.kind for part in ledger.parts} == {"damper": "loss", "push": "applied"}
+    assert ledger["push"][0] == 0.0 and ledger["numerical"][0] == 0.0
+
+
+def test_impacts_take_what_their_events_say():
+    run = ball(restitution=0.7)
+    losses = [event.energy_loss for event in run.events if event.kind == "closed"]
+    assert run.energy.sums["impacts"] == pytest.approx(-sum(losses), rel=1e-12)
+    assert abs(run.energy.sums["numerical"]) < 1e-12
+    steps = np.flatnonzero(np.diff(run.energy["impacts"]))
+    assert (steps + 1).tolist() == [event.row for event in run.events if event.kind == "closed"]
+
+
+def test_the_work_of_a_prescribed_motion_is_counted():
+    """A mass dragged by x(t) = sin t: λ h_t is the power of the drive, and the only cause of its kinetic energy."""
+    sheet = Sheet(1)
+    coordinates = sheet.coordinates("slider.displacement")
+    from mbd.tape.functions import cos, sin
+
+    rows = (Row("drive", "", sheet.q[0] - sin(sheet.t), sheet.v[0] - cos(sheet.t)),)
+    equations = sheet.equations("driven", coordinates, 1.5 * sheet.v[0] ** 2, sheet.tape.zero, rows=rows)
+    t = np.linspace(0.0, 2.0, 201)
+    q, v, a = (x[:, None] for x in (np.sin(t), np.cos(t), -np.sin(t)))
+    ledger = Trajectory(record(equations, t, q, v, a, lam=-3.0 * a)).energy
+    assert ledger.sums["drive"] == pytest.approx(1.5 * (np.cos(2.0) ** 2 - 1.0), rel=1e-6)
+    assert ledger.drift < 1e-8
+
+
+def test_a_bead_on_a_turning_hoop_takes_its_energy_from_the_turning():
+    """T = ½ R²(θ̇² + Ω² sin²θ): the hoop's drive works, though no constraint row shows it."""
+    from scipy.integrate import solve_ivp
+
+    from mbd.tape.functions import cos, sin
+
+    turn, g = 3.0, 9.81
+    sheet = Sheet(1)
+    coordinates = sheet.coordinates("bead.angle")
+    kinetic = 0.5 * (sheet.v[0] ** 2 + turn**2 * sin(sheet.q[0]) ** 2)
+    equations = sheet.equations("hoop", coordinates, kinetic, -g * cos(sheet.q[0]))
+
+    def rate(_: float, y: np.ndarray) -> list[float]:
+        return [y[1], turn**2 * np.sin(y[0]) * np.cos(y[0]) - g * np.sin(y[0])]
+
+    t = np.linspace(0.0, 2.0, 201)
+    y = solve_ivp(rate, (0.0, 2.0), [0.5, 0.0], t_eval=t, rtol=1e-11, atol=1e-12).y
+    a = np.array([rate(0.0, state)[1] for state in y.T])
+    ledger = Trajectory(record(equations, t, y[:1].T, y[1:].T, a[:, None])).energy
+    assert np.ptp(ledger.total) > 0.1
+    assert ledger.drift < 1e-8 and [part.name for part in ledger.parts] == ["moving coordinates"]
+
+
+def test_a_potential_that_moves_with_time_does_work():
+    """V = ½ k (x − t)²: the wall of the spring walks away."""
+    sheet = Sheet(1)
+    coordinates = sheet.coordinates("slider.displacement")
+    equations = sheet.equations("walk", coordinates, 0.5 * sheet.v[0] ** 2, 2.0 * (sheet.q[0] - sheet.t) ** 2)
+    t = np.linspace(0.0, 2.0, 201)
+    q, v, a = t - np.sin(2.0 * t) / 2.0, 1.0 - np.cos(2.0 * t), 2.0 * np.sin(2.0 * t)
+    ledger = Trajectory(record(equations, t, q[:, None], v[:, None], a[:, None])).energy
+    assert ledger.drift < 1e-7 and [part.name for part in ledger.parts] == ["changing potential"]
+
+
+def test_the_ledger_prints_and_names_its_parts():
+    ledger = oscillator().energy
+    text = repr(ledger)
+    for word in ("kinetic", "potential", "damper", "push", "numerical", "the integrator", "[J]"):
+        assert word in text
+    with pytest.raises(UnknownNameError, match="no part of the energy named 'dumper'; did you mean 'damper'"):
+        ledger["dumper"]
+
+
+def test_steps_of_a_repeating_walk_are_equal():
+    steps = gait(walker(steps=5, period=0.5, swing=0.25))
+    assert [step.foot for step in steps] == ["left foot", "right foot", "left foot"]
+    for step in steps:
+        assert step.period == pytest.approx(0.5) and step.length == pytest.approx(2.0 * np.sin(0.25))
+        assert step.speed == pytest.approx(4.0 * np.sin(0.25)) and step.deviation < 1e-12
+    assert "length [m]" in repr(steps) and steps.as_json()[0]["foot"] == "left foot"
+
+
+def test_the_loss_of_a_step_is_what_its_impacts_took():
+    run = walker(steps=4)
+    impacts = run.energy.work["impacts"] if "impacts" in run.energy.work else np.zeros(len(run))
+    rows = [event.row for event in run.events if event.kind == "closed"]
+    for step, before, after in zip(gait(run), rows[:-1], rows[1:], strict=True):
+        assert step.loss == pytest.approx(impacts[before] - impacts[after], abs=1e-12)
+
+
+def test_a_long_walk_is_shortened_in_print_only():
+    steps = gait(walker(steps=40, dt=0.1))
+    assert len(steps) == 38 and "14 more" in repr(steps) and len(repr(steps).splitlines()) == 26
+
+
+def test_a_mechanism_without_feet_has_no_steps():
+    assert len(gait(oscillator())) == 0 and len(gait(ball())) == 0
+
+
+def test_sides_are_exchanged_word_by_word():
+    assert mirrored(["left hip.angle", "right hip.angle", "trunk.x"]) == [
+        ("left hip.angle", "right hip.angle"), ("right hip.angle", "left hip.angle"), ("trunk.x", "trunk.x"),
+    ]  # fmt: skip

@@ -1,0 +1,64 @@
+"""Numbers from equations: random inputs, evaluation by the plain interpreter, finite differences."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mbd.equations.equations import Equations
+from mbd.tape.evaluate import evaluate
+from mbd.tape.node import Node
+
+__all__ = ["at", "block", "derivative", "inputs", "moved"]
+
+
+def inputs(equations: Equations, seed: int = 0, x: float = 0.0, spread: float = 1.0) -> dict[tuple[str, int], float]:
+    """A random value for every input; parameters at their values, every penalty switched on.
+
+    x : size of the local increments; spread : of the coordinates
+    """
+    rng = np.random.default_rng(seed)
+    n_anchors = sum(len(contact.anchors) for contact in equations.contacts)
+    sizes = {
+        "q": equations.n_q, "v": equations.n_v, "a": equations.n_v, "z": equations.n_z, "s": equations.n_z,
+        "lam": len(equations.rows), "anchor": n_anchors,
+    }  # fmt: skip
+    found = {("t", 0): 0.37, ("c", 0): 0.7, ("c", 1): 0.23}
+    for kind, size in sizes.items():
+        found |= {(kind, k): float(value) for k, value in enumerate(rng.uniform(-1, 1, size) * spread)}
+    found |= {("x", k): float(value) for k, value in enumerate(rng.uniform(-1, 1, equations.n_v) * x)}
+    found |= {("p", k): parameter.value for k, parameter in enumerate(equations.parameters)}
+    found |= {("switch", k): 1.0 for k in range(len(equations.contacts))}
+    return found
+
+
+def at(nodes: Sequence[Node], given: dict[tuple[str, int], float]) -> np.ndarray:
+    """Values of the nodes."""
+    return np.array(evaluate(nodes, given))
+
+
+def moved(given: dict[tuple[str, int], float], step: float, along: dict[tuple[str, int], float]) -> dict:
+    """The inputs shifted along a direction."""
+    return given | {key: given[key] + step * rate for key, rate in along.items()}
+
+
+def derivative(nodes: Sequence[Node], given: dict, along: dict[tuple[str, int], float], step: float = 1e-3) -> np.ndarray:
+    """d nodes along a direction of the inputs, by central differences of sixth order."""
+    weights = {1: 0.75, 2: -0.15, 3: 1.0 / 60.0}
+    terms = [
+        w * (at(nodes, moved(given, k * step, along)) - at(nodes, moved(given, -k * step, along)))
+        for k, w in weights.items()
+    ]
+    return sum(terms) / step
+
+
+def block(values: np.ndarray, *sizes: tuple[int, ...]) -> list[np.ndarray]:
+    """A flat list of numbers parted into arrays of these shapes."""
+    parts, first = [], 0
+    for shape in sizes:
+        size = int(np.prod(shape))
+        parts.append(values[first : first + size].reshape(shape))
+        first += size
+    assert first == len(values)
+    return parts

@@ -1,0 +1,109 @@
+"""The lists that the law tests run over: (id, factory). A new idea adds one line here.
+
+JOINTS    factory(parent, child) → joint, between any two frames
+LOSSES    factory() → loss
+FORCES    factory(a, b, joint) → force, from two frames of different bodies and a joint named 'hinge' with an `angle`
+MEASURES  factory(a, b, joint) → measure, from the same
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import mbd
+from mbd.bodies.base import Frame
+from mbd.constraints.base import Measure
+from mbd.forces.base import Force
+from mbd.joints.base import Joint
+from mbd.joints.losses.base import Loss
+
+TILTED = (1.0, 2.0, -2.0)
+"""A direction along no axis."""
+
+JOINTS: list[tuple[str, Callable[[Frame, Frame], Joint]]] = [
+    ("revolute", lambda a, b: mbd.Revolute("joint", a, b)),
+    ("revolute about -z", lambda a, b: mbd.Revolute("joint", a, b, axis=(0, 0, -1))),
+    ("revolute about x", lambda a, b: mbd.Revolute("joint", a, b, axis=(1, 0, 0))),
+    ("revolute tilted", lambda a, b: mbd.Revolute("joint", a, b, axis=TILTED)),
+    ("revolute with loss and spring", lambda a, b: mbd.Revolute("joint", a, b, loss=mbd.Viscous(0.3), stiffness=4.0)),
+    ("prismatic", lambda a, b: mbd.Prismatic("joint", a, b)),
+    ("prismatic along y", lambda a, b: mbd.Prismatic("joint", a, b, axis=(0, 1, 0))),
+    ("prismatic tilted", lambda a, b: mbd.Prismatic("joint", a, b, axis=TILTED)),
+    ("translation xy", lambda a, b: mbd.Translation("joint", a, b)),
+    ("translation xyz", lambda a, b: mbd.Translation("joint", a, b, axes="xyz")),
+    ("translation z", lambda a, b: mbd.Translation("joint", a, b, axes="z")),
+    ("planar", lambda a, b: mbd.Planar("joint", a, b)),
+    ("cylindrical", lambda a, b: mbd.Cylindrical("joint", a, b)),
+    ("cylindrical tilted", lambda a, b: mbd.Cylindrical("joint", a, b, axis=TILTED)),
+    ("universal", lambda a, b: mbd.Universal("joint", a, b)),
+    ("universal about y and z", lambda a, b: mbd.Universal("joint", a, b, axis=(0, 1, 0), second_axis=(0, 0, 1))),
+    ("screw", lambda a, b: mbd.Screw("joint", a, b, pitch=0.2)),
+    ("screw tilted", lambda a, b: mbd.Screw("joint", a, b, pitch=-0.7, axis=TILTED)),
+    ("weld", lambda a, b: mbd.Weld("joint", a, b)),
+]
+
+LOSSES: list[tuple[str, Callable[[], Loss]]] = [
+    ("viscous", lambda: mbd.Viscous(0.7)),
+    ("quadratic", lambda: mbd.Quadratic(0.4)),
+    ("coulomb smoothed", lambda: mbd.Coulomb(2.0, smoothing=0.05)),
+    ("tabulated", lambda: mbd.Tabulated([-4.0, -1.0, 2.0, 5.0], [-9.0, -1.5, 1.0, 8.0])),
+    ("dissipation of a function", lambda: mbd.Dissipation(cosh_dissipation)),
+    ("viscous and quadratic", lambda: mbd.Viscous(0.7) + mbd.Quadratic(0.4)),
+]
+
+
+def cosh_dissipation(rate: float) -> float:
+    """D(v) = cosh(v/10) − 1."""
+    result: float = mbd.cosh(rate / 10.0) - 1.0
+    return result
+
+
+def quartic(angle: float) -> float:
+    """V(q) = q⁴/4."""
+    return 0.25 * angle**4
+
+
+def pull(t: float, angle: float) -> tuple[float, float]:
+    """A force in the plane."""
+    return 3.0 * t, mbd.sin(angle)
+
+
+def hill(x: float) -> float:
+    """A wavy ground."""
+    height: float = 0.2 * mbd.sin(x)
+    return height
+
+
+def dune(x: float, z: float) -> float:
+    """A wavy ground in two directions."""
+    height: float = 0.2 * mbd.sin(x) * mbd.cos(z)
+    return height
+
+
+FORCES: list[tuple[str, Callable[[Frame, Frame, Joint], Force]]] = [
+    ("spring", lambda a, b, joint: mbd.Spring("force", a, b, stiffness=50.0, length=0.3)),
+    ("spring without length", lambda a, b, joint: mbd.Spring("force", a, b, stiffness=50.0)),
+    ("damper", lambda a, b, joint: mbd.Damper("force", a, b, 3.0)),
+    ("orifice damper", lambda a, b, joint: mbd.Damper("force", a, b, mbd.Quadratic(2.0))),
+    ("torsion spring", lambda a, b, joint: mbd.TorsionSpring("force", joint, stiffness=7.0, rest=0.2)),
+    ("constant force", lambda a, b, joint: mbd.Applied("force", a, force=(2.0, 3.0, 4.0))),
+    ("constant torque", lambda a, b, joint: mbd.Applied("force", a, torque=2.0)),
+    ("force by a function", lambda a, b, joint: mbd.Applied("force", a, force=pull, arguments=("t", "hinge.angle"))),
+    ("sampled force", lambda a, b, joint: mbd.Applied("force", a, force=(mbd.Samples([0, 1, 3], [0, 2, 1]), 1.5))),
+    ("motor", lambda a, b, joint: mbd.Motor("force", joint, torque=4.0)),
+    ("potential", lambda a, b, joint: mbd.Potential("force", quartic, "hinge.angle")),
+]
+
+MEASURES: list[tuple[str, Callable[[Frame, Frame, Joint], Measure]]] = [
+    ("touchdown", lambda a, b, joint: mbd.touchdown(a)),
+    ("touchdown on a plane", lambda a, b, joint: mbd.touchdown(a, mbd.Plane((0.3, 1.0, -0.2), 0.4))),
+    ("touchdown on a hill", lambda a, b, joint: mbd.touchdown(a, hill)),
+    ("touchdown on dunes", lambda a, b, joint: mbd.touchdown(a, dune)),
+    ("height", lambda a, b, joint: mbd.height(a)),
+    ("flexion", lambda a, b, joint: mbd.flexion(joint)),
+    ("extension", lambda a, b, joint: mbd.extension(joint, offset=0.1)),
+    ("distance", lambda a, b, joint: mbd.distance(a, b)),
+    ("separation", lambda a, b, joint: mbd.separation(a, b, (1, 1, 0))),
+    ("named measure", lambda a, b, joint: mbd.measure("hinge.angle", unit="rad")),
+    ("measure of points", lambda a, b, joint: mbd.measure(lambda p, q: p[1] - 2.0 * q[0], a, b, tangents=lambda p, q: p[0])),
+]

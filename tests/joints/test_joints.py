@@ -1,0 +1,122 @@
+"""What single joints do, and what they refuse."""
+
+import math
+import pickle
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, strategies as st
+
+import mbd
+from mbd.bodies import Ground
+from mbd.errors import ModelError
+from mbd.tape.node import Tape
+from tests.helpers import FreeScope
+
+GROUND = Ground().origin
+ROD = mbd.Link("rod", 1.0, 0.5, 0.2)
+
+
+def test_a_positive_angle_swings_a_hanging_link_forward():
+    scope = FreeScope()
+    R, _ = mbd.Revolute("hip", GROUND, ROD.start).transform([0.3], scope)
+    end = [sum(R[i][k] * (0.0, -0.5, 0.0)[k] for k in range(3)) for i in range(3)]
+    assert end[0] == pytest.approx(0.5 * math.sin(0.3))
+    assert end[1] == pytest.approx(-0.5 * math.cos(0.3))
+
+
+@given(turns=st.floats(-40.0, 40.0))
+def test_a_screw_counts_full_turns(turns):
+    joint = mbd.Screw("screw", GROUND, ROD.start, pitch=0.01)
+    scope = FreeScope()
+    angle = scope.tape.input("q", 0)
+    scope.numbers[angle] = turns
+    R, p = joint.transform([angle], scope)
+    assert scope.value(*p)[2] == pytest.approx(0.01 * turns / (2 * math.pi), abs=1e-12)
+    assert scope.value(*joint.recover(R, p, scope)) == pytest.approx([turns], abs=1e-9)
+    assert scope.value(*(value for _, value in joint.rows(R, p, scope))) == pytest.approx([0.0] * 5, abs=1e-9)
+
+
+def test_a_screw_out_of_step_has_a_residual():
+    joint = mbd.Screw("screw", GROUND, ROD.start, pitch=0.01)
+    R, _ = mbd.Revolute("turn", GROUND, ROD.start).transform([0.4], FreeScope())
+    rows = dict(joint.rows(R, (0.0, 0.0, 0.0), FreeScope()))
+    assert float(FreeScope().value(*[mbd.sin(0.4)])[0]) == pytest.approx(
+        Tape().lift(rows["turn about"].data).data  # a constant of its own tape
+    )
+
+
+def test_spring_of_a_joint_stores_energy_about_its_rest():
+    joint = mbd.Revolute("knee", GROUND, ROD.start, stiffness=8.0, rest=0.5)
+    assert FreeScope().value(joint.elastic_energy([1.5], scope := FreeScope())) if False else True
+    scope = FreeScope()
+    assert scope.value(joint.elastic_energy([1.5], scope)) == pytest.approx([4.0])
+
+
+def test_a_joint_without_stiffness_or_loss_costs_nothing():
+    scope = FreeScope()
+    q = scope.tape.input("q", 0)
+    joint = mbd.Revolute("knee", GROUND, ROD.start)
+    assert scope.tape.lift(joint.elastic_energy([q], scope)).is_zero
+    assert joint.resistance([q], scope) == [0.0]
+
+
+def test_a_loss_by_label_acts_on_that_coordinate_only():
+    joint = mbd.Planar("float", GROUND, ROD.start, loss={"angle": mbd.Viscous(2.0)})
+    scope = FreeScope()
+    rates = [scope.tape.input("v", k) for k in range(3)]
+    scope.numbers |= dict(zip(rates, (1.0, 2.0, 3.0), strict=True))
+    assert scope.value(*joint.resistance(rates, scope)) == pytest.approx([0.0, 0.0, 6.0])
+    assert joint.parameters() == {"float loss.angle.coefficient": 2.0}
+
+
+def test_one_loss_acts_on_every_coordinate_of_one_unit():
+    joint = mbd.Translation("slide", GROUND, ROD.start, loss=mbd.Viscous(2.0))
+    scope = FreeScope()
+    assert scope.value(*joint.resistance([1.0, 3.0], scope)) == pytest.approx([2.0, 6.0])
+    assert joint.parameters() == {"slide loss.coefficient": 2.0}
+
+
+@pytest.mark.parametrize("kind", [mbd.Planar, mbd.Cylindrical, mbd.Weld])
+def test_one_loss_on_metres_and_radians_is_refused(kind):
+    with pytest.raises((ModelError, TypeError)):
+        kind("float", GROUND, ROD.start, loss=mbd.Viscous(2.0))
+
+
+@pytest.mark.parametrize(
+    ("make", "told"),
+    [
+        (lambda: mbd.Revolute("knee", ROD, ROD.start), "parent must be a frame"),
+        (lambda: mbd.Revolute("", GROUND, ROD.start), "needs a name"),
+        (lambda: mbd.Revolute("left.knee", GROUND, ROD.start), "no dot"),
+        (lambda: mbd.Revolute("knee", GROUND, ROD.start, axis=(0, 0, 0)), "must not be zero"),
+        (lambda: mbd.Revolute("knee", GROUND, ROD.start, axis=(0, 0, math.nan)), "must be finite"),
+        (lambda: mbd.Revolute("knee", GROUND, ROD.start, loss=0.1), "such as mbd.Viscous"),
+        (lambda: mbd.Revolute("knee", GROUND, ROD.start, stiffness="stiff"), "must be a number"),
+        (lambda: mbd.Planar("float", GROUND, ROD.start, loss={"angel": mbd.Viscous(1.0)}), "'angle'"),
+        (lambda: mbd.Translation("slide", GROUND, ROD.start, axes="xw"), "'xyz'"),
+        (lambda: mbd.Translation("slide", GROUND, ROD.start, axes="xx"), "each once"),
+        (lambda: mbd.Universal("cross", GROUND, ROD.start, second_axis=(0, 0, 1)), "across each other"),
+        (lambda: mbd.Screw("screw", GROUND, ROD.start, pitch=0.0), "mbd.Revolute"),
+    ],
+)
+def test_wrong_joints_are_refused_in_words(make, told):
+    with pytest.raises(ModelError, match=told):
+        make()
+
+
+def test_joints_are_values():
+    joint = mbd.Revolute("knee", GROUND, ROD.start, axis=(0, 0, 2), loss=mbd.Viscous(0.1))
+    assert joint.axis == (0.0, 0.0, 1.0)
+    assert pickle.loads(pickle.dumps(joint)) == joint
+    assert replace(joint, loss=None).loss is None
+    assert len({joint, replace(joint)}) == 1
+    assert {mbd.Planar("float", GROUND, ROD.start, loss={"x": mbd.Viscous(1.0)})}
+
+
+def test_a_joint_tells_what_is_impossible_about_it():
+    joint = mbd.Revolute("knee", ROD.end, ROD.start, loss=mbd.Viscous(-1.0), stiffness=-2.0)
+    text = " ".join(joint.faults())
+    assert "feed energy in" in text
+    assert "stiffness -2 is negative" in text
+    assert "connects 'rod' to itself" in text

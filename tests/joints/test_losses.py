@@ -1,0 +1,142 @@
+"""Laws of every loss, and what single losses do."""
+
+import math
+
+import pytest
+import sympy
+from hypothesis import given, strategies as st
+
+import mbd
+from mbd.errors import CapabilityError, ModelError
+from mbd.joints.losses import DissipationFunction
+from mbd.tape.derivatives import jvp
+from tests.helpers import FreeScope
+from tests.instances import LOSSES
+
+every_loss = pytest.mark.parametrize("factory", [factory for _, factory in LOSSES], ids=[name for name, _ in LOSSES])
+RATES = st.floats(-50.0, 50.0)
+
+
+def force_at(loss, rate: float) -> float:
+    scope = FreeScope()
+    v = scope.tape.input("v", 0)
+    scope.numbers[v] = rate
+    return scope.value(loss.force(v, scope, "knee loss"))[0]
+
+
+@every_loss
+@given(rate=RATES)
+def test_dissipated_power_is_never_negative(factory, rate):
+    assert force_at(factory(), rate) * rate >= 0.0
+
+
+@every_loss
+def test_there_is_no_force_at_rest(factory):
+    assert force_at(factory(), 0.0) == pytest.approx(0.0, abs=1e-15)
+
+
+@every_loss
+@given(rate=RATES)
+def test_force_is_continuous(factory, rate):
+    loss = factory()
+    assert force_at(loss, rate + 1e-7) == pytest.approx(force_at(loss, rate), abs=1e-4)
+
+
+@every_loss
+@given(rate=RATES)
+def test_force_is_the_slope_of_the_dissipation_function(factory, rate):
+    loss = factory()
+    if not isinstance(loss, DissipationFunction):
+        return
+    scope = FreeScope()
+    v = scope.tape.input("v", 0)
+    scope.numbers[v] = rate
+    (slope,) = jvp([scope.tape.lift(loss.dissipation(v, scope, "loss"))], {v: 1.0})
+    assert scope.value(slope)[0] == pytest.approx(scope.value(loss.force(v, scope, "loss"))[0], rel=1e-12, abs=1e-12)
+
+
+@every_loss
+@given(rate=RATES)
+def test_the_sign_of_a_folded_rate_is_not_lost(factory, rate):
+    """A rate that reaches the loss as −v gives F(−v), whatever the tape folds."""
+    loss, scope = factory(), FreeScope()
+    v = scope.tape.input("v", 0)
+    scope.numbers[v] = rate
+    assert scope.value(loss.force(-v, scope, "loss"))[0] == pytest.approx(force_at(loss, -rate))
+
+
+@every_loss
+def test_parameters_are_declared_before_they_are_used(factory):
+    loss, scope = factory(), FreeScope()
+    loss.force(scope.tape.input("v", 0), scope, "knee loss")
+    assert scope.recorded == loss.parameters("knee loss")
+    assert loss.faults("knee loss") == []
+
+
+def test_losses_add():
+    both = mbd.Viscous(2.0) + mbd.Quadratic(3.0) + mbd.Viscous(1.0)
+    assert force_at(both, 2.0) == pytest.approx(2.0 * 2.0 + 3.0 * 4.0 + 2.0)
+    assert list(both.parameters("knee loss")) == [
+        "knee loss.viscous.coefficient", "knee loss.quadratic.coefficient", "knee loss.viscous 2.coefficient",
+    ]  # fmt: skip
+
+
+def test_smoothed_friction_approaches_its_torque():
+    assert force_at(mbd.Coulomb(2.0, smoothing=0.01), 5.0) == pytest.approx(2.0, rel=1e-5)
+    assert force_at(mbd.Coulomb(2.0, smoothing=0.01), -5.0) == pytest.approx(-2.0, rel=1e-5)
+
+
+def test_friction_that_truly_sticks_points_to_the_smoothed_form():
+    with pytest.raises(CapabilityError, match=r"smoothing=0\.01"):
+        mbd.Coulomb(2.0)
+
+
+def test_a_table_passes_through_its_points_and_goes_on_straight():
+    loss = mbd.Tabulated([-2.0, 1.0, 3.0], [-4.0, 1.0, 9.0])
+    for rate, torque in zip(loss.rate, loss.torque, strict=True):
+        assert force_at(loss, rate) == pytest.approx(torque)
+    slope = force_at(loss, 11.0) - force_at(loss, 10.0)
+    assert force_at(loss, 100.0) - force_at(loss, 99.0) == pytest.approx(slope)
+    assert slope > 0.0
+
+
+def test_a_table_that_falls_at_its_end_stays_constant_beyond():
+    loss = mbd.Tabulated([-3.0, -1.0, 1.0, 3.0], [-1.0, -4.0, 4.0, 1.0])
+    assert force_at(loss, 1000.0) == pytest.approx(1.0)
+    assert force_at(loss, -1000.0) == pytest.approx(-1.0)
+
+
+def test_a_table_that_feeds_energy_in_is_a_fault():
+    text = " ".join(mbd.Tabulated([-1.0, 0.0, 2.0], [1.0, 0.5, 3.0]).faults("knee loss"))
+    assert "torque 1 at the rate -1" in text
+    assert "torque 0.5 at the rate 0" in text
+    assert "one sign only" in mbd.Tabulated([1.0, 2.0], [1.0, 3.0]).faults("knee loss")[0]
+
+
+@pytest.mark.parametrize(
+    ("rate", "torque", "told"),
+    [([0.0, 1.0], [0.0], "as many torques"), ([1.0, 0.0], [0.0, 1.0], "increase"), ([0.0, math.nan], [0, 1], "finite")],
+)
+def test_wrong_tables_are_refused(rate, torque, told):
+    with pytest.raises(ModelError, match=told):
+        mbd.Tabulated(rate, torque)
+
+
+def test_a_sympy_dissipation_is_the_same_as_a_function():
+    v = sympy.Symbol("rate")
+    assert force_at(mbd.Dissipation(v**4 / 4), 3.0) == pytest.approx(27.0)
+
+
+def test_a_dissipation_that_feeds_energy_in_is_a_fault():
+    assert "takes energy out" in mbd.Dissipation(lambda v: -v * v).faults("knee loss")[0]
+    assert mbd.Dissipation(lambda v: v * v).faults("knee loss") == []
+
+
+def test_negative_coefficients_are_faults():
+    assert "feed energy in" in mbd.Viscous(-0.1).faults("knee loss")[0]
+    assert "feed energy in" in (mbd.Viscous(0.1) + mbd.Quadratic(-0.1)).faults("knee loss")[0]
+
+
+def test_a_number_is_no_loss_to_add():
+    with pytest.raises(TypeError):
+        mbd.Viscous(0.1) + 0.1
