@@ -74,7 +74,7 @@ if TYPE_CHECKING:
         Viscous as Viscous,
     )
     from mbd.model import Model as Model, on_slope as on_slope
-    from mbd.simulation import simulate as simulate
+    from mbd.simulation.simulate import simulate as simulate
     from mbd.state import State as State
     from mbd.tape.functions import (
         acos as acos,
@@ -111,7 +111,7 @@ _HOMES = {
     "mbd.joints": "Cylindrical Planar Prismatic Revolute Screw Translation Universal Weld",
     "mbd.joints.losses": "Coulomb Dissipation Quadratic Tabulated Viscous",
     "mbd.model": "Model on_slope",
-    "mbd.simulation": "simulate",
+    "mbd.simulation.simulate": "simulate",
     "mbd.state": "State",
     "mbd.tape.functions": "acos asin atan atan2 cos cosh exp log maximum minimum sign sin sinh sqrt tan tanh where",
     "mbd.trajectory": "Trajectory load",

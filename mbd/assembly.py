@@ -10,10 +10,10 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.compile.mechanism import Mechanism, rate_names
+from mbd.compile.mechanisms import mechanism_of
 from mbd.equations.equations import Equations
 from mbd.errors import AssemblyError, UnknownNameError, nearest
 from mbd.kernel.active_set import ActiveSetManager
-from mbd.compile.mechanisms import mechanism_of
 from mbd.state import State
 
 __all__ = ["assemble"]
@@ -119,7 +119,13 @@ def assemble(
     for k, value in held_v.items():
         y[k] = value
     work = _Assembly(
-        mechanism, manager, mechanism.parameters(changed), q, y, manager.flags(closed), np.zeros(mechanism.layout.n_anchors)
+        mechanism,
+        manager,
+        mechanism.parameters(changed),
+        q,
+        y,
+        manager.flags(closed),
+        np.zeros(mechanism.layout.n_anchors),
     )
     wanted_q, wanted_y = q.copy(), y.copy()
     free_q = np.ones(len(q), bool) if project else np.array([k not in held_q for k in range(len(q))])
@@ -316,7 +322,12 @@ def _armed(work: _Assembly, opened: set[str]) -> frozenset[str]:
 
 
 def _moved(
-    equations: Equations, work: _Assembly, q: Vector, y: Vector, held_q: Mapping[int, float], held_v: Mapping[int, float]
+    equations: Equations,
+    work: _Assembly,
+    q: Vector,
+    y: Vector,
+    held_q: Mapping[int, float],
+    held_v: Mapping[int, float],
 ) -> dict[str, float]:
     """How far named values, and unnamed ones from their defaults, were moved."""
     moved = {}

@@ -66,7 +66,9 @@ class State:
             return float(self.q[self.names.index(name)])
         if name in self.velocity_names:
             return float(self.v[self.velocity_names.index(name)])
-        short = {rate.removesuffix(".rate").rpartition(".")[0] + ".rate": k for k, rate in enumerate(self.velocity_names)}
+        short = {
+            rate.removesuffix(".rate").rpartition(".")[0] + ".rate": k for k, rate in enumerate(self.velocity_names)
+        }
         if name in short:
             return float(self.v[short[name]])
         raise UnknownNameError(nearest(name, [*self.names, *self.velocity_names], "coordinate or rate"))

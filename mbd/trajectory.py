@@ -166,8 +166,10 @@ class Trajectory:
         """0: reached its end time, 1: an event ended it, −1: it failed (as in ``scipy.integrate.solve_ivp``)."""
         if not self.record.success:
             return -1
-        last = self.record.events[-1] if self.record.events else None
-        return int(last is not None and last.kind == "event" and last.time >= self.record.time[-1])
+        until = self.settings.get("until")
+        stop = until if isinstance(until, str) else until[0] if isinstance(until, list | tuple) else None
+        ending = (event for event in self.record.events if event.time >= self.record.time[-1])
+        return int(any(event.kind == "event" or event.name == stop for event in ending))
 
     @property
     def final(self) -> Any:

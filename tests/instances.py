@@ -105,5 +105,8 @@ MEASURES: list[tuple[str, Callable[[Frame, Frame, Joint], Measure]]] = [
     ("distance", lambda a, b, joint: mbd.distance(a, b)),
     ("separation", lambda a, b, joint: mbd.separation(a, b, (1, 1, 0))),
     ("named measure", lambda a, b, joint: mbd.measure("hinge.angle", unit="rad")),
-    ("measure of points", lambda a, b, joint: mbd.measure(lambda p, q: p[1] - 2.0 * q[0], a, b, tangents=lambda p, q: p[0])),
+    (
+        "measure of points",
+        lambda a, b, joint: mbd.measure(lambda p, q: p[1] - 2.0 * q[0], a, b, tangents=lambda p, q: p[0]),
+    ),
 ]

@@ -1,6 +1,6 @@
 """Steps of a walker, read from the events of a run.
 
-A step goes from one touchdown to the next of another foot; a foot is a contact that holds a place on the ground.
+A step goes from one touchdown to the next of another foot; a foot is a contact of a point with the ground.
 """
 
 from __future__ import annotations
@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mbd.results.record import EventRecord
+
 if TYPE_CHECKING:
-    from mbd.results.record import EventRecord
     from mbd.trajectory import Trajectory
 
 __all__ = ["Gait", "Step", "gait", "mirrored"]
@@ -89,15 +90,15 @@ def _line(number: int, step: Step) -> str:
 
 
 def gait(run: Trajectory) -> Gait:
-    """The steps of a walker; none for a mechanism without feet that alternate."""
+    """The steps of a walker; none for a mechanism without feet that alternate.
+
+    A foot that stands alone at the start counts as having just touched down.
+    """
     feet = {contact.name: contact for contact in run.facts.contacts if contact.place}
-    strikes: list[EventRecord] = []
-    for event in run.events:
-        if event.kind == "closed" and event.name in feet and (not strikes or strikes[-1].name != event.name):
-            strikes.append(event)
+    strikes = _strikes(run, list(feet))
     if len(strikes) < 2:
         return Gait(())
-    places = {event.row: run.columns.anchors[event.row, list(feet[event.name].place)] for event in strikes}
+    places = {event.row: run[feet[event.name].place][event.row] for event in strikes}
     states = _states(run, [event.row for event in strikes])
     pairs = mirrored(states.keys())
     impacts = run.energy.work.get("impacts", np.zeros(len(run)))
@@ -109,6 +110,17 @@ def gait(run: Trajectory) -> Gait:
         deviation = max(change, default=float("nan"))
         steps.append(Step(after.time, after.name, after.time - before.time, length, lost, deviation))
     return Gait(tuple(steps))
+
+
+def _strikes(run: Trajectory, feet: Sequence[str]) -> list[EventRecord]:
+    """The touchdowns of feet in turn."""
+    names = [contact.name for contact in run.facts.contacts]
+    standing = [foot for foot in feet if len(run) and run.record.closed[0, names.index(foot)]]
+    found = [EventRecord(float(run.time[0]), "closed", standing[0])] if len(standing) == 1 else []
+    for event in run.events:
+        if event.kind == "closed" and event.name in feet and (not found or found[-1].name != event.name):
+            found.append(event)
+    return found
 
 
 def _states(run: Trajectory, rows: Sequence[int]) -> dict[str, Any]:

@@ -48,7 +48,7 @@ halve:
 %middle = add i64 %low, %half
 %address = getelementptr double, ptr %breaks, i64 %middle
 %break = load double, ptr %address
-%left = fcmp ole double %x, %break
+%left = fcmp olt double %x, %break
 %next = select i1 %left, i64 %low, i64 %middle
 %rest = sub i64 %size, %half
 br label %test

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from mbd.arrays import Vector
-from mbd.compile.backend import Backend, Functions
-from mbd.compile.backend import backend as choose_backend
+from mbd.compile.backend import Backend, Functions, backend as choose_backend
 from mbd.compile.layout import Layout
 from mbd.equations import programs
 from mbd.equations.equations import Equations

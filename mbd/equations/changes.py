@@ -36,8 +36,14 @@ def _slope(placement: Placement, mark: Mark, j: int) -> Scalar:
     column = placement.columns(mover)[j - mover.edge.first]
     if isinstance(mark.of, Axes):
         return cross(column.angular, _column(mark.of, mark.column))[mark.axis]
-    swing = cross(column.angular, difference(mark.of.position, placement.joint(mover).position))
-    return total(column.linear, swing)[mark.axis]
+    return total(column.linear, cross(column.angular, _arm(placement, mark.of, mover)))[mark.axis]
+
+
+def _arm(placement: Placement, point: Point, mover: Moving) -> Triple:
+    """p − o_j, without the way to the origin and back where both are on one body."""
+    if point.carrier is mover:
+        return rotate(placement.axes(mover).rotation, difference(point.place, mover.shift))
+    return difference(point.position, placement.joint(mover).position)
 
 
 def _column(axes: Axes, k: int) -> Triple:

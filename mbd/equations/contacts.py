@@ -14,7 +14,7 @@ from mbd.equations.dynamics import Dynamics, Work
 from mbd.equations.effects import penalty_effect
 from mbd.equations.equations import Contact, Effect, Guard, Row
 from mbd.equations.surroundings import Surroundings
-from mbd.joints.base import Joint, row_unit
+from mbd.joints.base import row_unit
 from mbd.tape.derivatives import live
 from mbd.tape.node import Node, Scalar
 
@@ -42,7 +42,7 @@ def laws(
     """Cut joints, then bilateral constraints, then contacts and events, each in the order of the model."""
     found = Laws()
     for joint in scope.cuts:
-        for part, value in joint.rows(*scope.relative(joint), scope):
+        for part, value in scope.cut_rows(joint)[0]:
             _row(found, scope, joint.name, part, value, unit=row_unit(part), may_fold=True)
     for constraint in bilaterals:
         _row(found, scope, constraint.name, "", constraint.residual(scope), unit=constraint.measure.unit)
@@ -72,7 +72,7 @@ def _row(
     title = f"'{owner}'" + (f", row '{part}'" if part else "")
     if node.is_constant:
         if not node.is_zero:
-            found.faults.append(f"{title} is the constant {node.data:.6g} {unit}, whatever the motion; it can never be 0")
+            found.faults.append(f"{title} is {node.data:.6g} {unit} whatever the motion, so it can never be 0")
         elif not may_fold:
             found.faults.append(f"{title} is 0 whatever the motion, so it constrains nothing; remove it")
         return -1

@@ -89,7 +89,7 @@ def _state_balance(scope: Surroundings, found: Sequence[Cause]) -> list[Node]:
     given = {state.index: rate for cause in found for state, rate in cause.rates}
     missing = [coordinate.name for coordinate, node in scope.states if node.index not in given]
     if missing:
-        raise ModelError([f"the state '{name}' has no rate; its force must list it in Action.rates" for name in missing])
+        raise ModelError([f"state '{name}' has no rate; its force must list it in Action.rates" for name in missing])
     return [scope.tape.input("s", k) - given[node.index] for k, (_, node) in enumerate(scope.states)]
 
 

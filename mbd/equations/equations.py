@@ -124,7 +124,7 @@ class Effect:
 
 
 class Geometry(Protocol):
-    """What a derivation knows of its own expressions: shorter ways to derivatives that the tape alone could also take."""
+    """What a derivation knows of its own expressions: shorter ways to derivatives that the tape could take alone."""
 
     def balance_with(self, values: Sequence[Node], multipliers: Sequence[Node]) -> list[Node]:
         """balance + Σ_k multiplier_k ∂value_k/∂x (length n_v + n_z), for values that depend on t and q ⊕ x only."""

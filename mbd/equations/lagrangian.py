@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
 
 from mbd.equations import equations as records
@@ -13,7 +13,7 @@ from mbd.equations.equations import Effect, Equations, Row
 from mbd.equations.inputs import Inputs
 from mbd.equations.outputs import Outputs
 from mbd.equations.parameters import ParameterTable
-from mbd.errors import ModelError, TraceError, nearest
+from mbd.errors import ModelError, TraceError, UnknownNameError, nearest
 from mbd.tape.derivatives import gradient, jvp
 from mbd.tape.node import Node, Scalar, Tape
 from mbd.tape.tracing import traced_scalar
@@ -58,7 +58,7 @@ class Coordinate:
         return sympy.Symbol(f"{self.name}_rate", real=True)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Lagrangian:
     """A mechanism given by its energies in generalized coordinates q, with v = q̇.
 
@@ -122,7 +122,26 @@ class Lagrangian:
         """Operations of the equations, and of each effect."""
         from mbd.equations.cost import cost
 
-        return cost(self.equations_of_motion())
+        return cost(self)
+
+    def without(self, *names: str) -> Lagrangian:
+        """A copy that lacks some of its 'potential', 'dissipation', forces ('theta force') and constraints."""
+        forces = {f"{name} force": name for name in self.forces}
+        known = {"potential", "dissipation", *forces, *self.constraints}
+        for name in names:
+            if name not in known:
+                raise UnknownNameError("without: " + nearest(name, known, "effect or constraint"))
+        bare: dict[str, Any] = {name: 0.0 for name in ("potential", "dissipation") if name in names}
+        bare["forces"] = {name: self.forces[name] for title, name in forces.items() if title not in names}
+        bare["constraints"] = {name: h for name, h in self._rows.items() if name not in names}
+        return replace(self, **bare)
+
+    @property
+    def _rows(self) -> Mapping[str, Expression]:
+        """The constraints by name."""
+        rows = self.constraints
+        assert isinstance(rows, Mapping)
+        return rows
 
 
 # reading the description --------------------------------------------------------------------------------------------
@@ -185,7 +204,7 @@ class _Lowering:
         self.V = self._scalar(system.potential, "the potential")
         self.D = self._scalar(system.dissipation, "the dissipation")
         self.Q = {name: self._scalar(force, f"the force on {name!r}") for name, force in system.forces.items()}
-        self.h = {name: self._scalar(value, f"the constraint {name!r}") for name, value in system.constraints.items()}
+        self.h = {name: self._scalar(value, f"the constraint {name!r}") for name, value in system._rows.items()}
         self._check(system)
 
     def _scalar(self, expression: Expression, what: str) -> Node:
@@ -216,7 +235,8 @@ class _Lowering:
         sympy = sys.modules.get("sympy")
         if sympy is None:
             return {}
-        t, found = sympy.Symbol("t"), {}
+        t = sympy.Symbol("t")
+        found: dict[Any, Scalar] = {}
         for name, value in self._known.items():
             if f"{name}_rate" in self._known:
                 motion = sympy.Function(name)(t)
@@ -225,10 +245,11 @@ class _Lowering:
 
     def _check(self, system: Lagrangian) -> None:
         """An energy of the wrong variables is a fault."""
-        for what, node in (("the potential", self.V), *((f"the constraint {name!r}", h) for name, h in self.h.items())):
-            moving = [c.name for c, d in zip(system.coordinates, gradient(node, self.inputs.v), strict=True) if not d.is_zero]
-            if moving:
-                self.faults.append(f"{what} depends on the rate of {moving[0]!r}; it may depend on q and t only")
+        still = [("the potential", self.V), *((f"the constraint {name!r}", h) for name, h in self.h.items())]
+        for what, node in still:
+            for coordinate, slope in zip(system.coordinates, gradient(node, self.inputs.v), strict=True):
+                if not slope.is_zero:
+                    self.faults.append(f"{what} depends on the rate of '{coordinate.name}'; only q and t may enter it")
         for name, h in self.h.items():
             if h.is_constant:
                 self.faults.append(f"the constraint {name!r} is the constant {h.data}; it depends on no coordinate")

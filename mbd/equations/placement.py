@@ -139,7 +139,8 @@ class Placement:
             body = point.carrier
             if point.at_joint:
                 assert body.parent is not None
-                known = total(self._carried(body.parent, body.arm), rotate(self.axes(body.parent).rotation, body.sliding))
+                sliding = rotate(self.axes(body.parent).rotation, body.sliding)
+                known = total(self._carried(body.parent, body.arm), sliding)
             else:
                 known = self._carried(body, point.place)
             self._linear[point] = known

@@ -11,15 +11,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from mbd.bodies.algebra import IDENTITY, cross, difference, dot, rotate, scaled, total, transpose
+from mbd.bodies.algebra import cross, difference, dot, rotate, scaled, total, transpose
 from mbd.equations.dynamics import Dynamics, Work
 from mbd.equations.equations import Row
 from mbd.equations.kinematics import Moving
-from mbd.equations.surroundings import Surroundings
+from mbd.equations.surroundings import Surroundings, placeholders
 from mbd.joints.base import Joint
-from mbd.scope import Rotation, Triple
+from mbd.scope import Triple
 from mbd.tape.derivatives import substitute, vjp
-from mbd.tape.node import Node, Scalar
+from mbd.tape.node import Scalar
 
 __all__ = ["Wrench", "reaction"]
 
@@ -89,18 +89,19 @@ def _solved(matrix: list[list[Scalar]], right: list[Scalar]) -> list[Scalar]:
 def _of_cut_joint(joint: Joint, scope: Surroundings, rows: Sequence[Row]) -> Wrench:
     """From the multipliers of the joint's own rows."""
     tape = scope.tape
-    fresh = [tape.input("virtual", k) for k in range(12)]
-    R_fresh: Rotation = tuple(tuple(fresh[3 * i + k] for k in range(3)) for i in range(3))  # type: ignore[assignment]
-    p_fresh: Triple = (fresh[9], fresh[10], fresh[11])
+    R_free, p_free = placeholders(tape)
+    fresh = [tape.lift(part) for part in (*R_free[0], *R_free[1], *R_free[2], *p_free)]
     numbers = {row.part: k for k, row in enumerate(rows) if row.owner == joint.name and row.contact < 0}
-    named = [(part, tape.lift(value)) for part, value in joint.rows(R_fresh, p_fresh, scope) if part in numbers]
-    bars = vjp([value for _, value in named], [tape.input("lam", numbers[part]) for part, _ in named], fresh)
+    held = [(part, tape.lift(value)) for part, value in joint.rows(R_free, p_free, scope) if part in numbers]
+    bars = vjp([value for _, value in held], [tape.input("lam", numbers[part]) for part, _ in held], fresh)
     R, p = scope.relative(joint)
-    placed = dict(zip(fresh, [tape.lift(part) for part in (*R[0], *R[1], *R[2], *p)], strict=True))
-    bars = substitute(bars, placed)
-    force = (bars[9], bars[10], bars[11])
+    placed = zip(fresh, [tape.lift(part) for part in (*R[0], *R[1], *R[2], *p)], strict=True)
+    *turn, x, y, z = substitute(bars, dict(placed))
     torque: Triple = (0.0, 0.0, 0.0)
     for k in range(3):  # δR = δθ × R, column by column
-        torque = total(torque, cross((R[0][k], R[1][k], R[2][k]), (bars[k], bars[3 + k], bars[6 + k])))
+        torque = total(torque, cross((R[0][k], R[1][k], R[2][k]), (turn[k], turn[3 + k], turn[6 + k])))
     axes = scope.frame(joint.parent).rotation
-    return Wrench(scaled(-1.0, rotate(axes, force)), scaled(-1.0, rotate(axes, torque)))
+    force: Triple = (x, y, z)
+    if not scope.cut_rows(joint)[1]:
+        force = rotate(axes, force)
+    return Wrench(scaled(-1.0, force), scaled(-1.0, rotate(axes, torque)))

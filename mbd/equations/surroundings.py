@@ -6,6 +6,7 @@ from collections.abc import Collection, Iterable, Sequence
 
 from mbd.bodies.algebra import IDENTITY, difference, product, rotate, transpose
 from mbd.bodies.base import Body, Frame
+from mbd.bodies.values import Vector3
 from mbd.equations.changes import rates
 from mbd.equations.equations import Coordinate
 from mbd.equations.inputs import Inputs
@@ -16,10 +17,16 @@ from mbd.equations.placement import Placement
 from mbd.errors import UnknownNameError, nearest
 from mbd.joints.base import Joint
 from mbd.scope import FrameMotion, JointMotion, Rotation, Triple
-from mbd.tape.derivatives import jvp
+from mbd.tape.derivatives import jvp, live
 from mbd.tape.node import Node, Scalar, Table, Tape
 
-__all__ = ["Surroundings"]
+__all__ = ["Surroundings", "placeholders"]
+
+
+def placeholders(tape: Tape) -> tuple[Rotation, Triple]:
+    """R, p of a joint as fresh inputs, for asking how its rows depend on them."""
+    a, b, c, d, e, f, g, h, i, x, y, z = (tape.input("virtual", k) for k in range(12))
+    return ((a, b, c), (d, e, f), (g, h, i)), (x, y, z)
 
 
 class Surroundings:
@@ -40,7 +47,7 @@ class Surroundings:
     """
 
     def __init__(
-        self, ground: Body, tree: Sequence[Joint], cuts: Sequence[Joint], gravity: Triple, tunable: Collection[str]
+        self, ground: Body, tree: Sequence[Joint], cuts: Sequence[Joint], gravity: Vector3, tunable: Collection[str]
     ) -> None:
         self.tape = Tape()
         self.parameters = ParameterTable(self.tape, tunable)
@@ -148,6 +155,25 @@ class Surroundings:
         parent, child = self.frame(joint.parent), self.frame(joint.child)
         back = transpose(parent.rotation)
         return product(back, child.rotation), rotate(back, difference(child.position, parent.position))
+
+    def cut_rows(self, joint: Joint) -> tuple[list[tuple[str, Node]], bool]:
+        """(part, residual) of a cut joint, and whether its places are written in ground axes.
+
+        Where a joint holds its two points together, ``R_Aᵀ (p_B − p_A) = 0`` is ``p_B − p_A = 0``, which is shorter.
+        """
+        R, p = self.relative(joint)
+        level = self._holds_points(joint)
+        if level:
+            p = difference(self.frame(joint.child).position, self.frame(joint.parent).position)
+        return [(part, self.tape.lift(value)) for part, value in joint.rows(R, p, self)], level
+
+    def _holds_points(self, joint: Joint) -> bool:
+        """Whether the rows that depend on p are its three components."""
+        R, p = placeholders(self.tape)
+        rows = [self.tape.lift(value) for _, value in joint.rows(R, p, self)]
+        places = {self.tape.lift(part).index for part in p}
+        shifts = [row.index for row in rows if places & {node.index for node in live([row])}]
+        return set(shifts) == places
 
     def rates(self, values: Sequence[Node]) -> list[Node]:
         """d/dt of functions of t and q ⊕ x."""

@@ -27,8 +27,11 @@ from mbd.state import Mode, State
 __all__ = ["Coefficients", "DEFAULT_TOLERANCE", "Formulation", "NewmarkFamily", "NewmarkMemory", "Starting"]
 
 EPS = float(np.finfo(float).eps)
-DEFAULT_TOLERANCE = 1e-11
-"""Residual of the balance over the sum of its terms at which Newton stops; far below any step error."""
+DEFAULT_TOLERANCE = 1e-9
+"""Largest residual of the balance, relative to the sum of its terms, at which Newton stops.
+
+It is tightened to 1e-4 of the first Newton correction, which measures the error of the step itself, down to 1e-3 of
+this value: the iteration error stays invisible beside the step error at every dt."""
 MAX_ITERATIONS = 25
 
 Formulation: TypeAlias = Literal["ggl", "index3"]
@@ -68,7 +71,8 @@ class NewmarkMemory:
     """What the scheme keeps between steps.
 
     rate (n,) true v̇ and ż; aux (n,) the auxiliary a for steps of size `step`; lam (m,) multipliers;
-    slope, lam_slope: their last rates of change, which predict the next step; shift (n_v,) the position correction.
+    slope, lam_slope: their last rates of change, which predict the next step; shift (n_v,) the position correction and
+    shift_change what it changed by in the last step.
     """
 
     rate: Vector
@@ -77,6 +81,7 @@ class NewmarkMemory:
     slope: Vector
     lam_slope: Vector
     shift: Vector
+    shift_change: Vector
     step: float
 
 
@@ -158,7 +163,7 @@ class NewmarkFamily(Integrator):
         slope, lam_slope = (later - rate) / ahead, (lam_later - lam) / ahead
         c = self.coefficients
         jerk = (c.alpha_m - c.alpha_f) * dt if self.starting == "jerk" else 0.0
-        return NewmarkMemory(rate, rate + jerk * slope, lam, slope, lam_slope, np.zeros(n_v), dt)
+        return NewmarkMemory(rate, rate + jerk * slope, lam, slope, lam_slope, np.zeros(n_v), np.zeros(n_v), dt)
 
     def step(self, system: System, state: State, dt: float, mode: Mode, memory: NewmarkMemory) -> StepResult:
         """One step by Newton's method; the readable twin of the compiled kernel."""
@@ -186,7 +191,8 @@ class _Step:
         self.n_v = len(state.v)
         self.rate = memory.rate + dt * memory.slope
         self.lam = memory.lam + dt * memory.lam_slope
-        self.shift = memory.shift * stretch**3
+        self.shift = (memory.shift + stretch * memory.shift_change) * stretch**3
+        self.tolerance = 4.0 * EPS if scheme.exact else 1e-3 * scheme.tolerance
         a1 = self._aux()
         self.y = y0 + dt * ((1.0 - k.gamma) * self.a0 + k.gamma * a1)
         n_v = self.n_v
@@ -198,18 +204,20 @@ class _Step:
 
     def _error(self, terms: Terms) -> float:
         """Largest residual over its tolerance, each block apart."""
-        tolerance = 4.0 * EPS if self.scheme.exact else self.scheme.tolerance
+        tolerance = self.tolerance
         fastest = float(np.max(np.abs(self.rate[: self.n_v]), initial=0.0))
         size = np.abs(terms.S) @ np.abs(self.rate) if terms.S is not None else np.abs(terms.r)
         scale_r = np.full(len(terms.r), np.max(size, initial=0.0)) if terms.scale_r is None else terms.scale_r
         parts = [np.abs(terms.r) / (tolerance * np.maximum(scale_r, 1e-280))]
         if len(terms.h):
             floor = 16.0 * EPS * (np.ones(len(terms.h)) if terms.scale_h is None else terms.scale_h)
-            parts.append(np.abs(terms.h) / (np.maximum(floor, tolerance * self.c_K * fastest) + 1e-300))
+            speed = float(np.max(np.abs(self.y[: self.n_v]), initial=0.0))
+            limit = self.c_C * speed if self.scheme.stabilized else self.c_K * fastest
+            parts.append(np.abs(terms.h) / (np.maximum(floor, tolerance * limit) + 1e-300))
             if self.scheme.stabilized:
                 scale = np.ones(len(terms.h)) if terms.scale_rate is None else terms.scale_rate
-                limit = np.maximum(16.0 * EPS * scale, tolerance * self.c_C * fastest)
-                parts.append(np.abs(terms.rate) / (limit + 1e-300))
+                limits = np.maximum(16.0 * EPS * scale, tolerance * self.c_C * fastest)
+                parts.append(np.abs(terms.rate) / (limits + 1e-300))
         return float(np.max(np.concatenate(parts)))
 
     def run(self) -> StepResult:
@@ -222,17 +230,17 @@ class _Step:
             error = self._error(terms)
             if not np.isfinite(error):
                 return self._result(t1, StepReport(False, iteration, error, "a force or a row is not finite"))
-            floor = 1e4 if self.scheme.exact else 1e4 * EPS / self.scheme.tolerance
+            floor = 4096.0 * EPS / self.tolerance
             if error <= 1.0 or (iteration >= 2 and error > 0.5 * before and error <= max(1.0, floor)):
                 return self._result(t1, StepReport(True, iteration, error))
             before = error
             try:
-                self._correct(terms)
+                self._correct(terms, iteration)
             except np.linalg.LinAlgError:
                 return self._result(t1, StepReport(False, iteration, error, "the Newton matrix is singular"))
         return self._result(t1, StepReport(False, MAX_ITERATIONS, error, "Newton did not converge"))
 
-    def _correct(self, terms: Terms) -> None:
+    def _correct(self, terms: Terms, iteration: int) -> None:
         n, m, n_v = len(terms.r), len(terms.h), self.n_v
         assert terms.S is not None
         if not m:
@@ -250,6 +258,9 @@ class _Step:
             if stabilized:
                 self.x = self.x + solved[:n_v, 1] - self.shift
                 self.shift = solved[:n_v, 1]
+        if iteration == 0 and not self.scheme.exact:
+            relative = float(np.max(np.abs(change)) / max(np.max(np.abs(self.rate)), 1e-300))
+            self.tolerance = min(self.scheme.tolerance, max(1e-4 * relative, self.tolerance))
         self.rate = self.rate + change
         self.y = self.y + self.c_C * change
         self.x = self.x + self.c_K * change[:n_v]
@@ -259,7 +270,14 @@ class _Step:
             return StepResult(self.state, self.memory, report)
         memory, dt, n_v = self.memory, self.dt, self.n_v
         after = NewmarkMemory(
-            self.rate, self._aux(), self.lam, (self.rate - memory.rate) / dt, (self.lam - memory.lam) / dt, self.shift, dt
+            self.rate,
+            self._aux(),
+            self.lam,
+            (self.rate - memory.rate) / dt,
+            (self.lam - memory.lam) / dt,
+            self.shift,
+            self.shift - memory.shift,
+            dt,
         )
         old = self.state
         state = State(
@@ -267,4 +285,3 @@ class _Step:
             old.names, old.velocity_names, {}, old.parameters,
         )  # fmt: skip
         return StepResult(state, after, report)
-

@@ -139,6 +139,7 @@ def ir_of_kernel() -> tuple[str, str]:
 def object_code(path: str) -> None:
     """Write the kernel's object file, with its entry under the name ENTRY (run in a process of its own)."""
     import llvmlite.binding as llvm
+
     from mbd.compile.llvm import host
 
     text, mangled = ir_of_kernel()

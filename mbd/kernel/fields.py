@@ -26,7 +26,7 @@ REAL_ARRAYS = (
     "out",  # of the function called last
     "acc",  # of the accelerations program
     "clock",  # time, base time of the grid, step size of aux, time of the last switch
-    "q", "y", "rate", "aux", "slope", "lam", "lam_slope", "shift", "anchors",  # accepted state
+    "q", "y", "rate", "aux", "slope", "lam", "lam_slope", "shift", "shift_change", "anchors",  # accepted state
     "q1", "y1", "rate1", "aux1", "lam1", "shift1",  # candidate of the step under judgement
     "kkt", "rhs", "work",  # linear algebra
     "force", "bias", "jump", "impulse",  # complementarity: right-hand sides, velocity or acceleration, multipliers
@@ -54,7 +54,9 @@ Kernel = namedtuple("Kernel", FIELDS)  # type: ignore[misc]
 # places in `state`
 MODE, ROWS, GRID, RESTART, STORED, LOGGED, SWITCHES, SINCE_STORE, BLOCKED, FRESH = range(10)
 # places in `counts`
-(STEPS, ITERATIONS, TANGENTS, RESIDUALS, FACTORIZATIONS, EVENTS, RESTARTS, IMPACTS, LOCATIONS, STAGNATIONS, DEEPEST) = range(11)
+(STEPS, ITERATIONS, TANGENTS, RESIDUALS, FACTORIZATIONS, EVENTS, RESTARTS, IMPACTS, LOCATIONS, STAGNATIONS, DEEPEST) = (
+    range(11)
+)
 # places in `clock`
 NOW, BASE, AUX_STEP, LAST_SWITCH = range(4)
 # functions in `code`; modes follow in pairs (tangent, residual)

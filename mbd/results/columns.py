@@ -12,16 +12,14 @@ from numpy.typing import NDArray
 from mbd.arrays import Matrix, Vector
 from mbd.errors import UnknownNameError, nearest
 from mbd.results.interpolation import Grid, Places
+from mbd.results.names import AXES
 from mbd.results.record import Record, Rows
 
 if TYPE_CHECKING:
     from mbd.equations.equations import Equations
     from mbd.tape.node import Node, Scalar
 
-__all__ = ["AXES", "Alias", "Columns", "ModelColumns", "StoredColumns", "gather"]
-
-AXES = (".x", ".y", ".z")
-"""Endings of the components of a vector."""
+__all__ = ["Alias", "Columns", "ModelColumns", "StoredColumns", "gather"]
 
 Alias = tuple[str, int]
 """A named quantity that is itself part of the state: ('q', 0), ('v', 3), …"""

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
+from mbd.results.names import AXES
+
 if TYPE_CHECKING:
     from mbd.equations.equations import Equations
 
@@ -14,13 +16,16 @@ __all__ = ["ContactFacts", "Facts"]
 
 @dataclass(frozen=True)
 class ContactFacts:
-    """A contact: its name, kind ('unilateral' or 'penalty'), unit of the gap, and the anchors that hold where it
-    touched the ground (x, y, z), empty for contacts without a place such as a knee stop."""
+    """A contact.
+
+    kind : 'unilateral' or 'penalty'; unit : of its gap; place : the frame that touches ('left shank.end'), '' for a
+    contact without one such as a knee stop
+    """
 
     name: str
     kind: str
     unit: str
-    place: tuple[int, ...] = ()
+    place: str = ""
 
 
 @dataclass(frozen=True)
@@ -48,10 +53,10 @@ class Facts:
             tuple((c.name, c.unit) for c in (*equations.coordinates, *equations.states)),
             equations.n_q,
             tuple(
-                ContactFacts(c.name, c.kind, c.unit, tuple(c.anchors) if len(c.anchors) == 3 else ())
-                for c in equations.contacts
+                ContactFacts(contact.name, contact.kind, contact.unit, place)
+                for contact, place in zip(equations.contacts, _places(equations), strict=True)
             ),
-            tuple((body, tuple(frames)) for body, frames in figure),
+            tuple((body, tuple(frames)) for body, frames in figure if body != "ground"),
         )
 
     @classmethod
@@ -61,10 +66,27 @@ class Facts:
             data["model"],
             tuple((name, unit) for name, unit in data["coordinates"]),
             data["coordinate_count"],
-            tuple(ContactFacts(c["name"], c["kind"], c["unit"], tuple(c["place"])) for c in data["contacts"]),
+            tuple(ContactFacts(**contact) for contact in data["contacts"]),
             tuple((body, tuple(frames)) for body, frames in data["segments"]),
         )
 
     def as_json(self) -> dict[str, Any]:
         """Plain lists and dictionaries."""
         return asdict(self)
+
+
+def _places(equations: Equations) -> list[str]:
+    """The frame that each contact touches with: the one whose position it captures, or whose height is its gap."""
+    names = set(equations.output_names())
+    frames = [name[:-3] for name in equations.output_names() if name.endswith(".vx") and f"{name[:-3]}.x" in names]
+    positions = {frame: [equations.output(frame + axis) for axis in AXES] for frame in frames if equations.contacts}
+    found = []
+    for contact in equations.contacts:
+        captured = {node.index for node in contact.captured}
+        found.append("")
+        for frame, position in positions.items():
+            moving = {node.index for node in position if not node.is_constant}
+            if captured == moving if captured else contact.gap is position[1]:
+                found[-1] = frame
+                break
+    return found

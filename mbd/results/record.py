@@ -137,5 +137,5 @@ class Record:
         if not self.parameter_changes:
             return self.parameters
         starts = np.array([row for row, _ in self.parameter_changes])
-        values = np.stack([self.parameters, *(vector for _, vector in self.parameter_changes)])
+        values = np.stack([self.parameters, *(vector[: len(self.parameters)] for _, vector in self.parameter_changes)])
         return np.asarray(values[np.searchsorted(starts, source, side="right")])

@@ -31,7 +31,9 @@ class Named(Mapping[str, float]):
         mechanism, v = run.mechanism, run.values
         known = mechanism.named.get(name)
         if known is None:
-            known = mechanism.named[name] = scalar_function([mechanism.equations.output(name)], mechanism.layout, "named")
+            known = mechanism.named[name] = scalar_function(
+                [mechanism.equations.output(name)], mechanism.layout, "named"
+            )
         layout, flags = mechanism.layout, v["closed"][: v["n_contacts"]]
         block = mechanism.block(
             run.now, v["q"][: v["n_q"]], v["y"][: v["n"]], v["anchors"][: v["n_anchors"]], run.manager.penalties(flags)
@@ -65,7 +67,9 @@ def apply_reset(run: Run, guard: Guard) -> None:
         elif name in states:
             v["y"][states[name]] = number
         else:
-            raise UnknownNameError(f"reset of {guard.name!r}: " + nearest(name, [*positions, *rates, *states], "quantity"))
+            raise UnknownNameError(
+                f"reset of {guard.name!r}: " + nearest(name, [*positions, *rates, *states], "quantity")
+            )
     flags = v["closed"][: v["n_contacts"]]
     rows = list(run.manager.active_rows(flags))
     terms = run.mechanism.acceleration_terms(
@@ -74,7 +78,9 @@ def apply_reset(run: Run, guard: Guard) -> None:
     off = [k for k in rows if abs(terms.h[k]) > 1e-6 or abs(terms.rate[k]) > 1e-6 * (1.0 + np.max(np.abs(v["y"])))]
     if off:
         names = ", ".join(repr(equations.rows[k].owner) for k in off)
-        raise SimulationError(f"the reset of {guard.name!r} at t = {run.now:.6g} s breaks {names}; reset velocities too")
+        raise SimulationError(
+            f"the reset of {guard.name!r} at t = {run.now:.6g} s breaks {names}; reset velocities too"
+        )
 
 
 class Boundaries:
@@ -130,16 +136,22 @@ class Boundaries:
 
     def _call(self, run: Run, controller: Any) -> None:
         named = run.named()
-        answer = controller.update(run.now, {name: named[name] for name in controller.reads}, self.states[controller.name])
+        answer = controller.update(
+            run.now, {name: named[name] for name in controller.reads}, self.states[controller.name]
+        )
         if isinstance(answer, tuple):
             answer, self.states[controller.name] = answer
         written = dict(answer or {})
         wrong = [name for name in written if name not in controller.writes]
         if wrong:
-            raise UnknownNameError(f"Controller {controller.name!r}: " + nearest(wrong[0], controller.writes, "entry of writes"))
+            raise UnknownNameError(
+                f"Controller {controller.name!r}: " + nearest(wrong[0], controller.writes, "entry of writes")
+            )
         bad = [name for name, value in written.items() if not np.isfinite(value)]
         if bad:
-            raise SimulationError(f"Controller {controller.name!r} wrote {written[bad[0]]!r} to {bad[0]!r} at t = {run.now:.6g} s")
+            raise SimulationError(
+                f"Controller {controller.name!r} wrote {written[bad[0]]!r} to {bad[0]!r} at t = {run.now:.6g} s"
+            )
         if written:
             run.change_parameters(written)
 

@@ -45,7 +45,9 @@ def explanation(stepper: Stepper, status: int) -> str:
             "and close again without motion; give one of them a release rule, friction or a penalty law"
         )
     if status == F.NO_IMPACT:
-        return f"{where}: no impulses satisfy the impact law of all contacts that close{with_closed}; penalty contacts can"
+        return (
+            f"{where}: no impulses satisfy the impact law of all contacts that close{with_closed}; penalty contacts can"
+        )
     if status in (F.DEPENDENT, F.CONFLICT):
         what = "depend on each other" if status == F.DEPENDENT else "conflict"
         return f"{where}: rows {what} at {_unknown(stepper)}{with_closed}; leave one out, or hold fewer contacts closed"

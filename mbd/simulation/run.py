@@ -176,7 +176,9 @@ class Run:
             name = guards[index] if kind == "event" else self.manager.names[index]
             if kind == "closed":
                 impulse = line[[5 + k for k in self.manager.contacts[index].rows]].copy()
-            self.events.append(EventRecord(float(line[0]), kind, name, impulse, float(line[3]), self.stored + int(line[4])))
+            self.events.append(
+                EventRecord(float(line[0]), kind, name, impulse, float(line[3]), self.stored + int(line[4]))
+            )
         if count:
             self.pieces.append(v["store"].reshape(-1, v["width"])[:count].copy())
         self.stored += count

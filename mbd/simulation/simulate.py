@@ -7,10 +7,10 @@ import platform
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal
 
+from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import CapabilityError, ModelError, SimulationError, UnknownNameError, nearest
 from mbd.integrators import HHT, Integrator
 from mbd.kernel.active_set import ActiveSetManager
-from mbd.compile.mechanisms import mechanism_of
 from mbd.simulation.run import Run
 from mbd.state import State
 from mbd.trajectory import Trajectory
@@ -186,7 +186,12 @@ def _bar(progress: Any, begin: float, end: float) -> Callable[[float, float], No
         return progress  # type: ignore[no-any-return]
     from tqdm import tqdm
 
-    bar = tqdm(total=end - begin, unit="s", disable=None, bar_format="{l_bar}{bar}| {n:.2f}/{total:.2f} s [{elapsed}<{remaining}]")
+    bar = tqdm(
+        total=end - begin,
+        unit="s",
+        disable=None,
+        bar_format="{l_bar}{bar}| {n:.2f}/{total:.2f} s [{elapsed}<{remaining}]",
+    )
 
     def show(t: float, until: float) -> None:
         bar.update(t - begin - bar.n)
@@ -194,5 +199,3 @@ def _bar(progress: Any, begin: float, end: float) -> Callable[[float, float], No
             bar.close()
 
     return show
-
-

@@ -57,7 +57,9 @@ class Stepper:
         self.values: dict[str, Any] = {}
         self._sizes(dt, options)
         self._arrays(parameters, manager)
-        self.system = MechanismSystem(mechanism, manager, self.values["params"], self.values["anchors"], self.stabilized)
+        self.system = MechanismSystem(
+            mechanism, manager, self.values["params"], self.values["anchors"], self.stabilized
+        )
         self.scheme = PlainScheme(integrator, self.system, manager)
         self.functions: list[Any] = [mechanism.common[name] for name in ("accelerations", "guards", "scales")]
         self.functions.append(None if mechanism.vector else mechanism.common["compose"])
@@ -79,7 +81,7 @@ class Stepper:
             capacity=int(options["capacity"]), stride=int(options.get("store", 1)), event_width=5 + layout.n_rows,
             event_capacity=max(EVENT_CAPACITY, 8 * n_contacts + 16), chunk=int(options.get("chunk", 1)), hooks=0,
             rest_speed=float(options.get("rest_speed", 1e-6)), dt=dt, until=0.0,
-            alpha_m=0.0, alpha_f=0.0, beta=0.25, gamma=0.5, tolerance=1e-11, jerk=1, exact=0,
+            alpha_m=0.0, alpha_f=0.0, beta=0.25, gamma=0.5, tolerance=1e-9, jerk=1, exact=0,
         )  # fmt: skip
         if isinstance(self.integrator, NewmarkFamily):
             c = self.integrator.coefficients
@@ -94,7 +96,7 @@ class Stepper:
         size = n + rows
         reals = {
             "block": self.mechanism.layout.size, "out": size * size + n + 2 * rows, "acc": self.mechanism.sizes["accelerations"],
-            "clock": 4, "q": n_q, "y": n, "rate": n, "aux": n, "slope": n, "lam": rows, "lam_slope": rows, "shift": n,
+            "clock": 4, "q": n_q, "y": n, "rate": n, "aux": n, "slope": n, "lam": rows, "lam_slope": rows, "shift": n, "shift_change": n,
             "anchors": v["n_anchors"], "q1": n_q, "y1": n, "rate1": n, "aux1": n, "lam1": rows, "shift1": n,
             "kkt": size * size, "rhs": size, "work": 3 * size, "force": n, "bias": rows, "jump": n, "impulse": rows,
             "guards0": 4 * contacts + 2 * guards, "guards1": 4 * contacts + 2 * guards, "scale": n + 2 * rows,

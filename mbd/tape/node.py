@@ -303,6 +303,10 @@ class Tape:
             product = factor * b.args[0].data
             if _NORMAL < product < 1.0 / _NORMAL:
                 return self.mul(product, b.args[1])
+        if b.op == "mul":
+            for inner, other in (b.args, b.args[::-1]):
+                if inner.op == "mul" and inner.args[0].op == "const" and inner.args[0].data * factor == 1.0:
+                    return self.mul(inner.args[1], other)  # 2·((½ k) x) = k x
         return self._make(("mul", a.index, b.index), "mul", (a, b))
 
     def div(self, left: Scalar, right: Scalar) -> Node:

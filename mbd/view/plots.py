@@ -171,11 +171,12 @@ def phase_portrait(run: Trajectory, *coordinates: str, path: str | Path | None =
         for number, name in enumerate(wanted):
             place, rate = run[name], run[f"{name}.rate"]
             shade = CYCLE[number % len(CYCLE)]
-            axes.plot([], [], color=shade, label=name)
+            width = 3.0 if "left" in name.split() else 1.1  # the two sides of a repeating walk lie on each other
+            axes.plot([], [], color=shade, linewidth=width, label=name)
             axes.plot(place[:1], rate[:1], "o", color=shade, markersize=5)
             for start, stop in pairwise(cuts):
-                axes.plot(place[start:stop], rate[start:stop], color=shade)
-                axes.plot(place[stop - 1 : stop + 1], rate[stop - 1 : stop + 1], ":", color=shade, linewidth=1.0)
+                axes.plot(place[start:stop], rate[start:stop], color=shade, linewidth=width)
+                axes.plot(place[stop - 1 : stop + 1], rate[stop - 1 : stop + 1], ":", color=shade, linewidth=width)
         kinds = {unit(name, run.facts) for name in wanted}
         kind = kinds.pop() if len(kinds) == 1 else ""
         axes.set_xlabel(f"{QUANTITIES.get(kind, 'coordinate')} [{kind}]" if kind else "coordinate")

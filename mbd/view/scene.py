@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
-from mbd.results.columns import AXES
+from mbd.results.names import AXES
 
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
@@ -142,10 +142,10 @@ def _touches(run: Trajectory, turn: Matrix) -> list[Touch]:
         closed = run.record.closed[:, column].astype(np.int8)
         if not contact.place or not closed.any():
             continue
-        held = run.columns.anchors[:, list(contact.place)]
+        where = run[contact.place]
         change = np.flatnonzero(np.diff(closed, prepend=0, append=0))
         for first, stop in zip(change[::2], change[1::2], strict=True):
-            found.append(Touch(contact.name, turn @ held[first], float(run.time[first]), float(run.time[stop - 1])))
+            found.append(Touch(contact.name, turn @ where[first], float(run.time[first]), float(run.time[stop - 1])))
     return found
 
 

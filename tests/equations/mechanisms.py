@@ -91,7 +91,7 @@ def furnished(model: mbd.Model, seed: int) -> mbd.Model:
         mbd.Potential("well", lambda p: 0.5 * p[0] * p[0] * p[1], arguments=(point(last),)),
     )  # fmt: skip
     model.constrain(
-        mbd.Bilateral("rod", mbd.distance(model.ground.point(3.0, 2.0), point(last)), value=lambda t: 2.0 + 0.1 * t * t),
+        mbd.Bilateral("rod", mbd.distance(model.ground.point(3.0, 2.0), point(last)), value=lambda t: 2.0 + 0.1 * t**2),
         mbd.Unilateral("foot", mbd.touchdown(point(last), ground=lambda x: 0.1 * mbd.sin(x))),
         mbd.Penalty("pad", mbd.height(point(last)), stiffness=50.0, damping=2.0, exponent=2),
     )
@@ -115,7 +115,7 @@ def leg() -> mbd.Model:
         mbd.Event("toe off", mbd.measure("shank.end.vy")),
     )
     model.apply(
-        mbd.Motor("drive", upper, torque=lambda t, angle: 0.3 * mbd.sin(2.0 * t) * angle, arguments=("t", "knee.angle")),
+        mbd.Motor("drive", upper, lambda t, angle: 0.3 * mbd.sin(2.0 * t) * angle, arguments=["t", "knee.angle"]),
         mbd.TorsionSpring("ankle-like", upper, stiffness=2.0, rest=0.3),
     )
     return model

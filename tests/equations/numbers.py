@@ -43,7 +43,7 @@ def moved(given: dict[tuple[str, int], float], step: float, along: dict[tuple[st
     return given | {key: given[key] + step * rate for key, rate in along.items()}
 
 
-def derivative(nodes: Sequence[Node], given: dict, along: dict[tuple[str, int], float], step: float = 1e-3) -> np.ndarray:
+def derivative(nodes: Sequence[Node], given: dict, along: dict, step: float = 1e-3) -> np.ndarray:
     """d nodes along a direction of the inputs, by central differences of sixth order."""
     weights = {1: 0.75, 2: -0.15, 3: 1.0 / 60.0}
     terms = [

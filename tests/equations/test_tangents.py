@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from mbd.equations import derive
 from mbd.equations.programs import accelerations, newton, residual
@@ -33,7 +32,8 @@ def _newton_is_derivative_of_residual(equations, seed):
         out = residual(equations, rows, penalties, stabilized)
         np.testing.assert_allclose(at(out, point), np.concatenate(rest), rtol=1e-12, atol=1e-12)
         for j in range(n):
-            along = {("a", j): 1.0, ("v", j): c0, ("x", j): c1} if j < n_v else {("s", j - n_v): 1.0, ("z", j - n_v): c0}
+            k = j - n_v
+            along = {("a", j): 1.0, ("v", j): c0, ("x", j): c1} if k < 0 else {("s", k): 1.0, ("z", k): c0}
             change = derivative(out, point, along)
             np.testing.assert_allclose(K[:n, j], change[:n], rtol=1e-6, atol=1e-6)
             if stabilized:

@@ -37,6 +37,7 @@ class Sheet:
     def point(self, name: str, x: Scalar, y: Scalar) -> tuple[Node, Node]:
         x, y = self.tape.lift(x), self.tape.lift(y)
         self.outputs |= {f"{name}.x": x, f"{name}.y": y, f"{name}.z": self.tape.zero}
+        self.outputs |= {f"{name}.vx": self.rate(x), f"{name}.vy": self.rate(y), f"{name}.vz": self.tape.zero}
         return x, y
 
     def output(self, name: str) -> Node:
@@ -73,7 +74,7 @@ def record(equations: Equations, time, q, v, a, *, lam=None, closed=None, events
 
 
 def oscillator(dt: float = 0.01, until: float = 2.0, damping: float = 0.3, stiffness: float = 9.0) -> Trajectory:
-    """A mass of 1 kg on a spring with a damper and a force cos 2t: the exact motion x = e^(−δt) cos ωt + p cos 2t + r sin 2t."""
+    """A mass of 1 kg on a spring with a damper and a force cos 2t: x = e^(−δt) cos ωt + p cos 2t + r sin 2t, exact."""
     sheet = Sheet(1)
     coordinates = sheet.coordinates("slider.displacement")
     sheet.outputs["slider.rate"] = sheet.v[0]
@@ -81,8 +82,8 @@ def oscillator(dt: float = 0.01, until: float = 2.0, damping: float = 0.3, stiff
     sheet.point("mass.origin", sheet.q[0], 0.0)
     push = cos(2.0 * sheet.t)
     effects = (
-        Effect("damper", "loss", lambda: [], power=-damping * sheet.v[0] ** 2),
-        Effect("push", "applied", lambda: [], power=push * sheet.v[0]),
+        Effect("damper", "loss", list, power=-damping * sheet.v[0] ** 2),
+        Effect("push", "applied", list, power=push * sheet.v[0]),
     )
     equations = sheet.equations(
         "oscillator", coordinates, 0.5 * sheet.v[0] ** 2, 0.5 * stiffness * sheet.q[0] ** 2, effects=effects,
@@ -111,7 +112,7 @@ def ball(restitution: float = 0.8, bounces: int = 4, dt: float = 0.01, slope: fl
     sheet.outputs |= {"floor.gap": y, "floor.force": -sheet.tape.input("lam", 0)}
     anchor = [sheet.tape.input("anchor", k) for k in range(2)]
     rows = (Row("floor", "normal", y, sheet.v[1], 0), Row("floor", "tangent", x - anchor[0], sheet.v[0], 0))
-    contact = Contact("floor", "unilateral", y, sheet.v[1], (0, 1), (x, y, sheet.tape.zero), (0, 1, 2))
+    contact = Contact("floor", "unilateral", y, sheet.v[1], (0, 1), (x, y), (0, 1))
     equations = sheet.equations(
         "ball", coordinates, 0.5 * mass * (sheet.v[0] ** 2 + sheet.v[1] ** 2), -mass * (gx * x + gy * y),
         rows=rows, contacts=(contact,), figure=[("ball", ["origin"])],
@@ -122,7 +123,9 @@ def ball(restitution: float = 0.8, bounces: int = 4, dt: float = 0.01, slope: fl
     for k in range(bounces + 1):
         flight = (speed + np.sqrt(speed**2 - 2.0 * gy * height)) / -gy
         s = np.linspace(0.0, flight, max(3, round(flight / dt)))
-        pieces.append((start + s, x0 + vx * s + gx * s**2 / 2, height + speed * s + gy * s**2 / 2, vx + gx * s, speed + gy * s))
+        pieces.append(
+            (start + s, x0 + vx * s + gx * s**2 / 2, height + speed * s + gy * s**2 / 2, vx + gx * s, speed + gy * s)
+        )
         start, x0, vx = start + flight, x0 + vx * flight + gx * flight**2 / 2, vx + gx * flight
         down = -(speed + gy * flight)
         after = restitution * down if k < bounces else 0.0
@@ -144,8 +147,10 @@ def ball(restitution: float = 0.8, bounces: int = 4, dt: float = 0.01, slope: fl
     return Trajectory(record(equations, t, q, v, a, lam=lam, closed=closed, events=events))
 
 
-def walker(steps: int = 5, period: float = 0.5, swing: float = 0.25, dt: float = 0.01, slope: float = 0.05) -> Trajectory:
-    """Two straight legs of 1 m that pivot in turn about their feet with the angles ±swing·cos: a motion, not a dynamics."""
+def walker(
+    steps: int = 5, period: float = 0.5, swing: float = 0.25, dt: float = 0.01, slope: float = 0.05
+) -> Trajectory:
+    """Two straight legs of 1 m that pivot in turn about their feet, angles ±swing·cos: a motion, not a dynamics."""
     sheet = Sheet(4)
     tape = sheet.tape
     coordinates = sheet.coordinates("trunk.x", "trunk.y", "left hip.angle", "right hip.angle")
@@ -155,13 +160,13 @@ def walker(steps: int = 5, period: float = 0.5, swing: float = 0.25, dt: float =
         angle = sheet.q[2 + number]
         sheet.point(f"{side} leg.start", *hip)
         x, y = sheet.point(f"{side} leg.end", hip[0] + sin(angle), hip[1] - cos(angle))
-        places = tuple(range(3 * number, 3 * number + 3))
+        places = (2 * number, 2 * number + 1)
         name = f"{side} foot"
         rows += [
             Row(name, "normal", y, sheet.rate(y), number),
             Row(name, "tangent", x - tape.input("anchor", places[0]), sheet.rate(x), number),
         ]
-        contacts.append(Contact(name, "unilateral", y, sheet.rate(y), (2 * number, 2 * number + 1), (x, y, tape.zero), places))
+        contacts.append(Contact(name, "unilateral", y, sheet.rate(y), (2 * number, 2 * number + 1), (x, y), places))
         sheet.outputs |= {f"{name}.gap": y, f"{name}.force": -tape.input("lam", 2 * number)}
         figure.append((f"{side} leg", ["start", "end"]))
     gx, gy = 9.81 * float(np.sin(slope)), -9.81 * float(np.cos(slope))
@@ -192,6 +197,13 @@ def walker(steps: int = 5, period: float = 0.5, swing: float = 0.25, dt: float =
     lam = np.repeat(held, 2, axis=1) * -98.1 * np.array([1.0, 0.0, 1.0, 0.0])
     q_all = np.concatenate(q)
     run = record(
-        equations, np.concatenate(times), q_all, np.concatenate(v), np.zeros_like(q_all), lam=lam, closed=held, events=events
+        equations,
+        np.concatenate(times),
+        q_all,
+        np.concatenate(v),
+        np.zeros_like(q_all),
+        lam=lam,
+        closed=held,
+        events=events,
     )
     return Trajectory(run)

@@ -21,6 +21,8 @@ for (const event of run.events) {
   if (group && event.time - group.time < 1e-9 * span) group.events.push(event); else instants.push({ time: event.time, events: [event] });
 }
 
+for (const group of instants) group.events.sort((a, b) => (a.kind > b.kind) - (a.kind < b.kind)); // closed, event, opened
+
 const state = { t: first, playing: false, speed: 1, chart: 0, traced: new Set(), hover: -1, stamp: 0, dirty: true };
 const camera = { yaw: -0.6, pitch: 0.42, zoom: 1, dx: 0, dy: 0 };
 

@@ -1,0 +1,83 @@
+"""What the equations cost in scalar operations, in all and for each effect."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from mbd.equations.equations import Equations
+from mbd.equations.programs import accelerations, guards, newton, residual
+from mbd.tape.derivatives import live
+from mbd.tape.node import Node
+
+__all__ = ["Cost", "cost", "operations"]
+
+
+def operations(nodes: Sequence[Node]) -> int:
+    """Scalar operations that some outputs take, each counted once."""
+    return sum(1 for node in live(nodes) if node.args)
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Scalar operations of the programs that a run calls.
+
+    Parameters
+    ----------
+    newton : tangent and residual of one Newton iteration, index 3, with no contact closed
+    residual : of the residual alone
+    accelerations : mass matrix, forces and all rows, for starts, impacts and restarts
+    guards : what is watched after every step
+    effects : how much `newton` shrinks without an effect
+    contacts : how much `newton` grows while a contact is closed
+    """
+
+    name: str
+    newton: int
+    residual: int
+    accelerations: int
+    guards: int
+    effects: Mapping[str, int]
+    contacts: Mapping[str, int]
+
+    def __repr__(self) -> str:
+        width = max([30, *(len(name) + 4 for name in (*self.effects, *self.contacts))])
+        programs = ("newton", "residual", "accelerations", "guards")
+        lines = [f"{self.name + ', operations':<{width}}"]
+        lines += [f"{program:<{width}}{getattr(self, program):>8}" for program in programs]
+        for title, counts in ("of newton, by effect", self.effects), ("added while closed", self.contacts):
+            if counts:
+                lines += [title, *(f"  {name:<{width - 2}}{count:>8}" for name, count in counts.items())]
+        return "\n".join(lines)
+
+
+def cost(model: Any) -> Cost:
+    """Operations of a model, and of each of its effects: with it, minus without it.
+
+    Parameters
+    ----------
+    model : a `Model` or `Lagrangian`, anything with ``without(name)`` that `derive` takes
+    """
+    from mbd.equations.derivation import derive
+
+    equations = derive(model)
+    base = _newton(equations)
+    mode = equations.bilateral
+    effects = [effect.name for effect in equations.effects if effect.contact < 0]
+    return Cost(
+        equations.name,
+        newton=base,
+        residual=operations(residual(equations, mode, (), stabilized=False)),
+        accelerations=operations(accelerations(equations)),
+        guards=operations(guards(equations)),
+        effects={name: base - _newton(derive(model.without(name))) for name in effects},
+        contacts={c.name: _newton(equations, k) - base for k, c in enumerate(equations.contacts)},
+    )
+
+
+def _newton(equations: Equations, closed: int | None = None) -> int:
+    """Operations of one Newton iteration, with one contact closed or none."""
+    contact = () if closed is None else equations.contacts[closed].rows
+    penalties = () if closed is None or contact else (closed,)
+    return operations(newton(equations, [*equations.bilateral, *contact], penalties, stabilized=False))

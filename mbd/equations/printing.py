@@ -1,0 +1,175 @@
+"""The equations of motion in print: text that can be read line by line, or LaTeX."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Any
+
+from mbd.equations.cost import operations
+from mbd.equations.equations import Equations
+from mbd.equations.inputs import Inputs
+from mbd.equations.programs import constraint_jacobian, mass_matrix
+from mbd.tape.derivatives import live, substitute
+from mbd.tape.node import Node
+from mbd.tape.printing import listing
+from mbd.tape.sympy import raise_to_sympy
+
+__all__ = ["report"]
+
+WHOLE = 120
+"""Operations up to which LaTeX writes whole formulas; beyond, what is used twice gets a name of its own."""
+
+
+def report(equations: Equations, latex: bool = False) -> str:
+    """M, f, B and h of ``M(q) a + f(t, q, v) + B(q, t)ᵀ λ = 0``, ``h(q, t) = 0``, with operation counts.
+
+    Parameters
+    ----------
+    equations : what to print; contacts are printed as rows of B and h, penalty stops by their forces
+    latex : LaTeX instead of text
+    """
+    parts = _parts(equations)
+    return _latex(equations, parts) if latex else _text(equations, parts)
+
+
+Parts = dict[str, dict[tuple[str, ...], Node]]
+"""Letter → entries by the names of coordinates and rows; zeros are left out."""
+
+
+def _parts(equations: Equations) -> Parts:
+    """The entries at x = 0; M above its diagonal only, since it is symmetric."""
+    inputs = Inputs.of(equations)
+    here: dict[Node, float] = {x: 0.0 for x in inputs.x}
+    rest: dict[Node, float] = {node: 0.0 for node in (*inputs.a, *inputs.s, *inputs.lam)}
+    rates = [_plain(name) for name in (*equations.velocity_names, *(state.name for state in equations.states))]
+    names = [name.removesuffix(".rate") for name in rates]
+    rows = [_plain(f"{row.owner}.{row.part}" if row.part else row.owner) for row in equations.rows]
+    M = mass_matrix(equations)
+    B = constraint_jacobian(equations, range(len(rows)))
+    parts: Parts = {
+        "M": {(names[i], names[j]): M[j][i] for i in range(len(M)) for j in range(i, len(M))},
+        "f": {(name,): node for name, node in zip(names, substitute(list(equations.balance), rest), strict=True)},
+        "B": {(rows[k], names[j]): node for k, line in enumerate(B) for j, node in enumerate(line)},
+        "h": {(name,): row.value for name, row in zip(rows, equations.rows, strict=True)},
+        "p": {(_plain(c.name),): c.force for c in equations.contacts if c.force is not None},
+    }
+    for letter, entries in parts.items():
+        values = substitute(list(entries.values()), here)
+        parts[letter] = {key: node for key, node in zip(entries, values, strict=True) if not node.is_zero}
+    return parts
+
+
+def _plain(name: str) -> str:
+    """A name without spaces: 'left hip.angle' → 'left_hip.angle'."""
+    return re.sub(r"\s+", "_", name)
+
+
+def _input_names(equations: Equations) -> dict[Node, str]:
+    """Inputs by the names that users know."""
+    inputs = Inputs.of(equations)
+    names = {inputs.t: "t"}
+    names |= dict(zip(inputs.q, (_plain(c.name) for c in equations.coordinates), strict=True))
+    names |= dict(zip(inputs.v, (_plain(name) for name in equations.velocity_names), strict=True))
+    names |= dict(zip(inputs.z, (_plain(c.name) for c in equations.states), strict=True))
+    names |= {equations.tape.input("p", k): _plain(p.name) for k, p in enumerate(equations.parameters)}
+    for contact in equations.contacts:
+        names |= {equations.tape.input("anchor", k): f"{_plain(contact.name)}.anchor{k}" for k in contact.anchors}
+    return names
+
+
+def _counts(parts: Parts) -> str:
+    each = ", ".join(f"{letter} {operations(list(entries.values()))}" for letter, entries in parts.items() if entries)
+    together = operations([node for entries in parts.values() for node in entries.values()])
+    return f"operations: {each}; together {together} after sharing"
+
+
+def _text(equations: Equations, parts: Parts) -> str:
+    """Assignments, one a line."""
+    entries = {
+        f"{letter}[{', '.join(key)}]": node for letter, found in parts.items() for key, node in found.items()
+    }
+    lines = [
+        f"{equations.name}: M(q) a + f(t, q, v) + Bᵀ λ = 0, h(q, t) = 0"
+        f"  ({equations.n_v} coordinates, {equations.n_z} states, {len(equations.rows)} rows)",
+        "M is symmetric, entries above its diagonal are shown; what is not shown is zero",
+    ]
+    if parts["p"]:
+        lines.append("p are forces of penalty contacts while they act")
+    lines.append(_counts(parts))
+    return "\n".join([*lines, "", listing(entries, _input_names(equations))])
+
+
+# LaTeX --------------------------------------------------------------------------------------------------------------
+def _latex(equations: Equations, parts: Parts) -> str:
+    """An ``align*`` environment; symbols are listed under it."""
+    import sympy
+
+    symbols, legend = _symbols(equations)
+    places = {name: str(k + 1) for k, name in enumerate(_numbered(equations))}
+    named = [(letter, key, node) for letter, found in parts.items() for key, node in found.items()]
+    outputs = [node for _, _, node in named]
+    shared = [] if operations(outputs) <= WHOLE else _shared(outputs)
+    lines, known = [], dict(symbols)
+    for k, node in enumerate(shared):
+        (formula,) = raise_to_sympy([node], known)
+        known[node] = sympy.Symbol(f"w_{{{k + 1}}}", real=True)
+        lines.append(f"w_{{{k + 1}}} &= {sympy.latex(formula)}")
+    for letter, key, node in named:
+        (formula,) = raise_to_sympy([node], known)
+        index = " ".join(places[part] for part in key)
+        lines.append(f"{letter}_{{{index}}} &= {sympy.latex(formula)}")
+    body = " \\\\\n".join(lines)
+    comments = "\n".join(f"% {line}" for line in [equations.name, _counts(parts), *legend])
+    return f"{comments}\n\\begin{{align*}}\n{body}\n\\end{{align*}}"
+
+
+def _numbered(equations: Equations) -> list[str]:
+    """Names of coordinates and rows; both are numbered from 1."""
+    names = [_plain(name).removesuffix(".rate") for name in equations.velocity_names]
+    names += [_plain(state.name) for state in equations.states]
+    return names
+
+
+def _symbols(equations: Equations) -> tuple[dict[Node, Any], list[str]]:
+    """q_1, \\dot q_1, … and a symbol for every parameter, with the list of what they mean."""
+    import sympy
+
+    inputs, legend = Inputs.of(equations), []
+    found: dict[Node, Any] = {inputs.t: sympy.Symbol("t", real=True)}
+    for k, (q, coordinate) in enumerate(zip(inputs.q, equations.coordinates, strict=True), start=1):
+        found[q] = sympy.Symbol(f"q_{{{k}}}", real=True)
+        legend.append(f"q_{k} = {coordinate.name} [{coordinate.unit}]")
+    for k, v in enumerate(inputs.v, start=1):
+        found[v] = sympy.Symbol(f"\\dot{{q}}_{{{k}}}", real=True)
+    for k, (z, state) in enumerate(zip(inputs.z, equations.states, strict=True), start=1):
+        found[z] = sympy.Symbol(f"z_{{{k}}}", real=True)
+        legend.append(f"z_{k} = {state.name}")
+    for k, parameter in enumerate(equations.parameters):
+        found[equations.tape.input("p", k)] = sympy.Symbol(_parameter_symbol(parameter.name), real=True)
+    return found, legend
+
+
+LETTERS = {
+    "mass": "m", "length": "l", "center": "c", "inertia": "J", "stiffness": "k", "coefficient": "d", "damping": "d",
+}  # fmt: skip
+"""Letters of common fields; other fields are written out."""
+
+
+def _parameter_symbol(name: str) -> str:
+    """'left thigh.mass' → m with 'left thigh' below it."""
+    owner, _, field = name.partition(".")
+    letter = LETTERS.get(field, f"\\mathrm{{{field.replace('_', ' ')}}}") if field else owner
+    return f"{letter}_{{\\mathrm{{{owner.replace(' ', '~')}}}}}" if field else letter
+
+
+def _shared(outputs: Sequence[Node]) -> list[Node]:
+    """Operations that are used more than once, in order."""
+    uses: dict[int, int] = {}
+    order = live(outputs)
+    for node in order:
+        for arg in node.args:
+            uses[arg.index] = uses.get(arg.index, 0) + 1
+    for node in outputs:
+        uses[node.index] = uses.get(node.index, 0) + 1
+    return [node for node in order if node.args and uses[node.index] > 1]

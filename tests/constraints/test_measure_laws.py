@@ -1,0 +1,69 @@
+"""Laws of every measure."""
+
+import numpy as np
+import pytest
+from hypothesis import given, strategies as st
+
+import mbd
+from mbd.constraints.base import Measure
+from mbd.constraints.touchdown import Touchdown
+from mbd.tape.derivatives import gradient
+from tests.helpers import FreeScope
+from tests.instances import MEASURES
+
+every_measure = pytest.mark.parametrize("factory", [make for _, make in MEASURES], ids=[name for name, _ in MEASURES])
+POSE = st.lists(st.floats(-1.0, 1.0), min_size=6, max_size=6)
+
+
+def scene(factory, pose=(0.1, 0.2, 0.3, 0.4, 0.5, 0.6)) -> tuple[Measure, FreeScope]:
+    """A measure of two bodies that float."""
+    thigh, shank = mbd.Link("thigh", 1.0, 0.5, 0.2), mbd.RigidBody("shank", 2.0, (1.0, 1.0, 1.0))
+    joint = mbd.Revolute("hinge", thigh.end, shank.origin)
+    scope = FreeScope([joint])
+    scope.move("thigh", pose)
+    scope.move("shank", (3.0, 0.2, 0.1, 0.3, -0.2, 0.1))
+    return factory(thigh.point(0.0, 0.0, name="a"), shank.point(0.1, -0.2, 0.1, name="b"), joint), scope
+
+
+@every_measure
+@given(pose=POSE)
+def test_tangent_rows_vanish_at_the_place_of_closing(factory, pose):
+    measure, scope = scene(factory, pose)
+    captured = measure.captured(scope)
+    anchors = [scope.tape.input("anchor", k) for k in range(len(captured))]
+    scope.numbers |= dict(zip(anchors, scope.value(*captured), strict=True))
+    rows = measure.tangents(scope, anchors)
+    assert scope.value(*(value for _, value in rows)) == pytest.approx([0.0] * len(rows), abs=1e-15)
+    assert len({part for part, _ in rows}) == len(rows)
+    assert bool(rows) == measure.has_tangents
+
+
+@every_measure
+@given(pose=POSE)
+def test_a_touchdown_has_a_unit_normal_and_tangents_across_it(factory, pose):
+    """At contact ∇g and the tangents are an orthonormal frame; the normal is what makes λ the contact force."""
+    measure, scope = scene(factory, pose)
+    if not isinstance(measure, Touchdown):
+        return
+    place = scope.coordinates("thigh")[:3]
+    scope.numbers[place[1]] -= scope.value(measure.gap(scope))[0]  # near the ground; exact on level ground
+    for _ in range(30):
+        slope = scope.value(gradient(scope.tape.lift(measure.gap(scope)), place)[1])[0]
+        scope.numbers[place[1]] -= scope.value(measure.gap(scope))[0] / slope
+    captured = measure.captured(scope)
+    anchors = [scope.tape.input("anchor", k) for k in range(len(captured))]
+    scope.numbers |= dict(zip(anchors, scope.value(*captured), strict=True))
+    rows = [measure.gap(scope), *(value for _, value in measure.tangents(scope, anchors))]
+    frame = scope.matrix([gradient(scope.tape.lift(row), place) for row in rows])
+    np.testing.assert_allclose(frame @ frame.T, np.eye(3), atol=1e-9)
+    assert np.linalg.det(frame) == pytest.approx(np.linalg.det([[0, 1, 0], [1, 0, 0], [0, 0, 1]]))
+
+
+@every_measure
+def test_unit_and_title_are_known(factory):
+    measure, _ = scene(factory)
+    assert measure.unit in ("m", "rad")
+    assert measure.reaction in ("force", "tension")
+    assert measure.title
+    assert measure.mentions()
+    assert measure.faults("foot") == []
