@@ -31,7 +31,7 @@ class ModeCode:
 
 @dataclass(frozen=True)
 class AccelerationTerms:
-    """The parts of ``M a + f + R λ = 0``, ``h``, ``ḣ``, ``ḧ = B a + bias`` over all rows, and what closing contacts hold.
+    """The parts of ``M a + f + R λ = 0``, ``h``, ``ḣ``, ``ḧ = B a + bias`` of all rows, and what closing contacts hold.
 
     M (n, n), f (n,), R (n, n_rows), B (n_rows, n), h, rate, bias (n_rows,), captured (n_anchors,), kinetic [J].
     """

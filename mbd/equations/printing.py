@@ -117,7 +117,7 @@ def _latex(equations: Equations, parts: Parts) -> str:
         lines.append(f"w_{{{k + 1}}} &= {sympy.latex(formula)}")
     for letter, key, node in named:
         (formula,) = raise_to_sympy([node], known)
-        index = " ".join(places[part] for part in key)
+        index = "\\,".join(places.get(part, f"\\mathrm{{{part.replace('_', '~')}}}") for part in key)
         lines.append(f"{letter}_{{{index}}} &= {sympy.latex(formula)}")
     body = " \\\\\n".join(lines)
     comments = "\n".join(f"% {line}" for line in [equations.name, _counts(parts), *legend])
@@ -125,7 +125,7 @@ def _latex(equations: Equations, parts: Parts) -> str:
 
 
 def _numbered(equations: Equations) -> list[str]:
-    """Names of coordinates and rows; both are numbered from 1."""
+    """Names of coordinates and states, which are numbered from 1."""
     names = [_plain(name).removesuffix(".rate") for name in equations.velocity_names]
     names += [_plain(state.name) for state in equations.states]
     return names

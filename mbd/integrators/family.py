@@ -243,7 +243,7 @@ class _Step:
     def _correct(self, terms: Terms, iteration: int) -> None:
         n, m, n_v = len(terms.r), len(terms.h), self.n_v
         assert terms.S is not None
-        if not m:
+        if not m or terms.H is None:
             change = np.linalg.solve(terms.S, -terms.r)
         else:
             matrix = np.block([[terms.S, terms.R], [terms.H, np.zeros((m, m))]])

@@ -50,21 +50,20 @@ def entry(table):
 
 def _numba_types() -> dict[str, Any]:
     """The `Kernel` as numba sees it: a pointer to the table, whose fields are invariant loads."""
-    from llvmlite import ir
-    from numba.core import types as nb
-    from numba.core.datamodel import models, register_default
-    from numba.core.typing.templates import AttributeTemplate
-    from numba.core.typing.typeof import typeof_impl  # noqa: F401  (numba fills its registries on import)
-    from numba.extending import infer_getattr, intrinsic, lower_getattr_generic
+    ir: Any = import_module("llvmlite.ir")
+    nb: Any = import_module("numba.core.types")
+    models: Any = import_module("numba.core.datamodel.models")
+    templates: Any = import_module("numba.core.typing.templates")
+    extending: Any = import_module("numba.extending")
 
     reals, integers = nb.CPointer(nb.float64), nb.CPointer(nb.int64)
 
-    class KernelType(nb.Type):
+    class KernelType(nb.Type):  # type: ignore[misc]
         def __init__(self) -> None:
             super().__init__(name="Kernel")
 
-    @register_default(KernelType)
-    class KernelModel(models.PrimitiveModel):
+    @extending.register_model(KernelType)
+    class KernelModel(models.PrimitiveModel):  # type: ignore[misc]
         def __init__(self, manager: Any, kind: Any) -> None:
             super().__init__(manager, kind, ir.IntType(64).as_pointer())
 
@@ -75,14 +74,14 @@ def _numba_types() -> dict[str, Any]:
             return nb.float64
         return nb.int64 if name in INTEGERS else integers
 
-    @infer_getattr
-    class KernelFields(AttributeTemplate):
+    @extending.infer_getattr
+    class KernelFields(templates.AttributeTemplate):  # type: ignore[misc]
         key = KernelType
 
         def generic_resolve(self, kind: Any, name: str) -> Any:
             return kind_of(name)
 
-    @lower_getattr_generic(KernelType)
+    @extending.lower_getattr_generic(KernelType)  # type: ignore[untyped-decorator]
     def field(context: Any, builder: Any, kind: Any, value: Any, name: str) -> Any:
         place = builder.gep(value, [ir.Constant(ir.IntType(64), Kernel._fields.index(name))])
         if name in REALS:
@@ -93,14 +92,14 @@ def _numba_types() -> dict[str, Any]:
             return loaded
         return builder.inttoptr(loaded, context.get_value_type(kind_of(name)))
 
-    @intrinsic
+    @extending.intrinsic  # type: ignore[untyped-decorator]
     def as_kernel(context: Any, table: Any) -> Any:
         def lower(ctx: Any, builder: Any, signature: Any, args: Any) -> Any:
             return args[0]
 
         return KernelType()(table), lower
 
-    @intrinsic
+    @extending.intrinsic  # type: ignore[untyped-decorator]
     def call_address(context: Any, address: Any, block: Any, params: Any, out: Any) -> Any:
         def lower(ctx: Any, builder: Any, signature: Any, args: Any) -> Any:
             kind = ir.FunctionType(ir.VoidType(), [value.type for value in args[1:]])
@@ -114,8 +113,7 @@ def _numba_types() -> dict[str, Any]:
 
 def ir_of_kernel() -> tuple[str, str]:
     """LLVM IR of the whole kernel and the name of its entry function (imports numba; takes a while)."""
-    import numba
-
+    numba: Any = import_module("numba")
     namespace: dict[str, Any] = {"__builtins__": __builtins__, **_numba_types()}
     exec(compile(SHIMS, "<kernel>", "exec"), namespace)
     functions: dict[str, Any] = {"call": namespace["call"], "entry": namespace["entry"]}

@@ -38,7 +38,8 @@ REAL_ARRAYS = (
     "store", "log", "detail",
 )  # fmt: skip
 INTEGER_ARRAYS = (
-    "row_contact", "row_normal", "unit",  # contact of each row; 1 for its normal row; unit block of each balance component
+    "row_contact", "row_normal",  # contact of each row; 1 for its normal row
+    "unit",  # unit block of each balance component
     "kind", "opens", "normal",  # contact: 0 unilateral, 1 penalty; 0 on pull, 1 on gap, 2 by When; its normal row
     "when_start", "when_target", "when_after",  # who opens it
     "while_kind", "while_target",  # 0 always, 1 while a contact is closed, 2 while a measure is positive

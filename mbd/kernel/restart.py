@@ -160,7 +160,7 @@ def violation(K: Any, c: int, largest: float) -> float:
     n = K.n
     row = K.normal[c]
     if K.active[c] == 1:
-        return K.impulse[row] - 1e-11 * largest  # λ > 0 would pull
+        return float(K.impulse[row] - 1e-11 * largest)  # λ > 0 would pull
     o_B = n * n + n + n * K.n_rows
     value = K.bias[row]
     size = abs(K.bias[row])
@@ -168,7 +168,7 @@ def violation(K: Any, c: int, largest: float) -> float:
         term = K.acc[o_B + row * n + j] * K.jump[j]
         value += term
         size = max(size, abs(term))
-    return -value - 1e-11 * size
+    return float(-value - 1e-11 * size)
 
 
 def complementarity(K: Any) -> int:

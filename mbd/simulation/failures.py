@@ -38,11 +38,11 @@ def explanation(stepper: Stepper, status: int) -> str:
             f"{floor:.3g}{with_closed}; use a larger tolerance= of the integrator or a larger dt"
         )
     if status == F.SINGULAR:
-        return f"{where}: the Newton matrix is singular at {_unknown(stepper)}{with_closed}; rows depend on each other there"
+        return f"{where}: the Newton matrix is singular at {_unknown(stepper)}{with_closed}; rows depend on each other"
     if status == F.CHATTER:
         return (
-            f"{where}: more than {values['max_switches']} switches at one instant: {_last_events(stepper)}; contacts release "
-            "and close again without motion; give one of them a release rule, friction or a penalty law"
+            f"{where}: more than {values['max_switches']} switches at one instant: {_last_events(stepper)}; contacts "
+            "release and close again without motion; give one of them a release rule, friction or a penalty law"
         )
     if status == F.NO_IMPACT:
         return (

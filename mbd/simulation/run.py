@@ -232,8 +232,8 @@ class Run:
         time, q, velocity, z, a, s, lam, closed = np.split(table, cuts, axis=1)
         record = Record(
             equations=equations, parameters=self.first_parameters,
-            parameter_names=[parameter.name for parameter in equations.parameters], time=time[:, 0], q=q, v=velocity, z=z,
-            a=a, s=s, lam=lam, closed=closed.astype(np.uint8), events=self.events, stats=self._statistics(),
+            parameter_names=[parameter.name for parameter in equations.parameters], time=time[:, 0], q=q, v=velocity,
+            z=z, a=a, s=s, lam=lam, closed=closed.astype(np.uint8), events=self.events, stats=self._statistics(),
             success=not problem, message=problem or message, failure=self._capsule(problem), final=self.state(),
             settings=self.settings, parameter_changes=self.parameter_changes,
         )  # fmt: skip
@@ -242,8 +242,8 @@ class Run:
     def _statistics(self) -> dict[str, Any]:
         counts = self.values["counts"]
         names = (
-            "steps", "iterations", "tangents", "residuals", "factorizations", "events", "restarts", "impacts", "locations",
-            "stagnations",
+            "steps", "iterations", "tangents", "residuals", "factorizations", "events", "restarts", "impacts",
+            "locations", "stagnations",
         )  # fmt: skip
         numbers: dict[str, Any] = {name: int(counts[place]) for place, name in enumerate(names)}
         numbers["modes"] = len(self.stepper.modes)

@@ -77,7 +77,8 @@ class Stepper:
             o_lam=layout.lam, o_anchor=layout.anchor, o_switch=layout.switch, vector=int(self.mechanism.vector),
             stabilized=int(self.stabilized), max_iterations=MAX_ITERATIONS,
             max_switches=int(options.get("max_switches", 20 + 4 * n_contacts)),
-            linear=int(options.get("locate") == "linear"), width=1 + layout.n_q + 2 * layout.n + layout.n_rows + n_contacts,
+            linear=int(options.get("locate") == "linear"),
+            width=1 + layout.n_q + 2 * layout.n + layout.n_rows + n_contacts,
             capacity=int(options["capacity"]), stride=int(options.get("store", 1)), event_width=5 + layout.n_rows,
             event_capacity=max(EVENT_CAPACITY, 8 * n_contacts + 16), chunk=int(options.get("chunk", 1)), hooks=0,
             rest_speed=float(options.get("rest_speed", 1e-6)), dt=dt, until=0.0,
@@ -95,17 +96,18 @@ class Stepper:
         n, n_q, rows, contacts, guards = v["n"], v["n_q"], v["n_rows"], v["n_contacts"], v["n_guards"]
         size = n + rows
         reals = {
-            "block": self.mechanism.layout.size, "out": size * size + n + 2 * rows, "acc": self.mechanism.sizes["accelerations"],
-            "clock": 4, "q": n_q, "y": n, "rate": n, "aux": n, "slope": n, "lam": rows, "lam_slope": rows, "shift": n, "shift_change": n,
+            "block": self.mechanism.layout.size, "out": size * size + n + 2 * rows, "clock": 4,
+            "acc": self.mechanism.sizes["accelerations"], "q": n_q, "y": n, "rate": n, "aux": n, "slope": n, "lam": rows, "lam_slope": rows, "shift": n,
+            "shift_change": n,
             "anchors": v["n_anchors"], "q1": n_q, "y1": n, "rate1": n, "aux1": n, "lam1": rows, "shift1": n,
             "kkt": size * size, "rhs": size, "work": 3 * size, "force": n, "bias": rows, "jump": n, "impulse": rows,
             "guards0": 4 * contacts + 2 * guards, "guards1": 4 * contacts + 2 * guards, "scale": n + 2 * rows,
-            "side": guards, "pick": 8, "store": v["capacity"] * v["width"], "log": v["event_capacity"] * v["event_width"],
-            "detail": 8,
+            "side": guards, "pick": 8, "detail": 8, "store": v["capacity"] * v["width"],
+            "log": v["event_capacity"] * v["event_width"],
         }  # fmt: skip
         integers = {
-            "unit": n, "notify": contacts + guards, "terminal": contacts + guards, "closed": contacts, "armed": contacts,
-            "touched": contacts, "active": contacts + guards, "free": contacts, "closing": contacts,
+            "unit": n, "notify": contacts + guards, "terminal": contacts + guards, "closed": contacts,
+            "armed": contacts, "touched": contacts, "active": contacts + guards, "free": contacts, "closing": contacts,
             "mode_closed": MODE_CAPACITY * contacts, "mode_code": 2 * MODE_CAPACITY, "mode_count": 1, "rows": rows,
             "pivots": size, "columns": size, "fired": 2, "state": 16, "counts": 16,
         }  # fmt: skip
