@@ -250,7 +250,8 @@ def _conflicts(work: _Assembly, rows: Sequence[int], misfit: Vector, speed_misfi
         if abs(position) > TOLERANCE or abs(velocity) > TOLERANCE * speed or not np.isfinite(position + velocity):
             found.append(
                 f"the start contradicts {row.owner!r} ({row.part}): position residual {position:.6g} {row.unit}, "
-                f"velocity residual {velocity:.6g} {row.unit}/s; name fewer values, or use assemble(..., project=True) to move all"
+                f"velocity residual {velocity:.6g} {row.unit}/s; name fewer values, or "
+                f"use assemble(..., project=True) to move all"
             )
     return found
 
@@ -300,8 +301,8 @@ def _below(work: _Assembly, opened: set[str]) -> list[str]:
         off = named_off or (contact.only_while is not None and values[3 * count + c] <= 0.0)
         if values[c] < -BELOW and not work.flags[c] and contact.name not in opened and not off:
             faults.append(
-                f"{contact.name!r} starts {-values[c]:.6g} {contact.unit} inside its surface; raise the mechanism, name "
-                f"it in closed=[…] to set it on the surface, or in open=[…] to ignore it until it has risen"
+                f"{contact.name!r} starts {-values[c]:.6g} {contact.unit} inside its surface; raise the mechanism, "
+                f"name it in closed=[…] to set it on the surface, or in open=[…] to ignore it until it has risen"
             )
     return faults
 

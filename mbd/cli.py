@@ -133,15 +133,19 @@ def progress_bar() -> Iterator[Progress | None]:
         return
     from tqdm import tqdm
 
+    bars: list[tqdm[Any]] = []
     shape = "{percentage:3.0f}% |{bar:30}| {n:.2f} of {total:.2f} s  [{elapsed} < {remaining}]"
-    with tqdm(bar_format=shape, mininterval=0.2, leave=False, file=sys.stderr) as bar:
 
-        def show(t: float, until: float) -> None:
-            if bar.total is None and until < float("inf"):
-                bar.reset(total=until)
-            bar.update(t - bar.n)
+    def show(t: float, until: float) -> None:
+        if not bars:
+            bars.append(tqdm(total=until, bar_format=shape, mininterval=0.2, leave=False, file=sys.stderr))
+        bars[0].update(t - bars[0].n)
 
+    try:
         yield show
+    finally:
+        for bar in bars:
+            bar.close()
 
 
 def run_command(arguments: argparse.Namespace) -> int:

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 from mbd.bodies.base import Body, Frame
 from mbd.bodies.ground import Ground
-from mbd.bodies.values import Vector3, name_of, number, triple
+from mbd.bodies.values import Vector3, number, triple
 from mbd.constraints.base import Constraint
 from mbd.constraints.bilateral import Bilateral
 from mbd.constraints.controller import Controller
@@ -52,6 +52,8 @@ class Model:
         every joint (absolute coordinates), a list of names cuts those
     tunable : names of parameters that stay run-time inputs although they are 0 or ±1
 
+    A model pickles as its description; functions in it must then be those of a module, not lambdas.
+
     Examples
     --------
     >>> from mbd.bodies import Link
@@ -70,7 +72,7 @@ class Model:
         cut: str | Iterable[str] = "auto",
         tunable: Iterable[str] = (),
     ) -> None:
-        self.name = name_of(name, "Model")
+        self.name = _title(name)
         self.gravity = triple(gravity, f"gravity of '{name}'")
         self.cut: str | tuple[str, ...] = cut if isinstance(cut, str) else tuple(cut)
         self.tunable = (tunable,) if isinstance(tunable, str) else tuple(tunable)
@@ -149,6 +151,12 @@ class Model:
         frames = [frame for joint in self.joints for frame in (joint.parent, joint.child)]
         return frames + [mention for mention in self.mentions() if isinstance(mention, Frame)]
 
+    @property
+    def instants(self) -> list[float]:
+        """Times at which sampled signals have a kink, in order: steps end there [s]."""
+        words: list[Force | Constraint] = [*self.forces, *self.constraints]
+        return sorted({instant for word in words for instant in word.instants()})
+
     def without(self, *names: str) -> Model:
         """A copy that lacks some joints, losses ('left knee loss'), springs, forces or constraints, or 'gravity'."""
         model = copy.copy(self)
@@ -207,6 +215,12 @@ class Model:
         counts = {"bodies": len(self.bodies) - 1, "joints": len(self.joints), "forces": len(self.forces)}
         counts["constraints"] = len(self.constraints)
         return f"Model({self.name!r}: " + ", ".join(f"{count} {kind}" for kind, count in counts.items()) + ")"
+
+
+def _title(name: Any) -> str:
+    if not isinstance(name, str) or not name.strip():
+        raise ModelError(f"Model needs a name as its first argument, such as Model('kneed walker'); got {name!r}")
+    return name
 
 
 def _all_are(kind: Any, words: Iterable[Word], sentence: str) -> list[Word]:

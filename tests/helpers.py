@@ -116,7 +116,8 @@ class FreeScope:
     # numbers ------------------------------------------------------------------------------------------------------
     def value(self, *expressions: Scalar, given: Mapping[Any, float] | None = None) -> list[float]:
         """The values of scalars with the numbers known so far."""
-        return evaluate([self.tape.lift(e) for e in expressions], {**self.numbers, **(given or {})})
+        numbers: dict[Any, float] = {**self.numbers, **(given or {})}
+        return evaluate([self.tape.lift(e) for e in expressions], numbers)
 
     def matrix(self, rows: Sequence[Sequence[Scalar]]) -> np.ndarray[Any, np.dtype[np.float64]]:
         """The values of rows of scalars."""

@@ -16,6 +16,8 @@ from mbd.constraints.base import Measure
 from mbd.forces.base import Force
 from mbd.joints.base import Joint
 from mbd.joints.losses.base import Loss
+from mbd.scope import Triple
+from mbd.tape.node import Scalar
 
 TILTED = (1.0, 2.0, -2.0)
 """A direction along no axis."""
@@ -80,6 +82,11 @@ def dune(x: float, z: float) -> float:
     return height
 
 
+def first_of(p: Triple, q: Triple) -> Scalar:
+    """The x of the first point."""
+    return p[0]
+
+
 FORCES: list[tuple[str, Callable[[Frame, Frame, Joint], Force]]] = [
     ("spring", lambda a, b, joint: mbd.Spring("force", a, b, stiffness=50.0, length=0.3)),
     ("spring without length", lambda a, b, joint: mbd.Spring("force", a, b, stiffness=50.0)),
@@ -105,8 +112,5 @@ MEASURES: list[tuple[str, Callable[[Frame, Frame, Joint], Measure]]] = [
     ("distance", lambda a, b, joint: mbd.distance(a, b)),
     ("separation", lambda a, b, joint: mbd.separation(a, b, (1, 1, 0))),
     ("named measure", lambda a, b, joint: mbd.measure("hinge.angle", unit="rad")),
-    (
-        "measure of points",
-        lambda a, b, joint: mbd.measure(lambda p, q: p[1] - 2.0 * q[0], a, b, tangents=lambda p, q: p[0]),
-    ),
+    ("measure of points", lambda a, b, joint: mbd.measure(lambda p, q: p[1] - 2.0 * q[0], a, b, tangents=first_of)),
 ]

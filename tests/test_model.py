@@ -133,3 +133,11 @@ def test_describing_a_model_loads_no_heavy_library():
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_steps_end_where_sampled_signals_have_a_kink():
+    model = chain(1)
+    joint = model.joints[0]
+    model.apply(mbd.Motor("drive", joint, torque=mbd.Samples([0.0, 0.5, 2.0], [0, 1, 0], kind="linear")))
+    model.apply(mbd.Applied("push", joint.child, force=(mbd.Samples([0.1, 0.2, 0.3], [0, 1, 0]), 0.0)))
+    assert model.instants == [0.0, 0.1, 0.3, 0.5, 2.0]

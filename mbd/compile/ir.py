@@ -356,7 +356,7 @@ class _Body:
             found = self.do(f"getelementptr double, ptr %parameters, i64 {row}"), self.do(f"fsub double {x}, {left}")
             self.pieces[table.index, argument.index] = found
         row, s = found
-        value = ""
+        value = constant(0.0) if order == 3 else ""  # so that a NaN comes out again
         for power in range(3, order - 1, -1):
             c = self.do(f"load double, ptr {self.do(f'getelementptr double, ptr {row}, i64 {power}')}")
             factor = PERMUTATIONS[power][order]

@@ -169,7 +169,8 @@ ROWS = 4096
 def _lookup(breaks: Vector, coefficients: Any, order: int, x: Any) -> Any:
     """The order-th derivative of a table at every row."""
     piece = np.maximum(np.searchsorted(breaks, x, side="right") - 1, 0)
-    s, result = x - breaks[piece], None
+    s = x - breaks[piece]
+    result = 0.0 if order == 3 else None  # so that a NaN comes out again
     for power in range(3, order - 1, -1):
         c = math.perm(power, order) * coefficients[piece, power]
         result = c if result is None else result * s + c

@@ -36,7 +36,7 @@ class Dialect:
 
 def cubic(row: str, s: str, order: int) -> str:
     """The order-th derivative of ``Σ_k row_k s^k`` (Horner); `row` is a template of the power."""
-    text = ""
+    text = "0.0" if order == 3 else ""  # so that a NaN comes out again
     for power in range(3, order - 1, -1):
         factor = math.perm(power, order)
         c = row.format(power) if factor == 1 else f"{factor}.0 * {row.format(power)}"

@@ -87,6 +87,10 @@ class Constraint(ABC):
         """Run-time parameters by full name."""
         return {}
 
+    def instants(self) -> tuple[float, ...]:
+        """Times at which its sampled signals have a kink [s]."""
+        return ()
+
     def faults(self) -> list[str]:
         """What is physically impossible about it, one sentence each."""
         return []

@@ -10,7 +10,7 @@ from mbd.constraints.base import Constraint, Measure
 from mbd.constraints.measures import JointMeasure
 from mbd.errors import ModelError
 from mbd.forces.base import joint_of
-from mbd.forces.quantities import Mention, arguments_of, mentioned, quantity_of, scalar, value_parameters
+from mbd.forces.quantities import Mention, arguments_of, kinks, mentioned, quantity_of, scalar, value_parameters
 from mbd.joints.base import Joint
 from mbd.scope import Scope
 from mbd.tape.node import Scalar
@@ -67,6 +67,10 @@ class Bilateral(Constraint):
     def parameters(self) -> dict[str, float]:
         """`value` where it is a number, and arguments given as numbers."""
         return value_parameters(self.value, self.arguments, self.name, "value")
+
+    def instants(self) -> tuple[float, ...]:
+        """Kinks of its samples."""
+        return kinks(self.value)
 
     def faults(self) -> list[str]:
         """Those of its measure."""

@@ -9,7 +9,16 @@ from mbd.bodies.base import Frame
 from mbd.bodies.values import name_of
 from mbd.errors import ModelError
 from mbd.forces.base import Action, Force, frame_of
-from mbd.forces.quantities import Mention, arguments_of, is_single, mentioned, triple_at, triple_of, value_parameters
+from mbd.forces.quantities import (
+    Mention,
+    arguments_of,
+    is_single,
+    kinks,
+    mentioned,
+    triple_at,
+    triple_of,
+    value_parameters,
+)
 from mbd.scope import Scope
 from mbd.tape.node import Scalar
 
@@ -66,6 +75,10 @@ class Applied(Force):
         return value_parameters(self.force, self.arguments, self.name, "force") | value_parameters(
             self.torque, self.arguments, self.name, "torque"
         )
+
+    def instants(self) -> tuple[float, ...]:
+        """Kinks of its samples."""
+        return kinks(self.force, self.torque)
 
     def act(self, scope: Scope) -> Action:
         """Force on velocity, torque on angular velocity."""

@@ -56,6 +56,10 @@ class Force(ABC):
     def parameters(self) -> dict[str, float]:
         """Run-time parameters by full name."""
 
+    def instants(self) -> tuple[float, ...]:
+        """Times at which its sampled signals have a kink [s]."""
+        return ()
+
     def faults(self) -> list[str]:
         """What is physically impossible about it, one sentence each."""
         return []

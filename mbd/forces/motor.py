@@ -7,7 +7,7 @@ from typing import Any
 
 from mbd.bodies.values import name_of
 from mbd.forces.base import Action, Force, joint_of
-from mbd.forces.quantities import Mention, arguments_of, mentioned, quantity_of, scalar, value_parameters
+from mbd.forces.quantities import Mention, arguments_of, kinks, mentioned, quantity_of, scalar, value_parameters
 from mbd.joints.base import Joint
 from mbd.scope import Scope
 
@@ -50,6 +50,10 @@ class Motor(Force):
     def parameters(self) -> dict[str, float]:
         """`torque` where it is a number, and arguments given as numbers."""
         return value_parameters(self.torque, self.arguments, self.name, "torque")
+
+    def instants(self) -> tuple[float, ...]:
+        """Kinks of its samples."""
+        return kinks(self.torque)
 
     def act(self, scope: Scope) -> Action:
         """The torque on the rate."""

@@ -18,7 +18,7 @@ from mbd.tape.node import Scalar
 from mbd.tape.tracing import Argument, traced, traced_scalar
 
 __all__ = [
-    "ArgumentSpec", "Mention", "Samples", "arguments_of", "is_number", "is_single", "mentioned", "quantity_of",
+    "ArgumentSpec", "Mention", "Samples", "arguments_of", "is_number", "is_single", "kinks", "mentioned", "quantity_of",
     "resolved", "scalar", "triple_at", "triple_of", "value_parameters",
 ]  # fmt: skip
 
@@ -70,6 +70,11 @@ class Samples:
         """Breaks and rows of coefficients as the tape stores them."""
         through = linear if self.kind == "linear" else monotone
         return through(self.time, self.values, "constant", "Samples")
+
+    @property
+    def kinks(self) -> tuple[float, ...]:
+        """Times at which its slope jumps [s]: every sample of straight lines, the ends of a cubic."""
+        return self.time if self.kind == "linear" else (self.time[0], self.time[-1])
 
     def signal(self, scope: Scope, owner: str) -> Scalar:
         """Its value at the time t."""
@@ -186,6 +191,12 @@ def triple_at(value: Any, arguments: ArgumentSpec, scope: Scope, owner: str, fie
         came = f"{len(result)} numbers" if isinstance(result, tuple) else "one number"
         raise ModelError(f"{field} of '{owner}': three components (or two, x and y) are expected, {came} came")
     return result if len(result) == 3 else (*result, 0.0)
+
+
+def kinks(*values: Any) -> tuple[float, ...]:
+    """Times at which quantities given by samples have a kink [s]."""
+    parts = [part for value in values for part in (value if isinstance(value, tuple) else (value,))]
+    return tuple(instant for part in parts if isinstance(part, Samples) for instant in part.kinks)
 
 
 def value_parameters(value: Any, arguments: ArgumentSpec, owner: str, field: str) -> dict[str, float]:

@@ -305,6 +305,11 @@ def same_instant(K: Any) -> bool:
     return bool(K.state[SWITCHES] > K.max_switches)
 
 
+def was_closed(K: Any, c: int) -> bool:
+    """Whether a contact was closed in the row before the last."""
+    return bool(K.store[(K.state[STORED] - 2) * K.width + K.width - K.n_contacts + c] == 1.0)
+
+
 def handle_event(K: Any) -> int:
     """Take the located event: rows before and after, impact, restart. Negative: nothing for the caller to do."""
     kind = K.fired[0]
@@ -328,6 +333,9 @@ def handle_event(K: Any) -> int:
     if status != 0:
         return status
     store_row(K)
+    for c in range(K.n_contacts):
+        if was_closed(K, c) and K.closed[c] == 0 and K.armed[c] == 0 and K.guards0[K.n_contacts + c] < -1e-6:
+            K.sinking[c] = min(K.sinking[c], K.clock[NOW])
     for c in range(K.n_contacts):
         if K.notify[c] == 1 and (K.closing[c] == 1 or (kind != CLOSE and c == index)):
             return EVENT

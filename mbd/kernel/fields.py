@@ -32,6 +32,7 @@ REAL_ARRAYS = (
     "force", "bias", "jump", "impulse",  # complementarity: right-hand sides, velocity or acceleration, multipliers
     "guards0", "guards1",  # guard values at the accepted state and at the candidate
     "scale",  # magnitudes of r, h, ḣ term by term
+    "deepest", "sinking",  # lowest gap of each contact while ignored; time of its first release into its surface
     "side",  # sign of each user guard since it last crossed
     "restitution",
     "pick",  # the fired guard: estimate, bracket, sizes

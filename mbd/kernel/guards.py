@@ -16,6 +16,7 @@ from mbd.kernel.fields import (
     GUARDS,
     LOCATIONS,
     NO_LOCATION,
+    NOT_FINITE,
     NOW,
     OPEN_FORCE,
     OPEN_GAP,
@@ -63,6 +64,12 @@ def try_step(K: Any, h: float, t1: float) -> int:
             K.lam1[k] = K.impulse[k]
     if K.n_contacts + K.n_guards > 0:
         watch(K, t1, K.q1, K.y1, K.rate1, K.lam1, K.guards1)
+        finite = 0.0
+        for i in range(4 * K.n_contacts + 2 * K.n_guards):
+            finite += abs(K.guards1[i])
+        if not finite < 1e300:
+            K.detail[0] = t1
+            return NOT_FINITE
     return 0
 
 
@@ -91,6 +98,8 @@ def update_armed(K: Any) -> None:
     """A contact is armed once its gap has risen above zero while it is watched; not watched, it is not armed."""
     for c in range(K.n_contacts):
         if K.closed[c] == 0:
+            if K.armed[c] == 0:
+                K.deepest[c] = min(K.deepest[c], K.guards0[c])
             if not is_watched(K, c, K.guards0):
                 K.armed[c] = 0
             elif K.armed[c] == 0 and K.guards0[c] > 1e-8 * gap_scale(K, c):

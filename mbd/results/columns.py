@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mbd.arrays import Matrix, Vector
 from mbd.errors import UnknownNameError, nearest
 from mbd.results.interpolation import Grid, Places
-from mbd.results.names import AXES
+from mbd.results.names import AXES, rate_name
 from mbd.results.record import Record, Rows
 
 if TYPE_CHECKING:
@@ -188,8 +188,8 @@ class ModelColumns(Columns):
 class StoredColumns(Columns):
     """Quantities read from a file: each name with its values at the stored rows, or its place in the state.
 
-    Between the rows, parts of the state are interpolated like in a live run; other quantities by cubic Hermite with
-    three-point slopes.
+    Between the rows, parts of the state are interpolated like in a live run; other quantities by cubic Hermite, with
+    their rates where these are stored too ('foot.vx' for 'foot.x'), else with three-point slopes.
     """
 
     def __init__(
@@ -234,8 +234,10 @@ class StoredColumns(Columns):
             if name in self._aliases:
                 found.append(self._read(name, state))
             else:
-                column = self._read(name, self.record)
-                found.append(places.blend(column, self.grid.slopes(column)))
+                column, rate = self._read(name, self.record), rate_name(name)
+                known = rate in self._aliases or rate in self._values
+                slopes = self._read(rate, self.record) if known else self.grid.slopes(column)
+                found.append(places.blend(column, slopes))
         return found
 
 

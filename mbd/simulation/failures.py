@@ -86,6 +86,12 @@ def _not_finite(stepper: Stepper) -> str:
     for row in equations.rows:
         if not _finite([row.value, row.rate], inputs):
             return f"the constraint {row.owner!r} ({row.part}) is not finite"
+    for contact in equations.contacts:
+        if not _finite([contact.gap, contact.gap_rate], inputs):
+            return f"the gap of {contact.name!r} is not finite"
+    for guard in equations.guards:
+        if not _finite([guard.value, guard.rate], inputs):
+            return f"the guard of the event {guard.name!r} is not finite"
     if not _finite(list(equations.balance), inputs):
         return "the inertia forces are not finite (velocities have run away)"
     return "a derivative of a force or constraint is not finite"

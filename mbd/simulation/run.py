@@ -60,7 +60,7 @@ class Run:
         self.pieces: list[Vector] = []
         self.events: list[EventRecord] = []
         self.parameter_changes: list[tuple[int, Vector]] = []
-        self.stored, self.warnings = 0, list[str]()
+        self.stored = 0
         self.observers: Sequence[Callable[[float, State], None]] = ()
         self.progress: Callable[[float, float], None] | None = None
         self.boundaries = Boundaries(getattr(model, "controllers", ()), mechanism, start.time, dt, end)
@@ -249,8 +249,23 @@ class Run:
         numbers["modes"] = len(self.stepper.modes)
         numbers["compiled"] = self.stepper.compiled
         numbers["derive_and_compile_seconds"] = self.mechanism.seconds
+        numbers["notes"] = self._notes()
         numbers["wall_seconds"] = perf_counter() - self.began
         return numbers
+
+    def _notes(self) -> list[str]:
+        """What the user should know of contacts that were ignored on purpose."""
+        v, notes = self.values, []
+        for c, contact in enumerate(self.manager.contacts):
+            if v["deepest"][c] < -1e-9:
+                notes.append(
+                    f"{contact.name!r} lay up to {-v['deepest'][c]:.3g} {contact.unit} below its surface while ignored"
+                )
+            if np.isfinite(v["sinking"][c]):
+                notes.append(
+                    f"{contact.name!r} was released at t = {v['sinking'][c]:.6g} s while moving into its surface"
+                )
+        return notes
 
     def _capsule(self, problem: str) -> dict[str, Any] | None:
         if not problem:

@@ -102,7 +102,7 @@ class Stepper:
             "anchors": v["n_anchors"], "q1": n_q, "y1": n, "rate1": n, "aux1": n, "lam1": rows, "shift1": n,
             "kkt": size * size, "rhs": size, "work": 3 * size, "force": n, "bias": rows, "jump": n, "impulse": rows,
             "guards0": 4 * contacts + 2 * guards, "guards1": 4 * contacts + 2 * guards, "scale": n + 2 * rows,
-            "side": guards, "pick": 8, "detail": 8, "store": v["capacity"] * v["width"],
+            "deepest": contacts, "sinking": contacts, "side": guards, "pick": 8, "detail": 8, "store": v["capacity"] * v["width"],
             "log": v["event_capacity"] * v["event_width"],
         }  # fmt: skip
         integers = {
@@ -117,6 +117,7 @@ class Stepper:
             v[name] = np.zeros(max(length, 1), dtype=np.int64)
         for name, table in manager.tables().items():
             v[name] = table if len(table) else np.zeros(1, dtype=table.dtype)
+        v["sinking"][:] = np.inf
         v["unit"] = unit_blocks(self.mechanism)
         v["params"] = np.ascontiguousarray(parameters, dtype=float) if len(parameters) else np.zeros(1)
         if not v["n_anchors"]:

@@ -12,6 +12,7 @@ from mbd.bodies.point_mass import PointMass
 from mbd.errors import ModelError, nearest
 from mbd.forces.base import Force
 from mbd.joints.base import Joint
+from mbd.joints.screw import Screw
 from mbd.topology.graph import disconnected
 from mbd.topology.plan import cut_names, is_planar
 
@@ -212,7 +213,8 @@ def _constrained(model: Model) -> list[Frame | Joint | str]:
 
 def _spins(joint: Joint, body: Body) -> bool:
     frame = joint.parent if joint.parent.body is body else joint.child
-    return frame.offset == (0.0, 0.0, 0.0) and any(label.unit == "rad" for label in joint.labels)
+    turns = any(label.unit == "rad" for label in joint.labels) and not isinstance(joint, Screw)
+    return turns and frame.offset == (0.0, 0.0, 0.0)
 
 
 def _weights(body: Body) -> list[float]:

@@ -181,5 +181,5 @@ def phase_portrait(run: Trajectory, *coordinates: str, path: str | Path | None =
         kind = kinds.pop() if len(kinds) == 1 else ""
         axes.set_xlabel(f"{QUANTITIES.get(kind, 'coordinate')} [{kind}]" if kind else "coordinate")
         axes.set_ylabel(f"rate [{kind}/s]" if kind else "rate")
-        _legend(axes, min(len(wanted), 3))
+        _legend(axes, min(len(wanted), 2))
     return figure

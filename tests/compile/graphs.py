@@ -63,7 +63,9 @@ def graphs(draw: st.DrawFn, specials: bool = True, size: int = 40) -> Graph:
     numbers = [tape.input(kind, index) for kind, count in KINDS for index in range(count)]
     conditions = [numbers[0] < numbers[1], numbers[3] <= 0.5]
     place = st.integers(0, 1000)
-    for op, i, j, k in draw(st.lists(st.tuples(st.sampled_from(STEPS), place, place, place), min_size=5, max_size=size)):
+    for op, i, j, k in draw(
+        st.lists(st.tuples(st.sampled_from(STEPS), place, place, place), min_size=5, max_size=size)
+    ):
         x, y = numbers[-1 - i % len(numbers)], numbers[-1 - j % len(numbers)]
         first, second = conditions[-1 - k % len(conditions)], conditions[-1 - j % len(conditions)]
         try:

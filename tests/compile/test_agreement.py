@@ -162,6 +162,45 @@ def test_a_c_function_needs_a_name_that_c_allows():
         source({"left foot": []}, Layout(0, 0, 0, 0, 0, 0, 0))
 
 
+def test_a_table_takes_the_piece_that_begins_at_a_break():
+    tape = Tape()
+    rows = [[float(piece), 10.0, 100.0, 1000.0] for piece in range(5)]
+    table = tape.table("steps", [0.0, 1.0, 2.0, 3.0, 4.0], rows)
+    outputs = [tape.lookup(table, tape.input("t"), order) for order in range(4)]
+    layout = Layout(0, 0, 0, 0, 0, 0, 0, (0,))
+    functions = [scalar_function(outputs, layout), by_llvm({"f": outputs}, layout)["f"]]
+    with tempfile.TemporaryDirectory() as folder:
+        if COMPILER:
+            functions.append(by_c({"f": outputs}, Path(folder), layout)["f"])
+        for t in (-0.5, 0.0, 0.5, 1.0, 2.0, 3.0, 3.5, 4.0, 5.0, math.nan):
+            graph = Graph(tuple(outputs), np.array([t, 0.0, 0.0]), np.array(table.flat), layout)
+            expected = [table.value(t, order) for order in range(4)]
+            columns = array_function(outputs)({"t": np.array([t])}, graph.parameters)
+            assert np.array_equal(np.ravel(columns), expected, equal_nan=True)
+            for function in functions:
+                assert np.array_equal(run(function, graph), expected, equal_nan=True)
+
+
+def test_tables_are_read_from_the_parameters():
+    tape = Tape()
+    table = tape.table("flat", [0.0], [[1.0, 0.0, 0.0, 0.0]])
+    layout = Layout(0, 0, 0, 0, 0, 0, 1, (1,))
+    outputs = [tape.lookup(table, tape.input("t"))]
+    graph = Graph(tuple(outputs), np.zeros(3), np.array([9.0, 0.0, 5.0, 0.0, 0.0, 0.0]), layout)
+    for function in (scalar_function(outputs, layout), by_llvm({"f": outputs}, layout)["f"]):
+        assert run(function, graph) == [5.0]
+
+
+def test_a_number_is_a_true_condition_unless_it_is_zero():
+    tape = Tape()
+    t = tape.input("t")
+    outputs = [tape.where(tape.binary("and", t, tape.input("c", 0) < 1.0), 1.0, 2.0)]
+    layout = Layout(0, 0, 0, 0, 0, 0, 0)
+    for function in (scalar_function(outputs, layout), by_llvm({"f": outputs}, layout)["f"]):
+        for value, expected in ((0.0, 2.0), (-0.0, 2.0), (0.5, 1.0), (math.nan, 1.0)):
+            assert run(function, Graph(tuple(outputs), np.array([value, 0.0, 0.0]), np.zeros(0), layout)) == [expected]
+
+
 def test_conditions_are_stored_as_one_and_zero():
     tape = Tape()
     t = tape.input("t")

@@ -142,3 +142,9 @@ def test_a_massless_body_between_others_is_left_to_the_assembly():
     hip, leg = mbd.PointMass("hip", 0.0), mbd.Link("leg", 1.0, 1.0, 0.5, 0.1)
     model.connect(mbd.Translation("trunk", model.ground.origin, hip.origin), mbd.Revolute("pin", hip.origin, leg.start))
     assert model.check() == []
+
+
+def test_a_point_mass_on_a_thread_is_moved_by_it():
+    model = Model("nut")
+    model.connect(mbd.Screw("thread", model.ground.origin, mbd.PointMass("nut mass", 1.0).origin, pitch=0.01))
+    assert model.check() == []

@@ -130,7 +130,7 @@ function listen() {
 readColors();
 fill();
 choosePoints();
-if (run.points.length) { survey(); el("follow").checked = path.width > 0 && path.all[2] - path.all[0] > 2.2 * path.width; }
+if (run.points.length) { survey(); el("follow").checked = el("ghosts").checked = path.width > 0 && path.all[2] - path.all[0] > 2.2 * path.width; }
 el("about").open = run.events.length < 6;
 chooseChart(0);
 listen();

@@ -66,7 +66,7 @@ const fixed = run.points.map((point) => point.at.every((axis) => axis.every((x) 
 
 function drawFigure(g, v, p, alpha, ghost) {
   const at = run.points.map((_, k) => v.to(pointAt(k, p)));
-  const unit = Math.min(Math.max(v.scale * Math.max(path.height, path.width) * 0.019, 3), 10);
+  const unit = Math.min(Math.max(v.scale * Math.max(path.height, path.width) * 0.017, 3), 8);
   g.globalAlpha = alpha;
   if (!ghost) at.forEach((q, k) => { if (fixed[k]) drawPivot(g, q, unit); });
   for (const k of order) {
