@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -134,3 +134,23 @@ def skew(vector: Sequence[Scalar]) -> Rotation:
 def moment(arm: Triple, force: Triple) -> Triple:
     """arm × force."""
     return cross(arm, force)
+
+
+# observed order ---------------------------------------------------------------------------------------------------
+SECOND_ORDER = (3.6, 4.4)
+"""How many times an error of second order may fall as dt is halved; 4 in the limit."""
+
+
+def halved(error: Callable[[float], Any], dt: float, halvings: int = 3) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Sizes of an error at dt, dt/2, dt/4, …: one line a step, one column a quantity."""
+    sizes = [np.abs(np.atleast_1d(error(dt / 2**k))) for k in range(halvings + 1)]
+    return np.array(sizes, dtype=float)
+
+
+def assert_second_order(error: Callable[[float], Any], dt: float, halvings: int = 3) -> None:
+    """Every error of `error(dt)`, a number or several, falls 3.6 to 4.4 times with each halving of dt."""
+    sizes = halved(error, dt, halvings)
+    falls = sizes[:-1] / sizes[1:]
+    low, high = SECOND_ORDER
+    report = f"errors at dt = {dt:g}, dt/2, …:\n{sizes}\nfall by\n{falls}"
+    assert np.all((falls > low) & (falls < high)), report

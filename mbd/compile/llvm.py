@@ -207,9 +207,15 @@ class Build:
 
 
 class Library:
-    """Machine code in memory. It keeps the execution engine alive; functions may be added at any time.
+    """Machine code of functions with one layout, in memory; functions may be added at any time.
 
-    >>> library = Library(layout); library.add({"energy": [node]}); library.address("energy")  # doctest: +SKIP
+    >>> from mbd.tape.node import Tape
+    >>> library = Library(Layout(0, 0, 0, 0, 0, 0, 0), cache=ObjectCache())
+    >>> library.add({"twice": [2.0 * Tape().input("t")]})
+    >>> block, parameters, out = np.array([3.0, 0.0, 0.0]), np.zeros(0), np.zeros(1)
+    >>> library["twice"](block, parameters, out)
+    >>> float(out[0]), library.address("twice") > 0
+    (6.0, True)
     """
 
     def __init__(self, layout: Layout, opt: int = OPT, cache: ObjectCache | None = None) -> None:

@@ -40,6 +40,7 @@ REAL_ARRAYS = (
 )  # fmt: skip
 INTEGER_ARRAYS = (
     "row_contact", "row_normal",  # contact of each row; 1 for its normal row
+    "row_unit",  # 0 [m], 1 [rad], 2 other, of each row
     "unit",  # unit block of each balance component
     "kind", "opens", "normal",  # contact: 0 unilateral, 1 penalty; 0 on pull, 1 on gap, 2 by When; its normal row
     "when_start", "when_target", "when_after",  # who opens it

@@ -335,7 +335,7 @@ def bracket(K: Any, kind: int, index: int, low: float, high: float, estimate: fl
     else:
         stay(K)
     f_low = guard_value(K, kind, index, t + low)
-    if f_low <= 0.0:
+    if f_low <= 0.0 and kind != WATCH:
         if low > 0.0:
             low = 0.0
             stay(K)
@@ -375,5 +375,10 @@ def bracket(K: Any, kind: int, index: int, low: float, high: float, estimate: fl
         if side != 0 and trial % 12 == 11:
             f_low = f_high = 1.0
             f_high = -1.0
+    if kind == WATCH and guard_value(K, kind, index, t + place) >= 0.0:  # end where it is watched, or it fires again
+        place = high
+        status = try_step(K, place, t + place)
+        if status != 0:
+            return status
     K.pick[2] = place
     return 0

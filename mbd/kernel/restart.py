@@ -76,6 +76,16 @@ def refresh_scales(K: Any) -> None:
         for i in range(K.n):
             if K.unit[i] == unit:
                 K.scale[i] = big
+    for k in range(K.n_rows):  # a row that vanishes term by term still inherits the round-off of its coordinates
+        size = 1e-3
+        speed = 1e-3
+        for i in range(K.n_v):
+            if K.unit[i] == K.row_unit[k]:
+                speed = max(speed, abs(K.block[K.o_v + i]))
+                if i < K.n_q:
+                    size = max(size, abs(K.block[K.o_q + i]))
+        K.scale[K.n + k] = max(K.scale[K.n + k], size)
+        K.scale[K.n + K.n_rows + k] = max(K.scale[K.n + K.n_rows + k], speed)
 
 
 def active_rows(K: Any, flags: Any) -> int:

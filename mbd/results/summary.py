@@ -31,8 +31,10 @@ def facts(run: Trajectory) -> list[tuple[str, str]]:
         found.append(("energy", f"change {energy.change:.4g} J; numerical {energy.numerical[-1]:.2g} J ({relative})"))
         found.append(("constraints", str(run.violation)))
     found.append(("events", counts(run) or "none"))
-    if run.stats:
-        found.append(("cost", ", ".join(f"{key.replace('_', ' ')} {_number(v)}" for key, v in run.stats.items())))
+    costs = {key.replace("_", " "): value for key, value in run.stats.items() if isinstance(value, int | float)}
+    if costs:
+        found.append(("cost", ", ".join(f"{key} {_number(value)}" for key, value in costs.items())))
+    found += [("note", str(note)) for note in run.stats.get("notes", ())]
     return found
 
 

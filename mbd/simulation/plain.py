@@ -14,7 +14,7 @@ from mbd.kernel.active_set import ActiveSetManager
 from mbd.kernel.fields import ITERATIONS, NOT_CONVERGED, NOT_FINITE, NOW
 from mbd.state import Mode, State
 
-__all__ = ["MechanismSystem", "PlainScheme"]
+__all__ = ["MechanismSystem", "PlainScheme", "row_units", "unit_blocks"]
 
 
 class MechanismSystem:
@@ -42,6 +42,8 @@ class MechanismSystem:
         self.mechanism.common["scales"](block, self.parameters, scale)
         picked = list(rows)
         r_size, h_size, rate_size = np.split(scale, [n, n + self.mechanism.layout.n_rows])
+        size, speed = _by_coordinate(point, self.mechanism)
+        h_size, rate_size = np.maximum(h_size, size), np.maximum(rate_size, speed)
         tail = n + (2 if self.stabilized else 1) * m
         if tangent is None:
             out = np.zeros(tail)
@@ -107,6 +109,21 @@ def _by_unit(scale: Vector, mechanism: Mechanism) -> Vector:
         if chosen.any():
             result[chosen] = result[chosen].max()
     return result
+
+
+def _by_coordinate(point: Point, mechanism: Mechanism) -> tuple[Vector, Vector]:
+    """Size of the coordinates and speeds of each row's unit, whose round-off the row inherits."""
+    units, n_v = unit_blocks(mechanism), mechanism.layout.n_v
+    q, v = np.abs(point.q[:n_v]), np.abs(point.y[:n_v])
+    size = [float(np.max(q[units[: len(q)] == unit], initial=1e-3)) for unit in range(3)]
+    speed = [float(np.max(v[units[:n_v] == unit], initial=1e-3)) for unit in range(3)]
+    rows = row_units(mechanism)
+    return np.array(size)[rows], np.array(speed)[rows]
+
+
+def row_units(mechanism: Mechanism) -> Any:
+    """0 [m], 1 [rad], 2 other, of each row."""
+    return np.array([{"m": 0, "rad": 1}.get(row.unit, 2) for row in mechanism.equations.rows], dtype=np.int64)
 
 
 def unit_blocks(mechanism: Mechanism) -> Any:

@@ -13,7 +13,7 @@ from mbd.integrators.base import Integrator
 from mbd.integrators.family import MAX_ITERATIONS, NewmarkFamily
 from mbd.kernel import fields as F
 from mbd.kernel.active_set import ActiveSetManager
-from mbd.simulation.plain import MechanismSystem, PlainScheme, unit_blocks
+from mbd.simulation.plain import MechanismSystem, PlainScheme, row_units, unit_blocks
 
 __all__ = ["Stepper", "is_compiled"]
 
@@ -119,6 +119,7 @@ class Stepper:
             v[name] = table if len(table) else np.zeros(1, dtype=table.dtype)
         v["sinking"][:] = np.inf
         v["unit"] = unit_blocks(self.mechanism)
+        v["row_unit"] = np.append(row_units(self.mechanism), 2)
         v["params"] = np.ascontiguousarray(parameters, dtype=float) if len(parameters) else np.zeros(1)
         if not v["n_anchors"]:
             v["anchors"] = np.zeros(0)

@@ -38,8 +38,8 @@ LAYOUT = Layout(2, 2, 1, 1, 1, 1, 3, (3, 3 + 5 * len(BREAKS)))
 
 UNARY = ("sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "abs", "sign")
 BINARY = ("atan2", "min", "max", "pow")
-STEPS = ("add", "sub", "mul", "div", "neg", *UNARY, *BINARY, "sin", "cos", "lt", "le", "and", "or", "not", "where", "where",
-         "table", "table1", "table2", "table3", "ramp", "const", "mixed")  # fmt: skip
+STEPS = ("add", "sub", "mul", "div", "neg", *UNARY, *BINARY, "sin", "cos", "lt", "le", "and", "or", "not", "where",
+         "where", "table", "table1", "table2", "table3", "ramp", "const", "mixed")  # fmt: skip
 
 ordinary = st.floats(-4.0, 4.0).map(lambda x: round(x, 4))
 special = st.sampled_from((0.0, -0.0, math.nan, math.inf, -math.inf, 1e308, -1e-310, 3e6, -1048576.0, 1e22))

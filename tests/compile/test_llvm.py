@@ -1,0 +1,199 @@
+"""Machine code: cut functions, levels, threads, libraries."""
+
+from __future__ import annotations
+
+import gc
+import threading
+
+import llvmlite.binding as llvm
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+from mbd.compile.cache import ObjectCache
+from mbd.compile.ir import LARGE, module
+from mbd.compile.layout import Layout
+from mbd.compile.llvm import Library, call, compile_functions, emit_object, host, load_object
+from mbd.errors import ModelError, UnknownNameError
+from mbd.tape.functions import cos, sin
+from mbd.tape.node import Tape
+from tests.compile.chains import chain
+from tests.compile.graphs import by_llvm, graphs, run
+
+NONE = ObjectCache()
+
+
+def state(links, seed=0):
+    rng = np.random.default_rng(seed)
+    return rng.uniform(-2.0, 2.0, links.layout.size), rng.uniform(0.5, 2.0, links.layout.n_parameters)
+
+
+def results(function, links, seed=0):
+    out = np.empty(len(links.outputs))
+    function(*state(links, seed), out)
+    return out
+
+
+@given(graphs(size=80))
+@settings(max_examples=25)
+def test_a_function_cut_into_parts_gives_the_same_bits(graph):
+    whole = run(by_llvm({"f": graph.outputs})["f"], graph)
+    for part in (1, 7, 25):
+        cut = run(by_llvm({"f": graph.outputs}, large=0, part=part)["f"], graph)
+        assert np.array_equal(whole, cut, equal_nan=True)
+
+
+def test_big_functions_are_cut_and_small_ones_are_not():
+    small, big = chain(3), chain(10)
+    assert "@mbd.r.1" not in module({"r": small.outputs}, small.layout)
+    text = module({"r": big.outputs}, big.layout)
+    assert "@mbd.r.1(" in text
+    whole = by_llvm({"r": big.outputs}, big.layout, large=10 * LARGE)["r"]
+    cut = by_llvm({"r": big.outputs}, big.layout)["r"]
+    assert np.array_equal(results(whole, big), results(cut, big))
+
+
+def test_sines_and_cosines_of_four_angles_are_one_call():
+    links = chain(4)
+    text = module({"r": links.outputs}, links.layout)
+    assert text.count("call fastcc") == 1
+    tape = Tape()
+    x = tape.input("q", 0)
+    text = module({"f": [sin(x), cos(x), sin(cos(x))]}, Layout(1, 1, 0, 0, 0, 0, 0))
+    assert text.count("call fastcc") == 2  # the second needs the first
+
+
+@given(graphs())
+@settings(max_examples=15)
+def test_the_text_is_valid_whatever_the_graph(graph):
+    for fused in (False, True):
+        llvm.parse_assembly(module({"f": graph.outputs}, graph.layout, fused, large=0, part=9)).verify()
+
+
+def test_the_same_program_has_the_same_text_and_the_same_bytes():
+    first, second = chain(3), chain(3)
+    other = Tape()
+    other.input("lam", 0) * other.input("lam", 1)  # an index further than usual
+    texts = [module({"r": links.outputs}, links.layout) for links in (first, second)]
+    assert texts[0] == texts[1]
+    assert emit_object(texts[0]) == emit_object(texts[1])
+
+
+def test_what_else_the_tape_holds_does_not_change_the_text():
+    layout = Layout(2, 2, 0, 0, 0, 0, 0)
+
+    def text(tape):
+        x, y = tape.input("q", 0), tape.input("q", 1)
+        return module({"f": [sin(x) * y + cos(x)]}, layout)
+
+    used = Tape()
+    _ = used.input("t") * used.input("v", 1)
+    assert text(Tape()) == text(used)
+
+
+@pytest.mark.parametrize("links", [3, 10])
+def test_all_levels_give_the_same_bits(links):
+    links = chain(links)
+    reference = results(by_llvm({"r": links.outputs}, links.layout, level=0)["r"], links)
+    for level in (1, 2, 3) if len(links.outputs) < 20 else (1, 2):
+        assert np.array_equal(reference, results(by_llvm({"r": links.outputs}, links.layout, level=level)["r"], links))
+
+
+def test_threads_call_one_function_with_buffers_of_their_own():
+    links = chain(5)
+    library = compile_functions({"r": links.outputs}, links.layout, cache=NONE)
+    function = library["r"]
+    alone = [results(function, links, seed) for seed in range(4)]
+    wrong: list[int] = []
+
+    def work(seed):
+        (block, parameters), out = state(links, seed), np.empty(len(links.outputs))
+        for _ in range(3000):
+            out[:] = 0.0
+            function(block, parameters, out)
+            if not np.array_equal(out, alone[seed]):
+                wrong.append(seed)
+                return
+
+    threads = [threading.Thread(target=work, args=(seed,)) for seed in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not wrong
+
+
+def test_a_library_takes_further_functions_and_knows_them_by_name():
+    links = chain(2)
+    library = Library(links.layout, cache=NONE)
+    library.add({"balance": links.balance, "tangent": links.tangent})
+    first = library.address("balance")
+    library.add({"energy": [links.energy]})
+    assert list(library) == ["balance", "tangent", "energy"]
+    assert "energy" in library
+    assert library.address("balance") == first != library.address("tangent")
+    assert [build.names for build in library.builds] == [("balance", "tangent"), ("energy",)]
+    with pytest.raises(UnknownNameError, match="did you mean 'energy'"):
+        library["enregy"]
+    with pytest.raises(ModelError, match="already"):
+        library.add({"energy": [links.energy]})
+    with pytest.raises(ModelError, match="letters"):
+        library.add({"left foot": [links.energy]})
+
+
+def test_a_function_outlives_the_variable_that_held_its_library():
+    links = chain(2)
+    function = compile_functions({"r": links.outputs}, links.layout, cache=NONE)["r"]
+    expected = results(function, links)
+    gc.collect()
+    for _ in range(3):
+        compile_functions({"r": links.outputs}, links.layout, cache=NONE)
+        gc.collect()
+    assert np.array_equal(results(function, links), expected)
+
+
+def test_arrays_that_do_not_fit_are_refused():
+    links = chain(2)
+    function = compile_functions({"r": links.outputs}, links.layout, cache=NONE)["r"]
+    block, parameters = state(links)
+    out = np.empty(function.size)
+    with pytest.raises(ValueError, match="`out` needs 6 numbers, this array has 5"):
+        function(block, parameters, out[:-1])
+    with pytest.raises(ValueError, match="`parameters` needs 7"):
+        function(block, parameters[:-1], out)
+    with pytest.raises(TypeError, match="float32"):
+        function(block.astype(np.float32), parameters, out)
+    with pytest.raises(TypeError, match="contiguous"):
+        function(np.repeat(block, 2)[::2], parameters, out)
+
+
+def test_an_address_can_be_called_from_python():
+    links = chain(2)
+    library = compile_functions({"r": links.outputs}, links.layout, cache=NONE)
+    assert np.array_equal(results(call(library.address("r")), links), results(library["r"], links))
+
+
+def test_an_object_can_stay_for_the_whole_process_and_show_one_function_only():
+    text = """
+define double @helper(double %x) {
+%y = fmul double %x, %x
+ret double %y
+}
+define void @resident_square(ptr %block, ptr %parameters, ptr %out) {
+%x = load double, ptr %block
+%y = call double @helper(double %x)
+store double %y, ptr %out
+ret void
+}"""
+    code = emit_object(text, level=3, keep=("resident_square",))
+    assert b"helper" not in code
+    out = np.empty(1)
+    call(load_object(code, "resident_square"))(np.array([3.0]), np.empty(0), out)
+    assert out == [9.0]
+
+
+def test_the_host_is_described_completely():
+    this = host()
+    assert this.triple
+    assert this.cpu
+    assert this.llvm.split(".")[0].isdigit()

@@ -1,0 +1,194 @@
+"""The command line, called as a user calls it."""
+
+from __future__ import annotations
+
+import json
+import sys
+
+import numpy as np
+import pytest
+
+import mbd
+from mbd import cli
+from mbd.errors import SimulationError
+from tests.view.stand_ins import ball, walker
+
+WALK = '''"""A walk made by hand."""
+from tests.view.stand_ins import walker
+
+def main():
+    return walker(steps=5)
+'''
+
+PENDULUM = '''"""A pendulum."""
+import mbd
+
+model = mbd.Model("pendulum")
+rod = mbd.Link("rod", mass=1.0, length=1.0, center=1.0)
+model.connect(mbd.Revolute("pivot", model.ground.origin, rod.start))
+start = mbd.assemble(model, position={"pivot.angle": 0.3})
+integrator = mbd.HHT(alpha=0.05)
+dt, until = 0.01, 0.5
+'''
+
+
+@pytest.fixture
+def script(tmp_path, monkeypatch):
+    """Write a script into an empty folder, which is also where the command runs."""
+    monkeypatch.chdir(tmp_path)
+
+    def write(text: str, name: str = "my_walk.py"):
+        path = tmp_path / name
+        path.write_text(text, encoding="utf-8")
+        return str(path)
+
+    return write
+
+
+def test_run_writes_plots_page_run_and_record(script, tmp_path, capsys):
+    assert cli.main(["run", script(WALK)]) == 0
+    out = tmp_path / "mbd-runs" / "my-walk"
+    kinds = {path.name for path in out.iterdir()}
+    assert kinds == {
+        "page.html",
+        "run.mbd.npz",
+        "coordinates.png",
+        "energy.png",
+        "phase.png",
+        "forces.png",
+        "record.json",
+    }
+    text = capsys.readouterr().out
+    assert "Trajectory of 'walker'" in text and "length [m]" in text and "page.html" in text
+    again = mbd.load(out / "run.mbd.npz")
+    np.testing.assert_array_equal(again["left foot.force"], walker(steps=5)["left foot.force"])
+
+
+def test_the_record_tells_how_the_run_came_about(script, tmp_path, capsys):
+    assert cli.main(["run", script(WALK), "--out", str(tmp_path / "here")]) == 0
+    record = json.loads((tmp_path / "here" / "record.json").read_text())
+    assert record["versions"]["mbd"] == mbd.__version__ and record["versions"]["numpy"] == np.__version__
+    assert record["settings"]["dt"] == 0.01 and record["statistics"]["steps"] > 0 and record["success"] is True
+    assert record["machine"]["architecture"] and set(record["wall_times"]) == {"load", "simulate", "total"}
+    assert [step["foot"] for step in record["steps"]] == ["right foot", "left foot", "right foot", "left foot"]
+    assert sum(v for k, v in record["energy"].items() if k != "change") == pytest.approx(record["energy"]["change"])
+    capsys.readouterr()
+
+
+def test_run_simulates_what_a_script_defines(script, tmp_path, capsys):
+    assert cli.main(["run", script(PENDULUM, "pendulum.py"), "--until", "0.2", "--out", "out"]) == 0
+    run = mbd.load(tmp_path / "out" / "run.mbd.npz")
+    assert run.time[-1] == pytest.approx(0.2) and run.settings["dt"] == 0.01
+    assert run.energy.drift < 1e-3
+    capsys.readouterr()
+
+
+def test_a_failed_run_is_told_and_kept(script, tmp_path, capsys, monkeypatch):
+    text = "from mbd.errors import SimulationError\nfrom tests.view.stand_ins import ball\ndef main():\n"
+    text += "    raise SimulationError('t = 1 s: Newton stalled; try a smaller dt', ball())\n"
+    assert cli.main(["run", script(text), "--out", "out"]) == 1
+    told = capsys.readouterr()
+    assert told.err == "error: t = 1 s: Newton stalled; try a smaller dt\n"
+    assert (tmp_path / "out" / "run.mbd.npz").is_file() and (tmp_path / "out" / "page.html").is_file()
+
+
+def test_debug_shows_where_an_error_came_from(script):
+    path = script("from mbd.errors import SimulationError\ndef main():\n    raise SimulationError('stalled')\n")
+    with pytest.raises(SimulationError):
+        cli.main(["run", path, "--debug"])
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("model = 1\n", "my_walk.py does not define start, integrator, dt, until; a script defines"),
+        ("def main():\n    return 3\n", "main() of my_walk.py must return the run of mbd.simulate, got int"),
+        ("x = 1\ny = x / 0\n", "line 2 of my_walk.py: ZeroDivisionError: division by zero"),
+        ("def main(:\n", "SyntaxError: "),
+    ],
+)
+def test_a_wrong_script_is_told_in_one_line(script, capsys, text, told):
+    assert cli.main(["run", script(text)]) == 1
+    error = capsys.readouterr().err
+    assert error.startswith(f"error: {told}") and error.count("\n") == 1
+
+
+def test_another_step_is_refused_where_main_chooses_it(script, capsys):
+    assert cli.main(["run", script(WALK), "--dt", "0.1"]) == 1
+    assert "has a main(), which chooses dt itself" in capsys.readouterr().err
+
+
+def test_an_unknown_example_gets_the_nearest_name(monkeypatch, tmp_path, capsys):
+    (tmp_path / "kneed_walker.py").write_text('"""A walker with knees.\n\nMore."""\n')
+    monkeypatch.setattr(cli, "folder", lambda: tmp_path)
+    assert cli.main(["run", "kneed-waker"]) == 1
+    assert "no example named 'kneed-waker'; did you mean 'kneed-walker'?" in capsys.readouterr().err
+    assert cli.main(["examples"]) == 0
+    assert "kneed-walker  A walker with knees." in capsys.readouterr().out
+    assert cli.find("kneed_walker") == cli.find("kneed-walker") == tmp_path / "kneed_walker.py"
+
+
+def test_a_missing_script_is_named(capsys):
+    assert cli.main(["run", "absent.py"]) == 1
+    assert capsys.readouterr().err == "error: no script at 'absent.py'\n"
+
+
+def test_check_lists_every_fault(script, capsys):
+    good = script(PENDULUM, "good.py")
+    assert cli.main(["check", good]) == 0
+    assert "no faults" in capsys.readouterr().out
+    bad = PENDULUM.replace("mass=1.0", "mass=-1.0").partition("start =")[0]
+    bad += 'model.connect(mbd.Revolute("pivot", rod.end, mbd.PointMass("bob", mass=-2.0).origin))\n'
+    assert cli.main(["check", script(bad, "bad.py")]) == 1
+    told = capsys.readouterr()
+    assert told.err == "" and "rod" in told.out and "bob" in told.out and "pivot" in told.out
+    assert f"{told.out.count(chr(10) + '- ') + 1} faults" in told.out
+
+
+def test_info_names_versions_machine_backend_and_cache(capsys):
+    assert cli.main(["info"]) == 0
+    text = capsys.readouterr().out
+    for word in ("mbd", "python", "numpy", "processor", "backend", "code cache", "examples"):
+        assert f"\n{word}" in f"\n{text}"
+
+
+def test_a_bar_is_shown_on_a_terminal_only(monkeypatch):
+    with cli.progress_bar() as bar:
+        assert bar is None
+    written: list[str] = []
+
+    class Terminal:
+        encoding = "utf-8"
+
+        def isatty(self) -> bool:
+            return True
+
+        def write(self, text: str) -> int:
+            written.append(text)
+            return len(text)
+
+        def flush(self) -> None:
+            pass
+
+        def fileno(self) -> int:
+            raise OSError
+
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    with cli.progress_bar() as bar:
+        assert bar is not None
+        bar(0.0, 6.0)
+        bar(3.0, 6.0)
+        bar(6.0, 6.0)
+    assert any("of 6.00 s" in text for text in written)
+
+
+def test_the_page_opens_when_asked(script, monkeypatch, capsys):
+    opened: list[str] = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    assert cli.main(["run", script(WALK), "--open"]) == 0
+    assert opened[0].startswith("file://") and opened[0].endswith("page.html")
+    capsys.readouterr()
+
+
+def test_what_a_stand_in_knows_is_what_a_run_knows():
+    assert ball().success and ball().final is not None

@@ -1,0 +1,97 @@
+"""Plots: what they show, without a window."""
+
+from __future__ import annotations
+
+import struct
+
+import numpy as np
+import pytest
+from matplotlib import pyplot
+
+from mbd.errors import UnknownNameError
+from mbd.view.plots import contacts, phase_portrait, stretches
+from mbd.view.style import color
+from tests.view.stand_ins import ball, oscillator, walker
+
+
+@pytest.fixture(autouse=True)
+def _no_window_stays_open():
+    yield
+    pyplot.close("all")
+
+
+def is_picture(path) -> bool:
+    head = path.read_bytes()[:24]
+    width, height = struct.unpack(">II", head[16:24])
+    return head.startswith(b"\x89PNG") and width > 300 and height > 100
+
+
+def test_histories_have_one_panel_per_unit_and_the_contacts_below():
+    figure = walker().plot("left hip.angle", "right hip.angle", "left foot.force")
+    angles, forces, bars = figure.axes
+    assert angles.get_ylabel() == "angle [rad]" and forces.get_ylabel() == "force [N]"
+    assert [text.get_text() for text in angles.get_legend().get_texts()] == ["left hip.angle", "right hip.angle"]
+    assert [label.get_text() for label in bars.get_yticklabels()] == ["left foot", "right foot"]
+    assert bars.get_xlabel() == "time [s]"
+
+
+def test_histories_mark_the_events():
+    run = ball()
+    figure = run.plot("flight.y")
+    marks = [line for line in figure.axes[0].lines if line.get_linestyle() == ":"]
+    assert [line.get_xdata()[0] for line in marks] == [event.time for event in run.events if event.kind == "closed"]
+
+
+def test_histories_without_names_show_the_coordinates_and_a_vector_its_components():
+    assert [line.get_label() for line in oscillator().plot().axes[0].lines] == ["slider.displacement"]
+    labels = [line.get_label() for line in ball().plot("ball.origin").axes[0].lines][:3]
+    assert labels == ["ball.origin.x", "ball.origin.y", "ball.origin.z"]
+    with pytest.raises(UnknownNameError, match="flight.y"):
+        ball().plot("flight.why")
+
+
+def test_the_energy_plot_stacks_what_is_left_and_what_is_lost():
+    run = ball()
+    figure = run.energy.plot()
+    upper, lower = figure.axes
+    labels = [text.get_text() for text in upper.get_legend().get_texts()]
+    assert labels == ["kinetic", "potential (above its least)", "lost: impacts", "start"]
+    assert len(upper.collections) == 3 and lower.get_ylabel() == "numerical [J]"
+    assert upper.get_ylabel() == "energy [J]"
+
+
+def test_the_energy_plot_raises_its_ceiling_with_what_is_put_in():
+    upper = oscillator().energy.plot().axes[0]
+    ledger = oscillator().energy
+    (ceiling,) = upper.lines
+    np.testing.assert_allclose(
+        ceiling.get_ydata(), ledger.total[0] - ledger.potential.min() + ledger["push"], atol=1e-12
+    )
+    assert ceiling.get_label() == "start + put in"
+
+
+def test_the_phase_portrait_jumps_in_dots():
+    axes = phase_portrait(ball(bounces=3), "flight.y").axes[0]
+    dotted = [line for line in axes.lines if line.get_linestyle() == ":" and len(line.get_xdata()) == 2]
+    assert len(dotted) == 4
+    assert all(abs(np.ptp(line.get_xdata())) < 1e-9 < np.ptp(line.get_ydata()) for line in dotted)
+    assert axes.get_xlabel() == "length [m]" and axes.get_ylabel() == "rate [m/s]"
+
+
+def test_pictures_are_written_where_asked_for(tmp_path):
+    run = walker()
+    run.plot(path=tmp_path / "new" / "a.png")
+    run.energy.plot(path=tmp_path / "b.png")
+    phase_portrait(run, path=tmp_path / "c.png")
+    contacts(run, path=tmp_path / "d.png")
+    assert all(is_picture(path) for path in (tmp_path / "new" / "a.png", *tmp_path.glob("*.png")))
+    assert not pyplot.get_fignums()
+
+
+def test_stretches_are_the_times_of_closed_rows():
+    assert stretches([0.0, 1.0, 2.0, 2.0, 3.0], [1, 1, 0, 1, 1]) == [(0.0, 1.0), (2.0, 3.0)]
+    assert stretches([0.0, 1.0], [0, 0]) == []
+
+
+def test_sides_have_their_colors():
+    assert color("left knee lock") == color("left thigh") != color("right thigh") != color("hip")
