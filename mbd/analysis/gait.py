@@ -105,7 +105,7 @@ def gait(run: Trajectory) -> Gait:
     steps = []
     for number, (before, after) in enumerate(pairwise(strikes)):
         lost = float(impacts[before.row] - impacts[after.row])
-        change = [abs(states[mine][number + 1] - states[other][number]) for mine, other in pairs]
+        change = [float(abs(states[mine][number + 1] - states[other][number])) for mine, other in pairs]
         length = float(np.linalg.norm(places[after.row] - places[before.row]))
         deviation = max(change, default=float("nan"))
         steps.append(Step(after.time, after.name, after.time - before.time, length, lost, deviation))

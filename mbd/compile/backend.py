@@ -87,12 +87,12 @@ class Backend:
         return self._create(layout)
 
 
-def backend(kind: str = "auto", opt: int | None = None, cache: ObjectCache | None = None) -> Backend:
+def backend(kind: str = "auto", level: int | None = None, cache: ObjectCache | None = None) -> Backend:
     """The backend called 'llvm' or 'python'; 'auto' is machine code where llvmlite is installed.
 
     Parameters
     ----------
-    opt : optimization level of the machine code, see `mbd.compile.llvm`
+    level : optimization level of the machine code, see `mbd.compile.llvm`
     cache : where object files are kept; that of the user by default
     """
     if kind == "python":
@@ -102,19 +102,21 @@ def backend(kind: str = "auto", opt: int | None = None, cache: ObjectCache | Non
     if find_spec("llvmlite") is None:
         if kind == "llvm":
             raise CapabilityError("backend 'llvm' needs the package llvmlite: pip install llvmlite, or use 'python'")
-        return Backend("python", "llvmlite is not installed: plain Python runs some 250 times slower than machine code")
+        return Backend("python", "llvmlite is not installed: plain Python runs some 200 times slower than machine code")
     try:
         from mbd.compile import llvm
     except (ImportError, OSError) as error:
         if kind == "llvm":
             raise CapabilityError(f"llvmlite is installed but does not load ({error}); use backend 'python'") from error
         return Backend("python", f"llvmlite is installed but does not load ({error}): plain Python runs instead")
-    level = llvm.OPT if opt is None else opt
-    return Backend("llvm", "", lambda layout: llvm.Library(layout, level, cache))
+    chosen = llvm.LEVEL if level is None else level
+    return Backend("llvm", "", lambda layout: llvm.Library(layout, chosen, cache))
 
 
-def make_functions(programs: Mapping[str, Sequence[Node]], layout: Layout, kind: str = "auto") -> Functions:
+def make_functions(
+    programs: Mapping[str, Sequence[Node]], layout: Layout, kind: str = "auto", level: int | None = None
+) -> Functions:
     """The functions of some programs in the backend of that kind."""
-    functions = backend(kind).functions(layout)
+    functions = backend(kind, level).functions(layout)
     functions.add(programs)
     return functions

@@ -4,16 +4,18 @@ The text of `ir` is the key: if an object file made from the same text, for the 
 the cache, it is loaded and nothing is parsed or optimized. A `Library` holds the code; addresses are valid as long as
 it lives. The code has no globals and holds no lock, so threads may call it at once with buffers of their own.
 
-Optimization levels, measured on r and S of planar chains (Zen 4; generation in ms / call in ns)
+Levels, measured on r and S of planar chains (Zen 4; milliseconds to generate the code / nanoseconds per call):
 
-    operations     0           2            3
-    577            4 / 150     18 / 80      125 / 63
-    1 179          7 / 365     38 / 152     410 / 110
-    1 981          7 / 690     57 / 247     1400 / 187
+    operations     0            2             3           gcc -O3
+    577            5 / 100      19 / 80       125 / 63    235 / 107
+    1 179          9 / 188      39 / 152      400 / 110   270 / 211
+    1 981          11 / 300     58 / 245      1400 / 185  600 / 327
+    4 185          20 / 680     106 / 575     350 / 565   1540 / 680
 
-Level 2 runs no passes over the IR, where the tape has left nothing to fold; they took 5 to 10 ms and gained nothing.
-Level 3 adds the pipeline with vectorization of straight-line code: slow to make, worth it for long runs.
-All levels give the same bits.
+Level 0 cuts every function into parts of 120 operations, small enough for the allocator that looks at one block only.
+Level 1 takes 8 % less than level 2 for code 2 % slower. Neither runs passes over the IR, where the tape has left
+nothing to fold: they took 5 to 40 ms and gained nothing. Level 3 does, for the sake of the vectorization of
+straight-line code: slow to make, worth it for long runs. All levels give the same bits.
 """
 
 from __future__ import annotations
@@ -26,6 +28,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import llvmlite.binding as llvm
 import numpy as np
@@ -38,12 +41,15 @@ from mbd.errors import CapabilityError, ModelError, UnknownNameError, nearest
 from mbd.tape.node import Node
 
 __all__ = [
-    "OPT", "Build", "Host", "Library", "Machine", "MachineFunction", "cached_object", "call", "compile_functions",
+    "LEVEL", "Build", "Host", "Library", "Machine", "MachineFunction", "cached_object", "call", "compile_functions",
     "emit_object", "host", "load_object",
 ]  # fmt: skip
 
-OPT = 2
+LEVEL = 2
 """Default optimization level, see above."""
+
+CUTS = {0: {"large": 150, "part": 120}}
+"""Cuts of functions into parts that differ from those of `ir`, by level."""
 
 _PROTOTYPE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
 
@@ -92,12 +98,12 @@ def _announce_library() -> None:
         llvm.add_symbol(name, ctypes.cast(getattr(found, name), ctypes.c_void_p).value)
 
 
-def _target_machine(opt: int) -> llvm.TargetMachine:
+def _target_machine(level: int) -> llvm.TargetMachine:
     this = host()
-    return llvm.Target.from_triple(this.triple).create_target_machine(cpu=this.cpu, features=this.features, opt=opt)
+    return llvm.Target.from_triple(this.triple).create_target_machine(cpu=this.cpu, features=this.features, opt=level)
 
 
-def emit_object(text: str, level: int = OPT, keep: Sequence[str] | None = None) -> bytes:
+def emit_object(text: str, level: int = LEVEL, keep: Sequence[str] | None = None) -> bytes:
     """The object file of an IR text.
 
     Parameters
@@ -135,18 +141,30 @@ def cached_object(tag: str, make: Callable[[], bytes], cache: ObjectCache | None
     return code
 
 
+_FLOAT = np.dtype(np.float64)
+
+
+def _pointer(array: Any) -> int:
+    """Where the numbers of an array begin (faster than ``array.ctypes.data``)."""
+    if array.dtype != _FLOAT or not array.flags.c_contiguous:
+        raise TypeError(
+            f"compiled code takes contiguous arrays of float64; this one has dtype {array.dtype} and "
+            f"strides {array.strides}: use numpy.ascontiguousarray(array, dtype=float)"
+        )
+    if array.size and array.flags.writeable:
+        return ctypes.addressof(ctypes.c_double.from_buffer(array))
+    address: int = array.ctypes.data
+    return address
+
+
 def call(address: int) -> Callable[[Vector, Vector, Vector], None]:
     """A function of three float64 arrays from the address of machine code; whoever asks keeps the code alive."""
     function = _PROTOTYPE(address)
 
     def run(block: Vector, parameters: Vector, out: Vector) -> None:
-        for array in (block, parameters, out):
-            if array.dtype != np.float64 or not array.flags.c_contiguous:
-                raise TypeError(
-                    f"compiled code takes contiguous arrays of float64; this one has dtype {array.dtype} and "
-                    f"strides {array.strides}: use numpy.ascontiguousarray(array, dtype=float)"
-                )
-        function(block.ctypes.data, parameters.ctypes.data, out.ctypes.data)
+        if not out.flags.writeable:
+            raise ValueError("`out` is a read-only array")
+        function(_pointer(block), _pointer(parameters), _pointer(out))
 
     return run
 
@@ -187,11 +205,10 @@ class MachineFunction:
         self._sizes, self._library, self._run = sizes, library, call(address)
 
     def __call__(self, block: Vector, parameters: Vector, out: Vector) -> None:
-        for what, array, size in zip(
-            ("block", "parameters", "out"), (block, parameters, out), self._sizes, strict=True
-        ):
-            if array.size < size:
-                raise ValueError(f"{self.name}: `{what}` needs {size} numbers, this array has {array.size}")
+        sizes = self._sizes
+        if block.size < sizes[0] or parameters.size < sizes[1] or out.size < sizes[2]:
+            came = block.size, parameters.size, out.size
+            raise ValueError(f"{self.name}: (block, parameters, out) need {sizes} numbers, these arrays have {came}")
         self._run(block, parameters, out)
 
 
@@ -218,8 +235,8 @@ class Library:
     (6.0, True)
     """
 
-    def __init__(self, layout: Layout, opt: int = OPT, cache: ObjectCache | None = None) -> None:
-        self.layout, self.opt = layout, opt
+    def __init__(self, layout: Layout, level: int = LEVEL, cache: ObjectCache | None = None) -> None:
+        self.layout, self.level = layout, level
         self.builds: list[Build] = []
         self._cache = default_cache() if cache is None else cache
         self._functions: dict[str, MachineFunction] = {}
@@ -233,16 +250,16 @@ class Library:
             if name in self._functions:
                 raise ModelError(f"this library already has a function {name!r}; give every function its own name")
         begin = time.perf_counter()
-        text = module(programs, self.layout, host().fused)
+        text = module(programs, self.layout, host().fused, **CUTS.get(self.level, {}))
         written = time.perf_counter()
         cached = True
 
         def make() -> bytes:
             nonlocal cached
             cached = False
-            return emit_object(text, self.opt)
+            return emit_object(text, self.level)
 
-        code = cached_object(f"level {self.opt}\n{text}", make, self._cache)
+        code = cached_object(f"level {self.level}\n{text}", make, self._cache)
         made = time.perf_counter()
         addresses = self._machine.load(code, [f"mbd.{name}" for name in programs])
         for (name, outputs), address in zip(programs.items(), addresses, strict=True):
@@ -280,16 +297,16 @@ def _sizes(outputs: Sequence[Node], layout: Layout) -> tuple[int, int, int]:
 
 
 def compile_functions(
-    programs: Mapping[str, Sequence[Node]], layout: Layout, opt: int = OPT, cache: ObjectCache | None = None
+    programs: Mapping[str, Sequence[Node]], layout: Layout, level: int = LEVEL, cache: ObjectCache | None = None
 ) -> Library:
     """A library with one function per program, all in one object file.
 
     Parameters
     ----------
     programs : names and what each function writes to ``out``
-    opt : optimization level 0 … 3
+    level : optimization level 0 … 3
     cache : where object files are kept; that of the user by default, ``ObjectCache()`` for none
     """
-    library = Library(layout, opt, cache)
+    library = Library(layout, level, cache)
     library.add(programs)
     return library

@@ -255,7 +255,8 @@ class _Step:
             solved = np.linalg.solve(matrix, right)
             change = solved[:n, 0]
             self.lam = self.lam + solved[n:, 0]
-            if stabilized:
+            floor = 16.0 * EPS * (np.ones(m) if terms.scale_h is None else terms.scale_h)
+            if stabilized and np.any(np.abs(terms.h) > floor):
                 self.x = self.x + solved[:n_v, 1] - self.shift
                 self.shift = solved[:n_v, 1]
         if iteration == 0 and not self.scheme.exact:

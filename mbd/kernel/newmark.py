@@ -163,6 +163,11 @@ def newmark_step(K: Any, h: float, t1: float) -> int:
             before = 1e300
             continue
         before = error
+        shifting = False  # a position at round-off stays: correcting it would only stir the velocity rows
+        if K.stabilized == 1:
+            for k in range(m):
+                if abs(K.out[o_r + n + k]) > 16.0 * EPS * K.scale[n + K.rows[k]]:
+                    shifting = True
         # right-hand sides before the factors overwrite the tangent
         o_h = o_r + n
         for i in range(n):
@@ -203,7 +208,7 @@ def newmark_step(K: Any, h: float, t1: float) -> int:
                 block[K.o_x + i] += c_K * change
         for k in range(m):
             block[K.o_lam + K.rows[k]] += K.rhs[n + k]
-        if K.stabilized == 1 and m > 0:
+        if shifting:
             for i in range(n):
                 K.work[i] = 0.0
             solve(K.kkt, size, K.pivots, K.work)

@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbd.compile.mechanism import Mechanism, rate_names
+from mbd.compile.mechanism import rate_names
 from mbd.compile.python import scalar_function
 from mbd.equations.equations import Guard
 from mbd.errors import SimulationError, UnknownNameError, nearest
 from mbd.kernel import fields as F
-from mbd.tape.derivatives import live
 
 if TYPE_CHECKING:
     from mbd.simulation.run import Run
@@ -86,12 +85,16 @@ def apply_reset(run: Run, guard: Guard) -> None:
 class Boundaries:
     """Instants at which a step must end: samples of controllers, jumps and kinks of signals in time."""
 
-    def __init__(self, controllers: Sequence[Any], mechanism: Mechanism, begin: float, dt: float, end: float) -> None:
+    def __init__(
+        self, controllers: Sequence[Any], instants: Sequence[float], begin: float, dt: float, end: float
+    ) -> None:
         self.controllers = tuple(controllers)
         self.states = {controller.name: controller.state for controller in self.controllers}
         self.begin_time = begin
         self.samples = {c.name: 0 for c in self.controllers if c.period is not None}
-        self.breaks = [time for time in signal_breaks(mechanism, 4.0 * dt) if begin < time < end]
+        inside = [time for time in instants if begin < time < end]
+        dense = len(inside) * 4.0 * dt > end - begin  # samples as dense as the steps are stepped over
+        self.breaks = [] if dense else inside
         self.place = 0
 
     def _sample(self, controller: Any) -> float:
@@ -154,25 +157,3 @@ class Boundaries:
             )
         if written:
             run.change_parameters(written)
-
-
-def signal_breaks(mechanism: Mechanism, spacing: float) -> list[float]:
-    """Times at which a tabulated signal of time jumps or kinks, if they lie farther apart than `spacing`."""
-    equations = mechanism.equations
-    nodes = live([*equations.balance, *(row.value for row in equations.rows)])
-    found: set[float] = set()
-    for node in nodes:
-        if node.op == "table" and node.args[0].op == "input" and node.args[0].data[0] == "t":
-            table = node.data[0]
-            breaks, rows = table.breaks, table.coefficients
-            for k in range(1, len(breaks)):
-                width = breaks[k] - breaks[k - 1]
-                a, b, c, d = rows[k - 1]
-                value, slope = a + width * (b + width * (c + width * d)), b + width * (2 * c + 3 * d * width)
-                size = abs(value) + abs(rows[k][0]) + 1e-300
-                steep = abs(slope) + abs(rows[k][1]) + size / width
-                jumps = abs(value - rows[k][0]) > 1e-9 * size
-                kinks = abs(slope - rows[k][1]) > 1e-9 * steep
-                if jumps or (kinks and width > spacing):
-                    found.add(breaks[k])
-    return sorted(found)

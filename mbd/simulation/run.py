@@ -63,7 +63,8 @@ class Run:
         self.stored = 0
         self.observers: Sequence[Callable[[float, State], None]] = ()
         self.progress: Callable[[float, float], None] | None = None
-        self.boundaries = Boundaries(getattr(model, "controllers", ()), mechanism, start.time, dt, end)
+        controllers, instants = getattr(model, "controllers", ()), getattr(model, "instants", ())
+        self.boundaries = Boundaries(controllers, instants, start.time, dt, end)
         self._begin(start)
 
     def observe(

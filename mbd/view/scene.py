@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -104,7 +105,8 @@ def scene(run: Trajectory, count: int) -> Scene:
     ]
     points = tuple(dict.fromkeys(point for _, members in bodies for point in members))
     number = {point: k for k, point in enumerate(points)}
-    segments = tuple((body, tuple(number[point] for point in members)) for body, members in bodies if members)
+    lines = ((body, line) for body, members in bodies if members for line in _lines(members))
+    segments = tuple((body, tuple(number[point] for point in line)) for body, line in lines)
     scalars = [point + axis for point in points for axis in AXES]
     raw = instants.read(run, scalars).reshape(len(instants.time), len(points), 3)
     turn = upright(run)
@@ -117,6 +119,14 @@ def scene(run: Trajectory, count: int) -> Scene:
     }
     grounds = tuple(Ground(turn @ normal, offset) for normal, offset in _grounds(run, instants, raw))
     return Scene(instants, points, positions, segments, masses, grounds, touches, spatial)
+
+
+def _lines(members: Sequence[str]) -> list[Sequence[str]]:
+    """A body of many points as a star about its origin or center if that is one of them, else as one outline."""
+    hubs = [point for point in members if point.rpartition(".")[2] in ("origin", "center")]
+    if len(members) < 3 or not hubs:
+        return [members]
+    return [(hubs[0], point) for point in members if point != hubs[0]]
 
 
 def upright(run: Trajectory) -> Matrix:

@@ -9,14 +9,16 @@ import numpy as np
 
 import mbd
 
-__all__ = ["FORMS", "WITH_ROWS", "Pendulum"]
+__all__ = ["FORMS", "WITH_EVENTS", "WITH_ROWS", "Pendulum"]
 
 
 class Pendulum(ABC):
     """A pendulum of some length, mass and gravity; angles from the downward vertical.
 
-    `angle`, `rate` and `tension` read a run, or a moment of one.
+    `angle`, `rate` and `tension` read a run, or a moment of one. `across` is the name of the bob's x.
     """
+
+    across = "bob place.x"
 
     def __init__(self, length: float = 1.0, mass: float = 1.0, gravity: float = 9.81) -> None:
         self.length, self.mass, self.gravity = length, mass, gravity
@@ -61,6 +63,7 @@ class Minimal(Pendulum):
     """One revolute joint, one coordinate; the rod's pull is the reaction in the pivot."""
 
     cut: Any = "auto"
+    across = "rod.end.x"
 
     def build(self) -> Any:
         model = mbd.Model("pendulum", gravity=(0.0, -self.gravity, 0.0), cut=self.cut)
@@ -180,3 +183,5 @@ FORMS: dict[str, type[Pendulum]] = {
     "Lagrange, natural": LagrangeNatural,
 }
 WITH_ROWS = ("all joints cut", "natural", "Lagrange, natural")
+WITH_EVENTS = ("minimal", "all joints cut", "natural")
+"""Those made of bodies, to which events can be added."""

@@ -18,10 +18,10 @@ def random_body(rng: random.Random, name: str, spatial: bool) -> mbd.RigidBody:
     return mbd.RigidBody(name, mass=rng.uniform(0.5, 2.0), inertia=inertia if spatial else a, center=center)
 
 
-def random_frame(rng: random.Random, body: mbd.RigidBody | Ground, spatial: bool):
+def random_frame(rng: random.Random, body: mbd.RigidBody | Ground, spatial: bool, turned: float):
     """A point of a body, sometimes with turned axes."""
     frame = body.point(rng.uniform(-0.6, 0.6), rng.uniform(-0.6, 0.6), rng.uniform(-0.6, 0.6) if spatial else 0.0)
-    if rng.random() < 0.5:
+    if rng.random() < turned:
         axis = [rng.uniform(-1, 1) for _ in range(3)] if spatial else (0.0, 0.0, 1.0)
         frame = frame.turned(rng.uniform(-1, 1), axis)
     return frame
@@ -49,8 +49,11 @@ def random_joint(rng: random.Random, name: str, a, b, spatial: bool):
     return rng.choice(kinds)()
 
 
-def random_tree(seed: int, bodies: int, spatial: bool, most: int = 6) -> mbd.Model:
-    """A tree of bodies with random joints, some described from the far side; at most `most` coordinates."""
+def random_tree(seed: int, bodies: int, spatial: bool, most: int = 6, turned: float = 0.5) -> mbd.Model:
+    """A tree of bodies with random joints, some described from the far side; at most `most` coordinates.
+
+    turned : share of frames with axes of their own
+    """
     rng = random.Random(seed)
     gravity = [rng.uniform(-10, 10) for _ in range(3)] if spatial else (rng.uniform(-3, 3), -9.81, 0.0)
     model = mbd.Model("random tree", gravity=gravity)
@@ -58,7 +61,7 @@ def random_tree(seed: int, bodies: int, spatial: bool, most: int = 6) -> mbd.Mod
     coordinates = 0
     for k in range(bodies):
         body, onto = random_body(rng, f"body {k}", spatial), rng.choice(known)
-        ends = [random_frame(rng, onto, spatial), random_frame(rng, body, spatial)]
+        ends = [random_frame(rng, onto, spatial, turned), random_frame(rng, body, spatial, turned)]
         if rng.random() < 0.4:
             ends.reverse()
         joint = random_joint(rng, f"joint {k}", *ends, spatial)
