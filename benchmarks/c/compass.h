@@ -4,7 +4,8 @@
    A leg's mass is at (x + c sin th, y - c cos th), its foot at (x + L sin th, y - L cos th).
    Rows: h0 = y - L cos th1, h1 = x + L sin th1.  r = M a + f + B' lam. */
 
-enum { N = 4, M = 2, ANGLES = 0xC };
+enum { N = 4, M = 2, ANGLES = 0xC, ANGLE_ROWS = 0 };
+#include "point.h"
 
 typedef struct {
     double hip, leg, length, center, gx, gy; /* masses [kg], lengths [m], gravity [m/s^2] */

@@ -14,7 +14,7 @@ from mbd.compile.python import ScalarFunction
 from mbd.errors import CapabilityError, UnknownNameError, nearest
 from mbd.tape.node import Node
 
-__all__ = ["Backend", "Function", "Functions", "Twins", "backend", "make_functions"]
+__all__ = ["Backend", "Function", "Functions", "Twins", "backend"]
 
 
 class Function(Protocol):
@@ -111,12 +111,3 @@ def backend(kind: str = "auto", level: int | None = None, cache: ObjectCache | N
         return Backend("python", f"llvmlite is installed but does not load ({error}): plain Python runs instead")
     chosen = llvm.LEVEL if level is None else level
     return Backend("llvm", "", lambda layout: llvm.Library(layout, chosen, cache))
-
-
-def make_functions(
-    programs: Mapping[str, Sequence[Node]], layout: Layout, kind: str = "auto", level: int | None = None
-) -> Functions:
-    """The functions of some programs in the backend of that kind."""
-    functions = backend(kind, level).functions(layout)
-    functions.add(programs)
-    return functions

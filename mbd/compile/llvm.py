@@ -103,21 +103,11 @@ def _target_machine(level: int) -> llvm.TargetMachine:
     return llvm.Target.from_triple(this.triple).create_target_machine(cpu=this.cpu, features=this.features, opt=level)
 
 
-def emit_object(text: str, level: int = LEVEL, keep: Sequence[str] | None = None) -> bytes:
-    """The object file of an IR text.
-
-    Parameters
-    ----------
-    level : optimization level, see above
-    keep : the only functions that must stay visible; None keeps all
-    """
+def emit_object(text: str, level: int = LEVEL) -> bytes:
+    """The object file of an IR text."""
     machine = _target_machine(level)
     ir = llvm.parse_assembly(text, llvm.create_context())
     ir.triple, ir.data_layout = machine.triple, str(machine.target_data)
-    if keep is not None:
-        for function in ir.functions:
-            if not function.is_declaration and function.name not in keep:
-                function.linkage = "internal"
     if level >= 3:
         options = llvm.create_pipeline_tuning_options(speed_level=3)
         options.slp_vectorization = True

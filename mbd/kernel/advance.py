@@ -33,7 +33,7 @@ from mbd.kernel.fields import (
     SWITCHES,
     WATCH,
 )  # fmt: skip
-from mbd.kernel.guards import gap_scale, gap_tolerance, is_watched, judge, locate, try_step, update_armed, watch
+from mbd.kernel.guards import gap_scale, gap_tolerance, is_watched, judge, locate, try_step, update_armed, update_sides, watch
 from mbd.kernel.hooks import scheme_accept, scheme_start
 from mbd.kernel.restart import (
     active_rows,
@@ -145,6 +145,7 @@ def restart(K: Any) -> int:
     K.state[GRID] = 0
     if K.n_contacts + K.n_guards > 0:
         watch(K, K.clock[NOW], K.q, K.y, K.rate, K.lam, K.guards0)
+        update_armed(K)
     return 0
 
 
@@ -155,6 +156,7 @@ def accept(K: Any, h: float, t1: float) -> None:
     for i in range(4 * K.n_contacts + 2 * K.n_guards):
         K.guards0[i] = K.guards1[i]
     update_armed(K)
+    update_sides(K)
 
 
 def project_velocity(K: Any) -> int:

@@ -26,7 +26,7 @@ from mbd.kernel.fields import (
 from mbd.kernel.hooks import call, scheme_step
 from mbd.kernel.restart import compose, consistent, fill_block
 
-__all__ = ["gap_scale", "judge", "locate", "try_step", "update_armed", "watch"]
+__all__ = ["gap_scale", "judge", "locate", "try_step", "update_armed", "update_sides", "watch"]
 
 GRAZE = 6
 
@@ -106,6 +106,14 @@ def update_armed(K: Any) -> None:
                 K.armed[c] = 1
 
 
+def update_sides(K: Any) -> None:
+    """A guard that fires in one direction only is ready again once it has gone back."""
+    for e in range(K.n_guards):
+        back = -K.direction[e]
+        if back * K.side[e] < 0.0 and back * K.guards0[4 * K.n_contacts + e] > 0.0:
+            K.side[e] = float(back)
+
+
 def hermite_turn(g0: float, g1: float, d0: float, d1: float, rising: bool) -> float:
     """Place in (0, 1) of the interior maximum (rising) or minimum of the cubic Hermite interpolant; −1 if none."""
     a = 3.0 * (d0 + d1 - 2.0 * (g1 - g0))
@@ -175,9 +183,10 @@ def judge(K: Any, h: float) -> bool:
                         consider(K, CLOSE, c, top + (1.0 - top) * crossing(hermite(g0, g1, d0, d1, top), g1), top)
                     else:
                         consider(K, CLOSE, c, 0.0, 0.0)
-            elif g0 > tiny and d0 < 0.0 < d1:
+            elif d0 < 0.0 < d1:
                 bottom = hermite_turn(g0, g1, d0, d1, False)
-                if bottom > 0.0 and hermite(g0, g1, d0, d1, bottom) < -1e-3 * d0:
+                limit = -1e-3 * d0 if g0 > tiny else -4.0 * tiny
+                if bottom > 0.0 and hermite(g0, g1, d0, d1, bottom) < limit:
                     consider(K, GRAZE, c, bottom, 0.0)
         elif K.kind[c] == 0:
             if K.opens[c] == 0 and K.lam1[K.normal[c]] > 0.0:
@@ -188,11 +197,26 @@ def judge(K: Any, h: float) -> bool:
         elif K.guards1[2 * nC + c] < 0.0:
             consider(K, OPEN_FORCE, c, crossing(K.guards0[2 * nC + c], K.guards1[2 * nC + c]), 0.0)
     for e in range(K.n_guards):
-        v0 = K.guards0[4 * nC + e]
-        v1 = K.guards1[4 * nC + e]
-        if K.side[e] * v1 < 0.0 and K.active[nC + e] == 0 and (K.direction[e] == 0 or K.direction[e] * v1 > 0.0):
-            consider(K, CROSS, e, crossing(v0, v1) if v0 * v1 < 0.0 else 0.0, 0.0)
+        judge_user(K, e, h)
     return bool(K.fired[0] >= 0)
+
+
+def judge_user(K: Any, e: int, h: float) -> None:
+    """Whether a user's guard crosses zero from its side; one that has just fired must leave zero before."""
+    place = 4 * K.n_contacts + e
+    side = K.side[e]
+    v0 = side * K.guards0[place]
+    v1 = side * K.guards1[place]
+    if K.active[K.n_contacts + e] == 1 or v1 >= 0.0 or K.direction[e] * side > 0.0:
+        return
+    d0 = side * K.guards0[place + K.n_guards] * h
+    d1 = side * K.guards1[place + K.n_guards] * h
+    top = hermite_turn(v0, v1, d0, d1, True) if d0 > 0.0 else -1.0
+    peak = hermite(v0, v1, d0, d1, top) if top > 0.0 else -1.0
+    if peak > max(v0, 0.0):
+        consider(K, CROSS, e, top + (1.0 - top) * crossing(peak, v1), top)
+    else:
+        consider(K, CROSS, e, crossing(v0, v1) if v0 > 0.0 else 0.0, 0.0)
 
 
 def guard_value(K: Any, kind: int, index: int, t1: float) -> float:
@@ -302,6 +326,16 @@ def locate(K: Any, h: float) -> int:
         found = K.pick[2]
         if found <= 0.0:
             return 0
+        if kind == CLOSE and not is_watched(K, index, K.guards1):  # no longer watched when it gets there
+            K.active[index] = 1
+            K.fired[0] = -1
+            status = try_step(K, end, t + end)
+            if status != 0:
+                return status
+            if not judge(K, end):
+                K.pick[2] = end
+                return 0
+            continue
         # did another guard fire before this one? (this one is at round-off and may look fired itself)
         place = index if kind != CROSS else K.n_contacts + index
         quiet = K.active[place]

@@ -26,6 +26,7 @@ def simulate(
     start: State,
     integrator: Integrator | None = None,
     dt: float | None = None,
+    tol: None = None,
     *,
     until: float | str | tuple[str, float],
     contact: Literal["events"] = "events",
@@ -50,6 +51,7 @@ def simulate(
     start : from `mbd.assemble`, or `Trajectory.final` of an earlier run
     integrator : default ``HHT(alpha=0.05)``
     dt : step [s]
+    tol : error control is not available yet; steps are fixed
     until : end time [s]; or the name of a contact or event, at whose first closing or crossing the run ends;
         or (name, latest time)
     contact, impact : strategy and law; this version knows located events with Newton's law
@@ -74,7 +76,7 @@ def simulate(
         if the run cannot go on.
     """
     scheme = integrator if integrator is not None else HHT(alpha=0.05)
-    faults = _faults(scheme, start, dt, until, contact, impact, locate, store, on_failure, rest_speed)
+    faults = _faults(scheme, start, dt, tol, until, contact, impact, locate, store, on_failure, rest_speed)
     if faults:
         raise ModelError(faults)
     assert dt is not None
@@ -102,7 +104,7 @@ def simulate(
 
 
 def _faults(
-    scheme: Any, start: Any, dt: Any, until: Any, contact: Any, impact: Any, locate: Any, store: Any, on_failure: Any,
+    scheme: Any, start: Any, dt: Any, tol: Any, until: Any, contact: Any, impact: Any, locate: Any, store: Any, on_failure: Any,
     rest_speed: Any,
 ) -> list[str]:  # fmt: skip
     """Everything that is wrong with the arguments themselves."""
@@ -111,6 +113,8 @@ def _faults(
         faults.append(f"integrator must be an mbd integrator such as mbd.HHT(alpha=0.05), not {scheme!r}")
     if not isinstance(start, State):
         faults.append(f"start must be a State from mbd.assemble(model, …), not {start!r}")
+    if tol is not None:
+        faults.append("tol= is not available: steps are fixed; give dt and compare with dt/2, whose error is a quarter")
     if dt is None:
         faults.append("a step is needed: simulate(…, dt=1e-3)")
     elif not _number(dt) or not math.isfinite(dt) or dt <= 0.0:

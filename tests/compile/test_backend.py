@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mbd.compile import backend as module
-from mbd.compile.backend import backend, make_functions
+from mbd.compile.backend import backend
 from mbd.compile.cache import ObjectCache
 from mbd.errors import CapabilityError, UnknownNameError
 from tests.compile.chains import chain
@@ -38,7 +38,10 @@ def test_every_backend_gives_functions_by_name(kind):
 
 
 def test_machine_code_and_plain_python_agree_to_round_off():
-    machine, plain = (make_functions({"r": LINKS.outputs}, LINKS.layout, kind)["r"] for kind in ("llvm", "python"))
+    both = [backend(kind, cache=ObjectCache()).functions(LINKS.layout) for kind in ("llvm", "python")]
+    for functions in both:
+        functions.add({"r": LINKS.outputs})
+    machine, plain = (functions["r"] for functions in both)
     for seed in range(20):
         a, b = results(machine, LINKS, seed), results(plain, LINKS, seed)
         assert np.abs(a - b).max() <= 1e-14 * np.abs(a).max()
@@ -75,13 +78,14 @@ def test_plain_python_needs_no_llvmlite():
     program = """
 import sys
 sys.modules["llvmlite"] = None
-from mbd.compile.backend import make_functions
+from mbd.compile.backend import backend
 from mbd.compile.layout import Layout
 from mbd.tape.node import Tape
 import numpy
 out = numpy.zeros(1)
-make_functions({"f": [2.0 * Tape().input("t")]}, Layout(0, 0, 0, 0, 0, 0, 0), "python")["f"](
-    numpy.array([3.0, 0.0, 0.0]), numpy.zeros(0), out)
+functions = backend("python").functions(Layout(0, 0, 0, 0, 0, 0, 0))
+functions.add({"f": [2.0 * Tape().input("t")]})
+functions["f"](numpy.array([3.0, 0.0, 0.0]), numpy.zeros(0), out)
 print(out[0])
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
