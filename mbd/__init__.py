@@ -44,6 +44,7 @@ if TYPE_CHECKING:
         ModelError as ModelError,
         SimulationError as SimulationError,
         TraceError as TraceError,
+        TrajectoryError as TrajectoryError,
         UnknownNameError as UnknownNameError,
     )
     from mbd.forces import (
@@ -105,7 +106,7 @@ _HOMES = {
     "mbd.constraints": "Bilateral Controller Event Penalty Plane Unilateral When "
     "distance extension flexion height measure separation touchdown",
     "mbd.equations.lagrangian": "Coordinate Lagrangian",
-    "mbd.errors": "AssemblyError CapabilityError MbdError ModelError SimulationError TraceError UnknownNameError",
+    "mbd.errors": "AssemblyError CapabilityError MbdError ModelError SimulationError TraceError TrajectoryError UnknownNameError",
     "mbd.forces": "Applied Damper Motor Potential Samples Spring TorsionSpring",
     "mbd.integrators": "HHT GeneralizedAlpha Newmark",
     "mbd.joints": "Cylindrical Planar Prismatic Revolute Screw Translation Universal Weld",

@@ -95,9 +95,9 @@ def assemble(
     ModelError
         if the model itself has faults.
     """
-    mechanism = mechanism_of(model, backend)
-    manager = ActiveSetManager(mechanism.equations)
     position, velocity, changed = dict(position or {}), dict(velocity or {}), dict(parameters or {})
+    mechanism = mechanism_of(model, backend, changed)
+    manager = ActiveSetManager(mechanism.equations)
     opened = (open,) if isinstance(open, str) else tuple(open)
     closed = (closed,) if isinstance(closed, str) else tuple(closed)
     equations = mechanism.equations
@@ -121,7 +121,7 @@ def assemble(
     work = _Assembly(
         mechanism,
         manager,
-        mechanism.parameters(changed),
+        mechanism.parameters(changed, getattr(model, "parameters", {})),
         q,
         y,
         manager.flags(closed),

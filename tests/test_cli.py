@@ -11,7 +11,7 @@ import pytest
 import mbd
 from mbd import cli
 from mbd.errors import SimulationError
-from tests.view.stand_ins import ball, walker
+from tests.view.stand_ins import walker
 
 WALK = '''"""A walk made by hand."""
 from tests.view.stand_ins import walker
@@ -190,5 +190,17 @@ def test_the_page_opens_when_asked(script, monkeypatch, capsys):
     capsys.readouterr()
 
 
-def test_what_a_stand_in_knows_is_what_a_run_knows():
-    assert ball().success and ball().final is not None
+def test_the_kneed_walker_walks(tmp_path, capsys):
+    """The main job: ten steps of V. F. Hsu Chen's walker, with the period and length of its fixed point."""
+    assert cli.main(["run", "kneed-walker", "--out", str(tmp_path)]) == 0
+    steps = json.loads((tmp_path / "record.json").read_text())["steps"]
+    assert len(steps) == 10 and {step["foot"] for step in steps} == {"left foot", "right foot"}
+    assert steps[-1]["period"] == pytest.approx(0.5643282, abs=1e-5)
+    assert steps[-1]["length"] == pytest.approx(0.4726568, abs=1e-5)
+    assert steps[-1]["deviation"] < 1e-4
+    assert "0.56433" in capsys.readouterr().out
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert len(page) < 1_000_000 and '"left knee lock"' in page
+    run = mbd.load(tmp_path / "run.mbd.npz")
+    standing = run["left foot.force"][run.record.closed[:, 0] == 1]
+    assert standing.min() > 0.0 and abs(run.energy.sums["numerical"]) < 1e-3

@@ -11,6 +11,9 @@
 #include <stdint.h>
 #include <string.h>
 
+static inline double larger(double a, double b) { return b > a ? b : a; } /* one instruction, which fmax is not */
+static inline double smaller(double a, double b) { return b < a ? b : a; }
+
 #include MODEL
 #include "linear.h"
 
@@ -34,17 +37,17 @@ static void refresh_scales(const Model *p, const Point *at, Motion *s)
     for (int i = 0; i < N; i++) {
         int angle = ANGLES >> i & 1;
         if (angle)
-            torque = fmax(torque, s->scale_r[i]);
+            torque = larger(torque, s->scale_r[i]);
         else
-            force = fmax(force, s->scale_r[i]);
-        size[angle] = fmax(size[angle], fabs(at->q[i]));
-        speed[angle] = fmax(speed[angle], fabs(at->v[i]));
+            force = larger(force, s->scale_r[i]);
+        size[angle] = larger(size[angle], fabs(at->q[i]));
+        speed[angle] = larger(speed[angle], fabs(at->v[i]));
     }
     for (int i = 0; i < N; i++)
         s->scale_r[i] = ANGLES >> i & 1 ? torque : force;
     for (int k = 0; k < M; k++) {
-        s->scale_h[k] = fmax(s->scale_h[k], size[ANGLE_ROWS >> k & 1]);
-        s->scale_rate[k] = fmax(s->scale_rate[k], speed[ANGLE_ROWS >> k & 1]);
+        s->scale_h[k] = larger(s->scale_h[k], size[ANGLE_ROWS >> k & 1]);
+        s->scale_rate[k] = larger(s->scale_rate[k], speed[ANGLE_ROWS >> k & 1]);
     }
 }
 
@@ -99,32 +102,20 @@ static double residual_size(const Motion *s, const Point *at, const double r[N],
     double size = 0.0, finite = 0.0, fastest = 0.0, speed = 0.0;
     for (int i = 0; i < N; i++) {
         finite += fabs(r[i]);
-        size = fmax(size, fabs(r[i]) / (tolerance * s->scale_r[i]));
-        fastest = fmax(fastest, fabs(at->a[i]));
-        speed = fmax(speed, fabs(at->v[i]));
+        size = larger(size, fabs(r[i]) / (tolerance * s->scale_r[i]));
+        fastest = larger(fastest, fabs(at->a[i]));
+        speed = larger(speed, fabs(at->v[i]));
     }
     for (int k = 0; k < M; k++) {
         double limit = STABILIZED ? tolerance * C * speed : tolerance * K * fastest;
         finite += fabs(h[k]);
-        size = fmax(size, fabs(h[k]) / (fmax(16.0 * EPS * s->scale_h[k], limit) + 1e-300));
+        size = larger(size, fabs(h[k]) / (larger(16.0 * EPS * s->scale_h[k], limit) + 1e-300));
         if (STABILIZED) {
             finite += fabs(rate[k]);
-            size = fmax(size, fabs(rate[k]) / (fmax(16.0 * EPS * s->scale_rate[k], tolerance * C * fastest) + 1e-300));
+            size = larger(size, fabs(rate[k]) / (larger(16.0 * EPS * s->scale_rate[k], tolerance * C * fastest) + 1e-300));
         }
     }
     return finite < 1e300 ? size : -1.0;
-}
-
-/* Whether an iterate passes; one that stalls is judged against fresh scales, and then against round-off. */
-static int converged(const Model *p, Motion *s, const Point *at, const double r[N], const double h[M],
-                     const double rate[M], double C, double K, double tolerance, int stalled, double *error)
-{
-    *error = residual_size(s, at, r, h, rate, C, K, tolerance);
-    if (*error <= 1.0 || !stalled)
-        return *error <= 1.0;
-    refresh_scales(p, at, s);
-    *error = residual_size(s, at, r, h, rate, C, K, tolerance);
-    return *error <= 1.0 || residual_size(s, at, r, h, rate, 0.0, 0.0, 256.0 * EPS) <= 16.0;
 }
 
 static int step(const Model *p, const Scheme *c, Motion *s, int64_t counts[3])
@@ -156,15 +147,17 @@ static int step(const Model *p, const Scheme *c, Motion *s, int64_t counts[3])
         else
             residual(p, &at, r, h, rate);
         counts[renew ? TANGENTS : RESIDUALS]++;
-        int stalled = 0;
         error = residual_size(s, &at, r, h, rate, C, K, tolerance);
         if (error < 0.0)
             return 1;
-        stalled = iteration >= 2 && error > 0.5 * before;
-        if (error <= 1.0 || (stalled && converged(p, s, &at, r, h, rate, C, K, tolerance, 1, &error))) {
-            accepted = 1;
-            break;
+        accepted = error <= 1.0;
+        if (!accepted && iteration >= 2 && error > 0.5 * before) { /* stalled: fresh scales, then round-off decide */
+            refresh_scales(p, &at, s);
+            error = residual_size(s, &at, r, h, rate, C, K, tolerance);
+            accepted = error <= 1.0 || residual_size(s, &at, r, h, rate, 0.0, 0.0, 256.0 * EPS) <= 16.0;
         }
+        if (accepted)
+            break;
         if (!renew && error > 0.1 * before) { /* the old tangent has done its work: renew it at the same iterate */
             fresh = 0;
             before = 1e300;
@@ -197,10 +190,10 @@ static int step(const Model *p, const Scheme *c, Motion *s, int64_t counts[3])
         if (iteration == 0) { /* stay far below the error of the step, which the predictor's error measures */
             double biggest = 0.0, fastest = 1e-300;
             for (int i = 0; i < N; i++) {
-                biggest = fmax(biggest, fabs(b[i]));
-                fastest = fmax(fastest, fabs(at.a[i]));
+                biggest = larger(biggest, fabs(b[i]));
+                fastest = larger(fastest, fabs(at.a[i]));
             }
-            tolerance = fmin(c->tolerance, fmax(1e-4 * biggest / fastest, tolerance));
+            tolerance = smaller(c->tolerance, larger(1e-4 * biggest / fastest, tolerance));
         }
         for (int i = 0; i < N; i++) {
             at.a[i] += b[i];
@@ -232,7 +225,8 @@ static int step(const Model *p, const Scheme *c, Motion *s, int64_t counts[3])
     return 0;
 }
 
-/* Many steps from q, v; a row (q, v, a, lam) is stored every `stride` steps, the start first. 0, or the step that failed. */
+/* Many steps from q, v, with a row (q, v, a, lam) stored every `stride` of them, the start first.
+   Returns 0, or the number of the step that failed (-1: the start). */
 int64_t run(const Model *p, const Scheme *scheme, const double *q, const double *v, int64_t steps, int64_t stride,
             double *store, int64_t counts[3])
 {
@@ -242,11 +236,14 @@ int64_t run(const Model *p, const Scheme *scheme, const double *q, const double 
     if (start(p, scheme, &s))
         return -1;
     memcpy(store, &s.now, sizeof s.now);
-    for (int64_t k = 1; k <= steps; k++) {
+    for (int64_t k = 1, since = 0; k <= steps; k++) {
         if (step(p, scheme, &s, counts))
             return k;
-        if (k % stride == 0)
-            memcpy(store += sizeof s.now / sizeof *store, &s.now, sizeof s.now);
+        if (++since < stride)
+            continue;
+        since = 0;
+        store += sizeof s.now / sizeof *store;
+        memcpy(store, &s.now, sizeof s.now);
     }
     return 0;
 }

@@ -71,6 +71,7 @@ class Mechanism:
         self.common.add(common)
         self.vector = composed is None
         self.named: dict[str, Any] = {}
+        self.notes: list[str] = []
         self._modes: dict[tuple[tuple[int, ...], tuple[int, ...], bool], ModeCode] = {}
         self.seconds = perf_counter() - started
 
@@ -95,8 +96,12 @@ class Mechanism:
         """How many contact modes have code."""
         return len(self._modes)
 
-    def parameters(self, values: Mapping[str, float] | None = None) -> Vector:
+    def parameters(
+        self, values: Mapping[str, float] | None = None, folded: Mapping[str, float] | None = None
+    ) -> Vector:
         """The parameter vector, with some values replaced by name; tables follow.
+
+        A value equal to the one that `folded` gives for its name is already part of the equations.
 
         Raises
         ------
@@ -106,8 +111,10 @@ class Mechanism:
         names = [parameter.name for parameter in self.equations.parameters]
         p = [parameter.value for parameter in self.equations.parameters]
         for name, value in (values or {}).items():
+            if name not in names and (folded or {}).get(name) == value:
+                continue
             if name not in names:
-                raise UnknownNameError(nearest(name, names, "run-time parameter"))
+                raise UnknownNameError(nearest(name, {*names, *(folded or {})}, "parameter"))
             p[names.index(name)] = float(value)
         for table in self.equations.tables:
             p += table.flat

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import threading
+from collections.abc import Mapping
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -11,7 +13,7 @@ from mbd.equations.derivation import derive
 
 __all__ = ["mechanism_of"]
 
-_KNOWN: WeakKeyDictionary[Any, dict[str, tuple[Any, Mechanism]]] = WeakKeyDictionary()
+_KNOWN: WeakKeyDictionary[Any, dict[tuple[str, frozenset[str]], tuple[Any, Mechanism]]] = WeakKeyDictionary()
 _LOCK = threading.Lock()
 
 
@@ -27,19 +29,40 @@ def _same(old: Any, new: Any) -> bool:
     return alike and old[1:] == new[1:]
 
 
-def mechanism_of(model: Any, backend: str = "auto") -> Mechanism:
+def mechanism_of(model: Any, backend: str = "auto", changed: Mapping[str, float] | None = None) -> Mechanism:
     """The mechanism of a model; derived again only if the model has changed since.
 
     Parameters
     ----------
     backend : 'auto', 'llvm' (machine code) or 'python' (the plain twin)
+    changed : parameter values that are wanted; an exact 0 or ±1 of the model among them, which is folded into the
+        equations, is made a run-time input (one more derivation, noted in `Mechanism.notes`)
     """
+    mechanism = _mechanism(model, backend, frozenset())
+    inputs = {parameter.name for parameter in mechanism.equations.parameters}
+    values = getattr(model, "parameters", {})
+    wanted = {name for controller in getattr(model, "controllers", ()) for name in controller.writes}
+    wanted |= {name for name, value in (changed or {}).items() if values.get(name) != value}
+    structural = frozenset(name for name in wanted - inputs if name in values)
+    return _mechanism(model, backend, structural) if structural else mechanism
+
+
+def _mechanism(model: Any, backend: str, tunable: frozenset[str]) -> Mechanism:
     now = _description(model)
     with _LOCK:
-        known = _KNOWN.setdefault(model, {}).get(backend)
+        known = _KNOWN.setdefault(model, {}).get((backend, tunable))
     if known is not None and _same(known[0], now):
         return known[1]
-    made = Mechanism(derive(model), backend)
+    described = model
+    if tunable:
+        described = copy.copy(model)
+        described.tunable = (*model.tunable, *sorted(tunable))
+    made = Mechanism(derive(described), backend)
+    if tunable:
+        names = ", ".join(map(repr, sorted(tunable)))
+        made.notes.append(
+            f"derived once more with {names} as run-time input; name it in tunable=[…] of the model to avoid it"
+        )
     with _LOCK:
-        _KNOWN[model][backend] = (now, made)
+        _KNOWN[model][backend, tunable] = (now, made)
     return made

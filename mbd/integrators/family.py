@@ -206,8 +206,11 @@ class _Step:
         """Largest residual over its tolerance, each block apart."""
         tolerance = self.tolerance
         fastest = float(np.max(np.abs(self.rate[: self.n_v]), initial=0.0))
-        size = np.abs(terms.S) @ np.abs(self.rate) if terms.S is not None else np.abs(terms.r)
-        scale_r = np.full(len(terms.r), np.max(size, initial=0.0)) if terms.scale_r is None else terms.scale_r
+        # rates of the start and of the prediction too: where a force passes zero it has no size of its own
+        change = np.maximum(np.abs(self.memory.rate), np.abs(self.dt * self.memory.slope))
+        size = np.abs(terms.S) @ np.maximum(np.abs(self.rate), change) if terms.S is not None else np.abs(terms.r)
+        own = np.full(len(terms.r), np.max(size, initial=0.0)) if terms.scale_r is None else terms.scale_r
+        scale_r = np.maximum(own, size)
         parts = [np.abs(terms.r) / (tolerance * np.maximum(scale_r, 1e-280))]
         if len(terms.h):
             floor = 16.0 * EPS * (np.ones(len(terms.h)) if terms.scale_h is None else terms.scale_h)

@@ -33,8 +33,18 @@ from mbd.kernel.fields import (
     SWITCHES,
     WATCH,
 )  # fmt: skip
-from mbd.kernel.guards import gap_scale, gap_tolerance, is_watched, judge, locate, try_step, update_armed, update_sides, watch
+from mbd.kernel.guards import (
+    gap_scale,
+    gap_tolerance,
+    is_watched,
+    judge,
+    try_step,
+    update_armed,
+    update_sides,
+    watch,
+)  # fmt: skip
 from mbd.kernel.hooks import scheme_accept, scheme_start
+from mbd.kernel.locate import locate
 from mbd.kernel.restart import (
     active_rows,
     capture,
@@ -393,7 +403,8 @@ def advance(K: Any) -> int:
             return PAUSE
         steps += 1
         t1 = K.clock[BASE] + (K.state[GRID] + 1) * K.dt
-        if t1 > K.until - 1e-6 * K.dt:
+        cut = t1 > K.until - 1e-6 * K.dt
+        if cut:
             t1 = K.until
         h = t1 - t
         status = try_step(K, h, t1)
@@ -420,6 +431,9 @@ def advance(K: Any) -> int:
         else:
             accept(K, h, t1)
             K.state[GRID] += 1
+            if cut:  # a boundary inside the run: the grid goes on from here
+                K.clock[BASE] = t1
+                K.state[GRID] = 0
         K.state[SINCE_STORE] += 1
         if K.state[SINCE_STORE] >= K.stride:
             store_row(K)

@@ -1,7 +1,7 @@
-"""Judging a step: which guard fired first, and at which instant exactly.
+"""Judging a step: which guard fired first.
 
 A watched gap fires when it falls through zero, also when it dips below zero and returns within
-the step (cubic Hermite interpolant, then the dip itself is stepped to). A contact that is not
+the step (cubic Hermite interpolant; `locate` then steps to the dip itself). A contact that is not
 armed is ignored until its gap has risen above zero. Closed contacts fire by their release rule.
 """
 
@@ -13,9 +13,8 @@ from mbd.kernel.fields import (
     CLOSE,
     CROSS,
     EPS,
+    GRAZE,
     GUARDS,
-    LOCATIONS,
-    NO_LOCATION,
     NOT_FINITE,
     NOW,
     OPEN_FORCE,
@@ -26,9 +25,10 @@ from mbd.kernel.fields import (
 from mbd.kernel.hooks import call, scheme_step
 from mbd.kernel.restart import compose, consistent, fill_block
 
-__all__ = ["gap_scale", "judge", "locate", "try_step", "update_armed", "update_sides", "watch"]
-
-GRAZE = 6
+__all__ = [
+    "gap_scale", "gap_tolerance", "guard_value", "is_watched", "judge", "try_step", "update_armed", "update_sides",
+    "watch",
+]  # fmt: skip
 
 
 def watch(K: Any, t: float, q: Any, y: Any, rate: Any, lam: Any, values: Any) -> None:
@@ -202,7 +202,7 @@ def judge(K: Any, h: float) -> bool:
 
 
 def judge_user(K: Any, e: int, h: float) -> None:
-    """Whether a user's guard crosses zero from its side; one that has just fired must leave zero before."""
+    """Whether a user's guard crosses zero from its side; one that still rises from there does so after its top."""
     place = 4 * K.n_contacts + e
     side = K.side[e]
     v0 = side * K.guards0[place]
@@ -212,9 +212,8 @@ def judge_user(K: Any, e: int, h: float) -> None:
     d0 = side * K.guards0[place + K.n_guards] * h
     d1 = side * K.guards1[place + K.n_guards] * h
     top = hermite_turn(v0, v1, d0, d1, True) if d0 > 0.0 else -1.0
-    peak = hermite(v0, v1, d0, d1, top) if top > 0.0 else -1.0
-    if peak > max(v0, 0.0):
-        consider(K, CROSS, e, top + (1.0 - top) * crossing(peak, v1), top)
+    if top > 0.0:
+        consider(K, CROSS, e, top + (1.0 - top) * crossing(max(hermite(v0, v1, d0, d1, top), 0.0), v1), top)
     else:
         consider(K, CROSS, e, crossing(v0, v1) if v0 > 0.0 else 0.0, 0.0)
 
@@ -235,184 +234,3 @@ def guard_value(K: Any, kind: int, index: int, t1: float) -> float:
     if consistent(K, t1, K.q1, K.y1) != 0:
         return float(-K.lam1[K.normal[index]])
     return float(-K.impulse[K.normal[index]])
-
-
-def stay(K: Any) -> None:
-    """The candidate becomes the accepted state itself: an event at the very start of the step."""
-    for i in range(K.n_q):
-        K.q1[i] = K.q[i]
-    for i in range(K.n):
-        K.y1[i] = K.y[i]
-        K.rate1[i] = K.rate[i]
-        K.aux1[i] = K.aux[i]
-    for k in range(K.n_rows):
-        K.lam1[k] = K.lam[k]
-    for i in range(4 * K.n_contacts + 2 * K.n_guards):
-        K.guards1[i] = K.guards0[i]
-
-
-def dip(K: Any, h: float) -> int:
-    """Step to the lowest point of a grazing gap; a real dip becomes a closing, else the guard keeps quiet."""
-    t = K.clock[NOW]
-    c = K.fired[1]
-    nC = K.n_contacts
-    low = 0.0
-    high = h
-    rate_low = K.guards0[nC + c]
-    rate_high = K.guards1[nC + c]
-    place = K.pick[0] * h
-    for _ in range(30):
-        status = try_step(K, place, t + place)
-        if status != 0:
-            return status
-        if K.guards1[c] < -gap_tolerance(K, c):
-            K.fired[0] = CLOSE
-            K.pick[0] = place
-            K.pick[1] = 0.0
-            return 0
-        rate = K.guards1[nC + c]
-        if rate == 0.0 or high - low < 1e-7 * h:
-            break
-        if rate < 0.0:
-            low = place
-            rate_low = rate
-        else:
-            high = place
-            rate_high = rate
-        place = low + (high - low) * min(max(rate_low / (rate_low - rate_high), 0.02), 0.98)
-    K.active[c] = 1
-    K.fired[0] = -1
-    return try_step(K, h, t + h)
-
-
-def locate(K: Any, h: float) -> int:
-    """Move the candidate to the instant of the first event of the step; K.pick[2] its distance from the start.
-
-    Bracketing (Illinois variant of the false position) on steps of varying size from the same accepted state,
-    until the guard is at round-off. K.fired[0] < 0 afterwards: there was no event, the candidate is the full step.
-    """
-    t = K.clock[NOW]
-    end = h
-    for _ in range(4 * (K.n_contacts + K.n_guards) + 4):
-        kind = K.fired[0]
-        index = K.fired[1]
-        if kind == GRAZE:
-            status = dip(K, end)
-            if status != 0:
-                return status
-            if K.fired[0] < 0:
-                if not judge(K, end):
-                    K.pick[2] = end
-                    return 0
-                continue
-            kind = CLOSE
-            end = K.pick[0]
-            estimate = 0.5
-            low = 0.0
-        else:
-            estimate = K.pick[0]
-            low = K.pick[1] * end
-        status = bracket(K, kind, index, low, end, estimate)
-        if status != 0:
-            return status
-        if K.fired[0] < 0:
-            status = try_step(K, end, t + end)
-            if status != 0:
-                return status
-            if not judge(K, end):
-                K.pick[2] = end
-                return 0
-            continue
-        found = K.pick[2]
-        if found <= 0.0:
-            return 0
-        if kind == CLOSE and not is_watched(K, index, K.guards1):  # no longer watched when it gets there
-            K.active[index] = 1
-            K.fired[0] = -1
-            status = try_step(K, end, t + end)
-            if status != 0:
-                return status
-            if not judge(K, end):
-                K.pick[2] = end
-                return 0
-            continue
-        # did another guard fire before this one? (this one is at round-off and may look fired itself)
-        place = index if kind != CROSS else K.n_contacts + index
-        quiet = K.active[place]
-        K.active[place] = 1
-        other = judge(K, found)
-        K.active[place] = quiet
-        if not other:
-            K.fired[0] = kind
-            K.fired[1] = index
-            K.pick[2] = found
-            return 0
-        end = found
-    return NO_LOCATION
-
-
-def bracket(K: Any, kind: int, index: int, low: float, high: float, estimate: float) -> int:
-    """Root of the fired guard between two distances from the accepted state."""
-    t = K.clock[NOW]
-    K.counts[LOCATIONS] += 1
-    f_high = guard_value(K, kind, index, t + high)
-    if f_high >= 0.0:
-        if kind == OPEN_PULL:  # only the multiplier of the step was negative, not that of the motion
-            K.active[index] = 1
-            K.fired[0] = -1
-        K.pick[2] = high
-        return 0
-    if low > 0.0:
-        status = try_step(K, low, t + low)
-        if status != 0:
-            return status
-    else:
-        stay(K)
-    f_low = guard_value(K, kind, index, t + low)
-    if f_low <= 0.0 and kind != WATCH:
-        if low > 0.0:
-            low = 0.0
-            stay(K)
-        K.pick[2] = low
-        return 0
-    tiny = 0.0
-    if kind == CLOSE or kind == OPEN_GAP:
-        tiny = 0.25 * gap_tolerance(K, index)
-    elif kind != WATCH:
-        tiny = 1e-15 * max(f_low, -f_high)
-    side = 0
-    place = low
-    for trial in range(80):
-        place = low + (high - low) * f_low / (f_low - f_high)
-        if trial == 0 and kind == CLOSE and low == 0.0 and 0.0 < estimate < 1.0 and K.linear == 0:
-            place = high * estimate
-        if not (low < place < high):
-            place = 0.5 * (low + high)
-        status = try_step(K, place, t + place)
-        if status != 0:
-            return status
-        value = guard_value(K, kind, index, t + place)
-        if K.linear == 1 or abs(value) <= tiny or high - low <= 4.0 * EPS * max(abs(t), high):
-            break
-        if value < 0.0:
-            high = place
-            f_high = value
-            if side == -1:
-                f_low *= 0.5
-            side = -1
-        else:
-            low = place
-            f_low = value
-            if side == 1:
-                f_high *= 0.5
-            side = 1
-        if side != 0 and trial % 12 == 11:
-            f_low = f_high = 1.0
-            f_high = -1.0
-    if kind == WATCH and guard_value(K, kind, index, t + place) >= 0.0:  # end where it is watched, or it fires again
-        place = high
-        status = try_step(K, place, t + place)
-        if status != 0:
-            return status
-    K.pick[2] = place
-    return 0

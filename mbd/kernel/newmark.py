@@ -28,7 +28,7 @@ from mbd.kernel.fields import (
 )  # fmt: skip
 from mbd.kernel.hooks import call
 from mbd.kernel.linear import factor, solve
-from mbd.kernel.restart import compose, consistent, fill_block, refresh_scales
+from mbd.kernel.restart import compose, consistent, fill_block, raise_scales, refresh_scales
 
 __all__ = ["newmark_accept", "newmark_start", "newmark_step"]
 
@@ -55,6 +55,12 @@ def newmark_start(K: Any) -> int:
     K.clock[AUX_STEP] = K.dt
     fill_block(K, t, K.q, K.y)
     refresh_scales(K)
+    for i in range(n):  # a force that is zero just now has its size a step later
+        K.block[K.o_a + i] += K.dt * K.slope[i]
+        K.block[K.o_v + i] += K.dt * K.rate[i]
+        if i < K.n_v:
+            K.block[K.o_x + i] = K.dt * (K.y[i] + 0.5 * K.dt * K.rate[i])
+    raise_scales(K)
     return 0
 
 
@@ -146,7 +152,7 @@ def newmark_step(K: Any, h: float, t1: float) -> int:
             accepted = True
             break
         if iteration >= 2 and error > 0.5 * before:
-            refresh_scales(K)
+            raise_scales(K)
             error = residual_size(K, o_r, m, c_C, c_K, tolerance)
             if error <= 1.0:
                 accepted = True

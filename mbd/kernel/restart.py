@@ -27,7 +27,7 @@ from mbd.kernel.linear import eliminate
 
 __all__ = [
     "active_rows", "capture", "complementarity", "compose", "consistent", "evaluate", "fill_block", "impact",
-    "refresh_scales", "solve_rows",
+    "raise_scales", "refresh_scales", "solve_rows",
 ]  # fmt: skip
 
 
@@ -86,6 +86,16 @@ def refresh_scales(K: Any) -> None:
                     size = max(size, abs(K.block[K.o_q + i]))
         K.scale[K.n + k] = max(K.scale[K.n + k], size)
         K.scale[K.n + K.n_rows + k] = max(K.scale[K.n + K.n_rows + k], speed)
+
+
+def raise_scales(K: Any) -> None:
+    """Magnitudes at the state now in the block where they exceed those known; where a force passes zero it has none."""
+    known = K.n + 2 * K.n_rows
+    for i in range(known):
+        K.work[i] = K.scale[i]
+    refresh_scales(K)
+    for i in range(known):
+        K.scale[i] = max(K.scale[i], K.work[i])
 
 
 def active_rows(K: Any, flags: Any) -> int:

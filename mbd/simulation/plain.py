@@ -145,10 +145,11 @@ class PlainScheme:
         self.report = StepReport(True)
 
     def _state(self, K: Any) -> tuple[State, Mode, list[int]]:
-        mode = self.manager.mode(K.closed)
+        flags = K.closed[: K.n_contacts]
+        mode = self.manager.mode(flags)
         n_v = K.n_v
         state = State(float(K.clock[NOW]), K.q.copy(), K.y[:n_v].copy(), K.y[n_v:].copy(), mode)
-        return state, mode, list(self.manager.active_rows(K.closed))
+        return state, mode, list(self.manager.active_rows(flags))
 
     def start(self, K: Any) -> int:
         """Memory at the accepted state, whose rates are consistent; sizes of the residual for the guards."""

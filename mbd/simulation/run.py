@@ -51,7 +51,8 @@ class Run:
         self.mechanism, self.manager, self.start, self.end, self.stop = mechanism, manager, start, end, stop
         self.settings, self.changed, self.dt = settings, dict(changed), dt
         rows = int(min(ROWS_AT_ONCE, (end - start.time) / dt / options.get("store", 1) + 64))
-        parameters = mechanism.parameters(changed)
+        self.folded = getattr(model, "parameters", {})
+        parameters = mechanism.parameters(changed, self.folded)
         self.first_parameters = parameters.copy()
         compiled_options = {**options, "capacity": rows + 8}
         self.stepper = Stepper(mechanism, manager, integrator, parameters, dt, compiled_options)
@@ -204,7 +205,7 @@ class Run:
     def change_parameters(self, values: Mapping[str, float]) -> None:
         """New parameter values from now on; the scheme restarts from them."""
         self.changed.update(values)
-        self.values["params"][: len(self.first_parameters)] = self.mechanism.parameters(self.changed)
+        self.values["params"][: len(self.first_parameters)] = self.mechanism.parameters(self.changed, self.folded)
         self.parameter_changes.append((self.stored + int(self.values["state"][F.STORED]), self.values["params"].copy()))
         self.values["state"][F.RESTART] = 1
 
@@ -256,7 +257,7 @@ class Run:
 
     def _notes(self) -> list[str]:
         """What the user should know of contacts that were ignored on purpose."""
-        v, notes = self.values, []
+        v, notes = self.values, list(self.mechanism.notes)
         for c, contact in enumerate(self.manager.contacts):
             if v["deepest"][c] < -1e-9:
                 notes.append(

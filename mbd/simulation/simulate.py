@@ -80,7 +80,8 @@ def simulate(
     if faults:
         raise ModelError(faults)
     assert dt is not None
-    mechanism = mechanism_of(model, backend)
+    changed = {**start.parameters, **(parameters or {})}
+    mechanism = mechanism_of(model, backend, changed)
     manager = ActiveSetManager(mechanism.equations)
     _fits(start, mechanism.equations, manager)
     end, stop = _end(until, manager, dt, start.time)
@@ -93,7 +94,6 @@ def simulate(
         "contact": contact, "impact": impact, "locate": locate, "store": store, "rest_speed": rest_speed,
         "backend": mechanism.backend.name, "versions": _versions(),
     }  # fmt: skip
-    changed = {**start.parameters, **(parameters or {})}
     options = {"locate": locate, "store": store, "rest_speed": rest_speed}
     run = Run(model, mechanism, manager, scheme, start, float(dt), end, stop, changed, options, settings)
     run.observe(observers, _bar(progress, start.time, end))
@@ -104,8 +104,8 @@ def simulate(
 
 
 def _faults(
-    scheme: Any, start: Any, dt: Any, tol: Any, until: Any, contact: Any, impact: Any, locate: Any, store: Any, on_failure: Any,
-    rest_speed: Any,
+    scheme: Any, start: Any, dt: Any, tol: Any, until: Any, contact: Any, impact: Any, locate: Any, store: Any,
+    on_failure: Any, rest_speed: Any,
 ) -> list[str]:  # fmt: skip
     """Everything that is wrong with the arguments themselves."""
     faults = []

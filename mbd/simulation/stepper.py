@@ -97,13 +97,13 @@ class Stepper:
         size = n + rows
         reals = {
             "block": self.mechanism.layout.size, "out": size * size + n + 2 * rows, "clock": 4,
-            "acc": self.mechanism.sizes["accelerations"], "q": n_q, "y": n, "rate": n, "aux": n, "slope": n, "lam": rows, "lam_slope": rows, "shift": n,
-            "shift_change": n,
+            "acc": self.mechanism.sizes["accelerations"], "q": n_q, "y": n, "rate": n, "aux": n, "slope": n,
+            "lam": rows, "lam_slope": rows, "shift": n, "shift_change": n,
             "anchors": v["n_anchors"], "q1": n_q, "y1": n, "rate1": n, "aux1": n, "lam1": rows, "shift1": n,
             "kkt": size * size, "rhs": size, "work": 3 * size, "force": n, "bias": rows, "jump": n, "impulse": rows,
             "guards0": 4 * contacts + 2 * guards, "guards1": 4 * contacts + 2 * guards, "scale": n + 2 * rows,
-            "deepest": contacts, "sinking": contacts, "side": guards, "pick": 8, "detail": 8, "store": v["capacity"] * v["width"],
-            "log": v["event_capacity"] * v["event_width"],
+            "deepest": contacts, "sinking": contacts, "side": guards, "pick": 8, "detail": 8,
+            "store": v["capacity"] * v["width"], "log": v["event_capacity"] * v["event_width"],
         }  # fmt: skip
         integers = {
             "unit": n, "notify": contacts + guards, "terminal": contacts + guards, "closed": contacts,

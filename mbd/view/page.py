@@ -153,13 +153,17 @@ def _charts(run: Trajectory, instants: Instants) -> list[dict[str, Any]]:
     """The energies, then the coordinates and their rates by unit."""
     ledger = run.energy
     floor = float(np.min(ledger.potential))
-    spent = [part for part in ledger.parts if part.kind in SPENT and np.any(part.energy)]
-    gone = -sum((part.energy for part in spent), np.zeros(len(ledger.time)))
+    acting = [part for part in ledger.parts if np.any(part.energy)]
+    spent = [part for part in acting if part.kind in SPENT]
+    given = [part for part in acting if part.kind not in SPENT]
+    none = np.zeros(len(ledger.time))
+    gone, gained = -sum((part.energy for part in spent), none), sum((part.energy for part in given), none)
     series = [
         ("total", "ink", ledger.total - floor),
         ("kinetic", CYCLE[2], ledger.kinetic),
         ("potential", CYCLE[3], ledger.potential - floor),
         *([("lost", CYCLE[4], gone)] if spent else []),
+        *([("put in", CYCLE[5], gained)] if given else []),
     ]
     columns = [(name, shade, instants.blend(run, column)) for name, shade, column in series]
     charts = [_chart("energy", "J", columns)]

@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+import mbd
 from mbd.analysis.gait import gait, mirrored
 from mbd.equations.equations import Row
 from mbd.errors import UnknownNameError
@@ -90,6 +91,53 @@ def test_a_potential_that_moves_with_time_does_work():
     q, v, a = t - np.sin(2.0 * t) / 2.0, 1.0 - np.cos(2.0 * t), 2.0 * np.sin(2.0 * t)
     ledger = Trajectory(record(equations, t, q[:, None], v[:, None], a[:, None])).energy
     assert ledger.drift < 1e-7 and [part.name for part in ledger.parts] == ["changing potential"]
+
+
+def stopped_leg(dt: float) -> Trajectory:
+    """A driven leg with losses, a spring and a penalty knee stop that closes."""
+    model = mbd.Model("stopped leg")
+    thigh = mbd.Link("thigh", mass=1.0, length=0.5, center=0.2)
+    shank = mbd.Link("shank", mass=0.5, length=0.5, center=0.2, inertia=0.01)
+    knee = mbd.Revolute("knee", thigh.end, shank.start, loss=mbd.Viscous(0.05) + mbd.Quadratic(0.02))
+    model.connect(mbd.Revolute("hip", model.ground.origin, thigh.start, loss=mbd.Viscous(0.1)), knee)
+    model.constrain(mbd.Penalty("stop", mbd.flexion(knee), stiffness=500.0, damping=2.0))
+    model.apply(
+        mbd.Applied("push", shank.end, force=lambda t: (3.0 * mbd.sin(5.0 * t), 0.0, 0.0)),
+        mbd.Spring("band", model.ground.point(0.3, 0.0), shank.end, stiffness=30.0, length=0.4),
+    )
+    start = mbd.assemble(model, position={"hip.angle": 0.5, "knee.angle": -0.3}, velocity={"knee.rate": 4.0})
+    return mbd.simulate(model, start, mbd.HHT(alpha=0.05), dt=dt, until=1.0)
+
+
+def test_what_the_ledger_leaves_over_falls_with_the_step_as_the_scheme_promises():
+    runs = [stopped_leg(dt) for dt in (2e-3, 1e-3, 5e-4)]
+    left = [abs(float(run.energy.numerical[-1])) for run in runs]
+    assert all(1.7 < np.log2(a / b) < 2.3 for a, b in pairwise(left))
+    last = runs[-1].energy
+    assert {part.name for part in last.parts} == {"hip loss", "knee loss", "push", "stop"}
+    assert last.sums["stop"] < 0.0 < last.sums["push"] and runs[-1].events[0].name == "stop"
+    assert last.drift < 1e-4
+
+
+def test_the_drive_of_a_slider_crank_gives_back_what_it_takes():
+    """At constant crank speed the energy after one turn is that of the start: the drive's net work is zero."""
+    model = mbd.Model("slider-crank", gravity=(0.0, 0.0, 0.0))
+    crank = mbd.Link("crank", mass=0.5, length=0.1, center=0.05)
+    rod = mbd.Link("rod", mass=0.5, length=0.3, center=0.15)
+    slider = mbd.PointMass("slider", mass=0.4)
+    turn = mbd.Revolute("turn", model.ground.origin, crank.start)
+    model.connect(
+        turn, mbd.Revolute("pin", crank.end, rod.start), mbd.Prismatic("guide", model.ground.origin, slider.origin),
+        mbd.Revolute("wrist", rod.end, slider.origin),
+    )  # fmt: skip
+    model.constrain(mbd.Bilateral("drive", turn, value=lambda t: 10.0 * t))
+    reach = float(np.arccos(-1.0 / 3.0))  # from the end of the hanging crank up to y = 0
+    pose = {"turn.angle": 0.0, "pin.angle": reach}
+    start = mbd.assemble(model, position=pose, velocity={"turn.rate": 10.0})
+    run = mbd.simulate(model, start, mbd.GeneralizedAlpha(rho_inf=0.9), dt=1e-3, until=0.2 * np.pi)
+    work = run.energy["drive"]
+    assert np.ptp(work) > 0.1 and abs(work[-1]) < 1e-3 * np.ptp(work)
+    np.testing.assert_allclose(run.energy.total - run.energy.total[0], work, atol=1e-4 * np.ptp(work))
 
 
 def test_the_ledger_prints_and_names_its_parts():

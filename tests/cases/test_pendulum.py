@@ -39,7 +39,7 @@ def test_a_wide_swing_keeps_its_phase_to_second_order(form: str, scheme: Newmark
 @pytest.mark.parametrize(("form", "scheme"), PAIRS)
 def test_any_swing_follows_its_equation_of_motion(form: str, scheme: NewmarkFamily) -> None:
     swing = FORMS[form](length=0.7, mass=2.3, gravity=3.7)
-    start, until = swing.start(-2.6, 0.4), 5.0
+    start, until = swing.start(-2.6, 0.4), 4.4
     angle, rate = integrated(pendulum(0.7, 3.7), [-2.6, 0.4], until)
     tension = 2.3 * (0.7 * rate**2 + 3.7 * math.cos(angle))
 
@@ -47,7 +47,7 @@ def test_any_swing_follows_its_equation_of_motion(form: str, scheme: NewmarkFami
         run = last(swing, start, scheme, round(until / dt), until)
         return [swing.angle(run)[-1] - angle, swing.rate(run)[-1] - rate, swing.tension(run)[-1] - tension]
 
-    assert_second_order(errors, 0.0025)
+    assert_second_order(errors, 0.002)
 
 
 @pytest.mark.parametrize("form", WITH_EVENTS)

@@ -1,0 +1,1 @@
+"""What `mbd` costs, measured: see README.md here, and run ``python -m benchmarks``."""

@@ -1,0 +1,92 @@
+"""The hand-written C loops of `c/`, compiled here and now with what this machine offers."""
+
+from __future__ import annotations
+
+import ctypes
+import shutil
+import subprocess
+from collections.abc import Sequence
+from dataclasses import astuple, dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from mbd import State
+from mbd.integrators.family import NewmarkFamily
+
+__all__ = ["FLAGS", "Motion", "Program", "compiler", "compiler_version"]
+
+HERE = Path(__file__).with_name("c")
+FLAGS = ("-O3", "-march=native")
+
+
+def compiler() -> str | None:
+    """Path of the C compiler, None where there is none."""
+    return shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
+
+
+def compiler_version() -> str:
+    """One line that says which compiler it is."""
+    found = compiler()
+    if found is None:
+        return "no C compiler found"
+    return subprocess.run([found, "--version"], capture_output=True, text=True, check=True).stdout.splitlines()[0]
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What a C loop computed.
+
+    rows (stored, 3 n + m): q, v, a, λ; seconds of wall time; counts of tangents, residuals and iterations.
+    """
+
+    rows: np.ndarray[Any, np.dtype[np.float64]]
+    seconds: float
+    counts: tuple[int, int, int]
+
+
+class Program:
+    """One model in one formulation as a C loop.
+
+    Parameters
+    ----------
+    source : header of the model in `c/`
+    sizes : degrees of freedom and rows
+    numbers : dataclass of the model's parameters, in the order of the C struct
+    names : coordinates in the order of the C code
+    """
+
+    def __init__(self, source: str, sizes: tuple[int, int], numbers: Any, names: Sequence[str], stabilized: bool):
+        self.width = 3 * sizes[0] + sizes[1]
+        self.numbers = np.array(astuple(numbers))
+        self.names = tuple(names)
+        command = [str(compiler()), *FLAGS, "-shared", "-fPIC", f'-DMODEL="{source}"', f"-DSTABILIZED={int(stabilized)}"]
+        with TemporaryDirectory() as folder:
+            library = Path(folder) / "loop.so"
+            subprocess.run([*command, str(HERE / "newmark.c"), "-lm", "-o", str(library)], check=True)
+            self._run = ctypes.CDLL(str(library)).run
+        pointers, integers = [ctypes.c_void_p] * 4, [ctypes.c_int64] * 2
+        self._run.argtypes = [*pointers, *integers, ctypes.c_void_p, ctypes.c_void_p]
+        self._run.restype = ctypes.c_int64
+
+    def order(self, start: State) -> list[int]:
+        """Where the coordinates of the C code stand in those of the model."""
+        return [start.names.index(name) for name in self.names]
+
+    def run(self, start: State, scheme: NewmarkFamily, dt: float, steps: int, stride: int) -> Motion:
+        """Steps from a consistent state; one row of results every `stride` of them."""
+        order, c = self.order(start), scheme.coefficients
+        settings = np.array([c.alpha_m, c.alpha_f, c.beta, c.gamma, scheme.tolerance, dt])
+        q, v = start.q[order], start.v[order]
+        rows, counts = np.zeros((steps // stride + 1, self.width)), np.zeros(3, dtype=np.int64)
+        arrays = [array.ctypes.data for array in (self.numbers, settings, q, v)]
+        began = perf_counter()
+        failed = self._run(*arrays, steps, stride, rows.ctypes.data, counts.ctypes.data)
+        seconds = perf_counter() - began
+        if failed:
+            raise ArithmeticError(f"the C loop failed in step {failed}")
+        tangents, residuals, iterations = (int(count) for count in counts)
+        return Motion(rows, seconds, (tangents, residuals, iterations))

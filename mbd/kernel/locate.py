@@ -1,0 +1,264 @@
+"""The instant at which a guard fired, exactly: steps of varying size from the same accepted state."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mbd.kernel.fields import CLOSE, CROSS, EPS, GRAZE, LOCATIONS, NO_LOCATION, NOW, OPEN_GAP, OPEN_PULL, WATCH
+from mbd.kernel.guards import gap_tolerance, guard_value, hermite, is_watched, judge, try_step
+
+__all__ = ["locate"]
+
+SAME = 1e-9
+"""Events closer than this part of the way to the first are one event."""
+
+
+def stay(K: Any) -> None:
+    """The candidate becomes the accepted state itself: an event at the very start of the step."""
+    for i in range(K.n_q):
+        K.q1[i] = K.q[i]
+    for i in range(K.n):
+        K.y1[i] = K.y[i]
+        K.rate1[i] = K.rate[i]
+        K.aux1[i] = K.aux[i]
+    for k in range(K.n_rows):
+        K.lam1[k] = K.lam[k]
+    for i in range(4 * K.n_contacts + 2 * K.n_guards):
+        K.guards1[i] = K.guards0[i]
+
+
+def dip(K: Any, h: float) -> int:
+    """Step to the lowest point of a grazing gap; a real dip becomes a closing, else the guard keeps quiet."""
+    t = K.clock[NOW]
+    c = K.fired[1]
+    nC = K.n_contacts
+    low = 0.0
+    high = h
+    rate_low = K.guards0[nC + c]
+    rate_high = K.guards1[nC + c]
+    place = K.pick[0] * h
+    for _ in range(30):
+        status = try_step(K, place, t + place)
+        if status != 0:
+            return status
+        if K.guards1[c] < -gap_tolerance(K, c):
+            K.fired[0] = CLOSE
+            K.pick[0] = place
+            K.pick[1] = 0.0
+            return 0
+        rate = K.guards1[nC + c]
+        if rate == 0.0 or high - low < 1e-7 * h:
+            break
+        if rate < 0.0:
+            low = place
+            rate_low = rate
+        else:
+            high = place
+            rate_high = rate
+        place = low + (high - low) * min(max(rate_low / (rate_low - rate_high), 0.02), 0.98)
+    K.active[c] = 1
+    K.fired[0] = -1
+    return try_step(K, h, t + h)
+
+
+def locate(K: Any, h: float) -> int:
+    """Move the candidate to the instant of the first event of the step; K.pick[2] its distance from the start.
+
+    A bracketing root finder on steps of varying size from the same accepted state, until the guard is at round-off.
+    K.fired[0] < 0 afterwards: there was no event, the candidate is the full step.
+    """
+    t = K.clock[NOW]
+    end = h
+    for _ in range(4 * (K.n_contacts + K.n_guards) + 4):
+        kind = K.fired[0]
+        index = K.fired[1]
+        if kind == GRAZE:
+            status = dip(K, end)
+            if status != 0:
+                return status
+            if K.fired[0] < 0:
+                if not judge(K, end):
+                    K.pick[2] = end
+                    return 0
+                continue
+            kind = CLOSE
+            end = K.pick[0]
+            low = 0.0
+        else:
+            low = K.pick[1] * end
+        status = bracket(K, kind, index, low, end)
+        if status != 0:
+            return status
+        if K.fired[0] < 0:
+            status = try_step(K, end, t + end)
+            if status != 0:
+                return status
+            if not judge(K, end):
+                K.pick[2] = end
+                return 0
+            continue
+        found = K.pick[2]
+        if found <= 0.0:
+            return 0
+        if kind == CLOSE and not is_watched(K, index, K.guards1):  # no longer watched when it gets there
+            K.active[index] = 1
+            K.fired[0] = -1
+            status = try_step(K, end, t + end)
+            if status != 0:
+                return status
+            if not judge(K, end):
+                K.pick[2] = end
+                return 0
+            continue
+        # did another guard fire before this one? (this one is at round-off and may look fired itself)
+        place = index if kind != CROSS else K.n_contacts + index
+        quiet = K.active[place]
+        K.active[place] = 1
+        other = judge(K, found) and K.pick[0] < 1.0 - SAME
+        K.active[place] = quiet
+        if not other:
+            K.fired[0] = kind
+            K.fired[1] = index
+            K.pick[2] = found
+            return 0
+        end = found
+    return NO_LOCATION
+
+
+def guard_rate(K: Any, kind: int, index: int) -> float:
+    """Rate of `guard_value` at the candidate; 0 where it is not known."""
+    if kind == CLOSE:
+        return float(K.guards1[K.n_contacts + index])
+    if kind == OPEN_GAP:
+        return float(-K.guards1[K.n_contacts + index])
+    if kind == CROSS:
+        return float(K.side[index] * K.guards1[4 * K.n_contacts + K.n_guards + index])
+    return 0.0
+
+
+def first_guess(f_low: float, f_high: float, d_low: float, d_high: float) -> float:
+    """Fraction at which the cubic Hermite interpolant from f_low > 0 to f_high < 0 is zero; d: rates times width."""
+    if d_low == 0.0 and d_high == 0.0:
+        return f_low / (f_low - f_high)
+    low = 0.0
+    high = 1.0
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        if hermite(f_low, f_high, d_low, d_high, middle) > 0.0:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)
+
+
+def bracket(K: Any, kind: int, index: int, low: float, high: float) -> int:
+    """Root of the fired guard between two distances from the accepted state; K.pick[2] its distance."""
+    t = K.clock[NOW]
+    K.counts[LOCATIONS] += 1
+    f_high = guard_value(K, kind, index, t + high)
+    if f_high >= 0.0:
+        if kind == OPEN_PULL:  # only the multiplier of the step was negative, not that of the motion
+            K.active[index] = 1
+            K.fired[0] = -1
+        K.pick[2] = high
+        return 0
+    d_high = guard_rate(K, kind, index)
+    if low > 0.0:
+        status = try_step(K, low, t + low)
+        if status != 0:
+            return status
+    else:
+        stay(K)
+    f_low = guard_value(K, kind, index, t + low)
+    if f_low <= 0.0 and kind != WATCH:
+        if low > 0.0 and kind != CROSS:
+            low = 0.0
+            stay(K)
+        K.pick[2] = low
+        return 0
+    f_low = max(f_low, 1e-300)
+    width = high - low
+    guess = first_guess(f_low, f_high, guard_rate(K, kind, index) * width, d_high * width)
+    if K.linear == 1 and kind != WATCH:
+        place = low + width * f_low / (f_low - f_high)
+        K.pick[2] = place
+        return try_step(K, place, t + place)
+    return refine(K, kind, index, low, f_low, high, f_high, low + width * guess)
+
+
+def refine(K: Any, kind: int, index: int, low: float, f_low: float, high: float, f_high: float, guess: float) -> int:
+    """Brent's root finder (Brent 1973, ch. 4) from a bracket and a first guess; leaves the candidate at the root."""
+    t = K.clock[NOW]
+    tiny = 0.0
+    if kind == CLOSE or kind == OPEN_GAP:
+        tiny = 0.25 * gap_tolerance(K, index)
+    elif kind != WATCH:
+        tiny = 1e-15 * max(f_low, -f_high)
+    a = low  # the iterate before
+    fa = f_low
+    b = high  # the best iterate
+    fb = f_high
+    c = low  # the other end of the bracket
+    fc = f_low
+    move = high - low
+    before = move
+    at = -1.0  # where the candidate stands
+    for trial in range(100):
+        if (fb > 0.0) == (fc > 0.0):
+            c = a
+            fc = fa
+            move = b - a
+            before = move
+        if abs(fc) < abs(fb):
+            a = b
+            b = c
+            c = a
+            fa = fb
+            fb = fc
+            fc = fa
+        limit = 2.0 * EPS * max(abs(t), high)
+        half = 0.5 * (c - b)
+        if abs(half) <= limit or abs(fb) <= tiny:
+            break
+        if trial == 0:
+            before = move
+            move = guess - b
+        elif abs(before) >= limit and abs(fa) > abs(fb):
+            s = fb / fa
+            if a == c:
+                p = 2.0 * half * s
+                r = 1.0 - s
+            else:
+                u = fa / fc
+                w = fb / fc
+                p = s * (2.0 * half * u * (u - w) - (b - a) * (w - 1.0))
+                r = (u - 1.0) * (w - 1.0) * (s - 1.0)
+            if p > 0.0:
+                r = -r
+            else:
+                p = -p
+            if 2.0 * p < min(3.0 * half * r - abs(limit * r), abs(before * r)):
+                before = move
+                move = p / r
+            else:
+                move = half
+                before = half
+        else:
+            move = half
+            before = half
+        a = b
+        fa = fb
+        if abs(move) > limit:
+            b += move
+        else:
+            b += limit if half > 0.0 else -limit
+        status = try_step(K, b, t + b)
+        if status != 0:
+            return status
+        at = b
+        fb = guard_value(K, kind, index, t + b)
+    place = b
+    if kind == WATCH and fb >= 0.0:  # end where it is watched, or it fires again
+        place = c
+    K.pick[2] = place
+    return 0 if at == place else try_step(K, place, t + place)
