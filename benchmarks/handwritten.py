@@ -63,10 +63,11 @@ class Program:
         self.width = 3 * sizes[0] + sizes[1]
         self.numbers = np.array(astuple(numbers))
         self.names = tuple(names)
-        command = [str(compiler()), *FLAGS, "-shared", "-fPIC", f'-DMODEL="{source}"', f"-DSTABILIZED={int(stabilized)}"]
+        chosen = (f'-DMODEL="{source}"', f"-DSTABILIZED={int(stabilized)}")
         with TemporaryDirectory() as folder:
             library = Path(folder) / "loop.so"
-            subprocess.run([*command, str(HERE / "newmark.c"), "-lm", "-o", str(library)], check=True)
+            command = [str(compiler()), *FLAGS, "-shared", "-fPIC", *chosen, str(HERE / "newmark.c"), "-lm", "-o"]
+            subprocess.run([*command, str(library)], check=True)
             self._run = ctypes.CDLL(str(library)).run
         pointers, integers = [ctypes.c_void_p] * 4, [ctypes.c_int64] * 2
         self._run.argtypes = [*pointers, *integers, ctypes.c_void_p, ctypes.c_void_p]

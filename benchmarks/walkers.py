@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import mbd
 
-__all__ = ["COMPASS", "SEVEN", "Compass", "Seven", "compass", "kneed_walker", "seven"]
+__all__ = ["COMPASS", "SEVEN", "Compass", "Seven", "compass", "kneed_model", "kneed_walker", "knocking_walker", "seven"]
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class Compass:
 
 @dataclass(frozen=True)
 class Seven:
-    """Numbers of the seven-link walker, in the order of `c/seven.h`: masses, inertias, centers, lengths, gravity [SI]."""
+    """Numbers of the seven-link walker in SI units, in the order of `c/seven.h`."""
 
     trunk: float = 40.0
     thigh: float = 8.0
@@ -96,22 +96,37 @@ def seven(p: Seven = SEVEN) -> tuple[mbd.Model, mbd.State]:
     return model, mbd.assemble(model, position=position)
 
 
-def kneed_walker() -> tuple[mbd.Model, mbd.State]:
-    """McGeer's kneed walker with point masses, at the fixed point of its gait (Chen 2007, MIT thesis)."""
+def _kneed_legs(stiffness: float = 0.0) -> tuple[mbd.Model, dict[str, tuple[mbd.Revolute, mbd.Link]]]:
+    """Hip mass, thighs and shanks of McGeer's walker; knee and shank of each side. A spring may pull the right knee."""
     model = mbd.Model("kneed walker", gravity=mbd.on_slope(0.0504))
     hip = mbd.PointMass("hip", mass=0.5)
     model.connect(mbd.Translation("trunk", model.ground.origin, hip.origin))
-    for side, other in ("left", "right"), ("right", "left"):
+    legs = {}
+    for side, spring in ("left", 0.0), ("right", stiffness):
         thigh = mbd.Link(f"{side} thigh", mass=0.5, length=0.5, center=0.325)
         shank = mbd.Link(f"{side} shank", mass=0.05, length=0.5, center=0.125)
-        knee = mbd.Revolute(f"{side} knee", thigh.end, shank.start)
+        knee = mbd.Revolute(f"{side} knee", thigh.end, shank.start, stiffness=spring, rest=0.3)
         model.connect(mbd.Revolute(f"{side} hip", hip.origin, thigh.start), knee)
-        strike = mbd.When(f"{other} foot")
-        locked = mbd.When(f"{other} foot", after_impact=True)
+        legs[side] = knee, shank
+    return model, legs
+
+
+def kneed_model() -> mbd.Model:
+    """McGeer's kneed walker with point masses (Chen 2007, MIT thesis)."""
+    model, legs = _kneed_legs()
+    for side, other in ("left", "right"), ("right", "left"):
+        knee, shank = legs[side]
+        strike, after = mbd.When(f"{other} foot"), mbd.When(f"{other} foot", after_impact=True)
         model.constrain(
             mbd.Unilateral(f"{side} foot", mbd.touchdown(shank.end), release=strike),
-            mbd.Unilateral(f"{side} knee lock", mbd.flexion(knee), release=locked),
+            mbd.Unilateral(f"{side} knee lock", mbd.flexion(knee), release=after),
         )
+    return model
+
+
+def kneed_walker() -> tuple[mbd.Model, mbd.State]:
+    """The kneed walker at the fixed point of its gait, just after the strike of the left foot."""
+    model = kneed_model()
     start = mbd.assemble(
         model,
         closed=["left foot", "left knee lock"],
@@ -123,3 +138,22 @@ def kneed_walker() -> tuple[mbd.Model, mbd.State]:
         },
     )
     return model, start
+
+
+def knocking_walker(stop: bool) -> tuple[mbd.Model, mbd.State]:
+    """The same legs on a held foot, with a spring that drives the swing knee against a stop without loss.
+
+    Some thirty impacts a second, for ever. Without `stop` it is watched all the same, but out of reach.
+    """
+    model, legs = _kneed_legs(stiffness=0.5)
+    foot = legs["left"][1].end
+    reach = 0.0 if stop else 10.0
+    gap = mbd.measure(lambda angle: reach - angle, "right knee.angle", unit="rad")
+    model.constrain(
+        mbd.Bilateral("foot x", mbd.measure(lambda foot: foot[0], foot)),
+        mbd.Bilateral("foot y", mbd.measure(lambda foot: foot[1], foot)),
+        mbd.Bilateral("left knee held", mbd.measure(lambda angle: angle, "left knee.angle", unit="rad")),
+        mbd.Unilateral("stop", gap, restitution=1.0),
+    )
+    position = {"left hip.angle": 0.2, "right hip.angle": -0.2, "right knee.angle": -0.01}
+    return model, mbd.assemble(model, position=position)

@@ -22,6 +22,8 @@ TOLERANCE = 1e-9
 """Largest row residual [m, rad, m/s, rad/s] of a start, relative to 1 or the speed, that counts as consistent."""
 BELOW = 1e-6
 """Depth [m, rad] below which an open contact is told to start inside the ground."""
+REFINEMENTS = 3
+"""Solutions of the linear equations for velocities: bodies without mass leave an error in the first [-]."""
 LIFTED = 1e-8
 """Height [m, rad] above which an open contact is armed from the start."""
 
@@ -228,7 +230,7 @@ def _close_velocities(work: _Assembly, free: Matrix) -> Vector:
     n_v = work.equations.n_v
     terms = work.mechanism.acceleration_terms(0.0, work.q, work.y, work.parameters, work.anchors)
     places = _involved(terms.B[picked][:, :n_v], free)
-    if len(places):
+    for _ in range(REFINEMENTS if len(places) else 0):
         B = terms.B[np.ix_(picked, places)]
         M = terms.M[:n_v, :n_v][np.ix_(places, places)]
         work.y[places] += _least_change(M, B, terms.rate[picked], np.zeros(len(places)))

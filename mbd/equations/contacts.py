@@ -16,16 +16,25 @@ from mbd.equations.equations import Contact, Effect, Guard, Row
 from mbd.equations.surroundings import Surroundings
 from mbd.joints.base import row_unit
 from mbd.tape.derivatives import live
+from mbd.tape.evaluate import evaluate
 from mbd.tape.node import Node, Scalar
 
 __all__ = ["Laws", "laws"]
 
+FITS = 1e-9
+"""Misfit of unmoving parts that counts as none [m, rad]: above the round-off of users' sums, far below a tolerance."""
+
 
 @dataclass
 class Laws:
-    """The constraints of a model as expressions; `faults` tells what cannot hold."""
+    """The constraints of a model as expressions; `faults` tells what cannot hold.
+
+    viewed : the values of `rows` in views; penalties : (number, gap, force) of penalty contacts in views
+    """
 
     rows: list[Row] = field(default_factory=list)
+    viewed: list[Node] = field(default_factory=list)
+    penalties: list[tuple[int, Node, Node]] = field(default_factory=list)
     contacts: list[Contact] = field(default_factory=list)
     guards: list[Guard] = field(default_factory=list)
     effects: list[Effect] = field(default_factory=list)
@@ -68,19 +77,33 @@ def _row(
     may_fold: bool = False,
 ) -> int:
     """Add a row and give its number, or −1 for one that holds by itself."""
-    node = scope.tape.lift(value)
+    view = scope.tape.lift(value)
+    node, rate = scope.views.real([view, *scope.rates([view])])
     title = f"'{owner}'" + (f", row '{part}'" if part else "")
-    if node.is_constant:
-        if not node.is_zero:
-            found.faults.append(f"{title} is {node.data:.6g} {unit} whatever the motion, so it can never be 0")
-        elif not may_fold:
-            found.faults.append(f"{title} is 0 whatever the motion, so it constrains nothing; remove it")
-        return -1
-    rates = [other for other in live([node]) if other.op == "input" and other.data[0] in ("v", "a", "lam", "z")]
-    if rates:
+    kinds = {other.data[0] for other in live([node]) if other.op == "input"}
+    if kinds & {"v", "z"}:
         found.faults.append(f"{title} depends on velocities or states; a constraint may depend on positions and t only")
-    found.rows.append(Row(owner, part, node, scope.rates([node])[0], contact, unit))
+    elif "x" not in kinds:
+        found.faults += _idle(scope, node, title, kinds, unit, may_fold)
+        return -1
+    found.rows.append(Row(owner, part, node, rate, contact, unit))
+    found.viewed.append(view)
     return len(found.rows) - 1
+
+
+def _idle(scope: Surroundings, node: Node, title: str, kinds: set[str], unit: str, may_fold: bool) -> list[str]:
+    """What is wrong with a row that no motion changes."""
+    if "anchor" in kinds:
+        return []
+    if "t" in kinds:
+        return [f"{title} prescribes in time what no motion changes; let it depend on the posture"]
+    given: dict[Node | tuple[str, int], float] = {
+        ("p", k): parameter.value for k, parameter in enumerate(scope.parameters.found)
+    }
+    (size,) = evaluate([node], given)
+    if abs(size) > FITS:
+        return [f"{title} is {size:.6g} {unit} whatever the motion, so it can never be 0"]
+    return [] if may_fold else [f"{title} is 0 whatever the motion, so it constrains nothing; remove it"]
 
 
 def _unilateral(found: Laws, scope: Surroundings, law: Unilateral, number: int) -> None:
@@ -94,11 +117,12 @@ def _unilateral(found: Laws, scope: Surroundings, law: Unilateral, number: int) 
         for part, value in law.measure.tangents(scope, held):
             numbers.append(_row(found, scope, law.name, part, value, unit="m", contact=number, may_fold=True))
     condition = law.only_while
+    gap, rate = scope.views.real([gap, *scope.rates([gap])])
     found.contacts.append(
         Contact(
-            law.name, law.kind, gap, scope.rates([gap])[0], tuple(k for k in numbers if k >= 0), captured, anchors,
+            law.name, law.kind, gap, rate, tuple(k for k in numbers if k >= 0), captured, anchors,
             opens_on=law.opens_on, when=tuple((rule.other, rule.after_impact) for rule in law.releases),
-            only_while=scope.tape.lift(condition.gap(scope)) if isinstance(condition, Measure) else condition,
+            only_while=scope.real(condition.gap(scope)) if isinstance(condition, Measure) else condition,
             restitution=law.restitution, unit=unit,
         )
     )  # fmt: skip
@@ -106,7 +130,7 @@ def _unilateral(found: Laws, scope: Surroundings, law: Unilateral, number: int) 
 
 def _anchored(found: Laws, scope: Surroundings, measure: Measure | None) -> tuple[tuple[Node, ...], tuple[int, ...]]:
     """What a contact stores as it closes, and the numbers of its anchors."""
-    captured = () if measure is None else tuple(scope.tape.lift(value) for value in measure.captured(scope))
+    captured = () if measure is None else tuple(scope.real(value) for value in measure.captured(scope))
     first = sum(len(contact.anchors) for contact in found.contacts)
     return captured, tuple(range(first, first + len(captured)))
 
@@ -114,11 +138,13 @@ def _anchored(found: Laws, scope: Surroundings, measure: Measure | None) -> tupl
 def _penalty(found: Laws, scope: Surroundings, dynamics: Dynamics, law: Penalty, number: int) -> None:
     """A force law on a gap: −p ∂g/∂q on the left-hand side while it acts."""
     gap = scope.tape.lift(law.measure.gap(scope))
-    if gap.is_constant:
-        found.faults.append(f"the gap of '{law.name}' is the constant {gap.data:.6g}, whatever the motion")
+    if not any(node.op == "input" and node.data[0] == "x" for node in live([scope.real(gap)])):
+        found.faults.append(f"the gap of '{law.name}' is the same whatever the motion; let it depend on the posture")
     rate = scope.rates([gap])[0]
     force = scope.tape.lift(law.force(gap, rate, scope))
     generalized = (*dynamics.generalized(Work([gap], [-force])), *[scope.tape.zero] * len(scope.states))
+    found.penalties.append((number, gap, force))
+    gap, rate, force = scope.views.real([gap, rate, force])
     found.contacts.append(
         Contact(
             law.name, law.kind, gap, rate, force=force, generalized=generalized, opens_on=law.opens_on,
@@ -130,5 +156,5 @@ def _penalty(found: Laws, scope: Surroundings, dynamics: Dynamics, law: Penalty,
 
 def _guard(scope: Surroundings, event: Event) -> Guard:
     """A user's event; its measure may depend on velocities."""
-    value = scope.tape.lift(event.guard.gap(scope))
-    return Guard(event.name, value, scope.changes([value])[0], event.direction, event.terminal, event.reset)
+    value = event.guard.gap(scope)
+    return Guard(event.name, scope.real(value), scope.change(value), event.direction, event.terminal, event.reset)

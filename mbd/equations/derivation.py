@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from mbd.equations.changes import partials, rates
-from mbd.equations.contacts import laws
+from mbd.equations.contacts import Laws, laws
 from mbd.equations.dynamics import Dynamics, Work
 from mbd.equations.effects import Cause, causes, effect_of, weight_of
 from mbd.equations.equations import Equations
@@ -50,11 +50,11 @@ def derive(model: Model | FrontDoor) -> Equations:
 
 def _derived(model: Model, plan: Plan) -> Equations:
     """Kinematics, causes of forces, balance, constraints, results."""
-    scope = Surroundings(model.ground, plan.edges, plan.cut, model.gravity, model.tunable)
+    scope = Surroundings(model.ground, plan.edges, plan.cut, model.gravity, model.tunable, plan.planar)
     scope.offer_frames(model.frames.values())
     moving = list(scope.bodies.values())
     masses = {body.body.name: body.body.mass_properties(scope) for body in moving}
-    dynamics = Dynamics(moving, masses, scope.placement, scope.inputs)
+    dynamics = Dynamics(moving, masses, scope.placement, scope.views, scope.inputs)
     found = causes(scope, (*plan.edges, *plan.cut), model.forces)
     work = sum((cause.work for cause in found), Work())
     rests = _state_balance(scope, found)
@@ -63,13 +63,12 @@ def _derived(model: Model, plan: Plan) -> Equations:
         raise ModelError(constraints.faults)
     weight = weight_of(scope, dynamics)
     stored = [weight, *found] if weight.acts else found
-    zero = scope.tape.zero
-    effects = (*(effect_of(cause, dynamics, len(rests), zero) for cause in stored), *constraints.effects)
-    potential = zero
-    for cause in stored:
-        potential = potential if cause.potential is None else potential + cause.potential
+    effects = (*(effect_of(cause, scope, dynamics) for cause in stored), *constraints.effects)
+    potential = scope.tape.zero
+    for effect in effects:
+        potential = potential if effect.potential is None else potential + effect.potential
     balance = [*dynamics.balance(work), *rests]
-    outputs = Outputs(scope.tape, scope.quantities)
+    outputs = Outputs(scope.tape, scope.quantities, scope.real)
     equations = Equations(
         name=model.name, tape=scope.tape, coordinates=scope.coordinates,
         states=tuple(coordinate for coordinate, _ in scope.states), parameters=scope.parameters.found,
@@ -78,10 +77,21 @@ def _derived(model: Model, plan: Plan) -> Equations:
         compose=None if all(joint.is_vector for joint in plan.edges) else scope.composed,
         output=outputs, output_names=outputs.names,
         velocity_names=tuple(f"{coordinate.name}.rate" for coordinate in scope.coordinates), notes=plan.notes,
-        figure=figure_of(model), geometry=TreeGeometry(scope, dynamics, work, rests),
+        figure=figure_of(model), geometry=TreeGeometry(scope, dynamics, work, rests, constraints),
     )  # fmt: skip
-    offer_results(outputs, scope, dynamics, work, equations, model, {joint.name for joint in plan.floating})
+    whole = work + _closed(scope, constraints)
+    offer_results(outputs, scope, dynamics, whole, equations, model, {joint.name for joint in plan.floating})
     return equations
+
+
+def _closed(scope: Surroundings, constraints: Laws) -> Work:
+    """The work of every row, and of every penalty contact behind its switch."""
+    work = Work()
+    for k, value in enumerate(constraints.viewed):
+        work.on_value(value, scope.tape.input("lam", k))
+    for number, gap, force in constraints.penalties:
+        work.on_value(gap, -(scope.tape.input("switch", number) * force))
+    return work
 
 
 def _state_balance(scope: Surroundings, found: Sequence[Cause]) -> list[Node]:
@@ -101,10 +111,15 @@ class TreeGeometry:
     dynamics: Dynamics
     work: Work
     rests: Sequence[Node]
+    constraints: Laws
 
     def balance_with(self, values: Sequence[Node], multipliers: Sequence[Node]) -> list[Node]:
         """The balance with forces on these values in the same reverse sweep."""
-        return [*self.dynamics.balance(self.work + Work(list(values), list(multipliers))), *self.rests]
+        laws = self.constraints
+        viewed = {row.value.index: view for row, view in zip(laws.rows, laws.viewed, strict=True)}
+        viewed |= {laws.contacts[number].gap.index: gap for number, gap, _ in laws.penalties}
+        work = Work([viewed.get(value.index, value) for value in values], list(multipliers))
+        return [*self.dynamics.balance(self.work + work), *self.rests]
 
     def partials(self, outputs: Sequence[Node]) -> list[dict[Node, Node]]:
         """∂node/∂x_j of the places and rotations inside the outputs."""

@@ -13,10 +13,10 @@ from dataclasses import dataclass, field
 
 from mbd.bodies.algebra import cross, dot, rotate, scaled, total
 from mbd.bodies.mass import MassProperties
-from mbd.equations.changes import Pull, pulls
 from mbd.equations.inputs import Inputs
 from mbd.equations.kinematics import Moving, Twist, twists
 from mbd.equations.placement import Placement
+from mbd.equations.views import Pull, Views
 from mbd.scope import Triple
 from mbd.tape.derivatives import vjp
 from mbd.tape.node import Node, Scalar
@@ -26,7 +26,7 @@ __all__ = ["Dynamics", "Work"]
 
 @dataclass
 class Work:
-    """Generalized forces by their virtual work, positive on the left-hand side.
+    """Generalized forces by their virtual work, positive on the left-hand side, written in views.
 
     values, multipliers : Σ multiplier · δvalue of functions of t and q ⊕ x (potentials, rows, gaps)
     velocities, forces : Σ force · δvelocity of functions of the velocities (losses, motors, applied forces)
@@ -58,10 +58,15 @@ class Dynamics:
     """Masses on a tree of moving bodies."""
 
     def __init__(
-        self, bodies: Sequence[Moving], masses: Mapping[str, MassProperties], placement: Placement, inputs: Inputs
+        self,
+        bodies: Sequence[Moving],
+        masses: Mapping[str, MassProperties],
+        placement: Placement,
+        views: Views,
+        inputs: Inputs,
     ) -> None:
-        self._bodies, self._masses, self._placement, self._inputs = bodies, masses, placement, inputs
-        self._tape = placement.tape
+        self._bodies, self._masses, self._inputs = bodies, masses, inputs
+        self._placement, self._views, self._tape = placement, views, placement.tape
         self._twists = twists(bodies)
         self._inertia = [pull for body in bodies if body.parent is not None for pull in self._inertia_of(body)]
 
@@ -84,7 +89,7 @@ class Dynamics:
         increments = [self._tape.input("virtual", k) for k in range(6)]
         turn, shift = increments[:3], increments[3:]
         extra = {body.body.name: Twist((turn[0], turn[1], turn[2]), (shift[0], shift[1], shift[2]))}
-        pulls_on, _ = self._read(work)
+        pulls_on, _ = self._read(work, attributed=True)
         tx, ty, tz, fx, fy, fz = self._sweep([*self._inertia, *pulls_on], twists(self._bodies, extra), increments)
         return (fx, fy, fz), (tx, ty, tz)
 
@@ -96,12 +101,11 @@ class Dynamics:
         torque = total(rotate(mass.inertia, body.angular_acceleration), cross(body.angular_velocity, momentum))
         return [Pull(body, mass.center, force, torque)]
 
-    def _read(self, work: Work) -> tuple[list[Pull], list[Node]]:
+    def _read(self, work: Work, attributed: bool = False) -> tuple[list[Pull], list[Node]]:
         """Forces on bodies, and forces on coordinates."""
-        x, v = self._inputs.x, self._inputs.v
-        still, on_x = pulls(self._placement, work.values, work.multipliers, x, motion=False)
-        moving, on_v = pulls(self._placement, work.velocities, work.forces, v, motion=True)
-        on_x, on_v = on_x or [self._tape.zero] * len(x), on_v or [self._tape.zero] * len(v)
+        x, v, pulls = self._inputs.x, self._inputs.v, self._views.pulls
+        still, on_x = pulls(work.values, work.multipliers, x, motion=False, attributed=attributed)
+        moving, on_v = pulls(work.velocities, work.forces, v, motion=True, attributed=attributed)
         return still + moving, [a + b for a, b in zip(on_x, on_v, strict=True)]
 
     def _gather(self, forces: Sequence[Pull], direct: Sequence[Node]) -> list[Node]:
@@ -132,10 +136,11 @@ class Dynamics:
         return self._tape.lift(energy)
 
     def weight_energy(self, gravity: Triple) -> Node:
-        """−Σ m g·p_C [J]."""
+        """−Σ m g·p_C [J], in views."""
         energy: Scalar = 0.0
         for body in self._bodies:
             if body.parent is not None and any(not self._tape.lift(part).is_zero for part in gravity):
                 mass = self._masses[body.body.name]
-                energy = energy - mass.mass * dot(gravity, self._placement.point(body, mass.center).position)
+                center = self._views.position(self._placement.point(body, mass.center))
+                energy = energy - mass.mass * dot(gravity, center)
         return self._tape.lift(energy)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
-from mbd.equations.changes import motion_seeds
 from mbd.equations.dynamics import Dynamics, Work
 from mbd.equations.equations import Effect
 from mbd.equations.surroundings import Surroundings
@@ -96,7 +95,8 @@ def _apply(cause: Cause, pairs: Iterable[tuple[Scalar, Scalar]], scope: Surround
 def _dissipate(cause: Cause, D: Node, scope: Surroundings) -> None:
     """D(v): +∂D/∂v on the left-hand side, power −v · ∂D/∂v."""
     cause.work.on_velocity(D, scope.tape.one)
-    loss = -jvp([D], motion_seeds(scope.placement, [D], scope.inputs.v))[0]
+    own = {view.node: view.node for view in scope.views.inside([D]) if view.motion}  # velocities are linear in v
+    loss = -jvp([D], {**{rate: rate for rate in scope.inputs.v}, **own})[0]
     cause.power = loss if cause.power is None else cause.power + loss
 
 
@@ -108,13 +108,11 @@ def weight_of(scope: Surroundings, dynamics: Dynamics) -> Cause:
     return cause
 
 
-def effect_of(cause: Cause, dynamics: Dynamics, n_z: int, zero: Node) -> Effect:
+def effect_of(cause: Cause, scope: Surroundings, dynamics: Dynamics) -> Effect:
     """The record of a cause; its generalized forces are made when they are asked for."""
-    power = cause.power
-    return Effect(
-        cause.name, cause.kind, _lazily(dynamics, cause.work, n_z, zero),
-        None if power is not None and power.is_zero else power, cause.potential,
-    )  # fmt: skip
+    power = None if cause.power is None or cause.power.is_zero else scope.real(cause.power)
+    potential = None if cause.potential is None else scope.real(cause.potential)
+    return Effect(cause.name, cause.kind, _lazily(scope, dynamics, cause.work), power, potential)
 
 
 def penalty_effect(
@@ -124,5 +122,5 @@ def penalty_effect(
     return Effect(name, "penalty", lambda: generalized, force * rate, contact=contact)
 
 
-def _lazily(dynamics: Dynamics, work: Work, n_z: int, zero: Node) -> Callable[[], Sequence[Node]]:
-    return lambda: (*dynamics.generalized(work), *[zero] * n_z)
+def _lazily(scope: Surroundings, dynamics: Dynamics, work: Work) -> Callable[[], Sequence[Node]]:
+    return lambda: (*dynamics.generalized(work), *[scope.tape.zero] * len(scope.states))

@@ -17,9 +17,13 @@ class Outputs:
     """Results by name; each is traced at its first use and kept.
 
     base : results that are offered here too
+    finish : what is done to every result in the end
     """
 
-    def __init__(self, tape: Tape, base: Outputs | None = None) -> None:
+    def __init__(
+        self, tape: Tape, base: Outputs | None = None, finish: Callable[[Scalar], Node] | None = None
+    ) -> None:
+        self._finish = tape.lift if finish is None else finish
         self._tape = tape
         self._makers: dict[str, Callable[[], Scalar]] = {} if base is None else dict(base._makers)
         self._made: dict[str, Node] = {}
@@ -51,7 +55,7 @@ class Outputs:
             make = self._makers.get(name)
             if make is None:
                 raise UnknownNameError(nearest(name, self._makers, "result"))
-            node = self._made[name] = self._tape.lift(make())
+            node = self._made[name] = self._finish(make())
         return node
 
     def names(self) -> Sequence[str]:

@@ -37,9 +37,7 @@ class Axes:
 
 @dataclass(frozen=True, eq=False)
 class Mark:
-    """What a node is: component `axis` of a point, or element (axis, column) of a rotation, or a component of the
-    velocity of a point or of the angular velocity of axes; `sign` is −1 where the node is the negative of it.
-    """
+    """What a node is: component `axis` of a point, or element (axis, column) of a rotation; or the negative of it."""
 
     of: Point | Axes
     axis: int
@@ -50,16 +48,15 @@ class Mark:
 class Placement:
     """Everything in ground axes of the bodies of a tree.
 
-    places, motions : what nodes are known to be, by their index; configurations and velocities apart
+    marks : what nodes are known to be, by their index
     movers : for each coordinate number, the body that it moves against its parent
     """
 
     def __init__(self, tape: Tape, bodies: Sequence[Moving], coordinates: Collection[Node]) -> None:
         self.tape = tape
         self.movers = [body for body in bodies if body.edge is not None for _ in body.columns]
-        self.places: dict[int, Mark] = {}
-        self.motions: dict[int, Mark] = {}
-        self._coordinates = frozenset(coordinates)  # a force on one of these is a generalized force already
+        self.marks: dict[int, Mark] = {}
+        self._coordinates = frozenset(coordinates)
         self._axes: dict[Moving, Axes] = {}
         self._points: dict[tuple[Moving, int, int, int], Point] = {}
         self._columns: dict[Moving, list[Column]] = {}
@@ -74,7 +71,7 @@ class Placement:
             known = self._axes[body] = Axes(body, R)
             for i in range(3):
                 for k in range(3):
-                    self._remember(self.places, R[i][k], Mark(known, i, k))
+                    self._remember(R[i][k], Mark(known, i, k))
         return known
 
     def point(self, body: Moving, place: Triple) -> Point:
@@ -105,7 +102,7 @@ class Placement:
     def _made(self, key: tuple[Moving, int, int, int], point: Point) -> Point:
         self._points[key] = point
         for axis in range(3):
-            self._remember(self.places, point.position[axis], Mark(point, axis))
+            self._remember(point.position[axis], Mark(point, axis))
         return point
 
     def _origin(self, body: Moving) -> Triple:
@@ -128,8 +125,6 @@ class Placement:
         known = self._angular.get(body)
         if known is None:
             known = self._angular[body] = rotate(self.axes(body).rotation, body.angular_velocity)
-            for axis in range(3):
-                self._remember(self.motions, known[axis], Mark(self.axes(body), axis))
         return known
 
     def velocity(self, point: Point) -> Triple:
@@ -144,8 +139,6 @@ class Placement:
             else:
                 known = self._carried(body, point.place)
             self._linear[point] = known
-            for axis in range(3):
-                self._remember(self.motions, known[axis], Mark(point, axis))
         return known
 
     def _carried(self, body: Moving, place: Triple) -> Triple:
@@ -156,11 +149,11 @@ class Placement:
         from_joint = difference(cross(omega, rotate(R, place)), cross(omega, rotate(R, body.shift)))
         return total(joint, from_joint)
 
-    def _remember(self, marks: dict[int, Mark], value: Scalar, mark: Mark) -> None:
+    def _remember(self, value: Scalar, mark: Mark) -> None:
         """Note what a node is; a negative is noted by what it is the negative of, too."""
         if not isinstance(value, Node) or not value.args or value in self._coordinates:
             return
-        marks.setdefault(value.index, mark)
+        self.marks.setdefault(value.index, mark)
         inner = value.args[0]
         if value.op == "neg" and inner.args and inner not in self._coordinates:
-            marks.setdefault(inner.index, Mark(mark.of, mark.axis, mark.column, -1.0))
+            self.marks.setdefault(inner.index, Mark(mark.of, mark.axis, mark.column, -1.0))

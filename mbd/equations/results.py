@@ -34,7 +34,7 @@ def offer_results(
 ) -> None:
     """Everything that a run can be asked for besides what words may ask for.
 
-    work : the forces without rows and penalties; hidden : names of joints that no user made
+    work : all forces, with all rows and penalties; hidden : names of joints that no user made
     """
     tape, rows, contacts = scope.tape, equations.rows, equations.contacts
     _offer_rows(outputs, tape, rows, model.bilaterals)
@@ -43,13 +43,7 @@ def offer_results(
     _offer_motors(outputs, scope, model.forces)
     for name, energy in ("kinetic_energy", equations.kinetic), ("potential_energy", equations.potential):
         outputs.value(name, energy)
-    whole = Work() + work
-    for k, row in enumerate(rows):
-        whole.on_value(row.value, tape.input("lam", k))
-    for number, contact in enumerate(contacts):
-        if contact.force is not None:
-            whole.on_value(contact.gap, -(tape.input("switch", number) * contact.force))
-    _offer_joints(outputs, scope, dynamics, whole, rows, hidden)
+    _offer_joints(outputs, scope, dynamics, work, rows, hidden)
 
 
 def _offer_joints(
@@ -75,7 +69,7 @@ def _offer_joints(
 
 
 def _acceleration(scope: Surroundings, joint: str, place: int) -> Scalar:
-    return scope.changes([scope.tape.lift(scope.joint(joint).rates[place])])[0]
+    return scope.change(scope.joint(joint).rates[place])
 
 
 def _offer_rows(outputs: Outputs, tape: Tape, rows: Sequence[Row], bilaterals: Iterable[Bilateral]) -> None:

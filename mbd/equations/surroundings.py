@@ -7,13 +7,14 @@ from collections.abc import Collection, Iterable, Sequence
 from mbd.bodies.algebra import IDENTITY, difference, product, rotate, transpose
 from mbd.bodies.base import Body, Frame
 from mbd.bodies.values import Vector3
-from mbd.equations.changes import rates
+from mbd.equations import changes
 from mbd.equations.equations import Coordinate
 from mbd.equations.inputs import Inputs
 from mbd.equations.kinematics import Edge, Moving, ground_motion, moving_body
 from mbd.equations.outputs import AXES, Outputs
 from mbd.equations.parameters import ParameterTable
 from mbd.equations.placement import Placement
+from mbd.equations.views import Views
 from mbd.errors import UnknownNameError, nearest
 from mbd.joints.base import Joint
 from mbd.scope import FrameMotion, JointMotion, Rotation, Triple
@@ -30,7 +31,7 @@ def placeholders(tape: Tape) -> tuple[Rotation, Triple]:
 
 
 class Surroundings:
-    """`mbd.scope.Scope` over a spanning tree.
+    """`mbd.scope.Scope` over a spanning tree; words see places and velocities as views, which `real` resolves.
 
     Parameters
     ----------
@@ -38,6 +39,7 @@ class Surroundings:
     cuts : the joints that become rows
     gravity : (x, y, z) [m/s²]; run-time parameters 'gravity.x', …
     tunable : names of parameters that stay inputs even at an exact 0 or ±1
+    planar : whether all moves in x–y and turns about z
 
     Attributes
     ----------
@@ -47,7 +49,13 @@ class Surroundings:
     """
 
     def __init__(
-        self, ground: Body, tree: Sequence[Joint], cuts: Sequence[Joint], gravity: Vector3, tunable: Collection[str]
+        self,
+        ground: Body,
+        tree: Sequence[Joint],
+        cuts: Sequence[Joint],
+        gravity: Vector3,
+        tunable: Collection[str],
+        planar: bool,
     ) -> None:
         self.tape = Tape()
         self.parameters = ParameterTable(self.tape, tunable)
@@ -62,6 +70,7 @@ class Surroundings:
         values = [node for joint in tree for node in self._tree_motion(joint).coordinates]
         self.composed = tuple(self.tape.lift(value) for value in values)
         self.placement = Placement(self.tape, list(self.bodies.values()), self.composed)
+        self.views = Views(self.placement, self.composed, planar)
         self.quantities = Outputs(self.tape)
         self._offer_quantities()
 
@@ -113,11 +122,13 @@ class Surroundings:
         """Motion of a frame, in ground axes."""
         body = self._body(frame.body.name)
         R, place = frame.placement(self)
-        axes = self.placement.axes(body).rotation
-        point = self.placement.point(body, place)
-        rotation = axes if R is IDENTITY else product(axes, R)
+        axes, point, views = self.placement.axes(body), self.placement.point(body, place), self.views
+        rotation = views.rotation(axes)
         return FrameMotion(
-            point.position, rotation, self.placement.velocity(point), self.placement.angular_velocity(body)
+            views.position(point),
+            rotation if R is IDENTITY else product(rotation, R),
+            views.velocity(point),
+            views.angular_velocity(axes),
         )
 
     def joint(self, name: str) -> JointMotion:
@@ -175,18 +186,23 @@ class Surroundings:
         shifts = [row.index for row in rows if places & {node.index for node in live([row])}]
         return set(shifts) == places
 
-    def rates(self, values: Sequence[Node]) -> list[Node]:
-        """d/dt of functions of t and q ⊕ x."""
-        seeds: dict[Node, Scalar] = {self.time: 1.0, **dict(zip(self.inputs.x, self.inputs.v, strict=True))}
-        return jvp(values, seeds | rates(self.placement, values))
+    def real(self, value: Scalar) -> Node:
+        """A word's expression with the motion itself in place of the views."""
+        return self.views.real([self.tape.lift(value)])[0]
 
-    def changes(self, values: Sequence[Node]) -> list[Node]:
-        """d/dt of functions of t, q ⊕ x, v and z."""
+    def rates(self, values: Sequence[Node]) -> list[Node]:
+        """d/dt, in views, of words' functions of t and q ⊕ x."""
+        seeds: dict[Node, Scalar] = {self.time: 1.0, **dict(zip(self.inputs.x, self.inputs.v, strict=True))}
+        return jvp(values, seeds | self.views.rates(values))
+
+    def change(self, value: Scalar) -> Node:
+        """d/dt of a word's function of t, q ⊕ x, v and z; no view is left in it."""
+        values = [self.real(value)]
         inputs = self.inputs
         seeds: dict[Node, Scalar] = {self.time: 1.0, **dict(zip(inputs.x, inputs.v, strict=True))}
         seeds |= dict(zip(inputs.v, inputs.a, strict=True))
         seeds |= {node: self.tape.input("s", k) for k, (_, node) in enumerate(self.states)}
-        return jvp(values, seeds | rates(self.placement, values))
+        return jvp(values, seeds | changes.rates(self.placement, values))[0]
 
     def offer_frames(self, frames: Iterable[Frame]) -> None:
         """Name the components of frames' places and velocities, and register their parameters."""

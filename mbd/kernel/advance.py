@@ -35,7 +35,6 @@ from mbd.kernel.fields import (
 )  # fmt: skip
 from mbd.kernel.guards import (
     gap_scale,
-    gap_tolerance,
     is_watched,
     judge,
     try_step,
@@ -80,8 +79,8 @@ def store_row(K: Any) -> None:
     K.state[SINCE_STORE] = 0
 
 
-def log_event(K: Any, kind: int, index: int, loss: float) -> None:
-    """One line of the event log: t, kind, index, energy loss, row of results, impulses of its rows."""
+def log_event(K: Any, kind: int, index: int, loss: float, struck: bool) -> None:
+    """One line of the event log: t, kind, index, energy loss, row of results, impulses of its rows if it struck."""
     o = K.state[LOGGED] * K.event_width
     K.log[o] = K.clock[NOW]
     K.log[o + 1] = float(kind)
@@ -89,10 +88,20 @@ def log_event(K: Any, kind: int, index: int, loss: float) -> None:
     K.log[o + 3] = loss
     K.log[o + 4] = float(K.state[STORED])
     for k in range(K.n_rows):
-        mine = kind == LOG_CLOSED and K.row_contact[k] == index and K.kind[index] == 0
-        K.log[o + 5 + k] = -K.impulse[k] if mine else 0.0
+        K.log[o + 5 + k] = -K.impulse[k] if struck and K.row_contact[k] == index else 0.0
     K.state[LOGGED] += 1
     K.counts[EVENTS] += 1
+
+
+def is_awaited(K: Any, first: int) -> bool:
+    """Whether someone waits for an event logged since the line `first`."""
+    for line in range(first, K.state[LOGGED]):
+        index = int(K.log[line * K.event_width + 2])
+        if int(K.log[line * K.event_width + 1]) == LOG_EVENT:
+            index += K.n_contacts
+        if K.notify[index] == 1:
+            return True
+    return False
 
 
 def find_mode(K: Any) -> int:
@@ -131,10 +140,10 @@ def settle(K: Any) -> int:
             K.closed[c] = K.active[c]
             if K.active[c] == 1:
                 capture(K, c)
-                log_event(K, LOG_CLOSED, c, 0.0)
+                log_event(K, LOG_CLOSED, c, 0.0, False)
             else:
                 K.armed[c] = 1
-                log_event(K, LOG_OPENED, c, 0.0)
+                log_event(K, LOG_OPENED, c, 0.0, False)
         K.active[c] = 0
     return 0
 
@@ -237,10 +246,10 @@ def release_for(K: Any, after: int) -> None:
         if K.closed[c] == 1 and K.opens[c] == 2:
             for place in range(K.when_start[c], K.when_start[c + 1]):
                 target = K.when_target[place]
-                if K.when_after[place] == after and K.closing[target] == 1 and K.kind[target] == 0:
+                if K.when_after[place] == after and K.closing[target] == 1:
                     K.closed[c] = 0
                     K.armed[c] = 0
-                    log_event(K, LOG_OPENED, c, 0.0)
+                    log_event(K, LOG_OPENED, c, 0.0, False)
                     break
 
 
@@ -266,7 +275,7 @@ def close_by_impact(K: Any, fastest: float) -> int:
                     for j in range(n):
                         rate += 0.5 * K.acc[o_B + k * n + j] * K.jump[j]
                     work += K.impulse[k] * rate
-            log_event(K, LOG_CLOSED, c, work)
+            log_event(K, LOG_CLOSED, c, work, True)
             if K.active[c] == 1:
                 capture(K, c)
                 K.closed[c] = 1
@@ -275,7 +284,7 @@ def close_by_impact(K: Any, fastest: float) -> int:
         elif K.active[c] == 0:
             K.closed[c] = 0
             K.armed[c] = 1
-            log_event(K, LOG_OPENED, c, 0.0)
+            log_event(K, LOG_OPENED, c, 0.0, False)
     if not slow:
         release_for(K, 1)
     return 0
@@ -312,18 +321,19 @@ def switch(K: Any) -> int:
                     hard = True
                 else:
                     K.closed[c] = 1
-                    log_event(K, LOG_CLOSED, c, 0.0)
+                    log_event(K, LOG_CLOSED, c, 0.0, False)
         if hard:
             status = close_by_impact(K, fastest)
             if status != 0:
                 return status
+        else:  # a penalty contact closes without impact
+            release_for(K, 0)
+            release_for(K, 1)
     elif kind != CROSS and kind != WATCH:
         K.closed[index] = 0
         K.armed[index] = 1 if kind == OPEN_PULL or K.opens[index] == 1 else 0
-        log_event(K, LOG_OPENED, index, 0.0)
-    if kind == WATCH:
-        K.armed[index] = 1 if K.guards0[index] > gap_tolerance(K, index) else 0
-    else:
+        log_event(K, LOG_OPENED, index, 0.0, False)
+    if kind != WATCH:
         mark_touching(K)
     return 0
 
@@ -348,6 +358,7 @@ def handle_event(K: Any) -> int:
     """Take the located event: rows before and after, impact, restart. Negative: nothing for the caller to do."""
     kind = K.fired[0]
     index = K.fired[1]
+    first = K.state[LOGGED]
     take_over(K, K.clock[NOW] + K.pick[2])
     if same_instant(K):
         return CHATTER
@@ -356,10 +367,10 @@ def handle_event(K: Any) -> int:
         return switch(K) - 1
     store_row(K)
     if kind == CROSS:
-        log_event(K, LOG_EVENT, index, 0.0)
+        log_event(K, LOG_EVENT, index, 0.0, False)
         K.side[index] = -K.side[index]
         K.state[RESTART] = 1
-        return EVENT if K.notify[K.n_contacts + index] == 1 else -1
+        return EVENT if is_awaited(K, first) else -1
     status = switch(K)
     if status != 0:
         return status
@@ -368,12 +379,9 @@ def handle_event(K: Any) -> int:
         return status
     store_row(K)
     for c in range(K.n_contacts):
-        if was_closed(K, c) and K.closed[c] == 0 and K.armed[c] == 0 and K.guards0[K.n_contacts + c] < -1e-6:
+        if was_closed(K, c) and K.closed[c] == 0 and K.armed[c] != 1 and K.guards0[K.n_contacts + c] < -1e-6:
             K.sinking[c] = min(K.sinking[c], K.clock[NOW])
-    for c in range(K.n_contacts):
-        if K.notify[c] == 1 and (K.closing[c] == 1 or (kind != CLOSE and c == index)):
-            return EVENT
-    return -1
+    return EVENT if is_awaited(K, first) else -1
 
 
 def advance(K: Any) -> int:
@@ -384,12 +392,15 @@ def advance(K: Any) -> int:
             return FULL
         if K.state[RESTART] > 0:
             visible = K.state[RESTART] == 1
+            first = K.state[LOGGED]
             status = restart(K)
             if status != 0:
                 return status
             K.state[RESTART] = 0
-            if visible:
+            if visible or K.state[LOGGED] > first:
                 store_row(K)
+            if is_awaited(K, first):
+                return EVENT
         t = K.clock[NOW]
         if t >= K.until - 1e-12 * K.dt:
             if K.state[SINCE_STORE] > 0:

@@ -95,13 +95,15 @@ def gap_tolerance(K: Any, c: int) -> float:
 
 
 def update_armed(K: Any) -> None:
-    """A contact is armed once its gap has risen above zero while it is watched; not watched, it is not armed."""
+    """A contact is armed (1) once its gap has risen above zero; one that becomes watched (−1), if it is not below."""
     for c in range(K.n_contacts):
         if K.closed[c] == 0:
-            if K.armed[c] == 0:
+            if K.armed[c] != 1:
                 K.deepest[c] = min(K.deepest[c], K.guards0[c])
             if not is_watched(K, c, K.guards0):
-                K.armed[c] = 0
+                K.armed[c] = -1
+            elif K.armed[c] == -1:
+                K.armed[c] = 1 if K.guards0[c] >= -1e-10 * gap_scale(K, c) else 0
             elif K.armed[c] == 0 and K.guards0[c] > 1e-8 * gap_scale(K, c):
                 K.armed[c] = 1
 
@@ -172,7 +174,7 @@ def judge(K: Any, h: float) -> bool:
             if K.while_kind[c] == 2 and K.guards0[3 * nC + c] <= 0.0 < K.guards1[3 * nC + c]:
                 consider(K, WATCH, c, crossing(K.guards0[3 * nC + c], K.guards1[3 * nC + c]), 0.0)
                 continue
-            if K.armed[c] == 0 or not is_watched(K, c, K.guards0):
+            if K.armed[c] != 1 or not is_watched(K, c, K.guards0):
                 continue
             if g1 < -tiny:
                 if g0 > tiny:
@@ -228,7 +230,8 @@ def guard_value(K: Any, kind: int, index: int, t1: float) -> float:
     if kind == OPEN_FORCE:
         return float(K.guards1[2 * nC + index])
     if kind == WATCH:
-        return float(-K.guards1[3 * nC + index])
+        condition = float(K.guards1[3 * nC + index])
+        return -condition if condition != 0.0 else 1e-300  # watched only above zero
     if kind == CROSS:
         return float(K.side[index] * K.guards1[4 * nC + index])
     if consistent(K, t1, K.q1, K.y1) != 0:

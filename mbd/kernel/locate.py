@@ -170,13 +170,12 @@ def bracket(K: Any, kind: int, index: int, low: float, high: float) -> int:
     else:
         stay(K)
     f_low = guard_value(K, kind, index, t + low)
-    if f_low <= 0.0 and kind != WATCH:
+    if f_low <= 0.0:
         if low > 0.0 and kind != CROSS:
             low = 0.0
             stay(K)
         K.pick[2] = low
         return 0
-    f_low = max(f_low, 1e-300)
     width = high - low
     guess = first_guess(f_low, f_high, guard_rate(K, kind, index) * width, d_high * width)
     if K.linear == 1 and kind != WATCH:
@@ -192,7 +191,7 @@ def refine(K: Any, kind: int, index: int, low: float, f_low: float, high: float,
     tiny = 0.0
     if kind == CLOSE or kind == OPEN_GAP:
         tiny = 0.25 * gap_tolerance(K, index)
-    elif kind != WATCH:
+    elif kind != WATCH and kind != CROSS:  # a user's guard has a scale of its own: its instant is found instead
         tiny = 1e-15 * max(f_low, -f_high)
     a = low  # the iterate before
     fa = f_low

@@ -97,19 +97,68 @@ def residual_size(K: Any, o_r: int, m: int, c_C: float, c_K: float, tolerance: f
 
 
 def newmark_step(K: Any, h: float, t1: float) -> int:
-    """Candidate state (q1, y1, rate1, aux1, lam1) after a step of size h; the accepted state is untouched."""
-    n = K.n
-    n_v = K.n_v
+    """Candidate state (q1, y1, rate1, aux1, lam1) after a step of size h; the accepted state is untouched.
+
+    One tangent, then residuals with its factors; a new tangent where the residual falls by less than a factor of three.
+    """
     m = K.state[ROWS]
-    size = n + m
-    mean_f = 1.0 - K.alpha_f
-    mean_m = 1.0 - K.alpha_m
-    c = mean_f / mean_m
+    size = K.n + m
+    c = (1.0 - K.alpha_f) / (1.0 - K.alpha_m)
     c_C = K.gamma * h * c
     c_K = K.beta * h * h * c
+    predict(K, h, t1, c_C, c_K)
+    tolerance = 4.0 * EPS if K.exact == 1 else 1e-3 * K.tolerance
+    before = 1e300
+    fresh = False
+    status = NOT_CONVERGED
+    for iteration in range(K.max_iterations):
+        tangent = not fresh
+        if tangent:
+            call(K, K.mode_code[2 * K.state[MODE]], K.out)
+            K.counts[TANGENTS] += 1
+        else:
+            call(K, K.mode_code[2 * K.state[MODE] + 1], K.out)
+            K.counts[RESIDUALS] += 1
+        o_r = size * size if tangent else 0
+        error = residual_size(K, o_r, m, c_C, c_K, tolerance)
+        if error < 0.0:
+            status = NOT_FINITE
+            break
+        K.detail[1] = error
+        if error > 1.0 and iteration >= 2 and error > 0.5 * before:
+            raise_scales(K)
+            error = residual_size(K, o_r, m, c_C, c_K, tolerance)
+            if error > 1.0 and residual_size(K, o_r, m, 0.0, 0.0, 256.0 * EPS) <= 16.0:
+                K.counts[STAGNATIONS] += 1
+                error = 1.0
+            elif iteration >= 6 and K.exact == 0 and residual_size(K, o_r, m, 0.0, 0.0, 1e5 * EPS) <= 1e3:
+                status = STAGNATED
+                break
+        if error <= 1.0:
+            finish(K, h)
+            return 0
+        if not tangent and error > 0.3 * before:
+            fresh = False  # the old tangent has done its work: renew it at the same iterate
+            before = 1e300
+            continue
+        before = error
+        shifting = right_hand_sides(K, o_r, m, c_C, c_K, tangent)
+        if tangent and not factorize(K, size):
+            status = SINGULAR
+            break
+        biggest = correct(K, m, c_C, c_K, tangent, shifting)
+        if iteration == 0 and K.exact == 0:  # the predictor's error measures that of the step: stay far below it
+            tolerance = min(K.tolerance, max(1e-4 * biggest, tolerance))
+        fresh = True
+    K.detail[0] = t1
+    K.detail[2] = h
+    return status
+
+
+def predict(K: Any, h: float, t1: float, c_C: float, c_K: float) -> None:
+    """The block at t₁ with rates, multipliers and position correction extrapolated."""
     block = K.block
     stretch = h / K.clock[AUX_STEP]
-    mode = K.state[MODE]
     block[0] = t1
     block[1] = c_C
     block[2] = c_K
@@ -119,123 +168,94 @@ def newmark_step(K: Any, h: float, t1: float) -> int:
         block[K.o_lam + k] = K.lam[k] + h * K.lam_slope[k]
     for k in range(K.n_anchors):
         block[K.o_anchor + k] = K.anchors[k]
-    for i in range(n):
+    for i in range(K.n):
         a0 = K.rate[i] + stretch * (K.aux[i] - K.rate[i])
         rate = K.rate[i] + h * K.slope[i]
-        a1 = (mean_f * rate + K.alpha_f * K.rate[i] - K.alpha_m * a0) / mean_m
+        a1 = ((1.0 - K.alpha_f) * rate + K.alpha_f * K.rate[i] - K.alpha_m * a0) / (1.0 - K.alpha_m)
         block[K.o_a + i] = rate
         block[K.o_v + i] = K.y[i] + h * ((1.0 - K.gamma) * a0 + K.gamma * a1)
-        if i < n_v:
+        if i < K.n_v:
             K.shift1[i] = (K.shift[i] + stretch * K.shift_change[i]) * (stretch * stretch * stretch)
             block[K.o_x + i] = h * K.y[i] + h * h * ((0.5 - K.beta) * a0 + K.beta * a1) + K.shift1[i]
-    tolerance = 4.0 * EPS if K.exact == 1 else 1e-3 * K.tolerance
-    before = 1e300
-    fresh = False
-    accepted = False
-    status = NOT_CONVERGED
-    for iteration in range(K.max_iterations):
-        tangent = iteration == 0 or not fresh
-        if tangent:
-            call(K, K.mode_code[2 * mode], K.out)
-            K.counts[TANGENTS] += 1
-            o_r = size * size
-        else:
-            call(K, K.mode_code[2 * mode + 1], K.out)
-            K.counts[RESIDUALS] += 1
-            o_r = 0
-        error = residual_size(K, o_r, m, c_C, c_K, tolerance)
-        if error < 0.0:
-            status = NOT_FINITE
-            break
-        K.detail[1] = error
-        if error <= 1.0:
-            accepted = True
-            break
-        if iteration >= 2 and error > 0.5 * before:
-            raise_scales(K)
-            error = residual_size(K, o_r, m, c_C, c_K, tolerance)
-            if error <= 1.0:
-                accepted = True
-                break
-            if residual_size(K, o_r, m, 0.0, 0.0, 256.0 * EPS) <= 16.0:
-                K.counts[STAGNATIONS] += 1
-                accepted = True
-                break
-            if iteration >= 6 and K.exact == 0 and residual_size(K, o_r, m, 0.0, 0.0, 1e5 * EPS) <= 1e3:
-                status = STAGNATED
-                break
-        if not tangent and error > 0.1 * before:
-            fresh = False  # the old tangent has done its work: renew it at the same iterate
-            before = 1e300
-            continue
-        before = error
-        shifting = False  # a position at round-off stays: correcting it would only stir the velocity rows
-        if K.stabilized == 1:
-            for k in range(m):
-                if abs(K.out[o_r + n + k]) > 16.0 * EPS * K.scale[n + K.rows[k]]:
-                    shifting = True
-        # right-hand sides before the factors overwrite the tangent
-        o_h = o_r + n
-        for i in range(n):
-            K.rhs[i] = -K.out[o_r + i]
-        for k in range(m):
-            if K.stabilized == 1:
-                K.rhs[n + k] = -K.out[o_h + m + k] / c_C
-                h_next = K.out[o_h + k] - (c_K / c_C) * K.out[o_h + m + k]
-                if tangent:
-                    for j in range(n_v):
-                        h_next -= K.out[(n + k) * size + j] * K.shift1[j]
-                K.work[n + k] = -h_next
-            else:
-                K.rhs[n + k] = -K.out[o_h + k] / c_K
-        if tangent:
-            for k in range(size * size):
-                K.kkt[k] = K.out[k]
-            column = factor(K.kkt, size, K.pivots)
-            K.counts[FACTORIZATIONS] += 1
-            if column != 0:
-                K.state[BLOCKED] = column - 1
-                status = SINGULAR
-                break
-        solve(K.kkt, size, K.pivots, K.rhs)
-        K.counts[ITERATIONS] += 1
-        if iteration == 0 and K.exact == 0:  # the predictor's error measures that of the step: stay far below it
-            biggest = 0.0
-            fastest = 1e-300
-            for i in range(n):
-                biggest = max(biggest, abs(K.rhs[i]))
-                fastest = max(fastest, abs(block[K.o_a + i]))
-            tolerance = min(K.tolerance, max(1e-4 * biggest / fastest, tolerance))
-        for i in range(n):
-            change = K.rhs[i]
-            block[K.o_a + i] += change
-            block[K.o_v + i] += c_C * change
-            if i < n_v:
-                block[K.o_x + i] += c_K * change
-        for k in range(m):
-            block[K.o_lam + K.rows[k]] += K.rhs[n + k]
-        if shifting:
-            for i in range(n):
-                K.work[i] = 0.0
-            solve(K.kkt, size, K.pivots, K.work)
-            for i in range(n_v):
-                shift = K.work[i] if tangent else K.shift1[i] + K.work[i]
-                block[K.o_x + i] += shift - K.shift1[i]
-                K.shift1[i] = shift
-        fresh = True
-    if not accepted:
-        K.detail[0] = t1
-        K.detail[2] = h
-        return status
+
+
+def right_hand_sides(K: Any, o_r: int, m: int, c_C: float, c_K: float, tangent: bool) -> bool:
+    """−r and −h/c_K (index 3) or −ḣ/c_C in K.rhs; for the stabilized form the position residual in K.work.
+
+    Returns whether positions need correcting: one at round-off stays, as correcting it would only stir the velocity rows.
+    With a new tangent the whole correction U is solved for, so that it stays normal to the rows.
+    """
+    n = K.n
+    o_h = o_r + n
+    shifting = False
     for i in range(n):
+        K.rhs[i] = -K.out[o_r + i]
+        K.work[i] = 0.0
+    for k in range(m):
+        if K.stabilized == 0:
+            K.rhs[n + k] = -K.out[o_h + k] / c_K
+            continue
+        rate = K.out[o_h + m + k]
+        h = K.out[o_h + k]
+        if abs(h) > 16.0 * EPS * K.scale[n + K.rows[k]]:
+            shifting = True
+        h -= (c_K / c_C) * rate
+        if tangent:
+            for j in range(K.n_v):
+                h -= K.out[(n + k) * (n + m) + j] * K.shift1[j]
+        K.rhs[n + k] = -rate / c_C
+        K.work[n + k] = -h
+    return shifting
+
+
+def factorize(K: Any, size: int) -> bool:
+    """LU factors of the tangent in K.out; false where a pivot is missing."""
+    for k in range(size * size):
+        K.kkt[k] = K.out[k]
+    column = factor(K.kkt, size, K.pivots)
+    K.counts[FACTORIZATIONS] += 1
+    K.state[BLOCKED] = column - 1
+    return bool(column == 0)
+
+
+def correct(K: Any, m: int, c_C: float, c_K: float, tangent: bool, shifting: bool) -> float:
+    """Apply a Newton correction to the block; its size relative to the largest rate."""
+    n = K.n
+    block = K.block
+    biggest = 0.0
+    fastest = 1e-300
+    solve(K.kkt, n + m, K.pivots, K.rhs)
+    K.counts[ITERATIONS] += 1
+    for i in range(n):
+        change = K.rhs[i]
+        biggest = max(biggest, abs(change))
+        fastest = max(fastest, abs(block[K.o_a + i]))
+        block[K.o_a + i] += change
+        block[K.o_v + i] += c_C * change
+        if i < K.n_v:
+            block[K.o_x + i] += c_K * change
+    for k in range(m):
+        block[K.o_lam + K.rows[k]] += K.rhs[n + k]
+    if shifting:
+        solve(K.kkt, n + m, K.pivots, K.work)
+        for i in range(K.n_v):
+            shift = K.work[i] if tangent else K.shift1[i] + K.work[i]
+            block[K.o_x + i] += shift - K.shift1[i]
+            K.shift1[i] = shift
+    return biggest / fastest
+
+
+def finish(K: Any, h: float) -> None:
+    """The converged block becomes the candidate."""
+    stretch = h / K.clock[AUX_STEP]
+    for i in range(K.n):
         a0 = K.rate[i] + stretch * (K.aux[i] - K.rate[i])
-        K.rate1[i] = block[K.o_a + i]
-        K.y1[i] = block[K.o_v + i]
-        K.aux1[i] = (mean_f * K.rate1[i] + K.alpha_f * K.rate[i] - K.alpha_m * a0) / mean_m
+        K.rate1[i] = K.block[K.o_a + i]
+        K.y1[i] = K.block[K.o_v + i]
+        K.aux1[i] = ((1.0 - K.alpha_f) * K.rate1[i] + K.alpha_f * K.rate[i] - K.alpha_m * a0) / (1.0 - K.alpha_m)
     for k in range(K.n_rows):
-        K.lam1[k] = block[K.o_lam + k]
+        K.lam1[k] = K.block[K.o_lam + k]
     compose(K, K.q1)
-    return 0
 
 
 def newmark_accept(K: Any, h: float) -> None:

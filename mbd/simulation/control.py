@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +16,15 @@ from mbd.kernel import fields as F
 if TYPE_CHECKING:
     from mbd.simulation.run import Run
 
-__all__ = ["Boundaries", "Named", "apply_reset"]
+__all__ = ["Boundaries", "Named", "apply_reset", "asked"]
+
+
+def asked(what: str, function: Callable[..., Any], *arguments: Any) -> Any:
+    """What a user's function answers; whatever it raises ends the run, which is kept."""
+    try:
+        return function(*arguments)
+    except Exception as exc:  # the user's code may raise anything; all of it ends the run in one way
+        raise SimulationError(f"{what} raised {type(exc).__name__}: {exc}") from exc
 
 
 class Named(Mapping[str, float]):
@@ -52,23 +60,24 @@ class Named(Mapping[str, float]):
 
 def apply_reset(run: Run, guard: Guard) -> None:
     """Set the coordinates and rates that a user's event resets; rows must still hold."""
-    wanted = guard.reset(run.named()) if callable(guard.reset) else guard.reset
+    what = f"the reset of {guard.name!r} at t = {run.now:.6g} s"
+    wanted = asked(what, _reset_values, guard.reset, run.named())
+    bad = [name for name, value in wanted.items() if not np.isfinite(value)]
+    if bad:
+        raise SimulationError(f"{what} sets {bad[0]!r} to {wanted[bad[0]]!r}")
     equations, v = run.mechanism.equations, run.values
     positions = {coordinate.name: k for k, coordinate in enumerate(equations.coordinates)}
     rates = {name: k for name, k in rate_names(equations).items() if name not in positions}
     states = {state.name: equations.n_v + k for k, state in enumerate(equations.states)}
-    for name, value in dict(wanted).items():
-        number = value(run.named()) if callable(value) else float(value)
+    places = rates | states
+    unknown = [name for name in wanted if name not in positions and name not in places]
+    if unknown:
+        raise UnknownNameError(f"{what}: " + nearest(unknown[0], [*positions, *places], "quantity"))
+    for name, number in wanted.items():
         if name in positions:
             v["q"][positions[name]] = number
-        elif name in rates:
-            v["y"][rates[name]] = number
-        elif name in states:
-            v["y"][states[name]] = number
         else:
-            raise UnknownNameError(
-                f"reset of {guard.name!r}: " + nearest(name, [*positions, *rates, *states], "quantity")
-            )
+            v["y"][places[name]] = number
     flags = v["closed"][: v["n_contacts"]]
     rows = list(run.manager.active_rows(flags))
     terms = run.mechanism.acceleration_terms(
@@ -77,9 +86,13 @@ def apply_reset(run: Run, guard: Guard) -> None:
     off = [k for k in rows if abs(terms.h[k]) > 1e-6 or abs(terms.rate[k]) > 1e-6 * (1.0 + np.max(np.abs(v["y"])))]
     if off:
         names = ", ".join(repr(equations.rows[k].owner) for k in off)
-        raise SimulationError(
-            f"the reset of {guard.name!r} at t = {run.now:.6g} s breaks {names}; reset velocities too"
-        )
+        raise SimulationError(f"{what} breaks {names}; reset velocities too")
+
+
+def _reset_values(reset: Any, named: Named) -> dict[str, float]:
+    """The values that a reset sets, by name."""
+    wanted = reset(named) if callable(reset) else reset
+    return {name: float(value(named) if callable(value) else value) for name, value in dict(wanted).items()}
 
 
 class Boundaries:
@@ -121,8 +134,8 @@ class Boundaries:
         """Do what is due at a boundary; False at the end of the run."""
         if target >= end:
             return False
-        if self.place < len(self.breaks) and self.breaks[self.place] <= target * (1.0 + 4.0 * F.EPS) + 1e-300:
-            run.values["clock"][F.NOW] = self.breaks[self.place]
+        if self.place < len(self.breaks) and self.breaks[self.place] <= np.nextafter(target, np.inf):
+            run.move_to(self.breaks[self.place])
             self.place += 1
             run.values["state"][F.RESTART] = 1
         for controller in self.controllers:
@@ -139,21 +152,17 @@ class Boundaries:
 
     def _call(self, run: Run, controller: Any) -> None:
         named = run.named()
-        answer = controller.update(
-            run.now, {name: named[name] for name in controller.reads}, self.states[controller.name]
-        )
+        what = f"Controller {controller.name!r} at t = {run.now:.6g} s"
+        values = {name: named[name] for name in controller.reads}
+        answer = asked(what, controller.update, run.now, values, self.states[controller.name])
         if isinstance(answer, tuple):
             answer, self.states[controller.name] = answer
-        written = dict(answer or {})
+        written = asked(what, lambda: {name: float(value) for name, value in dict(answer or {}).items()})
         wrong = [name for name in written if name not in controller.writes]
         if wrong:
-            raise UnknownNameError(
-                f"Controller {controller.name!r}: " + nearest(wrong[0], controller.writes, "entry of writes")
-            )
+            raise UnknownNameError(f"{what}: " + nearest(wrong[0], controller.writes, "entry of writes"))
         bad = [name for name, value in written.items() if not np.isfinite(value)]
         if bad:
-            raise SimulationError(
-                f"Controller {controller.name!r} wrote {written[bad[0]]!r} to {bad[0]!r} at t = {run.now:.6g} s"
-            )
+            raise SimulationError(f"{what} wrote {written[bad[0]]!r} to {bad[0]!r}")
         if written:
             run.change_parameters(written)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from mbd.kernel import fields as F
+from mbd.results.record import EventRecord
 from mbd.simulation.stepper import Stepper
 from mbd.tape.evaluate import evaluate
 from mbd.tape.node import Node
@@ -14,7 +16,7 @@ from mbd.tape.node import Node
 __all__ = ["explanation"]
 
 
-def explanation(stepper: Stepper, status: int) -> str:
+def explanation(stepper: Stepper, status: int, events: Sequence[EventRecord] = ()) -> str:
     """A sentence for a failure status of the kernel."""
     values = stepper.values
     now = float(values["clock"][F.NOW])
@@ -41,8 +43,9 @@ def explanation(stepper: Stepper, status: int) -> str:
         return f"{where}: the Newton matrix is singular at {_unknown(stepper)}{with_closed}; rows depend on each other"
     if status == F.CHATTER:
         return (
-            f"{where}: more than {values['max_switches']} switches at one instant: {_last_events(stepper)}; contacts "
-            "release and close again without motion; give one of them a release rule, friction or a penalty law"
+            f"{where}: more than {values['max_switches']} switches at one instant: {_last_events(events)}; they "
+            "follow each other without motion; give a contact a release rule, friction or a penalty law, or an event "
+            "a reset that leaves zero"
         )
     if status == F.NO_IMPACT:
         return (
@@ -66,13 +69,9 @@ def _unknown(stepper: Stepper) -> str:
     return f"{row.owner!r} ({row.part})"
 
 
-def _last_events(stepper: Stepper) -> str:
-    values = stepper.values
-    width, count = values["event_width"], int(values["state"][F.LOGGED])
-    lines = values["log"].reshape(-1, width)[max(count - 6, 0) : count]
-    words = ("closed", "opened", "event")
-    names = [*stepper.manager.names]
-    shown = [f"{names[int(line[2])]!r} {words[int(line[1])]}" for line in lines if int(line[1]) < 2]
+def _last_events(events: Sequence[EventRecord]) -> str:
+    """The last switches, oldest first."""
+    shown = [f"{event.name!r} {'crossed' if event.kind == 'event' else event.kind}" for event in events[-6:]]
     return ", ".join(shown) or "no contact changed"
 
 

@@ -10,10 +10,11 @@ import numpy as np
 
 from mbd.arrays import Vector
 from mbd.compile.mechanism import Mechanism
+from mbd.errors import SimulationError, UnknownNameError
 from mbd.integrators.base import Integrator
 from mbd.kernel import fields as F
 from mbd.kernel.active_set import ActiveSetManager
-from mbd.simulation.control import Boundaries, Named, apply_reset
+from mbd.simulation.control import Boundaries, Named, apply_reset, asked
 from mbd.simulation.failures import explanation
 from mbd.simulation.stepper import Stepper
 from mbd.state import State
@@ -62,6 +63,7 @@ class Run:
         self.events: list[EventRecord] = []
         self.parameter_changes: list[tuple[int, Vector]] = []
         self.stored = 0
+        self.cause: Exception | None = None
         self.observers: Sequence[Callable[[float, State], None]] = ()
         self.progress: Callable[[float, float], None] | None = None
         controllers, instants = getattr(model, "controllers", ()), getattr(model, "instants", ())
@@ -76,7 +78,7 @@ class Run:
 
     # the start ----------------------------------------------------------------------------------------------------
     def _begin(self, start: State) -> None:
-        v, equations = self.values, self.mechanism.equations
+        v = self.values
         v["q"][: v["n_q"]] = start.q
         v["y"][: v["n"]] = np.concatenate([start.v, start.z])
         if len(start.anchors):
@@ -97,10 +99,11 @@ class Run:
         guards = self._guard_values()
         for c in range(n_contacts):
             close, slow = abs(guards[c]) <= 1e-8, abs(guards[n_contacts + c]) <= 1e-9
-            v["touched"][c] = int(v["armed"][c] == 1 and v["kind"][c] == 0 and close and slow)
+            target = v["while_target"][c]
+            watched = (True, v["closed"][target] == 1, guards[3 * n_contacts + c] > 0.0)[v["while_kind"][c]]
+            v["touched"][c] = int(v["armed"][c] == 1 and v["kind"][c] == 0 and close and slow and watched)
         for e in range(n_guards):
             self._set_side(e, guards)
-        del equations
 
     def _guard_values(self) -> Vector:
         v = self.values
@@ -116,45 +119,59 @@ class Run:
         """The sign from which a user's guard will cross next; at zero its rate decides."""
         n_contacts, n_guards = self.values["n_contacts"], self.values["n_guards"]
         value, rate = guards[4 * n_contacts + e], guards[4 * n_contacts + n_guards + e]
-        decider = value if abs(value) > 1e-9 else rate
+        decider = value if abs(value) > 1e-9 else rate if rate != 0.0 else -self.values["direction"][e]
         self.values["side"][e] = 1.0 if decider > 0.0 else -1.0
 
     # the run ------------------------------------------------------------------------------------------------------
     def complete(self) -> tuple[Trajectory, str]:
         """Run to the end; the trajectory, and what went wrong ('' if nothing did)."""
-        problem, message = "", ""
-        shown = 0.0
-        self.boundaries.begin(self)
-        try:
-            while True:
-                target = self.boundaries.next(self.end)
-                status = self.stepper.advance(target)
-                known = len(self.events)
-                self._collect()
-                if status == F.NEW_MODE:
-                    self.stepper.add_mode()
-                elif status == F.DONE:
-                    if not self.boundaries.arrive(self, target, self.end):
-                        message = f"reached t = {self.end:g} s"
-                        break
-                elif status == F.EVENT:
-                    ended = self._react(self.events[known:])
-                    if ended:
-                        message = f"ended by {ended!r} at t = {self.now:.6g} s"
-                        break
-                elif status not in (F.FULL, F.PAUSE):
-                    problem = explanation(self.stepper, status)
-                    break
-                if perf_counter() - shown > SHOW_EVERY:
-                    shown = perf_counter()
-                    self._show()
-        except KeyboardInterrupt:
-            problem = f"interrupted at t = {self.now:.6g} s; everything until then is kept"
+        problem, message = self._guarded(self._march)
         self._collect()
         if self.stop and not problem and not message.startswith("ended"):
             message = f"{self.stop!r} did not happen before t = {self.end:g} s"
-        self._show(finished=True)
+        problem = problem or self._guarded(self._last_show)[0]
         return self._trajectory(problem, message), problem
+
+    def _guarded(self, part: Callable[[], tuple[str, str]]) -> tuple[str, str]:
+        """(problem, message) of a part of the run; what users' functions raise ends it in order."""
+        try:
+            return part()
+        except KeyboardInterrupt:
+            return f"interrupted at t = {self.now:.6g} s; everything until then is kept", ""
+        except (SimulationError, UnknownNameError) as error:
+            self.cause = self.cause or error
+            return str(error), ""
+
+    def _march(self) -> tuple[str, str]:
+        """Kernel, reaction, kernel, … until the end; (problem, message)."""
+        shown = 0.0
+        self.boundaries.begin(self)
+        while True:
+            target = self.boundaries.next(self.end)
+            status = self.stepper.advance(target)
+            known = len(self.events)
+            self._collect()
+            if status == F.NEW_MODE:
+                self.stepper.add_mode()
+            elif status == F.DONE:
+                if not self.boundaries.arrive(self, target, self.end):
+                    return "", f"reached t = {self.end:g} s"
+            elif status == F.EVENT:
+                ended = self._react(self.events[known:])
+                if ended:
+                    return self._finish(f"ended by {ended!r} at t = {self.now:.6g} s")
+            elif status not in (F.FULL, F.PAUSE):
+                return explanation(self.stepper, status, self.events), ""
+            if perf_counter() - shown > SHOW_EVERY:
+                shown = perf_counter()
+                self._show()
+
+    def _finish(self, message: str) -> tuple[str, str]:
+        """Store the row after the event that ends the run."""
+        status = self.stepper.advance(self.now)
+        self._collect()
+        ended = status in (F.DONE, F.EVENT, F.NEW_MODE)
+        return ("", message) if ended else (explanation(self.stepper, status, self.events), "")
 
     @property
     def now(self) -> float:
@@ -162,9 +179,13 @@ class Run:
 
     def _show(self, finished: bool = False) -> None:
         if self.progress is not None:
-            self.progress(self.now, self.now if finished else self.end)
+            asked("progress", self.progress, self.now, self.now if finished else self.end)
         for observer in self.observers:
-            observer(self.now, self.state())
+            asked("an observer", observer, self.now, self.state())
+
+    def _last_show(self) -> tuple[str, str]:
+        self._show(finished=True)
+        return "", ""
 
     def _collect(self) -> None:
         """Take over the rows and events that the kernel has stored."""
@@ -208,6 +229,12 @@ class Run:
         self.values["params"][: len(self.first_parameters)] = self.mechanism.parameters(self.changed, self.folded)
         self.parameter_changes.append((self.stored + int(self.values["state"][F.STORED]), self.values["params"].copy()))
         self.values["state"][F.RESTART] = 1
+
+    def move_to(self, time: float) -> None:
+        """Put the clock, and the row just stored as the left side of a break, on its instant."""
+        if self.pieces and self.pieces[-1][-1, 0] == self.now:
+            self.pieces[-1][-1, 0] = time
+        self.values["clock"][F.NOW] = time
 
     def named(self) -> Named:
         """Named quantities at the present state."""

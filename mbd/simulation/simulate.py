@@ -99,7 +99,7 @@ def simulate(
     run.observe(observers, _bar(progress, start.time, end))
     trajectory, problem = run.complete()
     if problem and on_failure == "raise":
-        raise SimulationError(problem, trajectory)
+        raise SimulationError(problem, trajectory) from run.cause
     return trajectory
 
 

@@ -42,7 +42,8 @@ def placement(joint, q, sin, cos):
             R = about(forward.axis, sin(value["angle"]), cos(value["angle"]))
             p = value["displacement"] * np.array(forward.axis)
         case "Screw":
-            R, p = about(forward.axis, sin(q[0]), cos(q[0])), q[0] * (forward.pitch / (2 * np.pi)) * np.array(forward.axis)
+            R = about(forward.axis, sin(q[0]), cos(q[0]))
+            p = q[0] * (forward.pitch / (2 * np.pi)) * np.array(forward.axis)
         case "Prismatic":
             p = q[0] * np.array(forward.axis)
         case "Universal":
@@ -126,11 +127,11 @@ def test_equations_equal_those_of_the_positions_only_route(seed, spatial):
 
 
 def test_both_front_doors_agree_on_a_double_pendulum():
-    m, l, g = sp.symbols("m l g")
+    m, L, g = sp.symbols("m L g")
     a, b = mbd.Coordinate("a"), mbd.Coordinate("b")  # both from the vertical
-    T = m * l**2 * (a.v**2 + b.v**2 / 2 + a.v * b.v * sp.cos(a.q - b.q))
-    V = -m * g * l * (2 * sp.cos(a.q) + sp.cos(b.q))
-    textbook = derive(mbd.Lagrangian("double pendulum", [a, b], T, V, parameters={m: 0.7, l: 0.4, g: 9.81}))
+    T = m * L**2 * (a.v**2 + b.v**2 / 2 + a.v * b.v * sp.cos(a.q - b.q))
+    V = -m * g * L * (2 * sp.cos(a.q) + sp.cos(b.q))
+    textbook = derive(mbd.Lagrangian("double pendulum", [a, b], T, V, parameters={m: 0.7, L: 0.4, g: 9.81}))
     model = mbd.Model("double pendulum")
     links = [mbd.Link(name, mass=0.7, length=0.4, center=0.4) for name in ("upper", "lower")]
     model.connect(

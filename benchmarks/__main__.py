@@ -1,0 +1,53 @@
+"""``python -m benchmarks [run | compare | baseline]``: see README.md here."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from benchmarks.compare import comparison, regressions
+from benchmarks.figures import NOISY, table
+from benchmarks.handwritten import compiler
+from benchmarks.run import BASELINE, GROUPS, RESULTS, Record, measure
+
+
+def main() -> int:
+    """Measure and print; 1 if a comparison finds a figure more than 15 % worse."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description="What mbd costs, measured.")
+    parser.add_argument(
+        "what", nargs="?", default="run", choices=("run", "compare", "baseline"),
+        help="print the figures; compare them with the baseline; or make them the baseline",
+    )  # fmt: skip
+    parser.add_argument("--only", nargs="+", choices=GROUPS, default=GROUPS, metavar="GROUP", help=", ".join(GROUPS))
+    parser.add_argument("--repeats", type=int, default=7, help="of every measurement, minima count (default 7)")
+    parser.add_argument("--json", nargs="?", const=RESULTS, type=Path, metavar="FILE", help="also write a record")
+    options = parser.parse_args()
+    if options.what == "compare" and not BASELINE.exists():
+        parser.error(f"there is no {BASELINE.name} to compare with; make one with 'python -m benchmarks baseline'")
+    if compiler() is None:
+        print("no C compiler (cc, gcc, clang) was found: figures stand without their ratio to hand-written C")
+    record = measure(options.repeats, options.only)
+    if options.json:
+        record.save(options.json)
+    print(*(f"{key}: {value}" for key, value in record.machine.items()), sep=", ")
+    _warn_if_noisy(record)
+    if options.what == "compare":
+        stored = Record.load(BASELINE)
+        print(comparison(record, stored))
+        return 1 if regressions(record, stored) else 0
+    print(table(record.figures))
+    if options.what == "baseline":
+        record.save(BASELINE)
+    return 0
+
+
+def _warn_if_noisy(record: Record) -> None:
+    noisy = sum(figure.spread > NOISY for figure in record.figures)
+    if noisy:
+        total = len(record.figures)
+        print(f"the machine was busy: {noisy} of {total} figures have a median more than 20 % above their minimum")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,115 @@
+"""Microseconds per implicit step on the kernel path, beside hand-written C of the same scheme."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+import mbd
+from benchmarks import walkers
+from benchmarks.figures import Figure, Samples, interleaved
+from benchmarks.handwritten import Program, compiler
+from mbd.integrators.family import NewmarkFamily
+
+__all__ = ["CASES", "Case", "DT", "measure"]
+
+DT = 1e-3
+AIM_RATIO = 1.2
+SAME = 1e-9
+"""Largest difference of positions and velocities, relative to the largest of them (or to 1), between mbd and C."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A walker to be stepped.
+
+    Parameters
+    ----------
+    name : of the walker
+    make : model and start
+    source, numbers, names : its C code, that code's parameters, its coordinates in the order of the C code
+    rows : constraint rows
+    steps : how many are run; the motion is that of a walker for so long
+    aim : µs per index-3 step
+    """
+
+    name: str
+    make: Callable[[], tuple[mbd.Model, mbd.State]]
+    source: str
+    numbers: Any
+    names: tuple[str, ...]
+    rows: int
+    steps: int
+    aim: float
+
+
+_LEGS = [f"{side} {joint}.angle" for side in ("left", "right") for joint in ("hip", "knee", "ankle")]
+CASES = (
+    Case(
+        "compass, 4 dof + 2 rows", walkers.compass, "compass.h", walkers.COMPASS,
+        ("trunk.x", "trunk.y", "left hip.angle", "right hip.angle"), rows=2, steps=3000, aim=0.35,
+    ),
+    Case(
+        "7 links, 9 dof + 3 rows", walkers.seven, "seven.h", walkers.SEVEN,
+        ("root.x", "root.y", "root.angle", *_LEGS), rows=3, steps=450, aim=1.8,
+    ),
+)  # fmt: skip
+
+
+def measure(repeats: int) -> list[Figure]:
+    """Both walkers, index 3 and stabilized."""
+    return [figure for case in CASES for form in ("index3", "ggl") for figure in _case(case, form, repeats)]
+
+
+def _case(case: Case, form: Any, repeats: int) -> list[Figure]:
+    """One walker in one formulation. Set-up is excluded: a long run minus a short one."""
+    model, start = case.make()
+    scheme = mbd.GeneralizedAlpha(rho_inf=0.9, formulation=form)
+    short, none = case.steps // 10, 10 * case.steps
+
+    def run(steps: int) -> dict[str, Any]:
+        return dict(mbd.simulate(model, start, scheme, dt=DT, until=steps * DT, store=none).stats)
+
+    tasks: dict[str, Callable[[], float]] = {
+        "long": lambda: float(run(case.steps)["wall_seconds"]),
+        "short": lambda: float(run(short)["wall_seconds"]),
+    }
+    if compiler() is not None:
+        program = Program(case.source, (len(case.names), case.rows), case.numbers, case.names, form == "ggl")
+        _assert_same(case, model, start, scheme, program)
+        tasks["C long"] = lambda: program.run(start, scheme, DT, case.steps, none).seconds
+        tasks["C short"] = lambda: program.run(start, scheme, DT, short, none).seconds
+    samples = interleaved(tasks, 5 * repeats)
+    own, spread = _per_step(samples["long"], samples["short"], case.steps - short)
+    reference = None
+    if "C long" in samples:
+        reference, _ = _per_step(samples["C long"], samples["C short"], case.steps - short)
+    name = f"step, {case.name}, {'index 3' if form == 'index3' else 'stabilized'}"
+    aims = (case.aim, AIM_RATIO) if form == "index3" else (None, None)
+    counts = run(case.steps)
+    evaluations = (counts["tangents"] + counts["residuals"]) / counts["steps"]
+    return [
+        Figure(name, own, "µs", aims[0], "C" if reference else "", reference, aims[1], spread),
+        Figure(f"{name}: evaluations", evaluations, "a step"),
+    ]
+
+
+def _per_step(long: Samples, short: Samples, steps: int) -> tuple[float, float]:
+    """Microseconds per step, and the spread of the long runs."""
+    return (long.least - short.least) / steps * 1e6, long.spread
+
+
+def _assert_same(case: Case, model: mbd.Model, start: mbd.State, scheme: NewmarkFamily, program: Program) -> None:
+    """The C loop computes the same motion; otherwise the comparison would mean nothing."""
+    run = mbd.simulate(model, start, scheme, dt=DT, until=case.steps * DT)
+    mine = [run[name] for name in case.names] + [run[f"{name}.rate"] for name in case.names]
+    theirs = program.run(start, scheme, DT, case.steps, 1).rows
+    groups: Sequence[slice] = (slice(0, len(case.names)), slice(len(case.names), 2 * len(case.names)))
+    for group in groups:
+        own, other = np.stack(mine[group], axis=1), theirs[:, group]
+        difference = float(np.max(np.abs(own - other))) / max(1.0, float(np.max(np.abs(other))))
+        if not difference < SAME:
+            raise AssertionError(f"{case.name}: the C loop and mbd differ by {difference:.1e} after {case.steps} steps")
