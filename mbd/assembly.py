@@ -264,6 +264,8 @@ def _undetermined(work: _Assembly) -> list[str]:
     picked = list(work.manager.active_rows(work.flags))
     terms = work.mechanism.acceleration_terms(0.0, work.q, work.y, work.parameters, work.anchors)
     n, m = len(terms.f), len(picked)
+    if n == 0:
+        return ["nothing can move: the model has no coordinate; connect a body by a joint that lets it move"]
     matrix = np.block([[terms.M, terms.R[:, picked]], [terms.B[picked], np.zeros((m, m))]])
     if not np.isfinite(matrix).all() or not np.isfinite(terms.f).all():
         return ["a force, mass or constraint is not finite at the start; check the parameters and functions used"]

@@ -45,7 +45,9 @@ class Case:
     quantities: Mapping[str, Quantity]
 
     def __getitem__(self, beginning: str) -> Quantity:
-        """The one quantity whose name begins so."""
+        """The quantity of that name, or the one whose name begins so."""
+        if beginning in self.quantities:
+            return self.quantities[beginning]
         found = [quantity for name, quantity in self.quantities.items() if name.startswith(beginning)]
         assert len(found) == 1, f"{len(found)} quantities of {self.name} begin with {beginning!r}"
         return found[0]

@@ -51,6 +51,19 @@ static void refresh_scales(const Model *p, const Point *at, Motion *s)
     }
 }
 
+/* The same where they exceed those known; a force that passes zero has none. */
+static void raise_scales(const Model *p, const Point *at, Motion *s)
+{
+    Motion old = *s;
+    refresh_scales(p, at, s);
+    for (int i = 0; i < N; i++)
+        s->scale_r[i] = larger(s->scale_r[i], old.scale_r[i]);
+    for (int k = 0; k < M; k++) {
+        s->scale_h[k] = larger(s->scale_h[k], old.scale_h[k]);
+        s->scale_rate[k] = larger(s->scale_rate[k], old.scale_rate[k]);
+    }
+}
+
 /* Accelerations and multipliers that satisfy the balance and the rows at acceleration level. */
 static int consistent(const Model *p, Point *at)
 {
@@ -92,6 +105,13 @@ static int start(const Model *p, const Scheme *c, Motion *s)
     for (int k = 0; k < M; k++)
         s->lam_slope[k] = (later.lam[k] - s->now.lam[k]) / step;
     refresh_scales(p, &s->now, s);
+    later = s->now;
+    for (int i = 0; i < N; i++) { /* sizes a step later count as well */
+        later.q[i] += c->dt * (s->now.v[i] + 0.5 * c->dt * s->now.a[i]);
+        later.v[i] += c->dt * s->now.a[i];
+        later.a[i] += c->dt * s->slope[i];
+    }
+    raise_scales(p, &later, s);
     return 0;
 }
 
@@ -152,13 +172,13 @@ static int step(const Model *p, const Scheme *c, Motion *s, int64_t counts[3])
             return 1;
         accepted = error <= 1.0;
         if (!accepted && iteration >= 2 && error > 0.5 * before) { /* stalled: fresh scales, then round-off decide */
-            refresh_scales(p, &at, s);
+            raise_scales(p, &at, s);
             error = residual_size(s, &at, r, h, rate, C, K, tolerance);
             accepted = error <= 1.0 || residual_size(s, &at, r, h, rate, 0.0, 0.0, 256.0 * EPS) <= 16.0;
         }
         if (accepted)
             break;
-        if (!renew && error > 0.1 * before) { /* the old tangent has done its work: renew it at the same iterate */
+        if (!renew && error > 0.3 * before) { /* the old tangent has done its work: renew it at the same iterate */
             fresh = 0;
             before = 1e300;
             continue;
@@ -175,15 +195,18 @@ static int step(const Model *p, const Scheme *c, Motion *s, int64_t counts[3])
             if (factor(A, pivots))
                 return 1;
         }
+        int shifting = 0; /* a position at round-off stays: correcting it would only stir the velocity rows */
         if (STABILIZED) { /* position correction in the metric of the same matrix */
             memset(d, 0, sizeof d);
             for (int k = 0; k < M; k++) {
+                shifting |= fabs(h[k]) > 16.0 * EPS * s->scale_h[k];
                 d[N + k] = K / C * rate[k] - h[k];
                 if (renew)
                     for (int j = 0; j < N; j++)
                         d[N + k] += rows[k][j] * shift[j];
             }
-            solve(A, pivots, d);
+            if (shifting)
+                solve(A, pivots, d);
         }
         solve(A, pivots, b);
         counts[ITERATIONS]++;
@@ -199,7 +222,7 @@ static int step(const Model *p, const Scheme *c, Motion *s, int64_t counts[3])
             at.a[i] += b[i];
             at.v[i] += C * b[i];
             at.q[i] += K * b[i];
-            if (STABILIZED) {
+            if (shifting) {
                 double next = renew ? d[i] : shift[i] + d[i];
                 at.q[i] += next - shift[i];
                 shift[i] = next;

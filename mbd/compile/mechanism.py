@@ -78,18 +78,19 @@ class Mechanism:
     def mode(self, rows: Sequence[int], penalties: Sequence[int], stabilized: bool) -> ModeCode:
         """Code of the mode with these rows and penalty contacts, made on first use."""
         key = (tuple(rows), tuple(penalties), stabilized)
-        if key not in self._modes:
-            started = perf_counter()
-            tangent, residual = f"tangent_{len(self._modes)}", f"residual_{len(self._modes)}"
-            self.common.add(
-                {
-                    tangent: programs.newton(self.equations, rows, penalties, stabilized),
-                    residual: programs.residual(self.equations, rows, penalties, stabilized),
-                }
-            )
-            self._modes[key] = ModeCode(key[0], key[1], self.common[tangent], self.common[residual])
-            self.seconds += perf_counter() - started
-        return self._modes[key]
+        with self.equations.tape.lock:  # runs in other threads share this mechanism
+            if key not in self._modes:
+                started = perf_counter()
+                tangent, residual = f"tangent_{len(self._modes)}", f"residual_{len(self._modes)}"
+                self.common.add(
+                    {
+                        tangent: programs.newton(self.equations, rows, penalties, stabilized),
+                        residual: programs.residual(self.equations, rows, penalties, stabilized),
+                    }
+                )
+                self._modes[key] = ModeCode(key[0], key[1], self.common[tangent], self.common[residual])
+                self.seconds += perf_counter() - started
+            return self._modes[key]
 
     @property
     def modes(self) -> int:

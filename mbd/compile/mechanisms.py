@@ -10,6 +10,9 @@ from weakref import WeakKeyDictionary
 
 from mbd.compile.mechanism import Mechanism
 from mbd.equations.derivation import derive
+from mbd.equations.lagrangian import Lagrangian
+from mbd.errors import ModelError
+from mbd.model import Model
 
 __all__ = ["mechanism_of"]
 
@@ -38,6 +41,8 @@ def mechanism_of(model: Any, backend: str = "auto", changed: Mapping[str, float]
     changed : parameter values that are wanted; an exact 0 or ±1 of the model among them, which is folded into the
         equations, is made a run-time input (one more derivation, noted in `Mechanism.notes`)
     """
+    if not isinstance(model, Model | Lagrangian):
+        raise ModelError(f"a Model or a Lagrangian is expected, not {model!r}")
     mechanism = _mechanism(model, backend, frozenset())
     inputs = {parameter.name for parameter in mechanism.equations.parameters}
     values = getattr(model, "parameters", {})

@@ -131,9 +131,7 @@ def _geometry(edge: Edge, scope: Scope) -> tuple[Rotation, Triple, Triple, tuple
     return turn, total(p_parent, rotate(R_parent, p)), p_child, tuple(columns)
 
 
-def _joint_motion(
-    edge: Edge, columns: Sequence[Column], tape: Tape
-) -> tuple[Triple, Triple, Triple, Triple]:
+def _joint_motion(edge: Edge, columns: Sequence[Column], tape: Tape) -> tuple[Triple, Triple, Triple, Triple]:
     """ω_r, ω̇_r in child axes and ṗ, p̈ in parent axes."""
     turning, sliding = _combined(columns, edge.rates)
     turning_rate, sliding_rate = _combined(columns, edge.accelerations)

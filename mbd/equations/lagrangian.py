@@ -136,6 +136,10 @@ class Lagrangian:
         bare["constraints"] = {name: h for name, h in self._rows.items() if name not in names}
         return replace(self, **bare)
 
+    def with_tunable(self, *names: str) -> Lagrangian:
+        """A copy in which some parameters stay inputs even at an exact 0 or ±1."""
+        return replace(self, tunable=(*self.tunable, *names))
+
     @property
     def _rows(self) -> Mapping[str, Expression]:
         """The constraints by name."""
@@ -279,9 +283,7 @@ def _assembled(system: Lagrangian, lowering: _Lowering) -> Equations:
     )  # fmt: skip
 
 
-def _effects(
-    system: Lagrangian, lowering: _Lowering, dV: Sequence[Node], dD: Sequence[Node]
-) -> tuple[Effect, ...]:
+def _effects(system: Lagrangian, lowering: _Lowering, dV: Sequence[Node], dD: Sequence[Node]) -> tuple[Effect, ...]:
     """The causes of forces: potential, dissipation, and each generalized force."""
     tape, v = lowering.tape, lowering.inputs.v
     found = []
@@ -308,9 +310,7 @@ def _sum(tape: Tape, terms: Sequence[Node]) -> Node:
     return total
 
 
-def _outputs(
-    system: Lagrangian, lowering: _Lowering, rows: Sequence[Row], effects: Sequence[Effect]
-) -> Outputs:
+def _outputs(system: Lagrangian, lowering: _Lowering, rows: Sequence[Row], effects: Sequence[Effect]) -> Outputs:
     """θ, its rate and acceleration, forces, multipliers, energies and powers."""
     outputs, inputs = Outputs(lowering.tape), lowering.inputs
     for k, coordinate in enumerate(system.coordinates):

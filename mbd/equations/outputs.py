@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 
 from mbd.errors import UnknownNameError, nearest
 from mbd.tape.node import Node, Scalar, Tape
@@ -20,9 +21,7 @@ class Outputs:
     finish : what is done to every result in the end
     """
 
-    def __init__(
-        self, tape: Tape, base: Outputs | None = None, finish: Callable[[Scalar], Node] | None = None
-    ) -> None:
+    def __init__(self, tape: Tape, base: Outputs | None = None, finish: Callable[[Scalar], Node] | None = None) -> None:
         self._finish = tape.lift if finish is None else finish
         self._tape = tape
         self._makers: dict[str, Callable[[], Scalar]] = {} if base is None else dict(base._makers)
@@ -46,7 +45,7 @@ class Outputs:
             return made[k]
 
         for k, suffix in enumerate(suffixes):
-            self.add(f"{name}.{suffix}", lambda k=k: component(k))  # type: ignore[misc]
+            self.add(f"{name}.{suffix}", partial(component, k))
 
     def __call__(self, name: str) -> Node:
         """The node of a result; an unknown name is answered with the nearest known ones."""

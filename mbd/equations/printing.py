@@ -86,9 +86,7 @@ def _counts(parts: Parts) -> str:
 
 def _text(equations: Equations, parts: Parts) -> str:
     """Assignments, one a line."""
-    entries = {
-        f"{letter}[{', '.join(key)}]": node for letter, found in parts.items() for key, node in found.items()
-    }
+    entries = {f"{letter}[{', '.join(key)}]": node for letter, found in parts.items() for key, node in found.items()}
     lines = [
         f"{equations.name}: M(q) a + f(t, q, v) + Bᵀ λ = 0, h(q, t) = 0"
         f"  ({equations.n_v} coordinates, {equations.n_z} states, {len(equations.rows)} rows)",
@@ -138,10 +136,13 @@ def _symbols(equations: Equations) -> tuple[dict[Node, Any], list[str]]:
     inputs, legend = Inputs.of(equations), []
     found: dict[Node, Any] = {inputs.t: sympy.Symbol("t", real=True)}
     for k, (q, coordinate) in enumerate(zip(inputs.q, equations.coordinates, strict=True), start=1):
-        found[q] = sympy.Symbol(f"q_{{{k}}}", real=True)
-        legend.append(f"q_{k} = {coordinate.name} [{coordinate.unit}]")
-    for k, v in enumerate(inputs.v, start=1):
-        found[v] = sympy.Symbol(f"\\dot{{q}}_{{{k}}}", real=True)
+        own = coordinate.name.isidentifier()
+        found[q] = sympy.Symbol(coordinate.name if own else f"q_{{{k}}}", real=True)
+        legend.append(f"{'coordinate ' if own else 'q_'}{k} = {coordinate.name} [{coordinate.unit}]")
+    for k, (v, name) in enumerate(zip(inputs.v, equations.velocity_names, strict=True), start=1):
+        own = name.removesuffix(".rate").isidentifier()
+        letter = sympy.latex(sympy.Symbol(name.removesuffix(".rate"))) if own else f"q_{{{k}}}"
+        found[v] = sympy.Symbol(f"\\dot{{{letter}}}", real=True)
     for k, (z, state) in enumerate(zip(inputs.z, equations.states, strict=True), start=1):
         found[z] = sympy.Symbol(f"z_{{{k}}}", real=True)
         legend.append(f"z_{k} = {state.name}")
@@ -159,6 +160,8 @@ LETTERS = {
 def _parameter_symbol(name: str) -> str:
     """'left thigh.mass' → m with 'left thigh' below it."""
     owner, _, field = name.partition(".")
+    if owner == "gravity":
+        return f"g_{field}"
     letter = LETTERS.get(field, f"\\mathrm{{{field.replace('_', ' ')}}}") if field else owner
     return f"{letter}_{{\\mathrm{{{owner.replace(' ', '~')}}}}}" if field else letter
 

@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from mbd.equations.equations import Equations
+from mbd.equations.factoring import factored
 from mbd.equations.inputs import Inputs
 from mbd.tape.derivatives import gradient, jvp, jvps, live, substitute, vjp
 from mbd.tape.node import Node, Tape
@@ -167,7 +168,9 @@ def _tangent(equations: Equations, r: Sequence[Node]) -> list[list[Node]]:
     for j, (x, v, a) in enumerate(zip(inputs.x, inputs.v, inputs.a, strict=True)):
         directions.append({a: 1.0, v: c_C, x: c_K, **{node: c_K * slope for node, slope in known[j].items()}})
     directions += [{s: 1.0, z: c_C} for s, z in zip(inputs.s, inputs.z, strict=True)]
-    return jvps(r, directions)
+    plain = [entry for column in jvps(r, directions) for entry in column]
+    entries = min(plain, factored(plain, inputs.c), key=lambda S: len(live([*r, *S])))
+    return [entries[j * len(r) : (j + 1) * len(r)] for j in range(len(r))]
 
 
 def _row_forces(
@@ -181,9 +184,7 @@ def _row_forces(
     return [[*line, *padding] for line in B]
 
 
-def _jacobian_rates(
-    equations: Equations, B: Sequence[Sequence[Node]], hv: Sequence[Node]
-) -> Sequence[Sequence[Node]]:
+def _jacobian_rates(equations: Equations, B: Sequence[Sequence[Node]], hv: Sequence[Node]) -> Sequence[Sequence[Node]]:
     """∂ḣ/∂x of each row; where coordinates add it is dB/dt, which reuses what B is made of."""
     inputs = Inputs.of(equations)
     if equations.compose is not None:

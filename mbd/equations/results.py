@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
 from mbd.constraints.bilateral import Bilateral
@@ -15,6 +16,7 @@ from mbd.equations.surroundings import Surroundings
 from mbd.forces.base import Force
 from mbd.forces.motor import Motor
 from mbd.joints.base import Joint
+from mbd.scope import Triple
 from mbd.tape.node import Scalar, Tape
 
 if TYPE_CHECKING:
@@ -52,20 +54,20 @@ def _offer_joints(
     """Accelerations and reactions of the joints; `hidden` are those that no user made."""
     known: dict[str, Wrench] = {}
 
-    def wrench(joint: Joint) -> Wrench:
+    def part(joint: Joint, kind: str) -> Triple:
         if joint.name not in known:
             known[joint.name] = reaction(joint, scope, dynamics, work, rows)
-        return known[joint.name]
+        return known[joint.name].force if kind == "force" else known[joint.name].torque
 
     for joint in (*scope.tree, *scope.cuts):
         for k, label in enumerate(joint.labels):
             name = f"{joint.name}.{label.name}.acceleration"
-            outputs.add(name, lambda n=joint.name, k=k: _acceleration(scope, n, k))  # type: ignore[misc]
+            outputs.add(name, partial(_acceleration, scope, joint.name, k))
         if len(joint.labels) == 1:
-            outputs.add(f"{joint.name}.acceleration", lambda n=joint.name: _acceleration(scope, n, 0))  # type: ignore[misc]
+            outputs.add(f"{joint.name}.acceleration", partial(_acceleration, scope, joint.name, 0))
         if joint.name not in hidden:
-            outputs.triple(f"{joint.name}.reaction_force", lambda joint=joint: wrench(joint).force)  # type: ignore[misc]
-            outputs.triple(f"{joint.name}.reaction_torque", lambda joint=joint: wrench(joint).torque)  # type: ignore[misc]
+            outputs.triple(f"{joint.name}.reaction_force", partial(part, joint, "force"))
+            outputs.triple(f"{joint.name}.reaction_torque", partial(part, joint, "torque"))
 
 
 def _acceleration(scope: Surroundings, joint: str, place: int) -> Scalar:

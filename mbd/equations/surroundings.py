@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
+from functools import partial
 
 from mbd.bodies.algebra import IDENTITY, difference, product, rotate, transpose
 from mbd.bodies.base import Body, Frame
@@ -208,21 +209,30 @@ class Surroundings:
         """Name the components of frames' places and velocities, and register their parameters."""
         for frame in frames:
             frame.placement(self)
-            self.quantities.triple(frame.full_name, lambda frame=frame: self.frame(frame).position)  # type: ignore[misc]
-            self.quantities.triple(
-                frame.full_name, lambda frame=frame: self.frame(frame).velocity, [f"v{axis}" for axis in AXES]  # type: ignore[misc]
-            )
+            self.quantities.triple(frame.full_name, partial(self._position, frame))
+            self.quantities.triple(frame.full_name, partial(self._velocity, frame), [f"v{axis}" for axis in AXES])
+
+    def _position(self, frame: Frame) -> Triple:
+        return self.frame(frame).position
+
+    def _velocity(self, frame: Frame) -> Triple:
+        return self.frame(frame).velocity
 
     def _offer_quantities(self) -> None:
         """Time, coordinates and rates of every joint."""
         self.quantities.value("t", self.time)
         for joint in (*self.tree, *self.cuts):
             for k, label in enumerate(joint.labels):
-                name = f"{joint.name}.{label.name}"
-                self.quantities.add(name, lambda n=joint.name, k=k: self.joint(n).coordinates[k])  # type: ignore[misc]
-                self.quantities.add(f"{name}.rate", lambda n=joint.name, k=k: self.joint(n).rates[k])  # type: ignore[misc]
+                self.quantities.add(f"{joint.name}.{label.name}", partial(self._coordinate, joint.name, k))
+                self.quantities.add(f"{joint.name}.{label.name}.rate", partial(self._rate, joint.name, k))
             if len(joint.labels) == 1:
-                self.quantities.add(f"{joint.name}.rate", lambda n=joint.name: self.joint(n).rates[0])  # type: ignore[misc]
+                self.quantities.add(f"{joint.name}.rate", partial(self._rate, joint.name, 0))
+
+    def _coordinate(self, joint: str, place: int) -> Scalar:
+        return self.joint(joint).coordinates[place]
+
+    def _rate(self, joint: str, place: int) -> Scalar:
+        return self.joint(joint).rates[place]
 
     def _body(self, name: str) -> Moving:
         if name not in self.bodies:

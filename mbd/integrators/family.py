@@ -61,9 +61,10 @@ class Coefficients:
     def rho_inf(self) -> float:
         """Spectral radius of the amplification matrix as ω dt → ∞."""
         beta, gamma = self.beta, self.gamma
-        roots = [-self.alpha_f / (1.0 - self.alpha_f)] if self.alpha_f else []
-        roots += list(np.roots([beta, 0.5 + gamma - 2.0 * beta, 0.5 - gamma + beta]))
-        return float(max(abs(root) for root in roots))
+        half, product = 0.5 * (0.5 + gamma - 2.0 * beta) / beta, (0.5 - gamma + beta) / beta
+        split = half * half - product  # of the roots of z² + 2 half z + product; complex or double where it is not > 0
+        pair = float(np.sqrt(product)) if split <= 1e-14 * half * half else abs(half) + float(np.sqrt(split))
+        return max(abs(self.alpha_f / (1.0 - self.alpha_f)), pair)
 
 
 @dataclass(frozen=True)
@@ -158,7 +159,7 @@ class NewmarkFamily(Integrator):
         n_v = len(state.v)
         rate, lam = consistent_rates(system, state.time, state.q, y, mode)
         ahead = dt / 16.0
-        q = _compose(system, state.q, ahead * (state.v + 0.5 * ahead * rate[:n_v]))
+        q = _compose(system, state.q, ahead * state.v)
         later, lam_later = consistent_rates(system, state.time + ahead, q, y + ahead * rate, mode)
         slope, lam_slope = (later - rate) / ahead, (lam_later - lam) / ahead
         c = self.coefficients
@@ -187,7 +188,7 @@ class _Step:
         self.c_C, self.c_K = k.gamma * dt * c, k.beta * dt * dt * c
         stretch = dt / memory.step
         self.a0 = memory.rate + stretch * (memory.aux - memory.rate)
-        y0 = np.concatenate([state.v, state.z])
+        y0 = self.y0 = np.concatenate([state.v, state.z])
         self.n_v = len(state.v)
         self.rate = memory.rate + dt * memory.slope
         self.lam = memory.lam + dt * memory.lam_slope
@@ -196,6 +197,7 @@ class _Step:
         a1 = self._aux()
         self.y = y0 + dt * ((1.0 - k.gamma) * self.a0 + k.gamma * a1)
         n_v = self.n_v
+        self.size_at_start = self._size_at_start()
         self.x = dt * state.v + dt * dt * ((0.5 - k.beta) * self.a0[:n_v] + k.beta * a1[:n_v]) + self.shift
 
     def _aux(self) -> Vector:
@@ -206,12 +208,12 @@ class _Step:
         """Largest residual over its tolerance, each block apart."""
         tolerance = self.tolerance
         fastest = float(np.max(np.abs(self.rate[: self.n_v]), initial=0.0))
-        # rates of the start and of the prediction too: where a force passes zero it has no size of its own
-        change = np.maximum(np.abs(self.memory.rate), np.abs(self.dt * self.memory.slope))
-        size = np.abs(terms.S) @ np.maximum(np.abs(self.rate), change) if terms.S is not None else np.abs(terms.r)
-        own = np.full(len(terms.r), np.max(size, initial=0.0)) if terms.scale_r is None else terms.scale_r
-        scale_r = np.maximum(own, size)
-        parts = [np.abs(terms.r) / (tolerance * np.maximum(scale_r, 1e-280))]
+        scale_r = terms.scale_r
+        if scale_r is None:  # a system that does not tell: inertia forces and what the accelerations add to the others
+            rate = np.maximum(np.abs(self.rate), np.abs(self.memory.rate))
+            scale_r = np.full(len(terms.r), np.max(np.abs(np.asarray(terms.S)) @ rate, initial=0.0))
+        scale_r = np.maximum(scale_r, self.size_at_start)
+        parts = [np.abs(terms.r) / (tolerance * np.maximum(scale_r, 1e-200))]
         if len(terms.h):
             floor = 16.0 * EPS * (np.ones(len(terms.h)) if terms.scale_h is None else terms.scale_h)
             speed = float(np.max(np.abs(self.y[: self.n_v]), initial=0.0))
@@ -222,6 +224,13 @@ class _Step:
                 limits = np.maximum(16.0 * EPS * scale, tolerance * self.c_C * fastest)
                 parts.append(np.abs(terms.rate) / (limits + 1e-300))
         return float(np.max(np.concatenate(parts)))
+
+    def _size_at_start(self) -> Vector:
+        """Magnitude of the balance's terms before the step; where a force passes zero it has none of its own."""
+        state, memory = self.state, self.memory
+        point = Point(state.time, state.q, np.zeros(self.n_v), self.y0, memory.rate, memory.lam)
+        scale = self.system.evaluate(point, self.mode, None).scale_r
+        return np.zeros(len(memory.rate)) if scale is None else scale
 
     def run(self) -> StepResult:
         """Newton: evaluate, judge every block, correct accelerations, multipliers and the position shift."""
@@ -263,7 +272,7 @@ class _Step:
                 self.x = self.x + solved[:n_v, 1] - self.shift
                 self.shift = solved[:n_v, 1]
         if iteration == 0 and not self.scheme.exact:
-            relative = float(np.max(np.abs(change)) / max(np.max(np.abs(self.rate)), 1e-300))
+            relative = float(np.max(np.abs(change)) / max(np.max(np.abs(self.rate)), 1e-200))
             self.tolerance = min(self.scheme.tolerance, max(1e-4 * relative, self.tolerance))
         self.rate = self.rate + change
         self.y = self.y + self.c_C * change

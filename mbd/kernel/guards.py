@@ -193,11 +193,15 @@ def judge(K: Any, h: float) -> bool:
         elif K.kind[c] == 0:
             if K.opens[c] == 0 and K.lam1[K.normal[c]] > 0.0:
                 consider(K, OPEN_PULL, c, crossing(-K.lam[K.normal[c]], -K.lam1[K.normal[c]]), 0.0)
-        elif K.opens[c] == 1:
-            if g1 > tiny:
-                consider(K, OPEN_GAP, c, crossing(g0, g1), 0.0)
-        elif K.guards1[2 * nC + c] < 0.0:
-            consider(K, OPEN_FORCE, c, crossing(K.guards0[2 * nC + c], K.guards1[2 * nC + c]), 0.0)
+        else:
+            low = 0.0
+            if g0 >= -tiny and d0 < 0.0:  # it closed just now; it opens after its deepest point
+                low = max(hermite_turn(g0, g1, d0, d1, False), 0.0)
+            if K.opens[c] == 1:
+                if g1 > tiny:
+                    consider(K, OPEN_GAP, c, low + (1.0 - low) * crossing(hermite(g0, g1, d0, d1, low), g1), low)
+            elif K.guards1[2 * nC + c] < 0.0:
+                consider(K, OPEN_FORCE, c, max(low, crossing(K.guards0[2 * nC + c], K.guards1[2 * nC + c])), low)
     for e in range(K.n_guards):
         judge_user(K, e, h)
     return bool(K.fired[0] >= 0)

@@ -4,7 +4,19 @@ from __future__ import annotations
 
 from typing import Any
 
-from mbd.kernel.fields import CLOSE, CROSS, EPS, GRAZE, LOCATIONS, NO_LOCATION, NOW, OPEN_GAP, OPEN_PULL, WATCH
+from mbd.kernel.fields import (
+    CLOSE,
+    CROSS,
+    EPS,
+    GRAZE,
+    LOCATIONS,
+    NO_LOCATION,
+    NOW,
+    OPEN_FORCE,
+    OPEN_GAP,
+    OPEN_PULL,
+    WATCH,
+)
 from mbd.kernel.guards import gap_tolerance, guard_value, hermite, is_watched, judge, try_step
 
 __all__ = ["locate"]
@@ -171,6 +183,9 @@ def bracket(K: Any, kind: int, index: int, low: float, high: float) -> int:
         stay(K)
     f_low = guard_value(K, kind, index, t + low)
     if f_low <= 0.0:
+        if (kind == OPEN_GAP or kind == OPEN_FORCE) and K.guards0[K.n_contacts + index] < 0.0:
+            K.pick[2] = high  # a touch too short to be seen within the step: it is over at its end
+            return try_step(K, high, t + high)
         if low > 0.0 and kind != CROSS:
             low = 0.0
             stay(K)
@@ -215,7 +230,7 @@ def refine(K: Any, kind: int, index: int, low: float, f_low: float, high: float,
             fa = fb
             fb = fc
             fc = fa
-        limit = 2.0 * EPS * max(abs(t), high)
+        limit = 2.0 * EPS * max(abs(t), b)
         half = 0.5 * (c - b)
         if abs(half) <= limit or abs(fb) <= tiny:
             break

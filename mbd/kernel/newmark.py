@@ -39,8 +39,8 @@ def newmark_start(K: Any) -> int:
     step = K.dt / 16.0
     t = K.clock[NOW]
     fill_block(K, t, K.q, K.y)
-    for i in range(K.n_v):  # a little later on the Taylor parabola
-        K.block[K.o_x + i] = step * (K.y[i] + 0.5 * step * K.rate[i])
+    for i in range(K.n_v):  # a little later along the tangent: a parabola would multiply stiff forces by (ω dt)²
+        K.block[K.o_x + i] = step * K.y[i]
     compose(K, K.q1)
     for i in range(n):
         K.y1[i] = K.y[i] + step * K.rate[i]
@@ -60,7 +60,7 @@ def newmark_start(K: Any) -> int:
         K.block[K.o_v + i] += K.dt * K.rate[i]
         if i < K.n_v:
             K.block[K.o_x + i] = K.dt * (K.y[i] + 0.5 * K.dt * K.rate[i])
-    raise_scales(K)
+    raise_scales(K, False)
     return 0
 
 
@@ -126,7 +126,7 @@ def newmark_step(K: Any, h: float, t1: float) -> int:
             break
         K.detail[1] = error
         if error > 1.0 and iteration >= 2 and error > 0.5 * before:
-            raise_scales(K)
+            raise_scales(K, True)
             error = residual_size(K, o_r, m, c_C, c_K, tolerance)
             if error > 1.0 and residual_size(K, o_r, m, 0.0, 0.0, 256.0 * EPS) <= 16.0:
                 K.counts[STAGNATIONS] += 1

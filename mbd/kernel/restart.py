@@ -88,14 +88,20 @@ def refresh_scales(K: Any) -> None:
         K.scale[K.n + K.n_rows + k] = max(K.scale[K.n + K.n_rows + k], speed)
 
 
-def raise_scales(K: Any) -> None:
-    """Magnitudes at the state now in the block where they exceed those known; where a force passes zero it has none."""
+def raise_scales(K: Any, rows: bool) -> None:
+    """Magnitudes at the state now in the block where they exceed those known; where a force passes zero it has none.
+
+    Those of rows, by which gaps are judged too, only on demand: a state far ahead says nothing of the round-off here.
+    """
     known = K.n + 2 * K.n_rows
     for i in range(known):
         K.work[i] = K.scale[i]
     refresh_scales(K)
     for i in range(known):
-        K.scale[i] = max(K.scale[i], K.work[i])
+        if i < K.n or rows:
+            K.scale[i] = max(K.scale[i], K.work[i])
+        else:
+            K.scale[i] = K.work[i]
 
 
 def active_rows(K: Any, flags: Any) -> int:

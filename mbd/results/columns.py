@@ -101,7 +101,8 @@ class ModelColumns(Columns):
     def knows(self, name: str) -> bool:
         if name not in self._nodes:
             try:
-                self._nodes[name] = self.equations.output(name)
+                with self.equations.tape.lock:
+                    self._nodes[name] = self.equations.output(name)
             except (UnknownNameError, KeyError):
                 return False
         return True
@@ -136,8 +137,10 @@ class ModelColumns(Columns):
         from mbd.tape.derivatives import jvp
 
         tape = self.equations.tape
-        seeds: dict[Node, Scalar] = {tape.input("x", k): tape.input("v", k) for k in range(self.equations.n_v)}
-        return np.column_stack(self.evaluate(jvp(compose, seeds), self.rows))
+        with tape.lock:
+            seeds: dict[Node, Scalar] = {tape.input("x", k): tape.input("v", k) for k in range(self.equations.n_v)}
+            rates = jvp(compose, seeds)
+        return np.column_stack(self.evaluate(rates, self.rows))
 
     def evaluate(self, nodes: Sequence[Node], rows: Rows) -> list[Vector]:
         """Each expression at each row, (R,)."""

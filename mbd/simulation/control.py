@@ -38,9 +38,9 @@ class Named(Mapping[str, float]):
         mechanism, v = run.mechanism, run.values
         known = mechanism.named.get(name)
         if known is None:
-            known = mechanism.named[name] = scalar_function(
-                [mechanism.equations.output(name)], mechanism.layout, "named"
-            )
+            with mechanism.equations.tape.lock:
+                output = mechanism.equations.output(name)
+                known = mechanism.named[name] = scalar_function([output], mechanism.layout, "named")
         layout, flags = mechanism.layout, v["closed"][: v["n_contacts"]]
         block = mechanism.block(
             run.now, v["q"][: v["n_q"]], v["y"][: v["n"]], v["anchors"][: v["n_anchors"]], run.manager.penalties(flags)

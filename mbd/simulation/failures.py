@@ -51,6 +51,8 @@ def explanation(stepper: Stepper, status: int, events: Sequence[EventRecord] = (
         return (
             f"{where}: no impulses satisfy the impact law of all contacts that close{with_closed}; penalty contacts can"
         )
+    if status in (F.DEPENDENT, F.CONFLICT) and int(values["state"][F.BLOCKED]) < values["n"]:
+        return f"{where}: neither mass nor rows determine {_unknown(stepper)}{with_closed}; give it a mass, or lock it"
     if status in (F.DEPENDENT, F.CONFLICT):
         what = "depend on each other" if status == F.DEPENDENT else "conflict"
         return f"{where}: rows {what} at {_unknown(stepper)}{with_closed}; leave one out, or hold fewer contacts closed"

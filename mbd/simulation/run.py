@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from mbd.arrays import Vector
+from mbd.assembly import BELOW
 from mbd.compile.mechanism import Mechanism
-from mbd.errors import SimulationError, UnknownNameError
+from mbd.errors import ModelError, SimulationError, UnknownNameError
 from mbd.integrators.base import Integrator
 from mbd.kernel import fields as F
 from mbd.kernel.active_set import ActiveSetManager
@@ -96,12 +97,18 @@ class Run:
         for e, guard in enumerate(self.manager.guards):
             wanted = guard.terminal or guard.reset is not None or guard.name in ends
             v["notify"][n_contacts + e] = int(wanted)
-        guards = self._guard_values()
+        guards, inside = self._guard_values(), []
         for c in range(n_contacts):
             close, slow = abs(guards[c]) <= 1e-8, abs(guards[n_contacts + c]) <= 1e-9
             target = v["while_target"][c]
             watched = (True, v["closed"][target] == 1, guards[3 * n_contacts + c] > 0.0)[v["while_kind"][c]]
-            v["touched"][c] = int(v["armed"][c] == 1 and v["kind"][c] == 0 and close and slow and watched)
+            ready = v["armed"][c] == 1 and watched
+            v["touched"][c] = int(ready and v["kind"][c] == 0 and close and slow)
+            if ready and guards[c] < -BELOW:
+                contact = self.manager.contacts[c]
+                inside.append(f"{contact.name!r} starts {-guards[c]:.6g} {contact.unit} inside its surface")
+        if inside:
+            raise ModelError(inside)
         for e in range(n_guards):
             self._set_side(e, guards)
 

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import math
 import platform
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal
 
 from mbd.compile.mechanisms import mechanism_of
-from mbd.errors import CapabilityError, ModelError, SimulationError, UnknownNameError, nearest
+from mbd.errors import CapabilityError, ModelError, SimulationError
 from mbd.integrators import HHT, Integrator
 from mbd.kernel.active_set import ActiveSetManager
+from mbd.simulation.arguments import callbacks, choices, end_of, fits, named_numbers, numbers
 from mbd.simulation.run import Run
 from mbd.state import State
 from mbd.trajectory import Trajectory
@@ -76,15 +76,17 @@ def simulate(
         if the run cannot go on.
     """
     scheme = integrator if integrator is not None else HHT(alpha=0.05)
-    faults = _faults(scheme, start, dt, tol, until, contact, impact, locate, store, on_failure, rest_speed)
+    words = {"contact": contact, "impact": impact, "locate": locate, "on_failure": on_failure}
+    faults = choices(words) + numbers(scheme, start, dt, tol, until, store, rest_speed)
+    faults += callbacks(observers, progress) + named_numbers(parameters, "parameters")
     if faults:
         raise ModelError(faults)
     assert dt is not None
     changed = {**start.parameters, **(parameters or {})}
     mechanism = mechanism_of(model, backend, changed)
     manager = ActiveSetManager(mechanism.equations)
-    _fits(start, mechanism.equations, manager)
-    end, stop = _end(until, manager, dt, start.time)
+    fits(start, mechanism.equations, manager)
+    end, stop = end_of(until, manager, dt, start.time)
     rows = len(mechanism.equations.rows)
     refusal = scheme.check(rows)
     if refusal:
@@ -101,73 +103,6 @@ def simulate(
     if problem and on_failure == "raise":
         raise SimulationError(problem, trajectory) from run.cause
     return trajectory
-
-
-def _faults(
-    scheme: Any, start: Any, dt: Any, tol: Any, until: Any, contact: Any, impact: Any, locate: Any, store: Any,
-    on_failure: Any, rest_speed: Any,
-) -> list[str]:  # fmt: skip
-    """Everything that is wrong with the arguments themselves."""
-    faults = []
-    if not isinstance(scheme, Integrator):
-        faults.append(f"integrator must be an mbd integrator such as mbd.HHT(alpha=0.05), not {scheme!r}")
-    if not isinstance(start, State):
-        faults.append(f"start must be a State from mbd.assemble(model, …), not {start!r}")
-    if tol is not None:
-        faults.append("tol= is not available: steps are fixed; give dt and compare with dt/2, whose error is a quarter")
-    if dt is None:
-        faults.append("a step is needed: simulate(…, dt=1e-3)")
-    elif not _number(dt) or not math.isfinite(dt) or dt <= 0.0:
-        faults.append(f"dt must be a positive number of seconds, not {dt!r}; 1e-3 suits a walker")
-    last = until[1] if isinstance(until, tuple) and len(until) == 2 else until
-    if not isinstance(last, str):
-        if not _number(last) or not math.isfinite(last):
-            faults.append(f"until must be a finite time [s], an event's name, or (name, latest time), not {until!r}")
-        elif isinstance(start, State) and last < start.time:
-            faults.append(f"until = {last:g} s lies before the start at {start.time:g} s")
-    for name, value, known in (
-        ("contact", contact, ("events",)), ("impact", impact, ("newton",)), ("locate", locate, ("root", "linear")),
-        ("on_failure", on_failure, ("raise", "return")),
-    ):  # fmt: skip
-        if value not in known:
-            faults.append(f"{name}={value!r} is not available; use {' or '.join(map(repr, known))}")
-    if not isinstance(store, int) or isinstance(store, bool) or store < 1:
-        faults.append(f"store must be a whole number of steps ≥ 1, not {store!r}")
-    if not _number(rest_speed) or not rest_speed >= 0.0:
-        faults.append(f"rest_speed must be a speed ≥ 0, not {rest_speed!r}")
-    return faults
-
-
-def _number(value: Any) -> bool:
-    return not isinstance(value, bool) and hasattr(value, "__float__")
-
-
-def _fits(start: State, equations: Any, manager: ActiveSetManager) -> None:
-    """The state must be one of this model."""
-    names = tuple(coordinate.name for coordinate in equations.coordinates)
-    if start.names != names or len(start.v) != equations.n_v or len(start.z) != equations.n_z:
-        raise ModelError(
-            f"the start has the coordinates {', '.join(start.names) or 'none'}, but the model has {', '.join(names)}; "
-            "assemble it from this model"
-        )
-    unknown = [nearest(name, manager.names, "contact") for name in start.mode.closed if name not in manager.names]
-    if unknown:
-        raise UnknownNameError(unknown)
-
-
-def _end(
-    until: float | str | tuple[str, float], manager: ActiveSetManager, dt: float, begin: float
-) -> tuple[float, str | None]:
-    """Latest time, and the event that ends the run."""
-    if isinstance(until, str):
-        until = (until, begin + 1e6 * dt)
-    if not isinstance(until, tuple):
-        return float(until), None
-    name, latest = until
-    known = [*manager.names, *(guard.name for guard in manager.guards)]
-    if name not in known:
-        raise UnknownNameError("until: " + nearest(name, known, "contact or event"))
-    return float(latest), name
 
 
 def _versions() -> dict[str, str]:

@@ -10,6 +10,7 @@ exact zero therefore leaves no trace.
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
+from threading import RLock
 from typing import Any, NoReturn, TypeAlias
 
 from mbd.errors import TraceError
@@ -159,10 +160,11 @@ class Tape:
     """A growing graph of scalars; nothing is ever removed, `live` finds what an output needs.
 
     Folding keeps every value to round-off, and to the bit wherever only zeros, ones and signs are concerned:
-    sums are never reassociated.
+    sums are never reassociated. Threads that share a derivation add to it under its `lock`.
     """
 
     def __init__(self) -> None:
+        self.lock = RLock()
         self.nodes: list[Node] = []
         self.tables: list[Table] = []
         self._known: dict[Hashable, Node] = {}

@@ -47,7 +47,8 @@ def test_any_swing_follows_its_equation_of_motion(form: str, scheme: NewmarkFami
         run = last(swing, start, scheme, round(until / dt), until)
         return [swing.angle(run)[-1] - angle, swing.rate(run)[-1] - rate, swing.tension(run)[-1] - tension]
 
-    assert_second_order(errors, 0.002)
+    # at position level the round-off of multipliers grows like 1/dt²
+    assert_second_order(errors, 0.004 if scheme.formulation == "index3" else 0.002)
 
 
 @pytest.mark.parametrize("form", WITH_EVENTS)

@@ -74,8 +74,8 @@ def test_plain_functions_are_as_good_as_sympy():
     )  # fmt: skip
     q = mbd.Coordinate("hip angle")
     by_sympy = mbd.Lagrangian(
-        "pendulum", [q], m * L**2 * q.v**2 / 2, -9.81 * m * L * sp.cos(q.q), forces={q: sp.sin(sp.Symbol("t")) - 0.1 * q.v},
-        parameters={m: 2.0, L: 0.5},
+        "pendulum", [q], m * L**2 * q.v**2 / 2, -9.81 * m * L * sp.cos(q.q),
+        forces={q: sp.sin(sp.Symbol("t")) - 0.1 * q.v}, parameters={m: 2.0, L: 0.5},
     )  # fmt: skip
     values = [at(list(derive(system).balance), inputs(derive(system), 4)) for system in (by_function, by_sympy)]
     np.testing.assert_allclose(*values, rtol=1e-14)
@@ -84,8 +84,8 @@ def test_plain_functions_are_as_good_as_sympy():
 def test_dynamicsymbols_of_sympy_are_coordinates():
     theta = dynamicsymbols("theta")
     t = sp.Symbol("t")
-    system = mbd.Lagrangian("pendulum", [theta], m * theta.diff(t) ** 2 / 2, -m * g * sp.cos(theta), parameters={m: 2, g: 3})
-    equations = derive(system)
+    T, V = m * theta.diff(t) ** 2 / 2, -m * g * sp.cos(theta)
+    equations = derive(mbd.Lagrangian("pendulum", [theta], T, V, parameters={m: 2, g: 3}))
     point = inputs(equations, 5)
     expected = 2.0 * point["a", 0] + 6.0 * np.sin(point["q", 0])
     assert at(list(equations.balance), point)[0] == pytest.approx(expected)
@@ -109,6 +109,7 @@ def test_structural_values_fold_unless_tunable():
     assert [p.name for p in derive(pendulum(parameters={m: 1.0, L: 1.5, g: 0.0})).parameters] == ["L"]
     tuned = pendulum(parameters={m: 1.0, L: 1.5, g: 0.0}, tunable=("g",))
     assert [p.name for p in derive(tuned).parameters] == ["L", "g"]
+    assert [p.name for p in derive(tuned.with_tunable("m")).parameters] == ["m", "L", "g"]
     assert pendulum().parameters == {"m": 2.0, "L": 1.5, "g": 9.81}
 
 
@@ -153,4 +154,6 @@ def test_it_pickles_and_prints():
     system = pickle.loads(pickle.dumps(pendulum()))
     assert derive(system).parameters == derive(pendulum()).parameters
     assert "M[x, x] = m" in system.equations()
-    assert r"\begin{align*}" in system.equations(latex=True)
+    theta = mbd.Coordinate("theta")
+    swing = mbd.Lagrangian("swing", [theta], m * theta.v**2 / 2, dissipation=k * theta.v**2, parameters={m: 2, k: 3})
+    assert r"f_{1} &= 2 \dot{\theta} k" in swing.equations(latex=True)

@@ -48,9 +48,7 @@ def test_forces_with_a_potential_are_its_gradient(equations):
     point = inputs(equations, 3)
     for effect in equations.effects:
         if effect.potential is not None:
-            gradient = [
-                derivative([effect.potential], point, {("x", k): 1.0})[0] for k in range(equations.n_v)
-            ]
+            gradient = [derivative([effect.potential], point, {("x", k): 1.0})[0] for k in range(equations.n_v)]
             np.testing.assert_allclose(at(list(effect.generalized()), point)[: equations.n_v], gradient, atol=1e-7)
 
 

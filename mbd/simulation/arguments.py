@@ -1,0 +1,136 @@
+"""What may be given to a run: every fault of the arguments, said before the first step."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from numbers import Integral
+from typing import Any
+
+import numpy as np
+
+from mbd.equations.equations import Equations
+from mbd.errors import ModelError, UnknownNameError, nearest
+from mbd.integrators import Integrator
+from mbd.kernel.active_set import ActiveSetManager
+from mbd.state import State
+
+__all__ = ["callbacks", "choices", "end_of", "fits", "named_numbers", "numbers"]
+
+CHOICES = {
+    "contact": ("events",), "impact": ("newton",), "locate": ("root", "linear"), "on_failure": ("raise", "return"),
+}  # fmt: skip
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value is one real number, finite or not."""
+    return not isinstance(value, bool | str) and hasattr(value, "__float__") and not getattr(value, "ndim", 0)
+
+
+def choices(words: Mapping[str, Any]) -> list[str]:
+    """Words that are none of those offered."""
+    return [
+        f"{name}={value!r} is not available; use {' or '.join(map(repr, CHOICES[name]))}"
+        for name, value in words.items()
+        if value not in CHOICES[name]
+    ]
+
+
+def numbers(scheme: Any, start: Any, dt: Any, tol: Any, until: Any, store: Any, rest_speed: Any) -> list[str]:
+    """What is wrong with the integrator, the start, the step and the end."""
+    faults = []
+    if not isinstance(scheme, Integrator):
+        faults.append(f"integrator must be an mbd integrator such as mbd.HHT(alpha=0.05), not {scheme!r}")
+    if not isinstance(start, State):
+        faults.append(f"start must be a State from mbd.assemble(model, …), not {start!r}")
+    if tol is not None:
+        faults.append("tol= is not available: steps are fixed; give dt and compare with dt/2, whose error is a quarter")
+    if dt is None:
+        faults.append("a step is needed: simulate(…, dt=1e-3)")
+    elif not is_number(dt) or not math.isfinite(dt) or dt <= 0.0:
+        faults.append(f"dt must be a positive number of seconds, not {dt!r}; 1e-3 suits a walker")
+    faults += _times(start, dt, until)
+    if not isinstance(store, Integral) or isinstance(store, bool) or store < 1:
+        faults.append(f"store must be a whole number of steps ≥ 1, not {store!r}")
+    if not is_number(rest_speed) or not rest_speed >= 0.0:
+        faults.append(f"rest_speed must be a speed ≥ 0, not {rest_speed!r}")
+    return faults
+
+
+def _times(start: Any, dt: Any, until: Any) -> list[str]:
+    """What is wrong with the end of the run, and a step that the clock cannot tell."""
+    begin = start.time if isinstance(start, State) else 0.0
+    if not is_number(begin) or not math.isfinite(begin):
+        return [f"the time of the start must be finite, not {begin!r}"]
+    pair = isinstance(until, tuple) and len(until) == 2 and isinstance(until[0], str)
+    last = until[1] if pair else until
+    if isinstance(until, str):
+        last = begin
+    if not is_number(last) or not math.isfinite(last):
+        return [f"until must be a finite time [s], an event's name, or (name, latest time), not {until!r}"]
+    if last < begin:
+        return [f"until = {last:g} s lies before the start at {begin:g} s"]
+    if is_number(dt) and 0.0 < dt < 8.0 * np.spacing(max(abs(float(begin)), abs(float(last)))):
+        return [f"dt = {dt:g} s is too small to be told apart at t = {last:g} s; use a larger dt or an earlier end"]
+    return []
+
+
+def callbacks(observers: Any, progress: Any) -> list[str]:
+    """Observers and progress that cannot be called."""
+    several = isinstance(observers, Sequence) and not isinstance(observers, str)
+    if not several or not all(map(callable, observers)):
+        return [f"observers must be a list of functions observer(time, state), not {observers!r}"]
+    if not callable(progress) and not isinstance(progress, bool | None):
+        return [f"progress must be True, None or a function progress(t, until), not {progress!r}"]
+    return []
+
+
+def named_numbers(values: Any, what: str) -> list[str]:
+    """What is wrong with values by name."""
+    if values is None:
+        return []
+    if not isinstance(values, Mapping):
+        return [f"{what} must map names to numbers, such as {{'left thigh.mass': 0.5}}, not {values!r}"]
+    return [
+        f"{what}: the value of {name!r} must be a finite number, not {value!r}"
+        for name, value in values.items()
+        if not is_number(value) or not math.isfinite(value)
+    ]
+
+
+def fits(start: State, equations: Equations, manager: ActiveSetManager) -> None:
+    """The state must be one of this model, of finite numbers."""
+    names = tuple(coordinate.name for coordinate in equations.coordinates)
+    anchors = sum(len(contact.anchors) for contact in manager.contacts)
+    sizes = (len(start.q), len(start.v), len(start.z)) == (equations.n_q, equations.n_v, equations.n_z)
+    if start.names != names or not sizes:
+        raise ModelError(
+            f"the start has the coordinates {', '.join(start.names) or 'none'}, but the model has {', '.join(names)}; "
+            "assemble it from this model"
+        )
+    contacts = [*sorted(start.mode.closed), *sorted(start.armed or ())]
+    unknown = [nearest(name, manager.names, "contact") for name in dict.fromkeys(contacts) if name not in manager.names]
+    if unknown:
+        raise UnknownNameError(unknown)
+    if len(start.anchors) != anchors and start.mode.closed:
+        raise ModelError(f"the start holds {len(start.anchors)} anchors of contacts, but the model has {anchors}")
+    parts = ((start.q, names), (start.v, equations.velocity_names), (start.z, [s.name for s in equations.states]))
+    values = [(name, value) for part, known in parts for name, value in zip(known, part, strict=True)]
+    bad = [
+        f"the start has {name!r} = {value}; give a finite number" for name, value in values if not np.isfinite(value)
+    ]
+    if bad:
+        raise ModelError(bad)
+
+
+def end_of(until: Any, manager: ActiveSetManager, dt: float, begin: float) -> tuple[float, str | None]:
+    """Latest time, and the event that ends the run."""
+    if isinstance(until, str):
+        until = (until, begin + 1e6 * dt)
+    if not isinstance(until, tuple):
+        return float(until), None
+    name, latest = until
+    known = [*manager.names, *(guard.name for guard in manager.guards)]
+    if name not in known:
+        raise UnknownNameError("until: " + nearest(name, known, "contact or event"))
+    return float(latest), name
