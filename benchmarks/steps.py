@@ -22,6 +22,8 @@ DT = 1e-3
 AIM_RATIO = 1.2
 SAME = 1e-9
 """Largest difference of positions and velocities, relative to the largest of them (or to 1), between mbd and C."""
+COMPARED = 1000
+"""Steps over which they are compared: an unstable motion amplifies the tolerance of Newton's iteration e times in 0.3 s."""
 
 
 @dataclass(frozen=True)
@@ -108,12 +110,13 @@ def _per_step(long: Samples, short: Samples, steps: int) -> tuple[float, float]:
 
 def _assert_same(case: Case, model: mbd.Model, start: mbd.State, scheme: NewmarkFamily, program: Program) -> None:
     """The C loop computes the same motion; otherwise the comparison would mean nothing."""
-    run = mbd.simulate(model, start, scheme, dt=DT, until=case.steps * DT)
+    steps = min(case.steps, COMPARED)
+    run = mbd.simulate(model, start, scheme, dt=DT, until=steps * DT)
     mine = [run[name] for name in case.names] + [run[f"{name}.rate"] for name in case.names]
-    theirs = program.run(start, scheme, DT, case.steps, 1).rows
+    theirs = program.run(start, scheme, DT, steps, 1).rows
     groups: Sequence[slice] = (slice(0, len(case.names)), slice(len(case.names), 2 * len(case.names)))
     for group in groups:
         own, other = np.stack(mine[group], axis=1), theirs[:, group]
         difference = float(np.max(np.abs(own - other))) / max(1.0, float(np.max(np.abs(other))))
         if not difference < SAME:
-            raise AssertionError(f"{case.name}: the C loop and mbd differ by {difference:.1e} after {case.steps} steps")
+            raise AssertionError(f"{case.name}: the C loop and mbd differ by {difference:.1e} within {steps} steps")

@@ -106,7 +106,8 @@ _HOMES = {
     "mbd.constraints": "Bilateral Controller Event Penalty Plane Unilateral When "
     "distance extension flexion height measure separation touchdown",
     "mbd.equations.lagrangian": "Coordinate Lagrangian",
-    "mbd.errors": "AssemblyError CapabilityError MbdError ModelError SimulationError TraceError TrajectoryError UnknownNameError",
+    "mbd.errors": "AssemblyError CapabilityError MbdError ModelError SimulationError TraceError TrajectoryError "
+    "UnknownNameError",
     "mbd.forces": "Applied Damper Motor Potential Samples Spring TorsionSpring",
     "mbd.integrators": "HHT GeneralizedAlpha Newmark",
     "mbd.joints": "Cylindrical Planar Prismatic Revolute Screw Translation Universal Weld",

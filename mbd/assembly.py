@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,12 +12,13 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.compile.mechanism import Mechanism, rate_names
 from mbd.compile.mechanisms import mechanism_of
+from mbd.conditions import Condition, conditions
 from mbd.equations.equations import Equations
-from mbd.errors import AssemblyError, UnknownNameError, nearest
+from mbd.errors import AssemblyError, ModelError, UnknownNameError, nearest
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.state import State
 
-__all__ = ["assemble"]
+__all__ = ["Posture", "assemble", "is_number", "named_numbers", "undetermined"]
 
 TOLERANCE = 1e-9
 """Largest row residual [m, rad, m/s, rad/s] of a start, relative to 1 or the speed, that counts as consistent."""
@@ -28,8 +30,34 @@ LIFTED = 1e-8
 """Height [m, rad] above which an open contact is armed from the start."""
 
 
+def named_numbers(values: Any, what: str) -> list[str]:
+    """What is wrong with numbers by name."""
+    if not isinstance(values, Mapping | None):
+        return [f"{what} must map names to numbers, such as {{'left hip.angle': 0.2}}, not {values!r}"]
+    return [
+        f"{what}: the value of {name!r} must be a finite number, not {value!r}"
+        for name, value in (values or {}).items()
+        if not isinstance(name, str) or not is_number(value) or not math.isfinite(value)
+    ]
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value is one real number, finite or not."""
+    return not isinstance(value, bool | str) and hasattr(value, "__float__") and not getattr(value, "ndim", 0)
+
+
+def _names(value: Any, what: str) -> tuple[tuple[str, ...], list[str]]:
+    """Names given as one or several."""
+    several = (value,) if isinstance(value, str) else tuple(value) if isinstance(value, Iterable) else (value,)
+    if all(isinstance(name, str) for name in several):
+        return several, []
+    return (), [f"{what} lists names of contacts, such as ['left foot'], not {value!r}"]
+
+
 @dataclass
-class _Assembly:
+class Posture:
+    """A mechanism on the way to a consistent start."""
+
     mechanism: Mechanism
     manager: ActiveSetManager
     parameters: Vector
@@ -37,23 +65,18 @@ class _Assembly:
     y: Vector
     flags: Any
     anchors: Vector
+    places: Sequence[Condition] = ()
+    rates: Sequence[Condition] = ()
 
     @property
     def equations(self) -> Equations:
         return self.mechanism.equations
 
-
-def _places(values: Mapping[str, float], names: Mapping[str, int], kind: str) -> tuple[dict[int, float], list[str]]:
-    found: dict[int, float] = {}
-    faults = []
-    for name, value in values.items():
-        if name not in names:
-            faults.append(nearest(name, names, kind))
-        elif not np.isfinite(value):
-            faults.append(f"the {kind} {name!r} must be a finite number, not {value!r}")
-        else:
-            found[names[name]] = float(value)
-    return found, faults
+    def with_conditions(self, h: Vector, B: Matrix, conditions: Sequence[Condition]) -> tuple[Vector, Matrix]:
+        """Rows and their Jacobian, followed by those of named conditions."""
+        block = self.mechanism.block(0.0, self.q, self.y, self.anchors)
+        found = [condition.at(block, self.parameters) for condition in conditions]
+        return np.append(h, [r for r, _ in found]), np.vstack([B, *(slope for _, slope in found)])
 
 
 def assemble(
@@ -74,7 +97,8 @@ def assemble(
     Parameters
     ----------
     model : a `Model` or `Lagrangian`
-    position : {'left hip.angle': 0.2} coordinates [m, rad], and first-order states
+    position : {'left hip.angle': 0.2} coordinates [m, rad], first-order states, and any named position
+        ('left shank.end.x', the angle of a cut joint), which then holds like a row
     velocity : {'left hip.angle': −1.1} or {'left hip.rate': …} rates by coordinate or rate name [m/s, rad/s]
     closed : names of contacts that start closed
     open : names of contacts that start open even if they touch or lie below their surface; ignored until risen
@@ -97,17 +121,25 @@ def assemble(
     ModelError
         if the model itself has faults.
     """
+    wanted = {"position": position, "velocity": velocity, "parameters": parameters}
+    faults = [fault for what, values in wanted.items() for fault in named_numbers(values, what)]
+    (opened, more), (closed, others) = _names(open, "open"), _names(closed, "closed")
+    if faults + more + others:
+        raise ModelError(faults + more + others)
     position, velocity, changed = dict(position or {}), dict(velocity or {}), dict(parameters or {})
     mechanism = mechanism_of(model, backend, changed)
     manager = ActiveSetManager(mechanism.equations)
-    opened = (open,) if isinstance(open, str) else tuple(open)
-    closed = (closed,) if isinstance(closed, str) else tuple(closed)
     equations = mechanism.equations
     coordinates = {coordinate.name: k for k, coordinate in enumerate(equations.coordinates)}
     states = {state.name: k + len(equations.velocity_names) for k, state in enumerate(equations.states)}
-    held_q, faults = _places({k: v for k, v in position.items() if k not in states}, coordinates, "coordinate")
-    held_v, more = _places(velocity, rate_names(equations), "rate")
-    faults += more
+    rates = rate_names(equations)
+    elsewhere = {name: value for name, value in position.items() if name not in states and name not in coordinates}
+    places, unknown = conditions(mechanism, elsewhere, rates=False)
+    speeds, strange = conditions(mechanism, {k: v for k, v in velocity.items() if k not in rates}, rates=True)
+    faults = [nearest(name, coordinates, "coordinate") for name in unknown]
+    faults += [nearest(name, rates, "rate") for name in strange]
+    held_q = {coordinates[name]: float(value) for name, value in position.items() if name in coordinates}
+    held_v = {rates[name]: float(value) for name, value in velocity.items() if name in rates}
     for name in [*closed, *opened]:
         if name not in manager.names:
             faults.append(nearest(name, manager.names, "contact"))
@@ -120,7 +152,7 @@ def assemble(
         y[equations.n_v + k] = float(position.get(state.name, state.default))
     for k, value in held_v.items():
         y[k] = value
-    work = _Assembly(
+    work = Posture(
         mechanism,
         manager,
         mechanism.parameters(changed, getattr(model, "parameters", {})),
@@ -128,6 +160,8 @@ def assemble(
         y,
         manager.flags(closed),
         np.zeros(mechanism.layout.n_anchors),
+        places,
+        speeds,
     )
     wanted_q, wanted_y = q.copy(), y.copy()
     free_q = np.ones(len(q), bool) if project else np.array([k not in held_q for k in range(len(q))])
@@ -139,7 +173,7 @@ def assemble(
     bad = _conflicts(work, rows, misfit, speed_misfit)
     if bad:
         raise AssemblyError(bad)
-    faults = _undetermined(work) + _below(work, set(opened))
+    faults = undetermined(work) + _below(work, set(opened))
     if faults:
         raise AssemblyError(faults)
     moved = _moved(equations, work, wanted_q, wanted_y, held_q, held_v)
@@ -149,7 +183,7 @@ def assemble(
     )  # fmt: skip
 
 
-def _position_rows(work: _Assembly) -> list[int]:
+def _position_rows(work: Posture) -> list[int]:
     """Active rows that fix positions: bilateral ones and the gaps of closed contacts; anchors adapt to the position."""
     normals = {contact.rows[0] for contact in work.manager.contacts if contact.rows}
     rows = work.equations.rows
@@ -176,20 +210,20 @@ def _least_change(M: Matrix, B: Matrix, residual: Vector, pull: Vector) -> Vecto
     return np.asarray(pull - flow @ multiplier)
 
 
-def _close_positions(work: _Assembly, rows: Sequence[int], free: Matrix) -> Vector:
+def _close_positions(work: Posture, rows: Sequence[int], free: Matrix) -> Vector:
     """Newton on the free coordinates; the remaining residual of each row."""
-    if not rows:
+    if not rows and not work.places:
         return np.zeros(0)
     n_v = work.equations.n_v
     start, before, picked = work.q.copy(), np.inf, list(rows)
     for iteration in range(200):
         terms = work.mechanism.acceleration_terms(0.0, work.q, work.y, work.parameters, work.anchors)
-        h = terms.h[picked]
+        h, B = work.with_conditions(terms.h[picked], terms.B[picked][:, :n_v], work.places)
         size = float(np.max(np.abs(h)))
-        places = _involved(terms.B[picked][:, :n_v], free)
+        places = _involved(B, free)
         if not np.isfinite(size) or not len(places):
             return h
-        B = terms.B[np.ix_(picked, places)]
+        B = B[:, places]
         M = terms.M[:n_v, :n_v][np.ix_(places, places)]
         near = size < 1e-3 or iteration > 20
         pull = (start - work.q)[places] if near and iteration < 100 else np.zeros(len(places))
@@ -211,10 +245,10 @@ def _close_positions(work: _Assembly, rows: Sequence[int], free: Matrix) -> Vect
             work.mechanism.common["compose"](block, work.parameters, out)
             work.q = out
     terms = work.mechanism.acceleration_terms(0.0, work.q, work.y, work.parameters, work.anchors)
-    return np.asarray(terms.h[picked])
+    return work.with_conditions(terms.h[picked], terms.B[picked][:, :n_v], work.places)[0]
 
 
-def _capture(work: _Assembly) -> None:
+def _capture(work: Posture) -> None:
     terms = work.mechanism.acceleration_terms(0.0, work.q, work.y, work.parameters, work.anchors)
     for contact, flag in zip(work.manager.contacts, work.flags, strict=True):
         if flag:
@@ -222,44 +256,54 @@ def _capture(work: _Assembly) -> None:
                 work.anchors[anchor] = terms.captured[anchor]
 
 
-def _close_velocities(work: _Assembly, free: Matrix) -> Vector:
+def _close_velocities(work: Posture, free: Matrix) -> Vector:
     """Complete the free velocities; the remaining rate of each active row."""
     picked = list(work.manager.active_rows(work.flags))
-    if not picked:
+    if not picked and not work.rates:
         return np.zeros(0)
     n_v = work.equations.n_v
-    terms = work.mechanism.acceleration_terms(0.0, work.q, work.y, work.parameters, work.anchors)
-    places = _involved(terms.B[picked][:, :n_v], free)
-    for _ in range(REFINEMENTS if len(places) else 0):
-        B = terms.B[np.ix_(picked, places)]
-        M = terms.M[:n_v, :n_v][np.ix_(places, places)]
-        work.y[places] += _least_change(M, B, terms.rate[picked], np.zeros(len(places)))
+    for refinement in range(REFINEMENTS + 1):
         terms = work.mechanism.acceleration_terms(0.0, work.q, work.y, work.parameters, work.anchors)
-    return np.asarray(terms.rate[picked])
+        rate, B = work.with_conditions(terms.rate[picked], terms.B[picked][:, :n_v], work.rates)
+        places = _involved(B, free)
+        if refinement == REFINEMENTS or not len(places):
+            break
+        M = terms.M[:n_v, :n_v][np.ix_(places, places)]
+        work.y[places] += _least_change(M, B[:, places], rate, np.zeros(len(places)))
+    return rate
 
 
-def _conflicts(work: _Assembly, rows: Sequence[int], misfit: Vector, speed_misfit: Vector) -> list[str]:
+def _conflicts(work: Posture, rows: Sequence[int], misfit: Vector, speed_misfit: Vector) -> list[str]:
     """Every row that the named values contradict, with both residuals."""
     equations = work.equations
     active = list(work.manager.active_rows(work.flags))
     speed = 1.0 + float(np.max(np.abs(work.y[: equations.n_v]), initial=0.0))
-    h = dict(zip(rows, misfit, strict=True))
-    rate = dict(zip(active, speed_misfit, strict=True))
+    h = dict(zip(rows, misfit, strict=False))
+    rate = dict(zip(active, speed_misfit, strict=False))
     found = []
+    wanted = [
+        *zip(work.places, misfit[len(rows) :], strict=True),
+        *zip(work.rates, speed_misfit[len(active) :], strict=True),
+    ]
+    for condition, off in wanted:
+        if not abs(off) <= TOLERANCE * speed:
+            found.append(
+                f"{condition.name!r} = {condition.target:.9g} cannot be reached: off by {off:.6g}; name fewer values"
+            )
     for k in active:
         row = equations.rows[k]
         position, velocity = float(h.get(k, 0.0)), float(rate[k])
         if abs(position) > TOLERANCE or abs(velocity) > TOLERANCE * speed or not np.isfinite(position + velocity):
             found.append(
-                f"the start contradicts {row.owner!r} ({row.part}): position residual {position:.6g} {row.unit}, "
+                f"the start contradicts {row.title}: position residual {position:.6g} {row.unit}, "
                 f"velocity residual {velocity:.6g} {row.unit}/s; name fewer values, or "
                 f"use assemble(..., project=True) to move all"
             )
     return found
 
 
-def _undetermined(work: _Assembly) -> list[str]:
-    """Coordinates whose acceleration neither mass nor rows determine, and rows that depend on others."""
+def undetermined(work: Posture) -> list[str]:
+    """Coordinates whose acceleration neither mass nor rows determine, rows that depend on others, negative inertia."""
     equations = work.equations
     picked = list(work.manager.active_rows(work.flags))
     terms = work.mechanism.acceleration_terms(0.0, work.q, work.y, work.parameters, work.anchors)
@@ -284,19 +328,31 @@ def _undetermined(work: _Assembly) -> list[str]:
             )
         else:
             rows = [equations.rows[picked[k]] for k in np.flatnonzero(weights[n:] > 1e-6 * weights[place])]
-            names = ", ".join(f"{row.owner!r} ({row.part})" for row in rows)
+            names = ", ".join(row.title for row in rows)
             faults.append(f"redundant constraints: the rows {names} depend on each other; leave one of them out")
-    return faults
+    return faults or _negative(work, terms.M[: equations.n_v, : equations.n_v], terms.B[picked][:, : equations.n_v])
 
 
-def _gaps(work: _Assembly) -> Vector:
+def _negative(work: Posture, M: Matrix, B: Matrix) -> list[str]:
+    """Motions that the rows allow and whose kinetic energy would be negative."""
+    scale = np.sqrt(np.abs(np.diag(M)) + 1e-300)
+    free = np.linalg.svd(B / scale, full_matrices=True)[2][len(B) :].T if len(B) else np.eye(len(M))
+    values, directions = np.linalg.eigh(free.T @ (M / np.outer(scale, scale)) @ free)
+    if not len(values) or values[0] > -1e-9:
+        return []
+    motion = np.abs(free @ directions[:, 0]) / scale
+    name = work.equations.velocity_names[int(np.argmax(motion))].removesuffix(".rate")
+    return [f"the mass or inertia that resists the motion of {name!r} is negative; check the parameters given"]
+
+
+def _gaps(work: Posture) -> Vector:
     out = np.zeros(work.mechanism.sizes["guards"])
     block = work.mechanism.block(0.0, work.q, work.y, work.anchors)
     work.mechanism.common["guards"](block, work.parameters, out)
     return out
 
 
-def _below(work: _Assembly, opened: set[str]) -> list[str]:
+def _below(work: Posture, opened: set[str]) -> list[str]:
     """Open contacts that start inside their surface without having been named open."""
     faults = []
     values, count = _gaps(work), len(work.manager.contacts)
@@ -311,7 +367,7 @@ def _below(work: _Assembly, opened: set[str]) -> list[str]:
     return faults
 
 
-def _armed(work: _Assembly, opened: set[str]) -> frozenset[str]:
+def _armed(work: Posture, opened: set[str]) -> frozenset[str]:
     """Open contacts that may close from the start.
 
     One that touches (|g| below 1e-8) and waits for another by `When` is a trailing foot: ignored until it has risen.
@@ -328,7 +384,7 @@ def _armed(work: _Assembly, opened: set[str]) -> frozenset[str]:
 
 def _moved(
     equations: Equations,
-    work: _Assembly,
+    work: Posture,
     q: Vector,
     y: Vector,
     held_q: Mapping[int, float],

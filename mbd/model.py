@@ -167,7 +167,8 @@ class Model:
             setattr(model, kind, [word for word in words if word.name not in names])
         for place, joint in enumerate(model.joints):
             bare: dict[str, Any] = {"loss": None} if joint.loss is not None else {}
-            spring: dict[str, Any] = {"stiffness": 0.0} if joint.stiffness != 0.0 else {}
+            sprung = joint.stiffness != 0.0 or f"{joint.name} spring.stiffness" in self.tunable
+            spring: dict[str, Any] = {"stiffness": 0.0} if sprung else {}
             for effect, change in (f"{joint.name} loss", bare), (f"{joint.name} spring", spring):
                 known |= {effect} if change else set()
                 if effect in names and change:
@@ -177,6 +178,15 @@ class Model:
         for name in names:
             if name not in known:
                 raise UnknownNameError("without: " + nearest(name, known, "joint, loss, force or constraint"))
+        gone = set(self.parameters) - set(model.parameters)
+        gone |= {parameter for parameter in self.tunable if parameter.rpartition(".")[0] in names}
+        model.tunable = tuple(parameter for parameter in self.tunable if parameter not in gone)
+        return model
+
+    def with_tunable(self, *names: str) -> Model:
+        """A copy in which more parameters stay run-time inputs although they are 0 or ±1."""
+        model = copy.copy(self)
+        model.tunable = (*self.tunable, *names)
         return model
 
     # what follows from it -----------------------------------------------------------------------------------------

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Case", "Quantity", "case", "double_pendulum", "integrated", "pendulum"]
+__all__ = ["Case", "Quantity", "case", "double_pendulum", "integrated", "knee_stop_events", "leg", "pendulum"]
 
 Numbers = NDArray[np.float64]
 Motion = Callable[[float, Numbers], Any]
@@ -109,3 +109,57 @@ def double_pendulum(m1: float, m2: float, L1: float, L2: float, g: float) -> Mot
         return [w, u, (first - m2 * c * second) / (L1 * bottom), ((m1 + m2) * second - c * first) / (L2 * bottom)]
 
     return motion
+
+
+def leg(m1: float, m2: float, L1: float, L2: float, g: float, stop: Callable[[float, float], float]) -> Motion:
+    """Two uniform rods hanging from a fixed hip; y = (θ₁, θ₂, θ₁˙, θ₂˙) from the downward vertical.
+
+    `stop` gives the torque of the knee stop from hyperextension d = θ₂ − θ₁ and its rate.
+    """
+    a, b, c = (m1 / 3 + m2) * L1 * L1, m2 * L2 * L2 / 3, 0.5 * m2 * L1 * L2
+
+    def motion(t: float, y: Numbers) -> list[float]:
+        one, two, w, u = y
+        mixed, s = c * np.cos(one - two), c * np.sin(one - two)
+        torque = stop(two - one, u - w)
+        first = -s * u * u - (0.5 * m1 + m2) * g * L1 * np.sin(one) + torque
+        second = s * w * w - 0.5 * m2 * g * L2 * np.sin(two) - torque
+        bottom = a * b - mixed * mixed
+        return [w, u, (b * first - mixed * second) / bottom, (a * second - mixed * first) / bottom]
+
+    return motion
+
+
+def knee_stop_events(
+    sizes: tuple[float, float, float, float, float], k: float, c: float, pulls: bool, start: Sequence[float], count: int
+) -> list[float]:
+    """Instants at which the stop begins and ends to act, by turns.
+
+    It begins as d rises through zero; it ends as d falls through zero (`pulls`) or as its torque does.
+    """
+    from scipy.integrate import solve_ivp
+
+    def depth(t: float, y: Numbers) -> float:
+        return float(y[1] - y[0])
+
+    def torque(t: float, y: Numbers) -> float:
+        return float(k * (y[1] - y[0]) + c * (y[3] - y[2]))
+
+    times, t, y, closed = [], 0.0, np.array(start, dtype=float), False
+    while len(times) < count:
+        law = (lambda d, rate: k * d + c * rate) if closed else (lambda d, rate: 0.0)
+        motion = leg(*sizes, law)
+        ends: Any = [(lambda t, y: depth(t, y)) if not closed or pulls else (lambda t, y: torque(t, y))]
+        ends[0].terminal, ends[0].direction = True, -1.0 if closed else 1.0
+        # leave the last event before looking for the next; a penalty that let go early first sinks back out
+        away = solve_ivp(motion, (t, t + 1e-4), y, "DOP853", rtol=1e-12, atol=1e-13)
+        if not closed and depth(t, away.y[:, -1]) > 0.0:
+            out: Any = [lambda t, y: depth(t, y)]
+            out[0].terminal, out[0].direction = True, -1.0
+            away = solve_ivp(motion, (t, t + 1.0), y, "DOP853", events=out, rtol=1e-12, atol=1e-13)
+        solved = solve_ivp(
+            motion, (away.t[-1], t + 10.0), away.y[:, -1], "DOP853", events=ends, rtol=1e-12, atol=1e-13
+        )
+        t, y, closed = float(solved.t[-1]), solved.y[:, -1], not closed
+        times.append(t)
+    return times

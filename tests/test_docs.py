@@ -16,6 +16,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 
 BLOCK = re.compile(r"^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+NUMBER = re.compile(r"[-+]?\d+\.\d+")
 LINK = re.compile(r"\]\(([^)#\s]+)(?:#[^)\s]*)?\)")
 
 
@@ -59,9 +60,22 @@ def promised(lines: list[str], end: int, column: int) -> str | None:
 
 
 def agrees(expected: str, came: str) -> bool:
-    """Equal but for white space; '…' stands for anything."""
+    """Equal but for white space and the last digits of numbers with a point; '…' stands for anything."""
     wanted, got = " ".join(expected.split()), " ".join(came.split())
-    return re.fullmatch(".*?".join(map(re.escape, wanted.split("…"))), got, re.DOTALL) is not None
+    *texts, end = NUMBER.split(wanted)
+    pattern = "".join(anything(text) + f"({NUMBER.pattern})" for text in texts) + anything(end)
+    match = re.fullmatch(pattern, got, re.DOTALL)
+    return match is not None and all(map(close, NUMBER.findall(wanted), match.groups()))
+
+
+def anything(text: str) -> str:
+    return ".*?".join(map(re.escape, text.split("…")))
+
+
+def close(wanted: str, came: str) -> bool:
+    """To four digits, or to one unit of the last digit."""
+    last = 10.0 ** -len(wanted.partition(".")[2])
+    return abs(float(wanted) - float(came)) <= max(1e-4 * abs(float(wanted)), 1.01 * last)
 
 
 def run_block(page: Path, before: int, code: str, namespace: dict[str, Any]) -> list[str]:
@@ -106,3 +120,19 @@ def test_a_changed_output_is_noticed(tmp_path):
     assert len(differ) == 2
     assert "promises\n3\nbut prints\n2" in differ[0]
     assert "say in a comment" in differ[1]
+
+
+@pytest.mark.parametrize(
+    ("expected", "came", "same"),
+    [
+        ("a  b", "a b", True),
+        ("a … c", "a b\nb c", True),
+        ("1.23456 m", "1.23451 m", True),
+        ("1.23456 m", "1.23556 m", False),
+        ("0.12", "0.13", True),
+        ("12 of 3.0", "13 of 3.0", False),
+        ("x = … N", "x = 3.2 m", False),
+    ],
+)
+def test_what_counts_as_the_same_output(expected, came, same):
+    assert agrees(expected, came) is same

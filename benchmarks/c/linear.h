@@ -1,6 +1,6 @@
 /* LU with partial pivoting of a row-major SIZE x SIZE matrix whose size is known to the compiler. */
 
-/* Factors in place; 0, or 1 + the column without a pivot. */
+/* Factors in place, with inverse pivots on the diagonal; 0, or 1 + the column without a pivot. */
 static int factor(double A[SIZE][SIZE], int pivots[SIZE])
 {
     for (int k = 0; k < SIZE; k++) {
@@ -21,6 +21,7 @@ static int factor(double A[SIZE][SIZE], int pivots[SIZE])
                 A[p][j] = swap;
             }
         double inverse = 1.0 / A[k][k];
+        A[k][k] = inverse;
         for (int i = k + 1; i < SIZE; i++)
             if (A[i][k] != 0.0) {
                 double left = A[i][k] * inverse;
@@ -46,10 +47,9 @@ static void solve(double A[SIZE][SIZE], const int pivots[SIZE], double b[SIZE])
             total -= A[i][j] * b[j];
         b[i] = total;
     }
-    for (int i = SIZE - 1; i >= 0; i--) {
-        double total = b[i];
-        for (int j = i + 1; j < SIZE; j++)
-            total -= A[i][j] * b[j];
-        b[i] = total / A[i][i];
+    for (int k = SIZE - 1; k >= 0; k--) {
+        b[k] *= A[k][k];
+        for (int i = 0; i < k; i++)
+            b[i] -= A[i][k] * b[k];
     }
 }

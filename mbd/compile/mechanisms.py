@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import threading
 from collections.abc import Mapping
 from typing import Any
@@ -60,8 +59,7 @@ def _mechanism(model: Any, backend: str, tunable: frozenset[str]) -> Mechanism:
         return known[1]
     described = model
     if tunable:
-        described = copy.copy(model)
-        described.tunable = (*model.tunable, *sorted(tunable))
+        described = model.with_tunable(*sorted(tunable))
     made = Mechanism(derive(described), backend)
     if tunable:
         names = ", ".join(map(repr, sorted(tunable)))

@@ -13,7 +13,9 @@ from mbd.forces.base import joint_of
 from mbd.forces.quantities import Mention, arguments_of, kinks, mentioned, quantity_of, scalar, value_parameters
 from mbd.joints.base import Joint
 from mbd.scope import Scope
-from mbd.tape.node import Scalar
+from mbd.tape.derivatives import live
+from mbd.tape.functions import atan2, cos, sin
+from mbd.tape.node import Node, Scalar
 
 __all__ = ["Bilateral"]
 
@@ -57,8 +59,15 @@ class Bilateral(Constraint):
         return "bilateral"
 
     def residual(self, scope: Scope) -> Scalar:
-        """h = g − value [m or rad]."""
-        return self.measure.gap(scope) - scalar(self.value, self.arguments, scope, self.name, "value")
+        """h = g − value [m or rad].
+
+        The angle of a cut joint is read off its frames and jumps by a turn; there
+        ``h = atan2(sin(g − value), cos(g − value))``.
+        """
+        gap = self.measure.gap(scope)
+        h = gap - scalar(self.value, self.arguments, scope, self.name, "value")
+        wraps = isinstance(self.subject, Joint) and isinstance(gap, Node) and any(n.op == "atan2" for n in live([gap]))
+        return atan2(sin(h), cos(h)) if wraps else h
 
     def mentions(self) -> list[Mention]:
         """What its measure and its value depend on."""

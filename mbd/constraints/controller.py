@@ -26,7 +26,7 @@ class Controller:
     name : its name
     update : ``update(time, values, state)`` gives the parameters to write {name: value}, or (that, next state)
     period : time between samples [s]; None for events only
-    on : names of contacts and events at which it is called
+    on : names of contacts, as which close, and of events, as which happen, it is called
     reads : names of the quantities in `values`
     writes : names of the parameters that it may write
     state : what the first call receives

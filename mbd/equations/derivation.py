@@ -100,7 +100,7 @@ def _state_balance(scope: Surroundings, found: Sequence[Cause]) -> list[Node]:
     missing = [coordinate.name for coordinate, node in scope.states if node.index not in given]
     if missing:
         raise ModelError([f"state '{name}' has no rate; its force must list it in Action.rates" for name in missing])
-    return [scope.tape.input("s", k) - given[node.index] for k, (_, node) in enumerate(scope.states)]
+    return [scope.tape.input("s", k) - scope.real(given[node.index]) for k, (_, node) in enumerate(scope.states)]
 
 
 @dataclass(frozen=True)

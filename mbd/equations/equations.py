@@ -59,6 +59,11 @@ class Row:
     contact: int = -1
     unit: str = "m"
 
+    @property
+    def title(self) -> str:
+        """Owner and part, for messages."""
+        return f"{self.owner!r} ({self.part})" if self.part else repr(self.owner)
+
 
 @dataclass(frozen=True)
 class Contact:

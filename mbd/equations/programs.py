@@ -17,6 +17,7 @@ All are values: functions from equations to nodes, which the compile stage turns
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from math import perm
 
 from mbd.equations.equations import Equations
 from mbd.equations.factoring import factored
@@ -205,7 +206,11 @@ def _transposed(columns: Sequence[Sequence[Node]]) -> list[list[Node]]:
 
 
 def _magnitudes(tape: Tape, outputs: Sequence[Node]) -> list[Node]:
-    """|x| through sums and products: Σ|terms| where terms are added, |x| of everything else."""
+    """|x| through sums and products: Σ|terms| where terms are added, |x| of everything else.
+
+    Sines and tables that happen to vanish keep the round-off of their argument and of their coefficients: they count
+    with their amplitude.
+    """
     size: dict[int, Node] = {}
     for node in live(outputs):
         parts = [size[arg.index] for arg in node.args]
@@ -213,6 +218,12 @@ def _magnitudes(tape: Tape, outputs: Sequence[Node]) -> list[Node]:
             size[node.index] = parts[0] + parts[1]
         elif node.op in ("mul", "div"):
             size[node.index] = parts[0] * parts[1] if node.op == "mul" else parts[0] / abs(node.args[1])
+        elif node.op in ("sin", "cos", "tanh"):
+            size[node.index] = tape.one
+        elif node.op == "table":
+            table, order = node.data
+            amplitude = perm(order, order) * max(abs(row[order]) for row in table.coefficients)
+            size[node.index] = abs(node) + amplitude
         else:
             size[node.index] = parts[0] if node.op == "neg" else abs(node)
     return [size[node.index] for node in outputs]

@@ -32,7 +32,11 @@ DEFAULT_TOLERANCE = 1e-9
 
 It is tightened to 1e-4 of the first Newton correction, which measures the error of the step itself, down to 1e-3 of
 this value: the iteration error stays invisible beside the step error at every dt."""
-MAX_ITERATIONS = 25
+MAX_ITERATIONS = 50
+MOST_HALVINGS = 10
+"""How often a Newton correction is halved before the iteration goes on from where it is."""
+FAR = 1e4
+"""Residual over its tolerance above which a correction that does not reduce it is halved."""
 
 Formulation: TypeAlias = Literal["ggl", "index3"]
 Starting: TypeAlias = Literal["jerk", "consistent"]
@@ -200,6 +204,8 @@ class _Step:
         self.size_at_start = self._size_at_start()
         self.x = dt * state.v + dt * dt * ((0.5 - k.beta) * self.a0[:n_v] + k.beta * a1[:n_v]) + self.shift
 
+        self.last: tuple[Any, Any] = np.zeros(len(y0)), np.zeros(len(self.lam))
+
     def _aux(self) -> Vector:
         k = self.k
         return ((1 - k.alpha_f) * self.rate + k.alpha_f * self.memory.rate - k.alpha_m * self.a0) / (1 - k.alpha_m)
@@ -235,17 +241,26 @@ class _Step:
     def run(self) -> StepResult:
         """Newton: evaluate, judge every block, correct accelerations, multipliers and the position shift."""
         t1 = self.state.time + self.dt
-        before, error = np.inf, np.inf
+        before, error, left, halvings = np.inf, np.inf, np.inf, 0
+        reference = self.size_at_start
         for iteration in range(MAX_ITERATIONS):
             point = Point(t1, self.state.q, self.x, self.y, self.rate, self.lam)
             terms = self.system.evaluate(point, self.mode, (self.c_C, self.c_K))
             error = self._error(terms)
+            if iteration == 0:
+                reference = np.maximum(np.abs(terms.r), 1e-200) if terms.scale_r is None else terms.scale_r
+            imbalance = float(np.max(np.abs(terms.r) / np.maximum(reference, 1e-200), initial=0.0))
+            stuck = not (error <= FAR or imbalance <= 0.9 * left)
+            if halvings < MOST_HALVINGS and iteration > 0 and stuck:
+                self._retreat()
+                halvings += 1
+                continue
             if not np.isfinite(error):
                 return self._result(t1, StepReport(False, iteration, error, "a force or a row is not finite"))
             floor = 4096.0 * EPS / self.tolerance
             if error <= 1.0 or (iteration >= 2 and error > 0.5 * before and error <= max(1.0, floor)):
                 return self._result(t1, StepReport(True, iteration, error))
-            before = error
+            before, left, halvings = error, imbalance, 0
             try:
                 self._correct(terms, iteration)
             except np.linalg.LinAlgError:
@@ -271,12 +286,21 @@ class _Step:
             if stabilized and np.any(np.abs(terms.h) > floor):
                 self.x = self.x + solved[:n_v, 1] - self.shift
                 self.shift = solved[:n_v, 1]
+        self.last = change, solved[n:, 0] if m else np.zeros(0)
         if iteration == 0 and not self.scheme.exact:
             relative = float(np.max(np.abs(change)) / max(np.max(np.abs(self.rate)), 1e-200))
             self.tolerance = min(self.scheme.tolerance, max(1e-4 * relative, self.tolerance))
         self.rate = self.rate + change
         self.y = self.y + self.c_C * change
         self.x = self.x + self.c_K * change[:n_v]
+
+    def _retreat(self) -> None:
+        """Take back half of the last correction: a full Newton step jumped over a steep place."""
+        change, multiplier = self.last = self.last[0] / 2.0, self.last[1] / 2.0
+        self.rate = self.rate - change
+        self.y = self.y - self.c_C * change
+        self.x = self.x - self.c_K * change[: self.n_v]
+        self.lam = self.lam - multiplier
 
     def _result(self, t1: float, report: StepReport) -> StepResult:
         if not report.converged:

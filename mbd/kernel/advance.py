@@ -22,8 +22,10 @@ from mbd.kernel.fields import (
     MODE,
     NEW_MODE,
     NOW,
+    OPEN_FORCE,
     OPEN_PULL,
     PAUSE,
+    PRESS,
     RESTART,
     RESTARTS,
     ROWS,
@@ -329,12 +331,17 @@ def switch(K: Any) -> int:
         else:  # a penalty contact closes without impact
             release_for(K, 0)
             release_for(K, 1)
+    elif kind == PRESS:
+        K.closed[index] = 1
+        log_event(K, LOG_CLOSED, index, 0.0, False)
     elif kind != CROSS and kind != WATCH:
         K.closed[index] = 0
-        K.armed[index] = 1 if kind == OPEN_PULL or K.opens[index] == 1 else 0
+        K.armed[index] = 2 if kind == OPEN_FORCE else 1
         log_event(K, LOG_OPENED, index, 0.0, False)
     if kind != WATCH:
         mark_touching(K)
+    if kind == OPEN_PULL:  # its force has passed zero: the acceleration there is round-off and decides nothing
+        K.touched[index] = 0
     return 0
 
 

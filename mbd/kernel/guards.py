@@ -20,6 +20,7 @@ from mbd.kernel.fields import (
     OPEN_FORCE,
     OPEN_GAP,
     OPEN_PULL,
+    PRESS,
     WATCH,
 )  # fmt: skip
 from mbd.kernel.hooks import call, scheme_step
@@ -95,9 +96,16 @@ def gap_tolerance(K: Any, c: int) -> float:
 
 
 def update_armed(K: Any) -> None:
-    """A contact is armed (1) once its gap has risen above zero; one that becomes watched (−1), if it is not below."""
+    """A contact is armed (1) once its gap has risen above zero; one that becomes watched (−1), if it is not below.
+
+    A penalty contact that opened below the surface because it would have pulled (2) acts again as it presses.
+    """
     for c in range(K.n_contacts):
         if K.closed[c] == 0:
+            if K.armed[c] == 2:
+                if K.guards0[c] > gap_tolerance(K, c):
+                    K.armed[c] = 1
+                continue
             if K.armed[c] != 1:
                 K.deepest[c] = min(K.deepest[c], K.guards0[c])
             if not is_watched(K, c, K.guards0):
@@ -174,6 +182,8 @@ def judge(K: Any, h: float) -> bool:
             if K.while_kind[c] == 2 and K.guards0[3 * nC + c] <= 0.0 < K.guards1[3 * nC + c]:
                 consider(K, WATCH, c, crossing(K.guards0[3 * nC + c], K.guards1[3 * nC + c]), 0.0)
                 continue
+            if K.armed[c] == 2 and g1 < 0.0 and K.guards1[2 * nC + c] > 0.0:
+                consider(K, PRESS, c, crossing(K.guards0[2 * nC + c], K.guards1[2 * nC + c]), 0.0)
             if K.armed[c] != 1 or not is_watched(K, c, K.guards0):
                 continue
             if g1 < -tiny:
@@ -233,6 +243,8 @@ def guard_value(K: Any, kind: int, index: int, t1: float) -> float:
         return float(-K.guards1[index])
     if kind == OPEN_FORCE:
         return float(K.guards1[2 * nC + index])
+    if kind == PRESS:
+        return float(-K.guards1[2 * nC + index])
     if kind == WATCH:
         condition = float(K.guards1[3 * nC + index])
         return -condition if condition != 0.0 else 1e-300  # watched only above zero

@@ -32,6 +32,11 @@ from mbd.kernel.restart import compose, consistent, fill_block, raise_scales, re
 
 __all__ = ["newmark_accept", "newmark_start", "newmark_step"]
 
+MOST_HALVINGS = 10
+"""How often a Newton correction is halved before the iteration goes on from where it is."""
+FAR = 1e4
+"""Residual over its tolerance above which a correction that does not reduce it is halved."""
+
 
 def newmark_start(K: Any) -> int:
     """Memory of the scheme at a consistent state: a₀ = v̇₀ + (α_m − α_f) dt j₀, j₀ by a difference (or a₀ = v̇₀)."""
@@ -99,7 +104,8 @@ def residual_size(K: Any, o_r: int, m: int, c_C: float, c_K: float, tolerance: f
 def newmark_step(K: Any, h: float, t1: float) -> int:
     """Candidate state (q1, y1, rate1, aux1, lam1) after a step of size h; the accepted state is untouched.
 
-    One tangent, then residuals with its factors; a new tangent where the residual falls by less than a factor of three.
+    Newton's method, its corrections halved where the residual grows: one tangent, then residuals with its factors; a
+    new tangent where the residual falls by less than a factor of three.
     """
     m = K.state[ROWS]
     size = K.n + m
@@ -109,6 +115,8 @@ def newmark_step(K: Any, h: float, t1: float) -> int:
     predict(K, h, t1, c_C, c_K)
     tolerance = 4.0 * EPS if K.exact == 1 else 1e-3 * K.tolerance
     before = 1e300
+    left = 1e300  # the error where the last correction started
+    halvings = 0
     fresh = False
     status = NOT_CONVERGED
     for iteration in range(K.max_iterations):
@@ -121,6 +129,10 @@ def newmark_step(K: Any, h: float, t1: float) -> int:
             K.counts[RESIDUALS] += 1
         o_r = size * size if tangent else 0
         error = residual_size(K, o_r, m, c_C, c_K, tolerance)
+        if halvings < MOST_HALVINGS and iteration > 0 and (error < 0.0 or (error > FAR and error > 0.9 * left)):
+            retreat(K, m, c_C, c_K)  # a full Newton step jumped over a steep place
+            halvings += 1
+            continue
         if error < 0.0:
             status = NOT_FINITE
             break
@@ -142,6 +154,8 @@ def newmark_step(K: Any, h: float, t1: float) -> int:
             before = 1e300
             continue
         before = error
+        left = error
+        halvings = 0
         shifting = right_hand_sides(K, o_r, m, c_C, c_K, tangent)
         if tangent and not factorize(K, size):
             status = SINGULAR
@@ -182,7 +196,7 @@ def predict(K: Any, h: float, t1: float, c_C: float, c_K: float) -> None:
 def right_hand_sides(K: Any, o_r: int, m: int, c_C: float, c_K: float, tangent: bool) -> bool:
     """−r and −h/c_K (index 3) or −ḣ/c_C in K.rhs; for the stabilized form the position residual in K.work.
 
-    Returns whether positions need correcting: one at round-off stays, as correcting it would only stir the velocity rows.
+    Returns whether positions need correcting: at round-off they stay, correcting would only stir the velocity rows.
     With a new tangent the whole correction U is solved for, so that it stays normal to the rows.
     """
     n = K.n
@@ -243,6 +257,20 @@ def correct(K: Any, m: int, c_C: float, c_K: float, tangent: bool, shifting: boo
             block[K.o_x + i] += shift - K.shift1[i]
             K.shift1[i] = shift
     return biggest / fastest
+
+
+def retreat(K: Any, m: int, c_C: float, c_K: float) -> None:
+    """Take back half of the last correction of rates, velocities, positions and multipliers."""
+    n = K.n
+    for i in range(n + m):
+        K.rhs[i] *= 0.5
+    for i in range(n):
+        K.block[K.o_a + i] -= K.rhs[i]
+        K.block[K.o_v + i] -= c_C * K.rhs[i]
+        if i < K.n_v:
+            K.block[K.o_x + i] -= c_K * K.rhs[i]
+    for k in range(m):
+        K.block[K.o_lam + K.rows[k]] -= K.rhs[n + k]
 
 
 def finish(K: Any, h: float) -> None:

@@ -16,6 +16,7 @@ from mbd.kernel.fields import (
     COMPOSE,
     CONFLICT,
     DEPENDENT,
+    ENERGY_GAIN,
     IMPACTS,
     NO_IMPACT,
     NOT_FINITE,
@@ -253,6 +254,23 @@ def capture(K: Any, c: int) -> None:
         K.anchors[k] = K.acc[o_captured + k]
 
 
+def gains_energy(K: Any) -> bool:
+    """Whether impulses do work on the mechanism, −½ Σ Λ (γ⁻ + γ⁺) < 0: restitution that sticks can (Kane's paradox)."""
+    n = K.n
+    o_B = n * n + n + n * K.n_rows
+    o_rate = o_B + n * K.n_rows + K.n_rows
+    loss = 0.0
+    size = 0.0
+    for k in range(K.n_rows):
+        if K.impulse[k] != 0.0:
+            half = 0.0
+            for j in range(n):
+                half += 0.5 * K.acc[o_B + k * n + j] * K.jump[j]
+            loss += K.impulse[k] * (K.acc[o_rate + k] + half)
+            size += abs(K.impulse[k]) * (abs(K.acc[o_rate + k]) + abs(half))
+    return bool(loss < -1e-9 * size)
+
+
 def impact(K: Any, slow: bool) -> int:
     """Newton's impact law over all closed and closing rows together; the velocities in K.y jump.
 
@@ -277,6 +295,8 @@ def impact(K: Any, slow: bool) -> int:
     status = complementarity(K)
     if status != 0 and status != DEPENDENT:
         return status
+    if not slow and gains_energy(K):
+        return ENERGY_GAIN
     for i in range(n):
         K.y[i] += K.jump[i]
     K.counts[IMPACTS] += 1

@@ -104,7 +104,10 @@ class ModelColumns(Columns):
                 with self.equations.tape.lock:
                     self._nodes[name] = self.equations.output(name)
             except (UnknownNameError, KeyError):
-                return False
+                places = {parameter.name: k for k, parameter in enumerate(self.equations.parameters)}
+                if name not in places:
+                    return False
+                self._nodes[name] = self.equations.tape.input("p", places[name])
         return True
 
     def node(self, name: str) -> Node:

@@ -9,22 +9,18 @@ from typing import Any
 
 import numpy as np
 
+from mbd.assembly import is_number
 from mbd.equations.equations import Equations
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.integrators import Integrator
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.state import State
 
-__all__ = ["callbacks", "choices", "end_of", "fits", "named_numbers", "numbers"]
+__all__ = ["callbacks", "choices", "end_of", "fits", "numbers"]
 
 CHOICES = {
     "contact": ("events",), "impact": ("newton",), "locate": ("root", "linear"), "on_failure": ("raise", "return"),
 }  # fmt: skip
-
-
-def is_number(value: Any) -> bool:
-    """Whether a value is one real number, finite or not."""
-    return not isinstance(value, bool | str) and hasattr(value, "__float__") and not getattr(value, "ndim", 0)
 
 
 def choices(words: Mapping[str, Any]) -> list[str]:
@@ -83,19 +79,6 @@ def callbacks(observers: Any, progress: Any) -> list[str]:
     if not callable(progress) and not isinstance(progress, bool | None):
         return [f"progress must be True, None or a function progress(t, until), not {progress!r}"]
     return []
-
-
-def named_numbers(values: Any, what: str) -> list[str]:
-    """What is wrong with values by name."""
-    if values is None:
-        return []
-    if not isinstance(values, Mapping):
-        return [f"{what} must map names to numbers, such as {{'left thigh.mass': 0.5}}, not {values!r}"]
-    return [
-        f"{what}: the value of {name!r} must be a finite number, not {value!r}"
-        for name, value in values.items()
-        if not is_number(value) or not math.isfinite(value)
-    ]
 
 
 def fits(start: State, equations: Equations, manager: ActiveSetManager) -> None:

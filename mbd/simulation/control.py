@@ -114,7 +114,10 @@ class Boundaries:
         return float(self.begin_time + self.samples[controller.name] * controller.period)
 
     def begin(self, run: Run) -> None:
-        """The first call of every sampled controller."""
+        """The first call of every sampled controller; names that no result has are errors before the first step."""
+        for controller in self.controllers:
+            for name in controller.reads:
+                run.mechanism.equations.output(name)
         for controller in self.controllers:
             if controller.period is not None:
                 self._call(run, controller)

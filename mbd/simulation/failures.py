@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,8 +16,10 @@ from mbd.tape.node import Node
 __all__ = ["explanation"]
 
 
-def explanation(stepper: Stepper, status: int, events: Sequence[EventRecord] = ()) -> str:
-    """A sentence for a failure status of the kernel."""
+def explanation(
+    stepper: Stepper, status: int, events: Sequence[EventRecord] = (), places: Mapping[str, str] | None = None
+) -> str:
+    """A sentence for a failure status of the kernel; `places` tells the frames that forces act on, by their names."""
     values = stepper.values
     now = float(values["clock"][F.NOW])
     time = float(values["detail"][0]) if values["detail"][0] > now else now
@@ -26,7 +28,8 @@ def explanation(stepper: Stepper, status: int, events: Sequence[EventRecord] = (
     with_closed = f" with {', '.join(map(repr, closed))} closed" if closed else ""
     residual = float(values["detail"][1])
     if status == F.NOT_FINITE:
-        return f"{where}: {_not_finite(stepper)}{with_closed}; nothing after the last accepted step is kept"
+        what = _not_finite(stepper, places or {})
+        return f"{where}: {what}{with_closed}; nothing after the last accepted step is kept"
     if status == F.NOT_CONVERGED:
         own = f" ({stepper.scheme.report.message})" if not stepper.compiled and stepper.scheme.report.message else ""
         return (
@@ -49,13 +52,19 @@ def explanation(stepper: Stepper, status: int, events: Sequence[EventRecord] = (
         )
     if status == F.NO_IMPACT:
         return (
-            f"{where}: no impulses satisfy the impact law of all contacts that close{with_closed}; penalty contacts can"
+            f"{where}: no forces or impulses let every contact push or open{with_closed}: one that sticks whatever its "
+            "force may have none; use friction=0, a release rule or a penalty contact"
         )
     if status in (F.DEPENDENT, F.CONFLICT) and int(values["state"][F.BLOCKED]) < values["n"]:
         return f"{where}: neither mass nor rows determine {_unknown(stepper)}{with_closed}; give it a mass, or lock it"
     if status in (F.DEPENDENT, F.CONFLICT):
         what = "depend on each other" if status == F.DEPENDENT else "conflict"
         return f"{where}: rows {what} at {_unknown(stepper)}{with_closed}; leave one out, or hold fewer contacts closed"
+    if status == F.ENERGY_GAIN:
+        return (
+            f"{where}: the impact law would create energy{with_closed}: restitution where a contact also sticks "
+            "(Kane's paradox); use friction=0 or restitution=0 there"
+        )
     return f"{where}: the instant of an event could not be isolated{with_closed}; try a smaller dt"
 
 
@@ -68,7 +77,7 @@ def _unknown(stepper: Stepper) -> str:
     if column < n:
         return f"the state {equations.states[column - equations.n_v].name!r}"
     row = equations.rows[int(values["rows"][min(column - n, values["n_rows"] - 1)])]
-    return f"{row.owner!r} ({row.part})"
+    return row.title
 
 
 def _last_events(events: Sequence[EventRecord]) -> str:
@@ -77,16 +86,17 @@ def _last_events(events: Sequence[EventRecord]) -> str:
     return ", ".join(shown) or "no contact changed"
 
 
-def _not_finite(stepper: Stepper) -> str:
+def _not_finite(stepper: Stepper, places: Mapping[str, str]) -> str:
     """The first cause whose force is not finite where the step failed."""
     equations, values = stepper.mechanism.equations, stepper.values
     inputs = _inputs(stepper, values["block"])
     for effect in equations.effects:
         if not _finite(list(effect.generalized()), inputs):
-            return f"the force of {effect.name!r} is not finite{_moved_by(stepper, effect, inputs)}"
+            place = f" on {places[effect.name]}" if places.get(effect.name) else ""
+            return f"the force of {effect.name!r}{place} is not finite{_moved_by(stepper, effect, inputs)}"
     for row in equations.rows:
         if not _finite([row.value, row.rate], inputs):
-            return f"the constraint {row.owner!r} ({row.part}) is not finite"
+            return f"the constraint {row.title} is not finite"
     for contact in equations.contacts:
         if not _finite([contact.gap, contact.gap_rate], inputs):
             return f"the gap of {contact.name!r} is not finite"

@@ -25,6 +25,7 @@ class MechanismSystem:
     ) -> None:
         self.mechanism, self.manager = mechanism, manager
         self.parameters, self.anchors, self.stabilized = parameters, anchors, stabilized
+        self.evaluated: Vector | None = None  # the inputs evaluated last, to explain a failure with
         layout = mechanism.layout
         self.n_q, self.n_v, self.n_z = layout.n_q, layout.n_v, layout.n_z
 
@@ -37,7 +38,7 @@ class MechanismSystem:
         rows, penalties = self._active(mode)
         code = self.mechanism.mode(rows, penalties, self.stabilized)
         n, m = self.mechanism.layout.n, len(rows)
-        block = self._block(point, rows, penalties)
+        block = self.evaluated = self._block(point, rows, penalties)
         scale = np.zeros(n + 2 * self.mechanism.layout.n_rows)
         self.mechanism.common["scales"](block, self.parameters, scale)
         picked = list(rows)
@@ -170,6 +171,8 @@ class PlainScheme:
         K.counts[ITERATIONS] += result.report.iterations
         if not result.report.converged:
             K.detail[0], K.detail[1], K.detail[2] = t1, result.report.residual, h
+            if self.system.evaluated is not None:
+                K.block[:] = self.system.evaluated
             return NOT_CONVERGED if np.isfinite(result.report.residual) else NOT_FINITE
         y = np.concatenate([result.state.v, result.state.z])
         if not (np.isfinite(y).all() and np.isfinite(result.state.q).all()):

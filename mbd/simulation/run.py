@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
 from mbd.arrays import Vector
-from mbd.assembly import BELOW
+from mbd.assembly import BELOW, Posture, undetermined
 from mbd.compile.mechanism import Mechanism
+from mbd.equations.equations import Contact
 from mbd.errors import ModelError, SimulationError, UnknownNameError
+from mbd.forces.base import Force
 from mbd.integrators.base import Integrator
 from mbd.kernel import fields as F
 from mbd.kernel.active_set import ActiveSetManager
@@ -29,6 +32,8 @@ STEPS_AT_ONCE = {True: 20000, False: 200}
 """Steps between two looks at the clock, compiled and interpreted: some 20 ms."""
 SHOW_EVERY = 0.1
 """Wall time between two calls of progress and observers [s]."""
+RESOLVED = 5.0
+"""Steps that a penalty contact must last to be resolved at all."""
 KINDS = ("closed", "opened", "event")
 
 
@@ -52,6 +57,8 @@ class Run:
         self.began = perf_counter()
         self.mechanism, self.manager, self.start, self.end, self.stop = mechanism, manager, start, end, stop
         self.settings, self.changed, self.dt = settings, dict(changed), dt
+        forces = [force for force in getattr(model, "forces", ()) if isinstance(force, Force)]
+        self.places = {force.name: _places(force) for force in forces}
         rows = int(min(ROWS_AT_ONCE, (end - start.time) / dt / options.get("store", 1) + 64))
         self.folded = getattr(model, "parameters", {})
         parameters = mechanism.parameters(changed, self.folded)
@@ -70,6 +77,8 @@ class Run:
         controllers, instants = getattr(model, "controllers", ()), getattr(model, "instants", ())
         self.boundaries = Boundaries(controllers, instants, start.time, dt, end)
         self._begin(start)
+        if changed:
+            self._check(start, parameters)
 
     def observe(
         self, observers: Sequence[Callable[[float, State], None]], progress: Callable[[float, float], None] | None
@@ -111,6 +120,15 @@ class Run:
             raise ModelError(inside)
         for e in range(n_guards):
             self._set_side(e, guards)
+
+    def _check(self, start: State, parameters: Vector) -> None:
+        """Values of parameters may take away what determines the motion."""
+        y, flags = np.concatenate([start.v, start.z]), self.values["closed"][: self.values["n_contacts"]]
+        faults = undetermined(
+            Posture(self.mechanism, self.manager, parameters, start.q, y, flags, self.values["anchors"])
+        )
+        if faults:
+            raise ModelError(faults)
 
     def _guard_values(self) -> Vector:
         v = self.values
@@ -168,7 +186,7 @@ class Run:
                 if ended:
                     return self._finish(f"ended by {ended!r} at t = {self.now:.6g} s")
             elif status not in (F.FULL, F.PAUSE):
-                return explanation(self.stepper, status, self.events), ""
+                return explanation(self.stepper, status, self.events, self.places), ""
             if perf_counter() - shown > SHOW_EVERY:
                 shown = perf_counter()
                 self._show()
@@ -178,7 +196,7 @@ class Run:
         status = self.stepper.advance(self.now)
         self._collect()
         ended = status in (F.DONE, F.EVENT, F.NEW_MODE)
-        return ("", message) if ended else (explanation(self.stepper, status, self.events), "")
+        return ("", message) if ended else (explanation(self.stepper, status, self.events, self.places), "")
 
     @property
     def now(self) -> float:
@@ -231,7 +249,11 @@ class Run:
         return ended
 
     def change_parameters(self, values: Mapping[str, float]) -> None:
-        """New parameter values from now on; the scheme restarts from them."""
+        """New parameter values from now on; the scheme restarts from them if they differ."""
+        equations = self.mechanism.equations
+        present = {parameter.name: v for parameter, v in zip(equations.parameters, self.values["params"], strict=False)}
+        if all(present.get(name) == value for name, value in values.items()):
+            return
         self.changed.update(values)
         self.values["params"][: len(self.first_parameters)] = self.mechanism.parameters(self.changed, self.folded)
         self.parameter_changes.append((self.stored + int(self.values["state"][F.STORED]), self.values["params"].copy()))
@@ -301,9 +323,29 @@ class Run:
                 notes.append(
                     f"{contact.name!r} was released at t = {v['sinking'][c]:.6g} s while moving into its surface"
                 )
+            notes += self._short_touch(contact)
         return notes
+
+    def _short_touch(self, contact: Contact) -> list[str]:
+        """A penalty contact over within a few steps is not resolved: its energy is anyone's guess."""
+        if contact.kind != "penalty":
+            return []
+        times = [(event.kind, event.time) for event in self.events if event.name == contact.name]
+        spans = [b[1] - a[1] for a, b in pairwise(times) if (a[0], b[0]) == ("closed", "opened")]
+        if not spans or min(spans) >= RESOLVED * self.dt:
+            return []
+        return [
+            f"{contact.name!r} closed for {min(spans) / self.dt:.2g} steps only, too few for its spring and damper; "
+            f"use dt below {min(spans) / 20.0:.2g} s, a softer stiffness, or mbd.Unilateral"
+        ]
 
     def _capsule(self, problem: str) -> dict[str, Any] | None:
         if not problem:
             return None
         return {"message": problem, "time": self.now, "state": self.state(), "dt": self.dt, "settings": self.settings}
+
+
+def _places(force: Force) -> str:
+    """The frames and joints of a force, for messages."""
+    named = [getattr(mention, "full_name", getattr(mention, "name", None)) for mention in force.mentions()]
+    return ", ".join(repr(name) for name in named if name)

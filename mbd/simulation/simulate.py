@@ -6,11 +6,12 @@ import platform
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal
 
+from mbd.assembly import named_numbers
 from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import CapabilityError, ModelError, SimulationError
 from mbd.integrators import HHT, Integrator
 from mbd.kernel.active_set import ActiveSetManager
-from mbd.simulation.arguments import callbacks, choices, end_of, fits, named_numbers, numbers
+from mbd.simulation.arguments import callbacks, choices, end_of, fits, numbers
 from mbd.simulation.run import Run
 from mbd.state import State
 from mbd.trajectory import Trajectory

@@ -135,12 +135,6 @@ def mention_faults(model: Model) -> list[str]:
                 )
             if isinstance(mention, str) and mention not in known:
                 found.append(f"'{word.name}': " + nearest(mention, known, "quantity"))
-    for controller in model.controllers:
-        found += [
-            f"'{controller.name}' reads: " + nearest(name, known, "quantity")
-            for name in controller.reads
-            if name not in known
-        ]
     return found
 
 

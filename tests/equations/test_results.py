@@ -137,3 +137,17 @@ def test_small_programs_stay_small():
     assert counts["walker"][1] <= 153
     assert counts["four-bar"][0] <= 370
     assert counts["four-bar"][1] <= 147
+
+
+@pytest.mark.parametrize("make", [leg, four_bar, lambda: furnished(random_tree(5, 3, spatial=True), 2)])
+def test_only_the_inputs_of_the_contract_are_left(make):
+    from mbd.equations.programs import accelerations, guards, newton, scales
+    from mbd.tape.derivatives import live
+
+    equations = derive(make())
+    rows = range(len(equations.rows))
+    nodes = [*accelerations(equations), *guards(equations), *scales(equations), *newton(equations, rows, (), True)]
+    nodes += [equations.output(name) for name in equations.output_names()]
+    nodes += [node for effect in equations.effects for node in effect.generalized()]
+    kinds = {node.data[0] for node in live(nodes) if node.op == "input"}
+    assert kinds <= {"t", "c", "q", "x", "v", "a", "z", "s", "lam", "anchor", "switch", "p"}

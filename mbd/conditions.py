@@ -1,0 +1,65 @@
+"""Named values that are no coordinates: the angle of a cut joint, the place of a foot, held as rows at the start."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mbd.arrays import Vector
+from mbd.compile.mechanism import Mechanism
+from mbd.compile.python import scalar_function
+from mbd.errors import UnknownNameError
+from mbd.tape.derivatives import gradient, live
+
+__all__ = ["Condition", "conditions"]
+
+PLACES = frozenset({"t", "q", "x", "p"})
+"""Kinds of inputs that a position may depend on; a rate depends on v as well."""
+
+
+@dataclass(frozen=True)
+class Condition:
+    """``value(q) = target`` or ``value(q, v) = target``, with the gradient that Newton's method needs."""
+
+    name: str
+    target: float
+    periodic: bool
+    function: Any
+
+    def at(self, block: Vector, parameters: Vector) -> tuple[float, Vector]:
+        """(residual, gradient) at a state; angles compare modulo a turn."""
+        out = np.zeros(self.function.size)
+        self.function(block, parameters, out)
+        residual = float(out[0]) - self.target
+        if self.periodic:
+            residual = math.atan2(math.sin(residual), math.cos(residual))
+        return residual, out[1:]
+
+
+def conditions(mechanism: Mechanism, values: Mapping[str, float], rates: bool) -> tuple[list[Condition], list[str]]:
+    """The conditions behind names of results, and the names that are no such result.
+
+    Parameters
+    ----------
+    rates : whether the names are rates (linear in v) instead of positions
+    """
+    equations, found, wrong = mechanism.equations, [], []
+    kind, allowed = ("v", PLACES | {"v"}) if rates else ("x", PLACES)
+    inputs = [equations.tape.input(kind, k) for k in range(equations.n_v)]
+    for name, target in values.items():
+        try:
+            node = equations.output(name)
+        except (UnknownNameError, KeyError):
+            wrong.append(name)
+            continue
+        if not {part.data[0] for part in live([node]) if part.op == "input"} <= allowed:
+            wrong.append(name)
+            continue
+        function = scalar_function([node, *gradient(node, inputs)], mechanism.layout, "condition")
+        periodic = not rates and name.rpartition(".")[2] in ("angle", "first", "second")
+        found.append(Condition(name, float(target), periodic, function))
+    return found, wrong

@@ -1,0 +1,104 @@
+"""Case j16: a user's force that becomes NaN during the run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import mbd
+from tests.cases.schemes import SCHEMES, name_of
+from tests.problems import case
+
+J16 = case("j16-nan-user-force")
+
+
+def particle(push: Any, arguments: tuple[str, ...] = ("t",), mass: float = 1.0) -> mbd.Model:
+    """A free particle under a force along x."""
+    model = mbd.Model("particle", gravity=(0.0, 0.0, 0.0))
+    body = mbd.PointMass("particle", mass)
+    model.connect(mbd.Translation("place", model.ground.origin, body.origin))
+    model.apply(mbd.Applied("push", body.origin, force=push, arguments=arguments))
+    return model
+
+
+def until_half_a_second(t: float) -> tuple[float, float]:
+    return mbd.where(t < 0.5, 1.0, math.nan), 0.0
+
+
+@pytest.mark.parametrize("backend", ["auto", "python"])
+@pytest.mark.parametrize("dt", [0.01, 0.003, 0.0007])
+@pytest.mark.parametrize("scheme", SCHEMES, ids=name_of)
+def test_the_run_stops_naming_force_time_and_body_and_keeps_what_it_has(
+    scheme: mbd.Newmark, dt: float, backend: str
+) -> None:
+    model = particle(until_half_a_second)
+    with pytest.raises(mbd.SimulationError) as failure:
+        mbd.simulate(model, mbd.assemble(model, backend=backend), scheme, dt=dt, until=1.0, backend=backend)
+    first = math.ceil(round(0.5 / dt, 9)) * dt
+    for words in f"t = {first:.9g} s", "'push'", "'particle.origin'", "'place.x'", "not finite":
+        assert words in str(failure.value)
+    run = failure.value.run
+    t = run.time[-1]
+    assert t == pytest.approx(first - dt, abs=1e-12)
+    assert run["place.x"] == pytest.approx(run.time**2 / 2, abs=1e-12)
+    assert run["place.x.rate"] == pytest.approx(run.time, abs=1e-12)
+    assert (not run.success) and run.failure["time"] == t
+    assert np.isfinite(np.column_stack([run[name] for name in run.names if name != "push.power"])).all()
+    assert t * t / 2 <= J16["x and v at the last valid time"].value[0]
+
+
+def test_the_same_run_is_returned_when_that_is_asked_for() -> None:
+    model = particle(until_half_a_second)
+    run = mbd.simulate(model, mbd.assemble(model), mbd.HHT(), dt=1e-3, until=1.0, on_failure="return")
+    assert not run.success
+    assert run.status == -1
+    assert "'push'" in run.message
+    assert run["place.x"][-1] == pytest.approx(run.time[-1] ** 2 / 2, abs=1e-12)
+    assert run.final.time == run.time[-1]
+
+
+def cliff(x: float) -> tuple[float, float]:
+    """Real only up to x = 0.3."""
+    return 2.0 + 1e-300 * mbd.sqrt(0.3 - x), 0.0
+
+
+def quotient(t: float) -> tuple[float, float]:
+    """2 N, with a pole of no strength at every step of 0.01 from 0.4 on that hits it."""
+    return 2.0 + mbd.where(t < 0.395, 0.0, 1.0) / mbd.where(t < 0.395, 1.0, 0.0), 0.0
+
+
+@pytest.mark.parametrize("backend", ["auto", "python"])
+@pytest.mark.parametrize(("push", "arguments"), [(cliff, ("place.x",)), (quotient, ("t",))], ids=["root", "pole"])
+def test_a_force_that_leaves_its_domain_is_named_too(push: Callable[..., Any], arguments: Any, backend: str) -> None:
+    """Another force, mass and start: a square root of a negative place, and infinity."""
+    model = particle(push, arguments, mass=1.6)
+    start = mbd.assemble(model, velocity={"place.x": 0.1}, backend=backend)
+    with pytest.raises(mbd.SimulationError, match=r"force of 'push' on 'particle\.origin'") as failure:
+        mbd.simulate(model, start, mbd.GeneralizedAlpha(0.9), dt=0.01, until=2.0, backend=backend)
+    run = failure.value.run
+    assert len(run) > 25
+    assert run["place.x"] == pytest.approx(0.1 * run.time + run.time**2 / 1.6, abs=1e-12)
+
+
+def test_the_force_at_fault_is_named_among_several() -> None:
+    model = particle(until_half_a_second)
+    other = mbd.PointMass("other", 2.0)
+    model.connect(mbd.Translation("other place", model.ground.origin, other.origin))
+    model.apply(
+        mbd.Applied("pull", other.origin, force=lambda t: (mbd.where(t < 0.3, 1.0, math.inf), 0.0)),
+        mbd.Applied("steady", other.origin, force=(1.0, 0.0, 0.0)),
+    )
+    run = mbd.simulate(model, mbd.assemble(model), mbd.HHT(), dt=0.01, until=1.0, on_failure="return")
+    assert run.message.startswith("t = 0.3 s")
+    assert "'pull' on 'other.origin'" in run.message
+    assert "'push'" not in run.message
+
+
+def test_a_force_that_is_not_finite_at_the_start_is_refused_before_the_run() -> None:
+    model = particle(lambda t: (mbd.where(t < 0.0, 1.0, math.nan), 0.0))
+    with pytest.raises(mbd.AssemblyError, match="not finite at the start"):
+        mbd.assemble(model)
