@@ -6,9 +6,9 @@ the foot meets the ground a little ahead of the shank's axis. That foot sticks b
 one strikes, and takes no impulse from the strike (McGeer's rule). HHT with 5 % damping quiets the stiff stops.
 
 T. McGeer, Passive walking with knees, Proc. IEEE Conf. Robotics and Automation (1990) 1640. Uniform rods of 7 and
-3.5 kg and the knee stop are those of a two-link leg with 5000 N m/rad and 20 N m s/rad. Slope and place of the foot
-were found by random search: from the straight legs below it settles into a steady walk, the fixed point of its return
-map (steps of 0.471 m in 0.853 s). With the foot 25 mm ahead it limps; with 5 mm its stance knee gives way.
+3.5 kg make a person of 70 kg. Slope and place of the foot were found by random search: from the straight legs below
+it settles within ten steps into a steady walk, the fixed point of its return map (0.427 m in 0.871 s). With the foot
+30 mm ahead it limps, and with 5 mm its stance knee gives way: the event 'fall' ends the run.
 """
 
 import mbd

@@ -1,8 +1,8 @@
 """The compass gait: two straight legs walk down a slope of 3° with no motor and no control.
 
-Legs of equal length scuff: at mid-stance the swing foot passes a little below the ground, which a real walker avoids by
-knees or by stepping stones. The model ignores a foot until it is ahead of the other one: `only_while`. At the strike the
-new foot stops dead and the old one is released, so it takes no impulse (the one-foot rule).
+Legs of equal length scuff: at mid-stance the swing foot passes a little below the ground, where a real walker has
+knees or stepping stones. The model watches a foot only while it is ahead of the other one: `only_while`. At the strike
+the new foot stops dead; the old one is released just before and takes no impulse (the one-foot rule).
 
 A. Goswami, B. Thuilot & B. Espiau, Compass-like biped robot, INRIA research report 2996 (1996): legs of 5 kg and 1 m,
 10 kg at the hip. The start is just after a strike of the steady gait; angles are from the slope's normal.

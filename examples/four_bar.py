@@ -10,7 +10,7 @@ J. J. Uicker, G. R. Pennock & J. E. Shigley, Theory of Machines and Mechanisms, 
 import mbd
 
 model = mbd.Model("four-bar")
-crank = mbd.Link("crank", length=0.1, **mbd.rod(mass=0.5, length=0.1).link)
+crank = mbd.Link("crank", mass=4.0, length=0.1, center=0.0, inertia=0.02)  # with a flywheel
 coupler = mbd.Link("coupler", length=0.35, **mbd.rod(mass=0.8, length=0.35).link)
 rocker = mbd.Link("rocker", length=0.3, **mbd.rod(mass=0.7, length=0.3).link)
 drive = mbd.Revolute("drive", model.ground.origin, crank.start)

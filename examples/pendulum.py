@@ -4,7 +4,7 @@ The moment of inertia about the pin is m L²/3, so the rod moves like a simple p
 4 √(2 L/3 g) K(sin² θ₀/2), with K the complete elliptic integral of the first kind of parameter m = k². Energy and the
 centripetal acceleration give the pull of the pin at the lowest point: m g (1 + 3/2 (1 − cos θ₀)) = 5/2 m g.
 
-See any textbook of dynamics, such as J. L. Meriam & L. G. Kraige, Engineering Mechanics: Dynamics, section 6/4.
+Any textbook has it, such as J. L. Meriam & L. G. Kraige, Engineering Mechanics: Dynamics, chapter 6.
 """
 
 import math

@@ -32,7 +32,7 @@ def leg(side, other, masses, ahead, knee_loss=None, **ankle):
 
 
 hydraulic_knee = mbd.Viscous(0.3) + mbd.Quadratic(0.1)
-measured_ankle = mbd.Tabulated(rate=[-6.0, -2.0, 0.0, 2.0, 6.0], torque=[-20.0, -10.0, 0.0, 10.0, 20.0])
+measured_ankle = mbd.Tabulated(rate=[-30.0, -6.0, -2.0, 2.0, 6.0, 30.0], torque=[-60.0, -20.0, -10.0, 10.0, 20.0, 60.0])
 leg("left", "right", masses=(7.0, 3.5, 1.0), ahead=0.02)
 leg("right", "left", (6.0, 2.0, 0.8), 0.01, hydraulic_knee, stiffness=350.0, loss=measured_ankle)
 model.constrain(mbd.Event("fall", mbd.measure(lambda p: p[1] - 0.5, hip.origin), terminal=True))

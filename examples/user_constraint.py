@@ -4,8 +4,8 @@ The gap is the distance to the dome; any function of positions, angles and time 
 direction, the curvature terms and the release follow from it. On the dome m g cos θ − N = m v²/R, and energy gives v².
 The bead leaves where N falls to zero, at cos θ = 2/3 + v₀²/(3 g R), whatever its mass, and lands on a parabola.
 
-R. P. Feynman et al. give it as exercise; so does every text, such as D. Kleppner & R. Kolenkow, An Introduction to
-Mechanics, problem 5.1. The event 'landing' ends the run.
+From rest that is R/3 below the top, a problem in every text, such as D. Kleppner & R. Kolenkow, An Introduction to
+Mechanics, chapter 4. The event 'landing' ends the run.
 """
 
 import mbd

@@ -4,14 +4,13 @@ The rule asks for the balance M a + f = 0 half-way through the step, where v = v
 
     v₁ = v₀ + dt a,    q₁ = q₀ + dt (v₀ + ½ dt a)
 
-It is of second order and symplectic. `start` and `step` are all it needs: events are located, impacts applied and the
-scheme restarted around it. It serves mechanisms without closed contacts; rows would join the Newton matrix below.
-The wall stands at the lowest point, so the speed falls by the restitution e from hit to hit, and the energy by e².
-
-E. Hairer, C. Lubich & G. Wanner, Geometric Numerical Integration, section II.1.
+It is of second order and symplectic (E. Hairer, C. Lubich & G. Wanner, Geometric Numerical Integration). `start` and
+`step` are all that moves it, `order` is its promise: events are located, impacts applied and the scheme restarted
+around it. It serves mechanisms whose contacts do not stay closed; their rows would join the Newton matrix below. The
+wall stands at the lowest point, so from hit to hit the speed falls by the restitution e and the energy by e².
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,8 +18,11 @@ import mbd
 from mbd.integrators import Integrator, Point, StepReport, StepResult
 
 
+@dataclass(frozen=True)
 class ImplicitMidpoint(Integrator):
     """The implicit midpoint rule; its memory is the last acceleration, from which Newton's method starts."""
+
+    tolerance: float = 1e-12
 
     def order(self, system=None):
         return 2
@@ -36,7 +38,7 @@ class ImplicitMidpoint(Integrator):
             terms = system.evaluate(middle, mode, tangent=(half, half * half))  # ∂v/∂a and ∂q/∂a
             change = np.linalg.solve(terms.S, -terms.r)
             a = a + change
-            if np.max(np.abs(change)) < 1e-12 * (1.0 + np.max(np.abs(a))):
+            if np.max(np.abs(change)) < self.tolerance * (1.0 + np.max(np.abs(a))):
                 after = replace(state, time=state.time + dt, q=state.q + dt * (state.v + half * a), v=state.v + dt * a)
                 return StepResult(after, a, StepReport(True, iteration))
         return StepResult(state, memory, StepReport(False, 20, message="the midpoint rule did not converge"))

@@ -26,6 +26,8 @@ BELOW = 1e-6
 """Depth [m, rad] below which an open contact is told to start inside the ground."""
 REFINEMENTS = 3
 """Solutions of the linear equations for velocities: bodies without mass leave an error in the first [-]."""
+NUDGE, NUDGES = 0.01, 3
+"""Step [m, rad] out of a flat spot of the rows, and how often it is tried."""
 LIFTED = 1e-8
 """Height [m, rad] above which an open contact is armed from the start."""
 
@@ -221,6 +223,9 @@ def _close_positions(work: Posture, rows: Sequence[int], free: Matrix) -> Vector
         h, B = work.with_conditions(terms.h[picked], terms.B[picked][:, :n_v], work.places)
         size = float(np.max(np.abs(h)))
         places = _involved(B, free)
+        if not len(places) and size > TOLERANCE and work.mechanism.vector and iteration < NUDGES:
+            _nudge(work, rows, free)
+            continue
         if not np.isfinite(size) or not len(places):
             return h
         B = B[:, places]
@@ -246,6 +251,14 @@ def _close_positions(work: Posture, rows: Sequence[int], free: Matrix) -> Vector
             work.q = out
     terms = work.mechanism.acceleration_terms(0.0, work.q, work.y, work.parameters, work.anchors)
     return work.with_conditions(terms.h[picked], terms.B[picked][:, :n_v], work.places)[0]
+
+
+def _nudge(work: Posture, rows: Sequence[int], free: Matrix) -> None:
+    """Leave a flat spot, where no free coordinate acts on the rows, along those that act on them nearby."""
+    nearby = work.q + np.where(free, NUDGE * (1.0 + np.arange(len(work.q)) / 7.0), 0.0)
+    terms = work.mechanism.acceleration_terms(0.0, nearby, work.y, work.parameters, work.anchors)
+    places = _involved(terms.B[list(rows)][:, : work.equations.n_v], free)
+    work.q[places] = nearby[places]
 
 
 def _capture(work: Posture) -> None:

@@ -157,9 +157,7 @@ def knee_stop_events(
             out: Any = [lambda t, y: depth(t, y)]
             out[0].terminal, out[0].direction = True, -1.0
             away = solve_ivp(motion, (t, t + 1.0), y, "DOP853", events=out, rtol=1e-12, atol=1e-13)
-        solved = solve_ivp(
-            motion, (away.t[-1], t + 10.0), away.y[:, -1], "DOP853", events=ends, rtol=1e-12, atol=1e-13
-        )
+        solved = solve_ivp(motion, (away.t[-1], t + 10.0), away.y[:, -1], "DOP853", events=ends, rtol=1e-12, atol=1e-13)
         t, y, closed = float(solved.t[-1]), solved.y[:, -1], not closed
         times.append(t)
     return times

@@ -21,7 +21,7 @@ RANKS = [
     ("compile",),
     ("kernel",),
     ("integrators",),
-    ("assembly", "results", "simulation", "trajectory"),
+    ("assembly", "conditions", "results", "simulation", "trajectory"),
     ("analysis", "view"),
     ("cli",),
 ]

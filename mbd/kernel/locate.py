@@ -112,7 +112,7 @@ def locate(K: Any, h: float) -> int:
         found = K.pick[2]
         if found <= 0.0:
             return 0
-        if kind == CLOSE and not is_watched(K, index, K.guards1):  # no longer watched when it gets there
+        if kind == CLOSE and left_alone(K, index):  # no longer watched when it gets there
             K.active[index] = 1
             K.fired[0] = -1
             status = try_step(K, end, t + end)
@@ -135,6 +135,14 @@ def locate(K: Any, h: float) -> int:
             return 0
         end = found
     return NO_LOCATION
+
+
+def left_alone(K: Any, c: int) -> bool:
+    """Whether contact c is not watched at the candidate; a condition that ends at the same instant has ended."""
+    if not is_watched(K, c, K.guards1):
+        return True
+    place = 3 * K.n_contacts + c
+    return bool(K.while_kind[c] == 2 and K.guards1[place] <= SAME * K.guards0[place])
 
 
 def guard_rate(K: Any, kind: int, index: int) -> float:

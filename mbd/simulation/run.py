@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from time import perf_counter
 from typing import Any
@@ -288,10 +289,12 @@ class Run:
         n_q, n_v, n, rows = v["n_q"], v["n_v"], v["n"], v["n_rows"]
         cuts = np.cumsum([1, n_q, n_v, n - n_v, n_v, n - n_v, rows])
         time, q, velocity, z, a, s, lam, closed = np.split(table, cuts, axis=1)
+        last = len(table) - 1  # a run that failed right at an event has no row after it
+        events = [event if event.row <= last else replace(event, row=last) for event in self.events]
         record = Record(
             equations=equations, parameters=self.first_parameters,
             parameter_names=[parameter.name for parameter in equations.parameters], time=time[:, 0], q=q, v=velocity,
-            z=z, a=a, s=s, lam=lam, closed=closed.astype(np.uint8), events=self.events, stats=self._statistics(),
+            z=z, a=a, s=s, lam=lam, closed=closed.astype(np.uint8), events=events, stats=self._statistics(),
             success=not problem, message=problem or message, failure=self._capsule(problem), final=self.state(),
             settings=self.settings, parameter_changes=self.parameter_changes,
         )  # fmt: skip

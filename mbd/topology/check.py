@@ -55,6 +55,20 @@ def quantities(model: Model) -> list[str]:
     return names
 
 
+RESULTS = (
+    "acceleration", "energy", "force", "friction", "gap", "gap_rate", "multiplier", "power", "tension", "torque",
+    *(f"reaction_{what}.{axis}" for what in ("force", "torque") for axis in "xyz"),
+)  # fmt: skip
+"""What a run knows of joints, forces and constraints besides places and rates."""
+
+
+def readable(model: Model) -> list[str]:
+    """Names that controllers may read: quantities and results; which of these a word has shows when a run begins."""
+    words: list[Joint | Force | Constraint] = [*model.joints, *model.forces, *model.constraints]
+    owners = [word.name for word in words] + [name for joint in model.joints for name in joint.coordinate_names]
+    return [*quantities(model), *(f"{owner}.{result}" for owner in owners for result in RESULTS)]
+
+
 # names ----------------------------------------------------------------------------------------------------------
 def name_faults(model: Model) -> list[str]:
     """Two things of one name."""
@@ -135,6 +149,14 @@ def mention_faults(model: Model) -> list[str]:
                 )
             if isinstance(mention, str) and mention not in known:
                 found.append(f"'{word.name}': " + nearest(mention, known, "quantity"))
+    if any(controller.reads for controller in model.controllers):
+        known = set(readable(model))
+    for controller in model.controllers:
+        found += [
+            f"'{controller.name}' reads: " + nearest(name, known, "quantity")
+            for name in controller.reads
+            if name not in known
+        ]
     return found
 
 

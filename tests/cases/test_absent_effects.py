@@ -43,7 +43,9 @@ def arm(contacts: bool = False, weak: bool = False, tunable: tuple[str, ...] = (
 
 
 def swing(model: mbd.Model, scheme: NewmarkFamily, dt: float = 1e-3) -> mbd.Trajectory:
-    angles = ("upper floating.angle", "lower floating.angle") if model.cut == "all" else ("shoulder.angle", "elbow.angle")
+    angles = (
+        ("upper floating.angle", "lower floating.angle") if model.cut == "all" else ("shoulder.angle", "elbow.angle")
+    )
     values = (START[0], START[1] if model.cut == "all" else START[1] - START[0])
     start = mbd.assemble(model, position=dict(zip(angles, values, strict=True)))
     return mbd.simulate(model, start, scheme, dt=dt, until=5.0)

@@ -67,9 +67,7 @@ def test_the_stop_closes_and_opens_at_the_reference_instants_to_second_order(
 
 @pytest.mark.parametrize("release", CASES)
 @pytest.mark.parametrize("scheme", SCHEMES, ids=name_of)
-def test_speeds_at_the_switches_are_those_of_the_reference_to_second_order(
-    scheme: NewmarkFamily, release: str
-) -> None:
+def test_speeds_at_the_switches_are_those_of_the_reference_to_second_order(scheme: NewmarkFamily, release: str) -> None:
     model, start, reference = published(release)
     knee, hip = reference["d' = w2 - w1"].value, reference["w1 at the events"].value
 
@@ -137,6 +135,16 @@ def test_the_stop_alone_takes_energy_and_only_between_its_switches(release: str)
     assert np.max(run["knee stop.force"]) > 200.0
     pulls = np.min(run["knee stop.force"])
     assert pulls < -20.0 if release == "gap" else pulls > -1e-6
+
+
+@pytest.mark.parametrize("release", CASES)
+def test_the_explicit_reference_agrees_with_the_published_instants(release: str) -> None:
+    reference = CASES[release]
+    sizes = tuple(reference.definition[name] for name in SIZES)
+    first = [reference.start[name] for name in ("theta1", "theta2", "w1", "w2")]
+    k, c = reference.definition["k"], reference.definition["c"]
+    found = knee_stop_events(sizes, k, c, release == "gap", first, count=6)
+    assert found == pytest.approx(reference["event times"].value, abs=1e-9)
 
 
 @pytest.mark.parametrize("release", CASES)

@@ -48,7 +48,9 @@ def test_a_scheme_has_the_four_numbers_of_its_family(name: str) -> None:
 @pytest.mark.parametrize(("name", "xi"), DAMPED)
 def test_the_spectral_radius_is_that_of_the_exact_amplification_matrix(name: str, xi: float) -> None:
     found = [spectrum(SCHEMES[name], turn, xi).radius for turn in (0.1, 0.5, 1.0, 2.0, 10.0, 1000.0)]
-    assert found == pytest.approx(I1[f"spectral radius at Omega = w dt = 0.1, 0.5, 1, 2, 10, 1000 | {name}, xi={xi:g}"].value, abs=1e-10)
+    assert found == pytest.approx(
+        I1[f"spectral radius at Omega = w dt = 0.1, 0.5, 1, 2, 10, 1000 | {name}, xi={xi:g}"].value, abs=1e-10
+    )
 
 
 @pytest.mark.parametrize(("name", "xi"), DAMPED)

@@ -50,9 +50,7 @@ def box(friction: float | None = 0.0, restitution: float = 0.0, reverse: bool = 
     body = mbd.RigidBody("box", mass=2.0, inertia=0.2)
     model.connect(mbd.Planar("place", model.ground.origin, body.origin))
     contacts = [
-        mbd.Unilateral(
-            name, mbd.touchdown(body.point(x, -0.15)), restitution=restitution, friction=friction
-        )
+        mbd.Unilateral(name, mbd.touchdown(body.point(x, -0.15)), restitution=restitution, friction=friction)
         for name, x in (("left", -0.25), ("right", 0.25))
     ]
     model.constrain(*(contacts[::-1] if reverse else contacts))
