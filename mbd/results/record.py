@@ -31,7 +31,7 @@ class EventRecord:
     kind : 'closed' or 'opened' (a contact), 'event' (a user's own, or a fall)
     name : of the contact or event
     impulse : impulses of the contact's rows at the instant, normal first, pushing ≥ 0 [N s or N m s]
-    energy_loss : kinetic energy that the impact of this instant took [J], with the first event of the instant
+    energy_loss : kinetic energy taken by the impulses of this contact, −½ Σ Λ (γ⁻ + γ⁺) over its rows [J]
     row : the stored row just after it (the right side); the row before is the left side
     """
 

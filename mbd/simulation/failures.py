@@ -34,7 +34,8 @@ def explanation(
         own = f" ({stepper.scheme.report.message})" if not stepper.compiled and stepper.scheme.report.message else ""
         return (
             f"{where}: Newton stalled at {residual:.3g} times the tolerance after {values['max_iterations']} "
-            f"iterations{own}{with_closed}; try a smaller dt or softer stiffness"
+            f"iterations{own}{with_closed}; try a smaller dt or softer stiffness; a force that jumps with "
+            "the state (mbd.where, sign) must be made continuous, or be switched by an Event or Controller"
         )
     if status == F.STAGNATED:
         floor = residual * values["tolerance"]

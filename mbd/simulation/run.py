@@ -108,12 +108,16 @@ class Run:
             wanted = guard.terminal or guard.reset is not None or guard.name in ends
             v["notify"][n_contacts + e] = int(wanted)
         guards, inside = self._guard_values(), []
+        rates = self.mechanism.acceleration_terms(
+            start.time, start.q, v["y"][: v["n"]], v["params"], v["anchors"][: v["n_anchors"]]
+        ).rate
         for c in range(n_contacts):
             close, slow = abs(guards[c]) <= 1e-8, abs(guards[n_contacts + c]) <= 1e-9
             target = v["while_target"][c]
             watched = (True, v["closed"][target] == 1, guards[3 * n_contacts + c] > 0.0)[v["while_kind"][c]]
             ready = v["armed"][c] == 1 and watched
-            v["touched"][c] = int(ready and v["kind"][c] == 0 and close and slow)
+            still = all(abs(rates[row]) <= 1e-9 for row in self.manager.contacts[c].rows)
+            v["touched"][c] = int(ready and v["kind"][c] == 0 and close and slow and still)
             if ready and guards[c] < -BELOW:
                 contact = self.manager.contacts[c]
                 inside.append(f"{contact.name!r} starts {-guards[c]:.6g} {contact.unit} inside its surface")

@@ -1,0 +1,182 @@
+"""Users' own events: crossings by direction, resets, ends of runs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import mbd
+from tests.simulation.mechanisms import G, ball, falling, pendulum, run
+
+DROP = np.sqrt(2.0 / G)
+
+
+def oscillator(*events):
+    """A point on a spring with a period of 1 s, starting at 1 m."""
+    model = mbd.Model("oscillator")
+    body = mbd.PointMass("body", mass=1.0)
+    model.connect(mbd.Prismatic("slide", model.ground.origin, body.origin, stiffness=(2 * np.pi) ** 2))
+    model.constrain(*events)
+    return model
+
+
+def bouncing(reset, **settings):
+    model, body = falling()
+    model.constrain(mbd.Event("bounce", mbd.height(body.origin), direction=-1, reset=reset))
+    return run(model, {"fall.displacement": 1.0}, **settings)
+
+
+@pytest.mark.parametrize(
+    "direction, expected", [(-1, [0.25, 1.25, 2.25]), (1, [0.75, 1.75, 2.75]), (0, [0.25, 0.75, 1.25, 1.75, 2.25, 2.75])]
+)
+def test_an_event_fires_at_every_crossing_in_its_direction(direction, expected):
+    model = oscillator(mbd.Event("zero", mbd.measure("slide.displacement"), direction=direction))
+    trajectory = run(model, {"slide.displacement": 1.0}, dt=1e-3, until=3.0)
+    np.testing.assert_allclose([event.time for event in trajectory.events], expected, atol=2e-4)
+    assert {event.kind for event in trajectory.events} == {"event"}
+    rows = [event.row for event in trajectory.events]
+    assert np.abs(trajectory["slide.displacement"][rows]).max() < 1e-12
+    np.testing.assert_array_equal(trajectory.record.v[rows], trajectory.record.v[np.array(rows) - 1])
+
+
+def test_events_at_one_instant_all_happen():
+    guard = mbd.measure("slide.displacement")
+    model = oscillator(mbd.Event("one", guard), mbd.Event("two", guard, direction=-1), mbd.Event("three", guard))
+    trajectory = run(model, {"slide.displacement": 1.0}, until=0.5)
+    assert sorted(event.name for event in trajectory.events) == ["one", "three", "two"]
+    assert len({event.time for event in trajectory.events}) == 1
+
+
+def test_an_event_without_consequence_leaves_the_motion_alone():
+    plain = run(oscillator(), {"slide.displacement": 1.0}, dt=1e-3, until=2.0)
+    watched = run(
+        oscillator(mbd.Event("zero", mbd.measure("slide.displacement"))), {"slide.displacement": 1.0}, dt=1e-3, until=2.0
+    )
+    np.testing.assert_allclose(watched.record.q[-1], plain.record.q[-1], atol=2e-5)
+
+
+def test_a_guard_on_a_velocity_fires_at_the_turning_point():
+    model = pendulum()
+    model.constrain(mbd.Event("turn", mbd.measure("hinge.rate"), direction=1))
+    trajectory = run(model, {"hinge.angle": 0.5}, dt=1e-3, until=2.0)
+    (event,) = trajectory.events
+    assert trajectory["hinge.angle"][event.row] == pytest.approx(-0.5, abs=1e-4)
+
+
+def test_a_guard_of_time_fires_at_its_time():
+    model = pendulum()
+    model.constrain(mbd.Event("tick", mbd.measure(lambda t: t - 0.12345, "t")))
+    trajectory = run(model, {"hinge.angle": 0.5}, dt=0.01)
+    assert [event.time for event in trajectory.events] == [pytest.approx(0.12345, abs=1e-14)]
+
+
+# resets -------------------------------------------------------------------------------------------------------------
+RESETS = {
+    "function of named values": lambda named: {"fall.rate": -0.5 * named["fall.rate"]},
+    "mapping of functions": {"fall.rate": lambda named: -0.5 * named["fall.rate"]},
+    "by coordinate": {"fall.displacement.rate": lambda named: -0.5 * named["fall.displacement.rate"]},
+}
+
+
+@pytest.mark.parametrize("reset", RESETS.values(), ids=RESETS)
+def test_a_ball_bounces_by_reset(reset):
+    trajectory = bouncing(reset, until=1.35)
+    expected = DROP + 2 * DROP * np.cumsum([0.0, *0.5 ** np.arange(1, 8)])
+    np.testing.assert_allclose([event.time for event in trajectory.events], expected, atol=1e-9)
+    first = trajectory.events[0].row
+    assert trajectory["fall.rate"][first] == pytest.approx(-0.5 * trajectory["fall.rate"][first - 1], rel=1e-12)
+    assert trajectory["fall.displacement"].min() > -1e-12
+
+
+@pytest.mark.parametrize("dt", [1e-3, 0.05, 0.4])
+def test_bounces_by_reset_that_crowd_together_are_never_missed(dt):
+    trajectory = bouncing(RESETS["mapping of functions"], dt=dt, until=1.5, on_failure="return")
+    assert not trajectory.success, "a reset cannot bring the ball to rest"
+    assert "more than" in trajectory.message and "'bounce' crossed" in trajectory.message
+    assert trajectory["fall.displacement"].min() > -1e-9
+    assert trajectory.time[-1] == pytest.approx(3.0 * DROP, abs=1e-6)
+    assert len(trajectory.events) < 100
+
+
+def test_a_reset_to_a_number_sets_it():
+    model = pendulum()
+    model.constrain(mbd.Event("bottom", mbd.measure("hinge.angle"), direction=-1, reset={"hinge.rate": -1.0}))
+    trajectory = run(model, {"hinge.angle": 1.0}, until=0.6, dt=1e-3)
+    assert trajectory["hinge.rate"][trajectory.events[0].row] == -1.0
+
+
+def test_a_reset_of_a_position_moves_the_mechanism():
+    model, body = falling()
+    model.constrain(mbd.Event("floor", mbd.height(body.origin), reset={"fall.displacement": 2.0}))
+    trajectory = run(model, {"fall.displacement": 1.0}, until=0.5)
+    (event,) = trajectory.events
+    assert trajectory["fall.displacement"][event.row] == 2.0
+    assert trajectory["fall.rate"][event.row] == pytest.approx(-G * DROP, rel=1e-9)
+
+
+def test_a_reset_that_breaks_a_constraint_is_refused_and_the_run_kept():
+    model, body = falling()
+    model.constrain(
+        mbd.Bilateral("rail", mbd.measure(lambda y, t: y - 1.0 + t, "fall.displacement", "t")),
+        mbd.Event("half", mbd.measure(lambda p: p[1] - 0.5, body.origin), reset={"fall.rate": 3.0}),
+    )
+    with pytest.raises(mbd.SimulationError, match="breaks 'rail'") as failed:
+        run(model, {"fall.displacement": 1.0})
+    assert failed.value.run.time[-1] == pytest.approx(0.5)
+
+
+BAD_RESETS = {
+    "wrong name": ({"fall.rat": 0.0}, "fall.rate"),
+    "not a number": ({"fall.rate": "up"}, "ValueError"),
+    "nan": (lambda named: {"fall.rate": float("nan")}, "nan"),
+    "raises": (lambda named: 1 / 0, "ZeroDivisionError"),
+    "asks for a wrong name": (lambda named: {"fall.rate": named["fal.rate"]}, "fall.rate"),
+}
+
+
+@pytest.mark.parametrize("reset, said", BAD_RESETS.values(), ids=BAD_RESETS)
+def test_a_bad_reset_ends_the_run_with_a_reason_and_keeps_it(reset, said):
+    with pytest.raises(mbd.MbdError, match=said) as failed:
+        bouncing(reset)
+    if isinstance(failed.value, mbd.SimulationError):
+        assert "'bounce'" in str(failed.value)
+        assert failed.value.run.time[-1] == pytest.approx(DROP)
+        assert failed.value.run.success is False
+
+
+# ends ---------------------------------------------------------------------------------------------------------------
+def test_a_terminal_event_ends_the_run_with_its_name_and_both_rows():
+    model, body = falling()
+    model.constrain(mbd.Event("landed", mbd.height(body.origin), terminal=True))
+    trajectory = run(model, {"fall.displacement": 1.0})
+    assert trajectory.success and "'landed'" in trajectory.message and trajectory.status == 1
+    assert trajectory.time[-1] == trajectory.time[-2] == trajectory.final.time == pytest.approx(DROP)
+    assert trajectory.events[-1].row == len(trajectory.time) - 1
+
+
+def test_a_terminal_reset_shows_in_the_last_row():
+    model, body = falling()
+    model.constrain(mbd.Event("caught", mbd.height(body.origin), terminal=True, reset={"fall.rate": 0.0}))
+    trajectory = run(model, {"fall.displacement": 1.0})
+    assert trajectory["fall.rate"][-1] == trajectory.final["fall.rate"] == 0.0
+    assert trajectory["fall.rate"][-2] == pytest.approx(-G * DROP, rel=1e-9)
+
+
+@pytest.mark.parametrize("until, happened", [("floor", True), (("floor", 0.3), False), (("floor", 0.6), True)])
+def test_a_run_ends_at_the_first_closing_of_a_contact_or_at_its_latest_time(until, happened):
+    trajectory = run(ball(restitution=0.5), {"fall.displacement": 1.0}, until=until)
+    assert trajectory.success
+    assert trajectory.time[-1] == pytest.approx(DROP if happened else 0.3)
+    assert ("did not happen" in trajectory.message) == (not happened)
+    assert trajectory.status == int(happened)
+
+
+def test_a_run_until_a_contact_that_rests_at_the_start_ends_there():
+    trajectory = run(ball(), {"fall.displacement": 0.0}, until="floor")
+    assert trajectory.time[-1] == 0.0 and "ended by 'floor'" in trajectory.message
+
+
+def test_a_run_until_an_event_of_the_user_ends_there():
+    model = oscillator(mbd.Event("zero", mbd.measure("slide.displacement"), direction=1))
+    trajectory = run(model, {"slide.displacement": 1.0}, until="zero", dt=1e-3)
+    assert trajectory.time[-1] == pytest.approx(0.75, abs=1e-4)
