@@ -88,7 +88,7 @@ def fits(start: State, equations: Equations, manager: ActiveSetManager) -> None:
     sizes = (len(start.q), len(start.v), len(start.z)) == (equations.n_q, equations.n_v, equations.n_z)
     if start.names != names or not sizes:
         raise ModelError(
-            f"the start has the coordinates {', '.join(start.names) or 'none'} and {len(start.z)} first-order states, but "
+            f"the start has the coordinates {', '.join(start.names) or 'none'} and {len(start.z)} states, but "
             f"the model has {', '.join(names)} and {equations.n_z} states; assemble it from this model"
         )
     contacts = [*sorted(start.mode.closed), *sorted(start.armed or ())]

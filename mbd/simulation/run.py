@@ -149,8 +149,19 @@ class Run:
         """The sign from which a user's guard will cross next; at zero its rate decides."""
         n_contacts, n_guards = self.values["n_contacts"], self.values["n_guards"]
         value, rate = guards[4 * n_contacts + e], guards[4 * n_contacts + n_guards + e]
-        decider = value if abs(value) > 1e-9 else rate if rate != 0.0 else -self.values["direction"][e]
+        decider = value if abs(value) > 1e-9 else rate
         self.values["side"][e] = 1.0 if decider > 0.0 else -1.0
+
+    def _reset(self, e: int) -> None:
+        """Apply the reset of a user's guard at zero; one that turns its motion around will cross from the same side."""
+        place = 4 * self.values["n_contacts"] + e
+        before = self._guard_values()[place + self.values["n_guards"]]
+        apply_reset(self, self.manager.guards[e])
+        guards = self._guard_values()
+        if abs(guards[place]) > 1e-9:
+            self._set_side(e, guards)
+        elif before * guards[place + self.values["n_guards"]] <= 0.0:
+            self.values["side"][e] *= -1.0
 
     # the run ------------------------------------------------------------------------------------------------------
     def complete(self) -> tuple[Trajectory, str]:
@@ -246,8 +257,7 @@ class Run:
                 continue
             guard = self.manager.guards[guards[event.name]] if event.kind == "event" else None
             if guard is not None and guard.reset is not None:
-                apply_reset(self, guard)
-                self._set_side(guards[event.name], self._guard_values())
+                self._reset(guards[event.name])
             self.boundaries.call(self, event.name)
             if event.name == self.stop or (guard is not None and guard.terminal):
                 ended = event.name

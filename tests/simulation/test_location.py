@@ -82,13 +82,14 @@ def test_many_events_in_one_step_come_in_their_order():
         mbd.Event("b at half", mbd.measure(lambda p: p[1] - 0.5, b.origin)),
         mbd.Unilateral("A", mbd.height(a.origin)),
         mbd.Event("b at quarter", mbd.measure(lambda p: p[1] - 0.25, b.origin)),
-        mbd.Unilateral("B", mbd.height(b.origin), restitution=0.5),
+        mbd.Unilateral("B", mbd.height(b.origin), restitution=0.6),
     )
     trajectory = run(model, {"a.displacement": 0.7, "b.displacement": 1.0}, dt=0.7, until=0.7)
     found = [(event.name, event.time) for event in trajectory.events]
     names, times = zip(*found, strict=True)
     assert names == ("b at half", "A", "b at quarter", "B", "b at quarter")
-    up = DROP + (0.5 * G * DROP - np.sqrt(0.25 * (G * DROP) ** 2 - 0.5 * G)) / G
+    speed = 0.6 * G * DROP
+    up = DROP + (speed - np.sqrt(speed**2 - 0.5 * G)) / G
     np.testing.assert_allclose(
         times, [np.sqrt(1.0 / G), np.sqrt(1.4 / G), np.sqrt(1.5 / G), DROP, up], rtol=0, atol=1e-9
     )
@@ -103,8 +104,7 @@ def test_a_guard_that_is_not_finite_stops_the_run_by_name():
 
 
 @pytest.mark.parametrize("formulation", ["ggl", "index3"])
-def test_a_chain_hits_a_stop_on_time_in_both_formulations(formulation):
-    """A pendulum of a bar on a cut loop: the stop is at the bottom, reached after a quarter of the exact period."""
+def test_a_pendulum_in_absolute_coordinates_is_at_the_bottom_after_a_quarter_period(formulation):
     model = mbd.Model("pendulum", cut="all")
     rod = mbd.Link("rod", mass=1.0, length=1.0, center=1.0)
     hinge = mbd.Revolute("hinge", model.ground.origin, rod.start)
@@ -114,7 +114,7 @@ def test_a_chain_hits_a_stop_on_time_in_both_formulations(formulation):
     for dt in (4e-3, 2e-3):
         trajectory = run(
             model,
-            {"rod.x": 0.0, "rod.y": 0.0, "rod.angle": 1.0} if "rod.x" in names(model) else None,
+            {"rod floating.angle": 1.0},
             dt=dt,
             until=("bottom", 2.0),
             integrator=mbd.HHT(0.05, formulation=formulation),
@@ -125,7 +125,3 @@ def test_a_chain_hits_a_stop_on_time_in_both_formulations(formulation):
     exact = ellipk(np.sin(0.5) ** 2) / np.sqrt(G)
     errors = np.abs(np.array(times) - exact)
     assert errors[1] < 1e-5 and errors[0] / errors[1] == pytest.approx(4.0, abs=0.6)
-
-
-def names(model):
-    return mbd.assemble(model, project=True).names
