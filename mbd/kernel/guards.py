@@ -98,7 +98,7 @@ def gap_tolerance(K: Any, c: int) -> float:
 def update_armed(K: Any) -> None:
     """A contact is armed (1) once its gap has risen above zero; one that becomes watched (−1), if it is above or rests.
 
-    One that sinks through zero as it becomes watched is below as long as it is watched: ignored like any that is below.
+    One that sinks through zero together with its own condition is below as long as it is watched, and ignored like that.
 
     A penalty contact that opened below the surface because it would have pulled (2) acts again as it presses.
     """
@@ -114,7 +114,7 @@ def update_armed(K: Any) -> None:
                 K.armed[c] = -1
             elif K.armed[c] == -1:
                 near = 1e-10 * gap_scale(K, c)
-                sinks = K.guards0[K.n_contacts + c] < -1e-9
+                sinks = K.while_kind[c] == 2 and K.guards0[K.n_contacts + c] < -1e-9
                 K.armed[c] = 1 if K.guards0[c] > near or (K.guards0[c] >= -near and not sinks) else 0
             elif K.armed[c] == 0 and K.guards0[c] > 1e-8 * gap_scale(K, c):
                 K.armed[c] = 1

@@ -73,12 +73,17 @@ class Columns(ABC):
         return tuple(s for s in stems if s not in known and all(s + axis in known for axis in AXES))
 
     def components(self, name: str) -> tuple[str, ...]:
-        """The scalars behind a name: itself, or the three components of a vector."""
-        if self.knows(name):
+        """The scalars behind a name: itself, or the three components of a vector.
+
+        A vector comes before a parameter of its name: 'left thigh.center' is a place, not a distance along the link.
+        """
+        if name in self.names:
             return (name,)
         parts = tuple(name + axis for axis in AXES)
         if all(self.knows(part) for part in parts):
             return parts
+        if self.knows(name):
+            return (name,)
         raise UnknownNameError(nearest(name, (*self.names, *self.vectors), "result"))
 
 

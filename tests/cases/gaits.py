@@ -99,28 +99,35 @@ class Walker:
         """From just after a heel strike to just after the next."""
         y, knee = np.asarray(state, dtype=float), None
         if self.knees:
-            ends = (
-                [lambda y: y[1] - y[2]]
-                if not self.foot_meets_ground
-                else [lambda y: y[1] - y[2], lambda y: self.foot(y[:3])]
-            )
+            ends = [lambda y: y[1] - y[2], lambda y: self.foot(y[:3])][: 1 + self.foot_meets_ground]
             which, t, y = self._run(self.bent, y[[0, 1, 1, 2, 3, 3]], t, *ends)
             if which > 0:
                 return Step("fall" if which == len(ends) else "stumble", t, y)
             knee = t
             speeds = self._velocities(self.bent, y[:3]) @ y[3:]
             y = np.concatenate([y[:2], self._projected(self.straight, y[:2], speeds)])
-        else:  # the straight swing leg scuffs as it passes the other one
-            which, t, y = self._run(self.straight, y, t, lambda y: y[0] - y[1])
-            if which > 0:
-                return Step("fall", t, y)
-        which, t, y = self._run(self.straight, y, t, lambda y: self.foot(y[:2]))
-        if which > 0:
-            return Step("fall", t, y, knee)
-        speeds = self._velocities(self.straight, y[:2]) @ y[2:]
-        order = [4, 3, 2, 1, 0, 9, 8, 7, 6, 5]  # the legs change roles
-        q = y[1::-1].copy()
-        return Step("heel", t, np.concatenate([q, self._projected(self.straight, q, speeds[order])]), knee)
+        which, t, y = self._straight(y, t)
+        return Step("fall", t, y, knee) if which > 0 else Step("heel", t, self._struck(y), knee)
+
+    def _straight(self, y: Numbers, t: float) -> tuple[int, float, Numbers]:
+        """The swing with straight legs until the foot comes down (0) or the walker falls (1).
+
+        Without knees it scuffs as it passes the other leg, forwards and perhaps back again, which is ignored.
+        """
+        while True:
+            if not self.knees:
+                which, t, y = self._run(self.straight, y, t, lambda y: y[0] - y[1])
+                if which > 0:
+                    return which, t, y
+            which, t, y = self._run(self.straight, y, t, lambda y: self.foot(y[:2]))
+            if self.knees or which > 0 or abs(y[0] - y[1]) > 1e-6:
+                return which, t, y
+
+    def _struck(self, y: Numbers) -> Numbers:
+        """The state after a heel strike: the legs change roles."""
+        speeds, q = self._velocities(self.straight, y[:2]) @ y[2:], y[1::-1].copy()
+        order = [4, 3, 2, 1, 0, 9, 8, 7, 6, 5]
+        return np.concatenate([q, self._projected(self.straight, q, speeds[order])])
 
     def walk(self, state: Numbers, most: int) -> list[Step]:
         """Up to `most` steps; the last may be a fall."""

@@ -88,20 +88,27 @@ class Strike:
 
 def strikes(run: mbd.Trajectory, slope: float) -> list[Strike]:
     """The heel strikes of a run, each with the instant of the knee strike before it."""
-    found: list[Strike] = []
+    hits: list[tuple[float, str, float | None]] = []
     knee: float | None = None
-    tip = "shank.end.x" if "left shank.end.x" in run else "leg.end.x"
     for event in run.events:
         if event.kind == "closed" and event.name.endswith("knee lock"):
             knee = event.time
-        if event.kind != "closed" or not event.name.endswith("foot"):
-            continue
-        side = event.name.split()[0]
-        other = "left" if side == "right" else "right"
-        ends: dict[str, Any] = {at: run.at(event.time, side=at) for at in ("left", "right")}
-        states = []
-        for moment, (stance, swing) in (ends["right"], (side, other)), (ends["left"], (other, side)):
-            angles = [moment[f"{leg} hip.angle"] - slope for leg in (stance, swing)]
-            states.append(np.array([*angles, *(moment[f"{leg} hip.rate"] for leg in (stance, swing))]))
-        found.append(Strike(event.time, side, ends["right"][f"{side} {tip}"], states[0], states[1], knee))
-    return found
+        if event.kind == "closed" and event.name.endswith("foot"):
+            hits.append((event.time, event.name.split()[0], knee))
+    times = [time for time, _, _ in hits]
+    tip = "shank.end.x" if "left shank.end.x" in run else "leg.end.x"
+    names = [f"{side} {part}" for side in ("left", "right") for part in ("hip.angle", "hip.rate", tip)]
+    after, before = (run.at(times, side=side).read(*names) for side in ("right", "left"))
+
+    def state(values: Mapping[str, Any], k: int, stance: str) -> NDArray[np.float64]:
+        legs = (stance, "left" if stance == "right" else "right")
+        angles = [values[f"{leg} hip.angle"][k] - slope for leg in legs]
+        return np.array([*angles, *(values[f"{leg} hip.rate"][k] for leg in legs)])
+
+    return [
+        Strike(
+            time, side, after[f"{side} {tip}"][k], state(after, k, side),
+            state(before, k, "left" if side == "right" else "right"), lock,
+        )
+        for k, (time, side, lock) in enumerate(hits)
+    ]  # fmt: skip
