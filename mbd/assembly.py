@@ -339,10 +339,6 @@ def undetermined(work: Posture) -> list[str]:
                 f"nothing determines the motion of {name!r}: no mass or inertia resists it and no constraint holds it; "
                 "give the bodies it moves a mass, or lock it"
             )
-        else:
-            rows = [equations.rows[picked[k]] for k in np.flatnonzero(weights[n:] > 1e-6 * weights[place])]
-            names = ", ".join(row.title for row in rows)
-            faults.append(f"redundant constraints: the rows {names} depend on each other; leave one of them out")
     return faults or _negative(work, terms.M[: equations.n_v, : equations.n_v], terms.B[picked][:, : equations.n_v])
 
 

@@ -20,6 +20,7 @@ from mbd.kernel.fields import (
     LOG_OPENED,
     LOGGED,
     MODE,
+    N_DROPPED,
     NEW_MODE,
     NOW,
     OPEN_FORCE,
@@ -46,6 +47,7 @@ from mbd.kernel.guards import (
 )  # fmt: skip
 from mbd.kernel.hooks import scheme_accept, scheme_start
 from mbd.kernel.locate import locate
+from mbd.kernel.redundancy import find_dependent, spread
 from mbd.kernel.restart import (
     active_rows,
     capture,
@@ -55,6 +57,7 @@ from mbd.kernel.restart import (
     impact,
     load_accelerations,
     solve_rows,
+    stepping_rows,
 )  # fmt: skip
 
 __all__ = ["advance"]
@@ -107,13 +110,14 @@ def is_awaited(K: Any, first: int) -> bool:
 
 
 def find_mode(K: Any) -> int:
-    """Number of the mode of the closed contacts, −1 if its code is not made yet."""
+    """Number of the mode of the closed contacts and dependent rows, −1 if its code is not made yet."""
+    width = K.n_contacts + K.n_rows
     for mode in range(K.mode_count[0]):
         same = True
         for c in range(K.n_contacts):
-            if K.mode_closed[mode * K.n_contacts + c] != K.closed[c]:
-                same = False
-                break
+            same = same and K.mode_key[mode * width + c] == K.closed[c]
+        for k in range(K.n_rows):
+            same = same and K.mode_key[mode * width + K.n_contacts + k] == K.dropped[k]
         if same:
             return mode
     return -1
@@ -156,11 +160,14 @@ def restart(K: Any) -> int:
     if status != 0:
         return status
     K.counts[RESTARTS] += 1
-    K.state[ROWS] = active_rows(K, K.closed)
+    find_dependent(K, active_rows(K, K.closed))
+    if K.state[N_DROPPED] > 0:
+        spread(K, K.lam)
+    K.state[ROWS] = stepping_rows(K)
     status = scheme_start(K)
     if status != 0:
         return status
-    K.state[ROWS] = active_rows(K, K.closed)
+    K.state[ROWS] = stepping_rows(K)
     K.state[MODE] = find_mode(K)
     K.clock[BASE] = K.clock[NOW]
     K.state[GRID] = 0
@@ -168,6 +175,22 @@ def restart(K: Any) -> int:
         watch(K, K.clock[NOW], K.q, K.y, K.rate, K.lam, K.guards0)
         update_armed(K)
     return 0
+
+
+def still_dependent(K: Any, t1: float) -> bool:
+    """Whether the rows that were left out hold at the candidate; their multipliers get the least norm."""
+    evaluate(K, t1, K.q1, K.y1)
+    o_h = K.n * K.n + K.n + 2 * K.n * K.n_rows
+    for k in range(K.n_rows):  # the step was solved without them
+        if K.dropped[k] == 1:
+            K.lam1[k] = 0.0
+    spread(K, K.lam1)
+    for k in range(K.n_rows):
+        if K.dropped[k] == 1:
+            size = max(K.scale[K.n + k], 1e-3)
+            if abs(K.acc[o_h + k]) > 1e-9 * size or abs(K.acc[o_h + K.n_rows + k]) > 1e-6 * (size + 1.0):
+                return False
+    return True
 
 
 def accept(K: Any, h: float, t1: float) -> None:
@@ -191,7 +214,7 @@ def project_velocity(K: Any) -> int:
         K.force[i] = 0.0
     for k in range(K.n_rows):
         K.bias[k] = K.acc[o_rate + k]
-    status = solve_rows(K, m)
+    status = solve_rows(K, m, True)
     if status == 0:
         for i in range(K.n):
             K.y[i] += K.jump[i]
@@ -429,6 +452,7 @@ def advance(K: Any) -> int:
         if status != 0:
             return status
         K.counts[STEPS] += 1
+        holds = K.state[N_DROPPED] == 0 or still_dependent(K, t1)
         fired = False
         if K.n_contacts + K.n_guards > 0:
             for c in range(K.n_contacts + K.n_guards):
@@ -449,6 +473,8 @@ def advance(K: Any) -> int:
         else:
             accept(K, h, t1)
             K.state[GRID] += 1
+            if not holds:  # the pose has changed its rank
+                K.state[RESTART] = 2
             if cut:  # a boundary inside the run: the grid goes on from here
                 K.clock[BASE] = t1
                 K.state[GRID] = 0

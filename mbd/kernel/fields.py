@@ -29,6 +29,7 @@ REAL_ARRAYS = (
     "q", "y", "rate", "aux", "slope", "lam", "lam_slope", "shift", "shift_change", "anchors",  # accepted state
     "q1", "y1", "rate1", "aux1", "lam1", "shift1",  # candidate of the step under judgement
     "kkt", "rhs", "work",  # linear algebra
+    "basis", "lower", "mix",  # dependent rows as combinations of others
     "force", "bias", "jump", "impulse",  # complementarity: right-hand sides, velocity or acceleration, multipliers
     "guards0", "guards1",  # guard values at the accepted state and at the candidate
     "scale",  # magnitudes of r, h, ḣ term by term
@@ -47,7 +48,8 @@ INTEGER_ARRAYS = (
     "while_kind", "while_target",  # 0 always, 1 while a contact is closed, 2 while a measure is positive
     "anchor_start", "direction", "notify", "terminal",
     "closed", "armed", "touched", "active", "free", "closing",  # contacts
-    "mode_closed", "mode_code", "mode_count",  # known modes
+    "dropped",  # rows that depend on others
+    "mode_key", "mode_code", "mode_count",  # known modes
     "rows", "pivots", "columns", "fired", "state", "counts",
 )  # fmt: skip
 FIELDS = (*INTEGERS, *REALS, *REAL_ARRAYS, *INTEGER_ARRAYS, "code", "hooks")
@@ -55,7 +57,7 @@ FIELDS = (*INTEGERS, *REALS, *REAL_ARRAYS, *INTEGER_ARRAYS, "code", "hooks")
 Kernel = namedtuple("Kernel", FIELDS)  # type: ignore[misc]
 
 # places in `state`
-MODE, ROWS, GRID, RESTART, STORED, LOGGED, SWITCHES, SINCE_STORE, BLOCKED, FRESH = range(10)
+MODE, ROWS, GRID, RESTART, STORED, LOGGED, SWITCHES, SINCE_STORE, BLOCKED, FRESH, N_DROPPED = range(11)
 # places in `counts`
 (STEPS, ITERATIONS, TANGENTS, RESIDUALS, FACTORIZATIONS, EVENTS, RESTARTS, IMPACTS, LOCATIONS, STAGNATIONS, DEEPEST) = (
     range(11)

@@ -18,6 +18,7 @@ from mbd.kernel.fields import (
     DEPENDENT,
     ENERGY_GAIN,
     IMPACTS,
+    N_DROPPED,
     NO_IMPACT,
     NOT_FINITE,
     NOW,
@@ -25,10 +26,11 @@ from mbd.kernel.fields import (
 )  # fmt: skip
 from mbd.kernel.hooks import call
 from mbd.kernel.linear import eliminate
+from mbd.kernel.redundancy import find_dependent, spread
 
 __all__ = [
     "active_rows", "capture", "complementarity", "compose", "consistent", "evaluate", "fill_block", "impact",
-    "raise_scales", "refresh_scales", "solve_rows",
+    "raise_scales", "refresh_scales", "solve_rows", "stepping_rows",
 ]  # fmt: skip
 
 
@@ -105,6 +107,17 @@ def raise_scales(K: Any, rows: bool) -> None:
             K.scale[i] = K.work[i]
 
 
+def stepping_rows(K: Any) -> int:
+    """The active rows of the closed contacts that do not depend on others, into K.rows; how many."""
+    m = 0
+    for row in range(K.n_rows):
+        contact = K.row_contact[row]
+        if K.dropped[row] == 0 and (contact < 0 or K.closed[contact] == 1):
+            K.rows[m] = row
+            m += 1
+    return m
+
+
 def active_rows(K: Any, flags: Any) -> int:
     """Numbers of the active rows into K.rows, ascending; how many."""
     m = 0
@@ -122,8 +135,11 @@ def evaluate(K: Any, t: float, q: Any, y: Any) -> None:
     call(K, ACCELERATIONS, K.acc)
 
 
-def solve_rows(K: Any, m: int) -> int:
-    """w and λ for the m rows in K.rows; w in K.jump, λ of all rows in K.impulse."""
+def solve_rows(K: Any, m: int, dropping: bool) -> int:
+    """w and λ for the m rows in K.rows; w in K.jump, λ of all rows in K.impulse.
+
+    Rows may depend on each other where `dropping` allows it: then K.dropped tells which, and λ has the least norm.
+    """
     n = K.n
     size = n + m
     o_R = n * n + n
@@ -159,9 +175,13 @@ def solve_rows(K: Any, m: int) -> int:
         K.impulse[k] = 0.0
     for k in range(m):
         K.impulse[K.rows[k]] = K.rhs[n + k]
+    for k in range(rank, size):
+        if K.columns[k] < n or not dropping:
+            K.state[BLOCKED] = K.columns[k]
+            return DEPENDENT
     if rank < size:
-        K.state[BLOCKED] = K.columns[rank]
-        return DEPENDENT
+        find_dependent(K, m)
+        spread(K, K.impulse)
     return 0
 
 
@@ -169,7 +189,10 @@ def consistent(K: Any, t: float, q: Any, y: Any) -> int:
     """Rates and multipliers of the closed rows at a state, in K.jump and K.impulse."""
     evaluate(K, t, q, y)
     load_accelerations(K)
-    return solve_rows(K, active_rows(K, K.closed))
+    status = solve_rows(K, stepping_rows(K), False)
+    if K.state[N_DROPPED] > 0:
+        spread(K, K.impulse)
+    return status
 
 
 def load_accelerations(K: Any) -> None:
@@ -208,8 +231,8 @@ def complementarity(K: Any) -> int:
     for c in range(K.n_contacts):
         n_free += K.free[c]
     for attempt in range(4 * n_free * n_free + 8):
-        status = solve_rows(K, active_rows(K, K.active))
-        if status != 0 and status != DEPENDENT:
+        status = solve_rows(K, active_rows(K, K.active), True)
+        if status != 0:
             return status
         flip = first_violation(K, attempt <= n_free + 1)
         if flip < 0:
@@ -223,8 +246,8 @@ def complementarity(K: Any) -> int:
             if K.free[c] == 1:
                 K.active[c] = (subset >> place) & 1
                 place += 1
-        status = solve_rows(K, active_rows(K, K.active))
-        if (status == 0 or status == DEPENDENT) and first_violation(K, True) < 0:
+        status = solve_rows(K, active_rows(K, K.active), True)
+        if status == 0 and first_violation(K, True) < 0:
             return status
     return NO_IMPACT
 
@@ -293,7 +316,7 @@ def impact(K: Any, slow: bool) -> int:
         K.active[c] = 1 if (both and K.kind[c] == 0) else 0
         K.free[c] = 1 if (K.active[c] == 1 and K.opens[c] == 0 and not slow) else 0
     status = complementarity(K)
-    if status != 0 and status != DEPENDENT:
+    if status != 0:
         return status
     if not slow and gains_energy(K):
         return ENERGY_GAIN

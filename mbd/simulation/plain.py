@@ -21,17 +21,25 @@ class MechanismSystem:
     """A mechanism as the numbers an integrator sees; bound to parameters and to the anchors held now."""
 
     def __init__(
-        self, mechanism: Mechanism, manager: ActiveSetManager, parameters: Vector, anchors: Vector, stabilized: bool
+        self,
+        mechanism: Mechanism,
+        manager: ActiveSetManager,
+        parameters: Vector,
+        anchors: Vector,
+        stabilized: bool,
+        dropped: Any,
     ) -> None:
         self.mechanism, self.manager = mechanism, manager
         self.parameters, self.anchors, self.stabilized = parameters, anchors, stabilized
+        self.dropped = dropped  # rows that depend on others, 1 each
         self.evaluated: Vector | None = None  # the inputs evaluated last, to explain a failure with
         layout = mechanism.layout
         self.n_q, self.n_v, self.n_z = layout.n_q, layout.n_v, layout.n_z
 
     def _active(self, mode: Mode) -> tuple[tuple[int, ...], tuple[int, ...]]:
         flags = self.manager.flags(mode.closed)
-        return self.manager.active_rows(flags), self.manager.penalties(flags)
+        rows = tuple(row for row in self.manager.active_rows(flags) if not self.dropped[row])
+        return rows, self.manager.penalties(flags)
 
     def evaluate(self, point: Point, mode: Mode, tangent: tuple[float, float] | None) -> Terms:
         """Terms of `Terms` at a point of the mechanism."""
@@ -150,7 +158,7 @@ class PlainScheme:
         mode = self.manager.mode(flags)
         n_v = K.n_v
         state = State(float(K.clock[NOW]), K.q.copy(), K.y[:n_v].copy(), K.y[n_v:].copy(), mode)
-        return state, mode, list(self.manager.active_rows(flags))
+        return state, mode, [row for row in self.manager.active_rows(flags) if not K.dropped[row]]
 
     def start(self, K: Any) -> int:
         """Memory at the accepted state, whose rates are consistent; sizes of the residual for the guards."""

@@ -58,7 +58,7 @@ class Stepper:
         self._sizes(dt, options)
         self._arrays(parameters, manager)
         self.system = MechanismSystem(
-            mechanism, manager, self.values["params"], self.values["anchors"], self.stabilized
+            mechanism, manager, self.values["params"], self.values["anchors"], self.stabilized, self.values["dropped"]
         )
         self.scheme = PlainScheme(integrator, self.system, manager)
         self.functions: list[Any] = [mechanism.common[name] for name in ("accelerations", "guards", "scales")]
@@ -100,7 +100,8 @@ class Stepper:
             "acc": self.mechanism.sizes["accelerations"], "q": n_q, "y": n, "rate": n, "aux": n, "slope": n,
             "lam": rows, "lam_slope": rows, "shift": n, "shift_change": n,
             "anchors": v["n_anchors"], "q1": n_q, "y1": n, "rate1": n, "aux1": n, "lam1": rows, "shift1": n,
-            "kkt": size * size, "rhs": size, "work": 3 * size, "force": n, "bias": rows, "jump": n, "impulse": rows,
+            "basis": (rows + 1) * n, "lower": (rows + 1) * rows, "mix": rows * rows, "kkt": size * size, "rhs": size,
+            "work": 3 * size, "force": n, "bias": rows, "jump": n, "impulse": rows,
             "guards0": 4 * contacts + 2 * guards, "guards1": 4 * contacts + 2 * guards, "scale": n + 2 * rows,
             "deepest": contacts, "sinking": contacts, "side": guards, "pick": 8, "detail": 8,
             "store": v["capacity"] * v["width"], "log": v["event_capacity"] * v["event_width"],
@@ -108,7 +109,8 @@ class Stepper:
         integers = {
             "unit": n, "notify": contacts + guards, "terminal": contacts + guards, "closed": contacts,
             "armed": contacts, "touched": contacts, "active": contacts + guards, "free": contacts, "closing": contacts,
-            "mode_closed": MODE_CAPACITY * contacts, "mode_code": 2 * MODE_CAPACITY, "mode_count": 1, "rows": rows,
+            "mode_key": MODE_CAPACITY * (contacts + rows), "dropped": rows, "mode_code": 2 * MODE_CAPACITY,
+            "mode_count": 1, "rows": rows,
             "pivots": size, "columns": size, "fired": 2, "state": 16, "counts": 16,
         }  # fmt: skip
         for name, length in reals.items():
@@ -127,13 +129,14 @@ class Stepper:
     def add_mode(self) -> None:
         """Make code for the contacts closed now."""
         v = self.values
-        flags = v["closed"][: v["n_contacts"]]
-        code = self.mechanism.mode(self.manager.active_rows(flags), self.manager.penalties(flags), self.stabilized)
-        count, contacts = int(v["mode_count"][0]), v["n_contacts"]
+        flags, dropped = v["closed"][: v["n_contacts"]], v["dropped"][: v["n_rows"]]
+        rows = tuple(row for row in self.manager.active_rows(flags) if not dropped[row])
+        code = self.mechanism.mode(rows, self.manager.penalties(flags), self.stabilized)
+        count, width = int(v["mode_count"][0]), v["n_contacts"] + v["n_rows"]
         if 2 * (count + 1) > len(v["mode_code"]):
             v["mode_code"] = np.concatenate([v["mode_code"], np.zeros_like(v["mode_code"])])
-            v["mode_closed"] = np.concatenate([v["mode_closed"], np.zeros_like(v["mode_closed"])])
-        v["mode_closed"][count * contacts : (count + 1) * contacts] = flags
+            v["mode_key"] = np.concatenate([v["mode_key"], np.zeros_like(v["mode_key"])])
+        v["mode_key"][count * width : (count + 1) * width] = np.concatenate([flags, dropped])
         v["mode_code"][2 * count : 2 * count + 2] = len(self.functions), len(self.functions) + 1
         self.functions += [code.tangent, code.residual]
         self.modes.append(code)
