@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 import time
 from functools import partial
 
 from benchmarks.figures import Figure, interleaved
+from benchmarks.processes import output_of
 
 __all__ = ["measure"]
 
@@ -42,9 +40,5 @@ def measure(repeats: int) -> list[Figure]:
 
 def _until_done(script: str) -> float:
     """Seconds from the start of the process to the end of the script, which says what time it is then."""
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(entry for entry in sys.path if entry)}
-    environment.pop("PYTHONDONTWRITEBYTECODE", None)  # an installed package has its bytecode
-    command = [sys.executable, "-c", f"{script}\nimport time\nprint(time.time())"]
     began = time.time()
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
-    return float(done.stdout) - began
+    return float(output_of(f"{script}\nimport time\nprint(time.time())")) - began

@@ -23,7 +23,7 @@ AIM_RATIO = 1.2
 SAME = 1e-9
 """Largest difference of positions and velocities, relative to the largest of them (or to 1), between mbd and C."""
 COMPARED = 1000
-"""Steps over which they are compared: an unstable motion amplifies the tolerance of Newton's iteration e times in 0.3 s."""
+"""Steps over which they are compared: an unstable motion amplifies the tolerance of Newton's iteration."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,10 @@ def _case(case: Case, form: Any, repeats: int) -> list[Figure]:
             run(steps)
         return watch.seconds
 
-    tasks = {"long": partial(kernel_seconds, case.steps), "short": partial(kernel_seconds, short)}
+    tasks: dict[str, Callable[[], float]] = {
+        "long": partial(kernel_seconds, case.steps),
+        "short": partial(kernel_seconds, short),
+    }
     if compiler() is not None:
         program = Program(case.source, (len(case.names), case.rows), case.numbers, case.names, form == "ggl")
         _assert_same(case, model, start, scheme, program)

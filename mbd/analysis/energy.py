@@ -46,7 +46,7 @@ def ledger(columns: ModelColumns) -> Ledger:
     unnamed = [Part("moving coordinates", "drive", moved), *_jumps(columns, total)]
     least = ROUND_OFF * float(np.max(np.abs(kinetic) + np.abs(potential), initial=0.0))
     kept = [part for part in unnamed if np.max(np.abs(part.energy)) > least]
-    return Ledger(columns.record.time, kinetic, potential, (*named, *kept))
+    return Ledger(columns.record.time, kinetic, potential, (*named, *kept), columns.record.settings.get("store", 1))
 
 
 def _momentum_power(equations: Equations) -> Node:

@@ -30,13 +30,15 @@ class Part:
 class Ledger:
     """Energy of a run at every stored row.
 
-    time [s], kinetic T [J], potential V [J] (R,); parts : what changed T + V, each summed from the start
+    time [s], kinetic T [J], potential V [J] (R,); parts : what changed T + V, each summed from the start;
+    stride : steps between stored rows, over which works are integrated
     """
 
     time: Vector
     kinetic: Vector
     potential: Vector
     parts: tuple[Part, ...]
+    stride: int = 1
 
     @property
     def total(self) -> Vector:
@@ -95,6 +97,10 @@ class Ledger:
         for name, value in self.sums.items():
             kind = kinds.get(name, "the integrator")
             lines.append(f"  {name:<{width - 2}}{'':>28}{value:>14.6g}   {kind}")
+        if self.stride > 1 and self.parts:
+            lines.append(
+                f"works are integrated over rows {self.stride} steps apart, whose error stands under 'numerical'"
+            )
         return "\n".join(lines)
 
     def plot(self, path: Any = None) -> Any:

@@ -147,7 +147,7 @@ def load(path: str | Path) -> Trajectory:
     aliases = {name: (part, index) for name, (part, index) in meta["aliases"].items()}
     parts = tuple(Part(name, kind, arrays[f"part {k}"]) for k, (name, kind) in enumerate(meta["parts"]))
     columns = StoredColumns(record, aliases, values, meta["names"], arrays["anchors"], arrays.get("q_rate", record.v))
-    ledger = Ledger(record.time, arrays["kinetic"], arrays["potential"], parts)
+    ledger = Ledger(record.time, arrays["kinetic"], arrays["potential"], parts, record.settings.get("store", 1))
     return Trajectory(record, Archive(columns, ledger, Violation(**meta["violation"]), Facts.read(meta["facts"])))
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from mbd.compile.mechanism import rate_names
 from mbd.compile.python import scalar_function
 from mbd.equations.equations import Guard
-from mbd.errors import SimulationError, UnknownNameError, nearest
+from mbd.errors import ModelError, SimulationError, UnknownNameError, nearest
 from mbd.kernel import fields as F
 
 if TYPE_CHECKING:
@@ -102,6 +102,11 @@ class Boundaries:
         self, controllers: Sequence[Any], instants: Sequence[float], begin: float, dt: float, end: float
     ) -> None:
         self.controllers = tuple(controllers)
+        fast = [c for c in self.controllers if c.period is not None and c.period < 1e-6 * dt]
+        if fast:
+            raise ModelError(
+                [f"the period of {c.name!r}, {c.period:g} s, is far below dt = {dt:g} s; lower dt too" for c in fast]
+            )
         self.states = {controller.name: controller.state for controller in self.controllers}
         self.begin_time = begin
         self.samples = {c.name: 0 for c in self.controllers if c.period is not None}

@@ -331,6 +331,12 @@ class Run:
     def _notes(self) -> list[str]:
         """What the user should know of contacts that were ignored on purpose."""
         v, notes = self.values, list(self.mechanism.notes)
+        dependent = [self.mechanism.equations.rows[row].title for row in sorted(self.stepper.dependent)]
+        if dependent:
+            notes.append(
+                f"redundant constraints: {', '.join(dependent)} depend on other rows; the motion is unique, their "
+                "multipliers are not: those of least norm are given"
+            )
         for c, contact in enumerate(self.manager.contacts):
             if v["deepest"][c] < -1e-9:
                 notes.append(

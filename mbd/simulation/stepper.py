@@ -64,6 +64,7 @@ class Stepper:
         self.functions: list[Any] = [mechanism.common[name] for name in ("accelerations", "guards", "scales")]
         self.functions.append(None if mechanism.vector else mechanism.common["compose"])
         self.modes: list[Any] = []
+        self.dependent: set[int] = set()
         self.kernel: Any = None
         self._table: Any = None
         assert layout.n == self.values["n"]
@@ -140,6 +141,7 @@ class Stepper:
         v["mode_code"][2 * count : 2 * count + 2] = len(self.functions), len(self.functions) + 1
         self.functions += [code.tangent, code.residual]
         self.modes.append(code)
+        self.dependent |= {row for row in range(v["n_rows"]) if dropped[row]}
         v["mode_count"][0] = count + 1
         self.kernel = self._table = None
 

@@ -146,7 +146,10 @@ def test_three_steps_from_another_start_are_those_of_an_explicit_method(
     def errors(dt: float) -> list[float]:
         found = strikes(gait.walk(state, mbd.GeneralizedAlpha(0.9), dt, expected[-1].time + 0.02), gait.slope)
         assert len(found) == 3
-        off = [np.append(mine.after, mine.time) - np.append(its.state, its.time) for mine, its in zip(found, expected, strict=True)]
+        off = [
+            np.append(mine.after, mine.time) - np.append(its.state, its.time)
+            for mine, its in zip(found, expected, strict=True)
+        ]
         return [float(np.linalg.norm(off))]
 
     assert_second_order(errors, 5e-4)

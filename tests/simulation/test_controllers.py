@@ -126,7 +126,7 @@ def test_a_state_machine_switches_the_damping_of_a_knee_between_phases():
     trajectory = run(model, {"hinge.angle": 1.0}, dt=1e-3, until=2.0)
     first, second = (event.row for event in trajectory.events[:2])
     free = run(pendulum(loss=mbd.Viscous(0.2)), {"hinge.angle": 1.0}, dt=1e-3, until=2.0)
-    np.testing.assert_allclose(trajectory["hinge.angle"][:first], free["hinge.angle"][:first], atol=1e-9)
+    np.testing.assert_allclose(trajectory["hinge.angle"][: first - 1], free["hinge.angle"][: first - 1], atol=1e-9)
     assert abs(trajectory["hinge.angle"][second:]).max() < 0.6 * abs(free["hinge.angle"][second:]).max()
 
 
@@ -166,16 +166,16 @@ def driven(times, values, dt, kind="linear"):
     return run(model, dt=dt)
 
 
-def test_a_kink_between_grid_points_does_not_cost_accuracy():
-    """A triangular push; the exact place at 1 s is the double integral."""
-    times, values = [0.0, 0.3333, 0.6667, 1.0], [0.0, 3.0, -1.0, 0.0]
-    t = np.linspace(0.0, 1.0, 200001)
-    force = np.interp(t, times, values)
-    speed = np.concatenate([[0.0], np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(t))])
-    exact = np.sum(0.5 * (speed[1:] + speed[:-1]) * np.diff(t))
+def test_a_kink_between_grid_points_does_not_cost_order():
+    times, values = [0.0, 0.3333, 0.6667, 1.0], [0.0, 3.0, -1.0, 2.0]
+    exact = speed = 0.0
+    for k in range(3):
+        h, a, b = times[k + 1] - times[k], values[k], values[k + 1]
+        exact += h * speed + h * h * (2 * a + b) / 6
+        speed += h * (a + b) / 2
     errors = [abs(driven(times, values, dt)["rail.displacement"][-1] - exact) for dt in (0.02, 0.01, 0.005)]
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
-    assert np.all((orders > 1.8) & (orders < 2.2)) or max(errors) < 1e-9
+    assert np.all((orders > 1.8) & (orders < 2.2))
 
 
 def test_kinks_are_step_boundaries():
@@ -185,13 +185,10 @@ def test_kinks_are_step_boundaries():
 
 
 def test_a_jump_keeps_its_two_sides_and_the_order_of_the_scheme():
-    model = pushed(force=0.0)
     jump = 0.35711
-    step = mbd.Samples([0.0, jump, jump + 1e-9, 1.0], [1.0, 1.0, -2.0, -2.0], kind="linear")
-    model.forces = [mbd.Applied("push", model.forces[0].frame, force=(step, 0.0, 0.0))]
     exact = 0.5 * jump**2 + jump * (1 - jump) - (1 - jump) ** 2
     for dt in (0.02, 0.005):
-        trajectory = run(model, dt=dt)
+        trajectory = driven([0.0, jump, jump + 1e-9, 1.0], [1.0, 1.0, -2.0, -2.0], dt)
         assert trajectory["rail.displacement"][-1] == pytest.approx(exact, abs=1e-8)
     assert trajectory.at(jump - 1e-6)["rail.acceleration"] == pytest.approx(1.0)
     assert trajectory.at(jump + 1e-6)["rail.acceleration"] == pytest.approx(-2.0)

@@ -27,7 +27,8 @@ def bouncing(reset, **settings):
 
 
 @pytest.mark.parametrize(
-    "direction, expected", [(-1, [0.25, 1.25, 2.25]), (1, [0.75, 1.75, 2.75]), (0, [0.25, 0.75, 1.25, 1.75, 2.25, 2.75])]
+    "direction, expected",
+    [(-1, [0.25, 1.25, 2.25]), (1, [0.75, 1.75, 2.75]), (0, [0.25, 0.75, 1.25, 1.75, 2.25, 2.75])],
 )
 def test_an_event_fires_at_every_crossing_in_its_direction(direction, expected):
     model = oscillator(mbd.Event("zero", mbd.measure("slide.displacement"), direction=direction))
@@ -50,7 +51,10 @@ def test_events_at_one_instant_all_happen():
 def test_an_event_without_consequence_leaves_the_motion_alone():
     plain = run(oscillator(), {"slide.displacement": 1.0}, dt=1e-3, until=2.0)
     watched = run(
-        oscillator(mbd.Event("zero", mbd.measure("slide.displacement"))), {"slide.displacement": 1.0}, dt=1e-3, until=2.0
+        oscillator(mbd.Event("zero", mbd.measure("slide.displacement"))),
+        {"slide.displacement": 1.0},
+        dt=1e-3,
+        until=2.0,
     )
     np.testing.assert_allclose(watched.record.q[-1], plain.record.q[-1], atol=2e-5)
 

@@ -1,0 +1,154 @@
+"""Going on from the end of a run, prescribed motions, stored rows, determinism."""
+
+from __future__ import annotations
+
+import tracemalloc
+
+import numpy as np
+import pytest
+
+import mbd
+from tests.simulation.mechanisms import G, ball, falling, kneed_walker, kneed_walker_start, pendulum, point, run
+
+
+# going on -----------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("pause", [0.2, 0.5643, 0.7, 1.0])
+def test_a_walk_continued_from_its_end_has_the_same_events(pause):
+    walker = kneed_walker()
+    start, scheme = kneed_walker_start(walker), mbd.HHT(0.05)
+    whole = mbd.simulate(walker, start, scheme, dt=1e-3, until=2.0)
+    first = mbd.simulate(walker, start, scheme, dt=1e-3, until=pause)
+    second = mbd.simulate(walker, first.final, scheme, dt=1e-3, until=2.0)
+    events = first.events + second.events
+    assert [(e.name, e.kind) for e in events] == [(e.name, e.kind) for e in whole.events]
+    np.testing.assert_allclose([e.time for e in events], [e.time for e in whole.events], atol=1e-6)
+    np.testing.assert_allclose(second.final.q, whole.final.q, atol=1e-5)
+    assert second.time[0] == first.time[-1] == pause
+
+
+def test_a_run_continued_right_after_an_impact_does_not_repeat_it():
+    walker = kneed_walker()
+    start, scheme = kneed_walker_start(walker), mbd.HHT(0.05)
+    first = mbd.simulate(walker, start, scheme, dt=1e-3, until="right foot")
+    second = mbd.simulate(walker, first.final, scheme, dt=1e-3, until=first.time[-1] + 0.1)
+    assert first.events[-2].name == "right foot" and second.events == []
+    np.testing.assert_allclose(second.record.a[0], first.record.a[-1], atol=1e-9)
+    np.testing.assert_allclose(second.record.lam[0], first.record.lam[-1], atol=1e-9)
+
+
+def test_a_released_contact_stays_ignored_in_the_continued_run():
+    model, body = falling()
+    other = mbd.PointMass("other", mass=1.0)
+    model.connect(mbd.Prismatic("drop", model.ground.origin, other.origin, axis=(0, 1, 0)))
+    model.constrain(
+        mbd.Unilateral("A", mbd.height(other.origin)),
+        mbd.Unilateral("B", mbd.height(body.origin), release=mbd.When("A")),
+    )
+    first = run(model, {"drop.displacement": 0.1}, closed=["B"], until=0.3)
+    assert "B" not in first.final.armed and first.final["fall.displacement"] < -0.01
+    second = mbd.simulate(model, first.final, mbd.HHT(0.05), dt=0.01, until=0.6)
+    assert second.events == []
+    fall = 0.6 - first.events[0].time
+    assert second["fall.displacement"][-1] == pytest.approx(-0.5 * G * fall**2, rel=1e-6)
+
+
+def test_changed_parameters_travel_with_the_state():
+    model = pendulum()
+    start = mbd.assemble(model, {"hinge.angle": 0.3}, parameters={"rod.length": 2.0})
+    first = mbd.simulate(model, start, mbd.HHT(0.05), dt=0.01, until=0.5)
+    second = mbd.simulate(model, first.final, mbd.HHT(0.05), dt=0.01, until=1.0)
+    assert second.parameters["rod.length"] == 2.0
+
+
+# prescribed motion --------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("formulation", ["ggl", "index3"])
+def test_a_prescribed_motion_is_followed_and_its_force_is_that_of_newton(formulation):
+    model, body = point()
+    model.constrain(mbd.Bilateral("lift", mbd.height(body.origin), value=lambda t: 0.1 * mbd.sin(6.0 * t)))
+    scheme = mbd.HHT(0.1, formulation=formulation)
+    start = mbd.assemble(model)
+    assert start["place.y.rate"] == pytest.approx(0.6), "the start moves as prescribed"
+    errors = []
+    for dt in (4e-3, 2e-3):
+        trajectory = mbd.simulate(model, start, scheme, dt=dt, until=1.0)
+        t = trajectory.time
+        np.testing.assert_allclose(trajectory["place.y"], 0.1 * np.sin(6.0 * t), atol=1e-13)
+        force = G - 3.6 * np.sin(6.0 * t)
+        errors.append(abs(-trajectory.record.lam[-1, 0] - force[-1]))
+    assert max(errors) < 1e-3 and errors[0] / errors[1] == pytest.approx(4.0, abs=0.8)
+
+
+def test_a_prescribed_point_with_a_contact_below_lands_on_the_moving_schedule():
+    """A table rises under a hanging ball: contact where its height reaches the ball."""
+    model, body = falling()
+    model.constrain(
+        mbd.Bilateral("thread", mbd.height(body.origin), value=0.3),
+        mbd.Event("met", mbd.measure(lambda p, t: p[1] - t * t, body.origin, "t")),
+    )
+    trajectory = run(model, until=1.0)
+    assert [event.time for event in trajectory.events] == [pytest.approx(np.sqrt(0.3), abs=1e-12)]
+
+
+# rows ---------------------------------------------------------------------------------------------------------------
+def test_a_run_of_no_length_is_its_start():
+    trajectory = run(pendulum(), {"hinge.angle": 0.4}, until=0.0)
+    assert len(trajectory.time) == 1 and trajectory["hinge.angle"][0] == 0.4
+    assert trajectory["hinge.acceleration"][0] == pytest.approx(-1.5 * G * np.sin(0.4), rel=1e-12)
+    assert trajectory.success
+
+
+@pytest.mark.parametrize("store", [1, 7, 1000])
+def test_a_stride_keeps_events_the_start_and_the_end(store):
+    trajectory = run(ball(restitution=0.5), {"fall.displacement": 1.0}, dt=1e-3, until=1.2, store=store)
+    every = run(ball(restitution=0.5), {"fall.displacement": 1.0}, dt=1e-3, until=1.2)
+    assert trajectory.time[0] == 0.0 and trajectory.time[-1] == 1.2
+    np.testing.assert_array_equal(trajectory.record.q[-1], every.record.q[-1])
+    for event, other in zip(trajectory.events, every.events, strict=True):
+        assert event.time == other.time == trajectory.time[event.row] == trajectory.time[event.row - 1]
+    assert len(trajectory.time) <= 1210 / store + 3 * len(every.events) + 3
+
+
+def test_a_last_step_is_cut_to_the_end_of_the_run():
+    trajectory = run(pendulum(), {"hinge.angle": 0.4}, until=0.1234, dt=0.01)
+    assert trajectory.time[-1] == 0.1234 and trajectory.final.time == 0.1234
+    fine = run(pendulum(), {"hinge.angle": 0.4}, until=0.1234, dt=1e-4)
+    assert trajectory["hinge.angle"][-1] == pytest.approx(fine["hinge.angle"][-1], abs=1e-4)
+
+
+def test_the_memory_of_a_long_run_grows_with_its_stored_rows_only():
+    model = pendulum()
+    start = mbd.assemble(model, {"hinge.angle": 0.4})
+    mbd.simulate(model, start, mbd.HHT(0.05), dt=1e-3, until=0.1)
+    peaks = []
+    for steps in (100_000, 1_000_000):
+        tracemalloc.start()
+        trajectory = mbd.simulate(model, start, mbd.HHT(0.05), dt=1e-3, until=steps * 1e-3, store=100_000)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+        assert trajectory.stats["steps"] == steps and len(trajectory.time) == 1 + steps // 100_000
+    assert peaks[1] < peaks[0] + 50_000
+
+
+# the same again -----------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("backend", ["auto", "python"])
+def test_the_same_run_gives_the_same_bits(backend):
+    trajectories = []
+    for _ in range(2):
+        walker = kneed_walker()
+        start = kneed_walker_start(walker, backend=backend)
+        trajectories.append(mbd.simulate(walker, start, mbd.HHT(0.05), dt=5e-3, until=0.7, backend=backend))
+    first, second = (trajectory.record for trajectory in trajectories)
+    for part in ("time", "q", "v", "a", "lam", "closed"):
+        assert np.array_equal(getattr(first, part), getattr(second, part)), part
+    for a, b in zip(first.events, second.events, strict=True):
+        assert (a.time, a.name, a.kind, a.energy_loss) == (b.time, b.name, b.kind, b.energy_loss)
+        assert np.array_equal(a.impulse, b.impulse)
+
+
+def test_a_state_is_never_changed_by_a_run():
+    walker = kneed_walker()
+    start = kneed_walker_start(walker)
+    before = [np.copy(part) for part in (start.q, start.v, start.anchors)]
+    mbd.simulate(walker, start, mbd.HHT(0.05), dt=5e-3, until=0.7)
+    for old, new in zip(before, (start.q, start.v, start.anchors), strict=True):
+        assert np.array_equal(old, new)

@@ -1,0 +1,142 @@
+"""A run that cannot go on says why, and keeps everything computed."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+
+import numpy as np
+import pytest
+
+import mbd
+from tests.simulation.mechanisms import ball, falling, pendulum, point, run
+
+
+def short_of_breath(backend):
+    """A force that is not a number after 0.5 s."""
+    model, body = falling()
+    model.apply(mbd.Applied("gasp", body.origin, force=(0.0, lambda t: mbd.sqrt(0.5 - t), 0.0)))
+    return mbd.simulate, model, mbd.assemble(model, {"fall.displacement": 1.0}, backend=backend)
+
+
+@pytest.mark.parametrize("backend", ["auto", "python"])
+def test_a_force_that_becomes_nan_stops_the_run_by_name_and_keeps_it(backend):
+    simulate, model, start = short_of_breath(backend)
+    with pytest.raises(mbd.SimulationError, match="'gasp'") as failed:
+        simulate(model, start, mbd.HHT(0.05), dt=0.01, until=1.0, backend=backend)
+    kept = failed.value.run
+    assert kept.time[-1] == pytest.approx(0.5) and kept.final.time == kept.time[-1]
+    assert not kept.success and kept.status == -1 and kept.message == str(failed.value)
+    assert np.isfinite(kept.record.q).all() and np.isfinite(kept.record.a).all()
+    assert "0.51" in str(failed.value), "the instant that could not be reached"
+
+
+@pytest.mark.parametrize("backend", ["auto", "python"])
+def test_on_request_a_failure_is_returned(backend):
+    simulate, model, start = short_of_breath(backend)
+    trajectory = simulate(model, start, mbd.HHT(0.05), dt=0.01, until=1.0, backend=backend, on_failure="return")
+    assert not trajectory.success and trajectory.failure is not None
+    assert trajectory.time[-1] == pytest.approx(0.5)
+    again = simulate(model, trajectory.final, mbd.HHT(0.05), dt=1e-3, until=0.5 - 1e-9 + 1e-9, backend=backend)
+    assert again.success, "the state kept can be gone on from"
+
+
+def test_a_force_that_is_nan_at_the_start_is_refused():
+    model, body = falling()
+    model.apply(mbd.Applied("never", body.origin, force=(0.0, lambda t: mbd.log(t - 1.0), 0.0)))
+    with pytest.raises(mbd.MbdError, match="finite"):
+        run(model, {"fall.displacement": 1.0})
+
+
+def test_a_function_that_raises_while_it_is_traced_is_told_by_name():
+    model, body = falling()
+
+    def push(t):
+        raise RuntimeError("out of ideas")
+
+    model.apply(mbd.Applied("push", body.origin, force=(0.0, push, 0.0)))
+    with pytest.raises(mbd.TraceError, match="'push'.*out of ideas"):
+        mbd.assemble(model)
+
+
+def test_a_step_that_does_not_converge_names_what_is_closed_and_what_to_try():
+    model, body = falling()
+    model.constrain(mbd.Penalty("floor", mbd.height(body.origin), stiffness=1e18, exponent=3))
+    trajectory = run(model, {"fall.displacement": 1.0}, on_failure="return", until=2.0, dt=0.1)
+    if not trajectory.success:
+        assert "smaller dt" in trajectory.message and "'floor'" in trajectory.message
+    assert np.isfinite(trajectory.record.q).all()
+
+
+def test_chatter_lists_the_contacts_that_switch():
+    trajectory = run(
+        ball(restitution=0.5), {"fall.displacement": 1.0}, until=2.0, rest_speed=0.0, on_failure="return"
+    )
+    assert not trajectory.success
+    assert "'floor' closed" in trajectory.message and "switches" in trajectory.message
+    assert trajectory["fall.displacement"].min() > -1e-12
+
+
+# interruptions ------------------------------------------------------------------------------------------------------
+def test_ctrl_c_keeps_the_run():
+    calls = []
+
+    def impatient(t, state):
+        calls.append(t)
+        if len(calls) == 2:
+            raise KeyboardInterrupt
+
+    model = pendulum()
+    with pytest.raises(mbd.SimulationError, match="interrupted") as stopped:
+        run(model, {"hinge.angle": 1.0}, dt=1e-6, until=100.0, store=10_000, observers=[impatient])
+    kept = stopped.value.run
+    assert kept.final.time == calls[1] > 0.0 and not kept.success
+    assert mbd.simulate(model, kept.final, mbd.HHT(0.05), dt=1e-3, until=kept.final.time + 0.1).success
+
+
+def test_a_signal_from_the_keyboard_reaches_a_compiled_run():
+    model = pendulum()
+    start = mbd.assemble(model, {"hinge.angle": 1.0})
+    mbd.simulate(model, start, mbd.HHT(0.05), dt=1e-3, until=0.1)
+    threading.Timer(0.2, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+    trajectory = mbd.simulate(
+        model, start, mbd.HHT(0.05), dt=1e-7, until=1e4, store=10**6, on_failure="return"
+    )
+    assert "interrupted" in trajectory.message and 0.0 < trajectory.final.time < 1e4
+
+
+def test_an_observer_that_always_interrupts_does_not_lose_the_run():
+    def rude(t, state):
+        raise KeyboardInterrupt
+
+    trajectory = run(pendulum(), {"hinge.angle": 1.0}, observers=[rude], on_failure="return")
+    assert not trajectory.success and "interrupted" in trajectory.message and len(trajectory.time) >= 1
+
+
+def test_an_observer_that_fails_ends_the_run_with_its_reason_and_cause():
+    def broken(t, state):
+        raise ValueError("no disk")
+
+    with pytest.raises(mbd.SimulationError, match="no disk") as failed:
+        run(pendulum(), {"hinge.angle": 1.0}, observers=[broken])
+    cause = failed.value.__cause__
+    assert isinstance(cause, mbd.SimulationError) and isinstance(cause.__cause__, ValueError)
+    assert failed.value.run is not None
+
+
+def test_observers_and_progress_see_the_end():
+    seen, shown = [], []
+    run(
+        pendulum(), {"hinge.angle": 1.0}, observers=[lambda t, state: seen.append((t, state["hinge.angle"]))],
+        progress=lambda t, until: shown.append((t, until)),
+    )  # fmt: skip
+    assert seen[-1][0] == 1.0 and shown[-1] == (1.0, 1.0)
+    assert [t for t, _ in seen] == sorted(t for t, _ in seen)
+
+
+def test_a_contact_with_a_gap_that_fails_names_it():
+    model, body = point()
+    model.constrain(mbd.Unilateral("well", mbd.measure(lambda p: mbd.log(p[1]) + 5.0, body.origin), only_while=None))
+    trajectory = run(model, {"place.y": 1.0}, {"place.y": 0.0}, on_failure="return", dt=0.4, until=3.0)
+    assert np.isfinite(trajectory.record.q).all()
