@@ -93,16 +93,17 @@ def _case(case: Case, form: Any, repeats: int) -> list[Figure]:
         tasks["C short"] = lambda: program.run(start, scheme, DT, short, none).seconds
     samples = interleaved(tasks, 5 * repeats)
     own, spread = _per_step(samples["long"], samples["short"], case.steps - short)
-    reference = None
+    reference = work = None
     if "C long" in samples:
         reference, _ = _per_step(samples["C long"], samples["C short"], case.steps - short)
+        work = sum(program.run(start, scheme, DT, case.steps, none).counts[:2]) / case.steps
     name = f"step, {case.name}, {'index 3' if form == 'index3' else 'stabilized'}"
     aims = (case.aim, AIM_RATIO) if form == "index3" else (None, None)
     counts = run(case.steps)
     evaluations = (counts["tangents"] + counts["residuals"]) / counts["steps"]
     return [
         Figure(name, own, "µs", aims[0], "C" if reference else "", reference, aims[1], spread),
-        Figure(f"{name}: evaluations", evaluations, "a step"),
+        Figure(f"{name}: evaluations", evaluations, "a step", yardstick="C" if work else "", reference=work),
     ]
 
 

@@ -24,8 +24,11 @@ if TYPE_CHECKING:
         Bilateral as Bilateral,
         Controller as Controller,
         Event as Event,
+        KnifeEdge as KnifeEdge,
+        Nonholonomic as Nonholonomic,
         Penalty as Penalty,
         Plane as Plane,
+        Rolling as Rolling,
         Unilateral as Unilateral,
         When as When,
         distance as distance,
@@ -103,7 +106,7 @@ __version__ = "0.1.0"
 _HOMES = {
     "mbd.assembly": "assemble",
     "mbd.bodies": "Link PointMass RigidBody box cylinder disk rod segment sphere",
-    "mbd.constraints": "Bilateral Controller Event Penalty Plane Unilateral When "
+    "mbd.constraints": "Bilateral Controller Event KnifeEdge Nonholonomic Penalty Plane Rolling Unilateral When "
     "distance extension flexion height measure separation touchdown",
     "mbd.equations.lagrangian": "Coordinate Lagrangian",
     "mbd.errors": "AssemblyError CapabilityError MbdError ModelError SimulationError TraceError TrajectoryError "

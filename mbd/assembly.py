@@ -186,10 +186,13 @@ def assemble(
 
 
 def _position_rows(work: Posture) -> list[int]:
-    """Active rows that fix positions: bilateral ones and the gaps of closed contacts; anchors adapt to the position."""
+    """Active rows that fix positions: bilateral ones and the gaps of closed contacts; anchors adapt to the position.
+
+    Rows on velocities leave positions free.
+    """
     normals = {contact.rows[0] for contact in work.manager.contacts if contact.rows}
-    rows = work.equations.rows
-    return [k for k in work.manager.active_rows(work.flags) if rows[k].contact < 0 or k in normals]
+    rows, active = work.equations.rows, work.manager.active_rows(work.flags)
+    return [k for k in active if not rows[k].is_velocity and (rows[k].contact < 0 or k in normals)]
 
 
 def _involved(B: Matrix, free: Matrix) -> Any:
@@ -307,9 +310,9 @@ def _conflicts(work: Posture, rows: Sequence[int], misfit: Vector, speed_misfit:
         row = equations.rows[k]
         position, velocity = float(h.get(k, 0.0)), float(rate[k])
         if abs(position) > TOLERANCE or abs(velocity) > TOLERANCE * speed or not np.isfinite(position + velocity):
+            place = "" if row.is_velocity else f"position residual {position:.6g} {row.unit}, "
             found.append(
-                f"the start contradicts {row.title}: position residual {position:.6g} {row.unit}, "
-                f"velocity residual {velocity:.6g} {row.unit}/s; name fewer values, or "
+                f"the start contradicts {row.title}: {place}velocity residual {velocity:.6g} {row.unit}/s; name fewer values, or "
                 f"use assemble(..., project=True) to move all"
             )
     return found

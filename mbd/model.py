@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 from mbd.bodies.base import Body, Frame
 from mbd.bodies.ground import Ground
 from mbd.bodies.values import Vector3, number, triple
-from mbd.constraints.base import Constraint
+from mbd.constraints.base import Constraint, VelocityConstraint
 from mbd.constraints.bilateral import Bilateral
 from mbd.constraints.controller import Controller
 from mbd.constraints.event import Event
@@ -121,6 +121,11 @@ class Model:
     def bilaterals(self) -> list[Bilateral]:
         """Constraints that always act."""
         return [word for word in self.constraints if isinstance(word, Bilateral)]
+
+    @property
+    def nonholonomic(self) -> list[VelocityConstraint]:
+        """Constraints on velocities, which always act."""
+        return [word for word in self.constraints if isinstance(word, VelocityConstraint)]
 
     @property
     def contacts(self) -> list[Unilateral | Penalty]:

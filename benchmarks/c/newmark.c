@@ -51,14 +51,14 @@ static void refresh_scales(const Model *p, const Point *at, Motion *s)
     }
 }
 
-/* The same where they exceed those known; a force that passes zero has none. */
-static void raise_scales(const Model *p, const Point *at, Motion *s)
+/* The same where they exceed those known, those of rows on demand; a force that passes zero has none. */
+static void raise_scales(const Model *p, const Point *at, Motion *s, int rows)
 {
     Motion old = *s;
     refresh_scales(p, at, s);
     for (int i = 0; i < N; i++)
         s->scale_r[i] = larger(s->scale_r[i], old.scale_r[i]);
-    for (int k = 0; k < M; k++) {
+    for (int k = 0; k < M && rows; k++) {
         s->scale_h[k] = larger(s->scale_h[k], old.scale_h[k]);
         s->scale_rate[k] = larger(s->scale_rate[k], old.scale_rate[k]);
     }
@@ -93,7 +93,7 @@ static int start(const Model *p, const Scheme *c, Motion *s)
         return 1;
     Point later = s->now;
     for (int i = 0; i < N; i++) {
-        later.q[i] += step * (s->now.v[i] + 0.5 * step * s->now.a[i]);
+        later.q[i] += step * s->now.v[i];
         later.v[i] += step * s->now.a[i];
     }
     if (consistent(p, &later))
@@ -111,7 +111,7 @@ static int start(const Model *p, const Scheme *c, Motion *s)
         later.v[i] += c->dt * s->now.a[i];
         later.a[i] += c->dt * s->slope[i];
     }
-    raise_scales(p, &later, s);
+    raise_scales(p, &later, s, 0);
     return 0;
 }
 
@@ -172,7 +172,7 @@ static int step(const Model *p, const Scheme *c, Motion *s, int64_t counts[3])
             return 1;
         accepted = error <= 1.0;
         if (!accepted && iteration >= 2 && error > 0.5 * before) { /* stalled: fresh scales, then round-off decide */
-            raise_scales(p, &at, s);
+            raise_scales(p, &at, s, 1);
             error = residual_size(s, &at, r, h, rate, C, K, tolerance);
             accepted = error <= 1.0 || residual_size(s, &at, r, h, rate, 0.0, 0.0, 256.0 * EPS) <= 16.0;
         }

@@ -1,17 +1,21 @@
 """Constraints: where (measures), what law, and when."""
 
-from mbd.constraints.base import Constraint, Measure
+from mbd.constraints.base import Constraint, Measure, VelocityConstraint
 from mbd.constraints.bilateral import Bilateral
 from mbd.constraints.controller import Controller
 from mbd.constraints.event import Event
+from mbd.constraints.knife_edge import KnifeEdge
 from mbd.constraints.measures import distance, extension, flexion, height, separation
+from mbd.constraints.nonholonomic import Nonholonomic
 from mbd.constraints.penalty import Penalty
+from mbd.constraints.rolling import Rolling
 from mbd.constraints.rules import When
 from mbd.constraints.touchdown import Plane, touchdown
 from mbd.constraints.unilateral import Unilateral
 from mbd.constraints.user_measure import measure
 
 __all__ = [
-    "Bilateral", "Constraint", "Controller", "Event", "Measure", "Penalty", "Plane", "Unilateral", "When", "distance",
-    "extension", "flexion", "height", "measure", "separation", "touchdown",
+    "Bilateral", "Constraint", "Controller", "Event", "KnifeEdge", "Measure", "Nonholonomic", "Penalty", "Plane",
+    "Rolling", "Unilateral", "VelocityConstraint", "When", "distance", "extension", "flexion", "height", "measure",
+    "separation", "touchdown",
 ]  # fmt: skip

@@ -9,7 +9,7 @@ from mbd.forces.quantities import Mention
 from mbd.scope import Scope
 from mbd.tape.node import Scalar
 
-__all__ = ["Constraint", "Measure"]
+__all__ = ["Constraint", "Measure", "VelocityConstraint"]
 
 
 class Measure(ABC):
@@ -72,7 +72,7 @@ class Constraint(ABC):
     @property
     @abstractmethod
     def kind(self) -> str:
-        """'bilateral', 'unilateral', 'penalty' or 'event'."""
+        """'bilateral', 'nonholonomic', 'unilateral', 'penalty' or 'event'."""
 
     @abstractmethod
     def mentions(self) -> list[Mention]:
@@ -94,3 +94,25 @@ class Constraint(ABC):
     def faults(self) -> list[str]:
         """What is physically impossible about it, one sentence each."""
         return []
+
+
+class VelocityConstraint(Constraint):
+    """Rows ``a(q, t) · v + b(q, t) = 0`` that hold velocities and need not come from positions.
+
+    A new one is a frozen dataclass with a `name`. Its multipliers λ enter the balance as ``+aᵀ λ``, so −λ is the force
+    of the row on the mechanism.
+    """
+
+    @property
+    @abstractmethod
+    def unit(self) -> str:
+        """'m' or 'rad': that of the rows times seconds."""
+
+    @abstractmethod
+    def rates(self, scope: Scope) -> Sequence[tuple[str, Scalar]]:
+        """(part, a · v + b) of each row, linear in velocities [unit/s]; a single row has the part ''."""
+
+    @property
+    def kind(self) -> str:
+        """'nonholonomic'."""
+        return "nonholonomic"

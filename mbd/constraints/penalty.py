@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from mbd.bodies.values import name_of, number
 from mbd.constraints.base import Constraint, Measure
+from mbd.constraints.restitution import KELVIN_VOIGT, chi_for, damping_ratio_for, law_of, wanted
 from mbd.constraints.unilateral import measure_of
 from mbd.errors import ModelError
 from mbd.forces.quantities import Mention
@@ -15,12 +17,18 @@ from mbd.tape.node import Scalar
 
 __all__ = ["Penalty"]
 
+SLOWEST = 1e-6
+"""Least approach speed of the χ laws [m/s or rad/s], the default of 'name.slowest': a touch at rest divides by it."""
+
 
 @dataclass(frozen=True)
 class Penalty(Constraint):
-    """``p = k δⁿ + c δ̇`` with the penetration ``δ = −g``, while it acts: a rubber stop (Kelvin & Voigt for n = 1).
+    """A force law on the penetration ``δ = −g`` while it acts: a rubber stop, a mat, a ball on a plate.
 
-    It begins to act as g falls through zero.
+    Without restitution, ``p = k δⁿ + c δ̇`` (Kelvin & Voigt for n = 1). With it, ``p = max(0, k δⁿ (1 + χ δ̇/δ̇₀))``,
+    δ̇₀ the approach speed as it closes; χ gives that restitution exactly, whatever k, m and n are, or is that of a
+    published law, which only comes near it (see `mbd.constraints.restitution`). It begins to act as g falls through
+    zero. `mbd.penalty_parameters` finds k and a safe dt.
 
     Parameters
     ----------
@@ -29,7 +37,13 @@ class Penalty(Constraint):
     stiffness : k [N/mⁿ, or N m/radⁿ]
     damping : c [N s/m, or N m s/rad]
     exponent : n ≥ 1, fixed when the model is built (3/2 for Hertz)
-    release : 'gap': it acts until g > 0 again and may pull just before; 'pull': until the force would attract
+    restitution : e of a blow without other forces, 0.05 to 1, instead of `damping`
+    law : how e becomes a loss: 'exact' (default), 'hunt-crossley', 'lankarani-nikravesh', 'flores', 'gonthier', or
+        'kelvin-voigt', a damper for the `effective_mass` (n = 1)
+    release : of Kelvin–Voigt. 'gap': it acts until g > 0 again and may pull just before; 'pull': until the force would
+        attract. The χ laws never pull and end at g = 0
+    effective_mass : mass that the contact feels, ``1/(J M⁻¹ Jᵀ)`` with J = ∂g/∂q [kg, or kg m²], for 'kelvin-voigt'
+        with a restitution
     """
 
     name: str
@@ -37,15 +51,58 @@ class Penalty(Constraint):
     stiffness: float
     damping: float = 0.0
     exponent: float = 1.0
+    restitution: float | None = None
+    law: str | None = None
     release: str = "gap"
+    effective_mass: float | None = None
 
     def __post_init__(self) -> None:
         name_of(self.name, "Penalty")
         measure_of(self.measure, f"Penalty '{self.name}'")
-        for field in ("stiffness", "damping", "exponent"):
-            object.__setattr__(self, field, number(getattr(self, field), f"{field} of '{self.name}'"))
+        for field in ("stiffness", "damping", "exponent", "restitution", "effective_mass"):
+            if getattr(self, field) is not None or field in ("stiffness", "damping", "exponent"):
+                object.__setattr__(self, field, number(getattr(self, field), f"{field} of '{self.name}'"))
         if self.release not in ("gap", "pull"):
             raise ModelError(f"release of Penalty '{self.name}' is 'gap' or 'pull', got {self.release!r}")
+        law_of(self.law, f"Penalty '{self.name}'")
+        contradictions = self._contradictions()
+        if contradictions:
+            raise ModelError(contradictions)
+        if self.restitution is not None:
+            wanted(self.restitution, f"Penalty '{self.name}'")
+
+    def _contradictions(self) -> list[str]:
+        """Arguments that say the same thing twice, or nothing without another."""
+        title, found = f"Penalty '{self.name}'", []
+        if self.restitution is None:
+            if self.law not in (None, KELVIN_VOIGT):
+                found.append(f"{title}: law={self.law!r} turns a restitution into a loss; give restitution too")
+            if self.effective_mass is not None:
+                found.append(f"{title}: effective_mass serves law='{KELVIN_VOIGT}' with a restitution; give both")
+            return found
+        if self.damping != 0.0:
+            found.append(
+                f"{title}: damping {self.damping:g} and restitution {self.restitution:g} both say how much is lost; "
+                "give one of them"
+            )
+        if self.law != KELVIN_VOIGT:
+            if self.effective_mass is not None:
+                found.append(
+                    f"{title}: effective_mass serves law='{KELVIN_VOIGT}' only, got law={self.law!r}, which needs no "
+                    "mass; leave one of them out"
+                )
+            return found
+        if self.exponent != 1.0:
+            found.append(
+                f"{title}: law='{KELVIN_VOIGT}' reaches a restitution for exponent 1 only, got exponent "
+                f"{self.exponent:g}; use law='exact'"
+            )
+        if self.effective_mass is None or self.effective_mass <= 0.0:
+            found.append(
+                f"{title}: law='{KELVIN_VOIGT}' reaches a restitution for one effective_mass only; give it, a positive "
+                f"one (got {self.effective_mass}), or use law='exact'"
+            )
+        return found
 
     @property
     def kind(self) -> str:
@@ -53,24 +110,55 @@ class Penalty(Constraint):
         return "penalty"
 
     @property
+    def chi(self) -> float | None:
+        """χ of its law; None where a damper takes the energy."""
+        if self.restitution is None or self.law == KELVIN_VOIGT:
+            return None
+        return chi_for(self.restitution, law_of(self.law, self.name))
+
+    @property
+    def damper(self) -> float:
+        """c: `damping`, or that of Kelvin–Voigt for a restitution, ``2 ζ √(k m)`` [N s/m, or N m s/rad]."""
+        if self.restitution is None or self.effective_mass is None:
+            return self.damping
+        ratio = damping_ratio_for(self.restitution, self.release)
+        return 2.0 * ratio * math.sqrt(max(self.stiffness, 0.0) * self.effective_mass)
+
+    @property
     def opens_on(self) -> str:
         """'gap' or 'pull'."""
-        return self.release
+        return "gap" if self.chi is not None else self.release
 
-    def force(self, gap: Scalar, gap_rate: Scalar, scope: Scope) -> Scalar:
-        """k δⁿ + c δ̇ [N or N m], of g and ġ."""
-        depth: Scalar = -gap if self.exponent == int(self.exponent) else maximum(-gap, 0.0)
-        power: Scalar = scope.tape.power(depth, self.exponent)
+    def captured(self, gap_rate: Scalar) -> tuple[Scalar, ...]:
+        """What is held from the instant of closing: the approach speed −ġ, where χ needs it."""
+        return () if self.chi is None else (-gap_rate,)
+
+    def force(self, gap: Scalar, gap_rate: Scalar, scope: Scope, approach: Scalar = 1.0) -> Scalar:
+        """p [N or N m] of g, ġ and the approach speed as it closed."""
         k = scope.parameter(self.name, "stiffness", self.stiffness)
-        return k * power - scope.parameter(self.name, "damping", self.damping) * gap_rate
+        chi = self.chi
+        if chi is None:
+            return k * self._power(-gap, scope) - scope.parameter(self.name, "damping", self.damper) * gap_rate
+        slowest = scope.parameter(self.name, "slowest", SLOWEST)
+        loss = scope.parameter(self.name, "chi", chi) * gap_rate / maximum(approach, slowest)
+        return k * self._power(-gap, scope) * maximum(1.0 - loss, 0.0)
+
+    def _power(self, depth: Scalar, scope: Scope) -> Scalar:
+        """δⁿ, not above zero where δ < 0; it falls below where the sign of the force tells when to open."""
+        if self.exponent % 2.0 == 1.0:
+            return scope.tape.power(depth, self.exponent)
+        pressed: Scalar = scope.tape.power(maximum(depth, 0.0), self.exponent)
+        return pressed - scope.tape.power(maximum(-depth, 0.0), self.exponent) if self.opens_on == "pull" else pressed
 
     def mentions(self) -> list[Mention]:
         """What its measure depends on."""
         return self.measure.mentions()
 
     def parameters(self) -> dict[str, float]:
-        """`stiffness` and `damping`."""
-        return {f"{self.name}.stiffness": self.stiffness, f"{self.name}.damping": self.damping}
+        """`stiffness`, and `damping` or `chi` and `slowest`, the least approach speed."""
+        chi = self.chi
+        loss = {"damping": self.damper} if chi is None else {"slowest": SLOWEST, "chi": chi}
+        return {f"{self.name}.{field}": value for field, value in {"stiffness": self.stiffness, **loss}.items()}
 
     def faults(self) -> list[str]:
         """A law that would not push, or would feed energy in."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from mbd.constraints.base import Measure
+from mbd.constraints.base import Measure, VelocityConstraint
 from mbd.constraints.bilateral import Bilateral
 from mbd.constraints.event import Event
 from mbd.constraints.penalty import Penalty
@@ -15,7 +15,7 @@ from mbd.equations.effects import penalty_effect
 from mbd.equations.equations import Contact, Effect, Guard, Row
 from mbd.equations.surroundings import Surroundings
 from mbd.joints.base import row_unit
-from mbd.tape.derivatives import live
+from mbd.tape.derivatives import gradient, live
 from mbd.tape.evaluate import evaluate
 from mbd.tape.node import Node, Scalar
 
@@ -29,7 +29,7 @@ FITS = 1e-9
 class Laws:
     """The constraints of a model as expressions; `faults` tells what cannot hold.
 
-    viewed : the values of `rows` in views; penalties : (number, gap, force) of penalty contacts in views
+    viewed : the values of `rows`, the rates of those on velocities, in views; penalties : (number, gap, force) of penalty contacts in views
     """
 
     rows: list[Row] = field(default_factory=list)
@@ -44,16 +44,19 @@ class Laws:
 def laws(
     scope: Surroundings,
     dynamics: Dynamics,
-    bilaterals: Sequence[Bilateral],
+    bilaterals: Sequence[Bilateral | VelocityConstraint],
     contacts: Sequence[Unilateral | Penalty],
     events: Sequence[Event],
 ) -> Laws:
-    """Cut joints, then bilateral constraints, then contacts and events, each in the order of the model."""
+    """Cut joints, then what always acts (positions first), then contacts and events, in the order of the model."""
     found = Laws()
     for joint in scope.cuts:
         for part, value in scope.cut_rows(joint)[0]:
             _row(found, scope, joint.name, part, value, unit=row_unit(part), may_fold=True)
     for constraint in bilaterals:
+        if isinstance(constraint, VelocityConstraint):
+            _velocity_rows(found, scope, constraint)
+            continue
         _row(found, scope, constraint.name, "", constraint.residual(scope), unit=constraint.measure.unit)
     for number, contact in enumerate(contacts):
         if isinstance(contact, Penalty):
@@ -89,6 +92,30 @@ def _row(
     found.rows.append(Row(owner, part, node, rate, contact, unit))
     found.viewed.append(view)
     return len(found.rows) - 1
+
+
+def _velocity_rows(found: Laws, scope: Surroundings, law: VelocityConstraint) -> None:
+    """Rows ``a(q, t) · v + b(q, t) = 0``, with what is wrong with them."""
+    for part, value in law.rates(scope):
+        view = scope.tape.lift(value)
+        rate = scope.real(view)
+        title = f"'{law.name}'" + (f", row '{part}'" if part else "")
+        slopes = gradient(rate, scope.inputs.v)
+        if {other.data[0] for other in live([rate]) if other.op == "input"} & {"z", "s", "a"}:
+            found.faults.append(f"{title} depends on states; it may depend on velocities, positions and t only")
+        elif any(other.op == "input" and other.data[0] == "v" for other in live(slopes)):
+            found.faults.append(
+                f"{title} is not linear in velocities; give a row a(q) · v + b(t), a sum of rates times functions of "
+                "positions and t"
+            )
+        elif all(slope.is_zero for slope in slopes):
+            found.faults.append(
+                f"{title} holds no velocity, so it constrains nothing; let rates such as 'body.x.rate' enter it, or "
+                "use mbd.Bilateral for positions"
+            )
+        else:
+            found.rows.append(Row(law.name, part, scope.tape.zero, rate, unit=law.unit, kind="velocity"))
+            found.viewed.append(view)
 
 
 def _idle(scope: Surroundings, node: Node, title: str, kinds: set[str], unit: str, may_fold: bool) -> list[str]:

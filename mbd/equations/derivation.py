@@ -58,7 +58,7 @@ def _derived(model: Model, plan: Plan) -> Equations:
     found = causes(scope, (*plan.edges, *plan.cut), model.forces)
     work = sum((cause.work for cause in found), Work())
     rests = _state_balance(scope, found)
-    constraints = laws(scope, dynamics, model.bilaterals, model.contacts, model.events)
+    constraints = laws(scope, dynamics, [*model.bilaterals, *model.nonholonomic], model.contacts, model.events)
     if constraints.faults:
         raise ModelError(constraints.faults)
     weight = weight_of(scope, dynamics)
@@ -87,8 +87,9 @@ def _derived(model: Model, plan: Plan) -> Equations:
 def _closed(scope: Surroundings, constraints: Laws) -> Work:
     """The work of every row, and of every penalty contact behind its switch."""
     work = Work()
-    for k, value in enumerate(constraints.viewed):
-        work.on_value(value, scope.tape.input("lam", k))
+    for k, (row, view) in enumerate(zip(constraints.rows, constraints.viewed, strict=True)):
+        act = work.on_velocity if row.is_velocity else work.on_value
+        act(view, scope.tape.input("lam", k))
     for number, gap, force in constraints.penalties:
         work.on_value(gap, -(scope.tape.input("switch", number) * force))
     return work
@@ -113,12 +114,23 @@ class TreeGeometry:
     rests: Sequence[Node]
     constraints: Laws
 
-    def balance_with(self, values: Sequence[Node], multipliers: Sequence[Node]) -> list[Node]:
-        """The balance with forces on these values in the same reverse sweep."""
+    def balance_with(
+        self,
+        values: Sequence[Node],
+        multipliers: Sequence[Node],
+        rates: Sequence[Node] = (),
+        forces: Sequence[Node] = (),
+    ) -> list[Node]:
+        """The balance with forces on these values and velocities in the same reverse sweep."""
         laws = self.constraints
-        viewed = {row.value.index: view for row, view in zip(laws.rows, laws.viewed, strict=True)}
+        rows = list(zip(laws.rows, laws.viewed, strict=True))
+        viewed = {row.value.index: view for row, view in rows if not row.is_velocity}
+        moving = {row.rate.index: view for row, view in rows if row.is_velocity}
         viewed |= {laws.contacts[number].gap.index: gap for number, gap, _ in laws.penalties}
-        work = Work([viewed.get(value.index, value) for value in values], list(multipliers))
+        work = Work(
+            [viewed.get(value.index, value) for value in values], list(multipliers),
+            [moving.get(rate.index, rate) for rate in rates], list(forces),
+        )  # fmt: skip
         return [*self.dynamics.balance(self.work + work), *self.rests]
 
     def partials(self, outputs: Sequence[Node]) -> list[dict[Node, Node]]:

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 from mbd.tape.node import Node, Table, Tape
 
@@ -44,12 +44,13 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Row:
-    """One scalar constraint ``h = 0``.
+    """One scalar constraint, on positions ``h = 0`` or on velocities ``B v + b = 0``.
 
     owner : name of the joint or constraint; part : which of its rows ('x', 'normal', 'tangent', …)
-    value : h on the tape; rate : ḣ = B v + h_t on the tape
+    value : h on the tape, zero for a row on velocities; rate : ḣ = B v + h_t, or B v + b, on the tape
     contact : number of the contact it belongs to, −1 for bilateral rows
-    unit : of h, 'm' or 'rad'
+    unit : of h, 'm' or 'rad'; that of the rate times seconds for a row on velocities
+    kind : 'position', B = ∂h/∂q; or 'velocity', B = ∂rate/∂v, which need not come from a position
     """
 
     owner: str
@@ -58,6 +59,12 @@ class Row:
     rate: Node
     contact: int = -1
     unit: str = "m"
+    kind: Literal["position", "velocity"] = "position"
+
+    @property
+    def is_velocity(self) -> bool:
+        """Whether it holds at velocity level only."""
+        return self.kind == "velocity"
 
     @property
     def title(self) -> str:
@@ -131,8 +138,17 @@ class Effect:
 class Geometry(Protocol):
     """What a derivation knows of its own expressions: shorter ways to derivatives that the tape could take alone."""
 
-    def balance_with(self, values: Sequence[Node], multipliers: Sequence[Node]) -> list[Node]:
-        """balance + Σ_k multiplier_k ∂value_k/∂x (length n_v + n_z), for values that depend on t and q ⊕ x only."""
+    def balance_with(
+        self,
+        values: Sequence[Node],
+        multipliers: Sequence[Node],
+        rates: Sequence[Node] = (),
+        forces: Sequence[Node] = (),
+    ) -> list[Node]:
+        """balance + Σ_k multiplier_k ∂value_k/∂x + Σ_k force_k ∂rate_k/∂v (length n_v + n_z).
+
+        The values depend on t and q ⊕ x only, the rates on v too.
+        """
 
     def partials(self, outputs: Sequence[Node]) -> list[dict[Node, Node]]:
         """For each x_j, ∂node/∂x_j of the nodes inside `outputs` (positions, rotations) where it is known."""

@@ -52,10 +52,12 @@ def _parts(equations: Equations) -> Parts:
         "f": {(name,): node for name, node in zip(names, substitute(list(equations.balance), rest), strict=True)},
         "B": {(rows[k], names[j]): node for k, line in enumerate(B) for j, node in enumerate(line)},
         "h": {(name,): row.value for name, row in zip(rows, equations.rows, strict=True)},
+        "b": {(name,): row.rate for name, row in zip(rows, equations.rows, strict=True) if row.is_velocity},
         "p": {(_plain(c.name),): c.force for c in equations.contacts if c.force is not None},
     }
+    still = {**here, **dict.fromkeys(inputs.v, 0.0)}
     for letter, entries in parts.items():
-        values = substitute(list(entries.values()), here)
+        values = substitute(list(entries.values()), still if letter == "b" else here)
         parts[letter] = {key: node for key, node in zip(entries, values, strict=True) if not node.is_zero}
     return parts
 
@@ -94,6 +96,8 @@ def _text(equations: Equations, parts: Parts) -> str:
     ]
     if parts["p"]:
         lines.append("p are forces of penalty contacts while they act")
+    if any(row.is_velocity for row in equations.rows):
+        lines.append("rows without h hold velocities: B v + b = 0")
     lines.append(_counts(parts))
     return "\n".join([*lines, "", listing(entries, _input_names(equations))])
 

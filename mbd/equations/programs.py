@@ -11,6 +11,8 @@ With N = n_v + n_z rates, m active rows in ascending number, R rows and nC conta
 `compose`          q ⊕ x, or None where it is q + x
 =================  ==================================================================================
 
+Of a row on velocities h is zero; index 3 has its rate in the place of h.
+
 All are values: functions from equations to nodes, which the compile stage turns into code.
 """
 
@@ -35,19 +37,19 @@ def newton(equations: Equations, rows: Sequence[int], penalties: Sequence[int], 
     """Tangent and residual of one Newton iteration of the Newmark family.
 
     ``K = [S  ∂r/∂λ; B̃  0]`` with ``S = M + c_C C_t + c_K K_t`` from one forward sweep a column, and
-    ``B̃ = B`` (index 3) or ``B + (c_K/c_C) ∂ḣ/∂x`` (stabilized); the columns of first-order states are zero in B̃.
+    ``B̃ = B`` (index 3) or ``B + (c_K/c_C) ∂ḣ/∂x`` (stabilized, and rows on velocities in both); the columns of
+    first-order states are zero in B̃.
     """
     inputs = Inputs.of(equations)
     rows = sorted(rows)
     r = balance_with(equations, rows, penalties)
-    h = [equations.rows[k].value for k in rows]
     B = constraint_jacobian(equations, rows)
-    bottom, hv = B, []
-    if stabilized and rows:
-        hv = [equations.rows[k].rate for k in rows]
-        ratio = inputs.c[1] / inputs.c[0]
-        changes = _jacobian_rates(equations, B, hv)
-        bottom = [[b + ratio * g for b, g in zip(*pair, strict=True)] for pair in zip(B, changes, strict=True)]
+    bottom = list(B)
+    fast = [place for place, k in enumerate(rows) if stabilized or equations.rows[k].is_velocity]
+    ratio = inputs.c[1] / inputs.c[0]
+    changes = _jacobian_rates(equations, [rows[place] for place in fast], [B[place] for place in fast])
+    for place, change in zip(fast, changes, strict=True):
+        bottom[place] = [b + ratio * g for b, g in zip(B[place], change, strict=True)]
     S = _tangent(equations, r)
     right = _row_forces(equations, r, rows, B)
     zero = equations.tape.zero
@@ -57,14 +59,21 @@ def newton(equations: Equations, rows: Sequence[int], penalties: Sequence[int], 
         out += [S[j][i] for j in range(n)] + [right[k][i] for k in range(m)]
     for k in range(m):
         out += [*bottom[k], *([zero] * (n_z + m))]
-    return out + r + h + hv
+    return out + r + _levels(equations, rows, stabilized)
 
 
 def residual(equations: Equations, rows: Sequence[int], penalties: Sequence[int], stabilized: bool) -> list[Node]:
     """r | h | ḣ of one contact mode."""
     rows = sorted(rows)
-    hv = [equations.rows[k].rate for k in rows] if stabilized else []
-    return balance_with(equations, rows, penalties) + [equations.rows[k].value for k in rows] + hv
+    return balance_with(equations, rows, penalties) + _levels(equations, rows, stabilized)
+
+
+def _levels(equations: Equations, rows: Sequence[int], stabilized: bool) -> list[Node]:
+    """h | ḣ of the stabilized form; h alone in index 3, where the rate of a row on velocities takes its place."""
+    chosen = [equations.rows[k] for k in rows]
+    if stabilized:
+        return [row.value for row in chosen] + [row.rate for row in chosen]
+    return [row.rate if row.is_velocity else row.value for row in chosen]
 
 
 def accelerations(equations: Equations) -> list[Node]:
@@ -127,30 +136,47 @@ def _switched_balance(equations: Equations) -> list[Node]:
 
 
 def _balance(equations: Equations, rows: Iterable[int], penalties: Iterable[tuple[int, Node]]) -> list[Node]:
-    """balance + Σ λ_k ∂h_k/∂x − Σ switch_c F_c ∂g_c/∂x."""
+    """balance + Σ λ_k ∂h_k/∂x − Σ switch_c F_c ∂g_c/∂x; of rows on velocities λ_k ∂rate_k/∂v."""
     inputs = Inputs.of(equations)
-    work = [(equations.rows[k].value, inputs.lam[k]) for k in rows]
+    rows = list(rows)
+    work = [(equations.rows[k].value, inputs.lam[k]) for k in rows if not equations.rows[k].is_velocity]
+    fast = [k for k in rows if equations.rows[k].is_velocity]
+    rates, forces = [equations.rows[k].rate for k in fast], [inputs.lam[k] for k in fast]
     for c, switch in penalties:
         contact = equations.contacts[c]
         if contact.force is not None:
             work.append((contact.gap, -(switch * contact.force)))
-    if not work:
+    if not work and not fast:
         return list(equations.balance)
     values, multipliers = [value for value, _ in work], [multiplier for _, multiplier in work]
     if equations.geometry is not None:
-        return equations.geometry.balance_with(values, multipliers)
-    added = vjp(values, multipliers, inputs.x) + [equations.tape.zero] * equations.n_z
-    return [r + extra for r, extra in zip(equations.balance, added, strict=True)]
+        return equations.geometry.balance_with(values, multipliers, rates, forces)
+    result = list(equations.balance)
+    for outputs, adjoints, along in (values, multipliers, inputs.x), (rates, forces, inputs.v):
+        if outputs:
+            added = vjp(outputs, adjoints, along) + [equations.tape.zero] * equations.n_z
+            result = [r + extra for r, extra in zip(result, added, strict=True)]
+    return result
 
 
 def constraint_jacobian(equations: Equations, rows: Sequence[int]) -> list[list[Node]]:
-    """B = ∂h/∂x of the rows, one list of n_v entries a row."""
+    """B = ∂h/∂x of the rows, ∂rate/∂v of those on velocities; one list of n_v entries a row."""
     inputs = Inputs.of(equations)
     h = [equations.rows[k].value for k in rows]
-    if equations.geometry is None:
-        return [gradient(value, inputs.x) for value in h]
-    known = equations.geometry.partials(h)
-    return _transposed(jvps(h, [{x: 1.0, **known[j]} for j, x in enumerate(inputs.x)])) if h else []
+    B = _slopes(equations, h)
+    for place, k in enumerate(rows):
+        if equations.rows[k].is_velocity:
+            B[place] = gradient(equations.rows[k].rate, inputs.v)
+    return B
+
+
+def _slopes(equations: Equations, values: Sequence[Node]) -> list[list[Node]]:
+    """∂value/∂x, one list of n_v entries a value."""
+    inputs = Inputs.of(equations)
+    if equations.geometry is None or not values:
+        return [gradient(value, inputs.x) for value in values]
+    known = equations.geometry.partials(values)
+    return _transposed(jvps(values, [{x: 1.0, **known[j]} for j, x in enumerate(inputs.x)]))
 
 
 def mass_matrix(equations: Equations, balance: Sequence[Node] | None = None) -> list[list[Node]]:
@@ -185,13 +211,18 @@ def _row_forces(
     return [[*line, *padding] for line in B]
 
 
-def _jacobian_rates(equations: Equations, B: Sequence[Sequence[Node]], hv: Sequence[Node]) -> Sequence[Sequence[Node]]:
-    """∂ḣ/∂x of each row; where coordinates add it is dB/dt, which reuses what B is made of."""
+def _jacobian_rates(equations: Equations, rows: Sequence[int], B: Sequence[Sequence[Node]]) -> Sequence[Sequence[Node]]:
+    """∂ḣ/∂x of each row; of positions, where coordinates add, it is dB/dt, which reuses what B is made of."""
     inputs = Inputs.of(equations)
+    hv = [equations.rows[k].rate for k in rows]
     if equations.compose is not None:
         return [gradient(rate, inputs.x) for rate in hv]
     flat = _time_rates(equations, [entry for line in B for entry in line])
-    return [flat[k * equations.n_v : (k + 1) * equations.n_v] for k in range(len(B))]
+    found = [flat[k * equations.n_v : (k + 1) * equations.n_v] for k in range(len(B))]
+    fast = [place for place, k in enumerate(rows) if equations.rows[k].is_velocity]
+    for place, slopes in zip(fast, _slopes(equations, [hv[place] for place in fast]), strict=True):
+        found[place] = slopes
+    return found
 
 
 def _time_rates(equations: Equations, values: Sequence[Node]) -> list[Node]:

@@ -75,7 +75,10 @@ def _acceleration(scope: Surroundings, joint: str, place: int) -> Scalar:
 
 
 def _offer_rows(outputs: Outputs, tape: Tape, rows: Sequence[Row], bilaterals: Iterable[Bilateral]) -> None:
-    """Multiplier and residual of each bilateral row; tension of rods, force or torque that drives a joint."""
+    """Multiplier and residual of each bilateral row; tension of rods, force or torque that drives a joint.
+
+    A row on velocities has its rate as residual, and the force −λ along the row.
+    """
     words = {constraint.name: constraint for constraint in bilaterals}
     for k, row in enumerate(rows):
         if row.contact >= 0:
@@ -83,7 +86,9 @@ def _offer_rows(outputs: Outputs, tape: Tape, rows: Sequence[Row], bilaterals: I
         multiplier = tape.input("lam", k)
         name = f"{row.owner}.{row.part}" if row.part else row.owner
         outputs.value(f"{name}.multiplier", multiplier)
-        outputs.value(f"{name}.residual", row.value)
+        outputs.value(f"{name}.residual", row.rate if row.is_velocity else row.value)
+        if row.is_velocity:
+            outputs.value(f"{name}.force", -multiplier)
         measure = words[row.owner].measure if row.owner in words else None
         if isinstance(measure, JointMeasure):
             outputs.value(f"{name}.{'torque' if row.unit == 'rad' else 'force'}", -multiplier)

@@ -48,9 +48,11 @@ class AveragedStep:
             terms = self._evaluate(t1, x, y1, a1, lam, (c_C, c_K))
             mass = np.asarray(self._evaluate(t1, x, y1, a1, lam, (0.0, 0.0)).S)
             r = (1.0 - alpha) * terms.r + alpha * (mass @ a1 + force0)
-            scale = np.max(np.abs(mass) @ np.abs(a1)) + np.max(np.abs(force0), initial=0.0) + 1e-280
+            scale = np.max(np.abs(mass) @ np.abs(a1)) + np.max(np.abs(force0), initial=0.0) + 1e-300
             error = float(np.max(np.abs(r)) / (1e-3 * self.scheme.tolerance * scale))
-            error = max(error, float(np.max(np.abs(terms.h), initial=0.0)) / (64.0 * EPS))
+            fast = np.zeros(len(terms.h), bool) if terms.velocity is None else np.asarray(terms.velocity, dtype=bool)
+            held = np.where(fast, terms.rate, terms.h)
+            error = max(error, float(np.max(np.abs(held), initial=0.0)) / (64.0 * EPS))
             if not np.isfinite(error):
                 return self._failed(iteration, error, "a force or a row is not finite")
             if error <= 1.0 or (iteration >= 2 and error > 0.5 * before and error < 1e3):
@@ -62,7 +64,7 @@ class AveragedStep:
             if m:
                 R = (1.0 - alpha) * np.asarray(terms.R)
                 matrix = np.block([[S, R], [np.asarray(terms.H), np.zeros((m, m))]])
-                right = np.concatenate([-r, -terms.h / c_K])
+                right = np.concatenate([-r, -held / np.where(fast, c_C, c_K)])
             change = np.linalg.solve(matrix, right)
             a1, lam = a1 + change[: len(r)], lam + change[len(r) :]
         return self._failed(MAX_ITERATIONS, error, "Newton did not converge")

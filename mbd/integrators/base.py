@@ -46,6 +46,8 @@ class Terms:
     R : (n, m) ∂r/∂λ, equal to Bᵀ unless forces depend on multipliers
     H : (m, n) row tangent: B for index 3, B + (c_K/c_C) ∂ḣ/∂x for the stabilized form; zero columns for z
     scale_r, scale_h, scale_rate : magnitudes term by term before cancellation; None: taken from the values
+    velocity : (m,) booleans, rows that hold velocities only: h = 0, `rate` and H = B + (c_K/c_C) ∂rate/∂x in both
+        forms; None: no such row
     """
 
     r: Vector
@@ -57,6 +59,7 @@ class Terms:
     scale_r: Vector | None = None
     scale_h: Vector | None = None
     scale_rate: Vector | None = None
+    velocity: Any = None
 
 
 class System(Protocol):
@@ -157,5 +160,5 @@ class Integrator(ABC):
         return Advance(state, memory, count, report)
 
     def check(self, rows: int) -> str | None:
-        """Why this scheme cannot integrate a mechanism with that many rows, or None."""
+        """Why this scheme cannot integrate a mechanism with that many rows on positions, or None."""
         return None

@@ -8,7 +8,7 @@ True accelerations v̇ satisfy the balance and the rows at t₁; an auxiliary a 
 
 First-order states follow the velocity formula with their own rates. With rows: index 3 enforces h(q₁) = 0;
 the stabilized form (Gear, Gupta & Leimkuhler 1985) enforces ḣ = 0 as well, by a position correction U that is
-normal to the rows in the metric of the Newton matrix.
+normal to the rows in the metric of the Newton matrix. Rows on velocities are enforced as they are in both.
 """
 
 from __future__ import annotations
@@ -225,11 +225,18 @@ class _Step:
             speed = float(np.max(np.abs(self.y[: self.n_v]), initial=0.0))
             limit = self.c_C * speed if self.scheme.stabilized else self.c_K * fastest
             parts.append(np.abs(terms.h) / (np.maximum(floor, tolerance * limit) + 1e-300))
-            if self.scheme.stabilized:
+            held = self._held(terms)
+            if np.any(held):
                 scale = np.ones(len(terms.h)) if terms.scale_rate is None else terms.scale_rate
                 limits = np.maximum(16.0 * EPS * scale, tolerance * self.c_C * fastest)
-                parts.append(np.abs(terms.rate) / (limits + 1e-300))
+                parts.append((np.abs(terms.rate) / (limits + 1e-300))[held])
         return float(np.max(np.concatenate(parts)))
+
+    def _held(self, terms: Terms) -> Any:
+        """Which rows are held at velocity level, (m,) booleans."""
+        if self.scheme.stabilized or terms.velocity is None:
+            return np.full(len(terms.h), self.scheme.stabilized)
+        return np.asarray(terms.velocity, dtype=bool)
 
     def _size_at_start(self) -> Vector:
         """Magnitude of the balance's terms before the step; where a force passes zero it has none of its own."""
@@ -275,10 +282,15 @@ class _Step:
         else:
             matrix = np.block([[terms.S, terms.R], [terms.H, np.zeros((m, m))]])
             stabilized = self.scheme.stabilized
-            goal = terms.rate / self.c_C if stabilized else terms.h / self.c_K
+            held = self._held(terms)
+            goal = terms.h / self.c_K
+            goal[held] = terms.rate[held] / self.c_C
             right = np.zeros((n + m, 2))
             right[:, 0] = np.concatenate([-terms.r, -goal])
-            right[n:, 1] = -(terms.h - self.c_K / self.c_C * terms.rate - terms.H[:, :n_v] @ self.shift)
+            if stabilized:
+                right[n:, 1] = -(terms.h - self.c_K / self.c_C * terms.rate - terms.H[:, :n_v] @ self.shift)
+                if terms.velocity is not None:  # corrections of positions go along these rows, not against them
+                    right[n:, 1][np.asarray(terms.velocity, dtype=bool)] = 0.0
             solved = np.linalg.solve(matrix, right)
             change = solved[:n, 0]
             self.lam = self.lam + solved[n:, 0]

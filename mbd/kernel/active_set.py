@@ -31,6 +31,7 @@ class ActiveSetManager:
         self.contacts: list[Contact] = []
         self.guards: list[Guard] = []
         self._row_contact = [row.contact for row in equations.rows]
+        self._row_level = [int(row.is_velocity) for row in equations.rows]
         for contact in equations.contacts:
             self.register(contact)
         for guard in equations.guards:
@@ -80,7 +81,7 @@ class ActiveSetManager:
             while_target.append(number[str(contact.only_while)] if named else -1)
         normals = [contact.rows[0] if contact.rows else -1 for contact in self.contacts]
         integers = {
-            "row_contact": self._row_contact,
+            "row_contact": self._row_contact, "row_level": self._row_level,
             "row_normal": [int(k in normals) for k in range(len(self._row_contact))],
             "kind": [int(contact.kind == "penalty") for contact in self.contacts],
             "opens": [opens[contact.opens_on] for contact in self.contacts],

@@ -22,6 +22,7 @@ from mbd.kernel.fields import (
     MODE,
     N_DROPPED,
     NEW_MODE,
+    NOT_CONVERGED,
     NOW,
     OPEN_FORCE,
     OPEN_PULL,
@@ -30,7 +31,10 @@ from mbd.kernel.fields import (
     RESTART,
     RESTARTS,
     ROWS,
+    SHORTENED,
     SINCE_STORE,
+    SINGULAR,
+    STAGNATED,
     STEPS,
     STORED,
     SWITCHES,
@@ -61,6 +65,9 @@ from mbd.kernel.restart import (
 )  # fmt: skip
 
 __all__ = ["advance"]
+
+SHORTEST = 0.1
+"""Part of a step below which a failing step is not shortened any further [-]."""
 
 
 def store_row(K: Any) -> None:
@@ -449,6 +456,11 @@ def advance(K: Any) -> int:
             t1 = K.until
         h = t1 - t
         status = try_step(K, h, t1)
+        full = h
+        while (status == NOT_CONVERGED or status == STAGNATED or status == SINGULAR) and h > SHORTEST * full:
+            h *= 0.6180339887498949  # a pose in which rows lose rank is stepped over; stiff places get smaller steps
+            t1 = t + h
+            status = try_step(K, h, t1)
         if status != 0:
             return status
         K.counts[STEPS] += 1
@@ -473,6 +485,10 @@ def advance(K: Any) -> int:
         else:
             accept(K, h, t1)
             K.state[GRID] += 1
+            if h < full:
+                K.counts[SHORTENED] += 1
+                K.clock[BASE] = t1
+                K.state[GRID] = 0
             if not holds:  # the pose has changed its rank
                 K.state[RESTART] = 2
             if cut:  # a boundary inside the run: the grid goes on from here

@@ -28,7 +28,7 @@ REAL_ARRAYS = (
     "clock",  # time, base time of the grid, step size of aux, time of the last switch
     "q", "y", "rate", "aux", "slope", "lam", "lam_slope", "shift", "shift_change", "anchors",  # accepted state
     "q1", "y1", "rate1", "aux1", "lam1", "shift1",  # candidate of the step under judgement
-    "kkt", "rhs", "work",  # linear algebra
+    "kkt", "rhs", "work", "spare",  # linear algebra
     "basis", "lower", "mix",  # dependent rows as combinations of others
     "force", "bias", "jump", "impulse",  # complementarity: right-hand sides, velocity or acceleration, multipliers
     "guards0", "guards1",  # guard values at the accepted state and at the candidate
@@ -41,6 +41,7 @@ REAL_ARRAYS = (
 )  # fmt: skip
 INTEGER_ARRAYS = (
     "row_contact", "row_normal",  # contact of each row; 1 for its normal row
+    "row_level",  # of each row: 0 holds positions, 1 velocities only
     "row_unit",  # 0 [m], 1 [rad], 2 other, of each row
     "unit",  # unit block of each balance component
     "kind", "opens", "normal",  # contact: 0 unilateral, 1 penalty; 0 on pull, 1 on gap, 2 by When; its normal row
@@ -57,11 +58,12 @@ FIELDS = (*INTEGERS, *REALS, *REAL_ARRAYS, *INTEGER_ARRAYS, "code", "hooks")
 Kernel = namedtuple("Kernel", FIELDS)  # type: ignore[misc]
 
 # places in `state`
-MODE, ROWS, GRID, RESTART, STORED, LOGGED, SWITCHES, SINCE_STORE, BLOCKED, FRESH, N_DROPPED = range(11)
+MODE, ROWS, GRID, RESTART, STORED, LOGGED, SWITCHES, SINCE_STORE, BLOCKED, FRESH, N_DROPPED, NEAR = range(12)
 # places in `counts`
-(STEPS, ITERATIONS, TANGENTS, RESIDUALS, FACTORIZATIONS, EVENTS, RESTARTS, IMPACTS, LOCATIONS, STAGNATIONS, DEEPEST) = (
-    range(11)
-)
+(
+    STEPS, ITERATIONS, TANGENTS, RESIDUALS, FACTORIZATIONS, EVENTS, RESTARTS, IMPACTS, LOCATIONS, STAGNATIONS, CAREFUL,
+    SHORTENED,
+) = range(12)  # fmt: skip
 # places in `clock`
 NOW, BASE, AUX_STEP, LAST_SWITCH = range(4)
 # functions in `code`; modes follow in pairs (tangent, residual)

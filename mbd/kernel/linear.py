@@ -21,7 +21,7 @@ def factor(A: Any, n: int, pivots: Any) -> int:
                 big = size
                 p = i
         pivots[k] = p
-        if not (big > 1e-300 and big < 1e300):
+        if not (big > 1e-305 and big < 1e300):
             return k + 1
         if p != k:
             for j in range(n):

@@ -9,13 +9,16 @@ from __future__ import annotations
 
 from typing import Any
 
+from mbd.kernel.careful import careful_correction
 from mbd.kernel.fields import (
     AUX_STEP,
     BLOCKED,
+    CAREFUL,
     EPS,
     FACTORIZATIONS,
     ITERATIONS,
     MODE,
+    NEAR,
     NOT_CONVERGED,
     NOT_FINITE,
     NOW,
@@ -34,6 +37,10 @@ __all__ = ["newmark_accept", "newmark_start", "newmark_step"]
 
 MOST_HALVINGS = 10
 """How often a Newton correction is halved before the iteration goes on from where it is."""
+CONTINUOUS = 0.05
+"""Part of the speed by which a careful step may differ from its prediction: the branch is continuous in velocity [-]."""
+WATCHFUL = 20
+"""Steps after a careful one in which every step must continue its branch."""
 FAR = 1e4
 """Residual over its tolerance above which a correction that does not reduce it is halved."""
 
@@ -88,9 +95,13 @@ def residual_size(K: Any, o_r: int, m: int, c_C: float, c_K: float, tolerance: f
         h = abs(K.out[o_h + k])
         finite += h
         limit = tolerance * c_K * fastest
+        floor = 16.0 * EPS * K.scale[K.n + row]
         if K.stabilized == 1:
             limit = tolerance * c_C * speed
-        size = max(size, h / (max(16.0 * EPS * K.scale[K.n + row], limit) + 1e-300))
+        elif K.row_level[row] == 1:  # a rate stands in the place of h
+            limit = tolerance * c_C * fastest
+            floor = 16.0 * EPS * K.scale[K.n + K.n_rows + row]
+        size = max(size, h / (max(floor, limit) + 1e-300))
         if K.stabilized == 1:
             rate = abs(K.out[o_h + m + k])
             finite += rate
@@ -113,6 +124,9 @@ def newmark_step(K: Any, h: float, t1: float) -> int:
     c_C = K.gamma * h * c
     c_K = K.beta * h * h * c
     predict(K, h, t1, c_C, c_K)
+    if K.state[NEAR] > 0:
+        for i in range(K.n):
+            K.y1[i] = K.block[K.o_v + i]
     tolerance = 4.0 * EPS if K.exact == 1 else 1e-3 * K.tolerance
     before = 1e300
     left = 1e300  # the error where the last correction started
@@ -139,6 +153,8 @@ def newmark_step(K: Any, h: float, t1: float) -> int:
         K.detail[1] = error
         if error > 1.0 and iteration >= 2 and error > 0.5 * before:
             raise_scales(K, True)
+            if runs_away(K, m):
+                break
             error = residual_size(K, o_r, m, c_C, c_K, tolerance)
             if error > 1.0 and residual_size(K, o_r, m, 0.0, 0.0, 256.0 * EPS) <= 16.0:
                 K.counts[STAGNATIONS] += 1
@@ -147,6 +163,10 @@ def newmark_step(K: Any, h: float, t1: float) -> int:
                 status = STAGNATED
                 break
         if error <= 1.0:
+            if K.state[NEAR] > 0:
+                if leaves_branch(K):
+                    break
+                K.state[NEAR] -= 1
             finish(K, h)
             return 0
         if not tangent and error > 0.3 * before:
@@ -164,9 +184,75 @@ def newmark_step(K: Any, h: float, t1: float) -> int:
         if iteration == 0 and K.exact == 0:  # the predictor's error measures that of the step: stay far below it
             tolerance = min(K.tolerance, max(1e-4 * biggest, tolerance))
         fresh = True
+    if m > 0 and K.stabilized == 1 and status != NOT_FINITE and careful_step(K, h, t1, c_C, c_K):
+        return 0
     K.detail[0] = t1
     K.detail[2] = h
     return status
+
+
+def runs_away(K: Any, m: int) -> bool:
+    """Whether multipliers fight each other: their forces cancel to less than 1e-7 of their size.
+
+    Then r would vanish beside its terms whatever the motion, and a step must not be accepted for it.
+    """
+    size = K.n + m
+    call(K, K.mode_code[2 * K.state[MODE]], K.spare)
+    largest = 0.0
+    total = 0.0
+    for i in range(K.n):
+        terms = 0.0
+        force = 0.0
+        for k in range(m):
+            part = K.spare[i * size + K.n + k] * K.block[K.o_lam + K.rows[k]]
+            terms += abs(part)
+            force += part
+        largest = max(largest, terms)
+        total = max(total, abs(force))
+    return largest > 1e7 * total and largest > 1e3 * K.work[0]
+
+
+def leaves_branch(K: Any) -> bool:
+    """Whether velocities are no continuation of those before the step (the predicted ones are in K.y1)."""
+    fastest = 0.0
+    change = 0.0
+    for i in range(K.n_v):
+        fastest = max(fastest, max(abs(K.y[i]), abs(K.y1[i])))
+        change = max(change, abs(K.block[K.o_v + i] - K.y1[i]))
+    return change > CONTINUOUS * fastest
+
+
+def careful_step(K: Any, h: float, t1: float, c_C: float, c_K: float) -> bool:
+    """The step once more with separate matrices for positions and velocities; whether it converged."""
+    m = K.state[ROWS]
+    size = K.n + m
+    predict(K, h, t1, c_C, c_K)
+    for i in range(K.n):
+        K.y1[i] = K.block[K.o_v + i]
+    before = 1e300
+    for iteration in range(K.max_iterations):
+        call(K, K.mode_code[2 * K.state[MODE]], K.out)
+        K.counts[TANGENTS] += 1
+        error = residual_size(K, size * size, m, c_C, c_K, K.tolerance)
+        if error >= 0.0 and iteration >= 2 and error > 0.5 * before:
+            raise_scales(K, True)
+            if runs_away(K, m):
+                return False
+            error = residual_size(K, size * size, m, c_C, c_K, K.tolerance)
+            if residual_size(K, size * size, m, 0.0, 0.0, 256.0 * EPS) <= 64.0:
+                K.counts[STAGNATIONS] += 1
+                error = min(error, 1.0)
+        if 0.0 <= error <= 1.0:
+            if leaves_branch(K):
+                return False
+            K.counts[CAREFUL] += 1
+            K.state[NEAR] = WATCHFUL
+            finish(K, h)
+            return True
+        before = error
+        if error < 0.0 or not careful_correction(K, c_C, c_K):
+            return False
+    return False
 
 
 def predict(K: Any, h: float, t1: float, c_C: float, c_K: float) -> None:
@@ -196,6 +282,8 @@ def predict(K: Any, h: float, t1: float, c_C: float, c_K: float) -> None:
 def right_hand_sides(K: Any, o_r: int, m: int, c_C: float, c_K: float, tangent: bool) -> bool:
     """−r and −h/c_K (index 3) or −ḣ/c_C in K.rhs; for the stabilized form the position residual in K.work.
 
+    Rows on velocities have −rate/c_C in both forms and take no part in the correction of positions.
+
     Returns whether positions need correcting: at round-off they stay, correcting would only stir the velocity rows.
     With a new tangent the whole correction U is solved for, so that it stays normal to the rows.
     """
@@ -207,9 +295,13 @@ def right_hand_sides(K: Any, o_r: int, m: int, c_C: float, c_K: float, tangent: 
         K.work[i] = 0.0
     for k in range(m):
         if K.stabilized == 0:
-            K.rhs[n + k] = -K.out[o_h + k] / c_K
+            K.rhs[n + k] = -K.out[o_h + k] / (c_C if K.row_level[K.rows[k]] == 1 else c_K)
             continue
         rate = K.out[o_h + m + k]
+        K.rhs[n + k] = -rate / c_C
+        if K.row_level[K.rows[k]] == 1:  # corrections of positions go along the row, not against it
+            K.work[n + k] = 0.0
+            continue
         h = K.out[o_h + k]
         if abs(h) > 16.0 * EPS * K.scale[n + K.rows[k]]:
             shifting = True
@@ -217,7 +309,6 @@ def right_hand_sides(K: Any, o_r: int, m: int, c_C: float, c_K: float, tangent: 
         if tangent:
             for j in range(K.n_v):
                 h -= K.out[(n + k) * (n + m) + j] * K.shift1[j]
-        K.rhs[n + k] = -rate / c_C
         K.work[n + k] = -h
     return shifting
 

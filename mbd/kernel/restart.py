@@ -70,7 +70,7 @@ def refresh_scales(K: Any) -> None:
     """Magnitudes of r, h and ḣ, term by term before cancellation, at the state now in the block."""
     call(K, SCALES, K.scale)
     for i in range(K.n):
-        K.scale[i] = max(K.scale[i], 1e-280)
+        K.scale[i] = max(K.scale[i], 1e-300)
     for unit in range(2):  # forces [N] and torques [N m] are judged as blocks of their own
         big = 0.0
         for i in range(K.n):

@@ -15,8 +15,8 @@ __all__ = ["Violation", "violation"]
 class Violation:
     """Largest |h| of the active rows over a run, by unit, and where it occurred.
 
-    length [m], angle [rad], rate: largest |ḣ| [m/s or rad/s]; worst : owner and part of the row with the largest |h|,
-    '' without rows
+    length [m], angle [rad], rate: largest |ḣ|, also of rows on velocities [m/s or rad/s]; worst : owner and part of the
+    row with the largest |h|, '' without rows
     """
 
     length: float = 0.0
@@ -43,6 +43,7 @@ def violation(columns: ModelColumns) -> Violation:
     for number, row in enumerate(rows):
         active = columns.record.closed[:, row.contact].astype(bool) if row.contact >= 0 else np.True_
         size = float(np.max(np.abs(values[number]), initial=0.0, where=active))
+        size = 0.0 if row.is_velocity else size
         largest[row.unit] = max(largest.get(row.unit, 0.0), size)
         fastest = max(fastest, float(np.max(np.abs(values[len(rows) + number]), initial=0.0, where=active)))
         if size > highest:

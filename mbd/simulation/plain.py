@@ -9,10 +9,12 @@ import numpy as np
 
 from mbd.arrays import Vector
 from mbd.compile.mechanism import Mechanism
+from mbd.equations.programs import mass_matrix
 from mbd.integrators.base import Integrator, Point, StepReport, Terms
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.kernel.fields import ITERATIONS, NOT_CONVERGED, NOT_FINITE, NOW
 from mbd.state import Mode, State
+from mbd.tape.derivatives import live
 
 __all__ = ["MechanismSystem", "PlainScheme", "row_units", "unit_blocks"]
 
@@ -35,6 +37,14 @@ class MechanismSystem:
         self.evaluated: Vector | None = None  # the inputs evaluated last, to explain a failure with
         layout = mechanism.layout
         self.n_q, self.n_v, self.n_z = layout.n_q, layout.n_v, layout.n_z
+
+    @property
+    def constant_mass(self) -> bool:
+        """Whether neither posture nor time enters the mass matrix."""
+        equations = self.mechanism.equations
+        with equations.tape.lock:
+            inside = live([entry for column in mass_matrix(equations) for entry in column])
+        return not any(node.op == "input" and node.data[0] in ("t", "q", "x") for node in inside)
 
     def _active(self, mode: Mode) -> tuple[tuple[int, ...], tuple[int, ...]]:
         flags = self.manager.flags(mode.closed)
@@ -69,16 +79,21 @@ class MechanismSystem:
                 block[1:3] = (2.0, 0.0)
                 code.tangent(block, self.parameters, other)
                 matrix = 2.0 * matrix - other[: (n + m) ** 2].reshape(n + m, n + m)
+        velocity = np.array([self.mechanism.equations.rows[row].is_velocity for row in rows], dtype=bool)
+        h, rate = out[n : n + m], out[n + m :]
+        if not self.stabilized:  # index 3 has the rate of a row on velocities in the place of h
+            h, rate = np.where(velocity, 0.0, h), np.where(velocity, h, 0.0)
         return Terms(
             out[:n],
             None if matrix is None else matrix[:n, :n],
-            out[n : n + m],
-            out[n + m :] if self.stabilized else np.zeros(m),
+            h,
+            rate,
             None if matrix is None else matrix[:n, n:],
             None if matrix is None else matrix[n:, :n],
             _by_unit(r_size, self.mechanism),
             h_size[picked],
             rate_size[picked],
+            velocity if velocity.any() else None,
         )
 
     def _block(self, point: Point, rows: Sequence[int], penalties: Sequence[int]) -> Vector:
@@ -112,7 +127,7 @@ class MechanismSystem:
 def _by_unit(scale: Vector, mechanism: Mechanism) -> Vector:
     """Forces and torques as blocks of their own, as the kernel judges them."""
     units = unit_blocks(mechanism)
-    result = np.maximum(scale, 1e-280)
+    result = np.maximum(scale, 1e-300)
     for unit in (0, 1):
         chosen = units == unit
         if chosen.any():

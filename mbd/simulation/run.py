@@ -318,7 +318,7 @@ class Run:
         counts = self.values["counts"]
         names = (
             "steps", "iterations", "tangents", "residuals", "factorizations", "events", "restarts", "impacts",
-            "locations", "stagnations",
+            "locations", "stagnations", "careful", "shortened",
         )  # fmt: skip
         numbers: dict[str, Any] = {name: int(counts[place]) for place, name in enumerate(names)}
         numbers["modes"] = len(self.stepper.modes)
@@ -337,6 +337,9 @@ class Run:
                 f"redundant constraints: {', '.join(dependent)} depend on other rows; the motion is unique, their "
                 "multipliers are not: those of least norm are given"
             )
+        shortened = int(v["counts"][F.SHORTENED])
+        if shortened:
+            notes.append(f"{shortened} steps were shortened where Newton's method failed at the full dt")
         for c, contact in enumerate(self.manager.contacts):
             if v["deepest"][c] < -1e-9:
                 notes.append(

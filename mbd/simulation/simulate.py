@@ -88,8 +88,7 @@ def simulate(
     manager = ActiveSetManager(mechanism.equations)
     fits(start, mechanism.equations, manager)
     end, stop = end_of(until, manager, dt, start.time)
-    rows = len(mechanism.equations.rows)
-    refusal = scheme.check(rows)
+    refusal = scheme.check(sum(not row.is_velocity for row in mechanism.equations.rows))
     if refusal:
         raise CapabilityError(refusal)
     settings = {

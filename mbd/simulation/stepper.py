@@ -102,6 +102,7 @@ class Stepper:
             "lam": rows, "lam_slope": rows, "shift": n, "shift_change": n,
             "anchors": v["n_anchors"], "q1": n_q, "y1": n, "rate1": n, "aux1": n, "lam1": rows, "shift1": n,
             "basis": (rows + 1) * n, "lower": (rows + 1) * rows, "mix": rows * rows, "kkt": size * size, "rhs": size,
+            "spare": size * size + n + 2 * rows,
             "work": 3 * size, "force": n, "bias": rows, "jump": n, "impulse": rows,
             "guards0": 4 * contacts + 2 * guards, "guards1": 4 * contacts + 2 * guards, "scale": n + 2 * rows,
             "deepest": contacts, "sinking": contacts, "side": guards, "pick": 8, "detail": 8,

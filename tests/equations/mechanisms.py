@@ -2,103 +2,10 @@
 
 from __future__ import annotations
 
-import random
-
 import mbd
-from mbd.bodies.ground import Ground
+from mbd.testing.mechanisms import furnished, random_tree
 
 __all__ = ["four_bar", "furnished", "leg", "random_tree", "walker"]
-
-
-def random_body(rng: random.Random, name: str, spatial: bool) -> mbd.RigidBody:
-    """A body with a centre off its origin and an inertia that a real body can have."""
-    a, b, c = (rng.uniform(0.1, 1.0) for _ in range(3))
-    inertia = (b + c, a + c, a + b, 0.05 * rng.uniform(-1, 1), 0.05 * rng.uniform(-1, 1), 0.05 * rng.uniform(-1, 1))
-    center = (rng.uniform(-0.5, 0.5), rng.uniform(-0.5, 0.5), rng.uniform(-0.5, 0.5) if spatial else 0.0)
-    return mbd.RigidBody(name, mass=rng.uniform(0.5, 2.0), inertia=inertia if spatial else a, center=center)
-
-
-def random_frame(rng: random.Random, body: mbd.RigidBody | Ground, spatial: bool, turned: float):
-    """A point of a body, sometimes with turned axes."""
-    frame = body.point(rng.uniform(-0.6, 0.6), rng.uniform(-0.6, 0.6), rng.uniform(-0.6, 0.6) if spatial else 0.0)
-    if rng.random() < turned:
-        axis = [rng.uniform(-1, 1) for _ in range(3)] if spatial else (0.0, 0.0, 1.0)
-        frame = frame.turned(rng.uniform(-1, 1), axis)
-    return frame
-
-
-def random_joint(rng: random.Random, name: str, a, b, spatial: bool):
-    """A joint of any kind."""
-    if not spatial:
-        kinds = [
-            lambda: mbd.Revolute(name, a, b),
-            lambda: mbd.Prismatic(name, a, b, axis=(0.6, 0.8, 0.0)),
-            lambda: mbd.Translation(name, a, b),
-            lambda: mbd.Planar(name, a, b),
-        ]
-    else:
-        axis = [rng.uniform(-1, 1) for _ in range(3)]
-        kinds = [
-            lambda: mbd.Revolute(name, a, b, axis=axis),
-            lambda: mbd.Prismatic(name, a, b, axis=axis),
-            lambda: mbd.Cylindrical(name, a, b),
-            lambda: mbd.Universal(name, a, b),
-            lambda: mbd.Screw(name, a, b, pitch=0.3, axis=axis),
-            lambda: mbd.Translation(name, a, b, axes="xyz"),
-        ]
-    return rng.choice(kinds)()
-
-
-def random_tree(seed: int, bodies: int, spatial: bool, most: int = 6, turned: float = 0.5) -> mbd.Model:
-    """A tree of bodies with random joints, some described from the far side; at most `most` coordinates.
-
-    turned : share of frames with axes of their own
-    """
-    rng = random.Random(seed)
-    gravity = [rng.uniform(-10, 10) for _ in range(3)] if spatial else (rng.uniform(-3, 3), -9.81, 0.0)
-    model = mbd.Model("random tree", gravity=gravity)
-    known: list = [model.ground]
-    coordinates = 0
-    for k in range(bodies):
-        body, onto = random_body(rng, f"body {k}", spatial), rng.choice(known)
-        ends = [random_frame(rng, onto, spatial, turned), random_frame(rng, body, spatial, turned)]
-        if rng.random() < 0.4:
-            ends.reverse()
-        joint = random_joint(rng, f"joint {k}", *ends, spatial)
-        if coordinates + len(joint.labels) > most:
-            joint = mbd.Revolute(f"joint {k}", *ends)
-        if coordinates + 1 > most:
-            break
-        coordinates += len(joint.labels)
-        model.connect(joint)
-        known.append(body)
-    return model
-
-
-def furnished(model: mbd.Model, seed: int) -> mbd.Model:
-    """The model with a spring, a damper, applied forces, and rows between its last body and the ground."""
-    rng = random.Random(seed)
-    bodies = [body for body in model.bodies.values() if body is not model.ground]
-    last, first = bodies[-1], bodies[0]
-    spatial = any(joint.is_planar is False for joint in model.joints)
-
-    def point(body):
-        return body.point(rng.uniform(-0.5, 0.5), rng.uniform(-0.5, 0.5), rng.uniform(-0.5, 0.5) if spatial else 0.0)
-
-    anchor = model.ground.point(2.0, 1.5, 0.7 if spatial else 0.0)
-    model.apply(
-        mbd.Spring("spring", anchor, point(last), stiffness=7.0, length=0.8),
-        mbd.Damper("damper", point(model.ground), point(last), mbd.Viscous(0.7) + mbd.Quadratic(0.3)),
-        mbd.Applied("push", point(last), force=lambda t, p: (mbd.sin(t) * p[0], 2.0, 0.3 * t), torque=(0.3, -0.2, 0.5),
-                    arguments=("t", point(first))),
-        mbd.Potential("well", lambda p: 0.5 * p[0] * p[0] * p[1], arguments=(point(last),)),
-    )  # fmt: skip
-    model.constrain(
-        mbd.Bilateral("rod", mbd.distance(model.ground.point(3.0, 2.0), point(last)), value=lambda t: 2.0 + 0.1 * t**2),
-        mbd.Unilateral("foot", mbd.touchdown(point(last), ground=lambda x: 0.1 * mbd.sin(x))),
-        mbd.Penalty("pad", mbd.height(point(last)), stiffness=50.0, damping=2.0, exponent=2),
-    )
-    return model
 
 
 def leg() -> mbd.Model:

@@ -65,14 +65,12 @@ def test_a_step_that_does_not_converge_names_what_is_closed_and_what_to_try():
     model.constrain(mbd.Penalty("floor", mbd.height(body.origin), stiffness=1e18, exponent=3))
     trajectory = run(model, {"fall.displacement": 1.0}, on_failure="return", until=2.0, dt=0.1)
     if not trajectory.success:
-        assert "smaller dt" in trajectory.message and "'floor'" in trajectory.message
+        assert "'floor' closed" in trajectory.message and "dt" in trajectory.message
     assert np.isfinite(trajectory.record.q).all()
 
 
 def test_chatter_lists_the_contacts_that_switch():
-    trajectory = run(
-        ball(restitution=0.5), {"fall.displacement": 1.0}, until=2.0, rest_speed=0.0, on_failure="return"
-    )
+    trajectory = run(ball(restitution=0.5), {"fall.displacement": 1.0}, until=2.0, rest_speed=0.0, on_failure="return")
     assert not trajectory.success
     assert "'floor' closed" in trajectory.message and "switches" in trajectory.message
     assert trajectory["fall.displacement"].min() > -1e-12
@@ -100,9 +98,7 @@ def test_a_signal_from_the_keyboard_reaches_a_compiled_run():
     start = mbd.assemble(model, {"hinge.angle": 1.0})
     mbd.simulate(model, start, mbd.HHT(0.05), dt=1e-3, until=0.1)
     threading.Timer(0.2, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
-    trajectory = mbd.simulate(
-        model, start, mbd.HHT(0.05), dt=1e-7, until=1e4, store=10**6, on_failure="return"
-    )
+    trajectory = mbd.simulate(model, start, mbd.HHT(0.05), dt=1e-7, until=1e4, store=10**6, on_failure="return")
     assert "interrupted" in trajectory.message and 0.0 < trajectory.final.time < 1e4
 
 

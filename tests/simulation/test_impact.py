@@ -240,3 +240,13 @@ def test_an_impact_on_a_moving_floor_takes_the_speed_of_the_floor():
     assert trajectory["fall.displacement"][after] == pytest.approx(0.1 * np.sin(5.0 * t), abs=1e-12)
     assert trajectory["fall.rate"][after] == pytest.approx(0.5 * np.cos(5.0 * t), abs=1e-12)
     assert trajectory["floor.gap"][after:].min() > -1e-12
+
+
+def test_a_box_lands_flat_on_two_sticking_corners_and_rests():
+    """Their tangent rows depend on each other: the motion is unique, the split of the friction is not, and it is said."""
+    trajectory = run(box(friction=None), {"place.y": 1.0}, {"place.x": 0.5, "place.y": 0.0})
+    assert {event.name for event in trajectory.events} == {"left", "right"}
+    assert trajectory["left.force"][-1] + trajectory["right.force"][-1] == pytest.approx(2.0 * G, rel=1e-9)
+    np.testing.assert_allclose(trajectory.record.v[-1], 0.0, atol=1e-9)
+    assert trajectory["place.x"][-1] == pytest.approx(0.5 * trajectory.events[0].time, abs=1e-9)
+    assert any("not" in note and "unique" in note for note in trajectory.stats["notes"])

@@ -1,0 +1,119 @@
+"""Stiffness, loss and step of a penalty contact from what it shall do."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from mbd.bodies.values import number
+from mbd.constraints.restitution import (
+    KELVIN_VOIGT,
+    blow_integral,
+    chi_for,
+    damping_ratio_for,
+    law_of,
+    over_angle,
+    restitution_of_chi,
+    restitution_of_ratio,
+    stored_work,
+    wanted,
+)
+from mbd.errors import ModelError
+
+__all__ = ["PenaltyParameters", "penalty_parameters"]
+
+STEPS_IN_CONTACT = 10.0
+"""Steps that resolve a blow: its peak force is right to some percent, its restitution to some thousandths."""
+
+
+@dataclass(frozen=True)
+class PenaltyParameters:
+    """A penalty contact of a wanted blow.
+
+    stiffness : k [N/mⁿ, or N m/radⁿ]
+    damping : c of Kelvin–Voigt [N s/m, or N m s/rad]; 0 for the χ laws
+    chi : χ of the other laws; 0 for Kelvin–Voigt
+    restitution : what the law gives, which a published χ only comes near
+    duration : of the blow [s]
+    largest_dt : a tenth of it [s]
+    """
+
+    stiffness: float
+    damping: float
+    chi: float
+    restitution: float
+    duration: float
+    largest_dt: float
+
+
+def penalty_parameters(
+    restitution: float,
+    penetration: float,
+    effective_mass: float,
+    approach_speed: float,
+    exponent: float = 1.0,
+    law: str | None = None,
+    release: str = "gap",
+) -> PenaltyParameters:
+    """Stiffness, loss, duration and largest safe dt of the blow that goes so deep and leaves with so much speed.
+
+    Other forces than that of the contact are neglected, as they are in a short blow. χ laws, with `chi_for(e, law)`:
+
+        k = (n+1) m δ̇₀² Φ/δ_maxⁿ⁺¹,   Φ = (χ − ln(1+χ))/χ²
+        T = (m δ̇₀/k) ((n+1) m δ̇₀²/k)^(−n/(n+1)) ∫_{−e}¹ P^(−n/(n+1)) dw/(1+χ w),   P = ∫_w¹ s ds/(1+χ s)
+
+    Kelvin–Voigt, with ζ of `damping_ratio_for(e, release)` and ``φ = arccos ζ/√(1−ζ²)`` (arcosh ζ/√(ζ²−1) above 1):
+
+        k = m (δ̇₀ exp(−ζ φ)/δ_max)²,   c = 2 ζ √(k m),   T = 2 φ √(m/k) ('pull') or π √(m/k)/√(1−ζ²) ('gap')
+
+    Parameters
+    ----------
+    restitution : e, 0.05 to 1
+    penetration : δ_max, how deep the blow may go [m or rad]
+    effective_mass : mass that the contact feels, ``1/(J M⁻¹ Jᵀ)`` with J = ∂g/∂q [kg, or kg m²]
+    approach_speed : δ̇₀ of the fastest blow [m/s or rad/s]
+    exponent : n
+    law, release : as for `Penalty`
+
+    >>> found = penalty_parameters(0.5, penetration=1e-3, effective_mass=2.0, approach_speed=1.0)
+    >>> f"{found.stiffness:.4g} N/m, chi {found.chi:.4f}, dt up to {found.largest_dt:.2g} s"
+    '...'
+    """
+    title = "penalty_parameters"
+    law = law_of(law, title)
+    e = wanted(number(restitution, f"restitution of {title}"), title)
+    given = {"penetration": penetration, "effective_mass": effective_mass, "approach_speed": approach_speed}
+    values = {name: number(value, f"{name} of {title}") for name, value in given.items()}
+    n = number(exponent, f"exponent of {title}")
+    faults = [f"{title}: {name} {value:g} must be positive" for name, value in values.items() if value <= 0.0]
+    if n < 1.0:
+        faults.append(f"{title}: exponent {n:g} is below 1, endlessly stiff at touch; give n ≥ 1")
+    if release not in ("gap", "pull"):
+        faults.append(f"{title}: release is 'gap' or 'pull', got {release!r}")
+    if law == KELVIN_VOIGT and n != 1.0:
+        faults.append(f"{title}: law='{KELVIN_VOIGT}' reaches a restitution for exponent 1 only, got exponent {n:g}")
+    if faults:
+        raise ModelError(faults)
+    blow = (e, *values.values())
+    return _kelvin_voigt(*blow, release) if law == KELVIN_VOIGT else _hysteretic(*blow, n, chi_for(e, law))
+
+
+def _kelvin_voigt(e: float, depth: float, mass: float, speed: float, release: str) -> PenaltyParameters:
+    """Of the damped oscillator."""
+    ratio = damping_ratio_for(e, release)
+    angle = over_angle(ratio)
+    stiffness = mass * (speed * math.exp(-ratio * angle) / depth) ** 2
+    pace = math.sqrt(stiffness / mass)
+    duration = 2.0 * angle / pace if release == "pull" else math.pi / (pace * math.sqrt(1.0 - ratio * ratio))
+    c = 2.0 * ratio * math.sqrt(stiffness * mass)
+    found = restitution_of_ratio(ratio, release)
+    return PenaltyParameters(stiffness, c, 0.0, found, duration, duration / STEPS_IN_CONTACT)
+
+
+def _hysteretic(e: float, depth: float, mass: float, speed: float, n: float, chi: float) -> PenaltyParameters:
+    """Of a χ law."""
+    energy = (n + 1.0) * mass * speed**2
+    stiffness = energy * stored_work(chi) / depth ** (n + 1.0)
+    pace = mass * speed / stiffness * (energy / stiffness) ** (-n / (n + 1.0))
+    duration = pace * blow_integral(chi, n)
+    return PenaltyParameters(stiffness, 0.0, chi, restitution_of_chi(chi), duration, duration / STEPS_IN_CONTACT)

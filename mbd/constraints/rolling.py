@@ -1,0 +1,96 @@
+"""A wheel that rolls without slip."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from mbd.bodies.algebra import cross, dot, scaled, total
+from mbd.bodies.base import Frame
+from mbd.bodies.ground import Ground
+from mbd.bodies.values import name_of, number
+from mbd.constraints.base import VelocityConstraint
+from mbd.constraints.touchdown import Plane
+from mbd.errors import CapabilityError, ModelError
+from mbd.forces.base import frame_of
+from mbd.forces.quantities import Mention
+from mbd.scope import Scope
+from mbd.tape.node import Node, Scalar
+
+__all__ = ["Rolling"]
+
+
+@dataclass(frozen=True)
+class Rolling(VelocityConstraint):
+    """``t · (v_C + ω × (−r n)) = 0``: the point of a wheel that touches a plane does not slip along it.
+
+    n is the plane's normal and t the direction forward along it (x on level ground), r the radius, C the centre. Only
+    the slip is held at zero; the wheel stays on the plane by what you give it, such as ``Bilateral`` or ``Unilateral``
+    on ``touchdown(center, Plane(offset=radius))`` without friction, or a joint.
+
+    Parameters
+    ----------
+    name : its name
+    center : the centre of the wheel, a frame of the body that turns
+    radius : r, the run-time parameter 'name.radius' [m]
+    ground : the plane it rolls on, y = 0 by default
+
+    'name.force' is the friction on the wheel along t [N], −λ; 'name.residual' the slip [m/s].
+
+    Raises
+    ------
+    CapabilityError
+        where the wheel turns about other axes than z: a disk that tilts touches the ground elsewhere.
+    """
+
+    name: str
+    center: Frame
+    radius: float
+    ground: Plane = Plane()
+
+    def __post_init__(self) -> None:
+        name_of(self.name, "Rolling")
+        frame_of(self.center, f"center of Rolling '{self.name}'")
+        object.__setattr__(self, "radius", number(self.radius, f"radius of '{self.name}'"))
+        if not isinstance(self.ground, Plane):
+            raise ModelError(f"ground of Rolling '{self.name}' is a mbd.Plane, got {self.ground!r}")
+        if self.ground.normal[2] != 0.0:
+            raise ModelError(
+                f"ground of Rolling '{self.name}': its normal must lie in the x-y plane, in which the wheel rolls, "
+                f"got {self.ground.normal}"
+            )
+
+    @property
+    def unit(self) -> str:
+        """'m'."""
+        return "m"
+
+    def rates(self, scope: Scope) -> Sequence[tuple[str, Scalar]]:
+        """Velocity of the touching point along the plane."""
+        motion = scope.frame(self.center)
+        if any(isinstance(part, Node) and not part.is_zero for part in motion.angular_velocity[:2]):
+            raise CapabilityError(
+                f"Rolling '{self.name}' serves wheels of planar mechanisms, which turn about z only; a disk or ball "
+                "that tilts in space is not solved by this version: write its rows with mbd.Nonholonomic"
+            )
+        r = scope.parameter(self.name, "radius", self.radius)
+        slip = total(motion.velocity, cross(motion.angular_velocity, scaled(-r, self.ground.normal)))
+        forward, _ = self.ground.directions(motion.position, scope)
+        return [("", dot(forward, slip))]
+
+    def mentions(self) -> list[Mention]:
+        """Its centre."""
+        return [self.center]
+
+    def parameters(self) -> dict[str, float]:
+        """`radius`."""
+        return {f"{self.name}.radius": self.radius}
+
+    def faults(self) -> list[str]:
+        """A radius that is not positive, a wheel that is the ground."""
+        found = []
+        if self.radius <= 0.0:
+            found.append(f"Rolling '{self.name}': radius {self.radius:g} m is not positive; give a value > 0")
+        if isinstance(self.center.body, Ground):
+            found.append(f"Rolling '{self.name}' has its center on the ground; give a frame of the wheel")
+        return found

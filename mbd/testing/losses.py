@@ -1,0 +1,110 @@
+"""Laws of losses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from mbd.joints.losses.base import DissipationFunction, Loss
+from mbd.tape.derivatives import jvp
+from mbd.testing.findings import Findings, Verdict
+from mbd.testing.scope import FreeScope
+
+__all__ = ["check_loss"]
+
+OWNER = "knee loss"
+
+
+def check_loss(loss: Loss | Callable[[], Loss], *, rates: int = 60, fastest: float = 50.0, seed: int = 0) -> Verdict:
+    """A loss takes energy out at every rate, is smooth enough for Newton's method, and declares its parameters.
+
+    Parameters
+    ----------
+    loss : a loss, or a function that makes one
+    rates : how many rates are tried, of both signs and from 10⁻⁶ of the fastest up
+    fastest : the largest rate [rad/s or m/s]
+
+    Raises
+    ------
+    LawBroken
+        an AssertionError that lists the broken laws, with the rates that show them.
+    """
+    made = loss if isinstance(loss, Loss) else loss()
+    findings = Findings(f"loss {made!r}")
+    rng = np.random.default_rng(seed)
+    sizes = fastest * 10.0 ** rng.uniform(-6.0, 0.0, rates)
+    sizes[: rates // 2] = rng.uniform(0.0, fastest, rates // 2)
+    _declared(findings, made)
+    findings.equal("no force at rest", "F(0)", force_at(made, 0.0), 0.0, "a loss that pushes at rest feeds energy in")
+    for rate in map(float, sizes * rng.choice([-1.0, 1.0], rates)):
+        findings.where = f"rate {rate!r} (seed {seed})"
+        _power(findings, made, rate, fastest)
+        _tangent(findings, made, rate)
+    return findings.verdict()
+
+
+def force_at(loss: Loss, rate: float) -> float:
+    """F(v) as a number [N or N m]."""
+    scope = FreeScope()
+    v = scope.tape.input("v", 0)
+    return scope.value(loss.force(v, scope, OWNER), given={v: rate})[0]
+
+
+def _declared(findings: Findings, loss: Loss) -> None:
+    scope = FreeScope()
+    loss.force(scope.tape.input("v", 0), scope, OWNER)
+    law = "parameters are declared before they are used"
+    hint = "fields() must name every scope.parameter(owner, field, value) with the same value"
+    declared = loss.parameters(OWNER)
+    findings.holds(law, scope.recorded == declared, f"used {scope.recorded}, declared {declared}", hint)
+    faults = loss.faults(OWNER)
+    findings.holds("it finds no fault with itself", not faults, "; ".join(faults), "its own faults() complains")
+
+
+def _power(findings: Findings, loss: Loss, rate: float, fastest: float) -> None:
+    force = force_at(loss, rate)
+    sentence = f"power taken out F(v) v: expected ≥ 0 W, found {force * rate:.6g} W (F = {force:.6g})"
+    hint = "F opposes the motion and has the sign of the rate: it stands on the left-hand side of M a + f = 0"
+    findings.holds("passivity: it never feeds energy in", force * rate >= 0.0, sentence, hint)
+    findings.equal(
+        "determinism", "F(v) asked again", force_at(loss, rate), force, "F may depend on its rate alone", 0.0
+    )
+    scope = FreeScope()
+    v = scope.tape.input("v", 0)
+    turned = scope.value(loss.force(-v, scope, OWNER), given={v: rate})[0]
+    hint = "write the force for any scalar, not for an input: a rate may arrive as −v, or as a number"
+    findings.equal("any scalar may be the rate", "F(−v)", turned, force_at(loss, -rate), hint, 1e-12)
+    nearby = force_at(loss, rate + 1e-8 * fastest)
+    allowed = 1e-3 * (1.0 + abs(force))
+    sentence = f"F jumps from {force:.6g} to {nearby:.6g} between rates {1e-8 * fastest:.1g} apart"
+    hint = "Newton's method needs a continuous force; smooth the jump"
+    findings.holds("continuity", abs(nearby - force) <= allowed, sentence, hint)
+
+
+def _tangent(findings: Findings, loss: Loss, rate: float) -> None:
+    scope = FreeScope()
+    v = scope.tape.input("v", 0)
+    scope.numbers[v] = rate
+    (slope,) = scope.value(*jvp([scope.tape.lift(loss.force(v, scope, OWNER))], {v: 1.0}))
+    step = 1e-5 * max(abs(rate), 1e-2)
+    right, left = ((force_at(loss, rate + side * step) - force_at(loss, rate)) / (side * step) for side in (1.0, -1.0))
+    if abs(right - left) <= 1e-2 * (1.0 + abs(slope)):  # no kink here
+        found = 0.5 * (right + left)
+        hint = "the exact derivative of the recorded force differs from its values; build it from mbd's functions"
+        findings.equal("tangent: ∂F/∂v is the slope of F", "∂F/∂v", slope, found, hint, 1e-4)
+    if isinstance(loss, DissipationFunction):
+        (lost, rest, slope) = _dissipation(loss, rate)
+        hint = "force() must be the derivative of dissipation(), or be left to the base class"
+        findings.equal("F = ∂D/∂v", "F(v)", force_at(loss, rate), slope, hint, 1e-9)
+        sentence = f"D({rate:.6g}) = {lost:.6g} W is less than D(0) = {rest:.6g} W"
+        findings.holds("D is least at rest", lost >= rest, sentence, "a dissipation function rises on both sides of 0")
+
+
+def _dissipation(loss: DissipationFunction, rate: float) -> tuple[float, float, float]:
+    """D(v), D(0), ∂D/∂v."""
+    scope = FreeScope()
+    v = scope.tape.input("v", 0)
+    lost = scope.tape.lift(loss.dissipation(v, scope, OWNER))
+    value, slope = scope.value(lost, *jvp([lost], {v: 1.0}), given={v: rate})
+    return value, scope.value(lost, given={v: 0.0})[0], slope
