@@ -27,6 +27,7 @@ if TYPE_CHECKING:
         KnifeEdge as KnifeEdge,
         Nonholonomic as Nonholonomic,
         Penalty as Penalty,
+        PenaltyParameters as PenaltyParameters,
         Plane as Plane,
         Rolling as Rolling,
         Unilateral as Unilateral,
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
         flexion as flexion,
         height as height,
         measure as measure,
+        penalty_parameters as penalty_parameters,
         separation as separation,
         touchdown as touchdown,
     )
@@ -106,8 +108,8 @@ __version__ = "0.1.0"
 _HOMES = {
     "mbd.assembly": "assemble",
     "mbd.bodies": "Link PointMass RigidBody box cylinder disk rod segment sphere",
-    "mbd.constraints": "Bilateral Controller Event KnifeEdge Nonholonomic Penalty Plane Rolling Unilateral When "
-    "distance extension flexion height measure separation touchdown",
+    "mbd.constraints": "Bilateral Controller Event KnifeEdge Nonholonomic Penalty PenaltyParameters Plane "
+    "Rolling Unilateral When distance extension flexion height measure penalty_parameters separation touchdown",
     "mbd.equations.lagrangian": "Coordinate Lagrangian",
     "mbd.errors": "AssemblyError CapabilityError MbdError ModelError SimulationError TraceError TrajectoryError "
     "UnknownNameError",

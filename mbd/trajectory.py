@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -213,6 +214,11 @@ class Trajectory:
 
         return save(self, path, names)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """To another process it travels as the file that `save` writes."""
+        with TemporaryDirectory() as folder:
+            return _received, (self.save(Path(folder) / "run").read_bytes(),)
+
     def to_dataframe(self, names: Sequence[str] | None = None) -> Any:
         """A pandas table with `time` as index and a column per name (all of `names` by default)."""
         from mbd.results.tables import dataframe
@@ -268,6 +274,14 @@ class Moments(Mapping[str, Any]):
         times = self.time.ravel()
         span = f"t = {times[0]:g} s" if times.size == 1 else f"{times.size} times"
         return f"<values at {span}, side={self.side!r}: {len(self)} names>"
+
+
+def _received(content: bytes) -> Trajectory:
+    """A run that came from another process."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "run.npz"
+        path.write_bytes(content)
+        return load(path)
 
 
 def load(path: str | Path) -> Trajectory:

@@ -152,12 +152,12 @@ def knee_stop_events(
         ends: Any = [(lambda t, y: depth(t, y)) if not closed or pulls else (lambda t, y: torque(t, y))]
         ends[0].terminal, ends[0].direction = True, -1.0 if closed else 1.0
         # leave the last event before looking for the next; a penalty that let go early first sinks back out
-        away = solve_ivp(motion, (t, t + 1e-4), y, "DOP853", rtol=1e-12, atol=1e-13)
+        away = solve_ivp(motion, (t, t + 1e-4), y, "DOP853", rtol=3e-14, atol=1e-15)
         if not closed and depth(t, away.y[:, -1]) > 0.0:
             out: Any = [lambda t, y: depth(t, y)]
             out[0].terminal, out[0].direction = True, -1.0
-            away = solve_ivp(motion, (t, t + 1.0), y, "DOP853", events=out, rtol=1e-12, atol=1e-13)
-        solved = solve_ivp(motion, (away.t[-1], t + 10.0), away.y[:, -1], "DOP853", events=ends, rtol=1e-12, atol=1e-13)
+            away = solve_ivp(motion, (t, t + 1.0), y, "DOP853", events=out, rtol=3e-14, atol=1e-15)
+        solved = solve_ivp(motion, (away.t[-1], t + 10.0), away.y[:, -1], "DOP853", events=ends, rtol=3e-14, atol=1e-15)
         t, y, closed = float(solved.t[-1]), solved.y[:, -1], not closed
         times.append(t)
     return times

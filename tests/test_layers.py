@@ -21,7 +21,7 @@ RANKS = [
     ("compile",),
     ("kernel",),
     ("integrators",),
-    ("assembly", "conditions", "results", "simulation", "trajectory"),
+    ("assembly", "conditions", "posture", "results", "simulation", "trajectory"),
     ("analysis", "view"),
     ("cli",),
 ]

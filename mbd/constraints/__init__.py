@@ -8,6 +8,7 @@ from mbd.constraints.knife_edge import KnifeEdge
 from mbd.constraints.measures import distance, extension, flexion, height, separation
 from mbd.constraints.nonholonomic import Nonholonomic
 from mbd.constraints.penalty import Penalty
+from mbd.constraints.penalty_parameters import PenaltyParameters, penalty_parameters
 from mbd.constraints.rolling import Rolling
 from mbd.constraints.rules import When
 from mbd.constraints.touchdown import Plane, touchdown
@@ -15,7 +16,7 @@ from mbd.constraints.unilateral import Unilateral
 from mbd.constraints.user_measure import measure
 
 __all__ = [
-    "Bilateral", "Constraint", "Controller", "Event", "KnifeEdge", "Measure", "Nonholonomic", "Penalty", "Plane",
-    "Rolling", "Unilateral", "VelocityConstraint", "When", "distance", "extension", "flexion", "height", "measure",
-    "separation", "touchdown",
+    "Bilateral", "Constraint", "Controller", "Event", "KnifeEdge", "Measure", "Nonholonomic", "Penalty",
+    "PenaltyParameters", "Plane", "Rolling", "Unilateral", "VelocityConstraint", "When", "distance", "extension",
+    "flexion", "height", "measure", "penalty_parameters", "separation", "touchdown",
 ]  # fmt: skip

@@ -11,6 +11,7 @@ from mbd.constraints.base import VelocityConstraint
 from mbd.errors import ModelError
 from mbd.forces.quantities import (
     Mention,
+    Samples,
     arguments_of,
     is_number,
     kinks,
@@ -61,9 +62,9 @@ class Nonholonomic(VelocityConstraint):
         put(self, "row", quantity_of(self.row, f"row of '{self.name}'"))
         put(self, "bias", quantity_of(self.bias, f"bias of '{self.name}'"))
         put(self, "arguments", arguments_of(self.arguments, f"Nonholonomic '{self.name}'"))
-        if is_number(self.row) or not hasattr(self.row, "free_symbols") and not callable(self.row):
+        if is_number(self.row) or isinstance(self.row, Samples):
             raise ModelError(
-                f"row of '{self.name}' must be a function or a sympy expression of rates, got {self.row!r}"
+                f"row of Nonholonomic '{self.name}' must be a function or a sympy expression of rates, got {self.row!r}"
             )
         if not self.arguments:
             raise ModelError(

@@ -144,11 +144,12 @@ class Penalty(Constraint):
         return k * self._power(-gap, scope) * maximum(1.0 - loss, 0.0)
 
     def _power(self, depth: Scalar, scope: Scope) -> Scalar:
-        """δⁿ, not above zero where δ < 0; it falls below where the sign of the force tells when to open."""
-        if self.exponent % 2.0 == 1.0:
-            return scope.tape.power(depth, self.exponent)
-        pressed: Scalar = scope.tape.power(maximum(depth, 0.0), self.exponent)
-        return pressed - scope.tape.power(maximum(-depth, 0.0), self.exponent) if self.opens_on == "pull" else pressed
+        """δⁿ; where δ < 0 it is 0, or negative where the sign of the force tells when to open."""
+        power = scope.tape.power
+        if self.chi is None and self.exponent % 2.0 == 1.0:
+            return power(depth, self.exponent)
+        pressed: Scalar = power(maximum(depth, 0.0), self.exponent)
+        return pressed - power(maximum(-depth, 0.0), self.exponent) if self.opens_on == "pull" else pressed
 
     def mentions(self) -> list[Mention]:
         """What its measure depends on."""

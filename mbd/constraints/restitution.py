@@ -5,7 +5,7 @@ A blow without other forces, of the effective mass m at the approach speed δ̇�
 χ laws, ``F = k δⁿ (1 + χ w)``: from ``m δ̈ = −F`` follows ``k δⁿ⁺¹/(n+1) = m δ̇₀² ∫_w¹ s/(1 + χ s) ds``. The blow ends
 where the integral from −e to 1 is zero, ``(1 + e) χ = ln((1 + χ)/(1 − e χ))``, whatever k, m and n are.
 
-Kelvin–Voigt, ``F = k δ + c δ̇``, with the damping ratio ``ζ = c/(2 √(k m))``, ends where δ = 0 ('gap') or F = 0 ('pull').
+Kelvin–Voigt, ``F = k δ + c δ̇`` with the damping ratio ``ζ = c/(2 √(k m))``, ends at δ = 0 ('gap') or F = 0 ('pull').
 """
 
 from __future__ import annotations
@@ -89,8 +89,8 @@ def restitution_of_chi(chi: float) -> float:
         return 1.0
     from scipy.optimize import brentq
 
-    top = min(1.0, 1.0 / chi)
-    return float(brentq(lambda e: _work(chi, -e), 1e-12 * top, top * (1.0 - 1e-15), xtol=1e-300, rtol=1e-14))
+    top = 1.0 if chi < 1.0 else (1.0 - 1e-15) / chi
+    return float(brentq(lambda e: _work(chi, -e), 1e-12 * top, top, xtol=1e-300, rtol=1e-14))
 
 
 def _work(chi: float, w: float, u: float | None = None) -> float:
@@ -106,19 +106,20 @@ def stored_work(chi: float) -> float:
     return _work(chi, 0.0)
 
 
-def blow_integral(chi: float, exponent: float, nodes: int = 200) -> float:
-    """``∫_{−e}¹ dw/(P(w)^{n/(n+1)} (1 + χ w))`` with ``P(w) = ∫_w¹ s/(1 + χ s) ds``: the duration in its own scale.
+def blow_integral(chi: float, exponent: float, end: float, nodes: int = 200) -> float:
+    """``∫_end¹ dw/(P(w)^{n/(n+1)} (1 + χ w))`` with ``P(w) = ∫_w¹ s/(1 + χ s) ds``: a duration in its own scale.
 
-    P vanishes linearly at both ends; ``s = τᵖ/(τᵖ + (1−τ)ᵖ)``, p = n + 1, takes the integrable poles away.
+    From touch until the deepest point (end = 0), or until it parts (end = −e, where P is zero again);
+    ``s = τᵖ/(τᵖ + (1−τ)ᵖ)``, p = n + 1, takes the integrable poles away.
     """
     import numpy as np
 
-    e, p, power = restitution_of_chi(chi), exponent + 1.0, exponent / (exponent + 1.0)
+    p, power = exponent + 1.0, exponent / (exponent + 1.0)
     places, weights = np.polynomial.legendre.leggauss(nodes)
     tau = 0.5 * (places + 1.0)
     front, back = tau**p, (1.0 - tau) ** p
-    w = -e + (1.0 + e) * front / (front + back)
-    slope = (1.0 + e) * p * (tau * (1.0 - tau)) ** exponent / (front + back) ** 2
+    w = end + (1.0 - end) * front / (front + back)
+    slope = (1.0 - end) * p * (tau * (1.0 - tau)) ** exponent / (front + back) ** 2
     work = np.array([max(_work(chi, float(each)), 1e-16) for each in w])  # round-off at the ends, where slope is 0
     return float(np.sum(0.5 * weights * slope / (work**power * (1.0 + chi * w))))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from mbd.bodies.algebra import cross, dot, scaled, total
 from mbd.bodies.base import Frame
@@ -46,7 +46,7 @@ class Rolling(VelocityConstraint):
     name: str
     center: Frame
     radius: float
-    ground: Plane = Plane()
+    ground: Plane = field(default_factory=Plane)
 
     def __post_init__(self) -> None:
         name_of(self.name, "Rolling")

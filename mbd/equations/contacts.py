@@ -29,7 +29,8 @@ FITS = 1e-9
 class Laws:
     """The constraints of a model as expressions; `faults` tells what cannot hold.
 
-    viewed : the values of `rows`, the rates of those on velocities, in views; penalties : (number, gap, force) of penalty contacts in views
+    viewed : the values of `rows`, the rates of those on velocities, in views
+    penalties : (number, gap, force) of penalty contacts in views
     """
 
     rows: list[Row] = field(default_factory=list)
@@ -138,7 +139,7 @@ def _unilateral(found: Laws, scope: Surroundings, law: Unilateral, number: int) 
     gap = scope.tape.lift(law.measure.gap(scope))
     unit = law.measure.unit
     numbers = [_row(found, scope, law.name, "normal", gap, unit=unit, contact=number)]
-    captured, anchors = _anchored(found, scope, law.measure if law.sticks else None)
+    captured, anchors = _anchored(found, scope, law.measure.captured(scope) if law.sticks else ())
     if law.sticks:
         held = [scope.tape.input("anchor", k) for k in anchors]
         for part, value in law.measure.tangents(scope, held):
@@ -155,9 +156,9 @@ def _unilateral(found: Laws, scope: Surroundings, law: Unilateral, number: int) 
     )  # fmt: skip
 
 
-def _anchored(found: Laws, scope: Surroundings, measure: Measure | None) -> tuple[tuple[Node, ...], tuple[int, ...]]:
+def _anchored(found: Laws, scope: Surroundings, values: Sequence[Scalar]) -> tuple[tuple[Node, ...], tuple[int, ...]]:
     """What a contact stores as it closes, and the numbers of its anchors."""
-    captured = () if measure is None else tuple(scope.real(value) for value in measure.captured(scope))
+    captured = tuple(scope.real(value) for value in values)
     first = sum(len(contact.anchors) for contact in found.contacts)
     return captured, tuple(range(first, first + len(captured)))
 
@@ -168,14 +169,15 @@ def _penalty(found: Laws, scope: Surroundings, dynamics: Dynamics, law: Penalty,
     if not any(node.op == "input" and node.data[0] == "x" for node in live([scope.real(gap)])):
         found.faults.append(f"the gap of '{law.name}' is the same whatever the motion; let it depend on the posture")
     rate = scope.rates([gap])[0]
-    force = scope.tape.lift(law.force(gap, rate, scope))
+    captured, anchors = _anchored(found, scope, law.captured(rate))
+    force = scope.tape.lift(law.force(gap, rate, scope, *[scope.tape.input("anchor", k) for k in anchors]))
     generalized = (*dynamics.generalized(Work([gap], [-force])), *[scope.tape.zero] * len(scope.states))
     found.penalties.append((number, gap, force))
     gap, rate, force = scope.views.real([gap, rate, force])
     found.contacts.append(
         Contact(
-            law.name, law.kind, gap, rate, force=force, generalized=generalized, opens_on=law.opens_on,
-            unit=law.measure.unit,
+            law.name, law.kind, gap, rate, captured=captured, anchors=anchors, force=force, generalized=generalized,
+            opens_on=law.opens_on, unit=law.measure.unit,
         )
     )  # fmt: skip
     found.effects.append(penalty_effect(law.name, number, gap, rate, force, generalized))

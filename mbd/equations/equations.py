@@ -9,7 +9,7 @@ Inputs on the tape, as (kind, index)
     ('v', i), ('a', i)   velocities, accelerations
     ('z', i), ('s', i)   first-order states and their rates ż
     ('lam', k)     multiplier of row k of `rows`
-    ('anchor', k)  value held since a contact closed (point of touchdown)
+    ('anchor', k)  value held since a contact closed (point of touchdown, approach speed)
     ('switch', c)  1.0 while penalty contact number c acts, else 0.0
     ('p', k)       parameter k
 """

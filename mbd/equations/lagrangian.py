@@ -14,7 +14,7 @@ from mbd.equations.inputs import Inputs
 from mbd.equations.outputs import Outputs
 from mbd.equations.parameters import ParameterTable
 from mbd.errors import ModelError, TraceError, UnknownNameError, nearest
-from mbd.tape.derivatives import gradient, jvp
+from mbd.tape.derivatives import gradient, jvp, live
 from mbd.tape.node import Node, Scalar, Tape
 from mbd.tape.tracing import traced_scalar
 
@@ -77,6 +77,7 @@ class Lagrangian:
     dissipation : D(v, q, t) [W]; its gradient ∂D/∂v resists the motion
     forces : generalized forces Q(t, q, v) by coordinate (or its name)
     constraints : h by name, or (name, h) pairs, or bare expressions called 'constraint 1', …
+    nonholonomic : ``a(q, t) · v + b(q, t) = 0`` by name, rows on velocities whose B is a
     parameters : values by sympy symbol or by name; run-time inputs, where exact 0 and ±1 fold unless `tunable`
     tunable : names of parameters that stay inputs even at 0 or ±1
     """
@@ -90,6 +91,7 @@ class Lagrangian:
     constraints: Mapping[str, Expression] | Sequence[Any] = ()
     parameters: Mapping[Any, float] = field(default_factory=dict)
     tunable: Collection[str] = ()
+    nonholonomic: Mapping[str, Expression] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "coordinates", tuple(_coordinate(c) for c in self.coordinates))
@@ -127,13 +129,14 @@ class Lagrangian:
     def without(self, *names: str) -> Lagrangian:
         """A copy that lacks some of its 'potential', 'dissipation', forces ('theta force') and constraints."""
         forces = {f"{name} force": name for name in self.forces}
-        known = {"potential", "dissipation", *forces, *self.constraints}
+        known = {"potential", "dissipation", *forces, *self.constraints, *self.nonholonomic}
         for name in names:
             if name not in known:
                 raise UnknownNameError("without: " + nearest(name, known, "effect or constraint"))
         bare: dict[str, Any] = {name: 0.0 for name in ("potential", "dissipation") if name in names}
         bare["forces"] = {name: self.forces[name] for title, name in forces.items() if title not in names}
         bare["constraints"] = {name: h for name, h in self._rows.items() if name not in names}
+        bare["nonholonomic"] = {name: rate for name, rate in self.nonholonomic.items() if name not in names}
         return replace(self, **bare)
 
     def with_tunable(self, *names: str) -> Lagrangian:
@@ -196,7 +199,7 @@ class _Lowering:
     def __init__(self, system: Lagrangian) -> None:
         self.tape = tape = Tape()
         n = len(system.coordinates)
-        self.inputs = Inputs.sized(tape, n, n, 0, len(system.constraints))
+        self.inputs = Inputs.sized(tape, n, n, 0, len(system.constraints) + len(system.nonholonomic))
         self.table = ParameterTable(tape, system.tunable)
         self.faults: list[str] = []
         self.q = [q + x for q, x in zip(self.inputs.q, self.inputs.x, strict=True)]
@@ -209,6 +212,7 @@ class _Lowering:
         self.D = self._scalar(system.dissipation, "the dissipation")
         self.Q = {name: self._scalar(force, f"the force on {name!r}") for name, force in system.forces.items()}
         self.h = {name: self._scalar(value, f"the constraint {name!r}") for name, value in system._rows.items()}
+        self.rates = {name: self._scalar(value, f"the row {name!r}") for name, value in system.nonholonomic.items()}
         self._check(system)
 
     def _scalar(self, expression: Expression, what: str) -> Node:
@@ -257,6 +261,12 @@ class _Lowering:
         for name, h in self.h.items():
             if h.is_constant:
                 self.faults.append(f"the constraint {name!r} is the constant {h.data}; it depends on no coordinate")
+        for name, rate in self.rates.items():
+            slopes = gradient(rate, self.inputs.v)
+            if any(other.op == "input" and other.data[0] == "v" for other in live(slopes)):
+                self.faults.append(f"the row {name!r} is not linear in rates; give a(q, t) · v + b(q, t)")
+            elif all(slope.is_zero for slope in slopes):
+                self.faults.append(f"no rate enters the row {name!r}; a row of q and t belongs to constraints")
 
 
 # the equations ------------------------------------------------------------------------------------------------------
@@ -272,6 +282,7 @@ def _assembled(system: Lagrangian, lowering: _Lowering) -> Equations:
     balance = [p - t + v + d - f for p, t, v, d, f in zip(momentum_rates, dT, dV, dD, Q, strict=True)]
     rates = jvp(list(lowering.h.values()), clock)
     rows = [Row(name, "", h, rate, unit="") for (name, h), rate in zip(lowering.h.items(), rates, strict=True)]
+    rows += [Row(name, "", tape.zero, rate, unit="", kind="velocity") for name, rate in lowering.rates.items()]
     effects = _effects(system, lowering, dV, dD)
     outputs = _outputs(system, lowering, rows, effects)
     return Equations(
@@ -321,7 +332,9 @@ def _outputs(system: Lagrangian, lowering: _Lowering, rows: Sequence[Row], effec
         outputs.value(f"{name}.force", force)
     for k, row in enumerate(rows):
         outputs.value(f"{row.owner}.multiplier", inputs.lam[k])
-        outputs.value(f"{row.owner}.residual", row.value)
+        outputs.value(f"{row.owner}.residual", row.rate if row.is_velocity else row.value)
+        if row.is_velocity:
+            outputs.value(f"{row.owner}.force", -inputs.lam[k])
     for effect in effects:
         if effect.power is not None:
             outputs.value(f"{effect.name}.power", effect.power)

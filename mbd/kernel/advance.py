@@ -337,6 +337,14 @@ def mark_touching(K: Any) -> None:
             K.touched[c] = 1 if still else 0
 
 
+def capture_approach(K: Any) -> None:
+    """Penalty contacts that close hold their approach speed, as an impact at the same instant leaves it."""
+    for c in range(K.n_contacts):
+        if K.closing[c] == 1 and K.kind[c] == 1 and K.anchor_start[c] < K.anchor_start[c + 1]:
+            evaluate(K, K.clock[NOW], K.q, K.y)
+            capture(K, c)
+
+
 def switch(K: Any) -> int:
     """What the fired guard does to the closed contacts and the velocities; the state is at its instant."""
     kind = K.fired[0]
@@ -361,6 +369,7 @@ def switch(K: Any) -> int:
         else:  # a penalty contact closes without impact
             release_for(K, 0)
             release_for(K, 1)
+        capture_approach(K)
     elif kind == PRESS:
         K.closed[index] = 1
         log_event(K, LOG_CLOSED, index, 0.0, False)

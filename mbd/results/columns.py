@@ -171,7 +171,7 @@ class ModelColumns(Columns):
 
     @property
     def anchors(self) -> Matrix:
-        """What each contact captured in the row where it closed, held until it opens."""
+        """What each contact captured in the row where it closed, or holds from the start, until it opens."""
         if self._anchors is None:
             contacts = self.equations.contacts
             held = np.zeros((len(self.record.time), sum(len(contact.anchors) for contact in contacts)))
@@ -183,6 +183,8 @@ class ModelColumns(Columns):
                 fresh = closed.copy()
                 fresh[1:] &= ~closed[:-1]
                 captured = np.column_stack(self.evaluate(contact.captured, rows.part(fresh)))
+                if closed[0] and self.record.start is not None and contact.name in self.record.start.mode.closed:
+                    captured[0] = self.record.start.anchors[list(contact.anchors)]
                 held[np.ix_(closed, np.array(contact.anchors))] = captured[np.cumsum(fresh)[closed] - 1]
             self._anchors = held
         return self._anchors

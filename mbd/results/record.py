@@ -96,6 +96,7 @@ class Record:
     final : the `State` to go on from
     settings : how the run was made: integrator, dt, until, contact, locate, versions
     parameter_changes : (row, parameters) pairs: values that hold from that row on
+    start : the `State` it began with, whose closed contacts hold its anchors; None in a run read from a file
     """
 
     equations: Equations | None
@@ -117,6 +118,7 @@ class Record:
     final: Any = None
     settings: dict[str, Any] = field(default_factory=dict)
     parameter_changes: Sequence[tuple[int, Vector]] = ()
+    start: Any = None
 
     def __post_init__(self) -> None:
         count = len(self.time)

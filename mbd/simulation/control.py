@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,19 +12,12 @@ from mbd.compile.python import scalar_function
 from mbd.equations.equations import Guard
 from mbd.errors import ModelError, SimulationError, UnknownNameError, nearest
 from mbd.kernel import fields as F
+from mbd.simulation.asked import asked
 
 if TYPE_CHECKING:
     from mbd.simulation.run import Run
 
-__all__ = ["Boundaries", "Named", "apply_reset", "asked"]
-
-
-def asked(what: str, function: Callable[..., Any], *arguments: Any) -> Any:
-    """What a user's function answers; whatever it raises ends the run, which is kept."""
-    try:
-        return function(*arguments)
-    except Exception as exc:  # the user's code may raise anything; all of it ends the run in one way
-        raise SimulationError(f"{what} raised {type(exc).__name__}: {exc}") from exc
+__all__ = ["Boundaries", "Named", "apply_reset"]
 
 
 class Named(Mapping[str, float]):

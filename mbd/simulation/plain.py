@@ -13,6 +13,7 @@ from mbd.equations.programs import mass_matrix
 from mbd.integrators.base import Integrator, Point, StepReport, Terms
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.kernel.fields import ITERATIONS, NOT_CONVERGED, NOT_FINITE, NOW
+from mbd.simulation.asked import asked
 from mbd.state import Mode, State
 from mbd.tape.derivatives import live
 
@@ -178,7 +179,8 @@ class PlainScheme:
     def start(self, K: Any) -> int:
         """Memory at the accepted state, whose rates are consistent; sizes of the residual for the guards."""
         state, mode, _ = self._state(K)
-        self.memory = self.integrator.start(self.system, state, mode, float(K.dt))
+        what = f"the start of {self.integrator!r} at t = {state.time:.6g} s"
+        self.memory = asked(what, self.integrator.start, self.system, state, mode, float(K.dt))
         K.slope[:] = getattr(self.memory, "slope", 0.0)
         from mbd.kernel.restart import fill_block, refresh_scales
 
@@ -189,7 +191,8 @@ class PlainScheme:
     def step(self, K: Any, h: float, t1: float) -> int:
         """A candidate from the integrator's own step."""
         state, mode, rows = self._state(K)
-        result = self.integrator.step(self.system, state, t1 - state.time, mode, self.memory)
+        what = f"a step of {self.integrator!r} from t = {state.time:.6g} s"
+        result = asked(what, self.integrator.step, self.system, state, t1 - state.time, mode, self.memory)
         self.report = result.report
         K.counts[ITERATIONS] += result.report.iterations
         if not result.report.converged:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from mbd.arrays import Vector
-from mbd.assembly import BELOW, Posture, undetermined
+from mbd.assembly import BELOW, undetermined
 from mbd.compile.mechanism import Mechanism
 from mbd.equations.equations import Contact
 from mbd.errors import ModelError, SimulationError, UnknownNameError
@@ -19,7 +19,9 @@ from mbd.forces.base import Force
 from mbd.integrators.base import Integrator
 from mbd.kernel import fields as F
 from mbd.kernel.active_set import ActiveSetManager
-from mbd.simulation.control import Boundaries, Named, apply_reset, asked
+from mbd.posture import Posture
+from mbd.simulation.asked import asked
+from mbd.simulation.control import Boundaries, Named, apply_reset
 from mbd.simulation.failures import explanation
 from mbd.simulation.stepper import Stepper
 from mbd.state import State
@@ -33,7 +35,7 @@ STEPS_AT_ONCE = {True: 20000, False: 200}
 """Steps between two looks at the clock, compiled and interpreted: some 20 ms."""
 SHOW_EVERY = 0.1
 """Wall time between two calls of progress and observers [s]."""
-RESOLVED = 5.0
+RESOLVED = 10.0
 """Steps that a penalty contact must last to be resolved at all."""
 KINDS = ("closed", "opened", "event")
 
@@ -118,7 +120,7 @@ class Run:
             ready = v["armed"][c] == 1 and watched
             still = all(abs(rates[row]) <= 1e-9 for row in self.manager.contacts[c].rows)
             v["touched"][c] = int(ready and v["kind"][c] == 0 and close and slow and still)
-            if ready and guards[c] < -BELOW:
+            if ready and v["closed"][c] == 0 and guards[c] < -BELOW:
                 contact = self.manager.contacts[c]
                 inside.append(f"{contact.name!r} starts {-guards[c]:.6g} {contact.unit} inside its surface")
         if inside:
@@ -310,7 +312,7 @@ class Run:
             parameter_names=[parameter.name for parameter in equations.parameters], time=time[:, 0], q=q, v=velocity,
             z=z, a=a, s=s, lam=lam, closed=closed.astype(np.uint8), events=events, stats=self._statistics(),
             success=not problem, message=problem or message, failure=self._capsule(problem), final=self.state(),
-            settings=self.settings, parameter_changes=self.parameter_changes,
+            settings=self.settings, parameter_changes=self.parameter_changes, start=self.start,
         )  # fmt: skip
         return Trajectory(record)
 
@@ -361,8 +363,8 @@ class Run:
         if not spans or min(spans) >= RESOLVED * self.dt:
             return []
         return [
-            f"{contact.name!r} closed for {min(spans) / self.dt:.2g} steps only, too few for its spring and damper; "
-            f"use dt below {min(spans) / 20.0:.2g} s, a softer stiffness, or mbd.Unilateral"
+            f"{contact.name!r} closed for {min(spans) / self.dt:.2g} steps only, too few: its peak force and energy "
+            f"are not resolved; use dt below {min(spans) / 20.0:.2g} s, a softer stiffness, or mbd.Unilateral"
         ]
 
     def _capsule(self, problem: str) -> dict[str, Any] | None:

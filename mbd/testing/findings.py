@@ -52,7 +52,7 @@ class Findings:
     def equal(
         self, law: str, what: str, found: Any, expected: Any, hint: str, tolerance: float = 1e-9, size: Any = 0.0
     ) -> bool:
-        """Whether ``|found − expected| ≤ tolerance (1 + |expected| + size)``, entry by entry; size: before cancelling."""
+        """Whether ``|found − expected| ≤ tolerance (1 + |expected| + size)``; size: of the terms that cancel."""
         now, wanted = np.asarray(found, dtype=float), np.asarray(expected, dtype=float)
         if now.shape != wanted.shape and wanted.ndim:
             return self.holds(law, False, f"{what}: {wanted.size} numbers expected, {now.size} found", hint)

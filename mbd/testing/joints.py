@@ -1,4 +1,4 @@
-"""Laws of joints: the uses of one definition (tree edge, cut edge, seen from either side) describe the same mechanics."""
+"""Laws of joints: tree edge, cut edge, seen from either side, one definition describes the same mechanics."""
 
 from __future__ import annotations
 
@@ -89,7 +89,8 @@ def _transform_laws(findings: Findings, placed: Placed) -> None:
     hint = "transform() returns R with the child's axes as columns, seen from the parent, and p"
     findings.equal("R is a rotation", "R Rᵀ", R @ R.T, EYE, hint, 1e-12)
     findings.equal("R is a rotation", "det R", np.linalg.det(R), 1.0, hint, 1e-12)
-    findings.equal("determinism", "transform asked again", placed.numbers(), place, "it may depend on q alone", 0.0)
+    again = Placed.at(joint, scope.value(*placed.q)).numbers()
+    findings.equal("determinism", "transform asked again", again, place, "it may depend on q alone", 0.0)
     law = "the subspace is the derivative of the transform"
     hint = "subspace() gives (ω, v) of the child frame per unit rate in CHILD axes: [ω×] = Rᵀ ∂R/∂q, v = Rᵀ ∂p/∂q"
     subspace = joint.subspace(placed.q, scope)
@@ -201,11 +202,12 @@ def _mechanics(findings: Findings, joint: Joint, seed: int) -> None:
     flat = joint.is_planar
     moved: Any = replace(joint, parent=_like(joint.parent, base), child=_like(joint.child, load))  # type: ignore[type-var]
     for cut in ("auto", (joint.name,)):
-        if cut != "auto" and not joint.labels:
-            continue
         model = mbd.Model("two bodies", gravity=(1.0, -9.81, 0.0 if flat else 2.0), cut=cut)
         hinge = mbd.Revolute("hinge", model.ground.point(0.3, 0.1), base.point(0.1, 0.4), loss=mbd.Viscous(0.2))
         model.connect(hinge, moved)
+        if cut != "auto":  # another way to the ground
+            ends = model.ground.point(-0.2, 0.3), load.point(0.1, 0.2)
+            model.connect(mbd.Planar("arm", *ends) if flat else mbd.Universal("arm", *ends))
         equation_laws(findings, model, postures=1, seed=seed)
 
 

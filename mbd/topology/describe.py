@@ -74,7 +74,8 @@ def _constraint(word: Constraint) -> str:
     if isinstance(word, VelocityConstraint):
         said += ", on the velocities of " + ", ".join(f"'{name}'" for name in _mentioned(word))
     if isinstance(word, Penalty):
-        said += f", {_measure(word.measure)}, stiffness {word.stiffness:.6g}, damping {word.damping:.6g}"
+        loss = f"damping {word.damper:.6g}" if word.chi is None else f"chi {word.chi:.6g}"
+        said += f", {_measure(word.measure)}, stiffness {word.stiffness:.6g}, {loss}"
     return said
 
 

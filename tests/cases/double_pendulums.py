@@ -67,9 +67,9 @@ class DoublePendulum(ABC):
         a, b, w, u = motion
         L1, L2 = self.sizes.L1, self.sizes.L2
         first = np.array([L1 * np.sin(a), -L1 * np.cos(a)])
-        second = first + [L2 * np.sin(b), -L2 * np.cos(b)]
+        second = first + np.array([L2 * np.sin(b), -L2 * np.cos(b)])
         fast = np.array([L1 * np.cos(a) * w, L1 * np.sin(a) * w])
-        faster = fast + [L2 * np.cos(b) * u, L2 * np.sin(b) * u]
+        faster = fast + np.array([L2 * np.cos(b) * u, L2 * np.sin(b) * u])
         return (*first, *second, *fast, *faster)
 
 

@@ -1,12 +1,12 @@
 """Passive walkers by hand: point masses on straight segments, integrated by DOP853, impacts as projections.
 
-Angles are those of the published cases: from the vertical, positive backwards; a stance foot at the origin, the leg from
-foot to hip along (sin q, cos q), swing segments hanging from the hip. Every mass lies at Σ_j c_j (sin q_j, cos q_j), so
+Angles are those of the published cases: from the vertical, positive backwards; a stance foot at the origin, the leg
+from foot to hip along (sin q, cos q), swing segments hanging from the hip. Masses lie at Σ_j c_j (sin q_j, cos q_j), so
 
     M_ij = A_ij cos(q_i − q_j),   A_ij = Σ m c_i c_j,
     Σ_j M_ij q¨_j + Σ_j A_ij sin(q_i − q_j) q˙_j² − g Σ m c_i sin q_i = 0.
 
-A plastic impact projects the velocities of the masses onto those that the next posture allows, in the metric of the masses.
+A plastic impact projects the velocities of the masses onto those that the next posture allows, in their metric.
 """
 
 from __future__ import annotations

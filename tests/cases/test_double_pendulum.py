@@ -24,8 +24,10 @@ def last(leg: DoublePendulum, start: mbd.State, scheme: NewmarkFamily, dt: float
     return mbd.simulate(leg.model, start, scheme, dt=until / steps, until=until, store=steps)
 
 
-def first_step(scheme: NewmarkFamily) -> float:
-    """dt of the first of four runs [s]; at position level the round-off of multipliers grows like 1/dt²."""
+def first_step(scheme: NewmarkFamily, form: str) -> float:
+    """dt of the first of four runs [s]; where multipliers are solved for, their round-off grows as dt falls."""
+    if form not in WITH_ROWS:
+        return 5e-4
     return 2e-3 if scheme.formulation == "index3" else 1e-3
 
 
@@ -39,7 +41,7 @@ def test_angles_and_rates_meet_the_reference_to_second_order(form: str, scheme: 
         found = np.array([[column[-1] for column in swing.motion(run)] for run in runs])
         return [float(np.linalg.norm(each)) for each in (found - reference.value)]
 
-    assert_second_order(errors, first_step(scheme))
+    assert_second_order(errors, first_step(scheme, form))
 
 
 @pytest.mark.parametrize(("form", "scheme"), PAIRS)
@@ -53,7 +55,7 @@ def test_places_and_rod_tensions_meet_the_reference_to_second_order(form: str, s
         pulls = np.array([column[-1] for column in swing.tensions(run)])
         return [float(np.linalg.norm(found - places.value)), *(pulls - tensions.value)]
 
-    assert_second_order(errors, first_step(scheme))
+    assert_second_order(errors, first_step(scheme, form))
 
 
 @pytest.mark.parametrize("form", FORMS)
@@ -81,7 +83,7 @@ def test_unequal_rods_started_with_speed_follow_lagranges_equations(form: str, s
         found = np.array([[column[-1] for column in swing.bobs(run)] for run in runs])
         return [float(np.linalg.norm(each)) for each in found - exact]
 
-    assert_second_order(errors, first_step(scheme))
+    assert_second_order(errors, first_step(scheme, form))
 
 
 def test_every_kind_of_coordinates_gives_one_motion_and_one_pair_of_tensions() -> None:

@@ -116,7 +116,7 @@ def test_small_disturbances_decay_with_the_published_floquet_multipliers(name: s
     assert max(abs(np.array(found))) == pytest.approx(gait.reference["largest |multiplier|"].value, abs=1e-4)
 
 
-# started elsewhere ------------------------------------------------------------------------------------------------------
+# started elsewhere ------------------------------------------------------------------------------------------------
 WALKING = [
     ("compass", (1.0, 1.0, 0.9)), ("compass", (0.9, 0.9, 0.9)), ("compass", (1.0, 1.1, 1.0)),
     ("compass, g = 9.80665", (0.9, 1.0, 1.0)), ("compass, g = 9.80665", (1.0, 1.0, 1.1)),

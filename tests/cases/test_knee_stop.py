@@ -102,7 +102,7 @@ def test_the_knee_is_never_deeper_than_the_reference_but_for_a_second_order_erro
 
 @pytest.mark.parametrize("release", CASES)
 def test_one_linear_interpolation_back_keeps_the_second_order(release: str) -> None:
-    """As in the chapter. Its error depends on where in the step the event falls, so only the size is of second order."""
+    """As in the chapter. Where in the step an event falls changes its error, so only the size is of second order."""
     model, start, reference = published(release)
     times = reference["event times"].value
 

@@ -92,7 +92,7 @@ def written_out(k: Coefficients, w: float, xi: float) -> np.ndarray:
     return np.linalg.solve(left, right)
 
 
-# i2: coefficients of the leading errors -------------------------------------------------------------------------------
+# i2: coefficients of the leading errors ---------------------------------------------------------------------------
 def extrapolated(value: Callable[[float], float]) -> float:
     """The limit at zero of a function of Ω², from Ω = 0.08, 0.04, 0.02."""
     a, b, c = (value(turn) for turn in (0.08, 0.04, 0.02))
@@ -116,13 +116,25 @@ def test_the_numerical_damping_has_its_asymptotic_coefficient(name: str) -> None
     assert SCHEMES[name].order() == (1 if power == 1 else 2)
 
 
+@pytest.mark.parametrize(
+    "scheme", [mbd.HHT(0.17), mbd.GeneralizedAlpha(0.33), mbd.GeneralizedAlpha(0.93), WBZ(0.2)], ids=repr
+)
+def test_any_second_order_member_has_the_coefficients_of_the_general_formulas(scheme: NewmarkFamily) -> None:
+    """(12β − 1 + 12 α_f (α_m − α_f))/24 and ½ (α_f − α_m)(β + α_f (α_m − 1)): other parameters than the published."""
+    k = scheme.coefficients
+    elongation = (12 * k.beta - 1 + 12 * k.alpha_f * (k.alpha_m - k.alpha_f)) / 24
+    damping = 0.5 * (k.alpha_f - k.alpha_m) * (k.beta + k.alpha_f * k.alpha_m - k.alpha_f)
+    assert extrapolated(lambda turn: spectrum(scheme, turn).elongation / turn**2) == pytest.approx(elongation, abs=1e-6)
+    assert extrapolated(lambda turn: spectrum(scheme, turn).damping / turn**3) == pytest.approx(damping, abs=2e-6)
+
+
 def test_linear_acceleration_becomes_unstable_at_its_critical_step() -> None:
     scheme, critical = mbd.Newmark(beta=1 / 6, start="consistent"), I2["linear acceleration: critical Omega"].value
     assert spectrum(scheme, critical * (1 - 1e-6)).radius == pytest.approx(1.0, abs=1e-12)
     assert spectrum(scheme, critical * (1 + 1e-6)).radius > 1.001
 
 
-# i3: which beta -------------------------------------------------------------------------------------------------------
+# i3: which beta ---------------------------------------------------------------------------------------------------
 class Unsquared(mbd.HHT):
     """HHT with β = (1+α)/4."""
 
@@ -140,13 +152,21 @@ def test_hht_squares_its_beta_for_without_the_square_it_is_unstable() -> None:
     assert squared < 1.0 < unsquared
 
 
+@pytest.mark.parametrize("alpha", [0.02, 0.12, 0.3])
+def test_any_alpha_is_stable_with_the_square_and_unstable_without(alpha: float) -> None:
+    """For ω dt → ∞ the squared β gives (1−α)/(1+α), the other one two real roots of which one is beyond −1."""
+    assert spectrum(mbd.HHT(alpha, start="consistent"), 1e4).radius < 1.0
+    assert mbd.HHT(alpha).coefficients.rho_inf == pytest.approx((1 - alpha) / (1 + alpha), abs=1e-14)
+    assert spectrum(Unsquared(alpha, start="consistent"), 1e4).radius > 1.05
+
+
 @pytest.mark.parametrize("alpha", [-1e-9, 1 / 3 + 1e-9, 0.5, math.nan])
 def test_hht_refuses_an_alpha_for_which_it_is_unstable_or_of_first_order(alpha: float) -> None:
     with pytest.raises(mbd.CapabilityError, match="alpha between 0 and 1/3"):
         mbd.HHT(alpha)
 
 
-# i4: the discrete solution ----------------------------------------------------------------------------------------------
+# i4: the discrete solution ----------------------------------------------------------------------------------------
 EXACT = {
     "trapezoidal": mbd.Newmark(start="consistent"),
     "HHT 0.05": mbd.HHT(alpha=0.05, start="consistent"),

@@ -103,7 +103,7 @@ def test_the_wheel_passes_the_top_only_above_the_published_speed() -> None:
     assert touchdowns(back)[0].name == "spoke 7"
 
 
-# rest -------------------------------------------------------------------------------------------------------------------
+# rest -------------------------------------------------------------------------------------------------------------
 def rocking(wheel: RimlessWheel, speed: float) -> tuple[list[float], float]:
     """Instants of the impacts of a rocking wheel by hand, by DOP853, and the instant at which they pile up."""
     from scipy.integrate import solve_ivp
