@@ -4,6 +4,8 @@ JOINTS    factory(parent, child) → joint, between any two frames
 LOSSES    factory() → loss
 FORCES    factory(a, b, joint) → force, from two frames of different bodies and a joint named 'hinge' with an `angle`
 MEASURES  factory(a, b, joint) → measure, from the same
+CONSTRAINTS  factory(a, b, joint) → constraint, from the same, whose first body floats on the joint 'float thigh'
+INTEGRATORS  schemes
 """
 
 from __future__ import annotations
@@ -12,8 +14,9 @@ from collections.abc import Callable
 
 import mbd
 from mbd.bodies.base import Frame
-from mbd.constraints.base import Measure
+from mbd.constraints.base import Constraint, Measure
 from mbd.forces.base import Force
+from mbd.integrators import Integrator
 from mbd.joints.base import Joint
 from mbd.joints.losses.base import Loss
 from mbd.scope import Triple
@@ -82,6 +85,15 @@ def dune(x: float, z: float) -> float:
     return height
 
 
+def skid(vx: float, vy: float, angle: float) -> float:
+    """Velocity across a direction."""
+    row: float = vx * mbd.sin(angle) - vy * mbd.cos(angle)
+    return row
+
+
+SKID = ("float thigh.x.rate", "float thigh.y.rate", "float thigh.angle")
+
+
 def first_of(p: Triple, q: Triple) -> Scalar:
     """The x of the first point."""
     return p[0]
@@ -113,4 +125,31 @@ MEASURES: list[tuple[str, Callable[[Frame, Frame, Joint], Measure]]] = [
     ("separation", lambda a, b, joint: mbd.separation(a, b, (1, 1, 0))),
     ("named measure", lambda a, b, joint: mbd.measure("hinge.angle", unit="rad")),
     ("measure of points", lambda a, b, joint: mbd.measure(lambda p, q: p[1] - 2.0 * q[0], a, b, tangents=first_of)),
+]
+
+CONSTRAINTS: list[tuple[str, Callable[[Frame, Frame, Joint], Constraint]]] = [
+    ("foot that sticks", lambda a, b, joint: mbd.Unilateral("law", mbd.touchdown(a))),
+    ("foot that bounces", lambda a, b, joint: mbd.Unilateral("law", mbd.touchdown(b), restitution=0.7, friction=0.0)),
+    ("foot on a hill", lambda a, b, joint: mbd.Unilateral("law", mbd.touchdown(b, hill))),
+    ("knee lock", lambda a, b, joint: mbd.Unilateral("law", mbd.flexion(joint))),
+    ("rubber stop", lambda a, b, joint: mbd.Penalty("law", mbd.flexion(joint), stiffness=1e3, damping=2.0)),
+    ("mat", lambda a, b, joint: mbd.Penalty("law", mbd.touchdown(a), 1e4, damping=10.0, release="pull")),
+    ("ball", lambda a, b, joint: mbd.Penalty("law", mbd.height(a), 1e5, exponent=1.5, restitution=0.5)),
+    ("rod", lambda a, b, joint: mbd.Bilateral("law", mbd.distance(a, b), value=0.6)),
+    ("slot", lambda a, b, joint: mbd.Bilateral("law", mbd.separation(a, b, (1, 1, 0)))),
+    ("prescribed motion", lambda a, b, joint: mbd.Bilateral("law", joint, value=lambda t: 0.3 * mbd.sin(3.0 * t))),
+    ("blade", lambda a, b, joint: mbd.KnifeEdge("law", a)),
+    ("nonholonomic row", lambda a, b, joint: mbd.Nonholonomic("law", skid, arguments=SKID)),
+    ("rolling", lambda a, b, joint: mbd.Rolling("law", a, radius=0.3)),
+]
+
+INTEGRATORS: list[Integrator] = [
+    mbd.Newmark(),
+    mbd.Newmark(beta=0.31, gamma=0.6),
+    mbd.Newmark(formulation="index3"),
+    mbd.HHT(alpha=0.05),
+    mbd.HHT(alpha=0.05, formulation="index3"),
+    mbd.HHT(alpha=0.05, form="averaged"),
+    mbd.GeneralizedAlpha(rho_inf=0.9),
+    mbd.GeneralizedAlpha(rho_inf=0.0),
 ]

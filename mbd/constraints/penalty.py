@@ -141,7 +141,8 @@ class Penalty(Constraint):
             return k * self._power(-gap, scope) - scope.parameter(self.name, "damping", self.damper) * gap_rate
         slowest = scope.parameter(self.name, "slowest", SLOWEST)
         loss = scope.parameter(self.name, "chi", chi) * gap_rate / maximum(approach, slowest)
-        return k * self._power(-gap, scope) * maximum(1.0 - loss, 0.0)
+        pushing: Scalar = maximum(1.0 - loss, 0.0)
+        return k * self._power(-gap, scope) * pushing
 
     def _power(self, depth: Scalar, scope: Scope) -> Scalar:
         """δⁿ; where δ < 0 it is 0, or negative where the sign of the force tells when to open."""
@@ -149,7 +150,9 @@ class Penalty(Constraint):
         if self.chi is None and self.exponent % 2.0 == 1.0:
             return power(depth, self.exponent)
         pressed: Scalar = power(maximum(depth, 0.0), self.exponent)
-        return pressed - power(maximum(-depth, 0.0), self.exponent) if self.opens_on == "pull" else pressed
+        if self.opens_on == "pull":
+            pressed = pressed - power(maximum(-depth, 0.0), self.exponent)
+        return pressed
 
     def mentions(self) -> list[Mention]:
         """What its measure depends on."""

@@ -98,6 +98,7 @@ class Lagrangian:
         object.__setattr__(self, "parameters", {_name(key): float(value) for key, value in self.parameters.items()})
         object.__setattr__(self, "forces", {_name(key): value for key, value in self.forces.items()})
         object.__setattr__(self, "constraints", _named(self.constraints))
+        object.__setattr__(self, "nonholonomic", dict(self.nonholonomic))
 
     def check(self) -> list[str]:
         """Every fault of the description, one sentence each."""
@@ -176,6 +177,11 @@ def _name_faults(system: Lagrangian) -> list[str]:
         if name in taken:
             faults.append(f"the name {name!r} is given twice among the coordinates and parameters of {system.name!r}")
         taken.add(name)
+    faults += [
+        f"two constraints of {system.name!r} are named {name!r}; give each its own name"
+        for name in system._rows
+        if name in system.nonholonomic
+    ]
     faults += [nearest(name, names, "coordinate") for name in system.forces if name not in names]
     faults += [
         nearest(name, system.parameters, "parameter") for name in system.tunable if name not in system.parameters

@@ -98,7 +98,7 @@ def gap_tolerance(K: Any, c: int) -> float:
 def update_armed(K: Any) -> None:
     """A contact is armed (1) once its gap has risen above zero; one that becomes watched (−1), if it is above or rests.
 
-    One that sinks through zero together with its own condition is below as long as it is watched, and ignored like that.
+    One that sinks through zero together with its own condition is below as long as it is watched, so it is ignored.
 
     A penalty contact that opened below the surface because it would have pulled (2) acts again as it presses.
     """

@@ -51,7 +51,7 @@ def newmark_start(K: Any) -> int:
     step = K.dt / 16.0
     t = K.clock[NOW]
     fill_block(K, t, K.q, K.y)
-    for i in range(K.n_v):  # a little later along the tangent: a parabola would multiply stiff forces by (ω dt)²
+    for i in range(K.n_v):  # a little later along the tangent: a parabola would blow stiff forces up by (ω dt)²
         K.block[K.o_x + i] = step * K.y[i]
     compose(K, K.q1)
     for i in range(n):
@@ -67,6 +67,10 @@ def newmark_start(K: Any) -> int:
     K.clock[AUX_STEP] = K.dt
     fill_block(K, t, K.q, K.y)
     refresh_scales(K)
+    if unresolved(K):
+        for i in range(n):
+            K.slope[i] = 0.0
+            K.aux[i] = K.rate[i]
     for i in range(n):  # a force that is zero just now has its size a step later
         K.block[K.o_a + i] += K.dt * K.slope[i]
         K.block[K.o_v + i] += K.dt * K.rate[i]
@@ -74,6 +78,21 @@ def newmark_start(K: Any) -> int:
             K.block[K.o_x + i] = K.dt * (K.y[i] + 0.5 * K.dt * K.rate[i])
     raise_scales(K, False)
     return 0
+
+
+def unresolved(K: Any) -> bool:
+    """Whether accelerations would change within dt to a hundred times what all terms of the balance make up now.
+
+    A jerk like that (a stiff contact that closes, shorter than dt) is no start for anything: a₀ = v̇₀ then.
+    """
+    change = 0.0
+    known = 0.0
+    for i in range(K.n_v):
+        change = max(change, abs(K.slope[i]) * K.dt)
+        known = max(known, abs(K.rate[i]))
+        if K.acc[i * K.n + i] > 0.0:
+            known = max(known, K.scale[i] / K.acc[i * K.n + i])
+    return change > 100.0 * known
 
 
 def residual_size(K: Any, o_r: int, m: int, c_C: float, c_K: float, tolerance: float) -> float:

@@ -200,7 +200,7 @@ def _starts(findings: Findings, model: Any, equations: Equations, seed: int) -> 
         above = _falling(equations, contact, seed)
         if above is not None:
             place, speed = above
-            values = {"position": place, "velocity": speed, "open": names, "project": True}
+            values: dict[str, Any] = {"position": place, "velocity": speed, "open": names, "project": True}
             asked.append((f"a gap of '{contact.name}' of 0.01, closing (seed {seed})", values))
     for label, values in asked:
         try:

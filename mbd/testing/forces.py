@@ -9,6 +9,7 @@ import numpy as np
 
 import mbd
 from mbd.bodies.base import Frame
+from mbd.errors import ModelError
 from mbd.forces.base import Action, Force
 from mbd.joints.base import Joint
 from mbd.tape.derivatives import gradient, jvp
@@ -46,17 +47,19 @@ def check_force(
     LawBroken
         an AssertionError that lists the broken laws.
     """
-    factory = None
+    factory, made = None, force
     if not isinstance(force, Force):
         factory = force
-        force, hinge, places = between(factory)
+        made, hinge, places = between(factory)
         joints, frames = [*joints, hinge], [*frames, *places]
-    findings = Findings(f"force {type(force).__name__} '{force.name}'")
-    mentions = force.mentions()
+    if not isinstance(made, Force):
+        raise ModelError(f"check_force takes a force or a function (a, b, hinge) that makes one; got {made!r}")
+    findings = Findings(f"force {type(made).__name__} '{made.name}'")
+    mentions = made.mentions()
     scope = scope_of(mentions, joints, frames)
     met = set(scope.bodies)
-    action = force.act(scope)
-    _words(findings, force, scope, action, met)
+    action = made.act(scope)
+    _words(findings, made, scope, action, met)
     if internal is None:
         internal = relates_bodies(mentions)
     rng = np.random.default_rng(seed)
@@ -64,7 +67,7 @@ def check_force(
     for k in range(postures):
         scope.scatter(rng)
         findings.where = f"random places and rates of {', '.join(scope.bodies)} (seed {seed}, posture {k})"
-        _passivity(findings, force, action, scope)
+        _passivity(findings, made, action, scope)
         _tangent(findings, scope, effort)
         if internal:
             _balance(findings, scope, effort, rng)

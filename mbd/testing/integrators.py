@@ -30,7 +30,7 @@ def check_integrator(
     *,
     problems: Sequence[str] = tuple(PROBLEMS),
     dt: float = 0.2,
-    halvings: int = 5,
+    halvings: int = 4,
 ) -> Verdict:
     """A scheme has the order it promises, leaves its inputs alone, fails openly, and remembers nothing by itself.
 

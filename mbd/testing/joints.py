@@ -71,7 +71,7 @@ def check_joint(joint: Joint | Callable[[Frame, Frame], Joint], *, postures: int
         shown = ", ".join(f"{label.name} = {value:.4f}" for label, value in zip(joint.labels, values, strict=True))
         for each, side in (joint, ""), (Reversed(joint), ", seen from the child"):
             findings.where = f"{shown or 'its one posture'}{side} (seed {seed}, posture {k})"
-            placed = Placed.at(each, values)
+            placed = Placed.at(each, list(values))
             _transform_laws(findings, placed)
             _row_laws(findings, placed)
         _composition(findings, joint, values)

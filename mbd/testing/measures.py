@@ -50,11 +50,12 @@ def check_measure(
     LawBroken
         an AssertionError that lists the broken laws.
     """
+    made: Any = measure
     if not isinstance(measure, Measure):
-        measure, hinge, places = between(measure)
+        made, hinge, places = between(measure)
         joints, frames = [*joints, hinge], [*frames, *places]
-    findings = Findings(f"measure {type(measure).__name__}")
-    measure_laws(findings, measure, invariant, joints, frames, postures, seed)
+    findings = Findings(f"measure {type(made).__name__}")
+    measure_laws(findings, made, invariant, joints, frames, postures, seed)
     return findings.verdict()
 
 

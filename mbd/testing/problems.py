@@ -63,7 +63,7 @@ class Actuated:
     constant_mass = True
 
     def evaluate(self, point: Point, mode: Mode, tangent: tuple[float, float] | None) -> Terms:
-        (q,), (v, z), rate = point.q + point.x, point.y, point.rate
+        q, z, rate = float(point.q[0] + point.x[0]), float(point.y[1]), point.rate
         r = rate + np.array([q - z, z - np.cos(point.t)])
         scale = np.abs(rate) + np.array([abs(q) + abs(z), abs(z) + 1.0])
         if tangent is None:
@@ -109,7 +109,8 @@ def broken(system: Any) -> Any:
             return Terms(np.full_like(terms.r, np.nan), terms.S, terms.h, terms.rate, terms.R, terms.H)
 
     if hasattr(system, "accelerations"):
-        Broken.accelerations = lambda self, t, q, y, mode: system.accelerations(t, q, y, mode)  # type: ignore[attr-defined]
+        nothing = (np.full(2, np.nan), np.full(1, np.nan))
+        Broken.accelerations = lambda self, t, q, y, mode: nothing  # type: ignore[attr-defined]
     return Broken()
 
 

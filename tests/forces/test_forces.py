@@ -10,7 +10,8 @@ import sympy
 import mbd
 from mbd.bodies import Ground
 from mbd.errors import ModelError, TraceError
-from tests.forces.test_force_laws import generalized, scene
+from mbd.testing.forces import generalized
+from mbd.testing.measures import between
 from tests.helpers import FreeScope
 
 GROUND = Ground()
@@ -29,28 +30,30 @@ def test_a_stretched_spring_pulls_its_ends_together():
     spring = mbd.Spring("spring", GROUND.origin, BALL.origin, stiffness=10.0, length=1.0)
     scope = ball_at(3.0, 0.0, 0.0)
     assert scope.value(spring.act(scope).potential) == pytest.approx([20.0])
-    assert scope.value(*generalized(spring, scope)) == pytest.approx([-20.0, 0, 0, 0, 0, 0])
+    assert scope.value(*generalized(spring.act(scope), scope)) == pytest.approx([-20.0, 0, 0, 0, 0, 0])
 
 
 def test_a_spring_without_length_has_no_root():
     spring = mbd.Spring("spring", GROUND.origin, BALL.origin, stiffness=10.0)
     scope = ball_at(0.0, 0.0, 0.0)
-    assert scope.value(*generalized(spring, scope)) == [0.0] * 6
+    assert scope.value(*generalized(spring.act(scope), scope)) == [0.0] * 6
 
 
 def test_a_damper_resists_the_rate_of_its_length():
     damper = mbd.Damper("damper", GROUND.origin, BALL.origin, 5.0)
     scope = ball_at(0.0, 2.0, 0.0, speed=(7.0, 3.0, 0.0))
-    assert scope.value(*generalized(damper, scope))[:3] == pytest.approx([0.0, -15.0, 0.0])
+    assert scope.value(*generalized(damper.act(scope), scope))[:3] == pytest.approx([0.0, -15.0, 0.0])
     assert damper.parameters() == {"damper.coefficient": 5.0}
 
 
 def test_an_applied_force_has_the_moment_of_its_arm():
-    force, scope = scene(lambda a, b, joint: mbd.Applied("push", a, force=(2.0, 3.0, 4.0), torque=1.5))
+    force, joint, _ = between(lambda a, b, joint: mbd.Applied("push", a, force=(2.0, 3.0, 4.0), torque=1.5))
+    scope = FreeScope([joint])
+    scope.move("thigh", (3.0, 0.2, 0.1, 0.3, -0.2, 0.1), (0.1, -0.2, 0.3, 0.5, 0.4, -0.6))
     motion = scope.frame(force.frame)
     origin = scope.frame(force.frame.body.origin)
     arm = np.array(scope.value(*motion.position)) - scope.value(*origin.position)
-    work = np.array(scope.value(*generalized(force, scope)))
+    work = np.array(scope.value(*generalized(force.act(scope), scope)))
     np.testing.assert_allclose(work[:3], (2.0, 3.0, 4.0))
     moment = np.cross(arm, (2.0, 3.0, 4.0))
     assert work[3] == pytest.approx(moment[0])  # the first turn is about the x axis of the ground
@@ -94,14 +97,14 @@ def test_one_function_may_give_all_components():
     force = mbd.Applied("push", BALL.origin, force=lambda t: (t, 2.0 * t))
     scope = ball_at(0.0, 0.0, 0.0)
     scope.numbers[scope.time] = 1.5
-    assert scope.value(*generalized(force, scope))[:3] == pytest.approx([1.5, 3.0, 0.0])
+    assert scope.value(*generalized(force.act(scope), scope))[:3] == pytest.approx([1.5, 3.0, 0.0])
 
 
 def test_a_single_torque_acts_about_z():
     for torque in (2.0, lambda t: 2.0, mbd.Samples([0, 1], [2.0, 2.0]), sympy.Integer(2)):
         force = mbd.Applied("twist", BALL.origin, torque=torque)
         scope = ball_at(0.0, 0.0, 0.0)
-        assert scope.value(*generalized(force, scope)) == pytest.approx([0, 0, 0, 0, 0, 2.0])
+        assert scope.value(*generalized(force.act(scope), scope)) == pytest.approx([0, 0, 0, 0, 0, 2.0])
 
 
 @pytest.mark.parametrize("kind", ["cubic", "linear"])
@@ -117,7 +120,7 @@ def test_columns_of_samples_are_components():
     force = mbd.Applied("push", BALL.origin, force=mbd.Samples([0, 1], [[1.0, 2.0], [3.0, 4.0]], kind="linear"))
     scope = ball_at(0.0, 0.0, 0.0)
     scope.numbers[scope.time] = 0.5
-    assert scope.value(*generalized(force, scope))[:3] == pytest.approx([2.0, 3.0, 0.0])
+    assert scope.value(*generalized(force.act(scope), scope))[:3] == pytest.approx([2.0, 3.0, 0.0])
 
 
 @pytest.mark.parametrize(

@@ -65,7 +65,9 @@ def test_an_integrator_of_ones_own_that_returns_nan_is_stopped():
         def step(self, system, state, dt, mode, memory):
             result = super().step(system, state, dt, mode, memory)
             if state.time > 0.3:
-                return StepResult(State(result.state.time, result.state.q * np.nan, result.state.v), memory, result.report)
+                return StepResult(
+                    State(result.state.time, result.state.q * np.nan, result.state.v), memory, result.report
+                )
             return result
 
     trajectory = run(pendulum(), {"hinge.angle": 1.0}, integrator=Lost(), on_failure="return")
@@ -205,7 +207,12 @@ def test_undamped_index_3_is_refused_for_a_reason():
 
 
 def test_integrators_are_values():
-    schemes = [mbd.Newmark(), mbd.HHT(0.05), mbd.HHT(0.1, form="averaged"), mbd.GeneralizedAlpha(0.8, start="consistent")]
+    schemes = [
+        mbd.Newmark(),
+        mbd.HHT(0.05),
+        mbd.HHT(0.1, form="averaged"),
+        mbd.GeneralizedAlpha(0.8, start="consistent"),
+    ]
     for scheme in schemes:
         copy = pickle.loads(pickle.dumps(scheme))
         assert copy == scheme and hash(copy) == hash(scheme) and repr(copy) == repr(scheme)

@@ -4,73 +4,19 @@ import math
 
 import pytest
 import sympy
-from hypothesis import given, strategies as st
 
 import mbd
 from mbd.errors import CapabilityError, ModelError
-from mbd.joints.losses import DissipationFunction
-from mbd.tape.derivatives import jvp
-from tests.helpers import FreeScope
+from mbd.testing import check_loss
+from mbd.testing.losses import force_at
 from tests.instances import LOSSES
 
 every_loss = pytest.mark.parametrize("factory", [factory for _, factory in LOSSES], ids=[name for name, _ in LOSSES])
-RATES = st.floats(-50.0, 50.0)
-
-
-def force_at(loss, rate: float) -> float:
-    scope = FreeScope()
-    v = scope.tape.input("v", 0)
-    scope.numbers[v] = rate
-    return scope.value(loss.force(v, scope, "knee loss"))[0]
 
 
 @every_loss
-@given(rate=RATES)
-def test_dissipated_power_is_never_negative(factory, rate):
-    assert force_at(factory(), rate) * rate >= 0.0
-
-
-@every_loss
-def test_there_is_no_force_at_rest(factory):
-    assert force_at(factory(), 0.0) == pytest.approx(0.0, abs=1e-15)
-
-
-@every_loss
-@given(rate=RATES)
-def test_force_is_continuous(factory, rate):
-    loss = factory()
-    assert force_at(loss, rate + 1e-7) == pytest.approx(force_at(loss, rate), abs=1e-4)
-
-
-@every_loss
-@given(rate=RATES)
-def test_force_is_the_slope_of_the_dissipation_function(factory, rate):
-    loss = factory()
-    if not isinstance(loss, DissipationFunction):
-        return
-    scope = FreeScope()
-    v = scope.tape.input("v", 0)
-    scope.numbers[v] = rate
-    (slope,) = jvp([scope.tape.lift(loss.dissipation(v, scope, "loss"))], {v: 1.0})
-    assert scope.value(slope)[0] == pytest.approx(scope.value(loss.force(v, scope, "loss"))[0], rel=1e-12, abs=1e-12)
-
-
-@every_loss
-@given(rate=RATES)
-def test_the_sign_of_a_folded_rate_is_not_lost(factory, rate):
-    """A rate that reaches the loss as −v gives F(−v), whatever the tape folds."""
-    loss, scope = factory(), FreeScope()
-    v = scope.tape.input("v", 0)
-    scope.numbers[v] = rate
-    assert scope.value(loss.force(-v, scope, "loss"))[0] == pytest.approx(force_at(loss, -rate))
-
-
-@every_loss
-def test_parameters_are_declared_before_they_are_used(factory):
-    loss, scope = factory(), FreeScope()
-    loss.force(scope.tape.input("v", 0), scope, "knee loss")
-    assert scope.recorded == loss.parameters("knee loss")
-    assert loss.faults("knee loss") == []
+def test_every_loss_keeps_the_laws(factory):
+    assert len(check_loss(factory).laws) >= 8
 
 
 def test_losses_add():

@@ -1,0 +1,15 @@
+"""Laws of every integrator: `mbd.testing.check_integrator`."""
+
+import pytest
+
+from mbd.testing import check_integrator
+from tests.instances import INTEGRATORS
+from tests.integrators.own import ProjectedMidpoint, SemiImplicitEuler
+
+
+@pytest.mark.parametrize("scheme", [*INTEGRATORS, SemiImplicitEuler(), ProjectedMidpoint()], ids=repr)
+def test_every_integrator_keeps_the_laws(scheme):
+    verdict = check_integrator(scheme)
+    refused = scheme.check(1)
+    assert verdict.laws["order: as promised, within 0.15"] == (3 if refused else 4)
+    assert len(verdict.notes) == bool(refused)
