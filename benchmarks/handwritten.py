@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import astuple, dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from time import perf_counter
+from time import thread_time
 from typing import Any
 
 import numpy as np
@@ -40,7 +40,7 @@ def compiler_version() -> str:
 class Motion:
     """What a C loop computed.
 
-    rows (stored, 3 n + m): q, v, a, λ; seconds of wall time; counts of tangents, residuals and iterations.
+    rows (stored, 3 n + m): q, v, a, λ; seconds of processor time; counts of tangents, residuals and iterations.
     """
 
     rows: np.ndarray[Any, np.dtype[np.float64]]
@@ -84,9 +84,9 @@ class Program:
         q, v = start.q[order], start.v[order]
         rows, counts = np.zeros((steps // stride + 1, self.width)), np.zeros(3, dtype=np.int64)
         arrays = [array.ctypes.data for array in (self.numbers, settings, q, v)]
-        began = perf_counter()
+        began = thread_time()
         failed = self._run(*arrays, steps, stride, rows.ctypes.data, counts.ctypes.data)
-        seconds = perf_counter() - began
+        seconds = thread_time() - began
         if failed:
             raise ArithmeticError(f"the C loop failed in step {failed}")
         tangents, residuals, iterations = (int(count) for count in counts)

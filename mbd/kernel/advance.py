@@ -492,14 +492,16 @@ def advance(K: Any) -> int:
             if status >= 0:
                 return status
             continue
-        if h < 1e-3 * K.dt:
+        if h < full:
+            K.counts[SHORTENED] += 1
+        uneven = K.stabilized == 0 and K.state[ROWS] > 0 and h < (1.0 - 1e-6) * K.dt
+        if h < 1e-3 * K.dt or uneven:  # index 3 rings after a change of step
             take_over(K, t1)
             K.state[RESTART] = 2
         else:
             accept(K, h, t1)
             K.state[GRID] += 1
             if h < full:
-                K.counts[SHORTENED] += 1
                 K.clock[BASE] = t1
                 K.state[GRID] = 0
             if not holds:  # the pose has changed its rank

@@ -43,7 +43,10 @@ def watch(K: Any, t: float, q: Any, y: Any, rate: Any, lam: Any, values: Any) ->
 
 
 def try_step(K: Any, h: float, t1: float) -> int:
-    """A candidate at t1 = t + h with its guards; a step far below dt follows the Taylor polynomial."""
+    """A candidate at t1 = t + h with its guards; a step far below dt follows the Taylor polynomial.
+
+    A scheme leaves velocities, rates and multipliers of the candidate in the block; only its positions are centered.
+    """
     if h >= 1e-3 * K.dt:
         status = scheme_step(K, h, t1)
         if status != 0:
@@ -61,10 +64,16 @@ def try_step(K: Any, h: float, t1: float) -> int:
         for i in range(K.n):
             K.rate1[i] = K.jump[i]
             K.aux1[i] = K.jump[i]
+            K.block[K.o_a + i] = K.jump[i]
         for k in range(K.n_rows):
             K.lam1[k] = K.impulse[k]
+            K.block[K.o_lam + k] = K.impulse[k]
     if K.n_contacts + K.n_guards > 0:
-        watch(K, t1, K.q1, K.y1, K.rate1, K.lam1, K.guards1)
+        for i in range(K.n_q):
+            K.block[K.o_q + i] = K.q1[i]
+        for i in range(K.n_v):
+            K.block[K.o_x + i] = 0.0
+        call(K, GUARDS, K.guards1)
         finite = 0.0
         for i in range(4 * K.n_contacts + 2 * K.n_guards):
             finite += abs(K.guards1[i])

@@ -13,6 +13,7 @@ from mbd.equations.programs import mass_matrix
 from mbd.integrators.base import Integrator, Point, StepReport, Terms
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.kernel.fields import ITERATIONS, NOT_CONVERGED, NOT_FINITE, NOW
+from mbd.kernel.restart import fill_block, refresh_scales
 from mbd.simulation.asked import asked
 from mbd.state import Mode, State
 from mbd.tape.derivatives import live
@@ -182,8 +183,6 @@ class PlainScheme:
         what = f"the start of {self.integrator!r} at t = {state.time:.6g} s"
         self.memory = asked(what, self.integrator.start, self.system, state, mode, float(K.dt))
         K.slope[:] = getattr(self.memory, "slope", 0.0)
-        from mbd.kernel.restart import fill_block, refresh_scales
-
         fill_block(K, K.clock[NOW], K.q, K.y)
         refresh_scales(K)
         return 0
@@ -211,6 +210,9 @@ class PlainScheme:
         K.q1[:], K.y1[:], K.rate1[:], K.aux1[:] = result.state.q, y, rate, rate
         K.lam1[:] = 0.0
         K.lam1[rows] = lam
+        fill_block(K, t1, K.q1, K.y1)
+        K.block[K.o_a : K.o_a + K.n] = rate
+        K.block[K.o_lam : K.o_lam + K.n_rows] = K.lam1[: K.n_rows]
         return 0
 
     def accept(self, K: Any, h: float) -> None:

@@ -62,7 +62,7 @@ class Findings:
             wrong = ~(np.abs(now - wanted) <= limit)
         if not wrong.any():
             return self.holds(law, True, "", hint)
-        with np.errstate(invalid="ignore"):
+        with np.errstate(invalid="ignore", divide="ignore"):
             misses = np.where(wrong, np.nan_to_num(np.abs(now - wanted) / limit, nan=np.inf), 0.0)
         place = np.unravel_index(int(np.argmax(misses)), now.shape) if now.ndim else ()
         entry = f" entry {', '.join(str(int(k)) for k in place)}" if now.size > 1 else ""

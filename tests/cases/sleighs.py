@@ -43,6 +43,21 @@ class Sleigh:
         model.constrain(blade if by_hand else mbd.KnifeEdge("blade", body.origin))
         return model
 
+    def energies(self) -> mbd.Lagrangian:
+        """The same by its energies, with the row to the left."""
+        return mbd.Lagrangian(
+            "sleigh",
+            ["x", "y", "angle"],
+            kinetic=lambda x_rate, y_rate, angle, angle_rate, m, J, a: (
+                0.5 * m * (x_rate - a * mbd.sin(angle) * angle_rate) ** 2
+                + 0.5 * m * (y_rate + a * mbd.cos(angle) * angle_rate) ** 2
+                + 0.5 * J * angle_rate**2
+            ),
+            potential=lambda x, angle, m, a, g: -m * g * (x + a * mbd.cos(angle)),
+            nonholonomic={"blade": lambda x_rate, y_rate, angle: -blade_row(x_rate, y_rate, angle)},
+            parameters={"m": self.mass, "J": self.inertia, "a": self.ahead, "g": self.pull},
+        )
+
     def start(self, model: Any, angle: float, speed: float, turning: float) -> mbd.State:
         """P at the ground's origin, the speed along the blade."""
         velocity = {"body.x": speed * np.cos(angle), "body.y": speed * np.sin(angle), "body.angle": turning}

@@ -112,8 +112,8 @@ def test_small_disturbances_decay_with_the_published_floquet_multipliers(name: s
     found = sorted(np.linalg.eigvals(np.array(columns).T), key=lambda z: (z.real, z.imag))
     real, imaginary = gait.reference["Floquet multipliers"].value
     expected = sorted(real + 1j * imaginary, key=lambda z: (z.real, z.imag))
-    assert np.array(found) == pytest.approx(np.array(expected), abs=1e-4)
-    assert max(abs(np.array(found))) == pytest.approx(gait.reference["largest |multiplier|"].value, abs=1e-4)
+    assert np.array(found) == pytest.approx(np.array(expected), abs=2e-5)
+    assert max(abs(np.array(found))) == pytest.approx(gait.reference["largest |multiplier|"].value, abs=2e-5)
 
 
 # started elsewhere ------------------------------------------------------------------------------------------------

@@ -20,22 +20,6 @@ SLEIGH = Sleigh(mass=1.7, inertia=0.31, ahead=-0.23, pull=0.9)
 FORMULATIONS = pytest.mark.parametrize("stabilized", [False, True], ids=["index 3", "stabilized"])
 
 
-def sleigh_of_energies() -> mbd.Lagrangian:
-    """The same sleigh by its energies."""
-    return mbd.Lagrangian(
-        "sleigh",
-        ["x", "y", "angle"],
-        kinetic=lambda x_rate, y_rate, angle, angle_rate, m, J, a: (
-            0.5 * m * (x_rate - a * mbd.sin(angle) * angle_rate) ** 2
-            + 0.5 * m * (y_rate + a * mbd.cos(angle) * angle_rate) ** 2
-            + 0.5 * J * angle_rate**2
-        ),
-        potential=lambda x, angle, m, a, g: -m * g * (x + a * mbd.cos(angle)),
-        nonholonomic={"blade": lambda x_rate, y_rate, angle: -blade_row(x_rate, y_rate, angle)},
-        parameters={"m": SLEIGH.mass, "J": SLEIGH.inertia, "a": SLEIGH.ahead, "g": SLEIGH.pull},
-    )
-
-
 def skater(bias=0.0, **options) -> mbd.Model:
     """A free disk with one row of the user's own."""
     model = mbd.Model("skater", gravity=(0.0, 0.0, 0.0))
@@ -49,7 +33,7 @@ def skater(bias=0.0, **options) -> mbd.Model:
 SCENES = {
     "sleigh": SLEIGH.model,
     "sleigh by hand": lambda: SLEIGH.model(by_hand=True),
-    "sleigh of energies": sleigh_of_energies,
+    "sleigh of energies": SLEIGH.energies,
     "tractor": tractor,
     "tractor with a cut hitch": lambda: tractor(["hitch"]),
     "tractor, all cut": lambda: tractor("all"),
@@ -97,6 +81,7 @@ def test_accelerations_program_has_the_slopes_of_each_rate(scene):
     for j in range(n):
         np.testing.assert_allclose(B[:, j], derivative(rates, point, {("v", j): 1.0}), atol=1e-8)
     np.testing.assert_allclose(Rm, B.T, atol=1e-12)
+    np.testing.assert_allclose(hv, at(rates, point), atol=1e-14)
     motion = {("x", k): point["v", k] for k in range(n)} | {("t", 0): 1.0}
     np.testing.assert_allclose(bias, derivative(rates, point, motion), atol=1e-7)
     out = at(residual(equations, range(R), (), stabilized=True), point)
@@ -106,7 +91,6 @@ def test_accelerations_program_has_the_slopes_of_each_rate(scene):
 
 
 def test_a_blade_and_the_same_row_by_hand_are_one_row():
-    point = {("v", 0): 0.3, ("v", 1): -0.8, ("v", 2): 2.0, ("q", 2): 0.7}
     found = []
     for scene in "sleigh", "sleigh by hand", "sleigh of energies":
         equations = derive(SCENES[scene]())
@@ -284,7 +268,7 @@ def test_rows_of_both_kinds_together_keep_second_order(scheme):
 
 
 def test_energies_and_bodies_give_one_motion():
-    model, other = SLEIGH.model(), sleigh_of_energies()
+    model, other = SLEIGH.model(), SLEIGH.energies()
     start = SLEIGH.start(model, 0.8, 0.5, -1.6)
     velocity = {name: float(value) for name, value in zip(("x", "y", "angle"), start.v, strict=True)}
     begin = mbd.assemble(other, position={"angle": 0.8}, velocity=velocity)
