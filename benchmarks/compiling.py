@@ -6,9 +6,9 @@ import os
 from collections.abc import Callable
 from functools import partial
 from tempfile import TemporaryDirectory
-from time import thread_time
 
 from benchmarks.figures import Figure, interleaved
+from benchmarks.stopwatch import processor_seconds
 from benchmarks.walkers import kneed_model
 from mbd.compile.mechanism import Mechanism
 from mbd.equations.derivation import derive
@@ -26,12 +26,12 @@ def measure(repeats: int) -> list[Figure]:
     it is compiled once a machine, not once a model."""
     with TemporaryDirectory() as full:
         tasks: dict[str, Callable[[], float]] = {
-            "Python loop": python_loop,
-            "derive": partial(_timed, _derive),
+            "Python loop": partial(processor_seconds, python_loop),
+            "derive": partial(processor_seconds, _derive),
             "derive + compile, first mode, cold": partial(_cold, 1),
             "derive + compile, 4 modes of a gait, cold": partial(_cold, len(MODES)),
-            "derive + compile, first mode, from cache": partial(_timed, _make, full, 1),
-            "derive + compile, 4 modes of a gait, from cache": partial(_timed, _make, full, len(MODES)),
+            "derive + compile, first mode, from cache": partial(processor_seconds, _make, full, 1),
+            "derive + compile, 4 modes of a gait, from cache": partial(processor_seconds, _make, full, len(MODES)),
         }
         samples = interleaved(tasks, repeats)
     yardstick = samples.pop("Python loop").least
@@ -45,20 +45,12 @@ def measure(repeats: int) -> list[Figure]:
     ]  # fmt: skip
 
 
-def python_loop() -> float:
-    """Seconds that a fixed piece of plain Python takes, some 20 ms: the yardstick of what is done in Python."""
-    began = thread_time()
+def python_loop() -> None:
+    """A fixed piece of plain Python, some 10 ms: the yardstick of what is done in Python."""
     known: dict[tuple[str, int, int], int] = {}
     for k in range(40_000):
         key = ("add", k % 977, k % 1009)
         known[key] = known.get(key, 0) + len(key)
-    return thread_time() - began
-
-
-def _timed(task: Callable[..., object], *arguments: object) -> float:
-    began = thread_time()
-    task(*arguments)
-    return thread_time() - began
 
 
 def _derive() -> object:
@@ -83,4 +75,4 @@ def _make(folder: str, modes: int) -> None:
 
 def _cold(modes: int) -> float:
     with TemporaryDirectory() as empty:
-        return _timed(_make, empty, modes)
+        return processor_seconds(_make, empty, modes)

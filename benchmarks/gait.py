@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from time import thread_time
 from typing import Any
 
 import mbd
 from benchmarks.figures import Figure, interleaved
 from benchmarks.processes import output_of
+from benchmarks.stopwatch import processor_seconds
 from benchmarks.walkers import kneed_walker, knocking_walker
 from mbd.compile.mechanisms import mechanism_of
 
@@ -49,7 +48,9 @@ def _thousand(repeats: int, c_step: float | None) -> list[Figure]:
     def run(store: int) -> Any:
         return mbd.simulate(model, start, mbd.HHT(alpha=0.05), dt=1e-3, until=UNTIL, store=store)
 
-    samples = interleaved({"all": partial(_timed, run, 1), "few": partial(_timed, run, 1000)}, repeats)
+    samples = interleaved(
+        {"all": partial(processor_seconds, run, 1), "few": partial(processor_seconds, run, 1000)}, repeats
+    )
     result = run(1)
     strikes = sum(event.kind == "closed" and event.name.endswith("foot") for event in result.events)
     if strikes != WALKER_STEPS:
@@ -82,13 +83,7 @@ def _events(repeats: int, c_step: float | None) -> list[Figure]:
     for name, stop in ("with", True), ("without", False):
         model, start = knocking_walker(stop)
         runs[name] = partial(mbd.simulate, model, start, mbd.HHT(alpha=0.05), dt=1e-3, until=4.0, store=1000)
-    samples = interleaved({name: partial(_timed, run) for name, run in runs.items()}, 5 * repeats)
+    samples = interleaved({name: partial(processor_seconds, run) for name, run in runs.items()}, 5 * repeats)
     each = (samples["with"].least - samples["without"].least) / runs["with"]().stats["locations"]
     spread = max(samples["with"].spread, samples["without"].spread)
     return [Figure("event: location, impact, restart", each * 1e6, "µs", 20.0, *_yardstick(c_step, 1.0), spread=spread)]
-
-
-def _timed(task: Callable[..., object], *arguments: object) -> float:
-    began = thread_time()
-    task(*arguments)
-    return thread_time() - began

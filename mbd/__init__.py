@@ -132,9 +132,11 @@ __all__ = ["__version__", *_HOME]
 
 def __getattr__(name: str) -> Any:
     """A public name, from its module (PEP 562)."""
-    if name in _HOME:
-        import importlib
+    import importlib
 
+    if name == "testing":  # the law kit, a module of its own
+        return importlib.import_module("mbd.testing")
+    if name in _HOME:
         value = globals()[name] = getattr(importlib.import_module(_HOME[name]), name)
         return value
     if name.startswith("__"):
@@ -147,4 +149,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_HOME})
+    return sorted({*globals(), *_HOME, "testing"})

@@ -12,8 +12,10 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.python import scalar_function
+from mbd.equations.equations import Equations
 from mbd.errors import UnknownNameError
 from mbd.tape.derivatives import gradient, live
+from mbd.tape.node import Node
 
 __all__ = ["Condition", "conditions"]
 
@@ -40,6 +42,14 @@ class Condition:
         return residual, out[1:]
 
 
+def _result(equations: Equations, name: str) -> Node | None:
+    """A named result, None if there is none of that name."""
+    try:
+        return equations.output(name)
+    except (UnknownNameError, KeyError):
+        return None
+
+
 def conditions(mechanism: Mechanism, values: Mapping[str, float], rates: bool) -> tuple[list[Condition], list[str]]:
     """The conditions behind names of results, and the names that are no such result.
 
@@ -51,9 +61,9 @@ def conditions(mechanism: Mechanism, values: Mapping[str, float], rates: bool) -
     kind, allowed = ("v", PLACES | {"v"}) if rates else ("x", PLACES)
     inputs = [equations.tape.input(kind, k) for k in range(equations.n_v)]
     for name, target in values.items():
-        try:
-            node = equations.output(name)
-        except (UnknownNameError, KeyError):
+        node = _result(equations, f"{name}.rate") if rates else None  # 'pin.angle' of a cut joint means its rate
+        node = _result(equations, name) if node is None else node
+        if node is None:
             wrong.append(name)
             continue
         if not {part.data[0] for part in live([node]) if part.op == "input"} <= allowed:

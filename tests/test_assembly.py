@@ -37,10 +37,9 @@ LINKAGE = linkage()
 
 def residuals(model, state):
     mechanism = mechanism_of(model)
-    terms = mechanism.acceleration_terms(
+    return mechanism.acceleration_terms(
         0.0, state.q, np.concatenate([state.v, state.z]), mechanism.parameters(state.parameters), state.anchors
     )
-    return terms
 
 
 # completion ---------------------------------------------------------------------------------------------------------
@@ -71,7 +70,8 @@ def test_values_that_are_not_named_move_least_in_the_metric_of_the_mass():
     model = mbd.Model("rod", gravity=(0, 0, 0))
     light, heavy = mbd.PointMass("light", mass=1.0), mbd.PointMass("heavy", mass=4.0)
     model.connect(
-        mbd.Prismatic("l", model.ground.origin, light.origin), mbd.Prismatic("h", model.ground.point(0.6, 0), heavy.origin)
+        mbd.Prismatic("l", model.ground.origin, light.origin),
+        mbd.Prismatic("h", model.ground.point(0.6, 0), heavy.origin),
     )
     model.constrain(mbd.Bilateral("rod", mbd.distance(light.origin, heavy.origin), value=1.0))
     state = mbd.assemble(model)
@@ -191,7 +191,8 @@ def test_an_angle_that_the_linkage_cannot_reach_is_told():
 def test_constraints_that_can_never_hold_together_are_told_each():
     model, body = point()
     model.constrain(
-        mbd.Bilateral("one", mbd.height(body.origin), value=0.5), mbd.Bilateral("two", mbd.height(body.origin), value=0.6)
+        mbd.Bilateral("one", mbd.height(body.origin), value=0.5),
+        mbd.Bilateral("two", mbd.height(body.origin), value=0.6),
     )
     with pytest.raises(mbd.AssemblyError) as refused:
         mbd.assemble(model)
@@ -199,7 +200,7 @@ def test_constraints_that_can_never_hold_together_are_told_each():
 
 
 def test_a_motion_that_nothing_determines_is_told_by_its_coordinate():
-    model, body = falling()
+    model, _body = falling()
     with pytest.raises(mbd.AssemblyError, match="nothing determines the motion of 'fall.displacement'"):
         mbd.assemble(model, parameters={"ball.mass": 0.0})
 
@@ -224,7 +225,7 @@ def test_a_massless_body_is_allowed_where_its_motion_is_determined():
 
 @pytest.mark.parametrize("parameters", [{"ball.mass": -1.0}, {"ball.mass": -1e-3}])
 def test_a_negative_mass_given_as_a_parameter_is_refused(parameters):
-    model, body = falling()
+    model, _body = falling()
     with pytest.raises(mbd.AssemblyError, match=r"negative"):
         mbd.assemble(model, parameters=parameters)
 
@@ -258,7 +259,7 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize("wish, said", WRONG.values(), ids=WRONG)
+@pytest.mark.parametrize(("wish", "said"), WRONG.values(), ids=WRONG)
 def test_a_wrong_word_is_refused_with_what_was_meant(wish, said):
     with pytest.raises(mbd.ModelError, match=said):
         mbd.assemble(ball(), **wish)

@@ -38,7 +38,7 @@ __all__ = ["newmark_accept", "newmark_start", "newmark_step"]
 MOST_HALVINGS = 10
 """How often a Newton correction is halved before the iteration goes on from where it is."""
 CONTINUOUS = 0.05
-"""Part of the speed by which a careful step may differ from its prediction: the branch is continuous in velocity [-]."""
+"""Part of the speed by which a careful step may differ from its prediction: branches are continuous in velocity [-]."""
 WATCHFUL = 20
 """Steps after a careful one in which every step must continue its branch."""
 FAR = 1e4

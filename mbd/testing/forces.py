@@ -16,7 +16,7 @@ from mbd.tape.derivatives import gradient, jvp
 from mbd.tape.node import Node, Scalar
 from mbd.testing.equations import equation_laws
 from mbd.testing.findings import Findings, Verdict
-from mbd.testing.measures import Build, between, relates_bodies, scope_of, turn_of
+from mbd.testing.measures import Build, between, relates_bodies, scope_of, turn_of, unsaid
 from mbd.testing.scope import FreeScope
 
 __all__ = ["check_force"]
@@ -57,9 +57,8 @@ def check_force(
     findings = Findings(f"force {type(made).__name__} '{made.name}'")
     mentions = made.mentions()
     scope = scope_of(mentions, joints, frames)
-    met = set(scope.bodies)
     action = made.act(scope)
-    _words(findings, made, scope, action, met)
+    _words(findings, made, scope, action)
     if internal is None:
         internal = relates_bodies(mentions)
     rng = np.random.default_rng(seed)
@@ -102,15 +101,15 @@ def power(action: Action, scope: FreeScope) -> Node:
     return scope.tape.lift(total)
 
 
-def _words(findings: Findings, force: Force, scope: FreeScope, action: Action, met: set[str]) -> None:
+def _words(findings: Findings, force: Force, scope: FreeScope, action: Action) -> None:
     own = {name: value for name, value in scope.recorded.items() if name.startswith(f"{force.name}.")}
     declared = force.parameters()
     hint = "parameters() must name every scope.parameter(…) with the same value"
     sentence = f"used {own}, declared {declared}"
     findings.holds("parameters are declared before they are used", own == declared, sentence, hint)
-    unsaid = sorted(set(scope.bodies) - met)
+    left = unsaid(force.mentions(), scope)
     hint = "mentions() must list every frame, joint and name that act() asks for"
-    findings.holds("mentions are complete", not unsaid, f"not mentioned: {', '.join(unsaid)}", hint)
+    findings.holds("mentions are complete", not left, f"not mentioned: {', '.join(left)}", hint)
     faults = force.faults()
     findings.holds("it finds no fault with itself", not faults, "; ".join(faults), "its own faults() complains")
     kinds, law = ("potential", "loss", "applied"), "kind agrees with the action"

@@ -116,7 +116,7 @@ def _transaction(findings: Findings, scheme: Integrator, posed: Problem, dt: flo
         _numbers(result.state), hint, 0.0,
     )  # fmt: skip
     sizes = [len(part) for part in (result.state.q, result.state.v, result.state.z)]
-    wanted = [len(part) for part in (state.q, state.v, state.z)]
+    wanted = [len(part) for part in (posed.start.q, posed.start.v, posed.start.z)]
     findings.equal("q, v and z keep their sizes", "sizes", sizes, wanted, "velocities and states are advanced apart")
 
 

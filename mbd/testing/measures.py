@@ -19,7 +19,7 @@ from mbd.tape.node import Node
 from mbd.testing.findings import Findings, Verdict
 from mbd.testing.scope import FreeScope
 
-__all__ = ["Build", "between", "check_measure", "measure_laws", "relates_bodies", "scope_of", "turn_of"]
+__all__ = ["Build", "between", "check_measure", "measure_laws", "relates_bodies", "scope_of", "turn_of", "unsaid"]
 
 Build = Callable[[Frame, Frame, Joint], Any]
 """factory(a, b, hinge): frames a and b of two bodies, and a joint 'hinge' with an angle between these bodies."""
@@ -87,14 +87,22 @@ def scope_of(mentions: Sequence[Mention], joints: Iterable[Joint], frames: Itera
     known = [mention for mention in mentions if isinstance(mention, Joint)]
     places = [mention for mention in mentions if isinstance(mention, Frame)]
     scope = FreeScope({joint.name: joint for joint in [*joints, *known]}.values(), frames=[*frames, *places])
-    moving = [*places, *(frame for joint in scope.joints.values() for frame in (joint.parent, joint.child))]
-    for name in [mention for mention in mentions if isinstance(mention, str)]:
-        owner = name.rpartition(".")[0]
-        moving += [scope.frames[owner]] if owner in scope.frames else []
-    for frame in moving:
+    for frame in [*places, *(frame for joint in scope.joints.values() for frame in (joint.parent, joint.child))]:
         if not isinstance(frame.body, Ground):
             scope.coordinates(frame.body.name)
     return scope
+
+
+def unsaid(mentions: Sequence[Mention], scope: FreeScope) -> list[str]:
+    """The bodies that were asked for although no mention leads to them."""
+    said: list[Frame] = [mention for mention in mentions if isinstance(mention, Frame)]
+    joints = [mention for mention in mentions if isinstance(mention, Joint)]
+    for name in [mention for mention in mentions if isinstance(mention, str)]:
+        owners = [name.rpartition(".")[0], name.removesuffix(".rate").rpartition(".")[0]]
+        said += [scope.frames[owner] for owner in owners if owner in scope.frames]
+        joints += [scope.joints[owner] for owner in owners if owner in scope.joints]
+    said += [frame for joint in joints for frame in (joint.parent, joint.child)]
+    return sorted(scope.asked - {frame.body.name for frame in said})
 
 
 def measure_laws(
@@ -109,9 +117,8 @@ def measure_laws(
     """The laws of `check_measure`, added to what was found before."""
     mentions = measure.mentions()
     scope = scope_of(mentions, joints, frames)
-    met = set(scope.bodies)
     gap = scope.tape.lift(measure.gap(scope))
-    _words(findings, measure, scope, gap, met)
+    _words(findings, measure, scope, gap)
     captured = [scope.tape.lift(value) for value in measure.captured(scope)]
     anchors = [scope.tape.input("anchor", k) for k in range(len(captured))]
     rows = [(part, scope.tape.lift(value)) for part, value in measure.tangents(scope, anchors)]
@@ -156,7 +163,7 @@ def _balance(findings: Findings, scope: FreeScope, slope: Any) -> None:
         findings.equal(law, f"net moment about {'xyz'[k]} for λ = 1", slope @ scope.ride(zero, axis), 0.0, hint, 1e-9)
 
 
-def _words(findings: Findings, measure: Measure, scope: FreeScope, gap: Node, met: set[str]) -> None:
+def _words(findings: Findings, measure: Measure, scope: FreeScope, gap: Node) -> None:
     """What it says of itself."""
     units = ("m", "rad")
     findings.holds("unit is 'm' or 'rad'", measure.unit in units, f"unit {measure.unit!r}", "angles are 'rad'")
@@ -167,9 +174,9 @@ def _words(findings: Findings, measure: Measure, scope: FreeScope, gap: Node, me
     kinds = sorted({node.data[0] for node in live([gap]) if node.op == "input"} & {"v", "z", "a", "lam"})
     hint = "rows and contacts need positions and time only; velocities belong to losses, events and controllers"
     findings.holds("it depends on the posture and the time", not kinds, f"it depends on inputs {kinds}", hint)
-    unsaid = sorted(set(scope.bodies) - met)
+    left = unsaid(measure.mentions(), scope)
     hint = "mentions() must list every frame, joint and name that gap() asks for"
-    findings.holds("mentions are complete", not unsaid, f"not mentioned: {', '.join(unsaid)}", hint)
+    findings.holds("mentions are complete", not left, f"not mentioned: {', '.join(left)}", hint)
     faults = measure.faults("it")
     findings.holds("it finds no fault with itself", not faults, "; ".join(faults), "its own faults() complains")
     again = scope.tape.lift(measure.gap(scope))

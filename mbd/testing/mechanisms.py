@@ -108,7 +108,7 @@ def furnished(model: mbd.Model, seed: int) -> mbd.Model:
 
 
 def random_loop(seed: int, bars: int = 3) -> tuple[mbd.Model, dict[str, float]]:
-    """A planar loop of bars hinged to each other and to the ground, and the angles at which it is closed.
+    """A planar loop of bars hinged to each other and to the ground, and the angles of all of them at which it is closed.
 
     The hinges are corners of a random polygon, so the loop closes there to round-off. Some hinges have losses.
     """
@@ -135,6 +135,7 @@ def random_loop(seed: int, bars: int = 3) -> tuple[mbd.Model, dict[str, float]]:
         angles[f"hinge {k}.angle"] = math.remainder(heading - before, 2.0 * math.pi)
         end, before = bar.end, heading
     model.connect(mbd.Revolute(f"hinge {bars}", end, model.ground.point(*corners[-1])))
+    angles[f"hinge {bars}.angle"] = math.remainder(-before, 2.0 * math.pi)
     return model, angles
 
 

@@ -27,7 +27,8 @@ AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 class FreeScope:
     """`mbd.scope.Scope` in which each body has six coordinates: place, then turns about x, y, z.
 
-    Joints are read off their frames; `recorded` holds every parameter asked for, `numbers` the inputs of `value`.
+    Joints are read off their frames; `recorded` holds every parameter asked for, `asked` every body,
+    `numbers` the inputs of `value`.
     """
 
     def __init__(self, joints: Iterable[Joint] = (), tunable: Iterable[str] = (), frames: Iterable[Frame] = ()) -> None:
@@ -40,6 +41,7 @@ class FreeScope:
         self._parameters: dict[str, Node] = {}
         self._bodies: dict[str, int] = {}
         self.states: dict[str, Node] = {}
+        self.asked: set[str] = set()
 
     @property
     def time(self) -> Node:
@@ -95,6 +97,7 @@ class FreeScope:
         R_frame, place = frame.placement(self)
         if isinstance(frame.body, Ground):
             return FrameMotion(place, R_frame, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+        self.asked.add(frame.body.name)
         x, y, z, *turns = self.coordinates(frame.body.name)
         R: Any = axis_rotation(AXES[0], turns[0])
         for axis, turn in zip(AXES[1:], turns[1:], strict=True):

@@ -125,14 +125,3 @@ def test_the_bare_motion_is_the_published_one() -> None:
     exact = A2["[theta1, theta2"].value[-1]
     found = [run["shoulder.angle"][-1], run["shoulder.angle"][-1] + run["elbow.angle"][-1]]
     assert np.mod(found - exact[:2] + np.pi, 2 * np.pi) - np.pi == pytest.approx([0.0, 0.0], abs=1e-5)
-
-
-@pytest.mark.slow
-def test_watching_contacts_that_stay_open_costs_at_most_a_fifth_of_the_time() -> None:
-    """Shortest of thirty runs of each, taken in turns."""
-    models = [arm(), arm(contacts=True)]
-    best = [np.inf, np.inf]
-    for _ in range(30):
-        for k, model in enumerate(models):
-            best[k] = min(best[k], swing(model, mbd.HHT(), dt=1e-4).stats["wall_seconds"])
-    assert best[1] / best[0] <= 1.2

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import mbd
-from mbd.integrators import Integrator, Point, StepReport, StepResult, Terms
+from mbd.integrators import Integrator, StepReport, StepResult, Terms
 from mbd.state import Mode, State
 from tests.integrators.own import ProjectedMidpoint, SemiImplicitEuler
 from tests.integrators.test_order import started
@@ -23,7 +23,7 @@ def walk(scheme, dt, until=0.6, **settings):
     return mbd.simulate(walker, kneed_walker_start(walker), scheme, dt=dt, until=until, **settings)
 
 
-@pytest.mark.parametrize("scheme, order", OWN.values(), ids=OWN)
+@pytest.mark.parametrize(("scheme", "order"), OWN.values(), ids=OWN)
 def test_an_integrator_of_ones_own_walks_through_knee_lock_and_heel_strike(scheme, order):
     exact = walk(mbd.HHT(0.05), 1e-4)
     errors = []
@@ -104,7 +104,7 @@ class Oscillator:
         self.omega = omega
 
     def evaluate(self, point, mode, tangent):
-        c_C, c_K = tangent or (0.0, 0.0)
+        _c_C, c_K = tangent or (0.0, 0.0)
         return Terms(point.rate + self.omega**2 * (point.q + point.x), np.array([[1.0 + c_K * self.omega**2]]))
 
 
@@ -170,7 +170,7 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize("make, said", WRONG.values(), ids=WRONG)
+@pytest.mark.parametrize(("make", "said"), WRONG.values(), ids=WRONG)
 def test_a_parameter_that_no_scheme_has_is_refused(make, said):
     with pytest.raises(mbd.CapabilityError, match=said):
         make()

@@ -120,7 +120,7 @@ def test_index_3_is_of_second_order_once_its_start_has_died_away(scheme):
                          ids=repr)  # fmt: skip
 def test_the_textbook_start_costs_the_multipliers_one_order_at_first(scheme):
     table = errors("double pendulum in absolute coordinates", scheme)
-    jerk = errors("double pendulum in absolute coordinates", type(scheme)(list(vars(scheme).values())[0]))
+    jerk = errors("double pendulum in absolute coordinates", type(scheme)(next(iter(vars(scheme).values()))))
     assert np.all(observed(table["q"][:, 0]) > 1.85), "positions do not suffer"
     assert np.mean(observed(table["lam"][2:, 1])) < 1.2
     assert table["lam"][-1, 1] > 4.0 * jerk["lam"][-1, 1]
@@ -154,7 +154,7 @@ def test_the_averaged_form_is_of_second_order_where_the_mass_is_constant():
 
 def system_of(scene, scheme):
     """The scene as numbers."""
-    model, start = started(scene)
+    model, _start = started(scene)
     mechanism = mechanism_of(model)
     manager = ActiveSetManager(mechanism.equations)
     return Stepper(mechanism, manager, scheme, mechanism.parameters(), 1e-3, {"capacity": 8}).system

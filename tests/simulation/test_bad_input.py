@@ -93,7 +93,7 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize("settings, said", WRONG.values(), ids=WRONG)
+@pytest.mark.parametrize(("settings", "said"), WRONG.values(), ids=WRONG)
 def test_a_wrong_argument_is_refused_by_its_name(settings, said):
     with pytest.raises(mbd.ModelError, match=said):
         simulate(**settings)
@@ -179,7 +179,7 @@ ABSURD = {
 }
 
 
-@pytest.mark.parametrize("model, settings", ABSURD.values(), ids=ABSURD)
+@pytest.mark.parametrize(("model", "settings"), ABSURD.values(), ids=ABSURD)
 def test_absurd_values_give_finite_rows_or_a_clear_failure(model, settings):
     trajectory = run(model(), {"hinge.angle": 1.0}, on_failure="return", **settings)
     assert finite(trajectory)

@@ -139,7 +139,7 @@ BAD = {
 }
 
 
-@pytest.mark.parametrize("update, said", BAD.values(), ids=BAD)
+@pytest.mark.parametrize(("update", "said"), BAD.values(), ids=BAD)
 def test_a_controller_that_fails_ends_the_run_by_name_and_keeps_it(update, said):
     def late(t, values, state):
         return update(t, values, state) if t > 0.25 else {}

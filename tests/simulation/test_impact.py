@@ -231,11 +231,11 @@ def test_a_lock_released_only_by_its_rule_may_pull():
 
 
 def test_an_impact_on_a_moving_floor_takes_the_speed_of_the_floor():
-    model, body = falling()
+    model, _body = falling()
     floor = mbd.measure(lambda y, t: y - 0.1 * mbd.sin(5.0 * t), "fall.displacement", "t")
     model.constrain(mbd.Unilateral("floor", floor))
     trajectory = run(model, {"fall.displacement": 0.3}, until=0.3, dt=1e-3)
-    (before, after), *_ = impacts(trajectory)
+    (_before, after), *_ = impacts(trajectory)
     t = trajectory.time[after]
     assert trajectory["fall.displacement"][after] == pytest.approx(0.1 * np.sin(5.0 * t), abs=1e-12)
     assert trajectory["fall.rate"][after] == pytest.approx(0.5 * np.cos(5.0 * t), abs=1e-12)

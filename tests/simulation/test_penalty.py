@@ -44,9 +44,9 @@ def test_the_error_of_a_bounce_on_rubber_is_of_second_order():
 def test_an_undamped_stop_keeps_energy_over_many_bounces():
     model = rubber(stiffness=5e3)
     trajectory = run(model, {"fall.displacement": 0.2}, integrator=mbd.Newmark(), dt=5e-4, until=5.0)
-    energy = trajectory.energy.kinetic + trajectory.energy.potential
     assert len(trajectory.events) > 20
-    assert np.abs(energy - energy[0]).max() < 2e-3 * energy[0]
+    speeds = trajectory["fall.rate"][[event.row for event in trajectory.events]]
+    np.testing.assert_allclose(np.abs(speeds), np.sqrt(0.4 * G), rtol=1e-4)
 
 
 @pytest.mark.parametrize("exponent", [1.0, 1.5, 2.0, 3.0])
@@ -90,9 +90,9 @@ def test_stiffer_and_stiffer_stops_approach_the_rigid_one():
     """Critically damped rubber of growing stiffness against a plastic floor: the gap of motion shrinks like 1/√k."""
     body_drops = {"fall.displacement": 0.2}
     distances = []
-    for k in (1e5, 1e7, 1e9):
+    for k in (1e4, 1e6, 1e8):
         model = rubber(stiffness=k, damping=2 * np.sqrt(2.0 * k), release="pull")
-        trajectory = run(model, body_drops, dt=1e-4, until=0.4)
+        trajectory = run(model, body_drops, dt=2e-5, until=0.6)
         distances.append(-trajectory["fall.displacement"].min())
         assert trajectory["floor.force"][-1] == pytest.approx(2 * G, rel=1e-6)
     assert distances[0] / distances[1] == pytest.approx(10.0, rel=0.1)

@@ -27,7 +27,7 @@ def bouncing(reset, **settings):
 
 
 @pytest.mark.parametrize(
-    "direction, expected",
+    ("direction", "expected"),
     [(-1, [0.25, 1.25, 2.25]), (1, [0.75, 1.75, 2.75]), (0, [0.25, 0.75, 1.25, 1.75, 2.25, 2.75])],
 )
 def test_an_event_fires_at_every_crossing_in_its_direction(direction, expected):
@@ -138,7 +138,7 @@ BAD_RESETS = {
 }
 
 
-@pytest.mark.parametrize("reset, said", BAD_RESETS.values(), ids=BAD_RESETS)
+@pytest.mark.parametrize(("reset", "said"), BAD_RESETS.values(), ids=BAD_RESETS)
 def test_a_bad_reset_ends_the_run_with_a_reason_and_keeps_it(reset, said):
     with pytest.raises(mbd.MbdError, match=said) as failed:
         bouncing(reset)
@@ -166,7 +166,7 @@ def test_a_terminal_reset_shows_in_the_last_row():
     assert trajectory["fall.rate"][-2] == pytest.approx(-G * DROP, rel=1e-9)
 
 
-@pytest.mark.parametrize("until, happened", [("floor", True), (("floor", 0.3), False), (("floor", 0.6), True)])
+@pytest.mark.parametrize(("until", "happened"), [("floor", True), (("floor", 0.3), False), (("floor", 0.6), True)])
 def test_a_run_ends_at_the_first_closing_of_a_contact_or_at_its_latest_time(until, happened):
     trajectory = run(ball(restitution=0.5), {"fall.displacement": 1.0}, until=until)
     assert trajectory.success

@@ -194,7 +194,7 @@ def test_the_motion_does_not_depend_on_the_order_of_contacts():
     )
 
 
-@pytest.mark.parametrize("force, stays", [(-5.0, True), (0.0, True), (5.0, False)])
+@pytest.mark.parametrize(("force", "stays"), [(-5.0, True), (0.0, True), (5.0, False)])
 def test_a_contact_that_touches_at_rest_is_decided_by_its_acceleration(force, stays):
     model, body = point(gravity=(0.0, 0.0, 0.0))
     model.constrain(mbd.Unilateral("floor", mbd.height(body.origin)))

@@ -55,14 +55,14 @@ CONSTRAINTS = {
         pad(lambda k, d, rate: k * d - 0.02 * k * rate), r"at ġ = ∓0\.01: .* pressing \(expected ≥ 0\)"
     ),
     "passivity: a penalty gives back no more than it took": (
-        pad(lambda k, d, rate: k * d - 0.02 * k * rate), r"'pad' gave .* of the swing of kinetic energy.*t = |'pad' gave"
+        pad(lambda k, d, rate: k * d - 0.02 * k * rate), r"'pad' gave .* of the swing"
     ),
-    "a penalty starts from zero": (pad(lambda k, d, rate: k * d + 5.0), r"at the first touch, at rest: expected 0, found"),
+    "a penalty starts from zero": (pad(lambda k, d, rate: k * d + 5.0), r"at the first touch, at rest: expected 0"),
     "frame invariance: turning and moving the whole scene changes nothing": (
         lambda a, b, hinge: mbd.Bilateral("rod", Place(a, b, from_origin), 0.4), r"gap after the move"
     ),
-    "impact: no energy is made": (
-        lambda a, b, hinge: Superball("ball", mbd.height(a), restitution=1.5), r"'ball' gives .* J in an impact"
+    "the run goes through": (
+        lambda a, b, hinge: Superball("ball", mbd.height(a), restitution=1.5), r"the impact law would create energy"
     ),
     "B = ∂h/∂q": (lambda a, b, hinge: Hidden("rod", mbd.distance(a, b), 0.6), r"row 'rod'"),
     "it finds no fault with itself": (

@@ -96,7 +96,7 @@ class Undeclared(Own):
 FORCES = {
     "action = reaction: the forces on all bodies balance": [
         (lambda a, b, hinge: Own("it", a, b, asymmetric), r"net force along x \[N\]: expected 0, found .*seed 0"),
-        (lambda a, b, hinge: Own("it", a, b, crooked), r"net moment about z \[N m\]: expected 0"),
+        (lambda a, b, hinge: Own("it", a, b, crooked), r"net moment about . \[N m\]: expected 0"),
     ],
     "frame invariance: turning and moving the whole scene changes nothing": [
         (lambda a, b, hinge: Own("it", a, b, anchored), r"absolute place or direction"),
@@ -241,7 +241,7 @@ MEASURES = {
         lambda a, b, hinge: Place(a, b, stretch, (stretch,)), r"smallest singular value"
     ),
     "tangents are as announced": (
-        lambda a, b, hinge: Place(a, b, stretch, (across,), sticks=False), r"has_tangents is False, tangents\(\) gives 1"
+        lambda a, b, hinge: Place(a, b, stretch, (across,), sticks=False), r"has_tangents is False"
     ),
     "unit is 'm' or 'rad'": (lambda a, b, hinge: Place(a, b, stretch, unit_="deg"), r"unit 'deg'"),
     "determinism": (lambda a, b, hinge: Growing(a, b, stretch), r"two expressions"),
