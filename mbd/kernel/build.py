@@ -28,7 +28,7 @@ __all__ = ["MODULES", "entry", "ir_of_kernel", "object_code", "source_digest"]
 
 ENTRY = "mbd_kernel"
 
-MODULES = ("linear", "redundancy", "restart", "careful", "newmark", "guards", "locate", "advance")
+MODULES = ("linear", "redundancy", "restart", "careful", "newmark", "guards", "locate", "switching", "advance")
 
 
 def source_digest() -> str:

@@ -16,7 +16,7 @@ from mbd.tape.derivatives import gradient, jvp
 from mbd.tape.node import Node, Scalar
 from mbd.testing.equations import equation_laws
 from mbd.testing.findings import Findings, Verdict
-from mbd.testing.measures import Build, between, relates_bodies, scope_of, turn_of, unsaid
+from mbd.testing.measures import Build, balance, between, relates_bodies, scope_of, turn_of, unsaid
 from mbd.testing.scope import FreeScope
 
 __all__ = ["check_force"]
@@ -69,7 +69,17 @@ def check_force(
         _passivity(findings, made, action, scope)
         _tangent(findings, scope, effort)
         if internal:
-            _balance(findings, scope, effort, rng)
+            hint = (
+                "each force on one body needs its opposite on the other, in the line of action; or pass internal=False"
+            )
+            balance(
+                findings,
+                "action = reaction: the forces on all bodies balance",
+                scope,
+                np.array(scope.value(*effort)),
+                "",
+                hint,
+            )
             _invariance(findings, action, scope, rng)
     findings.where = f"seed {seed}"
     if factory is not None and not findings.broken:
@@ -147,20 +157,6 @@ def _tangent(findings: Findings, scope: FreeScope, effort: list[Node]) -> None:
     hint = "a kink, or a derivative that is not that of the value; tables and where() must meet smoothly"
     size = np.abs(sides[0])
     findings.equal("tangent: ∂f/∂q and ∂f/∂v are slopes of f", "generalized force", exact, slope, hint, 1e-6, size)
-
-
-def _balance(findings: Findings, scope: FreeScope, effort: list[Node], rng: np.random.Generator) -> None:
-    """No net force and no net moment on all bodies together."""
-    work = np.array(scope.value(*effort))
-    size = np.abs(work)
-    law, zero = "action = reaction: the forces on all bodies balance", np.zeros(3)
-    hint = "each force on one body needs its opposite on the other, in the line of action; or pass internal=False"
-    for k, axis in enumerate(np.eye(3)):
-        found = work @ scope.ride(axis, zero)
-        findings.equal(law, f"net force along {'xyz'[k]} [N]", found, 0.0, hint, 1e-9, size)
-    for k, axis in enumerate(np.eye(3)):
-        found = work @ scope.ride(zero, axis)
-        findings.equal(law, f"net moment about {'xyz'[k]} [N m]", found, 0.0, hint, 1e-9, size)
 
 
 def _invariance(findings: Findings, action: Action, scope: FreeScope, rng: np.random.Generator) -> None:

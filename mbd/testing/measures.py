@@ -19,7 +19,17 @@ from mbd.tape.node import Node
 from mbd.testing.findings import Findings, Verdict
 from mbd.testing.scope import FreeScope
 
-__all__ = ["Build", "between", "check_measure", "measure_laws", "relates_bodies", "scope_of", "turn_of", "unsaid"]
+__all__ = [
+    "Build",
+    "balance",
+    "between",
+    "check_measure",
+    "measure_laws",
+    "relates_bodies",
+    "scope_of",
+    "turn_of",
+    "unsaid",
+]
 
 Build = Callable[[Frame, Frame, Joint], Any]
 """factory(a, b, hinge): frames a and b of two bodies, and a joint 'hinge' with an angle between these bodies."""
@@ -145,7 +155,15 @@ def measure_laws(
             hint = "a tangent that is parallel to the normal holds nothing of its own"
             findings.holds("tangents are independent of the normal", smallest > 1e-8, sentence, hint)
         if invariant:
-            _balance(findings, scope, slope)
+            hint = "g must change with relative motion only; or pass invariant=False"
+            balance(
+                findings,
+                "action = reaction: the forces λ ∂g/∂q on all bodies balance",
+                scope,
+                slope,
+                " for λ = 1",
+                hint,
+            )
             before = scope.value(gap)[0]
             scope.turn_scene(turn_of(rng), rng.uniform(-1.0, 1.0, 3))
             hint = "it depends on an absolute place or direction; take differences of places, or pass invariant=False"
@@ -154,13 +172,14 @@ def measure_laws(
     findings.where = ""
 
 
-def _balance(findings: Findings, scope: FreeScope, slope: Any) -> None:
-    """The multiplier's forces λ ∇g on all bodies together make no force and no moment."""
-    law, zero = "action = reaction: the forces λ ∂g/∂q on all bodies balance", np.zeros(3)
-    hint = "g must change with relative motion only; or pass invariant=False"
-    for k, axis in enumerate(np.eye(3)):
-        findings.equal(law, f"net force along {'xyz'[k]} for λ = 1", slope @ scope.ride(axis, zero), 0.0, hint, 1e-9)
-        findings.equal(law, f"net moment about {'xyz'[k]} for λ = 1", slope @ scope.ride(zero, axis), 0.0, hint, 1e-9)
+def balance(findings: Findings, law: str, scope: FreeScope, work: Any, each: str, hint: str) -> None:
+    """Generalized forces that act between the bodies make no force and no moment on all of them together."""
+    size, zero = np.abs(work), np.zeros(3)
+    rides = {"force along": [(axis, zero) for axis in np.eye(3)], "moment about": [(zero, axis) for axis in np.eye(3)]}
+    for kind, motions in rides.items():
+        for name, motion in zip("xyz", motions, strict=True):
+            found = work @ scope.ride(*motion)
+            findings.equal(law, f"net {kind} {name}{each}", found, 0.0, hint, 1e-9, size)
 
 
 def _words(findings: Findings, measure: Measure, scope: FreeScope, gap: Node) -> None:

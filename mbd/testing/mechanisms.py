@@ -108,7 +108,7 @@ def furnished(model: mbd.Model, seed: int) -> mbd.Model:
 
 
 def random_loop(seed: int, bars: int = 3) -> tuple[mbd.Model, dict[str, float]]:
-    """A planar loop of bars hinged to each other and to the ground, and the angles of all of them at which it is closed.
+    """A planar loop of bars hinged to each other and to the ground, and the angles of its hinges where it is closed.
 
     The hinges are corners of a random polygon, so the loop closes there to round-off. Some hinges have losses.
     """

@@ -243,10 +243,57 @@ def test_an_impact_on_a_moving_floor_takes_the_speed_of_the_floor():
 
 
 def test_a_box_lands_flat_on_two_sticking_corners_and_rests():
-    """Their tangent rows depend on each other: the motion is unique, the split of the friction is not, and it is said."""
+    """Their tangent rows depend on each other: the motion is unique, the split of friction is not, and it is said."""
     trajectory = run(box(friction=None), {"place.y": 1.0}, {"place.x": 0.5, "place.y": 0.0})
     assert {event.name for event in trajectory.events} == {"left", "right"}
     assert trajectory["left.force"][-1] + trajectory["right.force"][-1] == pytest.approx(2.0 * G, rel=1e-9)
     np.testing.assert_allclose(trajectory.record.v[-1], 0.0, atol=1e-9)
     assert trajectory["place.x"][-1] == pytest.approx(0.5 * trajectory.events[0].time, abs=1e-9)
     assert any("not" in note and "unique" in note for note in trajectory.stats["notes"])
+
+
+# chains -------------------------------------------------------------------------------------------------------------
+def cradle(count, restitution, apart=0.0, reverse=False):
+    """Balls in a row on a rail, 0.1 m wide; the first comes with 1 m/s."""
+    model = mbd.Model("cradle", gravity=(0, 0, 0))
+    for k in range(count):
+        body = mbd.PointMass(f"ball {k}", mass=1.0)
+        model.connect(mbd.Prismatic(f"p{k}", model.ground.origin, body.origin))
+    contacts = [
+        mbd.Unilateral(
+            f"c{k}",
+            mbd.measure(lambda a, b: b - a - 0.1, f"p{k}.displacement", f"p{k + 1}.displacement"),
+            restitution=restitution,
+        )
+        for k in range(count - 1)
+    ]
+    model.constrain(*(contacts[::-1] if reverse else contacts))
+    place = {f"p{k}.displacement": 0.1 * k + apart * k for k in range(1, count)} | {"p0.displacement": -0.5}
+    return run(model, place, {"p0.displacement": 1.0}, until=2.0)
+
+
+@pytest.mark.parametrize("reverse", [False, True])
+@pytest.mark.parametrize("apart", [0.0, 1e-3])
+@pytest.mark.parametrize("count", [2, 3, 5])
+def test_a_blow_runs_through_a_cradle_to_its_last_ball(count, apart, reverse):
+    trajectory = cradle(count, 1.0, apart, reverse)
+    np.testing.assert_allclose(trajectory.record.v[-1], [0.0] * (count - 1) + [1.0], atol=1e-12)
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.3, 0.5, 0.9])
+def test_a_row_of_balls_keeps_its_momentum_and_loses_energy(restitution):
+    trajectory = cradle(4, restitution)
+    np.testing.assert_allclose(trajectory.record.v.sum(axis=1), 1.0, atol=1e-12)
+    kinetic = trajectory.energy.kinetic
+    assert np.all(np.diff(kinetic) < 1e-12)
+    assert kinetic[0] - kinetic[-1] == pytest.approx(sum(event.energy_loss for event in trajectory.events), rel=1e-9)
+    if restitution == 0.0:
+        np.testing.assert_allclose(trajectory.record.v[-1], 0.25, atol=1e-12)
+
+
+def test_two_contacts_of_one_point_share_the_blow_and_the_load():
+    model, body = falling()
+    model.constrain(*(mbd.Unilateral(name, mbd.height(body.origin)) for name in ("one", "two")))
+    trajectory = run(model, {"fall.displacement": 1.0})
+    assert sum(event.impulse[0] for event in trajectory.events) == pytest.approx(2.0 * np.sqrt(2 * G), rel=1e-9)
+    assert trajectory["one.force"][-1] + trajectory["two.force"][-1] == pytest.approx(2.0 * G, rel=1e-9)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -125,3 +127,26 @@ def test_a_pendulum_in_absolute_coordinates_is_at_the_bottom_after_a_quarter_per
     exact = ellipk(np.sin(0.5) ** 2) / np.sqrt(G)
     errors = np.abs(np.array(times) - exact)
     assert errors[1] < 1e-5 and errors[0] / errors[1] == pytest.approx(4.0, abs=0.6)
+
+
+@pytest.mark.parametrize("begin", [-5.0, 1e3, 1e6, 1e9])
+def test_a_late_start_changes_nothing_but_the_round_off_of_time(begin):
+    model = ball(restitution=0.5)
+    start = replace(mbd.assemble(model, {"fall.displacement": 1.0}), time=begin)
+    trajectory = mbd.simulate(model, start, mbd.HHT(0.05), dt=0.01, until=begin + 2.0)
+    expected = DROP * np.array([1.0, 2.0, 2.5, 2.75])
+    found = np.array([event.time for event in trajectory.events[:4]]) - begin
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 + 1e-15 * abs(begin) * 100)
+    assert trajectory["floor.gap"].min() > -1e-9
+    assert trajectory["floor.force"][-1] == pytest.approx(2.0 * G)
+
+
+@pytest.mark.parametrize("late", [0.0, 1e-15, -1e-15, 1e-12, -1e-12])
+def test_an_event_at_the_very_end_of_a_run_happens_there_or_at_once_in_the_next(late):
+    model = ball()
+    first = run(model, {"fall.displacement": 1.0}, until=DROP + late)
+    second = mbd.simulate(model, first.final, mbd.HHT(0.05), dt=0.01, until=1.0)
+    (event,) = first.events + second.events
+    assert event.time == pytest.approx(DROP, abs=1e-11)
+    assert event.impulse[0] == pytest.approx(2.0 * np.sqrt(2 * G), rel=1e-9)
+    assert second["fall.displacement"].min() > -1e-11

@@ -86,7 +86,8 @@ def test_threads_that_share_a_model_get_the_same_bits():
         walker, start = fresh()
         mechanisms._KNOWN.pop(walker, None)  # derived and compiled by the threads themselves
         with ThreadPoolExecutor(4) as pool:
-            results = list(pool.map(lambda _: walk(walker, start), range(4)))
+            futures = [pool.submit(walk, walker, start) for _ in range(4)]
+            results = [future.result() for future in futures]
         assert all(result == alone for result in results)
 
 

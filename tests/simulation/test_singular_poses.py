@@ -9,7 +9,7 @@ import mbd
 
 
 def four_bars(count):
-    """`count` parallelograms side by side: cranks upright on a common base, couplers of the same length (IFToMM A02)."""
+    """`count` parallelograms side by side: cranks upright on one base, couplers of the same length (IFToMM A02)."""
     model = mbd.Model("four-bars")
     cranks = [mbd.Link(f"crank {k}", mass=1.0, length=1.0, center=0.5, inertia=1 / 12) for k in range(count + 1)]
     for k, crank in enumerate(cranks):

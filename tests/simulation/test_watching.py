@@ -204,3 +204,13 @@ def test_a_contact_that_touches_at_rest_is_decided_by_its_acceleration(force, st
     assert trajectory["place.y"][-1] == pytest.approx(expected, abs=1e-12)
     assert trajectory["floor.force"][-1] == pytest.approx(max(-force, 0.0))
     assert all(not event.impulse.any() for event in trajectory.events), "touching at rest is no impact"
+
+
+def test_a_contact_closed_at_the_start_that_would_pull_opens_there():
+    model, body = point()
+    model.constrain(mbd.Unilateral("floor", mbd.height(body.origin)))
+    model.apply(mbd.Applied("lift", body.origin, force=(0.0, 15.0, 0.0)))
+    trajectory = run(model, closed=["floor"], until=0.1)
+    (event,) = trajectory.events
+    assert (event.time, event.kind) == (0.0, "opened")
+    assert trajectory["place.y"][-1] == pytest.approx(0.005 * (15.0 - G), rel=1e-9)

@@ -97,6 +97,42 @@ class Wide(Revolute):
         return [a + 2.0 * b for a, b in zip(q, x, strict=True)]
 
 
+class Degrees(Revolute):
+    """A unit that nothing knows."""
+
+    @property
+    def labels(self):
+        return (Label("angle", "deg"),)
+
+
+class Twins(Revolute):
+    """Two rows of one name."""
+
+    def rows(self, R, p, scope):
+        return [("x", value) for _, value in super().rows(R, p, scope)]
+
+
+class Shifted(Revolute):
+    """q ⊕ 0 is not q."""
+
+    def compose(self, q, x):
+        return [a + b + 0.1 for a, b in zip(q, x, strict=True)]
+
+
+class Short(Revolute):
+    """A row is missing."""
+
+    def rows(self, R, p, scope):
+        return list(super().rows(R, p, scope))[:4]
+
+
+class Weak(Revolute):
+    """It finds a fault with itself."""
+
+    def faults(self):
+        return ["the pin is worn"]
+
+
 @dataclass(frozen=True)
 class Corkscrew(Joint):
     """A correct joint of a user's own: a screw about z of unit pitch."""
@@ -136,6 +172,11 @@ JOINTS = {
     "recover inverts the transform": (Forgetful, r"expected .*, found"),
     "rows vanish on the joint's own motion": (Stiff, r"h entry 4: expected 0"),
     "rows and coordinates share the six freedoms": (Loose, r"smallest singular value"),
+    "rows do not resist the joint's motion": (Stiff, r"ḣ along 'angle' entry 4: expected 0"),
+    "units are 'rad' or 'm'": (Degrees, r"units \['deg'\]"),
+    "names are told apart": (Twins, r"row names \['x', 'x'"),
+    "q ⊕ 0 = q": (Shifted, r"q ⊕ 0: expected"),
+    "it finds no fault with itself": (Weak, r"the pin is worn"),
     "determinism": (Drawn, r"transform asked again"),
     "parameters are declared before they are used": (Secret, r"undeclared: \{'joint\.play': 0\.25\}"),
     "is_planar tells the truth": (Flat, r"is_planar is True, the transform moves z"),
@@ -151,6 +192,11 @@ def test_a_wrong_joint_is_caught(law):
         check_joint(lambda a, b: kind("joint", a, b, axis=axis))
     assert law in caught.value.laws
     assert f"joint {kind.__name__} 'joint' breaks" in str(caught.value)
+
+
+def test_a_missing_row_is_caught():
+    with pytest.raises(LawBroken, match=r"number of rows: expected 5, found 4"):
+        check_joint(lambda a, b: Short("joint", a, b))
 
 
 def test_a_velocity_in_the_wrong_axes_is_caught():

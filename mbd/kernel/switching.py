@@ -1,0 +1,203 @@
+"""What an event does: contacts close by impact, open by their rules, and settle on forces that push."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mbd.kernel.fields import (
+    CLOSE,
+    CROSS,
+    EVENTS,
+    LOG_CLOSED,
+    LOG_OPENED,
+    LOGGED,
+    NOW,
+    OPEN_FORCE,
+    OPEN_PULL,
+    PRESS,
+    STORED,
+    WATCH,
+)  # fmt: skip
+from mbd.kernel.guards import gap_scale, is_watched
+from mbd.kernel.restart import capture, complementarity, evaluate, impact, load_accelerations
+
+__all__ = ["log_event", "settle", "switch"]
+
+
+def log_event(K: Any, kind: int, index: int, loss: float, struck: bool) -> None:
+    """One line of the event log: t, kind, index, energy loss, row of results, impulses of its rows if it struck."""
+    o = K.state[LOGGED] * K.event_width
+    K.log[o] = K.clock[NOW]
+    K.log[o + 1] = float(kind)
+    K.log[o + 2] = float(index)
+    K.log[o + 3] = loss
+    K.log[o + 4] = float(K.state[STORED])
+    for k in range(K.n_rows):
+        K.log[o + 5 + k] = -K.impulse[k] if struck and K.row_contact[k] == index else 0.0
+    K.state[LOGGED] += 1
+    K.counts[EVENTS] += 1
+
+
+def settle(K: Any) -> int:
+    """Consistent accelerations and multipliers; contacts that would pull open, touching ones that press close."""
+    evaluate(K, K.clock[NOW], K.q, K.y)
+    load_accelerations(K)
+    for c in range(K.n_contacts):
+        K.active[c] = 1 if (K.closed[c] == 1 and K.kind[c] == 0) else 0
+        K.free[c] = 0
+        if K.kind[c] == 0:
+            if (K.closed[c] == 1 and K.opens[c] == 0) or (K.closed[c] == 0 and K.touched[c] == 1):
+                K.free[c] = 1
+    status = complementarity(K)
+    if status != 0:
+        return status
+    for i in range(K.n):
+        K.rate[i] = K.jump[i]
+    for k in range(K.n_rows):
+        K.lam[k] = K.impulse[k]
+    for c in range(K.n_contacts):
+        K.touched[c] = 0
+        if K.kind[c] == 0 and K.active[c] != K.closed[c]:
+            K.closed[c] = K.active[c]
+            if K.active[c] == 1:
+                capture(K, c)
+                log_event(K, LOG_CLOSED, c, 0.0, False)
+            else:
+                K.armed[c] = 1
+                log_event(K, LOG_OPENED, c, 0.0, False)
+        K.active[c] = 0
+    return 0
+
+
+def gather_closing(K: Any) -> float:
+    """Mark the contacts that close at this instant in K.closing; the fastest closing speed of unilateral ones.
+
+    Contacts that touch and approach close together with the fired one, whatever their order.
+    """
+    nC = K.n_contacts
+    fastest = 0.0
+    for c in range(nC):
+        K.closing[c] = 0
+        if K.closed[c] == 1:
+            continue
+        fired = K.fired[0] == CLOSE and K.fired[1] == c
+        near = abs(K.guards0[c]) <= 1e-10 * gap_scale(K, c)
+        ready = K.armed[c] == 1 and is_watched(K, c, K.guards0)
+        approach = -K.guards0[nC + c]
+        if fired or (near and ready and K.kind[c] == 0 and approach > 1e-9):
+            K.closing[c] = 1
+            if K.kind[c] == 0:
+                fastest = max(fastest, approach)
+    return fastest
+
+
+def release_for(K: Any, after: int) -> None:
+    """Open the contacts whose rule names one that closes now."""
+    for c in range(K.n_contacts):
+        if K.closed[c] == 1 and K.opens[c] == 2:
+            for place in range(K.when_start[c], K.when_start[c + 1]):
+                target = K.when_target[place]
+                if K.when_after[place] == after and K.closing[target] == 1:
+                    K.closed[c] = 0
+                    K.armed[c] = 0
+                    log_event(K, LOG_OPENED, c, 0.0, False)
+                    break
+
+
+def close_by_impact(K: Any, fastest: float) -> int:
+    """Impact of all closing unilateral contacts, the releases it causes, anchors and log."""
+    n = K.n
+    slow = fastest < K.rest_speed
+    if not slow:
+        release_for(K, 0)
+    status = impact(K, slow)
+    if status != 0:
+        return status
+    o_B = n * n + n + n * K.n_rows
+    o_rate = o_B + n * K.n_rows + K.n_rows
+    for c in range(K.n_contacts):
+        if K.kind[c] != 0 or (K.closed[c] == 0 and K.closing[c] == 0):
+            continue
+        if K.closing[c] == 1:
+            work = 0.0  # −½ Λ (γ⁻ + γ⁺) over its rows: its share of the kinetic energy lost
+            for k in range(K.n_rows):
+                if K.row_contact[k] == c:
+                    rate = K.acc[o_rate + k]
+                    for j in range(n):
+                        rate += 0.5 * K.acc[o_B + k * n + j] * K.jump[j]
+                    work += K.impulse[k] * rate
+            log_event(K, LOG_CLOSED, c, work, True)
+            if K.active[c] == 1:
+                capture(K, c)
+                K.closed[c] = 1
+            else:
+                K.armed[c] = 1
+        elif K.active[c] == 0:
+            K.closed[c] = 0
+            K.armed[c] = 1
+            log_event(K, LOG_OPENED, c, 0.0, False)
+    if not slow:
+        release_for(K, 1)
+    return 0
+
+
+def mark_touching(K: Any) -> None:
+    """Contacts at g = 0 and ġ = 0 are left to their acceleration."""
+    evaluate(K, K.clock[NOW], K.q, K.y)
+    o_rate = K.n * K.n + K.n + 2 * K.n * K.n_rows + K.n_rows
+    for c in range(K.n_contacts):
+        K.touched[c] = 0
+        near = abs(K.guards0[c]) <= 1e-10 * gap_scale(K, c)
+        if K.kind[c] == 0 and K.closed[c] == 0 and K.armed[c] == 1 and near and is_watched(K, c, K.guards0):
+            still = True
+            for k in range(K.n_rows):
+                if K.row_contact[k] == c and abs(K.acc[o_rate + k]) > 1e-9:
+                    still = False
+            K.touched[c] = 1 if still else 0
+
+
+def capture_approach(K: Any) -> None:
+    """Penalty contacts that close hold their approach speed, as an impact at the same instant leaves it."""
+    for c in range(K.n_contacts):
+        if K.closing[c] == 1 and K.kind[c] == 1 and K.anchor_start[c] < K.anchor_start[c + 1]:
+            evaluate(K, K.clock[NOW], K.q, K.y)
+            capture(K, c)
+
+
+def switch(K: Any) -> int:
+    """What the fired guard does to the closed contacts and the velocities; the state is at its instant."""
+    kind = K.fired[0]
+    index = K.fired[1]
+    for c in range(K.n_contacts):
+        K.closing[c] = 0
+        K.active[c] = 0
+    if kind == CLOSE:
+        fastest = gather_closing(K)
+        hard = False
+        for c in range(K.n_contacts):
+            if K.closing[c] == 1:
+                if K.kind[c] == 0:
+                    hard = True
+                else:
+                    K.closed[c] = 1
+                    log_event(K, LOG_CLOSED, c, 0.0, False)
+        if hard:
+            status = close_by_impact(K, fastest)
+            if status != 0:
+                return status
+        else:  # a penalty contact closes without impact
+            release_for(K, 0)
+            release_for(K, 1)
+        capture_approach(K)
+    elif kind == PRESS:
+        K.closed[index] = 1
+        log_event(K, LOG_CLOSED, index, 0.0, False)
+    elif kind != CROSS and kind != WATCH:
+        K.closed[index] = 0
+        K.armed[index] = 2 if kind == OPEN_FORCE else 1
+        log_event(K, LOG_OPENED, index, 0.0, False)
+    if kind != WATCH:
+        mark_touching(K)
+    if kind == OPEN_PULL:  # its force has passed zero: the acceleration there is round-off and decides nothing
+        K.touched[index] = 0
+    return 0
