@@ -112,6 +112,15 @@ def test_a_start_may_be_given_and_a_run_that_differs_is_caught():
         check_constraint(lambda: falling(True))
 
 
+def test_a_lagrangian_is_taken_too():
+    rod = mbd.Lagrangian(
+        "pendulum in x and y", ["x", "y"], kinetic=lambda x_rate, y_rate: (x_rate**2 + y_rate**2) / 2,
+        potential=lambda y: 9.81 * y, constraints={"rod": lambda x, y: (x**2 + y**2 - 1) / 2},
+    )  # fmt: skip
+    verdict = check_constraint(lambda: (rod, mbd.assemble(rod, position={"x": 1.0})))
+    assert {"B = ∂h/∂q", "rows hold along the run"} <= set(verdict.laws)
+
+
 def test_something_else_is_told_what_is_expected():
     with pytest.raises(mbd.ModelError, match="check_constraint takes a constraint"):
         check_constraint(lambda: 3)
