@@ -188,7 +188,7 @@ def undetermined(work: Posture) -> list[str]:
     """Coordinates whose acceleration neither mass nor rows determine, rows that depend on others, negative inertia."""
     equations = work.equations
     picked = list(work.manager.active_rows(work.flags))
-    terms = work.mechanism.acceleration_terms(0.0, work.q, work.y, work.parameters, work.anchors)
+    terms = work.mechanism.acceleration_terms(work.time, work.q, work.y, work.parameters, work.anchors)
     n, m = len(terms.f), len(picked)
     if n == 0:
         return ["nothing can move: the model has no coordinate; connect a body by a joint that lets it move"]
@@ -225,7 +225,7 @@ def _negative(work: Posture, M: Matrix, B: Matrix) -> list[str]:
 
 def _gaps(work: Posture) -> Vector:
     out = np.zeros(work.mechanism.sizes["guards"])
-    block = work.mechanism.block(0.0, work.q, work.y, work.anchors)
+    block = work.mechanism.block(work.time, work.q, work.y, work.anchors)
     work.mechanism.common["guards"](block, work.parameters, out)
     return out
 

@@ -39,6 +39,7 @@ class Posture:
     anchors: Vector
     places: Sequence[Condition] = ()
     rates: Sequence[Condition] = ()
+    time: float = 0.0
 
     @property
     def equations(self) -> Equations:
@@ -46,7 +47,7 @@ class Posture:
 
     def with_conditions(self, h: Vector, B: Matrix, conditions: Sequence[Condition]) -> tuple[Vector, Matrix]:
         """Rows and their Jacobian, followed by those of named conditions."""
-        block = self.mechanism.block(0.0, self.q, self.y, self.anchors)
+        block = self.mechanism.block(self.time, self.q, self.y, self.anchors)
         found = [condition.at(block, self.parameters) for condition in conditions]
         return np.append(h, [r for r, _ in found]), np.vstack([B, *(slope for _, slope in found)])
 
@@ -108,7 +109,7 @@ def _newton(work: Posture, rows: Sequence[int], free: Matrix, start: Vector) -> 
     n_v = work.equations.n_v
     before, picked = np.inf, list(rows)
     for iteration in range(200):
-        terms = work.mechanism.acceleration_terms(0.0, work.q, work.y, work.parameters, work.anchors)
+        terms = work.mechanism.acceleration_terms(work.time, work.q, work.y, work.parameters, work.anchors)
         h, B = work.with_conditions(terms.h[picked], terms.B[picked][:, :n_v], work.places)
         size = float(np.max(np.abs(h)))
         places = _involved(B, free)
@@ -130,7 +131,7 @@ def _newton(work: Posture, rows: Sequence[int], free: Matrix, start: Vector) -> 
         before = size
         x = np.zeros(n_v)
         x[places] = change / limit
-        block = work.mechanism.block(0.0, work.q, work.y, work.anchors)
+        block = work.mechanism.block(work.time, work.q, work.y, work.anchors)
         if work.mechanism.vector:
             work.q = work.q + x
         else:
@@ -138,20 +139,20 @@ def _newton(work: Posture, rows: Sequence[int], free: Matrix, start: Vector) -> 
             out = np.zeros(len(work.q))
             work.mechanism.common["compose"](block, work.parameters, out)
             work.q = out
-    terms = work.mechanism.acceleration_terms(0.0, work.q, work.y, work.parameters, work.anchors)
+    terms = work.mechanism.acceleration_terms(work.time, work.q, work.y, work.parameters, work.anchors)
     return work.with_conditions(terms.h[picked], terms.B[picked][:, :n_v], work.places)[0]
 
 
 def _nudge(work: Posture, rows: Sequence[int], free: Matrix) -> None:
     """Leave a flat spot, where no free coordinate acts on the rows, along those that act on them nearby."""
     nearby = work.q + np.where(free, NUDGE * (1.0 + np.arange(len(work.q)) / 7.0), 0.0)
-    terms = work.mechanism.acceleration_terms(0.0, nearby, work.y, work.parameters, work.anchors)
+    terms = work.mechanism.acceleration_terms(work.time, nearby, work.y, work.parameters, work.anchors)
     places = _involved(terms.B[list(rows)][:, : work.equations.n_v], free)
     work.q[places] = nearby[places]
 
 
 def capture(work: Posture) -> None:
-    terms = work.mechanism.acceleration_terms(0.0, work.q, work.y, work.parameters, work.anchors)
+    terms = work.mechanism.acceleration_terms(work.time, work.q, work.y, work.parameters, work.anchors)
     for contact, flag in zip(work.manager.contacts, work.flags, strict=True):
         if flag:
             for anchor in contact.anchors:
@@ -165,7 +166,7 @@ def close_velocities(work: Posture, free: Matrix) -> Vector:
         return np.zeros(0)
     n_v = work.equations.n_v
     for refinement in range(REFINEMENTS + 1):
-        terms = work.mechanism.acceleration_terms(0.0, work.q, work.y, work.parameters, work.anchors)
+        terms = work.mechanism.acceleration_terms(work.time, work.q, work.y, work.parameters, work.anchors)
         rate, B = work.with_conditions(terms.rate[picked], terms.B[picked][:, :n_v], work.rates)
         places = _involved(B, free)
         if refinement == REFINEMENTS or not len(places):

@@ -250,7 +250,7 @@ def advance(K: Any) -> int:
                 return EVENT
         t = K.clock[NOW]
         if t >= K.until - 1e-12 * K.dt:
-            if K.state[SINCE_STORE] > 0:
+            if K.state[SINCE_STORE] > 0 and K.until >= K.end:
                 store_row(K)
             return DONE
         if K.state[MODE] < 0:

@@ -20,7 +20,7 @@ INTEGERS = (
     "width", "capacity", "stride", "event_width", "event_capacity",  # storage
     "chunk",  # steps before control returns
 )  # fmt: skip
-REALS = ("alpha_m", "alpha_f", "beta", "gamma", "tolerance", "rest_speed", "dt", "until")
+REALS = ("alpha_m", "alpha_f", "beta", "gamma", "tolerance", "rest_speed", "dt", "until", "end")
 REAL_ARRAYS = (
     "params", "block",
     "out",  # of the function called last

@@ -37,6 +37,8 @@ SHOW_EVERY = 0.1
 """Wall time between two calls of progress and observers [s]."""
 RESOLVED = 10.0
 """Steps that a penalty contact must last to be resolved at all."""
+MOST_EXPECTED = 1 << 22
+"""Rows for which a table is laid out at the start; longer runs enlarge it."""
 KINDS = ("closed", "opened", "event")
 
 
@@ -66,11 +68,12 @@ class Run:
         self.folded = getattr(model, "parameters", {})
         parameters = mechanism.parameters(changed, self.folded)
         self.first_parameters = parameters.copy()
-        compiled_options = {**options, "capacity": rows + 8}
+        compiled_options = {**options, "capacity": rows + 8, "end": end}
         self.stepper = Stepper(mechanism, manager, integrator, parameters, dt, compiled_options)
         self.values = self.stepper.values
         self.values["chunk"] = STEPS_AT_ONCE[self.stepper.compiled]
-        self.pieces: list[Vector] = []
+        expected = min(1.25 * (end - start.time) / dt / options.get("store", 1) + 1024, MOST_EXPECTED)
+        self.table = np.empty((int(expected), self.values["width"]))  # memory is taken as rows are written
         self.events: list[EventRecord] = []
         self.parameter_changes: list[tuple[int, Vector]] = []
         self.stored = 0
@@ -132,7 +135,9 @@ class Run:
         """Values of parameters may take away what determines the motion."""
         y, flags = np.concatenate([start.v, start.z]), self.values["closed"][: self.values["n_contacts"]]
         faults = undetermined(
-            Posture(self.mechanism, self.manager, parameters, start.q, y, flags, self.values["anchors"])
+            Posture(
+                self.mechanism, self.manager, parameters, start.q, y, flags, self.values["anchors"], time=start.time
+            )
         )
         if faults:
             raise ModelError(faults)
@@ -246,7 +251,9 @@ class Run:
                 EventRecord(float(line[0]), kind, name, impulse, float(line[3]), self.stored + int(line[4]))
             )
         if count:
-            self.pieces.append(v["store"].reshape(-1, v["width"])[:count].copy())
+            if self.stored + count > len(self.table):
+                self.table = np.concatenate([self.table, np.empty((len(self.table) + count, v["width"]))])
+            self.table[self.stored : self.stored + count] = v["store"].reshape(-1, v["width"])[:count]
         self.stored += count
         v["state"][F.STORED] = v["state"][F.LOGGED] = 0
 
@@ -271,6 +278,7 @@ class Run:
         present = {parameter.name: v for parameter, v in zip(equations.parameters, self.values["params"], strict=False)}
         if all(present.get(name) == value for name, value in values.items()):
             return
+        self.stepper.keep_row()
         self.changed.update(values)
         self.values["params"][: len(self.first_parameters)] = self.mechanism.parameters(self.changed, self.folded)
         self.parameter_changes.append((self.stored + int(self.values["state"][F.STORED]), self.values["params"].copy()))
@@ -278,8 +286,10 @@ class Run:
 
     def move_to(self, time: float) -> None:
         """Put the clock, and the row just stored as the left side of a break, on its instant."""
-        if self.pieces and self.pieces[-1][-1, 0] == self.now:
-            self.pieces[-1][-1, 0] = time
+        self.stepper.keep_row()
+        self._collect()
+        if self.stored and self.table[self.stored - 1, 0] == self.now:
+            self.table[self.stored - 1, 0] = time
         self.values["clock"][F.NOW] = time
 
     def named(self) -> Named:
@@ -301,7 +311,7 @@ class Run:
 
     def _trajectory(self, problem: str, message: str) -> Trajectory:
         v, equations = self.values, self.mechanism.equations
-        table = np.concatenate(self.pieces) if self.pieces else np.zeros((0, v["width"]))
+        table = self.table[: self.stored]
         n_q, n_v, n, rows = v["n_q"], v["n_v"], v["n"], v["n_rows"]
         cuts = np.cumsum([1, n_q, n_v, n - n_v, n_v, n - n_v, rows])
         time, q, velocity, z, a, s, lam, closed = np.split(table, cuts, axis=1)

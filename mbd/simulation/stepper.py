@@ -82,7 +82,7 @@ class Stepper:
             width=1 + layout.n_q + 2 * layout.n + layout.n_rows + n_contacts,
             capacity=int(options["capacity"]), stride=int(options.get("store", 1)), event_width=5 + layout.n_rows,
             event_capacity=max(EVENT_CAPACITY, 8 * n_contacts + 16), chunk=int(options.get("chunk", 1)), hooks=0,
-            rest_speed=float(options.get("rest_speed", 1e-6)), dt=dt, until=0.0,
+            rest_speed=float(options.get("rest_speed", 1e-6)), dt=dt, until=0.0, end=float(options.get("end", 0.0)),
             alpha_m=0.0, alpha_f=0.0, beta=0.25, gamma=0.5, tolerance=1e-9, jerk=1, exact=0,
         )  # fmt: skip
         if isinstance(self.integrator, NewmarkFamily):
@@ -150,6 +150,14 @@ class Stepper:
         """Run the kernel until it returns; its status."""
         self.values["until"] = until
         return self._advance_compiled() if self.compiled else self._advance_plain()
+
+    def keep_row(self) -> None:
+        """Store the accepted state, unless it is the last row anyway."""
+        if self.values["state"][F.SINCE_STORE] > 0:
+            from mbd.kernel.advance import store_row
+
+            values = {**self.values, "code": self.functions, "hooks": self.scheme}
+            store_row(F.Kernel(**{name: values[name] for name in F.FIELDS}))
 
     def _advance_plain(self) -> int:
         from mbd.kernel.advance import advance

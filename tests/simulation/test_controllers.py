@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -203,3 +205,27 @@ def test_multipliers_between_rows_stay_bounded_beside_a_kink():
     force = trajectory.at(np.linspace(0.0, 0.5, 2001))["floor.force"]
     exact = 2 * G - np.interp(np.linspace(0.0, 0.5, 2001), [0.0, 0.1234, 0.5], [0.0, -10.0, 0.0])
     np.testing.assert_allclose(force, exact, atol=1e-6)
+
+
+def test_a_stride_keeps_its_rows_between_the_samples_of_a_controller():
+    """A controller at every step that writes only twice: rows at the stride, and both sides of what it changed."""
+    calls = []
+
+    def update(t, values, state):
+        calls.append(t)
+        return {"push.force.x": 1.0 if t < 0.4995 else -1.0}
+
+    model = pushed(mbd.Controller("fast", update, period=1e-3, writes=("push.force.x",)))
+    trajectory = run(model, dt=1e-3, store=100)
+    assert len(calls) == 1000 and len(trajectory.time) < 20
+    assert trajectory.at(0.5, side="left")["rail.acceleration"] == pytest.approx(1.0)
+    assert trajectory.at(0.5, side="right")["rail.acceleration"] == pytest.approx(-1.0)
+    assert trajectory["rail.displacement"][-1] == pytest.approx(0.25, abs=1e-9)
+
+
+def test_parameters_of_a_late_start_are_judged_at_its_time():
+    model, body = falling()
+    model.apply(mbd.Applied("late", body.origin, force=(0.0, lambda t: mbd.sqrt(t - 1.0), 0.0)))
+    start = replace(mbd.assemble(falling()[0], {"fall.displacement": 1.0}), time=2.0)
+    trajectory = mbd.simulate(model, start, mbd.HHT(0.05), dt=0.01, until=2.5, parameters={"ball.mass": 3.0})
+    assert trajectory.success
