@@ -80,7 +80,7 @@ def consistent_rates(system: System, t: float, q: Vector, y: Vector, mode: Mode)
         rate, lam = own(t, q, y, mode)
         return rate, lam
     n = len(y)
-    point = Point(t, q, np.zeros(n), y, np.zeros(n), np.zeros(0))
+    point = Point(t, q, np.zeros(getattr(system, "n_v", n)), y, np.zeros(n), np.zeros(0))
     terms = system.evaluate(point, mode, (0.0, 0.0))
     return -np.linalg.solve(np.asarray(terms.S), terms.r), np.zeros(0)
 
