@@ -42,8 +42,9 @@ def comparison(now: Record, then: Record) -> str:
         mark = "  WORSE" if figure.name in worse else ""
         noise = ", noisy" if mark and figure.spread > NOISY else ""
         lines.append(f"{figure.name:<{width}}  {was:>16}  {value:>16}  {change - 1.0:+7.1%}{of}{mark}{noise}")
-    gone = sorted(set(old) - {figure.name for figure in now.figures})
-    lines += [f"{name:<{width}}  not measured now" for name in gone]
+    gone = set(old) - {figure.name for figure in now.figures}
+    if gone:
+        lines.append(f"{len(gone)} figures of the baseline were not measured now")
     if now.machine != then.machine:
         keys = [key for key in then.machine if not key.startswith("load") and now.machine.get(key) != then.machine[key]]
         lines += [f"{key}: {then.machine[key]} then, {now.machine.get(key)} now" for key in keys]

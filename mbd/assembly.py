@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
-from mbd.compile.mechanism import rate_names
+from mbd.compile.mechanism import Mechanism, rate_names
 from mbd.compile.mechanisms import mechanism_of
-from mbd.conditions import conditions
+from mbd.conditions import Condition, conditions
 from mbd.equations.equations import Equations
 from mbd.errors import AssemblyError, ModelError, UnknownNameError, nearest
 from mbd.kernel.active_set import ActiveSetManager
@@ -97,62 +98,73 @@ def assemble(
     (opened, more), (closed, others) = _names(open, "open"), _names(closed, "closed")
     if faults + more + others:
         raise ModelError(faults + more + others)
-    position, velocity, changed = dict(position or {}), dict(velocity or {}), dict(parameters or {})
+    changed = dict(parameters or {})
     mechanism = mechanism_of(model, backend, changed)
-    manager = ActiveSetManager(mechanism.equations)
+    manager, equations = ActiveSetManager(mechanism.equations), mechanism.equations
+    named, faults = _named(mechanism, position or {}, velocity or {})
+    faults += [nearest(name, manager.names, "contact") for name in [*closed, *opened] if name not in manager.names]
+    faults += [f"contact {name!r} is named both closed and open" for name in set(closed) & set(opened)]
+    if faults:
+        raise UnknownNameError(faults)
+    q, y = _values(equations, named)
+    values = mechanism.parameters(changed, getattr(model, "parameters", {}))
+    anchors = np.zeros(mechanism.layout.n_anchors)
+    work = Posture(
+        mechanism, manager, values, q.copy(), y.copy(), manager.flags(closed), anchors, named.places, named.speeds
+    )
+    rows = position_rows(work)
+    misfit = close_positions(work, rows, np.array([project or k not in named.q for k in range(len(q))], dtype=bool))
+    capture(work)
+    free = np.array([project or k not in named.v for k in range(equations.n_v)], dtype=bool)
+    speed_misfit = close_velocities(work, free)
+    capture(work)  # approach speeds
+    bad = _conflicts(work, rows, misfit, speed_misfit) or undetermined(work) + _below(work, set(opened))
+    if bad:
+        raise AssemblyError(bad)
+    return State(
+        0.0, work.q, work.y[: equations.n_v].copy(), work.y[equations.n_v :].copy(), manager.mode(work.flags),
+        _armed(work, set(opened)), work.anchors, tuple(coordinate.name for coordinate in equations.coordinates),
+        equations.velocity_names, _moved(work, q, y, named), changed,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Named:
+    """Values that a start names: q, v and z by number, any other position or rate as a condition."""
+
+    q: Mapping[int, float]
+    v: Mapping[int, float]
+    z: Mapping[int, float]
+    places: Sequence[Condition]
+    speeds: Sequence[Condition]
+
+
+def _named(
+    mechanism: Mechanism, position: Mapping[str, float], velocity: Mapping[str, float]
+) -> tuple[_Named, list[str]]:
+    """The values by number, and what is wrong with their names."""
     equations = mechanism.equations
     coordinates = {coordinate.name: k for k, coordinate in enumerate(equations.coordinates)}
-    states = {state.name: k + len(equations.velocity_names) for k, state in enumerate(equations.states)}
+    states = {state.name: k for k, state in enumerate(equations.states)}
     rates = rate_names(equations)
     elsewhere = {name: value for name, value in position.items() if name not in states and name not in coordinates}
     places, unknown = conditions(mechanism, elsewhere, rates=False)
     speeds, strange = conditions(mechanism, {k: v for k, v in velocity.items() if k not in rates}, rates=True)
     faults = [nearest(name, coordinates, "coordinate") for name in unknown]
     faults += [nearest(name, rates, "rate") for name in strange]
-    held_q = {coordinates[name]: float(value) for name, value in position.items() if name in coordinates}
-    held_v = {rates[name]: float(value) for name, value in velocity.items() if name in rates}
-    for name in [*closed, *opened]:
-        if name not in manager.names:
-            faults.append(nearest(name, manager.names, "contact"))
-    faults += [f"contact {name!r} is named both closed and open" for name in set(closed) & set(opened)]
-    if faults:
-        raise UnknownNameError(faults)
-    q = np.array([held_q.get(k, c.default) for k, c in enumerate(equations.coordinates)], dtype=float)
-    y = np.zeros(equations.n_v + equations.n_z)
-    for k, state in enumerate(equations.states):
-        y[equations.n_v + k] = float(position.get(state.name, state.default))
-    for k, value in held_v.items():
-        y[k] = value
-    work = Posture(
-        mechanism,
-        manager,
-        mechanism.parameters(changed, getattr(model, "parameters", {})),
-        q,
-        y,
-        manager.flags(closed),
-        np.zeros(mechanism.layout.n_anchors),
-        places,
-        speeds,
+    q, z, v = (
+        {numbers[name]: float(value) for name, value in given.items() if name in numbers}
+        for numbers, given in ((coordinates, position), (states, position), (rates, velocity))
     )
-    wanted_q, wanted_y = q.copy(), y.copy()
-    free_q = np.ones(len(q), bool) if project else np.array([k not in held_q for k in range(len(q))])
-    free_v = np.ones(equations.n_v, bool) if project else np.array([k not in held_v for k in range(equations.n_v)])
-    rows = position_rows(work)
-    misfit = close_positions(work, rows, free_q)
-    capture(work)
-    speed_misfit = close_velocities(work, free_v)
-    capture(work)  # approach speeds
-    bad = _conflicts(work, rows, misfit, speed_misfit)
-    if bad:
-        raise AssemblyError(bad)
-    faults = undetermined(work) + _below(work, set(opened))
-    if faults:
-        raise AssemblyError(faults)
-    moved = _moved(equations, work, wanted_q, wanted_y, held_q, held_v)
-    return State(
-        0.0, work.q, work.y[: equations.n_v].copy(), work.y[equations.n_v :].copy(), manager.mode(work.flags),
-        _armed(work, set(opened)), work.anchors, tuple(coordinates), equations.velocity_names, moved, dict(changed),
-    )  # fmt: skip
+    return _Named(q, v, z, places, speeds), faults
+
+
+def _values(equations: Equations, named: _Named) -> tuple[Vector, Vector]:
+    """q and (v, z) as named; defaults elsewhere, no velocity."""
+    q = np.array([named.q.get(k, c.default) for k, c in enumerate(equations.coordinates)], dtype=float)
+    v = [named.v.get(k, 0.0) for k in range(equations.n_v)]
+    z = [named.z.get(k, float(state.default)) for k, state in enumerate(equations.states)]
+    return q, np.array([*v, *z], dtype=float)
 
 
 def _conflicts(work: Posture, rows: Sequence[int], misfit: Vector, speed_misfit: Vector) -> list[str]:
@@ -260,22 +272,15 @@ def _armed(work: Posture, opened: set[str]) -> frozenset[str]:
     return frozenset(armed)
 
 
-def _moved(
-    equations: Equations,
-    work: Posture,
-    q: Vector,
-    y: Vector,
-    held_q: Mapping[int, float],
-    held_v: Mapping[int, float],
-) -> dict[str, float]:
+def _moved(work: Posture, q: Vector, y: Vector, named: _Named) -> dict[str, float]:
     """How far named values, and unnamed ones from their defaults, were moved."""
     moved = {}
-    for k, coordinate in enumerate(equations.coordinates):
+    for k, coordinate in enumerate(work.equations.coordinates):
         change = float(work.q[k] - q[k])
-        if change != 0.0 and (k in held_q or abs(change) > 1e-15):
+        if change != 0.0 and (k in named.q or abs(change) > 1e-15):
             moved[coordinate.name] = change
-    for k, name in enumerate(equations.velocity_names):
+    for k, name in enumerate(work.equations.velocity_names):
         change = float(work.y[k] - y[k])
-        if change != 0.0 and (k in held_v or abs(change) > 1e-15):
+        if change != 0.0 and (k in named.v or abs(change) > 1e-15):
             moved[name] = change
     return moved

@@ -152,6 +152,7 @@ def _nudge(work: Posture, rows: Sequence[int], free: Matrix) -> None:
 
 
 def capture(work: Posture) -> None:
+    """Store what closed contacts hold, such as the place of touchdown, into the anchors."""
     terms = work.mechanism.acceleration_terms(work.time, work.q, work.y, work.parameters, work.anchors)
     for contact, flag in zip(work.manager.contacts, work.flags, strict=True):
         if flag:

@@ -83,7 +83,7 @@ def test_run_simulates_what_a_script_defines(script, tmp_path, capsys):
     capsys.readouterr()
 
 
-def test_a_failed_run_is_told_and_kept(script, tmp_path, capsys, monkeypatch):
+def test_a_failed_run_is_told_and_kept(script, tmp_path, capsys):
     text = "from mbd.errors import SimulationError\nfrom tests.view.stand_ins import ball\ndef main():\n"
     text += "    raise SimulationError('t = 1 s: Newton stalled; try a smaller dt', ball())\n"
     assert cli.main(["run", script(text), "--out", "out"]) == 1

@@ -30,6 +30,10 @@ typedef struct {
     double scale_r[N], scale_h[M], scale_rate[M];
 } Motion;
 
+typedef struct {
+    double r[N], h[M], rate[M];
+} Residual;
+
 static void refresh_scales(const Model *p, const Point *at, Motion *s)
 {
     double force = 1e-280, torque = 1e-280, size[2] = {1e-3, 1e-3}, speed[2] = {1e-3, 1e-3};
@@ -116,9 +120,9 @@ static int start(const Model *p, const Scheme *c, Motion *s)
 }
 
 /* Largest residual over its tolerance, each block apart; -1 if not finite. */
-static double residual_size(const Motion *s, const Point *at, const double r[N], const double h[M], const double rate[M],
-                            double C, double K, double tolerance)
+static double residual_size(const Motion *s, const Point *at, const Residual *e, double C, double K, double tolerance)
 {
+    const double *r = e->r, *h = e->h, *rate = e->rate;
     double size = 0.0, finite = 0.0, fastest = 0.0, speed = 0.0;
     for (int i = 0; i < N; i++) {
         finite += fabs(r[i]);
@@ -138,114 +142,145 @@ static double residual_size(const Motion *s, const Point *at, const double r[N],
     return finite < 1e300 ? size : -1.0;
 }
 
-static int step(const Model *p, const Scheme *c, Motion *s, int64_t counts[3])
-{
-    const double h1 = c->dt, mean_f = 1.0 - c->alpha_f, mean_m = 1.0 - c->alpha_m;
-    const double C = c->gamma * h1 * mean_f / mean_m, K = c->beta * h1 * h1 * mean_f / mean_m;
-    double A[SIZE][SIZE], rows[M][N], r[N], h[M], rate[M], b[SIZE], d[SIZE], shift[N];
-    double tolerance = 1e-3 * c->tolerance, before = 1e300, error;
-    int pivots[SIZE], fresh = 0, accepted = 0;
-    Point at;
+/* Step-wide numbers: c_C = C, c_K = K, and what the average of the scheme weighs. */
+typedef struct {
+    double C, K, mean_f, mean_m;
+} Factors;
 
+static inline Factors factors_of(const Scheme *c)
+{
+    double mean_f = 1.0 - c->alpha_f, mean_m = 1.0 - c->alpha_m, h = c->dt;
+    return (Factors){c->gamma * h * mean_f / mean_m, c->beta * h * h * mean_f / mean_m, mean_f, mean_m};
+}
+
+/* Accelerations, multipliers and position correction extrapolated. */
+static void predict(const Scheme *c, const Factors *f, const Motion *s, Point *at, double shift[N])
+{
+    const double h = c->dt;
     for (int k = 0; k < M; k++)
-        at.lam[k] = s->now.lam[k] + h1 * s->lam_slope[k];
+        at->lam[k] = s->now.lam[k] + h * s->lam_slope[k];
     for (int i = 0; i < N; i++) {
         double a0 = s->aux[i];
-        at.a[i] = s->now.a[i] + h1 * s->slope[i];
-        double a1 = (mean_f * at.a[i] + c->alpha_f * s->now.a[i] - c->alpha_m * a0) / mean_m;
-        at.v[i] = s->now.v[i] + h1 * ((1.0 - c->gamma) * a0 + c->gamma * a1);
-        at.q[i] = s->now.q[i] + h1 * s->now.v[i] + h1 * h1 * ((0.5 - c->beta) * a0 + c->beta * a1);
+        at->a[i] = s->now.a[i] + h * s->slope[i];
+        double a1 = (f->mean_f * at->a[i] + c->alpha_f * s->now.a[i] - c->alpha_m * a0) / f->mean_m;
+        at->v[i] = s->now.v[i] + h * ((1.0 - c->gamma) * a0 + c->gamma * a1);
+        at->q[i] = s->now.q[i] + h * s->now.v[i] + h * h * ((0.5 - c->beta) * a0 + c->beta * a1);
         if (STABILIZED) {
             shift[i] = s->shift[i] + s->shift_change[i];
-            at.q[i] += shift[i];
+            at->q[i] += shift[i];
         }
     }
-    for (int iteration = 0; iteration < MAX_ITERATIONS; iteration++) {
-        int renew = iteration == 0 || !fresh;
-        if (renew)
-            tangent(p, &at, C, K, STABILIZED ? K / C : 0.0, A, r, h, rate);
-        else
-            residual(p, &at, r, h, rate);
-        counts[renew ? TANGENTS : RESIDUALS]++;
-        error = residual_size(s, &at, r, h, rate, C, K, tolerance);
-        if (error < 0.0)
-            return 1;
-        accepted = error <= 1.0;
-        if (!accepted && iteration >= 2 && error > 0.5 * before) { /* stalled: fresh scales, then round-off decide */
-            raise_scales(p, &at, s, 1);
-            error = residual_size(s, &at, r, h, rate, C, K, tolerance);
-            accepted = error <= 1.0 || residual_size(s, &at, r, h, rate, 0.0, 0.0, 256.0 * EPS) <= 16.0;
-        }
-        if (accepted)
-            break;
-        if (!renew && error > 0.3 * before) { /* the old tangent has done its work: renew it at the same iterate */
-            fresh = 0;
-            before = 1e300;
-            continue;
-        }
-        before = error;
-        for (int i = 0; i < N; i++)
-            b[i] = -r[i];
-        for (int k = 0; k < M; k++)
-            b[N + k] = STABILIZED ? -rate[k] / C : -h[k] / K;
-        if (renew) {
-            if (STABILIZED)
-                for (int k = 0; k < M; k++)
-                    memcpy(rows[k], A[N + k], sizeof rows[k]);
-            if (factor(A, pivots))
-                return 1;
-        }
-        int shifting = 0; /* a position at round-off stays: correcting it would only stir the velocity rows */
-        if (STABILIZED) { /* position correction in the metric of the same matrix */
-            memset(d, 0, sizeof d);
-            for (int k = 0; k < M; k++) {
-                shifting |= fabs(h[k]) > 16.0 * EPS * s->scale_h[k];
-                d[N + k] = K / C * rate[k] - h[k];
-                if (renew)
-                    for (int j = 0; j < N; j++)
-                        d[N + k] += rows[k][j] * shift[j];
-            }
-            if (shifting)
-                solve(A, pivots, d);
-        }
-        solve(A, pivots, b);
-        counts[ITERATIONS]++;
-        if (iteration == 0) { /* stay far below the error of the step, which the predictor's error measures */
-            double biggest = 0.0, fastest = 1e-300;
-            for (int i = 0; i < N; i++) {
-                biggest = larger(biggest, fabs(b[i]));
-                fastest = larger(fastest, fabs(at.a[i]));
-            }
-            tolerance = smaller(c->tolerance, larger(1e-4 * biggest / fastest, tolerance));
-        }
-        for (int i = 0; i < N; i++) {
-            at.a[i] += b[i];
-            at.v[i] += C * b[i];
-            at.q[i] += K * b[i];
-            if (shifting) {
-                double next = renew ? d[i] : shift[i] + d[i];
-                at.q[i] += next - shift[i];
-                shift[i] = next;
-            }
-        }
-        for (int k = 0; k < M; k++)
-            at.lam[k] += b[N + k];
-        fresh = 1;
-    }
-    if (!accepted)
-        return 1;
+}
+
+/* b for accelerations and multipliers, d for the whole position correction (with old factors: for its change).
+   Returns whether positions need correcting: at round-off they stay, correcting would only stir the velocity rows. */
+static int right_hand_sides(const Factors *f, const Motion *s, const Residual *e, double A[SIZE][SIZE], int renewed,
+                            const double shift[N], double b[SIZE], double d[SIZE])
+{
+    int shifting = 0;
     for (int i = 0; i < N; i++) {
-        s->aux[i] = (mean_f * at.a[i] + c->alpha_f * s->now.a[i] - c->alpha_m * s->aux[i]) / mean_m;
-        s->slope[i] = (at.a[i] - s->now.a[i]) / h1;
+        b[i] = -e->r[i];
+        d[i] = 0.0;
+    }
+    for (int k = 0; k < M; k++) {
+        b[N + k] = STABILIZED ? -e->rate[k] / f->C : -e->h[k] / f->K;
+        if (STABILIZED) {
+            shifting |= fabs(e->h[k]) > 16.0 * EPS * s->scale_h[k];
+            d[N + k] = f->K / f->C * e->rate[k] - e->h[k];
+            for (int j = 0; j < N && renewed; j++)
+                d[N + k] += A[N + k][j] * shift[j];
+        }
+    }
+    return shifting;
+}
+
+/* Apply a correction; its size relative to the largest acceleration. */
+static double correct(const Factors *f, const double b[SIZE], const double d[SIZE], int shifting, int renewed, Point *at,
+                      double shift[N])
+{
+    double biggest = 0.0, fastest = 1e-300;
+    for (int i = 0; i < N; i++) {
+        biggest = larger(biggest, fabs(b[i]));
+        fastest = larger(fastest, fabs(at->a[i]));
+        at->a[i] += b[i];
+        at->v[i] += f->C * b[i];
+        at->q[i] += f->K * b[i];
+        if (shifting) {
+            double next = renewed ? d[i] : shift[i] + d[i];
+            at->q[i] += next - shift[i];
+            shift[i] = next;
+        }
+    }
+    for (int k = 0; k < M; k++)
+        at->lam[k] += b[N + k];
+    return biggest / fastest;
+}
+
+/* The converged point becomes the state. */
+static void finish(const Scheme *c, const Factors *f, const Point *at, const double shift[N], Motion *s)
+{
+    for (int i = 0; i < N; i++) {
+        s->aux[i] = (f->mean_f * at->a[i] + c->alpha_f * s->now.a[i] - c->alpha_m * s->aux[i]) / f->mean_m;
+        s->slope[i] = (at->a[i] - s->now.a[i]) / c->dt;
         if (STABILIZED) {
             s->shift_change[i] = shift[i] - s->shift[i];
             s->shift[i] = shift[i];
         }
     }
     for (int k = 0; k < M; k++)
-        s->lam_slope[k] = (at.lam[k] - s->now.lam[k]) / h1;
-    s->now = at;
-    return 0;
+        s->lam_slope[k] = (at->lam[k] - s->now.lam[k]) / c->dt;
+    s->now = *at;
+}
+
+/* One step: a tangent, then residuals with its factors; a new tangent where the residual falls too slowly. */
+static int step(const Model *p, const Scheme *c, Motion *s, int64_t counts[3])
+{
+    const Factors f = factors_of(c);
+    double A[SIZE][SIZE], b[SIZE], d[SIZE], shift[N], tolerance = 1e-3 * c->tolerance, before = 1e300;
+    int pivots[SIZE], fresh = 0;
+    Point at;
+    Residual e;
+
+    predict(c, &f, s, &at, shift);
+    for (int iteration = 0; iteration < MAX_ITERATIONS; iteration++) {
+        int renew = !fresh;
+        if (renew)
+            tangent(p, &at, f.C, f.K, STABILIZED ? f.K / f.C : 0.0, A, e.r, e.h, e.rate);
+        else
+            residual(p, &at, e.r, e.h, e.rate);
+        counts[renew ? TANGENTS : RESIDUALS]++;
+        double error = residual_size(s, &at, &e, f.C, f.K, tolerance);
+        if (error < 0.0)
+            return 1;
+        if (error > 1.0 && iteration >= 2 && error > 0.5 * before) { /* stalled: new scales, then round-off decide */
+            raise_scales(p, &at, s, 1);
+            error = residual_size(s, &at, &e, f.C, f.K, tolerance);
+            if (residual_size(s, &at, &e, 0.0, 0.0, 256.0 * EPS) <= 16.0)
+                error = smaller(error, 1.0);
+        }
+        if (error <= 1.0) {
+            finish(c, &f, &at, shift, s);
+            return 0;
+        }
+        if (!renew && error > 0.3 * before) { /* the old tangent has done its work: renew it at the same iterate */
+            fresh = 0;
+            before = 1e300;
+            continue;
+        }
+        before = error;
+        int shifting = right_hand_sides(&f, s, &e, A, renew, shift, b, d);
+        if (renew && factor(A, pivots))
+            return 1;
+        if (shifting)
+            solve(A, pivots, d);
+        solve(A, pivots, b);
+        counts[ITERATIONS]++;
+        double biggest = correct(&f, b, d, shifting, renew, &at, shift);
+        if (iteration == 0) /* stay far below the error of the step, which the predictor's error measures */
+            tolerance = smaller(c->tolerance, larger(1e-4 * biggest, tolerance));
+        fresh = 1;
+    }
+    return 1;
 }
 
 /* Many steps from q, v, with a row (q, v, a, lam) stored every `stride` of them, the start first.

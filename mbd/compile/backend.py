@@ -9,6 +9,7 @@ from typing import Protocol
 
 from mbd.arrays import Vector
 from mbd.compile.cache import ObjectCache
+from mbd.compile.functions import ByName
 from mbd.compile.layout import Layout
 from mbd.compile.python import ScalarFunction
 from mbd.errors import CapabilityError, UnknownNameError, nearest
@@ -43,31 +44,16 @@ class Functions(Protocol):
     def __len__(self) -> int: ...
 
 
-class Twins:
+class Twins(ByName[ScalarFunction]):
     """`Functions` in plain Python."""
 
     def __init__(self, layout: Layout) -> None:
+        super().__init__()
         self.layout = layout
-        self._functions: dict[str, ScalarFunction] = {}
 
     def add(self, programs: Mapping[str, Sequence[Node]]) -> None:
         for name, outputs in programs.items():
             self._functions[name] = ScalarFunction(name, outputs, self.layout)
-
-    def __getitem__(self, name: str) -> ScalarFunction:
-        function = self._functions.get(name)
-        if function is None:
-            raise UnknownNameError(nearest(name, self._functions, "function"))
-        return function
-
-    def __contains__(self, name: object) -> bool:
-        return name in self._functions
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._functions)
-
-    def __len__(self) -> int:
-        return len(self._functions)
 
 
 @dataclass(frozen=True)

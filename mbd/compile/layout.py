@@ -18,7 +18,10 @@ __all__ = ["Layout"]
 
 @dataclass(frozen=True)
 class Layout:
-    """Offsets into the block; (v, z) and (a, ż) stand together, as the integrators treat them alike."""
+    """Offsets into the block; (v, z) and (a, ż) stand together, as the integrators treat them alike.
+
+    q, x, v, a, lam, anchor, switch : where each part begins; size : numbers in the block
+    """
 
     n_q: int
     n_v: int

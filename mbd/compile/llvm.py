@@ -25,7 +25,7 @@ import re
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -35,9 +35,10 @@ import numpy as np
 
 from mbd.arrays import Vector
 from mbd.compile.cache import ObjectCache, default_cache, key_of
+from mbd.compile.functions import ByName
 from mbd.compile.ir import LIBRARY, module
 from mbd.compile.layout import Layout
-from mbd.errors import CapabilityError, ModelError, UnknownNameError, nearest
+from mbd.errors import CapabilityError, ModelError
 from mbd.tape.node import Node
 
 __all__ = [
@@ -153,7 +154,7 @@ def call(address: int) -> Callable[[Vector, Vector, Vector], None]:
 
     def run(block: Vector, parameters: Vector, out: Vector) -> None:
         if not out.flags.writeable:
-            raise ValueError("`out` is a read-only array")
+            raise ValueError("`out` is a read-only array; give one that may be written, such as numpy.zeros(size)")
         function(_pointer(block), _pointer(parameters), _pointer(out))
 
     return run
@@ -213,7 +214,7 @@ class Build:
     load: float
 
 
-class Library:
+class Library(ByName[MachineFunction]):
     """Machine code of functions with one layout, in memory; functions may be added at any time.
 
     >>> from mbd.tape.node import Tape
@@ -226,10 +227,10 @@ class Library:
     """
 
     def __init__(self, layout: Layout, level: int = LEVEL, cache: ObjectCache | None = None) -> None:
+        super().__init__("compiled function")
         self.layout, self.level = layout, level
         self.builds: list[Build] = []
         self._cache = default_cache() if cache is None else cache
-        self._functions: dict[str, MachineFunction] = {}
         self._machine = Machine()
 
     def add(self, programs: Mapping[str, Sequence[Node]]) -> None:
@@ -256,21 +257,6 @@ class Library:
             self._functions[name] = MachineFunction(name, address, _sizes(outputs, self.layout), self)
         times = written - begin, made - written, time.perf_counter() - made
         self.builds.append(Build(tuple(programs), cached, *times))
-
-    def __getitem__(self, name: str) -> MachineFunction:
-        function = self._functions.get(name)
-        if function is None:
-            raise UnknownNameError(nearest(name, self._functions, "compiled function"))
-        return function
-
-    def __contains__(self, name: object) -> bool:
-        return name in self._functions
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._functions)
-
-    def __len__(self) -> int:
-        return len(self._functions)
 
     def address(self, name: str) -> int:
         """Where the code of a function begins."""

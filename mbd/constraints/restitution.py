@@ -35,6 +35,7 @@ Multibody Syst. Dyn. 11:209 (its first approximation). They are approximations: 
 SMALL = 0.1
 """Below this χ logarithms cancel, and series of `TERMS` terms are used."""
 TERMS = 18
+"""Terms of these series: at `SMALL` what is left out is below round-off."""
 
 
 def law_of(name: str | None, owner: str) -> str:

@@ -115,7 +115,7 @@ def effect_of(cause: Cause, scope: Surroundings, dynamics: Dynamics) -> Effect:
     return Effect(cause.name, cause.kind, _lazily(scope, dynamics, cause.work), power, potential)
 
 
-def penalty_effect(name: str, contact: int, gap: Node, rate: Node, force: Node, generalized: Sequence[Node]) -> Effect:
+def penalty_effect(name: str, contact: int, rate: Node, force: Node, generalized: Sequence[Node]) -> Effect:
     """A penalty contact as an effect; its power is force · ġ while it acts."""
     return Effect(name, "penalty", lambda: generalized, force * rate, contact=contact)
 

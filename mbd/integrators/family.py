@@ -33,6 +33,7 @@ DEFAULT_TOLERANCE = 1e-9
 It is tightened to 1e-4 of the first Newton correction, which measures the error of the step itself, down to 1e-3 of
 this value: the iteration error stays invisible beside the step error at every dt."""
 MAX_ITERATIONS = 50
+"""Newton iterations, halvings included, after which a step counts as failed; one that converges takes one to three."""
 MOST_HALVINGS = 10
 """How often a Newton correction is halved before the iteration goes on from where it is."""
 FAR = 1e4

@@ -55,5 +55,7 @@ def unpack(value: Any, arrays: Mapping[str, NDArray[Any]]) -> Any:
 
     kind = getattr(mbd.state, value["class"], None)
     if not (isinstance(kind, type) and is_dataclass(kind)):
-        raise TrajectoryError(f"the file's final state is a {value['class']!r}, which this mbd does not have")
+        raise TrajectoryError(
+            f"the file's final state is a {value['class']!r}, which this mbd does not have; update mbd"
+        )
     return kind(**{name: unpack(item, arrays) for name, item in value["fields"].items()})

@@ -166,7 +166,9 @@ def _read(source: Path) -> tuple[Arrays, dict[str, Any]]:
     if not isinstance(meta, dict) or meta.get("format") != FORMAT:
         raise TrajectoryError(refusal)
     if meta["version"] > VERSION:
-        raise TrajectoryError(f"'{source}' was written by a newer mbd (format {meta['version']}, here {VERSION})")
+        raise TrajectoryError(
+            f"'{source}' was written by a newer mbd (format {meta['version']}, here {VERSION}); update mbd"
+        )
     return arrays, meta
 
 

@@ -57,7 +57,7 @@ def apply_reset(run: Run, guard: Guard) -> None:
     wanted = asked(what, _reset_values, guard.reset, run.named())
     bad = [name for name, value in wanted.items() if not np.isfinite(value)]
     if bad:
-        raise SimulationError(f"{what} sets {bad[0]!r} to {wanted[bad[0]]!r}")
+        raise SimulationError(f"{what} sets {bad[0]!r} to {wanted[bad[0]]!r}; give a finite number")
     equations, v = run.mechanism.equations, run.values
     positions = {coordinate.name: k for k, coordinate in enumerate(equations.coordinates)}
     rates = {name: k for name, k in rate_names(equations).items() if name not in positions}
@@ -164,6 +164,6 @@ class Boundaries:
             raise UnknownNameError(f"{what}: " + nearest(wrong[0], controller.writes, "entry of writes"))
         bad = [name for name, value in written.items() if not np.isfinite(value)]
         if bad:
-            raise SimulationError(f"{what} wrote {written[bad[0]]!r} to {bad[0]!r}")
+            raise SimulationError(f"{what} wrote {written[bad[0]]!r} to {bad[0]!r}; write a finite number")
         if written:
             run.change_parameters(written)

@@ -43,13 +43,15 @@ def explanation(
             "the state (mbd.where, sign) must be made continuous, or be switched by an Event or Controller"
         )
     if status == F.STAGNATED:
-        floor = residual * values["tolerance"]
         return (
-            f"{where}: stagnated at round-off: residual {residual * values['tolerance']:.3g} of the forces, attainable "
-            f"{floor:.3g}{with_closed}; use a larger tolerance= of the integrator or a larger dt"
+            f"{where}: stagnated at round-off: residual {residual * values['tolerance']:.3g} of the forces"
+            f"{with_closed}; use a larger tolerance= of the integrator or a larger dt"
         )
     if status == F.SINGULAR:
-        return f"{where}: the Newton matrix is singular at {_unknown(stepper)}{with_closed}; rows depend on each other"
+        return (
+            f"{where}: the Newton matrix is singular at {_unknown(stepper)}{with_closed}; rows depend on each other: "
+            "leave one out, or try another dt"
+        )
     if status == F.CHATTER:
         return (
             f"{where}: more than {values['max_switches']} switches at one instant: {_last_events(events)}; they "

@@ -40,6 +40,7 @@ RESOLVED = 10.0
 MOST_EXPECTED = 1 << 22
 """Rows for which a table is laid out at the start; longer runs enlarge it."""
 KINDS = ("closed", "opened", "event")
+"""Names of the kinds of events that the kernel logs by number."""
 
 
 class Run:
@@ -125,7 +126,10 @@ class Run:
             v["touched"][c] = int(ready and v["kind"][c] == 0 and close and slow and still)
             if ready and v["closed"][c] == 0 and guards[c] < -BELOW:
                 contact = self.manager.contacts[c]
-                inside.append(f"{contact.name!r} starts {-guards[c]:.6g} {contact.unit} inside its surface")
+                inside.append(
+                    f"{contact.name!r} starts {-guards[c]:.6g} {contact.unit} inside its surface; assemble the start "
+                    "with it in closed=[…] or open=[…]"
+                )
         if inside:
             raise ModelError(inside)
         for e in range(n_guards):

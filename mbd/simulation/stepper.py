@@ -18,7 +18,9 @@ from mbd.simulation.plain import MechanismSystem, PlainScheme, row_units, unit_b
 __all__ = ["Stepper", "is_compiled"]
 
 EVENT_CAPACITY = 512
+"""Events that the kernel may log before it hands them over, at least."""
 MODE_CAPACITY = 16
+"""Modes for which a table is laid out at the start; it doubles as it fills."""
 
 
 def is_compiled(mechanism: Mechanism, integrator: Integrator) -> bool:
@@ -77,11 +79,11 @@ class Stepper:
             n_contacts=n_contacts, n_guards=n_guards, o_q=layout.q, o_x=layout.x, o_v=layout.v, o_a=layout.a,
             o_lam=layout.lam, o_anchor=layout.anchor, o_switch=layout.switch, vector=int(self.mechanism.vector),
             stabilized=int(self.stabilized), max_iterations=MAX_ITERATIONS,
-            max_switches=int(options.get("max_switches", 20 + 4 * n_contacts)),
+            max_switches=20 + 4 * n_contacts,
             linear=int(options.get("locate") == "linear"),
             width=1 + layout.n_q + 2 * layout.n + layout.n_rows + n_contacts,
             capacity=int(options["capacity"]), stride=int(options.get("store", 1)), event_width=5 + layout.n_rows,
-            event_capacity=max(EVENT_CAPACITY, 8 * n_contacts + 16), chunk=int(options.get("chunk", 1)), hooks=0,
+            event_capacity=max(EVENT_CAPACITY, 8 * n_contacts + 16), chunk=1, hooks=0,
             rest_speed=float(options.get("rest_speed", 1e-6)), dt=dt, until=0.0, end=float(options.get("end", 0.0)),
             alpha_m=0.0, alpha_f=0.0, beta=0.25, gamma=0.5, tolerance=1e-9, jerk=1, exact=0,
         )  # fmt: skip

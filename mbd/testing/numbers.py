@@ -91,7 +91,7 @@ def solved(equations: Equations, given: Point, rows: Sequence[int] | None = None
     return given | found | {("lam", k): value for k, value in zip(rows, unknowns[n:], strict=True)}
 
 
-def placed(equations: Equations, given: Point, seed: int = 0) -> Point:
+def placed(equations: Equations, given: Point) -> Point:
     """The inputs moved by Newton's method until all rows hold, with velocities made consistent."""
     from mbd.equations.programs import constraint_jacobian
 

@@ -139,6 +139,7 @@ def mention_faults(model: Model) -> list[str]:
     found = []
     joints = {joint.name for joint in model.joints}
     known = set(quantities(model))
+    owners = {force.name for force in model.forces}
     words: list[Force | Constraint] = [*model.forces, *model.constraints]
     for word in words:
         for mention in word.mentions():
@@ -147,7 +148,8 @@ def mention_faults(model: Model) -> list[str]:
                     f"'{word.name}' refers to the joint '{mention.name}', which is not connected; "
                     "pass it to model.connect as well"
                 )
-            if isinstance(mention, str) and mention not in known:
+            state = isinstance(mention, str) and mention.rpartition(".")[0] in owners  # a first-order state of a force
+            if isinstance(mention, str) and mention not in known and not state:
                 found.append(f"'{word.name}': " + nearest(mention, known, "quantity"))
     if any(controller.reads for controller in model.controllers):
         known = set(readable(model))

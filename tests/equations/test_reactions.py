@@ -19,7 +19,7 @@ def motion_of(equations, point):
     return along | {("v", k): point["a", k] for k in range(equations.n_v)}
 
 
-def momentum_rates(model, equations, body, point):
+def momentum_rates(equations, body, point):
     """d/dt of linear momentum, and of angular momentum about the centre, in ground axes."""
     scope = equations.geometry.scope
     mass = body.mass_properties(scope)
@@ -37,7 +37,7 @@ def check_balance(model, equations, point, pushes=()):
     for body in model.bodies.values():
         if body is model.ground:
             continue
-        linear, angular, mass = momentum_rates(model, equations, body, point)
+        linear, angular, mass = momentum_rates(equations, body, point)
         center = triple(equations, f"{body.name}.center", point)
         force, torque = mass * np.array(model.gravity), np.zeros(3)
         for joint in model.joints:

@@ -1,0 +1,38 @@
+"""Functions of a model by name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Generic, TypeVar
+
+from mbd.errors import UnknownNameError, nearest
+
+__all__ = ["ByName"]
+
+F = TypeVar("F")
+
+
+class ByName(Generic[F]):
+    """Functions found by name; a wrong name is answered with the nearest one. Whoever derives from it adds them.
+
+    kind : what they are called in that answer
+    """
+
+    def __init__(self, kind: str = "function") -> None:
+        self._kind = kind
+        self._functions: dict[str, F] = {}
+
+    def __getitem__(self, name: str) -> F:
+        function = self._functions.get(name)
+        if function is None:
+            raise UnknownNameError(nearest(name, self._functions, self._kind))
+        return function
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._functions
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._functions)
+
+    def __len__(self) -> int:
+        return len(self._functions)
