@@ -142,7 +142,9 @@ def test_a_falling_rod_has_the_period_of_the_elliptic_integral() -> None:
 
 def test_a_rod_released_from_the_horizontal_pulls_with_five_halves_of_its_weight() -> None:
     run = run_of("pendulum")
-    for time in zeros(run, "pin.angle"):
+    lowest = zeros(run, "pin.angle")
+    assert lowest
+    for time in lowest:
         assert run.at(time)["pin.reaction_force.y"] == pytest.approx(2.5 * 2.0 * g, rel=1e-5)
 
 
@@ -370,7 +372,9 @@ def test_what_gravity_gives_the_chapter_walker_its_strikes_and_knee_stops_take()
 
 def test_a_strike_keeps_the_angular_momentum_about_the_new_foot() -> None:
     run = run_of("chapter-walker")
-    for hit in strikes(run, "foot")[-3:]:
+    hits = strikes(run, "foot")[-3:]
+    assert len(hits) == 3
+    for hit in hits:
         foot = run[f"{hit.name.removesuffix('foot')}sole.origin"][hit.row]
         before, after = (
             sum(m * np.cross(p - foot, v)[2] + spin for m, p, v, spin in _masses(run, row))

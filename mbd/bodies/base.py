@@ -38,7 +38,7 @@ class Body(ABC):
 
     @abstractmethod
     def mass_properties(self, scope: Scope) -> MassProperties:
-        """Mass, centre and inertia as run-time scalars."""
+        """Mass, center and inertia as run-time scalars."""
 
     def faults(self) -> list[str]:
         """What is physically impossible about it, one sentence each."""
@@ -73,7 +73,7 @@ class Body(ABC):
 
     @property
     def center(self) -> Frame:
-        """The frame at the centre of mass."""
+        """The frame at the center of mass."""
         return self.frame("center")
 
     def point(self, x: float, y: float, z: float = 0.0, name: str | None = None) -> Frame:

@@ -17,7 +17,7 @@ __all__ = ["SEGMENTS", "Solid", "box", "cylinder", "disk", "rod", "segment", "sp
 
 @dataclass(frozen=True)
 class Solid:
-    """Mass m [kg], centre of mass [m], principal moments about the centre (Ixx, Iyy, Izz) [kg m²]."""
+    """Mass m [kg], center of mass [m], principal moments about the center (Ixx, Iyy, Izz) [kg m²]."""
 
     mass: float
     center: Vector3
@@ -46,7 +46,7 @@ def rod(mass: float, length: float) -> Solid:
 
 
 def box(mass: float, sides: Any) -> Solid:
-    """A uniform box about its centre, sides (a, b, c) along x, y, z: ``Ixx = m (b² + c²)/12``, …"""
+    """A uniform box about its center, sides (a, b, c) along x, y, z: ``Ixx = m (b² + c²)/12``, …"""
     m, (a, b, c) = number(mass, "mass of a box"), triple(sides, "sides of a box")
     x, y, z = m * a * a / 12.0, m * b * b / 12.0, m * c * c / 12.0
     return Solid(m, (0.0, 0.0, 0.0), (y + z, x + z, x + y))
@@ -60,7 +60,7 @@ def sphere(mass: float, radius: float) -> Solid:
 
 
 def cylinder(mass: float, radius: float, length: float, axis: str = "z") -> Solid:
-    """A uniform cylinder about its centre: ``m r²/2`` about its axis, ``m (3 r² + L²)/12`` across."""
+    """A uniform cylinder about its center: ``m r²/2`` about its axis, ``m (3 r² + L²)/12`` across."""
     m, r, L = number(mass, "mass of a cylinder"), number(radius, "its radius"), number(length, "its length")
     if axis not in ("x", "y", "z"):
         raise ModelError(f"the axis of a cylinder is 'x', 'y' or 'z', got {axis!r}")
@@ -70,7 +70,7 @@ def cylinder(mass: float, radius: float, length: float, axis: str = "z") -> Soli
 
 
 def disk(mass: float, radius: float, axis: str = "z") -> Solid:
-    """A thin uniform disk about its centre: ``m r²/2`` about its axis, half of it across."""
+    """A thin uniform disk about its center: ``m r²/2`` about its axis, half of it across."""
     return cylinder(mass, radius, 0.0, axis)
 
 
@@ -85,7 +85,7 @@ SEGMENTS: dict[str, tuple[float, float, float]] = {
     "leg": (0.161, 0.447, 0.326),
     "HAT": (0.678, 0.626, 0.496),
 }
-"""Mass over body mass; centre of mass from the proximal end and radius of gyration about it, over segment length.
+"""Mass over body mass; center of mass from the proximal end and radius of gyration about it, over segment length.
 
 D. A. Winter, Biomechanics and Motor Control of Human Movement, 4th ed., Wiley 2009, table 4.1. Ends: thigh from
 greater trochanter to femoral condyles, shank to medial malleolus, foot from lateral malleolus to the head of
@@ -97,7 +97,7 @@ glenohumeral joint.
 def segment(name: str, body_mass: float, length: float) -> Solid:
     """A segment of the human body as a link along −y from its proximal end.
 
-    ``m = c_m M``, centre ``c_c L`` from the proximal end, ``Izz = Ixx = m (c_r L)²``; the moment about the long axis is
+    ``m = c_m M``, center ``c_c L`` from the proximal end, ``Izz = Ixx = m (c_r L)²``; the moment about the long axis is
     left out of Winter's table and taken as zero, as for a rod.
 
     Parameters

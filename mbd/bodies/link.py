@@ -26,15 +26,15 @@ __all__ = ["Link"]
 class Link(Body):
     """A straight link that lies along −y of its own axes, so that at angle zero it hangs.
 
-    ``start = (0, 0, 0)``, ``end = (0, −length, 0)``, centre of mass ``(0, −center, 0)``.
+    ``start = (0, 0, 0)``, ``end = (0, −length, 0)``, center of mass ``(0, −center, 0)``.
 
     Parameters
     ----------
     name : its name
     mass : m [kg]
     length : from start to end [m]
-    center : from the start to the centre of mass [m]; kept as `center_distance`, since `center` is the frame there
-    inertia : about the centre of mass [kg m²]: a number about z, or three or six as for `RigidBody`
+    center : from the start to the center of mass [m]; kept as `center_distance`, since `center` is the frame there
+    inertia : about the center of mass [kg m²]: a number about z, or three or six as for `RigidBody`
     """
 
     name: str
@@ -76,7 +76,7 @@ class Link(Body):
         return self.frame("end")
 
     def mass_properties(self, scope: Scope) -> MassProperties:
-        """m, centre, I."""
+        """m, center, I."""
         parameter = self.parameter(scope)
         return MassProperties(
             parameter("mass"), self.landmarks(parameter)["center"], inertia_matrix(self.inertia, parameter)

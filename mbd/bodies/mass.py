@@ -1,4 +1,4 @@
-"""Mass, centre of mass and inertia, as scalars for the derivation and as numbers for the check."""
+"""Mass, center of mass and inertia, as scalars for the derivation and as numbers for the check."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ __all__ = [
 ]  # fmt: skip
 
 Inertia: TypeAlias = float | tuple[float, ...]
-"""About the centre of mass in body axes [kg m²]: a number (about z), (Ixx, Iyy, Izz), or these and (Ixy, Ixz, Iyz)."""
+"""About the center of mass in body axes [kg m²]: a number (about z), (Ixx, Iyy, Izz), or these and (Ixy, Ixz, Iyz)."""
 
 _ELEMENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
 
 
 @dataclass(frozen=True)
 class MassProperties:
-    """What a body weighs: mass m [kg], centre of mass [m], inertia matrix about the centre, body axes [kg m²]."""
+    """What a body weighs: mass m [kg], center of mass [m], inertia matrix about the center, body axes [kg m²]."""
 
     mass: Scalar = 0.0
     center: Triple = ZERO
@@ -83,13 +83,13 @@ def inertia_faults(owner: str, inertia: Inertia, mass: float) -> list[str]:
     if moments.min() < -1e-12 * largest:
         faults.append(
             f"body '{owner}': its inertia has the negative principal moment {moments.min():.6g} kg m²; "
-            "moments about the centre of mass are ≥ 0"
+            "moments about the center of mass are ≥ 0"
         )
     elif len(moments) == 3 and moments[2] > (moments[0] + moments[1]) * (1.0 + 1e-9):
         a, b, c = moments
         faults.append(
             f"body '{owner}': principal moments {a:.6g}, {b:.6g}, {c:.6g} kg m² break the triangle inequality "
-            f"({c:.6g} > {a:.6g} + {b:.6g}); give moments about the centre, or a single number for planar motion"
+            f"({c:.6g} > {a:.6g} + {b:.6g}); give moments about the center, or a single number for planar motion"
         )
     if mass == 0.0 and largest > 0.0:
         faults.append(f"body '{owner}': an inertia without a mass; give the mass, or inertia 0")

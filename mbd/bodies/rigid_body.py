@@ -24,15 +24,15 @@ __all__ = ["RigidBody"]
 
 @dataclass(frozen=True, init=False)
 class RigidBody(Body):
-    """A rigid body, ``T = ½ m |v_c|² + ½ ωᵀ I ω`` with v_c the velocity of its centre of mass.
+    """A rigid body, ``T = ½ m |v_c|² + ½ ωᵀ I ω`` with v_c the velocity of its center of mass.
 
     Parameters
     ----------
     name : its name
     mass : m [kg]
-    inertia : I about the centre of mass in body axes [kg m²]: a number (about z, for planar motion),
+    inertia : I about the center of mass in body axes [kg m²]: a number (about z, for planar motion),
         (Ixx, Iyy, Izz), or (Ixx, Iyy, Izz, Ixy, Ixz, Iyz), the elements of the matrix
-    center : place of the centre of mass in body axes [m]; kept as `center_offset`, since `center` is the frame there
+    center : place of the center of mass in body axes [m]; kept as `center_offset`, since `center` is the frame there
     """
 
     name: str
@@ -57,7 +57,7 @@ class RigidBody(Body):
         return {"origin": ZERO, "center": (parameter("center.x"), parameter("center.y"), parameter("center.z"))}
 
     def mass_properties(self, scope: Scope) -> MassProperties:
-        """m, centre, I."""
+        """m, center, I."""
         parameter = self.parameter(scope)
         return MassProperties(
             parameter("mass"), self.landmarks(parameter)["center"], inertia_matrix(self.inertia, parameter)

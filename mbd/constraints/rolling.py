@@ -24,14 +24,14 @@ __all__ = ["Rolling"]
 class Rolling(VelocityConstraint):
     """``t · (v_C + ω × (−r n)) = 0``: the point of a wheel that touches a plane does not slip along it.
 
-    n is the plane's normal and t the direction forward along it (x on level ground), r the radius, C the centre. Only
+    n is the plane's normal and t the direction forward along it (x on level ground), r the radius, C the center. Only
     the slip is held at zero; the wheel stays on the plane by what you give it, such as ``Bilateral`` or ``Unilateral``
     on ``touchdown(center, Plane(offset=radius))`` without friction, or a joint.
 
     Parameters
     ----------
     name : its name
-    center : the centre of the wheel, a frame of the body that turns
+    center : the center of the wheel, a frame of the body that turns
     radius : r, the run-time parameter 'name.radius' [m]
     ground : the plane it rolls on, y = 0 by default
 
@@ -79,7 +79,7 @@ class Rolling(VelocityConstraint):
         return [("", dot(forward, slip))]
 
     def mentions(self) -> list[Mention]:
-        """Its centre."""
+        """Its center."""
         return [self.center]
 
     def parameters(self) -> dict[str, float]:

@@ -94,7 +94,7 @@ class Dynamics:
         return (fx, fy, fz), (tx, ty, tz)
 
     def _inertia_of(self, body: Moving) -> list[Pull]:
-        """Force m (a_C − g) at the centre, torque I α + ω × I ω."""
+        """Force m (a_C − g) at the center, torque I α + ω × I ω."""
         mass = self._masses[body.body.name]
         force = scaled(mass.mass, body.acceleration_at(mass.center))
         momentum = rotate(mass.inertia, body.angular_velocity)

@@ -5,7 +5,7 @@
 Inputs on the tape, as (kind, index)
     ('t', 0)       time
     ('c', 0), ('c', 1)   tangent factors c_C = ∂v₁/∂v̇₁ and c_K = ∂q₁/∂v̇₁
-    ('q', i)       coordinates at the centre of the chart; ('x', i) local increment: everything is evaluated at q ⊕ x
+    ('q', i)       coordinates at the center of the chart; ('x', i) local increment: everything is evaluated at q ⊕ x
     ('v', i), ('a', i)   velocities, accelerations
     ('z', i), ('s', i)   first-order states and their rates ż
     ('lam', k)     multiplier of row k of `rows`

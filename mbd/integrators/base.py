@@ -22,7 +22,7 @@ __all__ = ["Advance", "Integrator", "Point", "StepReport", "StepResult", "System
 class Point:
     """Where the balance is evaluated: at q ⊕ x.
 
-    t [s]; q (n_q,) centre of the chart; x (n_v,) local increment; y (n,) = (v, z); rate (n,) = (v̇, ż);
+    t [s]; q (n_q,) center of the chart; x (n_v,) local increment; y (n,) = (v, z); rate (n,) = (v̇, ż);
     lam (m,) multipliers of the active rows.
     """
 

@@ -47,7 +47,7 @@ INTEGER_ARRAYS = (
     "kind", "opens", "normal",  # contact: 0 unilateral, 1 penalty; 0 on pull, 1 on gap, 2 by When; its normal row
     "when_start", "when_target", "when_after",  # who opens it
     "while_kind", "while_target",  # 0 always, 1 while a contact is closed, 2 while a measure is positive
-    "anchor_start", "direction", "notify", "terminal",
+    "anchor_start", "direction", "notify",
     "closed", "armed", "touched", "active", "free", "closing",  # contacts
     "dropped",  # rows that depend on others
     "mode_key", "mode_code", "mode_count",  # known modes
@@ -58,7 +58,7 @@ FIELDS = (*INTEGERS, *REALS, *REAL_ARRAYS, *INTEGER_ARRAYS, "code", "hooks")
 Kernel = namedtuple("Kernel", FIELDS)  # type: ignore[misc]
 
 # places in `state`
-MODE, ROWS, GRID, RESTART, STORED, LOGGED, SWITCHES, SINCE_STORE, BLOCKED, FRESH, N_DROPPED, NEAR = range(12)
+MODE, ROWS, GRID, RESTART, STORED, LOGGED, SWITCHES, SINCE_STORE, BLOCKED, N_DROPPED, NEAR = range(11)
 # places in `counts`
 (
     STEPS, ITERATIONS, TANGENTS, RESIDUALS, FACTORIZATIONS, EVENTS, RESTARTS, IMPACTS, LOCATIONS, STAGNATIONS, CAREFUL,
@@ -67,7 +67,7 @@ MODE, ROWS, GRID, RESTART, STORED, LOGGED, SWITCHES, SINCE_STORE, BLOCKED, FRESH
 # places in `clock`
 NOW, BASE, AUX_STEP, LAST_SWITCH = range(4)
 # functions in `code`; modes follow in pairs (tangent, residual)
-ACCELERATIONS, GUARDS, SCALES, COMPOSE, FIRST_MODE = range(5)
+ACCELERATIONS, GUARDS, SCALES, COMPOSE = range(4)
 # what advance returns
 DONE, FULL, NEW_MODE, EVENT, PAUSE = range(5)
 (
@@ -78,3 +78,4 @@ CLOSE, OPEN_PULL, OPEN_GAP, OPEN_FORCE, CROSS, WATCH, GRAZE, PRESS = range(8)
 # kinds in the log
 LOG_CLOSED, LOG_OPENED, LOG_EVENT = range(3)
 EPS = 2.220446049250313e-16
+"""Distance from 1 to the next double, as a literal for numba [-]."""

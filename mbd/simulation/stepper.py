@@ -111,7 +111,7 @@ class Stepper:
             "store": v["capacity"] * v["width"], "log": v["event_capacity"] * v["event_width"],
         }  # fmt: skip
         integers = {
-            "unit": n, "notify": contacts + guards, "terminal": contacts + guards, "closed": contacts,
+            "unit": n, "notify": contacts + guards, "closed": contacts,
             "armed": contacts, "touched": contacts, "active": contacts + guards, "free": contacts, "closing": contacts,
             "mode_key": MODE_CAPACITY * (contacts + rows), "dropped": rows, "mode_code": 2 * MODE_CAPACITY,
             "mode_count": 1, "rows": rows,

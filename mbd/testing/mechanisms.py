@@ -17,7 +17,7 @@ __all__ = ["furnished", "random_body", "random_frame", "random_joint", "random_l
 
 
 def random_body(rng: random.Random, name: str, spatial: bool) -> mbd.RigidBody:
-    """A body with a centre off its origin and an inertia that a real body can have."""
+    """A body with a center off its origin and an inertia that a real body can have."""
     a, b, c = (rng.uniform(0.1, 1.0) for _ in range(3))
     inertia = (b + c, a + c, a + b, 0.05 * rng.uniform(-1, 1), 0.05 * rng.uniform(-1, 1), 0.05 * rng.uniform(-1, 1))
     center = (rng.uniform(-0.5, 0.5), rng.uniform(-0.5, 0.5), rng.uniform(-0.5, 0.5) if spatial else 0.0)

@@ -31,7 +31,7 @@ def test_parameters_are_declared_before_they_are_used(factory):
 
 
 @every_body
-def test_centre_of_mass_is_where_its_frame_is(factory):
+def test_center_of_mass_is_where_its_frame_is(factory):
     body, scope = factory(), FreeScope()
     _, place = body.center.placement(scope)
     np.testing.assert_allclose(scope.value(*place), scope.value(*body.mass_properties(scope).center))

@@ -41,7 +41,7 @@ def test_solids_make_possible_bodies(solid):
     assert mbd.RigidBody("solid", **solid.body).faults() == []
 
 
-def test_a_rod_makes_a_link_whose_centre_is_halfway():
+def test_a_rod_makes_a_link_whose_center_is_halfway():
     link = mbd.Link("rod", length=2.0, **mbd.rod(3.0, 2.0).link)
     assert link.center.offset == (0.0, -1.0, 0.0)
     assert link.inertia == (1.0, 0.0, 1.0)

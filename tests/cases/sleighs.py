@@ -21,7 +21,7 @@ def blade_row(vx: Any, vy: Any, angle: Any) -> Any:
 
 @dataclass(frozen=True)
 class Sleigh:
-    """A body on a blade at P, its mass centre a ahead, on a plane on which a weight m g_x pulls along x.
+    """A body on a blade at P, its mass center a ahead, on a plane on which a weight m g_x pulls along x.
 
     With v the speed along the blade and ω = θ˙ (Neimark & Fufaev 1972; the weight by virtual work)
     ``v˙ = a ω² + g_x cos θ``, ``(I + m a²) ω˙ = −m a (v ω + g_x sin θ)``;

@@ -19,7 +19,7 @@ m, J_c, d, c, g = (A3.definition[name] for name in ("m", "I_com", "d", "c", "g")
 
 
 def bar(loss: Any, cut: str = "auto") -> mbd.Model:
-    """A rigid body whose mass centre hangs d below its pivot."""
+    """A rigid body whose mass center hangs d below its pivot."""
     model = mbd.Model("bar", gravity=(0.0, -g, 0.0), cut=cut)
     body = mbd.RigidBody("bar", mass=m, inertia=(0.2, 0.1, J_c), center=(0.0, -d, 0.0))
     model.connect(mbd.Revolute("pivot", model.ground.origin, body.origin, loss=loss))

@@ -82,7 +82,7 @@ def test_an_unevenly_turned_crank_needs_the_torque_of_its_kinetic_energy(scheme:
     acceleration = -10.0 * math.sin(5.0 * until)
 
     def inertia(angle: complex) -> complex:
-        """J(φ) from the velocities of the rod's centre and of the slider for φ˙ = 1, all by hand."""
+        """J(φ) from the velocities of the rod's center and of the slider for φ˙ = 1, all by hand."""
         sine, cosine = np.sin(angle), np.cos(angle)
         below = np.sqrt(1.0 - (crank / rod * sine) ** 2)  # cos of the rod's angle β, sin β = crank/rod sin φ
         swing = crank / rod * cosine / below  # β˙

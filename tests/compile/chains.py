@@ -28,7 +28,7 @@ class Chain:
 
 
 def chain(n: int) -> Chain:
-    """The chain with relative angles q + x, lengths l, masses m and inertias j as parameters, centre at mid-length."""
+    """The chain with relative angles q + x, lengths l, masses m and inertias j as parameters, center at mid-length."""
     tape = Tape()
     gravity = tape.input("p", 0)
     x = [tape.input("x", i) for i in range(n)]

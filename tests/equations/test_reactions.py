@@ -20,7 +20,7 @@ def motion_of(equations, point):
 
 
 def momentum_rates(equations, body, point):
-    """d/dt of linear momentum, and of angular momentum about the centre, in ground axes."""
+    """d/dt of linear momentum, and of angular momentum about the center, in ground axes."""
     scope = equations.geometry.scope
     mass = body.mass_properties(scope)
     motion = scope.frame(body.center)
