@@ -175,7 +175,7 @@ static void predict(const Scheme *c, const Factors *f, const Motion *s, Point *a
 /* b for accelerations and multipliers, d for the whole position correction (with old factors: for its change).
    Returns whether positions need correcting: at round-off they stay, correcting would only stir the velocity rows. */
 static int right_hand_sides(const Factors *f, const Motion *s, const Residual *e, double A[SIZE][SIZE], int renewed,
-                            const double shift[N], double b[SIZE], double d[SIZE])
+                            const double shift[N], double b[SIZE], double d[SIZE], double turning[M][N])
 {
     int shifting = 0;
     for (int i = 0; i < N; i++) {
@@ -187,8 +187,10 @@ static int right_hand_sides(const Factors *f, const Motion *s, const Residual *e
         if (STABILIZED) {
             shifting |= fabs(e->h[k]) > 16.0 * EPS * s->scale_h[k];
             d[N + k] = f->K / f->C * e->rate[k] - e->h[k];
-            for (int j = 0; j < N && renewed; j++)
+            for (int j = 0; j < N && renewed; j++) {
                 d[N + k] += A[N + k][j] * shift[j];
+                turning[k][j] = (A[N + k][j] - A[j][N + k]) / f->K; /* d(rate)/dq / C, as B~ = B + K/C d(rate)/dq */
+            }
         }
     }
     return shifting;
@@ -236,7 +238,7 @@ static void finish(const Scheme *c, const Factors *f, const Point *at, const dou
 static int step(const Model *p, const Scheme *c, Motion *s, int64_t counts[3])
 {
     const Factors f = factors_of(c);
-    double A[SIZE][SIZE], b[SIZE], d[SIZE], shift[N], tolerance = 1e-3 * c->tolerance, before = 1e300;
+    double A[SIZE][SIZE], turning[M][N], b[SIZE], d[SIZE], shift[N], tolerance = 1e-3 * c->tolerance, before = 1e300;
     int pivots[SIZE], fresh = 0;
     Point at;
     Residual e;
@@ -268,11 +270,15 @@ static int step(const Model *p, const Scheme *c, Motion *s, int64_t counts[3])
             continue;
         }
         before = error;
-        int shifting = right_hand_sides(&f, s, &e, A, renew, shift, b, d);
+        int shifting = right_hand_sides(&f, s, &e, A, renew, shift, b, d, turning);
         if (renew && factor(A, pivots))
             return 1;
-        if (shifting)
+        if (shifting) { /* positions first: what that changes of the rates, the accelerations make good */
             solve(A, pivots, d);
+            for (int k = 0; k < M; k++)
+                for (int j = 0; j < N; j++)
+                    b[N + k] -= turning[k][j] * (renew ? d[j] - shift[j] : d[j]);
+        }
         solve(A, pivots, b);
         counts[ITERATIONS]++;
         double biggest = correct(&f, b, d, shifting, renew, &at, shift);

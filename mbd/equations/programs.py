@@ -3,7 +3,7 @@
 With N = n_v + n_z rates, m active rows in ascending number, R rows and nC contacts in all:
 
 =================  ==================================================================================
-`newton`           K ((N+m) × (N+m), row-major) | r (N) | h (m) | ḣ (m, stabilized only)
+`newton`           K ((N+m) × (N+m), row-major) | r (N) | h (m) | ḣ (m) | ∂ḣ/∂x (m × n_v), both stabilized only
 `residual`         r (N) | h (m) | ḣ (m, stabilized only)
 `accelerations`    M (N × N) | f (N) | ∂r/∂λ (N × R) | B (R × N) | h (R) | ḣ (R) | γ (R) | captured | T
 `guards`           g (nC) | ġ (nC) | penalty force (nC) | only_while (nC) | event values | event rates
@@ -44,12 +44,14 @@ def newton(equations: Equations, rows: Sequence[int], penalties: Sequence[int], 
     rows = sorted(rows)
     r = balance_with(equations, rows, penalties)
     B = constraint_jacobian(equations, rows)
-    bottom = list(B)
+    bottom, turning = list(B), list[Node]()
     fast = [place for place, k in enumerate(rows) if stabilized or equations.rows[k].is_velocity]
     ratio = inputs.c[1] / inputs.c[0]
     changes = _jacobian_rates(equations, [rows[place] for place in fast], [B[place] for place in fast])
     for place, change in zip(fast, changes, strict=True):
         bottom[place] = [b + ratio * g for b, g in zip(B[place], change, strict=True)]
+    if stabilized:
+        turning = [entry for change in changes for entry in change]
     S = _tangent(equations, r)
     right = _row_forces(equations, r, rows, B)
     zero = equations.tape.zero
@@ -59,7 +61,7 @@ def newton(equations: Equations, rows: Sequence[int], penalties: Sequence[int], 
         out += [S[j][i] for j in range(n)] + [right[k][i] for k in range(m)]
     for k in range(m):
         out += [*bottom[k], *([zero] * (n_z + m))]
-    return out + r + _levels(equations, rows, stabilized)
+    return out + r + _levels(equations, rows, stabilized) + turning
 
 
 def residual(equations: Equations, rows: Sequence[int], penalties: Sequence[int], stabilized: bool) -> list[Node]:

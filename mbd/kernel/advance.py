@@ -12,6 +12,7 @@ from mbd.kernel.fields import (
     EVENT,
     FULL,
     GRID,
+    INCHING,
     LAST_SWITCH,
     LOG_EVENT,
     LOGGED,
@@ -42,6 +43,11 @@ from mbd.kernel.switching import log_event, settle, switch
 
 __all__ = ["advance"]
 
+MOST_SHORTENED = 5
+"""Shortened steps, less half the full ones between them, after which a mechanism with rows is stuck.
+
+Without rows ten times as many.
+"""
 SHORTEST = 0.1
 """Part of a step below which a failing step is not shortened any further [-]."""
 
@@ -291,6 +297,14 @@ def advance(K: Any) -> int:
             continue
         if h < full:
             K.counts[SHORTENED] += 1
+            K.state[INCHING] += 2
+            patience = 2 * MOST_SHORTENED if K.state[ROWS] > 0 else 20 * MOST_SHORTENED
+            if K.state[INCHING] > patience:
+                K.detail[0] = t1
+                K.detail[1] = 0.0
+                return NOT_CONVERGED
+        elif K.state[INCHING] > 0:
+            K.state[INCHING] -= 1
         uneven = K.stabilized == 0 and K.state[ROWS] > 0 and h < (1.0 - 1e-6) * K.dt
         if h < 1e-3 * K.dt or uneven:  # index 3 rings after a change of step
             take_over(K, t1)

@@ -29,6 +29,7 @@ REAL_ARRAYS = (
     "q", "y", "rate", "aux", "slope", "lam", "lam_slope", "shift", "shift_change", "anchors",  # accepted state
     "q1", "y1", "rate1", "aux1", "lam1", "shift1",  # candidate of the step under judgement
     "kkt", "rhs", "work", "spare",  # linear algebra
+    "turning",  # ∂ḣ/∂x of the active rows, stabilized only
     "basis", "lower", "mix",  # dependent rows as combinations of others
     "force", "bias", "jump", "impulse",  # complementarity: right-hand sides, velocity or acceleration, multipliers
     "guards0", "guards1",  # guard values at the accepted state and at the candidate
@@ -58,12 +59,14 @@ FIELDS = (*INTEGERS, *REALS, *REAL_ARRAYS, *INTEGER_ARRAYS, "code", "hooks")
 Kernel = namedtuple("Kernel", FIELDS)  # type: ignore[misc]
 
 # places in `state`
-MODE, ROWS, GRID, RESTART, STORED, LOGGED, SWITCHES, SINCE_STORE, BLOCKED, N_DROPPED, NEAR = range(11)
+MODE, ROWS, GRID, RESTART, STORED, LOGGED, SWITCHES, SINCE_STORE, BLOCKED, N_DROPPED, NEAR, INCHING = range(12)
 # places in `counts`
 (
     STEPS, ITERATIONS, TANGENTS, RESIDUALS, FACTORIZATIONS, EVENTS, RESTARTS, IMPACTS, LOCATIONS, STAGNATIONS, CAREFUL,
     SHORTENED,
 ) = range(12)  # fmt: skip
+# places in `detail` of the sizes of velocity corrections: of the last, and of the last ordinary step
+CORRECTED, USUAL = 4, 5
 # places in `clock`
 NOW, BASE, AUX_STEP, LAST_SWITCH = range(4)
 # functions in `code`; modes follow in pairs (tangent, residual)

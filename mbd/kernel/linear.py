@@ -11,7 +11,7 @@ __all__ = ["eliminate", "factor", "solve"]
 
 
 def factor(A: Any, n: int, pivots: Any) -> int:
-    """LU factors of the row-major n×n matrix A, in place; 0, or 1 + the column without a pivot."""
+    """LU factors of the row-major n×n matrix A, in place, inverse pivots on the diagonal; 0, or 1 + the bad column."""
     for k in range(n):
         p = k
         big = abs(A[k * n + k])
@@ -29,12 +29,25 @@ def factor(A: Any, n: int, pivots: Any) -> int:
                 A[k * n + j] = A[p * n + j]
                 A[p * n + j] = swap
         inverse = 1.0 / A[k * n + k]
+        A[k * n + k] = inverse
         for i in range(k + 1, n):
             if A[i * n + k] != 0.0:
                 left = A[i * n + k] * inverse
                 A[i * n + k] = left
-                for j in range(k + 1, n):
+                j = k + 1
+                while j + 3 < n:  # four at once, which become one instruction
+                    a0 = A[i * n + j] - left * A[k * n + j]
+                    a1 = A[i * n + j + 1] - left * A[k * n + j + 1]
+                    a2 = A[i * n + j + 2] - left * A[k * n + j + 2]
+                    a3 = A[i * n + j + 3] - left * A[k * n + j + 3]
+                    A[i * n + j] = a0
+                    A[i * n + j + 1] = a1
+                    A[i * n + j + 2] = a2
+                    A[i * n + j + 3] = a3
+                    j += 4
+                while j < n:
                     A[i * n + j] -= left * A[k * n + j]
+                    j += 1
     return 0
 
 
@@ -46,17 +59,16 @@ def solve(A: Any, n: int, pivots: Any, b: Any) -> None:
             swap = b[k]
             b[k] = b[p]
             b[p] = swap
-    for i in range(1, n):
-        total = b[i]
-        for j in range(i):
-            total -= A[i * n + j] * b[j]
-        b[i] = total
-    for k in range(n):
-        i = n - 1 - k
-        total = b[i]
-        for j in range(i + 1, n):
-            total -= A[i * n + j] * b[j]
-        b[i] = total / A[i * n + i]
+    for k in range(n):  # by columns: the entries of b do not wait for each other
+        left = b[k]
+        for i in range(k + 1, n):
+            b[i] -= A[i * n + k] * left
+    for c in range(n):
+        k = n - 1 - c
+        left = b[k] * A[k * n + k]
+        b[k] = left
+        for i in range(k):
+            b[i] -= A[i * n + k] * left
 
 
 def eliminate(A: Any, n: int, b: Any, columns: Any, work: Any, rank_tolerance: float) -> int:

@@ -14,6 +14,7 @@ from mbd.kernel.fields import (
     AUX_STEP,
     BLOCKED,
     CAREFUL,
+    CORRECTED,
     EPS,
     FACTORIZATIONS,
     ITERATIONS,
@@ -28,6 +29,7 @@ from mbd.kernel.fields import (
     STAGNATED,
     STAGNATIONS,
     TANGENTS,
+    USUAL,
 )  # fmt: skip
 from mbd.kernel.hooks import call
 from mbd.kernel.linear import factor, solve
@@ -38,7 +40,10 @@ __all__ = ["newmark_accept", "newmark_start", "newmark_step"]
 MOST_HALVINGS = 10
 """How often a Newton correction is halved before the iteration goes on from where it is."""
 CONTINUOUS = 0.05
-"""Part of the speed by which a careful step may differ from its prediction: branches are continuous in velocity [-]."""
+"""Part of the speed by which a careful step may differ from its prediction: branches are continuous in velocity [-].
+
+And no more than twenty times what the last ordinary step was corrected by.
+"""
 WATCHFUL = 20
 """Steps after a careful one in which every step must continue its branch."""
 FAR = 1e4
@@ -200,6 +205,8 @@ def newmark_step(K: Any, h: float, t1: float) -> int:
             status = SINGULAR
             break
         biggest = correct(K, m, c_C, c_K, tangent, shifting)
+        if iteration == 0 and K.state[NEAR] == 0:
+            K.detail[USUAL] = K.detail[CORRECTED]
         if iteration == 0 and K.exact == 0:  # the predictor's error measures that of the step: stay far below it
             tolerance = min(K.tolerance, max(1e-4 * biggest, tolerance))
         fresh = True
@@ -238,7 +245,10 @@ def leaves_branch(K: Any) -> bool:
     for i in range(K.n_v):
         fastest = max(fastest, max(abs(K.y[i]), abs(K.y1[i])))
         change = max(change, abs(K.block[K.o_v + i] - K.y1[i]))
-    return change > CONTINUOUS * fastest
+    usual = CONTINUOUS * fastest
+    if K.detail[USUAL] > 0.0:
+        usual = min(usual, 20.0 * K.detail[USUAL] + 1e-9 * fastest)
+    return change > usual
 
 
 def careful_step(K: Any, h: float, t1: float, c_C: float, c_K: float) -> bool:
@@ -329,6 +339,9 @@ def right_hand_sides(K: Any, o_r: int, m: int, c_C: float, c_K: float, tangent: 
             for j in range(K.n_v):
                 h -= K.out[(n + k) * (n + m) + j] * K.shift1[j]
         K.work[n + k] = -h
+    if tangent and K.stabilized == 1:
+        for k in range(m * K.n_v):
+            K.turning[k] = K.out[o_h + 2 * m + k]
     return shifting
 
 
@@ -348,6 +361,19 @@ def correct(K: Any, m: int, c_C: float, c_K: float, tangent: bool, shifting: boo
     block = K.block
     biggest = 0.0
     fastest = 1e-300
+    if shifting:  # positions first: what that changes of ḣ, the accelerations make good in the same iteration
+        solve(K.kkt, n + m, K.pivots, K.work)
+        for i in range(K.n_v):
+            shift = K.work[i] if tangent else K.shift1[i] + K.work[i]
+            K.work[i] = shift - K.shift1[i]
+            K.shift1[i] = shift
+            block[K.o_x + i] += K.work[i]
+        inverse = 1.0 / c_C
+        for k in range(m):
+            turned = 0.0
+            for i in range(K.n_v):
+                turned += K.turning[k * K.n_v + i] * K.work[i]
+            K.rhs[n + k] -= turned * inverse
     solve(K.kkt, n + m, K.pivots, K.rhs)
     K.counts[ITERATIONS] += 1
     for i in range(n):
@@ -360,12 +386,7 @@ def correct(K: Any, m: int, c_C: float, c_K: float, tangent: bool, shifting: boo
             block[K.o_x + i] += c_K * change
     for k in range(m):
         block[K.o_lam + K.rows[k]] += K.rhs[n + k]
-    if shifting:
-        solve(K.kkt, n + m, K.pivots, K.work)
-        for i in range(K.n_v):
-            shift = K.work[i] if tangent else K.shift1[i] + K.work[i]
-            block[K.o_x + i] += shift - K.shift1[i]
-            K.shift1[i] = shift
+    K.detail[CORRECTED] = c_C * biggest
     return biggest / fastest
 
 

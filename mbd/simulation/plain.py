@@ -66,6 +66,7 @@ class MechanismSystem:
         size, speed = _by_coordinate(point, self.mechanism)
         h_size, rate_size = np.maximum(h_size, size), np.maximum(rate_size, speed)
         tail = n + (2 if self.stabilized else 1) * m
+        full = (n + m) ** 2 + tail + (m * self.n_v if self.stabilized else 0)
         if tangent is None:
             out = np.zeros(tail)
             code.residual(block, self.parameters, out)
@@ -73,11 +74,11 @@ class MechanismSystem:
         else:
             factors = tangent if tangent[0] > 0.0 else (1.0, 0.0)
             block[1:3] = factors
-            out = np.zeros((n + m) ** 2 + tail)
+            out = np.zeros(full)
             code.tangent(block, self.parameters, out)
-            matrix, out = out[: (n + m) ** 2].reshape(n + m, n + m), out[(n + m) ** 2 :]
+            matrix, out = out[: (n + m) ** 2].reshape(n + m, n + m), out[(n + m) ** 2 : (n + m) ** 2 + tail]
             if tangent != factors:  # S is affine in the factors: M is its value at (0, 0)
-                other = np.zeros((n + m) ** 2 + tail)
+                other = np.zeros(full)
                 block[1:3] = (2.0, 0.0)
                 code.tangent(block, self.parameters, other)
                 matrix = 2.0 * matrix - other[: (n + m) ** 2].reshape(n + m, n + m)

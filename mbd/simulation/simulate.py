@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from typing import Any, Literal
 
 from mbd.assembly import named_numbers
@@ -94,7 +95,7 @@ def simulate(
     settings = {
         "model": getattr(model, "name", ""), "integrator": repr(scheme), "dt": float(dt), "until": until,
         "contact": contact, "impact": impact, "locate": locate, "store": store, "rest_speed": rest_speed,
-        "backend": mechanism.backend.name, "versions": _versions(),
+        "backend": mechanism.backend.name, "versions": dict(_versions()),
     }  # fmt: skip
     options = {"locate": locate, "store": store, "rest_speed": rest_speed}
     run = Run(model, mechanism, manager, scheme, start, float(dt), end, stop, changed, options, settings)
@@ -105,6 +106,7 @@ def simulate(
     return trajectory
 
 
+@cache
 def _versions() -> dict[str, str]:
     from importlib.metadata import PackageNotFoundError, version
 

@@ -99,12 +99,12 @@ class Stepper:
         n, n_q, rows, contacts, guards = v["n"], v["n_q"], v["n_rows"], v["n_contacts"], v["n_guards"]
         size = n + rows
         reals = {
-            "block": self.mechanism.layout.size, "out": size * size + n + 2 * rows, "clock": 4,
+            "block": self.mechanism.layout.size, "out": size * size + n + 2 * rows + rows * n, "clock": 4,
             "acc": self.mechanism.sizes["accelerations"], "q": n_q, "y": n, "rate": n, "aux": n, "slope": n,
             "lam": rows, "lam_slope": rows, "shift": n, "shift_change": n,
             "anchors": v["n_anchors"], "q1": n_q, "y1": n, "rate1": n, "aux1": n, "lam1": rows, "shift1": n,
             "basis": (rows + 1) * n, "lower": (rows + 1) * rows, "mix": rows * rows, "kkt": size * size, "rhs": size,
-            "spare": size * size + n + 2 * rows,
+            "spare": size * size + n + 2 * rows + rows * n, "turning": rows * n,
             "work": 3 * size, "force": n, "bias": rows, "jump": n, "impulse": rows,
             "guards0": 4 * contacts + 2 * guards, "guards1": 4 * contacts + 2 * guards, "scale": n + 2 * rows,
             "deepest": contacts, "sinking": contacts, "side": guards, "pick": 8, "detail": 8,

@@ -178,9 +178,14 @@ def _tangent(findings: Findings, equations: Equations, point: Point) -> None:
     hint = "K_t, C_t or M differs from differences of the residual: a force with a kink, or an inexact derivative"
     for stabilized in False, True:
         law = f"tangent exactness: Newton's matrix against differences ({'ggl' if stabilized else 'index 3'})"
-        sizes = ((n,), (m,), (m,)) if stabilized else ((n,), (m,))
+        sizes = ((n,), (m,), (m,), (m, n_v)) if stabilized else ((n,), (m,))
         K, *parts = block(at(newton(equations, rows, penalties, stabilized), point), (n + m, n + m), *sizes)
         out = residual(equations, rows, penalties, stabilized)
+        if stabilized:
+            turning = parts.pop()
+            for j in range(n_v if m else 0):
+                change = derivative(out, point, {("x", j): 1.0})[n + m :]
+                findings.equal(law, f"∂ḣ/∂x in column {j}", turning[:, j], change, hint, 10.0 * DIFFERENCE, change)
         r = np.concatenate(parts)
         findings.equal(law, "residual beside the matrix", r, at(out, point), hint, 1e-11, r)
         scale = np.abs(r[:n]).max(initial=0.0)

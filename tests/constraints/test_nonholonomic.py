@@ -53,7 +53,8 @@ def test_newton_matrix_is_the_derivative_of_the_residual(scene, stabilized):
     n, m = equations.n_v, len(equations.rows)
     point = inputs(equations, 5, x=0.2)
     c0, c1 = point["c", 0], point["c", 1]
-    K, *rest = block(at(newton(equations, range(m), (), stabilized), point), (n + m, n + m), (n + m + stabilized * m,))
+    sizes = (n + m, n + m), (n + m + stabilized * m,), (stabilized * m, n)
+    K, *rest = block(at(newton(equations, range(m), (), stabilized), point), *sizes)
     out = residual(equations, range(m), (), stabilized)
     np.testing.assert_allclose(at(out, point), rest[0], rtol=1e-12, atol=1e-12)
     for j in range(n):

@@ -53,7 +53,7 @@ def test_tangent_is_the_derivative_of_the_residual():
     )  # fmt: skip
     equations = derive(bead)
     point = inputs(equations, 3, x=0.1)
-    K, r, h, hv = block(at(newton(equations, [0], (), True), point), (4, 4), (3,), (1,), (1,))
+    K, r, h, hv, _ = block(at(newton(equations, [0], (), True), point), (4, 4), (3,), (1,), (1,), (1, 3))
     out = residual(equations, [0], (), True)
     np.testing.assert_allclose(np.concatenate([r, h, hv]), at(out, point))
     c0, c1 = point["c", 0], point["c", 1]

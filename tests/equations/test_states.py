@@ -68,7 +68,7 @@ def test_states_stand_behind_the_coordinates():
 def test_tangent_covers_states():
     equations = derive(model())
     point = inputs(equations, 2, x=0.1)
-    K, *_ = block(at(newton(equations, [0], (), True), point), (4, 4), (3,), (1,), (1,))
+    K, *_ = block(at(newton(equations, [0], (), True), point), (4, 4), (3,), (1,), (1,), (1, 2))
     out = residual(equations, [0], (), True)
     c0, c1 = point["c", 0], point["c", 1]
     for j in range(2):
