@@ -65,7 +65,10 @@ class AveragedStep:
                 R = (1.0 - alpha) * np.asarray(terms.R)
                 matrix = np.block([[S, R], [np.asarray(terms.H), np.zeros((m, m))]])
                 right = np.concatenate([-r, -held / np.where(fast, c_C, c_K)])
-            change = np.linalg.solve(matrix, right)
+            try:
+                change = np.linalg.solve(matrix, right)
+            except np.linalg.LinAlgError:
+                return self._failed(iteration, error, "the Newton matrix is singular")
             a1, lam = a1 + change[: len(r)], lam + change[len(r) :]
         return self._failed(MAX_ITERATIONS, error, "Newton did not converge")
 
