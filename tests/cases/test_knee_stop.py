@@ -11,7 +11,7 @@ from tests.cases.schemes import SCHEMES, name_of
 from tests.helpers import assert_second_order, halved
 from tests.problems import Case, case, knee_stop_events
 
-CASES = {"gap": case("h1-knee-stop-seed-law"), "pull": case("h1b-knee-stop-unilateral")}
+CASES = {"gap": case("h1-knee-stop-gap-law"), "pull": case("h1b-knee-stop-unilateral")}
 """By the release rule: at d = 0 (the torque may pull just before), or as the torque would pull."""
 SIZES = ("m1", "m2", "L1", "L2", "g")
 

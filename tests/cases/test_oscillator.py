@@ -17,14 +17,14 @@ from tests.problems import case
 
 I1, I2, I3, I4 = (
     case(name)
-    for name in ("i1-spectral-properties", "i2-asymptotic-coefficients", "i3-seed-hht-beta", "i4-discrete-exactness")
+    for name in ("i1-spectral-properties", "i2-asymptotic-coefficients", "i3-hht-beta", "i4-discrete-exactness")
 )
 
 SCHEMES: dict[str, NewmarkFamily] = {
     "Newmark trapezoidal (beta 1/4, gamma 1/2)": mbd.Newmark(start="consistent"),
     "Newmark linear acceleration (1/6, 1/2)": mbd.Newmark(beta=1 / 6, gamma=0.5, start="consistent"),
     "Newmark damped (0.3025, 0.6)": mbd.Newmark(beta=0.3025, gamma=0.6, start="consistent"),
-    "HHT alpha = 0.05 (seed text)": mbd.HHT(alpha=0.05, start="consistent"),
+    "HHT alpha = 0.05 (chapter text)": mbd.HHT(alpha=0.05, start="consistent"),
     "HHT alpha = 1/3": mbd.HHT(alpha=1 / 3, start="consistent"),
     "HHT alpha = 0.1": mbd.HHT(alpha=0.1, start="consistent"),
     "HHT alpha = 0.3": mbd.HHT(alpha=0.3, start="consistent"),
