@@ -5,6 +5,7 @@ from __future__ import annotations
 import platform
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
+from importlib.util import find_spec
 from typing import Any, Literal
 
 from mbd.assembly import named_numbers
@@ -125,6 +126,8 @@ def _bar(progress: Any, begin: float, end: float) -> Callable[[float, float], No
         return None
     if callable(progress):
         return progress  # type: ignore[no-any-return]
+    if find_spec("tqdm") is None:
+        return None
     from tqdm import tqdm
 
     bar = tqdm(
