@@ -11,7 +11,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from benchmarks import compiling, counts, gait, startup, steps
+from benchmarks import compiling, counts, gait, startup, steps, watching
 from benchmarks.figures import Figure
 from benchmarks.handwritten import FLAGS, compiler, compiler_version
 
@@ -19,7 +19,7 @@ __all__ = ["BASELINE", "GROUPS", "RESULTS", "Record", "measure"]
 
 HERE = Path(__file__).parent
 BASELINE, RESULTS = HERE / "baseline.json", HERE / "results.json"
-GROUPS = ("counts", "steps", "gait", "compiling", "startup")
+GROUPS = ("counts", "steps", "watching", "gait", "compiling", "startup")
 C_STEP = "step, compass, 4 dof + 2 rows, index 3"
 
 
@@ -54,6 +54,8 @@ def measure(repeats: int, groups: Iterable[str] = GROUPS) -> Record:
         reference = next(figure.reference for figure in stepped if figure.name == C_STEP)
         figures += stepped if "steps" in groups else []
         figures += gait.measure(repeats, reference) if "gait" in groups else []
+    if "watching" in groups:
+        figures += watching.measure(repeats)
     if "compiling" in groups:
         figures += compiling.measure(repeats)
     if "startup" in groups:
