@@ -34,7 +34,7 @@ from mbd.kernel.fields import (
     SWITCHES,
     WATCH,
 )  # fmt: skip
-from mbd.kernel.guards import judge, try_step, update_armed, update_sides, watch
+from mbd.kernel.guards import is_quiet, judge, try_step, update_armed, update_sides, watch
 from mbd.kernel.hooks import scheme_accept, scheme_start
 from mbd.kernel.locate import locate
 from mbd.kernel.redundancy import find_dependent, spread
@@ -141,14 +141,15 @@ def still_dependent(K: Any, t1: float) -> bool:
     return True
 
 
-def accept(K: Any, h: float, t1: float) -> None:
+def accept(K: Any, h: float, t1: float, quiet: bool) -> None:
     """The candidate becomes the accepted state; guards follow."""
     scheme_accept(K, h)
     K.clock[NOW] = t1
     for i in range(4 * K.n_contacts + 2 * K.n_guards):
         K.guards0[i] = K.guards1[i]
-    update_armed(K)
-    update_sides(K)
+    if not quiet:
+        update_armed(K)
+        update_sides(K)
 
 
 def project_velocity(K: Any) -> int:
@@ -282,7 +283,8 @@ def advance(K: Any) -> int:
         K.counts[STEPS] += 1
         holds = K.state[N_DROPPED] == 0 or still_dependent(K, t1)
         fired = False
-        if K.n_contacts + K.n_guards > 0:
+        quiet = is_quiet(K)
+        if not quiet:
             for c in range(K.n_contacts + K.n_guards):
                 K.active[c] = 0
             if judge(K, h):
@@ -310,7 +312,7 @@ def advance(K: Any) -> int:
             take_over(K, t1)
             K.state[RESTART] = 2
         else:
-            accept(K, h, t1)
+            accept(K, h, t1, quiet)
             K.state[GRID] += 1
             if h < full:
                 K.clock[BASE] = t1

@@ -32,6 +32,10 @@ __all__ = [
 ]  # fmt: skip
 
 
+APART = 1e-6
+"""Gap [m, rad] above which a contact is clearly open."""
+
+
 def watch(K: Any, t: float, q: Any, y: Any, rate: Any, lam: Any, values: Any) -> None:
     """Gaps, gap rates, penalty forces, conditions and user guards at a state."""
     fill_block(K, t, q, y)
@@ -176,6 +180,21 @@ def crossing(value0: float, value1: float) -> float:
     if change == 0.0:
         return 0.5
     return min(max(value0 / change, 0.0), 1.0)
+
+
+def is_quiet(K: Any) -> bool:
+    """Whether no guard can have fired: every contact open, armed, always watched and clearly apart."""
+    if K.n_guards > 0:
+        return False
+    nC = K.n_contacts
+    for c in range(nC):
+        if K.closed[c] != 0 or K.armed[c] != 1 or K.while_kind[c] != 0:
+            return False
+        if not (K.guards0[c] > APART and K.guards1[c] > APART):
+            return False
+        if K.guards0[nC + c] < 0.0 < K.guards1[nC + c]:
+            return False
+    return True
 
 
 def judge(K: Any, h: float) -> bool:
