@@ -32,8 +32,9 @@ def explanation(
         return f"{where}: {what}{with_closed}; nothing after the last accepted step is kept"
     if status == F.NOT_CONVERGED and residual <= 1.0:
         return (
-            f"{where}: next to a pose in which rows lose rank{with_closed}, every step down to a tenth of dt leaves "
-            "the branch that is continuous in velocity; try another dt, or formulation='index3' with a damped scheme"
+            f"{where}: steps fail or leave the branch that is continuous in velocity, down to a tenth of dt{with_closed}: "
+            "next to a pose in which rows lose rank, or in a force too steep for dt; try a smaller dt, or, at such a "
+            "pose, formulation='index3' with a damped scheme"
         )
     if status == F.NOT_CONVERGED:
         own = f" ({stepper.scheme.report.message})" if not stepper.compiled and stepper.scheme.report.message else ""
