@@ -32,7 +32,7 @@ def explanation(
         return f"{where}: {what}{with_closed}; nothing after the last accepted step is kept"
     if status == F.NOT_CONVERGED and residual <= 1.0:
         return (
-            f"{where}: steps fail or leave the branch that is continuous in velocity, down to a tenth of dt{with_closed}: "
+            f"{where}: steps fail or leave the branch continuous in velocity, down to a tenth of dt{with_closed}: "
             "next to a pose in which rows lose rank, or in a force too steep for dt; try a smaller dt, or, at such a "
             "pose, formulation='index3' with a damped scheme"
         )
