@@ -1,0 +1,1 @@
+"""Scenes on which multibody systems fail, often silently: definitions, references, and what must hold."""
