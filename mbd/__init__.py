@@ -75,6 +75,7 @@ if TYPE_CHECKING:
     from mbd.joints.losses import (
         Coulomb as Coulomb,
         Dissipation as Dissipation,
+        PinFriction as PinFriction,
         Quadratic as Quadratic,
         Tabulated as Tabulated,
         Viscous as Viscous,
@@ -116,7 +117,7 @@ _HOMES = {
     "mbd.forces": "Applied Damper Motor Potential Samples Spring TorsionSpring",
     "mbd.integrators": "HHT GeneralizedAlpha Newmark",
     "mbd.joints": "Cylindrical Planar Prismatic Revolute Screw Translation Universal Weld",
-    "mbd.joints.losses": "Coulomb Dissipation Quadratic Tabulated Viscous",
+    "mbd.joints.losses": "Coulomb Dissipation PinFriction Quadratic Tabulated Viscous",
     "mbd.model": "Model on_slope",
     "mbd.simulation.simulate": "simulate",
     "mbd.state": "State",

@@ -2,7 +2,7 @@
 
 Every compiled function has one signature, ``f(block, parameters, out)``, three arrays of float64:
 
-block       ``[t, c_C, c_K | q | x | v, z | a, ż | λ | anchors | switches]``
+block       ``[t, c_C, c_K | q | x | v, z | a, ż | λ | anchors | switches | slips]``
 parameters  ``[p | tables]``
 out         whatever the program lists
 """
@@ -20,7 +20,7 @@ __all__ = ["Layout"]
 class Layout:
     """Offsets into the block; (v, z) and (a, ż) stand together, as the integrators treat them alike.
 
-    q, x, v, a, lam, anchor, switch : where each part begins; size : numbers in the block
+    q, x, v, a, lam, anchor, switch, slip : where each part begins; size : numbers in the block
     """
 
     n_q: int
@@ -31,6 +31,7 @@ class Layout:
     n_contacts: int
     n_parameters: int
     table_offsets: tuple[int, ...] = ()
+    n_frictions: int = 0
 
     @classmethod
     def of(cls, equations: Equations) -> Layout:
@@ -42,7 +43,7 @@ class Layout:
         anchors = sum(len(contact.anchors) for contact in equations.contacts)
         return cls(
             equations.n_q, equations.n_v, equations.n_z, len(equations.rows), anchors, len(equations.contacts),
-            len(equations.parameters), tuple(offsets),
+            len(equations.parameters), tuple(offsets), len(equations.frictions),
         )  # fmt: skip
 
     @property
@@ -79,13 +80,17 @@ class Layout:
         return self.anchor + self.n_anchors
 
     @property
-    def size(self) -> int:
+    def slip(self) -> int:
         return self.switch + self.n_contacts
+
+    @property
+    def size(self) -> int:
+        return self.slip + self.n_frictions
 
     def place(self, kind: str, index: int) -> int:
         """Offset of an input in the block."""
         starts = {
             "t": 0, "c": 1, "q": self.q, "x": self.x, "v": self.v, "z": self.v + self.n_v, "a": self.a,
-            "s": self.a + self.n_v, "lam": self.lam, "anchor": self.anchor, "switch": self.switch,
+            "s": self.a + self.n_v, "lam": self.lam, "anchor": self.anchor, "switch": self.switch, "slip": self.slip,
         }  # fmt: skip
         return starts[kind] + index

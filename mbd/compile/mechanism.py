@@ -25,6 +25,7 @@ class ModeCode:
 
     rows: tuple[int, ...]
     penalties: tuple[int, ...]
+    sliding: tuple[int, ...]
     tangent: Any
     residual: Any
 
@@ -72,23 +73,25 @@ class Mechanism:
         self.vector = composed is None
         self.named: dict[str, Any] = {}
         self.notes: list[str] = []
-        self._modes: dict[tuple[tuple[int, ...], tuple[int, ...], bool], ModeCode] = {}
+        self._modes: dict[tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...], bool], ModeCode] = {}
         self.seconds = perf_counter() - started
 
-    def mode(self, rows: Sequence[int], penalties: Sequence[int], stabilized: bool) -> ModeCode:
-        """Code of the mode with these rows and penalty contacts, made on first use."""
-        key = (tuple(rows), tuple(penalties), stabilized)
+    def mode(
+        self, rows: Sequence[int], penalties: Sequence[int], stabilized: bool, sliding: Sequence[int] = ()
+    ) -> ModeCode:
+        """Code of the mode with these rows, penalty contacts and sliding frictions, made on first use."""
+        key = (tuple(rows), tuple(penalties), tuple(sliding), stabilized)
         with self.equations.tape.lock:  # runs in other threads share this mechanism
             if key not in self._modes:
                 started = perf_counter()
                 tangent, residual = f"tangent_{len(self._modes)}", f"residual_{len(self._modes)}"
                 self.common.add(
                     {
-                        tangent: programs.newton(self.equations, rows, penalties, stabilized),
-                        residual: programs.residual(self.equations, rows, penalties, stabilized),
+                        tangent: programs.newton(self.equations, rows, penalties, stabilized, sliding),
+                        residual: programs.residual(self.equations, rows, penalties, stabilized, sliding),
                     }
                 )
-                self._modes[key] = ModeCode(key[0], key[1], self.common[tangent], self.common[residual])
+                self._modes[key] = ModeCode(key[0], key[1], key[2], self.common[tangent], self.common[residual])
                 self.seconds += perf_counter() - started
             return self._modes[key]
 
@@ -135,15 +138,28 @@ class Mechanism:
         return block
 
     def acceleration_terms(
-        self, t: float, q: Vector, y: Vector, parameters: Vector, anchors: Vector, penalties: Sequence[int] = ()
+        self,
+        t: float,
+        q: Vector,
+        y: Vector,
+        parameters: Vector,
+        anchors: Vector,
+        penalties: Sequence[int] = (),
+        slips: Vector | None = None,
+        lam: Vector | None = None,
     ) -> AccelerationTerms:
-        """M, f, R, B, h, ḣ, bias at a state."""
+        """M, f, R, B, h, ḣ, bias at a state; R follows multipliers `lam` where frictions slide (signs `slips`)."""
         layout = self.layout
         n, rows = layout.n, layout.n_rows
         out = np.zeros(self.sizes["accelerations"])
-        self.common["accelerations"](self.block(t, q, y, anchors, penalties), parameters, out)
-        cuts = np.cumsum([n * n, n, n * rows, rows * n, rows, rows, rows, layout.n_anchors])
-        M, f, R, B, h, rate, bias, captured, kinetic = np.split(out, cuts)
+        block = self.block(t, q, y, anchors, penalties)
+        if slips is not None:
+            block[layout.slip : layout.size] = slips
+        if lam is not None:
+            block[layout.lam : layout.anchor] = lam
+        self.common["accelerations"](block, parameters, out)
+        cuts = np.cumsum([n * n, n, n * rows, rows * n, rows, rows, rows, layout.n_anchors, 1])
+        M, f, R, B, h, rate, bias, captured, kinetic, _ = np.split(out, cuts)
         return AccelerationTerms(
             M.reshape(n, n), f, R.reshape(n, rows), B.reshape(rows, n), h, rate, bias, captured, float(kinetic[0])
         )
@@ -154,8 +170,8 @@ class Mechanism:
         layout = self.layout
         n, rows = layout.n, layout.n_rows
         return {
-            "accelerations": n * n + n + 2 * n * rows + 3 * rows + layout.n_anchors + 1,
-            "guards": 4 * layout.n_contacts + 2 * len(self.equations.guards),
+            "accelerations": n * n + n + 2 * n * rows + 3 * rows + layout.n_anchors + 1 + layout.n_frictions,
+            "guards": 4 * layout.n_contacts + 2 * len(self.equations.guards) + 3 * layout.n_frictions,
             "scales": n + 2 * rows,
             "compose": layout.n_q,
         }

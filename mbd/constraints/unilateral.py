@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from mbd.bodies.values import name_of, number
 from mbd.constraints.base import Constraint, Measure
 from mbd.constraints.rules import When, condition_of, releases_of
-from mbd.errors import CapabilityError, ModelError
+from mbd.errors import ModelError
 from mbd.forces.quantities import Mention
 
 __all__ = ["Unilateral"]
@@ -25,7 +25,8 @@ class Unilateral(Constraint):
     name : its name
     measure : where
     restitution : e of Newton's law, 0 (plastic) to 1
-    friction : None: it sticks where the measure has tangents; 0: it slides freely
+    friction : None: it sticks where the measure has tangents; 0: it slides freely; μ > 0: Coulomb's law,
+        ``|λ_T| ≤ μ p``, it sticks, slips and turns around in the one direction of a planar model
     release : `When` another contact closes (or several of them), instead of on pull
     only_while : name of a contact that must be closed, or a measure that must be positive, for this one to be watched
     """
@@ -44,11 +45,6 @@ class Unilateral(Constraint):
         put(self, "restitution", number(self.restitution, f"restitution of '{self.name}'"))
         if self.friction is not None:
             put(self, "friction", number(self.friction, f"friction of '{self.name}'"))
-            if self.friction > 0.0:
-                raise CapabilityError(
-                    f"Unilateral '{self.name}': sliding with a friction coefficient ({self.friction:g}) is not solved "
-                    "by this version; use friction=None (it sticks) or friction=0 (it slides freely)"
-                )
         put(self, "release", releases_of(self.release, self.name) or None)
         put(self, "only_while", condition_of(self.only_while, self.name))
 
@@ -73,6 +69,15 @@ class Unilateral(Constraint):
         return self.friction is None and self.measure.has_tangents
 
     @property
+    def slides(self) -> bool:
+        """Whether Coulomb friction resists its sliding."""
+        return self.friction is not None and self.friction > 0.0
+
+    def parameters(self) -> dict[str, float]:
+        """'<name>.mu' where it slides with friction."""
+        return {f"{self.name}.mu": self.friction} if self.friction is not None and self.friction > 0.0 else {}
+
+    @property
     def others(self) -> tuple[str, ...]:
         """The contacts of its rules."""
         names = [rule.other for rule in self.releases]
@@ -90,6 +95,11 @@ class Unilateral(Constraint):
             faults.append(f"'{self.name}': restitution {self.restitution:g} is not between 0 and 1")
         if self.friction is not None and self.friction < 0.0:
             faults.append(f"'{self.name}': friction {self.friction:g} is negative; give 0, or None to stick")
+        if self.slides and not self.measure.has_tangents:
+            faults.append(
+                f"'{self.name}': friction {self.friction:g} on a {self.measure.title}, which has no direction to slide "
+                "in; use mbd.touchdown, give mbd.measure(…, tangents=…), or friction=0"
+            )
         if any(rule.other == self.name for rule in self.releases):
             faults.append(f"'{self.name}': release=When('{self.name}') names itself; name the contact that opens it")
         if self.only_while == self.name:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from mbd.constraints.base import Measure, VelocityConstraint
 from mbd.constraints.bilateral import Bilateral
@@ -12,11 +12,12 @@ from mbd.constraints.penalty import Penalty
 from mbd.constraints.unilateral import Unilateral
 from mbd.equations.dynamics import Dynamics, Work
 from mbd.equations.effects import penalty_effect
-from mbd.equations.equations import Contact, Effect, Guard, Row
+from mbd.equations.equations import Contact, Effect, Friction, Guard, Row
 from mbd.equations.surroundings import Surroundings
-from mbd.joints.base import row_unit
-from mbd.tape.derivatives import gradient, live
+from mbd.joints.base import Joint, row_unit
+from mbd.tape.derivatives import gradient, live, substitute
 from mbd.tape.evaluate import evaluate
+from mbd.tape.functions import sqrt
 from mbd.tape.node import Node, Scalar
 
 __all__ = ["Laws", "laws"]
@@ -31,6 +32,7 @@ class Laws:
 
     viewed : the values of `rows`, the rates of those on velocities, in views
     penalties : (number, gap, force) of penalty contacts in views
+    sliding : the sliding velocities of `frictions` in views
     """
 
     rows: list[Row] = field(default_factory=list)
@@ -38,6 +40,8 @@ class Laws:
     penalties: list[tuple[int, Node, Node]] = field(default_factory=list)
     contacts: list[Contact] = field(default_factory=list)
     guards: list[Guard] = field(default_factory=list)
+    frictions: list[Friction] = field(default_factory=list)
+    sliding: list[Node] = field(default_factory=list)
     effects: list[Effect] = field(default_factory=list)
     faults: list[str] = field(default_factory=list)
 
@@ -45,11 +49,12 @@ class Laws:
 def laws(
     scope: Surroundings,
     dynamics: Dynamics,
+    joints: Sequence[Joint],
     bilaterals: Sequence[Bilateral | VelocityConstraint],
     contacts: Sequence[Unilateral | Penalty],
     events: Sequence[Event],
 ) -> Laws:
-    """Cut joints, then what always acts (positions first), then contacts and events, in the order of the model."""
+    """Cut joints, what always acts (positions first), dry joints, contacts and events, in the order of the model."""
     found = Laws()
     for joint in scope.cuts:
         for part, value in scope.cut_rows(joint)[0]:
@@ -59,11 +64,13 @@ def laws(
             _velocity_rows(found, scope, constraint)
             continue
         _row(found, scope, constraint.name, "", constraint.residual(scope), unit=constraint.measure.unit)
+    for joint in joints:
+        dry_joint(found, scope, dynamics, joint)
     for number, contact in enumerate(contacts):
         if isinstance(contact, Penalty):
             _penalty(found, scope, dynamics, contact, number)
         else:
-            _unilateral(found, scope, contact, number)
+            _unilateral(found, scope, dynamics, contact, number)
     for event in events:
         found.guards.append(_guard(scope, event))
     return found
@@ -134,16 +141,19 @@ def _idle(scope: Surroundings, node: Node, title: str, kinds: set[str], unit: st
     return [] if may_fold else [f"{title} is 0 whatever the motion, so it constrains nothing; remove it"]
 
 
-def _unilateral(found: Laws, scope: Surroundings, law: Unilateral, number: int) -> None:
-    """A normal row, and tangent rows that hold the place of touchdown where it sticks."""
+def _unilateral(found: Laws, scope: Surroundings, dynamics: Dynamics, law: Unilateral, number: int) -> None:
+    """A normal row, and tangent rows that hold the place of touchdown where and while it sticks."""
     gap = scope.tape.lift(law.measure.gap(scope))
     unit = law.measure.unit
     numbers = [_row(found, scope, law.name, "normal", gap, unit=unit, contact=number)]
-    captured, anchors = _anchored(found, scope, law.measure.captured(scope) if law.sticks else ())
-    if law.sticks:
+    held_by = law.sticks or law.slides
+    captured, anchors = _anchored(found, scope, law.measure.captured(scope) if held_by else ())
+    if held_by:
         held = [scope.tape.input("anchor", k) for k in anchors]
         for part, value in law.measure.tangents(scope, held):
             numbers.append(_row(found, scope, law.name, part, value, unit="m", contact=number, may_fold=True))
+    if law.slides:
+        _sliding(found, scope, dynamics, law, numbers, dict(zip(anchors, captured, strict=True)))
     condition = law.only_while
     gap, rate = scope.views.real([gap, *scope.rates([gap])])
     found.contacts.append(
@@ -152,6 +162,71 @@ def _unilateral(found: Laws, scope: Surroundings, law: Unilateral, number: int) 
             opens_on=law.opens_on, when=tuple((rule.other, rule.after_impact) for rule in law.releases),
             only_while=scope.real(condition.gap(scope)) if isinstance(condition, Measure) else condition,
             restitution=law.restitution, unit=unit,
+        )
+    )  # fmt: skip
+
+
+def _sliding(
+    found: Laws, scope: Surroundings, dynamics: Dynamics, law: Unilateral, numbers: list[int], captured: dict[int, Node]
+) -> None:
+    """Coulomb friction along the tangent of a contact, ``|λ_T| ≤ μ p``; the direction is that at the point of now."""
+    normal, *tangents = [k for k in numbers if k >= 0]
+    if len(tangents) != 1:
+        found.faults.append(
+            f"'{law.name}': friction {law.friction:g} needs one direction of sliding, but its point can slide in "
+            f"{len(tangents)}; friction is solved in planar models: use friction=None (it sticks) or 0 in space"
+        )
+        return
+    (row,) = tangents
+    here = {scope.tape.input("anchor", k): value for k, value in captured.items()}
+    view = substitute(scope.rates([found.viewed[row]]), here)[0]
+    coefficient = scope.parameter(law.name, "mu", law.friction or 0.0)
+    limit = -(coefficient * scope.tape.input("lam", normal))
+    _friction(found, scope, dynamics, law.name, row, found.rows[row].contact, view, limit)
+
+
+def dry_joint(found: Laws, scope: Surroundings, dynamics: Dynamics, joint: Joint) -> None:
+    """Set-valued losses of a joint: a row on each of its rates, held while ``|λ| ≤ limit``."""
+    rates: Sequence[Scalar] | None = None
+    for place, owner, loss in joint.losses():
+        load = _pin_load(found, scope, joint) if loss.needs_reaction else 0.0
+        limit = loss.dry(load, scope, owner)
+        if (isinstance(limit, float) and limit == 0.0) or (isinstance(limit, Node) and limit.is_zero):
+            continue
+        rates = scope.joint(joint.name).rates if rates is None else rates
+        view = scope.tape.lift(rates[place])
+        name = joint.name if len(joint.labels) == 1 else f"{joint.name}.{joint.labels[place].name}"
+        unit = joint.labels[place].unit
+        found.rows.append(Row(name, "dry", scope.tape.zero, scope.real(view), unit=unit, kind="velocity"))
+        found.viewed.append(view)
+        _friction(found, scope, dynamics, name, len(found.rows) - 1, -1, view, scope.tape.lift(limit))
+
+
+def _pin_load(found: Laws, scope: Surroundings, joint: Joint) -> Node:
+    """Resultant of the reaction at a cut joint [N]; rounded below 1e-9 N, where it has no direction."""
+    square = scope.tape.lift(1e-18)
+    for k, row in enumerate(found.rows):
+        if row.owner == joint.name and row.contact < 0 and row.unit == "m" and not row.is_velocity:
+            square = square + scope.tape.input("lam", k) * scope.tape.input("lam", k)
+    return scope.tape.lift(sqrt(square))
+
+
+def _friction(
+    found: Laws, scope: Surroundings, dynamics: Dynamics, name: str, row: int, contact: int, view: Node, limit: Node
+) -> None:
+    """A direction of dry friction, its row marked as held by it, and its loss as an effect."""
+    number = len(found.frictions)
+    rate = scope.real(view)
+    found.rows[row] = replace(found.rows[row], friction=number)
+    found.frictions.append(Friction(name, row, contact, rate, scope.change(view), limit))
+    found.sliding.append(view)
+    multiplier = scope.tape.input("lam", row)
+    work = Work()
+    work.on_velocity(view, multiplier)
+    found.effects.append(
+        Effect(
+            f"{name} friction", "loss",
+            lambda: (*dynamics.generalized(work), *[scope.tape.zero] * len(scope.states)), -(multiplier * rate),
         )
     )  # fmt: skip
 

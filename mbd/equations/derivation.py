@@ -58,7 +58,8 @@ def _derived(model: Model, plan: Plan) -> Equations:
     found = causes(scope, (*plan.edges, *plan.cut), model.forces)
     work = sum((cause.work for cause in found), Work())
     rests = _state_balance(scope, found)
-    constraints = laws(scope, dynamics, [*model.bilaterals, *model.nonholonomic], model.contacts, model.events)
+    joints = (*plan.edges, *plan.cut)
+    constraints = laws(scope, dynamics, joints, [*model.bilaterals, *model.nonholonomic], model.contacts, model.events)
     if constraints.faults:
         raise ModelError(constraints.faults)
     weight = weight_of(scope, dynamics)
@@ -78,6 +79,7 @@ def _derived(model: Model, plan: Plan) -> Equations:
         output=outputs, output_names=outputs.names,
         velocity_names=tuple(f"{coordinate.name}.rate" for coordinate in scope.coordinates), notes=plan.notes,
         figure=figure_of(model), geometry=TreeGeometry(scope, dynamics, work, rests, constraints),
+        frictions=tuple(constraints.frictions),
     )  # fmt: skip
     whole = work + _closed(scope, constraints)
     offer_results(outputs, scope, dynamics, whole, equations, model, {joint.name for joint in plan.floating})
@@ -88,6 +90,9 @@ def _closed(scope: Surroundings, constraints: Laws) -> Work:
     """The work of every row, and of every penalty contact behind its switch."""
     work = Work()
     for k, (row, view) in enumerate(zip(constraints.rows, constraints.viewed, strict=True)):
+        if row.friction >= 0:  # λ_T along the direction of now, not along that at the anchor
+            work.on_velocity(constraints.sliding[row.friction], scope.tape.input("lam", k))
+            continue
         act = work.on_velocity if row.is_velocity else work.on_value
         act(view, scope.tape.input("lam", k))
     for number, gap, force in constraints.penalties:
@@ -126,6 +131,7 @@ class TreeGeometry:
         rows = list(zip(laws.rows, laws.viewed, strict=True))
         viewed = {row.value.index: view for row, view in rows if not row.is_velocity}
         moving = {row.rate.index: view for row, view in rows if row.is_velocity}
+        moving |= {f.rate.index: view for f, view in zip(laws.frictions, laws.sliding, strict=True)}
         viewed |= {laws.contacts[number].gap.index: gap for number, gap, _ in laws.penalties}
         work = Work(
             [viewed.get(value.index, value) for value in values], list(multipliers),

@@ -11,6 +11,7 @@ Inputs on the tape, as (kind, index)
     ('lam', k)     multiplier of row k of `rows`
     ('anchor', k)  value held since a contact closed (point of touchdown, approach speed)
     ('switch', c)  1.0 while penalty contact number c acts, else 0.0
+    ('slip', k)    sign of the sliding of friction k, 0.0 while it sticks or its contact is open
     ('p', k)       parameter k
 """
 
@@ -22,7 +23,7 @@ from typing import Any, Literal, Protocol
 
 from mbd.tape.node import Node, Table, Tape
 
-__all__ = ["Contact", "Coordinate", "Effect", "Equations", "Geometry", "Guard", "Parameter", "Row"]
+__all__ = ["Contact", "Coordinate", "Effect", "Equations", "Friction", "Geometry", "Guard", "Parameter", "Row"]
 
 
 @dataclass(frozen=True)
@@ -51,6 +52,7 @@ class Row:
     contact : number of the contact it belongs to, −1 for bilateral rows
     unit : of h, 'm' or 'rad'; that of the rate times seconds for a row on velocities
     kind : 'position', B = ∂h/∂q; or 'velocity', B = ∂rate/∂v, which need not come from a position
+    friction : number of the dry friction that holds it only while it sticks, −1 otherwise
     """
 
     owner: str
@@ -60,6 +62,7 @@ class Row:
     contact: int = -1
     unit: str = "m"
     kind: Literal["position", "velocity"] = "position"
+    friction: int = -1
 
     @property
     def is_velocity(self) -> bool:
@@ -102,6 +105,27 @@ class Contact:
     only_while: Node | str | None = None
     restitution: float = 0.0
     unit: str = "m"
+
+
+@dataclass(frozen=True)
+class Friction:
+    """Dry friction along one direction, ``|λ_T| ≤ limit`` while γ = 0 and ``λ_T = limit · sign γ`` while it slides.
+
+    The mechanism feels −λ_T along γ. It sticks by its row, whose multiplier is λ_T; while it slides the row is off.
+
+    name : the contact or the joint
+    row : the row that holds γ = 0 while it sticks
+    contact : the contact whose normal force it follows, −1 if it always acts
+    rate : γ on the tape; change : γ̇, with accelerations
+    limit : of multipliers and parameters, homogeneous of degree one in the multipliers but for a constant
+    """
+
+    name: str
+    row: int
+    contact: int
+    rate: Node
+    change: Node
+    limit: Node
 
 
 @dataclass(frozen=True)
@@ -186,6 +210,7 @@ class Equations:
     notes: tuple[str, ...] = ()
     figure: Callable[[], Any] | None = field(default=None, repr=False)
     geometry: Geometry | None = field(default=None, repr=False)
+    frictions: tuple[Friction, ...] = ()
 
     @property
     def n_q(self) -> int:
@@ -206,4 +231,4 @@ class Equations:
     @property
     def bilateral(self) -> tuple[int, ...]:
         """Numbers of the rows that are always active."""
-        return tuple(k for k, row in enumerate(self.rows) if row.contact < 0)
+        return tuple(k for k, row in enumerate(self.rows) if row.contact < 0 and row.friction < 0)

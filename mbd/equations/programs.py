@@ -5,8 +5,9 @@ With N = n_v + n_z rates, m active rows in ascending number, R rows and nC conta
 =================  ==================================================================================
 `newton`           K ((N+m) × (N+m), row-major) | r (N) | h (m) | ḣ (m) | ∂ḣ/∂x (m × n_v), both stabilized only
 `residual`         r (N) | h (m) | ḣ (m, stabilized only)
-`accelerations`    M (N × N) | f (N) | ∂r/∂λ (N × R) | B (R × N) | h (R) | ḣ (R) | γ (R) | captured | T
-`guards`           g (nC) | ġ (nC) | penalty force (nC) | only_while (nC) | event values | event rates
+`accelerations`    M (N × N) | f (N) | ∂r/∂λ (N × R) | B (R × N) | h (R) | ḣ (R) | γ (R) | captured | T | limits
+`guards`           g (nC) | ġ (nC) | penalty force (nC) | only_while (nC) | event values | event rates |
+                   sliding velocity | its rate | limit of each friction
 `scales`           magnitudes of r (N) | of h (R) | of ḣ (R), term by term before cancellation
 `compose`          q ⊕ x, or None where it is q + x
 =================  ==================================================================================
@@ -33,7 +34,9 @@ __all__ = [
 ]  # fmt: skip
 
 
-def newton(equations: Equations, rows: Sequence[int], penalties: Sequence[int], stabilized: bool) -> list[Node]:
+def newton(
+    equations: Equations, rows: Sequence[int], penalties: Sequence[int], stabilized: bool, sliding: Sequence[int] = ()
+) -> list[Node]:
     """Tangent and residual of one Newton iteration of the Newmark family.
 
     ``K = [S  ∂r/∂λ; B̃  0]`` with ``S = M + c_C C_t + c_K K_t`` from one forward sweep a column, and
@@ -42,7 +45,7 @@ def newton(equations: Equations, rows: Sequence[int], penalties: Sequence[int], 
     """
     inputs = Inputs.of(equations)
     rows = sorted(rows)
-    r = balance_with(equations, rows, penalties)
+    r = balance_with(equations, rows, penalties, sliding)
     B = constraint_jacobian(equations, rows)
     bottom, turning = list(B), list[Node]()
     fast = [place for place, k in enumerate(rows) if stabilized or equations.rows[k].is_velocity]
@@ -64,10 +67,12 @@ def newton(equations: Equations, rows: Sequence[int], penalties: Sequence[int], 
     return out + r + _levels(equations, rows, stabilized) + turning
 
 
-def residual(equations: Equations, rows: Sequence[int], penalties: Sequence[int], stabilized: bool) -> list[Node]:
+def residual(
+    equations: Equations, rows: Sequence[int], penalties: Sequence[int], stabilized: bool, sliding: Sequence[int] = ()
+) -> list[Node]:
     """r | h | ḣ of one contact mode."""
     rows = sorted(rows)
-    return balance_with(equations, rows, penalties) + _levels(equations, rows, stabilized)
+    return balance_with(equations, rows, penalties, sliding) + _levels(equations, rows, stabilized)
 
 
 def _levels(equations: Equations, rows: Sequence[int], stabilized: bool) -> list[Node]:
@@ -100,7 +105,7 @@ def accelerations(equations: Equations) -> list[Node]:
     out += [entry for line in B for entry in [*line, *padding]]
     out += [row.value for row in equations.rows] + hv + _time_rates(equations, hv)
     out += [value for contact in equations.contacts for value in contact.captured]
-    return [*out, equations.kinetic]
+    return [*out, equations.kinetic, *(friction.limit for friction in equations.frictions)]
 
 
 def guards(equations: Equations) -> list[Node]:
@@ -109,7 +114,10 @@ def guards(equations: Equations) -> list[Node]:
     out = [contact.gap for contact in contacts] + [contact.gap_rate for contact in contacts]
     out += [tape.zero if contact.force is None else contact.force for contact in contacts]
     out += [contact.only_while if isinstance(contact.only_while, Node) else tape.one for contact in contacts]
-    return out + [guard.value for guard in equations.guards] + [guard.rate for guard in equations.guards]
+    out += [guard.value for guard in equations.guards] + [guard.rate for guard in equations.guards]
+    frictions = equations.frictions
+    out += [friction.rate for friction in frictions] + [friction.change for friction in frictions]
+    return out + [friction.limit for friction in frictions]
 
 
 def scales(equations: Equations) -> list[Node]:
@@ -126,29 +134,39 @@ def compose(equations: Equations) -> list[Node] | None:
 
 
 # parts --------------------------------------------------------------------------------------------------------------
-def balance_with(equations: Equations, rows: Iterable[int], penalties: Iterable[int]) -> list[Node]:
-    """``r = M a + f + Bᵀλ`` with these rows active and these penalty contacts acting."""
-    return _balance(equations, rows, [(c, equations.tape.one) for c in penalties])
+def balance_with(
+    equations: Equations, rows: Iterable[int], penalties: Iterable[int], sliding: Iterable[int] = ()
+) -> list[Node]:
+    """``r = M a + f + Bᵀλ`` with these rows active, these penalty contacts acting and these frictions sliding."""
+    return _balance(equations, rows, [(c, equations.tape.one) for c in penalties], sliding)
 
 
 def _switched_balance(equations: Equations) -> list[Node]:
-    """r with every row, and every penalty behind its switch."""
+    """r with every row, every penalty behind its switch and every friction behind its slip."""
     switches = [(c, equations.tape.input("switch", c)) for c in range(len(equations.contacts))]
-    return _balance(equations, range(len(equations.rows)), switches)
+    return _balance(equations, range(len(equations.rows)), switches, range(len(equations.frictions)))
 
 
-def _balance(equations: Equations, rows: Iterable[int], penalties: Iterable[tuple[int, Node]]) -> list[Node]:
-    """balance + Σ λ_k ∂h_k/∂x − Σ switch_c F_c ∂g_c/∂x; of rows on velocities λ_k ∂rate_k/∂v."""
+def _balance(
+    equations: Equations, rows: Iterable[int], penalties: Iterable[tuple[int, Node]], sliding: Iterable[int]
+) -> list[Node]:
+    """balance + Σ λ_k ∂h_k/∂x − Σ switch_c F_c ∂g_c/∂x + Σ slip_k limit_k ∂γ_k/∂v.
+
+    Of rows on velocities λ_k ∂rate_k/∂v.
+    """
     inputs = Inputs.of(equations)
     rows = list(rows)
     work = [(equations.rows[k].value, inputs.lam[k]) for k in rows if not equations.rows[k].is_velocity]
     fast = [k for k in rows if equations.rows[k].is_velocity]
     rates, forces = [equations.rows[k].rate for k in fast], [inputs.lam[k] for k in fast]
+    for k in sliding:
+        rates.append(equations.frictions[k].rate)
+        forces.append(equations.tape.input("slip", k) * equations.frictions[k].limit)
     for c, switch in penalties:
         contact = equations.contacts[c]
         if contact.force is not None:
             work.append((contact.gap, -(switch * contact.force)))
-    if not work and not fast:
+    if not work and not rates:
         return list(equations.balance)
     values, multipliers = [value for value, _ in work], [multiplier for _, multiplier in work]
     if equations.geometry is not None:
@@ -207,7 +225,8 @@ def _row_forces(
 ) -> list[list[Node]]:
     """∂r/∂λ, column by column: Bᵀ, and more where forces depend on multipliers."""
     inputs = Inputs.of(equations)
-    if any(node.op == "input" and node.data[0] == "lam" for node in live(equations.balance)):
+    loaded = any(node.op == "input" and node.data[0] == "slip" for node in live(r))
+    if loaded or any(node.op == "input" and node.data[0] == "lam" for node in live(equations.balance)):
         return jvps(r, [{inputs.lam[k]: 1.0} for k in rows])
     padding = [equations.tape.zero] * equations.n_z
     return [[*line, *padding] for line in B]

@@ -84,6 +84,9 @@ def _offer_rows(outputs: Outputs, tape: Tape, rows: Sequence[Row], bilaterals: I
         if row.contact >= 0:
             continue
         multiplier = tape.input("lam", k)
+        if row.friction >= 0:
+            outputs.value(f"{row.owner}.friction", -multiplier)
+            continue
         name = f"{row.owner}.{row.part}" if row.part else row.owner
         outputs.value(f"{name}.multiplier", multiplier)
         outputs.value(f"{name}.residual", row.rate if row.is_velocity else row.value)

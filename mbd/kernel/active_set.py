@@ -32,6 +32,8 @@ class ActiveSetManager:
         self.guards: list[Guard] = []
         self._row_contact = [row.contact for row in equations.rows]
         self._row_level = [int(row.is_velocity) for row in equations.rows]
+        self._row_friction = [row.friction for row in equations.rows]
+        self.frictions = equations.frictions
         for contact in equations.contacts:
             self.register(contact)
         for guard in equations.guards:
@@ -55,9 +57,22 @@ class ActiveSetManager:
         """The closed contacts by name."""
         return Mode(frozenset(c.name for c, flag in zip(self.contacts, flags, strict=True) if flag))
 
-    def active_rows(self, flags: Sequence[int] | Integers) -> tuple[int, ...]:
-        """Numbers of the rows that act: bilateral ones and those of closed unilateral contacts, ascending."""
-        return tuple(k for k, contact in enumerate(self._row_contact) if contact < 0 or flags[contact])
+    def active_rows(
+        self, flags: Sequence[int] | Integers, sticks: Sequence[int] | Integers | None = None
+    ) -> tuple[int, ...]:
+        """Rows that act, ascending: bilateral ones, those of closed contacts and of frictions that stick.
+
+        Parameters
+        ----------
+        flags : 1 for each closed contact
+        sticks : 1 for each friction that sticks; None: none does
+        """
+        rows = zip(self._row_contact, self._row_friction, strict=True)
+        return tuple(
+            k
+            for k, (contact, friction) in enumerate(rows)
+            if (contact < 0 or flags[contact]) and (friction < 0 or (sticks is not None and sticks[friction]))
+        )
 
     def penalties(self, flags: Sequence[int] | Integers) -> tuple[int, ...]:
         """Numbers of the penalty contacts that act."""
@@ -81,7 +96,9 @@ class ActiveSetManager:
             while_target.append(number[str(contact.only_while)] if named else -1)
         normals = [contact.rows[0] if contact.rows else -1 for contact in self.contacts]
         integers = {
-            "row_contact": self._row_contact, "row_level": self._row_level,
+            "row_contact": self._row_contact, "row_level": self._row_level, "row_friction": self._row_friction,
+            "friction_row": [friction.row for friction in self.frictions],
+            "friction_contact": [friction.contact for friction in self.frictions],
             "row_normal": [int(k in normals) for k in range(len(self._row_contact))],
             "kind": [int(contact.kind == "penalty") for contact in self.contacts],
             "opens": [opens[contact.opens_on] for contact in self.contacts],

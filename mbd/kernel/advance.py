@@ -15,6 +15,8 @@ from mbd.kernel.fields import (
     INCHING,
     LAST_SWITCH,
     LOG_EVENT,
+    LOG_SLIPPED,
+    LOG_STUCK,
     LOGGED,
     MODE,
     N_DROPPED,
@@ -77,8 +79,11 @@ def is_awaited(K: Any, first: int) -> bool:
     """Whether someone waits for an event logged since the line `first`."""
     for line in range(first, K.state[LOGGED]):
         index = int(K.log[line * K.event_width + 2])
-        if int(K.log[line * K.event_width + 1]) == LOG_EVENT:
+        kind = int(K.log[line * K.event_width + 1])
+        if kind == LOG_EVENT:
             index += K.n_contacts
+        elif kind == LOG_STUCK or kind == LOG_SLIPPED:
+            index += K.n_contacts + K.n_guards
         if K.notify[index] == 1:
             return True
     return False
@@ -86,13 +91,16 @@ def is_awaited(K: Any, first: int) -> bool:
 
 def find_mode(K: Any) -> int:
     """Number of the mode of the closed contacts and dependent rows, −1 if its code is not made yet."""
-    width = K.n_contacts + K.n_rows
+    width = K.n_contacts + K.n_rows + K.n_frictions
     for mode in range(K.mode_count[0]):
         same = True
         for c in range(K.n_contacts):
             same = same and K.mode_key[mode * width + c] == K.closed[c]
         for k in range(K.n_rows):
             same = same and K.mode_key[mode * width + K.n_contacts + k] == K.dropped[k]
+        for f in range(K.n_frictions):
+            phase = 2 if K.sticks[f] == 1 else (1 if K.slip[f] != 0.0 else 0)
+            same = same and K.mode_key[mode * width + K.n_contacts + K.n_rows + f] == phase
         if same:
             return mode
     return -1
@@ -115,7 +123,7 @@ def restart(K: Any) -> int:
     K.state[MODE] = find_mode(K)
     K.clock[BASE] = K.clock[NOW]
     K.state[GRID] = 0
-    if K.n_contacts + K.n_guards > 0:
+    if K.n_watched > 0:
         watch(K, K.clock[NOW], K.q, K.y, K.rate, K.lam, K.guards0)
         update_armed(K)
     return 0
@@ -145,7 +153,7 @@ def accept(K: Any, h: float, t1: float, quiet: bool) -> None:
     """The candidate becomes the accepted state; guards follow."""
     scheme_accept(K, h)
     K.clock[NOW] = t1
-    for i in range(4 * K.n_contacts + 2 * K.n_guards):
+    for i in range(K.n_watched):
         K.guards0[i] = K.guards1[i]
     if not quiet:
         update_armed(K)
@@ -183,7 +191,7 @@ def take_over(K: Any, t1: float) -> None:
     for k in range(K.n_rows):
         K.lam[k] = K.lam1[k]
     K.clock[NOW] = t1
-    for i in range(4 * K.n_contacts + 2 * K.n_guards):
+    for i in range(K.n_watched):
         K.guards0[i] = K.guards1[i]
     if project_velocity(K) == 0 and consistent(K, t1, K.q, K.y) == 0:
         for i in range(K.n):
@@ -285,7 +293,7 @@ def advance(K: Any) -> int:
         fired = False
         quiet = is_quiet(K)
         if not quiet:
-            for c in range(K.n_contacts + K.n_guards):
+            for c in range(K.n_contacts + K.n_guards + K.n_frictions):
                 K.active[c] = 0
             if judge(K, h):
                 status = locate(K, h)

@@ -29,7 +29,10 @@ __all__ = ["MODULES", "entry", "ir_of_kernel", "object_code", "source_digest"]
 
 ENTRY = "mbd_kernel"
 
-MODULES = ("linear", "redundancy", "restart", "careful", "newmark", "guards", "locate", "switching", "advance")
+MODULES = (
+    "linear", "redundancy", "restart", "complementarity", "impact", "careful", "newmark", "guards", "locate",
+    "switching", "advance",
+)  # fmt: skip
 
 
 def source_digest() -> str:

@@ -10,8 +10,8 @@ from collections import namedtuple
 __all__ = ["FIELDS", "INTEGERS", "INTEGER_ARRAYS", "REALS", "REAL_ARRAYS", "Kernel"]
 
 INTEGERS = (
-    "n_q", "n_v", "n", "n_rows", "n_anchors", "n_contacts", "n_guards",  # sizes; n = n_v + n_z rates
-    "o_q", "o_x", "o_v", "o_a", "o_lam", "o_anchor", "o_switch",  # offsets into the block
+    "n_q", "n_v", "n", "n_rows", "n_anchors", "n_contacts", "n_guards", "n_frictions",  # sizes; n = n_v + n_z rates
+    "o_q", "o_x", "o_v", "o_a", "o_lam", "o_anchor", "o_switch", "o_slip",  # offsets into the block
     "vector",  # 1: q ⊕ x is q + x
     "stabilized",  # 1: velocity level with position correction, 0: index 3
     "jerk",  # 1: a₀ starts from the jerk, 0: a₀ = v̇₀
@@ -19,6 +19,9 @@ INTEGERS = (
     "max_iterations", "max_switches", "linear",  # linear: event instants by one linear interpolation
     "width", "capacity", "stride", "event_width", "event_capacity",  # storage
     "chunk",  # steps before control returns
+    "impact_law",  # 0 Newton, 1 Poisson, 2 sequential
+    "n_watched",  # guard values in all
+    "loaded",  # 1: a friction follows multipliers other than linearly
 )  # fmt: skip
 REALS = ("alpha_m", "alpha_f", "beta", "gamma", "tolerance", "rest_speed", "dt", "until", "end")
 REAL_ARRAYS = (
@@ -32,6 +35,8 @@ REAL_ARRAYS = (
     "turning",  # ∂ḣ/∂x of the active rows, stabilized only
     "basis", "lower", "mix",  # dependent rows as combinations of others
     "force", "bias", "jump", "impulse",  # complementarity: right-hand sides, velocity or acceleration, multipliers
+    "slip", "limit", "base_limit",  # frictions: sign of sliding, largest, at zero multipliers
+    "given", "total", "total_jump", "loads", "trial", "trial_given", "trial_jump",  # phases of an impact
     "guards0", "guards1",  # guard values at the accepted state and at the candidate
     "scale",  # magnitudes of r, h, ḣ term by term
     "deepest", "sinking",  # lowest gap of each contact while ignored; time of its first release into its surface
@@ -43,13 +48,16 @@ REAL_ARRAYS = (
 INTEGER_ARRAYS = (
     "row_contact", "row_normal",  # contact of each row; 1 for its normal row
     "row_level",  # of each row: 0 holds positions, 1 velocities only
+    "row_friction",  # friction of each row that holds only while it sticks, −1 otherwise
+    "friction_row", "friction_contact",
     "row_unit",  # 0 [m], 1 [rad], 2 other, of each row
     "unit",  # unit block of each balance component
     "kind", "opens", "normal",  # contact: 0 unilateral, 1 penalty; 0 on pull, 1 on gap, 2 by When; its normal row
     "when_start", "when_target", "when_after",  # who opens it
     "while_kind", "while_target",  # 0 always, 1 while a contact is closed, 2 while a measure is positive
     "anchor_start", "direction", "notify",
-    "closed", "armed", "touched", "active", "free", "closing",  # contacts
+    "closed", "armed", "touched", "active", "free", "closing", "parting", "trial_free",  # contacts
+    "sticks", "loose", "was",  # frictions
     "dropped",  # rows that depend on others
     "mode_key", "mode_code", "mode_count",  # known modes
     "rows", "pivots", "columns", "fired", "state", "counts",
@@ -63,8 +71,8 @@ MODE, ROWS, GRID, RESTART, STORED, LOGGED, SWITCHES, SINCE_STORE, BLOCKED, N_DRO
 # places in `counts`
 (
     STEPS, ITERATIONS, TANGENTS, RESIDUALS, FACTORIZATIONS, EVENTS, RESTARTS, IMPACTS, LOCATIONS, STAGNATIONS, CAREFUL,
-    SHORTENED,
-) = range(12)  # fmt: skip
+    SHORTENED, STRONGE,
+) = range(13)  # fmt: skip
 # places in `detail` of the sizes of velocity corrections: of the last, and of the last ordinary step
 CORRECTED, USUAL = 4, 5
 # places in `clock`
@@ -75,10 +83,11 @@ ACCELERATIONS, GUARDS, SCALES, COMPOSE = range(4)
 DONE, FULL, NEW_MODE, EVENT, PAUSE = range(5)
 (
     NOT_FINITE, NOT_CONVERGED, SINGULAR, STAGNATED, CHATTER, NO_IMPACT, DEPENDENT, CONFLICT, NO_LOCATION, ENERGY_GAIN,
-) = range(10, 20)  # fmt: skip
+    NO_FORCE,
+) = range(10, 21)  # fmt: skip
 # kinds of fired guards
-CLOSE, OPEN_PULL, OPEN_GAP, OPEN_FORCE, CROSS, WATCH, GRAZE, PRESS = range(8)
+CLOSE, OPEN_PULL, OPEN_GAP, OPEN_FORCE, CROSS, WATCH, GRAZE, PRESS, STICK, SLIP, STICK_BRIEF = range(11)
 # kinds in the log
-LOG_CLOSED, LOG_OPENED, LOG_EVENT = range(3)
+LOG_CLOSED, LOG_OPENED, LOG_EVENT, LOG_STUCK, LOG_SLIPPED = range(5)
 EPS = 2.220446049250313e-16
 """Distance from 1 to the next double, as a literal for numba [-]."""

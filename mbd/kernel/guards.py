@@ -21,14 +21,17 @@ from mbd.kernel.fields import (
     OPEN_GAP,
     OPEN_PULL,
     PRESS,
+    SLIP,
+    STICK,
+    STICK_BRIEF,
     WATCH,
 )  # fmt: skip
 from mbd.kernel.hooks import call, scheme_step
-from mbd.kernel.restart import compose, consistent, fill_block
+from mbd.kernel.restart import compose, consistent, evaluate_loaded, fill_block, limit_of
 
 __all__ = [
-    "gap_scale", "gap_tolerance", "guard_value", "is_watched", "judge", "try_step", "update_armed", "update_sides",
-    "watch",
+    "frictions_at", "gap_scale", "gap_tolerance", "guard_value", "is_watched", "judge", "try_step", "update_armed",
+    "update_sides", "watch",
 ]  # fmt: skip
 
 
@@ -72,19 +75,27 @@ def try_step(K: Any, h: float, t1: float) -> int:
         for k in range(K.n_rows):
             K.lam1[k] = K.impulse[k]
             K.block[K.o_lam + k] = K.impulse[k]
-    if K.n_contacts + K.n_guards > 0:
+    if K.n_watched > 0:
         for i in range(K.n_q):
             K.block[K.o_q + i] = K.q1[i]
         for i in range(K.n_v):
             K.block[K.o_x + i] = 0.0
         call(K, GUARDS, K.guards1)
         finite = 0.0
-        for i in range(4 * K.n_contacts + 2 * K.n_guards):
+        for i in range(K.n_watched):
             finite += abs(K.guards1[i])
         if not finite < 1e300:
             K.detail[0] = t1
             return NOT_FINITE
+        for f in range(K.n_frictions):
+            if K.slip[f] != 0.0:
+                K.lam1[K.friction_row[f]] = K.slip[f] * K.guards1[frictions_at(K) + 2 * K.n_frictions + f]
     return 0
+
+
+def frictions_at(K: Any) -> int:
+    """Where the sliding velocities begin among the guard values; their rates and the limits follow."""
+    return int(4 * K.n_contacts + 2 * K.n_guards)
 
 
 def is_watched(K: Any, c: int, values: Any) -> bool:
@@ -184,7 +195,7 @@ def crossing(value0: float, value1: float) -> float:
 
 def is_quiet(K: Any) -> bool:
     """Whether no guard can have fired: every contact open, armed, always watched and clearly apart."""
-    if K.n_guards > 0:
+    if K.n_guards + K.n_frictions > 0:
         return False
     nC = K.n_contacts
     for c in range(nC):
@@ -246,6 +257,8 @@ def judge(K: Any, h: float) -> bool:
                 consider(K, OPEN_FORCE, c, max(low, crossing(K.guards0[2 * nC + c], K.guards1[2 * nC + c])), low)
     for e in range(K.n_guards):
         judge_user(K, e, h)
+    for f in range(K.n_frictions):
+        judge_friction(K, f, h)
     return bool(K.fired[0] >= 0)
 
 
@@ -266,6 +279,52 @@ def judge_user(K: Any, e: int, h: float) -> None:
         consider(K, CROSS, e, crossing(v0, v1) if v0 > 0.0 else 0.0, 0.0)
 
 
+def judge_friction(K: Any, f: int, h: float) -> None:
+    """Whether a friction that slides comes to rest, or one that sticks is pulled beyond its limit."""
+    place = frictions_at(K) + f
+    nF = K.n_frictions
+    if K.active[K.n_contacts + K.n_guards + f] == 1:
+        return
+    if K.sticks[f] == 1:
+        row = K.friction_row[f]
+        m0 = K.guards0[place + 2 * nF] - abs(K.lam[row])
+        m1 = K.guards1[place + 2 * nF] - abs(K.lam1[row])
+        if m1 < -1e-12 * abs(K.lam1[row]):
+            consider(K, SLIP, f, crossing(max(m0, 0.0), m1), 0.0)
+        return
+    s = K.slip[f]
+    v0 = s * K.guards0[place]
+    v1 = s * K.guards1[place]
+    if s == 0.0:
+        return
+    d0 = s * K.guards0[place + nF] * h
+    d1 = s * K.guards1[place + nF] * h
+    tiny = 16.0 * EPS * max(K.scale[K.n + K.n_rows + K.friction_row[f]], 1e-3)
+    if v1 < -tiny:
+        top = hermite_turn(v0, v1, d0, d1, True) if d0 > 0.0 else -1.0
+        if v0 > tiny:
+            consider(K, STICK, f, crossing(v0, v1), 0.0)
+        elif top > 0.0 and hermite(v0, v1, d0, d1, top) > tiny:
+            consider(K, STICK, f, top + (1.0 - top) * crossing(hermite(v0, v1, d0, d1, top), v1), top)
+        else:
+            consider(K, STICK, f, 0.0, 0.0)
+    elif d0 < 0.0 < d1 and v0 > tiny:
+        bottom = hermite_turn(v0, v1, d0, d1, False)
+        if bottom > 0.0 and hermite(v0, v1, d0, d1, bottom) < 0.0:  # it turns around and back within the step
+            consider(K, STICK_BRIEF, f, bottom, 0.0)
+
+
+def margin(K: Any, f: int, t1: float) -> float:
+    """What is left of a sticking friction at the candidate, limit − |λ_T| of consistent multipliers."""
+    row = K.friction_row[f]
+    if consistent(K, t1, K.q1, K.y1) != 0:
+        return float(K.guards1[frictions_at(K) + 2 * K.n_frictions + f] - abs(K.lam1[row]))
+    for k in range(K.n_rows):
+        K.loads[k] = K.impulse[k]
+    evaluate_loaded(K, K.loads)
+    return float(limit_of(K, f) - abs(K.impulse[row]))
+
+
 def guard_value(K: Any, kind: int, index: int, t1: float) -> float:
     """The fired guard at the candidate, counted so that it is ≥ 0 before and < 0 after its event."""
     nC = K.n_contacts
@@ -282,6 +341,10 @@ def guard_value(K: Any, kind: int, index: int, t1: float) -> float:
         return -condition if condition != 0.0 else 1e-300  # watched only above zero
     if kind == CROSS:
         return float(K.side[index] * K.guards1[4 * nC + index])
+    if kind == STICK:
+        return float(K.slip[index] * K.guards1[frictions_at(K) + index])
+    if kind == SLIP:
+        return margin(K, index, t1)
     if consistent(K, t1, K.q1, K.y1) != 0:
         return float(-K.lam1[K.normal[index]])
     return float(-K.impulse[K.normal[index]])

@@ -15,9 +15,12 @@ from mbd.kernel.fields import (
     OPEN_FORCE,
     OPEN_GAP,
     OPEN_PULL,
+    SLIP,
+    STICK,
+    STICK_BRIEF,
     WATCH,
 )
-from mbd.kernel.guards import gap_tolerance, guard_value, hermite, is_watched, judge, try_step
+from mbd.kernel.guards import frictions_at, gap_tolerance, guard_value, hermite, is_watched, judge, try_step
 
 __all__ = ["locate"]
 
@@ -35,7 +38,7 @@ def stay(K: Any) -> None:
         K.aux1[i] = K.aux[i]
     for k in range(K.n_rows):
         K.lam1[k] = K.lam[k]
-    for i in range(4 * K.n_contacts + 2 * K.n_guards):
+    for i in range(K.n_watched):
         K.guards1[i] = K.guards0[i]
 
 
@@ -81,7 +84,7 @@ def locate(K: Any, h: float) -> int:
     """
     t = K.clock[NOW]
     end = h
-    for _ in range(4 * (K.n_contacts + K.n_guards) + 4):
+    for _ in range(4 * (K.n_contacts + K.n_guards + K.n_frictions) + 4):
         kind = K.fired[0]
         index = K.fired[1]
         if kind == GRAZE:
@@ -95,6 +98,14 @@ def locate(K: Any, h: float) -> int:
                 continue
             kind = CLOSE
             end = K.pick[0]
+            low = 0.0
+        elif kind == STICK_BRIEF:  # a step to the deepest place shows it at rest on the way, or not at all
+            status = try_step(K, K.pick[0] * end, t + K.pick[0] * end)
+            if status != 0:
+                return status
+            kind = STICK
+            if guard_value(K, kind, index, t + K.pick[0] * end) < 0.0:
+                end = K.pick[0] * end
             low = 0.0
         else:
             low = K.pick[1] * end
@@ -123,7 +134,11 @@ def locate(K: Any, h: float) -> int:
                 return 0
             continue
         # did another guard fire before this one? (this one is at round-off and may look fired itself)
-        place = index if kind != CROSS else K.n_contacts + index
+        place = index
+        if kind == CROSS:
+            place += K.n_contacts
+        elif kind == STICK or kind == SLIP:
+            place += K.n_contacts + K.n_guards
         quiet = K.active[place]
         K.active[place] = 1
         other = judge(K, found) and K.pick[0] < 1.0 - SAME
@@ -153,6 +168,8 @@ def guard_rate(K: Any, kind: int, index: int) -> float:
         return float(-K.guards1[K.n_contacts + index])
     if kind == CROSS:
         return float(K.side[index] * K.guards1[4 * K.n_contacts + K.n_guards + index])
+    if kind == STICK:
+        return float(K.slip[index] * K.guards1[frictions_at(K) + K.n_frictions + index])
     return 0.0
 
 
@@ -179,6 +196,9 @@ def bracket(K: Any, kind: int, index: int, low: float, high: float) -> int:
     if f_high >= 0.0:
         if kind == OPEN_PULL:  # only the multiplier of the step was negative, not that of the motion
             K.active[index] = 1
+            K.fired[0] = -1
+        elif kind == STICK or kind == SLIP:
+            K.active[K.n_contacts + K.n_guards + index] = 1
             K.fired[0] = -1
         K.pick[2] = high
         return 0

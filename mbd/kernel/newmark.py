@@ -297,6 +297,8 @@ def predict(K: Any, h: float, t1: float, c_C: float, c_K: float) -> None:
         block[K.o_lam + k] = K.lam[k] + h * K.lam_slope[k]
     for k in range(K.n_anchors):
         block[K.o_anchor + k] = K.anchors[k]
+    for f in range(K.n_frictions):
+        block[K.o_slip + f] = K.slip[f]
     for i in range(K.n):
         a0 = K.rate[i] + stretch * (K.aux[i] - K.rate[i])
         rate = K.rate[i] + h * K.slope[i]

@@ -1,9 +1,7 @@
-"""Consistent accelerations, impact, and the complementarity behind both.
+"""The block of inputs at a state, magnitudes, and consistent accelerations.
 
-Both solve ``M w + force + R λ = 0`` with ``B w + bias = 0`` on closed rows and
-``0 ≤ B w + bias ⟂ −λ ≥ 0`` on contacts that may choose: w the acceleration and λ the
-multiplier, or w the jump of velocity and λ the impulse. M may be singular; only the whole
-matrix is ever solved with.
+``M w + force + R λ = 0`` with ``B w + bias = 0`` on active rows: w the acceleration and λ the multiplier, or w the jump
+of velocity and λ the impulse. M may be singular; only the whole matrix is ever solved with.
 """
 
 from __future__ import annotations
@@ -16,12 +14,8 @@ from mbd.kernel.fields import (
     COMPOSE,
     CONFLICT,
     DEPENDENT,
-    ENERGY_GAIN,
-    IMPACTS,
     N_DROPPED,
-    NO_IMPACT,
     NOT_FINITE,
-    NOW,
     SCALES,
 )  # fmt: skip
 from mbd.kernel.hooks import call
@@ -29,9 +23,13 @@ from mbd.kernel.linear import eliminate
 from mbd.kernel.redundancy import find_dependent, spread
 
 __all__ = [
-    "active_rows", "capture", "complementarity", "compose", "consistent", "evaluate", "fill_block", "impact",
-    "raise_scales", "refresh_scales", "solve_rows", "stepping_rows",
+    "active_rows", "capture", "compose", "consistent", "evaluate", "evaluate_loaded",
+    "fill_block", "limit_of", "load_accelerations", "raise_scales", "refresh_scales", "row_speed", "solve_rows",
+    "stepping_rows",
 ]  # fmt: skip
+
+MOST_LOADS = 30
+"""How often multipliers that friction follows are solved for again [-]."""
 
 
 def fill_block(K: Any, t: float, q: Any, y: Any) -> None:
@@ -53,6 +51,8 @@ def fill_block(K: Any, t: float, q: Any, y: Any) -> None:
         block[K.o_anchor + k] = K.anchors[k]
     for c in range(K.n_contacts):
         block[K.o_switch + c] = 1.0 if (K.kind[c] == 1 and K.closed[c] == 1) else 0.0
+    for f in range(K.n_frictions):
+        block[K.o_slip + f] = K.slip[f]
 
 
 def compose(K: Any, q1: Any) -> None:
@@ -107,12 +107,20 @@ def raise_scales(K: Any, rows: bool) -> None:
             K.scale[i] = K.work[i]
 
 
+def is_held(K: Any, row: int, flags: Any) -> bool:
+    """Whether a row acts: always, while its contact is closed and does not part, and while its friction sticks."""
+    contact = K.row_contact[row]
+    friction = K.row_friction[row]
+    if contact >= 0 and (flags[contact] == 0 or (K.row_normal[row] == 1 and K.parting[contact] == 1)):
+        return False
+    return bool(friction < 0 or K.sticks[friction] == 1)
+
+
 def stepping_rows(K: Any) -> int:
     """The active rows of the closed contacts that do not depend on others, into K.rows; how many."""
     m = 0
     for row in range(K.n_rows):
-        contact = K.row_contact[row]
-        if K.dropped[row] == 0 and (contact < 0 or K.closed[contact] == 1):
+        if K.dropped[row] == 0 and is_held(K, row, K.closed):
             K.rows[m] = row
             m += 1
     return m
@@ -122,17 +130,43 @@ def active_rows(K: Any, flags: Any) -> int:
     """Numbers of the active rows into K.rows, ascending; how many."""
     m = 0
     for row in range(K.n_rows):
-        contact = K.row_contact[row]
-        if contact < 0 or flags[contact] == 1:
+        if is_held(K, row, flags):
             K.rows[m] = row
             m += 1
     return m
 
 
 def evaluate(K: Any, t: float, q: Any, y: Any) -> None:
-    """M, f, R, B, h, ḣ, bias, captured, kinetic energy at a state, into K.acc."""
+    """M, f, R, B, h, ḣ, bias, captured, kinetic energy, limits at a state, into K.acc."""
     fill_block(K, t, q, y)
     call(K, ACCELERATIONS, K.acc)
+
+
+def evaluate_loaded(K: Any, lam: Any) -> float:
+    """K.acc again with other multipliers, at the state already in the block; how far they differ from those before.
+
+    Only R and the limits of frictions follow them.
+    """
+    change = 0.0
+    size = 1e-300
+    for k in range(K.n_rows):
+        change = max(change, abs(K.block[K.o_lam + k] - lam[k]))
+        size = max(size, abs(lam[k]))
+        K.block[K.o_lam + k] = lam[k]
+    for f in range(K.n_frictions):
+        K.block[K.o_slip + f] = K.slip[f]
+    call(K, ACCELERATIONS, K.acc)
+    return change / size
+
+
+def limit_of(K: Any, f: int) -> float:
+    """Largest friction at the multipliers now in the block."""
+    return float(K.acc[K.n * K.n + K.n + 2 * K.n * K.n_rows + 3 * K.n_rows + K.n_anchors + 1 + f])
+
+
+def row_speed(K: Any, row: int) -> float:
+    """ḣ of a row, from K.acc."""
+    return float(K.acc[K.n * K.n + K.n + 2 * K.n * K.n_rows + K.n_rows + row])
 
 
 def solve_rows(K: Any, m: int, dropping: bool) -> int:
@@ -190,8 +224,17 @@ def consistent(K: Any, t: float, q: Any, y: Any) -> int:
     evaluate(K, t, q, y)
     load_accelerations(K)
     status = solve_rows(K, stepping_rows(K), False)
+    if K.loaded == 1:  # R follows multipliers: of degree one, so that to solve again is Newton's method
+        for _ in range(MOST_LOADS):
+            if status != 0 or evaluate_loaded(K, K.impulse) < 1e-13:
+                break
+            load_accelerations(K)
+            status = solve_rows(K, stepping_rows(K), False)
     if K.state[N_DROPPED] > 0:
         spread(K, K.impulse)
+    for f in range(K.n_frictions):
+        if K.slip[f] != 0.0:
+            K.impulse[K.friction_row[f]] = K.lam[K.friction_row[f]]
     return status
 
 
@@ -205,125 +248,8 @@ def load_accelerations(K: Any) -> None:
         K.bias[k] = K.acc[o_bias + k]
 
 
-def violation(K: Any, c: int, largest: float) -> float:
-    """How badly contact c breaks complementarity, relative; ≤ 0 if it does not."""
-    n = K.n
-    row = K.normal[c]
-    if K.active[c] == 1:
-        return float(K.impulse[row] - 1e-11 * largest)  # λ > 0 would pull
-    o_B = n * n + n + n * K.n_rows
-    value = K.bias[row]
-    size = abs(K.bias[row])
-    for j in range(n):
-        term = K.acc[o_B + row * n + j] * K.jump[j]
-        value += term
-        size = max(size, abs(term))
-    return float(-value - 1e-11 * size)
-
-
-def complementarity(K: Any) -> int:
-    """Choose K.active among the contacts with K.free = 1 (others keep theirs) and solve.
-
-    Principal pivoting: the worst first, then by least index, which cannot cycle where the
-    Delassus matrix is a P-matrix; else every subset is tried while there are few.
-    """
-    n_free = 0
-    for c in range(K.n_contacts):
-        n_free += K.free[c]
-    for attempt in range(4 * n_free * n_free + 8):
-        status = solve_rows(K, active_rows(K, K.active), True)
-        if status != 0:
-            return status
-        flip = first_violation(K, attempt <= n_free + 1)
-        if flip < 0:
-            return status
-        K.active[flip] = 1 - K.active[flip]
-    if n_free > 12:
-        return NO_IMPACT
-    for subset in range(1 << n_free):
-        place = 0
-        for c in range(K.n_contacts):
-            if K.free[c] == 1:
-                K.active[c] = (subset >> place) & 1
-                place += 1
-        status = solve_rows(K, active_rows(K, K.active), True)
-        if status == 0 and first_violation(K, True) < 0:
-            return status
-    return NO_IMPACT
-
-
-def first_violation(K: Any, worst: bool) -> int:
-    """The contact that must change, or −1."""
-    largest = 0.0
-    for k in range(K.n_rows):
-        largest = max(largest, abs(K.impulse[k]))
-    found = -1
-    most = 0.0
-    for c in range(K.n_contacts):
-        if K.free[c] == 1:
-            size = violation(K, c, largest)
-            if size > most:
-                found = c
-                if not worst:
-                    return found
-                most = size
-    return found
-
-
 def capture(K: Any, c: int) -> None:
     """Hold the anchors of a contact that closes; K.acc is evaluated at the instant."""
     o_captured = K.n * K.n + K.n + 2 * K.n * K.n_rows + 3 * K.n_rows
     for k in range(K.anchor_start[c], K.anchor_start[c + 1]):
         K.anchors[k] = K.acc[o_captured + k]
-
-
-def gains_energy(K: Any) -> bool:
-    """Whether impulses do work on the mechanism, −½ Σ Λ (γ⁻ + γ⁺) < 0: restitution that sticks can (Kane's paradox)."""
-    n = K.n
-    o_B = n * n + n + n * K.n_rows
-    o_rate = o_B + n * K.n_rows + K.n_rows
-    loss = 0.0
-    size = 0.0
-    for k in range(K.n_rows):
-        if K.impulse[k] != 0.0:
-            half = 0.0
-            for j in range(n):
-                half += 0.5 * K.acc[o_B + k * n + j] * K.jump[j]
-            loss += K.impulse[k] * (K.acc[o_rate + k] + half)
-            size += abs(K.impulse[k]) * (abs(K.acc[o_rate + k]) + abs(half))
-    return bool(loss < -1e-9 * size)
-
-
-def impact(K: Any, slow: bool) -> int:
-    """Newton's impact law over all closed and closing rows together; the velocities in K.y jump.
-
-    ``M (v⁺ − v⁻) + Bᵀ λ̂ = 0``, bilateral and held rows ``B v⁺ + h_t = 0``,
-    ``0 ≤ γ⁺ + e γ⁻ ⟂ −λ̂ ≥ 0`` for contacts that may open. A slow impact (below the rest speed) sticks.
-    Afterwards K.active says which contacts are closed; a contact that rebounds is not.
-    """
-    n = K.n
-    evaluate(K, K.clock[NOW], K.q, K.y)
-    o_rate = n * n + n + 2 * n * K.n_rows + K.n_rows
-    for i in range(n):
-        K.force[i] = 0.0
-    for k in range(K.n_rows):
-        c = K.row_contact[k]
-        K.bias[k] = K.acc[o_rate + k]
-        if c >= 0 and K.closing[c] == 1 and not slow and K.row_normal[k] == 1:
-            K.bias[k] *= 1.0 + K.restitution[c]
-    for c in range(K.n_contacts):
-        both = K.closed[c] == 1 or K.closing[c] == 1
-        K.active[c] = 1 if (both and K.kind[c] == 0) else 0
-        K.free[c] = 1 if (K.active[c] == 1 and K.opens[c] == 0 and not slow) else 0
-    status = complementarity(K)
-    if status != 0:
-        return status
-    if not slow and gains_energy(K):
-        return ENERGY_GAIN
-    for i in range(n):
-        K.y[i] += K.jump[i]
-    K.counts[IMPACTS] += 1
-    for c in range(K.n_contacts):
-        if K.closing[c] == 1 and K.restitution[c] > 0.0 and not slow:
-            K.active[c] = 0
-    return 0

@@ -4,24 +4,36 @@ from __future__ import annotations
 
 from typing import Any
 
+from mbd.kernel.complementarity import complementarity
 from mbd.kernel.fields import (
+    BLOCKED,
     CLOSE,
     CROSS,
     EVENTS,
     LOG_CLOSED,
     LOG_OPENED,
+    LOG_SLIPPED,
+    LOG_STUCK,
     LOGGED,
+    NO_FORCE,
+    NO_IMPACT,
     NOW,
     OPEN_FORCE,
     OPEN_PULL,
     PRESS,
+    SLIP,
+    STICK,
     STORED,
     WATCH,
 )  # fmt: skip
 from mbd.kernel.guards import gap_scale, is_watched
-from mbd.kernel.restart import capture, complementarity, evaluate, impact, load_accelerations
+from mbd.kernel.impact import impact
+from mbd.kernel.restart import active_rows, capture, evaluate, row_speed, solve_rows
 
 __all__ = ["log_event", "settle", "switch"]
+
+STILL = 1e-9
+"""Speed [m/s, rad/s] of a gap or along a friction that counts as none."""
 
 
 def log_event(K: Any, kind: int, index: int, loss: float, struck: bool) -> None:
@@ -39,16 +51,28 @@ def log_event(K: Any, kind: int, index: int, loss: float, struck: bool) -> None:
 
 
 def settle(K: Any) -> int:
-    """Consistent accelerations and multipliers; contacts that would pull open, touching ones that press close."""
+    """Consistent accelerations and multipliers; contacts that would pull open, touching ones that press close.
+
+    Frictions that do not move stick or begin to slide.
+    """
+    for f in range(K.n_frictions):
+        K.was[f] = frictional_state(K, f)
+    find_slips(K)
     evaluate(K, K.clock[NOW], K.q, K.y)
-    load_accelerations(K)
+    for k in range(K.n_rows):
+        K.impulse[k] = K.lam[k]
     for c in range(K.n_contacts):
         K.active[c] = 1 if (K.closed[c] == 1 and K.kind[c] == 0) else 0
         K.free[c] = 0
         if K.kind[c] == 0:
             if (K.closed[c] == 1 and K.opens[c] == 0) or (K.closed[c] == 0 and K.touched[c] == 1):
                 K.free[c] = 1
-    status = complementarity(K)
+    status = complementarity(K, 0)
+    if status == NO_IMPACT or status == 0:
+        jammed = find_jammed(K)
+        if jammed >= 0:
+            K.state[BLOCKED] = jammed
+            return NO_FORCE
     if status != 0:
         return status
     for i in range(K.n):
@@ -66,13 +90,105 @@ def settle(K: Any) -> int:
                 K.armed[c] = 1
                 log_event(K, LOG_OPENED, c, 0.0, False)
         K.active[c] = 0
+    for f in range(K.n_frictions):
+        c = K.friction_contact[f]
+        if c >= 0 and K.closed[c] == 0:
+            K.sticks[f] = 0
+            K.slip[f] = 0.0
+        now = frictional_state(K, f)
+        if now != K.was[f]:
+            if now == 2:
+                log_event(K, LOG_STUCK, f, 0.0, False)
+            elif now != 0 and K.was[f] != 0:
+                log_event(K, LOG_SLIPPED, f, 0.0, False)
     return 0
+
+
+def frictional_state(K: Any, f: int) -> int:
+    """0 off, 2 sticking, ±1 sliding."""
+    if K.sticks[f] == 1:
+        return 2
+    return int(K.slip[f])
+
+
+def find_slips(K: Any) -> None:
+    """Which frictions slide, by their velocity, and which may choose; K.loose tells what an event has found out.
+
+    On entry K.loose[f] is 0, 2 where an event found the velocity to be zero, 3 where it found that it must slide.
+    """
+    if K.n_frictions == 0:
+        return
+    evaluate(K, K.clock[NOW], K.q, K.y)
+    for f in range(K.n_frictions):  # its direction is that at the point of now, unless it is held already
+        c = K.friction_contact[f]
+        if c >= 0 and (K.closed[c] == 0 or K.sticks[f] == 0):
+            capture(K, c)
+    evaluate(K, K.clock[NOW], K.q, K.y)
+    for f in range(K.n_frictions):
+        c = K.friction_contact[f]
+        told = K.loose[f]
+        K.loose[f] = 0
+        if c >= 0 and K.closed[c] == 0 and K.touched[c] == 0:
+            K.sticks[f] = 0
+            K.slip[f] = 0.0
+            continue
+        gamma = row_speed(K, K.friction_row[f])
+        if told == 3:
+            continue
+        if told == 2 or abs(gamma) <= STILL * max(1.0, 1e-2 * K.scale[K.n + K.n_rows + K.friction_row[f]]):
+            K.loose[f] = 1
+            K.sticks[f] = 1
+            K.slip[f] = 0.0
+        else:
+            K.sticks[f] = 0
+            K.slip[f] = 1.0 if gamma > 0.0 else -1.0
+
+
+def find_jammed(K: Any) -> int:
+    """A contact that slides so that pushing on it makes it approach: no force or several are consistent; −1 if none.
+
+    ``dg̈/dp = B_n K⁻¹ (B_n − μ s B_T)ᵀ ≤ 0`` with the other rows held (Painlevé 1895; Génot & Brogliato 1999,
+    Eur. J. Mech. A 18:653). K.jump and K.impulse are kept.
+    """
+    n = K.n
+    o_R = n * n + n
+    o_B = o_R + n * K.n_rows
+    for f in range(K.n_frictions):
+        c = K.friction_contact[f]
+        if c < 0 or K.sticks[f] == 1 or K.slip[f] == 0.0 or K.loose[f] == 1 or K.closed[c] == 0:
+            continue
+        normal = K.normal[c]
+        for i in range(n):
+            K.trial_jump[i] = K.jump[i]
+            K.force[i] = -K.acc[o_R + i * K.n_rows + normal]
+        for k in range(K.n_rows):
+            K.trial[k] = K.impulse[k]
+            K.bias[k] = 0.0
+        before = K.active[c]
+        K.active[c] = 1
+        K.parting[c] = 1
+        status = solve_rows(K, active_rows(K, K.active), True)
+        K.parting[c] = 0
+        K.active[c] = before
+        gained = 0.0
+        size = 0.0
+        for j in range(n):
+            gained += K.acc[o_B + normal * n + j] * K.jump[j]
+            size = max(size, abs(K.acc[o_B + normal * n + j] * K.jump[j]))
+        for i in range(n):
+            K.jump[i] = K.trial_jump[i]
+        for k in range(K.n_rows):
+            K.impulse[k] = K.trial[k]
+        if status == 0 and gained <= 1e-10 * size:
+            return int(c)
+    return -1
 
 
 def gather_closing(K: Any) -> float:
     """Mark the contacts that close at this instant in K.closing; the fastest closing speed of unilateral ones.
 
-    Contacts that touch and approach close together with the fired one, whatever their order.
+    Contacts that touch and approach close together with the fired one, whatever their order; those that touch and
+    rest (2) take part in its impact.
     """
     nC = K.n_contacts
     fastest = 0.0
@@ -84,10 +200,12 @@ def gather_closing(K: Any) -> float:
         near = abs(K.guards0[c]) <= 1e-10 * gap_scale(K, c)
         ready = K.armed[c] == 1 and is_watched(K, c, K.guards0)
         approach = -K.guards0[nC + c]
-        if fired or (near and ready and K.kind[c] == 0 and approach > 1e-9):
+        if fired or (near and ready and K.kind[c] == 0 and approach > STILL):
             K.closing[c] = 1
             if K.kind[c] == 0:
                 fastest = max(fastest, approach)
+        elif near and ready and K.kind[c] == 0 and approach >= -STILL:
+            K.closing[c] = 2
     return fastest
 
 
@@ -118,7 +236,9 @@ def close_by_impact(K: Any, fastest: float) -> int:
     for c in range(K.n_contacts):
         if K.kind[c] != 0 or (K.closed[c] == 0 and K.closing[c] == 0):
             continue
-        if K.closing[c] == 1:
+        if K.closing[c] == 2 and K.impulse[K.normal[c]] == 0.0:
+            continue  # it touched only
+        if K.closing[c] > 0:
             work = 0.0  # −½ Λ (γ⁻ + γ⁺) over its rows: its share of the kinetic energy lost
             for k in range(K.n_rows):
                 if K.row_contact[k] == c:
@@ -151,7 +271,7 @@ def mark_touching(K: Any) -> None:
         if K.kind[c] == 0 and K.closed[c] == 0 and K.armed[c] == 1 and near and is_watched(K, c, K.guards0):
             still = True
             for k in range(K.n_rows):
-                if K.row_contact[k] == c and abs(K.acc[o_rate + k]) > 1e-9:
+                if K.row_contact[k] == c and K.row_friction[k] < 0 and abs(K.acc[o_rate + k]) > STILL:
                     still = False
             K.touched[c] = 1 if still else 0
 
@@ -162,6 +282,17 @@ def capture_approach(K: Any) -> None:
         if K.closing[c] == 1 and K.kind[c] == 1 and K.anchor_start[c] < K.anchor_start[c + 1]:
             evaluate(K, K.clock[NOW], K.q, K.y)
             capture(K, c)
+
+
+def bursts(K: Any, c: int) -> bool:
+    """Whether the force of a sliding contact changed its sign through a pole, not through zero."""
+    for f in range(K.n_frictions):
+        if K.friction_contact[f] == c and K.slip[f] != 0.0:
+            largest = 0.0
+            for i in range(K.n):
+                largest = max(largest, K.scale[i])
+            return bool(abs(K.lam[K.normal[c]]) > 1e-3 * largest)
+    return False
 
 
 def switch(K: Any) -> int:
@@ -192,6 +323,16 @@ def switch(K: Any) -> int:
     elif kind == PRESS:
         K.closed[index] = 1
         log_event(K, LOG_CLOSED, index, 0.0, False)
+    elif kind == STICK:
+        K.loose[index] = 2
+        K.sticks[index] = 0
+    elif kind == SLIP:
+        K.loose[index] = 3
+        K.sticks[index] = 0
+        K.slip[index] = 1.0 if K.lam[K.friction_row[index]] > 0.0 else -1.0
+    elif kind == OPEN_PULL and bursts(K, index):
+        K.state[BLOCKED] = index
+        return NO_FORCE
     elif kind != CROSS and kind != WATCH:
         K.closed[index] = 0
         K.armed[index] = 2 if kind == OPEN_FORCE else 1

@@ -19,7 +19,8 @@ from mbd.state import State
 __all__ = ["callbacks", "choices", "end_of", "fits", "numbers"]
 
 CHOICES = {
-    "contact": ("events",), "impact": ("newton",), "locate": ("root", "linear"), "on_failure": ("raise", "return"),
+    "contact": ("events",), "impact": ("newton", "poisson", "sequential"),
+    "locate": ("root", "linear"), "on_failure": ("raise", "return"),
 }  # fmt: skip
 
 

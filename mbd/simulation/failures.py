@@ -74,6 +74,13 @@ def explanation(
             f"{where}: the impact law would create energy{with_closed}: restitution where a contact also sticks "
             "(Kane's paradox); use friction=0 or restitution=0 there"
         )
+    if status == F.NO_FORCE:
+        name = stepper.manager.names[int(values["state"][F.BLOCKED])]
+        return (
+            f"{where}: Painlevé: no consistent contact force at {name!r}, which slides with friction so that a push "
+            f"makes it approach{with_closed}; rigid bodies with Coulomb friction have no motion there: lower the "
+            "friction coefficient, or make the contact compliant with mbd.Penalty"
+        )
     return f"{where}: the instant of an event could not be isolated{with_closed}; try a smaller dt"
 
 

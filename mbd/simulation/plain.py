@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from mbd.arrays import Vector
-from mbd.compile.mechanism import Mechanism
+from mbd.compile.mechanism import Mechanism, ModeCode
 from mbd.equations.programs import mass_matrix
 from mbd.integrators.base import Integrator, Point, StepReport, Terms
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.kernel.fields import ITERATIONS, NOT_CONVERGED, NOT_FINITE, NOW
-from mbd.kernel.restart import fill_block, refresh_scales
+from mbd.kernel.restart import MOST_LOADS, fill_block, refresh_scales
 from mbd.simulation.asked import asked
 from mbd.state import Mode, State
 from mbd.tape.derivatives import live
@@ -32,10 +32,13 @@ class MechanismSystem:
         anchors: Vector,
         stabilized: bool,
         dropped: Any,
+        sticks: Any,
+        slip: Any,
     ) -> None:
         self.mechanism, self.manager = mechanism, manager
         self.parameters, self.anchors, self.stabilized = parameters, anchors, stabilized
         self.dropped = dropped  # rows that depend on others, 1 each
+        self.sticks, self.slip = sticks, slip[: mechanism.layout.n_frictions]  # of frictions
         self.evaluated: Vector | None = None  # the inputs evaluated last, to explain a failure with
         layout = mechanism.layout
         self.n_q, self.n_v, self.n_z = layout.n_q, layout.n_v, layout.n_z
@@ -50,13 +53,17 @@ class MechanismSystem:
 
     def _active(self, mode: Mode) -> tuple[tuple[int, ...], tuple[int, ...]]:
         flags = self.manager.flags(mode.closed)
-        rows = tuple(row for row in self.manager.active_rows(flags) if not self.dropped[row])
+        rows = tuple(row for row in self.manager.active_rows(flags, self.sticks) if not self.dropped[row])
         return rows, self.manager.penalties(flags)
+
+    def _code(self, rows: tuple[int, ...], penalties: tuple[int, ...]) -> ModeCode:
+        sliding = tuple(int(f) for f in np.flatnonzero(self.slip))
+        return self.mechanism.mode(rows, penalties, self.stabilized, sliding)
 
     def evaluate(self, point: Point, mode: Mode, tangent: tuple[float, float] | None) -> Terms:
         """Terms of `Terms` at a point of the mechanism."""
         rows, penalties = self._active(mode)
-        code = self.mechanism.mode(rows, penalties, self.stabilized)
+        code = self._code(rows, penalties)
         n, m = self.mechanism.layout.n, len(rows)
         block = self.evaluated = self._block(point, rows, penalties)
         scale = np.zeros(n + 2 * self.mechanism.layout.n_rows)
@@ -105,15 +112,24 @@ class MechanismSystem:
         block[layout.x : layout.v] = point.x
         block[layout.a : layout.lam] = point.rate
         block[[layout.lam + k for k in rows]] = point.lam
+        block[layout.slip : layout.size] = self.slip
         return block
 
     def accelerations(self, t: float, q: Vector, y: Vector, mode: Mode) -> tuple[Vector, Vector]:
         """Consistent (v̇, ż) and λ of the active rows."""
         rows, penalties = self._active(mode)
-        terms = self.mechanism.acceleration_terms(t, q, y, self.parameters, self.anchors, penalties)
-        n, m, picked = len(terms.f), len(rows), list(rows)
-        matrix = np.block([[terms.M, terms.R[:, picked]], [terms.B[picked], np.zeros((m, m))]])
-        solved = np.linalg.solve(matrix, -np.concatenate([terms.f, terms.bias[picked]]))
+        n, m, picked = self.mechanism.layout.n, len(rows), list(rows)
+        lam = np.zeros(self.mechanism.layout.n_rows)
+        for _ in range(MOST_LOADS):  # friction follows multipliers: of degree one, so that this is Newton's method
+            terms = self.mechanism.acceleration_terms(
+                t, q, y, self.parameters, self.anchors, penalties, slips=self.slip, lam=lam
+            )
+            matrix = np.block([[terms.M, terms.R[:, picked]], [terms.B[picked], np.zeros((m, m))]])
+            solved = np.linalg.solve(matrix, -np.concatenate([terms.f, terms.bias[picked]]))
+            change = np.max(np.abs(lam[picked] - solved[n:]), initial=0.0)
+            lam[picked] = solved[n:]
+            if not self.slip.any() or change <= 1e-13 * np.max(np.abs(lam)):
+                break
         return solved[:n], solved[n:]
 
     def compose(self, q: Vector, x: Vector) -> Vector:
@@ -176,7 +192,7 @@ class PlainScheme:
         mode = self.manager.mode(flags)
         n_v = K.n_v
         state = State(float(K.clock[NOW]), K.q.copy(), K.y[:n_v].copy(), K.y[n_v:].copy(), mode)
-        return state, mode, [row for row in self.manager.active_rows(flags) if not K.dropped[row]]
+        return state, mode, [row for row in self.manager.active_rows(flags, K.sticks) if not K.dropped[row]]
 
     def start(self, K: Any) -> int:
         """Memory at the accepted state, whose rates are consistent; sizes of the residual for the guards."""

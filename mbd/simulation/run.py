@@ -39,7 +39,7 @@ RESOLVED = 10.0
 """Steps that a penalty contact must last to be resolved at all."""
 MOST_EXPECTED = 1 << 22
 """Rows for which a table is laid out at the start; longer runs enlarge it."""
-KINDS = ("closed", "opened", "event")
+KINDS = ("closed", "opened", "event", "stuck", "slipped")
 """Names of the kinds of events that the kernel logs by number."""
 
 
@@ -245,10 +245,12 @@ class Run:
         count, logged = int(v["state"][F.STORED]), int(v["state"][F.LOGGED])
         lines = v["log"].reshape(-1, v["event_width"])[:logged]
         guards = [guard.name for guard in self.manager.guards]
+        frictions = [friction.name for friction in self.manager.frictions]
         for line in lines:
             kind = KINDS[int(line[1])]
             index, impulse = int(line[2]), np.zeros(0)
-            name = guards[index] if kind == "event" else self.manager.names[index]
+            names = {"event": guards, "stuck": frictions, "slipped": frictions}.get(kind, self.manager.names)
+            name = names[index]
             if kind == "closed":
                 impulse = line[[5 + k for k in self.manager.contacts[index].rows]].copy()
             self.events.append(
@@ -266,7 +268,7 @@ class Run:
         guards = {guard.name: e for e, guard in enumerate(self.manager.guards)}
         ended = ""
         for event in happened:
-            if event.kind == "opened":
+            if event.kind not in ("closed", "event"):
                 continue
             guard = self.manager.guards[guards[event.name]] if event.kind == "event" else None
             if guard is not None and guard.reset is not None:
@@ -334,7 +336,7 @@ class Run:
         counts = self.values["counts"]
         names = (
             "steps", "iterations", "tangents", "residuals", "factorizations", "events", "restarts", "impacts",
-            "locations", "stagnations", "careful", "shortened",
+            "locations", "stagnations", "careful", "shortened", "energetic_impacts",
         )  # fmt: skip
         numbers: dict[str, Any] = {name: int(counts[place]) for place, name in enumerate(names)}
         numbers["modes"] = len(self.stepper.modes)
@@ -356,6 +358,12 @@ class Run:
         shortened = int(v["counts"][F.SHORTENED])
         if shortened:
             notes.append(f"{shortened} steps were shortened where Newton's method failed at the full dt")
+        energetic = int(v["counts"][F.STRONGE])
+        if energetic:
+            notes.append(
+                f"{energetic} impacts took Stronge's energetic restitution, where the {self.settings['impact']} law "
+                "would have created energy"
+            )
         for c, contact in enumerate(self.manager.contacts):
             if v["deepest"][c] < -1e-9:
                 notes.append(

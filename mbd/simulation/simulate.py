@@ -33,7 +33,7 @@ def simulate(
     *,
     until: float | str | tuple[str, float],
     contact: Literal["events"] = "events",
-    impact: Literal["newton"] = "newton",
+    impact: Literal["newton", "poisson", "sequential"] = "newton",
     locate: Literal["root", "linear"] = "root",
     parameters: Mapping[str, float] | None = None,
     store: int = 1,
@@ -57,7 +57,9 @@ def simulate(
     tol : error control is not available yet; steps are fixed
     until : end time [s]; or the name of a contact or event, at whose first closing or crossing the run ends;
         or (name, latest time)
-    contact, impact : strategy and law; this version knows located events with Newton's law
+    contact : strategy; this version knows located events
+    impact : law of restitution over all contacts of an instant: 'newton' on gap rates, 'poisson' on impulses,
+        'sequential' one contact after the other; where it would create energy, Stronge's law takes its place
     locate : 'root' finds event instants to round-off; 'linear' by one linear interpolation back, second order
     parameters : values that differ from the model's, by name
     store : keep every store-th step; rows at events and the last row are always kept
@@ -98,7 +100,7 @@ def simulate(
         "contact": contact, "impact": impact, "locate": locate, "store": store, "rest_speed": rest_speed,
         "backend": mechanism.backend.name, "versions": dict(_versions()),
     }  # fmt: skip
-    options = {"locate": locate, "store": store, "rest_speed": rest_speed}
+    options = {"locate": locate, "store": store, "rest_speed": rest_speed, "impact": impact}
     run = Run(model, mechanism, manager, scheme, start, float(dt), end, stop, changed, options, settings)
     run.observe(observers, _bar(progress, start.time, end))
     trajectory, problem = run.complete()

@@ -9,16 +9,20 @@ import numpy as np
 
 from mbd.arrays import Vector
 from mbd.compile.mechanism import Mechanism
+from mbd.equations.equations import Equations
 from mbd.integrators.base import Integrator
 from mbd.integrators.family import MAX_ITERATIONS, NewmarkFamily
 from mbd.kernel import fields as F
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.simulation.plain import MechanismSystem, PlainScheme, row_units, unit_blocks
+from mbd.tape.derivatives import live
 
 __all__ = ["Stepper", "is_compiled"]
 
 EVENT_CAPACITY = 512
 """Events that the kernel may log before it hands them over, at least."""
+LAWS = ("newton", "poisson", "sequential")
+"""Impact laws in the order of their numbers in the kernel."""
 MODE_CAPACITY = 16
 """Modes for which a table is laid out at the start; it doubles as it fills."""
 
@@ -34,6 +38,12 @@ def _hht_step() -> Any:
     from mbd.integrators.hht import HHT
 
     return HHT.step
+
+
+def is_loaded(equations: Equations) -> bool:
+    """Whether a friction follows multipliers other than linearly, as a pin does."""
+    limits = [friction.limit for friction in equations.frictions if friction.contact < 0]
+    return any(node.op == "input" and node.data[0] == "lam" for node in live(limits))
 
 
 class Stepper:
@@ -60,8 +70,9 @@ class Stepper:
         self._sizes(dt, options)
         self._arrays(parameters, manager)
         self.system = MechanismSystem(
-            mechanism, manager, self.values["params"], self.values["anchors"], self.stabilized, self.values["dropped"]
-        )
+            mechanism, manager, self.values["params"], self.values["anchors"], self.stabilized, self.values["dropped"],
+            self.values["sticks"], self.values["slip"],
+        )  # fmt: skip
         self.scheme = PlainScheme(integrator, self.system, manager)
         self.functions: list[Any] = [mechanism.common[name] for name in ("accelerations", "guards", "scales")]
         self.functions.append(None if mechanism.vector else mechanism.common["compose"])
@@ -77,7 +88,10 @@ class Stepper:
         values.update(
             n_q=layout.n_q, n_v=layout.n_v, n=layout.n, n_rows=layout.n_rows, n_anchors=layout.n_anchors,
             n_contacts=n_contacts, n_guards=n_guards, o_q=layout.q, o_x=layout.x, o_v=layout.v, o_a=layout.a,
-            o_lam=layout.lam, o_anchor=layout.anchor, o_switch=layout.switch, vector=int(self.mechanism.vector),
+            o_lam=layout.lam, o_anchor=layout.anchor, o_switch=layout.switch, o_slip=layout.slip,
+            n_frictions=layout.n_frictions, n_watched=self.mechanism.sizes["guards"],
+            loaded=int(is_loaded(self.mechanism.equations)), impact_law=LAWS.index(options.get("impact", "newton")),
+            vector=int(self.mechanism.vector),
             stabilized=int(self.stabilized), max_iterations=MAX_ITERATIONS,
             max_switches=20 + 4 * n_contacts,
             linear=int(options.get("locate") == "linear"),
@@ -97,6 +111,7 @@ class Stepper:
     def _arrays(self, parameters: Vector, manager: ActiveSetManager) -> None:
         v = self.values
         n, n_q, rows, contacts, guards = v["n"], v["n_q"], v["n_rows"], v["n_contacts"], v["n_guards"]
+        frictions = v["n_frictions"]
         size = n + rows
         reals = {
             "block": self.mechanism.layout.size, "out": size * size + n + 2 * rows + rows * n, "clock": 4,
@@ -106,14 +121,18 @@ class Stepper:
             "basis": (rows + 1) * n, "lower": (rows + 1) * rows, "mix": rows * rows, "kkt": size * size, "rhs": size,
             "spare": size * size + n + 2 * rows + rows * n, "turning": rows * n,
             "work": 3 * size, "force": n, "bias": rows, "jump": n, "impulse": rows,
-            "guards0": 4 * contacts + 2 * guards, "guards1": 4 * contacts + 2 * guards, "scale": n + 2 * rows,
+            "guards0": v["n_watched"], "guards1": v["n_watched"], "scale": n + 2 * rows,
             "deepest": contacts, "sinking": contacts, "side": guards, "pick": 8, "detail": 8,
+            "slip": frictions, "limit": frictions, "base_limit": frictions, "given": rows, "total": rows,
+            "total_jump": n, "loads": rows, "trial": rows, "trial_given": rows, "trial_jump": n,
             "store": v["capacity"] * v["width"], "log": v["event_capacity"] * v["event_width"],
         }  # fmt: skip
         integers = {
-            "unit": n, "notify": contacts + guards, "closed": contacts,
-            "armed": contacts, "touched": contacts, "active": contacts + guards, "free": contacts, "closing": contacts,
-            "mode_key": MODE_CAPACITY * (contacts + rows), "dropped": rows, "mode_code": 2 * MODE_CAPACITY,
+            "unit": n, "notify": contacts + guards + frictions, "closed": contacts,
+            "armed": contacts, "touched": contacts, "active": contacts + guards + frictions, "free": contacts,
+            "closing": contacts, "parting": contacts, "trial_free": contacts, "sticks": frictions, "loose": frictions,
+            "was": frictions, "mode_key": MODE_CAPACITY * (contacts + rows + frictions), "dropped": rows,
+            "mode_code": 2 * MODE_CAPACITY,
             "mode_count": 1, "rows": rows,
             "pivots": size, "columns": size, "fired": 2, "state": 16, "counts": 16,
         }  # fmt: skip
@@ -134,13 +153,16 @@ class Stepper:
         """Make code for the contacts closed now."""
         v = self.values
         flags, dropped = v["closed"][: v["n_contacts"]], v["dropped"][: v["n_rows"]]
-        rows = tuple(row for row in self.manager.active_rows(flags) if not dropped[row])
-        code = self.mechanism.mode(rows, self.manager.penalties(flags), self.stabilized)
-        count, width = int(v["mode_count"][0]), v["n_contacts"] + v["n_rows"]
+        sticks, slip = v["sticks"][: v["n_frictions"]], v["slip"][: v["n_frictions"]]
+        rows = tuple(row for row in self.manager.active_rows(flags, sticks) if not dropped[row])
+        sliding = tuple(int(f) for f in np.flatnonzero(slip))
+        code = self.mechanism.mode(rows, self.manager.penalties(flags), self.stabilized, sliding)
+        count, width = int(v["mode_count"][0]), v["n_contacts"] + v["n_rows"] + v["n_frictions"]
+        phases = np.where(sticks == 1, 2, slip != 0.0)
         if 2 * (count + 1) > len(v["mode_code"]):
             v["mode_code"] = np.concatenate([v["mode_code"], np.zeros_like(v["mode_code"])])
             v["mode_key"] = np.concatenate([v["mode_key"], np.zeros_like(v["mode_key"])])
-        v["mode_key"][count * width : (count + 1) * width] = np.concatenate([flags, dropped])
+        v["mode_key"][count * width : (count + 1) * width] = np.concatenate([flags, dropped, phases])
         v["mode_code"][2 * count : 2 * count + 2] = len(self.functions), len(self.functions) + 1
         self.functions += [code.tangent, code.residual]
         self.modes.append(code)

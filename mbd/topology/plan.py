@@ -72,7 +72,7 @@ class Plan:
 
 def plan(model: Model) -> Plan:
     """The tree, the cut joints and the floating bodies of a model whose `cut` is 'auto', 'loops', 'all' or names."""
-    wanted = cut_names(model)
+    wanted = cut_names(model) | {joint.name for joint in model.joints if needs_reaction(joint)}
     planar = is_planar(model)
     graph = graph_of(model, without=wanted)
     tree, closing, reached = spanning_tree(graph, model.ground.name)
@@ -113,6 +113,11 @@ def cut_names(model: Model) -> set[str]:
         if name not in names:
             raise ModelError("cut: " + nearest(name, names, "joint"))
     return set(model.cut)
+
+
+def needs_reaction(joint: Joint) -> bool:
+    """Whether its friction follows the force that it transmits, which rows must carry."""
+    return any(loss.needs_reaction for _, _, loss in joint.losses())
 
 
 def is_planar(model: Model) -> bool:

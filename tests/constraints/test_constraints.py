@@ -8,7 +8,7 @@ import sympy
 
 import mbd
 from mbd.bodies import Ground
-from mbd.errors import CapabilityError, ModelError
+from mbd.errors import ModelError
 from tests.helpers import FreeScope
 
 GROUND = Ground()
@@ -168,9 +168,9 @@ def test_wrong_constraints_are_refused_in_words(make, told):
         make()
 
 
-def test_sliding_friction_is_refused_with_what_to_do():
-    with pytest.raises(CapabilityError, match="friction=None"):
-        mbd.Unilateral("foot", FOOT, friction=0.5)
+def test_friction_without_a_direction_to_slide_in_is_a_fault():
+    (fault,) = mbd.Unilateral("foot", mbd.height(FOOT.point), friction=0.5).faults()
+    assert "no direction to slide in" in fault and "touchdown" in fault
 
 
 def test_impossible_constraints_tell_why():

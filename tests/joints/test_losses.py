@@ -6,7 +6,7 @@ import pytest
 import sympy
 
 import mbd
-from mbd.errors import CapabilityError, ModelError
+from mbd.errors import ModelError
 from mbd.testing import check_loss
 from mbd.testing.losses import force_at
 from tests.instances import LOSSES
@@ -30,11 +30,6 @@ def test_losses_add():
 def test_smoothed_friction_approaches_its_torque():
     assert force_at(mbd.Coulomb(2.0, smoothing=0.01), 5.0) == pytest.approx(2.0, rel=1e-5)
     assert force_at(mbd.Coulomb(2.0, smoothing=0.01), -5.0) == pytest.approx(-2.0, rel=1e-5)
-
-
-def test_friction_that_truly_sticks_points_to_the_smoothed_form():
-    with pytest.raises(CapabilityError, match=r"smoothing=0\.01"):
-        mbd.Coulomb(2.0)
 
 
 def test_a_table_passes_through_its_points_and_goes_on_straight():

@@ -73,7 +73,7 @@ WRONG = {
     "store True": ({"store": True}, "store"),
     "locate": ({"locate": "exact"}, "'root' or 'linear'"),
     "contact": ({"contact": "nonsmooth"}, "'events'"),
-    "impact": ({"impact": "poisson"}, "'newton'"),
+    "impact": ({"impact": "stronge"}, "'newton'"),
     "on_failure": ({"on_failure": "ignore"}, "'raise' or 'return'"),
     "tol": ({"tol": 1e-6}, "dt"),
     "rest speed": ({"rest_speed": -1.0}, "rest_speed"),

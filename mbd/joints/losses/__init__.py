@@ -3,8 +3,12 @@
 from mbd.joints.losses.base import DissipationFunction, Loss, LossSum
 from mbd.joints.losses.coulomb import Coulomb
 from mbd.joints.losses.dissipation import Dissipation
+from mbd.joints.losses.pin_friction import PinFriction
 from mbd.joints.losses.quadratic import Quadratic
 from mbd.joints.losses.tabulated import Tabulated
 from mbd.joints.losses.viscous import Viscous
 
-__all__ = ["Coulomb", "Dissipation", "DissipationFunction", "Loss", "LossSum", "Quadratic", "Tabulated", "Viscous"]
+__all__ = [
+    "Coulomb", "Dissipation", "DissipationFunction", "Loss", "LossSum", "PinFriction", "Quadratic", "Tabulated",
+    "Viscous",
+]  # fmt: skip

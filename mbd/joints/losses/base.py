@@ -29,6 +29,20 @@ class Loss(ABC):
     def fields(self) -> dict[str, float]:
         """Its physical quantities by field; each is a run-time parameter 'owner.field'."""
 
+    @property
+    def needs_reaction(self) -> bool:
+        """Whether its friction follows the force in the joint, which is cut then, so that rows carry that force."""
+        return False
+
+    def dry(self, load: Scalar, scope: Scope, owner: str) -> Scalar:
+        """Largest friction that truly sticks, ``|F| ≤ dry`` at rest and ``F = dry · sign v`` in motion, beside `force`.
+
+        Parameters
+        ----------
+        load : resultant force in the joint [N], where it `needs_reaction`
+        """
+        return 0.0
+
     def faults(self, owner: str) -> list[str]:
         """Why it would not dissipate, one sentence each; by default, negative fields."""
         return [
@@ -81,6 +95,18 @@ class LossSum(Loss):
         result: Scalar = 0.0
         for name, loss in self.named(owner):
             result = result + loss.force(rate, scope, name)
+        return result
+
+    @property
+    def needs_reaction(self) -> bool:
+        """Whether one of its parts does."""
+        return any(loss.needs_reaction for loss in self.losses)
+
+    def dry(self, load: Scalar, scope: Scope, owner: str) -> Scalar:
+        """The sum of what sticks."""
+        result: Scalar = 0.0
+        for name, loss in self.named(owner):
+            result = result + loss.dry(load, scope, name)
         return result
 
     def fields(self) -> dict[str, float]:

@@ -1,11 +1,11 @@
-"""Dry friction, smoothed."""
+"""Dry friction, truly sticking or smoothed."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from mbd.bodies.values import number
-from mbd.errors import CapabilityError, ModelError
+from mbd.errors import ModelError
 from mbd.joints.losses.base import DissipationFunction
 from mbd.scope import Scope
 from mbd.tape.functions import sqrt
@@ -16,14 +16,16 @@ __all__ = ["Coulomb"]
 
 @dataclass(frozen=True)
 class Coulomb(DissipationFunction):
-    """``D = T (√(v² + ε²) − ε)``, ``F = T v/√(v² + ε²)``: dry friction whose step at rest is smoothed over ε.
+    """Dry friction ``F ∈ T Sgn(v)``: it sticks while ``|F| ≤ T`` and resists with T in motion.
 
-    Far from rest F is T sign v, less by a part ε²/(2 v²); at rest it creeps with the viscous coefficient T/ε.
+    Set-valued, it holds the joint exactly where it comes to rest; stick and slip follow each other at located instants.
+    With a smoothing ε > 0 it is ``D = T (√(v² + ε²) − ε)``, ``F = T v/√(v² + ε²)`` instead, a force like any other: far
+    from rest it lacks a part ε²/(2 v²), at rest it creeps with the viscous coefficient T/ε.
 
     Parameters
     ----------
     torque : T ≥ 0, the friction torque or force [N m or N]
-    smoothing : ε > 0, the rate over which it sets in [rad/s or m/s]
+    smoothing : None, or the rate ε over which it sets in [rad/s or m/s]
     """
 
     torque: float
@@ -32,27 +34,33 @@ class Coulomb(DissipationFunction):
     def __post_init__(self) -> None:
         object.__setattr__(self, "torque", number(self.torque, "torque of Coulomb"))
         if self.smoothing is None:
-            raise CapabilityError(
-                f"Coulomb({self.torque:g}) without smoothing truly sticks, which this version does not solve; "
-                f"give the rate over which it sets in, such as Coulomb({self.torque:g}, smoothing=0.01)"
-            )
+            return
         object.__setattr__(self, "smoothing", number(self.smoothing, "smoothing of Coulomb"))
         if self.smoothing <= 0.0:
-            raise ModelError(f"smoothing of Coulomb must be positive, got {self.smoothing:g}; try 0.01 rad/s")
+            raise ModelError(
+                f"smoothing of Coulomb must be positive, got {self.smoothing:g}; try 0.01 rad/s, or None to truly stick"
+            )
 
     def fields(self) -> dict[str, float]:
-        """`torque` and `smoothing`."""
-        assert self.smoothing is not None
-        return {"torque": self.torque, "smoothing": self.smoothing}
+        """`torque`, and `smoothing` if there is one."""
+        return {"torque": self.torque} | ({} if self.smoothing is None else {"smoothing": self.smoothing})
 
     def dissipation(self, rate: Scalar, scope: Scope, owner: str) -> Scalar:
-        """T (√(v² + ε²) − ε)."""
+        """T (√(v² + ε²) − ε); 0 where it truly sticks."""
+        if self.smoothing is None:
+            return 0.0
         T, eps = (scope.parameter(owner, field, value) for field, value in self.fields().items())
         root: Scalar = sqrt(rate * rate + eps * eps)
         return T * (root - eps)
 
     def force(self, rate: Scalar, scope: Scope, owner: str) -> Scalar:
-        """T v/√(v² + ε²), the derivative of D in its shortest form."""
+        """T v/√(v² + ε²), the derivative of D in its shortest form; 0 where it truly sticks."""
+        if self.smoothing is None:
+            return 0.0
         T, eps = (scope.parameter(owner, field, value) for field, value in self.fields().items())
         root: Scalar = sqrt(rate * rate + eps * eps)
         return T * rate / root
+
+    def dry(self, load: Scalar, scope: Scope, owner: str) -> Scalar:
+        """T, where it truly sticks."""
+        return scope.parameter(owner, "torque", self.torque) if self.smoothing is None else 0.0

@@ -1,0 +1,240 @@
+"""Who pushes and who sticks: contacts and dry friction choose so that every one of them obeys its law.
+
+``M w + force + R λ = 0`` with ``B w + bias = 0`` on held rows, ``0 ≤ B w + bias ⟂ −λ ≥ 0`` on contacts that may choose,
+``|λ_T| ≤ limit`` where a friction sticks and ``λ_T = limit · sign`` where it slides along w.
+
+A semismooth Newton method: every contact and friction takes the branch of its law that the last solution asks for, and
+the linear equations of these branches are solved again (Alart & Curnier 1991; Hintermüller, Ito & Kunisch 2002). Where
+a set of branches returns, single changes follow, the worst first and then the first, which cannot cycle where the
+Delassus matrix is a P-matrix; at last every choice is tried while there are few.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mbd.kernel.fields import NO_IMPACT
+from mbd.kernel.restart import (
+    MOST_LOADS,
+    active_rows,
+    evaluate_loaded,
+    limit_of,
+    load_accelerations,
+    solve_rows,
+)
+
+__all__ = ["complementarity"]
+
+MOST_NEWTON = 12
+"""Changes of all branches at once before single ones follow [-]."""
+MOST_CHOICES = 6561
+"""Sets of branches that are tried one after the other when nothing else has led to a solution [-]."""
+
+
+def complementarity(K: Any, level: int) -> int:
+    """Choose K.active of contacts with K.free = 1 and K.sticks, K.slip of frictions with K.loose = 1, and solve.
+
+    Others keep theirs. With K.free = 2 a contact chooses K.parting: its normal row is off, its tangents stay.
+    level 0: accelerations, force and bias are those of K.acc; 1: velocities, bias and impulses K.given are in place.
+    """
+    choices = 0
+    sets = 1
+    for c in range(K.n_contacts):
+        if K.free[c] > 0:
+            choices += 1
+            sets = min(sets * 2, 2 * MOST_CHOICES)
+    for f in range(K.n_frictions):
+        choices += K.loose[f]
+        sets = min(sets * (1 + 2 * K.loose[f]), 2 * MOST_CHOICES)
+    for attempt in range(4 * choices * choices + MOST_NEWTON + 8):
+        status = solve_branches(K, level)
+        if status != 0:
+            return status
+        if attempt < MOST_NEWTON:
+            if change_all(K) == 0:
+                return status
+        elif change_one(K, attempt <= MOST_NEWTON + choices + 1) == 0:
+            return status
+    if sets > MOST_CHOICES:
+        return NO_IMPACT
+    for number in range(sets):
+        choose(K, number)
+        status = solve_branches(K, level)
+        if status == 0 and worst(K, False) == 0:
+            return status
+    return NO_IMPACT
+
+
+def solve_branches(K: Any, level: int) -> int:
+    """Solve with the present branches; the friction that slides is put into K.impulse of its row."""
+    if K.n_frictions == 0:
+        load(K, level)
+        return int(solve_rows(K, active_rows(K, K.active), True))
+    status = 0
+    for _ in range(MOST_LOADS):
+        evaluate_loaded(K, whole(K, level))
+        load(K, level)
+        status = solve_rows(K, active_rows(K, K.active), True)
+        if status != 0:
+            return status
+        if evaluate_loaded(K, whole(K, level)) < 1e-13 or K.loaded == 0:
+            break
+    for f in range(K.n_frictions):
+        limit = limit_of(K, f) - (K.base_limit[f] if level == 1 else 0.0)
+        K.limit[f] = limit
+        if slides(K, f):
+            K.impulse[K.friction_row[f]] = K.slip[f] * limit
+    return status
+
+
+def whole(K: Any, level: int) -> Any:
+    """The multipliers that friction follows: with the impulses that are given."""
+    for k in range(K.n_rows):
+        K.loads[k] = K.impulse[k] + (K.given[k] if level == 1 else 0.0)
+    return K.loads
+
+
+def load(K: Any, level: int) -> None:
+    """Force and bias of the accelerations, or the force of the impulses that are given."""
+    if level == 0:
+        load_accelerations(K)
+        return
+    o_R = K.n * K.n + K.n
+    for i in range(K.n):
+        K.force[i] = 0.0
+        for k in range(K.n_rows):
+            K.force[i] += K.acc[o_R + i * K.n_rows + k] * K.given[k] if K.given[k] != 0.0 else 0.0
+
+
+def is_on(K: Any, f: int) -> bool:
+    """Whether a friction acts: its contact is closed, or it always does."""
+    c = K.friction_contact[f]
+    return bool(c < 0 or K.active[c] == 1)
+
+
+def slides(K: Any, f: int) -> bool:
+    """Whether a friction acts and slides."""
+    return bool(is_on(K, f) and K.sticks[f] == 0)
+
+
+def contact_fault(K: Any, c: int, largest: float) -> float:
+    """How badly contact c breaks its law, relative; ≤ 0 if it does not."""
+    n = K.n
+    row = K.normal[c]
+    if K.active[c] == 1 and K.parting[c] == 0:
+        return float(K.impulse[row] - 1e-11 * largest)  # λ > 0 would pull
+    o_B = n * n + n + n * K.n_rows
+    value = K.bias[row]
+    size = abs(K.bias[row])
+    for j in range(n):
+        term = K.acc[o_B + row * n + j] * K.jump[j]
+        value += term
+        size = max(size, abs(term))
+    return float(-value - 1e-11 * size)
+
+
+def friction_fault(K: Any, f: int, largest: float) -> float:
+    """How badly friction f breaks its law, relative; ≤ 0 if it does not."""
+    row = K.friction_row[f]
+    if K.sticks[f] == 1:
+        return float(abs(K.impulse[row]) - K.limit[f] - 1e-11 * largest)
+    n = K.n
+    o_B = n * n + n + n * K.n_rows
+    value = K.bias[row]
+    size = abs(K.bias[row])
+    for j in range(n):
+        term = K.acc[o_B + row * n + j] * K.jump[j]
+        value += term
+        size = max(size, abs(term))
+    return float(-K.slip[f] * value - 1e-11 * size)  # it slides against its own friction
+
+
+def largest_impulse(K: Any) -> float:
+    """Size of the multipliers."""
+    largest = 0.0
+    for k in range(K.n_rows):
+        largest = max(largest, abs(K.impulse[k]))
+    return largest
+
+
+def toggle(K: Any, c: int) -> None:
+    """The other branch of a contact."""
+    if K.free[c] == 2:
+        K.parting[c] = 1 - K.parting[c]
+    else:
+        K.active[c] = 1 - K.active[c]
+
+
+def turn(K: Any, f: int) -> None:
+    """The other branch of a friction: from sticking to sliding as its multiplier pulls, and back."""
+    if K.sticks[f] == 1:
+        K.sticks[f] = 0
+        K.slip[f] = 1.0 if K.impulse[K.friction_row[f]] > 0.0 else -1.0
+    else:
+        K.sticks[f] = 1
+        K.slip[f] = 0.0
+
+
+def change_all(K: Any) -> int:
+    """Every contact and friction takes the branch that the solution asks for; how many changed."""
+    largest = largest_impulse(K)
+    count = 0
+    for f in range(K.n_frictions):
+        if K.loose[f] == 1 and is_on(K, f) and friction_fault(K, f, largest) > 0.0:
+            turn(K, f)
+            count += 1
+    for c in range(K.n_contacts):
+        if K.free[c] > 0 and contact_fault(K, c, largest) > 0.0:
+            toggle(K, c)
+            count += 1
+    return count
+
+
+def worst(K: Any, first: bool) -> int:
+    """1 + number of the contact or friction that must change (frictions after contacts), 0 if none."""
+    largest = largest_impulse(K)
+    found = 0
+    most = 0.0
+    for place in range(K.n_contacts + K.n_frictions):
+        f = place - K.n_contacts
+        fault = 0.0
+        if f < 0:
+            if K.free[place] > 0:
+                fault = contact_fault(K, place, largest)
+        elif K.loose[f] == 1 and is_on(K, f):
+            fault = friction_fault(K, f, largest)
+        if fault > most:
+            found = place + 1
+            if first:
+                return found
+            most = fault
+    return found
+
+
+def change_one(K: Any, the_worst: bool) -> int:
+    """One contact or friction takes its other branch; 0 if none needs to."""
+    place = worst(K, not the_worst)
+    if place == 0:
+        return 0
+    if place <= K.n_contacts:
+        toggle(K, place - 1)
+    else:
+        turn(K, place - 1 - K.n_contacts)
+    return 1
+
+
+def choose(K: Any, number: int) -> None:
+    """The set of branches of that number."""
+    for c in range(K.n_contacts):
+        if K.free[c] == 1:
+            K.active[c] = number % 2
+            number //= 2
+        elif K.free[c] == 2:
+            K.parting[c] = number % 2
+            number //= 2
+    for f in range(K.n_frictions):
+        if K.loose[f] == 1:
+            branch = number % 3
+            number //= 3
+            K.sticks[f] = 1 if branch == 0 else 0
+            K.slip[f] = 0.0 if branch == 0 else (1.0 if branch == 1 else -1.0)
