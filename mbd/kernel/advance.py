@@ -24,6 +24,7 @@ from mbd.kernel.fields import (
     NOT_CONVERGED,
     NOW,
     PAUSE,
+    REDONE,
     RESTART,
     RESTARTS,
     ROWS,
@@ -39,6 +40,7 @@ from mbd.kernel.fields import (
 from mbd.kernel.guards import is_quiet, judge, try_step, update_armed, update_sides, watch
 from mbd.kernel.hooks import scheme_accept, scheme_start
 from mbd.kernel.locate import locate
+from mbd.kernel.nonsmooth import lands, lets_go, rebound, strike
 from mbd.kernel.redundancy import find_dependent, spread
 from mbd.kernel.restart import active_rows, consistent, evaluate, solve_rows, stepping_rows
 from mbd.kernel.switching import log_event, settle, switch
@@ -246,6 +248,24 @@ def handle_event(K: Any) -> int:
     return EVENT if is_awaited(K, first) else -1
 
 
+def land(K: Any, h: float, t1: float) -> int:
+    """End a non-smooth step: rows before and after, impact, restart. Negative: nothing for the caller to do."""
+    first = K.state[LOGGED]
+    status = strike(K, h, t1)
+    if status != 0:
+        return status
+    store_row(K)
+    status = rebound(K)
+    if status != 0:
+        return status
+    status = restart(K)
+    if status != 0:
+        return status
+    store_row(K)
+    K.state[REDONE] = 0
+    return EVENT if is_awaited(K, first) else -1
+
+
 def advance(K: Any) -> int:
     """Step until `until`, a full store, a mode without code, an event to report, or a failure."""
     steps = 0
@@ -305,6 +325,17 @@ def advance(K: Any) -> int:
             if status >= 0:
                 return status
             continue
+        if K.strategy == 1 and not quiet:
+            if lets_go(K) > 0:
+                if K.state[REDONE] > K.max_switches:
+                    return CHATTER
+                continue
+            if lands(K):
+                status = land(K, h, t1)
+                if status >= 0:
+                    return status
+                continue
+            K.state[REDONE] = 0
         if h < full:
             K.counts[SHORTENED] += 1
             K.state[INCHING] += 2

@@ -31,7 +31,7 @@ ENTRY = "mbd_kernel"
 
 MODULES = (
     "linear", "redundancy", "restart", "complementarity", "impact", "careful", "newmark", "guards", "locate",
-    "switching", "advance",
+    "switching", "nonsmooth", "advance",
 )  # fmt: skip
 
 

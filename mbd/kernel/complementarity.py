@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from mbd.kernel.fields import NO_IMPACT
+from mbd.kernel.fields import NO_IMPACT, PAST_TIME
 from mbd.kernel.restart import (
     MOST_LOADS,
     active_rows,
@@ -80,17 +80,19 @@ def solve_branches(K: Any, level: int) -> int:
         if evaluate_loaded(K, whole(K, level)) < 1e-13 or K.loaded == 0:
             break
     for f in range(K.n_frictions):
-        limit = limit_of(K, f) - (K.base_limit[f] if level == 1 else 0.0)
-        K.limit[f] = limit
+        row = K.friction_row[f]
+        K.limit[f] = limit_of(K, f)
+        if level == 1:  # a force that stays finite has an impulse only over the time of a non-smooth step
+            K.limit[f] += (K.detail[PAST_TIME] - 1.0) * K.base_limit[f]
         if slides(K, f):
-            K.impulse[K.friction_row[f]] = K.slip[f] * limit
+            K.impulse[row] = K.slip[f] * K.limit[f] - (K.past[row] if level == 1 else 0.0)
     return status
 
 
 def whole(K: Any, level: int) -> Any:
-    """The multipliers that friction follows: with the impulses that are given."""
+    """The multipliers that friction follows: with the impulses that are given, and those of a smooth step before."""
     for k in range(K.n_rows):
-        K.loads[k] = K.impulse[k] + (K.given[k] if level == 1 else 0.0)
+        K.loads[k] = K.impulse[k] + (K.given[k] + K.past[k] if level == 1 else 0.0)
     return K.loads
 
 
@@ -104,6 +106,12 @@ def load(K: Any, level: int) -> None:
         K.force[i] = 0.0
         for k in range(K.n_rows):
             K.force[i] += K.acc[o_R + i * K.n_rows + k] * K.given[k] if K.given[k] != 0.0 else 0.0
+    if K.strategy == 1 and level == 1:
+        for f in range(K.n_frictions):
+            if slides(K, f):  # what friction lacks of its limit under the forces of the smooth step
+                row = K.friction_row[f]
+                for i in range(K.n):
+                    K.force[i] += K.acc[o_R + i * K.n_rows + row] * (K.slip[f] * K.past_limit[f] - K.past[row])
 
 
 def is_on(K: Any, f: int) -> bool:
@@ -137,7 +145,7 @@ def friction_fault(K: Any, f: int, largest: float) -> float:
     """How badly friction f breaks its law, relative; ≤ 0 if it does not."""
     row = K.friction_row[f]
     if K.sticks[f] == 1:
-        return float(abs(K.impulse[row]) - K.limit[f] - 1e-11 * largest)
+        return float(abs(K.impulse[row] + K.past[row]) - K.limit[f] - 1e-11 * largest)
     n = K.n
     o_B = n * n + n + n * K.n_rows
     value = K.bias[row]
@@ -169,7 +177,8 @@ def turn(K: Any, f: int) -> None:
     """The other branch of a friction: from sticking to sliding as its multiplier pulls, and back."""
     if K.sticks[f] == 1:
         K.sticks[f] = 0
-        K.slip[f] = 1.0 if K.impulse[K.friction_row[f]] > 0.0 else -1.0
+        row = K.friction_row[f]
+        K.slip[f] = 1.0 if K.impulse[row] + K.past[row] > 0.0 else -1.0
     else:
         K.sticks[f] = 1
         K.slip[f] = 0.0

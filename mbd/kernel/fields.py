@@ -19,6 +19,7 @@ INTEGERS = (
     "max_iterations", "max_switches", "linear",  # linear: event instants by one linear interpolation
     "width", "capacity", "stride", "event_width", "event_capacity",  # storage
     "chunk",  # steps before control returns
+    "strategy",  # 0 located events, 1 non-smooth steps
     "impact_law",  # 0 Newton, 1 Poisson, 2 sequential
     "n_watched",  # guard values in all
     "loaded",  # 1: a friction follows multipliers other than linearly
@@ -37,6 +38,7 @@ REAL_ARRAYS = (
     "force", "bias", "jump", "impulse",  # complementarity: right-hand sides, velocity or acceleration, multipliers
     "slip", "limit", "base_limit",  # frictions: sign of sliding, largest, at zero multipliers
     "given", "total", "total_jump", "loads", "trial", "trial_given", "trial_jump",  # phases of an impact
+    "before", "past", "past_limit",  # non-smooth steps: gap rates before, impulses and limits of the smooth part
     "guards0", "guards1",  # guard values at the accepted state and at the candidate
     "scale",  # magnitudes of r, h, ḣ term by term
     "deepest", "sinking",  # lowest gap of each contact while ignored; time of its first release into its surface
@@ -67,7 +69,9 @@ FIELDS = (*INTEGERS, *REALS, *REAL_ARRAYS, *INTEGER_ARRAYS, "code", "hooks")
 Kernel = namedtuple("Kernel", FIELDS)  # type: ignore[misc]
 
 # places in `state`
-MODE, ROWS, GRID, RESTART, STORED, LOGGED, SWITCHES, SINCE_STORE, BLOCKED, N_DROPPED, NEAR, INCHING = range(12)
+(
+    MODE, ROWS, GRID, RESTART, STORED, LOGGED, SWITCHES, SINCE_STORE, BLOCKED, N_DROPPED, NEAR, INCHING, REDONE,
+) = range(13)  # fmt: skip
 # places in `counts`
 (
     STEPS, ITERATIONS, TANGENTS, RESIDUALS, FACTORIZATIONS, EVENTS, RESTARTS, IMPACTS, LOCATIONS, STAGNATIONS, CAREFUL,
@@ -75,6 +79,8 @@ MODE, ROWS, GRID, RESTART, STORED, LOGGED, SWITCHES, SINCE_STORE, BLOCKED, N_DRO
 ) = range(13)  # fmt: skip
 # places in `detail` of the sizes of velocity corrections: of the last, and of the last ordinary step
 CORRECTED, USUAL = 4, 5
+# and of the time that K.past covers, of the last correction of positions by contacts
+PAST_TIME, LIFTED = 6, 7
 # places in `clock`
 NOW, BASE, AUX_STEP, LAST_SWITCH = range(4)
 # functions in `code`; modes follow in pairs (tangent, residual)

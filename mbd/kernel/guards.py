@@ -214,7 +214,7 @@ def judge(K: Any, h: float) -> bool:
     K.fired[0] = -1
     K.pick[0] = 2.0
     for c in range(nC):
-        if K.active[c] == 1:  # already found to be no event in this step
+        if K.active[c] == 1 or (K.strategy == 1 and K.kind[c] == 0):  # found to be no event, or not located
             continue
         g0 = K.guards0[c]
         g1 = K.guards1[c]
@@ -257,8 +257,9 @@ def judge(K: Any, h: float) -> bool:
                 consider(K, OPEN_FORCE, c, max(low, crossing(K.guards0[2 * nC + c], K.guards1[2 * nC + c])), low)
     for e in range(K.n_guards):
         judge_user(K, e, h)
-    for f in range(K.n_frictions):
-        judge_friction(K, f, h)
+    if K.strategy == 0:
+        for f in range(K.n_frictions):
+            judge_friction(K, f, h)
     return bool(K.fired[0] >= 0)
 
 

@@ -17,7 +17,7 @@ from __future__ import annotations
 from typing import Any
 
 from mbd.kernel.complementarity import complementarity
-from mbd.kernel.fields import ENERGY_GAIN, IMPACTS, NO_IMPACT, NOW, STRONGE
+from mbd.kernel.fields import ENERGY_GAIN, IMPACTS, NO_IMPACT, NOW, PAST_TIME, STRONGE
 from mbd.kernel.restart import capture, evaluate, evaluate_loaded, limit_of, row_speed
 
 __all__ = ["impact"]
@@ -71,6 +71,10 @@ def prepare(K: Any) -> None:
         evaluate_loaded(K, K.given)
         for f in range(K.n_frictions):
             K.base_limit[f] = limit_of(K, f)  # no impulse comes from a force that stays finite
+        if K.strategy == 1:
+            evaluate_loaded(K, K.past)
+            for f in range(K.n_frictions):
+                K.past_limit[f] = limit_of(K, f) + (K.detail[PAST_TIME] - 1.0) * K.base_limit[f]
     start_over(K)
 
 
@@ -137,7 +141,7 @@ def newton_law(K: Any, slow: bool) -> int:
         K.given[k] = 0.0
         K.bias[k] = row_speed(K, k)
         if c >= 0 and K.closing[c] > 0 and not slow and K.row_normal[k] == 1:
-            K.bias[k] *= 1.0 + K.restitution[c]
+            K.bias[k] += K.restitution[c] * (K.before[c] if K.strategy == 1 else K.bias[k])
     status = blow(K)
     if status == 0 and not slow:
         let_rebound(K)
@@ -147,7 +151,8 @@ def newton_law(K: Any, slow: bool) -> int:
 def let_rebound(K: Any) -> None:
     """Contacts that closed with a restitution leave again."""
     for c in range(K.n_contacts):
-        if K.closing[c] > 0 and K.restitution[c] > 0.0:
+        rests = K.strategy == 1 and K.before[c] >= 0.0
+        if K.closing[c] > 0 and K.restitution[c] > 0.0 and not rests:
             K.active[c] = 0
 
 

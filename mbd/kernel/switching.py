@@ -45,7 +45,7 @@ def log_event(K: Any, kind: int, index: int, loss: float, struck: bool) -> None:
     K.log[o + 3] = loss
     K.log[o + 4] = float(K.state[STORED])
     for k in range(K.n_rows):
-        K.log[o + 5 + k] = -K.impulse[k] if struck and K.row_contact[k] == index else 0.0
+        K.log[o + 5 + k] = 0.0 - K.impulse[k] if struck and K.row_contact[k] == index else 0.0
     K.state[LOGGED] += 1
     K.counts[EVENTS] += 1
 
@@ -55,8 +55,6 @@ def settle(K: Any) -> int:
 
     Frictions that do not move stick or begin to slide.
     """
-    for f in range(K.n_frictions):
-        K.was[f] = frictional_state(K, f)
     find_slips(K)
     evaluate(K, K.clock[NOW], K.q, K.y)
     for k in range(K.n_rows):
@@ -101,6 +99,7 @@ def settle(K: Any) -> int:
                 log_event(K, LOG_STUCK, f, 0.0, False)
             elif now != 0 and K.was[f] != 0:
                 log_event(K, LOG_SLIPPED, f, 0.0, False)
+            K.was[f] = now
     return 0
 
 

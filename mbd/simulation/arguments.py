@@ -19,7 +19,7 @@ from mbd.state import State
 __all__ = ["callbacks", "choices", "end_of", "fits", "numbers"]
 
 CHOICES = {
-    "contact": ("events",), "impact": ("newton", "poisson", "sequential"),
+    "contact": ("auto", "events", "nonsmooth"), "impact": ("newton", "poisson", "sequential"),
     "locate": ("root", "linear"), "on_failure": ("raise", "return"),
 }  # fmt: skip
 

@@ -91,6 +91,7 @@ class Stepper:
             o_lam=layout.lam, o_anchor=layout.anchor, o_switch=layout.switch, o_slip=layout.slip,
             n_frictions=layout.n_frictions, n_watched=self.mechanism.sizes["guards"],
             loaded=int(is_loaded(self.mechanism.equations)), impact_law=LAWS.index(options.get("impact", "newton")),
+            strategy=int(options.get("contact") == "nonsmooth"),
             vector=int(self.mechanism.vector),
             stabilized=int(self.stabilized), max_iterations=MAX_ITERATIONS,
             max_switches=20 + 4 * n_contacts,
@@ -124,7 +125,8 @@ class Stepper:
             "guards0": v["n_watched"], "guards1": v["n_watched"], "scale": n + 2 * rows,
             "deepest": contacts, "sinking": contacts, "side": guards, "pick": 8, "detail": 8,
             "slip": frictions, "limit": frictions, "base_limit": frictions, "given": rows, "total": rows,
-            "total_jump": n, "loads": rows, "trial": rows, "trial_given": rows, "trial_jump": n,
+            "total_jump": n, "loads": rows, "before": contacts, "past": rows, "past_limit": frictions,
+            "trial": rows, "trial_given": rows, "trial_jump": n,
             "store": v["capacity"] * v["width"], "log": v["event_capacity"] * v["event_width"],
         }  # fmt: skip
         integers = {

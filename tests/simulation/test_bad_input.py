@@ -72,7 +72,7 @@ WRONG = {
     "store 1.5": ({"store": 1.5}, "store"),
     "store True": ({"store": True}, "store"),
     "locate": ({"locate": "exact"}, "'root' or 'linear'"),
-    "contact": ({"contact": "nonsmooth"}, "'events'"),
+    "contact": ({"contact": "smooth"}, "'events'"),
     "impact": ({"impact": "stronge"}, "'newton'"),
     "on_failure": ({"on_failure": "ignore"}, "'raise' or 'return'"),
     "tol": ({"tol": 1e-6}, "dt"),

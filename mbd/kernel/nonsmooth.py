@@ -1,0 +1,211 @@
+"""Contact without locating instants: fixed steps, positions and velocities corrected at their ends.
+
+After Brüls, Acary & Cardona 2014 (Comput. Methods Appl. Mech. Eng. 281:131). A step is taken smoothly with the contacts
+that are closed, whose rows keep the order of the scheme. At its end
+
+positions    ``M U + B_bᵀ ν_b = B_uᵀ ν_u``, ``h(q₁) = 0``, ``0 ≤ g(q₁) ⟂ ν_u ≥ 0`` with ``q₁ = q~ ⊕ U``
+velocities   the impact law from v~, with ``0 ≤ γ₁ + e γ₀ ⟂ Λ_u ≥ 0``, γ₀ the gap rate before the step, and friction
+             whose impulse over the whole step obeys Coulomb's law
+forces       those of consistent accelerations, from which the scheme starts again
+
+instead of carrying the accelerations of the free flight on. A contact that would pull over a step, and a friction
+beyond its limit, let go before it, and the step is taken again.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mbd.kernel.complementarity import complementarity
+from mbd.kernel.fields import (
+    COMPOSE,
+    LIFTED,
+    LOG_OPENED,
+    NO_IMPACT,
+    NOW,
+    PAST_TIME,
+    REDONE,
+    RESTART,
+)  # fmt: skip
+from mbd.kernel.guards import frictions_at, gap_scale, gap_tolerance, is_watched, watch
+from mbd.kernel.hooks import call
+from mbd.kernel.restart import evaluate
+from mbd.kernel.switching import STILL, close_by_impact, log_event, mark_touching
+
+__all__ = ["lands", "lets_go", "rebound", "strike"]
+
+MOST_LIFTS = 20
+"""Corrections of positions at one instant [-]."""
+PULL = 1e-9
+"""Pull over a step, relative to the forces, above which a contact lets go before it [-]."""
+RESTING = 2.0
+"""Approach speed over the change of speed in a step below which a contact rests instead of rebounding [-]."""
+
+
+def lets_go(K: Any) -> int:
+    """Contacts that pulled and frictions beyond their limits in the step just tried let go before it; how many."""
+    force = 0.0
+    for i in range(K.n_v):
+        force = max(force, K.scale[i])
+    count = 0
+    for c in range(K.n_contacts):
+        if K.kind[c] == 0 and K.closed[c] == 1 and K.opens[c] == 0 and K.lam1[K.normal[c]] > PULL * force:
+            K.closed[c] = 0
+            K.armed[c] = 1
+            count += 1
+            log_event(K, LOG_OPENED, c, 0.0, False)
+    limits = frictions_at(K) + 2 * K.n_frictions
+    for f in range(K.n_frictions):
+        c = K.friction_contact[f]
+        if c >= 0 and K.closed[c] == 0:
+            K.sticks[f] = 0
+            K.slip[f] = 0.0
+            continue
+        pull = K.lam1[K.friction_row[f]]
+        if K.sticks[f] == 1 and abs(pull) - K.guards1[limits + f] > PULL * force:
+            K.sticks[f] = 0
+            K.slip[f] = 1.0 if pull > 0.0 else -1.0
+            K.loose[f] = 3
+            count += 1
+    if count > 0:
+        K.state[RESTART] = 2
+        K.state[REDONE] += 1
+    return count
+
+
+def lands(K: Any) -> bool:
+    """Whether open contacts lie below their surfaces at the candidate, or a friction has turned around.
+
+    The contacts are marked in K.closing.
+    """
+    found = False
+    for c in range(K.n_contacts):
+        K.closing[c] = 0
+        if K.kind[c] == 0 and K.closed[c] == 0 and K.armed[c] == 1 and is_watched(K, c, K.guards0):
+            if K.guards1[c] < -gap_tolerance(K, c):
+                K.closing[c] = 1
+                found = True
+    for f in range(K.n_frictions):
+        if K.slip[f] != 0.0:
+            turned = -K.slip[f] * K.guards1[frictions_at(K) + f]
+            if turned > STILL:
+                found = True
+    return found
+
+
+def lift(K: Any) -> int:
+    """Positions of K.q moved least, in the metric of M, until no contact lies below its surface."""
+    for f in range(K.n_frictions):
+        K.limit[f] = K.slip[f]  # kept here: friction moves nothing
+        K.slip[f] = 0.0
+        K.loose[f] = 0
+    status = NO_IMPACT
+    for _ in range(MOST_LIFTS):
+        for c in range(K.n_contacts):
+            near = K.closing[c] > 0 or K.closed[c] == 1
+            if K.kind[c] == 0 and not near and K.armed[c] == 1 and is_watched(K, c, K.guards0):
+                near = K.guards0[c] < gap_tolerance(K, c)
+                K.closing[c] = 1 if near else 0
+            K.active[c] = 1 if (near and K.kind[c] == 0) else 0
+            K.free[c] = 1 if (K.active[c] == 1 and K.closed[c] == 0 and K.closing[c] == 1) else 0
+            K.parting[c] = 0
+        status = lift_once(K)
+        if status != 0:
+            break
+        for c in range(K.n_contacts):  # one that was lifted stays at its surface while others follow
+            if K.closing[c] == 1 and K.kind[c] == 0 and K.impulse[K.normal[c]] < 0.0:
+                K.closing[c] = 3
+        watch(K, K.clock[NOW], K.q, K.y, K.rate, K.lam, K.guards0)
+        left = 0.0
+        for c in range(K.n_contacts):
+            if K.kind[c] == 0 and K.armed[c] == 1 and K.closed[c] == 0 and is_watched(K, c, K.guards0):
+                left = max(left, -K.guards0[c] / gap_tolerance(K, c))
+        if left <= 1.0 and K.detail[LIFTED] <= 1e-12:
+            break
+    for f in range(K.n_frictions):
+        K.slip[f] = K.limit[f]
+    return status
+
+
+def lift_once(K: Any) -> int:
+    """One Newton step of `lift`; the size of the correction relative to 1 is left in K.detail[LIFTED]."""
+    n = K.n
+    evaluate(K, K.clock[NOW], K.q, K.y)
+    o_h = n * n + n + 2 * n * K.n_rows
+    for i in range(n):
+        K.force[i] = 0.0
+    for k in range(K.n_rows):
+        c = K.row_contact[k]
+        K.given[k] = 0.0
+        held = c < 0 or K.closed[c] == 1 or K.row_normal[k] == 1
+        K.bias[k] = K.acc[o_h + k] if held else 0.0  # a contact that comes down keeps its place along the surface
+    status = complementarity(K, 2)
+    if status != 0:
+        return status
+    moved = 0.0
+    for i in range(K.n_v):
+        moved = max(moved, abs(K.jump[i]))
+    K.detail[LIFTED] = moved
+    if K.vector == 1:
+        for i in range(K.n_q):
+            K.q[i] += K.jump[i]
+    else:
+        for i in range(K.n_q):
+            K.block[K.o_q + i] = K.q[i]
+        for i in range(K.n_v):
+            K.block[K.o_x + i] = K.jump[i]
+        call(K, COMPOSE, K.q)
+        for i in range(K.n_v):
+            K.block[K.o_x + i] = 0.0
+    return 0
+
+
+def strike(K: Any, h: float, t1: float) -> int:
+    """The candidate becomes the accepted state, lifted out of the surfaces."""
+    nC = K.n_contacts
+    for c in range(nC):
+        K.before[c] = K.guards0[nC + c]
+    for i in range(K.n_q):
+        K.q[i] = K.q1[i]
+    for i in range(K.n):
+        K.y[i] = K.y1[i]
+        K.rate[i] = K.rate1[i]
+    for k in range(K.n_rows):
+        K.lam[k] = K.lam1[k]
+    K.clock[NOW] = t1
+    for i in range(K.n_watched):
+        K.guards0[i] = K.guards1[i]
+    status = lift(K)
+    if status != 0:
+        return status
+    for k in range(K.n_rows):
+        K.past[k] = h * K.lam[k]
+    K.detail[PAST_TIME] = h
+    return 0
+
+
+def rebound(K: Any) -> int:
+    """The impact of a step, after `strike`; where all that come down rest, none of the closed contacts leaves."""
+    nC = K.n_contacts
+    fastest = 0.0
+    for c in range(nC):
+        if K.kind[c] != 0 or K.closed[c] == 1:
+            K.closing[c] = 0
+            continue
+        near = K.closing[c] == 3 or K.guards0[c] <= 1e-10 * gap_scale(K, c)
+        ready = K.armed[c] == 1 and is_watched(K, c, K.guards0)
+        K.closing[c] = 1 if (near and ready) else 0
+        if K.closing[c] == 1:
+            approach = max(-K.before[c], 0.0)
+            gained = abs(K.guards0[nC + c] - K.before[c])
+            if approach < RESTING * gained:
+                K.before[c] = 0.0  # it rests
+            else:
+                fastest = max(fastest, approach)
+    status = close_by_impact(K, fastest)
+    if status == 0:
+        mark_touching(K)
+    for k in range(K.n_rows):
+        K.past[k] = 0.0
+    K.detail[PAST_TIME] = 0.0
+    return status
