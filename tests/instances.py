@@ -85,6 +85,18 @@ def dune(x: float, z: float) -> float:
     return height
 
 
+def swell(x: float, t: float) -> float:
+    """A ground that moves up and down, a wave running over it."""
+    height: float = 0.1 * mbd.sin(2.0 * x - 3.0 * t)
+    return height
+
+
+def waves(x: float, z: float, t: float) -> float:
+    """The same in two directions."""
+    height: float = 0.1 * mbd.sin(2.0 * x + z - 3.0 * t) + 0.05 * t
+    return height
+
+
 def skid(vx: float, vy: float, angle: float) -> float:
     """Velocity across a direction."""
     row: float = vx * mbd.sin(angle) - vy * mbd.cos(angle)
@@ -118,6 +130,10 @@ MEASURES: list[tuple[str, Callable[[Frame, Frame, Joint], Measure]]] = [
     ("touchdown on a plane", lambda a, b, joint: mbd.touchdown(a, mbd.Plane((0.3, 1.0, -0.2), 0.4))),
     ("touchdown on a hill", lambda a, b, joint: mbd.touchdown(a, hill)),
     ("touchdown on dunes", lambda a, b, joint: mbd.touchdown(a, dune)),
+    ("touchdown on a body", lambda a, b, joint: mbd.touchdown(a, mbd.Plane((0.3, 1.0, -0.2), 0.1, frame=b))),
+    ("touchdown on a belt", lambda a, b, joint: mbd.touchdown(a, mbd.Plane(velocity=(0.4, 0.0, 0.1)))),
+    ("touchdown on a swell", lambda a, b, joint: mbd.touchdown(a, swell)),
+    ("touchdown on waves", lambda a, b, joint: mbd.touchdown(a, waves)),
     ("height", lambda a, b, joint: mbd.height(a)),
     ("flexion", lambda a, b, joint: mbd.flexion(joint)),
     ("extension", lambda a, b, joint: mbd.extension(joint, offset=0.1)),
@@ -131,9 +147,14 @@ CONSTRAINTS: list[tuple[str, Callable[[Frame, Frame, Joint], Constraint]]] = [
     ("foot that sticks", lambda a, b, joint: mbd.Unilateral("law", mbd.touchdown(a))),
     ("foot that bounces", lambda a, b, joint: mbd.Unilateral("law", mbd.touchdown(b), restitution=0.7, friction=0.0)),
     ("foot on a hill", lambda a, b, joint: mbd.Unilateral("law", mbd.touchdown(b, hill))),
+    ("foot on a plate", lambda a, b, joint: mbd.Unilateral("law", mbd.touchdown(b, mbd.Plane(frame=a)), friction=0.0)),
+    ("foot on a belt", lambda a, b, joint: mbd.Unilateral("law", mbd.touchdown(b, mbd.Plane(velocity=(0.4, 0.0))))),
+    ("foot on a swell", lambda a, b, joint: mbd.Unilateral("law", mbd.touchdown(b, swell))),
+    ("ball on a swell", lambda a, b, joint: mbd.Unilateral("law", mbd.touchdown(a, swell), 0.7, friction=0.0)),
     ("knee lock", lambda a, b, joint: mbd.Unilateral("law", mbd.flexion(joint))),
     ("rubber stop", lambda a, b, joint: mbd.Penalty("law", mbd.flexion(joint), stiffness=1e3, damping=2.0)),
     ("mat", lambda a, b, joint: mbd.Penalty("law", mbd.touchdown(a), 1e4, damping=10.0, release="pull")),
+    ("raft", lambda a, b, joint: mbd.Penalty("law", mbd.touchdown(a, swell), 1e4, damping=10.0, release="pull")),
     ("ball", lambda a, b, joint: mbd.Penalty("law", mbd.height(a), 1e5, exponent=1.5, restitution=0.5)),
     ("rod", lambda a, b, joint: mbd.Bilateral("law", mbd.distance(a, b), value=0.6)),
     ("slot", lambda a, b, joint: mbd.Bilateral("law", mbd.separation(a, b, (1, 1, 0)))),
@@ -141,6 +162,7 @@ CONSTRAINTS: list[tuple[str, Callable[[Frame, Frame, Joint], Constraint]]] = [
     ("blade", lambda a, b, joint: mbd.KnifeEdge("law", a)),
     ("nonholonomic row", lambda a, b, joint: mbd.Nonholonomic("law", skid, arguments=SKID)),
     ("rolling", lambda a, b, joint: mbd.Rolling("law", a, radius=0.3)),
+    ("rolling on a belt", lambda a, b, joint: mbd.Rolling("law", a, 0.3, mbd.Plane(velocity=(0.4, 0.0)))),
 ]
 
 INTEGRATORS: list[Integrator] = [

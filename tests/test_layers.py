@@ -23,7 +23,7 @@ RANKS = [
     ("integrators",),
     ("assembly", "conditions", "posture", "results", "simulation", "trajectory"),
     ("analysis", "view"),
-    ("cli", "testing"),
+    ("cli", "hardcases", "testing"),
 ]
 """From the lowest layer to the highest; parts of one layer may know each other."""
 

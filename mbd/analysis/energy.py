@@ -2,6 +2,9 @@
 
 ``ΔE = Δ(T + V) = Σ_effects ∫ P dt + Σ_rows ∫ λ h_t dt + Σ_impacts (T⁺ − T⁻) + … + numerical``
 
+A surface that moves with time does work through its contact: λ h_t of a closed one, −p ∂g/∂t of a penalty (whose own
+part is p ġ, that of the motion against the surface), and Λ h_t in an impact, apart from what the impact loses.
+
 Every physical part is integrated on its own, by Simpson's rule with the run's own cubic interpolation between the
 rows, which is more accurate than a second-order scheme; `numerical` is what is left: the integrator's own gain or loss,
 which falls with dt at the scheme's order.
@@ -43,7 +46,8 @@ def ledger(columns: ModelColumns) -> Ledger:
     works = _integrals(columns, [power for _, _, power in powers])
     named = [Part(name, kind, work) for (name, kind, _), work in zip(powers, works, strict=True)]
     moved = np.cumsum(np.where(_after_switch(columns), 0.0, np.diff(moving, prepend=moving[0])))
-    unnamed = [Part("moving coordinates", "drive", moved), *_jumps(columns, total)]
+    driven = any(kind == "drive" for _, kind, _ in powers)
+    unnamed = [Part("moving coordinates", "drive", moved), *_jumps(columns, total, driven)]
     least = ROUND_OFF * float(np.max(np.abs(kinetic) + np.abs(potential), initial=0.0))
     kept = [part for part in unnamed if np.max(np.abs(part.energy)) > least]
     return Ledger(columns.record.time, kinetic, potential, (*named, *kept), columns.record.settings.get("store", 1))
@@ -86,6 +90,12 @@ def _powers(equations: Equations) -> list[tuple[str, str, Node]]:
         if not speed.is_zero:
             add(row.owner, "drive", tape.input("lam", number) * speed)
     clock: dict[Node, Scalar] = {tape.input("t"): 1.0}
+    for number, contact in enumerate(equations.contacts):
+        speed = jvp([contact.gap], clock)[0]
+        if contact.force is not None and not speed.is_zero:
+            work = tape.input("switch", number) * contact.force * speed
+            add(contact.name, "penalty", work)
+            add(f"surface of {contact.name}", "drive", -work)
     states: dict[Node, Scalar] = {tape.input("z", k): tape.input("s", k) for k in range(equations.n_z)}
     for name, power in (
         ("moving coordinates, explicit", -jvp([equations.kinetic], clock)[0]),
@@ -114,12 +124,23 @@ def _after_switch(columns: ModelColumns) -> Any:
     return np.diff(time, prepend=time[0] - 1.0) <= 0.0
 
 
-def _jumps(columns: ModelColumns, total: Vector) -> list[Part]:
-    """Changes of energy at an instant: impacts where a contact closed, resets elsewhere."""
+def _jumps(columns: ModelColumns, total: Vector, driven: bool) -> list[Part]:
+    """Changes of energy at an instant: impacts where a contact closed, resets elsewhere.
+
+    Where something is `driven` an impact gives what its events do not lose: the work of the drives and surfaces.
+    """
     record = columns.record
     jumps = np.where(_after_switch(columns), np.diff(total, prepend=total[0]), 0.0)
-    struck = np.isin(record.time, [record.time[event.row] for event in record.events if event.kind == "closed"])
+    closings = [event for event in record.events if event.kind == "closed"]
+    struck = np.isin(record.time, [record.time[event.row] for event in closings])
+    given = np.where(struck, jumps, 0.0)
+    resets = Part("resets", "reset", np.cumsum(np.where(struck, 0.0, jumps)))
+    if not driven:
+        return [Part("impacts", "impact", np.cumsum(given)), resets]
+    lost = np.zeros(len(given))
+    np.add.at(lost, [event.row for event in closings], [-event.energy_loss for event in closings])
     return [
-        Part("impacts", "impact", np.cumsum(np.where(struck, jumps, 0.0))),
-        Part("resets", "reset", np.cumsum(np.where(struck, 0.0, jumps))),
+        Part("impacts", "impact", np.cumsum(lost)),
+        Part("drives at impacts", "drive", np.cumsum(given - lost)),
+        resets,
     ]

@@ -11,7 +11,8 @@ from mbd.constraints.penalty import Penalty
 from mbd.constraints.penalty_parameters import PenaltyParameters, penalty_parameters
 from mbd.constraints.rolling import Rolling
 from mbd.constraints.rules import When
-from mbd.constraints.touchdown import Plane, touchdown
+from mbd.constraints.surfaces import Plane
+from mbd.constraints.touchdown import touchdown
 from mbd.constraints.unilateral import Unilateral
 from mbd.constraints.user_measure import measure
 

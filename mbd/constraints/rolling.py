@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from mbd.bodies.algebra import cross, dot, scaled, total
+from mbd.bodies.algebra import cross, difference, dot, scaled, total
 from mbd.bodies.base import Frame
 from mbd.bodies.ground import Ground
 from mbd.bodies.values import name_of, number
 from mbd.constraints.base import VelocityConstraint
-from mbd.constraints.touchdown import Plane
+from mbd.constraints.surfaces import Plane
 from mbd.errors import CapabilityError, ModelError
 from mbd.forces.base import frame_of
 from mbd.forces.quantities import Mention
@@ -22,9 +22,10 @@ __all__ = ["Rolling"]
 
 @dataclass(frozen=True)
 class Rolling(VelocityConstraint):
-    """``t · (v_C + ω × (−r n)) = 0``: the point of a wheel that touches a plane does not slip along it.
+    """``t · (v_C + ω × (−r n) − v_P) = 0``: the point of a wheel that touches a plane does not slip along it.
 
-    n is the plane's normal and t the direction forward along it (x on level ground), r the radius, C the center. Only
+    n is the plane's normal and t the direction forward along it (x on level ground), r the radius, C the center, v_P
+    the velocity of the plane there, where it lies on another body (which then feels the friction) or runs. Only
     the slip is held at zero; the wheel stays on the plane by what you give it, such as ``Bilateral`` or ``Unilateral``
     on ``touchdown(center, Plane(offset=radius))`` without friction, or a joint.
 
@@ -59,6 +60,11 @@ class Rolling(VelocityConstraint):
                 f"ground of Rolling '{self.name}': its normal must lie in the x-y plane, in which the wheel rolls, "
                 f"got {self.ground.normal}"
             )
+        if self.ground.frame is not None and not self.ground.frame.is_planar:
+            raise ModelError(
+                f"ground of Rolling '{self.name}': the wheel rolls in the x-y plane, but its frame "
+                f"'{self.ground.frame.full_name}' is tilted out of it; turn the frame about z only"
+            )
 
     @property
     def unit(self) -> str:
@@ -74,23 +80,32 @@ class Rolling(VelocityConstraint):
                 "that tilts in space is not solved by this version: write its rows with mbd.Nonholonomic"
             )
         r = scope.parameter(self.name, "radius", self.radius)
-        slip = total(motion.velocity, cross(motion.angular_velocity, scaled(-r, self.ground.normal)))
-        forward, _ = self.ground.directions(motion.position, scope)
-        return [("", dot(forward, slip))]
+        ground = self.ground
+        arm = scaled(-r, ground.turned(ground.normal, scope))
+        slip = total(motion.velocity, cross(motion.angular_velocity, arm))
+        if ground.is_moving:
+            slip = difference(slip, ground.velocity_at(total(motion.position, arm), scope))
+        forward, _ = ground.directions(motion.position, scope)
+        return [("", dot(ground.turned(forward, scope), slip))]
 
     def mentions(self) -> list[Mention]:
-        """Its center."""
-        return [self.center]
+        """Its center, and the frame of the plane."""
+        return [self.center] if self.ground.frame is None else [self.center, self.ground.frame]
 
     def parameters(self) -> dict[str, float]:
         """`radius`."""
         return {f"{self.name}.radius": self.radius}
 
     def faults(self) -> list[str]:
-        """A radius that is not positive, a wheel that is the ground."""
+        """A radius that is not positive, a wheel that is the ground, or that rolls on itself."""
         found = []
         if self.radius <= 0.0:
             found.append(f"Rolling '{self.name}': radius {self.radius:g} m is not positive; give a value > 0")
         if isinstance(self.center.body, Ground):
             found.append(f"Rolling '{self.name}' has its center on the ground; give a frame of the wheel")
+        elif self.ground.frame is not None and self.ground.frame.body is self.center.body:
+            found.append(
+                f"Rolling '{self.name}': its plane lies on the wheel '{self.center.body.name}' itself; give the "
+                "plane a frame of another body"
+            )
         return found

@@ -255,7 +255,7 @@ def _penalty(found: Laws, scope: Surroundings, dynamics: Dynamics, law: Penalty,
             opens_on=law.opens_on, unit=law.measure.unit,
         )
     )  # fmt: skip
-    found.effects.append(penalty_effect(law.name, number, rate, force, generalized))
+    found.effects.append(penalty_effect(law.name, number, gap, rate, force, generalized, scope))
 
 
 def _guard(scope: Surroundings, event: Event) -> Guard:

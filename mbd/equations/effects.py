@@ -115,9 +115,12 @@ def effect_of(cause: Cause, scope: Surroundings, dynamics: Dynamics) -> Effect:
     return Effect(cause.name, cause.kind, _lazily(scope, dynamics, cause.work), power, potential)
 
 
-def penalty_effect(name: str, contact: int, rate: Node, force: Node, generalized: Sequence[Node]) -> Effect:
-    """A penalty contact as an effect; its power is force · ġ while it acts."""
-    return Effect(name, "penalty", lambda: generalized, force * rate, contact=contact)
+def penalty_effect(
+    name: str, contact: int, gap: Node, rate: Node, force: Node, generalized: Sequence[Node], scope: Surroundings
+) -> Effect:
+    """A penalty contact as an effect; its power on the mechanism is force · (ġ − ∂g/∂t) while it acts."""
+    drift = jvp([gap], {scope.time: 1.0})[0]
+    return Effect(name, "penalty", lambda: generalized, force * (rate - drift), contact=contact)
 
 
 def _lazily(scope: Surroundings, dynamics: Dynamics, work: Work) -> Callable[[], Sequence[Node]]:

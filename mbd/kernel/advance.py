@@ -7,8 +7,10 @@ from typing import Any
 from mbd.kernel.fields import (
     BASE,
     CHATTER,
+    CLOSE,
     CROSS,
     DONE,
+    ENDLESS,
     EVENT,
     FULL,
     GRID,
@@ -24,6 +26,7 @@ from mbd.kernel.fields import (
     NOT_CONVERGED,
     NOW,
     PAUSE,
+    PLASTIC,
     REDONE,
     RESTART,
     RESTARTS,
@@ -235,13 +238,17 @@ def handle_event(K: Any) -> int:
         K.side[index] = -K.side[index]
         K.state[RESTART] = 1
         return EVENT if is_awaited(K, first) else -1
+    if kind == CLOSE and K.state[SWITCHES] > K.max_switches // 2:  # blows by turns: their limit is plastic, all at once
+        K.state[PLASTIC] = 1
+        K.counts[ENDLESS] += 1
     status = switch(K)
+    K.state[PLASTIC] = 0
     if status != 0:
         return status
     status = restart(K)
+    store_row(K)  # also where no accelerations are consistent: the velocities after the event are known
     if status != 0:
         return status
-    store_row(K)
     for c in range(K.n_contacts):
         if was_closed(K, c) and K.closed[c] == 0 and K.armed[c] != 1 and K.guards0[K.n_contacts + c] < -1e-6:
             K.sinking[c] = min(K.sinking[c], K.clock[NOW])

@@ -30,7 +30,7 @@ __all__ = ["MODULES", "entry", "ir_of_kernel", "object_code", "source_digest"]
 ENTRY = "mbd_kernel"
 
 MODULES = (
-    "linear", "redundancy", "restart", "complementarity", "impact", "careful", "newmark", "guards", "locate",
+    "linear", "lemke", "redundancy", "restart", "complementarity", "impact", "careful", "newmark", "guards", "locate",
     "switching", "nonsmooth", "advance",
 )  # fmt: skip
 

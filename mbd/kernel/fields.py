@@ -71,12 +71,13 @@ Kernel = namedtuple("Kernel", FIELDS)  # type: ignore[misc]
 # places in `state`
 (
     MODE, ROWS, GRID, RESTART, STORED, LOGGED, SWITCHES, SINCE_STORE, BLOCKED, N_DROPPED, NEAR, INCHING, REDONE,
-) = range(13)  # fmt: skip
+    PLASTIC,
+) = range(14)  # fmt: skip
 # places in `counts`
 (
     STEPS, ITERATIONS, TANGENTS, RESIDUALS, FACTORIZATIONS, EVENTS, RESTARTS, IMPACTS, LOCATIONS, STAGNATIONS, CAREFUL,
-    SHORTENED, STRONGE,
-) = range(13)  # fmt: skip
+    SHORTENED, STRONGE, ENDLESS,
+) = range(14)  # fmt: skip
 # places in `detail` of the sizes of velocity corrections: of the last, and of the last ordinary step
 CORRECTED, USUAL = 4, 5
 # and of the time that K.past covers, of the last correction of positions by contacts

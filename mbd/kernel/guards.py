@@ -21,6 +21,7 @@ from mbd.kernel.fields import (
     OPEN_GAP,
     OPEN_PULL,
     PRESS,
+    ROWS,
     SLIP,
     STICK,
     STICK_BRIEF,
@@ -50,24 +51,30 @@ def watch(K: Any, t: float, q: Any, y: Any, rate: Any, lam: Any, values: Any) ->
 
 
 def try_step(K: Any, h: float, t1: float) -> int:
-    """A candidate at t1 = t + h with its guards; a step far below dt follows the Taylor polynomial.
+    """A candidate at t1 = t + h with its guards; a step far below dt with rows is one of Heun's method.
 
+    There an implicit step would divide the round-off of positions by h².
     A scheme leaves velocities, rates and multipliers of the candidate in the block; only its positions are centered.
     """
-    if h >= 1e-3 * K.dt:
+    if h >= 1e-3 * K.dt or (K.state[ROWS] == 0 and h >= 1e-9 * K.dt):
         status = scheme_step(K, h, t1)
         if status != 0:
             return status
     else:
-        fill_block(K, K.clock[NOW], K.q, K.y)
-        for i in range(K.n_v):
-            K.block[K.o_x + i] = h * (K.y[i] + 0.5 * h * (K.rate[i] + h * K.slope[i] / 3.0))
-        compose(K, K.q1)
         for i in range(K.n):
-            K.y1[i] = K.y[i] + h * (K.rate[i] + 0.5 * h * K.slope[i])
-        status = consistent(K, t1, K.q1, K.y1)
-        if status != 0:
-            return status
+            K.rate1[i] = K.rate[i]
+        for _ in range(2):
+            fill_block(K, K.clock[NOW], K.q, K.y)
+            for i in range(K.n_v):
+                K.block[K.o_x + i] = h * (K.y[i] + h * (K.rate[i] / 3.0 + K.rate1[i] / 6.0))
+            compose(K, K.q1)
+            for i in range(K.n):
+                K.y1[i] = K.y[i] + 0.5 * h * (K.rate[i] + K.rate1[i])
+            status = consistent(K, t1, K.q1, K.y1)
+            if status != 0:
+                return status
+            for i in range(K.n):
+                K.rate1[i] = K.jump[i]
         for i in range(K.n):
             K.rate1[i] = K.jump[i]
             K.aux1[i] = K.jump[i]

@@ -17,7 +17,7 @@ from __future__ import annotations
 from typing import Any
 
 from mbd.kernel.complementarity import complementarity
-from mbd.kernel.fields import ENERGY_GAIN, IMPACTS, NO_IMPACT, NOW, PAST_TIME, STRONGE
+from mbd.kernel.fields import ENERGY_GAIN, IMPACTS, NO_IMPACT, NOW, PAST_TIME, PLASTIC, STRONGE
 from mbd.kernel.restart import capture, evaluate, evaluate_loaded, limit_of, row_speed
 
 __all__ = ["impact"]
@@ -35,7 +35,7 @@ def impact(K: Any, slow: bool) -> int:
     """
     prepare(K)
     status = 0
-    if slow or K.impact_law == 0:
+    if slow or K.impact_law == 0 or K.state[PLASTIC] == 1:
         status = newton_law(K, slow)
     elif K.impact_law == 1:
         status = poisson_law(K, False)
@@ -141,18 +141,23 @@ def newton_law(K: Any, slow: bool) -> int:
         K.given[k] = 0.0
         K.bias[k] = row_speed(K, k)
         if c >= 0 and K.closing[c] > 0 and not slow and K.row_normal[k] == 1:
-            K.bias[k] += K.restitution[c] * (K.before[c] if K.strategy == 1 else K.bias[k])
+            K.bias[k] += restitution_of(K, c) * (K.before[c] if K.strategy == 1 else K.bias[k])
     status = blow(K)
     if status == 0 and not slow:
         let_rebound(K)
     return status
 
 
+def restitution_of(K: Any, c: int) -> float:
+    """e, or 0 at the end of impacts without end."""
+    return 0.0 if K.state[PLASTIC] == 1 else float(K.restitution[c])
+
+
 def let_rebound(K: Any) -> None:
     """Contacts that closed with a restitution leave again."""
     for c in range(K.n_contacts):
         rests = K.strategy == 1 and K.before[c] >= 0.0
-        if K.closing[c] > 0 and K.restitution[c] > 0.0 and not rests:
+        if K.closing[c] > 0 and restitution_of(K, c) > 0.0 and not rests:
             K.active[c] = 0
 
 

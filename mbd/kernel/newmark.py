@@ -181,6 +181,9 @@ def newmark_step(K: Any, h: float, t1: float) -> int:
                 break
             error = residual_size(K, o_r, m, c_C, c_K, tolerance)
             if error > 1.0 and residual_size(K, o_r, m, 0.0, 0.0, 256.0 * EPS) <= 16.0:
+                if residual_size(K, o_r, m, c_C, c_K, K.tolerance) > 1.0:
+                    status = STAGNATED
+                    break
                 K.counts[STAGNATIONS] += 1
                 error = 1.0
             elif iteration >= 6 and K.exact == 0 and residual_size(K, o_r, m, 0.0, 0.0, 1e5 * EPS) <= 1e3:
@@ -192,6 +195,9 @@ def newmark_step(K: Any, h: float, t1: float) -> int:
                     break
                 K.state[NEAR] -= 1
             finish(K, h)
+            if overturns(K, h):
+                K.detail[1] = 0.0
+                break
             return 0
         if not tangent and error > 0.3 * before:
             fresh = False  # the old tangent has done its work: renew it at the same iterate
@@ -215,6 +221,21 @@ def newmark_step(K: Any, h: float, t1: float) -> int:
     K.detail[0] = t1
     K.detail[2] = h
     return status
+
+
+def overturns(K: Any, h: float) -> bool:
+    """Whether the estimated error of an angle in this step exceeds half a radian: it is not resolved at all.
+
+    ``e = h² |1/6 − β − (α_m − α_f)/2| |a₁ − a₀|``
+    """
+    share = abs(1.0 / 6.0 - K.beta - 0.5 * (K.alpha_m - K.alpha_f)) * h * h
+    stretch = h / K.clock[AUX_STEP]
+    for i in range(K.n_v):
+        if K.unit[i] == 1:
+            a0 = K.rate[i] + stretch * (K.aux[i] - K.rate[i])
+            if share * abs(K.aux1[i] - a0) > 0.5:
+                return True
+    return False
 
 
 def runs_away(K: Any, m: int) -> bool:
@@ -277,7 +298,7 @@ def careful_step(K: Any, h: float, t1: float, c_C: float, c_K: float) -> bool:
             K.counts[CAREFUL] += 1
             K.state[NEAR] = WATCHFUL
             finish(K, h)
-            return True
+            return not overturns(K, h)
         before = error
         if error < 0.0 or not careful_correction(K, c_C, c_K):
             return False

@@ -20,6 +20,7 @@ from mbd.kernel.fields import (
     NOW,
     OPEN_FORCE,
     OPEN_PULL,
+    PLASTIC,
     PRESS,
     SLIP,
     STICK,
@@ -187,7 +188,7 @@ def gather_closing(K: Any) -> float:
     """Mark the contacts that close at this instant in K.closing; the fastest closing speed of unilateral ones.
 
     Contacts that touch and approach close together with the fired one, whatever their order; those that touch and
-    rest (2) take part in its impact.
+    rest (2) take part in its impact, where impacts follow each other without end also those that leave.
     """
     nC = K.n_contacts
     fastest = 0.0
@@ -203,7 +204,7 @@ def gather_closing(K: Any) -> float:
             K.closing[c] = 1
             if K.kind[c] == 0:
                 fastest = max(fastest, approach)
-        elif near and ready and K.kind[c] == 0 and approach >= -STILL:
+        elif near and ready and K.kind[c] == 0 and (approach >= -STILL or K.state[PLASTIC] == 1):
             K.closing[c] = 2
     return fastest
 

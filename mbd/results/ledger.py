@@ -17,8 +17,8 @@ __all__ = ["Ledger", "Part"]
 class Part:
     """Energy that one cause has given to the mechanism since the start (negative: taken), at every row [J].
 
-    kind : 'loss', 'applied', 'penalty', … of an effect; 'drive' (a prescribed motion, coordinates or a potential that
-    move with time), 'impact', 'reset' (a user's event set values, a controller changed parameters)
+    kind : 'loss', 'applied', 'penalty', … of an effect; 'drive' (a prescribed motion, coordinates, a potential or a
+    surface that move with time), 'impact', 'reset' (a user's event set values, a controller changed parameters)
     """
 
     name: str

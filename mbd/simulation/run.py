@@ -364,6 +364,12 @@ class Run:
                 f"{energetic} impacts took Stronge's energetic restitution, where the {self.settings['impact']} law "
                 "would have created energy"
             )
+        endless = int(v["counts"][F.ENDLESS])
+        if endless:
+            notes.append(
+                f"{endless} times contacts struck by turns without end at one instant; they were closed together, "
+                "which is the limit of these impacts"
+            )
         for c, contact in enumerate(self.manager.contacts):
             if v["deepest"][c] < -1e-9:
                 notes.append(

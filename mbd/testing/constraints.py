@@ -141,9 +141,10 @@ def _force_law(findings: Findings, equations: Equations, contact: Contact, seed:
             return
         direction = _slope(equations, contact, placed)
         findings.where = f"penetration {depth:g} {contact.unit} (seed {seed + k})"
+        drift = float(at([contact.gap_rate], placed)[0])  # of a surface that moves, the mechanism being at rest
 
-        def force(rate: float, placed: Point = placed, direction: Numbers = direction) -> float:
-            speed = direction * rate / (direction @ direction)
+        def force(rate: float, placed: Point = placed, direction: Numbers = direction, drift: float = drift) -> float:
+            speed = direction * (rate - drift) / (direction @ direction)
             return float(at([contact.force], placed | {("v", j): float(s) for j, s in enumerate(speed)})[0])  # type: ignore[list-item]
 
         rest, hint = force(0.0), "force() is positive pushing: p = k δⁿ + c δ̇ with δ = −g"

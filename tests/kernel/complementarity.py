@@ -1,0 +1,64 @@
+"""Lemke's method as the tests call it, interpreted or compiled, and what a solution is."""
+
+from __future__ import annotations
+
+import itertools
+import types
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from mbd.kernel import lemke as lemke_module, linear
+from mbd.kernel.lemke import lemke, lemke_places
+
+__all__ = ["compiled", "enumerated", "is_solution", "root", "solved"]
+
+
+def solved(M, q, most=None, function=lemke):
+    """(status, z)."""
+    n = len(q)
+    z, work, basis = np.full(n, np.nan), np.full(lemke_places(n), np.nan), np.zeros(n, dtype=np.int64)
+    flat, given_q = M.flatten(), q.copy()
+    status = function(flat, n, given_q, z, work, basis, 20 * n + 20 if most is None else most)
+    assert np.array_equal(flat, M.flatten(), equal_nan=True) and np.array_equal(given_q, q, equal_nan=True)
+    return status, z
+
+
+def is_solution(M, q, z, bound=1e-7):
+    """Whether w = M z + q ≥ 0, z ≥ 0, zᵀ w = 0, of the terms of each row and of q."""
+    w, terms = M @ z + q, np.abs(M) @ np.abs(z) + np.abs(q) + 1e-3 * np.abs(q).max()
+    closed = (np.abs(w) <= bound * terms) | (z <= bound * (1.0 + np.abs(z).max()))
+    return bool(np.all(z >= 0.0) and np.all(w >= -bound * terms) and np.all(closed))
+
+
+def enumerated(M, q):
+    """Every solution that is a vertex."""
+    n = len(q)
+    for basic in itertools.chain.from_iterable(itertools.combinations(range(n), k) for k in range(n + 1)):
+        part, z = list(basic), np.zeros(n)
+        if part:
+            block = M[np.ix_(part, part)]
+            if np.linalg.matrix_rank(block) < len(part):
+                continue
+            z[part] = np.linalg.solve(block, -q[part])
+        if np.all(z >= -1e-10) and np.all(M @ z + q >= -1e-9 * (1.0 + np.abs(q).max())):
+            yield z
+
+
+def root(rng, n, rank):
+    return rng.normal(size=(n, rank))
+
+
+@lru_cache(maxsize=1)
+def compiled():
+    """The same functions as machine code, options of the kernel."""
+    numba = pytest.importorskip("numba")
+    options = {"error_model": "numpy", "boundscheck": False}
+    namespace = {name: value for name, value in vars(lemke_module).items() if name.isupper()}
+    for module in (linear, lemke_module):
+        for name, value in vars(module).items():
+            if isinstance(value, types.FunctionType) and value.__module__ == module.__name__:
+                code = types.FunctionType(value.__code__, namespace, name, value.__defaults__)
+                namespace[name] = numba.njit(**options)(code)
+    return namespace["lemke"]
