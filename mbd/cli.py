@@ -1,4 +1,4 @@
-"""The command line: ``mbd run kneed-walker``, ``mbd check my_model.py``, ``mbd examples``, ``mbd info``."""
+"""The command line: ``mbd run kneed-walker``, ``mbd check my_model.py``, ``mbd hardcases g1``, ``mbd info``, …"""
 
 from __future__ import annotations
 
@@ -10,21 +10,19 @@ import sys
 import time
 import traceback
 import webbrowser
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mbd.errors import MbdError, ModelError, SimulationError, UnknownNameError, nearest
+from mbd.view.progress import Progress, progress_bar
 
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
 
 __all__ = ["Script", "examples", "find", "main"]
-
-Progress = Callable[[float, float], None]
 
 TOLD = (
     MbdError, OSError, ArithmeticError, AssertionError, AttributeError, ImportError, LookupError, NameError,
@@ -125,29 +123,6 @@ class Script:
 # commands ---------------------------------------------------------------------------------------------------------
 
 
-@contextmanager
-def progress_bar() -> Iterator[Progress | None]:
-    """Simulated time and time left on a terminal, at most five times a second; nothing elsewhere."""
-    if not sys.stderr.isatty() or find_spec("tqdm") is None:
-        yield None
-        return
-    from tqdm import tqdm
-
-    bars: list[tqdm[Any]] = []
-    shape = "{percentage:3.0f}% |{bar:30}| {n:.2f} of {total:.2f} s  [{elapsed} < {remaining}]"
-
-    def show(t: float, until: float) -> None:
-        if not bars:
-            bars.append(tqdm(total=until, bar_format=shape, mininterval=0.2, leave=False, file=sys.stderr))
-        bars[0].update(t - bars[0].n)
-
-    try:
-        yield show
-    finally:
-        for bar in bars:
-            bar.close()
-
-
 def run_command(arguments: argparse.Namespace) -> int:
     """``mbd run``: simulate, print a summary, write plots, page, run and record."""
     began = time.perf_counter()
@@ -216,6 +191,13 @@ def examples_command(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def hardcases_command(arguments: argparse.Namespace) -> int:
+    """``mbd hardcases``: judge every hard case."""
+    from mbd.hardcases.command import run
+
+    return run(arguments.names, arguments.scheme, arguments.slow, arguments.out, arguments.markdown)
+
+
 def info_command(arguments: argparse.Namespace) -> int:
     """``mbd info``: versions, machine, backend and cache."""
     from mbd.compile.backend import backend
@@ -254,6 +236,16 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--until", type=float, metavar="SECONDS", help="another end time than the script's")
     check = command("check", check_command, "report every fault of a script's model")
     check.add_argument("script", metavar="SCRIPT-or-EXAMPLE", help="a Python file that defines model, or an example")
+    hard = command(
+        "hardcases", hardcases_command, "judge scenes on which multibody systems fail; write a table and a page"
+    )
+    hard.add_argument(
+        "names", nargs="*", metavar="NAME", help="cases, such as g1 j7, a group, such as g, or a part of ids"
+    )
+    hard.add_argument("--out", metavar="DIR", default="mbd-runs", help="folder for hardcases.html (default: mbd-runs)")
+    hard.add_argument("--slow", action="store_true", help="also judge the cases that take long")
+    hard.add_argument("--scheme", action="append", metavar="NAME", help="with this integrator only; may be given again")
+    hard.add_argument("--markdown", metavar="FILE", help="also write the table into this page, between its marks")
     command("examples", examples_command, "list the examples")
     command("info", info_command, "print versions, machine, backend and cache")
     return parser

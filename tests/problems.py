@@ -1,9 +1,9 @@
 """Problems with exact or published answers, and their sources.
 
-The cases are files of `tests/cases/data`: definition (SI, radians), initial values, and quantities, each with its
-value, the accuracy of that value and how it was found. The rest are equations of motion written by hand, integrated
-by an explicit Runge–Kutta method of order 8 (DOP853 of scipy, Hairer, Nørsett & Wanner 1993), which shares nothing
-with what is tested.
+The cases are files of `tests/cases/data`, or of `mbd/hardcases/data` where they are hard cases too: definition (SI,
+radians), initial values, and quantities, each with its value, the accuracy of that value and how it was found. The
+rest are equations of motion written by hand, integrated by an explicit Runge–Kutta method of order 8 (DOP853 of scipy,
+Hairer, Nørsett & Wanner 1993), which shares nothing with what is tested.
 """
 
 from __future__ import annotations
@@ -17,6 +17,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from mbd.hardcases.case import definition
 
 __all__ = ["Case", "Quantity", "case", "double_pendulum", "integrated", "knee_stop_events", "leg", "pendulum"]
 
@@ -66,7 +68,8 @@ def _numbers(values: Mapping[str, Any]) -> dict[str, Any]:
 @cache
 def case(name: str) -> Case:
     """The reference case of that name."""
-    data = json.loads((DATA / f"{name}.json").read_text(encoding="utf-8"))
+    own = DATA / f"{name}.json"
+    data = json.loads(own.read_text(encoding="utf-8")) if own.is_file() else definition(name)
     quantities = {
         q["name"]: Quantity(
             q["name"],

@@ -1,0 +1,135 @@
+"""A slider-crank whose slider has clearance in its guide (g6)."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from mbd.arrays import Vector
+from mbd.assembly import assemble
+from mbd.bodies import RigidBody
+from mbd.constraints import Unilateral, measure
+from mbd.hardcases.case import Curve, Figure, Outcome
+from mbd.hardcases.impacts import deepest, difference, impact_figures
+from mbd.hardcases.measuring import (
+    accuracy,
+    error_curve,
+    halved,
+    hard_case,
+    numbers,
+    published,
+    second_order,
+    size,
+)
+from mbd.joints import Revolute
+from mbd.model import Model
+from mbd.simulation import simulate
+
+__all__ = ["SLIDER_CRANK"]
+
+CORNERS = ("front-top", "front-bottom", "rear-top", "rear-bottom")
+"""As the reference counts them."""
+
+LIMITS = {
+    "the impact times [s]": ("impact times", 1e-5),
+    "the impulses [N s]": ("impulses", 2e-4),
+    "the crank speed after each impact [rad/s]": ("crank speed after each", 1e-5),
+}
+"""The reference of each error, and the most it may be at the finest step over the largest value."""
+
+
+@cache
+def slider_crank(sizes: tuple[float, ...], turned: bool = False) -> Model:
+    """Crank, rod and slider in a chain of three hinges; sizes are l1, l2, a, b, c, m1, m2, m3, J1, J2, J3, g, eN."""
+    l1, l2, a, b, c, m1, m2, m3, J1, J2, J3, g, e = sizes
+    model = Model("slider-crank", gravity=(0.0, -g, 0.0))
+    crank = RigidBody("crank", mass=m1, inertia=J1, center=(0.5 * l1, 0.0, 0.0))
+    rod = RigidBody("rod", mass=m2, inertia=J2, center=(0.5 * l2, 0.0, 0.0))
+    slider = RigidBody("slider", mass=m3, inertia=J3)
+    model.connect(
+        Revolute("main", model.ground.origin, crank.origin),
+        Revolute("pin", crank.point(l1, 0.0), rod.origin),
+        Revolute("wrist", rod.point(l2, 0.0), slider.origin),
+    )
+    half = b + c
+    corners = []
+    for name in CORNERS:
+        point = slider.point(a if "front" in name else -a, b if "top" in name else -b)
+        gap = (lambda p: half - p[1]) if "top" in name else (lambda p: p[1] + half)
+        corners.append(Unilateral(name, measure(gap, point), restitution=e))
+    model.constrain(*(corners[::-1] if turned else corners))
+    return model
+
+
+def turning(id: str, scheme: Any, dt: float, turned: bool = False) -> tuple[Model, Any]:
+    """The run until shortly after the last published impact."""
+    given = numbers(id)
+    names = ("l1", "l2", "a", "b", "c", "m1", "m2", "m3", "J1", "J2", "J3", "g", "eN")
+    model = slider_crank(tuple(float(given[name]) for name in names), turned)
+    (q1, q2, q3), (w1, w2, w3) = given["angles"], given["rates"]
+    start = assemble(
+        model,
+        position={"main.angle": q1, "pin.angle": q2 - q1, "wrist.angle": q3 - q2},
+        velocity={"main.angle": w1, "pin.angle": w2 - w1, "wrist.angle": w3 - w2},
+    )
+    times = published(id, "impact times")
+    until = times[-1] + 0.1 * (times[-1] - times[-2])
+    return model, simulate(model, start, scheme, dt=dt, until=until, on_failure="return")
+
+
+def turning_errors(id: str, run: Any) -> dict[str, Vector]:
+    """Errors at the impacts of one run, by what they are of."""
+    count = len(published(id, "impact times"))
+    events = [event for event in run.events if event.impulse.any()][:count]
+    order = [CORNERS.index(event.name) for event in events]
+    if order != list(published(id, "corner index sequence")):
+        return dict.fromkeys(LIMITS, np.array([np.nan]))
+    values = (
+        np.array([event.time for event in events]),
+        np.array([event.impulse[0] for event in events]),
+        run["main.angle.rate"][[event.row for event in events]],
+    )
+    return {what: value - published(id, name) for (what, (name, _)), value in zip(LIMITS.items(), values, strict=True)}
+
+
+def rattling(id: str, scheme: Any) -> Outcome:
+    """The corners strike in their order, at their instants, with their impulses, to second order."""
+    steps = halved(published(id, "impact times")[0] / 100.3)
+    runs = []
+    for dt in steps:
+        model, run = turning(id, scheme, float(dt))
+        runs.append(run)
+    errors = [turning_errors(id, each) for each in runs]
+    figures: list[Figure] = []
+    for what, (name, limit) in LIMITS.items():
+        largest, floor = size(published(id, name)), 10.0 * accuracy(id, name)
+        figures += second_order(what, [each[what] for each in errors], limit * largest, min(floor, 1e-9 * largest))
+    wrong = [float(np.isnan(each["the impulses [N s]"]).any()) for each in errors]
+    _, other = turning(id, scheme, float(steps[-1]), turned=True)
+    figures += [
+        Figure("runs in which the corners strike in another order [-]", sum(wrong), 0.0),
+        Figure("change with the order of the corners, relative [-]", difference(run, other), 1e-9),
+        Figure("penetration [m]", deepest(run), 1e-10),
+        *impact_figures(model, run),
+    ]
+    late = run.time > 0.8 * run.time[-1]
+    return Outcome(
+        figures,
+        [
+            Curve(
+                "gap of the corner front-top, last fifth", run.time[late], run["front-top.gap"][late], y_label="gap [m]"
+            ),
+            error_curve(
+                "error of the impact times", steps, [each["the impact times [s]"] for each in errors], "error [s]"
+            ),
+        ],
+    )
+
+
+SLIDER_CRANK = hard_case(
+    "g6-slider-crank-clearance",
+    "The corners of a loose slider strike its guide in the right order and at the right instants, to second order.",
+    rattling,
+)

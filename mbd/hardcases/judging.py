@@ -1,0 +1,137 @@
+"""Cases chosen by name, judged with their schemes, timed; an error of a judge is a verdict too."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+
+from mbd.errors import ModelError, UnknownNameError, nearest
+from mbd.hardcases.case import Figure, HardCase, Outcome
+from mbd.hardcases.schemes import SCHEMES, scheme
+
+__all__ = ["Judged", "Verdict", "chosen", "judged", "named_schemes", "ratio", "short", "with_schemes"]
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What one judge found with one scheme.
+
+    error : what stopped the judge, '' where it came to its end; seconds : of wall time
+    """
+
+    scheme: str
+    outcome: Outcome
+    seconds: float
+    error: str = ""
+
+    @property
+    def passed(self) -> bool:
+        return not self.error and self.outcome.passed
+
+    @property
+    def worst(self) -> Figure | None:
+        """The figure that comes nearest to its limit, or passes it the farthest."""
+        return max(self.outcome.figures, key=ratio, default=None)
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """A case with all its schemes."""
+
+    case: HardCase
+    parts: Sequence[Judged] = field(default_factory=list)
+
+    @property
+    def passed(self) -> bool:
+        return bool(self.parts) and all(part.passed for part in self.parts)
+
+    @property
+    def seconds(self) -> float:
+        return sum(part.seconds for part in self.parts)
+
+    @property
+    def worst(self) -> Judged:
+        """The part that was stopped by an error, else the one with the worst figure."""
+        stopped = [part for part in self.parts if part.error]
+        return stopped[0] if stopped else max(self.parts, key=lambda part: ratio(part.worst))
+
+    @property
+    def word(self) -> str:
+        """'holds', or 'fails' with the schemes, where not all do."""
+        failing = [part.scheme for part in self.parts if not part.passed]
+        if not failing:
+            return "holds"
+        return "fails" if len(failing) == len(self.parts) else f"fails with {', '.join(failing)}"
+
+
+def ratio(figure: Figure | None) -> float:
+    """Value over limit: above 1 it fails; infinite where it is not a number or the limit is 0."""
+    if figure is None or math.isnan(figure.value):
+        return math.inf
+    if figure.limit > 0.0:
+        return max(figure.value / figure.limit, 0.0)
+    return 0.0 if figure.passed else math.inf
+
+
+def short(case: HardCase) -> str:
+    """'g1' of 'g1-bouncing-ball'."""
+    return case.id.partition("-")[0]
+
+
+def chosen(cases: Sequence[HardCase], names: Sequence[str], slow: bool) -> list[HardCase]:
+    """The cases that names stand for, in the order of the registry; without names all but the slow ones.
+
+    A name is an id, its beginning ('g1'), a group ('g'), or any part of ids ('pendulum').
+    """
+    if not names:
+        return [case for case in cases if slow or not case.slow]
+    found: list[HardCase] = []
+    faults = []
+    for name in names:
+        word = name.lower()
+        exact = [case for case in cases if word in (case.id, short(case))]
+        part = [case for case in cases if (case.id.startswith(word) if len(word) == 1 else word in case.id)]
+        found += exact or part
+        if not exact and not part:
+            faults.append(nearest(name, [short(case) for case in cases], "hard case", "There are"))
+    if faults:
+        raise UnknownNameError(faults)
+    return [case for case in cases if case in found]
+
+
+def named_schemes(names: Iterable[str] | None) -> tuple[str, ...] | None:
+    """Schemes as the list spells them, or an error that offers the nearest; None for all that a case asks for."""
+    if not names:
+        return None
+    for name in names:
+        scheme(name)
+    spelled = {name.lower(): name for name in SCHEMES}
+    return tuple(spelled[name.lower()] for name in names)
+
+
+def with_schemes(case: HardCase, only: Sequence[str] | None) -> list[str]:
+    """The schemes to judge a case with."""
+    return [name for name in case.schemes if only is None or name in only]
+
+
+def judged(case: HardCase, only: Sequence[str] | None = None, tell: Callable[[str], None] | None = None) -> Verdict:
+    """The verdict on a case; `tell` is called with each scheme before it runs."""
+    names = with_schemes(case, only)
+    if not names:
+        raise ModelError(
+            f"'{case.id}' is not judged with {', '.join(only or ())}; it is with {', '.join(case.schemes)}"
+        )
+    parts = []
+    for name in names:
+        if tell is not None:
+            tell(name)
+        began = time.perf_counter()
+        outcome, error = Outcome([]), ""
+        try:
+            outcome = case.judge(scheme(name))
+        except Exception as problem:  # whatever stops a judge is what the table must say
+            error = f"{type(problem).__name__}: {problem}"
+        parts.append(Judged(name, outcome, time.perf_counter() - began, error))
+    return Verdict(case, parts)

@@ -1,0 +1,153 @@
+"""A leg whose knee runs into a stop of spring and damper, with two rules of release (h1, h1b)."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from mbd.arrays import Vector
+from mbd.assembly import assemble
+from mbd.bodies import Link
+from mbd.constraints import Event, Penalty, flexion, measure
+from mbd.hardcases.case import Curve, Figure, Outcome
+from mbd.hardcases.measuring import (
+    accuracy,
+    error_curve,
+    halved,
+    hard_case,
+    numbers,
+    published,
+    second_order,
+    size,
+)
+from mbd.joints import Revolute
+from mbd.model import Model
+from mbd.simulation import simulate
+
+__all__ = ["GAP", "PULL"]
+
+RELEASES = {"unilateral": "pull"}
+"""What the definition calls a law, by the word of `Penalty`; any other is that of the gap."""
+
+LIMITS = {
+    "the switching times [s]": ("event times", 1e-4),
+    "the knee's rate at the switches [rad/s]": ("d' = w2 - w1", 1e-3),
+    "the hip's rate at the switches [rad/s]": ("w1 at the events", 2e-3),
+    "the largest hyperextensions [rad]": ("max hyperextension", 1e-3),
+    "the times of largest hyperextension [s]": ("time of max", 1e-4),
+}
+"""The reference of each error, and the most it may be at the finest step over the largest value."""
+
+
+@cache
+def leg(m: tuple[float, float], L: tuple[float, float], g: float, k: float, c: float, release: str) -> Model:
+    """Uniform rods that hang from a fixed hip; the knee's angle is the hyperextension d."""
+    model = Model("leg", gravity=(0.0, -g, 0.0))
+    thigh, shank = (
+        Link(name, mass, length=length, center=0.5 * length, inertia=mass * length**2 / 12.0)
+        for name, mass, length in zip(("thigh", "shank"), m, L, strict=True)
+    )
+    knee = Revolute("knee", thigh.end, shank.start)
+    model.connect(Revolute("hip", model.ground.origin, thigh.start), knee)
+    model.constrain(
+        Penalty("knee stop", flexion(knee), stiffness=k, damping=c, release=release),
+        Event("deepest", measure("knee.rate", unit="rad"), direction=-1),
+    )
+    return model
+
+
+def swing(id: str, scheme: Any, dt: float, locate: Any = "root") -> Any:
+    """The run a little beyond the last published switch."""
+    given = numbers(id)
+    m, L = ((float(given[f"{name}1"]), float(given[f"{name}2"])) for name in ("m", "L"))
+    release = RELEASES.get(given["law"], "gap")
+    model = leg(m, L, float(given["g"]), float(given["k"]), float(given["c"]), release)
+    start = assemble(
+        model,
+        position={"hip.angle": given["theta1"], "knee.angle": given["theta2"] - given["theta1"]},
+        velocity={"hip.angle": given["w1"], "knee.angle": given["w2"] - given["w1"]},
+    )
+    times = published(id, "event times")
+    return simulate(model, start, scheme, dt=dt, until=times[-1] + times[1] - times[0], locate=locate)
+
+
+def errors_of(id: str, run: Any) -> dict[str, Vector]:
+    """Errors of one run, by what they are of; NaN where the switches are not those of the reference."""
+    times = published(id, "event times")
+    events = [event for event in run.events if event.name == "knee stop"]
+    kinds = [("closed", "opened")[k % 2] for k in range(len(times))]
+    tops = np.array([event.time for event in run.events if event.name == "deepest"])
+    if [event.kind for event in events[: len(times)]] != kinds or not len(tops):
+        return dict.fromkeys(LIMITS, np.array([math.nan]))
+    rows = [event.row for event in events[: len(times)]]
+    wanted = published(id, "time of max")
+    deepest = tops[[int(np.argmin(np.abs(tops - time))) for time in wanted]]
+    values = (
+        run.time[rows],
+        run["knee.rate"][rows],
+        run["hip.rate"][rows],
+        run.at(deepest)["knee.angle"],
+        deepest,
+    )
+    return {what: value - published(id, name) for (what, (name, _)), value in zip(LIMITS.items(), values, strict=True)}
+
+
+def stopped(id: str, scheme: Any) -> Outcome:
+    """Switches at the reference instants to second order, never deeper than the reference but for the error."""
+    times = published(id, "event times")
+    steps = halved((times[1] - times[0]) / 60.0)
+    runs = [swing(id, scheme, float(dt)) for dt in steps]
+    errors = [errors_of(id, run) for run in runs]
+    figures: list[Figure] = []
+    for what, (name, limit) in LIMITS.items():
+        most = limit * size(published(id, name))
+        figures += second_order(what, [each[what] for each in errors], most, 10.0 * accuracy(id, name))
+    run, depths = runs[-1], published(id, "max hyperextension")
+    beyond = float(np.max(run["knee.angle"])) - max(depths)
+    allowed = 2.0 * size(errors[-1]["the largest hyperextensions [rad]"])
+    linear = errors_of(id, swing(id, scheme, float(steps[-1]), "linear"))
+    what = "the switching times [s]"
+    between = np.ones(len(run), dtype=bool)
+    moments = [event.time for event in run.events if event.name == "knee stop"]
+    for closes, opens in zip(moments[::2], moments[1::2], strict=False):
+        between &= (run.time < closes) | (run.time > opens)
+    if len(moments) % 2:
+        between &= run.time < moments[-1]
+    force = run["knee stop.force"]
+    figures += [
+        Figure("hyperextension beyond the largest of the reference [rad]", beyond, allowed),
+        Figure("error of the switching times with one linear step back, over that with roots [-]",
+               size(linear[what]) / max(size(errors[-1][what]), 1e-300), 1.5),
+        Figure("torque of the stop while it is open [N m]", size(force[between]), 0.0),
+        *second_order("the energy, over what the stop took [-]", [_lost(each) for each in runs], 2e-3, 1e-9),
+    ]  # fmt: skip
+    if RELEASES.get(numbers(id)["law"]) == "pull":
+        figures.append(Figure("torque that pulls, over the largest [-]", float(np.max(-force)) / size(force), 1e-8))
+    return Outcome(
+        figures,
+        [
+            Curve("hyperextension of the knee", run.time, run["knee.angle"], y_label="angle [rad]"),
+            error_curve("error of the switching times", steps, [each[what] for each in errors], "error [s]"),
+        ],
+    )
+
+
+def _lost(run: Any) -> float:
+    """The energy that the scheme itself made, over that which the stop took."""
+    sums = run.energy.sums
+    return float(sums["numerical"] / abs(sums["knee stop"]))
+
+
+GAP = hard_case(
+    "h1-knee-stop-gap-law",
+    "A knee stop that lets go where the gap opens switches at the reference instants, to second order.",
+    stopped,
+)
+PULL = hard_case(
+    "h1b-knee-stop-unilateral",
+    "A knee stop that never pulls lets go as its torque falls to zero, at the reference instants to second order.",
+    stopped,
+)

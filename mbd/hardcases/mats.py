@@ -1,0 +1,189 @@
+"""A mass that falls on a very stiff spring (j6)."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from mbd.assembly import assemble
+from mbd.bodies import PointMass
+from mbd.constraints import Penalty, height
+from mbd.hardcases.case import Curve, Figure, Outcome
+from mbd.hardcases.measuring import (
+    accuracy,
+    error_curve,
+    halved,
+    hard_case,
+    numbers,
+    published,
+)
+from mbd.joints import Prismatic
+from mbd.model import Model
+from mbd.simulation import simulate
+
+__all__ = ["STIFF"]
+
+STIFFER = (1.0, 10.0)
+"""Stiffness over that of the definition."""
+
+LONGER = (0.15, 0.3, 1.1, 3.0, 10.0, 100.0)
+"""Steps over the duration of the blow that do not resolve it."""
+
+
+@cache
+def mat(m: float, g: float, k: float, c: float) -> Model:
+    """A ball over a mat."""
+    model = Model("ball", gravity=(0.0, -g, 0.0))
+    body = PointMass("ball", mass=m)
+    model.connect(Prismatic("fall", model.ground.origin, body.origin, axis=(0, 1, 0)))
+    model.constrain(Penalty("mat", height(body.origin), stiffness=k, damping=c))
+    return model
+
+
+def blow(m: float, g: float, k: float, c: float, drop: float) -> dict[str, float]:
+    """The blow in closed form: m ẍ = m g − k x − c ẋ from x = 0 at the speed √(2 g h), until x = 0 again."""
+    from scipy.optimize import brentq
+
+    w, d, v = math.sqrt(k / m), 0.5 * c / m, math.sqrt(2.0 * g * drop)
+    if d >= w:
+        raise ValueError(f"the mat is damped beyond oscillation (c = {c:g}); this case needs c < {2.0 * m * w:g}")
+    f, rest = math.sqrt(w * w - d * d), m * g / k
+    one = (v - d * rest) / f
+
+    def depth(t: float) -> float:
+        return rest + math.exp(-d * t) * (one * math.sin(f * t) - rest * math.cos(f * t))
+
+    def speed(t: float) -> float:
+        wave = (f * one + d * rest) * math.cos(f * t) + (f * rest - d * one) * math.sin(f * t)
+        return math.exp(-d * t) * wave
+
+    top = float(brentq(speed, 0.0, math.pi / f, xtol=1e-22, rtol=1e-15))
+    end = float(brentq(depth, top, top + math.pi / f, xtol=1e-22, rtol=1e-15))
+    return {
+        "contact start": math.sqrt(2.0 * drop / g), "max penetration": depth(top), "contact duration": end,
+        "rebound speed": -speed(end), "peak contact force": k * depth(top) + c * speed(top),
+    }  # fmt: skip
+
+
+def dropped(given: dict[str, float], scheme: Any, dt: float) -> Any:
+    """The end of the fall, from just above the mat and as fast as it is there, and the blow."""
+    near = min(given["drop"], (2.3 * dt) * math.sqrt(2.0 * given["g"] * given["drop"]))
+    speed = math.sqrt(2.0 * given["g"] * (given["drop"] - near))
+    model = mat(given["m"], given["g"], given["k"], given["c"])
+    start = assemble(model, position={"fall.displacement": near}, velocity={"fall.displacement": -speed})
+    return simulate(model, start, scheme, dt=dt, until=6.0 * dt + 1.5 * blow(**given)["contact duration"])
+
+
+LIMITS = {"contact duration": 2e-4, "rebound speed": 1e-4, "max penetration": 1e-4, "work of the mat": 1e-6}
+"""The most that each may be off at the finest step, over its size; the work over m g h."""
+
+
+def blow_errors(given: dict[str, float], wanted: dict[str, float], run: Any) -> dict[str, float]:
+    """Errors of the first blow of one run, relative."""
+    closed, opened = [event for event in run.events if event.name == "mat"][:2]
+    fine = run.at(np.linspace(closed.time, opened.time, 4001))["fall.displacement"]
+    found = {
+        "contact duration": opened.time - closed.time,
+        "rebound speed": run["fall.rate"][opened.row],
+        "max penetration": -float(np.min(fine)),
+    }
+    errors = {name: value / wanted[name] - 1.0 for name, value in found.items()}
+    work = run.energy["mat"][opened.row] - run.energy["mat"][closed.row]
+    spent = 0.5 * given["m"] * (wanted["rebound speed"] ** 2 - 2.0 * given["g"] * given["drop"])
+    return errors | {"work of the mat": float(work - spent) / given_energy(given)}
+
+
+def resolved(given: dict[str, float], scheme: Any) -> tuple[list[Figure], list[Curve]]:
+    """Steps that resolve the blow: depth, duration, rebound and work to second order; nothing gained, no note."""
+    wanted = blow(**given)
+    steps = halved(wanted["contact duration"] / 40.0)
+    runs = [dropped(given, scheme, float(dt)) for dt in steps]
+    errors = [blow_errors(given, wanted, run) for run in runs]
+    told = f"k = {given['k']:g}"
+    figures: list[Figure] = []
+    for name, limit in LIMITS.items():
+        found = [each[name] for each in errors]
+        figures.append(Figure(f"{told}: error of the {name}, finest step, relative [-]", abs(found[-1]), limit))
+        figures.append(_fall(f"{told}: {name}", found, 1e-7))
+    gains = []
+    for run in runs:
+        closed, opened = (event.row for event in run.events[:2])
+        gains.append((run.energy.total[opened] - run.energy.total[closed]) / given_energy(given))
+    notes = [note for run in runs for note in _unresolved(run)]
+    figures += [
+        Figure(f"{told}: notes of a step that is too long [-]", len(notes), 0.0),
+        Figure(f"{told}: energy gained in the blow, relative [-]", float(np.max(gains)), 1e-9),
+    ]
+    run, late = runs[-1], [each["contact duration"] for each in errors]
+    return figures, [
+        Curve(f"depth, {told}", run.time, -run["fall.displacement"], y_label="depth [m]"),
+        error_curve(f"error of the duration, {told}", steps, late, "relative error"),
+    ]
+
+
+def _fall(what: str, errors: list[float], floor: float) -> Figure:
+    """Of second order or better: numerical damping is of third."""
+    a, b = (max(abs(error), floor) for error in errors[-2:])
+    short = 2.0 - math.log2(a / b) if a > 4.0 * floor else 0.0
+    return Figure(f"{what}: what the observed order lacks of 2 [-]", short, 0.15)
+
+
+def _unresolved(run: Any) -> list[str]:
+    """Notes that say that a blow is not resolved."""
+    return [note for note in run.stats["notes"] if "not resolved" in note]
+
+
+def too_long(given: dict[str, float], scheme: Any) -> list[Figure]:
+    """Steps longer than the blow: told, and without energy from nowhere."""
+    duration = blow(**given)["contact duration"]
+    silent, gains = 0, []
+    for factor in LONGER:
+        run = dropped(given, scheme, factor * duration)
+        total = run.energy.total
+        silent += not _unresolved(run)
+        gains.append((total[-1] - total[0]) / given_energy(given))
+    told = f"k = {given['k']:g}"
+    return [
+        Figure(f"{told}: steps of 0.15 to 100 blows that are not told [-]", silent, 0.0),
+        Figure(f"{told}: energy gained with such steps, relative [-]", float(np.max(gains)), 1e-9),
+    ]
+
+
+def given_energy(given: dict[str, float]) -> float:
+    """m g h [J]."""
+    return given["m"] * given["g"] * given["drop"]
+
+
+def stiff(id: str, scheme: Any) -> Outcome:
+    """A blow of microseconds is right where it is resolved, and told where it is not."""
+    given = {name: float(numbers(id)[name]) for name in ("m", "g", "k", "c", "drop")}
+    closed_form = blow(**given)
+    figures = [
+        Figure(
+            f"closed form against the reference, {name} [-]",
+            abs(closed_form[name] - published(id, name)), accuracy(id, name) + 1e-12 * closed_form[name],
+        )
+        for name in closed_form
+    ]  # fmt: skip
+    model, fall = mat(*(given[name] for name in "mgkc")), closed_form["contact start"]
+    start = assemble(model, position={"fall.displacement": given["drop"]})
+    run = simulate(model, start, scheme, dt=fall / 20.3, until=("mat", 2.0 * fall))
+    off = abs(run.events[0].time - published(id, "contact start"))
+    figures.append(Figure("error of the contact start [s]", off, accuracy(id, "contact start") + 1e-12))
+    curves: list[Curve] = []
+    for factor in STIFFER:
+        stiffer = given | {"k": factor * given["k"]}
+        found, seen = resolved(stiffer, scheme)
+        figures += [*found, *too_long(stiffer, scheme)]
+        curves += seen
+    return Outcome(figures, curves[:2])
+
+
+STIFF = hard_case(
+    "j6-stiff-penalty-1e9",
+    "A blow of microseconds is of second order where steps resolve it; where not, it is told and makes no energy.",
+    stiff,
+)

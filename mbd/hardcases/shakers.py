@@ -1,0 +1,143 @@
+"""A mass on a vibrating table (j10)."""
+
+from __future__ import annotations
+
+import math
+import re
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+import mbd.tape.functions as tape
+from mbd.assembly import assemble
+from mbd.bodies import PointMass
+from mbd.constraints import Unilateral, measure
+from mbd.hardcases.case import Curve, Figure, Outcome
+from mbd.hardcases.impacts import deepest, impact_figures
+from mbd.hardcases.measuring import (
+    accuracy,
+    error_curve,
+    halved,
+    hard_case,
+    numbers,
+    published,
+    quantity,
+    second_order,
+    size,
+)
+from mbd.joints import Prismatic
+from mbd.model import Model
+from mbd.simulation import simulate
+
+__all__ = ["SHAKEN"]
+
+SETTLED = 8.0
+"""Periods after which the error of the first steps of a scheme in positions only has died out."""
+
+LONG = 10
+"""Periods of the shaker that throws the mass."""
+
+
+@cache
+def table(m: float, g: float, A: float, w: float) -> Model:
+    """A mass over a table at the height A sin(ωt)."""
+    model = Model("shaker", gravity=(0.0, -g, 0.0))
+    body = PointMass("mass", mass=m)
+    model.connect(Prismatic("rise", model.ground.origin, body.origin, axis=(0, 1, 0)))
+    gap = measure(lambda y, t: y - A * tape.sin(w * t), "rise.displacement", "t")
+    model.constrain(Unilateral("table", gap))
+    return model
+
+
+def shaken(id: str, scheme: Any, dt: float, periods: float, amplitude: float | None = None) -> Any:
+    """The run of a mass that begins on the table and moves with it."""
+    given = numbers(id)
+    A, w = float(given["A"]) if amplitude is None else amplitude, float(given["w"])
+    if not given["on_table"]:
+        raise ValueError("the mass begins on the table, got on_table = false")
+    model = table(float(given["m"]), float(given["g"]), A, w)
+    velocity = {"rise.displacement": A * w + float(given["relative_velocity"])}
+    start = assemble(model, position={"rise.displacement": 0.0}, velocity=velocity, closed=["table"])
+    return simulate(model, start, scheme, dt=dt, until=periods * 2.0 * math.pi / w)
+
+
+def staying_figures(id: str, scheme: Any, period: float) -> tuple[list[Figure], list[Curve]]:
+    """Γ < 1: the contact persists, and its force is m (g + z¨)."""
+    given = numbers(id)
+    m, g, A, w = (float(given[name]) for name in ("m", "g", "A", "w"))
+    extremes = published(id, "contact force extremes")
+    steps = halved(period / 40.0)  # rows at the quarters of the period
+    runs = [shaken(id, scheme, float(dt), SETTLED) for dt in steps]
+    errors, peaks = [], []
+    for run in runs:
+        exact = m * (g - A * w * w * np.sin(w * run.time))
+        last = run.time > period * (SETTLED - 1.001)
+        errors.append(size((run["table.force"] - exact)[last]))
+        force = run["table.force"][last]
+        peaks.append(np.array([np.min(force), np.max(force)]) - extremes)
+    count = int(re.findall(r"in (\d+) periods", quantity(id, "number of releases")["name"])[0])
+    run = shaken(id, scheme, float(steps[0]), float(count))
+    opened = [event for event in run.events if event.kind == "opened"]
+    floor = 1e-9 * m * g
+    figures = [
+        Figure(f"releases in {count} periods [-]", abs(len(opened) - published(id, "number of releases")), 0.0),
+        Figure(f"switches in {count} periods [-]", len(run.events), 0.0),
+        Figure("error of Γ, A ω²/g [-]", abs(A * w * w / g - published(id, "Gamma")), accuracy(id, "Gamma") + 1e-15),
+        *second_order("the contact force [N]", errors, 2e-3 * m * g, floor),
+        *second_order("the extremes of the contact force [N]", peaks, 2e-3 * m * g, floor),
+        Figure("error of the height of the mass on the table [m]", size(run["table.gap"]), 1e-10),
+    ]
+    curves = [Curve("contact force", runs[-1].time, runs[-1]["table.force"], y_label="force [N]")]
+    return figures, curves
+
+
+def thrown_figures(id: str, scheme: Any, period: float) -> tuple[list[Figure], list[Curve]]:
+    """Γ > 1: one release a period, where g + z¨ passes zero."""
+    given = numbers(id)
+    m, g, w = (float(given[name]) for name in ("m", "g", "w"))
+    entry = quantity(id, "first lift-off time")
+    gamma = float(re.findall(r"Gamma = ([\d.]+)", entry["name"])[0])
+    amplitude = gamma * g / (w * w)
+    first = float(entry["value"])
+    steps = halved(period / 37.0)  # no row at the instant of lift-off
+    runs = [shaken(id, scheme, float(dt), LONG, amplitude) for dt in steps]
+    errors, other = [], []
+    for run in runs:
+        opened = np.array([event.time for event in run.events if event.kind == "opened"])
+        errors.append(opened[0] - first if len(opened) else math.nan)
+        phases = first + period * np.arange(LONG)
+        other.append(opened - phases if len(opened) == LONG else np.array([math.nan]))
+    run = runs[-1]
+    figures = [
+        *second_order(f"the first lift-off time at Γ = {gamma:g} [s]", errors, 1e-4 * period, 1e-10 * period),
+        *second_order(f"the lift-off times at Γ = {gamma:g} [s]", other, 1e-4 * period * LONG**0.5, 1e-9 * period),
+        Figure(f"penetration at Γ = {gamma:g} [m]", float(np.max([deepest(each) for each in runs])), 1e-10),
+        Figure(f"pull at Γ = {gamma:g} [N]", float(np.max(-run["table.force"])), 1e-9 * m * g),
+        *impact_figures_moving(table(m, g, amplitude, w), run),
+    ]
+    curves = [
+        Curve(f"height over the table, Γ = {gamma:g}", run.time, run["table.gap"], y_label="gap [m]"),
+        error_curve("error of the first lift-off time", steps, errors, "error [s]"),
+    ]
+    return figures, curves
+
+
+def impact_figures_moving(model: Model, run: Any) -> list[Figure]:
+    """What holds at impacts on a table that moves: it may give or take energy."""
+    return [each for each in impact_figures(model, run) if "energy" not in each.what]
+
+
+def shaking(id: str, scheme: Any) -> Outcome:
+    """No release below Γ = 1, one a period above."""
+    period = 2.0 * math.pi / float(numbers(id)["w"])
+    figures, curves = staying_figures(id, scheme, period)
+    more, seen = thrown_figures(id, scheme, period)
+    return Outcome([*figures, *more], [*curves, *seen][:2])
+
+
+SHAKEN = hard_case(
+    "j10-chatter-on-vibrating-table",
+    "The mass stays on the table while A ω² < g, without a flip; beyond, it leaves once a period at the right phase.",
+    shaking,
+)
