@@ -141,9 +141,14 @@ class Model:
     def parameters(self) -> dict[str, float]:
         """Every run-time parameter and its value in this description: {'left thigh.mass': 0.5, …}."""
         result = {f"gravity.{axis}": value for axis, value in zip("xyz", self.gravity, strict=True)}
-        words: list[Body | Frame | Joint | Force | Constraint] = [*self.bodies.values(), *self.points(), *self.joints]
-        for word in (*words, *self.forces, *self.constraints):
+        words: list[Body | Frame | Joint] = [*self.bodies.values(), *self.points(), *self.joints]
+        for word in words:
             result |= word.parameters()
+        taken = {force.name for force in self.forces}  # one may be named like the spring that a joint could have
+        result = {name: value for name, value in result.items() if name.rpartition(".")[0] not in taken}
+        actions: list[Force | Constraint] = [*self.forces, *self.constraints]
+        for action in actions:
+            result |= action.parameters()
         return result
 
     def mentions(self) -> list[Mention]:

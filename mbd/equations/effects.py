@@ -39,10 +39,17 @@ class Cause:
 
 
 def causes(scope: Surroundings, joints: Iterable[Joint], forces: Iterable[Force]) -> list[Cause]:
-    """Springs and losses of all joints, then the forces, without what folds away."""
+    """Springs and losses of all joints, then the forces, without what folds away.
+
+    A force may be named like the spring that a joint could have: then the parameters of that name are the force's.
+    """
     found: list[Cause] = []
+    forces = list(forces)
+    taken = {force.name for force in forces}
     for joint in joints:
-        found += [_joint_spring(joint, scope), _joint_loss(joint, scope)]
+        if f"{joint.name} spring" not in taken:
+            found.append(_joint_spring(joint, scope))
+        found.append(_joint_loss(joint, scope))
     found += [_force(force, scope) for force in forces]
     return [cause for cause in found if cause.acts]
 

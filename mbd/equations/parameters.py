@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from mbd.equations.equations import Parameter
+from mbd.errors import ModelError
 from mbd.tape.node import Node, Tape
 
 __all__ = ["ParameterTable"]
@@ -20,14 +21,20 @@ class ParameterTable:
         self._tape = tape
         self._tunable = frozenset(tunable)
         self._nodes: dict[str, Node] = {}
+        self._values: dict[str, float] = {}
         self._found: list[Parameter] = []
 
     def node(self, name: str, value: float) -> Node:
         """The input of a parameter, or a constant where its value is structural."""
+        value = float(value)
         known = self._nodes.get(name)
         if known is not None:
+            if value != self._values[name]:
+                raise ModelError(
+                    f"two things have a parameter {name!r}, {self._values[name]:g} and {value:g}; rename one of them"
+                )
             return known
-        value = float(value)
+        self._values[name] = value
         if value in STRUCTURAL and name not in self._tunable:
             node = self._tape.constant(value)
         else:

@@ -9,6 +9,7 @@ import numpy as np
 
 from mbd.kernel import fields as F
 from mbd.results.record import EventRecord
+from mbd.simulation.round_off import remainder
 from mbd.simulation.stepper import Stepper
 from mbd.tape.evaluate import evaluate
 from mbd.tape.node import Node
@@ -44,9 +45,10 @@ def explanation(
             "the state (mbd.where, sign) must be made continuous, or be switched by an Event or Controller"
         )
     if status == F.STAGNATED:
+        left = remainder(stepper)
         return (
-            f"{where}: stagnated at round-off: residual {residual * values['tolerance']:.3g} of the forces"
-            f"{with_closed}; use a larger tolerance= of the integrator or a larger dt"
+            f"{where}: stagnated at round-off: residual {left.residual:.3g}, attainable {left.attainable:.3g} of the "
+            f"forces{with_closed}; use a larger tolerance= of the integrator or a larger dt"
         )
     if status == F.SINGULAR:
         return (

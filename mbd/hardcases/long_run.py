@@ -1,0 +1,166 @@
+"""A pendulum over very many periods: j12."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+import mbd
+from mbd.hardcases.case import Curve, Figure, HardCase, Outcome, definition
+from mbd.hardcases.convergence import quantity
+
+__all__ = ["CASES", "long_pendulum", "numerical_damping"]
+
+J12, QUICK = "j12-long-time-1e5-periods", "j12-long-time-1e3-periods"
+STEPS = 100
+"""Steps in a period [-]."""
+FIRST, TIMES = 10, 5.0
+"""Energy may differ at the end by so many times what it does within the first periods [-]."""
+PHASE = 0.05
+"""How far the phase may be from periods × relative error of one × 2π [-]."""
+SMALL, SMALL_RATE, RATE = 0.05, 0.01, 0.05
+"""A small amplitude over that of the case; how far its decay, and that of the case, may be from the one predicted by
+the algorithmic damping of linear oscillators [-]."""
+BLOCKS = 20
+"""Parts of the run whose mean energies must fall."""
+
+
+def long_pendulum(share: float = 1.0, case: str = J12) -> tuple[mbd.Model, mbd.State]:
+    """A point mass on a massless rod, released at a share of its amplitude."""
+    numbers, begin = definition(case)["definition"], definition(case)["initial_conditions"]
+    model = mbd.Model("pendulum", gravity=(0.0, -numbers["g"], 0.0))
+    rod = mbd.Link("rod", numbers["m"], numbers["L"], numbers["L"])
+    model.connect(mbd.Revolute("pivot", model.ground.origin, rod.start))
+    return model, mbd.assemble(model, position={"pivot.angle": share * begin["theta0"]})
+
+
+def numerical_damping(coefficients: Any, turn: float) -> tuple[float, float]:
+    """Damping ratio ξ and angle a step of the family on ``v̇ + ω² q = 0`` with ω dt = `turn`.
+
+    From the eigenvalues of one step on (q, v dt, v̇ dt², a dt²): ``ξ = −ln|μ| / arg μ``.
+    """
+    am, af, beta, gamma = coefficients.alpha_m, coefficients.alpha_f, coefficients.beta, coefficients.gamma
+    after = [[1, 0, 0, -beta], [0, 1, 0, -gamma], [turn**2, 0, 1, 0], [0, 0, -(1 - af) / (1 - am), 1]]
+    before = [[1, 1, 0, 0.5 - beta], [0, 1, 0, 1 - gamma], [0, 0, 0, 0], [0, 0, af / (1 - am), -am / (1 - am)]]
+    roots = np.linalg.eigvals(np.linalg.solve(np.array(after), np.array(before)))
+    (root,) = roots[roots.imag > 1e-9 * np.abs(roots).max()]
+    angle = math.atan2(root.imag, root.real)
+    return -math.log(abs(root)) / angle, angle
+
+
+def judge_long_run(case: str, integrator: Any) -> Outcome:
+    """Undamped: energy bounded and a phase error that only adds up. Damped: energy falls at the predicted rate."""
+    numbers = definition(case)["definition"]
+    count = int(numbers["n_periods"])
+    until = float(quantity(case, "end time").value)
+    dt = until / count / STEPS
+    model, start = long_pendulum(case=case)
+    begin = mbd.simulate(model, start, integrator, dt=dt, until=FIRST * STEPS * dt)
+    bottom = numbers["m"] * numbers["g"] * numbers["L"]
+    energy = quantity(case, "energy above")
+    total = begin.energy.total + bottom
+    figures = [Figure("error of the energy at the start [J]", abs(total[0] - energy.value), 10.0 * energy.accuracy)]
+    if integrator.coefficients.undamped:
+        run = mbd.simulate(model, start, integrator, dt=dt, until=until, store=STEPS)
+        figures += _kept(run, bottom, float(np.max(np.abs(total / total[0] - 1.0))))
+        figures += _phase(case, run, begin, count)
+    else:
+        run = mbd.simulate(model, start, integrator, dt=dt, until=until, store=_stride(count))
+        figures += _falling(run, bottom)
+        figures.append(_rate(case, integrator, dt, 1.0, run, RATE))
+        few = min(count, 1000) * STEPS * dt
+        model, start = long_pendulum(SMALL, case)
+        small = mbd.simulate(model, start, integrator, dt=dt, until=few, store=_stride(min(count, 1000)))
+        figures.append(_rate(case, integrator, dt, SMALL, small, SMALL_RATE))
+    return Outcome(figures, [Curve("energy [J]", run.time, run.energy.total + bottom, y_label="energy [J]")])
+
+
+def _stride(count: int) -> int:
+    """Steps between rows: no divisor of a period, so that rows meet every phase of it."""
+    return 101 if count > 10_000 else 7
+
+
+def _kept(run: Any, bottom: float, usual: float) -> list[Figure]:
+    """Energy at the end and on the way against what it does in the first periods."""
+    total = run.energy.total + bottom
+    off = total / total[0] - 1.0
+    return [
+        Figure("energy error at the end over the largest of the first periods [-]", abs(off[-1]) / usual, TIMES),
+        Figure("largest energy error over the largest of the first periods [-]", np.max(np.abs(off)) / usual, TIMES),
+    ]
+
+
+def _phase(case: str, run: Any, begin: Any, count: int) -> list[Figure]:
+    """Phase error at the end against that of one period, found from zero crossings of the first few."""
+    from scipy.special import ellipk, ellipkinc
+
+    numbers, top = definition(case)["definition"], definition(case)["initial_conditions"]["theta0"]
+    k, frequency = math.sin(0.5 * top), math.sqrt(numbers["g"] / numbers["L"])
+    # θ/2 = asin(k sin φ), and time runs as F(φ | k²)/ω: a phase that is uniform in time
+    phi = np.unwrap(np.arctan2(np.sin(0.5 * run["pivot.angle"]) / k, run["pivot.angle.rate"] / (2.0 * k * frequency)))
+    phase = 0.5 * math.pi * ellipkinc(phi, k * k) / ellipk(k * k)
+    exact = math.sin(0.5 * float(quantity(case, "theta(").value)) / k  # sin φ after whole periods
+    due = 0.5 * math.pi * ellipkinc(math.asin(exact), k * k) / ellipk(k * k) if abs(exact) <= 1.0 else math.nan
+    lag = float(due - phase[-1])
+    period = run.time[-1] / count
+    falls = _falls(begin)
+    one = (falls[-1] - falls[0]) / (len(falls) - 1) / period - 1.0
+    expected = 2.0 * math.pi * count * one
+    return [
+        Figure("phase error over periods × error of one × 2π, less 1 [-]", abs(lag / expected - 1.0), PHASE),
+        Figure("relative error of the period over (ω dt)²/12, less 1 [-]",
+               abs(one / ((frequency * period / STEPS) ** 2 / 12.0) - 1.0), 0.5),
+    ]  # fmt: skip
+
+
+def _falls(run: Any) -> list[float]:
+    """Times at which the angle falls through zero, by bisection of the run's own interpolation."""
+    angle, found = run["pivot.angle"], []
+    for row in np.flatnonzero((angle[:-1] > 0.0) & (angle[1:] <= 0.0)):
+        left, right = float(run.time[row]), float(run.time[row + 1])
+        for _ in range(50):
+            middle = 0.5 * (left + right)
+            left, right = (middle, right) if run.at(middle)["pivot.angle"] > 0.0 else (left, middle)
+        found.append(right)
+    return found
+
+
+def _falling(run: Any, bottom: float) -> list[Figure]:
+    """Mean energies of the parts of the run; it wavers within a period, by what no scheme is to blame for."""
+    parts = [float(np.mean(part)) for part in np.array_split(run.energy.total + bottom, BLOCKS)]
+    return [Figure("parts of the run with more energy than the part before", int(np.sum(np.diff(parts) >= 0.0)), 0)]
+
+
+def _rate(case: str, integrator: Any, dt: float, share: float, run: Any, limit: float) -> Figure:
+    """Decay of the energy against exp(−4π ξ N), from the mean logarithms of the first and last part of the run.
+
+    ξ is that of a linear oscillator as fast as the pendulum is at the energy of each part.
+    """
+    from scipy.special import ellipk
+
+    numbers = definition(case)["definition"]
+    bottom, frequency = numbers["m"] * numbers["g"] * numbers["L"], math.sqrt(numbers["g"] / numbers["L"])
+    parts = np.array_split(np.arange(len(run)), BLOCKS)
+    total = run.energy.total + bottom
+    level = [float(np.mean(np.log(total[part]))) for part in parts]
+    middle = [float(np.mean(run.time[part])) for part in parts]
+    rates = []
+    for each in level:
+        square = math.exp(each) / (2.0 * bottom)  # k² = sin²(θ₀/2) = E/(2 m g L)
+        ratio, turn = numerical_damping(integrator.coefficients, 0.5 * math.pi * frequency / ellipk(square) * dt)
+        rates.append(2.0 * ratio * turn / dt)
+    expected = float(np.trapezoid(rates, middle))
+    what = "its amplitude" if share == 1.0 else f"{share:g} of its amplitude"
+    return Figure(f"rate of decay from {what} over that of the algorithmic damping, less 1 [-]",
+                  abs((level[0] - level[-1]) / expected - 1.0), limit)  # fmt: skip
+
+
+MUST = "undamped: energy bounded, phase error adds up; damped: energy falls at the rate of the algorithmic damping"
+
+CASES = tuple(
+    HardCase(id, MUST, partial(judge_long_run, id), ("Newmark", "HHT", "generalized-alpha"), slow)
+    for id, slow in ((QUICK, False), (J12, True))
+)

@@ -1,0 +1,194 @@
+"""Masses that differ by a million or vanish: j4 and j5."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+import mbd
+from mbd.hardcases.case import Curve, Figure, HardCase, Outcome, definition
+from mbd.hardcases.convergence import EVERY, allowance, quantity, study
+
+__all__ = ["CASES", "bob_on_link", "heavy_below_light"]
+
+J4, J5 = "j4-mass-ratio-1e6", "j5-near-massless-link"
+GAP = 1e-10
+"""Gap of a joint [m] that is allowed."""
+FINE, MIDDLE, COARSE = (5e-7, 2.5e-7, 1.25e-7), 5e-7, (1e-2, 1e-3, 1e-4)
+"""Steps [s] that resolve the snap of the light mass through the straight line, in minimal and in absolute coordinates,
+and steps that do not: there a scheme may damp it or say that it cannot go on."""
+ANGLE_LIMIT, RATE_LIMIT, ABSOLUTE = 2e-5, 4e-3, 100.0
+"""Errors at the finest step [rad, rad/s]; in absolute coordinates, at steps four times as large, so many times that."""
+GAIN = 1e-3
+"""Energy that may be gained, over that of the heavy mass between its lowest and highest place [-]."""
+
+
+WELDED, HINGED = 0.2, 0.5
+"""Factors of the allowance of errors of the period, with one coordinate and with rows."""
+
+
+def heavy_below_light(cut: str = "auto", case: str = J4) -> tuple[mbd.Model, mbd.State]:
+    """A double pendulum of a light mass and a heavy one below it; cut='all' has absolute coordinates."""
+    numbers, begin = definition(case)["definition"], definition(case)["initial_conditions"]
+    model = mbd.Model("mass ratio", gravity=(0.0, -numbers["g"], 0.0), cut=cut)
+    upper = mbd.Link("upper", numbers["m1"], numbers["L1"], numbers["L1"])
+    lower = mbd.Link("lower", numbers["m2"], numbers["L2"], numbers["L2"])
+    model.connect(
+        mbd.Revolute("shoulder", model.ground.origin, upper.start), mbd.Revolute("elbow", upper.end, lower.start)
+    )
+    one, two = begin["theta1"], begin["theta2"]
+    names = ("shoulder.angle", "elbow.angle") if cut == "auto" else ("upper floating.angle", "lower floating.angle")
+    return model, mbd.assemble(model, position={names[0]: one, names[1]: two - one if cut == "auto" else two})
+
+
+def judge_mass_ratio(integrator: Any) -> Outcome:
+    """The values where the step resolves the light mass; elsewhere no gain of energy, no open joint, or an error."""
+    reference = quantity(J4, "[theta1, theta2")
+    model, start = heavy_below_light()
+
+    def errors(dt: float) -> Mapping[str, float]:
+        run = _swing(model, start, integrator, dt, reference.times)
+        return _differences(run, reference, "auto")
+
+    found = study(errors, FINE)
+    absolute, begun = heavy_below_light("all")
+    wide = _swing(absolute, begun, integrator, MIDDLE, reference.times)
+    apart = _differences(wide, reference, "all")
+    gap, silent, curves = wide.violation.length, [], []
+    for mechanism, at in (model, start), (absolute, begun):
+        for dt in COARSE:
+            run = _swing(mechanism, at, integrator, dt, reference.times)
+            gap = max(gap, run.violation.length)
+            total = run.energy.total
+            silent.append(_gain(total) if run.success else 0.0)
+            curves.append(Curve(f"energy, {mechanism.cut}, dt = {dt:g} s", run.time, total, y_label="energy [J]"))
+    limits = {"error of the angles [rad]": ANGLE_LIMIT, "error of the rates [rad/s]": RATE_LIMIT}
+    figures = []
+    for what, limit in limits.items():
+        sizes = found.errors[what]
+        below = 2.0 - math.log2(sizes[-2] / sizes[-1]) if sizes[-1] > reference.accuracy else 0.0 * sizes[-1]
+        figures += [
+            Figure(
+                f"2 − order of {what.split(' [')[0]} [-]", below, 0.15
+            ),  # the damping of the fast motion has order 3
+            Figure(f"{what} at dt = {FINE[-1]:g} s", float(sizes[-1]), limit),
+            Figure(f"{what} at dt = {MIDDLE:g} s, absolute coordinates", apart[what], ABSOLUTE * limit),
+        ]
+    figures.append(Figure("gap of the joints at any step [m]", gap, GAP))
+    figures.append(Figure("energy gained in silence at large steps [-]", max(silent), GAIN))
+    return Outcome(figures, [*curves, *found.curves()])
+
+
+def _swing(model: mbd.Model, start: mbd.State, integrator: Any, dt: float, times: Any) -> Any:
+    """A run that keeps about 5000 rows, with those at the instants of the reference."""
+    stride = max(1, round(2e-4 / dt))
+    return mbd.simulate(model, start, integrator, dt=dt, until=float(times[-1]), store=stride, on_failure="return")
+
+
+def _differences(run: Any, reference: Any, cut: str) -> dict[str, float]:
+    """Errors of both angles and of both rates; NaN where the run stopped early."""
+    names = ("error of the angles [rad]", "error of the rates [rad/s]")
+    if not run.success:
+        return dict.fromkeys(names, math.nan)
+    at = run.at(reference.times)
+    one, two = ("shoulder", "elbow") if cut == "auto" else ("upper floating", "lower floating")
+    first = np.column_stack([at[f"{one}.angle"], at[f"{one}.angle.rate"]])
+    second = np.column_stack([at[f"{two}.angle"], at[f"{two}.angle.rate"]])
+    if cut == "auto":
+        second = second + first
+    off = np.abs(np.stack([first, second]) - np.moveaxis(reference.value.reshape(-1, 2, 2), 2, 0))
+    return dict(zip(names, (float(np.max(off[..., 0])), float(np.max(off[..., 1]))), strict=True))
+
+
+def _gain(total: Any) -> float:
+    """Largest energy above that at the start, over 2 m g (L₁ + L₂) of the heavy mass."""
+    numbers = definition(J4)["definition"]
+    swing = 2.0 * numbers["m2"] * numbers["g"] * (numbers["L1"] + numbers["L2"])
+    return float(np.max(total - total[0]) / swing)
+
+
+def bob_on_link(mass: float, held: str = "weld", case: str = J5) -> tuple[mbd.Model, mbd.State]:
+    """A bob at the end of a link of little or no mass, by a 'weld', a 'hinge', or without a bob ('nothing')."""
+    numbers, begin = definition(case)["definition"], definition(case)["initial_conditions"]
+    length, angle = numbers["total_length"], begin["theta0"]
+    model = mbd.Model("bob on a link", gravity=(0.0, -numbers["g"], 0.0))
+    link = mbd.Link("stick", mass, length, 0.5 * length, mass * length**2 / 12.0)
+    bob = mbd.PointMass("bob", numbers["bob_mass"])
+    model.connect(mbd.Revolute("pivot", model.ground.origin, link.start))
+    position = {"pivot.angle": angle}
+    if held == "weld":
+        model.connect(mbd.Weld("glue", link.end, bob.origin))
+    elif held == "hinge":
+        model.connect(
+            mbd.Translation("place", model.ground.origin, bob.origin), mbd.Revolute("pin", link.end, bob.origin)
+        )
+        position |= {"place.x": length * math.sin(angle), "place.y": -length * math.cos(angle)}
+    return model, mbd.assemble(model, position=position)
+
+
+def judge_massless_link(integrator: Any) -> Outcome:
+    """Period and pull at the start with almost no mass and with none; an error where nothing determines the motion."""
+    numbers = definition(J5)["definition"]
+    period, pull = quantity(J5, "period"), quantity(J5, "tension at the start")
+    full = float(period.value)
+    ways = [(numbers["link_mass"], "weld"), (0.0, "weld"), (numbers["link_mass"], "hinge"), (0.0, "hinge")]
+    off = []
+
+    def errors(dt: float) -> Mapping[str, float]:
+        found = {}
+        for mass, held in ways:
+            model, start = bob_on_link(mass, held)
+            run = mbd.simulate(model, start, integrator, dt=dt, until=1.3 * full)
+            name = f"error of the period, {mass:g} kg, {held} [s]"
+            found[name] = abs(_period(run) - full)
+            off.append(abs(float(np.linalg.norm(run["pivot.reaction_force"][0])) - float(pull.value)))
+        return found
+
+    found = study(errors, full / 100)
+    rate, fine = 2.0 * math.pi / full, float(found.steps[-1])
+    limits = {what: allowance(WELDED if "weld" in what else HINGED, rate, fine, full) for what in found.errors}
+    return Outcome(
+        [
+            *found.figures(limits),
+            Figure("error of the pull at the start [N]", max(off), pull.accuracy),
+            Figure("links that nothing moves and that are not refused by name", _unnamed(), 0),
+        ],
+        found.curves(),
+    )
+
+
+def _period(run: Any) -> float:
+    """Time between the first fall through zero and the next."""
+    angle = run["pivot.angle"]
+    falls = np.flatnonzero((angle[:-1] > 0.0) & (angle[1:] <= 0.0))
+    if len(falls) < 2:
+        return math.nan
+    found = []
+    for row in falls[:2]:
+        left, right = float(run.time[row]), float(run.time[row + 1])
+        for _ in range(60):
+            middle = 0.5 * (left + right)
+            left, right = (middle, right) if run.at(middle)["pivot.angle"] > 0.0 else (left, middle)
+        found.append(right)
+    return found[1] - found[0]
+
+
+def _unnamed() -> int:
+    """0 if a massless link without a bob is refused before a run begins, and named."""
+    try:
+        bob_on_link(0.0, "nothing")
+    except mbd.ModelError as error:
+        return 0 if re.search(r"'(stick|pivot)", str(error)) and "mass" in str(error) else 1
+    return 1
+
+
+CASES = (
+    HardCase(J4, "values where the step resolves the light mass; else an error or damping, no gain, no open joint",
+             judge_mass_ratio, EVERY),
+    HardCase(J5, "a link of almost no mass, or of none, moves as its bob does; motion without mass is refused",
+             judge_massless_link, EVERY),
+)  # fmt: skip

@@ -1,0 +1,179 @@
+"""Linkages that pass poses in which their rows lose rank and another branch of motions begins: j3 and j3b."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+import mbd
+from mbd.hardcases.case import Curve, Figure, HardCase, Outcome, definition
+from mbd.hardcases.convergence import EVERY, allowance, distance_to, quantity, study
+
+__all__ = ["CASES", "equal_slider_crank", "parallelogram"]
+
+J3, J3B = "j3-slider-crank-equal-lengths", "j3b-fourbar-flattening"
+JUMP = 1e-6
+"""Relative change of energy that one passage of a singular pose may make [-]."""
+CLOSE = 1e-8
+"""Gap of a joint [m] and angle between parallel links [rad] that are allowed."""
+WINDOW = 0.02
+"""Time [s] before and after a singular pose within which a jump of energy is looked for."""
+CRANK, FLAT = 0.6, 0.2
+"""Factors of the allowance of errors, of j3 and j3b."""
+
+
+def equal_slider_crank(case: str = J3) -> tuple[mbd.Model, mbd.State]:
+    """Crank and rod of one length, the slider on the x axis through the crank's pivot."""
+    numbers, begin = definition(case)["definition"], definition(case)["initial_conditions"]
+    L, m = numbers["L"], numbers["m_each"]
+    rod = {"mass": m, "length": L, "center": 0.5 * L, "inertia": m * L * L / 12.0}
+    model = mbd.Model("slider-crank", gravity=(0.0, -numbers["g"], 0.0))
+    crank, coupler = mbd.Link("crank", **rod), mbd.Link("rod", **rod)
+    slider = mbd.PointMass("slider", m)
+    model.connect(
+        mbd.Revolute("main", model.ground.origin, crank.start),
+        mbd.Revolute("pin", crank.end, coupler.start),
+        mbd.Prismatic("guide", model.ground.origin, slider.origin),
+        mbd.Revolute("wrist", slider.origin, coupler.end),
+    )
+    angle = begin["crank_angle"]  # from the x axis; links hang along −y at angle zero
+    place = {"main.angle": angle + 0.5 * math.pi, "pin.angle": -2.0 * angle}
+    place["guide.displacement"] = 2.0 * L * math.cos(angle)
+    return model, mbd.assemble(model, position=place, velocity={"main.angle": begin["crank_rate"]})
+
+
+def parallelogram(case: str = J3B) -> tuple[mbd.Model, mbd.State]:
+    """Two cranks and a coupler of one length on a base of the same length; 'a' and 'd' are their pivots."""
+    numbers, begin = definition(case)["definition"], definition(case)["initial_conditions"]
+    L, m = numbers["L"], numbers["link_mass"]
+    rod = {"mass": m, "length": L, "center": 0.5 * L, "inertia": m * L * L / 12.0}
+    model = mbd.Model("parallelogram", gravity=(0.0, -numbers["g"], 0.0))
+    one, other, coupler = (mbd.Link(name, **rod) for name in ("one", "other", "coupler"))
+    model.connect(
+        mbd.Revolute("a", model.ground.origin, one.start),
+        mbd.Revolute("d", model.ground.point(L, 0.0, name="far end"), other.start),
+        mbd.Revolute("b", one.end, coupler.start),
+        mbd.Revolute("c", coupler.end, other.end),
+    )
+    angle = begin["theta_from_downward"]
+    place = {"a.angle": angle, "d.angle": angle, "b.angle": 0.5 * math.pi - angle}
+    return model, mbd.assemble(model, position=place, velocity={"a.angle": begin["thetadot"]})
+
+
+def judge_slider_crank(integrator: Any) -> Outcome:
+    """Two singular poses are passed on the smooth branch: angle and slider with order 2, energy without a jump."""
+    model, start = equal_slider_crank()
+    angle, slider = quantity(J3, "crank angle"), quantity(J3, "slider position")
+    instant, rate = quantity(J3, "time of first"), quantity(J3, "crank rate at the first")
+    energy = quantity(J3, "energy")
+    runs = []
+
+    def errors(dt: float) -> Mapping[str, float]:
+        run = mbd.simulate(model, start, integrator, dt=dt, until=float(angle.times[-1]), on_failure="return")
+        runs.append(run)
+        if not run.success:
+            return dict.fromkeys(("error of the crank angle [rad]", "error of the slider [m]"), math.nan)
+        at = run.at(angle.times)
+        return {
+            "error of the crank angle [rad]": distance_to(at["main.angle"] - 0.5 * math.pi, angle),
+            "error of the slider [m]": distance_to(at["guide.displacement"], slider),
+        }
+
+    found = study(errors, 2e-3)
+    finest, dt, turn = runs[-1], float(found.steps[-1]), definition(J3)["initial_conditions"]["crank_rate"]
+    turned = finest["main.angle"] - 0.5 * math.pi
+    passages = _passages(finest, turned, lambda at: float(at["main.angle"]) - 0.5 * math.pi)
+    first = passages[0] if passages else math.nan
+    speed = float(finest.at(first)["main.angle.rate"]) if passages else math.nan
+    L = definition(J3)["definition"]["L"]
+    branch = max(float(np.max(np.abs(
+        run["guide.displacement"] - 2.0 * L * np.cos(run["main.angle"] - 0.5 * math.pi)))) for run in runs)  # fmt: skip
+    return Outcome(
+        [
+            Figure("runs that stop early", sum(not run.success for run in runs), 0),
+            *found.figures({"error of the crank angle [rad]": allowance(CRANK, turn, dt, angle.size),
+                            "error of the slider [m]": allowance(CRANK, turn, dt, 2.0 * L * angle.size)}),
+            Figure("error of the time of the first singular pose [s]", abs(first - float(instant.value)),
+                   allowance(CRANK, turn, dt, instant.size)),
+            Figure("error of the crank rate there [rad/s]", abs(speed - float(rate.value)),
+                   allowance(CRANK, turn, dt, rate.size)),
+            Figure("error of the energy at the start [J]", abs(float(finest.energy.total[0]) - float(energy.value)),
+                   max(energy.accuracy, 1e-12 * float(energy.value))),
+            Figure("jump of energy at a singular pose, relative [-]", _jump(finest, passages), JUMP),
+            Figure("slider off the smooth branch [m]", branch, CLOSE),
+            Figure("gap of the joints [m]", max(run.violation.length for run in runs), CLOSE),
+        ],
+        [Curve("crank angle [rad]", finest.time, turned), *found.curves()],
+    )  # fmt: skip
+
+
+def judge_parallelogram(integrator: Any) -> Outcome:
+    """Every flat pose is passed on the branch where the cranks stay parallel."""
+    model, start = parallelogram()
+    angle, count = quantity(J3B, "crank angle"), quantity(J3B, "flat positions")
+    runs = []
+
+    def errors(dt: float) -> Mapping[str, float]:
+        run = mbd.simulate(model, start, integrator, dt=dt, until=float(angle.times[-1]), on_failure="return")
+        runs.append(run)
+        found = distance_to(run.at(angle.times)["a.angle"], angle) if run.success else math.nan
+        return {"error of the crank angle [rad]": found}
+
+    found = study(errors, 2e-3)
+    finest, dt, turn = runs[-1], float(found.steps[-1]), definition(J3B)["initial_conditions"]["thetadot"]
+    passages = _passages(finest, finest["a.angle"], lambda at: float(at["a.angle"]))
+    skew = max(float(np.max(np.abs(run["d.angle"] - run["a.angle"]))) for run in runs)
+    return Outcome(
+        [
+            Figure("runs that stop early", sum(not run.success for run in runs), 0),
+            *found.figures({"error of the crank angle [rad]": allowance(FLAT, turn, dt, angle.size)}),
+            Figure("wrong number of flat poses", abs(len(passages) - float(count.value)), 0),
+            Figure("jump of energy at a flat pose, relative [-]", _jump(finest, passages), JUMP),
+            Figure("cranks out of parallel [rad]", skew, CLOSE),
+            Figure("gap of the joints [m]", max(run.violation.length for run in runs), CLOSE),
+        ],
+        [Curve("crank angle [rad]", finest.time, finest["a.angle"]), *found.curves()],
+    )
+
+
+def _passages(run: Any, angle: Any, angle_at: Callable[[Any], float]) -> list[float]:
+    """Times at which an angle is π/2 + k π, by bisection of the run's own interpolation."""
+    halves = np.floor(angle / math.pi + 0.5)
+    found = []
+    for row in np.flatnonzero(np.diff(halves)):
+        left, right, level = float(run.time[row]), float(run.time[row + 1]), halves[row]
+        for _ in range(60):
+            middle = 0.5 * (left + right)
+            if math.floor(angle_at(run.at(middle)) / math.pi + 0.5) == level:
+                left = middle
+            else:
+                right = middle
+        found.append(right)
+    return found
+
+
+def _jump(run: Any, passages: list[float]) -> float:
+    """Largest change of energy across a singular pose, beyond its straight trend before and after, over the energy.
+
+    The trend is the scheme's own error, of order dt²; what a bad passage does is added within one step.
+    """
+    total, worst = run.energy.total, 0.0 if passages else math.nan
+    for instant in passages:
+        before = (run.time > instant - WINDOW) & (run.time < instant)
+        after = (run.time > instant) & (run.time < instant + WINDOW)
+        if np.count_nonzero(before) < 4 or np.count_nonzero(after) < 4:
+            return math.nan
+        ends = [np.polyval(np.polyfit(run.time[side] - instant, total[side], 2), 0.0) for side in (before, after)]
+        worst = max(worst, float(abs(ends[1] - ends[0]) / np.max(np.abs(run.energy.kinetic))))
+    return worst
+
+
+CASES = (
+    HardCase(J3, "the slider-crank passes its singular poses on the smooth branch, with order 2 and no jump of energy",
+             judge_slider_crank, EVERY),
+    HardCase(J3B, "the parallelogram passes its flat poses with its cranks parallel, with order 2",
+             judge_parallelogram, EVERY),
+)  # fmt: skip

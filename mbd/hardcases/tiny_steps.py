@@ -1,0 +1,109 @@
+"""A pendulum in x and y under ever smaller steps: j1."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+import mbd
+from mbd.hardcases.case import Curve, Figure, HardCase, Outcome, definition
+from mbd.hardcases.convergence import EPS, EVERY, force_floor, quantity, study
+
+__all__ = ["CASES", "circle"]
+
+J1 = "j1-tiny-steps-index3"
+SHARE = 0.5
+"""C of the multiplier error C dt² over m g²/L; the worst scheme needs about half of it [-]."""
+CLOSE = 1e-10
+"""|constraint| over L that is allowed at every step [-]."""
+NEAR, NEAR_STEP = 1e-8, 1e-6
+"""Places must be this accurate [m] at steps of this size [s] and below."""
+TOO_SMALL = 1e-17
+"""A tolerance of the balance that no double precision meets: a tenth of a unit in the last place [-]."""
+
+
+def circle(case: str = J1) -> tuple[mbd.Model, mbd.State]:
+    """A point mass on the circle x² + y² = L², whose multiplier is the pull of the rod; at rest at its angle."""
+    numbers, begin = definition(case)["definition"], definition(case)["initial_conditions"]
+    L, angle = numbers["L"], begin["angle_from_vertical"]
+    model = mbd.Model("pendulum in x and y", gravity=(0.0, -numbers["g"], 0.0))
+    bob = mbd.PointMass("bob", numbers["m"])
+    model.connect(mbd.Translation("place", model.ground.origin, bob.origin))
+    row = mbd.measure(lambda x, y: (x * x + y * y - L * L) / (2.0 * L), "place.x", "place.y")
+    model.constrain(mbd.Bilateral("rod", row))
+    return model, mbd.assemble(model, position={"place.x": L * math.sin(angle), "place.y": -L * math.cos(angle)})
+
+
+def judge_tiny_steps(integrator: Any) -> Outcome:
+    """Errors fall with dt² down to round-off and stay there; a tolerance below round-off is refused by name."""
+    model, start = circle()
+    numbers = definition(J1)["definition"]
+    L, m, g, until = (numbers[name] for name in ("L", "m", "g", "t_end"))
+    first, last = quantity(J1, "rod tension at t = 0+"), quantity(J1, "rod tension at t_end")
+    top = math.cos(definition(J1)["initial_conditions"]["angle_from_vertical"])
+    low = (float(last.value) / (m * g) + 2.0 * top) / 3.0  # T = m g (3 cos θ − 2 cos θ₀), so cos θ from the reference
+    place, speed = L * np.array([math.sqrt(1.0 - low * low), -low]), math.sqrt(2.0 * g * L * (low - top))
+    over, off, begun = [], [], []
+
+    def errors(dt: float) -> Mapping[str, float]:
+        run = mbd.simulate(model, start, integrator, dt=dt, until=until, store=max(1, round(until / dt / 1000)))
+        tension = abs(float(run["rod.multiplier"][-1]) - float(last.value))
+        floor = force_floor(integrator, dt, until / dt, m, L, speed)
+        over.append(tension / (SHARE * m * g * g / L * dt * dt + floor))
+        off.append(run.violation.length / L)
+        begun.append(abs(float(run["rod.multiplier"][0]) - float(first.value)))
+        found = math.dist((run["place.x"][-1], run["place.y"][-1]), place)
+        return {"error of the place [m]": found, "error of the tension [N]": tension}
+
+    found = study(errors, numbers["dts"])
+    places, steps = found.errors["error of the place [m]"], found.steps
+    rest = 10.0 * EPS * L * np.sqrt(until / steps)
+    floors = np.array([force_floor(integrator, dt, until / dt, m, L, speed) for dt in steps])
+    figures = [
+        Figure("|order − 2| of the place above round-off [-]",
+               found.deviation("error of the place [m]", float(rest[-1])), 0.15),
+        Figure("error of the place over C dt² and round-off [-]",
+               float(np.max(places / (SHARE * g * steps**2 + rest))), 1.0),
+        Figure(f"error of the place at dt ≤ {NEAR_STEP:g} s [m]", float(np.max(places[steps <= NEAR_STEP])), NEAR),
+        Figure("|order − 2| of the tension above its round-off floor [-]",
+               found.deviation("error of the tension [N]", floors), 0.15),
+        Figure("error of the tension over C dt² and its round-off floor [-]", max(over), 1.0),
+        Figure("error of the tension at the start [N]", max(begun), first.accuracy),
+        Figure("|constraint| over L [-]", max(off), CLOSE),
+        _refusal(integrator, model, start, min(numbers["dts"])),
+    ]  # fmt: skip
+    return Outcome(
+        figures, [*found.curves(), Curve("round-off floor of the tension [N]", steps, floors, "dt [s]", "", True)]
+    )
+
+
+def _refusal(integrator: Any, model: mbd.Model, start: mbd.State, dt: float) -> Figure:
+    """Whether a tolerance that cannot be met stops the run and tells what can be met: 0 if so."""
+    what = "runs that go on, or stop without saying what is attainable, under a tolerance below round-off"
+    run = mbd.simulate(model, start, _with_tolerance(integrator, TOO_SMALL), dt=dt, until=50 * dt, on_failure="return")
+    number = r"([\d.]+(?:e[-+]?\d+)?)"
+    said = re.search(rf"stagnated at round-off: residual {number}, attainable {number}", run.message)
+    told = said is not None and all(TOO_SMALL < float(each) < 1e-8 for each in said.groups())
+    return Figure(what, 0.0 if told and not run.success else 1.0, 0.0)
+
+
+def _with_tolerance(integrator: Any, tolerance: float) -> Any:
+    """The same scheme with another tolerance."""
+    own = {
+        name: getattr(integrator, name) for name in ("alpha", "rho_inf", "beta", "gamma") if hasattr(integrator, name)
+    }
+    return type(integrator)(**own, formulation=integrator.formulation, tolerance=tolerance)
+
+
+CASES = (
+    HardCase(
+        J1,
+        "errors fall with dt² until round-off and stay there; no false failure of Newton, no false success",
+        judge_tiny_steps,
+        EVERY,
+    ),
+)
