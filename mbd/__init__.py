@@ -81,6 +81,8 @@ if TYPE_CHECKING:
         Viscous as Viscous,
     )
     from mbd.model import Model as Model, on_slope as on_slope
+    from mbd.results.failure import Failure as Failure
+    from mbd.simulation.replay import Replay as Replay, replay as replay
     from mbd.simulation.simulate import simulate as simulate
     from mbd.state import State as State
     from mbd.tape.functions import (
@@ -119,6 +121,8 @@ _HOMES = {
     "mbd.joints": "Cylindrical Planar Prismatic Revolute Screw Translation Universal Weld",
     "mbd.joints.losses": "Coulomb Dissipation PinFriction Quadratic Tabulated Viscous",
     "mbd.model": "Model on_slope",
+    "mbd.results.failure": "Failure",
+    "mbd.simulation.replay": "Replay replay",
     "mbd.simulation.simulate": "simulate",
     "mbd.state": "State",
     "mbd.tape.functions": "acos asin atan atan2 cos cosh exp log maximum minimum sign sin sinh sqrt tan tanh where",

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from mbd.arrays import Vector
 from mbd.errors import UnknownNameError, nearest
 
-__all__ = ["Mode", "State"]
+__all__ = ["Memory", "Mode", "State"]
 
 
 def _empty() -> Vector:
@@ -31,6 +32,37 @@ class Mode:
 
 
 @dataclass(frozen=True, eq=False)
+class Memory:
+    """What a run knows beyond positions and velocities; opaque, for `simulate` alone.
+
+    With it a run goes on as if it had not been cut: accelerations and auxiliary ones, multipliers, what predicts the
+    next step, rows left out, sides of guards, the grid of instants, samples and states of controllers. It is used only
+    where everything that it belongs to is the same to the bit, else the scheme is started anew.
+
+    Attributes
+    ----------
+    belongs : words that must be the same: scheme, step, options, names of rows, contacts, events, controllers
+    digest : of the forces, rows and guards at the state: they must be the same too
+    time : that of the state [s]; the clock among `reals` may differ from it by round-off
+    parameters : values of all parameters that it was computed with
+    reals, integers : the kernel's arrays one after the other
+    scheme : memory of an integrator that steps in Python
+    controllers : samples and states of controllers, and the time from which samples count
+    pending : (kind, name) of events at this instant whose reset or controller failed, to be repeated
+    """
+
+    belongs: tuple[str, ...]
+    digest: str
+    time: float
+    parameters: Vector
+    reals: Vector
+    integers: Vector
+    scheme: Any = None
+    controllers: Mapping[str, Any] = field(default_factory=dict)
+    pending: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
 class State:
     """Where a mechanism is and how it moves.
 
@@ -46,6 +78,8 @@ class State:
     names : coordinate names, in the order of q; velocity_names in the order of v
     moved : how far the assembly moved each named quantity from the value asked for [m, rad, m/s, rad/s]
     parameters : parameter values that differ from the model's
+    memory : what a run needs beside this to go on exactly; None: it is started from the state alone. A state changed
+        by ``dataclasses.replace`` may keep it: a memory of other values is never used
     """
 
     time: float
@@ -59,6 +93,7 @@ class State:
     velocity_names: tuple[str, ...] = ()
     moved: Mapping[str, float] = field(default_factory=dict)
     parameters: Mapping[str, float] = field(default_factory=dict)
+    memory: Memory | None = field(default=None, repr=False)
 
     def __getitem__(self, name: str) -> float:
         """A coordinate ('left hip.angle') or a rate ('left hip.angle.rate', 'left hip.rate')."""

@@ -19,6 +19,7 @@ from mbd.results.interpolation import Side
 from mbd.results.record import EventRecord, Record
 
 if TYPE_CHECKING:
+    from mbd.results.failure import Failure
     from mbd.results.ledger import Ledger
     from mbd.results.storage import Archive
     from mbd.results.violation import Violation
@@ -158,9 +159,10 @@ class Trajectory:
         return self.record.message
 
     @property
-    def failure(self) -> Any:
-        """What is needed to replay the step that failed; None after a success."""
-        return self.record.failure
+    def failure(self) -> Failure | None:
+        """What is needed to replay the step that failed, with `mbd.replay`; None after a success."""
+        failure: Failure | None = self.record.failure
+        return failure
 
     @property
     def status(self) -> int:
@@ -174,7 +176,7 @@ class Trajectory:
 
     @property
     def final(self) -> Any:
-        """The state at the end, to go on from."""
+        """The state at the end, to go on from; with the same scheme and step as if there had been no end."""
         return self.record.final
 
     @cached_property

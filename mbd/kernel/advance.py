@@ -15,6 +15,7 @@ from mbd.kernel.fields import (
     FULL,
     GRID,
     INCHING,
+    LAST,
     LAST_SWITCH,
     LOG_EVENT,
     LOG_SLIPPED,
@@ -57,6 +58,11 @@ Without rows ten times as many.
 """
 SHORTEST = 0.1
 """Part of a step below which a failing step is not shortened any further [-]."""
+SHORTENING = 0.6180339887498949
+"""Golden ratio: what is left of a step whose Newton iteration failed, for the next try (at most five) [-].
+
+No power of it is a simple fraction, so that tries do not meet a pose that repeats with the grid again.
+"""
 
 
 def store_row(K: Any) -> None:
@@ -292,8 +298,6 @@ def advance(K: Any) -> int:
                 return EVENT
         t = K.clock[NOW]
         if t >= K.until - 1e-12 * K.dt:
-            if K.state[SINCE_STORE] > 0 and K.until >= K.end:
-                store_row(K)
             return DONE
         if K.state[MODE] < 0:
             K.state[MODE] = find_mode(K)
@@ -304,13 +308,15 @@ def advance(K: Any) -> int:
         steps += 1
         t1 = K.clock[BASE] + (K.state[GRID] + 1) * K.dt
         cut = t1 > K.until - 1e-6 * K.dt
+        if cut and K.until >= K.end:  # the caller decides: a step of the grid as in a longer run, or one cut
+            return LAST
         if cut:
             t1 = K.until
         h = t1 - t
         status = try_step(K, h, t1)
         full = h
         while (status == NOT_CONVERGED or status == STAGNATED or status == SINGULAR) and h > SHORTEST * full:
-            h *= 0.6180339887498949  # a pose in which rows lose rank is stepped over; stiff places get smaller steps
+            h *= SHORTENING  # a pose in which rows lose rank is stepped over; stiff places get smaller steps
             t1 = t + h
             status = try_step(K, h, t1)
         if status != 0:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import namedtuple
 
-__all__ = ["FIELDS", "INTEGERS", "INTEGER_ARRAYS", "REALS", "REAL_ARRAYS", "Kernel"]
+__all__ = ["FIELDS", "INTEGERS", "INTEGER_ARRAYS", "KEPT_INTEGERS", "KEPT_REALS", "REALS", "REAL_ARRAYS", "Kernel"]
 
 INTEGERS = (
     "n_q", "n_v", "n", "n_rows", "n_anchors", "n_contacts", "n_guards", "n_frictions",  # sizes; n = n_v + n_z rates
@@ -68,6 +68,14 @@ FIELDS = (*INTEGERS, *REALS, *REAL_ARRAYS, *INTEGER_ARRAYS, "code", "hooks")
 
 Kernel = namedtuple("Kernel", FIELDS)  # type: ignore[misc]
 
+KEPT_REALS = (
+    "clock", "q", "y", "rate", "aux", "slope", "lam", "lam_slope", "shift", "shift_change", "anchors", "guards0",
+    "scale", "mix", "deepest", "sinking", "side", "detail", "slip",
+)  # fmt: skip
+"""What of the real arrays the next step depends on: restored before a step, they make it the same to the bit."""
+KEPT_INTEGERS = ("closed", "armed", "touched", "dropped", "rows", "state", "sticks", "loose", "was")
+"""What of the integer arrays the next step depends on."""
+
 # places in `state`
 (
     MODE, ROWS, GRID, RESTART, STORED, LOGGED, SWITCHES, SINCE_STORE, BLOCKED, N_DROPPED, NEAR, INCHING, REDONE,
@@ -87,11 +95,11 @@ NOW, BASE, AUX_STEP, LAST_SWITCH = range(4)
 # functions in `code`; modes follow in pairs (tangent, residual)
 ACCELERATIONS, GUARDS, SCALES, COMPOSE = range(4)
 # what advance returns
-DONE, FULL, NEW_MODE, EVENT, PAUSE = range(5)
+DONE, FULL, NEW_MODE, EVENT, PAUSE, LAST = range(6)
 (
     NOT_FINITE, NOT_CONVERGED, SINGULAR, STAGNATED, CHATTER, NO_IMPACT, DEPENDENT, CONFLICT, NO_LOCATION, ENERGY_GAIN,
-    NO_FORCE,
-) = range(10, 21)  # fmt: skip
+    NO_FORCE, TOO_TIGHT,
+) = range(10, 22)  # fmt: skip
 # kinds of fired guards
 CLOSE, OPEN_PULL, OPEN_GAP, OPEN_FORCE, CROSS, WATCH, GRAZE, PRESS, STICK, SLIP, STICK_BRIEF = range(11)
 # kinds in the log

@@ -29,6 +29,7 @@ from mbd.kernel.fields import (
     STAGNATED,
     STAGNATIONS,
     TANGENTS,
+    TOO_TIGHT,
     USUAL,
 )  # fmt: skip
 from mbd.kernel.hooks import call
@@ -182,8 +183,9 @@ def newmark_step(K: Any, h: float, t1: float) -> int:
             error = residual_size(K, o_r, m, c_C, c_K, tolerance)
             if error > 1.0 and residual_size(K, o_r, m, 0.0, 0.0, 256.0 * EPS) <= 16.0:
                 if residual_size(K, o_r, m, c_C, c_K, K.tolerance) > 1.0:
-                    status = STAGNATED
-                    break
+                    K.detail[0] = t1
+                    K.detail[2] = h
+                    return TOO_TIGHT
                 K.counts[STAGNATIONS] += 1
                 error = 1.0
             elif iteration >= 6 and K.exact == 0 and residual_size(K, o_r, m, 0.0, 0.0, 1e5 * EPS) <= 1e3:
@@ -196,7 +198,7 @@ def newmark_step(K: Any, h: float, t1: float) -> int:
                 K.state[NEAR] -= 1
             finish(K, h)
             if overturns(K, h):
-                K.detail[1] = 0.0
+                K.detail[1] = -1.0
                 break
             return 0
         if not tangent and error > 0.3 * before:

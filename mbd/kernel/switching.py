@@ -225,7 +225,7 @@ def release_for(K: Any, after: int) -> None:
 def close_by_impact(K: Any, fastest: float) -> int:
     """Impact of all closing unilateral contacts, the releases it causes, anchors and log."""
     n = K.n
-    slow = fastest < K.rest_speed
+    slow = fastest < K.rest_speed or (K.state[PLASTIC] == 1 and fastest == 0.0)  # a rebound too small to rise at all
     if not slow:
         release_for(K, 0)
     status = impact(K, slow)

@@ -18,13 +18,13 @@ from mbd.results.columns import Alias, Columns, StoredColumns
 from mbd.results.facts import Facts
 from mbd.results.ledger import Ledger, Part
 from mbd.results.record import EventRecord, Record
-from mbd.results.states import pack, unpack
+from mbd.results.states import pack_state, unpack
 from mbd.results.violation import Violation
 
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
 
-__all__ = ["Archive", "load", "plain", "save"]
+__all__ = ["Archive", "Arrays", "load", "plain", "read", "save", "write"]
 
 FORMAT, VERSION = "mbd run", 1
 
@@ -60,6 +60,8 @@ def plain(value: Any) -> Any:
 
 def save(run: Trajectory, path: str | Path, names: Sequence[str] | None = None) -> Path:
     """Write a run; see `Trajectory.save`."""
+    from mbd.results.capsule import packed
+
     target = Path(path)
     if not target.suffix:
         target = target.with_name(target.name + SUFFIX)
@@ -71,9 +73,10 @@ def save(run: Trajectory, path: str | Path, names: Sequence[str] | None = None) 
     meta: dict[str, Any] = {
         "format": FORMAT, "version": VERSION, "facts": run.facts.as_json(),
         "parameter_names": list(record.parameter_names), "stats": record.stats, "settings": record.settings,
-        "success": record.success, "message": record.message, "failure": record.failure and str(record.failure),
+        "success": record.success, "message": record.message,
+        "failure": None if record.failure is None else packed(record.failure, arrays),
         "events": [_event(event) for event in record.events], "violation": asdict(run.violation),
-        "changes": [row for row, _ in record.parameter_changes], "final": pack(record.final, arrays),
+        "changes": [row for row, _ in record.parameter_changes], "final": pack_state(record.final, arrays),
     }  # fmt: skip
     for number, (_, values) in enumerate(record.parameter_changes):
         arrays[f"change {number}"] = values
@@ -81,11 +84,11 @@ def save(run: Trajectory, path: str | Path, names: Sequence[str] | None = None) 
     meta["parts"] = _ledger(run.energy, arrays)
     text = json.dumps(meta, default=plain)
     arrays["meta"] = np.frombuffer(text.encode(), dtype=np.uint8)
-    _write(target, arrays)
+    write(target, arrays)
     return target
 
 
-def _write(target: Path, arrays: Arrays) -> None:
+def write(target: Path, arrays: Arrays) -> None:
     """Write beside the target, then rename, so that a reader never sees half a file."""
     target.parent.mkdir(parents=True, exist_ok=True)
     partial = target.with_name(f".{target.name}.{os.getpid()}")
@@ -141,7 +144,7 @@ def load(path: str | Path) -> Trajectory:
     from mbd.trajectory import Trajectory
 
     source = Path(path)
-    arrays, meta = _read(source)
+    arrays, meta = read(source, FORMAT, VERSION, "run.save(…)")
     record = _record(arrays, meta)
     values = {name: arrays[f"value {number}"] for name, number in meta["values"].items()}
     aliases = {name: (part, index) for name, (part, index) in meta["aliases"].items()}
@@ -151,10 +154,12 @@ def load(path: str | Path) -> Trajectory:
     return Trajectory(record, Archive(columns, ledger, Violation(**meta["violation"]), Facts.read(meta["facts"])))
 
 
-def _read(source: Path) -> tuple[Arrays, dict[str, Any]]:
+def read(source: Path, kind: str, version: int, written_by: str) -> tuple[Arrays, dict[str, Any]]:
+    """Arrays and words of a file of one kind ('mbd run', 'mbd failure')."""
+    name = kind.removeprefix("mbd ")
     if not source.is_file():
-        raise FileNotFoundError(f"no run file at '{source}'")
-    refusal = f"'{source}' is not a run of mbd; expected a file written by run.save(…)"
+        raise FileNotFoundError(f"no {name} file at '{source}'")
+    refusal = f"'{source}' is not a {name} of mbd; expected a file written by {written_by}"
     if not zipfile.is_zipfile(source):
         raise TrajectoryError(refusal)
     try:
@@ -163,23 +168,27 @@ def _read(source: Path) -> tuple[Arrays, dict[str, Any]]:
         meta = json.loads(arrays["meta"].tobytes())
     except (KeyError, ValueError, zipfile.BadZipFile) as error:
         raise TrajectoryError(refusal) from error
-    if not isinstance(meta, dict) or meta.get("format") != FORMAT:
+    if not isinstance(meta, dict) or meta.get("format") != kind:
         raise TrajectoryError(refusal)
-    if meta["version"] > VERSION:
+    if meta["version"] > version:
         raise TrajectoryError(
-            f"'{source}' was written by a newer mbd (format {meta['version']}, here {VERSION}); update mbd"
+            f"'{source}' was written by a newer mbd (format {meta['version']}, here {version}); update mbd"
         )
     return arrays, meta
 
 
 def _record(arrays: Arrays, meta: Mapping[str, Any]) -> Record:
+    from mbd.results.capsule import unpacked
+
+    failure = meta["failure"]  # older files have its sentence only
+    failure = unpacked(failure, arrays) if isinstance(failure, dict) else failure
     events = tuple(
         EventRecord(**{**event, "impulse": np.asarray(event["impulse"], dtype=np.float64)}) for event in meta["events"]
     )
     changes = tuple((row, arrays[f"change {number}"]) for number, row in enumerate(meta["changes"]))
     return Record(
         equations=None, parameter_names=tuple(meta["parameter_names"]), events=events, stats=meta["stats"],
-        success=meta["success"], message=meta["message"], failure=meta["failure"],
+        success=meta["success"], message=meta["message"], failure=failure,
         final=unpack(meta["final"], arrays), settings=meta["settings"], parameter_changes=changes,
         **{name: arrays[name] for name in ROWS},
     )  # fmt: skip

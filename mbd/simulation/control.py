@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mbd.arrays import Vector
 from mbd.compile.mechanism import rate_names
 from mbd.compile.python import scalar_function
 from mbd.equations.equations import Guard
 from mbd.errors import ModelError, SimulationError, UnknownNameError, nearest
 from mbd.kernel import fields as F
 from mbd.simulation.asked import asked
+from mbd.simulation.memory import without_sharing
 
 if TYPE_CHECKING:
     from mbd.simulation.run import Run
@@ -88,6 +90,22 @@ def _reset_values(reset: Any, named: Named) -> dict[str, float]:
     return {name: float(value(named) if callable(value) else value) for name, value in dict(wanted).items()}
 
 
+NEAR = 8.0 * F.EPS
+"""Two instants are one where they differ by less, relative: round-off of a sum of steps [-]."""
+CROWD = 32
+"""Breaks within 64 steps before and after one, above which it is stepped over as one of a dense signal."""
+
+
+def _sparse(instants: Vector, dt: float) -> Vector:
+    """The breaks at which steps end: not those of samples about as dense as the steps.
+
+    Judged around each of them, so that it does not depend on where a run begins or ends.
+    """
+    window = 64.0 * dt
+    around = np.searchsorted(instants, instants + window) - np.searchsorted(instants, instants - window)
+    return np.asarray(instants[around <= CROWD])
+
+
 class Boundaries:
     """Instants at which a step must end: samples of controllers, jumps and kinks of signals in time."""
 
@@ -100,16 +118,38 @@ class Boundaries:
             raise ModelError(
                 [f"the period of {c.name!r}, {c.period:g} s, is far below dt = {dt:g} s; lower dt too" for c in fast]
             )
-        self.states = {controller.name: controller.state for controller in self.controllers}
+        self.states = {controller.name: without_sharing(controller.state) for controller in self.controllers}
         self.begin_time = begin
         self.samples = {c.name: 0 for c in self.controllers if c.period is not None}
-        inside = [time for time in instants if begin < time < end]
-        dense = len(inside) * 4.0 * dt > end - begin  # samples as dense as the steps are stepped over
-        self.breaks = [] if dense else inside
-        self.place = 0
+        self.breaks = _sparse(np.asarray(instants, dtype=float), dt)
+        self.place = int(np.searchsorted(self.breaks, begin, side="right"))
+        self.near = min(NEAR * abs(end), 1e-6 * dt)
 
+    # what a run keeps of it -----------------------------------------------------------------------------------------
+    def kept(self) -> tuple[Any, ...]:
+        """What changes as the run goes on; for `restore`."""
+        return self.begin_time, self.samples, self.states, self.place
+
+    def restore(self, kept: tuple[Any, ...]) -> None:
+        """As it was."""
+        self.begin_time, self.samples, self.states, self.place = kept
+
+    def remembered(self) -> dict[str, Any]:
+        """For a run that goes on from here."""
+        return {"begin": self.begin_time, "samples": dict(self.samples), "states": without_sharing(self.states)}
+
+    def take_up(self, remembered: Mapping[str, Any], now: float) -> None:
+        """Go on with the samples and states of an earlier run."""
+        self.begin_time, self.samples = remembered["begin"], dict(remembered["samples"])
+        self.states = without_sharing(dict(remembered["states"]))
+        self.place = int(np.searchsorted(self.breaks, now, side="right"))
+
+    # the run --------------------------------------------------------------------------------------------------------
     def _sample(self, controller: Any) -> float:
         return float(self.begin_time + self.samples[controller.name] * controller.period)
+
+    def _count(self, controller: Any) -> None:
+        self.samples = {**self.samples, controller.name: self.samples[controller.name] + 1}
 
     def begin(self, run: Run) -> None:
         """The first call of every sampled controller; names that no result has are errors before the first step."""
@@ -119,30 +159,30 @@ class Boundaries:
         for controller in self.controllers:
             if controller.period is not None:
                 self._call(run, controller)
-                self.samples[controller.name] = 1
+                self._count(controller)
 
-    def next(self, end: float) -> float:
-        """Where the kernel must stop next; just before a break, so that the step sees its left side."""
-        target = end
-        if self.place < len(self.breaks):
-            target = min(target, float(np.nextafter(self.breaks[self.place], -np.inf)))
-        for controller in self.controllers:
-            if controller.period is not None:
-                target = min(target, self._sample(controller))
-        return target
+    def next(self, end: float) -> tuple[float, bool]:
+        """Where the kernel must stop next, and whether a boundary is there; one at round-off of the end is the end.
+
+        Just before a break, so that the step sees its left side.
+        """
+        due = [float(np.nextafter(time, -np.inf)) for time in self.breaks[self.place : self.place + 1]]
+        due += [self._sample(controller) for controller in self.controllers if controller.period is not None]
+        first = min(due, default=np.inf)
+        return (first, True) if first <= end + self.near else (end, False)
 
     def arrive(self, run: Run, target: float, end: float) -> bool:
-        """Do what is due at a boundary; False at the end of the run."""
-        if target >= end:
+        """Do what is due at a boundary; False at the end of the run, where it is left to a run that goes on."""
+        if target >= end - self.near:
             return False
         if self.place < len(self.breaks) and self.breaks[self.place] <= np.nextafter(target, np.inf):
-            run.move_to(self.breaks[self.place])
+            run.move_to(float(self.breaks[self.place]))
             self.place += 1
             run.values["state"][F.RESTART] = 1
         for controller in self.controllers:
             if controller.period is not None and self._sample(controller) <= target:
                 self._call(run, controller)
-                self.samples[controller.name] += 1
+                self._count(controller)
         return True
 
     def call(self, run: Run, name: str) -> None:
@@ -155,9 +195,11 @@ class Boundaries:
         named = run.named()
         what = f"Controller {controller.name!r} at t = {run.now:.6g} s"
         values = {name: named[name] for name in controller.reads}
-        answer = asked(what, controller.update, run.now, values, self.states[controller.name])
+        state = without_sharing(self.states[controller.name])  # the one before the call stays as it was
+        answer = asked(what, controller.update, run.now, values, state)
         if isinstance(answer, tuple):
-            answer, self.states[controller.name] = answer
+            answer, state = answer
+        self.states = {**self.states, controller.name: state}
         written = asked(what, lambda: {name: float(value) for name, value in dict(answer or {}).items()})
         wrong = [name for name in written if name not in controller.writes]
         if wrong:

@@ -2,19 +2,78 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mbd.arrays import Vector
 from mbd.kernel import fields as F
+from mbd.results.failure import Failure
 from mbd.results.record import EventRecord
 from mbd.simulation.round_off import remainder
 from mbd.simulation.stepper import Stepper
+from mbd.state import State
 from mbd.tape.evaluate import evaluate
 from mbd.tape.node import Node
 
-__all__ = ["explanation"]
+if TYPE_CHECKING:
+    from mbd.simulation.run import Run
+
+__all__ = ["attempt", "explanation"]
+
+LATEST = 12
+"""Events that a failure tells."""
+
+
+def attempt(run: Run) -> Callable[[str, State], Failure]:
+    """What a run has just tried, noted before it is taken back; the failure, given its sentence and the state kept."""
+    v = run.values
+    newton = v["detail"][0] > run.now and v["block"][0] == v["detail"][0]
+    time = max(float(v["detail"][0]), run.now)
+    candidate = _iterate(run, time) if newton else run.state()
+    residuals = residuals_of(run.stepper, v["block"]) if newton else {}
+    residual = float(v["detail"][1]) if newton else 0.0
+    happened = tuple(run.events)
+
+    def failure(problem: str, final: State) -> Failure:
+        return Failure(
+            problem, final.time, time, final, candidate, residuals, residual, run.tried, run.dt,
+            run.stepper.integrator, run.settings, dict(run.changed),
+            (*run.earlier, *run.events)[-LATEST:], happened[len(run.events) :], run.model,
+        )  # fmt: skip
+
+    return failure
+
+
+def _iterate(run: Run, time: float) -> State:
+    """Newton's last iterate, which is in the block."""
+    block, layout, system = run.values["block"], run.mechanism.layout, run.stepper.system
+    y = block[layout.v : layout.a].copy()
+    q = system.compose(block[layout.q : layout.x].copy(), block[layout.x : layout.v].copy())
+    return replace(run.state(), time=time, q=q, v=y[: layout.n_v], z=y[layout.n_v :])
+
+
+def residuals_of(stepper: Stepper, block: Vector) -> dict[str, float]:
+    """The balance by coordinate, and the rows that are closed with their rates, at the inputs in a block."""
+    mode = int(stepper.values["state"][F.MODE])
+    if mode < 0:
+        return {}
+    code, n = stepper.modes[mode], stepper.values["n"]
+    out = np.zeros(n + 2 * len(code.rows) + 1)
+    with np.errstate(all="ignore"):
+        code.residual(block, stepper.values["params"], out)
+    return dict(zip(residual_names(stepper, code.rows), out.tolist(), strict=False))
+
+
+def residual_names(stepper: Stepper, rows: Sequence[int]) -> list[str]:
+    """Names of the balance and of rows in the order in which a mode's code gives them."""
+    equations = stepper.mechanism.equations
+    names = [name.removesuffix(".rate") for name in equations.velocity_names]
+    names += [state.name for state in equations.states]
+    titles = [equations.rows[row].title for row in rows]
+    return names + titles + ([f"{title} (rate)" for title in titles] if stepper.stabilized else [])
 
 
 def explanation(
@@ -31,6 +90,11 @@ def explanation(
     if status == F.NOT_FINITE:
         what = _not_finite(stepper, places or {})
         return f"{where}: {what}{with_closed}; nothing after the last accepted step is kept"
+    if status == F.NOT_CONVERGED and residual < 0.0:
+        return (
+            f"{where}: a step would miss an angle by more than half a radian, down to a tenth of dt{with_closed}: the "
+            "motion is too fast to be resolved; use a smaller dt"
+        )
     if status == F.NOT_CONVERGED and residual <= 1.0:
         return (
             f"{where}: steps fail or leave the branch continuous in velocity, down to a tenth of dt{with_closed}: "
@@ -44,7 +108,7 @@ def explanation(
             f"iterations{own}{with_closed}; try a smaller dt or softer stiffness; a force that jumps with "
             "the state (mbd.where, sign) must be made continuous, or be switched by an Event or Controller"
         )
-    if status == F.STAGNATED:
+    if status in (F.STAGNATED, F.TOO_TIGHT):
         left = remainder(stepper)
         return (
             f"{where}: stagnated at round-off: residual {left.residual:.3g}, attainable {left.attainable:.3g} of the "

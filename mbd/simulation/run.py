@@ -20,9 +20,13 @@ from mbd.integrators.base import Integrator
 from mbd.kernel import fields as F
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.posture import Posture
+from mbd.results.failure import Failure
 from mbd.simulation.asked import asked
 from mbd.simulation.control import Boundaries, Named, apply_reset
-from mbd.simulation.failures import explanation
+from mbd.simulation.ends import advance, call, close
+from mbd.simulation.failures import attempt, explanation
+from mbd.simulation.memory import take_up
+from mbd.simulation.savepoints import Savepoint, rewind, save
 from mbd.simulation.stepper import Stepper
 from mbd.state import State
 from mbd.trajectory import EventRecord, Record, Trajectory
@@ -39,6 +43,8 @@ RESOLVED = 10.0
 """Steps that a penalty contact must last to be resolved at all."""
 MOST_EXPECTED = 1 << 22
 """Rows for which a table is laid out at the start; longer runs enlarge it."""
+INTERRUPTED = "interrupted"
+"""The problem of a run that was interrupted, until its time is known."""
 KINDS = ("closed", "opened", "event", "stuck", "slipped")
 """Names of the kinds of events that the kernel logs by number."""
 
@@ -61,6 +67,7 @@ class Run:
         settings: dict[str, Any],
     ) -> None:
         self.began = perf_counter()
+        self.model = model
         self.mechanism, self.manager, self.start, self.end, self.stop = mechanism, manager, start, end, stop
         self.settings, self.changed, self.dt = settings, dict(changed), dt
         forces = [force for force in getattr(model, "forces", ()) if isinstance(force, Force)]
@@ -79,13 +86,23 @@ class Run:
         self.parameter_changes: list[tuple[int, Vector]] = []
         self.stored = 0
         self.cause: Exception | None = None
+        self.history: list[Savepoint] = []
+        self.pending: tuple[EventRecord, ...] = ()
+        self.earlier: Sequence[EventRecord] = ()  # of the run that is repeated, for its message
+        self.limit: int | None = None
+        self.tried = 0
+        self.label: float | None = None
+        self.failure: Failure | None = None
         self.observers: Sequence[Callable[[float, State], None]] = ()
         self.progress: Callable[[float, float], None] | None = None
         controllers, instants = getattr(model, "controllers", ()), getattr(model, "instants", ())
         self.boundaries = Boundaries(controllers, instants, start.time, dt, end)
-        self._begin(start)
-        if changed:
-            self._check(start, parameters)
+        self.resumed = take_up(self, start)
+        self._notify()
+        if not self.resumed:
+            self._begin(start)
+            if changed:
+                self._check(start, parameters)
 
     def observe(
         self, observers: Sequence[Callable[[float, State], None]], progress: Callable[[float, float], None] | None
@@ -94,6 +111,16 @@ class Run:
         self.observers, self.progress = observers, progress
 
     # the start ----------------------------------------------------------------------------------------------------
+    def _notify(self) -> None:
+        """Of which contacts and events Python must hear."""
+        notify = self.values["notify"]
+        ends = {self.stop} | {name for controller in self.boundaries.controllers for name in controller.on}
+        for c, contact in enumerate(self.manager.contacts):
+            notify[c] = int(contact.name in ends)
+        for e, guard in enumerate(self.manager.guards):
+            wanted = guard.terminal or guard.reset is not None or guard.name in ends
+            notify[self.values["n_contacts"] + e] = int(wanted)
+
     def _begin(self, start: State) -> None:
         v = self.values
         v["q"][: v["n_q"]] = start.q
@@ -107,12 +134,6 @@ class Run:
         v["clock"][F.NOW] = v["clock"][F.BASE] = start.time
         v["clock"][F.LAST_SWITCH] = -np.inf
         v["state"][F.RESTART], v["state"][F.MODE] = 1, -1
-        ends = {self.stop} | {name for controller in self.boundaries.controllers for name in controller.on}
-        for c, contact in enumerate(self.manager.contacts):
-            v["notify"][c] = int(contact.name in ends)
-        for e, guard in enumerate(self.manager.guards):
-            wanted = guard.terminal or guard.reset is not None or guard.name in ends
-            v["notify"][n_contacts + e] = int(wanted)
         guards, inside = self._guard_values(), []
         rates = self.mechanism.acceleration_terms(
             start.time, start.q, v["y"][: v["n"]], v["params"], v["anchors"][: v["n_anchors"]]
@@ -177,53 +198,87 @@ class Run:
     # the run ------------------------------------------------------------------------------------------------------
     def complete(self) -> tuple[Trajectory, str]:
         """Run to the end; the trajectory, and what went wrong ('' if nothing did)."""
-        problem, message = self._guarded(self._march)
-        self._collect()
+        problem, message = self.march()
+        self.collect()
+        settled = True
+        if problem:
+            tried = attempt(self)
+            settled = rewind(self, failed=problem != INTERRUPTED)
+        final = close(self, settled)
+        problem = self._told(problem)
         if self.stop and not problem and not message.startswith("ended"):
             message = f"{self.stop!r} did not happen before t = {self.end:g} s"
-        problem = problem or self._guarded(self._last_show)[0]
-        return self._trajectory(problem, message), problem
+        if problem:
+            self.failure = tried(problem, final)
+        else:
+            problem = self._told(self._guarded(self._last_show)[0])
+            self.failure = attempt(self)(problem, final) if problem else None
+        return self._trajectory(problem, message, final), problem
+
+    def march(self) -> tuple[str, str]:
+        """Run until the end or a failure, of which nothing is taken back yet; (problem, message)."""
+        return self._guarded(self._march)
 
     def _guarded(self, part: Callable[[], tuple[str, str]]) -> tuple[str, str]:
         """(problem, message) of a part of the run; what users' functions raise ends it in order."""
         try:
             return part()
         except KeyboardInterrupt:
-            return f"interrupted at t = {self.now:.6g} s; everything until then is kept", ""
+            return INTERRUPTED, ""
         except (SimulationError, UnknownNameError) as error:
             self.cause = self.cause or error
             return str(error), ""
 
+    def _told(self, problem: str) -> str:
+        """A problem in words; an interruption happened at the state that was kept."""
+        if problem == INTERRUPTED:
+            return f"interrupted at t = {self.now:.6g} s; everything until then is kept"
+        return problem
+
     def _march(self) -> tuple[str, str]:
         """Kernel, reaction, kernel, … until the end; (problem, message)."""
         shown = 0.0
-        self.boundaries.begin(self)
-        while True:
-            target = self.boundaries.next(self.end)
-            status = self.stepper.advance(target)
+        if not self.resumed:
+            self.boundaries.begin(self)
+        save(self, self.pending)
+        ended = self._react(self.pending)
+        self.pending = ()
+        save(self)
+        while not ended:
             known = len(self.events)
-            self._collect()
+            target, due = self.boundaries.next(self.end)
+            status = advance(self, target, due)
+            self.collect()
             if status == F.NEW_MODE:
                 self.stepper.add_mode()
             elif status == F.DONE:
+                save(self)
                 if not self.boundaries.arrive(self, target, self.end):
+                    self.label = self.end
                     return "", f"reached t = {self.end:g} s"
             elif status == F.EVENT:
+                save(self, self.events[known:])
                 ended = self._react(self.events[known:])
-                if ended:
-                    return self._finish(f"ended by {ended!r} at t = {self.now:.6g} s")
             elif status not in (F.FULL, F.PAUSE):
-                return explanation(self.stepper, status, self.events, self.places), ""
+                return self._explained(status), ""
+            save(self)
+            if self.limit is not None and self.values["counts"][F.STEPS] >= self.limit:
+                return "", f"stopped after {self.limit} steps at t = {self.now:g} s"
             if perf_counter() - shown > SHOW_EVERY:
                 shown = perf_counter()
                 self._show()
+        return self._finish(f"ended by {ended!r} at t = {self.now:.6g} s")
 
     def _finish(self, message: str) -> tuple[str, str]:
         """Store the row after the event that ends the run."""
-        status = self.stepper.advance(self.now)
-        self._collect()
+        save(self)
+        status = call(self, self.now, np.inf)
+        self.collect()
         ended = status in (F.DONE, F.EVENT, F.NEW_MODE)
-        return ("", message) if ended else (explanation(self.stepper, status, self.events, self.places), "")
+        return ("", message) if ended else (self._explained(status), "")
+
+    def _explained(self, status: int) -> str:
+        return explanation(self.stepper, status, [*self.earlier, *self.events], self.places)
 
     @property
     def now(self) -> float:
@@ -239,7 +294,7 @@ class Run:
         self._show(finished=True)
         return "", ""
 
-    def _collect(self) -> None:
+    def collect(self) -> None:
         """Take over the rows and events that the kernel has stored."""
         v = self.values
         count, logged = int(v["state"][F.STORED]), int(v["state"][F.LOGGED])
@@ -285,15 +340,19 @@ class Run:
         if all(present.get(name) == value for name, value in values.items()):
             return
         self.stepper.keep_row()
-        self.changed.update(values)
-        self.values["params"][: len(self.first_parameters)] = self.mechanism.parameters(self.changed, self.folded)
+        self.set_parameters({**self.changed, **values})
         self.parameter_changes.append((self.stored + int(self.values["state"][F.STORED]), self.values["params"].copy()))
         self.values["state"][F.RESTART] = 1
+
+    def set_parameters(self, changed: Mapping[str, float]) -> None:
+        """Parameters that differ from the model's."""
+        self.changed = dict(changed)
+        self.values["params"][: len(self.first_parameters)] = self.mechanism.parameters(self.changed, self.folded)
 
     def move_to(self, time: float) -> None:
         """Put the clock, and the row just stored as the left side of a break, on its instant."""
         self.stepper.keep_row()
-        self._collect()
+        self.collect()
         if self.stored and self.table[self.stored - 1, 0] == self.now:
             self.table[self.stored - 1, 0] = time
         self.values["clock"][F.NOW] = time
@@ -311,11 +370,12 @@ class Run:
         y = v["y"][: v["n"]].copy()
         n_v = v["n_v"]
         return State(
-            self.now, v["q"][: v["n_q"]].copy(), y[:n_v], y[n_v:], self.manager.mode(v["closed"][: len(names)]), armed,
+            self.now if self.label is None else self.label, v["q"][: v["n_q"]].copy(), y[:n_v], y[n_v:],
+            self.manager.mode(v["closed"][: len(names)]), armed,
             v["anchors"][: v["n_anchors"]].copy(), self.start.names, self.start.velocity_names, {}, dict(self.changed),
         )  # fmt: skip
 
-    def _trajectory(self, problem: str, message: str) -> Trajectory:
+    def _trajectory(self, problem: str, message: str, final: State) -> Trajectory:
         v, equations = self.values, self.mechanism.equations
         table = self.table[: self.stored]
         n_q, n_v, n, rows = v["n_q"], v["n_v"], v["n"], v["n_rows"]
@@ -327,7 +387,7 @@ class Run:
             equations=equations, parameters=self.first_parameters,
             parameter_names=[parameter.name for parameter in equations.parameters], time=time[:, 0], q=q, v=velocity,
             z=z, a=a, s=s, lam=lam, closed=closed.astype(np.uint8), events=events, stats=self._statistics(),
-            success=not problem, message=problem or message, failure=self._capsule(problem), final=self.state(),
+            success=not problem, message=problem or message, failure=self.failure, final=final,
             settings=self.settings, parameter_changes=self.parameter_changes, start=self.start,
         )  # fmt: skip
         return Trajectory(record)
@@ -394,11 +454,6 @@ class Run:
             f"{contact.name!r} closed for {min(spans) / self.dt:.2g} steps only, too few: its peak force and energy "
             f"are not resolved; use dt below {min(spans) / 20.0:.2g} s, a softer stiffness, or mbd.Unilateral"
         ]
-
-    def _capsule(self, problem: str) -> dict[str, Any] | None:
-        if not problem:
-            return None
-        return {"message": problem, "time": self.now, "state": self.state(), "dt": self.dt, "settings": self.settings}
 
 
 def _places(force: Force) -> str:

@@ -9,6 +9,7 @@ from importlib.util import find_spec
 from typing import Any, Literal
 
 from mbd.assembly import named_numbers
+from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import CapabilityError, ModelError, SimulationError
 from mbd.integrators import HHT, Integrator
@@ -19,7 +20,7 @@ from mbd.simulation.strategy import chosen
 from mbd.state import State
 from mbd.trajectory import Trajectory
 
-__all__ = ["simulate"]
+__all__ = ["prepared", "simulate"]
 
 REST_SPEED = 1e-6
 """Approach speed [m/s, rad/s] below which a contact closes without rebound and releases nobody: ends Zeno sequences."""
@@ -92,27 +93,48 @@ def simulate(
         raise ModelError(faults)
     assert dt is not None
     changed = {**start.parameters, **(parameters or {})}
-    mechanism = mechanism_of(model, backend, changed)
-    manager = ActiveSetManager(mechanism.equations)
-    fits(start, mechanism.equations, manager)
-    end, stop = end_of(until, manager, dt, start.time)
-    strategy, reason = chosen(contact, manager)
-    refusal = scheme.check(sum(not row.is_velocity for row in mechanism.equations.rows))
-    if refusal:
-        raise CapabilityError(refusal)
-    settings = {
-        "model": getattr(model, "name", ""), "integrator": repr(scheme), "dt": float(dt), "until": until,
-        "contact": strategy, "contact_reason": reason, "impact": impact,
-        "locate": locate, "store": store, "rest_speed": rest_speed,
-        "backend": mechanism.backend.name, "versions": dict(_versions()),
+    options = {
+        "contact": contact, "impact": impact, "locate": locate, "store": store, "rest_speed": rest_speed,
+        "backend": backend,
     }  # fmt: skip
-    options = {"locate": locate, "store": store, "rest_speed": rest_speed, "impact": impact, "contact": strategy}
-    run = Run(model, mechanism, manager, scheme, start, float(dt), end, stop, changed, options, settings)
+    run = prepared(model, start, scheme, float(dt), until, changed, options)
+    end = run.end
     run.observe(observers, _bar(progress, start.time, end))
     trajectory, problem = run.complete()
     if problem and on_failure == "raise":
         raise SimulationError(problem, trajectory) from run.cause
     return trajectory
+
+
+def prepared(
+    model: Any,
+    start: State,
+    scheme: Integrator,
+    dt: float,
+    until: Any,
+    changed: Mapping[str, float],
+    options: Mapping[str, Any],
+    watch: Callable[[Mechanism], Any] | None = None,
+) -> Run:
+    """A run ready to be completed; `watch` may put something in the place of the mechanism."""
+    mechanism = mechanism_of(model, options["backend"], changed)
+    manager = ActiveSetManager(mechanism.equations)
+    fits(start, mechanism.equations, manager)
+    end, stop = end_of(until, manager, dt, start.time)
+    strategy, reason = chosen(options["contact"], manager)
+    options = {**options, "contact": strategy}
+    refusal = scheme.check(sum(not row.is_velocity for row in mechanism.equations.rows))
+    if refusal:
+        raise CapabilityError(refusal)
+    settings = {
+        "model": getattr(model, "name", ""), "integrator": repr(scheme), "dt": dt, "until": until, **options,
+        "contact_reason": reason, "backend": mechanism.backend.name, "versions": dict(_versions()),
+    }  # fmt: skip
+    own = {name: options[name] for name in ("contact", "impact", "locate", "store", "rest_speed")}
+    return Run(
+        model, mechanism if watch is None else watch(mechanism), manager, scheme, start, dt, end, stop, changed, own,
+        settings,
+    )  # fmt: skip
 
 
 @cache

@@ -80,6 +80,7 @@ class Stepper:
         self.dependent: set[int] = set()
         self.kernel: Any = None
         self._table: Any = None
+        self.resumed_at = float("nan")  # the instant whose row was stored as a run was taken up again
         assert layout.n == self.values["n"]
 
     def _sizes(self, dt: float, options: dict[str, Any]) -> None:
@@ -138,8 +139,10 @@ class Stepper:
             "mode_count": 1, "rows": rows,
             "pivots": size, "columns": size, "fired": 2, "state": 16, "counts": 16,
         }  # fmt: skip
+        self.reals = _shelve(v, {name: reals.pop(name) for name in F.KEPT_REALS}, float)
+        self.integers = _shelve(v, {name: integers.pop(name) for name in F.KEPT_INTEGERS}, np.int64)
         for name, length in reals.items():
-            v[name] = np.zeros(max(length, 1))[:length] if length else np.zeros(1)
+            v[name] = np.zeros(max(length, 1))
         for name, length in integers.items():
             v[name] = np.zeros(max(length, 1), dtype=np.int64)
         for name, table in manager.tables().items():
@@ -162,15 +165,15 @@ class Stepper:
         count, width = int(v["mode_count"][0]), v["n_contacts"] + v["n_rows"] + v["n_frictions"]
         phases = np.where(sticks == 1, 2, slip != 0.0)
         if 2 * (count + 1) > len(v["mode_code"]):
-            v["mode_code"] = np.concatenate([v["mode_code"], np.zeros_like(v["mode_code"])])
             v["mode_key"] = np.concatenate([v["mode_key"], np.zeros_like(v["mode_key"])])
+            v["mode_code"] = np.concatenate([v["mode_code"], np.zeros_like(v["mode_code"])])
         v["mode_key"][count * width : (count + 1) * width] = np.concatenate([flags, dropped, phases])
         v["mode_code"][2 * count : 2 * count + 2] = len(self.functions), len(self.functions) + 1
         self.functions += [code.tangent, code.residual]
         self.modes.append(code)
         self.dependent |= {row for row in range(v["n_rows"]) if dropped[row]}
+        self.kernel = self._table = None  # before the mode counts: an interrupt may come between any two lines
         v["mode_count"][0] = count + 1
-        self.kernel = self._table = None
 
     def advance(self, until: float) -> int:
         """Run the kernel until it returns; its status."""
@@ -179,11 +182,24 @@ class Stepper:
 
     def keep_row(self) -> None:
         """Store the accepted state, unless it is the last row anyway."""
-        if self.values["state"][F.SINCE_STORE] > 0:
-            from mbd.kernel.advance import store_row
+        if self.values["state"][F.SINCE_STORE] > 0 and self.values["clock"][F.NOW] != self.resumed_at:
+            self.store_row()
 
-            values = {**self.values, "code": self.functions, "hooks": self.scheme}
-            store_row(F.Kernel(**{name: values[name] for name in F.FIELDS}))
+    def store_row(self) -> None:
+        """Store the accepted state as a row of the results."""
+        from mbd.kernel.advance import store_row
+
+        values = {**self.values, "code": self.functions, "hooks": self.scheme}
+        store_row(F.Kernel(**{name: values[name] for name in F.FIELDS}))
+
+    def hold(self) -> None:
+        """Give the inputs of the forces the closed contacts, as a start of the scheme would leave them."""
+        from mbd.kernel.restart import fill_block
+
+        values = {**self.values, "code": self.functions, "hooks": self.scheme}
+        fill_block(
+            F.Kernel(**{name: values[name] for name in F.FIELDS}), values["clock"][F.NOW], values["q"], values["y"]
+        )
 
     def _advance_plain(self) -> int:
         from mbd.kernel.advance import advance
@@ -209,3 +225,12 @@ class Stepper:
             else:
                 self._table[place] = self.values[name].ctypes.data
         return entry()(self._table.ctypes.data)
+
+
+def _shelve(values: dict[str, Any], lengths: dict[str, int], kind: Any) -> Any:
+    """Arrays side by side on one shelf, which is copied at once; each begins on a cache line."""
+    starts = np.cumsum([0, *(-8 * (-max(length, 1) // 8) for length in lengths.values())])
+    shelf = np.zeros(int(starts[-1]), dtype=kind)
+    for start, (name, length) in zip(starts, lengths.items(), strict=False):
+        values[name] = shelf[start : start + max(length, 1)]
+    return shelf

@@ -46,7 +46,7 @@ def test_the_run_stops_naming_force_time_and_body_and_keeps_what_it_has(
     assert t == pytest.approx(first - dt, abs=1e-12)
     assert run["place.x"] == pytest.approx(run.time**2 / 2, abs=1e-12)
     assert run["place.x.rate"] == pytest.approx(run.time, abs=1e-12)
-    assert (not run.success) and run.failure["time"] == t
+    assert (not run.success) and run.failure.time == t
     assert np.isfinite(np.column_stack([run[name] for name in run.names if name != "push.power"])).all()
     assert t * t / 2 <= J16["x and v at the last valid time"].value[0]
 

@@ -1,0 +1,109 @@
+"""What lets a run go on as if it had never been cut: written into its final state, read by the run that goes on."""
+
+from __future__ import annotations
+
+import hashlib
+from copy import deepcopy
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mbd.kernel import fields as F
+from mbd.results.record import EventRecord
+from mbd.state import Memory, State
+
+if TYPE_CHECKING:
+    from mbd.simulation.run import Run
+
+__all__ = ["memory_of", "take_up", "without_sharing"]
+
+OPTIONS = ("dt", "contact", "impact", "locate", "rest_speed", "backend")
+"""Settings that a memory depends on."""
+
+
+def memory_of(run: Run, time: float) -> Memory:
+    """The memory of the accepted state, which must be settled; `time` is what its state says."""
+    stepper = run.stepper
+    parameters, reals, integers = run.values["params"].copy(), stepper.reals.copy(), stepper.integers.copy()
+    for array in (parameters, reals, integers):
+        array.flags.writeable = False
+    return Memory(
+        belongs(run), digest(run), time, parameters, reals, integers, stepper.scheme.memory,
+        run.boundaries.remembered(), tuple((event.kind, event.name) for event in run.pending),
+    )  # fmt: skip
+
+
+def belongs(run: Run) -> tuple[str, ...]:
+    """Words that two runs must share for the memory of one to be of use to the other."""
+    integrator, equations = run.stepper.integrator, run.mechanism.equations
+    kind = type(integrator)
+    words = [f"{kind.__module__}.{kind.__qualname__}", repr(integrator), f"compiled {run.stepper.compiled}"]
+    words += [f"{name} {run.settings[name]!r}" for name in OPTIONS]
+    words.append(f"mbd {run.settings['versions']['mbd']}")
+    words += [f"{name} {len(run.values[name])}" for name in (*F.KEPT_REALS, *F.KEPT_INTEGERS)]
+    words += [row.title for row in equations.rows] + run.manager.names
+    words += [guard.name for guard in run.manager.guards]
+    words += [f"{c.name} {c.period!r} {c.on!r}" for c in run.boundaries.controllers]
+    return tuple(words)
+
+
+def digest(run: Run) -> str:
+    """Of masses, forces, rows and guards at the accepted state: a model that was changed there has another one."""
+    v, mechanism = run.values, run.mechanism
+    acting = run.manager.penalties(v["closed"][: v["n_contacts"]])
+    block = mechanism.block(run.now, v["q"][: v["n_q"]], v["y"][: v["n"]], v["anchors"][: v["n_anchors"]], acting)
+    told = hashlib.sha256()
+    for name in ("accelerations", "guards"):
+        out = np.zeros(max(mechanism.sizes[name], 1))
+        if mechanism.sizes[name]:
+            mechanism.common[name](block, v["params"], out)
+        told.update(out.tobytes())
+    return told.hexdigest()
+
+
+def take_up(run: Run, start: State) -> bool:
+    """Go on from the memory of a state, if it is one of this run; whether it was."""
+    memory = start.memory
+    if memory is None or memory.belongs != belongs(run):
+        return False
+    stepper, v = run.stepper, run.values
+    fresh = stepper.reals.copy(), stepper.integers.copy()
+    stepper.reals[:], stepper.integers[:] = memory.reals, memory.integers
+    if not (_is_of(run, memory, start) and memory.digest == digest(run)):
+        stepper.reals[:], stepper.integers[:] = fresh
+        return False
+    stepper.scheme.memory = memory.scheme
+    run.boundaries.take_up(memory.controllers, run.now)
+    run.pending = tuple(EventRecord(run.now, kind, name) for kind, name in memory.pending)
+    v["state"][F.STORED] = v["state"][F.LOGGED] = 0
+    v["state"][F.MODE] = -1
+    phase = int(v["state"][F.SINCE_STORE])
+    stepper.hold()
+    stepper.store_row()
+    v["store"][0] = start.time
+    v["state"][F.SINCE_STORE] = phase
+    stepper.resumed_at = run.now
+    return True
+
+
+def _is_of(run: Run, memory: Memory, start: State) -> bool:
+    """Whether a state and the parameters are those of a memory, to the bit; the memory is in the kernel's arrays."""
+    v, manager = run.values, run.manager
+    n_contacts, n_anchors = v["n_contacts"], v["n_anchors"]
+    pairs = (
+        (v["q"][: v["n_q"]], start.q),
+        (v["y"][: v["n"]], np.concatenate([start.v, start.z])),
+        (v["closed"][:n_contacts], manager.flags(start.mode.closed)),
+        (v["armed"][:n_contacts] == 1, manager.flags(start.armed or ()) == 1),
+        (v["anchors"][:n_anchors], start.anchors if n_anchors else v["anchors"][:n_anchors]),
+        (v["params"], memory.parameters),
+    )
+    return memory.time == start.time and all(np.array_equal(one, other) for one, other in pairs)
+
+
+def without_sharing(value: Any) -> Any:
+    """A copy that changes apart, of anything that can be copied."""
+    try:
+        return deepcopy(value)
+    except Exception:  # an open file, a lock, a generator: the user's, and shared then
+        return value
