@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from mbd.analysis.mobility import Mobility as Mobility, mobility as mobility
     from mbd.assembly import assemble as assemble
     from mbd.bodies import (
         Link as Link,
@@ -109,6 +110,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOMES = {
+    "mbd.analysis.mobility": "Mobility mobility",
     "mbd.assembly": "assemble",
     "mbd.bodies": "Link PointMass RigidBody box cylinder disk rod segment sphere",
     "mbd.constraints": "Bilateral Controller Event KnifeEdge Nonholonomic Penalty PenaltyParameters Plane "

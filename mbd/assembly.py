@@ -10,13 +10,15 @@ from typing import Any
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.closure import Held
 from mbd.compile.mechanism import Mechanism, rate_names
 from mbd.compile.mechanisms import mechanism_of
 from mbd.conditions import Condition, conditions
+from mbd.contradictions import Attempt, contradictions, infeasible
 from mbd.equations.equations import Equations
 from mbd.errors import AssemblyError, ModelError, UnknownNameError, nearest
 from mbd.kernel.active_set import ActiveSetManager
-from mbd.posture import TOLERANCE, Posture, capture, close_positions, close_velocities, position_rows
+from mbd.posture import Posture, capture, close_positions, close_velocities, position_rows
 from mbd.state import State
 
 __all__ = ["assemble", "is_number", "named_numbers", "undetermined"]
@@ -88,8 +90,9 @@ def assemble(
     UnknownNameError
         for wrong names, with the nearest valid ones.
     AssemblyError
-        if the named values contradict rows (both residuals of each are given), if nothing determines the motion of a
-        coordinate, if rows depend on each other, or if an open contact starts inside its surface.
+        if constraints cannot hold together (the closure error, an irreducible set of them and what to relax), if the
+        named values contradict rows (both residuals of each, and which names are in conflict), if nothing determines
+        the motion of a coordinate, or if an open contact starts inside its surface.
     ModelError
         if the model itself has faults.
     """
@@ -112,13 +115,7 @@ def assemble(
     work = Posture(
         mechanism, manager, values, q.copy(), y.copy(), manager.flags(closed), anchors, named.places, named.speeds
     )
-    rows = position_rows(work)
-    misfit = close_positions(work, rows, np.array([project or k not in named.q for k in range(len(q))], dtype=bool))
-    capture(work)
-    free = np.array([project or k not in named.v for k in range(equations.n_v)], dtype=bool)
-    speed_misfit = close_velocities(work, free)
-    capture(work)  # approach speeds
-    bad = _conflicts(work, rows, misfit, speed_misfit) or undetermined(work) + _below(work, set(opened))
+    bad = _closed(work, named, project, model) or undetermined(work) + _below(work, set(opened))
     if bad:
         raise AssemblyError(bad)
     return State(
@@ -167,33 +164,28 @@ def _values(equations: Equations, named: _Named) -> tuple[Vector, Vector]:
     return q, np.array([*v, *z], dtype=float)
 
 
-def _conflicts(work: Posture, rows: Sequence[int], misfit: Vector, speed_misfit: Vector) -> list[str]:
-    """Every row that the named values contradict, with both residuals."""
+def _closed(work: Posture, named: _Named, project: bool, model: Any) -> list[str]:
+    """Close positions, then velocities; what contradicts them."""
     equations = work.equations
-    active = list(work.manager.active_rows(work.flags))
-    speed = 1.0 + float(np.max(np.abs(work.y[: equations.n_v]), initial=0.0))
-    h = dict(zip(rows, misfit, strict=False))
-    rate = dict(zip(active, speed_misfit, strict=False))
-    found = []
-    wanted = [
-        *zip(work.places, misfit[len(rows) :], strict=True),
-        *zip(work.rates, speed_misfit[len(active) :], strict=True),
-    ]
-    for condition, off in wanted:
-        if not abs(off) <= TOLERANCE * speed:
-            found.append(
-                f"{condition.name!r} = {condition.target:.9g} cannot be reached: off by {off:.6g}; name fewer values"
-            )
-    for k in active:
-        row = equations.rows[k]
-        position, velocity = float(h.get(k, 0.0)), float(rate[k])
-        if abs(position) > TOLERANCE or abs(velocity) > TOLERANCE * speed or not np.isfinite(position + velocity):
-            place = "" if row.is_velocity else f"position residual {position:.6g} {row.unit}, "
-            found.append(
-                f"the start contradicts {row.title}: {place}velocity residual {velocity:.6g} {row.unit}/s; "
-                f"name fewer values, or use assemble(..., project=True) to move all"
-            )
-    return found
+    q, y, rows = work.q.copy(), work.y.copy(), position_rows(work)
+    held_q, held_v = ([], []) if project else _held(equations, named)
+    free = np.ones((2, equations.n_v), dtype=bool)
+    free[0, [each.place for each in held_q]] = free[1, [each.place for each in held_v]] = False
+    misfit = close_positions(work, rows, free[0])
+    never = infeasible(work, rows, q, misfit, model, named=bool(work.places or held_q))
+    if never:
+        return never
+    capture(work)
+    speed_misfit = close_velocities(work, free[1])
+    capture(work)  # approach speeds
+    return contradictions(work, Attempt(rows, q, y, held_q, held_v, misfit, speed_misfit), model)
+
+
+def _held(equations: Equations, named: _Named) -> tuple[list[Held], list[Held]]:
+    """Coordinates and rates that stay as named."""
+    names = [coordinate.name for coordinate in equations.coordinates]
+    places = [Held(names[k], value, k) for k, value in named.q.items()]
+    return places, [Held(equations.velocity_names[k], value, k) for k, value in named.v.items()]
 
 
 def undetermined(work: Posture) -> list[str]:

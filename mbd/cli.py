@@ -167,17 +167,22 @@ def _tell(run: Trajectory, out: Path, wall: dict[str, float], show: bool) -> Non
 
 
 def check_command(arguments: argparse.Namespace) -> int:
-    """``mbd check``: every fault of a script's model."""
+    """``mbd check``: every fault of a script's model; degrees of freedom, redundant rows and conflicts."""
     script = Script.load(arguments.script)
     script.require("model")
     model = script.names["model"]
     faults = model.check()
     for fault in faults:
         print(f"- {fault}")
-    print(
-        f"{model!r}: {len(faults)} fault{'s' if len(faults) != 1 else ''}" if faults else f"{model!r}: no faults found"
-    )
-    return 1 if faults else 0
+    print(f"{model!r}: " + (f"{len(faults)} fault{'s' * (len(faults) > 1)}" if faults else "no faults found"))
+    if faults:
+        return 1
+    from mbd import State, mobility
+
+    start = script.names.get("start")
+    found = mobility(model, start if isinstance(start, State) else None)
+    print(found)
+    return 0 if found.consistent else 1
 
 
 def examples_command(arguments: argparse.Namespace) -> int:
@@ -234,7 +239,7 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--open", action="store_true", help="open the page in a browser")
     run.add_argument("--dt", type=float, metavar="SECONDS", help="another step size than the script's")
     run.add_argument("--until", type=float, metavar="SECONDS", help="another end time than the script's")
-    check = command("check", check_command, "report every fault of a script's model")
+    check = command("check", check_command, "report faults, degrees of freedom and redundant rows of a script's model")
     check.add_argument("script", metavar="SCRIPT-or-EXAMPLE", help="a Python file that defines model, or an example")
     hard = command(
         "hardcases", hardcases_command, "judge scenes on which multibody systems fail; write a table and a page"

@@ -212,11 +212,22 @@ class Model:
         if found:
             raise ModelError(found)
 
-    def describe(self) -> str:
-        """The mechanism in a page of text."""
+    def describe(self, mobility: bool = False) -> str:
+        """The mechanism in a page of text.
+
+        Parameters
+        ----------
+        mobility : whether to derive the equations too and tell the degrees of freedom by the rank of the rows, which
+            rows are redundant and which conflict; see `mbd.mobility`
+        """
         from mbd.topology.describe import description
 
-        return description(self)
+        said = description(self)
+        if mobility and not self.check():
+            from mbd.analysis.mobility import mobility as of
+
+            said += f"\n{of(self)}"
+        return said
 
     def equations(self, latex: bool = False) -> str:
         """The equations of motion, printed as text or LaTeX."""

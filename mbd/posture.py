@@ -14,7 +14,10 @@ from mbd.conditions import Condition
 from mbd.equations.equations import Equations
 from mbd.kernel.active_set import ActiveSetManager
 
-__all__ = ["Posture", "TOLERANCE", "capture", "close_positions", "close_velocities", "position_rows"]
+__all__ = [
+    "Posture", "TOLERANCE", "capture", "close_nearby", "close_positions", "close_velocities", "descend",
+    "descents", "move", "position_rows",
+]  # fmt: skip
 
 TOLERANCE = 1e-9
 """Largest row residual [m, rad, m/s, rad/s] of a start, relative to 1 or the speed, that counts as consistent."""
@@ -22,6 +25,10 @@ REFINEMENTS = 3
 """Solutions of the linear equations for velocities: bodies without mass leave an error in the first [-]."""
 NUDGE, NUDGES = 0.01, 3
 """Step [m, rad] out of a flat spot of the rows, and how often it is tried."""
+TRIES, DESCENT = 4, 400
+"""Starts of a descent of the sum of squares of the rows, and its most steps [-]."""
+CLOSE = 1e-3
+"""Row residual [m, rad] at the end of a descent from which Newton's method may go on."""
 RESTARTS = 12
 """Other starts of Newton's method before positions count as out of reach [-]."""
 
@@ -40,6 +47,7 @@ class Posture:
     places: Sequence[Condition] = ()
     rates: Sequence[Condition] = ()
     time: float = 0.0
+    iterations: int = 0
 
     @property
     def equations(self) -> Equations:
@@ -85,7 +93,8 @@ def _least_change(M: Matrix, B: Matrix, residual: Vector, pull: Vector) -> Vecto
 def close_positions(work: Posture, rows: Sequence[int], free: Matrix) -> Vector:
     """The free coordinates that satisfy the rows nearest to the given ones; the remaining residual of each row.
 
-    Newton's method from the given values; where it gets stuck, from others with the free angles turned.
+    Newton's method from the given values; where it gets stuck, from others with the free angles turned, and at last
+    from where the sum of squares of the rows is least, which Newton's method misses near singular poses.
     """
     if not rows and not work.places:
         return np.zeros(0)
@@ -100,8 +109,75 @@ def close_positions(work: Posture, rows: Sequence[int], free: Matrix) -> Vector:
         again = _newton(work, rows, free, start)
         if np.max(np.abs(again)) <= TOLERANCE:
             return again
+    weights = np.ones(len(rows) + len(work.places))
+    for q in descents(work, start, free) if np.max(np.abs(misfit)) > TOLERANCE else ():
+        work.q = q
+        missing, _ = descend(work, rows, free, weights)
+        if np.max(np.abs(missing)) < CLOSE:
+            again = _newton(work, rows, free, work.q.copy())
+            if np.max(np.abs(again)) <= TOLERANCE:
+                return again
     work.q = first
     return misfit
+
+
+def descents(work: Posture, start: Vector, free: Matrix) -> list[Vector]:
+    """Positions to descend from: the given one, and others with the free angles turned and the rest shifted."""
+    if not work.mechanism.vector or not bool(np.any(free)):
+        return [start.copy()]
+    reach = np.array([1.5 if c.unit == "rad" else 0.5 for c in work.equations.coordinates])
+    turns = np.random.default_rng(1).uniform(-1.0, 1.0, (TRIES, len(start)))
+    turns[0] = 0.0
+    return [start + np.where(free, reach * turn, 0.0) for turn in turns]
+
+
+def descend(work: Posture, rows: Sequence[int], free: Matrix, weights: Vector) -> tuple[Vector, Matrix]:
+    """(h, B) at the end of a descent of Σ (w h)² from the position of `work`, which moves there."""
+    n_v, moving = work.equations.n_v, np.flatnonzero(free)
+    h, B = _weighted_rows(work, rows, weights)
+    damping = 1e-3
+    for _ in range(DESCENT):
+        J = B[:, moving]
+        slope = J.T @ h
+        if not len(moving) or np.linalg.norm(slope) <= 1e-13 * (1.0 + np.linalg.norm(h)):
+            break
+        before, x = work.q.copy(), np.zeros(n_v)
+        x[moving] = -np.linalg.solve(J.T @ J + damping * np.eye(len(moving)), slope)
+        x *= min(1.0, 0.5 / float(np.max(np.abs(x))))
+        move(work, x)
+        new_h, new_B = _weighted_rows(work, rows, weights)
+        if np.linalg.norm(new_h) < np.linalg.norm(h):
+            h, B, damping = new_h, new_B, max(damping / 3.0, 1e-12)
+        else:
+            work.q, damping = before, 4.0 * damping
+            if damping > 1e12:
+                break
+    return h / weights, B / weights[:, None]
+
+
+def _weighted_rows(work: Posture, rows: Sequence[int], weights: Vector) -> tuple[Vector, Matrix]:
+    """w h and w B of rows and named results."""
+    terms = work.mechanism.acceleration_terms(work.time, work.q, work.y, work.parameters, work.anchors)
+    picked = list(rows)
+    h, B = work.with_conditions(terms.h[picked], terms.B[picked][:, : work.equations.n_v], work.places)
+    return weights * h, weights[:, None] * B
+
+
+def close_nearby(work: Posture, rows: Sequence[int], free: Matrix) -> Vector:
+    """Newton's method from the present position alone; the remaining residual of each row."""
+    return _newton(work, rows, free, work.q.copy()) if rows or work.places else np.zeros(0)
+
+
+def move(work: Posture, x: Vector) -> None:
+    """q ← q ⊕ x."""
+    if work.mechanism.vector:
+        work.q = work.q + x
+        return
+    block = work.mechanism.block(work.time, work.q, work.y, work.anchors)
+    block[work.mechanism.layout.x : work.mechanism.layout.v] = x
+    out = np.zeros(len(work.q))
+    work.mechanism.common["compose"](block, work.parameters, out)
+    work.q = out
 
 
 def _newton(work: Posture, rows: Sequence[int], free: Matrix, start: Vector) -> Vector:
@@ -109,6 +185,7 @@ def _newton(work: Posture, rows: Sequence[int], free: Matrix, start: Vector) -> 
     n_v = work.equations.n_v
     before, picked = np.inf, list(rows)
     for iteration in range(200):
+        work.iterations += 1
         terms = work.mechanism.acceleration_terms(work.time, work.q, work.y, work.parameters, work.anchors)
         h, B = work.with_conditions(terms.h[picked], terms.B[picked][:, :n_v], work.places)
         size = float(np.max(np.abs(h)))
@@ -131,14 +208,7 @@ def _newton(work: Posture, rows: Sequence[int], free: Matrix, start: Vector) -> 
         before = size
         x = np.zeros(n_v)
         x[places] = change / limit
-        block = work.mechanism.block(work.time, work.q, work.y, work.anchors)
-        if work.mechanism.vector:
-            work.q = work.q + x
-        else:
-            block[work.mechanism.layout.x : work.mechanism.layout.v] = x
-            out = np.zeros(len(work.q))
-            work.mechanism.common["compose"](block, work.parameters, out)
-            work.q = out
+        move(work, x)
     terms = work.mechanism.acceleration_terms(work.time, work.q, work.y, work.parameters, work.anchors)
     return work.with_conditions(terms.h[picked], terms.B[picked][:, :n_v], work.places)[0]
 

@@ -145,6 +145,35 @@ def test_check_lists_every_fault(script, capsys):
     assert f"{told.out.count(chr(10) + '- ') + 1} faults" in told.out
 
 
+LINKAGE = '''"""A linkage with a redundant crank."""
+import mbd
+from tests.cases.linkages import four_bar, parallel_cranks
+
+model = parallel_cranks()
+'''
+
+
+def test_check_tells_the_degrees_of_freedom_and_the_redundant_rows(script, capsys):
+    assert cli.main(["check", script(LINKAGE)]) == 0
+    told = capsys.readouterr().out
+    assert "no faults found\nparallel cranks: 1 degree of freedom, where Grübler counts 0\n" in told
+    assert "'pin 2' (y) depends on 'pin 1' (x), 'pin 1' (y), 'pin 2' (x)" in told
+
+
+def test_check_fails_where_constraints_conflict_and_tells_what_to_relax(script, capsys):
+    assert cli.main(["check", script(LINKAGE.replace("parallel_cranks()", "four_bar((0.2, 0.2, 0.2), 1.0)"))]) == 1
+    told = capsys.readouterr().out
+    assert "in conflict: constraints cannot be satisfied: closure error 0.4 m at joint 'c'" in told
+    assert "change a length in the loop" in told
+
+
+def test_check_looks_at_the_start_of_the_script(script, capsys):
+    flat = "\nfrom tests.cases.linkages import four_bars, upright\nmodel = four_bars(1)\n"
+    flat += "start = upright(model, 1, angle=1.5707963267948966)\n"
+    assert cli.main(["check", script(LINKAGE + flat)]) == 0
+    assert "singular here: rank 1, 2 at postures nearby" in capsys.readouterr().out
+
+
 def test_info_names_versions_machine_backend_and_cache(capsys):
     assert cli.main(["info"]) == 0
     text = capsys.readouterr().out

@@ -21,7 +21,18 @@ RANKS = [
     ("compile",),
     ("kernel",),
     ("integrators",),
-    ("assembly", "conditions", "posture", "results", "simulation", "trajectory"),
+    (
+        "assembly",
+        "closure",
+        "conditions",
+        "conflicts",
+        "contradictions",
+        "dependence",
+        "posture",
+        "results",
+        "simulation",
+        "trajectory",
+    ),
     ("analysis", "view"),
     ("cli", "hardcases", "testing"),
 ]
@@ -29,7 +40,7 @@ RANKS = [
 
 RANK = {part: rank for rank, parts in enumerate(RANKS) for part in parts}
 
-DOORS = {"model": ("equations",), "trajectory": ("analysis", "view"), "results.ledger": ("view",)}
+DOORS = {"model": ("equations", "analysis.mobility"), "trajectory": ("analysis", "view"), "results.ledger": ("view",)}
 """Methods of the objects in users' hands that only call a later stage, and import it when they are called."""
 
 FILES = sorted(file for file in PACKAGE.rglob("*.py") if file != PACKAGE / "__init__.py")

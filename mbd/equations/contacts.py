@@ -33,6 +33,7 @@ class Laws:
     viewed : the values of `rows`, the rates of those on velocities, in views
     penalties : (number, gap, force) of penalty contacts in views
     sliding : the sliding velocities of `frictions` in views
+    idle : (owner, part) of rows of cut joints that hold by themselves
     """
 
     rows: list[Row] = field(default_factory=list)
@@ -44,6 +45,7 @@ class Laws:
     sliding: list[Node] = field(default_factory=list)
     effects: list[Effect] = field(default_factory=list)
     faults: list[str] = field(default_factory=list)
+    idle: list[tuple[str, str]] = field(default_factory=list)
 
 
 def laws(
@@ -58,7 +60,8 @@ def laws(
     found = Laws()
     for joint in scope.cuts:
         for part, value in scope.cut_rows(joint)[0]:
-            _row(found, scope, joint.name, part, value, unit=row_unit(part), may_fold=True)
+            if _row(found, scope, joint.name, part, value, unit=row_unit(part), may_fold=True) < 0:
+                found.idle.append((joint.name, part))
     for constraint in bilaterals:
         if isinstance(constraint, VelocityConstraint):
             _velocity_rows(found, scope, constraint)

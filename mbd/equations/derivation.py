@@ -76,7 +76,7 @@ def _derived(model: Model, plan: Plan) -> Equations:
         balance=tuple(balance), rows=tuple(constraints.rows), contacts=tuple(constraints.contacts),
         guards=tuple(constraints.guards), effects=effects, kinetic=dynamics.kinetic(), potential=potential,
         compose=None if all(joint.is_vector for joint in plan.edges) else scope.composed,
-        output=outputs, output_names=outputs.names,
+        idle=tuple(constraints.idle), output=outputs, output_names=outputs.names,
         velocity_names=tuple(f"{coordinate.name}.rate" for coordinate in scope.coordinates), notes=plan.notes,
         figure=figure_of(model), geometry=TreeGeometry(scope, dynamics, work, rests, constraints),
         frictions=tuple(constraints.frictions),

@@ -189,6 +189,7 @@ class Equations:
     kinetic, potential : T and V; V includes gravity and every effect with a potential
     output : any named result as a node ('left hip.angle', 'left shank.end.x', 'left knee.reaction_force.x', …)
     output_names : the names that `output` certainly knows
+    idle : (owner, part) of rows of cut joints that hold whatever the motion, and were left out
     """
 
     name: str
@@ -208,6 +209,7 @@ class Equations:
     output_names: Callable[[], Sequence[str]]
     velocity_names: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    idle: tuple[tuple[str, str], ...] = ()
     figure: Callable[[], Any] | None = field(default=None, repr=False)
     geometry: Geometry | None = field(default=None, repr=False)
     frictions: tuple[Friction, ...] = ()

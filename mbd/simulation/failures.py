@@ -12,6 +12,7 @@ from mbd.arrays import Vector
 from mbd.kernel import fields as F
 from mbd.results.failure import Failure
 from mbd.results.record import EventRecord
+from mbd.simulation.redundant import clash
 from mbd.simulation.round_off import remainder
 from mbd.simulation.stepper import Stepper
 from mbd.state import State
@@ -133,8 +134,7 @@ def explanation(
     if status in (F.DEPENDENT, F.CONFLICT) and int(values["state"][F.BLOCKED]) < values["n"]:
         return f"{where}: neither mass nor rows determine {_unknown(stepper)}{with_closed}; give it a mass, or lock it"
     if status in (F.DEPENDENT, F.CONFLICT):
-        what = "depend on each other" if status == F.DEPENDENT else "conflict"
-        return f"{where}: rows {what} at {_unknown(stepper)}{with_closed}; leave one out, or hold fewer contacts closed"
+        return f"{where}: {_clashing(stepper, status)}{with_closed}; leave one out, or hold fewer contacts closed"
     if status == F.ENERGY_GAIN:
         return (
             f"{where}: the impact law would create energy{with_closed}: restitution where a contact also sticks "
@@ -148,6 +148,13 @@ def explanation(
             "friction coefficient, or make the contact compliant with mbd.Penalty"
         )
     return f"{where}: the instant of an event could not be isolated{with_closed}; try a smaller dt"
+
+
+def _clashing(stepper: Stepper, status: int) -> str:
+    """Which rows depend on each other or conflict."""
+    told = clash(stepper.mechanism.equations.rows, stepper.values)
+    what = "depend on each other" if status == F.DEPENDENT else "conflict"
+    return f"rows {what}: {told}" if told else f"rows {what} at {_unknown(stepper)}"
 
 
 def _unknown(stepper: Stepper) -> str:

@@ -26,6 +26,7 @@ from mbd.simulation.control import Boundaries, Named, apply_reset
 from mbd.simulation.ends import advance, call, close
 from mbd.simulation.failures import attempt, explanation
 from mbd.simulation.memory import take_up
+from mbd.simulation.redundant import redundancy
 from mbd.simulation.savepoints import Savepoint, rewind, save
 from mbd.simulation.stepper import Stepper
 from mbd.state import State
@@ -409,12 +410,8 @@ class Run:
     def _notes(self) -> list[str]:
         """What the user should know of contacts that were ignored on purpose."""
         v, notes = self.values, list(self.mechanism.notes)
-        dependent = [self.mechanism.equations.rows[row].title for row in sorted(self.stepper.dependent)]
-        if dependent:
-            notes.append(
-                f"redundant constraints: {', '.join(dependent)} depend on other rows; the motion is unique, their "
-                "multipliers are not: those of least norm are given"
-            )
+        dependent = redundancy(self.mechanism.equations.rows, self.stepper.dependent)
+        notes += [dependent] if dependent else []
         shortened = int(v["counts"][F.SHORTENED])
         if shortened:
             notes.append(f"{shortened} steps were shortened where Newton's method failed at the full dt")

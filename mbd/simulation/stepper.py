@@ -23,6 +23,8 @@ EVENT_CAPACITY = 512
 """Events that the kernel may log before it hands them over, at least."""
 LAWS = ("newton", "poisson", "sequential")
 """Impact laws in the order of their numbers in the kernel."""
+TAKES_PART = 1e-7
+"""Coefficient of a row below which another does not depend on it [-]."""
 MODE_CAPACITY = 16
 """Modes for which a table is laid out at the start; it doubles as it fills."""
 
@@ -77,7 +79,7 @@ class Stepper:
         self.functions: list[Any] = [mechanism.common[name] for name in ("accelerations", "guards", "scales")]
         self.functions.append(None if mechanism.vector else mechanism.common["compose"])
         self.modes: list[Any] = []
-        self.dependent: set[int] = set()
+        self.dependent: dict[int, tuple[int, ...]] = {}
         self.kernel: Any = None
         self._table: Any = None
         self.resumed_at = float("nan")  # the instant whose row was stored as a run was taken up again
@@ -171,7 +173,10 @@ class Stepper:
         v["mode_code"][2 * count : 2 * count + 2] = len(self.functions), len(self.functions) + 1
         self.functions += [code.tangent, code.residual]
         self.modes.append(code)
-        self.dependent |= {row for row in range(v["n_rows"]) if dropped[row]}
+        mix = v["mix"].reshape(v["n_rows"], -1) if v["n_rows"] else v["mix"]
+        for row in range(v["n_rows"]):
+            if dropped[row]:  # as they were found first
+                self.dependent.setdefault(row, tuple(int(k) for k in np.flatnonzero(np.abs(mix[row]) > TAKES_PART)))
         self.kernel = self._table = None  # before the mode counts: an interrupt may come between any two lines
         v["mode_count"][0] = count + 1
 

@@ -374,7 +374,7 @@ def test_a_row_said_twice_does_not_restart_the_scheme(scheme, second):
     model, start = pendulum_held_twice(second)
     run = mbd.simulate(model, start, SCHEMES[scheme], dt=1e-2, until=2.0)
     assert run.stats["restarts"] == 1
-    assert any("'again' depend on other rows" in note for note in run.stats["notes"])
+    assert any("'again' depends on " in note for note in run.stats["notes"])
     assert run["bob place.y"].min() == pytest.approx(-1.0, abs=1e-4)
     assert np.abs(run["rod.residual"]).max() < 1e-10
     assert np.abs(run["again.residual"]).max() < (1e-10 if second == "position" or scheme == "hht" else 2e-3)

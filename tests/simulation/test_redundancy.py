@@ -103,5 +103,5 @@ def test_redundant_rows_that_conflict_are_an_error_at_assembly():
     model.connect(mbd.Translation("place", model.ground.origin, bob.origin))
     for name, length in ("short", 1.0), ("long", 1.1):
         model.constrain(mbd.Bilateral(name, mbd.distance(model.ground.origin, bob.origin), length))
-    with pytest.raises(mbd.AssemblyError, match="'short'.*\n.*'long'"):
+    with pytest.raises(mbd.AssemblyError, match="constraint 'short', constraint 'long' cannot hold together"):
         mbd.assemble(model, position={"place.x": 0.6})

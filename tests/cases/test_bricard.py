@@ -1,0 +1,69 @@
+"""Case b4: Bricard's mechanism, which moves although Grübler's count gives it no freedom."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import mbd
+from mbd.integrators.family import NewmarkFamily
+from tests.cases.linkages import bricard
+from tests.cases.schemes import WITH_ROWS, name_of
+from tests.helpers import assert_second_order
+from tests.problems import case
+
+B4 = case("b4-iftomm-a04-bricard")
+MODEL = bricard()
+START = mbd.assemble(MODEL)
+PLACES = B4["P3"]
+
+
+def swing(scheme: NewmarkFamily, dt: float) -> mbd.Trajectory:
+    return mbd.simulate(MODEL, START, scheme, dt=dt, until=10.0, store=5)
+
+
+def misses(run: mbd.Trajectory) -> np.ndarray:
+    """How far P3 is from the reference at each of its times [m]."""
+    found = run.at(PLACES.t)["rod 2.tip"]
+    return np.linalg.norm(found - PLACES.value, axis=1)
+
+
+def test_it_has_one_degree_of_freedom_where_grubler_counts_none() -> None:
+    found = mbd.mobility(MODEL, START)
+    assert (found.dof, found.grubler) == (B4["number of degrees of freedom"].value, 0)
+    assert (found.coordinates, found.rank) == (5, 4), "the reference's own rank analysis: 5 unknowns, rank 4"
+    (row,) = found.dependent
+    assert "'P3'" in row.row and all("'P3'" in title for title, _ in row.on)
+    assert found.consistent and not found.singular
+    assert "1 degree of freedom, where Grübler counts 0" in str(found)
+
+
+@pytest.mark.parametrize("cut", [["P0"], ["P2"], ["P5"]], ids=str)
+def test_the_freedom_does_not_depend_on_where_the_loop_is_cut(cut: list[str]) -> None:
+    found = mbd.mobility(bricard(cut))
+    assert (found.dof, found.grubler, len(found.dependent)) == (1, 0, 1)
+
+
+@pytest.mark.parametrize("scheme", WITH_ROWS, ids=name_of)
+def test_the_place_of_p3_meets_the_reference_to_second_order(scheme: NewmarkFamily) -> None:
+    assert_second_order(lambda dt: misses(swing(scheme, dt)), 2e-3, halvings=2)
+
+
+def test_at_a_small_step_p3_is_within_the_accuracy_of_the_reference() -> None:
+    assert np.max(misses(swing(mbd.GeneralizedAlpha(0.9), 1e-4))) < PLACES.accuracy
+
+
+@pytest.mark.parametrize("scheme", WITH_ROWS, ids=name_of)
+def test_it_neither_freezes_nor_leaves_its_constraints_and_tells_the_redundancy_once(scheme: NewmarkFamily) -> None:
+    run = swing(scheme, 1e-3)
+    assert np.ptp(run["P0.angle"]) > 1.0
+    assert max(run.violation.length, run.violation.angle) < 1e-8
+    assert run.energy.drift < 1e-6
+    (note,) = run.stats["notes"]
+    assert note.startswith("redundant constraints: 1 ('P3' (turn 2) depends on 'P3' (x), 'P3' (y)")
+    assert np.max(np.abs(run.record.lam)) < 10.0, "N and N m; no large multipliers of alternating sign"
+
+
+def test_energy_is_kept_at_a_small_step() -> None:
+    energy = swing(mbd.GeneralizedAlpha(1.0), 2e-4).energy
+    assert abs(energy.sums["numerical"]) < 1e-8
