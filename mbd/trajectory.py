@@ -111,7 +111,10 @@ class Trajectory:
     # what happened ----------------------------------------------------------------------------------------------
     @property
     def events(self) -> list[EventRecord]:
-        """What happened, in order: `time`, `kind` ('closed', 'opened', 'event'), `name`, `impulse`, `energy_loss`."""
+        """What happened, in order: `time`, `kind`, `name`, `impulse`, `energy_loss`.
+
+        kind is 'closed' or 'opened' of a contact, 'stuck' or 'slipped' of dry friction, or 'event'.
+        """
         return list(self.record.events)
 
     @cached_property

@@ -51,6 +51,9 @@ LOSSES: list[tuple[str, Callable[[], Loss]]] = [
     ("viscous", lambda: mbd.Viscous(0.7)),
     ("quadratic", lambda: mbd.Quadratic(0.4)),
     ("coulomb smoothed", lambda: mbd.Coulomb(2.0, smoothing=0.05)),
+    ("coulomb", lambda: mbd.Coulomb(2.0)),
+    ("pin friction", lambda: mbd.PinFriction(0.3, 0.02)),
+    ("dry and viscous", lambda: mbd.Coulomb(2.0) + mbd.Viscous(0.7) + mbd.PinFriction(0.3, 0.02)),
     ("tabulated", lambda: mbd.Tabulated([-4.0, -1.0, 2.0, 5.0], [-9.0, -1.5, 1.0, 8.0])),
     ("dissipation of a function", lambda: mbd.Dissipation(cosh_dissipation)),
     ("viscous and quadratic", lambda: mbd.Viscous(0.7) + mbd.Quadratic(0.4)),
@@ -146,6 +149,7 @@ MEASURES: list[tuple[str, Callable[[Frame, Frame, Joint], Measure]]] = [
 CONSTRAINTS: list[tuple[str, Callable[[Frame, Frame, Joint], Constraint]]] = [
     ("foot that sticks", lambda a, b, joint: mbd.Unilateral("law", mbd.touchdown(a))),
     ("foot that bounces", lambda a, b, joint: mbd.Unilateral("law", mbd.touchdown(b), restitution=0.7, friction=0.0)),
+    ("foot with friction", lambda a, b, joint: mbd.Unilateral("law", mbd.touchdown(a), friction=0.4)),
     ("foot on a hill", lambda a, b, joint: mbd.Unilateral("law", mbd.touchdown(b, hill))),
     ("foot on a plate", lambda a, b, joint: mbd.Unilateral("law", mbd.touchdown(b, mbd.Plane(frame=a)), friction=0.0)),
     ("foot on a belt", lambda a, b, joint: mbd.Unilateral("law", mbd.touchdown(b, mbd.Plane(velocity=(0.4, 0.0))))),

@@ -30,7 +30,8 @@ class Cost:
     accelerations : mass matrix, forces and all rows, for starts, impacts and restarts
     guards : what is watched after every step
     effects : how much `newton` shrinks without an effect
-    contacts : how much `newton` grows while a contact is closed
+    contacts : how much `newton` grows while a contact is closed, and sticks if it has friction
+    frictions : how much it grows while a dry friction slides, its contact being closed
     """
 
     name: str
@@ -40,13 +41,18 @@ class Cost:
     guards: int
     effects: Mapping[str, int]
     contacts: Mapping[str, int]
+    frictions: Mapping[str, int]
 
     def __repr__(self) -> str:
-        width = max([30, *(len(name) + 4 for name in (*self.effects, *self.contacts))])
+        width = max([30, *(len(name) + 4 for name in (*self.effects, *self.contacts, *self.frictions))])
         programs = ("newton", "residual", "accelerations", "guards")
         lines = [f"{self.name + ', operations':<{width}}"]
         lines += [f"{program:<{width}}{getattr(self, program):>8}" for program in programs]
-        for title, counts in ("of newton, by effect", self.effects), ("added while closed", self.contacts):
+        parts = {
+            "of newton, by effect": self.effects, "added while closed": self.contacts,
+            "added while it slides": self.frictions,
+        }  # fmt: skip
+        for title, counts in parts.items():
             if counts:
                 lines += [title, *(f"  {name:<{width - 2}}{count:>8}" for name, count in counts.items())]
         return "\n".join(lines)
@@ -64,7 +70,8 @@ def cost(model: Any) -> Cost:
     equations = derive(model)
     base = _newton(equations)
     mode = equations.bilateral
-    effects = [effect.name for effect in equations.effects if effect.contact < 0]
+    rubbing = {f"{friction.name} friction": k for k, friction in enumerate(equations.frictions)}
+    effects = [effect.name for effect in equations.effects if effect.contact < 0 and effect.name not in rubbing]
     return Cost(
         equations.name,
         newton=base,
@@ -73,7 +80,15 @@ def cost(model: Any) -> Cost:
         guards=operations(guards(equations)),
         effects={name: base - _newton(derive(model.without(name))) for name in effects},
         contacts={c.name: _newton(equations, k) - base for k, c in enumerate(equations.contacts)},
+        frictions={name: _sliding(equations, k) - base for name, k in rubbing.items()},
     )
+
+
+def _sliding(equations: Equations, friction: int) -> int:
+    """Operations of one Newton iteration with one friction sliding, its contact closed."""
+    contact = equations.frictions[friction].contact
+    rows = [] if contact < 0 else [k for k in equations.contacts[contact].rows if equations.rows[k].friction < 0]
+    return operations(newton(equations, [*equations.bilateral, *rows], (), False, [friction]))
 
 
 def _newton(equations: Equations, closed: int | None = None) -> int:

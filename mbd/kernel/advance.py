@@ -47,7 +47,8 @@ from mbd.kernel.locate import locate
 from mbd.kernel.nonsmooth import lands, lets_go, rebound, strike
 from mbd.kernel.redundancy import find_dependent, spread
 from mbd.kernel.restart import active_rows, consistent, evaluate, solve_rows, stepping_rows
-from mbd.kernel.switching import log_event, settle, switch
+from mbd.kernel.settle import log_event, settle
+from mbd.kernel.switching import switch
 
 __all__ = ["advance"]
 
@@ -141,13 +142,9 @@ def restart(K: Any) -> int:
 
 
 def still_dependent(K: Any, t1: float) -> bool:
-    """Whether the rows that were left out hold at the candidate; their multipliers get the least norm."""
+    """Whether the rows that were left out hold at the candidate."""
     evaluate(K, t1, K.q1, K.y1)
     o_h = K.n * K.n + K.n + 2 * K.n * K.n_rows
-    for k in range(K.n_rows):  # the step was solved without them
-        if K.dropped[k] == 1:
-            K.lam1[k] = 0.0
-    spread(K, K.lam1)
     for k in range(K.n_rows):
         if K.dropped[k] == 1:
             size = max(K.scale[K.n + k], 1e-3)

@@ -13,13 +13,15 @@ from __future__ import annotations
 
 from typing import Any
 
-from mbd.kernel.fields import NO_IMPACT, PAST_TIME
+from mbd.kernel.fields import BLOCKED, CONFLICT, N_DROPPED, NO_IMPACT, PAST_TIME
+from mbd.kernel.redundancy import spread
 from mbd.kernel.restart import (
     MOST_LOADS,
     active_rows,
     evaluate_loaded,
     limit_of,
     load_accelerations,
+    refresh_scales,
     solve_rows,
 )
 
@@ -27,14 +29,19 @@ __all__ = ["complementarity"]
 
 MOST_NEWTON = 12
 """Changes of all branches at once before single ones follow [-]."""
+ROUND_OFF = 1e-11
+"""What multipliers and velocities or accelerations may miss of their laws, relative to their terms [-]."""
+SURE = 1e-6
+"""The same for a friction that an event has found to slide: its acceleration is still round-off [-]."""
 MOST_CHOICES = 6561
 """Sets of branches that are tried one after the other when nothing else has led to a solution [-]."""
 
 
 def complementarity(K: Any, level: int) -> int:
-    """Choose K.active of contacts with K.free = 1 and K.sticks, K.slip of frictions with K.loose = 1, and solve.
+    """Choose K.active of contacts with K.free = 1 and K.sticks, K.slip of frictions with K.loose = 1 or 2, and solve.
 
-    Others keep theirs. With K.free = 2 a contact chooses K.parting: its normal row is off, its tangents stay.
+    Others keep theirs. With K.free = 2 a contact chooses K.parting: its normal row is off, its tangents stay. With
+    K.loose = 2 a friction slides unless that is clearly wrong.
     level 0: accelerations, force and bias are those of K.acc; 1: velocities, bias and impulses K.given are in place.
     """
     choices = 0
@@ -44,10 +51,14 @@ def complementarity(K: Any, level: int) -> int:
             choices += 1
             sets = min(sets * 2, 2 * MOST_CHOICES)
     for f in range(K.n_frictions):
-        choices += K.loose[f]
-        sets = min(sets * (1 + 2 * K.loose[f]), 2 * MOST_CHOICES)
+        if K.loose[f] > 0:
+            choices += 1
+            sets = min(sets * 3, 2 * MOST_CHOICES)
+    measure_free(K, level)
     for attempt in range(4 * choices * choices + MOST_NEWTON + 8):
         status = solve_branches(K, level)
+        if status == CONFLICT and give_way(K) == 1:
+            continue
         if status != 0:
             return status
         if attempt < MOST_NEWTON:
@@ -79,14 +90,24 @@ def solve_branches(K: Any, level: int) -> int:
             return status
         if evaluate_loaded(K, whole(K, level)) < 1e-13 or K.loaded == 0:
             break
+    find_limits(K, level)
+    if K.state[N_DROPPED] > 0:
+        spread(K, K.impulse)
+        evaluate_loaded(K, whole(K, level))
+        find_limits(K, level)
     for f in range(K.n_frictions):
-        row = K.friction_row[f]
-        K.limit[f] = limit_of(K, f)
-        if level == 1:  # a force that stays finite has an impulse only over the time of a non-smooth step
-            K.limit[f] += (K.detail[PAST_TIME] - 1.0) * K.base_limit[f]
         if slides(K, f):
+            row = K.friction_row[f]
             K.impulse[row] = K.slip[f] * K.limit[f] - (K.past[row] if level == 1 else 0.0)
     return status
+
+
+def find_limits(K: Any, level: int) -> None:
+    """Largest frictions at the multipliers now in the block, of impulses without those of forces that stay finite."""
+    for f in range(K.n_frictions):
+        K.limit[f] = limit_of(K, f)
+        if level == 1:  # only over the time of a non-smooth step
+            K.limit[f] += (K.detail[PAST_TIME] - 1.0) * K.base_limit[f]
 
 
 def whole(K: Any, level: int) -> Any:
@@ -125,36 +146,64 @@ def slides(K: Any, f: int) -> bool:
     return bool(is_on(K, f) and K.sticks[f] == 0)
 
 
-def contact_fault(K: Any, c: int, largest: float) -> float:
-    """How badly contact c breaks its law, relative; ≤ 0 if it does not."""
+def measure_free(K: Any, level: int) -> None:
+    """Sizes of w where no row acted, by which its round-off is judged: where all rests w itself is nothing else."""
+    if level == 0 and K.scale[0] == 0.0:
+        refresh_scales(K)
+    for i in range(K.n):
+        mass = abs(K.acc[i * K.n + i])
+        K.typical[i] = abs(K.y[i]) if level == 1 else (K.scale[i] / mass if mass > 0.0 else 0.0)
+
+
+def departure(K: Any, row: int, sign: float, tolerance: float) -> float:
+    """How far sign (B w + bias) of a row is below zero, beyond a tolerance relative to its terms."""
     n = K.n
-    row = K.normal[c]
-    if K.active[c] == 1 and K.parting[c] == 0:
-        return float(K.impulse[row] - 1e-11 * largest)  # λ > 0 would pull
     o_B = n * n + n + n * K.n_rows
     value = K.bias[row]
     size = abs(K.bias[row])
     for j in range(n):
-        term = K.acc[o_B + row * n + j] * K.jump[j]
-        value += term
-        size = max(size, abs(term))
-    return float(-value - 1e-11 * size)
+        slope = K.acc[o_B + row * n + j]
+        value += slope * K.jump[j]
+        size = max(size, abs(slope) * max(abs(K.jump[j]), K.typical[j]))
+    return float(-sign * value - tolerance * size)
+
+
+def contact_fault(K: Any, c: int, largest: float) -> float:
+    """How badly contact c breaks its law; ≤ 0 if it does not."""
+    if K.active[c] == 1 and K.parting[c] == 0:
+        return float(K.impulse[K.normal[c]] - ROUND_OFF * largest)  # λ > 0 would pull
+    return departure(K, K.normal[c], 1.0, ROUND_OFF)
 
 
 def friction_fault(K: Any, f: int, largest: float) -> float:
-    """How badly friction f breaks its law, relative; ≤ 0 if it does not."""
+    """How badly friction f breaks its law; ≤ 0 if it does not."""
     row = K.friction_row[f]
     if K.sticks[f] == 1:
-        return float(abs(K.impulse[row] + K.past[row]) - K.limit[f] - 1e-11 * largest)
-    n = K.n
-    o_B = n * n + n + n * K.n_rows
-    value = K.bias[row]
-    size = abs(K.bias[row])
-    for j in range(n):
-        term = K.acc[o_B + row * n + j] * K.jump[j]
-        value += term
-        size = max(size, abs(term))
-    return float(-K.slip[f] * value - 1e-11 * size)  # it slides against its own friction
+        return float(abs(K.impulse[row] + K.past[row]) - K.limit[f] - ROUND_OFF * largest)
+    return departure(K, row, K.slip[f], SURE if K.loose[f] == 2 else ROUND_OFF)  # it slides against its own friction
+
+
+def give_way(K: Any) -> int:
+    """Where held rows contradict each other, a friction that may choose slides, or a contact opens; 0 if none can.
+
+    It is the one whose row is blamed if it can. Its direction is other than the one it had last.
+    """
+    m = active_rows(K, K.active)
+    chosen = -1
+    for k in range(m):
+        f = K.row_friction[K.rows[k]]
+        if f >= 0 and K.loose[f] > 0 and (chosen < 0 or K.n + k == K.state[BLOCKED]):
+            chosen = f
+    if chosen >= 0:
+        K.sticks[chosen] = 0
+        K.lean[chosen] = 1.0 if K.lean[chosen] < 0.0 else -1.0
+        K.slip[chosen] = K.lean[chosen]
+        return 1
+    for c in range(K.n_contacts):
+        if K.free[c] == 1 and K.active[c] == 1:
+            K.active[c] = 0
+            return 1
+    return 0
 
 
 def largest_impulse(K: Any) -> float:
@@ -179,6 +228,7 @@ def turn(K: Any, f: int) -> None:
         K.sticks[f] = 0
         row = K.friction_row[f]
         K.slip[f] = 1.0 if K.impulse[row] + K.past[row] > 0.0 else -1.0
+        K.lean[f] = K.slip[f]
     else:
         K.sticks[f] = 1
         K.slip[f] = 0.0
@@ -189,7 +239,7 @@ def change_all(K: Any) -> int:
     largest = largest_impulse(K)
     count = 0
     for f in range(K.n_frictions):
-        if K.loose[f] == 1 and is_on(K, f) and friction_fault(K, f, largest) > 0.0:
+        if K.loose[f] > 0 and is_on(K, f) and friction_fault(K, f, largest) > 0.0:
             turn(K, f)
             count += 1
     for c in range(K.n_contacts):
@@ -210,7 +260,7 @@ def worst(K: Any, first: bool) -> int:
         if f < 0:
             if K.free[place] > 0:
                 fault = contact_fault(K, place, largest)
-        elif K.loose[f] == 1 and is_on(K, f):
+        elif K.loose[f] > 0 and is_on(K, f):
             fault = friction_fault(K, f, largest)
         if fault > most:
             found = place + 1
@@ -242,7 +292,7 @@ def choose(K: Any, number: int) -> None:
             K.parting[c] = number % 2
             number //= 2
     for f in range(K.n_frictions):
-        if K.loose[f] == 1:
+        if K.loose[f] > 0:
             branch = number % 3
             number //= 3
             K.sticks[f] = 1 if branch == 0 else 0

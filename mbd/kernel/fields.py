@@ -37,6 +37,8 @@ REAL_ARRAYS = (
     "basis", "lower", "mix",  # dependent rows as combinations of others
     "force", "bias", "jump", "impulse",  # complementarity: right-hand sides, velocity or acceleration, multipliers
     "slip", "limit", "base_limit",  # frictions: sign of sliding, largest, at zero multipliers
+    "lean",  # frictions: the direction in which each slid last
+    "typical",  # of velocities or accelerations without rows
     "given", "total", "total_jump", "loads", "trial", "trial_given", "trial_jump",  # phases of an impact
     "before", "past", "past_limit",  # non-smooth steps: gap rates before, impulses and limits of the smooth part
     "guards0", "guards1",  # guard values at the accepted state and at the candidate
@@ -58,8 +60,8 @@ INTEGER_ARRAYS = (
     "when_start", "when_target", "when_after",  # who opens it
     "while_kind", "while_target",  # 0 always, 1 while a contact is closed, 2 while a measure is positive
     "anchor_start", "direction", "notify",
-    "closed", "armed", "touched", "active", "free", "closing", "parting", "trial_free",  # contacts
-    "sticks", "loose", "was",  # frictions
+    "closed", "armed", "touched", "active", "free", "closing", "parting",  # contacts
+    "sticks", "loose", "was",  # frictions; was: 0 off, 2 sticking, ±1 sliding since the last restart
     "dropped",  # rows that depend on others
     "mode_key", "mode_code", "mode_count",  # known modes
     "rows", "pivots", "columns", "fired", "state", "counts",
@@ -70,7 +72,7 @@ Kernel = namedtuple("Kernel", FIELDS)  # type: ignore[misc]
 
 KEPT_REALS = (
     "clock", "q", "y", "rate", "aux", "slope", "lam", "lam_slope", "shift", "shift_change", "anchors", "guards0",
-    "scale", "mix", "deepest", "sinking", "side", "detail", "slip",
+    "scale", "mix", "deepest", "sinking", "side", "detail", "slip", "lean",
 )  # fmt: skip
 """What of the real arrays the next step depends on: restored before a step, they make it the same to the bit."""
 KEPT_INTEGERS = ("closed", "armed", "touched", "dropped", "rows", "state", "sticks", "loose", "was")
@@ -104,5 +106,7 @@ DONE, FULL, NEW_MODE, EVENT, PAUSE, LAST = range(6)
 CLOSE, OPEN_PULL, OPEN_GAP, OPEN_FORCE, CROSS, WATCH, GRAZE, PRESS, STICK, SLIP, STICK_BRIEF = range(11)
 # kinds in the log
 LOG_CLOSED, LOG_OPENED, LOG_EVENT, LOG_STUCK, LOG_SLIPPED = range(5)
+UNKNOWN = -9
+"""State of a friction before the first restart, in `was`: what it begins with is no event [-]."""
 EPS = 2.220446049250313e-16
 """Distance from 1 to the next double, as a literal for numba [-]."""

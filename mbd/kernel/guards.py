@@ -15,6 +15,7 @@ from mbd.kernel.fields import (
     EPS,
     GRAZE,
     GUARDS,
+    N_DROPPED,
     NOT_FINITE,
     NOW,
     OPEN_FORCE,
@@ -27,7 +28,9 @@ from mbd.kernel.fields import (
     STICK_BRIEF,
     WATCH,
 )  # fmt: skip
+from mbd.kernel.hermite import crossing, hermite, hermite_turn
 from mbd.kernel.hooks import call, scheme_step
+from mbd.kernel.redundancy import spread
 from mbd.kernel.restart import compose, consistent, evaluate_loaded, fill_block, limit_of
 
 __all__ = [
@@ -36,6 +39,8 @@ __all__ = [
 ]  # fmt: skip
 
 
+REST = 1e-12
+"""Speed along a friction, relative to its terms, that is no turn: other rows may hold it still as it pulls [-]."""
 APART = 1e-6
 """Gap [m, rad] above which a contact is clearly open."""
 
@@ -60,6 +65,13 @@ def try_step(K: Any, h: float, t1: float) -> int:
         status = scheme_step(K, h, t1)
         if status != 0:
             return status
+        if K.state[N_DROPPED] > 0:  # the step was solved without them; their multipliers get the least norm
+            for k in range(K.n_rows):
+                if K.dropped[k] == 1:
+                    K.lam1[k] = 0.0
+            spread(K, K.lam1)
+            for k in range(K.n_rows):
+                K.block[K.o_lam + k] = K.lam1[k]
     else:
         for i in range(K.n):
             K.rate1[i] = K.rate[i]
@@ -95,8 +107,9 @@ def try_step(K: Any, h: float, t1: float) -> int:
             K.detail[0] = t1
             return NOT_FINITE
         for f in range(K.n_frictions):
+            K.limit[f] = K.guards1[frictions_at(K) + 2 * K.n_frictions + f]
             if K.slip[f] != 0.0:
-                K.lam1[K.friction_row[f]] = K.slip[f] * K.guards1[frictions_at(K) + 2 * K.n_frictions + f]
+                K.lam1[K.friction_row[f]] = K.slip[f] * K.limit[f]
     return 0
 
 
@@ -159,30 +172,6 @@ def update_sides(K: Any) -> None:
             K.side[e] = float(back)
 
 
-def hermite_turn(g0: float, g1: float, d0: float, d1: float, rising: bool) -> float:
-    """Place in (0, 1) of the interior maximum (rising) or minimum of the cubic Hermite interpolant; −1 if none."""
-    a = 3.0 * (d0 + d1 - 2.0 * (g1 - g0))
-    b = 2.0 * (3.0 * (g1 - g0) - 2.0 * d0 - d1)
-    root = b * b - 4.0 * a * d0
-    if root < 0.0:
-        return -1.0
-    root = root**0.5
-    for sign in (-1.0, 1.0):
-        far = b + root if b >= 0.0 else b - root
-        place = -2.0 * d0 / far if sign < 0.0 and far != 0.0 else (-far / (2.0 * a) if a != 0.0 else -1.0)
-        if 0.0 < place < 1.0:
-            curvature = 2.0 * a * place + b
-            if (curvature < 0.0) == rising:
-                return place
-    return -1.0
-
-
-def hermite(g0: float, g1: float, d0: float, d1: float, s: float) -> float:
-    """Cubic Hermite interpolant at s in [0, 1]; d are rates times the step."""
-    u = 1.0 - s
-    return g0 * (1.0 + 2.0 * s) * u * u + g1 * s * s * (3.0 - 2.0 * s) + d0 * s * u * u - d1 * s * s * u
-
-
 def consider(K: Any, kind: int, index: int, estimate: float, low: float) -> None:
     """Keep the candidate that fires first; all in fractions of the step."""
     if estimate < K.pick[0]:
@@ -190,14 +179,6 @@ def consider(K: Any, kind: int, index: int, estimate: float, low: float) -> None
         K.pick[1] = low
         K.fired[0] = kind
         K.fired[1] = index
-
-
-def crossing(value0: float, value1: float) -> float:
-    """Fraction at which a straight line through two values of opposite sign is zero."""
-    change = value0 - value1
-    if change == 0.0:
-        return 0.5
-    return min(max(value0 / change, 0.0), 1.0)
 
 
 def is_quiet(K: Any) -> bool:
@@ -307,7 +288,7 @@ def judge_friction(K: Any, f: int, h: float) -> None:
         return
     d0 = s * K.guards0[place + nF] * h
     d1 = s * K.guards1[place + nF] * h
-    tiny = 16.0 * EPS * max(K.scale[K.n + K.n_rows + K.friction_row[f]], 1e-3)
+    tiny = REST * max(K.scale[K.n + K.n_rows + K.friction_row[f]], 1e-3)
     if v1 < -tiny:
         top = hermite_turn(v0, v1, d0, d1, True) if d0 > 0.0 else -1.0
         if v0 > tiny:

@@ -9,21 +9,23 @@ Poisson       compression with e = 0 to −λ̂_c; then e times that impulse, an
 sequential    one contact after the other, the fastest first, until none approaches; equally fast ones together
               (Han & Gilmore 1993, J. Mech. Design 115:412)
 Stronge       as Poisson, with one factor on all impulses of the second phase, so that it gives back e² of the work that
-              the normal impulses of the first took (Stronge 1990, Proc. R. Soc. Lond. A 431:169)
+              the normal impulses of the first took (Stronge 1990, Proc. R. Soc. Lond. A 431:169), never energy in all
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-from mbd.kernel.complementarity import complementarity
-from mbd.kernel.fields import ENERGY_GAIN, IMPACTS, NO_IMPACT, NOW, PAST_TIME, PLASTIC, STRONGE
-from mbd.kernel.restart import capture, evaluate, evaluate_loaded, limit_of, row_speed
+from mbd.kernel.blow import blow, energy_gain, gather, let_rebound, loosen, prepare, restitution_of, speed, start_over
+from mbd.kernel.fields import ENERGY_GAIN, IMPACTS, NO_IMPACT, PLASTIC, STRONGE
+from mbd.kernel.restart import row_speed
 
 __all__ = ["impact"]
 
 MOST_BLOWS = 1000
 """Blows of the sequential law at one instant [-]."""
+GAIN = 1e-12
+"""Energy that impulses add, relative to its terms, above which a law is given up: restitution that sticks can [-]."""
 APPROACH = 1e-11
 """Approach speed, relative to the fastest, that counts as none [-]."""
 
@@ -43,93 +45,20 @@ def impact(K: Any, slow: bool) -> int:
         status = sequential_law(K)
     if status != 0:
         return status
-    if not slow and gains_energy(K):
+    if not slow and energy_gain(K) > GAIN:
+        for c in range(K.n_contacts):
+            if K.closing[c] > 0 and K.restitution[c] > 1.0:
+                return ENERGY_GAIN
         K.counts[STRONGE] += 1
         start_over(K)
         status = poisson_law(K, True)
         if status != 0:
             return status
-        if gains_energy(K):
+        if energy_gain(K) > GAIN:
             return ENERGY_GAIN
     for i in range(K.n):
         K.y[i] += K.jump[i]
     K.counts[IMPACTS] += 1
-    return 0
-
-
-def prepare(K: Any) -> None:
-    """K.acc at the instant, directions of sliding where contacts are now, force zero; all frictions begin stuck."""
-    evaluate(K, K.clock[NOW], K.q, K.y)
-    if K.n_frictions > 0:
-        for f in range(K.n_frictions):
-            c = K.friction_contact[f]
-            if c >= 0 and (K.closing[c] > 0 or (K.closed[c] == 1 and K.sticks[f] == 0)):
-                capture(K, c)
-        for k in range(K.n_rows):
-            K.given[k] = 0.0
-        evaluate(K, K.clock[NOW], K.q, K.y)
-        evaluate_loaded(K, K.given)
-        for f in range(K.n_frictions):
-            K.base_limit[f] = limit_of(K, f)  # no impulse comes from a force that stays finite
-        if K.strategy == 1:
-            evaluate_loaded(K, K.past)
-            for f in range(K.n_frictions):
-                K.past_limit[f] = limit_of(K, f) + (K.detail[PAST_TIME] - 1.0) * K.base_limit[f]
-    start_over(K)
-
-
-def start_over(K: Any) -> None:
-    """No jump and no impulse yet."""
-    for i in range(K.n):
-        K.total_jump[i] = 0.0
-    for k in range(K.n_rows):
-        K.total[k] = 0.0
-
-
-def gather(K: Any, slow: bool) -> None:
-    """All closed and closing contacts take part; those that open on pull may choose."""
-    for c in range(K.n_contacts):
-        both = K.closed[c] == 1 or K.closing[c] > 0
-        K.active[c] = 1 if (both and K.kind[c] == 0) else 0
-        K.free[c] = 1 if (K.active[c] == 1 and K.opens[c] == 0 and not slow) else 0
-    loosen(K)
-
-
-def loosen(K: Any) -> None:
-    """Frictions of this blow may choose, from sticking."""
-    for f in range(K.n_frictions):
-        c = K.friction_contact[f]
-        K.loose[f] = 1 if (c < 0 or K.active[c] == 1) else 0
-        if K.loose[f] == 1:
-            K.sticks[f] = 1
-            K.slip[f] = 0.0
-
-
-def speed(K: Any, row: int) -> float:
-    """γ of a row after the jumps so far."""
-    o_B = K.n * K.n + K.n + K.n * K.n_rows
-    value = row_speed(K, row)
-    for j in range(K.n):
-        value += K.acc[o_B + row * K.n + j] * K.total_jump[j]
-    return value
-
-
-def blow(K: Any) -> int:
-    """The next jump and its impulses, beside the impulses in K.given: bias is in place, contacts have been gathered."""
-    for k in range(K.n_rows):
-        K.impulse[k] = 0.0
-    status = complementarity(K, 1)
-    if status != 0:
-        return status
-    for i in range(K.n):
-        K.total_jump[i] += K.jump[i]
-        K.jump[i] = K.total_jump[i]
-    for k in range(K.n_rows):
-        K.total[k] += K.impulse[k] + K.given[k]
-        K.impulse[k] = K.total[k]
-        K.given[k] = 0.0
-    for c in range(K.n_contacts):
-        K.parting[c] = 0
     return 0
 
 
@@ -148,19 +77,6 @@ def newton_law(K: Any, slow: bool) -> int:
     return status
 
 
-def restitution_of(K: Any, c: int) -> float:
-    """e, or 0 at the end of impacts without end."""
-    return 0.0 if K.state[PLASTIC] == 1 else float(K.restitution[c])
-
-
-def let_rebound(K: Any) -> None:
-    """Contacts that closed with a restitution leave again."""
-    for c in range(K.n_contacts):
-        rests = K.strategy == 1 and K.before[c] >= 0.0
-        if K.closing[c] > 0 and restitution_of(K, c) > 0.0 and not rests:
-            K.active[c] = 0
-
-
 def poisson_law(K: Any, energetic: bool) -> int:
     """Compression, then restitution of its impulses (Poisson) or of their work (Stronge)."""
     gather(K, False)
@@ -171,62 +87,85 @@ def poisson_law(K: Any, energetic: bool) -> int:
     if status != 0:
         return status
     work = 0.0  # of the normal impulses in compression, each counted with its e²
-    for c in range(K.n_contacts):
-        if K.closing[c] > 0 and K.kind[c] == 0 and K.active[c] == 1:
-            row = K.normal[c]
-            K.given[row] = K.restitution[c] * K.total[row]
-            work += 0.5 * K.restitution[c] * K.restitution[c] * K.total[row] * (row_speed(K, row) + speed(K, row))
-    if energetic and work > 0.0:
-        status = scale_to_work(K, work)
-        if status != 0:
-            return status
-    let_part(K, 2)
-    status = blow(K)
-    if status == 0:
-        let_rebound(K)
-    return status
-
-
-def let_part(K: Any, free: int) -> None:
-    """Contacts that are given an impulse part under it, their tangents stay; `free` tells who may choose."""
-    for c in range(K.n_contacts):
-        row = K.normal[c]
-        parts = K.kind[c] == 0 and K.given[row] != 0.0
-        K.parting[c] = 1 if parts else 0
-        if parts or free == 0:
-            K.free[c] = free
-    for k in range(K.n_rows):
-        K.bias[k] = speed(K, k)
-    loosen(K)
-
-
-def scale_to_work(K: Any, work: float) -> int:
-    """Scale K.given so that it does this work: its rows move by σ d under σ K.given, hence ½ σ² Σ given · d = work."""
     for i in range(K.n):
         K.trial_jump[i] = K.total_jump[i]
     for k in range(K.n_rows):
         K.trial[k] = K.total[k]
-        K.trial_given[k] = K.given[k]
+        K.trial_given[k] = 0.0
     for c in range(K.n_contacts):
-        K.trial_free[c] = K.free[c]
-    let_part(K, 0)
-    status = blow(K)
-    done = 0.0
-    for k in range(K.n_rows):
-        if K.trial_given[k] != 0.0:
-            moved = speed(K, k)
-            for j in range(K.n):
-                moved -= K.acc[K.n * K.n + K.n + K.n * K.n_rows + k * K.n + j] * K.trial_jump[j]
-            done -= 0.5 * K.trial_given[k] * (moved - row_speed(K, k))
+        if K.closing[c] > 0 and K.kind[c] == 0 and K.active[c] == 1:
+            row = K.normal[c]
+            K.trial_given[row] = K.restitution[c] * K.total[row]
+            work += 0.5 * K.restitution[c] * K.restitution[c] * K.total[row] * (row_speed(K, row) + speed(K, row))
+    status = give_back_work(K, max(work, 0.0)) if energetic else give_back(K, 1.0)
+    fastest = 0.0
+    for c in range(K.n_contacts):
+        K.touched[c] = 1 if (K.kind[c] == 0 and (K.closed[c] == 1 or K.closing[c] > 0)) else 0
+        if K.touched[c] == 1:
+            fastest = max(fastest, abs(row_speed(K, K.normal[c])))
+    end_together(K, fastest)
+    return status
+
+
+def give_back(K: Any, factor: float) -> int:
+    """The second phase with this factor on the impulses K.trial_given, from the end of the first.
+
+    Contacts that are given an impulse part under it, unless they would approach; their tangents stay.
+    """
+    gather(K, False)
     for i in range(K.n):
         K.total_jump[i] = K.trial_jump[i]
-    factor = (work / done) ** 0.5 if done > 0.0 else 0.0
     for k in range(K.n_rows):
         K.total[k] = K.trial[k]
         K.given[k] = factor * K.trial_given[k]
     for c in range(K.n_contacts):
-        K.free[c] = K.trial_free[c]
-    return status
+        if K.kind[c] == 0 and K.trial_given[K.normal[c]] != 0.0:
+            K.parting[c] = 1
+            K.free[c] = 2
+    for k in range(K.n_rows):
+        K.bias[k] = speed(K, k)
+    return blow(K)
+
+
+def work_given_back(K: Any) -> float:
+    """Work of the normal impulses of the second phase, ½ Σ Λ (γ_c + γ⁺)."""
+    o_B = K.n * K.n + K.n + K.n * K.n_rows
+    work = 0.0
+    for k in range(K.n_rows):
+        if K.trial_given[k] != 0.0:
+            before = row_speed(K, k)
+            for j in range(K.n):
+                before += K.acc[o_B + k * K.n + j] * K.trial_jump[j]
+            work -= 0.5 * (K.total[k] - K.trial[k]) * (before + speed(K, k))
+    return work
+
+
+def give_back_work(K: Any, work: float) -> int:
+    """The second phase with the largest factor that gives back no more than this work, and no energy in all.
+
+    The work grows with the square of the factor while no branch changes; where one does, the factor is bisected. Less
+    than the work is given back where friction would add to it, because it follows the direction at the end of a phase.
+    """
+    status = give_back(K, 1.0)
+    if status != 0:
+        return status
+    done = work_given_back(K)
+    factor = (work / done) ** 0.5 if done > 0.0 else 0.0
+    status = give_back(K, factor)
+    if status != 0 or (abs(work_given_back(K) - work) <= 1e-12 * work and energy_gain(K) <= 1e-13):
+        return status
+    low = 0.0
+    high = max(2.0, 2.0 * factor)
+    for _ in range(64):
+        factor = 0.5 * (low + high)
+        status = give_back(K, factor)
+        if status != 0:
+            return status
+        if work_given_back(K) <= work and energy_gain(K) <= 1e-13:
+            low = factor
+        else:
+            high = factor
+    return give_back(K, low)
 
 
 def sequential_law(K: Any) -> int:
@@ -242,7 +181,7 @@ def sequential_law(K: Any) -> int:
                 most = max(most, -speed(K, K.normal[c]))
         fastest = max(fastest, most)
         if most <= APPROACH * fastest or most < 1e-14:
-            end_sequence(K, fastest)
+            end_together(K, fastest)
             return 0
         for c in range(K.n_contacts):
             strikes = K.opens[c] != 0 or -speed(K, K.normal[c]) >= (1.0 - 1e-9) * most if K.kind[c] == 0 else False
@@ -261,8 +200,8 @@ def sequential_law(K: Any) -> int:
     return NO_IMPACT
 
 
-def end_sequence(K: Any, fastest: float) -> None:
-    """Contacts that neither approach nor part stay closed."""
+def end_together(K: Any, fastest: float) -> None:
+    """Contacts that took part, and neither part nor closed with a restitution, stay closed."""
     for c in range(K.n_contacts):
         K.active[c] = 0
         if K.touched[c] == 1:
@@ -270,20 +209,3 @@ def end_sequence(K: Any, fastest: float) -> None:
             stays = not leaves and (K.closed[c] == 1 or K.restitution[c] == 0.0)
             K.active[c] = 1 if stays else 0
         K.touched[c] = 0
-
-
-def gains_energy(K: Any) -> bool:
-    """Whether impulses do work on the mechanism, −½ Σ Λ (γ⁻ + γ⁺) < 0: restitution that sticks can (Kane's paradox)."""
-    n = K.n
-    o_B = n * n + n + n * K.n_rows
-    loss = 0.0
-    size = 0.0
-    for k in range(K.n_rows):
-        if K.impulse[k] != 0.0:
-            half = 0.0
-            for j in range(n):
-                half += 0.5 * K.acc[o_B + k * n + j] * K.jump[j]
-            before = row_speed(K, k)
-            loss += K.impulse[k] * (before + half)
-            size += abs(K.impulse[k]) * (abs(before) + abs(half))
-    return bool(loss < -1e-9 * size)

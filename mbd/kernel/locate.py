@@ -20,10 +20,13 @@ from mbd.kernel.fields import (
     STICK_BRIEF,
     WATCH,
 )
-from mbd.kernel.guards import frictions_at, gap_tolerance, guard_value, hermite, is_watched, judge, try_step
+from mbd.kernel.guards import frictions_at, gap_tolerance, guard_value, is_watched, judge, try_step
+from mbd.kernel.hermite import first_guess
 
 __all__ = ["locate"]
 
+MOST_HALVINGS = 12
+"""How often a step is halved to see a friction slide, or a contact part, that has just begun to [-]."""
 SAME = 1e-9
 """Events closer than this part of the way to the first are one event."""
 
@@ -173,19 +176,21 @@ def guard_rate(K: Any, kind: int, index: int) -> float:
     return 0.0
 
 
-def first_guess(f_low: float, f_high: float, d_low: float, d_high: float) -> float:
-    """Fraction at which the cubic Hermite interpolant from f_low > 0 to f_high < 0 is zero; d: rates times width."""
-    if d_low == 0.0 and d_high == 0.0:
-        return f_low / (f_low - f_high)
-    low = 0.0
-    high = 1.0
-    for _ in range(40):
-        middle = 0.5 * (low + high)
-        if hermite(f_low, f_high, d_low, d_high, middle) > 0.0:
-            low = middle
-        else:
-            high = middle
-    return 0.5 * (low + high)
+def find_way(K: Any, kind: int, index: int, high: float) -> float:
+    """Distance at which what began just now, sliding or parting, is seen by shorter steps than one that misses it.
+
+    0 if none sees it; − status if a step fails.
+    """
+    tiny = gap_tolerance(K, index) if kind == CLOSE else 0.0
+    low = high
+    for _ in range(MOST_HALVINGS):
+        low *= 0.5
+        status = try_step(K, low, K.clock[NOW] + low)
+        if status != 0:
+            return -float(status)
+        if guard_value(K, kind, index, K.clock[NOW] + low) > tiny:
+            return low
+    return 0.0
 
 
 def bracket(K: Any, kind: int, index: int, low: float, high: float) -> int:
@@ -210,6 +215,13 @@ def bracket(K: Any, kind: int, index: int, low: float, high: float) -> int:
     else:
         stay(K)
     f_low = guard_value(K, kind, index, t + low)
+    if f_low <= 0.0 and (kind == STICK or kind == CLOSE):
+        low = find_way(K, kind, index, high)
+        if low < 0.0:
+            return int(-low)
+        if low == 0.0:
+            stay(K)
+        f_low = guard_value(K, kind, index, t + low)
     if f_low <= 0.0:
         if (kind == OPEN_GAP or kind == OPEN_FORCE) and K.guards0[K.n_contacts + index] < 0.0:
             K.pick[2] = high  # a touch too short to be seen within the step: it is over at its end

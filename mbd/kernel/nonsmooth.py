@@ -30,7 +30,8 @@ from mbd.kernel.fields import (
 from mbd.kernel.guards import frictions_at, gap_scale, gap_tolerance, is_watched, watch
 from mbd.kernel.hooks import call
 from mbd.kernel.restart import evaluate
-from mbd.kernel.switching import STILL, close_by_impact, log_event, mark_touching
+from mbd.kernel.settle import STILL, log_event
+from mbd.kernel.switching import close_by_impact, mark_touching
 
 __all__ = ["lands", "lets_go", "rebound", "strike"]
 

@@ -12,6 +12,9 @@ __all__ = ["find_dependent", "spread"]
 DEPENDENCE = 1e-9
 """What is left of a row beside the earlier ones, relative, below which it depends on them [-]."""
 
+LEAST_SHARE = 1e-4
+"""Part of the largest limit of friction that even one without load counts as, where several hold together [-]."""
+
 
 def find_dependent(K: Any, m: int) -> None:
     """Mark rows among the m in K.rows that depend on earlier ones in K.dropped, with B_d = C B_kept in K.mix.
@@ -65,27 +68,46 @@ def find_dependent(K: Any, m: int) -> None:
             K.mix[row * K.n_rows + K.columns[i]] = value / K.lower[i * K.n_rows + i]
 
 
+def share(K: Any, row: int, largest: float) -> float:
+    """Size W by which a multiplier counts: parallel frictions then share their load in the ratio of their limits."""
+    f = K.row_friction[row]
+    if f < 0 or largest == 0.0:
+        return 1.0
+    return float(max(K.limit[f] / largest, LEAST_SHARE))
+
+
 def spread(K: Any, lam: Any) -> None:
-    """The multipliers of least norm with the same forces: λ_d = y, λ_kept = μ − Cᵀ y, (1 + C Cᵀ) y = C μ."""
+    """The multipliers of least norm with the same forces: λ_d = y, λ_kept = μ − Cᵀ y.
+
+    (W_d⁻¹ + C W⁻¹ Cᵀ) y = C W⁻¹ μ, with W of `share`.
+    """
     count = 0
     for d in range(K.n_rows):
         if K.dropped[d] == 1:
             K.columns[count] = d
             count += 1
+    if count == 0:
+        return
+    largest = 0.0
+    for f in range(K.n_frictions):
+        largest = max(largest, K.limit[f])
     for i in range(K.n_rows):
         if K.dropped[i] == 0:
             for d in range(count):
                 lam[i] += K.mix[K.columns[d] * K.n_rows + i] * lam[K.columns[d]]
     for a in range(count):
         K.rhs[a] = 0.0
-        for i in range(K.n_rows):
-            K.rhs[a] += K.mix[K.columns[a] * K.n_rows + i] * lam[i] if K.dropped[i] == 0 else 0.0
         for b in range(count):
-            product = 1.0 if a == b else 0.0
-            for i in range(K.n_rows):
-                product += K.mix[K.columns[a] * K.n_rows + i] * K.mix[K.columns[b] * K.n_rows + i]
-            K.kkt[a * count + b] = product
-    if count == 0 or factor(K.kkt, count, K.pivots) != 0:
+            K.kkt[a * count + b] = 1.0 / share(K, K.columns[a], largest) if a == b else 0.0
+        for i in range(K.n_rows):
+            left = K.mix[K.columns[a] * K.n_rows + i]
+            if K.dropped[i] == 1 or left == 0.0:
+                continue
+            left /= share(K, i, largest)
+            K.rhs[a] += left * lam[i]
+            for b in range(count):
+                K.kkt[a * count + b] += left * K.mix[K.columns[b] * K.n_rows + i]
+    if factor(K.kkt, count, K.pivots) != 0:
         return
     solve(K.kkt, count, K.pivots, K.rhs)
     for d in range(count):

@@ -216,6 +216,8 @@ def solve_rows(K: Any, m: int, dropping: bool) -> int:
     if rank < size:
         find_dependent(K, m)
         spread(K, K.impulse)
+    elif dropping:
+        find_dependent(K, 0)
     return 0
 
 
@@ -232,10 +234,17 @@ def consistent(K: Any, t: float, q: Any, y: Any) -> int:
             status = solve_rows(K, stepping_rows(K), False)
     if K.state[N_DROPPED] > 0:
         spread(K, K.impulse)
+    if status == 0 and K.n_frictions > 0:
+        find_sliding_friction(K)
+    return status
+
+
+def find_sliding_friction(K: Any) -> None:
+    """Friction that slides follows the multipliers of the held rows in K.impulse."""
+    evaluate_loaded(K, K.impulse)
     for f in range(K.n_frictions):
         if K.slip[f] != 0.0:
-            K.impulse[K.friction_row[f]] = K.lam[K.friction_row[f]]
-    return status
+            K.impulse[K.friction_row[f]] = K.slip[f] * limit_of(K, f)
 
 
 def load_accelerations(K: Any) -> None:

@@ -1,22 +1,16 @@
-"""What an event does: contacts close by impact, open by their rules, and settle on forces that push."""
+"""What an event does: contacts close by impact, open by their rules; frictions stick and slip."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from mbd.kernel.complementarity import complementarity
 from mbd.kernel.fields import (
     BLOCKED,
     CLOSE,
     CROSS,
-    EVENTS,
     LOG_CLOSED,
     LOG_OPENED,
-    LOG_SLIPPED,
-    LOG_STUCK,
-    LOGGED,
     NO_FORCE,
-    NO_IMPACT,
     NOW,
     OPEN_FORCE,
     OPEN_PULL,
@@ -24,164 +18,14 @@ from mbd.kernel.fields import (
     PRESS,
     SLIP,
     STICK,
-    STORED,
     WATCH,
 )  # fmt: skip
 from mbd.kernel.guards import gap_scale, is_watched
 from mbd.kernel.impact import impact
-from mbd.kernel.restart import active_rows, capture, evaluate, row_speed, solve_rows
+from mbd.kernel.restart import capture, evaluate
+from mbd.kernel.settle import STILL, log_event
 
-__all__ = ["log_event", "settle", "switch"]
-
-STILL = 1e-9
-"""Speed [m/s, rad/s] of a gap or along a friction that counts as none."""
-
-
-def log_event(K: Any, kind: int, index: int, loss: float, struck: bool) -> None:
-    """One line of the event log: t, kind, index, energy loss, row of results, impulses of its rows if it struck."""
-    o = K.state[LOGGED] * K.event_width
-    K.log[o] = K.clock[NOW]
-    K.log[o + 1] = float(kind)
-    K.log[o + 2] = float(index)
-    K.log[o + 3] = loss
-    K.log[o + 4] = float(K.state[STORED])
-    for k in range(K.n_rows):
-        K.log[o + 5 + k] = 0.0 - K.impulse[k] if struck and K.row_contact[k] == index else 0.0
-    K.state[LOGGED] += 1
-    K.counts[EVENTS] += 1
-
-
-def settle(K: Any) -> int:
-    """Consistent accelerations and multipliers; contacts that would pull open, touching ones that press close.
-
-    Frictions that do not move stick or begin to slide.
-    """
-    find_slips(K)
-    evaluate(K, K.clock[NOW], K.q, K.y)
-    for k in range(K.n_rows):
-        K.impulse[k] = K.lam[k]
-    for c in range(K.n_contacts):
-        K.active[c] = 1 if (K.closed[c] == 1 and K.kind[c] == 0) else 0
-        K.free[c] = 0
-        if K.kind[c] == 0:
-            if (K.closed[c] == 1 and K.opens[c] == 0) or (K.closed[c] == 0 and K.touched[c] == 1):
-                K.free[c] = 1
-    status = complementarity(K, 0)
-    if status == NO_IMPACT or status == 0:
-        jammed = find_jammed(K)
-        if jammed >= 0:
-            K.state[BLOCKED] = jammed
-            return NO_FORCE
-    if status != 0:
-        return status
-    for i in range(K.n):
-        K.rate[i] = K.jump[i]
-    for k in range(K.n_rows):
-        K.lam[k] = K.impulse[k]
-    for c in range(K.n_contacts):
-        K.touched[c] = 0
-        if K.kind[c] == 0 and K.active[c] != K.closed[c]:
-            K.closed[c] = K.active[c]
-            if K.active[c] == 1:
-                capture(K, c)
-                log_event(K, LOG_CLOSED, c, 0.0, False)
-            else:
-                K.armed[c] = 1
-                log_event(K, LOG_OPENED, c, 0.0, False)
-        K.active[c] = 0
-    for f in range(K.n_frictions):
-        c = K.friction_contact[f]
-        if c >= 0 and K.closed[c] == 0:
-            K.sticks[f] = 0
-            K.slip[f] = 0.0
-        now = frictional_state(K, f)
-        if now != K.was[f]:
-            if now == 2:
-                log_event(K, LOG_STUCK, f, 0.0, False)
-            elif now != 0 and K.was[f] != 0:
-                log_event(K, LOG_SLIPPED, f, 0.0, False)
-            K.was[f] = now
-    return 0
-
-
-def frictional_state(K: Any, f: int) -> int:
-    """0 off, 2 sticking, ±1 sliding."""
-    if K.sticks[f] == 1:
-        return 2
-    return int(K.slip[f])
-
-
-def find_slips(K: Any) -> None:
-    """Which frictions slide, by their velocity, and which may choose; K.loose tells what an event has found out.
-
-    On entry K.loose[f] is 0, 2 where an event found the velocity to be zero, 3 where it found that it must slide.
-    """
-    if K.n_frictions == 0:
-        return
-    evaluate(K, K.clock[NOW], K.q, K.y)
-    for f in range(K.n_frictions):  # its direction is that at the point of now, unless it is held already
-        c = K.friction_contact[f]
-        if c >= 0 and (K.closed[c] == 0 or K.sticks[f] == 0):
-            capture(K, c)
-    evaluate(K, K.clock[NOW], K.q, K.y)
-    for f in range(K.n_frictions):
-        c = K.friction_contact[f]
-        told = K.loose[f]
-        K.loose[f] = 0
-        if c >= 0 and K.closed[c] == 0 and K.touched[c] == 0:
-            K.sticks[f] = 0
-            K.slip[f] = 0.0
-            continue
-        gamma = row_speed(K, K.friction_row[f])
-        if told == 3:
-            continue
-        if told == 2 or abs(gamma) <= STILL * max(1.0, 1e-2 * K.scale[K.n + K.n_rows + K.friction_row[f]]):
-            K.loose[f] = 1
-            K.sticks[f] = 1
-            K.slip[f] = 0.0
-        else:
-            K.sticks[f] = 0
-            K.slip[f] = 1.0 if gamma > 0.0 else -1.0
-
-
-def find_jammed(K: Any) -> int:
-    """A contact that slides so that pushing on it makes it approach: no force or several are consistent; −1 if none.
-
-    ``dg̈/dp = B_n K⁻¹ (B_n − μ s B_T)ᵀ ≤ 0`` with the other rows held (Painlevé 1895; Génot & Brogliato 1999,
-    Eur. J. Mech. A 18:653). K.jump and K.impulse are kept.
-    """
-    n = K.n
-    o_R = n * n + n
-    o_B = o_R + n * K.n_rows
-    for f in range(K.n_frictions):
-        c = K.friction_contact[f]
-        if c < 0 or K.sticks[f] == 1 or K.slip[f] == 0.0 or K.loose[f] == 1 or K.closed[c] == 0:
-            continue
-        normal = K.normal[c]
-        for i in range(n):
-            K.trial_jump[i] = K.jump[i]
-            K.force[i] = -K.acc[o_R + i * K.n_rows + normal]
-        for k in range(K.n_rows):
-            K.trial[k] = K.impulse[k]
-            K.bias[k] = 0.0
-        before = K.active[c]
-        K.active[c] = 1
-        K.parting[c] = 1
-        status = solve_rows(K, active_rows(K, K.active), True)
-        K.parting[c] = 0
-        K.active[c] = before
-        gained = 0.0
-        size = 0.0
-        for j in range(n):
-            gained += K.acc[o_B + normal * n + j] * K.jump[j]
-            size = max(size, abs(K.acc[o_B + normal * n + j] * K.jump[j]))
-        for i in range(n):
-            K.jump[i] = K.trial_jump[i]
-        for k in range(K.n_rows):
-            K.impulse[k] = K.trial[k]
-        if status == 0 and gained <= 1e-10 * size:
-            return int(c)
-    return -1
+__all__ = ["switch"]
 
 
 def gather_closing(K: Any) -> float:

@@ -36,6 +36,7 @@ class Facts:
     coordinate_count : how many of them belong to q
     contacts : in the order of the columns of `closed`
     segments : (body, (frame, …)) lines of the stick figure, whose points are the results 'body.frame'
+    frictions : (name, unit) of the dry frictions of joints, 'N' or 'N m'
     """
 
     model: str = ""
@@ -43,6 +44,7 @@ class Facts:
     coordinate_count: int = 0
     contacts: tuple[ContactFacts, ...] = ()
     segments: tuple[tuple[str, tuple[str, ...]], ...] = ()
+    frictions: tuple[tuple[str, str], ...] = ()
 
     @classmethod
     def of(cls, equations: Equations) -> Facts:
@@ -57,6 +59,11 @@ class Facts:
                 for contact, place in zip(equations.contacts, _places(equations), strict=True)
             ),
             tuple((body, tuple(frames)) for body, frames in figure if body != "ground"),
+            tuple(
+                (friction.name, "N m" if equations.rows[friction.row].unit == "rad" else "N")
+                for friction in equations.frictions
+                if friction.contact < 0
+            ),
         )
 
     @classmethod
@@ -68,6 +75,7 @@ class Facts:
             data["coordinate_count"],
             tuple(ContactFacts(**contact) for contact in data["contacts"]),
             tuple((body, tuple(frames)) for body, frames in data["segments"]),
+            tuple((name, unit) for name, unit in data.get("frictions", ())),
         )
 
     def as_json(self) -> dict[str, Any]:

@@ -28,8 +28,9 @@ class EventRecord:
     Parameters
     ----------
     time : instant [s]
-    kind : 'closed' or 'opened' (a contact), 'event' (a user's own, or a fall)
-    name : of the contact or event
+    kind : 'closed' or 'opened' (a contact), 'stuck' or 'slipped' (dry friction comes to rest; begins to slide or turns
+        around), 'event' (a user's own, or a fall)
+    name : of the contact, joint or event
     impulse : impulses of the contact's rows at the instant, normal first, pushing ≥ 0 [N s or N m s]
     energy_loss : kinetic energy taken by the impulses of this contact, −½ Σ Λ (γ⁻ + γ⁺) over its rows [J]
     row : the stored row just after it (the right side); the row before is the left side

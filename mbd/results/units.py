@@ -27,6 +27,8 @@ def unit(name: str, facts: Facts) -> str:
     contact = next((item for item in facts.contacts if item.name == stem), None)
     if contact is not None and last == "gap":
         return contact.unit
+    if last == "friction" and stem in dict(facts.frictions):
+        return dict(facts.frictions)[stem]
     if contact is not None and last == "force":
         return "N m" if contact.unit == "rad" else "N"
     if last in ("rate", "acceleration"):

@@ -33,7 +33,10 @@ class Violation:
 
 
 def violation(columns: ModelColumns) -> Violation:
-    """max |h| and max |ḣ| over the stored rows, each constraint row only while it is active."""
+    """max |h| and max |ḣ| over the stored rows, each constraint row only while it is active.
+
+    Rows of dry friction are left out: they hold only while it sticks, which rows of results do not tell.
+    """
     rows = columns.equations.rows
     if not rows:
         return Violation()
@@ -41,6 +44,8 @@ def violation(columns: ModelColumns) -> Violation:
     largest: dict[str, float] = {}
     fastest, worst, highest = 0.0, "", -1.0
     for number, row in enumerate(rows):
+        if row.friction >= 0:
+            continue
         active = columns.record.closed[:, row.contact].astype(bool) if row.contact >= 0 else np.True_
         size = float(np.max(np.abs(values[number]), initial=0.0, where=active))
         size = 0.0 if row.is_velocity else size

@@ -137,8 +137,8 @@ def explanation(
         return f"{where}: {_clashing(stepper, status)}{with_closed}; leave one out, or hold fewer contacts closed"
     if status == F.ENERGY_GAIN:
         return (
-            f"{where}: the impact law would create energy{with_closed}: restitution where a contact also sticks "
-            "(Kane's paradox); use friction=0 or restitution=0 there"
+            f"{where}: the impact law would create energy{with_closed}, and Stronge's in its place as well: a "
+            "restitution above 1 does; use one from 0 to 1"
         )
     if status == F.NO_FORCE:
         name = stepper.manager.names[int(values["state"][F.BLOCKED])]

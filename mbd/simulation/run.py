@@ -144,7 +144,8 @@ class Run:
             target = v["while_target"][c]
             watched = (True, v["closed"][target] == 1, guards[3 * n_contacts + c] > 0.0)[v["while_kind"][c]]
             ready = v["armed"][c] == 1 and watched
-            still = all(abs(rates[row]) <= 1e-9 for row in self.manager.contacts[c].rows)
+            held = [row for row in self.manager.contacts[c].rows if self.mechanism.equations.rows[row].friction < 0]
+            still = all(abs(rates[row]) <= 1e-9 for row in held)
             v["touched"][c] = int(ready and v["kind"][c] == 0 and close and slow and still)
             if ready and v["closed"][c] == 0 and guards[c] < -BELOW:
                 contact = self.manager.contacts[c]

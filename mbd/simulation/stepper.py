@@ -127,15 +127,15 @@ class Stepper:
             "work": 3 * size, "force": n, "bias": rows, "jump": n, "impulse": rows,
             "guards0": v["n_watched"], "guards1": v["n_watched"], "scale": n + 2 * rows,
             "deepest": contacts, "sinking": contacts, "side": guards, "pick": 8, "detail": 8,
-            "slip": frictions, "limit": frictions, "base_limit": frictions, "given": rows, "total": rows,
-            "total_jump": n, "loads": rows, "before": contacts, "past": rows, "past_limit": frictions,
-            "trial": rows, "trial_given": rows, "trial_jump": n,
+            "slip": frictions, "limit": frictions, "base_limit": frictions, "lean": frictions, "typical": n,
+            "given": rows, "total": rows, "total_jump": n, "loads": rows, "before": contacts, "past": rows,
+            "past_limit": frictions, "trial": rows, "trial_given": rows, "trial_jump": n,
             "store": v["capacity"] * v["width"], "log": v["event_capacity"] * v["event_width"],
         }  # fmt: skip
         integers = {
             "unit": n, "notify": contacts + guards + frictions, "closed": contacts,
             "armed": contacts, "touched": contacts, "active": contacts + guards + frictions, "free": contacts,
-            "closing": contacts, "parting": contacts, "trial_free": contacts, "sticks": frictions, "loose": frictions,
+            "closing": contacts, "parting": contacts, "sticks": frictions, "loose": frictions,
             "was": frictions, "mode_key": MODE_CAPACITY * (contacts + rows + frictions), "dropped": rows,
             "mode_code": 2 * MODE_CAPACITY,
             "mode_count": 1, "rows": rows,
@@ -150,6 +150,7 @@ class Stepper:
         for name, table in manager.tables().items():
             v[name] = table if len(table) else np.zeros(1, dtype=table.dtype)
         v["sinking"][:] = np.inf
+        v["was"][:] = F.UNKNOWN
         v["unit"] = unit_blocks(self.mechanism)
         v["row_unit"] = np.append(row_units(self.mechanism), 2)
         v["params"] = np.ascontiguousarray(parameters, dtype=float) if len(parameters) else np.zeros(1)

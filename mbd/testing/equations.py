@@ -92,6 +92,8 @@ def _inertia(findings: Findings, equations: Equations, point: Point) -> None:
 
 def _effects(findings: Findings, equations: Equations, point: Point) -> None:
     v = _speeds(equations, point)
+    for friction in equations.frictions:  # its multiplier opposes the motion, as where it slides
+        point = point | {("lam", friction.row): 0.7 * float(np.sign(at([friction.rate], point)[0]))}
     for effect in equations.effects:
         force = at(list(effect.generalized()), point)[: equations.n_v]
         if effect.potential is not None:

@@ -41,6 +41,8 @@ def check_loss(loss: Loss | Callable[[], Loss], *, rates: int = 60, fastest: flo
         findings.where = f"rate {rate!r} (seed {seed})"
         _power(findings, made, rate, fastest)
         _tangent(findings, made, rate)
+    findings.where = f"seed {seed}"
+    _dry(findings, made, rng)
     return findings.verdict()
 
 
@@ -51,9 +53,39 @@ def force_at(loss: Loss, rate: float) -> float:
     return scope.value(loss.force(v, scope, OWNER), given={v: rate})[0]
 
 
+def dry_at(loss: Loss, load: float) -> float:
+    """What truly sticks, at a force in the joint [N or N m]."""
+    scope = FreeScope()
+    value = scope.tape.input("lam", 0)
+    return scope.value(loss.dry(value, scope, OWNER), given={value: load})[0]
+
+
+def _dry(findings: Findings, loss: Loss, rng: np.random.Generator) -> None:
+    """Set-valued friction has a limit ≥ 0 that grows in proportion to the force in the joint, or not at all."""
+    rest = dry_at(loss, 0.0)
+    law = "dry friction has a limit ≥ 0"
+    for load in map(float, 10.0 ** rng.uniform(-3.0, 4.0, 8)):
+        limit = dry_at(loss, load)
+        sentence = f"expected dry ≥ 0, found {limit:.6g} at a force of {load:.6g} N"
+        findings.holds(law, limit >= 0.0, sentence, "a negative limit feeds energy in; give the size of the friction")
+        doubled = dry_at(loss, 2.0 * load)
+        hint = "a constant, or a constant times the force: the balance is solved for friction of that form"
+        findings.equal(
+            "dry friction follows the force in proportion", "dry(2 N)", doubled, 2.0 * limit - rest, hint, 1e-12
+        )
+        again = dry_at(loss, load)
+        findings.equal(
+            "determinism of dry friction", "dry asked again", again, limit, "it may depend on its load alone", 0.0
+        )
+        if not loss.needs_reaction:
+            hint = "needs_reaction must be True, so that the joint is cut and its rows carry the force"
+            findings.equal("a limit that follows the force asks for it", "dry", limit, rest, hint, 0.0)
+
+
 def _declared(findings: Findings, loss: Loss) -> None:
     scope = FreeScope()
     loss.force(scope.tape.input("v", 0), scope, OWNER)
+    loss.dry(scope.tape.input("lam", 0), scope, OWNER)
     law = "parameters are declared before they are used"
     hint = "fields() must name every scope.parameter(owner, field, value) with the same value"
     declared = loss.parameters(OWNER)

@@ -142,13 +142,15 @@ def random_loop(seed: int, bars: int = 3) -> tuple[mbd.Model, dict[str, float]]:
 def random_scene(seed: int, bodies: int = 3) -> mbd.Model:
     """A planar tree over the ground with feet, bumpers, stops, losses and springs, all contacts open at the start.
 
-    Feet stick, slide or bounce; bumpers are penalties; stops limit joints of one coordinate.
+    Feet stick, slide, rub or bounce; bumpers are penalties; stops limit joints of one coordinate.
     """
     rng = random.Random(seed)
     model = random_tree(seed, bodies, spatial=False, turned=0.2)
     for place, joint in enumerate(model.joints):
         if isinstance(joint, mbd.Revolute | mbd.Prismatic):
-            loss = rng.choice([None, mbd.Viscous(0.3), mbd.Quadratic(0.2), mbd.Coulomb(0.5, smoothing=0.1)])
+            loss = rng.choice(
+                [None, mbd.Viscous(0.3), mbd.Quadratic(0.2), mbd.Coulomb(0.5, smoothing=0.1), mbd.Coulomb(0.5)]
+            )
             stiffness = rng.choice([0.0, rng.uniform(1.0, 30.0)])
             model.joints[place] = replace(joint, loss=loss, stiffness=stiffness)
     stopped = [joint for joint in model.joints if len(joint.labels) == 1]
@@ -167,6 +169,7 @@ def random_scene(seed: int, bodies: int = 3) -> mbd.Model:
         kinds: list[Any] = [
             lambda name, foot=foot: mbd.Unilateral(name, foot),
             lambda name, foot=foot: mbd.Unilateral(name, foot, restitution=0.6, friction=0.0),
+            lambda name, foot=foot: mbd.Unilateral(name, foot, restitution=0.3, friction=0.4),
             lambda name, foot=foot: mbd.Penalty(name, foot, stiffness=1e4, damping=20.0, release="pull"),
         ]
         model.constrain(rng.choice(kinds)(f"{body.name} foot"))

@@ -20,7 +20,7 @@ __all__ = ["Point", "at", "block", "derivative", "inputs", "moved", "placed", "s
 
 
 def inputs(equations: Equations, seed: int = 0, x: float = 0.0, spread: float = 1.0) -> Point:
-    """A random value for every input; parameters at their values, every penalty switched on.
+    """A random value for every input; parameters at their values, every penalty switched on, no dry friction.
 
     x : size of the local increments; spread : of the coordinates
     """
@@ -36,6 +36,8 @@ def inputs(equations: Equations, seed: int = 0, x: float = 0.0, spread: float = 
     found |= {("x", k): float(value) for k, value in enumerate(rng.uniform(-1, 1, equations.n_v) * x)}
     found |= {("p", k): parameter.value for k, parameter in enumerate(equations.parameters)}
     found |= {("switch", k): 1.0 for k in range(len(equations.contacts))}
+    found |= {("slip", k): 0.0 for k in range(len(equations.frictions))}
+    found |= {("lam", friction.row): 0.0 for friction in equations.frictions}
     return found
 
 

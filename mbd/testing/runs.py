@@ -6,12 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from mbd.equations.equations import Contact, Equations
+from mbd.equations.equations import Contact, Equations, Friction
 from mbd.testing.findings import Findings
 
 __all__ = ["run_laws"]
 
 ROUND_OFF = 1e-8
+FRICTION = 1e-6
+"""What the multipliers of a step may miss of the law of friction, relative to the largest of that instant."""
 LEDGER = 1e-2
 """Largest share of the energy's swing that the books may miss at the step of a check; a missing work is of size 1."""
 
@@ -23,6 +25,8 @@ def run_laws(findings: Findings, run: Any, equations: Equations) -> None:
     for k, contact in enumerate(equations.contacts):
         _complementarity(findings, run, contact, flags[:, k], before)
         _impacts(findings, run, contact, before)
+    for friction in equations.frictions:
+        _friction(findings, run, friction, before)
     findings.where = before
     if equations.rows:
         _held(findings, run)
@@ -66,6 +70,28 @@ def _complementarity(findings: Findings, run: Any, contact: Contact, closed: Any
     sentence = f"{title} is closed with a gap of {gap[row]:.6g} {contact.unit}"
     stays = bool(np.all(np.abs(gap[closed]) <= ROUND_OFF))
     findings.holds("a closed contact stays closed", stays, sentence, "the rows must hold the gap at zero")
+
+
+def _friction(findings: Findings, run: Any, friction: Friction, where: str) -> None:
+    """|λ_T| ≤ limit, against the motion, and none where its contact is open."""
+    columns, record = run.columns, run.columns.record
+    rate, limit = (np.broadcast_to(value, run.time.shape) for value in columns.evaluate([friction.rate, friction.limit],
+                                                                                        columns.rows))  # fmt: skip
+    along = record.lam[:, friction.row]
+    on = record.closed[:, friction.contact].astype(bool) if friction.contact >= 0 else np.ones(len(along), dtype=bool)
+    size = 1.0 + np.max(np.abs(record.lam), axis=1, initial=0.0)
+    limit = np.where(on, limit, 0.0)
+    wrong = np.abs(along) > limit + FRICTION * size
+    row = _instant(findings, where, run, wrong)
+    sentence = f"'{friction.name}' rubs with {along[row]:.6g} of at most {limit[row]:.6g}"
+    hint = "the friction of a contact is at most μ times its force, and none where it is open"
+    findings.holds("friction stays within its limit", not wrong.any(), sentence, hint)
+    wrong = along * rate < -FRICTION * size
+    row = _instant(findings, where, run, wrong)
+    sentence = f"'{friction.name}' drives with {-along[row] * rate[row]:.6g} W at a speed of {rate[row]:.6g}"
+    findings.holds(
+        "friction opposes sliding", not wrong.any(), sentence, "its rate must be the one that it slides with"
+    )
 
 
 def _impacts(findings: Findings, run: Any, contact: Contact, where: str) -> None:

@@ -92,10 +92,10 @@ def _legend(axes: Any, count: int) -> None:
 
 
 def _mark(axes: Any, run: Trajectory) -> None:
-    """A thin line where a contact closed or a user's event happened."""
+    """A thin line where a contact closed, friction stuck or slipped, or a user's event happened."""
     marked = [event for event in run.events if event.kind != "opened"]
     for event in marked if len(marked) <= MANY else ():
-        shade = color(event.name) if event.kind == "closed" else "black"
+        shade = "black" if event.kind == "event" else color(event.name)
         axes.axvline(event.time, color=shade, linewidth=0.7, alpha=0.35, linestyle=":", zorder=0.5)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import mbd
+from mbd.compile.mechanisms import mechanism_of
 from mbd.equations.equations import Contact
 from mbd.testing import LawBroken, check_constraint, check_model
 from mbd.testing.findings import Findings
@@ -177,7 +178,7 @@ def told(gap, force, closed, kind="unilateral", opens_on="pull", impulse=0.0, lo
     )  # fmt: skip
     contact = Contact("foot", kind, Any, Any, opens_on=opens_on)  # type: ignore[arg-type]
     findings = Findings("a run", "here")
-    run_laws(findings, run, SimpleNamespace(contacts=[contact], rows=()))  # type: ignore[arg-type]
+    run_laws(findings, run, SimpleNamespace(contacts=[contact], rows=(), frictions=()))  # type: ignore[arg-type]
     return findings
 
 
@@ -221,5 +222,31 @@ def test_energy_that_no_effect_tells_is_caught():
         kinetic=np.array([0.0, 1.0]), potential=np.zeros(2), numerical=np.array([0.0, 0.1]), parts=[]
     ), columns=SimpleNamespace(record=SimpleNamespace(closed=np.zeros((2, 0)))), events=[],
        violation=SimpleNamespace(length=1e-3, angle=0.0, worst="rod"))  # fmt: skip
-    run_laws(findings, run, SimpleNamespace(contacts=[], rows=(1,)))  # type: ignore[arg-type]
+    run_laws(findings, run, SimpleNamespace(contacts=[], rows=(1,), frictions=()))  # type: ignore[arg-type]
     assert set(findings.broken) == {"energy books close", "rows hold along the run"}
+
+
+@pytest.mark.parametrize(
+    ("law", "wrong"),
+    [
+        ("friction stays within its limit", lambda friction: replace(friction, limit=0.5 * friction.limit)),
+        ("friction opposes sliding", lambda friction: replace(friction, rate=-friction.rate)),
+    ],
+)
+def test_friction_beyond_its_law_is_caught(law, wrong):
+    """A real run, judged by half its limit, or by sliding the other way."""
+    model = mbd.Model("block")
+    body = mbd.PointMass("block", mass=1.0)
+    model.connect(mbd.Translation("place", model.ground.origin, body.origin))
+    model.constrain(mbd.Unilateral("foot", mbd.touchdown(body.origin), friction=0.3))
+    start = mbd.assemble(model, velocity={"place.x": 1.0}, closed="foot")
+    run = mbd.simulate(model, start, mbd.HHT(0.05), dt=0.01, until=0.2)
+    equations = mechanism_of(model).equations
+    right = Findings("right")
+    run_laws(right, run, equations)
+    assert law in right.verdict().laws
+    findings = Findings("wrong")
+    run_laws(findings, run, replace(equations, frictions=tuple(wrong(each) for each in equations.frictions)))
+    with pytest.raises(LawBroken) as caught:
+        findings.verdict()
+    assert set(caught.value.laws) == {law}

@@ -279,6 +279,54 @@ class Moody(Own):
         return {}
 
 
+@dataclass(frozen=True)
+class Dry(Own):
+    """Friction that sticks, by a function of the force in the joint; it also asks for the joint to be cut, or not."""
+
+    cuts: bool = True
+
+    @property
+    def needs_reaction(self):
+        return self.cuts
+
+    def force(self, rate, scope, owner):
+        return 0.0
+
+    def dry(self, load, scope, owner):
+        return self.function(load) * scope.parameter(owner, "coefficient", self.coefficient)
+
+
+class MoodyDry(Dry):
+    """Its limit grows each time it is asked."""
+
+    def dry(self, load, scope, owner):
+        COUNT.append(1)
+        return super().dry(load, scope, owner) * (1.0 + 1e-3 * len(COUNT))
+
+
+DRY = {
+    "dry friction has a limit ≥ 0": (lambda: Dry(lambda load: 1.0 - load), "expected dry ≥ 0, found -"),
+    "dry friction follows the force in proportion": (
+        lambda: Dry(lambda load: load * load),
+        "a constant times the force",
+    ),
+    "determinism of dry friction": (lambda: MoodyDry(lambda load: load), "may depend on its load alone"),
+    "a limit that follows the force asks for it": (lambda: Dry(lambda load: load, 0.5, False), "needs_reaction"),
+}
+
+
+@pytest.mark.parametrize("law", DRY)
+def test_wrong_friction_that_sticks_is_caught(law):
+    make, reason = DRY[law]
+    with pytest.raises(LawBroken, match=reason) as caught:
+        check_loss(make)
+    assert law in caught.value.laws
+
+
+def test_friction_of_ones_own_that_sticks_passes():
+    assert "dry friction has a limit ≥ 0" in check_loss(Dry(lambda load: 2.0 + 0.1 * load)).laws
+
+
 def of_inputs_only(rate):
     """It asks whether the rate is an input, and forgets the sign of any other."""
     return rate if rate.op == "input" else -rate

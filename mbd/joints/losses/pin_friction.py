@@ -34,12 +34,12 @@ class PinFriction(Loss):
 
     @property
     def needs_reaction(self) -> bool:
-        """True."""
-        return True
+        """Whether there is any: without, the joint need not be cut."""
+        return self.mu != 0.0 and self.radius != 0.0
 
     def fields(self) -> dict[str, float]:
-        """`mu` and `radius`."""
-        return {"mu": self.mu, "radius": self.radius}
+        """`mu` and `radius`; nothing where one is 0 and the joint is not cut, so that a run cannot change it."""
+        return {"mu": self.mu, "radius": self.radius} if self.needs_reaction else {}
 
     def force(self, rate: Scalar, scope: Scope, owner: str) -> Scalar:
         """0: all of it sticks."""
@@ -47,5 +47,7 @@ class PinFriction(Loss):
 
     def dry(self, load: Scalar, scope: Scope, owner: str) -> Scalar:
         """μ r N."""
+        if not self.needs_reaction:
+            return 0.0
         mu, radius = (scope.parameter(owner, field, value) for field, value in self.fields().items())
         return mu * radius * load

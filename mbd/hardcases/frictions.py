@@ -1,0 +1,237 @@
+"""Dry friction in a joint (a4), friction that follows the force in a pin (a4c), and a rod that jams (j13)."""
+
+from __future__ import annotations
+
+import math
+from functools import cache, partial
+from typing import Any
+
+import numpy as np
+
+from mbd.assembly import assemble
+from mbd.bodies import Link, RigidBody
+from mbd.constraints import Unilateral, touchdown
+from mbd.hardcases.case import Curve, Figure, HardCase, Outcome, definition, reference
+from mbd.joints import Planar, Revolute
+from mbd.joints.losses import Coulomb, Loss, PinFriction
+from mbd.model import Model
+from mbd.simulation import simulate
+
+__all__ = ["CASES"]
+
+ORDER = 0.15
+"""How far an observed order may lie from 2."""
+STEPS = 0.01 / 2.0 ** np.arange(3)
+"""Steps over which the errors of turning angles and times are halved [s]."""
+SCHEMES = ("HHT", "HHT-index3", "generalized-alpha", "generalized-alpha-index3", "Newmark")
+
+
+def size(values: Any) -> float:
+    """The largest absolute value; NaN of nothing, and where one is none."""
+    found = np.abs(np.asarray(values, dtype=float))
+    return float(np.max(found)) if found.size else math.nan
+
+
+def numbers(id: str) -> dict[str, Any]:
+    """The definition and the initial conditions of a case."""
+    data = definition(id)
+    return {**data["definition"], **data["initial_conditions"]}
+
+
+def quantity(id: str, beginning: str) -> Any:
+    """The reference quantity whose name begins so."""
+    (name,) = [each["name"] for each in definition(id)["quantities"] if each["name"].startswith(beginning)]
+    return reference(id, name)
+
+
+def order_figures(what: str, errors: list[float], limit: float) -> list[Figure]:
+    """An error over halved steps: small at the last, of order 2 between the last two."""
+    order = math.log2(errors[-2] / errors[-1]) if errors[-1] > 0.0 else math.nan
+    name = what.partition(" [")[0]
+    return [
+        Figure(f"error of {what}, finest step", errors[-1], limit),
+        Figure(f"observed order − 2 of {name} [-]", abs(order - 2.0), ORDER),
+    ]
+
+
+# pendulums ----------------------------------------------------------------------------------------------------------
+@cache
+def pendulum(mass: float, length: float, g: float, loss: Loss) -> Model:
+    """A point mass on a massless rod, with friction in its hinge."""
+    model = Model("pendulum", gravity=(0.0, -g, 0.0))
+    rod = Link("rod", mass=mass, length=length, center=length)
+    model.connect(Revolute("hinge", model.ground.origin, rod.start, loss=loss))
+    return model
+
+
+def swing(model: Model, angle: float, scheme: Any, dt: float, until: float) -> tuple[Any, Any, Any]:
+    """The run of a pendulum let go, and the times and angles at which it turns, with those of its start."""
+    run = simulate(model, assemble(model, position={"hinge.angle": angle}), scheme, dt=dt, until=until)
+    turns = [event for event in run.events if event.kind in ("slipped", "stuck")]
+    times = np.array([run.time[0], *(event.time for event in turns)])
+    angles = run["hinge.angle"][[0, *(event.row for event in turns)]]
+    return run, times, angles
+
+
+def turning_figures(
+    model: Model, angle: float, scheme: Any, wanted: tuple[Any, Any], until: float
+) -> tuple[list[Figure], Any]:
+    """Number, times and angles of turning, over halved steps; the run at the finest."""
+    times, angles = wanted
+    errors: list[tuple[float, float]] = []
+    count = 0
+    run: Any = None
+    for dt in STEPS:
+        run, found, turned = swing(model, angle, scheme, float(dt), until)
+        count = max(count, abs(len(found) - len(times)))
+        same = len(found) == len(times)
+        errors.append((size(found - times), size(turned - angles)) if same else (math.nan, math.nan))
+    figures = [
+        Figure("turning points more or fewer than there are [-]", float(count), 0.0),
+        *order_figures("turning times [s]", [each[0] for each in errors], 5e-4),
+        *order_figures("turning angles [rad]", [each[1] for each in errors], 5e-5),
+    ]
+    return figures, run
+
+
+def friction_figures(run: Any, limit: Any) -> list[Figure]:
+    """Friction within its limit, against the motion, and its loss as its law says.
+
+    limit : the largest friction at every row
+    """
+    friction, rate = run["hinge.friction"], run["hinge.rate"]
+    work = run.energy["hinge friction"]
+    spent = np.concatenate([[0.0], np.cumsum(0.5 * (np.abs(rate) * limit)[1:] * np.diff(run.time))])
+    spent[1:] += np.cumsum(0.5 * (np.abs(rate) * limit)[:-1] * np.diff(run.time))
+    largest = size(limit)
+    return [
+        Figure("friction beyond its limit, relative [-]", float(np.max(np.abs(friction) - limit)) / largest, 1e-9),
+        Figure("power that friction feeds in, relative [-]", float(np.max(friction * rate)) / largest, 1e-9),
+        Figure("loss beside ∫ limit |rate| dt, relative [-]", abs(work[-1] + spent[-1]) / spent[-1], 1e-4),
+        Figure("numerical energy at the finest step, relative [-]", size(run.energy.numerical) / spent[-1], 1e-4),
+    ]
+
+
+def coulomb(id: str, scheme: Any) -> Outcome:
+    """A finite number of swings, then rest away from the vertical, without creep."""
+    given = numbers(id)
+    inertia, weight, torque = given["J"], given["K_mgd"], given["tau_friction"]
+    model = pendulum(inertia, 1.0, weight / inertia, Coulomb(torque))
+    wanted = (quantity(id, "turning times"), quantity(id, "turning angles"))
+    until = float(wanted[0][-1]) + 3.0
+    figures, run = turning_figures(model, given["theta0"], scheme, wanted, until)
+    rest = np.flatnonzero(run.time >= run.events[-1].time)[1:] if run.events else np.zeros(0, dtype=int)
+    angle = run["hinge.angle"][rest]
+    held = run["hinge.friction"][rest]
+    figures += [
+        Figure(
+            "half swings more or fewer than there are [-]", abs(len(run.events) - quantity(id, "number of half")), 0.0
+        ),
+        Figure("creep at rest [rad]", size(angle - angle[0]) if len(angle) else math.nan, 1e-12),
+        Figure("speed at rest [rad/s]", size(run["hinge.rate"][rest]), 1e-9),
+        Figure("error of the angle at rest [rad]", size(angle - quantity(id, "rest angle")), 5e-5),
+        Figure("friction at rest beside the weight's torque [N m]", size(held - weight * np.sin(angle)), 1e-9),
+        *friction_figures(run, np.full(len(run.time), torque)),
+    ]
+    curves = [
+        Curve("angle", run.time, run["hinge.angle"], y_label="angle [rad]"),
+        Curve("friction", run.time, run["hinge.friction"], y_label="torque [N m]"),
+    ]
+    return Outcome(figures, curves)
+
+
+def loaded(id: str, scheme: Any) -> Outcome:
+    """Friction μ r N of the whole force N in the pin, which it is itself a part of."""
+    given = numbers(id)
+    m, L, g, mu, radius = (given[name] for name in ("m", "L", "g", "mu", "pin_radius"))
+    model = pendulum(m, L, g, PinFriction(mu, radius))
+    wanted = (quantity(id, "turning times"), quantity(id, "turning angles"))
+    until = float(wanted[0][-1]) + 0.05
+    figures, run = turning_figures(model, given["theta0"], scheme, wanted, until)
+    force = np.linalg.norm(run["hinge.reaction_force"], axis=-1)
+    figures += friction_figures(run, mu * radius * force)
+    curves = [
+        Curve("angle", run.time, run["hinge.angle"], y_label="angle [rad]"),
+        Curve("force in the pin", run.time, force, y_label="force [N]"),
+    ]
+    return Outcome(figures, curves)
+
+
+# the rod ------------------------------------------------------------------------------------------------------------
+@cache
+def rod(L: float, m: float, g: float, mu: float) -> Model:
+    """A uniform rod along its own x whose lower end slides on the ground."""
+    model = Model("rod", gravity=(0.0, -g, 0.0))
+    body = RigidBody("rod", mass=m, inertia=m * L * L / 12.0)
+    model.connect(Planar("place", model.ground.origin, body.origin))
+    model.constrain(Unilateral("tip", touchdown(body.point(-0.5 * L, 0.0)), friction=mu))
+    return model
+
+
+def slide(id: str, mu: float, speed: float, scheme: Any, *, spin: float = 0.0, until: float = 0.1) -> Any:
+    """The run of the rod pushed along the ground at its angle, whatever comes of it."""
+    given = numbers(id)
+    L, angle = given["L"], given["theta"]
+    model = rod(L, given["m"], given["g"], mu)
+    # the tip stays on the ground: its speed is (speed, 0)
+    start = assemble(
+        model,
+        position={"place.y": 0.5 * L * math.sin(angle), "place.angle": angle},
+        velocity={
+            "place.x": speed - 0.5 * L * spin * math.sin(angle),
+            "place.y": 0.5 * L * spin * math.cos(angle),
+            "place.angle": spin,
+        },
+        closed=["tip"],
+    )
+    return simulate(model, start, scheme, dt=1e-3, until=until, on_failure="return")
+
+
+def push_of(id: str, mu: float, sign: float) -> float:
+    """The force of the ground on the rod at rest but for a sliding of this sign, −b/A [N]."""
+    given = numbers(id)
+    c, s = math.cos(given["theta"]), math.sin(given["theta"])
+    return float(given["m"] * given["g"] / (1.0 + 3.0 * c * (c + sign * mu * s)))
+
+
+def jamming(id: str, scheme: Any) -> Outcome:
+    """Where a push makes the sliding tip approach, the run ends by name; elsewhere the force is that of the rod."""
+    critical, mu = quantity(id, "critical"), numbers(id)["mu"]
+    figures = []
+    for sign, much in ((1.0, mu), (1.0, 0.999 * critical), (-1.0, 0.999 * critical), (-1.0, 0.5 * critical)):
+        run = slide(id, much, sign, scheme, until=1e-3)
+        wanted = push_of(id, much, sign)
+        found = run["tip.force"][0] if len(run.time) else math.nan
+        figures.append(Figure(f"μ = {much:.4g}, sliding {sign:+.0f}: force beside −b/A, relative [-]",
+                              abs(found / wanted - 1.0), 1e-9))  # fmt: skip
+    for much in (mu, 1.001 * critical):
+        run = slide(id, much, -1.0, scheme)
+        told = not run.success and "Painlevé: no consistent contact force at 'tip'" in run.message
+        figures.append(Figure(f"μ = {much:.4g}, jammed at the start and not told [-]", float(not told), 0.0))
+        figures.append(Figure(f"μ = {much:.4g}, rows with a force all the same [-]", float(len(run.time)), 0.0))
+    run = slide(id, mu, -1.0, scheme)
+    return Outcome(figures)
+
+
+def case(id: str, must: str, judge: Any) -> HardCase:
+    """A case whose judge is told which definition it judges."""
+    return HardCase(id, must, partial(judge, id), SCHEMES)
+
+
+CASES = (
+    case(
+        "a4-coulomb-pendulum",
+        "The pendulum swings as often as the friction lets it, then rests away from the vertical without creeping.",
+        coulomb,
+    ),
+    case(
+        "a4c-pin-friction-load-dependent",
+        "The friction follows the whole force in the pin, its own share included; angles and times of turning are met.",
+        loaded,
+    ),
+    case(
+        "j13-painleve-rod",
+        "Where no contact force is consistent the run ends and says so; just before, the force is finite and exact.",
+        jamming,
+    ),
+)

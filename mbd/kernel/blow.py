@@ -1,0 +1,122 @@
+"""One blow: the jump of velocities and its impulses, of all contacts and frictions that take part in it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mbd.kernel.complementarity import complementarity
+from mbd.kernel.fields import NOW, PAST_TIME, PLASTIC
+from mbd.kernel.restart import capture, evaluate, evaluate_loaded, limit_of, row_speed
+
+__all__ = ["blow", "energy_gain", "gather", "let_rebound", "loosen", "prepare", "restitution_of", "speed", "start_over"]
+
+
+def prepare(K: Any) -> None:
+    """K.acc at the instant, directions of sliding where contacts are now, force zero; all frictions begin stuck."""
+    evaluate(K, K.clock[NOW], K.q, K.y)
+    if K.n_frictions > 0:
+        for f in range(K.n_frictions):
+            c = K.friction_contact[f]
+            if c >= 0 and (K.closing[c] > 0 or (K.closed[c] == 1 and K.sticks[f] == 0)):
+                capture(K, c)
+        for k in range(K.n_rows):
+            K.given[k] = 0.0
+        evaluate(K, K.clock[NOW], K.q, K.y)
+        evaluate_loaded(K, K.given)
+        for f in range(K.n_frictions):
+            K.base_limit[f] = limit_of(K, f)  # no impulse comes from a force that stays finite
+        if K.strategy == 1:
+            evaluate_loaded(K, K.past)
+            for f in range(K.n_frictions):
+                K.past_limit[f] = limit_of(K, f) + (K.detail[PAST_TIME] - 1.0) * K.base_limit[f]
+    start_over(K)
+
+
+def start_over(K: Any) -> None:
+    """No jump and no impulse yet."""
+    for i in range(K.n):
+        K.total_jump[i] = 0.0
+    for k in range(K.n_rows):
+        K.total[k] = 0.0
+
+
+def gather(K: Any, slow: bool) -> None:
+    """All closed and closing contacts take part; those that open on pull may choose."""
+    for c in range(K.n_contacts):
+        both = K.closed[c] == 1 or K.closing[c] > 0
+        K.active[c] = 1 if (both and K.kind[c] == 0) else 0
+        K.free[c] = 1 if (K.active[c] == 1 and K.opens[c] == 0 and not slow) else 0
+    if not slow or K.strategy == 1:
+        loosen(K)
+        return
+    for f in range(K.n_frictions):  # what sticks goes on to stick, what slides feels nothing
+        K.loose[f] = 0
+        K.slip[f] = 0.0
+
+
+def loosen(K: Any) -> None:
+    """Frictions of this blow may choose, from sticking."""
+    for f in range(K.n_frictions):
+        c = K.friction_contact[f]
+        K.loose[f] = 1 if (c < 0 or K.active[c] == 1) else 0
+        if K.loose[f] == 1:
+            K.sticks[f] = 1
+            K.slip[f] = 0.0
+
+
+def speed(K: Any, row: int) -> float:
+    """γ of a row after the jumps so far."""
+    o_B = K.n * K.n + K.n + K.n * K.n_rows
+    value = row_speed(K, row)
+    for j in range(K.n):
+        value += K.acc[o_B + row * K.n + j] * K.total_jump[j]
+    return value
+
+
+def blow(K: Any) -> int:
+    """The next jump and its impulses, beside the impulses in K.given: bias is in place, contacts have been gathered."""
+    for k in range(K.n_rows):
+        K.impulse[k] = 0.0
+    status = complementarity(K, 1)
+    if status != 0:
+        return status
+    for i in range(K.n):
+        K.total_jump[i] += K.jump[i]
+        K.jump[i] = K.total_jump[i]
+    for k in range(K.n_rows):
+        K.total[k] += K.impulse[k] + K.given[k]
+        K.impulse[k] = K.total[k]
+        K.given[k] = 0.0
+    for c in range(K.n_contacts):
+        K.parting[c] = 0
+    return 0
+
+
+def restitution_of(K: Any, c: int) -> float:
+    """e, or 0 at the end of impacts without end."""
+    return 0.0 if K.state[PLASTIC] == 1 else float(K.restitution[c])
+
+
+def let_rebound(K: Any) -> None:
+    """Contacts that closed with a restitution leave again."""
+    for c in range(K.n_contacts):
+        rests = K.strategy == 1 and K.before[c] >= 0.0
+        if K.closing[c] > 0 and restitution_of(K, c) > 0.0 and not rests:
+            K.active[c] = 0
+
+
+def energy_gain(K: Any) -> float:
+    """Work of all impulses on the mechanism, ½ Σ λ̂ (γ⁻ + γ⁺), relative to its terms."""
+    n = K.n
+    o_B = n * n + n + n * K.n_rows
+    loss = 0.0
+    size = 1e-300
+    for k in range(K.n_rows):
+        if K.impulse[k] != 0.0:
+            half = 0.0
+            for j in range(n):
+                half += 0.5 * K.acc[o_B + k * n + j] * K.jump[j]
+            before = row_speed(K, k)
+            loss += K.impulse[k] * (before + half)
+            size += abs(K.impulse[k]) * (abs(before) + abs(half))
+    return -loss / size

@@ -1,0 +1,185 @@
+"""After an event: who pushes, sticks and slides, so that accelerations and forces are consistent."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mbd.kernel.complementarity import complementarity
+from mbd.kernel.fields import (
+    BLOCKED,
+    EVENTS,
+    LOG_CLOSED,
+    LOG_OPENED,
+    LOG_SLIPPED,
+    LOG_STUCK,
+    LOGGED,
+    NO_FORCE,
+    NO_IMPACT,
+    NOW,
+    SLIP,
+    STORED,
+    UNKNOWN,
+)  # fmt: skip
+from mbd.kernel.restart import active_rows, capture, evaluate, row_speed, solve_rows
+
+__all__ = ["STILL", "log_event", "settle"]
+
+STILL = 1e-9
+"""Speed [m/s, rad/s] of a gap or along a friction that counts as none."""
+CLOSE_TO_STILL = 1e-7
+"""The same along a friction that an event found at rest; index 3 may have moved it as velocities became consistent."""
+
+
+def log_event(K: Any, kind: int, index: int, loss: float, struck: bool) -> None:
+    """One line of the event log: t, kind, index, energy loss, row of results, impulses of its rows if it struck."""
+    o = K.state[LOGGED] * K.event_width
+    K.log[o] = K.clock[NOW]
+    K.log[o + 1] = float(kind)
+    K.log[o + 2] = float(index)
+    K.log[o + 3] = loss
+    K.log[o + 4] = float(K.state[STORED])
+    for k in range(K.n_rows):
+        K.log[o + 5 + k] = 0.0 - K.impulse[k] if struck and K.row_contact[k] == index else 0.0
+    K.state[LOGGED] += 1
+    K.counts[EVENTS] += 1
+
+
+def settle(K: Any) -> int:
+    """Consistent accelerations and multipliers; contacts that would pull open, touching ones that press close.
+
+    Frictions that do not move stick or begin to slide.
+    """
+    find_slips(K)
+    evaluate(K, K.clock[NOW], K.q, K.y)
+    for k in range(K.n_rows):
+        K.impulse[k] = K.lam[k]
+    for c in range(K.n_contacts):
+        K.active[c] = 1 if (K.closed[c] == 1 and K.kind[c] == 0) else 0
+        K.free[c] = 0
+        if K.kind[c] == 0:
+            if (K.closed[c] == 1 and K.opens[c] == 0) or (K.closed[c] == 0 and K.touched[c] == 1):
+                K.free[c] = 1
+    status = complementarity(K, 0)
+    if status == NO_IMPACT or status == 0:
+        jammed = find_jammed(K)
+        if jammed >= 0:
+            K.state[BLOCKED] = jammed
+            return NO_FORCE
+    if status != 0:
+        return status
+    for i in range(K.n):
+        K.rate[i] = K.jump[i]
+    for k in range(K.n_rows):
+        K.lam[k] = K.impulse[k]
+    for c in range(K.n_contacts):
+        K.touched[c] = 0
+        if K.kind[c] == 0 and K.active[c] != K.closed[c]:
+            K.closed[c] = K.active[c]
+            if K.active[c] == 1:
+                capture(K, c)
+                log_event(K, LOG_CLOSED, c, 0.0, False)
+            else:
+                K.armed[c] = 1
+                log_event(K, LOG_OPENED, c, 0.0, False)
+        K.active[c] = 0
+    for f in range(K.n_frictions):
+        c = K.friction_contact[f]
+        K.loose[f] = 0
+        if c >= 0 and K.closed[c] == 0:
+            K.sticks[f] = 0
+            K.slip[f] = 0.0
+        now = frictional_state(K, f)
+        if now != K.was[f] and K.was[f] != UNKNOWN:
+            if now == 2:
+                log_event(K, LOG_STUCK, f, 0.0, False)
+            elif now != 0 and K.was[f] != 0:
+                log_event(K, LOG_SLIPPED, f, 0.0, False)
+        K.was[f] = now
+    return 0
+
+
+def frictional_state(K: Any, f: int) -> int:
+    """0 off, 2 sticking, ±1 sliding."""
+    if K.sticks[f] == 1:
+        return 2
+    return int(K.slip[f])
+
+
+def find_slips(K: Any) -> None:
+    """Which frictions slide, by their velocity, and which may choose; K.loose tells what an event has found out.
+
+    On entry K.loose[f] is 0, 2 where an event found the velocity to be zero, 3 where it found that it must slide.
+    """
+    if K.n_frictions == 0:
+        return
+    evaluate(K, K.clock[NOW], K.q, K.y)
+    for f in range(K.n_frictions):  # its direction is that at the point of now, unless it is held already
+        c = K.friction_contact[f]
+        if c >= 0 and (K.closed[c] == 0 or K.sticks[f] == 0):
+            capture(K, c)
+    evaluate(K, K.clock[NOW], K.q, K.y)
+    for f in range(K.n_frictions):
+        c = K.friction_contact[f]
+        told = K.loose[f]
+        K.loose[f] = 0
+        K.lean[f] = K.slip[f] if K.slip[f] != 0.0 else K.lean[f]
+        if c >= 0 and K.closed[c] == 0 and K.touched[c] == 0:
+            K.sticks[f] = 0
+            K.slip[f] = 0.0
+            continue
+        gamma = row_speed(K, K.friction_row[f])
+        if told == 3:
+            K.loose[f] = 2
+            continue
+        small = max(1.0, 1e-2 * K.scale[K.n + K.n_rows + K.friction_row[f]])
+        still = abs(gamma) <= STILL * small
+        if (told == 2 and abs(gamma) <= CLOSE_TO_STILL * small) or (still and (K.slip[f] == 0.0 or K.fired[0] != SLIP)):
+            K.loose[f] = 1
+            K.sticks[f] = 1
+            K.slip[f] = 0.0
+        elif still:  # it is about to slide, and does unless its acceleration says otherwise
+            K.loose[f] = 1
+        else:
+            K.sticks[f] = 0
+            K.slip[f] = 1.0 if gamma > 0.0 else -1.0
+
+
+def find_jammed(K: Any) -> int:
+    """A contact that slides so that pushing on it makes it approach: no force or several are consistent; −1 if none.
+
+    ``dg̈/dp = B_n K⁻¹ (B_n − μ s B_T)ᵀ ≤ 0`` with the other rows held (Painlevé 1895; Génot & Brogliato 1999,
+    Eur. J. Mech. A 18:653). K.jump and K.impulse are kept.
+    """
+    n = K.n
+    o_R = n * n + n
+    o_B = o_R + n * K.n_rows
+    for f in range(K.n_frictions):
+        c = K.friction_contact[f]
+        if c < 0 or K.sticks[f] == 1 or K.slip[f] == 0.0 or K.loose[f] > 0 or K.closed[c] == 0:
+            continue
+        normal = K.normal[c]
+        for i in range(n):
+            K.trial_jump[i] = K.jump[i]
+            K.force[i] = -K.acc[o_R + i * K.n_rows + normal]
+        for k in range(K.n_rows):
+            K.trial[k] = K.impulse[k]
+            K.bias[k] = 0.0
+        before = K.active[c]
+        K.active[c] = 1
+        K.parting[c] = 1
+        status = solve_rows(K, active_rows(K, K.active), True)
+        K.parting[c] = 0
+        K.active[c] = before
+        gained = 0.0
+        alone = 0.0  # of the same push if no other row held
+        for j in range(n):
+            slope = K.acc[o_B + normal * n + j]
+            gained += slope * K.jump[j]
+            alone += slope * slope / K.acc[j * n + j] if K.acc[j * n + j] > 0.0 else 0.0
+        for i in range(n):
+            K.jump[i] = K.trial_jump[i]
+        for k in range(K.n_rows):
+            K.impulse[k] = K.trial[k]
+        if status == 0 and gained < -1e-9 * alone:
+            return int(c)
+    return -1

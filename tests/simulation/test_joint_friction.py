@@ -1,0 +1,112 @@
+"""Dry friction in joints, in chains and loops; both forms of the kernel, files and pictures."""
+
+from __future__ import annotations
+
+import pickle
+
+import numpy as np
+import pytest
+
+import mbd
+from tests.simulation.frictions import brick, check_friction, four_bar, stops
+from tests.simulation.mechanisms import pendulum, run
+
+
+# joints -------------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("cut", ["auto", "all"])
+@pytest.mark.parametrize("formulation", ["ggl", "index3"])
+def test_dry_pins_of_a_four_bar_stop_it_for_good(cut, formulation):
+    model = four_bar(mbd.Coulomb(0.6), cut)
+    scheme = mbd.HHT(0.05, formulation=formulation)
+    trajectory = run(model, {"pin 0.angle": 0.9}, {"pin 0.angle": 3.0}, until=2.0, dt=5e-3, integrator=scheme)
+    assert abs(trajectory["pin 0.rate"][-1]) < 1e-9
+    rest = trajectory["pin 0.angle"][trajectory.events[-1].row :]
+    np.testing.assert_allclose(rest, rest[0], rtol=0, atol=1e-12)
+    check_friction(model, trajectory, *((1e-6, 1e-9) if formulation == "ggl" else (1e-2, 1e-2)))
+
+
+def test_the_cut_of_a_four_bar_with_dry_pins_does_not_change_its_motion():
+    angles = []
+    closed = {"pin 0.angle": 0.9, "pin 1.angle": 1.8796872436635348, "pin 2.angle": -2.4200554058977284}
+    for cut in "auto", "all":
+        model = four_bar(mbd.Coulomb(0.3), cut)
+        trajectory = run(model, closed, {"pin 0.angle": 3.0}, until=1.0, dt=1e-3)
+        angles.append(trajectory.at(np.linspace(0.1, 0.9, 9))["pin 0.angle"])
+    np.testing.assert_allclose(*angles, rtol=0, atol=2e-5)
+
+
+def test_pin_friction_in_a_four_bar_is_that_of_the_force_in_each_pin():
+    model = four_bar(mbd.PinFriction(0.3, 0.05))
+    trajectory = run(model, {"pin 0.angle": 0.9}, {"pin 0.angle": 3.0}, until=1.0, dt=2e-3)
+    for pin in ("pin 0", "pin 1", "pin 2", "pin 3"):
+        force = np.linalg.norm(trajectory[f"{pin}.reaction_force"], axis=-1)
+        friction, rate = trajectory[f"{pin}.friction"], trajectory[f"{pin}.rate"]
+        assert np.all(np.abs(friction) <= 0.3 * 0.05 * force * (1 + 1e-6) + 1e-9)
+        slides = np.abs(rate) > 1e-4
+        np.testing.assert_allclose(np.abs(friction[slides]), 0.3 * 0.05 * force[slides], rtol=1e-6)
+        assert np.all(friction * rate <= 1e-9)
+    assert trajectory.energy["pin 0 friction"][-1] < 0.0
+    check_friction(model, trajectory)
+
+
+def test_friction_of_no_size_costs_nothing_and_changes_no_bit():
+    plain = str(pendulum().cost())
+    assert plain == str(pendulum(mbd.Coulomb(0.0)).cost()) == str(pendulum(mbd.PinFriction(0.0, 0.1)).cost())
+    rubs = pendulum(mbd.Coulomb(0.1)).cost()
+    assert plain != str(rubs) and rubs.newton == pendulum().cost().newton and rubs.frictions["hinge friction"] > 0
+    runs = [run(pendulum(loss), {"hinge.angle": 1.0}) for loss in (None, mbd.Coulomb(0.0), mbd.PinFriction(0.0, 0.1))]
+    for other in runs[1:]:
+        np.testing.assert_array_equal(runs[0].record.q, other.record.q)
+        np.testing.assert_array_equal(runs[0].record.a, other.record.a)
+
+
+def test_pin_friction_that_was_left_out_cannot_be_had_at_run_time():
+    """It would need the joint to be cut; the name is unknown rather than without effect."""
+    model = pendulum(mbd.PinFriction(0.0, 0.1))
+    with pytest.raises(mbd.MbdError, match=r"hinge loss\.mu"):
+        mbd.simulate(model, mbd.assemble(model), dt=0.01, until=0.1, parameters={"hinge loss.mu": 0.2})
+
+
+# around ------------------------------------------------------------------------------------------------------------
+TWINS = [(brick(0.4), 1e-9), (four_bar(mbd.PinFriction(0.3, 0.05)), 1e-4), (four_bar(mbd.Coulomb(0.4)), 1e-9)]
+
+
+@pytest.mark.parametrize(("model", "slack"), TWINS, ids=["contacts", "load-dependent pins", "dry pins"])
+def test_plain_python_gives_the_same_stick_and_slip(model, slack):
+    """To round-off, but for pins whose friction follows the force: the tangents of both forms, by which positions are
+    corrected, are taken at different iterates."""
+    if model.name == "brick":
+        position, velocity = {"place.y": 0.4, "place.angle": 0.3}, {"place.x": 1.0}
+    else:
+        position, velocity = {"pin 0.angle": 0.9}, {"pin 0.angle": 3.0}
+    scheme = mbd.HHT(0.05, tolerance=1e-13)
+    one, two = (
+        run(model, position, velocity, until=0.5, dt=0.01, backend=backend, integrator=scheme)
+        for backend in ("auto", "python")
+    )
+    assert [(e.kind, e.name) for e in one.events] == [(e.kind, e.name) for e in two.events]
+    np.testing.assert_allclose([e.time for e in one.events], [e.time for e in two.events], rtol=0, atol=slack)
+    np.testing.assert_allclose(one.record.v[-1], two.record.v[-1], rtol=0, atol=10.0 * slack)
+
+
+def test_a_run_goes_on_from_where_it_stuck():
+    model = pendulum(mbd.Coulomb(2.0))
+    first = run(model, {"hinge.angle": 0.1}, {"hinge.angle": 0.8}, until=1.0)
+    assert stops(first) == [("stuck", "hinge")]
+    second = mbd.simulate(model, first.final, mbd.HHT(0.05), dt=0.01, until=2.0)
+    assert second.events == []
+    np.testing.assert_allclose(second["hinge.angle"], first["hinge.angle"][-1], rtol=0, atol=1e-14)
+
+
+def test_friction_is_kept_in_files_tables_and_pictures(tmp_path):
+    trajectory = run(brick(0.3), {"place.y": 0.15}, {"place.x": 2.0}, closed=["left", "right"], until=0.9)
+    again = mbd.load(trajectory.save(tmp_path / "run.npz") or tmp_path / "run.npz")
+    assert [repr(event) for event in again.events] == [repr(event) for event in trajectory.events]
+    np.testing.assert_array_equal(again["left.friction"], trajectory["left.friction"])
+    assert "1 × left stuck" in str(trajectory)
+    assert "left.friction" in trajectory.to_dataframe()
+    assert "stuck" in trajectory.page(tmp_path / "page.html").read_text("utf-8")
+    trajectory.plot("left.friction", "place.x")
+    assert pickle.loads(pickle.dumps(trajectory.final)).mode == trajectory.final.mode
+    swing = run(pendulum(mbd.Coulomb(0.3)), {"hinge.angle": 1.0})
+    assert swing.plot("hinge.friction").axes[0].get_ylabel().endswith("[N m]")
