@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
 
 from mbd.constraints.base import Measure, VelocityConstraint
 from mbd.constraints.bilateral import Bilateral
@@ -12,40 +11,19 @@ from mbd.constraints.penalty import Penalty
 from mbd.constraints.unilateral import Unilateral
 from mbd.equations.dynamics import Dynamics, Work
 from mbd.equations.effects import penalty_effect
-from mbd.equations.equations import Contact, Effect, Friction, Guard, Row
+from mbd.equations.equations import Contact, Guard, Row
+from mbd.equations.frictions import dry_joint, sliding_contact
+from mbd.equations.laws import Laws
 from mbd.equations.surroundings import Surroundings
 from mbd.joints.base import Joint, row_unit
-from mbd.tape.derivatives import gradient, live, substitute
+from mbd.tape.derivatives import gradient, live
 from mbd.tape.evaluate import evaluate
-from mbd.tape.functions import sqrt
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["Laws", "laws"]
+__all__ = ["laws"]
 
 FITS = 1e-9
 """Misfit of unmoving parts that counts as none [m, rad]: above the round-off of users' sums, far below a tolerance."""
-
-
-@dataclass
-class Laws:
-    """The constraints of a model as expressions; `faults` tells what cannot hold.
-
-    viewed : the values of `rows`, the rates of those on velocities, in views
-    penalties : (number, gap, force) of penalty contacts in views
-    sliding : the sliding velocities of `frictions` in views
-    idle : (owner, part) of rows of cut joints that hold by themselves
-    """
-
-    rows: list[Row] = field(default_factory=list)
-    viewed: list[Node] = field(default_factory=list)
-    penalties: list[tuple[int, Node, Node]] = field(default_factory=list)
-    contacts: list[Contact] = field(default_factory=list)
-    guards: list[Guard] = field(default_factory=list)
-    frictions: list[Friction] = field(default_factory=list)
-    sliding: list[Node] = field(default_factory=list)
-    effects: list[Effect] = field(default_factory=list)
-    faults: list[str] = field(default_factory=list)
-    idle: list[tuple[str, str]] = field(default_factory=list)
 
 
 def laws(
@@ -156,7 +134,7 @@ def _unilateral(found: Laws, scope: Surroundings, dynamics: Dynamics, law: Unila
         for part, value in law.measure.tangents(scope, held):
             numbers.append(_row(found, scope, law.name, part, value, unit="m", contact=number, may_fold=True))
     if law.slides:
-        _sliding(found, scope, dynamics, law, numbers, dict(zip(anchors, captured, strict=True)))
+        sliding_contact(found, scope, dynamics, law, numbers, dict(zip(anchors, captured, strict=True)))
     condition = law.only_while
     gap, rate = scope.views.real([gap, *scope.rates([gap])])
     found.contacts.append(
@@ -165,71 +143,6 @@ def _unilateral(found: Laws, scope: Surroundings, dynamics: Dynamics, law: Unila
             opens_on=law.opens_on, when=tuple((rule.other, rule.after_impact) for rule in law.releases),
             only_while=scope.real(condition.gap(scope)) if isinstance(condition, Measure) else condition,
             restitution=law.restitution, unit=unit,
-        )
-    )  # fmt: skip
-
-
-def _sliding(
-    found: Laws, scope: Surroundings, dynamics: Dynamics, law: Unilateral, numbers: list[int], captured: dict[int, Node]
-) -> None:
-    """Coulomb friction along the tangent of a contact, ``|λ_T| ≤ μ p``; the direction is that at the point of now."""
-    normal, *tangents = [k for k in numbers if k >= 0]
-    if len(tangents) != 1:
-        found.faults.append(
-            f"'{law.name}': friction {law.friction:g} needs one direction of sliding, but its point can slide in "
-            f"{len(tangents)}; friction is solved in planar models: use friction=None (it sticks) or 0 in space"
-        )
-        return
-    (row,) = tangents
-    here = {scope.tape.input("anchor", k): value for k, value in captured.items()}
-    view = substitute(scope.rates([found.viewed[row]]), here)[0]
-    coefficient = scope.parameter(law.name, "mu", law.friction or 0.0)
-    limit = -(coefficient * scope.tape.input("lam", normal))
-    _friction(found, scope, dynamics, law.name, row, found.rows[row].contact, view, limit)
-
-
-def dry_joint(found: Laws, scope: Surroundings, dynamics: Dynamics, joint: Joint) -> None:
-    """Set-valued losses of a joint: a row on each of its rates, held while ``|λ| ≤ limit``."""
-    rates: Sequence[Scalar] | None = None
-    for place, owner, loss in joint.losses():
-        load = _pin_load(found, scope, joint) if loss.needs_reaction else 0.0
-        limit = loss.dry(load, scope, owner)
-        if (isinstance(limit, float) and limit == 0.0) or (isinstance(limit, Node) and limit.is_zero):
-            continue
-        rates = scope.joint(joint.name).rates if rates is None else rates
-        view = scope.tape.lift(rates[place])
-        name = joint.name if len(joint.labels) == 1 else f"{joint.name}.{joint.labels[place].name}"
-        unit = joint.labels[place].unit
-        found.rows.append(Row(name, "dry", scope.tape.zero, scope.real(view), unit=unit, kind="velocity"))
-        found.viewed.append(view)
-        _friction(found, scope, dynamics, name, len(found.rows) - 1, -1, view, scope.tape.lift(limit))
-
-
-def _pin_load(found: Laws, scope: Surroundings, joint: Joint) -> Node:
-    """Resultant of the reaction at a cut joint [N]; rounded below 1e-9 N, where it has no direction."""
-    square = scope.tape.lift(1e-18)
-    for k, row in enumerate(found.rows):
-        if row.owner == joint.name and row.contact < 0 and row.unit == "m" and not row.is_velocity:
-            square = square + scope.tape.input("lam", k) * scope.tape.input("lam", k)
-    return scope.tape.lift(sqrt(square))
-
-
-def _friction(
-    found: Laws, scope: Surroundings, dynamics: Dynamics, name: str, row: int, contact: int, view: Node, limit: Node
-) -> None:
-    """A direction of dry friction, its row marked as held by it, and its loss as an effect."""
-    number = len(found.frictions)
-    rate = scope.real(view)
-    found.rows[row] = replace(found.rows[row], friction=number)
-    found.frictions.append(Friction(name, row, contact, rate, scope.change(view), limit))
-    found.sliding.append(view)
-    multiplier = scope.tape.input("lam", row)
-    work = Work()
-    work.on_velocity(view, multiplier)
-    found.effects.append(
-        Effect(
-            f"{name} friction", "loss",
-            lambda: (*dynamics.generalized(work), *[scope.tape.zero] * len(scope.states)), -(multiplier * rate),
         )
     )  # fmt: skip
 

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from mbd.equations.changes import partials, rates
-from mbd.equations.contacts import Laws, laws
+from mbd.equations.contacts import laws
 from mbd.equations.dynamics import Dynamics, Work
 from mbd.equations.effects import Cause, causes, effect_of, weight_of
 from mbd.equations.equations import Equations
 from mbd.equations.figure import figure_of
+from mbd.equations.laws import Laws
 from mbd.equations.outputs import Outputs
 from mbd.equations.results import offer_results
 from mbd.equations.surroundings import Surroundings

@@ -228,16 +228,14 @@ def newmark_step(K: Any, h: float, t1: float) -> int:
 def overturns(K: Any, h: float) -> bool:
     """Whether the estimated error of an angle in this step exceeds half a radian: it is not resolved at all.
 
-    ``e = h² |1/6 − β − (α_m − α_f)/2| |a₁ − a₀|``
+    ``e = h² |1/6 − β − (α_m − α_f)/2| |v̇₁ − v̇₀|``
     """
     share = abs(1.0 / 6.0 - K.beta - 0.5 * (K.alpha_m - K.alpha_f)) * h * h
-    stretch = h / K.clock[AUX_STEP]
+    change = 0.0
     for i in range(K.n_v):
         if K.unit[i] == 1:
-            a0 = K.rate[i] + stretch * (K.aux[i] - K.rate[i])
-            if share * abs(K.aux1[i] - a0) > 0.5:
-                return True
-    return False
+            change = max(change, abs(K.rate1[i] - K.rate[i]))
+    return share * change > 0.5
 
 
 def runs_away(K: Any, m: int) -> bool:

@@ -1,0 +1,32 @@
+"""The constraints of a model as expressions, while they are gathered."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from mbd.equations.equations import Contact, Effect, Friction, Guard, Row
+from mbd.tape.node import Node
+
+__all__ = ["Laws"]
+
+
+@dataclass
+class Laws:
+    """The constraints of a model as expressions; `faults` tells what cannot hold.
+
+    viewed : the values of `rows`, the rates of those on velocities, in views
+    penalties : (number, gap, force) of penalty contacts in views
+    sliding : the sliding velocities of `frictions` in views
+    idle : (owner, part) of rows of cut joints that hold by themselves
+    """
+
+    rows: list[Row] = field(default_factory=list)
+    viewed: list[Node] = field(default_factory=list)
+    penalties: list[tuple[int, Node, Node]] = field(default_factory=list)
+    contacts: list[Contact] = field(default_factory=list)
+    guards: list[Guard] = field(default_factory=list)
+    frictions: list[Friction] = field(default_factory=list)
+    sliding: list[Node] = field(default_factory=list)
+    effects: list[Effect] = field(default_factory=list)
+    faults: list[str] = field(default_factory=list)
+    idle: list[tuple[str, str]] = field(default_factory=list)
