@@ -25,7 +25,7 @@ from mbd.cli import Script, examples
 g = 9.81
 NAMES = (
     "chapter-walker", "compass-gait", "double-pendulum", "four-bar", "kneed-walker", "lagrangian-double-pendulum",
-    "pendulum", "prosthetic-leg", "rimless-wheel", "slider-crank", "user-constraint", "user-integrator",
+    "pendulum", "prosthetic-leg", "rimless-wheel", "shaken-block", "slider-crank", "user-constraint", "user-integrator",
 )  # fmt: skip
 WALKERS = ("chapter-walker", "compass-gait", "kneed-walker", "prosthetic-leg")
 
@@ -274,6 +274,47 @@ def test_a_slow_rimless_wheel_rocks_between_two_spokes() -> None:
     assert speeds == pytest.approx(0.9 * math.cos(math.pi / 4) ** np.arange(1, len(speeds) + 1), rel=1e-3)
     faster = again("rimless-wheel", start=_wheel_with_speed(0.92), until=3.0)
     assert strikes(faster, "spoke")[0].name == "spoke 2"
+
+
+def test_the_shaken_block_sticks_and_slips_as_newmarks_sliding_block() -> None:
+    # between its instants the block feels g sin γ ∓ μ g cos γ, or the acceleration of the table
+    names = script("shaken-block")
+    slope, mu, stroke, turning = (names[word] for word in ("slope", "mu", "stroke", "turning"))
+    pull, grip = g * math.sin(slope), mu * g * math.cos(slope)
+    run = run_of("shaken-block")
+    time, slid, sign = 0.0, 0.0, 0.0
+
+    def speed(t: float) -> float:
+        return float(stroke * turning * math.cos(turning * t))
+
+    def asked(t: float) -> float:
+        """Of friction, by the table."""
+        return float(-stroke * turning**2 * math.sin(turning * t) - pull)
+
+    for event in run.events:
+        if sign == 0.0:  # it stuck: friction reaches what it can give
+            give_way = [(_first_root(lambda t: grip + s * asked(t), time), s) for s in (1.0, -1.0)]  # noqa: B023
+            end, sign = min(give_way)
+        else:
+            drive = pull - sign * grip
+            begin, before = time, speed(time)
+            end = _first_root(lambda t: sign * (before + drive * (t - begin) - speed(t)), begin + 1e-7)  # noqa: B023
+            table = stroke * (math.sin(turning * end) - math.sin(turning * begin))
+            slid += before * (end - begin) + 0.5 * drive * (end - begin) ** 2 - table
+            sign = 0.0 if abs(asked(end)) <= grip else math.copysign(1.0, -asked(end))
+        assert event.time == pytest.approx(end, abs=1e-9)
+        assert event.kind == ("stuck" if sign == 0.0 else "slipped")
+        assert run["path.x"][event.row] - run["rail.displacement"][event.row] == pytest.approx(slid, abs=1e-9)
+        time = end
+    assert len(run.events) == 26 and slid > 0.1
+
+
+def _first_root(function: Any, begin: float) -> float:
+    """Where a function, positive at first, falls through zero."""
+    times = begin + np.linspace(0.0, 1.0, 20001)[1:]
+    values = np.array([function(t) for t in times])
+    place = int(np.argmax(values < 0.0))
+    return float(brentq(function, times[max(place - 1, 0)], times[place], xtol=1e-14))
 
 
 def test_the_compass_gait_is_the_published_one() -> None:

@@ -235,7 +235,7 @@ def overturns(K: Any, h: float) -> bool:
     for i in range(K.n_v):
         if K.unit[i] == 1:
             change = max(change, abs(K.rate1[i] - K.rate[i]))
-    return share * change > 0.5
+    return bool(share * change > 0.5)
 
 
 def runs_away(K: Any, m: int) -> bool:
