@@ -95,7 +95,8 @@ def write(run: Trajectory, folder: str | Path, wall: Mapping[str, float], plots:
         if run.facts.coordinate_count:
             phase_portrait(run, path=place / "phase.png")
             paths.append(place / "phase.png")
-        forces = [name for name in (f"{contact.name}.force" for contact in run.facts.contacts) if name in run]
+        kinds = [f"{contact.name}.{what}" for contact in run.facts.contacts for what in ("force", "friction")]
+        forces = [name for name in kinds if name in run]
         if forces:
             run.plot(*forces, path=place / "forces.png")
             paths.append(place / "forces.png")
