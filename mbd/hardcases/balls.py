@@ -13,7 +13,8 @@ from mbd.bodies import PointMass
 from mbd.constraints import Unilateral, height, measure
 from mbd.hardcases.case import Curve, Figure, Outcome
 from mbd.hardcases.impacts import deepest, difference, impact_figures
-from mbd.hardcases.measuring import accuracy, hard_case, numbers, published, size
+from mbd.hardcases.measuring import accuracy, halved, hard_case, numbers, published, size
+from mbd.hardcases.stepped import HOW, stepped_figures, within_steps
 from mbd.joints import Prismatic, Translation
 from mbd.model import Model
 from mbd.simulation import simulate
@@ -61,6 +62,19 @@ def bounces(model: Model, h: float, v: float, scheme: Any, dt: float, until: flo
     return simulate(model, start, scheme, dt=dt, until=until, **settings)
 
 
+def stepped_figures_of(model: Model, h: float, v: float, scheme: Any, m: float, g: float, e: float) -> list[Figure]:
+    """In non-smooth steps: the first impact within one of them, rest after the Zeno time, with m g."""
+    first, last = zeno(h, g, e)
+    steps = halved(first / 20.3)
+    runs = [bounces(model, h, v, scheme, float(dt), 1.3 * last, contact="nonsmooth") for dt in steps]
+    fine = runs[-1]
+    return [
+        *within_steps("the first impact time [s]", steps, [run.events[0].time - first for run in runs], 1.0),
+        *rest_figures(fine, m, g, 1.05 * last, "non-smooth steps"),
+        *stepped_figures(model, fine),
+    ]
+
+
 def bouncing(id: str, scheme: Any) -> Outcome:
     """Impact times, apexes and impulse are those of the parabolas; after the Zeno time it rests in finite work."""
     given = numbers(id)
@@ -95,6 +109,7 @@ def bouncing(id: str, scheme: Any) -> Outcome:
         *rest_figures(run, m, g, late, "after the Zeno time"),
         *rest_figures(coarse, m, g, late, "one step beyond the end"),
         *impact_figures(model, run),
+        *stepped_figures_of(model, h, given["v"], scheme, m, g, e),
     ]  # fmt: skip
     return Outcome(
         figures,
@@ -141,6 +156,7 @@ def counting(id: str, scheme: Any) -> Outcome:
         *rest_figures(run, m, g, zeno_time + tail, "after the Zeno time"),
         Figure("penetration [m]", deepest(run), 1e-10),
         *impact_figures(model, run),
+        *stepped_figures_of(model, h, 0.0, scheme, m, g, e),
     ]  # fmt: skip
     speeds = np.array([speed for speed in after if speed > 0.0])
     return Outcome(
@@ -172,15 +188,15 @@ def cornered(id: str, scheme: Any) -> Outcome:
     m, e1, e2, (vx, vy) = given["m"], given["e1"], given["e2"], given["v"]
     wait = 1.0
     runs = []
-    for turned in (False, True):
+    for turned, contact in HOW:
         model = corner(m, e1, e2, turned)
         start = assemble(
             model,
             position={"flight.x": -vx * wait, "flight.y": -vy * wait},
             velocity={"flight.x": vx, "flight.y": vy},
         )
-        runs.append(simulate(model, start, scheme, dt=0.03 * wait, until=2.0 * wait))
-    run, other = runs
+        runs.append(simulate(model, start, scheme, dt=0.03 * wait, until=2.0 * wait, contact=contact))
+    run, other, stepped = runs
     wanted = published(id, "velocity after")
     found = [run["flight.x.rate"][-1], run["flight.y.rate"][-1]]
     speed = math.hypot(vx, vy)
@@ -193,7 +209,11 @@ def cornered(id: str, scheme: Any) -> Outcome:
         Figure("change with the order of the walls, relative [-]", difference(run, other), ROUND_OFF),
         Figure("penetration [m]", deepest(run), 1e-10),
         *impact_figures(corner(m, e1, e2, False), run),
-    ]
+        Figure("non-smooth steps: error of the velocity after [m/s]", size(stepped.record.v[-1] - wanted),
+               accuracy(id, "velocity") + ROUND_OFF * speed),
+        *within_steps("the impact times [s]", [0.03 * wait], [[event.time - wait for event in stepped.events]], 1.0),
+        *stepped_figures(corner(m, e1, e2, False), stepped),
+    ]  # fmt: skip
     x, y = run["flight.x"], run["flight.y"]
     return Outcome(
         figures,

@@ -25,6 +25,7 @@ from mbd.hardcases.measuring import (
     second_order,
     size,
 )
+from mbd.hardcases.stepped import HOW, stepped_figures, within_steps
 from mbd.joints import Planar
 from mbd.model import Model
 from mbd.simulation import simulate
@@ -96,9 +97,13 @@ def strikes(run: Any) -> list[Any]:
     return [event for event in run.events if event.kind == "closed" and event.impulse.any()]
 
 
-def rock(block: Block, angle: float, rate: float, scheme: Any, dt: float, until: float, turned: bool = False) -> Any:
+def rock(
+    block: Block, angle: float, rate: float, scheme: Any, dt: float, until: float, turned: bool = False,
+    contact: Any = "events",
+) -> Any:  # fmt: skip
     """The run of a block let go on one corner."""
-    return simulate(model_of(block, turned), block.tilted(angle, rate, turned), scheme, dt=dt, until=until)
+    start = block.tilted(angle, rate, turned)
+    return simulate(model_of(block, turned), start, scheme, dt=dt, until=until, contact=contact)
 
 
 def amplitudes(run: Any, instants: Any) -> Any:
@@ -156,6 +161,7 @@ def rocking(id: str, scheme: Any) -> Outcome:
                           abs(long["place.x"][-1] - other["place.x"][-1]), 1e-10))  # fmt: skip
     figures.append(_threshold(block, published(id, "toppling threshold"), scheme, steps[0]))
     figures += impact_figures(model_of(block), long)
+    figures += stepped_rocking(block, angle, rate, scheme, steps, (first, rest, ratio))
     return Outcome(
         figures,
         [
@@ -164,6 +170,28 @@ def rocking(id: str, scheme: Any) -> Outcome:
                         [each["the next impact times [s]"] for each in errors], "error [s]"),
         ],
     )  # fmt: skip
+
+
+def stepped_rocking(block: Block, angle: float, rate: float, scheme: Any, steps: Any, expected: Any) -> list[Figure]:
+    """In non-smooth steps: the first impact within one of them, Housner's ratio and rest to first order.
+
+    Lifting a corner by up to 2 b ω dt gives up to m g b ω dt; an impact takes ½ I_c ω² (1 − r²) of the energy about a
+    corner: the block goes on with rates up to 2 m g b dt / (I_c (1 − r²)).
+    """
+    first, rest, ratio = expected
+    runs = [rock(block, angle, rate, scheme, float(dt), rest, contact="nonsmooth") for dt in steps]
+    rates = [run["place.angle.rate"][strikes(run)[0].row - 1 :] for run in runs]
+    ends = [np.max(np.abs(run["place.angle.rate"][run.time > 0.95 * rest])) for run in runs]
+    about = block.inertia + block.m * (block.half_width**2 + block.half_height**2)
+    most = 2.0 * block.m * block.g * block.half_width / (about * (1.0 - ratio**2))
+    return [
+        *within_steps("the first impact time [s]", steps, [strikes(run)[0].time - first for run in runs], 1.0),
+        *within_steps(
+            "Housner's velocity ratio [-]", steps, [each[1] / each[0] - ratio for each in rates], 5.0 / first
+        ),
+        *within_steps("the rate at rest [rad/s]", steps, ends, most),
+        *stepped_figures(model_of(block), runs[-1]),
+    ]
 
 
 def _apart(run: Any, block: Block, angle: float, rate: float, scheme: Any) -> float:
@@ -211,15 +239,15 @@ def landing(id: str, scheme: Any) -> Outcome:
     block = Block(b, h, m, inertia, float(given.get("g", 0.0)), e, 0.0, offset)
     speed, wait = -float(given["vz"]), 1.0
     runs = []
-    for turned in (False, True):
+    for turned, contact in HOW:
         model = model_of(block, turned)
         start = assemble(
             model,
             position={"place.y": block.half_height + speed * wait},
             velocity={"place.x": 0.0, "place.y": -speed, "place.angle": float(given["omega"])},
         )
-        runs.append(simulate(model, start, scheme, dt=0.03 * wait, until=2.0 * wait))
-    run, other = runs
+        runs.append(simulate(model, start, scheme, dt=0.03 * wait, until=2.0 * wait, contact=contact))
+    run, other, stepped = runs
     found = [run[f"place.{name}.rate"][-1] for name in ("x", "y", "angle")]
     wanted, impulses = published(id, "velocity after"), published(id, "corner impulses")
     told = {event.name: event.impulse[0] for event in strikes(run)}
@@ -234,6 +262,9 @@ def landing(id: str, scheme: Any) -> Outcome:
         Figure("change with the order of the corners, relative [-]", difference(run, other), ROUND_OFF),
         Figure("penetration [m]", deepest(run), 1e-10),
         *impact_figures(model_of(block), run),
+        Figure("non-smooth steps: error of the velocity after [m/s]", size(stepped.record.v[-1] - wanted),
+               accuracy(id, "velocity after") + ROUND_OFF),
+        *stepped_figures(model_of(block), stepped),
     ]  # fmt: skip
     return Outcome(
         figures,

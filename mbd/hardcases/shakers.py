@@ -26,6 +26,7 @@ from mbd.hardcases.measuring import (
     second_order,
     size,
 )
+from mbd.hardcases.stepped import stepped_figures, within_steps
 from mbd.joints import Prismatic
 from mbd.model import Model
 from mbd.simulation import simulate
@@ -50,7 +51,9 @@ def table(m: float, g: float, A: float, w: float) -> Model:
     return model
 
 
-def shaken(id: str, scheme: Any, dt: float, periods: float, amplitude: float | None = None) -> Any:
+def shaken(
+    id: str, scheme: Any, dt: float, periods: float, amplitude: float | None = None, contact: Any = "events"
+) -> Any:
     """The run of a mass that begins on the table and moves with it."""
     given = numbers(id)
     A, w = float(given["A"]) if amplitude is None else amplitude, float(given["w"])
@@ -59,7 +62,8 @@ def shaken(id: str, scheme: Any, dt: float, periods: float, amplitude: float | N
     model = table(float(given["m"]), float(given["g"]), A, w)
     velocity = {"rise.displacement": A * w + float(given["relative_velocity"])}
     start = assemble(model, position={"rise.displacement": 0.0}, velocity=velocity, closed=["table"])
-    return simulate(model, start, scheme, dt=dt, until=periods * 2.0 * math.pi / w)
+    until = periods * 2.0 * math.pi / w
+    return simulate(model, start, scheme, dt=dt, until=until, contact=contact)
 
 
 def staying_figures(id: str, scheme: Any, period: float) -> tuple[list[Figure], list[Curve]]:
@@ -123,6 +127,35 @@ def thrown_figures(id: str, scheme: Any, period: float) -> tuple[list[Figure], l
     return figures, curves
 
 
+def stepped_shaking(id: str, scheme: Any, period: float) -> list[Figure]:
+    """In non-smooth steps: it stays without a switch below Γ = 1, and leaves once a period within a step above."""
+    given = numbers(id)
+    g, w = (float(given[name]) for name in ("g", "w"))
+    entry = quantity(id, "first lift-off time")
+    amplitude = float(re.findall(r"Gamma = ([\d.]+)", entry["name"])[0]) * g / (w * w)
+    steps = halved(period / 37.0)
+    stays = shaken(id, scheme, float(steps[0]), 100.0, contact="nonsmooth")
+    runs = [shaken(id, scheme, float(dt), LONG, amplitude, "nonsmooth") for dt in steps]
+    phases = float(entry["value"]) + period * np.arange(LONG)
+    found = [leaving(run, period) for run in runs]
+    errors = [each - phases if len(each) == LONG else math.nan for each in found]
+    moving = stepped_figures(table(float(given["m"]), g, amplitude, w), runs[-1])
+    return [
+        Figure("non-smooth steps: switches in 100 periods [-]", len(stays.events), 0.0),
+        Figure("non-smooth steps: height of the mass on the table [m]", size(stays["table.gap"]), 1e-10),
+        *within_steps("the lift-off times [s]", steps, errors, 1.0),
+        *(each for each in moving if "energy" not in each.what),
+    ]
+
+
+def leaving(run: Any, period: float) -> Any:
+    """The last instant of each period at which the mass leaves: it may touch again within a step or two."""
+    opened = np.array([event.time for event in run.events if event.kind == "opened"])
+    if not len(opened):
+        return opened
+    return opened[np.append(np.diff(opened) > 0.25 * period, True)]
+
+
 def impact_figures_moving(model: Model, run: Any) -> list[Figure]:
     """What holds at impacts on a table that moves: it may give or take energy."""
     return [each for each in impact_figures(model, run) if "energy" not in each.what]
@@ -133,7 +166,7 @@ def shaking(id: str, scheme: Any) -> Outcome:
     period = 2.0 * math.pi / float(numbers(id)["w"])
     figures, curves = staying_figures(id, scheme, period)
     more, seen = thrown_figures(id, scheme, period)
-    return Outcome([*figures, *more], [*curves, *seen][:2])
+    return Outcome([*figures, *more, *stepped_shaking(id, scheme, period)], [*curves, *seen][:2])
 
 
 SHAKEN = hard_case(

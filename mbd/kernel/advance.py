@@ -8,12 +8,16 @@ from mbd.kernel.fields import (
     BASE,
     CHATTER,
     CLOSE,
+    CONFLICT,
     CROSS,
     DONE,
     ENDLESS,
     EVENT,
+    EVENTS,
     FULL,
     GRID,
+    HALVED,
+    HALVES,
     INCHING,
     LAST,
     LAST_SWITCH,
@@ -24,6 +28,7 @@ from mbd.kernel.fields import (
     MODE,
     N_DROPPED,
     NEW_MODE,
+    NO_IMPACT,
     NOT_CONVERGED,
     NOW,
     PAUSE,
@@ -44,7 +49,7 @@ from mbd.kernel.fields import (
 from mbd.kernel.guards import is_quiet, judge, try_step, update_armed, update_sides, watch
 from mbd.kernel.hooks import scheme_accept, scheme_start
 from mbd.kernel.locate import locate
-from mbd.kernel.nonsmooth import lands, lets_go, rebound, strike
+from mbd.kernel.nonsmooth import keep, lands, lets_go, put_back, rebound, strike
 from mbd.kernel.redundancy import find_dependent, spread
 from mbd.kernel.restart import active_rows, consistent, evaluate, solve_rows, stepping_rows
 from mbd.kernel.settle import log_event, settle
@@ -57,6 +62,8 @@ MOST_SHORTENED = 5
 
 Without rows ten times as many.
 """
+MOST_HALVED = 3
+"""How often a non-smooth step whose end has no impulses is halved [-]."""
 SHORTEST = 0.1
 """Part of a step below which a failing step is not shortened any further [-]."""
 SHORTENING = 0.6180339887498949
@@ -259,20 +266,36 @@ def handle_event(K: Any) -> int:
 
 
 def land(K: Any, h: float, t1: float) -> int:
-    """End a non-smooth step: rows before and after, impact, restart. Negative: nothing for the caller to do."""
+    """End a non-smooth step: rows before and after, impact, restart. Negative: nothing for the caller to do.
+
+    Where no impulses obey all laws, the step is tried again with half its size, down to an eighth.
+    """
     first = K.state[LOGGED]
+    stored = K.state[STORED]
+    t = K.clock[NOW]
+    events = K.counts[EVENTS]
+    keep(K)
     status = strike(K, h, t1)
-    if status != 0:
-        return status
-    store_row(K)
-    status = rebound(K)
-    if status != 0:
-        return status
-    status = restart(K)
+    if status == 0:
+        store_row(K)
+        status = rebound(K)
+    if status == 0:
+        status = restart(K)
+    if (status == NO_IMPACT or status == CONFLICT) and K.state[HALVED] < MOST_HALVED:
+        K.state[HALVED] += 1
+        K.state[HALVES] = 2 ** (K.state[HALVED] + 1)
+        K.counts[SHORTENED] += 1
+        K.state[LOGGED] = first
+        K.state[STORED] = stored
+        K.counts[EVENTS] = events
+        put_back(K, t)
+        K.state[RESTART] = 2
+        return -1
     if status != 0:
         return status
     store_row(K)
     K.state[REDONE] = 0
+    K.state[HALVED] = 0
     return EVENT if is_awaited(K, first) else -1
 
 
@@ -310,8 +333,12 @@ def advance(K: Any) -> int:
         if cut:
             t1 = K.until
         h = t1 - t
-        status = try_step(K, h, t1)
+        if K.state[HALVED] > 0:
+            h *= 0.5 ** K.state[HALVED]
+            t1 = t + h
+            cut = False
         full = h
+        status = try_step(K, h, t1)
         while (status == NOT_CONVERGED or status == STAGNATED or status == SINGULAR) and h > SHORTEST * full:
             h *= SHORTENING  # a pose in which rows lose rank is stepped over; stiff places get smaller steps
             t1 = t + h
@@ -330,13 +357,18 @@ def advance(K: Any) -> int:
                 if status != 0:
                     return status
                 fired = K.fired[0] >= 0
+                if fired and K.strategy == 1 and lands(K):  # the contact comes first
+                    fired = False
+                    status = try_step(K, h, t1)
+                    if status != 0:
+                        return status
         if fired:
             status = handle_event(K)
             if status >= 0:
                 return status
             continue
         if K.strategy == 1 and not quiet:
-            if lets_go(K) > 0:
+            if lets_go(K, t1) > 0:
                 if K.state[REDONE] > K.max_switches:
                     return CHATTER
                 continue
@@ -363,7 +395,7 @@ def advance(K: Any) -> int:
         else:
             accept(K, h, t1, quiet)
             K.state[GRID] += 1
-            if h < full:
+            if h < full or K.state[HALVED] > 0:
                 K.clock[BASE] = t1
                 K.state[GRID] = 0
             if not holds:  # the pose has changed its rank
@@ -371,6 +403,10 @@ def advance(K: Any) -> int:
             if cut:  # a boundary inside the run: the grid goes on from here
                 K.clock[BASE] = t1
                 K.state[GRID] = 0
+        if K.state[HALVED] > 0:  # the end that had no impulses may not come at all
+            K.state[HALVES] -= 1
+            if K.state[HALVES] == 0:
+                K.state[HALVED] = 0
         K.state[SINCE_STORE] += 1
         if K.state[SINCE_STORE] >= K.stride:
             store_row(K)

@@ -6,7 +6,7 @@
 A semismooth Newton method: every contact and friction takes the branch of its law that the last solution asks for, and
 the linear equations of these branches are solved again (Alart & Curnier 1991; Hintermüller, Ito & Kunisch 2002). Where
 a set of branches returns, single changes follow, the worst first and then the first, which cannot cycle where the
-Delassus matrix is a P-matrix; at last every choice is tried while there are few.
+Delassus matrix is a P-matrix; then Lemke's method (`pivoting`); at last every choice is tried while there are few.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from __future__ import annotations
 from typing import Any
 
 from mbd.kernel.fields import BLOCKED, CONFLICT, N_DROPPED, NO_IMPACT, PAST_TIME
+from mbd.kernel.pivoting import pivoted
 from mbd.kernel.redundancy import spread
 from mbd.kernel.restart import (
     MOST_LOADS,
@@ -55,9 +56,11 @@ def complementarity(K: Any, level: int) -> int:
             choices += 1
             sets = min(sets * 3, 2 * MOST_CHOICES)
     measure_free(K, level)
-    for attempt in range(4 * choices * choices + MOST_NEWTON + 8):
+    for attempt in range(4 * choices * min(choices, 16) + MOST_NEWTON + 16):
+        if attempt == MOST_NEWTON + 4 * min(choices, 4) + 8:
+            pivoted(K, level)
         status = solve_branches(K, level)
-        if status == CONFLICT and give_way(K) == 1:
+        if status == CONFLICT and (give_way(K) == 1 or pivoted(K, level) == 1):
             continue
         if status != 0:
             return status

@@ -40,7 +40,9 @@ REAL_ARRAYS = (
     "lean",  # frictions: the direction in which each slid last
     "typical",  # of velocities or accelerations without rows
     "given", "total", "total_jump", "loads", "trial", "trial_given", "trial_jump",  # phases of an impact
+    "kept",  # what a non-smooth step began from
     "before", "past", "past_limit",  # non-smooth steps: gap rates before, impulses and limits of the smooth part
+    "lcp_matrix", "lcp_shift", "lcp_found", "lcp_work", "lcp_limit", "lcp_slope",  # Lemke's method
     "guards0", "guards1",  # guard values at the accepted state and at the candidate
     "scale",  # magnitudes of r, h, ḣ term by term
     "deepest", "sinking",  # lowest gap of each contact while ignored; time of its first release into its surface
@@ -62,6 +64,10 @@ INTEGER_ARRAYS = (
     "anchor_start", "direction", "notify",
     "closed", "armed", "touched", "active", "free", "closing", "parting",  # contacts
     "sticks", "loose", "was",  # frictions; was: 0 off, 2 sticking, ±1 sliding since the last restart
+    "let_go",  # 1: a friction that has let go for the step being tried
+    "lifting",  # 1: a row that is left out of the correction of positions
+    "kept_flags",  # what a non-smooth step began from
+    "lcp_rows", "lcp_who", "lcp_basis",  # Lemke's method
     "dropped",  # rows that depend on others
     "mode_key", "mode_code", "mode_count",  # known modes
     "rows", "pivots", "columns", "fired", "state", "counts",
@@ -81,8 +87,8 @@ KEPT_INTEGERS = ("closed", "armed", "touched", "dropped", "rows", "state", "stic
 # places in `state`
 (
     MODE, ROWS, GRID, RESTART, STORED, LOGGED, SWITCHES, SINCE_STORE, BLOCKED, N_DROPPED, NEAR, INCHING, REDONE,
-    PLASTIC,
-) = range(14)  # fmt: skip
+    PLASTIC, HALVED, HALVES,
+) = range(16)  # fmt: skip
 # places in `counts`
 (
     STEPS, ITERATIONS, TANGENTS, RESIDUALS, FACTORIZATIONS, EVENTS, RESTARTS, IMPACTS, LOCATIONS, STAGNATIONS, CAREFUL,

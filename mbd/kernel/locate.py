@@ -25,7 +25,7 @@ from mbd.kernel.hermite import first_guess
 
 __all__ = ["locate"]
 
-MOST_HALVINGS = 12
+MOST_LOOKS = 12
 """How often a step is halved to see a friction slide, or a contact part, that has just begun to [-]."""
 SAME = 1e-9
 """Events closer than this part of the way to the first are one event."""
@@ -183,7 +183,7 @@ def find_way(K: Any, kind: int, index: int, high: float) -> float:
     """
     tiny = gap_tolerance(K, index) if kind == CLOSE else 0.0
     low = high
-    for _ in range(MOST_HALVINGS):
+    for _ in range(MOST_LOOKS):
         low *= 0.5
         status = try_step(K, low, K.clock[NOW] + low)
         if status != 0:

@@ -29,11 +29,11 @@ from mbd.kernel.fields import (
 )  # fmt: skip
 from mbd.kernel.guards import frictions_at, gap_scale, gap_tolerance, is_watched, watch
 from mbd.kernel.hooks import call
-from mbd.kernel.restart import evaluate
+from mbd.kernel.restart import consistent, evaluate
 from mbd.kernel.settle import STILL, log_event
 from mbd.kernel.switching import close_by_impact, mark_touching
 
-__all__ = ["lands", "lets_go", "rebound", "strike"]
+__all__ = ["keep", "lands", "lets_go", "put_back", "rebound", "strike"]
 
 MOST_LIFTS = 20
 """Corrections of positions at one instant [-]."""
@@ -43,14 +43,17 @@ RESTING = 2.0
 """Approach speed over the change of speed in a step below which a contact rests instead of rebounding [-]."""
 
 
-def lets_go(K: Any) -> int:
-    """Contacts that pulled and frictions beyond their limits in the step just tried let go before it; how many."""
+def lets_go(K: Any, t1: float) -> int:
+    """Contacts that pulled and frictions beyond their limits in the step just tried let go before it; how many.
+
+    What has let go for a step does not hold again in it, even where frictions that depend on each other share a load.
+    """
     force = 0.0
     for i in range(K.n_v):
         force = max(force, K.scale[i])
     count = 0
     for c in range(K.n_contacts):
-        if K.kind[c] == 0 and K.closed[c] == 1 and K.opens[c] == 0 and K.lam1[K.normal[c]] > PULL * force:
+        if K.kind[c] == 0 and K.closed[c] == 1 and K.opens[c] == 0 and pulls(K, c, PULL * force, t1):
             K.closed[c] = 0
             K.armed[c] = 1
             count += 1
@@ -63,15 +66,28 @@ def lets_go(K: Any) -> int:
             K.slip[f] = 0.0
             continue
         pull = K.lam1[K.friction_row[f]]
+        if K.state[REDONE] == 0:
+            K.let_go[f] = 0
         if K.sticks[f] == 1 and abs(pull) - K.guards1[limits + f] > PULL * force:
             K.sticks[f] = 0
             K.slip[f] = 1.0 if pull > 0.0 else -1.0
-            K.loose[f] = 3
+            K.let_go[f] = 1
             count += 1
     if count > 0:
+        for f in range(K.n_frictions):
+            if K.let_go[f] == 1 and K.slip[f] != 0.0:
+                K.loose[f] = 3
         K.state[RESTART] = 2
         K.state[REDONE] += 1
     return count
+
+
+def pulls(K: Any, c: int, least: float, t1: float) -> bool:
+    """Whether a contact pulled at the candidate; where multipliers may ring, by consistent ones (index 3)."""
+    row = K.normal[c]
+    if K.lam1[row] <= least:
+        return False
+    return bool(K.stabilized == 1 or consistent(K, t1, K.q1, K.y1) != 0 or K.impulse[row] > least)
 
 
 def lands(K: Any) -> bool:
@@ -100,6 +116,10 @@ def lift(K: Any) -> int:
         K.limit[f] = K.slip[f]  # kept here: friction moves nothing
         K.slip[f] = 0.0
         K.loose[f] = 0
+    for k in range(K.n_rows):  # those that depend on others, and along a surface that is only being reached
+        c = K.row_contact[k]
+        along = c >= 0 and K.row_normal[k] == 0 and K.closed[c] == 0
+        K.lifting[k] = 1 if (along or K.dropped[k] == 1) else 0
     status = NO_IMPACT
     for _ in range(MOST_LIFTS):
         for c in range(K.n_contacts):
@@ -125,6 +145,8 @@ def lift(K: Any) -> int:
             break
     for f in range(K.n_frictions):
         K.slip[f] = K.limit[f]
+    for k in range(K.n_rows):
+        K.lifting[k] = 0
     return status
 
 
@@ -136,10 +158,8 @@ def lift_once(K: Any) -> int:
     for i in range(n):
         K.force[i] = 0.0
     for k in range(K.n_rows):
-        c = K.row_contact[k]
         K.given[k] = 0.0
-        held = c < 0 or K.closed[c] == 1 or K.row_normal[k] == 1
-        K.bias[k] = K.acc[o_h + k] if held else 0.0  # a contact that comes down keeps its place along the surface
+        K.bias[k] = K.acc[o_h + k]
     status = complementarity(K, 2)
     if status != 0:
         return status
@@ -202,6 +222,7 @@ def rebound(K: Any) -> int:
             if approach < RESTING * gained:
                 K.before[c] = 0.0  # it rests
             else:
+                K.before[c] = max(K.before[c], min(K.guards0[nC + c], 0.0))  # the slower one: it gains no energy
                 fastest = max(fastest, approach)
     status = close_by_impact(K, fastest)
     if status == 0:
@@ -210,3 +231,47 @@ def rebound(K: Any) -> int:
         K.past[k] = 0.0
     K.detail[PAST_TIME] = 0.0
     return status
+
+
+def keep(K: Any) -> None:
+    """Remember the accepted state, from which a step whose end has no impulses is tried again."""
+    copy(K, True)
+    copy_flags(K, True)
+
+
+def put_back(K: Any, t: float) -> None:
+    """The state as `keep` found it, at time t."""
+    copy(K, False)
+    copy_flags(K, False)
+    K.clock[NOW] = t
+
+
+def copy(K: Any, out: bool) -> None:
+    """The state into K.kept, or back."""
+    o = carry(K.q, K.kept, 0, K.n_q, out)
+    o = carry(K.y, K.kept, o, K.n, out)
+    o = carry(K.rate, K.kept, o, K.n, out)
+    o = carry(K.lam, K.kept, o, K.n_rows, out)
+    o = carry(K.guards0, K.kept, o, K.n_watched, out)
+    o = carry(K.anchors, K.kept, o, K.n_anchors, out)
+    carry(K.slip, K.kept, o, K.n_frictions, out)
+
+
+def copy_flags(K: Any, out: bool) -> None:
+    """Who is closed, armed, … into K.kept_flags, or back."""
+    o = carry(K.closed, K.kept_flags, 0, K.n_contacts, out)
+    o = carry(K.armed, K.kept_flags, o, K.n_contacts, out)
+    o = carry(K.touched, K.kept_flags, o, K.n_contacts, out)
+    o = carry(K.sticks, K.kept_flags, o, K.n_frictions, out)
+    o = carry(K.loose, K.kept_flags, o, K.n_frictions, out)
+    carry(K.was, K.kept_flags, o, K.n_frictions, out)
+
+
+def carry(values: Any, kept: Any, place: int, count: int, out: bool) -> int:
+    """Copy one array; where the next one goes."""
+    for i in range(count):
+        if out:
+            kept[place + i] = values[i]
+        else:
+            values[i] = kept[place + i]
+    return place + count

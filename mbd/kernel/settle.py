@@ -128,8 +128,8 @@ def find_slips(K: Any) -> None:
             K.slip[f] = 0.0
             continue
         gamma = row_speed(K, K.friction_row[f])
-        if told == 3:
-            K.loose[f] = 2
+        if told == 3:  # an event may have been wrong about it; a step that has been tried was not
+            K.loose[f] = 2 if K.strategy == 0 else 0
             continue
         small = max(1.0, 1e-2 * K.scale[K.n + K.n_rows + K.friction_row[f]])
         still = abs(gamma) <= STILL * small

@@ -25,6 +25,8 @@ def facts(run: Trajectory) -> list[tuple[str, str]]:
     settings += [f"{key} = {run.settings[key]}" for key in ("dt", "tol") if run.settings.get(key) is not None]
     if settings:
         found.append(("integrator", ", ".join(settings)))
+    if strategy(run):
+        found.append(("contact", strategy(run)))
     if len(time):
         energy = run.energy
         relative = f"{energy.drift:.2g} of the swing of kinetic energy"
@@ -36,6 +38,13 @@ def facts(run: Trajectory) -> list[tuple[str, str]]:
         found.append(("cost", ", ".join(f"{key} {_number(value)}" for key, value in costs.items())))
     found += [("note", str(note)) for note in run.stats.get("notes", ())]
     return found
+
+
+def strategy(run: Trajectory) -> str:
+    """How contacts were treated, and why; '' without contacts."""
+    if not run.record.closed.shape[1] or "contact" not in run.settings:
+        return ""
+    return str(run.settings.get("contact_reason") or f"contact='{run.settings['contact']}', as asked")
 
 
 def counts(run: Trajectory) -> str:

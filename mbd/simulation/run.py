@@ -415,7 +415,8 @@ class Run:
         notes += [dependent] if dependent else []
         shortened = int(v["counts"][F.SHORTENED])
         if shortened:
-            notes.append(f"{shortened} steps were shortened where Newton's method failed at the full dt")
+            cause = "Newton's method or the impact law failed at the full dt"
+            notes.append(f"{shortened} steps were shortened where {cause}")
         energetic = int(v["counts"][F.STRONGE])
         if energetic:
             notes.append(

@@ -14,6 +14,7 @@ from mbd.integrators.base import Integrator
 from mbd.integrators.family import MAX_ITERATIONS, NewmarkFamily
 from mbd.kernel import fields as F
 from mbd.kernel.active_set import ActiveSetManager
+from mbd.kernel.lemke import lemke_places
 from mbd.simulation.plain import MechanismSystem, PlainScheme, row_units, unit_blocks
 from mbd.tape.derivatives import live
 
@@ -116,7 +117,7 @@ class Stepper:
         v = self.values
         n, n_q, rows, contacts, guards = v["n"], v["n_q"], v["n_rows"], v["n_contacts"], v["n_guards"]
         frictions = v["n_frictions"]
-        size = n + rows
+        size, unknowns = n + rows, contacts + 3 * frictions
         reals = {
             "block": self.mechanism.layout.size, "out": size * size + n + 2 * rows + rows * n, "clock": 4,
             "acc": self.mechanism.sizes["accelerations"], "q": n_q, "y": n, "rate": n, "aux": n, "slope": n,
@@ -130,16 +131,21 @@ class Stepper:
             "slip": frictions, "limit": frictions, "base_limit": frictions, "lean": frictions, "typical": n,
             "given": rows, "total": rows, "total_jump": n, "loads": rows, "before": contacts, "past": rows,
             "past_limit": frictions, "trial": rows, "trial_given": rows, "trial_jump": n,
+            "lcp_matrix": unknowns * unknowns, "lcp_shift": unknowns, "lcp_found": unknowns,
+            "lcp_work": lemke_places(unknowns), "lcp_limit": frictions, "lcp_slope": frictions,
+            "kept": n_q + 2 * n + rows + v["n_watched"] + v["n_anchors"] + frictions,
             "store": v["capacity"] * v["width"], "log": v["event_capacity"] * v["event_width"],
         }  # fmt: skip
         integers = {
             "unit": n, "notify": contacts + guards + frictions, "closed": contacts,
             "armed": contacts, "touched": contacts, "active": contacts + guards + frictions, "free": contacts,
-            "closing": contacts, "parting": contacts, "sticks": frictions, "loose": frictions,
-            "was": frictions, "mode_key": MODE_CAPACITY * (contacts + rows + frictions), "dropped": rows,
+            "closing": contacts, "parting": contacts, "lifting": rows, "kept_flags": 3 * contacts + 3 * frictions,
+            "sticks": frictions, "loose": frictions, "was": frictions, "let_go": frictions, "dropped": rows,
+            "mode_key": MODE_CAPACITY * (contacts + rows + frictions),
             "mode_code": 2 * MODE_CAPACITY,
             "mode_count": 1, "rows": rows,
-            "pivots": size, "columns": size, "fired": 2, "state": 16, "counts": 16,
+            "pivots": size, "columns": size, "lcp_rows": contacts + frictions, "lcp_who": contacts + frictions,
+            "lcp_basis": unknowns, "fired": 2, "state": 16, "counts": 16,
         }  # fmt: skip
         self.reals = _shelve(v, {name: reals.pop(name) for name in F.KEPT_REALS}, float)
         self.integers = _shelve(v, {name: integers.pop(name) for name in F.KEPT_INTEGERS}, np.int64)

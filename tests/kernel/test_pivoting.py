@@ -1,0 +1,253 @@
+"""Branches by Lemke's method in the whole complementarity solver: degenerate, rank-deficient, infeasible problems."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+
+from mbd.kernel import complementarity as solver, fields as F, pivoting
+from mbd.kernel.complementarity import complementarity
+from mbd.kernel.lemke import lemke_places
+
+seeds = st.integers(0, 2**32 - 1)
+
+
+class Problem:
+    """``M w + force + R λ = 0`` with held rows H, contacts of normals N and tangents T, and dry frictions D.
+
+    mu : of each contact, 0 without friction, None for a tangent row that sticks whatever its force
+    """
+
+    def __init__(self, M, force, N=(), T=(), mu=(), H=(), D=(), limits=(), bias=(), held=()):
+        self.n, self.N, self.T, self.mu = len(M), N, T, mu
+        self.M, self.f = np.asarray(M, float), np.asarray(force, float)
+        rows, contact, normal, friction, who = [], [], [], [], []
+        for h in H:
+            rows.append(h), contact.append(-1), normal.append(0), friction.append(-1)
+        self.places = []
+        for c, row in enumerate(N):
+            self.places.append(len(rows))
+            rows.append(row), contact.append(c), normal.append(1), friction.append(-1)
+            if mu[c] is None or mu[c] > 0.0:
+                rows.append(T[c]), contact.append(c), normal.append(0)
+                friction.append(-1 if mu[c] is None else len(who))
+                who += [] if mu[c] is None else [(len(rows) - 1, c, float(mu[c]))]
+        for d, limit in zip(D, limits, strict=True):
+            rows.append(d), contact.append(-1), normal.append(0), friction.append(len(who))
+            who.append((len(rows) - 1, -1, float(limit)))
+        self.B, self.who, self.contacts = np.array(rows, float).reshape(len(rows), self.n), who, len(N)
+        self.bias = np.resize(np.asarray(bias if len(bias) else [0.0], float), len(rows))
+        self.K = self._kernel(contact, normal, friction)
+        for c in held:
+            self.K.free[c] = 0
+
+    def _kernel(self, contact, normal, friction):
+        n, rows, contacts, frictions = self.n, len(self.B), self.contacts, len(self.who)
+        size, unknowns, most = n + rows, contacts + 3 * frictions, 64
+        values = dict.fromkeys(F.INTEGERS, 0) | dict.fromkeys(F.REALS, 0.0)
+        values |= {name: np.zeros(most * most) for name in F.REAL_ARRAYS}
+        values |= {name: np.zeros(most * most, dtype=np.int64) for name in F.INTEGER_ARRAYS}
+        values |= {"n_v": n, "n": n, "n_rows": rows, "n_contacts": contacts, "n_frictions": frictions}
+        values |= {"o_lam": 0, "o_slip": rows, "code": [self.evaluate], "hooks": None}
+        values["lcp_work"] = np.zeros(lemke_places(max(unknowns, 1)))
+        values["kkt"], values["scale"] = np.zeros(size * size), np.ones(most * most)
+        K = F.Kernel(**{name: values[name] for name in F.FIELDS})
+        K.row_contact[:rows], K.row_normal[:rows], K.row_friction[:rows] = contact, normal, friction
+        K.normal[:contacts] = self.places
+        for f, (row, c, _) in enumerate(self.who):
+            K.friction_row[f], K.friction_contact[f], K.loose[f], K.sticks[f] = row, c, 1, 1
+        K.active[:contacts] = K.free[:contacts] = 1
+        K.code[0](K.block, K.params, K.acc)
+        return K
+
+    def limit(self, f, lam):
+        _, c, size = self.who[f]
+        return size if c < 0 else -size * lam[self.places[c]]
+
+    def evaluate(self, block, _params, out):
+        rows, lam, slip = len(self.B), block[: len(self.B)], block[len(self.B) :]
+        R, force = self.B.T.copy(), self.f.copy()
+        for f, (row, c, size) in enumerate(self.who):
+            if c >= 0:
+                R[:, self.places[c]] -= slip[f] * size * self.B[row]
+            else:
+                force += slip[f] * size * self.B[row]
+        limits = [self.limit(f, lam) for f in range(len(self.who))]
+        zero = np.zeros(rows)
+        parts = [self.M.ravel(), force, R.ravel(), self.B.ravel(), zero, zero, self.bias, [0.0], limits]
+        flat = np.concatenate([np.asarray(part, float) for part in parts])
+        out[: len(flat)] = flat
+
+    def solve(self, level=0):
+        if level == 1:
+            self.K.bias[: len(self.B)] = self.bias
+        return complementarity(self.K, level)
+
+    def check(self, bound=1e-8):
+        """Balance, Signorini's and Coulomb's laws, whatever the solver thinks of its solution."""
+        K, rows = self.K, len(self.B)
+        w, lam = K.jump[: self.n].copy(), K.impulse[:rows].copy()
+        assert np.abs(self.M @ w + self.f + self.B.T @ lam).max() < bound * (1.0 + np.abs(lam).max())
+        gamma, size = self.B @ w + self.bias, bound * (1.0 + np.abs(lam).max() + np.abs(w).max())
+        chosen = {row for row, _, _ in self.who} | set(self.places)
+        for row in set(range(rows)) - chosen:
+            contact = K.row_contact[row]
+            assert abs(gamma[row]) < size or (contact >= 0 and K.active[contact] == 0)
+        for c, row in enumerate(self.places):
+            if K.free[c]:
+                assert lam[row] <= size and gamma[row] >= -size and min(-lam[row], gamma[row]) <= size
+            else:
+                assert abs(gamma[row]) < size
+        for f, (row, _, _) in enumerate(self.who):
+            limit = self.limit(f, lam)
+            assert abs(lam[row]) <= limit + size
+            if abs(gamma[row]) > 30 * size:
+                assert abs(lam[row] - np.sign(gamma[row]) * limit) < 30 * size
+
+
+@pytest.fixture
+def only_lemke(monkeypatch):
+    """Nothing but Lemke's method chooses branches; whether it has, as a list with one entry."""
+    found = []
+
+    def counted(K, level):
+        found.append(pivoting.pivoted(K, level))
+        return found[-1]
+
+    def wrong(K, the_worst=False):
+        return int(not found or solver.worst(K, False) > 0)
+
+    monkeypatch.setattr(solver, "pivoted", counted)
+    monkeypatch.setattr(solver, "change_all", wrong)
+    monkeypatch.setattr(solver, "change_one", wrong)
+    monkeypatch.setattr(solver, "MOST_CHOICES", 0)
+    return found
+
+
+def scene(rng, contacts, dofs, frictions=0, held=0, copies=False, coefficient=0.5, level=0):
+    """A random problem; all contacts can open: normals have a common direction."""
+    root = rng.normal(size=(dofs, dofs))
+    M = root @ root.T + 0.5 * np.eye(dofs)
+    N, T = rng.normal(size=(contacts, dofs)), rng.normal(size=(contacts, dofs))
+    N[:, 0] = 2.0 + np.abs(N).sum(axis=1)
+    if copies:
+        N[contacts // 2 :], T[contacts // 2 :] = N[: contacts - contacts // 2], T[: contacts - contacts // 2]
+    H = rng.normal(size=(held, dofs))
+    H[:, 0] = 0.0
+    mu = rng.choice([0.0, 0.1, coefficient], contacts)
+    D, limits = rng.normal(size=(frictions, dofs)), rng.uniform(0.0, 2.0, frictions)
+    force = rng.normal(size=dofs) * 5.0
+    if level == 0:
+        return Problem(M, force, N, T, mu, H, D, limits)
+    count = contacts + held + frictions + np.count_nonzero(mu)
+    return Problem(M, 0.0 * force, N, T, mu, H, D, 0.0 * limits, rng.normal(size=count))
+
+
+@settings(max_examples=40)
+@given(contacts=st.integers(1, 5), frictions=st.integers(0, 2), held=st.integers(0, 1), seed=seeds)
+def test_contacts_and_friction_obey_their_laws(contacts, frictions, held, seed):
+    problem = scene(np.random.default_rng(seed), contacts, 2 * contacts + frictions + held + 1, frictions, held)
+    assert problem.solve() == 0
+    problem.check()
+
+
+# Lemke's method alone -----------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("level", [0, 1])
+@pytest.mark.parametrize("seed", range(15))
+def test_lemke_alone_finds_accelerations_and_impulses(only_lemke, seed, level):
+    rng = np.random.default_rng(seed)
+    problem = scene(rng, 2 + seed % 4, 14, seed % 3, seed % 2, coefficient=0.3, level=level)
+    assert problem.solve(level) == 0
+    assert only_lemke == [1]
+    problem.check()
+
+
+@pytest.mark.parametrize("seed", range(15))
+def test_contacts_twice_at_one_place_are_no_obstacle(only_lemke, seed):
+    problem = scene(np.random.default_rng(seed), 2 + seed % 5, 4 + seed % 3, 0, seed % 2, True, coefficient=0.0)
+    assert problem.solve() == 0
+    assert only_lemke == [1]
+    problem.check()
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_more_contacts_than_could_be_tried_one_set_after_the_other(only_lemke, seed):
+    problem = scene(np.random.default_rng(seed), 9, 22, 2, 1, coefficient=0.4)
+    assert problem.solve() == 0
+    problem.check()
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_held_rows_may_depend_on_each_other(only_lemke, seed):
+    rng = np.random.default_rng(seed)
+    problem = scene(rng, 3, 9, 1, 0)
+    row = np.append(0.0, rng.normal(size=8))
+    whole = Problem(problem.M, problem.f, N=problem.N, T=problem.T, mu=problem.mu, H=[row, 2.0 * row])
+    assert whole.solve() == 0 and only_lemke == [1]
+    whole.check()
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_friction_of_a_contact_that_is_held_follows_its_force(only_lemke, seed):
+    """Its push is no unknown, but follows those that are."""
+    rng = np.random.default_rng(seed)
+    problem = scene(rng, 3, 9)
+    pressed = problem.f + 40.0 * problem.N[0]
+    whole = Problem(problem.M, pressed, N=problem.N, T=problem.T, mu=[0.3, 0.3, 0.0], held=[0])
+    assert whole.solve() == 0 and only_lemke == [1]
+    whole.check()
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_contacts_under_given_impulses_choose_whether_they_part(only_lemke, seed):
+    """The second phase of an impact: the normal row is on or off, tangents stay."""
+    problem = scene(np.random.default_rng(seed), 4, 12, level=1, coefficient=0.3)
+    K = problem.K
+    for c, row in enumerate(problem.places):
+        K.free[c], K.parting[c], K.given[row] = 2, 1, -0.4 * (c + 1)
+    assert problem.solve(1) == 0 and only_lemke == [1]
+    given = K.given[: len(problem.B)].copy()
+    total = K.impulse[: len(problem.B)] + given
+    w = K.jump[: problem.n]
+    assert np.abs(problem.M @ w + problem.B.T @ total).max() < 1e-9 * (1.0 + np.abs(total).max())
+    gamma = problem.B @ w + problem.bias
+    for row in problem.places:
+        more = -K.impulse[row]
+        assert more > -1e-9 and gamma[row] > -1e-9 and min(more, gamma[row]) < 1e-9
+    for f, (row, _, _) in enumerate(problem.who):
+        assert abs(total[row]) <= problem.limit(f, total) + 1e-9
+
+
+# where it cannot ----------------------------------------------------------------------------------------------------
+def pivots(problem):
+    return pivoting.pivoted(problem.K, 0)
+
+
+def test_a_vice_has_no_solution_and_says_so():
+    """Two walls that come together: neither Lemke's method nor trying every set finds forces."""
+    problem = Problem(np.eye(2), np.zeros(2), N=[[1, 0], [-1, 0]], mu=[0.0, 0.0], bias=[-1.0, -1.0])
+    assert pivots(problem) == 0
+    assert problem.solve() in (F.NO_IMPACT, F.CONFLICT)
+
+
+def test_masses_that_only_contacts_determine_are_left_to_the_other_methods():
+    problem = Problem(np.diag([1.0, 0.0]), [1.0, 1.0], N=[[0, 1]], mu=[0.0])
+    assert pivots(problem) == 0
+    problem.K.active[0] = 1
+    assert problem.solve() == 0
+    assert problem.K.impulse[0] == pytest.approx(-1.0)
+
+
+def test_tangents_without_limit_and_friction_that_follows_a_pin_are_left_to_the_other_methods():
+    sticking = Problem(np.eye(2), [0.3, 1.0], N=[[0, 1]], T=[[1, 0]], mu=[None])
+    assert pivots(sticking) == 0
+    assert sticking.solve() == 0
+    sticking.check()
+    pin = Problem(np.eye(2), [0.3, 1.0], N=[[0, 1]], T=[[1, 0]], mu=[0.1])
+    assert pivots(pin) == 1
+    assert pivoting.pivoted(pin.K._replace(loaded=1), 0) == 0
+
+
+def test_nothing_to_choose_is_nothing_found():
+    assert pivots(Problem(np.eye(2), [1.0, 0.0], H=[[1, 0]])) == 0
