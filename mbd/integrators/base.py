@@ -48,6 +48,8 @@ class Terms:
     scale_r, scale_h, scale_rate : magnitudes term by term before cancellation; None: taken from the values
     velocity : (m,) booleans, rows that hold velocities only: h = 0, `rate` and H = B + (c_K/c_C) ∂rate/∂x in both
         forms; None: no such row
+    turning : (m, n_v) ∂ḣ/∂x, the rate of B, zero for rows on velocities, whose H it does not enter then; stabilized
+        only; None: poses in which rows lose rank are not looked for
     """
 
     r: Vector
@@ -60,6 +62,7 @@ class Terms:
     scale_h: Vector | None = None
     scale_rate: Vector | None = None
     velocity: Any = None
+    turning: Matrix | None = None
 
 
 class System(Protocol):

@@ -14,7 +14,7 @@ normal to the rows in the metric of the Newton matrix. Rows on velocities are en
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
@@ -22,6 +22,8 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.errors import CapabilityError
 from mbd.integrators.base import Integrator, Point, StepReport, StepResult, System, Terms, consistent_rates
+from mbd.integrators.passage import CONTINUOUS, WITHIN, Distance, distance_to_pose
+from mbd.kernel.fields import LEFT, PASSING
 from mbd.state import Mode, State
 
 __all__ = ["Coefficients", "DEFAULT_TOLERANCE", "Formulation", "NewmarkFamily", "NewmarkMemory", "Starting"]
@@ -78,7 +80,8 @@ class NewmarkMemory:
 
     rate (n,) true v̇ and ż; aux (n,) the auxiliary a for steps of size `step`; lam (m,) multipliers;
     slope, lam_slope: their last rates of change, which predict the next step; shift (n_v,) the position correction and
-    shift_change what it changed by in the last step.
+    shift_change what it changed by in the last step; near 1 within a few steps of a pose in which rows lose rank, and 2
+    just beyond it, where the scheme is started again.
     """
 
     rate: Vector
@@ -89,6 +92,7 @@ class NewmarkMemory:
     shift: Vector
     shift_change: Vector
     step: float
+    near: int = 0
 
 
 class NewmarkFamily(Integrator):
@@ -173,6 +177,8 @@ class NewmarkFamily(Integrator):
 
     def step(self, system: System, state: State, dt: float, mode: Mode, memory: NewmarkMemory) -> StepResult:
         """One step by Newton's method; the readable twin of the compiled kernel."""
+        if memory.near == LEFT:
+            memory = self.start(system, state, mode, dt)
         return _Step(self, system, state, dt, mode, memory).run()
 
 
@@ -205,6 +211,11 @@ class _Step:
         self.size_at_start = self._size_at_start()
         self.x = dt * state.v + dt * dt * ((0.5 - k.beta) * self.a0[:n_v] + k.beta * a1[:n_v]) + self.shift
 
+        self.both = scheme.stabilized  # h and ḣ are held, not h alone
+        self.near = memory.near
+        self.whole = dt > (1.0 - 1e-6) * memory.step
+        if self.near == PASSING:
+            self._hold_positions()
         self.last: tuple[Any, Any] = np.zeros(len(y0)), np.zeros(len(self.lam))
 
     def _aux(self) -> Vector:
@@ -224,7 +235,7 @@ class _Step:
         if len(terms.h):
             floor = 16.0 * EPS * (np.ones(len(terms.h)) if terms.scale_h is None else terms.scale_h)
             speed = float(np.max(np.abs(self.y[: self.n_v]), initial=0.0))
-            limit = self.c_C * speed if self.scheme.stabilized else self.c_K * fastest
+            limit = self.c_C * speed if self.both else self.c_K * fastest
             parts.append(np.abs(terms.h) / (np.maximum(floor, tolerance * limit) + 1e-300))
             held = self._held(terms)
             if np.any(held):
@@ -235,8 +246,8 @@ class _Step:
 
     def _held(self, terms: Terms) -> Any:
         """Which rows are held at velocity level, (m,) booleans."""
-        if self.scheme.stabilized or terms.velocity is None:
-            return np.full(len(terms.h), self.scheme.stabilized)
+        if self.both or terms.velocity is None:
+            return np.full(len(terms.h), self.both)
         return np.asarray(terms.velocity, dtype=bool)
 
     def _size_at_start(self) -> Vector:
@@ -254,6 +265,15 @@ class _Step:
         for iteration in range(MAX_ITERATIONS):
             point = Point(t1, self.state.q, self.x, self.y, self.rate, self.lam)
             terms = self.system.evaluate(point, self.mode, (self.c_C, self.c_K))
+            if iteration == 0 and terms.turning is not None and len(terms.turning):
+                away = self._distance(terms)
+                if away.too_close(self.scheme.tolerance, self.near > 0, self.whole):
+                    return self._result(t1, StepReport(False, 0, 0.0, "a pose in which rows lose rank is too close"))
+                if self.near:
+                    self.near = PASSING if away.steps < WITHIN else LEFT
+                elif away.steps < WITHIN and (away.steps < 1.0 or self.whole):
+                    self._hold_positions()
+                    terms = self.system.evaluate(replace(point, x=self.x, y=self.y), self.mode, (self.c_C, self.c_K))
             error = self._error(terms)
             if iteration == 0:
                 reference = np.maximum(np.abs(terms.r), 1e-200) if terms.scale_r is None else terms.scale_r
@@ -267,6 +287,8 @@ class _Step:
                 return self._result(t1, StepReport(False, iteration, error, "a force or a row is not finite"))
             floor = 4096.0 * EPS / self.tolerance
             if error <= 1.0 or (iteration >= 2 and error > 0.5 * before and error <= max(1.0, floor)):
+                if self.near and self._leaves_branch():
+                    return self._result(t1, StepReport(False, iteration, 0.0, "the step leaves its branch of motions"))
                 return self._result(t1, StepReport(True, iteration, error))
             before, left, halvings = error, imbalance, 0
             try:
@@ -275,6 +297,31 @@ class _Step:
                 return self._result(t1, StepReport(False, iteration, error, "the Newton matrix is singular"))
         return self._result(t1, StepReport(False, MAX_ITERATIONS, error, "Newton did not converge"))
 
+    def _distance(self, terms: Terms) -> Distance:
+        """How many whole steps a pose is away in which the rows lose rank."""
+        assert terms.S is not None
+        assert terms.H is not None
+        assert terms.turning is not None
+        scale = np.ones(len(terms.h)) if terms.scale_h is None else terms.scale_h
+        n_v = self.n_v
+        B = terms.H[:, :n_v] - self.c_K / self.c_C * terms.turning
+        mass = np.abs(np.diag(terms.S))[:n_v]
+        return distance_to_pose(B, terms.turning, mass, self.y[:n_v], scale, max(self.dt, self.memory.step))
+
+    def _hold_positions(self) -> None:
+        """Hold h alone in this step, by the trapezoidal rule: see `mbd.kernel.passage`."""
+        self.both, self.near, self.k = False, PASSING, Coefficients(0.0, 0.0, 0.25, 0.5)
+        self.c_C, self.c_K = 0.5 * self.dt, 0.25 * self.dt**2
+        self.a0, self.shift = self.memory.rate, np.zeros(self.n_v)
+        self.y = self.predicted = self.y0 + self.c_C * (self.a0 + self.rate)
+        self.x = self.c_C * (self.y0 + self.y)[: self.n_v]
+
+    def _leaves_branch(self) -> bool:
+        n_v = self.n_v
+        before, predicted, now = self.y0[:n_v], self.predicted[:n_v], self.y[:n_v]
+        speed = np.maximum(np.abs(before), np.abs(predicted)) + self.dt * np.abs(self.memory.rate[:n_v])
+        return float(np.max(np.abs(now - predicted), initial=0.0)) > CONTINUOUS * float(np.max(speed, initial=0.0))
+
     def _correct(self, terms: Terms, iteration: int) -> None:
         n, m, n_v = len(terms.r), len(terms.h), self.n_v
         assert terms.S is not None
@@ -282,7 +329,9 @@ class _Step:
             change = np.linalg.solve(terms.S, -terms.r)
         else:
             matrix = np.block([[terms.S, terms.R], [terms.H, np.zeros((m, m))]])
-            stabilized = self.scheme.stabilized
+            stabilized = self.both
+            if self.near and terms.turning is not None:
+                matrix[n:, :n_v] -= self.c_K / self.c_C * terms.turning
             held = self._held(terms)
             goal = terms.h / self.c_K
             goal[held] = terms.rate[held] / self.c_C
@@ -328,6 +377,7 @@ class _Step:
             self.shift,
             self.shift - memory.shift,
             dt,
+            self.near,
         )
         old = self.state
         state = State(

@@ -21,12 +21,14 @@ from mbd.kernel.fields import (
     INCHING,
     LAST,
     LAST_SWITCH,
+    LEFT,
     LOG_EVENT,
     LOG_SLIPPED,
     LOG_STUCK,
     LOGGED,
     MODE,
     N_DROPPED,
+    NEAR,
     NEW_MODE,
     NO_IMPACT,
     NOT_CONVERGED,
@@ -51,9 +53,10 @@ from mbd.kernel.hooks import scheme_accept, scheme_start
 from mbd.kernel.locate import locate
 from mbd.kernel.nonsmooth import keep, lands, lets_go, put_back, rebound, strike
 from mbd.kernel.redundancy import find_dependent, spread
-from mbd.kernel.restart import active_rows, consistent, evaluate, solve_rows, stepping_rows
+from mbd.kernel.restart import active_rows, evaluate, stepping_rows
 from mbd.kernel.settle import log_event, settle
 from mbd.kernel.switching import switch
+from mbd.kernel.takeover import leave_pose, take_over
 
 __all__ = ["advance"]
 
@@ -173,46 +176,6 @@ def accept(K: Any, h: float, t1: float, quiet: bool) -> None:
     if not quiet:
         update_armed(K)
         update_sides(K)
-
-
-def project_velocity(K: Any) -> int:
-    """The nearest velocities, in the metric of M, with B v + h_t = 0 on the closed rows."""
-    m = active_rows(K, K.closed)
-    if m == 0:
-        return 0
-    evaluate(K, K.clock[NOW], K.q, K.y)
-    o_rate = K.n * K.n + K.n + 2 * K.n * K.n_rows + K.n_rows
-    for i in range(K.n):
-        K.force[i] = 0.0
-    for k in range(K.n_rows):
-        K.bias[k] = K.acc[o_rate + k]
-    status = solve_rows(K, m, True)
-    if status == 0:
-        for i in range(K.n):
-            K.y[i] += K.jump[i]
-    return status
-
-
-def take_over(K: Any, t1: float) -> None:
-    """The candidate becomes the accepted state ahead of a restart, consistent in the old mode at every level.
-
-    A shortened index-3 step leaves B v + h_t of the size of its error; it would survive a release, so it is removed.
-    """
-    for i in range(K.n_q):
-        K.q[i] = K.q1[i]
-    for i in range(K.n):
-        K.y[i] = K.y1[i]
-        K.rate[i] = K.rate1[i]
-    for k in range(K.n_rows):
-        K.lam[k] = K.lam1[k]
-    K.clock[NOW] = t1
-    for i in range(K.n_watched):
-        K.guards0[i] = K.guards1[i]
-    if project_velocity(K) == 0 and consistent(K, t1, K.q, K.y) == 0:
-        for i in range(K.n):
-            K.rate[i] = K.jump[i]
-        for k in range(K.n_rows):
-            K.lam[k] = K.impulse[k]
 
 
 def same_instant(K: Any) -> bool:
@@ -346,7 +309,7 @@ def advance(K: Any) -> int:
         if status != 0:
             return status
         K.counts[STEPS] += 1
-        holds = K.state[N_DROPPED] == 0 or still_dependent(K, t1)
+        holds = K.state[N_DROPPED] == 0 or still_dependent(K, t1) or K.state[NEAR] > 0  # nothing is told apart there
         fired = False
         quiet = is_quiet(K)
         if not quiet:
@@ -389,7 +352,11 @@ def advance(K: Any) -> int:
         elif K.state[INCHING] > 0:
             K.state[INCHING] -= 1
         uneven = K.stabilized == 0 and K.state[ROWS] > 0 and h < (1.0 - 1e-6) * K.dt
-        if h < 1e-3 * K.dt or uneven:  # index 3 rings after a change of step
+        if K.state[NEAR] == LEFT:
+            status = leave_pose(K, h, t1)
+            if status != 0:
+                return status
+        elif h < 1e-3 * K.dt or uneven:  # index 3 rings after a change of step
             take_over(K, t1)
             K.state[RESTART] = 2
         else:

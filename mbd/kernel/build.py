@@ -30,8 +30,8 @@ __all__ = ["MODULES", "entry", "ir_of_kernel", "object_code", "source_digest"]
 ENTRY = "mbd_kernel"
 
 MODULES = (
-    "linear", "lemke", "redundancy", "restart", "pivoting", "complementarity", "blow", "impact", "settle", "careful",
-    "newmark", "hermite", "guards", "locate", "switching", "nonsmooth", "advance",
+    "linear", "lemke", "redundancy", "restart", "pivoting", "complementarity", "blow", "impact", "settle", "iteration",
+    "passage", "newmark", "hermite", "guards", "locate", "switching", "nonsmooth", "takeover", "advance",
 )  # fmt: skip
 
 

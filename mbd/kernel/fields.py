@@ -94,8 +94,10 @@ KEPT_INTEGERS = ("closed", "armed", "touched", "dropped", "rows", "state", "stic
     STEPS, ITERATIONS, TANGENTS, RESIDUALS, FACTORIZATIONS, EVENTS, RESTARTS, IMPACTS, LOCATIONS, STAGNATIONS, CAREFUL,
     SHORTENED, STRONGE, ENDLESS,
 ) = range(14)  # fmt: skip
-# places in `detail` of the sizes of velocity corrections: of the last, and of the last ordinary step
-CORRECTED, USUAL = 4, 5
+# values of state[NEAR]: within a few steps of a pose in which rows lose rank, and just beyond it
+PASSING, LEFT = 1, 2
+# places in `detail` of the largest inverse pivot of rows in the last step, of what round-off makes of velocities there
+PIVOT, KICK = 4, 5
 # and of the time that K.past covers, of the last correction of positions by contacts
 PAST_TIME, LIFTED = 6, 7
 # places in `clock`

@@ -9,12 +9,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from mbd.kernel.careful import careful_correction
 from mbd.kernel.fields import (
     AUX_STEP,
     BLOCKED,
-    CAREFUL,
-    CORRECTED,
     EPS,
     FACTORIZATIONS,
     ITERATIONS,
@@ -23,6 +20,8 @@ from mbd.kernel.fields import (
     NOT_CONVERGED,
     NOT_FINITE,
     NOW,
+    PASSING,
+    PIVOT,
     RESIDUALS,
     ROWS,
     SINGULAR,
@@ -30,23 +29,17 @@ from mbd.kernel.fields import (
     STAGNATIONS,
     TANGENTS,
     TOO_TIGHT,
-    USUAL,
 )  # fmt: skip
 from mbd.kernel.hooks import call
+from mbd.kernel.iteration import finish, overturns, predict, residual_size, runs_away
 from mbd.kernel.linear import factor, solve
+from mbd.kernel.passage import WITHIN, approaches, misses, passing_step, steps_to_pose
 from mbd.kernel.restart import compose, consistent, fill_block, raise_scales, refresh_scales
 
 __all__ = ["newmark_accept", "newmark_start", "newmark_step"]
 
 MOST_HALVINGS = 10
 """How often a Newton correction is halved before the iteration goes on from where it is."""
-CONTINUOUS = 0.05
-"""Part of the speed by which a careful step may differ from its prediction: branches are continuous in velocity [-].
-
-And no more than twenty times what the last ordinary step was corrected by.
-"""
-WATCHFUL = 20
-"""Steps after a careful one in which every step must continue its branch."""
 FAR = 1e4
 """Residual over its tolerance above which a correction that does not reduce it is halved."""
 
@@ -71,6 +64,8 @@ def newmark_start(K: Any) -> int:
     for k in range(K.n_rows):
         K.lam_slope[k] = (K.impulse[k] - K.lam[k]) / step if status == 0 else 0.0
     K.clock[AUX_STEP] = K.dt
+    K.state[NEAR] = 0
+    K.detail[PIVOT] = 0.0
     fill_block(K, t, K.q, K.y)
     refresh_scales(K)
     if unresolved(K):
@@ -101,42 +96,6 @@ def unresolved(K: Any) -> bool:
     return change > 100.0 * known
 
 
-def residual_size(K: Any, o_r: int, m: int, c_C: float, c_K: float, tolerance: float) -> float:
-    """Largest residual over its tolerance: balance, h and (stabilized) ḣ, each block apart; −1 if not finite."""
-    size = 0.0
-    finite = 0.0
-    fastest = 0.0
-    for i in range(K.n):
-        r = abs(K.out[o_r + i])
-        finite += r
-        size = max(size, r / (tolerance * K.scale[i]))
-    speed = 0.0
-    for i in range(K.n_v):
-        fastest = max(fastest, abs(K.block[K.o_a + i]))
-        speed = max(speed, abs(K.block[K.o_v + i]))
-    o_h = o_r + K.n
-    for k in range(m):
-        row = K.rows[k]
-        h = abs(K.out[o_h + k])
-        finite += h
-        limit = tolerance * c_K * fastest
-        floor = 16.0 * EPS * K.scale[K.n + row]
-        if K.stabilized == 1:
-            limit = tolerance * c_C * speed
-        elif K.row_level[row] == 1:  # a rate stands in the place of h
-            limit = tolerance * c_C * fastest
-            floor = 16.0 * EPS * K.scale[K.n + K.n_rows + row]
-        size = max(size, h / (max(floor, limit) + 1e-300))
-        if K.stabilized == 1:
-            rate = abs(K.out[o_h + m + k])
-            finite += rate
-            floor = 16.0 * EPS * K.scale[K.n + K.n_rows + row]
-            size = max(size, rate / (max(floor, tolerance * c_C * fastest) + 1e-300))
-    if not finite < 1e300:
-        return -1.0
-    return size
-
-
 def newmark_step(K: Any, h: float, t1: float) -> int:
     """Candidate state (q1, y1, rate1, aux1, lam1) after a step of size h; the accepted state is untouched.
 
@@ -148,11 +107,10 @@ def newmark_step(K: Any, h: float, t1: float) -> int:
     c = (1.0 - K.alpha_f) / (1.0 - K.alpha_m)
     c_C = K.gamma * h * c
     c_K = K.beta * h * h * c
+    if K.state[NEAR] == PASSING:
+        return passing_step(K, h, t1)
     predict(K, h, t1, c_C, c_K)
-    if K.state[NEAR] > 0:
-        for i in range(K.n):
-            K.y1[i] = K.block[K.o_v + i]
-    tolerance = 4.0 * EPS if K.exact == 1 else 1e-3 * K.tolerance
+    tolerance = min(4.0 * EPS, K.tolerance) if K.exact == 1 else 1e-3 * K.tolerance
     before = 1e300
     left = 1e300  # the error where the last correction started
     halvings = 0
@@ -167,7 +125,7 @@ def newmark_step(K: Any, h: float, t1: float) -> int:
             call(K, K.mode_code[2 * K.state[MODE] + 1], K.out)
             K.counts[RESIDUALS] += 1
         o_r = size * size if tangent else 0
-        error = residual_size(K, o_r, m, c_C, c_K, tolerance)
+        error = residual_size(K, o_r, m, c_C, c_K, tolerance, K.stabilized)
         if halvings < MOST_HALVINGS and iteration > 0 and (error < 0.0 or (error > FAR and error > 0.9 * left)):
             retreat(K, m, c_C, c_K)  # a full Newton step jumped over a steep place
             halvings += 1
@@ -180,22 +138,18 @@ def newmark_step(K: Any, h: float, t1: float) -> int:
             raise_scales(K, True)
             if runs_away(K, m):
                 break
-            error = residual_size(K, o_r, m, c_C, c_K, tolerance)
-            if error > 1.0 and residual_size(K, o_r, m, 0.0, 0.0, 256.0 * EPS) <= 16.0:
-                if residual_size(K, o_r, m, c_C, c_K, K.tolerance) > 1.0:
+            error = residual_size(K, o_r, m, c_C, c_K, tolerance, K.stabilized)
+            if error > 1.0 and residual_size(K, o_r, m, 0.0, 0.0, 256.0 * EPS, K.stabilized) <= 16.0:
+                if residual_size(K, o_r, m, c_C, c_K, K.tolerance, K.stabilized) > 1.0:
                     K.detail[0] = t1
                     K.detail[2] = h
                     return TOO_TIGHT
                 K.counts[STAGNATIONS] += 1
                 error = 1.0
-            elif iteration >= 6 and K.exact == 0 and residual_size(K, o_r, m, 0.0, 0.0, 1e5 * EPS) <= 1e3:
+            elif iteration >= 6 and K.exact == 0 and residual_size(K, o_r, m, 0.0, 0.0, 1e5 * EPS, K.stabilized) <= 1e3:
                 status = STAGNATED
                 break
         if error <= 1.0:
-            if K.state[NEAR] > 0:
-                if leaves_branch(K):
-                    break
-                K.state[NEAR] -= 1
             finish(K, h)
             if overturns(K, h):
                 K.detail[1] = -1.0
@@ -212,123 +166,20 @@ def newmark_step(K: Any, h: float, t1: float) -> int:
         if tangent and not factorize(K, size):
             status = SINGULAR
             break
+        if iteration == 0 and m > 0 and K.stabilized == 1 and approaches(K, m):
+            away = steps_to_pose(K, m, h, c_K / c_C) * h / K.dt
+            if away < WITHIN + 1.0 and misses(K, away, h):
+                K.detail[PIVOT] = 0.0
+                return SINGULAR
+            if away < WITHIN and (away < 1.0 or h > (1.0 - 1e-6) * K.dt):
+                return passing_step(K, h, t1)
         biggest = correct(K, m, c_C, c_K, tangent, shifting)
-        if iteration == 0 and K.state[NEAR] == 0:
-            K.detail[USUAL] = K.detail[CORRECTED]
         if iteration == 0 and K.exact == 0:  # the predictor's error measures that of the step: stay far below it
             tolerance = min(K.tolerance, max(1e-4 * biggest, tolerance))
         fresh = True
-    if m > 0 and K.stabilized == 1 and status != NOT_FINITE and careful_step(K, h, t1, c_C, c_K):
-        return 0
     K.detail[0] = t1
     K.detail[2] = h
     return status
-
-
-def overturns(K: Any, h: float) -> bool:
-    """Whether the estimated error of an angle in this step exceeds half a radian: it is not resolved at all.
-
-    ``e = h² |1/6 − β − (α_m − α_f)/2| |v̇₁ − v̇₀|``
-    """
-    share = abs(1.0 / 6.0 - K.beta - 0.5 * (K.alpha_m - K.alpha_f)) * h * h
-    change = 0.0
-    for i in range(K.n_v):
-        if K.unit[i] == 1:
-            change = max(change, abs(K.rate1[i] - K.rate[i]))
-    return bool(share * change > 0.5)
-
-
-def runs_away(K: Any, m: int) -> bool:
-    """Whether multipliers fight each other: their forces cancel to less than 1e-7 of their size.
-
-    Then r would vanish beside its terms whatever the motion, and a step must not be accepted for it.
-    """
-    size = K.n + m
-    call(K, K.mode_code[2 * K.state[MODE]], K.spare)
-    largest = 0.0
-    total = 0.0
-    for i in range(K.n):
-        terms = 0.0
-        force = 0.0
-        for k in range(m):
-            part = K.spare[i * size + K.n + k] * K.block[K.o_lam + K.rows[k]]
-            terms += abs(part)
-            force += part
-        largest = max(largest, terms)
-        total = max(total, abs(force))
-    return largest > 1e7 * total and largest > 1e3 * K.work[0]
-
-
-def leaves_branch(K: Any) -> bool:
-    """Whether velocities are no continuation of those before the step (the predicted ones are in K.y1)."""
-    fastest = 0.0
-    change = 0.0
-    for i in range(K.n_v):
-        fastest = max(fastest, max(abs(K.y[i]), abs(K.y1[i])))
-        change = max(change, abs(K.block[K.o_v + i] - K.y1[i]))
-    usual = CONTINUOUS * fastest
-    if K.detail[USUAL] > 0.0:
-        usual = min(usual, 20.0 * K.detail[USUAL] + 1e-9 * fastest)
-    return change > usual
-
-
-def careful_step(K: Any, h: float, t1: float, c_C: float, c_K: float) -> bool:
-    """The step once more with separate matrices for positions and velocities; whether it converged."""
-    m = K.state[ROWS]
-    size = K.n + m
-    predict(K, h, t1, c_C, c_K)
-    for i in range(K.n):
-        K.y1[i] = K.block[K.o_v + i]
-    before = 1e300
-    for iteration in range(K.max_iterations):
-        call(K, K.mode_code[2 * K.state[MODE]], K.out)
-        K.counts[TANGENTS] += 1
-        error = residual_size(K, size * size, m, c_C, c_K, K.tolerance)
-        if error >= 0.0 and iteration >= 2 and error > 0.5 * before:
-            raise_scales(K, True)
-            if runs_away(K, m):
-                return False
-            error = residual_size(K, size * size, m, c_C, c_K, K.tolerance)
-            if residual_size(K, size * size, m, 0.0, 0.0, 256.0 * EPS) <= 64.0:
-                K.counts[STAGNATIONS] += 1
-                error = min(error, 1.0)
-        if 0.0 <= error <= 1.0:
-            if leaves_branch(K):
-                return False
-            K.counts[CAREFUL] += 1
-            K.state[NEAR] = WATCHFUL
-            finish(K, h)
-            return not overturns(K, h)
-        before = error
-        if error < 0.0 or not careful_correction(K, c_C, c_K):
-            return False
-    return False
-
-
-def predict(K: Any, h: float, t1: float, c_C: float, c_K: float) -> None:
-    """The block at t₁ with rates, multipliers and position correction extrapolated."""
-    block = K.block
-    stretch = h / K.clock[AUX_STEP]
-    block[0] = t1
-    block[1] = c_C
-    block[2] = c_K
-    for i in range(K.n_q):
-        block[K.o_q + i] = K.q[i]
-    for k in range(K.n_rows):
-        block[K.o_lam + k] = K.lam[k] + h * K.lam_slope[k]
-    for k in range(K.n_anchors):
-        block[K.o_anchor + k] = K.anchors[k]
-    for f in range(K.n_frictions):
-        block[K.o_slip + f] = K.slip[f]
-    for i in range(K.n):
-        a0 = K.rate[i] + stretch * (K.aux[i] - K.rate[i])
-        rate = K.rate[i] + h * K.slope[i]
-        a1 = ((1.0 - K.alpha_f) * rate + K.alpha_f * K.rate[i] - K.alpha_m * a0) / (1.0 - K.alpha_m)
-        block[K.o_a + i] = rate
-        block[K.o_v + i] = K.y[i] + h * ((1.0 - K.gamma) * a0 + K.gamma * a1)
-        if i < K.n_v:
-            K.shift1[i] = (K.shift[i] + stretch * K.shift_change[i]) * (stretch * stretch * stretch)
-            block[K.o_x + i] = h * K.y[i] + h * h * ((0.5 - K.beta) * a0 + K.beta * a1) + K.shift1[i]
 
 
 def right_hand_sides(K: Any, o_r: int, m: int, c_C: float, c_K: float, tangent: bool) -> bool:
@@ -409,7 +260,6 @@ def correct(K: Any, m: int, c_C: float, c_K: float, tangent: bool, shifting: boo
             block[K.o_x + i] += c_K * change
     for k in range(m):
         block[K.o_lam + K.rows[k]] += K.rhs[n + k]
-    K.detail[CORRECTED] = c_C * biggest
     return biggest / fastest
 
 
@@ -425,19 +275,6 @@ def retreat(K: Any, m: int, c_C: float, c_K: float) -> None:
             K.block[K.o_x + i] -= c_K * K.rhs[i]
     for k in range(m):
         K.block[K.o_lam + K.rows[k]] -= K.rhs[n + k]
-
-
-def finish(K: Any, h: float) -> None:
-    """The converged block becomes the candidate."""
-    stretch = h / K.clock[AUX_STEP]
-    for i in range(K.n):
-        a0 = K.rate[i] + stretch * (K.aux[i] - K.rate[i])
-        K.rate1[i] = K.block[K.o_a + i]
-        K.y1[i] = K.block[K.o_v + i]
-        K.aux1[i] = ((1.0 - K.alpha_f) * K.rate1[i] + K.alpha_f * K.rate[i] - K.alpha_m * a0) / (1.0 - K.alpha_m)
-    for k in range(K.n_rows):
-        K.lam1[k] = K.block[K.o_lam + k]
-    compose(K, K.q1)
 
 
 def newmark_accept(K: Any, h: float) -> None:

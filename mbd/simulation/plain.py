@@ -12,7 +12,7 @@ from mbd.compile.mechanism import Mechanism, ModeCode
 from mbd.equations.programs import mass_matrix
 from mbd.integrators.base import Integrator, Point, StepReport, Terms
 from mbd.kernel.active_set import ActiveSetManager
-from mbd.kernel.fields import ITERATIONS, NOT_CONVERGED, NOT_FINITE, NOW
+from mbd.kernel.fields import CAREFUL, ITERATIONS, NEAR, NOT_CONVERGED, NOT_FINITE, NOW
 from mbd.kernel.restart import MOST_LOADS, fill_block, refresh_scales
 from mbd.simulation.asked import asked
 from mbd.state import Mode, State
@@ -74,6 +74,7 @@ class MechanismSystem:
         h_size, rate_size = np.maximum(h_size, size), np.maximum(rate_size, speed)
         tail = n + (2 if self.stabilized else 1) * m
         full = (n + m) ** 2 + tail + (m * self.n_v if self.stabilized else 0)
+        turning = None
         if tangent is None:
             out = np.zeros(tail)
             code.residual(block, self.parameters, out)
@@ -83,6 +84,8 @@ class MechanismSystem:
             block[1:3] = factors
             out = np.zeros(full)
             code.tangent(block, self.parameters, out)
+            if self.stabilized:
+                turning = out[(n + m) ** 2 + tail :].reshape(m, self.n_v)
             matrix, out = out[: (n + m) ** 2].reshape(n + m, n + m), out[(n + m) ** 2 : (n + m) ** 2 + tail]
             if tangent != factors:  # S is affine in the factors: M is its value at (0, 0)
                 other = np.zeros(full)
@@ -104,6 +107,7 @@ class MechanismSystem:
             h_size[picked],
             rate_size[picked],
             velocity if velocity.any() else None,
+            turning if turning is None else np.where(velocity[:, None], 0.0, turning),
         )
 
     def _block(self, point: Point, rows: Sequence[int], penalties: Sequence[int]) -> Vector:
@@ -199,6 +203,7 @@ class PlainScheme:
         state, mode, _ = self._state(K)
         what = f"the start of {self.integrator!r} at t = {state.time:.6g} s"
         self.memory = asked(what, self.integrator.start, self.system, state, mode, float(K.dt))
+        K.state[NEAR] = 0
         K.slope[:] = getattr(self.memory, "slope", 0.0)
         fill_block(K, K.clock[NOW], K.q, K.y)
         refresh_scales(K)
@@ -221,6 +226,8 @@ class PlainScheme:
             K.detail[0] = t1
             return NOT_FINITE
         self.pending = result.memory
+        K.state[NEAR] = getattr(result.memory, "near", 0)
+        K.counts[CAREFUL] += int(K.state[NEAR] > 0)
         rate, lam = getattr(result.memory, "rate", None), getattr(result.memory, "lam", None)
         if rate is None or lam is None:
             rate, lam = self.system.accelerations(t1, result.state.q, y, mode)

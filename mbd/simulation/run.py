@@ -415,8 +415,16 @@ class Run:
         notes += [dependent] if dependent else []
         shortened = int(v["counts"][F.SHORTENED])
         if shortened:
-            cause = "Newton's method or the impact law failed at the full dt"
-            notes.append(f"{shortened} steps were shortened where {cause}")
+            notes.append(
+                f"{shortened} steps were shortened where Newton's method or the impact law failed at the full dt, or "
+                "where a step would have ended too close to a pose in which rows lose rank"
+            )
+        careful = int(v["counts"][F.CAREFUL])
+        if careful:
+            notes.append(
+                f"poses in which rows lose rank were passed: {careful} steps next to them held positions alone on the "
+                "rows; their velocities and multipliers are less accurate"
+            )
         energetic = int(v["counts"][F.STRONGE])
         if energetic:
             notes.append(

@@ -1,0 +1,64 @@
+"""How many steps off a pose is in which rows lose rank: the readable twin of `mbd.kernel.passage`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mbd.arrays import Matrix, Vector
+from mbd.kernel.passage import CONTINUOUS, NEAREST, WITHIN
+
+__all__ = ["CONTINUOUS", "WITHIN", "Distance", "distance_to_pose"]
+
+EPS = float(np.finfo(float).eps)
+
+
+@dataclass(frozen=True)
+class Distance:
+    """Steps until the rows lose rank, and what round-off makes of velocities there, over the speed."""
+
+    steps: float
+    kick: float
+
+    def too_close(self, tolerance: float, near: bool, whole: bool) -> bool:
+        """Whether this step, or whole ones after it, would end where round-off makes more of velocities than that."""
+        if near or self.steps < 1.0:
+            return near and self.steps < NEAREST and self.kick > tolerance
+        part = self.steps % 1.0
+        part = min(part, 1.0 - part)
+        watched = self.steps < WITHIN or (not whole and self.steps < WITHIN + 1.0)
+        return watched and part < NEAREST and self.kick * self.steps > tolerance * max(part, 1e-3)
+
+
+def distance_to_pose(B: Matrix, turning: Matrix, mass: Vector, v: Vector, scale: Vector, dt: float) -> Distance:
+    """How far the nearest row is from depending on others, over what a step changes of that.
+
+    B : (m, n_v) rows; turning : (m, n_v) their rates; mass : (n_v,) weights of the coordinates; v : (n_v,)
+    scale : (m,) magnitudes of the rows' terms
+    """
+    weight = 1.0 / np.sqrt(np.where(mass > 0.0, mass, 1.0))
+    rows, turns = B * weight, turning * weight
+    lengths = np.linalg.norm(rows, axis=1) + dt * np.linalg.norm(turns, axis=1) + 1e-300
+    order, here = _leftovers(rows / lengths[:, None], None)
+    around = [_leftovers((rows + ahead * turns) / lengths[:, None], order)[1] for ahead in (-dt, dt)]
+    change = np.max([np.abs(left - here) for left in around], axis=0)
+    steps = here / (change + 1e-300)
+    k = int(np.argmin(steps))
+    across = 4.0 * EPS * scale[order[k]] / (here[k] * lengths[order[k]] + 1e-300)
+    return Distance(float(steps[k]), float(across / (dt * np.sqrt(mass @ v**2) + 1e-300)))
+
+
+def _leftovers(rows: Matrix, order: list[int] | None) -> tuple[list[int], Vector]:
+    """Lengths of rows less their parts along earlier ones; the longest remaining first, or in a given order."""
+    rows, taken, left = rows.copy(), list[int](), list[float]()
+    for place in range(len(rows)):
+        sizes = np.linalg.norm(rows, axis=1)
+        sizes[taken] = -1.0
+        k = int(np.argmax(sizes)) if order is None else order[place]
+        taken.append(k)
+        left.append(float(sizes[k]))
+        along = rows[k] / (sizes[k] + 1e-300)
+        others = [other for other in range(len(rows)) if other not in taken]
+        rows[others] -= np.outer(rows[others] @ along, along)
+    return taken, np.array(left)

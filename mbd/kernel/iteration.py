@@ -1,0 +1,122 @@
+"""What every Newton iteration of a step shares: prediction, size of the residual, acceptance."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mbd.kernel.fields import AUX_STEP, EPS, MODE
+from mbd.kernel.hooks import call
+from mbd.kernel.restart import compose
+
+__all__ = ["finish", "overturns", "predict", "residual_size", "runs_away"]
+
+
+def predict(K: Any, h: float, t1: float, c_C: float, c_K: float) -> None:
+    """The block at t₁ with rates, multipliers and position correction extrapolated."""
+    block = K.block
+    stretch = h / K.clock[AUX_STEP]
+    block[0] = t1
+    block[1] = c_C
+    block[2] = c_K
+    for i in range(K.n_q):
+        block[K.o_q + i] = K.q[i]
+    for k in range(K.n_rows):
+        block[K.o_lam + k] = K.lam[k] + h * K.lam_slope[k]
+    for k in range(K.n_anchors):
+        block[K.o_anchor + k] = K.anchors[k]
+    for f in range(K.n_frictions):
+        block[K.o_slip + f] = K.slip[f]
+    for i in range(K.n):
+        a0 = K.rate[i] + stretch * (K.aux[i] - K.rate[i])
+        rate = K.rate[i] + h * K.slope[i]
+        a1 = ((1.0 - K.alpha_f) * rate + K.alpha_f * K.rate[i] - K.alpha_m * a0) / (1.0 - K.alpha_m)
+        block[K.o_a + i] = rate
+        block[K.o_v + i] = K.y[i] + h * ((1.0 - K.gamma) * a0 + K.gamma * a1)
+        if i < K.n_v:
+            K.shift1[i] = (K.shift[i] + stretch * K.shift_change[i]) * (stretch * stretch * stretch)
+            block[K.o_x + i] = h * K.y[i] + h * h * ((0.5 - K.beta) * a0 + K.beta * a1) + K.shift1[i]
+
+
+def residual_size(K: Any, o_r: int, m: int, c_C: float, c_K: float, tolerance: float, both: int) -> float:
+    """Largest residual over its tolerance: balance, h and, with `both`, ḣ, each block apart; −1 if not finite."""
+    size = 0.0
+    finite = 0.0
+    fastest = 0.0
+    for i in range(K.n):
+        r = abs(K.out[o_r + i])
+        finite += r
+        size = max(size, r / (tolerance * K.scale[i]))
+    speed = 0.0
+    for i in range(K.n_v):
+        fastest = max(fastest, abs(K.block[K.o_a + i]))
+        speed = max(speed, abs(K.block[K.o_v + i]))
+    o_h = o_r + K.n
+    for k in range(m):
+        row = K.rows[k]
+        h = abs(K.out[o_h + k])
+        finite += h
+        limit = tolerance * c_K * fastest
+        floor = 16.0 * EPS * K.scale[K.n + row]
+        if both == 1:
+            limit = tolerance * min(c_C * speed, K.scale[K.n + row])
+        elif K.row_level[row] == 1:  # a rate stands in the place of h
+            if K.stabilized == 1:
+                h = abs(K.out[o_h + m + k])
+            limit = tolerance * c_C * fastest
+            floor = 16.0 * EPS * K.scale[K.n + K.n_rows + row]
+        size = max(size, h / (max(floor, limit) + 1e-300))
+        if both == 1:
+            rate = abs(K.out[o_h + m + k])
+            finite += rate
+            floor = 16.0 * EPS * K.scale[K.n + K.n_rows + row]
+            size = max(size, rate / (max(floor, tolerance * c_C * fastest) + 1e-300))
+    if not finite < 1e300:
+        return -1.0
+    return size
+
+
+def runs_away(K: Any, m: int) -> bool:
+    """Whether multipliers fight each other: their forces cancel to less than 1e-7 of their size.
+
+    Then r would vanish beside its terms whatever the motion, and a step must not be accepted for it.
+    """
+    size = K.n + m
+    call(K, K.mode_code[2 * K.state[MODE]], K.spare)
+    largest = 0.0
+    total = 0.0
+    for i in range(K.n):
+        terms = 0.0
+        force = 0.0
+        for k in range(m):
+            part = K.spare[i * size + K.n + k] * K.block[K.o_lam + K.rows[k]]
+            terms += abs(part)
+            force += part
+        largest = max(largest, terms)
+        total = max(total, abs(force))
+    return largest > 1e7 * total and largest > 1e3 * K.work[0]
+
+
+def finish(K: Any, h: float) -> None:
+    """The converged block becomes the candidate."""
+    stretch = h / K.clock[AUX_STEP]
+    for i in range(K.n):
+        a0 = K.rate[i] + stretch * (K.aux[i] - K.rate[i])
+        K.rate1[i] = K.block[K.o_a + i]
+        K.y1[i] = K.block[K.o_v + i]
+        K.aux1[i] = ((1.0 - K.alpha_f) * K.rate1[i] + K.alpha_f * K.rate[i] - K.alpha_m * a0) / (1.0 - K.alpha_m)
+    for k in range(K.n_rows):
+        K.lam1[k] = K.block[K.o_lam + k]
+    compose(K, K.q1)
+
+
+def overturns(K: Any, h: float) -> bool:
+    """Whether the estimated error of an angle in this step exceeds half a radian: it is not resolved at all.
+
+    ``e = h² |1/6 − β − (α_m − α_f)/2| |v̇₁ − v̇₀|``
+    """
+    share = abs(1.0 / 6.0 - K.beta - 0.5 * (K.alpha_m - K.alpha_f)) * h * h
+    change = 0.0
+    for i in range(K.n_v):
+        if K.unit[i] == 1:
+            change = max(change, abs(K.rate1[i] - K.rate[i]))
+    return bool(share * change > 0.5)

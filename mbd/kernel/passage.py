@@ -1,0 +1,251 @@
+"""Passing a pose in which rows lose rank for an instant: a few steps of the stabilized form taken as index 3.
+
+Let x be the distance from the pose along the motion and y a coordinate across it, where another branch crosses: the
+row is like h = x y there. Round-off δ of h leaves y open by δ/x, and ḣ = ẋ y + x ẏ = 0 then makes ẏ wrong by ẋ δ/x²,
+while a step that holds h alone makes it wrong by δ/(x dt). The second is less wrong where |x| < ẋ dt: within a step of
+the pose. So within `WITHIN` steps of it h alone is held, with ∂h/∂x = B = H − (c_K/c_C) ∂ḣ/∂x; then the velocities are
+projected onto the rows and the scheme starts again.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mbd.kernel.fields import (
+    CAREFUL,
+    EPS,
+    FACTORIZATIONS,
+    ITERATIONS,
+    KICK,
+    LEFT,
+    MODE,
+    NEAR,
+    NOT_CONVERGED,
+    NOT_FINITE,
+    PASSING,
+    PIVOT,
+    ROWS,
+    SINGULAR,
+    STAGNATIONS,
+    TANGENTS,
+)  # fmt: skip
+from mbd.kernel.hooks import call
+from mbd.kernel.iteration import finish, overturns, predict, residual_size, runs_away
+from mbd.kernel.linear import factor, solve
+from mbd.kernel.restart import raise_scales
+
+__all__ = ["approaches", "misses", "passing_step", "steps_to_pose"]
+
+WITHIN = 4.0
+"""Steps to a pose of lost rank, at the present speed, below which positions alone are held [-]."""
+NEAREST = 0.25
+"""Steps from a pose of lost rank below which no step ends where round-off makes more of velocities than the tolerance.
+
+It is shortened, so that the next one ends beyond.
+"""
+CONTINUOUS = 0.05
+"""Part of the speed by which a step near such a pose may differ from its prediction: the branch goes on in v [-]."""
+
+
+def approaches(K: Any, m: int) -> bool:
+    """Whether the smallest pivot of the rows fell since the last step as it does some steps before it vanishes."""
+    size = K.n + m
+    largest = 0.0  # the inverses are on the diagonal
+    for k in range(K.n, size):
+        largest = max(largest, abs(K.kkt[k * size + k]))
+    falls = largest * WITHIN > K.detail[PIVOT] * (WITHIN + 1.0)
+    K.detail[PIVOT] = largest
+    return bool(falls)
+
+
+def steps_to_pose(K: Any, m: int, h: float, ratio: float) -> float:
+    """Steps of size h until a row of B depends on the others: how far it is from that, over what a step changes of it.
+
+    K.out holds the tangent with H = B + ratio ∂ḣ/∂x, K.turning ∂ḣ/∂x, which is the rate of B. K.detail[KICK] tells
+    what round-off of that row makes of velocities, over the speed, in a whole step that holds positions.
+    """
+    leftovers(K, m, h, ratio, 0.0, 0)
+    leftovers(K, m, h, ratio, -h, m)
+    leftovers(K, m, h, ratio, h, 2 * m)
+    speed = 0.0
+    for j in range(K.n_v):
+        speed += abs(K.out[j * (K.n + m) + j]) * K.block[K.o_v + j] * K.block[K.o_v + j]
+    fewest = 1e300
+    for k in range(m):
+        here = K.spare[k]
+        change = max(abs(K.spare[m + k] - here), abs(K.spare[2 * m + k] - here))
+        if here < fewest * change:
+            fewest = here / change
+            across = 4.0 * EPS * K.scale[K.n + K.rows[K.columns[k]]] / (here * K.spare[3 * m + k] + 1e-300)
+            K.detail[KICK] = across / (K.dt * speed**0.5 + 1e-300)
+    return fewest
+
+
+def misses(K: Any, away: float, h: float) -> bool:
+    """Whether whole steps from here would end too close to the pose: then this one is shortened, while it holds ḣ too.
+
+    Steps of the stabilized form may change their size; those that hold h alone start to ring.
+    """
+    if away < 1.0 or (away >= WITHIN and h > (1.0 - 1e-6) * K.dt):
+        return False
+    part = away - int(away)
+    part = min(part, 1.0 - part)
+    return bool(part < NEAREST and K.detail[KICK] * away > K.tolerance * max(part, 1e-3))
+
+
+def leftovers(K: Any, m: int, h: float, ratio: float, ahead: float, place: int) -> None:
+    """Lengths of the rows of B, `ahead` of now, less their parts along earlier ones, into K.spare from `place` on.
+
+    Gram–Schmidt on scaled rows, the longest remaining first; at place 0 that order is found, elsewhere it is kept.
+    """
+    n = K.n_v
+    Q = K.basis
+    for k in range(m):
+        row = K.columns[k] if place > 0 else k
+        K.columns[k] = row
+        moves = 0.0 if K.row_level[K.rows[row]] == 1 else 1.0
+        length = 0.0
+        turned = 0.0
+        for j in range(n):
+            weight = abs(K.out[j * (K.n + m) + j])
+            weight = 1.0 / weight**0.5 if weight > 0.0 else 1.0
+            turn = K.turning[row * n + j] * weight
+            entry = K.out[(K.n + row) * (K.n + m) + j] * weight - ratio * turn
+            length += entry * entry
+            turned += turn * turn
+            Q[k * n + j] = entry + moves * ahead * turn
+        length = length**0.5 + moves * h * turned**0.5 + 1e-300
+        K.spare[3 * m + k] = length
+        for j in range(n):
+            Q[k * n + j] /= length
+    for done in range(m):
+        longest = done
+        left = -1.0
+        for k in range(done, m if place == 0 else done + 1):
+            length = 0.0
+            for j in range(n):
+                length += Q[k * n + j] * Q[k * n + j]
+            if length > left:
+                left = length
+                longest = k
+        left = left**0.5
+        K.spare[place + done] = left
+        row = K.columns[longest]
+        K.columns[longest] = K.columns[done]
+        K.columns[done] = row
+        length = K.spare[3 * m + longest]
+        K.spare[3 * m + longest] = K.spare[3 * m + done]
+        K.spare[3 * m + done] = length
+        for j in range(n):
+            swap = Q[longest * n + j] / (left + 1e-300)
+            Q[longest * n + j] = Q[done * n + j]
+            Q[done * n + j] = swap
+        for k in range(done + 1, m):
+            part = 0.0
+            for j in range(n):
+                part += Q[k * n + j] * Q[done * n + j]
+            for j in range(n):
+                Q[k * n + j] -= part * Q[done * n + j]
+
+
+def passing_step(K: Any, h: float, t1: float) -> int:
+    """The step with h held and ḣ left alone, of the trapezoidal rule: a damped scheme would begin with a transient.
+
+    The steps are too few for undamped multipliers to grow. Newton's method has a tangent each time.
+    """
+    m = K.state[ROWS]
+    o_r = (K.n + m) * (K.n + m)
+    c_C = 0.5 * h
+    c_K = 0.25 * h * h
+    K.state[NEAR] = PASSING
+    predict(K, h, t1, c_C, c_K)
+    for i in range(K.n):
+        K.y1[i] = K.y[i] + c_C * (K.rate[i] + K.block[K.o_a + i])
+        K.block[K.o_v + i] = K.y1[i]
+        if i < K.n_v:
+            K.block[K.o_x + i] = c_C * (K.y[i] + K.y1[i])
+            K.shift1[i] = 0.0
+    K.detail[0] = t1
+    K.detail[2] = h
+    tolerance = 4.0 * EPS if K.exact == 1 else 1e-3 * K.tolerance
+    before = 1e300
+    away = 0.0
+    for iteration in range(K.max_iterations):
+        call(K, K.mode_code[2 * K.state[MODE]], K.out)
+        K.counts[TANGENTS] += 1
+        error = residual_size(K, o_r, m, c_C, c_K, tolerance, 0)
+        if error < 0.0:
+            return NOT_FINITE
+        if error > 1.0 and iteration >= 2 and error > 0.5 * before:
+            raise_scales(K, True)
+            if runs_away(K, m):
+                return NOT_CONVERGED
+            error = residual_size(K, o_r, m, c_C, c_K, tolerance, 0)
+            if error > 1.0 and residual_size(K, o_r, m, 0.0, 0.0, 256.0 * EPS, 0) <= 16.0:
+                K.counts[STAGNATIONS] += 1
+                error = 1.0
+        K.detail[1] = error
+        if iteration == 0:
+            for k in range(m * K.n_v):
+                K.turning[k] = K.out[o_r + K.n + 2 * m + k]
+            away = steps_to_pose(K, m, h, c_K / c_C)
+            if away < NEAREST and K.detail[KICK] > K.tolerance:
+                return SINGULAR
+        if error <= 1.0:
+            K.detail[1] = 0.0
+            if leaves_branch(K, h):
+                return NOT_CONVERGED
+            finish(K, h)
+            if overturns(K, h):
+                K.detail[1] = -1.0
+                return NOT_CONVERGED
+            for i in range(K.n):
+                K.aux1[i] = K.rate1[i]
+            K.counts[CAREFUL] += 1
+            K.state[NEAR] = PASSING if away < WITHIN else LEFT
+            return 0
+        before = error
+        if not correct_positions(K, m, c_C, c_K):
+            return SINGULAR
+    return NOT_CONVERGED
+
+
+def correct_positions(K: Any, m: int, c_C: float, c_K: float) -> bool:
+    """One Newton correction of the index-3 step from the tangent in K.out; false if singular."""
+    n = K.n
+    size = n + m
+    o_h = size * size + n
+    for k in range(size * size):
+        K.kkt[k] = K.out[k]
+    for i in range(n):
+        K.rhs[i] = -K.out[size * size + i]
+    for k in range(m):
+        if K.row_level[K.rows[k]] == 1:
+            K.rhs[n + k] = -K.out[o_h + m + k] / c_C
+            continue
+        K.rhs[n + k] = -K.out[o_h + k] / c_K
+        for j in range(K.n_v):
+            K.kkt[(n + k) * size + j] -= c_K / c_C * K.out[o_h + 2 * m + k * K.n_v + j]
+    if factor(K.kkt, size, K.pivots) != 0:
+        return False
+    solve(K.kkt, size, K.pivots, K.rhs)
+    K.counts[FACTORIZATIONS] += 1
+    K.counts[ITERATIONS] += 1
+    for i in range(n):
+        K.block[K.o_a + i] += K.rhs[i]
+        K.block[K.o_v + i] += c_C * K.rhs[i]
+        if i < K.n_v:
+            K.block[K.o_x + i] += c_K * K.rhs[i]
+    for k in range(m):
+        K.block[K.o_lam + K.rows[k]] += K.rhs[n + k]
+    return True
+
+
+def leaves_branch(K: Any, h: float) -> bool:
+    """Whether velocities are no continuation of those before the step (the predicted ones are in K.y1)."""
+    fastest = 0.0
+    change = 0.0
+    for i in range(K.n_v):
+        fastest = max(fastest, max(abs(K.y[i]), abs(K.y1[i])) + h * abs(K.rate[i]))
+        change = max(change, abs(K.block[K.o_v + i] - K.y1[i]))
+    return change > CONTINUOUS * fastest

@@ -1,0 +1,78 @@
+"""Taking over a candidate where the scheme starts again: before events, after uneven steps, beyond singular poses."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mbd.kernel.fields import BASE, GRID, NOW, RESTARTS
+from mbd.kernel.guards import update_armed, update_sides, watch
+from mbd.kernel.hooks import scheme_accept, scheme_start
+from mbd.kernel.restart import active_rows, consistent, evaluate, solve_rows, stepping_rows
+
+__all__ = ["leave_pose", "take_over"]
+
+
+def project_velocity(K: Any, m: int) -> int:
+    """The nearest velocities, in the metric of M, with B v + h_t = 0 on the m rows in K.rows."""
+    if m == 0:
+        return 0
+    evaluate(K, K.clock[NOW], K.q, K.y)
+    o_rate = K.n * K.n + K.n + 2 * K.n * K.n_rows + K.n_rows
+    for i in range(K.n):
+        K.force[i] = 0.0
+    for k in range(K.n_rows):
+        K.bias[k] = K.acc[o_rate + k]
+    status = solve_rows(K, m, True)
+    if status == 0:
+        for i in range(K.n):
+            K.y[i] += K.jump[i]
+    return status
+
+
+def take_over(K: Any, t1: float) -> None:
+    """The candidate becomes the accepted state ahead of a restart, consistent in the old mode at every level.
+
+    A shortened index-3 step leaves B v + h_t of the size of its error; it would survive a release, so it is removed.
+    """
+    for i in range(K.n_q):
+        K.q[i] = K.q1[i]
+    for i in range(K.n):
+        K.y[i] = K.y1[i]
+        K.rate[i] = K.rate1[i]
+    for k in range(K.n_rows):
+        K.lam[k] = K.lam1[k]
+    K.clock[NOW] = t1
+    for i in range(K.n_watched):
+        K.guards0[i] = K.guards1[i]
+    if project_velocity(K, active_rows(K, K.closed)) == 0 and consistent(K, t1, K.q, K.y) == 0:
+        for i in range(K.n):
+            K.rate[i] = K.jump[i]
+        for k in range(K.n_rows):
+            K.lam[k] = K.impulse[k]
+
+
+def leave_pose(K: Any, h: float, t1: float) -> int:
+    """The candidate just beyond a pose in which rows lost rank, with velocities on the rows again, starts the scheme.
+
+    The rows are those that were stepped with: which depend on which is judged too badly here.
+    """
+    scheme_accept(K, h)
+    K.clock[NOW] = t1
+    status = project_velocity(K, stepping_rows(K))
+    if status == 0:
+        status = consistent(K, t1, K.q, K.y)
+    if status != 0:
+        return status
+    for i in range(K.n):
+        K.rate[i] = K.jump[i]
+    for k in range(K.n_rows):
+        K.lam[k] = K.impulse[k]
+    status = scheme_start(K)
+    K.counts[RESTARTS] += 1
+    K.clock[BASE] = t1
+    K.state[GRID] = 0
+    if K.n_watched > 0:
+        watch(K, t1, K.q, K.y, K.rate, K.lam, K.guards0)
+        update_armed(K)
+        update_sides(K)
+    return status
