@@ -5,24 +5,36 @@ from __future__ import annotations
 import copy
 import math
 import re
+import signal
 from pathlib import Path
 
 import pytest
 
 from mbd import cli
 from mbd.errors import UnknownNameError
-from mbd.hardcases import CASES, command, grazes, measuring
+from mbd.hardcases import CASES, case as cases, command, judging
 from mbd.hardcases.case import Curve, Figure, HardCase, Outcome, definition
+from mbd.hardcases.convergence import deviation, second_order
 from mbd.hardcases.judging import Judged, chosen, judged, ratio, short
+from mbd.hardcases.known import KNOWN, reason
 from mbd.hardcases.schemes import SCHEMES, scheme
-from mbd.hardcases.table import BEGIN, END, figure_text, write_markdown
+from mbd.hardcases.table import BEGIN, END, as_markdown, as_text, figure_text, worst_by_scheme, write_markdown
 from mbd.simulation.arguments import CHOICES
 from mbd.view.progress import counted
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "hardcases.md"
 
+SLOW = [pytest.mark.slow]
+
+
+def marks(case: HardCase, name: str) -> list:
+    """Strict where it is known not to hold: once it does, the list has to be shortened."""
+    known = [pytest.mark.xfail(strict=True, reason=reason(case.id, name))] if reason(case.id, name) else []
+    return known + (SLOW if case.slow else [])
+
+
 EVERY = [
-    pytest.param(case, name, id=f"{short(case)}-{name}", marks=[pytest.mark.slow] if case.slow else [])
+    pytest.param(case, name, id=f"{short(case)}-{name}", marks=marks(case, name))
     for case in CASES
     for name in case.schemes
 ]
@@ -31,19 +43,23 @@ EVERY = [
 @pytest.mark.parametrize(("case", "name"), EVERY)
 def test_what_must_hold_in_a_hard_case_holds(case: HardCase, name: str):
     outcome = case.judge(scheme(name))
-    assert outcome.figures, f"the judge of {case.id} measured nothing"
+    assert any(figure.is_judged for figure in outcome.figures), f"the judge of {case.id} measured nothing"
+    assert outcome.curves, f"{case.id} shows no curve"
     broken = [figure_text(figure) for figure in outcome.figures if not figure.passed]
     assert not broken, f"{case.must}\n{case.id} with {name}: value of limit\n" + "\n".join(broken)
 
 
 # a check that cannot fail is a defect ------------------------------------------------------------------------------
 SPOILED = {
-    "g1": "impact times", "g2": "velocities, simultaneous", "g2b": "momentum", "g3": "(amplitude, impact time)",
-    "g4": "sticking: [vx", "g5": "tip impact times", "g6": "impulses", "h1": "event times", "h1b": "max hyperextension",
+    "a4": "turning angles", "a4c": "turning angles", "b4": "P3", "b5": "slider height", "d1": "contact point P",
+    "d2": "[x, y](t)", "d3": "acceleration", "g1": "impact times", "g2": "velocities, simultaneous", "g2b": "momentum",
+    "g3": "(amplitude, impact time)", "g4": "sticking: [vx", "g5": "tip impact times", "g6": "impulses",
+    "h1": "event times", "h1b": "max hyperextension", "j2": "crank angle", "j3b": "crank angle", "j5": "period",
     "j6": "contact duration", "j7": "wall at d(1 - 0.001)", "j8": "Zeno time", "j9": "corner impulses",
-    "j9b": "velocity after", "j10": "first lift-off time",
+    "j9b": "velocity after", "j10": "first lift-off time", "j11": "minimum-norm leg forces", "j11b": "three contacts",
+    "j13": "A for the two", "j14": "tension", "j15": "smallest closure error", "j16": "x and v",
 }  # fmt: skip
-"""One reference of each case that is spoiled by a thousandth."""
+"""One reference of each case that is spoiled by a thousandth; those of long runs are left out."""
 
 
 def nudged(value, share: float):
@@ -51,8 +67,8 @@ def nudged(value, share: float):
 
 
 def judged_with(monkeypatch, case: HardCase, data: dict) -> Outcome:
-    for module in (measuring, grazes):
-        monkeypatch.setattr(module, "definition", lambda id: data)
+    read = cases.read
+    monkeypatch.setattr(cases, "read", lambda id: data if id == case.id else read(id))
     return case.judge(scheme("HHT"))
 
 
@@ -97,13 +113,41 @@ def test_a_figure_that_is_not_a_number_fails_and_ranks_first():
 
 
 def test_an_error_is_noticed_to_be_of_second_order_round_off_or_neither():
-    def passes(errors, limit=1.0, floor=1e-12):
-        return all(figure.passed for figure in measuring.second_order("x [m]", errors, limit, floor))
+    steps = [0.4, 0.2, 0.1]
+
+    def passes(errors, limit=1.0, floor=1e-12, better=False):
+        return all(figure.passed for figure in second_order("x [m]", steps, errors, limit, floor, better))
 
     assert passes([1e-2, 2.5e-3, 6.3e-4]) and passes([2e-13, 3e-13, 1e-13]) and passes([1e-10, 3e-13, 2e-13])
     assert not passes([1e-2, 5e-3, 2.5e-3]) and not passes([1e-2, 1e-2, 1e-2]) and not passes([1e-2, 1e-3, 1e-4])
     assert not passes([1e-2, 2.5e-3, math.nan]) and not passes([math.nan] * 3)
     assert not passes([1e-2, 2.5e-3, 6.3e-4], limit=1e-4)
+    assert passes([1e-2, 1.2e-3, 1.5e-4], better=True) and not passes([1e-2, 5e-3, 2.5e-3], better=True)
+    assert not passes([1e-13, 1e-3, 1e-13]), "what rises from round-off and falls back is no error of second order"
+    assert deviation([0.1, 0.01], [1e-11, 1e-14], 1e-12) == 0.0, "a fall by a hundred leads into round-off"
+
+
+def test_a_figure_without_a_limit_is_told_and_not_judged():
+    told = Outcome([Figure("share [-]", 0.5, 1.0), Figure("time ratio [-]", 1.5)])
+    assert told.passed and not Outcome([Figure("time ratio [-]", 1.5)]).passed
+    verdict = judged(HardCase("g1-bouncing-ball", "It runs.", lambda made: told))
+    assert worst_by_scheme(verdict) == ["share [-]: 0.5 (all) of 1", "not judged: time ratio [-]: 1.5 (all)"]
+
+
+def test_the_worst_figure_of_every_scheme_is_told():
+    def judge(made) -> Outcome:
+        return Outcome([Figure("gap [m]", 2.0 if "HHT" in repr(made) else 0.5, 1.0), Figure("count [-]", 0.0, 0.0)])
+
+    verdict = judged(HardCase("g1-bouncing-ball", "It runs.", judge))
+    assert worst_by_scheme(verdict) == ["gap [m]: 2 (HHT), 0.5 (generalized-alpha) of 1"]
+
+
+def test_what_is_known_not_to_hold_is_told_with_its_reason_and_when_it_holds(monkeypatch):
+    monkeypatch.setattr(judging, "reason", lambda case, name: "rows lose rank" if name == "HHT" else "")
+    failing = judged(stand_in(3.0))
+    assert failing.word == "does not hold" and failing.reasons == ["rows lose rank"] and not failing.passed
+    assert "does not hold: rows lose rank" in as_markdown([failing]) and "g1: rows lose rank" in as_text([failing], 120)
+    assert judged(stand_in(0.5)).word == "holds now with HHT: take it from the list of what does not"
 
 
 # the registry ------------------------------------------------------------------------------------------------------
@@ -116,6 +160,14 @@ def test_every_case_has_a_definition_known_schemes_and_a_paragraph():
         assert set(case.schemes) <= set(SCHEMES), case.id
         assert re.search(rf"\*\*[^*]*\b{short(case)}\b[^*]*\*\*", text), f"{PAGE.name} does not explain {short(case)}"
     assert BEGIN in text and END in text
+    pairs = {(case.id, name) for case in CASES for name in case.schemes}
+    assert set(KNOWN) <= pairs and all(len(why) > 20 for why in KNOWN.values())
+
+
+def test_cases_are_in_the_order_of_their_ids():
+    names = [short(case) for case in CASES]
+    assert names[:7] == ["a4", "a4c", "b2-N1", "b2-N2", "b2-N10", "b2b", "b4"]
+    assert names.index("j2") < names.index("j3") < names.index("j3b") < names.index("j10") < names.index("j17")
 
 
 def test_cases_are_chosen_by_name_group_and_part():
@@ -125,7 +177,7 @@ def test_cases_are_chosen_by_name_group_and_part():
     assert [short(case) for case in chosen(CASES, ["cradle"], slow=False)] == ["g2", "g2b"]
     slow = HardCase("x1-long", "It takes long.", lambda scheme: Outcome([]), slow=True)
     assert chosen([slow], [], slow=False) == [] and chosen([slow], [], slow=True) == chosen([slow], ["x1"], slow=False)
-    with pytest.raises(UnknownNameError, match="no hard case named 'g99'.*There are 'g1'"):
+    with pytest.raises(UnknownNameError, match="no hard case named 'g99'"):
         chosen(CASES, ["g99"], slow=False)
 
 
@@ -152,7 +204,7 @@ def test_a_failing_case_is_told_and_makes_the_exit_code_1(tmp_path, capsys, monk
     monkeypatch.setattr(command, "CASES", (stand_in(3.0),))
     assert cli.main(["hardcases", "--out", str(tmp_path)]) == 1
     told = capsys.readouterr().out
-    assert "fails" in told and "x [-]: 3 of 1" in told and "0 of 1 cases hold; not g1" in told
+    assert "does not hold" in told and "x [-]: 3 of 1" in told and "0 of 1 cases hold; not g1" in told
     text = (tmp_path / "hardcases.html").read_text(encoding="utf-8")
     assert "It &lt;holds&gt;." in text and "<details open>" in text
 
@@ -170,7 +222,44 @@ def test_a_judge_that_stops_is_a_verdict(tmp_path, capsys, monkeypatch):
 def test_a_case_that_fails_with_one_scheme_says_with_which():
     case = HardCase("g1-bouncing-ball", "", lambda made: Outcome([Figure("x", float("HHT" in repr(made)), 0.5)]))
     verdict = judged(case)
-    assert verdict.word == "fails with HHT" and not verdict.passed and verdict.worst.scheme == "HHT"
+    assert verdict.word == "does not hold with HHT" and not verdict.passed and verdict.worst.scheme == "HHT"
+
+
+def test_a_narrow_terminal_gets_paragraphs_that_fit():
+    verdicts = [judged(stand_in(0.5)), judged(stand_in(3.0))]
+    lines = as_text(verdicts, 60).splitlines()
+    assert max(map(len, lines)) <= 60 and lines[0] == "g1-bouncing-ball" and "1 of 2 cases hold" in lines[-1]
+    assert max(map(len, as_text(verdicts, 120).splitlines())) <= 120
+
+
+def test_an_interrupt_keeps_the_table_so_far_and_the_page_of_the_docs(tmp_path, capsys, monkeypatch):
+    def pressed(made) -> Outcome:
+        raise KeyboardInterrupt
+
+    stopping = HardCase("g3-rocking-block", "It runs.", pressed)
+    monkeypatch.setattr(command, "CASES", (stand_in(0.5), stopping, stand_in(0.7)))
+    page = tmp_path / "page.md"
+    page.write_text(f"{BEGIN}\nas it was\n{END}\n", encoding="utf-8")
+    assert cli.main(["hardcases", "--out", str(tmp_path), "--markdown", str(page)]) == 130
+    told = capsys.readouterr()
+    assert "1 of 1 cases hold" in told.out and "stopped after 1 of 3 cases" in told.err
+    assert "Stopped after 1 of 3 cases." in (tmp_path / "hardcases.html").read_text(encoding="utf-8")
+    assert "as it was" in page.read_text(encoding="utf-8")
+
+
+def test_an_interrupt_that_ends_a_run_in_order_ends_the_command_too(tmp_path, capsys, monkeypatch):
+    """A run returns what it has when Ctrl-C comes; its judge would go on."""
+
+    def swallowed(made) -> Outcome:
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt:
+            return Outcome([Figure("x [-]", 0.0, 1.0)])
+        raise AssertionError("no interrupt")
+
+    monkeypatch.setattr(command, "CASES", (stand_in(0.5), HardCase("g3-rocking-block", "It runs.", swallowed)))
+    assert cli.main(["hardcases", "--out", str(tmp_path)]) == 130
+    assert "stopped after 1 of 2 cases" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -1,24 +1,52 @@
 """Scenes on which multibody systems fail, often silently: definitions, references, and what must hold."""
 
-from mbd.hardcases import balls, blocks, clearances, cradles, grazes, knees, mats, rods, shakers, walls
+from __future__ import annotations
+
+import re
+
+from mbd.hardcases import (
+    absent_effects,
+    balls,
+    blocks,
+    clearances,
+    cradles,
+    four_bars,
+    frictions,
+    governor,
+    grazes,
+    knees,
+    long_run,
+    mass_ratios,
+    mats,
+    redundant_rows,
+    resting,
+    rods,
+    shakers,
+    singular_poses,
+    sleighs,
+    starts,
+    tiny_steps,
+    user_force,
+    walls,
+    wheel,
+)
+from mbd.hardcases.case import HardCase
 
 __all__ = ["CASES"]
 
-CASES = (
-    balls.BOUNCING,
-    cradles.ONE_IN,
-    cradles.TWO_IN,
-    blocks.ROCKING,
-    rods.DROPPED,
-    walls.DOUBLE_PENDULUM,
-    clearances.SLIDER_CRANK,
-    knees.GAP,
-    knees.PULL,
-    mats.STIFF,
-    grazes.GRAZING,
-    balls.ZENO,
-    blocks.FLAT,
-    balls.CORNER,
-    shakers.SHAKEN,
-)
+MODULES = (
+    absent_effects, balls, blocks, clearances, cradles, four_bars, frictions, governor, grazes, knees, long_run,
+    mass_ratios, mats, redundant_rows, resting, rods, shakers, singular_poses, sleighs, starts, tiny_steps, user_force,
+    walls, wheel,
+)  # fmt: skip
+
+
+def _place(case: HardCase) -> tuple[str, int, str]:
+    """j2 before j10, b2 before b2b; cases of one beginning stay as their module has them."""
+    found = re.match(r"([a-z])(\d+)([a-z]*)-", case.id)
+    assert found is not None, case.id
+    return found[1], int(found[2]), found[3]
+
+
+CASES = tuple(sorted((case for module in MODULES for case in module.CASES), key=_place))
 """Every case, in the order of the table."""

@@ -11,15 +11,16 @@ import numpy as np
 from mbd.assembly import assemble
 from mbd.bodies import PointMass
 from mbd.constraints import Unilateral, height, measure
-from mbd.hardcases.case import Curve, Figure, Outcome
+from mbd.hardcases.case import Curve, Figure, Outcome, hard_case
+from mbd.hardcases.convergence import halved
 from mbd.hardcases.impacts import deepest, difference, impact_figures
-from mbd.hardcases.measuring import accuracy, halved, hard_case, numbers, published, size
+from mbd.hardcases.references import accuracy, numbers, published, size
 from mbd.hardcases.stepped import HOW, stepped_figures, within_steps
 from mbd.joints import Prismatic, Translation
 from mbd.model import Model
 from mbd.simulation import simulate
 
-__all__ = ["BOUNCING", "CORNER", "ZENO"]
+__all__ = ["CASES"]
 
 REST_SPEED = 1e-6
 """Below this approach speed a ball may rest: what `simulate` does unless told otherwise [m/s]."""
@@ -224,18 +225,20 @@ def cornered(id: str, scheme: Any) -> Outcome:
     )
 
 
-BOUNCING = hard_case(
-    "g1-bouncing-ball",
-    "The ball bounces at the instants of the parabolas, passes its Zeno time in finite work, and rests with m g.",
-    bouncing,
-)
-ZENO = hard_case(
-    "j8-zeno-event-count",
-    "The number of impacts is that of the series, no more; the ball ends at rest with its weight on the floor.",
-    counting,
-)
-CORNER = hard_case(
-    "j9b-ball-into-corner",
-    "Two walls are met at one instant; each gives back its own part of the speed, in whichever order they are named.",
-    cornered,
+CASES = (
+    hard_case(
+        "g1-bouncing-ball",
+        "The ball bounces at the instants of the parabolas, passes its Zeno time in finite work, and rests with m g.",
+        bouncing,
+    ),
+    hard_case(
+        "j8-zeno-event-count",
+        "The number of impacts is that of the series, no more; the ball ends at rest with its weight on the floor.",
+        counting,
+    ),
+    hard_case(
+        "j9b-ball-into-corner",
+        "Two walls are met at one instant; each gives back its own part of the speed, whichever is named first.",
+        cornered,
+    ),
 )

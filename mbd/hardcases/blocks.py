@@ -13,24 +13,16 @@ import numpy as np
 from mbd.assembly import assemble
 from mbd.bodies import RigidBody
 from mbd.constraints import Unilateral, touchdown
-from mbd.hardcases.case import Curve, Figure, Outcome
+from mbd.hardcases.case import Curve, Figure, Outcome, hard_case
+from mbd.hardcases.convergence import error_curve, halved, second_order
 from mbd.hardcases.impacts import deepest, difference, impact_figures
-from mbd.hardcases.measuring import (
-    accuracy,
-    error_curve,
-    halved,
-    hard_case,
-    numbers,
-    published,
-    second_order,
-    size,
-)
+from mbd.hardcases.references import accuracy, numbers, published, size
 from mbd.hardcases.stepped import HOW, stepped_figures, within_steps
 from mbd.joints import Planar
 from mbd.model import Model
 from mbd.simulation import simulate
 
-__all__ = ["FLAT", "ROCKING"]
+__all__ = ["CASES"]
 
 ROUND_OFF = 1e-12
 BESIDE = 1e-6
@@ -148,7 +140,9 @@ def rocking(id: str, scheme: Any) -> Outcome:
     sizes = {"[s]": first, "[rad/s]": published(id, "speed before"), "[rad]": abs(angle)}
     for what, limit in ROCKING_LIMITS.items():
         unit = what[what.index("[") :]
-        figures += second_order(what, [each[what] for each in errors], limit * sizes[unit], 1e-9 * sizes[unit])
+        figures += second_order(
+            f"error of {what}", steps, [each[what] for each in errors], limit * sizes[unit], 1e-9 * sizes[unit]
+        )
     # a half cycle takes nearly the share `ratio` of the one before; after these many the rest speed is reached
     count = math.ceil(math.log(sizes["[rad/s]"] / 1e-6) / -math.log(ratio))
     rest = end + (end - first) * ratio**6 / (1.0 - ratio)
@@ -275,13 +269,15 @@ def landing(id: str, scheme: Any) -> Outcome:
     )
 
 
-ROCKING = hard_case(
-    "g3-rocking-block",
-    "A block rocks on sticking corners as Housner found, and comes to rest flat with half its weight on each.",
-    rocking,
-)
-FLAT = hard_case(
-    "j9-block-lands-flat",
-    "Two corners land at one instant, both push, and no rotation is created.",
-    landing,
+CASES = (
+    hard_case(
+        "g3-rocking-block",
+        "A block rocks on sticking corners as Housner found, and comes to rest flat with half its weight on each.",
+        rocking,
+    ),
+    hard_case(
+        "j9-block-lands-flat",
+        "Two corners land at one instant, both push, and no rotation is created.",
+        landing,
+    ),
 )

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, partial
 from importlib.resources import files
 from typing import Any
 
-import numpy as np
+from mbd.hardcases.schemes import EVERY
 
-__all__ = ["Curve", "Figure", "HardCase", "Outcome", "definition", "reference"]
+__all__ = ["Curve", "Figure", "HardCase", "Outcome", "definition", "hard_case"]
 
 
 @dataclass(frozen=True)
 class Figure:
-    """One measured number and the most it may be; NaN never passes.
+    """One measured number and the most it may be; NaN never passes. Without a limit it is shown, not judged.
 
     what : in plain words, with the unit in brackets: 'error of the first impact time [s]'
     value, limit : measured, allowed
@@ -24,7 +25,11 @@ class Figure:
 
     what: str
     value: float
-    limit: float
+    limit: float = math.inf
+
+    @property
+    def is_judged(self) -> bool:
+        return self.limit < math.inf
 
     @property
     def passed(self) -> bool:
@@ -52,7 +57,7 @@ class Outcome:
 
     @property
     def passed(self) -> bool:
-        return bool(self.figures) and all(figure.passed for figure in self.figures)
+        return any(figure.is_judged for figure in self.figures) and all(figure.passed for figure in self.figures)
 
 
 @dataclass(frozen=True)
@@ -64,6 +69,7 @@ class HardCase:
     judge : integrator → `Outcome`; it runs the scene and compares
     schemes : names of the integrators it is judged with, see `mbd.hardcases.schemes`
     slow : left out unless asked for
+    label : short name where the beginning of the id is shared with another: 'b2-N1'
     """
 
     id: str
@@ -72,21 +78,25 @@ class HardCase:
     schemes: Sequence[str] = ("HHT", "generalized-alpha")
     slow: bool = False
     notes: Mapping[str, str] = field(default_factory=dict)
+    label: str = ""
 
     @property
     def title(self) -> str:
         return str(definition(self.id)["title"])
 
 
-@cache
+def hard_case(id: str, must: str, judge: Callable[[str, Any], Outcome], schemes: Sequence[str] = EVERY) -> HardCase:
+    """A case whose judge is told which definition it judges."""
+    return HardCase(id, must, partial(judge, id), schemes)
+
+
 def definition(id: str) -> dict[str, Any]:
     """The case as data: 'definition', 'initial_conditions', 'quantities' (name, value, accuracy)."""
+    return read(id)
+
+
+@cache
+def read(id: str) -> dict[str, Any]:
+    """The file of a definition."""
     found: dict[str, Any] = json.loads((files("mbd.hardcases") / "data" / f"{id}.json").read_text("utf-8"))
     return found
-
-
-def reference(id: str, quantity: str) -> Any:
-    """A reference value as an array or a number."""
-    values = {entry["name"]: entry["value"] for entry in definition(id)["quantities"]}
-    value = np.asarray(values[quantity])
-    return value if value.ndim else value.item()

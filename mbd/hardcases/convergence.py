@@ -1,4 +1,4 @@
-"""Errors that must fall with the square of the step, and the figures that say so."""
+"""Errors that must fall with the square of the step until round-off, and the figures that say so."""
 
 from __future__ import annotations
 
@@ -10,63 +10,80 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mbd.hardcases.case import Curve, Figure, definition
+from mbd.arrays import Vector
+from mbd.hardcases.case import Curve, Figure
 
 __all__ = [
-    "DAMPED",
-    "EPS",
-    "EVERY",
-    "Reference",
-    "Study",
-    "allowance",
-    "distance_to",
-    "force_floor",
-    "quantity",
-    "study",
-]
+    "EPS", "Study", "allowance", "deviation", "error_curve", "force_floor", "halved", "second_order", "study",
+]  # fmt: skip
 
 EPS = float(np.finfo(float).eps)
-EVERY = ("HHT", "HHT-index3", "generalized-alpha", "generalized-alpha-index3", "Newmark")
-DAMPED = EVERY[:-1]
-"""Names of the schemes that most cases here are judged with; undamped ones hold rows only in the stabilized form."""
 ORDER = 2.0
 """What every scheme of the family promises."""
 MOST_DEVIATION = 0.15
 """How far an observed order may be from it."""
 
 
-@dataclass(frozen=True)
-class Reference:
-    """A reference value with the instants it belongs to (none for a constant) and its accuracy."""
-
-    value: NDArray[np.float64]
-    times: NDArray[np.float64]
-    accuracy: float
-
-    @property
-    def size(self) -> float:
-        """Largest absolute value."""
-        return float(np.max(np.abs(self.value)))
+def halved(dt: float, count: int = 3) -> Vector:
+    """dt, dt/2, dt/4, …"""
+    return np.asarray(dt / 2.0 ** np.arange(count))
 
 
-def quantity(id: str, beginning: str) -> Reference:
-    """The one quantity of a definition whose name begins so."""
-    found = [entry for entry in definition(id)["quantities"] if entry["name"].startswith(beginning)]
-    if len(found) != 1:
-        raise LookupError(f"{len(found)} quantities of {id} begin with {beginning!r}")
-    (entry,) = found
-    value = np.asarray(entry["value"], dtype=float)
-    relative = entry.get("accuracy_kind", "abs") == "rel"
-    accuracy = entry["accuracy"] * (float(np.max(np.abs(value))) if relative else 1.0)
-    return Reference(value, np.atleast_1d(np.asarray(entry.get("t", []), dtype=float)), accuracy)
+def deviation(steps: Any, errors: Any, floor: Any, better: bool = False) -> float:
+    """The largest |observed order − 2| above the floor of round-off; NaN where an error is none.
 
+    A fall into the floor must be of order 2 at least. Zero where every error is at round-off.
 
-def distance_to(found: Any, reference: Reference) -> float:
-    """Euclidean distance of all found values, at all instants, from their references; NaN where shapes differ."""
-    values = np.asarray(found, dtype=float)
-    if values.shape != reference.value.shape:
+    Parameters
+    ----------
+    steps, errors : from large to small steps
+    floor : size at which an error counts as round-off or as that of the reference; one, or one for each step
+    better : whether orders above 2 are as good: numerical damping is of order 3
+    """
+    sizes, h = np.asarray(errors, dtype=float), np.asarray(steps, dtype=float)
+    if not np.isfinite(sizes).all():
         return float("nan")
-    return float(np.linalg.norm(values - reference.value))
+    floors = np.broadcast_to(np.asarray(floor, dtype=float), sizes.shape)
+    worst = 0.0
+    for k in range(1, len(sizes)):
+        coarse, fine, least = float(sizes[k - 1]), float(sizes[k]), float(floors[k])
+        refinement = float(h[k - 1] / h[k])
+        if max(fine, coarse) <= 4.0 * least or (fine <= least and coarse <= refinement**ORDER * least):
+            continue  # at round-off, where it should be
+        order = math.log(max(coarse, least, 1e-300) / max(fine, least, 1e-300)) / math.log(refinement)
+        short = ORDER - order
+        worst = max(worst, abs(short) if fine > least and not better else short)
+    return worst
+
+
+def second_order(
+    what: str, steps: Any, errors: Sequence[Any], limit: float, floor: Any, better: bool = False
+) -> list[Figure]:
+    """An error small enough at the finest step, and of order 2 until round-off.
+
+    Parameters
+    ----------
+    what : 'error of the speed [m/s]'
+    errors : at each step a number, or several, whose Euclidean norm is taken
+    limit : the most it may be at the finest step
+    floor, better : see `deviation`
+    """
+    norms = _norms(errors)
+    off = deviation(steps, norms, floor, better)
+    told = "what is missing to order 2" if better else "|order − 2|"
+    return [
+        Figure(f"{told}, {what.partition(' [')[0]} [-]", off, MOST_DEVIATION),
+        Figure(f"{what} at dt = {float(steps[-1]):.3g} s", float(norms[-1]), limit),
+    ]
+
+
+def error_curve(name: str, steps: Any, errors: Sequence[Any], label: str = "error") -> Curve:
+    """Errors over steps, both logarithmic."""
+    return Curve(name, np.asarray(steps), _norms(errors), "step [s]", label, logarithmic=True)
+
+
+def _norms(errors: Sequence[Any]) -> NDArray[np.float64]:
+    return np.array([float(np.linalg.norm(np.atleast_1d(np.asarray(error, dtype=float)))) for error in errors])
 
 
 @dataclass(frozen=True)
@@ -76,20 +93,9 @@ class Study:
     steps: NDArray[np.float64]
     errors: Mapping[str, NDArray[np.float64]]
 
-    def deviation(self, what: str, floor: Any) -> float:
-        """Largest |observed order − 2| of errors above the floor of round-off, one or by step; NaN where there is none.
-
-        Zero where every error is at round-off: then only the limit of the error itself judges.
-        """
-        errors = self.errors[what]
-        if not np.isfinite(errors).all():
-            return float("nan")
-        clear = errors[1:] > np.broadcast_to(floor, errors.shape)[1:]
-        falls, refinements = errors[:-1] / np.maximum(errors[1:], 1e-300), self.steps[:-1] / self.steps[1:]
-        orders = np.log(falls[clear]) / np.log(refinements[clear])
-        return float(np.max(np.abs(orders - ORDER), initial=0.0))
-
-    def figures(self, limits: Mapping[str, float], floors: Mapping[str, float] | None = None) -> list[Figure]:
+    def figures(
+        self, limits: Mapping[str, float], floors: Mapping[str, float] | None = None, better: bool = False
+    ) -> list[Figure]:
         """For each error its order and its size at the finest step.
 
         limits : the most each error may be at the finest step, by what it is of
@@ -98,20 +104,18 @@ class Study:
         found = []
         for what, limit in limits.items():
             floor = (floors or {}).get(what, 1e-11)
-            plain = what.split(" [")[0]
-            found.append(Figure(f"|order − 2| of {plain} [-]", self.deviation(what, floor), MOST_DEVIATION))
-            found.append(Figure(f"{what} at dt = {self.steps[-1]:g} s", float(self.errors[what][-1]), limit))
+            found += second_order(what, self.steps, list(self.errors[what]), limit, floor, better)
         return found
 
     def curves(self) -> list[Curve]:
         """Errors over steps."""
-        return [Curve(what, self.steps, errors, "dt [s]", "error", True) for what, errors in self.errors.items()]
+        return [error_curve(what, self.steps, list(errors)) for what, errors in self.errors.items()]
 
 
 def study(errors: Callable[[float], Mapping[str, float]], dt: float | Sequence[float], halvings: int = 3) -> Study:
     """The errors of runs with dt, dt/2, dt/4, …, or with the steps given, from large to small."""
-    steps = [dt / 2**k for k in range(halvings + 1)] if isinstance(dt, float) else list(dt)
-    found = [errors(step) for step in steps]
+    steps = list(halved(dt, halvings + 1)) if isinstance(dt, float) else list(dt)
+    found = [errors(float(step)) for step in steps]
     return Study(np.array(steps), {what: np.array([each[what] for each in found]) for what in found[0]})
 
 

@@ -11,7 +11,10 @@ import numpy as np
 
 import mbd
 from mbd.hardcases.case import Curve, Figure, HardCase, Outcome, definition
-from mbd.hardcases.convergence import DAMPED, EVERY, allowance, distance_to, quantity, study
+from mbd.hardcases.convergence import allowance, study
+from mbd.hardcases.crossings import crossing
+from mbd.hardcases.references import distance_to, quantity
+from mbd.hardcases.schemes import DAMPED, EVERY
 
 __all__ = ["CASES", "four_bars"]
 
@@ -107,11 +110,7 @@ def _when(run: Any, turn: float, level: float) -> float:
     if not len(reached) or not reached[0]:
         return math.nan
     left, right = float(run.time[reached[0] - 1]), float(run.time[reached[0]])
-    for _ in range(50):
-        middle = 0.5 * (left + right)
-        beyond = abs(turn - float(run.at(middle)["base 0.angle"])) >= level
-        left, right = (left, middle) if beyond else (middle, right)
-    return right
+    return crossing(run, lambda at: np.abs(turn - at["base 0.angle"]) - level, left, right)
 
 
 def _skew(model: mbd.Model, run: Any) -> float:
@@ -120,10 +119,17 @@ def _skew(model: mbd.Model, run: Any) -> float:
     return max(float(np.max(np.abs(run[f"{base}.angle"] - run["base 0.angle"]))) for base in bases)
 
 
-MUST = "every flat pose is passed on the parallelogram branch, without a jump of energy, with an error of order 2"
+MUST = "Every flat pose is passed on the parallelogram branch, without a jump of energy, with an error of order 2."
 
 CASES = tuple(
-    HardCase(id, MUST, partial(judge_four_bars, id, dt), DAMPED if slow else EVERY, slow)
+    HardCase(
+        id,
+        MUST,
+        partial(judge_four_bars, id, dt),
+        DAMPED if slow else EVERY,
+        slow,
+        label=id.replace("-iftomm-a02-fourbar", "").removesuffix("-N40"),
+    )
     for id, dt, slow in (
         ("b2-iftomm-a02-fourbar-N1", 1e-3, False),
         ("b2-iftomm-a02-fourbar-N2", 1e-3, False),

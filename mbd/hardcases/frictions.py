@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from functools import cache, partial
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,9 @@ import numpy as np
 from mbd.assembly import assemble
 from mbd.bodies import Link, RigidBody
 from mbd.constraints import Unilateral, touchdown
-from mbd.hardcases.case import Curve, Figure, HardCase, Outcome, definition, reference
+from mbd.hardcases.case import Curve, Figure, Outcome, hard_case
+from mbd.hardcases.convergence import halved, second_order
+from mbd.hardcases.references import numbers, published, size
 from mbd.joints import Planar, Revolute
 from mbd.joints.losses import Coulomb, Loss, PinFriction
 from mbd.model import Model
@@ -19,39 +21,8 @@ from mbd.simulation import simulate
 
 __all__ = ["CASES"]
 
-ORDER = 0.15
-"""How far an observed order may lie from 2."""
-STEPS = 0.01 / 2.0 ** np.arange(3)
+STEPS = halved(0.01)
 """Steps over which the errors of turning angles and times are halved [s]."""
-SCHEMES = ("HHT", "HHT-index3", "generalized-alpha", "generalized-alpha-index3", "Newmark")
-
-
-def size(values: Any) -> float:
-    """The largest absolute value; NaN of nothing, and where one is none."""
-    found = np.abs(np.asarray(values, dtype=float))
-    return float(np.max(found)) if found.size else math.nan
-
-
-def numbers(id: str) -> dict[str, Any]:
-    """The definition and the initial conditions of a case."""
-    data = definition(id)
-    return {**data["definition"], **data["initial_conditions"]}
-
-
-def quantity(id: str, beginning: str) -> Any:
-    """The reference quantity whose name begins so."""
-    (name,) = [each["name"] for each in definition(id)["quantities"] if each["name"].startswith(beginning)]
-    return reference(id, name)
-
-
-def order_figures(what: str, errors: list[float], limit: float) -> list[Figure]:
-    """An error over halved steps: small at the last, of order 2 between the last two."""
-    order = math.log2(errors[-2] / errors[-1]) if errors[-1] > 0.0 else math.nan
-    name = what.partition(" [")[0]
-    return [
-        Figure(f"error of {what}, finest step", errors[-1], limit),
-        Figure(f"observed order − 2 of {name} [-]", abs(order - 2.0), ORDER),
-    ]
 
 
 # pendulums ----------------------------------------------------------------------------------------------------------
@@ -88,8 +59,8 @@ def turning_figures(
         errors.append((size(found - times), size(turned - angles)) if same else (math.nan, math.nan))
     figures = [
         Figure("turning points more or fewer than there are [-]", float(count), 0.0),
-        *order_figures("turning times [s]", [each[0] for each in errors], 5e-4),
-        *order_figures("turning angles [rad]", [each[1] for each in errors], 5e-5),
+        *second_order("error of the turning times [s]", STEPS, [each[0] for each in errors], 5e-4, 1e-11),
+        *second_order("error of the turning angles [rad]", STEPS, [each[1] for each in errors], 5e-5, 1e-11),
     ]
     return figures, run
 
@@ -117,7 +88,7 @@ def coulomb(id: str, scheme: Any) -> Outcome:
     given = numbers(id)
     inertia, weight, torque = given["J"], given["K_mgd"], given["tau_friction"]
     model = pendulum(inertia, 1.0, weight / inertia, Coulomb(torque))
-    wanted = (quantity(id, "turning times"), quantity(id, "turning angles"))
+    wanted = (published(id, "turning times"), published(id, "turning angles"))
     until = float(wanted[0][-1]) + 3.0
     figures, run = turning_figures(model, given["theta0"], scheme, wanted, until)
     rest = np.flatnonzero(run.time >= run.events[-1].time)[1:] if run.events else np.zeros(0, dtype=int)
@@ -125,11 +96,11 @@ def coulomb(id: str, scheme: Any) -> Outcome:
     held = run["hinge.friction"][rest]
     figures += [
         Figure(
-            "half swings more or fewer than there are [-]", abs(len(run.events) - quantity(id, "number of half")), 0.0
+            "half swings more or fewer than there are [-]", abs(len(run.events) - published(id, "number of half")), 0.0
         ),
         Figure("creep at rest [rad]", size(angle - angle[0]) if len(angle) else math.nan, 1e-12),
         Figure("speed at rest [rad/s]", size(run["hinge.rate"][rest]), 1e-9),
-        Figure("error of the angle at rest [rad]", size(angle - quantity(id, "rest angle")), 5e-5),
+        Figure("error of the angle at rest [rad]", size(angle - published(id, "rest angle")), 5e-5),
         Figure("friction at rest beside the weight's torque [N m]", size(held - weight * np.sin(angle)), 1e-9),
         *friction_figures(run, np.full(len(run.time), torque)),
     ]
@@ -145,7 +116,7 @@ def loaded(id: str, scheme: Any) -> Outcome:
     given = numbers(id)
     m, L, g, mu, radius = (given[name] for name in ("m", "L", "g", "mu", "pin_radius"))
     model = pendulum(m, L, g, PinFriction(mu, radius))
-    wanted = (quantity(id, "turning times"), quantity(id, "turning angles"))
+    wanted = (published(id, "turning times"), published(id, "turning angles"))
     until = float(wanted[0][-1]) + 0.05
     figures, run = turning_figures(model, given["theta0"], scheme, wanted, until)
     force = np.linalg.norm(run["hinge.reaction_force"], axis=-1)
@@ -196,8 +167,11 @@ def push_of(id: str, mu: float, sign: float) -> float:
 
 def jamming(id: str, scheme: Any) -> Outcome:
     """Where a push makes the sliding tip approach, the run ends by name; elsewhere the force is that of the rod."""
-    critical, mu = quantity(id, "critical"), numbers(id)["mu"]
-    figures = []
+    given = numbers(id)
+    critical, mu = published(id, "critical"), given["mu"]
+    found = slide(id, mu, 1.0, scheme, until=1e-3)["tip.force"][0] * published(id, "A for the two")[0]
+    figures = [Figure("A of the reference times the force over m g, less 1 [-]",
+                      abs(found / (given["m"] * given["g"]) - 1.0), 1e-9)]  # fmt: skip
     for sign, much in ((1.0, mu), (1.0, 0.999 * critical), (-1.0, 0.999 * critical), (-1.0, 0.5 * critical)):
         run = slide(id, much, sign, scheme, until=1e-3)
         wanted = push_of(id, much, sign)
@@ -209,27 +183,24 @@ def jamming(id: str, scheme: Any) -> Outcome:
         told = not run.success and "Painlevé: no consistent contact force at 'tip'" in run.message
         figures.append(Figure(f"μ = {much:.4g}, jammed at the start and not told [-]", float(not told), 0.0))
         figures.append(Figure(f"μ = {much:.4g}, rows with a force all the same [-]", float(len(run.time)), 0.0))
-    run = slide(id, mu, -1.0, scheme)
-    return Outcome(figures)
-
-
-def case(id: str, must: str, judge: Any) -> HardCase:
-    """A case whose judge is told which definition it judges."""
-    return HardCase(id, must, partial(judge, id), SCHEMES)
+    shares = 1.0 - np.logspace(0.0, -3.0, 13)
+    forces = [float(slide(id, share * critical, -1.0, scheme, until=1e-3)["tip.force"][0]) for share in shares]
+    curve = Curve("force as friction nears the jam", 1.0 - shares, forces, "1 − μ/critical μ", "force [N]", True)
+    return Outcome(figures, [curve])
 
 
 CASES = (
-    case(
+    hard_case(
         "a4-coulomb-pendulum",
         "The pendulum swings as often as the friction lets it, then rests away from the vertical without creeping.",
         coulomb,
     ),
-    case(
+    hard_case(
         "a4c-pin-friction-load-dependent",
         "The friction follows the whole force in the pin, its own share included; angles and times of turning are met.",
         loaded,
     ),
-    case(
+    hard_case(
         "j13-painleve-rod",
         "Where no contact force is consistent the run ends and says so; just before, the force is finite and exact.",
         jamming,

@@ -10,7 +10,8 @@ import numpy as np
 
 import mbd
 from mbd.hardcases.case import Curve, Figure, HardCase, Outcome, definition
-from mbd.hardcases.convergence import allowance, distance_to, quantity, study
+from mbd.hardcases.convergence import allowance, study
+from mbd.hardcases.references import distance_to, quantity
 
 __all__ = ["CASES", "governor"]
 
@@ -113,7 +114,7 @@ def judge_governor(integrator: Any) -> Outcome:
 
 
 CASES = (
-    HardCase(B5, "stiff spring-dampers do not limit the step: 0.01 s is within 1 mm, smaller ones have order 2",
+    HardCase(B5, "Stiff spring-dampers do not limit the step: 0.01 s is within 1 mm, smaller ones have order 2.",
              judge_governor, ("HHT", "generalized-alpha", "Newmark"),
              notes={"dt = 0.01 s": "after ten swings the phase error of order 2 alone is 2.4 mm, of the trapezoidal "
                                    "rule too; until three swings the slider is within 1 mm"}),

@@ -13,22 +13,15 @@ import numpy as np
 from mbd.assembly import assemble
 from mbd.bodies import PointMass
 from mbd.constraints import Unilateral, measure
-from mbd.hardcases.case import Curve, Figure, Outcome, definition
+from mbd.hardcases.case import Curve, Figure, Outcome, definition, hard_case
+from mbd.hardcases.convergence import second_order
 from mbd.hardcases.impacts import deepest
-from mbd.hardcases.measuring import (
-    accuracy,
-    hard_case,
-    numbers,
-    published,
-    quantity,
-    second_order,
-    size,
-)
+from mbd.hardcases.references import accuracy, numbers, published, size
 from mbd.joints import Prismatic
 from mbd.model import Model
 from mbd.simulation import simulate
 
-__all__ = ["GRAZING"]
+__all__ = ["CASES"]
 
 MOST_HALVINGS = 16
 """Of T/100: a scheme of order 2 is off by 1e-12 then."""
@@ -106,9 +99,7 @@ def graze_figures(id: str, offset: float, name: str, courses: list[Course], runs
         Figure(f"{told}: impacts more than one [-]", max(len(each) for each in hits) - 1.0, 0.0),
         Figure(f"{told}: penetration [m]", float(np.max([deepest(run) for run in runs])), 1e-10),
     ]
-    if (
-        np.ndim(quantity(id, name)["value"]) == 0
-    ):  # a number of impacts: none, for a wall that the motion does not reach
+    if np.ndim(published(id, name)) == 0:  # a number of impacts: none, for a wall that the motion does not reach
         count = published(id, name)
         clear = [abs(len(each) - count) for each, course in zip(hits, courses, strict=True) if course.error < -depth]
         return [*figures, Figure(f"{told}: impacts though the motion stays clear of it [-]", sum(clear), 0.0)]
@@ -146,14 +137,16 @@ def grazing(id: str, scheme: Any) -> Outcome:
             time = published(id, name)[0]
             errors = [size([event.time - time for event in run.events[:1]] or [math.nan]) for run in runs[:4]]
             what = f"the contact time at d(1 − {offset:g}) [s]"
-            figures += second_order(what, errors, 1e-4 * time, accuracy(id, name))
+            figures += second_order(f"error of {what}", steps[:4], errors, 1e-4 * time, accuracy(id, name))
             place = runs[0]["slide.displacement"]
             curves.append(Curve(f"motion, wall at d(1 − {offset:g})", runs[0].time, place, y_label="x [m]"))
     return Outcome(figures, curves[::-1])
 
 
-GRAZING = hard_case(
-    "j7-grazing-contact",
-    "A graze is found as soon as the motion is more accurate than it is deep; a tangent touch gives no impulse.",
-    grazing,
+CASES = (
+    hard_case(
+        "j7-grazing-contact",
+        "A graze is found as soon as the motion is more accurate than it is deep; a tangent touch gives no impulse.",
+        grazing,
+    ),
 )

@@ -10,7 +10,7 @@ import numpy as np
 
 from mbd.compile.mechanisms import mechanism_of
 from mbd.hardcases.case import Figure
-from mbd.hardcases.measuring import size
+from mbd.hardcases.references import size
 from mbd.results.record import EventRecord
 
 __all__ = ["deepest", "difference", "impact_figures"]

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.hardcases.case import Figure, HardCase, Outcome
+from mbd.hardcases.known import reason
 from mbd.hardcases.schemes import SCHEMES, scheme
 
 __all__ = ["Judged", "Verdict", "chosen", "judged", "named_schemes", "ratio", "short", "with_schemes"]
@@ -18,6 +19,7 @@ __all__ = ["Judged", "Verdict", "chosen", "judged", "named_schemes", "ratio", "s
 class Judged:
     """What one judge found with one scheme.
 
+    reason : why it is known not to hold, '' where it should
     error : what stopped the judge, '' where it came to its end; seconds : of wall time
     """
 
@@ -25,6 +27,7 @@ class Judged:
     outcome: Outcome
     seconds: float
     error: str = ""
+    reason: str = ""
 
     @property
     def passed(self) -> bool:
@@ -59,25 +62,39 @@ class Verdict:
 
     @property
     def word(self) -> str:
-        """'holds', or 'fails' with the schemes, where not all do."""
+        """'holds', or 'does not hold' with the schemes, where not all are meant; `reasons` tells why.
+
+        A scheme that holds although it is listed as one that does not is told too.
+        """
         failing = [part.scheme for part in self.parts if not part.passed]
-        if not failing:
-            return "holds"
-        return "fails" if len(failing) == len(self.parts) else f"fails with {', '.join(failing)}"
+        mended = [part.scheme for part in self.parts if part.passed and part.reason]
+        told = []
+        if failing:
+            told.append("does not hold" + (f" with {', '.join(failing)}" if len(failing) < len(self.parts) else ""))
+        if mended:
+            told.append(f"holds now with {', '.join(mended)}: take it from the list of what does not")
+        return "; ".join(told) or "holds"
+
+    @property
+    def reasons(self) -> list[str]:
+        """Why it is known not to hold, each reason once."""
+        return list(dict.fromkeys(part.reason for part in self.parts if part.reason and not part.passed))
 
 
 def ratio(figure: Figure | None) -> float:
-    """Value over limit: above 1 it fails; infinite where it is not a number or the limit is 0."""
+    """Value over limit: above 1 it fails; infinite where it is not a number or the limit is 0, −1 without a limit."""
     if figure is None or math.isnan(figure.value):
         return math.inf
+    if not figure.is_judged:
+        return -1.0
     if figure.limit > 0.0:
         return max(figure.value / figure.limit, 0.0)
     return 0.0 if figure.passed else math.inf
 
 
 def short(case: HardCase) -> str:
-    """'g1' of 'g1-bouncing-ball'."""
-    return case.id.partition("-")[0]
+    """'g1' of 'g1-bouncing-ball', or the label of a case that shares its beginning with another."""
+    return case.label or case.id.partition("-")[0]
 
 
 def chosen(cases: Sequence[HardCase], names: Sequence[str], slow: bool) -> list[HardCase]:
@@ -91,8 +108,8 @@ def chosen(cases: Sequence[HardCase], names: Sequence[str], slow: bool) -> list[
     faults = []
     for name in names:
         word = name.lower()
-        exact = [case for case in cases if word in (case.id, short(case))]
-        part = [case for case in cases if (case.id.startswith(word) if len(word) == 1 else word in case.id)]
+        exact = [case for case in cases if word in (case.id.lower(), short(case).lower(), case.id.partition("-")[0])]
+        part = [case for case in cases if (case.id.startswith(word) if len(word) == 1 else word in case.id.lower())]
         found += exact or part
         if not exact and not part:
             faults.append(nearest(name, [short(case) for case in cases], "hard case", "There are"))
@@ -116,8 +133,8 @@ def with_schemes(case: HardCase, only: Sequence[str] | None) -> list[str]:
     return [name for name in case.schemes if only is None or name in only]
 
 
-def judged(case: HardCase, only: Sequence[str] | None = None, tell: Callable[[str], None] | None = None) -> Verdict:
-    """The verdict on a case; `tell` is called with each scheme before it runs."""
+def judged(case: HardCase, only: Sequence[str] | None = None, between: Callable[[], bool] | None = None) -> Verdict:
+    """The verdict on a case; before each scheme `between` says whether to stop there."""
     names = with_schemes(case, only)
     if not names:
         raise ModelError(
@@ -125,13 +142,13 @@ def judged(case: HardCase, only: Sequence[str] | None = None, tell: Callable[[st
         )
     parts = []
     for name in names:
-        if tell is not None:
-            tell(name)
+        if between is not None and between():
+            break
         began = time.perf_counter()
         outcome, error = Outcome([]), ""
         try:
             outcome = case.judge(scheme(name))
         except Exception as problem:  # whatever stops a judge is what the table must say
             error = f"{type(problem).__name__}: {problem}"
-        parts.append(Judged(name, outcome, time.perf_counter() - began, error))
+        parts.append(Judged(name, outcome, time.perf_counter() - began, error, reason(case.id, name)))
     return Verdict(case, parts)

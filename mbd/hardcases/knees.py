@@ -12,22 +12,14 @@ from mbd.arrays import Vector
 from mbd.assembly import assemble
 from mbd.bodies import Link
 from mbd.constraints import Event, Penalty, flexion, measure
-from mbd.hardcases.case import Curve, Figure, Outcome
-from mbd.hardcases.measuring import (
-    accuracy,
-    error_curve,
-    halved,
-    hard_case,
-    numbers,
-    published,
-    second_order,
-    size,
-)
+from mbd.hardcases.case import Curve, Figure, Outcome, hard_case
+from mbd.hardcases.convergence import error_curve, halved, second_order
+from mbd.hardcases.references import accuracy, numbers, published, size
 from mbd.joints import Revolute
 from mbd.model import Model
 from mbd.simulation import simulate
 
-__all__ = ["GAP", "PULL"]
+__all__ = ["CASES"]
 
 RELEASES = {"unilateral": "pull"}
 """What the definition calls a law, by the word of `Penalty`; any other is that of the gap."""
@@ -104,7 +96,9 @@ def stopped(id: str, scheme: Any) -> Outcome:
     figures: list[Figure] = []
     for what, (name, limit) in LIMITS.items():
         most = limit * size(published(id, name))
-        figures += second_order(what, [each[what] for each in errors], most, 10.0 * accuracy(id, name))
+        figures += second_order(
+            f"error of {what}", steps, [each[what] for each in errors], most, 10.0 * accuracy(id, name)
+        )
     run, depths = runs[-1], published(id, "max hyperextension")
     beyond = float(np.max(run["knee.angle"])) - max(depths)
     allowed = 2.0 * size(errors[-1]["the largest hyperextensions [rad]"])
@@ -122,7 +116,8 @@ def stopped(id: str, scheme: Any) -> Outcome:
         Figure("error of the switching times with one linear step back, over that with roots [-]",
                size(linear[what]) / max(size(errors[-1][what]), 1e-300), 1.5),
         Figure("torque of the stop while it is open [N m]", size(force[between]), 0.0),
-        *second_order("the energy, over what the stop took [-]", [_lost(each) for each in runs], 2e-3, 1e-9),
+        *second_order("error of the energy, over what the stop took [-]", steps,
+                      [_lost(each) for each in runs], 2e-3, 1e-9),
     ]  # fmt: skip
     if RELEASES.get(numbers(id)["law"]) == "pull":
         figures.append(Figure("torque that pulls, over the largest [-]", float(np.max(-force)) / size(force), 1e-8))
@@ -141,13 +136,15 @@ def _lost(run: Any) -> float:
     return float(sums["numerical"] / abs(sums["knee stop"]))
 
 
-GAP = hard_case(
-    "h1-knee-stop-gap-law",
-    "A knee stop that lets go where the gap opens switches at the reference instants, to second order.",
-    stopped,
-)
-PULL = hard_case(
-    "h1b-knee-stop-unilateral",
-    "A knee stop that never pulls lets go as its torque falls to zero, at the reference instants to second order.",
-    stopped,
+CASES = (
+    hard_case(
+        "h1-knee-stop-gap-law",
+        "A knee stop that lets go where the gap opens switches at the reference instants, to second order.",
+        stopped,
+    ),
+    hard_case(
+        "h1b-knee-stop-unilateral",
+        "A knee stop that never pulls lets go as its torque falls to zero, at the reference instants to second order.",
+        stopped,
+    ),
 )

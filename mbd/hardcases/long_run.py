@@ -10,7 +10,8 @@ import numpy as np
 
 import mbd
 from mbd.hardcases.case import Curve, Figure, HardCase, Outcome, definition
-from mbd.hardcases.convergence import quantity
+from mbd.hardcases.crossings import falls
+from mbd.hardcases.references import quantity
 
 __all__ = ["CASES", "long_pendulum", "numerical_damping"]
 
@@ -106,26 +107,14 @@ def _phase(case: str, run: Any, begin: Any, count: int) -> list[Figure]:
     due = 0.5 * math.pi * ellipkinc(math.asin(exact), k * k) / ellipk(k * k) if abs(exact) <= 1.0 else math.nan
     lag = float(due - phase[-1])
     period = run.time[-1] / count
-    falls = _falls(begin)
-    one = (falls[-1] - falls[0]) / (len(falls) - 1) / period - 1.0
+    found = falls(begin, "pivot.angle")
+    one = (found[-1] - found[0]) / (len(found) - 1) / period - 1.0
     expected = 2.0 * math.pi * count * one
     return [
         Figure("phase error over periods × error of one × 2π, less 1 [-]", abs(lag / expected - 1.0), PHASE),
         Figure("relative error of the period over (ω dt)²/12, less 1 [-]",
                abs(one / ((frequency * period / STEPS) ** 2 / 12.0) - 1.0), 0.5),
     ]  # fmt: skip
-
-
-def _falls(run: Any) -> list[float]:
-    """Times at which the angle falls through zero, by bisection of the run's own interpolation."""
-    angle, found = run["pivot.angle"], []
-    for row in np.flatnonzero((angle[:-1] > 0.0) & (angle[1:] <= 0.0)):
-        left, right = float(run.time[row]), float(run.time[row + 1])
-        for _ in range(50):
-            middle = 0.5 * (left + right)
-            left, right = (middle, right) if run.at(middle)["pivot.angle"] > 0.0 else (left, middle)
-        found.append(right)
-    return found
 
 
 def _falling(run: Any, bottom: float) -> list[Figure]:
@@ -158,9 +147,16 @@ def _rate(case: str, integrator: Any, dt: float, share: float, run: Any, limit: 
                   abs((level[0] - level[-1]) / expected - 1.0), limit)  # fmt: skip
 
 
-MUST = "undamped: energy bounded, phase error adds up; damped: energy falls at the rate of the algorithmic damping"
+MUST = "Undamped: energy bounded, phase error adds up; damped: energy falls at the rate of the algorithmic damping."
 
 CASES = tuple(
-    HardCase(id, MUST, partial(judge_long_run, id), ("Newmark", "HHT", "generalized-alpha"), slow)
+    HardCase(
+        id,
+        MUST,
+        partial(judge_long_run, id),
+        ("Newmark", "HHT", "generalized-alpha"),
+        slow,
+        label=id.replace("-long-time", "").removesuffix("-periods"),
+    )
     for id, slow in ((QUICK, False), (J12, True))
 )

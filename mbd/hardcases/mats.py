@@ -11,20 +11,14 @@ import numpy as np
 from mbd.assembly import assemble
 from mbd.bodies import PointMass
 from mbd.constraints import Penalty, height
-from mbd.hardcases.case import Curve, Figure, Outcome
-from mbd.hardcases.measuring import (
-    accuracy,
-    error_curve,
-    halved,
-    hard_case,
-    numbers,
-    published,
-)
+from mbd.hardcases.case import Curve, Figure, Outcome, hard_case
+from mbd.hardcases.convergence import error_curve, halved, second_order
+from mbd.hardcases.references import accuracy, numbers, published
 from mbd.joints import Prismatic
 from mbd.model import Model
 from mbd.simulation import simulate
 
-__all__ = ["STIFF"]
+__all__ = ["CASES"]
 
 STIFFER = (1.0, 10.0)
 """Stiffness over that of the definition."""
@@ -106,8 +100,7 @@ def resolved(given: dict[str, float], scheme: Any) -> tuple[list[Figure], list[C
     figures: list[Figure] = []
     for name, limit in LIMITS.items():
         found = [each[name] for each in errors]
-        figures.append(Figure(f"{told}: error of the {name}, finest step, relative [-]", abs(found[-1]), limit))
-        figures.append(_fall(f"{told}: {name}", found, 1e-7))
+        figures += second_order(f"{told}: relative error of the {name} [-]", steps, found, limit, 1e-7, better=True)
     gains = []
     for run in runs:
         closed, opened = (event.row for event in run.events[:2])
@@ -122,13 +115,6 @@ def resolved(given: dict[str, float], scheme: Any) -> tuple[list[Figure], list[C
         Curve(f"depth, {told}", run.time, -run["fall.displacement"], y_label="depth [m]"),
         error_curve(f"error of the duration, {told}", steps, late, "relative error"),
     ]
-
-
-def _fall(what: str, errors: list[float], floor: float) -> Figure:
-    """Of second order or better: numerical damping is of third."""
-    a, b = (max(abs(error), floor) for error in errors[-2:])
-    short = 2.0 - math.log2(a / b) if a > 4.0 * floor else 0.0
-    return Figure(f"{what}: what the observed order lacks of 2 [-]", short, 0.15)
 
 
 def _unresolved(run: Any) -> list[str]:
@@ -182,8 +168,10 @@ def stiff(id: str, scheme: Any) -> Outcome:
     return Outcome(figures, curves[:2])
 
 
-STIFF = hard_case(
-    "j6-stiff-penalty-1e9",
-    "A blow of microseconds is of second order where steps resolve it; where not, it is told and makes no energy.",
-    stiff,
+CASES = (
+    hard_case(
+        "j6-stiff-penalty-1e9",
+        "A blow of microseconds is of second order where steps resolve it; where not, it is told and makes no energy.",
+        stiff,
+    ),
 )

@@ -16,7 +16,7 @@ import numpy as np
 
 from mbd.hardcases.case import Curve, Figure, definition
 from mbd.hardcases.judging import Judged, Verdict, ratio, short
-from mbd.hardcases.table import number, summary, worst_text
+from mbd.hardcases.table import number, summary, worst_by_scheme
 from mbd.view.report import machine, versions
 from mbd.view.style import CYCLE, rules
 
@@ -28,8 +28,8 @@ POINTS = 4000
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
 
 
-def write_page(verdicts: Sequence[Verdict], path: str | Path) -> Path:
-    """Write the page; it opens without a network."""
+def write_page(verdicts: Sequence[Verdict], path: str | Path, note: str = "") -> Path:
+    """Write the page, with a note on top; it opens without a network."""
     place = Path(path)
     place.parent.mkdir(parents=True, exist_ok=True)
     style = (resources.files("mbd.hardcases") / "data" / "page.css").read_text("utf-8")
@@ -51,7 +51,7 @@ def write_page(verdicts: Sequence[Verdict], path: str | Path) -> Path:
 <body>
 <header>
 <h1>Hard cases</h1>
-<p class="lead">Scenes on which multibody systems fail, often silently: {escape(summary(verdicts))}.</p>
+<p class="lead">Scenes on which multibody systems fail, often silently: {escape(summary(verdicts))}.{escape(note)}</p>
 <p class="made">{escape(told)}</p>
 </header>
 <main>
@@ -74,9 +74,11 @@ def write_page(verdicts: Sequence[Verdict], path: str | Path) -> Path:
 
 def _row(verdict: Verdict) -> str:
     case = verdict.case
+    why = "".join(f'<p class="why">{escape(each)}</p>' for each in verdict.reasons)
+    worst = "<br>".join(map(_whole, worst_by_scheme(verdict)))
     return (
         f'<tr><td><a href="#{case.id}">{short(case)}</a></td><td>{escape(case.must)}</td>'
-        f'<td class="figure">{_whole(worst_text(verdict))}</td><td>{_badge(verdict.passed, verdict.word)}</td>'
+        f'<td class="figure">{worst}</td><td>{_badge(verdict.passed, verdict.word)}{why}</td>'
         f'<td class="number">{verdict.seconds:.2f}</td></tr>'
     )
 
@@ -125,9 +127,11 @@ def _part(part: Judged) -> str:
         if worst is not None
         else "no figures"
     )
-    word = "holds" if part.passed else "fails"
+    word = "holds" if part.passed else "does not hold"
+    why = f"<p class='error'>{escape(part.reason)}</p>" if part.reason and not part.passed else ""
     return f"""<details{"" if part.passed else " open"}>
 <summary>{escape(part.scheme)} {_badge(part.passed, word)} <span>{escape(told)}</span></summary>
+{why}
 <table class="figures"><thead><tr><th>figure</th><th>value</th><th>limit</th><th></th></tr></thead>
 <tbody>
 {figures}
@@ -136,9 +140,11 @@ def _part(part: Judged) -> str:
 
 
 def _figure(figure: Figure) -> str:
-    share = ratio(figure)
+    share = max(ratio(figure), 0.0)
     bar = f'<span class="bar"><i style="width:{min(share, 1.0) * 100.0:.1f}%"></i></span>'
     cells = "".join(f'<td class="number">{number(value)}</td>' for value in (figure.value, figure.limit))
+    if not figure.is_judged:
+        cells = f'<td class="number">{number(figure.value)}</td><td class="number">not judged</td>'
     word = "holds" if figure.passed else "fails"
     return f'<tr class="{word}"><td>{escape(figure.what)}</td>{cells}<td>{bar}</td></tr>'
 
@@ -189,7 +195,8 @@ def _logarithmic(axes: Any, group: Sequence[tuple[str, Curve]]) -> None:
     top = max((float(np.nanmax(each)) for each in errors if np.isfinite(each).any()), default=0.0)
     if not top > 0.0:
         return
-    axes.plot(x, 2.0 * top * (x / x.max()) ** 2, ":", color="#8A8A8A", linewidth=1.0, label="order 2")
+    if group[0][1].x_label.endswith("[s]"):  # steps
+        axes.plot(x, 2.0 * top * (x / x.max()) ** 2, ":", color="#8A8A8A", linewidth=1.0, label="order 2")
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.minorticks_off()

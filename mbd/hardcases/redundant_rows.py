@@ -11,7 +11,9 @@ import numpy as np
 
 import mbd
 from mbd.hardcases.case import Curve, Figure, HardCase, Outcome, definition
-from mbd.hardcases.convergence import EVERY, allowance, distance_to, quantity, study
+from mbd.hardcases.convergence import allowance, study
+from mbd.hardcases.references import distance_to, quantity
+from mbd.hardcases.schemes import EVERY
 
 __all__ = ["CASES", "bricard", "parallel_cranks"]
 
@@ -24,11 +26,15 @@ LARGE = 10.0
 """A multiplier may be so many times the weight of the mechanism [-]; those that fight each other are 1e8 times it."""
 
 
-def parallel_cranks(case: str = J2, cut: Any = "auto") -> tuple[mbd.Model, mbd.State]:
-    """Equal cranks at equal distances that carry one coupler: every crank beyond the second is redundant."""
+def parallel_cranks(case: str = J2, cut: Any = "auto", count: int = 0) -> tuple[mbd.Model, mbd.State]:
+    """Equal cranks at equal distances that carry one coupler: every crank beyond the second is redundant.
+
+    count : of cranks; that of the case for 0
+    """
     numbers, begin = definition(case)["definition"], definition(case)["initial_conditions"]
-    count, L, apart, m = int(numbers["n_cranks"]), numbers["crank_length"], numbers["spacing"], numbers["crank_mass"]
+    L, apart, m = numbers["crank_length"], numbers["spacing"], numbers["crank_mass"]
     model = mbd.Model("parallel cranks", gravity=(0.0, -numbers["g"], 0.0), cut=cut)
+    count = count or int(numbers["n_cranks"])
     span = apart * (count - 1)
     coupler = mbd.RigidBody("coupler", mass=numbers["coupler_mass"], inertia=numbers["coupler_mass"] * span**2 / 12.0)
     cranks = [mbd.Link(f"crank {k}", m, L, 0.5 * L, m * L**2 / 12.0) for k in range(count)]
@@ -155,8 +161,8 @@ def _largest(runs: Any) -> float:
 
 
 CASES = (
-    HardCase(J2, "the motion is unique and of order 2, the sum of forces exact; what is redundant is told once",
+    HardCase(J2, "The motion is unique and of order 2, the sum of forces exact; what is redundant is told once.",
              judge_parallel_cranks, EVERY),
-    HardCase(B4, "the mechanism moves with its one freedom, on its rows, with order 2; what is redundant is told once",
+    HardCase(B4, "The mechanism moves with its one freedom, on its rows, with order 2; what is redundant is told once.",
              judge_bricard, EVERY),
 )  # fmt: skip

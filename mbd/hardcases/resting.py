@@ -9,7 +9,9 @@ import numpy as np
 
 import mbd
 from mbd.hardcases.case import Curve, Figure, HardCase, Outcome, definition
-from mbd.hardcases.convergence import EPS, EVERY, force_floor, quantity
+from mbd.hardcases.convergence import EPS, force_floor
+from mbd.hardcases.references import quantity
+from mbd.hardcases.schemes import EVERY
 
 __all__ = ["CASES", "block", "table"]
 
@@ -20,10 +22,15 @@ DRIFT = 1e-10
 """Most that anything at rest may move [m, rad]."""
 
 
-def table(case: str = J11, order: Sequence[int] = range(4)) -> tuple[mbd.Model, mbd.State]:
-    """A square table that may rise and tilt, on four contacts 'leg 0' … 'leg 3', given to the model in some order."""
+def table(
+    case: str = J11, order: Sequence[int] = range(4), center: Sequence[float] | None = None
+) -> tuple[mbd.Model, mbd.State]:
+    """A square table that may rise and tilt, on four contacts 'leg 0' … 'leg 3', given to the model in some order.
+
+    center : (x, z) of its mass center; that of the case if None
+    """
     numbers = definition(case)["definition"]
-    half, (x_c, z_c) = 0.5 * numbers["side"], numbers["com_offset"]
+    half, (x_c, z_c) = 0.5 * numbers["side"], numbers["com_offset"] if center is None else center
     corners = [(-half, -half), (half, -half), (half, half), (-half, half)]
     model = mbd.Model("table", gravity=(0.0, -numbers["g"], 0.0))
     stem = mbd.PointMass("stem", mass=0.0)
@@ -132,8 +139,8 @@ def _told(run: Any) -> bool:
 
 
 CASES = (
-    HardCase(J11, "the table rests; its legs share the weight with least norm, in any order, and that is told",
+    HardCase(J11, "The table rests; its legs share the weight with least norm, in any order, and that is told.",
              judge_table, EVERY),
-    HardCase(J11B, "the block rests on two points and on three, with determinate forces and those of least norm",
+    HardCase(J11B, "The block rests on two points and on three, with determinate forces and those of least norm.",
              judge_block, EVERY),
 )  # fmt: skip

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from mbd.errors import UnknownNameError, nearest
 from mbd.integrators import HHT, GeneralizedAlpha, Integrator, Newmark
 
-__all__ = ["EVERY", "SCHEMES", "scheme"]
+__all__ = ["DAMPED", "EVERY", "SCHEMES", "scheme"]
 
 SCHEMES: dict[str, Callable[[], Integrator]] = {
     "HHT": lambda: HHT(alpha=0.05),
@@ -19,6 +19,8 @@ SCHEMES: dict[str, Callable[[], Integrator]] = {
 """Newmark with rows in position only is refused: nothing damps its multipliers."""
 
 EVERY = tuple(SCHEMES)
+DAMPED = EVERY[:-1]
+"""Those whose multipliers forget their round-off."""
 
 
 def scheme(name: str) -> Integrator:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 import mbd
 from mbd.hardcases.case import Curve, Figure, HardCase, Outcome, definition
-from mbd.hardcases.convergence import EVERY, allowance, distance_to, quantity, study
+from mbd.hardcases.convergence import allowance, study
+from mbd.hardcases.crossings import crossing
+from mbd.hardcases.references import distance_to, quantity
+from mbd.hardcases.schemes import EVERY
 
 __all__ = ["CASES", "equal_slider_crank", "parallelogram"]
 
@@ -85,7 +88,7 @@ def judge_slider_crank(integrator: Any) -> Outcome:
     found = study(errors, 2e-3)
     finest, dt, turn = runs[-1], float(found.steps[-1]), definition(J3)["initial_conditions"]["crank_rate"]
     turned = finest["main.angle"] - 0.5 * math.pi
-    passages = _passages(finest, turned, lambda at: float(at["main.angle"]) - 0.5 * math.pi)
+    passages = _passages(finest, "main.angle", 0.5 * math.pi)
     first = passages[0] if passages else math.nan
     speed = float(finest.at(first)["main.angle.rate"]) if passages else math.nan
     L = definition(J3)["definition"]["L"]
@@ -124,7 +127,7 @@ def judge_parallelogram(integrator: Any) -> Outcome:
 
     found = study(errors, 2e-3)
     finest, dt, turn = runs[-1], float(found.steps[-1]), definition(J3B)["initial_conditions"]["thetadot"]
-    passages = _passages(finest, finest["a.angle"], lambda at: float(at["a.angle"]))
+    passages = _passages(finest, "a.angle")
     skew = max(float(np.max(np.abs(run["d.angle"] - run["a.angle"]))) for run in runs)
     return Outcome(
         [
@@ -139,20 +142,13 @@ def judge_parallelogram(integrator: Any) -> Outcome:
     )
 
 
-def _passages(run: Any, angle: Any, angle_at: Callable[[Any], float]) -> list[float]:
-    """Times at which an angle is π/2 + k π, by bisection of the run's own interpolation."""
-    halves = np.floor(angle / math.pi + 0.5)
-    found = []
-    for row in np.flatnonzero(np.diff(halves)):
-        left, right, level = float(run.time[row]), float(run.time[row + 1]), halves[row]
-        for _ in range(60):
-            middle = 0.5 * (left + right)
-            if math.floor(angle_at(run.at(middle)) / math.pi + 0.5) == level:
-                left = middle
-            else:
-                right = middle
-        found.append(right)
-    return found
+def _passages(run: Any, name: str, offset: float = 0.0) -> list[float]:
+    """Times at which an angle, measured from its offset, is π/2 + k π."""
+    rows = np.flatnonzero(np.diff(np.floor((run[name] - offset) / math.pi + 0.5)))
+    return [
+        crossing(run, lambda at: np.cos(at[name] - offset), float(run.time[row]), float(run.time[row + 1]))
+        for row in rows
+    ]
 
 
 def _jump(run: Any, passages: list[float]) -> float:
@@ -172,8 +168,8 @@ def _jump(run: Any, passages: list[float]) -> float:
 
 
 CASES = (
-    HardCase(J3, "the slider-crank passes its singular poses on the smooth branch, with order 2 and no jump of energy",
+    HardCase(J3, "The slider-crank passes its singular poses on the smooth branch, with order 2 and no jump of energy.",
              judge_slider_crank, EVERY),
-    HardCase(J3B, "the parallelogram passes its flat poses with its cranks parallel, with order 2",
+    HardCase(J3B, "The parallelogram passes its flat poses with its cranks parallel, with order 2.",
              judge_parallelogram, EVERY),
 )  # fmt: skip

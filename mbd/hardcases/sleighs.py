@@ -10,7 +10,9 @@ import numpy as np
 
 import mbd
 from mbd.hardcases.case import Curve, Figure, HardCase, Outcome, definition
-from mbd.hardcases.convergence import EVERY, allowance, distance_to, quantity, study
+from mbd.hardcases.convergence import allowance, study
+from mbd.hardcases.references import distance_to, quantity
+from mbd.hardcases.schemes import EVERY
 
 __all__ = ["CASES", "knife_edge", "sleigh"]
 
@@ -157,8 +159,8 @@ def judge_knife_edge(integrator: Any) -> Outcome:
 
 
 CASES = (
-    HardCase(D1, "the blade never slips sideways, energy is kept, the motion tends to a straight line",
+    HardCase(D1, "The blade never slips sideways, energy is kept, the motion tends to a straight line.",
              judge_sleigh, EVERY),
-    HardCase(D2, "the edge swings downhill and back and moves on sideways; it never slides down",
+    HardCase(D2, "The edge swings downhill and back and moves on sideways; it never slides down.",
              judge_knife_edge, EVERY),
 )  # fmt: skip

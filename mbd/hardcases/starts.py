@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 import mbd
-from mbd.hardcases.case import Figure, HardCase, Outcome, definition
-from mbd.hardcases.convergence import DAMPED, EVERY, Reference, quantity
+from mbd.hardcases.case import Curve, Figure, HardCase, Outcome, definition
+from mbd.hardcases.references import Reference, quantity
+from mbd.hardcases.schemes import DAMPED, EVERY
 
 __all__ = ["CASES", "bob", "four_bar_that_cannot_close"]
 
@@ -69,7 +70,8 @@ def judge_inconsistent_start(integrator: Any) -> Outcome:
             Figure("error of the tension of the projected start [N]", abs(float(pull[0]) - float(tension.value)),
                    max(tension.accuracy, 1e-12)),
             Figure("change of the tension in ten steps [N]", float(np.max(np.abs(pull - pull[0]))), _transient(dt)),
-        ]
+        ],
+        [Curve("tension from the projected start on", run.time, pull, y_label="tension [N]")],
     )  # fmt: skip
 
 
@@ -136,13 +138,21 @@ def judge_infeasible(integrator: Any) -> Outcome:
             Figure("simulations that start", begun, 0),
             Figure("error of the closure error told, relative [-]", off, SHOWN),
             Figure("errors without a joint of the loop and the iterations", unnamed, 0),
-        ]
+        ],
+        [Curve("stretched links; the last part is missing", *_chain(), "x [m]", "y [m]")],
     )
 
 
+def _chain() -> tuple[list[float], list[float]]:
+    """Corners of the stretched links, and the pivot that they do not reach."""
+    numbers = definition(J15)["definition"]
+    x = [0.0, *np.cumsum(numbers["links"]), numbers["ground"]]
+    return x, [0.0] * len(x)
+
+
 CASES = (
-    HardCase(J14, "a start off its rows is refused with residuals and name, or projected on request, never run",
+    HardCase(J14, "A start off its rows is refused with residuals and name, or projected on request, never run.",
              judge_inconsistent_start, EVERY),
-    HardCase(J15, "a loop that cannot close is refused with its closure error and the joint's name",
+    HardCase(J15, "A loop that cannot close is refused with its closure error and the joint's name.",
              judge_infeasible, DAMPED[:1]),
 )  # fmt: skip

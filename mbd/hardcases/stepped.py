@@ -9,7 +9,7 @@ import numpy as np
 
 from mbd.hardcases.case import Figure
 from mbd.hardcases.impacts import deepest, impact_figures
-from mbd.hardcases.measuring import size
+from mbd.hardcases.references import size
 
 __all__ = ["HOW", "stepped_figures", "within_steps"]
 

@@ -3,24 +3,31 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from mbd.errors import ModelError
 from mbd.hardcases.case import Figure
-from mbd.hardcases.judging import Verdict, short
+from mbd.hardcases.judging import Judged, Verdict, ratio, short
 
-__all__ = ["BEGIN", "END", "as_markdown", "as_text", "figure_text", "summary", "worst_text", "write_markdown"]
+__all__ = [
+    "BEGIN", "END", "as_markdown", "as_text", "figure_text", "number", "summary", "worst_by_scheme", "worst_text",
+    "write_markdown",
+]  # fmt: skip
 
 BEGIN, END = "<!-- table of mbd hardcases -->", "<!-- end of table -->"
 """Between these marks `mbd hardcases --markdown` writes."""
+
+NARROW = 100
+"""Columns below which a terminal has no room for a table."""
 
 HEADS = ("case", "what must hold", "nearest to its limit", "verdict", "s")
 
 
 def figure_text(figure: Figure) -> str:
-    """'penetration [m]: 2e-16 of 1e-10'."""
-    return f"{figure.what}: {number(figure.value)} of {number(figure.limit)}"
+    """'penetration [m]: 2e-16 of 1e-10'; without the limit where there is none."""
+    limit = f" of {number(figure.limit)}" if figure.is_judged else ""
+    return f"{figure.what}: {number(figure.value)}{limit}"
 
 
 def number(value: float) -> str:
@@ -33,11 +40,47 @@ def number(value: float) -> str:
 
 
 def worst_text(verdict: Verdict) -> str:
-    """What a row says about the worst figure, with its scheme."""
+    """The worst figure of all schemes, with its scheme, and what is shown without being judged."""
     part = verdict.worst
-    if part.error:
-        return f"{part.error} ({part.scheme})"
-    return f"{figure_text(part.worst)} ({part.scheme})" if part.worst is not None else "no figures"
+    told = part.error
+    if not told:
+        told = figure_text(part.worst) if part.worst is not None else "no figures"
+    return "; ".join([f"{told} ({part.scheme})", *_shown(verdict)])
+
+
+def worst_by_scheme(verdict: Verdict) -> list[str]:
+    """The worst figure of each scheme, those of one kind together: 'gap [m]: 2e-16 (HHT), 3e-16 (Newmark) of 1e-10'."""
+    kinds: dict[tuple[str, str], list[Judged]] = {}
+    for part in sorted(verdict.parts, key=lambda part: -ratio(part.worst)):
+        if part.error:
+            kinds.setdefault((part.error, ""), []).append(part)
+        elif part.worst is not None:
+            kinds.setdefault((part.worst.what, number(part.worst.limit)), []).append(part)
+    told = []
+    for (what, limit), parts in kinds.items():
+        values = {part.scheme: number(part.worst.value) if limit and part.worst else "" for part in parts}
+        told.append(f"{what}: {_values(values, verdict)} of {limit}" if limit else f"{what} ({', '.join(values)})")
+    return [*told, *_shown(verdict)]
+
+
+def _shown(verdict: Verdict) -> list[str]:
+    """Figures without a limit, of all schemes."""
+    found: dict[str, dict[str, str]] = {}
+    for part in verdict.parts:
+        for figure in part.outcome.figures:
+            if not figure.is_judged:
+                found.setdefault(figure.what, {})[part.scheme] = number(figure.value)
+    return [f"not judged: {what}: {_values(values, verdict)}" for what, values in found.items()]
+
+
+def _values(values: Mapping[str, str], verdict: Verdict) -> str:
+    """'2e-16 (HHT), 3e-16 (Newmark)'; '0 (all)' where every scheme has the same."""
+    if len(values) == len(verdict.parts) > 1 and len(set(values.values())) == 1:
+        return f"{next(iter(values.values()))} (all)"
+    same: dict[str, list[str]] = {}
+    for scheme, value in values.items():
+        same.setdefault(value, []).append(scheme)
+    return ", ".join(f"{value} ({', '.join(schemes)})" for value, schemes in same.items())
 
 
 def summary(verdicts: Sequence[Verdict]) -> str:
@@ -49,20 +92,44 @@ def summary(verdicts: Sequence[Verdict]) -> str:
 
 
 def as_text(verdicts: Sequence[Verdict], width: int = 120) -> str:
-    """The table for a terminal of that many columns."""
+    """The table for a terminal of that many columns; below `NARROW` each case is a paragraph."""
+    if width < NARROW:
+        return "\n".join(
+            [*(_paragraph(verdict, width) for verdict in verdicts), "", *_wrapped(summary(verdicts), width)]
+        )
     ids = max((len(verdict.case.id) for verdict in verdicts), default=4)
-    told = 14
+    told = 20
     free = max(width - ids - told - 6 - 8, 40)
     columns = (ids, free // 2, free - free // 2, told, 6)
     lines = [_line(HEADS, columns), "  ".join("─" * size for size in columns)]
     for verdict in verdicts:
         cells = (verdict.case.id, verdict.case.must, worst_text(verdict), verdict.word, f"{verdict.seconds:.2f}")
-        wrapped = [
-            textwrap.wrap(cell, size, break_on_hyphens=False) or [""] for cell, size in zip(cells, columns, strict=True)
-        ]
+        wrapped = [_wrapped(cell, size) for cell, size in zip(cells, columns, strict=True)]
         for k in range(max(map(len, wrapped))):
             lines.append(_line([cell[k] if k < len(cell) else "" for cell in wrapped], columns))
-    return "\n".join([*lines, "", summary(verdicts)])
+    return "\n".join([*lines, "", *_why(verdicts, width), *_wrapped(summary(verdicts), width)])
+
+
+def _why(verdicts: Sequence[Verdict], width: int) -> list[str]:
+    """Reasons that are known, below a table, each with its cases."""
+    found: dict[str, list[str]] = {}
+    for verdict in verdicts:
+        for reason in verdict.reasons:
+            found.setdefault(reason, []).append(short(verdict.case))
+    lines = [line for why, cases in found.items() for line in _wrapped(f"{', '.join(cases)}: {why}", width)]
+    return [*lines, ""] if lines else []
+
+
+def _paragraph(verdict: Verdict, width: int) -> str:
+    """A case on a narrow terminal."""
+    lines = [*_wrapped(verdict.case.id, width), *_wrapped(f"{verdict.word} ({verdict.seconds:.2f} s)", width - 2, "  ")]
+    lines += _wrapped(verdict.case.must, width - 2, "  ")
+    lines += _wrapped(worst_text(verdict), width - 2, "  ")
+    return "\n".join(lines)
+
+
+def _wrapped(text: str, width: int, indent: str = "") -> list[str]:
+    return [indent + line for line in textwrap.wrap(text, max(width, 20), break_on_hyphens=False)] or [""]
 
 
 def _line(cells: Sequence[str], columns: Sequence[int]) -> str:
@@ -75,7 +142,9 @@ def as_markdown(verdicts: Sequence[Verdict]) -> str:
     """The table for a page of the docs."""
     lines = ["| " + " | ".join(HEADS) + " |", "|---|---|---|---|---|"]
     for verdict in verdicts:
-        cells = (short(verdict.case), verdict.case.must, worst_text(verdict), verdict.word, f"{verdict.seconds:.1f}")
+        worst = "<br>".join(worst_by_scheme(verdict))
+        verdict_cell = ": ".join([verdict.word, *verdict.reasons])
+        cells = (short(verdict.case), verdict.case.must, worst, verdict_cell, f"{verdict.seconds:.1f}")
         lines.append("| " + " | ".join(" ".join(cell.replace("|", "\\|").split()) for cell in cells) + " |")
     return "\n".join([*lines, "", summary(verdicts) + "."])
 

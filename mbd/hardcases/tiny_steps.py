@@ -11,7 +11,9 @@ import numpy as np
 
 import mbd
 from mbd.hardcases.case import Curve, Figure, HardCase, Outcome, definition
-from mbd.hardcases.convergence import EPS, EVERY, force_floor, quantity, study
+from mbd.hardcases.convergence import EPS, deviation, force_floor, study
+from mbd.hardcases.references import quantity
+from mbd.hardcases.schemes import EVERY
 
 __all__ = ["CASES", "circle"]
 
@@ -65,12 +67,12 @@ def judge_tiny_steps(integrator: Any) -> Outcome:
     floors = np.array([force_floor(integrator, dt, until / dt, m, L, speed) for dt in steps])
     figures = [
         Figure("|order − 2| of the place above round-off [-]",
-               found.deviation("error of the place [m]", float(rest[-1])), 0.15),
+               deviation(steps, places, float(rest[-1])), 0.15),
         Figure("error of the place over C dt² and round-off [-]",
                float(np.max(places / (SHARE * g * steps**2 + rest))), 1.0),
         Figure(f"error of the place at dt ≤ {NEAR_STEP:g} s [m]", float(np.max(places[steps <= NEAR_STEP])), NEAR),
         Figure("|order − 2| of the tension above its round-off floor [-]",
-               found.deviation("error of the tension [N]", floors), 0.15),
+               deviation(steps, found.errors["error of the tension [N]"], floors), 0.15),
         Figure("error of the tension over C dt² and its round-off floor [-]", max(over), 1.0),
         Figure("error of the tension at the start [N]", max(begun), first.accuracy),
         Figure("|constraint| over L [-]", max(off), CLOSE),
@@ -102,7 +104,7 @@ def _with_tolerance(integrator: Any, tolerance: float) -> Any:
 CASES = (
     HardCase(
         J1,
-        "errors fall with dt² until round-off and stay there; no false failure of Newton, no false success",
+        "Errors fall with dt² until round-off and stay there; no false failure of Newton, no false success.",
         judge_tiny_steps,
         EVERY,
     ),

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 import mbd
-from mbd.hardcases.case import Figure, HardCase, Outcome, definition
-from mbd.hardcases.convergence import EVERY, quantity
+from mbd.hardcases.case import Curve, Figure, HardCase, Outcome, definition
+from mbd.hardcases.references import quantity
+from mbd.hardcases.schemes import EVERY
 
 __all__ = ["CASES", "pushed_particle"]
 
@@ -83,10 +84,11 @@ def judge_nan(integrator: Any) -> Outcome:
             Figure("error of place and speed carried on to the fault [m, m/s]", beyond, last.accuracy),
             Figure("error of place and speed [m, m/s]", off, last.accuracy),
             Figure("numbers kept that are none", bad, 0),
-        ]
+        ],
+        [Curve("place until the fault", run.time, run["place.x"], y_label="x [m]")],
     )
 
 
 CASES = (
-    HardCase(J16, "the run stops at the fault, names force, time and body, and keeps what it has", judge_nan, EVERY),
+    HardCase(J16, "The run stops at the fault, names force, time and body, and keeps what it has.", judge_nan, EVERY),
 )

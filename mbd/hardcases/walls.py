@@ -12,23 +12,15 @@ from mbd.arrays import Vector
 from mbd.assembly import assemble
 from mbd.bodies import Link
 from mbd.constraints import Plane, Unilateral, touchdown
-from mbd.hardcases.case import Curve, Figure, Outcome
+from mbd.hardcases.case import Curve, Figure, Outcome, hard_case
+from mbd.hardcases.convergence import error_curve, halved, second_order
 from mbd.hardcases.impacts import deepest, impact_figures
-from mbd.hardcases.measuring import (
-    accuracy,
-    error_curve,
-    halved,
-    hard_case,
-    numbers,
-    published,
-    second_order,
-    size,
-)
+from mbd.hardcases.references import accuracy, numbers, published, size
 from mbd.joints import Revolute
 from mbd.model import Model
 from mbd.simulation import simulate
 
-__all__ = ["DOUBLE_PENDULUM"]
+__all__ = ["CASES"]
 
 
 @cache
@@ -100,7 +92,7 @@ def tip(id: str, scheme: Any) -> Outcome:
         reactions.append(size(run["pin.reaction_force"]))
     for (what, limit), name in zip(SWING_LIMITS.items(), SWING_VALUES, strict=True):
         most, floor = limit * size(published(id, name)), 10.0 * accuracy(id, name)
-        figures += second_order(what, [each[what] for each in errors], most, floor)
+        figures += second_order(f"error of {what}", steps, [each[what] for each in errors], most, floor)
     figures += [
         Figure("force of the wall between impacts [N]", size(run["wall.force"]), 0.0),
         Figure(
@@ -140,8 +132,10 @@ def rows_after(id: str, scheme: Any, dt: float, tree: dict[str, Vector]) -> list
     ]  # fmt: skip
 
 
-DOUBLE_PENDULUM = hard_case(
-    "g5-double-pendulum-wall",
-    "Tip impacts at the reference instants to second order; an impulse is an impulse, and all rows hold after it.",
-    tip,
+CASES = (
+    hard_case(
+        "g5-double-pendulum-wall",
+        "Tip impacts at the reference instants to second order; an impulse is an impulse, and all rows hold after it.",
+        tip,
+    ),
 )

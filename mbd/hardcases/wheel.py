@@ -10,7 +10,9 @@ import numpy as np
 
 import mbd
 from mbd.hardcases.case import Curve, Figure, HardCase, Outcome, definition
-from mbd.hardcases.convergence import EPS, EVERY, quantity
+from mbd.hardcases.convergence import EPS
+from mbd.hardcases.references import quantity
+from mbd.hardcases.schemes import EVERY
 
 __all__ = ["CASES", "rolling_wheel"]
 
@@ -90,7 +92,7 @@ def judge_wheel(integrator: Any) -> Outcome:
 CASES = (
     HardCase(
         D3,
-        "a rolling wheel is exact to round-off at any step, held by a row or by a contact",
+        "A rolling wheel is exact to round-off at any step, held by a row or by a contact.",
         judge_wheel,
         EVERY,
     ),

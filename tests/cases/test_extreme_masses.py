@@ -34,16 +34,6 @@ def test_a_light_bob_over_a_heavy_one_meets_the_reference_where_its_blows_are_re
     assert run.energy.drift < 1e-5
 
 
-@pytest.mark.parametrize("form", [form for form in FORMS if form not in WITH_ROWS])
-@pytest.mark.parametrize("moment", [0, 1])
-def test_minimal_coordinates_reach_the_accuracy_of_the_reference(form: str, moment: int) -> None:
-    swing, reference = FORMS[form](**SIZES), J4["[theta1, theta2, w1, w2]"]
-    scheme, until = mbd.GeneralizedAlpha(1.0), reference.t[moment]
-    run = mbd.simulate(swing.model, swing.start(MOTION), scheme, dt=2.5e-7, until=until, store=100000)
-    miss = np.abs(np.array([column[-1] for column in swing.motion(run)]) - reference.value[moment])
-    assert miss[:2].max() < reference.accuracy and miss[2:].max() < 2e-5, miss
-
-
 @pytest.mark.parametrize("form", WITH_ROWS)
 @pytest.mark.parametrize("scheme", SCHEMES, ids=name_of)
 def test_coarse_steps_hold_the_joints_together_or_end_in_an_error(form: str, scheme: NewmarkFamily) -> None:

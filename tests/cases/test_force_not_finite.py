@@ -29,15 +29,13 @@ def until_half_a_second(t: float) -> tuple[float, float]:
     return mbd.where(t < 0.5, 1.0, math.nan), 0.0
 
 
-@pytest.mark.parametrize("backend", ["auto", "python"])
-@pytest.mark.parametrize("dt", [0.01, 0.003, 0.0007])
+@pytest.mark.parametrize("dt", [0.01, 0.003])
 @pytest.mark.parametrize("scheme", SCHEMES, ids=name_of)
-def test_the_run_stops_naming_force_time_and_body_and_keeps_what_it_has(
-    scheme: mbd.Newmark, dt: float, backend: str
-) -> None:
+def test_the_run_stops_naming_force_time_and_body_and_keeps_what_it_has(scheme: mbd.Newmark, dt: float) -> None:
+    """In plain Python; `mbd hardcases` judges the compiled kernel."""
     model = particle(until_half_a_second)
     with pytest.raises(mbd.SimulationError) as failure:
-        mbd.simulate(model, mbd.assemble(model, backend=backend), scheme, dt=dt, until=1.0, backend=backend)
+        mbd.simulate(model, mbd.assemble(model, backend="python"), scheme, dt=dt, until=1.0, backend="python")
     first = math.ceil(round(0.5 / dt, 9)) * dt
     for words in f"t = {first:.9g} s", "'push'", "'particle.origin'", "'place.x'", "not finite":
         assert words in str(failure.value)

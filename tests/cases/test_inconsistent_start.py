@@ -14,7 +14,7 @@ from tests.problems import case
 J14 = case("j14-inconsistent-initial")
 x, y, vx, vy = (J14.start[name] for name in ("x", "y", "vx", "vy"))
 L = J14.definition["L"]
-POSITION_OFF, VELOCITY_OFF = J14["position residual"].value, J14["velocity residual"].value
+VELOCITY_OFF = J14["velocity residual"].value
 NAMED = {
     "position": {"bob place.x": x, "bob place.y": y},
     "velocity": {"bob place.x": vx, "bob place.y.rate": vy},
@@ -46,17 +46,13 @@ def residuals(model: mbd.Model, **named: object) -> tuple[float, float]:
 
 
 def test_a_start_off_the_circle_is_refused_with_both_residuals_of_the_rod() -> None:
-    position, velocity = residuals(bob("x² + y²"), **NAMED)
-    assert position == pytest.approx(POSITION_OFF, rel=1e-5)
-    assert velocity == pytest.approx(2 * VELOCITY_OFF, rel=1e-5)
     position, velocity = residuals(bob("distance"), **NAMED)
     assert position == pytest.approx(math.hypot(x, y) - L, rel=1e-5)
     assert velocity == pytest.approx(VELOCITY_OFF / math.hypot(x, y), rel=1e-5)
 
 
-@pytest.mark.parametrize("measure", ["distance", "x² + y²"])
-def test_projection_gives_the_nearest_consistent_start_and_tells_how_far_it_moved(measure: str) -> None:
-    start = mbd.assemble(bob(measure), **NAMED, project=True)
+def test_projection_gives_the_nearest_consistent_start_and_tells_how_far_it_moved() -> None:
+    start = mbd.assemble(bob("distance"), **NAMED, project=True)
     position = J14["mass-orthogonal projection of the position"].value
     velocity = J14["mass-orthogonal projection of the velocity"].value
     assert start.q == pytest.approx(position, abs=1e-12)

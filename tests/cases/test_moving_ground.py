@@ -7,7 +7,6 @@ import pytest
 from scipy.optimize import brentq
 
 import mbd
-from tests.helpers import assert_second_order
 from tests.problems import case
 
 J10 = case("j10-chatter-on-vibrating-table")
@@ -28,32 +27,6 @@ def shaken(A, w, **contact):
 
 
 # a table that goes up and down ----------------------------------------------------------------------------------------
-def test_a_mass_stays_on_a_table_that_shakes_it_less_than_gravity():
-    A, w = J10.definition["A"], J10.definition["w"]
-    model = shaken(A, w)
-    start = mbd.assemble(model, closed="table")
-    assert start["flight.rate"] == pytest.approx(A * w, rel=1e-14)
-    run = mbd.simulate(model, start, mbd.GeneralizedAlpha(0.8), dt=5e-4, until=100 * 2 * np.pi / w)
-    assert len(run.events) == J10["number of releases"].value
-    force = run["table.force"]
-    np.testing.assert_allclose(force, M * (G - A * w**2 * np.sin(w * run.time)), rtol=0, atol=2e-3)
-    low, high = J10["contact force extremes"].value
-    assert force.min() == pytest.approx(low, abs=2e-3) and force.max() == pytest.approx(high, abs=2e-3)
-
-
-@pytest.mark.parametrize("scheme", [mbd.HHT(0.05), mbd.GeneralizedAlpha(0.8)], ids=str)
-def test_the_force_of_a_shaken_table_is_of_second_order(scheme):
-    A, w = J10.definition["A"], J10.definition["w"]
-    model = shaken(A, w)
-    start = mbd.assemble(model, closed="table")
-
-    def error(dt):
-        run = mbd.simulate(model, start, scheme, dt=dt, until=0.2)
-        return np.abs(run["table.force"] - M * (G - A * w**2 * np.sin(w * run.time))).max()
-
-    assert_second_order(error, 1e-3)
-
-
 def table_of_mass(A, w):
     """The table as a body that is driven, with the plane on it."""
     model = mbd.Model("driven table", gravity=(0.0, -G, 0.0))
@@ -76,16 +49,6 @@ def test_it_lifts_off_when_the_table_falls_faster(build, dt):
     (left,) = run.events
     assert left.kind == "opened"
     assert left.time == pytest.approx(J10["first lift-off time"].value, abs=J10["first lift-off time"].accuracy)
-
-
-def test_a_shaken_mass_leaves_once_a_period_at_the_same_phase():
-    """Γ = 1.25, plastic: it lands before the table would throw it again, so every period is alike."""
-    w = J10.definition["w"]
-    model = shaken(1.25 * G / w**2, w)
-    run = mbd.simulate(model, mbd.assemble(model, closed="table"), mbd.HHT(0.05), dt=5e-4, until=10 * 2 * np.pi / w)
-    left = np.array([event.time for event in run.events if event.kind == "opened"])
-    assert len(left) == 10
-    np.testing.assert_allclose(left, J10["first lift-off time"].value + np.arange(10) * 2 * np.pi / w, atol=1e-8)
 
 
 def bounces(A, w, e, height, count):

@@ -1,16 +1,15 @@
-"""Cases d1 (Chaplygin sleigh), d2 (knife edge on an incline) and d3 (rolling wheel): rows on velocities."""
+"""Rows on velocities: what `mbd hardcases` does not judge of d1 (sleigh), d2 (knife edge) and d3 (wheel)."""
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 import pytest
 
 import mbd
+from mbd.hardcases.sleighs import knife_edge
 from mbd.integrators.family import NewmarkFamily
 from tests.cases.schemes import INDEX_3, SCHEMES, name_of
-from tests.cases.sleighs import Sleigh, blade_row, rolling_wheel
+from tests.cases.sleighs import Sleigh, rolling_wheel
 from tests.helpers import assert_second_order
 from tests.problems import case
 
@@ -25,12 +24,6 @@ SLEIGH = Sleigh(D1.definition["m"], D1.definition["I_G"], D1.definition["a"])
 BEGIN = D1.start["theta0"], D1.start["v_along_blade"], D1.start["thetadot0"]
 
 
-def reference_motion() -> tuple[np.ndarray, np.ndarray]:
-    """The instants of d1, and (v, ω, θ, x, y, side force) at each."""
-    motion, place, force = D1["[blade speed"], D1["contact point P"], D1["side force"]
-    return motion.t, np.column_stack([motion.value, place.value, force.value])
-
-
 def found_motion(run: mbd.Trajectory, times: np.ndarray) -> np.ndarray:
     """The same of a run."""
     at = run.at(times)
@@ -42,32 +35,6 @@ def found_motion(run: mbd.Trajectory, times: np.ndarray) -> np.ndarray:
 def is_averaged(scheme: NewmarkFamily) -> bool:
     """The averaged form is of second order only where M is constant; that of the sleigh turns with it."""
     return getattr(scheme, "form", "endpoint") == "averaged"
-
-
-@pytest.mark.parametrize("scheme", EVERY[:-1], ids=name_of)
-def test_the_sleigh_meets_its_references(scheme: NewmarkFamily) -> None:
-    model = SLEIGH.model()
-    start = SLEIGH.start(model, *BEGIN)
-    times, reference = reference_motion()
-
-    def errors(dt: float) -> np.ndarray:
-        run = mbd.simulate(model, start, scheme, dt=dt, until=times[-1])
-        assert np.abs(run["blade.residual"]).max() < 1e-10
-        assert np.ptp(run["kinetic_energy"]) < 0.2 * dt * dt * 6.0
-        assert run["kinetic_energy"][0] == pytest.approx(D1["kinetic energy"].value, abs=1e-12)
-        return np.linalg.norm(found_motion(run, times)[:, :5] - reference[:, :5], axis=0)
-
-    assert_second_order(errors, 0.02, halvings=4)
-    run = mbd.simulate(model, start, scheme, dt=1e-3, until=times[-1])
-    assert found_motion(run, times) == pytest.approx(reference, abs=3e-6)
-
-
-def test_the_sleigh_tends_to_a_straight_line_at_its_limit_speed() -> None:
-    model = SLEIGH.model()
-    run = mbd.simulate(model, SLEIGH.start(model, *BEGIN), mbd.GeneralizedAlpha(0.9), dt=1e-3, until=12.0)
-    assert abs(run["body.angle.rate"][-1]) < 1e-4
-    speed = math.hypot(run["body.x.rate"][-1], run["body.y.rate"][-1])
-    assert speed == pytest.approx(D1["limit speed"].value, abs=1e-6)
 
 
 @every_scheme
@@ -105,20 +72,9 @@ def test_the_sleighs_energy_error_is_that_of_the_scheme() -> None:
 
 
 # d2 -----------------------------------------------------------------------------------------------------------------
-def edge() -> tuple[mbd.Model, mbd.State]:
-    """The knife edge of d2 in axes of the incline, x downhill, as a row of the user's own."""
-    mass, inertia = D2.definition["m"], D2.definition["I"]
-    model = mbd.Model("edge", gravity=(D2.definition["g"] * math.sin(D2.definition["slope"]), 0.0, 0.0))
-    body = mbd.RigidBody("edge", mass, (0.5 * inertia, 0.5 * inertia, inertia))
-    model.connect(mbd.Planar("body", model.ground.origin, body.origin))
-    names = ("body.x.rate", "body.y.rate", "body.angle")
-    model.constrain(mbd.Nonholonomic("blade", blade_row, arguments=names))
-    return model, mbd.assemble(model, velocity={"body.angle": D2.start["thetadot"]})
-
-
-@every_scheme
+@pytest.mark.parametrize("scheme", EVERY[-2:], ids=name_of)
 def test_the_knife_edge_on_an_incline_meets_its_references(scheme: NewmarkFamily) -> None:
-    model, start = edge()
+    model, start = knife_edge()
     place = D2["[x, y]"]
 
     def errors(dt: float) -> np.ndarray:
@@ -129,16 +85,8 @@ def test_the_knife_edge_on_an_incline_meets_its_references(scheme: NewmarkFamily
         assert at["blade.force"] == pytest.approx(-at["blade.multiplier"])
         return np.linalg.norm(np.column_stack([at["body.x"], at["body.y"]]) - place.value, axis=0)
 
-    assert_second_order(errors, 0.02, halvings=4)
-
-
-def test_the_knife_edge_does_not_slide_downhill() -> None:
-    model, start = edge()
-    omega = D2.start["thetadot"]
-    run = mbd.simulate(model, start, mbd.GeneralizedAlpha(0.9), dt=1e-3, until=40 * math.pi / omega)
-    assert run["body.x"].max() == pytest.approx(D2["max downhill"].value, abs=3e-6)
-    assert abs(run["body.x"][-1]) < 1e-5
-    assert run["body.y"][-1] / run.time[-1] == pytest.approx(D2["mean sideways"].value, abs=1e-5)
+    # the averaged form is stepped in plain Python, some milliseconds each
+    assert_second_order(errors, 0.04 if is_averaged(scheme) else 0.02, halvings=2 if is_averaged(scheme) else 4)
 
 
 # d3 -----------------------------------------------------------------------------------------------------------------
