@@ -53,6 +53,10 @@ def scene(M, normals, tangents, mu, velocity, closed=None):
         detail=np.zeros(8), hooks=None, strategy=0, past=np.zeros(rows), past_limit=np.zeros(max(frictions, 1)),
     )  # fmt: skip
 
+    for name in F.REAL_ARRAYS + F.INTEGER_ARRAYS:  # what does not matter here
+        if not hasattr(K, name):
+            setattr(K, name, np.zeros(4 * size * size, dtype=float if name in F.REAL_ARRAYS else int))
+
     def accelerations(block, params, out):
         """M | f | ∂r/∂λ | B | h | ḣ | γ | captured | T | limits, of friction μ p that slides."""
         R = B.T.copy()
