@@ -167,7 +167,7 @@ def _tell(run: Trajectory, out: Path, wall: dict[str, float], show: bool) -> Non
 
 
 def check_command(arguments: argparse.Namespace) -> int:
-    """``mbd check``: every fault of a script's model; degrees of freedom, redundant rows and conflicts."""
+    """``mbd check``: every fault of a script's model, what its integrator does not go with, its mobility."""
     script = Script.load(arguments.script)
     script.require("model")
     model = script.names["model"]
@@ -179,10 +179,26 @@ def check_command(arguments: argparse.Namespace) -> int:
         return 1
     from mbd import State, mobility
 
+    refused = _refused(script.names)
+    for refusal in refused:
+        print(f"- {refusal}")
     start = script.names.get("start")
     found = mobility(model, start if isinstance(start, State) else None)
     print(found)
-    return 0 if found.consistent else 1
+    return 0 if found.consistent and not refused else 1
+
+
+def _refused(names: dict[str, Any]) -> list[str]:
+    """What a script's integrator and options do not go with in its model."""
+    from mbd.compile.mechanisms import mechanism_of
+    from mbd.integrators import HHT, Integrator
+    from mbd.simulation.capabilities import refusals
+
+    scheme = names.get("integrator", HHT(alpha=0.05))
+    if not isinstance(scheme, Integrator):
+        return []
+    options = {name: names[name] for name in OPTIONS if name in names}
+    return refusals(names["model"], mechanism_of(names["model"]).equations, scheme, options)
 
 
 def examples_command(arguments: argparse.Namespace) -> int:
@@ -204,9 +220,10 @@ def hardcases_command(arguments: argparse.Namespace) -> int:
 
 
 def info_command(arguments: argparse.Namespace) -> int:
-    """``mbd info``: versions, machine, backend and cache."""
+    """``mbd info``: versions, machine, backend and cache; what goes with what."""
     from mbd.compile.backend import backend
     from mbd.compile.cache import default_cache
+    from mbd.simulation.capabilities import as_text
     from mbd.view.report import machine, versions
 
     chosen = backend()
@@ -217,6 +234,7 @@ def info_command(arguments: argparse.Namespace) -> int:
     rows["examples"] = f"{len(examples())} in {folder()}"
     for name, value in rows.items():
         print(f"{name:<14}{value}")
+    print(f"\n{as_text()}")
     return 0
 
 
@@ -252,7 +270,7 @@ def _parser() -> argparse.ArgumentParser:
     hard.add_argument("--scheme", action="append", metavar="NAME", help="with this integrator only; may be given again")
     hard.add_argument("--markdown", metavar="FILE", help="also write the table into this page, between its marks")
     command("examples", examples_command, "list the examples")
-    command("info", info_command, "print versions, machine, backend and cache")
+    command("info", info_command, "print versions, machine, backend and cache, and what goes with what")
     return parser
 
 

@@ -174,6 +174,13 @@ def test_check_looks_at_the_start_of_the_script(script, capsys):
     assert "singular here: rank 1, 2 at postures nearby" in capsys.readouterr().out
 
 
+def test_check_tells_what_the_integrator_does_not_go_with(script, capsys):
+    rod = 'model.constrain(mbd.Bilateral("tie", mbd.distance(model.ground.point(1.0, 0.0), rod.end), value=1.2))\n'
+    text = PENDULUM.partition("start =")[0] + rod + 'integrator = mbd.Newmark(formulation="index3")\n'
+    assert cli.main(["check", script(text)]) == 1
+    assert "use formulation='ggl'" in (told := capsys.readouterr().out) and "(rows on positions: 'tie')" in told
+
+
 def test_info_names_versions_machine_backend_and_cache(capsys):
     assert cli.main(["info"]) == 0
     text = capsys.readouterr().out

@@ -45,11 +45,11 @@ def ledger(columns: ModelColumns) -> Ledger:
     powers = _powers(equations)
     works = _integrals(columns, [power for _, _, power in powers])
     named = [Part(name, kind, work) for (name, kind, _), work in zip(powers, works, strict=True)]
-    moved = np.cumsum(np.where(_after_switch(columns), 0.0, np.diff(moving, prepend=moving[0])))
+    moved = np.cumsum(np.where(_after_switch(columns), 0.0, np.diff(moving, prepend=moving[:1])))
     driven = any(kind == "drive" for _, kind, _ in powers)
     unnamed = [Part("moving coordinates", "drive", moved), *_jumps(columns, total, driven)]
     least = ROUND_OFF * float(np.max(np.abs(kinetic) + np.abs(potential), initial=0.0))
-    kept = [part for part in unnamed if np.max(np.abs(part.energy)) > least]
+    kept = [part for part in unnamed if np.max(np.abs(part.energy), initial=0.0) > least]
     return Ledger(columns.record.time, kinetic, potential, (*named, *kept), columns.record.settings.get("store", 1))
 
 
@@ -121,7 +121,7 @@ def _integrals(columns: ModelColumns, powers: Sequence[Node]) -> list[Vector]:
 def _after_switch(columns: ModelColumns) -> Any:
     """Whether each row is the right side of a switch, (R,) booleans."""
     time = columns.record.time
-    return np.diff(time, prepend=time[0] - 1.0) <= 0.0
+    return np.diff(time, prepend=-np.inf) <= 0.0
 
 
 def _jumps(columns: ModelColumns, total: Vector, driven: bool) -> list[Part]:
@@ -130,7 +130,7 @@ def _jumps(columns: ModelColumns, total: Vector, driven: bool) -> list[Part]:
     Where something is `driven` an impact gives what its events do not lose: the work of the drives and surfaces.
     """
     record = columns.record
-    jumps = np.where(_after_switch(columns), np.diff(total, prepend=total[0]), 0.0)
+    jumps = np.where(_after_switch(columns), np.diff(total, prepend=total[:1]), 0.0)
     closings = [event for event in record.events if event.kind == "closed"]
     struck = np.isin(record.time, [record.time[event.row] for event in closings])
     given = np.where(struck, jumps, 0.0)

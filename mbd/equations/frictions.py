@@ -10,6 +10,7 @@ from mbd.equations.dynamics import Dynamics, Work
 from mbd.equations.equations import Effect, Friction, Row
 from mbd.equations.laws import Laws
 from mbd.equations.surroundings import Surroundings
+from mbd.errors import CapabilityError
 from mbd.joints.base import Joint
 from mbd.tape.derivatives import substitute
 from mbd.tape.functions import sqrt
@@ -24,11 +25,11 @@ def sliding_contact(
     """Coulomb friction along the tangent of a contact, ``|λ_T| ≤ μ p``; the direction is that at the point of now."""
     normal, *tangents = [k for k in numbers if k >= 0]
     if len(tangents) != 1:
-        found.faults.append(
-            f"'{law.name}': friction {law.friction:g} needs one direction of sliding, but its point can slide in "
-            f"{len(tangents)}; friction is solved in planar models: use friction=None (it sticks) or 0 in space"
+        raise CapabilityError(
+            f"Unilateral '{law.name}': friction {law.friction:g} needs one direction of sliding, but its point can "
+            f"slide in {len(tangents)}; friction is solved in planar models: in space use friction=None (it sticks) or "
+            "0"
         )
-        return
     (row,) = tangents
     here = {scope.tape.input("anchor", k): value for k, value in captured.items()}
     view = substitute(scope.rates([found.viewed[row]]), here)[0]

@@ -48,12 +48,12 @@ class Ledger:
     @property
     def change(self) -> float:
         """ΔE from the first row to the last [J]."""
-        return float(self.total[-1] - self.total[0])
+        return _last(self.total) - _last(self.total[:1])
 
     @property
     def numerical(self) -> Vector:
         """E(t) − E(0) − all parts [J]: what the integrator itself gained or lost."""
-        left = self.total - self.total[0]
+        left = self.total - _last(self.total[:1])
         for part in self.parts:
             left = left - part.energy
         return np.asarray(left)
@@ -61,15 +61,16 @@ class Ledger:
     @property
     def drift(self) -> float:
         """Largest |numerical| over the largest swing of kinetic energy [-]; zero for a mechanism that never moves."""
-        scale = float(np.ptp(self.kinetic)) or float(np.max(np.abs(self.kinetic), initial=0.0))
+        scale = float(np.ptp(self.kinetic)) if len(self.kinetic) else 0.0
+        scale = scale or float(np.max(np.abs(self.kinetic), initial=0.0))
         worst = float(np.max(np.abs(self.numerical), initial=0.0))
         return worst / scale if scale > 0.0 else 0.0
 
     @property
     def sums(self) -> dict[str, float]:
         """Each part at the end of the run, and 'numerical'; together they make `change` [J]."""
-        found = {part.name: float(part.energy[-1]) for part in self.parts}
-        found["numerical"] = float(self.numerical[-1])
+        found = {part.name: _last(part.energy) for part in self.parts}
+        found["numerical"] = _last(self.numerical)
         return found
 
     @property
@@ -90,8 +91,8 @@ class Ledger:
         width = max(18, *(len(part.name) + 2 for part in self.parts)) if self.parts else 18
         lines = [f"{'energy':<{width}}{'start':>14}{'end':>14}{'change':>14}   [J]"]
         for name, column in (("kinetic", self.kinetic), ("potential", self.potential), ("total", self.total)):
-            change = column[-1] - column[0]
-            lines.append(f"{name:<{width}}{column[0]:>14.6g}{column[-1]:>14.6g}{change:>14.6g}")
+            begin, end = _last(column[:1]), _last(column)
+            lines.append(f"{name:<{width}}{begin:>14.6g}{end:>14.6g}{end - begin:>14.6g}")
         lines.append("of which")
         kinds = {part.name: part.kind for part in self.parts}
         for name, value in self.sums.items():
@@ -108,3 +109,8 @@ class Ledger:
         from mbd.view.plots import energy
 
         return energy(self, path=path)
+
+
+def _last(column: Vector) -> float:
+    """The last value; 0 for a run that failed before its first row."""
+    return float(column[-1]) if len(column) else 0.0

@@ -22,7 +22,10 @@ from mbd.tape.node import Node
 if TYPE_CHECKING:
     from mbd.simulation.run import Run
 
-__all__ = ["attempt", "explanation"]
+__all__ = ["attempt", "crowded", "explanation"]
+
+MOST_EVENTS = 5000
+"""Events within one dt above which a run stops: they follow each other ever faster, or are located too roughly [-]."""
 
 LATEST = 12
 """Events that a failure tells."""
@@ -91,29 +94,30 @@ def explanation(
     if status == F.NOT_FINITE:
         what = _not_finite(stepper, places or {})
         return f"{where}: {what}{with_closed}; nothing after the last accepted step is kept"
+    worst = _worst(stepper)
     if status == F.NOT_CONVERGED and residual < 0.0:
         return (
-            f"{where}: a step would miss an angle by more than half a radian, down to a tenth of dt{with_closed}: the "
-            "motion is too fast to be resolved; use a smaller dt"
+            f"{where}: a step would miss an angle by more than half a radian, down to a tenth of dt{with_closed}"
+            f"{worst}: the motion is too fast to be resolved; use a smaller dt"
         )
     if status == F.NOT_CONVERGED and residual <= 1.0:
         return (
-            f"{where}: steps fail or leave the branch continuous in velocity, down to a tenth of dt{with_closed}: "
-            "next to a pose in which rows lose rank, or in a force too steep for dt; try a smaller dt, or, at such a "
-            "pose, formulation='index3' with a damped scheme"
+            f"{where}: steps fail or leave the branch continuous in velocity, down to a tenth of dt{with_closed}"
+            f"{worst}: next to a pose in which rows lose rank, or in a force too steep for dt; try a smaller dt, or, "
+            "at such a pose, formulation='index3' with a damped scheme"
         )
     if status == F.NOT_CONVERGED:
         own = f" ({stepper.scheme.report.message})" if not stepper.compiled and stepper.scheme.report.message else ""
         return (
             f"{where}: Newton stalled at {residual:.3g} times the tolerance after {values['max_iterations']} "
-            f"iterations{own}{with_closed}; try a smaller dt or softer stiffness; a force that jumps with "
+            f"iterations{own}{with_closed}{worst}; try a smaller dt or softer stiffness; a force that jumps with "
             "the state (mbd.where, sign) must be made continuous, or be switched by an Event or Controller"
         )
     if status in (F.STAGNATED, F.TOO_TIGHT):
         left = remainder(stepper)
         return (
             f"{where}: stagnated at round-off: residual {left.residual:.3g}, attainable {left.attainable:.3g} of the "
-            f"forces{with_closed}; use a larger tolerance= of the integrator or a larger dt"
+            f"forces{with_closed}{worst}; use a larger tolerance= of the integrator or a larger dt"
         )
     if status == F.SINGULAR:
         return (
@@ -128,8 +132,8 @@ def explanation(
         )
     if status == F.NO_IMPACT:
         return (
-            f"{where}: no forces or impulses let every contact push or open{with_closed}: one that sticks whatever its "
-            "force may have none; use friction=0, a release rule or a penalty contact"
+            f"{where}: no forces or impulses let every contact push or open{_touching(stepper)}: one that sticks "
+            "whatever its force may have none; use friction=0, a release rule or a penalty contact"
         )
     if status in (F.DEPENDENT, F.CONFLICT) and int(values["state"][F.BLOCKED]) < values["n"]:
         return f"{where}: neither mass nor rows determine {_unknown(stepper)}{with_closed}; give it a mass, or lock it"
@@ -137,7 +141,7 @@ def explanation(
         return f"{where}: {_clashing(stepper, status)}{with_closed}; leave one out, or hold fewer contacts closed"
     if status == F.ENERGY_GAIN:
         return (
-            f"{where}: the impact law would create energy{with_closed}, and Stronge's in its place as well: a "
+            f"{where}: the impact law would create energy{_touching(stepper)}, and Stronge's in its place as well: a "
             "restitution above 1 does; use one from 0 to 1"
         )
     if status == F.NO_FORCE:
@@ -147,7 +151,17 @@ def explanation(
             f"makes it approach{with_closed}; rigid bodies with Coulomb friction have no motion there: lower the "
             "friction coefficient, or make the contact compliant with mbd.Penalty"
         )
-    return f"{where}: the instant of an event could not be isolated{with_closed}; try a smaller dt"
+    return f"{where}: the instant of an event could not be isolated{with_closed}{worst}; try a smaller dt"
+
+
+def crowded(events: Sequence[EventRecord], now: float, dt: float) -> str:
+    """A sentence if there were too many events within the last dt, '' otherwise."""
+    if len(events) <= MOST_EVENTS or events[-MOST_EVENTS].time < now - dt:
+        return ""
+    return (
+        f"t = {now:.9g} s: more than {MOST_EVENTS} events within one dt: {_last_events(events)}; use a smaller dt, "
+        "or where it applies a softer stiffness, a larger rest_speed or locate='root'"
+    )
 
 
 def _clashing(stepper: Stepper, status: int) -> str:
@@ -155,6 +169,26 @@ def _clashing(stepper: Stepper, status: int) -> str:
     told = clash(stepper.mechanism.equations.rows, stepper.values)
     what = "depend on each other" if status == F.DEPENDENT else "conflict"
     return f"rows {what}: {told}" if told else f"rows {what} at {_unknown(stepper)}"
+
+
+def _worst(stepper: Stepper) -> str:
+    """Where the residual of the step that failed is largest, in words; '' where that is not known."""
+    values = stepper.values
+    if values["block"][0] != values["detail"][0]:
+        return ""
+    sizes = {name: abs(size) for name, size in residuals_of(stepper, values["block"]).items() if np.isfinite(size)}
+    if not sizes:
+        return ""
+    worst = max(sizes, key=lambda name: sizes[name])
+    return f", furthest from balance at {worst if worst.startswith(chr(39)) else repr(worst)}"
+
+
+def _touching(stepper: Stepper) -> str:
+    """The contacts that are closed or about to close, and the frictions of joints, in words."""
+    values, names = stepper.values, stepper.manager.names
+    near = [name for c, name in enumerate(names) if values["closed"][c] == 1 or values["closing"][c] != 0]
+    near += [friction.name for friction in stepper.manager.frictions if friction.contact < 0]
+    return f" at {', '.join(map(repr, near))}" if near else ""
 
 
 def _unknown(stepper: Stepper) -> str:

@@ -24,7 +24,7 @@ from mbd.results.failure import Failure
 from mbd.simulation.asked import asked
 from mbd.simulation.control import Boundaries, Named, apply_reset
 from mbd.simulation.ends import advance, call, close
-from mbd.simulation.failures import attempt, explanation
+from mbd.simulation.failures import attempt, crowded, explanation
 from mbd.simulation.memory import take_up
 from mbd.simulation.redundant import redundancy
 from mbd.simulation.savepoints import Savepoint, rewind, save
@@ -189,12 +189,13 @@ class Run:
     def _reset(self, e: int) -> None:
         """Apply the reset of a user's guard at zero; one that turns its motion around will cross from the same side."""
         place = 4 * self.values["n_contacts"] + e
-        before = self._guard_values()[place + self.values["n_guards"]]
+        before = self._guard_values()
         apply_reset(self, self.manager.guards[e])
-        guards = self._guard_values()
-        if abs(guards[place]) > 1e-9:
+        guards, rate = self._guard_values(), place + self.values["n_guards"]
+        stays = guards[place] == before[place]  # 'linear' location leaves it near zero, on either side
+        if abs(guards[place]) > 1e-9 and not stays:
             self._set_side(e, guards)
-        elif before * guards[place + self.values["n_guards"]] <= 0.0:
+        elif before[rate] * guards[rate] <= 0.0:
             self.values["side"][e] *= -1.0
 
     # the run ------------------------------------------------------------------------------------------------------
@@ -264,6 +265,9 @@ class Run:
             elif status not in (F.FULL, F.PAUSE):
                 return self._explained(status), ""
             save(self)
+            problem = crowded(self.events, self.now, self.dt)
+            if problem:
+                return problem, ""
             if self.limit is not None and self.values["counts"][F.STEPS] >= self.limit:
                 return "", f"stopped after {self.limit} steps at t = {self.now:g} s"
             if perf_counter() - shown > SHOW_EVERY:

@@ -15,6 +15,7 @@ from mbd.errors import CapabilityError, ModelError, SimulationError
 from mbd.integrators import HHT, Integrator
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.simulation.arguments import callbacks, choices, end_of, fits, numbers
+from mbd.simulation.capabilities import refusals
 from mbd.simulation.run import Run
 from mbd.simulation.strategy import chosen
 from mbd.state import State
@@ -121,11 +122,11 @@ def prepared(
     manager = ActiveSetManager(mechanism.equations)
     fits(start, mechanism.equations, manager)
     end, stop = end_of(until, manager, dt, start.time)
-    strategy, reason = chosen(options["contact"], manager)
+    strategy, reason = chosen(options["contact"], manager, options["locate"])
     options = {**options, "contact": strategy}
-    refusal = scheme.check(sum(not row.is_velocity for row in mechanism.equations.rows))
-    if refusal:
-        raise CapabilityError(refusal)
+    refused = refusals(model, mechanism.equations, scheme, options)
+    if refused:
+        raise CapabilityError(refused)
     settings = {
         "model": getattr(model, "name", ""), "integrator": repr(scheme), "dt": dt, "until": until, **options,
         "contact_reason": reason, "backend": mechanism.backend.name, "versions": dict(_versions()),

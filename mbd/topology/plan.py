@@ -132,6 +132,13 @@ def floating_joint(model: Model, body: Body, planar: bool) -> Joint:
         return Translation(name, origin, body.origin, axes="xy" if planar else "xyz")
     if planar:
         return Planar(name, origin, body.origin)
+    pins = [j for j in model.joints if needs_reaction(j) and body in (j.parent.body, j.child.body)]
+    if pins:
+        raise CapabilityError(
+            f"PinFriction of {pins[0].name!r} follows the force in the joint, which is cut for that, and '{body.name}' "
+            "would float in space, for which this version has no joint; in space use mbd.Coulomb, whose friction "
+            "torque is given"
+        )
     raise CapabilityError(
         f"cut={model.cut!r} lets the body '{body.name}' float in space, which needs a joint with free rotation that "
         "this version does not have; use cut='auto', or cut joints that leave every body a path to the ground"

@@ -1,0 +1,162 @@
+"""What goes with what: one table of laws against integrators and strategies, held before the first step.
+
+An integrator says itself what it cannot keep (`Integrator.check`); what a strategy cannot treat stands in `REFUSED`.
+Everything else in the table runs, and a test lets every pair run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from mbd.equations.equations import Equations
+from mbd.integrators import HHT, GeneralizedAlpha, Integrator, Newmark
+
+__all__ = ["LAWS", "REFUSED", "SCHEMES", "STRATEGIES", "SPACE", "Law", "as_markdown", "as_text", "refusals", "supports"]
+
+
+@dataclass(frozen=True)
+class Law:
+    """A kind of constraint, contact or friction: the names of the parts of a model that follow it.
+
+    holds : whether its rows hold positions
+    """
+
+    title: str
+    parts: Callable[[Any, Equations], list[str]]
+    holds: bool = False
+
+
+def _rows(velocity: bool) -> Callable[[Any, Equations], list[str]]:
+    def found(model: Any, equations: Equations) -> list[str]:
+        free = [row for row in equations.rows if row.contact < 0 and row.friction < 0]
+        return [row.owner for row in free if row.is_velocity == velocity]
+
+    return found
+
+
+def _contacts(chosen: Callable[[Any], Any]) -> Callable[[Any, Equations], list[str]]:
+    return lambda model, equations: [contact.name for contact in equations.contacts if chosen(contact)]
+
+
+def _frictions(of_contact: bool) -> Callable[[Any, Equations], list[str]]:
+    return lambda model, equations: [f.name for f in equations.frictions if (f.contact >= 0) == of_contact]
+
+
+LAWS: tuple[Law, ...] = (
+    Law("rows on positions", _rows(False), holds=True),
+    Law("rows on velocities", _rows(True)),
+    Law("Unilateral", _contacts(lambda contact: contact.kind == "unilateral"), holds=True),
+    Law("release=When", _contacts(lambda contact: contact.when), holds=True),
+    Law("friction=μ", _frictions(True), holds=True),
+    Law("Penalty", _contacts(lambda contact: contact.kind == "penalty")),
+    Law("dry friction of joints", _frictions(False)),
+    Law("Event", lambda model, equations: [guard.name for guard in equations.guards]),
+    Law("Controller", lambda model, equations: [c.name for c in getattr(model, "controllers", ())]),
+)
+"""Laws by the words that users know them by; a loop, and a joint with `PinFriction`, gives rows on positions."""
+
+SCHEMES: dict[str, tuple[Integrator, ...]] = {
+    "ggl": (Newmark(), Newmark(0.31, 0.6), HHT(0.05), GeneralizedAlpha(0.0), GeneralizedAlpha(1.0)),
+    "index3, ρ∞ < 1": (HHT(0.05, formulation="index3"), GeneralizedAlpha(0.5, formulation="index3")),
+    "index3, ρ∞ = 1": (Newmark(formulation="index3"), GeneralizedAlpha(1.0, formulation="index3")),
+    "HHT averaged": (HHT(0.05, form="averaged"),),
+}
+"""Columns of the table: schemes that stand for all with this formulation."""
+
+STRATEGIES: tuple[Mapping[str, str], ...] = (
+    {"contact": "events"}, {"contact": "nonsmooth"}, {"impact": "newton"}, {"impact": "poisson"},
+    {"impact": "sequential"}, {"locate": "linear"},
+)  # fmt: skip
+"""Further columns: arguments of `simulate`."""
+
+REFUSED: dict[tuple[str, str, str], str] = {
+    ("release=When", "impact", "sequential"): (
+        "contacts with a rule release=When, {names}, hold in an impact whatever its sign, so that impact='sequential' "
+        "finds none of them that strikes; use impact='newton' or 'poisson'"
+    ),
+}
+"""(law, argument, value) → why not, and what to use instead."""
+
+TOGETHER: dict[tuple[tuple[str, str], tuple[str, str]], str] = {
+    (("contact", "nonsmooth"), ("locate", "linear")): (
+        "contact='nonsmooth' does not locate contacts, and locate='linear' would locate all else roughly; use "
+        "locate='root', or contact='events'"
+    ),
+}
+"""Pairs of arguments that exclude each other."""
+
+SPACE: dict[str, str] = {
+    "friction=μ of a Unilateral": "friction=None (it sticks) or 0",
+    "Rolling": "mbd.Nonholonomic rows",
+    "PinFriction": "mbd.Coulomb, whose friction torque is given",
+    "cut='all', or a body held by no joint": "cut='auto', and joints that leave every body a path to the ground",
+}
+"""What is solved in planar models only, and what to use in space instead; refused as the equations are derived."""
+
+
+def supports(law: Law, scheme: Integrator) -> bool:
+    """Whether a scheme says that it can integrate rows as this law has them."""
+    return scheme.check(int(law.holds)) is None
+
+
+def refusals(model: Any, equations: Equations, scheme: Integrator, options: Mapping[str, Any]) -> list[str]:
+    """Every pair of a run that is not supported, each named with what to use instead."""
+    found = [text for pair, text in TOGETHER.items() if all(options.get(name) == value for name, value in pair)]
+    for (title, argument, value), text in REFUSED.items():
+        names = _law(title).parts(model, equations)
+        if names and options.get(argument) == value:
+            found.append(text.format(names=_listed(names)))
+    held = [row.owner for row in equations.rows if not row.is_velocity]
+    told = scheme.check(len(held))
+    if told:
+        found.append(f"{told} (rows on positions: {_listed(held)})" if held else told)
+    return found
+
+
+def _law(title: str) -> Law:
+    return next(law for law in LAWS if law.title == title)
+
+
+def _listed(names: Sequence[str], most: int = 4) -> str:
+    """Some names, quoted, each once."""
+    once = list(dict.fromkeys(names))
+    return ", ".join(map(repr, once[:most])) + (f" and {len(once) - most} more" if len(once) > most else "")
+
+
+def _cells() -> list[list[str]]:
+    """The table: its head, and a row for each law."""
+    rows = [["", *SCHEMES, *(f"{argument}={value}" for column in STRATEGIES for argument, value in column.items())]]
+    for law in LAWS:
+        cells = [all(supports(law, scheme) for scheme in schemes) for schemes in SCHEMES.values()]
+        pairs = [pair for column in STRATEGIES for pair in column.items()]
+        cells += [(law.title, argument, value) not in REFUSED for argument, value in pairs]
+        rows.append([law.title, *("yes" if cell else "no" for cell in cells)])
+    return rows
+
+
+def _others() -> list[str]:
+    """What is refused besides, a line each."""
+    lines = [f"in space, {what}: use {instead}" for what, instead in SPACE.items()]
+    for pair, text in TOGETHER.items():
+        both = " with ".join(f"{name}={value!r}" for name, value in pair)
+        lines.append(f"{both}: {text.partition('; ')[2]}")
+    return lines
+
+
+def as_markdown() -> str:
+    """The table as it stands in the documentation."""
+    head, *body = _cells()
+    lines = [f"| {' | '.join(row)} |" for row in (head, ["---"] * len(head), *body)]
+    return "\n".join([*lines, "", "Refused besides:", "", *(f"- {line}" for line in _others())])
+
+
+def as_text() -> str:
+    """The table for a terminal, with columns numbered."""
+    head, *body = _cells()
+    width = max(len(row[0]) for row in body) + 2
+    lines = ["what goes with what: " + ", ".join(f"{k}: {name}" for k, name in enumerate(head[1:], 1))]
+    lines.append(" " * width + "".join(f"{k:<5}" for k in range(1, len(head))))
+    lines += [f"{row[0]:<{width}}" + "".join(f"{cell:<5}" for cell in row[1:]) for row in body]
+    return "\n".join([*lines, "refused besides:", *(f"  {line}" for line in _others())])

@@ -1,0 +1,183 @@
+"""What every run must keep, whatever its scene is; and batches of wild scenes in processes of their own."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+import threading
+import time
+import traceback
+from pathlib import Path
+from queue import Empty, Queue
+
+import numpy as np
+
+import mbd
+from mbd.testing.wild import wild_scene
+
+__all__ = ["complaints", "run_batch", "verdict"]
+
+ADVICE = re.compile(r"; |: |use |try |give |leave |hold |raise |name |move |change |make |lower |lock ")
+"""A message that tells what to try has a second part."""
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def verdict(seed: int, scenes=wild_scene) -> dict:
+    """How a scene ended: 'ok', 'stopped' in the run, 'refused' before it, or 'bad' with reasons."""
+    began = time.perf_counter()
+    told = {"seed": seed, "scene": "", "message": "", "reasons": []}
+    try:
+        scene = scenes(seed)
+        told["scene"] = f"{scene.integrator!r} dt={scene.dt:.3g} until={scene.until:.3g} {dict(scene.options)}"
+        run = scene.run()
+        told["reasons"] = complaints(run)
+    except mbd.MbdError as error:
+        told |= {"kind": "refused", "message": f"{type(error).__name__}: {error}"}
+    except Exception as error:
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        reason = f"crashed: {error!r} at {Path(place.filename).name}:{place.lineno}"
+        told |= {"kind": "bad", "message": repr(error), "reasons": [reason]}
+    else:
+        told |= {"kind": "ok" if run.success else "stopped", "message": run.message}
+    if told["kind"] != "ok" and not explains(told["message"]):
+        told["reasons"].append("the message names nothing of the model, or nothing to try")
+    if told["reasons"]:
+        told["kind"] = "bad"
+    return told | {"seconds": round(time.perf_counter() - began, 2)}
+
+
+def explains(message: str) -> bool:
+    """Whether a message quotes a name, and has a part that says what to do."""
+    return bool(re.search(r"'[^']+'", message)) and bool(ADVICE.search(message))
+
+
+def complaints(run: mbd.Trajectory) -> list[str]:
+    """What a run, whether it went to its end or not, does not keep."""
+    found = []
+    record = run.record
+    for name in ("time", "q", "v", "z", "a", "s", "lam"):
+        if not np.isfinite(getattr(record, name)).all():
+            found.append(f"{name} is not finite")
+    if found:
+        return found
+    held = run.violation
+    size = 1.0 + float(np.max(np.abs(record.q), initial=0.0)) + _extent(run)
+    floor = 1e-8 * size + (_located_roughly(run) if run.settings["locate"] == "linear" else 0.0)
+    if max(held.length, held.angle) > floor:
+        found.append(f"rows do not hold: {held}")
+    return found + _ledger(run) + _penetration(run, floor) + _friction(run)
+
+
+def _extent(run: mbd.Trajectory) -> float:
+    """Largest length of the model [m]."""
+    given = {name: abs(value) for name, value in run.parameters.items() if not name.startswith("gravity")}
+    return max([value for name, value in given.items() if name.endswith((".x", ".y", ".z", ".length"))], default=0.0)
+
+
+def _located_roughly(run: mbd.Trajectory) -> float:
+    """What linear location promises: dt² times accelerations [m, rad]."""
+    return run.settings["dt"] ** 2 * float(np.max(np.abs(run.record.a), initial=0.0))
+
+
+def _ledger(run: mbd.Trajectory) -> list[str]:
+    books = run.energy
+    values = [*books.sums.values(), books.numerical, books["kinetic"]]
+    if not all(np.isfinite(value).all() for value in values):
+        return ["the energy books are not finite"]
+    blows = books.work.get("impacts", np.zeros(0))
+    largest = float(np.max(np.abs(books["kinetic"]), initial=0.0))
+    gained = float(np.max(np.diff(blows), initial=0.0))
+    if run.settings["contact"] == "events" and gained > 1e-9 * largest:  # non-smooth steps lift bodies too
+        return [f"an impact gives {gained:.3g} J, the largest kinetic energy is {largest:.3g} J"]
+    return []
+
+
+def _penetration(run: mbd.Trajectory, floor: float) -> list[str]:
+    """Gaps of multiplier contacts that are below zero and not told of; contacts that keep pulling."""
+    told, found, ends = " ".join(run.stats["notes"]), [], _at_ends(run)
+    largest = float(np.max(np.abs(run.record.lam), initial=0.0))
+    for contact in run.record.equations.contacts:
+        if contact.kind != "unilateral":
+            continue
+        deepest = float(np.min(run[f"{contact.name}.gap"], initial=0.0, where=ends))
+        if deepest < -10.0 * floor and f"{contact.name!r} lay" not in told and f"{contact.name!r} was rel" not in told:
+            found.append(f"{contact.name!r} is {-deepest:.3g} {contact.unit} below its surface, and no note says so")
+        if contact.opens_on == "pull" and lasts(run, run[f"{contact.name}.force"] < -1e-3 * largest):
+            found.append(f"{contact.name!r} keeps pulling")
+    return found
+
+
+def _at_ends(run: mbd.Trajectory):
+    """Rows at which gaps must be ≥ 0, (R,) booleans; instants located inside a non-smooth step are not among them.
+
+    Non-smooth steps correct positions at their ends only; a mat, an event or a controller may cut them.
+    """
+    if run.settings["contact"] != "nonsmooth":
+        return np.full(len(run.time), True)
+    feet = {contact.name for contact in run.record.equations.contacts if contact.kind == "unilateral"}
+    return ~np.isin(run.time, [event.time for event in run.events if event.name not in feet])
+
+
+def lasts(run: mbd.Trajectory, wrong) -> bool:
+    """Whether something is wrong at five instants one after the other: the multipliers of single steps may err."""
+    later = np.diff(run.time, prepend=-np.inf) > 0.0
+    return bool(np.convolve(wrong[later], np.ones(5)).max(initial=0.0) >= 5.0) if later.any() else False
+
+
+def _friction(run: mbd.Trajectory) -> list[str]:
+    """Dry friction that stays beyond its limit."""
+    frictions, found = run.record.equations.frictions, []
+    if not frictions:
+        return []
+    columns = run._model_columns
+    limits = columns.evaluate([friction.limit for friction in frictions], columns.rows)
+    largest = float(np.max(np.abs(run.record.lam), initial=0.0))
+    for friction, limit in zip(frictions, limits, strict=True):
+        force = np.abs(run.record.lam[:, friction.row])
+        if lasts(run, force > 1.001 * np.abs(limit) + 1e-6 * largest):
+            k = int(np.argmax(force - np.abs(limit)))
+            found.append(f"friction of {friction.name!r} is {force[k]:.6g}, more than {np.ravel(limit)[k]:.6g}")
+    return found
+
+
+# batches ------------------------------------------------------------------------------------------------------------
+def run_batch(seeds: list[int], limit: float = 60.0) -> list[dict]:
+    """Verdicts of scenes, run in another process; one that dies or takes longer than `limit` seconds is 'bad'."""
+    left, verdicts = list(seeds), []
+    while left:
+        verdicts += _until_lost(left, limit)
+        left = [seed for seed in left if seed not in {told["seed"] for told in verdicts}]
+    return verdicts
+
+
+def _until_lost(seeds: list[int], limit: float) -> list[dict]:
+    """Verdicts up to the end, or to the first scene that is lost, which has one too."""
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])}
+    command = [sys.executable, str(Path(__file__).resolve()), *map(str, seeds)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, env=environment)
+    lines: Queue[str] = Queue()
+    threading.Thread(target=lambda: ([lines.put(line) for line in process.stdout], lines.put("")), daemon=True).start()
+    verdicts: list[dict] = []
+    for seed in seeds:
+        why = ""
+        try:
+            line = lines.get(timeout=limit)
+            why = "" if line else f"the interpreter died with code {process.wait()}"
+        except Empty:
+            why = f"no end after {limit:g} s"
+        if why:
+            process.kill()
+            process.wait()
+            lost = {"seed": seed, "kind": "bad", "message": why, "reasons": [why], "scene": "", "seconds": limit}
+            return [*verdicts, lost]
+        verdicts.append(json.loads(line))
+    process.wait()
+    return verdicts
+
+
+if __name__ == "__main__":
+    for seed in sys.argv[1:]:
+        print(json.dumps(verdict(int(seed))), flush=True)
