@@ -8,7 +8,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from mbd.analysis.linearization import Linearization as Linearization, linearize as linearize
     from mbd.analysis.mobility import Mobility as Mobility, mobility as mobility
+    from mbd.analysis.numerical import Criteria as Criteria, criteria as criteria
     from mbd.assembly import assemble as assemble
     from mbd.bodies import (
         Link as Link,
@@ -110,7 +112,9 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOMES = {
+    "mbd.analysis.linearization": "Linearization linearize",
     "mbd.analysis.mobility": "Mobility mobility",
+    "mbd.analysis.numerical": "Criteria criteria",
     "mbd.assembly": "assemble",
     "mbd.bodies": "Link PointMass RigidBody box cylinder disk rod segment sphere",
     "mbd.constraints": "Bilateral Controller Event KnifeEdge Nonholonomic Penalty PenaltyParameters Plane "

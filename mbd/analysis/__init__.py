@@ -1,1 +1,1 @@
-"""Questions asked of a run: energy, gait."""
+"""Questions asked of a run, a state or an integrator: energy, gait, mobility, small motions, numerical criteria."""

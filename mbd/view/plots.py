@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from mbd.results.ledger import Ledger
     from mbd.trajectory import Trajectory
 
-__all__ = ["contacts", "energy", "histories", "phase_portrait"]
+__all__ = ["contacts", "drawing", "energy", "histories", "phase_portrait"]
 
 MANY = 60
 """Events beyond this number are left to the contact bars, so that lines do not hide the curves."""
@@ -36,7 +36,7 @@ QUANTITIES = {
 
 
 @contextmanager
-def _drawing(path: str | Path | None, width: float, height: float) -> Iterator[Any]:
+def drawing(path: str | Path | None, width: float, height: float) -> Iterator[Any]:
     """A figure in the package's style, laid out and saved at the end."""
     matplotlib = library("matplotlib", "plot", "plotting")
     with matplotlib.rc_context(rules()):
@@ -68,7 +68,7 @@ def histories(run: Trajectory, *names: str, path: str | Path | None = None) -> A
     bars = len(run.facts.contacts)
     heights = [2.1 + 0.17 * ((len(group) - 1) // 4) for group in panels.values()]
     heights += [0.25 + 0.2 * bars] if bars else []
-    with _drawing(path, 7.4, 0.7 + sum(heights)) as figure:
+    with drawing(path, 7.4, 0.7 + sum(heights)) as figure:
         grid = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
         for axes, (kind, group) in zip(grid, panels.items(), strict=False):
             for number, name in enumerate(group):
@@ -121,7 +121,7 @@ def stretches(time: Any, closed: Any) -> list[tuple[float, float]]:
 
 def contacts(run: Trajectory, path: str | Path | None = None) -> Any:
     """Which contacts are closed when."""
-    with _drawing(path, 7.4, 0.9 + 0.28 * max(len(run.facts.contacts), 1)) as figure:
+    with drawing(path, 7.4, 0.9 + 0.28 * max(len(run.facts.contacts), 1)) as figure:
         axes = figure.subplots()
         _bars(axes, run)
         axes.set_xlabel("time [s]")
@@ -141,7 +141,7 @@ def energy(ledger: Ledger, path: str | Path | None = None) -> Any:
     layers = [ledger.kinetic, ledger.potential - floor, *(-part.energy for part in spent)]
     labels = ["kinetic", "potential (above its least)", *(f"lost: {part.name}" for part in spent)]
     ceiling = ledger.total[0] - floor + sum((part.energy for part in given), np.zeros(len(time)))
-    with _drawing(path, 7.4, 4.4) as figure:
+    with drawing(path, 7.4, 4.4) as figure:
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[3.0, 1.0])
         shades = [CYCLE[0], CYCLE[5], CYCLE[1], CYCLE[4], CYCLE[3], CYCLE[2], CYCLE[6], CYCLE[7]]
         colors = [shades[k % len(shades)] for k in range(len(layers))]
@@ -166,7 +166,7 @@ def phase_portrait(run: Trajectory, *coordinates: str, path: str | Path | None =
     angles = tuple(name for name, kind in known.items() if kind == "rad")
     wanted: Sequence[str] = coordinates or angles or tuple(known)
     cuts = run.columns.grid.cuts
-    with _drawing(path, 5.6, 4.6) as figure:
+    with drawing(path, 5.6, 4.6) as figure:
         axes = figure.subplots()
         for number, name in enumerate(wanted):
             place, rate = run[name], run[f"{name}.rate"]

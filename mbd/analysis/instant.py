@@ -1,0 +1,174 @@
+"""A mechanism at one instant: which rows act, which frictions stick or slide, accelerations and multipliers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mbd.arrays import Matrix, Vector
+from mbd.compile.mechanism import Mechanism
+from mbd.compile.mechanisms import mechanism_of
+from mbd.compile.python import scalar_function
+from mbd.equations.equations import Row
+from mbd.equations.linearization import LinearTerms, linearization
+from mbd.errors import ModelError
+from mbd.integrators.hht import HHT
+from mbd.kernel import fields as F
+from mbd.kernel.active_set import ActiveSetManager
+from mbd.kernel.redundancy import find_dependent, spread
+from mbd.kernel.restart import active_rows
+from mbd.kernel.switching import settle
+from mbd.simulation.arguments import fits
+from mbd.simulation.plain import MechanismSystem
+from mbd.simulation.stepper import Stepper
+from mbd.state import State
+
+__all__ = ["Instant", "instant"]
+
+INCONSISTENT = 1e-6
+"""Row residual [m, rad, m/s, rad/s], relative to 1 or the largest speed, above which a state is not consistent."""
+
+REASONS = {
+    F.NOT_FINITE: "a force, a mass or a row is not finite there",
+    F.CONFLICT: "no accelerations satisfy all rows there",
+    F.DEPENDENT: "neither mass nor rows determine all accelerations there",
+    F.NO_FORCE: "no contact forces are consistent with its frictions",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Instant:
+    """What acts at a state.
+
+    Attributes
+    ----------
+    rows : numbers of all active rows, ascending; dependent : for each, whether it follows from earlier ones
+    penalties, sliding : numbers of the penalty contacts that act and of the frictions that slide
+    rate : (n,) consistent (v̇, ż); lam : (n_rows,) multipliers, of least norm where rows depend on each other
+    system : the mechanism with all this held, as an integrator sees it
+    """
+
+    mechanism: Mechanism
+    state: State
+    rows: tuple[int, ...]
+    dependent: tuple[bool, ...]
+    penalties: tuple[int, ...]
+    sliding: tuple[int, ...]
+    rate: Vector
+    lam: Vector
+    system: MechanismSystem
+
+    @property
+    def titles(self) -> tuple[str, ...]:
+        """A title for each active row."""
+        return tuple(row.title for row in self._chosen)
+
+    @property
+    def velocity(self) -> Any:
+        """(m,) booleans, which of the active rows hold velocities only."""
+        return np.array([row.is_velocity for row in self._chosen], dtype=bool)
+
+    @property
+    def _chosen(self) -> list[Row]:
+        return [self.mechanism.equations.rows[k] for k in self.rows]
+
+    def terms(self, extra: Vector | None = None) -> LinearTerms:
+        """Derivatives of balance and rows here; `extra` (m,) is added to the multipliers of the active rows."""
+        mechanism, state, layout = self.mechanism, self.state, self.mechanism.layout
+        mode = self.rows, self.penalties, self.sliding
+        key = f"linear {mode}"
+        with mechanism.equations.tape.lock:
+            if key not in mechanism.named:
+                mechanism.named[key] = scalar_function(linearization(mechanism.equations, *mode), layout, "linear")
+        function = mechanism.named[key]
+        y = np.concatenate([state.v, state.z])
+        block = mechanism.block(state.time, state.q, y, self.system.anchors, self.penalties)
+        block[layout.a : layout.lam] = self.rate
+        block[layout.lam : layout.anchor] = self.lam
+        if extra is not None:
+            block[[layout.lam + k for k in self.rows]] += extra
+        block[layout.slip : layout.size] = self.system.slip
+        out = np.zeros(function.size)
+        function(block, self.system.parameters, out)
+        return LinearTerms.of(out, layout.n, layout.n_v, len(self.rows))
+
+    def kept(self, matrix: Matrix) -> Matrix:
+        """The lines of a matrix that belong to independent rows."""
+        return np.asarray(matrix[~np.array(self.dependent, dtype=bool)])
+
+
+def instant(model: Any, state: State, parameters: Mapping[str, float] | None = None, backend: str = "auto") -> Instant:
+    """Accelerations and multipliers of the contacts that are closed in a state; frictions at rest stick if they can.
+
+    Raises
+    ------
+    ModelError
+        if the state is that of another model, is not consistent, or closes a contact that would pull there.
+    """
+    changed = {**state.parameters, **(parameters or {})}
+    mechanism = mechanism_of(model, backend, changed)
+    manager = ActiveSetManager(mechanism.equations)
+    fits(state, mechanism.equations, manager)
+    values = mechanism.parameters(changed, getattr(model, "parameters", {}))
+    stepper = Stepper(mechanism, manager, HHT(), values, 1.0, {"capacity": 1})
+    K, flags = _kernel(stepper, state), manager.flags(state.mode.closed)
+    with np.errstate(all="ignore"):
+        status = settle(K)
+    if status != 0:
+        why = REASONS.get(status, "no consistent contact forces were found")
+        raise ModelError(f"no accelerations at t = {state.time:.6g} s: {why}")
+    opened = [name for name, was, now in zip(manager.names, flags, K.closed, strict=False) if was != now]
+    if opened:
+        raise ModelError([_pulls(name) for name in opened])
+    find_dependent(K, active_rows(K, K.closed))
+    if K.state[F.N_DROPPED] > 0:
+        spread(K, K.lam)
+    rows = manager.active_rows(flags, K.sticks)
+    layout = mechanism.layout
+    found = Instant(
+        mechanism, state, rows, tuple(bool(K.dropped[k]) for k in rows), manager.penalties(flags),
+        tuple(int(f) for f in np.flatnonzero(K.slip[: layout.n_frictions])), K.rate[: layout.n].copy(),
+        K.lam[: layout.n_rows].copy(), stepper.system,
+    )  # fmt: skip
+    faults = _faults(found)
+    if faults:
+        raise ModelError(faults)
+    return found
+
+
+def _kernel(stepper: Stepper, state: State) -> Any:
+    """The kernel's arrays at the state."""
+    values = stepper.values
+    values["q"][: values["n_q"]] = state.q
+    values["y"][: values["n"]] = np.concatenate([state.v, state.z])
+    values["closed"][: values["n_contacts"]] = stepper.manager.flags(state.mode.closed)
+    if len(state.anchors):
+        values["anchors"][:] = state.anchors
+    values["clock"][F.NOW] = state.time
+    values["chunk"] = 1
+    values = {**values, "code": stepper.functions, "hooks": stepper.scheme}
+    return F.Kernel(**{name: values[name] for name in F.FIELDS})
+
+
+def _pulls(name: str) -> str:
+    return (
+        f"{name!r} is closed in the state, but its force would pull there, so that it opens at once; assemble the "
+        "state without it in closed=[…], or choose one in which it pushes"
+    )
+
+
+def _faults(found: Instant) -> list[str]:
+    """Active rows that the state does not satisfy."""
+    terms, faults = found.terms(), list[str]()
+    limit = INCONSISTENT * max(1.0, float(np.max(np.abs(found.state.v), initial=0.0)))
+    for k, row in enumerate(found._chosen):
+        if abs(terms.h[k]) > INCONSISTENT:
+            faults.append(f"{row.title} is violated by {terms.h[k]:.3g} {row.unit}")
+        elif abs(terms.rate[k]) > limit:
+            faults.append(f"{row.title} is violated by {terms.rate[k]:.3g} {row.unit}/s in its velocity")
+    if faults:
+        faults[-1] += "; mbd.assemble(model, position, velocity) gives a state that satisfies all rows"
+    return faults

@@ -1,0 +1,111 @@
+"""The linear motion about a state, as a program: exact derivatives of the balance and of the rows at every level."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import chain
+
+import numpy as np
+
+from mbd.arrays import Matrix, Vector
+from mbd.equations.equations import Equations
+from mbd.equations.inputs import Inputs
+from mbd.equations.programs import balance_with, constraint_jacobian
+from mbd.tape.derivatives import jvp, jvps
+from mbd.tape.node import Node
+
+__all__ = ["LinearTerms", "linearization"]
+
+
+@dataclass(frozen=True)
+class LinearTerms:
+    """Derivatives at a point, with N = n_v + n_z rates and m active rows.
+
+    Attributes
+    ----------
+    r : (N,) balance ``M v̇ + f + Bᵀλ``, for first-order states ż − s
+    M, C : (N, N) ∂r/∂(v̇, ż) and ∂r/∂(v, z)
+    K : (N, n_v) ∂r/∂x with accelerations and multipliers held: ∂(M v̇)/∂x and ∂(Bᵀλ)/∂x are part of it
+    R : (N, m) ∂r/∂λ, Bᵀ unless forces depend on multipliers
+    h, rate, change : (m,) h, ḣ and ḧ; of rows on velocities h = 0, their rate and its change
+    B : (m, n_v) ∂h/∂x = ∂ḣ/∂v, of rows on velocities ∂rate/∂v
+    turning : (m, n_v) ∂ḣ/∂x
+    change_speed, change_place : (m, n_v) ∂ḧ/∂v and ∂ḧ/∂x with accelerations held
+    """
+
+    r: Vector
+    M: Matrix
+    C: Matrix
+    K: Matrix
+    R: Matrix
+    h: Vector
+    rate: Vector
+    change: Vector
+    B: Matrix
+    turning: Matrix
+    change_speed: Matrix
+    change_place: Matrix
+
+    @classmethod
+    def shapes(cls, n: int, n_v: int, m: int) -> list[tuple[int, ...]]:
+        """The shapes of the fields, in the order in which the program lists them."""
+        return [
+            (n,), (n, n), (n, n), (n, n_v), (n, m), (m,), (m,), (m,), (m, n_v), (m, n_v), (m, n_v), (m, n_v)
+        ]  # fmt: skip
+
+    @classmethod
+    def of(cls, out: Vector, n: int, n_v: int, m: int) -> LinearTerms:
+        """The fields from the numbers that the program gives."""
+        shapes = cls.shapes(n, n_v, m)
+        parts = np.split(out, np.cumsum([int(np.prod(shape)) for shape in shapes]))
+        return cls(*(part.reshape(shape) for part, shape in zip(parts, shapes, strict=False)))
+
+
+def linearization(
+    equations: Equations, rows: Sequence[int], penalties: Sequence[int], sliding: Sequence[int] = ()
+) -> list[Node]:
+    """The fields of `LinearTerms` in their order, matrices row by row, for one contact mode.
+
+    Parameters
+    ----------
+    rows : numbers of the active rows
+    penalties : numbers of the penalty contacts that act
+    sliding : numbers of the frictions that slide
+    """
+    inputs, rows = Inputs.of(equations), sorted(rows)
+    r = balance_with(equations, rows, penalties, sliding)
+    B = constraint_jacobian(equations, rows)
+    h, rate = [equations.rows[k].value for k in rows], [equations.rows[k].rate for k in rows]
+    seeds: dict[Node, Node | float] = {inputs.t: 1.0, **dict(zip(inputs.x, inputs.v, strict=True))}
+    known = {} if equations.geometry is None else equations.geometry.rates(rate)
+    change = jvp(rate, {**seeds, **known})
+    for k, line in enumerate(B):
+        for slope, acceleration in zip(line, inputs.a, strict=True):
+            change[k] = change[k] + slope * acceleration
+    rates, speeds = (*inputs.a, *inputs.s), (*inputs.v, *inputs.z)
+    matrices = [
+        _across(jvps(r, [{rate: 1.0} for rate in rates]), len(r)),
+        _across(jvps(r, [{speed: 1.0} for speed in speeds]), len(r)),
+        _across(_places(equations, r), len(r)),
+        _across(jvps(r, [{inputs.lam[k]: 1.0} for k in rows]), len(r)),
+    ]
+    of_rows = [
+        [entry for line in B for entry in line],
+        _across(_places(equations, rate), len(rows)),
+        _across(jvps(change, [{speed: 1.0} for speed in inputs.v]), len(rows)),
+        _across(_places(equations, change), len(rows)),
+    ]
+    return [*r, *chain(*matrices), *h, *rate, *change, *chain(*of_rows)]
+
+
+def _places(equations: Equations, values: Sequence[Node]) -> list[list[Node]]:
+    """∂value/∂x, one list a coordinate."""
+    x = Inputs.of(equations).x
+    known = [{} for _ in x] if equations.geometry is None else equations.geometry.partials(values)
+    return jvps(values, [{place: 1.0, **known[j]} for j, place in enumerate(x)])
+
+
+def _across(columns: Sequence[Sequence[Node]], height: int) -> list[Node]:
+    """Columns as a matrix, row by row."""
+    return [column[i] for i in range(height) for column in columns]
