@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mbd.errors import MbdError, ModelError, SimulationError, UnknownNameError, nearest
+from mbd.view.lab_arguments import describe
 from mbd.view.progress import Progress, progress_bar
 
 if TYPE_CHECKING:
@@ -219,6 +220,13 @@ def hardcases_command(arguments: argparse.Namespace) -> int:
     return run(arguments.names, arguments.scheme, arguments.slow, arguments.out, arguments.markdown)
 
 
+def accuracy_command(arguments: argparse.Namespace) -> int:
+    """``mbd accuracy``: errors and wall times of schemes and steps."""
+    from mbd.analysis.accuracy.command import run
+
+    return run(Script.load(arguments.script), arguments)
+
+
 def info_command(arguments: argparse.Namespace) -> int:
     """``mbd info``: versions, machine, backend and cache; what goes with what."""
     from mbd.compile.backend import backend
@@ -259,6 +267,7 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--until", type=float, metavar="SECONDS", help="another end time than the script's")
     check = command("check", check_command, "report faults, degrees of freedom and redundant rows of a script's model")
     check.add_argument("script", metavar="SCRIPT-or-EXAMPLE", help="a Python file that defines model, or an example")
+    describe(command("accuracy", accuracy_command, "measure what accuracy costs: errors, times of schemes and steps"))
     hard = command(
         "hardcases", hardcases_command, "judge scenes on which multibody systems fail; write a table and a page"
     )

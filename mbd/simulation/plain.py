@@ -51,7 +51,8 @@ class MechanismSystem:
             inside = live([entry for column in mass_matrix(equations) for entry in column])
         return not any(node.op == "input" and node.data[0] in ("t", "q", "x") for node in inside)
 
-    def _active(self, mode: Mode) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    def active(self, mode: Mode) -> tuple[tuple[int, ...], tuple[int, ...]]:
+        """Rows that act and penalty contacts that push in a mode."""
         flags = self.manager.flags(mode.closed)
         rows = tuple(row for row in self.manager.active_rows(flags, self.sticks) if not self.dropped[row])
         return rows, self.manager.penalties(flags)
@@ -62,7 +63,7 @@ class MechanismSystem:
 
     def evaluate(self, point: Point, mode: Mode, tangent: tuple[float, float] | None) -> Terms:
         """Terms of `Terms` at a point of the mechanism."""
-        rows, penalties = self._active(mode)
+        rows, penalties = self.active(mode)
         code = self._code(rows, penalties)
         n, m = self.mechanism.layout.n, len(rows)
         block = self.evaluated = self._block(point, rows, penalties)
@@ -121,7 +122,7 @@ class MechanismSystem:
 
     def accelerations(self, t: float, q: Vector, y: Vector, mode: Mode) -> tuple[Vector, Vector]:
         """Consistent (v̇, ż) and λ of the active rows."""
-        rows, penalties = self._active(mode)
+        rows, penalties = self.active(mode)
         n, m, picked = self.mechanism.layout.n, len(rows), list(rows)
         lam = np.zeros(self.mechanism.layout.n_rows)
         for _ in range(MOST_LOADS):  # friction follows multipliers: of degree one, so that this is Newton's method

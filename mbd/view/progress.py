@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from importlib.util import find_spec
 from typing import Any, TypeVar
 
-__all__ = ["Progress", "counted", "progress_bar"]
+__all__ = ["Progress", "counted", "progress_bar", "share_bar"]
 
 Progress = Callable[[float, float], None]
 Item = TypeVar("Item")
@@ -35,6 +35,19 @@ def progress_bar() -> Iterator[Progress | None]:
     finally:
         for bar in bars:
             bar.close()
+
+
+@contextmanager
+def share_bar() -> Iterator[Progress | None]:
+    """Runs done of all runs on a terminal, as a percentage and the time left; nothing elsewhere."""
+    if not _is_wanted():
+        yield None
+        return
+    from tqdm import tqdm
+
+    shape = "{percentage:3.0f}% |{bar:30}|  [{elapsed} < {remaining}]"
+    with tqdm(total=1.0, bar_format=shape, mininterval=0.2, leave=False, file=sys.stderr) as bar:
+        yield lambda done, total: (bar.update(max(done / total - bar.n, 0.0)), None)[1]
 
 
 def counted(items: Sequence[Item], name: Callable[[Item], str]) -> Iterator[Item]:

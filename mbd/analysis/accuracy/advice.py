@@ -1,0 +1,126 @@
+"""What the points of the lab mean, in plain words: the cheapest for an error, and what ten times less would cost."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from mbd.analysis.accuracy.points import Point
+
+__all__ = ["advice", "cheapest", "decades", "milliseconds"]
+
+MORE = 10.0
+"""Times more accuracy whose cost is told."""
+
+
+def cheapest(points: Sequence[Point], target: float) -> Point | None:
+    """The point of least wall time whose error is certainly no larger than the target."""
+    able = [point for point in points if point.reaches(target)]
+    return min(able, key=lambda point: point.seconds, default=None)
+
+
+def decades(points: Sequence[Point]) -> list[float]:
+    """Powers of ten between the largest and the smallest error, each reached by some point."""
+    known = [point.at_most for point in points if not point.failure and point.at_most and math.isfinite(point.at_most)]
+    if not known:
+        return []
+    first, last = math.floor(math.log10(max(known))), math.ceil(math.log10(min(known)))
+    return [10.0**k for k in range(min(first, -1), last - 1, -1)]
+
+
+def advice(points: Sequence[Point], target: float | None, bound: float) -> list[str]:
+    """Sentences.
+
+    Parameters
+    ----------
+    target : error that is wanted, relative to the range of each quantity [-]; None: every power of ten
+    bound : of the reference [-]
+    """
+    if not any(point.at_most is not None for point in points):
+        return ["No error is known, so nothing can be recommended."]
+    if target is None:
+        found = [(each, cheapest(points, each)) for each in decades(points)]
+        return [f"For an error of {each:g}: {_described(best)}." for each, best in found if best is not None]
+    best = cheapest(points, target)
+    if best is None:
+        return _unreached(points, target, bound)
+    return [
+        f"For an error of {target:g} take {_described(best)}.",
+        _costs(best),
+        _more(points, best, target / MORE),
+    ]
+
+
+def _described(point: Point) -> str:
+    size = f"error {point.error:.2g}" if point.error is not None else f"error below {point.at_most:.2g}"
+    return f"{point.scheme} with dt = {point.dt:.4g} s ({size}, {milliseconds(point.seconds)})"
+
+
+def milliseconds(seconds: float) -> str:
+    """Wall time with two digits.
+
+    >>> milliseconds(0.01234), milliseconds(2.5)
+    ('12 ms', '2.5 s')
+    """
+    number = float(f"{seconds if seconds >= 1.0 else 1e3 * seconds:.2g}")
+    return f"{number:g} {'s' if seconds >= 1.0 else 'ms'}"
+
+
+def _costs(point: Point) -> str:
+    """What comes along with a point."""
+    parts = [f"the scheme itself gains or loses up to {point.energy:.2g} J"]
+    if point.drift or point.drift_rate:
+        parts.append(f"rows are off by {point.drift:.2g}, their rates by {point.drift_rate:.2g}")
+    if point.events and point.event_time is not None:
+        parts.append(f"events come up to {point.event_time:.2g} s early or late")
+    if not point.same_events:
+        parts.append("its events are not those of the reference")
+    return f"With it {', '.join(parts)}."
+
+
+def _more(points: Sequence[Point], best: Point, target: float) -> str:
+    """What a tenth of the error costs: measured, or extrapolated from the finest step."""
+    finer = cheapest(points, target)
+    if finer is not None:
+        ratio = finer.seconds / best.seconds
+        times = f"{ratio:.2g} times the time" if ratio > 1.05 else "no more time"
+        return f"Ten times more accuracy costs {times}: {_described(finer)}."
+    guess = _extrapolated(points, target)
+    if guess is None:
+        return "Ten times more accuracy was not reached by any of these steps, nor do their orders tell what it costs."
+    scheme, dt, seconds = guess
+    return (
+        f"Ten times more accuracy was not measured; by its order {scheme} would need dt = {dt:.2g} s and "
+        f"{milliseconds(seconds)}, {seconds / best.seconds:.2g} times the time."
+    )
+
+
+def _extrapolated(points: Sequence[Point], target: float) -> tuple[str, float, float] | None:
+    """(scheme, dt, seconds) of the cheapest by the orders at the finest steps, wall time being that of the steps."""
+    finest: dict[str, tuple[str, float, float]] = {}
+    for point in sorted(points, key=lambda each: each.dt, reverse=True):
+        if point.failure or point.error is None or point.order is None or point.order < 0.5 or point.error <= target:
+            continue
+        factor = (point.error / target) ** (1.0 / point.order)
+        finest[point.scheme] = (point.scheme, point.dt / factor, point.seconds * factor)
+    return min(finest.values(), key=lambda guess: guess[2], default=None)
+
+
+def _unreached(points: Sequence[Point], target: float, bound: float) -> list[str]:
+    """The best that was reached, and why no more."""
+    able = [point for point in points if not point.failure and point.at_most is not None]
+    best = min(able, key=lambda point: point.at_most or 0.0, default=None)
+    if best is None:
+        return [f"An error of {target:g} is not reached: no run succeeded."]
+    said = [f"An error of {target:g} is not reached; the best is {_described(best)}."]
+    if bound >= target:
+        return [*said, f"The reference itself is known to {bound:.1g} only, so no run can be shown to do better."]
+    guess = _extrapolated(points, target)
+    if guess is None:
+        return [*said, "No order can be observed, so that the step it needs cannot be told."]
+    scheme, dt, seconds = guess
+    return [
+        *said,
+        f"The steps are too large: by its order {scheme} would need dt = {dt:.2g} s and {milliseconds(seconds)}. Give "
+        "finer dts; below some error round-off is all that is left.",
+    ]

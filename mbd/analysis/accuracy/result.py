@@ -1,0 +1,160 @@
+"""What the lab found: as text, table, CSV, plot and page."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mbd.analysis.accuracy.advice import advice
+from mbd.analysis.accuracy.points import Point
+from mbd.results.tables import library
+
+if TYPE_CHECKING:
+    from mbd.analysis.accuracy.truth import Truth
+
+__all__ = ["HEADS", "Accuracy", "cells"]
+
+HEADS = (
+    "scheme", "dt [s]", "error", "order", "time [ms]", "steps", "Newton", "tangents", "residuals", "factored",
+    "drift", "energy [J]", "event time [s]", "events",
+)  # fmt: skip
+"""Columns of the table."""
+
+MAPPINGS = ("errors", "end_errors")
+"""Fields of a point that have a value for each quantity."""
+
+
+@dataclass(frozen=True, eq=False)
+class Accuracy:
+    """Errors and costs of schemes and steps.
+
+    Attributes
+    ----------
+    model : name of the model
+    quantities : whose errors were measured
+    points : a `Point` for each scheme and step, the coarsest step of a scheme first
+    reference : what they were judged by, with its own bound, and the growth of errors; None where there is none
+    target : error that was wanted [-]
+    complete : False where it was interrupted
+    notes : what to know before reading the errors
+    """
+
+    model: str
+    quantities: tuple[str, ...]
+    points: tuple[Point, ...]
+    reference: Truth | None
+    target: float | None = None
+    complete: bool = True
+    notes: tuple[str, ...] = ()
+
+    @property
+    def schemes(self) -> tuple[str, ...]:
+        """Labels of the schemes."""
+        return tuple(dict.fromkeys(point.scheme for point in self.points))
+
+    def of(self, scheme: str) -> tuple[Point, ...]:
+        """The points of one scheme."""
+        return tuple(point for point in self.points if point.scheme == scheme)
+
+    @cached_property
+    def recommendation(self) -> tuple[str, ...]:
+        """The cheapest scheme and step for the target, what comes with it, what ten times more accuracy costs."""
+        return tuple(advice(self.points, self.target, self.reference.error if self.reference else float("inf")))
+
+    @property
+    def origin(self) -> str:
+        """What the errors are relative to, in a sentence or two."""
+        if self.reference is None:
+            return "no reference"
+        truth, events = self.reference, len(self.reference.run.events)
+        growth = "" if truth.growth is None else f"; a small change of the start grows {truth.growth:.2g} times"
+        told = f", its events ({events}) to {truth.event_bound:.1g} s" if events else ""
+        return f"{truth.method}, known to {truth.error:.1g}{told}{growth}; {truth.seconds:.1f} s"
+
+    def __repr__(self) -> str:
+        rows = [cells(point) for point in self.points]
+        widths = [
+            max(map(len, column)) for column in zip(HEADS, *(row for row in rows if row[2] != "failed"), strict=True)
+        ]
+        widths[0] = max([len(HEADS[0]), *(len(row[0]) for row in rows)])
+        lines = [f"accuracy of {self.model!r}: largest error of {len(self.quantities)} quantities over their range"]
+        lines += [f"reference    {self.origin}", "", _line(HEADS, widths), "  ".join("─" * w for w in widths)]
+        above = ""
+        for point, row in zip(self.points, rows, strict=True):
+            above, row[0] = row[0], row[0] if row[0] != above else ""
+            if point.failure:
+                lines.append(f"{row[0]:<{widths[0]}}  {row[1]:>{widths[1]}}  failed: {point.failure}")
+            else:
+                lines.append(_line(row, widths) + (f"  {point.note}" if point.note else ""))
+        lines += ["", *(f"note: {note}" for note in self.notes), *self.recommendation]
+        return "\n".join(lines)
+
+    # tables ---------------------------------------------------------------------------------------------------------
+    def rows(self) -> list[dict[str, Any]]:
+        """One flat dictionary a point; errors by quantity as 'error of …' and 'error at the end of …'."""
+        plain = [item.name for item in fields(Point) if item.name not in MAPPINGS]
+        found = []
+        for point in self.points:
+            row = {name: getattr(point, name) for name in plain}
+            for name in self.quantities:
+                row[f"error of {name}"] = point.errors.get(name)
+                row[f"error at the end of {name}"] = point.end_errors.get(name)
+            found.append(row)
+        return found
+
+    def to_dataframe(self) -> Any:
+        """A pandas table, a row for each point."""
+        return library("pandas", "data", "result.to_dataframe()").DataFrame(self.rows())
+
+    def to_csv(self, path: str | Path) -> Path:
+        """The same as a file of comma-separated values."""
+        target = Path(path)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        rows = self.rows()
+        with target.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.DictWriter(file, list(rows[0]) if rows else [])
+            writer.writeheader()
+            writer.writerows(rows)
+        return target
+
+    # pictures -------------------------------------------------------------------------------------------------------
+    def plot(self, path: str | Path | None = None) -> Any:
+        """Work and precision: error over wall time, a line for each scheme, steps written at its points.
+
+        Returns the matplotlib figure, also saved when a path is given.
+        """
+        from mbd.view.accuracy import work_precision
+
+        return work_precision(self, path)
+
+    def page(self, path: str | Path) -> Path:
+        """One self-contained HTML file: the plot for any quantity, with every point's figures, and the table."""
+        from mbd.view.accuracy_page import write
+
+        return write(self, path)
+
+
+def cells(point: Point) -> list[str]:
+    """A point as the texts of a row of `HEADS`."""
+    start = [point.scheme, f"{point.dt:.4g}"]
+    if point.failure:
+        return [*start, "failed", *[""] * (len(HEADS) - 3)]
+    error = f"{point.error:.2e}" if point.error is not None else "–"
+    if point.error is None and point.at_most is not None and point.at_most < 1e300:
+        error = f"< {point.at_most:.0e}"
+    counts = (point.steps, point.iterations, point.tangents, point.residuals, point.factorizations)
+    return [
+        *start, error, "–" if point.order is None else f"{point.order:.2f}", f"{1e3 * point.seconds:.3g}",
+        *map(str, counts), f"{point.drift:.1e}" if point.drift else "0", f"{point.energy:.1e}",
+        f"{point.event_time:.1e}" if point.events and point.event_time is not None else "–",
+        str(point.events) + ("" if point.same_events else " ≠"),
+    ]  # fmt: skip
+
+
+def _line(texts: Sequence[str], widths: Sequence[int]) -> str:
+    first, *rest = texts
+    return "  ".join([f"{first:<{widths[0]}}", *(f"{text:>{w}}" for text, w in zip(rest, widths[1:], strict=True))])

@@ -1,0 +1,175 @@
+"""The reference of the lab, its own error bound, and how fast errors grow by themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mbd.analysis.accuracy.compare import differences, ranges
+from mbd.analysis.accuracy.reference import Method, RungeKuttaReference
+from mbd.arrays import Vector
+from mbd.compile.mechanisms import mechanism_of
+from mbd.kernel.active_set import ActiveSetManager
+from mbd.simulation.simulate import simulate
+from mbd.state import State
+
+if TYPE_CHECKING:
+    from mbd.trajectory import Trajectory
+
+__all__ = ["INSTANTS", "Truth", "truth"]
+
+TIGHT, LOOSE = 1e-12, 1e-10
+"""Tolerances of the reference and of the run that bounds its error [-]."""
+INSTANTS = 400
+"""Common instants at which runs are compared, at most: stored rows of the reference, which need no interpolation."""
+NUDGE = 1e-9
+"""Part of their range by which the velocities of the start are changed, to measure how errors grow [-]."""
+
+Share = Callable[[float], None]
+"""Told which share of a run is done, 0 … 1."""
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """A run that others are judged by.
+
+    Parameters
+    ----------
+    run : of the reference
+    method : what it was integrated with, in words
+    instants : at which runs are compared [s]
+    scales : range of each quantity
+    bound : of the reference's own error of each quantity, relative to its range: the difference between two runs, with
+        tolerances of 1e-12 and 1e-10 and half the step between rows
+    event_bound : the same of its event times [s]
+    same_events : whether both have the same events
+    growth : how many times a small change of the start has grown at most [-]; None where it could not be measured
+    seconds : wall time of all that [s]
+    """
+
+    run: Trajectory = field(repr=False)
+    method: str
+    instants: Vector = field(repr=False)
+    scales: Mapping[str, float]
+    bound: Mapping[str, float]
+    event_bound: float
+    same_events: bool
+    growth: float | None
+    seconds: float
+
+    @property
+    def error(self) -> float:
+        """The largest bound of all quantities [-]."""
+        return max(self.bound.values(), default=0.0)
+
+
+def truth(
+    model: Any, start: State, until: Any, names: Sequence[str], step: float, sizes: Sequence[float],
+    options: Mapping[str, Any], shares: Sequence[Share],
+) -> Truth | str:  # fmt: skip
+    """The reference, or in a sentence why there is none.
+
+    Parameters
+    ----------
+    until : end time, or (event, latest time)
+    names : the quantities
+    step : between two rows of the reference [s]
+    sizes : of q, v and z
+    options : of `simulate`
+    shares : progress of the three runs
+    """
+    began = perf_counter()
+
+    def run(method: Method, tolerance: float, dt: float, begin: State, share: Share) -> Trajectory:
+        """One run of the reference scheme."""
+        last = until[1] if isinstance(until, tuple) else until
+        return simulate(
+            model, begin, RungeKuttaReference(tolerance, tuple(sizes), method), dt=dt, until=until,
+            **{**options, "contact": "events", "locate": "root"}, on_failure="return",
+            progress=lambda t, _: share((t - start.time) / max(last - start.time, 1e-300)),
+        )  # fmt: skip
+
+    messages = []
+    for method in ("DOP853", "Radau"):
+        tight = run(method, TIGHT, step, start, shares[0])
+        loose = run(method, LOOSE, step / 2.0, start, shares[1]) if tight.success else tight
+        if stopped(tight) or stopped(loose):
+            raise KeyboardInterrupt
+        if tight.success and loose.success:
+            break
+        messages.append(f"{method}: {tight.message if not tight.success else loose.message}")
+    else:
+        return "there is no reference: " + "; ".join(messages)
+    instants = chosen(tight.time)
+    scales = ranges(tight, names, instants)
+    apart = differences(loose, tight, scales, instants)
+    bound = {name: max(apart.largest.get(name, 0.0), apart.at_end.get(name, 0.0)) for name in scales}
+    growth = _growth(model, start, tight, options, lambda begin: run(method, TIGHT, step, begin, shares[2]))
+    words = {"DOP853": "Dormand–Prince 8(5,3)", "Radau": "Radau IIA of order 5"}[method]
+    return Truth(
+        tight, f"{words}, tolerance {TIGHT:g}", instants, scales, bound,
+        apart.event_time, apart.same_events, growth, perf_counter() - began,
+    )  # fmt: skip
+
+
+def chosen(times: Vector) -> Vector:
+    """Some of the times of a run's rows, evenly spread, the last among them and the first not."""
+    wanted = np.linspace(times[0], times[-1], INSTANTS + 1)[1:]
+    places = np.clip(np.searchsorted(times, wanted - 0.5 * (wanted[1] - wanted[0])), 1, len(times) - 1)
+    return np.unique(np.append(times[places], times[-1]))
+
+
+def stopped(run: Trajectory) -> bool:
+    """Whether a run ended because the user wanted it to."""
+    return not run.success and run.message.startswith("interrupted")
+
+
+def motion(run: Trajectory) -> list[str]:
+    """Names of all coordinates and their rates."""
+    count = run.facts.coordinate_count
+    names = [name for name, _ in run.facts.coordinates]
+    rates = [f"{name}.rate" for name in names[:count]]
+    return [*names, *(name for name in rates if name in run)]
+
+
+def _growth(
+    model: Any, start: State, reference: Trajectory, options: Mapping[str, Any], run: Callable[[State], Trajectory]
+) -> float | None:
+    """Largest difference of two runs over that of their starts, all relative to the ranges of the motion."""
+    instants = chosen(reference.time)
+    scales = ranges(reference, motion(reference), instants)
+    nudged = _nudged(model, start, reference, options)
+    other = run(nudged)
+    if stopped(other):
+        raise KeyboardInterrupt
+    if not other.success:
+        return None
+    apart = differences(other, reference, scales, instants)
+    rates = np.array([scales.get(name, 1.0) for name in start.velocity_names])
+    begun = float(np.max(np.abs(nudged.v - start.v) / rates, initial=0.0))
+    if not begun > 0.0:
+        return None
+    return apart.error / begun
+
+
+def _nudged(model: Any, start: State, reference: Trajectory, options: Mapping[str, Any]) -> State:
+    """The start with velocities changed by `NUDGE` of their range, as far as the closed rows let them."""
+    mechanism = mechanism_of(model, options.get("backend", "auto"), options.get("parameters"))
+    manager = ActiveSetManager(mechanism.equations)
+    y = np.concatenate([start.v, start.z])
+    terms = mechanism.acceleration_terms(start.time, start.q, y, reference.record.parameters, start.anchors)
+    rows = list(manager.active_rows(manager.flags(start.mode.closed)))
+    n, n_v = len(y), len(start.v)
+    swing = np.ptp(reference.record.v, axis=0) if len(reference.record.v) else np.ones(n_v)
+    change = np.zeros(n)
+    change[:n_v] = NUDGE * swing * np.where(np.arange(n_v) % 2 == 0, 1.0, -0.7)
+    if rows:
+        B = terms.B[rows]
+        matrix = np.block([[terms.M, B.T], [B, np.zeros((len(rows), len(rows)))]])
+        right = np.concatenate([np.zeros(n), -B @ change])
+        change = change + np.linalg.lstsq(matrix, right, rcond=None)[0][:n]
+    return replace(start, v=start.v + change[:n_v], memory=None)

@@ -1,0 +1,97 @@
+"""The work–precision plot of the accuracy lab."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mbd.view.plots import drawing
+from mbd.view.style import CYCLE
+
+if TYPE_CHECKING:
+    from mbd.analysis.accuracy import Accuracy, Point
+
+__all__ = ["clear", "work_precision"]
+
+MARKERS = "osD^vP*X"
+"""Of the schemes in turn."""
+
+
+def clear(point: Point) -> bool:
+    """Whether a point has an error and a time to be drawn at."""
+    return not point.failure and point.error is not None and point.error > 0.0 and point.seconds > 0.0
+
+
+def work_precision(found: Accuracy, path: str | Path | None = None) -> Any:
+    """Error over wall time, both logarithmic: a line for each scheme, grey lines through points of one step."""
+    shown = [point for point in found.points if clear(point)]
+    with drawing(path, 7.4, 4.8) as figure:
+        axes = figure.subplots()
+        for number, scheme in enumerate(found.schemes):
+            points = [point for point in shown if point.scheme == scheme]
+            axes.plot(
+                [1e3 * point.seconds for point in points], [point.error for point in points],
+                marker=MARKERS[number % len(MARKERS)], markersize=4.5, color=CYCLE[number % len(CYCLE)], label=scheme,
+                alpha=0.9,
+            )  # fmt: skip
+            for point in points:
+                if not point.same_events:
+                    axes.plot(1e3 * point.seconds, point.error, "o", markersize=10, mfc="none", color=CYCLE[1])
+        if shown:
+            axes.set_xscale("log")
+            axes.set_yscale("log")
+            _steps(axes, shown)
+            _limits(axes, found, shown)
+        else:
+            axes.text(0.5, 0.5, "no error is known", ha="center", transform=axes.transAxes)
+        axes.set_xlabel("wall time [ms]")
+        axes.set_ylabel("largest error over range")
+        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.3)
+        figure.suptitle(f"{found.model}: what accuracy costs", x=0.01, ha="left", fontweight="bold")
+    return figure
+
+
+def _steps(axes: Any, shown: list[Point]) -> None:
+    """A thin grey line through the points of each step, which is written at its slow end."""
+    for dt in sorted({point.dt for point in shown}):
+        group = sorted((point for point in shown if point.dt == dt), key=lambda point: point.seconds)
+        axes.plot(
+            [1e3 * point.seconds for point in group], [point.error for point in group], ":", color="#8A8A8A",
+            linewidth=0.8, zorder=0.9,
+        )  # fmt: skip
+        axes.annotate(
+            f"{1e3 * dt:.3g} ms", (1e3 * group[-1].seconds, group[-1].error), xytext=(8, 0),
+            textcoords="offset points", va="center", fontsize=7.5, color="#555555",
+        )  # fmt: skip
+
+
+def _limits(axes: Any, found: Accuracy, shown: list[Point]) -> None:
+    """The wanted error as a line, the bound of the reference as a band, and room for the labels."""
+    errors = [point.error for point in shown if point.error is not None]
+    low, high = min(errors) / 2.5, max(errors) * 2.5
+    if found.target is not None:
+        low, high = min(low, found.target / 1.6), max(high, found.target * 1.6)
+        axes.axhline(found.target, color="black", linewidth=0.9, linestyle="--", zorder=0.8)
+        axes.annotate(
+            f"wanted {found.target:g}", (0.995, found.target), xycoords=("axes fraction", "data"), ha="right",
+            xytext=(0, 3), textcoords="offset points", fontsize=7.5,
+        )  # fmt: skip
+    bound = found.reference.error if found.reference is not None else 0.0
+    if math.isfinite(bound) and bound > low:
+        axes.axhspan(low, bound, color="#EEEEEE", zorder=0.3)
+    times = [1e3 * point.seconds for point in shown]
+    spread = max(times) / min(times)
+    axes.set_ylim(low, high)
+    axes.set_xlim(min(times) / spread**0.06 / 1.05, max(times) * spread**0.16 * 1.1)
+    _plain(axes.xaxis, spread)
+
+
+def _plain(axis: Any, spread: float) -> None:
+    """Times written as numbers, between powers of ten too where there are few of these."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    digits = (1.0, 2.0, 5.0) if spread < 300.0 else (1.0,)
+    axis.set_major_locator(LogLocator(subs=digits))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())

@@ -1,0 +1,141 @@
+"use strict";
+(() => {
+  const data = JSON.parse(document.getElementById("data").textContent);
+  const [chart, tip, legend] = ["chart", "tip", "legend"].map((id) => document.getElementById(id));
+  const [quantity, which, cost] = ["quantity", "which", "cost"].map((id) => document.getElementById(id));
+  const units = { seconds: "wall time [ms]", dt: "step dt [ms]", steps: "steps", iterations: "Newton iterations" };
+  const margin = { left: 66, right: 70, top: 14, bottom: 44 };
+
+  quantity.add(new Option("the largest of all", ""));
+  data.quantities.forEach((name) => quantity.add(new Option(name, name)));
+
+  const error = (point) => {
+    const values = point[which.value];
+    const known = quantity.value ? [values[quantity.value]] : Object.values(values);
+    const found = Math.max(...known.filter((value) => value > 0));
+    return Number.isFinite(found) && (quantity.value || which.value !== "errors" || point.error !== null) ? found : null;
+  };
+  const work = (point) => (cost.value === "seconds" || cost.value === "dt" ? 1e3 : 1) * point[cost.value];
+  const short = (value, digits = 3) => (value === null || value === undefined ? "–" : String(Number(value.toPrecision(digits))));
+  const small = (value) => (value === null || value === undefined ? "–" : value === 0 ? "0" : value.toExponential(1));
+
+  const make = (name, attributes, text) => {
+    const node = document.createElementNS("http://www.w3.org/2000/svg", name);
+    Object.entries(attributes).forEach(([key, value]) => node.setAttribute(key, value));
+    if (text !== undefined) node.textContent = text;
+    chart.append(node);
+    return node;
+  };
+
+  const ticks = (low, high) => {
+    const digits = high / low < 300 ? [1, 2, 5] : [1];
+    const found = [];
+    for (let power = Math.floor(Math.log10(low)); power <= Math.ceil(Math.log10(high)); power += 1)
+      digits.forEach((digit) => found.push(digit * 10 ** power));
+    return found.filter((value) => value >= low && value <= high);
+  };
+
+  const told = (scheme, point) => [
+    scheme.name,
+    `dt      ${short(1e3 * point.dt)} ms`,
+    `error   ${small(error(point))}${point.order === null ? "" : `   order ${point.order.toFixed(2)}`}`,
+    `time    ${short(1e3 * point.seconds)} ms`,
+    `steps   ${point.steps}, Newton ${point.iterations}`,
+    `drift   ${small(point.drift)}, energy ${small(point.energy)} J`,
+    ...(point.events ? [`events  ${point.events}, off by ${small(point.event_time)} s`] : []),
+    ...(point.same_events ? [] : ["its events are not those of the reference"]),
+    ...(point.note ? [point.note] : []),
+  ].join("\n");
+
+  const show = (scheme, point, x, y) => {
+    tip.textContent = told(scheme, point);
+    tip.hidden = false;
+    const room = chart.getBoundingClientRect().width - tip.offsetWidth - 8;
+    tip.style.left = `${Math.min(x + 14, Math.max(room, 0))}px`;
+    tip.style.top = `${Math.max(y - tip.offsetHeight - 12, 0)}px`;
+  };
+
+  const emphasize = (number) =>
+    chart.querySelectorAll("[data-scheme]").forEach((node) =>
+      node.classList.toggle("faint", number !== null && Number(node.dataset.scheme) !== number));
+
+  const draw = () => {
+    chart.replaceChildren();
+    tip.hidden = true;
+    const { width, height } = chart.getBoundingClientRect();
+    const all = data.schemes.flatMap((scheme, number) => scheme.points
+      .filter((point) => !point.failure && error(point) !== null && work(point) > 0)
+      .map((point) => ({ scheme, number, point, cost: work(point), error: error(point) })));
+    if (!all.length) {
+      make("text", { x: width / 2, y: height / 2, "text-anchor": "middle" }, "no clear error of this quantity");
+      return;
+    }
+    const costs = all.map((each) => each.cost);
+    const errors = all.map((each) => each.error);
+    let [low, high] = [Math.min(...errors) / 2, Math.max(...errors) * 2];
+    if (data.target) [low, high] = [Math.min(low, data.target / 1.5), Math.max(high, data.target * 1.5)];
+    const spread = Math.max(...costs) / Math.min(...costs);
+    const [first, last] = [Math.min(...costs) / (1.1 * spread ** 0.05), Math.max(...costs) * 1.1 * spread ** 0.05];
+    const x = (value) => margin.left + (width - margin.left - margin.right) * Math.log(value / first) / Math.log(last / first);
+    const y = (value) => height - margin.bottom - (height - margin.top - margin.bottom) * Math.log(value / low) / Math.log(high / low);
+
+    const bounds = quantity.value ? [data.bound[quantity.value]] : Object.values(data.bound);
+    const bound = Math.max(0, ...bounds.filter((value) => value > 0));
+    if (bound > low)
+      make("rect", { class: "bound", x: margin.left, width: width - margin.left - margin.right, y: y(Math.min(bound, high)), height: y(low) - y(Math.min(bound, high)) });
+    ticks(first, last).forEach((value) => {
+      make("line", { class: "grid", x1: x(value), x2: x(value), y1: margin.top, y2: height - margin.bottom });
+      make("text", { x: x(value), y: height - margin.bottom + 18, "text-anchor": "middle" }, short(value));
+    });
+    ticks(low, high).forEach((value) => {
+      make("line", { class: "grid", x1: margin.left, x2: width - margin.right, y1: y(value), y2: y(value) });
+      make("text", { x: margin.left - 8, y: y(value) + 4, "text-anchor": "end" }, value.toExponential(0));
+    });
+    make("text", { x: (margin.left + width - margin.right) / 2, y: height - 6, "text-anchor": "middle" }, units[cost.value]);
+    make("text", { x: 14, y: height / 2, "text-anchor": "middle", transform: `rotate(-90 14 ${height / 2})` }, "error over range");
+    if (data.target) {
+      make("line", { class: "target", x1: margin.left, x2: width - margin.right, y1: y(data.target), y2: y(data.target) });
+      make("text", { x: width - margin.right - 4, y: y(data.target) - 5, "text-anchor": "end" }, `wanted ${data.target}`);
+    }
+    const labels = [];
+    if (cost.value !== "dt")
+      [...new Set(all.map((each) => each.point.dt))].forEach((dt) => {
+        const group = all.filter((each) => each.point.dt === dt).sort((a, b) => a.cost - b.cost);
+        const end = group[group.length - 1];
+        make("polyline", { class: "same", points: group.map((each) => `${x(each.cost)},${y(each.error)}`).join(" ") });
+        labels.push([{ class: "step", x: x(end.cost) + 10, y: y(end.error) + 4 }, `${short(1e3 * dt)} ms`]);
+      });
+    const drawn = [];
+    data.schemes.forEach((scheme, number) => {
+      const points = all.filter((each) => each.scheme === scheme);
+      make("polyline", { class: "curve", "data-scheme": number, stroke: scheme.color, points: points.map((each) => `${x(each.cost)},${y(each.error)}`).join(" ") });
+      drawn.push(...points.map((each) => ({ ...each, number })));
+    });
+    labels.forEach(([place, text]) => make("text", place, text));
+    drawn.forEach((each) => {
+      const { scheme, number } = each;
+      const at = { cx: x(each.cost), cy: y(each.error), "data-scheme": number };
+      if (!each.point.same_events) make("circle", { ...at, class: "other", r: 9 });
+      const dot = make("circle", { ...at, class: "point", r: 5.5, fill: scheme.color, tabindex: 0 });
+      const open = () => { show(scheme, each.point, at.cx, at.cy); emphasize(number); };
+      const close = () => { tip.hidden = true; emphasize(null); };
+      dot.addEventListener("pointerenter", open);
+      dot.addEventListener("focus", open);
+      dot.addEventListener("pointerleave", close);
+      dot.addEventListener("blur", close);
+    });
+  };
+
+  data.schemes.forEach((scheme, number) => {
+    const entry = document.createElement("span");
+    const line = document.createElement("i");
+    line.style.background = scheme.color;
+    entry.append(line, scheme.name);
+    entry.addEventListener("pointerenter", () => emphasize(number));
+    entry.addEventListener("pointerleave", () => emphasize(null));
+    legend.append(entry);
+  });
+  [quantity, which, cost].forEach((control) => control.addEventListener("change", draw));
+  new ResizeObserver(draw).observe(chart);
+  draw();
+})();

@@ -1,0 +1,303 @@
+"""The accuracy lab: its errors are the true ones, its reference is right to its bound, its advice follows."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from scipy.special import ellipj, ellipk
+
+import mbd
+import mbd.analysis.accuracy.lab as lab
+from mbd import cli
+from mbd.analysis.accuracy import Point, choices, points
+from mbd.analysis.accuracy.advice import advice, cheapest
+from mbd.analysis.accuracy.compare import aligned
+from mbd.analysis.accuracy.lab import with_orders
+from mbd.analysis.accuracy.reference import RungeKuttaReference
+from mbd.integrators import Integrator, StepReport, StepResult
+from mbd.integrators.base import consistent_rates
+
+G = 9.81
+
+
+@pytest.fixture(autouse=True, scope="module")
+def quick():
+    """A coarse reference is enough for small scenes; nothing is timed twice."""
+    patch = pytest.MonkeyPatch()
+    for place, name, value in ((choices, "LEAST_ROWS", 150), (choices, "MOST_ROWS", 300), (points, "REPEATS", 1),
+                               (lab, "PATIENCE", 0.0)):  # fmt: skip
+        patch.setattr(place, name, value)
+    yield
+    patch.undo()
+
+
+@dataclass(frozen=True)
+class SymplecticEuler(Integrator):
+    """Of first order: velocities first, positions with the new ones; gives up on steps above a limit."""
+
+    limit: float = 1.0
+
+    def order(self, system=None):
+        return 1
+
+    def start(self, system, state, mode, dt):
+        return None
+
+    def step(self, system, state, dt, mode, memory):
+        rates, _ = consistent_rates(system, state.time, state.q, np.concatenate([state.v, state.z]), mode)
+        v = state.v + dt * rates[: len(state.v)]
+        after = replace(state, time=state.time + dt, q=state.q + dt * v, v=v)
+        return StepResult(after, None, StepReport(dt <= self.limit, residual=1.0))
+
+
+def pendulum(angle=2.0):
+    """A point mass on a rod of 1 m, released from rest."""
+    model = mbd.Model("pendulum")
+    rod = mbd.Link("rod", mass=1.0, length=1.0, center=1.0)
+    model.connect(mbd.Revolute("pin", model.ground.origin, rod.start))
+    return model, mbd.assemble(model, position={"pin.angle": angle})
+
+
+def swing(t, angle=2.0):
+    """θ(t) of the pendulum by Jacobi's elliptic function (Landau & Lifshitz, Mechanics, §11)."""
+    k = np.sin(angle / 2)
+    return 2 * np.arcsin(k * ellipj(ellipk(k**2) - np.sqrt(G) * np.asarray(t), k**2)[0])
+
+
+def ball(speed=0.0, restitution=0.5):
+    model = mbd.Model("ball")
+    mass = mbd.PointMass("ball", mass=2.0)
+    model.connect(mbd.Translation("fall", model.ground.origin, mass.origin, axes="y"))
+    model.constrain(mbd.Unilateral("floor", mbd.height(mass.origin), restitution=restitution))
+    return model, mbd.assemble(model, position={"fall.y": 1.0}, velocity={"fall.y": speed})
+
+
+@pytest.fixture(scope="module")
+def found(quick):
+    model, start = pendulum()
+    return mbd.accuracy(
+        model, start, 3.0, integrators=[mbd.Newmark(), mbd.HHT(alpha=0.05), SymplecticEuler()], dts=[0.01, 0.02, 0.005],
+        target=1e-3,
+    )  # fmt: skip
+
+
+def test_the_reference_of_a_pendulum_is_right_to_its_bound(found):
+    run = found.reference.run
+    true = np.max(np.abs(run["pin.angle"] - swing(run.time))) / np.ptp(run["pin.angle"])
+    assert true <= found.reference.bound["pin.angle"] < 1e-8
+    assert found.reference.error < 1e-8 and found.reference.growth < 100.0
+
+
+def test_errors_of_a_pendulum_are_those_against_its_elliptic_function(found):
+    model, start = pendulum()
+    instants = found.reference.instants
+    for scheme in (mbd.Newmark(), mbd.HHT(alpha=0.05)):
+        for point in found.of(repr(scheme)):
+            run = mbd.simulate(model, start, scheme, dt=point.dt, until=3.0)
+            gaps = np.abs(run.at(instants)["pin.angle"] - swing(instants)) / found.reference.scales["pin.angle"]
+            assert point.errors["pin.angle"] == pytest.approx(np.max(gaps), abs=2.0 * found.reference.error)
+            assert point.end_errors["pin.angle"] == pytest.approx(gaps[-1], abs=2.0 * found.reference.error)
+            assert point.energy == pytest.approx(np.max(np.abs(run.energy.numerical)), rel=1e-9)
+            assert point.steps == 3.0 / point.dt and point.tangents > 0 and point.factorizations > 0
+
+
+def test_schemes_show_the_orders_they_promise(found):
+    for scheme, order in (
+        ("Newmark(beta=0.25, gamma=0.5)", 2),
+        ("HHT(alpha=0.05)", 2),
+        ("SymplecticEuler(limit=1.0)", 1),
+    ):
+        each = found.of(scheme)
+        assert [point.dt for point in each] == [0.02, 0.01, 0.005] and each[0].order is None
+        assert [point.order for point in each[1:]] == pytest.approx([order, order], abs=0.15), scheme
+
+
+def test_text_tables_and_page_say_the_same(found, tmp_path):
+    text = repr(found)
+    assert "Dormand–Prince" in text and "HHT(alpha=0.05)" in text and "For an error of 0.001 take" in text
+    frame = found.to_dataframe()
+    assert len(frame) == 9 and frame["error"].max() == max(point.error for point in found.points)
+    with found.to_csv(tmp_path / "table.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert float(rows[0]["error of pin.angle"]) == found.points[0].errors["pin.angle"]
+    page = found.page(tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "http://www.w3.org/2000/svg" in page and page.count("://") == 1 and "src=" not in page
+    found.plot(tmp_path / "plot.png")
+    assert (tmp_path / "plot.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_an_oscillator_with_a_row_is_judged_by_its_exact_motion():
+    omega = 3.0
+    model = mbd.Lagrangian(
+        "two masses that move as one", ["x", "y"],
+        kinetic=lambda x_rate, y_rate: (x_rate**2 + y_rate**2) / 4, potential=lambda x: omega**2 * x**2 / 2,
+        constraints={"tie": lambda x, y: x - y},
+    )  # fmt: skip
+    start = mbd.assemble(model, position={"x": 1.0, "y": 1.0})
+    result = mbd.accuracy(model, start, 2.0, "x", [mbd.GeneralizedAlpha(rho_inf=0.5)], [0.02, 0.01])
+    run = result.reference.run
+    assert np.max(np.abs(run["x"] - np.cos(omega * run.time))) < 1e-9
+    assert run.violation.length + run.violation.rate < 1e-12
+    for point in result.points:
+        other = mbd.simulate(model, start, mbd.GeneralizedAlpha(rho_inf=0.5), dt=point.dt, until=2.0)
+        instants = result.reference.instants
+        true = np.max(np.abs(other.at(instants)["x"] - np.cos(omega * instants))) / result.reference.scales["x"]
+        assert point.error == pytest.approx(true, abs=1e-8)
+
+
+def test_a_bouncing_ball_is_exact_for_schemes_of_order_two_and_the_lab_says_so():
+    model, start = ball()
+    result = mbd.accuracy(model, start, 1.5, None, [mbd.Newmark(), SymplecticEuler()], [0.01, 0.005])
+    first = np.sqrt(2.0 / G)
+    hits = [event.time for event in result.reference.run.events if event.kind == "closed"]
+    flights = first + np.concatenate([[0.0], np.cumsum([2.0 * first * 0.5 ** (k + 1) for k in range(len(hits) - 1)])])
+    assert hits == pytest.approx(flights, abs=1e-10)
+    newmark, euler = result.of("Newmark(beta=0.25, gamma=0.5)"), result.of("SymplecticEuler(limit=1.0)")
+    assert all(p.error is None and p.at_most < 1e-8 and p.event_time < 1e-9 for p in newmark)
+    assert "no clear error" in newmark[0].note and newmark[1].order is None
+    assert euler[0].error > 1e-3 and euler[0].event_time > 1e-4
+
+
+def test_impacts_do_not_hide_the_order():
+    """A pendulum rebounds from a wall: without matching of its hits, errors would be those of the jumps."""
+    model = mbd.Model("pendulum at a wall")
+    rod = mbd.Link("rod", mass=1.0, length=1.0, center=1.0)
+    pin = mbd.Revolute("pin", model.ground.origin, rod.start)
+    model.connect(pin)
+    model.constrain(mbd.Unilateral("wall", mbd.extension(pin), restitution=0.8))
+    start = mbd.assemble(model, position={"pin.angle": 0.5})
+    result = mbd.accuracy(model, start, 3.0, None, [mbd.HHT(alpha=0.05)], [0.02, 0.01, 0.005])
+    assert [point.order for point in result.points[1:]] == pytest.approx([2.0, 2.0], abs=0.1)
+    assert result.points[-1].error < 1e-3 and all(point.same_events for point in result.points)
+    times = [point.event_time for point in result.points]
+    assert times[0] / times[1] == pytest.approx(4.0, rel=0.1)
+
+
+def test_the_end_may_be_an_event():
+    model, start = ball()
+    result = mbd.accuracy(model, start, "floor", None, [SymplecticEuler()], [0.01, 0.005])
+    assert result.reference.run.time[-1] == pytest.approx(np.sqrt(2.0 / G), abs=1e-10)
+    assert result.points[1].order == pytest.approx(1.0, abs=0.3)
+    with pytest.raises(mbd.UnknownNameError, match="floor"):
+        mbd.accuracy(model, start, "flor")
+
+
+def test_a_growing_error_is_reported():
+    model, start = pendulum(np.pi - 1e-3)
+    result = mbd.accuracy(model, start, 3.0, None, [mbd.HHT(alpha=0.05)], [0.01])
+    assert result.reference.growth > 1e3
+    assert any("grows" in note for note in result.notes)
+
+
+def test_a_step_too_large_is_listed_and_the_others_go_on():
+    model, start = pendulum()
+    result = mbd.accuracy(model, start, 3.0, None, [SymplecticEuler(0.05)], [0.2, 0.01], target=1e-9)
+    assert result.points[0].failure and result.points[0].error is None and result.points[1].error < 0.1
+    assert "failed: " in repr(result) and "1 point failed" in " ".join(result.notes)
+    assert "not reached; the best is SymplecticEuler(limit=0.05) with dt = 0.01 s" in result.recommendation[0]
+
+
+def test_every_wrong_argument_is_named_at_once():
+    model, start = pendulum()
+    with pytest.raises(mbd.UnknownNameError, match=r"pin\.angel[^\n]*did you mean 'pin\.angle'[\s\S]*rods\.end"):
+        mbd.accuracy(model, start, 1.0, ["pin.angel", "rods.end.x", "pin.angle"])
+    with pytest.raises(mbd.ModelError) as caught:
+        mbd.accuracy(model, start, 1.0, integrators=["HHT"], dts=[-1.0, 1e-3])
+    assert len(caught.value.faults) == 2
+    with pytest.raises(mbd.ModelError) as caught:
+        mbd.accuracy(model, start, 1.0, target=0.0, tolerances=[1e-3])
+    assert len(caught.value.faults) == 2
+    with pytest.raises(mbd.ModelError, match="after the start"):
+        mbd.accuracy(model, start, -1.0)
+
+
+def test_an_interrupted_lab_keeps_its_points():
+    def stop(done, total):
+        if done > 5.5:
+            raise KeyboardInterrupt
+
+    model, start = pendulum()
+    result = mbd.accuracy(model, start, 1.0, None, [mbd.HHT(alpha=0.05)], [0.04, 0.02, 0.01, 0.005], progress=stop)
+    assert not result.complete and 1 <= len(result.points) < 4
+    assert "interrupted" in result.notes[0] and result.points[0].error > 0.0
+
+
+def test_a_scene_too_stiff_for_one_method_goes_to_the_other(monkeypatch):
+    monkeypatch.setattr("mbd.analysis.accuracy.reference.MOST_STRIDES", {"DOP853": 0, "Radau": 4000})
+    model, start = pendulum()
+    result = mbd.accuracy(model, start, 0.5, None, [mbd.HHT(alpha=0.05)], [0.02])
+    assert "Radau" in result.reference.method and result.points[0].error > 0.0
+    assert np.max(np.abs(result.reference.run["pin.angle"] - swing(result.reference.run.time))) < 1e-8
+    monkeypatch.setattr("mbd.analysis.accuracy.reference.MOST_STRIDES", {"DOP853": 0, "Radau": 0})
+    result = mbd.accuracy(model, start, 0.5, None, [mbd.HHT(alpha=0.05)], [0.02])
+    assert result.reference is None and "there is no reference" in " ".join(result.notes)
+    assert result.points[0].error is None and result.points[0].steps == 25
+    assert RungeKuttaReference().order() == 8 and RungeKuttaReference(method="Radau").order() == 5
+
+
+# advice ------------------------------------------------------------------------------------------------------------
+def point(scheme, dt, error, seconds, **more):
+    return Point(scheme, dt, error=error, at_most=error, seconds=seconds, **more)
+
+
+GIVEN = [
+    point("quick", 0.2, 4e-3, 0.001), point("quick", 0.1, 1e-3, 0.002), point("quick", 0.05, 2.5e-4, 0.004),
+    point("slow", 0.2, 1e-3, 0.003), point("slow", 0.1, 1e-4, 0.006),
+    point("wrong", 0.1, None, 0.0001, failure="it fell"),
+]  # fmt: skip
+
+
+def test_the_cheapest_point_is_recommended_and_what_ten_times_more_costs():
+    given = with_orders(GIVEN, {"quick": None, "slow": None, "wrong": None})
+    assert cheapest(given, 1e-3).scheme == "quick" and cheapest(given, 2e-4).scheme == "slow"
+    text = advice(given, 1e-3, 1e-9)
+    assert "take quick with dt = 0.1 s (error 0.001, 2 ms)" in text[0]
+    assert "costs 3 times the time: slow with dt = 0.1 s (error 0.0001, 6 ms)" in text[2]
+    assert [line.split(" with")[0] for line in advice(given, None, 1e-9)] == [
+        "For an error of 0.001: quick", "For an error of 0.0001: slow",
+    ]  # fmt: skip
+
+
+def test_an_error_out_of_reach_is_said_with_the_step_it_would_need():
+    given = with_orders(GIVEN, {"quick": None, "slow": None, "wrong": None})
+    text = " ".join(advice(given, 1e-6, 1e-9))
+    assert "not reached; the best is slow" in text
+    assert "slow would need dt = 0.025 s and 24 ms" in text  # of order log2(10), a hundredth of the error
+    assert "known to 1e-05 only" in " ".join(advice(given, 1e-6, 1e-5))
+
+
+def test_events_are_matched_in_order_with_the_least_shifts():
+    assert aligned([1.0, 2.0], [1.05, 2.05], 0.1) == ([(1.0, 1.05), (2.0, 2.05)], [])
+    pairs, alone = aligned([1.0, 1.5, 1.501, 2.0], [1.01, 2.01], 0.05)
+    assert pairs == [(1.0, 1.01), (2.0, 2.01)] and alone == [1.5, 1.501]
+    pairs, alone = aligned([], [1.0], 0.05)
+    assert pairs == [] and alone == [1.0]
+
+
+# the command -------------------------------------------------------------------------------------------------------
+SCRIPT = """
+import mbd
+model = mbd.Model("pendulum")
+rod = mbd.Link("rod", mass=1.0, length=1.0, center=1.0)
+model.connect(mbd.Revolute("pin", model.ground.origin, rod.start))
+start = mbd.assemble(model, position={"pin.angle": 1.0})
+integrator, dt, until = mbd.GeneralizedAlpha(rho_inf=0.7), 1e-3, 1.0
+"""
+
+
+def test_the_command_measures_a_script(tmp_path, capsys):
+    script = tmp_path / "swing.py"
+    script.write_text(SCRIPT, encoding="utf-8")
+    assert cli.main(["accuracy", str(script), "--target", "1e-3", "--out", str(tmp_path / "out")]) == 0
+    text = capsys.readouterr().out
+    assert "GeneralizedAlpha(rho_inf=0.7)" in text and "For an error of 0.001 take" in text
+    names = {path.name for path in (tmp_path / "out").iterdir()}
+    assert names == {"accuracy.csv", "accuracy.png", "accuracy.html"}
+    more = ["--dt", "0.1", "--dt", "0.05", "--quantity", "pin.rate", "--until", "0.5"]
+    assert cli.main(["accuracy", str(script), "--target", "1e-8", "--out", str(tmp_path), *more]) == 1
+    assert "An error of 1e-08 is not reached" in capsys.readouterr().out
+    assert cli.main(["accuracy", str(script), "--quantity", "pin.angel", "--out", str(tmp_path)]) == 1
+    assert "did you mean 'pin.angle'" in capsys.readouterr().err
