@@ -20,7 +20,7 @@ from mbd.kernel import fields as F
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.kernel.redundancy import find_dependent, spread
 from mbd.kernel.restart import active_rows
-from mbd.kernel.switching import settle
+from mbd.kernel.settle import settle
 from mbd.simulation.arguments import fits
 from mbd.simulation.plain import MechanismSystem
 from mbd.simulation.stepper import Stepper

@@ -35,17 +35,21 @@ def prepare(K: Any) -> None:
 def start_over(K: Any) -> None:
     """No jump and no impulse yet."""
     for i in range(K.n):
-        K.total_jump[i] = 0.0
+        K.jump[i] = K.total_jump[i] = 0.0
     for k in range(K.n_rows):
-        K.total[k] = 0.0
+        K.impulse[k] = K.total[k] = 0.0
 
 
 def gather(K: Any, slow: bool) -> None:
-    """All closed and closing contacts take part; those that open on pull may choose."""
+    """All closed and closing contacts take part; those that open on pull may choose.
+
+    In a slow impact those are held that cannot rise: of non-smooth steps all, of blows without end the one that fired.
+    """
     for c in range(K.n_contacts):
         both = K.closed[c] == 1 or K.closing[c] > 0
+        held = slow and (K.strategy == 1 or (K.state[PLASTIC] == 1 and K.fired[1] == c))
         K.active[c] = 1 if (both and K.kind[c] == 0) else 0
-        K.free[c] = 1 if (K.active[c] == 1 and K.opens[c] == 0 and not slow) else 0
+        K.free[c] = 1 if (K.active[c] == 1 and K.opens[c] == 0 and not held) else 0
     if not slow or K.strategy == 1:
         loosen(K)
         return
