@@ -103,7 +103,7 @@ SCENES = {
     "ball on rubber": Scene(at(rubber_ball, {"fall.displacement": 0.2}), dt=1e-3, until=0.7),
     "pendulum with a slow servo": Scene(at(served_pendulum, {"hinge.angle": 0.7})),
     "redundant cranks": Scene(parallel_cranks),
-    "flat four-bar": Scene(lambda: four_bars(1), dt=5e-3, until=4.0),
+    "flat four-bar": Scene(lambda: four_bars(1).start, dt=5e-3, until=4.0),
     "controller and signal": Scene(at(driven_point, {"rail.displacement": 0.5})),
     "reset and listener": Scene(at(bouncing, {"fall.displacement": 0.3})),
     "skater": Scene(at(skater, velocity={"place.x": 1.0, "place.angle": 2.0})),
