@@ -12,8 +12,11 @@ from mbd.kernel.restart import active_rows, consistent, evaluate, solve_rows, st
 __all__ = ["leave_pose", "take_over"]
 
 
-def project_velocity(K: Any, m: int) -> int:
-    """The nearest velocities, in the metric of M, with B v + h_t = 0 on the m rows in K.rows."""
+def project_velocity(K: Any, m: int, dropping: bool) -> int:
+    """The nearest velocities, in the metric of M, with B v + h_t = 0 on the m rows in K.rows.
+
+    They may depend on each other where `dropping` finds out anew which do.
+    """
     if m == 0:
         return 0
     evaluate(K, K.clock[NOW], K.q, K.y)
@@ -22,7 +25,7 @@ def project_velocity(K: Any, m: int) -> int:
         K.force[i] = 0.0
     for k in range(K.n_rows):
         K.bias[k] = K.acc[o_rate + k]
-    status = solve_rows(K, m, True)
+    status = solve_rows(K, m, dropping)
     if status == 0:
         for i in range(K.n):
             K.y[i] += K.jump[i]
@@ -44,7 +47,7 @@ def take_over(K: Any, t1: float) -> None:
     K.clock[NOW] = t1
     for i in range(K.n_watched):
         K.guards0[i] = K.guards1[i]
-    if project_velocity(K, active_rows(K, K.closed)) == 0 and consistent(K, t1, K.q, K.y) == 0:
+    if project_velocity(K, active_rows(K, K.closed), True) == 0 and consistent(K, t1, K.q, K.y) == 0:
         for i in range(K.n):
             K.rate[i] = K.jump[i]
         for k in range(K.n_rows):
@@ -58,7 +61,7 @@ def leave_pose(K: Any, h: float, t1: float) -> int:
     """
     scheme_accept(K, h)
     K.clock[NOW] = t1
-    status = project_velocity(K, stepping_rows(K))
+    status = project_velocity(K, stepping_rows(K), False)
     if status == 0:
         status = consistent(K, t1, K.q, K.y)
     if status != 0:

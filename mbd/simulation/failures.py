@@ -67,7 +67,8 @@ def residuals_of(stepper: Stepper, block: Vector) -> dict[str, float]:
     code, n = stepper.modes[mode], stepper.values["n"]
     out = np.zeros(n + 2 * len(code.rows) + 1)
     with np.errstate(all="ignore"):
-        code.residual(block, stepper.values["params"], out)
+        program = getattr(code.residual, "program", code.residual)  # a replay watches that of the step
+        program(block, stepper.values["params"], out)
     return dict(zip(residual_names(stepper, code.rows), out.tolist(), strict=False))
 
 
