@@ -56,10 +56,13 @@ def complementarity(K: Any, level: int) -> int:
             choices += 1
             sets = min(sets * 3, 2 * MOST_CHOICES)
     measure_free(K, level)
+    nothing = NO_IMPACT
     for attempt in range(4 * choices * min(choices, 16) + MOST_NEWTON + 16):
         if attempt == MOST_NEWTON + 4 * min(choices, 4) + 8:
             pivoted(K, level)
         status = solve_branches(K, level)
+        if status == CONFLICT:
+            nothing = CONFLICT  # what held rows contradict is said rather than that no forces were found
         if status == CONFLICT and (give_way(K) == 1 or pivoted(K, level) == 1):
             continue
         if status != 0:
@@ -70,13 +73,13 @@ def complementarity(K: Any, level: int) -> int:
         elif change_one(K, attempt <= MOST_NEWTON + choices + 1) == 0:
             return status
     if sets > MOST_CHOICES:
-        return NO_IMPACT
+        return nothing
     for number in range(sets):
         choose(K, number)
         status = solve_branches(K, level)
         if status == 0 and worst(K, False) == 0:
             return status
-    return NO_IMPACT
+    return nothing
 
 
 def solve_branches(K: Any, level: int) -> int:

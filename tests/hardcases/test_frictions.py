@@ -25,8 +25,8 @@ def test_every_case_holds(case, scheme):
 @pytest.mark.parametrize(
     ("number", "wrong", "noticed"),
     [
-        (0, {"Coulomb": lambda torque: mbd.Coulomb(1.001 * torque)}, "observed order"),
-        (1, {"PinFriction": lambda mu, radius: mbd.PinFriction(1.002 * mu, radius)}, "observed order"),
+        (0, {"Coulomb": lambda torque: mbd.Coulomb(1.001 * torque)}, "order"),
+        (1, {"PinFriction": lambda mu, radius: mbd.PinFriction(1.002 * mu, radius)}, "order"),
         (2, {"numbers": lambda id, known=frictions.numbers: known(id) | {"mu": 1.2}}, "not told"),
     ],
 )
