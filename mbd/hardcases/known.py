@@ -4,29 +4,19 @@ from __future__ import annotations
 
 __all__ = ["KNOWN", "reason"]
 
-BRANCH = (
-    "next to a pose in which rows lose rank, Newton's tolerance on the rows of the stabilized form is divided by their "
-    "smallest singular value: velocities are kicked, and small steps stop"
-)
-LIGHT = (
-    "the stabilized form accepts joints that are open by its tolerance times the speed of the light mass, which is "
-    "hundreds of rad/s"
+UNEVEN = (
+    "the zone around a flat pose is entered at another distance with every step, which changes the small error by some "
+    "tenths of dt²: orders of 1.70 to 2.05 are observed, the error itself is a quarter of what is allowed"
 )
 LATE = (
     "just after a start or an impact the multiplier of index 3 is off by C dt ρ∞ⁿ, so that a release may be seen a "
     "step late at large steps; at T/148 it is exact"
 )
-NOT_ASKED = "an undamped scheme iterates to round-off whatever tolerance= says, so one that is too small is not refused"
-
-FOUR_BARS = tuple(f"b2-iftomm-a02-fourbar-N{count}" for count in (1, 2, 10))
 
 KNOWN: dict[tuple[str, str], str] = {
-    **{(case, scheme): BRANCH for case in FOUR_BARS for scheme in ("HHT", "generalized-alpha", "Newmark")},
-    **{("b2b-iftomm-a02-fourbar-N40", scheme): BRANCH for scheme in ("HHT", "generalized-alpha")},
-    **{("j3-slider-crank-equal-lengths", scheme): BRANCH for scheme in ("HHT", "generalized-alpha")},
-    **{("j4-mass-ratio-1e6", scheme): LIGHT for scheme in ("HHT", "generalized-alpha")},
+    ("b2-iftomm-a02-fourbar-N1", "HHT"): UNEVEN,
+    **{("b2b-iftomm-a02-fourbar-N40", scheme): UNEVEN for scheme in ("HHT", "generalized-alpha")},
     **{("j10-chatter-on-vibrating-table", scheme): LATE for scheme in ("HHT-index3", "generalized-alpha-index3")},
-    ("j1-tiny-steps-index3", "Newmark"): NOT_ASKED,
 }
 """Not an excuse: these fail, the command says so and its exit code is 1. A test complains once one of them holds."""
 
