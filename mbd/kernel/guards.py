@@ -39,6 +39,8 @@ __all__ = [
 ]  # fmt: skip
 
 
+DOUBTFUL = 0.25
+"""Part of the forces below which the sign of a multiplier of index 3 is asked of consistent accelerations [-]."""
 REST = 1e-12
 """Speed along a friction, relative to its terms, that is no turn: other rows may hold it still as it pulls [-]."""
 APART = 1e-6
@@ -232,8 +234,10 @@ def judge(K: Any, h: float) -> bool:
                 if bottom > 0.0 and hermite(g0, g1, d0, d1, bottom) < limit:
                     consider(K, GRAZE, c, bottom, 0.0)
         elif K.kind[c] == 0:
-            if K.opens[c] == 0 and K.lam1[K.normal[c]] > 0.0:
-                consider(K, OPEN_PULL, c, crossing(-K.lam[K.normal[c]], -K.lam1[K.normal[c]]), 0.0)
+            if K.opens[c] == 0:
+                pull = pull_of(K, c, h)
+                if pull > 0.0:
+                    consider(K, OPEN_PULL, c, crossing(-K.lam[K.normal[c]], -pull), 0.0)
         else:
             low = 0.0
             if g0 >= -tiny and d0 < 0.0:  # it closed just now; it opens after its deepest point
@@ -266,6 +270,22 @@ def judge_user(K: Any, e: int, h: float) -> None:
         consider(K, CROSS, e, top + (1.0 - top) * crossing(max(hermite(v0, v1, d0, d1, top), 0.0), v1), top)
     else:
         consider(K, CROSS, e, crossing(v0, v1) if v0 > 0.0 else 0.0, 0.0)
+
+
+def pull_of(K: Any, c: int, h: float) -> float:
+    """The multiplier of a closed contact at the candidate, positive where it pulls.
+
+    That of index 3 lags behind after a start; where it is small beside the forces the consistent one is asked.
+    """
+    pull = float(K.lam1[K.normal[c]])
+    if K.stabilized == 1 or K.strategy == 1:
+        return pull
+    force = 0.0
+    for i in range(K.n_v):
+        force = max(force, K.scale[i])
+    if abs(pull) < DOUBTFUL * force and consistent(K, K.clock[NOW] + h, K.q1, K.y1) == 0:
+        return float(K.impulse[K.normal[c]])
+    return pull
 
 
 def judge_friction(K: Any, f: int, h: float) -> None:
