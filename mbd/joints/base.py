@@ -129,6 +129,11 @@ class Joint(ABC):
     def faults(self) -> list[str]:
         """What is physically impossible about it, one sentence each."""
         faults = [fault for _, owner, loss in self.losses() for fault in loss.faults(owner)]
+        for place, owner, loss in self.losses():
+            if loss.needs_reaction and self.labels[place].unit != "rad":
+                faults.append(
+                    f"'{owner}': friction of a pin on '{self.labels[place].name}', which does not turn; use mbd.Coulomb"
+                )
         if self.stiffness < 0.0:
             faults.append(f"joint '{self.name}': stiffness {self.stiffness:g} is negative; give a value ≥ 0")
         if self.parent.body is self.child.body:
