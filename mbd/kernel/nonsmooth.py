@@ -35,6 +35,8 @@ from mbd.kernel.switching import close_by_impact, mark_touching
 
 __all__ = ["keep", "lands", "lets_go", "put_back", "rebound", "strike"]
 
+SUNK = 1e4
+"""Depth over the round-off of a gap at which a correction of positions has failed [-]."""
 MOST_LIFTS = 20
 """Corrections of positions at one instant [-]."""
 PULL = 1e-9
@@ -121,6 +123,7 @@ def lift(K: Any) -> int:
         along = c >= 0 and K.row_normal[k] == 0 and K.closed[c] == 0
         K.lifting[k] = 1 if (along or K.dropped[k] == 1) else 0
     status = NO_IMPACT
+    left = 0.0
     for _ in range(MOST_LIFTS):
         for c in range(K.n_contacts):
             near = K.closing[c] > 0 or K.closed[c] == 1
@@ -147,6 +150,8 @@ def lift(K: Any) -> int:
         K.slip[f] = K.limit[f]
     for k in range(K.n_rows):
         K.lifting[k] = 0
+    if status == 0 and left > SUNK:
+        return NO_IMPACT
     return status
 
 
