@@ -47,6 +47,15 @@ SHIMS = """
 def call(K, number, out):
     call_address(K.code[number], K.block, K.params, out)
 
+def scheme_step(K, h, t1):
+    return newmark_step(K, h, t1)
+
+def scheme_accept(K, h):
+    newmark_accept(K, h)
+
+def scheme_start(K):
+    return newmark_start(K)
+
 def entry(table):
     return advance(as_kernel(table))
 """
@@ -120,7 +129,8 @@ def ir_of_kernel() -> tuple[str, str]:
     numba: Any = import_module("numba")
     namespace: dict[str, Any] = {"__builtins__": __builtins__, **_numba_types()}
     exec(compile(SHIMS, "<kernel>", "exec"), namespace)
-    functions: dict[str, Any] = {"call": namespace["call"], "entry": namespace["entry"]}
+    shims = ("call", "scheme_step", "scheme_accept", "scheme_start", "entry")
+    functions: dict[str, Any] = {name: namespace[name] for name in shims}
     for module in ("fields", *MODULES):
         source = import_module(f"mbd.kernel.{module}")
         for name, value in vars(source).items():
@@ -131,8 +141,6 @@ def ir_of_kernel() -> tuple[str, str]:
     options = {"error_model": "numpy", "boundscheck": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
     for name, function in functions.items():
         namespace[name] = numba.njit(**options)(function)
-    for scheme, own in (("step", "newmark_step"), ("accept", "newmark_accept"), ("start", "newmark_start")):
-        namespace[f"scheme_{scheme}"] = namespace[own]
     namespace["entry"].compile(namespace["signature"])
     result = namespace["entry"].overloads[namespace["signature"]]
     return result.library.get_llvm_str(), result.fndesc.llvm_func_name

@@ -23,6 +23,7 @@ INTEGERS = (
     "impact_law",  # 0 Newton, 1 Poisson, 2 sequential
     "n_watched",  # guard values in all
     "loaded",  # 1: a friction follows multipliers other than linearly
+    "scheme",  # 0 Newmark family, 1 explicit Runge–Kutta, 2 Radau IIA
 )  # fmt: skip
 REALS = ("alpha_m", "alpha_f", "beta", "gamma", "tolerance", "rest_speed", "dt", "until", "end")
 REAL_ARRAYS = (
@@ -33,6 +34,7 @@ REAL_ARRAYS = (
     "q", "y", "rate", "aux", "slope", "lam", "lam_slope", "shift", "shift_change", "anchors",  # accepted state
     "q1", "y1", "rate1", "aux1", "lam1", "shift1",  # candidate of the step under judgement
     "kkt", "rhs", "work", "spare",  # linear algebra
+    "stages",  # what a scheme of several stages works on
     "turning",  # ∂ḣ/∂x of the active rows, stabilized only
     "basis", "lower", "mix",  # dependent rows as combinations of others
     "force", "bias", "jump", "impulse",  # complementarity: right-hand sides, velocity or acceleration, multipliers

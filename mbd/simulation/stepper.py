@@ -105,6 +105,7 @@ class Stepper:
             event_capacity=max(EVENT_CAPACITY, 8 * n_contacts + 16), chunk=1, hooks=0,
             rest_speed=float(options.get("rest_speed", 1e-6)), dt=dt, until=0.0, end=float(options.get("end", 0.0)),
             alpha_m=0.0, alpha_f=0.0, beta=0.25, gamma=0.5, tolerance=1e-9, jerk=1, exact=0,
+            scheme=0,
         )  # fmt: skip
         if isinstance(self.integrator, NewmarkFamily):
             c = self.integrator.coefficients
@@ -132,7 +133,7 @@ class Stepper:
             "given": rows, "total": rows, "total_jump": n, "loads": rows, "before": contacts, "past": rows,
             "past_limit": frictions, "trial": rows, "trial_given": rows, "trial_jump": n,
             "lcp_matrix": unknowns * unknowns, "lcp_shift": unknowns, "lcp_found": unknowns,
-            "lcp_work": lemke_places(unknowns), "lcp_limit": frictions, "lcp_slope": frictions,
+            "lcp_work": lemke_places(unknowns), "stages": 0, "lcp_limit": frictions, "lcp_slope": frictions,
             "kept": n_q + 2 * n + rows + v["n_watched"] + v["n_anchors"] + frictions,
             "store": v["capacity"] * v["width"], "log": v["event_capacity"] * v["event_width"],
         }  # fmt: skip
