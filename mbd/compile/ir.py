@@ -27,7 +27,7 @@ LARGE = 2500
 PART = 250
 """Operations of a part."""
 
-LIBRARY = ("acos", "asin", "atan", "atan2", "cos", "cosh", "exp", "log", "pow", "sin", "sinh", "tan", "tanh")
+LIBRARY = ("acos", "asin", "atan", "atan2", "cos", "cosh", "exp", "fmod", "log", "pow", "sin", "sinh", "tan", "tanh")
 """Functions of the C library that the code may call, by their C names."""
 
 ARITHMETIC = {"add": "fadd double", "sub": "fsub double", "mul": "fmul double", "div": "fdiv double"}

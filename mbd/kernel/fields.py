@@ -119,4 +119,4 @@ LOG_CLOSED, LOG_OPENED, LOG_EVENT, LOG_STUCK, LOG_SLIPPED = range(5)
 UNKNOWN = -9
 """State of a friction before the first restart, in `was`: what it begins with is no event [-]."""
 EPS = 2.220446049250313e-16
-"""Distance from 1 to the next double, as a literal for numba [-]."""
+"""Distance from 1 to the next double [-]."""

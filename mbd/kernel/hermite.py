@@ -13,9 +13,9 @@ def hermite_turn(g0: float, g1: float, d0: float, d1: float, rising: bool) -> fl
     if root < 0.0:
         return -1.0
     root = root**0.5
-    for sign in (-1.0, 1.0):
+    for attempt in range(2):
         far = b + root if b >= 0.0 else b - root
-        place = -2.0 * d0 / far if sign < 0.0 and far != 0.0 else (-far / (2.0 * a) if a != 0.0 else -1.0)
+        place = -2.0 * d0 / far if attempt == 0 and far != 0.0 else (-far / (2.0 * a) if a != 0.0 else -1.0)
         if 0.0 < place < 1.0:
             curvature = 2.0 * a * place + b
             if (curvature < 0.0) == rising:

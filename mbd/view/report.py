@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = ["machine", "record", "versions", "write"]
 
-LIBRARIES = ("numpy", "scipy", "sympy", "networkx", "llvmlite", "numba", "matplotlib")
+LIBRARIES = ("numpy", "scipy", "sympy", "networkx", "llvmlite", "matplotlib")
 
 
 def versions() -> dict[str, str | None]:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import ctypes
+import inspect
 import itertools
-import types
 from functools import lru_cache
 
 import numpy as np
-import pytest
 
+from mbd.compile.llvm import load_object
 from mbd.kernel import lemke as lemke_module, linear
+from mbd.kernel.build import constants_of, functions_of, object_of
 from mbd.kernel.lemke import lemke, lemke_places
+from mbd.kernel.translate import translate
 
 __all__ = ["compiled", "enumerated", "is_solution", "root", "solved"]
 
@@ -52,13 +55,16 @@ def root(rng, n, rank):
 
 @lru_cache(maxsize=1)
 def compiled():
-    """The same functions as machine code, options of the kernel."""
-    numba = pytest.importorskip("numba")
-    options = {"error_model": "numpy", "boundscheck": False}
-    namespace = {name: value for name, value in vars(lemke_module).items() if name.isupper()}
-    for module in (linear, lemke_module):
-        for name, value in vars(module).items():
-            if isinstance(value, types.FunctionType) and value.__module__ == module.__name__:
-                code = types.FunctionType(value.__code__, namespace, name, value.__defaults__)
-                namespace[name] = numba.njit(**options)(code)
-    return namespace["lemke"]
+    """The same functions as machine code, as in the kernel."""
+    functions = functions_of(*(inspect.getsource(module) for module in (linear, lemke_module)))
+    kinds = ["reals", "int", "reals", "reals", "reals", "ints", "int"]
+    text = translate(functions, constants_of("linear", "lemke"), "lemke", kinds)
+    address, number = ctypes.c_void_p, ctypes.c_int64
+    function = ctypes.CFUNCTYPE(number, address, number, address, address, address, address, number)(
+        load_object(object_of(text), "lemke")
+    )
+
+    def run(*arguments):
+        return function(*(one if isinstance(one, int) else one.ctypes.data for one in arguments))
+
+    return run

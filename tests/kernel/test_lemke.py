@@ -155,9 +155,3 @@ def test_machine_code_takes_the_same_path(n, rank, seed):
     plain, fast = solved(M, q), solved(M, q, function=compiled())
     assert plain[0] == fast[0]
     np.testing.assert_allclose(fast[1], plain[1], rtol=1e-9, atol=1e-9 * (1.0 + np.abs(plain[1]).max()))
-
-
-def test_it_compiles_for_the_bare_addresses_of_the_kernel():
-    kinds = pytest.importorskip("numba").types
-    reals, integers, count = kinds.CPointer(kinds.float64), kinds.CPointer(kinds.int64), kinds.int64
-    compiled().compile((reals, count, reals, reals, reals, integers, count))

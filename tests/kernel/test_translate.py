@@ -1,0 +1,159 @@
+"""Translated functions give the same bits as Python does, for everything the kernel may use."""
+
+from __future__ import annotations
+
+import ctypes
+import inspect
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+
+from mbd.compile.llvm import load_object
+from mbd.errors import CapabilityError
+from mbd.kernel.build import functions_of, object_of
+from mbd.kernel.translate import translate
+
+reals = st.lists(st.floats(-1e3, 1e3) | st.sampled_from([0.0, -0.0, np.inf, -np.inf, np.nan]), min_size=4, max_size=4)
+integers = st.lists(st.integers(-9, 9), min_size=4, max_size=4)
+HALF = 0.5
+MOST = 7
+
+
+def arithmetic(x, k):
+    x[0] = x[0] + x[1] * 2 - x[2] / 3.0
+    x[1] = -x[3] * HALF - float(k[0])
+    x[2] = abs(x[2]) + abs(k[1])
+    x[3] *= 0.25
+    x[3] += k[2]
+    k[0] = k[0] * k[1] - k[2]
+    k[3] -= MOST
+    return k[3]
+
+
+def rounding_down(x, k):
+    k[0] = k[0] // 3 + k[1] % 4
+    k[1] = k[1] // -2
+    k[2] = k[2] % -5
+    x[0] = k[3] % 1.0 + 0.6180339887498949 * k[0] % 1.0
+    x[1] = x[1] * 0.0 if not abs(x[1]) < 1e300 else x[1] % 0.75
+    k[3] = int(x[1]) if abs(x[1]) < 1e300 else 0
+    return 0
+
+
+def extremes(x, k):
+    x[0] = max(x[0], x[1], 0.0)
+    x[1] = min(x[1], x[2])
+    x[3] = max(x[3], k[3])
+    k[0] = max(k[0], 0, k[1])
+    k[1] = min(2, k[2])
+    return 0
+
+
+def decisions(x, k):
+    found = 0
+    if 0.0 < x[0] < x[1] <= 500.0:
+        found += 1
+    if x[0] == x[1] or (x[2] != x[2] and not k[0] > 0):
+        found += 2
+    elif k[0]:
+        found += 4
+    inside = k[1] >= 0 and k[1] < 4 and x[k[1]] > 0.0
+    kind = 8 if inside else (16 if x[3] >= 0.0 else 32)
+    mixed = x[1] if inside else 3
+    x[2] = mixed
+    k[3] = bool(x[3]) + int(k[2] == 1)
+    return found + kind
+
+
+def loops(x, k):
+    total = 0
+    for i in range(4):
+        if k[i] < 0:
+            continue
+        for j in range(i, -1, -1):
+            total += k[j]
+            if total > 12:
+                break
+    i = 0
+    while True:
+        i += 1
+        if x[i % 4] > 0.0 or i > 5:
+            break
+    for n in range(2, k[0]):
+        total = total + 2**n
+        n = 0
+    k[1] = i + total
+    return total
+
+
+def widening(x, k):
+    size = 0
+    for i in range(4):
+        if x[i] > size:
+            size = x[i]
+    x[0] = x[1] = size
+    return inner(x, k, size, k[0]) + inner(x, k, 1, 1)
+
+
+def inner(x, k, size: float, times: int) -> int:
+    values = x if times > 0 else whole(x)
+    values[3] = size / 2
+    for i in range(4):
+        if k[i] == times:
+            return i
+    return -1
+
+
+def whole(x):
+    x[2] = 0.0
+    return x
+
+
+CASES = (arithmetic, rounding_down, extremes, decisions, loops, widening)
+
+
+@lru_cache
+def machine_code(function):
+    functions = functions_of(*(inspect.getsource(one) for one in (function, inner, whole)))
+    name = f"translated_{function.__name__}"
+    functions[name] = functions.pop(function.__name__)
+    functions[name].name = name
+    text = translate(functions, {"HALF": HALF, "MOST": MOST}, name, ["reals", "ints"])
+    return ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p)(load_object(object_of(text), name))
+
+
+@pytest.mark.parametrize("function", CASES, ids=lambda function: function.__name__)
+@settings(max_examples=150)
+@given(x=reals, k=integers)
+def test_the_same_bits_as_python(function, x, k):
+    plain, fast = [(np.array(x), np.array(k, dtype=np.int64)) for _ in range(2)]
+    with np.errstate(all="ignore"):
+        expected = int(function(*plain))
+    found = machine_code(function)(*(array.ctypes.data for array in fast))
+    assert found == expected
+    numbers = ~np.isnan(plain[0])
+    np.testing.assert_array_equal(np.isnan(fast[0]), ~numbers)
+    np.testing.assert_array_equal(fast[0].view(np.int64)[numbers], plain[0].view(np.int64)[numbers])
+    np.testing.assert_array_equal(fast[1], plain[1])
+
+
+@pytest.mark.parametrize(
+    ("source", "message"),
+    [
+        ("def f(x):\n    return [1]", r"line 2: '\[1\]' is no expression"),
+        ("def f(x):\n    y = 1\n    return z", "line 3: 'z' has no value here"),
+        ("def f(x):\n    for i in x:\n        pass", "a loop over 'x', not over a range"),
+        ("def f(x):\n    x = 1.0", "one name for a value of kind 'reals' and one of kind 'real'"),
+        ("def f(x):\n    g(x)", "no function 'g'"),
+        ("def f(x):\n    f(x)", "'f' calls itself"),
+        ("def f(x):\n    with x:\n        pass", "no statement that the kernel may use"),
+        ("def f(x):\n    return x.size", "'x.size' is no field of the kernel"),
+        ("def f(x) -> int:\n    return x", "a value of kind 'reals' where one of kind 'int' is needed"),
+        ("def f(x):\n    return 3**int(x[0])", "a power of integers"),
+    ],
+)
+def test_what_the_kernel_may_not_use_is_named(source, message):
+    with pytest.raises(CapabilityError, match=message):
+        translate(functions_of(source), {}, "f", ["reals"])
