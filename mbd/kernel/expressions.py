@@ -299,7 +299,7 @@ class Expressions:
             return self._extreme(name, values)
         if name == "abs":
             return self._magnitude(values[0])
-        if name == "call":
+        if name in ("call", "call_on"):
             return self._model(values)
         symbol, kinds, result = self.callee(name, tuple(kind for _, kind in values))
         given = ", ".join(f"{LLVM[kind]} {self.cast(value, kind)}" for value, kind in zip(values, kinds, strict=True))
@@ -326,13 +326,15 @@ class Expressions:
         return self.emit(f"call i64 @llvm.abs.i64(i64 {self.cast(value, 'int')}, i1 true)"), "int"
 
     def _model(self, values: list[Value]) -> Value:
-        """``call(K, number, out)``: model code by its address, on the block, the parameters and `out`."""
-        (table, _), (number, _), (out, _) = values
-        fields = {}
-        for name in ("code", "block", "params"):
+        """``call(K, number, out)`` or ``call_on(K, number, numbers, out)``: model code by its address."""
+        (table, _), (number, _), *numbers, (out, _) = values
+        fields = []
+        for name in ("code", "params", "block"):
             place = self.emit(f"getelementptr inbounds i64, ptr {table}, i64 {PLACES[name]}")
-            fields[name] = self.emit(f"load ptr, ptr {place}, !invariant.load !0")
-        place = self.emit(f"getelementptr inbounds ptr, ptr {fields['code']}, i64 {number}")
-        code = self.emit(f"load ptr, ptr {place}")
-        self.lines.append(f"call void {code}(ptr {fields['block']}, ptr {fields['params']}, ptr {out})")
+            fields.append(self.emit(f"load ptr, ptr {place}, !invariant.load !0"))
+        code, params, block = fields
+        if numbers:
+            block = numbers[0][0]
+        place = self.emit(f"getelementptr inbounds ptr, ptr {code}, i64 {number}")
+        self.lines.append(f"call void {self.emit(f'load ptr, ptr {place}')}(ptr {block}, ptr {params}, ptr {out})")
         return "", "none"
