@@ -13,13 +13,15 @@ from collections.abc import Callable, Mapping
 from struct import pack
 
 from mbd.errors import CapabilityError
-from mbd.kernel.fields import FIELDS, INTEGERS, REAL_ARRAYS, REALS
+from mbd.kernel.fields import FIELDS, INTEGER_ARRAYS, INTEGERS, REAL_ARRAYS, REALS
 
-__all__ = ["LLVM", "Callee", "Expressions", "Function", "join"]
+__all__ = ["LLVM", "Callee", "Expressions", "Function", "join", "tags"]
 
 LLVM = {"bool": "i1", "int": "i64", "real": "double", "ints": "ptr", "reals": "ptr", "kernel": "ptr", "none": "void"}
 NUMBERS = ("bool", "int", "real")
 PLACES: dict[str, int] = {field: place for place, field in enumerate(FIELDS)}
+TAGS = {what: 2 * place + 3 for place, what in enumerate(("real", "int", *REAL_ARRAYS, *INTEGER_ARRAYS, "code"))}
+"""Numbers of LLVM's tags of memory, see `tags`."""
 ARITHMETIC = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul"}
 COMPARISONS = {
     ast.Lt: ("slt", "olt"), ast.LtE: ("sle", "ole"), ast.Gt: ("sgt", "ogt"), ast.GtE: ("sge", "oge"),
@@ -41,6 +43,18 @@ def join(a: str, b: str) -> str:
     if a in NUMBERS and b in NUMBERS:
         return max(a, b, key=NUMBERS.index)
     raise CapabilityError(f"one name for a value of kind {a!r} and one of kind {b!r}")
+
+
+def tags() -> str:
+    """What cannot share a place, in LLVM's words: reals and integers, and the arrays of any two fields of the kernel.
+
+    An array that is an argument or a local name may be that of any field of its kind.
+    """
+    lines = ["!0 = !{}", '!1 = !{!"kernel"}']
+    for what, tag in TAGS.items():
+        parent = 1 if what in ("real", "int") else TAGS["real" if what in REAL_ARRAYS else "int"] - 1
+        lines += [f'!{tag - 1} = !{{!"{what}", !{parent}}}', f"!{tag} = !{{!{tag - 1}, !{tag - 1}, i64 0}}"]
+    return "\n".join(lines)
 
 
 class Expressions:
@@ -158,24 +172,25 @@ class Expressions:
             kind = "reals" if node.attr in REAL_ARRAYS else "ints"
         return self.emit(f"load {LLVM[kind]}, ptr {place}, !invariant.load !0"), kind
 
-    def element(self, node: ast.Subscript) -> tuple[str, str]:
-        """Address and kind of an element of an array."""
+    def element(self, node: ast.Subscript) -> tuple[str, str, str]:
+        """Address of an element of an array, its kind, and what can be at that address: 'real', 'int', or a field."""
         array, kind = self.value(node.value)
         if kind not in ("ints", "reals"):
             raise CapabilityError(f"{ast.unparse(node.value)!r} is no array")
         own = kind[:-1]
         place = self.as_kind(node.slice, "int")
-        return self.emit(f"getelementptr inbounds {LLVM[own]}, ptr {array}, i64 {place}"), own
+        what = node.value.attr if isinstance(node.value, ast.Attribute) else own
+        return self.emit(f"getelementptr inbounds {LLVM[own]}, ptr {array}, i64 {place}"), own, what
 
-    def load(self, place: str, kind: str) -> str:
-        return self.emit(f"load {LLVM[kind]}, ptr {place}, !tbaa !{1 if kind == 'real' else 2}")
+    def load(self, place: str, kind: str, what: str) -> str:
+        return self.emit(f"load {LLVM[kind]}, ptr {place}, !tbaa !{TAGS[what]}")
 
-    def store(self, operand: str, place: str, kind: str) -> None:
-        self.lines.append(f"store {LLVM[kind]} {operand}, ptr {place}, !tbaa !{1 if kind == 'real' else 2}")
+    def store(self, operand: str, place: str, kind: str, what: str) -> None:
+        self.lines.append(f"store {LLVM[kind]} {operand}, ptr {place}, !tbaa !{TAGS[what]}")
 
     def _Subscript(self, node: ast.Subscript) -> Value:
-        place, kind = self.element(node)
-        return self.load(place, kind), kind
+        place, kind, what = self.element(node)
+        return self.load(place, kind, what), kind
 
     # operators ------------------------------------------------------------------------------------------------------
     def _BinOp(self, node: ast.BinOp) -> Value:

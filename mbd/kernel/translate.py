@@ -12,7 +12,7 @@ import ast
 from collections.abc import Mapping, Sequence
 
 from mbd.errors import CapabilityError
-from mbd.kernel.expressions import LLVM, Callee, Expressions, Function, join
+from mbd.kernel.expressions import LLVM, Callee, Expressions, Function, join, tags
 
 __all__ = ["translate"]
 
@@ -22,14 +22,7 @@ declare double @llvm.pow.f64(double, double)
 declare double @llvm.fabs.f64(double)
 declare double @llvm.copysign.f64(double, double)
 declare i64 @llvm.abs.i64(i64, i1)
-!0 = !{}
-!1 = !{!3, !3, i64 0}
-!2 = !{!4, !4, i64 0}
-!3 = !{!"real", !5}
-!4 = !{!"int", !5}
-!5 = !{!"kernel"}
 """
-"""Reals and integers never share a place (!tbaa); fields of the table do not change (!invariant.load)."""
 
 
 def translate(
@@ -61,7 +54,7 @@ class _Module:
 
     def text(self, entry: str, kinds: tuple[str, ...]) -> str:
         symbol, _, _ = self.callee(entry, kinds)
-        whole = "\n".join([HEAD, *self.texts])
+        whole = "\n".join([HEAD, tags(), *self.texts])
         return whole.replace(f"internal i64 @{symbol}(", f"i64 @{entry}(")
 
     def callee(self, name: str, given: tuple[str, ...]) -> Function:
@@ -142,8 +135,8 @@ class _Body(Expressions):
 
     def assign(self, target: ast.expr, value: tuple[str, str]) -> None:
         if isinstance(target, ast.Subscript):
-            place, kind = self.element(target)
-            self.store(self.cast(value, kind), place, kind)
+            place, kind, what = self.element(target)
+            self.store(self.cast(value, kind), place, kind, what)
         elif isinstance(target, ast.Name):
             kind = self.names[target.id] = join(self.names.get(target.id, value[1]), value[1])
             self.lines.append(f"store {LLVM[kind]} {self.cast(value, kind)}, ptr %own.{target.id}")
@@ -152,9 +145,9 @@ class _Body(Expressions):
 
     def _AugAssign(self, node: ast.AugAssign) -> None:
         if isinstance(node.target, ast.Subscript):
-            place, kind = self.element(node.target)
-            value = self.operation(node.op, (self.load(place, kind), kind), self.value(node.value))
-            self.store(self.cast(value, kind), place, kind)
+            place, kind, what = self.element(node.target)
+            value = self.operation(node.op, (self.load(place, kind, what), kind), self.value(node.value))
+            self.store(self.cast(value, kind), place, kind, what)
         else:
             own = ast.Name(ast.unparse(node.target), ast.Load())
             self.assign(node.target, self.operation(node.op, self.value(own), self.value(node.value)))
