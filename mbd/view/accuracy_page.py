@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import math
-import re
 from dataclasses import asdict
 from datetime import UTC, datetime
 from html import escape
-from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mbd.view.report import machine, versions
 from mbd.view.style import CYCLE
+from mbd.view.template import filled, written
 
 if TYPE_CHECKING:
     from mbd.analysis.accuracy import Accuracy, Point
@@ -23,20 +21,11 @@ __all__ = ["content", "write"]
 
 def write(found: Accuracy, path: str | Path) -> Path:
     """Write the page; see `Accuracy.page`."""
-    target = Path(path)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    target.write_text(html(found), encoding="utf-8")
-    return target
+    return written(html(found), path)
 
 
 def html(found: Accuracy) -> str:
     """The page as text."""
-    folder = resources.files("mbd.view") / "lab"
-
-    def text(name: str) -> str:
-        return folder.joinpath(name).read_text(encoding="utf-8")
-
-    data = json.dumps(content(found), separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
     known = versions()
     made = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
     told = f"mbd {known['mbd']}, Python {known['python']}, numpy {known['numpy']}, {machine()['processor']}; {made}"
@@ -48,11 +37,8 @@ def html(found: Accuracy) -> str:
         "<!--made-->": escape(told),
         "<!--rows-->": "\n".join(_row(p, not k) for scheme in found.schemes for k, p in enumerate(found.of(scheme))),
         "<!--heads-->": _heads(),
-        "/*style*/": text("page.css"),
-        "/*data*/": data,
-        "/*script*/": text("page.js"),
     }
-    return re.sub("|".join(map(re.escape, parts)), lambda mark: parts[mark.group()], text("page.html"))
+    return filled("lab", content(found), parts)
 
 
 def _heads() -> str:

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import json
-import re
 from html import escape
-from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +14,7 @@ from mbd.results.units import unit
 from mbd.view.plots import QUANTITIES, SPENT, stretches
 from mbd.view.scene import Instants, Scene, scene
 from mbd.view.style import CYCLE
+from mbd.view.template import filled, written
 
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
@@ -39,27 +37,12 @@ SCRIPTS = ("data.js", "stage.js", "charts.js", "controls.js")
 
 def write(run: Trajectory, path: str | Path) -> Path:
     """Write the page of a run; see `Trajectory.page`."""
-    target = Path(path)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    target.write_text(html(run), encoding="utf-8")
-    return target
+    return written(html(run), path)
 
 
 def html(run: Trajectory) -> str:
     """The page as text."""
-    folder = resources.files("mbd.view") / "player"
-
-    def text(name: str) -> str:
-        return folder.joinpath(name).read_text(encoding="utf-8")
-
-    data = json.dumps(content(run), separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
-    parts = {
-        "<!--title-->": escape(run.name),
-        "/*style*/": text("page.css"),
-        "/*data*/": data,
-        "/*script*/": "".join(text(name) for name in SCRIPTS),
-    }
-    return re.sub("|".join(map(re.escape, parts)), lambda mark: parts[mark.group()], text("page.html"))
+    return filled("player", content(run), {"<!--title-->": escape(run.name)}, SCRIPTS)
 
 
 def content(run: Trajectory) -> dict[str, Any]:

@@ -1,0 +1,39 @@
+"""Self-contained HTML pages: a folder's page.html with its style, its data and its script put in."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+__all__ = ["filled", "written"]
+
+
+def filled(folder: str, content: Any, parts: Mapping[str, str], scripts: Sequence[str] = ("page.js",)) -> str:
+    """The page of a folder of `mbd.view`.
+
+    content : what its script draws, as plain lists; parts : texts by the mark they replace; scripts : joined in order
+    """
+    place = resources.files("mbd.view") / folder
+
+    def text(name: str) -> str:
+        return place.joinpath(name).read_text(encoding="utf-8")
+
+    known = {
+        **parts,
+        "/*style*/": text("page.css"),
+        "/*data*/": json.dumps(content, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),
+        "/*script*/": "".join(text(name) for name in scripts),
+    }
+    return re.sub("|".join(map(re.escape, known)), lambda mark: known[mark.group()], text("page.html"))
+
+
+def written(page: str, path: str | Path) -> Path:
+    """Where the page was written; folders are made."""
+    target = Path(path)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    target.write_text(page, encoding="utf-8")
+    return target
