@@ -122,7 +122,7 @@ class Trajectory:
         """The energy ledger: kinetic, potential, and every part that changed them, with what is numerical apart."""
         if self._archive is not None:
             return self._archive.ledger
-        from mbd.analysis.energy import ledger
+        from mbd.results.energy import ledger
 
         return ledger(self._model_columns)
 

@@ -40,7 +40,7 @@ RANKS = [
 
 RANK = {part: rank for rank, parts in enumerate(RANKS) for part in parts}
 
-DOORS = {"model": ("equations", "analysis.mobility"), "trajectory": ("analysis", "view"), "results.ledger": ("view",)}
+DOORS = {"model": ("equations", "analysis.mobility"), "trajectory": ("view",), "results.ledger": ("view",)}
 """Methods of the objects in users' hands that only call a later stage, and import it when they are called."""
 
 FILES = sorted(file for file in PACKAGE.rglob("*.py") if file != PACKAGE / "__init__.py")

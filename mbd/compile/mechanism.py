@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from time import perf_counter
 from typing import Any
 
@@ -12,6 +13,7 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.compile.backend import Backend, Functions, backend as choose_backend
 from mbd.compile.layout import Layout
+from mbd.compile.python import ArrayFunction, array_function
 from mbd.equations import programs
 from mbd.equations.equations import Equations
 from mbd.errors import UnknownNameError, nearest
@@ -94,6 +96,12 @@ class Mechanism:
                 self._modes[key] = ModeCode(key[0], key[1], key[2], self.common[tangent], self.common[residual])
                 self.seconds += perf_counter() - started
             return self._modes[key]
+
+    @cached_property
+    def energies(self) -> ArrayFunction:
+        """T and V [J] at many states at once."""
+        with self.equations.tape.lock:
+            return array_function([self.equations.kinetic, self.equations.potential])
 
     @property
     def modes(self) -> int:

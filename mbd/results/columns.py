@@ -157,12 +157,12 @@ class ModelColumns(Columns):
         from mbd.compile.python import array_function
 
         unique = list({node.index: node for node in nodes}.values())
-        values = array_function(unique)(self._inputs(rows), self.record.parameters_at(rows.source))
+        values = array_function(unique)(self.inputs(rows), self.record.parameters_at(rows.source))
         found = {node.index: value for node, value in zip(unique, values, strict=True)}
         return [found[node.index] for node in nodes]
 
     @staticmethod
-    def _inputs(rows: Rows) -> Mapping[str, NDArray[Any]]:
+    def inputs(rows: Rows) -> Mapping[str, NDArray[Any]]:
         """The inputs of expressions, at the center of each chart (x = 0)."""
         return {
             "t": rows.time, "q": rows.q, "v": rows.v, "z": rows.z, "a": rows.a, "s": rows.s, "lam": rows.lam,

@@ -84,7 +84,7 @@ def simulate(
     ModelError, UnknownNameError, CapabilityError
         for arguments that cannot be honoured, all before the first step.
     SimulationError
-        if the run cannot go on.
+        if the run cannot go on, or if the scheme itself has more than doubled the energy of the mechanism.
     """
     scheme = integrator if integrator is not None else HHT(alpha=0.05)
     words = {"contact": contact, "impact": impact, "locate": locate, "on_failure": on_failure}

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbd.arrays import Vector
+from mbd.arrays import Matrix, Vector
 from mbd.results.columns import ModelColumns
 from mbd.results.ledger import Ledger, Part
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from mbd.equations.equations import Equations
     from mbd.tape.node import Node, Scalar
 
-__all__ = ["ledger"]
+__all__ = ["doubted_ledger", "kinds_of_work", "ledger"]
 
 ROUND_OFF = 1e-12
 """A part without a name of its own that stays below this share of the largest energy is not listed [-]."""
@@ -38,19 +38,39 @@ def ledger(columns: ModelColumns) -> Ledger:
     ----------
     columns : the run's states with the model's equations
     """
+    return doubted_ledger(columns)[0]
+
+
+def doubted_ledger(columns: ModelColumns) -> tuple[Ledger, Matrix]:
+    """The ledger, and how far the sum of its works may be off at every row (2, R) [J]: of those that give, and of all.
+
+    The doubt is Σ |Simpson − trapezoid| over all intervals and works: generous where the rows resolve the powers, and
+    as large as the works where they do not, as with rows many steps apart.
+    """
     equations = columns.equations
-    shares = 2.0 * equations.kinetic - _momentum_power(equations)
+    with equations.tape.lock:
+        shares = 2.0 * equations.kinetic - _momentum_power(equations)
+        powers = _powers(equations)
     kinetic, potential, moving = columns.evaluate([equations.kinetic, equations.potential, shares], columns.rows)
     total = kinetic + potential
-    powers = _powers(equations)
-    works = _integrals(columns, [power for _, _, power in powers])
+    works, doubt = _integrals(columns, [power for _, _, power in powers])
     named = [Part(name, kind, work) for (name, kind, _), work in zip(powers, works, strict=True)]
     moved = np.cumsum(np.where(_after_switch(columns), 0.0, np.diff(moving, prepend=moving[:1])))
     driven = any(kind == "drive" for _, kind, _ in powers)
     unnamed = [Part("moving coordinates", "drive", moved), *_jumps(columns, total, driven)]
     least = ROUND_OFF * float(np.max(np.abs(kinetic) + np.abs(potential), initial=0.0))
     kept = [part for part in unnamed if np.max(np.abs(part.energy), initial=0.0) > least]
-    return Ledger(columns.record.time, kinetic, potential, (*named, *kept), columns.record.settings.get("store", 1))
+    stride = columns.record.settings.get("store", 1)
+    return Ledger(columns.record.time, kinetic, potential, (*named, *kept), stride), doubt
+
+
+def kinds_of_work(equations: Equations) -> frozenset[str]:
+    """The kinds of everything that may change T + V while the mechanism moves smoothly: 'loss', 'applied', 'drive', …
+
+    Empty where nothing does; what belongs to moving coordinates is told as far as it depends on time explicitly.
+    """
+    with equations.tape.lock:
+        return frozenset(kind for _, kind, _ in _powers(equations))
 
 
 def _momentum_power(equations: Equations) -> Node:
@@ -106,16 +126,19 @@ def _powers(equations: Equations) -> list[tuple[str, str, Node]]:
     return [(name, kind, power) for (name, kind), power in found.items()]
 
 
-def _integrals(columns: ModelColumns, powers: Sequence[Node]) -> list[Vector]:
-    """∫ P dt from the first row to each row, by Simpson's rule; nothing is added across a switch."""
+def _integrals(columns: ModelColumns, powers: Sequence[Node]) -> tuple[list[Vector], Matrix]:
+    """∫ P dt from the first row to each, by Simpson's rule, and their doubts; nothing is added across a switch."""
     begin, places = columns.grid.middles()
     ends, middles = columns.evaluate(powers, columns.rows), columns.evaluate(powers, columns.between(places))
-    found = []
+    found, doubt = [], np.zeros((2, len(columns.record.time)))
     for end, middle in zip(ends, middles, strict=True):
         steps = np.zeros(len(columns.record.time))
         steps[begin + 1] = places.step / 6.0 * (end[begin] + 4.0 * middle + end[begin + 1])
+        off = np.abs(steps[begin + 1] - places.step / 2.0 * (end[begin] + end[begin + 1]))
+        gives = max(np.max(end, initial=0.0), np.max(middle, initial=0.0)) > 0.0
+        doubt[0 if gives else 1 :, begin + 1] += off
         found.append(np.cumsum(steps))
-    return found
+    return found, np.cumsum(doubt, axis=1)
 
 
 def _after_switch(columns: ModelColumns) -> Any:

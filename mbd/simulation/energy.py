@@ -1,0 +1,215 @@
+"""Whether the scheme itself has put energy into a mechanism: what no other test of a run tells.
+
+With E = T + V, the first row 0 and row k, what a mechanism has by right is
+
+``S_k = T_0 + max_{j ≤ k} (V_0 − V_j) + G_k``,  ``G_k = Σ_parts max_{j ≤ k} W_part,j``
+
+its energy of motion at the start, the potential that it has given off, and the works of forces, motors, drives, resets
+and impacts where they have given any. Where ``E_k − E_0 − G_k > S_k``, the scheme has more than doubled that: an error.
+Losses do not enter, so that one that rows integrate roughly cannot pass for a gain; the doubt about works is taken off.
+
+A glance at E in some of the rows comes first. Only where that looks strange is the ledger of all rows made.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from mbd.arrays import Matrix, Vector
+from mbd.compile.mechanism import Mechanism
+from mbd.results.columns import ModelColumns
+from mbd.results.energy import doubted_ledger, kinds_of_work
+from mbd.simulation.outcome import record_of, whole_record
+
+if TYPE_CHECKING:
+    from mbd.results.ledger import Ledger
+    from mbd.simulation.run import Run
+
+__all__ = ["EnergyWatch", "Judgement", "judgement"]
+
+FIRST_LOOK = 20000
+"""Stored rows after which a run that goes on is looked at; the next looks at four times as many, and at its end."""
+LOOKS = 4
+"""Looks at a run that goes on."""
+SPREAD, EARLY = 30, tuple(2**k for k in range(10))
+"""Rows of a look: so many from the last look to now, and the first rows of a run at these numbers."""
+TELLING = 0.1
+"""Share of the energy that a mechanism has, above which a note tells what the scheme gained or lost [-]."""
+LEAP = 100.0
+"""Rise of energy over all earlier swings that looks strange where something is driven [-]."""
+ROUND_OFF = 1e-9
+"""Share of the largest energies below which changes mean nothing [-]."""
+MOVED = 1e-6
+"""Way of the fastest coordinate [m, rad] below which a mechanism is at rest, and its energy round-off."""
+UNDRIVEN = frozenset({"loss", "penalty"})
+"""Kinds of works that take energy, or give back what they took."""
+
+KINDS: WeakKeyDictionary[Mechanism, frozenset[str]] = WeakKeyDictionary()
+"""What may change the energy of a mechanism, found when it is first looked at."""
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What the ledger says of a scheme.
+
+    row : the first row from which on the energy is the scheme's own, −1 if there is none
+    numerical : the most that the scheme has given (positive) or taken at a time [J]
+    owned : what the mechanism has by right at that row, or in all [J]
+    """
+
+    row: int
+    numerical: float
+    owned: float
+
+    @property
+    def share(self) -> float:
+        """numerical / owned [-]; 0 where neither is anything."""
+        return self.numerical / self.owned if self.owned > 0.0 else 0.0
+
+
+def judgement(ledger: Ledger, doubt: Matrix, way: Vector) -> Judgement:
+    """Judge a scheme by the ledger, its doubts (2, R) [J] and the largest way of a coordinate since the start (R,).
+
+    A row alone, as next to a pose in which rows lose rank, is no verdict: of those from the first one on, at least two
+    and at least half must say the same.
+    """
+    given = sum((np.maximum.accumulate(np.maximum(part.energy, 0.0)) for part in ledger.parts), np.zeros(len(way)))
+    fallen = np.maximum.accumulate(ledger.potential[0] - ledger.potential)
+    owned = ledger.kinetic[0] + fallen + given
+    noise = ROUND_OFF * np.maximum.accumulate(np.abs(ledger.kinetic) + np.abs(ledger.potential))
+    moves = np.maximum.accumulate(way) > MOVED
+    gain = np.where(moves, np.maximum(ledger.total - ledger.total[0] - given - noise - doubt[0], 0.0), 0.0)
+    loss = np.where(moves, np.maximum(-ledger.numerical - noise - doubt[1], 0.0), 0.0)
+    bad = gain > owned
+    rest = np.cumsum(bad[::-1])[::-1]  # bad rows from each on
+    firm = bad & (rest >= 2) & (2 * rest >= np.arange(len(bad), 0, -1))
+    if firm.any():
+        row = int(np.argmax(firm))
+        return Judgement(row, float(np.max(ledger.numerical[row:])), float(owned[row]))
+    most, least = float(np.max(gain)), float(np.max(loss))
+    return Judgement(-1, most if most >= least else -least, float(owned[-1]))
+
+
+class EnergyWatch:
+    """Looks at the energy of a run now and then.
+
+    Attributes
+    ----------
+    problem, note : what was found, in a sentence; '' if nothing
+    rows, ledgers : rows in which T + V was evaluated, and ledgers made
+    """
+
+    def __init__(self) -> None:
+        self.problem = self.note = ""
+        self.rows = self.ledgers = 0
+        self._due, self._looks, self._upto = FIRST_LOOK, 0, 0
+        self._seen = np.zeros((0, 3))  # T, V and the way of the fastest coordinate, of the rows looked at so far
+        self._cleared = 0.0  # a rise of energy that a ledger has explained
+
+    def is_due(self, run: Run) -> bool:
+        """Whether a run that goes on is to be looked at now."""
+        return run.stored >= self._due and self._looks < LOOKS
+
+    def judge(self, run: Run) -> str:
+        """Look at the run as far as it is stored; a sentence if the energy is the scheme's own, '' otherwise."""
+        if self.problem or run.stored < 2 or run.values["n_v"] == 0:
+            return self.problem
+        self._look(run)
+        if not self._looks_strange(run):
+            return ""
+        columns = ModelColumns(whole_record(run), run.mechanism.equations)
+        with np.errstate(all="ignore"):
+            ledger, doubt = doubted_ledger(columns)
+            found = judgement(ledger, doubt, _way(columns.record.q, columns.record.q[0]))
+        self.ledgers += 1
+        self._cleared = float(np.nanmax(ledger.total - ledger.total[0]))
+        if found.row >= 0:
+            self.problem = _sentence(run, found)
+        elif abs(found.share) > TELLING:
+            self.note = _note(found)
+        return self.problem
+
+    def _look(self, run: Run) -> None:
+        """Evaluate T and V at some rows that were not looked at yet."""
+        rows = np.linspace(min(self._upto, run.stored - 1), run.stored - 1, SPREAD).astype(np.intp)
+        early = np.array(EARLY if self._looks == 0 else (), dtype=np.intp)
+        chosen = np.unique(np.concatenate([rows, early[early < run.stored]]))
+        record = record_of(run, run.table[chosen])
+        inputs = ModelColumns.inputs(record.rows(np.zeros((len(chosen), run.values["n_anchors"]))))
+        with np.errstate(all="ignore"):
+            kinetic, potential = run.mechanism.energies(inputs, record.parameters_at(chosen))
+        way = _way(record.q, run.table[0, 1 : 1 + run.values["n_q"]])
+        self._seen = np.concatenate([self._seen, np.column_stack([kinetic, potential, way])])
+        self.rows += len(chosen)
+        self._upto, self._due, self._looks = run.stored, 4 * max(self._due, run.stored // 4), self._looks + 1
+
+    def _looks_strange(self, run: Run) -> bool:
+        """Whether only the ledger can tell that the energies seen are right."""
+        kinetic, potential, way = self._seen.T
+        if np.max(way) <= MOVED:
+            return False
+        total = kinetic + potential
+        fallen = np.maximum.accumulate(potential[0] - potential)
+        noise = ROUND_OFF * np.max(np.abs(self._seen[:, :2]))
+        owned = kinetic[0] + fallen
+        rise = total - total[0]
+        risen = ~(rise <= np.maximum(TELLING * owned + noise, 2.0 * self._cleared))  # NaN is strange too
+        sunk = rise < -TELLING * owned[-1] - noise
+        if not (risen.any() or sunk.any()):
+            return False
+        kinds = _kinds(run.mechanism)
+        if kinds <= UNDRIVEN:
+            sudden = bool(run.parameter_changes) or any(event.kind in ("closed", "event") for event in run.events)
+            return bool(risen.any()) or not (kinds or sudden)
+        swing = kinetic[0] + _swing(kinetic) + _swing(potential)
+        leaps = rise[1:] > LEAP * swing[:-1]
+        return bool(np.any(leaps[3:] & risen[4:]))
+
+
+def _way(q: Vector, start: Vector) -> Vector:
+    """The largest way of a coordinate from the start, at each row (R,) [m, rad]."""
+    return np.asarray(np.max(np.abs(q - start), axis=1, initial=0.0))
+
+
+def _swing(values: Vector) -> Vector:
+    """Highest less lowest value up to each row."""
+    return np.asarray(np.maximum.accumulate(values) - np.minimum.accumulate(values))
+
+
+def _kinds(mechanism: Mechanism) -> frozenset[str]:
+    if mechanism not in KINDS:
+        KINDS[mechanism] = kinds_of_work(mechanism.equations)
+    return KINDS[mechanism]
+
+
+def _sentence(run: Run, found: Judgement) -> str:
+    """Since when, how much, which coordinate moves fastest, and what to try."""
+    v = run.values
+    table = run.table[: found.row + 1]
+    first = 1 + v["n_q"]
+    speeds = np.abs(table[:, first : first + v["n_v"]])
+    changes = np.abs(table[:, first + v["n"] : first + v["n"] + v["n_v"]])
+    fastest = int(np.argmax(np.nan_to_num(speeds[-1])))
+    name = run.mechanism.equations.velocity_names[fastest].removesuffix(".rate")
+    top = float(np.max(speeds[:, fastest]))
+    turn = run.dt * float(np.max(changes[:, fastest])) / top if top > 0.0 else 1.0  # share of v that a step changes
+    way, finer = speeds[-1, fastest] * run.dt, 0.1 * run.dt / max(1.0, turn)
+    return (
+        f"t = {table[-1, 0]:.9g} s: from here on the energy is not the mechanism's: the scheme itself has put up to "
+        f"{found.numerical:.3g} J into a mechanism that had {found.owned:.3g} J of its own to move with by then; dt = "
+        f"{run.dt:g} s does not resolve the motion, of which {name!r} is the fastest, {way:.3g} in one step; try dt "
+        f"below {finer:.1g} s, or a larger mass or a softer stiffness there"
+    )
+
+
+def _note(found: Judgement) -> str:
+    done, what = ("put", "into") if found.numerical > 0.0 else ("taken", "from")
+    share = 100.0 * abs(found.share)
+    return (
+        f"the scheme itself has {done} up to {abs(found.numerical):.3g} J {what} a mechanism that had "
+        f"{found.owned:.3g} J of its own to move with ({share:.2g} %): see run.energy.numerical, and use a smaller dt"
+    )

@@ -1,0 +1,81 @@
+"""What a run tells its user in ``stats["notes"]``: what happened on purpose but might surprise."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mbd.equations.equations import Contact
+from mbd.kernel import fields as F
+from mbd.simulation.redundant import redundancy
+
+if TYPE_CHECKING:
+    from mbd.simulation.run import Run
+
+__all__ = ["notes_of"]
+
+RESOLVED = 10.0
+"""Steps that a penalty contact must last to be resolved at all."""
+
+COUNTED = (
+    (
+        F.SHORTENED,
+        "{count} steps were shortened where Newton's method or the impact law failed at the full dt, or where a step "
+        "would have ended too close to a pose in which rows lose rank",
+    ),
+    (
+        F.CAREFUL,
+        "poses in which rows lose rank were passed: {count} steps next to them held positions alone on the rows; their "
+        "velocities and multipliers are less accurate",
+    ),
+    (
+        F.STRONGE,
+        "{count} impacts took Stronge's energetic restitution, where the {impact} law would have created energy",
+    ),
+    (
+        F.ENDLESS,
+        "{count} times contacts struck by turns without end at one instant; they were closed together, which is the "
+        "limit of these impacts",
+    ),
+)
+"""Places of the kernel's counts, and what to say where they are not zero."""
+
+
+def notes_of(run: Run) -> list[str]:
+    """The notes of a run that is over, in sentences."""
+    notes = list(run.mechanism.notes)
+    dependent = redundancy(run.mechanism.equations.rows, run.stepper.dependent)
+    notes += [dependent] if dependent else []
+    counts, impact = run.values["counts"], run.settings["impact"]
+    notes += [text.format(count=int(counts[place]), impact=impact) for place, text in COUNTED if counts[place]]
+    notes += [run.energy.note] if run.energy.note else []
+    for number, contact in enumerate(run.manager.contacts):
+        notes += _ignored(run, number, contact) + _short_touch(run, contact)
+    return notes
+
+
+def _ignored(run: Run, number: int, contact: Contact) -> list[str]:
+    """A contact that lay below its surface or went into it while it was left out on purpose."""
+    deepest, sinking = run.values["deepest"][number], run.values["sinking"][number]
+    notes = []
+    if deepest < -1e-9:
+        notes.append(f"{contact.name!r} lay up to {-deepest:.3g} {contact.unit} below its surface while ignored")
+    if np.isfinite(sinking):
+        notes.append(f"{contact.name!r} was released at t = {sinking:.6g} s while moving into its surface")
+    return notes
+
+
+def _short_touch(run: Run, contact: Contact) -> list[str]:
+    """A penalty contact over within a few steps is not resolved: its energy is anyone's guess."""
+    if contact.kind != "penalty":
+        return []
+    times = [(event.kind, event.time) for event in run.events if event.name == contact.name]
+    spans = [b[1] - a[1] for a, b in pairwise(times) if (a[0], b[0]) == ("closed", "opened")]
+    if not spans or min(spans) >= RESOLVED * run.dt:
+        return []
+    return [
+        f"{contact.name!r} closed for {min(spans) / run.dt:.2g} steps only, too few: its peak force and energy "
+        f"are not resolved; use dt below {min(spans) / 20.0:.2g} s, a softer stiffness, or mbd.Unilateral"
+    ]
