@@ -199,7 +199,7 @@ def _refused(names: dict[str, Any]) -> list[str]:
     if not isinstance(scheme, Integrator):
         return []
     options = {name: names[name] for name in OPTIONS if name in names}
-    return refusals(names["model"], mechanism_of(names["model"]).equations, scheme, options)
+    return refusals(mechanism_of(names["model"]).equations, scheme, options)
 
 
 def examples_command(arguments: argparse.Namespace) -> int:

@@ -18,11 +18,12 @@ from mbd.errors import ModelError
 from mbd.integrators.hht import HHT
 from mbd.kernel import fields as F
 from mbd.kernel.active_set import ActiveSetManager
-from mbd.kernel.redundancy import find_dependent, spread
+from mbd.kernel.redundancy import find_dependent, sharing, spread
 from mbd.kernel.restart import active_rows
 from mbd.kernel.settle import settle
 from mbd.simulation.arguments import fits
 from mbd.simulation.plain import MechanismSystem
+from mbd.simulation.shares import shares
 from mbd.simulation.stepper import Stepper
 from mbd.state import State
 
@@ -99,6 +100,24 @@ class Instant:
         """The lines of a matrix that belong to independent rows."""
         return np.asarray(matrix[~np.array(self.dependent, dtype=bool)])
 
+    def forces(self, terms: LinearTerms) -> Matrix:
+        """(N, kept) what the multipliers of the independent rows do to the balance.
+
+        While a friction slides, the rows that depend on them take their shares of a load, as in a run; they are held.
+        """
+        R = self.kept(terms.R.T).T
+        if not (self.sliding and any(self.dependent)):
+            return R
+        state, system = self.state, self.system
+        there = self.mechanism.acceleration_terms(
+            state.time, state.q, np.concatenate([state.v, state.z]), system.parameters, system.anchors,
+            slips=system.slip, lam=self.lam,
+        )  # fmt: skip
+        flags = np.array(self.dependent, dtype=bool)
+        kept, dependent = np.array(self.rows)[~flags], np.array(self.rows)[flags]
+        part = shares(self.mechanism.equations.rows, there, kept.tolist(), dependent.tolist())
+        return np.asarray(R + terms.R[:, flags] @ part)
+
 
 def instant(model: Any, state: State, parameters: Mapping[str, float] | None = None, backend: str = "auto") -> Instant:
     """Accelerations and multipliers of the contacts that are closed in a state; frictions at rest stick if they can.
@@ -124,7 +143,7 @@ def instant(model: Any, state: State, parameters: Mapping[str, float] | None = N
     if opened:
         raise ModelError([_pulls(name) for name in opened])
     find_dependent(K, active_rows(K, K.closed))
-    if K.state[F.N_DROPPED] > 0:
+    if K.state[F.N_DROPPED] > 0 and not sharing(K):
         spread(K, K.lam)
     rows = manager.active_rows(flags, K.sticks)
     layout = mechanism.layout

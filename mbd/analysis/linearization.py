@@ -217,7 +217,7 @@ def _motion(found: Instant, terms: LinearTerms, n_v: int) -> Matrix:
     n, B = len(terms.r), found.kept(terms.B)
     m = len(B)
     still = np.zeros((m, n - n_v))
-    matrix = np.block([[terms.M, found.kept(terms.R.T).T], [B, still, np.zeros((m, m))]]) if m else terms.M
+    matrix = np.block([[terms.M, found.forces(terms)], [B, still, np.zeros((m, m))]]) if m else terms.M
     place, speed = found.kept(terms.change_place), found.kept(terms.change_speed)
     right = np.vstack([np.hstack([terms.K, terms.C]), np.hstack([place, speed, still])])
     full = np.zeros((n_v + n, n_v + n))

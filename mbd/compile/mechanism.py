@@ -23,20 +23,25 @@ __all__ = ["AccelerationTerms", "Mechanism", "ModeCode", "rate_names"]
 
 @dataclass(frozen=True)
 class ModeCode:
-    """Code of one contact mode: Newton tangent with residual, and residual alone."""
+    """Code of one contact mode: Newton tangent with residual, and residual alone.
+
+    borne : rows that depend on `rows`; their multipliers are given and act
+    """
 
     rows: tuple[int, ...]
     penalties: tuple[int, ...]
     sliding: tuple[int, ...]
     tangent: Any
     residual: Any
+    borne: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
 class AccelerationTerms:
     """The parts of ``M a + f + R λ = 0``, ``h``, ``ḣ``, ``ḧ = B a + bias`` of all rows, and what closing contacts hold.
 
-    M (n, n), f (n,), R (n, n_rows), B (n_rows, n), h, rate, bias (n_rows,), captured (n_anchors,), kinetic [J].
+    M (n, n), f (n,), R (n, n_rows), B (n_rows, n), h, rate, bias (n_rows,), captured (n_anchors,), kinetic [J],
+    limits (n_frictions,) largest frictions [N, N m].
     """
 
     M: Vector
@@ -48,6 +53,7 @@ class AccelerationTerms:
     bias: Vector
     captured: Vector
     kinetic: float
+    limits: Vector
 
 
 class Mechanism:
@@ -75,25 +81,33 @@ class Mechanism:
         self.vector = composed is None
         self.named: dict[str, Any] = {}
         self.notes: list[str] = []
-        self._modes: dict[tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...], bool], ModeCode] = {}
+        self._modes: dict[tuple[tuple[int, ...], ...], ModeCode] = {}
         self.seconds = perf_counter() - started
 
     def mode(
-        self, rows: Sequence[int], penalties: Sequence[int], stabilized: bool, sliding: Sequence[int] = ()
+        self,
+        rows: Sequence[int],
+        penalties: Sequence[int],
+        stabilized: bool,
+        sliding: Sequence[int] = (),
+        borne: Sequence[int] = (),
     ) -> ModeCode:
-        """Code of the mode with these rows, penalty contacts and sliding frictions, made on first use."""
-        key = (tuple(rows), tuple(penalties), tuple(sliding), stabilized)
+        """Code of the mode with these rows, penalty contacts and sliding frictions, made on first use.
+
+        borne : rows that depend on those, with given multipliers
+        """
+        key = (tuple(rows), tuple(penalties), tuple(sliding), tuple(borne), (int(stabilized),))
         with self.equations.tape.lock:  # runs in other threads share this mechanism
             if key not in self._modes:
                 started = perf_counter()
                 tangent, residual = f"tangent_{len(self._modes)}", f"residual_{len(self._modes)}"
                 self.common.add(
                     {
-                        tangent: programs.newton(self.equations, rows, penalties, stabilized, sliding),
-                        residual: programs.residual(self.equations, rows, penalties, stabilized, sliding),
+                        tangent: programs.newton(self.equations, rows, penalties, stabilized, sliding, borne),
+                        residual: programs.residual(self.equations, rows, penalties, stabilized, sliding, borne),
                     }
                 )
-                self._modes[key] = ModeCode(key[0], key[1], key[2], self.common[tangent], self.common[residual])
+                self._modes[key] = ModeCode(key[0], key[1], key[2], self.common[tangent], self.common[residual], key[3])
                 self.seconds += perf_counter() - started
             return self._modes[key]
 
@@ -158,19 +172,25 @@ class Mechanism:
     ) -> AccelerationTerms:
         """M, f, R, B, h, ḣ, bias at a state; R follows multipliers `lam` where frictions slide (signs `slips`)."""
         layout = self.layout
-        n, rows = layout.n, layout.n_rows
-        out = np.zeros(self.sizes["accelerations"])
         block = self.block(t, q, y, anchors, penalties)
         if slips is not None:
             block[layout.slip : layout.size] = slips
         if lam is not None:
             block[layout.lam : layout.anchor] = lam
+        return self.terms_of(block, parameters)
+
+    def terms_of(self, block: Vector, parameters: Vector) -> AccelerationTerms:
+        """The same at the inputs in a block; its accelerations and multipliers enter no more than R and the limits."""
+        layout = self.layout
+        n, rows = layout.n, layout.n_rows
+        out = np.zeros(self.sizes["accelerations"])
         self.common["accelerations"](block, parameters, out)
         cuts = np.cumsum([n * n, n, n * rows, rows * n, rows, rows, rows, layout.n_anchors, 1])
-        M, f, R, B, h, rate, bias, captured, kinetic, _ = np.split(out, cuts)
+        M, f, R, B, h, rate, bias, captured, kinetic, limits = np.split(out, cuts)
         return AccelerationTerms(
-            M.reshape(n, n), f, R.reshape(n, rows), B.reshape(rows, n), h, rate, bias, captured, float(kinetic[0])
-        )
+            M.reshape(n, n), f, R.reshape(n, rows), B.reshape(rows, n), h, rate, bias, captured, float(kinetic[0]),
+            limits,
+        )  # fmt: skip
 
     @property
     def sizes(self) -> dict[str, int]:

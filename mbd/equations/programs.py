@@ -35,9 +35,16 @@ __all__ = [
 
 
 def newton(
-    equations: Equations, rows: Sequence[int], penalties: Sequence[int], stabilized: bool, sliding: Sequence[int] = ()
+    equations: Equations,
+    rows: Sequence[int],
+    penalties: Sequence[int],
+    stabilized: bool,
+    sliding: Sequence[int] = (),
+    borne: Sequence[int] = (),
 ) -> list[Node]:
     """Tangent and residual of one Newton iteration of the Newmark family.
+
+    The rows `borne` take part with their multipliers alone, which are given.
 
     ``K = [S  ∂r/∂λ; B̃  0]`` with ``S = M + c_C C_t + c_K K_t`` from one forward sweep a column, and
     ``B̃ = B`` (index 3) or ``B + (c_K/c_C) ∂ḣ/∂x`` (stabilized, and rows on velocities in both); the columns of
@@ -45,7 +52,7 @@ def newton(
     """
     inputs = Inputs.of(equations)
     rows = sorted(rows)
-    r = balance_with(equations, rows, penalties, sliding)
+    r = balance_with(equations, sorted({*rows, *borne}), penalties, sliding)
     B = constraint_jacobian(equations, rows)
     bottom, turning = list(B), list[Node]()
     fast = [place for place, k in enumerate(rows) if stabilized or equations.rows[k].is_velocity]
@@ -68,11 +75,17 @@ def newton(
 
 
 def residual(
-    equations: Equations, rows: Sequence[int], penalties: Sequence[int], stabilized: bool, sliding: Sequence[int] = ()
+    equations: Equations,
+    rows: Sequence[int],
+    penalties: Sequence[int],
+    stabilized: bool,
+    sliding: Sequence[int] = (),
+    borne: Sequence[int] = (),
 ) -> list[Node]:
-    """r | h | ḣ of one contact mode."""
+    """r | h | ḣ of one contact mode; of the rows `borne` only the given multipliers."""
     rows = sorted(rows)
-    return balance_with(equations, rows, penalties, sliding) + _levels(equations, rows, stabilized)
+    r = balance_with(equations, sorted({*rows, *borne}), penalties, sliding)
+    return r + _levels(equations, rows, stabilized)
 
 
 def _levels(equations: Equations, rows: Sequence[int], stabilized: bool) -> list[Node]:

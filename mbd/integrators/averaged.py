@@ -49,7 +49,8 @@ class AveragedStep:
             mass = np.asarray(self._evaluate(t1, x, y1, a1, lam, (0.0, 0.0)).S)
             r = (1.0 - alpha) * terms.r + alpha * (mass @ a1 + force0)
             scale = np.max(np.abs(mass) @ np.abs(a1)) + np.max(np.abs(force0), initial=0.0) + 1e-300
-            error = float(np.max(np.abs(r)) / (1e-3 * self.scheme.tolerance * scale))
+            terms_of_r = 0.0 if terms.scale_r is None else float(np.max(terms.scale_r))  # at rest they cancel
+            error = float(np.max(np.abs(r)) / max(1e-3 * self.scheme.tolerance * scale, 16.0 * EPS * terms_of_r))
             fast = np.zeros(len(terms.h), bool) if terms.velocity is None else np.asarray(terms.velocity, dtype=bool)
             held = np.where(fast, terms.rate, terms.h)
             error = max(error, float(np.max(np.abs(held), initial=0.0)) / (64.0 * EPS))

@@ -23,8 +23,8 @@ __all__ = ["MODULES", "constants_of", "entry", "functions_of", "kernel_object", 
 ENTRY = "mbd_kernel"
 
 MODULES = (
-    "linear", "lemke", "redundancy", "restart", "pivoting", "complementarity", "blow", "impact", "settle", "iteration",
-    "passage", "newmark", "hermite", "guards", "locate", "switching", "nonsmooth", "takeover", "advance",
+    "linear", "lemke", "redundancy", "saddle", "restart", "pivoting", "complementarity", "blow", "impact", "settle",
+    "iteration", "passage", "newmark", "hermite", "guards", "locate", "switching", "nonsmooth", "takeover", "advance",
 )  # fmt: skip
 
 APART = ("factor", "solve")

@@ -15,16 +15,9 @@ from typing import Any
 
 from mbd.kernel.fields import BLOCKED, CONFLICT, N_DROPPED, NO_IMPACT, PAST_TIME
 from mbd.kernel.pivoting import pivoted
-from mbd.kernel.redundancy import spread
-from mbd.kernel.restart import (
-    MOST_LOADS,
-    active_rows,
-    evaluate_loaded,
-    limit_of,
-    load_accelerations,
-    refresh_scales,
-    solve_rows,
-)
+from mbd.kernel.redundancy import sharing, spread
+from mbd.kernel.restart import MOST_LOADS, active_rows, evaluate_loaded, limit_of, load_accelerations, refresh_scales
+from mbd.kernel.saddle import solve_rows
 
 __all__ = ["complementarity"]
 
@@ -90,17 +83,22 @@ def solve_branches(K: Any, level: int) -> int:
     status = 0
     for _ in range(MOST_LOADS):
         evaluate_loaded(K, whole(K, level))
+        find_limits(K, level)
         load(K, level)
         status = solve_rows(K, active_rows(K, K.active), True)
         if status != 0:
             return status
-        if evaluate_loaded(K, whole(K, level)) < 1e-13 or K.loaded == 0:
+        change = evaluate_loaded(K, whole(K, level))
+        if change < 1e-13 or (K.loaded == 0 and not sharing(K)):
             break
     find_limits(K, level)
-    if K.state[N_DROPPED] > 0:
-        spread(K, K.impulse)
-        evaluate_loaded(K, whole(K, level))
-        find_limits(K, level)
+    if K.state[N_DROPPED] > 0 and not sharing(K):
+        for _ in range(MOST_LOADS):  # frictions that hold together share by their limits, which follow their loads
+            spread(K, K.impulse)
+            change = evaluate_loaded(K, whole(K, level))
+            find_limits(K, level)
+            if change < 1e-13:
+                break
     for f in range(K.n_frictions):
         if slides(K, f):
             row = K.friction_row[f]

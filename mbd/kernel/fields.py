@@ -36,7 +36,7 @@ REAL_ARRAYS = (
     "kkt", "rhs", "work", "spare",  # linear algebra
     "stages",  # what a scheme of several stages works on
     "turning",  # ∂ḣ/∂x of the active rows, stabilized only
-    "basis", "lower", "mix",  # dependent rows as combinations of others
+    "basis", "lower", "mix", "shares",  # dependent rows as combinations of others, and what they bear of their loads
     "force", "bias", "jump", "impulse",  # complementarity: right-hand sides, velocity or acceleration, multipliers
     "slip", "limit", "base_limit",  # frictions: sign of sliding, largest, at zero multipliers
     "lean",  # frictions: the direction in which each slid last

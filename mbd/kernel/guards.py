@@ -30,8 +30,7 @@ from mbd.kernel.fields import (
 )  # fmt: skip
 from mbd.kernel.hermite import crossing, hermite, hermite_turn
 from mbd.kernel.hooks import call, scheme_step
-from mbd.kernel.redundancy import spread
-from mbd.kernel.restart import compose, consistent, evaluate_loaded, fill_block, limit_of
+from mbd.kernel.restart import compose, consistent, evaluate_loaded, fill_block, limit_of, share_out
 
 __all__ = [
     "frictions_at", "gap_scale", "gap_tolerance", "guard_value", "is_watched", "judge", "try_step", "update_armed",
@@ -67,11 +66,11 @@ def try_step(K: Any, h: float, t1: float) -> int:
         status = scheme_step(K, h, t1)
         if status != 0:
             return status
-        if K.state[N_DROPPED] > 0:  # the step was solved without them; their multipliers get the least norm
+        if K.state[N_DROPPED] > 0:  # a scheme leaves the multipliers of the rows that it was solved with
             for k in range(K.n_rows):
                 if K.dropped[k] == 1:
                     K.lam1[k] = 0.0
-            spread(K, K.lam1)
+            share_out(K, K.lam1)
             for k in range(K.n_rows):
                 K.block[K.o_lam + k] = K.lam1[k]
     else:

@@ -168,8 +168,13 @@ def give_back_work(K: Any, work: float) -> int:
     return give_back(K, low)
 
 
+def is_held_through(K: Any, c: int) -> bool:
+    """Whether a contact acts in every blow whatever the sign of its impulse: it has a rule, and does not rebound."""
+    return bool(K.opens[c] != 0 and (K.closed[c] == 1 or K.restitution[c] == 0.0))
+
+
 def sequential_law(K: Any) -> int:
-    """Blow after blow of the contacts that approach fastest, each as if the others were not there."""
+    """Blow after blow of the contacts that approach fastest, each as if the others that push were not there."""
     gather(K, False)
     for c in range(K.n_contacts):
         K.touched[c] = K.active[c]  # takes part
@@ -177,16 +182,20 @@ def sequential_law(K: Any) -> int:
     for _ in range(MOST_BLOWS):
         most = 0.0
         for c in range(K.n_contacts):
-            if K.touched[c] == 1 and K.opens[c] == 0:
-                most = max(most, -speed(K, K.normal[c]))
+            if K.touched[c] == 1:
+                approach = -speed(K, K.normal[c])
+                most = max(most, abs(approach) if is_held_through(K, c) else approach)
         fastest = max(fastest, most)
         if most <= APPROACH * fastest or most < 1e-14:
             end_together(K, fastest)
             return 0
         for c in range(K.n_contacts):
-            strikes = K.opens[c] != 0 or -speed(K, K.normal[c]) >= (1.0 - 1e-9) * most if K.kind[c] == 0 else False
-            K.active[c] = 1 if (K.touched[c] == 1 and strikes) else 0
-            K.free[c] = 1 if (K.active[c] == 1 and K.opens[c] == 0) else 0
+            K.active[c] = 0
+            K.free[c] = 0
+            if K.touched[c] == 1:
+                held = is_held_through(K, c)
+                K.active[c] = 1 if held or -speed(K, K.normal[c]) >= (1.0 - 1e-9) * most else 0
+                K.free[c] = 1 if (K.active[c] == 1 and not held) else 0
         loosen(K)
         for k in range(K.n_rows):
             c = K.row_contact[k]
@@ -205,7 +214,7 @@ def end_together(K: Any, fastest: float) -> None:
     for c in range(K.n_contacts):
         K.active[c] = 0
         if K.touched[c] == 1:
-            leaves = K.opens[c] == 0 and speed(K, K.normal[c]) > 1e-9 * fastest
+            leaves = not is_held_through(K, c) and speed(K, K.normal[c]) > 1e-9 * fastest
             stays = not leaves and (K.closed[c] == 1 or K.restitution[c] == 0.0)
             K.active[c] = 1 if stays else 0
         K.touched[c] = 0

@@ -34,7 +34,8 @@ from mbd.kernel.hooks import call
 from mbd.kernel.iteration import finish, overturns, predict, residual_size, runs_away
 from mbd.kernel.linear import factor, solve
 from mbd.kernel.passage import WITHIN, approaches, misses, passing_step, steps_to_pose
-from mbd.kernel.restart import compose, consistent, fill_block, raise_scales, refresh_scales
+from mbd.kernel.redundancy import sharing
+from mbd.kernel.restart import add_shares, compose, consistent, fill_block, raise_scales, refresh_scales, share_loads
 
 __all__ = ["newmark_accept", "newmark_start", "newmark_step"]
 
@@ -115,9 +116,12 @@ def newmark_step(K: Any, h: float, t1: float) -> int:
     left = 1e300  # the error where the last correction started
     halvings = 0
     fresh = False
+    together = sharing(K)
     status = NOT_CONVERGED
     for iteration in range(K.max_iterations):
         tangent = not fresh
+        if together:
+            share_loads(K, m)
         if tangent:
             call(K, K.mode_code[2 * K.state[MODE]], K.out)
             K.counts[TANGENTS] += 1
@@ -223,6 +227,8 @@ def factorize(K: Any, size: int) -> bool:
     """LU factors of the tangent in K.out; false where a pivot is missing."""
     for k in range(size * size):
         K.kkt[k] = K.out[k]
+    if sharing(K):
+        add_shares(K, size - K.n)
     column = factor(K.kkt, size, K.pivots)
     K.counts[FACTORIZATIONS] += 1
     K.state[BLOCKED] = column - 1

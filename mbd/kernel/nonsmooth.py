@@ -33,7 +33,7 @@ from mbd.kernel.restart import consistent, evaluate
 from mbd.kernel.settle import STILL, log_event
 from mbd.kernel.switching import close_by_impact, mark_touching
 
-__all__ = ["keep", "lands", "lets_go", "put_back", "rebound", "strike"]
+__all__ = ["PULL", "keep", "lands", "lets_go", "put_back", "rebound", "strike"]
 
 SUNK = 1e4
 """Depth over the round-off of a gap at which a correction of positions has failed [-]."""
@@ -115,7 +115,7 @@ def lands(K: Any) -> bool:
 def lift(K: Any) -> int:
     """Positions of K.q moved least, in the metric of M, until no contact lies below its surface."""
     for f in range(K.n_frictions):
-        K.limit[f] = K.slip[f]  # kept here: friction moves nothing
+        K.base_limit[f] = K.slip[f]  # kept here: friction moves nothing
         K.slip[f] = 0.0
         K.loose[f] = 0
     for k in range(K.n_rows):  # those that depend on others, and along a surface that is only being reached
@@ -147,7 +147,7 @@ def lift(K: Any) -> int:
         if left <= 1.0 and K.detail[LIFTED] <= 1e-12:
             break
     for f in range(K.n_frictions):
-        K.slip[f] = K.limit[f]
+        K.slip[f] = K.base_limit[f]
     for k in range(K.n_rows):
         K.lifting[k] = 0
     if status == 0 and left > SUNK:

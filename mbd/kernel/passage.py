@@ -32,7 +32,8 @@ from mbd.kernel.fields import (
 from mbd.kernel.hooks import call
 from mbd.kernel.iteration import finish, overturns, predict, residual_size, runs_away
 from mbd.kernel.linear import factor, solve
-from mbd.kernel.restart import raise_scales
+from mbd.kernel.redundancy import sharing
+from mbd.kernel.restart import add_shares, raise_scales, share_loads
 
 __all__ = ["approaches", "misses", "passing_step", "steps_to_pose"]
 
@@ -171,6 +172,8 @@ def passing_step(K: Any, h: float, t1: float) -> int:
     before = 1e300
     away = 0.0
     for iteration in range(K.max_iterations):
+        if sharing(K):
+            share_loads(K, m)
         call(K, K.mode_code[2 * K.state[MODE]], K.out)
         K.counts[TANGENTS] += 1
         error = residual_size(K, o_r, m, c_C, c_K, tolerance, 0)
@@ -217,6 +220,8 @@ def correct_positions(K: Any, m: int, c_C: float, c_K: float) -> bool:
     o_h = size * size + n
     for k in range(size * size):
         K.kkt[k] = K.out[k]
+    if sharing(K):
+        add_shares(K, m)
     for i in range(n):
         K.rhs[i] = -K.out[size * size + i]
     for k in range(m):

@@ -17,7 +17,9 @@ from typing import Any
 from mbd.kernel.fields import N_DROPPED, PAST_TIME
 from mbd.kernel.lemke import LCP_SOLVED, lemke
 from mbd.kernel.linear import factor, solve
-from mbd.kernel.restart import active_rows, evaluate_loaded, limit_of, load_accelerations, solve_rows
+from mbd.kernel.redundancy import shared, sharing
+from mbd.kernel.restart import active_rows, evaluate_loaded, limit_of, load_accelerations
+from mbd.kernel.saddle import solve_rows
 
 __all__ = ["pivoted"]
 
@@ -147,6 +149,7 @@ def hold(K: Any, level: int, pushes: int, drags: int) -> int:
     n = K.n
     size = n + held
     o_B = o_R + n * K.n_rows
+    together = sharing(K)
     for i in range(size * size):
         K.kkt[i] = 0.0
     for i in range(n):
@@ -154,6 +157,8 @@ def hold(K: Any, level: int, pushes: int, drags: int) -> int:
             K.kkt[i * size + j] = K.acc[i * n + j]
         for k in range(held):
             K.kkt[i * size + n + k] = K.acc[o_R + i * K.n_rows + K.rows[k]]
+            if together:
+                K.kkt[i * size + n + k] += shared(K, i, K.rows[k])
             K.kkt[(n + k) * size + i] = K.acc[o_B + K.rows[k] * n + i]
     return held if factor(K.kkt, size, K.pivots) == 0 else -1
 

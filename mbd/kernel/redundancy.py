@@ -1,4 +1,9 @@
-"""Rows that depend on others: found in order, left out of the solve, their multipliers of least norm."""
+"""Rows that depend on others: found in order, left out of the solve, their multipliers of least norm.
+
+With B_d = C B_kept the multipliers of least norm obey ``λ_d = W_d C W_kept⁻¹ λ_kept``, W of `share`: the shares. Where
+no friction slides the forces Bᵀλ alone matter, so that the solve leaves λ_d out and `spread` finds them afterwards.
+Where one does, its force depends on how a load is shared (other μ, other drag): the shares are part of the solve then.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +12,7 @@ from typing import Any
 from mbd.kernel.fields import N_DROPPED
 from mbd.kernel.linear import factor, solve
 
-__all__ = ["find_dependent", "spread"]
+__all__ = ["find_dependent", "find_mix", "find_shares", "shared", "sharing", "spread", "take_shares"]
 
 DEPENDENCE = 1e-9
 """What is left of a row beside the earlier ones, relative, below which it depends on them [-]."""
@@ -21,51 +26,133 @@ def find_dependent(K: Any, m: int) -> None:
 
     Gram–Schmidt in the order of the rows, on columns scaled by √M_ii; B is that of K.acc.
     """
-    n = K.n
-    o_B = n * n + n + n * K.n_rows
     kept = 0
     K.state[N_DROPPED] = 0
     for k in range(K.n_rows):
         K.dropped[k] = 0
     for k in range(m):
         row = K.rows[k]
-        base = kept * n
-        size = 0.0
-        for j in range(n):
-            weight = K.acc[j * n + j]
-            K.basis[base + j] = K.acc[o_B + row * n + j] / (weight**0.5 if weight > 0.0 else 1.0)
-            size += K.basis[base + j] * K.basis[base + j]
-        for i in range(kept):
-            K.lower[kept * K.n_rows + i] = 0.0
-        for _ in range(2):
-            for i in range(kept):
-                part = 0.0
-                for j in range(n):
-                    part += K.basis[i * n + j] * K.basis[base + j]
-                K.lower[kept * K.n_rows + i] += part
-                for j in range(n):
-                    K.basis[base + j] -= part * K.basis[i * n + j]
-        left = 0.0
-        for j in range(n):
-            left += K.basis[base + j] * K.basis[base + j]
-        if left > DEPENDENCE * DEPENDENCE * size and size > 0.0:
-            left = left**0.5
-            K.lower[kept * K.n_rows + kept] = left
-            for j in range(n):
-                K.basis[base + j] /= left
-            K.columns[kept] = row
+        left = leftover(K, row, kept)
+        if left > DEPENDENCE:
+            keep_row(K, row, kept)
             kept += 1
             continue
         K.dropped[row] = 1
         K.state[N_DROPPED] += 1
-        for i in range(K.n_rows):
-            K.mix[row * K.n_rows + i] = 0.0
-        for back in range(kept):  # c L = coefficients of the row in the basis
-            i = kept - 1 - back
-            value = K.lower[kept * K.n_rows + i]
-            for j in range(i + 1, kept):
-                value -= K.mix[row * K.n_rows + K.columns[j]] * K.lower[j * K.n_rows + i]
-            K.mix[row * K.n_rows + K.columns[i]] = value / K.lower[i * K.n_rows + i]
+        combine(K, row, kept)
+
+
+def find_mix(K: Any, m: int) -> None:
+    """C in K.mix at another place, that of K.acc, with the m rows in K.rows kept and the others told by K.dropped."""
+    for k in range(m):
+        leftover(K, K.rows[k], k)
+        keep_row(K, K.rows[k], k)
+    for row in range(K.n_rows):
+        if K.dropped[row] == 1:
+            leftover(K, row, m)
+            combine(K, row, m)
+
+
+def leftover(K: Any, row: int, kept: int) -> float:
+    """What is left of a row beside the `kept` first vectors of K.basis, relative to it, as the next vector there.
+
+    Its parts along them are left in the next line of K.lower.
+    """
+    n = K.n
+    o_B = n * n + n + n * K.n_rows
+    base = kept * n
+    size = 0.0
+    for j in range(n):
+        weight = K.acc[j * n + j]
+        K.basis[base + j] = K.acc[o_B + row * n + j] / (weight**0.5 if weight > 0.0 else 1.0)
+        size += K.basis[base + j] * K.basis[base + j]
+    for i in range(kept):
+        K.lower[kept * K.n_rows + i] = 0.0
+    for _ in range(2):
+        for i in range(kept):
+            part = 0.0
+            for j in range(n):
+                part += K.basis[i * n + j] * K.basis[base + j]
+            K.lower[kept * K.n_rows + i] += part
+            for j in range(n):
+                K.basis[base + j] -= part * K.basis[i * n + j]
+    left = 0.0
+    for j in range(n):
+        left += K.basis[base + j] * K.basis[base + j]
+    return float((left / size) ** 0.5) if size > 0.0 else 0.0
+
+
+def keep_row(K: Any, row: int, kept: int) -> None:
+    """The next vector of K.basis, which `leftover` has found, gets length 1; its row number into K.columns."""
+    n = K.n
+    left = 0.0
+    for j in range(n):
+        left += K.basis[kept * n + j] * K.basis[kept * n + j]
+    left = left**0.5 + 1e-300
+    K.lower[kept * K.n_rows + kept] = left
+    for j in range(n):
+        K.basis[kept * n + j] /= left
+    K.columns[kept] = row
+
+
+def combine(K: Any, row: int, kept: int) -> None:
+    """The coefficients of a row in the kept rows from those in the basis, ``c L = `` the next line of K.lower."""
+    for i in range(K.n_rows):
+        K.mix[row * K.n_rows + i] = 0.0
+    for back in range(kept):
+        i = kept - 1 - back
+        value = K.lower[kept * K.n_rows + i]
+        for j in range(i + 1, kept):
+            value -= K.mix[row * K.n_rows + K.columns[j]] * K.lower[j * K.n_rows + i]
+        K.mix[row * K.n_rows + K.columns[i]] = value / K.lower[i * K.n_rows + i]
+
+
+def sharing(K: Any) -> bool:
+    """Whether a friction slides while rows depend on others: then the shares are part of the solve."""
+    if K.state[N_DROPPED] > 0:
+        for f in range(K.n_frictions):
+            if K.slip[f] != 0.0:
+                return True
+    return False
+
+
+def find_shares(K: Any) -> None:
+    """W_d C W_kept⁻¹ into K.shares, from K.mix and the limits in K.limit."""
+    largest = largest_limit(K)
+    for d in range(K.n_rows):
+        for k in range(K.n_rows):
+            part = 0.0
+            if K.dropped[d] == 1 and K.dropped[k] == 0:
+                part = K.mix[d * K.n_rows + k]
+                if part != 0.0:
+                    part *= share(K, d, largest) / share(K, k, largest)
+            K.shares[d * K.n_rows + k] = part
+
+
+def take_shares(K: Any, lam: Any) -> None:
+    """The multipliers of dependent rows from those of the others."""
+    for d in range(K.n_rows):
+        if K.dropped[d] == 1:
+            lam[d] = 0.0
+            for k in range(K.n_rows):
+                lam[d] += K.shares[d * K.n_rows + k] * lam[k] if K.dropped[k] == 0 else 0.0
+
+
+def shared(K: Any, i: int, row: int) -> float:
+    """What the multiplier 1 of a row brings into component i of the balance through dependent rows, ``Σ R_d share``."""
+    value = 0.0
+    for d in range(K.n_rows):
+        if K.dropped[d] == 1:
+            value += K.acc[K.n * K.n + K.n + i * K.n_rows + d] * K.shares[d * K.n_rows + row]
+    return value
+
+
+def largest_limit(K: Any) -> float:
+    """The largest limit of all frictions."""
+    largest = 0.0
+    for f in range(K.n_frictions):
+        largest = max(largest, K.limit[f])
+    return largest
 
 
 def share(K: Any, row: int, largest: float) -> float:
@@ -88,9 +175,7 @@ def spread(K: Any, lam: Any) -> None:
             count += 1
     if count == 0:
         return
-    largest = 0.0
-    for f in range(K.n_frictions):
-        largest = max(largest, K.limit[f])
+    largest = largest_limit(K)
     for i in range(K.n_rows):
         if K.dropped[i] == 0:
             for d in range(count):

@@ -1,31 +1,18 @@
-"""The block of inputs at a state, magnitudes, and consistent accelerations.
-
-``M w + force + R λ = 0`` with ``B w + bias = 0`` on active rows: w the acceleration and λ the multiplier, or w the jump
-of velocity and λ the impulse. M may be singular; only the whole matrix is ever solved with.
-"""
+"""The block of inputs at a state, magnitudes, and consistent accelerations."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from mbd.kernel.fields import (
-    ACCELERATIONS,
-    BLOCKED,
-    COMPOSE,
-    CONFLICT,
-    DEPENDENT,
-    N_DROPPED,
-    NOT_FINITE,
-    SCALES,
-)  # fmt: skip
+from mbd.kernel.fields import ACCELERATIONS, COMPOSE, N_DROPPED, SCALES
 from mbd.kernel.hooks import call
-from mbd.kernel.linear import eliminate
-from mbd.kernel.redundancy import find_dependent, spread
+from mbd.kernel.redundancy import find_mix, find_shares, shared, sharing, spread, take_shares
+from mbd.kernel.saddle import solve_rows
 
 __all__ = [
-    "active_rows", "capture", "compose", "consistent", "evaluate", "evaluate_loaded",
-    "fill_block", "limit_of", "load_accelerations", "raise_scales", "refresh_scales", "row_speed", "solve_rows",
-    "stepping_rows",
+    "active_rows", "add_shares", "capture", "compose", "consistent", "evaluate", "evaluate_loaded",
+    "fill_block", "limit_of", "load_accelerations", "raise_scales", "refresh_scales", "row_speed", "share_loads",
+    "share_out", "stepping_rows",
 ]  # fmt: skip
 
 MOST_LOADS = 30
@@ -174,74 +161,77 @@ def row_speed(K: Any, row: int) -> float:
     return float(K.acc[K.n * K.n + K.n + 2 * K.n * K.n_rows + K.n_rows + row])
 
 
-def solve_rows(K: Any, m: int, dropping: bool) -> int:
-    """w and λ for the m rows in K.rows; w in K.jump, λ of all rows in K.impulse.
-
-    Rows may depend on each other where `dropping` allows it: then K.dropped tells which, and λ has the least norm.
-    """
-    n = K.n
-    size = n + m
-    o_R = n * n + n
-    o_B = o_R + n * K.n_rows
-    A = K.kkt
-    for i in range(n):
-        for j in range(n):
-            A[i * size + j] = K.acc[i * n + j]
-        for k in range(m):
-            A[i * size + n + k] = K.acc[o_R + i * K.n_rows + K.rows[k]]
-        K.rhs[i] = -K.force[i]
-    for k in range(m):
-        row = K.rows[k]
-        for j in range(n):
-            A[(n + k) * size + j] = K.acc[o_B + row * n + j]
-        for j in range(m):
-            A[(n + k) * size + n + j] = 0.0
-        K.rhs[n + k] = -K.bias[row]
-    finite = 0.0
-    for k in range(size * size):
-        finite += abs(A[k])
-    for k in range(size):
-        finite += abs(K.rhs[k])
-    if not finite < 1e300:
-        return NOT_FINITE
-    rank = eliminate(A, size, K.rhs, K.columns, K.work, 1e-12)
-    if rank < 0:
-        K.state[BLOCKED] = K.columns[-1 - rank]
-        return CONFLICT
-    for i in range(n):
-        K.jump[i] = K.rhs[i]
-    for k in range(K.n_rows):
-        K.impulse[k] = 0.0
-    for k in range(m):
-        K.impulse[K.rows[k]] = K.rhs[n + k]
-    for k in range(rank, size):
-        if K.columns[k] < n or not dropping:
-            K.state[BLOCKED] = K.columns[k]
-            return DEPENDENT
-    if rank < size:
-        find_dependent(K, m)
-        spread(K, K.impulse)
-    elif dropping:
-        find_dependent(K, 0)
-    return 0
-
-
 def consistent(K: Any, t: float, q: Any, y: Any) -> int:
     """Rates and multipliers of the closed rows at a state, in K.jump and K.impulse."""
     evaluate(K, t, q, y)
+    m = stepping_rows(K)
+    together = sharing(K)
+    if together:
+        find_mix(K, m)
+        find_limits_of_loads(K)
+        find_shares(K)
     load_accelerations(K)
-    status = solve_rows(K, stepping_rows(K), False)
-    if K.loaded == 1:  # R follows multipliers: of degree one, so that to solve again is Newton's method
+    status = solve_rows(K, m, False)
+    if K.loaded == 1 or together:  # R follows multipliers: of degree one, so that to solve again is Newton's method
         for _ in range(MOST_LOADS):
             if status != 0 or evaluate_loaded(K, K.impulse) < 1e-13:
                 break
+            if together:
+                find_limits_of_loads(K)
+                find_shares(K)
             load_accelerations(K)
-            status = solve_rows(K, stepping_rows(K), False)
-    if K.state[N_DROPPED] > 0:
-        spread(K, K.impulse)
+            status = solve_rows(K, m, False)
+    if K.state[N_DROPPED] > 0 and status == 0:
+        share_out(K, K.impulse)
     if status == 0 and K.n_frictions > 0:
         find_sliding_friction(K)
     return status
+
+
+def find_limits_of_loads(K: Any) -> None:
+    """Largest frictions at the multipliers now in the block."""
+    for f in range(K.n_frictions):
+        K.limit[f] = limit_of(K, f)
+
+
+def share_out(K: Any, lam: Any) -> None:
+    """Multipliers of dependent rows beside those of K.rows, which were solved with, at the state now in the block.
+
+    Frictions that hold together share by their limits, which follow their loads: they are found by turns.
+    """
+    for turn in range(MOST_LOADS):
+        change = evaluate_loaded(K, lam)
+        if turn == 0:
+            find_mix(K, stepping_rows(K))
+        find_limits_of_loads(K)
+        if sharing(K):
+            find_shares(K)
+            take_shares(K, lam)
+        else:
+            spread(K, lam)
+        if K.n_frictions == 0 or (turn > 0 and change < 1e-13):
+            break
+
+
+def share_loads(K: Any, m: int) -> None:
+    """Multipliers of dependent rows in the block, where they are part of the step's equations, at its iterate."""
+    call(K, ACCELERATIONS, K.acc)
+    find_mix(K, m)
+    find_limits_of_loads(K)
+    find_shares(K)
+    for k in range(K.n_rows):
+        K.loads[k] = K.block[K.o_lam + k]
+    take_shares(K, K.loads)
+    for k in range(K.n_rows):
+        K.block[K.o_lam + k] = K.loads[k]
+
+
+def add_shares(K: Any, m: int) -> None:
+    """What the multipliers of a step bring along through dependent rows, into the tangent in K.kkt."""
+    size = K.n + m
+    for i in range(K.n):
+        for k in range(m):
+            K.kkt[i * size + K.n + k] += shared(K, i, K.rows[k])
 
 
 def find_sliding_friction(K: Any) -> None:

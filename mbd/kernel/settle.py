@@ -20,7 +20,8 @@ from mbd.kernel.fields import (
     STORED,
     UNKNOWN,
 )  # fmt: skip
-from mbd.kernel.restart import active_rows, capture, evaluate, row_speed, solve_rows
+from mbd.kernel.restart import active_rows, capture, evaluate, row_speed
+from mbd.kernel.saddle import solve_rows
 
 __all__ = ["STILL", "log_event", "settle"]
 

@@ -22,7 +22,7 @@ from mbd.kernel.fields import (
 )  # fmt: skip
 from mbd.kernel.guards import gap_scale, is_watched
 from mbd.kernel.impact import impact
-from mbd.kernel.restart import capture, evaluate
+from mbd.kernel.restart import capture, evaluate, row_speed
 from mbd.kernel.settle import STILL, log_event
 
 __all__ = ["switch"]
@@ -68,29 +68,26 @@ def release_for(K: Any, after: int) -> None:
 
 def close_by_impact(K: Any, fastest: float) -> int:
     """Impact of all closing unilateral contacts, the releases it causes, anchors and log."""
-    n = K.n
     slow = fastest < K.rest_speed or (K.state[PLASTIC] == 1 and fastest == 0.0)  # a rebound too small to rise at all
     if not slow:
         release_for(K, 0)
     status = impact(K, slow)
     if status != 0:
         return status
-    o_B = n * n + n + n * K.n_rows
-    o_rate = o_B + n * K.n_rows + K.n_rows
+    count = 0
+    own = 0.0
     for c in range(K.n_contacts):
-        if K.kind[c] != 0 or (K.closed[c] == 0 and K.closing[c] == 0):
+        if strikes(K, c):
+            count += 1
+            own += abs(loss_in(K, c))
+    others = loss_elsewhere(K) if count > 0 else 0.0
+    for c in range(K.n_contacts):
+        if K.kind[c] != 0 or (K.closed[c] == 0 and not strikes(K, c)):
             continue
-        if K.closing[c] == 2 and K.impulse[K.normal[c]] == 0.0:
-            continue  # it touched only
         if K.closing[c] > 0:
-            work = 0.0  # −½ Λ (γ⁻ + γ⁺) over its rows: its share of the kinetic energy lost
-            for k in range(K.n_rows):
-                if K.row_contact[k] == c:
-                    rate = K.acc[o_rate + k]
-                    for j in range(n):
-                        rate += 0.5 * K.acc[o_B + k * n + j] * K.jump[j]
-                    work += K.impulse[k] * rate
-            log_event(K, LOG_CLOSED, c, work, True)
+            loss = loss_in(K, c)
+            part = abs(loss) / own if own > 0.0 else 1.0 / count
+            log_event(K, LOG_CLOSED, c, loss + part * others, True)
             if K.active[c] == 1:
                 capture(K, c)
                 K.closed[c] = 1
@@ -103,6 +100,39 @@ def close_by_impact(K: Any, fastest: float) -> int:
     if not slow:
         release_for(K, 1)
     return 0
+
+
+def strikes(K: Any, c: int) -> bool:
+    """Whether a contact closes in the impact just found; one that only touches takes no impulse."""
+    return bool(K.kind[c] == 0 and K.closing[c] > 0 and (K.closing[c] == 1 or K.impulse[K.normal[c]] != 0.0))
+
+
+def loss_of(K: Any, row: int) -> float:
+    """What the impulse of a row took, −½ Λ (γ⁻ + γ⁺): its part of the kinetic energy lost."""
+    o_B = K.n * K.n + K.n + K.n * K.n_rows
+    rate = row_speed(K, row)
+    for j in range(K.n):
+        rate += 0.5 * K.acc[o_B + row * K.n + j] * K.jump[j]
+    return float(K.impulse[row] * rate)
+
+
+def loss_in(K: Any, c: int) -> float:
+    """What the impulses of a contact took."""
+    loss = 0.0
+    for k in range(K.n_rows):
+        if K.row_contact[k] == c:
+            loss += loss_of(K, k)
+    return loss
+
+
+def loss_elsewhere(K: Any) -> float:
+    """What friction in joints, and contacts that were closed before, took in an impact."""
+    loss = 0.0
+    for k in range(K.n_rows):
+        c = K.row_contact[k]
+        if (c < 0 and K.row_friction[k] >= 0) or (c >= 0 and not strikes(K, c)):
+            loss += loss_of(K, k)
+    return loss
 
 
 def mark_touching(K: Any) -> None:

@@ -7,7 +7,8 @@ from typing import Any
 from mbd.kernel.fields import BASE, GRID, NOW, RESTARTS
 from mbd.kernel.guards import update_armed, update_sides, watch
 from mbd.kernel.hooks import scheme_accept, scheme_start
-from mbd.kernel.restart import active_rows, consistent, evaluate, solve_rows, stepping_rows
+from mbd.kernel.restart import active_rows, consistent, evaluate, stepping_rows
+from mbd.kernel.saddle import solve_rows
 
 __all__ = ["leave_pose", "take_over"]
 

@@ -32,7 +32,8 @@ class EventRecord:
         around), 'event' (a user's own, or a fall)
     name : of the contact, joint or event
     impulse : impulses of the contact's rows at the instant, normal first, pushing ≥ 0 [N s or N m s]
-    energy_loss : kinetic energy taken by the impulses of this contact, −½ Σ Λ (γ⁻ + γ⁺) over its rows [J]
+    energy_loss : kinetic energy that a contact took as it closed, −½ Σ Λ (γ⁻ + γ⁺) over its rows, and its part of what
+        friction in joints and contacts closed before took in the same impact, in the ratio of these [J]
     row : the stored row just after it (the right side); the row before is the left side
     """
 

@@ -1,7 +1,7 @@
 """What goes with what: one table of laws against integrators and strategies, held before the first step.
 
-An integrator says itself what it cannot keep (`Integrator.check`); what a strategy cannot treat stands in `REFUSED`.
-Everything else in the table runs, and a test lets every pair run.
+An integrator says itself what it cannot keep (`Integrator.check`). Every strategy treats every law; a test lets every
+pair of the table run.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 from mbd.equations.equations import Equations
 from mbd.integrators import HHT, GeneralizedAlpha, Integrator, Newmark
 
-__all__ = ["LAWS", "REFUSED", "SCHEMES", "STRATEGIES", "SPACE", "Law", "as_markdown", "as_text", "refusals", "supports"]
+__all__ = ["LAWS", "SCHEMES", "STRATEGIES", "SPACE", "Law", "as_markdown", "as_text", "refusals", "supports"]
 
 
 @dataclass(frozen=True)
@@ -71,14 +71,6 @@ STRATEGIES: tuple[Mapping[str, str], ...] = (
 )  # fmt: skip
 """Further columns: arguments of `simulate`."""
 
-REFUSED: dict[tuple[str, str, str], str] = {
-    ("release=When", "impact", "sequential"): (
-        "contacts with a rule release=When, {names}, hold in an impact whatever its sign, so that impact='sequential' "
-        "finds none of them that strikes; use impact='newton' or 'poisson'"
-    ),
-}
-"""(law, argument, value) → why not, and what to use instead."""
-
 TOGETHER: dict[tuple[tuple[str, str], tuple[str, str]], str] = {
     (("contact", "nonsmooth"), ("locate", "linear")): (
         "contact='nonsmooth' does not locate contacts, and locate='linear' would locate all else roughly; use "
@@ -101,22 +93,14 @@ def supports(law: Law, scheme: Integrator) -> bool:
     return scheme.check(int(law.holds)) is None
 
 
-def refusals(model: Any, equations: Equations, scheme: Integrator, options: Mapping[str, Any]) -> list[str]:
+def refusals(equations: Equations, scheme: Integrator, options: Mapping[str, Any]) -> list[str]:
     """Every pair of a run that is not supported, each named with what to use instead."""
     found = [text for pair, text in TOGETHER.items() if all(options.get(name) == value for name, value in pair)]
-    for (title, argument, value), text in REFUSED.items():
-        names = _law(title).parts(model, equations)
-        if names and options.get(argument) == value:
-            found.append(text.format(names=_listed(names)))
     held = [row.owner for row in equations.rows if not row.is_velocity]
     told = scheme.check(len(held))
     if told:
         found.append(f"{told} (rows on positions: {_listed(held)})" if held else told)
     return found
-
-
-def _law(title: str) -> Law:
-    return next(law for law in LAWS if law.title == title)
 
 
 def _listed(names: Sequence[str], most: int = 4) -> str:
@@ -130,8 +114,7 @@ def _cells() -> list[list[str]]:
     rows = [["", *SCHEMES, *(f"{argument}={value}" for column in STRATEGIES for argument, value in column.items())]]
     for law in LAWS:
         cells = [all(supports(law, scheme) for scheme in schemes) for schemes in SCHEMES.values()]
-        pairs = [pair for column in STRATEGIES for pair in column.items()]
-        cells += [(law.title, argument, value) not in REFUSED for argument, value in pairs]
+        cells += [True for column in STRATEGIES for _ in column]
         rows.append([law.title, *("yes" if cell else "no" for cell in cells)])
     return rows
 

@@ -46,7 +46,10 @@ COUNTED = (
 def notes_of(run: Run) -> list[str]:
     """The notes of a run that is over, in sentences."""
     notes = list(run.mechanism.notes)
-    dependent = redundancy(run.mechanism.equations.rows, run.stepper.dependent)
+    equations = run.mechanism.equations
+    loaded = bool(run.values["loaded"]) or any(friction.contact >= 0 for friction in equations.frictions)
+    rubs = loaded and any(code.borne for code in run.stepper.modes)
+    dependent = redundancy(equations.rows, run.stepper.dependent, rubs)
     notes += [dependent] if dependent else []
     counts, impact = run.values["counts"], run.settings["impact"]
     notes += [text.format(count=int(counts[place]), impact=impact) for place, text in COUNTED if counts[place]]

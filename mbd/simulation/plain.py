@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from mbd.arrays import Vector
+from mbd.arrays import Matrix, Vector
 from mbd.compile.mechanism import Mechanism, ModeCode
 from mbd.equations.programs import mass_matrix
 from mbd.integrators.base import Integrator, Point, StepReport, Terms
@@ -15,6 +15,7 @@ from mbd.kernel.active_set import ActiveSetManager
 from mbd.kernel.fields import CAREFUL, ITERATIONS, NEAR, NOT_CONVERGED, NOT_FINITE, NOW
 from mbd.kernel.restart import MOST_LOADS, fill_block, refresh_scales
 from mbd.simulation.asked import asked
+from mbd.simulation.shares import shares
 from mbd.state import Mode, State
 from mbd.tape.derivatives import live
 
@@ -57,16 +58,25 @@ class MechanismSystem:
         rows = tuple(row for row in self.manager.active_rows(flags, self.sticks) if not self.dropped[row])
         return rows, self.manager.penalties(flags)
 
-    def _code(self, rows: tuple[int, ...], penalties: tuple[int, ...]) -> ModeCode:
+    def _code(self, rows: tuple[int, ...], penalties: tuple[int, ...], borne: tuple[int, ...]) -> ModeCode:
         sliding = tuple(int(f) for f in np.flatnonzero(self.slip))
-        return self.mechanism.mode(rows, penalties, self.stabilized, sliding)
+        return self.mechanism.mode(rows, penalties, self.stabilized, sliding, borne)
+
+    def _borne(self, mode: Mode) -> tuple[int, ...]:
+        """Rows that act and depend on others, where how loads are shared moves the mechanism: a friction slides."""
+        if not self.slip.any() or not any(self.dropped):
+            return ()
+        held = self.manager.active_rows(self.manager.flags(mode.closed), self.sticks)
+        return tuple(row for row in held if self.dropped[row])
 
     def evaluate(self, point: Point, mode: Mode, tangent: tuple[float, float] | None) -> Terms:
         """Terms of `Terms` at a point of the mechanism."""
         rows, penalties = self.active(mode)
-        code = self._code(rows, penalties)
+        borne = self._borne(mode)
+        code = self._code(rows, penalties, borne)
         n, m = self.mechanism.layout.n, len(rows)
         block = self.evaluated = self._block(point, rows, penalties)
+        brought = self._share_loads(block, rows, borne) if borne else 0.0
         scale = np.zeros(n + 2 * self.mechanism.layout.n_rows)
         self.mechanism.common["scales"](block, self.parameters, scale)
         picked = list(rows)
@@ -102,7 +112,7 @@ class MechanismSystem:
             None if matrix is None else matrix[:n, :n],
             h,
             rate,
-            None if matrix is None else matrix[:n, n:],
+            None if matrix is None else matrix[:n, n:] + brought,
             None if matrix is None else matrix[n:, :n],
             _by_unit(r_size, self.mechanism),
             h_size[picked],
@@ -120,19 +130,37 @@ class MechanismSystem:
         block[layout.slip : layout.size] = self.slip
         return block
 
+    def _share_loads(self, block: Vector, rows: tuple[int, ...], borne: tuple[int, ...]) -> Matrix:
+        """Multipliers of the rows `borne` into the block; (n, m) what those of `rows` bring along through them."""
+        lam, kept, dependent = self.mechanism.layout.lam, list(rows), list(borne)
+        places = [lam + k for k in dependent]
+        for _ in range(MOST_LOADS):  # frictions that hold together share by their limits, which follow the loads
+            terms = self.mechanism.terms_of(block, self.parameters)
+            part = shares(self.mechanism.equations.rows, terms, kept, dependent)
+            before, block[places] = block[places], part @ block[[lam + k for k in kept]]
+            if np.max(np.abs(block[places] - before)) <= 1e-14 * np.max(np.abs(block[places])):
+                break
+        return np.asarray(terms.R[:, dependent] @ part)
+
     def accelerations(self, t: float, q: Vector, y: Vector, mode: Mode) -> tuple[Vector, Vector]:
         """Consistent (v̇, ż) and λ of the active rows."""
         rows, penalties = self.active(mode)
-        n, m, picked = self.mechanism.layout.n, len(rows), list(rows)
+        n, m, picked, borne = self.mechanism.layout.n, len(rows), list(rows), list(self._borne(mode))
         lam = np.zeros(self.mechanism.layout.n_rows)
         for _ in range(MOST_LOADS):  # friction follows multipliers: of degree one, so that this is Newton's method
             terms = self.mechanism.acceleration_terms(
                 t, q, y, self.parameters, self.anchors, penalties, slips=self.slip, lam=lam
             )
-            matrix = np.block([[terms.M, terms.R[:, picked]], [terms.B[picked], np.zeros((m, m))]])
+            R = terms.R[:, picked]
+            if borne:
+                part = shares(self.mechanism.equations.rows, terms, picked, borne)
+                R = R + terms.R[:, borne] @ part
+            matrix = np.block([[terms.M, R], [terms.B[picked], np.zeros((m, m))]])
             solved = np.linalg.solve(matrix, -np.concatenate([terms.f, terms.bias[picked]]))
             change = np.max(np.abs(lam[picked] - solved[n:]), initial=0.0)
             lam[picked] = solved[n:]
+            if borne:
+                lam[borne] = part @ solved[n:]
             if not self.slip.any() or change <= 1e-13 * np.max(np.abs(lam)):
                 break
         return solved[:n], solved[n:]

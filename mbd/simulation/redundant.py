@@ -17,13 +17,14 @@ MOST_TOLD = 8
 """Redundant rows that a note tells one by one."""
 
 
-def redundancy(rows: Sequence[Row], dependent: Mapping[int, tuple[int, ...]]) -> str:
+def redundancy(rows: Sequence[Row], dependent: Mapping[int, tuple[int, ...]], rubs: bool) -> str:
     """The note on rows that left the solve; '' if none did.
 
     Parameters
     ----------
     rows : of the equations
     dependent : numbers of the rows that left, and of those on which each depends
+    rubs : whether friction that follows multipliers has slid beside them
     """
     if not dependent:
         return ""
@@ -32,10 +33,13 @@ def redundancy(rows: Sequence[Row], dependent: Mapping[int, tuple[int, ...]]) ->
         for row, on in sorted(dependent.items())
     ]
     more = ["…"] if len(told) > MOST_TOLD else []
-    return (
-        f"redundant constraints: {len(told)} ({'; '.join(told[:MOST_TOLD] + more)}); the motion is unique, their "
-        "multipliers are not: those of least norm are given"
+    what = (
+        "how they share a load is not determined, nor is the drag of friction that slides: multipliers of least norm "
+        "are taken"
+        if rubs
+        else "the motion is unique, their multipliers are not: those of least norm are given"
     )
+    return f"redundant constraints: {len(told)} ({'; '.join(told[:MOST_TOLD] + more)}); {what}"
 
 
 def clash(rows: Sequence[Row], values: Mapping[str, Any]) -> str:

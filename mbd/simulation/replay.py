@@ -186,10 +186,15 @@ class _Watched:
         return getattr(self._mechanism, name)
 
     def mode(
-        self, rows: Sequence[int], penalties: Sequence[int], stabilized: bool, sliding: Sequence[int] = ()
+        self,
+        rows: Sequence[int],
+        penalties: Sequence[int],
+        stabilized: bool,
+        sliding: Sequence[int] = (),
+        borne: Sequence[int] = (),
     ) -> ModeCode:
         """Code of a mode that can be watched; compiled programs keep their addresses."""
-        key = (tuple(rows), tuple(penalties), stabilized, tuple(sliding))
+        key = (tuple(rows), tuple(penalties), stabilized, tuple(sliding), tuple(borne))
         if key not in self._codes:
             code = self._mechanism.mode(*key)
             n, m = self._mechanism.layout.n, len(code.rows)

@@ -124,7 +124,7 @@ def prepared(
     end, stop = end_of(until, manager, dt, start.time)
     strategy, reason = chosen(options["contact"], manager, options["locate"])
     options = {**options, "contact": strategy}
-    refused = refusals(model, mechanism.equations, scheme, options)
+    refused = refusals(mechanism.equations, scheme, options)
     if refused:
         raise CapabilityError(refused)
     settings = {

@@ -124,7 +124,8 @@ class Stepper:
             "acc": self.mechanism.sizes["accelerations"], "q": n_q, "y": n, "rate": n, "aux": n, "slope": n,
             "lam": rows, "lam_slope": rows, "shift": n, "shift_change": n,
             "anchors": v["n_anchors"], "q1": n_q, "y1": n, "rate1": n, "aux1": n, "lam1": rows, "shift1": n,
-            "basis": (rows + 1) * n, "lower": (rows + 1) * rows, "mix": rows * rows, "kkt": size * size, "rhs": size,
+            "basis": (rows + 1) * n, "lower": (rows + 1) * rows, "mix": rows * rows, "shares": rows * rows,
+            "kkt": size * size, "rhs": size,
             "spare": size * size + n + 2 * rows + rows * n, "turning": rows * n,
             "work": 3 * size, "force": n, "bias": rows, "jump": n, "impulse": rows,
             "guards0": v["n_watched"], "guards1": v["n_watched"], "scale": n + 2 * rows,
@@ -169,9 +170,11 @@ class Stepper:
         v = self.values
         flags, dropped = v["closed"][: v["n_contacts"]], v["dropped"][: v["n_rows"]]
         sticks, slip = v["sticks"][: v["n_frictions"]], v["slip"][: v["n_frictions"]]
-        rows = tuple(row for row in self.manager.active_rows(flags, sticks) if not dropped[row])
+        held = self.manager.active_rows(flags, sticks)
+        rows = tuple(row for row in held if not dropped[row])
         sliding = tuple(int(f) for f in np.flatnonzero(slip))
-        code = self.mechanism.mode(rows, self.manager.penalties(flags), self.stabilized, sliding)
+        borne = tuple(row for row in held if dropped[row]) if sliding else ()
+        code = self.mechanism.mode(rows, self.manager.penalties(flags), self.stabilized, sliding, borne)
         count, width = int(v["mode_count"][0]), v["n_contacts"] + v["n_rows"] + v["n_frictions"]
         phases = np.where(sticks == 1, 2, slip != 0.0)
         if 2 * (count + 1) > len(v["mode_code"]):

@@ -99,16 +99,9 @@ def wild_scene(seed: int, shapes: int = 120, interpreted: Sequence[Integrator] =
     refused = options["contact"] == "nonsmooth" and rng.random() < 0.9
     if slow or refused:
         options["locate"] = "root"  # that pair is refused; roughly located bounces may be thousands, long in Python
-    if options["impact"] == "sequential" and any(getattr(law, "release", None) for law in _laws(shape.model)):
-        options["impact"] = "newton"  # that pair too
     changed = _masses(rng, shape.model) if rng.random() < 0.5 else {}
     start = {**_start(rng, shape), "parameters": changed}
     return WildScene(seed, shape.model, start, scheme, dt, dt * steps, options)
-
-
-def _laws(model: Any) -> list[Any]:
-    """The unilateral contacts of a model in words."""
-    return [law for law in getattr(model, "constraints", ()) if isinstance(law, mbd.Unilateral)]
 
 
 def _masses(rng: random.Random, model: Any) -> dict[str, float]:

@@ -1,0 +1,124 @@
+"""The equations of accelerations and impacts in one matrix.
+
+``M w + force + R λ = 0`` with ``B w + bias = 0`` on active rows: w the acceleration and λ the multiplier, or w the jump
+of velocity and λ the impulse. M may be singular; only the whole matrix is ever solved with.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mbd.kernel.fields import BLOCKED, CONFLICT, DEPENDENT, NOT_FINITE
+from mbd.kernel.linear import eliminate
+from mbd.kernel.redundancy import find_dependent, find_shares, shared, sharing, spread, take_shares
+
+__all__ = ["solve_rows"]
+
+
+def solve_rows(K: Any, m: int, dropping: bool) -> int:
+    """w and λ for the m rows in K.rows; w in K.jump, λ of all rows in K.impulse.
+
+    Rows may depend on each other where `dropping` allows it: then K.dropped tells which, and λ has the least norm; with
+    a friction that slides the shares of the limits in K.limit are solved with. K.rows has the dependent ones last then.
+    Without `dropping` the rows are those that K.dropped has left, and K.shares are in place.
+    """
+    size = K.n + m
+    rank = solve_matrix(K, m, not dropping and sharing(K))
+    if rank < 0:
+        return -rank
+    if rank == size:
+        if dropping:
+            find_dependent(K, 0)
+        elif sharing(K):
+            take_shares(K, K.impulse)
+        return 0
+    undetermined = K.n + m
+    for k in range(rank, size):
+        if K.columns[k] < K.n or not dropping:
+            undetermined = min(undetermined, int(K.columns[k]))
+    if dropping:
+        find_dependent(K, m)
+        if sharing(K):  # how loads are shared moves the mechanism: any unknown may be the one without a pivot
+            find_shares(K)
+            return solve_shared(K, dependent_last(K, m))
+    if undetermined < size:
+        K.state[BLOCKED] = undetermined
+        return DEPENDENT
+    spread(K, K.impulse)
+    return 0
+
+
+def solve_shared(K: Any, m: int) -> int:
+    """w and λ with the shares of dependent rows in K.shares, for the m independent rows that come first in K.rows."""
+    rank = solve_matrix(K, m, True)
+    if rank < 0:
+        return -rank
+    if rank < K.n + m:
+        K.state[BLOCKED] = K.columns[rank]
+        return DEPENDENT
+    take_shares(K, K.impulse)
+    return 0
+
+
+def dependent_last(K: Any, m: int) -> int:
+    """The m rows in K.rows with those that depend on others behind the rest; how many the rest are."""
+    kept = 0
+    for k in range(m):
+        K.columns[k] = K.rows[k]
+        kept += 1 - K.dropped[K.rows[k]]
+    first = 0
+    last = kept
+    for k in range(m):
+        row = K.columns[k]
+        if K.dropped[row] == 1:
+            K.rows[last] = row
+            last += 1
+        else:
+            K.rows[first] = row
+            first += 1
+    return int(kept)
+
+
+def solve_matrix(K: Any, m: int, together: bool) -> int:
+    """w and λ of the m rows in K.rows, as far as they are independent, others 0; the rank, or minus a failure.
+
+    With `together` each multiplier brings the shares of the rows that depend on its row along.
+    """
+    n = K.n
+    size = n + m
+    o_R = n * n + n
+    o_B = o_R + n * K.n_rows
+    A = K.kkt
+    for i in range(n):
+        for j in range(n):
+            A[i * size + j] = K.acc[i * n + j]
+        for k in range(m):
+            A[i * size + n + k] = K.acc[o_R + i * K.n_rows + K.rows[k]]
+            if together:
+                A[i * size + n + k] += shared(K, i, K.rows[k])
+        K.rhs[i] = -K.force[i]
+    for k in range(m):
+        row = K.rows[k]
+        for j in range(n):
+            A[(n + k) * size + j] = K.acc[o_B + row * n + j]
+        for j in range(m):
+            A[(n + k) * size + n + j] = 0.0
+        K.rhs[n + k] = -K.bias[row]
+    finite = 0.0
+    for k in range(size * size):
+        finite += abs(A[k])
+    for k in range(size):
+        finite += abs(K.rhs[k])
+    if not finite < 1e300:
+        return -NOT_FINITE
+    rank = int(eliminate(A, size, K.rhs, K.columns, K.work, 1e-12))
+    if rank < 0:
+        K.state[BLOCKED] = K.columns[-1 - rank]
+        return -CONFLICT
+    for i in range(n):
+        K.jump[i] = K.rhs[i]
+    for k in range(K.n_rows):
+        K.impulse[k] = 0.0
+    for k in range(m):
+        K.impulse[K.rows[k]] = K.rhs[n + k]
+    return rank

@@ -1,0 +1,233 @@
+"""Friction that slides on rows that depend on each other: what is reported is what has moved the mechanism."""
+
+from __future__ import annotations
+
+from functools import cache, lru_cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+
+import mbd
+from mbd.equations.programs import balance_with
+from mbd.kernel.redundancy import LEAST_SHARE
+from tests.simulation.frictions import check_friction
+from tests.simulation.mechanisms import G
+
+SCHEMES = [
+    mbd.HHT(0.05), mbd.GeneralizedAlpha(0.8), mbd.Newmark(), mbd.HHT(0.05, formulation="index3"),
+    mbd.GeneralizedAlpha(0.5, formulation="index3"),
+]  # fmt: skip
+every_scheme = pytest.mark.parametrize("scheme", SCHEMES, ids=repr)
+every_strategy = pytest.mark.parametrize("contact", ["events", "nonsmooth"])
+PLACES, COEFFICIENTS = (-0.5, 0.1, 0.5), (0.1, 0.3, 0.6)
+MASS, HIGH = 1.0, 0.2
+
+
+@cache
+def sled(order=(0, 1, 2), slope=0.0, restitution=0.0):
+    """A body on three runners in a row, HIGH below its center, with different friction."""
+    model = mbd.Model("sled", gravity=mbd.on_slope(slope, G))
+    body = mbd.RigidBody("body", mass=MASS, inertia=0.1)
+    model.connect(mbd.Planar("place", model.ground.origin, body.origin))
+    for k in order:
+        touch = mbd.touchdown(body.point(PLACES[k], -HIGH))
+        model.constrain(mbd.Unilateral(f"runner {k}", touch, friction=COEFFICIENTS[k], restitution=restitution))
+    return model
+
+
+def slide(model, scheme=SCHEMES[0], speed=3.0, **options):
+    """A run that begins with all runners on the ground."""
+    start = mbd.assemble(
+        model, position={"place.y": HIGH}, velocity={"place.x": speed}, closed=[f"runner {k}" for k in range(3)]
+    )
+    return mbd.simulate(model, start, scheme, **{"dt": 1e-2, "until": 0.5, **options})
+
+
+def imbalance(run):
+    """(R,) largest component of M v̇ + f + Bᵀλ with what is reported, friction included, over the largest force."""
+    equations = run.record.equations
+    nodes = balance_with(equations, range(len(equations.rows)), ())
+    left = [np.broadcast_to(value, run.time.shape) for value in run.columns.evaluate(nodes, run.columns.rows)]
+    return np.max(np.abs(left), axis=0) / np.maximum(1.0, np.max(np.abs(run.record.lam), axis=1, initial=0.0))
+
+
+def drag_of_least_norm(sign):
+    """Forces N and deceleration with ΣN = m g, Σ x N = HIGH · drag, N orthogonal to what makes no force."""
+    x, mu = np.array(PLACES), np.array(COEFFICIENTS)
+    idle = np.cross(np.ones(3), x)
+    push = np.linalg.solve([np.ones(3), x - HIGH * sign * mu, idle], [MASS * G, 0.0, 0.0])
+    return push, mu @ push / MASS
+
+
+# the sled ------------------------------------------------------------------------------------------------------------
+@every_scheme
+@every_strategy
+def test_a_sled_on_three_runners_slides_with_the_drag_that_it_reports(scheme, contact):
+    run = slide(sled(), scheme, contact=contact)
+    push, slowing = drag_of_least_norm(1.0)
+    assert np.min(push) > 0.0
+    for k in range(3):
+        assert run[f"runner {k}.force"] == pytest.approx(np.full(len(run.time), push[k]), abs=1e-9)
+        assert run[f"runner {k}.friction"] == pytest.approx(-COEFFICIENTS[k] * run[f"runner {k}.force"], abs=1e-12)
+    drag = -sum(run[f"runner {k}.friction"] for k in range(3))
+    assert drag == pytest.approx(-MASS * run["place.x.acceleration"], abs=1e-12)
+    assert run["place.x"] == pytest.approx(3.0 * run.time - 0.5 * slowing * run.time**2, abs=1e-9)
+    assert "nor is the drag" in run.stats["notes"][0]
+
+
+@pytest.mark.parametrize("order", [(2, 0, 1), (1, 2, 0), (2, 1, 0)])
+@every_strategy
+def test_the_order_of_the_runners_changes_nothing(order, contact):
+    runs = [slide(sled(numbers, 0.2), speed=-2.0, until=1.0, contact=contact) for numbers in ((0, 1, 2), order)]
+    assert runs[0].final.q == pytest.approx(runs[1].final.q, abs=1e-12)
+    for k in range(3):
+        for what in "force", "friction":
+            name = f"runner {k}.{what}"
+            assert runs[0][name] == pytest.approx(runs[1][name], abs=1e-9)
+    stops = [{(event.name, round(event.time, 9)) for event in run.events} for run in runs]
+    assert stops[0] == stops[1]
+
+
+@every_scheme
+@every_strategy
+def test_it_halts_on_a_slope_and_its_runners_then_share_by_their_limits(scheme, contact):
+    run = slide(sled(slope=0.2), scheme, speed=-2.0, until=1.0, contact=contact)
+    assert {event.kind for event in run.events} == {"stuck"}
+    assert len({event.time for event in run.events}) == 1
+    assert np.max(imbalance(run)) < 1e-12
+    if contact == "events":  # a non-smooth step slides on until its end
+        check_friction(sled(slope=0.2), run)
+    used = [run[f"runner {k}.friction"][-1] / (COEFFICIENTS[k] * run[f"runner {k}.force"][-1]) for k in range(3)]
+    assert used == pytest.approx([used[0]] * 3, abs=1e-9)
+    assert LEAST_SHARE < abs(used[0]) < 1.0
+
+
+def test_machine_code_and_plain_python_agree():
+    compiled, plain = (slide(sled(slope=0.2), speed=-2.0, until=0.6, backend=name) for name in ("auto", "python"))
+    np.testing.assert_allclose(compiled.record.lam, plain.record.lam, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(compiled.record.q, plain.record.q, rtol=0, atol=1e-11)
+
+
+# impacts -------------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("law", ["newton", "poisson", "sequential"])
+@pytest.mark.parametrize("restitution", [0.0, 0.5])
+@every_strategy
+def test_impulses_of_redundant_runners_are_the_change_of_momentum(law, restitution, contact):
+    model = sled(restitution=restitution)
+    start = mbd.assemble(model, position={"place.y": 0.4}, velocity={"place.x": 2.0, "place.y": -1.0})
+    run = mbd.simulate(model, start, dt=5e-3, until=0.3, impact=law, contact=contact)
+    struck = [event for event in run.events if event.impulse.any()]
+    after = struck[0].row
+    first = [event for event in struck if event.row == after]
+    assert len(first) == 3
+    change = run.record.v[after] - run.record.v[after - 1]
+    push = {event.name: event.impulse for event in first}
+    x = np.array([PLACES[int(name[-1])] for name in push])
+    along, up = np.array([impulse[1] for impulse in push.values()]), np.array([i[0] for i in push.values()])
+    assert MASS * change[0] == pytest.approx(along.sum(), abs=1e-12)
+    assert MASS * change[1] == pytest.approx(up.sum(), abs=1e-12)
+    assert 0.1 * change[2] == pytest.approx(x @ up + HIGH * along.sum(), abs=1e-12)
+    for name, (normal, tangent) in push.items():
+        assert tangent == pytest.approx(-COEFFICIENTS[int(name[-1])] * normal, abs=1e-12)  # it goes on sliding
+        assert normal > 0.0
+    lost = run.energy.kinetic[after - 1] - run.energy.kinetic[after]
+    assert sum(event.energy_loss for event in first) == pytest.approx(lost, abs=1e-12)
+
+
+# any mechanism -------------------------------------------------------------------------------------------------------
+@lru_cache(maxsize=8)
+def laden(feet, swings):
+    """A body on feet in a row, with a load that swings on it; coefficients are run-time parameters."""
+    model = mbd.Model("laden")
+    body = mbd.RigidBody("body", mass=2.0, inertia=0.3)
+    model.connect(mbd.Planar("place", model.ground.origin, body.origin))
+    if swings:
+        load = mbd.Link("load", mass=0.7, length=0.4, center=0.3, inertia=0.01)
+        model.connect(mbd.Revolute("hinge", body.origin, load.start, loss=mbd.Coulomb(0.05)))
+    for k, x in enumerate(feet):
+        model.constrain(mbd.Unilateral(f"foot {k}", mbd.touchdown(body.point(x, -0.1)), friction=0.1))
+    return model
+
+
+@settings(max_examples=25)
+@given(
+    feet=st.sampled_from([(-0.9, 0.1, 0.8), (-0.9, -0.8, 0.3, 0.9)]), swings=st.booleans(),
+    mu=st.lists(st.floats(0.02, 0.4), min_size=4, max_size=4), speed=st.floats(-2.0, 2.0),
+    scheme=st.sampled_from(SCHEMES), contact=st.sampled_from(["events", "nonsmooth"]), high=st.sampled_from([0.1, 0.3]),
+)  # fmt: skip
+def test_reported_forces_balance_in_every_row_and_obey_coulomb(feet, swings, mu, speed, scheme, contact, high):
+    model = laden(feet, swings)
+    changed = {f"foot {k}.mu": mu[k] for k in range(len(feet))}
+    start = mbd.assemble(
+        model, position={"place.y": high} | ({"hinge.angle": 1.0} if swings else {}), velocity={"place.x": speed},
+        parameters=changed, closed=[f"foot {k}" for k in range(len(feet))] if high == 0.1 else [],
+    )  # fmt: skip
+    run = mbd.simulate(model, start, scheme, dt=5e-3, until=0.6, contact=contact)
+    equations = run.record.equations
+    assert np.max(imbalance(run)) < 1e-8
+    for each in equations.contacts:
+        force = run[f"{each.name}.force"]
+        assert np.min(force) > -1e-9 * np.max(np.abs(run.record.lam))
+        assert np.all(np.abs(run[f"{each.name}.friction"]) <= changed[f"{each.name}.mu"] * force + 1e-9 * force.max())
+
+
+@pytest.mark.parametrize("scheme", [SCHEMES[0], SCHEMES[3]], ids=repr)
+@pytest.mark.parametrize("loss", [None, mbd.Coulomb(0.2), mbd.PinFriction(0.2, 0.05)], ids=repr)
+def test_pins_of_redundant_cranks_balance_while_their_rows_turn(scheme, loss):
+    model = mbd.Model("parallel cranks")
+    coupler = mbd.RigidBody("coupler", mass=2.0, inertia=0.1)
+    cranks = [mbd.Link(f"crank {k}", mass=1.0, length=1.0, center=0.5, inertia=1 / 12) for k in range(3)]
+    for k, crank in enumerate(cranks):
+        model.connect(mbd.Revolute(f"base {k}", model.ground.point(float(k), 0.0), crank.start))
+    for k, crank in enumerate(cranks):
+        model.connect(mbd.Revolute(f"pin {k}", crank.end, coupler.point(k - 1.0, 0.0), loss=loss))
+    start = mbd.assemble(model, position={"base 0.angle": 0.8, "pin 0.angle": -0.8}, velocity={"base 0.rate": 1.0})
+    run = mbd.simulate(model, start, scheme, dt=5e-3, until=0.6)
+    assert np.max(imbalance(run)) < 1e-6
+    if loss is not None:
+        check_friction(model, run)
+
+
+def test_three_runners_with_one_coefficient_slide_as_two_do():
+    """Then the drag is μ m g however they share it."""
+    drags = []
+    for places in (-0.5, 0.5), (-0.5, 0.1, 0.5):
+        model = mbd.Model("plain sled")
+        body = mbd.RigidBody("body", mass=MASS, inertia=0.1)
+        model.connect(mbd.Planar("place", model.ground.origin, body.origin))
+        for k, x in enumerate(places):
+            model.constrain(mbd.Unilateral(f"runner {k}", mbd.touchdown(body.point(x, -HIGH)), friction=0.25))
+        names = [f"runner {k}" for k in range(len(places))]
+        start = mbd.assemble(model, position={"place.y": HIGH}, velocity={"place.x": 3.0}, closed=names)
+        run = mbd.simulate(model, start, dt=1e-2, until=0.5)
+        drags.append(run["place.x.acceleration"])
+    assert drags[0] == pytest.approx(np.full(len(drags[0]), -0.25 * G), abs=1e-12)
+    assert drags[1] == pytest.approx(drags[0], abs=1e-12)
+
+
+def test_the_linear_motion_of_a_sliding_sled_is_that_of_its_run():
+    """A spring holds it on a belt that runs below: δẍ = −k/m δx, with the drag of shares that do not change."""
+    model = mbd.Model("held")
+    body = mbd.RigidBody("body", mass=MASS, inertia=0.1)
+    model.connect(mbd.Planar("place", model.ground.origin, body.origin))
+    belt = mbd.Plane(velocity=(1.0, 0.0))
+    for k, x in enumerate(PLACES):
+        model.constrain(
+            mbd.Unilateral(f"runner {k}", mbd.touchdown(body.point(x, -HIGH), belt), friction=0.1 + 0.2 * k)
+        )
+    model.apply(mbd.Spring("spring", model.ground.point(-4.0, HIGH), body.origin, stiffness=30.0, length=4.0))
+    start = mbd.assemble(model, position={"place.y": HIGH}, closed=[f"runner {k}" for k in range(3)])
+    linear = mbd.linearize(model, start)
+    step = 1e-4
+    moved = [
+        mbd.simulate(
+            model,
+            mbd.assemble(
+                model, position={"place.x": side * step, "place.y": HIGH}, closed=[f"runner {k}" for k in range(3)]
+            ),
+            dt=1e-4, until=1e-4,
+        )["place.x.acceleration"][0]
+        for side in (-1.0, 1.0)
+    ]  # fmt: skip
+    assert linear.A[1, 0] == pytest.approx((moved[1] - moved[0]) / (2.0 * step), rel=1e-6)
