@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from mbd.analysis.accuracy import Accuracy as Accuracy, accuracy as accuracy
+    from mbd.analysis.effects import Effects as Effects, effects as effects
     from mbd.analysis.linearization import Linearization as Linearization, linearize as linearize
     from mbd.analysis.mobility import Mobility as Mobility, mobility as mobility
     from mbd.analysis.numerical import Criteria as Criteria, criteria as criteria
@@ -115,6 +116,7 @@ __version__ = "0.1.0"
 _HOMES = {
     "mbd.analysis.linearization": "Linearization linearize",
     "mbd.analysis.accuracy": "Accuracy accuracy",
+    "mbd.analysis.effects": "Effects effects",
     "mbd.analysis.mobility": "Mobility mobility",
     "mbd.analysis.numerical": "Criteria criteria",
     "mbd.assembly": "assemble",

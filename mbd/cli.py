@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mbd.errors import MbdError, ModelError, SimulationError, UnknownNameError, nearest
+from mbd.view.effects_arguments import describe as describe_effects
 from mbd.view.lab_arguments import describe
 from mbd.view.progress import Progress, progress_bar
 
@@ -227,6 +228,13 @@ def accuracy_command(arguments: argparse.Namespace) -> int:
     return run(Script.load(arguments.script), arguments)
 
 
+def effects_command(arguments: argparse.Namespace) -> int:
+    """``mbd effects``: what each effect of a scene costs and changes."""
+    from mbd.analysis.effects.command import run
+
+    return run(Script.load(arguments.script), arguments)
+
+
 def info_command(arguments: argparse.Namespace) -> int:
     """``mbd info``: versions, machine, backend and cache; what goes with what."""
     from mbd.compile.backend import backend
@@ -268,6 +276,7 @@ def _parser() -> argparse.ArgumentParser:
     check = command("check", check_command, "report faults, degrees of freedom and redundant rows of a script's model")
     check.add_argument("script", metavar="SCRIPT-or-EXAMPLE", help="a Python file that defines model, or an example")
     describe(command("accuracy", accuracy_command, "measure what accuracy costs: errors, times of schemes and steps"))
+    describe_effects(command("effects", effects_command, "leave out each effect in turn: its cost, energy and change"))
     hard = command(
         "hardcases", hardcases_command, "judge scenes on which multibody systems fail; write a table and a page"
     )

@@ -168,7 +168,12 @@ class Model:
         return sorted({instant for word in words for instant in word.instants()})
 
     def without(self, *names: str) -> Model:
-        """A copy that lacks some joints, losses ('left knee loss'), springs, forces or constraints, or 'gravity'."""
+        """A copy that lacks some joints, constraints or effects.
+
+        Effects are those that `cost` lists: 'gravity', losses ('left knee loss', all of it), springs of joints, forces,
+        penalty contacts, and dry friction alone ('left knee friction', 'box friction'), which leaves the rest of the
+        loss or the contact.
+        """
         model = copy.copy(self)
         known = {"gravity"}
         for kind in ("joints", "forces", "constraints", "controllers"):
@@ -176,13 +181,17 @@ class Model:
             known |= {word.name for word in words}
             setattr(model, kind, [word for word in words if word.name not in names])
         for place, joint in enumerate(model.joints):
-            bare: dict[str, Any] = {"loss": None} if joint.loss is not None else {}
-            sprung = joint.stiffness != 0.0 or f"{joint.name} spring.stiffness" in self.tunable
-            spring: dict[str, Any] = {"stiffness": 0.0} if sprung else {}
-            for effect, change in (f"{joint.name} loss", bare), (f"{joint.name} spring", spring):
-                known |= {effect} if change else set()
-                if effect in names and change:
-                    model.joints[place] = replace(model.joints[place], **change)  # type: ignore[type-var]
+            changes = _bare(joint, self.tunable)
+            known |= set(changes)
+            for effect in [effect for effect in changes if effect in names]:
+                changes = _bare(model.joints[place], self.tunable)  # a second friction is left out beside the first
+                if effect in changes:
+                    model.joints[place] = replace(model.joints[place], **changes[effect])  # type: ignore[type-var]
+        for place, word in enumerate(model.constraints):
+            if isinstance(word, Unilateral) and word.slides:
+                known.add(f"{word.name} friction")
+                if f"{word.name} friction" in names:
+                    model.constraints[place] = replace(word, friction=0.0)
         if "gravity" in names:
             model.gravity = (0.0, 0.0, 0.0)
         for name in names:
@@ -246,6 +255,16 @@ class Model:
         counts = {"bodies": len(self.bodies) - 1, "joints": len(self.joints), "forces": len(self.forces)}
         counts["constraints"] = len(self.constraints)
         return f"Model({self.name!r}: " + ", ".join(f"{count} {kind}" for kind, count in counts.items()) + ")"
+
+
+def _bare(joint: Joint, tunable: Iterable[str]) -> dict[str, dict[str, Any]]:
+    """The effects of a joint by name, each with the fields of the joint that lacks it."""
+    found: dict[str, dict[str, Any]] = {name: {"loss": rest} for name, rest in joint.frictions().items()}
+    if joint.loss is not None:
+        found[f"{joint.name} loss"] = {"loss": None}
+    if joint.stiffness != 0.0 or f"{joint.name} spring.stiffness" in tunable:
+        found[f"{joint.name} spring"] = {"stiffness": 0.0}
+    return found
 
 
 def _title(name: Any) -> str:

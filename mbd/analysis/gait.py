@@ -101,7 +101,7 @@ def gait(run: Trajectory) -> Gait:
     places = {event.row: run[feet[event.name].place][event.row] for event in strikes}
     states = _states(run, [event.row for event in strikes])
     pairs = mirrored(states.keys())
-    impacts = run.energy.work.get("impacts", np.zeros(len(run)))
+    impacts = run.energy.by_kind().get("impact", np.zeros(len(run)))
     steps = []
     for number, (before, after) in enumerate(pairwise(strikes)):
         lost = float(impacts[before.row] - impacts[after.row])

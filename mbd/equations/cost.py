@@ -67,6 +67,8 @@ def cost(model: Any) -> Cost:
     """
     from mbd.equations.derivation import derive
 
+    described = [controller.name for controller in getattr(model, "controllers", ())]
+    model = model.without(*described) if described else model  # they take no operation, and may need an effect
     equations = derive(model)
     base = _newton(equations)
     mode = equations.bilateral

@@ -20,12 +20,14 @@ __all__ = ["Cause", "causes", "effect_of", "penalty_effect", "weight_of"]
 class Cause:
     """What one effect does.
 
+    column : its kind in the energy ledger, '' for the usual one of its kind
     work : its virtual work, positive on the left-hand side; power : what it gives to the mechanism [W], None if nothing
     potential : stored energy [J]; rates : ż of its first-order states
     """
 
     name: str
     kind: str
+    column: str = ""
     work: Work = field(default_factory=Work)
     power: Node | None = None
     potential: Node | None = None
@@ -64,7 +66,7 @@ def _joint_spring(joint: Joint, scope: Surroundings) -> Cause:
 
 def _joint_loss(joint: Joint, scope: Surroundings) -> Cause:
     """``∂D/∂q̇`` on each rate."""
-    cause = Cause(f"{joint.name} loss", "loss")
+    cause = Cause(f"{joint.name} loss", "loss", "joint loss")
     if joint.losses():
         rates = scope.joint(joint.name).rates
         pairs = list(zip(rates, joint.resistance(rates, scope), strict=True))
@@ -75,7 +77,7 @@ def _joint_loss(joint: Joint, scope: Surroundings) -> Cause:
 def _force(force: Force, scope: Surroundings) -> Cause:
     """The action of a force."""
     action: Action = force.act(scope)
-    cause = Cause(force.name, force.kind, rates=action.rates)
+    cause = Cause(force.name, force.kind, force.column, rates=action.rates)
     _apply(cause, action.pairs, scope)
     if action.potential is not None:
         _store(cause, action.potential, scope)
@@ -119,7 +121,7 @@ def effect_of(cause: Cause, scope: Surroundings, dynamics: Dynamics) -> Effect:
     """The record of a cause; its generalized forces are made when they are asked for."""
     power = None if cause.power is None or cause.power.is_zero else scope.real(cause.power)
     potential = None if cause.potential is None else scope.real(cause.potential)
-    return Effect(cause.name, cause.kind, _lazily(scope, dynamics, cause.work), power, potential)
+    return Effect(cause.name, cause.kind, _lazily(scope, dynamics, cause.work), power, potential, column=cause.column)
 
 
 def penalty_effect(

@@ -145,6 +145,7 @@ class Effect:
     """One cause of forces: a loss, a spring, a motor, a penalty stop, gravity.
 
     kind : 'gravity', 'potential', 'loss', 'applied', 'penalty'
+    column : kind of cause in the energy ledger, see `mbd.results.ledger.Part`; by default from its kind
     generalized : makes its part of f (length n_v + n_z), positive on the left-hand side
     power : rate of work it does on the mechanism [W]; None where `potential` accounts for it
     potential : its stored energy [J] or None
@@ -157,6 +158,12 @@ class Effect:
     power: Node | None = None
     potential: Node | None = None
     contact: int = -1
+    column: str = ""
+
+    def __post_init__(self) -> None:
+        if not self.column:
+            usual = {"loss": "damper", "applied": "force"}
+            object.__setattr__(self, "column", usual.get(self.kind, self.kind))
 
 
 class Geometry(Protocol):

@@ -80,5 +80,6 @@ def _add(
         Effect(
             f"{name} friction", "loss",
             lambda: (*dynamics.generalized(work), *[scope.tape.zero] * len(scope.states)), -(multiplier * rate),
+            column="friction",
         )
     )  # fmt: skip

@@ -46,7 +46,12 @@ class Force(ABC):
     @property
     @abstractmethod
     def kind(self) -> str:
-        """'potential', 'loss' or 'applied': the column of the energy ledger."""
+        """'potential', 'loss' or 'applied': whether it stores energy, only takes it, or may give it."""
+
+    @property
+    def column(self) -> str:
+        """Kind of cause in the energy ledger: 'damper' for a loss, 'force' for what is applied, 'potential'."""
+        return {"loss": "damper", "applied": "force"}.get(self.kind, self.kind)
 
     @abstractmethod
     def mentions(self) -> list[Mention]:

@@ -43,6 +43,11 @@ class Motor(Force):
         """'applied'."""
         return "applied"
 
+    @property
+    def column(self) -> str:
+        """'motor'."""
+        return "motor"
+
     def mentions(self) -> list[Mention]:
         """Its joint, and what its function is called with."""
         return [self.joint, *mentioned(self.arguments)]

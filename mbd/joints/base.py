@@ -102,6 +102,20 @@ class Joint(ABC):
             return []
         return [(place, f"{self.name} loss", self.loss) for place in range(len(self.labels))]
 
+    def frictions(self) -> dict[str, Any]:
+        """Its loss without each friction that truly sticks: {'left knee friction': Viscous(0.1)}."""
+        found: dict[str, Any] = {}
+        alone = len(self.labels) == 1
+        each = {self.labels[place].name: loss for place, _, loss in self.losses()}
+        for label, loss in each.items():
+            if loss.smooth is loss or loss.smooth == loss:
+                continue
+            rest = {**each, label: loss.smooth}
+            kept = {name: value for name, value in rest.items() if value is not None} or None
+            plain = alone and not isinstance(self.loss, Mapping)
+            found[f"{self.name}{'' if alone else f'.{label}'} friction"] = loss.smooth if plain else kept
+        return found
+
     def resistance(self, rates: Sequence[Scalar], scope: Scope) -> list[Scalar]:
         """Generalized force ∂D/∂q̇ of its losses for each coordinate, positive on the left-hand side [N m or N]."""
         forces: list[Scalar] = [0.0] * len(self.labels)

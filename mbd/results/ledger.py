@@ -2,36 +2,55 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from mbd.arrays import Vector
-from mbd.errors import UnknownNameError, nearest
+from mbd.errors import ModelError, UnknownNameError, nearest
 
-__all__ = ["Ledger", "Part"]
+__all__ = ["KINDS", "SPENT", "Ledger", "Part"]
+
+KINDS = (
+    "joint loss", "damper", "friction", "penalty", "impact", "motor", "force", "constraint", "reset",
+)  # fmt: skip
+"""Kinds of causes, in the order in which they are told; one of a user's own comes behind them."""
+
+SPENT = ("joint loss", "damper", "friction", "penalty", "impact")
+"""Kinds that take energy out; the others may give or take."""
 
 
 @dataclass(frozen=True, eq=False)
 class Part:
     """Energy that one cause has given to the mechanism since the start (negative: taken), at every row [J].
 
-    kind : 'loss', 'applied', 'penalty', … of an effect; 'drive' (a prescribed motion, coordinates, a potential or a
-    surface that move with time), 'impact', 'reset' (a user's event set values, a controller changed parameters)
+    name : of the element: 'left knee loss', 'hip motor', 'left foot impact'
+    kind : 'joint loss', 'damper', 'friction' (dry), 'penalty', 'impact', 'motor', 'force', 'constraint' (a prescribed
+        motion, coordinates, a potential or a surface that move with time) or 'reset' (a user's event set values, a
+        controller changed parameters); of stored energy 'gravity' or 'potential', where `energy` is the energy itself
     """
 
     name: str
     kind: str
     energy: Vector
 
+    @property
+    def passed(self) -> float:
+        """Energy that went through it, ``Σ |ΔE|`` over the rows [J]: what a loss took, and twice a spring's swing."""
+        return float(np.sum(np.abs(np.diff(self.energy))))
+
 
 @dataclass(frozen=True, eq=False)
 class Ledger:
-    """Energy of a run at every stored row.
+    """Energy of a run at every stored row: ``T + V = (T + V)₀ + Σ parts + numerical``.
 
-    time [s], kinetic T [J], potential V [J] (R,); parts : what changed T + V, each summed from the start;
+    time [s], kinetic T [J], potential V [J] (R,)
+    parts : what changed T + V, each integrated on its own from the start
+    stored : V by element: gravity, springs, potentials
     stride : steps between stored rows, over which works are integrated
+    marks : (time [s], name) of the events
     """
 
     time: Vector
@@ -39,6 +58,8 @@ class Ledger:
     potential: Vector
     parts: tuple[Part, ...]
     stride: int = 1
+    stored: tuple[Part, ...] = ()
+    marks: tuple[tuple[float, str], ...] = ()
 
     @property
     def total(self) -> Vector:
@@ -78,31 +99,65 @@ class Ledger:
         """Each part over time [J]."""
         return {part.name: part.energy for part in self.parts}
 
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """The kinds of the parts, in the order of `KINDS`."""
+        found = dict.fromkeys(part.kind for part in self.parts)
+        known = [kind for kind in KINDS if kind in found]
+        return (*known, *(kind for kind in found if kind not in KINDS))
+
+    def of(self, kind: str) -> tuple[Part, ...]:
+        """The parts of one kind."""
+        return tuple(part for part in self.parts if part.kind == kind)
+
+    def by_kind(self) -> dict[str, Vector]:
+        """What each kind of cause has given since the start, over time, and 'numerical' [J]."""
+        found = {kind: np.sum([part.energy for part in self.of(kind)], axis=0) for kind in self.kinds}
+        return {**found, "numerical": self.numerical}
+
     def __getitem__(self, name: str) -> Vector:
-        """'kinetic', 'potential', 'total', 'numerical', or a part by its name [J]."""
+        """'kinetic', 'potential', 'total', 'numerical', a part, stored energy or kind by its name [J]."""
         columns = {
-            "kinetic": self.kinetic, "potential": self.potential, "total": self.total, "numerical": self.numerical,
-        } | self.work  # fmt: skip
+            **self.by_kind(), **{part.name: part.energy for part in self.stored},
+            "kinetic": self.kinetic, "potential": self.potential, "total": self.total, **self.work,
+        }  # fmt: skip
         if name not in columns:
             raise UnknownNameError(nearest(name, columns, "part of the energy"))
         return columns[name]
 
+    def to_dataframe(self, by: Literal["element", "kind"] = "element") -> Any:
+        """A pandas table [J]: `time` as index; kinetic, potential, total; each part, or each kind; numerical."""
+        if by not in ("element", "kind"):
+            raise ModelError(f"to_dataframe(by=…) takes 'element' or 'kind', not {by!r}")
+        from mbd.results.tables import library
+
+        pandas = library("pandas", "data", "run.energy.to_dataframe()")
+        causes = self.by_kind() if by == "kind" else {**self.work, "numerical": self.numerical}
+        columns = {"kinetic": self.kinetic, "potential": self.potential, "total": self.total, **causes}
+        return pandas.DataFrame(columns, index=pandas.Index(self.time, name="time"))
+
     def __repr__(self) -> str:
-        width = max(18, *(len(part.name) + 2 for part in self.parts)) if self.parts else 18
-        lines = [f"{'energy':<{width}}{'start':>14}{'end':>14}{'change':>14}   [J]"]
+        return "\n".join(self._lines())
+
+    def _lines(self) -> Iterator[str]:
+        """T, V and E, then what changed them: by kind, those of several elements with their shares of it."""
+        width = max([18, *(len(part.name) + 4 for part in self.parts), *(len(kind) + 4 for kind in self.kinds)])
+        yield f"{'energy':<{width}}{'start':>14}{'end':>14}{'change':>14}   [J]"
         for name, column in (("kinetic", self.kinetic), ("potential", self.potential), ("total", self.total)):
             begin, end = _last(column[:1]), _last(column)
-            lines.append(f"{name:<{width}}{begin:>14.6g}{end:>14.6g}{end - begin:>14.6g}")
-        lines.append("of which")
-        kinds = {part.name: part.kind for part in self.parts}
-        for name, value in self.sums.items():
-            kind = kinds.get(name, "the integrator")
-            lines.append(f"  {name:<{width - 2}}{'':>28}{value:>14.6g}   {kind}")
+            yield f"{name:<{width}}{begin:>14.6g}{end:>14.6g}{end - begin:>14.6g}"
+        yield "of which"
+        for kind in self.kinds:
+            parts = self.of(kind)
+            told = sum(_last(part.energy) for part in parts)
+            alone = len(parts) == 1
+            title, note = (parts[0].name, f"   {kind}") if alone else (kind, "")
+            yield f"  {title:<{width - 2}}{'':>28}{told:>14.6g}{note}"
+            for part in () if alone else parts:
+                yield f"    {part.name:<{width - 4}}{'':>14}{_last(part.energy):>14.6g}"
+        yield f"  {'numerical':<{width - 2}}{'':>28}{_last(self.numerical):>14.6g}   the integrator"
         if self.stride > 1 and self.parts:
-            lines.append(
-                f"works are integrated over rows {self.stride} steps apart, whose error stands under 'numerical'"
-            )
-        return "\n".join(lines)
+            yield f"works are integrated over rows {self.stride} steps apart, whose error stands under 'numerical'"
 
     def plot(self, path: Any = None) -> Any:
         """The energies over time, and where they went; returns the matplotlib figure, saved if a path is given."""

@@ -81,7 +81,7 @@ def save(run: Trajectory, path: str | Path, names: Sequence[str] | None = None) 
     for number, (_, values) in enumerate(record.parameter_changes):
         arrays[f"change {number}"] = values
     meta["aliases"], meta["values"], meta["names"] = _columns(run.columns, names, arrays)
-    meta["parts"] = _ledger(run.energy, arrays)
+    meta["parts"], meta["stored"] = _ledger(run.energy, arrays)
     text = json.dumps(meta, default=plain)
     arrays["meta"] = np.frombuffer(text.encode(), dtype=np.uint8)
     write(target, arrays)
@@ -132,11 +132,23 @@ def _columns(
     return aliases, values, list(dict.fromkeys(wanted))
 
 
-def _ledger(ledger: Ledger, arrays: Arrays) -> list[tuple[str, str]]:
+def _ledger(ledger: Ledger, arrays: Arrays) -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:
+    """Names and kinds of what changed the energy, and of what stores it."""
     arrays["kinetic"], arrays["potential"] = ledger.kinetic, ledger.potential
-    for number, part in enumerate(ledger.parts):
-        arrays[f"part {number}"] = part.energy
-    return [(part.name, part.kind) for part in ledger.parts]
+    for title, parts in (("part", ledger.parts), ("store", ledger.stored)):
+        arrays.update({f"{title} {number}": part.energy for number, part in enumerate(parts)})
+    return [(part.name, part.kind) for part in ledger.parts], [(part.name, part.kind) for part in ledger.stored]
+
+
+def _read_ledger(record: Record, arrays: Arrays, meta: Mapping[str, Any]) -> Ledger:
+    """The ledger of a file; older ones do not tell what stores energy."""
+    parts, stored = (
+        tuple(Part(name, kind, arrays[f"{title} {k}"]) for k, (name, kind) in enumerate(meta.get(key, ())))
+        for title, key in (("part", "parts"), ("store", "stored"))
+    )
+    marks = tuple((event.time, event.name) for event in record.events if event.kind != "opened")
+    stride = record.settings.get("store", 1)
+    return Ledger(record.time, arrays["kinetic"], arrays["potential"], parts, stride, stored, marks)
 
 
 def load(path: str | Path) -> Trajectory:
@@ -148,9 +160,8 @@ def load(path: str | Path) -> Trajectory:
     record = _record(arrays, meta)
     values = {name: arrays[f"value {number}"] for name, number in meta["values"].items()}
     aliases = {name: (part, index) for name, (part, index) in meta["aliases"].items()}
-    parts = tuple(Part(name, kind, arrays[f"part {k}"]) for k, (name, kind) in enumerate(meta["parts"]))
     columns = StoredColumns(record, aliases, values, meta["names"], arrays["anchors"], arrays.get("q_rate", record.v))
-    ledger = Ledger(record.time, arrays["kinetic"], arrays["potential"], parts, record.settings.get("store", 1))
+    ledger = _read_ledger(record, arrays, meta)
     return Trajectory(record, Archive(columns, ledger, Violation(**meta["violation"]), Facts.read(meta["facts"])))
 
 

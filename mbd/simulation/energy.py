@@ -45,7 +45,7 @@ ROUND_OFF = 1e-9
 """Share of the largest energies below which changes mean nothing [-]."""
 MOVED = 1e-6
 """Way of the fastest coordinate [m, rad] below which a mechanism is at rest, and its energy round-off."""
-UNDRIVEN = frozenset({"loss", "penalty"})
+UNDRIVEN = frozenset({"joint loss", "damper", "friction", "penalty"})
 """Kinds of works that take energy, or give back what they took."""
 
 KINDS: WeakKeyDictionary[Mechanism, frozenset[str]] = WeakKeyDictionary()

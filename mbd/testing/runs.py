@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from mbd.equations.equations import Contact, Equations, Friction
+from mbd.results.ledger import SPENT
 from mbd.testing.findings import Findings
 
 __all__ = ["run_laws"]
@@ -126,7 +127,7 @@ def _energy(findings: Findings, run: Any, equations: Equations) -> None:
         if part.kind == "penalty" and part.name in acting and run[f"{part.name}.force"][0] == 0.0:
             law = "passivity: a penalty gives back no more than it took"
             findings.holds(law, worst <= LEDGER * swing, sentence, hint)
-        elif part.kind in ("loss", "impact"):
+        elif part.kind in SPENT and part.kind != "penalty":
             law = f"passivity: a{'n' if part.kind == 'impact' else ''} {part.kind} takes energy along the run"
             findings.holds(law, worst <= 1e-6 * (1.0 + swing), sentence, "its power on the mechanism is ≤ 0")
     hint = "an effect does work that neither its power nor its potential tells"

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mbd.results.ledger import SPENT
 from mbd.results.summary import facts
 from mbd.results.units import unit
-from mbd.view.plots import QUANTITIES, SPENT, stretches
+from mbd.view.plots import QUANTITIES, stretches
 from mbd.view.scene import Instants, Scene, scene
 from mbd.view.style import CYCLE
 from mbd.view.template import filled, written

@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mbd.results.ledger import SPENT, Ledger, Part
 from mbd.results.tables import library
 from mbd.results.units import unit
 from mbd.view.style import CYCLE, NEUTRAL, color, rules
 
 if TYPE_CHECKING:
-    from mbd.results.ledger import Ledger
     from mbd.trajectory import Trajectory
 
 __all__ = ["contacts", "drawing", "energy", "histories", "phase_portrait"]
@@ -26,8 +26,8 @@ __all__ = ["contacts", "drawing", "energy", "histories", "phase_portrait"]
 MANY = 60
 """Events beyond this number are left to the contact bars, so that lines do not hide the curves."""
 
-SPENT = ("loss", "impact", "penalty")
-"""Kinds of parts that are stacked as energy gone; other parts move the ceiling of the stack."""
+LAYERS = 8
+"""Causes that a stack of energies shows one by one; beyond, those of a kind are one layer."""
 
 QUANTITIES = {
     "rad": "angle", "m": "length", "rad/s": "angular rate", "m/s": "speed", "rad/s²": "angular acceleration",
@@ -93,10 +93,17 @@ def _legend(axes: Any, count: int) -> None:
 
 def _mark(axes: Any, run: Trajectory) -> None:
     """A thin line where a contact closed, friction stuck or slipped, or a user's event happened."""
-    marked = [event for event in run.events if event.kind != "opened"]
-    for event in marked if len(marked) <= MANY else ():
-        shade = "black" if event.kind == "event" else color(event.name)
-        axes.axvline(event.time, color=shade, linewidth=0.7, alpha=0.35, linestyle=":", zorder=0.5)
+    _lines(
+        axes, [(event.time, "" if event.kind == "event" else event.name) for event in run.events
+               if event.kind != "opened"]
+    )  # fmt: skip
+
+
+def _lines(axes: Any, marks: Sequence[tuple[float, str]], above: bool = False) -> None:
+    """A thin line at each (time, name), in the color of its side; black without a name; above areas or below curves."""
+    for time, name in marks if len(marks) <= MANY else ():
+        shade = color(name) if name else "black"
+        axes.axvline(time, color=shade, linewidth=0.7, alpha=0.35, linestyle=":", zorder=2.5 if above else 0.5)
 
 
 def _bars(axes: Any, run: Trajectory) -> None:
@@ -133,28 +140,43 @@ def energy(ledger: Ledger, path: str | Path | None = None) -> Any:
     """Kinetic and potential energy stacked with what was lost, below the ceiling of what was put in; and the remainder.
 
     ``T + (V − V_min) + Σ lost = E(0) − V_min + Σ put in + numerical``: where the stack leaves the line, the integrator
-    made or lost energy. The lower panel shows that difference alone.
+    made or lost energy. The lower panel shows that difference alone. Events are thin lines, many of them ticks.
     """
     time, floor = ledger.time, float(np.min(ledger.potential, initial=np.inf))
-    spent = [part for part in ledger.parts if part.kind in SPENT and np.any(part.energy)]
-    given = [part for part in ledger.parts if part.kind not in SPENT]
+    spent, given = _spent(ledger), [part for part in ledger.parts if part.kind not in SPENT]
     layers = [ledger.kinetic, ledger.potential - floor, *(-part.energy for part in spent)]
     labels = ["kinetic", "potential (above its least)", *(f"lost: {part.name}" for part in spent)]
-    ceiling = ledger.total[0] - floor + sum((part.energy for part in given), np.zeros(len(time)))
-    with drawing(path, 7.4, 4.4) as figure:
+    ceiling = ledger.total[:1] - floor + sum((part.energy for part in given), np.zeros(len(time)))
+    with drawing(path, 7.4, 4.4 + 0.17 * (len(layers) // 3)) as figure:
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[3.0, 1.0])
         shades = [CYCLE[0], CYCLE[5], CYCLE[1], CYCLE[4], CYCLE[3], CYCLE[2], CYCLE[6], CYCLE[7]]
-        colors = [shades[k % len(shades)] for k in range(len(layers))]
-        upper.stackplot(time, *layers, labels=labels, colors=colors, alpha=0.8, linewidth=0)
+        colors = [*shades, *(f"{shade}80" for shade in shades[2:])]
+        upper.stackplot(
+            time, *layers, labels=labels, colors=[colors[k % len(colors)] for k in range(len(layers))], alpha=0.8,
+            linewidth=0,
+        )  # fmt: skip
         upper.plot(time, ceiling, color="black", linewidth=1.0, label="start + put in" if given else "start")
         upper.set_ylabel("energy [J]")
-        _legend(upper, 4 if len(layers) > 2 else 3)
+        _legend(upper, 3)
         lower.plot(time, ledger.numerical, color=NEUTRAL)
         lower.set_ylabel("numerical [J]")
         lower.set_xlabel("time [s]")
+        for panel in (upper, lower):
+            _lines(panel, ledger.marks, above=True)
+        for instant, _ in ledger.marks if len(ledger.marks) > MANY else ():
+            lower.axvline(instant, ymin=0.93, color="black", linewidth=0.7, alpha=0.6)
         if len(time) and time[-1] > time[0]:
             lower.set_xlim(time[0], time[-1])
     return figure
+
+
+def _spent(ledger: Ledger) -> list[Part]:
+    """What took energy, as layers: each element, or each kind where there are many; little ones on top."""
+    parts = [part for part in ledger.parts if part.kind in SPENT and np.any(part.energy)]
+    if len(parts) > LAYERS:
+        sums = ledger.by_kind()
+        parts = [Part(kind, kind, sums[kind]) for kind in dict.fromkeys(part.kind for part in parts)]
+    return sorted(parts, key=lambda part: -float(np.max(np.abs(part.energy))))
 
 
 def phase_portrait(run: Trajectory, *coordinates: str, path: str | Path | None = None) -> Any:

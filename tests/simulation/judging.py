@@ -87,7 +87,7 @@ def _ledger(run: mbd.Trajectory) -> list[str]:
     values = [*books.sums.values(), books.numerical, books["kinetic"]]
     if not all(np.isfinite(value).all() for value in values):
         return ["the energy books are not finite"]
-    blows = books.work.get("impacts", np.zeros(0))
+    blows = books.by_kind().get("impact", np.zeros(0))
     largest = float(np.max(np.abs(books["kinetic"]), initial=0.0))
     gained = float(np.max(np.diff(blows), initial=0.0))
     if run.settings["contact"] == "events" and gained > 1e-9 * largest:  # non-smooth steps lift bodies too

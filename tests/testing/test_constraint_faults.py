@@ -190,8 +190,8 @@ RUNS = {
     "a penalty pushes": {"gap": [1, -1, -1], "force": [0, 2, -1], "closed": [0, 1, 1], "kind": "penalty"},
     "impact: impulses push": {"gap": [1, 0, 0], "force": [0, 2, 1], "closed": [0, 1, 1], "impulse": -0.2},
     "impact: no energy is made": {"gap": [1, 0, 0], "force": [0, 2, 1], "closed": [0, 1, 1], "loss": -0.2},
-    "passivity: a loss takes energy along the run": {
-        "gap": [1, 0, 0], "force": [0, 2, 1], "closed": [0, 1, 1], "parts": [("loss", "loss", [0, -1, -0.5])],
+    "passivity: a damper takes energy along the run": {
+        "gap": [1, 0, 0], "force": [0, 2, 1], "closed": [0, 1, 1], "parts": [("loss", "damper", [0, -1, -0.5])],
     },
     "passivity: an impact takes energy along the run": {
         "gap": [1, 0, 0], "force": [0, 2, 1], "closed": [0, 1, 1], "parts": [("foot", "impact", [0, 0, 0.5])],

@@ -55,7 +55,7 @@ def test_the_energy_plot_stacks_what_is_left_and_what_is_lost():
     figure = run.energy.plot()
     upper, lower = figure.axes
     labels = [text.get_text() for text in upper.get_legend().get_texts()]
-    assert labels == ["kinetic", "potential (above its least)", "lost: impacts", "start"]
+    assert labels == ["kinetic", "potential (above its least)", "lost: floor impact", "start"]
     assert len(upper.collections) == 3 and lower.get_ylabel() == "numerical [J]"
     assert upper.get_ylabel() == "energy [J]"
 

@@ -14,7 +14,7 @@ from mbd.arrays import Vector
 if TYPE_CHECKING:
     from mbd.trajectory import EventRecord, Trajectory
 
-__all__ = ["Difference", "Matches", "aligned", "differences", "matched", "ranges"]
+__all__ = ["Difference", "Matches", "aligned", "apart", "differences", "gaps", "matched", "ranges"]
 
 ALONE = 0.01
 """What an event without a match costs, as a shift relative to the length of the run [-]."""
@@ -140,9 +140,9 @@ def differences(run: Trajectory, reference: Trajectory, scales: Mapping[str, flo
     found = matched(run.events, reference.events, begin, end)
     pairs = found.pairs + found.late
     inside = instants[instants <= end]
-    keep = _apart(inside, pairs, BESIDE * (end - begin))
-    compared = _gaps(run, reference, scales, inside[keep], inside[keep]) if keep.any() else {}
-    ends = {} if found.late else _gaps(run, reference, scales, run.time[-1:], reference.time[-1:])
+    keep = apart(inside, pairs, BESIDE * (end - begin))
+    compared = gaps(run, reference, scales, inside[keep], inside[keep]) if keep.any() else {}
+    ends = {} if found.late else gaps(run, reference, scales, run.time[-1:], reference.time[-1:])
     return Difference(
         {name: float(np.nanmax(gap, initial=0.0)) for name, gap in compared.items()},
         {name: float(gap[0]) for name, gap in ends.items() if np.isfinite(gap[0])},
@@ -152,7 +152,7 @@ def differences(run: Trajectory, reference: Trajectory, scales: Mapping[str, flo
     )
 
 
-def _apart(instants: Vector, pairs: Sequence[tuple[float, float]], beside: float) -> NDArray[np.bool_]:
+def apart(instants: Vector, pairs: Sequence[tuple[float, float]], beside: float) -> NDArray[np.bool_]:
     """Which instants do not lie between the two times of an event."""
     keep = np.ones(len(instants), dtype=bool)
     for ours, theirs in pairs:
@@ -160,7 +160,7 @@ def _apart(instants: Vector, pairs: Sequence[tuple[float, float]], beside: float
     return keep
 
 
-def _gaps(
+def gaps(
     run: Trajectory, reference: Trajectory, scales: Mapping[str, float], ours: Vector, theirs: Vector
 ) -> dict[str, Vector]:
     """|difference| over range of each quantity."""

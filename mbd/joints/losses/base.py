@@ -43,6 +43,11 @@ class Loss(ABC):
         """
         return 0.0
 
+    @property
+    def smooth(self) -> Loss | None:
+        """What is left of it without friction that truly sticks; None where that is all of it."""
+        return self if type(self).dry is Loss.dry else None
+
     def faults(self, owner: str) -> list[str]:
         """Why it would not dissipate, one sentence each; by default, negative fields."""
         return [
@@ -108,6 +113,12 @@ class LossSum(Loss):
         for name, loss in self.named(owner):
             result = result + loss.dry(load, scope, name)
         return result
+
+    @property
+    def smooth(self) -> Loss | None:
+        """Those of its parts that are smooth, with the names of their parameters."""
+        parts = tuple(part for loss in self.losses if (part := loss.smooth) is not None)
+        return LossSum(parts) if parts else None
 
     def fields(self) -> dict[str, float]:
         """The fields of its parts: 'viscous.coefficient', …"""

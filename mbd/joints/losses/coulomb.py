@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from mbd.bodies.values import number
 from mbd.errors import ModelError
-from mbd.joints.losses.base import DissipationFunction
+from mbd.joints.losses.base import DissipationFunction, Loss
 from mbd.scope import Scope
 from mbd.tape.functions import sqrt
 from mbd.tape.node import Scalar
@@ -40,6 +40,11 @@ class Coulomb(DissipationFunction):
             raise ModelError(
                 f"smoothing of Coulomb must be positive, got {self.smoothing:g}; try 0.01 rad/s, or None to truly stick"
             )
+
+    @property
+    def smooth(self) -> Loss | None:
+        """Itself with a smoothing, else nothing."""
+        return None if self.smoothing is None else self
 
     def fields(self) -> dict[str, float]:
         """`torque`, and `smoothing` if there is one."""

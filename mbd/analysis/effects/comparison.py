@@ -1,0 +1,96 @@
+"""How far a run without an effect is from the whole scene's: until their events differ."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mbd.analysis.accuracy.compare import apart, gaps
+from mbd.analysis.effects.contribution import Change
+from mbd.arrays import Vector
+
+if TYPE_CHECKING:
+    from mbd.equations.equations import Equations
+    from mbd.trajectory import EventRecord, Trajectory
+
+__all__ = ["change", "common", "same_rows"]
+
+ALIKE = 4
+"""Events among which the next one is looked for: those of about one instant may come in any order."""
+BESIDE = 1e-9
+"""Instants this close to an event are left out too, relative to the length of the run [-]."""
+
+
+def change(run: Trajectory, whole: Trajectory, scales: Mapping[str, float], instants: Vector) -> Change:
+    """What sets a run without some effects apart from that of the whole scene.
+
+    Parameters
+    ----------
+    scales : range of each output in the whole scene
+    instants : at which they are compared [s]
+    """
+    if not run.success:
+        return Change(failure=run.message)
+    pairs, differs = common(run.events, _possible(whole.events, run.record.equations))
+    begin, end = float(whole.time[0]), min(float(run.time[-1]), float(whole.time[-1]))
+    shift = max((abs(a - b) for a, b in pairs), default=0.0)
+    ends = _ends(run, whole)
+    if ends:
+        differs = min(end, end if differs is None else differs)
+    elif differs is not None and end - differs <= 2.0 * shift:  # in the other run it comes after the end
+        pairs, differs = [*pairs, (differs, end)], None
+    until = end if differs is None else min(end, differs)
+    inside = instants[instants <= until]
+    keep = apart(inside, pairs, BESIDE * max(end - begin, 1e-300))
+    kept = inside[keep]
+    outputs = {}
+    if len(kept) > 1:
+        found = gaps(run, whole, scales, kept, kept)
+        outputs = {name: float(np.nanmax(gap, initial=0.0)) for name, gap in found.items()}
+    left_out = 1.0 - float(np.mean(keep)) if len(keep) else 1.0
+    return Change(outputs, until, shift, differs, left_out, ends, identical=same_rows(run, whole))
+
+
+def _possible(events: Sequence[EventRecord], equations: Equations | None) -> list[EventRecord]:
+    """The events that can happen in a scene: not those of contacts and frictions that it lacks."""
+    assert equations is not None
+    contacts = {contact.name for contact in equations.contacts}
+    frictions = {friction.name for friction in equations.frictions}
+    known = {"closed": contacts, "opened": contacts, "stuck": frictions, "slipped": frictions}
+    return [event for event in events if event.kind == "event" or event.name in known[event.kind]]
+
+
+def common(
+    first: Sequence[EventRecord], second: Sequence[EventRecord]
+) -> tuple[list[tuple[float, float]], float | None]:
+    """Times of the events that two runs share from the start on, and the time of the first that one of them lacks."""
+    mine, theirs = list(first), list(second)
+    pairs: list[tuple[float, float]] = []
+    while mine and theirs:
+        event = mine[0]
+        match = next(
+            (k for k, other in enumerate(theirs[:ALIKE]) if (other.kind, other.name) == (event.kind, event.name)), None
+        )
+        if match is None:
+            break
+        if match and all((e.kind, e.name) != (theirs[0].kind, theirs[0].name) for e in mine[1:ALIKE]):
+            break  # what the other run has first never comes in this one
+        pairs.append((event.time, theirs[match].time))
+        del mine[0], theirs[match]
+    rest = [events[0].time for events in (mine, theirs) if events]
+    return pairs, min(rest, default=None)
+
+
+def _ends(run: Trajectory, whole: Trajectory) -> str:
+    """How a run ends where the whole scene does not end so."""
+    mine, theirs = (each.message.partition(" at t =")[0] for each in (run, whole))
+    return run.message if mine != theirs else ""
+
+
+def same_rows(run: Trajectory, whole: Trajectory) -> bool:
+    """Whether times, positions, velocities and accelerations of all rows are the same to the bit."""
+    return all(
+        getattr(run.record, name).tobytes() == getattr(whole.record, name).tobytes() for name in ("time", "q", "v", "a")
+    )

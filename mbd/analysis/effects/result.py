@@ -1,0 +1,176 @@
+"""What the study of effects found: as text, table, CSV and plot."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mbd.analysis.effects.advice import advice
+from mbd.analysis.effects.contribution import Change, Contribution
+from mbd.errors import UnknownNameError, nearest
+from mbd.results.tables import library
+
+if TYPE_CHECKING:
+    from mbd.trajectory import Trajectory
+
+__all__ = ["HEADS", "Effects", "Together", "cells"]
+
+HEADS = ("effect", "kind", "operations", "ns/step", "energy [J]", "share", "change", "of", "until [s]")
+"""Columns of the table."""
+
+WHEN = {"always": "", "while closed": "*", "while sliding": "†"}
+"""Marks of operations that are not always taken."""
+
+
+@dataclass(frozen=True)
+class Together:
+    """Effects left out at once: their names, those put back before, the change, and the operations that are left."""
+
+    names: tuple[str, ...]
+    back: tuple[str, ...]
+    change: Change
+    operations: int
+
+
+@dataclass(frozen=True, eq=False)
+class Effects:
+    """What each effect of a scene costs, carries and changes.
+
+    Attributes
+    ----------
+    model : name of the model
+    outputs : by which changes were judged
+    tolerance : change that was allowed, relative to the range of an output [-]
+    contributions : a `Contribution` for each effect, in the order of the model
+    operations : of a Newton iteration of the whole scene, no contact closed
+    shared : operations that only effects need, but more than one of them: counted for none
+    together : what may be left out at once, shown by a run; None where nothing may
+    run : of the whole scene
+    complete : False where it was interrupted
+    """
+
+    model: str
+    outputs: tuple[str, ...]
+    tolerance: float
+    contributions: tuple[Contribution, ...]
+    operations: int
+    shared: int
+    together: Together | None
+    run: Trajectory = field(repr=False)
+    complete: bool = True
+
+    def __getitem__(self, name: str) -> Contribution:
+        """An effect by name."""
+        for each in self.contributions:
+            if each.name == name:
+                return each
+        raise UnknownNameError(nearest(name, [each.name for each in self.contributions], "effect"))
+
+    @cached_property
+    def recommendation(self) -> tuple[str, ...]:
+        """Which effects may be left out, alone and together."""
+        return tuple(advice(self))
+
+    @property
+    def droppable(self) -> tuple[str, ...]:
+        """The effects that may be left out together within the tolerance, as a run has shown."""
+        return self.together.names if self.together is not None else ()
+
+    def __repr__(self) -> str:
+        rows = [HEADS, *(cells(each) for each in self.contributions)]
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        span = f"{float(self.run.time[-1]) - float(self.run.time[0]):g} s" if len(self.run) else "0 s"
+        lines = [f"effects of {self.model!r} over {span}: {self.run.message}"]
+        lines += [_line(rows[0], widths), "  ".join("─" * width for width in widths)]
+        for row in rows[1:]:
+            lines.append(_line(row, widths).rstrip())
+        told = [f"without {each.name!r}: {each.change}" for each in self.contributions if str(each.change)]
+        lines += ["", *told] if told else []
+        lines += ["", *self.legend, "", *self.recommendation]
+        return "\n".join(lines)
+
+    @property
+    def legend(self) -> tuple[str, ...]:
+        """What the columns mean, and how sure the times are."""
+        marks = {each.acts for each in self.contributions}
+        acts = [f"{WHEN[kind]} {kind}" for kind in WHEN if WHEN[kind] and kind in marks]
+        shared = f", {self.shared} more are shared by several effects" if self.shared > 0 else ""
+        found = [
+            f"operations: of a Newton iteration, {self.operations} in all{shared}" + "".join(f"; {a}" for a in acts),
+            "energy: Σ |ΔE| that went through it; share: of all elements, impacts included",
+            "change: largest difference of an output over its range without the effect; which output; compared until",
+        ]
+        times = [each.timing for each in self.contributions if each.timing is not None]
+        if times:
+            whole = sorted({round(time.whole) for time in times})
+            span = f"{whole[0]}" if len(whole) == 1 else f"{whole[0]} to {whole[-1]}"
+            told = f"processor time, of {span} ns in all; least of {times[0].rounds} runs with and without, by turns"
+            found.insert(1, f"ns/step: {told}")
+        return (*found, *(() if self.complete else ("interrupted: the rest was not measured",)))
+
+    # tables ---------------------------------------------------------------------------------------------------------
+    def rows(self) -> list[dict[str, Any]]:
+        """One flat dictionary an effect; changes by output as 'change of …'."""
+        found = []
+        for each in self.contributions:
+            change = each.change
+            row: dict[str, Any] = {
+                "effect": each.name, "kind": each.kind, "operations": each.operations, "acts": each.acts,
+                "nanoseconds per step": None if each.timing is None else each.timing.added,
+                "noise": None if each.timing is None else each.timing.noise,
+                "energy": each.energy, "share": each.share, "change": change.largest, "until": change.until,
+                "event time": change.event_time, "differs at": change.differs_at, "left out": change.left_out,
+                "identical": change.identical, "droppable": each.name in self.droppable, "note": str(change),
+            }  # fmt: skip
+            found.append(row | {f"change of {name}": change.outputs.get(name) for name in self.outputs})
+        return found
+
+    def to_dataframe(self) -> Any:
+        """A pandas table, a row for each effect."""
+        return library("pandas", "data", "result.to_dataframe()").DataFrame(self.rows())
+
+    def to_csv(self, path: str | Path) -> Path:
+        """The same as a file of comma-separated values."""
+        target = Path(path)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        rows = self.rows()
+        with target.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.DictWriter(file, list(rows[0]) if rows else [])
+            writer.writeheader()
+            writer.writerows(rows)
+        return target
+
+    def plot(self, path: str | Path | None = None) -> Any:
+        """Bars: share of the energy, change without it, operations and time.
+
+        Returns the matplotlib figure, also saved when a path is given.
+        """
+        from mbd.view.effects import bars
+
+        return bars(self, path)
+
+
+def cells(each: Contribution) -> tuple[str, ...]:
+    """An effect as the texts of a row of `HEADS`."""
+    change = each.change
+    largest, of = "–", ""
+    if change.outputs and not change.failure:
+        of = max(change.outputs, key=lambda name: change.outputs[name])
+        largest = f"{change.largest:.1e}" if change.largest else "0"
+        of = of if change.largest else ""
+    return (
+        each.name, each.kind, f"{each.operations}{WHEN[each.acts]}", each.time, f"{each.energy:.4g}",
+        f"{100.0 * each.share:.2g} %", largest, of, "" if change.failure else f"{change.until:.4g}",
+    )  # fmt: skip
+
+
+def _line(texts: Sequence[str], widths: Sequence[int]) -> str:
+    left = (0, 1, 7)
+    return "  ".join(
+        f"{text:<{width}}" if k in left else f"{text:>{width}}"
+        for k, (text, width) in enumerate(zip(texts, widths, strict=True))
+    )

@@ -1,0 +1,104 @@
+"""The scene without some of its effects, started with the same values."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mbd.assembly import assemble
+from mbd.compile.mechanisms import mechanism_of
+from mbd.equations.cost import Cost
+from mbd.equations.equations import Equations
+from mbd.state import Mode, State
+
+if TYPE_CHECKING:
+    from mbd.trajectory import Trajectory
+
+__all__ = ["Element", "Scene", "elements", "reduced"]
+
+
+@dataclass(frozen=True)
+class Element:
+    """An effect that may be left out: name, kind in the ledger, operations, and when it takes them."""
+
+    name: str
+    kind: str
+    operations: int
+    acts: str
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A model, its start, and the parameters that differ from the model's."""
+
+    model: Any
+    start: State
+    parameters: Mapping[str, float]
+
+
+def elements(equations: Equations, cost: Cost) -> tuple[Element, ...]:
+    """Every effect: forces of all kinds as they act, penalty contacts while closed, dry friction while it slides."""
+    columns = {effect.name: effect.column for effect in equations.effects}
+    penalties = [contact.name for contact in equations.contacts if contact.kind == "penalty"]
+    return (
+        *(Element(name, columns[name], count, "always") for name, count in cost.effects.items()),
+        *(Element(name, "penalty", cost.contacts[name], "while closed") for name in penalties),
+        *(Element(name, "friction", count, "while sliding") for name, count in cost.frictions.items()),
+    )
+
+
+def reduced(scene: Scene, run: Trajectory, names: Iterable[str], backend: str) -> Scene:
+    """The scene without some effects, from the same positions and velocities.
+
+    Rows are those of the whole scene or fewer, so the same values hold on them. Where an effect had a joint cut
+    (friction that follows its force), the coordinates are others: they are read off the whole scene and assembled.
+
+    Parameters
+    ----------
+    run : of the whole scene, whose first row gives what its state does not name
+    """
+    model = scene.model.without(*names)
+    known = getattr(model, "parameters", {})
+    mine = {name: value for name, value in scene.parameters.items() if name in known}
+    start = scene.start
+    equations = mechanism_of(model, backend, mine).equations
+    whole = mechanism_of(scene.model, backend, scene.parameters).equations
+    contacts = {contact.name for contact in equations.contacts}
+    if [c.name for c in equations.coordinates] != list(start.names):
+        return Scene(model, _reassembled(equations, model, start, run, contacts, mine, backend), mine)
+    states = dict(zip((state.name for state in whole.states), start.z, strict=True))
+    armed = None if start.armed is None else start.armed & contacts
+    made = replace(
+        start, z=np.array([states[state.name] for state in equations.states]),
+        mode=Mode(start.mode.closed & contacts), armed=armed, anchors=_anchors(equations, whole, start),
+        parameters=mine, memory=None, moved={},
+    )  # fmt: skip
+    return Scene(model, made, mine)
+
+
+def _anchors(equations: Equations, whole: Equations, start: State) -> Any:
+    """What the contacts that are left hold."""
+    held = np.zeros(sum(len(contact.anchors) for contact in equations.contacts))
+    known = {contact.name: contact.anchors for contact in whole.contacts}
+    for contact in equations.contacts:
+        places = known.get(contact.name, ())
+        if len(start.anchors) and len(places) == len(contact.anchors):
+            held[list(contact.anchors)] = start.anchors[list(places)]
+    return held
+
+
+def _reassembled(
+    equations: Equations, model: Any, start: State, run: Trajectory, contacts: set[str],
+    parameters: Mapping[str, float], backend: str,
+) -> State:  # fmt: skip
+    """A start in other coordinates."""
+    first = run.at(float(run.time[0]), side="left")
+    position = {coordinate.name: first[coordinate.name] for coordinate in (*equations.coordinates, *equations.states)}
+    velocity = {name: first[name] for name in equations.velocity_names}
+    closed = start.mode.closed & contacts
+    free = set() if start.armed is None else contacts - closed - start.armed
+    made = assemble(model, position, velocity, closed, free, parameters, project=True, backend=backend)
+    return replace(made, time=start.time)
