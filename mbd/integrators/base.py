@@ -90,12 +90,17 @@ def consistent_rates(system: System, t: float, q: Vector, y: Vector, mode: Mode)
 
 @dataclass(frozen=True)
 class StepReport:
-    """How a step went: converged or why not, Newton iterations, largest residual over its tolerance."""
+    """How a step went: converged or why not, Newton iterations, largest residual over its tolerance.
+
+    too_near : the step, or whole ones after it, would end too near to a pose in which rows lose rank; with another size
+        they may not
+    """
 
     converged: bool
     iterations: int = 0
     residual: float = 0.0
     message: str = ""
+    too_near: bool = False
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.errors import CapabilityError
 from mbd.integrators.base import Integrator, Point, StepReport, StepResult, System, Terms, consistent_rates
-from mbd.integrators.passage import CONTINUOUS, WITHIN, Distance, distance_to_pose
+from mbd.integrators.passage import CONTINUOUS, WHOLE, WITHIN, Distance, distance_to_pose
 from mbd.kernel.fields import LEFT, PASSING
 from mbd.state import Mode, State
 
@@ -81,7 +81,7 @@ class NewmarkMemory:
     rate (n,) true v̇ and ż; aux (n,) the auxiliary a for steps of size `step`; lam (m,) multipliers;
     slope, lam_slope: their last rates of change, which predict the next step; shift (n_v,) the position correction and
     shift_change what it changed by in the last step; near 1 within a few steps of a pose in which rows lose rank, and 2
-    just beyond it, where the scheme is started again.
+    just beyond it, where the scheme is started again; whole: the dt that steps have unless they must not [s].
     """
 
     rate: Vector
@@ -93,6 +93,7 @@ class NewmarkMemory:
     shift_change: Vector
     step: float
     near: int = 0
+    whole: float = 0.0
 
 
 class NewmarkFamily(Integrator):
@@ -173,12 +174,17 @@ class NewmarkFamily(Integrator):
         slope, lam_slope = (later - rate) / ahead, (lam_later - lam) / ahead
         c = self.coefficients
         jerk = (c.alpha_m - c.alpha_f) * dt if self.starting == "jerk" else 0.0
-        return NewmarkMemory(rate, rate + jerk * slope, lam, slope, lam_slope, np.zeros(n_v), np.zeros(n_v), dt)
+        return NewmarkMemory(rate, rate + jerk * slope, lam, slope, lam_slope, np.zeros(n_v), np.zeros(n_v), dt, 0, dt)
+
+    def resume(self, system: System, state: State, mode: Mode, dt: float, memory: NewmarkMemory) -> NewmarkMemory:
+        """A start, but that a keeps its distance from v̇, as beyond a pose in which rows lost rank."""
+        fresh = self.start(system, state, mode, dt)
+        return replace(fresh, aux=fresh.rate + (dt / memory.step) * (memory.aux - memory.rate))
 
     def step(self, system: System, state: State, dt: float, mode: Mode, memory: NewmarkMemory) -> StepResult:
         """One step by Newton's method; the readable twin of the compiled kernel."""
         if memory.near == LEFT:
-            memory = self.start(system, state, mode, dt)
+            memory = self.resume(system, state, mode, memory.whole or dt, memory)
         return _Step(self, system, state, dt, mode, memory).run()
 
 
@@ -203,7 +209,9 @@ class _Step:
         self.n_v = len(state.v)
         self.rate = memory.rate + dt * memory.slope
         self.lam = memory.lam + dt * memory.lam_slope
-        self.shift = (memory.shift + stretch * memory.shift_change) * stretch**3
+        self.size = dt / (memory.whole or memory.step)
+        cube = stretch**3 if self.size <= 1.0 + WHOLE else 1.0  # in a pair round-off is not made larger
+        self.shift = (memory.shift + stretch * memory.shift_change) * cube
         self.tolerance = 4.0 * EPS if scheme.exact else 1e-3 * scheme.tolerance
         a1 = self._aux()
         self.y = y0 + dt * ((1.0 - k.gamma) * self.a0 + k.gamma * a1)
@@ -213,7 +221,6 @@ class _Step:
 
         self.both = scheme.stabilized  # h and ḣ are held, not h alone
         self.near = memory.near
-        self.whole = dt > (1.0 - 1e-6) * memory.step
         if self.near == PASSING:
             self._hold_positions()
         self.last: tuple[Any, Any] = np.zeros(len(y0)), np.zeros(len(self.lam))
@@ -267,11 +274,12 @@ class _Step:
             terms = self.system.evaluate(point, self.mode, (self.c_C, self.c_K))
             if iteration == 0 and terms.turning is not None and len(terms.turning):
                 away = self._distance(terms)
-                if away.too_close(self.scheme.tolerance, self.near > 0, self.whole):
-                    return self._result(t1, StepReport(False, 0, 0.0, "a pose in which rows lose rank is too close"))
+                if away.too_close(self.scheme.tolerance, self.near > 0, self.size):
+                    why = "a pose in which rows lose rank is too close"
+                    return self._result(t1, StepReport(False, 0, 0.0, why, too_near=self.near == 0))
                 if self.near:
                     self.near = PASSING if away.steps < WITHIN else LEFT
-                elif away.steps < WITHIN and (away.steps < 1.0 or self.whole):
+                elif away.steps < WITHIN and (away.steps < 1.0 or abs(self.size - 1.0) <= WHOLE):
                     self._hold_positions()
                     terms = self.system.evaluate(replace(point, x=self.x, y=self.y), self.mode, (self.c_C, self.c_K))
             error = self._error(terms)
@@ -306,15 +314,14 @@ class _Step:
         n_v = self.n_v
         B = terms.H[:, :n_v] - self.c_K / self.c_C * terms.turning
         mass = np.abs(np.diag(terms.S))[:n_v]
-        return distance_to_pose(B, terms.turning, mass, self.y[:n_v], scale, max(self.dt, self.memory.step))
+        return distance_to_pose(B, terms.turning, mass, self.y[:n_v], scale, self.memory.whole or self.memory.step)
 
     def _hold_positions(self) -> None:
-        """Hold h alone in this step, by the trapezoidal rule: see `mbd.kernel.passage`."""
-        self.both, self.near, self.k = False, PASSING, Coefficients(0.0, 0.0, 0.25, 0.5)
-        self.c_C, self.c_K = 0.5 * self.dt, 0.25 * self.dt**2
-        self.a0, self.shift = self.memory.rate, np.zeros(self.n_v)
-        self.y = self.predicted = self.y0 + self.c_C * (self.a0 + self.rate)
-        self.x = self.c_C * (self.y0 + self.y)[: self.n_v]
+        """Hold h alone in this step, with the last correction of positions: see `mbd.kernel.passage`."""
+        self.both, self.near, self.predicted = False, PASSING, self.y
+        shift = self.memory.shift * min(self.dt / self.memory.step, 1.0) ** 3
+        self.x = self.x - self.shift + shift
+        self.shift = shift
 
     def _leaves_branch(self) -> bool:
         n_v = self.n_v
@@ -378,6 +385,7 @@ class _Step:
             self.shift - memory.shift,
             dt,
             self.near,
+            memory.whole,
         )
         old = self.state
         state = State(

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
-from mbd.kernel.passage import CONTINUOUS, NEAREST, WITHIN
+from mbd.kernel.pairs import WHOLE, is_of_pair
+from mbd.kernel.passage import CONTINUOUS, FORESEEN, NEAREST, WITHIN
 
-__all__ = ["CONTINUOUS", "WITHIN", "Distance", "distance_to_pose"]
+__all__ = ["CONTINUOUS", "WHOLE", "WITHIN", "Distance", "distance_to_pose"]
 
 EPS = float(np.finfo(float).eps)
 
@@ -21,14 +22,17 @@ class Distance:
     steps: float
     kick: float
 
-    def too_close(self, tolerance: float, near: bool, whole: bool) -> bool:
-        """Whether this step, or whole ones after it, would end where round-off makes more of velocities than that."""
-        if near or self.steps < 1.0:
-            return near and self.steps < NEAREST and self.kick > tolerance
+    def too_close(self, tolerance: float, near: bool, size: float) -> bool:
+        """Whether a step of `size` dt, or whole ones after it, would end where round-off makes more of velocities."""
+        if near:
+            return self.steps < NEAREST and self.kick > tolerance
+        if self.steps < 1.0 or self.steps >= WITHIN + 1.0 or is_of_pair(size):
+            return False
         part = self.steps % 1.0
         part = min(part, 1.0 - part)
-        watched = self.steps < WITHIN or (not whole and self.steps < WITHIN + 1.0)
-        return watched and part < NEAREST and self.kick * self.steps > tolerance * max(part, 1e-3)
+        foreseen = self.steps >= WITHIN - FORESEEN and abs(size - 1.0) <= WHOLE
+        doubt = FORESEEN - NEAREST if foreseen else 0.0
+        return part < NEAREST + doubt and self.kick * self.steps > tolerance * max(part - doubt, 1e-3)
 
 
 def distance_to_pose(B: Matrix, turning: Matrix, mass: Vector, v: Vector, scale: Vector, dt: float) -> Distance:

@@ -33,6 +33,7 @@ from mbd.kernel.fields import (
     NO_IMPACT,
     NOT_CONVERGED,
     NOW,
+    PAIRED,
     PAUSE,
     PLASTIC,
     REDONE,
@@ -46,12 +47,14 @@ from mbd.kernel.fields import (
     STEPS,
     STORED,
     SWITCHES,
+    TOO_NEAR,
     WATCH,
 )  # fmt: skip
 from mbd.kernel.guards import is_quiet, judge, try_step, update_armed, update_sides, watch
 from mbd.kernel.hooks import scheme_accept, scheme_start
 from mbd.kernel.locate import locate
 from mbd.kernel.nonsmooth import PULL, keep, lands, lets_go, put_back, rebound, strike
+from mbd.kernel.pairs import LONGER, SHORTER, WHOLE, may_pair
 from mbd.kernel.redundancy import find_dependent, sharing, spread
 from mbd.kernel.restart import active_rows, stepping_rows
 from mbd.kernel.settle import log_event, settle
@@ -143,6 +146,7 @@ def restart(K: Any) -> int:
         return status
     K.state[ROWS] = stepping_rows(K)
     K.state[MODE] = find_mode(K)
+    K.state[PAIRED] = 0
     K.clock[BASE] = K.clock[NOW]
     K.state[GRID] = 0
     if K.n_watched > 0:
@@ -275,6 +279,11 @@ def land(K: Any, h: float, t1: float) -> int:
     return EVENT if is_awaited(K, first) else -1
 
 
+def is_shortened(status: int) -> bool:
+    """Whether a step that ended so is tried again with another size."""
+    return status == NOT_CONVERGED or status == STAGNATED or status == SINGULAR or status == TOO_NEAR
+
+
 def advance(K: Any) -> int:
     """Step until `until`, a full store, a mode without code, an event to report, or a failure."""
     steps = 0
@@ -303,6 +312,8 @@ def advance(K: Any) -> int:
             return PAUSE
         steps += 1
         t1 = K.clock[BASE] + (K.state[GRID] + 1) * K.dt
+        if K.state[PAIRED] == 1:
+            t1 = t + LONGER * K.dt
         cut = t1 > K.until - 1e-6 * K.dt
         if cut and K.until >= K.end:  # the caller decides: a step of the grid as in a longer run, or one cut
             return LAST
@@ -314,8 +325,18 @@ def advance(K: Any) -> int:
             t1 = t + h
             cut = False
         full = h
+        pairs = False
         status = try_step(K, h, t1)
-        while (status == NOT_CONVERGED or status == STAGNATED or status == SINGULAR) and h > SHORTEST * full:
+        if status == TOO_NEAR and may_pair(K, h):
+            if t + (SHORTER + LONGER) * K.dt < K.until - WHOLE * K.dt:
+                h = SHORTER * K.dt
+                full = h
+                t1 = t + h
+                status = try_step(K, h, t1)
+                pairs = True
+            elif K.until >= K.end:
+                return LAST
+        while is_shortened(status) and h > SHORTEST * full:
             h *= SHORTENING  # a pose in which rows lose rank is stepped over; stiff places get smaller steps
             t1 = t + h
             status = try_step(K, h, t1)
@@ -364,18 +385,18 @@ def advance(K: Any) -> int:
                 return NOT_CONVERGED
         elif K.state[INCHING] > 0:
             K.state[INCHING] -= 1
+        K.state[PAIRED] = 0
+        if pairs and h == full:
+            K.state[PAIRED] = 1
+            K.counts[SHORTENED] += 1
         uneven = K.stabilized == 0 and K.state[ROWS] > 0 and (h < (1.0 - 1e-6) * K.dt or rings(K))
-        if K.state[NEAR] == LEFT:
-            status = leave_pose(K, h, t1)
-            if status != 0:
-                return status
-        elif h < 1e-3 * K.dt or uneven:  # index 3 rings after a change of step
+        if h < 1e-3 * K.dt or uneven:  # index 3 rings after a change of step
             take_over(K, t1)
             K.state[RESTART] = 2
         else:
             accept(K, h, t1, quiet)
             K.state[GRID] += 1
-            if h < full or K.state[HALVED] > 0:
+            if abs(h - K.dt) > WHOLE * K.dt:
                 K.clock[BASE] = t1
                 K.state[GRID] = 0
             if not holds:  # the pose has changed its rank
@@ -383,6 +404,10 @@ def advance(K: Any) -> int:
             if cut:  # a boundary inside the run: the grid goes on from here
                 K.clock[BASE] = t1
                 K.state[GRID] = 0
+            if K.state[NEAR] == LEFT:
+                status = leave_pose(K, h)
+                if status != 0:
+                    return status
         if K.state[HALVED] > 0:  # the end that had no impulses may not come at all
             K.state[HALVES] -= 1
             if K.state[HALVES] == 0:

@@ -24,7 +24,8 @@ ENTRY = "mbd_kernel"
 
 MODULES = (
     "linear", "lemke", "redundancy", "saddle", "restart", "pivoting", "complementarity", "blow", "impact", "settle",
-    "iteration", "passage", "newmark", "hermite", "guards", "locate", "switching", "nonsmooth", "takeover", "advance",
+    "pairs", "iteration", "passage", "newmark", "hermite", "guards", "locate", "switching", "nonsmooth", "takeover",
+    "advance",
 )  # fmt: skip
 
 APART = ("factor", "solve")
@@ -36,6 +37,9 @@ def scheme_step(K: Any, h: float, t1: float) -> int:
 
 def scheme_accept(K: Any, h: float) -> None:
     newmark_accept(K, h)
+
+def scheme_resume(K: Any, h: float) -> int:
+    return newmark_resume(K, h)
 
 def scheme_start(K: Any) -> int:
     return newmark_start(K)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
-__all__ = ["call", "scheme_accept", "scheme_start", "scheme_step"]
+__all__ = ["call", "scheme_accept", "scheme_resume", "scheme_start", "scheme_step"]
 
 
 def call(K: Any, number: int, out: Any) -> None:
@@ -24,6 +24,11 @@ def scheme_step(K: Any, h: float, t1: float) -> int:
 def scheme_accept(K: Any, h: float) -> None:
     """Make the candidate the accepted state."""
     K.hooks.accept(K, h)
+
+
+def scheme_resume(K: Any, h: float) -> int:
+    """Start with what the scheme averages kept, after a step of size h; rates in K.jump, multipliers in K.impulse."""
+    return int(K.hooks.resume(K, h))
 
 
 def scheme_start(K: Any) -> int:

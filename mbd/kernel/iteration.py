@@ -6,6 +6,7 @@ from typing import Any
 
 from mbd.kernel.fields import AUX_STEP, EPS, MODE
 from mbd.kernel.hooks import call
+from mbd.kernel.pairs import WHOLE
 from mbd.kernel.restart import compose
 
 __all__ = ["finish", "overturns", "predict", "residual_size", "runs_away"]
@@ -15,6 +16,9 @@ def predict(K: Any, h: float, t1: float, c_C: float, c_K: float) -> None:
     """The block at t₁ with rates, multipliers and position correction extrapolated."""
     block = K.block
     stretch = h / K.clock[AUX_STEP]
+    cube = stretch * stretch * stretch
+    if h > (1.0 + WHOLE) * K.dt:  # the longer of a pair, next to a pose: round-off of the shorter is not made larger
+        cube = 1.0
     block[0] = t1
     block[1] = c_C
     block[2] = c_K
@@ -33,7 +37,7 @@ def predict(K: Any, h: float, t1: float, c_C: float, c_K: float) -> None:
         block[K.o_a + i] = rate
         block[K.o_v + i] = K.y[i] + h * ((1.0 - K.gamma) * a0 + K.gamma * a1)
         if i < K.n_v:
-            K.shift1[i] = (K.shift[i] + stretch * K.shift_change[i]) * (stretch * stretch * stretch)
+            K.shift1[i] = (K.shift[i] + stretch * K.shift_change[i]) * cube
             block[K.o_x + i] = h * K.y[i] + h * h * ((0.5 - K.beta) * a0 + K.beta * a1) + K.shift1[i]
 
 

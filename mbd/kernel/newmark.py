@@ -28,16 +28,18 @@ from mbd.kernel.fields import (
     STAGNATED,
     STAGNATIONS,
     TANGENTS,
+    TOO_NEAR,
     TOO_TIGHT,
 )  # fmt: skip
 from mbd.kernel.hooks import call
 from mbd.kernel.iteration import finish, overturns, predict, residual_size, runs_away
 from mbd.kernel.linear import factor, solve
-from mbd.kernel.passage import WITHIN, approaches, misses, passing_step, steps_to_pose
+from mbd.kernel.pairs import WHOLE
+from mbd.kernel.passage import WITHIN, misses, passing_step, steps_of_fall, steps_to_pose
 from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import add_shares, compose, consistent, fill_block, raise_scales, refresh_scales, share_loads
 
-__all__ = ["newmark_accept", "newmark_start", "newmark_step"]
+__all__ = ["newmark_accept", "newmark_resume", "newmark_start", "newmark_step"]
 
 MOST_HALVINGS = 10
 """How often a Newton correction is halved before the iteration goes on from where it is."""
@@ -170,13 +172,15 @@ def newmark_step(K: Any, h: float, t1: float) -> int:
         if tangent and not factorize(K, size):
             status = SINGULAR
             break
-        if iteration == 0 and m > 0 and K.stabilized == 1 and approaches(K, m):
-            away = steps_to_pose(K, m, h, c_K / c_C) * h / K.dt
-            if away < WITHIN + 1.0 and misses(K, away, h):
-                K.detail[PIVOT] = 0.0
-                return SINGULAR
-            if away < WITHIN and (away < 1.0 or h > (1.0 - 1e-6) * K.dt):
-                return passing_step(K, h, t1)
+        if iteration == 0 and m > 0 and K.stabilized == 1:
+            fall = steps_of_fall(K, m)
+            if fall < WITHIN + 2.0:
+                away = steps_to_pose(K, m, h, c_K / c_C) * h / K.dt
+                if misses(K, away, h):
+                    K.detail[PIVOT] = 0.0
+                    return TOO_NEAR
+                if fall < WITHIN and away < WITHIN and (away < 1.0 or abs(h - K.dt) <= WHOLE * K.dt):
+                    return passing_step(K, h, t1)
         biggest = correct(K, m, c_C, c_K, tangent, shifting)
         if iteration == 0 and K.exact == 0:  # the predictor's error measures that of the step: stay far below it
             tolerance = min(K.tolerance, max(1e-4 * biggest, tolerance))
@@ -300,3 +304,19 @@ def newmark_accept(K: Any, h: float) -> None:
         K.lam_slope[k] = (K.lam1[k] - K.lam[k]) * inverse
         K.lam[k] = K.lam1[k]
     K.clock[AUX_STEP] = h
+
+
+def newmark_resume(K: Any, h: float) -> int:
+    """Start from the accepted state, the end of a step of size h, with the rates in K.jump, multipliers in K.impulse.
+
+    Only the auxiliary a is carried over: it keeps its distance from v̇, where a start would err by dt².
+    """
+    for i in range(K.n):
+        K.aux1[i] = (K.aux[i] - K.rate[i]) * (K.dt / h)
+        K.rate[i] = K.jump[i]
+    for k in range(K.n_rows):
+        K.lam[k] = K.impulse[k]
+    status = newmark_start(K)
+    for i in range(K.n):
+        K.aux[i] = K.rate[i] + K.aux1[i]
+    return status

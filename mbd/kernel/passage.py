@@ -4,7 +4,7 @@ Let x be the distance from the pose along the motion and y a coordinate across i
 row is like h = x y there. Round-off δ of h leaves y open by δ/x, and ḣ = ẋ y + x ẏ = 0 then makes ẏ wrong by ẋ δ/x²,
 while a step that holds h alone makes it wrong by δ/(x dt). The second is less wrong where |x| < ẋ dt: within a step of
 the pose. So within `WITHIN` steps of it h alone is held, with ∂h/∂x = B = H − (c_K/c_C) ∂ḣ/∂x; then the velocities are
-projected onto the rows and the scheme starts again.
+projected onto the rows and the scheme starts again, but for the average that it carries.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from __future__ import annotations
 from typing import Any
 
 from mbd.kernel.fields import (
+    AUX_STEP,
     CAREFUL,
     EPS,
     FACTORIZATIONS,
@@ -32,31 +33,31 @@ from mbd.kernel.fields import (
 from mbd.kernel.hooks import call
 from mbd.kernel.iteration import finish, overturns, predict, residual_size, runs_away
 from mbd.kernel.linear import factor, solve
+from mbd.kernel.pairs import WHOLE, is_of_pair
 from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import add_shares, raise_scales, share_loads
 
-__all__ = ["approaches", "misses", "passing_step", "steps_to_pose"]
+__all__ = ["misses", "passing_step", "steps_of_fall", "steps_to_pose"]
 
 WITHIN = 4.0
 """Steps to a pose of lost rank, at the present speed, below which positions alone are held [-]."""
-NEAREST = 0.25
-"""Steps from a pose of lost rank below which no step ends where round-off makes more of velocities than the tolerance.
-
-It is shortened, so that the next one ends beyond.
-"""
+NEAREST = 0.2
+"""Steps from a pose of lost rank below which no step ends where round-off of h makes too much of velocities [-]."""
+FORESEEN = 0.25
+"""The same, of the end of a step still to come: more, since how far the pose is then is only estimated [-]."""
 CONTINUOUS = 0.05
 """Part of the speed by which a step near such a pose may differ from its prediction: the branch goes on in v [-]."""
 
 
-def approaches(K: Any, m: int) -> bool:
-    """Whether the smallest pivot of the rows fell since the last step as it does some steps before it vanishes."""
+def steps_of_fall(K: Any, m: int) -> float:
+    """Steps until the smallest pivot of the rows vanishes, if it goes on as since the last step; a cheap first look."""
     size = K.n + m
     largest = 0.0  # the inverses are on the diagonal
     for k in range(K.n, size):
         largest = max(largest, abs(K.kkt[k * size + k]))
-    falls = largest * WITHIN > K.detail[PIVOT] * (WITHIN + 1.0)
+    before = K.detail[PIVOT]
     K.detail[PIVOT] = largest
-    return bool(falls)
+    return float(before / (largest - before)) if largest > before else 1e300
 
 
 def steps_to_pose(K: Any, m: int, h: float, ratio: float) -> float:
@@ -83,15 +84,18 @@ def steps_to_pose(K: Any, m: int, h: float, ratio: float) -> float:
 
 
 def misses(K: Any, away: float, h: float) -> bool:
-    """Whether whole steps from here would end too close to the pose: then this one is shortened, while it holds ḣ too.
+    """Whether whole steps from the end of this one would end too close to the pose: then it gets another size.
 
-    Steps of the stabilized form may change their size; those that hold h alone start to ring.
+    While ḣ is held too, steps may do that; those that hold h alone start to ring. It is the last whole one before these
+    that is looked at, or one that was shortened for another reason; those of a pair (`mbd.kernel.pairs`) are not.
     """
-    if away < 1.0 or (away >= WITHIN and h > (1.0 - 1e-6) * K.dt):
+    if away < 1.0 or away >= WITHIN + 1.0 or is_of_pair(h / K.dt):
         return False
     part = away - int(away)
     part = min(part, 1.0 - part)
-    return bool(part < NEAREST and K.detail[KICK] * away > K.tolerance * max(part, 1e-3))
+    foreseen = away >= WITHIN - FORESEEN and abs(h - K.dt) <= WHOLE * K.dt  # nearer it was judged already, as a rule
+    doubt = FORESEEN - NEAREST if foreseen else 0.0
+    return bool(part < NEAREST + doubt and K.detail[KICK] * away > K.tolerance * max(part - doubt, 1e-3))
 
 
 def leftovers(K: Any, m: int, h: float, ratio: float, ahead: float, place: int) -> None:
@@ -150,22 +154,26 @@ def leftovers(K: Any, m: int, h: float, ratio: float, ahead: float, place: int) 
 
 
 def passing_step(K: Any, h: float, t1: float) -> int:
-    """The step with h held and ḣ left alone, of the trapezoidal rule: a damped scheme would begin with a transient.
+    """The step with h held and ḣ left alone: the scheme's own, so that the motion along the branch errs as before.
 
-    The steps are too few for undamped multipliers to grow. Newton's method has a tangent each time.
+    The correction of positions stays what it was in the last step that held both: without it, accelerations would have
+    to make it good and multipliers begin with a transient of order dt. The steps are too few for undamped multipliers
+    to grow. Newton's method has a tangent each time.
     """
     m = K.state[ROWS]
     o_r = (K.n + m) * (K.n + m)
-    c_C = 0.5 * h
-    c_K = 0.25 * h * h
+    c = (1.0 - K.alpha_f) / (1.0 - K.alpha_m)
+    c_C = K.gamma * h * c
+    c_K = K.beta * h * h * c
     K.state[NEAR] = PASSING
     predict(K, h, t1, c_C, c_K)
+    cube = min(h / K.clock[AUX_STEP], 1.0) ** 3
     for i in range(K.n):
-        K.y1[i] = K.y[i] + c_C * (K.rate[i] + K.block[K.o_a + i])
-        K.block[K.o_v + i] = K.y1[i]
+        K.y1[i] = K.block[K.o_v + i]
         if i < K.n_v:
-            K.block[K.o_x + i] = c_C * (K.y[i] + K.y1[i])
-            K.shift1[i] = 0.0
+            K.block[K.o_x + i] -= K.shift1[i]
+            K.shift1[i] = K.shift[i] * cube
+            K.block[K.o_x + i] += K.shift1[i]
     K.detail[0] = t1
     K.detail[2] = h
     tolerance = 4.0 * EPS if K.exact == 1 else 1e-3 * K.tolerance
@@ -202,8 +210,6 @@ def passing_step(K: Any, h: float, t1: float) -> int:
             if overturns(K, h):
                 K.detail[1] = -1.0
                 return NOT_CONVERGED
-            for i in range(K.n):
-                K.aux1[i] = K.rate1[i]
             K.counts[CAREFUL] += 1
             K.state[NEAR] = PASSING if away < WITHIN else LEFT
             return 0

@@ -1,12 +1,12 @@
-"""Taking over a candidate where the scheme starts again: before events, after uneven steps, beyond singular poses."""
+"""Taking over a candidate before a restart (at events, after uneven steps), and going on beyond singular poses."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from mbd.kernel.fields import BASE, GRID, NOW, RESTARTS
+from mbd.kernel.fields import NOW
 from mbd.kernel.guards import update_armed, update_sides, watch
-from mbd.kernel.hooks import scheme_accept, scheme_start
+from mbd.kernel.hooks import scheme_resume
 from mbd.kernel.restart import active_rows, consistent, evaluate, stepping_rows
 from mbd.kernel.saddle import solve_rows
 
@@ -55,28 +55,20 @@ def take_over(K: Any, t1: float) -> None:
             K.lam[k] = K.impulse[k]
 
 
-def leave_pose(K: Any, h: float, t1: float) -> int:
-    """The candidate just beyond a pose in which rows lost rank, with velocities on the rows again, starts the scheme.
+def leave_pose(K: Any, h: float) -> int:
+    """Just beyond a pose in which rows lost rank: velocities on the rows again, rates and multipliers consistent.
 
-    The rows are those that were stepped with: which depend on which is judged too badly here.
+    The scheme starts anew, but for the average of accelerations that it carries. The rows are those that were stepped
+    with: which depend on which is judged too badly here.
     """
-    scheme_accept(K, h)
-    K.clock[NOW] = t1
     status = project_velocity(K, stepping_rows(K), False)
     if status == 0:
-        status = consistent(K, t1, K.q, K.y)
+        status = consistent(K, K.clock[NOW], K.q, K.y)
     if status != 0:
         return status
-    for i in range(K.n):
-        K.rate[i] = K.jump[i]
-    for k in range(K.n_rows):
-        K.lam[k] = K.impulse[k]
-    status = scheme_start(K)
-    K.counts[RESTARTS] += 1
-    K.clock[BASE] = t1
-    K.state[GRID] = 0
+    status = scheme_resume(K, h)
     if K.n_watched > 0:
-        watch(K, t1, K.q, K.y, K.rate, K.lam, K.guards0)
+        watch(K, K.clock[NOW], K.q, K.y, K.rate, K.lam, K.guards0)
         update_armed(K)
         update_sides(K)
     return status

@@ -120,7 +120,7 @@ def explanation(
             f"{where}: stagnated at round-off: residual {left.residual:.3g}, attainable {left.attainable:.3g} of the "
             f"forces{with_closed}{worst}; use a larger tolerance= of the integrator or a larger dt"
         )
-    if status == F.SINGULAR:
+    if status in (F.SINGULAR, F.TOO_NEAR):
         return (
             f"{where}: the Newton matrix is singular at {_unknown(stepper)}{with_closed}; rows depend on each other: "
             "leave one out, or try another dt"

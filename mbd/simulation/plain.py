@@ -12,7 +12,7 @@ from mbd.compile.mechanism import Mechanism, ModeCode
 from mbd.equations.programs import mass_matrix
 from mbd.integrators.base import Integrator, Point, StepReport, Terms
 from mbd.kernel.active_set import ActiveSetManager
-from mbd.kernel.fields import CAREFUL, ITERATIONS, NEAR, NOT_CONVERGED, NOT_FINITE, NOW
+from mbd.kernel.fields import CAREFUL, ITERATIONS, NEAR, NOT_CONVERGED, NOT_FINITE, NOW, TOO_NEAR
 from mbd.kernel.restart import MOST_LOADS, fill_block, refresh_scales
 from mbd.simulation.asked import asked
 from mbd.simulation.shares import shares
@@ -231,9 +231,19 @@ class PlainScheme:
         """Memory at the accepted state, whose rates are consistent; sizes of the residual for the guards."""
         state, mode, _ = self._state(K)
         what = f"the start of {self.integrator!r} at t = {state.time:.6g} s"
-        self.memory = asked(what, self.integrator.start, self.system, state, mode, float(K.dt))
+        return self._begin(K, asked(what, self.integrator.start, self.system, state, mode, float(K.dt)))
+
+    def resume(self, K: Any, h: float) -> int:
+        """The same after a step that told `LEFT`, from the rates in K.jump and the multipliers in K.impulse."""
+        K.rate[:], K.lam[:] = K.jump[: K.n], K.impulse[: K.n_rows]
+        state, mode, _ = self._state(K)
+        scheme: Any = self.integrator  # one of the family: no other tells that
+        return self._begin(K, scheme.resume(self.system, state, mode, float(K.dt), self.memory))
+
+    def _begin(self, K: Any, memory: Any) -> int:
+        self.memory = memory
         K.state[NEAR] = 0
-        K.slope[:] = getattr(self.memory, "slope", 0.0)
+        K.slope[:] = getattr(memory, "slope", 0.0)
         fill_block(K, K.clock[NOW], K.q, K.y)
         refresh_scales(K)
         return 0
@@ -249,6 +259,8 @@ class PlainScheme:
             K.detail[0], K.detail[1], K.detail[2] = t1, result.report.residual, h
             if self.system.evaluated is not None:
                 K.block[:] = self.system.evaluated
+            if result.report.too_near:
+                return TOO_NEAR
             return NOT_CONVERGED if np.isfinite(result.report.residual) else NOT_FINITE
         y = np.concatenate([result.state.v, result.state.z])
         if not (np.isfinite(y).all() and np.isfinite(result.state.q).all()):

@@ -147,7 +147,7 @@ class Stepper:
             "mode_code": 2 * MODE_CAPACITY,
             "mode_count": 1, "rows": rows,
             "pivots": size, "columns": size, "lcp_rows": contacts + frictions, "lcp_who": contacts + frictions,
-            "lcp_basis": unknowns, "fired": 2, "state": 16, "counts": 16,
+            "lcp_basis": unknowns, "fired": 2, "state": 17, "counts": 16,
         }  # fmt: skip
         self.reals = _shelve(v, {name: reals.pop(name) for name in F.KEPT_REALS}, float)
         self.integers = _shelve(v, {name: integers.pop(name) for name in F.KEPT_INTEGERS}, np.int64)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import mbd
+from mbd.kernel.pairs import LONGER, SHORTER
 from tests.simulation.singular import Passage, four_bars, kite, platform, slider_crank, stopped
 
 MECHANISMS = {
@@ -130,3 +131,54 @@ def test_steps_too_large_for_a_light_mass_open_no_joint(dt, scheme):
     assert run.violation.length < 1e-10
     if run.success:
         assert np.max(run.energy.total) - run.energy.total[0] < 1e-3 * 2e3 * 9.81 * 2.0
+
+
+@pytest.mark.parametrize("scheme", [mbd.Newmark(), mbd.GeneralizedAlpha(0.9)], ids=repr)
+@pytest.mark.parametrize("name", ["one four-bar", "two four-bars", "parallelogram"])
+def test_the_error_over_dt_squared_does_not_depend_on_where_the_grid_meets_the_poses(name, scheme):
+    found, exact = passage(name)
+    sizes, shortened = [], 0
+    for dt in (1.03e-3, 1e-3, 9.1e-4, 8.7e-4, 7.7e-4, 7e-4, 6.1e-4, 5e-4):
+        run = mbd.simulate(*found.start, scheme, dt=dt, until=found.until)
+        sizes.append((run[found.angle][-1] - exact) / dt**2)
+        shortened += run.stats["shortened"]
+    assert shortened > 0
+    assert np.ptp(sizes) < 0.02 * abs(np.mean(sizes))
+
+
+def test_a_pair_of_steps_lasts_half_a_step_less_and_errs_like_whole_steps():
+    assert abs(LONGER + SHORTER - 1.5) < 1e-15
+    assert abs(LONGER**3 + SHORTER**3 - 1.5) < 1e-15
+
+
+def paired_run(**settings):
+    """Two pairs of uneven steps, before the first flat pose and before the next but one."""
+    return mbd.simulate(*passage("one four-bar")[0].start, mbd.HHT(0.05), dt=5e-4, **settings)
+
+
+def test_steps_of_a_pair_have_their_sizes_and_whole_ones_follow():
+    run = paired_run(until=2.0)
+    sizes = np.diff(run.time) / 5e-4
+    (first, *_), short = np.flatnonzero(np.abs(sizes - 1.0) > 1e-6), run.stats["shortened"]
+    np.testing.assert_allclose(sizes[first - 1 : first + 3], [1.0, SHORTER, LONGER, 1.0], rtol=1e-9)
+    assert short >= 1
+
+
+@pytest.mark.parametrize("after", [0, 1, 2])
+def test_a_run_that_is_cut_at_a_pair_goes_on_as_if_it_were_whole(after):
+    whole = paired_run(until=1.0)
+    first = int(np.flatnonzero(np.abs(np.diff(whole.time) / 5e-4 - 1.0) > 1e-6)[0])
+    begun = paired_run(until=float(whole.time[first + after]))
+    rest = mbd.simulate(passage("one four-bar")[0].start[0], begun.final, mbd.HHT(0.05), dt=5e-4, until=1.0)
+    np.testing.assert_array_equal(np.concatenate([begun.record.q, rest.record.q[1:]]), whole.record.q)
+    np.testing.assert_array_equal(np.concatenate([begun.record.v, rest.record.v[1:]]), whole.record.v)
+
+
+def test_a_run_that_ends_within_a_pair_ends_there():
+    whole = paired_run(until=1.0)
+    first = int(np.flatnonzero(np.abs(np.diff(whole.time) / 5e-4 - 1.0) > 1e-6)[0])
+    for part in (0.2, 0.6, 1.2):
+        end = float(whole.time[first]) + part * 5e-4
+        run = paired_run(until=end)
+        assert run.success and run.time[-1] == end
+        assert run["base 0.angle"][-1] == pytest.approx(float(whole.at(end)["base 0.angle"]), abs=1e-9)

@@ -1,0 +1,32 @@
+"""Two steps of other sizes that last half a step less than two whole ones, and err like those that last as long.
+
+A step of size h errs by c h³, with c of the motion. Steps a dt and b dt with ``a + b = 3/2``, ``a³ + b³ = a + b`` thus
+err together like whole steps for that time, c dt² · 3/2 dt, and move the instants by half a step: away from a pose
+near which none may lie. One step of dt/2 would err by 3/8 c dt³ less, at some passages and not at others, by where the
+grid happens to lie: enough to hide that the sum of all errors falls as dt².
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mbd.kernel.fields import HALVED, PAIRED
+
+__all__ = ["LONGER", "SHORTER", "WHOLE", "is_of_pair", "may_pair"]
+
+LONGER = 0.75 + 0.38188130791298669
+"""3/4 + √(7/48), part of dt, of the second: what is predicted from it is stretched little [-]."""
+SHORTER = 0.75 - 0.38188130791298669
+"""3/4 − √(7/48), part of dt, of the first [-]."""
+WHOLE = 1e-6
+"""Part of dt by which a step may differ from the size it counts as: round-off of instants [-]."""
+
+
+def is_of_pair(size: float) -> bool:
+    """Whether a step of this size, part of dt, is one of a pair."""
+    return abs(size - SHORTER) <= WHOLE or abs(size - LONGER) <= WHOLE
+
+
+def may_pair(K: Any, h: float) -> bool:
+    """Whether a step of size h that would lead too near to a pose may be replaced by a pair: one of the grid."""
+    return bool(K.state[PAIRED] == 0 and K.state[HALVED] == 0 and abs(h - K.dt) <= WHOLE * K.dt)
