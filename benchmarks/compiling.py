@@ -66,7 +66,7 @@ def _make(folder: str, modes: int) -> None:
         manager = ActiveSetManager(mechanism.equations)
         for closed in MODES[:modes]:
             flags = manager.flags(closed)
-            mechanism.mode(manager.active_rows(flags), manager.penalties(flags), stabilized=True)
+            mechanism.stepping(manager.active_rows(flags), manager.penalties(flags), stabilized=True)
     finally:
         del os.environ["MBD_CACHE"]
         if before is not None:

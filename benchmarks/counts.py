@@ -24,7 +24,7 @@ WALKERS: dict[str, tuple[Callable[[], mbd.Model], tuple[str, ...]]] = {
 
 
 def measure() -> list[Figure]:
-    """Tangent with residual and residual alone in both formulations, and the programs of events."""
+    """Tangent with residual, residual alone, tangent with factors and correction, in both formulations; of events."""
     figures = []
     for name, (make, closed) in WALKERS.items():
         equations = derive(make())
@@ -34,5 +34,8 @@ def measure() -> list[Figure]:
         for form, stabilized in ("index 3", False), ("stabilized", True):
             outputs[f"tangent, {form}"] = programs.newton(equations, rows, (), stabilized)
             outputs[f"residual, {form}"] = programs.residual(equations, rows, (), stabilized)
+            straight = programs.correction(equations, rows, (), stabilized)
+            outputs[f"correction, {form}"] = straight.outputs if straight else []
+            outputs[f"solution, {form}"] = straight.solution if straight else []
         figures += [Figure(f"{name}: {program}", total(nodes), "ops") for program, nodes in outputs.items() if nodes]
     return figures

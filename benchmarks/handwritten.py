@@ -57,13 +57,22 @@ class Program:
     sizes : degrees of freedom and rows
     numbers : dataclass of the model's parameters, in the order of the C struct
     names : coordinates in the order of the C code
+    reduced : whether rows are eliminated before the rest is solved, instead of LU of the whole with a search for pivots
     """
 
-    def __init__(self, source: str, sizes: tuple[int, int], numbers: Any, names: Sequence[str], stabilized: bool):
+    def __init__(
+        self,
+        source: str,
+        sizes: tuple[int, int],
+        numbers: Any,
+        names: Sequence[str],
+        stabilized: bool,
+        reduced: bool = False,
+    ):
         self.width = 3 * sizes[0] + sizes[1]
         self.numbers = np.array(astuple(numbers))
         self.names = tuple(names)
-        chosen = (f'-DMODEL="{source}"', f"-DSTABILIZED={int(stabilized)}")
+        chosen = (f'-DMODEL="{source}"', f"-DSTABILIZED={int(stabilized)}", f"-DREDUCED={int(reduced)}")
         with TemporaryDirectory() as folder:
             library = Path(folder) / "loop.so"
             command = [str(compiler()), *FLAGS, "-shared", "-fPIC", *chosen, str(HERE / "newmark.c"), "-lm", "-o"]

@@ -7,6 +7,9 @@
 enum { N = 4, M = 2, ANGLES = 0xC, ANGLE_ROWS = 0 };
 #include "point.h"
 
+/* coordinates that the rows give, in the order of the rows, and the others */
+static const int GIVEN[M] = {1, 0}, FREE[N - M] = {2, 3};
+
 typedef struct {
     double hip, leg, length, center, gx, gy; /* masses [kg], lengths [m], gravity [m/s^2] */
 } Model;

@@ -1,11 +1,11 @@
 /* Generalized-alpha with constraint rows, written by hand for one model: the yardstick of mbd/kernel/newmark.py.
 
-       cc -O3 -march=native -shared -fPIC -DMODEL='"compass.h"' -DSTABILIZED=0 newmark.c -lm
+       cc -O3 -march=native -shared -fPIC -DMODEL='"compass.h"' -DSTABILIZED=0 -DREDUCED=0 newmark.c -lm
 
    The same scheme, predictor, tolerances, Newton policy (tangent first, then residuals; a new tangent where these stall)
-   and pivoted LU. Simpler, as a person would have it: sizes, model and formulation are known to the compiler, all steps
+   and pivoted LU, or with REDUCED elimination of the rows as in mbd/tape/elimination.py. Simpler, as a person would have it: sizes, model and formulation are known to the compiler, all steps
    have one length, there are no contacts. A model gives N, M, ANGLES (which coordinates are angles, as bits),
-   ANGLE_ROWS, tangent, residual, row_bias and magnitudes. */
+   ANGLE_ROWS, GIVEN and FREE (which coordinates the rows give), tangent, residual, row_bias and magnitudes. */
 
 #include <math.h>
 #include <stdint.h>

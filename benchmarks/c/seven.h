@@ -15,6 +15,9 @@
 enum { N = 9, M = 3, ANGLES = 0x1FC, ANGLE_ROWS = 4 };
 #include "point.h"
 
+/* coordinates that the rows give, in the order of the rows, and the others */
+static const int GIVEN[M] = {0, 1, 5}, FREE[N - M] = {2, 3, 4, 6, 7, 8};
+
 typedef struct {
     double trunk, thigh, shank, foot;                 /* masses [kg] */
     double trunk_i, thigh_i, shank_i, foot_i;         /* inertias about the centres [kg m^2] */

@@ -91,7 +91,7 @@ class Instant:
         block[layout.lam : layout.anchor] = self.lam
         if extra is not None:
             block[[layout.lam + k for k in self.rows]] += extra
-        block[layout.slip : layout.size] = self.system.slip
+        block[layout.slip : layout.shift] = self.system.slip
         out = np.zeros(function.size)
         function(block, self.system.parameters, out)
         return LinearTerms.of(out, layout.n, layout.n_v, len(self.rows))

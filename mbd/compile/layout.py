@@ -2,7 +2,7 @@
 
 Every compiled function has one signature, ``f(block, parameters, out)``, three arrays of float64:
 
-block       ``[t, c_C, c_K | q | x | v, z | a, ż | λ | anchors | switches | slips]``
+block       ``[t, c_C, c_K | q | x | v, z | a, ż | λ | anchors | switches | slips | u]``
 parameters  ``[p | tables]``
 out         whatever the program lists
 """
@@ -20,7 +20,10 @@ __all__ = ["Layout"]
 class Layout:
     """Offsets into the block; (v, z) and (a, ż) stand together, as the integrators treat them alike.
 
-    q, x, v, a, lam, anchor, switch, slip : where each part begins; size : numbers in the block
+    q, x, v, a, lam, anchor, switch, slip, shift : where each part begins; size : numbers in the block
+
+    u is the predicted shift of positions in the stabilized form, which only the program `correction` reads. The program
+    `solution` gets the output of that one in the place of the block; its inputs are called 'held'.
     """
 
     n_q: int
@@ -84,13 +87,18 @@ class Layout:
         return self.switch + self.n_contacts
 
     @property
-    def size(self) -> int:
+    def shift(self) -> int:
         return self.slip + self.n_frictions
+
+    @property
+    def size(self) -> int:
+        return self.shift + self.n_v
 
     def place(self, kind: str, index: int) -> int:
         """Offset of an input in the block."""
         starts = {
             "t": 0, "c": 1, "q": self.q, "x": self.x, "v": self.v, "z": self.v + self.n_v, "a": self.a,
             "s": self.a + self.n_v, "lam": self.lam, "anchor": self.anchor, "switch": self.switch, "slip": self.slip,
+            "shift": self.shift, "held": 0,
         }  # fmt: skip
         return starts[kind] + index

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from time import perf_counter
@@ -11,12 +11,14 @@ from typing import Any
 import numpy as np
 
 from mbd.arrays import Vector
-from mbd.compile.backend import Backend, Functions, backend as choose_backend
+from mbd.compile.backend import Backend, Function, Functions, backend as choose_backend
 from mbd.compile.layout import Layout
+from mbd.compile.postponed import Postponed
 from mbd.compile.python import ArrayFunction, array_function
 from mbd.equations import programs
 from mbd.equations.equations import Equations
 from mbd.errors import UnknownNameError, nearest
+from mbd.tape.node import Node
 
 __all__ = ["AccelerationTerms", "Mechanism", "ModeCode", "rate_names"]
 
@@ -25,6 +27,7 @@ __all__ = ["AccelerationTerms", "Mechanism", "ModeCode", "rate_names"]
 class ModeCode:
     """Code of one contact mode: Newton tangent with residual, and residual alone.
 
+    correction, solution : the tangent with its factors and what solves with these (see `programs.correction`), or None
     borne : rows that depend on `rows`; their multipliers are given and act
     """
 
@@ -33,6 +36,8 @@ class ModeCode:
     sliding: tuple[int, ...]
     tangent: Any
     residual: Any
+    correction: Any = None
+    solution: Any = None
     borne: tuple[int, ...] = ()
 
 
@@ -81,7 +86,8 @@ class Mechanism:
         self.vector = composed is None
         self.named: dict[str, Any] = {}
         self.notes: list[str] = []
-        self._modes: dict[tuple[tuple[int, ...], ...], ModeCode] = {}
+        self.postponed: list[Postponed] = []
+        self._modes: dict[tuple[Any, ...], ModeCode] = {}
         self.seconds = perf_counter() - started
 
     def mode(
@@ -96,20 +102,67 @@ class Mechanism:
 
         borne : rows that depend on those, with given multipliers
         """
-        key = (tuple(rows), tuple(penalties), tuple(sliding), tuple(borne), (int(stabilized),))
+        key = (tuple(rows), tuple(penalties), tuple(sliding), tuple(borne), stabilized)
         with self.equations.tape.lock:  # runs in other threads share this mechanism
             if key not in self._modes:
-                started = perf_counter()
-                tangent, residual = f"tangent_{len(self._modes)}", f"residual_{len(self._modes)}"
-                self.common.add(
-                    {
-                        tangent: programs.newton(self.equations, rows, penalties, stabilized, sliding, borne),
-                        residual: programs.residual(self.equations, rows, penalties, stabilized, sliding, borne),
-                    }
+                tangent, residual = self._add(
+                    key, len(self._modes), tangent=programs.newton, residual=programs.residual
                 )
-                self._modes[key] = ModeCode(key[0], key[1], key[2], self.common[tangent], self.common[residual], key[3])
-                self.seconds += perf_counter() - started
+                self._modes[key] = ModeCode(key[0], key[1], key[2], tangent, residual, borne=key[3])
             return self._modes[key]
+
+    def stepping(
+        self,
+        rows: Sequence[int],
+        penalties: Sequence[int],
+        stabilized: bool,
+        sliding: Sequence[int] = (),
+        borne: Sequence[int] = (),
+    ) -> ModeCode:
+        """The same for the compiled kernel: with factors in straight-line code where that pays and no row is `borne`.
+
+        The tangent as a matrix is then needed only where a pivot of these is too small; it is made the first time.
+        """
+        if borne:
+            return self.mode(rows, penalties, stabilized, sliding, borne)
+        mode = (tuple(rows), tuple(penalties), tuple(sliding), (), stabilized)
+        key = (*mode, "stepping")
+        with self.equations.tape.lock:
+            if key not in self._modes:
+                self._modes[key] = self._straight(mode) or self.mode(rows, penalties, stabilized, sliding)
+            return self._modes[key]
+
+    def _straight(self, mode: Any) -> ModeCode | None:
+        """A mode with factors, None where they do not pay."""
+        started, number = perf_counter(), len(self._modes)
+        rows, penalties, sliding, _, stabilized = mode
+        found = programs.correction(self.equations, rows, penalties, stabilized, sliding)
+        self.seconds += perf_counter() - started
+        if found is None:
+            return None
+        outputs, solution = found.outputs, found.solution
+        residual, first, again = self._add(
+            mode, number, residual=programs.residual, correction=lambda *_: outputs, solution=lambda *_: solution
+        )
+        size = (self.layout.n + len(rows)) ** 2 + found.tail
+        tangent = Postponed(lambda: self._add(mode, number, tangent=programs.newton)[0], size)
+        self.postponed.append(tangent)
+        return ModeCode(rows, penalties, sliding, tangent, residual, first, again)
+
+    def _add(self, mode: Any, number: int, **makers: Callable[..., Sequence[Node]]) -> list[Function]:
+        """Compile programs of a mode (rows, penalties, frictions, borne rows, form), with its number in their names."""
+        rows, penalties, sliding, borne, stabilized = mode
+        with self.equations.tape.lock:
+            started = perf_counter()
+            names = {f"{name}_{number}": make for name, make in makers.items()}
+            self.common.add(
+                {
+                    name: make(self.equations, rows, penalties, stabilized, sliding, borne)
+                    for name, make in names.items()
+                }
+            )
+            self.seconds += perf_counter() - started
+            return [self.common[name] for name in names]
 
     @cached_property
     def energies(self) -> ArrayFunction:
@@ -174,7 +227,7 @@ class Mechanism:
         layout = self.layout
         block = self.block(t, q, y, anchors, penalties)
         if slips is not None:
-            block[layout.slip : layout.size] = slips
+            block[layout.slip : layout.shift] = slips
         if lam is not None:
             block[layout.lam : layout.anchor] = lam
         return self.terms_of(block, parameters)

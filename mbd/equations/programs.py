@@ -5,6 +5,9 @@ With N = n_v + n_z rates, m active rows in ascending number, R rows and nC conta
 =================  ==================================================================================
 `newton`           K ((N+m) × (N+m), row-major) | r (N) | h (m) | ḣ (m) | ∂ḣ/∂x (m × n_v), both stabilized only
 `residual`         r (N) | h (m) | ḣ (m, stabilized only)
+`correction`       r, h and more as behind K in `newton` | sound | weakest | K⁻¹b (N+m) | change of U (n_v, stabilized
+                   only) | S_ii (n_v) and B̃ (m × n_v) where rows may lose rank | factors of K
+`solution`         K⁻¹b from the factors in the output of `correction`, b in the place of the solution there
 `accelerations`    M (N × N) | f (N) | ∂r/∂λ (N × R) | B (R × N) | h (R) | ḣ (R) | γ (R) | captured | T | limits
 `guards`           g (nC) | ġ (nC) | penalty force (nC) | only_while (nC) | event values | event rates |
                    sliding velocity | its rate | limit of each friction
@@ -20,17 +23,19 @@ All are values: functions from equations to nodes, which the compile stage turns
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from math import perm
 
 from mbd.equations.equations import Equations
 from mbd.equations.factoring import factored
 from mbd.equations.inputs import Inputs
 from mbd.tape.derivatives import gradient, jvp, jvps, live, substitute, vjp
+from mbd.tape.elimination import factors
 from mbd.tape.node import Node, Tape
 
 __all__ = [
-    "accelerations", "balance_with", "compose", "constraint_jacobian", "guards", "mass_matrix", "newton", "residual",
-    "scales",
+    "Correction", "accelerations", "balance_with", "compose", "constraint_jacobian", "correction", "guards",
+    "mass_matrix", "newton", "residual", "scales",
 ]  # fmt: skip
 
 
@@ -50,8 +55,80 @@ def newton(
     ``B̃ = B`` (index 3) or ``B + (c_K/c_C) ∂ḣ/∂x`` (stabilized, and rows on velocities in both); the columns of
     first-order states are zero in B̃.
     """
+    matrix, tail = _system(equations, sorted(rows), penalties, stabilized, sliding, borne)
+    return [entry for line in matrix for entry in line] + tail
+
+
+@dataclass(frozen=True)
+class Correction:
+    """Newton's first correction with its tangent, and code that solves with the same factors again.
+
+    outputs : of the program `correction`
+    solution : of the program `solution`, whose inputs are the outputs of the other
+    tail : outputs of `newton` behind K, with which those of `correction` begin
+    """
+
+    outputs: list[Node]
+    solution: list[Node]
+    tail: int
+
+
+LARGEST = 20
+"""Unknowns above which a system is not eliminated on the tape."""
+MOST_OPERATIONS = 1000
+"""Operations of an elimination with one solution above which making its code takes longer than it is likely to save."""
+
+
+def correction(
+    equations: Equations, rows: Sequence[int], penalties: Sequence[int], stabilized: bool, sliding: Sequence[int] = ()
+) -> Correction | None:
+    """Tangent, its factors in a fixed order, and the Newton correction, as one program; None where that does not pay.
+
+    Index 3 solves ``K (δv̇, δλ) = −(r, h/c_K)``, with ``rate/c_C`` for rows on velocities. The stabilized form first
+    corrects positions, ``K (U, ·) = −(0, h − (c_K/c_C) ḣ − B̃ u)`` with the U = u of the prediction, then solves
+    ``K (δv̇, δλ) = −(r, (ḣ + ∂ḣ/∂x (U − u))/c_C)``.
+    """
+    inputs, rows, tape = Inputs.of(equations), sorted(rows), equations.tape
+    n, n_v, m = inputs.n, equations.n_v, len(rows)
+    if not 0 < n + m <= LARGEST:
+        return None
+    matrix, tail = _system(equations, rows, penalties, stabilized, sliding)
+    found = factors(matrix, n, MOST_OPERATIONS)
+    if found is None:
+        return None
+    r, values = tail[:n], tail[n : n + m]
+    by_C, by_K = 1.0 / inputs.c[0], 1.0 / inputs.c[1]
+    fast = [equations.rows[k].is_velocity for k in rows]
+    change: list[Node] = []
+    goal = [value * (by_C if fast[k] else by_K) for k, value in enumerate(values)]
+    if stabilized:
+        rates, turning = tail[n + m : n + 2 * m], tail[n + 2 * m :]
+        before = [tape.input("shift", j) for j in range(n_v)]
+        apart = [values[k] - inputs.c[1] * by_C * rates[k] - _dot(matrix[n + k], before) for k in range(m)]
+        right = [tape.zero if fast[k] else -apart[k] for k in range(m)]
+        shift = found.solve([*([tape.zero] * n), *right])[:n_v]
+        change = [after - u for after, u in zip(shift, before, strict=True)]
+        goal = [(rates[k] + _dot(turning[k * n_v : (k + 1) * n_v], change)) * by_C for k in range(m)]
+    solved = found.solve([-force for force in r] + [-row for row in goal])
+    out = [*tail, found.sound, found.weakest, *solved, *change]
+    if stabilized and not found.weakest.is_zero:
+        out += [matrix[j][j] for j in range(n_v)] + [entry for line in matrix[n:] for entry in line[:n_v]]
+    kept = found.kept()
+    at, place = len(out), len(tail) + 2
+    again = found.read({node.index: tape.input("held", at + k) for k, node in enumerate(kept)})
+    return Correction([*out, *kept], again.solve([tape.input("held", place + k) for k in range(n + m)]), len(tail))
+
+
+def _system(
+    equations: Equations,
+    rows: Sequence[int],
+    penalties: Sequence[int],
+    stabilized: bool,
+    sliding: Sequence[int],
+    borne: Sequence[int] = (),
+) -> tuple[list[list[Node]], list[Node]]:
+    """K, line by line, and r | h | ḣ | ∂ḣ/∂x, the last two stabilized only."""
     inputs = Inputs.of(equations)
-    rows = sorted(rows)
     r = balance_with(equations, sorted({*rows, *borne}), penalties, sliding)
     B = constraint_jacobian(equations, rows)
     bottom, turning = list(B), list[Node]()
@@ -66,12 +143,9 @@ def newton(
     right = _row_forces(equations, r, rows, B)
     zero = equations.tape.zero
     n, n_z, m = inputs.n, equations.n_z, len(rows)
-    out: list[Node] = []
-    for i in range(n):
-        out += [S[j][i] for j in range(n)] + [right[k][i] for k in range(m)]
-    for k in range(m):
-        out += [*bottom[k], *([zero] * (n_z + m))]
-    return out + r + _levels(equations, rows, stabilized) + turning
+    matrix = [[S[j][i] for j in range(n)] + [right[k][i] for k in range(m)] for i in range(n)]
+    matrix += [[*bottom[k], *([zero] * (n_z + m))] for k in range(m)]
+    return matrix, r + _levels(equations, rows, stabilized) + turning
 
 
 def residual(
@@ -264,6 +338,14 @@ def _time_rates(equations: Equations, values: Sequence[Node]) -> list[Node]:
     inputs = Inputs.of(equations)
     known = {} if equations.geometry is None else equations.geometry.rates(values)
     return jvp(values, {inputs.t: 1.0, **dict(zip(inputs.x, inputs.v, strict=True)), **known})
+
+
+def _dot(a: Sequence[Node], b: Sequence[Node]) -> Node:
+    """Σ aᵢ bᵢ over the shorter of both."""
+    result = b[0].tape.zero
+    for x, y in zip(a, b, strict=False):
+        result = result + x * y
+    return result
 
 
 def _transposed(columns: Sequence[Sequence[Node]]) -> list[list[Node]]:

@@ -22,6 +22,9 @@ NUMBERS = ("bool", "int", "real")
 PLACES: dict[str, int] = {field: place for place, field in enumerate(FIELDS)}
 TAGS = {what: 2 * place + 3 for place, what in enumerate(("real", "int", *REAL_ARRAYS, *INTEGER_ARRAYS, "code"))}
 """Numbers of LLVM's tags of memory, see `tags`."""
+WITHIN_ANOTHER = {"shift1": "block"}
+"""Fields that lie in the array of another, whose tag they have."""
+TAGS |= {part: TAGS[whole] for part, whole in WITHIN_ANOTHER.items()}
 ARITHMETIC = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul"}
 COMPARISONS = {
     ast.Lt: ("slt", "olt"), ast.LtE: ("sle", "ole"), ast.Gt: ("sgt", "ogt"), ast.GtE: ("sge", "oge"),
@@ -52,6 +55,8 @@ def tags() -> str:
     """
     lines = ["!0 = !{}", '!1 = !{!"kernel"}']
     for what, tag in TAGS.items():
+        if what in WITHIN_ANOTHER:
+            continue
         parent = 1 if what in ("real", "int") else TAGS["real" if what in REAL_ARRAYS else "int"] - 1
         lines += [f'!{tag - 1} = !{{!"{what}", !{parent}}}', f"!{tag} = !{{!{tag - 1}, !{tag - 1}, i64 0}}"]
     return "\n".join(lines)

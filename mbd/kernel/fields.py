@@ -47,6 +47,7 @@ REAL_ARRAYS = (
     "lcp_matrix", "lcp_shift", "lcp_found", "lcp_work", "lcp_limit", "lcp_slope",  # Lemke's method
     "guards0", "guards1",  # guard values at the accepted state and at the candidate
     "scale",  # magnitudes of r, h, ḣ term by term
+    "weight",  # the inverse of those of r
     "deepest", "sinking",  # lowest gap of each contact while ignored; time of its first release into its surface
     "side",  # sign of each user guard since it last crossed
     "restitution",
@@ -80,7 +81,7 @@ Kernel = namedtuple("Kernel", FIELDS)  # type: ignore[misc]
 
 KEPT_REALS = (
     "clock", "q", "y", "rate", "aux", "slope", "lam", "lam_slope", "shift", "shift_change", "anchors", "guards0",
-    "scale", "mix", "deepest", "sinking", "side", "detail", "slip", "lean",
+    "scale", "weight", "mix", "deepest", "sinking", "side", "detail", "slip", "lean",
 )  # fmt: skip
 """What of the real arrays the next step depends on: restored before a step, they make it the same to the bit."""
 KEPT_INTEGERS = ("closed", "armed", "touched", "dropped", "rows", "state", "sticks", "loose", "was")
@@ -95,7 +96,8 @@ KEPT_INTEGERS = ("closed", "armed", "touched", "dropped", "rows", "state", "stic
 (
     STEPS, ITERATIONS, TANGENTS, RESIDUALS, FACTORIZATIONS, EVENTS, RESTARTS, IMPACTS, LOCATIONS, STAGNATIONS, CAREFUL,
     SHORTENED, STRONGE, ENDLESS,
-) = range(14)  # fmt: skip
+    PIVOTED,  # factorizations by the pivoted LU where straight-line code was not sound
+) = range(15)  # fmt: skip
 # values of state[NEAR]: within a few steps of a pose in which rows lose rank, and just beyond it
 PASSING, LEFT = 1, 2
 # places in `detail` of the largest inverse pivot of rows in the last step, of what round-off makes of velocities there
@@ -104,7 +106,7 @@ PIVOT, KICK = 4, 5
 PAST_TIME, LIFTED = 6, 7
 # places in `clock`
 NOW, BASE, AUX_STEP, LAST_SWITCH = range(4)
-# functions in `code`; modes follow in pairs (tangent, residual)
+# functions in `code`; modes follow: tangent, residual and, where straight-line code pays, correction and solution
 ACCELERATIONS, GUARDS, SCALES, COMPOSE = range(4)
 # what advance returns
 DONE, FULL, NEW_MODE, EVENT, PAUSE, LAST = range(6)

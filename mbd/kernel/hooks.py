@@ -8,12 +8,17 @@ from __future__ import annotations
 
 from typing import Any
 
-__all__ = ["call", "scheme_accept", "scheme_resume", "scheme_start", "scheme_step"]
+__all__ = ["call", "call_on", "scheme_accept", "scheme_resume", "scheme_start", "scheme_step"]
 
 
 def call(K: Any, number: int, out: Any) -> None:
     """Evaluate model function `number` on the block and parameters."""
     K.code[number](K.block, K.params, out)
+
+
+def call_on(K: Any, number: int, numbers: Any, out: Any) -> None:
+    """Evaluate function `number` on other numbers than the block."""
+    K.code[number](numbers, K.params, out)
 
 
 def scheme_step(K: Any, h: float, t1: float) -> int:

@@ -9,7 +9,7 @@ from mbd.kernel.hooks import call
 from mbd.kernel.pairs import WHOLE
 from mbd.kernel.restart import compose
 
-__all__ = ["finish", "overturns", "predict", "residual_size", "runs_away"]
+__all__ = ["finish", "overturns", "predict", "residual_size", "runs_away", "soundness_at"]
 
 
 def predict(K: Any, h: float, t1: float, c_C: float, c_K: float) -> None:
@@ -19,6 +19,10 @@ def predict(K: Any, h: float, t1: float, c_C: float, c_K: float) -> None:
     cube = stretch * stretch * stretch
     if h > (1.0 + WHOLE) * K.dt:  # the longer of a pair, next to a pose: round-off of the shorter is not made larger
         cube = 1.0
+    mean = 1.0 / (1.0 - K.alpha_m)
+    by_rate = (1.0 - K.alpha_f) * mean
+    by_last = K.alpha_f * mean
+    by_aux = K.alpha_m * mean
     block[0] = t1
     block[1] = c_C
     block[2] = c_K
@@ -31,14 +35,23 @@ def predict(K: Any, h: float, t1: float, c_C: float, c_K: float) -> None:
     for f in range(K.n_frictions):
         block[K.o_slip + f] = K.slip[f]
     for i in range(K.n):
-        a0 = K.rate[i] + stretch * (K.aux[i] - K.rate[i])
-        rate = K.rate[i] + h * K.slope[i]
-        a1 = ((1.0 - K.alpha_f) * rate + K.alpha_f * K.rate[i] - K.alpha_m * a0) / (1.0 - K.alpha_m)
+        last = K.rate[i]
+        a0 = last + stretch * (K.aux[i] - last)
+        rate = last + h * K.slope[i]
+        a1 = by_rate * rate + by_last * last - by_aux * a0
         block[K.o_a + i] = rate
         block[K.o_v + i] = K.y[i] + h * ((1.0 - K.gamma) * a0 + K.gamma * a1)
         if i < K.n_v:
-            K.shift1[i] = (K.shift[i] + stretch * K.shift_change[i]) * cube
-            block[K.o_x + i] = h * K.y[i] + h * h * ((0.5 - K.beta) * a0 + K.beta * a1) + K.shift1[i]
+            shift = (K.shift[i] + stretch * K.shift_change[i]) * cube
+            K.shift1[i] = shift
+            block[K.o_x + i] = h * K.y[i] + h * h * ((0.5 - K.beta) * a0 + K.beta * a1) + shift
+
+
+def soundness_at(K: Any, m: int) -> int:
+    """Where the output of straight-line factors goes on behind r, h, ḣ, ∂ḣ/∂x: sound, weakest, the correction."""
+    if K.stabilized == 0:
+        return int(K.n + m)
+    return int(K.n + 2 * m + m * K.n_v)
 
 
 def residual_size(K: Any, o_r: int, m: int, c_C: float, c_K: float, tolerance: float, both: int) -> float:
@@ -49,7 +62,8 @@ def residual_size(K: Any, o_r: int, m: int, c_C: float, c_K: float, tolerance: f
     for i in range(K.n):
         r = abs(K.out[o_r + i])
         finite += r
-        size = max(size, r / (tolerance * K.scale[i]))
+        size = max(size, r * K.weight[i])
+    size /= tolerance
     speed = 0.0
     for i in range(K.n_v):
         fastest = max(fastest, abs(K.block[K.o_a + i]))
@@ -85,7 +99,7 @@ def runs_away(K: Any, m: int) -> bool:
     Then r would vanish beside its terms whatever the motion, and a step must not be accepted for it.
     """
     size = K.n + m
-    call(K, K.mode_code[2 * K.state[MODE]], K.spare)
+    call(K, K.mode_code[4 * K.state[MODE]], K.spare)
     largest = 0.0
     total = 0.0
     for i in range(K.n):
@@ -103,11 +117,17 @@ def runs_away(K: Any, m: int) -> bool:
 def finish(K: Any, h: float) -> None:
     """The converged block becomes the candidate."""
     stretch = h / K.clock[AUX_STEP]
+    mean = 1.0 / (1.0 - K.alpha_m)
+    by_rate = (1.0 - K.alpha_f) * mean
+    by_last = K.alpha_f * mean
+    by_aux = K.alpha_m * mean
     for i in range(K.n):
-        a0 = K.rate[i] + stretch * (K.aux[i] - K.rate[i])
-        K.rate1[i] = K.block[K.o_a + i]
+        last = K.rate[i]
+        a0 = last + stretch * (K.aux[i] - last)
+        rate = K.block[K.o_a + i]
+        K.rate1[i] = rate
         K.y1[i] = K.block[K.o_v + i]
-        K.aux1[i] = ((1.0 - K.alpha_f) * K.rate1[i] + K.alpha_f * K.rate[i] - K.alpha_m * a0) / (1.0 - K.alpha_m)
+        K.aux1[i] = by_rate * rate + by_last * last - by_aux * a0
     for k in range(K.n_rows):
         K.lam1[k] = K.block[K.o_lam + k]
     compose(K, K.q1)

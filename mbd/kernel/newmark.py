@@ -22,6 +22,7 @@ from mbd.kernel.fields import (
     NOW,
     PASSING,
     PIVOT,
+    PIVOTED,
     RESIDUALS,
     ROWS,
     SINGULAR,
@@ -31,8 +32,8 @@ from mbd.kernel.fields import (
     TOO_NEAR,
     TOO_TIGHT,
 )  # fmt: skip
-from mbd.kernel.hooks import call
-from mbd.kernel.iteration import finish, overturns, predict, residual_size, runs_away
+from mbd.kernel.hooks import call, call_on
+from mbd.kernel.iteration import finish, overturns, predict, residual_size, runs_away, soundness_at
 from mbd.kernel.linear import factor, solve
 from mbd.kernel.pairs import WHOLE
 from mbd.kernel.passage import WITHIN, misses, passing_step, steps_of_fall, steps_to_pose
@@ -45,6 +46,8 @@ MOST_HALVINGS = 10
 """How often a Newton correction is halved before the iteration goes on from where it is."""
 FAR = 1e4
 """Residual over its tolerance above which a correction that does not reduce it is halved."""
+MOST_STRAIGHT = 2
+"""Tangents of a step that straight-line code may factor: where it takes more, pivots are searched for."""
 
 
 def newmark_start(K: Any) -> int:
@@ -117,6 +120,8 @@ def newmark_step(K: Any, h: float, t1: float) -> int:
     before = 1e300
     left = 1e300  # the error where the last correction started
     halvings = 0
+    tangents = 0
+    straight = False  # whether the factors at hand are those of straight-line code
     fresh = False
     together = sharing(K)
     status = NOT_CONVERGED
@@ -125,12 +130,12 @@ def newmark_step(K: Any, h: float, t1: float) -> int:
         if together:
             share_loads(K, m)
         if tangent:
-            call(K, K.mode_code[2 * K.state[MODE]], K.out)
-            K.counts[TANGENTS] += 1
+            straight = renew(K, m, tangents)
+            tangents += 1
         else:
-            call(K, K.mode_code[2 * K.state[MODE] + 1], K.out)
+            call(K, K.mode_code[4 * K.state[MODE] + 1], K.out)
             K.counts[RESIDUALS] += 1
-        o_r = size * size if tangent else 0
+        o_r = size * size if tangent and not straight else 0
         error = residual_size(K, o_r, m, c_C, c_K, tolerance, K.stabilized)
         if halvings < MOST_HALVINGS and iteration > 0 and (error < 0.0 or (error > FAR and error > 0.9 * left)):
             retreat(K, m, c_C, c_K)  # a full Newton step jumped over a steep place
@@ -168,20 +173,26 @@ def newmark_step(K: Any, h: float, t1: float) -> int:
         before = error
         left = error
         halvings = 0
-        shifting = right_hand_sides(K, o_r, m, c_C, c_K, tangent)
-        if tangent and not factorize(K, size):
+        ready = tangent and straight  # the correction has come with the tangent
+        shifting = ready and take_shift(K, m)
+        if not ready or (m > 0 and K.stabilized == 1 and not shifting):
+            ready = False
+            shifting = right_hand_sides(K, o_r, m, c_C, c_K, tangent, straight)
+        if tangent and not straight and not factorize(K, size):
             status = SINGULAR
             break
         if iteration == 0 and m > 0 and K.stabilized == 1:
-            fall = steps_of_fall(K, m)
+            fall = steps_of_fall(K, m, straight)
             if fall < WITHIN + 2.0:
-                away = steps_to_pose(K, m, h, c_K / c_C) * h / K.dt
+                away = steps_to_pose(K, m, h, c_K / c_C, straight) * h / K.dt
                 if misses(K, away, h):
                     K.detail[PIVOT] = 0.0
                     return TOO_NEAR
                 if fall < WITHIN and away < WITHIN and (away < 1.0 or abs(h - K.dt) <= WHOLE * K.dt):
                     return passing_step(K, h, t1)
-        biggest = correct(K, m, c_C, c_K, tangent, shifting)
+        if not ready:
+            solve_corrections(K, m, c_C, tangent, shifting, straight)
+        biggest = correct(K, m, c_C, c_K, ready, shifting)
         if iteration == 0 and K.exact == 0:  # the predictor's error measures that of the step: stay far below it
             tolerance = min(K.tolerance, max(1e-4 * biggest, tolerance))
         fresh = True
@@ -190,7 +201,42 @@ def newmark_step(K: Any, h: float, t1: float) -> int:
     return status
 
 
-def right_hand_sides(K: Any, o_r: int, m: int, c_C: float, c_K: float, tangent: bool) -> bool:
+def renew(K: Any, m: int, tangents: int) -> bool:
+    """Residual and tangent in K.out; whether its factors and the correction are there instead of it.
+
+    Straight-line code exchanges no rows: where a pivot is too small, or the correction was not what it should be, the
+    tangent itself is asked for and pivots are searched for.
+    """
+    K.counts[TANGENTS] += 1
+    first = K.mode_code[4 * K.state[MODE] + 2]
+    if first > 0:
+        if tangents < MOST_STRAIGHT:
+            call(K, first, K.out)
+            if K.out[soundness_at(K, m)] == 1.0:
+                K.counts[FACTORIZATIONS] += 1
+                return True
+        K.counts[PIVOTED] += 1
+    call(K, K.mode_code[4 * K.state[MODE]], K.out)
+    return False
+
+
+def take_shift(K: Any, m: int) -> bool:
+    """Whether positions need correcting by what has come with the tangent: the change of the shift, then in K.work."""
+    if K.stabilized == 0:
+        return False
+    shifting = False
+    for k in range(m):
+        row = K.rows[k]
+        if K.row_level[row] == 0 and abs(K.out[K.n + k]) > 16.0 * EPS * K.scale[K.n + row]:
+            shifting = True
+    if shifting:
+        place = soundness_at(K, m) + 2 + K.n + m
+        for i in range(K.n_v):
+            K.work[i] = K.out[place + i]
+    return shifting
+
+
+def right_hand_sides(K: Any, o_r: int, m: int, c_C: float, c_K: float, tangent: bool, straight: bool) -> bool:
     """−r and −h/c_K (index 3) or −ḣ/c_C in K.rhs; for the stabilized form the position residual in K.work.
 
     Rows on velocities have −rate/c_C in both forms and take no part in the correction of positions.
@@ -217,7 +263,7 @@ def right_hand_sides(K: Any, o_r: int, m: int, c_C: float, c_K: float, tangent: 
         if abs(h) > 16.0 * EPS * K.scale[n + K.rows[k]]:
             shifting = True
         h -= (c_K / c_C) * rate
-        if tangent:
+        if tangent and not straight:
             for j in range(K.n_v):
                 h -= K.out[(n + k) * (n + m) + j] * K.shift1[j]
         K.work[n + k] = -h
@@ -239,37 +285,61 @@ def factorize(K: Any, size: int) -> bool:
     return bool(column == 0)
 
 
-def correct(K: Any, m: int, c_C: float, c_K: float, tangent: bool, shifting: bool) -> float:
+def solve_corrections(K: Any, m: int, c_C: float, tangent: bool, shifting: bool, straight: bool) -> None:
+    """The change of the position shift in K.work, the corrections of rates and multipliers in K.rhs."""
+    if shifting:  # positions first: what that changes of ḣ, the accelerations make good in the same iteration
+        solve_with_factors(K, m, K.work, straight)
+        for i in range(K.n_v if tangent else 0):
+            K.work[i] -= K.shift1[i]
+        inverse = 1.0 / c_C
+        turning = soundness_at(K, m) - m * K.n_v
+        for k in range(m):
+            turned = 0.0
+            for i in range(K.n_v):
+                entry = K.out[turning + k * K.n_v + i] if straight else K.turning[k * K.n_v + i]
+                turned += entry * K.work[i]
+            K.rhs[K.n + k] -= turned * inverse
+    solve_with_factors(K, m, K.rhs, straight)
+
+
+def solve_with_factors(K: Any, m: int, b: Any, straight: bool) -> None:
+    """b ← K⁻¹ b with the factors at hand."""
+    size = K.n + m
+    if straight:
+        place = soundness_at(K, m) + 2
+        for i in range(size):
+            K.out[place + i] = b[i]
+        call_on(K, K.mode_code[4 * K.state[MODE] + 3], K.out, b)
+    else:
+        solve(K.kkt, size, K.pivots, b)
+
+
+def correct(K: Any, m: int, c_C: float, c_K: float, ready: bool, shifting: bool) -> float:
     """Apply a Newton correction to the block; its size relative to the largest rate."""
     n = K.n
     block = K.block
     biggest = 0.0
     fastest = 1e-300
-    if shifting:  # positions first: what that changes of ḣ, the accelerations make good in the same iteration
-        solve(K.kkt, n + m, K.pivots, K.work)
+    place = soundness_at(K, m) + 2
+    if shifting:
         for i in range(K.n_v):
-            shift = K.work[i] if tangent else K.shift1[i] + K.work[i]
-            K.work[i] = shift - K.shift1[i]
-            K.shift1[i] = shift
+            K.shift1[i] += K.work[i]
             block[K.o_x + i] += K.work[i]
-        inverse = 1.0 / c_C
-        for k in range(m):
-            turned = 0.0
-            for i in range(K.n_v):
-                turned += K.turning[k * K.n_v + i] * K.work[i]
-            K.rhs[n + k] -= turned * inverse
-    solve(K.kkt, n + m, K.pivots, K.rhs)
     K.counts[ITERATIONS] += 1
     for i in range(n):
-        change = K.rhs[i]
+        change = K.out[place + i] if ready else K.rhs[i]
+        rate = block[K.o_a + i]
         biggest = max(biggest, abs(change))
-        fastest = max(fastest, abs(block[K.o_a + i]))
-        block[K.o_a + i] += change
+        fastest = max(fastest, abs(rate))
+        K.rhs[i] = change
+        block[K.o_a + i] = rate + change
         block[K.o_v + i] += c_C * change
         if i < K.n_v:
             block[K.o_x + i] += c_K * change
     for k in range(m):
-        block[K.o_lam + K.rows[k]] += K.rhs[n + k]
+        change = K.out[place + n + k] if ready else K.rhs[n + k]
+        K.rhs[n + k] = change
+        block[K.o_lam + K.rows[k]] += change
     return biggest / fastest
 
 

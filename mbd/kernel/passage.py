@@ -31,7 +31,7 @@ from mbd.kernel.fields import (
     TANGENTS,
 )  # fmt: skip
 from mbd.kernel.hooks import call
-from mbd.kernel.iteration import finish, overturns, predict, residual_size, runs_away
+from mbd.kernel.iteration import finish, overturns, predict, residual_size, runs_away, soundness_at
 from mbd.kernel.linear import factor, solve
 from mbd.kernel.pairs import WHOLE, is_of_pair
 from mbd.kernel.redundancy import sharing
@@ -49,29 +49,50 @@ CONTINUOUS = 0.05
 """Part of the speed by which a step near such a pose may differ from its prediction: the branch goes on in v [-]."""
 
 
-def steps_of_fall(K: Any, m: int) -> float:
-    """Steps until the smallest pivot of the rows vanishes, if it goes on as since the last step; a cheap first look."""
+def steps_of_fall(K: Any, m: int, straight: bool) -> float:
+    """Steps until the smallest pivot of the rows vanishes, if it goes on as since the last step; a cheap first look.
+
+    Straight-line code tells its own; where it gave way to a search for pivots, they do not compare: then it may be now.
+    """
     size = K.n + m
-    largest = 0.0  # the inverses are on the diagonal
-    for k in range(K.n, size):
-        largest = max(largest, abs(K.kkt[k * size + k]))
+    largest = 0.0
+    if straight:
+        largest = K.out[soundness_at(K, m) + 1]
+    else:
+        for k in range(K.n, size):  # the inverses are on the diagonal
+            largest = max(largest, abs(K.kkt[k * size + k]))
+        if K.mode_code[4 * K.state[MODE] + 2] > 0:
+            K.detail[PIVOT] = 0.0
+            return 0.0
     before = K.detail[PIVOT]
     K.detail[PIVOT] = largest
     return float(before / (largest - before)) if largest > before else 1e300
 
 
-def steps_to_pose(K: Any, m: int, h: float, ratio: float) -> float:
+def steps_to_pose(K: Any, m: int, h: float, ratio: float, straight: bool) -> float:
     """Steps of size h until a row of B depends on the others: how far it is from that, over what a step changes of it.
 
-    K.out holds the tangent with H = B + ratio ∂ḣ/∂x, K.turning ∂ḣ/∂x, which is the rate of B. K.detail[KICK] tells
-    what round-off of that row makes of velocities, over the speed, in a whole step that holds positions.
+    K.out holds the diagonal of S and H = B + ratio ∂ḣ/∂x, in the tangent or, of straight-line code, behind the shift;
+    K.turning holds ∂ḣ/∂x, which is the rate of B. K.detail[KICK] tells what round-off of that row makes of velocities,
+    over the speed, in a whole step that holds positions.
     """
-    leftovers(K, m, h, ratio, 0.0, 0)
-    leftovers(K, m, h, ratio, -h, m)
-    leftovers(K, m, h, ratio, h, 2 * m)
+    size = K.n + m
+    o_S = 0
+    o_H = K.n * size
+    width = size
+    if straight:
+        o_S = soundness_at(K, m) + 2 + size + K.n_v
+        o_H = o_S + K.n_v
+        width = K.n_v
+        for k in range(m * K.n_v):
+            K.turning[k] = K.out[K.n + 2 * m + k]
+    stride = 1 if straight else size + 1
+    leftovers(K, m, h, ratio, 0.0, 0, o_S, stride, o_H, width)
+    leftovers(K, m, h, ratio, -h, m, o_S, stride, o_H, width)
+    leftovers(K, m, h, ratio, h, 2 * m, o_S, stride, o_H, width)
     speed = 0.0
     for j in range(K.n_v):
-        speed += abs(K.out[j * (K.n + m) + j]) * K.block[K.o_v + j] * K.block[K.o_v + j]
+        speed += abs(K.out[o_S + stride * j]) * K.block[K.o_v + j] * K.block[K.o_v + j]
     fewest = 1e300
     for k in range(m):
         here = K.spare[k]
@@ -98,7 +119,9 @@ def misses(K: Any, away: float, h: float) -> bool:
     return bool(part < NEAREST + doubt and K.detail[KICK] * away > K.tolerance * max(part - doubt, 1e-3))
 
 
-def leftovers(K: Any, m: int, h: float, ratio: float, ahead: float, place: int) -> None:
+def leftovers(
+    K: Any, m: int, h: float, ratio: float, ahead: float, place: int, o_S: int, stride: int, o_H: int, width: int
+) -> None:
     """Lengths of the rows of B, `ahead` of now, less their parts along earlier ones, into K.spare from `place` on.
 
     Gram–Schmidt on scaled rows, the longest remaining first; at place 0 that order is found, elsewhere it is kept.
@@ -112,10 +135,10 @@ def leftovers(K: Any, m: int, h: float, ratio: float, ahead: float, place: int) 
         length = 0.0
         turned = 0.0
         for j in range(n):
-            weight = abs(K.out[j * (K.n + m) + j])
+            weight = abs(K.out[o_S + stride * j])
             weight = 1.0 / weight**0.5 if weight > 0.0 else 1.0
             turn = K.turning[row * n + j] * weight
-            entry = K.out[(K.n + row) * (K.n + m) + j] * weight - ratio * turn
+            entry = K.out[o_H + row * width + j] * weight - ratio * turn
             length += entry * entry
             turned += turn * turn
             Q[k * n + j] = entry + moves * ahead * turn
@@ -182,7 +205,7 @@ def passing_step(K: Any, h: float, t1: float) -> int:
     for iteration in range(K.max_iterations):
         if sharing(K):
             share_loads(K, m)
-        call(K, K.mode_code[2 * K.state[MODE]], K.out)
+        call(K, K.mode_code[4 * K.state[MODE]], K.out)
         K.counts[TANGENTS] += 1
         error = residual_size(K, o_r, m, c_C, c_K, tolerance, 0)
         if error < 0.0:
@@ -199,7 +222,7 @@ def passing_step(K: Any, h: float, t1: float) -> int:
         if iteration == 0:
             for k in range(m * K.n_v):
                 K.turning[k] = K.out[o_r + K.n + 2 * m + k]
-            away = steps_to_pose(K, m, h, c_K / c_C)
+            away = steps_to_pose(K, m, h, c_K / c_C, False)
             if away < NEAREST and K.detail[KICK] > K.tolerance:
                 return SINGULAR
         if error <= 1.0:

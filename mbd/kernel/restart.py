@@ -66,6 +66,7 @@ def refresh_scales(K: Any) -> None:
         for i in range(K.n):
             if K.unit[i] == unit:
                 K.scale[i] = big
+    weigh(K)
     for k in range(K.n_rows):  # a row that vanishes term by term still inherits the round-off of its coordinates
         size = 1e-3
         speed = 1e-3
@@ -76,6 +77,12 @@ def refresh_scales(K: Any) -> None:
                     size = max(size, abs(K.block[K.o_q + i]))
         K.scale[K.n + k] = max(K.scale[K.n + k], size)
         K.scale[K.n + K.n_rows + k] = max(K.scale[K.n + K.n_rows + k], speed)
+
+
+def weigh(K: Any) -> None:
+    """Residuals are compared with their scale so often that its inverse is kept."""
+    for i in range(K.n):
+        K.weight[i] = 1.0 / K.scale[i]
 
 
 def raise_scales(K: Any, rows: bool) -> None:
@@ -92,6 +99,7 @@ def raise_scales(K: Any, rows: bool) -> None:
             K.scale[i] = max(K.scale[i], K.work[i])
         else:
             K.scale[i] = K.work[i]
+    weigh(K)
 
 
 def is_held(K: Any, row: int, flags: Any) -> bool:

@@ -23,6 +23,7 @@ __all__ = ["record_of", "trajectory_of", "whole_record"]
 COUNTS = (
     "steps", "iterations", "tangents", "residuals", "factorizations", "events", "restarts", "impacts",
     "locations", "stagnations", "careful", "shortened", "energetic_impacts",
+    "endless", "pivoted",
 )  # fmt: skip
 """Names of the kernel's counts, in the order of their places."""
 

@@ -127,7 +127,7 @@ class MechanismSystem:
         block[layout.x : layout.v] = point.x
         block[layout.a : layout.lam] = point.rate
         block[[layout.lam + k for k in rows]] = point.lam
-        block[layout.slip : layout.size] = self.slip
+        block[layout.slip : layout.shift] = self.slip
         return block
 
     def _share_loads(self, block: Vector, rows: tuple[int, ...], borne: tuple[int, ...]) -> Matrix:

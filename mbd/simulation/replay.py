@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -194,15 +194,34 @@ class _Watched:
         borne: Sequence[int] = (),
     ) -> ModeCode:
         """Code of a mode that can be watched; compiled programs keep their addresses."""
-        key = (tuple(rows), tuple(penalties), stabilized, tuple(sliding), tuple(borne))
+        return self._watched(
+            self._mechanism.mode, (tuple(rows), tuple(penalties), stabilized, tuple(sliding), tuple(borne))
+        )
+
+    def stepping(
+        self,
+        rows: Sequence[int],
+        penalties: Sequence[int],
+        stabilized: bool,
+        sliding: Sequence[int] = (),
+        borne: Sequence[int] = (),
+    ) -> ModeCode:
+        """The same as the compiled kernel has it."""
+        return self._watched(
+            self._mechanism.stepping, (tuple(rows), tuple(penalties), stabilized, tuple(sliding), tuple(borne))
+        )
+
+    def _watched(self, make: Callable[..., ModeCode], *chosen: Any) -> ModeCode:
+        mode = tuple(one if isinstance(one, bool) else tuple(one) for one in chosen)
+        key = (make.__name__, *mode)
         if key not in self._codes:
-            code = self._mechanism.mode(*key)
+            code, stabilized = make(*mode), mode[2]
             n, m = self._mechanism.layout.n, len(code.rows)
             kept = n + (2 if stabilized else 1) * m
             tangent = _Seen(code.tangent, self._seen, code.rows, (n + m) ** 2, kept)
-            self._codes[key] = replace(
-                code, tangent=tangent, residual=_Seen(code.residual, self._seen, code.rows, 0, kept)
-            )
+            residual = _Seen(code.residual, self._seen, code.rows, 0, kept)
+            first = None if code.correction is None else _Seen(code.correction, self._seen, code.rows, 0, kept)
+            self._codes[key] = replace(code, tangent=tangent, residual=residual, correction=first)
         return self._codes[key]
 
     def tries(self, run: Run) -> tuple[Try, ...]:
@@ -223,8 +242,13 @@ class _Seen:
     """A program whose residuals are noted; `factor` (∂q/∂v̇) is positive in the iterations of a step only."""
 
     def __init__(self, program: Any, seen: list[Any], rows: tuple[int, ...], place: int, kept: int) -> None:
-        self.program, self.address = program, getattr(program, "address", 0)
+        self.program = program
         self._seen, self._rows, self._place, self._kept = seen, rows, place, kept
+
+    @property
+    def address(self) -> int:
+        """Of the program, which may be made later."""
+        return int(getattr(self.program, "address", 0))
 
     def __call__(self, block: Any, parameters: Any, out: Any) -> None:
         self.program(block, parameters, out)

@@ -219,25 +219,27 @@ class Run:
         """Take over the rows and events that the kernel has stored."""
         v = self.values
         count, logged = int(v["state"][F.STORED]), int(v["state"][F.LOGGED])
-        lines = v["log"].reshape(-1, v["event_width"])[:logged]
-        guards = [guard.name for guard in self.manager.guards]
-        frictions = [friction.name for friction in self.manager.frictions]
-        for line in lines:
-            kind = KINDS[int(line[1])]
-            index, impulse = int(line[2]), np.zeros(0)
-            names = {"event": guards, "stuck": frictions, "slipped": frictions}.get(kind, self.manager.names)
-            name = names[index]
-            if kind == "closed":
-                impulse = line[[5 + k for k in self.manager.contacts[index].rows]].copy()
-            self.events.append(
-                EventRecord(float(line[0]), kind, name, impulse, float(line[3]), self.stored + int(line[4]))
-            )
+        if logged:
+            self._collect_events(logged)
         if count:
             if self.stored + count > len(self.table):
                 self.table = np.concatenate([self.table, np.empty((len(self.table) + count, v["width"]))])
             self.table[self.stored : self.stored + count] = v["store"].reshape(-1, v["width"])[:count]
         self.stored += count
         v["state"][F.STORED] = v["state"][F.LOGGED] = 0
+
+    def _collect_events(self, logged: int) -> None:
+        """Events from the lines of the log."""
+        manager, width, nothing = self.manager, self.values["event_width"], np.zeros(0)
+        contacts, frictions = manager.names, [friction.name for friction in manager.frictions]
+        guards = [guard.name for guard in manager.guards]
+        known = {"event": guards, "stuck": frictions, "slipped": frictions}
+        for line in self.values["log"][: logged * width].reshape(logged, width).tolist():
+            kind, index, impulse = KINDS[int(line[1])], int(line[2]), nothing
+            if kind == "closed":
+                impulse = np.array([line[5 + k] for k in manager.contacts[index].rows])
+            name = known.get(kind, contacts)[index]
+            self.events.append(EventRecord(line[0], kind, name, impulse, line[3], self.stored + int(line[4])))
 
     def _react(self, happened: Sequence[EventRecord]) -> str:
         """Resets, controllers and endings of the events just logged; the name of the event that ends the run."""

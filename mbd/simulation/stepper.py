@@ -26,6 +26,8 @@ LAWS = ("newton", "poisson", "sequential")
 """Impact laws in the order of their numbers in the kernel."""
 TAKES_PART = 1e-7
 """Coefficient of a row below which another does not depend on it [-]."""
+PROGRAMS = 4
+"""Programs of a mode: tangent, residual, correction and solution; 0 stands for the last two where there are none."""
 MODE_CAPACITY = 16
 """Modes for which a table is laid out at the start; it doubles as it fills."""
 
@@ -67,6 +69,7 @@ class Stepper:
     ) -> None:
         self.mechanism, self.manager, self.integrator = mechanism, manager, integrator
         self.compiled = is_compiled(mechanism, integrator)
+        self.straight = self.compiled  # the kernel's own scheme, which factors in straight-line code
         self.stabilized = getattr(integrator, "stabilized", True)
         layout = mechanism.layout
         self.values: dict[str, Any] = {}
@@ -83,6 +86,7 @@ class Stepper:
         self.dependent: dict[int, tuple[int, ...]] = {}
         self.kernel: Any = None
         self._table: Any = None
+        self._known: list[Any] = []
         self.resumed_at = float("nan")  # the instant whose row was stored as a run was taken up again
         assert layout.n == self.values["n"]
 
@@ -118,17 +122,17 @@ class Stepper:
         v = self.values
         n, n_q, rows, contacts, guards = v["n"], v["n_q"], v["n_rows"], v["n_contacts"], v["n_guards"]
         frictions = v["n_frictions"]
-        size, unknowns = n + rows, contacts + 3 * frictions
+        size, unknowns, block = n + rows, contacts + 3 * frictions, self.mechanism.layout.size
+        tail = n + 2 * rows + rows * n
         reals = {
-            "block": self.mechanism.layout.size, "out": size * size + n + 2 * rows + rows * n, "clock": 4,
+            "block": block, "out": max(size * size + 3 * tail + 2 * size + 2, block), "clock": 4,
             "acc": self.mechanism.sizes["accelerations"], "q": n_q, "y": n, "rate": n, "aux": n, "slope": n,
             "lam": rows, "lam_slope": rows, "shift": n, "shift_change": n,
-            "anchors": v["n_anchors"], "q1": n_q, "y1": n, "rate1": n, "aux1": n, "lam1": rows, "shift1": n,
+            "anchors": v["n_anchors"], "q1": n_q, "y1": n, "rate1": n, "aux1": n, "lam1": rows,
             "basis": (rows + 1) * n, "lower": (rows + 1) * rows, "mix": rows * rows, "shares": rows * rows,
-            "kkt": size * size, "rhs": size,
-            "spare": size * size + n + 2 * rows + rows * n, "turning": rows * n,
+            "kkt": size * size, "rhs": size, "spare": size * size + tail, "turning": rows * n,
             "work": 3 * size, "force": n, "bias": rows, "jump": n, "impulse": rows,
-            "guards0": v["n_watched"], "guards1": v["n_watched"], "scale": n + 2 * rows,
+            "guards0": v["n_watched"], "guards1": v["n_watched"], "scale": n + 2 * rows, "weight": n,
             "deepest": contacts, "sinking": contacts, "side": guards, "pick": 8, "detail": 8,
             "slip": frictions, "limit": frictions, "base_limit": frictions, "lean": frictions, "typical": n,
             "given": rows, "total": rows, "total_jump": n, "loads": rows, "before": contacts, "past": rows,
@@ -144,7 +148,7 @@ class Stepper:
             "closing": contacts, "parting": contacts, "lifting": rows, "kept_flags": 3 * contacts + 3 * frictions,
             "sticks": frictions, "loose": frictions, "was": frictions, "let_go": frictions, "dropped": rows,
             "mode_key": MODE_CAPACITY * (contacts + rows + frictions),
-            "mode_code": 2 * MODE_CAPACITY,
+            "mode_code": PROGRAMS * MODE_CAPACITY,
             "mode_count": 1, "rows": rows,
             "pivots": size, "columns": size, "lcp_rows": contacts + frictions, "lcp_who": contacts + frictions,
             "lcp_basis": unknowns, "fired": 2, "state": 17, "counts": 16,
@@ -157,6 +161,7 @@ class Stepper:
             v[name] = np.zeros(max(length, 1), dtype=np.int64)
         for name, table in manager.tables().items():
             v[name] = table if len(table) else np.zeros(1, dtype=table.dtype)
+        v["shift1"] = v["block"][self.mechanism.layout.shift :]  # read by model code as well
         v["sinking"][:] = np.inf
         v["was"][:] = F.UNKNOWN
         v["unit"] = unit_blocks(self.mechanism)
@@ -174,15 +179,18 @@ class Stepper:
         rows = tuple(row for row in held if not dropped[row])
         sliding = tuple(int(f) for f in np.flatnonzero(slip))
         borne = tuple(row for row in held if dropped[row]) if sliding else ()
-        code = self.mechanism.mode(rows, self.manager.penalties(flags), self.stabilized, sliding, borne)
+        make = self.mechanism.stepping if self.straight else self.mechanism.mode
+        code = make(rows, self.manager.penalties(flags), self.stabilized, sliding, borne)
         count, width = int(v["mode_count"][0]), v["n_contacts"] + v["n_rows"] + v["n_frictions"]
         phases = np.where(sticks == 1, 2, slip != 0.0)
-        if 2 * (count + 1) > len(v["mode_code"]):
+        if PROGRAMS * (count + 1) > len(v["mode_code"]):
             v["mode_key"] = np.concatenate([v["mode_key"], np.zeros_like(v["mode_key"])])
             v["mode_code"] = np.concatenate([v["mode_code"], np.zeros_like(v["mode_code"])])
         v["mode_key"][count * width : (count + 1) * width] = np.concatenate([flags, dropped, phases])
-        v["mode_code"][2 * count : 2 * count + 2] = len(self.functions), len(self.functions) + 1
-        self.functions += [code.tangent, code.residual]
+        known = [code.tangent, code.residual] + ([] if code.correction is None else [code.correction, code.solution])
+        places = [*range(len(self.functions), len(self.functions) + len(known)), 0, 0]
+        v["mode_code"][PROGRAMS * count : PROGRAMS * (count + 1)] = places[:PROGRAMS]
+        self.functions += known
         self.modes.append(code)
         mix = v["mix"].reshape(v["n_rows"], -1) if v["n_rows"] else v["mix"]
         for row in range(v["n_rows"]):
@@ -231,16 +239,25 @@ class Stepper:
             addresses = [0 if function is None else function.address for function in self.functions]
             self._code = np.array(addresses, dtype=np.int64)
             self._table = np.zeros(len(F.FIELDS), dtype=np.int64)
+            self._known = [None] * len(F.FIELDS)
         for place, name in enumerate(F.FIELDS):
-            if name == "code":
-                self._table[place] = self._code.ctypes.data
-            elif name in F.REALS:
-                self._table[place] = struct.unpack("q", struct.pack("d", self.values[name]))[0]
-            elif name in F.INTEGERS or name == "hooks":
-                self._table[place] = self.values[name]
+            value = self._code if name == "code" else self.values[name]
+            if value is self._known[place]:  # numbers do not change, arrays stay where they are
+                continue
+            self._known[place] = value
+            if name in F.REALS:
+                self._table[place] = struct.unpack("q", struct.pack("d", value))[0]
             else:
-                self._table[place] = self.values[name].ctypes.data
-        return entry()(self._table.ctypes.data)
+                self._table[place] = value.ctypes.data if isinstance(value, np.ndarray) else value
+        postponed = [tangent for tangent in self.mechanism.postponed if not tangent.made]
+        status = entry()(self._table.ctypes.data)
+        for tangent in postponed:
+            if tangent.raised is not None:
+                raised, tangent.raised = tangent.raised, None
+                raise raised
+            if tangent.made:
+                self._table = None  # it has another address now
+        return status
 
 
 def _shelve(values: dict[str, Any], lengths: dict[str, int], kind: Any) -> Any:

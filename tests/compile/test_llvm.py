@@ -159,7 +159,7 @@ def test_arrays_that_do_not_fit_are_refused():
     block, parameters = state(links)
     out = np.empty(function.size)
     for arrays in ((block, parameters, out[:-1]), (block, parameters[:-1], out), (block[:-1], parameters, out)):
-        with pytest.raises(ValueError, match=r"need \(11, 7, 6\) numbers, these arrays have"):
+        with pytest.raises(ValueError, match=r"need \(13, 7, 6\) numbers, these arrays have"):
             function(*arrays)
     fixed = out.copy()
     fixed.flags.writeable = False
