@@ -194,9 +194,7 @@ class _Watched:
         borne: Sequence[int] = (),
     ) -> ModeCode:
         """Code of a mode that can be watched; compiled programs keep their addresses."""
-        return self._watched(
-            self._mechanism.mode, (tuple(rows), tuple(penalties), stabilized, tuple(sliding), tuple(borne))
-        )
+        return self._watched(self._mechanism.mode, rows, penalties, stabilized, sliding, borne)
 
     def stepping(
         self,
@@ -207,9 +205,7 @@ class _Watched:
         borne: Sequence[int] = (),
     ) -> ModeCode:
         """The same as the compiled kernel has it."""
-        return self._watched(
-            self._mechanism.stepping, (tuple(rows), tuple(penalties), stabilized, tuple(sliding), tuple(borne))
-        )
+        return self._watched(self._mechanism.stepping, rows, penalties, stabilized, sliding, borne)
 
     def _watched(self, make: Callable[..., ModeCode], *chosen: Any) -> ModeCode:
         mode = tuple(one if isinstance(one, bool) else tuple(one) for one in chosen)
