@@ -66,7 +66,12 @@ if TYPE_CHECKING:
         Spring as Spring,
         TorsionSpring as TorsionSpring,
     )
-    from mbd.integrators import HHT as HHT, GeneralizedAlpha as GeneralizedAlpha, Newmark as Newmark
+    from mbd.integrators import (
+        HHT as HHT,
+        GeneralizedAlpha as GeneralizedAlpha,
+        Newmark as Newmark,
+        RadauIIA as RadauIIA,
+    )
     from mbd.joints import (
         Cylindrical as Cylindrical,
         Planar as Planar,
@@ -127,7 +132,7 @@ _HOMES = {
     "mbd.errors": "AssemblyError CapabilityError MbdError ModelError SimulationError TraceError TrajectoryError "
     "UnknownNameError",
     "mbd.forces": "Applied Damper Motor Potential Samples Spring TorsionSpring",
-    "mbd.integrators": "HHT GeneralizedAlpha Newmark",
+    "mbd.integrators": "HHT GeneralizedAlpha Newmark RadauIIA",
     "mbd.joints": "Cylindrical Planar Prismatic Revolute Screw Translation Universal Weld",
     "mbd.joints.losses": "Coulomb Dissipation PinFriction Quadratic Tabulated Viscous",
     "mbd.model": "Model on_slope",

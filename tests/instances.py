@@ -178,4 +178,5 @@ INTEGRATORS: list[Integrator] = [
     mbd.HHT(alpha=0.05, form="averaged"),
     mbd.GeneralizedAlpha(rho_inf=0.9),
     mbd.GeneralizedAlpha(rho_inf=0.0),
+    mbd.RadauIIA(),
 ]

@@ -4,6 +4,7 @@ from mbd.integrators.base import Advance, Integrator, Point, StepReport, StepRes
 from mbd.integrators.generalized_alpha import GeneralizedAlpha
 from mbd.integrators.hht import HHT
 from mbd.integrators.newmark import Newmark
+from mbd.integrators.radau import RadauIIA
 
 __all__ = [
     "Advance",
@@ -12,6 +13,7 @@ __all__ = [
     "Integrator",
     "Newmark",
     "Point",
+    "RadauIIA",
     "StepReport",
     "StepResult",
     "System",

@@ -24,8 +24,8 @@ ENTRY = "mbd_kernel"
 
 MODULES = (
     "linear", "lemke", "redundancy", "saddle", "restart", "pivoting", "complementarity", "blow", "impact", "settle",
-    "pairs", "iteration", "passage", "newmark", "hermite", "guards", "locate", "switching", "nonsmooth", "takeover",
-    "advance",
+    "pairs", "iteration", "passage", "newmark", "complex_linear", "stages", "radau", "hermite", "guards", "locate",
+    "switching", "nonsmooth", "takeover", "advance",
 )  # fmt: skip
 
 APART = ("factor", "solve")
@@ -33,15 +33,24 @@ APART = ("factor", "solve")
 
 SHIMS = """
 def scheme_step(K: Any, h: float, t1: float) -> int:
+    if K.scheme == 2:
+        return radau_step(K, h, t1)
     return newmark_step(K, h, t1)
 
 def scheme_accept(K: Any, h: float) -> None:
-    newmark_accept(K, h)
+    if K.scheme == 2:
+        radau_accept(K, h)
+    else:
+        newmark_accept(K, h)
 
 def scheme_resume(K: Any, h: float) -> int:
+    if K.scheme == 2:
+        return radau_resume(K, h)
     return newmark_resume(K, h)
 
 def scheme_start(K: Any) -> int:
+    if K.scheme == 2:
+        return radau_start(K)
     return newmark_start(K)
 
 def mbd_kernel(K: Any) -> int:

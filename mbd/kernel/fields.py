@@ -35,6 +35,8 @@ REAL_ARRAYS = (
     "q1", "y1", "rate1", "aux1", "lam1", "shift1",  # candidate of the step under judgement
     "kkt", "rhs", "work", "spare",  # linear algebra
     "stages",  # what a scheme of several stages works on
+    "past_stages",  # those of the last step, which predict the next
+    "error",  # local error of positions (n_v) and of rates' integrals (v, z) in the last step tried
     "turning",  # ∂ḣ/∂x of the active rows, stabilized only
     "basis", "lower", "mix", "shares",  # dependent rows as combinations of others, and what they bear of their loads
     "force", "bias", "jump", "impulse",  # complementarity: right-hand sides, velocity or acceleration, multipliers
@@ -81,7 +83,7 @@ Kernel = namedtuple("Kernel", FIELDS)  # type: ignore[misc]
 
 KEPT_REALS = (
     "clock", "q", "y", "rate", "aux", "slope", "lam", "lam_slope", "shift", "shift_change", "anchors", "guards0",
-    "scale", "weight", "mix", "deepest", "sinking", "side", "detail", "slip", "lean",
+    "scale", "weight", "mix", "deepest", "sinking", "side", "detail", "slip", "lean", "past_stages",
 )  # fmt: skip
 """What of the real arrays the next step depends on: restored before a step, they make it the same to the bit."""
 KEPT_INTEGERS = ("closed", "armed", "touched", "dropped", "rows", "state", "sticks", "loose", "was")

@@ -278,7 +278,7 @@ def factorize(K: Any, size: int) -> bool:
     for k in range(size * size):
         K.kkt[k] = K.out[k]
     if sharing(K):
-        add_shares(K, size - K.n)
+        add_shares(K, K.kkt, size - K.n)
     column = factor(K.kkt, size, K.pivots)
     K.counts[FACTORIZATIONS] += 1
     K.state[BLOCKED] = column - 1

@@ -250,7 +250,7 @@ def correct_positions(K: Any, m: int, c_C: float, c_K: float) -> bool:
     for k in range(size * size):
         K.kkt[k] = K.out[k]
     if sharing(K):
-        add_shares(K, m)
+        add_shares(K, K.kkt, m)
     for i in range(n):
         K.rhs[i] = -K.out[size * size + i]
     for k in range(m):

@@ -234,12 +234,12 @@ def share_loads(K: Any, m: int) -> None:
         K.block[K.o_lam + k] = K.loads[k]
 
 
-def add_shares(K: Any, m: int) -> None:
-    """What the multipliers of a step bring along through dependent rows, into the tangent in K.kkt."""
+def add_shares(K: Any, A: Any, m: int) -> None:
+    """What the multipliers of a step bring along through dependent rows, into the tangent A of m rows."""
     size = K.n + m
     for i in range(K.n):
         for k in range(m):
-            K.kkt[i * size + K.n + k] += shared(K, i, K.rows[k])
+            A[i * size + K.n + k] += shared(K, i, K.rows[k])
 
 
 def find_sliding_friction(K: Any) -> None:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from mbd.equations.equations import Equations
-from mbd.integrators import HHT, GeneralizedAlpha, Integrator, Newmark
+from mbd.integrators import HHT, GeneralizedAlpha, Integrator, Newmark, RadauIIA
 
 __all__ = ["LAWS", "SCHEMES", "STRATEGIES", "SPACE", "Law", "as_markdown", "as_text", "refusals", "supports"]
 
@@ -62,6 +62,7 @@ SCHEMES: dict[str, tuple[Integrator, ...]] = {
     "index3, ρ∞ < 1": (HHT(0.05, formulation="index3"), GeneralizedAlpha(0.5, formulation="index3")),
     "index3, ρ∞ = 1": (Newmark(formulation="index3"), GeneralizedAlpha(1.0, formulation="index3")),
     "HHT averaged": (HHT(0.05, form="averaged"),),
+    "RadauIIA": (RadauIIA(),),
 }
 """Columns of the table: schemes that stand for all with this formulation."""
 

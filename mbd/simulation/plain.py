@@ -52,6 +52,11 @@ class MechanismSystem:
             inside = live([entry for column in mass_matrix(equations) for entry in column])
         return not any(node.op == "input" and node.data[0] in ("t", "q", "x") for node in inside)
 
+    @property
+    def angles(self) -> Any:
+        """Which velocities turn, (n_v,) booleans."""
+        return unit_blocks(self.mechanism)[: self.n_v] == 1
+
     def active(self, mode: Mode) -> tuple[tuple[int, ...], tuple[int, ...]]:
         """Rows that act and penalty contacts that push in a mode."""
         flags = self.manager.flags(mode.closed)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,9 +13,12 @@ from mbd.compile.mechanism import Mechanism
 from mbd.equations.equations import Equations
 from mbd.integrators.base import Integrator
 from mbd.integrators.family import MAX_ITERATIONS, NewmarkFamily
+from mbd.integrators.radau import RadauIIA
 from mbd.kernel import fields as F
 from mbd.kernel.active_set import ActiveSetManager
+from mbd.kernel.collocation import RADAU
 from mbd.kernel.lemke import lemke_places
+from mbd.kernel.stages import STAGES_END, stage_place
 from mbd.simulation.plain import MechanismSystem, PlainScheme, row_units, unit_blocks
 from mbd.tape.derivatives import live
 
@@ -22,6 +26,8 @@ __all__ = ["Stepper", "is_compiled"]
 
 EVENT_CAPACITY = 512
 """Events that the kernel may log before it hands them over, at least."""
+RADAU_IIA = 2
+"""Number of that scheme in the kernel."""
 LAWS = ("newton", "poisson", "sequential")
 """Impact laws in the order of their numbers in the kernel."""
 TAKES_PART = 1e-7
@@ -33,10 +39,11 @@ MODE_CAPACITY = 16
 
 
 def is_compiled(mechanism: Mechanism, integrator: Integrator) -> bool:
-    """Whether the compiled kernel can run this scheme: machine code exists and it is the endpoint Newmark family."""
+    """Whether the compiled kernel can run this scheme: machine code exists, and it is one that the kernel knows."""
     own_step = getattr(integrator, "form", "endpoint") == "endpoint" and isinstance(integrator, NewmarkFamily)
     plain_step = own_step and type(integrator).step in (NewmarkFamily.step, _hht_step())
-    return plain_step and mechanism.common["accelerations"].address != 0
+    known = plain_step or (isinstance(integrator, RadauIIA) and type(integrator).step is RadauIIA.step)
+    return known and mechanism.common["accelerations"].address != 0
 
 
 def _hht_step() -> Any:
@@ -69,7 +76,7 @@ class Stepper:
     ) -> None:
         self.mechanism, self.manager, self.integrator = mechanism, manager, integrator
         self.compiled = is_compiled(mechanism, integrator)
-        self.straight = self.compiled  # the kernel's own scheme, which factors in straight-line code
+        self.straight = self.compiled and isinstance(integrator, NewmarkFamily)  # factored in straight-line code
         self.stabilized = getattr(integrator, "stabilized", True)
         layout = mechanism.layout
         self.values: dict[str, Any] = {}
@@ -117,6 +124,8 @@ class Stepper:
                 alpha_m=c.alpha_m, alpha_f=c.alpha_f, beta=c.beta, gamma=c.gamma, tolerance=self.integrator.tolerance,
                 jerk=int(self.integrator.starting == "jerk"), exact=int(self.integrator.exact),
             )  # fmt: skip
+        elif isinstance(self.integrator, RadauIIA):
+            values.update(scheme=RADAU_IIA, tolerance=self.integrator.tolerance)
 
     def _arrays(self, parameters: Vector, manager: ActiveSetManager) -> None:
         v = self.values
@@ -124,6 +133,7 @@ class Stepper:
         frictions = v["n_frictions"]
         size, unknowns, block = n + rows, contacts + 3 * frictions, self.mechanism.layout.size
         tail = n + 2 * rows + rows * n
+        stages = v["scheme"] == RADAU_IIA
         reals = {
             "block": block, "out": max(size * size + 3 * tail + 2 * size + 2, block), "clock": 4,
             "acc": self.mechanism.sizes["accelerations"], "q": n_q, "y": n, "rate": n, "aux": n, "slope": n,
@@ -138,7 +148,9 @@ class Stepper:
             "given": rows, "total": rows, "total_jump": n, "loads": rows, "before": contacts, "past": rows,
             "past_limit": frictions, "trial": rows, "trial_given": rows, "trial_jump": n,
             "lcp_matrix": unknowns * unknowns, "lcp_shift": unknowns, "lcp_found": unknowns,
-            "lcp_work": lemke_places(unknowns), "stages": 0, "lcp_limit": frictions, "lcp_slope": frictions,
+            "lcp_work": lemke_places(unknowns), "lcp_limit": frictions, "lcp_slope": frictions,
+            "stages": stage_place(SimpleNamespace(**v), STAGES_END) if stages else 0,
+            "past_stages": 3 * (n + rows + v["n_v"]) if stages else 0, "error": v["n_v"] + n,
             "kept": n_q + 2 * n + rows + v["n_watched"] + v["n_anchors"] + frictions,
             "store": v["capacity"] * v["width"], "log": v["event_capacity"] * v["event_width"],
         }  # fmt: skip
@@ -164,6 +176,8 @@ class Stepper:
         v["shift1"] = v["block"][self.mechanism.layout.shift :]  # read by model code as well
         v["sinking"][:] = np.inf
         v["was"][:] = F.UNKNOWN
+        if v["scheme"] == RADAU_IIA:
+            v["stages"][: len(RADAU.numbers())] = RADAU.numbers()
         v["unit"] = unit_blocks(self.mechanism)
         v["row_unit"] = np.append(row_units(self.mechanism), 2)
         v["params"] = np.ascontiguousarray(parameters, dtype=float) if len(parameters) else np.zeros(1)

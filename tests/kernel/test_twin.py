@@ -30,6 +30,7 @@ SCHEMES = {
     "undamped generalized alpha": mbd.GeneralizedAlpha(1.0),
     "hht index 3": mbd.HHT(0.05, formulation="index3", tolerance=TIGHT),
     "generalized alpha index 3": mbd.GeneralizedAlpha(0.5, formulation="index3", tolerance=TIGHT),
+    "radau": mbd.RadauIIA(tolerance=TIGHT),
     "textbook start": mbd.HHT(0.1, start="consistent", tolerance=TIGHT),
 }
 
@@ -177,7 +178,7 @@ def test_integrator_advance_and_the_compiled_kernel_agree_on_random_mechanisms(s
 
 
 def test_a_four_bar_turns_alike_on_both_paths():
-    for scheme in ("hht", "generalized alpha index 3"):
+    for scheme in ("hht", "generalized alpha index 3", "radau"):
         trajectories = []
         for backend in ("auto", "python"):
             model = four_bar()

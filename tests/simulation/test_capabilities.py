@@ -80,7 +80,7 @@ def test_interpreted_schemes_run_with_every_law(name):
 @pytest.mark.parametrize("name", SCENES)
 def test_every_strategy_runs_with_every_law_or_is_refused(name):
     for options in STRATEGIES:
-        for scheme in (mbd.HHT(0.05), mbd.GeneralizedAlpha(0.5, formulation="index3")):
+        for scheme in (mbd.HHT(0.05), mbd.GeneralizedAlpha(0.5, formulation="index3"), mbd.RadauIIA()):
             check(name, scheme, **options)
     for impact in ("poisson", "sequential"):
         check(name, mbd.GeneralizedAlpha(0.9), contact="nonsmooth", impact=impact)

@@ -21,6 +21,7 @@ SCHEMES = {
     "newmark": mbd.Newmark(),
     "hht index 3": mbd.HHT(0.1, formulation="index3"),
     "textbook start": mbd.HHT(0.1, start="consistent"),
+    "radau": mbd.RadauIIA(),
 }
 
 
@@ -42,7 +43,7 @@ def test_two_halves_are_the_whole_to_the_bit(name, scheme):
         assert_halves_are_the_whole(whole, *halves(model, start, SCHEMES[scheme], whole.time[row], **how))
 
 
-@pytest.mark.parametrize("scheme", [mbd.HHT(0.05), ProjectedMidpoint(), SemiImplicitEuler()], ids=repr)
+@pytest.mark.parametrize("scheme", [mbd.HHT(0.05), mbd.RadauIIA(), ProjectedMidpoint(), SemiImplicitEuler()], ids=repr)
 @pytest.mark.parametrize("name", ["bouncing ball", "redundant cranks", "controller and signal", "ball on rubber"])
 def test_two_halves_in_plain_python_are_the_whole_too(name, scheme):
     (model, start), how = scene(name), {"dt": SCENES[name].dt, "until": 0.5, "backend": "python"}

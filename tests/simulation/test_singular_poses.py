@@ -26,6 +26,7 @@ MECHANISMS = {
 }
 SCHEMES = [
     mbd.HHT(0.05), mbd.GeneralizedAlpha(0.9), mbd.GeneralizedAlpha(0.8), mbd.GeneralizedAlpha(0.5), mbd.Newmark(),
+    mbd.RadauIIA(),
 ]  # fmt: skip
 CLOSE = 1e-9
 """How far a run may be off its branch [m, rad]."""
@@ -75,7 +76,7 @@ def test_nothing_is_kicked_next_to_a_singular_pose(dt, scheme):
     found, _ = passage("slider-crank")
     run = mbd.simulate(*found.start, scheme, dt=dt, until=0.6)
     near = np.abs(run["main.angle"] - np.pi) < 40.0 * dt
-    bends = np.abs(np.diff(run["main.angle.rate"][near], 2))
+    bends = np.abs(np.diff(np.diff(run["main.angle.rate"][near]) / np.diff(run.time[near]))) * dt
     assert np.max(bends) < 20.0 * dt**2 + 1e-14 / dt**2  # the second slope of the rate is 8 rad/s³
 
 

@@ -1,0 +1,405 @@
+"""One step of the three-stage Radau IIA method of order 5 (Hairer & Wanner 1996, Solving ODEs II, IV.8 and VII.4).
+
+Rows are held in the stabilized form at every stage (`mbd.kernel.stages`), the last of which is the end of the step.
+Newton's method has one pair of matrices a step; accelerations and multipliers of the end come from the balance and the
+rows at acceleration level, which makes them as accurate as positions and velocities.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mbd.kernel.fields import (
+    AUX_STEP,
+    EPS,
+    MODE,
+    N_DROPPED,
+    NEAR,
+    NOT_CONVERGED,
+    NOT_FINITE,
+    NOW,
+    PASSING,
+    PIVOT,
+    ROWS,
+    SINGULAR,
+    STAGNATED,
+    STAGNATIONS,
+    TOO_NEAR,
+    TOO_TIGHT,
+)  # fmt: skip
+from mbd.kernel.hooks import call
+from mbd.kernel.iteration import runs_away
+from mbd.kernel.linear import factor, solve
+from mbd.kernel.pairs import WHOLE
+from mbd.kernel.passage import WITHIN, misses, passing_step, steps_of_fall, steps_to_pose
+from mbd.kernel.restart import (
+    compose,
+    consistent,
+    evaluate,
+    fill_block,
+    find_sliding_friction,
+    load_accelerations,
+    raise_scales,
+    refresh_scales,
+)
+from mbd.kernel.stages import (
+    A_,
+    E_,
+    MASS_PART,
+    MU_REAL,
+    STAGE_LAM,
+    STAGE_RATES,
+    STIFF_PART,
+    correct_stages,
+    evaluate_stages,
+    factor_stages,
+    hold_block,
+    load_stage,
+    predict_stages,
+    retreat_stages,
+    stage_place,
+)
+
+__all__ = ["radau_accept", "radau_resume", "radau_start", "radau_step"]
+
+MOST_RETREATS = 10
+"""How often a Newton correction is halved before the iteration goes on from where it is."""
+FAR_OFF = 1e4
+"""Residual over its tolerance above which a correction that does not reduce it is halved."""
+SLOW = 0.5
+"""Part of the residual left by a correction above which the matrices are made anew."""
+
+PATIENT = 6
+"""Corrections after which residuals that meet the tolerance asked for are taken for what they are [-]."""
+STUCK = 0.9
+"""Part of the residual left by a correction above which it falls no more; between both it falls slowly."""
+
+
+def radau_start(K: Any) -> int:
+    """The memory at a consistent state: stages of a step before it at rates and multipliers that do not change."""
+    t = K.clock[NOW]
+    for i in range(K.n):
+        K.slope[i] = 0.0
+        K.aux[i] = K.rate[i]
+        K.shift[i] = 0.0
+        K.shift_change[i] = 0.0
+    for k in range(K.n_rows):
+        K.lam_slope[k] = 0.0
+    forget_stages(K)
+    K.clock[AUX_STEP] = K.dt
+    K.state[NEAR] = 0
+    K.detail[PIVOT] = 0.0
+    fill_block(K, t, K.q, K.y)
+    refresh_scales(K)
+    for i in range(K.n):  # a force that is zero just now has its size a step later
+        K.block[K.o_v + i] += K.dt * K.rate[i]
+        if i < K.n_v:
+            K.block[K.o_x + i] = K.dt * (K.y[i] + 0.5 * K.dt * K.rate[i])
+    raise_scales(K, False)
+    return 0
+
+
+def radau_resume(K: Any, h: float) -> int:
+    """Start from the accepted state, with the rates in K.jump and the multipliers in K.impulse; nothing is kept."""
+    for i in range(K.n):
+        K.rate[i] = K.jump[i]
+    for k in range(K.n_rows):
+        K.lam[k] = K.impulse[k]
+    return radau_start(K)
+
+
+def forget_stages(K: Any) -> None:
+    """Stages to predict the next step from: those of rates and multipliers that do not change."""
+    n = K.n
+    for i in range(3):
+        for j in range(n):
+            K.past_stages[i * n + j] = K.rate[j]
+        for k in range(K.n_rows):
+            K.past_stages[3 * n + i * K.n_rows + k] = K.lam[k]
+        for j in range(K.n_v):
+            K.past_stages[3 * n + 3 * K.n_rows + i * K.n_v + j] = 0.0
+
+
+def radau_accept(K: Any, h: float) -> None:
+    """The candidate becomes the accepted state, its stages those to predict the next from."""
+    inverse = 1.0 / h
+    for i in range(K.n_q):
+        K.q[i] = K.q1[i]
+    for i in range(K.n):
+        K.y[i] = K.y1[i]
+        K.slope[i] = (K.rate1[i] - K.rate[i]) * inverse
+        K.rate[i] = K.rate1[i]
+        K.aux[i] = K.rate1[i]
+    for k in range(K.n_rows):
+        K.lam_slope[k] = (K.lam1[k] - K.lam[k]) * inverse
+        K.lam[k] = K.lam1[k]
+    if K.state[NEAR] > 0:  # a step of another rule, see `mbd.kernel.passage`
+        forget_stages(K)
+    else:
+        o = stage_place(K, STAGE_RATES)
+        for k in range(3 * (K.n + K.n_rows + K.n_v)):
+            K.past_stages[k] = K.stages[o + k]
+    K.clock[AUX_STEP] = h
+
+
+def radau_step(K: Any, h: float, t1: float) -> int:
+    """Candidate state (q1, y1, rate1, aux1, lam1) after a step of size h; the accepted state is untouched."""
+    m = K.state[ROWS]
+    if K.state[NEAR] == PASSING:
+        return pass_on(K, h, t1)
+    c = K.stages[MU_REAL] * h
+    hold_block(K)
+    predict_stages(K, h, m)
+    tolerance = 1e-3 * K.tolerance
+    before = 1e300
+    left = 1e300  # the error where the last correction started
+    retreats = 0
+    renew = True
+    status = NOT_CONVERGED
+    K.detail[0] = t1
+    K.detail[2] = h
+    for iteration in range(K.max_iterations):
+        error = evaluate_stages(K, h, t1, m, tolerance, c, c * c, renew)
+        if retreats < MOST_RETREATS and iteration > 0 and (error < 0.0 or (error > FAR_OFF and error > 0.9 * left)):
+            retreat_stages(K, m, 0.5)  # a full Newton step jumped over a steep place
+            retreats += 1
+            continue
+        if error < 0.0:
+            status = NOT_FINITE
+            break
+        K.detail[1] = error
+        if error > 1.0 and iteration >= 2 and error > 0.5 * before:
+            status = judge_stagnation(K, h, t1, m, tolerance, iteration >= PATIENT and error > STUCK * before)
+            if status == 0:
+                error = 1.0
+            elif status != NOT_CONVERGED or K.detail[1] < 0.0:
+                break
+        if error > 1.0 and was_enough(K, h, t1, m, iteration, error, left):
+            return complete(K, h, t1, m, renew, False)
+        if error <= 1.0:
+            return complete(K, h, t1, m, renew, True)
+        if not renew and error > SLOW * before:
+            renew = True  # the old matrices have done their work: make them anew at the same iterate
+            before = 1e300
+            continue
+        before = error
+        left = error
+        retreats = 0
+        if renew and not factor_stages(K, K.n + m):
+            status = SINGULAR
+            break
+        if iteration == 0 and m > 0:
+            fall = steps_of_fall(K, m, False)
+            found = look_ahead(K, h, t1, m, fall) if fall < WITHIN + 2.0 else 0
+            if found != 0:
+                return pass_on(K, h, t1) if found == PASSING else TOO_NEAR
+        biggest = correct_stages(K, m, h, renew)
+        if iteration == 0:  # the predictor is of order 3, the step of order 5: stay far below its error
+            tolerance = min(K.tolerance, max(1e-3 * biggest * biggest, tolerance))
+        renew = False
+    if K.detail[1] < 0.0:
+        K.detail[1] = 1e300
+    return status
+
+
+def pass_on(K: Any, h: float, t1: float) -> int:
+    """The trapezoidal step next to a pose in which rows lose rank, and what is known of its error: of positions."""
+    status = passing_step(K, h, t1)
+    if status == 0:
+        for i in range(K.n):
+            K.error[K.n_v + i] = 0.0
+            if i < K.n_v:
+                K.error[i] = h * h / 12.0 * (K.rate1[i] - K.rate[i])
+    return status
+
+
+def judge_stagnation(K: Any, h: float, t1: float, m: int, tolerance: float, stuck: bool) -> int:
+    """What residuals that fall no more mean: 0 round-off, NOT_CONVERGED go on, else the end of the iteration.
+
+    K.detail[1] < 0 where multipliers run away.
+    """
+    c = K.stages[MU_REAL] * h
+    for turn in range(3):
+        load_stage(K, 2 - turn, h, t1)
+        raise_scales(K, True)
+        if turn == 0 and m > 0 and runs_away(K, m):
+            K.detail[1] = -1.0
+            return NOT_CONVERGED
+    rough = evaluate_stages(K, h, t1, m, 256.0 * EPS, 0.0, 0.0, False)
+    if rough <= 16.0:
+        if evaluate_stages(K, h, t1, m, K.tolerance, c, c * c, False) > 1.0:
+            return TOO_TIGHT
+        K.counts[STAGNATIONS] += 1
+        return 0
+    if stuck and evaluate_stages(K, h, t1, m, 1e5 * EPS, 0.0, 0.0, False) <= 1e3:
+        return STAGNATED
+    if evaluate_stages(K, h, t1, m, tolerance, c, c * c, False) <= 1.0:
+        return 0
+    return NOT_CONVERGED
+
+
+def look_ahead(K: Any, h: float, t1: float, m: int, fall: float) -> int:
+    """PASSING where a pose in which rows lose rank is near, TOO_NEAR where this step would end too close; else 0."""
+    c = K.stages[MU_REAL] * h
+    load_stage(K, 2, h, t1)
+    K.block[1] = c
+    K.block[2] = c * c
+    call(K, K.mode_code[4 * K.state[MODE]], K.out)
+    size = K.n + m
+    for k in range(m * K.n_v):
+        K.turning[k] = K.out[size * size + K.n + 2 * m + k]
+    away = steps_to_pose(K, m, h, c, False) * h / K.dt
+    if misses(K, away, h):
+        K.detail[PIVOT] = 0.0
+        return TOO_NEAR
+    return PASSING if fall < WITHIN and away < WITHIN and (away < 1.0 or abs(h - K.dt) <= WHOLE * K.dt) else 0
+
+
+def was_enough(K: Any, h: float, t1: float, m: int, iteration: int, error: float, left: float) -> bool:
+    """Whether residuals meet the tolerance that was asked for where the tighter one of the step is not reached.
+
+    Where they fall slowly, as they are; where they grow, as they were: the last correction is taken back.
+    """
+    c = K.stages[MU_REAL] * h
+    if error > left and left < 1e300:
+        retreat_stages(K, m, 1.0)
+        if evaluate_stages(K, h, t1, m, K.tolerance, c, c * c, False) <= 1.0:
+            return True
+        retreat_stages(K, m, -1.0)
+        evaluate_stages(K, h, t1, m, K.tolerance, c, c * c, False)
+        return False
+    if iteration < PATIENT:
+        return False
+    return evaluate_stages(K, h, t1, m, K.tolerance, c, c * c, False) <= 1.0
+
+
+def complete(K: Any, h: float, t1: float, m: int, renew: bool, correcting: bool) -> int:
+    """The converged last stage becomes the candidate, with consistent rates and multipliers where rows are active.
+
+    The residuals are there: what they still correct costs two solutions.
+    """
+    if renew and not factor_stages(K, K.n + m):
+        return SINGULAR
+    if correcting:
+        correct_stages(K, m, h, renew)
+    load_stage(K, 2, h, t1)
+    o_W = stage_place(K, STAGE_RATES) + 2 * K.n
+    o_L = stage_place(K, STAGE_LAM) + 2 * K.n_rows
+    for i in range(K.n):
+        K.y1[i] = K.block[K.o_v + i]
+        K.rate1[i] = K.stages[o_W + i]
+    for k in range(K.n_rows):
+        K.lam1[k] = K.stages[o_L + k]
+    estimate_error(K, h, m)
+    for i in range(K.n_v):
+        if K.unit[i] == 1 and not abs(K.error[i]) <= 0.5:
+            K.detail[1] = -1.0
+            return NOT_CONVERGED
+    compose(K, K.q1)
+    if m > 0 or K.n_frictions > 0:
+        if end_rates(K, t1, m):
+            for i in range(K.n):
+                K.rate1[i] = K.jump[i]
+            for k in range(K.n_rows):
+                K.lam1[k] = K.impulse[k]
+        for k in range(K.n_rows):
+            K.block[K.o_lam + k] = K.lam1[k]
+    for i in range(K.n):
+        K.block[K.o_a + i] = K.rate1[i]
+        K.aux1[i] = K.rate1[i]
+    return 0
+
+
+def end_rates(K: Any, t1: float, m: int) -> bool:
+    """Consistent rates and multipliers of the candidate in K.jump and K.impulse; false where there are none.
+
+    Rows that were stepped with are independent, so that plain factors do for `consistent`, except where R follows
+    multipliers. Frictions that feel rows left out, whose multipliers are known later, keep those of the stage.
+    """
+    if K.state[N_DROPPED] > 0 and K.n_frictions > 0:
+        return False
+    if K.loaded == 1:
+        return bool(consistent(K, t1, K.q1, K.y1) == 0)
+    n = K.n
+    size = n + m
+    o_R = n * n + n
+    o_B = o_R + n * K.n_rows
+    evaluate(K, t1, K.q1, K.y1)
+    load_accelerations(K)
+    for i in range(n):
+        for j in range(n):
+            K.kkt[i * size + j] = K.acc[i * n + j]
+        for k in range(m):
+            K.kkt[i * size + n + k] = K.acc[o_R + i * K.n_rows + K.rows[k]]
+        K.rhs[i] = -K.force[i]
+    for k in range(m):
+        row = K.rows[k]
+        for j in range(n):
+            K.kkt[(n + k) * size + j] = K.acc[o_B + row * n + j]
+        for j in range(m):
+            K.kkt[(n + k) * size + n + j] = 0.0
+        K.rhs[n + k] = -K.bias[row]
+    if factor(K.kkt, size, K.pivots) != 0:
+        return False
+    solve(K.kkt, size, K.pivots, K.rhs)
+    for k in range(K.n_rows):
+        K.impulse[k] = 0.0
+    for i in range(n):
+        K.jump[i] = K.rhs[i]
+    for k in range(m):
+        K.impulse[K.rows[k]] = K.rhs[n + k]
+    if K.n_frictions > 0:
+        find_sliding_friction(K)
+    return True
+
+
+def estimate_error(K: Any, h: float, m: int) -> None:
+    """Error of order 3 of x and (v, z) over the step, into K.error (Hairer & Wanner 1996, eq. IV.8.20).
+
+    ``μ h f(y₀) + Σ e_i (Y_i − y₀)``, along the rows, filtered by (1 − hμ ∂f/∂y)⁻¹: stiff components do not count.
+    """
+    n = K.n
+    S = K.stages
+    c = S[MU_REAL] * h
+    o_W = stage_place(K, STAGE_RATES)
+    o_M = stage_place(K, MASS_PART)
+    o_K = stage_place(K, STIFF_PART)
+    for j in range(n):
+        raw = c * K.rate[j]
+        bend = c * K.y[j] if j < K.n_v else 0.0
+        for i in range(3):
+            load = 0.0
+            lift = 0.0
+            for k in range(3):
+                load += S[A_ + 3 * i + k] * S[o_W + k * n + j]
+                lift += S[A_ + 3 * i + k] * stage_speed(K, k, j, h)
+            raw += S[E_ + i] * h * load
+            bend += S[E_ + i] * h * lift if j < K.n_v else 0.0
+        K.error[K.n_v + j] = raw
+        if j < K.n_v:
+            K.error[j] = bend
+    for i in range(n):
+        total = 0.0
+        for j in range(n):
+            total += S[o_M + i * n + j] * K.error[K.n_v + j]
+            if j < K.n_v:
+                total -= S[o_K + i * n + j] / c * K.error[j]
+        K.rhs[i] = total
+    for k in range(m):
+        total = 0.0
+        for j in range(K.n_v):
+            total -= K.turning[k * K.n_v + j] * K.error[j]
+        K.rhs[n + k] = total
+    solve(K.kkt, n + m, K.pivots, K.rhs)
+    for i in range(n):
+        K.error[K.n_v + i] = K.rhs[i]
+        if i < K.n_v:
+            K.error[i] += c * K.rhs[i]
+
+
+def stage_speed(K: Any, k: int, j: int, h: float) -> float:
+    """v of component j at stage k."""
+    S = K.stages
+    o = stage_place(K, STAGE_RATES) + j
+    n = K.n
+    return float(K.y[j] + h * (S[A_ + 3 * k] * S[o] + S[A_ + 3 * k + 1] * S[o + n] + S[A_ + 3 * k + 2] * S[o + 2 * n]))
