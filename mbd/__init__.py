@@ -71,6 +71,7 @@ if TYPE_CHECKING:
         GeneralizedAlpha as GeneralizedAlpha,
         Newmark as Newmark,
         RadauIIA as RadauIIA,
+        RungeKutta853 as RungeKutta853,
     )
     from mbd.joints import (
         Cylindrical as Cylindrical,
@@ -132,7 +133,7 @@ _HOMES = {
     "mbd.errors": "AssemblyError CapabilityError MbdError ModelError SimulationError TraceError TrajectoryError "
     "UnknownNameError",
     "mbd.forces": "Applied Damper Motor Potential Samples Spring TorsionSpring",
-    "mbd.integrators": "HHT GeneralizedAlpha Newmark RadauIIA",
+    "mbd.integrators": "HHT GeneralizedAlpha Newmark RadauIIA RungeKutta853",
     "mbd.joints": "Cylindrical Planar Prismatic Revolute Screw Translation Universal Weld",
     "mbd.joints.losses": "Coulomb Dissipation PinFriction Quadratic Tabulated Viscous",
     "mbd.model": "Model on_slope",

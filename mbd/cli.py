@@ -32,7 +32,7 @@ TOLD = (
 )  # fmt: skip
 """Errors of users' scripts that are told in a sentence; ``--debug`` shows where they came from."""
 
-OPTIONS = ("dt", "contact", "impact", "locate", "parameters", "store", "observers", "rest_speed", "backend")
+OPTIONS = ("dt", "tol", "contact", "impact", "locate", "parameters", "store", "observers", "rest_speed", "backend")
 """Names that a script may define to pass them on to `simulate`."""
 
 
@@ -89,7 +89,7 @@ class Script:
         """All of these names, or an error that lists the missing ones."""
         missing = [name for name in wanted if name not in self.names]
         if missing:
-            has = "model, start, integrator, dt and until, or a function main() that returns a run"
+            has = "model, start, integrator, dt or tol, and until, or a function main() that returns a run"
             raise ModelError(f"{self.path.name} does not define {', '.join(missing)}; a script defines {has}")
 
     def run(self, progress: Progress | None, changes: dict[str, Any]) -> Trajectory:
@@ -113,8 +113,12 @@ class Script:
                     f"main() of {self.path.name} must return the run of mbd.simulate, got {type(run).__name__}"
                 )
             return run
-        self.require("model", "start", "integrator", *(name for name in ("dt", "until") if name not in changes))
+        steps = ("tol",) if "tol" in self.names and "dt" not in self.names else ("dt",)
+        given = {"tol" if name == "dt" else name for name in changes} | set(changes)
+        self.require("model", "start", "integrator", *(name for name in (*steps, "until") if name not in given))
         options = {name: self.names[name] for name in (*OPTIONS, "until") if name in self.names} | changes
+        if "dt" in changes:
+            options.pop("tol", None)
         from mbd import simulate
 
         names = self.names

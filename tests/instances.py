@@ -179,4 +179,5 @@ INTEGRATORS: list[Integrator] = [
     mbd.GeneralizedAlpha(rho_inf=0.9),
     mbd.GeneralizedAlpha(rho_inf=0.0),
     mbd.RadauIIA(),
+    mbd.RungeKutta853(),
 ]

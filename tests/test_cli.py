@@ -240,3 +240,11 @@ def test_the_kneed_walker_walks(tmp_path, capsys):
     run = mbd.load(tmp_path / "run.mbd.npz")
     standing = run["left foot.force"][run.record.closed[:, 0] == 1]
     assert standing.min() > 0.0 and abs(run.energy.sums["numerical"]) < 1e-3
+
+
+def test_a_script_may_ask_for_a_tolerance_and_the_command_line_for_a_step(script, tmp_path, capsys):
+    asked = script(PENDULUM.replace("dt, until = 0.01, 0.5", "tol, until = 1e-6, 0.5"))
+    assert cli.main(["run", asked, "--out", str(tmp_path / "one")]) == 0
+    assert "estimated error of coordinates" in capsys.readouterr().out
+    assert cli.main(["run", asked, "--dt", "0.01", "--out", str(tmp_path / "two")]) == 0
+    assert "dt = 0.01" in capsys.readouterr().out

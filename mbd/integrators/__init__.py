@@ -5,6 +5,7 @@ from mbd.integrators.generalized_alpha import GeneralizedAlpha
 from mbd.integrators.hht import HHT
 from mbd.integrators.newmark import Newmark
 from mbd.integrators.radau import RadauIIA
+from mbd.integrators.runge_kutta import RungeKutta853
 
 __all__ = [
     "Advance",
@@ -14,6 +15,7 @@ __all__ = [
     "Newmark",
     "Point",
     "RadauIIA",
+    "RungeKutta853",
     "StepReport",
     "StepResult",
     "System",

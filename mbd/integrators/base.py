@@ -8,7 +8,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
@@ -131,6 +131,11 @@ class Integrator(ABC):
     as accelerations and multipliers of the results (without them they come from `consistent_rates`).
     """
 
+    any_chart: ClassVar[bool] = True
+    """Whether positions may move in any chart q ⊕ x; False: along q + x only."""
+    between: ClassVar[str] = "hermite"
+    """How a run is read between its rows: 'hermite', or 'stages' where steps of `RungeKutta853` are taken again."""
+
     @abstractmethod
     def order(self, system: System | None = None) -> int:
         """The order of accuracy in dt that the scheme promises for this system."""
@@ -166,6 +171,21 @@ class Integrator(ABC):
                 return Advance(state, memory, count, report, rejected=True)
             state, memory, count = result.state, result.memory, count + 1
         return Advance(state, memory, count, report)
+
+    def local_error(self, old: Any, new: Any, dt: float) -> Vector | None:
+        """Estimated local error (n_v + n,) of positions x, then of (v, z), of a step of dt from memory `old` to `new`.
+
+        None: the scheme has no estimate, and takes fixed steps only.
+        """
+        return None
+
+    def error_order(self) -> int:
+        """The power of dt with which the estimated error per unit of time falls."""
+        return self.order()
+
+    def check_tolerance(self, rows: int) -> str | None:
+        """Why this scheme cannot follow a tolerance with that many rows on positions, or None."""
+        return f"{self!r} does not estimate its error; use dt=, or one of mbd's own schemes"
 
     def check(self, rows: int) -> str | None:
         """Why this scheme cannot integrate a mechanism with that many rows on positions, or None."""

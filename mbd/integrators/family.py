@@ -163,6 +163,21 @@ class NewmarkFamily(Integrator):
             )
         return None
 
+    def check_tolerance(self, rows: int) -> str | None:
+        """Steps that change need order 2, rows the stabilized form: index 3 diverges under changing steps."""
+        if self.order() < 2 or getattr(self, "form", "endpoint") != "endpoint":
+            return f"{self!r} is of first order, which follows no tolerance; use dt=, or mbd.HHT(0.05)"
+        if rows and not self.stabilized:
+            return f"{self!r} diverges where steps change with rows on positions; use formulation='ggl', or dt="
+        return None
+
+    def local_error(self, old: NewmarkMemory, new: NewmarkMemory, dt: float) -> Vector:
+        """``dt² (1/6 − β − (α_m − α_f)/2) (a₁ − a₀)`` of x; of (v, z) ``dt²/12`` times the change of slope."""
+        c, n_v = self.coefficients, len(new.shift)
+        a0 = old.rate + dt / old.step * (old.aux - old.rate)
+        x = dt * dt * (1.0 / 6.0 - c.beta - 0.5 * (c.alpha_m - c.alpha_f)) * (new.aux - a0)[:n_v]
+        return np.concatenate([x, dt * dt / 12.0 * ((new.rate - old.rate) / dt - old.slope)])
+
     def start(self, system: System, state: State, mode: Mode, dt: float) -> NewmarkMemory:
         """a₀ = v̇₀ + (α_m−α_f) dt j₀ with the jerk j₀ from one difference of consistent accelerations."""
         y = np.concatenate([state.v, state.z])

@@ -93,6 +93,18 @@ class RadauIIA(Integrator):
         """5."""
         return 5
 
+    def error_order(self) -> int:
+        """3: the estimate falls with dt⁴ in a step."""
+        return 3
+
+    def check_tolerance(self, rows: int) -> str | None:
+        """It follows any tolerance."""
+        return None
+
+    def local_error(self, old: RadauMemory, new: RadauMemory, dt: float) -> Vector:
+        """The estimate made with the step."""
+        return new.error
+
     def start(self, system: System, state: State, mode: Mode, dt: float) -> RadauMemory:
         """Stages of a step before it at rates and multipliers that do not change."""
         y = np.concatenate([state.v, state.z])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from mbd.kernel.control import controlled_step, first_step
 from mbd.kernel.fields import (
     BASE,
     CHATTER,
@@ -22,6 +23,7 @@ from mbd.kernel.fields import (
     LAST,
     LAST_SWITCH,
     LEFT,
+    LOCAL,
     LOG_EVENT,
     LOG_SLIPPED,
     LOG_STUCK,
@@ -30,6 +32,7 @@ from mbd.kernel.fields import (
     N_DROPPED,
     NEAR,
     NEW_MODE,
+    NEXT,
     NO_IMPACT,
     NOT_CONVERGED,
     NOW,
@@ -43,18 +46,24 @@ from mbd.kernel.fields import (
     SHORTENED,
     SINCE_STORE,
     SINGULAR,
+    SPENT,
     STAGNATED,
+    STEP,
     STEPS,
     STORED,
+    STRAIGHT,
     SWITCHES,
     TOO_NEAR,
+    TRIED,
     WATCH,
+    WIDTH,
 )  # fmt: skip
 from mbd.kernel.guards import is_quiet, judge, try_step, update_armed, update_sides, watch
 from mbd.kernel.hooks import scheme_accept, scheme_start
+from mbd.kernel.interior import parts_to_take
 from mbd.kernel.locate import locate
 from mbd.kernel.nonsmooth import PULL, keep, lands, lets_go, put_back, rebound, strike
-from mbd.kernel.pairs import LONGER, SHORTER, WHOLE, may_pair
+from mbd.kernel.pairs import FIRST, LONGER, SECOND, SHORTER, WHOLE, may_pair
 from mbd.kernel.redundancy import find_dependent, sharing, spread
 from mbd.kernel.restart import active_rows, stepping_rows
 from mbd.kernel.settle import log_event, settle
@@ -149,6 +158,9 @@ def restart(K: Any) -> int:
     K.state[PAIRED] = 0
     K.clock[BASE] = K.clock[NOW]
     K.state[GRID] = 0
+    K.state[STRAIGHT] = 0
+    if K.adaptive == 1:
+        first_step(K)
     if K.n_watched > 0:
         watch(K, K.clock[NOW], K.q, K.y, K.rate, K.lam, K.guards0)
         update_armed(K)
@@ -284,6 +296,57 @@ def is_shortened(status: int) -> bool:
     return status == NOT_CONVERGED or status == STAGNATED or status == SINGULAR or status == TOO_NEAR
 
 
+def forget_found(K: Any) -> None:
+    """No guard has been found to be no event yet."""
+    for c in range(K.n_contacts + K.n_guards + K.n_frictions):
+        K.active[c] = 0
+
+
+def step_end(K: Any) -> float:
+    """Where the next step of the grid ends; the second of a pair has its own size."""
+    if K.state[PAIRED] == SECOND:
+        return float(K.clock[NOW] + LONGER * K.clock[STEP])
+    return float(K.clock[BASE] + (K.state[GRID] + 1) * K.clock[STEP])
+
+
+def part_end(K: Any, on_grid: float) -> float:
+    """Where the next step ends: on the grid, or after the part of a step in which a guard may have fired."""
+    if K.state[STRAIGHT] == 1:
+        near = K.clock[NOW] + K.clock[WIDTH]
+        if near < on_grid - 1e-6 * K.clock[WIDTH]:
+            return float(near)
+    return on_grid
+
+
+def tried_step(K: Any, h: float, t1: float) -> int:
+    """A candidate at t1, or earlier where Newton's method or the allowed error asks for it; K.clock[TRIED] its step.
+
+    A pose in which rows lose rank is stepped over by a pair of steps, or a shortened one; stiff places get smaller.
+    """
+    if K.adaptive == 1:
+        return controlled_step(K, h)
+    if K.state[PAIRED] == FIRST:  # the step is taken once more
+        K.state[PAIRED] = 0
+    full = h
+    step = K.clock[STEP]
+    status = try_step(K, h, t1)
+    if status == TOO_NEAR and may_pair(K, h):
+        if K.clock[NOW] + (SHORTER + LONGER) * step < K.until - WHOLE * step:
+            h = SHORTER * step
+            full = h
+            K.state[PAIRED] = FIRST
+            status = try_step(K, h, K.clock[NOW] + h)
+        elif K.until >= K.end:
+            return LAST
+    while is_shortened(status) and h > SHORTEST * full:
+        h *= SHORTENING
+        status = try_step(K, h, K.clock[NOW] + h)
+    if h < full and K.state[PAIRED] == FIRST:
+        K.state[PAIRED] = 0
+    K.clock[TRIED] = h
+    return status
+
+
 def advance(K: Any) -> int:
     """Step until `until`, a full store, a mode without code, an event to report, or a failure."""
     steps = 0
@@ -311,10 +374,10 @@ def advance(K: Any) -> int:
         if steps >= K.chunk:
             return PAUSE
         steps += 1
-        t1 = K.clock[BASE] + (K.state[GRID] + 1) * K.dt
-        if K.state[PAIRED] == 1:
-            t1 = t + LONGER * K.dt
-        cut = t1 > K.until - 1e-6 * K.dt
+        on_grid = step_end(K)
+        t1 = part_end(K, on_grid)
+        within = t1 < on_grid  # the step ends inside one of the grid, where guards are looked at
+        cut = t1 > K.until - 1e-6 * K.clock[STEP]
         if cut and K.until >= K.end:  # the caller decides: a step of the grid as in a longer run, or one cut
             return LAST
         if cut:
@@ -325,30 +388,40 @@ def advance(K: Any) -> int:
             t1 = t + h
             cut = False
         full = h
-        pairs = False
-        status = try_step(K, h, t1)
-        if status == TOO_NEAR and may_pair(K, h):
-            if t + (SHORTER + LONGER) * K.dt < K.until - WHOLE * K.dt:
-                h = SHORTER * K.dt
-                full = h
-                t1 = t + h
-                status = try_step(K, h, t1)
-                pairs = True
-            elif K.until >= K.end:
-                return LAST
-        while is_shortened(status) and h > SHORTEST * full:
-            h *= SHORTENING  # a pose in which rows lose rank is stepped over; stiff places get smaller steps
-            t1 = t + h
-            status = try_step(K, h, t1)
+        status = tried_step(K, h, t1)
         if status != 0:
             return status
+        if K.clock[TRIED] < h:
+            h = K.clock[TRIED]
+            t1 = t + h
+            cut = cut and h >= full
+        paired = K.state[PAIRED] > 0
+        if K.adaptive == 1 or K.state[PAIRED] == FIRST:
+            full = h
         K.counts[STEPS] += 1
         holds = K.state[N_DROPPED] == 0 or still_dependent(K) or K.state[NEAR] > 0  # nothing is told apart there
         fired = False
         quiet = is_quiet(K)
-        if not quiet:
-            for c in range(K.n_contacts + K.n_guards + K.n_frictions):
-                K.active[c] = 0
+        judged = quiet
+        if K.looks > 1 and K.n_watched > 0 and K.state[STRAIGHT] == 0:
+            forget_found(K)
+            quiet = False
+            parts = parts_to_take(K, h)
+            judged = parts >= 0
+            if parts != 0:
+                within = True
+                cut = False
+                K.state[STRAIGHT] = 1
+                K.clock[WIDTH] = h / K.looks
+                h = abs(parts) * h / K.looks
+                t1 = t + h
+                status = try_step(K, h, t1)
+                if status != 0:
+                    return status
+        else:
+            K.state[STRAIGHT] = 0
+        if not judged:
+            forget_found(K)
             if judge(K, h):
                 status = locate(K, h)
                 if status != 0:
@@ -359,6 +432,8 @@ def advance(K: Any) -> int:
                     status = try_step(K, h, t1)
                     if status != 0:
                         return status
+        if K.adaptive == 1:
+            K.clock[SPENT] += K.clock[LOCAL]
         if fired:
             status = handle_event(K)
             if status >= 0:
@@ -375,7 +450,7 @@ def advance(K: Any) -> int:
                     return status
                 continue
             K.state[REDONE] = 0
-        if h < full:
+        if h < full and not within:
             K.counts[SHORTENED] += 1
             K.state[INCHING] += 2
             patience = 2 * MOST_SHORTENED if K.state[ROWS] > 0 else 20 * MOST_SHORTENED
@@ -385,25 +460,27 @@ def advance(K: Any) -> int:
                 return NOT_CONVERGED
         elif K.state[INCHING] > 0:
             K.state[INCHING] -= 1
-        K.state[PAIRED] = 0
-        if pairs and h == full:
-            K.state[PAIRED] = 1
-            K.counts[SHORTENED] += 1
-        uneven = K.stabilized == 0 and K.state[ROWS] > 0 and (h < (1.0 - 1e-6) * K.dt or rings(K))
-        if h < 1e-3 * K.dt or uneven:  # index 3 rings after a change of step
+        if not within:
+            if K.state[PAIRED] == FIRST:
+                K.state[PAIRED] = SECOND
+                K.counts[SHORTENED] += 1
+            else:
+                K.state[PAIRED] = 0
+        uneven = K.stabilized == 0 and K.state[ROWS] > 0 and (h < (1.0 - 1e-6) * K.clock[STEP] or rings(K))
+        if (h < 1e-3 * K.clock[STEP] and K.scheme != 1) or uneven:  # index 3 rings after a change of step
             take_over(K, t1)
             K.state[RESTART] = 2
         else:
             accept(K, h, t1, quiet)
-            K.state[GRID] += 1
-            if abs(h - K.dt) > WHOLE * K.dt:
-                K.clock[BASE] = t1
-                K.state[GRID] = 0
+            if not within:
+                K.state[GRID] += 1
             if not holds:  # the pose has changed its rank
                 K.state[RESTART] = 2
-            if cut:  # a boundary inside the run: the grid goes on from here
-                K.clock[BASE] = t1
+            if (h < full and not within) or K.state[HALVED] > 0 or paired or cut or K.adaptive == 1:
+                K.clock[BASE] = t1  # the grid goes on from here
                 K.state[GRID] = 0
+            if K.adaptive == 1 and not within:
+                K.clock[STEP] = K.clock[NEXT]
             if K.state[NEAR] == LEFT:
                 status = leave_pose(K, h)
                 if status != 0:

@@ -24,8 +24,8 @@ ENTRY = "mbd_kernel"
 
 MODULES = (
     "linear", "lemke", "redundancy", "saddle", "restart", "pivoting", "complementarity", "blow", "impact", "settle",
-    "pairs", "iteration", "passage", "newmark", "complex_linear", "stages", "radau", "hermite", "guards", "locate",
-    "switching", "nonsmooth", "takeover", "advance",
+    "pairs", "iteration", "passage", "newmark", "complex_linear", "stages", "radau", "runge_kutta", "hermite", "guards",
+    "control", "interior", "locate", "switching", "nonsmooth", "takeover", "advance",
 )  # fmt: skip
 
 APART = ("factor", "solve")
@@ -33,12 +33,16 @@ APART = ("factor", "solve")
 
 SHIMS = """
 def scheme_step(K: Any, h: float, t1: float) -> int:
+    if K.scheme == 1:
+        return runge_kutta_step(K, h, t1)
     if K.scheme == 2:
         return radau_step(K, h, t1)
     return newmark_step(K, h, t1)
 
 def scheme_accept(K: Any, h: float) -> None:
-    if K.scheme == 2:
+    if K.scheme == 1:
+        runge_kutta_accept(K, h)
+    elif K.scheme == 2:
         radau_accept(K, h)
     else:
         newmark_accept(K, h)
@@ -49,9 +53,15 @@ def scheme_resume(K: Any, h: float) -> int:
     return newmark_resume(K, h)
 
 def scheme_start(K: Any) -> int:
+    if K.scheme == 1:
+        return runge_kutta_start(K)
     if K.scheme == 2:
         return radau_start(K)
     return newmark_start(K)
+
+def scheme_error(K: Any, h: float) -> None:
+    if K.scheme == 0:
+        newmark_error(K, h)
 
 def mbd_kernel(K: Any) -> int:
     return advance(K)

@@ -24,19 +24,29 @@ INTEGERS = (
     "n_watched",  # guard values in all
     "loaded",  # 1: a friction follows multipliers other than linearly
     "scheme",  # 0 Newmark family, 1 explicit Runge–Kutta, 2 Radau IIA
+    "adaptive",  # 1: steps follow the estimated error, 0: they are all dt
+    "error_order",  # power of the step with which the estimated error per second falls
+    "looks",  # parts of a step at whose ends guards are looked at; 1: at those of the step only
 )  # fmt: skip
-REALS = ("alpha_m", "alpha_f", "beta", "gamma", "tolerance", "rest_speed", "dt", "until", "end")
+REALS = (
+    "alpha_m", "alpha_f", "beta", "gamma", "tolerance", "rest_speed", "until", "end",
+    "dt",  # of all steps, or where they follow the error a time that is short beside the motion
+    "allowed",  # local error in positions [m, rad] per second
+    "longest",  # step
+)  # fmt: skip
 REAL_ARRAYS = (
     "params", "block",
     "out",  # of the function called last
     "acc",  # of the accelerations program
-    "clock",  # time, base time of the grid, step size of aux, time of the last switch
+    "clock",  # see the places below
     "q", "y", "rate", "aux", "slope", "lam", "lam_slope", "shift", "shift_change", "anchors",  # accepted state
     "q1", "y1", "rate1", "aux1", "lam1", "shift1",  # candidate of the step under judgement
     "kkt", "rhs", "work", "spare",  # linear algebra
     "stages",  # what a scheme of several stages works on
     "past_stages",  # those of the last step, which predict the next
-    "error",  # local error of positions (n_v) and of rates' integrals (v, z) in the last step tried
+    "tableau",  # coefficients of its formula
+    "error",  # local error of the candidate as its scheme estimates it: of positions x, then of (v, z)
+    "inside",  # guards and multipliers at the ends of a step while places inside it are looked at
     "turning",  # ∂ḣ/∂x of the active rows, stabilized only
     "basis", "lower", "mix", "shares",  # dependent rows as combinations of others, and what they bear of their loads
     "force", "bias", "jump", "impulse",  # complementarity: right-hand sides, velocity or acceleration, multipliers
@@ -92,30 +102,33 @@ KEPT_INTEGERS = ("closed", "armed", "touched", "dropped", "rows", "state", "stic
 # places in `state`
 (
     MODE, ROWS, GRID, RESTART, STORED, LOGGED, SWITCHES, SINCE_STORE, BLOCKED, N_DROPPED, NEAR, INCHING, REDONE,
-    PLASTIC, HALVED, HALVES, PAIRED,
-) = range(17)  # fmt: skip
+    PLASTIC, HALVED, HALVES, PAIRED, STRAIGHT,
+) = range(18)  # fmt: skip
 # places in `counts`
 (
     STEPS, ITERATIONS, TANGENTS, RESIDUALS, FACTORIZATIONS, EVENTS, RESTARTS, IMPACTS, LOCATIONS, STAGNATIONS, CAREFUL,
     SHORTENED, STRONGE, ENDLESS,
     PIVOTED,  # factorizations by the pivoted LU where straight-line code was not sound
-) = range(15)  # fmt: skip
+    REJECTED,
+) = range(16)  # fmt: skip
 # values of state[NEAR]: within a few steps of a pose in which rows lose rank, and just beyond it
 PASSING, LEFT = 1, 2
 # places in `detail` of the largest inverse pivot of rows in the last step, of what round-off makes of velocities there
 PIVOT, KICK = 4, 5
 # and of the time that K.past covers, of the last correction of positions by contacts
 PAST_TIME, LIFTED = 6, 7
-# places in `clock`
-NOW, BASE, AUX_STEP, LAST_SWITCH = range(4)
+# places in `clock`: time, base time of the grid, step size of aux, time of the last switch, the present full step,
+# the step that will follow the candidate, the width of a step that is looked at as a whole (state[STRAIGHT] = 1), and
+# the step that the candidate took with its local error, and the sum of local errors
+NOW, BASE, AUX_STEP, LAST_SWITCH, STEP, NEXT, WIDTH, TRIED, LOCAL, SPENT = range(10)
 # functions in `code`; modes follow: tangent, residual and, where straight-line code pays, correction and solution
 ACCELERATIONS, GUARDS, SCALES, COMPOSE = range(4)
 # what advance returns
 DONE, FULL, NEW_MODE, EVENT, PAUSE, LAST = range(6)
 (
     NOT_FINITE, NOT_CONVERGED, SINGULAR, STAGNATED, CHATTER, NO_IMPACT, DEPENDENT, CONFLICT, NO_LOCATION, ENERGY_GAIN,
-    NO_FORCE, TOO_TIGHT, TOO_NEAR,
-) = range(10, 23)  # fmt: skip
+    NO_FORCE, TOO_TIGHT, TOO_NEAR, TOO_SMALL,
+) = range(10, 24)  # fmt: skip
 # kinds of fired guards
 CLOSE, OPEN_PULL, OPEN_GAP, OPEN_FORCE, CROSS, WATCH, GRAZE, PRESS, STICK, SLIP, STICK_BRIEF = range(11)
 # kinds in the log

@@ -24,6 +24,7 @@ from mbd.kernel.fields import (
     PRESS,
     ROWS,
     SLIP,
+    STEP,
     STICK,
     STICK_BRIEF,
     WATCH,
@@ -59,10 +60,11 @@ def watch(K: Any, t: float, q: Any, y: Any, rate: Any, lam: Any, values: Any) ->
 def try_step(K: Any, h: float, t1: float) -> int:
     """A candidate at t1 = t + h with its guards; a step far below dt with rows is one of Heun's method.
 
-    There an implicit step would divide the round-off of positions by h².
+    There an implicit step would divide the round-off of positions by h²; an explicit scheme takes it as any other.
     A scheme leaves velocities, rates and multipliers of the candidate in the block; only its positions are centered.
     """
-    if h >= 1e-3 * K.dt or (K.state[ROWS] == 0 and h >= 1e-9 * K.dt):
+    full = K.clock[STEP]
+    if h >= 1e-3 * full or (K.state[ROWS] == 0 and h >= 1e-9 * full) or K.scheme == 1:
         status = scheme_step(K, h, t1)
         if status != 0:
             return status

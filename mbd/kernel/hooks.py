@@ -1,14 +1,14 @@
 """What differs between the interpreted and the compiled kernel: calling model code, and the scheme.
 
 Interpreted, model functions are Python callables and the scheme is any integrator's own `step`;
-compiled, functions are called by address and the scheme is the Newmark family (see `build`).
+compiled, functions are called by address and the scheme is one of the kernel's own (see `build`).
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-__all__ = ["call", "call_on", "scheme_accept", "scheme_resume", "scheme_start", "scheme_step"]
+__all__ = ["call", "call_on", "scheme_accept", "scheme_error", "scheme_resume", "scheme_start", "scheme_step"]
 
 
 def call(K: Any, number: int, out: Any) -> None:
@@ -34,6 +34,11 @@ def scheme_accept(K: Any, h: float) -> None:
 def scheme_resume(K: Any, h: float) -> int:
     """Start with what the scheme averages kept, after a step of size h; rates in K.jump, multipliers in K.impulse."""
     return int(K.hooks.resume(K, h))
+
+
+def scheme_error(K: Any, h: float) -> None:
+    """Fill K.error with the local error of the candidate, which a step of h has just made."""
+    K.hooks.error(K, h)
 
 
 def scheme_start(K: Any) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from mbd.kernel.fields import AUX_STEP, EPS, MODE
+from mbd.kernel.fields import AUX_STEP, EPS, MODE, STEP
 from mbd.kernel.hooks import call
 from mbd.kernel.pairs import WHOLE
 from mbd.kernel.restart import compose
@@ -17,7 +17,7 @@ def predict(K: Any, h: float, t1: float, c_C: float, c_K: float) -> None:
     block = K.block
     stretch = h / K.clock[AUX_STEP]
     cube = stretch * stretch * stretch
-    if h > (1.0 + WHOLE) * K.dt:  # the longer of a pair, next to a pose: round-off of the shorter is not made larger
+    if h > (1.0 + WHOLE) * K.clock[STEP]:  # the longer of a pair: round-off of the shorter does not grow
         cube = 1.0
     mean = 1.0 / (1.0 - K.alpha_m)
     by_rate = (1.0 - K.alpha_f) * mean

@@ -28,6 +28,7 @@ from mbd.kernel.fields import (
     SINGULAR,
     STAGNATED,
     STAGNATIONS,
+    STEP,
     TANGENTS,
     TOO_NEAR,
     TOO_TIGHT,
@@ -35,7 +36,7 @@ from mbd.kernel.fields import (
 from mbd.kernel.hooks import call, call_on
 from mbd.kernel.iteration import finish, overturns, predict, residual_size, runs_away, soundness_at
 from mbd.kernel.linear import factor, solve
-from mbd.kernel.pairs import WHOLE
+from mbd.kernel.pairs import is_whole
 from mbd.kernel.passage import WITHIN, misses, passing_step, steps_of_fall, steps_to_pose
 from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import add_shares, compose, consistent, fill_block, raise_scales, refresh_scales, share_loads
@@ -184,11 +185,11 @@ def newmark_step(K: Any, h: float, t1: float) -> int:
         if iteration == 0 and m > 0 and K.stabilized == 1:
             fall = steps_of_fall(K, m, straight)
             if fall < WITHIN + 2.0:
-                away = steps_to_pose(K, m, h, c_K / c_C, straight) * h / K.dt
+                away = steps_to_pose(K, m, h, c_K / c_C, straight) * h / K.clock[STEP]
                 if misses(K, away, h):
                     K.detail[PIVOT] = 0.0
                     return TOO_NEAR
-                if fall < WITHIN and away < WITHIN and (away < 1.0 or abs(h - K.dt) <= WHOLE * K.dt):
+                if fall < WITHIN and away < WITHIN and (away < 1.0 or is_whole(K, h)):
                     return passing_step(K, h, t1)
         if not ready:
             solve_corrections(K, m, c_C, tangent, shifting, straight)

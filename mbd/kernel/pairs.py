@@ -10,14 +10,16 @@ from __future__ import annotations
 
 from typing import Any
 
-from mbd.kernel.fields import HALVED, PAIRED
+from mbd.kernel.fields import HALVED, PAIRED, STEP
 
-__all__ = ["LONGER", "SHORTER", "WHOLE", "is_of_pair", "may_pair"]
+__all__ = ["FIRST", "LONGER", "SECOND", "SHORTER", "WHOLE", "is_of_pair", "is_whole", "may_pair"]
 
 LONGER = 0.75 + 0.38188130791298669
 """3/4 + √(7/48), part of dt, of the second: what is predicted from it is stretched little [-]."""
 SHORTER = 0.75 - 0.38188130791298669
 """3/4 − √(7/48), part of dt, of the first [-]."""
+SECOND, FIRST = 1, 2
+"""Values of state[PAIRED]: the longer of a pair is next, the shorter is being tried."""
 WHOLE = 1e-6
 """Part of dt by which a step may differ from the size it counts as: round-off of instants [-]."""
 
@@ -27,6 +29,11 @@ def is_of_pair(size: float) -> bool:
     return abs(size - SHORTER) <= WHOLE or abs(size - LONGER) <= WHOLE
 
 
+def is_whole(K: Any, h: float) -> bool:
+    """Whether a step of size h is one of the grid."""
+    return bool(abs(h - K.clock[STEP]) <= WHOLE * K.clock[STEP])
+
+
 def may_pair(K: Any, h: float) -> bool:
     """Whether a step of size h that would lead too near to a pose may be replaced by a pair: one of the grid."""
-    return bool(K.state[PAIRED] == 0 and K.state[HALVED] == 0 and abs(h - K.dt) <= WHOLE * K.dt)
+    return bool(K.state[PAIRED] == 0 and K.state[HALVED] == 0 and is_whole(K, h))

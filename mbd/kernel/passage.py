@@ -28,12 +28,13 @@ from mbd.kernel.fields import (
     ROWS,
     SINGULAR,
     STAGNATIONS,
+    STEP,
     TANGENTS,
 )  # fmt: skip
 from mbd.kernel.hooks import call
 from mbd.kernel.iteration import finish, overturns, predict, residual_size, runs_away, soundness_at
 from mbd.kernel.linear import factor, solve
-from mbd.kernel.pairs import WHOLE, is_of_pair
+from mbd.kernel.pairs import is_of_pair, is_whole
 from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import add_shares, raise_scales, share_loads
 
@@ -100,7 +101,7 @@ def steps_to_pose(K: Any, m: int, h: float, ratio: float, straight: bool) -> flo
         if here < fewest * change:
             fewest = here / change
             across = 4.0 * EPS * K.scale[K.n + K.rows[K.columns[k]]] / (here * K.spare[3 * m + k] + 1e-300)
-            K.detail[KICK] = across / (K.dt * speed**0.5 + 1e-300)
+            K.detail[KICK] = across / (K.clock[STEP] * speed**0.5 + 1e-300)
     return fewest
 
 
@@ -110,11 +111,11 @@ def misses(K: Any, away: float, h: float) -> bool:
     While ḣ is held too, steps may do that; those that hold h alone start to ring. It is the last whole one before these
     that is looked at, or one that was shortened for another reason; those of a pair (`mbd.kernel.pairs`) are not.
     """
-    if away < 1.0 or away >= WITHIN + 1.0 or is_of_pair(h / K.dt):
+    if away < 1.0 or away >= WITHIN + 1.0 or is_of_pair(h / K.clock[STEP]):
         return False
     part = away - int(away)
     part = min(part, 1.0 - part)
-    foreseen = away >= WITHIN - FORESEEN and abs(h - K.dt) <= WHOLE * K.dt  # nearer it was judged already, as a rule
+    foreseen = away >= WITHIN - FORESEEN and is_whole(K, h)  # nearer it was judged already, as a rule
     doubt = FORESEEN - NEAREST if foreseen else 0.0
     return bool(part < NEAREST + doubt and K.detail[KICK] * away > K.tolerance * max(part - doubt, 1e-3))
 

@@ -24,13 +24,14 @@ from mbd.kernel.fields import (
     SINGULAR,
     STAGNATED,
     STAGNATIONS,
+    STEP,
     TOO_NEAR,
     TOO_TIGHT,
 )  # fmt: skip
 from mbd.kernel.hooks import call
 from mbd.kernel.iteration import runs_away
 from mbd.kernel.linear import factor, solve
-from mbd.kernel.pairs import WHOLE
+from mbd.kernel.pairs import is_whole
 from mbd.kernel.passage import WITHIN, misses, passing_step, steps_of_fall, steps_to_pose
 from mbd.kernel.restart import (
     compose,
@@ -248,11 +249,11 @@ def look_ahead(K: Any, h: float, t1: float, m: int, fall: float) -> int:
     size = K.n + m
     for k in range(m * K.n_v):
         K.turning[k] = K.out[size * size + K.n + 2 * m + k]
-    away = steps_to_pose(K, m, h, c, False) * h / K.dt
+    away = steps_to_pose(K, m, h, c, False) * h / K.clock[STEP]
     if misses(K, away, h):
         K.detail[PIVOT] = 0.0
         return TOO_NEAR
-    return PASSING if fall < WITHIN and away < WITHIN and (away < 1.0 or abs(h - K.dt) <= WHOLE * K.dt) else 0
+    return PASSING if fall < WITHIN and away < WITHIN and (away < 1.0 or is_whole(K, h)) else 0
 
 
 def was_enough(K: Any, h: float, t1: float, m: int, iteration: int, error: float, left: float) -> bool:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
 from mbd.errors import UnknownNameError, nearest
+from mbd.results.dense import Restepping
 from mbd.results.interpolation import Grid, Places
 from mbd.results.names import AXES, rate_name
 from mbd.results.record import Record, Rows
@@ -96,6 +97,7 @@ class ModelColumns(Columns):
         self._names: tuple[str, ...] | None = None
         self._nodes: dict[str, Node] = {}
         self._anchors: Matrix | None = None
+        self._steps: Restepping | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -133,7 +135,11 @@ class ModelColumns(Columns):
         return self.evaluate([self.node(name) for name in names], self.between(places))
 
     def between(self, places: Places) -> Rows:
-        """The states between the stored rows."""
+        """The states between the stored rows: explicit steps taken again where they can be, else Hermite."""
+        if self._steps is None and Restepping.serves(self):
+            self._steps = Restepping(self)
+        if self._steps is not None:
+            return self._steps.at(self.rows, places)
         return self.grid.between(self.rows, places, self.q_rate)
 
     @property

@@ -63,7 +63,9 @@ class Failure:
     def __repr__(self) -> str:
         worst = sorted(self.residuals.items(), key=lambda item: -abs(item[1]))[:3]
         lines = [f"Failure after t = {self.time:.9g} s, of the step to {self.attempted:.9g} s: {self.message}"]
-        lines.append(f"  {self.integrator!r}, dt = {self.dt:g} s, {self.iterations} Newton corrections")
+        tol = self.settings.get("tol")
+        steps = f"dt = {self.dt:g} s" if tol is None else f"tol = {tol:g}"
+        lines.append(f"  {self.integrator!r}, {steps}, {self.iterations} Newton corrections")
         lines += [f"  residual of {name}: {value:.3g}" for name, value in worst]
         lines += [f"  {event!r}" for event in self.events]
         lines += [f"  taken back: {event!r}" for event in self.undone]

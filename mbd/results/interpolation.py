@@ -17,7 +17,7 @@ from mbd.arrays import Matrix, Vector
 from mbd.errors import TrajectoryError
 from mbd.results.record import Rows
 
-__all__ = ["Grid", "Places", "Side", "hermite", "hermite_rate"]
+__all__ = ["Grid", "Places", "Side", "hermite", "hermite_rate", "quintic"]
 
 Side = Literal["left", "right"]
 
@@ -56,6 +56,17 @@ def hermite(places: Places, y0: Matrix, rate0: Matrix, y1: Matrix, rate1: Matrix
     left = (1 - x) ** 2 * ((1 + 2 * x) * y0 + x * h * rate0)
     right = x**2 * ((3 - 2 * x) * y1 - (1 - x) * h * rate1)
     return np.asarray(left + right)
+
+
+def quintic(places: Places, y: Matrix, rate: Matrix, change: Matrix) -> Matrix:
+    """The polynomial of degree 5 with values y, rates and their changes ÿ at both ends of each interval."""
+    x, h = _columns(places, y)
+    low, high = places.lower, places.upper
+    cubic = hermite(places, y[low], rate[low], y[high], rate[high])
+    span = y[high] - y[low]
+    first = h * h * change[low] - (6.0 * span - h * (4.0 * rate[low] + 2.0 * rate[high]))
+    last = h * h * change[high] - (-6.0 * span + h * (2.0 * rate[low] + 4.0 * rate[high]))
+    return np.asarray(cubic + 0.5 * (x * (1.0 - x)) ** 2 * (first * (1.0 - x) + last * x))
 
 
 def hermite_rate(places: Places, y0: Matrix, rate0: Matrix, y1: Matrix, rate1: Matrix) -> Matrix:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
 from html import escape
 from typing import TYPE_CHECKING, Any
 
@@ -33,11 +34,23 @@ def facts(run: Trajectory) -> list[tuple[str, str]]:
         found.append(("energy", f"change {energy.change:.4g} J; numerical {energy.numerical[-1]:.2g} J ({relative})"))
         found.append(("constraints", str(run.violation)))
     found.append(("events", counts(run) or "none"))
+    told = run.stats.get("tolerance")
+    if told:
+        found.append(("accuracy", accuracy(told)))
     costs = {key.replace("_", " "): value for key, value in run.stats.items() if isinstance(value, int | float)}
     if costs:
         found.append(("cost", ", ".join(f"{key} {_number(value)}" for key, value in costs.items())))
     found += [("note", str(note)) for note in run.stats.get("notes", ())]
     return found
+
+
+def accuracy(told: Mapping[str, Any]) -> str:
+    """The estimated error beside the one asked for, how errors grew, and what the runs cost."""
+    steps = " + ".join(str(one["steps"]) for one in told["runs"])
+    return (
+        f"estimated error of coordinates {told['estimated']:.2g}, asked for {told['requested']:g}; global over local "
+        f"errors {told['growth']:.2g}; runs of {steps} steps"
+    )
 
 
 def strategy(run: Trajectory) -> str:

@@ -40,11 +40,15 @@ def numbers(scheme: Any, start: Any, dt: Any, tol: Any, until: Any, store: Any, 
         faults.append(f"integrator must be an mbd integrator such as mbd.HHT(alpha=0.05), not {scheme!r}")
     if not isinstance(start, State):
         faults.append(f"start must be a State from mbd.assemble(model, …), not {start!r}")
-    if tol is not None:
-        faults.append("tol= is not available: steps are fixed; give dt and compare with dt/2, whose error is a quarter")
-    if dt is None:
-        faults.append("a step is needed: simulate(…, dt=1e-3)")
-    elif not is_number(dt) or not math.isfinite(dt) or dt <= 0.0:
+    if tol is not None and dt is not None:
+        faults.append(f"give dt={dt!r} for fixed steps or tol={tol!r} for steps that follow their error, not both")
+    elif tol is not None and (not is_number(tol) or not math.isfinite(tol) or tol <= 0.0):
+        faults.append(f"tol must be a positive error of coordinates [m, rad], not {tol!r}; 1e-6 is common")
+    elif tol is not None and store != 1:
+        faults.append(f"tol= compares runs at all their steps; use store=1, not {store!r}")
+    elif tol is None and dt is None:
+        faults.append("a step or a tolerance is needed: simulate(…, dt=1e-3) or simulate(…, tol=1e-6)")
+    elif tol is None and (not is_number(dt) or not math.isfinite(dt) or dt <= 0.0):
         faults.append(f"dt must be a positive number of seconds, not {dt!r}; 1e-3 suits a walker")
     faults += _times(start, dt, until)
     if not isinstance(store, Integral) or isinstance(store, bool) or store < 1:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from mbd.equations.equations import Equations
-from mbd.integrators import HHT, GeneralizedAlpha, Integrator, Newmark, RadauIIA
+from mbd.integrators import HHT, GeneralizedAlpha, Integrator, Newmark, RadauIIA, RungeKutta853
 
 __all__ = ["LAWS", "SCHEMES", "STRATEGIES", "SPACE", "Law", "as_markdown", "as_text", "refusals", "supports"]
 
@@ -63,6 +63,7 @@ SCHEMES: dict[str, tuple[Integrator, ...]] = {
     "index3, ρ∞ = 1": (Newmark(formulation="index3"), GeneralizedAlpha(1.0, formulation="index3")),
     "HHT averaged": (HHT(0.05, form="averaged"),),
     "RadauIIA": (RadauIIA(),),
+    "RungeKutta853": (RungeKutta853(),),
 }
 """Columns of the table: schemes that stand for all with this formulation."""
 
@@ -79,6 +80,18 @@ TOGETHER: dict[tuple[tuple[str, str], tuple[str, str]], str] = {
     ),
 }
 """Pairs of arguments that exclude each other."""
+
+CHARTS = "joints whose coordinates do not add, such as those of free rotations, have not"
+"""Why a scheme that knows vectors only is refused."""
+
+WITH_TOLERANCE: dict[tuple[str, str], str] = {
+    ("contact", "nonsmooth"): (
+        "contact='nonsmooth' takes fixed steps, of first order at impacts, which follow no tolerance; use "
+        "contact='events', or dt="
+    ),
+    ("locate", "linear"): "locate='linear' leaves errors of event instants that tol= does not see; use locate='root'",
+}
+"""Arguments that exclude tol=."""
 
 SPACE: dict[str, str] = {
     "friction=μ of a Unilateral": "friction=None (it sticks) or 0",
@@ -98,9 +111,13 @@ def refusals(equations: Equations, scheme: Integrator, options: Mapping[str, Any
     """Every pair of a run that is not supported, each named with what to use instead."""
     found = [text for pair, text in TOGETHER.items() if all(options.get(name) == value for name, value in pair)]
     held = [row.owner for row in equations.rows if not row.is_velocity]
-    told = scheme.check(len(held))
-    if told:
-        found.append(f"{told} (rows on positions: {_listed(held)})" if held else told)
+    told = [scheme.check(len(held))]
+    if options.get("tol") is not None:
+        told.append(scheme.check_tolerance(len(held)))
+        found += [text for (argument, value), text in WITH_TOLERANCE.items() if options.get(argument) == value]
+    found += [f"{text} (rows on positions: {_listed(held)})" if held else text for text in told if text]
+    if equations.compose is not None and not scheme.any_chart:
+        found.append(f"{scheme!r} moves coordinates along q + x, which {CHARTS}; use mbd.HHT(0.05)")
     return found
 
 
@@ -123,6 +140,11 @@ def _cells() -> list[list[str]]:
 def _others() -> list[str]:
     """What is refused besides, a line each."""
     lines = [f"in space, {what}: use {instead}" for what, instead in SPACE.items()]
+    for (argument, value), text in WITH_TOLERANCE.items():
+        lines.append(f"tol= with {argument}={value!r}: {text.partition('; ')[2]}")
+    lines.append(
+        "tol= with index 3 where rows hold positions, or with a scheme of first order: formulation='ggl', or dt="
+    )
     for pair, text in TOGETHER.items():
         both = " with ".join(f"{name}={value!r}" for name, value in pair)
         lines.append(f"{both}: {text.partition('; ')[2]}")

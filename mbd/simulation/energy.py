@@ -198,11 +198,13 @@ def _sentence(run: Run, found: Judgement) -> str:
     top = float(np.max(speeds[:, fastest]))
     turn = run.dt * float(np.max(changes[:, fastest])) / top if top > 0.0 else 1.0  # share of v that a step changes
     way, finer = speeds[-1, fastest] * run.dt, 0.1 * run.dt / max(1.0, turn)
+    setting = "the tolerance" if run.values["adaptive"] else f"dt = {run.dt:g} s"
+    remedy = "a smaller one" if run.values["adaptive"] else f"dt below {finer:.1g} s"
     return (
         f"t = {table[-1, 0]:.9g} s: from here on the energy is not the mechanism's: the scheme itself has put up to "
-        f"{found.numerical:.3g} J into a mechanism that had {found.owned:.3g} J of its own to move with by then; dt = "
-        f"{run.dt:g} s does not resolve the motion, of which {name!r} is the fastest, {way:.3g} in one step; try dt "
-        f"below {finer:.1g} s, or a larger mass or a softer stiffness there"
+        f"{found.numerical:.3g} J into a mechanism that had {found.owned:.3g} J of its own to move with by then; "
+        f"{setting} does not resolve the motion, of which {name!r} is the fastest, {way:.3g} in one step; try "
+        f"{remedy}, or a larger mass or a softer stiffness there"
     )
 
 

@@ -95,6 +95,12 @@ def explanation(
     if status == F.NOT_FINITE:
         what = _not_finite(stepper, places or {})
         return f"{where}: {what}{with_closed}; nothing after the last accepted step is kept"
+    if status == F.TOO_SMALL:
+        return (
+            f"{where}: steps fell below {float(values['detail'][2]):.2g} s without an error of "
+            f"{values['allowed']:.2g} per second{with_closed}; a force that jumps with the state (mbd.where, sign) "
+            "must be made continuous, or be switched by an Event or Controller; or ask for less by tol="
+        )
     worst = _worst(stepper)
     if status == F.NOT_CONVERGED and residual < 0.0:
         return (

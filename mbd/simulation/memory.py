@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 __all__ = ["memory_of", "take_up", "without_sharing"]
 
-OPTIONS = ("dt", "contact", "impact", "locate", "rest_speed", "backend")
+OPTIONS = ("dt", "tol", "allowed", "longest", "contact", "impact", "locate", "rest_speed", "backend")
 """Settings that a memory depends on."""
 
 

@@ -72,7 +72,7 @@ def _ignored(run: Run, number: int, contact: Contact) -> list[str]:
 
 def _short_touch(run: Run, contact: Contact) -> list[str]:
     """A penalty contact over within a few steps is not resolved: its energy is anyone's guess."""
-    if contact.kind != "penalty":
+    if contact.kind != "penalty" or run.values["adaptive"]:
         return []
     times = [(event.kind, event.time) for event in run.events if event.name == contact.name]
     spans = [b[1] - a[1] for a, b in pairwise(times) if (a[0], b[0]) == ("closed", "opened")]

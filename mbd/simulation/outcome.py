@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbd.arrays import Matrix
+from mbd.kernel import fields as F
 from mbd.results.record import EventRecord, Record
 from mbd.simulation.notes import notes_of
 from mbd.state import State
@@ -59,6 +60,9 @@ def trajectory_of(run: Run, problem: str, message: str, final: State) -> Traject
 def _statistics(run: Run) -> dict[str, Any]:
     counts = run.values["counts"]
     numbers: dict[str, Any] = {name: int(counts[place]) for place, name in enumerate(COUNTS)}
+    if run.values["adaptive"]:
+        numbers["rejected"] = int(counts[F.REJECTED])
+        numbers["local_errors"] = float(run.values["clock"][F.SPENT])
     numbers["modes"] = len(run.stepper.modes)
     numbers["compiled"] = run.stepper.compiled
     numbers["derive_and_compile_seconds"] = run.mechanism.seconds

@@ -285,6 +285,12 @@ class PlainScheme:
         K.block[K.o_lam : K.o_lam + K.n_rows] = K.lam1[: K.n_rows]
         return 0
 
+    def error(self, K: Any, h: float) -> None:
+        """The integrator's estimate of the local error of the candidate."""
+        estimate = self.integrator.local_error(self.memory, self.pending, h)
+        if estimate is not None:
+            K.error[:] = estimate
+
     def accept(self, K: Any, h: float) -> None:
         """The candidate becomes the accepted state, its memory the memory."""
         self.memory = self.pending

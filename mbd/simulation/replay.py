@@ -15,16 +15,20 @@ from mbd.compile.mechanism import Mechanism, ModeCode
 from mbd.errors import ModelError
 from mbd.integrators import Integrator
 from mbd.integrators.base import StepReport
-from mbd.kernel.newmark import newmark_accept, newmark_start, newmark_step
+from mbd.kernel.control import newmark_error
+from mbd.kernel.newmark import newmark_accept, newmark_resume, newmark_start, newmark_step
+from mbd.kernel.radau import radau_accept, radau_resume, radau_start, radau_step
+from mbd.kernel.runge_kutta import runge_kutta_accept, runge_kutta_start, runge_kutta_step
 from mbd.results.capsule import load
 from mbd.results.failure import Failure
 from mbd.simulation.failures import residual_names
 from mbd.simulation.run import Run
 from mbd.simulation.simulate import prepared
+from mbd.simulation.stepper import NEWMARK, RADAU_IIA, RUNGE_KUTTA
 from mbd.state import State
 from mbd.trajectory import Trajectory
 
-__all__ = ["Iteration", "Replay", "Try", "replay"]
+__all__ = ["Iteration", "Replay", "Try", "Twin", "replay"]
 
 
 SHOWN = 10
@@ -74,7 +78,8 @@ class Replay:
             "goes through" if self.passed else "fails as before" if self.reproduced else "fails, with another sentence"
         )
         settings = self.run.settings
-        how = f"{settings['integrator']}, dt = {settings['dt']:g} s"
+        steps = f"dt = {settings['dt']:g} s" if settings.get("dt") is not None else f"tol = {settings['tol']:g}"
+        how = f"{settings['integrator']}, {steps}"
         lines = [f"replay from t = {self.failure.time:.9g} s with {how}: {verdict}", f"  {self.message}"]
         for number, one in enumerate(self.tries, 1):
             lines.append(f"  try {number}, step to t = {one.time:.9g} s; largest residuals:")
@@ -140,7 +145,7 @@ def replay(
     trajectory, problem = run.complete()
     again, seen = _prepared(told, trajectory.final if problem else told.state, model, scheme, step, 1)
     if again.stepper.compiled:
-        again.stepper.compiled, again.stepper.scheme = False, _Twin()  # type: ignore[assignment]
+        again.stepper.compiled, again.stepper.scheme = False, Twin(again.stepper.values["scheme"])  # type: ignore[assignment]
     again.march()
     same = bool(problem) and problem == told.message
     return Replay(told, not problem, same, trajectory.message, seen.tries(again), trajectory)
@@ -153,6 +158,7 @@ def _prepared(
     known = told.settings
     until = tuple(known["until"]) if isinstance(known["until"], list) else known["until"]
     options = {name: known[name] for name in ("contact", "impact", "locate", "store", "rest_speed", "backend")}
+    options |= {name: known[name] for name in ("tol", "allowed", "longest") if known.get(name) is not None}
     watched: list[_Watched] = []
 
     def watch(mechanism: Mechanism) -> Any:
@@ -164,14 +170,26 @@ def _prepared(
     return run, watched[0]
 
 
-class _Twin:
+class Twin:
     """The kernel's own scheme in plain Python, step by step what its compiled form does."""
 
     memory = None
     report = StepReport(True)
-    start = staticmethod(newmark_start)
-    accept = staticmethod(newmark_accept)
-    step = staticmethod(newmark_step)
+
+    def __init__(self, scheme: int) -> None:
+        self.start, self.step, self.accept, self.resume, self.error = SCHEMES[scheme]
+
+
+def _nothing_to_add(K: Any, h: float) -> None:
+    """The step has left its error already."""
+
+
+SCHEMES: dict[int, tuple[Any, ...]] = {
+    NEWMARK: (newmark_start, newmark_step, newmark_accept, newmark_resume, newmark_error),
+    RUNGE_KUTTA: (runge_kutta_start, runge_kutta_step, runge_kutta_accept, None, _nothing_to_add),
+    RADAU_IIA: (radau_start, radau_step, radau_accept, radau_resume, _nothing_to_add),
+}
+"""Start, step, accept, resume and error of the kernel's schemes; an explicit one holds no pose to resume from."""
 
 
 class _Watched:

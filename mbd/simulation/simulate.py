@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from importlib.util import find_spec
 from typing import Any, Literal
@@ -18,11 +19,16 @@ from mbd.simulation.arguments import callbacks, choices, end_of, fits, numbers
 from mbd.simulation.capabilities import refusals
 from mbd.simulation.run import Run
 from mbd.simulation.strategy import chosen
+from mbd.simulation.tolerance import Trial, calibrated
 from mbd.state import State
 from mbd.trajectory import Trajectory
 
 __all__ = ["prepared", "simulate"]
 
+LONGEST = 0.1
+"""Longest step that follows its error, over the length of the run [-]."""
+INSTANT = 1e-3
+"""A short time where steps follow their error, over the length of the run or 1 s: for differences, and as `dt` [-]."""
 REST_SPEED = 1e-6
 """Approach speed [m/s, rad/s] below which a contact closes without rebound and releases nobody: ends Zeno sequences."""
 
@@ -32,7 +38,7 @@ def simulate(
     start: State,
     integrator: Integrator | None = None,
     dt: float | None = None,
-    tol: None = None,
+    tol: float | None = None,
     *,
     until: float | str | tuple[str, float],
     contact: Literal["auto", "events", "nonsmooth"] = "auto",
@@ -49,7 +55,8 @@ def simulate(
     """Integrate a model from a state.
 
     Steps of dt follow each other until a guard fires; its instant is located, an impact law applied where contacts
-    close, and the scheme restarted consistently from there with full steps again.
+    close, and the scheme restarted consistently from there with full steps again. With `tol` steps follow their own
+    error instead, and trial runs tell the error of the whole run, of which one that agrees with `tol` is returned.
 
     Parameters
     ----------
@@ -57,7 +64,9 @@ def simulate(
     start : from `mbd.assemble`, or `Trajectory.final` of an earlier run
     integrator : default ``HHT(alpha=0.05)``
     dt : step [s]
-    tol : error control is not available yet; steps are fixed
+    tol : in place of dt: the largest error of any coordinate [m, rad] over the whole run. It is estimated from two to
+        five runs at different tolerances, see ``run.stats["tolerance"]``; what controllers and observers do besides
+        answering happens in each of them. A tolerance that cannot be reached is a `SimulationError`
     until : end time [s]; or the name of a contact or event, at whose first closing or crossing the run ends;
         or (name, latest time)
     contact : 'events' locates the instants at which contacts close, open, stick and slip, which keeps the order of the
@@ -68,7 +77,7 @@ def simulate(
         'sequential' one contact after the other; where it would create energy, Stronge's law takes its place
     locate : 'root' finds event instants to round-off; 'linear' by one linear interpolation back, second order
     parameters : values that differ from the model's, by name
-    store : keep every store-th step; rows at events and the last row are always kept
+    store : keep every store-th step; rows at events and the last row are always kept; 1 with `tol`
     observers : called as ``observer(time, state)`` at intervals of about 0.1 s of wall time and at the end
     progress : True for a progress bar on a terminal, or ``progress(t, until)``
     on_failure : 'raise' a `SimulationError` whose ``run`` has everything computed, or 'return' it with success False
@@ -92,19 +101,52 @@ def simulate(
     faults += callbacks(observers, progress) + named_numbers(parameters, "parameters")
     if faults:
         raise ModelError(faults)
-    assert dt is not None
     changed = {**start.parameters, **(parameters or {})}
-    options = {
+    options: dict[str, Any] = {
         "contact": contact, "impact": impact, "locate": locate, "store": store, "rest_speed": rest_speed,
         "backend": backend,
     }  # fmt: skip
-    run = prepared(model, start, scheme, float(dt), until, changed, options)
-    end = run.end
-    run.observe(observers, _bar(progress, start.time, end))
-    trajectory, problem = run.complete()
+
+    def complete(step: float, more: Mapping[str, float]) -> tuple[Run, Trajectory, str]:
+        run = prepared(model, start, scheme, step, until, changed, {**options, **more})
+        run.observe(observers, _bar(progress, start.time, run.end))
+        return run, *run.complete()
+
+    if dt is not None:
+        run, trajectory, problem = complete(float(dt), {})
+    else:
+        assert tol is not None
+        run, trajectory, problem = _to_tolerance(complete, scheme, float(tol), _span(until, start.time))
     if problem and on_failure == "raise":
         raise SimulationError(problem, trajectory) from run.cause
     return trajectory
+
+
+def _span(until: Any, begin: float) -> float | None:
+    """Length of a run [s], None where an event ends it."""
+    latest = until[1] if isinstance(until, tuple) else until
+    return None if isinstance(latest, str) or isinstance(until, tuple) else float(latest) - begin
+
+
+def _to_tolerance(
+    complete: Callable[[float, Mapping[str, float]], tuple[Run, Trajectory, str]],
+    scheme: Integrator,
+    tol: float,
+    span: float | None,
+) -> tuple[Run, Trajectory, str]:
+    """The run whose error agrees with a tolerance; where an event ends it, the first guess is that it takes 1 s."""
+    length = span or 1.0
+    fixed = {"tol": tol, "longest": LONGEST * length}
+
+    def trial(allowed: float) -> Trial:
+        run, trajectory, problem = complete(INSTANT * min(length, 1.0), {**fixed, "allowed": allowed})
+        return Trial(allowed, trajectory, problem, run)
+
+    found = calibrated(trial, tol, tol / length, scheme.order() / scheme.error_order())
+    trajectory = found.trial.run
+    if found.problem and trajectory.success:  # no run failed, but none is good enough
+        trajectory = Trajectory(replace(trajectory.record, success=False, message=found.problem))
+    return found.trial.source, trajectory, found.problem
 
 
 def prepared(
@@ -122,16 +164,21 @@ def prepared(
     manager = ActiveSetManager(mechanism.equations)
     fits(start, mechanism.equations, manager)
     end, stop = end_of(until, manager, dt, start.time)
-    strategy, reason = chosen(options["contact"], manager, options["locate"])
+    tol = options.get("tol")
+    strategy, reason = chosen(options["contact"], manager, options["locate"], tol is not None)
     options = {**options, "contact": strategy}
     refused = refusals(mechanism.equations, scheme, options)
     if refused:
         raise CapabilityError(refused)
+    adaptive = {name: options.get(name) for name in ("tol", "allowed", "longest")}
     settings = {
-        "model": getattr(model, "name", ""), "integrator": repr(scheme), "dt": dt, "until": until, **options,
-        "contact_reason": reason, "backend": mechanism.backend.name, "versions": dict(_versions()),
+        "model": getattr(model, "name", ""), "integrator": repr(scheme), "dt": dt if tol is None else None,
+        "until": until, **options, **adaptive,
+        "contact_reason": reason, "between": scheme.between, "backend": mechanism.backend.name,
+        "versions": dict(_versions()),
     }  # fmt: skip
     own = {name: options[name] for name in ("contact", "impact", "locate", "store", "rest_speed")}
+    own |= {name: value for name, value in adaptive.items() if value is not None}
     return Run(
         model, mechanism if watch is None else watch(mechanism), manager, scheme, start, dt, end, stop, changed, own,
         settings,

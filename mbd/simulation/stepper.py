@@ -12,8 +12,10 @@ from mbd.arrays import Vector
 from mbd.compile.mechanism import Mechanism
 from mbd.equations.equations import Equations
 from mbd.integrators.base import Integrator
+from mbd.integrators.dormand_prince import STAGES, tableau
 from mbd.integrators.family import MAX_ITERATIONS, NewmarkFamily
 from mbd.integrators.radau import RadauIIA
+from mbd.integrators.runge_kutta import RungeKutta853
 from mbd.kernel import fields as F
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.kernel.collocation import RADAU
@@ -26,8 +28,6 @@ __all__ = ["Stepper", "is_compiled"]
 
 EVENT_CAPACITY = 512
 """Events that the kernel may log before it hands them over, at least."""
-RADAU_IIA = 2
-"""Number of that scheme in the kernel."""
 LAWS = ("newton", "poisson", "sequential")
 """Impact laws in the order of their numbers in the kernel."""
 TAKES_PART = 1e-7
@@ -38,12 +38,25 @@ MODE_CAPACITY = 16
 """Modes for which a table is laid out at the start; it doubles as it fills."""
 
 
+LOOKS = 4
+"""Parts in which a step of a scheme of order 3 or more is looked at for guards [-]."""
+NEWMARK, RUNGE_KUTTA, RADAU_IIA = range(3)
+"""Numbers of the kernel's own schemes."""
+
+
+def own_scheme(integrator: Integrator) -> int | None:
+    """Number of the kernel's scheme that takes this integrator's steps, None if it is written in Python only."""
+    step = type(integrator).step
+    for kind, number in ((RungeKutta853, RUNGE_KUTTA), (RadauIIA, RADAU_IIA)):
+        if isinstance(integrator, kind):
+            return number if step is kind.step else None
+    endpoint = getattr(integrator, "form", "endpoint") == "endpoint" and isinstance(integrator, NewmarkFamily)
+    return NEWMARK if endpoint and step in (NewmarkFamily.step, _hht_step()) else None
+
+
 def is_compiled(mechanism: Mechanism, integrator: Integrator) -> bool:
-    """Whether the compiled kernel can run this scheme: machine code exists, and it is one that the kernel knows."""
-    own_step = getattr(integrator, "form", "endpoint") == "endpoint" and isinstance(integrator, NewmarkFamily)
-    plain_step = own_step and type(integrator).step in (NewmarkFamily.step, _hht_step())
-    known = plain_step or (isinstance(integrator, RadauIIA) and type(integrator).step is RadauIIA.step)
-    return known and mechanism.common["accelerations"].address != 0
+    """Whether the compiled kernel can run this scheme: machine code exists and it is one of the kernel's own."""
+    return own_scheme(integrator) is not None and mechanism.common["accelerations"].address != 0
 
 
 def _hht_step() -> Any:
@@ -116,7 +129,10 @@ class Stepper:
             event_capacity=max(EVENT_CAPACITY, 8 * n_contacts + 16), chunk=1, hooks=0,
             rest_speed=float(options.get("rest_speed", 1e-6)), dt=dt, until=0.0, end=float(options.get("end", 0.0)),
             alpha_m=0.0, alpha_f=0.0, beta=0.25, gamma=0.5, tolerance=1e-9, jerk=1, exact=0,
-            scheme=0,
+            scheme=own_scheme(self.integrator) or NEWMARK,
+            adaptive=int("allowed" in options), allowed=float(options.get("allowed", 0.0)),
+            longest=float(options.get("longest", np.inf)), error_order=self.integrator.error_order(),
+            looks=LOOKS if self.integrator.order() > 2 and options.get("contact") != "nonsmooth" else 1,
         )  # fmt: skip
         if isinstance(self.integrator, NewmarkFamily):
             c = self.integrator.coefficients
@@ -125,7 +141,7 @@ class Stepper:
                 jerk=int(self.integrator.starting == "jerk"), exact=int(self.integrator.exact),
             )  # fmt: skip
         elif isinstance(self.integrator, RadauIIA):
-            values.update(scheme=RADAU_IIA, tolerance=self.integrator.tolerance)
+            values.update(tolerance=self.integrator.tolerance)
 
     def _arrays(self, parameters: Vector, manager: ActiveSetManager) -> None:
         v = self.values
@@ -133,9 +149,8 @@ class Stepper:
         frictions = v["n_frictions"]
         size, unknowns, block = n + rows, contacts + 3 * frictions, self.mechanism.layout.size
         tail = n + 2 * rows + rows * n
-        stages = v["scheme"] == RADAU_IIA
         reals = {
-            "block": block, "out": max(size * size + 3 * tail + 2 * size + 2, block), "clock": 4,
+            "block": block, "out": max(size * size + 3 * tail + 2 * size + 2, block), "clock": 16,
             "acc": self.mechanism.sizes["accelerations"], "q": n_q, "y": n, "rate": n, "aux": n, "slope": n,
             "lam": rows, "lam_slope": rows, "shift": n, "shift_change": n,
             "anchors": v["n_anchors"], "q1": n_q, "y1": n, "rate1": n, "aux1": n, "lam1": rows,
@@ -148,9 +163,9 @@ class Stepper:
             "given": rows, "total": rows, "total_jump": n, "loads": rows, "before": contacts, "past": rows,
             "past_limit": frictions, "trial": rows, "trial_given": rows, "trial_jump": n,
             "lcp_matrix": unknowns * unknowns, "lcp_shift": unknowns, "lcp_found": unknowns,
-            "lcp_work": lemke_places(unknowns), "lcp_limit": frictions, "lcp_slope": frictions,
-            "stages": stage_place(SimpleNamespace(**v), STAGES_END) if stages else 0,
-            "past_stages": 3 * (n + rows + v["n_v"]) if stages else 0, "error": v["n_v"] + n,
+            "lcp_work": lemke_places(unknowns), "stages": self._stages(), "error": v["n_v"] + n,
+            "past_stages": 3 * (n + rows + v["n_v"]) if v["scheme"] == RADAU_IIA else 0,
+            "inside": 2 * v["n_watched"] + 2 * rows + n_q + 2 * n, "lcp_limit": frictions, "lcp_slope": frictions,
             "kept": n_q + 2 * n + rows + v["n_watched"] + v["n_anchors"] + frictions,
             "store": v["capacity"] * v["width"], "log": v["event_capacity"] * v["event_width"],
         }  # fmt: skip
@@ -163,7 +178,7 @@ class Stepper:
             "mode_code": PROGRAMS * MODE_CAPACITY,
             "mode_count": 1, "rows": rows,
             "pivots": size, "columns": size, "lcp_rows": contacts + frictions, "lcp_who": contacts + frictions,
-            "lcp_basis": unknowns, "fired": 2, "state": 17, "counts": 16,
+            "lcp_basis": unknowns, "fired": 2, "state": 24, "counts": 16,
         }  # fmt: skip
         self.reals = _shelve(v, {name: reals.pop(name) for name in F.KEPT_REALS}, float)
         self.integers = _shelve(v, {name: integers.pop(name) for name in F.KEPT_INTEGERS}, np.int64)
@@ -174,6 +189,8 @@ class Stepper:
         for name, table in manager.tables().items():
             v[name] = table if len(table) else np.zeros(1, dtype=table.dtype)
         v["shift1"] = v["block"][self.mechanism.layout.shift :]  # read by model code as well
+        v["tableau"] = tableau()
+        v["clock"][F.STEP] = v["dt"]
         v["sinking"][:] = np.inf
         v["was"][:] = F.UNKNOWN
         if v["scheme"] == RADAU_IIA:
@@ -183,6 +200,13 @@ class Stepper:
         v["params"] = np.ascontiguousarray(parameters, dtype=float) if len(parameters) else np.zeros(1)
         if not v["n_anchors"]:
             v["anchors"] = np.zeros(0)
+
+    def _stages(self) -> int:
+        """Numbers that the stages of a step take."""
+        v = self.values
+        if v["scheme"] == RADAU_IIA:
+            return stage_place(SimpleNamespace(**v), STAGES_END)
+        return (STAGES + 1) * (v["n_v"] + v["n"]) if v["scheme"] == RUNGE_KUTTA else 0
 
     def add_mode(self) -> None:
         """Make code for the contacts closed now."""

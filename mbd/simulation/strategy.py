@@ -10,7 +10,7 @@ MOST_LOCATED = 16
 """Unilateral contacts up to which the instants of closing and opening are located by default [-]."""
 
 
-def chosen(contact: str, manager: ActiveSetManager, locate: str = "root") -> tuple[str, str]:
+def chosen(contact: str, manager: ActiveSetManager, locate: str = "root", tolerance: bool = False) -> tuple[str, str]:
     """The strategy and, where it was left open, the reason in a sentence.
 
     Located events keep the order of the scheme; their work grows with the number of closings, which many contacts
@@ -19,6 +19,8 @@ def chosen(contact: str, manager: ActiveSetManager, locate: str = "root") -> tup
     if contact != "auto":
         return contact, ""
     count = sum(item.kind == "unilateral" for item in manager.contacts)
+    if count > MOST_LOCATED and tolerance:
+        return "events", f"contact='events' was chosen: tol= asks to locate the instants of {count} contacts"
     if count > MOST_LOCATED and locate == "linear":
         return "events", f"contact='events' was chosen: locate='linear' asks to locate the instants of {count} contacts"
     if count > MOST_LOCATED:

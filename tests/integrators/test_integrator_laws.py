@@ -11,5 +11,8 @@ from tests.integrators.own import ProjectedMidpoint, SemiImplicitEuler
 def test_every_integrator_keeps_the_laws(scheme):
     verdict = check_integrator(scheme)
     refused = scheme.check(1)
+    if scheme.order() > 5:  # its errors are round-off here: test_runge_kutta measures the order
+        assert len(verdict.notes) == 8 and all("every error is below" in note for note in verdict.notes)
+        return
     assert verdict.laws["order: as promised, within 0.15"] == (3 if refused else 4)
     assert len(verdict.notes) == bool(refused)

@@ -32,6 +32,7 @@ SCHEMES = {
     "generalized alpha index 3": mbd.GeneralizedAlpha(0.5, formulation="index3", tolerance=TIGHT),
     "radau": mbd.RadauIIA(tolerance=TIGHT),
     "textbook start": mbd.HHT(0.1, start="consistent", tolerance=TIGHT),
+    "runge-kutta 8(5,3)": mbd.RungeKutta853(),
 }
 
 

@@ -1,0 +1,191 @@
+"""Step-size control: the local error of a step against the one allowed, and the next step.
+
+What a scheme owes to it: in a run with K.adaptive = 1, `scheme_step` leaves an estimate of its local error in K.error,
+(n_v + n,): that of the increment x of positions [m, rad], then that of (v, z); `scheme_error` fills it in where a
+scheme finds it from its memory. K.error_order is the power of the step with which that error per second falls. A scheme
+takes any step, without a fixed grid: the present full step is K.clock[STEP] (K.dt is a short time that stands for
+nothing else in such a run), and the state it keeps tells the size of its own last step (as K.clock[AUX_STEP] does).
+
+The error is controlled per unit of time: positions may err by K.allowed per second, and by their round-off in each
+step, ``err = max |e| / (allowed h + round-off)``, where e is also h times the error of velocities and, relative to
+their size, that of first-order states. A step is taken again where ``0.9 err^(−1/p) < 0.8``, p = K.error_order, else
+this factor, between 0.2 and 5 (2 where the scheme remembers the step), gives the next one; schemes with memory or
+factors keep their step between 0.8 and 1.25.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mbd.kernel.fields import (
+    AUX_STEP,
+    EPS,
+    LOCAL,
+    NEXT,
+    NOT_CONVERGED,
+    NOT_FINITE,
+    NOW,
+    REJECTED,
+    SINGULAR,
+    STAGNATED,
+    STEP,
+    TOO_NEAR,
+    TOO_SMALL,
+    TRIED,
+)
+from mbd.kernel.guards import try_step
+from mbd.kernel.hooks import scheme_error
+from mbd.kernel.restart import compose, consistent, fill_block, refresh_scales
+
+__all__ = ["controlled_step", "first_step", "newmark_error", "smallest_step"]
+
+SAFETY = 0.9
+"""Part of the step that would just be allowed [-]."""
+FALL = 0.2
+"""Least factor from one step to the next try [-]."""
+UNCHANGED = 1.25
+"""Growth below which a scheme that remembers its step keeps it [-]."""
+AGAIN = 0.8
+"""Factor below which a step is taken again [-]."""
+NEIGHBOURS = 4.0
+"""Error of positions, over the distance between neighbouring numbers, that is round-off [-]."""
+CANCELLED = 64.0
+"""The same for what a step adds to them: stages and estimates are sums in which large terms cancel [-]."""
+
+
+def smallest_step(K: Any) -> float:
+    """Below it the clock does not move."""
+    return float(64.0 * EPS * max(abs(K.clock[NOW]), K.longest))
+
+
+def newmark_error(K: Any, h: float) -> None:
+    """K.error of the Newmark family: ``h² (1/6 − β − (α_m − α_f)/2) (a₁ − a₀)`` of positions.
+
+    That of velocities and first-order states is ``h²/12`` times the change of the slope of their rates.
+    """
+    stretch = h / K.clock[AUX_STEP]
+    share = h * h * (1.0 / 6.0 - K.beta - 0.5 * (K.alpha_m - K.alpha_f))
+    for i in range(K.n):
+        a0 = K.rate[i] + stretch * (K.aux[i] - K.rate[i])
+        if i < K.n_v:
+            K.error[i] = share * (K.aux1[i] - a0)
+        K.error[K.n_v + i] = h * h / 12.0 * ((K.rate1[i] - K.rate[i]) / h - K.slope[i])
+
+
+def error_ratio(K: Any, h: float) -> float:
+    """err of the module's text for the candidate."""
+    n_v = K.n_v
+    far = 0.0
+    fast = 0.0
+    for i in range(K.n_q):
+        far = max(far, abs(K.q1[i]))
+    for i in range(n_v):
+        fast = max(fast, abs(K.y1[i]))
+    floor = EPS * (NEIGHBOURS * far + CANCELLED * h * fast)
+    largest = 0.0
+    for i in range(n_v):
+        largest = max(largest, max(abs(K.error[i]), h * abs(K.error[n_v + i])))
+    ratio = largest / (K.allowed * h + floor)
+    for i in range(n_v, K.n):
+        size = max(max(abs(K.y[i]), abs(K.y1[i])), h * max(abs(K.rate[i]), abs(K.rate1[i])))
+        if size > 0.0:
+            ratio = max(ratio, abs(K.error[n_v + i]) / size / (K.allowed * h + CANCELLED * EPS))
+    return ratio if ratio < 1e300 else 1e300
+
+
+def growth(K: Any, ratio: float) -> float:
+    """Factor from this step to the next."""
+    most = 5.0 if K.scheme != 0 else 2.0
+    factor = most
+    if ratio > 0.0:
+        factor = min(max(SAFETY * ratio ** (-1.0 / K.error_order), FALL), most)
+    if K.scheme != 1 and AGAIN <= factor <= UNCHANGED:
+        return 1.0
+    return factor
+
+
+def lower_scales(K: Any) -> None:
+    """Magnitudes of forces down towards those of the accepted state, by a hundred at most.
+
+    After a moment of huge forces residuals are judged too mildly otherwise, which the estimated error shows.
+    """
+    for i in range(K.n):
+        K.work[i] = K.scale[i]
+    fill_block(K, K.clock[NOW], K.q, K.y)
+    refresh_scales(K)
+    for i in range(K.n):
+        K.scale[i] = max(K.scale[i], 0.01 * K.work[i])
+
+
+def is_to_shorten(status: int) -> bool:
+    """Whether a step that ended so is tried with half its size."""
+    stalled = status == NOT_CONVERGED or status == STAGNATED
+    return stalled or status == SINGULAR or status == TOO_NEAR or status == NOT_FINITE
+
+
+def controlled_step(K: Any, h: float) -> int:
+    """A candidate whose error is allowed, after a step of h or less: K.clock[TRIED]; K.clock[NEXT] is the next step."""
+    t = K.clock[NOW]
+    while True:
+        for i in range(K.n_v + K.n):
+            K.error[i] = 0.0
+        status = try_step(K, h, t + h)
+        if status == 0:
+            scheme_error(K, h)
+            ratio = error_ratio(K, h)
+            factor = growth(K, ratio)
+            if factor >= AGAIN:
+                K.clock[LOCAL] = ratio * K.allowed * h
+                K.clock[TRIED] = h
+                following = h * factor
+                if h < (1.0 - 1e-6) * K.clock[STEP]:  # it was cut at a boundary: its error says little of longer ones
+                    following = max(following, K.clock[STEP])
+                K.clock[NEXT] = min(following, K.longest)
+                return 0
+            h *= factor
+            lower_scales(K)
+        elif is_to_shorten(status):
+            h *= 0.5  # a long step may also have left the region where forces are defined
+        else:
+            return status
+        K.counts[REJECTED] += 1
+        if h < smallest_step(K):
+            if status == 0:
+                K.detail[0] = t + h
+                K.detail[2] = h
+                return TOO_SMALL
+            return status
+        K.clock[STEP] = h  # no step is tiny beside the one that may be taken here
+
+
+def first_step(K: Any) -> None:
+    """K.clock[STEP] at an accepted, consistent state (Hairer, Nørsett & Wanner 1993, II.4).
+
+    ``h = (0.01 tol / max(|ẏ|, |ÿ|))^(1/(p+1))`` with y = (q, v) and ÿ by one difference.
+    """
+    n = K.n
+    speed = 0.0
+    force = 0.0
+    for i in range(n):
+        force = max(force, abs(K.rate[i]))
+        if i < K.n_v:
+            speed = max(speed, abs(K.y[i]))
+    size = 10.0 * K.allowed * K.longest
+    ahead = 1e-2 * (speed + (size * force) ** 0.5) / force if force > 0.0 else K.dt
+    ahead = min(max(ahead, 1e-3 * K.dt), K.dt)
+    t = K.clock[NOW]
+    fill_block(K, t, K.q, K.y)
+    for i in range(K.n_v):
+        K.block[K.o_x + i] = ahead * K.y[i]
+    compose(K, K.q1)
+    for i in range(n):
+        K.y1[i] = K.y[i] + ahead * K.rate[i]
+    change = max(speed, force)
+    if consistent(K, t + ahead, K.q1, K.y1) == 0:
+        for i in range(n):
+            change = max(change, abs(K.jump[i] - K.rate[i]) / ahead)
+    fill_block(K, t, K.q, K.y)
+    h = K.longest
+    if change > 0.0 and change < 1e300:
+        h = (0.01 * size / change) ** (1.0 / (K.error_order + 1.0))
+    K.clock[STEP] = min(max(h, 4.0 * smallest_step(K)), K.longest)

@@ -1,0 +1,155 @@
+"""Guards inside a long step, so that what happens and is over again within it is not missed.
+
+A step of a high-order scheme may be as long as the motion takes to turn around. It is looked at in K.looks parts: at
+their ends the guards are evaluated on the quintic Hermite interpolant of positions, velocities and accelerations (where
+⊕ is not +, on the integral of the cubic one of velocities), with consistent multipliers where a closed contact or a
+friction asks for them, and each part is judged like a step of its own.
+
+What is guaranteed: an excursion of a guard that lasts a fifth of the motion's own time scale or longer is seen, as it
+is by four short steps in place of the long one; one that is shallower than the error of the interpolant may be missed,
+like one between two short steps.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mbd.kernel.fields import NOW
+from mbd.kernel.guards import gap_scale, gap_tolerance, is_watched, judge, watch
+from mbd.kernel.restart import compose, consistent, fill_block
+
+__all__ = ["parts_to_take"]
+
+
+def parts_to_take(K: Any, h: float) -> int:
+    """After how many parts the candidate's step must end; −1: after the first, which holds an event; 0: never.
+
+    Guards and multipliers of the accepted state and of the candidate are as before afterwards.
+    """
+    keep_ends(K)
+    t = K.clock[NOW]
+    asked = needs_multipliers(K)
+    answer = 0
+    for part in range(1, K.looks + 1):
+        if part < K.looks:
+            look_at(K, t, h, part / K.looks, asked)
+        else:
+            put_candidate_back(K)
+        fired = judge(K, h / K.looks)
+        if fired:
+            answer = part - 1 if part > 1 else -1
+            break
+        if part < K.looks and rearms(K):
+            answer = part
+            break
+        for i in range(K.n_watched):
+            K.guards0[i] = K.guards1[i]
+        for k in range(K.n_rows):
+            K.lam[k] = K.lam1[k]
+    put_candidate_back(K)
+    place = 0
+    for i in range(K.n_watched):
+        K.guards0[i] = K.inside[place + i]
+    place += 2 * K.n_watched
+    for k in range(K.n_rows):
+        K.lam[k] = K.inside[place + k]
+    K.fired[0] = -1
+    return answer
+
+
+def keep_ends(K: Any) -> None:
+    """What is overwritten, into K.inside: guards and multipliers at both ends, the candidate."""
+    place = 0
+    for i in range(K.n_watched):
+        K.inside[i] = K.guards0[i]
+        K.inside[K.n_watched + i] = K.guards1[i]
+    place += 2 * K.n_watched
+    for k in range(K.n_rows):
+        K.inside[place + k] = K.lam[k]
+        K.inside[place + K.n_rows + k] = K.lam1[k]
+    place += 2 * K.n_rows
+    for i in range(K.n_q):
+        K.inside[place + i] = K.q1[i]
+    place += K.n_q
+    for i in range(K.n):
+        K.inside[place + i] = K.y1[i]
+        K.inside[place + K.n + i] = K.rate1[i]
+
+
+def put_candidate_back(K: Any) -> None:
+    """The candidate with its guards and multipliers."""
+    for i in range(K.n_watched):
+        K.guards1[i] = K.inside[K.n_watched + i]
+    place = 2 * K.n_watched
+    for k in range(K.n_rows):
+        K.lam1[k] = K.inside[place + K.n_rows + k]
+    place += 2 * K.n_rows
+    for i in range(K.n_q):
+        K.q1[i] = K.inside[place + i]
+    place += K.n_q
+    for i in range(K.n):
+        K.y1[i] = K.inside[place + i]
+        K.rate1[i] = K.inside[place + K.n + i]
+
+
+def needs_multipliers(K: Any) -> bool:
+    """Whether a guard asks for multipliers: of a contact that opens as it pulls, of friction."""
+    if K.n_frictions > 0:
+        return True
+    count = 0
+    for c in range(K.n_contacts):
+        if K.closed[c] == 1 and K.kind[c] == 0 and K.opens[c] == 0:
+            count += 1
+    return count > 0
+
+
+def look_at(K: Any, t: float, h: float, s: float, asked: bool) -> None:
+    """Guards (and multipliers) of the interpolant at the part s of the step, in place of those of the candidate."""
+    place = 2 * K.n_watched + 2 * K.n_rows
+    o_y = place + K.n_q
+    u = s * s
+    fill_block(K, t, K.q, K.y)
+    for i in range(K.n):
+        y0 = K.y[i]
+        y1 = K.inside[o_y + i]
+        d0 = h * K.rate[i]
+        d1 = h * K.inside[o_y + K.n + i]
+        gap = 0.0  # of the position at the end, which the integral of the cubic misses
+        if i < K.n_v:
+            whole = 0.5 * (y0 + y1) + (d0 - d1) / 12.0
+            if K.vector == 1:
+                gap = K.inside[place + i] - K.q[i] - h * whole
+            x = y0 * (s + u * s * (0.5 * s - 1.0)) + y1 * u * s * (1.0 - 0.5 * s)
+            x += d0 * u * (0.5 + s * (0.25 * s - 2.0 / 3.0)) + d1 * u * s * (0.25 * s - 1.0 / 3.0)
+            K.block[K.o_x + i] = h * x + gap * u * s * (10.0 + s * (6.0 * s - 15.0))
+        K.y1[i] = y0 + (y1 - y0) * u * (3.0 - 2.0 * s) + d0 * s * (1.0 - s) * (1.0 - s) - d1 * u * (1.0 - s)
+        K.y1[i] += gap / h * 30.0 * u * (1.0 - s) * (1.0 - s)
+        slope = 6.0 * (y1 - y0) * s * (1.0 - s) + d0 * (1.0 - s) * (1.0 - 3.0 * s) + d1 * s * (3.0 * s - 2.0)
+        K.rate1[i] = (slope + 60.0 * gap / h * s * (1.0 - s) * (1.0 - 2.0 * s)) / h
+    compose(K, K.q1)
+    if asked and consistent(K, t + s * h, K.q1, K.y1) == 0:
+        for i in range(K.n):
+            K.rate1[i] = K.jump[i]
+        for k in range(K.n_rows):
+            K.lam1[k] = K.impulse[k]
+    watch(K, t + s * h, K.q1, K.y1, K.rate1, K.lam1, K.guards1)
+
+
+def rearms(K: Any) -> bool:
+    """Whether a contact or a guard of the user would be ready to fire, or no longer, after the place just looked at."""
+    for c in range(K.n_contacts):
+        if K.closed[c] == 1:
+            continue
+        gap = K.guards1[c]
+        if K.armed[c] == 2:
+            changes = gap > gap_tolerance(K, c)
+        else:
+            changes = is_watched(K, c, K.guards1) != (K.armed[c] != -1)
+            changes = changes or (K.armed[c] == 0 and gap > 1e-8 * gap_scale(K, c))
+        if changes:
+            return True
+    for e in range(K.n_guards):
+        back = -K.direction[e]
+        if back * K.side[e] < 0.0 and back * K.guards1[4 * K.n_contacts + e] > 0.0:
+            return True
+    return False

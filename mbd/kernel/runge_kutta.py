@@ -1,0 +1,292 @@
+"""One explicit Runge–Kutta step of order 8 with its embedded error estimate (Dormand & Prince 1980, in the form of
+Hairer, Nørsett & Wanner 1993, II.5; coefficients in `mbd.integrators.dormand_prince`).
+
+    x_i = h Σ_j a_ij v_j,   y_i = y₀ + h Σ_j a_ij rate_j,   rate_i = rate(t₀ + c_i h, q₀ + x_i, y_i)
+
+with accelerations that satisfy the balance and the rows at acceleration level. Positions and velocities at the end are
+projected onto the rows in the metric of M, whose rates and multipliers are the consistent ones of that state. Positions
+must form a vector space (q ⊕ x = q + x).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mbd.kernel.fields import (
+    AUX_STEP,
+    EPS,
+    NEAR,
+    NOT_CONVERGED,
+    NOT_FINITE,
+    NOW,
+    RESIDUALS,
+    ROWS,
+    SINGULAR,
+)
+from mbd.kernel.linear import factor, solve
+from mbd.kernel.restart import consistent, evaluate, fill_block, raise_scales, refresh_scales
+
+__all__ = ["runge_kutta_accept", "runge_kutta_start", "runge_kutta_step"]
+
+EXPLICIT_STAGES = 12
+"""Stages of a step, the end not counted."""
+MOST_RETURNS = 8
+"""Newton corrections of positions onto the rows after a step; it takes one or two [-]."""
+
+
+def runge_kutta_start(K: Any) -> int:
+    """Sizes of forces and rows at the consistent state; the scheme remembers nothing but its rates."""
+    for i in range(K.n):
+        K.slope[i] = 0.0
+        K.aux[i] = K.rate[i]
+        K.shift[i] = 0.0
+        K.shift_change[i] = 0.0
+    for k in range(K.n_rows):
+        K.lam_slope[k] = 0.0
+    K.clock[AUX_STEP] = K.dt
+    K.state[NEAR] = 0
+    fill_block(K, K.clock[NOW], K.q, K.y)
+    refresh_scales(K)
+    return 0
+
+
+def runge_kutta_step(K: Any, h: float, t1: float) -> int:
+    """Candidate state (q1, y1, rate1, lam1) and K.error after a step of size h; the accepted state is untouched."""
+    n = K.n
+    n_v = K.n_v
+    width = n_v + n
+    at_end = EXPLICIT_STAGES * EXPLICIT_STAGES
+    at_nodes = at_end + EXPLICIT_STAGES
+    K.detail[0] = t1
+    K.detail[1] = 0.0
+    K.detail[2] = h
+    for i in range(n):
+        K.stages[n_v + i] = K.rate[i]
+        if i < n_v:
+            K.stages[i] = K.y[i]
+    for s in range(1, EXPLICIT_STAGES):
+        explicit_move(K, h, s * EXPLICIT_STAGES, s)
+        status = explicit_rates(K, K.clock[NOW] + K.tableau[at_nodes + s] * h)
+        if status != 0:
+            return status
+        for i in range(n):
+            K.stages[s * width + n_v + i] = K.jump[i]
+            if i < n_v:
+                K.stages[s * width + i] = K.y1[i]
+    explicit_move(K, h, at_end, EXPLICIT_STAGES)
+    if K.state[ROWS] > 0:
+        status = return_to_rows(K, t1)
+        if status != 0:
+            return status
+    if K.state[ROWS] == 0 and K.n_frictions == 0:
+        status = explicit_rates(K, t1)
+        for k in range(K.n_rows):
+            K.impulse[k] = 0.0
+    else:
+        status = consistent(K, t1, K.q1, K.y1)
+    if status != 0:
+        return status
+    for i in range(n):
+        K.rate1[i] = K.jump[i]
+        K.aux1[i] = K.jump[i]
+        K.block[K.o_a + i] = K.jump[i]
+        K.stages[EXPLICIT_STAGES * width + n_v + i] = K.jump[i]
+        if i < n_v:
+            K.stages[EXPLICIT_STAGES * width + i] = K.y1[i]
+    for k in range(K.n_rows):
+        K.lam1[k] = K.impulse[k]
+        K.block[K.o_lam + k] = K.impulse[k]
+    explicit_error(K, h)
+    for i in range(n_v):  # an angle that is wrong by half a radian is not resolved at all
+        if K.unit[i] == 1 and not abs(K.error[i]) <= 0.5:
+            K.detail[1] = -1.0
+            return NOT_CONVERGED
+    return 0
+
+
+def explicit_move(K: Any, h: float, weights: int, count: int) -> None:
+    """(q1, y1) moved from the accepted state by h times the weighted slopes of the first stages."""
+    n_v = K.n_v
+    width = n_v + K.n
+    for i in range(width):
+        K.spare[i] = 0.0
+    for j in range(count):
+        weight = h * K.tableau[weights + j]
+        if weight != 0.0:
+            for i in range(width):
+                K.spare[i] += weight * K.stages[j * width + i]
+    for i in range(n_v):
+        K.q1[i] = K.q[i] + K.spare[i]
+    for i in range(K.n):
+        K.y1[i] = K.y[i] + K.spare[n_v + i]
+
+
+def explicit_rates(K: Any, t: float) -> int:
+    """Rates at (q1, y1), in K.jump; where friction follows multipliers by the iteration of `consistent`."""
+    n = K.n
+    m = K.state[ROWS]
+    if K.loaded == 1 and K.n_frictions > 0:
+        return consistent(K, t, K.q1, K.y1)
+    evaluate(K, t, K.q1, K.y1)
+    K.counts[RESIDUALS] += 1
+    finite = 0.0
+    for i in range(n):
+        finite += abs(K.acc[n * n + i])
+    if not finite < 1e300:
+        return NOT_FINITE
+    if m == 0:
+        for i in range(n):
+            K.jump[i] = -K.acc[n * n + i]
+        if solve_mass(K.acc, n, K.jump):
+            return 0
+        return consistent(K, t, K.q1, K.y1)
+    o_bias = n * n + n + 2 * n * K.n_rows + 2 * K.n_rows
+    if not factor_saddle(K, m, False):
+        return SINGULAR
+    for i in range(n):
+        K.rhs[i] = -K.acc[n * n + i]
+    for k in range(m):
+        K.rhs[n + k] = -K.acc[o_bias + K.rows[k]]
+    solve(K.kkt, n + m, K.pivots, K.rhs)
+    for i in range(n):
+        K.jump[i] = K.rhs[i]
+    return 0
+
+
+def solve_mass(M: Any, n: int, b: Any) -> bool:
+    """b ← M⁻¹ b by M = L D Lᵀ, in the lower half of M; false where M is not clearly positive definite."""
+    for k in range(n):
+        pivot = M[k * n + k]
+        size = abs(pivot)
+        for j in range(k):
+            pivot -= M[k * n + j] * M[k * n + j] * M[j * n + j]
+        if not pivot > 1e-12 * size:
+            return False
+        M[k * n + k] = pivot
+        inverse = 1.0 / pivot
+        for i in range(k + 1, n):
+            entry = M[i * n + k]
+            for j in range(k):
+                entry -= M[i * n + j] * M[k * n + j] * M[j * n + j]
+            M[i * n + k] = entry * inverse
+    for i in range(n):
+        for j in range(i):
+            b[i] -= M[i * n + j] * b[j]
+    for i in range(n):
+        b[i] /= M[i * n + i]
+    for c in range(n):
+        i = n - 1 - c
+        for j in range(i + 1, n):
+            b[i] -= M[j * n + i] * b[j]
+    return True
+
+
+def factor_saddle(K: Any, m: int, symmetric: bool) -> bool:
+    """LU factors in K.kkt of [M R; B 0] from K.acc, or of [M Bᵀ; B 0]; false where a pivot is missing."""
+    n = K.n
+    size = n + m
+    o_R = n * n + n
+    o_B = o_R + n * K.n_rows
+    for i in range(n):
+        for j in range(n):
+            K.kkt[i * size + j] = K.acc[i * n + j]
+    for k in range(m):
+        row = K.rows[k]
+        for i in range(n):
+            entry = K.acc[o_B + row * n + i]
+            K.kkt[(n + k) * size + i] = entry
+            K.kkt[i * size + n + k] = entry if symmetric else K.acc[o_R + i * K.n_rows + row]
+        for j in range(m):
+            K.kkt[(n + k) * size + n + j] = 0.0
+    return bool(factor(K.kkt, size, K.pivots) == 0)
+
+
+def return_to_rows(K: Any, t1: float) -> int:
+    """The nearest positions with h = 0 and velocities with ḣ = 0, in the metric of M, in place of (q1, y1)."""
+    n = K.n
+    m = K.state[ROWS]
+    o_h = n * n + n + 2 * n * K.n_rows
+    before = 1e300
+    size = 0.0
+    for _ in range(MOST_RETURNS):
+        evaluate(K, t1, K.q1, K.y1)
+        K.counts[RESIDUALS] += 1
+        size = 0.0
+        for i in range(n):
+            K.rhs[i] = 0.0
+        for k in range(m):
+            row = K.rows[k]
+            h = 0.0 if K.row_level[row] == 1 else K.acc[o_h + row]
+            K.rhs[n + k] = -h
+            if not abs(h) < 1e300:
+                return NOT_FINITE
+            size = max(size, abs(h) / (16.0 * EPS * K.scale[n + row]))
+        if not factor_saddle(K, m, True):
+            return SINGULAR
+        if size <= 1.0 or size >= before:
+            break
+        before = size
+        solve(K.kkt, n + m, K.pivots, K.rhs)
+        for i in range(K.n_v):
+            K.q1[i] += K.rhs[i]
+    if size > 1e3:  # coordinates may have grown since their sizes were noted
+        raise_scales(K, True)
+        size = 0.0
+        for k in range(m):
+            size = max(size, abs(K.rhs[n + k]) / (16.0 * EPS * K.scale[n + K.rows[k]]))
+    if size > 1e3:
+        K.detail[1] = size
+        return NOT_CONVERGED
+    for i in range(n):
+        K.rhs[i] = 0.0
+    for k in range(m):
+        K.rhs[n + k] = -K.acc[o_h + K.n_rows + K.rows[k]]
+    solve(K.kkt, n + m, K.pivots, K.rhs)
+    for i in range(n):
+        K.y1[i] += K.rhs[i]
+    return 0
+
+
+def explicit_error(K: Any, h: float) -> None:
+    """K.error: local error by the embedded formulas, ``h e₅ · |e₅| / √(|e₅|² + |e₃|²/100)`` (Hairer et al., II.10).
+
+    The sizes |e| are the largest over positions and h times velocities; first-order states have sizes of their own.
+    """
+    n_v = K.n_v
+    width = n_v + K.n
+    fifth = EXPLICIT_STAGES * EXPLICIT_STAGES + 2 * EXPLICIT_STAGES
+    third = fifth + EXPLICIT_STAGES + 1
+    five = 0.0
+    three = 0.0
+    for i in range(width):
+        e5 = 0.0
+        e3 = 0.0
+        for j in range(EXPLICIT_STAGES + 1):
+            slope = K.stages[j * width + i]
+            e5 += K.tableau[fifth + j] * slope
+            e3 += K.tableau[third + j] * slope
+        K.error[i] = h * e5
+        if i >= 2 * n_v:
+            size = (e5 * e5 + 0.01 * e3 * e3) ** 0.5
+            K.error[i] *= abs(e5) / size if size > 0.0 else 0.0
+            continue
+        weight = 1.0 if i < n_v else h
+        five = max(five, weight * abs(e5))
+        three = max(three, weight * abs(e3))
+    size = (five * five + 0.01 * three * three) ** 0.5
+    share = five / size if size > 0.0 else 0.0
+    for i in range(2 * n_v):
+        K.error[i] *= share
+
+
+def runge_kutta_accept(K: Any, h: float) -> None:
+    """The candidate becomes the accepted state."""
+    for i in range(K.n_q):
+        K.q[i] = K.q1[i]
+    for i in range(K.n):
+        K.y[i] = K.y1[i]
+        K.rate[i] = K.rate1[i]
+        K.aux[i] = K.rate1[i]
+    for k in range(K.n_rows):
+        K.lam[k] = K.lam1[k]
+    K.clock[AUX_STEP] = h

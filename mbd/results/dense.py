@@ -1,0 +1,124 @@
+"""States between the rows of a run by explicit Runge–Kutta steps, as accurate as the steps themselves.
+
+A step from the row before ends at the time that is asked for, all times side by side. Accelerations and multipliers are
+the consistent ones there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from mbd.arrays import Matrix, Vector
+from mbd.compile.python import ArrayFunction, array_function
+from mbd.equations import programs
+from mbd.equations.equations import Equations
+from mbd.integrators.dormand_prince import END, NODES, STAGES, WEIGHTS
+from mbd.results.record import Rows
+from mbd.tape.node import Tape
+
+if TYPE_CHECKING:
+    from mbd.results.columns import ModelColumns
+    from mbd.results.interpolation import Places
+
+__all__ = ["Restepping"]
+
+
+class Restepping:
+    """States between the rows of a run of `RungeKutta853` that stored every step."""
+
+    def __init__(self, columns: ModelColumns) -> None:
+        self.columns, self.equations = columns, columns.equations
+        self.terms = _terms(self.equations)
+
+    @staticmethod
+    def serves(columns: ModelColumns) -> bool:
+        """Whether the steps of this run can be taken again: all stored, in one mode each, with no dry friction."""
+        settings, equations = columns.record.settings, columns.equations
+        stepped = settings.get("between") == "stages" and settings.get("store") == 1
+        return stepped and equations.compose is None and not equations.frictions
+
+    def at(self, rows: Rows, places: Places) -> Rows:
+        """The states at places; those that meet a row are that row."""
+        inside = places.step > 0.0
+        found = rows.part(places.lower)  # type: ignore[arg-type]
+        if not inside.any():
+            return found
+        begin, time = found.part(inside), places.time[inside]
+        q, v, z = self._parts(self._stepped(begin, (time - begin.time)[:, None]))
+        rate, lam = self._rates(replace(begin, time=time, q=q, v=v, z=z))
+        changed: dict[str, Any] = {"time": time, "q": q, "v": v, "z": z, "lam": lam}
+        changed["a"], changed["s"] = np.split(rate, [self.equations.n_v], axis=1)
+        there: dict[str, Any] = {name: _put(getattr(found, name), inside, new) for name, new in changed.items()}
+        return replace(found, **there)
+
+    def _stepped(self, begin: Rows, h: Matrix) -> Matrix:
+        """(q, v, z) after a step of h (k, 1) from each of the rows."""
+        base = np.hstack([begin.q, begin.v, begin.z])
+        slopes = np.zeros((STAGES, *base.shape))
+        slopes[0] = np.hstack([begin.v, begin.a, begin.s])
+        for stage in range(1, STAGES):
+            q, v, z = self._parts(base + h * np.tensordot(WEIGHTS[stage, :stage], slopes[:stage], 1))
+            rate, _ = self._rates(replace(begin, time=begin.time + NODES[stage] * h[:, 0], q=q, v=v, z=z))
+            slopes[stage] = np.hstack([v, rate])
+        return np.asarray(base + h * np.tensordot(END, slopes, 1))
+
+    def _parts(self, state: Matrix) -> tuple[Matrix, Matrix, Matrix]:
+        n_q, n_v = self.equations.n_q, self.equations.n_v
+        return state[:, :n_q], state[:, n_q : n_q + n_v], state[:, n_q + n_v :]
+
+    def _rates(self, rows: Rows) -> tuple[Matrix, Matrix]:
+        """Consistent (v̇, ż) and multipliers at each row, which may have other contacts closed."""
+        n, m, count = self.equations.n_v + self.equations.n_z, len(self.equations.rows), len(rows)
+        inputs, parameters = self.columns.inputs(rows), self.columns.record.parameters_at(rows.source)
+        flat = np.array(self.terms(inputs, parameters)).T
+        cuts = np.cumsum([n * n, n, n * m, m * n, m, m, m])
+        M, f, R, B, _, _, bias, _ = np.split(flat, cuts, axis=1)
+        M, R, B = M.reshape(count, n, n), R.reshape(count, n, m), B.reshape(count, m, n)
+        rate, lam = np.zeros((count, n)), np.zeros((count, m))
+        patterns, group = np.unique(rows.closed, axis=0, return_inverse=True)
+        for number, closed in enumerate(patterns):
+            mine = np.flatnonzero(group.ravel() == number)
+            held = [k for k, row in enumerate(self.equations.rows) if row.contact < 0 or closed[row.contact]]
+            size = n + len(held)
+            matrix = np.zeros((len(mine), size, size))
+            matrix[:, :n, :n] = M[mine]
+            matrix[:, :n, n:] = R[mine][:, :, held]
+            matrix[:, n:, :n] = B[mine][:, held]
+            solved = _solved(matrix, -np.hstack([f[mine], bias[mine][:, held]]))
+            rate[mine] = solved[:, :n]
+            lam[np.ix_(mine, np.array(held, dtype=np.intp))] = solved[:, n:]
+        return rate, lam
+
+
+def _terms(equations: Equations) -> ArrayFunction:
+    """M, f, R, B, h, ḣ, bias and the rest of `programs.accelerations` at many states, made once for these equations."""
+    if equations.tape not in _KNOWN:
+        with equations.tape.lock:
+            _KNOWN[equations.tape] = array_function(programs.accelerations(equations))
+    return _KNOWN[equations.tape]
+
+
+_KNOWN: WeakKeyDictionary[Tape, ArrayFunction] = WeakKeyDictionary()
+
+
+def _solved(matrix: Any, right: Matrix) -> Matrix:
+    """A x = b for each; of rows that depend on each other the multipliers of least norm."""
+    try:
+        found = np.linalg.solve(matrix, right[:, :, None])[:, :, 0]
+        left = np.max(np.abs(np.einsum("kij,kj->ki", matrix, found) - right), axis=1)
+        if np.all(left <= 1e-9 * (1.0 + np.max(np.abs(right), axis=1))):
+            return np.asarray(found)
+    except np.linalg.LinAlgError:
+        pass
+    return np.asarray(np.einsum("kij,kj->ki", np.linalg.pinv(matrix, rcond=1e-11), right))
+
+
+def _put(values: Matrix, where: Any, new: Matrix | Vector) -> Matrix:
+    """The values with some replaced."""
+    changed = values.copy()
+    changed[where] = new
+    return changed

@@ -1,0 +1,153 @@
+"""The explicit scheme of order 8: its coefficients, its order with and without rows, values between its steps."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import mbd
+from mbd.compile.mechanisms import mechanism_of
+from mbd.integrators.dormand_prince import END, FIFTH, NODES, STAGES, THIRD, WEIGHTS
+from mbd.integrators.runge_kutta import RungeKutta853
+from mbd.results.interpolation import Grid, quintic
+from mbd.simulation.capabilities import refusals
+from tests.integrators.test_order import double_pendulum
+from tests.simulation.mechanisms import ball, kneed_walker, kneed_walker_start, pendulum, run
+
+SCHEME = mbd.RungeKutta853()
+T = 1.0
+"""Length of every run [s]."""
+FINEST = 224
+
+
+def forced():
+    """A double pendulum driven by a motor in its lower joint, with friction in the upper."""
+    model = mbd.Model("driven")
+    rods = [mbd.Link(name, mass=1.0, length=1.0, center=0.5, inertia=0.1) for name in ("upper", "lower")]
+    model.connect(
+        mbd.Revolute("u", model.ground.origin, rods[0].start, loss=mbd.Viscous(0.5)),
+        mbd.Revolute("w", rods[0].end, rods[1].start),
+    )
+    model.apply(mbd.Motor("motor", model.joints[1], torque=lambda t: 2.0 * mbd.sin(2.0 * t)))
+    return model
+
+
+SCENES = {
+    "double pendulum": (double_pendulum, {"u.angle": 1.0, "w.angle": 0.5}, {"u.angle": 1.0, "w.angle": -2.0}),
+    "driven and damped": (forced, {"u.angle": 1.0, "w.angle": 0.5}, {"u.angle": 1.0, "w.angle": -1.0}),
+    "with rows": (
+        lambda: double_pendulum("all"), {"upper floating.angle": 1.0, "lower floating.angle": 1.5},
+        {"upper floating.angle": 1.0, "lower floating.angle": -1.0},
+    ),
+}  # fmt: skip
+
+
+@functools.cache
+def started(scene):
+    make, position, velocity = SCENES[scene]
+    model = make()
+    return model, mbd.assemble(model, position, velocity)
+
+
+@functools.cache
+def fixed(scene, steps):
+    model, start = started(scene)
+    return mbd.simulate(model, start, SCHEME, dt=T / steps, until=T)
+
+
+def test_the_formulas_meet_the_conditions_that_are_linear_in_the_nodes():
+    np.testing.assert_allclose(WEIGHTS.sum(axis=1), NODES, rtol=0, atol=1e-13)
+    for power in range(8):  # quadrature of order 8
+        assert END @ NODES**power == pytest.approx(1.0 / (power + 1), abs=1e-14)
+    nodes = np.append(NODES, 1.0)
+    for weights, order in ((FIFTH, 5), (THIRD, 3)):
+        sums = [weights @ nodes**power for power in range(order)]
+        assert np.max(np.abs(sums)) < 1e-13 and len(weights) == STAGES + 1
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_the_order_is_8_in_positions_rates_accelerations_and_multipliers(scene):
+    exact = fixed(scene, FINEST).record
+    for part in ("q", "v", "a", "lam"):
+        errors = []
+        for steps in (28, 56):
+            record, every = fixed(scene, steps).record, FINEST // steps
+            errors.append(np.max(np.abs(getattr(record, part) - getattr(exact, part)[::every]), initial=0.0))
+        if getattr(exact, part).size:
+            assert np.log2(errors[0] / errors[1]) == pytest.approx(8.0, abs=0.15 if part == "q" else 0.3), (
+                part,
+                errors,
+            )
+
+
+def test_rows_hold_to_round_off_on_both_levels():
+    violation = fixed("with rows", 28).violation
+    assert max(violation.length, violation.angle) < 1e-14 and violation.rate < 1e-13
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_between_its_rows_a_run_is_as_accurate_as_at_them(scene):
+    exact, coarse = fixed(scene, FINEST), fixed(scene, 28)
+    names = [coordinate.name for coordinate in exact.record.equations.coordinates]
+    for name in (*names, names[0] + ".rate"):
+        error = np.abs(coarse.at(exact.time)[name] - exact[name])
+        assert np.max(error) < 2.0 * np.max(error[:: FINEST // 28]) + 1e-13
+
+
+def test_a_file_knows_the_rows_only(tmp_path):
+    coarse = fixed("double pendulum", 28)
+    loaded = mbd.load(coarse.save(tmp_path / "run"))
+    away = np.abs(loaded.at(0.5 * T / 28)["u.angle"] - coarse.at(0.5 * T / 28)["u.angle"])
+    assert 1e-9 < away < 1e-4  # cubic polynomials
+    np.testing.assert_array_equal(loaded["u.angle"], coarse["u.angle"])
+
+
+# events -------------------------------------------------------------------------------------------------------------
+def test_impacts_of_a_ball_are_located_to_round_off_by_steps_longer_than_its_flights():
+    bouncing = run(ball(restitution=0.5), {"fall.displacement": 1.0}, integrator=SCHEME, dt=0.9, until=1.3)
+    first = np.sqrt(2.0 / 9.81)
+    instants = first * np.array([1.0, 2.0, 2.5, 2.75])
+    np.testing.assert_allclose([event.time for event in bouncing.events[:4]], instants, rtol=0, atol=1e-14)
+
+
+def test_a_step_over_a_whole_arc_sees_a_wall_within_it():
+    """A pendulum that swings out and back in one step, with a stop beyond the half of its swing."""
+    model = pendulum()
+    model.constrain(mbd.Event("turn", mbd.extension(model.joints[0], offset=0.25)))
+    start = mbd.assemble(model, {"hinge.angle": 0.0}, {"hinge.angle": 1.2})
+    coarse, fine = (mbd.simulate(model, start, SCHEME, dt=dt, until=1.2) for dt in (0.6, 0.01))
+    assert len(coarse.events) == len(fine.events) > 0
+    np.testing.assert_allclose([e.time for e in coarse.events], [e.time for e in fine.events], atol=2e-4)
+
+
+def test_a_walker_strikes_and_locks_at_the_same_instants_with_steps_of_a_twentieth():
+    walker = kneed_walker()
+    start = kneed_walker_start(walker)
+    coarse, fine = (mbd.simulate(walker, start, SCHEME, dt=dt, until=1.0) for dt in (0.05, 0.005))
+    assert [(e.name, e.kind) for e in coarse.events] == [(e.name, e.kind) for e in fine.events]
+    np.testing.assert_allclose([e.time for e in coarse.events], [e.time for e in fine.events], rtol=0, atol=1e-8)
+    assert len(coarse.events) == 5
+
+
+def test_coordinates_that_do_not_add_are_refused():
+    model, _ = started("double pendulum")
+    equations = mechanism_of(model).equations
+    turned = replace(equations, compose=[equations.tape.input("q", 0)])
+    assert not refusals(equations, SCHEME, {})
+    assert any("q + x" in text and "mbd.HHT" in text for text in refusals(turned, SCHEME, {}))
+
+
+def test_long_steps_are_looked_at_on_a_quintic():
+    """Exact for the motion of degree 5 that meets both ends."""
+    motion = np.polynomial.Polynomial(np.random.default_rng(3).normal(size=6))
+    rows = [part(np.array([0.0, 0.4, 1.0]))[:, None] for part in (motion, motion.deriv(), motion.deriv(2))]
+    instants = np.linspace(0.0, 1.0, 31)
+    found = quintic(Grid(np.array([0.0, 0.4, 1.0])).places(instants), *rows)
+    np.testing.assert_allclose(found[:, 0], motion(instants), rtol=0, atol=1e-14)
+
+
+def test_it_is_a_value():
+    assert RungeKutta853() == mbd.RungeKutta853() and repr(SCHEME) == "RungeKutta853()" and SCHEME.order() == 8
