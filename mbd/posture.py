@@ -100,11 +100,11 @@ def close_positions(work: Posture, rows: Sequence[int], free: Matrix) -> Vector:
         return np.zeros(0)
     start = work.q.copy()
     misfit = _newton(work, rows, free, start)
+    if np.max(np.abs(misfit)) <= TOLERANCE:
+        return misfit
     first, angles = work.q, np.array([c.unit == "rad" for c in work.equations.coordinates])
     turns = np.random.default_rng(0).uniform(-1.5, 1.5, (RESTARTS, len(start)))
     for turn in turns if work.mechanism.vector and bool((free & angles).any()) else ():
-        if np.max(np.abs(misfit)) <= TOLERANCE:
-            return misfit
         work.q = start + np.where(free & angles, turn, 0.0)
         again = _newton(work, rows, free, start)
         if np.max(np.abs(again)) <= TOLERANCE:

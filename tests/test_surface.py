@@ -14,7 +14,7 @@ import mbd
 
 NAMES = [name for name in mbd.__all__ if name != "__version__"]
 
-HEAVY = ("sympy", "numba", "llvmlite", "scipy.integrate", "matplotlib", "networkx", "pandas", "xarray")
+HEAVY = ("sympy", "llvmlite", "scipy.integrate", "matplotlib", "networkx", "pandas", "xarray")
 
 
 def loaded(program: str) -> set[str]:
@@ -41,6 +41,19 @@ model.connect(mbd.Revolute("pivot", model.ground.origin, rod.start, loss=mbd.Vis
 mbd.HHT(alpha=0.05)
 """
     assert loaded(program).isdisjoint(set(HEAVY))
+
+
+def test_a_run_loads_only_what_it_needs():
+    program = """
+import mbd
+from tests.simulation.mechanisms import kneed_walker, kneed_walker_start
+walker = kneed_walker()
+mbd.simulate(walker, kneed_walker_start(walker), mbd.HHT(alpha=0.05), dt=1e-3, until=2e-3)
+"""
+    needless = {*HEAVY} - {"llvmlite"} | {
+        "scipy", "numpy.random", "importlib.metadata", "mbd.kernel.translate", "mbd.simulation.replay",
+    }  # fmt: skip
+    assert loaded(program).isdisjoint(needless)
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -23,6 +23,7 @@ class Function(Protocol):
 
     address : of its machine code, 0 if it is plain Python
     size : number of outputs
+    provisional : whether faster machine code with the same results is being made and will change the address
     """
 
     @property
@@ -31,6 +32,8 @@ class Function(Protocol):
     def address(self) -> int: ...
     @property
     def size(self) -> int: ...
+    @property
+    def provisional(self) -> bool: ...
     def __call__(self, block: Vector, parameters: Vector, out: Vector) -> None: ...
 
 
@@ -78,7 +81,8 @@ def backend(kind: str = "auto", level: int | None = None, cache: ObjectCache | N
 
     Parameters
     ----------
-    level : optimization level of the machine code, see `mbd.compile.llvm`
+    level : optimization level of the machine code, see `mbd.compile.llvm`; by default 2, for which large programs do
+        not wait
     cache : where object files are kept; that of the user by default
     """
     if kind == "python":
@@ -95,5 +99,5 @@ def backend(kind: str = "auto", level: int | None = None, cache: ObjectCache | N
         if kind == "llvm":
             raise CapabilityError(f"llvmlite is installed but does not load ({error}); use backend 'python'") from error
         return Backend("python", f"llvmlite is installed but does not load ({error}): plain Python runs instead")
-    chosen = llvm.LEVEL if level is None else level
-    return Backend("llvm", "", lambda layout: llvm.Library(layout, chosen, cache))
+    chosen, hasty = (llvm.LEVEL, llvm.HASTY) if level is None else (level, None)
+    return Backend("llvm", "", lambda layout: llvm.Library(layout, chosen, cache, hasty))

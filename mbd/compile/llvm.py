@@ -16,6 +16,10 @@ Level 0 cuts every function into parts of 120 operations, small enough for the a
 Level 1 takes 8 % less than level 2 for code 2 % slower. Neither runs passes over the IR, where the tape has left
 nothing to fold: they took 5 to 40 ms and gained nothing. Level 3 does, for the sake of the vectorization of
 straight-line code: slow to make, worth it for long runs. All levels give the same bits.
+
+Large programs do not wait for level 2 (`HASTY`): they run at level 0 at once, and the object files of level 2 are made
+in pieces beside the run (`background`). A function tells by `provisional` that it has not yet got its final address. As
+all levels give the same bits, it does not matter to any result when that happens.
 """
 
 from __future__ import annotations
@@ -25,6 +29,7 @@ import re
 import sys
 import threading
 import time
+import weakref
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -34,20 +39,25 @@ import llvmlite.binding as llvm
 import numpy as np
 
 from mbd.arrays import Vector
+from mbd.compile.background import submit, wake
 from mbd.compile.cache import ObjectCache, default_cache, key_of
 from mbd.compile.functions import ByName
 from mbd.compile.ir import LIBRARY, module
 from mbd.compile.layout import Layout
+from mbd.compile.pieces import pieces
 from mbd.errors import CapabilityError, ModelError
 from mbd.tape.node import Node
 
 __all__ = [
-    "LEVEL", "Build", "Host", "Library", "Machine", "MachineFunction", "cached_object", "call", "compile_functions",
-    "emit_object", "host", "load_object",
+    "HASTY", "LEVEL", "Build", "Host", "Library", "Machine", "MachineFunction", "cached_object", "call",
+    "compile_functions", "emit_object", "host", "load_object",
 ]  # fmt: skip
 
 LEVEL = 2
 """Default optimization level, see above."""
+
+HASTY = 4500
+"""Lines of IR above which level 2 takes over 0.1 s, so that it is made in the background: some 2000 operations."""
 
 CUTS = {0: {"large": 150, "part": 120}}
 """Cuts of functions into parts that differ from those of `ir`, by level."""
@@ -123,13 +133,18 @@ def cached_object(tag: str, make: Callable[[], bytes], cache: ObjectCache | None
 
     The tag must say everything that the object depends on, besides processor and LLVM version.
     """
-    this, store = host(), default_cache() if cache is None else cache
-    key = key_of(tag, this.triple, this.cpu, this.features, this.llvm)
+    store = default_cache() if cache is None else cache
+    key = _key(tag)
     code = store.load(key)
     if code is None:
         code = make()
         store.store(key, code)
     return code
+
+
+def _key(tag: str) -> str:
+    this = host()
+    return key_of(tag, this.triple, this.cpu, this.features, this.llvm)
 
 
 _FLOAT = np.dtype(np.float64)
@@ -167,13 +182,14 @@ class Machine:
         self._lock = threading.Lock()
         self._engine: llvm.ExecutionEngine | None = None
 
-    def load(self, code: bytes, symbols: Sequence[str]) -> list[int]:
-        """The addresses of some functions of an object file, which must not bring a symbol that is here already."""
+    def load(self, code: bytes, symbols: Sequence[str], *more: bytes) -> list[int]:
+        """The addresses of some functions of object files, which must not bring a symbol that is here already."""
         with self._lock:
             if self._engine is None:
                 _announce_library()
                 self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _target_machine(0))
-            self._engine.add_object_file(llvm.ObjectFileRef.from_data(code))
+            for file in (code, *more):
+                self._engine.add_object_file(llvm.ObjectFileRef.from_data(file))
             self._engine.finalize_object()
             return [self._engine.get_function_address(symbol) for symbol in symbols]
 
@@ -189,11 +205,30 @@ def load_object(code: bytes, symbol: str) -> int:
 
 
 class MachineFunction:
-    """One compiled function: its address, and a call on arrays that checks their sizes."""
+    """One compiled function: its address, and a call on arrays that checks their sizes.
 
-    def __init__(self, name: str, address: int, sizes: tuple[int, int, int], library: Library) -> None:
+    A provisional one will get another address, of faster code with the same results; the present one stays valid too.
+    """
+
+    def __init__(
+        self, name: str, address: int, sizes: tuple[int, int, int], library: Library, provisional: bool = False
+    ) -> None:
         self.name, self.address, self.size = name, address, sizes[2]
         self._sizes, self._library, self._run = sizes, library, call(address)
+        self._provisional = provisional
+
+    @property
+    def provisional(self) -> bool:
+        """Whether a better version is being made."""
+        if self._provisional:
+            wake()
+        return self._provisional
+
+    def settle(self, address: int | None) -> None:
+        """From now on this is the function, or stays what it is."""
+        if address is not None:
+            self._run, self.address = call(address), address
+        self._provisional = False
 
     def __call__(self, block: Vector, parameters: Vector, out: Vector) -> None:
         sizes = self._sizes
@@ -205,17 +240,24 @@ class MachineFunction:
 
 @dataclass(frozen=True)
 class Build:
-    """How some functions came to be: from the cache or not, and the seconds it took."""
+    """How some functions came to be: from the cache or not, the seconds it took, and at which level they began."""
 
     names: tuple[str, ...]
     cached: bool
     text: float
     code: float
     load: float
+    level: int = LEVEL
 
 
 class Library(ByName[MachineFunction]):
     """Machine code of functions with one layout, in memory; functions may be added at any time.
+
+    Parameters
+    ----------
+    level : optimization level
+    cache : where object files are kept; that of the user by default
+    hasty : lines of IR above which functions run at level 0 until those of `level` are there; None to wait always
 
     >>> from mbd.tape.node import Tape
     >>> library = Library(Layout(0, 0, 0, 0, 0, 0, 0), cache=ObjectCache())
@@ -226,12 +268,16 @@ class Library(ByName[MachineFunction]):
     (6.0, True)
     """
 
-    def __init__(self, layout: Layout, level: int = LEVEL, cache: ObjectCache | None = None) -> None:
+    def __init__(
+        self, layout: Layout, level: int = LEVEL, cache: ObjectCache | None = None, hasty: int | None = None
+    ) -> None:
         super().__init__("compiled function")
-        self.layout, self.level = layout, level
+        self.layout, self.level, self.hasty = layout, level, hasty
         self.builds: list[Build] = []
+        self.notes: list[str] = []
         self._cache = default_cache() if cache is None else cache
         self._machine = Machine()
+        self._later: list[Machine] = []
 
     def add(self, programs: Mapping[str, Sequence[Node]]) -> None:
         """Compile, or fetch from the cache, one function per name and list of outputs."""
@@ -243,24 +289,71 @@ class Library(ByName[MachineFunction]):
         begin = time.perf_counter()
         text = module(programs, self.layout, host().fused, **CUTS.get(self.level, {}))
         written = time.perf_counter()
-        cached = True
-
-        def make() -> bytes:
-            nonlocal cached
-            cached = False
-            return emit_object(text, self.level)
-
-        code = cached_object(f"level {self.level}\n{text}", make, self._cache)
+        large = self.hasty is not None and text.count("\n") > self.hasty
+        texts = pieces(text) if large else [text]
+        known = [self._cache.load(_key(_tag(text, self.level))) for text in texts]
+        hasty = large and None in known
+        level = 0 if hasty else self.level
+        cached = None not in known
+        if hasty:
+            codes = [cached_object(_tag(text, 0), lambda: emit_object(text, 0), self._cache)]
+        else:
+            codes = [code or self._made(text) for code, text in zip(known, texts, strict=True)]
         made = time.perf_counter()
-        addresses = self._machine.load(code, [f"mbd.{name}" for name in programs])
+        addresses = self._machine.load(codes[0], [f"mbd.{name}" for name in programs], *codes[1:])
         for (name, outputs), address in zip(programs.items(), addresses, strict=True):
-            self._functions[name] = MachineFunction(name, address, _sizes(outputs, self.layout), self)
+            self._functions[name] = MachineFunction(name, address, _sizes(outputs, self.layout), self, hasty)
         times = written - begin, made - written, time.perf_counter() - made
-        self.builds.append(Build(tuple(programs), cached, *times))
+        self.builds.append(Build(tuple(programs), cached, *times, level))
+        if hasty:
+            submit(_Later(self, list(programs), texts))
+
+    def _made(self, text: str) -> bytes:
+        """The object file of a text that was not in the cache a moment ago."""
+        return cached_object(_tag(text, self.level), lambda: emit_object(text, self.level), self._cache)
+
+    def replace(self, names: Sequence[str], codes: Sequence[bytes]) -> None:
+        """Give provisional functions their final code."""
+        machine = Machine()
+        addresses = machine.load(codes[0], [f"mbd.{name}" for name in names], *codes[1:])
+        self._later.append(machine)
+        for name, address in zip(names, addresses, strict=True):
+            self._functions[name].settle(address)
 
     def address(self, name: str) -> int:
         """Where the code of a function begins."""
         return self[name].address
+
+
+def _tag(text: str, level: int) -> str:
+    return f"level {level}\n{text}"
+
+
+class _Later:
+    """The final code of some functions of a library, made piece by piece; for nobody if the library is gone."""
+
+    def __init__(self, library: Library, names: list[str], texts: list[str]) -> None:
+        self.library, self.names, self.texts = weakref.ref(library), names, texts
+        self.codes: list[bytes] = []
+
+    def step(self) -> bool:
+        """Make, or fetch, the next piece; exchange the functions when all are there."""
+        library = self.library()
+        if library is None:
+            return False
+        if len(self.codes) < len(self.texts):
+            self.codes.append(library._made(self.texts[len(self.codes)]))
+            return True
+        library.replace(self.names, self.codes)
+        return False
+
+    def failed(self, error: Exception) -> None:
+        """The functions stay what they are, and somebody may want to know."""
+        library = self.library()
+        if library is not None:
+            library.notes.append(f"{', '.join(self.names)} stay at level 0: {error or type(error).__name__}")
+            for name in self.names:
+                library[name].settle(None)
 
 
 def _sizes(outputs: Sequence[Node], layout: Layout) -> tuple[int, int, int]:

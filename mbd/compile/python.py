@@ -131,6 +131,7 @@ class ScalarFunction:
     """``f(block, parameters, out)`` in plain Python; its address is 0, for there is no machine code."""
 
     address = 0
+    provisional = False
 
     def __init__(self, name: str, outputs: Sequence[Node], layout: Layout) -> None:
         self.name, self.size = name, len(outputs)

@@ -16,8 +16,6 @@ from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
 
-from mbd.kernel.translate import translate
-
 __all__ = ["MODULES", "constants_of", "entry", "functions_of", "kernel_object", "object_of", "source_digest"]
 
 ENTRY = "mbd_kernel"
@@ -116,6 +114,8 @@ def object_of(text: str) -> bytes:
 
 def kernel_object() -> bytes:
     """The kernel's object file, with its entry under the name ENTRY."""
+    from mbd.kernel.translate import translate
+
     print("mbd: building the stepping kernel, once for this machine …", file=sys.stderr, flush=True)
     functions = functions_of(*map(_source, MODULES), SHIMS)
     return object_of(translate(functions, constants_of("fields", *MODULES), ENTRY, ["kernel"], APART))

@@ -137,7 +137,7 @@ class EnergyWatch:
         """Evaluate T and V at some rows that were not looked at yet."""
         rows = np.linspace(min(self._upto, run.stored - 1), run.stored - 1, SPREAD).astype(np.intp)
         early = np.array(EARLY if self._looks == 0 else (), dtype=np.intp)
-        chosen = np.unique(np.concatenate([rows, early[early < run.stored]]))
+        chosen = np.array(sorted({*rows.tolist(), *early[early < run.stored].tolist()}), dtype=np.intp)
         record = record_of(run, run.table[chosen])
         inputs = ModelColumns.inputs(record.rows(np.zeros((len(chosen), run.values["n_anchors"]))))
         with np.errstate(all="ignore"):

@@ -45,7 +45,7 @@ COUNTED = (
 
 def notes_of(run: Run) -> list[str]:
     """The notes of a run that is over, in sentences."""
-    notes = list(run.mechanism.notes)
+    notes = [*run.mechanism.notes, *getattr(run.mechanism.common, "notes", ())]
     equations = run.mechanism.equations
     loaded = bool(run.values["loaded"]) or any(friction.contact >= 0 for friction in equations.frictions)
     rubs = loaded and any(code.borne for code in run.stepper.modes)

@@ -65,6 +65,7 @@ def _statistics(run: Run) -> dict[str, Any]:
         numbers["local_errors"] = float(run.values["clock"][F.SPENT])
     numbers["modes"] = len(run.stepper.modes)
     numbers["compiled"] = run.stepper.compiled
+    numbers["optimized"] = run.stepper.compiled and not run.stepper.provisional
     numbers["derive_and_compile_seconds"] = run.mechanism.seconds
     numbers["notes"] = notes_of(run)
     numbers["wall_seconds"] = perf_counter() - run.began

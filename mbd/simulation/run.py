@@ -35,6 +35,8 @@ ROWS_AT_ONCE = 1 << 14
 """Rows of results that the kernel may fill before it hands them over."""
 STEPS_AT_ONCE = {True: 20000, False: 200}
 """Steps between two looks at the clock, compiled and interpreted: some 20 ms."""
+USUAL_SIZE = 10
+"""Unknowns above which there are fewer such steps, as the square: large mechanisms get better code at these looks."""
 SHOW_EVERY = 0.1
 """Wall time between two calls of progress and observers [s]."""
 MOST_EXPECTED = 1 << 22
@@ -75,7 +77,7 @@ class Run:
         compiled_options = {**options, "capacity": rows + 8, "end": end}
         self.stepper = Stepper(mechanism, manager, integrator, parameters, dt, compiled_options)
         self.values = self.stepper.values
-        self.values["chunk"] = STEPS_AT_ONCE[self.stepper.compiled]
+        self.values["chunk"] = _steps_at_once(self.stepper)
         expected = min(1.25 * (end - start.time) / dt / options.get("store", 1) + 1024, MOST_EXPECTED)
         self.table = np.empty((int(expected), self.values["width"]))  # memory is taken as rows are written
         self.events: list[EventRecord] = []
@@ -309,6 +311,13 @@ class Run:
             self.manager.mode(v["closed"][: len(names)]), armed,
             v["anchors"][: v["n_anchors"]].copy(), self.start.names, self.start.velocity_names, {}, dict(self.changed),
         )  # fmt: skip
+
+
+def _steps_at_once(stepper: Stepper) -> int:
+    """Steps of a call of the kernel; they follow from the size alone, as what is judged between calls must."""
+    layout = stepper.mechanism.layout
+    size = max((layout.n + layout.n_rows) // USUAL_SIZE, 1)
+    return max(STEPS_AT_ONCE[stepper.compiled] // (size * size), STEPS_AT_ONCE[False])
 
 
 def _places(force: Force) -> str:

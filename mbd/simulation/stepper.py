@@ -107,6 +107,7 @@ class Stepper:
         self.kernel: Any = None
         self._table: Any = None
         self._known: list[Any] = []
+        self._provisional = False  # whether addresses in the table may have changed
         self.resumed_at = float("nan")  # the instant whose row was stored as a run was taken up again
         assert layout.n == self.values["n"]
 
@@ -237,6 +238,11 @@ class Stepper:
         self.kernel = self._table = None  # before the mode counts: an interrupt may come between any two lines
         v["mode_count"][0] = count + 1
 
+    @property
+    def provisional(self) -> bool:
+        """Whether some function is waiting for faster code; the kernel gets that between two of its calls."""
+        return any(getattr(function, "provisional", False) for function in self.functions)
+
     def advance(self, until: float) -> int:
         """Run the kernel until it returns; its status."""
         self.values["until"] = until
@@ -273,7 +279,8 @@ class Stepper:
     def _advance_compiled(self) -> int:
         from mbd.kernel.build import entry
 
-        if self._table is None:
+        if self._table is None or self._provisional:
+            self._provisional = self.provisional  # before the addresses: whoever settles in between is looked at again
             addresses = [0 if function is None else function.address for function in self.functions]
             self._code = np.array(addresses, dtype=np.int64)
             self._table = np.zeros(len(F.FIELDS), dtype=np.int64)

@@ -10,21 +10,38 @@ from mbd.joints.base import Joint
 if TYPE_CHECKING:
     from mbd.model import Model
 
-__all__ = ["disconnected", "graph_of", "mobility", "spanning_tree"]
+__all__ = ["disconnected", "graph_of", "links_of", "mobility", "spanning_tree"]
 
 
-def graph_of(model: Model, without: Collection[str] = ()) -> Any:
-    """A `networkx.MultiGraph` of body names, in order of connection; edges carry their `joint`.
+Links = dict[str, dict[str, dict[str, Joint]]]
+"""The joints by name between a body and each of its neighbors, by their names: the adjacency of the graph."""
+
+
+def links_of(model: Model, without: Collection[str] = ()) -> Links:
+    """Who is connected to whom, in order of connection, in plain words: every model is asked this at its start.
 
     Parameters
     ----------
     model : a model
     without : names of joints to leave out
     """
-    import networkx as nx
+    links: Links = {name: {} for name in model.bodies}
+    for joint in model.joints:
+        if joint.name not in without:
+            parent, child = joint.parent.body.name, joint.child.body.name
+            between = links.setdefault(parent, {}).setdefault(child, {})
+            links.setdefault(child, {})[parent] = between
+            between[joint.name] = joint
+    return links
+
+
+def graph_of(model: Model, without: Collection[str] = ()) -> Any:
+    """The same as a `networkx.MultiGraph` of body names, for questions of one's own; edges carry their `joint`."""
+    import networkx as nx  # takes longer to load than a walker takes to derive
 
     graph: Any = nx.MultiGraph(name=model.name)
-    graph.add_nodes_from(model.bodies)
+    links = links_of(model, without)
+    graph.add_nodes_from(links)
     for joint in model.joints:
         if joint.name not in without:
             graph.add_edge(joint.parent.body.name, joint.child.body.name, key=joint.name, joint=joint)
@@ -33,14 +50,12 @@ def graph_of(model: Model, without: Collection[str] = ()) -> Any:
 
 def disconnected(model: Model) -> list[str]:
     """Names of the bodies without a chain of joints to the ground."""
-    import networkx as nx
-
-    graph = graph_of(model)
-    reached = nx.node_connected_component(graph, model.ground.name)
-    return [name for name in graph if name not in reached]
+    links = links_of(model)
+    _, _, reached = spanning_tree(links, model.ground.name)
+    return [name for name in links if name not in reached]
 
 
-def spanning_tree(graph: Any, root: str) -> tuple[list[Joint], list[Joint], list[str]]:
+def spanning_tree(links: Links, root: str) -> tuple[list[Joint], list[Joint], list[str]]:
     """Breadth first from the root, in order of connection.
 
     Returns
@@ -52,13 +67,17 @@ def spanning_tree(graph: Any, root: str) -> tuple[list[Joint], list[Joint], list
     reached, tree = {root: None}, {}
     queue = [root]
     for body in queue:
-        for _, other, joint in graph.edges(body, data="joint"):
+        for other, joints in links[body].items():
             if other not in reached:
                 reached[other] = None
                 queue.append(other)
-                tree[joint.name] = joint
-    closing = [joint for *_, joint in graph.edges(queue, data="joint") if joint.name not in tree]
-    return list(tree.values()), closing, queue
+                name, joint = next(iter(joints.items()))
+                tree[name] = joint
+    closing: dict[str, Joint] = {}
+    for body in queue:
+        for joints in links[body].values():
+            closing |= {name: joint for name, joint in joints.items() if name not in tree and name not in closing}
+    return list(tree.values()), list(closing.values()), queue
 
 
 def mobility(bodies: int, joints: Sequence[Joint], planar: bool) -> int:

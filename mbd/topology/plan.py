@@ -14,7 +14,7 @@ from mbd.joints.base import Joint
 from mbd.joints.planar import Planar
 from mbd.joints.reversed import Reversed
 from mbd.joints.translation import Translation
-from mbd.topology.graph import graph_of, mobility, spanning_tree
+from mbd.topology.graph import links_of, mobility, spanning_tree
 
 if TYPE_CHECKING:
     from mbd.model import Model
@@ -74,15 +74,15 @@ def plan(model: Model) -> Plan:
     """The tree, the cut joints and the floating bodies of a model whose `cut` is 'auto', 'loops', 'all' or names."""
     wanted = cut_names(model) | {joint.name for joint in model.joints if needs_reaction(joint)}
     planar = is_planar(model)
-    graph = graph_of(model, without=wanted)
-    tree, closing, reached = spanning_tree(graph, model.ground.name)
+    links = links_of(model, without=wanted)
+    tree, closing, reached = spanning_tree(links, model.ground.name)
     edges = _oriented(tree, [model.ground.name])
     floating: list[Joint] = []
     for body in model.bodies.values():
         if body.name in reached:
             continue
         floats = floating_joint(model, body, planar)
-        more, closes, found = spanning_tree(graph, body.name)
+        more, closes, found = spanning_tree(links, body.name)
         floating.append(floats)
         edges += [floats, *_oriented(more, [body.name])]
         closing += closes
