@@ -1,4 +1,4 @@
-"""``python -m benchmarks [run | compare | baseline]``: see README.md here."""
+"""``python -m benchmarks [run | compare | baseline | peers]``: see README.md here."""
 
 from __future__ import annotations
 
@@ -11,18 +11,25 @@ from benchmarks.figures import NOISY, table
 from benchmarks.handwritten import compiler
 from benchmarks.run import BASELINE, GROUPS, RESULTS, Record, measure
 
+DOCS = Path(__file__).parents[1] / "docs"
+
 
 def main() -> int:
     """Measure and print; 1 if a comparison finds a figure more than 15 % worse."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description="What mbd costs, measured.")
     parser.add_argument(
-        "what", nargs="?", default="run", choices=("run", "compare", "baseline"),
-        help="print the figures; compare them with the baseline; or make them the baseline",
+        "what", nargs="?", default="run", choices=("run", "compare", "baseline", "peers"),
+        help="print the figures; compare them with the baseline; make them the baseline; or compare with other systems",
     )  # fmt: skip
     parser.add_argument("--only", nargs="+", choices=GROUPS, default=GROUPS, metavar="GROUP", help=", ".join(GROUPS))
     parser.add_argument("--repeats", type=int, default=7, help="of every measurement, minima count (default 7)")
     parser.add_argument("--json", nargs="?", const=RESULTS, type=Path, metavar="FILE", help="also write a record")
+    parser.add_argument(
+        "--scenes", default="", metavar="S1,S4d", help="of 'peers': some only, which leaves the docs alone"
+    )
     options = parser.parse_args()
+    if options.what == "peers":
+        return _peers(parser, [word for word in options.scenes.split(",") if word], options.json)
     if options.what == "compare" and not BASELINE.exists():
         parser.error(f"there is no {BASELINE.name} to compare with; make one with 'python -m benchmarks baseline'")
     if compiler() is None:
@@ -39,6 +46,25 @@ def main() -> int:
     print(table(record.figures))
     if options.what == "baseline":
         record.save(BASELINE)
+    return 0
+
+
+def _peers(parser: argparse.ArgumentParser, words: list[str], json: Path | None) -> int:
+    """Beside other systems: print the tables; a run of all scenes writes the page of the documentation."""
+    from benchmarks.peers.command import compare
+    from benchmarks.peers.report import page, write
+    from benchmarks.peers.scenes import chosen
+
+    try:
+        chosen(words)
+    except ValueError as problem:
+        parser.error(str(problem))
+    comparison = compare(words, json)
+    if json:
+        comparison.save(json)
+    print(page(comparison))
+    if not words:
+        write(comparison, DOCS)
     return 0
 
 

@@ -15,7 +15,7 @@ from benchmarks import compiling, counts, gait, startup, steps, watching
 from benchmarks.figures import Figure
 from benchmarks.handwritten import FLAGS, compiler, compiler_version
 
-__all__ = ["BASELINE", "GROUPS", "RESULTS", "Record", "measure"]
+__all__ = ["BASELINE", "GROUPS", "RESULTS", "Record", "load", "measure"]
 
 HERE = Path(__file__).parent
 BASELINE, RESULTS = HERE / "baseline.json", HERE / "results.json"
@@ -45,7 +45,7 @@ class Record:
 def measure(repeats: int, groups: Iterable[str] = GROUPS) -> Record:
     """The figures of some groups, at least seven repeats of each measurement."""
     groups = set(groups)
-    busy = _load()
+    busy = load()
     figures: list[Figure] = []
     if "counts" in groups:
         figures += counts.measure()
@@ -60,10 +60,10 @@ def measure(repeats: int, groups: Iterable[str] = GROUPS) -> Record:
         figures += compiling.measure(repeats)
     if "startup" in groups:
         figures += startup.measure(repeats)
-    return Record(tuple(figures), {**_machine(), "load before": busy, "load after": _load(), "repeats": repeats})
+    return Record(tuple(figures), {**_machine(), "load before": busy, "load after": load(), "repeats": repeats})
 
 
-def _load() -> float | None:
+def load() -> float | None:
     """Processes that wanted to run in the last minute, where the system says so."""
     return round(os.getloadavg()[0], 2) if hasattr(os, "getloadavg") else None
 

@@ -43,6 +43,8 @@ def mechanism_of(model: Any, backend: str = "auto", changed: Mapping[str, float]
     if not isinstance(model, Model | Lagrangian):
         raise ModelError(f"a Model or a Lagrangian is expected, not {model!r}")
     mechanism = _mechanism(model, backend, frozenset())
+    if not changed and not getattr(model, "controllers", ()):
+        return mechanism
     inputs = {parameter.name for parameter in mechanism.equations.parameters}
     values = getattr(model, "parameters", {})
     wanted = {name for controller in getattr(model, "controllers", ()) for name in controller.writes}

@@ -71,8 +71,7 @@ class Run:
         forces = [force for force in getattr(model, "forces", ()) if isinstance(force, Force)]
         self.places = {force.name: _places(force) for force in forces}
         rows = int(min(ROWS_AT_ONCE, (end - start.time) / dt / options.get("store", 1) + 64))
-        self.folded = getattr(model, "parameters", {})
-        parameters = mechanism.parameters(changed, self.folded)
+        parameters = self._parameters()
         self.first_parameters = parameters.copy()
         compiled_options = {**options, "capacity": rows + 8, "end": end}
         self.stepper = Stepper(mechanism, manager, integrator, parameters, dt, compiled_options)
@@ -102,6 +101,11 @@ class Run:
             begin(self, start)
             if changed:
                 check_rank(self, start, parameters)
+
+    def _parameters(self) -> Vector:
+        """The parameter vector; which parameters are folded into the equations is asked only where it counts."""
+        folded = getattr(self.model, "parameters", {}) if self.changed else {}
+        return self.mechanism.parameters(self.changed, folded)
 
     def observe(
         self, observers: Sequence[Callable[[float, State], None]], progress: Callable[[float, float], None] | None
@@ -284,7 +288,7 @@ class Run:
     def set_parameters(self, changed: Mapping[str, float]) -> None:
         """Parameters that differ from the model's."""
         self.changed = dict(changed)
-        self.values["params"][: len(self.first_parameters)] = self.mechanism.parameters(self.changed, self.folded)
+        self.values["params"][: len(self.first_parameters)] = self._parameters()
 
     def move_to(self, time: float) -> None:
         """Put the clock, and the row just stored as the left side of a break, on its instant."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import struct
 from types import SimpleNamespace
 from typing import Any
 
@@ -21,6 +20,7 @@ from mbd.kernel.active_set import ActiveSetManager
 from mbd.kernel.collocation import RADAU
 from mbd.kernel.lemke import lemke_places
 from mbd.kernel.stages import STAGES_END, stage_place
+from mbd.simulation.call_table import CallTable
 from mbd.simulation.plain import MechanismSystem, PlainScheme, row_units, unit_blocks
 from mbd.tape.derivatives import live
 
@@ -93,6 +93,7 @@ class Stepper:
         self.stabilized = getattr(integrator, "stabilized", True)
         layout = mechanism.layout
         self.values: dict[str, Any] = {}
+        self._shelved: dict[str, tuple[Any, int]] = {}  # arrays and their addresses
         self._sizes(dt, options)
         self._arrays(parameters, manager)
         self.system = MechanismSystem(
@@ -104,9 +105,7 @@ class Stepper:
         self.functions.append(None if mechanism.vector else mechanism.common["compose"])
         self.modes: list[Any] = []
         self.dependent: dict[int, tuple[int, ...]] = {}
-        self.kernel: Any = None
-        self._table: Any = None
-        self._known: list[Any] = []
+        self._table: CallTable | None = None
         self._provisional = False  # whether addresses in the table may have changed
         self.resumed_at = float("nan")  # the instant whose row was stored as a run was taken up again
         assert layout.n == self.values["n"]
@@ -181,12 +180,10 @@ class Stepper:
             "pivots": size, "columns": size, "lcp_rows": contacts + frictions, "lcp_who": contacts + frictions,
             "lcp_basis": unknowns, "fired": 2, "state": 24, "counts": 16,
         }  # fmt: skip
-        self.reals = _shelve(v, {name: reals.pop(name) for name in F.KEPT_REALS}, float)
-        self.integers = _shelve(v, {name: integers.pop(name) for name in F.KEPT_INTEGERS}, np.int64)
-        for name, length in reals.items():
-            v[name] = np.zeros(max(length, 1))
-        for name, length in integers.items():
-            v[name] = np.zeros(max(length, 1), dtype=np.int64)
+        self.reals = self._shelve({name: reals.pop(name) for name in F.KEPT_REALS}, float)
+        self.integers = self._shelve({name: integers.pop(name) for name in F.KEPT_INTEGERS}, np.int64)
+        self._shelve(reals, float)
+        self._shelve(integers, np.int64)
         for name, table in manager.tables().items():
             v[name] = table if len(table) else np.zeros(1, dtype=table.dtype)
         v["shift1"] = v["block"][self.mechanism.layout.shift :]  # read by model code as well
@@ -208,6 +205,16 @@ class Stepper:
         if v["scheme"] == RADAU_IIA:
             return stage_place(SimpleNamespace(**v), STAGES_END)
         return (STAGES + 1) * (v["n_v"] + v["n"]) if v["scheme"] == RUNGE_KUTTA else 0
+
+    def _shelve(self, lengths: dict[str, int], kind: Any) -> Any:
+        """Arrays side by side on one shelf, which is copied at once; each begins on a cache line."""
+        starts = np.cumsum([0, *(-8 * (-max(length, 1) // 8) for length in lengths.values())]).tolist()
+        shelf = np.zeros(starts[-1], dtype=kind)
+        base = shelf.ctypes.data
+        for start, (name, length) in zip(starts, lengths.items(), strict=False):
+            self.values[name] = shelf[start : start + max(length, 1)]
+            self._shelved[name] = self.values[name], base + shelf.itemsize * start
+        return shelf
 
     def add_mode(self) -> None:
         """Make code for the contacts closed now."""
@@ -235,8 +242,7 @@ class Stepper:
         for row in range(v["n_rows"]):
             if dropped[row]:  # as they were found first
                 self.dependent.setdefault(row, tuple(int(k) for k in np.flatnonzero(np.abs(mix[row]) > TAKES_PART)))
-        self.kernel = self._table = None  # before the mode counts: an interrupt may come between any two lines
-        v["mode_count"][0] = count + 1
+        v["mode_count"][0] = count + 1  # at last: an interrupt may come between any two lines
 
     @property
     def provisional(self) -> bool:
@@ -281,21 +287,11 @@ class Stepper:
 
         if self._table is None or self._provisional:
             self._provisional = self.provisional  # before the addresses: whoever settles in between is looked at again
-            addresses = [0 if function is None else function.address for function in self.functions]
-            self._code = np.array(addresses, dtype=np.int64)
-            self._table = np.zeros(len(F.FIELDS), dtype=np.int64)
-            self._known = [None] * len(F.FIELDS)
-        for place, name in enumerate(F.FIELDS):
-            value = self._code if name == "code" else self.values[name]
-            if value is self._known[place]:  # numbers do not change, arrays stay where they are
-                continue
-            self._known[place] = value
-            if name in F.REALS:
-                self._table[place] = struct.unpack("q", struct.pack("d", value))[0]
-            else:
-                self._table[place] = value.ctypes.data if isinstance(value, np.ndarray) else value
+            self._table = CallTable(self.functions, self.values, self._shelved)
+        else:
+            self._table.fill(self.functions, self.values)
         postponed = [tangent for tangent in self.mechanism.postponed if not tangent.made]
-        status = entry()(self._table.ctypes.data)
+        status = entry()(self._table.address)
         for tangent in postponed:
             if tangent.raised is not None:
                 raised, tangent.raised = tangent.raised, None
@@ -303,12 +299,3 @@ class Stepper:
             if tangent.made:
                 self._table = None  # it has another address now
         return status
-
-
-def _shelve(values: dict[str, Any], lengths: dict[str, int], kind: Any) -> Any:
-    """Arrays side by side on one shelf, which is copied at once; each begins on a cache line."""
-    starts = np.cumsum([0, *(-8 * (-max(length, 1) // 8) for length in lengths.values())])
-    shelf = np.zeros(int(starts[-1]), dtype=kind)
-    for start, (name, length) in zip(starts, lengths.items(), strict=False):
-        values[name] = shelf[start : start + max(length, 1)]
-    return shelf

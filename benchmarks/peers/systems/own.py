@@ -1,0 +1,60 @@
+"""`mbd` itself: `simulate` as a user calls it, code already made, and the time inside the kernel."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from functools import partial
+from time import process_time
+
+import mbd
+from benchmarks.peers.equations import problem
+from benchmarks.peers.models import Posed, posed
+from benchmarks.peers.race import Attempt, Outcome, Sweep
+from benchmarks.peers.scenes import Scene
+from benchmarks.peers.schemes import Setting, settings
+from benchmarks.stopwatch import kernel_watched
+
+__all__ = ["attempts", "first_step", "once", "version"]
+
+APART = 1e-5
+"""Time between stored rows of motions with impacts, at least: cubic interpolation adds less than 1e-10 to any [s]."""
+
+
+def version() -> str:
+    """The version that runs."""
+    return mbd.__version__
+
+
+def _stride(scene: Scene, setting: Setting) -> int:
+    """Steps between stored rows: every output time, where steps hit them; else `APART`. All rows of steps that vary."""
+    if "dt" not in setting.words:
+        return 1
+    dt, per_row = setting.words["dt"], scene.every / setting.words["dt"]
+    if per_row >= 1.0 and abs(per_row - round(per_row)) < 1e-9 and problem(scene.name) and scene.name != "S5b":
+        return round(per_row)
+    return max(int(APART / dt), 1)
+
+
+def once(scene: Scene, case: Posed, setting: Setting) -> Outcome:
+    """One run; `seconds` are those of the kernel."""
+    stride = _stride(scene, setting)
+    with kernel_watched() as watch:
+        began = process_time()
+        run = mbd.simulate(case.model, case.start, setting.integrator, until=scene.until, store=stride, **setting.words)
+        whole = process_time() - began
+    return Outcome(case.read(run, scene.times), watch.seconds, run.stats["steps"], whole)
+
+
+def attempts(scene: Scene) -> list[Sweep]:
+    """Every scheme of the table; each model is derived, and the code of its modes made, before anything is timed."""
+    case, sweeps = posed(scene), settings(scene)
+    for sweep in sweeps:
+        with suppress(mbd.MbdError):  # a setting that fails says so when it is measured
+            once(scene, case, sweep[0])
+    return [[Attempt(one.label, partial(once, scene, case, one)) for one in sweep] for sweep in sweeps]
+
+
+def first_step(scene: Scene) -> None:
+    """Words, equations, code from the cache, and one step."""
+    case = posed(scene)
+    mbd.simulate(case.model, case.start, mbd.GeneralizedAlpha(1.0), dt=scene.every, until=scene.until)
