@@ -46,8 +46,12 @@ def four_bars(case: str) -> tuple[mbd.Model, mbd.State]:
     return model, mbd.assemble(model, position=position, velocity={"base 0.angle": rate})
 
 
-def judge_four_bars(case: str, dt: float, integrator: Any) -> Outcome:
-    """Every flat pose is passed on the branch where cranks stay parallel, without a jump of energy, with order 2."""
+def judge_four_bars(case: str, dts: tuple[float, float], integrator: Any) -> Outcome:
+    """Every flat pose is passed on the branch where cranks stay parallel, without a jump of energy, with order 2.
+
+    dts : largest step, and that of index 3 [s]. There a step that happens to end next to a flat pose of many four-bars
+    makes up to 1e-7 rad of round-off at 0.25 ms, as much as its error, and 1e-10 at 0.5 ms.
+    """
     model, start = four_bars(case)
     angle, place = quantity(case, "crank angle"), quantity(case, "B0")
     passes, energy = quantity(case, "number of singular"), quantity(case, "total energy")
@@ -68,7 +72,7 @@ def judge_four_bars(case: str, dt: float, integrator: Any) -> Outcome:
             "error of the corner [m]": distance_to(corner, place),
         }
 
-    found = study(errors, dt, 2)
+    found = study(errors, dts[getattr(integrator, "formulation", "") == "index3"], 2)
     finest = runs[-1]
     turning, fine = rate.size, float(found.steps[-1])
     limit = allowance(FACTOR, turning, fine)
@@ -125,15 +129,15 @@ CASES = tuple(
     HardCase(
         id,
         MUST,
-        partial(judge_four_bars, id, dt),
+        partial(judge_four_bars, id, dts),
         DAMPED if slow else EVERY,
         slow,
         label=id.replace("-iftomm-a02-fourbar", "").removesuffix("-N40"),
     )
-    for id, dt, slow in (
-        ("b2-iftomm-a02-fourbar-N1", 1e-3, False),
-        ("b2-iftomm-a02-fourbar-N2", 1e-3, False),
-        ("b2-iftomm-a02-fourbar-N10", 1e-3, False),
-        ("b2b-iftomm-a02-fourbar-N40", 1e-3, True),
+    for id, dts, slow in (
+        ("b2-iftomm-a02-fourbar-N1", (1e-3, 1e-3), False),
+        ("b2-iftomm-a02-fourbar-N2", (1e-3, 1e-3), False),
+        ("b2-iftomm-a02-fourbar-N10", (1e-3, 2e-3), False),
+        ("b2b-iftomm-a02-fourbar-N40", (1e-3, 2e-3), True),
     )
 )

@@ -68,7 +68,8 @@ def test_slider_motion_and_drive_torque_meet_the_reference(scheme: NewmarkFamily
             found.append(moments["guide.rate"] - reference[:, 1])
         return [float(np.linalg.norm(each)) for each in found]
 
-    assert_second_order(errors, (0.0125 if stabilized else 0.02) / OMEGA)
+    # without the last halving in index 3, where the round-off ε L/dt² of accelerations is a tenth of their error
+    assert_second_order(errors, (0.0125 if stabilized else 0.02) / OMEGA, 3 if stabilized else 2)
 
 
 @pytest.mark.parametrize("scheme", WITH_ROWS, ids=name_of)
