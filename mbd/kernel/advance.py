@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from mbd.kernel.control import controlled_step, first_step
 from mbd.kernel.fields import (
     BASE,
     CHATTER,
@@ -25,8 +24,6 @@ from mbd.kernel.fields import (
     LEFT,
     LOCAL,
     LOG_EVENT,
-    LOG_SLIPPED,
-    LOG_STUCK,
     LOGGED,
     MODE,
     N_DROPPED,
@@ -41,34 +38,31 @@ from mbd.kernel.fields import (
     PLASTIC,
     REDONE,
     RESTART,
-    RESTARTS,
     ROWS,
     SHORTENED,
     SINCE_STORE,
-    SINGULAR,
     SPENT,
-    STAGNATED,
     STEP,
     STEPS,
     STORED,
     STRAIGHT,
     SWITCHES,
-    TOO_NEAR,
     TRIED,
     WATCH,
     WIDTH,
 )  # fmt: skip
-from mbd.kernel.guards import is_quiet, judge, try_step, update_armed, update_sides, watch
-from mbd.kernel.hooks import scheme_accept, scheme_start
+from mbd.kernel.guards import is_quiet, judge, try_step, update_armed, update_sides
+from mbd.kernel.hooks import scheme_accept
 from mbd.kernel.interior import parts_to_take
 from mbd.kernel.locate import locate
 from mbd.kernel.nonsmooth import PULL, keep, lands, lets_go, put_back, rebound, strike
-from mbd.kernel.pairs import FIRST, LONGER, SECOND, SHORTER, WHOLE, may_pair
-from mbd.kernel.redundancy import find_dependent, sharing, spread
-from mbd.kernel.restart import active_rows, stepping_rows
-from mbd.kernel.settle import log_event, settle
+from mbd.kernel.observe import is_awaited, store_row
+from mbd.kernel.pairs import FIRST, SECOND
+from mbd.kernel.settle import log_event
+from mbd.kernel.starting import find_mode, restart, still_dependent
 from mbd.kernel.switching import switch
 from mbd.kernel.takeover import leave_pose, take_over
+from mbd.kernel.trying import part_end, step_end, tried_step
 
 __all__ = ["advance"]
 
@@ -79,107 +73,6 @@ Without rows ten times as many.
 """
 MOST_HALVED = 3
 """How often a non-smooth step whose end has no impulses is halved [-]."""
-SHORTEST = 0.1
-"""Part of a step below which a failing step is not shortened any further [-]."""
-SHORTENING = 0.6180339887498949
-"""Golden ratio: what is left of a step whose Newton iteration failed, for the next try (at most five) [-].
-
-No power of it is a simple fraction, so that tries do not meet a pose that repeats with the grid again.
-"""
-
-
-def store_row(K: Any) -> None:
-    """One row of results: t, q, (v, z), (v̇, ż), λ, closed."""
-    o = K.state[STORED] * K.width
-    K.store[o] = K.clock[NOW]
-    o += 1
-    for i in range(K.n_q):
-        K.store[o + i] = K.q[i]
-    o += K.n_q
-    for i in range(K.n):
-        K.store[o + i] = K.y[i]
-        K.store[o + K.n + i] = K.rate[i]
-    o += 2 * K.n
-    for k in range(K.n_rows):
-        K.store[o + k] = K.lam[k]
-    o += K.n_rows
-    for c in range(K.n_contacts):
-        K.store[o + c] = float(K.closed[c])
-    K.state[STORED] += 1
-    K.state[SINCE_STORE] = 0
-
-
-def is_awaited(K: Any, first: int) -> bool:
-    """Whether someone waits for an event logged since the line `first`."""
-    for line in range(first, K.state[LOGGED]):
-        index = int(K.log[line * K.event_width + 2])
-        kind = int(K.log[line * K.event_width + 1])
-        if kind == LOG_EVENT:
-            index += K.n_contacts
-        elif kind == LOG_STUCK or kind == LOG_SLIPPED:
-            index += K.n_contacts + K.n_guards
-        if K.notify[index] == 1:
-            return True
-    return False
-
-
-def find_mode(K: Any) -> int:
-    """Number of the mode of the closed contacts and dependent rows, −1 if its code is not made yet."""
-    width = K.n_contacts + K.n_rows + K.n_frictions
-    for mode in range(K.mode_count[0]):
-        same = True
-        for c in range(K.n_contacts):
-            same = same and K.mode_key[mode * width + c] == K.closed[c]
-        for k in range(K.n_rows):
-            same = same and K.mode_key[mode * width + K.n_contacts + k] == K.dropped[k]
-        for f in range(K.n_frictions):
-            phase = 2 if K.sticks[f] == 1 else (1 if K.slip[f] != 0.0 else 0)
-            same = same and K.mode_key[mode * width + K.n_contacts + K.n_rows + f] == phase
-        if same:
-            return mode
-    return -1
-
-
-def restart(K: Any) -> int:
-    """Make the state consistent in its mode and start the scheme from it."""
-    status = settle(K)
-    if status != 0:
-        return status
-    K.counts[RESTARTS] += 1
-    find_dependent(K, active_rows(K, K.closed))
-    if K.state[N_DROPPED] > 0 and not sharing(K):
-        spread(K, K.lam)
-    K.state[ROWS] = stepping_rows(K)
-    status = scheme_start(K)
-    if status != 0:
-        return status
-    K.state[ROWS] = stepping_rows(K)
-    K.state[MODE] = find_mode(K)
-    K.state[PAIRED] = 0
-    K.clock[BASE] = K.clock[NOW]
-    K.state[GRID] = 0
-    K.state[STRAIGHT] = 0
-    if K.adaptive == 1:
-        first_step(K)
-    if K.n_watched > 0:
-        watch(K, K.clock[NOW], K.q, K.y, K.rate, K.lam, K.guards0)
-        update_armed(K)
-    return 0
-
-
-def still_dependent(K: Any) -> bool:
-    """Whether the rows that were left out hold at the candidate, at which K.acc is."""
-    o_h = K.n * K.n + K.n + 2 * K.n * K.n_rows
-    for k in range(K.n_rows):
-        if K.dropped[k] == 1:
-            size = max(K.scale[K.n + k], 1e-3)
-            slip = 1e-6 * (size + 1.0)
-            if K.stabilized == 0:  # index 3 leaves rates of the size of its error, of which this row has its share
-                for i in range(K.n_rows):
-                    slip += 2.0 * abs(K.mix[k * K.n_rows + i] * K.acc[o_h + K.n_rows + i]) if K.dropped[i] == 0 else 0.0
-            if abs(K.acc[o_h + k]) > 1e-9 * size or abs(K.acc[o_h + K.n_rows + k]) > slip:
-                return False
-    return True
 
 
 def rings(K: Any) -> bool:
@@ -291,86 +184,93 @@ def land(K: Any, h: float, t1: float) -> int:
     return EVENT if is_awaited(K, first) else -1
 
 
-def is_shortened(status: int) -> bool:
-    """Whether a step that ended so is tried again with another size."""
-    return status == NOT_CONVERGED or status == STAGNATED or status == SINGULAR or status == TOO_NEAR
-
-
 def forget_found(K: Any) -> None:
     """No guard has been found to be no event yet."""
     for c in range(K.n_contacts + K.n_guards + K.n_frictions):
         K.active[c] = 0
 
 
-def step_end(K: Any) -> float:
-    """Where the next step of the grid ends; the second of a pair has its own size."""
-    if K.state[PAIRED] == SECOND:
-        return float(K.clock[NOW] + LONGER * K.clock[STEP])
-    return float(K.clock[BASE] + (K.state[GRID] + 1) * K.clock[STEP])
+def begin(K: Any) -> int:
+    """What comes before a step: room for its rows, a start of the scheme, code of the mode; −1 if it can be taken."""
+    if K.state[STORED] + 4 > K.capacity or K.state[LOGGED] + 3 * K.n_contacts + 6 > K.event_capacity:
+        return FULL
+    if K.state[RESTART] > 0:
+        visible = K.state[RESTART] == 1
+        first = K.state[LOGGED]
+        status = restart(K)
+        if status != 0:
+            return status
+        K.state[RESTART] = 0
+        if visible or K.state[LOGGED] > first:
+            store_row(K)
+        if is_awaited(K, first):
+            return EVENT
+    if K.clock[NOW] >= K.until - 1e-12 * K.dt:
+        return DONE
+    if K.state[MODE] < 0:
+        K.state[MODE] = find_mode(K)
+        if K.state[MODE] < 0:
+            return NEW_MODE
+    return -1
 
 
-def part_end(K: Any, on_grid: float) -> float:
-    """Where the next step ends: on the grid, or after the part of a step in which a guard may have fired."""
-    if K.state[STRAIGHT] == 1:
-        near = K.clock[NOW] + K.clock[WIDTH]
-        if near < on_grid - 1e-6 * K.clock[WIDTH]:
-            return float(near)
-    return on_grid
+def conclude(K: Any, h: float, full: float, t1: float, cut: bool, within: bool, quiet: bool, holds: bool) -> int:
+    """Accept a candidate without events; 0, or a failure.
 
-
-def tried_step(K: Any, h: float, t1: float) -> int:
-    """A candidate at t1, or earlier where Newton's method or the allowed error asks for it; K.clock[TRIED] its step.
-
-    A pose in which rows lose rank is stepped over by a pair of steps, or a shortened one; stiff places get smaller.
+    h of the `full` step that was to be; `cut` at a boundary inside the run; `within` a step of the grid;
+    `quiet`: no guard can have changed; `holds`: so do the rows that were left out.
     """
-    if K.adaptive == 1:
-        return controlled_step(K, h)
-    if K.state[PAIRED] == FIRST:  # the step is taken once more
-        K.state[PAIRED] = 0
-    full = h
-    step = K.clock[STEP]
-    status = try_step(K, h, t1)
-    if status == TOO_NEAR and may_pair(K, h):
-        if K.clock[NOW] + (SHORTER + LONGER) * step < K.until - WHOLE * step:
-            h = SHORTER * step
-            full = h
-            K.state[PAIRED] = FIRST
-            status = try_step(K, h, K.clock[NOW] + h)
-        elif K.until >= K.end:
-            return LAST
-    while is_shortened(status) and h > SHORTEST * full:
-        h *= SHORTENING
-        status = try_step(K, h, K.clock[NOW] + h)
-    if h < full and K.state[PAIRED] == FIRST:
-        K.state[PAIRED] = 0
-    K.clock[TRIED] = h
-    return status
+    paired = K.state[PAIRED] > 0
+    if h < full and not within:
+        K.counts[SHORTENED] += 1
+        K.state[INCHING] += 2
+        patience = 2 * MOST_SHORTENED if K.state[ROWS] > 0 else 20 * MOST_SHORTENED
+        if K.state[INCHING] > patience:
+            K.detail[0] = t1
+            K.detail[1] = 0.0
+            return NOT_CONVERGED
+    elif K.state[INCHING] > 0:
+        K.state[INCHING] -= 1
+    if not within:
+        if K.state[PAIRED] == FIRST:
+            K.state[PAIRED] = SECOND
+            K.counts[SHORTENED] += 1
+        else:
+            K.state[PAIRED] = 0
+    uneven = K.stabilized == 0 and K.state[ROWS] > 0 and (h < (1.0 - 1e-6) * K.clock[STEP] or rings(K))
+    if (h < 1e-3 * K.clock[STEP] and K.scheme != 1) or uneven:  # index 3 rings after a change of step
+        take_over(K, t1)
+        K.state[RESTART] = 2
+    else:
+        accept(K, h, t1, quiet)
+        if not within:
+            K.state[GRID] += 1
+        if not holds:  # the pose has changed its rank
+            K.state[RESTART] = 2
+        if (h < full and not within) or K.state[HALVED] > 0 or paired or cut or K.adaptive == 1:
+            K.clock[BASE] = t1  # the grid goes on from here
+            K.state[GRID] = 0
+        if K.adaptive == 1 and not within:
+            K.clock[STEP] = K.clock[NEXT]
+        if K.state[NEAR] == LEFT:
+            status = leave_pose(K, h)
+            if status != 0:
+                return status
+    if K.state[HALVED] > 0:  # the end that had no impulses may not come at all
+        K.state[HALVES] -= 1
+        if K.state[HALVES] == 0:
+            K.state[HALVED] = 0
+    return 0
 
 
 def advance(K: Any) -> int:
     """Step until `until`, a full store, a mode without code, an event to report, or a failure."""
     steps = 0
     while True:
-        if K.state[STORED] + 4 > K.capacity or K.state[LOGGED] + 3 * K.n_contacts + 6 > K.event_capacity:
-            return FULL
-        if K.state[RESTART] > 0:
-            visible = K.state[RESTART] == 1
-            first = K.state[LOGGED]
-            status = restart(K)
-            if status != 0:
-                return status
-            K.state[RESTART] = 0
-            if visible or K.state[LOGGED] > first:
-                store_row(K)
-            if is_awaited(K, first):
-                return EVENT
+        status = begin(K)
+        if status >= 0:
+            return status
         t = K.clock[NOW]
-        if t >= K.until - 1e-12 * K.dt:
-            return DONE
-        if K.state[MODE] < 0:
-            K.state[MODE] = find_mode(K)
-            if K.state[MODE] < 0:
-                return NEW_MODE
         if steps >= K.chunk:
             return PAUSE
         steps += 1
@@ -395,7 +295,6 @@ def advance(K: Any) -> int:
             h = K.clock[TRIED]
             t1 = t + h
             cut = cut and h >= full
-        paired = K.state[PAIRED] > 0
         if K.adaptive == 1 or K.state[PAIRED] == FIRST:
             full = h
         K.counts[STEPS] += 1
@@ -450,45 +349,9 @@ def advance(K: Any) -> int:
                     return status
                 continue
             K.state[REDONE] = 0
-        if h < full and not within:
-            K.counts[SHORTENED] += 1
-            K.state[INCHING] += 2
-            patience = 2 * MOST_SHORTENED if K.state[ROWS] > 0 else 20 * MOST_SHORTENED
-            if K.state[INCHING] > patience:
-                K.detail[0] = t1
-                K.detail[1] = 0.0
-                return NOT_CONVERGED
-        elif K.state[INCHING] > 0:
-            K.state[INCHING] -= 1
-        if not within:
-            if K.state[PAIRED] == FIRST:
-                K.state[PAIRED] = SECOND
-                K.counts[SHORTENED] += 1
-            else:
-                K.state[PAIRED] = 0
-        uneven = K.stabilized == 0 and K.state[ROWS] > 0 and (h < (1.0 - 1e-6) * K.clock[STEP] or rings(K))
-        if (h < 1e-3 * K.clock[STEP] and K.scheme != 1) or uneven:  # index 3 rings after a change of step
-            take_over(K, t1)
-            K.state[RESTART] = 2
-        else:
-            accept(K, h, t1, quiet)
-            if not within:
-                K.state[GRID] += 1
-            if not holds:  # the pose has changed its rank
-                K.state[RESTART] = 2
-            if (h < full and not within) or K.state[HALVED] > 0 or paired or cut or K.adaptive == 1:
-                K.clock[BASE] = t1  # the grid goes on from here
-                K.state[GRID] = 0
-            if K.adaptive == 1 and not within:
-                K.clock[STEP] = K.clock[NEXT]
-            if K.state[NEAR] == LEFT:
-                status = leave_pose(K, h)
-                if status != 0:
-                    return status
-        if K.state[HALVED] > 0:  # the end that had no impulses may not come at all
-            K.state[HALVES] -= 1
-            if K.state[HALVES] == 0:
-                K.state[HALVED] = 0
+        status = conclude(K, h, full, t1, cut, within, quiet, holds)
+        if status != 0:
+            return status
         K.state[SINCE_STORE] += 1
         if K.state[SINCE_STORE] >= K.stride:
             store_row(K)

@@ -261,7 +261,7 @@ class Stepper:
 
     def store_row(self) -> None:
         """Store the accepted state as a row of the results."""
-        from mbd.kernel.advance import store_row
+        from mbd.kernel.observe import store_row
 
         values = {**self.values, "code": self.functions, "hooks": self.scheme}
         store_row(F.Kernel(**{name: values[name] for name in F.FIELDS}))

@@ -1,0 +1,52 @@
+"""What a run leaves behind: rows of results, and events that someone waits for."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mbd.kernel.fields import (
+    LOG_EVENT,
+    LOG_SLIPPED,
+    LOG_STUCK,
+    LOGGED,
+    NOW,
+    SINCE_STORE,
+    STORED,
+)
+
+__all__ = ["is_awaited", "store_row"]
+
+
+def store_row(K: Any) -> None:
+    """One row of results: t, q, (v, z), (v̇, ż), λ, closed."""
+    o = K.state[STORED] * K.width
+    K.store[o] = K.clock[NOW]
+    o += 1
+    for i in range(K.n_q):
+        K.store[o + i] = K.q[i]
+    o += K.n_q
+    for i in range(K.n):
+        K.store[o + i] = K.y[i]
+        K.store[o + K.n + i] = K.rate[i]
+    o += 2 * K.n
+    for k in range(K.n_rows):
+        K.store[o + k] = K.lam[k]
+    o += K.n_rows
+    for c in range(K.n_contacts):
+        K.store[o + c] = float(K.closed[c])
+    K.state[STORED] += 1
+    K.state[SINCE_STORE] = 0
+
+
+def is_awaited(K: Any, first: int) -> bool:
+    """Whether someone waits for an event logged since the line `first`."""
+    for line in range(first, K.state[LOGGED]):
+        index = int(K.log[line * K.event_width + 2])
+        kind = int(K.log[line * K.event_width + 1])
+        if kind == LOG_EVENT:
+            index += K.n_contacts
+        elif kind == LOG_STUCK or kind == LOG_SLIPPED:
+            index += K.n_contacts + K.n_guards
+        if K.notify[index] == 1:
+            return True
+    return False

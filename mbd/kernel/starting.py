@@ -1,0 +1,84 @@
+"""The start of a scheme from a consistent state, in the mode of the contacts that are closed then."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mbd.kernel.control import first_step
+from mbd.kernel.fields import (
+    BASE,
+    GRID,
+    MODE,
+    N_DROPPED,
+    NOW,
+    PAIRED,
+    RESTARTS,
+    ROWS,
+    STRAIGHT,
+)
+from mbd.kernel.guards import update_armed, watch
+from mbd.kernel.hooks import scheme_start
+from mbd.kernel.redundancy import find_dependent, sharing, spread
+from mbd.kernel.restart import active_rows, stepping_rows
+from mbd.kernel.settle import settle
+
+__all__ = ["find_mode", "restart", "still_dependent"]
+
+
+def find_mode(K: Any) -> int:
+    """Number of the mode of the closed contacts and dependent rows, −1 if its code is not made yet."""
+    width = K.n_contacts + K.n_rows + K.n_frictions
+    for mode in range(K.mode_count[0]):
+        same = True
+        for c in range(K.n_contacts):
+            same = same and K.mode_key[mode * width + c] == K.closed[c]
+        for k in range(K.n_rows):
+            same = same and K.mode_key[mode * width + K.n_contacts + k] == K.dropped[k]
+        for f in range(K.n_frictions):
+            phase = 2 if K.sticks[f] == 1 else (1 if K.slip[f] != 0.0 else 0)
+            same = same and K.mode_key[mode * width + K.n_contacts + K.n_rows + f] == phase
+        if same:
+            return mode
+    return -1
+
+
+def restart(K: Any) -> int:
+    """Make the state consistent in its mode and start the scheme from it."""
+    status = settle(K)
+    if status != 0:
+        return status
+    K.counts[RESTARTS] += 1
+    find_dependent(K, active_rows(K, K.closed))
+    if K.state[N_DROPPED] > 0 and not sharing(K):
+        spread(K, K.lam)
+    K.state[ROWS] = stepping_rows(K)
+    status = scheme_start(K)
+    if status != 0:
+        return status
+    K.state[ROWS] = stepping_rows(K)
+    K.state[MODE] = find_mode(K)
+    K.state[PAIRED] = 0
+    K.clock[BASE] = K.clock[NOW]
+    K.state[GRID] = 0
+    K.state[STRAIGHT] = 0
+    if K.adaptive == 1:
+        first_step(K)
+    if K.n_watched > 0:
+        watch(K, K.clock[NOW], K.q, K.y, K.rate, K.lam, K.guards0)
+        update_armed(K)
+    return 0
+
+
+def still_dependent(K: Any) -> bool:
+    """Whether the rows that were left out hold at the candidate, at which K.acc is."""
+    o_h = K.n * K.n + K.n + 2 * K.n * K.n_rows
+    for k in range(K.n_rows):
+        if K.dropped[k] == 1:
+            size = max(K.scale[K.n + k], 1e-3)
+            slip = 1e-6 * (size + 1.0)
+            if K.stabilized == 0:  # index 3 leaves rates of the size of its error, of which this row has its share
+                for i in range(K.n_rows):
+                    slip += 2.0 * abs(K.mix[k * K.n_rows + i] * K.acc[o_h + K.n_rows + i]) if K.dropped[i] == 0 else 0.0
+            if abs(K.acc[o_h + k]) > 1e-9 * size or abs(K.acc[o_h + K.n_rows + k]) > slip:
+                return False
+    return True

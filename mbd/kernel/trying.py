@@ -1,0 +1,84 @@
+"""Where the next step ends, and what is tried until there is a candidate."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mbd.kernel.control import controlled_step
+from mbd.kernel.fields import (
+    BASE,
+    GRID,
+    LAST,
+    NOT_CONVERGED,
+    NOW,
+    PAIRED,
+    SINGULAR,
+    STAGNATED,
+    STEP,
+    STRAIGHT,
+    TOO_NEAR,
+    TRIED,
+    WIDTH,
+)
+from mbd.kernel.guards import try_step
+from mbd.kernel.pairs import FIRST, LONGER, SECOND, SHORTER, WHOLE, may_pair
+
+__all__ = ["part_end", "step_end", "tried_step"]
+
+SHORTEST = 0.1
+"""Part of a step below which a failing step is not shortened any further [-]."""
+SHORTENING = 0.6180339887498949
+"""Golden ratio: what is left of a step whose Newton iteration failed, for the next try (at most five) [-].
+
+No power of it is a simple fraction, so that tries do not meet a pose that repeats with the grid again.
+"""
+
+
+def is_shortened(status: int) -> bool:
+    """Whether a step that ended so is tried again with another size."""
+    return status == NOT_CONVERGED or status == STAGNATED or status == SINGULAR or status == TOO_NEAR
+
+
+def step_end(K: Any) -> float:
+    """Where the next step of the grid ends; the second of a pair has its own size."""
+    if K.state[PAIRED] == SECOND:
+        return float(K.clock[NOW] + LONGER * K.clock[STEP])
+    return float(K.clock[BASE] + (K.state[GRID] + 1) * K.clock[STEP])
+
+
+def part_end(K: Any, on_grid: float) -> float:
+    """Where the next step ends: on the grid, or after the part of a step in which a guard may have fired."""
+    if K.state[STRAIGHT] == 1:
+        near = K.clock[NOW] + K.clock[WIDTH]
+        if near < on_grid - 1e-6 * K.clock[WIDTH]:
+            return float(near)
+    return on_grid
+
+
+def tried_step(K: Any, h: float, t1: float) -> int:
+    """A candidate at t1, or earlier where Newton's method or the allowed error asks for it; K.clock[TRIED] its step.
+
+    A pose in which rows lose rank is stepped over by a pair of steps, or a shortened one; stiff places get smaller.
+    """
+    if K.adaptive == 1:
+        return controlled_step(K, h)
+    if K.state[PAIRED] == FIRST:  # the step is taken once more
+        K.state[PAIRED] = 0
+    full = h
+    step = K.clock[STEP]
+    status = try_step(K, h, t1)
+    if status == TOO_NEAR and may_pair(K, h):
+        if K.clock[NOW] + (SHORTER + LONGER) * step < K.until - WHOLE * step:
+            h = SHORTER * step
+            full = h
+            K.state[PAIRED] = FIRST
+            status = try_step(K, h, K.clock[NOW] + h)
+        elif K.until >= K.end:
+            return LAST
+    while is_shortened(status) and h > SHORTEST * full:
+        h *= SHORTENING
+        status = try_step(K, h, K.clock[NOW] + h)
+    if h < full and K.state[PAIRED] == FIRST:
+        K.state[PAIRED] = 0
+    K.clock[TRIED] = h
+    return status
