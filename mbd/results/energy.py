@@ -87,7 +87,7 @@ def _works(columns: ModelColumns, found: list[Power], moving: Vector) -> tuple[l
     record, rows = columns.record, columns.rows
     time = record.time.copy()
     after = _after_switch(columns)
-    before = np.append(after[1:], False)
+    before = np.append(after[1:], False)[: len(after)]
     time[before] = np.nextafter(time[before], -np.inf)
     inside = replace(rows, time=time)
     values = columns.evaluate([power.value for power in found], inside)
