@@ -16,6 +16,7 @@ from mbd.kernel.fields import (
     GRAZE,
     GUARDS,
     N_DROPPED,
+    NOT_CONVERGED,
     NOT_FINITE,
     NOW,
     OPEN_FORCE,
@@ -43,6 +44,8 @@ DOUBTFUL = 0.25
 """Part of the forces below which the sign of a multiplier of index 3 is asked of consistent accelerations [-]."""
 REST = 1e-12
 """Speed along a friction, relative to its terms, that is no turn: other rows may hold it still as it pulls [-]."""
+DEPARTED = 1e-6
+"""Part of its terms that a row which was left out may be off in a step; less starts the scheme anew with other rows."""
 APART = 1e-6
 """Gap [m, rad] above which a contact is clearly open."""
 
@@ -75,6 +78,10 @@ def try_step(K: Any, h: float, t1: float) -> int:
             share_out(K, K.lam1)
             for k in range(K.n_rows):
                 K.block[K.o_lam + k] = K.lam1[k]
+            if departs(K):
+                K.detail[0] = t1
+                K.detail[1] = 0.0
+                return NOT_CONVERGED
     else:
         for i in range(K.n):
             K.rate1[i] = K.rate[i]
@@ -114,6 +121,15 @@ def try_step(K: Any, h: float, t1: float) -> int:
             if K.slip[f] != 0.0:
                 K.lam1[K.friction_row[f]] = K.slip[f] * K.limit[f]
     return 0
+
+
+def departs(K: Any) -> bool:
+    """Whether a row that was left out is far from holding at the candidate, at which K.acc is: another branch."""
+    o_h = K.n * K.n + K.n + 2 * K.n * K.n_rows
+    for k in range(K.n_rows):
+        if K.dropped[k] == 1 and K.row_level[k] == 0 and abs(K.acc[o_h + k]) > DEPARTED * max(K.scale[K.n + k], 1e-3):
+            return True
+    return False
 
 
 def frictions_at(K: Any) -> int:

@@ -87,6 +87,8 @@ def locate(K: Any, h: float) -> int:
     """
     t = K.clock[NOW]
     end = h
+    found_kind = -1  # the event at `end`, before which others are looked for
+    found_index = 0
     for _ in range(4 * (K.n_contacts + K.n_guards + K.n_frictions) + 4):
         kind = K.fired[0]
         index = K.fired[1]
@@ -96,11 +98,14 @@ def locate(K: Any, h: float) -> int:
                 return status
             if K.fired[0] < 0:
                 if not judge(K, end):
-                    K.pick[2] = end
-                    return 0
+                    status = fall_back(K, h, end, found_kind, found_index)
+                    if status >= 0:
+                        return status
+                    end = h
                 continue
             kind = CLOSE
             end = K.pick[0]
+            found_kind = -1
             low = 0.0
         elif kind == STICK_BRIEF:  # a step to the deepest place shows it at rest on the way, or not at all
             status = try_step(K, K.pick[0] * end, t + K.pick[0] * end)
@@ -109,33 +114,29 @@ def locate(K: Any, h: float) -> int:
             kind = STICK
             if guard_value(K, kind, index, t + K.pick[0] * end) < 0.0:
                 end = K.pick[0] * end
+                found_kind = -1
             low = 0.0
         else:
             low = K.pick[1] * end
         status = bracket(K, kind, index, low, end)
         if status != 0:
             return status
+        found = K.pick[2]
+        if K.fired[0] >= 0 and found > 0.0 and kind == CLOSE and left_alone(K, index):  # not watched any more there
+            K.active[index] = 1
+            K.fired[0] = -1
         if K.fired[0] < 0:
             status = try_step(K, end, t + end)
             if status != 0:
                 return status
             if not judge(K, end):
-                K.pick[2] = end
-                return 0
+                status = fall_back(K, h, end, found_kind, found_index)
+                if status >= 0:
+                    return status
+                end = h
             continue
-        found = K.pick[2]
         if found <= 0.0:
             return 0
-        if kind == CLOSE and left_alone(K, index):  # no longer watched when it gets there
-            K.active[index] = 1
-            K.fired[0] = -1
-            status = try_step(K, end, t + end)
-            if status != 0:
-                return status
-            if not judge(K, end):
-                K.pick[2] = end
-                return 0
-            continue
         # did another guard fire before this one? (this one is at round-off and may look fired itself)
         place = index
         if kind == CROSS:
@@ -152,7 +153,29 @@ def locate(K: Any, h: float) -> int:
             K.pick[2] = found
             return 0
         end = found
+        found_kind = kind
+        found_index = index
     return NO_LOCATION
+
+
+def fall_back(K: Any, h: float, end: float, kind: int, index: int) -> int:
+    """Where no guard has fired before `end` after all: the event found there stands (kind ≥ 0), else the full step h.
+
+    The candidate is at `end`. −1: a guard has fired in the full step, which is the candidate then.
+    """
+    if kind >= 0:
+        K.fired[0] = kind
+        K.fired[1] = index
+        K.pick[2] = end
+        return 0
+    if end < h:
+        status = try_step(K, h, K.clock[NOW] + h)
+        if status != 0:
+            return status
+        if judge(K, h):
+            return -1
+    K.pick[2] = h
+    return 0
 
 
 def left_alone(K: Any, c: int) -> bool:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import mbd
+from mbd.testing.wild import wild_scene
 from tests.simulation.mechanisms import G, ball, falling, kneed_walker, kneed_walker_start, run, two_balls
 
 DROP = np.sqrt(2.0 / G)
@@ -150,3 +151,10 @@ def test_an_event_at_the_very_end_of_a_run_happens_there_or_at_once_in_the_next(
     assert event.time == pytest.approx(DROP, abs=1e-11)
     assert event.impulse[0] == pytest.approx(2.0 * np.sqrt(2 * G), rel=1e-9)
     assert second["fall.displacement"].min() > -1e-11
+
+
+@pytest.mark.parametrize("seed", [207, 1370], ids=["an opening that is none", "another branch of cranks"])
+def test_the_state_is_that_of_its_time_and_on_its_rows_until_a_wild_run_ends(seed):
+    """A guard that seemed to fire before another had left the state of the other's instant under a later time."""
+    trajectory = wild_scene(seed).run()
+    assert max(trajectory.violation.length, trajectory.violation.angle) < 1e-7
