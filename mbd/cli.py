@@ -177,6 +177,8 @@ def check_command(arguments: argparse.Namespace) -> int:
     script = Script.load(arguments.script)
     script.require("model")
     model = script.names["model"]
+    if not hasattr(model, "check"):
+        raise ModelError(f"model of {script.path.name} must be an mbd.Model or mbd.Lagrangian, not {model!r}")
     faults = model.check()
     for fault in faults:
         print(f"- {fault}")

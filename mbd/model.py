@@ -90,7 +90,10 @@ class Model:
 
     def constrain(self, *constraints: Constraint) -> None:
         """Add constraints and events."""
-        example = "constrain takes constraints such as mbd.Unilateral('foot', mbd.touchdown(shank.end))"
+        example = (
+            "constrain takes constraints such as mbd.Unilateral('foot', mbd.touchdown(shank.end)), and events; "
+            "forces and controllers go to apply"
+        )
         self.constraints += _all_are(Constraint, constraints, example)
 
     def apply(self, *forces: Force | Controller) -> None:

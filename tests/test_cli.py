@@ -113,6 +113,16 @@ def test_a_wrong_script_is_told_in_one_line(script, capsys, text, told):
     assert error.startswith(f"error: {told}") and error.count("\n") == 1
 
 
+def test_check_wants_a_model(script, capsys):
+    assert cli.main(["check", script("model = 3\n")]) == 1
+    assert "model of my_walk.py must be an mbd.Model" in capsys.readouterr().err
+
+
+def test_effects_of_a_script_with_a_tolerance_ask_for_a_step(script, capsys):
+    assert cli.main(["effects", script("model = start = 1\ntol, until = 1e-6, 1.0\n")]) == 1
+    assert "give --dt SECONDS" in capsys.readouterr().err
+
+
 def test_another_step_is_refused_where_main_chooses_it(script, capsys):
     assert cli.main(["run", script(WALK), "--dt", "0.1"]) == 1
     assert "has a main(), which chooses dt itself" in capsys.readouterr().err

@@ -89,6 +89,8 @@ def test_verbs_refuse_what_they_cannot_take():
         model.connect(joint.child.body)
     with pytest.raises(ModelError, match="constrain takes constraints"):
         model.constrain(joint)
+    with pytest.raises(ModelError, match="controllers go to apply"):
+        model.constrain(mbd.Controller("pd", lambda time, values, state: {}, period=0.1))
     with pytest.raises(ModelError, match="apply takes forces"):
         model.apply(mbd.Viscous(1.0))
     assert len(model.joints) == 1

@@ -127,6 +127,8 @@ def instant(model: Any, state: State, parameters: Mapping[str, float] | None = N
     ModelError
         if the state is that of another model, is not consistent, or closes a contact that would pull there.
     """
+    if not isinstance(state, State):
+        raise ModelError(f"state must be a State from mbd.assemble(model, …), not {state!r}")
     changed = {**state.parameters, **(parameters or {})}
     mechanism = mechanism_of(model, backend, changed)
     manager = ActiveSetManager(mechanism.equations)

@@ -18,6 +18,9 @@ from mbd.state import State
 
 __all__ = ["callbacks", "choices", "end_of", "fits", "numbers"]
 
+HUGE = 1e6
+"""Step over the latest time above which a run is refused: ends and events are told apart to 1e-12 dt [-]."""
+
 CHOICES = {
     "contact": ("auto", "events", "nonsmooth"), "impact": ("newton", "poisson", "sequential"),
     "locate": ("root", "linear"), "on_failure": ("raise", "return"),
@@ -73,6 +76,9 @@ def _times(start: Any, dt: Any, until: Any) -> list[str]:
         return [f"until = {last:g} s lies before the start at {begin:g} s"]
     if is_number(dt) and 0.0 < dt < 8.0 * np.spacing(max(abs(float(begin)), abs(float(last)))):
         return [f"dt = {dt:g} s is too small to be told apart at t = {last:g} s; use a larger dt or an earlier end"]
+    if is_number(dt) and math.isfinite(dt) and last > begin and dt > HUGE * max(abs(begin), abs(last)):
+        return [f"dt = {dt:g} s is more than {HUGE:g} times the end at t = {last:g} s, and too large for round-off to "
+                "tell one from the other; use a smaller dt"]  # fmt: skip
     return []
 
 

@@ -67,8 +67,10 @@ class Judgement:
 
     @property
     def share(self) -> float:
-        """numerical / owned [-]; 0 where neither is anything."""
-        return self.numerical / self.owned if self.owned > 0.0 else 0.0
+        """numerical / owned [-]; infinite where nothing is owned, 0 where neither is anything."""
+        if self.owned > 0.0:
+            return self.numerical / self.owned
+        return float(np.copysign(np.inf, self.numerical)) if self.numerical != 0.0 else 0.0
 
 
 def judgement(ledger: Ledger, doubt: Matrix, way: Vector) -> Judgement:
@@ -210,8 +212,8 @@ def _sentence(run: Run, found: Judgement) -> str:
 
 def _note(found: Judgement) -> str:
     done, what = ("put", "into") if found.numerical > 0.0 else ("taken", "from")
-    share = 100.0 * abs(found.share)
+    share = f" ({100.0 * abs(found.share):.2g} %)" if np.isfinite(found.share) else ""
     return (
         f"the scheme itself has {done} up to {abs(found.numerical):.3g} J {what} a mechanism that had "
-        f"{found.owned:.3g} J of its own to move with ({share:.2g} %): see run.energy.numerical, and use a smaller dt"
+        f"{found.owned:.3g} J of its own to move with{share}: see run.energy.numerical, and use a smaller dt"
     )

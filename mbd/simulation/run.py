@@ -90,6 +90,7 @@ class Run:
         self.tried = 0
         self.label: float | None = None
         self.failure: Failure | None = None
+        self.interrupted = False
         self.energy = EnergyWatch()
         self.observers: Sequence[Callable[[float, State], None]] = ()
         self.progress: Callable[[float, float], None] | None = None
@@ -142,6 +143,7 @@ class Run:
         try:
             return part()
         except KeyboardInterrupt:
+            self.interrupted = True
             return INTERRUPTED, ""
         except (SimulationError, UnknownNameError) as error:
             self.cause = self.cause or error

@@ -22,7 +22,7 @@ from mbd.simulation.arguments import callbacks, choices, end_of, fits, numbers
 from mbd.simulation.capabilities import refusals
 from mbd.simulation.run import Run
 from mbd.simulation.strategy import chosen
-from mbd.simulation.tolerance import Trial, calibrated
+from mbd.simulation.tolerance import FIRST, PILOT, Trial, calibrated
 from mbd.state import State
 from mbd.trajectory import Trajectory
 
@@ -30,6 +30,8 @@ __all__ = ["prepared", "simulate"]
 
 LONGEST = 0.1
 """Longest step that follows its error, over the length of the run [-]."""
+SHORTEST_CAP = 0.01
+"""Least by which that shrinks where less error is allowed: it bounds the steps of a motion that needs none [-]."""
 INSTANT = 1e-3
 """A short time where steps follow their error, over the length of the run or 1 s: for differences, and as `dt` [-]."""
 REST_SPEED = 1e-6
@@ -139,10 +141,13 @@ def _to_tolerance(
 ) -> tuple[Run, Trajectory, str]:
     """The run whose error agrees with a tolerance; where an event ends it, the first guess is that it takes 1 s."""
     length = span or 1.0
-    fixed = {"tol": tol, "longest": LONGEST * length}
+    coarsest, power = PILOT * FIRST * tol / length, 1.0 / scheme.error_order()
 
     def trial(allowed: float) -> Trial:
-        run, trajectory, problem = complete(INSTANT * min(length, 1.0), {**fixed, "allowed": allowed})
+        # shrinks as steps do, so that runs of a motion so easy that its steps are the longest differ in their steps
+        longest = LONGEST * length * min(max((allowed / coarsest) ** power, SHORTEST_CAP), 1.0)
+        more = {"tol": tol, "longest": longest, "allowed": allowed}
+        run, trajectory, problem = complete(INSTANT * min(length, 1.0), more)
         return Trial(allowed, trajectory, problem, run)
 
     found = calibrated(trial, tol, tol / length, scheme.order() / scheme.error_order())

@@ -23,7 +23,7 @@ from mbd.trajectory import Trajectory
 if TYPE_CHECKING:
     from mbd.simulation.run import Run
 
-__all__ = ["Gap", "Outcome", "Trial", "calibrated", "gap"]
+__all__ = ["FIRST", "PILOT", "Gap", "Outcome", "Trial", "calibrated", "gap"]
 
 PILOT = 10.0
 """Allowed error of the pilot run over that of the first run [-]."""
@@ -107,7 +107,12 @@ def calibrated(run: Callable[[float], Trial], tol: float, allowed: float, power:
     run : makes a run with a local error per second; tol : [m, rad]; allowed : what the tolerance would be per
         second if errors did not grow; power : κ
     """
-    trials = [trial for trial in [run(PILOT * FIRST * allowed)] if not trial.problem]
+    pilot = run(PILOT * FIRST * allowed)
+    if not pilot.problem and pilot.run.stats["steps"] == 0:  # it ended where it began
+        return _told([pilot], replace(pilot, error=0.0), tol, "")
+    if pilot.source.interrupted:
+        return _told([pilot], pilot, tol, pilot.problem)
+    trials = [] if pilot.problem else [pilot]
     wanted: float | None = FIRST * allowed
     loosened = False
     for _ in range(MOST_REPEATS + 1):
@@ -141,7 +146,8 @@ def _wanted(trials: Sequence[Trial], best: Trial, tol: float, power: float, loos
 def _estimated(trials: Sequence[Trial], power: float) -> list[Trial]:
     """The error of each run by its difference from the finest, of that one by its difference from the next coarser.
 
-    Two runs of the same steps tell nothing of each other: without a third their errors are infinite, without a gap.
+    Two runs of the same steps tell nothing of each other: without a third their errors are infinite, without a gap,
+    unless the steps are so short, as before an early event, that local errors are round-off.
     """
     finest = min(trials, key=lambda trial: trial.allowed)
     seen = {id(trial): _against(trial, finest, power) for trial in trials if not _same_steps(trial, finest)}
@@ -151,6 +157,8 @@ def _estimated(trials: Sequence[Trial], power: float) -> list[Trial]:
         other = seen[id(min(coarser, key=lambda trial: trial.allowed))]
         ratio = (finest.allowed / other.allowed) ** power
         known = replace(finest, error=max(ratio * other.error, _floor(finest, other)), gap=other.gap)
+    elif len(trials) > 1 and not seen and _is_rounding(finest):
+        known = replace(finest, error=_rounding(finest) * float(finest.run.stats["steps"]))
     return [seen.get(id(trial)) or replace(trial, error=known.error, gap=known.gap) for trial in trials]
 
 
@@ -221,10 +229,11 @@ def _unreached(trials: Sequence[Trial], best: Trial, tol: float) -> str:
     name = best.gap.name if best.gap is not None else ""
     where = f" (of {name!r})" if name else ""
     if not np.isfinite(best.error):
-        return (
-            f"tol = {tol:g} was not reached: runs at tolerances down to {trials[-1].allowed:.2g} per second have "
-            "different events, so that their error is not known; the motion is too sensitive, or give dt="
-        )
+        why = (
+            "took the same steps, so that their error is not known; give dt=" if best.gap is None else
+            "have different events, so that their error is not known; the motion is too sensitive, or give dt="
+        )  # fmt: skip
+        return f"tol = {tol:g} was not reached: runs at tolerances down to {trials[-1].allowed:.2g} per second {why}"
     stuck = any(_is_rounding(trial) for trial in trials)
     why = "smaller steps do not make it smaller, which is the floor of round-off" if stuck else (
         f"{len(trials)} runs did not come nearer"

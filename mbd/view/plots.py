@@ -13,9 +13,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mbd.results.interpolation import Grid
 from mbd.results.ledger import SPENT, Ledger, Part
 from mbd.results.tables import library
 from mbd.results.units import unit
+from mbd.view.curves import curves
 from mbd.view.style import CYCLE, NEUTRAL, color, rules
 
 if TYPE_CHECKING:
@@ -61,7 +63,7 @@ def histories(run: Trajectory, *names: str, path: str | Path | None = None) -> A
     """
     wanted = names or tuple(name for name, _ in run.facts.coordinates)
     scalars = list(dict.fromkeys(part for name in wanted for part in run.columns.components(name)))
-    values = dict(zip(scalars, run.columns.at_rows(scalars), strict=True))
+    time, values = curves(run, scalars)
     panels: dict[str, list[str]] = {}
     for name in scalars:
         panels.setdefault(unit(name, run.facts), []).append(name)
@@ -73,7 +75,7 @@ def histories(run: Trajectory, *names: str, path: str | Path | None = None) -> A
         for axes, (kind, group) in zip(grid, panels.items(), strict=False):
             for number, name in enumerate(group):
                 style = ("-", "--")[number // len(CYCLE) % 2]
-                axes.plot(run.time, values[name], style, color=CYCLE[number % len(CYCLE)], label=name)
+                axes.plot(time, values[name], style, color=CYCLE[number % len(CYCLE)], label=name)
             axes.set_ylabel(f"{QUANTITIES.get(kind, 'value')} [{kind}]" if kind else "value")
             _mark(axes, run)
             _legend(axes, len(group))
@@ -187,11 +189,12 @@ def phase_portrait(run: Trajectory, *coordinates: str, path: str | Path | None =
     known = dict(run.facts.coordinates[: run.facts.coordinate_count])
     angles = tuple(name for name, kind in known.items() if kind == "rad")
     wanted: Sequence[str] = coordinates or angles or tuple(known)
-    cuts = run.columns.grid.cuts
+    time, values = curves(run, [part for name in wanted for part in (name, f"{name}.rate")])
+    cuts = Grid(time).cuts
     with drawing(path, 5.6, 4.6) as figure:
         axes = figure.subplots()
         for number, name in enumerate(wanted):
-            place, rate = run[name], run[f"{name}.rate"]
+            place, rate = values[name], values[f"{name}.rate"]
             shade = CYCLE[number % len(CYCLE)]
             width = 3.0 if "left" in name.split() else 1.1  # the two sides of a repeating walk lie on each other
             axes.plot([], [], color=shade, linewidth=width, label=name)

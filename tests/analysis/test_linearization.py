@@ -170,6 +170,11 @@ def test_redundant_cranks_do_not_change_the_frequency_of_a_parallelogram(count):
     assert sum(found.instant.dependent) == count - 2
 
 
+def test_a_state_is_wanted():
+    with pytest.raises(mbd.ModelError, match="state must be a State from mbd.assemble"):
+        mbd.linearize(mbd.Model("empty"), 3)
+
+
 def test_a_pose_in_which_branches_meet_has_no_linear_motion():
     model = parallel_cranks(2)
     flat = {"base 0.angle": math.pi / 2, "base 1.angle": math.pi / 2}

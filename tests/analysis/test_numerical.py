@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -253,6 +254,15 @@ class Failing(RungeKutta):
 def test_a_scheme_that_is_not_linear_has_no_matrix():
     with pytest.raises(mbd.CapabilityError, match="is not linear in position, velocity and memory"):
         amplification_matrix(Limited((1.0,), (0.5, 0.5)), 0.5)
+
+
+def test_an_error_estimate_in_the_memory_need_not_be_linear():
+    found = criteria(mbd.RungeKutta853(), turns=FEW)
+    assert found.order == pytest.approx(8.0, abs=0.2) and found.rho_inf == np.inf
+    assert 5.5 < found.stability_limit < 6.5
+    z = 0.7j
+    series = sum(z**k / math.factorial(k) for k in range(9))  # the terms to order 8 are those of the exponential
+    assert abs(spectrum(mbd.RungeKutta853(), 0.7).principal - series) < 1e-6
 
 
 def test_a_scheme_that_does_not_step_says_why():

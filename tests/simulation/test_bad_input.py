@@ -45,6 +45,12 @@ def test_a_step_that_is_no_positive_number_of_seconds_is_refused(dt):
         simulate(dt=dt)
 
 
+@pytest.mark.parametrize("dt", [1e8, 1e13, 1e300])
+def test_a_step_beyond_which_the_end_cannot_be_told_is_refused(dt):
+    with pytest.raises(mbd.ModelError, match="times the end at t = .*smaller dt"):
+        simulate(dt=dt)
+
+
 @pytest.mark.parametrize("dt", [np.float32(0.0125), np.float64(0.01), np.array(0.01), 1])
 def test_any_kind_of_number_is_a_step(dt):
     assert simulate(dt=dt).success

@@ -140,6 +140,42 @@ def test_a_tolerance_below_round_off_stops_with_what_was_reached():
     assert not quiet.success and "was not reached" in quiet.message
 
 
+@pytest.mark.parametrize("scheme", [*SCHEMES[:2], mbd.RadauIIA()], ids=repr)
+def test_motions_that_need_no_short_steps_have_a_known_error(scheme):
+    model = double_pendulum()
+    for start, until in ((mbd.assemble(model), 10.0), (swinging()[1], 0.0), (swinging()[1], 1e-9)):
+        found = mbd.simulate(model, start, scheme, tol=1e-6, until=until)
+        still = np.max(np.abs(found.record.q - start.q), initial=0.0)
+        assert found.time[-1] == until and found.stats["tolerance"]["estimated"] <= 1e-6 and still < 1e-8
+    loose = mbd.simulate(model, swinging()[1], scheme, tol=1e8, until=1.0)
+    assert loose.success and np.isfinite(loose.stats["tolerance"]["estimated"])
+
+
+@pytest.mark.parametrize("scheme", [*SCHEMES[:2], mbd.RadauIIA()], ids=repr)
+def test_an_event_within_the_first_step_ends_a_run_to_a_tolerance(scheme):
+    model = pendulum()
+    model.constrain(mbd.Event("low", mbd.measure("hinge.angle"), terminal=True))
+    start = mbd.assemble(model, {"hinge.angle": 1e-6}, {"hinge.angle": -1.0})
+    found = mbd.simulate(model, start, scheme, tol=1e-6, until=1.0)
+    assert abs(found.time[-1] - 1e-6) < 1e-12 and found.stats["tolerance"]["estimated"] <= 1e-6
+
+
+def test_an_interrupted_trial_is_the_last_one():
+    model, calls = pendulum(mbd.Viscous(0.1)), []
+
+    def stopping(time, values, state):
+        calls.append(time)
+        if time > 0.0:
+            raise KeyboardInterrupt
+        return {}
+
+    model.apply(mbd.Controller("stop", stopping, period=0.5))
+    start = mbd.assemble(model, {"hinge.angle": 1.0})
+    with pytest.raises(SimulationError, match="interrupted at t = 0.5 s"):
+        mbd.simulate(model, start, EXPLICIT, tol=1e-6, until=2.0)
+    assert calls == [0.0, 0.5]
+
+
 @pytest.mark.parametrize("tol", [0.0, -1e-6, np.nan, np.inf, "small", True])
 def test_a_tolerance_that_is_none_is_refused(tol):
     model, start, _, _ = reference("double pendulum")

@@ -9,6 +9,7 @@ import pytest
 from matplotlib import pyplot
 
 from mbd.errors import UnknownNameError
+from mbd.view.curves import curves
 from mbd.view.plots import contacts, phase_portrait, stretches
 from mbd.view.style import color
 from tests.view.stand_ins import ball, oscillator, walker
@@ -33,6 +34,15 @@ def test_histories_have_one_panel_per_unit_and_the_contacts_below():
     assert [text.get_text() for text in angles.get_legend().get_texts()] == ["left hip.angle", "right hip.angle"]
     assert [label.get_text() for label in bars.get_yticklabels()] == ["left foot", "right foot"]
     assert bars.get_xlabel() == "time [s]"
+
+
+def test_long_steps_are_drawn_smooth_and_rows_are_met():
+    run = ball()
+    times, values = curves(run, ["flight.y"])
+    assert len(times) > 500 and np.all(np.diff(times) >= 0.0)
+    rows = np.searchsorted(times, run.time)
+    assert np.array_equal(times[rows], run.time) and np.allclose(values["flight.y"][rows], run["flight.y"], atol=1e-15)
+    assert np.count_nonzero(np.diff(times) == 0.0) == np.count_nonzero(np.diff(run.time) == 0.0)
 
 
 def test_histories_mark_the_events():

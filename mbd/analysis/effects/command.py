@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from mbd.analysis.effects.lab import OPTIONS, effects
+from mbd.errors import ModelError
 
 __all__ = ["run"]
 
@@ -32,6 +33,10 @@ def run(script: Script, arguments: Namespace) -> int:
     arguments : tolerance, out, until, dt, output; see `mbd.view.effects_arguments`
     """
     given: dict[str, Any] = {name: value for name in ("until", "dt") if (value := getattr(arguments, name)) is not None}
+    if "dt" not in given and "dt" not in script.names and "tol" in script.names:
+        raise ModelError(
+            f"{script.path.name} asks for a tolerance, but effects are compared at the same steps; give --dt SECONDS"
+        )
     script.require("model", "start", *(name for name in ("until", "dt") if name not in given))
     given = {name: given.get(name, script.names.get(name)) for name in ("until", "dt")}
     names, out = script.names, Path(arguments.out or Path("mbd-runs") / script.path.stem.replace("_", "-"))
