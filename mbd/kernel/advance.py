@@ -332,7 +332,8 @@ def advance(K: Any) -> int:
                     if status != 0:
                         return status
         if K.adaptive == 1:
-            K.clock[SPENT] += K.clock[LOCAL]
+            part = max(K.pick[2], 0.0) / h if fired else 1.0
+            K.clock[SPENT] += K.clock[LOCAL] * part ** (K.error_order + 1.0)
         if fired:
             status = handle_event(K)
             if status >= 0:

@@ -39,6 +39,8 @@ from mbd.kernel.restart import compose, consistent, fill_block, refresh_scales
 
 __all__ = ["controlled_step", "first_step", "newmark_error", "smallest_step"]
 
+LEAST = 1e-10
+"""Shortest step over the longest [-]."""
 SAFETY = 0.9
 """Part of the step that would just be allowed [-]."""
 FALL = 0.2
@@ -54,8 +56,8 @@ CANCELLED = 64.0
 
 
 def smallest_step(K: Any) -> float:
-    """Below it the clock does not move."""
-    return float(64.0 * EPS * max(abs(K.clock[NOW]), K.longest))
+    """Below it the clock does not move, or a run would never end: a motion that turns ever faster."""
+    return float(max(64.0 * EPS * max(abs(K.clock[NOW]), K.longest), LEAST * K.longest))
 
 
 def newmark_error(K: Any, h: float) -> None:

@@ -36,6 +36,8 @@ INSTANT = 1e-3
 """A short time where steps follow their error, over the length of the run or 1 s: for differences, and as `dt` [-]."""
 REST_SPEED = 1e-6
 """Approach speed [m/s, rad/s] below which a contact closes without rebound and releases nobody: ends Zeno sequences."""
+FAR_FINER = 1.5
+"""Order of a scheme over that of its estimate from which runs are much better than their estimates say [-]."""
 
 
 def simulate(
@@ -141,7 +143,9 @@ def _to_tolerance(
 ) -> tuple[Run, Trajectory, str]:
     """The run whose error agrees with a tolerance; where an event ends it, the first guess is that it takes 1 s."""
     length = span or 1.0
-    coarsest, power = PILOT * FIRST * tol / length, 1.0 / scheme.error_order()
+    finer = scheme.order() / scheme.error_order()  # power of the allowed error with which that of the run falls
+    first = (max(tol, tol ** (1.0 / finer)) if finer > FAR_FINER else tol) / length
+    coarsest, power = PILOT * FIRST * first, 1.0 / scheme.error_order()
 
     def trial(allowed: float) -> Trial:
         # shrinks as steps do, so that runs of a motion so easy that its steps are the longest differ in their steps
@@ -150,7 +154,7 @@ def _to_tolerance(
         run, trajectory, problem = complete(INSTANT * min(length, 1.0), more)
         return Trial(allowed, trajectory, problem, run)
 
-    found = calibrated(trial, tol, tol / length, scheme.order() / scheme.error_order())
+    found = calibrated(trial, tol, first, finer)
     trajectory = found.trial.run
     if found.problem and trajectory.success:  # no run failed, but none is good enough
         trajectory = Trajectory(replace(trajectory.record, success=False, message=found.problem))
