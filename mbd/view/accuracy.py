@@ -24,20 +24,12 @@ def clear(point: Point) -> bool:
 
 
 def work_precision(found: Accuracy, path: str | Path | None = None) -> Any:
-    """Error over wall time, both logarithmic: a line for each scheme, grey lines through points of one step."""
+    """Error over wall time, both logarithmic: a line for each scheme, dashed through tolerances, grey through steps."""
     shown = [point for point in found.points if clear(point)]
-    with drawing(path, 7.4, 4.8) as figure:
+    with drawing(path, 7.4, 5.2) as figure:
         axes = figure.subplots()
         for number, scheme in enumerate(found.schemes):
-            points = [point for point in shown if point.scheme == scheme]
-            axes.plot(
-                [1e3 * point.seconds for point in points], [point.error for point in points],
-                marker=MARKERS[number % len(MARKERS)], markersize=4.5, color=CYCLE[number % len(CYCLE)], label=scheme,
-                alpha=0.9,
-            )  # fmt: skip
-            for point in points:
-                if not point.same_events:
-                    axes.plot(1e3 * point.seconds, point.error, "o", markersize=10, mfc="none", color=CYCLE[1])
+            _scheme(axes, number, scheme, [point for point in shown if point.scheme == scheme])
         if shown:
             axes.set_xscale("log")
             axes.set_yscale("log")
@@ -45,21 +37,39 @@ def work_precision(found: Accuracy, path: str | Path | None = None) -> Any:
             _limits(axes, found, shown)
         else:
             axes.text(0.5, 0.5, "no error is known", ha="center", transform=axes.transAxes)
-        axes.set_xlabel("wall time [ms]")
+        dashed = any(point.tol is not None for point in shown)
+        axes.set_xlabel("wall time [ms]" + ("; dashed: tolerances, with their trial runs" if dashed else ""))
         axes.set_ylabel("largest error over range")
         axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.3)
         figure.suptitle(f"{found.model}: what accuracy costs", x=0.01, ha="left", fontweight="bold")
     return figure
 
 
+def _scheme(axes: Any, number: int, scheme: str, points: list[Point]) -> None:
+    """Two lines of one color: through its steps, and dashed through its tolerances."""
+    style = {"marker": MARKERS[number % len(MARKERS)], "color": CYCLE[number % len(CYCLE)], "alpha": 0.9}
+    fixed = [point for point in points if point.tol is None]
+    to_tolerance = [point for point in points if point.tol is not None]
+    for line, dashes, size in ((fixed, "-", 4.5), (to_tolerance, "--", 3.0)):
+        named = {"label": scheme} if line is (fixed or to_tolerance) and line else {}
+        axes.plot(
+            [1e3 * point.seconds for point in line], [point.error for point in line], dashes, markersize=size,
+            linewidth=1.5 if dashes == "-" else 1.0, **named, **style,
+        )  # fmt: skip
+    for point in points:
+        if not point.same_events:
+            axes.plot(1e3 * point.seconds, point.error, "o", markersize=10, mfc="none", color=CYCLE[1])
+
+
 def _steps(axes: Any, shown: list[Point]) -> None:
     """A thin grey line through the points of each step, which is written at its slow end."""
-    for dt in sorted({point.dt for point in shown}):
+    for dt in sorted({point.dt for point in shown if point.dt is not None}):
         group = sorted((point for point in shown if point.dt == dt), key=lambda point: point.seconds)
-        axes.plot(
-            [1e3 * point.seconds for point in group], [point.error for point in group], ":", color="#8A8A8A",
-            linewidth=0.8, zorder=0.9,
-        )  # fmt: skip
+        if len(group) > 2:
+            axes.plot(
+                [1e3 * point.seconds for point in group], [point.error for point in group], ":", color="#8A8A8A",
+                linewidth=0.8, zorder=0.9,
+            )  # fmt: skip
         axes.annotate(
             f"{1e3 * dt:.3g} ms", (1e3 * group[-1].seconds, group[-1].error), xytext=(8, 0),
             textcoords="offset points", va="center", fontsize=7.5, color="#555555",

@@ -49,14 +49,14 @@ def _heads() -> str:
 
 def _row(point: Point, leads: bool) -> str:
     """A point as a row of the table; the first of a scheme has its name."""
-    from mbd.analysis.accuracy.result import HEADS, cells
+    from mbd.analysis.accuracy.result import HEADS, cells, remark
 
     first, dt, *rest = cells(point)
     head = f"<td>{escape(first) if leads else ''}</td><td>{escape(dt)}</td>"
     if point.failure:
         kind, told = " first" if leads else "", f"failed: {escape(point.failure)}"
         return f'<tr class="failed{kind}">{head}<td colspan="{len(HEADS) - 2}">{told}</td></tr>'
-    note = f' title="{escape(point.note)}"' if point.note else ""
+    note = f' title="{escape(remark(point))}"' if remark(point) else ""
     kind = ' class="first"' if leads else ""
     return f"<tr{kind}{note}>{head}{''.join(f'<td>{escape(text)}</td>' for text in rest)}</tr>"
 

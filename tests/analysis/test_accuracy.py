@@ -210,6 +210,9 @@ def test_every_wrong_argument_is_named_at_once():
     with pytest.raises(mbd.ModelError) as caught:
         mbd.accuracy(model, start, 1.0, target=0.0, tolerances=[1e-3])
     assert len(caught.value.faults) == 2
+    with pytest.raises(mbd.ModelError) as caught:
+        mbd.accuracy(model, start, 1.0, dts="0.1", tols=[0.0, float("nan")])
+    assert len(caught.value.faults) == 3
     with pytest.raises(mbd.ModelError, match="after the start"):
         mbd.accuracy(model, start, -1.0)
 
@@ -236,6 +239,110 @@ def test_a_scene_too_stiff_for_one_method_goes_to_the_other(monkeypatch):
     assert result.reference is None and "there is no reference" in " ".join(result.notes)
     assert result.points[0].error is None and result.points[0].steps == 25
     assert RungeKuttaReference().order() == 8 and RungeKuttaReference(method="Radau").order() == 5
+
+
+# tolerances --------------------------------------------------------------------------------------------------------
+def test_a_tolerance_is_a_point_with_the_error_of_its_coordinates_and_its_trial_runs(tmp_path):
+    model, start = pendulum()
+    schemes = [mbd.Newmark(), mbd.RungeKutta853(), SymplecticEuler()]
+    result = mbd.accuracy(model, start, 2.0, None, schemes, [0.01], tols=[1e-6, 1e-4], target=1e-5)
+    assert [(p.dt, p.tol) for p in result.of("RungeKutta853()")] == [(0.01, None), (None, 1e-4), (None, 1e-6)]
+    instants = result.reference.instants
+    for scheme in schemes[:2]:
+        for point in result.of(repr(scheme))[1:]:
+            run = mbd.simulate(model, start, scheme, tol=point.tol, until=2.0)
+            true = np.max(np.abs(run.at(instants)["pin.angle"] - swing(instants)))
+            assert point.achieved == pytest.approx(true, abs=1e-9) and true < point.tol
+            assert point.estimated == run.stats["tolerance"]["estimated"] and point.order is None
+            assert point.runs == len(run.stats["tolerance"]["runs"]) > 1 and 0.0 < point.trials < 1.0
+            assert point.steps == run.stats["steps"]
+    assert [p.tol for p in result.of("SymplecticEuler(limit=1.0)")] == [None]
+    assert any("SymplecticEuler(limit=1.0) follows no tolerance" in note for note in result.notes)
+    missed = [point for point in result.points if point.tol is not None and point.achieved > point.tol]
+    assert sum("more than asked" in note for note in result.notes) == len(missed)
+    text = repr(result)
+    assert "tol 1e-06" in text and "achieved" in text and "trials" in text
+    rows = list(csv.DictReader(result.to_csv(tmp_path / "t.csv").open(encoding="utf-8")))
+    assert {row["tol"] for row in rows} == {"", "1e-06", "0.0001"}
+    page = result.page(tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "<td>tol 1e-06</td>" in page and '"tol": 1e-06' in page.replace('":1', '": 1')
+    result.plot(tmp_path / "plot.png")
+
+
+def test_index_3_with_rows_follows_no_tolerance_and_the_lab_says_why():
+    model = mbd.Lagrangian(
+        "bead on a circle", ["x", "y"], kinetic=lambda x_rate, y_rate: (x_rate**2 + y_rate**2) / 2,
+        potential=lambda y: G * y, constraints={"circle": lambda x, y: x**2 + y**2 - 1.0},
+    )  # fmt: skip
+    start = mbd.assemble(model, position={"x": 1.0, "y": 0.0})
+    schemes = [mbd.HHT(0.05), mbd.HHT(0.05, formulation="index3")]
+    result = mbd.accuracy(model, start, 0.5, "x", schemes, tols=[1e-3])
+    assert [(p.scheme, p.tol) for p in result.points] == [("HHT(alpha=0.05)", 1e-3)]
+    assert any("index 3 follows no tolerance here" in note and "ggl" in note for note in result.notes)
+
+
+def test_a_tolerance_out_of_reach_fails_with_the_best_that_was_reached_and_why():
+    model, start = pendulum(3.0)
+    result = mbd.accuracy(model, start, 3.0, None, [mbd.RungeKutta853()], tols=[1e-6, 1e-15], target=1e-18)
+    good, bad = result.points
+    assert good.failure == "" and good.achieved < 1e-5
+    assert "tol = 1e-15 was not reached: the best run has an estimated error of" in bad.failure
+    assert "round-off" in bad.failure and bad.estimated > 1e-15 and not bad.reaches(1.0)
+    assert "An error of 1e-18 is not reached; the best is RungeKutta853() with tol = 1e-06" in result.recommendation[0]
+    assert "so no run can be shown to do better" in result.recommendation[1]
+
+
+def test_a_tolerance_is_recommended_where_it_is_cheapest():
+    given = [*GIVEN, Point("eighth", None, error=1e-7, at_most=1e-7, seconds=0.0015, tol=1e-6)]
+    text = advice(given, 1e-3, 1e-12)
+    assert "take eighth with tol = 1e-06 (error 1e-07, 1.5 ms)" in text[0]
+    assert "It is ten times more accurate already; ten times more than that" in text[2]
+
+
+# what is left out, and what is said ---------------------------------------------------------------------------------
+def test_schemes_of_high_order_are_among_the_defaults_with_longer_steps_until_the_reference_ends_them():
+    model, start = pendulum()
+    result = mbd.accuracy(model, start, 2.0)
+    steps = {scheme: [p.dt for p in result.of(scheme) if p.dt] for scheme in result.schemes}
+    assert len(steps["HHT(alpha=0.05)"]) == 6
+    for scheme in "RadauIIA()", "RungeKutta853()":
+        assert steps[scheme][0] > 2.0 * steps["HHT(alpha=0.05)"][0]
+        assert any(p.tol for p in result.of(scheme))
+    high = [p for p in result.of("RungeKutta853()") if p.dt]
+    assert len(high) < 6 and high[-1].error is None and all(p.error for p in high[:-1])
+
+
+def test_a_judged_scheme_with_the_formulas_of_the_reference_is_named_and_bounded_by_another():
+    model, start = pendulum()
+    result = mbd.accuracy(model, start, 2.0, None, [mbd.RungeKutta853(), mbd.HHT(0.05)], [0.1])
+    truth = result.reference
+    assert truth.bound_of(mbd.HHT(0.05)) is truth.bound and truth.bound_of(mbd.RungeKutta853()) is truth.checked
+    assert (
+        all(truth.checked[name] >= bound for name, bound in truth.bound.items()) and max(truth.checked.values()) < 1e-7
+    )
+    assert any("RungeKutta853(): the reference has the same formulas" in note for note in result.notes)
+    alone = mbd.accuracy(model, start, 2.0, None, [mbd.HHT(0.05)], [0.1])
+    assert alone.reference.checked is None and not any("formulas" in note for note in alone.notes)
+
+
+def test_a_reference_that_has_not_converged_is_said_and_not_used(monkeypatch):
+    monkeypatch.setattr("mbd.analysis.accuracy.truth.LOOSE", 1e-2)
+    model = mbd.Model("double pendulum")
+    upper, lower = (mbd.Link(name, mass=1.0, length=1.0, center=1.0) for name in ("upper", "lower"))
+    model.connect(mbd.Revolute("hip", model.ground.origin, upper.start), mbd.Revolute("knee", upper.end, lower.start))
+    start = mbd.assemble(model, position={"hip.angle": 2.5, "knee.angle": 1.0})
+    result = mbd.accuracy(model, start, 10.0, None, [mbd.HHT(0.05)], [0.02], target=1e-3)
+    assert result.reference is None and all(p.error is None and p.at_most is None for p in result.points)
+    assert any("it has not converged" in note and "of the range of" in note for note in result.notes)
+    assert result.recommendation == ("No error is known, so nothing can be recommended.",)
+
+
+def test_no_order_is_told_where_contacts_are_not_smooth():
+    model, start = ball()
+    result = mbd.accuracy(model, start, 0.8, None, [mbd.HHT(0.05)], [0.01, 0.005], contact="nonsmooth", tols=[1e-3])
+    assert all(p.order is None for p in result.points) and result.points[0].error > 0.0
+    assert any("no order can be observed" in note for note in result.notes)
+    assert any("follows no tolerance" in note and "nonsmooth" in note for note in result.notes)
 
 
 # advice ------------------------------------------------------------------------------------------------------------
@@ -297,7 +404,7 @@ def test_the_command_measures_a_script(tmp_path, capsys):
     names = {path.name for path in (tmp_path / "out").iterdir()}
     assert names == {"accuracy.csv", "accuracy.png", "accuracy.html"}
     more = ["--dt", "0.1", "--dt", "0.05", "--quantity", "pin.rate", "--until", "0.5"]
-    assert cli.main(["accuracy", str(script), "--target", "1e-8", "--out", str(tmp_path), *more]) == 1
-    assert "An error of 1e-08 is not reached" in capsys.readouterr().out
+    assert cli.main(["accuracy", str(script), "--target", "1e-13", "--out", str(tmp_path), *more]) == 1
+    assert "An error of 1e-13 is not reached" in capsys.readouterr().out
     assert cli.main(["accuracy", str(script), "--quantity", "pin.angel", "--out", str(tmp_path)]) == 1
     assert "did you mean 'pin.angle'" in capsys.readouterr().err

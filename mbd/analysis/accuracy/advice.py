@@ -47,13 +47,13 @@ def advice(points: Sequence[Point], target: float | None, bound: float) -> list[
     return [
         f"For an error of {target:g} take {_described(best)}.",
         _costs(best),
-        _more(points, best, target / MORE),
+        _more(points, best, target / MORE, bound),
     ]
 
 
 def _described(point: Point) -> str:
     size = f"error {point.error:.2g}" if point.error is not None else f"error below {point.at_most:.2g}"
-    return f"{point.scheme} with dt = {point.dt:.4g} s ({size}, {milliseconds(point.seconds)})"
+    return f"{point.scheme} with {point.setting} ({size}, {milliseconds(point.seconds)})"
 
 
 def milliseconds(seconds: float) -> str:
@@ -78,19 +78,25 @@ def _costs(point: Point) -> str:
     return f"With it {', '.join(parts)}."
 
 
-def _more(points: Sequence[Point], best: Point, target: float) -> str:
+def _more(points: Sequence[Point], best: Point, target: float, bound: float) -> str:
     """What a tenth of the error costs: measured, or extrapolated from the finest step."""
+    if best.reaches(target) and best.at_most:
+        told, target = "It is ten times more accurate already; ten times more than that", best.at_most / MORE
+    else:
+        told = "Ten times more accuracy"
     finer = cheapest(points, target)
     if finer is not None:
         ratio = finer.seconds / best.seconds
         times = f"{ratio:.2g} times the time" if ratio > 1.05 else "no more time"
-        return f"Ten times more accuracy costs {times}: {_described(finer)}."
+        return f"{told} costs {times}: {_described(finer)}."
+    if bound >= target:
+        return f"{told} cannot be shown: the reference itself is known to {bound:.1g} only."
     guess = _extrapolated(points, target)
     if guess is None:
-        return "Ten times more accuracy was not reached by any of these steps, nor do their orders tell what it costs."
+        return f"{told} was not reached by any of these, nor do their orders tell what it costs."
     scheme, dt, seconds = guess
     return (
-        f"Ten times more accuracy was not measured; by its order {scheme} would need dt = {dt:.2g} s and "
+        f"{told} was not measured; by its order {scheme} would need dt = {dt:.2g} s and "
         f"{milliseconds(seconds)}, {seconds / best.seconds:.2g} times the time."
     )
 
@@ -98,11 +104,12 @@ def _more(points: Sequence[Point], best: Point, target: float) -> str:
 def _extrapolated(points: Sequence[Point], target: float) -> tuple[str, float, float] | None:
     """(scheme, dt, seconds) of the cheapest by the orders at the finest steps, wall time being that of the steps."""
     finest: dict[str, tuple[str, float, float]] = {}
-    for point in sorted(points, key=lambda each: each.dt, reverse=True):
+    fixed = [(point.dt, point) for point in points if point.dt is not None]
+    for dt, point in sorted(fixed, key=lambda each: each[0], reverse=True):
         if point.failure or point.error is None or point.order is None or point.order < 0.5 or point.error <= target:
             continue
         factor = (point.error / target) ** (1.0 / point.order)
-        finest[point.scheme] = (point.scheme, point.dt / factor, point.seconds * factor)
+        finest[point.scheme] = (point.scheme, dt / factor, point.seconds * factor)
     return min(finest.values(), key=lambda guess: guess[2], default=None)
 
 

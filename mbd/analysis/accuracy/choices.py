@@ -4,31 +4,28 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mbd.analysis.accuracy.settings import Setting, is_high, long_steps, steps_of, tolerances
 from mbd.analysis.accuracy.truth import motion, stopped
 from mbd.assembly import is_number
+from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import ModelError, SimulationError, UnknownNameError, nearest
-from mbd.integrators import HHT, GeneralizedAlpha, Integrator, Newmark
+from mbd.integrators import HHT, GeneralizedAlpha, Integrator, Newmark, RadauIIA, RungeKutta853
+from mbd.kernel.active_set import ActiveSetManager
+from mbd.simulation.capabilities import refusals
 from mbd.simulation.simulate import simulate
+from mbd.simulation.strategy import chosen as strategy_of
 from mbd.state import State
 
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
 
-__all__ = ["Plan", "label", "plan", "steps_for"]
+__all__ = ["Plan", "label", "plan"]
 
-FINENESS = 5
-"""Largest step: this part of the shortest time in which accelerations change velocities by their range [-]."""
-COUNT = 6
-"""Steps, each half the one before."""
-TENTH = 10.0
-"""The finest step is for an error this many times less than that wanted [-]."""
-MOST_STEPS = 400000
-"""Of the finest of these steps."""
 PROBES = (2000, 20000, 200000)
 """Steps of the run that looks for time scales, until one succeeds."""
 PROBE_STEP = 1e-3
@@ -41,20 +38,36 @@ LEAST_ROWS, MOST_ROWS = 1500, 4000
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """What is compared: schemes by label, steps [s], quantities, the end, step [s] and sizes of the reference."""
+    """What is compared: schemes and their settings by label, quantities, the end, step [s] and sizes of the reference.
+
+    own : whether the lab chose the settings, and may leave out those that tell nothing new
+    skipped : which schemes follow no tolerance, in a sentence each
+    """
 
     schemes: Mapping[str, Integrator]
-    dts: tuple[float, ...]
+    settings: Mapping[str, tuple[Setting, ...]]
     quantities: tuple[str, ...]
     until: Any
     step: float
     sizes: tuple[float, ...]
+    own: bool
+    skipped: tuple[str, ...]
     probe: Trajectory = field(repr=False)
 
     @property
     def count(self) -> int:
-        """How many points there are."""
-        return len(self.schemes) * len(self.dts)
+        """How many points there are at most."""
+        return sum(map(len, self.settings.values()))
+
+    def with_steps(self, dts: Sequence[float]) -> Plan:
+        """Other steps for the schemes of low order."""
+        changed = {
+            name: settings if is_high(self.schemes[name]) else (
+                *(Setting(dt) for dt in dts), *(setting for setting in settings if setting.dt is None)
+            )
+            for name, settings in self.settings.items()
+        }  # fmt: skip
+        return replace(self, settings=changed)
 
 
 def label(scheme: Integrator) -> str:
@@ -73,23 +86,61 @@ def plan(
     dts: Any,
     options: Mapping[str, Any],
     also: Any = None,
+    tols: Any = None,
+    target: float | None = None,
 ) -> Plan:
     """Arguments checked, all faults at once, and completed from a first run."""
     faults = [] if isinstance(start, State) else [f"start must be a State from mbd.assemble(model, …), not {start!r}"]
-    faults += _wrong_schemes(integrators) + _wrong_schemes(None if also is None else [also]) + _wrong_steps(dts)
+    faults += _wrong_schemes(integrators) + _wrong_schemes(None if also is None else [also])
+    faults += _wrong_numbers(dts, "dts", "steps [s]", "a step must be a positive number of seconds")
+    faults += _wrong_numbers(tols, "tols", "tolerances [m, rad]", "a tolerance must be a positive error of coordinates")
     if faults:
         raise ModelError(faults)
     probe, until = _probe(model, start, until, options)
-    chosen = _quantities(probe, quantities)
-    schemes = integrators if integrators is not None else _schemes(bool(probe.record.lam.shape[1]), also)
+    wanted = _quantities(probe, quantities)
+    able = Able(model, options)
+    schemes = integrators if integrators is not None else _schemes(able, bool(probe.record.lam.shape[1]), also)
     named = dict(schemes) if isinstance(schemes, Mapping) else {label(scheme): scheme for scheme in schemes}
     span = float(probe.time[-1]) - start.time
-    steps = tuple(sorted(map(float, dts), reverse=True)) if dts is not None else steps_of(probe, span)
+    settings, skipped = _settings(named, able, probe, span, dts, tols, target)
     step = float(np.clip(steps_of(probe, span)[0], span / MOST_ROWS, span / LEAST_ROWS))
     columns = (probe.record.q, probe.record.v, probe.record.z)
     sizes = np.concatenate([np.max(np.abs(column), axis=0, initial=0.0) for column in columns])
     sizes = np.where(sizes > 1e-6, sizes, np.max(sizes, initial=0.0) or 1.0)
-    return Plan(named, steps, chosen, until, step, tuple(map(float, sizes)), probe)
+    own = dts is None and tols is None
+    return Plan(named, settings, wanted, until, step, tuple(map(float, sizes)), own, tuple(skipped), probe)
+
+
+class Able:
+    """Which schemes can run, and follow a tolerance, with the rows and contacts of a model."""
+
+    def __init__(self, model: Any, options: Mapping[str, Any]) -> None:
+        self.equations = mechanism_of(model, options.get("backend", "auto"), options.get("parameters")).equations
+        self.manager, self.options = ActiveSetManager(self.equations), options
+
+    def refused(self, scheme: Integrator, tol: float | None = None) -> list[str]:
+        """Why not, [] where it can."""
+        contact, locate = self.options.get("contact", "auto"), self.options.get("locate", "root")
+        contact, _ = strategy_of(contact, self.manager, locate, tol is not None)
+        return refusals(self.equations, scheme, {**self.options, "contact": contact, "locate": locate, "tol": tol})
+
+
+def _settings(
+    schemes: Mapping[str, Integrator], able: Able, probe: Trajectory, span: float, dts: Any, tols: Any, target: Any
+) -> tuple[dict[str, tuple[Setting, ...]], list[str]]:
+    """Steps, then tolerances of each scheme, and which follow none; own ones where neither was given."""
+    given = None if dts is None else sorted(map(float, dts), reverse=True)
+    own, found, skipped = dts is None and tols is None, {}, []
+    ranges = [float(np.ptp(column)) for column in probe.record.q.T]
+    for name, scheme in schemes.items():
+        steps = given or ((long_steps if is_high(scheme) else steps_of)(probe, span) if own else ())
+        asked = tolerances(scheme, ranges, target) if own else sorted(map(float, () if tols is None else tols))[::-1]
+        refused = able.refused(scheme, asked[0]) if len(asked) else []
+        if refused and not able.refused(scheme):
+            skipped.append(f"{name} follows no tolerance here: {refused[0]}")
+        kept = () if refused else tuple(asked)
+        found[name] = (*(Setting(dt) for dt in steps), *(Setting(tol=tol) for tol in kept))
+    return found, skipped
 
 
 def _wrong_schemes(integrators: Any) -> list[str]:
@@ -104,21 +155,19 @@ def _wrong_schemes(integrators: Any) -> list[str]:
     ]  # fmt: skip
 
 
-def _wrong_steps(dts: Any) -> list[str]:
-    if dts is None:
+def _wrong_numbers(given: Any, name: str, what: str, rule: str) -> list[str]:
+    if given is None:
         return []
-    if isinstance(dts, str) or not isinstance(dts, Sequence | np.ndarray) or len(dts) == 0:
-        return [f"dts must be a list of steps [s], not {dts!r}"]
-    return [
-        f"a step must be a positive number of seconds, not {dt!r}"
-        for dt in dts if not is_number(dt) or not math.isfinite(dt) or dt <= 0.0
-    ]  # fmt: skip
+    if isinstance(given, str) or not isinstance(given, Sequence | np.ndarray) or len(given) == 0:
+        return [f"{name} must be a list of {what}, not {given!r}"]
+    return [f"{rule}, not {each!r}" for each in given if not is_number(each) or not math.isfinite(each) or each <= 0.0]
 
 
-def _schemes(rows: bool, also: Any) -> tuple[Integrator, ...]:
-    """Five of the family, from no damping to much, index 3 where there are rows; and one more if it is not there."""
+def _schemes(able: Able, rows: bool, also: Any) -> tuple[Integrator, ...]:
+    """Four of the family, from no damping to much, index 3 where there are rows; two of high order; and one's own."""
     last = HHT(alpha=0.05, formulation="index3") if rows else HHT(alpha=0.3)
-    known = (Newmark(), HHT(alpha=0.05), GeneralizedAlpha(rho_inf=0.9), GeneralizedAlpha(rho_inf=0.5), last)
+    wanted = (Newmark(), HHT(alpha=0.05), GeneralizedAlpha(rho_inf=0.5), last, RadauIIA(), RungeKutta853())
+    known = tuple(scheme for scheme in wanted if not able.refused(scheme))
     return known if also is None or also in known else (*known, also)
 
 
@@ -159,35 +208,3 @@ def _quantities(probe: Trajectory, wanted: Any) -> tuple[str, ...]:
         known = (*probe.names, *probe.columns.vectors)
         raise UnknownNameError([nearest(name, known, "quantity") for name in wrong])
     return tuple(dict.fromkeys(part for name in names for part in probe.columns.components(name)))
-
-
-def steps_of(probe: Trajectory, span: float) -> tuple[float, ...]:
-    """Six steps, halved each time, from a fifth of the model's shortest time scale on."""
-    record = probe.record
-    swing = np.ptp(record.v, axis=0) if len(record.v) else np.zeros(0)
-    rise = np.percentile(np.abs(record.a), 99, axis=0) if len(record.a) else np.zeros(0)
-    times = [s / r for s, r in zip(swing, rise, strict=True) if r > 1e-9 * np.max(rise) and s > 0.0]
-    largest = rounded(min([*times, span / 4.0]) / FINENESS)
-    return tuple(largest / 2**k for k in range(COUNT))
-
-
-def steps_for(target: float, error: float, dt: float, span: float) -> tuple[float, ...]:
-    """Six steps around that of an error, if `dt` has another and the order is 2; the finest for a tenth of it.
-
-    >>> steps_for(1e-4, error=1e-3, dt=1e-3, span=1.0)
-    (0.00256, 0.00128, 0.00064, 0.00032, 0.00016, 8e-05)
-    """
-    finest = max(0.9 * dt * math.sqrt(target / TENTH / error), span / MOST_STEPS)
-    least = rounded(min(finest, span / 2**COUNT))
-    return tuple(least * 2.0**k for k in reversed(range(COUNT)))
-
-
-def rounded(value: float) -> float:
-    """The next of 1, 2, 4, 5, 8 times a power of ten below.
-
-    >>> rounded(0.0123), rounded(0.0079)
-    (0.01, 0.005)
-    """
-    power = 10.0 ** math.floor(math.log10(value))
-    digit = max(d for d in (1, 2, 4, 5, 8) if d <= value / power * (1.0 + 1e-9))
-    return float(f"{digit * power:.3g}")

@@ -35,14 +35,14 @@ def run(script: Script, arguments: Namespace) -> int:
 
     Parameters
     ----------
-    arguments : target, out, until, dt, quantity, open; see `mbd.view.lab_arguments`
+    arguments : target, out, until, dt, tol, quantity, open; see `mbd.view.lab_arguments`
     """
     script.require("model", "start", *(["until"] if arguments.until is None else []))
     names, out = script.names, Path(arguments.out or Path("mbd-runs") / script.path.stem.replace("_", "-"))
     found = accuracy(
         names["model"], names["start"], names["until"] if arguments.until is None else arguments.until,
         quantities=arguments.quantity, dts=arguments.dt, target=arguments.target, also=names.get("integrator"),
-        progress=True, **{name: names[name] for name in OPTIONS if name in names},
+        tols=arguments.tol, progress=True, **{name: names[name] for name in OPTIONS if name in names},
     )  # fmt: skip
     print(found)
     written = [found.to_csv(out / "accuracy.csv")]

@@ -8,24 +8,23 @@ from contextlib import nullcontext
 from dataclasses import replace
 from typing import Any
 
-from mbd.analysis.accuracy.choices import Plan, plan, steps_for
-from mbd.analysis.accuracy.points import Point, Setting, measured, retimed
+from mbd.analysis.accuracy.choices import Plan, plan
+from mbd.analysis.accuracy.points import Point, Subject, measured, retimed
 from mbd.analysis.accuracy.result import Accuracy
-from mbd.analysis.accuracy.truth import Truth, stopped, truth
+from mbd.analysis.accuracy.settings import Setting, is_high, steps_for
+from mbd.analysis.accuracy.truth import Truth, truth
 from mbd.assembly import is_number
 from mbd.errors import ModelError
 from mbd.integrators import Integrator
-from mbd.simulation.simulate import simulate
 from mbd.state import State
-from mbd.trajectory import Trajectory
 from mbd.view.progress import Progress, share_bar
 
 __all__ = ["accuracy", "with_orders"]
 
 PATIENCE = 5.0
 """Wall time for timing all points some more [s]."""
-REFERENCE_RUNS = 3
-"""Runs of the reference: itself, its bound, and the growth of errors."""
+REFERENCE_RUNS = 4
+"""Runs of the reference: itself, its bound, the growth of errors, and a check by another scheme."""
 
 
 def accuracy(
@@ -38,13 +37,14 @@ def accuracy(
     target: float | None = None,
     progress: Progress | bool | None = None,
     also: Integrator | None = None,
+    tols: Sequence[float] | None = None,
     **options: Any,
 ) -> Accuracy:
-    """Measure what accuracy costs: errors, orders and wall times of schemes and steps, across impacts.
+    """Measure what accuracy costs: errors, orders and wall times of schemes, steps and tolerances, across impacts.
 
-    The reference is of another kind than what it judges, Dormand & Prince's method 8(5,3) with error control on the
-    mechanism's own accelerations; its own error is bounded by a second run with another tolerance and other steps. An
-    error that is less than ten times that bound is not told.
+    The reference is Dormand & Prince's method 8(5,3) with error control on the mechanism's own accelerations; its own
+    error is bounded by a second run with another tolerance and other steps, and where it judges `RungeKutta853`, which
+    has its formulas, by a run of `RadauIIA` too. An error that is less than ten times that bound is not told.
 
     Parameters
     ----------
@@ -52,8 +52,11 @@ def accuracy(
     start : from `mbd.assemble`
     until : end time [s], or the event that ends the runs, or (event, latest time)
     quantities : names of results; default all coordinates and their rates
-    integrators : a list, or a dictionary by label; default five of the Newmark family
-    dts : steps [s]; default six, halved each time, from the time scales of the model
+    integrators : a list, or a dictionary by label; default four of the Newmark family, `RadauIIA` and `RungeKutta853`
+    dts : steps [s] of all schemes; default six, halved each time, from the time scales of the model, longer ones for
+        schemes of high order, which stop where their error is that of the reference
+    tols : tolerances of ``simulate(tol=)`` [m, rad], for the schemes that follow one. Where either of dts and tols is
+        given only that is measured; where none is, tolerances around the target, or of three sizes
     target : error that is wanted, relative to the range of a quantity, for the recommendation [-]
     progress : True for a bar on a terminal, or ``progress(done, total)`` in runs
     also : an integrator that joins the default ones where it is none of them
@@ -66,15 +69,15 @@ def accuracy(
     """
     _check(target, options)
     options["parameters"] = {**getattr(start, "parameters", {}), **(options.get("parameters") or {})}
-    chosen = plan(model, start, until, quantities, integrators, dts, options, also)
+    chosen = plan(model, start, until, quantities, integrators, dts, options, also, tols, target)
     with share_bar() if progress is True else nullcontext(progress or None) as told:
         bench = Bench(model, start, chosen, options, told)
         reference = bench.reference()
-        points, complete = bench.points(target if dts is None else None)
+        points, complete = bench.points(target)
     notes = _notes(reference, bench.chosen, points, complete)
+    ordered = points if _unordered(bench) else with_orders(points, chosen.schemes)
     return Accuracy(
-        chosen.probe.name, chosen.quantities, tuple(with_orders(points, chosen.schemes)), bench.known, target, complete,
-        tuple(notes),
+        chosen.probe.name, chosen.quantities, tuple(ordered), bench.known, target, complete, tuple(notes),
     )  # fmt: skip
 
 
@@ -84,7 +87,7 @@ class Bench:
     def __init__(
         self, model: Any, start: State, chosen: Plan, options: Mapping[str, Any], told: Progress | None
     ) -> None:
-        self.model, self.start, self.chosen, self.options, self.told = model, start, chosen, options, told
+        self.subject, self.chosen, self.told = Subject(model, start, chosen.until, options), chosen, told
         self.total = REFERENCE_RUNS + chosen.count + 1
         self.known: Truth | None = None
 
@@ -95,55 +98,61 @@ class Bench:
 
     def reference(self) -> Truth | str:
         """What to judge by, or why there is none."""
+        subject, chosen = self.subject, self.chosen
         found = truth(
-            self.model, self.start, self.chosen.until, self.chosen.quantities, self.chosen.step, self.chosen.sizes,
-            self.options, [self.share(run) for run in range(REFERENCE_RUNS)],
+            subject.model, subject.start, chosen.until, chosen.quantities, chosen.step, chosen.sizes, subject.options,
+            [self.share(run) for run in range(REFERENCE_RUNS)], tuple(chosen.schemes.values()),
         )  # fmt: skip
         self.known = None if isinstance(found, str) else found
         return found
 
     def points(self, target: float | None) -> tuple[list[Point], bool]:
-        """Every scheme with every step, and whether it was not interrupted; steps around a target, if there is one."""
+        """Every scheme with every setting, and whether it was not interrupted; own steps are around a target."""
         found: list[Point] = []
         try:
-            if target is not None:
-                self.chosen = replace(self.chosen, dts=_around(self.chosen, target, self.point))
-            for name, scheme in self.chosen.schemes.items():
-                for dt in self.chosen.dts:
-                    found.append(self.point(name, scheme, dt, len(found)))
+            if target is not None and self.chosen.own:
+                self.chosen = self.chosen.with_steps(_around(self.chosen, target, self.point))
+            place = 0
+            for name, settings in self.chosen.settings.items():
+                self._of(name, settings, place, found)
+                place += len(settings)
             found = retimed(found, self.again, PATIENCE, self.share(self.total - 1))
             self.share(self.total - 1)(1.0)
         except KeyboardInterrupt:
             return found, False
         return found, True
 
-    def point(self, name: str, scheme: Integrator, dt: float, place: int = 0) -> Point:
+    def _of(self, name: str, settings: Sequence[Setting], place: int, found: list[Point]) -> None:
+        """The points of one scheme; own settings end where the error is no longer clear beside the reference's."""
+        done: set[bool] = set()
+        for k, setting in enumerate(settings):
+            by_tolerance = setting.tol is not None
+            if by_tolerance in done:
+                continue
+            point = self.point(name, setting, place + k)
+            found.append(point)
+            if self.chosen.own and self.known is not None and not point.failure and point.error is None:
+                done.add(by_tolerance)
+
+    def point(self, name: str, setting: Setting, place: int = 0) -> Point:
         """One measured point, the `place`-th of all."""
         share = self.share(REFERENCE_RUNS + place)
-        return measured(
-            self.model, self.start, self.chosen.until, scheme, name, Setting(dt), self.known, self.options, share
-        )
+        return measured(self.subject, self.chosen.schemes[name], name, setting, self.known, share)
 
-    def again(self, point: Point) -> Trajectory:
-        """One more run of a point."""
-        scheme, until = self.chosen.schemes[point.scheme], self.chosen.until
-        run = simulate(
-            self.model, self.start, scheme, **Setting(point.dt).arguments, until=until, **self.options,
-            on_failure="return",
-        )  # fmt: skip
-        if stopped(run):
-            raise KeyboardInterrupt
-        return run
+    def again(self, point: Point) -> float:
+        """Wall time of one more run of a point."""
+        return self.subject.run(self.chosen.schemes[point.scheme], point.setting, lambda part: None)[1]
 
 
-def _around(chosen: Plan, target: float, point: Callable[[str, Integrator, float], Point]) -> tuple[float, ...]:
-    """Steps around the one that reaches the target, judged by a first point or two; those of the plan otherwise."""
-    name, scheme = next(iter(chosen.schemes.items()))
-    for dt in chosen.dts[-2:]:
-        first = point(name, scheme, dt)
+def _around(chosen: Plan, target: float, point: Callable[[str, Setting], Point]) -> tuple[float, ...]:
+    """Steps of low order around the one that reaches the target, judged by a first point or two; else as planned."""
+    low = [name for name, scheme in chosen.schemes.items() if not is_high(scheme)]
+    dts = [setting.dt for setting in chosen.settings[low[0]] if setting.dt is not None] if low else []
+    for dt in dts[-2:]:
+        first = point(low[0], Setting(dt))
         if first.error and not first.failure and first.same_events:
             return steps_for(target, first.error, dt, float(chosen.probe.time[-1]) - float(chosen.probe.time[0]))
-    return chosen.dts
+    return tuple(dts)
 
 
 def _check(target: Any, options: Mapping[str, Any]) -> None:
@@ -159,29 +168,37 @@ def _check(target: Any, options: Mapping[str, Any]) -> None:
 
 
 def with_orders(points: Sequence[Point], schemes: Mapping[str, Any]) -> list[Point]:
-    """The points with the orders between neighbours, where both errors are known and of the same events."""
+    """The points with the orders between neighbouring steps, where both errors are known and of the same events."""
     found = []
     for scheme in schemes:
         before: Point | None = None
         for point in (each for each in points if each.scheme == scheme):
-            order = None
-            if before is not None and point.error and before.error and point.same_events and before.same_events:
+            known = before is not None and before.error and before.same_events and point.error and point.same_events
+            if known and before is not None and before.error and point.error and before.dt and point.dt:
                 order = math.log(before.error / point.error) / math.log(before.dt / point.dt)
-            found.append(replace(point, order=order))
+                found.append(replace(point, order=order))
+            else:
+                found.append(replace(point, order=None))
             before = point
     return found
+
+
+def _unordered(bench: Bench) -> bool:
+    """Whether impacts are corrected at the ends of steps, so that no order can be observed."""
+    struck = bench.known is not None and any(event.kind == "closed" for event in bench.known.run.events)
+    return struck and bench.chosen.probe.settings.get("contact") == "nonsmooth"
 
 
 def _notes(reference: Truth | str, chosen: Plan, points: Sequence[Point], complete: bool) -> list[str]:
     """What a reader must know before reading the errors."""
     notes = [] if complete else [f"interrupted: {len(points)} of {chosen.count} points were measured"]
+    notes += chosen.skipped
     if isinstance(reference, str):
         return [*notes, reference]
     growth = reference.growth
     if not reference.same_events:
         notes.append("the two runs of the reference have not the same events; some are too short to be sure of")
-    if reference.error > 0.01:
-        notes.append(f"the reference has not converged: its two runs differ by {reference.error:.1g}")
+    notes += _kinship(reference, chosen)
     if growth is None:
         notes.append("the growth of errors could not be measured")
     elif growth > 1e3:
@@ -191,8 +208,25 @@ def _notes(reference: Truth | str, chosen: Plan, points: Sequence[Point], comple
     failed = sum(bool(point.failure) for point in points)
     if failed:
         notes.append(f"{failed} {'point' if failed == 1 else 'points'} failed; the table says why")
+    notes += [
+        f"{point.scheme} with {point.setting} is off by {point.achieved:.2g} at or between its rows, more than asked"
+        for point in points if point.tol is not None and point.achieved is not None and point.achieved > point.tol
+    ]  # fmt: skip
     if any(not point.same_events for point in points):
         notes.append("where events are others than those of the reference (≠) no order can be observed")
     if chosen.probe.settings.get("contact") == "nonsmooth":
-        notes.append("contacts are non-smooth: first order at impacts, whatever the scheme; orders scatter")
+        notes.append("contacts are non-smooth, of first order at impacts whatever the scheme: no order can be observed")
     return notes
+
+
+def _kinship(reference: Truth, chosen: Plan) -> list[str]:
+    """Which schemes have the formulas of the reference, and what bounds the errors that both might share."""
+    kin = [name for name, scheme in chosen.schemes.items() if reference.is_kin(scheme)]
+    if not kin:
+        return []
+    if reference.checked is not None:
+        apart = max(reference.checked.values(), default=0.0)
+        known = f"a run of RadauIIA, another scheme, agrees with it to {apart:.1g}"
+    else:
+        known = "errors that both might share have not been looked for by another scheme"
+    return [f"{', '.join(kin)}: the reference has the same formulas, with steps of its own; {known}"]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbd.analysis.accuracy.compare import differences
+from mbd.analysis.accuracy.settings import Setting
 from mbd.analysis.accuracy.truth import Truth, stopped
 from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import MbdError
@@ -20,44 +21,29 @@ from mbd.state import State
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
 
-__all__ = ["Point", "Setting", "measured", "retimed"]
+__all__ = ["Point", "Setting", "Subject", "measured", "retimed"]
 
 REPEATS, ENOUGH = 5, 0.2
 """A run is repeated up to this many times, but not once this much wall time [s] is spent on it."""
-ROUNDS = 3
-"""Rounds over all points that time them once more."""
+ROUNDS, SHORT = 10, 0.3
+"""Rounds over all points, the quickest first, that time each once more until it took this much wall time [s]."""
 CLEAR = 10.0
 """An error is told where it is this many times the bound of the reference [-]."""
 
 
 @dataclass(frozen=True)
-class Setting:
-    """How fine a run is: its step [s]."""
-
-    dt: float
-
-    @property
-    def arguments(self) -> dict[str, Any]:
-        """For `simulate`."""
-        return {"dt": self.dt}
-
-    def __str__(self) -> str:
-        return f"dt = {self.dt:.4g} s"
-
-
-@dataclass(frozen=True)
 class Point:
-    """A scheme with a step: how accurate, and at what cost.
+    """A scheme with a step or a tolerance: how accurate, and at what cost.
 
     Parameters
     ----------
     scheme : the integrator's label
-    dt : step [s]
+    dt : step [s]; None with a tolerance
     error : largest error of all quantities, relative to their ranges, over all instants [-]; None where it is not known
     at_most : what the error does not exceed: it with the bound of the reference; None where nothing is known
     errors, end_errors : of each quantity: the largest over the instants, and at the end
     order : observed between this step and the next coarser one; None where none can be observed
-    seconds : wall time, the least of some repeats, without derivation and compilation [s]
+    seconds : wall time of the call, the least of some repeats, without derivation and compilation [s]
     steps, iterations, tangents, residuals, factorizations : counts of the run; Newton's are 0 for schemes of one's own
     drift, drift_rate : largest |h| [m or rad] and |ḣ| of the rows that act
     energy : largest energy that the scheme itself gained or lost [J]
@@ -67,10 +53,15 @@ class Point:
     left_out : share of the instants between an event and its match [-]
     failure : why there is no run, '' after a success
     note : what else should be known
+    tol : tolerance that was asked for [m, rad]; None with fixed steps
+    achieved : largest error of a coordinate, which `tol` is about [m, rad]; None: not known
+    estimated : what the run itself takes that to be [m, rad]
+    runs : how many runs there were, trial runs with it; counts are those of the one that is returned
+    trials : share of the wall time that all but that one took, and comparing them [-]
     """
 
     scheme: str
-    dt: float
+    dt: float | None
     error: float | None = None
     at_most: float | None = None
     errors: Mapping[str, float] = field(default_factory=dict, repr=False)
@@ -91,57 +82,105 @@ class Point:
     left_out: float = 0.0
     failure: str = ""
     note: str = ""
+    tol: float | None = None
+    achieved: float | None = None
+    estimated: float | None = None
+    runs: int = 1
+    trials: float = 0.0
+
+    @property
+    def setting(self) -> Setting:
+        """Its step or its tolerance."""
+        return Setting(self.dt, self.tol)
 
     def reaches(self, target: float) -> bool:
         """Whether the error is certainly no larger than that."""
         return not self.failure and self.at_most is not None and self.at_most <= target
 
 
-def measured(
-    model: Any, start: State, until: Any, scheme: Integrator, label: str, setting: Setting, truth: Truth | None,
-    options: Mapping[str, Any], share: Callable[[float], None],
-) -> Point:  # fmt: skip
-    """Run a scheme, some times over, and judge it.
+@dataclass(frozen=True)
+class Subject:
+    """What is run again and again: a model from a start to an end, with the options of `simulate`."""
 
-    Raises
-    ------
-    KeyboardInterrupt
-        where the user stopped it.
-    """
-    last = until[1] if isinstance(until, tuple) else until
-    mechanism = mechanism_of(model, options.get("backend", "auto"), options.get("parameters"))
-    spent, best, run = 0.0, float("inf"), None
-    for repeat in range(REPEATS):
-        made = mechanism.seconds
-        try:
-            run = simulate(
-                model, start, scheme, **setting.arguments, until=until, **options, on_failure="return",
-                progress=lambda t, _: share((t - start.time) / max(last - start.time, 1e-300)),
-            )  # fmt: skip
-        except MbdError as error:
-            return Point(label, setting.dt, failure=str(error))
+    model: Any
+    start: State
+    until: Any
+    options: Mapping[str, Any]
+
+    def run(self, scheme: Integrator, setting: Setting, share: Callable[[float], None]) -> tuple[Trajectory, float]:
+        """A run and the wall time of the call, without derivation and compilation [s].
+
+        Raises
+        ------
+        KeyboardInterrupt
+            where the user stopped it.
+        """
+        mechanism = mechanism_of(self.model, self.options.get("backend", "auto"), self.options.get("parameters"))
+        last, begin = self.until[1] if isinstance(self.until, tuple) else self.until, self.start.time
+        made, began = mechanism.seconds, perf_counter()
+        run = simulate(
+            self.model, self.start, scheme, **setting.arguments, until=self.until, **self.options, on_failure="return",
+            progress=lambda t, _: share((t - begin) / max(last - begin, 1e-300)),
+        )  # fmt: skip
         if stopped(run):
             raise KeyboardInterrupt
-        if not run.success:
-            return Point(label, setting.dt, failure=run.message)
-        seconds = run.stats["wall_seconds"]
-        best = min(best, seconds - (mechanism.seconds - made))
+        return run, perf_counter() - began - (mechanism.seconds - made)
+
+
+def measured(
+    subject: Subject, scheme: Integrator, label: str, setting: Setting, truth: Truth | None,
+    share: Callable[[float], None],
+) -> Point:  # fmt: skip
+    """Run a scheme, some times over, and judge it; `KeyboardInterrupt` where the user stopped it."""
+    spent, best, run = 0.0, float("inf"), None
+    point = Point(label, setting.dt, tol=setting.tol)
+    for _ in range(REPEATS):
+        began = perf_counter()
+        try:
+            latest, seconds = subject.run(scheme, setting, share)
+        except MbdError as error:
+            return replace(point, failure=str(error))
+        if not latest.success:
+            return replace(point, failure=latest.message, **_tolerance(latest, seconds))
+        if seconds < best:
+            run, best = latest, seconds
         spent += seconds
-        if spent > ENOUGH and (repeat > 0 or mechanism.seconds == made):
+        if spent > ENOUGH and perf_counter() - began < 2.0 * seconds:  # else it was compiled on the way
             break
     assert run is not None
     violation, stats = run.violation, run.stats
     names = ("steps", "iterations", "tangents", "residuals", "factorizations")
-    judged = _judged(run, truth) if truth is not None else {"note": "there is no reference"}
-    return Point(
-        label, setting.dt, seconds=best, **{name: stats[name] for name in names},
+    judged = _judged(run, truth, scheme) if truth is not None else {"note": "there is no reference"}
+    if setting.tol is not None:
+        judged |= _tolerance(run, best) | {"achieved": None if truth is None else _achieved(run, truth)}
+    return replace(
+        point, seconds=best, **{name: stats[name] for name in names},
         drift=max(violation.length, violation.angle), drift_rate=violation.rate,
         energy=float(np.max(np.abs(run.energy.numerical), initial=0.0)), events=len(run.events), **judged,
     )  # fmt: skip
 
 
+def _tolerance(run: Trajectory, seconds: float) -> dict[str, Any]:
+    """What a run to a tolerance says of itself."""
+    told = run.stats.get("tolerance")
+    if told is None:
+        return {}
+    return {
+        "estimated": told["estimated"], "runs": len(told["runs"]),
+        "trials": max(1.0 - run.stats["wall_seconds"] / seconds, 0.0),
+    }  # fmt: skip
+
+
+def _achieved(run: Trajectory, truth: Truth) -> float | None:
+    """Largest error of a coordinate [m, rad]; None where it is not clear beside the reference's own."""
+    names = [name for name, _ in run.facts.coordinates][: run.facts.coordinate_count]
+    found = differences(run, truth.run, dict.fromkeys(names, 1.0), truth.instants)
+    floor = max((truth.bound[name] * truth.scales[name] for name in names if name in truth.bound), default=0.0)
+    return found.error if found.error >= CLEAR * floor else None
+
+
 def retimed(
-    points: Sequence[Point], once: Callable[[Point], Trajectory], patience: float, share: Callable[[float], None]
+    points: Sequence[Point], once: Callable[[Point], float], patience: float, share: Callable[[float], None]
 ) -> list[Point]:
     """The points with the least wall time of some more rounds over all of them.
 
@@ -149,41 +188,43 @@ def retimed(
 
     Parameters
     ----------
-    once : a run of a point
+    once : wall time of one more run of a point [s]
     patience : wall time for all rounds [s]
     """
     found, began = list(points), perf_counter()
-    for _ in range(ROUNDS):
-        for place, point in enumerate(found):
-            spent = perf_counter() - began
-            if spent + (0.0 if point.failure else point.seconds) >= patience:
+    places = sorted((k for k, point in enumerate(found) if not point.failure), key=lambda k: found[k].seconds)
+    for turn in range(ROUNDS):
+        for place in places:
+            point, spent = found[place], perf_counter() - began
+            if spent + point.seconds >= patience:
                 return found
             share(spent / patience)
-            if not point.failure:
-                found[place] = replace(point, seconds=min(point.seconds, once(point).stats["wall_seconds"]))
+            if turn * point.seconds <= SHORT:
+                found[place] = replace(point, seconds=min(point.seconds, once(point)))
     return found
 
 
-def _judged(run: Any, truth: Truth) -> dict[str, Any]:
+def _judged(run: Any, truth: Truth, scheme: Integrator) -> dict[str, Any]:
     """Errors of a run against the reference, as far as that can tell."""
     early = run.time[-1] < truth.run.time[-1] - 1e-9 * abs(truth.run.time[-1]) and run.status == 1
     if early and truth.run.status != 1:
         return {"failure": f"{run.message}, where the reference goes on"}
+    known = truth.bound_of(scheme)
     found = differences(run, truth.run, truth.scales, truth.instants)
     clear = {
         name: max(found.largest.get(name, 0.0), found.at_end.get(name, 0.0)) >= CLEAR * bound
-        for name, bound in truth.bound.items()
+        for name, bound in known.items()
     }
-    worst = {name: max(found.largest.get(name, 0.0), found.at_end.get(name, 0.0)) for name in truth.bound}
+    worst = {name: max(found.largest.get(name, 0.0), found.at_end.get(name, 0.0)) for name in known}
     leading = max(worst, key=lambda name: worst[name])
     told = clear[leading]
-    notes = [] if told else [f"no clear error beside the reference's own, {truth.bound[leading]:.1g}"]
+    notes = [] if told else [f"no clear error beside the reference's own, {known[leading]:.1g}"]
     notes += [f"{found.left_out:.0%} of the instants lie beside events"] if found.left_out > 0.2 else []
     return {
         "error": found.error if told else None,
-        "at_most": max(worst[name] + bound for name, bound in truth.bound.items()),
+        "at_most": max(worst[name] + bound for name, bound in known.items()),
         "errors": {name: value for name, value in found.largest.items() if clear[name]},
-        "end_errors": {name: value for name, value in found.at_end.items() if value >= CLEAR * truth.bound[name]},
+        "end_errors": {name: value for name, value in found.at_end.items() if value >= CLEAR * known[name]},
         "event_time": found.event_time, "same_events": found.same_events, "left_out": found.left_out,
         "note": "; ".join(notes),
     }  # fmt: skip

@@ -16,10 +16,10 @@ from mbd.results.tables import library
 if TYPE_CHECKING:
     from mbd.analysis.accuracy.truth import Truth
 
-__all__ = ["HEADS", "Accuracy", "cells"]
+__all__ = ["HEADS", "Accuracy", "cells", "remark"]
 
 HEADS = (
-    "scheme", "dt [s]", "error", "order", "time [ms]", "steps", "Newton", "tangents", "residuals", "factored",
+    "scheme", "dt [s] or tol", "error", "order", "time [ms]", "steps", "Newton", "tangents", "residuals", "factored",
     "drift", "energy [J]", "event time [s]", "events",
 )  # fmt: skip
 """Columns of the table."""
@@ -30,13 +30,13 @@ MAPPINGS = ("errors", "end_errors")
 
 @dataclass(frozen=True, eq=False)
 class Accuracy:
-    """Errors and costs of schemes and steps.
+    """Errors and costs of schemes with steps and tolerances.
 
     Attributes
     ----------
     model : name of the model
     quantities : whose errors were measured
-    points : a `Point` for each scheme and step, the coarsest step of a scheme first
+    points : a `Point` for each scheme and step or tolerance, the coarsest of a scheme first
     reference : what they were judged by, with its own bound, and the growth of errors; None where there is none
     target : error that was wanted [-]
     complete : False where it was interrupted
@@ -89,7 +89,7 @@ class Accuracy:
             if point.failure:
                 lines.append(f"{row[0]:<{widths[0]}}  {row[1]:>{widths[1]}}  failed: {point.failure}")
             else:
-                lines.append(_line(row, widths) + (f"  {point.note}" if point.note else ""))
+                lines.append(_line(row, widths) + (f"  {remark(point)}" if remark(point) else ""))
         lines += ["", *(f"note: {note}" for note in self.notes), *self.recommendation]
         return "\n".join(lines)
 
@@ -123,7 +123,7 @@ class Accuracy:
 
     # pictures -------------------------------------------------------------------------------------------------------
     def plot(self, path: str | Path | None = None) -> Any:
-        """Work and precision: error over wall time, a line for each scheme, steps written at its points.
+        """Work and precision: error over wall time, a line for each scheme, dashed through its tolerances.
 
         Returns the matplotlib figure, also saved when a path is given.
         """
@@ -140,7 +140,7 @@ class Accuracy:
 
 def cells(point: Point) -> list[str]:
     """A point as the texts of a row of `HEADS`."""
-    start = [point.scheme, f"{point.dt:.4g}"]
+    start = [point.scheme, f"{point.dt:.4g}" if point.tol is None else f"tol {point.tol:.3g}"]
     if point.failure:
         return [*start, "failed", *[""] * (len(HEADS) - 3)]
     error = f"{point.error:.2e}" if point.error is not None else "–"
@@ -153,6 +153,16 @@ def cells(point: Point) -> list[str]:
         f"{point.event_time:.1e}" if point.events and point.event_time is not None else "–",
         str(point.events) + ("" if point.same_events else " ≠"),
     ]  # fmt: skip
+
+
+def remark(point: Point) -> str:
+    """What stands behind a row: what became of a tolerance, and the point's note."""
+    if point.tol is None:
+        return point.note
+    achieved = "–" if point.achieved is None else f"{point.achieved:.1e}"
+    estimated = "–" if point.estimated is None else f"{point.estimated:.1e}"
+    said = f"achieved {achieved}, estimated {estimated}; {point.runs} runs, trials {point.trials:.0%} of the time"
+    return f"{said}; {point.note}" if point.note else said
 
 
 def _line(texts: Sequence[str], widths: Sequence[int]) -> str:

@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbd.analysis.accuracy.compare import differences, ranges
+from mbd.analysis.accuracy.compare import Difference, differences, ranges
 from mbd.analysis.accuracy.reference import Method, RungeKuttaReference
 from mbd.arrays import Vector
 from mbd.compile.mechanisms import mechanism_of
+from mbd.errors import MbdError
+from mbd.integrators import Integrator, RadauIIA, RungeKutta853
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.simulation.simulate import simulate
 from mbd.state import State
@@ -28,6 +30,17 @@ INSTANTS = 400
 """Common instants at which runs are compared, at most: stored rows of the reference, which need no interpolation."""
 NUDGE = 1e-9
 """Part of their range by which the velocities of the start are changed, to measure how errors grow [-]."""
+UNSURE = 0.01
+"""Bound of the reference above which it has not converged, and judges nobody [-]."""
+CHECKS = (2.0, 8.0, 32.0)
+"""Steps between rows of the reference over those of the runs that check it, one after the other [-]."""
+NEAR = 3.0
+"""Difference of such a run, over the bound of the reference, that is near enough [-]."""
+CHECK_SECONDS = 3.0
+"""Wall time of such a run after which no finer one is made [s]."""
+WORDS = {"DOP853": "Dormand–Prince 8(5,3)", "Radau": "Radau IIA of order 5"}
+KIN: dict[Method, type[Integrator]] = {"DOP853": RungeKutta853, "Radau": RadauIIA}
+"""Schemes with the formulas of a reference."""
 
 Share = Callable[[float], None]
 """Told which share of a run is done, 0 … 1."""
@@ -49,6 +62,9 @@ class Truth:
     same_events : whether both have the same events
     growth : how many times a small change of the start has grown at most [-]; None where it could not be measured
     seconds : wall time of all that [s]
+    kind : which formulas it has
+    checked : bound by another scheme: difference to a run of `RadauIIA`, of each quantity; for schemes that have the
+        formulas of the reference and might share its errors; None: there is none
     """
 
     run: Trajectory = field(repr=False)
@@ -60,6 +76,16 @@ class Truth:
     same_events: bool
     growth: float | None
     seconds: float
+    kind: Method = "DOP853"
+    checked: Mapping[str, float] | None = None
+
+    def is_kin(self, scheme: Integrator) -> bool:
+        """Whether a scheme has the formulas of the reference."""
+        return isinstance(scheme, KIN[self.kind])
+
+    def bound_of(self, scheme: Integrator) -> Mapping[str, float]:
+        """What the reference is known to where it judges a scheme, for each quantity [-]."""
+        return self.checked if self.checked is not None and self.is_kin(scheme) else self.bound
 
     @property
     def error(self) -> float:
@@ -69,7 +95,7 @@ class Truth:
 
 def truth(
     model: Any, start: State, until: Any, names: Sequence[str], step: float, sizes: Sequence[float],
-    options: Mapping[str, Any], shares: Sequence[Share],
+    options: Mapping[str, Any], shares: Sequence[Share], schemes: Sequence[Integrator] = (),
 ) -> Truth | str:  # fmt: skip
     """The reference, or in a sentence why there is none.
 
@@ -80,16 +106,18 @@ def truth(
     step : between two rows of the reference [s]
     sizes : of q, v and z
     options : of `simulate`
-    shares : progress of the three runs
+    shares : progress of the three runs, and of a fourth with `RadauIIA` where it is needed
+    schemes : that will be judged
     """
+    located = {**options, "contact": "events", "locate": "root"}
+    last = until[1] if isinstance(until, tuple) else until
     began = perf_counter()
 
     def run(method: Method, tolerance: float, dt: float, begin: State, share: Share) -> Trajectory:
         """One run of the reference scheme."""
-        last = until[1] if isinstance(until, tuple) else until
         return simulate(
-            model, begin, RungeKuttaReference(tolerance, tuple(sizes), method), dt=dt, until=until,
-            **{**options, "contact": "events", "locate": "root"}, on_failure="return",
+            model, begin, RungeKuttaReference(tolerance, tuple(sizes), method), dt=dt, until=until, **located,
+            on_failure="return",
             progress=lambda t, _: share((t - start.time) / max(last - start.time, 1e-300)),
         )  # fmt: skip
 
@@ -108,12 +136,69 @@ def truth(
     scales = ranges(tight, names, instants)
     apart = differences(loose, tight, scales, instants)
     bound = {name: max(apart.largest.get(name, 0.0), apart.at_end.get(name, 0.0)) for name in scales}
+    if max(bound.values(), default=0.0) > UNSURE:
+        return _unconverged(bound, method, apart)
     growth = _growth(model, start, tight, options, lambda begin: run(method, TIGHT, step, begin, shares[2]))
-    words = {"DOP853": "Dormand–Prince 8(5,3)", "Radau": "Radau IIA of order 5"}[method]
-    return Truth(
-        tight, f"{words}, tolerance {TIGHT:g}", instants, scales, bound,
-        apart.event_time, apart.same_events, growth, perf_counter() - began,
+    found = Truth(
+        tight, f"{WORDS[method]}, tolerance {TIGHT:g}", instants, scales, bound,
+        apart.event_time, apart.same_events, growth, perf_counter() - began, method,
     )  # fmt: skip
+    if method != "DOP853" or not any(found.is_kin(scheme) for scheme in schemes):
+        return found
+
+    def other(dt: float) -> Trajectory:
+        """One run of another scheme."""
+        return simulate(
+            model, start, RadauIIA(), dt=dt, until=until, **located, on_failure="return",
+            progress=lambda t, _: shares[-1]((t - start.time) / max(last - start.time, 1e-300)),
+        )  # fmt: skip
+
+    return replace(found, checked=_by_another(found, other, step), seconds=perf_counter() - began)
+
+
+def _by_another(found: Truth, run: Callable[[float], Trajectory], step: float) -> dict[str, float] | None:
+    """Bound of the reference by runs of another scheme, finer ones until they agree with it or take long."""
+    checked: dict[str, float] | None = None
+    for parts in CHECKS:
+        try:
+            other = run(step / parts)
+        except MbdError:  # a scheme that cannot integrate this checks nothing
+            return checked
+        checked = _checked(other, found, checked)
+        known = max(checked.values(), default=0.0) if checked is not None else np.inf
+        if known <= NEAR * found.error or other.stats["wall_seconds"] > CHECK_SECONDS:
+            break
+    return checked
+
+
+def _unconverged(bound: Mapping[str, float], method: Method, apart: Difference) -> str:
+    """Why two runs that differ so much are no reference."""
+    worst = max(bound, key=lambda name: bound[name])
+    others = "" if apart.same_events else " and have other events"
+    return (
+        f"there is no reference, it has not converged: two runs of {WORDS[method]} with tolerances {TIGHT:g} and "
+        f"{LOOSE:g} differ by {bound[worst]:.1g} of the range of {worst!r}{others}; the motion is too sensitive, try a "
+        "shorter time"
+    )
+
+
+def _checked(other: Trajectory, found: Truth, before: dict[str, float] | None) -> dict[str, float] | None:
+    """The larger of the reference's bound and its difference to a run of another scheme, by quantity.
+
+    `before` is that of a coarser run, which stays where this one says no more.
+    """
+    if stopped(other):
+        raise KeyboardInterrupt
+    if not other.success:
+        return before
+    apart = differences(other, found.run, found.scales, found.instants)
+    if not apart.same_events:
+        return before
+    now = {
+        name: max(known, apart.largest.get(name, 0.0), apart.at_end.get(name, 0.0))
+        for name, known in found.bound.items()
+    }
+    return now if before is None else {name: min(value, before[name]) for name, value in now.items()}
 
 
 def chosen(times: Vector) -> Vector:

@@ -3,7 +3,7 @@
   const data = JSON.parse(document.getElementById("data").textContent);
   const [chart, tip, legend] = ["chart", "tip", "legend"].map((id) => document.getElementById(id));
   const [quantity, which, cost] = ["quantity", "which", "cost"].map((id) => document.getElementById(id));
-  const units = { seconds: "wall time [ms]", dt: "step dt [ms]", steps: "steps", iterations: "Newton iterations" };
+  const units = { seconds: "wall time [ms]", dt: "step dt [ms]", steps: "steps", iterations: "Newton iterations", residuals: "evaluations of the balance" };
   const margin = { left: 66, right: 70, top: 14, bottom: 44 };
 
   quantity.add(new Option("the largest of all", ""));
@@ -37,7 +37,8 @@
 
   const told = (scheme, point) => [
     scheme.name,
-    `dt      ${short(1e3 * point.dt)} ms`,
+    point.tol === null ? `dt      ${short(1e3 * point.dt)} ms` : `tol     ${short(point.tol)} m or rad`,
+    ...(point.tol === null ? [] : [`reached ${small(point.achieved)}, estimated ${small(point.estimated)}; ${point.runs} runs`]),
     `error   ${small(error(point))}${point.order === null ? "" : `   order ${point.order.toFixed(2)}`}`,
     `time    ${short(1e3 * point.seconds)} ms`,
     `steps   ${point.steps}, Newton ${point.iterations}`,
@@ -99,16 +100,19 @@
     }
     const labels = [];
     if (cost.value !== "dt")
-      [...new Set(all.map((each) => each.point.dt))].forEach((dt) => {
+      [...new Set(all.filter((each) => each.point.dt).map((each) => each.point.dt))].forEach((dt) => {
         const group = all.filter((each) => each.point.dt === dt).sort((a, b) => a.cost - b.cost);
         const end = group[group.length - 1];
-        make("polyline", { class: "same", points: group.map((each) => `${x(each.cost)},${y(each.error)}`).join(" ") });
+        if (group.length > 2) make("polyline", { class: "same", points: group.map((each) => `${x(each.cost)},${y(each.error)}`).join(" ") });
         labels.push([{ class: "step", x: x(end.cost) + 10, y: y(end.error) + 4 }, `${short(1e3 * dt)} ms`]);
       });
     const drawn = [];
     data.schemes.forEach((scheme, number) => {
       const points = all.filter((each) => each.scheme === scheme);
-      make("polyline", { class: "curve", "data-scheme": number, stroke: scheme.color, points: points.map((each) => `${x(each.cost)},${y(each.error)}`).join(" ") });
+      [true, false].forEach((fixed) => {
+        const line = points.filter((each) => (each.point.tol === null) === fixed);
+        make("polyline", { class: fixed ? "curve" : "curve trial", "data-scheme": number, stroke: scheme.color, points: line.map((each) => `${x(each.cost)},${y(each.error)}`).join(" ") });
+      });
       drawn.push(...points.map((each) => ({ ...each, number })));
     });
     labels.forEach(([place, text]) => make("text", place, text));
@@ -116,7 +120,7 @@
       const { scheme, number } = each;
       const at = { cx: x(each.cost), cy: y(each.error), "data-scheme": number };
       if (!each.point.same_events) make("circle", { ...at, class: "other", r: 9 });
-      const dot = make("circle", { ...at, class: "point", r: 5.5, fill: scheme.color, tabindex: 0 });
+      const dot = make("circle", { ...at, class: "point", r: each.point.tol === null ? 5.5 : 4, fill: scheme.color, tabindex: 0 });
       const open = () => { show(scheme, each.point, at.cx, at.cy); emphasize(number); };
       const close = () => { tip.hidden = true; emphasize(null); };
       dot.addEventListener("pointerenter", open);
