@@ -134,7 +134,8 @@ class Integrator(ABC):
     any_chart: ClassVar[bool] = True
     """Whether positions may move in any chart q ⊕ x; False: along q + x only."""
     between: ClassVar[str] = "hermite"
-    """How a run is read between its rows: 'hermite', or 'stages' where steps of `RungeKutta853` are taken again."""
+    """How a run is read between its rows: 'hermite', 'quintic' where accelerations are as accurate as positions, or
+    'stages' where steps of `RungeKutta853` are taken again."""
 
     @abstractmethod
     def order(self, system: System | None = None) -> int:

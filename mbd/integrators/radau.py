@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -79,6 +79,8 @@ class RadauIIA(Integrator):
     >>> RadauIIA().order()
     5
     """
+
+    between: ClassVar[str] = "quintic"
 
     tolerance: float = DEFAULT_TOLERANCE
 

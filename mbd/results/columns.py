@@ -140,7 +140,7 @@ class ModelColumns(Columns):
             self._steps = Restepping(self)
         if self._steps is not None:
             return self._steps.at(self.rows, places)
-        return self.grid.between(self.rows, places, self.q_rate)
+        return self.grid.between(self.rows, places, self.q_rate, is_smooth(self.record, self.equations.compose is None))
 
     @property
     def q_rate(self) -> Matrix:
@@ -247,7 +247,8 @@ class StoredColumns(Columns):
         return np.broadcast_to(self._values[name], (len(self.record.time),))
 
     def at_places(self, names: Sequence[str], places: Places) -> list[Vector]:
-        state = self.grid.between(self.record.rows(self._anchors), places, self._rates)
+        plain = np.array_equal(self._rates, self.record.v)
+        state = self.grid.between(self.record.rows(self._anchors), places, self._rates, is_smooth(self.record, plain))
         found = []
         for name in names:
             if name in self._aliases:
@@ -258,6 +259,11 @@ class StoredColumns(Columns):
                 slopes = self._read(rate, self.record) if known else self.grid.slopes(column)
                 found.append(places.blend(column, slopes))
         return found
+
+
+def is_smooth(record: Record, plain: bool) -> bool:
+    """Whether the scheme is of high order, with accelerations as accurate as positions; `plain`: q̇ = v."""
+    return plain and record.settings.get("between", "hermite") != "hermite"
 
 
 def gather(columns: Columns, read: Callable[[Sequence[str]], list[Vector]], name: str) -> Vector | Matrix:

@@ -17,7 +17,7 @@ from mbd.arrays import Matrix, Vector
 from mbd.errors import TrajectoryError
 from mbd.results.record import Rows
 
-__all__ = ["Grid", "Places", "Side", "hermite", "hermite_rate", "quintic"]
+__all__ = ["Grid", "Places", "Side", "hermite", "hermite_rate", "quintic", "quintics"]
 
 Side = Literal["left", "right"]
 
@@ -60,13 +60,25 @@ def hermite(places: Places, y0: Matrix, rate0: Matrix, y1: Matrix, rate1: Matrix
 
 def quintic(places: Places, y: Matrix, rate: Matrix, change: Matrix) -> Matrix:
     """The polynomial of degree 5 with values y, rates and their changes ÿ at both ends of each interval."""
+    return quintics(places, y, rate, change)[0]
+
+
+def quintics(places: Places, y: Matrix, rate: Matrix, change: Matrix) -> tuple[Matrix, Matrix, Matrix]:
+    """The same with its first two derivatives; where a time meets a row, what is stored there."""
     x, h = _columns(places, y)
     low, high = places.lower, places.upper
-    cubic = hermite(places, y[low], rate[low], y[high], rate[high])
+    ends = (y[low], rate[low], y[high], rate[high])
     span = y[high] - y[low]
     first = h * h * change[low] - (6.0 * span - h * (4.0 * rate[low] + 2.0 * rate[high]))
     last = h * h * change[high] - (-6.0 * span + h * (2.0 * rate[low] + 4.0 * rate[high]))
-    return np.asarray(cubic + 0.5 * (x * (1.0 - x)) ** 2 * (first * (1.0 - x) + last * x))
+    mean, tilt = first * (1.0 - x) + last * x, last - first  # beyond the cubic: ½ x² (1−x)² of these
+    bell, slope, bend = (x * (1.0 - x)) ** 2, 2.0 * x * (1.0 - x) * (1.0 - 2.0 * x), 2.0 - 12.0 * x * (1.0 - x)
+    length = np.where(h > 0.0, h, 1.0)
+    speed = hermite_rate(places, *ends) + 0.5 * (slope * mean + bell * tilt) / length
+    curved = (6.0 - 12.0 * x) * span + h * ((6.0 * x - 4.0) * rate[low] + (6.0 * x - 2.0) * rate[high])
+    turning = (curved + 0.5 * (bend * mean + 2.0 * slope * tilt)) / length**2
+    value = hermite(places, *ends) + 0.5 * bell * mean
+    return np.asarray(value), np.asarray(speed), np.asarray(np.where(h > 0.0, turning, change[low]))
 
 
 def hermite_rate(places: Places, y0: Matrix, rate0: Matrix, y1: Matrix, rate1: Matrix) -> Matrix:
@@ -134,21 +146,26 @@ class Grid:
                 rates[start:stop] = np.gradient(values[start:stop], self.time[start:stop], axis=0, edge_order=order)
         return rates
 
-    def between(self, rows: Rows, places: Places, q_rate: Matrix) -> Rows:
+    def between(self, rows: Rows, places: Places, q_rate: Matrix, smooth: bool = False) -> Rows:
         """The states at places between the rows.
 
         q by Hermite with q̇, v with v̇, z with ż; accelerations and ż are the slopes of those
         curves; multipliers by Hermite with three-point slopes; contacts and anchors as they hold in the interval.
+        `smooth`, for rows whose accelerations are as accurate as the rest and q̇ = v: q of degree 5, v and v̇ its slopes.
         """
         low, high = places.lower, places.upper
         ends = (rows.v[low], rows.a[low], rows.v[high], rows.a[high])
         states = (rows.z[low], rows.s[low], rows.z[high], rows.s[high])
+        if smooth:
+            q, v, a = quintics(places, rows.q, rows.v, rows.a)
+        else:
+            q, v, a = places.blend(rows.q, q_rate), hermite(places, *ends), hermite_rate(places, *ends)
         return Rows(
             places.time,
-            places.blend(rows.q, q_rate),
-            hermite(places, *ends),
+            q,
+            v,
             hermite(places, *states),
-            hermite_rate(places, *ends),
+            a,
             hermite_rate(places, *states),
             places.blend(rows.lam, self.slopes(rows.lam)),
             rows.closed[low],

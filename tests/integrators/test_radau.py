@@ -186,3 +186,23 @@ def test_a_tolerance_out_of_range_is_refused():
     with pytest.raises(mbd.CapabilityError, match="between 0 and 1e-3, not 0"):
         mbd.RadauIIA(tolerance=0)
     assert repr(mbd.RadauIIA()) == "RadauIIA()" and repr(mbd.RadauIIA(1e-8)) == "RadauIIA(tolerance=1e-08)"
+
+
+def test_a_run_is_read_between_its_rows_as_accurately_as_at_them(tmp_path):
+    """On polynomials of degree 5, also from a file; rates are one order less."""
+    model, start = started("double pendulum")
+    fine = mbd.simulate(model, start, mbd.RungeKutta853(), dt=2e-3, until=1.0)
+    instants = np.linspace(0.0, 1.0, 87)
+    names = [name for name in start.names]
+
+    def errors(dt):
+        coarse = mbd.simulate(model, start, mbd.RadauIIA(), dt=dt, until=1.0)
+        loaded = mbd.load(coarse.save(tmp_path / "run.npz"))
+        return [
+            max(np.abs(read.at(times)[name] - fine.at(times)[name]).max() for name in names)
+            for read, times in ((coarse, coarse.time), (coarse, instants), (loaded, instants))
+        ]
+
+    for dt in (0.04, 0.02):
+        at_rows, between, loaded = errors(dt)
+        assert between < 2.0 * at_rows and loaded < 2.0 * at_rows
