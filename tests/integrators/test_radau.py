@@ -193,7 +193,7 @@ def test_a_run_is_read_between_its_rows_as_accurately_as_at_them(tmp_path):
     model, start = started("double pendulum")
     fine = mbd.simulate(model, start, mbd.RungeKutta853(), dt=2e-3, until=1.0)
     instants = np.linspace(0.0, 1.0, 87)
-    names = [name for name in start.names]
+    names = list(start.names)
 
     def errors(dt):
         coarse = mbd.simulate(model, start, mbd.RadauIIA(), dt=dt, until=1.0)
