@@ -24,6 +24,7 @@ from mbd.kernel.fields import (
     SINGULAR,
 )
 from mbd.kernel.linear import factor, solve
+from mbd.kernel.passage import CONTINUOUS
 from mbd.kernel.restart import consistent, evaluate, fill_block, raise_scales, refresh_scales
 
 __all__ = ["runge_kutta_accept", "runge_kutta_start", "runge_kutta_step"]
@@ -45,9 +46,14 @@ def runge_kutta_start(K: Any) -> int:
         K.lam_slope[k] = 0.0
     K.clock[AUX_STEP] = K.dt
     K.state[NEAR] = 0
+    find_sizes(K)
+    return 0
+
+
+def find_sizes(K: Any) -> None:
+    """Sizes at the accepted state; those of a candidate that is refused must not excuse the next one."""
     fill_block(K, K.clock[NOW], K.q, K.y)
     refresh_scales(K)
-    return 0
 
 
 def runge_kutta_step(K: Any, h: float, t1: float) -> int:
@@ -77,6 +83,7 @@ def runge_kutta_step(K: Any, h: float, t1: float) -> int:
     if K.state[ROWS] > 0:
         status = return_to_rows(K, t1)
         if status != 0:
+            find_sizes(K)
             return status
     if K.state[ROWS] == 0 and K.n_frictions == 0:
         status = explicit_rates(K, t1)
@@ -100,6 +107,7 @@ def runge_kutta_step(K: Any, h: float, t1: float) -> int:
     for i in range(n_v):  # an angle that is wrong by half a radian is not resolved at all
         if K.unit[i] == 1 and not abs(K.error[i]) <= 0.5:
             K.detail[1] = -1.0
+            find_sizes(K)
             return NOT_CONVERGED
     return 0
 
@@ -242,8 +250,16 @@ def return_to_rows(K: Any, t1: float) -> int:
     for k in range(m):
         K.rhs[n + k] = -K.acc[o_h + K.n_rows + K.rows[k]]
     solve(K.kkt, n + m, K.pivots, K.rhs)
+    fastest = 0.0
+    change = 0.0
     for i in range(n):
+        if i < K.n_v:
+            change = max(change, abs(K.rhs[i]))
+            fastest = max(fastest, max(abs(K.y[i]), abs(K.y1[i])))
         K.y1[i] += K.rhs[i]
+    if change > CONTINUOUS * fastest:  # rows that have lost rank take the motion along the branch for one across it
+        K.detail[1] = 0.0
+        return NOT_CONVERGED
     return 0
 
 
