@@ -334,6 +334,11 @@ def advance(K: Any) -> int:
         if K.adaptive == 1:
             part = max(K.pick[2], 0.0) / h if fired else 1.0
             K.clock[SPENT] += K.clock[LOCAL] * part ** (K.error_order + 1.0)
+        elif K.scheme == 1:
+            largest = 0.0
+            for i in range(K.n_v):
+                largest = max(largest, abs(K.error[K.n_v + i]))
+            K.clock[SPENT] += largest
         if fired:
             status = handle_event(K)
             if status >= 0:

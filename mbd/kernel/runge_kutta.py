@@ -31,6 +31,8 @@ __all__ = ["runge_kutta_accept", "runge_kutta_start", "runge_kutta_step"]
 
 EXPLICIT_STAGES = 12
 """Stages of a step, the end not counted."""
+STILL = 1e-9
+"""Speed [m/s, rad/s] below which nothing moves: what the projection changes of it is round-off."""
 MOST_RETURNS = 8
 """Newton corrections of positions onto the rows after a step; it takes one or two [-]."""
 
@@ -257,7 +259,7 @@ def return_to_rows(K: Any, t1: float) -> int:
             change = max(change, abs(K.rhs[i]))
             fastest = max(fastest, max(abs(K.y[i]), abs(K.y1[i])))
         K.y1[i] += K.rhs[i]
-    if change > CONTINUOUS * fastest:  # rows that have lost rank take the motion along the branch for one across it
+    if change > max(CONTINUOUS * fastest, K.rest_speed + STILL):  # rows that lose rank take the branch for another
         K.detail[1] = 0.0
         return NOT_CONVERGED
     return 0

@@ -19,6 +19,9 @@ __all__ = ["notes_of"]
 RESOLVED = 10.0
 """Steps that a penalty contact must last to be resolved at all."""
 
+TELLING = 1e-4
+"""Sum of the local errors of velocities of an explicit scheme that a run tells [m/s, rad/s]."""
+
 COUNTED = (
     (
         F.SHORTENED,
@@ -54,6 +57,13 @@ def notes_of(run: Run) -> list[str]:
     counts, impact = run.values["counts"], run.settings["impact"]
     notes += [text.format(count=int(counts[place]), impact=impact) for place, text in COUNTED if counts[place]]
     notes += [run.energy.note] if run.energy.note else []
+    spent = float(run.values["clock"][F.SPENT])
+    if spent > TELLING and not run.values["adaptive"]:
+        notes.append(
+            f"estimated errors of velocities add up to {spent:.2g} m/s or rad/s over all steps: dt is large for the "
+            "motion, or steps met poses in which rows lose rank, which mbd.GeneralizedAlpha and mbd.RadauIIA pass with "
+            "care; use a smaller dt, or tol="
+        )
     for number, contact in enumerate(run.manager.contacts):
         notes += _ignored(run, number, contact) + _short_touch(run, contact)
     return notes

@@ -13,6 +13,7 @@ from mbd.arrays import Matrix
 from mbd.kernel import fields as F
 from mbd.results.record import EventRecord, Record
 from mbd.simulation.notes import notes_of
+from mbd.simulation.stepper import RUNGE_KUTTA
 from mbd.state import State
 from mbd.trajectory import Trajectory
 
@@ -62,6 +63,7 @@ def _statistics(run: Run) -> dict[str, Any]:
     numbers: dict[str, Any] = {name: int(counts[place]) for place, name in enumerate(COUNTS)}
     if run.values["adaptive"]:
         numbers["rejected"] = int(counts[F.REJECTED])
+    if run.values["adaptive"] or run.values["scheme"] == RUNGE_KUTTA:
         numbers["local_errors"] = float(run.values["clock"][F.SPENT])
     numbers["modes"] = len(run.stepper.modes)
     numbers["compiled"] = run.stepper.compiled
