@@ -39,6 +39,8 @@ SPREAD, EARLY = 30, tuple(2**k for k in range(10))
 """Rows of a look: so many from the last look to now, and the first rows of a run at these numbers."""
 TELLING = 0.1
 """Share of the energy that a mechanism has, above which a note tells what the scheme gained or lost [-]."""
+ABSURD = 1e6
+"""Gain of energy over all that there was before, above which a single row is a verdict [-]."""
 LEAP = 100.0
 """Rise of energy over all earlier swings that looks strange where something is driven [-]."""
 ROUND_OFF = 1e-9
@@ -77,7 +79,7 @@ def judgement(ledger: Ledger, doubt: Matrix, way: Vector) -> Judgement:
     """Judge a scheme by the ledger, its doubts (2, R) [J] and the largest way of a coordinate since the start (R,).
 
     A row alone, as next to a pose in which rows lose rank, is no verdict: of those from the first one on, at least two
-    and at least half must say the same.
+    and at least half must say the same, unless its gain is `ABSURD` times all energy until then.
     """
     given = sum((np.maximum.accumulate(np.maximum(part.energy, 0.0)) for part in ledger.parts), np.zeros(len(way)))
     fallen = np.maximum.accumulate(ledger.potential[0] - ledger.potential)
@@ -88,7 +90,11 @@ def judgement(ledger: Ledger, doubt: Matrix, way: Vector) -> Judgement:
     loss = np.where(moves, np.maximum(-ledger.numerical - noise - doubt[1], 0.0), 0.0)
     bad = gain > owned
     rest = np.cumsum(bad[::-1])[::-1]  # bad rows from each on
-    firm = bad & (rest >= 2) & (2 * rest >= np.arange(len(bad), 0, -1))
+    size = np.abs(ledger.kinetic) + np.abs(ledger.potential)
+    before = np.maximum.accumulate(np.concatenate([[0.0], size[:-1]]))
+    known = np.maximum(owned, before)
+    absurd = (known > 0.0) & (gain > ABSURD * known)
+    firm = absurd | (bad & (rest >= 2) & (2 * rest >= np.arange(len(bad), 0, -1)))
     if firm.any():
         row = int(np.argmax(firm))
         return Judgement(row, float(np.max(ledger.numerical[row:])), float(owned[row]))
