@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from mbd.analysis.linearization import Linearization as Linearization, linearize as linearize
     from mbd.analysis.mobility import Mobility as Mobility, mobility as mobility
     from mbd.analysis.numerical import Criteria as Criteria, criteria as criteria
+    from mbd.analysis.sweep import Sweep as Sweep, sweep as sweep
     from mbd.assembly import assemble as assemble
     from mbd.bodies import (
         Link as Link,
@@ -125,6 +126,7 @@ _HOMES = {
     "mbd.analysis.effects": "Effects effects",
     "mbd.analysis.mobility": "Mobility mobility",
     "mbd.analysis.numerical": "Criteria criteria",
+    "mbd.analysis.sweep": "Sweep sweep",
     "mbd.assembly": "assemble",
     "mbd.bodies": "Link PointMass RigidBody box cylinder disk rod segment sphere",
     "mbd.constraints": "Bilateral Controller Event KnifeEdge Nonholonomic Penalty PenaltyParameters Plane "
@@ -165,7 +167,8 @@ def __getattr__(name: str) -> Any:
     import difflib
 
     close = difflib.get_close_matches(name, _HOME, n=3, cutoff=0.6)
-    guess = f"did you mean {' or '.join(repr(one) for one in close)}?" if close else f"it has {', '.join(_HOME)}"
+    known = "it has Model, Revolute, assemble, simulate and others, which dir(mbd) lists"
+    guess = f"did you mean {' or '.join(repr(one) for one in close)}?" if close else known
     raise AttributeError(f"mbd has no {name!r}; {guess}")
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.bodies.values import is_number
 from mbd.closure import Held
 from mbd.compile.mechanism import Mechanism, rate_names
 from mbd.compile.mechanisms import mechanism_of
@@ -21,7 +22,7 @@ from mbd.kernel.active_set import ActiveSetManager
 from mbd.posture import Posture, capture, close_positions, close_velocities, position_rows
 from mbd.state import State
 
-__all__ = ["assemble", "is_number", "named_numbers", "undetermined"]
+__all__ = ["assemble", "named_numbers", "undetermined"]
 
 BELOW = 1e-6
 """Depth [m, rad] below which an open contact is told to start inside the ground."""
@@ -32,17 +33,13 @@ LIFTED = 1e-8
 def named_numbers(values: Any, what: str) -> list[str]:
     """What is wrong with numbers by name."""
     if not isinstance(values, Mapping | None):
-        return [f"{what} must map names to numbers, such as {{'left hip.angle': 0.2}}, not {values!r}"]
+        example = "left thigh.mass" if what == "parameters" else "left hip.angle"
+        return [f"{what} must map names to numbers, such as {{{example!r}: 0.2}}, not {values!r}"]
     return [
         f"{what}: the value of {name!r} must be a finite number, not {value!r}"
         for name, value in (values or {}).items()
         if not isinstance(name, str) or not is_number(value) or not math.isfinite(value)
     ]
-
-
-def is_number(value: Any) -> bool:
-    """Whether a value is one real number, finite or not."""
-    return not isinstance(value, bool | str) and hasattr(value, "__float__") and not getattr(value, "ndim", 0)
 
 
 def _names(value: Any, what: str) -> tuple[tuple[str, ...], list[str]]:
@@ -147,8 +144,13 @@ def _named(
     elsewhere = {name: value for name, value in position.items() if name not in states and name not in coordinates}
     places, unknown = conditions(mechanism, elsewhere, rates=False)
     speeds, strange = conditions(mechanism, {k: v for k, v in velocity.items() if k not in rates}, rates=True)
-    faults = [nearest(name, coordinates, "coordinate") for name in unknown]
-    faults += [nearest(name, rates, "rate") for name in strange]
+    faults = [
+        f"position: {name!r} is a rate; give it in velocity={{{name!r}: …}}"
+        if name in rates
+        else "position: " + nearest(name, coordinates, "coordinate")
+        for name in unknown
+    ]
+    faults += ["velocity: " + nearest(name, rates, "rate") for name in strange]
     q, z, v = (
         {numbers[name]: float(value) for name, value in given.items() if name in numbers}
         for numbers, given in ((coordinates, position), (states, position), (rates, velocity))

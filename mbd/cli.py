@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import ast
 import inspect
+import os
 import runpy
 import sys
 import time
@@ -62,9 +63,7 @@ def find(name: str) -> Path:
     known = examples()
     wanted = name.replace("_", "-")
     if wanted not in known:
-        raise UnknownNameError(
-            nearest(name, known, "example").replace("The model has", "There are") + "; or give a file"
-        )
+        raise UnknownNameError(nearest(name, known, "example", "There are") + "; or give a file")
     return known[wanted]
 
 
@@ -98,7 +97,7 @@ class Script:
         Parameters
         ----------
         progress : called with the simulated time and the end time [s]
-        changes : values that replace the script's own: dt, until
+        changes : values that replace the script's own: dt or tol, until
         """
         from mbd.trajectory import Trajectory
 
@@ -114,11 +113,12 @@ class Script:
                 )
             return run
         steps = ("tol",) if "tol" in self.names and "dt" not in self.names else ("dt",)
-        given = {"tol" if name == "dt" else name for name in changes} | set(changes)
+        given = {"dt", "tol"} | set(changes) if {"dt", "tol"} & set(changes) else set(changes)
         self.require("model", "start", "integrator", *(name for name in (*steps, "until") if name not in given))
         options = {name: self.names[name] for name in (*OPTIONS, "until") if name in self.names} | changes
-        if "dt" in changes:
-            options.pop("tol", None)
+        for one, other in (("dt", "tol"), ("tol", "dt")):
+            if one in changes and other not in changes:
+                options.pop(other, None)
         from mbd import simulate
 
         names = self.names
@@ -134,7 +134,7 @@ def run_command(arguments: argparse.Namespace) -> int:
     began = time.perf_counter()
     script = Script.load(arguments.script)
     loaded = time.perf_counter()
-    changes = {name: value for name in ("dt", "until") if (value := getattr(arguments, name)) is not None}
+    changes = {name: value for name in ("dt", "tol", "until") if (value := getattr(arguments, name)) is not None}
     failure: SimulationError | None = None
     with progress_bar() as progress:
         try:
@@ -278,6 +278,7 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--out", metavar="DIR", help="folder for the results (default: mbd-runs/NAME)")
     run.add_argument("--open", action="store_true", help="open the page in a browser")
     run.add_argument("--dt", type=float, metavar="SECONDS", help="another step size than the script's")
+    run.add_argument("--tol", type=float, metavar="ERROR", help="steps that follow this error, in place of dt")
     run.add_argument("--until", type=float, metavar="SECONDS", help="another end time than the script's")
     check = command("check", check_command, "report faults, degrees of freedom and redundant rows of a script's model")
     check.add_argument("script", metavar="SCRIPT-or-EXAMPLE", help="a Python file that defines model, or an example")
@@ -303,6 +304,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = _parser().parse_args(argv)
     try:
         code: int = arguments.function(arguments)
+        sys.stdout.flush()
+    except BrokenPipeError:  # who read the output has seen enough, as with `| head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 141  # 128 + SIGPIPE, as other programs
     except TOLD as error:
         if arguments.debug:
             raise

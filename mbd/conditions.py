@@ -66,7 +66,8 @@ def conditions(mechanism: Mechanism, values: Mapping[str, float], rates: bool) -
         if node is None:
             wrong.append(name)
             continue
-        if not {part.data[0] for part in live([node]) if part.op == "input"} <= allowed:
+        kinds = {part.data[0] for part in live([node]) if part.op == "input"}
+        if not kinds <= allowed or (rates and kinds & {"q", "x"} and "v" not in kinds):  # a place is no rate
             wrong.append(name)
             continue
         function = scalar_function([node, *gradient(node, inputs)], mechanism.layout, "condition")

@@ -71,8 +71,9 @@ def nearest(name: str, valid: Iterable[str], kind: str = "name", known: str = "T
     "no joint named 'left hop'; did you mean 'left hip'? The model has 'left hip', 'left knee'"
     """
     names = sorted(set(valid))
-    close = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
+    close = difflib.get_close_matches(str(name), names, n=1, cutoff=0.6)
     guess = f"; did you mean {close[0]!r}?" if close else ";"
+    known = known if close else known[0].lower() + known[1:]
     shown = ", ".join(repr(each) for each in names[:12]) + (f", … ({len(names)} in all)" if len(names) > 12 else "")
     has = f" {known} {shown}" if names else f" {known} none"
     return f"no {kind} named {name!r}{guess}{has}"

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 from mbd.bodies.base import Body, Frame
 from mbd.bodies.ground import Ground
-from mbd.bodies.values import Vector3, number, triple
+from mbd.bodies.values import Vector3, names_of, number, triple
 from mbd.constraints.base import Constraint, VelocityConstraint
 from mbd.constraints.bilateral import Bilateral
 from mbd.constraints.controller import Controller
@@ -74,8 +74,8 @@ class Model:
     ) -> None:
         self.name = _title(name)
         self.gravity = triple(gravity, f"gravity of '{name}'")
-        self.cut: str | tuple[str, ...] = cut if isinstance(cut, str) else tuple(cut)
-        self.tunable = (tunable,) if isinstance(tunable, str) else tuple(tunable)
+        self.cut: str | tuple[str, ...] = cut if isinstance(cut, str) else names_of(cut, f"cut of '{name}'")
+        self.tunable = names_of(tunable, f"tunable of '{name}'")
         self.ground = Ground()
         self.joints: list[Joint] = []
         self.forces: list[Force] = []

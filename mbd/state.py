@@ -106,7 +106,9 @@ class State:
         }
         if name in short:
             return float(self.v[short[name]])
-        raise UnknownNameError(nearest(name, [*self.names, *self.velocity_names], "coordinate or rate"))
+        raise UnknownNameError(
+            nearest(name, [*self.names, *self.velocity_names], "coordinate or rate", "The state has")
+        )
 
     def __repr__(self) -> str:
         lines = [f"State at t = {self.time:g} s, closed: {', '.join(sorted(self.mode.closed)) or 'none'}"]

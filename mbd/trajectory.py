@@ -70,6 +70,10 @@ class Trajectory:
 
     def __getitem__(self, name: str) -> Any:
         """A named quantity at every stored row: (R,), or (R, 3) for a vector."""
+        if not isinstance(name, str):
+            raise TrajectoryError(
+                f"a run is asked for one quantity by its name, such as run['hip.angle'], not {name!r}"
+            )
         if name not in self._known:
             value = gather(self.columns, self.columns.at_rows, name)
             value.flags.writeable = False
@@ -256,7 +260,10 @@ class Moments(Mapping[str, Any]):
     """
 
     def __init__(self, columns: Columns, times: ArrayLike, side: Side) -> None:
-        self.time = np.asarray(times, dtype=np.float64)
+        try:
+            self.time = np.asarray(times, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise TrajectoryError(f"times must be one number or several [s], not {times!r}") from None
         self.side = side
         self._columns = columns
         self._places = columns.grid.places(self.time, side)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
 import sys
 
 import numpy as np
@@ -258,3 +260,22 @@ def test_a_script_may_ask_for_a_tolerance_and_the_command_line_for_a_step(script
     assert "estimated error of coordinates" in capsys.readouterr().out
     assert cli.main(["run", asked, "--dt", "0.01", "--out", str(tmp_path / "two")]) == 0
     assert "dt = 0.01" in capsys.readouterr().out
+
+
+def test_a_tolerance_takes_the_place_of_the_step_of_a_script(script, tmp_path, capsys):
+    assert cli.main(["run", script(PENDULUM), "--tol", "1e-5", "--until", "0.2"]) == 0
+    told = capsys.readouterr().out
+    assert "tol = 1e-05" in told and "reached t = 0.2 s" in told
+    assert cli.main(["run", script(PENDULUM), "--tol", "1e-5", "--dt", "1e-3"]) == 1
+    assert "not both" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_a_reader_that_stops_reading_ends_a_command_quietly(unbuffered):
+    program = "import sys; from mbd import cli; sys.exit(cli.main(['examples']))"
+    read, write = os.pipe()
+    os.close(read)
+    environment = {**os.environ, "PYTHONUNBUFFERED": unbuffered}
+    ended = subprocess.run([sys.executable, "-c", program], stdout=write, stderr=subprocess.PIPE, env=environment)
+    os.close(write)
+    assert (ended.returncode, ended.stderr) == (141, b"")

@@ -147,6 +147,8 @@ def mobility(
       redundant: 5 rows; they agree; the motion is unique, their multipliers are not
         ...
     """
+    if not isinstance(state, State | None):
+        raise ModelError(f"state must be a State from mbd.assemble(model, …), or None, not {state!r}")
     changed = {**(state.parameters if state is not None else {}), **(parameters or {})}
     mechanism = mechanism_of(model, backend, changed)
     work = _posture(model, mechanism, state, closed, changed)

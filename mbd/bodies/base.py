@@ -63,7 +63,7 @@ class Body(ABC):
         """One of its own frames: 'origin', 'center', …"""
         frames = self.frames
         if name not in frames:
-            raise ModelError(f"body '{self.name}': " + nearest(name, frames, "frame"))
+            raise ModelError(f"body '{self.name}': " + nearest(name, frames, "frame", "The body has"))
         return frames[name]
 
     @property

@@ -107,7 +107,7 @@ def segment(name: str, body_mass: float, length: float) -> Solid:
     length : of the segment [m]
     """
     if name not in SEGMENTS:
-        raise ModelError(nearest(name, SEGMENTS, "body segment").replace("The model has", "The table has"))
+        raise ModelError(nearest(name, SEGMENTS, "body segment", "The table has"))
     M, L = number(body_mass, "body mass"), number(length, f"length of '{name}'")
     fraction, center, gyration = SEGMENTS[name]
     m = fraction * M

@@ -1,4 +1,4 @@
-"""What users give, checked at the border: finite numbers, triples, axes, names."""
+"""What users give, checked at the border: finite numbers, triples, axes, names, switches."""
 
 from __future__ import annotations
 
@@ -6,9 +6,11 @@ import math
 from collections.abc import Iterable
 from typing import Any, TypeAlias
 
+import numpy as np
+
 from mbd.errors import ModelError
 
-__all__ = ["Vector3", "name_of", "number", "numbers", "triple", "unit_vector"]
+__all__ = ["Vector3", "flag", "is_number", "name_of", "names_of", "number", "numbers", "triple", "unit_vector"]
 
 Vector3: TypeAlias = tuple[float, float, float]
 """Three plain numbers, known when the model is described."""
@@ -21,6 +23,34 @@ def name_of(name: Any, what: str) -> str:
     if "." in name:
         raise ModelError(f"{what} {name!r}: a name holds no dot, since dots part names as in 'left knee.angle'")
     return name
+
+
+def names_of(values: Any, what: str) -> tuple[str, ...]:
+    """Names given as one or several.
+
+    >>> names_of("left foot", "on of Controller 'knee'")
+    ('left foot',)
+    """
+    several = (values,) if isinstance(values, str) else values
+    if isinstance(several, Iterable) and not isinstance(several, bytes | type):
+        result = tuple(several)
+        if all(isinstance(name, str) and name for name in result):
+            return result
+    raise ModelError(f"{what} must be a name or several, such as ('left foot', 'right foot'); got {values!r}")
+
+
+def flag(value: Any, what: str) -> bool:
+    """True or False."""
+    if isinstance(value, bool | np.bool_):
+        return bool(value)
+    raise ModelError(f"{what} must be True or False, got {value!r}")
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value is one real number, finite or not."""
+    if isinstance(value, bool | str | type):
+        return False
+    return hasattr(value, "__float__") and not getattr(value, "ndim", 0) and not getattr(value, "free_symbols", ())
 
 
 def number(value: Any, what: str) -> float:

@@ -88,7 +88,7 @@ def backend(kind: str = "auto", level: int | None = None, cache: ObjectCache | N
     if kind == "python":
         return Backend("python")
     if kind not in ("llvm", "auto"):
-        raise UnknownNameError(nearest(kind, ("llvm", "python", "auto"), "backend"))
+        raise UnknownNameError(nearest(kind, ("llvm", "python", "auto"), "backend", "There are"))
     if find_spec("llvmlite") is None:
         if kind == "llvm":
             raise CapabilityError("backend 'llvm' needs the package llvmlite: pip install llvmlite, or use 'python'")

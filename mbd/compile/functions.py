@@ -25,7 +25,7 @@ class ByName(Generic[F]):
     def __getitem__(self, name: str) -> F:
         function = self._functions.get(name)
         if function is None:
-            raise UnknownNameError(nearest(name, self._functions, self._kind))
+            raise UnknownNameError(nearest(name, self._functions, self._kind, "There are"))
         return function
 
     def __contains__(self, name: object) -> bool:

@@ -193,7 +193,7 @@ class Mechanism:
             if name not in names and (folded or {}).get(name) == value:
                 continue
             if name not in names:
-                raise UnknownNameError(nearest(name, {*names, *(folded or {})}, "parameter"))
+                raise UnknownNameError(nearest(name, {*names, *(folded or {})}, "parameter", "There are"))
             p[names.index(name)] = float(value)
         for table in self.equations.tables:
             p += table.flat

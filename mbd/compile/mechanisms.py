@@ -42,6 +42,8 @@ def mechanism_of(model: Any, backend: str = "auto", changed: Mapping[str, float]
     """
     if not isinstance(model, Model | Lagrangian):
         raise ModelError(f"a Model or a Lagrangian is expected, not {model!r}")
+    if not isinstance(backend, str):
+        raise ModelError(f"backend must be 'auto', 'llvm' or 'python', not {backend!r}")
     mechanism = _mechanism(model, backend, frozenset())
     if not changed and not getattr(model, "controllers", ()):
         return mechanism

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from mbd.bodies.values import name_of, number
+from mbd.bodies.values import name_of, names_of, number
 from mbd.errors import ModelError
 
 __all__ = ["Controller"]
@@ -44,8 +44,7 @@ class Controller:
         name_of(self.name, "Controller")
         put = object.__setattr__
         for names in ("on", "reads", "writes"):
-            value = getattr(self, names)
-            put(self, names, (value,) if isinstance(value, str) else tuple(value))
+            put(self, names, names_of(getattr(self, names), f"{names} of Controller '{self.name}'"))
         if not callable(self.update):
             raise ModelError(f"Controller '{self.name}' needs update(time, values, state), got {self.update!r}")
         if self.period is not None:

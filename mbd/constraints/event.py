@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from mbd.bodies.values import name_of
+from mbd.bodies.values import flag, name_of, names_of
 from mbd.constraints.base import Constraint, Measure
 from mbd.constraints.unilateral import measure_of
 from mbd.errors import ModelError
@@ -39,6 +39,9 @@ class Event(Constraint):
         measure_of(self.guard, f"Event '{self.name}'")
         if not (self.reset is None or isinstance(self.reset, Mapping) or callable(self.reset)):
             raise ModelError(f"reset of Event '{self.name}' maps names to values, got {self.reset!r}")
+        if isinstance(self.reset, Mapping):
+            names_of(self.reset, f"each key of the reset of Event '{self.name}'")
+        object.__setattr__(self, "terminal", flag(self.terminal, f"terminal of Event '{self.name}'"))
         if self.direction not in (-1, 0, 1):
             raise ModelError(f"direction of Event '{self.name}' is -1, 0 or 1, got {self.direction!r}")
 

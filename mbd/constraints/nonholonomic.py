@@ -6,14 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from mbd.bodies.values import name_of
+from mbd.bodies.values import is_number, name_of
 from mbd.constraints.base import VelocityConstraint
 from mbd.errors import ModelError
 from mbd.forces.quantities import (
     Mention,
     Samples,
     arguments_of,
-    is_number,
     kinks,
     mentioned,
     quantity_of,

@@ -20,7 +20,7 @@ from mbd.constraints.restitution import (
 )
 from mbd.errors import ModelError
 
-__all__ = ["PenaltyParameters", "penalty_parameters"]
+__all__ = ["PenaltyParameters", "largest_dt", "penalty_parameters"]
 
 STEPS_OF_APPROACH = 5.0
 """Steps until the deepest point that resolve a blow: its restitution and depth are right to about a hundredth."""
@@ -104,6 +104,23 @@ def penalty_parameters(
     return _hysteretic(depth, mass, speed, chi_for(e, law), n)
 
 
+def largest_dt(stiffness: float, exponent: float, damping: float, chi: float, mass: float, speed: float) -> float:
+    """A fifth of the time until the deepest point of a blow of an effective mass that arrives at a speed [s].
+
+    Of Kelvin–Voigt with n = 1 and of χ laws as `penalty_parameters` gives it; with other n damping is left out.
+    """
+    if exponent == 1.0 and chi == 0.0:
+        angle = over_angle(0.5 * damping / math.sqrt(stiffness * mass))
+        return angle * math.sqrt(mass / stiffness) / STEPS_OF_APPROACH
+    return _pace(stiffness, mass, speed, exponent) * blow_integral(chi, exponent, 0.0) / STEPS_OF_APPROACH
+
+
+def _pace(stiffness: float, mass: float, speed: float, n: float) -> float:
+    """``(m δ̇₀/k) ((n+1) m δ̇₀²/k)^(−n/(n+1))``, the scale of times of a χ law [s]."""
+    energy = (n + 1.0) * mass * speed**2
+    return float(mass * speed / stiffness * (energy / stiffness) ** (-n / (n + 1.0)))
+
+
 def _kelvin_voigt(depth: float, mass: float, speed: float, ratio: float, release: str) -> PenaltyParameters:
     """Of the damped oscillator."""
     angle = over_angle(ratio)
@@ -119,7 +136,7 @@ def _hysteretic(depth: float, mass: float, speed: float, chi: float, n: float) -
     """Of a χ law."""
     energy = (n + 1.0) * mass * speed**2
     stiffness = energy * stored_work(chi) / depth ** (n + 1.0)
-    pace = mass * speed / stiffness * (energy / stiffness) ** (-n / (n + 1.0))
+    pace = _pace(stiffness, mass, speed, n)
     found = restitution_of_chi(chi)
     duration, approach = (pace * blow_integral(chi, n, end) for end in (-found, 0.0))
     return PenaltyParameters(stiffness, 0.0, chi, found, duration, approach / STEPS_OF_APPROACH)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from mbd.bodies.values import flag
 from mbd.constraints.base import Measure
 from mbd.errors import ModelError
 
@@ -27,14 +28,15 @@ class When:
     after_impact: bool = False
 
     def __post_init__(self) -> None:
-        if not isinstance(self.other, str):
+        object.__setattr__(self, "after_impact", flag(self.after_impact, f"after_impact of When({self.other!r})"))
+        if not isinstance(self.other, str) or not self.other:
             raise ModelError(f"When needs the name of another contact, such as When('right foot'), got {self.other!r}")
 
 
 def releases_of(value: Any, what: str) -> tuple[When, ...]:
     """The `release=` of a contact: None, one `When`, or several."""
     several = () if value is None else (value,) if isinstance(value, When) else value
-    if isinstance(several, str) or not isinstance(several, Iterable):
+    if isinstance(several, str | Mapping) or not isinstance(several, Iterable):
         raise ModelError(f"release of '{what}' is mbd.When('name of another contact'), got {value!r}")
     result = tuple(several)
     for rule in result:

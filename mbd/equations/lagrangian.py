@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import inspect
 import re
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
 
+from mbd.bodies.values import is_number, names_of, number
 from mbd.equations import equations as records
 from mbd.equations.equations import Effect, Equations, Row
 from mbd.equations.inputs import Inputs
@@ -42,6 +43,13 @@ class Coordinate:
     name: str
     unit: str = "rad"
     default: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not self.name.strip():
+            raise ModelError(f"Coordinate needs a name, such as Coordinate('theta'); got {self.name!r}")
+        if not isinstance(self.unit, str):
+            raise ModelError(f"unit of Coordinate {self.name!r} must be a text such as 'rad' or 'm', got {self.unit!r}")
+        object.__setattr__(self, "default", number(self.default, f"default of Coordinate {self.name!r}"))
 
     @property
     def q(self) -> Any:
@@ -94,8 +102,10 @@ class Lagrangian:
     nonholonomic: Mapping[str, Expression] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        _check_shapes(self)
         object.__setattr__(self, "coordinates", tuple(_coordinate(c) for c in self.coordinates))
         object.__setattr__(self, "parameters", {_name(key): float(value) for key, value in self.parameters.items()})
+        object.__setattr__(self, "tunable", names_of(self.tunable, f"tunable of {self.name!r}"))
         object.__setattr__(self, "forces", {_name(key): value for key, value in self.forces.items()})
         object.__setattr__(self, "constraints", _named(self.constraints))
         object.__setattr__(self, "nonholonomic", dict(self.nonholonomic))
@@ -169,6 +179,29 @@ def _named(constraints: Mapping[str, Expression] | Sequence[Any]) -> dict[str, E
     return dict(pairs)
 
 
+def _check_shapes(system: Lagrangian) -> None:
+    """Arguments of a wrong kind, all of them at once."""
+    if not isinstance(system.name, str) or not system.name.strip():
+        raise ModelError(f"Lagrangian needs a name as its first argument, got {system.name!r}")
+    faults = []
+    if isinstance(system.coordinates, str | Mapping) or not isinstance(system.coordinates, Iterable):
+        faults.append(f"coordinates must be a list of mbd.Coordinate or names, got {system.coordinates!r}")
+    for field_name in ("forces", "parameters", "nonholonomic"):
+        value = getattr(system, field_name)
+        if not isinstance(value, Mapping):
+            faults.append(f"{field_name} must be a mapping from names, such as {{'theta': …}}, got {value!r}")
+    if isinstance(system.parameters, Mapping):
+        faults += [
+            f"parameter {_name(key)!r} must be a number, got {value!r}"
+            for key, value in system.parameters.items()
+            if not is_number(value)
+        ]
+    if isinstance(system.constraints, str) or not isinstance(system.constraints, Iterable):
+        faults.append(f"constraints must be a mapping {{name: h}} or a list of expressions, got {system.constraints!r}")
+    if faults:
+        raise ModelError([f"Lagrangian {system.name!r}: {fault}" for fault in faults])
+
+
 def _name_faults(system: Lagrangian) -> list[str]:
     names = [coordinate.name for coordinate in system.coordinates]
     faults = [] if names else [f"{system.name!r} has no coordinates; give at least one mbd.Coordinate"]
@@ -184,7 +217,9 @@ def _name_faults(system: Lagrangian) -> list[str]:
     ]
     faults += [nearest(name, names, "coordinate") for name in system.forces if name not in names]
     faults += [
-        nearest(name, system.parameters, "parameter") for name in system.tunable if name not in system.parameters
+        nearest(name, system.parameters, "parameter", "There are")
+        for name in system.tunable
+        if name not in system.parameters
     ]
     faults += [
         f"parameter {name!r} is {value}, which is not a finite number"

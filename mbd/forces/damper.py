@@ -7,9 +7,9 @@ from typing import Any
 
 from mbd.bodies.algebra import difference, dot, norm
 from mbd.bodies.base import Frame
-from mbd.bodies.values import name_of
+from mbd.bodies.values import is_number, name_of
 from mbd.forces.base import Action, Force, frame_of
-from mbd.forces.quantities import Mention, is_number
+from mbd.forces.quantities import Mention
 from mbd.joints.losses.base import Loss, loss_of
 from mbd.joints.losses.viscous import Viscous
 from mbd.scope import Scope

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import numpy as np
 
 from mbd.bodies.base import Frame
-from mbd.bodies.values import number, numbers
+from mbd.bodies.values import is_number, number, numbers
 from mbd.errors import ModelError
 from mbd.joints.base import Joint
 from mbd.scope import Scope
@@ -18,7 +18,7 @@ from mbd.tape.node import Scalar
 from mbd.tape.tracing import Argument, traced, traced_scalar
 
 __all__ = [
-    "ArgumentSpec", "Mention", "Samples", "arguments_of", "is_number", "is_single", "kinks", "mentioned", "quantity_of",
+    "ArgumentSpec", "Mention", "Samples", "arguments_of", "is_single", "kinks", "mentioned", "quantity_of",
     "resolved", "scalar", "triple_at", "triple_of", "value_parameters",
 ]  # fmt: skip
 
@@ -45,7 +45,12 @@ class Samples:
     kind: str = "cubic"
 
     def __init__(self, time: Any, values: Any, kind: str = "cubic") -> None:
-        table = np.asarray(values, dtype=float)
+        try:
+            table = np.asarray(values, dtype=float)
+        except (TypeError, ValueError):
+            raise ModelError(
+                f"values of Samples must be numbers, one for each time or a row (x, y, z) for each; got {values!r}"
+            ) from None
         object.__setattr__(self, "time", numbers(time, "times of Samples"))
         if kind not in ("cubic", "linear"):
             raise ModelError(f"kind of Samples is 'cubic' or 'linear', got {kind!r}")
@@ -79,11 +84,6 @@ class Samples:
     def signal(self, scope: Scope, owner: str) -> Scalar:
         """Its value at the time t."""
         return scope.tape.lookup(scope.table(owner, *self.pieces()), scope.time)
-
-
-def is_number(value: Any) -> bool:
-    """Whether a quantity is a plain number."""
-    return isinstance(value, int | float | np.floating | np.integer) and not isinstance(value, bool)
 
 
 def is_single(value: Any) -> bool:
@@ -127,6 +127,8 @@ def triple_of(value: Any, what: str) -> Any:
 def arguments_of(values: Any, what: str) -> ArgumentSpec:
     """Arguments as users may give them: names, frames, joints, ``(label, one of these or a number)``, or a mapping."""
     entries = list(values.items()) if isinstance(values, Mapping) else [values] if isinstance(values, str) else values
+    if not isinstance(entries, Iterable) or isinstance(entries, bytes | type | Samples):
+        raise ModelError(f"{what}: arguments must be a list such as ('t', 'left hip.angle'), got {values!r}")
     result: list[tuple[str, Mention | float]] = []
     for entry in entries:
         label, value = entry if isinstance(entry, tuple) and len(entry) == 2 else (None, entry)

@@ -20,6 +20,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from mbd.arrays import Vector
+from mbd.bodies.values import is_number
 from mbd.errors import CapabilityError
 from mbd.integrators.base import Integrator, Point, StepReport, StepResult, System, Terms, consistent_rates
 from mbd.integrators.passage import CONTINUOUS, WHOLE, WITHIN, Distance, distance_to_pose
@@ -115,8 +116,10 @@ class NewmarkFamily(Integrator):
             raise CapabilityError(f"formulation is 'ggl' or 'index3', not {formulation!r}")
         if start not in ("jerk", "consistent"):
             raise CapabilityError(f"start is 'jerk' or 'consistent', not {start!r}")
-        if not 0.0 < tolerance < 1e-3:
-            raise CapabilityError(f"tolerance must lie between 0 and 1e-3, not {tolerance!r}")
+        if not is_number(tolerance) or not 0.0 < tolerance < 1e-3:
+            raise CapabilityError(
+                f"tolerance must be a number between 0 and 1e-3, not {tolerance!r}; leave it out for 1e-9"
+            )
         values = {**own, "formulation": formulation, "starting": start, "tolerance": float(tolerance)}
         for name, value in values.items():
             object.__setattr__(self, name, value)

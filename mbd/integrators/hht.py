@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
+from mbd.bodies.values import is_number
 from mbd.errors import CapabilityError
 from mbd.integrators.averaged import AveragedStep
 from mbd.integrators.base import StepResult, System
@@ -50,13 +51,13 @@ class HHT(NewmarkFamily):
         start: Starting = "jerk",
         tolerance: float = DEFAULT_TOLERANCE,
     ) -> None:
-        if not 0.0 <= alpha <= 1.0 / 3.0:
+        if not is_number(alpha) or not 0.0 <= alpha <= 1.0 / 3.0:
             raise CapabilityError(f"HHT needs alpha between 0 and 1/3, not {alpha!r}; 0.05 is common")
         if form not in ("endpoint", "averaged"):
             raise CapabilityError(f"form is 'endpoint' or 'averaged', not {form!r}")
         if form == "averaged" and formulation == "ggl":
             raise CapabilityError("HHT(form='averaged') enforces rows at position level; use formulation='index3'")
-        chosen: Formulation = formulation or ("index3" if form == "averaged" else "ggl")
+        chosen: Formulation = formulation if formulation is not None else ("index3" if form == "averaged" else "ggl")
         super().__init__(chosen, start, tolerance, alpha=float(alpha), form=form)
 
     @property

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+
+from mbd.bodies.values import is_number
 from mbd.errors import CapabilityError
 from mbd.integrators.family import DEFAULT_TOLERANCE, Coefficients, Formulation, NewmarkFamily, Starting
 
@@ -39,7 +42,8 @@ class Newmark(NewmarkFamily):
         start: Starting = "jerk",
         tolerance: float = DEFAULT_TOLERANCE,
     ) -> None:
-        if not gamma >= 0.5 or not beta > 0.0:
+        good = is_number(beta) and is_number(gamma) and math.isfinite(beta) and math.isfinite(gamma)
+        if not good or not gamma >= 0.5 or not beta > 0.0:
             raise CapabilityError(
                 f"Newmark needs gamma ≥ 1/2 (below it every step is unstable) and beta > 0, not beta={beta!r}, "
                 f"gamma={gamma!r}; Newmark(0.25, 0.5) is the trapezoidal rule"

@@ -18,6 +18,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.bodies.values import is_number
 from mbd.errors import CapabilityError
 from mbd.integrators.base import Integrator, Point, StepReport, StepResult, System, Terms, consistent_rates
 from mbd.integrators.family import DEFAULT_TOLERANCE, NewmarkFamily, NewmarkMemory
@@ -85,8 +86,10 @@ class RadauIIA(Integrator):
     tolerance: float = DEFAULT_TOLERANCE
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.tolerance < 1e-3:
-            raise CapabilityError(f"tolerance must lie between 0 and 1e-3, not {self.tolerance!r}")
+        if not is_number(self.tolerance) or not 0.0 < self.tolerance < 1e-3:
+            raise CapabilityError(
+                f"tolerance must be a number between 0 and 1e-3, not {self.tolerance!r}; leave it out for 1e-9"
+            )
 
     def __repr__(self) -> str:
         return "RadauIIA()" if self.tolerance == DEFAULT_TOLERANCE else f"RadauIIA(tolerance={self.tolerance!r})"

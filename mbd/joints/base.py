@@ -172,11 +172,13 @@ class Joint(ABC):
                     f"{kind} '{self.name}': its {side} must be a frame such as thigh.end or model.ground.origin, "
                     f"got {value!r}"
                 )
+        if isinstance(self.loss, Mapping) and not self.loss:
+            put(self, "loss", None)
         if isinstance(self.loss, Mapping):
             known = [label.name for label in self.labels]
             for label in self.loss:
                 if label not in known:
-                    raise ModelError(f"loss of '{self.name}': " + nearest(label, known, "coordinate"))
+                    raise ModelError(f"loss of '{self.name}': " + nearest(label, known, "coordinate", "The joint has"))
             put(self, "loss", {label: loss_of(loss, f"{self.name}.{label}") for label, loss in self.loss.items()})
         elif loss_of(self.loss, self.name) is not None and len({label.unit for label in self.labels}) != 1:
             labels = ", ".join(f"'{label.name}' [{label.unit}]" for label in self.labels)
@@ -184,6 +186,11 @@ class Joint(ABC):
                 f"{kind} '{self.name}': one loss cannot serve its coordinates ({labels or 'it has none'}); "
                 "say on which each acts, such as loss={'angle': mbd.Viscous(0.1)}"
             )
-        if len(self.labels) == 1:
+        if "stiffness" in vars(self):
             put(self, "stiffness", number(self.stiffness, f"stiffness of '{self.name}'"))
             put(self, "rest", number(self.rest, f"rest of '{self.name}'"))
+            if len(self.labels) != 1 and (self.stiffness or self.rest):
+                raise ModelError(
+                    f"{kind} '{self.name}': its spring would act on several coordinates "
+                    f"({', '.join(label.name for label in self.labels)}); free one only, or apply an mbd.Spring"
+                )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, field
 
 from mbd.bodies.algebra import IDENTITY, ZERO, dot, scaled
 from mbd.bodies.base import Frame
@@ -35,7 +35,7 @@ class Prismatic(Joint):
     child: Frame
     axis: Vector3 = (1.0, 0.0, 0.0)
     _: KW_ONLY
-    loss: JointLoss = None
+    loss: JointLoss = field(default=None, hash=False)
     stiffness: float = 0.0
     rest: float = 0.0
 

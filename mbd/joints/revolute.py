@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, field
 
 from mbd.bodies.algebra import ZERO, axis_rotation
 from mbd.bodies.base import Frame
@@ -35,7 +35,7 @@ class Revolute(Joint):
     child: Frame
     axis: Vector3 = Z
     _: KW_ONLY
-    loss: JointLoss = None
+    loss: JointLoss = field(default=None, hash=False)
     stiffness: float = 0.0
     rest: float = 0.0
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, field
 
 from mbd.bodies.algebra import axis_rotation, dot, scaled
 from mbd.bodies.base import Frame
@@ -40,7 +40,7 @@ class Screw(Joint):
     pitch: float
     axis: Vector3 = Z
     _: KW_ONLY
-    loss: JointLoss = None
+    loss: JointLoss = field(default=None, hash=False)
     stiffness: float = 0.0
     rest: float = 0.0
 

@@ -184,10 +184,16 @@ def update_armed(K: Any) -> None:
 
 
 def update_sides(K: Any) -> None:
-    """A guard that fires in one direction only is ready again once it has gone back."""
+    """A guard that fires in one direction only is ready again once it has gone back.
+
+    One that started at rest on its surface (side 0) is on the side to which it has moved.
+    """
     for e in range(K.n_guards):
+        value = K.guards0[4 * K.n_contacts + e]
+        if K.side[e] == 0.0 and value != 0.0:
+            K.side[e] = 1.0 if value > 0.0 else -1.0
         back = -K.direction[e]
-        if back * K.side[e] < 0.0 and back * K.guards0[4 * K.n_contacts + e] > 0.0:
+        if back * K.side[e] < 0.0 and back * value > 0.0:
             K.side[e] = float(back)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
-from mbd.errors import UnknownNameError, nearest
+from mbd.errors import TrajectoryError, UnknownNameError, nearest
 from mbd.results.dense import Restepping
 from mbd.results.interpolation import Grid, Places
 from mbd.results.names import AXES, rate_name
@@ -78,6 +78,8 @@ class Columns(ABC):
 
         A vector comes before a parameter of its name: 'left thigh.center' is a place, not a distance along the link.
         """
+        if not isinstance(name, str):
+            raise TrajectoryError(f"a quantity is asked for by its name, such as 'hip.angle', not {name!r}")
         if name in self.names:
             return (name,)
         parts = tuple(name + axis for axis in AXES)
@@ -85,7 +87,7 @@ class Columns(ABC):
             return parts
         if self.knows(name):
             return (name,)
-        raise UnknownNameError(nearest(name, (*self.names, *self.vectors), "result"))
+        raise UnknownNameError(nearest(name, (*self.names, *self.vectors), "result", "The run has"))
 
 
 class ModelColumns(Columns):
@@ -120,7 +122,7 @@ class ModelColumns(Columns):
     def node(self, name: str) -> Node:
         """The quantity as an expression."""
         if not self.knows(name):
-            raise UnknownNameError(nearest(name, (*self.names, *self.vectors), "result"))
+            raise UnknownNameError(nearest(name, (*self.names, *self.vectors), "result", "The run has"))
         return self._nodes[name]
 
     @property

@@ -42,6 +42,7 @@ def ledger(columns: ModelColumns) -> Ledger:
     return doubted_ledger(columns)[0]
 
 
+@np.errstate(all="ignore")
 def doubted_ledger(columns: ModelColumns) -> tuple[Ledger, Matrix]:
     """The ledger, and how far the sum of its works may be off at every row (2, R) [J]: of those that give, and of all.
 

@@ -134,6 +134,7 @@ class Grid:
         step = self.time[lower + 1] - self.time[lower]
         return lower, Places(self.time[lower] + step / 2, lower, lower + 1, np.full(len(lower), 0.5), step)
 
+    @np.errstate(all="ignore")
     def slopes(self, values: Matrix) -> Matrix:
         """Rates of change by three-point differences within each smooth segment."""
         rates = np.zeros_like(values, dtype=np.float64)

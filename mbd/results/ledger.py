@@ -72,6 +72,7 @@ class Ledger:
         return _last(self.total) - _last(self.total[:1])
 
     @property
+    @np.errstate(all="ignore")
     def numerical(self) -> Vector:
         """E(t) − E(0) − all parts [J]: what the integrator itself gained or lost."""
         left = self.total - _last(self.total[:1])
@@ -80,12 +81,15 @@ class Ledger:
         return np.asarray(left)
 
     @property
+    @np.errstate(all="ignore")
     def drift(self) -> float:
-        """Largest |numerical| over the largest swing of kinetic energy [-]; zero for a mechanism that never moves."""
+        """Largest |numerical| over the largest swing of kinetic energy [-]; zero for a mechanism that never moves, NaN
+        where energies are too large for numbers.
+        """
         scale = float(np.ptp(self.kinetic)) if len(self.kinetic) else 0.0
         scale = scale or float(np.max(np.abs(self.kinetic), initial=0.0))
         worst = float(np.max(np.abs(self.numerical), initial=0.0))
-        return worst / scale if scale > 0.0 else 0.0
+        return worst / scale if scale != 0.0 else 0.0
 
     @property
     def sums(self) -> dict[str, float]:
@@ -122,7 +126,7 @@ class Ledger:
             "kinetic": self.kinetic, "potential": self.potential, "total": self.total, **self.work,
         }  # fmt: skip
         if name not in columns:
-            raise UnknownNameError(nearest(name, columns, "part of the energy"))
+            raise UnknownNameError(nearest(name, columns, "part of the energy", "The ledger has"))
         return columns[name]
 
     def to_dataframe(self, by: Literal["element", "kind"] = "element") -> Any:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from mbd.assembly import is_number
+from mbd.bodies.values import is_number
 from mbd.equations.equations import Equations
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.integrators import Integrator

@@ -98,8 +98,9 @@ def guard_values(run: Run) -> Vector:
 
 
 def set_side(run: Run, e: int, guards: Vector) -> None:
-    """The sign from which a user's guard will cross next; at zero its rate decides."""
+    """The sign from which a user's guard will cross next: that of its value, however near to zero, so that a start
+    just before its surface fires it. At zero itself its rate decides, and where that is zero as well the first step.
+    """
     n_contacts, n_guards = run.values["n_contacts"], run.values["n_guards"]
     value, rate = guards[4 * n_contacts + e], guards[4 * n_contacts + n_guards + e]
-    decider = value if abs(value) > 1e-9 else rate
-    run.values["side"][e] = 1.0 if decider > 0.0 else -1.0
+    run.values["side"][e] = float(np.sign(value if value != 0.0 else rate))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbd.arrays import Vector
+from mbd.bodies.values import is_number
 from mbd.compile.mechanism import rate_names
 from mbd.compile.python import scalar_function
 from mbd.equations.equations import Guard
@@ -56,10 +57,7 @@ class Named(Mapping[str, float]):
 def apply_reset(run: Run, guard: Guard) -> None:
     """Set the coordinates and rates that a user's event resets; rows must still hold."""
     what = f"the reset of {guard.name!r} at t = {run.now:.6g} s"
-    wanted = asked(what, _reset_values, guard.reset, run.named())
-    bad = [name for name, value in wanted.items() if not np.isfinite(value)]
-    if bad:
-        raise SimulationError(f"{what} sets {bad[0]!r} to {wanted[bad[0]]!r}; give a finite number")
+    wanted = _finite_numbers(f"{what} sets", asked(what, _reset_values, guard.reset, run.named()))
     equations, v = run.mechanism.equations, run.values
     positions = {coordinate.name: k for k, coordinate in enumerate(equations.coordinates)}
     rates = {name: k for name, k in rate_names(equations).items() if name not in positions}
@@ -84,10 +82,45 @@ def apply_reset(run: Run, guard: Guard) -> None:
         raise SimulationError(f"{what} breaks {names}; reset velocities too")
 
 
-def _reset_values(reset: Any, named: Named) -> dict[str, float]:
-    """The values that a reset sets, by name."""
+def _reset_values(reset: Any, named: Named) -> dict[str, Any]:
+    """What a reset sets, by name."""
     wanted = reset(named) if callable(reset) else reset
-    return {name: float(value(named) if callable(value) else value) for name, value in dict(wanted).items()}
+    if not isinstance(wanted, Mapping):
+        raise ModelError(f"a reset maps names to values, such as {{'hip.rate': 0.0}}, not {wanted!r}")
+    return {name: value(named) if callable(value) else value for name, value in wanted.items()}
+
+
+def _finite_numbers(what: str, values: Mapping[str, Any]) -> dict[str, float]:
+    """Values that users' functions gave, by name, as floats."""
+    for name, value in values.items():
+        if not (isinstance(value, bool) or is_number(value)) or not np.isfinite(float(value)):
+            raise SimulationError(f"{what} {name!r} to {value!r}; give a finite number")
+    return {name: float(value) for name, value in values.items()}
+
+
+class Readings(dict[str, float]):
+    """What a controller reads, by name; a name that it does not read is an error that says so."""
+
+    def __init__(self, owner: str, values: Mapping[str, float]) -> None:
+        super().__init__(values)
+        self._owner = owner
+
+    def __missing__(self, name: str) -> float:
+        raise UnknownNameError(nearest(name, self, "entry of reads", "It reads") + "; name it in reads=")
+
+
+def _written(what: str, answer: Any, writes: Sequence[str]) -> dict[str, float]:
+    """The parameters that a controller's answer writes, by name; None writes nothing."""
+    answer = {} if answer is None else answer
+    if not isinstance(answer, Mapping):
+        raise SimulationError(
+            f"{what} must return the parameters to write, such as {{{writes[0] if writes else 'name'!r}: 1.0}}, None, "
+            f"or the pair (these, next state); it returned {answer!r}"
+        )
+    wrong = [name for name in answer if name not in writes]
+    if wrong:
+        raise UnknownNameError(f"{what}: " + nearest(wrong[0], writes, "entry of writes", "It may write"))
+    return _finite_numbers(f"{what} sets", answer)
 
 
 NEAR = 8.0 * F.EPS
@@ -194,18 +227,12 @@ class Boundaries:
     def _call(self, run: Run, controller: Any) -> None:
         named = run.named()
         what = f"Controller {controller.name!r} at t = {run.now:.6g} s"
-        values = {name: named[name] for name in controller.reads}
+        values = Readings(what, {name: named[name] for name in controller.reads})
         state = without_sharing(self.states[controller.name])  # the one before the call stays as it was
         answer = asked(what, controller.update, run.now, values, state)
-        if isinstance(answer, tuple):
+        if isinstance(answer, tuple) and len(answer) == 2:
             answer, state = answer
+        written = _written(what, answer, controller.writes)
         self.states = {**self.states, controller.name: state}
-        written = asked(what, lambda: {name: float(value) for name, value in dict(answer or {}).items()})
-        wrong = [name for name in written if name not in controller.writes]
-        if wrong:
-            raise UnknownNameError(f"{what}: " + nearest(wrong[0], controller.writes, "entry of writes"))
-        bad = [name for name, value in written.items() if not np.isfinite(value)]
-        if bad:
-            raise SimulationError(f"{what} wrote {written[bad[0]]!r} to {bad[0]!r}; write a finite number")
         if written:
             run.change_parameters(written)

@@ -102,17 +102,34 @@ def judgement(ledger: Ledger, doubt: Matrix, way: Vector) -> Judgement:
     return Judgement(-1, most if most >= least else -least, float(owned[-1]))
 
 
+def _passive(ledger: Ledger, way: Vector, found: Judgement) -> Judgement:
+    """The verdict on a mechanism that nothing drives: forces that only take energy cannot have made `ABSURD` of it.
+
+    Where rows do not resolve a blow, neither do they resolve its work, which then hides what the scheme has made.
+    """
+    size = np.maximum.accumulate(np.abs(ledger.kinetic) + np.abs(ledger.potential))
+    before = np.concatenate([size[:1], size[:-1]])
+    moves = np.maximum.accumulate(way) > MOVED
+    absurd = moves & (before > 0.0) & (ledger.total - ledger.total[0] > ABSURD * before)
+    if not absurd.any():
+        return found
+    row = int(np.argmax(absurd))
+    return Judgement(row, float(np.max(ledger.total[row:] - ledger.total[0])), float(before[row]))
+
+
 class EnergyWatch:
     """Looks at the energy of a run now and then.
 
     Attributes
     ----------
     problem, note : what was found, in a sentence; '' if nothing
+    share : of the energy that the mechanism had, what the scheme gave (positive) or took [-]
     rows, ledgers : rows in which T + V was evaluated, and ledgers made
     """
 
     def __init__(self) -> None:
         self.problem = self.note = ""
+        self.share = 0.0
         self.rows = self.ledgers = 0
         self._due, self._looks, self._upto = FIRST_LOOK, 0, 0
         self._seen = np.zeros((0, 3))  # T, V and the way of the fastest coordinate, of the rows looked at so far
@@ -122,23 +139,30 @@ class EnergyWatch:
         """Whether a run that goes on is to be looked at now."""
         return run.stored >= self._due and self._looks < LOOKS
 
+    @np.errstate(all="ignore")
     def judge(self, run: Run) -> str:
         """Look at the run as far as it is stored; a sentence if the energy is the scheme's own, '' otherwise."""
         if self.problem or run.stored < 2 or run.values["n_v"] == 0:
             return self.problem
         self._look(run)
+        if np.isinf(self._seen[:, 0]).any():
+            self._overflow(run)
+            return self.problem
         if not self._looks_strange(run):
             return ""
         columns = ModelColumns(whole_record(run), run.mechanism.equations)
-        with np.errstate(all="ignore"):
-            ledger, doubt = doubted_ledger(columns)
-            found = judgement(ledger, doubt, _way(columns.record.q, columns.record.q[0]))
+        ledger, doubt = doubted_ledger(columns)
+        way = _way(columns.record.q, columns.record.q[0])
+        found = judgement(ledger, doubt, way)
+        reset = bool(run.parameter_changes) or any(event.kind == "event" for event in run.events)
+        if found.row < 0 and _kinds(run.mechanism) <= UNDRIVEN and not reset and not columns.record.closed[0].any():
+            found = _passive(ledger, way, found)
         self.ledgers += 1
         self._cleared = float(np.nanmax(ledger.total - ledger.total[0]))
         if found.row >= 0:
             self.problem = _sentence(run, found)
         elif abs(found.share) > TELLING:
-            self.note = _note(found)
+            self.note, self.share = _note(found), found.share
         return self.problem
 
     def _look(self, run: Run) -> None:
@@ -148,12 +172,26 @@ class EnergyWatch:
         chosen = np.array(sorted({*rows.tolist(), *early[early < run.stored].tolist()}), dtype=np.intp)
         record = record_of(run, run.table[chosen])
         inputs = ModelColumns.inputs(record.rows(np.zeros((len(chosen), run.values["n_anchors"]))))
-        with np.errstate(all="ignore"):
-            kinetic, potential = run.mechanism.energies(inputs, record.parameters_at(chosen))
+        kinetic, potential = run.mechanism.energies(inputs, record.parameters_at(chosen))
         way = _way(record.q, run.table[0, 1 : 1 + run.values["n_q"]])
         self._seen = np.concatenate([self._seen, np.column_stack([kinetic, potential, way])])
         self.rows += len(chosen)
         self._upto, self._due, self._looks = run.stored, 4 * max(self._due, run.stored // 4), self._looks + 1
+
+    def _overflow(self, run: Run) -> None:
+        """Energies beyond the largest number: the scheme's own where the run began with less, else not judged."""
+        top = float(np.max(np.abs(run.table[run.stored - 1, 1 + run.values["n_q"] :][: run.values["n_v"]])))
+        if np.isfinite(self._seen[0, 0]):
+            setting = "the tolerance" if run.values["adaptive"] else f"dt = {run.dt:g} s"
+            self.problem = (
+                f"t = {run.now:.9g} s: the energy has grown beyond the largest number, at speeds of {top:.2g}: "
+                f"{setting} does not resolve the motion; use a smaller one, or slower motion"
+            )
+        else:
+            self.note = (
+                f"speeds of {top:.2g} at the start make an energy beyond the largest number: energies cannot be told, "
+                "and the run was not judged by them; use larger units"
+            )
 
     def _looks_strange(self, run: Run) -> bool:
         """Whether only the ledger can tell that the energies seen are right."""

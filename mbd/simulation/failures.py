@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbd.arrays import Vector
+from mbd.integrators.base import Point
 from mbd.kernel import fields as F
 from mbd.results.failure import Failure
 from mbd.results.record import EventRecord
@@ -127,10 +128,8 @@ def explanation(
             f"forces{with_closed}{worst}; use a larger tolerance= of the integrator or a larger dt"
         )
     if status in (F.SINGULAR, F.TOO_NEAR):
-        return (
-            f"{where}: the Newton matrix is singular at {_unknown(stepper)}{with_closed}; rows depend on each other: "
-            "leave one out, or try another dt"
-        )
+        what = f"{where}: the Newton matrix is singular at {_unknown(stepper)}{with_closed}"
+        return f"{what}; {_why_singular(stepper)}"
     if status == F.CHATTER:
         return (
             f"{where}: more than {values['max_switches']} switches at one instant: {_last_events(events)}; they "
@@ -159,6 +158,30 @@ def explanation(
             "friction coefficient, or make the contact compliant with mbd.Penalty"
         )
     return f"{where}: the instant of an event could not be isolated{with_closed}{worst}; try a smaller dt"
+
+
+def _why_singular(stepper: Stepper) -> str:
+    """What makes a Newton matrix singular, and what to try: rows, the mass matrix, or the step."""
+    v, system = stepper.values, stepper.system
+    if int(v["state"][F.ROWS]) > 0:
+        return "rows depend on each other: leave one out, or try another dt"
+    mode = stepper.manager.mode(v["closed"][: v["n_contacts"]])
+    zero, y, layout = np.zeros(v["n_v"]), v["y"][: v["n"]], stepper.mechanism.layout
+    time, q = float(v["clock"][F.NOW]), v["q"][: v["n_q"]]
+    if v["block"][0] > time:  # what the step was tried at
+        y, time = v["block"][layout.v : layout.a].copy(), float(v["block"][0])
+        q = system.compose(v["block"][layout.q : layout.x].copy(), v["block"][layout.x : layout.v].copy())
+    with np.errstate(all="ignore"):
+        terms = system.evaluate(Point(time, q, zero, y, np.zeros(v["n"]), np.zeros(0)), mode, (0.0, 0.0))
+        M = np.asarray(terms.S)
+        size = np.sqrt(np.abs(np.diag(M)))
+        sizes = np.linalg.svd(M / np.outer(size, size), compute_uv=False) if np.all(size > 0.0) else np.zeros(1)
+    if not np.isfinite(sizes).all() or sizes[-1] < 1e-12:
+        return "no row acts there, so its mass matrix is: nothing resists that motion; give what it moves a mass"
+    return (
+        "no row acts there and its mass matrix is regular: dt is too large for a force that grows along the motion "
+        "(a negative stiffness or damping); use a smaller dt"
+    )
 
 
 def crowded(events: Sequence[EventRecord], now: float, dt: float) -> str:
@@ -223,7 +246,8 @@ def _not_finite(stepper: Stepper, places: Mapping[str, str]) -> str:
     for effect in equations.effects:
         if not _finite(list(effect.generalized()), inputs):
             place = f" on {places[effect.name]}" if places.get(effect.name) else ""
-            return f"the force of {effect.name!r}{place} is not finite{_moved_by(stepper, effect, inputs)}"
+            moved = _moved_by(stepper, effect, inputs)
+            return f"the force of {effect.name!r}{place} is not finite{moved}; check its roots, logarithms, divisions"
     for row in equations.rows:
         if not _finite([row.value, row.rate], inputs):
             return f"the constraint {row.title} is not finite"

@@ -9,6 +9,9 @@ import numpy as np
 
 from mbd.equations.equations import Contact
 from mbd.kernel import fields as F
+from mbd.results.record import Record
+from mbd.simulation.blows import dt_of_blows
+from mbd.simulation.fastest import fastest, resolving_dt, sane_rows
 from mbd.simulation.redundant import redundancy
 
 if TYPE_CHECKING:
@@ -18,6 +21,15 @@ __all__ = ["notes_of"]
 
 RESOLVED = 10.0
 """Steps that a penalty contact must last to be resolved at all."""
+
+BLIND = 2.0
+"""Steps of a penalty contact below which its blow is the scheme's, not the law's: the run's message says so [-]."""
+
+TAKEN = 0.5
+"""Share of its energy that a scheme may take from a mechanism before the run's message says so [-]."""
+
+LOOKED_AT = 8
+"""Blows of a contact from which the step that resolves them is found."""
 
 TELLING = 1e-4
 """Sum of the local errors of velocities of an explicit scheme that a run tells [m/s, rad/s]."""
@@ -46,8 +58,8 @@ COUNTED = (
 """Places of the kernel's counts, and what to say where they are not zero."""
 
 
-def notes_of(run: Run) -> list[str]:
-    """The notes of a run that is over, in sentences."""
+def notes_of(run: Run, record: Record) -> tuple[list[str], list[str]]:
+    """The notes of a run that is over, in sentences, and those of them that put its result in doubt."""
     notes = [*run.mechanism.notes, *getattr(run.mechanism.common, "notes", ())]
     equations = run.mechanism.equations
     loaded = bool(run.values["loaded"]) or any(friction.contact >= 0 for friction in equations.frictions)
@@ -56,7 +68,8 @@ def notes_of(run: Run) -> list[str]:
     notes += [dependent] if dependent else []
     counts, impact = run.values["counts"], run.settings["impact"]
     notes += [text.format(count=int(counts[place]), impact=impact) for place, text in COUNTED if counts[place]]
-    notes += [run.energy.note] if run.energy.note else []
+    doubts = _energy_lost(run, record)
+    notes += doubts or ([run.energy.note] if run.energy.note else [])
     spent = float(run.values["clock"][F.SPENT])
     if spent > TELLING and not run.values["adaptive"]:
         notes.append(
@@ -65,8 +78,19 @@ def notes_of(run: Run) -> list[str]:
             "care; use a smaller dt, or tol="
         )
     for number, contact in enumerate(run.manager.contacts):
-        notes += _ignored(run, number, contact) + _short_touch(run, contact)
-    return notes
+        short, blind = _short_touch(run, record, number, contact)
+        notes += _ignored(run, number, contact) + short
+        doubts += blind
+    return notes, doubts
+
+
+def _energy_lost(run: Run, record: Record) -> list[str]:
+    """The note on the energy with the dt that resolves the fastest motion, where most of the energy is gone."""
+    if not run.energy.share < -TAKEN or run.values["adaptive"]:
+        return []
+    rate = fastest(run, record, sane_rows(run))
+    told = f": dt = {run.dt:g} s does not resolve its fastest motion of {rate:.3g} rad/s, dt below "
+    return [run.energy.note + (f"{told}{resolving_dt(rate):.2g} s does" if rate * run.dt > 1.0 else "")]
 
 
 def _ignored(run: Run, number: int, contact: Contact) -> list[str]:
@@ -80,15 +104,20 @@ def _ignored(run: Run, number: int, contact: Contact) -> list[str]:
     return notes
 
 
-def _short_touch(run: Run, contact: Contact) -> list[str]:
-    """A penalty contact over within a few steps is not resolved: its energy is anyone's guess."""
+def _short_touch(run: Run, record: Record, number: int, contact: Contact) -> tuple[list[str], list[str]]:
+    """A penalty contact over within a few steps is not resolved: its energy is anyone's guess. (note, doubt)"""
     if contact.kind != "penalty" or run.values["adaptive"]:
-        return []
+        return [], []
     times = [(event.kind, event.time) for event in run.events if event.name == contact.name]
     spans = [b[1] - a[1] for a, b in pairwise(times) if (a[0], b[0]) == ("closed", "opened")]
     if not spans or min(spans) >= RESOLVED * run.dt:
-        return []
-    return [
+        return [], []
+    last = len(record.time) - 1
+    closings = [min(e.row, last) for e in run.events if e.name == contact.name and e.kind == "closed"]
+    safe = dt_of_blows(run, record, number, closings[:LOOKED_AT])
+    safe = safe if np.isfinite(safe) else min(spans) / RESOLVED
+    note = (
         f"{contact.name!r} closed for {min(spans) / run.dt:.2g} steps only, too few: its peak force and energy "
-        f"are not resolved; use dt below {min(spans) / 20.0:.2g} s, a softer stiffness, or mbd.Unilateral"
-    ]
+        f"are not resolved; use dt below {safe:.2g} s, a softer stiffness, or mbd.Unilateral"
+    )
+    return [note], [note] if min(spans) < BLIND * run.dt else []

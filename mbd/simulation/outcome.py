@@ -52,13 +52,15 @@ def whole_record(run: Run) -> Record:
 
 
 def trajectory_of(run: Run, problem: str, message: str, final: State) -> Trajectory:
-    """The run by name; `problem` is '' if it went as far as it was asked to."""
+    """The run by name; `problem` is '' if it went as far as it was asked to. Its message tells what is in doubt."""
     record = whole_record(run)
-    record = replace(record, success=not problem, message=problem or message, failure=run.failure, final=final)
-    return Trajectory(replace(record, stats=_statistics(run)))
+    notes, doubts = notes_of(run, record)
+    told = problem or "; but ".join([message, *doubts])
+    record = replace(record, success=not problem, message=told, failure=run.failure, final=final)
+    return Trajectory(replace(record, stats=_statistics(run, notes)))
 
 
-def _statistics(run: Run) -> dict[str, Any]:
+def _statistics(run: Run, notes: list[str]) -> dict[str, Any]:
     counts = run.values["counts"]
     numbers: dict[str, Any] = {name: int(counts[place]) for place, name in enumerate(COUNTS)}
     if run.values["adaptive"]:
@@ -69,6 +71,6 @@ def _statistics(run: Run) -> dict[str, Any]:
     numbers["compiled"] = run.stepper.compiled
     numbers["optimized"] = run.stepper.compiled and not run.stepper.provisional
     numbers["derive_and_compile_seconds"] = run.mechanism.seconds
-    numbers["notes"] = notes_of(run)
+    numbers["notes"] = notes
     numbers["wall_seconds"] = perf_counter() - run.began
     return numbers

@@ -10,7 +10,8 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.compile.mechanism import Mechanism, ModeCode
 from mbd.equations.programs import mass_matrix
-from mbd.integrators.base import Integrator, Point, StepReport, Terms
+from mbd.errors import SimulationError
+from mbd.integrators.base import Integrator, Point, StepReport, StepResult, Terms
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.kernel.fields import CAREFUL, ITERATIONS, NEAR, NOT_CONVERGED, NOT_FINITE, NOW, TOO_NEAR
 from mbd.kernel.restart import MOST_LOADS, fill_block, refresh_scales
@@ -258,6 +259,8 @@ class PlainScheme:
         state, mode, rows = self._state(K)
         what = f"a step of {self.integrator!r} from t = {state.time:.6g} s"
         result = asked(what, self.integrator.step, self.system, state, t1 - state.time, mode, self.memory)
+        if not isinstance(result, StepResult):
+            raise SimulationError(f"{what} must return a StepResult(state, memory, report), not {result!r}")
         self.report = result.report
         K.counts[ITERATIONS] += result.report.iterations
         if not result.report.converged:

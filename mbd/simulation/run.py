@@ -22,8 +22,9 @@ from mbd.simulation.control import Boundaries, Named, apply_reset
 from mbd.simulation.ends import advance, call, close
 from mbd.simulation.energy import EnergyWatch
 from mbd.simulation.failures import attempt, crowded, explanation
+from mbd.simulation.fastest import stability
 from mbd.simulation.memory import take_up
-from mbd.simulation.outcome import trajectory_of
+from mbd.simulation.outcome import trajectory_of, whole_record
 from mbd.simulation.savepoints import Savepoint, rewind, save
 from mbd.simulation.stepper import Stepper
 from mbd.state import State
@@ -132,6 +133,8 @@ class Run:
             self.failure = (tried or attempt(self))(problem, final)  # a replay finds its sentence again
         if fed not in ("", problem):
             problem = f"{problem}; before that, {fed}"
+        if problem and not self.interrupted and self.stored:
+            problem += stability(self, whole_record(self))
         return trajectory_of(self, problem, message, final), problem
 
     def march(self) -> tuple[str, str]:

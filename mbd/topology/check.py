@@ -177,14 +177,18 @@ def rule_faults(model: Model) -> list[str]:
                 found.append(f"'{controller.name}' on: " + nearest(name, instants, "contact or event"))
         for name in controller.writes:
             if name not in parameters:
-                found.append(f"'{controller.name}' writes: " + nearest(name, parameters, "parameter"))
+                found.append(f"'{controller.name}' writes: " + nearest(name, parameters, "parameter", "There are"))
     return found
 
 
 def choice_faults(model: Model) -> list[str]:
     """Names in cut= and tunable= that do not exist."""
     parameters = model.parameters
-    found = ["tunable: " + nearest(name, parameters, "parameter") for name in model.tunable if name not in parameters]
+    found = [
+        "tunable: " + nearest(name, parameters, "parameter", "There are")
+        for name in model.tunable
+        if name not in parameters
+    ]
     try:
         cut_names(model)
     except ModelError as error:

@@ -136,8 +136,12 @@ BAD = {
     "raises": (lambda t, values, state: 1 / 0, "ZeroDivisionError"),
     "nan": (lambda t, values, state: {"push.force.x": float("nan")}, "nan"),
     "writes another name": (lambda t, values, state: {"push.force.y": 1.0}, "push.force.x"),
-    "text": (lambda t, values, state: {"push.force.x": "hard"}, "ValueError"),
-    "list": (lambda t, values, state: [1.0], "TypeError"),
+    "text": (lambda t, values, state: {"push.force.x": "hard"}, "'hard'; give a finite number"),
+    "words": (lambda t, values, state: "hard", "must return the parameters to write"),
+    "one of a pair": (lambda t, values, state: ({"push.force.x": 1.0},), "must return the parameters to write"),
+    "an array": (lambda t, values, state: {"push.force.x": np.zeros(2)}, "give a finite number"),
+    "not read": (lambda t, values, state: {"push.force.x": values["hip.angle"]}, "name it in reads="),
+    "list": (lambda t, values, state: [1.0], "must return the parameters to write"),
 }
 
 

@@ -74,6 +74,37 @@ def test_a_guard_of_time_fires_at_its_time():
     assert [event.time for event in trajectory.events] == [pytest.approx(0.12345, abs=1e-14)]
 
 
+BEFORE = [1e-6, 1e-9, 1e-10, 1e-12, 1e-15]
+"""Distances of a start from the surface of an event [m]."""
+
+
+@pytest.mark.parametrize("backend", ["llvm", "python"])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("distance", BEFORE)
+def test_a_start_just_before_the_surface_fires_at_once(distance, side, backend):
+    model = oscillator(mbd.Event("zero", mbd.measure("slide.displacement")))
+    start, speed = {"slide.displacement": side * distance}, {"slide.rate": -side}
+    events = run(model, start, speed, dt=1e-2, until=0.6, backend=backend).events
+    assert [event.time for event in events] == [pytest.approx(distance, abs=1e-15), pytest.approx(0.5, abs=2e-3)]
+    away = run(model, start, {"slide.rate": side}, dt=1e-2, until=0.6, backend=backend).events
+    assert [event.time for event in away] == [pytest.approx(0.5, abs=2e-3)]
+
+
+@pytest.mark.parametrize("speed", [1.0, -1.0])
+def test_a_start_on_the_surface_has_crossed_it(speed):
+    model = oscillator(mbd.Event("zero", mbd.measure("slide.displacement")))
+    (event,) = run(model, {"slide.displacement": 0.0}, {"slide.rate": speed}, dt=1e-2, until=0.6).events
+    assert event.time == pytest.approx(0.5, abs=2e-3)
+
+
+@pytest.mark.parametrize("place", [0.4, -0.4])
+def test_a_start_at_rest_on_the_surface_fires_as_it_comes_back(place):
+    model = oscillator(mbd.Event("back", mbd.measure(lambda x: x - place, "slide.displacement"), direction=0))
+    model.constrain(mbd.Event("turn", mbd.measure("slide.rate")))
+    events = run(model, {"slide.displacement": place}, dt=1e-3, until=0.9).events
+    assert [event.name for event in events] == ["turn"] and events[0].time == pytest.approx(0.5, abs=1e-3)
+
+
 # resets -------------------------------------------------------------------------------------------------------------
 RESETS = {
     "function of named values": lambda named: {"fall.rate": -0.5 * named["fall.rate"]},
@@ -131,7 +162,7 @@ def test_a_reset_that_breaks_a_constraint_is_refused_and_the_run_kept():
 
 BAD_RESETS = {
     "wrong name": ({"fall.rat": 0.0}, "fall.rate"),
-    "not a number": ({"fall.rate": "up"}, "ValueError"),
+    "not a number": ({"fall.rate": "up"}, "'up'; give a finite number"),
     "nan": (lambda named: {"fall.rate": float("nan")}, "nan"),
     "raises": (lambda named: 1 / 0, "ZeroDivisionError"),
     "asks for a wrong name": (lambda named: {"fall.rate": named["fal.rate"]}, "fall.rate"),

@@ -11,7 +11,7 @@ import numpy as np
 
 from mbd.analysis.accuracy.settings import Setting, is_high, long_steps, steps_of, tolerances
 from mbd.analysis.accuracy.truth import motion, stopped
-from mbd.assembly import is_number
+from mbd.bodies.values import is_number
 from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import ModelError, SimulationError, UnknownNameError, nearest
 from mbd.integrators import HHT, GeneralizedAlpha, Integrator, Newmark, RadauIIA, RungeKutta853

@@ -13,7 +13,7 @@ from mbd.analysis.accuracy.points import Point, Subject, measured, retimed
 from mbd.analysis.accuracy.result import Accuracy
 from mbd.analysis.accuracy.settings import Setting, is_high, steps_for
 from mbd.analysis.accuracy.truth import Truth, truth
-from mbd.assembly import is_number
+from mbd.bodies.values import is_number
 from mbd.errors import ModelError
 from mbd.integrators import Integrator
 from mbd.state import State

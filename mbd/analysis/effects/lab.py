@@ -18,7 +18,7 @@ from mbd.analysis.effects.contribution import Change, Contribution
 from mbd.analysis.effects.result import Effects, Together
 from mbd.analysis.effects.scenes import Element, Scene, elements, reduced
 from mbd.analysis.effects.timing import Pair, Timing, timed
-from mbd.assembly import is_number
+from mbd.bodies.values import is_number
 from mbd.compile.mechanisms import mechanism_of
 from mbd.equations.cost import cost
 from mbd.errors import MbdError, ModelError, SimulationError, UnknownNameError, nearest

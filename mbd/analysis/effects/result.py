@@ -68,7 +68,7 @@ class Effects:
         for each in self.contributions:
             if each.name == name:
                 return each
-        raise UnknownNameError(nearest(name, [each.name for each in self.contributions], "effect"))
+        raise UnknownNameError(nearest(name, [each.name for each in self.contributions], "effect", "There are"))
 
     @cached_property
     def recommendation(self) -> tuple[str, ...]:

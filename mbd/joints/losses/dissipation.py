@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from mbd.bodies.algebra import derivatives_at
+from mbd.errors import ModelError
 from mbd.joints.losses.base import DissipationFunction
 from mbd.scope import Scope
 from mbd.tape.node import Scalar, Tape
@@ -25,6 +26,13 @@ class Dissipation(DissipationFunction):
     """
 
     function: Any
+
+    def __post_init__(self) -> None:
+        if not callable(self.function) and not hasattr(self.function, "free_symbols"):
+            raise ModelError(
+                "Dissipation needs D(v), a function of one rate such as lambda v: 0.5 * c * v**2 or a sympy "
+                f"expression of the symbol rate; got {self.function!r}"
+            )
 
     def fields(self) -> dict[str, float]:
         """None: what the function contains is its own."""

@@ -1,0 +1,94 @@
+"""Steps that do not resolve the motion: what a run says, and the step that it asks for."""
+
+from __future__ import annotations
+
+import re
+import warnings
+
+import numpy as np
+import pytest
+
+import mbd
+from tests.simulation.mechanisms import falling, run
+
+STIFF = 1e9
+
+
+def dropped(integrator, dt, **law):
+    """A ball of 2 kg falls 0.1 m onto a penalty contact."""
+    model, body = falling()
+    model.constrain(mbd.Penalty("floor", mbd.height(body.origin), **{"stiffness": STIFF} | law))
+    start = mbd.assemble(model, position={"fall.displacement": 0.1})
+    return mbd.simulate(model, start, integrator, dt=dt, until=0.2, on_failure="return")
+
+
+def oscillator(stiffness, integrator, dt, damping=0.0):
+    """A mass of 1 kg on a spring, pulled out by 0.1 m."""
+    model = mbd.Model("oscillator", gravity=(0.0, 0.0, 0.0))
+    body = mbd.PointMass("body", mass=1.0)
+    loss = mbd.Viscous(damping) if damping else None
+    model.connect(mbd.Prismatic("slide", model.ground.origin, body.origin, stiffness=stiffness, loss=loss))
+    start = mbd.assemble(model, position={"slide.displacement": 0.1})
+    return mbd.simulate(model, start, integrator, dt=dt, until=100 * dt, on_failure="return")
+
+
+@pytest.mark.parametrize(
+    "law", [{}, {"exponent": 1.5}, {"restitution": 0.5, "exponent": 1.5}, {"damping": 2e4}], ids=str
+)
+def test_the_step_asked_for_is_that_of_penalty_parameters(law):
+    told = dropped(mbd.HHT(0.05), 1e-3, **law).message
+    (asked,) = re.findall(r"'floor' closed .* use dt below ([\d.e-]+) s", told)
+    speed, e = np.sqrt(2.0 * 9.81 * 0.1), law.get("restitution", 1.0)
+    if "damping" in law:
+        ratio = law["damping"] / (2.0 * np.sqrt(STIFF * 2.0))
+        expected = np.arccos(ratio) / np.sqrt(1.0 - ratio**2) * np.sqrt(2.0 / STIFF) / 5.0
+    else:  # the stiffness follows from the depth: k ~ δ^-(n+1)
+        n = law.get("exponent", 1.0)
+        near = mbd.penalty_parameters(e, 1e-4, effective_mass=2.0, approach_speed=speed, exponent=n)
+        depth = 1e-4 * (near.stiffness / STIFF) ** (1.0 / (n + 1.0))
+        expected = mbd.penalty_parameters(e, depth, effective_mass=2.0, approach_speed=speed, exponent=n).largest_dt
+    assert float(asked) == pytest.approx(expected, rel=0.06)
+
+
+def test_a_blow_that_is_resolved_leaves_the_message_alone():
+    found = dropped(mbd.HHT(0.05), 4e-6)
+    assert found.message == "reached t = 0.2 s" and not found.stats["notes"]
+
+
+def test_an_explicit_blow_that_makes_energy_out_of_nothing_is_an_error():
+    found = dropped(mbd.RungeKutta853(), 1e-3)
+    assert not found.success and "the energy is not the mechanism's" in found.message
+
+
+def test_a_scheme_that_takes_all_energy_of_a_stiff_spring_says_so_in_the_message():
+    found = oscillator(STIFF, mbd.HHT(0.05), 1e-4)
+    assert found.success and "3.16e+04 rad/s, dt below 9.9e-06 s does" in found.message
+
+
+@pytest.mark.parametrize(("stiffness", "damping", "limit"), [(1e6, 0.0, 6e-3), (1e8, 0.0, 6e-4), (1.0, 1e4, 6e-4)])
+def test_an_explicit_run_above_its_limit_of_stability_tells_the_limit(stiffness, damping, limit):
+    found = oscillator(stiffness, mbd.RungeKutta853(), 3.0 * limit, damping)
+    assert not found.success and f"stable for dt below {limit:.2g} s only" in found.message
+    assert oscillator(stiffness, mbd.RungeKutta853(), 0.5 * limit, damping).success
+
+
+@pytest.mark.parametrize("integrator", [mbd.HHT(0.05), mbd.RadauIIA(), mbd.RungeKutta853()], ids=repr)
+def test_speeds_whose_energy_no_number_holds_warn_in_words_only(integrator):
+    model, _ = falling()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = run(model, {}, {"fall.rate": 1e200}, integrator=integrator, dt=1e-3, until=1e-2)
+        assert "not judged" in str(found) and "kinetic" in str(found.energy)
+
+
+def test_a_mass_that_vanishes_is_no_matter_of_rows():
+    fading = mbd.Lagrangian(
+        "fading",
+        ["x", "y"],
+        kinetic=lambda x, x_rate, y_rate: 0.5 * mbd.where(x > 0.5, 1.0, 0.0) * x_rate**2 + 0.5 * y_rate**2,
+        potential=lambda x: 9.81 * x,
+    )
+    start = mbd.assemble(fading, position={"x": 1.0})
+    with pytest.raises(mbd.SimulationError, match="no row acts there, so its mass matrix is") as failed:
+        mbd.simulate(fading, start, mbd.HHT(0.05), dt=1e-2, until=1.0)
+    assert "rows depend" not in str(failed.value)

@@ -1,0 +1,118 @@
+"""Arguments of a wrong kind: every word says which argument, what came, and what would be right."""
+
+from __future__ import annotations
+
+import inspect
+
+import pytest
+
+import mbd
+
+MODEL = mbd.Model("arguments")
+ROD = mbd.Link("rod", mass=1.0, length=1.0, center=0.5)
+HINGE = mbd.Revolute("hinge", MODEL.ground.origin, ROD.start)
+FRAMES = MODEL.ground.origin, ROD.end
+
+WORDS = {
+    **{scheme: () for scheme in (mbd.HHT, mbd.GeneralizedAlpha, mbd.Newmark, mbd.RadauIIA)},
+    **{
+        joint: ("joint", *FRAMES)
+        for joint in (
+            mbd.Cylindrical, mbd.Planar, mbd.Prismatic, mbd.Revolute, mbd.Translation, mbd.Universal, mbd.Weld,
+        )
+    },
+    mbd.Screw: ("screw", *FRAMES, 0.1),
+    mbd.PointMass: ("point", 1.0),
+    mbd.RigidBody: ("body", 1.0, (1.0, 1.0, 1.0)),
+    mbd.Link: ("link", 1.0, 1.0, 0.5),
+    mbd.Coulomb: (1.0,),
+    mbd.Dissipation: (lambda rate: rate * rate,),
+    mbd.PinFriction: (0.1, 0.1),
+    mbd.Quadratic: (1.0,),
+    mbd.Tabulated: ((-1.0, 0.0, 1.0), (-1.0, 0.0, 1.0)),
+    mbd.Viscous: (1.0,),
+    mbd.Applied: ("push", FRAMES[1], (1.0, 0.0, 0.0)),
+    mbd.Damper: ("damper", *FRAMES, 1.0),
+    mbd.Motor: ("motor", HINGE, 1.0),
+    mbd.Potential: ("potential", lambda angle: angle, ("hinge.angle",)),
+    mbd.Samples: ([0.0, 1.0], [0.0, 1.0]),
+    mbd.Spring: ("spring", *FRAMES, 1.0),
+    mbd.TorsionSpring: ("spring", HINGE, 1.0),
+    mbd.Bilateral: ("rail", mbd.flexion(HINGE)),
+    mbd.Controller: ("brain", lambda time, values, state: None, 0.1),
+    mbd.Event: ("event", mbd.flexion(HINGE)),
+    mbd.KnifeEdge: ("knife", ROD.end),
+    mbd.Nonholonomic: ("row", lambda rate: rate, 0.0, ("hinge.rate",)),
+    mbd.Penalty: ("stop", mbd.flexion(HINGE), 1e3),
+    mbd.Plane: (),
+    mbd.Rolling: ("wheel", ROD.end, 0.1),
+    mbd.Unilateral: ("foot", mbd.height(ROD.end)),
+    mbd.When: ("foot",),
+    mbd.distance: FRAMES,
+    mbd.extension: (HINGE,),
+    mbd.flexion: (HINGE,),
+    mbd.height: (ROD.end,),
+    mbd.measure: ("hinge.angle",),
+    mbd.penalty_parameters: (0.5, 1e-3, 1.0, 1.0),
+    mbd.separation: (*FRAMES, (1.0, 0.0, 0.0)),
+    mbd.touchdown: (ROD.end,),
+    mbd.Coordinate: ("theta",),
+    mbd.Lagrangian: ("pendulum", ("theta",), lambda theta_rate: 0.5 * theta_rate**2),
+    mbd.Model: ("model",),
+    mbd.on_slope: (0.1,),
+}  # fmt: skip
+
+WRONG = [
+    "x", "", None, [1], {}, {1: 2}, {"a": 1}, ["a"], (None, None, None), (1, 2, 3, 4), [[1]], object(), -1.0,
+    float("nan"), float("inf"), 1j, b"x", True, lambda: 0, mbd.PointMass,
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("word", WORDS, ids=lambda word: word.__name__)
+def test_a_wrong_argument_is_taken_or_told_in_words(word):
+    signature = inspect.signature(word)
+    for name, parameter in signature.parameters.items():
+        for wrong in WRONG:
+            bound = signature.bind(*WORDS[word])
+            bound.arguments[name] = (wrong,) if parameter.kind is parameter.VAR_POSITIONAL else wrong
+            try:
+                made = word(*bound.args, **bound.kwargs)
+            except mbd.MbdError:
+                continue  # told in words; anything else that it raises is a fault
+            assert repr(made)
+            assert isinstance(made, mbd.Model | mbd.Lagrangian) or isinstance(hash(made), int)
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: mbd.HHT(alpha="x"), "alpha between 0 and 1/3, not 'x'; 0.05 is common"),
+        (lambda: mbd.GeneralizedAlpha(rho_inf=None), "rho_inf between 0 and 1, not None; 0.9 is common"),
+        (lambda: mbd.Newmark(gamma="x"), "gamma='x'"),
+        (lambda: mbd.RadauIIA(tolerance="x"), "tolerance must be a number between 0 and 1e-3, not 'x'"),
+        (lambda: mbd.HHT(formulation=""), "formulation is 'ggl' or 'index3', not ''"),
+        (lambda: mbd.Controller("brain", print, reads=5, period=1.0), "reads of Controller 'brain' must be a name"),
+        (lambda: mbd.Event("end", mbd.flexion(HINGE), terminal="no"), "terminal of Event 'end' must be True or False"),
+        (lambda: mbd.Translation("slide", *FRAMES, stiffness=1.0), "would act on several coordinates"),
+        (lambda: mbd.Dissipation(5), "needs D"),
+        (lambda: mbd.Motor("m", HINGE, 1.0, arguments=5), "arguments must be a list"),
+        (lambda: mbd.Lagrangian("p", 5, 0.0, parameters={"m": "x"}), "parameter 'm' must be a number, got 'x'"),
+    ],
+)
+def test_the_sentence_names_the_argument_and_what_came(make, said):
+    with pytest.raises(mbd.ModelError, match=said):
+        make()
+
+
+def test_lists_of_names_are_introduced_by_what_has_them():
+    for call, said in (
+        (lambda: mbd.assemble(MODEL, backend="lvm"), "There are 'auto', 'llvm', 'python'"),
+        (lambda: mbd.assemble(MODEL, parameters={"rod.mas": 1.0}), "There are "),
+        (lambda: mbd.assemble(MODEL, position={"zzz": 1.0}), "; the model has 'hinge.angle'"),
+        (lambda: mbd.assemble(MODEL, position={"hinge.rate": 1.0}), "give it in velocity="),
+        (lambda: mbd.assemble(MODEL, velocity={"rod.end.x": 1.0}), "no rate named 'rod.end.x'"),
+    ):
+        if not MODEL.joints:
+            MODEL.connect(HINGE)
+        with pytest.raises(mbd.ModelError, match=said):
+            call()
