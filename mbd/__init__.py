@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from mbd.analysis.accuracy import Accuracy as Accuracy, accuracy as accuracy
+    from mbd.analysis.accuracy import Accuracy as Accuracy, Known as Known, accuracy as accuracy
     from mbd.analysis.effects import Effects as Effects, effects as effects
     from mbd.analysis.linearization import Linearization as Linearization, linearize as linearize
     from mbd.analysis.mobility import Mobility as Mobility, mobility as mobility
@@ -122,7 +122,7 @@ __version__ = "0.1.0"
 
 _HOMES = {
     "mbd.analysis.linearization": "Linearization linearize",
-    "mbd.analysis.accuracy": "Accuracy accuracy",
+    "mbd.analysis.accuracy": "Accuracy Known accuracy",
     "mbd.analysis.effects": "Effects effects",
     "mbd.analysis.mobility": "Mobility mobility",
     "mbd.analysis.numerical": "Criteria criteria",

@@ -18,8 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mbd.errors import MbdError, ModelError, SimulationError, UnknownNameError, nearest
-from mbd.view.effects_arguments import describe as describe_effects
-from mbd.view.lab_arguments import describe
+from mbd.view import lab_arguments
 from mbd.view.progress import Progress, progress_bar
 
 if TYPE_CHECKING:
@@ -282,8 +281,12 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--until", type=float, metavar="SECONDS", help="another end time than the script's")
     check = command("check", check_command, "report faults, degrees of freedom and redundant rows of a script's model")
     check.add_argument("script", metavar="SCRIPT-or-EXAMPLE", help="a Python file that defines model, or an example")
-    describe(command("accuracy", accuracy_command, "measure what accuracy costs: errors, times of schemes and steps"))
-    describe_effects(command("effects", effects_command, "leave out each effect in turn: its cost, energy and change"))
+    lab_arguments.accuracy(
+        command("accuracy", accuracy_command, "measure what accuracy costs: errors, times of schemes and steps")
+    )
+    lab_arguments.effects(
+        command("effects", effects_command, "leave out each effect in turn: its cost, energy and change")
+    )
     hard = command(
         "hardcases", hardcases_command, "judge scenes on which multibody systems fail; write a table and a page"
     )

@@ -77,7 +77,7 @@ class _Worker:
         """Do a step; whether the job has more. Nothing that a job raises reaches anybody but the job itself."""
         try:
             return job.step()
-        except Exception as error:
+        except Exception as error:  # whatever a job raises: the thread goes on, and the job decides what follows
             job.failed(error)
             return False
 

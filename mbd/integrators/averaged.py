@@ -8,12 +8,11 @@ import numpy as np
 
 from mbd.arrays import Vector
 from mbd.integrators.base import Point, StepReport, StepResult, System, Terms
+from mbd.integrators.newton import EPS, MAX_ITERATIONS, NewmarkMemory
 from mbd.state import Mode, State
 
 if TYPE_CHECKING:
     from mbd.integrators.hht import HHT
-
-from mbd.integrators.family import EPS, MAX_ITERATIONS, NewmarkMemory
 
 __all__ = ["AveragedStep"]
 

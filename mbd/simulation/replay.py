@@ -203,27 +203,13 @@ class _Watched:
     def __getattr__(self, name: str) -> Any:
         return getattr(self._mechanism, name)
 
-    def mode(
-        self,
-        rows: Sequence[int],
-        penalties: Sequence[int],
-        stabilized: bool,
-        sliding: Sequence[int] = (),
-        borne: Sequence[int] = (),
-    ) -> ModeCode:
-        """Code of a mode that can be watched; compiled programs keep their addresses."""
-        return self._watched(self._mechanism.mode, rows, penalties, stabilized, sliding, borne)
+    def mode(self, *chosen: Any) -> ModeCode:
+        """Code of a mode that can be watched, as `Mechanism.mode` takes it; compiled programs keep their addresses."""
+        return self._watched(self._mechanism.mode, *chosen)
 
-    def stepping(
-        self,
-        rows: Sequence[int],
-        penalties: Sequence[int],
-        stabilized: bool,
-        sliding: Sequence[int] = (),
-        borne: Sequence[int] = (),
-    ) -> ModeCode:
+    def stepping(self, *chosen: Any) -> ModeCode:
         """The same as the compiled kernel has it."""
-        return self._watched(self._mechanism.stepping, rows, penalties, stabilized, sliding, borne)
+        return self._watched(self._mechanism.stepping, *chosen)
 
     def _watched(self, make: Callable[..., ModeCode], *chosen: Any) -> ModeCode:
         mode = tuple(one if isinstance(one, bool) else tuple(one) for one in chosen)

@@ -12,7 +12,8 @@ from mbd.compile.mechanism import Mechanism
 from mbd.equations.equations import Equations
 from mbd.integrators.base import Integrator
 from mbd.integrators.dormand_prince import STAGES, tableau
-from mbd.integrators.family import MAX_ITERATIONS, NewmarkFamily
+from mbd.integrators.family import NewmarkFamily
+from mbd.integrators.newton import MAX_ITERATIONS
 from mbd.integrators.radau import RadauIIA
 from mbd.integrators.runge_kutta import RungeKutta853
 from mbd.kernel import fields as F

@@ -12,15 +12,24 @@ from mbd.view.style import CYCLE
 if TYPE_CHECKING:
     from mbd.analysis.accuracy import Accuracy, Point
 
-__all__ = ["clear", "work_precision"]
+__all__ = ["clear", "height", "work_precision"]
 
 MARKERS = "osD^vP*X"
 """Of the schemes in turn."""
+WIDE, HIGH = 36.0, 8.0
+"""Room for the label of a step [points]."""
 
 
 def clear(point: Point) -> bool:
-    """Whether a point has an error and a time to be drawn at."""
-    return not point.failure and point.error is not None and point.error > 0.0 and point.seconds > 0.0
+    """Whether a point has an error, or what it is certainly below, and a time to be drawn at."""
+    return not point.failure and 0.0 < height(point) < math.inf and point.seconds > 0.0
+
+
+def height(point: Point) -> float:
+    """The error, or what it is certainly below where it is not clear beside the reference's own; inf: not known."""
+    if point.error is not None:
+        return point.error
+    return math.inf if point.at_most is None else point.at_most
 
 
 def work_precision(found: Accuracy, path: str | Path | None = None) -> Any:
@@ -33,14 +42,19 @@ def work_precision(found: Accuracy, path: str | Path | None = None) -> Any:
         if shown:
             axes.set_xscale("log")
             axes.set_yscale("log")
-            _steps(axes, shown)
+            labels = _steps(axes, shown)
             _limits(axes, found, shown)
         else:
             axes.text(0.5, 0.5, "no error is known", ha="center", transform=axes.transAxes)
         dashed = any(point.tol is not None for point in shown)
-        axes.set_xlabel("wall time [ms]" + ("; dashed: tolerances, with their trial runs" if dashed else ""))
-        axes.set_ylabel("largest error over range")
-        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.3)
+        hollow = any(point.error is None for point in shown)
+        told = ("; dashed: tolerances, with their trial runs" if dashed else "") + ("; hollow: below" if hollow else "")
+        axes.set_xlabel("wall time [ms]" + told)
+        axes.set_ylabel(f"largest error over {'the published value' if found.is_published else 'range'}")
+        if shown:
+            axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.3)
+            figure.draw_without_rendering()  # the legend takes its room first
+            _labelled(axes, labels)
         figure.suptitle(f"{found.model}: what accuracy costs", x=0.01, ha="left", fontweight="bold")
     return figure
 
@@ -53,32 +67,50 @@ def _scheme(axes: Any, number: int, scheme: str, points: list[Point]) -> None:
     for line, dashes, size in ((fixed, "-", 4.5), (to_tolerance, "--", 3.0)):
         named = {"label": scheme} if line is (fixed or to_tolerance) and line else {}
         axes.plot(
-            [1e3 * point.seconds for point in line], [point.error for point in line], dashes, markersize=size,
+            [1e3 * point.seconds for point in line], [height(point) for point in line], dashes, markersize=size,
             linewidth=1.5 if dashes == "-" else 1.0, **named, **style,
         )  # fmt: skip
     for point in points:
+        at = 1e3 * point.seconds, height(point)
+        if point.error is None:
+            axes.plot(*at, linestyle="", **style | {"markersize": 6, "mfc": "white", "alpha": 1.0})
         if not point.same_events:
-            axes.plot(1e3 * point.seconds, point.error, "o", markersize=10, mfc="none", color=CYCLE[1])
+            axes.plot(*at, "o", markersize=10, mfc="none", color=CYCLE[1])
 
 
-def _steps(axes: Any, shown: list[Point]) -> None:
-    """A thin grey line through the points of each step, which is written at its slow end."""
+def _steps(axes: Any, shown: list[Point]) -> list[tuple[float, float, str]]:
+    """A thin grey line through the points of each step, and where its label goes, at its slow end."""
+    labels = []
     for dt in sorted({point.dt for point in shown if point.dt is not None}):
         group = sorted((point for point in shown if point.dt == dt), key=lambda point: point.seconds)
         if len(group) > 2:
             axes.plot(
-                [1e3 * point.seconds for point in group], [point.error for point in group], ":", color="#8A8A8A",
+                [1e3 * point.seconds for point in group], [height(point) for point in group], ":", color="#8A8A8A",
                 linewidth=0.8, zorder=0.9,
             )  # fmt: skip
+        labels.append((1e3 * group[-1].seconds, height(group[-1]), f"{1e3 * dt:.3g} ms"))
+    return labels
+
+
+def _labelled(axes: Any, labels: list[tuple[float, float, str]]) -> None:
+    """Steps beside their points, pushed down until none covers another; the limits of the axes are known."""
+    placed: list[tuple[float, float]] = []
+    points = 72.0 / axes.figure.dpi
+    for time, error, text in sorted(labels, key=lambda label: -label[1]):
+        x, y = (points * float(each) for each in axes.transData.transform((time, error)))
+        low = y
+        while meets := [other for at, other in placed if abs(at - x) < WIDE and abs(other - low) < HIGH]:
+            low = min(meets) - HIGH
+        placed.append((x, low))
         axes.annotate(
-            f"{1e3 * dt:.3g} ms", (1e3 * group[-1].seconds, group[-1].error), xytext=(8, 0),
-            textcoords="offset points", va="center", fontsize=7.5, color="#555555",
+            text, (time, error), xytext=(8, low - y), textcoords="offset points", va="center", fontsize=7.5,
+            color="#555555", bbox={"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none", "alpha": 0.7},
         )  # fmt: skip
 
 
 def _limits(axes: Any, found: Accuracy, shown: list[Point]) -> None:
     """The wanted error as a line, the bound of the reference as a band, and room for the labels."""
-    errors = [point.error for point in shown if point.error is not None]
+    errors = [height(point) for point in shown]
     low, high = min(errors) / 2.5, max(errors) * 2.5
     if found.target is not None:
         low, high = min(low, found.target / 1.6), max(high, found.target * 1.6)

@@ -1,22 +1,40 @@
-"""The accuracy lab as one self-contained HTML page: no network, no libraries, our own small script."""
+"""The accuracy lab as one self-contained HTML page."""
 
 from __future__ import annotations
 
-import math
 from dataclasses import asdict
-from datetime import UTC, datetime
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mbd.view.report import machine, versions
+from mbd.view.lab_page import finite, lab_page
 from mbd.view.style import CYCLE
-from mbd.view.template import filled, written
+from mbd.view.template import written
 
 if TYPE_CHECKING:
     from mbd.analysis.accuracy import Accuracy, Point
 
 __all__ = ["content", "write"]
+
+CONTROLS = """\
+<label>quantity <select id="quantity"><option value="">the largest of all</option></select></label>
+<label>error <select id="which"><option value="errors">largest over time</option>
+<option value="end_errors">at the end</option></select></label>
+<label>over <select id="cost"><option value="seconds">wall time</option><option value="dt">step dt</option>
+<option value="steps">steps</option><option value="iterations">Newton iterations</option>
+<option value="residuals">evaluations</option></select></label>"""
+
+ABOUT = """\
+Reference: {origin}. {kind}<br>
+“–”: not known or not observable; “≠”: other events than the reference. Dashed: tolerances, timed with their trial runs.
+Hollow: no clear error beside the reference's own; drawn at what it is certainly below."""
+
+KINDS = {
+    True: "Errors are relative to the range of each quantity, away from the instants between an event and its match in "
+    "the reference.",
+    False: "Errors are relative to the published values.",
+}
+"""What errors are relative to, by whether they are those against a run."""
 
 
 def write(found: Accuracy, path: str | Path) -> Path:
@@ -26,25 +44,20 @@ def write(found: Accuracy, path: str | Path) -> Path:
 
 def html(found: Accuracy) -> str:
     """The page as text."""
-    known = versions()
-    made = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
-    told = f"mbd {known['mbd']}, Python {known['python']}, numpy {known['numpy']}, {machine()['processor']}; {made}"
-    parts = {
-        "<!--title-->": escape(found.model),
-        "<!--advice-->": "".join(f"<p>{escape(line)}</p>" for line in found.recommendation),
-        "<!--notes-->": "".join(f"<li>{escape(note)}</li>" for note in found.notes),
-        "<!--origin-->": escape(found.origin),
-        "<!--made-->": escape(told),
-        "<!--rows-->": "\n".join(_row(p, not k) for scheme in found.schemes for k, p in enumerate(found.of(scheme))),
-        "<!--heads-->": _heads(),
-    }
-    return filled("lab", content(found), parts)
-
-
-def _heads() -> str:
     from mbd.analysis.accuracy.result import HEADS
 
-    return "".join(f"<th>{escape(head)}</th>" for head in HEADS)
+    return lab_page(
+        title=f"{found.model}: what accuracy costs",
+        advice=found.recommendation,
+        notes=found.notes,
+        controls=CONTROLS,
+        shows="error over cost, one line for each scheme",
+        about=ABOUT.format(origin=escape(found.origin), kind=KINDS[not found.is_published]),
+        heads=[f"<th>{escape(head)}</th>" for head in HEADS],
+        rows=[_row(p, not k) for scheme in found.schemes for k, p in enumerate(found.of(scheme))],
+        content=content(found),
+        script="accuracy.js",
+    )
 
 
 def _row(point: Point, leads: bool) -> str:
@@ -67,7 +80,8 @@ def content(found: Accuracy) -> dict[str, Any]:
     return {
         "quantities": list(found.quantities),
         "target": found.target,
-        "bound": {name: _finite(value) for name, value in bound.items()},
+        "over": "the published value" if found.is_published else "range",
+        "bound": {name: finite(value) for name, value in bound.items()},
         "schemes": [
             {"name": scheme, "color": CYCLE[number % len(CYCLE)], "points": [_point(p) for p in found.of(scheme)]}
             for number, scheme in enumerate(found.schemes)
@@ -76,13 +90,9 @@ def content(found: Accuracy) -> dict[str, Any]:
 
 
 def _point(point: Point) -> dict[str, Any]:
-    """A point as JSON has it: what is not finite is not known."""
+    """A point as JSON has it."""
     return {
-        key: {name: _finite(each) for name, each in value.items()} if isinstance(value, dict)
-        else _finite(value) if isinstance(value, float) else value
+        key: {name: finite(each) for name, each in value.items()} if isinstance(value, dict)
+        else finite(value) if isinstance(value, float) else value
         for key, value in asdict(point).items()
     }  # fmt: skip
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None

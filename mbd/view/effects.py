@@ -70,7 +70,7 @@ def _changes(axes: Any, found: Effects, shades: Sequence[str]) -> None:
                       linewidth=0.0)  # fmt: skip
         axes.annotate(
             told + _why(one),
-            (max(size, low), place),
+            (size if size > 0.0 else found.tolerance, place),
             xytext=(4, 0),
             textcoords="offset points",
             va="center",

@@ -1,21 +1,36 @@
-"""Arguments of ``mbd accuracy``."""
+"""Arguments of ``mbd accuracy`` and ``mbd effects``."""
 
 from __future__ import annotations
 
 from argparse import ArgumentParser
 
-__all__ = ["describe"]
+__all__ = ["accuracy", "effects"]
 
 
-def describe(parser: ArgumentParser) -> None:
-    """Add them to a parser."""
-    parser.add_argument(
-        "script", metavar="SCRIPT-or-EXAMPLE", help="a Python file that defines model, start and until, or an example"
-    )
+def accuracy(parser: ArgumentParser) -> None:
+    """Add those of ``mbd accuracy`` to a parser."""
+    _shared(parser, "model, start and until")
     parser.add_argument("--target", type=float, metavar="ERROR", help="wanted error over the range of each quantity")
-    parser.add_argument("--out", metavar="DIR", help="folder for table, plot and page (default: mbd-runs/NAME)")
-    parser.add_argument("--until", type=float, metavar="SECONDS", help="another end time than the script's")
     parser.add_argument("--dt", type=float, action="append", metavar="SECONDS", help="a step; may be given again")
     parser.add_argument("--tol", type=float, action="append", metavar="ERROR", help="a tolerance [m, rad]; likewise")
     parser.add_argument("--quantity", action="append", metavar="NAME", help="a result to judge; may be given again")
+
+
+def effects(parser: ArgumentParser) -> None:
+    """Add those of ``mbd effects`` to a parser."""
+    _shared(parser, "model, start, dt and until")
+    parser.add_argument(
+        "--tolerance", type=float, default=1e-3, metavar="CHANGE",
+        help="change of an output that is allowed, over its range (default: 0.001)",
+    )  # fmt: skip
+    parser.add_argument("--output", action="append", metavar="NAME", help="a result to judge by; may be given again")
+    parser.add_argument("--dt", type=float, metavar="SECONDS", help="another step size than the script's")
+
+
+def _shared(parser: ArgumentParser, defines: str) -> None:
+    parser.add_argument(
+        "script", metavar="SCRIPT-or-EXAMPLE", help=f"a Python file that defines {defines}, or an example"
+    )
+    parser.add_argument("--out", metavar="DIR", help="folder for table, plot and page (default: mbd-runs/NAME)")
+    parser.add_argument("--until", type=float, metavar="SECONDS", help="another end time than the script's")
     parser.add_argument("--open", action="store_true", help="open the page in a browser")

@@ -241,6 +241,72 @@ def test_a_scene_too_stiff_for_one_method_goes_to_the_other(monkeypatch):
     assert RungeKuttaReference().order() == 8 and RungeKuttaReference(method="Radau").order() == 5
 
 
+# published values in place of a reference ---------------------------------------------------------------------------
+def test_known_values_judge_in_place_of_a_reference():
+    """A row of numbers is judged at its worst and at its end; other numbers at the end."""
+    model, start = pendulum()
+    exact, energy = float(swing(1.6)), -G * np.cos(2.0)
+    known = {
+        "pin.angle": mbd.Known(exact, accuracy=1e-12), "place": mbd.Known(exact, of="pin.angle"),
+        "energy": mbd.Known(energy, of=lambda run: run.energy.total),
+    }  # fmt: skip
+    result = mbd.accuracy(model, start, 1.6, integrators=[mbd.Newmark()], dts=[0.02, 0.01], known=known, store=5)
+    assert result.is_published and result.quantities == ("pin.angle", "place", "energy")
+    assert "published values: pin.angle = " in repr(result) and result.reference.growth is None
+    for point in result.points:
+        run = mbd.simulate(model, start, mbd.Newmark(), dt=point.dt, until=1.6, store=5)
+        assert point.errors["pin.angle"] == pytest.approx(abs(run["pin.angle"][-1] / exact - 1.0), rel=1e-9)
+        assert point.errors["pin.angle"] == point.errors["place"]
+        assert point.errors["energy"] == pytest.approx(np.max(np.abs(run.energy.total / energy - 1.0)), rel=1e-9)
+        assert point.end_errors["energy"] <= point.errors["energy"] and "energy" in point.note
+    assert result.points[1].order == pytest.approx(2.0, abs=0.15)
+
+
+def test_every_wrong_known_value_is_named_at_once_and_a_function_that_raises_fails_its_points(tmp_path):
+    model, start = pendulum()
+    with pytest.raises(mbd.ModelError, match="known must be a dictionary"):
+        mbd.accuracy(model, start, 1.0, known=[1.0])
+    with pytest.raises(mbd.ModelError, match=r"store"):
+        mbd.accuracy(model, start, 1.0, dts=[0.1], store=2)
+    known = {"a": mbd.Known("1", of=len), "b": mbd.Known(1.0, -1.0, of=3), "pin.angel": 1.0, "rod.end": 1.0}
+    with pytest.raises(mbd.ModelError) as caught:
+        mbd.accuracy(model, start, 1.0, dts=[0.1], known=known)
+    assert len(caught.value.faults) == 5 and "did you mean 'pin.angle'" in str(caught.value)
+    with pytest.raises(mbd.ModelError, match="either quantities or known"):
+        mbd.accuracy(model, start, 1.0, "pin.angle", dts=[0.1], known={"pin.angle": 1.0})
+    for answer, said in ((lambda run: run.nothing, "AttributeError"), (lambda run: np.nan, "no finite 'x'"),
+                         (lambda run: "a", "must be a number")):  # fmt: skip
+        known = {"x": mbd.Known(1.0, of=answer)}
+        result = mbd.accuracy(model, start, 1.0, integrators=[mbd.HHT()], dts=[0.1], known=known)
+        assert said in result.points[0].failure and "No run succeeded" in result.recommendation[0]
+        result.page(tmp_path / "page.html")
+        result.plot(tmp_path / "plot.png")
+
+
+def test_a_run_that_ends_without_its_energy_is_judged_by_known_values_but_not_by_a_reference():
+    model, start = pendulum()
+    known = {"end": mbd.Known(70.0, of=lambda run: run.time[-1])}
+    judged = mbd.accuracy(model, start, 70.0, integrators=[mbd.Newmark()], dts=[0.7], known=known).points[0]
+    assert judged.at_most < 1e-12 and not judged.failure and "the energy is not the mechanism's" in judged.note
+    compared = mbd.accuracy(model, start, 70.0, integrators=[mbd.Newmark()], dts=[0.7]).points[0]
+    assert "the energy is not the mechanism's" in compared.failure
+
+
+def test_errors_above_a_tenth_are_told_where_no_others_are():
+    given = [Point("a", 1.0, error=0.4, at_most=0.4, seconds=1.0), Point("b", 1.0, failure="fell")]
+    (said,) = advice(given, None, 0.0)
+    assert said == "No point has an error below a tenth; the best is a with dt = 1 s (error 0.4, 1 s)."
+
+
+def test_a_wrong_name_is_told_before_a_run_that_takes_too_long(monkeypatch):
+    monkeypatch.setattr(choices, "PROBES", (5,))
+    model, start = pendulum()
+    with pytest.raises(mbd.UnknownNameError, match="did you mean 'pin.angle'"):
+        mbd.accuracy(model, start, 1e4, "pin.angel")
+    with pytest.raises(mbd.SimulationError, match="known values and dts to do without"):
+        mbd.accuracy(model, start, 1e4)
+
+
 # tolerances --------------------------------------------------------------------------------------------------------
 def test_a_tolerance_is_a_point_with_the_error_of_its_coordinates_and_its_trial_runs(tmp_path):
     model, start = pendulum()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -315,7 +316,10 @@ def test_the_command_prints_the_table_and_writes_files(tmp_path, capsys, monkeyp
     assert cli.main(["effects", "swing.py", "--output", "pin.angle"]) == 0
     said = capsys.readouterr().out
     assert "pin loss" in said and "Leave out 'pin loss'" in said and "ns/step" in said
-    assert (tmp_path / "mbd-runs" / "swing" / "effects.csv").is_file()
+    files = {"effects.csv", "effects.html", *({"effects.png"} if find_spec("matplotlib") else ())}
+    assert {file.name for file in (tmp_path / "mbd-runs" / "swing").iterdir()} == files
+    assert cli.main(["effects", "swing.py", "--until", "0"]) == 1
+    assert "until must be after the start at 0 s" in capsys.readouterr().err
     assert cli.main(["effects", "swing.py", "--tolerance", "0"]) == 1
     assert "tolerance must be a positive" in capsys.readouterr().err
     assert cli.main(["effects", "swing.py", "--output", "pin.angel"]) == 1

@@ -12,12 +12,13 @@ import pytest
 import mbd
 from mbd.analysis.accuracy import choices, lab as laboratory, points
 from mbd.analysis.accuracy.points import CLEAR
+from mbd.cli import Script
 from mbd.hardcases.knees import leg as knee_leg
 from mbd.hardcases.long_run import long_pendulum
 from tests.cases.double_pendulums import FORMS as DOUBLE
 from tests.cases.flexible import NAMES, flexible_slider_crank
 from tests.cases.pendulums import FORMS
-from tests.cases.test_oscillator import EXACT, SCHEMES as OSCILLATING, spring_and_dashpot
+from tests.cases.test_oscillator import EXACT, SCHEMES as OSCILLATING, Unsquared, spring_and_dashpot
 from tests.cases.walkers import compass, kneed, standing, strikes
 from tests.cases.wheels import RimlessWheel
 from tests.problems import Case, case
@@ -292,6 +293,31 @@ def test_i1_i2_the_error_is_that_of_the_published_period_and_damping(name: str) 
     assert told == pytest.approx(abs(predicted), rel=0.03)
 
 
+def radius(run: mbd.Trajectory) -> float:
+    """The spectral radius of the steps of a linear oscillator: u₃ = c₂ u₂ + c₁ u₁ + c₀ u₀ along the run, its roots."""
+    four = np.lib.stride_tricks.sliding_window_view(run["guide.displacement"], 4)
+    four = four / np.max(np.abs(four), axis=1, keepdims=True)
+    ahead = np.linalg.lstsq(four[:, :3], four[:, 3], rcond=None)[0]
+    return float(np.max(np.abs(np.roots([1.0, *-ahead[::-1]]))))
+
+
+def test_i3_the_square_of_beta_decides_whether_stiff_modes_decay_or_grow() -> None:
+    """With ω dt = 1e4 the motion is not resolved, which the runs say; what they tell of their steps is published."""
+    unsquared, squared = case("i3-hht-beta").quantities.values()
+    alpha = case("i3-hht-beta").definition["alpha"]
+    model = spring_and_dashpot(1e4, 0.0, mass=1.0)
+    start = mbd.assemble(model, position={"guide.displacement": 1.0})
+    known = {"radius": mbd.Known(squared.value, squared.accuracy, of=radius)}
+    found = mbd.accuracy(
+        model, start, 40.0, integrators=[mbd.HHT(alpha), Unsquared(alpha)], dts=[1.0], target=1e-6, known=known
+    )  # fmt: skip
+    right, wrong = found.points
+    assert right.at_most < 1e-8 and right.reaches(1e-6) and "the energy is not the mechanism's" in right.note
+    assert wrong.error == pytest.approx(unsquared.value / squared.value - 1.0, abs=1e-8)
+    assert found.recommendation[0].startswith("For an error of 1e-06 take HHT(alpha=0.05) with dt = 1 s")
+
+
+# very long times ----------------------------------------------------------------------------------------------------
 @pytest.mark.slow
 def test_j12_a_thousand_periods() -> None:
     id = "j12-long-time-1e3-periods"
@@ -300,3 +326,43 @@ def test_j12_a_thousand_periods() -> None:
     scene = Scene(model, start, until, {"pivot.angle": (float(exact.value), 1e-9)}, until / 1000 / 100)
     found = assert_ends_agree(scene)
     assert found.points[0].error > 100.0 * found.points[1].at_most
+
+
+def long_lab(periods: int, steps: Sequence[int], integrators: Any = None, store: int | None = None) -> mbd.Accuracy:
+    """The example's scene and known values, over some of its periods."""
+    names = Script.load("long-pendulum").names
+    return mbd.accuracy(
+        names["model"], names["start"], periods * names["period"], dts=[names["period"] / count for count in steps],
+        integrators=integrators or names["integrators"], known=names["known"], store=store or names["store"],
+    )  # fmt: skip
+
+
+def test_j12_the_example_has_the_numbers_of_the_case() -> None:
+    names, j12 = Script.load("long-pendulum").names, case("j12-long-time-1e5-periods")
+    assert names["until"] == pytest.approx(j12["end time"].value, rel=1e-15)
+    assert names["count"] == j12.definition["n_periods"] and names["theta0"] == j12.start["theta0"]
+    assert names["known"]["energy"].value == j12["energy above"].value
+    assert [names[name] for name in "Lgm"] == [j12.definition[name] for name in "Lgm"]
+
+
+@pytest.mark.parametrize("periods", [1000, pytest.param(100_000, marks=pytest.mark.slow)])
+def test_j12_energy_is_bounded_and_phase_adds_up_by_the_published_values(periods: int) -> None:
+    """As the case wants: energy at the end within five times what it did in the first ten periods, and the phase error
+    periods × error of one × 2π within 5 %; HHT loses energy all the time."""
+    found = long_lab(periods, (50, 100))
+    assert found.is_published and found.notes == ()
+    undamped, damped, eighth = (found.of(scheme) for scheme in found.schemes)
+    few = long_lab(10, (50, 100), [mbd.Newmark()], store=1).points
+    for long, short in zip(undamped, few, strict=True):
+        assert long.errors["energy"] < 5.0 * short.errors["energy"]
+        assert long.errors["period"] == pytest.approx(short.errors["period"], rel=0.05)
+    assert undamped[-1].order == pytest.approx(2.0, abs=0.05)
+    assert all(point.end_errors["energy"] > 5.0 * undamped[-1].errors["energy"] for point in damped)
+    assert all(point.at_most < 1e-3 * undamped[-1].error for point in eighth)
+
+
+@pytest.mark.slow
+def test_j12_rho_one_of_the_generalized_scheme_is_the_trapezoidal_rule() -> None:
+    found = long_lab(100_000, (50,), [mbd.Newmark(), mbd.GeneralizedAlpha(rho_inf=1.0)])
+    one, other = found.points
+    assert one.errors == pytest.approx(other.errors, rel=1e-6)

@@ -2,6 +2,7 @@
 
 from mbd.analysis.accuracy.lab import accuracy
 from mbd.analysis.accuracy.points import Point
+from mbd.analysis.accuracy.published import Known
 from mbd.analysis.accuracy.result import Accuracy
 
-__all__ = ["Accuracy", "Point", "accuracy"]
+__all__ = ["Accuracy", "Known", "Point", "accuracy"]

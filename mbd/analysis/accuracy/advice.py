@@ -36,10 +36,14 @@ def advice(points: Sequence[Point], target: float | None, bound: float) -> list[
     target : error that is wanted, relative to the range of each quantity [-]; None: every power of ten
     bound : of the reference [-]
     """
-    if not any(point.at_most is not None for point in points):
+    if all(point.failure for point in points):
+        return ["No run succeeded, so nothing can be recommended."]
+    if not any(point.at_most is not None for point in points if not point.failure):
         return ["No error is known, so nothing can be recommended."]
     if target is None:
         found = [(each, cheapest(points, each)) for each in decades(points)]
+        if not any(best for _, best in found):
+            return [f"No point has an error below a tenth; the best is {_described(_best(points))}."]
         return [f"For an error of {each:g}: {_described(best)}." for each, best in found if best is not None]
     best = cheapest(points, target)
     if best is None:
@@ -113,12 +117,15 @@ def _extrapolated(points: Sequence[Point], target: float) -> tuple[str, float, f
     return min(finest.values(), key=lambda guess: guess[2], default=None)
 
 
+def _best(points: Sequence[Point]) -> Point:
+    """The most accurate; some error is known."""
+    able = [point for point in points if not point.failure and point.at_most is not None]
+    return min(able, key=lambda point: point.at_most or 0.0)
+
+
 def _unreached(points: Sequence[Point], target: float, bound: float) -> list[str]:
     """The best that was reached, and why no more."""
-    able = [point for point in points if not point.failure and point.at_most is not None]
-    best = min(able, key=lambda point: point.at_most or 0.0, default=None)
-    if best is None:
-        return [f"An error of {target:g} is not reached: no run succeeded."]
+    best = _best(points)
     said = [f"An error of {target:g} is not reached; the best is {_described(best)}."]
     if bound >= target:
         return [*said, f"The reference itself is known to {bound:.1g} only, so no run can be shown to do better."]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mbd.analysis.accuracy.published import Published, published
 from mbd.analysis.accuracy.settings import Setting, is_high, long_steps, steps_of, tolerances
 from mbd.analysis.accuracy.truth import motion, stopped
 from mbd.bodies.values import is_number
@@ -34,6 +35,8 @@ SEARCH = 200000
 """Steps after which the event that ends the run is no longer waited for."""
 LEAST_ROWS, MOST_ROWS = 1500, 4000
 """Rows of the reference."""
+FEW = 20
+"""Steps of the run that only tells names and sizes, where values are published and steps given."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +45,7 @@ class Plan:
 
     own : whether the lab chose the settings, and may leave out those that tell nothing new
     skipped : which schemes follow no tolerance, in a sentence each
+    known : published values to judge by; None: the lab integrates a reference
     """
 
     schemes: Mapping[str, Integrator]
@@ -53,6 +57,7 @@ class Plan:
     own: bool
     skipped: tuple[str, ...]
     probe: Trajectory = field(repr=False)
+    known: Published | None = None
 
     @property
     def count(self) -> int:
@@ -88,16 +93,21 @@ def plan(
     also: Any = None,
     tols: Any = None,
     target: float | None = None,
+    known: Any = None,
 ) -> Plan:
     """Arguments checked, all faults at once, and completed from a first run."""
     faults = [] if isinstance(start, State) else [f"start must be a State from mbd.assemble(model, …), not {start!r}"]
     faults += _wrong_schemes(integrators) + _wrong_schemes(None if also is None else [also])
     faults += _wrong_numbers(dts, "dts", "steps [s]", "a step must be a positive number of seconds")
     faults += _wrong_numbers(tols, "tols", "tolerances [m, rad]", "a tolerance must be a positive error of coordinates")
+    if known is not None and quantities is not None:
+        faults.append("either quantities or known values: with these, they are the quantities")
     if faults:
         raise ModelError(faults)
-    probe, until = _probe(model, start, until, options)
-    wanted = _quantities(probe, quantities)
+    options = {name: value for name, value in options.items() if name != "store"}
+    probe, until = _probe(model, start, until, options, quantities, dts if known is not None else None)
+    values = None if known is None else published(known, probe)
+    wanted = _quantities(probe, quantities) if values is None else tuple(values.known)
     able = Able(model, options)
     schemes = integrators if integrators is not None else _schemes(able, bool(probe.record.lam.shape[1]), also)
     named = dict(schemes) if isinstance(schemes, Mapping) else {label(scheme): scheme for scheme in schemes}
@@ -108,7 +118,7 @@ def plan(
     sizes = np.concatenate([np.max(np.abs(column), axis=0, initial=0.0) for column in columns])
     sizes = np.where(sizes > 1e-6, sizes, np.max(sizes, initial=0.0) or 1.0)
     own = dts is None and tols is None
-    return Plan(named, settings, wanted, until, step, tuple(map(float, sizes)), own, tuple(skipped), probe)
+    return Plan(named, settings, wanted, until, step, tuple(map(float, sizes)), own, tuple(skipped), probe, values)
 
 
 class Able:
@@ -171,8 +181,14 @@ def _schemes(able: Able, rows: bool, also: Any) -> tuple[Integrator, ...]:
     return known if also is None or also in known else (*known, also)
 
 
-def _probe(model: Any, start: State, until: Any, options: Mapping[str, Any]) -> tuple[Trajectory, Any]:
-    """A run that finds the end and the time scales; and the end as (event, latest time) or a time."""
+def _probe(
+    model: Any, start: State, until: Any, options: Mapping[str, Any], wanted: Any, steps: Any = None
+) -> tuple[Trajectory, Any]:
+    """A run that finds the end and the time scales; and the end as (event, latest time) or a time.
+
+    wanted : names of results, whose faults are told before a run fails
+    steps : that will be taken, where time scales are of no use: the run is short then
+    """
     scheme = GeneralizedAlpha(rho_inf=0.8)
     if isinstance(until, str):
         latest = start.time + SEARCH * PROBE_STEP
@@ -185,15 +201,27 @@ def _probe(model: Any, start: State, until: Any, options: Mapping[str, Any]) -> 
     if not given or last <= start.time:
         raise ModelError(f"until must be a time [s] after the start at {start.time:g} s, an event's name, or "
                          f"(name, latest time), not {until!r}")  # fmt: skip
-    for steps in PROBES:
+    if steps is not None:
+        dt = float(min(steps))
+        end = min(last, start.time + FEW * dt)
+        run = simulate(model, start, scheme, dt, until=end, **options, on_failure="return")
+        if stopped(run):
+            raise KeyboardInterrupt
+        return run, until
+    for count in PROBES:
         run = simulate(
-            model, start, scheme, dt=(last - start.time) / steps, until=until, **options, on_failure="return"
+            model, start, scheme, dt=(last - start.time) / count, until=until, **options, on_failure="return"
         )
         if stopped(run):
             raise KeyboardInterrupt
         if run.success:
             return run, until
-    raise SimulationError(f"no run of {PROBES[-1]} steps reaches the end: {run.message}", run)
+        _quantities(run, wanted)
+    raise SimulationError(
+        f"no run of {PROBES[-1]} steps reaches the end, so that there is nothing to choose steps and a reference by; "
+        f"give an earlier end, or known values and dts to do without: {run.message}",
+        run,
+    )
 
 
 def _quantities(probe: Trajectory, wanted: Any) -> tuple[str, ...]:

@@ -10,6 +10,7 @@ from typing import Any
 
 from mbd.analysis.accuracy.choices import Plan, plan
 from mbd.analysis.accuracy.points import Point, Subject, measured, retimed
+from mbd.analysis.accuracy.published import Known, Published
 from mbd.analysis.accuracy.result import Accuracy
 from mbd.analysis.accuracy.settings import Setting, is_high, steps_for
 from mbd.analysis.accuracy.truth import Truth, truth
@@ -19,8 +20,10 @@ from mbd.integrators import Integrator
 from mbd.state import State
 from mbd.view.progress import Progress, share_bar
 
-__all__ = ["accuracy", "with_orders"]
+__all__ = ["OPTIONS", "accuracy", "with_orders"]
 
+OPTIONS = ("contact", "impact", "locate", "parameters", "rest_speed", "backend")
+"""Of `simulate`, which every run shares."""
 PATIENCE = 5.0
 """Wall time for timing all points some more [s]."""
 REFERENCE_RUNS = 4
@@ -38,6 +41,7 @@ def accuracy(
     progress: Progress | bool | None = None,
     also: Integrator | None = None,
     tols: Sequence[float] | None = None,
+    known: Mapping[str, Known | float] | None = None,
     **options: Any,
 ) -> Accuracy:
     """Measure what accuracy costs: errors, orders and wall times of schemes, steps and tolerances, across impacts.
@@ -60,16 +64,18 @@ def accuracy(
     target : error that is wanted, relative to the range of a quantity, for the recommendation [-]
     progress : True for a bar on a terminal, or ``progress(done, total)`` in runs
     also : an integrator that joins the default ones where it is none of them
-    options : those of `mbd.simulate`: contact, impact, locate, parameters, rest_speed, backend
+    known : published values to judge by, by quantity, in place of quantities and of a reference of the lab's own: over
+        times for which that would take hours, or where only such a number says which of two runs is right
+    options : those of `mbd.simulate`: contact, impact, locate, parameters, rest_speed, backend; store with known values
 
     Returns
     -------
     Accuracy
         with what was measured until then if it was interrupted (Ctrl-C).
     """
-    _check(target, options)
+    _check(target, options, known)
     options["parameters"] = {**getattr(start, "parameters", {}), **(options.get("parameters") or {})}
-    chosen = plan(model, start, until, quantities, integrators, dts, options, also, tols, target)
+    chosen = plan(model, start, until, quantities, integrators, dts, options, also, tols, target, known)
     with share_bar() if progress is True else nullcontext(progress or None) as told:
         bench = Bench(model, start, chosen, options, told)
         reference = bench.reference()
@@ -89,16 +95,19 @@ class Bench:
     ) -> None:
         self.subject, self.chosen, self.told = Subject(model, start, chosen.until, options), chosen, told
         self.total = REFERENCE_RUNS + chosen.count + 1
-        self.known: Truth | None = None
+        self.known: Truth | Published | None = None
 
     def share(self, place: int) -> Callable[[float], None]:
         """Progress of one run among all."""
         told = self.told
         return (lambda part: None) if told is None else lambda part: told(place + min(max(part, 0.0), 1.0), self.total)
 
-    def reference(self) -> Truth | str:
+    def reference(self) -> Truth | Published | str:
         """What to judge by, or why there is none."""
         subject, chosen = self.subject, self.chosen
+        if chosen.known is not None:
+            self.known = chosen.known
+            return self.known
         found = truth(
             subject.model, subject.start, chosen.until, chosen.quantities, chosen.step, chosen.sizes, subject.options,
             [self.share(run) for run in range(REFERENCE_RUNS)], tuple(chosen.schemes.values()),
@@ -155,12 +164,12 @@ def _around(chosen: Plan, target: float, point: Callable[[str, Setting], Point])
     return tuple(dts)
 
 
-def _check(target: Any, options: Mapping[str, Any]) -> None:
+def _check(target: Any, options: Mapping[str, Any], known: Any) -> None:
     """Faults of the wanted error and of the options."""
     faults = []
     if target is not None and (not is_number(target) or not math.isfinite(target) or target <= 0.0):
         faults.append(f"target must be a positive relative error such as 1e-4, not {target!r}")
-    allowed = ("contact", "impact", "locate", "parameters", "rest_speed", "backend")
+    allowed = (*OPTIONS, *(["store"] if known is not None else []))
     faults += [f"accuracy() has no option {name!r}; it has {', '.join(allowed)}" for name in options
                if name not in allowed]  # fmt: skip
     if faults:
@@ -185,11 +194,10 @@ def with_orders(points: Sequence[Point], schemes: Mapping[str, Any]) -> list[Poi
 
 def _unordered(bench: Bench) -> bool:
     """Whether impacts are corrected at the ends of steps, so that no order can be observed."""
-    struck = bench.known is not None and any(event.kind == "closed" for event in bench.known.run.events)
-    return struck and bench.chosen.probe.settings.get("contact") == "nonsmooth"
+    return bench.known is not None and bench.known.struck and bench.chosen.probe.settings.get("contact") == "nonsmooth"
 
 
-def _notes(reference: Truth | str, chosen: Plan, points: Sequence[Point], complete: bool) -> list[str]:
+def _notes(reference: Truth | Published | str, chosen: Plan, points: Sequence[Point], complete: bool) -> list[str]:
     """What a reader must know before reading the errors."""
     notes = [] if complete else [f"interrupted: {len(points)} of {chosen.count} points were measured"]
     notes += chosen.skipped
@@ -198,10 +206,10 @@ def _notes(reference: Truth | str, chosen: Plan, points: Sequence[Point], comple
     growth = reference.growth
     if not reference.same_events:
         notes.append("the two runs of the reference have not the same events; some are too short to be sure of")
-    notes += _kinship(reference, chosen)
-    if growth is None:
+    notes += _kinship(reference, chosen) if isinstance(reference, Truth) else []
+    if growth is None and isinstance(reference, Truth):
         notes.append("the growth of errors could not be measured")
-    elif growth > 1e3:
+    elif growth is not None and growth > 1e3:
         notes.append(
             f"a small change of the start grows {growth:.1g} times: above 1e3 errors say little about a scheme"
         )

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbd.analysis.accuracy.compare import differences
+from mbd.analysis.accuracy.published import Published
 from mbd.analysis.accuracy.settings import Setting
-from mbd.analysis.accuracy.truth import Truth, stopped
+from mbd.analysis.accuracy.truth import CLEAR, Truth, stopped
 from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import MbdError
 from mbd.integrators import Integrator
@@ -21,14 +21,12 @@ from mbd.state import State
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
 
-__all__ = ["Point", "Setting", "Subject", "measured", "retimed"]
+__all__ = ["CLEAR", "Point", "Setting", "Subject", "measured", "retimed"]
 
 REPEATS, ENOUGH = 5, 0.2
 """A run is repeated up to this many times, but not once this much wall time [s] is spent on it."""
 ROUNDS, SHORT = 10, 0.3
 """Rounds over all points, the quickest first, that time each once more until it took this much wall time [s]."""
-CLEAR = 10.0
-"""An error is told where it is this many times the bound of the reference [-]."""
 
 
 @dataclass(frozen=True)
@@ -128,7 +126,7 @@ class Subject:
 
 
 def measured(
-    subject: Subject, scheme: Integrator, label: str, setting: Setting, truth: Truth | None,
+    subject: Subject, scheme: Integrator, label: str, setting: Setting, truth: Truth | Published | None,
     share: Callable[[float], None],
 ) -> Point:  # fmt: skip
     """Run a scheme, some times over, and judge it; `KeyboardInterrupt` where the user stopped it."""
@@ -140,7 +138,7 @@ def measured(
             latest, seconds = subject.run(scheme, setting, share)
         except MbdError as error:
             return replace(point, failure=str(error))
-        if not latest.success:
+        if not latest.success and not _is_told(latest, truth, subject):
             return replace(point, failure=latest.message, **_tolerance(latest, seconds))
         if seconds < best:
             run, best = latest, seconds
@@ -150,14 +148,25 @@ def measured(
     assert run is not None
     violation, stats = run.violation, run.stats
     names = ("steps", "iterations", "tangents", "residuals", "factorizations")
-    judged = _judged(run, truth, scheme) if truth is not None else {"note": "there is no reference"}
+    try:
+        judged = _judged(run, truth, scheme) if truth is not None else {"note": "there is no reference"}
+    except MbdError as error:
+        return replace(point, failure=str(error))
+    if not run.success:
+        judged["note"] = "; ".join(filter(None, [judged["note"], run.message.partition(";")[0]]))
     if setting.tol is not None:
-        judged |= _tolerance(run, best) | {"achieved": None if truth is None else _achieved(run, truth)}
+        judged |= _tolerance(run, best) | {"achieved": None if truth is None else truth.achieved(run)}
     return replace(
         point, seconds=best, **{name: stats[name] for name in names},
         drift=max(violation.length, violation.angle), drift_rate=violation.rate,
         energy=float(np.max(np.abs(run.energy.numerical), initial=0.0)), events=len(run.events), **judged,
     )  # fmt: skip
+
+
+def _is_told(run: Trajectory, truth: Truth | Published | None, subject: Subject) -> bool:
+    """Whether published values judge a run that did not succeed: only its energy is wrong, at its end."""
+    last = subject.until[1] if isinstance(subject.until, tuple) else subject.until
+    return isinstance(truth, Published) and bool(run.time[-1] >= last)
 
 
 def _tolerance(run: Trajectory, seconds: float) -> dict[str, Any]:
@@ -169,14 +178,6 @@ def _tolerance(run: Trajectory, seconds: float) -> dict[str, Any]:
         "estimated": told["estimated"], "runs": len(told["runs"]),
         "trials": max(1.0 - run.stats["wall_seconds"] / seconds, 0.0),
     }  # fmt: skip
-
-
-def _achieved(run: Trajectory, truth: Truth) -> float | None:
-    """Largest error of a coordinate [m, rad]; None where it is not clear beside the reference's own."""
-    names = [name for name, _ in run.facts.coordinates][: run.facts.coordinate_count]
-    found = differences(run, truth.run, dict.fromkeys(names, 1.0), truth.instants)
-    floor = max((truth.bound[name] * truth.scales[name] for name in names if name in truth.bound), default=0.0)
-    return found.error if found.error >= CLEAR * floor else None
 
 
 def retimed(
@@ -204,27 +205,24 @@ def retimed(
     return found
 
 
-def _judged(run: Any, truth: Truth, scheme: Integrator) -> dict[str, Any]:
-    """Errors of a run against the reference, as far as that can tell."""
-    early = run.time[-1] < truth.run.time[-1] - 1e-9 * abs(truth.run.time[-1]) and run.status == 1
-    if early and truth.run.status != 1:
-        return {"failure": f"{run.message}, where the reference goes on"}
+def _judged(run: Trajectory, truth: Truth | Published, scheme: Integrator) -> dict[str, Any]:
+    """Errors of a run against what it is judged by, as far as that can tell."""
+    unlike = truth.unlike(run)
+    if unlike:
+        return {"failure": unlike}
     known = truth.bound_of(scheme)
-    found = differences(run, truth.run, truth.scales, truth.instants)
-    clear = {
-        name: max(found.largest.get(name, 0.0), found.at_end.get(name, 0.0)) >= CLEAR * bound
-        for name, bound in known.items()
-    }
+    found = truth.judged(run)
     worst = {name: max(found.largest.get(name, 0.0), found.at_end.get(name, 0.0)) for name in known}
+    clear = {name: worst[name] >= CLEAR * bound for name, bound in known.items()}
     leading = max(worst, key=lambda name: worst[name])
     told = clear[leading]
     notes = [] if told else [f"no clear error beside the reference's own, {known[leading]:.1g}"]
-    notes += [f"{found.left_out:.0%} of the instants lie beside events"] if found.left_out > 0.2 else []
+    notes += [remark] if (remark := truth.remark(found)) else []
     return {
         "error": found.error if told else None,
         "at_most": max(worst[name] + bound for name, bound in known.items()),
         "errors": {name: value for name, value in found.largest.items() if clear[name]},
         "end_errors": {name: value for name, value in found.at_end.items() if value >= CLEAR * known[name]},
-        "event_time": found.event_time, "same_events": found.same_events, "left_out": found.left_out,
-        "note": "; ".join(notes),
+        "event_time": found.event_time if isinstance(truth, Truth) else None,
+        "same_events": found.same_events, "left_out": found.left_out, "note": "; ".join(notes),
     }  # fmt: skip

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -11,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from mbd.analysis.accuracy.advice import advice
 from mbd.analysis.accuracy.points import Point
-from mbd.results.tables import library
+from mbd.analysis.accuracy.published import Published
+from mbd.analysis.rows import Rows
 
 if TYPE_CHECKING:
     from mbd.analysis.accuracy.truth import Truth
@@ -29,7 +29,7 @@ MAPPINGS = ("errors", "end_errors")
 
 
 @dataclass(frozen=True, eq=False)
-class Accuracy:
+class Accuracy(Rows):
     """Errors and costs of schemes with steps and tolerances.
 
     Attributes
@@ -37,7 +37,8 @@ class Accuracy:
     model : name of the model
     quantities : whose errors were measured
     points : a `Point` for each scheme and step or tolerance, the coarsest of a scheme first
-    reference : what they were judged by, with its own bound, and the growth of errors; None where there is none
+    reference : what they were judged by, with its own bound: a run, with the growth of errors, or published values;
+        None where there is none
     target : error that was wanted [-]
     complete : False where it was interrupted
     notes : what to know before reading the errors
@@ -46,7 +47,7 @@ class Accuracy:
     model: str
     quantities: tuple[str, ...]
     points: tuple[Point, ...]
-    reference: Truth | None
+    reference: Truth | Published | None
     target: float | None = None
     complete: bool = True
     notes: tuple[str, ...] = ()
@@ -66,14 +67,14 @@ class Accuracy:
         return tuple(advice(self.points, self.target, self.reference.error if self.reference else float("inf")))
 
     @property
+    def is_published(self) -> bool:
+        """Whether errors are those against published values."""
+        return isinstance(self.reference, Published)
+
+    @property
     def origin(self) -> str:
         """What the errors are relative to, in a sentence or two."""
-        if self.reference is None:
-            return "no reference"
-        truth, events = self.reference, len(self.reference.run.events)
-        growth = "" if truth.growth is None else f"; a small change of the start grows {truth.growth:.2g} times"
-        told = f", its events ({events}) to {truth.event_bound:.1g} s" if events else ""
-        return f"{truth.method}, known to {truth.error:.1g}{told}{growth}; {truth.seconds:.1f} s"
+        return "no reference" if self.reference is None else self.reference.origin
 
     def __repr__(self) -> str:
         rows = [cells(point) for point in self.points]
@@ -81,7 +82,9 @@ class Accuracy:
             max(map(len, column)) for column in zip(HEADS, *(row for row in rows if row[2] != "failed"), strict=True)
         ]
         widths[0] = max([len(HEADS[0]), *(len(row[0]) for row in rows)])
-        lines = [f"accuracy of {self.model!r}: largest error of {len(self.quantities)} quantities over their range"]
+        what = "quantity" if len(self.quantities) == 1 else "quantities"
+        over = "over their published values" if self.is_published else "over their range"
+        lines = [f"accuracy of {self.model!r}: largest error of {len(self.quantities)} {what} {over}"]
         lines += [f"reference    {self.origin}", "", _line(HEADS, widths), "  ".join("─" * w for w in widths)]
         above = ""
         for point, row in zip(self.points, rows, strict=True):
@@ -105,21 +108,6 @@ class Accuracy:
                 row[f"error at the end of {name}"] = point.end_errors.get(name)
             found.append(row)
         return found
-
-    def to_dataframe(self) -> Any:
-        """A pandas table, a row for each point."""
-        return library("pandas", "data", "result.to_dataframe()").DataFrame(self.rows())
-
-    def to_csv(self, path: str | Path) -> Path:
-        """The same as a file of comma-separated values."""
-        target = Path(path)
-        target.parent.mkdir(parents=True, exist_ok=True)
-        rows = self.rows()
-        with target.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, list(rows[0]) if rows else [])
-            writer.writeheader()
-            writer.writerows(rows)
-        return target
 
     # pictures -------------------------------------------------------------------------------------------------------
     def plot(self, path: str | Path | None = None) -> Any:
@@ -148,11 +136,16 @@ def cells(point: Point) -> list[str]:
         error = f"< {point.at_most:.0e}"
     counts = (point.steps, point.iterations, point.tangents, point.residuals, point.factorizations)
     return [
-        *start, error, "–" if point.order is None else f"{point.order:.2f}", f"{1e3 * point.seconds:.3g}",
+        *start, error, "–" if point.order is None else f"{point.order:.2f}", _whole(1e3 * point.seconds),
         *map(str, counts), f"{point.drift:.1e}" if point.drift else "0", f"{point.energy:.1e}",
         f"{point.event_time:.1e}" if point.events and point.event_time is not None else "–",
         str(point.events) + ("" if point.same_events else " ≠"),
     ]  # fmt: skip
+
+
+def _whole(number: float) -> str:
+    """Three digits, or all before the point."""
+    return f"{number:.3g}" if number < 999.5 else f"{number:.0f}"
 
 
 def remark(point: Point) -> str:

@@ -22,7 +22,7 @@ from mbd.state import State
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
 
-__all__ = ["INSTANTS", "Truth", "truth"]
+__all__ = ["CLEAR", "INSTANTS", "Truth", "truth"]
 
 TIGHT, LOOSE = 1e-12, 1e-10
 """Tolerances of the reference and of the run that bounds its error [-]."""
@@ -38,6 +38,8 @@ NEAR = 3.0
 """Difference of such a run, over the bound of the reference, that is near enough [-]."""
 CHECK_SECONDS = 3.0
 """Wall time of such a run after which no finer one is made [s]."""
+CLEAR = 10.0
+"""An error is told where it is this many times the bound of what it was judged by [-]."""
 WORDS = {"DOP853": "Dormand–Prince 8(5,3)", "Radau": "Radau IIA of order 5"}
 KIN: dict[Method, type[Integrator]] = {"DOP853": RungeKutta853, "Radau": RadauIIA}
 """Schemes with the formulas of a reference."""
@@ -91,6 +93,39 @@ class Truth:
     def error(self) -> float:
         """The largest bound of all quantities [-]."""
         return max(self.bound.values(), default=0.0)
+
+    @property
+    def origin(self) -> str:
+        """What it is and how far it may be trusted, in a sentence or two."""
+        events = len(self.run.events)
+        growth = "" if self.growth is None else f"; a small change of the start grows {self.growth:.2g} times"
+        told = f", its events ({events}) to {self.event_bound:.1g} s" if events else ""
+        return f"{self.method}, known to {self.error:.1g}{told}{growth}; {self.seconds:.1f} s"
+
+    @property
+    def struck(self) -> bool:
+        """Whether there are impacts."""
+        return any(event.kind == "closed" for event in self.run.events)
+
+    def judged(self, run: Trajectory) -> Difference:
+        """How far a run is from this one."""
+        return differences(run, self.run, self.scales, self.instants)
+
+    def unlike(self, run: Trajectory) -> str:
+        """Why a run is not to be compared with this one; '' where it is."""
+        early = run.time[-1] < self.run.time[-1] - 1e-9 * abs(self.run.time[-1]) and run.status == 1
+        return f"{run.message}, where the reference goes on" if early and self.run.status != 1 else ""
+
+    def achieved(self, run: Trajectory) -> float | None:
+        """Largest error of a coordinate [m, rad]; None where it is not clear beside the reference's own."""
+        names = [name for name, _ in run.facts.coordinates][: run.facts.coordinate_count]
+        found = differences(run, self.run, dict.fromkeys(names, 1.0), self.instants)
+        floor = max((self.bound[name] * self.scales[name] for name in names if name in self.bound), default=0.0)
+        return found.error if found.error >= CLEAR * floor else None
+
+    def remark(self, found: Difference) -> str:
+        """What else is to be said of a difference."""
+        return f"{found.left_out:.0%} of the instants lie beside events" if found.left_out > 0.2 else ""
 
 
 def truth(

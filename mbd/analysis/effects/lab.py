@@ -113,6 +113,8 @@ class Bench:
         self.whole = self.run(self.scene)
         if not self.whole.success:
             raise SimulationError(f"the whole scene fails: {self.whole.message}", self.whole)
+        if not self.whole.time[-1] > self.whole.time[0]:
+            raise ModelError(f"until must be after the start at {self.whole.time[0]:g} s, not {self.until!r}")
         self.outputs = _outputs(self.whole, outputs)
         self.instants = np.linspace(float(self.whole.time[0]), float(self.whole.time[-1]), INSTANTS)
         self.scales = ranges(self.whole, self.outputs, self.instants)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -11,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from mbd.analysis.effects.advice import advice
 from mbd.analysis.effects.contribution import Change, Contribution
+from mbd.analysis.rows import Rows
 from mbd.errors import UnknownNameError, nearest
-from mbd.results.tables import library
 
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
@@ -37,7 +36,7 @@ class Together:
 
 
 @dataclass(frozen=True, eq=False)
-class Effects:
+class Effects(Rows):
     """What each effect of a scene costs, carries and changes.
 
     Attributes
@@ -83,8 +82,7 @@ class Effects:
     def __repr__(self) -> str:
         rows = [HEADS, *(cells(each) for each in self.contributions)]
         widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-        span = f"{float(self.run.time[-1]) - float(self.run.time[0]):g} s" if len(self.run) else "0 s"
-        lines = [f"effects of {self.model!r} over {span}: {self.run.message}"]
+        lines = [self.span]
         lines += [_line(rows[0], widths), "  ".join("─" * width for width in widths)]
         for row in rows[1:]:
             lines.append(_line(row, widths).rstrip())
@@ -92,6 +90,12 @@ class Effects:
         lines += ["", *told] if told else []
         lines += ["", *self.legend, "", *self.recommendation]
         return "\n".join(lines)
+
+    @property
+    def span(self) -> str:
+        """Which scene it is, and how it ends."""
+        span = f"{float(self.run.time[-1]) - float(self.run.time[0]):g} s" if len(self.run) else "0 s"
+        return f"effects of {self.model!r} over {span}: {self.run.message}"
 
     @property
     def legend(self) -> tuple[str, ...]:
@@ -129,21 +133,6 @@ class Effects:
             found.append(row | {f"change of {name}": change.outputs.get(name) for name in self.outputs})
         return found
 
-    def to_dataframe(self) -> Any:
-        """A pandas table, a row for each effect."""
-        return library("pandas", "data", "result.to_dataframe()").DataFrame(self.rows())
-
-    def to_csv(self, path: str | Path) -> Path:
-        """The same as a file of comma-separated values."""
-        target = Path(path)
-        target.parent.mkdir(parents=True, exist_ok=True)
-        rows = self.rows()
-        with target.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, list(rows[0]) if rows else [])
-            writer.writeheader()
-            writer.writerows(rows)
-        return target
-
     def plot(self, path: str | Path | None = None) -> Any:
         """Bars: share of the energy, change without it, operations and time.
 
@@ -152,6 +141,12 @@ class Effects:
         from mbd.view.effects import bars
 
         return bars(self, path)
+
+    def page(self, path: str | Path) -> Path:
+        """One self-contained HTML file: bars for any output, sorted as one likes, with all figures, and the table."""
+        from mbd.view.effects_page import write
+
+        return write(self, path)
 
 
 def cells(each: Contribution) -> tuple[str, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -97,10 +98,7 @@ class LossSum(Loss):
 
     def force(self, rate: Scalar, scope: Scope, owner: str) -> Scalar:
         """The sum of the forces."""
-        result: Scalar = 0.0
-        for name, loss in self.named(owner):
-            result = result + loss.force(rate, scope, name)
-        return result
+        return self._sum(owner, lambda name, loss: loss.force(rate, scope, name))
 
     @property
     def needs_reaction(self) -> bool:
@@ -109,9 +107,12 @@ class LossSum(Loss):
 
     def dry(self, load: Scalar, scope: Scope, owner: str) -> Scalar:
         """The sum of what sticks."""
+        return self._sum(owner, lambda name, loss: loss.dry(load, scope, name))
+
+    def _sum(self, owner: str, part: Callable[[str, Loss], Scalar]) -> Scalar:
         result: Scalar = 0.0
         for name, loss in self.named(owner):
-            result = result + loss.dry(load, scope, name)
+            result = result + part(name, loss)
         return result
 
     @property

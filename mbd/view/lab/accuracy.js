@@ -1,13 +1,9 @@
-"use strict";
 (() => {
-  const data = JSON.parse(document.getElementById("data").textContent);
-  const [chart, tip, legend] = ["chart", "tip", "legend"].map((id) => document.getElementById(id));
-  const [quantity, which, cost] = ["quantity", "which", "cost"].map((id) => document.getElementById(id));
+  const { data, chart, legend, short, small, make, show, hide, opens, named, start } = lab;
+  const quantity = named("quantity", data.quantities);
+  const [which, cost] = ["which", "cost"].map((id) => document.getElementById(id));
   const units = { seconds: "wall time [ms]", dt: "step dt [ms]", steps: "steps", iterations: "Newton iterations", residuals: "evaluations of the balance" };
   const margin = { left: 66, right: 70, top: 14, bottom: 44 };
-
-  quantity.add(new Option("the largest of all", ""));
-  data.quantities.forEach((name) => quantity.add(new Option(name, name)));
 
   const error = (point) => {
     const values = point[which.value];
@@ -15,18 +11,9 @@
     const found = Math.max(...known.filter((value) => value > 0));
     return Number.isFinite(found) && (quantity.value || which.value !== "errors" || point.error !== null) ? found : null;
   };
+  // what an error is certainly below, where it is not clear beside the reference's own; told of the largest of all
+  const below = (point) => (!quantity.value && which.value === "errors" && point.error === null && point.at_most > 0 ? point.at_most : null);
   const work = (point) => (cost.value === "seconds" || cost.value === "dt" ? 1e3 : 1) * point[cost.value];
-  const short = (value, digits = 3) => (value === null || value === undefined ? "–" : String(Number(value.toPrecision(digits))));
-  const small = (value) => (value === null || value === undefined ? "–" : value === 0 ? "0" : value.toExponential(1));
-
-  const make = (name, attributes, text) => {
-    const node = document.createElementNS("http://www.w3.org/2000/svg", name);
-    Object.entries(attributes).forEach(([key, value]) => node.setAttribute(key, value));
-    if (text !== undefined) node.textContent = text;
-    chart.append(node);
-    return node;
-  };
-
   const ticks = (low, high) => {
     const digits = high / low < 300 ? [1, 2, 5] : [1];
     const found = [];
@@ -35,26 +22,29 @@
     return found.filter((value) => value >= low && value <= high);
   };
 
+  // labels pushed down until none covers another
+  const apart = (labels) => {
+    const placed = [];
+    labels.sort((a, b) => a.y - b.y).forEach((label) => {
+      const meets = () => placed.find((other) => Math.abs(other.y - label.y) < 13 && Math.abs(other.x - label.x) < 52);
+      for (let other = meets(); other; other = meets()) label.y = other.y + 13;
+      placed.push(label);
+    });
+    return placed;
+  };
+
   const told = (scheme, point) => [
     scheme.name,
     point.tol === null ? `dt      ${short(1e3 * point.dt)} ms` : `tol     ${short(point.tol)} m or rad`,
     ...(point.tol === null ? [] : [`reached ${small(point.achieved)}, estimated ${small(point.estimated)}; ${point.runs} runs`]),
-    `error   ${small(error(point))}${point.order === null ? "" : `   order ${point.order.toFixed(2)}`}`,
+    `error   ${below(point) ? `below ${small(below(point))}` : small(error(point))}${point.order === null ? "" : `   order ${point.order.toFixed(2)}`}`,
     `time    ${short(1e3 * point.seconds)} ms`,
     `steps   ${point.steps}, Newton ${point.iterations}`,
     `drift   ${small(point.drift)}, energy ${small(point.energy)} J`,
-    ...(point.events ? [`events  ${point.events}, off by ${small(point.event_time)} s`] : []),
+    ...(point.events && point.event_time !== null ? [`events  ${point.events}, off by ${small(point.event_time)} s`] : []),
     ...(point.same_events ? [] : ["its events are not those of the reference"]),
     ...(point.note ? [point.note] : []),
   ].join("\n");
-
-  const show = (scheme, point, x, y) => {
-    tip.textContent = told(scheme, point);
-    tip.hidden = false;
-    const room = chart.getBoundingClientRect().width - tip.offsetWidth - 8;
-    tip.style.left = `${Math.min(x + 14, Math.max(room, 0))}px`;
-    tip.style.top = `${Math.max(y - tip.offsetHeight - 12, 0)}px`;
-  };
 
   const emphasize = (number) =>
     chart.querySelectorAll("[data-scheme]").forEach((node) =>
@@ -62,11 +52,11 @@
 
   const draw = () => {
     chart.replaceChildren();
-    tip.hidden = true;
+    hide();
     const { width, height } = chart.getBoundingClientRect();
     const all = data.schemes.flatMap((scheme, number) => scheme.points
-      .filter((point) => !point.failure && error(point) !== null && work(point) > 0)
-      .map((point) => ({ scheme, number, point, cost: work(point), error: error(point) })));
+      .filter((point) => !point.failure && (error(point) ?? below(point)) !== null && work(point) > 0)
+      .map((point) => ({ scheme, number, point, cost: work(point), error: error(point) ?? below(point), hollow: error(point) === null })));
     if (!all.length) {
       make("text", { x: width / 2, y: height / 2, "text-anchor": "middle" }, "no clear error of this quantity");
       return;
@@ -93,7 +83,7 @@
       make("text", { x: margin.left - 8, y: y(value) + 4, "text-anchor": "end" }, value.toExponential(0));
     });
     make("text", { x: (margin.left + width - margin.right) / 2, y: height - 6, "text-anchor": "middle" }, units[cost.value]);
-    make("text", { x: 14, y: height / 2, "text-anchor": "middle", transform: `rotate(-90 14 ${height / 2})` }, "error over range");
+    make("text", { x: 14, y: height / 2, "text-anchor": "middle", transform: `rotate(-90 14 ${height / 2})` }, `error over ${data.over}`);
     if (data.target) {
       make("line", { class: "target", x1: margin.left, x2: width - margin.right, y1: y(data.target), y2: y(data.target) });
       make("text", { x: width - margin.right - 4, y: y(data.target) - 5, "text-anchor": "end" }, `wanted ${data.target}`);
@@ -104,7 +94,7 @@
         const group = all.filter((each) => each.point.dt === dt).sort((a, b) => a.cost - b.cost);
         const end = group[group.length - 1];
         if (group.length > 2) make("polyline", { class: "same", points: group.map((each) => `${x(each.cost)},${y(each.error)}`).join(" ") });
-        labels.push([{ class: "step", x: x(end.cost) + 10, y: y(end.error) + 4 }, `${short(1e3 * dt)} ms`]);
+        labels.push({ x: x(end.cost) + 10, y: y(end.error) + 4, text: `${short(1e3 * dt)} ms` });
       });
     const drawn = [];
     data.schemes.forEach((scheme, number) => {
@@ -115,18 +105,17 @@
       });
       drawn.push(...points.map((each) => ({ ...each, number })));
     });
-    labels.forEach(([place, text]) => make("text", place, text));
+    apart(labels).forEach(({ x, y, text }) => make("text", { class: "step", x, y }, text));
     drawn.forEach((each) => {
       const { scheme, number } = each;
       const at = { cx: x(each.cost), cy: y(each.error), "data-scheme": number };
       if (!each.point.same_events) make("circle", { ...at, class: "other", r: 9 });
       const dot = make("circle", { ...at, class: "point", r: each.point.tol === null ? 5.5 : 4, fill: scheme.color, tabindex: 0 });
-      const open = () => { show(scheme, each.point, at.cx, at.cy); emphasize(number); };
-      const close = () => { tip.hidden = true; emphasize(null); };
-      dot.addEventListener("pointerenter", open);
-      dot.addEventListener("focus", open);
-      dot.addEventListener("pointerleave", close);
-      dot.addEventListener("blur", close);
+      if (each.hollow) {
+        dot.classList.add("hollow");
+        dot.style.stroke = scheme.color;
+      }
+      opens(dot, () => { show(told(scheme, each.point), at.cx, at.cy); emphasize(number); }, () => { hide(); emphasize(null); });
     });
   };
 
@@ -139,7 +128,5 @@
     entry.addEventListener("pointerleave", () => emphasize(null));
     legend.append(entry);
   });
-  [quantity, which, cost].forEach((control) => control.addEventListener("change", draw));
-  new ResizeObserver(draw).observe(chart);
-  draw();
+  start([quantity, which, cost], draw);
 })();

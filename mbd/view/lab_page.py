@@ -1,0 +1,50 @@
+"""The page that ``mbd accuracy`` and ``mbd effects`` fill: self-contained, no network, no libraries, our own script."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from html import escape
+from typing import Any
+
+from mbd.view.report import machine, versions
+from mbd.view.template import filled
+
+__all__ = ["finite", "lab_page"]
+
+
+def lab_page(
+    title: str, advice: Sequence[str], notes: Sequence[str], controls: str, shows: str, about: str,
+    heads: Sequence[str], rows: Sequence[str], content: Any, script: str,
+) -> str:  # fmt: skip
+    """The page as text.
+
+    Parameters
+    ----------
+    title, advice, notes : texts, escaped here
+    shows : what the picture shows, for readers who do not see it
+    controls, about, heads, rows : HTML
+    content : what the script draws, as plain lists
+    script : its file
+    """
+    known = versions()
+    made = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
+    told = f"mbd {known['mbd']}, Python {known['python']}, numpy {known['numpy']}, {machine()['processor']}; {made}"
+    parts = {
+        "<!--title-->": escape(title),
+        "<!--advice-->": "".join(f"<p>{escape(line)}</p>" for line in advice),
+        "<!--notes-->": "".join(f"<li>{escape(note)}</li>" for note in notes),
+        "<!--controls-->": controls,
+        "<!--shows-->": escape(shows),
+        "<!--about-->": about,
+        "<!--heads-->": "".join(heads),
+        "<!--rows-->": "\n".join(rows),
+        "<!--made-->": escape(told),
+    }
+    return filled("lab", content, parts, ("shared.js", script))
+
+
+def finite(value: float) -> float | None:
+    """A number as JSON has it: what is not finite is not known."""
+    return value if math.isfinite(value) else None
