@@ -52,6 +52,7 @@ if TYPE_CHECKING:
         AssemblyError as AssemblyError,
         CapabilityError as CapabilityError,
         MbdError as MbdError,
+        MemoryLimitError as MemoryLimitError,
         ModelError as ModelError,
         SimulationError as SimulationError,
         TraceError as TraceError,
@@ -132,8 +133,8 @@ _HOMES = {
     "mbd.constraints": "Bilateral Controller Event KnifeEdge Nonholonomic Penalty PenaltyParameters Plane "
     "Rolling Unilateral When distance extension flexion height measure penalty_parameters separation touchdown",
     "mbd.equations.lagrangian": "Coordinate Lagrangian",
-    "mbd.errors": "AssemblyError CapabilityError MbdError ModelError SimulationError TraceError TrajectoryError "
-    "UnknownNameError",
+    "mbd.errors": "AssemblyError CapabilityError MbdError MemoryLimitError ModelError SimulationError TraceError "
+    "TrajectoryError UnknownNameError",
     "mbd.forces": "Applied Damper Motor Potential Samples Spring TorsionSpring",
     "mbd.integrators": "HHT GeneralizedAlpha Newmark RadauIIA RungeKutta853",
     "mbd.joints": "Cylindrical Planar Prismatic Revolute Screw Translation Universal Weld",

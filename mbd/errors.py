@@ -10,6 +10,7 @@ __all__ = [
     "AssemblyError",
     "CapabilityError",
     "MbdError",
+    "MemoryLimitError",
     "ModelError",
     "SimulationError",
     "TraceError",
@@ -58,6 +59,10 @@ class SimulationError(MbdError, RuntimeError):
     def __init__(self, message: str, run: Any = None) -> None:
         super().__init__(message)
         self.run = run
+
+
+class MemoryLimitError(SimulationError):
+    """A run whose rows would not fit into memory; `run` has those computed until then."""
 
 
 class TrajectoryError(MbdError, ValueError):

@@ -101,9 +101,10 @@ class Trajectory:
         """Named quantities at any times of the run.
 
         The state is interpolated within the smooth segment that holds the time, never across a switch, and quantities
-        are evaluated from it. For `mbd.RungeKutta853` a step from the row before ends there, as accurate as the rows;
-        for other schemes, in a run that was read from a file, with dry friction, or with ``store`` other than 1, it is
-        interpolated by cubic Hermite polynomials (q with v, v with v̇), whose error is of order dt⁴.
+        are evaluated from it. For `mbd.RungeKutta853` a step from the row before ends there, as accurate as the rows.
+        With dry friction, with ``store`` other than 1, in a run that was read from a file, and for `mbd.RadauIIA`,
+        positions are polynomials of degree 8 through q, v and v̇ of three rows (degree 5 where fewer lie between two
+        events); for other schemes cubic Hermite polynomials (q with v, v with v̇), whose error is of order dt⁴.
 
         Parameters
         ----------

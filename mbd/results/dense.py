@@ -36,7 +36,10 @@ class Restepping:
 
     @staticmethod
     def serves(columns: ModelColumns) -> bool:
-        """Whether the steps of this run can be taken again: all stored, in one mode each, with no dry friction."""
+        """Whether the steps of this run can be taken again: all stored, in one mode each, with no dry friction.
+
+        With dry friction rows do not tell which frictions stick, and those that follow loads would need a search.
+        """
         settings, equations = columns.record.settings, columns.equations
         stepped = settings.get("between") == "stages" and settings.get("store") == 1
         return stepped and equations.compose is None and not equations.frictions

@@ -5,9 +5,10 @@
 A surface that moves with time does work through its contact: λ h_t of a closed one, −p ∂g/∂t of a penalty (whose own
 part is p ġ, that of the motion against the surface), and Λ h_t in an impact, apart from what the impact loses.
 
-Every physical part is integrated on its own, with an error of order 8 (`mbd.results.quadrature`), and an impact takes
-what its impulses say; `numerical` is what is left: the integrator's own gain or loss, which falls with dt at the
-scheme's order. Projections onto rows and what non-smooth steps lift out of surfaces stand there too.
+Every physical part is integrated on its own, with an error of order 8 (`mbd.results.quadrature`; long steps of
+`RungeKutta853` from states within them, `mbd.results.within`), and an impact takes what its impulses say; `numerical`
+is what is left: the integrator's own gain or loss, which falls with dt at the scheme's order. Projections onto rows and
+what non-smooth steps lift out of surfaces stand there too.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from mbd.results.columns import ModelColumns
 from mbd.results.ledger import Ledger, Part
 from mbd.results.powers import Power, moving_share, powers
 from mbd.results.quadrature import cumulative
+from mbd.results.within import readable, within
 
 if TYPE_CHECKING:
     from mbd.equations.equations import Equations
@@ -29,7 +31,14 @@ if TYPE_CHECKING:
 __all__ = ["doubted_ledger", "kinds_of_work", "ledger"]
 
 ROUND_OFF = 1e-12
-"""A part that no element of the model names is not listed below this share of the largest energy [-]."""
+"""A part that no element of the model names is not listed below this share of the largest energy [-].
+
+Nor are works integrated again whose error in one interval is below it.
+"""
+ALIKE = 1e-14
+"""Difference of two works of an interval, over the largest, that is round-off [-]."""
+MOST_AGAIN = 20000
+"""Intervals of a power that are integrated again, at most: the longest ones."""
 
 
 def ledger(columns: ModelColumns) -> Ledger:
@@ -59,10 +68,10 @@ def doubted_ledger(columns: ModelColumns) -> tuple[Ledger, Matrix]:
     )
     pairs = zip(holders, energies, strict=True)
     stored = tuple(Part(effect.name, effect.column, energy) for (effect, _), energy in pairs)
-    named, moved, doubt = _works(columns, found, moving)
+    least = ROUND_OFF * float(np.max(np.abs(kinetic) + np.abs(potential), initial=0.0))
+    named, moved, doubt = _works(columns, found, moving, least)
     driven = any(power.kind == "constraint" for power in found)
     unnamed = [*moved, *_jumps(columns, kinetic + potential, driven)]
-    least = ROUND_OFF * float(np.max(np.abs(kinetic) + np.abs(potential), initial=0.0))
     kept = [part for part in unnamed if np.max(np.abs(part.energy), initial=0.0) > least]
     marks = tuple((event.time, event.name) for event in record.events if event.kind != "opened")
     stride = record.settings.get("store", 1)
@@ -78,7 +87,9 @@ def kinds_of_work(equations: Equations) -> frozenset[str]:
         return frozenset(power.kind for power in powers(equations))
 
 
-def _works(columns: ModelColumns, found: list[Power], moving: Vector) -> tuple[list[Part], list[Part], Matrix]:
+def _works(
+    columns: ModelColumns, found: list[Power], moving: Vector, least: float
+) -> tuple[list[Part], list[Part], Matrix]:  # fmt: skip
     """The integrals of powers: those of elements, and that of coordinates that move with time, with its 2T − v·∂T/∂v.
 
     The third is their doubt, see `doubted_ledger`.
@@ -96,7 +107,8 @@ def _works(columns: ModelColumns, found: list[Power], moving: Vector) -> tuple[l
     named, moved = [], [Part("moving coordinates", "constraint", np.cumsum(np.where(after, 0.0, _steps(moving))))]
     doubt = np.zeros((2, len(record.time)))
     for power, value in zip(found, values, strict=True):
-        work = cumulative(record.time, value, None if power.rate is None else next(rates))
+        rate = None if power.rate is None else next(rates)
+        work = _refined(columns, power, value, rate, cumulative(record.time, value, rate), least)
         if power.name == "moving coordinates":
             moved = [Part(power.name, power.kind, moved[0].energy + work)]
         else:
@@ -104,6 +116,31 @@ def _works(columns: ModelColumns, found: list[Power], moving: Vector) -> tuple[l
         trapezoid = np.diff(record.time) * (value[:-1] + value[1:]) / 2.0
         doubt[0 if np.max(value, initial=0.0) > 0.0 else 1 :, 1:] += np.abs(np.diff(work) - trapezoid)
     return named, moved, np.cumsum(doubt, axis=1)
+
+
+def _refined(
+    columns: ModelColumns, power: Power, value: Vector, rate: Vector | None, work: Vector, least: float
+) -> Vector:  # fmt: skip
+    """A work with its long intervals integrated again from states within them, in explicit runs.
+
+    These are intervals in which it differs by more than `least` [J] from ``h/2 (P₀ + P₁) + h²/12 (Ṗ₀ − Ṗ₁)``.
+    """
+    known = readable(columns, multipliers=rate is None)
+    if not known.any():
+        return work
+    step, steps = np.diff(columns.record.time), np.diff(work)
+    plain = step * (value[:-1] + value[1:]) / 2.0
+    if rate is not None:
+        plain += step**2 * (rate[:-1] - rate[1:]) / 12.0
+    differ = np.where(known, np.abs(steps - plain), 0.0)
+    if rate is None:
+        differ[known & (differ <= ALIKE * np.max(np.abs(work)))] = np.inf  # few rows: both are the trapezoid
+    long = np.sort(np.argsort(-differ, kind="stable")[:MOST_AGAIN])
+    long = long[differ[long] > least]
+    if not len(long):
+        return work
+    steps[long] = within(columns, [power.value], long)[0]
+    return np.concatenate([[0.0], np.cumsum(steps)])
 
 
 def _steps(column: Vector) -> Vector:

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mbd.arrays import Matrix, Vector
 from mbd.errors import TrajectoryError
+from mbd.results.osculating import osculating
 from mbd.results.record import Rows
 
 __all__ = ["Grid", "Places", "Side", "hermite", "hermite_rate", "quintic", "quintics"]
@@ -39,6 +40,10 @@ class Places:
     upper: Index
     theta: Vector
     step: Vector
+
+    def part(self, chosen: Index) -> Places:
+        """Some of the places."""
+        return Places(self.time[chosen], self.lower[chosen], self.upper[chosen], self.theta[chosen], self.step[chosen])
 
     def blend(self, values: Matrix, rates: Matrix) -> Matrix:
         """Cubic Hermite interpolation of a column or of several."""
@@ -152,22 +157,25 @@ class Grid:
 
         q by Hermite with q̇, v with v̇, z with ż; accelerations and ż are the slopes of those
         curves; multipliers by Hermite with three-point slopes; contacts and anchors as they hold in the interval.
-        `smooth`, for rows whose accelerations are as accurate as the rest and q̇ = v: q of degree 5, v and v̇ its slopes.
+        `smooth`, for rows whose accelerations are as accurate as the rest and q̇ = v: q of degree 8 through three rows,
+        v and v̇ its slopes, and z of degree 5 (`results.osculating`).
         """
         low, high = places.lower, places.upper
         ends = (rows.v[low], rows.a[low], rows.v[high], rows.a[high])
         states = (rows.z[low], rows.s[low], rows.z[high], rows.s[high])
         if smooth:
-            q, v, a = quintics(places, rows.q, rows.v, rows.a)
+            q, v, a = osculating(rows.time, places, (rows.q, rows.v, rows.a)).values
+            z, change = osculating(rows.time, places, (rows.z, rows.s)).values
         else:
+            z, change = hermite(places, *states), hermite_rate(places, *states)
             q, v, a = places.blend(rows.q, q_rate), hermite(places, *ends), hermite_rate(places, *ends)
         return Rows(
             places.time,
             q,
             v,
-            hermite(places, *states),
+            z,
             a,
-            hermite_rate(places, *states),
+            change,
             places.blend(rows.lam, self.slopes(rows.lam)),
             rows.closed[low],
             rows.anchors[low],

@@ -70,6 +70,7 @@ def notes_of(run: Run, record: Record) -> tuple[list[str], list[str]]:
     notes += [text.format(count=int(counts[place]), impact=impact) for place, text in COUNTED if counts[place]]
     doubts = _energy_lost(run, record)
     notes += doubts or ([run.energy.note] if run.energy.note else [])
+    notes += [run.room.note] if run.room.note else []
     spent = float(run.values["clock"][F.SPENT])
     if spent > TELLING and not run.values["adaptive"]:
         notes.append(

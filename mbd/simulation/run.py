@@ -10,7 +10,7 @@ import numpy as np
 
 from mbd.arrays import Vector
 from mbd.compile.mechanism import Mechanism
-from mbd.errors import SimulationError, UnknownNameError
+from mbd.errors import MemoryLimitError, SimulationError, UnknownNameError
 from mbd.forces.base import Force
 from mbd.integrators.base import Integrator
 from mbd.kernel import fields as F
@@ -25,6 +25,7 @@ from mbd.simulation.failures import attempt, crowded, explanation
 from mbd.simulation.fastest import stability
 from mbd.simulation.memory import take_up
 from mbd.simulation.outcome import trajectory_of, whole_record
+from mbd.simulation.room import Room
 from mbd.simulation.savepoints import Savepoint, rewind, save
 from mbd.simulation.stepper import Stepper
 from mbd.state import State
@@ -93,6 +94,7 @@ class Run:
         self.failure: Failure | None = None
         self.interrupted = False
         self.energy = EnergyWatch()
+        self.room = Room(self.values["width"])
         self.observers: Sequence[Callable[[float, State], None]] = ()
         self.progress: Callable[[float, float], None] | None = None
         controllers, instants = getattr(model, "controllers", ()), getattr(model, "instants", ())
@@ -122,7 +124,7 @@ class Run:
         self.collect()
         settled, tried = True, attempt(self) if problem else None
         if problem:
-            settled = rewind(self, failed=problem not in (INTERRUPTED, self.energy.problem))
+            settled = rewind(self, failed=problem not in (INTERRUPTED, self.energy.problem, self.room.problem))
         final = close(self, settled)
         problem, fed = self._told(problem), self._told(self._guarded(self._judge_energy)[0])
         if self.stop and not problem and not message.startswith("ended"):
@@ -185,10 +187,11 @@ class Run:
             elif status not in (F.FULL, F.PAUSE):
                 return self._explained(status), ""
             save(self)
-            problem = crowded(self.events, self.now, self.dt)
+            problem = crowded(self.events, self.now, self.dt) or self.room.check(self)
             if not problem and self.limit is None and self.energy.is_due(self):
                 problem = self.energy.judge(self)
             if problem:
+                self.cause = MemoryLimitError(problem) if problem == self.room.problem else self.cause
                 return problem, ""
             if self.limit is not None and self.values["counts"][F.STEPS] >= self.limit:
                 return "", f"stopped after {self.limit} steps at t = {self.now:g} s"

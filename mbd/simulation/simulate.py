@@ -15,29 +15,29 @@ import numpy as np
 from mbd.assembly import named_numbers
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of
-from mbd.errors import CapabilityError, ModelError, SimulationError
+from mbd.errors import CapabilityError, MemoryLimitError, ModelError, SimulationError
 from mbd.integrators import HHT, Integrator
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.simulation.arguments import callbacks, choices, end_of, fits, numbers
 from mbd.simulation.capabilities import refusals
 from mbd.simulation.run import Run
+from mbd.simulation.search import LARGEST
 from mbd.simulation.strategy import chosen
-from mbd.simulation.tolerance import FIRST, PILOT, Trial, calibrated
+from mbd.simulation.tolerance import calibrated, first_allowed
+from mbd.simulation.trials import Trial
 from mbd.state import State
 from mbd.trajectory import Trajectory
 
 __all__ = ["prepared", "simulate"]
 
 LONGEST = 0.1
-"""Longest step that follows its error, over the length of the run [-]."""
+"""Longest step that follows its error in a first run, over the length of the run [-]."""
 SHORTEST_CAP = 0.01
 """Least by which that shrinks where less error is allowed: it bounds the steps of a motion that needs none [-]."""
 INSTANT = 1e-3
 """A short time where steps follow their error, over the length of the run or 1 s: for differences, and as `dt` [-]."""
 REST_SPEED = 1e-6
 """Approach speed [m/s, rad/s] below which a contact closes without rebound and releases nobody: ends Zeno sequences."""
-FAR_FINER = 1.5
-"""Order of a scheme over that of its estimate from which runs are much better than their estimates say [-]."""
 
 
 def simulate(
@@ -100,7 +100,8 @@ def simulate(
     ModelError, UnknownNameError, CapabilityError
         for arguments that cannot be honoured, all before the first step.
     SimulationError
-        if the run cannot go on, or if the scheme itself has more than doubled the energy of the mechanism.
+        if the run cannot go on, or if the scheme itself has more than doubled the energy of the mechanism; a
+        `MemoryLimitError` if its rows fill a quarter of the memory that was free.
     """
     scheme = integrator if integrator is not None else HHT(alpha=0.05)
     words = {"contact": contact, "impact": impact, "locate": locate, "on_failure": on_failure}
@@ -125,7 +126,8 @@ def simulate(
         assert tol is not None
         run, trajectory, problem = _to_tolerance(complete, scheme, float(tol), _span(until, start.time))
     if problem and on_failure == "raise":
-        raise SimulationError(problem, trajectory) from run.cause
+        kind = MemoryLimitError if isinstance(run.cause, MemoryLimitError) else SimulationError
+        raise kind(problem, trajectory) from (None if kind is MemoryLimitError else run.cause)
     return trajectory
 
 
@@ -144,17 +146,16 @@ def _to_tolerance(
     """The run whose error agrees with a tolerance; where an event ends it, the first guess is that it takes 1 s."""
     length = span or 1.0
     finer = scheme.order() / scheme.error_order()  # power of the allowed error with which that of the run falls
-    first = (max(tol, tol ** (1.0 / finer)) if finer > FAR_FINER else tol) / length
-    coarsest, power = PILOT * FIRST * first, 1.0 / scheme.error_order()
+    first, power = first_allowed(tol, length, finer), 1.0 / scheme.error_order()
 
     def trial(allowed: float) -> Trial:
-        # shrinks as steps do, so that runs of a motion so easy that its steps are the longest differ in their steps
-        longest = LONGEST * length * min(max((allowed / coarsest) ** power, SHORTEST_CAP), 1.0)
-        more = {"tol": tol, "longest": longest, "allowed": allowed}
+        # shrinks and grows as steps do, so that runs of a motion so easy that its steps are the longest have others
+        share = min(max((allowed / first) ** power, SHORTEST_CAP), LARGEST / LONGEST)
+        more = {"tol": tol, "longest": LONGEST * length * share, "allowed": allowed}
         run, trajectory, problem = complete(INSTANT * min(length, 1.0), more)
-        return Trial(allowed, trajectory, problem, run)
+        return Trial(allowed, trajectory, problem, run, widest=share == LARGEST / LONGEST)
 
-    found = calibrated(trial, tol, first, finer)
+    found = calibrated(trial, tol, first, finer, scheme.order())
     trajectory = found.trial.run
     if found.problem and trajectory.success:  # no run failed, but none is good enough
         trajectory = Trajectory(replace(trajectory.record, success=False, message=found.problem))

@@ -12,7 +12,7 @@ from mbd.analysis.gait import gait, mirrored
 from mbd.equations.equations import Row
 from mbd.errors import UnknownNameError
 from mbd.trajectory import Trajectory
-from tests.simulation.mechanisms import kneed_walker, kneed_walker_start
+from tests.simulation.mechanisms import kneed_walker, kneed_walker_start, pendulum
 from tests.view.stand_ins import Sheet, ball, oscillator, record, walker
 
 
@@ -118,6 +118,24 @@ def test_what_the_ledger_leaves_over_falls_with_the_step_as_the_scheme_promises(
     assert {part.name for part in last.parts} == {"hip loss", "knee loss", "push", "stop"}
     assert last.sums["stop"] < 0.0 < last.sums["push"] and runs[-1].events[0].name == "stop"
     assert last.drift < 1e-4
+
+
+@pytest.mark.parametrize("make", ["controlled", "driven", "rubbing"])
+def test_long_explicit_steps_leave_over_what_the_scheme_itself_makes(make):
+    """Works between samples of a controller, of a multiplier, and of dry friction fall like the steps' own errors."""
+    model = pendulum(mbd.Viscous(0.2) if make == "controlled" else mbd.Coulomb(0.5) if make == "rubbing" else None)
+    if make == "controlled":
+        model.apply(mbd.Motor("motor", model.joints[0], torque=0.5))
+        told = {"reads": ["hinge.angle"], "writes": ["motor.torque"], "period": 0.3}
+        model.apply(
+            mbd.Controller("servo", lambda t, v, s: {"motor.torque": 2 * np.sin(3 * t) - v["hinge.angle"]}, **told)
+        )
+    elif make == "driven":
+        model.constrain(mbd.Bilateral("drive", model.joints[0], value=lambda t: t + 0.3 * t * t))
+    start = mbd.assemble(model, {"hinge.angle": {"controlled": 1.0, "driven": 0.0, "rubbing": 1.5}[make]})
+    runs = [mbd.simulate(model, start, mbd.RungeKutta853(), dt=dt, until=2.7) for dt in (0.1, 0.05)]
+    left = [float(np.max(np.abs(run.energy.numerical))) for run in runs]
+    assert left[1] < (1e-6 if make == "rubbing" else 1e-10) and left[1] < left[0] / 20.0
 
 
 def test_the_drive_of_a_slider_crank_gives_back_what_it_takes():

@@ -1,0 +1,82 @@
+"""Works of long steps: powers integrated within the intervals between rows, where runs of high order know their states.
+
+Four points of Gauss–Legendre quadrature on each interval have an error of order 8 with a constant a hundred times below
+that of a polynomial through rows around (Davis & Rabinowitz 1984, ch. 2.7), and look at no other step: samples of
+controllers and events, beside which stretches are short, do no harm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbd.arrays import Matrix, Vector
+from mbd.results.dense import Restepping
+from mbd.results.interpolation import Places
+from mbd.results.quadrature import stretches
+
+if TYPE_CHECKING:
+    from mbd.results.columns import ModelColumns
+    from mbd.tape.node import Node
+
+__all__ = ["readable", "within"]
+
+POINTS, WEIGHTS = np.polynomial.legendre.leggauss(4)
+POINTS, WEIGHTS = 0.5 * (POINTS + 1.0), 0.5 * WEIGHTS
+AT_ONCE = 1024
+"""Intervals whose states are found together."""
+
+FEW = 3
+"""Steps of a stretch below which interpolated multipliers are better than none [-]."""
+
+Index = NDArray[np.intp]
+
+
+def readable(columns: ModelColumns, multipliers: bool) -> NDArray[np.bool_]:
+    """Between which rows the states of a run are as accurate as the rows, (R − 1,).
+
+    Parameters
+    ----------
+    multipliers : whether these count, which explicit steps with dry friction interpolate as well as few rows allow:
+        better than the rows alone tell a power only in stretches of one or two steps
+    """
+    record = columns.record
+    step = np.diff(record.time)
+    if Restepping.serves(columns):
+        return np.asarray(step > 0.0)
+    smooth = columns.equations.compose is None and record.settings.get("store", 1) == 1
+    if not smooth or record.settings.get("between") != "stages":
+        return np.zeros(len(step), dtype=bool)
+    found = step > 0.0
+    if multipliers:
+        first, last = stretches(record.time)
+        found[found] = last - first < FEW
+    return np.asarray(found)
+
+
+def within(columns: ModelColumns, values: Sequence[Node], lower: Index) -> Matrix:
+    """∫ P dt over intervals, (number of values, k).
+
+    Parameters
+    ----------
+    values : powers as expressions; lower : (k,) the rows that begin the intervals
+    """
+    found = np.zeros((len(values), len(lower)))
+    for first in range(0, len(lower), AT_ONCE):
+        part = lower[first : first + AT_ONCE]
+        powers = columns.evaluate(values, columns.between(_places(columns.record.time, part)))
+        step = columns.record.time[part + 1] - columns.record.time[part]
+        for number, power in enumerate(powers):
+            there = np.broadcast_to(power, (len(part) * len(POINTS),)).reshape(len(part), len(POINTS))
+            found[number, first : first + len(part)] = step * (there @ WEIGHTS)
+    return found
+
+
+def _places(time: Vector, lower: Index) -> Places:
+    """The points of quadrature in each interval, one interval after the other."""
+    begin, step = np.repeat(lower, len(POINTS)), np.repeat(time[lower + 1] - time[lower], len(POINTS))
+    theta = np.tile(POINTS, len(lower))
+    return Places(time[begin] + theta * step, begin, begin + 1, theta, step)

@@ -1,0 +1,144 @@
+"""How far apart two runs of one motion are: events matched, coordinates compared at a bounded number of instants.
+
+A run is compared where its rows are, which needs no interpolation on its side, and in the middles between them where
+what it gives there is less accurate than its rows. The other run is read by the polynomials of `results.osculating`,
+and by steps taken again where these are in doubt.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbd.arrays import Matrix, Vector
+from mbd.results.dense import Restepping
+from mbd.results.interpolation import Places, quintic
+from mbd.results.matching import apart, matched
+from mbd.results.osculating import DOUBT, osculating
+
+if TYPE_CHECKING:
+    from mbd.results.columns import ModelColumns
+    from mbd.results.record import Record
+    from mbd.trajectory import Trajectory
+
+__all__ = ["Gap", "gap"]
+
+SAMPLES = 64
+"""Rows of a run at which it is compared, about [-]."""
+MIDDLES = 32
+"""Middles between rows at which it is compared, about, if what it gives there is in doubt [-]."""
+BESIDE = 1e-9
+"""Instants this close to an event are not compared, relative to the length of the run [-]."""
+TRUSTED = 0.02
+"""Doubt of an interpolated coordinate, over the accuracy that is asked for, from which steps are taken again [-]."""
+DOUBTFUL = 16
+"""Instants at which steps are taken again, at most [-]."""
+ENOUGH = 0.5
+"""Share of the instants up to which those in doubt are left out, as the others tell the error too [-]."""
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Largest difference of a coordinate [m, rad] between two runs, which one, and the largest shift of an event [s].
+
+    same : whether both runs have the same events
+    """
+
+    size: float
+    name: str
+    shift: float
+    same: bool
+
+
+def gap(run: Trajectory, other: Trajectory, accuracy: float = 0.0) -> Gap:
+    """How far apart the coordinates of two runs are, away from their events; also at their ends.
+
+    Parameters
+    ----------
+    run : read as its user reads it; other : the more accurate one
+    accuracy : what matters [m, rad]: far smaller errors of interpolation do no harm
+    """
+    begin, end = float(run.time[0]), min(float(run.time[-1]), float(other.time[-1]))
+    pairs = matched(run.events, other.events, begin, end)
+    shifted = pairs.pairs + pairs.late
+    difference = np.zeros(run.record.q.shape[1])
+    beside = BESIDE * (end - begin)
+    rows, middles = _rows(run, end), _middles(run, end, accuracy)
+    rows, middles = rows[apart(rows, shifted, beside)], middles[apart(middles, shifted, beside)]
+    if len(rows):
+        difference = _difference(run, other, rows, middles, accuracy)
+    if not pairs.late:
+        difference = np.maximum(difference, np.abs(run.record.q[-1] - other.record.q[-1]))
+    worst = int(np.argmax(difference)) if difference.size else -1
+    equations = run.record.equations
+    names = [c.name for c in equations.coordinates] if equations is not None else []
+    return Gap(
+        float(difference[worst]) if worst >= 0 else 0.0, names[worst] if 0 <= worst < len(names) else "",
+        max((abs(a - b) for a, b in shifted), default=0.0), pairs.alone == 0,
+    )  # fmt: skip
+
+
+def _rows(run: Trajectory, end: float) -> Vector:
+    """Times of rows until the end, a bounded number of them."""
+    count = int(np.searchsorted(run.time, end, side="right"))
+    chosen = np.unique(np.linspace(0, count - 1, min(count, SAMPLES)).astype(np.intp))
+    return np.append(run.time[chosen], end)
+
+
+def _middles(run: Trajectory, end: float, accuracy: float) -> Vector:
+    """Middles between rows where what a run gives may be less accurate than its rows: the most doubtful ones."""
+    columns, record = run._model_columns, run.record
+    polynomials = record.settings.get("between", "hermite") != "hermite" and columns.equations.compose is None
+    if not polynomials or Restepping.serves(columns):
+        return np.zeros(0)
+    _, places = columns.grid.middles()
+    places = places.part(np.flatnonzero(places.time < end)[:: len(places.time) // MIDDLES + 1])
+    doubt = _doubt(places, record, quintic(places, record.q, record.v, record.a))
+    return places.time[doubt > TRUSTED * accuracy]
+
+
+def _difference(run: Trajectory, other: Trajectory, rows: Vector, middles: Vector, accuracy: float) -> Vector:
+    """Largest difference of each coordinate at rows of a run, and at middles between them (n_q,)."""
+    columns = run._model_columns
+    ours, sure = _positions(columns, columns.grid.places(rows), accuracy)
+    if len(middles):
+        record = columns.record
+        found = osculating(record.time, columns.grid.places(middles), (record.q, record.v, record.a))
+        ours = np.concatenate([ours, found.values[0]])
+        sure = np.append(sure, np.ones(len(middles), dtype=bool))
+    columns = other._model_columns
+    theirs, known = _positions(columns, columns.grid.places(np.append(rows, middles)), accuracy)
+    return np.asarray(np.max(np.abs(ours - theirs)[sure & known], axis=0, initial=0.0))
+
+
+def _doubt(places: Places, record: Record, q: Matrix) -> Vector:
+    """How far the worst coordinate of quintic polynomials may be off (k,) [m, rad]."""
+    return np.asarray(DOUBT * np.max(np.abs(q - places.blend(record.q, record.v)), axis=1, initial=0.0))
+
+
+def _positions(columns: ModelColumns, places: Places, accuracy: float) -> tuple[Matrix, NDArray[np.bool_]]:
+    """Coordinates at places (k, n_q), and where they are known well enough (k,)."""
+    record, sure = columns.record, np.ones(len(places.time), dtype=bool)
+    if columns.equations.compose is not None:
+        return np.asarray(columns.between(places).q), sure
+    if record.settings.get("between", "hermite") == "hermite":
+        return quintic(places, record.q, record.v, record.a), sure
+    known = (record.q, record.v, record.a)
+    q = quintic(places, *known)
+    doubt = _doubt(places, record, q)
+    poor = np.flatnonzero(doubt > TRUSTED * accuracy)
+    if not len(poor):
+        return q, sure
+    better = osculating(record.time, places.part(poor), known)
+    q[poor], doubt[poor] = better.values[0], better.doubt
+    again = poor[doubt[poor] > TRUSTED * accuracy]
+    sure[again] = False
+    if len(again) > ENOUGH * len(sure) and Restepping.serves(columns):
+        again = again[np.argsort(-doubt[again], kind="stable")[:DOUBTFUL]]
+        q[again], sure[again] = columns.between(places.part(again)).q, True
+    elif len(again) > ENOUGH * len(sure):
+        sure[again] = True  # the polynomials are what there is
+    return q, sure

@@ -1,0 +1,103 @@
+"""Memory for the rows of a run: how many it will need, said while it runs, and an end before there is none left.
+
+A run in steps of the size it has taken so far stores ``n ≈ n_now (T − t₀)/(t − t₀)`` rows of `width` numbers, 8 bytes
+each; where an event may end it sooner only those that it has are counted.
+"""
+
+from __future__ import annotations
+
+import os
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from mbd.simulation.run import Run
+
+__all__ = ["Room", "available", "memory"]
+
+SHARE = 0.25
+"""Part of the memory that is free as a run begins which its rows may fill: trial runs, and results, need some too."""
+UNKNOWN = 4.0e9
+"""Taken for the free memory where the system does not tell it [bytes]."""
+EARLIEST = 1 << 16
+"""Rows before which nothing is foretold."""
+MANY = 1 << 22
+"""Rows above which a run that follows its error says how many they will be: nobody has chosen their number."""
+LARGE = 1.0e9
+"""Memory above which every run says how much it will need [bytes]."""
+
+
+class Room:
+    """What the rows of one run may fill.
+
+    Attributes
+    ----------
+    problem : why the run had to end, in a sentence; '' if it did not
+    note : what was foretold; '' if nothing
+    """
+
+    def __init__(self, width: int) -> None:
+        self.size = 8 * width
+        self.most = int(SHARE * available()) // self.size
+        self.problem = self.note = ""
+
+    def check(self, run: Run) -> str:
+        """Look at a run that goes on; a sentence if it must not store any more rows."""
+        if run.stored < EARLIEST:
+            return ""
+        rows = _foretold(run)
+        if run.stored >= self.most:
+            self.problem = (
+                f"t = {run.now:.9g} s: {run.stored} rows fill {memory(run.stored * self.size)}, a quarter of the free "
+                f"memory; the whole run needs about {rows:.2g} rows, {memory(rows * self.size)}; {_remedy(run)}"
+            )
+            return self.problem
+        told = (rows > MANY and run.values["adaptive"]) or rows * self.size > LARGE or rows > self.most
+        if told and not self.note:
+            last = f"; it will be ended at {self.most} rows" if rows > self.most else ""
+            self.note = (
+                f"at t = {run.now:.3g} s there are {run.stored} rows: at this rate the run will have about {rows:.2g}, "
+                f"which take {memory(rows * self.size)}{last}; {_remedy(run)}"
+            )
+            warnings.warn(self.note, UserWarning, stacklevel=2)
+        return ""
+
+    def refused(self, rows: float) -> str:
+        """Why a run of so many rows is not even begun; '' if there is room for it."""
+        if rows <= self.most:
+            return ""
+        return (
+            f"about {rows:.2g} steps would be needed, whose rows take {memory(rows * self.size)}, more than a quarter "
+            "of the free memory"
+        )
+
+
+def _foretold(run: Run) -> float:
+    """Rows of the whole run."""
+    begin, span = run.start.time, run.end - run.start.time
+    if run.stop or not run.now > begin:
+        return float(run.stored)
+    return float(run.stored * max(span / (run.now - begin), 1.0))
+
+
+def _remedy(run: Run) -> str:
+    if run.values["adaptive"]:
+        return "ask for less accuracy or a shorter time, take a scheme of higher order, or dt= with store="
+    return "use store= to keep fewer rows, a larger dt, or a shorter time"
+
+
+def available() -> float:
+    """Free memory [bytes], with what the system would give back at once."""
+    try:
+        for line in Path("/proc/meminfo").read_text().splitlines():
+            if line.startswith("MemAvailable:"):
+                return 1024.0 * float(line.split()[1])
+        return float(os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
+    except (OSError, ValueError, AttributeError):
+        return UNKNOWN
+
+
+def memory(size: float) -> str:
+    """'3.2 GB' or '45 MB'."""
+    return f"{size / 1e9:.2g} GB" if size >= 1e9 else f"{max(size / 1e6, 1.0):.0f} MB"
