@@ -57,7 +57,7 @@ from mbd.kernel.interior import parts_to_take
 from mbd.kernel.locate import locate
 from mbd.kernel.nonsmooth import PULL, keep, lands, lets_go, put_back, rebound, strike
 from mbd.kernel.observe import is_awaited, store_row
-from mbd.kernel.pairs import FIRST, SECOND
+from mbd.kernel.pairs import ALONE, FIRST, SECOND
 from mbd.kernel.settle import log_event
 from mbd.kernel.starting import find_mode, restart, still_dependent
 from mbd.kernel.switching import switch
@@ -236,6 +236,7 @@ def conclude(K: Any, h: float, full: float, t1: float, cut: bool, within: bool, 
             K.state[PAIRED] = SECOND
             K.counts[SHORTENED] += 1
         else:
+            K.counts[SHORTENED] += 1 if K.state[PAIRED] == ALONE else 0
             K.state[PAIRED] = 0
     uneven = K.stabilized == 0 and K.state[ROWS] > 0 and (h < (1.0 - 1e-6) * K.clock[STEP] or rings(K))
     if (h < 1e-3 * K.clock[STEP] and K.scheme != 1) or uneven:  # index 3 rings after a change of step
@@ -291,11 +292,11 @@ def advance(K: Any) -> int:
         status = tried_step(K, h, t1)
         if status != 0:
             return status
-        if K.clock[TRIED] < h:
+        if K.clock[TRIED] != h:
             h = K.clock[TRIED]
             t1 = t + h
             cut = cut and h >= full
-        if K.adaptive == 1 or K.state[PAIRED] == FIRST:
+        if K.adaptive == 1 or K.state[PAIRED] == FIRST or K.state[PAIRED] == ALONE:
             full = h
         K.counts[STEPS] += 1
         holds = K.state[N_DROPPED] == 0 or still_dependent(K) or K.state[NEAR] > 0  # nothing is told apart there

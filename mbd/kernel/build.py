@@ -22,8 +22,9 @@ ENTRY = "mbd_kernel"
 
 MODULES = (
     "linear", "lemke", "redundancy", "saddle", "restart", "pivoting", "complementarity", "blow", "impact", "settle",
-    "pairs", "iteration", "passage", "newmark", "complex_linear", "stages", "radau", "runge_kutta", "hermite", "guards",
-    "control", "interior", "locate", "switching", "nonsmooth", "takeover", "observe", "starting", "trying", "advance",
+    "pairs", "iteration", "passage", "newmark", "complex_linear", "stages", "radau", "straddle", "runge_kutta",
+    "hermite", "guards", "control", "interior", "locate", "switching", "nonsmooth", "takeover", "observe", "starting",
+    "trying", "advance",
 )  # fmt: skip
 
 APART = ("factor", "solve")

@@ -26,9 +26,11 @@ from mbd.kernel.fields import (
     NOT_FINITE,
     NOW,
     REJECTED,
+    ROWS,
     SINGULAR,
     STAGNATED,
     STEP,
+    STIRRED,
     TOO_NEAR,
     TOO_SMALL,
     TRIED,
@@ -36,6 +38,7 @@ from mbd.kernel.fields import (
 from mbd.kernel.guards import try_step
 from mbd.kernel.hooks import scheme_error
 from mbd.kernel.restart import compose, consistent, fill_block, refresh_scales
+from mbd.kernel.straddle import step_by_pose, stirred, stirs
 
 __all__ = ["controlled_step", "first_step", "newmark_error", "smallest_step"]
 
@@ -84,6 +87,8 @@ def error_ratio(K: Any, h: float) -> float:
     for i in range(n_v):
         fast = max(fast, abs(K.y1[i]))
     floor = EPS * (NEIGHBOURS * far + CANCELLED * h * fast)
+    if K.scheme == 1 and K.state[ROWS] > 0:
+        floor += stirred(K, h) * h * fast
     largest = 0.0
     for i in range(n_v):
         largest = max(largest, max(abs(K.error[i]), h * abs(K.error[n_v + i])))
@@ -129,6 +134,11 @@ def controlled_step(K: Any, h: float) -> int:
     """A candidate whose error is allowed, after a step of h or less: K.clock[TRIED]; K.clock[NEXT] is the next step."""
     t = K.clock[NOW]
     while True:
+        wanted = h
+        if K.scheme == 1 and K.state[ROWS] > 0:
+            h = step_by_pose(K, wanted, 1.0)
+            if stirs(K, h):
+                return STIRRED
         for i in range(K.n_v + K.n):
             K.error[i] = 0.0
         status = try_step(K, h, t + h)
@@ -140,7 +150,9 @@ def controlled_step(K: Any, h: float) -> int:
                 K.clock[LOCAL] = ratio * K.allowed * h
                 K.clock[TRIED] = h
                 following = h * factor
-                if h < (1.0 - 1e-6) * K.clock[STEP]:  # it was cut at a boundary: its error says little of longer ones
+                if (
+                    wanted < (1.0 - 1e-6) * K.clock[STEP] or h < wanted
+                ):  # it was cut: its error says little of longer ones
                     following = max(following, K.clock[STEP])
                 K.clock[NEXT] = min(following, K.longest)
                 return 0

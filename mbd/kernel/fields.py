@@ -48,6 +48,7 @@ REAL_ARRAYS = (
     "error",  # local error of the candidate as its scheme estimates it: of positions x, then of (v, z)
     "inside",  # guards and multipliers at the ends of a step while places inside it are looked at
     "turning",  # ∂ḣ/∂x of the active rows, stabilized only
+    "left", "left1",  # of each row beside the earlier ones, at the accepted state and the candidate; explicit only
     "basis", "lower", "mix", "shares",  # dependent rows as combinations of others, and what they bear of their loads
     "force", "bias", "jump", "impulse",  # complementarity: right-hand sides, velocity or acceleration, multipliers
     "slip", "limit", "base_limit",  # frictions: sign of sliding, largest, at zero multipliers
@@ -93,7 +94,7 @@ Kernel = namedtuple("Kernel", FIELDS)  # type: ignore[misc]
 
 KEPT_REALS = (
     "clock", "q", "y", "rate", "aux", "slope", "lam", "lam_slope", "shift", "shift_change", "anchors", "guards0",
-    "scale", "weight", "mix", "deepest", "sinking", "side", "detail", "slip", "lean", "past_stages",
+    "scale", "weight", "mix", "deepest", "sinking", "side", "detail", "slip", "lean", "past_stages", "left",
 )  # fmt: skip
 """What of the real arrays the next step depends on: restored before a step, they make it the same to the bit."""
 KEPT_INTEGERS = ("closed", "armed", "touched", "dropped", "rows", "state", "sticks", "loose", "was")
@@ -119,16 +120,16 @@ PIVOT, KICK = 4, 5
 PAST_TIME, LIFTED = 6, 7
 # places in `clock`: time, base time of the grid, step size of aux, time of the last switch, the present full step,
 # the step that will follow the candidate, the width of a step that is looked at as a whole (state[STRAIGHT] = 1), and
-# the step that the candidate took with its local error, and the sum of local errors
-NOW, BASE, AUX_STEP, LAST_SWITCH, STEP, NEXT, WIDTH, TRIED, LOCAL, SPENT = range(10)
+# the step that the candidate took with its local error, the sum of local errors, and when rows will lose rank
+NOW, BASE, AUX_STEP, LAST_SWITCH, STEP, NEXT, WIDTH, TRIED, LOCAL, SPENT, POSE = range(11)
 # functions in `code`; modes follow: tangent, residual and, where straight-line code pays, correction and solution
 ACCELERATIONS, GUARDS, SCALES, COMPOSE = range(4)
 # what advance returns
 DONE, FULL, NEW_MODE, EVENT, PAUSE, LAST = range(6)
 (
     NOT_FINITE, NOT_CONVERGED, SINGULAR, STAGNATED, CHATTER, NO_IMPACT, DEPENDENT, CONFLICT, NO_LOCATION, ENERGY_GAIN,
-    NO_FORCE, TOO_TIGHT, TOO_NEAR, TOO_SMALL,
-) = range(10, 24)  # fmt: skip
+    NO_FORCE, TOO_TIGHT, TOO_NEAR, TOO_SMALL, STIRRED,
+) = range(10, 25)  # fmt: skip
 # kinds of fired guards
 CLOSE, OPEN_PULL, OPEN_GAP, OPEN_FORCE, CROSS, WATCH, GRAZE, PRESS, STICK, SLIP, STICK_BRIEF = range(11)
 # kinds in the log

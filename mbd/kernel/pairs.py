@@ -12,14 +12,14 @@ from typing import Any
 
 from mbd.kernel.fields import HALVED, PAIRED, STEP
 
-__all__ = ["FIRST", "LONGER", "SECOND", "SHORTER", "WHOLE", "is_of_pair", "is_whole", "may_pair"]
+__all__ = ["ALONE", "FIRST", "LONGER", "SECOND", "SHORTER", "WHOLE", "is_of_pair", "is_whole", "may_pair"]
 
 LONGER = 0.75 + 0.38188130791298669
 """3/4 + √(7/48), part of dt, of the second: what is predicted from it is stretched little [-]."""
 SHORTER = 0.75 - 0.38188130791298669
 """3/4 − √(7/48), part of dt, of the first [-]."""
-SECOND, FIRST = 1, 2
-"""Values of state[PAIRED]: the longer of a pair is next, the shorter is being tried."""
+SECOND, FIRST, ALONE = 1, 2, 3
+"""Values of state[PAIRED]: the longer of a pair is next, the shorter is tried; one that has its size for a pose is."""
 WHOLE = 1e-6
 """Part of dt by which a step may differ from the size it counts as: round-off of instants [-]."""
 

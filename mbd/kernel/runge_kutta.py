@@ -19,6 +19,7 @@ from mbd.kernel.fields import (
     NOT_CONVERGED,
     NOT_FINITE,
     NOW,
+    PASSING,
     RESIDUALS,
     ROWS,
     SINGULAR,
@@ -26,6 +27,7 @@ from mbd.kernel.fields import (
 from mbd.kernel.linear import factor, solve
 from mbd.kernel.passage import CONTINUOUS
 from mbd.kernel.restart import consistent, evaluate, fill_block, raise_scales, refresh_scales
+from mbd.kernel.straddle import forget_leftovers, keep_leftovers, note_leftovers
 
 __all__ = ["runge_kutta_accept", "runge_kutta_start", "runge_kutta_step"]
 
@@ -46,6 +48,7 @@ def runge_kutta_start(K: Any) -> int:
         K.shift_change[i] = 0.0
     for k in range(K.n_rows):
         K.lam_slope[k] = 0.0
+    forget_leftovers(K)
     K.clock[AUX_STEP] = K.dt
     K.state[NEAR] = 0
     find_sizes(K)
@@ -105,7 +108,11 @@ def runge_kutta_step(K: Any, h: float, t1: float) -> int:
     for k in range(K.n_rows):
         K.lam1[k] = K.impulse[k]
         K.block[K.o_lam + k] = K.impulse[k]
+    if K.state[ROWS] > 0:
+        note_leftovers(K)
     explicit_error(K, h)
+    if K.state[NEAR] == PASSING and not hold_error(K):
+        return SINGULAR
     for i in range(n_v):  # an angle that is wrong by half a radian is not resolved at all
         if K.unit[i] == 1 and not abs(K.error[i]) <= 0.5:
             K.detail[1] = -1.0
@@ -297,6 +304,32 @@ def explicit_error(K: Any, h: float) -> None:
         K.error[i] *= share
 
 
+def hold_error(K: Any) -> bool:
+    """K.error less what the projection onto the rows takes of it, in the metric of M; false if that is singular.
+
+    Stages next to a pose in which rows lose rank err across the rows, most of which is gone at the end of the step.
+    """
+    n = K.n
+    n_v = K.n_v
+    m = K.state[ROWS]
+    o_B = n * n + n + n * K.n_rows
+    if not factor_saddle(K, m, True):
+        return False
+    for level in range(2):
+        for i in range(n):
+            K.rhs[i] = 0.0
+        for k in range(m):
+            row = K.rows[k]
+            off = 0.0
+            for j in range(n if level == 1 else n_v):
+                off += K.acc[o_B + row * n + j] * K.error[level * n_v + j]
+            K.rhs[n + k] = 0.0 if level == 0 and K.row_level[row] == 1 else -off
+        solve(K.kkt, n + m, K.pivots, K.rhs)
+        for i in range(n_v):
+            K.error[level * n_v + i] += K.rhs[i]
+    return True
+
+
 def runge_kutta_accept(K: Any, h: float) -> None:
     """The candidate becomes the accepted state."""
     for i in range(K.n_q):
@@ -307,4 +340,6 @@ def runge_kutta_accept(K: Any, h: float) -> None:
         K.aux[i] = K.rate1[i]
     for k in range(K.n_rows):
         K.lam[k] = K.lam1[k]
+    if K.state[ROWS] > 0:
+        keep_leftovers(K, h)
     K.clock[AUX_STEP] = h

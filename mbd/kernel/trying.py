@@ -12,16 +12,19 @@ from mbd.kernel.fields import (
     NOT_CONVERGED,
     NOW,
     PAIRED,
+    ROWS,
     SINGULAR,
     STAGNATED,
     STEP,
+    STIRRED,
     STRAIGHT,
     TOO_NEAR,
     TRIED,
     WIDTH,
 )
 from mbd.kernel.guards import try_step
-from mbd.kernel.pairs import FIRST, LONGER, SECOND, SHORTER, WHOLE, may_pair
+from mbd.kernel.pairs import ALONE, FIRST, LONGER, SECOND, SHORTER, WHOLE, may_pair
+from mbd.kernel.straddle import LONGEST, is_resolved, step_by_pose, stirs
 
 __all__ = ["part_end", "step_end", "tried_step"]
 
@@ -62,11 +65,18 @@ def tried_step(K: Any, h: float, t1: float) -> int:
     """
     if K.adaptive == 1:
         return controlled_step(K, h)
-    if K.state[PAIRED] == FIRST:  # the step is taken once more
+    if K.state[PAIRED] == FIRST or K.state[PAIRED] == ALONE:  # the step is taken once more
         K.state[PAIRED] = 0
     full = h
     step = K.clock[STEP]
-    status = try_step(K, h, t1)
+    if K.scheme == 1 and K.state[ROWS] > 0:
+        status = step_past_pose(K, h)
+        h = K.clock[TRIED]
+        if status == LAST or status == STIRRED:
+            return status
+        full = h
+    else:
+        status = try_step(K, h, t1)
     if status == TOO_NEAR and may_pair(K, h):
         if K.clock[NOW] + (SHORTER + LONGER) * step < K.until - WHOLE * step:
             h = SHORTER * step
@@ -78,7 +88,32 @@ def tried_step(K: Any, h: float, t1: float) -> int:
     while is_shortened(status) and h > SHORTEST * full:
         h *= SHORTENING
         status = try_step(K, h, K.clock[NOW] + h)
-    if h < full and K.state[PAIRED] == FIRST:
+    if h < full and (K.state[PAIRED] == FIRST or K.state[PAIRED] == ALONE):
         K.state[PAIRED] = 0
     K.clock[TRIED] = h
     return status
+
+
+def step_past_pose(K: Any, unit: float) -> int:
+    """A candidate of an explicit scheme after a step of this size, or another near a pose: K.clock[TRIED] its step.
+
+    A step over the pose that is longer than others must be resolved like these; else they lead up to it.
+    """
+    h = step_by_pose(K, unit, LONGEST)
+    if h > unit:
+        if K.clock[NOW] + h > K.until - WHOLE * unit:
+            if K.until >= K.end:
+                return LAST
+            h = step_by_pose(K, unit, 1.0)
+        else:
+            status = try_step(K, h, K.clock[NOW] + h)
+            K.clock[TRIED] = h
+            K.state[PAIRED] = ALONE
+            if status == 0 and is_resolved(K, h):
+                return status
+            h = step_by_pose(K, unit, 1.0)
+    K.clock[TRIED] = h
+    K.state[PAIRED] = ALONE if h != unit else 0
+    if stirs(K, h):
+        return STIRRED
+    return try_step(K, h, K.clock[NOW] + h)

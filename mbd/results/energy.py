@@ -13,6 +13,7 @@ what non-smooth steps lift out of surfaces stand there too.
 
 from __future__ import annotations
 
+from collections.abc import Container
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -52,8 +53,10 @@ def ledger(columns: ModelColumns) -> Ledger:
 
 
 @np.errstate(all="ignore")
-def doubted_ledger(columns: ModelColumns) -> tuple[Ledger, Matrix]:
+def doubted_ledger(columns: ModelColumns, lending: Container[str] = ()) -> tuple[Ledger, Matrix]:
     """The ledger, and how far the sum of its works may be off at every row (2, R) [J]: of those that give, and of all.
+
+    Those that only give back what they took, by the names in `lending`, count among all.
 
     The doubt is Σ |work − trapezoid| over all intervals and works: generous where the rows resolve the powers, and as
     large as the works where they do not, as with rows many steps apart.
@@ -69,7 +72,7 @@ def doubted_ledger(columns: ModelColumns) -> tuple[Ledger, Matrix]:
     pairs = zip(holders, energies, strict=True)
     stored = tuple(Part(effect.name, effect.column, energy) for (effect, _), energy in pairs)
     least = ROUND_OFF * float(np.max(np.abs(kinetic) + np.abs(potential), initial=0.0))
-    named, moved, doubt = _works(columns, found, moving, least)
+    named, moved, doubt = _works(columns, found, moving, least, lending)
     driven = any(power.kind == "constraint" for power in found)
     unnamed = [*moved, *_jumps(columns, kinetic + potential, driven)]
     kept = [part for part in unnamed if np.max(np.abs(part.energy), initial=0.0) > least]
@@ -88,7 +91,7 @@ def kinds_of_work(equations: Equations) -> frozenset[str]:
 
 
 def _works(
-    columns: ModelColumns, found: list[Power], moving: Vector, least: float
+    columns: ModelColumns, found: list[Power], moving: Vector, least: float, lending: Container[str]
 ) -> tuple[list[Part], list[Part], Matrix]:  # fmt: skip
     """The integrals of powers: those of elements, and that of coordinates that move with time, with its 2T − v·∂T/∂v.
 
@@ -114,7 +117,8 @@ def _works(
         else:
             named.append(Part(power.name, power.kind, work))
         trapezoid = np.diff(record.time) * (value[:-1] + value[1:]) / 2.0
-        doubt[0 if np.max(value, initial=0.0) > 0.0 else 1 :, 1:] += np.abs(np.diff(work) - trapezoid)
+        gives = power.name not in lending and np.max(value, initial=0.0) > 0.0
+        doubt[0 if gives else 1 :, 1:] += np.abs(np.diff(work) - trapezoid)
     return named, moved, np.cumsum(doubt, axis=1)
 
 

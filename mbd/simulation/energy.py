@@ -6,13 +6,16 @@ With E = T + V, the first row 0 and row k, what a mechanism has by right is
 
 its energy of motion at the start, the potential that it has given off, and the works of forces, motors, drives, resets
 and impacts where they have given any. Where ``E_k − E_0 − G_k > S_k``, the scheme has more than doubled that: an error.
-Losses do not enter, so that one that rows integrate roughly cannot pass for a gain; the doubt about works is taken off.
+Losses do not enter, so that one that rows integrate roughly cannot pass for a gain; nor does the work of a penalty
+contact that was open at the start, which gives back less than it took, but in a blow of few rows adds up to anything.
+The doubt about the other works is taken off.
 
 A glance at E in some of the rows comes first. Only where that looks strange is the ledger of all rows made.
 """
 
 from __future__ import annotations
 
+from collections.abc import Container
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
@@ -75,13 +78,16 @@ class Judgement:
         return float(np.copysign(np.inf, self.numerical)) if self.numerical != 0.0 else 0.0
 
 
-def judgement(ledger: Ledger, doubt: Matrix, way: Vector) -> Judgement:
+def judgement(ledger: Ledger, doubt: Matrix, way: Vector, lending: Container[str] = ()) -> Judgement:
     """Judge a scheme by the ledger, its doubts (2, R) [J] and the largest way of a coordinate since the start (R,).
+
+    lending : names of the parts that only give back what they took
 
     A row alone, as next to a pose in which rows lose rank, is no verdict: of those from the first one on, at least two
     and at least half must say the same, unless its gain is `ABSURD` times all energy until then.
     """
-    given = sum((np.maximum.accumulate(np.maximum(part.energy, 0.0)) for part in ledger.parts), np.zeros(len(way)))
+    givers = [part.energy for part in ledger.parts if part.name not in lending]
+    given = sum((np.maximum.accumulate(np.maximum(energy, 0.0)) for energy in givers), np.zeros(len(way)))
     fallen = np.maximum.accumulate(ledger.potential[0] - ledger.potential)
     owned = ledger.kinetic[0] + fallen + given
     noise = ROUND_OFF * np.maximum.accumulate(np.abs(ledger.kinetic) + np.abs(ledger.potential))
@@ -97,24 +103,9 @@ def judgement(ledger: Ledger, doubt: Matrix, way: Vector) -> Judgement:
     firm = absurd | (bad & (rest >= 2) & (2 * rest >= np.arange(len(bad), 0, -1)))
     if firm.any():
         row = int(np.argmax(firm))
-        return Judgement(row, float(np.max(ledger.numerical[row:])), float(owned[row]))
+        return Judgement(row, float(np.max(gain[row:])), float(owned[row]))
     most, least = float(np.max(gain)), float(np.max(loss))
     return Judgement(-1, most if most >= least else -least, float(owned[-1]))
-
-
-def _passive(ledger: Ledger, way: Vector, found: Judgement) -> Judgement:
-    """The verdict on a mechanism that nothing drives: forces that only take energy cannot have made `ABSURD` of it.
-
-    Where rows do not resolve a blow, neither do they resolve its work, which then hides what the scheme has made.
-    """
-    size = np.maximum.accumulate(np.abs(ledger.kinetic) + np.abs(ledger.potential))
-    before = np.concatenate([size[:1], size[:-1]])
-    moves = np.maximum.accumulate(way) > MOVED
-    absurd = moves & (before > 0.0) & (ledger.total - ledger.total[0] > ABSURD * before)
-    if not absurd.any():
-        return found
-    row = int(np.argmax(absurd))
-    return Judgement(row, float(np.max(ledger.total[row:] - ledger.total[0])), float(before[row]))
 
 
 class EnergyWatch:
@@ -151,12 +142,9 @@ class EnergyWatch:
         if not self._looks_strange(run):
             return ""
         columns = ModelColumns(whole_record(run), run.mechanism.equations)
-        ledger, doubt = doubted_ledger(columns)
-        way = _way(columns.record.q, columns.record.q[0])
-        found = judgement(ledger, doubt, way)
-        reset = bool(run.parameter_changes) or any(event.kind == "event" for event in run.events)
-        if found.row < 0 and _kinds(run.mechanism) <= UNDRIVEN and not reset and not columns.record.closed[0].any():
-            found = _passive(ledger, way, found)
+        lending = _lending(run)
+        ledger, doubt = doubted_ledger(columns, lending)
+        found = judgement(ledger, doubt, _way(columns.record.q, columns.record.q[0]), lending)
         self.ledgers += 1
         self._cleared = float(np.nanmax(ledger.total - ledger.total[0]))
         if found.row >= 0:
@@ -230,6 +218,12 @@ def _kinds(mechanism: Mechanism) -> frozenset[str]:
     if mechanism not in KINDS:
         KINDS[mechanism] = kinds_of_work(mechanism.equations)
     return KINDS[mechanism]
+
+
+def _lending(run: Run) -> frozenset[str]:
+    """Penalty contacts that were open at the start and whose numbers did not change."""
+    contacts = () if run.parameter_changes else run.manager.contacts
+    return frozenset(each.name for each in contacts if each.kind == "penalty" and each.name not in run.start.mode)
 
 
 def _sentence(run: Run, found: Judgement) -> str:

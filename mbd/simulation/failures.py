@@ -15,7 +15,7 @@ from mbd.results.failure import Failure
 from mbd.results.record import EventRecord
 from mbd.simulation.redundant import clash
 from mbd.simulation.round_off import remainder
-from mbd.simulation.stepper import Stepper
+from mbd.simulation.stepper import RUNGE_KUTTA, Stepper
 from mbd.state import State
 from mbd.tape.evaluate import evaluate
 from mbd.tape.node import Node
@@ -112,7 +112,7 @@ def explanation(
         return (
             f"{where}: steps fail or leave the branch continuous in velocity, down to a tenth of dt{with_closed}"
             f"{worst}: next to a pose in which rows lose rank, or in a force too steep for dt; try a smaller dt, or, "
-            "at such a pose, formulation='index3' with a damped scheme"
+            f"at such a pose, {_passing(stepper)}"
         )
     if status == F.NOT_CONVERGED:
         own = f" ({stepper.scheme.report.message})" if not stepper.compiled and stepper.scheme.report.message else ""
@@ -126,6 +126,12 @@ def explanation(
         return (
             f"{where}: stagnated at round-off: residual {left.residual:.3g}, attainable {left.attainable:.3g} of the "
             f"forces{with_closed}{worst}; use a larger tolerance= of the integrator or a larger dt"
+        )
+    if status == F.STIRRED:
+        return (
+            f"{where}: a pose in which rows lose rank, at {_unknown(stepper)}{with_closed}: round-off would make "
+            f"{residual:.1g} of the velocities in an explicit step of {float(values['detail'][2]):.2g} s over it; use "
+            "mbd.GeneralizedAlpha, mbd.HHT or mbd.RadauIIA, or longer steps (a larger dt= or tol=)"
         )
     if status in (F.SINGULAR, F.TOO_NEAR):
         what = f"{where}: the Newton matrix is singular at {_unknown(stepper)}{with_closed}"
@@ -231,6 +237,12 @@ def _unknown(stepper: Stepper) -> str:
         return f"the state {equations.states[column - equations.n_v].name!r}"
     row = equations.rows[int(values["rows"][min(column - n, values["n_rows"] - 1)])]
     return row.title
+
+
+def _passing(stepper: Stepper) -> str:
+    """What passes poses in which rows lose rank where a scheme did not."""
+    explicit = int(stepper.values["scheme"]) == RUNGE_KUTTA
+    return "mbd.GeneralizedAlpha or mbd.RadauIIA" if explicit else "formulation='index3' with a damped scheme"
 
 
 def _last_events(events: Sequence[EventRecord]) -> str:

@@ -37,8 +37,8 @@ TELLING = 1e-4
 COUNTED = (
     (
         F.SHORTENED,
-        "{count} steps were shortened where Newton's method or the impact law failed at the full dt, or where a step "
-        "would have ended too close to a pose in which rows lose rank",
+        "{count} steps were shortened where Newton's method or the impact law failed at the full dt, or got another "
+        "size where one would have come too close to a pose in which rows lose rank",
     ),
     (
         F.CAREFUL,
@@ -75,8 +75,7 @@ def notes_of(run: Run, record: Record) -> tuple[list[str], list[str]]:
     if spent > TELLING and not run.values["adaptive"]:
         notes.append(
             f"estimated errors of velocities add up to {spent:.2g} m/s or rad/s over all steps: dt is large for the "
-            "motion, or steps met poses in which rows lose rank, which mbd.GeneralizedAlpha and mbd.RadauIIA pass with "
-            "care; use a smaller dt, or tol="
+            "motion; use a smaller dt, or tol="
         )
     for number, contact in enumerate(run.manager.contacts):
         short, blind = _short_touch(run, record, number, contact)

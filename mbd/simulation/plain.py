@@ -13,8 +13,9 @@ from mbd.equations.programs import mass_matrix
 from mbd.errors import SimulationError
 from mbd.integrators.base import Integrator, Point, StepReport, StepResult, Terms
 from mbd.kernel.active_set import ActiveSetManager
-from mbd.kernel.fields import CAREFUL, ITERATIONS, NEAR, NOT_CONVERGED, NOT_FINITE, NOW, TOO_NEAR
-from mbd.kernel.restart import MOST_LOADS, fill_block, refresh_scales
+from mbd.kernel.fields import CAREFUL, ITERATIONS, NEAR, NOT_CONVERGED, NOT_FINITE, NOW, ROWS, TOO_NEAR
+from mbd.kernel.restart import MOST_LOADS, evaluate, fill_block, refresh_scales
+from mbd.kernel.straddle import forget_leftovers, keep_leftovers, note_leftovers
 from mbd.simulation.asked import asked
 from mbd.simulation.shares import shares
 from mbd.state import Mode, State
@@ -250,6 +251,7 @@ class PlainScheme:
         self.memory = memory
         K.state[NEAR] = 0
         K.slope[:] = getattr(memory, "slope", 0.0)
+        forget_leftovers(K)
         fill_block(K, K.clock[NOW], K.q, K.y)
         refresh_scales(K)
         return 0
@@ -283,6 +285,9 @@ class PlainScheme:
         K.q1[:], K.y1[:], K.rate1[:], K.aux1[:] = result.state.q, y, rate, rate
         K.lam1[:] = 0.0
         K.lam1[rows] = lam
+        if K.scheme == 1 and rows:
+            evaluate(K, t1, K.q1, K.y1)
+            note_leftovers(K)
         fill_block(K, t1, K.q1, K.y1)
         K.block[K.o_a : K.o_a + K.n] = rate
         K.block[K.o_lam : K.o_lam + K.n_rows] = K.lam1[: K.n_rows]
@@ -296,6 +301,8 @@ class PlainScheme:
 
     def accept(self, K: Any, h: float) -> None:
         """The candidate becomes the accepted state, its memory the memory."""
+        if K.scheme == 1 and K.state[ROWS] > 0:
+            keep_leftovers(K, h)
         self.memory = self.pending
         K.slope[:] = (K.rate1 - K.rate) / h
         K.lam_slope[:] = (K.lam1 - K.lam) / h

@@ -153,7 +153,7 @@ class Stepper:
         reals = {
             "block": block, "out": max(size * size + 3 * tail + 2 * size + 2, block), "clock": 16,
             "acc": self.mechanism.sizes["accelerations"], "q": n_q, "y": n, "rate": n, "aux": n, "slope": n,
-            "lam": rows, "lam_slope": rows, "shift": n, "shift_change": n,
+            "lam": rows, "lam_slope": rows, "left": rows + 1, "left1": rows + 1, "shift": n, "shift_change": n,
             "anchors": v["n_anchors"], "q1": n_q, "y1": n, "rate1": n, "aux1": n, "lam1": rows,
             "basis": (rows + 1) * n, "lower": (rows + 1) * rows, "mix": rows * rows, "shares": rows * rows,
             "kkt": size * size, "rhs": size, "spare": size * size + tail, "turning": rows * n,

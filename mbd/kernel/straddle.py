@@ -1,0 +1,272 @@
+"""Steps of an explicit scheme that pass a pose in which rows lose rank between two of their stages.
+
+With x the distance from the pose along the motion and y across it, rows are like h = x y there. Accelerations that
+satisfy ``ḧ = x ÿ + 2 ẋ ẏ + ẍ y = 0`` make of a velocity ẏ that a stage is off the branch ``ÿ = −2 ẋ ẏ / x``, and the
+projection at the end of a step makes of round-off δ of h a velocity ẋ δ/x². So no stage may lie close to the pose. The
+widest gap between nodes of the formulas is amid the step: one that has the pose there begins and ends half a step from
+it. The steps before are shortened for that, those behind it go on from where it ends. Where steps of the grid are so
+short that x would be too small, the one over the pose is longer; where round-off counts even so, the run ends.
+
+The pose is where a row of B depends on earlier ones: where its part w beside these, found by Gram–Schmidt on columns
+scaled by √M_ii, passes zero. A glance at |w| of the ends of steps tells where it falls fast enough; then w is found
+along ``q + τ v + τ²/2 v̇`` as well, and where it vanishes by a secant.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mbd.kernel.fields import BLOCKED, EPS, KICK, NEAR, NOW, PASSING, POSE, ROWS
+from mbd.kernel.restart import evaluate
+
+__all__ = [
+    "LONGEST", "forget_leftovers", "is_resolved", "keep_leftovers", "note_leftovers", "step_by_pose", "stirred",
+    "stirs",
+]  # fmt: skip
+
+AMID = 0.46666666666666667
+"""The middle of the widest gap between nodes, those at 1/3 and 3/5 [-]."""
+GLANCE = 3.5
+"""Steps to a pose, as the last step tells, below which is looked closer [-]."""
+FAR_GLANCE = 14.0
+"""The same where round-off asks for longer steps over the pose [-]."""
+LONGEST = 16.0
+"""Steps of the grid that one over a pose may last, where round-off makes too much of velocities in shorter ones [-]."""
+STIR = 16.0
+"""What round-off of a row makes of velocities over what it would if it were one unit in the last place [-]."""
+HUSHED = 1e-9
+"""Share of velocities that round-off may make up before the step over a pose is longer than others [-]."""
+LOUD = 1e-5
+"""The same above which a step over a pose is refused [-]."""
+RESOLVED = 1e-8
+"""Share of velocities by which a step over a pose that is longer than others may err [-]."""
+SMALLEST = 0.1
+"""Part of a step below which none is made to lead up to a pose [-]."""
+CLEAR = 0.06
+"""Part of a step by which a pose must be away from all nodes [-]."""
+LOOKS_AHEAD = 4
+"""Places along the motion at which w is found [-]."""
+SETTLED = 0.01
+"""Part of a step by which the last of these may differ from where w vanishes [-]."""
+VANISHED = 0.2
+"""Length of w at a pose, over that of now: more, and rows only come close to losing rank [-]."""
+EXPLICIT_NODES = 12
+"""Nodes of the formulas, the end not counted."""
+EXPLICIT_PLACES = EXPLICIT_NODES * EXPLICIT_NODES + EXPLICIT_NODES
+"""Where they begin in the tableau."""
+NOWHERE = 1e300
+"""Time to a pose where there is none [s]."""
+
+
+def forget_leftovers(K: Any) -> None:
+    """Nothing is known at the start of the scheme: whether a pose is near is looked at before the first step."""
+    for k in range(K.n_rows):
+        K.left[k] = -1.0
+    K.left[K.state[ROWS]] = 1.0
+
+
+def note_leftovers(K: Any) -> None:
+    """|w| of each row at the candidate, at which K.acc is, and √(2 T): accepted with it by `keep_leftovers`."""
+    m = K.state[ROWS]
+    leftovers_here(K, m)
+    for k in range(m):
+        K.left1[k] = K.work[k]
+    K.left1[m] = motion(K, K.y1)
+
+
+def keep_leftovers(K: Any, h: float) -> None:
+    """The candidate is accepted after a step of h: |w| of each row, and whether one falls so that a pose may be near.
+
+    K.left[m] = 1 where it is to be looked for, else 0.
+    """
+    m = K.state[ROWS]
+    near = 0.0
+    for k in range(m):
+        fall = K.left[k] - K.left1[k]
+        if K.left[k] < 0.0 or K.left1[k] < GLANCE * fall:
+            near = 1.0
+        elif K.left1[k] < FAR_GLANCE * fall and K.adaptive == 0 and K.n_watched == 0:
+            if stirring(K, k, fall / h, K.left1[m]) > HUSHED * (AMID * h) ** 2:
+                near = 1.0
+        K.left[k] = K.left1[k]
+    K.left[m] = near
+
+
+def motion(K: Any, y: Any) -> float:
+    """√(Σ M_jj v_j²), of the size of √(2 T), with M in K.acc."""
+    size = 0.0
+    for j in range(K.n_v):
+        size += abs(K.acc[j * K.n + j]) * y[j] * y[j]
+    return float(size**0.5 + 1e-300)
+
+
+def stirring(K: Any, k: int, fall: float, speed: float) -> float:
+    """c [s²] of the share c/τ² of the velocities that round-off makes of them where a step ends τ from a pose.
+
+    Round-off δ of a row leaves positions open by δ/|w|; ḣ = 0 makes velocities δ/(|w| τ) of that, with |w| = fall τ.
+    """
+    turned = 1.0
+    for i in range(K.n_q):
+        if K.unit[i] == 1:
+            turned = max(turned, abs(K.q[i]))
+    return float(STIR * EPS * turned * K.scale[K.n + K.rows[k]] / (fall * speed + 1e-300))
+
+
+def leftovers_here(K: Any, m: int) -> None:
+    """Gram–Schmidt on the rows of B in K.acc, in their order: |w| into K.work, w/|w| into K.basis."""
+    n = K.n
+    o_B = n * n + n + n * K.n_rows
+    for j in range(n):
+        weight = K.acc[j * n + j]
+        K.spare[j] = 1.0 / weight**0.5 if weight > 0.0 else 1.0
+    for k in range(m):
+        row = o_B + K.rows[k] * n
+        base = k * n
+        for j in range(n):
+            K.basis[base + j] = K.acc[row + j] * K.spare[j]
+        for i in range(k):
+            other = i * n
+            part = 0.0
+            for j in range(n):
+                part += K.basis[other + j] * K.basis[base + j]
+            if part != 0.0:
+                for j in range(n):
+                    K.basis[base + j] -= part * K.basis[other + j]
+        left = 0.0
+        for j in range(n):
+            left += K.basis[base + j] * K.basis[base + j]
+        left = left**0.5
+        K.work[k] = left
+        inverse = 1.0 / (left + 1e-300)
+        for j in range(n):
+            K.basis[base + j] *= inverse
+
+
+def evaluate_ahead(K: Any, ahead: float) -> None:
+    """K.acc at the state that is `ahead` of the accepted one, along its velocities and accelerations."""
+    for i in range(K.n_v):
+        K.q1[i] = K.q[i] + ahead * (K.y[i] + 0.5 * ahead * K.rate[i])
+    for i in range(K.n):
+        K.y1[i] = K.y[i] + ahead * K.rate[i]
+    evaluate(K, K.clock[NOW] + ahead, K.q1, K.y1)
+
+
+def times_to_poses(K: Any, m: int, unit: float) -> float:
+    """Times from now to where each row loses rank, into K.work[m:2m]; the first of them. K.detail[KICK] is its c."""
+    n = K.n
+    evaluate_ahead(K, 0.0)
+    leftovers_here(K, m)
+    for k in range(m * n):
+        K.turning[k] = K.basis[k]
+    for k in range(m):
+        K.work[2 * m + k] = K.work[k]
+        K.work[m + k] = NOWHERE
+    ahead = unit
+    first = NOWHERE
+    for _ in range(LOOKS_AHEAD):
+        evaluate_ahead(K, ahead)
+        leftovers_here(K, m)
+        first = NOWHERE
+        for k in range(m):
+            along = 0.0
+            for j in range(n):
+                along += K.basis[k * n + j] * K.turning[k * n + j]
+            here = K.work[2 * m + k]
+            fall = here - along * K.work[k]
+            until = ahead * here / fall if fall > 1e-3 * here else NOWHERE
+            if abs(until - ahead) < 0.1 * ahead and K.work[k] > VANISHED * here:
+                until = NOWHERE
+            K.work[m + k] = until
+            first = min(first, until)
+        if first > 4.0 * FAR_GLANCE * unit or abs(first - ahead) < SETTLED * unit:
+            break
+        ahead = first
+    K.detail[KICK] = 0.0
+    speed = max(motion(K, K.y), motion(K, K.y1))  # it may start from rest
+    for k in range(m):
+        if K.work[m + k] < 1.1 * first and first < NOWHERE:
+            K.detail[KICK] += stirring(K, k, K.work[2 * m + k] / K.work[m + k], speed)
+    return first
+
+
+def step_by_pose(K: Any, unit: float, longest: float) -> float:
+    """The step to take in place of one of this size, so that none has a stage next to a pose; `unit` far from one.
+
+    Where round-off would make much of velocities that near, the step over the pose lasts up to `longest` units.
+    """
+    m = K.state[ROWS]
+    K.state[NEAR] = 0
+    K.detail[KICK] = 0.0
+    if K.left[m] == 0.0:
+        return unit
+    first = times_to_poses(K, m, unit)
+    K.clock[POSE] = K.clock[NOW] + first
+    span = unit
+    if K.n_watched == 0:
+        span = min(max((K.detail[KICK] / HUSHED) ** 0.5 / AMID, unit), longest * unit)
+    rest = (first - AMID * span) / unit
+    if rest >= 2.0:
+        K.detail[KICK] = 0.0  # far: what may come of it is judged nearer
+        return unit
+    if rest > 1.0:
+        return 0.5 * rest * unit
+    if rest >= SMALLEST:
+        return rest * unit
+    K.state[NEAR] = PASSING
+    return clearest(K, m, span, min(1.0, first / AMID / span))
+
+
+def stirred(K: Any, h: float) -> float:
+    """Share of the velocities that round-off makes of them in a step of size h to or over a pose; 0 far from one."""
+    if K.detail[KICK] == 0.0:
+        return 0.0
+    away = K.clock[POSE] - K.clock[NOW] - h
+    return float(min(K.detail[KICK] / (away * away + 1e-300), 1.0))
+
+
+def stirs(K: Any, h: float) -> bool:
+    """Whether round-off makes too much of velocities in such a step; K.detail then tells when, where, how much."""
+    share = stirred(K, h)
+    if share <= LOUD:
+        return False
+    m = K.state[ROWS]
+    first = times_to_poses(K, m, h)
+    for k in range(m):
+        if K.work[m + k] == first:
+            K.state[BLOCKED] = K.n + k
+    K.detail[0] = K.clock[POSE]
+    K.detail[1] = share
+    K.detail[2] = h
+    return True
+
+
+def is_resolved(K: Any, h: float) -> bool:
+    """Whether the candidate errs little enough after a step over a pose that was longer than others."""
+    fastest = 0.0
+    for i in range(K.n_v):
+        fastest = max(fastest, max(abs(K.y[i]), abs(K.y1[i])))
+    for i in range(K.n):
+        size = fastest if i < K.n_v else max(max(abs(K.y[i]), abs(K.y1[i])), h * abs(K.rate[i]))
+        if not abs(K.error[K.n_v + i]) <= RESOLVED * size:
+            return False
+    return True
+
+
+def clearest(K: Any, m: int, unit: float, wanted: float) -> float:
+    """The step over poses nearest below the wanted part of a unit with none of them close to a node."""
+    best = wanted
+    widest = -1.0
+    for k in range(17):
+        part = wanted * (1.0 - 0.05 * k)
+        clear = 0.5 * AMID
+        for row in range(m):
+            place = K.work[m + row] / (part * unit)
+            for node in range(EXPLICIT_NODES):
+                clear = min(clear, abs(place - K.tableau[EXPLICIT_PLACES + node]))
+            clear = min(clear, abs(place - 1.0))
+        if clear > widest + 1e-9:
+            best = part
+            widest = clear
+        if widest >= CLEAR:
+            break
+    return best * unit

@@ -1,0 +1,184 @@
+"""Explicit steps of order 8 over poses in which rows lose rank: between their stages, or with a named error."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import pytest
+
+import mbd
+from mbd.hardcases.singular_poses import equal_slider_crank
+from mbd.integrators.dormand_prince import NODES
+from mbd.kernel.straddle import AMID
+from tests.cases.linkages import four_bars, rod, upright
+
+SCHEME = mbd.RungeKutta853()
+T = 3.0
+"""Length of most runs [s], in which cranks lie flat six times."""
+
+
+def pendulum_like(count):
+    """What `count` parallelograms are while cranks stay parallel: one rod with the sums of masses and inertias."""
+    mass, static, inertia = 2.0 * count + 1.0, 0.5 * (count + 1) + count, (count + 1) / 3.0 + count
+    model = mbd.Model("rod")
+    center = static / mass
+    body = mbd.Link("rod", mass=mass, length=1.0, center=center, inertia=inertia - mass * center**2)
+    model.connect(mbd.Revolute("base 0", model.ground.origin, body.start))
+    return model
+
+
+@functools.cache
+def wanted(count, angle=np.pi, speed=-3.0, until=T):
+    model = pendulum_like(count)
+    start = mbd.assemble(model, position={"base 0.angle": angle}, velocity={"base 0.angle": speed})
+    return mbd.simulate(model, start, SCHEME, dt=1e-3, until=until)
+
+
+@functools.cache
+def started(count):
+    model = four_bars(count)
+    return model, upright(model, count, speed=-3.0)
+
+
+@functools.cache
+def flat(count):
+    """Instants at which cranks lie flat, from the single rod."""
+    exact = wanted(count)
+    times = np.linspace(0.0, T, 30001)
+    halves = np.floor(exact.at(times)["base 0.angle"] / np.pi + 0.5)
+    found = []
+    for k in np.flatnonzero(np.diff(halves)):
+        low, high = times[k], times[k + 1]
+        for _ in range(50):
+            middle = 0.5 * (low + high)
+            same = np.floor(exact.at(middle)["base 0.angle"] / np.pi + 0.5) == halves[k]
+            low, high = (middle, high) if same else (low, middle)
+        found.append(0.5 * (low + high))
+    return np.array(found)
+
+
+def error_and_skew(count, **how):
+    model, start = started(count)
+    run = mbd.simulate(model, start, SCHEME, until=T, **how)
+    away = abs(run["base 0.angle"][-1] - wanted(count)["base 0.angle"][-1])
+    return away, np.max(np.abs(run["base 0.angle"] - run[f"base {count}.angle"]))
+
+
+@pytest.mark.parametrize("count", [1, 3])
+@pytest.mark.parametrize("dt", np.geomspace(4e-4, 5e-2, 10).tolist())
+def test_flat_poses_are_passed_whatever_the_step(count, dt):
+    error, skew = error_and_skew(count, dt=dt)
+    assert error < 2e-9 + (5.0 * dt) ** 8 and skew < 1e-10
+
+
+@pytest.mark.parametrize("share", [0.0, *NODES[[1, 5, 9, 10]].tolist()])
+def test_a_pose_that_would_fall_on_a_stage_is_passed(share):
+    first = flat(2)[0]
+    for steps in (40, 211):  # the pose at that share of a step of the grid
+        error, skew = error_and_skew(2, dt=first / (steps + share))
+        assert error < 1e-9 and skew < 1e-10
+
+
+def test_no_step_ends_next_to_a_pose():
+    model, start = started(2)
+    for dt in (3e-2, 7e-3, 2e-3):
+        run = mbd.simulate(model, start, SCHEME, dt=dt, until=T)
+        away = np.min(np.abs(run.time[:, None] - flat(2)), axis=0)
+        assert np.all(away > 0.9 * AMID * dt)
+        assert run.stats["shortened"] >= len(flat(2))
+
+
+@pytest.mark.parametrize("tol", [1e-5, 1e-7, 1e-9])
+def test_steps_that_follow_a_tolerance_pass_flat_poses(tol):
+    error, skew = error_and_skew(1, tol=tol)
+    assert error < 3.0 * tol and skew < 1e-9
+
+
+def test_energy_and_rows_hold_at_and_between_all_rows():
+    model, start = started(2)
+    run = mbd.simulate(model, start, SCHEME, dt=5e-3, until=T)
+    assert np.ptp(run.energy.total) < 1e-9 and run.violation.length < 1e-12 and run.violation.rate < 1e-10
+    for instant in flat(2):
+        near = run.at(instant + 5e-3 * np.linspace(-0.4, 0.4, 41))
+        exact = wanted(2).at(instant + 5e-3 * np.linspace(-0.4, 0.4, 41))
+        for name, limit in (("base 0.angle", 1e-8), ("base 0.angle.rate", 1e-6)):
+            np.testing.assert_allclose(near[name], exact[name], rtol=0, atol=limit)
+
+
+@pytest.mark.parametrize("beyond", [-1e-2, -1e-4, 1e-3, 1e-1])
+def test_cranks_that_turn_back_next_to_a_flat_pose_do_so(beyond):
+    model, single = four_bars(1), pendulum_like(1)
+    speed = np.sqrt(2.0 * 2.0 * 9.81 / (5.0 / 3.0) * (1.0 - np.cos(0.5 * np.pi + beyond)))
+    start = upright(model, 1, angle=0.0, speed=speed)
+    alone = mbd.assemble(single, position={"base 0.angle": 0.0}, velocity={"base 0.angle": speed})
+    for dt in (2e-3, 1.1e-2):
+        run = mbd.simulate(model, start, SCHEME, dt=dt, until=2.0)
+        exact = mbd.simulate(single, alone, SCHEME, dt=dt, until=2.0)
+        assert run["base 0.angle"][-1] == pytest.approx(exact["base 0.angle"][-1], abs=1e-8)
+
+
+def test_loops_that_are_flat_one_after_the_other():
+    """Two parallelograms that have nothing to do with each other, the second a little behind the first."""
+    for late in (1e-3, 2e-2, 0.2):
+        model, place, speed = mbd.Model("two"), {}, {}
+        for k in range(2):
+            one, other, bar = (rod(f"{name} {k}") for name in ("one", "other", "bar"))
+            model.connect(
+                mbd.Revolute(f"a{k}", model.ground.point(0.0, 3.0 * k, name=f"a{k}"), one.start),
+                mbd.Revolute(f"d{k}", model.ground.point(1.0, 3.0 * k, name=f"d{k}"), other.start),
+                mbd.Revolute(f"b{k}", one.end, bar.start),
+                mbd.Revolute(f"c{k}", bar.end, other.end),
+            )
+            angle = np.pi + late * k
+            place |= {f"a{k}.angle": angle, f"d{k}.angle": angle, f"b{k}.angle": 0.5 * np.pi - angle}
+            speed[f"a{k}.angle"] = -3.0
+        start = mbd.assemble(model, position=place, velocity=speed)
+        run = mbd.simulate(model, start, SCHEME, dt=1.3e-2, until=T)
+        for k in range(2):
+            assert abs(run[f"a{k}.angle"][-1] - wanted(1, np.pi + late * k)["base 0.angle"][-1]) < 1e-6
+
+
+def test_a_slider_crank_goes_on_past_the_pivot():
+    model, start = equal_slider_crank()
+    for dt in (1e-2, 1e-3):
+        run = mbd.simulate(model, start, SCHEME, dt=dt, until=1.0)
+        ways = run["guide.displacement"]
+        assert np.min(ways) < -0.5 and np.ptp(run.energy.total) < 1e-7 * run.energy.total[0]
+
+
+def test_steps_too_fine_to_pass_say_so():
+    """So near to the pose round-off of the joints makes more of velocities than any motion."""
+    model = four_bars(1)
+    start = upright(model, 1, angle=0.5 * np.pi + 1e-6, speed=-3.0)
+    run = mbd.simulate(model, start, SCHEME, dt=1e-8, until=1e-6, on_failure="return")
+    assert not run.success
+    for word in ("lose rank", "'right 0'", "mbd.GeneralizedAlpha", "mbd.RadauIIA"):
+        assert word in run.message
+
+
+def test_the_plain_twin_takes_the_same_steps():
+    model, start = started(1)
+    until = flat(1)[0] + 0.05
+    runs = [mbd.simulate(model, start, SCHEME, dt=2e-2, until=until, backend=b) for b in ("python", "llvm")]
+    np.testing.assert_allclose(runs[0].time, runs[1].time, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(runs[0]["base 0.angle"], runs[1]["base 0.angle"], rtol=0, atol=1e-10)
+
+
+def test_a_longer_run_has_the_same_rows():
+    model, start = started(1)
+    long = mbd.simulate(model, start, SCHEME, dt=2e-2, until=2.0)
+    short = mbd.simulate(model, start, SCHEME, dt=2e-2, until=1.0)
+    np.testing.assert_array_equal(short.time[:-1], long.time[: len(short.time) - 1])
+    np.testing.assert_array_equal(short["base 0.angle"][:-1], long["base 0.angle"][: len(short.time) - 1])
+
+
+def test_a_start_from_rest_is_no_pose():
+    """What round-off makes of velocities is judged by those at the pose, not by those at rest."""
+    model, single = four_bars(1), pendulum_like(1)
+    start = upright(model, 1, angle=2.0, speed=0.0)
+    alone = mbd.assemble(single, position={"base 0.angle": 2.0})
+    for how in ({"dt": 4e-3}, {"tol": 1e-7}):
+        run = mbd.simulate(model, start, SCHEME, until=2.0, **how)
+        exact = mbd.simulate(single, alone, SCHEME, dt=1e-3, until=2.0)
+        assert run["base 0.angle"][-1] == pytest.approx(exact["base 0.angle"][-1], abs=2e-7)
