@@ -17,7 +17,16 @@ from mbd.hardcases.case import Curve, Figure, HardCase, Outcome, definition
 from mbd.hardcases.convergence import deviation, second_order
 from mbd.hardcases.judging import Judged, chosen, judged, ratio, short
 from mbd.hardcases.known import KNOWN, reason
-from mbd.hardcases.schemes import SCHEMES, scheme
+from mbd.hardcases.schemes import (
+    DAMPED,
+    EVERY as EVERY_SCHEME,
+    SCHEMES,
+    has_own_forces,
+    holds_positions_only,
+    is_explicit,
+    is_undamped,
+    scheme,
+)
 from mbd.hardcases.table import BEGIN, END, as_markdown, as_text, figure_text, worst_by_scheme, write_markdown
 from mbd.simulation.arguments import CHOICES
 from mbd.view.progress import counted
@@ -125,6 +134,35 @@ def test_an_error_is_noticed_to_be_of_second_order_round_off_or_neither():
     assert passes([1e-2, 1.2e-3, 1.5e-4], better=True) and not passes([1e-2, 5e-3, 2.5e-3], better=True)
     assert not passes([1e-13, 1e-3, 1e-13]), "what rises from round-off and falls back is no error of second order"
     assert deviation([0.1, 0.01], [1e-11, 1e-14], 1e-12) == 0.0, "a fall by a hundred leads into round-off"
+
+
+def test_a_scheme_of_higher_order_is_judged_at_every_step():
+    steps = [0.4, 0.2, 0.1]
+
+    def passes(errors, limit, erratic=False):
+        judged = second_order("x [m]", steps, errors, limit, 1e-12, order=5, erratic=erratic)
+        return all(figure.passed for figure in judged)
+
+    assert passes([1e-4, 3e-6, 1e-7], 1e-5) and passes([1e-13, 3e-13, 2e-13], 1e-5)
+    assert not passes([1e-2, 3e-6, 1e-7], 1e-5), "wrong with the largest step, by far more than order 2 allows there"
+    assert not passes([1e-6, 1e-6, 1e-6], 1e-5), "no order, though all are small"
+    assert passes([1e-6, 2e-6, 1e-6], 1e-5, erratic=True) and not passes([1e-6, 5e-5, 1e-6], 1e-5, erratic=True)
+
+
+def test_judges_ask_a_scheme_for_what_it_is():
+    def which(asked) -> list[str]:
+        return [name for name in SCHEMES if asked(scheme(name))]
+
+    assert which(is_undamped) == ["Newmark"] and which(is_explicit) == ["RungeKutta853"]
+    assert which(has_own_forces) == ["RadauIIA", "RungeKutta853"]
+    assert which(holds_positions_only) == ["HHT-index3", "generalized-alpha-index3"]
+    assert set(EVERY_SCHEME) - set(DAMPED) == {"Newmark"}
+
+
+def test_a_case_that_leaves_a_scheme_out_says_why():
+    for case in CASES:
+        left = [name for name in EVERY_SCHEME if name not in case.schemes]
+        assert not left or case.notes, f"{case.id} is not judged with {left} and does not say why"
 
 
 def test_a_figure_without_a_limit_is_told_and_not_judged():

@@ -141,7 +141,12 @@ def rocking(id: str, scheme: Any) -> Outcome:
     for what, limit in ROCKING_LIMITS.items():
         unit = what[what.index("[") :]
         figures += second_order(
-            f"error of {what}", steps, [each[what] for each in errors], limit * sizes[unit], 1e-9 * sizes[unit]
+            f"error of {what}",
+            steps,
+            [each[what] for each in errors],
+            limit * sizes[unit],
+            1e-9 * sizes[unit],
+            order=scheme.order(),
         )
     # a half cycle takes nearly the share `ratio` of the one before; after these many the rest speed is reached
     count = math.ceil(math.log(sizes["[rad/s]"] / 1e-6) / -math.log(ratio))

@@ -114,7 +114,12 @@ def rattling(id: str, scheme: Any) -> Outcome:
     for what, (name, limit) in LIMITS.items():
         largest, floor = size(published(id, name)), 10.0 * accuracy(id, name)
         figures += second_order(
-            f"error of {what}", steps, [each[what] for each in errors], limit * largest, min(floor, 1e-9 * largest)
+            f"error of {what}",
+            steps,
+            [each[what] for each in errors],
+            limit * largest,
+            min(floor, 1e-9 * largest),
+            order=scheme.order(),
         )
     wrong = [float(np.isnan(each["the impulses [N s]"]).any()) for each in errors]
     _, other = turning(id, scheme, float(steps[-1]), turned=True)

@@ -57,10 +57,12 @@ def turning_figures(
         count = max(count, abs(len(found) - len(times)))
         same = len(found) == len(times)
         errors.append((size(found - times), size(turned - angles)) if same else (math.nan, math.nan))
+    times_off, angles_off = ([each[k] for each in errors] for k in (0, 1))
+    order = scheme.order()
     figures = [
         Figure("turning points more or fewer than there are [-]", float(count), 0.0),
-        *second_order("error of the turning times [s]", STEPS, [each[0] for each in errors], 5e-4, 1e-11),
-        *second_order("error of the turning angles [rad]", STEPS, [each[1] for each in errors], 5e-5, 1e-11),
+        *second_order("error of the turning times [s]", STEPS, times_off, 5e-4, 1e-11, order=order),
+        *second_order("error of the turning angles [rad]", STEPS, angles_off, 5e-5, 1e-11, order=order),
     ]
     return figures, run
 

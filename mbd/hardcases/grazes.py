@@ -137,7 +137,8 @@ def grazing(id: str, scheme: Any) -> Outcome:
             time = published(id, name)[0]
             errors = [size([event.time - time for event in run.events[:1]] or [math.nan]) for run in runs[:4]]
             what = f"the contact time at d(1 − {offset:g}) [s]"
-            figures += second_order(f"error of {what}", steps[:4], errors, 1e-4 * time, accuracy(id, name))
+            figures += second_order(f"error of {what}", steps[:4], errors, 1e-4 * time, accuracy(id, name),
+                                    order=scheme.order())  # fmt: skip
             place = runs[0]["slide.displacement"]
             curves.append(Curve(f"motion, wall at d(1 − {offset:g})", runs[0].time, place, y_label="x [m]"))
     return Outcome(figures, curves[::-1])

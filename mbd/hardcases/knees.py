@@ -87,6 +87,22 @@ def errors_of(id: str, run: Any) -> dict[str, Vector]:
     return {what: value - published(id, name) for (what, (name, _)), value in zip(LIMITS.items(), values, strict=True)}
 
 
+def linear_figures(id: str, scheme: Any, steps: Any, rooted: float) -> list[Figure]:
+    """Switching times with one linear step back: little worse than with roots, or of the order 2 that such a step has.
+
+    rooted : the error with roots at the finest step [s]
+    """
+    what = "the switching times [s]"
+    told = "error of the switching times with one linear step back"
+    if scheme.order() <= 2:
+        linear = errors_of(id, swing(id, scheme, float(steps[-1]), "linear"))[what]
+        return [Figure(f"{told}, over that with roots [-]", size(linear) / max(rooted, 1e-300), 1.5)]
+    linears = [errors_of(id, swing(id, scheme, float(dt), "linear"))[what] for dt in steps]
+    name, limit = LIMITS[what]
+    most, floor = limit * size(published(id, name)), 10.0 * accuracy(id, name)
+    return second_order(f"{told} [s]", steps, linears, most, floor, order=scheme.order(), erratic=True)
+
+
 def stopped(id: str, scheme: Any) -> Outcome:
     """Switches at the reference instants to second order, never deeper than the reference but for the error."""
     times = published(id, "event times")
@@ -97,13 +113,16 @@ def stopped(id: str, scheme: Any) -> Outcome:
     for what, (name, limit) in LIMITS.items():
         most = limit * size(published(id, name))
         figures += second_order(
-            f"error of {what}", steps, [each[what] for each in errors], most, 10.0 * accuracy(id, name)
+            f"error of {what}",
+            steps,
+            [each[what] for each in errors],
+            most,
+            10.0 * accuracy(id, name),
+            order=scheme.order(),
         )
     run, depths = runs[-1], published(id, "max hyperextension")
     beyond = float(np.max(run["knee.angle"])) - max(depths)
     allowed = 2.0 * size(errors[-1]["the largest hyperextensions [rad]"])
-    linear = errors_of(id, swing(id, scheme, float(steps[-1]), "linear"))
-    what = "the switching times [s]"
     between = np.ones(len(run), dtype=bool)
     moments = [event.time for event in run.events if event.name == "knee stop"]
     for closes, opens in zip(moments[::2], moments[1::2], strict=False):
@@ -113,11 +132,10 @@ def stopped(id: str, scheme: Any) -> Outcome:
     force = run["knee stop.force"]
     figures += [
         Figure("hyperextension beyond the largest of the reference [rad]", beyond, allowed),
-        Figure("error of the switching times with one linear step back, over that with roots [-]",
-               size(linear[what]) / max(size(errors[-1][what]), 1e-300), 1.5),
+        *linear_figures(id, scheme, steps, size(errors[-1]["the switching times [s]"])),
         Figure("torque of the stop while it is open [N m]", size(force[between]), 0.0),
         *second_order("error of the energy, over what the stop took [-]", steps,
-                      [_lost(each) for each in runs], 2e-3, 1e-9),
+                      [_lost(each) for each in runs], 2e-3, 1e-9, order=scheme.order()),
     ]  # fmt: skip
     if RELEASES.get(numbers(id)["law"]) == "pull":
         figures.append(Figure("torque that pulls, over the largest [-]", float(np.max(-force)) / size(force), 1e-8))

@@ -21,11 +21,13 @@ __all__ = ["CASES", "bob_on_link", "heavy_below_light"]
 J4, J5 = "j4-mass-ratio-1e6", "j5-near-massless-link"
 GAP = 1e-10
 """Gap of a joint [m] that is allowed."""
-FINE, MIDDLE, COARSE = (1e-6, 2.5e-7), 5e-7, (1e-2, 1e-3, 1e-4)
+RESOLVING = {2: ((1e-6, 2.5e-7), 5e-7), 3: ((1e-6, 5e-7), 1e-6), 8: ((2e-6, 1e-6), 2e-6)}
 """Steps [s] that resolve the snap of the light mass through the straight line, in minimal and in absolute coordinates,
-and steps that do not: there a scheme may damp it or say that it cannot go on."""
+of schemes of that order at least; the limits are the same for all."""
+COARSE = (1e-2, 1e-3, 1e-4)
+"""Steps [s] that do not: there a scheme may damp it or say that it cannot go on."""
 ANGLE_LIMIT, RATE_LIMIT, ABSOLUTE = 8e-5, 1.6e-2, 25.0
-"""Errors at the finest step [rad, rad/s]; in absolute coordinates, at steps twice as large, so many times that."""
+"""Errors at the finest step [rad, rad/s]; in absolute coordinates, at steps that are larger, so many times that."""
 GAIN = 1e-3
 """Energy that may be gained, over that of the heavy mass between its lowest and highest place [-]."""
 
@@ -57,9 +59,10 @@ def judge_mass_ratio(integrator: Any) -> Outcome:
         run = _swing(model, start, integrator, dt, reference.times)
         return _differences(run, reference, "auto")
 
-    found = study(errors, FINE)
+    fine, middle = RESOLVING[max(order for order in RESOLVING if order <= max(integrator.order(), 2))]
+    found = study(errors, fine, integrator)
     absolute, begun = heavy_below_light("all")
-    wide = _swing(absolute, begun, integrator, MIDDLE, reference.times)
+    wide = _swing(absolute, begun, integrator, middle, reference.times)
     apart = _differences(wide, reference, "all")
     gap, silent, curves = wide.violation.length, [], []
     for mechanism, at in (model, start), (absolute, begun):
@@ -72,7 +75,7 @@ def judge_mass_ratio(integrator: Any) -> Outcome:
     limits = {"error of the angles [rad]": ANGLE_LIMIT, "error of the rates [rad/s]": RATE_LIMIT}
     figures = found.figures(limits, dict.fromkeys(limits, reference.accuracy), better=True)
     for what, limit in limits.items():
-        figures.append(Figure(f"{what} at dt = {MIDDLE:g} s, absolute coordinates", apart[what], ABSOLUTE * limit))
+        figures.append(Figure(f"{what} at dt = {middle:g} s, absolute coordinates", apart[what], ABSOLUTE * limit))
     figures.append(Figure("gap of the joints at any step [m]", gap, GAP))
     figures.append(Figure("energy gained in silence at large steps [-]", max(silent), GAIN))
     return Outcome(figures, [*curves, *found.curves()])
@@ -145,7 +148,7 @@ def judge_massless_link(integrator: Any) -> Outcome:
             off.append(abs(float(np.linalg.norm(run["pivot.reaction_force"][0])) - float(pull.value)))
         return found
 
-    found = study(errors, full / 100)
+    found = study(errors, full / 100, integrator)
     rate, fine = 2.0 * math.pi / full, float(found.steps[-1])
     limits = {what: allowance(WELDED if "weld" in what else HINGED, rate, fine, full) for what in found.errors}
     return Outcome(

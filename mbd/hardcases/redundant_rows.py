@@ -84,7 +84,7 @@ def judge_parallel_cranks(integrator: Any) -> Outcome:
         runs.append(run)
         return {"error of the crank angle [rad]": distance_to(run.at(angle.times)["base 0.angle"], angle)}
 
-    found = study(errors, 4e-3)
+    found = study(errors, 4e-3, integrator)
     finest, dt, rate = runs[-1], float(found.steps[-1]), math.sqrt(numbers["g"] / numbers["crank_length"])
     pins = [joint.name for joint in model.joints if joint.name.startswith("pin")]
     total = sum(finest[f"{pin}.reaction_force"][0, :2] for pin in pins)
@@ -121,7 +121,7 @@ def judge_bricard(integrator: Any) -> Outcome:
             "change of energy [J]": float(np.max(np.abs(total - total[0] - change.value))),
         }
 
-    found = study(errors, 2e-3, 2)
+    found = study(errors, 2e-3, integrator, 2)
     finest, dt, rate = runs[-1], float(found.steps[-1]), math.sqrt(numbers["g"] / numbers["rod_length"])
     work = numbers["rod_mass"] * numbers["g"] * numbers["rod_length"]
     limits = (allowance(PLACE, rate, dt, place.size), allowance(ENERGY, rate, dt, work))

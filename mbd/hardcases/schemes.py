@@ -1,13 +1,17 @@
-"""The integrators that hard cases are judged with, by name."""
+"""The integrators that hard cases are judged with, by name, and what judges ask of them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 
+from mbd.analysis.spectrum import spectrum
 from mbd.errors import UnknownNameError, nearest
-from mbd.integrators import HHT, GeneralizedAlpha, Integrator, Newmark
+from mbd.integrators import HHT, GeneralizedAlpha, Integrator, Newmark, RadauIIA, RungeKutta853
 
-__all__ = ["DAMPED", "EVERY", "SCHEMES", "scheme"]
+__all__ = [
+    "DAMPED", "EVERY", "SCHEMES", "has_own_forces", "holds_positions_only", "is_explicit", "is_undamped", "scheme",
+]  # fmt: skip
 
 SCHEMES: dict[str, Callable[[], Integrator]] = {
     "HHT": lambda: HHT(alpha=0.05),
@@ -15,11 +19,15 @@ SCHEMES: dict[str, Callable[[], Integrator]] = {
     "generalized-alpha": lambda: GeneralizedAlpha(rho_inf=0.8),
     "generalized-alpha-index3": lambda: GeneralizedAlpha(rho_inf=0.8, formulation="index3"),
     "Newmark": Newmark,
+    "RadauIIA": RadauIIA,
+    "RungeKutta853": RungeKutta853,
 }
 """Newmark with rows in position only is refused: nothing damps its multipliers."""
 
 EVERY = tuple(SCHEMES)
-DAMPED = EVERY[:-1]
+FAST = 1e4
+"""ω dt that stands for infinity [rad]."""
+DAMPED = tuple(name for name in EVERY if name != "Newmark")
 """Those whose multipliers forget their round-off."""
 
 
@@ -29,3 +37,25 @@ def scheme(name: str) -> Integrator:
     if name.lower() not in known:
         raise UnknownNameError(nearest(name, SCHEMES, "scheme", "There are"))
     return known[name.lower()]()
+
+
+def holds_positions_only(integrator: Integrator) -> bool:
+    """Whether rows are held in position alone, as with formulation='index3'."""
+    return getattr(integrator, "formulation", "ggl") == "index3"
+
+
+def has_own_forces(integrator: Integrator) -> bool:
+    """Whether multipliers at the end of a step follow from the state there, and remember nothing of earlier ones."""
+    return integrator.between != "hermite"  # accelerations as accurate as positions
+
+
+@cache
+def is_undamped(integrator: Integrator) -> bool:
+    """Whether nothing damps an oscillation, however fast: spectral radius 1 as ω dt → ∞."""
+    return abs(spectrum(integrator, FAST).radius - 1.0) < 1e-4
+
+
+@cache
+def is_explicit(integrator: Integrator) -> bool:
+    """Whether the stiffest spring bounds the step."""
+    return not spectrum(integrator, FAST).radius < 1.0 + 1e-4

@@ -74,13 +74,13 @@ def staying_figures(id: str, scheme: Any, period: float) -> tuple[list[Figure], 
     count = int(re.findall(r"in (\d+) periods", quantity(id, "number of releases").name)[0])
     run = shaken(id, scheme, float(steps[0]), float(count))
     opened = [event for event in run.events if event.kind == "opened"]
-    floor = 1e-9 * m * g
+    floor, order = 1e-9 * m * g, scheme.order()
     figures = [
         Figure(f"releases in {count} periods [-]", abs(len(opened) - published(id, "number of releases")), 0.0),
         Figure(f"switches in {count} periods [-]", len(run.events), 0.0),
         Figure("error of Γ, A ω²/g [-]", abs(A * w * w / g - published(id, "Gamma")), accuracy(id, "Gamma") + 1e-15),
-        *second_order("error of the contact force [N]", steps, errors, 2e-3 * m * g, floor),
-        *second_order("error of the extremes of the contact force [N]", steps, peaks, 2e-3 * m * g, floor),
+        *second_order("error of the contact force [N]", steps, errors, 2e-3 * m * g, floor, order=order),
+        *second_order("error of the extremes of the contact force [N]", steps, peaks, 2e-3 * m * g, floor, order=order),
         Figure("error of the height of the mass on the table [m]", size(run["table.gap"]), 1e-10),
     ]
     curves = [Curve("contact force", runs[-1].time, runs[-1]["table.force"], y_label="force [N]")]
@@ -106,10 +106,20 @@ def thrown_figures(id: str, scheme: Any, period: float) -> tuple[list[Figure], l
     run = runs[-1]
     figures = [
         *second_order(
-            f"error of the first lift-off time at Γ = {gamma:g} [s]", steps, errors, 1e-4 * period, 1e-10 * period
+            f"error of the first lift-off time at Γ = {gamma:g} [s]",
+            steps,
+            errors,
+            1e-4 * period,
+            1e-10 * period,
+            order=scheme.order(),
         ),
         *second_order(
-            f"error of the lift-off times at Γ = {gamma:g} [s]", steps, other, 1e-4 * period * LONG**0.5, 1e-9 * period
+            f"error of the lift-off times at Γ = {gamma:g} [s]",
+            steps,
+            other,
+            1e-4 * period * LONG**0.5,
+            1e-9 * period,
+            order=scheme.order(),
         ),
         Figure(f"penetration at Γ = {gamma:g} [m]", float(np.max([deepest(each) for each in runs])), 1e-10),
         Figure(f"pull at Γ = {gamma:g} [N]", float(np.max(-run["table.force"])), 1e-9 * m * g),

@@ -85,7 +85,7 @@ def judge_slider_crank(integrator: Any) -> Outcome:
             "error of the slider [m]": distance_to(at["guide.displacement"], slider),
         }
 
-    found = study(errors, 2e-3)
+    found = study(errors, 2e-3, integrator)
     finest, dt, turn = runs[-1], float(found.steps[-1]), definition(J3)["initial_conditions"]["crank_rate"]
     turned = finest["main.angle"] - 0.5 * math.pi
     passages = _passages(finest, "main.angle", 0.5 * math.pi)
@@ -125,7 +125,7 @@ def judge_parallelogram(integrator: Any) -> Outcome:
         found = distance_to(run.at(angle.times)["a.angle"], angle) if run.success else math.nan
         return {"error of the crank angle [rad]": found}
 
-    found = study(errors, 2e-3)
+    found = study(errors, 2e-3, integrator)
     finest, dt, turn = runs[-1], float(found.steps[-1]), definition(J3B)["initial_conditions"]["thetadot"]
     passages = _passages(finest, "a.angle")
     skew = max(float(np.max(np.abs(run["d.angle"] - run["a.angle"]))) for run in runs)

@@ -91,7 +91,7 @@ def judge_sleigh(integrator: Any) -> Outcome:
             "change of energy [J]": float(np.max(np.abs(run["kinetic_energy"] - run["kinetic_energy"][0]))),
         }
 
-    found = study(errors, 0.01)
+    found = study(errors, 0.01, integrator)
     finest = runs[float(found.steps[-1])]
     tail = mbd.simulate(model, finest.final, integrator, dt=0.01, until=3.0 * float(motion.times[-1]))
     speed = math.hypot(tail["body.x.rate"][-1], tail["body.y.rate"][-1])
@@ -131,7 +131,7 @@ def judge_knife_edge(integrator: Any) -> Outcome:
         forces.append(distance_to(at["blade.multiplier"], force) / allowance(FORCE, rate, dt, force.size))
         return {"error of the place [m]": distance_to(np.column_stack([at["body.x"], at["body.y"]]), place)}
 
-    found = study(errors, 0.01)
+    found = study(errors, 0.01, integrator)
     dt = turn / 1600
     run = mbd.simulate(model, start, integrator, dt=dt, until=20 * turn)
     slips.append(float(np.max(np.abs(run["blade.residual"]))))

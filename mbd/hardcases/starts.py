@@ -154,5 +154,5 @@ CASES = (
     HardCase(J14, "A start off its rows is refused with residuals and name, or projected on request, never run.",
              judge_inconsistent_start, EVERY),
     HardCase(J15, "A loop that cannot close is refused with its closure error and the joint's name.",
-             judge_infeasible, DAMPED[:1]),
+             judge_infeasible, DAMPED[:1], notes={"schemes": "one is enough: it is refused before any would begin"}),
 )  # fmt: skip

@@ -92,7 +92,8 @@ def tip(id: str, scheme: Any) -> Outcome:
         reactions.append(size(run["pin.reaction_force"]))
     for (what, limit), name in zip(SWING_LIMITS.items(), SWING_VALUES, strict=True):
         most, floor = limit * size(published(id, name)), 10.0 * accuracy(id, name)
-        figures += second_order(f"error of {what}", steps, [each[what] for each in errors], most, floor)
+        figures += second_order(f"error of {what}", steps, [each[what] for each in errors], most, floor,
+                                order=scheme.order())  # fmt: skip
     figures += [
         Figure("force of the wall between impacts [N]", size(run["wall.force"]), 0.0),
         Figure(

@@ -26,7 +26,7 @@ from mbd.integrators.newmark import Newmark
 from mbd.integrators.passage import WHOLE, WITHIN, distance_to_pose
 from mbd.kernel.collocation import RADAU
 from mbd.kernel.fields import LEFT, PASSING
-from mbd.kernel.radau import FAR_OFF, MOST_RETREATS, PATIENT, SLOW
+from mbd.kernel.radau import FAR_OFF, MOST_RETREATS, PATIENT, SLOW, is_settled
 from mbd.kernel.stages import MOST_STRETCHED
 from mbd.state import Mode, State
 
@@ -188,6 +188,7 @@ class _RadauStep:
     def run(self) -> StepResult:
         """Newton: evaluate all stages, judge them, correct rates, multipliers and position shifts."""
         before, left, error, retreats, renew = np.inf, np.inf, np.inf, 0, True
+        first = moved = 0.0  # what the first correction changed, and the last
         for iteration in range(MAX_ITERATIONS):
             terms = [self._terms(i) for i in range(3)]
             if renew:
@@ -202,24 +203,26 @@ class _RadauStep:
                 self._terms(sizes.index(error))  # the system remembers what it was evaluated at last
                 return self._failed(iteration, error, "a force or a row is not finite")
             floor = 4096.0 * EPS / self.tolerance
-            if error <= 1.0 or (iteration >= 2 and error > 0.5 * before and error <= max(1.0, floor)):
-                return self._completed(terms, matrices, renew, iteration, error)
-            if self._was_enough(iteration, error, left):
-                return self._completed(None, matrices, renew, iteration, error)
-            if not renew and error > SLOW * before:
+            passes = error <= 1.0 or (iteration >= 2 and error > 0.5 * before and error <= max(1.0, floor))
+            if not passes and self._was_enough(iteration, error, left):
+                return self._completed(matrices, iteration, error)
+            if not passes and not renew and error > SLOW * before:
                 renew, before = True, np.inf
                 continue
-            if iteration == 0:
+            if iteration == 0 and not passes:
                 near = self._near_pose()
                 if near is not None:
                     return near
-            before, left, retreats = error, error, 0
-            try:
-                biggest = self._correct(terms, matrices, renew)
+            before, left, retreats, last = error, error, 0, moved
+            try:  # residuals that pass are there too: what they still correct costs little
+                moved = self._correct(terms, matrices, renew)
             except np.linalg.LinAlgError:
                 return self._failed(iteration, error, "the Newton matrix is singular")
-            if iteration == 0:  # the predictor is of order 3, the step of order 5: stay far below its error
-                self.tolerance = min(self.upper, max(1e-3 * biggest**2, self.tolerance))
+            if passes and is_settled(moved, last, first):
+                return self._completed(matrices, iteration, error)
+            if iteration == 0 and not passes:  # the predictor is of order 3, the step of order 5: stay below its error
+                first = moved
+                self.tolerance = min(self.upper, max(1e-3 * first**2, self.tolerance))
             renew = False
         return self._failed(MAX_ITERATIONS, error, "Newton did not converge")
 
@@ -357,14 +360,10 @@ class _RadauStep:
     def _failed(self, iterations: int, error: float, message: str) -> StepResult:
         return StepResult(self.state, self.memory, StepReport(False, iterations, error, message))
 
-    def _completed(
-        self, terms: list[Terms] | None, matrices: _Matrices, whole: bool, iterations: int, residual: float
-    ) -> StepResult:
+    def _completed(self, matrices: _Matrices, iterations: int, residual: float) -> StepResult:
         """The last stage as the end of the step, with consistent rates and multipliers where rows are active."""
         old, dt, n_v, memory = self.state, self.dt, self.n_v, self.memory
         try:
-            if terms is not None:  # the residuals are there: what they still correct costs little
-                self._correct(terms, matrices, whole)
             error = self._local_error(matrices)
         except np.linalg.LinAlgError:
             return self._failed(iterations, residual, "the Newton matrix is singular")

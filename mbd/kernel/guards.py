@@ -73,7 +73,7 @@ def try_step(K: Any, h: float, t1: float) -> int:
             return status
         if K.state[N_DROPPED] > 0:  # a scheme leaves the multipliers of the rows that it was solved with
             for k in range(K.n_rows):
-                if K.dropped[k] == 1:
+                if K.dropped[k] == 1 and K.scheme != 1:  # the explicit one has shared them out already
                     K.lam1[k] = 0.0
             share_out(K, K.lam1)
             for k in range(K.n_rows):

@@ -26,7 +26,7 @@ from mbd.arrays import Matrix, Vector
 from mbd.compile.mechanism import Mechanism
 from mbd.results.columns import ModelColumns
 from mbd.results.energy import doubted_ledger, kinds_of_work
-from mbd.simulation.outcome import record_of, whole_record
+from mbd.simulation.stored import record_of, whole_record
 
 if TYPE_CHECKING:
     from mbd.results.ledger import Ledger

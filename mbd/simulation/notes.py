@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -9,10 +10,12 @@ import numpy as np
 
 from mbd.equations.equations import Contact
 from mbd.kernel import fields as F
+from mbd.results.columns import ModelColumns
 from mbd.results.record import Record
 from mbd.simulation.blows import dt_of_blows
 from mbd.simulation.fastest import fastest, resolving_dt, sane_rows
 from mbd.simulation.redundant import redundancy
+from mbd.simulation.stored import record_of
 
 if TYPE_CHECKING:
     from mbd.simulation.run import Run
@@ -21,6 +24,8 @@ __all__ = ["notes_of"]
 
 RESOLVED = 10.0
 """Steps that a penalty contact must last to be resolved at all."""
+HALVING = 3.0
+"""A blow over the time in which half of its speed is gone: half a sine has cos(π/3) = ½ [-]."""
 
 BLIND = 2.0
 """Steps of a penalty contact below which its blow is the scheme's, not the law's: the run's message says so [-]."""
@@ -108,16 +113,41 @@ def _short_touch(run: Run, record: Record, number: int, contact: Contact) -> tup
     """A penalty contact over within a few steps is not resolved: its energy is anyone's guess. (note, doubt)"""
     if contact.kind != "penalty" or run.values["adaptive"]:
         return [], []
-    times = [(event.kind, event.time) for event in run.events if event.name == contact.name]
-    spans = [b[1] - a[1] for a, b in pairwise(times) if (a[0], b[0]) == ("closed", "opened")]
-    if not spans or min(spans) >= RESOLVED * run.dt:
+    events = [event for event in run.events if event.name == contact.name]
+    spans = [b.time - a.time for a, b in pairwise(events) if (a.kind, b.kind) == ("closed", "opened")]
+    shortest = min(spans, default=np.inf)
+    said = f"closed for {shortest / run.dt:.2g} steps only"
+    if shortest >= RESOLVED * run.dt and events and events[-1].kind == "closed":
+        half = _halved(run, contact, events[-1].row)
+        shortest = HALVING * half
+        said = f"closed to stay and lost half of its speed within {half / run.dt:.2g} steps"
+    if shortest >= RESOLVED * run.dt:
         return [], []
     last = len(record.time) - 1
-    closings = [min(e.row, last) for e in run.events if e.name == contact.name and e.kind == "closed"]
+    closings = [min(event.row, last) for event in events if event.kind == "closed"]
     safe = dt_of_blows(run, record, number, closings[:LOOKED_AT])
-    safe = safe if np.isfinite(safe) else min(spans) / RESOLVED
+    safe = safe if np.isfinite(safe) else shortest / RESOLVED
     note = (
-        f"{contact.name!r} closed for {min(spans) / run.dt:.2g} steps only, too few: its peak force and energy "
-        f"are not resolved; use dt below {safe:.2g} s, a softer stiffness, or mbd.Unilateral"
+        f"{contact.name!r} {said}, too few: its peak force and energy are not resolved; use dt below {safe:.2g} s, "
+        "a softer stiffness, or mbd.Unilateral"
     )
-    return [note], [note] if min(spans) < BLIND * run.dt else []
+    return [note], [note] if shortest < BLIND * run.dt else []
+
+
+def _halved(run: Run, contact: Contact, row: int) -> float:
+    """Time from the row in which a contact closed until it approaches half as fast, by the rows stored [s].
+
+    Infinite where that takes longer than a resolved blow, or the run ends before.
+    """
+    table = run.table[row : min(run.stored, row + 2 + int(RESOLVED))]
+    table = table[table[:, 0] <= table[0, 0] + RESOLVED / HALVING * run.dt]
+    if len(table) < 2:
+        return np.inf
+    columns = ModelColumns(replace(record_of(run, table), parameter_changes=[]), run.mechanism.equations)
+    (rate,) = columns.evaluate([contact.gap_rate], columns.rows)
+    slow = np.flatnonzero(rate > 0.5 * rate[0])
+    if rate[0] >= 0.0 or not len(slow):
+        return np.inf
+    k = int(slow[0])
+    share = (rate[k - 1] - 0.5 * rate[0]) / (rate[k - 1] - rate[k])
+    return float(table[k - 1, 0] - table[0, 0] + share * (table[k, 0] - table[k - 1, 0]))

@@ -24,10 +24,11 @@ from mbd.simulation.energy import EnergyWatch
 from mbd.simulation.failures import attempt, crowded, explanation
 from mbd.simulation.fastest import stability
 from mbd.simulation.memory import take_up
-from mbd.simulation.outcome import trajectory_of, whole_record
+from mbd.simulation.outcome import trajectory_of
 from mbd.simulation.room import Room
 from mbd.simulation.savepoints import Savepoint, rewind, save
 from mbd.simulation.stepper import Stepper
+from mbd.simulation.stored import whole_record
 from mbd.state import State
 from mbd.trajectory import EventRecord, Trajectory
 

@@ -11,6 +11,7 @@ SCHEMES = {
     "HHT": mbd.HHT(0.05), "HHT-index3": mbd.HHT(0.05, formulation="index3"),
     "generalized-alpha": mbd.GeneralizedAlpha(0.8),
     "generalized-alpha-index3": mbd.GeneralizedAlpha(0.8, formulation="index3"), "Newmark": mbd.Newmark(),
+    "RadauIIA": mbd.RadauIIA(), "RungeKutta853": mbd.RungeKutta853(),
 }  # fmt: skip
 
 

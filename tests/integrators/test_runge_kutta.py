@@ -10,6 +10,8 @@ import pytest
 
 import mbd
 from mbd.compile.mechanisms import mechanism_of
+from mbd.hardcases.governor import governor
+from mbd.hardcases.user_force import pushed_particle
 from mbd.integrators.dormand_prince import END, FIFTH, NODES, STAGES, THIRD, WEIGHTS
 from mbd.integrators.runge_kutta import RungeKutta853
 from mbd.results.interpolation import Grid, quintic
@@ -152,6 +154,19 @@ def test_long_steps_are_looked_at_on_a_quintic():
 
 def test_it_is_a_value():
     assert RungeKutta853() == mbd.RungeKutta853() and repr(SCHEME) == "RungeKutta853()" and SCHEME.order() == 8
+
+
+@pytest.mark.parametrize("dt", [1e-2, 2e-3, 1e-3])
+def test_a_step_beyond_the_stable_ones_is_refused_and_says_so(dt):
+    """Dampers of 8100/s allow 0.7 ms."""
+    with pytest.raises(mbd.SimulationError, match="are explicit: with ω .* use a smaller dt, tol=, or mbd.RadauIIA"):
+        mbd.simulate(*governor(), SCHEME, dt=dt, until=1.0)
+
+
+def test_a_force_that_is_none_is_not_the_fault_of_the_step():
+    with pytest.raises(mbd.SimulationError, match="'push'.* is not finite") as caught:
+        mbd.simulate(*pushed_particle(), SCHEME, dt=0.01, until=1.0)
+    assert "explicit" not in str(caught.value)
 
 
 def test_a_step_that_is_refused_excuses_no_other():

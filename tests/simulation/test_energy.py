@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 import sympy
@@ -252,6 +254,40 @@ def test_a_single_step_that_makes_energy_where_there_is_none_is_refused():
     with pytest.raises(mbd.SimulationError, match="the scheme itself has put up to") as caught:
         mbd.simulate(model, start, mbd.RungeKutta853(), dt=1.0, until=1.0)
     assert len(caught.value.run.time) == 2
+
+
+def dropped_on_a_mat(scheme, dt):
+    """1 kg from 0.1 m onto 1e9 N/m: a blow of 99 µs."""
+    model = mbd.Model("ball", gravity=G)
+    body = mbd.PointMass("ball", 1.0)
+    model.connect(mbd.Prismatic("fall", model.ground.origin, body.origin, axis=(0, 1, 0)))
+    model.constrain(mbd.Penalty("mat", mbd.height(body.origin), stiffness=1e9))
+    start = mbd.assemble(model, position={"fall.displacement": 0.1})
+    return mbd.simulate(model, start, scheme, dt=dt, until=0.3, on_failure="return")
+
+
+@pytest.mark.parametrize("dt", [3e-4, 1e-3])
+def test_a_stiff_contact_that_throws_higher_is_refused_although_its_work_is_anything(dt):
+    run = dropped_on_a_mat(mbd.RungeKutta853(), dt)
+    assert not run.success and "the scheme itself has put up to" in run.message
+    assert float(re.search(r"put up to (\S+) J", run.message)[1]) > 0.5, "what it has gained, not what works say"
+
+
+def test_a_blow_that_ends_in_rest_within_a_step_is_told():
+    run = dropped_on_a_mat(mbd.RadauIIA(), 1e-2)
+    assert run.success and [event.kind for event in run.events] == ["closed"]
+    (note,) = [note for note in run.stats["notes"] if "not resolved" in note]
+    assert "'mat' closed to stay and lost half of its speed within" in note and "use dt below" in note
+
+
+def test_a_contact_that_was_closed_at_the_start_gives_what_it_holds():
+    model = mbd.Model("catapult", gravity=(0.0, 0.0, 0.0))
+    body = mbd.PointMass("ball", 1.0)
+    model.connect(mbd.Prismatic("fall", model.ground.origin, body.origin, axis=(0, 1, 0)))
+    model.constrain(mbd.Penalty("mat", mbd.height(body.origin), stiffness=100.0))
+    start = mbd.assemble(model, position={"fall.displacement": -0.1}, closed=["mat"])
+    run = mbd.simulate(model, start, mbd.RungeKutta853(), dt=1e-2, until=1.0)
+    assert run.success and not told(run) and run["fall.rate"][-1] == pytest.approx(1.0)
 
 
 # what it costs --------------------------------------------------------------------------------------------------------
