@@ -19,7 +19,7 @@ from mbd.compile.trigonometry import WIDTHS, constant, sincos
 from mbd.tape.derivatives import live
 from mbd.tape.node import CONDITIONS, Node, Table
 
-__all__ = ["LARGE", "LIBRARY", "PART", "module"]
+__all__ = ["LARGE", "LIBRARY", "MANY_ZEROS", "PART", "module"]
 
 LARGE = 2500
 """Operations above which a function is cut into parts."""
@@ -56,6 +56,36 @@ done:
 ret i64 %low
 }"""
 """The last piece of a table that begins at or before x, or the first one."""
+
+ZEROS = """\
+define internal void @mbd.zeros(ptr %to, i64 %n) #1 {
+entry:
+br label %test
+test:
+%k = phi i64 [ 0, %entry ], [ %next, %four ]
+%next = add i64 %k, 4
+%whole = icmp ule i64 %next, %n
+br i1 %whole, label %four, label %rest
+four:
+%from = getelementptr double, ptr %to, i64 %k
+store <4 x double> zeroinitializer, ptr %from, align 8
+br label %test
+rest:
+%last = phi i64 [ %k, %test ], [ %after, %one ]
+%more = icmp ult i64 %last, %n
+br i1 %more, label %one, label %done
+one:
+%place = getelementptr double, ptr %to, i64 %last
+store double 0.0, ptr %place
+%after = add i64 %last, 1
+br label %rest
+done:
+ret void
+}"""
+"""Zeros side by side."""
+
+MANY_ZEROS = 12
+"""Zeros side by side from which on a loop writes them: large matrices consist of little else."""
 
 ATTRIBUTES = """\
 attributes #0 = { nounwind }
@@ -94,6 +124,9 @@ def module(
     if "piece" in needs:
         needs.discard("piece")
         lines.append(PIECE)
+    if "zeros" in needs:
+        needs.discard("zeros")
+        lines.append(ZEROS)
     lines += sorted(needs)
     lines.append(ATTRIBUTES)
     return "\n".join(lines)
@@ -103,10 +136,11 @@ def _function(
     name: str, outputs: Sequence[Node], layout: Layout, lines: list[str], needs: set[str], large: int, part: int
 ) -> None:
     steps = list(_steps(live(outputs)))
+    places = _places(outputs)
     size = sum(len(nodes) for nodes, _ in steps)
     if size <= large:
         lines.append(f"define void @mbd.{name}({ARGUMENTS}) #0 {{\nentry:")
-        body = _Body(outputs, layout, {}, lines, needs)
+        body = _Body(places, layout, {}, lines, needs)
         for nodes, angles in steps:
             body.operations(nodes)
             body.angles(angles)
@@ -117,7 +151,7 @@ def _function(
     slots = _slots(parts)
     for number, steps in enumerate(parts):
         lines.append(f"define internal void @mbd.{name}.{number}({ARGUMENTS}, ptr noalias %work) #1 {{\nentry:")
-        body = _Body(outputs, layout, slots, lines, needs)
+        body = _Body(places, layout, slots, lines, needs)
         for nodes, angles in steps:
             body.operations(nodes)
             body.angles(angles)
@@ -213,20 +247,37 @@ def _slots(parts: list[list[Step]]) -> dict[int, int]:
     return slots
 
 
+def _places(outputs: Sequence[Node]) -> dict[int, list[int]]:
+    """Where each node is asked for, by its index."""
+    places: dict[int, list[int]] = {}
+    for k, node in enumerate(outputs):
+        places.setdefault(node.index, []).append(k)
+    return places
+
+
+def _runs(places: Sequence[int]) -> Iterator[tuple[int, int]]:
+    """Ascending places as runs (first, how many)."""
+    first, number = places[0], 0
+    for place in places:
+        if place != first + number:
+            yield first, number
+            first, number = place, 0
+        number += 1
+    yield first, number
+
+
 class _Body:
     """Writes the instructions of one function, or of one part of it."""
 
     def __init__(
-        self, outputs: Sequence[Node], layout: Layout, slots: dict[int, int], lines: list[str], needs: set[str]
+        self, places: dict[int, list[int]], layout: Layout, slots: dict[int, int], lines: list[str], needs: set[str]
     ) -> None:
         self.layout, self.slots, self.needs = layout, slots, needs
         self.append = lines.append
         self.names: dict[int, str] = {}
         self.flags: dict[int, str] = {}
         self.pieces: dict[tuple[int, int], tuple[str, str]] = {}
-        self.places: dict[int, list[int]] = {}
-        for k, node in enumerate(outputs):
-            self.places.setdefault(node.index, []).append(k)
+        self.places = places
         self.new = count().__next__
 
     def operations(self, nodes: Iterable[Node]) -> None:
@@ -296,8 +347,15 @@ class _Body:
     def rest(self, outputs: Sequence[Node]) -> None:
         """Outputs that are inputs or constants."""
         for node in outputs:
-            if not node.args:
-                for place in self.places.pop(node.index, ()):
+            if node.args or node.index not in self.places:
+                continue
+            for first, number in _runs(self.places.pop(node.index)):
+                if number >= MANY_ZEROS and self.number(node) == constant(0.0):
+                    self.needs.add("zeros")
+                    start = self.do(f"getelementptr double, ptr %out, i64 {first}")
+                    self.append(f"call void @mbd.zeros(ptr {start}, i64 {number})")
+                    continue
+                for place in range(first, first + number):
                     self.store(self.number(node), "out", place)
 
     def condition(self, node: Node) -> str:

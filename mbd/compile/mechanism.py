@@ -13,6 +13,7 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.compile.backend import Backend, Function, Functions, backend as choose_backend
 from mbd.compile.layout import Layout
+from mbd.compile.orders import elimination_order
 from mbd.compile.postponed import Postponed
 from mbd.compile.python import ArrayFunction, array_function
 from mbd.equations import programs
@@ -29,6 +30,7 @@ class ModeCode:
 
     correction, solution : the tangent with its factors and what solves with these (see `programs.correction`), or None
     borne : rows that depend on `rows`; their multipliers are given and act
+    order : in which the matrices of many unknowns are eliminated (see `orders`), or None
     """
 
     rows: tuple[int, ...]
@@ -39,6 +41,7 @@ class ModeCode:
     correction: Any = None
     solution: Any = None
     borne: tuple[int, ...] = ()
+    order: Any = None
 
 
 @dataclass(frozen=True)
@@ -81,6 +84,7 @@ class Mechanism:
         if composed is not None:
             common["compose"] = composed
         self.layout = Layout.of(equations)
+        self._accelerations = common["accelerations"]
         self.common: Functions = self.backend.functions(self.layout)
         self.common.add(common)
         self.vector = composed is None
@@ -105,10 +109,14 @@ class Mechanism:
         key = (tuple(rows), tuple(penalties), tuple(sliding), tuple(borne), stabilized)
         with self.equations.tape.lock:  # runs in other threads share this mechanism
             if key not in self._modes:
+                started = perf_counter()
+                outputs = programs.newton(self.equations, rows, penalties, stabilized, sliding, borne)
+                order = self._order(outputs, key[0])
+                self.seconds += perf_counter() - started
                 tangent, residual = self._add(
-                    key, len(self._modes), tangent=programs.newton, residual=programs.residual
+                    key, len(self._modes), tangent=lambda *_: outputs, residual=programs.residual
                 )
-                self._modes[key] = ModeCode(key[0], key[1], key[2], tangent, residual, borne=key[3])
+                self._modes[key] = ModeCode(key[0], key[1], key[2], tangent, residual, borne=key[3], order=order)
             return self._modes[key]
 
     def stepping(
@@ -148,6 +156,10 @@ class Mechanism:
         tangent = Postponed(lambda: self._add(mode, number, tangent=programs.newton)[0], size)
         self.postponed.append(tangent)
         return ModeCode(rows, penalties, sliding, tangent, residual, first, again)
+
+    def _order(self, tangent: Sequence[Node], rows: tuple[int, ...]) -> Any:
+        """The order in which the matrices of these rows are eliminated, None where it does not pay."""
+        return elimination_order(tangent, self._accelerations, self.layout.n, self.layout.n_rows, sorted(rows))
 
     def _add(self, mode: Any, number: int, **makers: Callable[..., Sequence[Node]]) -> list[Function]:
         """Compile programs of a mode (rows, penalties, frictions, borne rows, form), with its number in their names."""

@@ -17,6 +17,7 @@ from mbd.equations.outputs import Outputs
 from mbd.equations.results import offer_results
 from mbd.equations.surroundings import Surroundings
 from mbd.errors import ModelError
+from mbd.tape.derivatives import live
 from mbd.tape.node import Node
 
 if TYPE_CHECKING:
@@ -139,6 +140,15 @@ class TreeGeometry:
             [moving.get(rate.index, rate) for rate in rates], list(forces),
         )  # fmt: skip
         return [*self.dynamics.balance(self.work + work), *self.rests]
+
+    def mass_matrix(self) -> list[list[Node]] | None:
+        """M of the bodies, where no force and no state depends on accelerations."""
+        forces = [contact.force for contact in self.constraints.contacts if contact.force is not None]
+        forces += [friction.limit for friction in self.constraints.frictions]
+        inside = live([*self.dynamics.generalized(self.work), *forces])
+        if self.rests or any(node.op == "input" and node.data[0] == "a" for node in inside):
+            return None
+        return self.dynamics.mass_matrix()
 
     def partials(self, outputs: Sequence[Node]) -> list[dict[Node, Node]]:
         """∂node/∂x_j of the places and rotations inside the outputs."""

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 
 from mbd.bodies.algebra import cross, dot, rotate, scaled, total
 from mbd.bodies.mass import MassProperties
+from mbd.equations.composite import composite_mass_matrix
 from mbd.equations.inputs import Inputs
 from mbd.equations.kinematics import Moving, Twist, twists
 from mbd.equations.placement import Placement
@@ -79,6 +80,10 @@ class Dynamics:
         """The forces alone, without the bodies' inertia and weight (length n_v)."""
         pulls_on, direct = self._read(work)
         return self._gather(pulls_on, direct)
+
+    def mass_matrix(self) -> list[list[Node]]:
+        """M of the bodies, line by line (n_v × n_v)."""
+        return composite_mass_matrix(self._bodies, self._masses, len(self._inputs.v), self._tape)
 
     def joint_wrench(self, body: Moving, work: Work) -> tuple[Triple, Triple]:
         """Force and torque that a body needs at its joint, in body axes: the residual conjugate to a virtual motion.

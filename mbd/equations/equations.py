@@ -181,6 +181,9 @@ class Geometry(Protocol):
         The values depend on t and q ⊕ x only, the rates on v too.
         """
 
+    def mass_matrix(self) -> list[list[Node]] | None:
+        """M = ∂r/∂a, line by line; None where more than inertia depends on accelerations."""
+
     def partials(self, outputs: Sequence[Node]) -> list[dict[Node, Node]]:
         """For each x_j, ∂node/∂x_j of the nodes inside `outputs` (positions, rotations) where it is known."""
 

@@ -188,7 +188,8 @@ def accelerations(equations: Equations) -> list[Node]:
     r = _switched_balance(equations)
     rest: dict[Node, float] = {node: 0.0 for node in (*inputs.a, *inputs.s, *inputs.lam)}
     f = substitute(r, rest)
-    M = _transposed(mass_matrix(equations, r))
+    M = None if equations.geometry is None else equations.geometry.mass_matrix()
+    M = _transposed(mass_matrix(equations, r)) if M is None else M
     B = constraint_jacobian(equations, rows)
     right = _row_forces(equations, r, rows, B)
     hv = [row.rate for row in equations.rows]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -123,9 +124,10 @@ def _taken(run: Any) -> list[Figure]:
 
 
 def _told(run: Any) -> list[Figure]:
-    """Of an explicit scheme that stopped: whether it says that the step is too large."""
-    said = "explicit" in run.message and "smaller dt" in run.message
-    return [Figure(f"dt = {LARGE:g} s refused without saying that explicit steps must be smaller", float(not said), 0)]
+    """Of an explicit scheme that stopped: whether it says below which step it is stable, and that this is smaller."""
+    limit = re.search(r"an explicit scheme is stable for dt below ([\d.e+-]+) s", run.message)
+    said = limit is not None and float(limit[1]) < LARGE
+    return [Figure(f"dt = {LARGE:g} s refused without saying which steps are stable", float(not said), 0)]
 
 
 CASES = (

@@ -21,14 +21,17 @@ __all__ = ["MODULES", "constants_of", "entry", "functions_of", "kernel_object", 
 ENTRY = "mbd_kernel"
 
 MODULES = (
-    "linear", "lemke", "redundancy", "saddle", "restart", "pivoting", "complementarity", "blow", "impact", "settle",
-    "pairs", "iteration", "passage", "newmark", "complex_linear", "stages", "radau", "straddle", "runge_kutta",
-    "hermite", "guards", "control", "interior", "locate", "switching", "nonsmooth", "takeover", "observe", "starting",
-    "trying", "advance",
+    "linear", "ordered", "lemke", "redundancy", "saddle", "restart", "pivoting", "complementarity", "blow", "impact",
+    "settle", "pairs", "iteration", "leftovers", "passage", "newmark", "complex_linear", "ordered_complex",
+    "stages", "radau", "straddle", "runge_kutta", "hermite", "guards", "control", "interior", "locate", "switching",
+    "nonsmooth", "takeover", "observe", "starting", "trying", "advance",
 )  # fmt: skip
 
-APART = ("factor", "solve")
-"""Their loops keep their shape wherever they are called."""
+APART = (
+    "factor", "solve", "solve_definite", "factor_ordered", "solve_ordered", "factor_pair_ordered", "solve_pair_ordered",
+    "leftovers_of_many",
+)  # fmt: skip
+"""Their loops keep their shape wherever they are called; where they are not, nobody carries them along."""
 
 SHIMS = """
 def scheme_step(K: Any, h: float, t1: float) -> int:

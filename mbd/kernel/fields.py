@@ -85,7 +85,9 @@ INTEGER_ARRAYS = (
     "kept_flags",  # what a non-smooth step began from
     "lcp_rows", "lcp_who", "lcp_basis",  # Lemke's method
     "dropped",  # rows that depend on others
+    "support",  # of each row of the basis: how many of its entries are not zero, and which; then rows still to come
     "mode_key", "mode_code", "mode_count",  # known modes
+    "mode_order", "orders",  # where the order of elimination of each mode begins, 0 for none, and all of them
     "rows", "pivots", "columns", "fired", "state", "counts",
 )  # fmt: skip
 FIELDS = (*INTEGERS, *REALS, *REAL_ARRAYS, *INTEGER_ARRAYS, "code", "hooks")
@@ -104,12 +106,13 @@ KEPT_INTEGERS = ("closed", "armed", "touched", "dropped", "rows", "state", "stic
 (
     MODE, ROWS, GRID, RESTART, STORED, LOGGED, SWITCHES, SINCE_STORE, BLOCKED, N_DROPPED, NEAR, INCHING, REDONE,
     PLASTIC, HALVED, HALVES, PAIRED, STRAIGHT,
-) = range(18)  # fmt: skip
+    ORDERED,  # where the order of the factors in K.kkt begins in K.orders, 0 if pivots were searched for
+) = range(19)  # fmt: skip
 # places in `counts`
 (
     STEPS, ITERATIONS, TANGENTS, RESIDUALS, FACTORIZATIONS, EVENTS, RESTARTS, IMPACTS, LOCATIONS, STAGNATIONS, CAREFUL,
     SHORTENED, STRONGE, ENDLESS,
-    PIVOTED,  # factorizations by the pivoted LU where straight-line code was not sound
+    PIVOTED,  # factorizations by the pivoted LU where an order chosen beforehand was not sound
     REJECTED,
 ) = range(16)  # fmt: skip
 # values of state[NEAR]: within a few steps of a pose in which rows lose rank, and just beyond it

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-__all__ = ["eliminate", "factor", "solve"]
+__all__ = ["eliminate", "factor", "solve", "solve_definite"]
 
 
 def factor(A: Any, n: int, pivots: Any) -> int:
@@ -69,6 +69,52 @@ def solve(A: Any, n: int, pivots: Any, b: Any) -> None:
         b[k] = left
         for i in range(k):
             b[i] -= A[i * n + k] * left
+
+
+def solve_definite(M: Any, n: int, b: Any, work: Any) -> bool:
+    """b ← M⁻¹ b by M = Uᵀ D U, D U in the upper half of M; false where M is not clearly positive definite.
+
+    `work` needs n places, for the diagonal of M.
+    """
+    for k in range(n):
+        work[k] = abs(M[k * n + k])
+    for k in range(n):
+        pivot = M[k * n + k]
+        if not pivot > 1e-12 * work[k]:
+            return False
+        inverse = 1.0 / pivot
+        M[k * n + k] = inverse
+        for i in range(k + 1, n):
+            if M[k * n + i] != 0.0:
+                left = M[k * n + i] * inverse
+                b[i] -= left * b[k]
+                j = i
+                while j + 3 < n:  # four at once, which become one instruction
+                    a0 = M[i * n + j] - left * M[k * n + j]
+                    a1 = M[i * n + j + 1] - left * M[k * n + j + 1]
+                    a2 = M[i * n + j + 2] - left * M[k * n + j + 2]
+                    a3 = M[i * n + j + 3] - left * M[k * n + j + 3]
+                    M[i * n + j] = a0
+                    M[i * n + j + 1] = a1
+                    M[i * n + j + 2] = a2
+                    M[i * n + j + 3] = a3
+                    j += 4
+                while j < n:
+                    M[i * n + j] -= left * M[k * n + j]
+                    j += 1
+    for c in range(n):
+        k = n - 1 - c
+        left = b[k]
+        even = 0.0  # two sums, which do not wait for each other
+        j = k + 1
+        while j + 1 < n:
+            left -= M[k * n + j] * b[j]
+            even -= M[k * n + j + 1] * b[j + 1]
+            j += 2
+        if j < n:
+            left -= M[k * n + j] * b[j]
+        b[k] = (left + even) * M[k * n + k]
+    return True
 
 
 def eliminate(A: Any, n: int, b: Any, columns: Any, work: Any, rank_tolerance: float) -> int:

@@ -20,6 +20,7 @@ from mbd.kernel.fields import (
     NOT_CONVERGED,
     NOT_FINITE,
     NOW,
+    ORDERED,
     PASSING,
     PIVOT,
     PIVOTED,
@@ -35,7 +36,8 @@ from mbd.kernel.fields import (
 )  # fmt: skip
 from mbd.kernel.hooks import call, call_on
 from mbd.kernel.iteration import finish, overturns, predict, residual_size, runs_away, soundness_at
-from mbd.kernel.linear import factor, solve
+from mbd.kernel.linear import factor
+from mbd.kernel.ordered import LOSS_OF_STEP, OF_TANGENT, factor_ordered, order_at, solve_kkt
 from mbd.kernel.pairs import is_whole
 from mbd.kernel.passage import WITHIN, misses, passing_step, steps_of_fall, steps_to_pose
 from mbd.kernel.redundancy import sharing
@@ -179,7 +181,7 @@ def newmark_step(K: Any, h: float, t1: float) -> int:
         if not ready or (m > 0 and K.stabilized == 1 and not shifting):
             ready = False
             shifting = right_hand_sides(K, o_r, m, c_C, c_K, tangent, straight)
-        if tangent and not straight and not factorize(K, size):
+        if tangent and not straight and not factorize(K, size, tangents):
             status = SINGULAR
             break
         if iteration == 0 and m > 0 and K.stabilized == 1:
@@ -274,12 +276,24 @@ def right_hand_sides(K: Any, o_r: int, m: int, c_C: float, c_K: float, tangent: 
     return shifting
 
 
-def factorize(K: Any, size: int) -> bool:
-    """LU factors of the tangent in K.out; false where a pivot is missing."""
+def factorize(K: Any, size: int, tangents: int) -> bool:
+    """LU factors of the tangent in K.out; false where a pivot is missing.
+
+    Those of a step's first few tangents keep to the order of the mode, if it has one and its pivots are sound.
+    """
+    m = size - K.n
+    o = 0 if sharing(K) else order_at(K, m)
+    if o > 0 and tangents <= MOST_STRAIGHT:
+        if factor_ordered(K, K.out, o, OF_TANGENT, LOSS_OF_STEP):
+            K.counts[FACTORIZATIONS] += 1
+            return True
+    if o > 0:
+        K.counts[PIVOTED] += 1
+    K.state[ORDERED] = 0
     for k in range(size * size):
         K.kkt[k] = K.out[k]
     if sharing(K):
-        add_shares(K, K.kkt, size - K.n)
+        add_shares(K, K.kkt, m)
     column = factor(K.kkt, size, K.pivots)
     K.counts[FACTORIZATIONS] += 1
     K.state[BLOCKED] = column - 1
@@ -312,7 +326,7 @@ def solve_with_factors(K: Any, m: int, b: Any, straight: bool) -> None:
             K.out[place + i] = b[i]
         call_on(K, K.mode_code[4 * K.state[MODE] + 3], K.out, b)
     else:
-        solve(K.kkt, size, K.pivots, b)
+        solve_kkt(K, size, b)
 
 
 def correct(K: Any, m: int, c_C: float, c_K: float, ready: bool, shifting: bool) -> float:

@@ -23,8 +23,10 @@ from mbd.kernel.fields import (
     NEAR,
     NOT_CONVERGED,
     NOT_FINITE,
+    ORDERED,
     PASSING,
     PIVOT,
+    PIVOTED,
     ROWS,
     SINGULAR,
     STAGNATIONS,
@@ -33,7 +35,9 @@ from mbd.kernel.fields import (
 )  # fmt: skip
 from mbd.kernel.hooks import call
 from mbd.kernel.iteration import finish, overturns, predict, residual_size, runs_away, soundness_at
-from mbd.kernel.linear import factor, solve
+from mbd.kernel.leftovers import leftovers_of_many
+from mbd.kernel.linear import factor
+from mbd.kernel.ordered import LOSS_OF_STEP, OF_TANGENT, factor_ordered, order_at, solve_kkt, weakest_pivot
 from mbd.kernel.pairs import is_of_pair, is_whole
 from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import add_shares, raise_scales, share_loads
@@ -53,16 +57,19 @@ CONTINUOUS = 0.05
 def steps_of_fall(K: Any, m: int, straight: bool) -> float:
     """Steps until the smallest pivot of the rows vanishes, if it goes on as since the last step; a cheap first look.
 
-    Straight-line code tells its own; where it gave way to a search for pivots, they do not compare: then it may be now.
+    Pivots in an order given beforehand tell their own; where they gave way to a search for pivots, they do not compare:
+    then it may be now.
     """
     size = K.n + m
     largest = 0.0
     if straight:
         largest = K.out[soundness_at(K, m) + 1]
+    elif K.state[ORDERED] > 0:
+        largest = weakest_pivot(K)
     else:
         for k in range(K.n, size):  # the inverses are on the diagonal
             largest = max(largest, abs(K.kkt[k * size + k]))
-        if K.mode_code[4 * K.state[MODE] + 2] > 0:
+        if K.mode_code[4 * K.state[MODE] + 2] > 0 or order_at(K, m) > 0:
             K.detail[PIVOT] = 0.0
             return 0.0
     before = K.detail[PIVOT]
@@ -88,9 +95,14 @@ def steps_to_pose(K: Any, m: int, h: float, ratio: float, straight: bool) -> flo
         for k in range(m * K.n_v):
             K.turning[k] = K.out[K.n + 2 * m + k]
     stride = 1 if straight else size + 1
-    leftovers(K, m, h, ratio, 0.0, 0, o_S, stride, o_H, width)
-    leftovers(K, m, h, ratio, -h, m, o_S, stride, o_H, width)
-    leftovers(K, m, h, ratio, h, 2 * m, o_S, stride, o_H, width)
+    if order_at(K, m) > 0:
+        leftovers_of_many(K, m, h, ratio, 0.0, 0, o_S, stride, o_H, width)
+        leftovers_of_many(K, m, h, ratio, -h, m, o_S, stride, o_H, width)
+        leftovers_of_many(K, m, h, ratio, h, 2 * m, o_S, stride, o_H, width)
+    else:
+        leftovers(K, m, h, ratio, 0.0, 0, o_S, stride, o_H, width)
+        leftovers(K, m, h, ratio, -h, m, o_S, stride, o_H, width)
+        leftovers(K, m, h, ratio, h, 2 * m, o_S, stride, o_H, width)
     speed = 0.0
     for j in range(K.n_v):
         speed += abs(K.out[o_S + stride * j]) * K.block[K.o_v + j] * K.block[K.o_v + j]
@@ -248,10 +260,6 @@ def correct_positions(K: Any, m: int, c_C: float, c_K: float) -> bool:
     n = K.n
     size = n + m
     o_h = size * size + n
-    for k in range(size * size):
-        K.kkt[k] = K.out[k]
-    if sharing(K):
-        add_shares(K, K.kkt, m)
     for i in range(n):
         K.rhs[i] = -K.out[size * size + i]
     for k in range(m):
@@ -260,10 +268,10 @@ def correct_positions(K: Any, m: int, c_C: float, c_K: float) -> bool:
             continue
         K.rhs[n + k] = -K.out[o_h + k] / c_K
         for j in range(K.n_v):
-            K.kkt[(n + k) * size + j] -= c_K / c_C * K.out[o_h + 2 * m + k * K.n_v + j]
-    if factor(K.kkt, size, K.pivots) != 0:
+            K.out[(n + k) * size + j] -= c_K / c_C * K.out[o_h + 2 * m + k * K.n_v + j]
+    if not factor_positions(K, m):
         return False
-    solve(K.kkt, size, K.pivots, K.rhs)
+    solve_kkt(K, size, K.rhs)
     K.counts[FACTORIZATIONS] += 1
     K.counts[ITERATIONS] += 1
     for i in range(n):
@@ -274,6 +282,21 @@ def correct_positions(K: Any, m: int, c_C: float, c_K: float) -> bool:
     for k in range(m):
         K.block[K.o_lam + K.rows[k]] += K.rhs[n + k]
     return True
+
+
+def factor_positions(K: Any, m: int) -> bool:
+    """LU factors of the index-3 tangent in K.out; false if a pivot is missing."""
+    size = K.n + m
+    o = 0 if sharing(K) else order_at(K, m)
+    if o > 0 and factor_ordered(K, K.out, o, OF_TANGENT, LOSS_OF_STEP):
+        return True
+    K.counts[PIVOTED] += 1 if o > 0 else 0
+    K.state[ORDERED] = 0
+    for k in range(size * size):
+        K.kkt[k] = K.out[k]
+    if sharing(K):
+        add_shares(K, K.kkt, m)
+    return bool(factor(K.kkt, size, K.pivots) == 0)
 
 
 def leaves_branch(K: Any, h: float) -> bool:

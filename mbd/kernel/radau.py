@@ -30,7 +30,7 @@ from mbd.kernel.fields import (
 )  # fmt: skip
 from mbd.kernel.hooks import call
 from mbd.kernel.iteration import runs_away
-from mbd.kernel.linear import factor, solve
+from mbd.kernel.ordered import solve_kkt
 from mbd.kernel.pairs import is_whole
 from mbd.kernel.passage import WITHIN, misses, passing_step, steps_of_fall, steps_to_pose
 from mbd.kernel.restart import (
@@ -43,6 +43,7 @@ from mbd.kernel.restart import (
     raise_scales,
     refresh_scales,
 )
+from mbd.kernel.runge_kutta import factor_saddle
 from mbd.kernel.stages import (
     A_,
     E_,
@@ -338,27 +339,15 @@ def end_rates(K: Any, t1: float, m: int) -> bool:
     if K.loaded == 1:
         return bool(consistent(K, t1, K.q1, K.y1) == 0)
     n = K.n
-    size = n + m
-    o_R = n * n + n
-    o_B = o_R + n * K.n_rows
     evaluate(K, t1, K.q1, K.y1)
     load_accelerations(K)
+    if not factor_saddle(K, m, False):
+        return False
     for i in range(n):
-        for j in range(n):
-            K.kkt[i * size + j] = K.acc[i * n + j]
-        for k in range(m):
-            K.kkt[i * size + n + k] = K.acc[o_R + i * K.n_rows + K.rows[k]]
         K.rhs[i] = -K.force[i]
     for k in range(m):
-        row = K.rows[k]
-        for j in range(n):
-            K.kkt[(n + k) * size + j] = K.acc[o_B + row * n + j]
-        for j in range(m):
-            K.kkt[(n + k) * size + n + j] = 0.0
-        K.rhs[n + k] = -K.bias[row]
-    if factor(K.kkt, size, K.pivots) != 0:
-        return False
-    solve(K.kkt, size, K.pivots, K.rhs)
+        K.rhs[n + k] = -K.bias[K.rows[k]]
+    solve_kkt(K, n + m, K.rhs)
     for k in range(K.n_rows):
         K.impulse[k] = 0.0
     for i in range(n):
@@ -407,7 +396,7 @@ def estimate_error(K: Any, h: float, m: int) -> None:
         for j in range(K.n_v):
             total -= K.turning[k * K.n_v + j] * K.error[j]
         K.rhs[n + k] = total
-    solve(K.kkt, n + m, K.pivots, K.rhs)
+    solve_kkt(K, n + m, K.rhs)
     for i in range(n):
         K.error[K.n_v + i] = K.rhs[i]
         if i < K.n_v:

@@ -19,12 +19,14 @@ from mbd.kernel.fields import (
     NOT_CONVERGED,
     NOT_FINITE,
     NOW,
+    ORDERED,
     PASSING,
     RESIDUALS,
     ROWS,
     SINGULAR,
 )
-from mbd.kernel.linear import factor, solve
+from mbd.kernel.linear import factor, solve_definite
+from mbd.kernel.ordered import LOSS_AT_ONCE, OF_ACCELERATIONS, SYMMETRIC, factor_ordered, order_at, solve_kkt
 from mbd.kernel.passage import CONTINUOUS
 from mbd.kernel.restart import consistent, evaluate, fill_block, raise_scales, refresh_scales
 from mbd.kernel.straddle import forget_leftovers, keep_leftovers, note_leftovers
@@ -154,7 +156,7 @@ def explicit_rates(K: Any, t: float) -> int:
     if m == 0:
         for i in range(n):
             K.jump[i] = -K.acc[n * n + i]
-        if solve_mass(K.acc, n, K.jump):
+        if solve_definite(K.acc, n, K.jump, K.spare):
             return 0
         return consistent(K, t, K.q1, K.y1)
     o_bias = n * n + n + 2 * n * K.n_rows + 2 * K.n_rows
@@ -164,44 +166,20 @@ def explicit_rates(K: Any, t: float) -> int:
         K.rhs[i] = -K.acc[n * n + i]
     for k in range(m):
         K.rhs[n + k] = -K.acc[o_bias + K.rows[k]]
-    solve(K.kkt, n + m, K.pivots, K.rhs)
+    solve_kkt(K, n + m, K.rhs)
     for i in range(n):
         K.jump[i] = K.rhs[i]
     return 0
-
-
-def solve_mass(M: Any, n: int, b: Any) -> bool:
-    """b ← M⁻¹ b by M = L D Lᵀ, in the lower half of M; false where M is not clearly positive definite."""
-    for k in range(n):
-        pivot = M[k * n + k]
-        size = abs(pivot)
-        for j in range(k):
-            pivot -= M[k * n + j] * M[k * n + j] * M[j * n + j]
-        if not pivot > 1e-12 * size:
-            return False
-        M[k * n + k] = pivot
-        inverse = 1.0 / pivot
-        for i in range(k + 1, n):
-            entry = M[i * n + k]
-            for j in range(k):
-                entry -= M[i * n + j] * M[k * n + j] * M[j * n + j]
-            M[i * n + k] = entry * inverse
-    for i in range(n):
-        for j in range(i):
-            b[i] -= M[i * n + j] * b[j]
-    for i in range(n):
-        b[i] /= M[i * n + i]
-    for c in range(n):
-        i = n - 1 - c
-        for j in range(i + 1, n):
-            b[i] -= M[j * n + i] * b[j]
-    return True
 
 
 def factor_saddle(K: Any, m: int, symmetric: bool) -> bool:
     """LU factors in K.kkt of [M R; B 0] from K.acc, or of [M Bᵀ; B 0]; false where a pivot is missing."""
     n = K.n
     size = n + m
+    o = order_at(K, m)
+    if o > 0 and factor_ordered(K, K.acc, o, SYMMETRIC if symmetric else OF_ACCELERATIONS, LOSS_AT_ONCE):
+        return True
+    K.state[ORDERED] = 0
     o_R = n * n + n
     o_B = o_R + n * K.n_rows
     for i in range(n):
@@ -243,7 +221,7 @@ def return_to_rows(K: Any, t1: float) -> int:
         if size <= 1.0 or size >= before:
             break
         before = size
-        solve(K.kkt, n + m, K.pivots, K.rhs)
+        solve_kkt(K, n + m, K.rhs)
         for i in range(K.n_v):
             K.q1[i] += K.rhs[i]
     if size > 1e3:  # coordinates may have grown since their sizes were noted
@@ -258,7 +236,7 @@ def return_to_rows(K: Any, t1: float) -> int:
         K.rhs[i] = 0.0
     for k in range(m):
         K.rhs[n + k] = -K.acc[o_h + K.n_rows + K.rows[k]]
-    solve(K.kkt, n + m, K.pivots, K.rhs)
+    solve_kkt(K, n + m, K.rhs)
     fastest = 0.0
     change = 0.0
     for i in range(n):
@@ -324,7 +302,7 @@ def hold_error(K: Any) -> bool:
             for j in range(n if level == 1 else n_v):
                 off += K.acc[o_B + row * n + j] * K.error[level * n_v + j]
             K.rhs[n + k] = 0.0 if level == 0 and K.row_level[row] == 1 else -off
-        solve(K.kkt, n + m, K.pivots, K.rhs)
+        solve_kkt(K, n + m, K.rhs)
         for i in range(n_v):
             K.error[level * n_v + i] += K.rhs[i]
     return True

@@ -10,6 +10,7 @@ from typing import Any
 
 from mbd.kernel.fields import BLOCKED, CONFLICT, DEPENDENT, NOT_FINITE
 from mbd.kernel.linear import eliminate
+from mbd.kernel.ordered import LOSS_AT_ONCE, OF_ACCELERATIONS, factor_ordered, order_at, solve_ordered
 from mbd.kernel.redundancy import find_dependent, find_shares, shared, sharing, spread, take_shares
 
 __all__ = ["solve_rows"]
@@ -88,6 +89,9 @@ def solve_matrix(K: Any, m: int, together: bool) -> int:
     size = n + m
     o_R = n * n + n
     o_B = o_R + n * K.n_rows
+    o = 0 if together else order_at(K, m)
+    if o > 0 and factor_ordered(K, K.acc, o, OF_ACCELERATIONS, LOSS_AT_ONCE):  # far from any loss of rank
+        return solve_in_order(K, m)
     A = K.kkt
     for i in range(n):
         for j in range(n):
@@ -115,10 +119,31 @@ def solve_matrix(K: Any, m: int, together: bool) -> int:
     if rank < 0:
         K.state[BLOCKED] = K.columns[-1 - rank]
         return -CONFLICT
-    for i in range(n):
+    take_solution(K, m)
+    return rank
+
+
+def solve_in_order(K: Any, m: int) -> int:
+    """w and λ of the m rows in K.rows with the ordered factors at hand; all unknowns, or minus a failure."""
+    for i in range(K.n):
+        K.rhs[i] = -K.force[i]
+    for k in range(m):
+        K.rhs[K.n + k] = -K.bias[K.rows[k]]
+    finite = 0.0
+    solve_ordered(K, K.rhs)
+    for k in range(K.n + m):
+        finite += abs(K.rhs[k])
+    if not finite < 1e300:
+        return -NOT_FINITE
+    take_solution(K, m)
+    return int(K.n + m)
+
+
+def take_solution(K: Any, m: int) -> None:
+    """The solution in K.rhs to where others find it; multipliers of rows without part in it are 0."""
+    for i in range(K.n):
         K.jump[i] = K.rhs[i]
     for k in range(K.n_rows):
         K.impulse[k] = 0.0
     for k in range(m):
-        K.impulse[K.rows[k]] = K.rhs[n + k]
-    return rank
+        K.impulse[K.rows[k]] = K.rhs[K.n + k]

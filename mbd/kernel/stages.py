@@ -16,10 +16,25 @@ from __future__ import annotations
 from typing import Any
 
 from mbd.kernel.complex_linear import factor_complex, solve_complex
-from mbd.kernel.fields import AUX_STEP, BLOCKED, EPS, FACTORIZATIONS, ITERATIONS, MODE, NOW, RESIDUALS, ROWS, TANGENTS
+from mbd.kernel.fields import (
+    AUX_STEP,
+    BLOCKED,
+    EPS,
+    FACTORIZATIONS,
+    ITERATIONS,
+    MODE,
+    NOW,
+    ORDERED,
+    PIVOTED,
+    RESIDUALS,
+    ROWS,
+    TANGENTS,
+)  # fmt: skip
 from mbd.kernel.hooks import call
 from mbd.kernel.iteration import residual_size
-from mbd.kernel.linear import factor, solve
+from mbd.kernel.linear import factor
+from mbd.kernel.ordered import LOSS_OF_STEP, OF_TANGENT, factor_ordered, order_at, solve_kkt
+from mbd.kernel.ordered_complex import factor_pair_ordered, solve_pair_ordered
 from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import add_shares, share_loads
 
@@ -248,9 +263,17 @@ def keep_held(K: Any, m: int) -> None:
 
 def factor_stages(K: Any, size: int) -> bool:
     """LU factors of both matrices; false where a pivot is missing."""
-    column = factor(K.kkt, size, K.pivots)
-    if column == 0:
-        column = factor_complex(K.stages, stage_place(K, PAIR), size, stage_place(K, PAIR_PIVOTS))
+    o = 0 if sharing(K) else order_at(K, size - K.n)
+    column = 0
+    if o == 0 or not factor_ordered(K, K.kkt, o, OF_TANGENT, LOSS_OF_STEP):
+        K.state[ORDERED] = 0
+        K.counts[PIVOTED] += 1 if o > 0 else 0
+        column = factor(K.kkt, size, K.pivots)
+    o_P = stage_place(K, PAIR_PIVOTS)
+    if column == 0 and o > 0 and factor_pair_ordered(K, stage_place(K, PAIR), o, LOSS_OF_STEP):
+        K.stages[o_P] = -float(o)  # in the place of a row, which is not negative
+    elif column == 0:
+        column = factor_complex(K.stages, stage_place(K, PAIR), size, o_P)
     K.counts[FACTORIZATIONS] += 1
     K.state[BLOCKED] = column - 1
     return bool(column == 0)
@@ -297,7 +320,7 @@ def correct_positions_of_stages(K: Any, m: int, h: float, whole: bool) -> None:
             K.work[j] = 0.0
         for k in range(m):
             K.work[n + k] = S[o_h + i * m + k]
-        solve(K.kkt, size, K.pivots, K.work)
+        solve_kkt(K, size, K.work)
         for j in range(n_v):
             before = S[o_U + i * n_v + j]
             S[o_U + i * n_v + j] = K.work[j] if whole else before + K.work[j]
@@ -352,7 +375,7 @@ def solve_real(K: Any, m: int, h: float) -> None:
         for i in range(3):
             total -= S[S_REAL + i] * S[o_r + i * size + j]
         K.rhs[j] = total if j < K.n else total * inverse
-    solve(K.kkt, size, K.pivots, K.rhs)
+    solve_kkt(K, size, K.rhs)
 
 
 def solve_pair(K: Any, m: int, h: float) -> None:
@@ -374,7 +397,11 @@ def solve_pair(K: Any, m: int, h: float) -> None:
             re = turned
         S[o_b + j] = re
         S[o_b + size + j] = im
-    solve_complex(S, stage_place(K, PAIR), size, stage_place(K, PAIR_PIVOTS), o_b)
+    o_P = stage_place(K, PAIR_PIVOTS)
+    if S[o_P] < 0.0:
+        solve_pair_ordered(K, stage_place(K, PAIR), int(-S[o_P]), o_b)
+    else:
+        solve_complex(S, stage_place(K, PAIR), size, o_P, o_b)
 
 
 def retreat_stages(K: Any, m: int, part: float) -> None:

@@ -17,6 +17,7 @@ from __future__ import annotations
 from typing import Any
 
 from mbd.kernel.fields import BLOCKED, EPS, KICK, NEAR, NOW, PASSING, POSE, ROWS
+from mbd.kernel.ordered import order_at
 from mbd.kernel.restart import evaluate
 
 __all__ = [
@@ -46,7 +47,7 @@ CLEAR = 0.06
 """Part of a step by which a pose must be away from all nodes [-]."""
 LOOKS_AHEAD = 4
 """Places along the motion at which w is found [-]."""
-SETTLED = 0.01
+NEAR_ENOUGH = 0.01
 """Part of a step by which the last of these may differ from where w vanishes [-]."""
 VANISHED = 0.2
 """Length of w at a pose, over that of now: more, and rows only come close to losing rank [-]."""
@@ -68,7 +69,10 @@ def forget_leftovers(K: Any) -> None:
 def note_leftovers(K: Any) -> None:
     """|w| of each row at the candidate, at which K.acc is, and √(2 T): accepted with it by `keep_leftovers`."""
     m = K.state[ROWS]
-    leftovers_here(K, m)
+    if order_at(K, m) > 0:
+        lengths_of_many(K, m)
+    else:
+        leftovers_here(K, m)
     for k in range(m):
         K.left1[k] = K.work[k]
     K.left1[m] = motion(K, K.y1)
@@ -142,6 +146,38 @@ def leftovers_here(K: Any, m: int) -> None:
             K.basis[base + j] *= inverse
 
 
+def lengths_of_many(K: Any, m: int) -> None:
+    """|w| into K.work where most rows have nothing in common: roots of the pivots of their products, in their order.
+
+    Rows keep their zeros there, which Gram–Schmidt fills; see `mbd.kernel.leftovers`.
+    """
+    n = K.n
+    o_B = n * n + n + n * K.n_rows
+    for j in range(n):
+        weight = K.acc[j * n + j]
+        K.spare[j] = 1.0 / weight**0.5 if weight > 0.0 else 1.0
+    for k in range(m):
+        count = 0
+        for j in range(n):
+            K.basis[k * n + j] = K.acc[o_B + K.rows[k] * n + j] * K.spare[j]
+            if K.basis[k * n + j] != 0.0:
+                K.support[count] = j
+                count += 1
+        for i in range(k + 1):
+            part = 0.0
+            for e in range(count):
+                part += K.basis[k * n + K.support[e]] * K.basis[i * n + K.support[e]]
+            K.spare[n + k * m + i] = part
+    for k in range(m):
+        pivot = max(K.spare[n + k * (m + 1)], 0.0)
+        K.work[k] = pivot**0.5
+        for a in range(k + 1, m):
+            part = K.spare[n + a * m + k]
+            if part != 0.0 and pivot > 0.0:
+                for b in range(k + 1, a + 1):
+                    K.spare[n + a * m + b] -= part / pivot * K.spare[n + b * m + k]
+
+
 def evaluate_ahead(K: Any, ahead: float) -> None:
     """K.acc at the state that is `ahead` of the accepted one, along its velocities and accelerations."""
     for i in range(K.n_v):
@@ -178,7 +214,7 @@ def times_to_poses(K: Any, m: int, unit: float) -> float:
                 until = NOWHERE
             K.work[m + k] = until
             first = min(first, until)
-        if first > 4.0 * FAR_GLANCE * unit or abs(first - ahead) < SETTLED * unit:
+        if first > 4.0 * FAR_GLANCE * unit or abs(first - ahead) < NEAR_ENOUGH * unit:
             break
         ahead = first
     K.detail[KICK] = 0.0

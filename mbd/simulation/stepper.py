@@ -156,7 +156,7 @@ class Stepper:
             "lam": rows, "lam_slope": rows, "left": rows + 1, "left1": rows + 1, "shift": n, "shift_change": n,
             "anchors": v["n_anchors"], "q1": n_q, "y1": n, "rate1": n, "aux1": n, "lam1": rows,
             "basis": (rows + 1) * n, "lower": (rows + 1) * rows, "mix": rows * rows, "shares": rows * rows,
-            "kkt": size * size, "rhs": size, "spare": size * size + tail, "turning": rows * n,
+            "kkt": size * size, "rhs": size, "spare": 2 * size * (size + 1) + tail, "turning": rows * n,
             "work": 3 * size, "force": n, "bias": rows, "jump": n, "impulse": rows,
             "guards0": v["n_watched"], "guards1": v["n_watched"], "scale": n + 2 * rows, "weight": n,
             "deepest": contacts, "sinking": contacts, "side": guards, "pick": 8, "detail": 8,
@@ -176,7 +176,7 @@ class Stepper:
             "closing": contacts, "parting": contacts, "lifting": rows, "kept_flags": 3 * contacts + 3 * frictions,
             "sticks": frictions, "loose": frictions, "was": frictions, "let_go": frictions, "dropped": rows,
             "mode_key": MODE_CAPACITY * (contacts + rows + frictions),
-            "mode_code": PROGRAMS * MODE_CAPACITY,
+            "mode_code": PROGRAMS * MODE_CAPACITY, "mode_order": MODE_CAPACITY, "orders": 1, "support": rows * (n + 2),
             "mode_count": 1, "rows": rows,
             "pivots": size, "columns": size, "lcp_rows": contacts + frictions, "lcp_who": contacts + frictions,
             "lcp_basis": unknowns, "fired": 2, "state": 24, "counts": 16,
@@ -233,10 +233,14 @@ class Stepper:
         if PROGRAMS * (count + 1) > len(v["mode_code"]):
             v["mode_key"] = np.concatenate([v["mode_key"], np.zeros_like(v["mode_key"])])
             v["mode_code"] = np.concatenate([v["mode_code"], np.zeros_like(v["mode_code"])])
+            v["mode_order"] = np.concatenate([v["mode_order"], np.zeros_like(v["mode_order"])])
         v["mode_key"][count * width : (count + 1) * width] = np.concatenate([flags, dropped, phases])
         known = [code.tangent, code.residual] + ([] if code.correction is None else [code.correction, code.solution])
         places = [*range(len(self.functions), len(self.functions) + len(known)), 0, 0]
         v["mode_code"][PROGRAMS * count : PROGRAMS * (count + 1)] = places[:PROGRAMS]
+        if code.order is not None:
+            v["mode_order"][count] = len(v["orders"])
+            v["orders"] = np.concatenate([v["orders"], code.order])
         self.functions += known
         self.modes.append(code)
         mix = v["mix"].reshape(v["n_rows"], -1) if v["n_rows"] else v["mix"]

@@ -82,6 +82,11 @@ def _inertia(findings: Findings, equations: Equations, point: Point) -> None:
     n = equations.n_v
     M = at([entry for column in mass_matrix(equations)[:n] for entry in column[:n]], point).reshape(n, n)
     findings.equal("M is symmetric", "M", M, M.T, "two definitions of the same motion disagree", 1e-11)
+    composite = None if equations.geometry is None else equations.geometry.mass_matrix()
+    if composite is not None:
+        found = at([entry for line in composite for entry in line], point).reshape(n, n)
+        hint = "the motion per unit rate of a coordinate is not that of its bodies"
+        findings.equal("M = ∂r/∂a is that of composite bodies", "M", found, M, hint, 1e-11)
     law, hint = "M is positive semidefinite", "a mass or an inertia is negative somewhere"
     lowest = float(np.linalg.eigvalsh(0.5 * (M + M.T)).min()) / (1.0 + float(np.abs(M).max()))
     findings.holds(law, lowest > -1e-11, f"smallest eigenvalue {lowest:.3g} of its scale", hint)

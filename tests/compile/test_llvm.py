@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 
 from mbd.compile.cache import ObjectCache
-from mbd.compile.ir import LARGE, module
+from mbd.compile.ir import LARGE, MANY_ZEROS, module
 from mbd.compile.layout import Layout
 from mbd.compile.llvm import Library, call, compile_functions, emit_object, host, load_object
 from mbd.errors import ModelError, UnknownNameError
@@ -51,6 +51,21 @@ def test_big_functions_are_cut_and_small_ones_are_not():
     whole = by_llvm({"r": big.outputs}, big.layout, large=10 * LARGE)["r"]
     cut = by_llvm({"r": big.outputs}, big.layout)["r"]
     assert np.array_equal(results(whole, big), results(cut, big))
+
+
+@pytest.mark.parametrize("level", [0, 2])
+@pytest.mark.parametrize("between", [3, MANY_ZEROS, MANY_ZEROS + 1, MANY_ZEROS + 2, MANY_ZEROS + 3, 100])
+def test_zeros_side_by_side_are_all_written_and_nothing_else_is(between, level):
+    tape = Tape()
+    one = tape.input("t") + 1.0
+    outputs = [one, *[tape.zero] * between, one, *[tape.lift(-0.0)] * between, tape.zero]
+    library = compile_functions({"f": outputs}, Layout(0, 0, 0, 0, 0, 0, 0), level, NONE)
+    out = np.full(len(outputs) + 8, np.nan)
+    library["f"](np.array([2.0, 0.0, 0.0]), np.zeros(0), out)
+    expected = np.zeros(len(outputs))
+    expected[[0, between + 1]] = 3.0
+    np.testing.assert_array_equal(out[: len(outputs)], expected)
+    assert np.all(np.isnan(out[len(outputs) :]))
 
 
 def test_sines_and_cosines_of_four_angles_are_one_call():

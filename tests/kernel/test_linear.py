@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from mbd.kernel.linear import eliminate, factor, solve
+from mbd.kernel.linear import eliminate, factor, solve, solve_definite
 
 sizes = st.integers(1, 9)
 seeds = st.integers(0, 2**32 - 1)
@@ -83,3 +83,25 @@ def test_elimination_does_not_mind_the_units_of_rows_and_columns(n, seed):
     rank, x, _ = eliminated(rows[:, None] * A * columns, rows * b)
     assert rank == n
     np.testing.assert_allclose(columns * x, np.linalg.solve(A, b), rtol=1e-7, atol=1e-9)
+
+
+@given(n=sizes, seed=seeds)
+def test_definite_masses_are_solved_with(n, seed):
+    rng = np.random.default_rng(seed)
+    root = rng.normal(size=(n, n))
+    M, b = root @ root.T + 0.1 * np.eye(n), rng.normal(size=n)
+    flat, x = M.flatten(), b.copy()
+    assert solve_definite(flat, n, x, np.zeros(n))
+    bound = 1e-13 * np.linalg.cond(M) * (1.0 + np.abs(b).max())
+    np.testing.assert_allclose(M @ x, b, rtol=0, atol=bound * np.abs(M).max())
+
+
+@given(n=st.integers(2, 9), seed=seeds)
+def test_masses_that_are_not_definite_are_refused(n, seed):
+    rng = np.random.default_rng(seed)
+    root = rng.normal(size=(n, n))
+    root[-1] = root[0]
+    signs = np.ones(n)
+    signs[rng.integers(n)] = -1.0
+    for M in (root @ root.T, np.diag(signs)):
+        assert not solve_definite(M.flatten(), n, rng.normal(size=n), np.zeros(n))

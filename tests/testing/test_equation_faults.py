@@ -41,6 +41,9 @@ class Bent:
     def balance_with(self, *what):
         return self.geometry.balance_with(*what)
 
+    def mass_matrix(self):
+        return [[1.1 * entry for entry in line] for line in self.geometry.mass_matrix()]
+
     def partials(self, outputs):
         return [{node: 1.1 * slope for node, slope in known.items()} for known in self.geometry.partials(outputs)]
 
@@ -93,6 +96,7 @@ FAULTS = [
     ("rate", "ḣ = B v + h_t"),
     ("geometry", "ḧ = B a + (ḣ)˙ at a = 0"),
     ("geometry", "B = ∂h/∂q"),
+    ("geometry", "M = ∂r/∂a is that of composite bodies"),
     ("geometry", "tangent exactness: Newton's matrix against differences (index 3)"),
     ("kinked rate", "B = ∂ḣ/∂v of a row on velocities"),
     ("rate", "tangent exactness: Newton's matrix against differences (ggl)"),

@@ -1,0 +1,110 @@
+"""How much of each row of a large mechanism is left beside the others, where most rows have nothing in common.
+
+The squares that remain are the pivots of G = Q Qᵀ, Q the scaled rows, eliminated with the largest next (Cholesky with
+diagonal pivoting): what Gram–Schmidt finds, to within √ε of a row's length. While orthogonal rows fill up with what
+they were cleared of, G keeps its zeros: a row that is done makes neighbours of its own neighbours only.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+__all__ = ["leftovers_of_many"]
+
+NOTHING_LEFT = 1e-15
+"""Square of a scaled row below which it is round-off of its terms [-]."""
+
+
+def leftovers_of_many(
+    K: Any, m: int, h: float, ratio: float, ahead: float, place: int, o_S: int, stride: int, o_H: int, width: int
+) -> None:
+    """What `leftovers` finds, in the same places of K.spare and K.columns."""
+    if place == 0:
+        find_support(K, m, o_S, stride, o_H, width)
+    G = 5 * m
+    for row in range(m):
+        K.spare[4 * m + row] = scaled_row(K, m, row, h, ratio, ahead, o_H, width)
+        for other in range(row + 1):
+            part = common_part(K, row, other)
+            K.spare[G + row * m + other] = part
+            K.spare[G + other * m + row] = part
+    for done in range(m):
+        if place == 0:
+            longest = done
+            for k in range(done + 1, m):
+                if K.spare[G + K.columns[k] * (m + 1)] > K.spare[G + K.columns[longest] * (m + 1)]:
+                    longest = k
+            row = K.columns[longest]
+            K.columns[longest] = K.columns[done]
+            K.columns[done] = row
+        row = K.columns[done]
+        K.spare[place + done] = max(K.spare[G + row * (m + 1)], 0.0) ** 0.5
+        K.spare[3 * m + done] = K.spare[4 * m + row]
+        take_out(K, m, done, G)
+
+
+def find_support(K: Any, m: int, o_S: int, stride: int, o_H: int, width: int) -> None:
+    """Which entries of each row are not zero, into K.support; weights of columns behind the rows of the basis."""
+    n = K.n_v
+    for j in range(n):
+        weight = abs(K.out[o_S + stride * j])
+        K.basis[m * n + j] = 1.0 / weight**0.5 if weight > 0.0 else 1.0
+    for row in range(m):
+        K.columns[row] = row
+        count = 0
+        for j in range(n):
+            K.basis[row * n + j] = 0.0
+            if K.out[o_H + row * width + j] != 0.0 or K.turning[row * n + j] != 0.0:
+                count += 1
+                K.support[row * (n + 1) + count] = j
+        K.support[row * (n + 1)] = count
+
+
+def scaled_row(K: Any, m: int, row: int, h: float, ratio: float, ahead: float, o_H: int, width: int) -> float:
+    """A row of B, `ahead` of now, over the length that is returned, into the basis."""
+    n = K.n_v
+    moves = 0.0 if K.row_level[K.rows[row]] == 1 else 1.0
+    length = 0.0
+    turned = 0.0
+    for e in range(K.support[row * (n + 1)]):
+        j = K.support[row * (n + 1) + 1 + e]
+        weight = K.basis[m * n + j]
+        turn = K.turning[row * n + j] * weight
+        entry = K.out[o_H + row * width + j] * weight - ratio * turn
+        length += entry * entry
+        turned += turn * turn
+        K.basis[row * n + j] = entry + moves * ahead * turn
+    length = length**0.5 + moves * h * turned**0.5 + 1e-300
+    for e in range(K.support[row * (n + 1)]):
+        K.basis[row * n + K.support[row * (n + 1) + 1 + e]] /= length
+    return float(length)
+
+
+def common_part(K: Any, row: int, other: int) -> float:
+    """The product of two scaled rows."""
+    n = K.n_v
+    part = 0.0
+    for e in range(K.support[row * (n + 1)]):
+        j = K.support[row * (n + 1) + 1 + e]
+        part += K.basis[row * n + j] * K.basis[other * n + j]
+    return float(part)
+
+
+def take_out(K: Any, m: int, done: int, G: int) -> None:
+    """Clear the rows still to come of their parts along the one that is done."""
+    row = K.columns[done]
+    pivot = K.spare[G + row * (m + 1)]
+    if not pivot > NOTHING_LEFT:
+        return
+    near = m * (K.n_v + 1)
+    count = 0
+    for k in range(done + 1, m):
+        if K.spare[G + row * m + K.columns[k]] != 0.0:
+            K.support[near + count] = K.columns[k]
+            count += 1
+    for a in range(count):
+        one = K.support[near + a]
+        part = K.spare[G + row * m + one] / pivot
+        for b in range(count):
+            other = K.support[near + b]
+            K.spare[G + one * m + other] -= part * K.spare[G + row * m + other]

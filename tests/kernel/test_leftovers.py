@@ -1,0 +1,45 @@
+"""What is left of rows beside others: from their Gram matrix as by Gram–Schmidt."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+from hypothesis import given, strategies as st
+
+from mbd.kernel.leftovers import leftovers_of_many
+from mbd.kernel.passage import leftovers
+
+
+def kernel(rng, n, m, density):
+    """Rows with few entries and their rates, behind a diagonal, as in K.out; two places of K.spare are read later."""
+    there = rng.random((m, n)) < density
+    there[np.arange(m), rng.permutation(n)[:m]] = True
+    rows, turning = (np.where(there, rng.normal(size=(m, n)), 0.0) for _ in range(2))
+    return SimpleNamespace(
+        n_v=n, out=np.concatenate([rng.uniform(0.5, 2.0, n), rows.ravel()]), turning=turning.ravel(),
+        basis=np.zeros((m + 1) * n), support=np.zeros(m * (n + 2), dtype=np.int64), spare=np.zeros(5 * m + m * m),
+        columns=np.zeros(m, dtype=np.int64), rows=np.arange(m), row_level=np.zeros(m, dtype=np.int64),
+    )  # fmt: skip
+
+
+@given(n=st.integers(2, 16), m=st.integers(1, 10), seed=st.integers(0, 2**32 - 1), density=st.floats(0.05, 1.0))
+def test_both_ways_leave_the_same_of_every_row_in_the_same_order(n, m, seed, density):
+    m, found = min(m, n), []
+    for way in (leftovers, leftovers_of_many):
+        K = kernel(np.random.default_rng(seed), n, m, density)
+        for place, ahead in enumerate((0.0, -0.01, 0.01)):
+            way(K, m, 0.01, 0.005, ahead, place * m, 0, 1, n, n)
+        found.append((K.spare[: 4 * m].copy(), K.columns.copy()))
+    (one, order), (other, same) = found
+    np.testing.assert_array_equal(order, same)
+    np.testing.assert_allclose(one, other, rtol=0, atol=3e-8)
+    assert np.all(np.diff(other[:m]) <= 1e-12)  # the longest first
+
+
+def test_nothing_is_left_of_a_row_that_depends_on_others():
+    K = kernel(np.random.default_rng(3), 8, 4, 0.5)
+    rows, turning = K.out[8:].reshape(4, 8), K.turning.reshape(4, 8)
+    rows[3], turning[3] = rows[0] - 2.0 * rows[1], 0.0
+    leftovers_of_many(K, 4, 0.0, 0.0, 0.0, 0, 0, 1, 8, 8)
+    assert K.spare[3] < 1e-7 < K.spare[2]
