@@ -279,26 +279,27 @@ class Library(ByName[MachineFunction]):
         self._machine = Machine()
         self._later: list[Machine] = []
 
-    def add(self, programs: Mapping[str, Sequence[Node]]) -> None:
-        """Compile, or fetch from the cache, one function per name and list of outputs."""
+    def add(self, programs: Mapping[str, Sequence[Node]], rarely: bool = False) -> None:
+        """Compile, or fetch from the cache, one function per name and list of outputs; `rarely` called: at level 0."""
         for name in programs:
             if not re.fullmatch(r"[A-Za-z_][\w.]*", name, re.ASCII):
                 raise ModelError(f"a compiled function cannot be called {name!r}; use letters, digits, '_' and '.'")
             if name in self._functions:
                 raise ModelError(f"this library already has a function {name!r}; give every function its own name")
         begin = time.perf_counter()
-        text = module(programs, self.layout, host().fused, **CUTS.get(self.level, {}))
+        final = 0 if rarely else self.level
+        text = module(programs, self.layout, host().fused, **CUTS.get(final, {}))
         written = time.perf_counter()
-        large = self.hasty is not None and text.count("\n") > self.hasty
+        large = not rarely and self.hasty is not None and text.count("\n") > self.hasty
         texts = pieces(text) if large else [text]
-        known = [self._cache.load(_key(_tag(text, self.level))) for text in texts]
+        known = [self._cache.load(_key(_tag(text, final))) for text in texts]
         hasty = large and None in known
-        level = 0 if hasty else self.level
+        level = 0 if hasty else final
         cached = None not in known
         if hasty:
             codes = [cached_object(_tag(text, 0), lambda: emit_object(text, 0), self._cache)]
         else:
-            codes = [code or self._made(text) for code, text in zip(known, texts, strict=True)]
+            codes = [code or self._made(text, final) for code, text in zip(known, texts, strict=True)]
         made = time.perf_counter()
         addresses = self._machine.load(codes[0], [f"mbd.{name}" for name in programs], *codes[1:])
         for (name, outputs), address in zip(programs.items(), addresses, strict=True):
@@ -308,9 +309,9 @@ class Library(ByName[MachineFunction]):
         if hasty:
             submit(_Later(self, list(programs), texts))
 
-    def _made(self, text: str) -> bytes:
+    def _made(self, text: str, level: int) -> bytes:
         """The object file of a text that was not in the cache a moment ago."""
-        return cached_object(_tag(text, self.level), lambda: emit_object(text, self.level), self._cache)
+        return cached_object(_tag(text, level), lambda: emit_object(text, level), self._cache)
 
     def replace(self, names: Sequence[str], codes: Sequence[bytes]) -> None:
         """Give provisional functions their final code."""
@@ -342,7 +343,7 @@ class _Later:
         if library is None:
             return False
         if len(self.codes) < len(self.texts):
-            self.codes.append(library._made(self.texts[len(self.codes)]))
+            self.codes.append(library._made(self.texts[len(self.codes)], library.level))
             return True
         library.replace(self.names, self.codes)
         return False

@@ -75,11 +75,7 @@ class Mechanism:
         started = perf_counter()
         self.equations = equations
         self.backend: Backend = choose_backend(backend)
-        common = {
-            "accelerations": programs.accelerations(equations),
-            "guards": programs.guards(equations),
-            "scales": programs.scales(equations),
-        }
+        common = {"accelerations": programs.accelerations(equations), "guards": programs.guards(equations)}
         composed = programs.compose(equations)
         if composed is not None:
             common["compose"] = composed
@@ -87,6 +83,7 @@ class Mechanism:
         self._accelerations = common["accelerations"]
         self.common: Functions = self.backend.functions(self.layout)
         self.common.add(common)
+        self.common.add({"scales": programs.scales(equations)}, rarely=True)  # twice a restart, and nowhere else
         self.vector = composed is None
         self.named: dict[str, Any] = {}
         self.notes: list[str] = []

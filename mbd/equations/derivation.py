@@ -55,6 +55,7 @@ def _derived(model: Model, plan: Plan) -> Equations:
     scope = Surroundings(model.ground, plan.edges, plan.cut, model.gravity, model.tunable, plan.planar)
     scope.offer_frames(model.frames.values())
     moving = list(scope.bodies.values())
+    vectors = all(joint.is_vector for joint in plan.edges)
     masses = {body.body.name: body.body.mass_properties(scope) for body in moving}
     dynamics = Dynamics(moving, masses, scope.placement, scope.views, scope.inputs)
     found = causes(scope, (*plan.edges, *plan.cut), model.forces)
@@ -77,10 +78,11 @@ def _derived(model: Model, plan: Plan) -> Equations:
         states=tuple(coordinate for coordinate, _ in scope.states), parameters=scope.parameters.found,
         balance=tuple(balance), rows=tuple(constraints.rows), contacts=tuple(constraints.contacts),
         guards=tuple(constraints.guards), effects=effects, kinetic=dynamics.kinetic(), potential=potential,
-        compose=None if all(joint.is_vector for joint in plan.edges) else scope.composed,
+        compose=None if vectors else scope.composed,
         idle=tuple(constraints.idle), output=outputs, output_names=outputs.names,
         velocity_names=tuple(f"{coordinate.name}.rate" for coordinate in scope.coordinates), notes=plan.notes,
-        figure=figure_of(model), geometry=TreeGeometry(scope, dynamics, work, rests, constraints),
+        figure=figure_of(model),
+        geometry=TreeGeometry(scope, dynamics, work, rests, constraints, plan.planar and vectors),
         frictions=tuple(constraints.frictions),
     )  # fmt: skip
     whole = work + _closed(scope, constraints)
@@ -113,13 +115,20 @@ def _state_balance(scope: Surroundings, found: Sequence[Cause]) -> list[Node]:
 
 @dataclass(frozen=True)
 class TreeGeometry:
-    """`mbd.equations.equations.Geometry` of a tree of bodies."""
+    """`mbd.equations.equations.Geometry` of a tree of bodies; `planar` if so, with coordinates that add."""
 
     scope: Surroundings
     dynamics: Dynamics
     work: Work
     rests: Sequence[Node]
     constraints: Laws
+    planar: bool
+
+    @property
+    def depth(self) -> float:
+        """How many coordinates move a body, on average."""
+        paths = [len(body.path) for body in self.scope.bodies.values() if body.parent is not None]
+        return sum(paths) / max(1, len(paths))
 
     def balance_with(
         self,
@@ -129,17 +138,35 @@ class TreeGeometry:
         forces: Sequence[Node] = (),
     ) -> list[Node]:
         """The balance with forces on these values and velocities in the same reverse sweep."""
+        work = self.work + self._viewed(values, multipliers, rates, forces)
+        return [*self.dynamics.balance(work), *self.rests]
+
+    def tangent(
+        self,
+        values: Sequence[Node],
+        multipliers: Sequence[Node],
+        rates: Sequence[Node] = (),
+        forces: Sequence[Node] = (),
+    ) -> list[list[Node]] | None:
+        """The columns of S of the same balance from quantities of branches: of planar trees whose coordinates add."""
+        if not self.planar:
+            return None
+        return self.dynamics.tangent(self.work + self._viewed(values, multipliers, rates, forces), self.rests)
+
+    def _viewed(
+        self, values: Sequence[Node], multipliers: Sequence[Node], rates: Sequence[Node], forces: Sequence[Node]
+    ) -> Work:
+        """Forces on values and velocities, written in views."""
         laws = self.constraints
         rows = list(zip(laws.rows, laws.viewed, strict=True))
         viewed = {row.value.index: view for row, view in rows if not row.is_velocity}
         moving = {row.rate.index: view for row, view in rows if row.is_velocity}
         moving |= {f.rate.index: view for f, view in zip(laws.frictions, laws.sliding, strict=True)}
         viewed |= {laws.contacts[number].gap.index: gap for number, gap, _ in laws.penalties}
-        work = Work(
+        return Work(
             [viewed.get(value.index, value) for value in values], list(multipliers),
             [moving.get(rate.index, rate) for rate in rates], list(forces),
         )  # fmt: skip
-        return [*self.dynamics.balance(self.work + work), *self.rests]
 
     def mass_matrix(self) -> list[list[Node]] | None:
         """M of the bodies, where no force and no state depends on accelerations."""

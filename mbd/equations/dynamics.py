@@ -8,12 +8,13 @@ power; the sweep itself is the recursion of forces from the tips of the tree to 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 from mbd.bodies.algebra import cross, dot, rotate, scaled, total
 from mbd.bodies.mass import MassProperties
-from mbd.equations.composite import composite_mass_matrix
+from mbd.equations.composite_mass import composite_mass_matrix
+from mbd.equations.composite_tangent import Branches, turns_by_numbers
 from mbd.equations.inputs import Inputs
 from mbd.equations.kinematics import Moving, Twist, twists
 from mbd.equations.placement import Placement
@@ -48,6 +49,11 @@ class Work:
         self.velocities.append(velocity)
         self.forces.append(force)
 
+    def key(self) -> Hashable:
+        """Equal for the same work on the same tape."""
+        parts = (self.values, self.multipliers, self.velocities, self.forces)
+        return tuple(tuple(("node", p.index) if isinstance(p, Node) else p for p in part) for part in parts)
+
     def __add__(self, other: Work) -> Work:
         return Work(
             self.values + other.values, self.multipliers + other.multipliers,
@@ -69,12 +75,47 @@ class Dynamics:
         self._bodies, self._masses, self._inputs = bodies, masses, inputs
         self._placement, self._views, self._tape = placement, views, placement.tape
         self._twists = twists(bodies)
+        self._composites: Branches | None = None
+        self._balances: dict[Hashable, list[Node]] = {}
         self._inertia = [pull for body in bodies if body.parent is not None for pull in self._inertia_of(body)]
 
     def balance(self, work: Work) -> list[Node]:
         """M a + f of the bodies and of other forces (length n_v)."""
-        pulls_on, direct = self._read(work)
-        return self._gather([*self._inertia, *pulls_on], direct)
+        key = work.key()
+        if key not in self._balances:  # residual, tangent and correction of a mode ask for the same
+            pulls_on, direct = self._read(work)
+            self._balances[key] = self._gather([*self._inertia, *pulls_on], direct)
+        return list(self._balances[key])
+
+    def tangent(self, work: Work, rests: Sequence[Node]) -> list[list[Node]] | None:
+        """The columns of S = M + c_C C + c_K K of a planar tree from quantities of branches.
+
+        None where a coordinate does not turn its body by a number.
+
+        Parameters
+        ----------
+        rests : the rows of r that belong to first-order states (n_z)
+        """
+        branches = self._branches(len(rests))
+        if branches is None:
+            return None
+        pulls, direct = self._read(work)
+        pulls = [pull for pull in pulls if pull.carrier.parent is not None]
+        n = len(direct)
+        S = []
+        for line in branches.changes(pulls, [*direct, *rests]):
+            S.append([*(a + b for a, b in zip(line[:n], line[n : 2 * n], strict=True)), *line[2 * n :]])
+        for column, entries in zip(S[:n], branches.tangent([*self._inertia, *pulls]), strict=True):
+            column[:n] = [a + b for a, b in zip(entries, column[:n], strict=True)]
+        return S
+
+    def _branches(self, n_z: int) -> Branches | None:
+        """Quantities of branches, the same for all forces."""
+        if self._composites is None and turns_by_numbers(self._bodies, self._tape):
+            z, s = (tuple(self._tape.input(kind, k) for k in range(n_z)) for kind in "zs")
+            inputs = replace(self._inputs, z=z, s=s)
+            self._composites = Branches(self._bodies, self._masses, self._placement, inputs)
+        return self._composites
 
     def generalized(self, work: Work) -> list[Node]:
         """The forces alone, without the bodies' inertia and weight (length n_v)."""

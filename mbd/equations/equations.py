@@ -167,7 +167,13 @@ class Effect:
 
 
 class Geometry(Protocol):
-    """What a derivation knows of its own expressions: shorter ways to derivatives that the tape could take alone."""
+    """What a derivation knows of its own expressions: shorter ways to derivatives that the tape could take alone.
+
+    depth : how many coordinates move a body, on average
+    """
+
+    @property
+    def depth(self) -> float: ...
 
     def balance_with(
         self,
@@ -183,6 +189,15 @@ class Geometry(Protocol):
 
     def mass_matrix(self) -> list[list[Node]] | None:
         """M = ∂r/∂a, line by line; None where more than inertia depends on accelerations."""
+
+    def tangent(
+        self,
+        values: Sequence[Node],
+        multipliers: Sequence[Node],
+        rates: Sequence[Node] = (),
+        forces: Sequence[Node] = (),
+    ) -> list[list[Node]] | None:
+        """The columns of S = M + c_C C + c_K K of `balance_with` by a shorter way, or None where it knows none."""
 
     def partials(self, outputs: Sequence[Node]) -> list[dict[Node, Node]]:
         """For each x_j, ∂node/∂x_j of the nodes inside `outputs` (positions, rotations) where it is known."""
@@ -200,6 +215,7 @@ class Equations:
     output : any named result as a node ('left hip.angle', 'left shank.end.x', 'left knee.reaction_force.x', …)
     output_names : the names that `output` certainly knows
     idle : (owner, part) of rows of cut joints that hold whatever the motion, and were left out
+    memory : numbers that follow from the rest, kept once they were found
     """
 
     name: str
@@ -223,6 +239,7 @@ class Equations:
     figure: Callable[[], Any] | None = field(default=None, repr=False)
     geometry: Geometry | None = field(default=None, repr=False)
     frictions: tuple[Friction, ...] = ()
+    memory: dict[str, float] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @property
     def n_q(self) -> int:

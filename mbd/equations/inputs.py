@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from mbd.equations.equations import Equations
-from mbd.tape.node import Node, Tape
+from mbd.tape.node import Node, Scalar, Tape
 
 __all__ = ["Inputs"]
 
@@ -40,6 +41,17 @@ class Inputs:
             tape.input("t"), (tape.input("c", 0), tape.input("c", 1)), block("q", n_q), block("x", n_v),
             block("v", n_v), block("a", n_v), block("z", n_z), block("s", n_z), block("lam", n_rows),
         )  # fmt: skip
+
+    def directions(self, known: Sequence[Mapping[Node, Node]]) -> list[dict[Node, Scalar]]:
+        """Those of the columns of S: (1, c_C, c_K) in (a_j, v_j, x_j), and (1, c_C) in (ż_j, z_j).
+
+        known : for each x_j, ∂node/∂x_j of nodes that need not be differentiated through
+        """
+        c_C, c_K = self.c
+        found: list[dict[Node, Scalar]] = []
+        for j, (x, v, a) in enumerate(zip(self.x, self.v, self.a, strict=True)):
+            found.append({a: 1.0, v: c_C, x: c_K, **{node: c_K * slope for node, slope in known[j].items()}})
+        return found + [{s: 1.0, z: c_C} for s, z in zip(self.s, self.z, strict=True)]
 
     @property
     def n(self) -> int:

@@ -64,6 +64,7 @@ class Moving:
     turn : R, child axes in parent axes; arm : d, the joint in the parent; shift : the joint in the child
     columns : motion per unit rate of each coordinate
     turning, sliding : ω_r in child axes; ṗ of the joint's child frame against the parent in parent axes
+    sliding_rate : p̈ of the same
     angular_velocity, angular_acceleration, acceleration : ω, α, and a − g of the origin, child axes
     spin : A = [α]ₓ + [ω]ₓ²
     path : numbers of the coordinates that move it
@@ -82,6 +83,7 @@ class Moving:
     columns: tuple[Column, ...] = ()
     turning: Triple = ZERO
     sliding: Triple = ZERO
+    sliding_rate: Triple = ZERO
     path: tuple[int, ...] = ()
 
     def acceleration_at(self, place: Triple) -> Triple:
@@ -109,8 +111,9 @@ def moving_body(body: Body, parent: Moving, edge: Edge, scope: Scope) -> Moving:
     acceleration = difference(rotate(back, at_joint), rotate(spin, shift))
     path = (*parent.path, *range(edge.first, edge.first + len(edge.rates)))
     return Moving(
-        body, parent, edge, omega, alpha, acceleration, spin, turn, arm, shift, columns, turning, sliding, path
-    )
+        body, parent, edge, omega, alpha, acceleration, spin, turn, arm, shift, columns, turning, sliding,
+        sliding_rate, path,
+    )  # fmt: skip
 
 
 def _geometry(edge: Edge, scope: Scope) -> tuple[Rotation, Triple, Triple, tuple[Column, ...]]:

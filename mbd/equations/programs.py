@@ -27,8 +27,8 @@ from dataclasses import dataclass
 from math import perm
 
 from mbd.equations.equations import Equations
-from mbd.equations.factoring import factored
 from mbd.equations.inputs import Inputs
+from mbd.equations.tangents import Forces, tangent
 from mbd.tape.derivatives import gradient, jvp, jvps, live, substitute, vjp
 from mbd.tape.elimination import factors
 from mbd.tape.functions import maximum, minimum, sqrt
@@ -57,7 +57,7 @@ def newton(
 
     The rows `borne` take part with their multipliers alone, which are given.
 
-    ``K = [S  ∂r/∂λ; B̃  0]`` with ``S = M + c_C C_t + c_K K_t`` from one forward sweep a column, and
+    ``K = [S  ∂r/∂λ; B̃  0]`` with ``S = M + c_C C_t + c_K K_t`` (`mbd.equations.tangents`) and
     ``B̃ = B`` (index 3) or ``B + (c_K/c_C) ∂ḣ/∂x`` (stabilized, and rows on velocities in both); the columns of
     first-order states are zero in B̃.
     """
@@ -145,13 +145,16 @@ def _system(
         bottom[place] = [b + ratio * g for b, g in zip(B[place], change, strict=True)]
     if stabilized:
         turning = [entry for change in changes for entry in change]
-    S = _tangent(equations, r)
     right = _row_forces(equations, r, rows, B)
+    levels = _levels(equations, rows, stabilized)
+    forces = _forces(equations, sorted({*rows, *borne}), [(c, equations.tape.one) for c in penalties], sliding)
+    others = [*(entry for line in (*bottom, *right) for entry in line), *levels, *turning]
+    S = tangent(equations, r, forces, others)
     zero = equations.tape.zero
     n, n_z, m = inputs.n, equations.n_z, len(rows)
     matrix = [[S[j][i] for j in range(n)] + [right[k][i] for k in range(m)] for i in range(n)]
     matrix += [[*bottom[k], *([zero] * (n_z + m))] for k in range(m)]
-    return matrix, r + _levels(equations, rows, stabilized) + turning
+    return matrix, r + levels + turning
 
 
 def residual(
@@ -248,8 +251,25 @@ def _balance(
 
     Of rows on velocities λ_k ∂rate_k/∂v.
     """
-    inputs = Inputs.of(equations)
-    rows = list(rows)
+    inputs, forces = Inputs.of(equations), _forces(equations, rows, penalties, sliding)
+    values, multipliers, rates, rubbing = forces
+    if not values and not rates:
+        return list(equations.balance)
+    if equations.geometry is not None:
+        return equations.geometry.balance_with(*forces)
+    result = list(equations.balance)
+    for outputs, adjoints, along in (values, multipliers, inputs.x), (rates, rubbing, inputs.v):
+        if outputs:
+            added = vjp(outputs, adjoints, along) + [equations.tape.zero] * equations.n_z
+            result = [r + extra for r, extra in zip(result, added, strict=True)]
+    return result
+
+
+def _forces(
+    equations: Equations, rows: Iterable[int], penalties: Iterable[tuple[int, Node]], sliding: Iterable[int]
+) -> Forces:
+    """What acts besides `balance`."""
+    inputs, rows = Inputs.of(equations), list(rows)
     work = [(equations.rows[k].value, inputs.lam[k]) for k in rows if not equations.rows[k].is_velocity]
     fast = [k for k in rows if equations.rows[k].is_velocity]
     rates, forces = [equations.rows[k].rate for k in fast], [inputs.lam[k] for k in fast]
@@ -260,17 +280,7 @@ def _balance(
         contact = equations.contacts[c]
         if contact.force is not None:
             work.append((contact.gap, -(switch * contact.force)))
-    if not work and not rates:
-        return list(equations.balance)
-    values, multipliers = [value for value, _ in work], [multiplier for _, multiplier in work]
-    if equations.geometry is not None:
-        return equations.geometry.balance_with(values, multipliers, rates, forces)
-    result = list(equations.balance)
-    for outputs, adjoints, along in (values, multipliers, inputs.x), (rates, forces, inputs.v):
-        if outputs:
-            added = vjp(outputs, adjoints, along) + [equations.tape.zero] * equations.n_z
-            result = [r + extra for r, extra in zip(result, added, strict=True)]
-    return result
+    return [value for value, _ in work], [multiplier for _, multiplier in work], rates, forces
 
 
 def constraint_jacobian(equations: Equations, rows: Sequence[int]) -> list[list[Node]]:
@@ -298,20 +308,6 @@ def mass_matrix(equations: Equations, balance: Sequence[Node] | None = None) -> 
     inputs = Inputs.of(equations)
     r = equations.balance if balance is None else balance
     return jvps(r, [{rate: 1.0} for rate in (*inputs.a, *inputs.s)])
-
-
-def _tangent(equations: Equations, r: Sequence[Node]) -> list[list[Node]]:
-    """The columns of S: directions (1, c_C, c_K) in (a_j, v_j, x_j), and (1, c_C) in (ż_j, z_j)."""
-    inputs = Inputs.of(equations)
-    c_C, c_K = inputs.c
-    known = [{} for _ in inputs.x] if equations.geometry is None else equations.geometry.partials(r)
-    directions: list[dict[Node, Node | float]] = []
-    for j, (x, v, a) in enumerate(zip(inputs.x, inputs.v, inputs.a, strict=True)):
-        directions.append({a: 1.0, v: c_C, x: c_K, **{node: c_K * slope for node, slope in known[j].items()}})
-    directions += [{s: 1.0, z: c_C} for s, z in zip(inputs.s, inputs.z, strict=True)]
-    plain = [entry for column in jvps(r, directions) for entry in column]
-    entries = min(plain, factored(plain, inputs.c), key=lambda S: len(live([*r, *S])))
-    return [entries[j * len(r) : (j + 1) * len(r)] for j in range(len(r))]
 
 
 def _row_forces(

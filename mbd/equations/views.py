@@ -33,12 +33,13 @@ class View:
 
 @dataclass(frozen=True, eq=False)
 class Pull:
-    """A force at a place of a body [N], and a torque on it [N m], in body axes."""
+    """A force at a place of a body [N], and a torque on it [N m], in body axes; `ground`: the force in ground axes."""
 
     carrier: Moving
     place: Triple = ZERO
     force: Triple = ZERO
     torque: Triple = ZERO
+    ground: Triple = ZERO
 
 
 class Views:
@@ -158,7 +159,7 @@ class Views:
         back = transpose(self._placement.axes(of.carrier).rotation)
         columns = [rotate(back, (bar[0], bar[1], bar[2])) for bar in share]
         if isinstance(of, Point):
-            return Pull(of.carrier, of.place, force=columns[0])
+            return Pull(of.carrier, of.place, force=columns[0], ground=(share[0][0], share[0][1], share[0][2]))
         if motion:
             return Pull(of.carrier, torque=columns[0])
         (_, a, b), (c, _, d), (e, f, _) = columns

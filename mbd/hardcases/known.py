@@ -12,8 +12,7 @@ REFUSED_BESIDE_POSES = (
 KNOWN: dict[tuple[str, str], str] = {("b2b-iftomm-a02-fourbar-N40", "RadauIIA"): REFUSED_BESIDE_POSES}
 """Reasons by case and scheme.
 
-Not an excuse: what stands here
-fails, the command says so and its exit code is 1. A test complains once it holds.
+Not an excuse: what stands here fails, the command says so and its exit code is 1. A test complains once it holds.
 """
 
 

@@ -95,6 +95,14 @@ def test_a_large_function_runs_at_once_and_is_exchanged_for_one_with_the_same_bi
         assert np.array_equal(results(version, LINKS), expected)
 
 
+def test_what_is_called_rarely_stays_at_level_0_with_the_same_bits(jobs):
+    library, patient = Library(LINKS.layout, cache=NONE, hasty=0), Library(LINKS.layout, cache=NONE)
+    library.add({"r": LINKS.outputs}, rarely=True)
+    patient.add({"r": LINKS.outputs})
+    assert library.builds[0].level == 0 and not library["r"].provisional and not jobs
+    assert np.array_equal(results(library["r"], LINKS), results(patient["r"], LINKS))
+
+
 def test_what_was_made_in_the_background_is_found_again(jobs, tmp_path):
     cache = ObjectCache(tmp_path)
     first = hasty(cache)
