@@ -91,14 +91,16 @@ def judge_slider_crank(integrator: Any) -> Outcome:
     passages = _passages(finest, "main.angle", 0.5 * math.pi)
     first = passages[0] if passages else math.nan
     speed = float(finest.at(first)["main.angle.rate"]) if passages else math.nan
-    L = definition(J3)["definition"]["L"]
+    L, most = definition(J3)["definition"]["L"], allowance(CRANK, turn, dt, angle.size)
     branch = max(float(np.max(np.abs(
         run["guide.displacement"] - 2.0 * L * np.cos(run["main.angle"] - 0.5 * math.pi)))) for run in runs)  # fmt: skip
     return Outcome(
         [
             Figure("runs that stop early", sum(not run.success for run in runs), 0),
-            *found.figures({"error of the crank angle [rad]": allowance(CRANK, turn, dt, angle.size),
-                            "error of the slider [m]": allowance(CRANK, turn, dt, 2.0 * L * angle.size)}),
+            *found.figures(
+                dict(zip(found.errors, (most, 2.0 * L * most), strict=True)),
+                dict(zip(found.errors, (angle.accuracy, slider.accuracy), strict=True)),
+            ),
             Figure("error of the time of the first singular pose [s]", abs(first - float(instant.value)),
                    allowance(CRANK, turn, dt, instant.size)),
             Figure("error of the crank rate there [rad/s]", abs(speed - float(rate.value)),
