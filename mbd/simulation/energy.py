@@ -114,13 +114,14 @@ class EnergyWatch:
     Attributes
     ----------
     problem, note : what was found, in a sentence; '' if nothing
+    row : the first from which on the energy is the scheme's own, −1 if there is none
     share : of the energy that the mechanism had, what the scheme gave (positive) or took [-]
     rows, ledgers : rows in which T + V was evaluated, and ledgers made
     """
 
     def __init__(self) -> None:
         self.problem = self.note = ""
-        self.share = 0.0
+        self.share, self.row = 0.0, -1
         self.rows = self.ledgers = 0
         self._due, self._looks, self._upto = FIRST_LOOK, 0, 0
         self._seen = np.zeros((0, 3))  # T, V and the way of the fastest coordinate, of the rows looked at so far
@@ -148,7 +149,7 @@ class EnergyWatch:
         self.ledgers += 1
         self._cleared = float(np.nanmax(ledger.total - ledger.total[0]))
         if found.row >= 0:
-            self.problem = _sentence(run, found)
+            self.problem, self.row = _sentence(run, found), found.row
         elif abs(found.share) > TELLING:
             self.note, self.share = _note(found), found.share
         return self.problem

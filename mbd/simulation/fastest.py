@@ -103,12 +103,13 @@ def resolving_dt(rate: float) -> float:
 
 
 def sane_rows(run: Run) -> list[int]:
-    """Some rows until speeds have grown absurdly."""
+    """Some rows until speeds have grown absurdly, or the energy is the scheme's own."""
     n_q, n_v = run.values["n_q"], run.values["n_v"]
     speeds: Vector = np.max(np.abs(run.table[: run.stored, 1 + n_q : 1 + n_q + n_v]), axis=1, initial=0.0)
     early = speeds[: max(2, len(speeds) // 100)]
     wild = np.flatnonzero(~(speeds <= SANE * max(1e-3, float(early[0]) if len(early) else 0.0)))
     last = int(wild[0]) if len(wild) else len(speeds)
+    last = min(last, run.energy.row) if run.energy.row > 0 else last
     return sorted(set(np.linspace(0, last - 1, LOOKED_AT).astype(int).tolist())) if last > 0 else []
 
 
