@@ -37,7 +37,8 @@ class Memory:
 
     With it a run goes on as if it had not been cut: accelerations and auxiliary ones, multipliers, what predicts the
     next step, rows left out, sides of guards, the grid of instants, samples and states of controllers. It is used only
-    where everything that it belongs to is the same to the bit, else the scheme is started anew.
+    where everything that it belongs to is the same to the bit, else the scheme is started anew; controllers go on also
+    then, if the state is the same.
 
     Attributes
     ----------
@@ -49,6 +50,7 @@ class Memory:
     scheme : memory of an integrator that steps in Python
     controllers : samples and states of controllers, and the time from which samples count
     pending : (kind, name) of events at this instant whose reset or controller failed, to be repeated
+    place : (q, v, z) of the state; controllers go on from there whatever the scheme and its steps
     """
 
     belongs: tuple[str, ...]
@@ -60,6 +62,7 @@ class Memory:
     scheme: Any = None
     controllers: Mapping[str, Any] = field(default_factory=dict)
     pending: tuple[tuple[str, str], ...] = ()
+    place: Vector = field(default_factory=_empty)
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,8 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from mbd.compile.mechanisms import mechanism_of
-from mbd.errors import ModelError, SimulationError, UnknownNameError, nearest
+from mbd.errors import MbdError, ModelError, SimulationError, UnknownNameError, nearest
+from mbd.simulation.asked import asked
 from mbd.simulation.simulate import simulate
 from mbd.state import State
 from mbd.trajectory import Trajectory
@@ -24,6 +25,9 @@ __all__ = ["Sweep", "sweep"]
 
 SETTINGS = ("integrator", "dt", "tol", "until", "contact", "impact", "locate", "rest_speed")
 """Arguments of `simulate` that may take several values, beside the model's parameters."""
+
+OUTCOME = ("success", "message")
+"""Columns of every table."""
 
 Results: TypeAlias = Sequence[str] | Mapping[str, Callable[[Trajectory], float]]
 """What is kept of each run: names of quantities, at its end, or functions of the run by title."""
@@ -86,7 +90,7 @@ class Sweep:
 
     def _lines(self) -> Iterator[str]:
         """A line for each run; messages of those that failed."""
-        columns = {title: column for title, column in self.columns.items() if title not in ("success", "message")}
+        columns = {title: column for title, column in self.columns.items() if title not in OUTCOME}
         texts = {title: [_cell(value) for value in column] for title, column in columns.items()}
         widths = {title: max(map(len, (title, *column))) for title, column in texts.items()}
         yield "  ".join(f"{title:>{widths[title]}}" for title in texts)
@@ -129,7 +133,7 @@ def sweep(
     Returns
     -------
     Sweep
-        A run that fails is a line of the table with its message.
+        A run that fails is a line of the table with its message, and so is one of which a function finds no result.
 
     Raises
     ------
@@ -171,18 +175,29 @@ def _one(
     """(results, success, message) of one run."""
     given = dict(zip(names, case, strict=True))
     own = {name: value for name, value in given.items() if name in SETTINGS}
-    parameters = {**settings.get("parameters", {}), **{n: v for n, v in given.items() if n not in SETTINGS}}
+    parameters = {**(settings.get("parameters") or {}), **{n: v for n, v in given.items() if n not in SETTINGS}}
     count = len(results)
     try:
         begin = start(parameters) if callable(start) else start
         run = simulate(model, begin, **{**settings, **own, "parameters": parameters, "on_failure": "return"})
-        if not run.success:
-            return [float("nan")] * count, False, run.message
-        if isinstance(results, Mapping):
-            return [float(function(run)) for function in results.values()], True, run.message
-        return [float(run[name][-1]) for name in results], True, run.message
-    except (SimulationError, ModelError) as error:
+    except MbdError as error:
         return [float("nan")] * count, False, str(error)
+    if not run.success:
+        return [float("nan")] * count, False, run.message
+    if not isinstance(results, Mapping):
+        return [float(run[name][-1]) for name in results], True, run.message
+    found, missing = [], []
+    for title, function in results.items():
+        try:
+            found.append(asked(f"the function for {title!r}", _number, function, run))
+        except SimulationError as error:  # the event that it looks for did not come, say: other runs still count
+            found.append(float("nan"))
+            missing.append(str(error))
+    return found, not missing, "; ".join(missing) or run.message
+
+
+def _number(function: Callable[[Trajectory], float], run: Trajectory) -> float:
+    return float(function(run))
 
 
 def _checked(model: Any, values: Any, start: Any, results: Any, executor: Any, settings: Any) -> list[str]:
@@ -199,6 +214,12 @@ def _checked(model: Any, values: Any, start: Any, results: Any, executor: Any, s
     faults += [
         f"{name!r} is given among the values and as an argument; give it once" for name in values if name in settings
     ]
+    changed = settings.get("parameters")
+    faults += [
+        f"{name!r} is given among the values and in parameters=; give it once"
+        for name in values
+        if isinstance(changed, Mapping) and name in changed
+    ]
     if not isinstance(start, State) and not callable(start):
         faults.append(f"start must be a State from mbd.assemble, or a function of the parameters, not {start!r}")
     if executor is not None and not hasattr(executor, "submit"):
@@ -206,6 +227,12 @@ def _checked(model: Any, values: Any, start: Any, results: Any, executor: Any, s
     if isinstance(results, str) or not isinstance(results, Mapping | Sequence):
         faults.append(f"results must be a list of quantities or functions by title, not {results!r}")
         results = ()
+    titles = [*values, *results, *OUTCOME]
+    faults += [
+        f"{title!r} would be the title of two columns; choose another name for what is kept"
+        for title in dict.fromkeys(results)
+        if titles.count(title) > 1
+    ]
     if "on_failure" in settings:
         faults.append("a sweep keeps runs that fail as lines of its table; leave out on_failure=")
     if faults:

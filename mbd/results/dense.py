@@ -2,7 +2,7 @@
 
 A step from the row before ends at the time that is asked for, all times side by side. Accelerations and multipliers are
 the consistent ones there. A step that has a stage next to a pose in which rows lose rank would err by 1/x, x how far it
-is from there: polynomials of degree 5 between the rows, which lie far enough from such poses, take its place.
+is from there: polynomials through the rows around, which lie far enough from such poses, take its place.
 """
 
 from __future__ import annotations

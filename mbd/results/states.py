@@ -14,8 +14,11 @@ from mbd.errors import TrajectoryError
 
 __all__ = ["pack", "pack_state", "unpack"]
 
-HOMES = ("mbd.state", "mbd.integrators.family", "mbd.results.record")
-"""The modules whose dataclasses a file may name."""
+HOMES = (
+    "mbd.state", "mbd.results.record", "mbd.integrators.family", "mbd.integrators.newton", "mbd.integrators.radau",
+    "mbd.integrators.runge_kutta",
+)  # fmt: skip
+"""The modules whose dataclasses a file may name; `family` in older files."""
 
 
 def pack_state(state: Any, arrays: dict[str, NDArray[Any]]) -> Any:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mbd.arrays import Vector
 from mbd.kernel import fields as F
 from mbd.results.record import EventRecord
 from mbd.state import Memory, State
@@ -15,7 +16,7 @@ from mbd.state import Memory, State
 if TYPE_CHECKING:
     from mbd.simulation.run import Run
 
-__all__ = ["memory_of", "take_up", "without_sharing"]
+__all__ = ["carry_on", "memory_of", "take_up", "without_sharing"]
 
 OPTIONS = ("dt", "tol", "allowed", "longest", "contact", "impact", "locate", "rest_speed", "backend")
 """Settings that a memory depends on."""
@@ -25,12 +26,19 @@ def memory_of(run: Run, time: float) -> Memory:
     """The memory of the accepted state, which must be settled; `time` is what its state says."""
     stepper = run.stepper
     parameters, reals, integers = run.values["params"].copy(), stepper.reals.copy(), stepper.integers.copy()
-    for array in (parameters, reals, integers):
+    place = _place(run)
+    for array in (parameters, reals, integers, place):
         array.flags.writeable = False
     return Memory(
         belongs(run), digest(run), time, parameters, reals, integers, stepper.scheme.memory,
-        run.boundaries.remembered(), tuple((event.kind, event.name) for event in run.pending),
+        run.boundaries.remembered(), tuple((event.kind, event.name) for event in run.pending), place,
     )  # fmt: skip
+
+
+def _place(run: Run) -> Vector:
+    """(q, v, z) as the kernel has them."""
+    v = run.values
+    return np.concatenate([v["q"][: v["n_q"]], v["y"][: v["n"]]])
 
 
 def belongs(run: Run) -> tuple[str, ...]:
@@ -43,8 +51,12 @@ def belongs(run: Run) -> tuple[str, ...]:
     words += [f"{name} {len(run.values[name])}" for name in (*F.KEPT_REALS, *F.KEPT_INTEGERS)]
     words += [row.title for row in equations.rows] + run.manager.names
     words += [guard.name for guard in run.manager.guards]
-    words += [f"{c.name} {c.period!r} {c.on!r}" for c in run.boundaries.controllers]
-    return tuple(words)
+    return (*words, *_controllers(run))
+
+
+def _controllers(run: Run) -> tuple[str, ...]:
+    """The words of controllers, the last ones of `belongs`."""
+    return tuple(f"{c.name} {c.period!r} {c.on!r}" for c in run.boundaries.controllers)
 
 
 def digest(run: Run) -> str:
@@ -83,6 +95,21 @@ def take_up(run: Run, start: State) -> bool:
     v["store"][0] = start.time
     v["state"][F.SINCE_STORE] = phase
     stepper.resumed_at = run.now
+    return True
+
+
+def carry_on(run: Run, start: State) -> bool:
+    """Let controllers go on with their samples and states, where a scheme has begun anew at a state; whether they do.
+
+    What they keep belongs to the mechanism, not to how it is integrated: another dt, or the trial runs of a tolerance,
+    must not make another motion.
+    """
+    memory, own = start.memory, _controllers(run)
+    if memory is None or not own or memory.belongs[-len(own) :] != own:
+        return False
+    if memory.time != start.time or not np.array_equal(memory.place, _place(run)):
+        return False
+    run.boundaries.take_up(memory.controllers, run.now)
     return True
 
 

@@ -39,6 +39,12 @@ LOOKED_AT = 8
 TELLING = 1e-4
 """Sum of the local errors of velocities of an explicit scheme that a run tells [m/s, rad/s]."""
 
+ANEW = (
+    "controllers began anew, with their first state and a sample at the start: they or the state are not those "
+    "that the run before ended with"
+)
+"""Of a run that goes on from another one without what its controllers kept."""
+
 COUNTED = (
     (
         F.SHORTENED,
@@ -71,6 +77,8 @@ def notes_of(run: Run, record: Record) -> tuple[list[str], list[str]]:
     rubs = loaded and any(code.borne for code in run.stepper.modes)
     dependent = redundancy(equations.rows, run.stepper.dependent, rubs)
     notes += [dependent] if dependent else []
+    if run.start.memory is not None and not run.carried and run.boundaries.controllers:
+        notes.append(ANEW)
     counts, impact = run.values["counts"], run.settings["impact"]
     notes += [text.format(count=int(counts[place]), impact=impact) for place, text in COUNTED if counts[place]]
     doubts = _energy_lost(run, record)

@@ -23,7 +23,7 @@ from mbd.simulation.ends import advance, call, close
 from mbd.simulation.energy import EnergyWatch
 from mbd.simulation.failures import attempt, crowded, explanation
 from mbd.simulation.fastest import stability
-from mbd.simulation.memory import take_up
+from mbd.simulation.memory import carry_on, take_up
 from mbd.simulation.outcome import trajectory_of
 from mbd.simulation.room import Room
 from mbd.simulation.savepoints import Savepoint, rewind, save
@@ -102,8 +102,10 @@ class Run:
         self.boundaries = Boundaries(controllers, instants, start.time, dt, end)
         self.resumed = take_up(self, start)
         notify(self)
+        self.carried = self.resumed  # so do controllers
         if not self.resumed:
             begin(self, start)
+            self.carried = carry_on(self, start)
             if changed:
                 check_rank(self, start, parameters)
 
@@ -164,7 +166,7 @@ class Run:
     def _march(self) -> tuple[str, str]:
         """Kernel, reaction, kernel, … until the end; (problem, message)."""
         shown = 0.0
-        if not self.resumed:
+        if not self.carried:
             self.boundaries.begin(self)
         save(self, self.pending)
         ended = self._react(self.pending)

@@ -107,8 +107,8 @@ def _told(trials: Sequence[Trial], best: Trial, search: Search, problem: str) ->
         )
     if not problem and best.error > tol:
         stats["notes"].append(f"the estimated error {best.error:.2g} is above tol = {tol:g}")
-    better = search.why_better(trials, best) or f"{len(trials)} runs came no nearer" if best.error < WELL * tol else ""
-    if not problem and better:
+    if not problem and best.error < WELL * tol and stats["steps"] > 0:
+        better = search.why_better(trials, best) or f"{len(trials)} runs came no nearer"
         stats["notes"].append(f"the estimated error {best.error:.2g} is far below tol = {tol:g}: {better}")
     if best.gap is not None and not best.gap.same:
         stats["notes"].append("runs at different tolerances have different events; their error is not known")

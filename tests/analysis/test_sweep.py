@@ -42,6 +42,16 @@ def test_a_run_that_fails_is_a_line_with_its_message():
     assert "1e+09" in table["message"][1] and "failed" in repr(table)
 
 
+def test_a_result_that_is_not_there_costs_no_other_run():
+    """A time after the shorter run, and an event that did not come."""
+    results = {"late": lambda run: run.at(0.15)["fall.rate"], "first": lambda run: run.events[0].time, **DROP}
+    table = swept({"until": [0.1, 0.2]}, results)
+    assert np.isnan(table["late"]).tolist() == [True, False] and np.isnan(table["first"]).all()
+    assert np.isfinite(table["speed"]).all() and not table["success"].any()
+    assert "'late'" in table["message"][0] and "outside the run" in table["message"][0]
+    assert "IndexError" in table["message"][1] and "'late'" not in table["message"][1]
+
+
 def test_a_start_may_follow_the_parameters():
     model, _ = falling()
     start = lambda p: mbd.assemble(model, position={"fall.displacement": p["ball.mass"]})  # noqa: E731
@@ -60,6 +70,9 @@ def test_a_start_may_follow_the_parameters():
         ({"dt": [1.0]}, {"dt": 1.0}, "give it once"),
         ({"ball.mass": [1.0]}, {"results": ["fall.displacment"]}, "did you mean 'fall.displacement'"),
         ({"ball.mass": [1.0]}, {"executor": 4}, "ThreadPoolExecutor"),
+        ({"ball.mass": [1.0]}, {"parameters": {"ball.mass": 2.0}}, "in parameters="),
+        ({"ball.mass": [1.0]}, {"results": {"success": lambda run: 1.0}}, "title of two columns"),
+        ({"ball.mass": [1.0]}, {"results": {"ball.mass": lambda run: 1.0}}, "title of two columns"),
     ],
 )
 def test_faults_are_told_before_the_first_run(values, more, said):

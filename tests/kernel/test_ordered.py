@@ -90,6 +90,16 @@ def test_sound_factors_solve_what_dense_ones_do(n, m, seed):
         assert_solves(K, matrix(M, B.T, B), rng)
 
 
+def test_matrices_of_mechanisms_of_like_masses_are_sound_in_their_order():
+    for seed in range(60):
+        rng, n = np.random.default_rng(seed), 4 + seed % 13
+        M, R, B = saddle(rng, n, min(seed % 7, n // 2))
+        K = kernel(matrix(M, R, B), n, len(B))
+        assert factor_ordered(K, matrix(M, R, B).ravel(), 1, OF_TANGENT, LOSS_AT_ONCE)
+        for source in (OF_ACCELERATIONS, SYMMETRIC):
+            assert factor_ordered(K, accelerations(M, R, B), 1, source, LOSS_AT_ONCE)
+
+
 @given(n=st.integers(4, 12), m=st.integers(1, 4), seed=st.integers(0, 2**32 - 1))
 def test_symmetric_saddles_of_definite_masses_need_no_search(n, m, seed):
     rng = np.random.default_rng(seed)

@@ -170,6 +170,54 @@ def test_a_contact_opened_by_hand_makes_the_memory_void():
     assert restarted(ball(), replace(final, mode=type(final.mode)())) == 1
 
 
+def test_controllers_go_on_whatever_the_scheme_and_its_steps():
+    """They count their calls; only another state, or another controller, makes the count begin again."""
+    counts = []
+
+    def counting(period=0.1):
+        model = pendulum()
+        update = lambda t, values, n: (counts.append((n, round(t, 9))), ({}, n + 1))[1]  # noqa: E731
+        model.apply(mbd.Controller("count", update, period=period, state=0))
+        return model
+
+    model, how = counting(), {"dt": 0.05, "backend": "python"}
+    start = mbd.assemble(model, position={"hinge.angle": 1.0})
+    final = mbd.simulate(model, start, until=0.45, **how).final
+
+    def first(model, state, **more):
+        counts.clear()
+        notes = mbd.simulate(model, state, until=0.7, **{**how, **more}).stats["notes"]
+        return *counts[0], any("controllers began anew" in note for note in notes)
+
+    ways = ({}, {"dt": 0.025}, {"integrator": mbd.RadauIIA()}, {"dt": None, "tol": 1e-3}, {"backend": "llvm"})
+    assert [first(model, final, **way) for way in ways] == [(5, 0.5, False)] * len(ways)
+    assert first(model, final, parameters={"rod.mass": 2.0}) == (5, 0.5, False)
+    assert first(model, replace(final, q=final.q + 0.1)) == (0, 0.45, True)
+    assert first(counting(0.05), final) == (0, 0.45, True)
+    assert first(model, start) == (0, 0.0, False)
+
+
+def test_a_run_to_a_tolerance_goes_on_with_the_memory_of_its_controllers():
+    """A force of the place now and of the place before, which only the controller knows; halves of the same length."""
+    model = mbd.Model("cart", gravity=(0.0, 0.0, 0.0), tunable=("push.force.x",))
+    cart = mbd.PointMass("cart", mass=1.0)
+    model.connect(mbd.Prismatic("rail", model.ground.origin, cart.origin))
+    update = lambda t, values, last: (  # noqa: E731
+        {"push.force.x": -30.0 * values["rail.displacement"] + 10.0 * last}, values["rail.displacement"]
+    )  # fmt: skip
+    model.apply(
+        mbd.Applied("push", cart.origin, force=(0.0, 0.0, 0.0)),
+        mbd.Controller("c", update, period=0.05, reads=("rail.displacement",), writes=("push.force.x",), state=1.0),
+    )
+    start, how = mbd.assemble(model, position={"rail.displacement": 1.0}), {"backend": "python"}
+    whole = mbd.simulate(model, start, dt=0.01, until=2.0, **how)
+    for scheme in (mbd.RungeKutta853(), mbd.GeneralizedAlpha(0.8)):
+        first = mbd.simulate(model, start, scheme, tol=1e-5, until=1.0, **how)
+        second = mbd.simulate(model, first.final, scheme, tol=1e-5, until=2.0, **how)
+        assert second["rail.displacement"][-1] == pytest.approx(whole["rail.displacement"][-1], abs=1e-6)
+        assert len(second.stats["tolerance"]["runs"]) == len(first.stats["tolerance"]["runs"])
+
+
 def test_a_model_made_again_in_the_same_words_takes_the_memory():
     walker = kneed_walker()
     final = mbd.simulate(walker, kneed_walker_start(walker), dt=2e-3, until=0.8).final
@@ -186,6 +234,20 @@ def test_a_run_read_from_a_file_goes_on_to_the_bit(name, backend, tmp_path):
     first = mbd.simulate(model, start, **{**how, "until": whole.time[37]})
     for kept in mbd.load(first.save(tmp_path / "half")), pickle.loads(pickle.dumps(first)):
         assert_halves_are_the_whole(whole, first, mbd.simulate(model, kept.final, **how))
+
+
+@pytest.mark.parametrize("scheme", [mbd.HHT(0.05), mbd.RadauIIA(), mbd.RungeKutta853()], ids=repr)
+def test_a_file_keeps_the_memory_of_every_scheme_that_steps_in_python(scheme, tmp_path):
+    model = pendulum(loss=mbd.Viscous(0.1))
+    start = mbd.assemble(model, position={"hinge.angle": 1.0})
+    how = {"integrator": scheme, "dt": 0.02, "backend": "python"}
+    whole = mbd.simulate(model, start, until=0.4, **how)
+    first = mbd.simulate(model, start, until=whole.time[9], **how)
+    kept = mbd.load(first.save(tmp_path / "half")).final
+    assert kept.memory is not None and type(kept.memory.scheme) is type(first.final.memory.scheme)
+    second = mbd.simulate(model, kept, until=0.4, **how)
+    assert second.stats["restarts"] == 0
+    np.testing.assert_array_equal(second["hinge.angle"], whole["hinge.angle"][9:])
 
 
 def test_what_a_file_cannot_keep_starts_the_scheme_anew(tmp_path):

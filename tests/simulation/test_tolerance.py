@@ -98,6 +98,8 @@ def test_a_run_that_is_better_than_asked_says_why():
     assert any("steps end at events or have their largest size, 25 % of the run" in n for n in easy.stats["notes"])
     thrown = run(ball(restitution=0.5), {"fall.displacement": 1.0}, dt=None, tol=1e-4, until=1.2)
     assert any("round-off whatever the steps" in note for note in thrown.stats["notes"])
+    nothing = mbd.simulate(model, start, EXPLICIT, tol=1e-3, until=start.time)
+    assert not nothing.stats["notes"], "no steps, nothing to tell of them"
 
 
 def test_an_explicit_run_with_friction_is_as_accurate_between_its_rows():
