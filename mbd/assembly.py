@@ -19,6 +19,7 @@ from mbd.contradictions import Attempt, contradictions, infeasible
 from mbd.equations.equations import Equations
 from mbd.errors import AssemblyError, ModelError, UnknownNameError, nearest
 from mbd.kernel.active_set import ActiveSetManager
+from mbd.not_finite import first_cause, tape_inputs
 from mbd.posture import Posture, capture, close_positions, close_velocities, position_rows
 from mbd.state import State
 
@@ -200,7 +201,10 @@ def undetermined(work: Posture) -> list[str]:
         return ["nothing can move: the model has no coordinate; connect a body by a joint that lets it move"]
     matrix = np.block([[terms.M, terms.R[:, picked]], [terms.B[picked], np.zeros((m, m))]])
     if not np.isfinite(matrix).all() or not np.isfinite(terms.f).all():
-        return ["a force, mass or constraint is not finite at the start; check the parameters and functions used"]
+        block = work.mechanism.block(work.time, work.q, work.y, work.anchors)
+        inputs = tape_inputs(work.mechanism, block, work.parameters)
+        cause = first_cause(equations, inputs, when=" at the start")
+        return [cause or "a mass or a derivative is not finite at the start; check the parameters and functions used"]
     scale = np.sqrt(np.max(np.abs(matrix), axis=1))
     scale[scale == 0.0] = 1.0
     _, sizes, right = np.linalg.svd(matrix / np.outer(scale, scale))
@@ -226,7 +230,13 @@ def _negative(work: Posture, M: Matrix, B: Matrix) -> list[str]:
         return []
     motion = np.abs(free @ directions[:, 0]) / scale
     name = work.equations.velocity_names[int(np.argmax(motion))].removesuffix(".rate")
-    return [f"the mass or inertia that resists the motion of {name!r} is negative; check the parameters given"]
+    guilty = [
+        f"{each.name!r} is {value:g}"
+        for each, value in zip(work.equations.parameters, work.parameters, strict=False)
+        if value < 0.0 and each.name.rpartition(".")[2] in ("mass", "inertia", "xx", "yy", "zz")
+    ]
+    told = ", ".join(guilty) or "check the parameters given"
+    return [f"the mass or inertia that resists the motion of {name!r} is negative; {told}"]
 
 
 def _gaps(work: Posture) -> Vector:

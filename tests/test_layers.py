@@ -28,6 +28,7 @@ RANKS = [
         "conflicts",
         "contradictions",
         "dependence",
+        "not_finite",
         "posture",
         "results",
         "simulation",

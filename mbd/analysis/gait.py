@@ -1,6 +1,8 @@
 """Steps of a walker, read from the events of a run.
 
-A step goes from one touchdown to the next of another foot; a foot is a contact of a point with the ground.
+A step goes from one touchdown to the next of another foot. A foot is a body with contacts of points with the ground, so
+that heel and toe are one; where there is one such body only, as a wheel of spokes, each contact is, once the one before
+has left the ground.
 """
 
 from __future__ import annotations
@@ -115,12 +117,26 @@ def gait(run: Trajectory) -> Gait:
 def _strikes(run: Trajectory, feet: Sequence[str]) -> list[EventRecord]:
     """The touchdowns of feet in turn."""
     names = [contact.name for contact in run.facts.contacts]
+    bodies = _bodies(run)
+    alone = len({bodies[foot] for foot in feet}) == 1
     standing = [foot for foot in feet if len(run) and run.record.closed[0, names.index(foot)]]
-    found = [EventRecord(float(run.time[0]), "closed", standing[0])] if len(standing) == 1 else []
+    starts = len(standing) == 1 if alone else len({bodies[foot] for foot in standing}) == 1
+    found = [EventRecord(float(run.time[0]), "closed", standing[0])] if starts else []
     for event in run.events:
-        if event.kind == "closed" and event.name in feet and (not found or found[-1].name != event.name):
-            found.append(event)
+        if event.kind != "closed" or event.name not in feet:
+            continue
+        last = found[-1].name if found else ""
+        same = event.name == last if alone else bool(last) and bodies[event.name] == bodies[last]
+        if same or (alone and last and run.record.closed[event.row, names.index(last)]):
+            continue
+        found.append(event)
     return found
+
+
+def _bodies(run: Trajectory) -> dict[str, str]:
+    """The body of each contact's point; the point itself where no figure tells."""
+    owners = {f"{body}.{frame}": body for body, frames in run.facts.segments for frame in frames}
+    return {contact.name: owners.get(contact.place, contact.place) for contact in run.facts.contacts}
 
 
 def _states(run: Trajectory, rows: Sequence[int]) -> dict[str, Any]:

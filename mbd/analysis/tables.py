@@ -96,7 +96,7 @@ def criteria_table(found: Criteria) -> str:
 
 def _radius(value: float) -> str:
     """Five digits behind the point: multiple roots are known to ε^⅓ only."""
-    return f"{round(value, 5):.5g}"
+    return f"{round(value, 5) + 0.0:.5g}"  # + 0.0: no minus before zero
 
 
 def _small(value: float) -> str:

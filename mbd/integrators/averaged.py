@@ -40,6 +40,7 @@ class AveragedStep:
         old = self._evaluate(self.state.time, none, y0, a0, memory.lam, (0.0, 0.0))
         force0 = old.r - np.asarray(old.S) @ a0
         a1, lam = a0.copy(), memory.lam.copy()
+        far = np.abs(y0) / (k.beta * dt) + np.abs(a0)  # accelerations of which x is made, as large as they come
         t1, error, before = self.state.time + dt, np.inf, np.inf
         for iteration in range(MAX_ITERATIONS):
             y1 = y0 + dt * ((1.0 - k.gamma) * a0 + k.gamma * a1)
@@ -49,7 +50,9 @@ class AveragedStep:
             r = (1.0 - alpha) * terms.r + alpha * (mass @ a1 + force0)
             scale = np.max(np.abs(mass) @ np.abs(a1)) + np.max(np.abs(force0), initial=0.0) + 1e-300
             terms_of_r = 0.0 if terms.scale_r is None else float(np.max(terms.scale_r))  # at rest they cancel
-            error = float(np.max(np.abs(r)) / max(1e-3 * self.scheme.tolerance * scale, 16.0 * EPS * terms_of_r))
+            stiff = float(np.max(np.abs(np.asarray(terms.S) - mass) @ far))  # what x loses in forces
+            least = 16.0 * EPS * max(terms_of_r, stiff)
+            error = float(np.max(np.abs(r)) / max(1e-3 * self.scheme.tolerance * scale, least))
             fast = np.zeros(len(terms.h), bool) if terms.velocity is None else np.asarray(terms.velocity, dtype=bool)
             held = np.where(fast, terms.rate, terms.h)
             error = max(error, float(np.max(np.abs(held), initial=0.0)) / (64.0 * EPS))

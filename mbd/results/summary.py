@@ -15,6 +15,9 @@ __all__ = ["facts", "html", "text"]
 SHOWN_EVENTS = 8
 """Events listed in a notebook before the rest is counted."""
 
+LABELS = {"derive_and_compile_seconds": "derive and compile seconds (of the model, all its runs so far)"}
+"""Words for statistics whose names say too little."""
+
 
 def facts(run: Trajectory) -> list[tuple[str, str]]:
     """(title, value) pairs: what was run, how it ended, how well it did, what it cost."""
@@ -37,7 +40,8 @@ def facts(run: Trajectory) -> list[tuple[str, str]]:
     told = run.stats.get("tolerance")
     if told:
         found.append(("accuracy", accuracy(told)))
-    costs = {key.replace("_", " "): value for key, value in run.stats.items() if isinstance(value, int | float)}
+    numbers = {key: value for key, value in run.stats.items() if isinstance(value, int | float)}
+    costs = {LABELS.get(key, key.replace("_", " ")): value for key, value in numbers.items()}
     if costs:
         found.append(("cost", ", ".join(f"{key} {_number(value)}" for key, value in costs.items())))
     found += [("note", str(note)) for note in run.stats.get("notes", ())]

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mbd.arrays import Vector
 from mbd.integrators.base import Point
 from mbd.kernel import fields as F
+from mbd.not_finite import first_cause, tape_inputs
 from mbd.results.failure import Failure
 from mbd.results.record import EventRecord
 from mbd.simulation.redundant import clash
@@ -18,13 +19,16 @@ from mbd.simulation.round_off import remainder
 from mbd.simulation.stepper import RUNGE_KUTTA, Stepper
 from mbd.state import State
 from mbd.tape.evaluate import evaluate
-from mbd.tape.node import Node
 
 if TYPE_CHECKING:
     from mbd.simulation.run import Run
 
 __all__ = ["attempt", "crowded", "explanation"]
 
+RUSHING = 3.0
+"""How many times the largest rate so far a step changes one, above which dt is told not to resolve the motion [-]."""
+SLOW = 1e-3
+"""Largest rate so far [m/s, rad/s] below which that is not asked: a start from rest is no motion that runs away."""
 MOST_EVENTS = 5000
 """Events within one dt above which a run stops: they follow each other ever faster, or are located too roughly [-]."""
 
@@ -83,9 +87,16 @@ def residual_names(stepper: Stepper, rows: Sequence[int]) -> list[str]:
 
 
 def explanation(
-    stepper: Stepper, status: int, events: Sequence[EventRecord] = (), places: Mapping[str, str] | None = None
-) -> str:
-    """A sentence for a failure status of the kernel; `places` tells the frames that forces act on, by their names."""
+    stepper: Stepper, status: int, events: Sequence[EventRecord] = (), places: Mapping[str, str] | None = None,
+    swiftest: float = 0.0,
+) -> str:  # fmt: skip
+    """A sentence for a failure status of the kernel.
+
+    Parameters
+    ----------
+    places : the frames that forces act on, by their names
+    swiftest : largest rate of a coordinate in any row so far [m/s, rad/s]
+    """
     values = stepper.values
     now = float(values["clock"][F.NOW])
     time = float(values["detail"][0]) if values["detail"][0] > now else now
@@ -102,30 +113,38 @@ def explanation(
             f"{values['allowed']:.2g} per second{with_closed}; a force that jumps with the state (mbd.where, sign) "
             "must be made continuous, or be switched by an Event or Controller; or ask for less by tol="
         )
-    worst = _worst(stepper)
+    worst, rushing = _worst(stepper), _rushing(stepper, swiftest)
     if status == F.NOT_CONVERGED and residual < 0.0:
         return (
             f"{where}: a step would miss an angle by more than half a radian, down to a tenth of dt{with_closed}"
             f"{worst}: the motion is too fast to be resolved; use a smaller dt"
         )
+    said = "" if stepper.compiled else stepper.scheme.report.message
+    if status == F.NOT_CONVERGED and residual <= 1.0 and said:
+        return (
+            f"{where}: steps fail down to a tenth of dt; {type(stepper.scheme.integrator).__name__} says: {said}"
+            f"{with_closed}{worst}; try a smaller dt{rushing}"
+        )
     if status == F.NOT_CONVERGED and residual <= 1.0:
         return (
             f"{where}: steps fail or leave the branch continuous in velocity, down to a tenth of dt{with_closed}"
             f"{worst}: next to a pose in which rows lose rank, or in a force too steep for dt; try a smaller dt, or, "
-            f"at such a pose, {_passing(stepper)}"
+            f"at such a pose, {_passing(stepper)}{rushing}"
         )
     if status == F.NOT_CONVERGED:
-        own = f" ({stepper.scheme.report.message})" if not stepper.compiled and stepper.scheme.report.message else ""
+        own = f" ({said})" if said else ""
         return (
             f"{where}: Newton stalled at {residual:.3g} times the tolerance after {values['max_iterations']} "
             f"iterations{own}{with_closed}{worst}; try a smaller dt or softer stiffness; a force that jumps with "
             "the state (mbd.where, sign) must be made continuous, or be switched by an Event or Controller"
+            f"{rushing}"
         )
     if status in (F.STAGNATED, F.TOO_TIGHT):
         left = remainder(stepper)
+        how = "stagnated" if rushing else "stagnated at round-off"
         return (
-            f"{where}: stagnated at round-off: residual {left.residual:.3g}, attainable {left.attainable:.3g} of the "
-            f"forces{with_closed}{worst}; use a larger tolerance= of the integrator or a larger dt"
+            f"{where}: {how}: residual {left.residual:.3g}, attainable {left.attainable:.3g} of the forces{with_closed}"
+            f"{worst}{rushing or '; use a larger tolerance= of the integrator or a larger dt'}"
         )
     if status == F.STIRRED:
         return (
@@ -254,46 +273,24 @@ def _last_events(events: Sequence[EventRecord]) -> str:
 def _not_finite(stepper: Stepper, places: Mapping[str, str]) -> str:
     """The first cause whose force is not finite where the step failed."""
     equations, values = stepper.mechanism.equations, stepper.values
-    inputs = _inputs(stepper, values["block"])
-    for effect in equations.effects:
-        if not _finite(list(effect.generalized()), inputs):
-            place = f" on {places[effect.name]}" if places.get(effect.name) else ""
-            moved = _moved_by(stepper, effect, inputs)
-            return f"the force of {effect.name!r}{place} is not finite{moved}; check its roots, logarithms, divisions"
-    for row in equations.rows:
-        if not _finite([row.value, row.rate], inputs):
-            return f"the constraint {row.title} is not finite"
-    for contact in equations.contacts:
-        if not _finite([contact.gap, contact.gap_rate], inputs):
-            return f"the gap of {contact.name!r} is not finite"
-    for guard in equations.guards:
-        if not _finite([guard.value, guard.rate], inputs):
-            return f"the guard of the event {guard.name!r} is not finite"
-    if not _finite(list(equations.balance), inputs):
+    inputs = tape_inputs(stepper.mechanism, values["block"], values["params"])
+    cause = first_cause(equations, inputs, places)
+    if cause is None and not np.isfinite(evaluate(list(equations.balance), inputs)).all():
         return "the inertia forces are not finite (velocities have run away)"
-    return "a derivative of a force or constraint is not finite"
+    return cause or "a derivative of a force or constraint is not finite"
 
 
-def _moved_by(stepper: Stepper, effect: Any, inputs: dict[Any, float]) -> str:
-    """The coordinates that the force acts on."""
-    equations = stepper.mechanism.equations
-    forces = evaluate(list(effect.generalized()), inputs)
-    names = [name.removesuffix(".rate") for name in equations.velocity_names]
-    hit = [name for name, force in zip(names, forces, strict=False) if not np.isfinite(force)]
-    return f" (it acts on {', '.join(map(repr, hit))})" if hit else ""
-
-
-def _finite(nodes: list[Node], inputs: dict[Any, float]) -> bool:
-    return bool(np.isfinite(evaluate(nodes, inputs)).all())
-
-
-def _inputs(stepper: Stepper, block: Any) -> dict[Any, float]:
-    """Tape inputs at the block."""
-    layout = stepper.mechanism.layout
-    sizes = {
-        "t": 1, "c": 2, "q": layout.n_q, "x": layout.n_v, "v": layout.n_v, "z": layout.n_z, "a": layout.n_v,
-        "s": layout.n_z, "lam": layout.n_rows, "anchor": layout.n_anchors, "switch": layout.n_contacts,
-    }  # fmt: skip
-    inputs = {(kind, k): float(block[layout.place(kind, k)]) for kind, size in sizes.items() for k in range(size)}
-    inputs |= {("p", k): float(stepper.values["params"][k]) for k in range(layout.n_parameters)}
-    return inputs
+def _rushing(stepper: Stepper, swiftest: float) -> str:
+    """What a fixed step makes of velocities, where that is far more than any has been so far; '' elsewhere."""
+    values = stepper.values
+    if values["adaptive"] or swiftest < SLOW:
+        return ""
+    gains = np.abs(values["rate"][: values["n_v"]]) * values["dt"]
+    times = float(np.max(gains, initial=0.0)) / swiftest
+    if not RUSHING < times < np.inf:
+        return ""
+    name = stepper.mechanism.equations.velocity_names[int(np.argmax(gains))]
+    return (
+        f"; in a step of dt {name!r} changes by {times:.2g} times the largest rate so far: dt does not resolve the "
+        f"motion, or a force lets it run away; try dt = {0.1 * values['dt'] / times:.1g} s"
+    )

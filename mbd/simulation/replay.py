@@ -86,7 +86,7 @@ class Replay:
             shown = [f"    {place:3}  {_line(iteration)}" for place, iteration in enumerate(one.iterations)]
             lines += shown if len(shown) <= SHOWN else [*shown[: SHOWN // 2], "      …", *shown[-SHOWN // 2 :]]
         if not self.tries:
-            lines.append("  no Newton iteration took place")
+            lines.append("  no Newton iteration of mbd took place; what an integrator of your own solves is its own")
         return "\n".join(lines)
 
 
@@ -127,7 +127,8 @@ def replay(
     """
     told = load(failure, model) if isinstance(failure, str | Path) else failure
     if not isinstance(told, Failure):
-        raise ModelError(f"replay needs run.failure or the path of a file it was saved to, not {failure!r}")
+        came = type(failure).__name__
+        raise ModelError(f"replay needs run.failure or the path of a file it was saved to, not {came}")
     model = told.model if model is None else model
     scheme = told.integrator if integrator is None else integrator
     faults = []

@@ -212,7 +212,10 @@ class Run:
         return ("", message) if ended else (self._explained(status), "")
 
     def _explained(self, status: int) -> str:
-        return explanation(self.stepper, status, [*self.earlier, *self.events], self.places)
+        n_q, n_v = self.values["n_q"], self.values["n_v"]
+        rates = np.abs(self.table[: self.stored, 1 + n_q : 1 + n_q + n_v])
+        swiftest = float(np.max(rates, initial=0.0))
+        return explanation(self.stepper, status, [*self.earlier, *self.events], self.places, swiftest)
 
     @property
     def now(self) -> float:

@@ -12,6 +12,7 @@ import mbd
 from mbd import cli
 from mbd.analysis.effects import lab, timing
 from mbd.analysis.effects.comparison import common
+from mbd.analysis.effects.contribution import Change
 from mbd.analysis.effects.scenes import Scene, reduced
 from mbd.errors import ModelError, UnknownNameError
 from mbd.trajectory import EventRecord
@@ -230,6 +231,19 @@ def test_events_are_shared_until_one_has_another():
     assert pairs == [(0.1, 0.11), (0.2, 0.21), (0.2, 0.21)] and differs == 0.5
     assert common(mine, mine)[1] is None and common([], [])[1] is None
     assert common(mine, mine[:4])[1] == 0.9
+
+
+def test_an_event_of_the_same_name_much_later_is_another_one():
+    """A foot that slips and sticks again at once, and slips much later; in the whole scene it slips only then."""
+    mine = [event(0.05, "a"), event(0.07, "slip"), event(0.08, "b"), event(0.6, "slip")]
+    theirs = [event(0.05, "a"), event(0.07, "b"), event(0.6, "slip")]
+    for first, second in (mine, theirs), (theirs, mine):
+        assert common(first, second) == ([(0.05, 0.05)], 0.07)
+
+
+def test_what_is_hardly_compared_is_not_left_out():
+    assert Change({"hip.angle": 0.0}, until=1.0, event_time=0.3, left_out=0.3).within(1e-3)
+    assert not Change({"hip.angle": 0.0}, until=1.0, event_time=0.9, left_out=0.9).within(1e-3)
 
 
 def test_bad_input_is_answered_at_once():

@@ -199,6 +199,21 @@ def test_a_mechanism_without_feet_has_no_steps():
     assert len(gait(oscillator())) == 0 and len(gait(ball())) == 0
 
 
+def test_heel_and_toe_of_a_body_are_one_foot():
+    """Two tilted feet fall one after the other; the first rocks between toe and heel until the second makes a step."""
+    model, place = mbd.Model("feet"), {}
+    for k, side in enumerate(("left", "right")):
+        foot = mbd.RigidBody(f"{side} foot", mass=1.0, inertia=0.01)
+        model.connect(mbd.Planar(f"{side} way", model.ground.origin, foot.origin))
+        for part, x in ("heel", -0.1), ("toe", 0.1):
+            model.constrain(mbd.Unilateral(f"{side} {part}", mbd.touchdown(foot.point(x, -0.1, name=part))))
+        place |= {f"{side} way.x": k, f"{side} way.y": 0.15 + 0.3 * k, f"{side} way.angle": -0.2}
+    run = mbd.simulate(model, mbd.assemble(model, place), dt=1e-3, until=("right toe", 1.0), backend="python")
+    assert [event.name for event in run.events if event.kind == "closed"][:2] == ["left toe", "left heel"]
+    (step,) = gait(run).steps
+    assert step.foot == "right toe" and step.length == pytest.approx(1.0, abs=1e-3)
+
+
 def test_sides_are_exchanged_word_by_word():
     assert mirrored(["left hip.angle", "right hip.angle", "trunk.x"]) == [
         ("left hip.angle", "right hip.angle"), ("right hip.angle", "left hip.angle"), ("trunk.x", "trunk.x"),

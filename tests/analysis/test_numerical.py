@@ -144,6 +144,10 @@ def test_the_start_of_a_scheme_does_not_change_its_matrix():
     assert one.radius == pytest.approx(other.radius, abs=1e-12)
 
 
+def test_the_averaged_form_steps_a_stiff_oscillator_whose_forces_are_round_off():
+    assert spectrum(mbd.HHT(0.05, form="averaged"), 1e5).radius == pytest.approx(0.95 / 1.05, abs=1e-6)
+
+
 def test_the_averaged_form_has_the_spectrum_of_the_other_one():
     for turn in 0.1, 1.0, 10.0:
         one, other = (spectrum(mbd.HHT(0.1, form=form), turn) for form in ("averaged", "endpoint"))

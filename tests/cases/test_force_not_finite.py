@@ -98,5 +98,5 @@ def test_the_force_at_fault_is_named_among_several() -> None:
 
 def test_a_force_that_is_not_finite_at_the_start_is_refused_before_the_run() -> None:
     model = particle(lambda t: (mbd.where(t < 0.0, 1.0, math.nan), 0.0))
-    with pytest.raises(mbd.AssemblyError, match="not finite at the start"):
+    with pytest.raises(mbd.AssemblyError, match=r"the force of 'push' is not finite at the start"):
         mbd.assemble(model)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import mbd
+from mbd.integrators import StepReport, StepResult
 from tests.simulation.mechanisms import ball, falling, pendulum, point, run
 
 
@@ -136,3 +137,31 @@ def test_a_contact_with_a_gap_that_fails_names_it():
     model.constrain(mbd.Unilateral("well", mbd.measure(lambda p: mbd.log(p[1]) + 5.0, body.origin), only_while=None))
     trajectory = run(model, {"place.y": 1.0}, {"place.y": 0.0}, on_failure="return", dt=0.4, until=3.0)
     assert np.isfinite(trajectory.record.q).all()
+
+
+def test_a_motion_that_runs_away_asks_for_a_smaller_dt_and_not_for_a_larger_one():
+    """v̇ = 600 v³ reaches infinity after 1/(2 · 600 · v₀²) = 33 µs; no step of 10 ms sees that."""
+    model, body = falling(mass=1.0)
+    law = mbd.Applied("sting", body.origin, force=lambda p, v: (0.0, 600.0 * v**3, 0.0),
+                      arguments=(body.origin, "fall.rate"))  # fmt: skip
+    model.apply(law)
+    start = mbd.assemble(model, velocity={"fall.displacement": 5.0})
+    failed = mbd.simulate(model, start, mbd.RadauIIA(), dt=0.01, until=1.0, backend="python", on_failure="return")
+    assert not failed.success and "lets it run away; try dt = " in failed.message
+    assert (
+        "larger" not in failed.message
+        and "'fall.displacement.rate' changes by 1.5e+02 times the largest" in failed.message
+    )
+
+
+class Shy(mbd.Newmark):
+    """A scheme that stops for a reason of its own."""
+
+    def step(self, system, state, dt, mode, memory):
+        return StepResult(state, memory, StepReport(converged=False, message="too shy"))
+
+
+def test_what_an_integrator_of_ones_own_says_of_its_failure_is_told():
+    model, _body = falling()
+    failed = mbd.simulate(model, mbd.assemble(model), Shy(), dt=0.01, until=1.0, on_failure="return")
+    assert "Shy says: too shy" in failed.message and "rank" not in failed.message

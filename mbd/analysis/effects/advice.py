@@ -30,8 +30,8 @@ def advice(found: Effects) -> list[str]:
 def _none(found: Effects) -> list[str]:
     """Why nothing may go."""
     limit = f"{found.tolerance:g} of its range"
-    told = f"No effect may be left out: each changes an output by more than {limit}, or the events"
-    able = [each for each in found.contributions if each.change.comparable and each.change.outputs]
+    told = f"No effect may be left out: each changes an output by more than {limit}, or the events and their times"
+    able = [each for each in found.contributions if each.change.telling and each.change.outputs]
     if able:
         best = min(able, key=lambda each: each.change.largest)
         return [f"{told}; least, by {best.change.largest:.2g}, {best.name!r}."]

@@ -19,6 +19,8 @@ __all__ = ["change", "common", "same_rows"]
 
 ALIKE = 4
 """Events among which the next one is looked for: those of about one instant may come in any order."""
+FARTHER = 2.0
+"""How much farther one of two events that come in the other order may be shifted than the other or earlier ones [-]."""
 BESIDE = 1e-9
 """Instants this close to an event are left out too, relative to the length of the run [-]."""
 
@@ -68,19 +70,34 @@ def common(
     """Times of the events that two runs share from the start on, and the time of the first that one of them lacks."""
     mine, theirs = list(first), list(second)
     pairs: list[tuple[float, float]] = []
+    shift = 0.0
     while mine and theirs:
-        event = mine[0]
-        match = next(
-            (k for k, other in enumerate(theirs[:ALIKE]) if (other.kind, other.name) == (event.kind, event.name)), None
-        )
+        match = _like(mine[0], theirs[:ALIKE])
         if match is None:
             break
-        if match and all((e.kind, e.name) != (theirs[0].kind, theirs[0].name) for e in mine[1:ALIKE]):
-            break  # what the other run has first never comes in this one
-        pairs.append((event.time, theirs[match].time))
+        pair = mine[0].time, theirs[match].time
+        if match:
+            back = _like(theirs[0], mine[:ALIKE])
+            if back is None:
+                break  # what the other run has first never comes in this one
+            if not _about_one_instant(pair, (mine[back].time, theirs[0].time), shift):
+                break  # the same name, but another event
+        pairs.append(pair)
+        shift = max(shift, abs(pair[0] - pair[1]))
         del mine[0], theirs[match]
     rest = [events[0].time for events in (mine, theirs) if events]
     return pairs, min(rest, default=None)
+
+
+def _like(event: EventRecord, others: Sequence[EventRecord]) -> int | None:
+    """The first of the others with this kind and name."""
+    return next((k for k, other in enumerate(others) if (other.kind, other.name) == (event.kind, event.name)), None)
+
+
+def _about_one_instant(pair: tuple[float, float], other: tuple[float, float], shift: float) -> bool:
+    """Whether two events that come in the other order are shifted alike, and not one by much more than all the rest."""
+    less, more = sorted(abs(a - b) for a, b in (pair, other))
+    return more <= FARTHER * max(less, shift) + BESIDE * max(map(abs, (*pair, *other)))
 
 
 def _ends(run: Trajectory, whole: Trajectory) -> str:

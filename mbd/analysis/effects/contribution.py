@@ -11,6 +11,9 @@ if TYPE_CHECKING:
 
 __all__ = ["Change", "Contribution"]
 
+MOST = 0.5
+"""Share of the instants between shifted events above which the others say too little of a run [-]."""
+
 
 @dataclass(frozen=True)
 class Change:
@@ -50,9 +53,14 @@ class Change:
         """Whether the run has the events and the end of the whole scene."""
         return not self.failure and not self.ends and self.differs_at is None
 
+    @property
+    def telling(self) -> bool:
+        """Whether it is comparable, and at most of the instants: where events are far apart the others say little."""
+        return self.comparable and self.left_out <= MOST
+
     def within(self, tolerance: float) -> bool:
         """Whether it is the run of the whole scene, but for that much of the ranges."""
-        return self.comparable and self.largest <= tolerance
+        return self.telling and self.largest <= tolerance
 
     def __str__(self) -> str:
         """What else is to be said of it."""
