@@ -12,7 +12,7 @@ this the stabilized form of Gear, Gupta & Leimkuhler (1985).
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
@@ -21,11 +21,9 @@ from mbd.arrays import Matrix, Vector
 from mbd.bodies.values import is_number
 from mbd.errors import CapabilityError
 from mbd.integrators.base import Integrator, Point, StepReport, StepResult, System, Terms, consistent_rates
-from mbd.integrators.family import DEFAULT_TOLERANCE, NewmarkFamily, NewmarkMemory
-from mbd.integrators.newmark import Newmark
-from mbd.integrators.passage import WHOLE, WITHIN, distance_to_pose
+from mbd.integrators.family import DEFAULT_TOLERANCE
+from mbd.kernel.astride import MOST_SETTLED
 from mbd.kernel.collocation import RADAU
-from mbd.kernel.fields import LEFT, PASSING
 from mbd.kernel.radau import FAR_OFF, MOST_RETREATS, PATIENT, SLOW, is_settled
 from mbd.kernel.stages import MOST_STRETCHED
 from mbd.state import Mode, State
@@ -35,6 +33,8 @@ __all__ = ["RadauIIA", "RadauMemory"]
 EPS = float(np.finfo(float).eps)
 MAX_ITERATIONS = 50
 """Newton iterations, halvings included, after which a step counts as failed; one that converges takes three to six."""
+TURNED = 0.5
+"""How much rows may change from one stage to another before each stage is held to its own, relative [-]."""
 HALF_TURN = 0.5
 """Estimated error of an angle above which a step does not resolve the motion at all [rad]."""
 
@@ -44,8 +44,8 @@ class RadauMemory:
     """What the scheme keeps between steps.
 
     rate (n,) v̇ and ż, lam (m,) multipliers at the end of the step; rates (3, n), multipliers (3, m), shifts (3, n_v) of
-    its stages, which predict the next; slope, lam_slope : rates of change over the step; step : its size [s]; near : 1
-    within a few steps of a pose in which rows lose rank, and 2 just beyond it; error (n_v + n) : estimate of order 3
+    its stages, which predict the next; slope, lam_slope : rates of change over the step; step : its size [s];
+    error (n_v + n) : estimate of order 3
     """
 
     rate: Vector
@@ -57,7 +57,6 @@ class RadauMemory:
     lam_slope: Vector
     step: float
     error: Vector
-    near: int = 0
 
 
 @dataclass(frozen=True)
@@ -114,43 +113,20 @@ class RadauIIA(Integrator):
         """Stages of a step before it at rates and multipliers that do not change."""
         y = np.concatenate([state.v, state.z])
         rate, lam = consistent_rates(system, state.time, state.q, y, mode)
-        return _unchanging(rate, lam, np.zeros_like(rate), np.zeros_like(lam), len(state.v), dt, 0)
-
-    def resume(self, system: System, state: State, mode: Mode, dt: float, memory: RadauMemory) -> RadauMemory:
-        """A start: nothing of the memory is kept."""
-        return self.start(system, state, mode, dt)
+        n_v = len(state.v)
+        stages = np.tile(rate, (3, 1)), np.tile(lam, (3, 1)), np.zeros((3, n_v))
+        return RadauMemory(rate, lam, *stages, np.zeros_like(rate), np.zeros_like(lam), dt, np.zeros(n_v + len(rate)))
 
     def step(self, system: System, state: State, dt: float, mode: Mode, memory: RadauMemory) -> StepResult:
         """One step by Newton's method; the readable twin of the compiled kernel."""
-        if memory.near == LEFT:
-            memory = self.start(system, state, mode, dt)
-        if memory.near == PASSING:
-            return pass_pose(self.tolerance, system, state, dt, mode, memory)
-        return _RadauStep(self.tolerance, system, state, dt, mode, memory).run()
-
-
-def _unchanging(
-    rate: Vector, lam: Vector, slope: Vector, lam_slope: Vector, n_v: int, step: float, near: int
-) -> RadauMemory:
-    """A memory whose stages all have the same rates and multipliers."""
-    stages = np.tile(rate, (3, 1)), np.tile(lam, (3, 1)), np.zeros((3, n_v))
-    return RadauMemory(rate, lam, *stages, slope, lam_slope, step, np.zeros(n_v + len(rate)), near)
-
-
-def pass_pose(tolerance: float, system: System, state: State, dt: float, mode: Mode, memory: RadauMemory) -> StepResult:
-    """One of the few steps next to a pose in which rows lose rank, by the trapezoidal rule: see `kernel.passage`."""
-    n_v = len(state.v)
-    zero = np.zeros(n_v)
-    given = NewmarkMemory(
-        memory.rate, memory.rate, memory.lam, memory.slope, memory.lam_slope, zero, zero, memory.step, PASSING
-    )
-    result = NewmarkFamily.step(Newmark(tolerance=tolerance), system, state, dt, mode, given)
-    if not result.report.converged:
-        return StepResult(state, memory, result.report)
-    m = result.memory
-    error = np.concatenate([dt * dt / 12.0 * (m.rate - memory.rate)[:n_v], np.zeros(len(m.rate))])
-    after = _unchanging(m.rate, m.lam, m.slope, m.lam_slope, n_v, dt, m.near)
-    return StepResult(result.state, replace(after, error=error), result.report)
+        given = (self.tolerance, system, state, dt, mode, memory)
+        step = _RadauStep(*given)
+        if len(memory.lam) and step.rows_turn():
+            return _AstrideStep(*given).run()
+        result = step.run()
+        if len(memory.lam) and not result.report.converged and np.isfinite(result.report.residual):
+            result = _AstrideStep(*given).run()
+        return result
 
 
 @dataclass
@@ -167,6 +143,9 @@ class _Matrices:
 
 class _RadauStep:
     """The stages of one step while Newton iterates."""
+
+    astride: ClassVar[bool] = False
+    """Whether stages are held to rows of their own."""
 
     def __init__(
         self, tolerance: float, system: System, state: State, dt: float, mode: Mode, memory: RadauMemory
@@ -209,10 +188,6 @@ class _RadauStep:
             if not passes and not renew and error > SLOW * before:
                 renew, before = True, np.inf
                 continue
-            if iteration == 0 and not passes:
-                near = self._near_pose()
-                if near is not None:
-                    return near
             before, left, retreats, last = error, error, 0, moved
             try:  # residuals that pass are there too: what they still correct costs little
                 moved = self._correct(terms, matrices, renew)
@@ -225,6 +200,24 @@ class _RadauStep:
                 self.tolerance = min(self.upper, max(1e-3 * first**2, self.tolerance))
             renew = False
         return self._failed(MAX_ITERATIONS, error, "Newton did not converge")
+
+    def rows_turn(self) -> bool:
+        """Whether the rows change so much from stage to stage that one matrix does not serve all three.
+
+        Eigenvalues of what makes rows of the middle stage of those of another: they do not ask for units.
+        """
+        try:
+            first, middle, last = (self._rows(self._terms(i, (0.0, 0.0))) for i in range(3))
+            turns = [np.linalg.lstsq(each.T, middle.T, rcond=None)[0] for each in (first, last)]
+            return max(float(np.max(np.abs(np.linalg.eigvals(turn) - 1.0))) for turn in turns) > TURNED
+        except (np.linalg.LinAlgError, ValueError):  # a mass is missing, or a force is not finite: the step tells
+            return False
+
+    def _rows(self, terms: Terms) -> Matrix:
+        """B in the metric of M: scaled by the roots of its diagonal."""
+        mass = np.abs(np.diag(np.asarray(terms.S)))
+        B = np.asarray(terms.H)
+        return np.asarray(B / np.sqrt(np.where(mass > 0.0, mass, 1.0))[: B.shape[1]])
 
     # stages -------------------------------------------------------------------------------------------------------
     def _point(self, i: int) -> Point:
@@ -267,18 +260,24 @@ class _RadauStep:
         if not m:
             return _Matrices(S, pair, M, stiff[:, :n_v], np.zeros((0, n_v)), np.zeros((0, n_v)))
         H, B, zero = np.asarray(full.H), np.asarray(part.H), np.zeros((m, m))
-        R = np.asarray(full.R)
+        R, turning = np.asarray(full.R), (H - B)[:, :n_v] / c
+        if self.astride:
+            H = B
         real = np.block([[S, R], [H, zero]])
         pair = np.block([[pair, R], [B + ratio * (H - B), zero]])
-        return _Matrices(real, pair, M, stiff[:, :n_v], (H - B)[:, :n_v] / c, H[:, :n_v])
+        return _Matrices(real, pair, M, stiff[:, :n_v], turning, H[:, :n_v])
 
     # Newton -------------------------------------------------------------------------------------------------------
     def _correct(self, terms: list[Terms], matrices: _Matrices, whole: bool) -> float:
         """One simplified Newton correction of all stages; its size relative to the largest rate."""
-        n, m = len(self.y0), len(terms[0].h)
+        m = len(terms[0].h)
         r, rates = np.array([each.r for each in terms]), np.array([each.rate for each in terms])
         if m:
             self._correct_positions(terms, matrices, r, rates, whole)
+        return self._correct_rates(r, rates, matrices)
+
+    def _correct_rates(self, r: Matrix, rates: Matrix, matrices: _Matrices) -> float:
+        n = len(self.y0)
         right = -np.hstack([r, rates])
         real, pair = RADAU.s_real @ right, RADAU.s_pair @ right
         real[n:] /= self.c
@@ -330,23 +329,6 @@ class _RadauStep:
         self.W, self.lam = self.W - self.last[0], self.lam - self.last[1]
 
     # ends ---------------------------------------------------------------------------------------------------------
-    def _near_pose(self) -> StepResult | None:
-        """A step of another rule, or a failure, where rows are about to lose rank."""
-        terms = self._terms(2, (self.c, self.c**2))
-        if terms.turning is None or not len(terms.turning):
-            return None
-        scale = np.ones(len(terms.h)) if terms.scale_h is None else terms.scale_h
-        B = np.asarray(terms.H)[:, : self.n_v] - self.c * terms.turning
-        mass, size = np.abs(np.diag(np.asarray(terms.S)))[: self.n_v], self.dt / self.memory.step
-        y, longest = self._point(2).y, max(self.dt, self.memory.step)
-        away = distance_to_pose(B, terms.turning, mass, y[: self.n_v], scale, longest)
-        if away.too_close(self.upper, False, size):
-            why = "a pose in which rows lose rank is too close"
-            return StepResult(self.state, self.memory, StepReport(False, 0, 0.0, why, too_near=True))
-        if away.steps < WITHIN and (away.steps < 1.0 or abs(size - 1.0) <= WHOLE):
-            return pass_pose(self.upper, self.system, self.state, self.dt, self.mode, self.memory)
-        return None
-
     def _local_error(self, matrices: _Matrices) -> Vector:
         """``μ h f(y₀) + Σ e_i (Y_i − y₀)`` of x and (v, z), filtered by (1 − hμ ∂f/∂y)⁻¹ along the rows."""
         dt, c, n_v, e = self.dt, self.c, self.n_v, RADAU.e
@@ -384,6 +366,70 @@ class _RadauStep:
             old.names, old.velocity_names, {}, old.parameters,
         )  # fmt: skip
         return StepResult(state, after, StepReport(True, iterations + 1, residual))
+
+
+class _AstrideStep(_RadauStep):
+    """A step with stages on both sides of a pose in which rows lose rank: see `mbd.kernel.astride`."""
+
+    astride = True
+
+    def run(self) -> StepResult:
+        """Positions and multipliers settle stage by stage; Newton corrects rates, with new matrices each time."""
+        before, first, last, moved = np.inf, 0.0, 0.0, np.inf
+        error = np.inf
+        for iteration in range(MAX_ITERATIONS):
+            try:
+                quick = np.array([self._settle(i) for i in range(3)])
+            except np.linalg.LinAlgError:
+                return self._failed(iteration, error, "the rows depend on each other at a stage")
+            terms = [self._terms(i) for i in range(3)]
+            error = max(_size(self._error(i, each)) for i, each in enumerate(terms))
+            if not np.isfinite(error):
+                return self._failed(iteration, error, "a force or a row is not finite")
+            matrices = self._matrices(len(terms[0].h))
+            if error <= 1.0 and iteration > 0 and is_settled(moved, last, first):
+                return self._completed(matrices, iteration, error)
+            if error > 1.0 and iteration > 2 and error > SLOW * before:
+                if error * self.tolerance <= self.upper:
+                    return self._completed(matrices, iteration, error)
+                if iteration >= PATIENT:
+                    break
+            before, last = error, moved
+            r, n = np.array([each.r for each in terms]), len(self.y0)
+            try:
+                moved = self._correct_rates(r, -quick @ matrices.real[n:, :n].T, matrices)
+            except np.linalg.LinAlgError:
+                return self._failed(iteration, error, "the Newton matrix is singular")
+            if iteration == 0:
+                first, last = moved, 0.0
+                self.tolerance = min(self.upper, max(1e-3 * first**2, self.tolerance))
+        return self._failed(MAX_ITERATIONS, error, "Newton did not converge")
+
+    def _settle(self, i: int) -> Vector:
+        """U_i and λ_i at the rates of stage i; the least change of velocities (n,) that does away with ḣ."""
+        n, n_v, before = len(self.y0), self.n_v, np.inf
+        self.U[i] = 0.0
+        for turn in range(MOST_SETTLED):
+            terms = self._terms(i, (0.0, 0.0))
+            M, R, m = np.asarray(terms.S), np.asarray(terms.R), len(terms.h)
+            if not np.isfinite(np.concatenate([terms.r, terms.h])).all():
+                return np.zeros(n)
+            B = np.zeros((m, n))
+            H = np.asarray(terms.H)
+            B[:, : H.shape[1]] = H
+            matrix = np.block([[M, B.T], [B, np.zeros((m, m))]])
+            held = np.zeros(m, dtype=bool) if terms.velocity is None else np.asarray(terms.velocity)
+            h = np.where(held, 0.0, terms.h)
+            scale = 1.0 if terms.scale_h is None else terms.scale_h
+            size = float(np.max(np.abs(h) / (16.0 * EPS * scale + 1e-300)))
+            if turn > 0 and (size <= 1.0 or size >= before):
+                break
+            before = size
+            self.U[i] -= np.linalg.solve(matrix, np.concatenate([np.zeros(n), h]))[:n_v]
+        quick = -np.linalg.solve(matrix, np.concatenate([np.zeros(n), terms.rate]))[:n]
+        matrix[:n, n:] = R
+        self.lam[i] -= np.linalg.solve(matrix, np.concatenate([terms.r, np.zeros(m)]))[n:]
+        return np.asarray(quick)
 
 
 def _lagrange(places: Vector) -> Matrix:

@@ -23,8 +23,8 @@ ENTRY = "mbd_kernel"
 MODULES = (
     "linear", "ordered", "lemke", "redundancy", "saddle", "restart", "pivoting", "complementarity", "blow", "impact",
     "settle", "pairs", "iteration", "leftovers", "passage", "newmark", "complex_linear", "ordered_complex",
-    "stages", "radau", "straddle", "runge_kutta", "hermite", "guards", "control", "interior", "locate", "switching",
-    "nonsmooth", "takeover", "observe", "starting", "trying", "advance",
+    "stages", "straddle", "runge_kutta", "astride", "radau", "hermite", "guards", "control", "interior", "locate",
+    "switching", "nonsmooth", "takeover", "observe", "starting", "trying", "advance",
 )  # fmt: skip
 
 APART = (
@@ -50,8 +50,6 @@ def scheme_accept(K: Any, h: float) -> None:
         newmark_accept(K, h)
 
 def scheme_resume(K: Any, h: float) -> int:
-    if K.scheme == 2:
-        return radau_resume(K, h)
     return newmark_resume(K, h)
 
 def scheme_start(K: Any) -> int:

@@ -87,7 +87,7 @@ def error_ratio(K: Any, h: float) -> float:
     for i in range(n_v):
         fast = max(fast, abs(K.y1[i]))
     floor = EPS * (NEIGHBOURS * far + CANCELLED * h * fast)
-    if K.scheme == 1 and K.state[ROWS] > 0:
+    if K.scheme != 0 and K.state[ROWS] > 0:
         floor += stirred(K, h) * h * fast
     largest = 0.0
     for i in range(n_v):
@@ -135,7 +135,7 @@ def controlled_step(K: Any, h: float) -> int:
     t = K.clock[NOW]
     while True:
         wanted = h
-        if K.scheme == 1 and K.state[ROWS] > 0:
+        if K.scheme != 0 and K.state[ROWS] > 0:
             h = step_by_pose(K, wanted, 1.0)
             if stirs(K, h):
                 return STIRRED

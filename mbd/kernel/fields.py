@@ -48,7 +48,7 @@ REAL_ARRAYS = (
     "error",  # local error of the candidate as its scheme estimates it: of positions x, then of (v, z)
     "inside",  # guards and multipliers at the ends of a step while places inside it are looked at
     "turning",  # ∂ḣ/∂x of the active rows, stabilized only
-    "left", "left1",  # of each row beside the earlier ones, at the accepted state and the candidate; explicit only
+    "left", "left1",  # of each row beside the earlier ones, at the accepted state and the candidate; not of the family
     "basis", "lower", "mix", "shares",  # dependent rows as combinations of others, and what they bear of their loads
     "force", "bias", "jump", "impulse",  # complementarity: right-hand sides, velocity or acceleration, multipliers
     "slip", "limit", "base_limit",  # frictions: sign of sliding, largest, at zero multipliers

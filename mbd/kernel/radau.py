@@ -1,38 +1,33 @@
 """One step of the three-stage Radau IIA method of order 5 (Hairer & Wanner 1996, Solving ODEs II, IV.8 and VII.4).
 
 Rows are held in the stabilized form at every stage (`mbd.kernel.stages`), the last of which is the end of the step.
-Newton's method has one pair of matrices a step; accelerations and multipliers of the end come from the balance and the
-rows at acceleration level, which makes them as accurate as positions and velocities.
+Newton's method has one pair of matrices a step; next to a pose in which rows lose rank stages are held to rows of their
+own (`mbd.kernel.astride`). Accelerations and multipliers of the end come from the balance and the rows at acceleration
+level, which makes them as accurate as positions and velocities.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
+from mbd.kernel.astride import LOUDER, is_astride, is_beside, settle_stages, turn_rows
 from mbd.kernel.fields import (
     AUX_STEP,
     EPS,
-    MODE,
     N_DROPPED,
     NEAR,
     NOT_CONVERGED,
     NOT_FINITE,
     NOW,
     PASSING,
-    PIVOT,
     ROWS,
     SINGULAR,
     STAGNATED,
     STAGNATIONS,
-    STEP,
-    TOO_NEAR,
     TOO_TIGHT,
 )  # fmt: skip
-from mbd.kernel.hooks import call
 from mbd.kernel.iteration import runs_away
-from mbd.kernel.ordered import solve_kkt
-from mbd.kernel.pairs import is_whole
-from mbd.kernel.passage import WITHIN, misses, passing_step, steps_of_fall, steps_to_pose
+from mbd.kernel.ordered import LOSS_AT_ONCE, solve_kkt
 from mbd.kernel.restart import (
     compose,
     consistent,
@@ -46,12 +41,14 @@ from mbd.kernel.restart import (
 from mbd.kernel.runge_kutta import factor_saddle
 from mbd.kernel.stages import (
     A_,
+    BALANCES,
     E_,
     MASS_PART,
     MU_REAL,
     STAGE_LAM,
     STAGE_RATES,
     STIFF_PART,
+    correct_rates,
     correct_stages,
     evaluate_stages,
     factor_stages,
@@ -60,9 +57,10 @@ from mbd.kernel.stages import (
     predict_stages,
     retreat_stages,
     stage_place,
-)
+)  # fmt: skip
+from mbd.kernel.straddle import forget_leftovers, keep_leftovers, note_leftovers
 
-__all__ = ["radau_accept", "radau_resume", "radau_start", "radau_step"]
+__all__ = ["radau_accept", "radau_start", "radau_step"]
 
 MOST_RETREATS = 10
 """How often a Newton correction is halved before the iteration goes on from where it is."""
@@ -95,7 +93,7 @@ def radau_start(K: Any) -> int:
     forget_stages(K)
     K.clock[AUX_STEP] = K.dt
     K.state[NEAR] = 0
-    K.detail[PIVOT] = 0.0
+    forget_leftovers(K)
     fill_block(K, t, K.q, K.y)
     refresh_scales(K)
     for i in range(K.n):  # a force that is zero just now has its size a step later
@@ -104,15 +102,6 @@ def radau_start(K: Any) -> int:
             K.block[K.o_x + i] = K.dt * (K.y[i] + 0.5 * K.dt * K.rate[i])
     raise_scales(K, False)
     return 0
-
-
-def radau_resume(K: Any, h: float) -> int:
-    """Start from the accepted state, with the rates in K.jump and the multipliers in K.impulse; nothing is kept."""
-    for i in range(K.n):
-        K.rate[i] = K.jump[i]
-    for k in range(K.n_rows):
-        K.lam[k] = K.impulse[k]
-    return radau_start(K)
 
 
 def forget_stages(K: Any) -> None:
@@ -140,20 +129,28 @@ def radau_accept(K: Any, h: float) -> None:
     for k in range(K.n_rows):
         K.lam_slope[k] = (K.lam1[k] - K.lam[k]) * inverse
         K.lam[k] = K.lam1[k]
-    if K.state[NEAR] > 0:  # a step of another rule, see `mbd.kernel.passage`
-        forget_stages(K)
-    else:
-        o = stage_place(K, STAGE_RATES)
-        for k in range(3 * (K.n + K.n_rows + K.n_v)):
-            K.past_stages[k] = K.stages[o + k]
+    o = stage_place(K, STAGE_RATES)
+    for k in range(3 * (K.n + K.n_rows + K.n_v)):
+        K.past_stages[k] = K.stages[o + k]
+    if K.state[ROWS] > 0:
+        keep_leftovers(K, h)
     K.clock[AUX_STEP] = h
 
 
 def radau_step(K: Any, h: float, t1: float) -> int:
     """Candidate state (q1, y1, rate1, aux1, lam1) after a step of size h; the accepted state is untouched."""
     m = K.state[ROWS]
-    if K.state[NEAR] == PASSING:
-        return pass_on(K, h, t1)
+    if m > 0 and is_astride(K, h):
+        return step_astride(K, h, t1)
+    K.state[NEAR] = 0
+    status = plain_step(K, h, t1, m)
+    if (status == NOT_CONVERGED or status == STAGNATED or status == TOO_TIGHT) and m > 0 and is_beside(K, h, LOUDER):
+        return step_astride(K, h, t1)
+    return status
+
+
+def plain_step(K: Any, h: float, t1: float, m: int) -> int:
+    """The same with one pair of matrices for all stages."""
     c = K.stages[MU_REAL] * h
     hold_block(K)
     predict_stages(K, h, m)
@@ -202,11 +199,6 @@ def radau_step(K: Any, h: float, t1: float) -> int:
             if is_settled(moved, last, first):
                 return complete(K, h, t1, m, False)
             continue
-        if iteration == 0 and m > 0:
-            fall = steps_of_fall(K, m, False)
-            found = look_ahead(K, h, t1, m, fall) if fall < WITHIN + 2.0 else 0
-            if found != 0:
-                return pass_on(K, h, t1) if found == PASSING else TOO_NEAR
         moved = correct_stages(K, m, h, renew)
         if iteration == 0:  # the predictor is of order 3, the step of order 5: stay far below its error
             first = moved
@@ -225,15 +217,50 @@ def is_settled(moved: float, last: float, first: float) -> bool:
     return moved <= max(SETTLED, NEGLIGIBLE * first * first) or (last > 0.0 and moved > 0.5 * last)
 
 
-def pass_on(K: Any, h: float, t1: float) -> int:
-    """The trapezoidal step next to a pose in which rows lose rank, and what is known of its error: of positions."""
-    status = passing_step(K, h, t1)
-    if status == 0:
-        for i in range(K.n):
-            K.error[K.n_v + i] = 0.0
-            if i < K.n_v:
-                K.error[i] = h * h / 12.0 * (K.rate1[i] - K.rate[i])
-    return status
+def step_astride(K: Any, h: float, t1: float) -> int:
+    """The candidate of a step with stages on both sides of a pose in which rows lose rank: see `mbd.kernel.astride`.
+
+    Newton's method is linear there, with matrices made anew each time.
+    """
+    m = K.state[ROWS]
+    c = K.stages[MU_REAL] * h
+    K.state[NEAR] = PASSING
+    K.detail[0] = t1
+    K.detail[2] = h
+    hold_block(K)
+    predict_stages(K, h, m)
+    tolerance = 1e-3 * K.tolerance
+    before = 1e300
+    first = 0.0
+    moved = 1e300
+    last = 0.0
+    for iteration in range(K.max_iterations):
+        status = settle_stages(K, h, t1, m, iteration == 0)
+        if status != 0:
+            return status
+        error = evaluate_stages(K, h, t1, m, tolerance, c, c * c, True)
+        if error < 0.0:
+            return NOT_FINITE
+        K.detail[1] = error
+        if error > 1.0 and iteration > 2 and error > SLOW * before:
+            if evaluate_stages(K, h, t1, m, K.tolerance, c, c * c, False) <= 1.0:
+                return complete(K, h, t1, m, True)
+            if iteration >= PATIENT:
+                return NOT_CONVERGED
+            evaluate_stages(K, h, t1, m, tolerance, c, c * c, False)
+        if error <= 1.0 and iteration > 0 and is_settled(moved, last, first):
+            return complete(K, h, t1, m, True)
+        before = error
+        turn_rows(K, stage_place(K, BALANCES), m)
+        if not factor_stages(K, K.n + m):
+            return SINGULAR
+        last = moved
+        moved = correct_rates(K, m, h)
+        if iteration == 0:
+            first = moved
+            last = 0.0
+            tolerance = min(K.tolerance, max(1e-3 * first * first, tolerance))
+    return NOT_CONVERGED
 
 
 def judge_stagnation(K: Any, h: float, t1: float, m: int, tolerance: float, stuck: bool) -> int:
@@ -259,23 +286,6 @@ def judge_stagnation(K: Any, h: float, t1: float, m: int, tolerance: float, stuc
     if evaluate_stages(K, h, t1, m, tolerance, c, c * c, False) <= 1.0:
         return 0
     return NOT_CONVERGED
-
-
-def look_ahead(K: Any, h: float, t1: float, m: int, fall: float) -> int:
-    """PASSING where a pose in which rows lose rank is near, TOO_NEAR where this step would end too close; else 0."""
-    c = K.stages[MU_REAL] * h
-    load_stage(K, 2, h, t1)
-    K.block[1] = c
-    K.block[2] = c * c
-    call(K, K.mode_code[4 * K.state[MODE]], K.out)
-    size = K.n + m
-    for k in range(m * K.n_v):
-        K.turning[k] = K.out[size * size + K.n + 2 * m + k]
-    away = steps_to_pose(K, m, h, c, False) * h / K.clock[STEP]
-    if misses(K, away, h):
-        K.detail[PIVOT] = 0.0
-        return TOO_NEAR
-    return PASSING if fall < WITHIN and away < WITHIN and (away < 1.0 or is_whole(K, h)) else 0
 
 
 def was_enough(K: Any, h: float, t1: float, m: int, iteration: int, error: float, left: float) -> bool:
@@ -320,6 +330,8 @@ def complete(K: Any, h: float, t1: float, m: int, renew: bool) -> int:
                 K.rate1[i] = K.jump[i]
             for k in range(K.n_rows):
                 K.lam1[k] = K.impulse[k]
+        if m > 0:
+            note_leftovers(K)
         for k in range(K.n_rows):
             K.block[K.o_lam + k] = K.lam1[k]
     for i in range(K.n):
@@ -335,13 +347,14 @@ def end_rates(K: Any, t1: float, m: int) -> bool:
     multipliers. Frictions that feel rows left out, whose multipliers are known later, keep those of the stage.
     """
     if K.state[N_DROPPED] > 0 and K.n_frictions > 0:
+        evaluate(K, t1, K.q1, K.y1)
         return False
     if K.loaded == 1:
         return bool(consistent(K, t1, K.q1, K.y1) == 0)
     n = K.n
     evaluate(K, t1, K.q1, K.y1)
     load_accelerations(K)
-    if not factor_saddle(K, m, False):
+    if not factor_saddle(K, m, False, LOSS_AT_ONCE):
         return False
     for i in range(n):
         K.rhs[i] = -K.force[i]

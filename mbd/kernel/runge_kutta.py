@@ -160,7 +160,7 @@ def explicit_rates(K: Any, t: float) -> int:
             return 0
         return consistent(K, t, K.q1, K.y1)
     o_bias = n * n + n + 2 * n * K.n_rows + 2 * K.n_rows
-    if not factor_saddle(K, m, False):
+    if not factor_saddle(K, m, False, LOSS_AT_ONCE):
         return SINGULAR
     for i in range(n):
         K.rhs[i] = -K.acc[n * n + i]
@@ -172,12 +172,15 @@ def explicit_rates(K: Any, t: float) -> int:
     return 0
 
 
-def factor_saddle(K: Any, m: int, symmetric: bool) -> bool:
-    """LU factors in K.kkt of [M R; B 0] from K.acc, or of [M Bᵀ; B 0]; false where a pivot is missing."""
+def factor_saddle(K: Any, m: int, symmetric: bool, loss: float) -> bool:
+    """LU factors in K.kkt of [M R; B 0] from K.acc, or of [M Bᵀ; B 0]; false where a pivot is missing.
+
+    Pivots of an order chosen beforehand must keep the part `loss` of their terms, else they are searched for.
+    """
     n = K.n
     size = n + m
     o = order_at(K, m)
-    if o > 0 and factor_ordered(K, K.acc, o, SYMMETRIC if symmetric else OF_ACCELERATIONS, LOSS_AT_ONCE):
+    if o > 0 and factor_ordered(K, K.acc, o, SYMMETRIC if symmetric else OF_ACCELERATIONS, loss):
         return True
     K.state[ORDERED] = 0
     o_R = n * n + n
@@ -216,7 +219,7 @@ def return_to_rows(K: Any, t1: float) -> int:
             if not abs(h) < 1e300:
                 return NOT_FINITE
             size = max(size, abs(h) / (16.0 * EPS * K.scale[n + row]))
-        if not factor_saddle(K, m, True):
+        if not factor_saddle(K, m, True, LOSS_AT_ONCE):
             return SINGULAR
         if size <= 1.0 or size >= before:
             break
@@ -291,7 +294,7 @@ def hold_error(K: Any) -> bool:
     n_v = K.n_v
     m = K.state[ROWS]
     o_B = n * n + n + n * K.n_rows
-    if not factor_saddle(K, m, True):
+    if not factor_saddle(K, m, True, LOSS_AT_ONCE):
         return False
     for level in range(2):
         for i in range(n):

@@ -23,8 +23,10 @@ from mbd.kernel.fields import (
     FACTORIZATIONS,
     ITERATIONS,
     MODE,
+    NEAR,
     NOW,
     ORDERED,
+    PASSING,
     PIVOTED,
     RESIDUALS,
     ROWS,
@@ -39,8 +41,8 @@ from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import add_shares, share_loads
 
 __all__ = [
-    "correct_stages", "evaluate_stages", "factor_stages", "hold_block", "load_stage", "matrices", "predict_stages",
-    "retreat_stages", "stage_place",
+    "correct_rates", "correct_stages", "evaluate_stages", "factor_stages", "hold_block", "load_stage", "matrices",
+    "predict_stages", "retreat_stages", "stage_place",
 ]  # fmt: skip
 
 # where the numbers of the method lie in K.stages (see `mbd.kernel.collocation`)
@@ -195,7 +197,7 @@ def matrices(K: Any, m: int, h: float) -> None:
     """The real and the complex matrix at the block, whose r, h and ḣ stay in K.out.
 
     ``P(c) = M + c C + c² K`` and the rows ``B + c ∂ḣ/∂x``: at c = μh, (c, 0) and (−c, 0) the compiled tangent gives
-    ``M + c C + c² K``, ``M + c C`` and ``M − c C``.
+    ``M + c C + c² K``, ``M + c C`` and ``M − c C``. Next to a pose in which rows lose rank they are B alone.
     """
     n = K.n
     size = n + m
@@ -227,6 +229,9 @@ def matrices(K: Any, m: int, h: float) -> None:
             full = K.kkt[k]
             part = S[o_P + k]
             if i >= n:
+                if K.state[NEAR] == PASSING:
+                    K.kkt[k] = part
+                    full = part
                 S[o_P + k] = part + re * (full - part)
                 S[o_P + size * size + k] = im * (full - part)
                 continue
@@ -337,11 +342,16 @@ def correct_positions_of_stages(K: Any, m: int, h: float, whole: bool) -> None:
 
 def correct_stages(K: Any, m: int, h: float, whole: bool) -> float:
     """One simplified Newton correction of all stages; its size relative to the largest rate."""
+    if m > 0 and (whole or is_off(K, m)):
+        correct_positions_of_stages(K, m, h, whole)
+    return correct_rates(K, m, h)
+
+
+def correct_rates(K: Any, m: int, h: float) -> float:
+    """The correction of rates and multipliers by the residuals in K.stages; its size relative to the largest rate."""
     n = K.n
     size = n + m
     S = K.stages
-    if m > 0 and (whole or is_off(K, m)):
-        correct_positions_of_stages(K, m, h, whole)
     solve_real(K, m, h)
     solve_pair(K, m, h)
     K.counts[ITERATIONS] += 1

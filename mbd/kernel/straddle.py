@@ -1,4 +1,4 @@
-"""Steps of an explicit scheme that pass a pose in which rows lose rank between two of their stages.
+"""Steps of a scheme of several stages that pass a pose in which rows lose rank between two of these.
 
 With x the distance from the pose along the motion and y across it, rows are like h = x y there. Accelerations that
 satisfy ``ḧ = x ÿ + 2 ẋ ẏ + ẍ y = 0`` make of a velocity ẏ that a stage is off the branch ``ÿ = −2 ẋ ẏ / x``, and the
@@ -10,6 +10,9 @@ short that x would be too small, the one over the pose is longer; where round-of
 The pose is where a row of B depends on earlier ones: where its part w beside these, found by Gram–Schmidt on columns
 scaled by √M_ii, passes zero. A glance at |w| of the ends of steps tells where it falls fast enough; then w is found
 along ``q + τ v + τ²/2 v̇`` as well, and where it vanishes by a secant.
+
+Radau IIA holds rows at its stages, so that ḣ = 0 magnifies round-off there as the projection does; how its Newton's
+method gets across the pose is in `mbd.kernel.astride`.
 """
 
 from __future__ import annotations
@@ -18,21 +21,28 @@ from typing import Any
 
 from mbd.kernel.fields import BLOCKED, EPS, KICK, NEAR, NOW, PASSING, POSE, ROWS
 from mbd.kernel.ordered import order_at
-from mbd.kernel.restart import evaluate
+from mbd.kernel.restart import compose, evaluate, fill_block
 
 __all__ = [
-    "LONGEST", "forget_leftovers", "is_resolved", "keep_leftovers", "note_leftovers", "step_by_pose", "stirred",
+    "forget_leftovers", "is_resolved", "keep_leftovers", "longest_over", "note_leftovers", "step_by_pose", "stirred",
     "stirs",
 ]  # fmt: skip
 
 AMID = 0.46666666666666667
-"""The middle of the widest gap between nodes, those at 1/3 and 3/5 [-]."""
+"""The middle of the widest gap between nodes of the explicit scheme, those at 1/3 and 3/5 [-]."""
+AMID_RADAU = 0.4
+"""The same of Radau IIA, between (4 ± √6)/10 [-]."""
 GLANCE = 3.5
 """Steps to a pose, as the last step tells, below which is looked closer [-]."""
+CERTAIN = 6.0
+"""Steps to a pose below which it is taken for one; beyond, where nothing else asks for it, it may be none [-]."""
 FAR_GLANCE = 14.0
 """The same where round-off asks for longer steps over the pose [-]."""
 LONGEST = 16.0
 """Steps of the grid that one over a pose may last, where round-off makes too much of velocities in shorter ones [-]."""
+FAR_GLANCE_RADAU = 400.0
+LONGEST_RADAU = 512.0
+"""Both of Radau IIA, which can take such steps where forces are stiff, too [-]."""
 STIR = 16.0
 """What round-off of a row makes of velocities over what it would if it were one unit in the last place [-]."""
 HUSHED = 1e-9
@@ -59,8 +69,29 @@ NOWHERE = 1e300
 """Time to a pose where there is none [s]."""
 
 
+def amid(K: Any) -> float:
+    """Part of a step at which a pose lies best."""
+    return AMID_RADAU if K.scheme == 2 else AMID
+
+
+def far_glance(K: Any) -> float:
+    """Steps to a pose below which is looked closer where round-off asks for it."""
+    return FAR_GLANCE_RADAU if K.scheme == 2 else FAR_GLANCE
+
+
+def longest_over(K: Any) -> float:
+    """Steps of the grid that one over a pose may last."""
+    return LONGEST_RADAU if K.scheme == 2 else LONGEST
+
+
+def may_stretch(K: Any) -> bool:
+    """Whether a step over a pose may be longer than others: of an explicit scheme only where no guard is watched."""
+    return bool(K.n_watched == 0 or K.scheme == 2)
+
+
 def forget_leftovers(K: Any) -> None:
     """Nothing is known at the start of the scheme: whether a pose is near is looked at before the first step."""
+    K.clock[POSE] = -NOWHERE
     for k in range(K.n_rows):
         K.left[k] = -1.0
     K.left[K.state[ROWS]] = 1.0
@@ -89,8 +120,9 @@ def keep_leftovers(K: Any, h: float) -> None:
         fall = K.left[k] - K.left1[k]
         if K.left[k] < 0.0 or K.left1[k] < GLANCE * fall:
             near = 1.0
-        elif K.left1[k] < FAR_GLANCE * fall and K.adaptive == 0 and K.n_watched == 0:
-            if stirring(K, k, fall / h, K.left1[m]) > HUSHED * (AMID * h) ** 2:
+        elif K.left1[k] < far_glance(K) * fall and K.adaptive == 0 and may_stretch(K):
+            reach = (stirring(K, k, fall / h, K.left1[m]) / HUSHED) ** 0.5
+            if reach > amid(K) * h and K.left1[k] * h < (2.0 * reach + GLANCE * h) * fall:
                 near = 1.0
         K.left[k] = K.left1[k]
     K.left[m] = near
@@ -180,8 +212,10 @@ def lengths_of_many(K: Any, m: int) -> None:
 
 def evaluate_ahead(K: Any, ahead: float) -> None:
     """K.acc at the state that is `ahead` of the accepted one, along its velocities and accelerations."""
+    fill_block(K, K.clock[NOW], K.q, K.y)
     for i in range(K.n_v):
-        K.q1[i] = K.q[i] + ahead * (K.y[i] + 0.5 * ahead * K.rate[i])
+        K.block[K.o_x + i] = ahead * (K.y[i] + 0.5 * ahead * K.rate[i])
+    compose(K, K.q1)
     for i in range(K.n):
         K.y1[i] = K.y[i] + ahead * K.rate[i]
     evaluate(K, K.clock[NOW] + ahead, K.q1, K.y1)
@@ -214,7 +248,7 @@ def times_to_poses(K: Any, m: int, unit: float) -> float:
                 until = NOWHERE
             K.work[m + k] = until
             first = min(first, until)
-        if first > 4.0 * FAR_GLANCE * unit or abs(first - ahead) < NEAR_ENOUGH * unit:
+        if first > horizon(K, m, unit, first) or abs(first - ahead) < NEAR_ENOUGH * unit:
             break
         ahead = first
     K.detail[KICK] = 0.0
@@ -223,6 +257,18 @@ def times_to_poses(K: Any, m: int, unit: float) -> float:
         if K.work[m + k] < 1.1 * first and first < NOWHERE:
             K.detail[KICK] += stirring(K, k, K.work[2 * m + k] / K.work[m + k], speed)
     return first
+
+
+def horizon(K: Any, m: int, unit: float, first: float) -> float:
+    """Time beyond which a pose is not looked for: nothing is arranged so early, and the motion is not known so far."""
+    limit = 4.0 * FAR_GLANCE * unit
+    if K.scheme == 2 and first < NOWHERE:
+        speed = max(motion(K, K.y), motion(K, K.y1))
+        for k in range(m):
+            if K.work[m + k] == first:
+                reach = (stirring(K, k, K.work[2 * m + k] / first, speed) / HUSHED) ** 0.5
+                limit = max(limit, 4.0 * min(reach, LONGEST_RADAU * unit))
+    return limit
 
 
 def step_by_pose(K: Any, unit: float, longest: float) -> float:
@@ -236,11 +282,14 @@ def step_by_pose(K: Any, unit: float, longest: float) -> float:
     if K.left[m] == 0.0:
         return unit
     first = times_to_poses(K, m, unit)
-    K.clock[POSE] = K.clock[NOW] + first
+    limit = horizon(K, m, unit, first)
+    stretched = limit > 4.0 * FAR_GLANCE * unit and first <= limit
+    if K.scheme != 2 or first <= CERTAIN * unit or stretched:
+        K.clock[POSE] = K.clock[NOW] + first
     span = unit
-    if K.n_watched == 0:
-        span = min(max((K.detail[KICK] / HUSHED) ** 0.5 / AMID, unit), longest * unit)
-    rest = (first - AMID * span) / unit
+    if may_stretch(K):
+        span = min(max((K.detail[KICK] / HUSHED) ** 0.5 / amid(K), unit), longest * unit)
+    rest = (first - amid(K) * span) / unit
     if rest >= 2.0:
         K.detail[KICK] = 0.0  # far: what may come of it is judged nearer
         return unit
@@ -249,7 +298,7 @@ def step_by_pose(K: Any, unit: float, longest: float) -> float:
     if rest >= SMALLEST:
         return rest * unit
     K.state[NEAR] = PASSING
-    return clearest(K, m, span, min(1.0, first / AMID / span))
+    return clearest(K, m, span, min(1.0, first / amid(K) / span))
 
 
 def stirred(K: Any, h: float) -> float:
@@ -294,15 +343,25 @@ def clearest(K: Any, m: int, unit: float, wanted: float) -> float:
     widest = -1.0
     for k in range(17):
         part = wanted * (1.0 - 0.05 * k)
-        clear = 0.5 * AMID
+        clear = 0.5 * amid(K)
         for row in range(m):
             place = K.work[m + row] / (part * unit)
-            for node in range(EXPLICIT_NODES):
-                clear = min(clear, abs(place - K.tableau[EXPLICIT_PLACES + node]))
-            clear = min(clear, abs(place - 1.0))
+            clear = min(clear, clearance(K, place))
         if clear > widest + 1e-9:
             best = part
             widest = clear
         if widest >= CLEAR:
             break
     return best * unit
+
+
+def clearance(K: Any, place: float) -> float:
+    """Distance of a place, part of a step, from the nearest node or the end [-]."""
+    clear = abs(place - 1.0)
+    if K.scheme == 2:
+        for node in range(2):
+            clear = min(clear, abs(place - K.stages[node]))
+    else:
+        for node in range(EXPLICIT_NODES):
+            clear = min(clear, abs(place - K.tableau[EXPLICIT_PLACES + node]))
+    return clear

@@ -24,7 +24,7 @@ from mbd.kernel.fields import (
 )
 from mbd.kernel.guards import try_step
 from mbd.kernel.pairs import ALONE, FIRST, LONGER, SECOND, SHORTER, WHOLE, may_pair
-from mbd.kernel.straddle import LONGEST, is_resolved, step_by_pose, stirs
+from mbd.kernel.straddle import is_resolved, longest_over, step_by_pose, stirs
 
 __all__ = ["part_end", "step_end", "tried_step"]
 
@@ -69,7 +69,7 @@ def tried_step(K: Any, h: float, t1: float) -> int:
         K.state[PAIRED] = 0
     full = h
     step = K.clock[STEP]
-    if K.scheme == 1 and K.state[ROWS] > 0:
+    if K.scheme != 0 and K.state[ROWS] > 0:
         status = step_past_pose(K, h)
         h = K.clock[TRIED]
         if status == LAST or status == STIRRED:
@@ -95,11 +95,11 @@ def tried_step(K: Any, h: float, t1: float) -> int:
 
 
 def step_past_pose(K: Any, unit: float) -> int:
-    """A candidate of an explicit scheme after a step of this size, or another near a pose: K.clock[TRIED] its step.
+    """A candidate of a scheme of several stages after a step of this size, or another near a pose: K.clock[TRIED].
 
     A step over the pose that is longer than others must be resolved like these; else they lead up to it.
     """
-    h = step_by_pose(K, unit, LONGEST)
+    h = step_by_pose(K, unit, longest_over(K))
     if h > unit:
         if K.clock[NOW] + h > K.until - WHOLE * unit:
             if K.until >= K.end:

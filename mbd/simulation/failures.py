@@ -147,10 +147,13 @@ def explanation(
             f"{worst}{rushing or '; use a larger tolerance= of the integrator or a larger dt'}"
         )
     if status == F.STIRRED:
+        others = "mbd.GeneralizedAlpha, mbd.HHT or mbd.RadauIIA"
+        if int(values["scheme"]) != RUNGE_KUTTA:
+            others = "mbd.GeneralizedAlpha or mbd.HHT"
         return (
             f"{where}: a pose in which rows lose rank, at {_unknown(stepper)}{with_closed}: round-off would make "
-            f"{residual:.1g} of the velocities in an explicit step of {float(values['detail'][2]):.2g} s over it; use "
-            "mbd.GeneralizedAlpha, mbd.HHT or mbd.RadauIIA, or longer steps (a larger dt= or tol=)"
+            f"{residual:.1g} of the velocities in a step of {float(values['detail'][2]):.2g} s over it; use "
+            f"{others}, or longer steps (a larger dt= or tol=)"
         )
     if status in (F.SINGULAR, F.TOO_NEAR):
         what = f"{where}: the Newton matrix is singular at {_unknown(stepper)}{with_closed}"

@@ -285,7 +285,7 @@ class PlainScheme:
         K.q1[:], K.y1[:], K.rate1[:], K.aux1[:] = result.state.q, y, rate, rate
         K.lam1[:] = 0.0
         K.lam1[rows] = lam
-        if K.scheme == 1 and rows:
+        if K.scheme != 0 and rows:
             evaluate(K, t1, K.q1, K.y1)
             note_leftovers(K)
         fill_block(K, t1, K.q1, K.y1)
@@ -301,7 +301,7 @@ class PlainScheme:
 
     def accept(self, K: Any, h: float) -> None:
         """The candidate becomes the accepted state, its memory the memory."""
-        if K.scheme == 1 and K.state[ROWS] > 0:
+        if K.scheme != 0 and K.state[ROWS] > 0:
             keep_leftovers(K, h)
         self.memory = self.pending
         K.slope[:] = (K.rate1 - K.rate) / h

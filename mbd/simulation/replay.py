@@ -17,7 +17,7 @@ from mbd.integrators import Integrator
 from mbd.integrators.base import StepReport
 from mbd.kernel.control import newmark_error
 from mbd.kernel.newmark import newmark_accept, newmark_resume, newmark_start, newmark_step
-from mbd.kernel.radau import radau_accept, radau_resume, radau_start, radau_step
+from mbd.kernel.radau import radau_accept, radau_start, radau_step
 from mbd.kernel.runge_kutta import runge_kutta_accept, runge_kutta_start, runge_kutta_step
 from mbd.results.capsule import load
 from mbd.results.failure import Failure
@@ -188,9 +188,9 @@ def _nothing_to_add(K: Any, h: float) -> None:
 SCHEMES: dict[int, tuple[Any, ...]] = {
     NEWMARK: (newmark_start, newmark_step, newmark_accept, newmark_resume, newmark_error),
     RUNGE_KUTTA: (runge_kutta_start, runge_kutta_step, runge_kutta_accept, None, _nothing_to_add),
-    RADAU_IIA: (radau_start, radau_step, radau_accept, radau_resume, _nothing_to_add),
+    RADAU_IIA: (radau_start, radau_step, radau_accept, None, _nothing_to_add),
 }
-"""Start, step, accept, resume and error of the kernel's schemes; an explicit one holds no pose to resume from."""
+"""Start, step, accept, resume and error of the kernel's schemes; only the family has to resume beyond a pose."""
 
 
 class _Watched:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,13 +12,11 @@ from mbd.analysis.amplification import oscillated
 from mbd.analysis.numerical import spectrum
 from mbd.hardcases.mass_ratios import heavy_below_light
 from mbd.integrators.radau import RadauMemory
-from mbd.kernel.fields import LEFT
 from mbd.simulation.simulate import prepared
 from mbd.state import Mode
 from mbd.testing.problems import problem
 from tests.integrators.test_order import SCENES, T, observed, started
 from tests.simulation.mechanisms import ball, falling, run
-from tests.simulation.singular import slider_crank
 
 STEPS = (8, 16, 32, 64)
 """Steps in half a second; twice as many would meet round-off."""
@@ -147,17 +144,6 @@ def test_bounces_are_found_where_a_parabola_meets_the_floor():
     np.testing.assert_allclose(times[:2], [first, 2.0 * first], rtol=0, atol=1e-12)
 
 
-def test_a_singular_pose_is_passed_with_order_three():
-    """A few trapezoidal steps, each with an error of dt³, whatever their number over the whole run."""
-    passage = slider_crank(1.0)
-    exact, found = passage.end(), []
-    for dt in (1e-2, 5e-3, 2.5e-3):
-        ran = mbd.simulate(*passage.start, mbd.RadauIIA(), dt=dt, until=passage.until)
-        assert passage.off(ran) < 1e-9 and 0 < ran.stats["careful"] < 15
-        found.append(abs(ran[passage.angle][-1] - exact))
-    assert observed(np.array(found)) == pytest.approx(3.0, abs=0.15)
-
-
 @pytest.mark.parametrize("backend", ["auto", "python"])
 def test_a_motion_that_is_predicted_exactly_needs_no_iteration(backend):
     """Of a free fall the first residual is round-off; its error estimate still needs the factors of the step."""
@@ -182,15 +168,6 @@ def test_a_motion_too_fast_to_be_resolved_is_refused():
     wild = mbd.assemble(model, {"u.angle": 1.0}, {"u.angle": 300.0, "w.angle": -700.0})
     with pytest.raises(mbd.SimulationError, match="Newton stalled|half a radian"):
         mbd.simulate(model, wild, mbd.RadauIIA(), dt=0.1, until=1.0)
-
-
-def test_a_step_beyond_a_singular_pose_starts_anew():
-    posed = problem("row")
-    scheme = mbd.RadauIIA()
-    memory = scheme.start(posed.system, posed.start, Mode(), 0.1)
-    beyond = scheme.step(posed.system, posed.start, 0.1, Mode(), replace(memory, near=LEFT))
-    plain = scheme.step(posed.system, posed.start, 0.1, Mode(), memory)
-    np.testing.assert_array_equal(beyond.state.q, plain.state.q)
 
 
 def test_a_tolerance_out_of_range_is_refused():

@@ -53,8 +53,8 @@ def judge(name: str, scheme: mbd.Integrator, steps: tuple[float, ...], floor: fl
         assert found.off(run) < CLOSE, dt
         assert error < 1.5 * first * (dt / steps[0]) ** 2 + floor, (dt, error)
         assert run.violation.length < CLOSE
-        assert 0 < run.stats["careful"] < 100
-        assert any("lose rank were passed" in note for note in run.stats["notes"])
+        assert 0 < run.stats["careful"] + run.stats["shortened"] < 100
+        assert any("rows lose rank" in note for note in run.stats["notes"])
 
 
 @pytest.mark.parametrize("scheme", SCHEMES, ids=repr)
@@ -75,8 +75,10 @@ def test_singular_poses_are_passed_with_order_two_down_to_round_off(name, scheme
 def test_nothing_is_kicked_next_to_a_singular_pose(dt, scheme):
     found, _ = passage("slider-crank")
     run = mbd.simulate(*found.start, scheme, dt=dt, until=0.6)
-    near = np.abs(run["main.angle"] - np.pi) < 40.0 * dt
-    bends = np.abs(np.diff(np.diff(run["main.angle.rate"][near]) / np.diff(run.time[near]))) * dt
+    near = np.abs(run["main.angle"] - np.pi) < 40.0 * np.max(np.diff(run.time))
+    steps = np.diff(run.time[near])
+    slopes = np.diff(run["main.angle.rate"][near]) / steps
+    bends = np.abs(2.0 * np.diff(slopes) / (steps[1:] + steps[:-1])) * dt**2  # of steps that may be uneven
     assert np.max(bends) < 20.0 * dt**2 + 1e-14 / dt**2  # the second slope of the rate is 8 rad/s³
 
 
