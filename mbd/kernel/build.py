@@ -21,17 +21,21 @@ __all__ = ["MODULES", "constants_of", "entry", "functions_of", "kernel_object", 
 ENTRY = "mbd_kernel"
 
 MODULES = (
-    "linear", "ordered", "lemke", "redundancy", "saddle", "restart", "pivoting", "complementarity", "blow", "impact",
-    "settle", "pairs", "iteration", "leftovers", "passage", "newmark", "complex_linear", "ordered_complex",
-    "stages", "straddle", "runge_kutta", "astride", "radau", "hermite", "guards", "control", "interior", "locate",
-    "switching", "nonsmooth", "takeover", "observe", "starting", "trying", "advance",
+    "candidate", "linear", "ordered", "orthogonal", "lemke", "redundancy", "saddle", "restart", "pivoting",
+    "complementarity", "blow", "impact", "settle", "pairs", "iteration", "memory", "leftovers", "passage", "newton",
+    "newmark", "complex_linear", "ordered_complex", "stages", "straddle", "runge_kutta", "astride", "radau", "hermite",
+    "guards", "control", "interior", "refine", "locate", "switching", "nonsmooth", "takeover", "observe", "starting",
+    "trying", "events", "advance",
 )  # fmt: skip
 
 APART = (
     "factor", "solve", "solve_definite", "factor_ordered", "solve_ordered", "factor_pair_ordered", "solve_pair_ordered",
-    "leftovers_of_many",
+    "leftovers_of_many", "parts_to_take", "locate", "handle_event", "land",
 )  # fmt: skip
-"""Their loops keep their shape wherever they are called; where they are not, nobody carries them along."""
+"""Their loops keep their shape wherever they are called; where they are not, nobody carries them along.
+
+The last four are what few steps need: with them inside, the loop over steps would be too large to stay in one piece.
+"""
 
 SHIMS = """
 def scheme_step(K: Any, h: float, t1: float) -> int:

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from mbd.kernel.candidate import accept_guards, carry
 from mbd.kernel.fields import NOW
 from mbd.kernel.guards import gap_scale, gap_tolerance, is_watched, judge, watch
 from mbd.kernel.restart import compose, consistent, fill_block
@@ -26,7 +27,7 @@ def parts_to_take(K: Any, h: float) -> int:
 
     Guards and multipliers of the accepted state and of the candidate are as before afterwards.
     """
-    keep_ends(K)
+    copy_ends(K, True)
     t = K.clock[NOW]
     asked = needs_multipliers(K)
     answer = 0
@@ -42,54 +43,32 @@ def parts_to_take(K: Any, h: float) -> int:
         if part < K.looks and rearms(K):
             answer = part
             break
-        for i in range(K.n_watched):
-            K.guards0[i] = K.guards1[i]
+        accept_guards(K)
         for k in range(K.n_rows):
             K.lam[k] = K.lam1[k]
-    put_candidate_back(K)
-    place = 0
-    for i in range(K.n_watched):
-        K.guards0[i] = K.inside[place + i]
-    place += 2 * K.n_watched
-    for k in range(K.n_rows):
-        K.lam[k] = K.inside[place + k]
+    copy_ends(K, False)
     K.fired[0] = -1
     return answer
 
 
-def keep_ends(K: Any) -> None:
-    """What is overwritten, into K.inside: guards and multipliers at both ends, the candidate."""
-    place = 0
-    for i in range(K.n_watched):
-        K.inside[i] = K.guards0[i]
-        K.inside[K.n_watched + i] = K.guards1[i]
-    place += 2 * K.n_watched
-    for k in range(K.n_rows):
-        K.inside[place + k] = K.lam[k]
-        K.inside[place + K.n_rows + k] = K.lam1[k]
-    place += 2 * K.n_rows
-    for i in range(K.n_q):
-        K.inside[place + i] = K.q1[i]
-    place += K.n_q
-    for i in range(K.n):
-        K.inside[place + i] = K.y1[i]
-        K.inside[place + K.n + i] = K.rate1[i]
+def copy_ends(K: Any, out: bool) -> None:
+    """What is overwritten, into K.inside or back: guards and multipliers at both ends, the candidate."""
+    o = carry(K.guards0, K.inside, 0, K.n_watched, out)
+    o = carry(K.guards1, K.inside, o, K.n_watched, out)
+    o = carry(K.lam, K.inside, o, K.n_rows, out)
+    o = carry(K.lam1, K.inside, o, K.n_rows, out)
+    o = carry(K.q1, K.inside, o, K.n_q, out)
+    o = carry(K.y1, K.inside, o, K.n, out)
+    carry(K.rate1, K.inside, o, K.n, out)
 
 
 def put_candidate_back(K: Any) -> None:
-    """The candidate with its guards and multipliers."""
-    for i in range(K.n_watched):
-        K.guards1[i] = K.inside[K.n_watched + i]
-    place = 2 * K.n_watched
-    for k in range(K.n_rows):
-        K.lam1[k] = K.inside[place + K.n_rows + k]
-    place += 2 * K.n_rows
-    for i in range(K.n_q):
-        K.q1[i] = K.inside[place + i]
-    place += K.n_q
-    for i in range(K.n):
-        K.y1[i] = K.inside[place + i]
-        K.rate1[i] = K.inside[place + K.n + i]
+    """The candidate with its guards and multipliers; those of the accepted state stay what they are."""
+    o = carry(K.guards1, K.inside, K.n_watched, K.n_watched, False)
+    o = carry(K.lam1, K.inside, o + K.n_rows, K.n_rows, False)
+    o = carry(K.q1, K.inside, o, K.n_q, False)
+    o = carry(K.y1, K.inside, o, K.n, False)
+    carry(K.rate1, K.inside, o, K.n, False)
 
 
 def needs_multipliers(K: Any) -> bool:

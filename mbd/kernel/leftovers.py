@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Any
 
-__all__ = ["leftovers_of_many"]
+__all__ = ["common_part", "leftovers_of_many"]
 
 NOTHING_LEFT = 1e-15
 """Square of a scaled row below which it is round-off of its terms [-]."""
@@ -25,7 +25,7 @@ def leftovers_of_many(
     for row in range(m):
         K.spare[4 * m + row] = scaled_row(K, m, row, h, ratio, ahead, o_H, width)
         for other in range(row + 1):
-            part = common_part(K, row, other)
+            part = common_part(K, K.n_v, row, other)
             K.spare[G + row * m + other] = part
             K.spare[G + other * m + row] = part
     for done in range(m):
@@ -80,9 +80,8 @@ def scaled_row(K: Any, m: int, row: int, h: float, ratio: float, ahead: float, o
     return float(length)
 
 
-def common_part(K: Any, row: int, other: int) -> float:
-    """The product of two scaled rows."""
-    n = K.n_v
+def common_part(K: Any, n: int, row: int, other: int) -> float:
+    """The product of two rows of the basis, which are n long, over the entries of the first in K.support."""
     part = 0.0
     for e in range(K.support[row * (n + 1)]):
         j = K.support[row * (n + 1) + 1 + e]

@@ -24,31 +24,41 @@ def factor(A: Any, n: int, pivots: Any) -> int:
         if not (big > 1e-305 and big < 1e300):
             return k + 1
         if p != k:
-            for j in range(n):
-                swap = A[k * n + j]
-                A[k * n + j] = A[p * n + j]
-                A[p * n + j] = swap
+            swap_rows(A, n, k, p)
         inverse = 1.0 / A[k * n + k]
         A[k * n + k] = inverse
         for i in range(k + 1, n):
             if A[i * n + k] != 0.0:
                 left = A[i * n + k] * inverse
                 A[i * n + k] = left
-                j = k + 1
-                while j + 3 < n:  # four at once, which become one instruction
-                    a0 = A[i * n + j] - left * A[k * n + j]
-                    a1 = A[i * n + j + 1] - left * A[k * n + j + 1]
-                    a2 = A[i * n + j + 2] - left * A[k * n + j + 2]
-                    a3 = A[i * n + j + 3] - left * A[k * n + j + 3]
-                    A[i * n + j] = a0
-                    A[i * n + j + 1] = a1
-                    A[i * n + j + 2] = a2
-                    A[i * n + j + 3] = a3
-                    j += 4
-                while j < n:
-                    A[i * n + j] -= left * A[k * n + j]
-                    j += 1
+                subtract_row(A, n, i, k, left, k + 1)
     return 0
+
+
+def swap_rows(A: Any, n: int, i: int, k: int) -> None:
+    """Rows i and k of the row-major n×n matrix A change places."""
+    for j in range(n):
+        swap = A[i * n + j]
+        A[i * n + j] = A[k * n + j]
+        A[k * n + j] = swap
+
+
+def subtract_row(A: Any, n: int, i: int, k: int, part: float, first: int) -> None:
+    """Row i less `part` times row k, from the column `first` on."""
+    j = first
+    while j + 3 < n:  # four at once, which become one instruction
+        a0 = A[i * n + j] - part * A[k * n + j]
+        a1 = A[i * n + j + 1] - part * A[k * n + j + 1]
+        a2 = A[i * n + j + 2] - part * A[k * n + j + 2]
+        a3 = A[i * n + j + 3] - part * A[k * n + j + 3]
+        A[i * n + j] = a0
+        A[i * n + j + 1] = a1
+        A[i * n + j + 2] = a2
+        A[i * n + j + 3] = a3
+        j += 4
+    while j < n:
+        A[i * n + j] -= part * A[k * n + j]
+        j += 1
 
 
 def solve(A: Any, n: int, pivots: Any, b: Any) -> None:
@@ -88,20 +98,7 @@ def solve_definite(M: Any, n: int, b: Any, work: Any) -> bool:
             if M[k * n + i] != 0.0:
                 left = M[k * n + i] * inverse
                 b[i] -= left * b[k]
-                j = i
-                while j + 3 < n:  # four at once, which become one instruction
-                    a0 = M[i * n + j] - left * M[k * n + j]
-                    a1 = M[i * n + j + 1] - left * M[k * n + j + 1]
-                    a2 = M[i * n + j + 2] - left * M[k * n + j + 2]
-                    a3 = M[i * n + j + 3] - left * M[k * n + j + 3]
-                    M[i * n + j] = a0
-                    M[i * n + j + 1] = a1
-                    M[i * n + j + 2] = a2
-                    M[i * n + j + 3] = a3
-                    j += 4
-                while j < n:
-                    M[i * n + j] -= left * M[k * n + j]
-                    j += 1
+                subtract_row(M, n, i, k, left, i)
     for c in range(n):
         k = n - 1 - c
         left = b[k]
@@ -124,60 +121,20 @@ def eliminate(A: Any, n: int, b: Any, columns: Any, work: Any, rank_tolerance: f
     `work` needs 3 n places: row scales, column scales, solution. The number of the unknown
     eliminated k-th is left in columns[k], those beyond the rank being the dependent ones.
     """
-    for i in range(n):
-        big = 0.0
-        for j in range(n):
-            big = max(big, abs(A[i * n + j]))
-        work[i] = 1.0 / big if big > 0.0 else 1.0
-        for j in range(n):
-            A[i * n + j] *= work[i]
-        b[i] *= work[i]
-        columns[i] = i
-    for j in range(n):
-        big = 0.0
-        for i in range(n):
-            big = max(big, abs(A[i * n + j]))
-        work[n + j] = 1.0 / big if big > 0.0 else 1.0
-        for i in range(n):
-            A[i * n + j] *= work[n + j]
+    equilibrate(A, n, b, work)
     size = 0.0
     for i in range(n):
+        columns[i] = i
         size = max(size, abs(b[i]))
     rank = n
     for k in range(n):
-        p = k
-        c = k
-        big = 0.0
-        for i in range(k, n):
-            for j in range(k, n):
-                if abs(A[i * n + j]) > big:
-                    big = abs(A[i * n + j])
-                    p = i
-                    c = j
-        if not big > rank_tolerance:
+        if not bring_largest(A, n, k, b, columns, rank_tolerance):
             rank = k
             break
-        if p != k:
-            for j in range(n):
-                swap = A[k * n + j]
-                A[k * n + j] = A[p * n + j]
-                A[p * n + j] = swap
-            swap = b[k]
-            b[k] = b[p]
-            b[p] = swap
-        if c != k:
-            for i in range(n):
-                swap = A[i * n + k]
-                A[i * n + k] = A[i * n + c]
-                A[i * n + c] = swap
-            place = columns[k]
-            columns[k] = columns[c]
-            columns[c] = place
         for i in range(k + 1, n):
             left = A[i * n + k] / A[k * n + k]
             if left != 0.0:
-                for j in range(k + 1, n):
-                    A[i * n + j] -= left * A[k * n + j]
+                subtract_row(A, n, i, k, left, k + 1)
                 b[i] -= left * b[k]
     conflict = False
     for i in range(rank, n):
@@ -194,3 +151,54 @@ def eliminate(A: Any, n: int, b: Any, columns: Any, work: Any, rank_tolerance: f
     for j in range(n):
         b[j] = work[2 * n + j] * work[n + j]
     return -1 - rank if conflict else rank
+
+
+def equilibrate(A: Any, n: int, b: Any, work: Any) -> None:
+    """Scale rows (and b), then columns, of A x = b to largest entries of 1; the factors go into work[: 2 n]."""
+    for i in range(n):
+        big = 0.0
+        for j in range(n):
+            big = max(big, abs(A[i * n + j]))
+        work[i] = 1.0 / big if big > 0.0 else 1.0
+        for j in range(n):
+            A[i * n + j] *= work[i]
+        b[i] *= work[i]
+    for j in range(n):
+        big = 0.0
+        for i in range(n):
+            big = max(big, abs(A[i * n + j]))
+        work[n + j] = 1.0 / big if big > 0.0 else 1.0
+        for i in range(n):
+            A[i * n + j] *= work[n + j]
+
+
+def bring_largest(A: Any, n: int, k: int, b: Any, columns: Any, least: float) -> bool:
+    """The largest entry from (k, k) on comes to (k, k), its row with that of b, its column with its number.
+
+    False where none is above `least`: nothing moves then.
+    """
+    p = k
+    c = k
+    big = 0.0
+    for i in range(k, n):
+        for j in range(k, n):
+            if abs(A[i * n + j]) > big:
+                big = abs(A[i * n + j])
+                p = i
+                c = j
+    if not big > least:
+        return False
+    if p != k:
+        swap_rows(A, n, k, p)
+        swap = b[k]
+        b[k] = b[p]
+        b[p] = swap
+    if c != k:
+        for i in range(n):
+            swap = A[i * n + k]
+            A[i * n + k] = A[i * n + c]
+            A[i * n + c] = swap
+        place = columns[k]
+        columns[k] = columns[c]
+        columns[c] = place
+    return True

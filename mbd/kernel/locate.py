@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from mbd.kernel.candidate import stay
 from mbd.kernel.fields import (
     CLOSE,
     CROSS,
-    EPS,
     GRAZE,
     LOCATIONS,
     NO_LOCATION,
@@ -22,6 +22,7 @@ from mbd.kernel.fields import (
 )
 from mbd.kernel.guards import frictions_at, gap_tolerance, guard_value, is_watched, judge, try_step
 from mbd.kernel.hermite import first_guess
+from mbd.kernel.refine import refine
 
 __all__ = ["locate"]
 
@@ -29,20 +30,8 @@ MOST_LOOKS = 12
 """How often a step is halved to see a friction slide, or a contact part, that has just begun to [-]."""
 SAME = 1e-9
 """Events closer than this part of the way to the first are one event."""
-
-
-def stay(K: Any) -> None:
-    """The candidate becomes the accepted state itself: an event at the very start of the step."""
-    for i in range(K.n_q):
-        K.q1[i] = K.q[i]
-    for i in range(K.n):
-        K.y1[i] = K.y[i]
-        K.rate1[i] = K.rate[i]
-        K.aux1[i] = K.aux[i]
-    for k in range(K.n_rows):
-        K.lam1[k] = K.lam[k]
-    for i in range(K.n_watched):
-        K.guards1[i] = K.guards0[i]
+EARLIER, LATER = -2, -1
+"""Where `fall_back` has seen another guard fire: before the place looked at, or in the full step."""
 
 
 def dip(K: Any, h: float) -> int:
@@ -85,72 +74,38 @@ def locate(K: Any, h: float) -> int:
     A bracketing root finder on steps of varying size from the same accepted state, until the guard is at round-off.
     K.fired[0] < 0 afterwards: there was no event, the candidate is the full step.
     """
-    t = K.clock[NOW]
     end = h
     found_kind = -1  # the event at `end`, before which others are looked for
     found_index = 0
     for _ in range(4 * (K.n_contacts + K.n_guards + K.n_frictions) + 4):
         kind = K.fired[0]
         index = K.fired[1]
-        if kind == GRAZE:
-            status = dip(K, end)
-            if status != 0:
-                return status
-            if K.fired[0] < 0:
-                if not judge(K, end):
-                    status = fall_back(K, h, end, found_kind, found_index)
-                    if status >= 0:
-                        return status
-                    end = h
-                continue
-            kind = CLOSE
-            end = K.pick[0]
-            found_kind = -1
+        low = K.pick[1] * end
+        status = 0
+        if kind == GRAZE or kind == STICK_BRIEF:
             low = 0.0
-        elif kind == STICK_BRIEF:  # a step to the deepest place shows it at rest on the way, or not at all
-            status = try_step(K, K.pick[0] * end, t + K.pick[0] * end)
-            if status != 0:
-                return status
-            kind = STICK
-            if guard_value(K, kind, index, t + K.pick[0] * end) < 0.0:
-                end = K.pick[0] * end
+            status = dip(K, end) if kind == GRAZE else come_to_rest(K, index, end)
+            kind = K.fired[0]
+            if kind == CLOSE or (kind == STICK and K.pick[0] < end):
+                end = K.pick[0]
                 found_kind = -1
-            low = 0.0
-        else:
-            low = K.pick[1] * end
-        status = bracket(K, kind, index, low, end)
+        if status == 0 and kind >= 0:
+            status = root_before(K, kind, index, low, end)
         if status != 0:
             return status
-        found = K.pick[2]
-        if K.fired[0] >= 0 and found > 0.0 and kind == CLOSE and left_alone(K, index):  # not watched any more there
-            K.active[index] = 1
-            K.fired[0] = -1
         if K.fired[0] < 0:
-            status = try_step(K, end, t + end)
-            if status != 0:
+            status = fall_back(K, h, end, found_kind, found_index)
+            if status >= 0:
                 return status
-            if not judge(K, end):
-                status = fall_back(K, h, end, found_kind, found_index)
-                if status >= 0:
-                    return status
+            if status == LATER:
                 end = h
             continue
+        found = K.pick[2]
         if found <= 0.0:
             return 0
-        # did another guard fire before this one? (this one is at round-off and may look fired itself)
-        place = index
-        if kind == CROSS:
-            place += K.n_contacts
-        elif kind == STICK or kind == SLIP:
-            place += K.n_contacts + K.n_guards
-        quiet = K.active[place]
-        K.active[place] = 1
-        other = judge(K, found) and K.pick[0] < 1.0 - SAME
-        K.active[place] = quiet
-        if not other:
-            K.fired[0] = kind
-            K.fired[1] = index
-            K.pick[2] = found
+        together = found_kind >= 0 and found > (1.0 - SAME) * end  # as the one it was looked for before
+        if together or not another_before(K, kind, index, found):
+            take_event(K, kind, index, found)
             return 0
         end = found
         found_kind = kind
@@ -158,22 +113,68 @@ def locate(K: Any, h: float) -> int:
     return NO_LOCATION
 
 
+def come_to_rest(K: Any, index: int, end: float) -> int:
+    """A step to where a friction comes nearest to rest within `end`: at rest on the way, or not at all.
+
+    K.pick[0] is the distance of that place, or `end` where it slides on.
+    """
+    place = K.pick[0] * end
+    status = try_step(K, place, K.clock[NOW] + place)
+    if status == 0:
+        K.fired[0] = STICK
+        K.pick[0] = place if guard_value(K, STICK, index, K.clock[NOW] + place) < 0.0 else end
+    return status
+
+
+def root_before(K: Any, kind: int, index: int, low: float, end: float) -> int:
+    """`bracket`, and the candidate at `end` again where there was no event after all."""
+    status = bracket(K, kind, index, low, end)
+    if status != 0:
+        return status
+    if K.fired[0] >= 0 and K.pick[2] > 0.0 and kind == CLOSE and left_alone(K, index):  # not watched any more there
+        K.active[index] = 1
+        K.fired[0] = -1
+    return 0 if K.fired[0] >= 0 else try_step(K, end, K.clock[NOW] + end)
+
+
+def another_before(K: Any, kind: int, index: int, found: float) -> bool:
+    """Whether another guard fired before this one, which is at round-off and may look fired itself."""
+    place = index
+    if kind == CROSS:
+        place += K.n_contacts
+    elif kind == STICK or kind == SLIP:
+        place += K.n_contacts + K.n_guards
+    quiet = K.active[place]
+    K.active[place] = 1
+    other = judge(K, found) and K.pick[0] < 1.0 - SAME
+    K.active[place] = quiet
+    return other
+
+
+def take_event(K: Any, kind: int, index: int, place: float) -> None:
+    """The event that the step ends with."""
+    K.fired[0] = kind
+    K.fired[1] = index
+    K.pick[2] = place
+
+
 def fall_back(K: Any, h: float, end: float, kind: int, index: int) -> int:
     """Where no guard has fired before `end` after all: the event found there stands (kind ≥ 0), else the full step h.
 
-    The candidate is at `end`. −1: a guard has fired in the full step, which is the candidate then.
+    The candidate is at `end`. `EARLIER`: another guard has fired before that. `LATER`: one has fired in the full step,
+    which is the candidate then.
     """
+    if judge(K, end):
+        return EARLIER
     if kind >= 0:
-        K.fired[0] = kind
-        K.fired[1] = index
-        K.pick[2] = end
+        take_event(K, kind, index, end)
         return 0
     if end < h:
         status = try_step(K, h, K.clock[NOW] + h)
         if status != 0:
             return status
         if judge(K, h):
-            return -1
+            return LATER
     K.pick[2] = h
     return 0
 
@@ -261,81 +262,3 @@ def bracket(K: Any, kind: int, index: int, low: float, high: float) -> int:
         K.pick[2] = place
         return try_step(K, place, t + place)
     return refine(K, kind, index, low, f_low, high, f_high, low + width * guess)
-
-
-def refine(K: Any, kind: int, index: int, low: float, f_low: float, high: float, f_high: float, guess: float) -> int:
-    """Brent's root finder (Brent 1973, ch. 4) from a bracket and a first guess; leaves the candidate at the root."""
-    t = K.clock[NOW]
-    tiny = 0.0
-    if kind == CLOSE or kind == OPEN_GAP:
-        tiny = 0.25 * gap_tolerance(K, index)
-    elif kind != WATCH and kind != CROSS:  # a user's guard has a scale of its own: its instant is found instead
-        tiny = 1e-15 * max(f_low, -f_high)
-    a = low  # the iterate before
-    fa = f_low
-    b = high  # the best iterate
-    fb = f_high
-    c = low  # the other end of the bracket
-    fc = f_low
-    move = high - low
-    before = move
-    at = -1.0  # where the candidate stands
-    for trial in range(100):
-        if (fb > 0.0) == (fc > 0.0):
-            c = a
-            fc = fa
-            move = b - a
-            before = move
-        if abs(fc) < abs(fb):
-            a = b
-            b = c
-            c = a
-            fa = fb
-            fb = fc
-            fc = fa
-        limit = 2.0 * EPS * max(abs(t), b)
-        half = 0.5 * (c - b)
-        if abs(half) <= limit or abs(fb) <= tiny:
-            break
-        if trial == 0:
-            before = move
-            move = guess - b
-        elif abs(before) >= limit and abs(fa) > abs(fb):
-            s = fb / fa
-            if a == c:
-                p = 2.0 * half * s
-                r = 1.0 - s
-            else:
-                u = fa / fc
-                w = fb / fc
-                p = s * (2.0 * half * u * (u - w) - (b - a) * (w - 1.0))
-                r = (u - 1.0) * (w - 1.0) * (s - 1.0)
-            if p > 0.0:
-                r = -r
-            else:
-                p = -p
-            if 2.0 * p < min(3.0 * half * r - abs(limit * r), abs(before * r)):
-                before = move
-                move = p / r
-            else:
-                move = half
-                before = half
-        else:
-            move = half
-            before = half
-        a = b
-        fa = fb
-        if abs(move) > limit:
-            b += move
-        else:
-            b += limit if half > 0.0 else -limit
-        status = try_step(K, b, t + b)
-        if status != 0:
-            return status
-        at = b
-        fb = guard_value(K, kind, index, t + b)
-    place = b
-    if kind == WATCH and fb >= 0.0:  # end where it is watched, or it fires again
-        place = c
-    K.pick[2] = place
-    return 0 if at == place else try_step(K, place, t + place)

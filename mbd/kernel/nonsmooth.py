@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from mbd.kernel.candidate import adopt, carry
 from mbd.kernel.complementarity import complementarity
 from mbd.kernel.fields import (
     COMPOSE,
@@ -191,16 +192,7 @@ def strike(K: Any, h: float, t1: float) -> int:
     nC = K.n_contacts
     for c in range(nC):
         K.before[c] = K.guards0[nC + c]
-    for i in range(K.n_q):
-        K.q[i] = K.q1[i]
-    for i in range(K.n):
-        K.y[i] = K.y1[i]
-        K.rate[i] = K.rate1[i]
-    for k in range(K.n_rows):
-        K.lam[k] = K.lam1[k]
-    K.clock[NOW] = t1
-    for i in range(K.n_watched):
-        K.guards0[i] = K.guards1[i]
+    adopt(K, t1)
     status = lift(K)
     if status != 0:
         return status
@@ -270,13 +262,3 @@ def copy_flags(K: Any, out: bool) -> None:
     o = carry(K.sticks, K.kept_flags, o, K.n_frictions, out)
     o = carry(K.loose, K.kept_flags, o, K.n_frictions, out)
     carry(K.was, K.kept_flags, o, K.n_frictions, out)
-
-
-def carry(values: Any, kept: Any, place: int, count: int, out: bool) -> int:
-    """Copy one array; where the next one goes."""
-    for i in range(count):
-        if out:
-            kept[place + i] = values[i]
-        else:
-            values[i] = kept[place + i]
-    return place + count

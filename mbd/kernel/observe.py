@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from mbd.kernel.candidate import carry
 from mbd.kernel.fields import (
     LOG_EVENT,
     LOG_SLIPPED,
@@ -21,17 +22,10 @@ def store_row(K: Any) -> None:
     """One row of results: t, q, (v, z), (v̇, ż), λ, closed."""
     o = K.state[STORED] * K.width
     K.store[o] = K.clock[NOW]
-    o += 1
-    for i in range(K.n_q):
-        K.store[o + i] = K.q[i]
-    o += K.n_q
-    for i in range(K.n):
-        K.store[o + i] = K.y[i]
-        K.store[o + K.n + i] = K.rate[i]
-    o += 2 * K.n
-    for k in range(K.n_rows):
-        K.store[o + k] = K.lam[k]
-    o += K.n_rows
+    o = carry(K.q, K.store, o + 1, K.n_q, True)
+    o = carry(K.y, K.store, o, K.n, True)
+    o = carry(K.rate, K.store, o, K.n, True)
+    o = carry(K.lam, K.store, o, K.n_rows, True)
     for c in range(K.n_contacts):
         K.store[o + c] = float(K.closed[c])
     K.state[STORED] += 1

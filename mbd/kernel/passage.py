@@ -38,6 +38,7 @@ from mbd.kernel.iteration import finish, overturns, predict, residual_size, runs
 from mbd.kernel.leftovers import leftovers_of_many
 from mbd.kernel.linear import factor
 from mbd.kernel.ordered import LOSS_OF_STEP, OF_TANGENT, factor_ordered, order_at, solve_kkt, weakest_pivot
+from mbd.kernel.orthogonal import clear_row, square
 from mbd.kernel.pairs import is_of_pair, is_whole
 from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import add_shares, raise_scales, share_loads
@@ -163,9 +164,7 @@ def leftovers(
         longest = done
         left = -1.0
         for k in range(done, m if place == 0 else done + 1):
-            length = 0.0
-            for j in range(n):
-                length += Q[k * n + j] * Q[k * n + j]
+            length = square(Q, k * n, n)
             if length > left:
                 left = length
                 longest = k
@@ -182,11 +181,7 @@ def leftovers(
             Q[longest * n + j] = Q[done * n + j]
             Q[done * n + j] = swap
         for k in range(done + 1, m):
-            part = 0.0
-            for j in range(n):
-                part += Q[k * n + j] * Q[done * n + j]
-            for j in range(n):
-                Q[k * n + j] -= part * Q[done * n + j]
+            clear_row(Q, k * n, done * n, n)
 
 
 def passing_step(K: Any, h: float, t1: float) -> int:

@@ -27,6 +27,7 @@ from mbd.kernel.fields import (
     TOO_TIGHT,
 )  # fmt: skip
 from mbd.kernel.iteration import runs_away
+from mbd.kernel.memory import forget_steps, look_a_step_ahead
 from mbd.kernel.ordered import LOSS_AT_ONCE, solve_kkt
 from mbd.kernel.restart import (
     compose,
@@ -82,25 +83,12 @@ NEGLIGIBLE = 1e-2
 
 def radau_start(K: Any) -> int:
     """The memory at a consistent state: stages of a step before it at rates and multipliers that do not change."""
-    t = K.clock[NOW]
-    for i in range(K.n):
-        K.slope[i] = 0.0
-        K.aux[i] = K.rate[i]
-        K.shift[i] = 0.0
-        K.shift_change[i] = 0.0
-    for k in range(K.n_rows):
-        K.lam_slope[k] = 0.0
+    forget_steps(K)
     forget_stages(K)
-    K.clock[AUX_STEP] = K.dt
-    K.state[NEAR] = 0
     forget_leftovers(K)
-    fill_block(K, t, K.q, K.y)
+    fill_block(K, K.clock[NOW], K.q, K.y)
     refresh_scales(K)
-    for i in range(K.n):  # a force that is zero just now has its size a step later
-        K.block[K.o_v + i] += K.dt * K.rate[i]
-        if i < K.n_v:
-            K.block[K.o_x + i] = K.dt * (K.y[i] + 0.5 * K.dt * K.rate[i])
-    raise_scales(K, False)
+    look_a_step_ahead(K)
     return 0
 
 

@@ -11,6 +11,7 @@ from typing import Any
 
 from mbd.kernel.fields import N_DROPPED
 from mbd.kernel.linear import factor, solve
+from mbd.kernel.orthogonal import clear_row, square
 
 __all__ = ["find_dependent", "find_mix", "find_shares", "shared", "sharing", "spread", "take_shares"]
 
@@ -61,34 +62,23 @@ def leftover(K: Any, row: int, kept: int) -> float:
     n = K.n
     o_B = n * n + n + n * K.n_rows
     base = kept * n
-    size = 0.0
     for j in range(n):
         weight = K.acc[j * n + j]
         K.basis[base + j] = K.acc[o_B + row * n + j] / (weight**0.5 if weight > 0.0 else 1.0)
-        size += K.basis[base + j] * K.basis[base + j]
+    size = square(K.basis, base, n)
     for i in range(kept):
         K.lower[kept * K.n_rows + i] = 0.0
     for _ in range(2):
         for i in range(kept):
-            part = 0.0
-            for j in range(n):
-                part += K.basis[i * n + j] * K.basis[base + j]
-            K.lower[kept * K.n_rows + i] += part
-            for j in range(n):
-                K.basis[base + j] -= part * K.basis[i * n + j]
-    left = 0.0
-    for j in range(n):
-        left += K.basis[base + j] * K.basis[base + j]
+            K.lower[kept * K.n_rows + i] += clear_row(K.basis, base, i * n, n)
+    left = square(K.basis, base, n)
     return float((left / size) ** 0.5) if size > 0.0 else 0.0
 
 
 def keep_row(K: Any, row: int, kept: int) -> None:
     """The next vector of K.basis, which `leftover` has found, gets length 1; its row number into K.columns."""
     n = K.n
-    left = 0.0
-    for j in range(n):
-        left += K.basis[kept * n + j] * K.basis[kept * n + j]
-    left = left**0.5 + 1e-300
+    left = square(K.basis, kept * n, n) ** 0.5 + 1e-300
     K.lower[kept * K.n_rows + kept] = left
     for j in range(n):
         K.basis[kept * n + j] /= left

@@ -26,6 +26,7 @@ from mbd.kernel.fields import (
     SINGULAR,
 )
 from mbd.kernel.linear import factor, solve_definite
+from mbd.kernel.memory import forget_steps
 from mbd.kernel.ordered import LOSS_AT_ONCE, OF_ACCELERATIONS, SYMMETRIC, factor_ordered, order_at, solve_kkt
 from mbd.kernel.passage import CONTINUOUS
 from mbd.kernel.restart import consistent, evaluate, fill_block, raise_scales, refresh_scales
@@ -43,16 +44,8 @@ MOST_RETURNS = 8
 
 def runge_kutta_start(K: Any) -> int:
     """Sizes of forces and rows at the consistent state; the scheme remembers nothing but its rates."""
-    for i in range(K.n):
-        K.slope[i] = 0.0
-        K.aux[i] = K.rate[i]
-        K.shift[i] = 0.0
-        K.shift_change[i] = 0.0
-    for k in range(K.n_rows):
-        K.lam_slope[k] = 0.0
+    forget_steps(K)
     forget_leftovers(K)
-    K.clock[AUX_STEP] = K.dt
-    K.state[NEAR] = 0
     find_sizes(K)
     return 0
 

@@ -20,7 +20,9 @@ from __future__ import annotations
 from typing import Any
 
 from mbd.kernel.fields import BLOCKED, EPS, KICK, NEAR, NOW, PASSING, POSE, ROWS
+from mbd.kernel.leftovers import common_part
 from mbd.kernel.ordered import order_at
+from mbd.kernel.orthogonal import clear_row, square
 from mbd.kernel.restart import compose, evaluate, fill_block
 
 __all__ = [
@@ -148,34 +150,34 @@ def stirring(K: Any, k: int, fall: float, speed: float) -> float:
     return float(STIR * EPS * turned * K.scale[K.n + K.rows[k]] / (fall * speed + 1e-300))
 
 
+def weigh_columns(K: Any) -> None:
+    """1/√M_jj into K.spare, with M in K.acc."""
+    for j in range(K.n):
+        weight = K.acc[j * K.n + j]
+        K.spare[j] = 1.0 / weight**0.5 if weight > 0.0 else 1.0
+
+
+def load_row(K: Any, k: int) -> None:
+    """Row k of those in K.rows, of B in K.acc, on the columns weighed by `weigh_columns`, into line k of K.basis."""
+    n = K.n
+    row = n * n + n + n * K.n_rows + K.rows[k] * n
+    for j in range(n):
+        K.basis[k * n + j] = K.acc[row + j] * K.spare[j]
+
+
 def leftovers_here(K: Any, m: int) -> None:
     """Gram–Schmidt on the rows of B in K.acc, in their order: |w| into K.work, w/|w| into K.basis."""
     n = K.n
-    o_B = n * n + n + n * K.n_rows
-    for j in range(n):
-        weight = K.acc[j * n + j]
-        K.spare[j] = 1.0 / weight**0.5 if weight > 0.0 else 1.0
+    weigh_columns(K)
     for k in range(m):
-        row = o_B + K.rows[k] * n
-        base = k * n
-        for j in range(n):
-            K.basis[base + j] = K.acc[row + j] * K.spare[j]
+        load_row(K, k)
         for i in range(k):
-            other = i * n
-            part = 0.0
-            for j in range(n):
-                part += K.basis[other + j] * K.basis[base + j]
-            if part != 0.0:
-                for j in range(n):
-                    K.basis[base + j] -= part * K.basis[other + j]
-        left = 0.0
-        for j in range(n):
-            left += K.basis[base + j] * K.basis[base + j]
-        left = left**0.5
+            clear_row(K.basis, k * n, i * n, n)
+        left = square(K.basis, k * n, n) ** 0.5
         K.work[k] = left
         inverse = 1.0 / (left + 1e-300)
         for j in range(n):
-            K.basis[base + j] *= inverse
+            K.basis[k * n + j] *= inverse
 
 
 def lengths_of_many(K: Any, m: int) -> None:
@@ -184,22 +186,17 @@ def lengths_of_many(K: Any, m: int) -> None:
     Rows keep their zeros there, which Gram–Schmidt fills; see `mbd.kernel.leftovers`.
     """
     n = K.n
-    o_B = n * n + n + n * K.n_rows
-    for j in range(n):
-        weight = K.acc[j * n + j]
-        K.spare[j] = 1.0 / weight**0.5 if weight > 0.0 else 1.0
+    weigh_columns(K)
     for k in range(m):
+        load_row(K, k)
         count = 0
         for j in range(n):
-            K.basis[k * n + j] = K.acc[o_B + K.rows[k] * n + j] * K.spare[j]
             if K.basis[k * n + j] != 0.0:
-                K.support[count] = j
                 count += 1
+                K.support[k * (n + 1) + count] = j
+        K.support[k * (n + 1)] = count
         for i in range(k + 1):
-            part = 0.0
-            for e in range(count):
-                part += K.basis[k * n + K.support[e]] * K.basis[i * n + K.support[e]]
-            K.spare[n + k * m + i] = part
+            K.spare[n + k * m + i] = common_part(K, n, k, i)
     for k in range(m):
         pivot = max(K.spare[n + k * (m + 1)], 0.0)
         K.work[k] = pivot**0.5

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from mbd.kernel.candidate import adopt
 from mbd.kernel.fields import NOW
 from mbd.kernel.guards import update_armed, update_sides, watch
 from mbd.kernel.hooks import scheme_resume
@@ -38,16 +39,7 @@ def take_over(K: Any, t1: float) -> None:
 
     A shortened index-3 step leaves B v + h_t of the size of its error; it would survive a release, so it is removed.
     """
-    for i in range(K.n_q):
-        K.q[i] = K.q1[i]
-    for i in range(K.n):
-        K.y[i] = K.y1[i]
-        K.rate[i] = K.rate1[i]
-    for k in range(K.n_rows):
-        K.lam[k] = K.lam1[k]
-    K.clock[NOW] = t1
-    for i in range(K.n_watched):
-        K.guards0[i] = K.guards1[i]
+    adopt(K, t1)
     if project_velocity(K, active_rows(K, K.closed), True) == 0 and consistent(K, t1, K.q, K.y) == 0:
         for i in range(K.n):
             K.rate[i] = K.jump[i]

@@ -100,92 +100,111 @@ def explanation(
     values = stepper.values
     now = float(values["clock"][F.NOW])
     time = float(values["detail"][0]) if values["detail"][0] > now else now
-    closed = sorted(stepper.manager.mode(values["closed"][: values["n_contacts"]]).closed)
-    where = f"t = {time:.9g} s (last accepted {now:.9g} s)"
-    with_closed = f" with {', '.join(map(repr, closed))} closed" if closed else ""
-    residual = float(values["detail"][1])
+    names = sorted(stepper.manager.mode(values["closed"][: values["n_contacts"]]).closed)
+    closed = f" with {', '.join(map(repr, names))} closed" if names else ""
+    what = _what(stepper, status, closed, events, places or {}, _rushing(stepper, swiftest))
+    return f"t = {time:.9g} s (last accepted {now:.9g} s): {what}"
+
+
+def _what(
+    stepper: Stepper, status: int, closed: str, events: Sequence[EventRecord], places: Mapping[str, str], rushing: str
+) -> str:
+    """What went wrong and what to try; `closed` and `rushing` tell in words which contacts are, and what runs away."""
     if status == F.NOT_FINITE:
-        what = _not_finite(stepper, places or {})
-        return f"{where}: {what}{with_closed}; nothing after the last accepted step is kept"
-    if status == F.TOO_SMALL:
-        return (
-            f"{where}: steps fell below {float(values['detail'][2]):.2g} s without an error of "
-            f"{values['allowed']:.2g} per second{with_closed}; a force that jumps with the state (mbd.where, sign) "
-            "must be made continuous, or be switched by an Event or Controller; or ask for less by tol="
-        )
-    worst, rushing = _worst(stepper), _rushing(stepper, swiftest)
-    if status == F.NOT_CONVERGED and residual < 0.0:
-        return (
-            f"{where}: a step would miss an angle by more than half a radian, down to a tenth of dt{with_closed}"
-            f"{worst}: the motion is too fast to be resolved; use a smaller dt"
-        )
-    said = "" if stepper.compiled else stepper.scheme.report.message
-    if status == F.NOT_CONVERGED and residual <= 1.0 and said:
-        return (
-            f"{where}: steps fail down to a tenth of dt; {type(stepper.scheme.integrator).__name__} says: {said}"
-            f"{with_closed}{worst}; try a smaller dt{rushing}"
-        )
-    if status == F.NOT_CONVERGED and residual <= 1.0:
-        return (
-            f"{where}: steps fail or leave the branch continuous in velocity, down to a tenth of dt{with_closed}"
-            f"{worst}: next to a pose in which rows lose rank, or in a force too steep for dt; try a smaller dt, or, "
-            f"at such a pose, {_passing(stepper)}{rushing}"
-        )
-    if status == F.NOT_CONVERGED:
-        own = f" ({said})" if said else ""
-        return (
-            f"{where}: Newton stalled at {residual:.3g} times the tolerance after {values['max_iterations']} "
-            f"iterations{own}{with_closed}{worst}; try a smaller dt or softer stiffness; a force that jumps with "
-            "the state (mbd.where, sign) must be made continuous, or be switched by an Event or Controller"
-            f"{rushing}"
-        )
-    if status in (F.STAGNATED, F.TOO_TIGHT):
+        return f"{_not_finite(stepper, places)}{closed}; nothing after the last accepted step is kept"
+    if status in (F.NOT_CONVERGED, F.STAGNATED, F.TOO_TIGHT):
+        return _no_end(stepper, status, closed, rushing)
+    if status in (F.SINGULAR, F.TOO_NEAR):
+        return f"the Newton matrix is singular at {_unknown(stepper)}{closed}; {_why_singular(stepper)}"
+    if status in (F.TOO_SMALL, F.STIRRED):
+        return _no_size(stepper, status, closed)
+    if status in (F.DEPENDENT, F.CONFLICT):
+        if int(stepper.values["state"][F.BLOCKED]) < stepper.values["n"]:
+            return f"neither mass nor rows determine {_unknown(stepper)}{closed}; give it a mass, or lock it"
+        return f"{_clashing(stepper, status)}{closed}; leave one out, or hold fewer contacts closed"
+    if status in (F.CHATTER, F.NO_IMPACT, F.ENERGY_GAIN, F.NO_FORCE):
+        return _no_contact(stepper, status, closed, events)
+    return f"the instant of an event could not be isolated{closed}{_worst(stepper)}; try a smaller dt"
+
+
+def _no_end(stepper: Stepper, status: int, closed: str, rushing: str) -> str:
+    """A Newton iteration that does not come to its end."""
+    worst, residual = _worst(stepper), float(stepper.values["detail"][1])
+    if status != F.NOT_CONVERGED:
         left = remainder(stepper)
         how = "stagnated" if rushing else "stagnated at round-off"
         return (
-            f"{where}: {how}: residual {left.residual:.3g}, attainable {left.attainable:.3g} of the forces{with_closed}"
-            f"{worst}{rushing or '; use a larger tolerance= of the integrator or a larger dt'}"
+            f"{how}: residual {left.residual:.3g}, attainable {left.attainable:.3g} of the forces{closed}{worst}"
+            f"{rushing or '; use a larger tolerance= of the integrator or a larger dt'}"
         )
-    if status == F.STIRRED:
-        others = "mbd.GeneralizedAlpha, mbd.HHT or mbd.RadauIIA"
-        if int(values["scheme"]) != RUNGE_KUTTA:
-            others = "mbd.GeneralizedAlpha or mbd.HHT"
+    if residual < 0.0:
         return (
-            f"{where}: a pose in which rows lose rank, at {_unknown(stepper)}{with_closed}: round-off would make "
-            f"{residual:.1g} of the velocities in a step of {float(values['detail'][2]):.2g} s over it; use "
-            f"{others}, or longer steps (a larger dt= or tol=)"
+            f"a step would miss an angle by more than half a radian, down to a tenth of dt{closed}"
+            f"{worst}: the motion is too fast to be resolved; use a smaller dt"
         )
-    if status in (F.SINGULAR, F.TOO_NEAR):
-        what = f"{where}: the Newton matrix is singular at {_unknown(stepper)}{with_closed}"
-        return f"{what}; {_why_singular(stepper)}"
+    said = "" if stepper.compiled else stepper.scheme.report.message
+    if residual <= 1.0 and said:
+        return (
+            f"steps fail down to a tenth of dt; {type(stepper.scheme.integrator).__name__} says: {said}"
+            f"{closed}{worst}; try a smaller dt{rushing}"
+        )
+    if residual <= 1.0:
+        return (
+            f"steps fail or leave the branch continuous in velocity, down to a tenth of dt{closed}"
+            f"{worst}: next to a pose in which rows lose rank, or in a force too steep for dt; try a smaller dt, or, "
+            f"at such a pose, {_passing(stepper)}{rushing}"
+        )
+    own = f" ({said})" if said else ""
+    return (
+        f"Newton stalled at {residual:.3g} times the tolerance after {stepper.values['max_iterations']} "
+        f"iterations{own}{closed}{worst}; try a smaller dt or softer stiffness; a force that jumps with "
+        "the state (mbd.where, sign) must be made continuous, or be switched by an Event or Controller"
+        f"{rushing}"
+    )
+
+
+def _no_size(stepper: Stepper, status: int, closed: str) -> str:
+    """A step for which no size is right: by its estimated error, or at a pose in which rows lose rank."""
+    _, residual, h = stepper.values["detail"][:3].tolist()
+    if status == F.TOO_SMALL:
+        return (
+            f"steps fell below {h:.2g} s without an error of "
+            f"{stepper.values['allowed']:.2g} per second{closed}; a force that jumps with the state (mbd.where, sign) "
+            "must be made continuous, or be switched by an Event or Controller; or ask for less by tol="
+        )
+    explicit = int(stepper.values["scheme"]) == RUNGE_KUTTA
+    others = "mbd.GeneralizedAlpha, mbd.HHT or mbd.RadauIIA" if explicit else "mbd.GeneralizedAlpha or mbd.HHT"
+    return (
+        f"a pose in which rows lose rank, at {_unknown(stepper)}{closed}: round-off would make "
+        f"{residual:.1g} of the velocities in a step of {h:.2g} s over it; use {others}, or longer steps (a larger "
+        "dt= or tol=)"
+    )
+
+
+def _no_contact(stepper: Stepper, status: int, closed: str, events: Sequence[EventRecord]) -> str:
+    """Contacts and frictions that have no forces, no impulses, or no end of switching."""
     if status == F.CHATTER:
         return (
-            f"{where}: more than {values['max_switches']} switches at one instant: {_last_events(events)}; they "
+            f"more than {stepper.values['max_switches']} switches at one instant: {_last_events(events)}; they "
             "follow each other without motion; give a contact a release rule, friction or a penalty law, or an event "
             "a reset that leaves zero"
         )
     if status == F.NO_IMPACT:
         return (
-            f"{where}: no forces or impulses let every contact push or open{_touching(stepper)}: one that sticks "
+            f"no forces or impulses let every contact push or open{_touching(stepper)}: one that sticks "
             "whatever its force may have none; use friction=0, a release rule or a penalty contact"
         )
-    if status in (F.DEPENDENT, F.CONFLICT) and int(values["state"][F.BLOCKED]) < values["n"]:
-        return f"{where}: neither mass nor rows determine {_unknown(stepper)}{with_closed}; give it a mass, or lock it"
-    if status in (F.DEPENDENT, F.CONFLICT):
-        return f"{where}: {_clashing(stepper, status)}{with_closed}; leave one out, or hold fewer contacts closed"
     if status == F.ENERGY_GAIN:
         return (
-            f"{where}: the impact law would create energy{_touching(stepper)}, and Stronge's in its place as well: a "
+            f"the impact law would create energy{_touching(stepper)}, and Stronge's in its place as well: a "
             "restitution above 1 does; use one from 0 to 1"
         )
-    if status == F.NO_FORCE:
-        name = stepper.manager.names[int(values["state"][F.BLOCKED])]
-        return (
-            f"{where}: Painlevé: no consistent contact force at {name!r}, which slides with friction so that a push "
-            f"makes it approach{with_closed}; rigid bodies with Coulomb friction have no motion there: lower the "
-            "friction coefficient, or make the contact compliant with mbd.Penalty"
-        )
-    return f"{where}: the instant of an event could not be isolated{with_closed}{worst}; try a smaller dt"
+    name = stepper.manager.names[int(stepper.values["state"][F.BLOCKED])]
+    return (
+        f"Painlevé: no consistent contact force at {name!r}, which slides with friction so that a push "
+        f"makes it approach{closed}; rigid bodies with Coulomb friction have no motion there: lower the "
+        "friction coefficient, or make the contact compliant with mbd.Penalty"
+    )
 
 
 def _why_singular(stepper: Stepper) -> str:

@@ -11,7 +11,8 @@ import pytest
 from hypothesis import given, settings
 
 from mbd.compile.cache import ObjectCache
-from mbd.compile.ir import LARGE, MANY_ZEROS, module
+from mbd.compile.instructions import MANY_ZEROS
+from mbd.compile.ir import LARGE, module
 from mbd.compile.layout import Layout
 from mbd.compile.llvm import Library, call, compile_functions, emit_object, host, load_object
 from mbd.errors import ModelError, UnknownNameError

@@ -1,0 +1,49 @@
+"""The candidate of a step and the accepted state, the one taken for the other; numbers carried there and back."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mbd.kernel.fields import NOW
+
+__all__ = ["accept_guards", "adopt", "carry", "stay"]
+
+
+def carry(values: Any, kept: Any, place: int, count: int, out: bool) -> int:
+    """Copy one array to its place among what is kept (`out`), or back; where the next one goes."""
+    for i in range(count):
+        if out:
+            kept[place + i] = values[i]
+        else:
+            values[i] = kept[place + i]
+    return place + count
+
+
+def adopt(K: Any, t1: float) -> None:
+    """The candidate becomes the accepted state ahead of a restart: what the scheme remembers stays behind."""
+    exchange(K, False)
+    K.clock[NOW] = t1
+    accept_guards(K)
+
+
+def accept_guards(K: Any) -> None:
+    """Guards of the candidate become those of the accepted state."""
+    for i in range(K.n_watched):
+        K.guards0[i] = K.guards1[i]
+
+
+def stay(K: Any) -> None:
+    """The candidate becomes the accepted state itself: an event at the very start of the step."""
+    exchange(K, True)
+    for i in range(K.n):
+        K.aux1[i] = K.aux[i]
+    for i in range(K.n_watched):
+        K.guards1[i] = K.guards0[i]
+
+
+def exchange(K: Any, out: bool) -> None:
+    """q, (v, z), their rates and multipliers of the accepted state into the candidate, or back."""
+    carry(K.q, K.q1, 0, K.n_q, out)
+    carry(K.y, K.y1, 0, K.n, out)
+    carry(K.rate, K.rate1, 0, K.n, out)
+    carry(K.lam, K.lam1, 0, K.n_rows, out)

@@ -1,0 +1,124 @@
+"""What a step ends with: an event that was located, or the impact of a non-smooth step."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mbd.kernel.fields import (
+    CHATTER,
+    CLOSE,
+    CONFLICT,
+    CROSS,
+    ENDLESS,
+    EVENT,
+    EVENTS,
+    HALVED,
+    HALVES,
+    LAST_SWITCH,
+    LOG_EVENT,
+    LOGGED,
+    NO_IMPACT,
+    NOW,
+    PLASTIC,
+    REDONE,
+    RESTART,
+    SHORTENED,
+    STORED,
+    SWITCHES,
+    WATCH,
+)  # fmt: skip
+from mbd.kernel.nonsmooth import keep, put_back, rebound, strike
+from mbd.kernel.observe import is_awaited, store_row
+from mbd.kernel.settle import log_event
+from mbd.kernel.starting import restart
+from mbd.kernel.switching import switch
+from mbd.kernel.takeover import take_over
+
+__all__ = ["handle_event", "land"]
+
+MOST_HALVED = 3
+"""How often a non-smooth step whose end has no impulses is halved [-]."""
+
+
+def same_instant(K: Any) -> bool:
+    """Count switches without progress in time; true when there were too many."""
+    now = K.clock[NOW]
+    if now - K.clock[LAST_SWITCH] <= 1e-10 * K.dt:
+        K.state[SWITCHES] += 1
+    else:
+        K.state[SWITCHES] = 0
+    K.clock[LAST_SWITCH] = now
+    return bool(K.state[SWITCHES] > K.max_switches)
+
+
+def was_closed(K: Any, c: int) -> bool:
+    """Whether a contact was closed in the row before the last."""
+    return bool(K.store[(K.state[STORED] - 2) * K.width + K.width - K.n_contacts + c] == 1.0)
+
+
+def handle_event(K: Any) -> int:
+    """Take the located event: rows before and after, impact, restart. Negative: nothing for the caller to do."""
+    kind = K.fired[0]
+    index = K.fired[1]
+    first = K.state[LOGGED]
+    take_over(K, K.clock[NOW] + K.pick[2])
+    if same_instant(K):
+        return CHATTER
+    if kind == WATCH:
+        K.state[RESTART] = 2
+        return switch(K) - 1
+    store_row(K)
+    if kind == CROSS:
+        log_event(K, LOG_EVENT, index, 0.0, False)
+        K.side[index] = -K.side[index]
+        K.state[RESTART] = 1
+        return EVENT if is_awaited(K, first) else -1
+    if kind == CLOSE and K.state[SWITCHES] > K.max_switches // 2:  # blows by turns: their limit is plastic, all at once
+        K.state[PLASTIC] = 1
+        K.counts[ENDLESS] += 1
+    status = switch(K)
+    K.state[PLASTIC] = 0
+    if status != 0:
+        return status
+    status = restart(K)
+    store_row(K)  # also where no accelerations are consistent: the velocities after the event are known
+    if status != 0:
+        return status
+    for c in range(K.n_contacts):
+        if was_closed(K, c) and K.closed[c] == 0 and K.armed[c] != 1 and K.guards0[K.n_contacts + c] < -1e-6:
+            K.sinking[c] = min(K.sinking[c], K.clock[NOW])
+    return EVENT if is_awaited(K, first) else -1
+
+
+def land(K: Any, h: float, t1: float) -> int:
+    """End a non-smooth step: rows before and after, impact, restart. Negative: nothing for the caller to do.
+
+    Where no impulses obey all laws, the step is tried again with half its size, down to an eighth.
+    """
+    first = K.state[LOGGED]
+    stored = K.state[STORED]
+    t = K.clock[NOW]
+    events = K.counts[EVENTS]
+    keep(K)
+    status = strike(K, h, t1)
+    if status == 0:
+        store_row(K)
+        status = rebound(K)
+    if status == 0:
+        status = restart(K)
+    if (status == NO_IMPACT or status == CONFLICT) and K.state[HALVED] < MOST_HALVED:
+        K.state[HALVED] += 1
+        K.state[HALVES] = 2 ** (K.state[HALVED] + 1)
+        K.counts[SHORTENED] += 1
+        K.state[LOGGED] = first
+        K.state[STORED] = stored
+        K.counts[EVENTS] = events
+        put_back(K, t)
+        K.state[RESTART] = 2
+        return -1
+    if status != 0:
+        return status
+    store_row(K)
+    K.state[REDONE] = 0
+    K.state[HALVED] = 0
+    return EVENT if is_awaited(K, first) else -1

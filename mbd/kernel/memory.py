@@ -1,0 +1,37 @@
+"""What a scheme takes along from step to step, as it is at a start: nothing, and sizes of forces to measure by."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mbd.kernel.fields import AUX_STEP, NEAR, PIVOT
+from mbd.kernel.restart import raise_scales
+
+__all__ = ["forget_steps", "look_a_step_ahead"]
+
+
+def forget_steps(K: Any) -> None:
+    """Nothing is known of steps before: rates and multipliers do not change, no pose of lost rank is near."""
+    for i in range(K.n):
+        K.slope[i] = 0.0
+        K.aux[i] = K.rate[i]
+        K.shift[i] = 0.0
+        K.shift_change[i] = 0.0
+    for k in range(K.n_rows):
+        K.lam_slope[k] = 0.0
+    K.clock[AUX_STEP] = K.dt
+    K.state[NEAR] = 0
+    K.detail[PIVOT] = 0.0
+
+
+def look_a_step_ahead(K: Any) -> None:
+    """Raise the sizes noted at the accepted state, which is in the block, to those a step later.
+
+    A force that is zero just now has its size then.
+    """
+    for i in range(K.n):
+        K.block[K.o_a + i] += K.dt * K.slope[i]
+        K.block[K.o_v + i] += K.dt * K.rate[i]
+        if i < K.n_v:
+            K.block[K.o_x + i] = K.dt * (K.y[i] + 0.5 * K.dt * K.rate[i])
+    raise_scales(K, False)

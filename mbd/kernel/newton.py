@@ -1,0 +1,333 @@
+"""Newton's method for the unknowns of one step of the Newmark family (see `mbd.kernel.newmark`): rates, multipliers.
+
+The tangent K is that of the compiled model at the iterate, or factors of it and the first correction made by
+straight-line code. The stabilized form corrects positions by U first, then the rates, in the metric of the same matrix.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mbd.kernel.fields import (
+    BLOCKED,
+    EPS,
+    FACTORIZATIONS,
+    ITERATIONS,
+    MODE,
+    NOT_CONVERGED,
+    NOT_FINITE,
+    ORDERED,
+    PIVOT,
+    PIVOTED,
+    RESIDUALS,
+    ROWS,
+    SINGULAR,
+    STAGNATED,
+    STAGNATIONS,
+    STEP,
+    TANGENTS,
+    TOO_NEAR,
+    TOO_TIGHT,
+)  # fmt: skip
+from mbd.kernel.hooks import call, call_on
+from mbd.kernel.iteration import finish, overturns, residual_size, runs_away, soundness_at
+from mbd.kernel.linear import factor
+from mbd.kernel.ordered import LOSS_OF_STEP, OF_TANGENT, factor_ordered, order_at, solve_kkt
+from mbd.kernel.pairs import is_whole
+from mbd.kernel.passage import WITHIN, misses, passing_step, steps_of_fall, steps_to_pose
+from mbd.kernel.redundancy import sharing
+from mbd.kernel.restart import add_shares, raise_scales, share_loads
+
+__all__ = ["solve_step"]
+
+MOST_HALVINGS = 10
+"""How often a Newton correction is halved before the iteration goes on from where it is."""
+FAR = 1e4
+"""Residual over its tolerance above which a correction that does not reduce it is halved."""
+MOST_STRAIGHT = 2
+"""Tangents of a step that straight-line code may factor: where it takes more, pivots are searched for."""
+
+
+def solve_step(K: Any, h: float, t1: float, c_C: float, c_K: float) -> int:
+    """The candidate from the prediction in the block; 0, or why there is none.
+
+    Newton's method, its corrections halved where the residual grows: one tangent, then residuals with its factors; a
+    new tangent where the residual falls by less than a factor of three.
+    """
+    m = K.state[ROWS]
+    tolerance = min(4.0 * EPS, K.tolerance) if K.exact == 1 else 1e-3 * K.tolerance
+    before = 1e300
+    left = 1e300  # the error where the last correction started
+    halvings = 0
+    tangents = 0
+    straight = False  # whether the factors at hand are those of straight-line code
+    fresh = False
+    together = sharing(K)
+    for iteration in range(K.max_iterations):
+        tangent = not fresh
+        if together:
+            share_loads(K, m)
+        if tangent:
+            straight = renew(K, m, tangents)
+            tangents += 1
+        else:
+            call(K, K.mode_code[4 * K.state[MODE] + 1], K.out)
+            K.counts[RESIDUALS] += 1
+        o_r = (K.n + m) * (K.n + m) if tangent and not straight else 0
+        error = residual_size(K, o_r, m, c_C, c_K, tolerance, K.stabilized)
+        if halvings < MOST_HALVINGS and iteration > 0 and (error < 0.0 or (error > FAR and error > 0.9 * left)):
+            retreat(K, m, c_C, c_K)  # a full Newton step jumped over a steep place
+            halvings += 1
+            continue
+        if error < 0.0:
+            return no_candidate(K, h, t1, NOT_FINITE)
+        K.detail[1] = error
+        if error > 1.0 and iteration >= 2 and error > 0.5 * before:
+            error = second_look(K, o_r, m, c_C, c_K, tolerance, iteration)
+            if error < 0.0:
+                return no_candidate(K, h, t1, int(-error))
+        if error <= 1.0:
+            return conclude_step(K, h, t1)
+        if not tangent and error > 0.3 * before:
+            fresh = False  # the old tangent has done its work: renew it at the same iterate
+            before = 1e300
+            continue
+        before = error
+        left = error
+        halvings = 0
+        ready = tangent and straight  # the correction has come with the tangent
+        shifting = ready and take_shift(K, m)
+        if not ready or (m > 0 and K.stabilized == 1 and not shifting):
+            ready = False
+            shifting = right_hand_sides(K, o_r, m, c_C, c_K, tangent, straight)
+        if tangent and not straight and not factorize(K, K.n + m, tangents):
+            return no_candidate(K, h, t1, SINGULAR)
+        if iteration == 0 and m > 0 and K.stabilized == 1:
+            status = pass_pose(K, h, t1, m, c_C, c_K, straight)
+            if status >= 0:
+                return status
+        if not ready:
+            solve_corrections(K, m, c_C, tangent, shifting, straight)
+        biggest = correct(K, m, c_C, c_K, ready, shifting)
+        if iteration == 0 and K.exact == 0:  # the predictor's error measures that of the step: stay far below it
+            tolerance = min(K.tolerance, max(1e-4 * biggest, tolerance))
+        fresh = True
+    return no_candidate(K, h, t1, NOT_CONVERGED)
+
+
+def no_candidate(K: Any, h: float, t1: float, status: int) -> int:
+    """The status, after noting which step has none."""
+    K.detail[0] = t1
+    K.detail[2] = h
+    return status
+
+
+def conclude_step(K: Any, h: float, t1: float) -> int:
+    """The iterate becomes the candidate, unless the step is far too long for it."""
+    finish(K, h)
+    if overturns(K, h):
+        K.detail[1] = -1.0
+        return no_candidate(K, h, t1, NOT_CONVERGED)
+    return 0
+
+
+def second_look(K: Any, o_r: int, m: int, c_C: float, c_K: float, tolerance: float, iteration: int) -> float:
+    """A residual that falls no more, over its tolerance with sizes of forces as they are here; 1 if it is round-off.
+
+    −status where the iteration is to end.
+    """
+    raise_scales(K, True)
+    if runs_away(K, m):
+        return -float(NOT_CONVERGED)
+    error = residual_size(K, o_r, m, c_C, c_K, tolerance, K.stabilized)
+    if error > 1.0 and residual_size(K, o_r, m, 0.0, 0.0, 256.0 * EPS, K.stabilized) <= 16.0:
+        if residual_size(K, o_r, m, c_C, c_K, K.tolerance, K.stabilized) > 1.0:
+            return -float(TOO_TIGHT)
+        K.counts[STAGNATIONS] += 1
+        return 1.0
+    if error > 1.0 and iteration >= 6 and K.exact == 0:
+        if residual_size(K, o_r, m, 0.0, 0.0, 1e5 * EPS, K.stabilized) <= 1e3:
+            return -float(STAGNATED)
+    return error
+
+
+def pass_pose(K: Any, h: float, t1: float, m: int, c_C: float, c_K: float, straight: bool) -> int:
+    """−1 where no pose in which rows lose rank is near; else how a step that passes it ends, or that this must not."""
+    fall = steps_of_fall(K, m, straight)
+    if not fall < WITHIN + 2.0:
+        return -1
+    away = steps_to_pose(K, m, h, c_K / c_C, straight) * h / K.clock[STEP]
+    if misses(K, away, h):
+        K.detail[PIVOT] = 0.0
+        return TOO_NEAR
+    if fall < WITHIN and away < WITHIN and (away < 1.0 or is_whole(K, h)):
+        return passing_step(K, h, t1)
+    return -1
+
+
+def renew(K: Any, m: int, tangents: int) -> bool:
+    """Residual and tangent in K.out; whether its factors and the correction are there instead of it.
+
+    Straight-line code exchanges no rows: where a pivot is too small, or the correction was not what it should be, the
+    tangent itself is asked for and pivots are searched for.
+    """
+    K.counts[TANGENTS] += 1
+    first = K.mode_code[4 * K.state[MODE] + 2]
+    if first > 0:
+        if tangents < MOST_STRAIGHT:
+            call(K, first, K.out)
+            if K.out[soundness_at(K, m)] == 1.0:
+                K.counts[FACTORIZATIONS] += 1
+                return True
+        K.counts[PIVOTED] += 1
+    call(K, K.mode_code[4 * K.state[MODE]], K.out)
+    return False
+
+
+def take_shift(K: Any, m: int) -> bool:
+    """Whether positions need correcting by what has come with the tangent: the change of the shift, then in K.work."""
+    if K.stabilized == 0:
+        return False
+    shifting = False
+    for k in range(m):
+        row = K.rows[k]
+        if K.row_level[row] == 0 and abs(K.out[K.n + k]) > 16.0 * EPS * K.scale[K.n + row]:
+            shifting = True
+    if shifting:
+        place = soundness_at(K, m) + 2 + K.n + m
+        for i in range(K.n_v):
+            K.work[i] = K.out[place + i]
+    return shifting
+
+
+def right_hand_sides(K: Any, o_r: int, m: int, c_C: float, c_K: float, tangent: bool, straight: bool) -> bool:
+    """−r and −h/c_K (index 3) or −ḣ/c_C in K.rhs; for the stabilized form the position residual in K.work.
+
+    Rows on velocities have −rate/c_C in both forms and take no part in the correction of positions.
+
+    Returns whether positions need correcting: at round-off they stay, correcting would only stir the velocity rows.
+    With a new tangent the whole correction U is solved for, so that it stays normal to the rows.
+    """
+    n = K.n
+    o_h = o_r + n
+    shifting = False
+    for i in range(n):
+        K.rhs[i] = -K.out[o_r + i]
+        K.work[i] = 0.0
+    for k in range(m):
+        if K.stabilized == 0:
+            K.rhs[n + k] = -K.out[o_h + k] / (c_C if K.row_level[K.rows[k]] == 1 else c_K)
+            continue
+        rate = K.out[o_h + m + k]
+        K.rhs[n + k] = -rate / c_C
+        if K.row_level[K.rows[k]] == 1:  # corrections of positions go along the row, not against it
+            K.work[n + k] = 0.0
+            continue
+        h = K.out[o_h + k]
+        if abs(h) > 16.0 * EPS * K.scale[n + K.rows[k]]:
+            shifting = True
+        h -= (c_K / c_C) * rate
+        if tangent and not straight:
+            for j in range(K.n_v):
+                h -= K.out[(n + k) * (n + m) + j] * K.shift1[j]
+        K.work[n + k] = -h
+    if tangent and K.stabilized == 1:
+        for k in range(m * K.n_v):
+            K.turning[k] = K.out[o_h + 2 * m + k]
+    return shifting
+
+
+def factorize(K: Any, size: int, tangents: int) -> bool:
+    """LU factors of the tangent in K.out; false where a pivot is missing.
+
+    Those of a step's first few tangents keep to the order of the mode, if it has one and its pivots are sound.
+    """
+    m = size - K.n
+    o = 0 if sharing(K) else order_at(K, m)
+    if o > 0 and tangents <= MOST_STRAIGHT:
+        if factor_ordered(K, K.out, o, OF_TANGENT, LOSS_OF_STEP):
+            K.counts[FACTORIZATIONS] += 1
+            return True
+    if o > 0:
+        K.counts[PIVOTED] += 1
+    K.state[ORDERED] = 0
+    for k in range(size * size):
+        K.kkt[k] = K.out[k]
+    if sharing(K):
+        add_shares(K, K.kkt, m)
+    column = factor(K.kkt, size, K.pivots)
+    K.counts[FACTORIZATIONS] += 1
+    K.state[BLOCKED] = column - 1
+    return bool(column == 0)
+
+
+def solve_corrections(K: Any, m: int, c_C: float, tangent: bool, shifting: bool, straight: bool) -> None:
+    """The change of the position shift in K.work, the corrections of rates and multipliers in K.rhs."""
+    if shifting:  # positions first: what that changes of ḣ, the accelerations make good in the same iteration
+        solve_with_factors(K, m, K.work, straight)
+        for i in range(K.n_v if tangent else 0):
+            K.work[i] -= K.shift1[i]
+        inverse = 1.0 / c_C
+        turning = soundness_at(K, m) - m * K.n_v
+        for k in range(m):
+            turned = 0.0
+            for i in range(K.n_v):
+                entry = K.out[turning + k * K.n_v + i] if straight else K.turning[k * K.n_v + i]
+                turned += entry * K.work[i]
+            K.rhs[K.n + k] -= turned * inverse
+    solve_with_factors(K, m, K.rhs, straight)
+
+
+def solve_with_factors(K: Any, m: int, b: Any, straight: bool) -> None:
+    """b ← K⁻¹ b with the factors at hand."""
+    size = K.n + m
+    if straight:
+        place = soundness_at(K, m) + 2
+        for i in range(size):
+            K.out[place + i] = b[i]
+        call_on(K, K.mode_code[4 * K.state[MODE] + 3], K.out, b)
+    else:
+        solve_kkt(K, size, b)
+
+
+def correct(K: Any, m: int, c_C: float, c_K: float, ready: bool, shifting: bool) -> float:
+    """Apply a Newton correction to the block; its size relative to the largest rate."""
+    n = K.n
+    block = K.block
+    biggest = 0.0
+    fastest = 1e-300
+    place = soundness_at(K, m) + 2
+    if shifting:
+        for i in range(K.n_v):
+            K.shift1[i] += K.work[i]
+            block[K.o_x + i] += K.work[i]
+    K.counts[ITERATIONS] += 1
+    for i in range(n):
+        change = K.out[place + i] if ready else K.rhs[i]
+        rate = block[K.o_a + i]
+        biggest = max(biggest, abs(change))
+        fastest = max(fastest, abs(rate))
+        K.rhs[i] = change
+        block[K.o_a + i] = rate + change
+        block[K.o_v + i] += c_C * change
+        if i < K.n_v:
+            block[K.o_x + i] += c_K * change
+    for k in range(m):
+        change = K.out[place + n + k] if ready else K.rhs[n + k]
+        K.rhs[n + k] = change
+        block[K.o_lam + K.rows[k]] += change
+    return biggest / fastest
+
+
+def retreat(K: Any, m: int, c_C: float, c_K: float) -> None:
+    """Take back half of the last correction of rates, velocities, positions and multipliers."""
+    n = K.n
+    for i in range(n + m):
+        K.rhs[i] *= 0.5
+    for i in range(n):
+        K.block[K.o_a + i] -= K.rhs[i]
+        K.block[K.o_v + i] -= c_C * K.rhs[i]
+        if i < K.n_v:
+            K.block[K.o_x + i] -= c_K * K.rhs[i]
+    for k in range(m):
+        K.block[K.o_lam + K.rows[k]] -= K.rhs[n + k]
