@@ -10,6 +10,7 @@ out         whatever the program lists
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 from mbd.equations.equations import Equations
 
@@ -49,56 +50,60 @@ class Layout:
             len(equations.parameters), tuple(offsets), len(equations.frictions),
         )  # fmt: skip
 
-    @property
+    @cached_property
     def n(self) -> int:
         """Number of rates: n_v + n_z."""
         return self.n_v + self.n_z
 
-    @property
+    @cached_property
     def q(self) -> int:
         return 3
 
-    @property
+    @cached_property
     def x(self) -> int:
         return 3 + self.n_q
 
-    @property
+    @cached_property
     def v(self) -> int:
         return self.x + self.n_v
 
-    @property
+    @cached_property
     def a(self) -> int:
         return self.v + self.n
 
-    @property
+    @cached_property
     def lam(self) -> int:
         return self.a + self.n
 
-    @property
+    @cached_property
     def anchor(self) -> int:
         return self.lam + self.n_rows
 
-    @property
+    @cached_property
     def switch(self) -> int:
         return self.anchor + self.n_anchors
 
-    @property
+    @cached_property
     def slip(self) -> int:
         return self.switch + self.n_contacts
 
-    @property
+    @cached_property
     def shift(self) -> int:
         return self.slip + self.n_frictions
 
-    @property
+    @cached_property
     def size(self) -> int:
         return self.shift + self.n_v
 
     def place(self, kind: str, index: int) -> int:
         """Offset of an input in the block."""
-        starts = {
+        return self._starts[kind] + index
+
+    @cached_property
+    def _starts(self) -> dict[str, int]:
+        """Where the inputs of each kind begin."""
+        return {
             "t": 0, "c": 1, "q": self.q, "x": self.x, "v": self.v, "z": self.v + self.n_v, "a": self.a,
             "s": self.a + self.n_v, "lam": self.lam, "anchor": self.anchor, "switch": self.switch, "slip": self.slip,
             "shift": self.shift, "held": 0,
         }  # fmt: skip
-        return starts[kind] + index

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import accumulate, pairwise
 from time import perf_counter
 from typing import Any
 
@@ -13,7 +14,7 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.compile.backend import Backend, Function, Functions, backend as choose_backend
 from mbd.compile.layout import Layout
-from mbd.compile.orders import elimination_order
+from mbd.compile.orders import elimination_order, may_pay
 from mbd.compile.postponed import Postponed
 from mbd.compile.python import ArrayFunction, array_function
 from mbd.equations import programs
@@ -137,6 +138,32 @@ class Mechanism:
                 self._modes[key] = self._straight(mode) or self.mode(rows, penalties, stabilized, sliding)
             return self._modes[key]
 
+    def explicit(
+        self,
+        rows: Sequence[int],
+        penalties: Sequence[int],
+        stabilized: bool,
+        sliding: Sequence[int] = (),
+        borne: Sequence[int] = (),
+    ) -> ModeCode:
+        """The same for steps that ask for accelerations alone: tangent and residual are made if somebody calls them."""
+        mode = (tuple(rows), tuple(penalties), tuple(sliding), tuple(borne), stabilized)
+        key = (*mode, "explicit")
+        with self.equations.tape.lock:
+            if key not in self._modes:
+                started, number, n, m = perf_counter(), len(self._modes), self.layout.n, len(rows)
+                tail = n + (2 if stabilized else 1) * m
+                size = (n + m) ** 2 + tail + (m * self.layout.n_v if stabilized else 0)
+                tangent = self._later(mode, number, size, tangent=programs.newton)
+                residual = self._later(mode, number, tail, residual=programs.residual)
+                order = None
+                if may_pay(self._accelerations, n, self.layout.n_rows, sorted(rows)):  # its pattern is that of both
+                    outputs = programs.newton(self.equations, rows, penalties, stabilized, sliding, borne)
+                    order = self._order(outputs, rows)
+                self._modes[key] = ModeCode(*mode[:3], tangent, residual, borne=mode[3], order=order)
+                self.seconds += perf_counter() - started
+            return self._modes[key]
+
     def _straight(self, mode: Any) -> ModeCode | None:
         """A mode with factors, None where they do not pay."""
         started, number = perf_counter(), len(self._modes)
@@ -150,11 +177,16 @@ class Mechanism:
             mode, number, residual=programs.residual, correction=lambda *_: outputs, solution=lambda *_: solution
         )
         size = (self.layout.n + len(rows)) ** 2 + found.tail
-        tangent = Postponed(lambda: self._add(mode, number, tangent=programs.newton)[0], size)
-        self.postponed.append(tangent)
+        tangent = self._later(mode, number, size, tangent=programs.newton)
         return ModeCode(rows, penalties, sliding, tangent, residual, first, again)
 
-    def _order(self, tangent: Sequence[Node], rows: tuple[int, ...]) -> Any:
+    def _later(self, mode: Any, number: int, size: int, **maker: Callable[..., Sequence[Node]]) -> Postponed:
+        """A program of a mode, of so many outputs, that is compiled when it is called first."""
+        later = Postponed(lambda: self._add(mode, number, **maker)[0], size)
+        self.postponed.append(later)
+        return later
+
+    def _order(self, tangent: Sequence[Node], rows: Sequence[int]) -> Any:
         """The order in which the matrices of these rows are eliminated, None where it does not pay."""
         return elimination_order(tangent, self._accelerations, self.layout.n, self.layout.n_rows, sorted(rows))
 
@@ -247,8 +279,10 @@ class Mechanism:
         n, rows = layout.n, layout.n_rows
         out = np.zeros(self.sizes["accelerations"])
         self.common["accelerations"](block, parameters, out)
-        cuts = np.cumsum([n * n, n, n * rows, rows * n, rows, rows, rows, layout.n_anchors, 1])
-        M, f, R, B, h, rate, bias, captured, kinetic, limits = np.split(out, cuts)
+        lengths = (n * n, n, n * rows, rows * n, rows, rows, rows, layout.n_anchors, 1)
+        starts = list(accumulate(lengths, initial=0))
+        M, f, R, B, h, rate, bias, captured, kinetic = (out[a:b] for a, b in pairwise(starts))
+        limits = out[starts[-1] :]
         return AccelerationTerms(
             M.reshape(n, n), f, R.reshape(n, rows), B.reshape(rows, n), h, rate, bias, captured, float(kinetic[0]),
             limits,

@@ -23,7 +23,7 @@ import numpy as np
 from mbd.tape.node import Node
 from mbd.tape.ordering import Order, order
 
-__all__ = ["FEWER", "SMALLEST", "elimination_order", "flat_order"]
+__all__ = ["FEWER", "SMALLEST", "elimination_order", "flat_order", "may_pay"]
 
 SMALLEST = 21
 """Unknowns from which on an order is looked for: below, loops over dense rows take no longer [-]."""
@@ -31,12 +31,18 @@ FEWER = 4
 """How many times fewer operations than dense elimination it must take [-]."""
 
 
+def may_pay(accelerations: Sequence[Node], n: int, n_rows: int, rows: Sequence[int]) -> bool:
+    """Whether there may be an order that pays, as far as size and entries of the matrices of accelerations tell."""
+    size = n + len(rows)
+    return size >= SMALLEST and 4 * len(_of_accelerations(accelerations, n, n_rows, rows)) <= size * size
+
+
 def elimination_order(
     tangent: Sequence[Node], accelerations: Sequence[Node], n: int, n_rows: int, rows: Sequence[int]
 ) -> Any | None:
     """The order for the outputs of `programs.newton` and `programs.accelerations`, None where it does not pay."""
     size = n + len(rows)
-    if size < SMALLEST:
+    if not may_pay(accelerations, n, n_rows, rows):
         return None
     places = {divmod(k, size) for k, node in enumerate(tangent[: size * size]) if not node.is_zero}
     places |= _of_accelerations(accelerations, n, n_rows, rows)

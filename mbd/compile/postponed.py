@@ -38,6 +38,11 @@ class Postponed:
         return self._made is not None
 
     @property
+    def provisional(self) -> bool:
+        """Whether there is code, and better one is being made."""
+        return bool(getattr(self._made, "provisional", False))
+
+    @property
     def address(self) -> int:
         """Where a call goes: to the code, or to what makes it."""
         if self._made is not None:

@@ -258,7 +258,7 @@ class ArrayFunction:
         if kind not in inputs:
             if kind == "x":
                 rows = max((len(array) for array in inputs.values()), default=1)
-                return np.broadcast_to(0.0, (self._kinds[kind], rows))
+                return np.zeros((self._kinds[kind], rows))
             raise UnknownNameError(nearest(kind, inputs, "input", "There are"))
         array = np.asarray(inputs[kind], dtype=float)
         return array[np.newaxis] if array.ndim == 1 else array.T

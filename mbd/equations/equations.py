@@ -215,7 +215,7 @@ class Equations:
     output : any named result as a node ('left hip.angle', 'left shank.end.x', 'left knee.reaction_force.x', …)
     output_names : the names that `output` certainly knows
     idle : (owner, part) of rows of cut joints that hold whatever the motion, and were left out
-    memory : numbers that follow from the rest, kept once they were found
+    memory : what follows from the rest, kept once it was found
     """
 
     name: str
@@ -239,7 +239,7 @@ class Equations:
     figure: Callable[[], Any] | None = field(default=None, repr=False)
     geometry: Geometry | None = field(default=None, repr=False)
     frictions: tuple[Friction, ...] = ()
-    memory: dict[str, float] = field(default_factory=dict, init=False, repr=False, compare=False)
+    memory: dict[str, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @property
     def n_q(self) -> int:

@@ -28,7 +28,11 @@ class Inputs:
     @classmethod
     def of(cls, equations: Equations) -> Inputs:
         """The inputs that these equations may depend on, besides parameters, anchors and switches."""
-        return cls.sized(equations.tape, equations.n_q, equations.n_v, equations.n_z, len(equations.rows))
+        if "inputs" not in equations.memory:
+            sizes = equations.n_q, equations.n_v, equations.n_z, len(equations.rows)
+            equations.memory["inputs"] = cls.sized(equations.tape, *sizes)
+        found: Inputs = equations.memory["inputs"]
+        return found
 
     @classmethod
     def sized(cls, tape: Tape, n_q: int, n_v: int, n_z: int = 0, n_rows: int = 0) -> Inputs:

@@ -73,7 +73,7 @@ def _ratio(equations: Equations) -> float:
             deep = equations.geometry is not None and equations.geometry.depth >= DEEP
             ratio = 0.0 if deep else _size(balance, known) / max(1, _size(balance, seeded(equations, balance)))
         equations.memory["branches over seeds"] = ratio
-    return equations.memory["branches over seeds"]
+    return float(equations.memory["branches over seeds"])
 
 
 def _size(others: Sequence[Node], columns: Columns) -> int:

@@ -57,6 +57,8 @@ def _touch(run: Run, start: State, guards: Vector) -> list[str]:
     """Note which contacts touch at the start; complaints of those that are open inside their surface."""
     v, inside = run.values, []
     n_contacts = v["n_contacts"]
+    if n_contacts == 0:
+        return []
     rates = run.mechanism.acceleration_terms(
         start.time, start.q, v["y"][: v["n"]], v["params"], v["anchors"][: v["n_anchors"]]
     ).rate
@@ -90,10 +92,10 @@ def check_rank(run: Run, start: State, parameters: Vector) -> None:
 def guard_values(run: Run) -> Vector:
     """Gaps, their rates and users' guards at the accepted state, in the order of the kernel."""
     v = run.values
-    block = run.mechanism.block(v["clock"][F.NOW], v["q"][: v["n_q"]], v["y"][: v["n"]], v["anchors"][: v["n_anchors"]])
-    out = np.zeros(max(run.mechanism.sizes["guards"], 1))
-    if run.mechanism.sizes["guards"]:
-        run.mechanism.common["guards"](block, v["params"], out)
+    out = np.zeros(max(v["n_watched"], 1))
+    if v["n_watched"]:
+        q, y, anchors = v["q"][: v["n_q"]], v["y"][: v["n"]], v["anchors"][: v["n_anchors"]]
+        run.mechanism.common["guards"](run.mechanism.block(v["clock"][F.NOW], q, y, anchors), v["params"], out)
     return out
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from operator import is_, itemgetter
 from typing import Any
 
 import numpy as np
@@ -12,9 +13,12 @@ from mbd.kernel import fields as F
 __all__ = ["CallTable"]
 
 PLACES = {name: place for place, name in enumerate(F.FIELDS)}
-WHOLE = [(PLACES[name], name) for name in (*F.INTEGERS, "hooks")]
-REAL = [(PLACES[name], name) for name in F.REALS]
-ARRAYS = [(PLACES[name], name) for name in (*F.REAL_ARRAYS, *F.INTEGER_ARRAYS)]
+ARRAYS = (*F.REAL_ARRAYS, *F.INTEGER_ARRAYS)
+"""Names of arrays, which stand side by side, as integers and reals do."""
+WHOLE = slice(0, len(F.INTEGERS))
+REAL = slice(WHOLE.stop, WHOLE.stop + len(F.REALS))
+BOUND = slice(REAL.stop, REAL.stop + len(ARRAYS))
+_whole, _real, _arrays = itemgetter(*F.INTEGERS), itemgetter(*F.REALS), itemgetter(*ARRAYS)
 
 
 class CallTable:
@@ -33,24 +37,21 @@ class CallTable:
         self._words = np.zeros(len(F.FIELDS), dtype=np.int64)
         self._reals = self._words.view(np.float64)
         self._code = np.zeros(0, dtype=np.int64)
-        self._bound: dict[int, Any] = {}
+        self._bound, self._words[BOUND] = zip(*[known.get(name, (None, 0)) for name in ARRAYS], strict=True)
         self.address = self._words.ctypes.data
-        for name, (array, address) in known.items():
-            self._bound[PLACES[name]] = array
-            self._words[PLACES[name]] = address
         self.fill(functions, values)
 
     def fill(self, functions: Sequence[Any], values: Mapping[str, Any]) -> None:
         """Bring the table up to what the next call needs."""
-        for place, name in WHOLE:
-            self._words[place] = values[name]
-        for place, name in REAL:
-            self._reals[place] = values[name]
-        for place, name in ARRAYS:
-            array = values[name]
-            if self._bound.get(place) is not array:
-                self._bound[place] = array
-                self._words[place] = array.ctypes.data
+        self._words[WHOLE] = _whole(values)
+        self._words[PLACES["hooks"]] = values["hooks"]
+        self._reals[REAL] = _real(values)
+        arrays = _arrays(values)
+        if not all(map(is_, arrays, self._bound)):
+            for place, (array, before) in enumerate(zip(arrays, self._bound, strict=True), BOUND.start):
+                if array is not before:
+                    self._words[place] = array.ctypes.data
+            self._bound = arrays
         if len(functions) != len(self._code):
             self._code = np.array(
                 [0 if function is None else function.address for function in functions], dtype=np.int64

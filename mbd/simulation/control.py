@@ -134,6 +134,8 @@ def _sparse(instants: Vector, dt: float) -> Vector:
 
     Judged around each of them, so that it does not depend on where a run begins or ends.
     """
+    if not len(instants):
+        return instants
     window = 64.0 * dt
     around = np.searchsorted(instants, instants + window) - np.searchsorted(instants, instants - window)
     return np.asarray(instants[around <= CROWD])

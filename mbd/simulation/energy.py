@@ -156,9 +156,10 @@ class EnergyWatch:
 
     def _look(self, run: Run) -> None:
         """Evaluate T and V at some rows that were not looked at yet."""
-        rows = np.linspace(min(self._upto, run.stored - 1), run.stored - 1, SPREAD).astype(np.intp)
-        early = np.array(EARLY if self._looks == 0 else (), dtype=np.intp)
-        chosen = np.array(sorted({*rows.tolist(), *early[early < run.stored].tolist()}), dtype=np.intp)
+        last = run.stored - 1
+        first, early = min(self._upto, last), EARLY if self._looks == 0 else ()
+        spread = {first + k * (last - first) // (SPREAD - 1) for k in range(SPREAD)}
+        chosen = np.array(sorted(spread.union(row for row in early if row <= last)), dtype=np.intp)
         record = record_of(run, run.table[chosen])
         inputs = ModelColumns.inputs(record.rows(np.zeros((len(chosen), run.values["n_anchors"]))))
         kinetic, potential = run.mechanism.energies(inputs, record.parameters_at(chosen))

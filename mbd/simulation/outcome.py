@@ -31,8 +31,10 @@ def trajectory_of(run: Run, problem: str, message: str, final: State) -> Traject
     record = whole_record(run)
     notes, doubts = notes_of(run, record)
     told = problem or "; but ".join([message, *doubts])
-    record = replace(record, success=not problem, message=told, failure=run.failure, final=final)
-    return Trajectory(replace(record, stats=_statistics(run, notes)))
+    ended = replace(
+        record, success=not problem, message=told, failure=run.failure, final=final, stats=_statistics(run, notes)
+    )
+    return Trajectory(ended)
 
 
 def _statistics(run: Run, notes: list[str]) -> dict[str, Any]:

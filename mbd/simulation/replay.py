@@ -212,6 +212,10 @@ class _Watched:
         """The same as the compiled kernel has it."""
         return self._watched(self._mechanism.stepping, *chosen)
 
+    def explicit(self, *chosen: Any) -> ModeCode:
+        """The same as explicit steps have it."""
+        return self._watched(self._mechanism.explicit, *chosen)
+
     def _watched(self, make: Callable[..., ModeCode], *chosen: Any) -> ModeCode:
         mode = tuple(one if isinstance(one, bool) else tuple(one) for one in chosen)
         key = (make.__name__, *mode)

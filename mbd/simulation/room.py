@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import warnings
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 __all__ = ["Room", "available", "memory"]
 
 SHARE = 0.25
-"""Part of the memory that is free as a run begins which its rows may fill: trial runs, and results, need some too."""
+"""Part of the memory that is free which the rows of a run may fill: trial runs, and results, need some too."""
 UNKNOWN = 4.0e9
 """Taken for the free memory where the system does not tell it [bytes]."""
 EARLIEST = 1 << 16
@@ -31,6 +32,8 @@ LARGE = 1.0e9
 class Room:
     """What the rows of one run may fill.
 
+    The system is asked for the free memory, which takes 50 µs, once it matters: after some ten thousand rows.
+
     Attributes
     ----------
     problem : why the run had to end, in a sentence; '' if it did not
@@ -39,8 +42,12 @@ class Room:
 
     def __init__(self, width: int) -> None:
         self.size = 8 * width
-        self.most = int(SHARE * available()) // self.size
         self.problem = self.note = ""
+
+    @cached_property
+    def most(self) -> int:
+        """Rows for which there is room as it is looked at first."""
+        return int(SHARE * available()) // self.size
 
     def check(self, run: Run) -> str:
         """Look at a run that goes on; a sentence if it must not store any more rows."""

@@ -101,7 +101,7 @@ def simulate(
         for arguments that cannot be honoured, all before the first step.
     SimulationError
         if the run cannot go on, or if the scheme itself has more than doubled the energy of the mechanism; a
-        `MemoryLimitError` if its rows fill a quarter of the memory that was free.
+        `MemoryLimitError` if its rows fill a quarter of the memory that was free as it grew long.
     """
     scheme = integrator if integrator is not None else HHT(alpha=0.05)
     words = {"contact": contact, "impact": impact, "locate": locate, "on_failure": on_failure}

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from functools import lru_cache
+from itertools import accumulate
 from types import SimpleNamespace
 from typing import Any
 
@@ -70,6 +73,14 @@ def is_loaded(equations: Equations) -> bool:
     """Whether a friction follows multipliers other than linearly, as a pin does."""
     limits = [friction.limit for friction in equations.frictions if friction.contact < 0]
     return any(node.op == "input" and node.data[0] == "lam" for node in live(limits))
+
+
+@lru_cache(maxsize=256)
+def _side_by_side(lengths: Iterable[int]) -> tuple[tuple[slice, ...], int]:
+    """Places of arrays of 8-byte numbers, each at the beginning of a cache line, and their end."""
+    lengths = [max(length, 1) for length in lengths]
+    starts = list(accumulate((-8 * (-length // 8) for length in lengths), initial=0))
+    return tuple(slice(start, start + length) for start, length in zip(starts, lengths, strict=False)), starts[-1]
 
 
 class Stepper:
@@ -181,22 +192,25 @@ class Stepper:
             "pivots": size, "columns": size, "lcp_rows": contacts + frictions, "lcp_who": contacts + frictions,
             "lcp_basis": unknowns, "fired": 2, "state": 24, "counts": 16,
         }  # fmt: skip
+        tables = manager.tables()
+        for name, table in tables.items():
+            (reals if table.dtype == float else integers)[name] = len(table)
         self.reals = self._shelve({name: reals.pop(name) for name in F.KEPT_REALS}, float)
         self.integers = self._shelve({name: integers.pop(name) for name in F.KEPT_INTEGERS}, np.int64)
         self._shelve(reals, float)
         self._shelve(integers, np.int64)
-        for name, table in manager.tables().items():
-            v[name] = table if len(table) else np.zeros(1, dtype=table.dtype)
+        for name, table in tables.items():
+            v[name][: len(table)] = table
         v["shift1"] = v["block"][self.mechanism.layout.shift :]  # read by model code as well
         v["tableau"] = tableau()
+        v["params"] = np.ascontiguousarray(parameters, dtype=float) if len(parameters) else np.zeros(1)
         v["clock"][F.STEP] = v["dt"]
         v["sinking"][:] = np.inf
         v["was"][:] = F.UNKNOWN
         if v["scheme"] == RADAU_IIA:
             v["stages"][: len(RADAU.numbers())] = RADAU.numbers()
         v["unit"] = unit_blocks(self.mechanism)
-        v["row_unit"] = np.append(row_units(self.mechanism), 2)
-        v["params"] = np.ascontiguousarray(parameters, dtype=float) if len(parameters) else np.zeros(1)
+        v["row_unit"] = np.array([*row_units(self.mechanism), 2], dtype=np.int64)
         if not v["n_anchors"]:
             v["anchors"] = np.zeros(0)
 
@@ -209,12 +223,12 @@ class Stepper:
 
     def _shelve(self, lengths: dict[str, int], kind: Any) -> Any:
         """Arrays side by side on one shelf, which is copied at once; each begins on a cache line."""
-        starts = np.cumsum([0, *(-8 * (-max(length, 1) // 8) for length in lengths.values())]).tolist()
-        shelf = np.zeros(starts[-1], dtype=kind)
+        places, whole = _side_by_side(tuple(lengths.values()))
+        shelf = np.zeros(whole, dtype=kind)
         base = shelf.ctypes.data
-        for start, (name, length) in zip(starts, lengths.items(), strict=False):
-            self.values[name] = shelf[start : start + max(length, 1)]
-            self._shelved[name] = self.values[name], base + shelf.itemsize * start
+        for name, place in zip(lengths, places, strict=True):
+            array = self.values[name] = shelf[place]
+            self._shelved[name] = array, base + 8 * place.start
         return shelf
 
     def add_mode(self) -> None:
@@ -226,7 +240,7 @@ class Stepper:
         rows = tuple(row for row in held if not dropped[row])
         sliding = tuple(int(f) for f in np.flatnonzero(slip))
         borne = tuple(row for row in held if dropped[row]) if sliding else ()
-        make = self.mechanism.stepping if self.straight else self.mechanism.mode
+        make = self._maker()
         code = make(rows, self.manager.penalties(flags), self.stabilized, sliding, borne)
         count, width = int(v["mode_count"][0]), v["n_contacts"] + v["n_rows"] + v["n_frictions"]
         phases = np.where(sticks == 1, 2, slip != 0.0)
@@ -248,6 +262,12 @@ class Stepper:
             if dropped[row]:  # as they were found first
                 self.dependent.setdefault(row, tuple(int(k) for k in np.flatnonzero(np.abs(mix[row]) > TAKES_PART)))
         v["mode_count"][0] = count + 1  # at last: an interrupt may come between any two lines
+
+    def _maker(self) -> Any:
+        """What makes the code of a mode, no more of it than the scheme calls."""
+        if own_scheme(self.integrator) == RUNGE_KUTTA:
+            return self.mechanism.explicit
+        return self.mechanism.stepping if self.straight else self.mechanism.mode
 
     @property
     def provisional(self) -> bool:

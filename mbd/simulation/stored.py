@@ -21,12 +21,14 @@ def record_of(run: Run, table: Matrix, events: Sequence[EventRecord] = ()) -> Re
     """Rows that the kernel has stored, (R, width), as a record without a verdict."""
     v, equations = run.values, run.mechanism.equations
     n_q, n_v, n, rows = v["n_q"], v["n_v"], v["n"], v["n_rows"]
-    cuts = np.cumsum([1, n_q, n_v, n - n_v, n_v, n - n_v, rows])
-    time, q, velocity, z, a, s, lam, closed = np.split(table, cuts, axis=1)
+    at_v, at_a = 1 + n_q, 1 + n_q + n
+    at_lam, at_closed = at_a + n, at_a + n + rows
     return Record(
         equations=equations, parameters=run.first_parameters,
-        parameter_names=[parameter.name for parameter in equations.parameters], time=time[:, 0], q=q, v=velocity,
-        z=z, a=a, s=s, lam=lam, closed=closed.astype(np.uint8), events=events, settings=run.settings,
+        parameter_names=[parameter.name for parameter in equations.parameters], time=table[:, 0], q=table[:, 1:at_v],
+        v=table[:, at_v : at_v + n_v], z=table[:, at_v + n_v : at_a], a=table[:, at_a : at_a + n_v],
+        s=table[:, at_a + n_v : at_lam], lam=table[:, at_lam:at_closed],
+        closed=table[:, at_closed:].astype(np.uint8), events=events, settings=run.settings,
         parameter_changes=run.parameter_changes, start=run.start,
     )  # fmt: skip
 

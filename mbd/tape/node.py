@@ -168,6 +168,7 @@ class Tape:
         self.nodes: list[Node] = []
         self.tables: list[Table] = []
         self._known: dict[Hashable, Node] = {}
+        self._numbers: dict[float, Node] = {}
         self.zero = self.constant(0.0)
         self.one = self.constant(1.0)
 
@@ -179,8 +180,12 @@ class Tape:
         return node
 
     def constant(self, number: float) -> Node:
-        number = float(number) + 0.0
-        return self._make(("const", number if number == number else "nan"), "const", (), number)
+        node = self._numbers.get(number) if number.__class__ is float else None
+        if node is None:
+            number = float(number) + 0.0
+            node = self._make(("const", number if number == number else "nan"), "const", (), number)
+            self._numbers[number] = node
+        return node
 
     def input(self, kind: str, index: int = 0) -> Node:
         """The node of a run-time input, known by its kind ('t', 'q', 'v', 'p', …) and place."""

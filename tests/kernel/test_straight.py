@@ -131,6 +131,28 @@ def test_a_tangent_is_compiled_when_it_is_asked_for():
     assert [tangent.made for tangent in mechanism_of(walker).postponed] == [False]
 
 
+def test_explicit_steps_have_neither_tangent_nor_residual_compiled():
+    model = box(friction=None)
+    start = mbd.assemble(model, {"place.y": 0.2, "place.angle": 0.1})
+    found = mbd.simulate(model, start, mbd.RungeKutta853(), dt=2e-2, until=0.5)
+    later = mechanism_of(model).postponed
+    assert found.stats["modes"] >= 2 and len(later) == 2 * found.stats["modes"]
+    assert not any(program.made for program in later)
+
+
+@pytest.mark.parametrize("stabilized", [False, True])
+def test_what_is_compiled_later_has_as_many_outputs_as_was_said(stabilized):
+    mechanism = mechanism_of(kneed_walker())
+    late, made = (make((0, 1, 2), (), stabilized) for make in (mechanism.explicit, mechanism.mode))
+    assert (late.tangent.size, late.residual.size) == (made.tangent.size, made.residual.size)
+    block, parameters = np.linspace(0.1, 0.9, mechanism.layout.size), mechanism.parameters()
+    for one, other in (late.tangent, made.tangent), (late.residual, made.residual):
+        outs = np.zeros((2, other.size))
+        one(block, parameters, outs[0])
+        other(block, parameters, outs[1])
+        np.testing.assert_array_equal(*outs)
+
+
 def test_what_is_raised_while_code_is_made_comes_out_of_the_step(monkeypatch):
     made = Mechanism._add
 
