@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import mbd
-from mbd.kernel import advance as kernel_advance
+from mbd.kernel import events as kernel_events
 from mbd.kernel.fields import NO_IMPACT
 from tests.simulation.mechanisms import G, ball, falling, kneed_walker, kneed_walker_start, point, run, two_balls
 
@@ -258,7 +258,7 @@ def test_an_interrupted_run_keeps_what_it_has():
 @pytest.mark.parametrize("until_works", [1, 2, 3, 4])
 def test_a_step_whose_end_has_no_impulses_is_tried_down_to_an_eighth(monkeypatch, until_works):
     """The impact law refuses the first attempts; the state is what it was, and nothing of them is stored."""
-    refused, rebound = [], kernel_advance.rebound
+    refused, rebound = [], kernel_events.rebound
 
     def refuse(K):
         if len(refused) < until_works:
@@ -266,7 +266,7 @@ def test_a_step_whose_end_has_no_impulses_is_tried_down_to_an_eighth(monkeypatch
             return NO_IMPACT
         return rebound(K)
 
-    monkeypatch.setattr(kernel_advance, "rebound", refuse)
+    monkeypatch.setattr(kernel_events, "rebound", refuse)
     trajectory = nonsmooth(
         ball(restitution=0.5), {"fall.displacement": 1.0}, {"fall.displacement": -50.0}, dt=0.17, until=0.34,
         backend="python", on_failure="return",
