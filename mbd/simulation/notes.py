@@ -33,6 +33,9 @@ BLIND = 2.0
 TAKEN = 0.5
 """Share of its energy that a scheme may take from a mechanism before the run's message says so [-]."""
 
+OVERSHOT = 1e-8
+"""Depth at which a contact may close that is no more than round-off of large coordinates [m, rad]."""
+
 LOOKED_AT = 8
 """Blows of a contact from which the step that resolves them is found."""
 
@@ -92,7 +95,7 @@ def notes_of(run: Run, record: Record) -> tuple[list[str], list[str]]:
         )
     for number, contact in enumerate(run.manager.contacts):
         short, blind = _short_touch(run, record, number, contact)
-        notes += _ignored(run, number, contact) + short
+        notes += _ignored(run, number, contact) + _overshot(run, record, contact) + short
         doubts += blind
     return notes, doubts
 
@@ -115,6 +118,25 @@ def _ignored(run: Run, number: int, contact: Contact) -> list[str]:
     if np.isfinite(sinking):
         notes.append(f"{contact.name!r} was released at t = {sinking:.6g} s while moving into its surface")
     return notes
+
+
+def _overshot(run: Run, record: Record, contact: Contact) -> list[str]:
+    """A located contact that closes below its surface: it was passed in a step too long to see it come."""
+    if contact.kind == "penalty" or run.values["strategy"] == 1 or run.values["linear"] == 1:
+        return []
+    last = len(record.time) - 1
+    rows = [min(event.row, last) for event in run.events if event.name == contact.name and event.kind == "closed"]
+    if not rows:
+        return []
+    columns = ModelColumns(record, run.mechanism.equations)
+    (gaps,) = columns.evaluate([contact.gap], columns.rows.part(np.array(rows)))
+    worst = int(np.argmin(gaps))
+    if not gaps[worst] < -OVERSHOT:
+        return []
+    return [
+        f"{contact.name!r} closed {-gaps[worst]:.2g} {contact.unit} below its surface at t = "
+        f"{record.time[rows[worst]]:.6g} s: steps were too long to see it come; use a smaller dt"
+    ]
 
 
 def _short_touch(run: Run, record: Record, number: int, contact: Contact) -> tuple[list[str], list[str]]:
