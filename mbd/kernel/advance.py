@@ -49,6 +49,7 @@ from mbd.kernel.locate import locate
 from mbd.kernel.nonsmooth import PULL, lands, lets_go
 from mbd.kernel.observe import is_awaited, store_row
 from mbd.kernel.pairs import ALONE, FIRST, SECOND
+from mbd.kernel.settle import room_to_log
 from mbd.kernel.starting import find_mode, restart, still_dependent
 from mbd.kernel.takeover import leave_pose, take_over
 from mbd.kernel.trying import part_end, step_end, tried_step
@@ -94,7 +95,7 @@ def forget_found(K: Any) -> None:
 
 def begin(K: Any) -> int:
     """What comes before a step: room for its rows, a start of the scheme, code of the mode; −1 if it can be taken."""
-    if K.state[STORED] + 4 > K.capacity or K.state[LOGGED] + 3 * K.n_contacts + 6 > K.event_capacity:
+    if K.state[STORED] + 4 > K.capacity or K.state[LOGGED] + room_to_log(K) > K.event_capacity:
         return FULL
     if K.state[RESTART] > 0:
         visible = K.state[RESTART] == 1

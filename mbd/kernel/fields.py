@@ -114,7 +114,8 @@ KEPT_INTEGERS = ("closed", "armed", "touched", "dropped", "rows", "state", "stic
     SHORTENED, STRONGE, ENDLESS,
     PIVOTED,  # factorizations by the pivoted LU where an order chosen beforehand was not sound
     REJECTED,
-) = range(16)  # fmt: skip
+    LOST,  # rows and lines for which there was no room: none, as `room_to_log` and the rows kept free see to
+) = range(17)  # fmt: skip
 # values of state[NEAR]: within a few steps of a pose in which rows lose rank, and just beyond it
 PASSING, LEFT = 1, 2
 # places in `detail` of the largest inverse pivot of rows in the last step, of what round-off makes of velocities there

@@ -10,6 +10,7 @@ from mbd.kernel.fields import (
     LOG_SLIPPED,
     LOG_STUCK,
     LOGGED,
+    LOST,
     NOW,
     SINCE_STORE,
     STORED,
@@ -20,6 +21,9 @@ __all__ = ["is_awaited", "store_row"]
 
 def store_row(K: Any) -> None:
     """One row of results: t, q, (v, z), (v̇, ż), λ, closed."""
+    if K.state[STORED] >= K.capacity:  # never beyond the array; the run ends with an error
+        K.counts[LOST] += 1
+        return
     o = K.state[STORED] * K.width
     K.store[o] = K.clock[NOW]
     o = carry(K.q, K.store, o + 1, K.n_q, True)

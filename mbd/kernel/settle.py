@@ -13,6 +13,7 @@ from mbd.kernel.fields import (
     LOG_SLIPPED,
     LOG_STUCK,
     LOGGED,
+    LOST,
     NO_FORCE,
     NO_IMPACT,
     NOW,
@@ -23,7 +24,7 @@ from mbd.kernel.fields import (
 from mbd.kernel.restart import active_rows, capture, evaluate, row_speed
 from mbd.kernel.saddle import solve_rows
 
-__all__ = ["STILL", "log_event", "settle"]
+__all__ = ["STILL", "log_event", "room_to_log", "settle"]
 
 STILL = 1e-9
 """Speed [m/s, rad/s] of a gap or along a friction that counts as none."""
@@ -31,8 +32,20 @@ CLOSE_TO_STILL = 1e-7
 """The same along a friction that an event found at rest; index 3 may have moved it as velocities became consistent."""
 
 
+def room_to_log(K: Any) -> int:
+    """Lines of the event log that one step with its event and two restarts may fill.
+
+    A restart logs each contact and each friction at most once. An event logs one guard; an impact each contact at most
+    three times: released by one that strikes, closed, and opened again.
+    """
+    return int(5 * K.n_contacts + 2 * K.n_frictions + 8)
+
+
 def log_event(K: Any, kind: int, index: int, loss: float, struck: bool) -> None:
     """One line of the event log: t, kind, index, energy loss, row of results, impulses of its rows if it struck."""
+    if K.state[LOGGED] >= K.event_capacity:  # never beyond the array; the run ends with an error
+        K.counts[LOST] += 1
+        return
     o = K.state[LOGGED] * K.event_width
     K.log[o] = K.clock[NOW]
     K.log[o + 1] = float(kind)

@@ -46,6 +46,11 @@ MOST_EXPECTED = 1 << 22
 """Rows for which a table is laid out at the start; longer runs enlarge it."""
 INTERRUPTED = "interrupted"
 """The problem of a run that was interrupted, until its time is known."""
+OVERFULL = (
+    "t = {:.9g} s: more rows or events came in one step than there was room for: a fault of mbd, please report the "
+    "model; a smaller dt has fewer events in a step"
+)
+"""The problem of a run whose rows and events outgrew what `advance` keeps free for a step."""
 KINDS = ("closed", "opened", "event", "stuck", "slipped")
 """Names of the kinds of events that the kernel logs by number."""
 
@@ -177,6 +182,8 @@ class Run:
             target, due = self.boundaries.next(self.end)
             status = advance(self, target, due)
             self.collect()
+            if self.values["counts"][F.LOST]:
+                return OVERFULL.format(self.now), ""
             if status == F.NEW_MODE:
                 self.stepper.add_mode()
             elif status == F.DONE:

@@ -23,6 +23,7 @@ from mbd.kernel import fields as F
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.kernel.collocation import RADAU
 from mbd.kernel.lemke import lemke_places
+from mbd.kernel.settle import room_to_log
 from mbd.kernel.stages import STAGES_END, stage_place
 from mbd.simulation.call_table import CallTable
 from mbd.simulation.plain import MechanismSystem, PlainScheme, row_units, unit_blocks
@@ -138,7 +139,7 @@ class Stepper:
             linear=int(options.get("locate") == "linear"),
             width=1 + layout.n_q + 2 * layout.n + layout.n_rows + n_contacts,
             capacity=int(options["capacity"]), stride=int(options.get("store", 1)), event_width=5 + layout.n_rows,
-            event_capacity=max(EVENT_CAPACITY, 8 * n_contacts + 16), chunk=1, hooks=0,
+            chunk=1, hooks=0,
             rest_speed=float(options.get("rest_speed", 1e-6)), dt=dt, until=0.0, end=float(options.get("end", 0.0)),
             alpha_m=0.0, alpha_f=0.0, beta=0.25, gamma=0.5, tolerance=1e-9, jerk=1, exact=0,
             scheme=own_scheme(self.integrator) or NEWMARK,
@@ -146,6 +147,7 @@ class Stepper:
             longest=float(options.get("longest", np.inf)), error_order=self.integrator.error_order(),
             looks=LOOKS if self.integrator.order() > 2 and options.get("contact") != "nonsmooth" else 1,
         )  # fmt: skip
+        values["event_capacity"] = max(EVENT_CAPACITY, 2 * room_to_log(SimpleNamespace(**values)))
         if isinstance(self.integrator, NewmarkFamily):
             c = self.integrator.coefficients
             values.update(
@@ -190,7 +192,7 @@ class Stepper:
             "mode_code": PROGRAMS * MODE_CAPACITY, "mode_order": MODE_CAPACITY, "orders": 1, "support": rows * (n + 2),
             "mode_count": 1, "rows": rows,
             "pivots": size, "columns": size, "lcp_rows": contacts + frictions, "lcp_who": contacts + frictions,
-            "lcp_basis": unknowns, "fired": 2, "state": 24, "counts": 16,
+            "lcp_basis": unknowns, "fired": 2, "state": 24, "counts": 24,
         }  # fmt: skip
         tables = manager.tables()
         for name, table in tables.items():
