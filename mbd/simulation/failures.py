@@ -14,9 +14,10 @@ from mbd.kernel import fields as F
 from mbd.not_finite import first_cause, tape_inputs
 from mbd.results.failure import Failure
 from mbd.results.record import EventRecord
+from mbd.simulation.lengths import RUNGE_KUTTA
 from mbd.simulation.redundant import clash
 from mbd.simulation.round_off import remainder
-from mbd.simulation.stepper import RUNGE_KUTTA, Stepper
+from mbd.simulation.stepper import Stepper
 from mbd.state import State
 from mbd.tape.evaluate import evaluate
 

@@ -13,7 +13,7 @@ from mbd.constraints.penalty_parameters import STEPS_OF_APPROACH
 from mbd.integrators.base import Point
 from mbd.kernel import fields as F
 from mbd.results.record import Record
-from mbd.simulation.stepper import RUNGE_KUTTA
+from mbd.simulation.lengths import RUNGE_KUTTA
 
 if TYPE_CHECKING:
     from mbd.simulation.run import Run

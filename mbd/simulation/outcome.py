@@ -7,8 +7,8 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from mbd.kernel import fields as F
+from mbd.simulation.lengths import RUNGE_KUTTA
 from mbd.simulation.notes import notes_of
-from mbd.simulation.stepper import RUNGE_KUTTA
 from mbd.simulation.stored import whole_record
 from mbd.state import State
 from mbd.trajectory import Trajectory

@@ -22,9 +22,9 @@ from mbd.kernel.runge_kutta import runge_kutta_accept, runge_kutta_start, runge_
 from mbd.results.capsule import load
 from mbd.results.failure import Failure
 from mbd.simulation.failures import residual_names
+from mbd.simulation.lengths import NEWMARK, RADAU_IIA, RUNGE_KUTTA
 from mbd.simulation.run import Run
 from mbd.simulation.simulate import prepared
-from mbd.simulation.stepper import NEWMARK, RADAU_IIA, RUNGE_KUTTA
 from mbd.state import State
 from mbd.trajectory import Trajectory
 

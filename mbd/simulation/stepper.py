@@ -14,7 +14,7 @@ from mbd.arrays import Vector
 from mbd.compile.mechanism import Mechanism
 from mbd.equations.equations import Equations
 from mbd.integrators.base import Integrator
-from mbd.integrators.dormand_prince import STAGES, tableau
+from mbd.integrators.dormand_prince import tableau
 from mbd.integrators.family import NewmarkFamily
 from mbd.integrators.newton import MAX_ITERATIONS
 from mbd.integrators.radau import RadauIIA
@@ -22,10 +22,9 @@ from mbd.integrators.runge_kutta import RungeKutta853
 from mbd.kernel import fields as F
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.kernel.collocation import RADAU
-from mbd.kernel.lemke import lemke_places
 from mbd.kernel.settle import room_to_log
-from mbd.kernel.stages import STAGES_END, stage_place
 from mbd.simulation.call_table import CallTable
+from mbd.simulation.lengths import NEWMARK, PROGRAMS, RADAU_IIA, RUNGE_KUTTA, array_lengths
 from mbd.simulation.plain import MechanismSystem, PlainScheme, row_units, unit_blocks
 from mbd.tape.derivatives import live
 
@@ -37,16 +36,11 @@ LAWS = ("newton", "poisson", "sequential")
 """Impact laws in the order of their numbers in the kernel."""
 TAKES_PART = 1e-7
 """Coefficient of a row below which another does not depend on it [-]."""
-PROGRAMS = 4
-"""Programs of a mode: tangent, residual, correction and solution; 0 stands for the last two where there are none."""
-MODE_CAPACITY = 16
-"""Modes for which a table is laid out at the start; it doubles as it fills."""
 
-
+LINE = 64
+"""Length of a cache line [bytes]."""
 LOOKS = 4
 """Parts in which a step of a scheme of order 3 or more is looked at for guards [-]."""
-NEWMARK, RUNGE_KUTTA, RADAU_IIA = range(3)
-"""Numbers of the kernel's own schemes."""
 
 
 def own_scheme(integrator: Integrator) -> int | None:
@@ -159,41 +153,7 @@ class Stepper:
 
     def _arrays(self, parameters: Vector, manager: ActiveSetManager) -> None:
         v = self.values
-        n, n_q, rows, contacts, guards = v["n"], v["n_q"], v["n_rows"], v["n_contacts"], v["n_guards"]
-        frictions = v["n_frictions"]
-        size, unknowns, block = n + rows, contacts + 3 * frictions, self.mechanism.layout.size
-        tail = n + 2 * rows + rows * n
-        reals = {
-            "block": block, "out": max(size * size + 3 * tail + 2 * size + 2, block), "clock": 16,
-            "acc": self.mechanism.sizes["accelerations"], "q": n_q, "y": n, "rate": n, "aux": n, "slope": n,
-            "lam": rows, "lam_slope": rows, "left": rows + 1, "left1": rows + 1, "shift": n, "shift_change": n,
-            "anchors": v["n_anchors"], "q1": n_q, "y1": n, "rate1": n, "aux1": n, "lam1": rows,
-            "basis": (rows + 1) * n, "lower": (rows + 1) * rows, "mix": rows * rows, "shares": rows * rows,
-            "kkt": size * size, "rhs": size, "spare": 2 * size * (size + 1) + tail, "turning": rows * n,
-            "work": 3 * size, "force": n, "bias": rows, "jump": n, "impulse": rows,
-            "guards0": v["n_watched"], "guards1": v["n_watched"], "scale": n + 2 * rows, "weight": n,
-            "deepest": contacts, "sinking": contacts, "side": guards, "pick": 8, "detail": 8,
-            "slip": frictions, "limit": frictions, "base_limit": frictions, "lean": frictions, "typical": n,
-            "given": rows, "total": rows, "total_jump": n, "loads": rows, "before": contacts, "past": rows,
-            "past_limit": frictions, "trial": rows, "trial_given": rows, "trial_jump": n,
-            "lcp_matrix": unknowns * unknowns, "lcp_shift": unknowns, "lcp_found": unknowns,
-            "lcp_work": lemke_places(unknowns), "stages": self._stages(), "error": v["n_v"] + n,
-            "past_stages": 3 * (n + rows + v["n_v"]) if v["scheme"] == RADAU_IIA else 0,
-            "inside": 2 * v["n_watched"] + 2 * rows + n_q + 2 * n, "lcp_limit": frictions, "lcp_slope": frictions,
-            "kept": n_q + 2 * n + rows + v["n_watched"] + v["n_anchors"] + frictions,
-            "store": v["capacity"] * v["width"], "log": v["event_capacity"] * v["event_width"],
-        }  # fmt: skip
-        integers = {
-            "unit": n, "notify": contacts + guards + frictions, "closed": contacts,
-            "armed": contacts, "touched": contacts, "active": contacts + guards + frictions, "free": contacts,
-            "closing": contacts, "parting": contacts, "lifting": rows, "kept_flags": 3 * contacts + 3 * frictions,
-            "sticks": frictions, "loose": frictions, "was": frictions, "let_go": frictions, "dropped": rows,
-            "mode_key": MODE_CAPACITY * (contacts + rows + frictions),
-            "mode_code": PROGRAMS * MODE_CAPACITY, "mode_order": MODE_CAPACITY, "orders": 1, "support": rows * (n + 2),
-            "mode_count": 1, "rows": rows,
-            "pivots": size, "columns": size, "lcp_rows": contacts + frictions, "lcp_who": contacts + frictions,
-            "lcp_basis": unknowns, "fired": 2, "state": 24, "counts": 24,
-        }  # fmt: skip
+        reals, integers = array_lengths(v, self.mechanism.layout.size, self.mechanism.sizes["accelerations"])
         tables = manager.tables()
         for name, table in tables.items():
             (reals if table.dtype == float else integers)[name] = len(table)
@@ -216,17 +176,12 @@ class Stepper:
         if not v["n_anchors"]:
             v["anchors"] = np.zeros(0)
 
-    def _stages(self) -> int:
-        """Numbers that the stages of a step take."""
-        v = self.values
-        if v["scheme"] == RADAU_IIA:
-            return stage_place(SimpleNamespace(**v), STAGES_END)
-        return (STAGES + 1) * (v["n_v"] + v["n"]) if v["scheme"] == RUNGE_KUTTA else 0
-
     def _shelve(self, lengths: dict[str, int], kind: Any) -> Any:
         """Arrays side by side on one shelf, which is copied at once; each begins on a cache line."""
         places, whole = _side_by_side(tuple(lengths.values()))
-        shelf = np.zeros(whole, dtype=kind)
+        room = np.zeros(whole + LINE // 8 - 1, dtype=kind)  # numpy begins anywhere
+        first = -room.ctypes.data % LINE // 8
+        shelf = room[first : first + whole]
         base = shelf.ctypes.data
         for name, place in zip(lengths, places, strict=True):
             array = self.values[name] = shelf[place]
