@@ -8,7 +8,10 @@ from mbd.kernel.complementarity import complementarity
 from mbd.kernel.fields import NOW, PAST_TIME, PLASTIC
 from mbd.kernel.restart import capture, evaluate, evaluate_loaded, limit_of, row_speed
 
-__all__ = ["blow", "energy_gain", "gather", "let_rebound", "loosen", "prepare", "restitution_of", "speed", "start_over"]
+__all__ = [
+    "blow", "energy_gain", "gather", "let_rebound", "loosen", "prepare", "restitution_of", "speed", "start_over",
+    "strikes",
+]  # fmt: skip
 
 
 def prepare(K: Any) -> None:
@@ -124,3 +127,8 @@ def energy_gain(K: Any) -> float:
             loss += K.impulse[k] * (before + half)
             size += abs(K.impulse[k]) * (abs(before) + abs(half))
     return -loss / size
+
+
+def strikes(K: Any, c: int) -> bool:
+    """Whether a contact closes in the impact just found; one that only touches takes no impulse."""
+    return bool(K.kind[c] == 0 and K.closing[c] > 0 and (K.closing[c] == 1 or K.impulse[K.normal[c]] != 0.0))

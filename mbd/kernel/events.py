@@ -29,7 +29,7 @@ from mbd.kernel.fields import (
 )  # fmt: skip
 from mbd.kernel.nonsmooth import keep, put_back, rebound, strike
 from mbd.kernel.observe import is_awaited, store_row
-from mbd.kernel.settle import log_event
+from mbd.kernel.settle import NO_IMPULSE, log_event
 from mbd.kernel.starting import restart
 from mbd.kernel.switching import switch
 from mbd.kernel.takeover import take_over
@@ -53,7 +53,7 @@ def same_instant(K: Any) -> bool:
 
 def was_closed(K: Any, c: int) -> bool:
     """Whether a contact was closed in the row before the last."""
-    return bool(K.store[(K.state[STORED] - 2) * K.width + K.width - K.n_contacts + c] == 1.0)
+    return bool(K.store[(K.state[STORED] - 1) * K.width - K.n_frictions - K.n_contacts + c] == 1.0)
 
 
 def handle_event(K: Any) -> int:
@@ -69,7 +69,7 @@ def handle_event(K: Any) -> int:
         return switch(K) - 1
     store_row(K)
     if kind == CROSS:
-        log_event(K, LOG_EVENT, index, 0.0, False)
+        log_event(K, LOG_EVENT, index, 0.0, NO_IMPULSE)
         K.side[index] = -K.side[index]
         K.state[RESTART] = 1
         return EVENT if is_awaited(K, first) else -1

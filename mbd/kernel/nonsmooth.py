@@ -31,7 +31,7 @@ from mbd.kernel.fields import (
 from mbd.kernel.guards import frictions_at, gap_scale, gap_tolerance, is_watched, watch
 from mbd.kernel.hooks import call
 from mbd.kernel.restart import consistent, evaluate
-from mbd.kernel.settle import STILL, log_event
+from mbd.kernel.settle import NO_IMPULSE, STILL, log_event
 from mbd.kernel.switching import close_by_impact, mark_touching
 
 __all__ = ["PULL", "keep", "lands", "lets_go", "put_back", "rebound", "strike"]
@@ -60,7 +60,7 @@ def lets_go(K: Any, t1: float) -> int:
             K.closed[c] = 0
             K.armed[c] = 1
             count += 1
-            log_event(K, LOG_OPENED, c, 0.0, False)
+            log_event(K, LOG_OPENED, c, 0.0, NO_IMPULSE)
     limits = frictions_at(K) + 2 * K.n_frictions
     for f in range(K.n_frictions):
         c = K.friction_contact[f]

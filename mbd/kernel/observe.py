@@ -20,7 +20,7 @@ __all__ = ["is_awaited", "store_row"]
 
 
 def store_row(K: Any) -> None:
-    """One row of results: t, q, (v, z), (v̇, ż), λ, closed."""
+    """One row of results: t, q, (v, z), (v̇, ż), λ, closed, and what frictions do: 2 sticks, ±1 slides, 0 off."""
     if K.state[STORED] >= K.capacity:  # never beyond the array; the run ends with an error
         K.counts[LOST] += 1
         return
@@ -32,6 +32,8 @@ def store_row(K: Any) -> None:
     o = carry(K.lam, K.store, o, K.n_rows, True)
     for c in range(K.n_contacts):
         K.store[o + c] = float(K.closed[c])
+    for f in range(K.n_frictions):
+        K.store[o + K.n_contacts + f] = 2.0 if K.sticks[f] == 1 else K.slip[f]
     K.state[STORED] += 1
     K.state[SINCE_STORE] = 0
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from mbd.kernel.blow import strikes
 from mbd.kernel.complementarity import complementarity
 from mbd.kernel.fields import (
     BLOCKED,
@@ -24,12 +25,14 @@ from mbd.kernel.fields import (
 from mbd.kernel.restart import active_rows, capture, evaluate, row_speed
 from mbd.kernel.saddle import solve_rows
 
-__all__ = ["STILL", "log_event", "room_to_log", "settle"]
+__all__ = ["ALL_IMPULSES", "NO_IMPULSE", "OWN_IMPULSE", "STILL", "log_event", "room_to_log", "settle"]
 
 STILL = 1e-9
 """Speed [m/s, rad/s] of a gap or along a friction that counts as none."""
 CLOSE_TO_STILL = 1e-7
 """The same along a friction that an event found at rest; index 3 may have moved it as velocities became consistent."""
+NO_IMPULSE, OWN_IMPULSE, ALL_IMPULSES = 0, 1, 2
+"""Which impulses a line of the event log holds [-]."""
 
 
 def room_to_log(K: Any) -> int:
@@ -41,8 +44,12 @@ def room_to_log(K: Any) -> int:
     return int(5 * K.n_contacts + 2 * K.n_frictions + 8)
 
 
-def log_event(K: Any, kind: int, index: int, loss: float, struck: bool) -> None:
-    """One line of the event log: t, kind, index, energy loss, row of results, impulses of its rows if it struck."""
+def log_event(K: Any, kind: int, index: int, loss: float, impulses: int) -> None:
+    """One line of the event log: t, kind, index, energy loss, row of results, impulses.
+
+    impulses : NO_IMPULSE; OWN_IMPULSE, those of the rows of contact `index`; ALL_IMPULSES, with those of the rows that
+        belong to no contact that closes in this impact
+    """
     if K.state[LOGGED] >= K.event_capacity:  # never beyond the array; the run ends with an error
         K.counts[LOST] += 1
         return
@@ -53,7 +60,9 @@ def log_event(K: Any, kind: int, index: int, loss: float, struck: bool) -> None:
     K.log[o + 3] = loss
     K.log[o + 4] = float(K.state[STORED])
     for k in range(K.n_rows):
-        K.log[o + 5 + k] = 0.0 - K.impulse[k] if struck and K.row_contact[k] == index else 0.0
+        c = K.row_contact[k]
+        told = impulses != NO_IMPULSE and (c == index or (impulses == ALL_IMPULSES and (c < 0 or not strikes(K, c))))
+        K.log[o + 5 + k] = 0.0 - K.impulse[k] if told else 0.0
     K.state[LOGGED] += 1
     K.counts[EVENTS] += 1
 
@@ -91,10 +100,10 @@ def settle(K: Any) -> int:
             K.closed[c] = K.active[c]
             if K.active[c] == 1:
                 capture(K, c)
-                log_event(K, LOG_CLOSED, c, 0.0, False)
+                log_event(K, LOG_CLOSED, c, 0.0, NO_IMPULSE)
             else:
                 K.armed[c] = 1
-                log_event(K, LOG_OPENED, c, 0.0, False)
+                log_event(K, LOG_OPENED, c, 0.0, NO_IMPULSE)
         K.active[c] = 0
     for f in range(K.n_frictions):
         c = K.friction_contact[f]
@@ -105,9 +114,9 @@ def settle(K: Any) -> int:
         now = frictional_state(K, f)
         if now != K.was[f] and K.was[f] != UNKNOWN:
             if now == 2:
-                log_event(K, LOG_STUCK, f, 0.0, False)
+                log_event(K, LOG_STUCK, f, 0.0, NO_IMPULSE)
             elif now != 0 and K.was[f] != 0:
-                log_event(K, LOG_SLIPPED, f, 0.0, False)
+                log_event(K, LOG_SLIPPED, f, 0.0, NO_IMPULSE)
         K.was[f] = now
     return 0
 

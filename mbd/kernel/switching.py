@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from mbd.kernel.blow import strikes
 from mbd.kernel.fields import (
     BLOCKED,
     CLOSE,
@@ -23,7 +24,7 @@ from mbd.kernel.fields import (
 from mbd.kernel.guards import gap_scale, is_watched
 from mbd.kernel.impact import impact
 from mbd.kernel.restart import capture, evaluate, row_speed
-from mbd.kernel.settle import STILL, log_event
+from mbd.kernel.settle import ALL_IMPULSES, NO_IMPULSE, OWN_IMPULSE, STILL, log_event
 
 __all__ = ["switch"]
 
@@ -62,7 +63,7 @@ def release_for(K: Any, after: int) -> None:
                 if K.when_after[place] == after and K.closing[target] == 1:
                     K.closed[c] = 0
                     K.armed[c] = 0
-                    log_event(K, LOG_OPENED, c, 0.0, False)
+                    log_event(K, LOG_OPENED, c, 0.0, NO_IMPULSE)
                     break
 
 
@@ -81,13 +82,15 @@ def close_by_impact(K: Any, fastest: float) -> int:
             count += 1
             own += abs(loss_in(K, c))
     others = loss_elsewhere(K) if count > 0 else 0.0
+    told = ALL_IMPULSES  # in the first line, so that each impulse of this impact is told once
     for c in range(K.n_contacts):
         if K.kind[c] != 0 or (K.closed[c] == 0 and not strikes(K, c)):
             continue
         if K.closing[c] > 0:
             loss = loss_in(K, c)
             part = abs(loss) / own if own > 0.0 else 1.0 / count
-            log_event(K, LOG_CLOSED, c, loss + part * others, True)
+            log_event(K, LOG_CLOSED, c, loss + part * others, told)
+            told = OWN_IMPULSE
             if K.active[c] == 1:
                 capture(K, c)
                 K.closed[c] = 1
@@ -96,15 +99,10 @@ def close_by_impact(K: Any, fastest: float) -> int:
         elif K.active[c] == 0:
             K.closed[c] = 0
             K.armed[c] = 1
-            log_event(K, LOG_OPENED, c, 0.0, False)
+            log_event(K, LOG_OPENED, c, 0.0, NO_IMPULSE)
     if not slow:
         release_for(K, 1)
     return 0
-
-
-def strikes(K: Any, c: int) -> bool:
-    """Whether a contact closes in the impact just found; one that only touches takes no impulse."""
-    return bool(K.kind[c] == 0 and K.closing[c] > 0 and (K.closing[c] == 1 or K.impulse[K.normal[c]] != 0.0))
 
 
 def loss_of(K: Any, row: int) -> float:
@@ -185,7 +183,7 @@ def switch(K: Any) -> int:
                     hard = True
                 else:
                     K.closed[c] = 1
-                    log_event(K, LOG_CLOSED, c, 0.0, False)
+                    log_event(K, LOG_CLOSED, c, 0.0, NO_IMPULSE)
         if hard:
             status = close_by_impact(K, fastest)
             if status != 0:
@@ -196,7 +194,7 @@ def switch(K: Any) -> int:
         capture_approach(K)
     elif kind == PRESS:
         K.closed[index] = 1
-        log_event(K, LOG_CLOSED, index, 0.0, False)
+        log_event(K, LOG_CLOSED, index, 0.0, NO_IMPULSE)
     elif kind == STICK:
         K.loose[index] = 2
         K.sticks[index] = 0
@@ -210,7 +208,7 @@ def switch(K: Any) -> int:
     elif kind != CROSS and kind != WATCH:
         K.closed[index] = 0
         K.armed[index] = 2 if kind == OPEN_FORCE else 1
-        log_event(K, LOG_OPENED, index, 0.0, False)
+        log_event(K, LOG_OPENED, index, 0.0, NO_IMPULSE)
     if kind != WATCH:
         mark_touching(K)
     if kind == OPEN_PULL:  # its force has passed zero: the acceleration there is round-off and decides nothing

@@ -180,4 +180,5 @@ class Grid:
             rows.closed[low],
             rows.anchors[low],
             rows.source[low],
+            rows.phase[low],
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
@@ -31,7 +31,11 @@ class EventRecord:
     kind : 'closed' or 'opened' (a contact), 'stuck' or 'slipped' (dry friction comes to rest; begins to slide or turns
         around), 'event' (a user's own, or a fall)
     name : of the contact, joint or event
-    impulse : impulses of the contact's rows at the instant, normal first, pushing ≥ 0 [N s or N m s]
+    impulse : impulses of the contact's own rows at the instant, normal first, pushing ≥ 0 [N s or N m s]; zeros where
+        it closed or opened without one, empty for penalty contacts, frictions and a user's event
+    impulses : the same by name, and those of the contacts (and dry frictions in joints) that took part in its impact
+        without closing in it; where several contacts close in one impact, the first event has these. Each impulse of
+        a run is thus in one event
     energy_loss : kinetic energy that a contact took as it closed, −½ Σ Λ (γ⁻ + γ⁺) over its rows, and its part of what
         friction in joints and contacts closed before took in the same impact, in the ratio of these [J]
     row : the stored row just after it (the right side); the row before is the left side
@@ -43,11 +47,15 @@ class EventRecord:
     impulse: Vector = field(default_factory=_nothing)
     energy_loss: float = 0.0
     row: int = 0
+    impulses: Mapping[str, Vector] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         extra = ""
-        if self.impulse.size:
+        if self.impulse.any():
             extra += f", impulse {', '.join(f'{value:.4g}' for value in self.impulse)}"
+        for name, impulse in self.impulses.items():
+            if name != self.name:
+                extra += f", impulse of {name!r} {', '.join(f'{value:.4g}' for value in impulse)}"
         if self.energy_loss:
             extra += f", energy loss {self.energy_loss:.4g} J"
         return f"<{self.time:.6f} s: {self.name!r} {self.kind}{extra}>"
@@ -58,7 +66,8 @@ class Rows:
     """States of the mechanism, one a row, from which any named quantity can be evaluated.
 
     time (R,) [s]; q (R, n_q), v and a (R, n_v), z and s (R, n_z); lam (R, n_rows), zero where a row is open;
-    closed (R, n_contacts); anchors (R, n_anchors); source (R,): the stored row whose parameters hold here
+    closed (R, n_contacts); anchors (R, n_anchors); source (R,): the stored row whose parameters hold here;
+    phase (R, n_frictions): 2 where dry friction sticks, ±1 where it slides that way, 0 where it is off
     """
 
     time: Vector
@@ -71,6 +80,7 @@ class Rows:
     closed: NDArray[np.uint8]
     anchors: Matrix
     source: NDArray[np.intp]
+    phase: NDArray[np.int8]
 
     def __len__(self) -> int:
         return len(self.time)
@@ -99,6 +109,7 @@ class Record:
     settings : how the run was made: integrator, dt, until, contact, locate, versions
     parameter_changes : (row, parameters) pairs: values that hold from that row on
     start : the `State` it began with, whose closed contacts hold its anchors; None in a run read from a file
+    phase : see `Rows`; by default for a mechanism without dry friction
     """
 
     equations: Equations | None
@@ -121,10 +132,13 @@ class Record:
     settings: dict[str, Any] = field(default_factory=dict)
     parameter_changes: Sequence[tuple[int, Vector]] = ()
     start: Any = None
+    phase: NDArray[np.int8] = field(default_factory=lambda: np.zeros((0, 0), dtype=np.int8))
 
     def __post_init__(self) -> None:
         count = len(self.time)
-        for name in ("q", "v", "z", "a", "s", "lam", "closed"):
+        if not self.phase.size:
+            object.__setattr__(self, "phase", np.zeros((count, self.phase.shape[1]), dtype=np.int8))
+        for name in ("q", "v", "z", "a", "s", "lam", "closed", "phase"):
             shape = getattr(self, name).shape
             if len(shape) != 2 or shape[0] != count:
                 raise ValueError(f"a record of {count} rows needs {name} of shape ({count}, n), got {shape}")
@@ -133,7 +147,7 @@ class Record:
         """The stored states, with the values that closed contacts hold."""
         return Rows(
             self.time, self.q, self.v, self.z, self.a, self.s, self.lam, self.closed, anchors,
-            np.arange(len(self.time), dtype=np.intp),
+            np.arange(len(self.time), dtype=np.intp), self.phase,
         )  # fmt: skip
 
     def parameters_at(self, source: NDArray[np.intp]) -> Vector | Matrix:

@@ -34,7 +34,7 @@ SUFFIX = ".mbd.npz"
 COMPRESSION = 1
 """Level of zlib: higher levels take five times as long for a few percent [-]."""
 
-ROWS = ("time", "q", "v", "z", "a", "s", "lam", "closed", "parameters")
+ROWS = ("time", "q", "v", "z", "a", "s", "lam", "closed", "phase", "parameters")
 
 Arrays = dict[str, NDArray[Any]]
 
@@ -105,8 +105,15 @@ def write(target: Path, arrays: Arrays) -> None:
 def _event(event: EventRecord) -> dict[str, Any]:
     return {
         "time": event.time, "kind": event.kind, "name": event.name, "impulse": event.impulse,
-        "energy_loss": event.energy_loss, "row": event.row,
+        "energy_loss": event.energy_loss, "row": event.row, "impulses": dict(event.impulses),
     }  # fmt: skip
+
+
+def _read_event(event: Mapping[str, Any]) -> EventRecord:
+    """An event; older files have its own impulse only."""
+    own = np.asarray(event["impulse"], dtype=np.float64)
+    told = {name: np.asarray(values, dtype=np.float64) for name, values in event.get("impulses", {}).items()}
+    return EventRecord(**{**event, "impulse": own, "impulses": told})
 
 
 def _columns(
@@ -193,13 +200,11 @@ def _record(arrays: Arrays, meta: Mapping[str, Any]) -> Record:
 
     failure = meta["failure"]  # older files have its sentence only
     failure = unpacked(failure, arrays) if isinstance(failure, dict) else failure
-    events = tuple(
-        EventRecord(**{**event, "impulse": np.asarray(event["impulse"], dtype=np.float64)}) for event in meta["events"]
-    )
+    events = tuple(_read_event(event) for event in meta["events"])
     changes = tuple((row, arrays[f"change {number}"]) for number, row in enumerate(meta["changes"]))
     return Record(
         equations=None, parameter_names=tuple(meta["parameter_names"]), events=events, stats=meta["stats"],
         success=meta["success"], message=meta["message"], failure=failure,
         final=unpack(meta["final"], arrays), settings=meta["settings"], parameter_changes=changes,
-        **{name: arrays[name] for name in ROWS},
+        **{name: arrays[name] for name in ROWS if name in arrays},  # older files do not tell what frictions do
     )  # fmt: skip

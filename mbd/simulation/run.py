@@ -257,16 +257,18 @@ class Run:
 
     def _collect_events(self, logged: int) -> None:
         """Events from the lines of the log."""
-        manager, width, nothing = self.manager, self.values["event_width"], np.zeros(0)
+        manager, width = self.manager, self.values["event_width"]
         contacts, frictions = manager.names, [friction.name for friction in manager.frictions]
         guards = [guard.name for guard in manager.guards]
         known = {"event": guards, "stuck": frictions, "slipped": frictions}
-        for line in self.values["log"][: logged * width].reshape(logged, width).tolist():
-            kind, index, impulse = KINDS[int(line[1])], int(line[2]), nothing
-            if kind == "closed":
-                impulse = np.array([line[5 + k] for k in manager.contacts[index].rows])
-            name = known.get(kind, contacts)[index]
-            self.events.append(EventRecord(line[0], kind, name, impulse, line[3], self.stored + int(line[4])))
+        for line in self.values["log"][: logged * width].reshape(logged, width):
+            kind, index = KINDS[int(line[1])], int(line[2])
+            name, told, impulse = known.get(kind, contacts)[index], {}, np.zeros(0)
+            if kind in ("closed", "opened"):
+                told = _impulses(manager, index, line[5:])
+                impulse = told[name]
+            row = self.stored + int(line[4])
+            self.events.append(EventRecord(float(line[0]), kind, name, impulse, float(line[3]), row, told))
 
     def _react(self, happened: Sequence[EventRecord]) -> str:
         """Resets, controllers and endings of the events just logged; the name of the event that ends the run."""
@@ -343,6 +345,19 @@ def _steps_at_once(stepper: Stepper) -> int:
     layout = stepper.mechanism.layout
     size = max((layout.n + layout.n_rows) // USUAL_SIZE, 1)
     return max(STEPS_AT_ONCE[stepper.compiled] // (size * size), STEPS_AT_ONCE[False])
+
+
+def _impulses(manager: ActiveSetManager, own: int, line: Vector) -> dict[str, Vector]:
+    """Impulses of contacts, and of dry frictions in joints, by name: that of contact `own`, and others if any."""
+    found = {manager.names[own]: line[list(manager.contacts[own].rows)]}
+    for name, contact in zip(manager.names, manager.contacts, strict=True):
+        rows = list(contact.rows)
+        if name != manager.names[own] and line[rows].any():
+            found[name] = line[rows]
+    for friction in manager.frictions:
+        if friction.contact < 0 and line[friction.row] != 0.0:
+            found[friction.name] = line[[friction.row]]
+    return found
 
 
 def _places(force: Force) -> str:

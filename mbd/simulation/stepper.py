@@ -131,7 +131,7 @@ class Stepper:
             stabilized=int(self.stabilized), max_iterations=MAX_ITERATIONS,
             max_switches=20 + 4 * n_contacts,
             linear=int(options.get("locate") == "linear"),
-            width=1 + layout.n_q + 2 * layout.n + layout.n_rows + n_contacts,
+            width=1 + layout.n_q + 2 * layout.n + layout.n_rows + n_contacts + layout.n_frictions,
             capacity=int(options["capacity"]), stride=int(options.get("store", 1)), event_width=5 + layout.n_rows,
             chunk=1, hooks=0,
             rest_speed=float(options.get("rest_speed", 1e-6)), dt=dt, until=0.0, end=float(options.get("end", 0.0)),

@@ -23,12 +23,14 @@ def record_of(run: Run, table: Matrix, events: Sequence[EventRecord] = ()) -> Re
     n_q, n_v, n, rows = v["n_q"], v["n_v"], v["n"], v["n_rows"]
     at_v, at_a = 1 + n_q, 1 + n_q + n
     at_lam, at_closed = at_a + n, at_a + n + rows
+    at_friction = at_closed + v["n_contacts"]
     return Record(
         equations=equations, parameters=run.first_parameters,
         parameter_names=[parameter.name for parameter in equations.parameters], time=table[:, 0], q=table[:, 1:at_v],
         v=table[:, at_v : at_v + n_v], z=table[:, at_v + n_v : at_a], a=table[:, at_a : at_a + n_v],
         s=table[:, at_a + n_v : at_lam], lam=table[:, at_lam:at_closed],
-        closed=table[:, at_closed:].astype(np.uint8), events=events, settings=run.settings,
+        closed=table[:, at_closed:at_friction].astype(np.uint8), phase=table[:, at_friction:].astype(np.int8),
+        events=events, settings=run.settings,
         parameter_changes=run.parameter_changes, start=run.start,
     )  # fmt: skip
 
