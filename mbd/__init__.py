@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from mbd.analysis.sweep import Sweep as Sweep, sweep as sweep
     from mbd.assembly import assemble as assemble
     from mbd.bodies import (
+        Domain as Domain,
         Link as Link,
         PointMass as PointMass,
         RigidBody as RigidBody,
@@ -129,7 +130,7 @@ _HOMES = {
     "mbd.analysis.numerical": "Criteria criteria",
     "mbd.analysis.sweep": "Sweep sweep",
     "mbd.assembly": "assemble",
-    "mbd.bodies": "Link PointMass RigidBody box cylinder disk rod segment sphere",
+    "mbd.bodies": "Domain Link PointMass RigidBody box cylinder disk rod segment sphere",
     "mbd.constraints": "Bilateral Controller Event KnifeEdge Nonholonomic Penalty PenaltyParameters Plane "
     "Rolling Unilateral When distance extension flexion height measure penalty_parameters separation touchdown",
     "mbd.equations.lagrangian": "Coordinate Lagrangian",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -10,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
-from mbd.bodies.values import is_number
+from mbd.bodies.values import named_number_faults
 from mbd.closure import Held
 from mbd.compile.mechanism import Mechanism, rate_names
 from mbd.compile.mechanisms import mechanism_of
@@ -23,24 +22,12 @@ from mbd.not_finite import first_cause, tape_inputs
 from mbd.posture import Posture, capture, close_positions, close_velocities, position_rows
 from mbd.state import State
 
-__all__ = ["assemble", "named_numbers", "undetermined"]
+__all__ = ["assemble", "undetermined"]
 
 BELOW = 1e-6
 """Depth [m, rad] below which an open contact is told to start inside the ground."""
 LIFTED = 1e-8
 """Height [m, rad] above which an open contact is armed from the start."""
-
-
-def named_numbers(values: Any, what: str) -> list[str]:
-    """What is wrong with numbers by name."""
-    if not isinstance(values, Mapping | None):
-        example = "left thigh.mass" if what == "parameters" else "left hip.angle"
-        return [f"{what} must map names to numbers, such as {{{example!r}: 0.2}}, not {values!r}"]
-    return [
-        f"{what}: the value of {name!r} must be a finite number, not {value!r}"
-        for name, value in (values or {}).items()
-        if not isinstance(name, str) or not is_number(value) or not math.isfinite(value)
-    ]
 
 
 def _names(value: Any, what: str) -> tuple[tuple[str, ...], list[str]]:
@@ -95,7 +82,7 @@ def assemble(
         if the model itself has faults.
     """
     wanted = {"position": position, "velocity": velocity, "parameters": parameters}
-    faults = [fault for what, values in wanted.items() for fault in named_numbers(values, what)]
+    faults = [fault for what, values in wanted.items() for fault in named_number_faults(values, what)]
     (opened, more), (closed, others) = _names(open, "open"), _names(closed, "closed")
     if faults + more + others:
         raise ModelError(faults + more + others)

@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import Any, TypeVar
 
 from mbd.bodies.base import Body, Frame
+from mbd.bodies.domains import ParameterCheck
 from mbd.bodies.ground import Ground
 from mbd.bodies.values import Vector3, names_of, number, triple
 from mbd.constraints.base import Constraint, VelocityConstraint
@@ -217,6 +218,12 @@ class Model:
         from mbd.topology.check import faults
 
         return faults(self)
+
+    def parameter_check(self) -> ParameterCheck:
+        """The same judgement of values that differ from those of the description."""
+        from mbd.topology.check import parameter_check
+
+        return parameter_check(self)
 
     def require_valid(self) -> None:
         """Raise a `ModelError` with every fault, if there is one."""

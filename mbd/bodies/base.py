@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from mbd.bodies.algebra import IDENTITY, constant_rotation, product
+from mbd.bodies.domains import Domain, Parameterized, at_least_zero
 from mbd.bodies.mass import MassProperties
 from mbd.bodies.values import Vector3, number, triple, unit_vector
 from mbd.errors import ModelError, nearest
@@ -20,13 +21,11 @@ Parameter = Callable[[str], Scalar]
 """Gives the value of a field of a body, a number or a run-time input."""
 
 
-class Body(ABC):
+class Body(Parameterized, ABC):
     """Something that moves as a whole, with named frames; a body's axes lie in its `origin` frame.
 
     A new kind of body is a frozen dataclass with a `name`, its `fields`, its `landmarks` and its mass.
     """
-
-    name: str
 
     @abstractmethod
     def fields(self) -> dict[str, float]:
@@ -40,9 +39,18 @@ class Body(ABC):
     def mass_properties(self, scope: Scope) -> MassProperties:
         """Mass, center and inertia as run-time scalars."""
 
-    def faults(self) -> list[str]:
-        """What is physically impossible about it, one sentence each."""
-        return []
+    def domains(self) -> dict[str, Domain]:
+        """A mass ≥ 0; any other field may have any finite value."""
+        return (
+            {f"{self.name}.mass": at_least_zero("is negative; give a mass ≥ 0", "kg")}
+            if "mass" in self.fields()
+            else {}
+        )
+
+    @property
+    def known_as(self) -> str:
+        """ "body 'left thigh'"."""
+        return f"body '{self.name}'"
 
     def parameter(self, scope: Scope) -> Parameter:
         """The run-time inputs of its fields."""

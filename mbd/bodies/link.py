@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from mbd.bodies.algebra import ZERO
 from mbd.bodies.base import Body, Frame, Parameter
+from mbd.bodies.domains import Domain, at_least_zero
 from mbd.bodies.mass import (
     Inertia,
     MassProperties,
@@ -14,7 +16,6 @@ from mbd.bodies.mass import (
     inertia_fields,
     inertia_matrix,
     inertia_of,
-    mass_faults,
 )
 from mbd.bodies.values import name_of, number
 from mbd.scope import Scope, Triple
@@ -82,9 +83,11 @@ class Link(Body):
             parameter("mass"), self.landmarks(parameter)["center"], inertia_matrix(self.inertia, parameter)
         )
 
-    def faults(self) -> list[str]:
+    def domains(self) -> dict[str, Domain]:
+        """Mass and length ≥ 0."""
+        length = at_least_zero("is negative; turn the joint's frame instead", "m")
+        return {**super().domains(), f"{self.name}.length": length}
+
+    def value_faults(self, values: Mapping[str, float]) -> list[str]:
         """A negative mass or length, an impossible inertia."""
-        faults = mass_faults(self.name, self.mass) + inertia_faults(self.name, self.inertia, self.mass)
-        if self.length < 0.0:
-            faults.append(f"body '{self.name}': length {self.length:g} m is negative; turn the joint's frame instead")
-        return faults
+        return super().value_faults(values) + inertia_faults(self.name, self.inertia, values)

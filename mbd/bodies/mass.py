@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
@@ -14,9 +14,7 @@ from mbd.errors import ModelError
 from mbd.scope import Rotation, Triple
 from mbd.tape.node import Scalar
 
-__all__ = [
-    "Inertia", "MassProperties", "inertia_faults", "inertia_fields", "inertia_matrix", "inertia_of", "mass_faults",
-]  # fmt: skip
+__all__ = ["Inertia", "MassProperties", "inertia_faults", "inertia_fields", "inertia_matrix", "inertia_of"]
 
 Inertia: TypeAlias = float | tuple[float, ...]
 """About the center of mass in body axes [kg m²]: a number (about z), (Ixx, Iyy, Izz), or these and (Ixy, Ixz, Iyz)."""
@@ -39,7 +37,7 @@ def inertia_of(value: Any, what: str) -> Inertia:
     >>> inertia_of((1, 2, 3), "inertia")
     (1.0, 2.0, 3.0)
     """
-    if np.ndim(value) == 0:
+    if not isinstance(value, Iterable) or isinstance(value, str | bytes):
         return number(value, what)
     result = numbers(value, what)
     if len(result) not in (3, 6):
@@ -67,13 +65,18 @@ def inertia_matrix(inertia: Inertia, parameter: Callable[[str], Scalar]) -> Rota
     return ((I["xx"], I["xy"], I["xz"]), (I["xy"], I["yy"], I["yz"]), (I["xz"], I["yz"], I["zz"]))
 
 
-def inertia_faults(owner: str, inertia: Inertia, mass: float) -> list[str]:
+def inertia_faults(owner: str, inertia: Inertia, values: Mapping[str, float]) -> list[str]:
     """What no body can have: a negative moment, or principal moments that break the triangle inequality.
 
     An inertia with exactly Ixx = Iyy = 0 is planar, meant for motion in x–y, and only its Izz is judged.
+
+    Parameters
+    ----------
+    owner : name of the body
+    inertia : as described, which says what parameters there are
+    values : of the body's parameters by full name
     """
-    values = inertia_fields(inertia)
-    matrix = np.array(inertia_matrix(inertia, values.__getitem__), dtype=float)
+    matrix = np.array(inertia_matrix(inertia, lambda field: values[f"{owner}.{field}"]), dtype=float)
     largest = float(np.abs(matrix).max())
     if matrix[0, 0] == 0.0 and matrix[1, 1] == 0.0 and not matrix[[0, 0, 1], [1, 2, 2]].any():
         moments = np.array([matrix[2, 2]])
@@ -91,11 +94,6 @@ def inertia_faults(owner: str, inertia: Inertia, mass: float) -> list[str]:
             f"body '{owner}': principal moments {a:.6g}, {b:.6g}, {c:.6g} kg m² break the triangle inequality "
             f"({c:.6g} > {a:.6g} + {b:.6g}); give moments about the center, or a single number for planar motion"
         )
-    if mass == 0.0 and largest > 0.0:
+    if values[f"{owner}.mass"] == 0.0 and largest > 0.0:
         faults.append(f"body '{owner}': an inertia without a mass; give the mass, or inertia 0")
     return faults
-
-
-def mass_faults(owner: str, mass: float) -> list[str]:
-    """The sentence about a negative mass."""
-    return [] if mass >= 0.0 else [f"body '{owner}': mass {mass:g} kg is negative; give a mass ≥ 0"]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from mbd.bodies.algebra import ZERO
 from mbd.bodies.base import Body, Parameter
-from mbd.bodies.mass import MassProperties, mass_faults
+from mbd.bodies.mass import MassProperties
 from mbd.bodies.values import name_of, number
 from mbd.scope import Scope, Triple
 
@@ -41,7 +41,3 @@ class PointMass(Body):
     def mass_properties(self, scope: Scope) -> MassProperties:
         """m at the origin."""
         return MassProperties(self.parameter(scope)("mass"))
-
-    def faults(self) -> list[str]:
-        """A negative mass."""
-        return mass_faults(self.name, self.mass)

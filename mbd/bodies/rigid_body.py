@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +15,6 @@ from mbd.bodies.mass import (
     inertia_fields,
     inertia_matrix,
     inertia_of,
-    mass_faults,
 )
 from mbd.bodies.values import Vector3, name_of, number, triple
 from mbd.scope import Scope, Triple
@@ -63,6 +63,6 @@ class RigidBody(Body):
             parameter("mass"), self.landmarks(parameter)["center"], inertia_matrix(self.inertia, parameter)
         )
 
-    def faults(self) -> list[str]:
+    def value_faults(self, values: Mapping[str, float]) -> list[str]:
         """A negative mass, an impossible inertia."""
-        return mass_faults(self.name, self.mass) + inertia_faults(self.name, self.inertia, self.mass)
+        return super().value_faults(values) + inertia_faults(self.name, self.inertia, values)

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any, TypeAlias
 
 import numpy as np
 
 from mbd.errors import ModelError
 
-__all__ = ["Vector3", "flag", "is_number", "name_of", "names_of", "number", "numbers", "triple", "unit_vector"]
+__all__ = [
+    "Vector3", "flag", "is_finite_number", "is_number", "name_of", "named_number_faults", "names_of", "number",
+    "numbers", "triple", "unit_vector",
+]  # fmt: skip
 
 Vector3: TypeAlias = tuple[float, float, float]
 """Three plain numbers, known when the model is described."""
@@ -48,7 +51,7 @@ def flag(value: Any, what: str) -> bool:
 
 def is_number(value: Any) -> bool:
     """Whether a value is one real number, finite or not."""
-    if isinstance(value, bool | str | type):
+    if isinstance(value, bool | np.bool_ | str | type):
         return False
     return hasattr(value, "__float__") and not getattr(value, "ndim", 0) and not getattr(value, "free_symbols", ())
 
@@ -59,15 +62,47 @@ def number(value: Any, what: str) -> float:
     >>> number(2, "mass of 'rod'")
     2.0
     """
-    if isinstance(value, bool | str | bytes):
-        raise ModelError(f"{what} must be a number, got {value!r}")
+    if not is_number(value):
+        raise ModelError(f"{what} must be a number, got {_shown(value)}")
     try:
         result = float(value)
     except (TypeError, ValueError):
-        raise ModelError(f"{what} must be a number, got {value!r}") from None
+        raise ModelError(f"{what} must be a number, got {_shown(value)}") from None
+    except OverflowError:
+        raise ModelError(f"{what} must be below 1.8e308, got {_shown(value)}") from None
     if not math.isfinite(result):
-        raise ModelError(f"{what} must be finite, got {value!r}")
+        raise ModelError(f"{what} must be finite, got {_shown(value)}")
     return result
+
+
+def _shown(value: Any) -> str:
+    """A value for a message; an integer of thousands of digits is not written out."""
+    if isinstance(value, int) and value.bit_length() > 1024:
+        return f"an integer of {value.bit_length()} bits"
+    return repr(value)
+
+
+def named_number_faults(values: Any, what: str) -> list[str]:
+    """What is wrong with numbers by name, such as ``parameters={'left thigh.mass': 1.0}``."""
+    if not isinstance(values, Mapping | None):
+        example = "left thigh.mass" if what == "parameters" else "left hip.angle"
+        return [f"{what} must map names to numbers, such as {{{example!r}: 0.2}}, not {values!r}"]
+    found = []
+    for name, value in (values or {}).items():
+        if not isinstance(name, str):
+            found.append(f"{what}: {name!r} is no name; give names such as 'left hip.angle'")
+        elif not is_finite_number(value):
+            found.append(f"{what}: the value of {name!r} must be a finite number, not {_shown(value)}")
+    return found
+
+
+def is_finite_number(value: Any) -> bool:
+    """Whether a value is one finite real number."""
+    try:
+        number(value, "")
+    except ModelError:
+        return False
+    return True
 
 
 def numbers(values: Any, what: str) -> tuple[float, ...]:

@@ -39,11 +39,19 @@ def mechanism_of(model: Any, backend: str = "auto", changed: Mapping[str, float]
     backend : 'auto', 'llvm' (machine code) or 'python' (the plain twin)
     changed : parameter values that are wanted; an exact 0 or ±1 of the model among them, which is folded into the
         equations, is made a run-time input (one more derivation, noted in `Mechanism.notes`)
+
+    Raises
+    ------
+    ModelError
+        for values that the words of the model do not allow, as if it had been described with them.
     """
     if not isinstance(model, Model | Lagrangian):
         raise ModelError(f"a Model or a Lagrangian is expected, not {model!r}")
     if not isinstance(backend, str):
         raise ModelError(f"backend must be 'auto', 'llvm' or 'python', not {backend!r}")
+    faults = model.parameter_check().faults(changed) if changed else []
+    if faults:
+        raise ModelError(faults)
     mechanism = _mechanism(model, backend, frozenset())
     if not changed and not getattr(model, "controllers", ()):
         return mechanism

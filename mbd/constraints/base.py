@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 
+from mbd.bodies.domains import Parameterized
 from mbd.forces.quantities import Mention
 from mbd.scope import Scope
 from mbd.tape.node import Scalar
@@ -64,10 +65,8 @@ class Measure(ABC):
         return []
 
 
-class Constraint(ABC):
+class Constraint(Parameterized, ABC):
     """A law on a measure; a new constraint is a frozen dataclass with a `name`."""
-
-    name: str
 
     @property
     @abstractmethod
@@ -83,17 +82,9 @@ class Constraint(ABC):
         """Names of the other constraints it refers to."""
         return ()
 
-    def parameters(self) -> dict[str, float]:
-        """Run-time parameters by full name."""
-        return {}
-
     def instants(self) -> tuple[float, ...]:
         """Times at which its sampled signals have a kink [s]."""
         return ()
-
-    def faults(self) -> list[str]:
-        """What is physically impossible about it, one sentence each."""
-        return []
 
 
 class VelocityConstraint(Constraint):

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from mbd.bodies.domains import Domain, at_least_zero, positive
 from mbd.bodies.values import name_of, number
 from mbd.constraints.base import Constraint, Measure
-from mbd.constraints.restitution import KELVIN_VOIGT, chi_for, damping_ratio_for, law_of, wanted
+from mbd.constraints.restitution import KELVIN_VOIGT, LEAST_RESTITUTION, chi_for, damping_ratio_for, law_of, wanted
 from mbd.constraints.unilateral import measure_of
 from mbd.errors import ModelError
 from mbd.forces.quantities import Mention
@@ -164,13 +165,20 @@ class Penalty(Constraint):
         loss = {"damping": self.damper} if chi is None else {"slowest": SLOWEST, "chi": chi}
         return {f"{self.name}.{field}": value for field, value in {"stiffness": self.stiffness, **loss}.items()}
 
+    def domains(self) -> dict[str, Domain]:
+        """A stiffness > 0, damping ≥ 0; χ from that of no loss to that of the least restitution."""
+        domains = {"stiffness": positive("does not push; give a positive one")}
+        if self.chi is None:
+            domains["damping"] = at_least_zero("would feed energy in; give a value ≥ 0")
+        else:
+            largest = chi_for(LEAST_RESTITUTION, law_of(self.law, self.name))
+            said = f"is not between 0 and {largest:g}, which belong to the restitutions 1 and {LEAST_RESTITUTION:g}"
+            domains |= {"chi": Domain(low=0.0, high=largest, problem=said), "slowest": positive(unit="m/s")}
+        return {f"{self.name}.{field}": domain for field, domain in domains.items()}
+
     def faults(self) -> list[str]:
         """A law that would not push, or would feed energy in."""
-        faults = self.measure.faults(self.name)
-        if self.stiffness <= 0.0:
-            faults.append(f"'{self.name}': stiffness {self.stiffness:g} does not push; give a positive one")
-        if self.damping < 0.0:
-            faults.append(f"'{self.name}': damping {self.damping:g} would feed energy in; give a value ≥ 0")
+        faults = self.measure.faults(self.name) + super().faults()
         if self.exponent < 1.0:
             faults.append(f"'{self.name}': exponent {self.exponent:g} is below 1, endlessly stiff at touch; give n ≥ 1")
         return faults

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from mbd.bodies.algebra import cross, difference, dot, scaled, total
 from mbd.bodies.base import Frame
+from mbd.bodies.domains import Domain, positive
 from mbd.bodies.ground import Ground
 from mbd.bodies.values import name_of, number
 from mbd.constraints.base import VelocityConstraint
@@ -96,11 +97,18 @@ class Rolling(VelocityConstraint):
         """`radius`."""
         return {f"{self.name}.radius": self.radius}
 
+    def domains(self) -> dict[str, Domain]:
+        """A radius > 0."""
+        return {f"{self.name}.radius": positive(unit="m")}
+
+    @property
+    def known_as(self) -> str:
+        """ "Rolling 'wheel'"."""
+        return f"Rolling '{self.name}'"
+
     def faults(self) -> list[str]:
         """A radius that is not positive, a wheel that is the ground, or that rolls on itself."""
-        found = []
-        if self.radius <= 0.0:
-            found.append(f"Rolling '{self.name}': radius {self.radius:g} m is not positive; give a value > 0")
+        found = super().faults()
         if isinstance(self.center.body, Ground):
             found.append(f"Rolling '{self.name}' has its center on the ground; give a frame of the wheel")
         elif self.ground.frame is not None and self.ground.frame.body is self.center.body:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from mbd.bodies.domains import Domain
 from mbd.bodies.values import name_of, number
 from mbd.constraints.base import Constraint, Measure
 from mbd.constraints.rules import When, condition_of, releases_of
@@ -75,7 +76,11 @@ class Unilateral(Constraint):
 
     def parameters(self) -> dict[str, float]:
         """'<name>.mu' where it slides with friction."""
-        return {f"{self.name}.mu": self.friction} if self.friction is not None and self.friction > 0.0 else {}
+        return {f"{self.name}.mu": self.friction} if self.friction else {}
+
+    def domains(self) -> dict[str, Domain]:
+        """μ ≥ 0."""
+        return {f"{self.name}.mu": Domain(low=0.0, problem="is negative; give 0, or None to stick", called="friction")}
 
     @property
     def others(self) -> tuple[str, ...]:
@@ -90,11 +95,9 @@ class Unilateral(Constraint):
 
     def faults(self) -> list[str]:
         """An impossible restitution or friction, a rule that names itself."""
-        faults = self.measure.faults(self.name)
+        faults = self.measure.faults(self.name) + super().faults()
         if not 0.0 <= self.restitution <= 1.0:
             faults.append(f"'{self.name}': restitution {self.restitution:g} is not between 0 and 1")
-        if self.friction is not None and self.friction < 0.0:
-            faults.append(f"'{self.name}': friction {self.friction:g} is negative; give 0, or None to stick")
         if self.slides and not self.measure.has_tangents:
             faults.append(
                 f"'{self.name}': friction {self.friction:g} on a {self.measure.title}, which has no direction to slide "

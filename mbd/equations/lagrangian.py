@@ -8,7 +8,8 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
 
-from mbd.bodies.values import is_number, names_of, number
+from mbd.bodies.domains import ParameterCheck
+from mbd.bodies.values import named_number_faults, names_of, number
 from mbd.equations import equations as records
 from mbd.equations.equations import Effect, Equations, Row
 from mbd.equations.inputs import Inputs
@@ -115,6 +116,10 @@ class Lagrangian:
         faults = _name_faults(self)
         return faults or _Lowering(self).faults
 
+    def parameter_check(self) -> ParameterCheck:
+        """The judgement of values that differ from those of the description; any finite one may be given."""
+        return ParameterCheck((), self.parameters)
+
     def equations_of_motion(self) -> Equations:
         """The same equations that a model of bodies gives; faults are raised together as a `ModelError`."""
         faults = _name_faults(self)
@@ -191,11 +196,7 @@ def _check_shapes(system: Lagrangian) -> None:
         if not isinstance(value, Mapping):
             faults.append(f"{field_name} must be a mapping from names, such as {{'theta': …}}, got {value!r}")
     if isinstance(system.parameters, Mapping):
-        faults += [
-            f"parameter {_name(key)!r} must be a number, got {value!r}"
-            for key, value in system.parameters.items()
-            if not is_number(value)
-        ]
+        faults += named_number_faults({_name(key): value for key, value in system.parameters.items()}, "parameters")
     if isinstance(system.constraints, str) or not isinstance(system.constraints, Iterable):
         faults.append(f"constraints must be a mapping {{name: h}} or a list of expressions, got {system.constraints!r}")
     if faults:
@@ -220,11 +221,6 @@ def _name_faults(system: Lagrangian) -> list[str]:
         nearest(name, system.parameters, "parameter", "There are")
         for name in system.tunable
         if name not in system.parameters
-    ]
-    faults += [
-        f"parameter {name!r} is {value}, which is not a finite number"
-        for name, value in system.parameters.items()
-        if value != value or value in (float("inf"), float("-inf"))
     ]
     return faults
 

@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 from mbd.bodies.base import Frame
+from mbd.bodies.domains import Parameterized
 from mbd.errors import ModelError
 from mbd.forces.quantities import Mention
 from mbd.joints.base import Joint
@@ -34,10 +35,11 @@ class Action:
     rates: tuple[tuple[Node, Scalar], ...] = ()
 
 
-class Force(ABC):
-    """A cause of motion besides joints and constraints; a new force is a frozen dataclass with a `name`."""
+class Force(Parameterized, ABC):
+    """A cause of motion besides joints and constraints; a new force is a frozen dataclass with a `name`.
 
-    name: str
+    `domains` may say what its parameters may be.
+    """
 
     @abstractmethod
     def act(self, scope: Scope) -> Action:
@@ -64,10 +66,6 @@ class Force(ABC):
     def instants(self) -> tuple[float, ...]:
         """Times at which its sampled signals have a kink [s]."""
         return ()
-
-    def faults(self) -> list[str]:
-        """What is physically impossible about it, one sentence each."""
-        return []
 
 
 def frame_of(value: object, what: str) -> Frame:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -60,6 +61,10 @@ class Damper(Force):
     def parameters(self) -> dict[str, float]:
         """Those of its loss: 'name.coefficient', …"""
         return self.law.parameters(self.name)
+
+    def value_faults(self, values: Mapping[str, float]) -> list[str]:
+        """Those of its loss."""
+        return self.law.value_faults(self.name, values)
 
     def faults(self) -> list[str]:
         """Those of its loss, ends that are one."""

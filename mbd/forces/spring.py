@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from mbd.bodies.algebra import difference, dot, norm
 from mbd.bodies.base import Frame
+from mbd.bodies.domains import Domain, at_least_zero
 from mbd.bodies.values import name_of, number
 from mbd.forces.base import Action, Force, frame_of
 from mbd.forces.quantities import Mention
@@ -54,11 +55,18 @@ class Spring(Force):
         """`stiffness` and `length`."""
         return {f"{self.name}.stiffness": self.stiffness, f"{self.name}.length": self.length}
 
+    def domains(self) -> dict[str, Domain]:
+        """A length ≥ 0."""
+        return {f"{self.name}.length": at_least_zero("is negative; give the unstretched length", "m")}
+
+    @property
+    def known_as(self) -> str:
+        """ "spring 'tendon'"."""
+        return f"spring '{self.name}'"
+
     def faults(self) -> list[str]:
         """A negative length, ends that are one."""
-        faults = []
-        if self.length < 0.0:
-            faults.append(f"spring '{self.name}': length {self.length:g} m is negative; give the unstretched length")
+        faults = super().faults()
         if self.a.body is self.b.body:
             faults.append(f"spring '{self.name}': both ends are on '{self.a.body.name}', so it does nothing")
         return faults

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from mbd.bodies.base import Frame
+from mbd.bodies.domains import Domain, Parameterized, at_least_zero
 from mbd.bodies.values import name_of, number
 from mbd.errors import ModelError, nearest
 from mbd.joints.losses.base import Loss, loss_of
@@ -31,7 +32,7 @@ def row_unit(label: str) -> str:
     return "rad" if label.startswith("turn") else "m"
 
 
-class Joint(ABC):
+class Joint(Parameterized, ABC):
     """A joint between a frame of the parent body and a frame of the child body.
 
     The relative motion is ``child = parent · (R(q), p(q))``. As a tree edge the joint generates its
@@ -42,7 +43,6 @@ class Joint(ABC):
     coordinate, whose linear spring has the energy ``½ k (q − rest)²``. It calls `settle` when it is made.
     """
 
-    name: str
     parent: Frame
     child: Frame
     loss: JointLoss
@@ -140,16 +140,29 @@ class Joint(ABC):
             result |= loss.parameters(owner)
         return result
 
+    def domains(self) -> dict[str, Domain]:
+        """The stiffness of its spring ≥ 0."""
+        return {f"{self.name} spring.stiffness": at_least_zero()} if len(self.labels) == 1 else {}
+
+    @property
+    def known_as(self) -> str:
+        """ "joint 'left knee'"."""
+        return f"joint '{self.name}'"
+
+    def value_faults(self, values: Mapping[str, float]) -> list[str]:
+        """What is wrong with the values of its spring and its losses."""
+        faults = [fault for _, owner, loss in self.losses() for fault in loss.value_faults(owner, values)]
+        return list(dict.fromkeys(faults + super().value_faults(values)))
+
     def faults(self) -> list[str]:
         """What is physically impossible about it, one sentence each."""
         faults = [fault for _, owner, loss in self.losses() for fault in loss.faults(owner)]
+        faults += super().faults()
         for place, owner, loss in self.losses():
             if loss.needs_reaction and self.labels[place].unit != "rad":
                 faults.append(
                     f"'{owner}': friction of a pin on '{self.labels[place].name}', which does not turn; use mbd.Coulomb"
                 )
-        if self.stiffness < 0.0:
-            faults.append(f"joint '{self.name}': stiffness {self.stiffness:g} is negative; give a value ≥ 0")
         if self.parent.body is self.child.body:
             faults.append(
                 f"joint '{self.name}' connects '{self.parent.body.name}' to itself; give a frame of another body"

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from mbd.bodies.algebra import cross, difference, rotate, scaled, transpose
 from mbd.bodies.base import Frame
+from mbd.bodies.domains import Domain
 from mbd.joints.base import Joint, JointLoss, Label
 from mbd.scope import Rotation, Scope, Triple
 from mbd.tape.node import Scalar
@@ -85,6 +86,10 @@ class Reversed(Joint):
     def parameters(self) -> dict[str, float]:
         """As the joint."""
         return self.joint.parameters()
+
+    def domains(self) -> dict[str, Domain]:
+        """As the joint."""
+        return self.joint.domains()
 
     def transform(self, q: Sequence[Scalar], scope: Scope) -> tuple[Rotation, Triple]:
         """The inverse placement."""

@@ -8,6 +8,7 @@ from dataclasses import KW_ONLY, dataclass, field
 
 from mbd.bodies.algebra import axis_rotation, dot, scaled
 from mbd.bodies.base import Frame
+from mbd.bodies.domains import Domain
 from mbd.bodies.values import Vector3, number, unit_vector
 from mbd.errors import ModelError
 from mbd.joints.base import Joint, JointLoss, Label
@@ -17,6 +18,8 @@ from mbd.tape.functions import cos, sin
 from mbd.tape.node import Scalar
 
 __all__ = ["Screw"]
+
+PITCH = Domain(excluded=(0.0,), problem="makes the thread a hinge; use mbd.Revolute", unit="m")
 
 
 @dataclass(frozen=True)
@@ -47,8 +50,9 @@ class Screw(Joint):
     def __post_init__(self) -> None:
         object.__setattr__(self, "axis", unit_vector(self.axis, f"axis of '{self.name}'"))
         object.__setattr__(self, "pitch", number(self.pitch, f"pitch of '{self.name}'"))
-        if self.pitch == 0.0:
-            raise ModelError(f"Screw '{self.name}': a thread of pitch 0 is a hinge; use mbd.Revolute")
+        faults = PITCH.faults(f"Screw '{self.name}'", "pitch", self.pitch)
+        if faults:
+            raise ModelError(faults)
         self.settle()
 
     @property
@@ -64,6 +68,10 @@ class Screw(Joint):
     def parameters(self) -> dict[str, float]:
         """`pitch`, and those of spring and loss."""
         return {f"{self.name}.pitch": self.pitch, **super().parameters()}
+
+    def domains(self) -> dict[str, Domain]:
+        """A pitch that is not 0, and those of the spring."""
+        return {f"{self.name}.pitch": PITCH, **super().domains()}
 
     def advance(self, scope: Scope) -> Scalar:
         """Shift per angle, pitch/2π [m/rad]."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbd.arrays import Vector
-from mbd.bodies.values import is_number
+from mbd.bodies.values import is_finite_number
 from mbd.compile.mechanism import rate_names
 from mbd.compile.python import scalar_function
 from mbd.equations.equations import Guard
@@ -93,7 +93,7 @@ def _reset_values(reset: Any, named: Named) -> dict[str, Any]:
 def _finite_numbers(what: str, values: Mapping[str, Any]) -> dict[str, float]:
     """Values that users' functions gave, by name, as floats."""
     for name, value in values.items():
-        if not (isinstance(value, bool) or is_number(value)) or not np.isfinite(float(value)):
+        if not is_finite_number(value):
             raise SimulationError(f"{what} {name!r} to {value!r}; give a finite number")
     return {name: float(value) for name, value in values.items()}
 
@@ -237,4 +237,4 @@ class Boundaries:
         written = _written(what, answer, controller.writes)
         self.states = {**self.states, controller.name: state}
         if written:
-            run.change_parameters(written)
+            run.change_parameters(written, what)

@@ -25,6 +25,7 @@ from mbd.simulation.failures import attempt, crowded, explanation
 from mbd.simulation.fastest import stability
 from mbd.simulation.memory import carry_on, take_up
 from mbd.simulation.outcome import trajectory_of
+from mbd.simulation.parameters import ParameterJudge
 from mbd.simulation.room import Room
 from mbd.simulation.savepoints import Savepoint, rewind, save
 from mbd.simulation.stepper import Stepper
@@ -100,6 +101,7 @@ class Run:
         self.failure: Failure | None = None
         self.interrupted = False
         self.energy = EnergyWatch()
+        self.judge = ParameterJudge(model, mechanism)
         self.room = Room(self.values["width"])
         self.observers: Sequence[Callable[[float, State], None]] = ()
         self.progress: Callable[[float, float], None] | None = None
@@ -297,12 +299,22 @@ class Run:
         elif before[rate] * guards[rate] <= 0.0:
             self.values["side"][e] *= -1.0
 
-    def change_parameters(self, values: Mapping[str, float]) -> None:
-        """New parameter values from now on; the scheme restarts from them if they differ."""
+    def change_parameters(self, values: Mapping[str, float], what: str) -> None:
+        """New parameter values from now on; the scheme restarts from them if they differ.
+
+        Raises
+        ------
+        SimulationError
+            for values with which the mechanism cannot go on; it keeps those that it has. `what` gives them.
+        """
         equations = self.mechanism.equations
         present = {parameter.name: v for parameter, v in zip(equations.parameters, self.values["params"], strict=False)}
         if all(present.get(name) == value for name, value in values.items()):
             return
+        faults = self.judge.faults(self, values)
+        if faults:
+            given = ", ".join(f"{name!r} to {value:g}" for name, value in values.items())
+            raise SimulationError(f"{what} sets {given}, which cannot be: {'; '.join(faults)}")
         self.stepper.keep_row()
         self.set_parameters({**self.changed, **values})
         self.parameter_changes.append((self.stored + int(self.values["state"][F.STORED]), self.values["params"].copy()))

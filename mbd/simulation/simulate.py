@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from mbd.assembly import named_numbers
+from mbd.bodies.values import named_number_faults
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import CapabilityError, MemoryLimitError, ModelError, SimulationError
@@ -106,7 +106,7 @@ def simulate(
     scheme = integrator if integrator is not None else HHT(alpha=0.05)
     words = {"contact": contact, "impact": impact, "locate": locate, "on_failure": on_failure}
     faults = choices(words) + numbers(scheme, start, dt, tol, until, store, rest_speed)
-    faults += callbacks(observers, progress) + named_numbers(parameters, "parameters")
+    faults += callbacks(observers, progress) + named_number_faults(parameters, "parameters")
     if faults:
         raise ModelError(faults)
     changed = {**start.parameters, **(parameters or {})}

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from mbd.bodies.base import Body, Frame
+from mbd.bodies.domains import ParameterCheck, Parameterized
 from mbd.bodies.ground import Ground
 from mbd.bodies.point_mass import PointMass
 from mbd.errors import ModelError, nearest
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from mbd.constraints.base import Constraint
     from mbd.model import Model
 
-__all__ = ["faults", "quantities"]
+__all__ = ["faults", "parameter_check", "quantities"]
 
 
 def faults(model: Model) -> list[str]:
@@ -30,16 +31,25 @@ def faults(model: Model) -> list[str]:
             f"model '{model.name}' has no joints; connect a body to the ground, such as "
             "model.connect(mbd.Revolute('hip', model.ground.origin, thigh.start))"
         ]
-    words: list[Body | Joint | Force | Constraint] = [*model.bodies.values(), *model.joints]
-    words += [*model.forces, *model.constraints]
-    found = [fault for word in words for fault in word.faults()]
+    words: list[Parameterized] = [*model.bodies.values(), *model.joints, *model.forces, *model.constraints]
+    found = [fault for word in words for fault in (*word.faults(), *word.value_faults(word.parameters()))]
     found += name_faults(model)
     found += reach_faults(model)
     found += mention_faults(model)
     found += rule_faults(model)
     found += choice_faults(model)
-    found += massless_faults(model)
+    found += massless_faults(model, model.parameters)
     return list(dict.fromkeys(found))
+
+
+def parameter_check(model: Model) -> ParameterCheck:
+    """The same judgement of other values of the parameters, without the faults that values cannot change."""
+    bodies = list(model.bodies.values())
+    words: list[Parameterized] = [*bodies, *model.forces]  # before joints, whose missing springs they may be named like
+    words += [*model.constraints, *model.joints]
+    decisive = [name for body in bodies for name in body.parameters()]
+    decisive += [name for frame in model.points() for name in frame.parameters()]
+    return ParameterCheck(words, model.parameters, lambda values: massless_faults(model, values), decisive)
 
 
 def quantities(model: Model) -> list[str]:
@@ -197,11 +207,15 @@ def choice_faults(model: Model) -> list[str]:
 
 
 # what nothing determines ------------------------------------------------------------------------------------------
-def massless_faults(model: Model) -> list[str]:
+def massless_faults(model: Model, values: Mapping[str, float]) -> list[str]:
     """Bodies whose motion nothing determines, as far as the description shows it; assembly finds the others.
 
     A massless body at the end of the tree may move freely; a point mass all of whose joints turn about its own point
     may spin. Bodies and joints that a constraint refers to are left to the assembly.
+
+    Parameters
+    ----------
+    values : of all parameters by full name
     """
     bound = {m.body.name if isinstance(m, Frame) else m.name for m in _constrained(model) if not isinstance(m, str)}
     planar, found = is_planar(model), []
@@ -215,13 +229,13 @@ def massless_faults(model: Model) -> list[str]:
         if isinstance(body, Ground) or body.name in bound or not joints or len(free) < len(joints):
             continue
         one_axis = planar or len(joints) == 1
-        if isinstance(body, PointMass) and one_axis and all(_spins(joint, body) for joint in joints):
+        if isinstance(body, PointMass) and one_axis and all(_spins(joint, body, values) for joint in joints):
             names = ", ".join(f"'{joint.name}'" for joint in joints)
             found.append(
                 f"point mass '{body.name}' may spin about its own point, where {names} holds it, and nothing "
                 "determines that motion; weld it to its neighbour (mbd.Weld), or shift it with mbd.Translation"
             )
-        elif len(joints) == 1 and not any(_weights(body)):
+        elif len(joints) == 1 and not any(_weights(body, values)):
             found.append(
                 f"body '{body.name}' has neither mass nor inertia and '{joints[0].name}' lets it move, so nothing "
                 "determines its motion; give it a mass, or weld it"
@@ -233,11 +247,12 @@ def _constrained(model: Model) -> list[Frame | Joint | str]:
     return [mention for word in model.constraints for mention in word.mentions()]
 
 
-def _spins(joint: Joint, body: Body) -> bool:
+def _spins(joint: Joint, body: Body, values: Mapping[str, float]) -> bool:
     frame = joint.parent if joint.parent.body is body else joint.child
     turns = any(label.unit == "rad" for label in joint.labels) and not isinstance(joint, Screw)
-    return turns and frame.offset == (0.0, 0.0, 0.0)
+    offset = [values.get(f"{frame.full_name}.{axis}", at) for axis, at in zip("xyz", frame.offset, strict=True)]
+    return turns and not any(offset)
 
 
-def _weights(body: Body) -> list[float]:
-    return [value for field, value in body.fields().items() if field.startswith(("mass", "inertia"))]
+def _weights(body: Body, values: Mapping[str, float]) -> list[float]:
+    return [values[f"{body.name}.{field}"] for field in body.fields() if field.startswith(("mass", "inertia"))]

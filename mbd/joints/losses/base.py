@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from mbd.bodies.algebra import derivatives_at
+from mbd.bodies.domains import Domain, at_least_zero
 from mbd.errors import ModelError
 from mbd.scope import Scope
 from mbd.tape.node import Scalar
 
 __all__ = ["DissipationFunction", "Loss", "LossSum", "loss_of"]
+
+DISSIPATES = at_least_zero("is negative, so it would feed energy in; give a value ≥ 0")
+"""The domain of a coefficient of friction or damping."""
 
 
 class Loss(ABC):
@@ -49,13 +53,23 @@ class Loss(ABC):
         """What is left of it without friction that truly sticks; None where that is all of it."""
         return self if type(self).dry is Loss.dry else None
 
-    def faults(self, owner: str) -> list[str]:
-        """Why it would not dissipate, one sentence each; by default, negative fields."""
+    def domains(self) -> dict[str, Domain]:
+        """Domains of its fields: all of them ≥ 0, unless a loss says otherwise."""
+        return dict.fromkeys(self.fields(), DISSIPATES)
+
+    def value_faults(self, owner: str, values: Mapping[str, float]) -> list[str]:
+        """Why it would not dissipate at some values of its parameters, given by full name, one sentence each."""
+        named = ((field, domain, f"{owner}.{field}") for field, domain in self.domains().items())
         return [
-            f"'{owner}': {field} {value:g} is negative, so it would feed energy in; give a value ≥ 0"
-            for field, value in self.fields().items()
-            if value < 0.0
+            fault
+            for field, domain, name in named
+            if name in values
+            for fault in domain.faults(f"'{owner}'", field, values[name])
         ]
+
+    def faults(self, owner: str) -> list[str]:
+        """Why it would not dissipate, one sentence each."""
+        return self.value_faults(owner, self.parameters(owner))
 
     def parameters(self, owner: str) -> dict[str, float]:
         """Run-time parameters by full name: {'left knee loss.coefficient': 0.1}."""
@@ -124,6 +138,10 @@ class LossSum(Loss):
     def fields(self) -> dict[str, float]:
         """The fields of its parts: 'viscous.coefficient', …"""
         return {f"{name}.{field}"[1:]: value for name, loss in self.named("") for field, value in loss.fields().items()}
+
+    def value_faults(self, owner: str, values: Mapping[str, float]) -> list[str]:
+        """What is wrong with the values of its parts."""
+        return [fault for name, loss in self.named(owner) for fault in loss.value_faults(name, values)]
 
     def faults(self, owner: str) -> list[str]:
         """The faults of its parts."""

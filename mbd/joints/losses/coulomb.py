@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from mbd.bodies.domains import Domain, positive
 from mbd.bodies.values import number
 from mbd.errors import ModelError
 from mbd.joints.losses.base import DissipationFunction, Loss
@@ -12,6 +13,8 @@ from mbd.tape.functions import sqrt
 from mbd.tape.node import Scalar
 
 __all__ = ["Coulomb"]
+
+SMOOTHING = positive("is not positive; try 0.01 rad/s, or None to truly stick")
 
 
 @dataclass(frozen=True)
@@ -36,10 +39,9 @@ class Coulomb(DissipationFunction):
         if self.smoothing is None:
             return
         object.__setattr__(self, "smoothing", number(self.smoothing, "smoothing of Coulomb"))
-        if self.smoothing <= 0.0:
-            raise ModelError(
-                f"smoothing of Coulomb must be positive, got {self.smoothing:g}; try 0.01 rad/s, or None to truly stick"
-            )
+        faults = SMOOTHING.faults("Coulomb", "smoothing", self.smoothing)
+        if faults:
+            raise ModelError(faults)
 
     @property
     def smooth(self) -> Loss | None:
@@ -49,6 +51,10 @@ class Coulomb(DissipationFunction):
     def fields(self) -> dict[str, float]:
         """`torque`, and `smoothing` if there is one."""
         return {"torque": self.torque} | ({} if self.smoothing is None else {"smoothing": self.smoothing})
+
+    def domains(self) -> dict[str, Domain]:
+        """T ≥ 0, ε > 0."""
+        return super().domains() | ({} if self.smoothing is None else {"smoothing": SMOOTHING})
 
     def dissipation(self, rate: Scalar, scope: Scope, owner: str) -> Scalar:
         """T (√(v² + ε²) − ε); 0 where it truly sticks."""
