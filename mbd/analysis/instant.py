@@ -166,8 +166,8 @@ def _kernel(stepper: Stepper, state: State) -> Any:
     values["q"][: values["n_q"]] = state.q
     values["y"][: values["n"]] = np.concatenate([state.v, state.z])
     values["closed"][: values["n_contacts"]] = stepper.manager.flags(state.mode.closed)
-    if len(state.anchors):
-        values["anchors"][:] = state.anchors
+    if len(state.anchors) == values["n_anchors"]:
+        values["anchors"][: values["n_anchors"]] = state.anchors
     values["clock"][F.NOW] = state.time
     values["chunk"] = 1
     values = {**values, "code": stepper.functions, "hooks": stepper.scheme}

@@ -89,6 +89,7 @@ class Mechanism:
         self.named: dict[str, Any] = {}
         self.notes: list[str] = []
         self.postponed: list[Postponed] = []
+        self.without_effect: frozenset[str] = frozenset()
         self._modes: dict[tuple[Any, ...], ModeCode] = {}
         self.seconds = perf_counter() - started
 
@@ -221,7 +222,8 @@ class Mechanism:
     ) -> Vector:
         """The parameter vector, with some values replaced by name; tables follow.
 
-        A value equal to the one that `folded` gives for its name is already part of the equations.
+        A value equal to the one that `folded` gives for its name is already part of the equations; parameters
+        `without_effect`, such as the rest of a spring of stiffness 0, are in no equation.
 
         Raises
         ------
@@ -231,7 +233,7 @@ class Mechanism:
         names = [parameter.name for parameter in self.equations.parameters]
         p = [parameter.value for parameter in self.equations.parameters]
         for name, value in (values or {}).items():
-            if name not in names and (folded or {}).get(name) == value:
+            if name in self.without_effect or (name not in names and (folded or {}).get(name) == value):
                 continue
             if name not in names:
                 raise UnknownNameError(nearest(name, {*names, *(folded or {})}, "parameter", "There are"))

@@ -78,6 +78,9 @@ def _mechanism(model: Any, backend: str, tunable: frozenset[str]) -> Mechanism:
         made.notes.append(
             f"derived once more with {names} as run-time input; name it in tunable=[…] of the model to avoid it"
         )
+        made.without_effect = tunable - {parameter.name for parameter in made.equations.parameters}
+        idle = sorted(made.without_effect)
+        made.notes += [f"{name!r} enters no equation of this model: its value has no effect" for name in idle]
     with _LOCK:
         _KNOWN[model][backend, tunable] = (now, made)
     return made

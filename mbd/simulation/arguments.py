@@ -109,7 +109,7 @@ def fits(start: State, equations: Equations, manager: ActiveSetManager) -> None:
     if len(start.anchors) != anchors and start.mode.closed:
         raise ModelError(
             f"the start holds {len(start.anchors)} anchors of contacts, but the model has {anchors}; assemble it from "
-            "this model"
+            "this model, with the same parameters="
         )
     parts = ((start.q, names), (start.v, equations.velocity_names), (start.z, [s.name for s in equations.states]))
     values = [(name, value) for part, known in parts for name, value in zip(known, part, strict=True)]

@@ -36,8 +36,8 @@ def begin(run: Run, start: State) -> None:
     v = run.values
     v["q"][: v["n_q"]] = start.q
     v["y"][: v["n"]] = np.concatenate([start.v, start.z])
-    if len(start.anchors):
-        v["anchors"][:] = start.anchors
+    if len(start.anchors) == v["n_anchors"]:  # else all contacts are open, and store theirs as they close
+        v["anchors"][: v["n_anchors"]] = start.anchors
     n_contacts, n_guards = v["n_contacts"], v["n_guards"]
     v["closed"][:n_contacts] = run.manager.flags(start.mode.closed)
     armed: Iterable[str] = set(run.manager.names) - start.mode.closed if start.armed is None else start.armed

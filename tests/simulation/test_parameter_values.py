@@ -96,6 +96,14 @@ def restitution(value: Any) -> mbd.Model:
     return mat(restitution=restitution_of_chi(value) if inside else 0.01 if value > 0.0 else 1.0 - value)
 
 
+def flat(aside: Any) -> mbd.Model:
+    """A planar body whose foot may lie out of the plane, so that it also sticks sideways."""
+    foot = lambda model, joint, body: mbd.Unilateral("foot", mbd.touchdown(body.point(0.0, -0.1, aside, "toe")))  # noqa: E731
+    model = scene(foot)
+    model.joints[0] = mbd.Planar("float", model.ground.point(0.0, 2.0, 0.0, "above"), model.joints[0].child)
+    return model
+
+
 def wheel(radius: Any) -> mbd.Model:
     return scene(lambda model, joint, body: mbd.Rolling("wheel", body.origin, radius))
 
@@ -118,6 +126,8 @@ PLACES = [
         "pull", m.ground.point(v, 5.0, 0.0, "wall"), b.origin, 50.0, 0.3))),
     Place("hinge spring.stiffness", lambda v: scene(joint=hinge(stiffness=v))),
     Place("hinge spring.rest", lambda v: scene(joint=hinge(stiffness=3.0, rest=v))),
+    Place("hinge spring.rest", lambda v: scene(joint=hinge(rest=v))),
+    Place("box.toe.z", flat, 0.0),
     Place("nut.pitch", lambda v: scene(joint=lambda m, b: mbd.Screw("nut", m.ground.origin, b.origin, v),
                                        body=mbd.RigidBody("box", 2.0, (0.3, 0.4, 0.5)))),
     Place("hinge loss.coefficient", lossy(mbd.Viscous)),
@@ -214,7 +224,7 @@ def test_a_value_is_refused_or_accepted_alike_wherever_it_is_given(place: Place)
 @pytest.mark.parametrize("place", PLACES, ids=lambda place: place.name)
 def test_a_value_makes_the_same_motion_wherever_it_is_given(place: Place) -> None:
     """To the round-off of the steps: the words' own form may fold, or cut another joint."""
-    model, value = place.model(place.usual), 0.9 * place.usual
+    model, value = place.model(place.usual), 0.9 * place.usual + 0.01
     other = place.model(value)
     described = simulated(other, assembled(other))
     given = {place.name: value}
