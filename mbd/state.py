@@ -11,7 +11,7 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.errors import UnknownNameError, nearest
 
-__all__ = ["Memory", "Mode", "State"]
+__all__ = ["Memory", "Mode", "State", "malformed"]
 
 
 def _empty() -> Vector:
@@ -51,6 +51,7 @@ class Memory:
     controllers : samples and states of controllers, and the time from which samples count
     pending : (kind, name) of events at this instant whose reset or controller failed, to be repeated
     place : (q, v, z) of the state; controllers go on from there whatever the scheme and its steps
+    seal : hash of the rest; a memory that does not agree with it is damaged and never used
     """
 
     belongs: tuple[str, ...]
@@ -63,6 +64,7 @@ class Memory:
     controllers: Mapping[str, Any] = field(default_factory=dict)
     pending: tuple[tuple[str, str], ...] = ()
     place: Vector = field(default_factory=_empty)
+    seal: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,3 +123,44 @@ class State:
             far = max(self.moved.items(), key=lambda item: abs(item[1]))
             lines.append(f"  assembly moved {len(self.moved)} of these; farthest {far[0]!r} by {far[1]:.3g}")
         return "\n".join(lines)
+
+
+def malformed(state: State) -> list[str]:
+    """What of a state is not even of the kind that it must be, a sentence each; names and sizes are not asked.
+
+    Assembled states and those at the end of a run are well formed; one made or changed by hand may not be.
+    """
+    faults = [
+        f"the {name} of the start must be an array of numbers (n,), not {value!r:.80}"
+        for name, value in ((name, getattr(state, name)) for name in ("q", "v", "z", "anchors"))
+        if not _is_vector(value)
+    ]
+    closed = state.mode.closed if isinstance(state.mode, Mode) else None
+    if not _are_names(closed):
+        faults.append(f"the mode of the start must be a Mode(frozenset of names of contacts), not {state.mode!r:.80}")
+    if state.armed is not None and not _are_names(state.armed):
+        faults.append(f"armed of the start must be None or a frozenset of names of contacts, not {state.armed!r:.80}")
+    for name in ("names", "velocity_names"):
+        value = getattr(state, name)
+        if not isinstance(value, tuple) or not all(isinstance(one, str) for one in value):
+            faults.append(f"{name} of the start must be a tuple of names, not {value!r:.80}")
+    if not isinstance(state.parameters, Mapping):
+        faults.append(f"parameters of the start must map names to numbers, not {state.parameters!r:.80}")
+    if state.memory is not None and not isinstance(state.memory, Memory):
+        faults.append(f"memory of the start must be that of a run, or None, not {state.memory!r:.80}")
+    return faults
+
+
+def _is_vector(value: Any) -> bool:
+    """Whether a value is an array, list or tuple (n,) of real numbers."""
+    if not isinstance(value, np.ndarray | list | tuple):
+        return False
+    try:
+        array = np.asarray(value)
+    except ValueError:  # lists of different lengths
+        return False
+    return array.ndim == 1 and (array.dtype.kind in "fiu" or array.size == 0)
+
+
+def _are_names(value: Any) -> bool:
+    return isinstance(value, set | frozenset) and all(isinstance(one, str) for one in value)

@@ -2,41 +2,34 @@
 
 from __future__ import annotations
 
-import json
-import os
-import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mbd.errors import TrajectoryError
+from mbd.results.archive import Arrays, read, write
 from mbd.results.columns import Alias, Columns, StoredColumns
+from mbd.results.content import arrays_of_run, expect
 from mbd.results.facts import Facts
 from mbd.results.ledger import Ledger, Part
 from mbd.results.record import EventRecord, Record
 from mbd.results.states import pack_state, unpack
 from mbd.results.violation import Violation
+from mbd.state import State, malformed
 
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
 
-__all__ = ["Archive", "Arrays", "load", "plain", "read", "save", "write"]
+__all__ = ["SUFFIX", "Archive", "load", "save"]
 
 FORMAT, VERSION = "mbd run", 1
 
 SUFFIX = ".mbd.npz"
 """Added to a path without an extension."""
 
-COMPRESSION = 1
-"""Level of zlib: higher levels take five times as long for a few percent [-]."""
-
 ROWS = ("time", "q", "v", "z", "a", "s", "lam", "closed", "phase", "parameters")
-
-Arrays = dict[str, NDArray[Any]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,15 +40,6 @@ class Archive:
     ledger: Ledger
     violation: Violation
     facts: Facts
-
-
-def plain(value: Any) -> Any:
-    """A number, list or text for JSON in place of a numpy value; the printed form of anything else."""
-    if isinstance(value, np.generic):
-        return value.item()
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    return repr(value)
 
 
 def save(run: Trajectory, path: str | Path, names: Sequence[str] | None = None) -> Path:
@@ -82,24 +66,8 @@ def save(run: Trajectory, path: str | Path, names: Sequence[str] | None = None) 
         arrays[f"change {number}"] = values
     meta["aliases"], meta["values"], meta["names"] = _columns(run.columns, names, arrays)
     meta["parts"], meta["stored"] = _ledger(run.energy, arrays)
-    text = json.dumps(meta, default=plain)
-    arrays["meta"] = np.frombuffer(text.encode(), dtype=np.uint8)
-    write(target, arrays)
+    write(target, arrays, meta)
     return target
-
-
-def write(target: Path, arrays: Arrays) -> None:
-    """Write beside the target, then rename, so that a reader never sees half a file."""
-    target.parent.mkdir(parents=True, exist_ok=True)
-    partial = target.with_name(f".{target.name}.{os.getpid()}")
-    try:
-        with zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED, compresslevel=COMPRESSION) as archive:
-            for name, array in arrays.items():
-                with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
-                    np.lib.format.write_array(member, np.ascontiguousarray(array), allow_pickle=False)
-        partial.replace(target)
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 def _event(event: EventRecord) -> dict[str, Any]:
@@ -160,39 +128,21 @@ def _read_ledger(record: Record, arrays: Arrays, meta: Mapping[str, Any]) -> Led
 
 def load(path: str | Path) -> Trajectory:
     """Read a run; see `mbd.load`."""
+    return read(Path(path), FORMAT, VERSION, "run.save(…)", arrays_of_run, _run)
+
+
+def _run(meta: dict[str, Any], arrays: Arrays) -> Trajectory:
+    """A run from the words and arrays of a file."""
     from mbd.trajectory import Trajectory
 
-    source = Path(path)
-    arrays, meta = read(source, FORMAT, VERSION, "run.save(…)")
     record = _record(arrays, meta)
+    expect(bool(np.all(np.isfinite(record.time)) and np.all(np.diff(record.time) >= 0.0)), "'time'")
+    expect(bool(np.all(record.closed <= 1) and np.all(record.closed >= 0)), "'closed'")
     values = {name: arrays[f"value {number}"] for name, number in meta["values"].items()}
     aliases = {name: (part, index) for name, (part, index) in meta["aliases"].items()}
     columns = StoredColumns(record, aliases, values, meta["names"], arrays["anchors"], arrays.get("q_rate", record.v))
     ledger = _read_ledger(record, arrays, meta)
     return Trajectory(record, Archive(columns, ledger, Violation(**meta["violation"]), Facts.read(meta["facts"])))
-
-
-def read(source: Path, kind: str, version: int, written_by: str) -> tuple[Arrays, dict[str, Any]]:
-    """Arrays and words of a file of one kind ('mbd run', 'mbd failure')."""
-    name = kind.removeprefix("mbd ")
-    if not source.is_file():
-        raise FileNotFoundError(f"no {name} file at '{source}'")
-    refusal = f"'{source}' is not a {name} of mbd; expected a file written by {written_by}"
-    if not zipfile.is_zipfile(source):
-        raise TrajectoryError(refusal)
-    try:
-        with np.load(source, allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
-        meta = json.loads(arrays["meta"].tobytes())
-    except (KeyError, ValueError, zipfile.BadZipFile) as error:
-        raise TrajectoryError(refusal) from error
-    if not isinstance(meta, dict) or meta.get("format") != kind:
-        raise TrajectoryError(refusal)
-    if meta["version"] > version:
-        raise TrajectoryError(
-            f"'{source}' was written by a newer mbd (format {meta['version']}, here {version}); update mbd"
-        )
-    return arrays, meta
 
 
 def _record(arrays: Arrays, meta: Mapping[str, Any]) -> Record:
@@ -201,10 +151,12 @@ def _record(arrays: Arrays, meta: Mapping[str, Any]) -> Record:
     failure = meta["failure"]  # older files have its sentence only
     failure = unpacked(failure, arrays) if isinstance(failure, dict) else failure
     events = tuple(_read_event(event) for event in meta["events"])
+    final = unpack(meta["final"], arrays)
+    expect(final is None or (isinstance(final, State) and not malformed(final)), "its final state")
     changes = tuple((row, arrays[f"change {number}"]) for number, row in enumerate(meta["changes"]))
     return Record(
         equations=None, parameter_names=tuple(meta["parameter_names"]), events=events, stats=meta["stats"],
         success=meta["success"], message=meta["message"], failure=failure,
-        final=unpack(meta["final"], arrays), settings=meta["settings"], parameter_changes=changes,
+        final=final, settings=meta["settings"], parameter_changes=changes,
         **{name: arrays[name] for name in ROWS if name in arrays},  # older files do not tell what frictions do
     )  # fmt: skip

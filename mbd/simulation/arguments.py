@@ -14,7 +14,7 @@ from mbd.equations.equations import Equations
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.integrators import Integrator
 from mbd.kernel.active_set import ActiveSetManager
-from mbd.state import State
+from mbd.state import State, malformed
 
 __all__ = ["callbacks", "choices", "end_of", "fits", "numbers"]
 
@@ -43,6 +43,8 @@ def numbers(scheme: Any, start: Any, dt: Any, tol: Any, until: Any, store: Any, 
         faults.append(f"integrator must be an mbd integrator such as mbd.HHT(alpha=0.05), not {scheme!r}")
     if not isinstance(start, State):
         faults.append(f"start must be a State from mbd.assemble(model, …), not {start!r}")
+    else:
+        faults += malformed(start)
     if tol is not None and dt is not None:
         faults.append(f"give dt={dt!r} for fixed steps or tol={tol!r} for steps that follow their error, not both")
     elif tol is not None and (not is_number(tol) or not math.isfinite(tol) or tol <= 0.0):
@@ -106,13 +108,14 @@ def fits(start: State, equations: Equations, manager: ActiveSetManager) -> None:
     unknown = [nearest(name, manager.names, "contact") for name in dict.fromkeys(contacts) if name not in manager.names]
     if unknown:
         raise UnknownNameError(unknown)
-    if len(start.anchors) != anchors and start.mode.closed:
+    if len(start.anchors) != anchors and (start.mode.closed or len(start.anchors)):
         raise ModelError(
             f"the start holds {len(start.anchors)} anchors of contacts, but the model has {anchors}; assemble it from "
             "this model, with the same parameters="
         )
     parts = ((start.q, names), (start.v, equations.velocity_names), (start.z, [s.name for s in equations.states]))
     values = [(name, value) for part, known in parts for name, value in zip(known, part, strict=True)]
+    values += [(f"anchor {k} of its contacts", value) for k, value in enumerate(start.anchors)]
     bad = [
         f"the start has {name!r} = {value}; give a finite number" for name, value in values if not np.isfinite(value)
     ]

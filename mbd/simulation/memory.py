@@ -11,6 +11,7 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.kernel import fields as F
 from mbd.results.record import EventRecord
+from mbd.simulation.remembered import damage, out_of_range, sealed
 from mbd.state import Memory, State
 
 if TYPE_CHECKING:
@@ -29,10 +30,10 @@ def memory_of(run: Run, time: float) -> Memory:
     place = _place(run)
     for array in (parameters, reals, integers, place):
         array.flags.writeable = False
-    return Memory(
+    return sealed(Memory(
         belongs(run), digest(run), time, parameters, reals, integers, stepper.scheme.memory,
         run.boundaries.remembered(), tuple((event.kind, event.name) for event in run.pending), place,
-    )  # fmt: skip
+    ))  # fmt: skip
 
 
 def _place(run: Run) -> Vector:
@@ -76,7 +77,13 @@ def digest(run: Run) -> str:
 def take_up(run: Run, start: State) -> bool:
     """Go on from the memory of a state, if it is one of this run; whether it was."""
     memory = start.memory
-    if memory is None or memory.belongs != belongs(run):
+    if memory is None:
+        return False
+    run.damage = damage(memory)
+    if run.damage or memory.belongs != belongs(run):
+        return False
+    run.damage = out_of_range(run, memory)
+    if run.damage:
         return False
     stepper, v = run.stepper, run.values
     fresh = stepper.reals.copy(), stepper.integers.copy()
@@ -88,7 +95,7 @@ def take_up(run: Run, start: State) -> bool:
     run.boundaries.take_up(memory.controllers, run.now)
     run.pending = tuple(EventRecord(run.now, kind, name) for kind, name in memory.pending)
     v["state"][F.STORED] = v["state"][F.LOGGED] = 0
-    v["state"][F.MODE] = -1
+    v["state"][F.MODE], v["state"][F.ORDERED] = -1, 0
     phase = int(v["state"][F.SINCE_STORE])
     stepper.hold()
     stepper.store_row()
@@ -105,7 +112,9 @@ def carry_on(run: Run, start: State) -> bool:
     must not make another motion.
     """
     memory, own = start.memory, _controllers(run)
-    if memory is None or not own or memory.belongs[-len(own) :] != own:
+    if memory is None or run.damage or not own or memory.belongs[-len(own) :] != own:
+        return False
+    if set(memory.controllers["samples"]) != set(run.boundaries.samples):
         return False
     if memory.time != start.time or not np.array_equal(memory.place, _place(run)):
         return False

@@ -48,6 +48,12 @@ ANEW = (
 )
 """Of a run that goes on from another one without what its controllers kept."""
 
+DAMAGED = (
+    "what the start remembers of the run before is damaged: {}; the scheme restarted from its positions, velocities "
+    "and contacts alone, so that the motion is that of a new run"
+)
+"""Of a run that goes on from a state whose memory no run has written."""
+
 COUNTED = (
     (
         F.SHORTENED,
@@ -80,6 +86,7 @@ def notes_of(run: Run, record: Record) -> tuple[list[str], list[str]]:
     rubs = loaded and any(code.borne for code in run.stepper.modes)
     dependent = redundancy(equations.rows, run.stepper.dependent, rubs)
     notes += [dependent] if dependent else []
+    notes += [DAMAGED.format(run.damage)] if run.damage else []
     if run.start.memory is not None and not run.carried and run.boundaries.controllers:
         notes.append(ANEW)
     counts, impact = run.values["counts"], run.settings["impact"]

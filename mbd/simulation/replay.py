@@ -107,6 +107,7 @@ def replay(
     integrator: Integrator | None = None,
     steps: int | None = None,
     model: Any = None,
+    trusted: bool = False,
 ) -> Replay:
     """Repeat the step at which a run failed, from the last accepted state.
 
@@ -115,17 +116,17 @@ def replay(
 
     Parameters
     ----------
-    failure : `Trajectory.failure`, or a file that `Failure.save` wrote. A file may hold a pickled model, which is
-        code: open only files you trust, or give the model
+    failure : `Trajectory.failure`, or a file that `Failure.save` wrote
     dt, integrator : in place of those of the run
     steps : how many steps to take; by default as many as reach the instant that could not be reached
-    model : in place of that of the failure, such as a repaired one
+    model : in place of that of the failure, such as a repaired one; needed with a file, unless that is trusted
+    trusted : read the model that a file holds as a pickle, which may run any code: only for files of your own
 
     Returns
     -------
     Replay
     """
-    told = load(failure, model) if isinstance(failure, str | Path) else failure
+    told = load(failure, model, trusted) if isinstance(failure, str | Path) else failure
     if not isinstance(told, Failure):
         came = type(failure).__name__
         raise ModelError(f"replay needs run.failure or the path of a file it was saved to, not {came}")

@@ -6,11 +6,11 @@ each; where an event may end it sooner only those that it has are counted.
 
 from __future__ import annotations
 
-import os
 import warnings
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING
+
+from mbd.results.free import available, size_in_words as memory
 
 if TYPE_CHECKING:
     from mbd.simulation.run import Run
@@ -19,8 +19,6 @@ __all__ = ["Room", "available", "memory"]
 
 SHARE = 0.25
 """Part of the memory that is free which the rows of a run may fill: trial runs, and results, need some too."""
-UNKNOWN = 4.0e9
-"""Taken for the free memory where the system does not tell it [bytes]."""
 EARLIEST = 1 << 16
 """Rows before which nothing is foretold."""
 MANY = 1 << 22
@@ -92,19 +90,3 @@ def _remedy(run: Run) -> str:
     if run.values["adaptive"]:
         return "ask for less accuracy or a shorter time, take a scheme of higher order, or dt= with store="
     return "use store= to keep fewer rows, a larger dt, or a shorter time"
-
-
-def available() -> float:
-    """Free memory [bytes], with what the system would give back at once."""
-    try:
-        for line in Path("/proc/meminfo").read_text().splitlines():
-            if line.startswith("MemAvailable:"):
-                return 1024.0 * float(line.split()[1])
-        return float(os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
-    except (OSError, ValueError, AttributeError):
-        return UNKNOWN
-
-
-def memory(size: float) -> str:
-    """'3.2 GB' or '45 MB'."""
-    return f"{size / 1e9:.2g} GB" if size >= 1e9 else f"{max(size / 1e6, 1.0):.0f} MB"

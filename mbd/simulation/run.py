@@ -107,6 +107,7 @@ class Run:
         self.progress: Callable[[float, float], None] | None = None
         controllers, instants = getattr(model, "controllers", ()), getattr(model, "instants", ())
         self.boundaries = Boundaries(controllers, instants, start.time, dt, end)
+        self.damage = ""  # of the memory of the start
         self.resumed = take_up(self, start)
         notify(self)
         self.carried = self.resumed  # so do controllers

@@ -107,6 +107,8 @@ def simulate(
     words = {"contact": contact, "impact": impact, "locate": locate, "on_failure": on_failure}
     faults = choices(words) + numbers(scheme, start, dt, tol, until, store, rest_speed)
     faults += callbacks(observers, progress) + named_number_faults(parameters, "parameters")
+    if isinstance(start, State) and isinstance(start.parameters, Mapping):
+        faults += named_number_faults(start.parameters, "parameters of the start")
     if faults:
         raise ModelError(faults)
     changed = {**start.parameters, **(parameters or {})}

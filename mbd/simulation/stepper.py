@@ -100,6 +100,7 @@ class Stepper:
         self.stabilized = getattr(integrator, "stabilized", True)
         layout = mechanism.layout
         self.values: dict[str, Any] = {}
+        self._places: dict[str, slice] = {}  # of arrays on their shelves
         self._shelved: dict[str, tuple[Any, int]] = {}  # arrays and their addresses
         self._sizes(dt, options)
         self._arrays(parameters, manager)
@@ -184,9 +185,14 @@ class Stepper:
         shelf = room[first : first + whole]
         base = shelf.ctypes.data
         for name, place in zip(lengths, places, strict=True):
+            self._places[name] = place
             array = self.values[name] = shelf[place]
             self._shelved[name] = array, base + 8 * place.start
         return shelf
+
+    def place_of(self, name: str) -> slice:
+        """Where a kept array stands in `reals` or `integers`."""
+        return self._places[name]
 
     def add_mode(self) -> None:
         """Make code for the contacts closed now."""

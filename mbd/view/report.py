@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mbd.analysis.gait import gait
-from mbd.results.storage import SUFFIX, plain
+from mbd.results.archive import plain
+from mbd.results.storage import SUFFIX
 from mbd.results.summary import facts
 
 if TYPE_CHECKING:

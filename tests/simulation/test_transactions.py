@@ -262,7 +262,9 @@ def test_a_failure_goes_into_a_file_and_is_repeated_from_it(scheme, tmp_path):
     failure = clean_failure(integrator=scheme).failure
     path = failure.save(tmp_path / "stuck")
     assert path.name == "stuck.failure.npz"
-    assert mbd.replay(path).reproduced
+    with pytest.raises(mbd.TrajectoryError, match=r"a pickle may run any code; give the model.*trusted=True"):
+        mbd.replay(path)
+    assert mbd.replay(path, trusted=True).reproduced
     own = {"integrator": scheme} if isinstance(scheme, ProjectedMidpoint) else {}
     assert mbd.replay(path, model=stuck()[0], **own).reproduced, "the pickle is not needed"
 
