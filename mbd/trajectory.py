@@ -105,6 +105,10 @@ class Trajectory:
         With dry friction, with ``store`` other than 1, in a run that was read from a file, and for `mbd.RadauIIA`,
         positions are polynomials of degree 8 through q, v and v̇ of three rows (degree 5 where fewer lie between two
         events); for other schemes cubic Hermite polynomials (q with v, v with v̇), whose error is of order dt⁴.
+        Accelerations, multipliers and all forces and reactions that follow from them are solved from the balance of
+        forces there, with the contacts and frictions of the interval, and are as accurate as at the rows; where forces
+        are too stiff for the steps, interpolated. A run that was read from a file does the same if it has its
+        equations (`save`).
 
         Parameters
         ----------

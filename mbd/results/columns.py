@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Mapping, Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +12,9 @@ from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
 from mbd.errors import TrajectoryError, UnknownNameError, nearest
+from mbd.results.balance import Balance
 from mbd.results.dense import Restepping
+from mbd.results.forces import balanced
 from mbd.results.interpolation import Grid, Places
 from mbd.results.names import AXES, rate_name
 from mbd.results.record import Record, Rows
@@ -134,15 +137,30 @@ class ModelColumns(Columns):
         return self.evaluate([self.node(name) for name in names], self.rows)
 
     def at_places(self, names: Sequence[str], places: Places) -> list[Vector]:
-        return self.evaluate([self.node(name) for name in names], self.between(places))
+        nodes = [self.node(name) for name in names]
+        return self.evaluate(nodes, self.between(places, asks_for_forces(nodes)))
 
-    def between(self, places: Places) -> Rows:
-        """The states between the stored rows: explicit steps taken again where they can be, else Hermite."""
+    def between(self, places: Places, forces: bool = True) -> Rows:
+        """The states between the stored rows: explicit steps taken again where they can be, else polynomials.
+
+        forces : whether accelerations, ż and multipliers count, which then come from the balance of forces
+        """
         if self._steps is None and Restepping.serves(self):
             self._steps = Restepping(self)
+        rows = self.rows
         if self._steps is not None:
-            return self._steps.at(self.rows, places)
-        return self.grid.between(self.rows, places, self.q_rate, is_smooth(self.record, self.equations.compose is None))
+            return self._steps.at(rows, places)
+        plain = self.equations.compose is None
+        smooth = is_smooth(self.record, plain)
+        found = self.grid.between(rows, places, self.q_rate, smooth)
+        if not forces or not Balance.serves(self.equations):
+            return found
+        return balanced(self.balance, rows, places, found, self.grid.rougher(rows, places, found, plain, smooth))
+
+    @cached_property
+    def balance(self) -> Balance:
+        """The equations of motion, to be solved at any state."""
+        return Balance(self)
 
     @property
     def q_rate(self) -> Matrix:
@@ -174,7 +192,7 @@ class ModelColumns(Columns):
         """The inputs of expressions, at the center of each chart (x = 0)."""
         return {
             "t": rows.time, "q": rows.q, "v": rows.v, "z": rows.z, "a": rows.a, "s": rows.s, "lam": rows.lam,
-            "anchor": rows.anchors, "switch": rows.closed,
+            "anchor": rows.anchors, "switch": rows.closed, "slip": np.where(np.abs(rows.phase) == 1, rows.phase, 0),
         }  # fmt: skip
 
     @property
@@ -261,6 +279,13 @@ class StoredColumns(Columns):
                 slopes = self._read(rate, self.record) if known else self.grid.slopes(column)
                 found.append(places.blend(column, slopes))
         return found
+
+
+def asks_for_forces(nodes: Sequence[Node]) -> bool:
+    """Whether quantities depend on accelerations, ż or multipliers."""
+    from mbd.tape.derivatives import live
+
+    return any(node.op == "input" and node.data[0] in ("a", "s", "lam") for node in live(nodes))
 
 
 def is_smooth(record: Record, plain: bool) -> bool:

@@ -6,7 +6,7 @@ A surface that moves with time does work through its contact: λ h_t of a closed
 part is p ġ, that of the motion against the surface), and Λ h_t in an impact, apart from what the impact loses.
 
 Every physical part is integrated on its own, with an error of order 8 (`mbd.results.quadrature`; long steps of
-`RungeKutta853` from states within them, `mbd.results.within`), and an impact takes what its impulses say; `numerical`
+schemes of high order from states within them, `mbd.results.within`), and an impact takes what its impulses say; `numerical`
 is what is left: the integrator's own gain or loss, which falls with dt at the scheme's order. Projections onto rows and
 what non-smooth steps lift out of surfaces stand there too.
 """
@@ -125,11 +125,11 @@ def _works(
 def _refined(
     columns: ModelColumns, power: Power, value: Vector, rate: Vector | None, work: Vector, least: float
 ) -> Vector:  # fmt: skip
-    """A work with its long intervals integrated again from states within them, in explicit runs.
+    """A work with its long intervals integrated again from states within them, in runs of high order.
 
     These are intervals in which it differs by more than `least` [J] from ``h/2 (P₀ + P₁) + h²/12 (Ṗ₀ − Ṗ₁)``.
     """
-    known = readable(columns, multipliers=rate is None)
+    known = readable(columns)
     if not known.any():
         return work
     step, steps = np.diff(columns.record.time), np.diff(work)

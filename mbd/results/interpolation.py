@@ -6,7 +6,7 @@ On an interval of length h, with θ from 0 to 1,
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, Literal
 
@@ -18,7 +18,7 @@ from mbd.errors import TrajectoryError
 from mbd.results.osculating import osculating
 from mbd.results.record import Rows
 
-__all__ = ["Grid", "Places", "Side", "hermite", "hermite_rate", "quintic", "quintics"]
+__all__ = ["Grid", "Places", "Side", "hermite", "hermite_rate", "parabola", "quintic", "quintics"]
 
 Side = Literal["left", "right"]
 
@@ -94,6 +94,14 @@ def hermite_rate(places: Places, y0: Matrix, rate0: Matrix, y1: Matrix, rate1: M
     return np.asarray(np.where(h > 0, inside, rate0))
 
 
+def parabola(places: Places, y0: Matrix, rate0: Matrix, y1: Matrix) -> tuple[Matrix, Matrix]:
+    """The polynomial of degree 2 with both values and the first rate, and its rate."""
+    x, h = _columns(places, y0)
+    bend = y1 - y0 - h * rate0
+    rate = rate0 + np.divide(2.0 * x * bend, h, out=np.zeros_like(y0), where=h > 0)
+    return np.asarray(y0 + x * h * rate0 + x * x * bend), np.asarray(rate)
+
+
 @dataclass(frozen=True, eq=False)
 class Grid:
     """The times of the stored rows; two equal neighbours are the two sides of a switch."""
@@ -156,9 +164,9 @@ class Grid:
         """The states at places between the rows.
 
         q by Hermite with q̇, v with v̇, z with ż; accelerations and ż are the slopes of those
-        curves; multipliers by Hermite with three-point slopes; contacts and anchors as they hold in the interval.
-        `smooth`, for rows whose accelerations are as accurate as the rest and q̇ = v: q of degree 8 through three rows,
-        v and v̇ its slopes, and z of degree 5 (`results.osculating`).
+        curves; multipliers by Hermite with three-point slopes; contacts, frictions and anchors as they hold in the
+        interval. `smooth`, for rows whose accelerations are as accurate as the rest and q̇ = v: q of degree 8 through
+        three rows, v and v̇ its slopes, and z of degree 5 (`results.osculating`).
         """
         low, high = places.lower, places.upper
         ends = (rows.v[low], rows.a[low], rows.v[high], rows.a[high])
@@ -169,16 +177,24 @@ class Grid:
         else:
             z, change = hermite(places, *states), hermite_rate(places, *states)
             q, v, a = places.blend(rows.q, q_rate), hermite(places, *ends), hermite_rate(places, *ends)
-        return Rows(
-            places.time,
-            q,
-            v,
-            z,
-            a,
-            change,
-            places.blend(rows.lam, self.slopes(rows.lam)),
-            rows.closed[low],
-            rows.anchors[low],
-            rows.source[low],
-            rows.phase[low],
-        )
+        lam = places.blend(rows.lam, self.slopes(rows.lam))
+        return replace(rows.part(low), time=places.time, q=q, v=v, z=z, a=a, s=change, lam=lam)
+
+    def rougher(self, rows: Rows, places: Places, found: Rows, plain: bool, smooth: bool) -> Rows:
+        """What `between` has found, by polynomials of another degree: the difference tells the error of either.
+
+        q, v and v̇ of degree 5 where q̇ = v (`plain`), else v of degree 2; z of degree 3 (`smooth`) or 2; multipliers
+        along straight lines.
+        """
+        low, high = places.lower, places.upper
+        if plain:
+            q, v, a = quintics(places, rows.q, rows.v, rows.a)
+        else:
+            q, (v, a) = found.q, parabola(places, rows.v[low], rows.a[low], rows.v[high])
+        states = (rows.z[low], rows.s[low], rows.z[high])
+        z, change = parabola(places, *states)
+        if smooth:
+            z, change = hermite(places, *states, rows.s[high]), hermite_rate(places, *states, rows.s[high])
+        x, _ = _columns(places, rows.lam)
+        lam = (1.0 - x) * rows.lam[low] + x * rows.lam[high]
+        return replace(found, q=q, v=v, z=z, a=a, s=change, lam=lam)

@@ -85,7 +85,7 @@ class Rows:
     def __len__(self) -> int:
         return len(self.time)
 
-    def part(self, chosen: slice | NDArray[np.bool_]) -> Rows:
+    def part(self, chosen: slice | NDArray[np.bool_] | NDArray[np.intp]) -> Rows:
         """Some of the rows."""
         return Rows(**{item.name: getattr(self, item.name)[chosen] for item in fields(self)})
 

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
+from mbd.results.columns import is_smooth
 from mbd.results.dense import Restepping
 from mbd.results.interpolation import Places
-from mbd.results.quadrature import stretches
 
 if TYPE_CHECKING:
     from mbd.results.columns import ModelColumns
@@ -29,32 +29,15 @@ POINTS, WEIGHTS = 0.5 * (POINTS + 1.0), 0.5 * WEIGHTS
 AT_ONCE = 1024
 """Intervals whose states are found together."""
 
-FEW = 3
-"""Steps of a stretch below which interpolated multipliers are better than none [-]."""
-
 Index = NDArray[np.intp]
 
 
-def readable(columns: ModelColumns, multipliers: bool) -> NDArray[np.bool_]:
-    """Between which rows the states of a run are as accurate as the rows, (R − 1,).
-
-    Parameters
-    ----------
-    multipliers : whether these count, which explicit steps with dry friction interpolate as well as few rows allow:
-        better than the rows alone tell a power only in stretches of one or two steps
-    """
+def readable(columns: ModelColumns) -> NDArray[np.bool_]:
+    """Between which rows the states of a run are as accurate as the rows, (R − 1,)."""
     record = columns.record
     step = np.diff(record.time)
-    if Restepping.serves(columns):
-        return np.asarray(step > 0.0)
-    smooth = columns.equations.compose is None and record.settings.get("store", 1) == 1
-    if not smooth or record.settings.get("between") != "stages":
-        return np.zeros(len(step), dtype=bool)
-    found = step > 0.0
-    if multipliers:
-        first, last = stretches(record.time)
-        found[found] = last - first < FEW
-    return np.asarray(found)
+    smooth = is_smooth(record, columns.equations.compose is None) and record.settings.get("store", 1) == 1
+    return np.asarray((step > 0.0) & (smooth or Restepping.serves(columns)))
 
 
 def within(columns: ModelColumns, values: Sequence[Node], lower: Index) -> Matrix:

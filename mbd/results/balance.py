@@ -1,0 +1,270 @@
+"""Accelerations and multipliers that are consistent with given positions and velocities, many states at once.
+
+``M a + f + R λ = 0`` with ``B a + γ = 0`` on the rows that hold: those of joints and bilateral constraints, of closed
+contacts and of frictions that stick. Where rows depend on others only a largest independent set is solved with: beside
+the constraint manifold, as at a stage of an explicit step, all of them together are nearly singular and contradict each
+other. Their multipliers are those of least norm among all that give the same forces.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbd.arrays import Matrix, Vector
+from mbd.compile.python import ArrayFunction, array_function
+from mbd.equations import programs
+from mbd.equations.equations import Equations
+from mbd.results.record import Rows
+from mbd.tape.derivatives import live
+from mbd.tape.node import Tape
+
+if TYPE_CHECKING:
+    from mbd.results.columns import ModelColumns
+
+__all__ = ["Balance", "Solved", "put"]
+
+DEPENDENCE = 1e-6
+"""What is left of a row beside the earlier ones, relative, below which it depends on them [-].
+
+The largest over some stored states counts: at one of them rows may depend on each other for an instant, and an error of
+1e-9 in positions leaves as much of a row that depends on others.
+"""
+SAMPLES = 16
+"""Stored states at which the dependence of rows is judged, at most [-]."""
+LEAST_SIZE = -1e6
+"""Log |det| that stands for that of a singular matrix [-]."""
+MOST_LOADS = 30
+"""How often multipliers that friction follows are solved for again [-]."""
+LEAST_SHARE = 1e-4
+"""Part of the largest limit of friction that even one without load counts as, where several hold together [-]."""
+SETTLED = 1e-13
+"""Relative change of multipliers at which that ends [-]."""
+STICKS = 2
+"""Phase of a friction that sticks."""
+
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """Consistent values at k states.
+
+    rate : (v̇, ż) (k, n); lam : all multipliers (k, m), zero where a row is off
+    size : log |det| of the matrix (k,); 0 without rows
+    sound : where the values are determined and finite (k,)
+    inertia, load : M (k, n, n) and f (k, n), which weigh differences
+    """
+
+    rate: Matrix
+    lam: Matrix
+    size: Vector
+    sound: Flags
+    inertia: Any
+    load: Matrix
+
+
+@dataclass(frozen=True, eq=False)
+class _Held:
+    """Rows that hold in one mode.
+
+    every : their numbers; kept : those of an independent set, ascending
+    """
+
+    every: list[int]
+    kept: list[int]
+
+    @property
+    def depend(self) -> bool:
+        """Whether rows depend on others."""
+        return len(self.kept) < len(self.every)
+
+
+class Balance:
+    """Solves for accelerations and multipliers at states of a run."""
+
+    def __init__(self, columns: ModelColumns) -> None:
+        self.columns, self.equations = columns, columns.equations
+        self.terms, self.follows = _terms(self.equations)
+        self._held: dict[bytes, _Held] = {}
+
+    @staticmethod
+    def serves(equations: Equations) -> bool:
+        """Whether the equations of motion are there; a table of columns may do without."""
+        return equations.n_v > 0 and len(equations.balance) == equations.n_v + equations.n_z
+
+    @np.errstate(all="ignore")
+    def solve(self, rows: Rows) -> Solved:
+        """Consistent values at states, which may be in several modes; multipliers in `rows` are a first guess."""
+        n, m, count = self.equations.n_v + self.equations.n_z, len(self.equations.rows), len(rows)
+        found = Solved(
+            np.zeros((count, n)), np.zeros((count, m)), np.zeros(count), np.zeros(count, dtype=bool),
+            np.zeros((count, n, n)), np.zeros((count, n)),
+        )  # fmt: skip
+        modes = np.hstack([rows.closed.astype(np.int8), rows.phase])
+        patterns, group = np.unique(modes, axis=0, return_inverse=True)
+        for number, mode in enumerate(patterns):
+            mine = group.ravel() == number
+            self._solve_in(mode, rows.part(mine), mine, found)
+        return found
+
+    def _solve_in(self, mode: NDArray[np.int8], rows: Rows, mine: Flags, found: Solved) -> None:
+        """The same in one mode; `mine` are the places of the results."""
+        key = mode.tobytes()
+        held = self._held[key] if key in self._held else self._held.setdefault(key, self._rows_of(mode))
+        slides = bool(np.any(np.abs(rows.phase) == 1))
+        turns = MOST_LOADS if self.follows or (held.depend and self.equations.frictions) else 1
+        lam = rows.lam
+        for _ in range(turns):
+            M, f, R, B, bias, limits = self._terms_at(replace(rows, lam=lam))
+            forces, spread = R[:, :, held.kept], None
+            if held.depend:
+                mix, weight = _mix(M, B, held), self._shares(held, limits)
+                spread = _shared(mix, weight, held) if slides else _least_norm(mix, weight)
+            if slides and spread is not None:  # how a load is shared moves the mechanism
+                forces = R[:, :, held.every] @ spread
+            rate, force, size, sound = _saddle(M, f, forces, B[:, held.kept], bias[:, held.kept])
+            before, lam = lam, np.zeros_like(rows.lam)
+            lam[:, held.every] = force if spread is None else (spread @ force[:, :, None])[:, :, 0]
+            change = np.max(np.abs(lam - before), axis=1, initial=0.0)
+            if np.all((change <= SETTLED * np.max(np.abs(lam), axis=1, initial=0.0)) | ~sound):
+                break
+        if slides:
+            limits = self._terms_at(replace(rows, lam=lam))[-1]
+            for number, friction in enumerate(self.equations.frictions):
+                way = rows.phase[:, number]
+                sliding = np.abs(way) == 1
+                lam[sliding, friction.row] = (way * limits[:, number])[sliding]
+        sound &= np.isfinite(rate).all(axis=1) & np.isfinite(lam).all(axis=1)
+        found.rate[mine], found.lam[mine], found.size[mine], found.sound[mine] = rate, lam, size, sound
+        found.inertia[mine], found.load[mine] = M, f
+
+    def _shares(self, held: _Held, limits: Matrix) -> Matrix:
+        """W of the rows that hold (k, every): 1, or the limit of the friction that holds one over the largest."""
+        largest = np.max(limits, axis=1, initial=0.0)
+        weight = np.ones((len(limits), len(held.every)))
+        for place, row in enumerate(held.every):
+            friction = self.equations.rows[row].friction
+            if friction >= 0:
+                part = np.divide(limits[:, friction], largest, out=np.ones_like(largest), where=largest > 0.0)
+                weight[:, place] = np.maximum(part, LEAST_SHARE)
+        return weight
+
+    def _terms_at(self, rows: Rows) -> tuple[Any, ...]:
+        """M (k, n, n), f (k, n), R (k, n, m), B (k, m, n), γ (k, m), limits of frictions (k, n_frictions)."""
+        n, m, count = self.equations.n_v + self.equations.n_z, len(self.equations.rows), len(rows)
+        flat = np.array(self.terms(self.columns.inputs(rows), self.columns.record.parameters_at(rows.source))).T
+        cuts = np.cumsum([n * n, n, n * m, m * n, m, m, m])
+        M, f, R, B, _, _, bias, rest = np.split(flat.reshape(count, -1), cuts, axis=1)
+        limits = rest[:, rest.shape[1] - len(self.equations.frictions) :]
+        return M.reshape(count, n, n), f, R.reshape(count, n, m), B.reshape(count, m, n), bias, limits
+
+    def _rows_of(self, mode: NDArray[np.int8]) -> _Held:
+        """The rows that hold in a mode, judged at stored states."""
+        contacts = len(self.equations.contacts)
+        closed, phase = mode[:contacts], mode[contacts:]
+        every = [
+            k for k, row in enumerate(self.equations.rows)
+            if (row.contact < 0 or closed[row.contact]) and (row.friction < 0 or phase[row.friction] == STICKS)
+        ]  # fmt: skip
+        if not every:
+            return _Held([], [])
+        record = self.columns.record
+        same = np.all(record.closed == closed, axis=1) & np.all(record.phase == phase, axis=1)
+        places = np.flatnonzero(same)
+        chosen = places[np.linspace(0, len(places) - 1, min(len(places), SAMPLES)).astype(np.intp)]
+        M, _, _, B, *_ = self._terms_at(self.columns.rows.part(chosen))
+        independent = _independent(B[:, every] / _weights(M))
+        return _Held(every, [every[k] for k in independent])
+
+
+def _weights(M: Any) -> Any:
+    """√M_ii (k, 1, n), by which columns of B are divided before rows are compared; 1 of what has no inertia."""
+    found = np.sqrt(np.maximum(np.einsum("kii->ki", M), 0.0))
+    return np.where(found > 0.0, found, 1.0)[:, None, :]
+
+
+def _mix(M: Any, B: Any, held: _Held) -> Any:
+    """T (k, every, kept) of ``B = T B_kept``, by least squares on columns divided by √M_ii."""
+    scaled = np.nan_to_num(B / _weights(M), posinf=0.0, neginf=0.0)
+    basis, _ = np.linalg.qr(np.swapaxes(scaled[:, held.kept], 1, 2))
+    along = scaled[:, held.every] @ basis
+    kept = along[:, [held.every.index(k) for k in held.kept]]
+    kept[np.linalg.slogdet(kept)[0] == 0.0] = np.eye(len(held.kept))
+    return np.swapaxes(np.linalg.solve(np.swapaxes(kept, 1, 2), np.swapaxes(along, 1, 2)), 1, 2)
+
+
+def _least_norm(mix: Any, weight: Matrix) -> Any:
+    """S (k, every, kept) of λ = S λ_kept: of all λ with the same forces that with the least λᵀ W⁻¹ λ."""
+    heavy = weight[:, :, None] * mix
+    return np.swapaxes(np.linalg.solve(np.swapaxes(mix, 1, 2) @ heavy, np.swapaxes(heavy, 1, 2)), 1, 2)
+
+
+def _shared(mix: Any, weight: Matrix, held: _Held) -> Any:
+    """S (k, every, kept) of λ = S λ_kept with ``S = W T W_kept⁻¹``, the same λ, where λ_kept is part of it."""
+    kept = [held.every.index(k) for k in held.kept]
+    return weight[:, :, None] * mix / weight[:, None, kept]
+
+
+def _saddle(M: Any, f: Matrix, R: Any, B: Any, bias: Matrix) -> tuple[Matrix, Matrix, Vector, Flags]:
+    """a, λ and log |det| of ``M a + f + R λ = 0``, ``B a + γ = 0`` for each of k states, and where there are any."""
+    count, n, m = len(f), f.shape[1], bias.shape[1]
+    matrix = np.zeros((count, n + m, n + m))
+    matrix[:, :n, :n], matrix[:, :n, n:], matrix[:, n:, :n] = M, R, B
+    right = -np.hstack([f, bias])
+    finite = np.isfinite(matrix).all(axis=(1, 2)) & np.isfinite(right).all(axis=1)
+    matrix[~finite] = np.eye(n + m)
+    sign, size = np.linalg.slogdet(matrix)
+    sound = finite & (sign != 0.0)
+    matrix[~sound] = np.eye(n + m)
+    solved = np.linalg.solve(matrix, right[:, :, None])[:, :, 0]
+    size = np.where(sound, np.maximum(size, LEAST_SIZE), LEAST_SIZE) if m else np.zeros(count)
+    return np.asarray(solved[:, :n]), np.asarray(solved[:, n:]), np.asarray(size), np.asarray(sound)
+
+
+def _independent(B: Any) -> list[int]:
+    """The rows that do not depend on earlier ones at every one of k states, from B (k, m, n)."""
+    basis, kept = np.zeros((len(B), 0, B.shape[2])), []
+    for row in range(B.shape[1]):
+        left, size = B[:, row], np.linalg.norm(B[:, row], axis=1)
+        for _ in range(2):
+            left = left - np.einsum("kbn,kb->kn", basis, np.einsum("kbn,kn->kb", basis, left))
+        length = np.linalg.norm(left, axis=1)
+        if np.any(length > DEPENDENCE * size):
+            there = (length > DEPENDENCE**2 * size)[:, None]
+            unit = np.divide(left, length[:, None], out=np.zeros_like(left), where=there)
+            basis = np.concatenate([basis, unit[:, None]], axis=1)
+            kept.append(row)
+    return kept
+
+
+def _terms(equations: Equations) -> tuple[ArrayFunction, bool]:
+    """M, f, R, B, h, ḣ, γ and the rest of `programs.accelerations` at many states, made once for these equations.
+
+    And whether R follows multipliers.
+    """
+    if equations.tape not in _KNOWN:
+        with equations.tape.lock:
+            nodes = programs.accelerations(equations)
+            follows = any(node.op == "input" and node.data[0] == "lam" for node in live(nodes[: _last_of_R(equations)]))
+            _KNOWN[equations.tape] = array_function(nodes), follows
+    return _KNOWN[equations.tape]
+
+
+def _last_of_R(equations: Equations) -> int:
+    n = equations.n_v + equations.n_z
+    return n * n + n + n * len(equations.rows)
+
+
+_KNOWN: WeakKeyDictionary[Tape, tuple[ArrayFunction, bool]] = WeakKeyDictionary()
+
+
+def put(values: Matrix, where: Flags, new: Matrix | Vector) -> Matrix:
+    """The values with some replaced."""
+    changed = values.copy()
+    changed[where] = new
+    return changed

@@ -1,0 +1,62 @@
+"""Random mechanisms to ask for results between rows: trees, loops, redundant rows, contacts that stay closed."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+
+import mbd
+from mbd.hardcases.redundant_rows import bricard, parallel_cranks
+from mbd.testing.mechanisms import furnished, random_loop, random_tree
+
+__all__ = ["KINDS"]
+
+
+def tree(seed: int) -> tuple[mbd.Model, mbd.State]:
+    """A planar or spatial tree with springs, losses, forces and a rod of prescribed length."""
+    model = furnished(random_tree(seed, 3, spatial=seed % 2 == 0), seed).without("foot", "pad")
+    return model, mbd.assemble(model, project=True)
+
+
+def loop(seed: int) -> tuple[mbd.Model, mbd.State]:
+    """A planar loop of bars, some hinges with losses, driven through a spring; sometimes with every joint cut."""
+    model, angles = random_loop(seed)
+    rng = random.Random(seed)
+    rest = angles["hinge 0.angle"] + 0.5
+    model.apply(mbd.TorsionSpring("spring", model.joints[0], stiffness=rng.uniform(1.0, 20.0), rest=rest))
+    return model, mbd.assemble(model, position=angles, velocity={"hinge 0.angle": rng.uniform(-2.0, 2.0)}, project=True)
+
+
+def redundant(seed: int) -> tuple[mbd.Model, mbd.State]:
+    """Parallel cranks with one or two too many, or Bricard's mechanism, in tree coordinates or with all joints cut."""
+    rng = random.Random(seed)
+    cut = rng.choice(["auto", "all"])
+    if seed % 3 == 0:
+        return bricard()
+    return parallel_cranks(cut=cut, count=rng.choice([3, 4]))
+
+
+def standing(seed: int) -> tuple[mbd.Model, mbd.State]:
+    """A plate on sticking, sliding or smooth feet that stay closed, with a pendulum on it and a spring to a wall."""
+    rng = random.Random(seed)
+    model = mbd.Model(f"standing {seed}")
+    plate = mbd.RigidBody("plate", mass=3.0, inertia=0.4)
+    model.connect(mbd.Planar("place", model.ground.origin, plate.origin))
+    feet = rng.choice([[-0.8, 0.8], [-0.8, 0.1, 0.8]])
+    friction = rng.choice([0.0, 0.1, None])
+    for k, x in enumerate(feet):
+        model.constrain(mbd.Unilateral(f"foot {k}", mbd.touchdown(plate.point(x, -0.2)), friction=friction))
+    rod = mbd.Link("rod", 0.8, 0.5, 0.25, 0.02)
+    loss = rng.choice([None, mbd.Viscous(0.1), mbd.Coulomb(0.05)])
+    model.connect(mbd.Revolute("hinge", plate.point(0.0, 0.1), rod.start, loss=loss))
+    model.apply(mbd.Spring("spring", model.ground.point(3.0, 0.0), plate.origin, stiffness=10.0, length=2.5))
+    start = mbd.assemble(
+        model, closed=[f"foot {k}" for k in range(len(feet))], position={"place.y": 0.2, "hinge.angle": 0.4},
+        velocity={"hinge.angle": rng.uniform(1.0, 2.0), "place.x": 0.0 if friction is None else 2.0},
+    )  # fmt: skip
+    return model, start
+
+
+KINDS: dict[str, Callable[[int], tuple[mbd.Model, mbd.State]]] = {
+    "tree": tree, "loop": loop, "redundant": redundant, "standing": standing,
+}  # fmt: skip

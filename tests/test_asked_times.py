@@ -1,0 +1,125 @@
+"""Results at asked times against the same run stepped so that a row falls there, and against a far more accurate one.
+
+``put`` ends at the asked time, so that its last row is a step of the scheme; what a run says between its rows may be no
+worse than rows: not further from the motion than a few times what `put` is, or the row before the asked time. (The last
+row of schemes with rows in position only is made consistent on all levels, and more accurate than those before.)
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Mapping
+from functools import cache
+
+import numpy as np
+import pytest
+
+import mbd
+from mbd.hardcases.redundant_rows import bricard
+from mbd.hardcases.schemes import SCHEMES
+from tests.asked import KINDS
+
+UNTIL = 0.4
+PARTS = (0.15, 0.8)
+"""Where times are asked for, about, over the length of a run [-]."""
+STEPS = {"RadauIIA": 5e-3, "RungeKutta853": 2e-2}
+"""dt of schemes of high order; others take the usual one [s]."""
+USUAL = 4e-3
+FACTOR = 6.0
+"""Error between rows over the largest one of rows at the same times, by kind of quantity [-]."""
+FLOOR = 1e-10
+"""The same where both are round-off, relative to the quantity [-]."""
+
+
+def kinds_of(run: mbd.Trajectory) -> Mapping[str, list[str]]:
+    """Named scalars of a run by kind."""
+    coordinates = {c.name for c in run.record.equations.coordinates}
+    tests = {
+        "coordinates": lambda name: name in coordinates,
+        "rates": lambda name: name.endswith(".rate"),
+        "accelerations": lambda name: name.endswith("acceleration"),
+        "multipliers": lambda name: name.endswith(".multiplier"),
+        "reactions": lambda name: "reaction_" in name or name.endswith((".force", ".friction", ".tension", ".torque")),
+        "energies": lambda name: name.endswith("_energy"),
+    }
+    return {kind: [name for name in run.names if test(name)] for kind, test in tests.items()}
+
+
+@cache
+def mechanism(kind: str, seed: int) -> tuple[mbd.Model, mbd.State]:
+    return KINDS[kind](seed)
+
+
+@cache
+def exact(kind: str, seed: int, until: float) -> mbd.Trajectory:
+    return mbd.simulate(*mechanism(kind, seed), mbd.RadauIIA(), dt=1e-3, until=until)
+
+
+def check(kind: str, seed: int, scheme: mbd.Integrator, dt: float) -> None:
+    """Assert the law at a few random times."""
+    model, start = mechanism(kind, seed)
+    run = mbd.simulate(model, start, scheme, dt=dt, until=UNTIL)
+    rng = random.Random(seed)
+    found = dict.fromkeys(kinds_of(run), (0.0, 0.0, 0.0))
+    for part in PARTS:
+        t = (part + 0.1 * rng.random()) * UNTIL
+        if any(abs(event.time - t) < 2.0 * dt for event in run.events):
+            continue
+        put, true = mbd.simulate(model, start, scheme, dt=dt, until=t), exact(kind, seed, t)
+        moments, before = run.at(t), int(np.searchsorted(run.time, t)) - 1
+        nearby = true.at(run.time[before])
+        for group, names in kinds_of(run).items():
+            for name, (value,) in moments.read(*names).items():
+                row = max(abs(put[name][-1] - true[name][-1]), abs(run[name][before] - nearby[name]))
+                errors = abs(value - true[name][-1]), row, float(np.max(np.abs(run[name])))
+                found[group] = tuple(map(max, found[group], errors))
+    for group, (between, row, size) in found.items():
+        assert between <= FACTOR * row + FLOOR * size, f"{group}: {between:.2g} between rows, {row:.2g} at them"
+
+
+@pytest.mark.parametrize("name", SCHEMES)
+@pytest.mark.parametrize("kind", KINDS)
+def test_between_rows_results_are_as_accurate_as_at_rows(kind, name):
+    check(kind, 1, SCHEMES[name](), STEPS.get(name, USUAL))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SCHEMES)
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("seed", [0, *range(2, 12)])
+def test_between_rows_results_of_many_mechanisms_are_as_accurate_as_at_rows(kind, name, seed):
+    check(kind, seed, SCHEMES[name](), STEPS.get(name, USUAL))
+
+
+@pytest.mark.parametrize("tol", [1e-4, 1e-9])
+def test_explicit_steps_with_a_redundant_row_keep_their_tolerance_between_rows(tol):
+    model, start = bricard()
+    run = mbd.simulate(model, start, mbd.RungeKutta853(), tol=tol, until=1.0)
+    fine = mbd.simulate(model, start, mbd.RungeKutta853(), dt=1e-3, until=1.0)
+    times = np.linspace(0.0, 1.0, 173)
+    ours, exact = run.at(times), fine.at(times)
+    for coordinate in run.record.equations.coordinates:
+        np.testing.assert_allclose(ours[coordinate.name], exact[coordinate.name], rtol=0, atol=tol)
+    for name in ("P3.reaction_torque.x", "P3.reaction_force.y"):
+        np.testing.assert_allclose(ours[name], exact[name], rtol=0, atol=300.0 * tol)
+
+
+def test_forces_between_rows_of_a_stiff_mechanism_stay_with_the_rows():
+    """Springs far too stiff for dt: positions between rows are off by little, the spring's force by (ω dt)² as much."""
+    for stiffness in (1e6, 1e8, 1e10):
+        model = mbd.Model("stiff")
+        body, tip = mbd.PointMass("body", 1.0), mbd.PointMass("tip", 1.0)
+        model.connect(mbd.Translation("place", model.ground.origin, body.origin))
+        model.connect(mbd.Translation("far", model.ground.origin, tip.origin))
+        model.constrain(mbd.Bilateral("rod", mbd.distance(model.ground.point(0.0, 1.0), body.origin), value=1.0))
+        model.apply(mbd.Spring("spring", body.origin, tip.origin, stiffness=stiffness, length=0.5))
+        near = {"place.x": np.sin(0.7), "place.y": 1.0 - np.cos(0.7)}
+        out = {"far.x": 1.5 * np.sin(0.7), "far.y": 1.0 - 1.5 * np.cos(0.7)}
+        run = mbd.simulate(model, mbd.assemble(model, position=near | out), mbd.HHT(alpha=0.3), dt=5e-3, until=0.5)
+        rows = np.arange(10, len(run) - 1)
+        for name in ("rod.tension", "place.y.acceleration"):
+            values = run[name]
+            low, high = np.minimum(values[rows], values[rows + 1]), np.maximum(values[rows], values[rows + 1])
+            between = run.at(0.5 * (run.time[rows] + run.time[rows + 1]))[name]
+            room = 0.05 * np.max(np.abs(values)) + (high - low)
+            assert np.all((between > low - room) & (between < high + room)), (stiffness, name)
