@@ -6,9 +6,9 @@ A surface that moves with time does work through its contact: λ h_t of a closed
 part is p ġ, that of the motion against the surface), and Λ h_t in an impact, apart from what the impact loses.
 
 Every physical part is integrated on its own, with an error of order 8 (`mbd.results.quadrature`; long steps of
-schemes of high order from states within them, `mbd.results.within`), and an impact takes what its impulses say; `numerical`
-is what is left: the integrator's own gain or loss, which falls with dt at the scheme's order. Projections onto rows and
-what non-smooth steps lift out of surfaces stand there too.
+schemes of high order from states within them, `mbd.results.within`), and an impact takes what its impulses say;
+`numerical` is what is left: the integrator's own gain or loss, which falls with dt at the scheme's order. Projections
+onto rows and what non-smooth steps lift out of surfaces stand there too.
 """
 
 from __future__ import annotations
