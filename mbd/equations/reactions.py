@@ -9,7 +9,7 @@ directions of the joint (its springs, losses, motors, stops) is not part of the 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from mbd.bodies.algebra import cross, difference, dot, rotate, scaled, total, transpose
 from mbd.equations.dynamics import Dynamics, Work
@@ -17,11 +17,16 @@ from mbd.equations.equations import Row
 from mbd.equations.kinematics import Moving
 from mbd.equations.surroundings import Surroundings, placeholders
 from mbd.joints.base import Joint
+from mbd.joints.reversed import Reversed
 from mbd.scope import Triple
 from mbd.tape.derivatives import substitute, vjp
 from mbd.tape.node import Scalar
 
 __all__ = ["Wrench", "reaction"]
+
+
+Direction: TypeAlias = tuple[Triple, Triple]
+"""Angular and linear velocity of a joint's child for one unit of a coordinate's rate."""
 
 
 class Wrench(NamedTuple):
@@ -36,22 +41,35 @@ def reaction(joint: Joint, scope: Surroundings, dynamics: Dynamics, work: Work, 
     if any(cut.name == joint.name for cut in scope.cuts):
         return _of_cut_joint(joint, scope, rows)
     body = scope.bodies[joint.child.body.name]
-    force, torque = _without_free(body, Wrench(*dynamics.joint_wrench(body, work)))
-    R = scope.placement.axes(body).rotation
-    force, torque = rotate(R, force), rotate(R, torque)
-    if joint.is_reversed:
+    wrench, R = Wrench(*dynamics.joint_wrench(body, work)), scope.placement.axes(body).rotation
+    if isinstance(joint, Reversed):
+        force, torque = rotate(R, wrench.force), rotate(R, wrench.torque)
         arm = difference(scope.frame(joint.child).position, scope.frame(joint.parent).position)
-        return Wrench(scaled(-1.0, force), scaled(-1.0, total(torque, cross(arm, force))))
-    return Wrench(force, torque)
+        back = Wrench(scaled(-1.0, force), scaled(-1.0, total(torque, cross(arm, force))))
+        return _without_free(_directions(joint.joint, scope), back)
+    force, torque = _without_free(_columns(body), wrench)
+    return Wrench(rotate(R, force), rotate(R, torque))
 
 
-def _without_free(body: Moving, wrench: Wrench) -> Wrench:
-    """The part that does no work on the joint's coordinates, body axes.
-
-    A multiple of each free direction, torques for the turning ones and forces for the sliding ones, is taken off.
-    """
+def _columns(body: Moving) -> list[Direction]:
+    """The free directions of the joint that leads to a body, in the body's axes."""
     back = transpose(body.turn)
-    free = [(column.angular, rotate(back, column.linear)) for column in body.columns]
+    return [(column.angular, rotate(back, column.linear)) for column in body.columns]
+
+
+def _directions(joint: Joint, scope: Surroundings) -> list[Direction]:
+    """The free directions of a joint as the user described it, in ground axes."""
+    R = scope.frame(joint.child).rotation
+    columns = joint.subspace(scope.joint(joint.name).coordinates, scope)
+    return [(rotate(R, angular), rotate(R, linear)) for angular, linear in columns]
+
+
+def _without_free(free: Sequence[Direction], wrench: Wrench) -> Wrench:
+    """The part that does no work on the joint's coordinates.
+
+    A multiple of each free direction, torques for the turning ones and forces for the sliding ones, acting at the
+    origin of the child's frame, is taken off.
+    """
     along = [(angular, None) if _is_turn(angular) else (None, linear) for angular, linear in free]
     gram: list[list[Scalar]] = []
     for angular, linear in free:

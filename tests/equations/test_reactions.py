@@ -128,3 +128,27 @@ def test_a_closed_contact_and_forces_enter_the_reactions():
     places = [triple(equations, name, point) for name in ("rod.end", "rod.center")]
     zero = np.zeros(3)
     check_balance(model, equations, point, [(rod, places[0], ground, zero), (rod, places[1], push, zero)])
+
+
+@pytest.mark.parametrize("kind", [mbd.Translation, mbd.Prismatic])
+def test_reactions_do_not_depend_on_the_side_from_which_a_joint_is_walked(kind):
+    """A sliding joint with a loss between two bodies, reached from either of them."""
+    one, two = mbd.Link("one", 1.3, 0.9, 0.4, 0.1), mbd.Link("two", 0.8, 1.1, 0.5, 0.2)
+    found, position, velocity = [], {"near.angle": 0.3}, {"near.angle": 0.5}
+    for cut in ("far", "near"):
+        model = mbd.Model("slide", cut=[cut])
+        a, b = one.point(0.2, -0.3).turned(0.4), two.point(-0.3, 0.1).turned(-0.7)
+        label = kind("probe", a, b).labels[0].name
+        slide = kind("slide", a, b, loss={label: mbd.Viscous(3.0)})
+        model.connect(mbd.Revolute("near", model.ground.origin, one.start), slide)
+        model.connect(mbd.Planar("far", model.ground.point(0.5, -0.2), two.origin))
+        names = [name for joint in model.joints for name in joint.coordinate_names]
+        position.setdefault(f"slide.{label}", 0.7), velocity.setdefault(f"slide.{label}", 1.9)
+        if kind is mbd.Translation:
+            position.setdefault("slide.y", 0.4)
+        start = mbd.assemble(model, position, velocity)
+        run = mbd.simulate(model, start, mbd.RungeKutta853(), dt=1e-3, until=2e-3)
+        position, velocity = {n: run[n][0] for n in names}, {n: run[f"{n}.rate"][0] for n in names}
+        found.append([run[f"slide.reaction_{part}"][0] for part in ("force", "torque")])
+    np.testing.assert_allclose(found[0], found[1], atol=1e-9)
+    assert abs(found[0][1][2]) > 0.1

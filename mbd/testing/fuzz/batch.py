@@ -1,0 +1,153 @@
+"""Many fuzzed scenes in processes of their own, and what came of them."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from queue import Empty, Queue
+from typing import Any
+
+from mbd.testing.fuzz.scenes import STRUCTURES
+
+__all__ = ["main", "run_batch", "summary"]
+
+COMMAND = [sys.executable, "-m", "mbd.testing.fuzz", "--worker"]
+"""A worker."""
+LIMIT = 60.0
+"""Wall time after which a scene counts as one without end [s]."""
+
+
+def in_order(numbers: Iterable[int], workers: int, place: int) -> list[int]:
+    """The scenes of one worker, those of one mechanism together."""
+    return sorted((n for n in numbers if n % STRUCTURES % workers == place), key=lambda n: (n % STRUCTURES, n))
+
+
+def run_batch(
+    numbers: Sequence[int], limit: float = LIMIT, hear: Callable[[dict[str, Any]], None] | None = None
+) -> list[dict[str, Any]]:
+    """Verdicts of scenes, made in another process; one that dies or takes longer than `limit` seconds is 'bad'.
+
+    Parameters
+    ----------
+    hear : called with each verdict
+    """
+    left, found = list(numbers), []
+    while left:
+        done = _until_lost(left, limit, hear)
+        found += done
+        left = left[len(done) :]
+    return found
+
+
+def _until_lost(
+    numbers: Sequence[int], limit: float, hear: Callable[[dict[str, Any]], None] | None
+) -> list[dict[str, Any]]:
+    process = subprocess.Popen(
+        COMMAND,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+        env=dict(os.environ),
+    )
+    assert process.stdin is not None
+    assert process.stdout is not None
+    lines: Queue[str] = Queue()
+    stream = process.stdout
+
+    def listen() -> None:
+        for line in stream:
+            lines.put(line)
+        lines.put("")
+
+    threading.Thread(target=listen, daemon=True).start()
+    process.stdin.write(json.dumps(list(numbers)))
+    process.stdin.close()
+    found: list[dict[str, Any]] = []
+    for number in numbers:
+        try:
+            line = lines.get(timeout=limit)
+            why = "" if line else f"the interpreter died with code {process.wait()}"
+        except Empty:
+            why = f"no end after {limit:g} s"
+        if why:
+            process.kill()
+        lost = {"number": number, "kind": "bad", "message": why, "reasons": [why], "scene": "", "seconds": limit}
+        found.append(lost if why else json.loads(line))
+        if hear is not None:
+            hear(found[-1])
+        if why:
+            break
+    process.wait()
+    return found
+
+
+def summary(verdicts: Iterable[dict[str, Any]]) -> str:
+    """Counts, the errors by their class, and the bad ones with their numbers."""
+    told = list(verdicts)
+    kinds = Counter(v["kind"] for v in told)
+    seconds = sorted(v["seconds"] for v in told)
+    lines = [f"{len(told)} scenes: " + ", ".join(f"{kinds[kind]} {kind}" for kind in ("ok", "error", "bad"))]
+    if seconds:
+        lines.append(
+            f"median {1e3 * seconds[len(seconds) // 2]:.0f} ms, mean {1e3 * sum(seconds) / len(seconds):.0f} ms a scene"
+        )
+    classes = Counter(v.get("class", "?") for v in told if v["kind"] == "error")
+    lines += [f"  {count:6d} {name}" for name, count in classes.most_common()]
+    laws = Counter(reason.split(":")[0] for v in told if v["kind"] == "bad" for reason in v["reasons"][:1])
+    lines += [f"  bad {count:4d} {law}" for law, count in laws.most_common()]
+    for v in [v for v in told if v["kind"] == "bad"][:200]:
+        lines.append(f"{v['scene'] or v['number']}\n      " + "\n      ".join(v["reasons"][:4]))
+    return "\n".join(lines)
+
+
+def _work() -> None:
+    """A worker: numbers come as one list, verdicts go out line by line."""
+    from mbd.testing.fuzz.verdict import verdict
+
+    for number in json.load(sys.stdin):
+        print(json.dumps(verdict(number)), flush=True)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """The command."""
+    parser = argparse.ArgumentParser(prog="python -m mbd.testing.fuzz", description=__doc__)
+    parser.add_argument("--scenes", default="0:200", help="numbers of scenes, first:end")
+    parser.add_argument("--workers", type=int, default=1, help="processes side by side")
+    parser.add_argument("--seconds", type=float, default=0.0, help="wall time after which no scene is begun")
+    parser.add_argument("--out", default="", help="a file for all verdicts, one a line")
+    parser.add_argument("--worker", action="store_true", help=argparse.SUPPRESS)
+    given = parser.parse_args(arguments)
+    if given.worker:
+        _work()
+        return
+    first, end = (int(part) for part in given.scenes.split(":"))
+    began, lock, found = time.perf_counter(), threading.Lock(), list[dict[str, Any]]()
+
+    def hear(told: dict[str, Any]) -> None:
+        with lock:
+            found.append(told)
+            if given.out:
+                with open(given.out, "a", encoding="utf-8") as file:
+                    file.write(json.dumps(told) + "\n")
+
+    def serve(place: int) -> None:
+        mine = in_order(range(first, end), given.workers, place)
+        for k in range(0, len(mine), 250):
+            if given.seconds and time.perf_counter() - began > given.seconds:
+                return
+            run_batch(mine[k : k + 250], hear=hear)
+
+    threads = [threading.Thread(target=serve, args=(place,)) for place in range(given.workers)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    print(summary(sorted(found, key=lambda told: int(told["number"]))))

@@ -1,0 +1,135 @@
+"""The verdict on a run, by mechanics written apart from the library's own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+import mbd
+from mbd.testing.fuzz import laws, steps
+from mbd.testing.fuzz.bodies import Bodies
+from mbd.testing.fuzz.faults import Fault, Faults
+from mbd.testing.fuzz.geometry import Array
+from mbd.testing.fuzz.loads import loads
+from mbd.testing.fuzz.readings import Readings, readings
+
+__all__ = ["Judgement", "judge"]
+
+MOST = 48
+"""Rows at which forces are balanced, at most."""
+SHARE = 1e-6
+"""What the balance of a body may miss at a row, where Newton's method ends, over the sum of its terms [-]."""
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """faults : broken laws; tried : how often each law was tried; unjudged : words that this judge does not know."""
+
+    faults: tuple[Fault, ...]
+    tried: Mapping[str, int]
+    unjudged: str = ""
+
+    def __str__(self) -> str:
+        return "\n".join(map(str, self.faults)) or f"{len(self.tried)} laws hold"
+
+
+def judge(run: mbd.Trajectory, model: mbd.Model, parameters: Mapping[str, float] | None = None) -> Judgement:
+    """Whether a run keeps the laws of mechanics.
+
+    Places and motions of bodies come from forward kinematics of the description, with the coordinates that the run
+    reports; forces from their laws, but reactions, contact forces and dry friction as reported; then every body
+    is in balance, constraints hold, contacts push, friction opposes, and rows follow each other as a motion does.
+
+    Parameters
+    ----------
+    run : of `model`; it may have failed, its rows count all the same
+    parameters : those that differ from the model's
+    """
+    given = dict(parameters or {})
+    told = readings(run, model, given)
+    if not run.success:
+        told = told.part(told.time < _until(run))
+    found = Faults(told.time)
+    for name, values in told.values.items():
+        found.small("numbers are finite", name, ~np.isfinite(values), 0.5)
+    if found.found or not len(told):
+        return Judgement(tuple(found.found), found.tried)
+    smooth = run.settings["contact"] != "nonsmooth"
+    with np.errstate(all="ignore"):
+        if run.settings["store"] == 1:
+            steps.motion(found, told, smooth, rates="index3" not in run.settings["integrator"])
+        try:
+            _rows(found, run, model, told, smooth)
+        except NotImplementedError as error:
+            return Judgement(tuple(found.found), found.tried, str(error))
+        if smooth and run.success:
+            steps.passive(found, run)
+    return Judgement(tuple(found.found), found.tried)
+
+
+def _until(run: mbd.Trajectory) -> float:
+    """The instant from which on a failed run says that its rows are none [s]."""
+    head = run.message.partition(" s: ")[0].removeprefix("t = ")
+    try:
+        return float(head)
+    except ValueError:
+        return float(np.inf)
+
+
+def _rows(found: Faults, run: mbd.Trajectory, model: mbd.Model, told: Readings, smooth: bool) -> None:
+    """Laws at rows: guards and impacts at all of them, forces at a choice."""
+    if model.events or model.contacts:
+        everywhere = Bodies(model, told)
+        if smooth:
+            steps.crossings(found, everywhere)
+            steps.impacts(found, everywhere, run, told["kinetic_energy"])
+    chosen = _choice(run, len(told))
+    bodies = Bodies(model, told.part(chosen))
+    there = found.at(bodies.told.time)
+    laws.places(there, bodies)
+    laws.closure(there, bodies, rates="index3" not in run.settings["integrator"])
+    laws.constraints(there, bodies)
+    acting = loads(bodies)
+    if smooth:
+        laws.balance(there, bodies, acting, SHARE)
+    laws.contacts(there, bodies, acting, run)
+    laws.energies(there, bodies, acting)
+
+
+def _choice(run: mbd.Trajectory, n: int) -> Array:
+    """Some of n rows: the first and last, those at events, and others evenly."""
+    rows = {0, n - 1, *np.linspace(0, n - 1, min(n, MOST // 2)).astype(int)}
+    at_events = [row for event in run.events for row in (event.row - 1, event.row, event.row + 1) if 0 <= row < n]
+    rows |= set(at_events[: MOST // 2])
+    return np.array(sorted(rows))
+
+
+def between(run: mbd.Trajectory, model: mbd.Model, parameters: Mapping[str, float] | None = None) -> Judgement:
+    """Whether what a run tells between its rows keeps the laws as its rows do.
+
+    Where the scheme's own interpolation is of low order, the balance may miss a part of what forces change from row to
+    row.
+    """
+    time = run.time
+    steps_of = np.flatnonzero(np.diff(time) > 0.0)
+    if run.settings["contact"] == "nonsmooth" or len(steps_of) < 4:
+        return Judgement((), {})
+    some = steps_of[np.unique(np.linspace(0, len(steps_of) - 1, 12).astype(int))]
+    times = np.concatenate([(1.0 - part) * time[some] + part * time[some + 1] for part in (0.3, 0.62)])
+    times = np.sort(times[(times > np.repeat(0.0, len(times)))])
+    told = readings(run, model, dict(parameters or {}), times)
+    found = Faults(told.time)
+    precise = run.settings["integrator"].startswith(("Runge", "Radau"))
+    with np.errstate(all="ignore"):
+        try:
+            bodies = Bodies(model, told)
+            laws.places(found, bodies)
+            laws.closure(found, bodies, 1e-6 if precise else 1e-3, rates=precise)
+            laws.constraints(found, bodies, 1e-6 if precise else 1e-3) if precise else None
+            if precise:
+                laws.balance(found, bodies, loads(bodies), 1e-5)
+        except NotImplementedError as error:
+            return Judgement(tuple(found.found), found.tried, str(error))
+    return Judgement(tuple(found.found), found.tried)

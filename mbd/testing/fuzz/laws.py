@@ -1,0 +1,268 @@
+"""Laws that hold at every instant: places, closure of loops, balance of forces, constraints, contacts, energies."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+import mbd
+from mbd.testing.fuzz.bodies import Bodies, mass_of
+from mbd.testing.fuzz.faults import Faults
+from mbd.testing.fuzz.geometry import Array, cross, inverse, product, twist
+from mbd.testing.fuzz.loads import Loads
+from mbd.testing.fuzz.quantities import gap_of, named, value_of
+
+__all__ = ["balance", "closure", "constraints", "contacts", "energies", "places", "size_of"]
+
+HELD = 1e-7
+"""What rows may miss, over the size of the mechanism [-]."""
+EQUAL = 1e-9
+"""What two ways to compute one number may differ by, over what it is made of [-]."""
+
+
+def size_of(bodies: Bodies) -> float:
+    """Extent of the mechanism: the largest distance of a frame from the origin [m], at least 1."""
+    reach = [float(np.max(np.abs(placed.H[:, :3, 3]), initial=0.0)) for placed in bodies.placed.values()]
+    arms = [float(np.max(np.abs(bodies.constant(frame)[:3, 3]))) for frame in bodies.model.frames.values()]
+    return 1.0 + max(reach, default=0.0) + max(arms, default=0.0)
+
+
+def places(found: Faults, bodies: Bodies) -> None:
+    """Reported places and velocities of frames are those of forward kinematics."""
+    told, size = bodies.told, size_of(bodies)
+    for name, frame in bodies.model.frames.items():
+        if f"{name}.x" not in told:
+            continue
+        off = np.max(np.abs(told.vector(name) - bodies.place(frame)), axis=1)
+        found.small("place of a frame", name, off, EQUAL * size)
+        if f"{name}.vx" in told:
+            own = bodies.velocity(frame.body.name, bodies.place(frame))
+            reported = np.stack([told[f"{name}.v{axis}"] for axis in "xyz"], axis=1)
+            fast = size * (
+                1.0 + np.linalg.norm(own, axis=1) + np.linalg.norm(bodies.twist(frame.body.name).angular, axis=1)
+            )
+            found.small("velocity of a frame", name, np.max(np.abs(reported - own), axis=1), EQUAL * fast)
+
+
+def closure(found: Faults, bodies: Bodies, loose: float = HELD, rates: bool = True) -> None:
+    """Joints that close loops fit: their frames, seen over both branches, differ by the joint's own motion alone.
+
+    Parameters
+    ----------
+    loose : what places may miss, over the size of the mechanism [-]; rates : whether velocities are held too
+    """
+    size = size_of(bodies)
+    for joint in bodies.closing:
+        across = product(inverse(bodies.frame(joint.parent)), bodies.frame(joint.child))
+        gap = product(inverse(bodies.between(joint)), across)
+        off = np.max(np.abs(gap.H - np.eye(4)), axis=(1, 2))
+        found.small("joint holds its frames together", joint.name, off, loose * size)
+        if not rates:
+            continue
+        apart = twist(gap)
+        slip = np.linalg.norm(apart.angular, axis=1) + np.linalg.norm(apart.linear, axis=1)
+        motion = np.abs(across.first).max(axis=(1, 2))
+        found.small("velocities fit at a joint", joint.name, slip, loose * size * (1.0 + motion))
+
+
+def balance(found: Faults, bodies: Bodies, acting: Loads, share: Any) -> None:
+    """Newton's and Euler's equations of every body: ``m a_c = Σ F``, ``I ω̇ + ω × I ω = Σ T`` about the mass center.
+
+    Parameters
+    ----------
+    share : what is allowed of the sum of the terms, a number or (n,) [-]
+    """
+    planar = all(j.is_planar and j.parent.is_planar and j.child.is_planar for j in bodies.model.joints)
+    sizes = [load.force_size for load in acting.on.values()]
+    whole = np.max(sizes, axis=0) if sizes else 0.0
+    reach = size_of(bodies)
+    motions = [bodies.twist(name) for name in acting.on]
+    spinning = np.max([np.sum(m.angular**2, axis=1) for m in motions], axis=0, initial=0.0)
+    whirl = reach * (
+        spinning + np.max([np.linalg.norm(m.angular_second, axis=1) for m in motions], axis=0, initial=0.0)
+    )
+    for name, load in acting.on.items():
+        mass = mass_of(bodies.model.bodies[name], bodies.told.parameters)
+        R, motion = bodies.placed[name].H[:, :3, :3], bodies.twist(name)
+        arm = R @ mass.center
+        a = motion.linear_second + cross(motion.angular_second, arm) + cross(motion.angular, cross(motion.angular, arm))
+        inertia = R @ mass.inertia @ np.swapaxes(R, 1, 2)
+        spin, change = motion.angular[:, :, None], motion.angular_second[:, :, None]
+        gyro = cross(motion.angular, (inertia @ spin)[:, :, 0])
+        turn = (inertia @ change)[:, :, 0]
+        force, torque = mass.mass * a - load.force, turn + gyro - load.torque
+        if planar:
+            force, torque = force[:, :2], torque[:, 2:]
+        heavy = mass.mass * (np.linalg.norm(a, axis=1) + whirl) + load.force_size
+        twisted = np.linalg.norm(turn, axis=1) + np.linalg.norm(gyro, axis=1) + load.torque_size
+        twisted = twisted + mass.mass * reach * whirl
+        limit = share * heavy + 1e-3 * share * whole + 1e-9
+        found.small("balance of forces", name, np.linalg.norm(force, axis=1), limit)
+        limit = share * twisted + 1e-3 * share * reach * whole + 1e-9
+        if not (mass.planar and not planar):
+            found.small("balance of torques", name, np.linalg.norm(torque, axis=1), limit)
+
+
+def constraints(found: Faults, bodies: Bodies, loose: float = HELD) -> None:
+    """What always acts holds: measures at their values, rows on velocities."""
+    size = size_of(bodies)
+    for word in bodies.model.constraints:
+        if isinstance(word, mbd.Bilateral):
+            wanted = value_of(word.value, word.arguments, bodies, word.name, "value")
+            off = gap_of(word.measure, bodies).value - wanted
+            found.small("constraint holds", word.name, off, loose * (size + np.max(np.abs(wanted), initial=0.0)))
+        elif isinstance(word, mbd.KnifeEdge):
+            R = bodies.frame(word.frame).H[:, :3, :3]
+            v = bodies.velocity(word.frame.body.name, bodies.place(word.frame))
+            off = np.sum(v * (R @ np.asarray(word.normal)), axis=1)
+            found.small("row on velocities holds", word.name, off, loose * (size + np.linalg.norm(v, axis=1)))
+        elif isinstance(word, mbd.Nonholonomic):
+            values = [named(given, bodies) for _, given in word.arguments]
+            bias = value_of(word.bias, (("t", "t"),), bodies, word.name, "bias")
+            scale = sum(np.abs(value) for value in values)
+            found.small("row on velocities holds", word.name, word.row(*values) + bias, loose * (size + scale))
+        elif isinstance(word, mbd.Rolling):
+            found.small("row on velocities holds", word.name, _slip(word, bodies), loose * size * 100.0)
+
+
+def _slip(word: mbd.Rolling, bodies: Bodies) -> Array:
+    """Velocity of the wheel's lowest point against the plane, along the plane."""
+    plane, n = word.ground, len(bodies.told)
+    R = np.broadcast_to(np.eye(3), (n, 3, 3)) if plane.frame is None else bodies.frame(plane.frame).H[:, :3, :3]
+    normal = np.asarray(plane.normal)
+    place = bodies.place(word.center) - bodies.told.parameters[f"{word.name}.radius"] * (R @ normal)
+    v = bodies.velocity(word.center.body.name, place) - R @ np.asarray(plane.velocity)
+    if plane.frame is not None:
+        v = v - bodies.velocity(plane.frame.body.name, place)
+    return np.asarray(np.sum(v * (R @ np.cross(normal, [0.0, 0.0, 1.0])), axis=1))
+
+
+def contacts(found: Faults, bodies: Bodies, acting: Loads, run: Any) -> None:
+    """Gaps, pushes and friction of contacts; dry friction in joints.
+
+    What the run tells in a note about penetration or pull is not counted.
+    """
+    told, size = bodies.told, size_of(bodies)
+    notes = " ".join(map(str, run.stats["notes"]))
+    located = run.settings["contact"] != "nonsmooth" and "index3" not in run.settings["integrator"]
+    largest = np.max([load.force_size for load in acting.on.values()], axis=0, initial=1e-9)
+    for word in bodies.model.contacts:
+        gap = gap_of(word.measure, bodies)
+        closed, force = told.closed[word.name], told[f"{word.name}.force"]
+        found.small("gap as reported", word.name, gap.value - told[f"{word.name}.gap"], EQUAL * size)
+        fast = size * (1.0 + sum(np.abs(motion.angular).max(axis=1) for motion in map(bodies.twist, acting.on)))
+        rate = gap.rate(bodies)
+        found.small(
+            "gap rate as reported", word.name, rate - told[f"{word.name}.gap_rate"], EQUAL * (fast + np.abs(rate))
+        )
+        found.small("an open contact is without force", word.name, force, 0.0, ~closed)
+        if isinstance(word, mbd.Penalty):
+            _force_law(found, word, gap.value, rate, bodies)
+            continue
+        mentioned = f"{word.name!r}" in notes
+        if word.opens_on == "pull":
+            found.small(
+                "a closed contact does not pull",
+                word.name,
+                np.minimum(force, 0.0),
+                1e-6 * largest,
+                closed & ~np.bool_(mentioned),
+            )
+        found.small("a closed contact touches", word.name, gap.value, HELD * size, closed)
+        if not mentioned and word.only_while is None and not word.releases:
+            found.small(
+                "an open contact is outside", word.name, np.minimum(gap.value, 0.0), 10.0 * HELD * size, ~closed
+            )
+        if word.slides and gap.tangents and f"{word.name}.friction" in told:
+            mu = told.parameters[f"{word.name}.mu"]
+            speed = _sliding(gap, bodies)
+            limit = np.where(closed, mu * np.maximum(force, 0.0), 0.0)
+            _dry(found, word.name, told[f"{word.name}.friction"], speed, limit, largest, located)
+    for joint in bodies.model.joints:
+        _joint_friction(found, joint, bodies, largest, located)
+
+
+def _force_law(found: Faults, word: mbd.Penalty, gap: Array, rate: Array, bodies: Bodies) -> None:
+    """p = k δⁿ + c δ̇ of a penalty without a restitution of its own."""
+    told = bodies.told
+    force, closed = told[f"{word.name}.force"], told.closed[word.name]
+    if word.opens_on == "pull":
+        found.small(
+            "a closed contact does not pull",
+            word.name,
+            np.minimum(force, 0.0),
+            1e-6 * np.max(np.abs(force), initial=1.0),
+        )
+    if word.chi is not None:
+        return
+    stiffness, damping = told.parameters[f"{word.name}.stiffness"], told.parameters[f"{word.name}.damping"]
+    pressed = stiffness * np.maximum(-gap, 0.0) ** word.exponent
+    off = np.where(closed, pressed - damping * rate, 0.0) - force
+    scale = np.abs(pressed) + np.abs(damping * rate) + stiffness * 1e-9
+    found.small("force law of a penalty", word.name, off, 1e-7 * scale, closed & (gap < 0.0))
+
+
+def _sliding(gap: Any, bodies: Bodies) -> Array:
+    """Velocity of the point against the surface along the first tangent."""
+    _, direction = gap.tangents[0]
+    (body, place, _), *carriers = gap.points
+    v = bodies.velocity(body, place)
+    for carrier, _, _ in carriers:
+        v = v - bodies.velocity(carrier, place)
+    return np.asarray(np.sum(v * direction, axis=1))
+
+
+def _joint_friction(found: Faults, joint: Any, bodies: Bodies, largest: Array, located: bool) -> None:
+    told = bodies.told
+    for k, name in enumerate(joint.coordinate_names):
+        friction = next((n for n in (f"{name}.friction", f"{joint.name}.friction") if n in told), None)
+        if friction is None:
+            continue
+        limit = np.zeros(len(told))
+        load = np.linalg.norm(told.vector(f"{joint.name}.reaction_force"), axis=1)
+        for place, owner, loss in joint.losses():
+            if place == k:
+                limit = limit + _limit(loss, owner, load, told.parameters)
+        _dry(found, friction, told[friction], told[f"{name}.rate"], limit, largest, located)
+
+
+def _limit(loss: Any, owner: str, load: Array, parameters: Any) -> Any:
+    """Largest friction of a loss that truly sticks."""
+    if isinstance(loss, mbd.PinFriction):
+        return parameters[f"{owner}.mu"] * parameters[f"{owner}.radius"] * load
+    if isinstance(loss, mbd.Coulomb) and loss.smoothing is None:
+        return parameters[f"{owner}.torque"]
+    if hasattr(loss, "losses"):
+        return sum(_limit(part, name, load, parameters) for name, part in loss.named(owner))
+    return 0.0
+
+
+def _dry(found: Faults, name: str, friction: Array, rate: Array, limit: Any, largest: Array, located: bool) -> None:
+    """|F| ≤ limit; where it is located when sliding begins and ends, F against the motion and all of it in motion."""
+    scale = 1e-5 * (largest + np.max(np.abs(limit), initial=0.0))
+    found.small("friction within its limit", name, np.maximum(np.abs(friction) - limit, 0.0), scale)
+    if not located:
+        return
+    found.small("friction opposes sliding", name, np.maximum(friction * np.sign(rate), 0.0), scale, np.abs(rate) > 1e-6)
+    moving = np.abs(rate) > 1e-4
+    found.small("sliding friction is all of it", name, np.abs(friction) - limit, scale, moving)
+
+
+def energies(found: Faults, bodies: Bodies, acting: Loads) -> tuple[Array, Array]:
+    """T and the change of V are those of the bodies and springs; returns T and V (n,) [J]."""
+    told = bodies.told
+    T = np.zeros(len(told))
+    for name in acting.on:
+        mass = mass_of(bodies.model.bodies[name], told.parameters)
+        R, motion = bodies.placed[name].H[:, :3, :3], bodies.twist(name)
+        v = motion.linear + cross(motion.angular, R @ mass.center)
+        local = (np.swapaxes(R, 1, 2) @ motion.angular[:, :, None])[:, :, 0]
+        T = T + 0.5 * mass.mass * np.sum(v * v, axis=1) + 0.5 * np.sum(local * (local @ mass.inertia), axis=1)
+    V = sum(acting.stored.values(), start=np.zeros(len(told)))
+    scale = np.max(np.abs(T), initial=0.0) + sum(np.max(np.abs(part), initial=0.0) for part in acting.stored.values())
+    if "kinetic_energy" in told:
+        found.small("kinetic energy", "kinetic_energy", T - told["kinetic_energy"], EQUAL * scale + 1e-12)
+        off = (V - V[:1]) - (told["potential_energy"] - told["potential_energy"][:1])
+        found.small("potential energy", "potential_energy", off, 10.0 * EQUAL * scale + 1e-12)
+    return T, V

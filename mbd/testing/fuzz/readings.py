@@ -1,0 +1,126 @@
+"""What a run reports, as numbers by name: at its rows, or at other times."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+import mbd
+from mbd.joints.base import Joint
+from mbd.testing.fuzz.geometry import Array, Signal
+
+__all__ = ["Readings", "names_for", "readings"]
+
+
+@dataclass(frozen=True)
+class Readings:
+    """Reported quantities, (n,) each.
+
+    time : instants (n,) [s]
+    values : reported quantities by name
+    closed : by contact, whether it is closed, (n,) booleans
+    parameters : values of the parameters, one number or (n,) each
+    tree : names of the coordinates that the run integrates
+    """
+
+    time: Array
+    values: Mapping[str, Array]
+    closed: Mapping[str, Any]
+    parameters: Mapping[str, Any]
+    tree: frozenset[str]
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def __getitem__(self, name: str) -> Array:
+        return self.values[name]
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.values
+
+    def vector(self, name: str) -> Array:
+        """The components x, y, z of a reported vector, (n, 3)."""
+        return np.stack([self.values[f"{name}.{axis}"] for axis in "xyz"], axis=1)
+
+    def coordinate(self, name: str) -> Signal:
+        """A coordinate with its rate and acceleration."""
+        return Signal(self.values[name], self.values[f"{name}.rate"], self.values[f"{name}.acceleration"])
+
+    def part(self, chosen: Any) -> Readings:
+        """Some of the instants."""
+        parameters = {name: value[chosen] if np.ndim(value) else value for name, value in self.parameters.items()}
+        return Readings(
+            self.time[chosen],
+            {name: value[chosen] for name, value in self.values.items()},
+            {name: value[chosen] for name, value in self.closed.items()},
+            parameters,
+            self.tree,
+        )
+
+
+def names_for(run: mbd.Trajectory, model: mbd.Model) -> list[str]:
+    """The reported quantities that a judge needs, of those that the run has."""
+    labels = [name for joint in model.joints for name in joint.coordinate_names]
+    labels += [f"{body} floating.{label}" for body in model.bodies for label in ("x", "y", "z", "angle")]
+    wanted = [name + suffix for name in labels for suffix in ("", ".rate", ".acceleration")]
+    vectors = [f"{joint.name}.reaction_{kind}" for joint in model.joints for kind in ("force", "torque")]
+    wanted += [f"{vector}.{axis}" for vector in vectors for axis in "xyz"]
+    wanted += [f"{frame}.{axis}" for frame in model.frames for axis in ("x", "y", "z", "vx", "vy", "vz")]
+    reported = ("force", "gap", "gap_rate", "friction", "friction.forward", "friction.sideways", "multiplier")
+    wanted += [f"{word.name}.{suffix}" for word in model.constraints for suffix in reported]
+    wanted += [f"{name}.friction" for name in (*labels, *(joint.name for joint in model.joints))]
+    wanted += ["kinetic_energy", "potential_energy"]
+    known = set(run.names)
+    return [name for name in dict.fromkeys(wanted) if name in known]
+
+
+def readings(run: mbd.Trajectory, model: mbd.Model, given: Mapping[str, float], times: Array | None = None) -> Readings:
+    """What a run reports at its rows, or between them at other times.
+
+    Parameters
+    ----------
+    given : parameters that differ from the model's
+    """
+    record, names = run.record, names_for(run, model)
+    parameters = {**model.parameters, **given}
+    tree = (
+        frozenset(coordinate.name for coordinate in record.equations.coordinates) if record.equations else frozenset()
+    )
+    if times is None:
+        found = dict(zip(names, run.columns.at_rows(names), strict=True))
+        time, source = record.time, np.arange(len(record.time))
+    else:
+        found = run.at(times).read(*names)
+        time, source = times, np.searchsorted(record.time, times, side="right") - 1
+    values = {name: np.broadcast_to(np.asarray(value, dtype=float), time.shape) for name, value in found.items()}
+    contacts = [contact.name for contact in model.contacts]
+    closed = {name: record.closed[source, k].astype(bool) for k, name in enumerate(contacts)}
+    changed = _changed(run, parameters, source)
+    return Readings(time, values, closed, changed, tree)
+
+
+def _changed(run: mbd.Trajectory, parameters: Mapping[str, float], source: Any) -> dict[str, Any]:
+    """The parameters with what controllers have written on the way."""
+    found: dict[str, Any] = dict(parameters)
+    names = list(run.record.parameter_names)
+    for row, values in run.record.parameter_changes:
+        for name, value in zip(names, values, strict=False):
+            known = found.get(name, value)
+            if np.any(known != value):
+                found[name] = np.where(source >= row, value, known)
+    return found
+
+
+def coordinates(joint: Joint, told: Readings) -> list[Signal] | None:
+    """The coordinates of a joint, None where the run does not report them."""
+    if any(name not in told for name in joint.coordinate_names):
+        return None
+    return [told.coordinate(name) for name in joint.coordinate_names]
+
+
+def known(names: Iterable[str], told: Readings) -> bool:
+    """Whether all of these are reported."""
+    return all(name in told for name in names)

@@ -1,0 +1,130 @@
+"""Fuzzed scenes: a mechanism, values of its parameters, a start, a scheme and its steps, all made from one number."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import mbd
+from mbd.testing.fuzz.structures import Structure, structure
+
+__all__ = ["STRUCTURES", "Scene", "scene"]
+
+STRUCTURES = 160
+"""How many mechanisms there are; scenes with numbers equal modulo this share one."""
+
+SCHEMES: tuple[Any, ...] = (
+    mbd.HHT(0.05), mbd.HHT(0.3), mbd.GeneralizedAlpha(0.9), mbd.GeneralizedAlpha(0.0), mbd.GeneralizedAlpha(0.5),
+    mbd.Newmark(), mbd.Newmark(0.3025, 0.6), mbd.HHT(0.05, formulation="index3"), mbd.HHT(0.05, start="consistent"),
+    mbd.GeneralizedAlpha(0.7, formulation="index3"), mbd.RadauIIA(), mbd.RadauIIA(), mbd.RungeKutta853(),
+    mbd.RungeKutta853(),
+)  # fmt: skip
+VARIED = (
+    ".mass",
+    ".inertia",
+    ".stiffness",
+    ".damping",
+    ".coefficient",
+    ".torque",
+    ".mu",
+    ".length",
+    ".center",
+    ".x",
+    ".y",
+)
+"""Endings of parameters that scenes change."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What to run.
+
+    number : what it was made from; form : its mechanism
+    cut : which joints are cut; start : arguments of `mbd.assemble`
+    options : arguments of `mbd.simulate` besides model and start
+    check : what is compared beside the laws: '', 'restart', 'file', 'cut', 'twin', 'between', 'step there'
+    """
+
+    number: int
+    form: Structure
+    cut: Any
+    start: Mapping[str, Any]
+    options: Mapping[str, Any]
+    check: str
+
+    @property
+    def model(self) -> mbd.Model:
+        """The mechanism with the joints that are cut."""
+        return self.form.with_cut(self.cut)
+
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """Parameters that differ from those of the model."""
+        found: Mapping[str, float] = self.start["parameters"]
+        return found
+
+    def __str__(self) -> str:
+        options = ", ".join(f"{name}={value!r}" for name, value in self.options.items())
+        return f"{self.number}: {self.form.kind} {self.form.number}, cut={self.cut!r}, {options}, check {self.check!r}"
+
+
+def scene(number: int, structures: int = STRUCTURES) -> Scene:
+    """The scene of a number.
+
+    Raises
+    ------
+    ModelError
+        where the library refuses the words of its mechanism.
+    """
+    form = structure(number % structures)
+    rng = random.Random(f"scene {number}")
+    cut: Any = rng.choices(["auto", *form.cuts], [3, *(1 for _ in form.cuts)])[0]
+    scheme = rng.choice(SCHEMES)
+    options: dict[str, Any] = {"integrator": scheme}
+    dt = 10.0 ** (rng.uniform(-3.3, -1.8) if rng.random() < 0.8 else rng.uniform(-6.0, -1.0))
+    steps = 10.0 ** rng.uniform(1.0, 2.3)
+    explicit = isinstance(scheme, mbd.RungeKutta853 | mbd.RadauIIA)
+    if rng.random() < 0.2 and getattr(scheme, "formulation", "ggl") != "index3" and scheme.order() > 1:
+        options |= {"tol": 10.0 ** rng.uniform(-8 if explicit else -4.5, -2), "until": rng.uniform(0.1, 0.5)}
+    else:
+        options |= {"dt": dt, "until": dt * steps}
+    contacts = bool(form.model.contacts)
+    if contacts:
+        options["contact"] = rng.choice(
+            ["auto", "events", "events", "nonsmooth"] if "dt" in options else ["auto", "events"]
+        )
+        options["impact"] = rng.choice(["newton", "newton", "poisson", "sequential"])
+    check = rng.choice(["", "", "restart", "file", "cut", "between", "between", "step there"])
+    if rng.random() < 0.02:
+        check = "twin"
+    return Scene(number, form, cut, _start(rng, form), options, check)
+
+
+def _start(rng: random.Random, form: Structure) -> dict[str, Any]:
+    """The pose of the mechanism or one nearby, any speed, other parameters.
+
+    Where rows tie coordinates together, mostly the pose itself and one rate; sometimes more than they allow, which is
+    projected or refused.
+    """
+    tied = form.loops and rng.random() < 0.85
+    spread = 0.0 if tied else rng.choice([0.0, 0.0, 0.02, 0.02 if form.model.contacts else 0.3])
+    speed = rng.choice([0.0, 1.0, 10.0 ** rng.uniform(-3, 1)])
+    position = {name: value + spread * rng.uniform(-1, 1) for name, value in form.position.items()}
+    free = [name for name in form.position if not form.held or name not in form.held]
+    moving = rng.sample(free, 1) if tied and free else free
+    velocity = {name: speed * rng.uniform(-1, 1) for name in moving} if speed else {}
+    values = _parameters(rng, form)
+    return {"position": position, "velocity": velocity, "parameters": values, "project": not tied}
+
+
+def _parameters(rng: random.Random, form: Structure) -> dict[str, float]:
+    """Some masses, stiffnesses, losses; lengths only where no loop depends on them."""
+    if rng.random() < 0.4:
+        return {}
+    known = form.model.parameters
+    ends = VARIED if not form.loops and not form.model.contacts else VARIED[:7]
+    free = [name for name, value in known.items() if name.endswith(ends) and value not in (0.0, 1.0, -1.0)]
+    picked = rng.sample(free, min(len(free), rng.randint(1, 4)))
+    return {name: known[name] * 10.0 ** rng.uniform(-0.5, 0.5) for name in picked}

@@ -1,0 +1,127 @@
+"""Laws along rows: positions and velocities are integrals, guards that cross make events, passive parts only take."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import mbd
+from mbd.testing.fuzz.bodies import Bodies
+from mbd.testing.fuzz.faults import Faults
+from mbd.testing.fuzz.geometry import Array
+from mbd.testing.fuzz.quantities import gap_of
+from mbd.testing.fuzz.readings import Readings
+
+__all__ = ["crossings", "impacts", "motion", "passive"]
+
+PASSIVE = ("joint loss", "damper", "friction", "penalty", "impact")
+"""Kinds of parts of the ledger that only take energy."""
+
+
+def motion(found: Faults, told: Readings, smooth: bool = True, rates: bool = True) -> None:
+    """Each coordinate is the integral of its rate, and that of its acceleration, from one row to the next.
+
+    ``Δq = h (v₀+v₁)/2 − h² (a₁−a₀)/12`` and ``Δv = h (a₀+a₁)/2`` but for what accelerations change meanwhile: h² and
+    h times the largest change of a of the steps around.
+
+    Parameters
+    ----------
+    smooth : whether velocities change by accelerations alone, not by impulses within steps
+    rates : whether those of velocities count, which index 3 corrects without
+    """
+    h = np.diff(told.time)
+    steps = np.flatnonzero(h > 0.0)
+    if len(steps) < 2:
+        return
+    h = h[steps]
+    there = found.at(told.time[steps])
+    for name in [name for name in told.values if f"{name}.rate" in told and f"{name}.acceleration" in told]:
+        q, v, a = told.coordinate(name)
+        change = _around(np.abs(np.diff(a))[steps]) + 1e-3 * (np.abs(a[steps]) + np.abs(a[steps + 1]))
+        fast = np.maximum(np.abs(v[steps]), np.abs(v[steps + 1]))
+        off = np.diff(q)[steps] - h * (v[steps] + v[steps + 1]) / 2.0
+        if smooth:
+            off = off + h**2 * np.diff(a)[steps] / 12.0
+        limit = 3.0 * h**2 * change + 1e-8 * (1.0 + np.abs(q[steps]) + h * fast)
+        limit = limit if smooth and rates else limit + (0.2 if smooth else 10.0) * h * _range(v)[steps]
+        there.small("a coordinate is the integral of its rate", name, off, limit)
+        if smooth and rates:
+            off = np.diff(v)[steps] - h * (a[steps] + a[steps + 1]) / 2.0
+            there.small("a rate is the integral of the acceleration", name, off, 2.0 * h * change + 1e-7 * (1.0 + fast))
+
+
+def _around(values: Array) -> Array:
+    """The largest of each value and its two neighbours on either side."""
+    wide = np.pad(values, 2, mode="edge")
+    return np.asarray(np.max(np.stack([wide[k : k + len(values)] for k in range(5)]), axis=0))
+
+
+def _range(values: Array) -> Array:
+    """Largest minus smallest of each value and its four neighbours on either side."""
+    wide = np.pad(values, 4, mode="edge")
+    around = np.stack([wide[k : k + len(values)] for k in range(9)])
+    return np.asarray(np.ptp(around, axis=0))
+
+
+def crossings(found: Faults, bodies: Bodies) -> None:
+    """Between two rows without an event no guard passes from one side to the other."""
+    told = bodies.told
+    steps = np.flatnonzero(np.diff(told.time) > 0.0)
+    there = found.at(told.time[steps + 1])
+    for word in bodies.model.events:
+        g = gap_of(word.guard, bodies).value
+        before, after = g[steps], g[steps + 1]
+        rises, falls = np.minimum(-before, after), np.minimum(before, -after)
+        crossed = np.maximum(
+            rises if word.direction >= 0 else 0.0 * g[steps], falls if word.direction <= 0 else 0.0 * g[steps]
+        )
+        there.small(
+            "an event happens where its guard crosses zero",
+            word.name,
+            np.maximum(crossed, 0.0),
+            1e-7 * (1.0 + np.abs(g).max()),
+        )
+
+
+def impacts(found: Faults, bodies: Bodies, run: mbd.Trajectory, T: Array) -> None:
+    """A single contact that strikes rebounds with its restitution; no impact makes energy."""
+    told, settings = bodies.told, run.settings
+    words = {word.name: word for word in bodies.model.contacts if isinstance(word, mbd.Unilateral)}
+    times = np.array([event.time for event in run.events])
+    energetic = bool(run.stats["energetic_impacts"])  # Stronge's law took the place of Newton's
+    driven = any(
+        isinstance(word, mbd.Bilateral) and not isinstance(word.value, float) for word in bodies.model.constraints
+    )
+    for event in run.events:
+        word = words.get(event.name)
+        if event.kind != "closed" or word is None or not 0 < event.row < len(told):
+            continue
+        alone = np.count_nonzero(times == event.time) == 1
+        k = event.row
+        there = found.at(told.time[k : k + 1])
+        gap = gap_of(word.measure, bodies)
+        moving = driven or bool(np.any(gap.drift))
+        if not moving and not any(e.time == event.time and e.kind == "event" for e in run.events):
+            scale = float(np.max(T))
+            there.small("an impact makes no energy", event.name, max(T[k] - T[k - 1], 0.0), 1e-8 * scale + 1e-12)
+        others = any(told.closed[name][k - 1] or told.closed[name][k] for name in words if name != event.name)
+        if not alone or others or settings["impact"] != "newton" or energetic:
+            continue
+        rate = gap.rate(bodies)
+        before, after = rate[k - 1], rate[k]
+        slow = abs(before) <= 1.01 * settings["rest_speed"]
+        wanted = 0.0 if slow else -word.restitution * before
+        speeds = 1.0 + np.max(np.abs(rate[k - 1 : k + 1]))
+        there.small(
+            "a blow rebounds with its restitution", event.name, after - wanted, 1e-6 * speeds + float(slow) * 1e-3
+        )
+
+
+def passive(found: Faults, run: mbd.Trajectory) -> None:
+    """What only takes energy has given none at any row, unless a note tells so."""
+    ledger = run.energy
+    notes = " ".join(map(str, run.stats["notes"]))
+    swing = np.max(np.abs(ledger.kinetic), initial=0.0) + np.ptp(ledger.potential)
+    there = found.at(ledger.time)
+    for part in ledger.parts:
+        if part.kind in PASSIVE and f"'{part.name}'" not in notes:
+            there.small("a passive part gives no energy", part.name, np.maximum(part.energy, 0.0), 1e-6 * swing + 1e-9)

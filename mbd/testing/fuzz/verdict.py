@@ -1,0 +1,184 @@
+"""A scene is run and judged: well, ended by an error with a name, or bad."""
+
+from __future__ import annotations
+
+import time
+import traceback
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+import mbd
+from mbd.errors import MbdError
+from mbd.testing.fuzz.judge import between, judge
+from mbd.testing.fuzz.scenes import Scene, scene
+
+__all__ = ["verdict"]
+
+
+def verdict(number: int) -> dict[str, Any]:
+    """How the scene of a number ended.
+
+    Returns
+    -------
+    'kind': 'ok', 'error' (of a class, 'class') or 'bad' with 'reasons'; 'message', 'scene', 'seconds', 'check'
+    """
+    began = time.perf_counter()
+    told: dict[str, Any] = {"number": number, "kind": "ok", "reasons": [], "message": "", "scene": "", "check": ""}
+    try:
+        made = scene(number)
+        told |= {"scene": str(made), "check": made.check}
+        told |= _judged(made)
+    except MbdError as error:
+        told |= {"kind": "error", "class": type(error).__name__, "message": str(error)}
+    except Exception as error:
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        told["reasons"] = [f"crashed: {error!r} at {Path(place.filename).name}:{place.lineno}"]
+    if told["reasons"]:
+        told["kind"] = "bad"
+    return told | {"seconds": round(time.perf_counter() - began, 4)}
+
+
+def run_of(made: Scene, **changes: Any) -> mbd.Trajectory:
+    """The run of a scene, with other options where they are given."""
+    options = {**made.options, **changes}
+    model = options.pop("model", made.model)
+    start = options.pop("start", None)
+    if start is None:
+        start = mbd.assemble(model, **made.start)
+    return mbd.simulate(model, start, on_failure="return", **options)
+
+
+def _judged(made: Scene) -> dict[str, Any]:
+    run = run_of(made)
+    found = judge(run, made.model, made.parameters)
+    reasons = [str(fault) for fault in found.faults]
+    if found.unjudged:
+        reasons.append(f"not judged: {found.unjudged}")
+    if run.success and not reasons and len(run) > 3:
+        reasons += _compared(made, run)
+    told: dict[str, Any] = {"reasons": reasons, "notes": list(map(str, run.stats["notes"])), "rows": len(run)}
+    if not run.success:
+        told |= {"kind": "error", "class": _class_of(run.message), "message": run.message}
+    return told
+
+
+def _class_of(message: str) -> str:
+    """The kind of a failed run, by the first words behind the instant."""
+    text = message.split(": ", 1)[-1] if message.startswith("t = ") else message
+    words = [word for word in text.replace("'", " ").split() if word.isalpha()]
+    return "stopped: " + " ".join(words[:3])
+
+
+def _compared(made: Scene, run: mbd.Trajectory) -> list[str]:
+    check = made.check
+    if check in ("restart", "file"):
+        return _restarted(made, run, by_file=check == "file")
+    if check == "between":
+        return [f"between rows: {fault}" for fault in between(run, made.model, made.parameters).faults]
+    if check == "step there":
+        return _step_there(made, run)
+    if check == "cut":
+        return _other_cut(made, run)
+    if check == "twin":
+        return _twin(made, run)
+    return []
+
+
+def _restarted(made: Scene, run: mbd.Trajectory, by_file: bool) -> list[str]:
+    """A run that is cut in two at one of its rows and goes on from there is the same, to the bit."""
+    if "tol" in made.options:
+        return []
+    middle = len(run) // 2
+    at = float(run.time[middle])
+    if np.count_nonzero(run.time == at) > 1:
+        return []
+    first = run_of(made, until=at)
+    final = first.final
+    if by_file:
+        with TemporaryDirectory() as folder:
+            final = mbd.load(first.save(Path(folder) / "half")).final
+    second = run_of(made, start=final, until=made.options["until"])
+    wanted = run.record.q[-1]
+    if first.success and second.success and np.array_equal(second.record.q[-1], wanted):
+        return []
+    dt = made.options["dt"]
+    on_grid = any(abs((at - t) / dt - round((at - t) / dt)) < 1e-6 for t in (0.0, *(e.time for e in run.events)))
+    off = np.max(np.abs(second.record.q[-1] - wanted)) if second.success else np.inf
+    if not on_grid or run.stats.get("shortened", 0):
+        return []
+    return [f"cut in two at t = {at:.6g} s: the end differs by {off:.3g}"]
+
+
+def _step_there(made: Scene, run: mbd.Trajectory) -> list[str]:
+    """What is asked between rows is where a run that ends there ends."""
+    if run.settings["contact"] == "nonsmooth" or run.record.parameter_changes:
+        return []
+    k = len(run) * 2 // 3
+    t = float(0.6 * run.time[k - 1] + 0.4 * run.time[k])
+    if t <= run.time[k - 1] or t >= run.time[k] or "tol" in made.options:
+        return []
+    short = run_of(made, until=t)
+    if not short.success:
+        return [f"a run until t = {t:.6g} s fails: {short.message[:80]}"]
+    faults = []
+    h = run.time[k] - run.time[k - 1]
+    lo, hi = max(k - 4, 0), min(k + 4, len(run))
+    precise = run.settings["integrator"].startswith(("Runge", "Radau"))
+    for joint in made.model.joints:
+        for name in joint.coordinate_names:
+            a = run[f"{name}.acceleration"][lo:hi]
+            bound = h**2 * (0.05 if precise else 1.0) * (np.ptp(a) + 1e-6 * np.max(np.abs(a))) + 1e-8 * (
+                1.0 + abs(run[name][k])
+            )
+            off = abs(float(run.at(t)[name]) - float(short[name][-1]))
+            if not off <= bound:
+                faults.append(f"between rows: {name!r} at t = {t:.6g} s off by {off:.3g} from a step that ends there")
+    return faults
+
+
+def _other_cut(made: Scene, run: mbd.Trajectory) -> list[str]:
+    """The same motion whichever joints are cut, within what half of the step changes."""
+    others = [cut for cut in ("auto", *made.form.cuts) if cut != made.cut]
+    if not others or run.settings["contact"] == "nonsmooth":
+        return []
+    cut = others[made.number % len(others)]
+    names = [name for joint in made.model.joints for name in joint.coordinate_names]
+    place = {name: float(run[name][0]) for name in names}
+    speed = {name: float(run[f"{name}.rate"][0]) for name in names}
+    other_model = made.form.with_cut(cut)
+    again = mbd.assemble(other_model, position=place, velocity=speed, parameters=made.parameters, project=True)
+    changes: dict[str, Any] = (
+        {"dt": made.options["dt"] / 2.0} if "dt" in made.options else {"tol": made.options["tol"] / 4.0}
+    )
+    other, finer = run_of(made, model=other_model, start=again), run_of(made, **changes)
+    if not other.success or not finer.success or [e.name for e in finer.events] != [e.name for e in run.events]:
+        return []
+    moved = max(abs(float(run[name][-1]) - float(finer[name][-1])) for name in names)
+    faults = [f"other cut: with {cut!r} {fault}" for fault in judge(other, other_model, made.parameters).faults]
+    for name in names:
+        a, b, c = (float(each[name][-1]) for each in (run, other, finer))
+        allowed = 20.0 * abs(a - c) + 1e-6 * (1.0 + abs(a)) + 30.0 * made.options.get("tol", 0.0)
+        if not abs(a - b) <= allowed + 20.0 * moved:
+            faults.append(
+                f"other cut: with {cut!r} {name!r} ends at {b:.9g} instead of {a:.9g}, half of the step at {c:.9g}"
+            )
+    return faults
+
+
+def _twin(made: Scene, run: mbd.Trajectory) -> list[str]:
+    """The first steps in plain Python are those of machine code."""
+    if "tol" in made.options:
+        return []
+    k = min(6, len(run) - 1)
+    until = float(run.time[k])
+    if until <= 0.0:
+        return []
+    fast, plain = (run_of(made, until=until, backend=backend) for backend in ("llvm", "python"))
+    if len(fast) != len(plain) or fast.success != plain.success:
+        return [f"compiled code has {len(fast)} rows until t = {until:.6g} s, its twin {len(plain)}"]
+    off = np.max(np.abs(fast.record.q - plain.record.q), initial=0.0)
+    scale = 1.0 + np.max(np.abs(fast.record.q), initial=0.0)
+    return [] if off <= 1e-9 * scale else [f"compiled code and its twin differ by {off:.3g} after {k} steps"]

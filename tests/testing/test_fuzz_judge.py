@@ -1,0 +1,223 @@
+"""The judge of fuzzed scenes agrees with the library on sound runs, and sees each kind of wrong one."""
+
+import json
+import sys
+
+import numpy as np
+import pytest
+
+import mbd
+from mbd.bodies import algebra
+from mbd.equations import kinematics
+from mbd.joints.losses.viscous import Viscous
+from mbd.results.columns import ModelColumns
+from mbd.testing.fuzz import batch
+from mbd.testing.fuzz.geometry import Signal, inverse, product, shift, turn, twist
+from mbd.testing.fuzz.judge import between, judge
+from mbd.testing.fuzz.scenes import STRUCTURES, scene
+from mbd.testing.fuzz.verdict import verdict
+
+SOUND = [2, 10, 12, 40, 68, 98, 112, 128, 138]
+
+
+def laws_broken(run, model, parameters=None):
+    return {fault.law for fault in judge(run, model, parameters).faults}
+
+
+def arm(**change):
+    """A mass that slides along a turning arm, with a loss in the hinge."""
+    model = mbd.Model("arm", **change)
+    boom, slider = mbd.Link("boom", 1.3, 1.1, 0.4, 0.1), mbd.RigidBody("slider", 0.7, 0.05, center=(0.1, 0.2, 0.0))
+    model.connect(
+        mbd.Revolute("hinge", model.ground.origin, boom.start, loss=mbd.Viscous(0.3)),
+        mbd.Prismatic("track", boom.point(0.1, -0.3), slider.origin, axis=(0, 1, 0), stiffness=30.0, rest=0.2),
+    )
+    return model
+
+
+def swung(model, **options):
+    start = mbd.assemble(model, position={"hinge.angle": 1.0}, velocity={"hinge.angle": 4.0})
+    return mbd.simulate(model, start, dt=5e-3, until=0.5, **options)
+
+
+def skidding():
+    """A mass that falls on a floor and skids."""
+    model, ball = mbd.Model("ball"), mbd.PointMass("ball", 1.3)
+    model.connect(mbd.Translation("flight", model.ground.origin, ball.origin))
+    model.constrain(mbd.Unilateral("floor", mbd.touchdown(ball.origin), friction=0.3, restitution=0.5))
+    start = mbd.assemble(model, position={"flight.y": 0.01}, velocity={"flight.x": 2.0})
+    return model, mbd.simulate(model, start, dt=1e-3, until=0.2)
+
+
+def four_bar():
+    model = mbd.Model("four-bar")
+    a, b, c = (mbd.Link(name, 1.0, 1.0, 0.5, 0.1) for name in ("crank", "coupler", "rocker"))
+    model.connect(
+        mbd.Revolute("one", model.ground.origin, a.start), mbd.Revolute("two", a.end, b.start),
+        mbd.Revolute("three", b.end, c.end), mbd.Revolute("four", model.ground.point(1.2, 0.0), c.start),
+    )  # fmt: skip
+    start = mbd.assemble(model, position={"one.angle": 0.4}, velocity={"one.angle": 2.0})
+    return model, mbd.simulate(model, start, mbd.RungeKutta853(), dt=1e-2, until=0.5)
+
+
+# sound runs ----------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("scheme", [mbd.HHT(), mbd.RadauIIA(), mbd.RungeKutta853()], ids=repr)
+def test_a_sound_run_breaks_no_law(scheme):
+    run = swung(arm(), integrator=scheme)
+    assert judge(run, arm()).faults == ()
+    assert len(judge(run, arm()).tried) >= 9
+
+
+def test_impacts_friction_and_loops_of_sound_runs_break_no_law():
+    model, run = skidding()
+    found = judge(run, model)
+    assert found.faults == () and "sliding friction is all of it" in found.tried
+    model, run = four_bar()
+    assert judge(run, model).faults == () and "joint holds its frames together" in judge(run, model).tried
+    assert between(run, model).faults == ()
+
+
+@pytest.mark.parametrize("number", SOUND)
+def test_fuzzed_scenes_are_judged_sound(number):
+    told = verdict(number)
+    assert told["kind"] == "ok", told
+
+
+def test_a_scene_is_made_again_from_its_number():
+    one, two = scene(25), scene(25)
+    assert str(one) == str(two) and one.start == two.start and one.model is two.model
+    assert scene(25 + STRUCTURES).form is one.form
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("part", range(20))
+def test_twenty_thousand_fuzzed_scenes_break_no_law(part):
+    numbers = [n for n in range(20000) if n % STRUCTURES % 20 == part]
+    told = batch.run_batch(sorted(numbers, key=lambda n: (n % STRUCTURES, n)))
+    bad = [v for v in told if v["kind"] == "bad"]
+    assert not bad, batch.summary(bad)
+    assert len(told) == len(numbers)
+
+
+def test_placements_are_differentiated_in_time():
+    def moved(t):
+        first = Signal(*(np.array([x]) for x in (np.sin(2 * t), 2 * np.cos(2 * t), -4 * np.sin(2 * t))))
+        second = Signal(*(np.array([x]) for x in (t**2, 2 * t, 2.0)))
+        return product(
+            turn((0.6, 0.0, 0.8), first), inverse(product(shift((0, 1, 0), second), turn((1, 0, 0), second)))
+        )
+
+    h, now = 1e-4, moved(0.7)
+    before, after = moved(0.7 - h), moved(0.7 + h)
+    np.testing.assert_allclose(now.first, (after.H - before.H) / (2 * h), atol=1e-6)
+    np.testing.assert_allclose(now.second, (after.first - before.first) / (2 * h), atol=1e-6)
+    np.testing.assert_allclose(twist(now).linear, now.first[:, :3, 3])
+
+
+# planted faults ------------------------------------------------------------------------------------------------------
+def test_a_wrapped_angle_is_seen():
+    run = swung(arm())
+    run.record.q[60:, 0] -= 2.0 * np.pi
+    assert laws_broken(run, arm()) == {"a coordinate is the integral of its rate"}
+
+
+def test_a_contact_that_pulls_is_seen():
+    model, run = skidding()
+    run.record.lam[-1, 0] = 30.0
+    assert "a closed contact does not pull" in laws_broken(run, model)
+
+
+def test_friction_with_a_wrong_sign_is_seen():
+    model, run = skidding()
+    run.record.lam[-1, 1] *= -1.0
+    assert {"friction opposes sliding", "balance of forces"} <= laws_broken(run, model)
+
+
+def test_a_wrong_reaction_between_rows_is_seen(monkeypatch):
+    model, run = four_bar()
+    right = ModelColumns.between
+
+    def wrong(self, places):
+        rows = right(self, places)
+        rows.lam[:] *= 1.001
+        return rows
+
+    monkeypatch.setattr(ModelColumns, "between", wrong)
+    assert "balance of torques" in {fault.law for fault in between(run, model).faults}
+    assert judge(run, model).faults == ()
+
+
+def test_a_row_off_its_constraint_is_seen():
+    model, run = four_bar()
+    run.record.q[30, 1] += 1e-5
+    assert "joint holds its frames together" in laws_broken(run, model)
+
+
+def test_a_joint_assembled_half_a_turn_off_is_seen():
+    model, run = four_bar()
+    other = mbd.Model("turned")
+    other.ground = model.ground
+    last = model.joints[3]
+    other.connect(*model.joints[:3], mbd.Revolute(last.name, last.parent, last.child.turned(np.pi)))
+    assert "joint holds its frames together" in laws_broken(run, other)
+
+
+def test_energy_that_a_loss_gives_is_seen(monkeypatch):
+    right = Viscous.force
+    monkeypatch.setattr(Viscous, "force", lambda self, *given: -right(self, *given))
+    model = arm()
+    assert {"balance of torques", "a passive part gives no energy"} <= laws_broken(swung(model), model)
+
+
+def test_a_blow_that_gives_energy_is_seen():
+    model, run = skidding()
+    row = run.events[0].row
+    run.record.v[row:, 1] *= 20.0
+    broken = laws_broken(run, model)
+    assert {"an impact makes no energy", "a blow rebounds with its restitution"} <= broken
+
+
+def test_a_missed_event_is_seen():
+    model = arm()
+    run = swung(model)
+    model.constrain(mbd.Event("passing", mbd.measure(lambda q: q - 1.1, "hinge.angle", unit="rad")))
+    assert laws_broken(run, model) == {"an event happens where its guard crosses zero"}
+
+
+def test_a_coriolis_term_with_a_wrong_sign_is_seen(monkeypatch):
+    monkeypatch.setattr(
+        kinematics, "scaled", lambda s, v: algebra.scaled(-s if isinstance(s, float) and s == 2.0 else s, v)
+    )
+    model = arm()
+    run = swung(model)
+    assert "balance of forces" in laws_broken(run, model)
+
+
+def test_parameters_are_those_of_the_run():
+    model = arm()
+    run = swung(model, parameters={"slider.mass": 1.9})
+    assert laws_broken(run, model, {"slider.mass": 1.9}) == set()
+    assert "balance of forces" in laws_broken(run, model)
+
+
+# batches -------------------------------------------------------------------------------------------------------------
+def test_a_worker_that_dies_or_never_ends_costs_one_scene(tmp_path, monkeypatch):
+    script = tmp_path / "worker.py"
+    script.write_text(
+        "import json, os, sys, time\n"
+        "for n in json.load(sys.stdin):\n"
+        "    os._exit(3) if n == 2 else time.sleep(60) if n == 4 else None\n"
+        "    print(json.dumps({'number': n, 'kind': 'ok', 'reasons': [], 'scene': '', 'seconds': 0.0}), flush=True)\n"
+    )
+    monkeypatch.setattr(batch, "COMMAND", [sys.executable, str(script)])
+    told = batch.run_batch([1, 2, 3, 4, 5], limit=2.0)
+    assert [v["kind"] for v in told] == ["ok", "bad", "ok", "bad", "ok"]
+    assert "died with code 3" in told[1]["message"] and "no end after 2 s" in told[3]["message"]
+    assert "3 ok, 0 error, 2 bad" in batch.summary(told)
+
+
+def test_the_command_writes_a_summary(tmp_path, capsys):
+    out = tmp_path / "verdicts.jsonl"
+    batch.main(["--scenes", "2:3", "--out", str(out)])
+    assert "1 scenes: 1 ok" in capsys.readouterr().out
+    assert json.loads(out.read_text())["number"] == 2
