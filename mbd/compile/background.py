@@ -16,6 +16,8 @@ import time
 from collections import deque
 from typing import Protocol
 
+from mbd.compile import forking  # noqa: F401  (a fork stops the thread first, then waits for locks)
+
 __all__ = ["Job", "finish", "submit", "wake"]
 
 PAUSE = 0.001

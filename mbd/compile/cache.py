@@ -1,8 +1,12 @@
 """Object files on disk, so that a model is turned into machine code once per machine.
 
-One file per key in a directory of the user; it starts with the sha256 of the rest, and an entry that does not fit
-it counts as absent. Files appear by renaming, so that readers never see half of one. The directory is
-``MBD_CACHE`` if that is set (the word ``off`` means no cache), else the platform's cache directory.
+One file per key in a directory of the user; it starts with the sha256 of the key and the rest, so that an entry that
+was damaged, or has got the name of another, counts as absent. Files appear by renaming, so that readers never see half
+of one. The directory is ``MBD_CACHE`` if that is set (the word ``off`` means no cache), else the platform's cache
+directory.
+
+What is read here is executed. A directory that belongs to another user, or that others may write to, is not used, and a
+warning says so; nor is a file of another user, one that others may write to, or anything that is not a regular file.
 Nothing here raises: a directory that cannot be used is a cache that remembers nothing.
 """
 
@@ -10,6 +14,9 @@ from __future__ import annotations
 
 import contextlib
 import os
+import stat
+import time
+import warnings
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
@@ -17,10 +24,14 @@ from pathlib import Path
 __all__ = ["LIMIT", "ObjectCache", "default_cache", "key_of"]
 
 LIMIT = 256 * 2**20
-"""Bytes above which the entries that were written longest ago are removed (a model takes 10 to 200 kB)."""
+"""Bytes above which the entries that were used longest ago are removed (a model takes 10 to 200 kB)."""
+RECENT = 3600.0
+"""Age of the note of its last use below which an entry keeps it, and that of a draft that may still be written [s]."""
 
 _DIGEST = 32
-_SUFFIX = ".object"
+_SUFFIX, _DRAFT, _LASTING = ".object", ".draft", "kernel-"
+_OTHERS = stat.S_IWGRP | stat.S_IWOTH
+_TOLD: set[str] = set()
 
 
 def key_of(*parts: str) -> str:
@@ -33,43 +44,90 @@ def key_of(*parts: str) -> str:
     return digest.hexdigest()
 
 
+def _sealed(key: str, data: bytes) -> bytes:
+    """What an entry of this key begins with."""
+    return sha256(f"{len(key)}:{key}".encode() + data).digest()
+
+
+def _foreign(status: os.stat_result) -> str:
+    """Whose a directory or file is, if it is not of this user alone; ''."""
+    if os.name == "nt":
+        return ""
+    if status.st_uid != os.geteuid():
+        return "belongs to another user"
+    return "may be written by others" if status.st_mode & _OTHERS else ""
+
+
 @dataclass(frozen=True)
 class ObjectCache:
     """Bytes by key in a directory; `directory` None remembers nothing."""
 
     directory: Path | None = None
 
-    def load(self, key: str) -> bytes | None:
-        """What was stored under the key, or None if there is nothing whole and readable."""
-        if self.directory is None:
+    def load(self, key: str, lasting: bool = False) -> bytes | None:
+        """What was stored under the key, or None if there is nothing whole, readable and of this user."""
+        if self.directory is None or not self._is_ours():
             return None
+        path = self.directory / _name(key, lasting)
         try:
-            content = (self.directory / (key + _SUFFIX)).read_bytes()
+            content = _content_of(path)
+            if content is None:
+                return None
+            data = content[_DIGEST:]
+            if not data or _sealed(key, data) != content[:_DIGEST]:
+                return None
+            if time.time() - path.stat().st_mtime > RECENT:
+                os.utime(path)  # it was used
         except OSError:
             return None
-        data = content[_DIGEST:]
-        return data if data and sha256(data).digest() == content[:_DIGEST] else None
+        return data
 
-    def store(self, key: str, data: bytes) -> None:
-        """Write an entry at once, or not at all."""
+    def store(self, key: str, data: bytes, lasting: bool = False) -> None:
+        """Write an entry at once, or not at all; one that is `lasting` outlives those that are not."""
         if self.directory is None:
             return
-        draft = self.directory / f"{key}.{os.getpid()}.{os.urandom(4).hex()}.draft"
+        draft = self.directory / f"{key}.{os.getpid()}.{os.urandom(4).hex()}{_DRAFT}"
         try:
             self.directory.mkdir(mode=0o700, parents=True, exist_ok=True)
-            draft.write_bytes(sha256(data).digest() + data)
-            os.replace(draft, self.directory / (key + _SUFFIX))
+            if not self._is_ours():
+                return
+            draft.write_bytes(_sealed(key, data) + data)
+            draft.chmod(0o600)
+            os.replace(draft, self.directory / _name(key, lasting))
             self._prune()
         except OSError:
             with contextlib.suppress(OSError):
                 draft.unlink(missing_ok=True)
 
-    def _prune(self) -> None:
-        """Remove the oldest entries until `LIMIT` is kept."""
+    def _is_ours(self) -> bool:
+        """Whether the directory is of this user alone; says once why not. One that is not there yet is."""
         assert self.directory is not None
-        entries = [(status.st_mtime, status.st_size, path) for path, status in self._entries(self.directory)]
-        excess = sum(size for _, size, _ in entries) - LIMIT
-        for _, size, path in sorted(entries):
+        try:
+            problem = _foreign(self.directory.stat())
+        except OSError:
+            return True  # nothing can be read there, and `store` makes it or fails
+        if problem:
+            _tell(
+                f"the code cache '{self.directory}' {problem}, and what is in it is executed: it is not used, and code "
+                "is compiled anew in every process; name a directory of your own in MBD_CACHE, or take the rights of "
+                "others away (chmod go-w)"
+            )
+        return not problem
+
+    def _prune(self) -> None:
+        """Remove drafts that nobody finished, then the entries used longest ago until `LIMIT` is kept."""
+        assert self.directory is not None
+        entries = []
+        now = time.time()
+        for path, status in self._entries(self.directory):
+            if path.name.endswith(_DRAFT):
+                if now - status.st_mtime > RECENT:
+                    with contextlib.suppress(OSError):
+                        path.unlink()
+                continue
+            entries.append((path.name.startswith(_LASTING), status.st_mtime, status.st_size, path))
+        excess = sum(size for _, _, size, _ in entries) - LIMIT
+        for _, _, size, path in sorted(entries):
             if excess <= 0:
                 return
             with contextlib.suppress(OSError):
@@ -81,19 +139,50 @@ class ObjectCache:
         found = []
         with os.scandir(directory) as scan:
             for entry in scan:
-                if entry.name.endswith((_SUFFIX, ".draft")):
+                if entry.name.endswith((_SUFFIX, _DRAFT)):
                     with contextlib.suppress(OSError):  # removed by another process meanwhile
-                        found.append((Path(entry.path), entry.stat()))
+                        found.append((Path(entry.path), entry.stat(follow_symlinks=False)))
         return found
 
 
+def _name(key: str, lasting: bool) -> str:
+    return f"{_LASTING if lasting else ''}{key}{_SUFFIX}"
+
+
+def _content_of(path: Path) -> bytes | None:
+    """All of a regular file of this user; None of anything else, which might never end or be written by others."""
+    flags = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+    with open(os.open(path, flags), "rb") as file:
+        status = os.fstat(file.fileno())
+        if not stat.S_ISREG(status.st_mode) or _foreign(status) or status.st_size > LIMIT:
+            return None
+        return file.read()
+
+
+def _tell(sentence: str) -> None:
+    """Warn, once in a process."""
+    if sentence not in _TOLD:
+        _TOLD.add(sentence)
+        warnings.warn(sentence, UserWarning, stacklevel=2)
+
+
 def default_cache() -> ObjectCache:
-    """The cache that ``MBD_CACHE`` names, or that of the user."""
+    """The cache that ``MBD_CACHE`` names, or that of the user; one that remembers nothing where there is none."""
     place = os.environ.get("MBD_CACHE", "").strip()
     if place.lower() == "off":
         return ObjectCache()
-    if place:
-        return ObjectCache(Path(place).expanduser())
-    from platformdirs import user_cache_path
+    try:
+        if place:
+            return ObjectCache(Path(place).expanduser())
+        from platformdirs import user_cache_path
 
-    return ObjectCache(user_cache_path("mbd", appauthor=False) / "objects")
+        directory = user_cache_path("mbd", appauthor=False) / "objects"
+    except (RuntimeError, KeyError, OSError):  # no HOME, and no entry for this user
+        directory = Path()
+    if directory.is_absolute():
+        return ObjectCache(directory)
+    _tell(
+        "there is no home directory to keep compiled code in: it is compiled anew in every process; name a directory "
+        "in MBD_CACHE"
+    )
+    return ObjectCache()

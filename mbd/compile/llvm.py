@@ -27,7 +27,6 @@ from __future__ import annotations
 import ctypes
 import re
 import sys
-import threading
 import time
 import weakref
 from collections.abc import Callable, Mapping, Sequence
@@ -35,12 +34,14 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
+import llvmlite
 import llvmlite.binding as llvm
 import numpy as np
 
 from mbd.arrays import Vector
 from mbd.compile.background import submit, wake
 from mbd.compile.cache import ObjectCache, default_cache, key_of
+from mbd.compile.forking import COMPILING
 from mbd.compile.functions import ByName
 from mbd.compile.ir import LIBRARY, module
 from mbd.compile.layout import Layout
@@ -61,6 +62,9 @@ HASTY = 4500
 
 CUTS = {0: {"large": 150, "part": 120}}
 """Cuts of functions into parts that differ from those of `ir`, by level."""
+
+PASSES = {"from level": 3, "speed_level": 3, "slp_vectorization": True}
+"""Passes over the IR, and from which level on; part of the key of every object file."""
 
 _PROTOTYPE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
 
@@ -116,35 +120,39 @@ def _target_machine(level: int) -> llvm.TargetMachine:
 
 def emit_object(text: str, level: int = LEVEL) -> bytes:
     """The object file of an IR text."""
-    machine = _target_machine(level)
-    ir = llvm.parse_assembly(text, llvm.create_context())
-    ir.triple, ir.data_layout = machine.triple, str(machine.target_data)
-    if level >= 3:
-        options = llvm.create_pipeline_tuning_options(speed_level=3)
-        options.slp_vectorization = True
-        builder = llvm.create_pass_builder(machine, options)
-        builder.getModulePassManager().run(ir, builder)
-    code: bytes = machine.emit_object(ir)
+    with COMPILING:
+        machine = _target_machine(level)
+        ir = llvm.parse_assembly(text, llvm.create_context())
+        ir.triple, ir.data_layout = machine.triple, str(machine.target_data)
+        if level >= PASSES["from level"]:
+            options = llvm.create_pipeline_tuning_options(speed_level=PASSES["speed_level"])
+            options.slp_vectorization = PASSES["slp_vectorization"]
+            builder = llvm.create_pass_builder(machine, options)
+            builder.getModulePassManager().run(ir, builder)
+        code: bytes = machine.emit_object(ir)
     return code
 
 
-def cached_object(tag: str, make: Callable[[], bytes], cache: ObjectCache | None = None) -> bytes:
+def cached_object(
+    tag: str, make: Callable[[], bytes], cache: ObjectCache | None = None, lasting: bool = False
+) -> bytes:
     """What `make` compiles for this machine, from the cache if it is there.
 
-    The tag must say everything that the object depends on, besides processor and LLVM version.
+    The tag must say everything that the object depends on, besides processor, LLVM version and `PASSES`; what is
+    `lasting` is the last to be removed from a cache that is full.
     """
     store = default_cache() if cache is None else cache
     key = _key(tag)
-    code = store.load(key)
+    code = store.load(key, lasting)
     if code is None:
         code = make()
-        store.store(key, code)
+        store.store(key, code, lasting)
     return code
 
 
 def _key(tag: str) -> str:
     this = host()
-    return key_of(tag, this.triple, this.cpu, this.features, this.llvm)
+    return key_of(tag, this.triple, this.cpu, this.features, this.llvm, llvmlite.__version__, repr(PASSES))
 
 
 _FLOAT = np.dtype(np.float64)
@@ -179,12 +187,11 @@ class Machine:
     """An execution engine: object files go in, addresses come out. Addresses are valid as long as it lives."""
 
     def __init__(self) -> None:
-        self._lock = threading.Lock()
         self._engine: llvm.ExecutionEngine | None = None
 
     def load(self, code: bytes, symbols: Sequence[str], *more: bytes) -> list[int]:
         """The addresses of some functions of object files, which must not bring a symbol that is here already."""
-        with self._lock:
+        with COMPILING:
             if self._engine is None:
                 _announce_library()
                 self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _target_machine(0))

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 from weakref import WeakKeyDictionary
 
+from mbd.compile.forking import free_in_child
 from mbd.compile.mechanism import Mechanism
 from mbd.equations.derivation import derive
 from mbd.equations.lagrangian import Lagrangian
@@ -17,6 +18,7 @@ __all__ = ["mechanism_of"]
 
 _KNOWN: WeakKeyDictionary[Any, dict[tuple[str, frozenset[str]], tuple[Any, Mechanism]]] = WeakKeyDictionary()
 _LOCK = threading.Lock()
+free_in_child(_LOCK)
 
 
 def _description(model: Any) -> Any:

@@ -15,6 +15,7 @@ from collections.abc import Callable
 from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 __all__ = ["MODULES", "constants_of", "entry", "functions_of", "kernel_object", "object_of", "source_digest"]
 
@@ -102,12 +103,17 @@ def constants_of(*modules: str) -> dict[str, float]:
 
 def object_of(text: str) -> bytes:
     """The object file of an IR text, optimized for this machine."""
-    import llvmlite.binding as llvm
-
+    from mbd.compile.forking import COMPILING
     from mbd.compile.llvm import host
 
+    with COMPILING:
+        return _compiled(text, host())
+
+
+def _compiled(text: str, here: Any) -> bytes:
+    import llvmlite.binding as llvm
+
     module = llvm.parse_assembly(text)
-    here = host()
     target = llvm.Target.from_triple(here.triple)
     machine = target.create_target_machine(cpu=here.cpu, features=here.features, opt=3)
     tuning = llvm.create_pipeline_tuning_options(speed_level=2)
@@ -132,5 +138,5 @@ def entry() -> Callable[[int], int]:
     """The compiled kernel: ``entry(address of table) → status``."""
     from mbd.compile.llvm import cached_object, load_object
 
-    address = load_object(cached_object(f"kernel {source_digest()}", kernel_object), ENTRY)
+    address = load_object(cached_object(f"kernel {source_digest()}", kernel_object, lasting=True), ENTRY)
     return ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)(address)
