@@ -95,6 +95,7 @@ if TYPE_CHECKING:
         Viscous as Viscous,
     )
     from mbd.model import Model as Model, on_slope as on_slope
+    from mbd.projection import project as project
     from mbd.results.failure import Failure as Failure
     from mbd.simulation.replay import Replay as Replay, replay as replay
     from mbd.simulation.simulate import simulate as simulate
@@ -141,6 +142,7 @@ _HOMES = {
     "mbd.joints": "Cylindrical Planar Prismatic Revolute Screw Translation Universal Weld",
     "mbd.joints.losses": "Coulomb Dissipation PinFriction Quadratic Tabulated Viscous",
     "mbd.model": "Model on_slope",
+    "mbd.projection": "project",
     "mbd.results.failure": "Failure",
     "mbd.simulation.replay": "Replay replay",
     "mbd.simulation.simulate": "simulate",

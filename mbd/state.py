@@ -51,6 +51,7 @@ class Memory:
     controllers : samples and states of controllers, and the time from which samples count
     pending : (kind, name) of events at this instant whose reset or controller failed, to be repeated
     place : (q, v, z) of the state; controllers go on from there whatever the scheme and its steps
+    mode, anchors : those of the state, by which one that was changed by hand is told apart
     seal : hash of the rest; a memory that does not agree with it is damaged and never used
     """
 
@@ -64,6 +65,8 @@ class Memory:
     controllers: Mapping[str, Any] = field(default_factory=dict)
     pending: tuple[tuple[str, str], ...] = ()
     place: Vector = field(default_factory=_empty)
+    mode: Mode = Mode()
+    anchors: Vector = field(default_factory=_empty)
     seal: str = ""
 
 

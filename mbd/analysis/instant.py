@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.bodies.values import named_number_faults
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of
 from mbd.compile.python import scalar_function
+from mbd.consistency import residuals, violations
 from mbd.equations.equations import Row
 from mbd.equations.linearization import LinearTerms, linearization
 from mbd.errors import ModelError
@@ -25,12 +27,9 @@ from mbd.simulation.arguments import fits
 from mbd.simulation.plain import MechanismSystem
 from mbd.simulation.shares import shares
 from mbd.simulation.stepper import Stepper
-from mbd.state import State
+from mbd.state import State, malformed
 
 __all__ = ["Instant", "instant"]
-
-INCONSISTENT = 1e-6
-"""Row residual [m, rad, m/s, rad/s], relative to 1 or the largest speed, above which a state is not consistent."""
 
 REASONS = {
     F.NOT_FINITE: "a force, a mass or a row is not finite there",
@@ -129,6 +128,9 @@ def instant(model: Any, state: State, parameters: Mapping[str, float] | None = N
     """
     if not isinstance(state, State):
         raise ModelError(f"state must be a State from mbd.assemble(model, …), not {state!r}")
+    faults = malformed(state) + named_number_faults(parameters, "parameters")
+    if faults:
+        raise ModelError(faults)
     changed = {**state.parameters, **(parameters or {})}
     mechanism = mechanism_of(model, backend, changed)
     manager = ActiveSetManager(mechanism.equations)
@@ -183,13 +185,10 @@ def _pulls(name: str) -> str:
 
 def _faults(found: Instant) -> list[str]:
     """Active rows that the state does not satisfy."""
-    terms, faults = found.terms(), list[str]()
-    limit = INCONSISTENT * max(1.0, float(np.max(np.abs(found.state.v), initial=0.0)))
-    for k, row in enumerate(found._chosen):
-        if abs(terms.h[k]) > INCONSISTENT:
-            faults.append(f"{row.title} is violated by {terms.h[k]:.3g} {row.unit}")
-        elif abs(terms.rate[k]) > limit:
-            faults.append(f"{row.title} is violated by {terms.rate[k]:.3g} {row.unit}/s in its velocity")
+    state, system = found.state, found.system
+    y, speed = np.concatenate([state.v, state.z]), float(np.max(np.abs(state.v), initial=0.0))
+    left = residuals(found.mechanism, state.time, state.q, y, system.parameters, system.anchors)
+    faults = violations(found.mechanism.equations.rows, found.rows, left, speed)
     if faults:
-        faults[-1] += "; mbd.assemble(model, position, velocity) gives a state that satisfies all rows"
+        faults[-1] += "; mbd.project(model, state) or mbd.assemble(model, …) gives a state that satisfies all rows"
     return faults

@@ -96,6 +96,9 @@ def callbacks(observers: Any, progress: Any) -> list[str]:
 
 def fits(start: State, equations: Equations, manager: ActiveSetManager) -> None:
     """The state must be one of this model, of finite numbers."""
+    faults = malformed(start)
+    if faults:
+        raise ModelError(faults)
     names = tuple(coordinate.name for coordinate in equations.coordinates)
     anchors = sum(len(contact.anchors) for contact in manager.contacts)
     sizes = (len(start.q), len(start.v), len(start.z)) == (equations.n_q, equations.n_v, equations.n_z)
@@ -108,7 +111,7 @@ def fits(start: State, equations: Equations, manager: ActiveSetManager) -> None:
     unknown = [nearest(name, manager.names, "contact") for name in dict.fromkeys(contacts) if name not in manager.names]
     if unknown:
         raise UnknownNameError(unknown)
-    if len(start.anchors) != anchors and (start.mode.closed or len(start.anchors)):
+    if len(start.anchors) != anchors and start.mode.closed:
         raise ModelError(
             f"the start holds {len(start.anchors)} anchors of contacts, but the model has {anchors}; assemble it from "
             "this model, with the same parameters="

@@ -9,15 +9,18 @@ import numpy as np
 
 from mbd.arrays import Vector
 from mbd.assembly import BELOW, undetermined
+from mbd.consistency import residuals
 from mbd.errors import ModelError
 from mbd.kernel import fields as F
 from mbd.posture import Posture
+from mbd.simulation.memory import memory_of_end
+from mbd.simulation.parameters import residuals_now, violations_now
 from mbd.state import State
 
 if TYPE_CHECKING:
     from mbd.simulation.run import Run
 
-__all__ = ["begin", "check_rank", "guard_values", "notify", "set_side"]
+__all__ = ["begin", "check_rank", "guard_values", "notify", "require_consistent", "set_side"]
 
 
 def notify(run: Run) -> None:
@@ -44,6 +47,7 @@ def begin(run: Run, start: State) -> None:
     v["armed"][:n_contacts] = run.manager.flags(armed)
     v["clock"][F.NOW] = v["clock"][F.BASE] = start.time
     v["clock"][F.LAST_SWITCH] = -np.inf
+    require_consistent(run, start)
     v["state"][F.RESTART], v["state"][F.MODE] = 1, -1
     guards = guard_values(run)
     inside = _touch(run, start, guards)
@@ -51,6 +55,31 @@ def begin(run: Run, start: State) -> None:
         raise ModelError(inside)
     for e in range(n_guards):
         set_side(run, e, guards)
+
+
+def require_consistent(run: Run, start: State) -> None:
+    """A start must satisfy the rows that are active in it, as far as the run that it is the end of left them.
+
+    Raises
+    ------
+    ModelError
+        with the rows that it violates, and how far.
+    """
+    v, mechanism = run.values, run.mechanism
+    if not run.manager.active_rows(v["closed"][: v["n_contacts"]]):
+        return
+    q, y, anchors = v["q"][: v["n_q"]], v["y"][: v["n"]], v["anchors"][: v["n_anchors"]]
+    usual, memory = None, memory_of_end(run, start)
+    if memory is not None and len(memory.parameters) == len(v["params"]):
+        usual = residuals(mechanism, start.time, q, y, memory.parameters, anchors)[:2]
+    faults = violations_now(run, residuals_now(run), usual)
+    if faults:
+        advice = (
+            "mbd.project(model, state) gives the nearest state that does, mbd.assemble(model, …) one of named values"
+        )
+        if run.changed != start.parameters:
+            advice += "; give it the parameters= of the run too"
+        raise ModelError([f"the start does not satisfy its constraints: {'; '.join(faults)}. {advice}"])
 
 
 def _touch(run: Run, start: State, guards: Vector) -> list[str]:

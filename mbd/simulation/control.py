@@ -16,6 +16,7 @@ from mbd.errors import ModelError, SimulationError, UnknownNameError, nearest
 from mbd.kernel import fields as F
 from mbd.simulation.asked import asked
 from mbd.simulation.memory import without_sharing
+from mbd.simulation.parameters import residuals_now, violations_now
 
 if TYPE_CHECKING:
     from mbd.simulation.run import Run
@@ -59,6 +60,7 @@ def apply_reset(run: Run, guard: Guard) -> None:
     what = f"the reset of {guard.name!r} at t = {run.now:.6g} s"
     wanted = _finite_numbers(f"{what} sets", asked(what, _reset_values, guard.reset, run.named()))
     equations, v = run.mechanism.equations, run.values
+    usual = residuals_now(run)[:2]
     positions = {coordinate.name: k for k, coordinate in enumerate(equations.coordinates)}
     rates = {name: k for name, k in rate_names(equations).items() if name not in positions}
     states = {state.name: equations.n_v + k for k, state in enumerate(equations.states)}
@@ -71,15 +73,9 @@ def apply_reset(run: Run, guard: Guard) -> None:
             v["q"][positions[name]] = number
         else:
             v["y"][places[name]] = number
-    flags = v["closed"][: v["n_contacts"]]
-    rows = list(run.manager.active_rows(flags))
-    terms = run.mechanism.acceleration_terms(
-        run.now, v["q"][: v["n_q"]], v["y"][: v["n"]], v["params"], v["anchors"][: v["n_anchors"]]
-    )
-    off = [k for k in rows if abs(terms.h[k]) > 1e-6 or abs(terms.rate[k]) > 1e-6 * (1.0 + np.max(np.abs(v["y"])))]
+    off = violations_now(run, residuals_now(run), usual)
     if off:
-        names = ", ".join(repr(equations.rows[k].owner) for k in off)
-        raise SimulationError(f"{what} breaks {names}; reset velocities too")
+        raise SimulationError(f"{what} breaks constraints: {'; '.join(off)}; reset all that they bind, velocities too")
 
 
 def _reset_values(reset: Any, named: Named) -> dict[str, Any]:

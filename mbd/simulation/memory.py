@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from copy import deepcopy
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from mbd.state import Memory, State
 if TYPE_CHECKING:
     from mbd.simulation.run import Run
 
-__all__ = ["carry_on", "memory_of", "take_up", "without_sharing"]
+__all__ = ["carry_on", "memory_of", "memory_of_end", "take_up", "without_memory", "without_sharing"]
 
 OPTIONS = ("dt", "tol", "allowed", "longest", "contact", "impact", "locate", "rest_speed", "backend")
 """Settings that a memory depends on."""
@@ -33,6 +34,8 @@ def memory_of(run: Run, time: float) -> Memory:
     return sealed(Memory(
         belongs(run), digest(run), time, parameters, reals, integers, stepper.scheme.memory,
         run.boundaries.remembered(), tuple((event.kind, event.name) for event in run.pending), place,
+        run.manager.mode(run.values["closed"][: run.values["n_contacts"]]),
+        run.values["anchors"][: run.values["n_anchors"]].copy(),
     ))  # fmt: skip
 
 
@@ -120,6 +123,20 @@ def carry_on(run: Run, start: State) -> bool:
         return False
     run.boundaries.take_up(memory.controllers, run.now)
     return True
+
+
+def memory_of_end(run: Run, start: State) -> Memory | None:
+    """The memory of a state, which is in the kernel's arrays, if it is the end of an earlier run as that left it."""
+    memory = start.memory
+    if memory is None or damage(memory) or memory.time != start.time or memory.mode != start.mode:
+        return None
+    same = np.array_equal(memory.place, _place(run)) and np.array_equal(memory.anchors, start.anchors)
+    return memory if same else None
+
+
+def without_memory(state: State) -> State:
+    """The same state, from which a scheme starts afresh; that a run has ended in it is still known."""
+    return state if state.memory is None else replace(state, memory=sealed(replace(state.memory, belongs=())))
 
 
 def _is_of(run: Run, memory: Memory, start: State) -> bool:

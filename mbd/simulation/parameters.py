@@ -1,23 +1,27 @@
-"""Values that a controller writes during a run, judged as those that a model is described with."""
+"""What controllers and resets change during a run, judged as what a model is described with and a run starts from."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from mbd.arrays import Vector
 from mbd.assembly import undetermined
 from mbd.bodies.domains import ParameterCheck
 from mbd.compile.mechanism import Mechanism
+from mbd.consistency import residuals, violations
 from mbd.posture import Posture
 from mbd.tape.derivatives import live
+from mbd.tape.node import Node
 
 if TYPE_CHECKING:
     from mbd.simulation.run import Run
 
-__all__ = ["ParameterJudge"]
+__all__ = ["ParameterJudge", "residuals_now", "violations_now"]
 
 
 class ParameterJudge:
@@ -39,18 +43,45 @@ class ParameterJudge:
     @cached_property
     def _inert(self) -> frozenset[str]:
         """Names of the parameters on which the kinetic energy, and with it the mass matrix, depends."""
-        equations = self._mechanism.equations
-        places = {n.data[1] for n in live([equations.kinetic]) if n.op == "input" and n.data[0] == "p"}
-        return frozenset(p.name for k, p in enumerate(equations.parameters) if k in places)
+        return self._in([self._mechanism.equations.kinetic])
+
+    @cached_property
+    def _binding(self) -> frozenset[str]:
+        """Names of the parameters on which rows depend."""
+        return self._in([node for row in self._mechanism.equations.rows for node in (row.value, row.rate)])
+
+    def _in(self, nodes: Sequence[Node]) -> frozenset[str]:
+        """Names of the parameters in some expressions."""
+        places = {n.data[1] for n in live(nodes) if n.op == "input" and n.data[0] == "p"}
+        return frozenset(p.name for k, p in enumerate(self._mechanism.equations.parameters) if k in places)
 
     def faults(self, run: Run, values: Mapping[str, float]) -> list[str]:
         """One sentence for each; of the state only what the values may have changed is looked at."""
         changed = {**run.changed, **values}
         found = self._check.faults(changed, values)
-        if found or self._inert.isdisjoint(values):
+        if found or (self._inert.isdisjoint(values) and self._binding.isdisjoint(values)):
             return found
-        v = run.values
-        parameters = self._mechanism.parameters(changed, getattr(self._model, "parameters", {}))
-        q, y, anchors = v["q"][: v["n_q"]].copy(), v["y"][: v["n"]].copy(), np.array(v["anchors"])
-        flags = v["closed"][: v["n_contacts"]]
-        return undetermined(Posture(self._mechanism, run.manager, parameters, q, y, flags, anchors, time=run.now))
+        parameters = self._mechanism.parameters(changed, self._model.parameters)
+        if not self._inert.isdisjoint(values):
+            v = run.values
+            q, y, anchors = v["q"][: v["n_q"]].copy(), v["y"][: v["n"]].copy(), np.array(v["anchors"])
+            flags = v["closed"][: v["n_contacts"]]
+            found = undetermined(Posture(self._mechanism, run.manager, parameters, q, y, flags, anchors, time=run.now))
+        if not found and not self._binding.isdisjoint(values):
+            found = violations_now(run, residuals_now(run, parameters), residuals_now(run)[:2])
+        return found
+
+
+def residuals_now(run: Run, parameters: Vector | None = None) -> NDArray[np.float64]:
+    """`mbd.consistency.residuals` of the accepted state, with other values of parameters if these are given."""
+    v = run.values
+    q, y, anchors = v["q"][: v["n_q"]], v["y"][: v["n"]], v["anchors"][: v["n_anchors"]]
+    return residuals(run.mechanism, run.now, q, y, v["params"] if parameters is None else parameters, anchors)
+
+
+def violations_now(run: Run, found: NDArray[np.float64], usual: NDArray[np.float64] | None = None) -> list[str]:
+    """`mbd.consistency.violations` of the rows that are active now."""
+    v = run.values
+    active = run.manager.active_rows(v["closed"][: v["n_contacts"]])
+    speed = float(np.max(np.abs(v["y"][: v["n_v"]]), initial=0.0))
+    return violations(run.mechanism.equations.rows, active, found, speed, usual)

@@ -42,15 +42,22 @@ def sealed(memory: Memory) -> Memory:
 def _seal(memory: Memory) -> str:
     """Hash of what the kernel and the clocks of controllers go on from."""
     told = hashlib.sha256(repr((memory.belongs, memory.digest, memory.time, memory.pending)).encode())
+    told.update(repr(sorted(memory.mode.closed)).encode())
     told.update(repr((memory.controllers.get("begin"), sorted(dict(memory.controllers["samples"]).items()))).encode())
-    for array in (memory.parameters, memory.reals, memory.integers, memory.place):
+    for array in (memory.parameters, memory.reals, memory.integers, memory.place, memory.anchors):
         told.update(array.tobytes())
     return told.hexdigest()
 
 
 def damage(memory: Memory) -> str:
     """Why a memory cannot be what a run has written, in a few words; '' if it can."""
-    for name, kind in (("parameters", float), ("reals", float), ("integers", np.int64), ("place", float)):
+    for name, kind in (
+        ("parameters", float),
+        ("reals", float),
+        ("integers", np.int64),
+        ("place", float),
+        ("anchors", float),
+    ):
         array = getattr(memory, name)
         if not isinstance(array, np.ndarray) or array.ndim != 1 or array.dtype != kind:
             return f"its {name} are no array of numbers"

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import replace
 from itertools import zip_longest
 from typing import Any
 
@@ -24,6 +23,7 @@ from mbd.equations.cost import cost
 from mbd.errors import MbdError, ModelError, SimulationError, UnknownNameError, nearest
 from mbd.integrators import Integrator
 from mbd.results.ledger import Ledger
+from mbd.simulation.memory import without_memory
 from mbd.simulation.simulate import simulate
 from mbd.state import State
 from mbd.trajectory import Trajectory
@@ -99,7 +99,7 @@ class Bench:
         self.backend = options.get("backend", "auto")
         self.options = {name: value for name, value in options.items() if name != "parameters"}
         parameters = {**start.parameters, **(options.get("parameters") or {})}
-        self.scene = Scene(model, replace(start, memory=None), parameters)
+        self.scene = Scene(model, without_memory(start), parameters)
         self.cost = cost(model)
         equations = mechanism_of(model, self.backend, parameters).equations
         self.elements = elements(equations, self.cost)

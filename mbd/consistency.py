@@ -1,0 +1,54 @@
+"""Whether a state satisfies the rows that are active in it, and how far it is off."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbd.arrays import Vector
+from mbd.compile.mechanism import Mechanism
+from mbd.equations.equations import Row
+
+__all__ = ["INCONSISTENT", "residuals", "violations"]
+
+INCONSISTENT = 1e-6
+"""Residual of a row [m, rad], over the size of its terms up to 1, above which a state is not consistent; that of its
+rate [m/s, rad/s], over the size of its terms up to the larger of 1 and the speed."""
+ROUND_OFF = 1e-8
+"""The same residuals below which it always is: ten times what an assembly leaves."""
+
+
+def residuals(
+    mechanism: Mechanism, time: float, q: Vector, y: Vector, parameters: Vector, anchors: Vector
+) -> NDArray[np.float64]:
+    """(4, n_rows): h and ḣ of every row, and the sizes of their terms."""
+    layout = mechanism.layout
+    block = mechanism.block(time, q, y, anchors)
+    terms, sizes = mechanism.terms_of(block, parameters), np.zeros(mechanism.sizes["scales"])
+    mechanism.common["scales"](block, parameters, sizes)
+    return np.array([terms.h, terms.rate, *np.split(sizes[layout.n :], 2)])
+
+
+def violations(
+    rows: Sequence[Row], active: Sequence[int], found: NDArray[np.float64], speed: float, usual: Vector | None = None
+) -> list[str]:
+    """The active rows that do not hold, one part of a sentence each: "'rod' is violated by 0.1 m".
+
+    Parameters
+    ----------
+    rows, active : all rows, and the numbers of those that act
+    found : from `residuals`
+    speed : the largest velocity [m/s, rad/s]
+    usual : (2, n_rows) residuals that are not to blame on the state, such as those that a scheme leaves
+    """
+    said, fast = [], max(1.0, speed)
+    for k in active:
+        h, rate, h_size, rate_size = (float(value) for value in found[:, k])
+        left = (0.0, 0.0) if usual is None else (2.0 * abs(float(usual[0, k])), 2.0 * abs(float(usual[1, k])))
+        if not abs(h) <= max(ROUND_OFF, INCONSISTENT * min(1.0, h_size), left[0]):
+            said.append(f"{rows[k].title} is violated by {h:.3g} {rows[k].unit}")
+        elif not abs(rate) <= max(ROUND_OFF * fast, INCONSISTENT * min(fast, rate_size), left[1]):
+            said.append(f"{rows[k].title} is violated by {rate:.3g} {rows[k].unit}/s in its velocity")
+    return said
