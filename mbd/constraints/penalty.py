@@ -145,10 +145,28 @@ class Penalty(Constraint):
         pushing: Scalar = maximum(1.0 - loss, 0.0)
         return k * self._power(-gap, scope) * pushing
 
+    def elastic_energy(self, gap: Scalar, scope: Scope) -> Scalar | None:
+        """∫ k δⁿ dδ [J] from touch to the depth δ = −g: what the contact can give back; None where its law is another.
+
+        The energy ledger books it apart from what is lost, so that a blow of few steps is booked rightly too.
+        """
+        own = type(self)
+        if own.force is not Penalty.force or own._power is not Penalty._power:
+            return None
+        k, power = scope.parameter(self.name, "stiffness", self.stiffness), scope.tape.power
+        depth = -gap if self._is_odd else maximum(-gap, gap if self.opens_on == "pull" else 0.0)
+        energy: Scalar = k * power(depth, self.exponent + 1.0) / (self.exponent + 1.0)
+        return energy
+
+    @property
+    def _is_odd(self) -> bool:
+        """Whether δⁿ is negative, and not 0, where δ is."""
+        return self.chi is None and self.exponent % 2.0 == 1.0
+
     def _power(self, depth: Scalar, scope: Scope) -> Scalar:
         """δⁿ; where δ < 0 it is 0, or negative where the sign of the force tells when to open."""
         power = scope.tape.power
-        if self.chi is None and self.exponent % 2.0 == 1.0:
+        if self._is_odd:
             return power(depth, self.exponent)
         pressed: Scalar = power(maximum(depth, 0.0), self.exponent)
         if self.opens_on == "pull":

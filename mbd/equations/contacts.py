@@ -164,6 +164,8 @@ def _penalty(found: Laws, scope: Surroundings, dynamics: Dynamics, law: Penalty,
     force = scope.tape.lift(law.force(gap, rate, scope, *[scope.tape.input("anchor", k) for k in anchors]))
     generalized = (*dynamics.generalized(Work([gap], [-force])), *[scope.tape.zero] * len(scope.states))
     found.penalties.append((number, gap, force))
+    energy = law.elastic_energy(gap, scope)
+    elastic = None if energy is None else scope.real(energy)
     gap, rate, force = scope.views.real([gap, rate, force])
     found.contacts.append(
         Contact(
@@ -171,7 +173,7 @@ def _penalty(found: Laws, scope: Surroundings, dynamics: Dynamics, law: Penalty,
             opens_on=law.opens_on, unit=law.measure.unit,
         )
     )  # fmt: skip
-    found.effects.append(penalty_effect(law.name, number, gap, rate, force, generalized, scope))
+    found.effects.append(penalty_effect(law.name, number, gap, rate, force, generalized, scope, elastic))
 
 
 def _guard(scope: Surroundings, event: Event) -> Guard:

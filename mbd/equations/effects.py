@@ -125,11 +125,12 @@ def effect_of(cause: Cause, scope: Surroundings, dynamics: Dynamics) -> Effect:
 
 
 def penalty_effect(
-    name: str, contact: int, gap: Node, rate: Node, force: Node, generalized: Sequence[Node], scope: Surroundings
-) -> Effect:
+    name: str, contact: int, gap: Node, rate: Node, force: Node, generalized: Sequence[Node], scope: Surroundings,
+    elastic: Node | None = None,
+) -> Effect:  # fmt: skip
     """A penalty contact as an effect; its power on the mechanism is force · (ġ − ∂g/∂t) while it acts."""
     drift = jvp([gap], {scope.time: 1.0})[0]
-    return Effect(name, "penalty", lambda: generalized, force * (rate - drift), contact=contact)
+    return Effect(name, "penalty", lambda: generalized, force * (rate - drift), contact=contact, elastic=elastic)
 
 
 def _lazily(scope: Surroundings, dynamics: Dynamics, work: Work) -> Callable[[], Sequence[Node]]:

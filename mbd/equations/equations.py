@@ -150,6 +150,8 @@ class Effect:
     power : rate of work it does on the mechanism [W]; None where `potential` accounts for it
     potential : its stored energy [J] or None
     contact : the penalty contact whose switch it follows, −1 otherwise
+    elastic : energy that a penalty contact can give back while it acts [J], of which `power` is not the account; None
+        where its law does not tell
     """
 
     name: str
@@ -159,6 +161,7 @@ class Effect:
     potential: Node | None = None
     contact: int = -1
     column: str = ""
+    elastic: Node | None = None
 
     def __post_init__(self) -> None:
         if not self.column:

@@ -126,6 +126,7 @@ def _ledger(meta: Mapping[str, Any], members: Members, count: int) -> set[str]:
     wanted = {"kinetic", "potential"}
     wanted |= {f"part {k}" for k, _ in enumerate(_pairs(meta["parts"], "'parts'"))}
     wanted |= {f"store {k}" for k, _ in enumerate(_pairs(meta.get("stored", []), "'stored'"))}
+    _pairs(meta.get("withheld", []), "'withheld'")
     for name in wanted:
         expect(members.head(name) == Head("f", (count,)), f"{name!r}")
     return wanted

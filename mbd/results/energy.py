@@ -21,13 +21,15 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.results.columns import ModelColumns
-from mbd.results.ledger import Ledger, Part
-from mbd.results.powers import Power, moving_share, powers
+from mbd.results.ledger import SPENT, Ledger, Part
+from mbd.results.powers import Lost, Power, moving_share, powers
 from mbd.results.quadrature import cumulative
+from mbd.results.record import EventRecord
 from mbd.results.within import readable, within
 
 if TYPE_CHECKING:
     from mbd.equations.equations import Equations
+    from mbd.tape.node import Node
 
 __all__ = ["doubted_ledger", "kinds_of_work", "ledger"]
 
@@ -38,6 +40,10 @@ Nor are works integrated again whose error in one interval is below it.
 """
 ALIKE = 1e-14
 """Difference of two works of an interval, over the largest, that is round-off [-]."""
+RESOLVED = 0.05
+"""Error of the work of a blow, over its largest, up to which rows tell it [-]."""
+UNSURE = 10.0
+"""Gain of a penalty contact of a user's own law over its error below which it is not told [-]."""
 MOST_AGAIN = 20000
 """Intervals of a power that are integrated again, at most: the longest ones."""
 
@@ -111,19 +117,83 @@ def _works(
     doubt = np.zeros((2, len(record.time)))
     for power, value in zip(found, values, strict=True):
         rate = None if power.rate is None else next(rates)
-        work = _refined(columns, power, value, rate, cumulative(record.time, value, rate), least)
+        work = _refined(columns, power.value, value, rate, cumulative(record.time, value, rate), least)
+        trapezoid = _trapezoid(record.time, value)
+        unsure = np.abs(np.diff(work) - trapezoid)
+        if power.lost is not None:
+            work = _of_stop(columns, power.lost, work, unsure, least)
+        elif power.kind in SPENT:
+            work = never_giving(work, value, trapezoid)
         if power.name == "moving coordinates":
             moved = [Part(power.name, power.kind, moved[0].energy + work)]
         else:
-            named.append(Part(power.name, power.kind, work))
-        trapezoid = np.diff(record.time) * (value[:-1] + value[1:]) / 2.0
+            part = Part(power.name, power.kind, work)
+            is_own_law = power.kind == "penalty" and power.lost is None
+            named.append(_told(part, float(np.sum(unsure)), least) if is_own_law else part)
         gives = power.name not in lending and np.max(value, initial=0.0) > 0.0
-        doubt[0 if gives else 1 :, 1:] += np.abs(np.diff(work) - trapezoid)
+        doubt[0 if gives else 1 :, 1:] += unsure
     return named, moved, np.cumsum(doubt, axis=1)
 
 
+def _trapezoid(time: Vector, power: Vector) -> Vector:
+    """h/2 (P₀ + P₁) of each interval (R − 1,) [J]."""
+    return np.asarray(np.diff(time) * (power[:-1] + power[1:]) / 2.0)
+
+
+def never_giving(work: Vector, power: Vector, trapezoid: Vector) -> Vector:
+    """A work whose power is nowhere positive, with the trapezoid where a polynomial through it overshoots."""
+    if np.max(power, initial=0.0) > ROUND_OFF * np.max(np.abs(power), initial=0.0):
+        return work
+    steps = np.diff(work)
+    return np.concatenate([[0.0], np.cumsum(np.where(steps > 0.0, np.minimum(trapezoid, 0.0), steps))])
+
+
+def _told(part: Part, doubt: float, least: float) -> Part:
+    """A penalty contact of a law of the user's, withheld where it seems to give energy that may be an error."""
+    gain = float(np.max(part.energy - part.energy[:1], initial=0.0))
+    if not least < gain <= UNSURE * doubt:
+        return part
+    reason = (
+        f"its power, added up over the rows, gives {gain:.3g} J, with an error of up to {doubt:.3g} J; blows of so few "
+        "steps do not tell its work: use a smaller dt, or define elastic_energy of its law"
+    )
+    return replace(part, energy=np.full(len(part.energy), np.nan), withheld=reason)
+
+
+def _of_stop(columns: ModelColumns, lost: Lost, direct: Vector, unsure: Vector, least: float) -> Vector:
+    """Work of a penalty contact: ∫ p ġ dt of the blows whose rows tell it, else −U(g) and what was lost.
+
+    ∫ p ġ dt is the more accurate where rows resolve a blow, as they balance forces; of a few rows it may be anything.
+    What a contact still holds as it opens is lost, what it holds as it closes it owes: neither is given to the
+    mechanism.
+    """
+    time, closed = columns.record.time, columns.record.closed[:, lost.contact].astype(bool)
+    nodes = [node for node in (lost.elastic, lost.value, lost.rate) if node is not None]
+    elastic, power, *rest = (np.broadcast_to(one, time.shape) for one in columns.evaluate(nodes, columns.rows))
+    rate = rest[0] if rest else None
+    work = _refined(columns, lost.value, power, rate, cumulative(time, power, rate), least)
+    work = never_giving(work, power, _trapezoid(time, power))
+    held = np.where(closed, elastic, 0.0)
+    steps = -np.diff(held)
+    steps[closed[:-1] & ~closed[1:]] = 0.0
+    steps += np.diff(work)
+    begins = closed & ~np.concatenate([[False], closed[:-1]])
+    if not begins.any():
+        return direct
+    blow = np.maximum(np.cumsum(begins) - 1, 0)  # that of each row, or the last before it
+    since = np.where(closed, direct - direct[np.flatnonzero(begins)][blow], 0.0)
+    size, doubt, gain = (np.zeros(blow[-1] + 1) for _ in range(3))
+    np.maximum.at(size, blow, np.abs(since))
+    np.maximum.at(gain, blow, since)
+    np.add.at(doubt, blow[1:], unsure)
+    allowed = ROUND_OFF * size
+    allowed[0] += held[0]
+    told = (doubt <= RESOLVED * size) & (gain <= allowed)
+    return np.concatenate([[0.0], np.cumsum(np.where(told[blow[1:]], np.diff(direct), steps))])
+
+
 def _refined(
-    columns: ModelColumns, power: Power, value: Vector, rate: Vector | None, work: Vector, least: float
+    columns: ModelColumns, power: Node, value: Vector, rate: Vector | None, work: Vector, least: float
 ) -> Vector:  # fmt: skip
     """A work with its long intervals integrated again from states within them, in runs of high order.
 
@@ -143,7 +213,7 @@ def _refined(
     long = long[differ[long] > least]
     if not len(long):
         return work
-    steps[long] = within(columns, [power.value], long)[0]
+    steps[long] = within(columns, [power], long)[0]
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
@@ -167,15 +237,29 @@ def _jumps(columns: ModelColumns, total: Vector, driven: bool) -> list[Part]:
     left = np.where(after, _steps(total), 0.0)
     hits = [event for event in record.events if event.kind == "closed" and event.impulse.any() and after[event.row]]
     struck = np.bincount([event.row for event in hits], minlength=len(left))
-    impacts = {event.name: np.zeros(len(left)) for event in hits}
-    for event in hits:
-        impacts[event.name][event.row] -= event.energy_loss
-        left[event.row] += event.energy_loss
+    impacts: dict[str, Vector] = {}
+    for row in sorted({event.row for event in hits}):
+        for name, loss in _losses([event for event in hits if event.row == row]).items():
+            impacts.setdefault(name, np.zeros(len(left)))[row] -= loss
+            left[row] += loss
     reset = _resets(columns.equations, record, len(left))
     beyond = np.where((struck > 0) & ~reset, left, 0.0)
     parts = [Part(f"{name} impact", "impact", np.cumsum(taken)) for name, taken in impacts.items()]
     parts.append(Part("resets", "reset", np.cumsum(np.where(reset, left, 0.0))))
     return [*parts, Part("drives at impacts", "constraint", np.cumsum(beyond))] if driven else parts
+
+
+def _losses(struck: list[EventRecord]) -> dict[str, float]:
+    """What the contacts of one impact took, by name; together where one of them would seem to give.
+
+    ``−½ Σ Λ (γ⁻ + γ⁺)`` is right in all, and for a contact as far as its speed changes in proportion to its impulse:
+    where blows follow each other, as through a row of balls, that of the second has none before.
+    """
+    total = sum(event.energy_loss for event in struck)
+    least = ROUND_OFF * sum(abs(event.energy_loss) for event in struck)
+    if len(struck) < 2 or min(event.energy_loss for event in struck) >= -least:
+        return {event.name: event.energy_loss for event in struck}
+    return {" and ".join(event.name for event in struck): total}
 
 
 def _resets(equations: Equations, record: Any, rows: int) -> Any:

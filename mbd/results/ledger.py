@@ -30,11 +30,13 @@ class Part:
     kind : 'joint loss', 'damper', 'friction' (dry), 'penalty', 'impact', 'motor', 'force', 'constraint' (a prescribed
         motion, coordinates, a potential or a surface that move with time) or 'reset' (a user's event set values, a
         controller changed parameters); of stored energy 'gravity' or 'potential', where `energy` is the energy itself
+    withheld : why its energy is not told, NaN at every row; '' where it is
     """
 
     name: str
     kind: str
     energy: Vector
+    withheld: str = ""
 
     @property
     def passed(self) -> float:
@@ -45,6 +47,9 @@ class Part:
 @dataclass(frozen=True, eq=False)
 class Ledger:
     """Energy of a run at every stored row: ``T + V = (T + V)₀ + Σ parts + numerical``.
+
+    A part that can only take energy never shows that it gave some: where the rows of a run cannot tell its work it is
+    withheld, with the reason, and stands under `numerical`.
 
     time [s], kinetic T [J], potential V [J] (R,)
     parts : what changed T + V, each integrated on its own from the start
@@ -74,10 +79,10 @@ class Ledger:
     @property
     @np.errstate(all="ignore")
     def numerical(self) -> Vector:
-        """E(t) − E(0) − all parts [J]: what the integrator itself gained or lost."""
+        """E(t) − E(0) − all parts [J]: what the integrator itself gained or lost, and parts that are withheld."""
         left = self.total - _last(self.total[:1])
         for part in self.parts:
-            left = left - part.energy
+            left = left if part.withheld else left - part.energy
         return np.asarray(left)
 
     @property
@@ -115,8 +120,9 @@ class Ledger:
         return tuple(part for part in self.parts if part.kind == kind)
 
     def by_kind(self) -> dict[str, Vector]:
-        """What each kind of cause has given since the start, over time, and 'numerical' [J]."""
-        found = {kind: np.sum([part.energy for part in self.of(kind)], axis=0) for kind in self.kinds}
+        """What each kind of cause has given since the start, over time, without withheld parts, and 'numerical' [J]."""
+        nothing = np.zeros(len(self.time))
+        found = {kind: sum((p.energy for p in self.of(kind) if not p.withheld), nothing) for kind in self.kinds}
         return {**found, "numerical": self.numerical}
 
     def __getitem__(self, name: str) -> Vector:
@@ -153,13 +159,19 @@ class Ledger:
         yield "of which"
         for kind in self.kinds:
             parts = self.of(kind)
-            told = sum(_last(part.energy) for part in parts)
+            told = [_last(part.energy) for part in parts if not part.withheld]
             alone = len(parts) == 1
             title, note = (parts[0].name, f"   {kind}") if alone else (kind, "")
-            yield f"  {title:<{width - 2}}{'':>28}{told:>14.6g}{note}"
+            yield f"  {title:<{width - 2}}{'':>28}{_number(sum(told) if told else None)}{note}"
             for part in () if alone else parts:
-                yield f"    {part.name:<{width - 4}}{'':>14}{_last(part.energy):>14.6g}"
-        yield f"  {'numerical':<{width - 2}}{'':>28}{_last(self.numerical):>14.6g}   the integrator"
+                yield f"    {part.name:<{width - 4}}{'':>14}{_number(None if part.withheld else _last(part.energy))}"
+        withheld = [part for part in self.parts if part.withheld]
+        yield (
+            f"  {'numerical':<{width - 2}}{'':>28}{_number(_last(self.numerical))}   the integrator"
+            f"{', and what is withheld' if withheld else ''}"
+        )
+        for part in withheld:
+            yield f"{part.name!r} is withheld: {part.withheld}"
         if self.stride > 1 and self.parts:
             yield f"works are integrated over rows {self.stride} steps apart, whose error stands under 'numerical'"
 
@@ -168,6 +180,11 @@ class Ledger:
         from mbd.view.plots import energy
 
         return energy(self, path=path)
+
+
+def _number(value: float | None) -> str:
+    """An energy of the table; 'withheld' for None."""
+    return f"{'withheld':>14}" if value is None else f"{value:>14.6g}"
 
 
 def _last(column: Vector) -> float:

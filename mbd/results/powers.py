@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 from mbd.tape.derivatives import gradient, jvp, live, substitute
 
 if TYPE_CHECKING:
-    from mbd.equations.equations import Equations
+    from mbd.equations.equations import Effect, Equations
     from mbd.tape.node import Node, Scalar
 
-__all__ = ["Power", "moving_share", "powers"]
+__all__ = ["Lost", "Power", "moving_share", "powers"]
 
 UNKNOWN_RATE = frozenset({"a", "s", "lam"})
 """Inputs whose rates the stored rows do not hold."""
@@ -20,23 +20,43 @@ UNKNOWN_RATE = frozenset({"a", "s", "lam"})
 
 @dataclass(frozen=True)
 class Power:
-    """Power that one cause gives to the mechanism [W], and its rate [W/s] where that follows from the rows."""
+    """Power that one cause gives to the mechanism [W], and its rate [W/s] where that follows from the rows.
+
+    lost : what a penalty contact takes without giving it back; None for others, and where its law does not tell
+    """
 
     name: str
     kind: str
     value: Node
     rate: Node | None
+    lost: Lost | None = None
+
+
+@dataclass(frozen=True)
+class Lost:
+    """What a penalty contact takes without giving it back.
+
+    value, rate : power [W] and its rate; elastic : energy that it can give back while it acts [J]; contact : its number
+    """
+
+    value: Node
+    rate: Node | None
+    elastic: Node
+    contact: int
 
 
 def powers(equations: Equations) -> list[Power]:
     """Everything that changes T + V, apart from jumps.
 
-    Effects give their own power; a row with h_t ≠ 0 does the work ``λ h_t``; with
-    ``dT/dt = Q·v − ∂T/∂t + d/dt(2T − v·∂T/∂v)`` and ``dV/dt = v·∂V/∂q + ∂V/∂t + ∂V/∂z·ż`` a kinetic energy or a
-    potential that depends on time or on first-order states adds the rest.
+    Effects give their own power; a row with
+    h_t ≠ 0 does the work ``λ h_t``; with ``dT/dt = Q·v − ∂T/∂t + d/dt(2T − v·∂T/∂v)`` and
+    ``dV/dt = v·∂V/∂q + ∂V/∂t + ∂V/∂z·ż`` a kinetic energy or a potential that depends on time or on first-order states
+    adds the rest.
     """
     tape = equations.tape
     found: dict[tuple[str, str], Node] = {}
+    elastic: dict[tuple[str, str], tuple[Node, Effect]] = {}
+    dry = {f"{friction.name} friction": k for k, friction in enumerate(equations.frictions)}
 
     def add(name: str, kind: str, power: Node) -> None:
         found[name, kind] = found.get((name, kind), tape.zero) + power
@@ -44,7 +64,11 @@ def powers(equations: Equations) -> list[Power]:
     for effect in equations.effects:
         if effect.power is not None:
             switch = tape.one if effect.contact < 0 else tape.input("switch", effect.contact)
+            if effect.column == "friction" and effect.name in dry:  # what sticks does no work
+                switch = abs(tape.input("slip", dry[effect.name]))
             add(effect.name, effect.column, switch * effect.power)
+            if effect.elastic is not None:
+                elastic[effect.name, effect.column] = switch * _change(equations, effect.elastic), effect
     still = {tape.input("v", k): 0.0 for k in range(equations.n_v)}
     for number, row in enumerate(equations.rows):
         speed = substitute([row.rate], still)[0]
@@ -65,7 +89,13 @@ def powers(equations: Equations) -> list[Power]:
         if not power.is_zero:
             add(name, "constraint", power)
     rates = _rates(equations, list(found.values()))
-    return [Power(*key, power, rate) for (key, power), rate in zip(found.items(), rates, strict=True)]
+    lost = [found[key] + stored for key, (stored, _) in elastic.items()]
+    losses = {
+        key: Lost(value, rate, effect.elastic, effect.contact)
+        for (key, (_, effect)), value, rate in zip(elastic.items(), lost, _rates(equations, lost), strict=True)
+        if effect.elastic is not None
+    }
+    return [Power(*key, power, rate, losses.get(key)) for (key, power), rate in zip(found.items(), rates, strict=True)]
 
 
 def moving_share(equations: Equations) -> Node:
@@ -76,6 +106,14 @@ def moving_share(equations: Equations) -> Node:
     for rate, momentum in zip(v, gradient(equations.kinetic, v), strict=True):
         total = total - rate * momentum
     return total
+
+
+def _change(equations: Equations, value: Node) -> Node:
+    """d/dt of a function of t and q ⊕ x."""
+    tape = equations.tape
+    seeds: dict[Node, Scalar] = {tape.input("t"): 1.0}
+    seeds |= {tape.input("x", k): tape.input("v", k) for k in range(equations.n_v)}
+    return jvp([value], seeds)[0]
 
 
 def _rates(equations: Equations, nodes: Sequence[Node]) -> list[Node | None]:

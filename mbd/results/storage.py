@@ -66,6 +66,7 @@ def save(run: Trajectory, path: str | Path, names: Sequence[str] | None = None) 
         arrays[f"change {number}"] = values
     meta["aliases"], meta["values"], meta["names"] = _columns(run.columns, names, arrays)
     meta["parts"], meta["stored"] = _ledger(run.energy, arrays)
+    meta["withheld"] = [[part.name, part.withheld] for part in run.energy.parts if part.withheld]
     write(target, arrays, meta)
     return target
 
@@ -117,8 +118,12 @@ def _ledger(ledger: Ledger, arrays: Arrays) -> tuple[list[tuple[str, str]], list
 
 def _read_ledger(record: Record, arrays: Arrays, meta: Mapping[str, Any]) -> Ledger:
     """The ledger of a file; older ones do not tell what stores energy."""
+    reasons = dict(meta.get("withheld", ()))
     parts, stored = (
-        tuple(Part(name, kind, arrays[f"{title} {k}"]) for k, (name, kind) in enumerate(meta.get(key, ())))
+        tuple(
+            Part(name, kind, arrays[f"{title} {k}"], reasons.get(name, ""))
+            for k, (name, kind) in enumerate(meta.get(key, ()))
+        )
         for title, key in (("part", "parts"), ("store", "stored"))
     )
     marks = tuple((event.time, event.name) for event in record.events if event.kind != "opened")

@@ -86,7 +86,7 @@ def judgement(ledger: Ledger, doubt: Matrix, way: Vector, lending: Container[str
     A row alone, as next to a pose in which rows lose rank, is no verdict: of those from the first one on, at least two
     and at least half must say the same, unless its gain is `ABSURD` times all energy until then.
     """
-    givers = [part.energy for part in ledger.parts if part.name not in lending]
+    givers = [part.energy for part in ledger.parts if part.name not in lending and not part.withheld]
     given = sum((np.maximum.accumulate(np.maximum(energy, 0.0)) for energy in givers), np.zeros(len(way)))
     fallen = np.maximum.accumulate(ledger.potential[0] - ledger.potential)
     owned = ledger.kinetic[0] + fallen + given

@@ -225,7 +225,7 @@ def _contribution(
 
 def _energies(ledger: Ledger) -> dict[str, float]:
     """What went through each element of the ledger [J]."""
-    return {part.name: part.passed for part in (*ledger.parts, *ledger.stored)}
+    return {part.name: part.passed for part in (*ledger.parts, *ledger.stored) if not part.withheld}
 
 
 def _check(start: Any, tolerance: Any, options: Mapping[str, Any]) -> None:
