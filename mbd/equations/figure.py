@@ -18,8 +18,12 @@ Segments = list[tuple[str, tuple[str, ...]]]
 
 
 def figure_of(model: Model) -> Callable[[], Segments]:
-    """The figure, made when it is asked for: a link from start to end, other bodies through the frames in use."""
-    return lambda: _segments(model)
+    """The figure of the model as it is now: a link from start to end, other bodies through the frames in use.
+
+    It holds names only: equations are kept as long as the model is there, which they must not keep themselves.
+    """
+    found = _segments(model)
+    return lambda: found
 
 
 def _segments(model: Model) -> Segments:
