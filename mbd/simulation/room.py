@@ -7,7 +7,6 @@ each; where an event may end it sooner only those that it has are counted.
 from __future__ import annotations
 
 import warnings
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 from mbd.results.free import available, size_in_words as memory
@@ -19,8 +18,8 @@ __all__ = ["Room", "available", "memory"]
 
 SHARE = 0.25
 """Part of the memory that is free which the rows of a run may fill: trial runs, and results, need some too."""
-EARLIEST = 1 << 16
-"""Rows before which nothing is foretold."""
+EARLIEST, NOTABLE = 1 << 16, 1 << 25
+"""Rows, and bytes of them, before which nothing is foretold."""
 MANY = 1 << 22
 """Rows above which a run that follows its error says how many they will be: nobody has chosen their number."""
 LARGE = 1.0e9
@@ -30,7 +29,8 @@ LARGE = 1.0e9
 class Room:
     """What the rows of one run may fill.
 
-    The system is asked for the free memory, which takes 50 µs, once it matters: after some ten thousand rows.
+    The system is asked for the free memory, which takes 50 µs, once it matters: after some ten thousand rows, and as
+    often as their number has doubled.
 
     Attributes
     ----------
@@ -41,16 +41,33 @@ class Room:
     def __init__(self, width: int) -> None:
         self.size = 8 * width
         self.problem = self.note = ""
+        self._most, self._seen = -1, 0
 
-    @cached_property
+    def exhausted(self, run: Run) -> str:
+        """The sentence of a run that was refused memory."""
+        self.problem = (
+            f"t = {run.now:.9g} s: the system has no memory left; {run.stored} rows fill "
+            f"{memory(run.stored * self.size)}; {_remedy(run)}"
+        )
+        return self.problem
+
+    @property
     def most(self) -> int:
-        """Rows for which there is room as it is looked at first."""
-        return int(SHARE * available()) // self.size
+        """Rows for which there is room, as it was when it was looked at last."""
+        if self._most < 0:
+            self._look(0)
+        return self._most
+
+    def _look(self, stored: int) -> None:
+        """Ask for the free memory, of which these rows have taken some."""
+        self._most, self._seen = int(SHARE * (available() + stored * self.size)) // self.size, stored
 
     def check(self, run: Run) -> str:
         """Look at a run that goes on; a sentence if it must not store any more rows."""
-        if run.stored < EARLIEST:
+        if run.stored < EARLIEST and run.stored * self.size < NOTABLE:
             return ""
+        if run.stored >= 2 * self._seen:
+            self._look(run.stored)
         rows = _foretold(run)
         if run.stored >= self.most:
             self.problem = (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from time import perf_counter
 from typing import Any
 
@@ -43,8 +44,8 @@ USUAL_SIZE = 10
 """Unknowns above which there are fewer such steps, as the square: large mechanisms get better code at these looks."""
 SHOW_EVERY = 0.1
 """Wall time between two calls of progress and observers [s]."""
-MOST_EXPECTED = 1 << 22
-"""Rows for which a table is laid out at the start; longer runs enlarge it."""
+FIRST_TABLE = 1 << 26
+"""Size of the table that is laid out at the start; longer runs double it as it fills [bytes]."""
 INTERRUPTED = "interrupted"
 """The problem of a run that was interrupted, until its time is known."""
 OVERFULL = (
@@ -86,12 +87,14 @@ class Run:
         self.stepper = Stepper(mechanism, manager, integrator, parameters, dt, compiled_options)
         self.values = self.stepper.values
         self.values["chunk"] = _steps_at_once(self.stepper)
-        expected = min(1.25 * (end - start.time) / dt / options.get("store", 1) + 1024, MOST_EXPECTED)
-        self.table = np.empty((int(expected), self.values["width"]))  # memory is taken as rows are written
+        width, capacity = self.values["width"], self.values["capacity"]
+        expected = 1.25 * (end - start.time) / dt / options.get("store", 1) + 1024
+        expected = max(min(expected, FIRST_TABLE / (8 * width)), 3 * capacity)
+        self.table = np.empty((int(expected), width))  # memory is taken as rows are written
         self.events: list[EventRecord] = []
         self.parameter_changes: list[tuple[int, Vector]] = []
         self.stored = 0
-        self.cause: Exception | None = None
+        self.cause: BaseException | None = None
         self.history: list[Savepoint] = []
         self.pending: tuple[EventRecord, ...] = ()
         self.earlier: Sequence[EventRecord] = ()  # of the run that is repeated, for its message
@@ -132,6 +135,17 @@ class Run:
     def complete(self) -> tuple[Trajectory, str]:
         """Run to the end; the trajectory, and what went wrong ('' if nothing did)."""
         problem, message = self.march()
+        try:
+            return self._concluded(problem, message)
+        except MemoryError:  # with what there is, and nothing that takes more
+            self.history, self.cause = [], MemoryLimitError(self.room.exhausted(self))
+            record = replace(
+                whole_record(self), success=False, message=self.room.problem, final=self.state(), stats={"notes": []}
+            )
+            return Trajectory(record), self.room.problem
+
+    def _concluded(self, problem: str, message: str) -> tuple[Trajectory, str]:
+        """The trajectory of a march that is over, and what went wrong with either."""
         self.collect()
         settled, tried = True, attempt(self) if problem else None
         if problem:
@@ -158,9 +172,13 @@ class Run:
         """(problem, message) of a part of the run; what users' functions raise ends it in order."""
         try:
             return part()
-        except KeyboardInterrupt:
+        except (KeyboardInterrupt, SystemExit) as error:
             self.interrupted = True
+            self.cause = error if isinstance(error, SystemExit) else None
             return INTERRUPTED, ""
+        except MemoryError:
+            self.cause = MemoryLimitError(self.room.exhausted(self))
+            return self.room.problem, ""
         except (SimulationError, UnknownNameError) as error:
             self.cause = self.cause or error
             return str(error), ""
@@ -183,6 +201,7 @@ class Run:
         while not ended:
             known = len(self.events)
             target, due = self.boundaries.next(self.end)
+            self._make_room(2 * self.values["capacity"])  # before they are made: then none is lost
             status = advance(self, target, due)
             self.collect()
             if self.values["counts"][F.LOST]:
@@ -252,11 +271,21 @@ class Run:
         if logged:
             self._collect_events(logged)
         if count:
-            if self.stored + count > len(self.table):
-                self.table = np.concatenate([self.table, np.empty((len(self.table) + count, v["width"]))])
+            self._make_room(count)
             self.table[self.stored : self.stored + count] = v["store"].reshape(-1, v["width"])[:count]
         self.stored += count
         v["state"][F.STORED] = v["state"][F.LOGGED] = 0
+
+    def _make_room(self, count: int) -> None:
+        """Have places for so many more rows; a MemoryError leaves all as it is."""
+        if self.stored + count <= len(self.table):
+            return
+        try:
+            table = np.empty((2 * len(self.table) + count, self.values["width"]))
+        except MemoryError:
+            table = np.empty((self.stored + count, self.values["width"]))
+        table[: self.stored] = self.table[: self.stored]
+        self.table = table
 
     def _collect_events(self, logged: int) -> None:
         """Events from the lines of the log."""

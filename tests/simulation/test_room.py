@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import warnings
 
 import numpy as np
 import pytest
 
 import mbd
-from mbd.simulation import room
+from mbd.results import free
+from mbd.simulation import room, run as running
 from tests.simulation.mechanisms import falling
 
 
@@ -50,3 +53,127 @@ def test_a_run_that_fits_says_nothing():
         found = mbd.simulate(model, start, mbd.HHT(0.05), dt=1e-6, until=0.2)
     assert len(found) == 200_001 and not any("at this rate" in note for note in found.stats["notes"])
     assert room.available() > 1e6 and room.memory(3.21e9) == "3.2 GB" and room.memory(4.5e7) == "45 MB"
+
+
+# memory that is refused ----------------------------------------------------------------------------------------------
+SHORT = """
+import resource, sys
+import numpy as np
+import mbd
+from mbd.results import free
+from mbd.simulation import room, run as running
+from tests.simulation.mechanisms import falling
+
+model, _ = falling(mass=1.0)
+mbd.simulate(model, mbd.assemble(model), dt=1e-3, until=0.1)  # all is loaded
+running.FIRST_TABLE = 1 << 20
+room.available = lambda: 1e12  # nobody foresees it
+def pages():
+    return int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
+resource.setrlimit(resource.RLIMIT_AS, (pages() + (int(sys.argv[1]) << 20),) * 2)
+try:
+    mbd.simulate(model, mbd.assemble(model), dt=1e-6, until=10.0)
+except mbd.MemoryLimitError as error:
+    rows = len(error.run)
+    assert "no memory left" in str(error) and "use store=" in str(error), error
+    assert rows > 30_000 and not error.run.success
+    assert np.isfinite(error.run.time[-1]) and error.run.time[-1] == error.run.final.time
+    print("kept")
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits of the address space are those of Linux")
+@pytest.mark.parametrize("megabytes", [24, 80])
+def test_a_run_that_is_refused_memory_keeps_its_rows(megabytes):
+    ended = subprocess.run([sys.executable, "-c", SHORT, str(megabytes)], capture_output=True, text=True, timeout=300)
+    assert ended.stdout == "kept\n", ended.stderr[-2000:]
+
+
+def test_an_exhausted_memory_in_a_users_function_ends_the_run_with_its_rows():
+    model, start = stiff()
+
+    def observer(time, state):
+        if time > 0.0:
+            raise MemoryError
+
+    with pytest.raises(mbd.SimulationError) as told:
+        mbd.simulate(model, start, mbd.HHT(0.05), dt=1e-4, until=50.0, observers=[observer])
+    assert len(told.value.run) > 1
+
+
+def test_a_long_run_lays_out_no_more_than_it_fills(monkeypatch):
+    model, start = stiff()
+    seen = []
+    run = mbd.simulate(
+        model, start, mbd.HHT(0.05), dt=1e-6, until=1e3, on_failure="return",
+        observers=[lambda time, state: seen.append(time) or (_ for _ in ()).throw(KeyboardInterrupt)],
+    )  # fmt: skip
+    assert seen and run.record.q.base.nbytes <= 1 << 26
+    one = mbd.simulate(model, start, mbd.HHT(0.05), dt=1e-5, until=1.0)
+    monkeypatch.setattr(running, "FIRST_TABLE", 1 << 10)
+    other = mbd.simulate(model, start, mbd.HHT(0.05), dt=1e-5, until=1.0)
+    assert one["fall.displacement"].tobytes() == other["fall.displacement"].tobytes()
+
+
+@pytest.mark.parametrize("leave", [KeyboardInterrupt, SystemExit(3)], ids=["interrupt", "exit"])
+def test_whoever_ends_the_process_from_a_run_gets_its_rows_first(leave):
+    model, start = stiff()
+
+    def observer(time, state):
+        if time > 0.0:
+            raise leave
+
+    with pytest.raises(mbd.SimulationError, match="interrupted at t = .*everything until then is kept") as told:
+        mbd.simulate(model, start, mbd.HHT(0.05), dt=1e-5, until=50.0, observers=[observer])
+    assert len(told.value.run) > 1 and told.value.run.final.time == told.value.run.time[-1]
+    assert told.value.__cause__ is (leave if isinstance(leave, SystemExit) else None)
+
+
+# what the system tells ---------------------------------------------------------------------------------------------
+def files(folder, **contents):
+    for name, text in contents.items():
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / name.replace("__", ".")).write_text(f"{text}\n")
+
+
+@pytest.fixture
+def system(tmp_path, monkeypatch):
+    """A machine with 8 GB free, in files of a test."""
+    monkeypatch.setattr(free, "PROC", tmp_path / "proc")
+    monkeypatch.setattr(free, "CGROUPS", tmp_path / "groups")
+    files(tmp_path / "proc", meminfo="MemTotal: 1 kB\nMemAvailable: 8000000 kB")
+    files(tmp_path / "proc" / "self", cgroup="0::/box/inner", statm="1000 500 100 1 0 600 0")
+    return tmp_path
+
+
+def test_limits_of_control_groups_count(system):
+    assert free.available() == pytest.approx(8.192e9)
+    files(system / "groups", memory__max="max", memory__current="77")
+    files(system / "groups" / "box", memory__max="3000000000", memory__current="1000000000")
+    assert free.available() == pytest.approx(2e9), "of the group around"
+    files(system / "groups" / "box", memory__stat="anon 5\ninactive_file 400000000\nactive_file 7")
+    assert free.available() == pytest.approx(2.4e9), "files in memory are given back"
+    files(system / "groups" / "box" / "inner", memory__max="500000000", memory__current="600000000")
+    assert free.available() == 0.0
+
+
+def test_limits_of_older_control_groups_count(system):
+    files(system / "proc" / "self", cgroup="5:cpu:/x\n4:memory,hugetlb:/box\n0::/")
+    files(system / "groups" / "memory" / "box", memory__limit_in_bytes="700000000", memory__usage_in_bytes="100000000")
+    assert free.available() == pytest.approx(6e8)
+    files(system / "groups" / "memory" / "box", memory__limit_in_bytes=str((1 << 63) - 4096))
+    assert free.available() == pytest.approx(8.192e9)
+
+
+def test_a_limit_of_the_address_space_counts(system, monkeypatch):
+    resource = pytest.importorskip("resource")
+    limits = {resource.RLIMIT_AS: (1_000_000_000, -1), resource.RLIMIT_DATA: (resource.RLIM_INFINITY,) * 2}
+    monkeypatch.setattr(resource, "getrlimit", limits.get)
+    page = resource.getpagesize()
+    assert free.available() == pytest.approx(1e9 - 1000 * page)
+
+
+def test_a_system_that_tells_nothing_is_taken_to_have_some(system):
+    for file in (system / "proc" / "meminfo", system / "proc" / "self" / "cgroup", system / "proc" / "self" / "statm"):
+        file.unlink()
+    assert free.available() == free.UNKNOWN
