@@ -257,7 +257,7 @@ def _armed(work: Posture, opened: set[str]) -> frozenset[str]:
     values = _gaps(work)
     for c, contact in enumerate(work.manager.contacts):
         lifted = values[c] > LIFTED
-        trailing = contact.opens_on == "when" or contact.name in opened
+        trailing = bool(contact.when) or contact.name in opened
         if not work.flags[c] and (lifted or (not trailing and values[c] > -BELOW)):
             armed.add(contact.name)
     return frozenset(armed)

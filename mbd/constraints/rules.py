@@ -15,20 +15,26 @@ __all__ = ["When", "condition_of", "releases_of"]
 
 @dataclass(frozen=True)
 class When:
-    """As another contact closes, this one opens; this replaces opening on pull.
+    """As another contact closes, this one opens; unless `may_pull` is False this replaces opening on pull.
 
     Parameters
     ----------
     other : name of the other contact
     after_impact : False: it opens before the impact of the other and takes no impulse from it (McGeer's rule);
         True: it stays shut through the impact and opens after it
+    may_pull : what happens before that where its force would pull. None: it holds as a latch does, and a note tells how
+        much a foot (a contact along a distance) pulled; True: the same without a note; False: it opens then too, like a
+        contact without a rule
     """
 
     other: str
     after_impact: bool = False
+    may_pull: bool | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "after_impact", flag(self.after_impact, f"after_impact of When({self.other!r})"))
+        if self.may_pull is not None:
+            object.__setattr__(self, "may_pull", flag(self.may_pull, f"may_pull of When({self.other!r})"))
         if not isinstance(self.other, str) or not self.other:
             raise ModelError(f"When needs the name of another contact, such as When('right foot'), got {self.other!r}")
 

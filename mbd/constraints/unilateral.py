@@ -28,7 +28,8 @@ class Unilateral(Constraint):
     restitution : e of Newton's law, 0 (plastic) to 1
     friction : None: it sticks where the measure has tangents; 0: it slides freely; μ > 0: Coulomb's law,
         ``|λ_T| ≤ μ p``, it sticks, slips and turns around in the one direction of a planar model
-    release : `When` another contact closes (or several of them), instead of on pull
+    release : `When` another contact closes (or several of them), instead of on pull, or besides (`may_pull=False`);
+        while it pulls it has no friction
     only_while : name of a contact that must be closed, or a measure that must be positive, for this one to be watched
     """
 
@@ -61,8 +62,8 @@ class Unilateral(Constraint):
 
     @property
     def opens_on(self) -> str:
-        """'pull' or 'when'."""
-        return "when" if self.release else "pull"
+        """'pull', or 'when' where every rule lets it pull until then."""
+        return "when" if self.release and all(rule.may_pull is not False for rule in self.releases) else "pull"
 
     @property
     def sticks(self) -> bool:

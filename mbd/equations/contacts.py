@@ -142,7 +142,7 @@ def _unilateral(found: Laws, scope: Surroundings, dynamics: Dynamics, law: Unila
             law.name, law.kind, gap, rate, tuple(k for k in numbers if k >= 0), captured, anchors,
             opens_on=law.opens_on, when=tuple((rule.other, rule.after_impact) for rule in law.releases),
             only_while=scope.real(condition.gap(scope)) if isinstance(condition, Measure) else condition,
-            restitution=law.restitution, unit=unit,
+            restitution=law.restitution, unit=unit, may_pull=any(rule.may_pull for rule in law.releases),
         )
     )  # fmt: skip
 

@@ -89,6 +89,7 @@ class Contact:
     only_while : name of a contact that must be closed, or a node that must be positive, or None
     restitution : e of Newton's law
     unit : of the gap
+    may_pull : whether its rule says that it may, so that no note tells that it did
     """
 
     name: str
@@ -105,6 +106,7 @@ class Contact:
     only_while: Node | str | None = None
     restitution: float = 0.0
     unit: str = "m"
+    may_pull: bool = False
 
 
 @dataclass(frozen=True)

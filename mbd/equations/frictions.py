@@ -13,7 +13,7 @@ from mbd.equations.surroundings import Surroundings
 from mbd.errors import CapabilityError
 from mbd.joints.base import Joint
 from mbd.tape.derivatives import substitute
-from mbd.tape.functions import sqrt
+from mbd.tape.functions import maximum, sqrt
 from mbd.tape.node import Node, Scalar
 
 __all__ = ["dry_joint", "sliding_contact"]
@@ -34,7 +34,8 @@ def sliding_contact(
     here = {scope.tape.input("anchor", k): value for k, value in captured.items()}
     view = substitute(scope.rates([found.viewed[row]]), here)[0]
     coefficient = scope.parameter(law.name, "mu", law.friction or 0.0)
-    limit = -(coefficient * scope.tape.input("lam", normal))
+    push = -scope.tape.input("lam", normal)
+    limit = coefficient * (maximum(push, 0.0) if law.opens_on == "when" else push)  # none while a rule lets it pull
     _add(found, scope, dynamics, law.name, row, found.rows[row].contact, view, limit)
 
 

@@ -8,6 +8,7 @@ from mbd.kernel.candidate import accept_guards
 from mbd.kernel.events import handle_event, land
 from mbd.kernel.fields import (
     BASE,
+    CALMED,
     CHATTER,
     DONE,
     EVENT,
@@ -29,6 +30,7 @@ from mbd.kernel.fields import (
     NOW,
     PAIRED,
     PAUSE,
+    PULL,
     REDONE,
     RESTART,
     ROWS,
@@ -46,9 +48,10 @@ from mbd.kernel.guards import is_quiet, judge, try_step, update_armed, update_si
 from mbd.kernel.hooks import scheme_accept
 from mbd.kernel.interior import parts_to_take
 from mbd.kernel.locate import locate
-from mbd.kernel.nonsmooth import PULL, lands, lets_go
+from mbd.kernel.nonsmooth import lands, lets_go
 from mbd.kernel.observe import is_awaited, store_row
 from mbd.kernel.pairs import ALONE, FIRST, SECOND
+from mbd.kernel.restart import consistent
 from mbd.kernel.settle import room_to_log
 from mbd.kernel.starting import find_mode, restart, still_dependent
 from mbd.kernel.takeover import leave_pose, take_over
@@ -64,9 +67,11 @@ Without rows ten times as many.
 
 
 def rings(K: Any) -> bool:
-    """Whether a step of index 3 ends with a contact that pulls, although it has been judged to push.
+    """Whether a step ends with a contact that pulls, although it has been judged to push.
 
-    Multipliers of index 3 err for some steps after a start; consistent ones take the place of such a row's.
+    The multipliers of a step belong to its own accelerations, which satisfy the constraints on average only: those of
+    index 3 err for some steps after a start, and undamped ones alternate where dt is long for the motion. Consistent
+    ones take the place of such a row's.
     """
     force = 0.0
     for i in range(K.n_v):
@@ -141,7 +146,9 @@ def conclude(K: Any, h: float, full: float, t1: float, cut: bool, within: bool, 
         else:
             K.counts[SHORTENED] += 1 if K.state[PAIRED] == ALONE else 0
             K.state[PAIRED] = 0
-    uneven = K.stabilized == 0 and K.state[ROWS] > 0 and (h < (1.0 - 1e-6) * K.clock[STEP] or rings(K))
+    uneven = K.stabilized == 0 and K.state[ROWS] > 0 and h < (1.0 - 1e-6) * K.clock[STEP]
+    uneven = uneven or (not quiet and rings(K))
+    K.state[CALMED] = 0
     if (h < 1e-3 * K.clock[STEP] and K.scheme != 1) or uneven:  # index 3 rings after a change of step
         take_over(K, t1)
         K.state[RESTART] = 2
@@ -165,6 +172,24 @@ def conclude(K: Any, h: float, full: float, t1: float, cut: bool, within: bool, 
         if K.state[HALVES] == 0:
             K.state[HALVED] = 0
     return 0
+
+
+def calm(K: Any) -> bool:
+    """Where a contact seems to pull at the end of a step: start the scheme again before it, once; True if so.
+
+    Accelerations and multipliers are made consistent there, which ends their oscillation; the step is taken again.
+    """
+    if K.state[CALMED] == 1 or K.state[NEAR] > 0 or not rings(K):
+        return False
+    if consistent(K, K.clock[NOW], K.q, K.y) != 0:
+        return False
+    for i in range(K.n):
+        K.rate[i] = K.jump[i]
+    for k in range(K.n_rows):
+        K.lam[k] = K.impulse[k]
+    K.state[CALMED] = 1
+    K.state[RESTART] = 2
+    return True
 
 
 def look_inside(K: Any, h: float) -> int:
@@ -292,6 +317,8 @@ def judge_step(K: Any, h: float, full: float, t1: float, cut: bool, within: bool
         event = find_event(K, h, t1)
         if event > 0:
             return event
+    if event == 0 and not quiet and K.state[ROWS] > 0 and calm(K):
+        return -1
     add_error(K, h, event < 0)
     if event < 0:
         return handle_event(K)

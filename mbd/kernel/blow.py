@@ -43,14 +43,14 @@ def start_over(K: Any) -> None:
         K.impulse[k] = K.total[k] = 0.0
 
 
-def gather(K: Any, slow: bool) -> None:
+def gather(K: Any, slow: bool, hold: bool) -> None:
     """All closed and closing contacts take part; those that open on pull may choose.
 
-    In a slow impact all are held; where blows follow without end, the one that fired and cannot rise.
+    With `hold` all are held; where blows follow without end, the one that fired and cannot rise.
     """
     for c in range(K.n_contacts):
         both = K.closed[c] == 1 or K.closing[c] > 0
-        held = slow and (K.state[PLASTIC] == 0 or K.strategy == 1 or K.fired[1] == c)
+        held = hold and (K.state[PLASTIC] == 0 or K.strategy == 1 or K.fired[1] == c)
         K.active[c] = 1 if (both and K.kind[c] == 0) else 0
         K.free[c] = 1 if (K.active[c] == 1 and K.opens[c] == 0 and not held) else 0
     if not slow or K.strategy == 1:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from mbd.kernel.candidate import carry
 from mbd.kernel.fields import (
     CHATTER,
     CLOSE,
@@ -41,14 +42,66 @@ MOST_HALVED = 3
 
 
 def same_instant(K: Any) -> bool:
-    """Count switches without progress in time; true when there were too many."""
+    """Count switches without progress in time; true when there were too many, or when they repeat themselves."""
     now = K.clock[NOW]
     if now - K.clock[LAST_SWITCH] <= 1e-10 * K.dt:
         K.state[SWITCHES] += 1
     else:
         K.state[SWITCHES] = 0
+        K.seen[0] = 0.0
     K.clock[LAST_SWITCH] = now
+    if repeats(K):
+        if K.state[SWITCHES] > K.max_switches // 2:
+            return True
+        K.state[SWITCHES] = K.max_switches // 2  # from the next blow on they are plastic, all at once
+        K.seen[0] = 0.0
     return bool(K.state[SWITCHES] > K.max_switches)
+
+
+def repeats(K: Any) -> bool:
+    """Whether everything is as it was after an earlier switch of this instant, so that they go on without end.
+
+    The state is compared with the one noted when there were half as many switches or fewer, so that a cycle of any
+    length is found (Brent 1980, BIT 20:176).
+    """
+    same = K.seen[0] > 0.0
+    o = 1
+    for c in range(K.n_contacts):
+        same = same and K.seen[o + 2 * c] == K.closed[c] and K.seen[o + 2 * c + 1] == K.armed[c]
+    o += 2 * K.n_contacts
+    for f in range(K.n_frictions):
+        same = same and K.seen[o + 2 * f] == K.sticks[f] and K.seen[o + 2 * f + 1] == K.slip[f]
+    o += 2 * K.n_frictions
+    for e in range(K.n_guards):
+        same = same and K.seen[o + e] == K.side[e]
+    o += K.n_guards
+    for i in range(K.n_q):
+        same = same and K.seen[o + i] == K.q[i]
+    o += K.n_q
+    for i in range(K.n):
+        same = same and K.seen[o + i] == K.y[i]
+    if same:
+        return True
+    number = int(K.state[SWITCHES])
+    if number > 0 and number >= 2.0 * K.seen[0]:
+        note_state(K, number)
+    return False
+
+
+def note_state(K: Any, number: int) -> None:
+    """What `repeats` compares with, at this switch of the instant."""
+    K.seen[0] = float(number)
+    o = 1
+    for c in range(K.n_contacts):
+        K.seen[o + 2 * c] = float(K.closed[c])
+        K.seen[o + 2 * c + 1] = float(K.armed[c])
+    o += 2 * K.n_contacts
+    for f in range(K.n_frictions):
+        K.seen[o + 2 * f] = float(K.sticks[f])
+        K.seen[o + 2 * f + 1] = K.slip[f]
+    o = carry(K.side, K.seen, o + 2 * K.n_frictions, K.n_guards, True)
+    o = carry(K.q, K.seen, o, K.n_q, True)
+    carry(K.y, K.seen, o, K.n, True)
 
 
 def was_closed(K: Any, c: int) -> bool:

@@ -22,7 +22,7 @@ INTEGERS = (
     "strategy",  # 0 located events, 1 non-smooth steps
     "impact_law",  # 0 Newton, 1 Poisson, 2 sequential
     "n_watched",  # guard values in all
-    "loaded",  # 1: a friction follows multipliers other than linearly
+    "loaded",  # a friction follows multipliers other than linearly: 1 as that of a pin, 2 not at all where one pulls
     "scheme",  # 0 Newmark family, 1 explicit Runge–Kutta, 2 Radau IIA
     "adaptive",  # 1: steps follow the estimated error, 0: they are all dt
     "error_order",  # power of the step with which the estimated error per second falls
@@ -64,6 +64,7 @@ REAL_ARRAYS = (
     "deepest", "sinking",  # lowest gap of each contact while ignored; time of its first release into its surface
     "side",  # sign of each user guard since it last crossed
     "restitution",
+    "seen",  # at which switch of an instant these were noted, 0 for none: who is closed, sticks, …, and the state
     "pick",  # the fired guard: estimate, bracket, sizes
     "store", "log", "detail",
 )  # fmt: skip
@@ -107,7 +108,8 @@ KEPT_INTEGERS = ("closed", "armed", "touched", "dropped", "rows", "state", "stic
     MODE, ROWS, GRID, RESTART, STORED, LOGGED, SWITCHES, SINCE_STORE, BLOCKED, N_DROPPED, NEAR, INCHING, REDONE,
     PLASTIC, HALVED, HALVES, PAIRED, STRAIGHT,
     ORDERED,  # where the order of the factors in K.kkt begins in K.orders, 0 if pivots were searched for
-) = range(19)  # fmt: skip
+    CALMED,  # 1: the scheme has been started again at the accepted state because a contact seemed to pull in the step
+) = range(20)  # fmt: skip
 # places in `counts`
 (
     STEPS, ITERATIONS, TANGENTS, RESIDUALS, FACTORIZATIONS, EVENTS, RESTARTS, IMPACTS, LOCATIONS, STAGNATIONS, CAREFUL,
@@ -140,5 +142,7 @@ CLOSE, OPEN_PULL, OPEN_GAP, OPEN_FORCE, CROSS, WATCH, GRAZE, PRESS, STICK, SLIP,
 LOG_CLOSED, LOG_OPENED, LOG_EVENT, LOG_STUCK, LOG_SLIPPED = range(5)
 UNKNOWN = -9
 """State of a friction before the first restart, in `was`: what it begins with is no event [-]."""
+PULL = 1e-9
+"""Pull of a contact, relative to the forces, that is more than round-off [-]."""
 EPS = 2.220446049250313e-16
 """Distance from 1 to the next double [-]."""

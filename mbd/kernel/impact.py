@@ -17,7 +17,7 @@ from __future__ import annotations
 from typing import Any
 
 from mbd.kernel.blow import blow, energy_gain, gather, let_rebound, loosen, prepare, restitution_of, speed, start_over
-from mbd.kernel.fields import ENERGY_GAIN, IMPACTS, NO_IMPACT, PLASTIC, STRONGE
+from mbd.kernel.fields import ENERGY_GAIN, IMPACTS, NO_IMPACT, PLASTIC, PULL, STRONGE
 from mbd.kernel.restart import row_speed
 
 __all__ = ["impact"]
@@ -33,12 +33,16 @@ APPROACH = 1e-11
 def impact(K: Any, slow: bool) -> int:
     """The velocities in K.y jump, by K.jump; impulses, negative where they push, are left in K.impulse.
 
-    A slow impact (below the rest speed) sticks. Afterwards K.active says which contacts are closed.
+    A slow impact (below the rest speed) sticks; in non-smooth steps, whose speeds are of the size of dt, only where
+    that takes no pull. Afterwards K.active says which contacts are closed.
     """
     prepare(K)
     status = 0
     if slow or K.impact_law == 0 or K.state[PLASTIC] == 1:
-        status = newton_law(K, slow)
+        status = newton_law(K, slow, True)
+        if slow and K.strategy == 1 and status == 0 and would_hold_back(K):
+            start_over(K)
+            status = newton_law(K, slow, False)
     elif K.impact_law == 1:
         status = poisson_law(K, False)
     else:
@@ -56,15 +60,39 @@ def impact(K: Any, slow: bool) -> int:
             return status
         if energy_gain(K) > GAIN:
             return ENERGY_GAIN
+    if slow and K.strategy == 0:
+        rest(K)
     for i in range(K.n):
         K.y[i] += K.jump[i]
     K.counts[IMPACTS] += 1
     return 0
 
 
-def newton_law(K: Any, slow: bool) -> int:
-    """One blow that reverses the gap rates of closing contacts by their restitutions."""
-    gather(K, slow)
+def would_hold_back(K: Any) -> bool:
+    """Whether a contact that opens on pull would have to pull in the blow just found, its smooth step included."""
+    largest = 0.0
+    for k in range(K.n_rows):
+        largest = max(largest, abs(K.impulse[k] + K.past[k]))
+    for c in range(K.n_contacts):
+        row = K.normal[c]
+        if K.kind[c] == 0 and K.active[c] == 1 and K.opens[c] == 0:
+            if K.impulse[row] + K.past[row] > PULL * largest:
+                return True
+    return False
+
+
+def rest(K: Any) -> None:
+    """What holds a contact at rest that would leave more slowly than the rest speed is no impulse of the contact."""
+    for c in range(K.n_contacts):
+        if K.kind[c] == 0 and K.active[c] == 1 and K.opens[c] == 0 and K.impulse[K.normal[c]] > 0.0:
+            for k in range(K.n_rows):
+                if K.row_contact[k] == c:
+                    K.impulse[k] = 0.0
+
+
+def newton_law(K: Any, slow: bool, held: bool) -> int:
+    """One blow that reverses the gap rates of closing contacts by their restitutions; a slow one may be `held`."""
+    gather(K, slow, slow and held)
     for k in range(K.n_rows):
         c = K.row_contact[k]
         K.given[k] = 0.0
@@ -79,7 +107,7 @@ def newton_law(K: Any, slow: bool) -> int:
 
 def poisson_law(K: Any, energetic: bool) -> int:
     """Compression, then restitution of its impulses (Poisson) or of their work (Stronge)."""
-    gather(K, False)
+    gather(K, False, False)
     for k in range(K.n_rows):
         K.given[k] = 0.0
         K.bias[k] = row_speed(K, k)
@@ -112,7 +140,7 @@ def give_back(K: Any, factor: float) -> int:
 
     Contacts that are given an impulse part under it, unless they would approach; their tangents stay.
     """
-    gather(K, False)
+    gather(K, False, False)
     for i in range(K.n):
         K.total_jump[i] = K.trial_jump[i]
     for k in range(K.n_rows):
@@ -175,7 +203,7 @@ def is_held_through(K: Any, c: int) -> bool:
 
 def sequential_law(K: Any) -> int:
     """Blow after blow of the contacts that approach fastest, each as if the others that push were not there."""
-    gather(K, False)
+    gather(K, False, False)
     for c in range(K.n_contacts):
         K.touched[c] = K.active[c]  # takes part
     fastest = 0.0

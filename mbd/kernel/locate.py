@@ -257,7 +257,7 @@ def bracket(K: Any, kind: int, index: int, low: float, high: float) -> int:
         return 0
     width = high - low
     guess = first_guess(f_low, f_high, guard_rate(K, kind, index) * width, d_high * width)
-    if K.linear == 1 and kind != WATCH:
+    if K.linear == 1 and kind != WATCH and kind != OPEN_PULL:  # no contact is stored that pulls
         place = low + width * f_low / (f_low - f_high)
         K.pick[2] = place
         return try_step(K, place, t + place)

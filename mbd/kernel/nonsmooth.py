@@ -25,6 +25,7 @@ from mbd.kernel.fields import (
     NO_IMPACT,
     NOW,
     PAST_TIME,
+    PULL,
     REDONE,
     RESTART,
 )  # fmt: skip
@@ -34,14 +35,12 @@ from mbd.kernel.restart import consistent, evaluate
 from mbd.kernel.settle import NO_IMPULSE, STILL, log_event
 from mbd.kernel.switching import close_by_impact, mark_touching
 
-__all__ = ["PULL", "keep", "lands", "lets_go", "put_back", "rebound", "strike"]
+__all__ = ["keep", "lands", "lets_go", "put_back", "rebound", "strike"]
 
 SUNK = 1e4
 """Depth over the round-off of a gap at which a correction of positions has failed [-]."""
 MOST_LIFTS = 20
 """Corrections of positions at one instant [-]."""
-PULL = 1e-9
-"""Pull over a step, relative to the forces, above which a contact lets go before it [-]."""
 RESTING = 2.0
 """Approach speed over the change of speed in a step below which a contact rests instead of rebounding [-]."""
 
@@ -86,11 +85,11 @@ def lets_go(K: Any, t1: float) -> int:
 
 
 def pulls(K: Any, c: int, least: float, t1: float) -> bool:
-    """Whether a contact pulled at the candidate; where multipliers may ring, by consistent ones (index 3)."""
+    """Whether a contact pulled at the candidate, by consistent multipliers: those of a step may oscillate."""
     row = K.normal[c]
     if K.lam1[row] <= least:
         return False
-    return bool(K.stabilized == 1 or consistent(K, t1, K.q1, K.y1) != 0 or K.impulse[row] > least)
+    return bool(consistent(K, t1, K.q1, K.y1) != 0 or K.impulse[row] > least)
 
 
 def lands(K: Any) -> bool:

@@ -337,7 +337,7 @@ def end_rates(K: Any, t1: float, m: int) -> bool:
     if K.state[N_DROPPED] > 0 and K.n_frictions > 0:
         evaluate(K, t1, K.q1, K.y1)
         return False
-    if K.loaded == 1:
+    if K.loaded > 0:
         return bool(consistent(K, t1, K.q1, K.y1) == 0)
     n = K.n
     evaluate(K, t1, K.q1, K.y1)

@@ -180,7 +180,7 @@ def consistent(K: Any, t: float, q: Any, y: Any) -> int:
         find_shares(K)
     load_accelerations(K)
     status = solve_rows(K, m, False)
-    if K.loaded == 1 or together:  # R follows multipliers: of degree one, so that to solve again is Newton's method
+    if K.loaded > 0 or together:  # R follows multipliers: of degree one, so that to solve again is Newton's method
         for _ in range(MOST_LOADS):
             if status != 0 or evaluate_loaded(K, K.impulse) < 1e-13:
                 break

@@ -137,7 +137,7 @@ def explicit_rates(K: Any, t: float) -> int:
     """Rates at (q1, y1), in K.jump; where friction follows multipliers by the iteration of `consistent`."""
     n = K.n
     m = K.state[ROWS]
-    if K.loaded == 1 and K.n_frictions > 0:
+    if K.loaded > 0 and K.n_frictions > 0:
         return consistent(K, t, K.q1, K.y1)
     evaluate(K, t, K.q1, K.y1)
     K.counts[RESIDUALS] += 1

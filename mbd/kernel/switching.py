@@ -48,7 +48,7 @@ def gather_closing(K: Any) -> float:
         if fired or (near and ready and K.kind[c] == 0 and approach > STILL):
             K.closing[c] = 1
             if K.kind[c] == 0:
-                fastest = max(fastest, approach)
+                fastest = max(fastest, abs(approach))  # located roughly it may part already, which is no rest
         elif near and ready and K.kind[c] == 0 and (approach >= -STILL or K.state[PLASTIC] == 1):
             K.closing[c] = 2
     return fastest
@@ -57,7 +57,7 @@ def gather_closing(K: Any) -> float:
 def release_for(K: Any, after: int) -> None:
     """Open the contacts whose rule names one that closes now."""
     for c in range(K.n_contacts):
-        if K.closed[c] == 1 and K.opens[c] == 2:
+        if K.closed[c] == 1:
             for place in range(K.when_start[c], K.when_start[c + 1]):
                 target = K.when_target[place]
                 if K.when_after[place] == after and K.closing[target] == 1:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from mbd.kernel.candidate import adopt
-from mbd.kernel.fields import NOW
+from mbd.kernel.fields import NOW, PULL
 from mbd.kernel.guards import update_armed, update_sides, watch
 from mbd.kernel.hooks import scheme_resume
 from mbd.kernel.restart import active_rows, consistent, evaluate, stepping_rows
@@ -34,13 +34,29 @@ def project_velocity(K: Any, m: int, dropping: bool) -> int:
     return status
 
 
+def would_pull(K: Any) -> bool:
+    """Whether a contact that pushes by the multipliers of the step pulls by those in K.impulse."""
+    force = 0.0
+    for i in range(K.n_v):
+        force = max(force, K.scale[i])
+    for c in range(K.n_contacts):
+        if K.kind[c] == 0 and K.closed[c] == 1 and K.opens[c] == 0:
+            if K.lam[K.normal[c]] <= 0.0 and K.impulse[K.normal[c]] > PULL * force:
+                return True
+    return False
+
+
 def take_over(K: Any, t1: float) -> None:
     """The candidate becomes the accepted state ahead of a restart, consistent in the old mode at every level.
 
     A shortened index-3 step leaves B v + h_t of the size of its error; it would survive a release, so it is removed.
+    Where dt is so long that a contact pushes by the step but would pull by consistent multipliers, those of the step
+    stay, and the restart decides.
     """
     adopt(K, t1)
     if project_velocity(K, active_rows(K, K.closed), True) == 0 and consistent(K, t1, K.q, K.y) == 0:
+        if would_pull(K):
+            return
         for i in range(K.n):
             K.rate[i] = K.jump[i]
         for k in range(K.n_rows):

@@ -185,8 +185,11 @@ def _no_size(stepper: Stepper, status: int, closed: str) -> str:
 def _no_contact(stepper: Stepper, status: int, closed: str, events: Sequence[EventRecord]) -> str:
     """Contacts and frictions that have no forces, no impulses, or no end of switching."""
     if status == F.CHATTER:
+        state, most = stepper.values["state"], stepper.values["max_switches"]
+        many = max(state[F.SWITCHES], state[F.REDONE]) > most
+        said = f"more than {most} switches" if many else "the same switches again and again"
         return (
-            f"more than {stepper.values['max_switches']} switches at one instant: {_last_events(events)}; they "
+            f"{said} at one instant: {_last_events(events)}; they "
             "follow each other without motion; give a contact a release rule, friction or a penalty law, or an event "
             "a reset that leaves zero"
         )

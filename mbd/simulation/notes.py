@@ -36,6 +36,9 @@ TAKEN = 0.5
 OVERSHOT = 1e-8
 """Depth at which a contact may close that is no more than round-off of large coordinates [m, rad]."""
 
+PULL = 1e-9
+"""Pull of a contact over all multipliers that is more than round-off [-]."""
+
 LOOKED_AT = 8
 """Blows of a contact from which the step that resolves them is found."""
 
@@ -103,6 +106,7 @@ def notes_of(run: Run, record: Record) -> tuple[list[str], list[str]]:
     for number, contact in enumerate(run.manager.contacts):
         short, blind = _short_touch(run, record, number, contact)
         notes += _ignored(run, number, contact) + _overshot(run, record, contact) + short
+        notes += _pulled(record, number, contact)
         doubts += blind
     return notes, doubts
 
@@ -125,6 +129,25 @@ def _ignored(run: Run, number: int, contact: Contact) -> list[str]:
     if np.isfinite(sinking):
         notes.append(f"{contact.name!r} was released at t = {sinking:.6g} s while moving into its surface")
     return notes
+
+
+def _pulled(record: Record, number: int, contact: Contact) -> list[str]:
+    """A foot that stays until another contact closes, and pulled meanwhile, which a ground cannot do."""
+    if contact.kind == "penalty" or contact.opens_on != "when" or contact.may_pull or contact.unit != "m":
+        return []
+    pull = np.where(record.closed[:, number] == 1, record.lam[:, contact.rows[0]], 0.0)
+    worst = int(np.argmax(pull)) if len(pull) else 0
+    if not len(pull) or not pull[worst] > PULL * float(np.max(np.abs(record.lam[worst]))):
+        return []
+    pull = np.maximum(pull, 0.0)
+    steps = np.diff(record.time)
+    when = record.time[pull > 0.0]
+    impulse = 0.5 * float(np.sum(steps * (pull[1:] + pull[:-1])))
+    return [
+        f"{contact.name!r} pulled with up to {pull[worst]:.3g} N at t = {record.time[worst]:.6g} s, {impulse:.3g} N s "
+        f"in all from {when[0]:.6g} to {when[-1]:.6g} s, since its When rule alone opens it: may_pull=False lets it "
+        "open then too, may_pull=True leaves this note out"
+    ]
 
 
 def _overshot(run: Run, record: Record, contact: Contact) -> list[str]:

@@ -64,10 +64,13 @@ def _hht_step() -> Any:
     return HHT.step
 
 
-def is_loaded(equations: Equations) -> bool:
-    """Whether a friction follows multipliers other than linearly, as a pin does."""
+def follows(equations: Equations) -> int:
+    """How frictions follow multipliers: 0 linearly, 1 as that of a pin does, 2 those of contacts that may pull."""
     limits = [friction.limit for friction in equations.frictions if friction.contact < 0]
-    return any(node.op == "input" and node.data[0] == "lam" for node in live(limits))
+    if any(node.op == "input" and node.data[0] == "lam" for node in live(limits)):
+        return 1
+    rubbing = [equations.contacts[friction.contact] for friction in equations.frictions if friction.contact >= 0]
+    return 2 if any(contact.opens_on == "when" for contact in rubbing) else 0
 
 
 @lru_cache(maxsize=256)
@@ -126,11 +129,11 @@ class Stepper:
             n_contacts=n_contacts, n_guards=n_guards, o_q=layout.q, o_x=layout.x, o_v=layout.v, o_a=layout.a,
             o_lam=layout.lam, o_anchor=layout.anchor, o_switch=layout.switch, o_slip=layout.slip,
             n_frictions=layout.n_frictions, n_watched=self.mechanism.sizes["guards"],
-            loaded=int(is_loaded(self.mechanism.equations)), impact_law=LAWS.index(options.get("impact", "newton")),
+            loaded=follows(self.mechanism.equations), impact_law=LAWS.index(options.get("impact", "newton")),
             strategy=int(options.get("contact") == "nonsmooth"),
             vector=int(self.mechanism.vector),
             stabilized=int(self.stabilized), max_iterations=MAX_ITERATIONS,
-            max_switches=20 + 4 * n_contacts,
+            max_switches=20 + 4 * (n_contacts + n_guards + layout.n_frictions),
             linear=int(options.get("locate") == "linear"),
             width=1 + layout.n_q + 2 * layout.n + layout.n_rows + n_contacts + layout.n_frictions,
             capacity=int(options["capacity"]), stride=int(options.get("store", 1)), event_width=5 + layout.n_rows,

@@ -65,7 +65,8 @@ def _constraint(word: Constraint) -> str:
     if isinstance(word, Unilateral):
         said += f", {_measure(word.measure)}" + (", sticks" if word.sticks else "")
         rules = [f"'{rule.other}' closes{' (after the impact)' if rule.after_impact else ''}" for rule in word.releases]
-        said += ", opens " + ("as " + " or ".join(rules) if rules else "on pull")
+        on_pull = ["on pull"] if word.opens_on == "pull" else []
+        said += ", opens " + " or ".join((["as " + " or ".join(rules)] if rules else []) + on_pull)
         if word.only_while is not None:
             other = word.only_while
             said += f", only while {_measure(other)} > 0" if isinstance(other, Measure) else f", only while '{other}'"

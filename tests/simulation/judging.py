@@ -98,15 +98,32 @@ def _ledger(run: mbd.Trajectory) -> list[str]:
 def _penetration(run: mbd.Trajectory, floor: float) -> list[str]:
     """Gaps of multiplier contacts that are below zero and not told of; contacts that keep pulling."""
     told, found, ends = " ".join(run.stats["notes"]), [], _at_ends(run)
-    largest = float(np.max(np.abs(run.record.lam), initial=0.0))
     for contact in run.record.equations.contacts:
         if contact.kind != "unilateral":
             continue
         deepest = float(np.min(run[f"{contact.name}.gap"], initial=0.0, where=ends))
         if deepest < -10.0 * floor and f"{contact.name!r} lay" not in told and f"{contact.name!r} was rel" not in told:
             found.append(f"{contact.name!r} is {-deepest:.3g} {contact.unit} below its surface, and no note says so")
-        if contact.opens_on == "pull" and lasts(run, run[f"{contact.name}.force"] < -1e-3 * largest):
-            found.append(f"{contact.name!r} keeps pulling")
+        found += _pulls(run, contact)
+    return found
+
+
+def _pulls(run: mbd.Trajectory, contact) -> list[str]:
+    """A closed contact that opens on pull pushes in every row and in every blow, to round-off of all multipliers."""
+    if contact.opens_on != "pull":
+        return []
+    lam = run.record.lam
+    rows = np.max(np.abs(lam), axis=1, initial=0.0)
+    size = 1e-7 * rows + 1e-12 * np.max(rows, initial=0.0)
+    pull = np.where(lam[:, contact.rows[0]] > size, lam[:, contact.rows[0]], 0.0)
+    blows = [
+        event
+        for event in run.events
+        if event.name == contact.name and event.kind == "closed" and np.min(event.impulse[:1], initial=0.0) < -1e-12
+    ]
+    found = [f"{contact.name!r} has an impulse of {event.impulse[0]:.3g}" for event in blows[:1]]
+    if pull.any():
+        found.append(f"{contact.name!r} pulls in {np.count_nonzero(pull)} rows, with up to {np.max(pull):.3g}")
     return found
 
 
@@ -140,6 +157,23 @@ def _friction(run: mbd.Trajectory) -> list[str]:
         if lasts(run, force > 1.001 * np.abs(limit) + 1e-6 * largest):
             k = int(np.argmax(force - np.abs(limit)))
             found.append(f"friction of {friction.name!r} is {force[k]:.6g}, more than {np.ravel(limit)[k]:.6g}")
+    return found + _drives(run, frictions)
+
+
+def _drives(run: mbd.Trajectory, frictions) -> list[str]:
+    """Friction that slides takes energy: its force and the velocity along it have opposite signs."""
+    columns, found = run._model_columns, []
+    if not run.success:
+        return []
+    later = np.diff(run.time, append=np.inf) > 0.0  # just before a switch it may have passed its rest already
+    rates = columns.evaluate([friction.rate for friction in frictions], columns.rows)
+    for number, (friction, rate) in enumerate(zip(frictions, rates, strict=True)):
+        slides = (np.abs(run.record.phase[:, number]) == 1) & later
+        power = np.where(slides, -run.record.lam[:, friction.row] * rate, 0.0)
+        size = np.max(np.abs(run.record.lam[:, friction.row])) * 1e-6
+        if np.any(power > size):
+            k = int(np.argmax(power))
+            found.append(f"friction of {friction.name!r} drives with {power[k]:.3g} W at t = {run.time[k]:.6g} s")
     return found
 
 

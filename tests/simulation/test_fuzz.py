@@ -75,7 +75,7 @@ def dropped():
     [
         ("q", 0, np.nan, "q is not finite"),
         ("q", 1, -0.1, "'floor' is 0.1 m below its surface"),
-        ("lam", 0, 30.0, "'floor' keeps pulling"),
+        ("lam", 0, 30.0, "'floor' pulls"),
         ("lam", 1, 30.0, "friction of 'floor' is 30"),
     ],
 )
