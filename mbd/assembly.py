@@ -19,8 +19,10 @@ from mbd.equations.equations import Equations
 from mbd.errors import AssemblyError, ModelError, UnknownNameError, nearest
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.not_finite import first_cause, tape_inputs
-from mbd.posture import Posture, capture, close_positions, close_velocities, position_rows
+from mbd.opening import opening
+from mbd.posture import TOLERANCE, Posture, capture, close_positions, close_velocities, position_rows
 from mbd.state import State
+from mbd.turns import nearest_turns
 
 __all__ = ["assemble", "undetermined"]
 
@@ -94,11 +96,12 @@ def assemble(
     faults += [f"contact {name!r} is named both closed and open" for name in set(closed) & set(opened)]
     if faults:
         raise UnknownNameError(faults)
-    q, y = _values(equations, named)
+    q, y = _values(equations, named, {})
     values = mechanism.parameters(changed, getattr(model, "parameters", {}))
+    guess, _ = _values(equations, named, opening(model, mechanism, values, position or {}))
     anchors = np.zeros(mechanism.layout.n_anchors)
     work = Posture(
-        mechanism, manager, values, q.copy(), y.copy(), manager.flags(closed), anchors, named.places, named.speeds
+        mechanism, manager, values, guess, y.copy(), manager.flags(closed), anchors, named.places, named.speeds
     )
     bad = _closed(work, named, project, model) or undetermined(work) + _below(work, set(opened))
     if bad:
@@ -146,9 +149,11 @@ def _named(
     return _Named(q, v, z, places, speeds), faults
 
 
-def _values(equations: Equations, named: _Named) -> tuple[Vector, Vector]:
-    """q and (v, z) as named; defaults elsewhere, no velocity."""
-    q = np.array([named.q.get(k, c.default) for k, c in enumerate(equations.coordinates)], dtype=float)
+def _values(equations: Equations, named: _Named, guess: Mapping[str, float]) -> tuple[Vector, Vector]:
+    """q and (v, z) as named; elsewhere the guess, or defaults, and no velocity."""
+    q = np.array(
+        [named.q.get(k, guess.get(c.name, c.default)) for k, c in enumerate(equations.coordinates)], dtype=float
+    )
     v = [named.v.get(k, 0.0) for k in range(equations.n_v)]
     z = [named.z.get(k, float(state.default)) for k, state in enumerate(equations.states)]
     return q, np.array([*v, *z], dtype=float)
@@ -162,6 +167,8 @@ def _closed(work: Posture, named: _Named, project: bool, model: Any) -> list[str
     free = np.ones((2, equations.n_v), dtype=bool)
     free[0, [each.place for each in held_q]] = free[1, [each.place for each in held_v]] = False
     misfit = close_positions(work, rows, free[0])
+    if np.max(np.abs(misfit), initial=0.0) <= TOLERANCE:
+        nearest_turns(work, rows, list(named.q), TOLERANCE)
     never = infeasible(work, rows, q, misfit, model, named=bool(work.places or held_q))
     if never:
         return never

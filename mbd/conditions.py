@@ -33,7 +33,7 @@ class Condition:
     function: Any
 
     def at(self, block: Vector, parameters: Vector) -> tuple[float, Vector]:
-        """(residual, gradient) at a state; angles compare modulo a turn."""
+        """(residual, gradient) at a state; angles read off a rotation compare modulo a turn."""
         out = np.zeros(self.function.size)
         self.function(block, parameters, out)
         residual = float(out[0]) - self.target
@@ -59,6 +59,8 @@ def conditions(mechanism: Mechanism, values: Mapping[str, float], rates: bool) -
     """
     equations, found, wrong = mechanism.equations, [], []
     kind, allowed = ("v", PLACES | {"v"}) if rates else ("x", PLACES)
+    turns = {turn.name: turn.anchor for turn in equations.turns if turn.name}
+    counts = {equations.tape.input("anchor", anchor).index for anchor in turns.values()}
     inputs = [equations.tape.input(kind, k) for k in range(equations.n_v)]
     for name, target in values.items():
         node = _result(equations, f"{name}.rate") if rates else None  # 'pin.angle' of a cut joint means its rate
@@ -66,11 +68,11 @@ def conditions(mechanism: Mechanism, values: Mapping[str, float], rates: bool) -
         if node is None:
             wrong.append(name)
             continue
-        kinds = {part.data[0] for part in live([node]) if part.op == "input"}
+        kinds = {part.data[0] for part in live([node]) if part.op == "input" and part.index not in counts}
         if not kinds <= allowed or (rates and kinds & {"q", "x"} and "v" not in kinds):  # a place is no rate
             wrong.append(name)
             continue
         function = scalar_function([node, *gradient(node, inputs)], mechanism.layout, "condition")
-        periodic = not rates and name.rpartition(".")[2] in ("angle", "first", "second")
+        periodic = not rates and name not in turns and name.rpartition(".")[2] in ("angle", "first", "second")
         found.append(Condition(name, float(target), periodic, function))
     return found, wrong

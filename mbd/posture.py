@@ -13,6 +13,7 @@ from mbd.compile.mechanism import Mechanism
 from mbd.conditions import Condition
 from mbd.equations.equations import Equations
 from mbd.kernel.active_set import ActiveSetManager
+from mbd.turns import choose_turns, hold_directions
 
 __all__ = [
     "Posture", "TOLERANCE", "capture", "close_nearby", "close_positions", "close_velocities", "descend",
@@ -23,6 +24,8 @@ TOLERANCE = 1e-9
 """Largest row residual [m, rad, m/s, rad/s] of a start, relative to 1 or the speed, that counts as consistent."""
 REFINEMENTS = 3
 """Solutions of the linear equations for velocities: bodies without mass leave an error in the first [-]."""
+ACTS = 1e-14
+"""Derivative [m/rad, -] of a row below which a coordinate does not act on it: what cancellation leaves of zero."""
 NUDGE, NUDGES = 0.01, 3
 """Step [m, rad] out of a flat spot of the rows, and how often it is tried."""
 TRIES, DESCENT = 4, 400
@@ -73,7 +76,7 @@ def position_rows(work: Posture) -> list[int]:
 def _involved(B: Matrix, free: Matrix) -> Any:
     """The free coordinates that the rows act on; the others stay where they are."""
     size = float(np.max(np.abs(B), initial=0.0))
-    return np.flatnonzero(free & (np.max(np.abs(B), axis=0, initial=0.0) > 1e-12 * size))
+    return np.flatnonzero(free & (np.max(np.abs(B), axis=0, initial=0.0) > max(1e-12 * size, ACTS)))
 
 
 def _weighted(M: Matrix) -> Matrix:
@@ -99,6 +102,7 @@ def close_positions(work: Posture, rows: Sequence[int], free: Matrix) -> Vector:
     if not rows and not work.places:
         return np.zeros(0)
     start = work.q.copy()
+    choose_turns(work, rows)
     misfit = _newton(work, rows, free, start)
     if np.max(np.abs(misfit)) <= TOLERANCE:
         return misfit
@@ -106,6 +110,7 @@ def close_positions(work: Posture, rows: Sequence[int], free: Matrix) -> Vector:
     turns = np.random.default_rng(0).uniform(-1.5, 1.5, (RESTARTS, len(start)))
     for turn in turns if work.mechanism.vector and bool((free & angles).any()) else ():
         work.q = start + np.where(free & angles, turn, 0.0)
+        choose_turns(work, rows)
         again = _newton(work, rows, free, start)
         if np.max(np.abs(again)) <= TOLERANCE:
             return again
@@ -133,6 +138,7 @@ def descents(work: Posture, start: Vector, free: Matrix) -> list[Vector]:
 
 def descend(work: Posture, rows: Sequence[int], free: Matrix, weights: Vector) -> tuple[Vector, Matrix]:
     """(h, B) at the end of a descent of Σ (w h)² from the position of `work`, which moves there."""
+    choose_turns(work, rows)
     n_v, moving = work.equations.n_v, np.flatnonzero(free)
     h, B = _weighted_rows(work, rows, weights)
     damping = 1e-3
@@ -165,6 +171,7 @@ def _weighted_rows(work: Posture, rows: Sequence[int], weights: Vector) -> tuple
 
 def close_nearby(work: Posture, rows: Sequence[int], free: Matrix) -> Vector:
     """Newton's method from the present position alone; the remaining residual of each row."""
+    hold_directions(work.mechanism, work.time, work.q, work.parameters, work.anchors)
     return _newton(work, rows, free, work.q.copy()) if rows or work.places else np.zeros(0)
 
 

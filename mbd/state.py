@@ -82,7 +82,7 @@ class State:
     z : (n_z,) first-order states
     mode : closed contacts
     armed : names of the open contacts that may close; None: decided from the gaps at the start
-    anchors : values held since contacts closed (points of touchdown) [m]
+    anchors : values held since contacts closed (points of touchdown) [m], then the whole turns of planar cut joints
     names : coordinate names, in the order of q; velocity_names in the order of v
     moved : how far the assembly moved each named quantity from the value asked for [m, rad, m/s, rad/s]
     parameters : parameter values that differ from the model's

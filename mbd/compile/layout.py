@@ -44,10 +44,9 @@ class Layout:
         for table in equations.tables:
             offsets.append(offset)
             offset += 5 * len(table.breaks)
-        anchors = sum(len(contact.anchors) for contact in equations.contacts)
         return cls(
-            equations.n_q, equations.n_v, equations.n_z, len(equations.rows), anchors, len(equations.contacts),
-            len(equations.parameters), tuple(offsets), len(equations.frictions),
+            equations.n_q, equations.n_v, equations.n_z, len(equations.rows), equations.n_anchors,
+            len(equations.contacts), len(equations.parameters), tuple(offsets), len(equations.frictions),
         )  # fmt: skip
 
     @cached_property

@@ -20,7 +20,7 @@ from mbd.tape.derivatives import gradient, live
 from mbd.tape.evaluate import evaluate
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["laws"]
+__all__ = ["anchors_held", "laws"]
 
 FITS = 1e-9
 """Misfit of unmoving parts that counts as none [m, rad]: above the round-off of users' sums, far below a tolerance."""
@@ -55,6 +55,17 @@ def laws(
     for event in events:
         found.guards.append(_guard(scope, event))
     return found
+
+
+def anchors_held(scope: Surroundings, contacts: Sequence[Unilateral | Penalty]) -> int:
+    """How many values all contacts store as they close."""
+    zero = scope.tape.zero
+    return sum(len(law.captured(zero) if isinstance(law, Penalty) else _captured(scope, law)) for law in contacts)
+
+
+def _captured(scope: Surroundings, law: Unilateral) -> Sequence[Scalar]:
+    """What a contact that holds its place stores as it closes."""
+    return law.measure.captured(scope) if law.sticks or law.slides else ()
 
 
 def _row(
@@ -128,7 +139,7 @@ def _unilateral(found: Laws, scope: Surroundings, dynamics: Dynamics, law: Unila
     unit = law.measure.unit
     numbers = [_row(found, scope, law.name, "normal", gap, unit=unit, contact=number)]
     held_by = law.sticks or law.slides
-    captured, anchors = _anchored(found, scope, law.measure.captured(scope) if held_by else ())
+    captured, anchors = _anchored(found, scope, _captured(scope, law))
     if held_by:
         held = [scope.tape.input("anchor", k) for k in anchors]
         for part, value in law.measure.tangents(scope, held):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from mbd.equations.changes import partials, rates
-from mbd.equations.contacts import laws
+from mbd.equations.contacts import anchors_held, laws
 from mbd.equations.dynamics import Dynamics, Work
 from mbd.equations.effects import Cause, causes, effect_of, weight_of
 from mbd.equations.equations import Equations
@@ -54,6 +54,8 @@ def _derived(model: Model, plan: Plan) -> Equations:
     """Kinematics, causes of forces, balance, constraints, results."""
     scope = Surroundings(model.ground, plan.edges, plan.cut, model.gravity, model.tunable, plan.planar)
     scope.offer_frames(model.frames.values())
+    if plan.planar and plan.cut:
+        scope.count_turns(anchors_held(scope, model.contacts))
     moving = list(scope.bodies.values())
     vectors = all(joint.is_vector for joint in plan.edges)
     masses = {body.body.name: body.body.mass_properties(scope) for body in moving}
@@ -83,7 +85,7 @@ def _derived(model: Model, plan: Plan) -> Equations:
         velocity_names=tuple(f"{coordinate.name}.rate" for coordinate in scope.coordinates), notes=plan.notes,
         figure=figure_of(model),
         geometry=TreeGeometry(scope, dynamics, work, rests, constraints, plan.planar and vectors),
-        frictions=tuple(constraints.frictions),
+        frictions=tuple(constraints.frictions), turns=tuple(scope.turns.values()),
     )  # fmt: skip
     whole = work + _closed(scope, constraints)
     offer_results(outputs, scope, dynamics, whole, equations, model, {joint.name for joint in plan.floating})

@@ -9,7 +9,8 @@ Inputs on the tape, as (kind, index)
     ('v', i), ('a', i)   velocities, accelerations
     ('z', i), ('s', i)   first-order states and their rates ż
     ('lam', k)     multiplier of row k of `rows`
-    ('anchor', k)  value held since a contact closed (point of touchdown, approach speed)
+    ('anchor', k)  value held since a contact closed (point of touchdown, approach speed); behind those of all contacts,
+                   the whole turns of cut joints
     ('switch', c)  1.0 while penalty contact number c acts, else 0.0
     ('slip', k)    sign of the sliding of friction k, 0.0 while it sticks or its contact is open
     ('p', k)       parameter k
@@ -23,7 +24,7 @@ from typing import Any, Literal, Protocol
 
 from mbd.tape.node import Node, Table, Tape
 
-__all__ = ["Contact", "Coordinate", "Effect", "Equations", "Friction", "Geometry", "Guard", "Parameter", "Row"]
+__all__ = ["Contact", "Coordinate", "Effect", "Equations", "Friction", "Geometry", "Guard", "Parameter", "Row", "Turn"]
 
 
 @dataclass(frozen=True)
@@ -143,6 +144,28 @@ class Guard:
 
 
 @dataclass(frozen=True)
+class Turn:
+    """The angle between the frames of a cut joint in the plane, a sum of coordinates and of whole turns.
+
+    ``angle = sign (φ_child − φ_parent + offset + 2π n)``, with the headings φ of the two bodies along the tree. The
+    number n is a constant of the motion, since the angle is continuous: which of the angles that give the same pose is
+    meant. The start chooses it.
+
+    name : of the coordinate, 'knee.angle'; '' for a joint that does not turn, whose row is the angle
+    joint : name of the joint
+    anchor : number of the anchor that holds n
+    angle : on the tape [rad]
+    sign : ±1, so that one more turn changes the angle by 2π · sign
+    """
+
+    name: str
+    joint: str
+    anchor: int
+    angle: Node
+    sign: float
+
+
+@dataclass(frozen=True)
 class Effect:
     """One cause of forces: a loss, a spring, a motor, a penalty stop, gravity.
 
@@ -219,6 +242,7 @@ class Equations:
     kinetic, potential : T and V; V includes gravity and every effect with a potential
     output : any named result as a node ('left hip.angle', 'left shank.end.x', 'left knee.reaction_force.x', …)
     output_names : the names that `output` certainly knows
+    turns : of the planar cut joints, see `Turn`
     idle : (owner, part) of rows of cut joints that hold whatever the motion, and were left out
     memory : what follows from the rest, kept once it was found
     """
@@ -244,6 +268,7 @@ class Equations:
     figure: Callable[[], Any] | None = field(default=None, repr=False)
     geometry: Geometry | None = field(default=None, repr=False)
     frictions: tuple[Friction, ...] = ()
+    turns: tuple[Turn, ...] = ()
     memory: dict[str, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @property
@@ -257,6 +282,11 @@ class Equations:
     @property
     def n_z(self) -> int:
         return len(self.states)
+
+    @property
+    def n_anchors(self) -> int:
+        """Values that contacts hold, followed by the whole turns of cut joints."""
+        return sum(len(contact.anchors) for contact in self.contacts) + len(self.turns)
 
     @property
     def tables(self) -> list[Table]:

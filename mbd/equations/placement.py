@@ -14,7 +14,7 @@ from mbd.equations.kinematics import Column, Moving
 from mbd.scope import Rotation, Triple
 from mbd.tape.node import Node, Scalar, Tape
 
-__all__ = ["Axes", "Mark", "Placement", "Point"]
+__all__ = ["Axes", "Heading", "Mark", "Placement", "Point"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +33,14 @@ class Axes:
 
     carrier: Moving
     rotation: Rotation
+
+
+@dataclass(frozen=True, eq=False)
+class Heading:
+    """The direction of a body of a planar mechanism: the sum of the angles on its path, over any number of turns."""
+
+    carrier: Moving
+    angle: Scalar
 
 
 @dataclass(frozen=True, eq=False)

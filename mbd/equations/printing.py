@@ -77,6 +77,7 @@ def _input_names(equations: Equations) -> dict[Node, str]:
     names |= {equations.tape.input("p", k): _plain(p.name) for k, p in enumerate(equations.parameters)}
     for contact in equations.contacts:
         names |= {equations.tape.input("anchor", k): f"{_plain(contact.name)}.anchor{k}" for k in contact.anchors}
+    names |= {equations.tape.input("anchor", t.anchor): f"{_plain(t.joint)}.turns" for t in equations.turns}
     return names
 
 

@@ -177,7 +177,7 @@ def accelerations(equations: Equations) -> list[Node]:
     """What assembly, impacts and restarts need, over all rows and with penalties behind their switches.
 
     ``r = M a + f + (∂r/∂λ) λ``, ``ḣ = B v + h_t``, ``ḧ = B a + γ``; `captured` are the values that closing contacts
-    store, in the order of contacts and anchors; T is the kinetic energy.
+    store, in the order of contacts and anchors, and the whole turns as they are; T is the kinetic energy.
     """
     inputs = Inputs.of(equations)
     tape = equations.tape
@@ -196,6 +196,7 @@ def accelerations(equations: Equations) -> list[Node]:
     out += [entry for line in B for entry in [*line, *padding]]
     out += [row.value for row in equations.rows] + hv + _time_rates(equations, hv)
     out += [value for contact in equations.contacts for value in contact.captured]
+    out += [tape.input("anchor", turn.anchor) for turn in equations.turns]
     return [*out, equations.kinetic, *(friction.limit for friction in equations.frictions)]
 
 

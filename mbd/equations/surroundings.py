@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterable, Sequence
 from functools import partial
 
@@ -9,7 +10,8 @@ from mbd.bodies.algebra import IDENTITY, difference, product, rotate, transpose
 from mbd.bodies.base import Body, Frame
 from mbd.bodies.values import Vector3
 from mbd.equations import changes
-from mbd.equations.equations import Coordinate
+from mbd.equations.equations import Coordinate, Turn
+from mbd.equations.headings import Headings, direction, spin
 from mbd.equations.inputs import Inputs
 from mbd.equations.kinematics import Edge, Moving, ground_motion, moving_body
 from mbd.equations.outputs import AXES, Outputs
@@ -17,7 +19,7 @@ from mbd.equations.parameters import ParameterTable
 from mbd.equations.placement import Placement
 from mbd.equations.views import Views
 from mbd.errors import UnknownNameError, nearest
-from mbd.joints.base import Joint
+from mbd.joints.base import Joint, row_unit
 from mbd.scope import FrameMotion, JointMotion, Rotation, Triple
 from mbd.tape.derivatives import jvp, live
 from mbd.tape.node import Node, Scalar, Table, Tape
@@ -47,6 +49,7 @@ class Surroundings:
     bodies : by name, the ground first
     placement : everything in ground axes
     quantities : named results that words may ask for
+    turns : of the cut joints of a planar mechanism, by joint
     """
 
     def __init__(
@@ -73,6 +76,8 @@ class Surroundings:
         self.placement = Placement(self.tape, list(self.bodies.values()), self.composed)
         self.views = Views(self.placement, self.composed, planar)
         self.quantities = Outputs(self.tape)
+        self.turns: dict[str, Turn] = {}
+        self._angles: dict[str, tuple[int, Scalar]] = {}
         self._offer_quantities()
 
     # the tree -------------------------------------------------------------------------------------------------------
@@ -143,6 +148,9 @@ class Surroundings:
             if joint is None:
                 raise UnknownNameError(nearest(name, [j.name for j in (*self.tree, *self.cuts)], "joint"))
             values = [self.tape.lift(value) for value in joint.recover(*self.relative(joint), self)]
+            place, angle = self._angles.get(name, (-1, 0.0))
+            if place >= 0:
+                values[place] = self.tape.lift(angle)
             known = self._joints[name] = JointMotion(tuple(values), tuple(self.rates(values)))
         return known
 
@@ -172,12 +180,49 @@ class Surroundings:
         """(part, residual) of a cut joint, and whether its places are written in ground axes.
 
         Where a joint holds its two points together, ``R_Aᵀ (p_B − p_A) = 0`` is ``p_B − p_A = 0``, which is shorter.
+        Where it holds a direction in the plane, the angle itself is the row: its sine would be 0 half a turn off too.
         """
         R, p = self.relative(joint)
         level = self._holds_points(joint)
         if level:
             p = difference(self.frame(joint.child).position, self.frame(joint.parent).position)
-        return [(part, self.tape.lift(value)) for part, value in joint.rows(R, p, self)], level
+        rows = [(part, self.tape.lift(value)) for part, value in joint.rows(R, p, self)]
+        place, angle = self._angles.get(joint.name, (0, 0.0))
+        if place < 0:
+            rows = [(part, self.tape.lift(angle) if self._holds_turn(part, value) else value) for part, value in rows]
+        return rows, level
+
+    def _holds_turn(self, part: str, value: Node) -> bool:
+        """Whether a row of a joint that does not turn in the plane is one on its direction."""
+        inputs = {node.data[0] for node in live([self.real(value)]) if node.op == "input"}
+        return row_unit(part) == "rad" and "x" in inputs
+
+    def count_turns(self, first: int) -> None:
+        """Measure the angles of cut joints in the plane by the headings of their bodies, over any number of turns.
+
+        Parameters
+        ----------
+        first : number of the first anchor that is free to hold whole turns
+        """
+        headings = Headings(self)
+        for joint in self.cuts:
+            turns = spin(joint, self)
+            bodies = [self.bodies[frame.body.name] for frame in (joint.parent, joint.child)]
+            parent, child = (headings.of(body) for body in bodies)
+            turning = [] if turns is None else [k for k, slope in enumerate(turns.slopes) if slope != 0.0]
+            if turns is None or parent is None or child is None or len(turning) > 1:
+                continue
+            place = turning[0] if turning else -1
+            sign = turns.slopes[place] if turning else 1.0
+            if abs(sign) != 1.0:
+                continue
+            anchor = first + len(self.turns)
+            whole = (2.0 * math.pi) * self.tape.input("anchor", anchor)
+            offset = direction(joint.child) - direction(joint.parent) - turns.offset
+            angle = self.tape.lift(sign * (self.views.heading(child) - self.views.heading(parent) + offset + whole))
+            name = joint.coordinate_names[place] if turning else ""
+            self._angles[joint.name] = (place, angle)
+            self.turns[joint.name] = Turn(name, joint.name, anchor, self.real(angle), sign)
 
     def _holds_points(self, joint: Joint) -> bool:
         """Whether the rows that depend on p are its three components."""

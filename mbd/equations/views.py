@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from mbd.bodies.algebra import ZERO, cross, rotate, transpose
 from mbd.equations.kinematics import Moving
-from mbd.equations.placement import Axes, Placement, Point
+from mbd.equations.placement import Axes, Heading, Placement, Point
 from mbd.scope import Rotation, Triple
 from mbd.tape.derivatives import live, substitute, vjp
 from mbd.tape.node import Node, Scalar
@@ -21,9 +21,9 @@ __all__ = ["Pull", "View", "Views"]
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """Component `axis` of a point or element (axis, column) of a rotation, or, if `motion`, of its velocity."""
+    """Component `axis` of a point, element (axis, column) of a rotation, a heading; if `motion`, of its velocity."""
 
-    of: Point | Axes
+    of: Point | Axes | Heading
     axis: int
     column: int
     motion: bool
@@ -58,9 +58,11 @@ class Views:
         self._placement, self._tape, self._planar = placement, placement.tape, planar
         self._coordinates = frozenset(coordinates)
         self._known: dict[int, View] = {}
-        self._nodes: dict[tuple[Point | Axes, int, int, bool], Scalar] = {}
+        self._nodes: dict[tuple[Point | Axes | Heading, int, int, bool], Scalar] = {}
 
-    def _view(self, of: Point | Axes, real: Scalar, axis: int, column: int = 0, motion: bool = False) -> Scalar:
+    def _view(
+        self, of: Point | Axes | Heading, real: Scalar, axis: int, column: int = 0, motion: bool = False
+    ) -> Scalar:
         key = (of, axis, column, motion)
         if key not in self._nodes:
             node = self._tape.lift(real)
@@ -71,10 +73,12 @@ class Views:
             self._nodes[key] = node
         return self._nodes[key]
 
-    def _is_fixed(self, of: Point | Axes, axis: int, column: int, motion: bool) -> bool:
+    def _is_fixed(self, of: Point | Axes | Heading, axis: int, column: int, motion: bool) -> bool:
         """Whether no virtual motion changes a component."""
         if of.carrier.parent is None:
             return True
+        if isinstance(of, Heading):
+            return False
         if isinstance(of, Axes) and motion:
             return self._planar and axis != 2
         return self._planar and (axis == 2 or column == 2)
@@ -95,6 +99,10 @@ class Views:
         R = axes.rotation
         a, b, c = (tuple(self._view(axes, R[i][k], i, k) for k in range(3)) for i in range(3))
         return (a, b, c)  # type: ignore[return-value]
+
+    def heading(self, heading: Heading) -> Scalar:
+        """The angle of a body in the plane."""
+        return self._view(heading, heading.angle, 2)
 
     def angular_velocity(self, axes: Axes) -> Triple:
         """ω."""
@@ -118,6 +126,8 @@ class Views:
                 continue
             if isinstance(view.of, Point):
                 found[view.node] = self.velocity(view.of)[view.axis]
+            elif isinstance(view.of, Heading):
+                found[view.node] = self.angular_velocity(self._placement.axes(view.of.carrier))[2]
             else:
                 R = self.rotation(view.of)
                 column = (R[0][view.column], R[1][view.column], R[2][view.column])
@@ -145,7 +155,7 @@ class Views:
             values = substitute(values, {v.node: v.real for v in self.inside(values) if self._is_coordinate(v.real)})
         views = [view for view in self.inside(values) if view.motion == motion]
         bars = self.real(vjp(values, multipliers, [*inputs, *(view.node for view in views)]))
-        shares: dict[Point | Axes, list[list[Scalar]]] = {}
+        shares: dict[Point | Axes | Heading, list[list[Scalar]]] = {}
         for view, bar in zip(views, bars[len(inputs) :], strict=True):
             share = shares.setdefault(view.of, [[0.0, 0.0, 0.0] for _ in range(3)])
             share[view.column][view.axis] = bar
@@ -154,8 +164,10 @@ class Views:
     def _is_coordinate(self, node: Node) -> bool:
         return node.op == "input" or node in self._coordinates
 
-    def _pull(self, of: Point | Axes, share: Sequence[Sequence[Scalar]], motion: bool) -> Pull:
+    def _pull(self, of: Point | Axes | Heading, share: Sequence[Sequence[Scalar]], motion: bool) -> Pull:
         """From ground axes to a force or a torque in body axes; ``δR = δθ × R`` gives the torque Σ_k e_k × Rᵀ bar_k."""
+        if isinstance(of, Heading):
+            return Pull(of.carrier, torque=(0.0, 0.0, share[0][2]))
         back = transpose(self._placement.axes(of.carrier).rotation)
         columns = [rotate(back, (bar[0], bar[1], bar[2])) for bar in share]
         if isinstance(of, Point):

@@ -200,7 +200,10 @@ class ModelColumns(Columns):
         """What each contact captured in the row where it closed, or holds from the start, until it opens."""
         if self._anchors is None:
             contacts = self.equations.contacts
-            held = np.zeros((len(self.record.time), sum(len(contact.anchors) for contact in contacts)))
+            held = np.zeros((len(self.record.time), self.equations.n_anchors))
+            counts = [turn.anchor for turn in self.equations.turns]
+            if counts and self.record.start is not None and len(self.record.start.anchors):
+                held[:, counts] = self.record.start.anchors[counts]
             rows = self.record.rows(held)
             for number, contact in enumerate(contacts):
                 closed = self.record.closed[:, number].astype(bool)

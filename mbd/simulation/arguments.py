@@ -100,7 +100,7 @@ def fits(start: State, equations: Equations, manager: ActiveSetManager) -> None:
     if faults:
         raise ModelError(faults)
     names = tuple(coordinate.name for coordinate in equations.coordinates)
-    anchors = sum(len(contact.anchors) for contact in manager.contacts)
+    anchors = equations.n_anchors
     sizes = (len(start.q), len(start.v), len(start.z)) == (equations.n_q, equations.n_v, equations.n_z)
     if start.names != names or not sizes:
         raise ModelError(
@@ -111,10 +111,10 @@ def fits(start: State, equations: Equations, manager: ActiveSetManager) -> None:
     unknown = [nearest(name, manager.names, "contact") for name in dict.fromkeys(contacts) if name not in manager.names]
     if unknown:
         raise UnknownNameError(unknown)
-    if len(start.anchors) != anchors and start.mode.closed:
+    if len(start.anchors) != anchors and (start.mode.closed or len(start.anchors)):
         raise ModelError(
-            f"the start holds {len(start.anchors)} anchors of contacts, but the model has {anchors}; assemble it from "
-            "this model, with the same parameters="
+            f"the start holds {len(start.anchors)} anchors of contacts and turns of cut joints, but the model has "
+            f"{anchors}; assemble it from this model, with the same parameters="
         )
     parts = ((start.q, names), (start.v, equations.velocity_names), (start.z, [s.name for s in equations.states]))
     values = [(name, value) for part, known in parts for name, value in zip(known, part, strict=True)]

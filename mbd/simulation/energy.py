@@ -161,7 +161,8 @@ class EnergyWatch:
         spread = {first + k * (last - first) // (SPREAD - 1) for k in range(SPREAD)}
         chosen = np.array(sorted(spread.union(row for row in early if row <= last)), dtype=np.intp)
         record = record_of(run, run.table[chosen])
-        inputs = ModelColumns.inputs(record.rows(np.zeros((len(chosen), run.values["n_anchors"]))))
+        anchors = np.tile(run.values["anchors"][: run.values["n_anchors"]], (len(chosen), 1))
+        inputs = ModelColumns.inputs(record.rows(anchors))
         kinetic, potential = run.mechanism.energies(inputs, record.parameters_at(chosen))
         way = _way(record.q, run.table[0, 1 : 1 + run.values["n_q"]])
         self._seen = np.concatenate([self._seen, np.column_stack([kinetic, potential, way])])

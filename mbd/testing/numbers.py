@@ -25,10 +25,9 @@ def inputs(equations: Equations, seed: int = 0, x: float = 0.0, spread: float = 
     x : size of the local increments; spread : of the coordinates
     """
     rng = np.random.default_rng(seed)
-    n_anchors = sum(len(contact.anchors) for contact in equations.contacts)
     sizes = {
         "q": equations.n_q, "v": equations.n_v, "a": equations.n_v, "z": equations.n_z, "s": equations.n_z,
-        "lam": len(equations.rows), "anchor": n_anchors,
+        "lam": len(equations.rows), "anchor": equations.n_anchors,
     }  # fmt: skip
     found: Point = {("t", 0): 0.37, ("c", 0): 0.7, ("c", 1): 0.23}
     for kind, size in sizes.items():
@@ -37,6 +36,7 @@ def inputs(equations: Equations, seed: int = 0, x: float = 0.0, spread: float = 
     found |= {("p", k): parameter.value for k, parameter in enumerate(equations.parameters)}
     found |= {("switch", k): 1.0 for k in range(len(equations.contacts))}
     found |= {("slip", k): 0.0 for k in range(len(equations.frictions))}
+    found |= {("anchor", turn.anchor): 0.0 for turn in equations.turns}
     found |= {("lam", friction.row): 0.0 for friction in equations.frictions}
     return found
 

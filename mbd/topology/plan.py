@@ -19,7 +19,7 @@ from mbd.topology.graph import links_of, mobility, spanning_tree
 if TYPE_CHECKING:
     from mbd.model import Model
 
-__all__ = ["Plan", "plan"]
+__all__ = ["Plan", "plan", "uncut"]
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,16 @@ class Plan:
 
 def plan(model: Model) -> Plan:
     """The tree, the cut joints and the floating bodies of a model whose `cut` is 'auto', 'loops', 'all' or names."""
-    wanted = cut_names(model) | {joint.name for joint in model.joints if needs_reaction(joint)}
+    return _plan(model, cut_names(model) | {joint.name for joint in model.joints if needs_reaction(joint)})
+
+
+def uncut(model: Model) -> Plan:
+    """The same as `plan`, of the model that has nothing but its loops cut."""
+    return _plan(model, set())
+
+
+def _plan(model: Model, wanted: set[str]) -> Plan:
+    """The tree without some joints."""
     planar = is_planar(model)
     links = links_of(model, without=wanted)
     tree, closing, reached = spanning_tree(links, model.ground.name)

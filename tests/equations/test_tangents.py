@@ -22,10 +22,9 @@ SCENES = {
 def test_accelerations_program_is_the_linear_form_of_the_residual(scene):
     equations = derive(SCENES[scene]())
     n, n_v, R = equations.n_v + equations.n_z, equations.n_v, len(equations.rows)
-    anchors = sum(len(contact.anchors) for contact in equations.contacts)
     point = inputs(equations, 7)
     values = at(accelerations(equations), point)
-    sizes = ((n, n), (n,), (n, R), (R, n), (R,), (R,), (R,), (anchors,), (1,))
+    sizes = ((n, n), (n,), (n, R), (R, n), (R,), (R,), (R,), (equations.n_anchors,), (1,))
     M, f, Rm, B, h, hv, bias, captured, T = block(values, *sizes)
     penalties = [k for k, contact in enumerate(equations.contacts) if contact.kind == "penalty"]
     out = at(residual(equations, range(R), penalties, stabilized=True), point)
@@ -41,5 +40,5 @@ def test_accelerations_program_is_the_linear_form_of_the_residual(scene):
     np.testing.assert_allclose(bias, derivative(hv_nodes, point, motion), atol=1e-7)
     explicit = derivative([row.value for row in equations.rows], point, {("t", 0): 1.0})
     np.testing.assert_allclose(hv, B[:, :n_v] @ v + explicit, atol=1e-7)
-    assert len(captured) == anchors
+    assert len(captured) == equations.n_anchors
     assert T[0] == pytest.approx(0.5 * v @ M[:n_v, :n_v] @ v)
