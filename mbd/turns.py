@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,12 +12,13 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.python import ScalarFunction, scalar_function
+from mbd.state import State
 from mbd.tape.derivatives import live
 
 if TYPE_CHECKING:
     from mbd.posture import Posture
 
-__all__ = ["choose_turns", "hold_directions", "nearest_turns", "whole_turns"]
+__all__ = ["choose_turns", "directed", "hold_directions", "nearest_turns", "whole_turns"]
 
 EDGE = 1e-9
 """An angle this near to −π [rad] is called π, so that round-off does not choose between the two."""
@@ -52,6 +54,16 @@ def hold_directions(mechanism: Mechanism, time: float, q: Vector, parameters: Ve
     for turn, angle in zip(mechanism.equations.turns, angles, strict=True):
         if not turn.name:
             anchors[turn.anchor] -= turn.sign * whole_turns(float(angle))
+
+
+def directed(mechanism: Mechanism, start: State) -> State:
+    """The state in which the rows of joints that hold a direction ask for its pose, whoever turned its bodies."""
+    if not mechanism.equations.turns:
+        return start
+    given = start.anchors if len(start.anchors) else np.zeros(mechanism.layout.n_anchors)
+    anchors = given.copy()
+    hold_directions(mechanism, start.time, start.q, mechanism.parameters(), anchors)
+    return start if np.array_equal(anchors, start.anchors) else replace(start, anchors=anchors)
 
 
 def choose_turns(work: Posture, rows: Sequence[int]) -> None:

@@ -27,6 +27,7 @@ from mbd.simulation.tolerance import calibrated, first_allowed
 from mbd.simulation.trials import Trial
 from mbd.state import State
 from mbd.trajectory import Trajectory
+from mbd.turns import directed
 
 __all__ = ["prepared", "simulate"]
 
@@ -178,6 +179,7 @@ def prepared(
     mechanism = mechanism_of(model, options["backend"], changed)
     manager = ActiveSetManager(mechanism.equations)
     fits(start, mechanism.equations, manager)
+    start = directed(mechanism, start)
     end, stop = end_of(until, manager, dt, start.time)
     tol = options.get("tol")
     strategy, reason = chosen(options["contact"], manager, options["locate"], tol is not None)

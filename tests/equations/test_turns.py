@@ -213,7 +213,7 @@ def test_stops_and_events_beyond_a_turn_are_met_under_every_cut():
 
 def test_a_run_of_many_turns_goes_on_to_the_bit_from_its_middle(tmp_path):
     whole = swung("all", scheme="HHT")
-    half = swung("all", 0.5, "HHT")
+    half = swung("all", 0.2, "HHT")
     half.save(tmp_path / "half.npz")
     for state in half.final, mbd.load(tmp_path / "half.npz").final:
         rest = swung("all", scheme="HHT", start=state)
