@@ -60,7 +60,8 @@ def directed(mechanism: Mechanism, start: State) -> State:
     """The state in which the rows of joints that hold a direction ask for its pose, whoever turned its bodies."""
     if not mechanism.equations.turns:
         return start
-    given = start.anchors if len(start.anchors) else np.zeros(mechanism.layout.n_anchors)
+    fits = len(start.anchors) == mechanism.layout.n_anchors
+    given = start.anchors if fits else np.zeros(mechanism.layout.n_anchors)
     anchors = given.copy()
     hold_directions(mechanism, start.time, start.q, mechanism.parameters(), anchors)
     return start if np.array_equal(anchors, start.anchors) else replace(start, anchors=anchors)

@@ -202,7 +202,7 @@ class ModelColumns(Columns):
             contacts = self.equations.contacts
             held = np.zeros((len(self.record.time), self.equations.n_anchors))
             counts = [turn.anchor for turn in self.equations.turns]
-            if counts and self.record.start is not None and len(self.record.start.anchors):
+            if counts and self.record.start is not None and len(self.record.start.anchors) == held.shape[1]:
                 held[:, counts] = self.record.start.anchors[counts]
             rows = self.record.rows(held)
             for number, contact in enumerate(contacts):

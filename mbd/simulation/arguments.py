@@ -111,7 +111,7 @@ def fits(start: State, equations: Equations, manager: ActiveSetManager) -> None:
     unknown = [nearest(name, manager.names, "contact") for name in dict.fromkeys(contacts) if name not in manager.names]
     if unknown:
         raise UnknownNameError(unknown)
-    if len(start.anchors) != anchors and (start.mode.closed or len(start.anchors)):
+    if len(start.anchors) != anchors and (start.mode.closed or (len(start.anchors) and equations.turns)):
         raise ModelError(
             f"the start holds {len(start.anchors)} anchors of contacts and turns of cut joints, but the model has "
             f"{anchors}; assemble it from this model, with the same parameters="
