@@ -59,7 +59,7 @@ def at_rest(model, state):
 def moving(cut="auto"):
     """A four-bar somewhere in its motion."""
     model = four_bar(cut, loss=mbd.Quadratic(0.3))
-    return model, mbd.assemble(model, position={"a.angle": 2.0}, velocity={"a.angle": 1.7})
+    return model, mbd.assemble(model, position={"a.angle": 0.4}, velocity={"a.angle": 1.7})
 
 
 def on_spring(loss=None, stiffness=40.0):
