@@ -91,6 +91,23 @@ def test_between_rows_results_of_many_mechanisms_are_as_accurate_as_at_rows(kind
     check(kind, seed, SCHEMES[name](), STEPS.get(name, USUAL))
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_no_instant_between_long_steps_is_worse_than_the_others(kind):
+    """Wherever it is asked: choices between two ways to find a force must not flip within an interval."""
+    until = 0.4
+    run = mbd.simulate(*mechanism(kind, 0), mbd.RadauIIA(), dt=2.5e-2, until=until)
+    true = exact(kind, 0, until)
+    times = np.setdiff1d(np.linspace(0.0, until, 241), run.time)
+    for event in run.events:
+        times = times[np.abs(times - event.time) > 5e-2]
+    names = kinds_of(run)["reactions"] + kinds_of(run)["accelerations"]
+    size = max(np.max(np.abs(run[name])) for name in names)
+    for name in names:
+        found = np.abs(run.at(times)[name] - true.at(times)[name])
+        row = np.max(np.abs(run[name] - true.at(run.time)[name]))
+        assert np.max(found) <= 30.0 * max(row, np.median(found)) + 1e-9 * size, name
+
+
 @pytest.mark.parametrize("tol", [1e-4, 1e-9])
 def test_explicit_steps_with_a_redundant_row_keep_their_tolerance_between_rows(tol):
     model, start = bricard()

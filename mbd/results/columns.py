@@ -14,7 +14,7 @@ from mbd.arrays import Matrix, Vector
 from mbd.errors import TrajectoryError, UnknownNameError, nearest
 from mbd.results.balance import Balance
 from mbd.results.dense import Restepping
-from mbd.results.forces import balanced
+from mbd.results.forces import Forces
 from mbd.results.interpolation import Grid, Places
 from mbd.results.names import AXES, rate_name
 from mbd.results.record import Record, Rows
@@ -147,15 +147,22 @@ class ModelColumns(Columns):
         """
         if self._steps is None and Restepping.serves(self):
             self._steps = Restepping(self)
-        rows = self.rows
         if self._steps is not None:
-            return self._steps.at(rows, places)
-        plain = self.equations.compose is None
+            return self._steps.at(self.rows, places)
+        if forces and Balance.serves(self.equations):
+            return self._forces.at(places)
+        return self._interpolated(places)[0]
+
+    def _interpolated(self, places: Places) -> tuple[Rows, Rows]:
+        """States by polynomials, and by polynomials of a lower degree."""
+        rows, plain = self.rows, self.equations.compose is None
         smooth = is_smooth(self.record, plain)
         found = self.grid.between(rows, places, self.q_rate, smooth)
-        if not forces or not Balance.serves(self.equations):
-            return found
-        return balanced(self.balance, rows, places, found, self.grid.rougher(rows, places, found, plain, smooth))
+        return found, self.grid.rougher(rows, places, found, plain, smooth)
+
+    @cached_property
+    def _forces(self) -> Forces:
+        return Forces(self.balance, self.rows, self._interpolated)
 
     @cached_property
     def balance(self) -> Balance:

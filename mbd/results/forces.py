@@ -14,46 +14,86 @@ lower degree is taken.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
-from mbd.results.balance import Balance, Flags, Solved, put
+from mbd.results.balance import Balance, Flags, put
 from mbd.results.interpolation import Places
 from mbd.results.record import Rows
 
-__all__ = ["balanced"]
+__all__ = ["Forces"]
 
+POINTS = np.array([0.2, 0.5, 0.8])
+"""Where in an interval both are compared [-]."""
+AT_ONCE = 1024
+"""Intervals that are compared together."""
+UNKNOWN = -1
+"""Of an interval that was not asked for yet."""
 NEGLIGIBLE = 1e-9
 """Change of forces, over the forces, that decides nothing [-]."""
 
 
-def balanced(balance: Balance, rows: Rows, places: Places, found: Rows, rougher: Rows) -> Rows:
-    """The states `found` at places with accelerations and multipliers from the balance where these are the better ones.
+States = Callable[[Places], tuple[Rows, Rows]]
+"""Interpolated states at places, and the same by polynomials of a lower degree."""
 
-    Parameters
-    ----------
-    rows : stored; found : interpolated states; rougher : the same by polynomials of a lower degree
-    """
-    inside = places.step > 0.0
-    if not inside.any():
-        return found
-    here, there = balance.solve(found.part(inside)), balance.solve(rougher.part(inside))
-    lower, upper, theta = places.lower[inside], places.upper[inside], places.theta[inside][:, None]
-    (first, from_first), (last, from_last) = (_missed(balance, rows, lower, end) for end in (lower, upper))
-    rate = here.rate + (1.0 - theta) * first[0] + theta * last[0]
-    lam = here.lam + (1.0 - theta) * first[1] + theta * last[1]
-    ours, others = found.part(inside), rougher.part(inside)
-    good = here.sound & there.sound & from_first & from_last
-    good &= _steadier(here, there, np.hstack([ours.a, ours.s]), np.hstack([others.a, others.s]), ours.lam, others.lam)
-    chosen = inside.copy()
-    chosen[inside] = good
-    a, s = np.split(rate[good], [ours.a.shape[1]], axis=1)
-    return replace(
-        found, a=put(found.a, chosen, a), s=put(found.s, chosen, s), lam=put(found.lam, chosen, lam[good])
-    )  # fmt: skip
+
+class Forces:
+    """Accelerations and multipliers between the rows of a run."""
+
+    def __init__(self, balance: Balance, rows: Rows, states: States) -> None:
+        self.balance, self.rows, self.states = balance, rows, states
+        self._known = np.full(len(rows), UNKNOWN, dtype=np.int8)  # of each interval, by the row that begins it
+
+    def at(self, places: Places) -> Rows:
+        """The states at places, with accelerations and multipliers from the balance where these are the better ones."""
+        found, _ = self.states(places)
+        inside = np.flatnonzero((places.step > 0.0) & self._serves(places))
+        if not len(inside):
+            return found
+        here = self.balance.solve(found.part(inside))
+        lower, upper, theta = places.lower[inside], places.upper[inside], places.theta[inside][:, None]
+        (first, from_first), (last, from_last) = (_missed(self.balance, self.rows, lower, k) for k in (lower, upper))
+        rate = here.rate + (1.0 - theta) * first[0] + theta * last[0]
+        lam = here.lam + (1.0 - theta) * first[1] + theta * last[1]
+        good = here.sound & from_first & from_last
+        chosen = np.zeros(len(found), dtype=bool)
+        chosen[inside[good]] = True
+        a, s = np.split(rate[good], [found.a.shape[1]], axis=1)
+        return replace(
+            found, a=put(found.a, chosen, a), s=put(found.s, chosen, s), lam=put(found.lam, chosen, lam[good])
+        )  # fmt: skip
+
+    def _serves(self, places: Places) -> Flags:
+        """Whether the balance is better than polynomials in the interval of each place; false where it meets a row."""
+        asked = np.unique(places.lower[places.step > 0.0])
+        fresh = asked[self._known[asked] == UNKNOWN]
+        for part in np.array_split(fresh, -(-len(fresh) // AT_ONCE)) if len(fresh) else ():
+            self._known[part] = self._steadier(part)
+        return np.asarray(self._known[places.lower] == 1)
+
+    def _steadier(self, lower: Any) -> Flags:
+        """Where the balance changes less with the degree of interpolation than the polynomials, (k,) intervals.
+
+        Both are compared at several points of an interval: at some a difference may pass zero. Accelerations are
+        weighed by inertia.
+        """
+        time = self.rows.time
+        begin, step = np.repeat(lower, len(POINTS)), np.repeat(time[lower + 1] - time[lower], len(POINTS))
+        theta = np.tile(POINTS, len(lower))
+        found, rougher = self.states(Places(time[begin] + theta * step, begin, begin + 1, theta, step))
+        here, there = self.balance.solve(found), self.balance.solve(rougher)
+        rate, rough_rate = np.hstack([found.a, found.s]), np.hstack([rougher.a, rougher.s])
+        moved = _largest(np.einsum("kij,kj->ki", here.inertia, here.rate - there.rate))
+        bent = _largest(np.einsum("kij,kj->ki", here.inertia, rate - rough_rate))
+        pushed, bowed = _largest(here.lam - there.lam), _largest(found.lam - rougher.lam)
+        least = NEGLIGIBLE * _largest(here.load)
+        sound = (here.sound & there.sound).reshape(-1, len(POINTS)).all(axis=1)
+        steady = (moved <= bent + least) & (pushed <= bowed + NEGLIGIBLE * _largest(here.lam) + least)
+        return np.asarray(sound & steady)
 
 
 def _missed(balance: Balance, rows: Rows, lower: Any, ends: Any) -> tuple[tuple[Matrix, Matrix], Flags]:
@@ -71,17 +111,6 @@ def _missed(balance: Balance, rows: Rows, lower: Any, ends: Any) -> tuple[tuple[
     return (rate[place], (at.lam - solved.lam)[place]), solved.sound[place]
 
 
-def _steadier(here: Solved, there: Solved, rate: Matrix, rough_rate: Matrix, lam: Matrix, rough_lam: Matrix) -> Flags:
-    """Where the balance changes less with the degree of interpolation than polynomials through rates and multipliers.
-
-    Accelerations are weighed by inertia.
-    """
-    least = NEGLIGIBLE * _size(here.load)
-    moved = _size(np.einsum("kij,kj->ki", here.inertia, here.rate - there.rate))
-    bent = _size(np.einsum("kij,kj->ki", here.inertia, rate - rough_rate))
-    pushed, bowed = _size(here.lam - there.lam), _size(lam - rough_lam)
-    return np.asarray((moved <= bent + least) & (pushed <= bowed + NEGLIGIBLE * _size(here.lam) + least))
-
-
-def _size(values: Matrix) -> Vector:
-    return np.asarray(np.linalg.norm(values, axis=1))
+def _largest(values: Matrix) -> Vector:
+    """The largest size of vectors over the points of each interval (k,)."""
+    return np.asarray(np.max(np.linalg.norm(values, axis=1).reshape(-1, len(POINTS)), axis=1))

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from mbd.arrays import Matrix, Vector
 from mbd.results.dense import Restepping
 from mbd.results.interpolation import Places, quintic
-from mbd.results.matching import apart, matched
+from mbd.results.matching import Matches, apart, matched
 from mbd.results.osculating import DOUBT, osculating
 
 if TYPE_CHECKING:
@@ -42,8 +42,9 @@ ENOUGH = 0.5
 
 @dataclass(frozen=True)
 class Gap:
-    """Largest difference of a coordinate [m, rad] between two runs, which one, and the largest shift of an event [s].
+    """Largest difference of a coordinate between two runs, which one, and the largest shift of an event [s].
 
+    size : [m, rad], or in its own unit that of a result that was compared in the place of coordinates
     same : whether both runs have the same events
     """
 
@@ -53,19 +54,22 @@ class Gap:
     same: bool
 
 
-def gap(run: Trajectory, other: Trajectory, accuracy: float = 0.0) -> Gap:
+def gap(run: Trajectory, other: Trajectory, accuracy: float = 0.0, names: tuple[str, ...] = ()) -> Gap:
     """How far apart the coordinates of two runs are, away from their events; also at their ends.
 
     Parameters
     ----------
     run : read as its user reads it; other : the more accurate one
     accuracy : what matters [m, rad]: far smaller errors of interpolation do no harm
+    names : of other results to compare in the place of the coordinates, at rows and in middles between them
     """
     begin, end = float(run.time[0]), min(float(run.time[-1]), float(other.time[-1]))
     pairs = matched(run.events, other.events, begin, end)
     shifted = pairs.pairs + pairs.late
     difference = np.zeros(run.record.q.shape[1])
     beside = BESIDE * (end - begin)
+    if names:
+        return _named(run, other, names, pairs, end)
     rows, middles = _rows(run, end), _middles(run, end, accuracy)
     rows, middles = rows[apart(rows, shifted, beside)], middles[apart(middles, shifted, beside)]
     if len(rows):
@@ -74,11 +78,29 @@ def gap(run: Trajectory, other: Trajectory, accuracy: float = 0.0) -> Gap:
         difference = np.maximum(difference, np.abs(run.record.q[-1] - other.record.q[-1]))
     worst = int(np.argmax(difference)) if difference.size else -1
     equations = run.record.equations
-    names = [c.name for c in equations.coordinates] if equations is not None else []
+    known = [c.name for c in equations.coordinates] if equations is not None else []
     return Gap(
-        float(difference[worst]) if worst >= 0 else 0.0, names[worst] if 0 <= worst < len(names) else "",
+        float(difference[worst]) if worst >= 0 else 0.0, known[worst] if 0 <= worst < len(known) else "",
         max((abs(a - b) for a, b in shifted), default=0.0), pairs.alone == 0,
     )  # fmt: skip
+
+
+def _named(run: Trajectory, other: Trajectory, names: tuple[str, ...], pairs: Matches, end: float) -> Gap:
+    """The same of named results, each read as a user reads it."""
+    _, between = run._model_columns.grid.middles()
+    middles = between.time[between.time < end]
+    middles = middles[:: len(middles) // MIDDLES + 1]
+    shifted, beside = pairs.pairs + pairs.late, BESIDE * (end - float(run.time[0]))
+    times = np.concatenate([_rows(run, end)[:-1], middles])
+    times = times[apart(times, shifted, beside)]
+    ours, theirs = run.at(times).read(*names), other.at(times).read(*names)
+    apart_by = {name: float(np.max(np.abs(ours[name] - theirs[name]), initial=0.0)) for name in names}
+    if not pairs.late:
+        last = {name: abs(float(run[name][-1] - other[name][-1])) for name in names}
+        apart_by = {name: max(size, last[name]) for name, size in apart_by.items()}
+    worst = max(names, key=lambda name: apart_by[name])
+    shift = max((abs(a - b) for a, b in shifted), default=0.0)
+    return Gap(apart_by[worst], worst, shift, pairs.alone == 0)
 
 
 def _rows(run: Trajectory, end: float) -> Vector:

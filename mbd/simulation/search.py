@@ -55,8 +55,11 @@ LEAST_ORDER, MOST_ORDER = 0.5, 1.5
 class Search:
     """What is known of the errors of trial runs, and which one comes next."""
 
-    def __init__(self, tol: float, power: float, order: int, regular: bool, ratio: float) -> None:
+    def __init__(
+        self, tol: float, power: float, order: int, regular: bool, ratio: float, names: tuple[str, ...] = ()
+    ) -> None:  # fmt: skip
         self.tol, self.power, self.order, self.regular, self.ratio = tol, power, order, regular, ratio
+        self.names = names
         self.comparing = 0.0  # seconds
         self._gaps: dict[tuple[float, float], Gap] = {}
 
@@ -79,7 +82,8 @@ class Search:
 
     def why_better(self, trials: Sequence[Trial], best: Trial) -> str:
         """Why no looser run is worth trying, or ''."""
-        if best.error == 0.0 or best.gap is None or best.gap.size <= ROUND_OFF:
+        rounded = best.error == 0.0 or best.gap is None or best.gap.size <= ROUND_OFF
+        if rounded and not self.names:  # results that are named may be so because of coordinates that are not
             return "errors are round-off whatever the steps"
         looser = [trial for trial in trials if trial.allowed > best.allowed]
         if (best.widest and best.is_stretched) or any(same_steps(*two) for two in combinations([best, *looser], 2)):
@@ -121,10 +125,10 @@ class Search:
             near = sorted((seen[id(trial)] for trial in coarser), key=lambda trial: trial.allowed)
             fall = self._fall(near[0], finest, self._observed(near))
             difference = near[0].gap.size if near[0].gap is not None and near[0].gap.same else np.inf
-            error = max(fall / (1.0 - fall) * difference, least_error(finest, near[0]))
+            error = max(fall / (1.0 - fall) * difference, least_error(finest, near[0], self.names))
             known = replace(known, error=error, gap=near[0].gap)
         elif len(trials) > 1 and not seen and is_rounding(finest):
-            known = replace(known, error=rounding(finest) * float(finest.run.stats["steps"]))
+            known = replace(known, error=rounding(finest, self.names) * float(finest.run.stats["steps"]))
         return [seen.get(id(trial)) or replace(known, allowed=trial.allowed, run=trial.run, source=trial.source)
                 for trial in trials]  # fmt: skip
 
@@ -133,11 +137,11 @@ class Search:
         key = (trial.allowed, finest.allowed)
         if key not in self._gaps:
             began = perf_counter()
-            self._gaps[key] = gap(trial.run, finest.run, self.tol)
+            self._gaps[key] = gap(trial.run, finest.run, self.tol, self.names)
             self.comparing += perf_counter() - began
         told = self._gaps[key]
         part = 1.0 / (1.0 - self._fall(trial, finest, self.power))
-        least = rounding(trial) * float(trial.run.stats["steps"])
+        least = rounding(trial, self.names) * float(trial.run.stats["steps"])
         return replace(trial, error=max(part * told.size, least) if told.same else np.inf, gap=told, finest=False)
 
     def _fall(self, trial: Trial, finer: Trial, power: float) -> float:

@@ -20,6 +20,7 @@ from mbd.integrators import HHT, Integrator
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.simulation.arguments import callbacks, choices, end_of, fits, numbers
 from mbd.simulation.capabilities import refusals
+from mbd.simulation.judged import judged
 from mbd.simulation.run import Run
 from mbd.simulation.search import LARGEST
 from mbd.simulation.strategy import chosen
@@ -48,6 +49,7 @@ def simulate(
     dt: float | None = None,
     tol: float | None = None,
     *,
+    tol_of: Sequence[str] | None = None,
     until: float | str | tuple[str, float],
     contact: Literal["auto", "events", "nonsmooth"] = "auto",
     impact: Literal["newton", "poisson", "sequential"] = "newton",
@@ -75,6 +77,9 @@ def simulate(
     tol : in place of dt: the largest error of any coordinate [m, rad] over the whole run. It is estimated from two to
         five runs at different tolerances, see ``run.stats["tolerance"]``; what controllers and observers do besides
         answering happens in each of them. A tolerance that cannot be reached is a `SimulationError`
+    tol_of : names of the results that `tol` holds for, each in its own unit, at rows and between them: forces,
+        reactions, multipliers, rates or energies too, or coordinates without one that does not matter, such as the
+        angle of a fast spin; by default every coordinate
     until : end time [s]; or the name of a contact or event, at whose first closing or crossing the run ends;
         or (name, latest time)
     contact : 'events' locates the instants at which contacts close, open, stick and slip, which keeps the order of the
@@ -107,6 +112,8 @@ def simulate(
     scheme = integrator if integrator is not None else HHT(alpha=0.05)
     words = {"contact": contact, "impact": impact, "locate": locate, "on_failure": on_failure}
     faults = choices(words) + numbers(scheme, start, dt, tol, until, store, rest_speed)
+    if tol_of is not None and tol is None:
+        faults.append(f"tol_of={tol_of!r} says what tol holds for; give tol too, or leave it out")
     faults += callbacks(observers, progress) + named_number_faults(parameters, "parameters")
     if isinstance(start, State) and isinstance(start.parameters, Mapping):
         faults += named_number_faults(start.parameters, "parameters of the start")
@@ -118,7 +125,7 @@ def simulate(
         "backend": backend,
     }  # fmt: skip
 
-    def complete(step: float, more: Mapping[str, float]) -> tuple[Run, Trajectory, str]:
+    def complete(step: float, more: Mapping[str, Any]) -> tuple[Run, Trajectory, str]:
         run = prepared(model, start, scheme, step, until, changed, {**options, **more})
         run.observe(observers, _bar(progress, start.time, run.end))
         return run, *run.complete()
@@ -127,7 +134,8 @@ def simulate(
         run, trajectory, problem = complete(float(dt), {})
     else:
         assert tol is not None
-        run, trajectory, problem = _to_tolerance(complete, scheme, float(tol), _span(until, start.time))
+        names = judged(mechanism_of(model, backend, changed).equations, tol_of)
+        run, trajectory, problem = _to_tolerance(complete, scheme, float(tol), names, _span(until, start.time))
     if problem and on_failure == "raise":
         kind = MemoryLimitError if isinstance(run.cause, MemoryLimitError) else SimulationError
         raise kind(problem, trajectory) from (None if kind is MemoryLimitError else run.cause)
@@ -141,9 +149,10 @@ def _span(until: Any, begin: float) -> float | None:
 
 
 def _to_tolerance(
-    complete: Callable[[float, Mapping[str, float]], tuple[Run, Trajectory, str]],
+    complete: Callable[[float, Mapping[str, Any]], tuple[Run, Trajectory, str]],
     scheme: Integrator,
     tol: float,
+    names: tuple[str, ...],
     span: float | None,
 ) -> tuple[Run, Trajectory, str]:
     """The run whose error agrees with a tolerance; where an event ends it, the first guess is that it takes 1 s."""
@@ -154,11 +163,11 @@ def _to_tolerance(
     def trial(allowed: float) -> Trial:
         # shrinks and grows as steps do, so that runs of a motion so easy that its steps are the longest have others
         share = min(max((allowed / first) ** power, SHORTEST_CAP), LARGEST / LONGEST)
-        more = {"tol": tol, "longest": LONGEST * length * share, "allowed": allowed}
+        more: dict[str, Any] = {"tol": tol, "tol_of": names, "longest": LONGEST * length * share, "allowed": allowed}
         run, trajectory, problem = complete(INSTANT * min(length, 1.0), more)
         return Trial(allowed, trajectory, problem, run, widest=share == LARGEST / LONGEST)
 
-    found = calibrated(trial, tol, first, finer, scheme.order())
+    found = calibrated(trial, tol, first, finer, scheme.order(), names)
     trajectory = found.trial.run
     if found.problem and trajectory.success:  # no run failed, but none is good enough
         trajectory = Trajectory(replace(trajectory.record, success=False, message=found.problem))
@@ -190,7 +199,7 @@ def prepared(
     adaptive = {name: options.get(name) for name in ("tol", "allowed", "longest")}
     settings = {
         "model": getattr(model, "name", ""), "integrator": repr(scheme), "dt": dt if tol is None else None,
-        "until": until, **options, **adaptive,
+        "until": until, **options, **adaptive, "tol_of": list(options.get("tol_of", ())),
         "contact_reason": reason, "between": scheme.between, "backend": mechanism.backend.name,
         "versions": dict(_versions()),
     }  # fmt: skip

@@ -39,17 +39,20 @@ def first_allowed(tol: float, length: float, power: float) -> float:
     return FIRST * (max(tol, tol ** (1.0 / power)) if power > FAR_FINER else tol) / length
 
 
-def calibrated(run: Callable[[float], Trial], tol: float, allowed: float, power: float, order: int) -> Outcome:
+def calibrated(
+    run: Callable[[float], Trial], tol: float, allowed: float, power: float, order: int, names: tuple[str, ...] = ()
+) -> Outcome:
     """Runs until the estimated error of one agrees with the tolerance.
 
     Parameters
     ----------
     run : makes a run with a local error per second; tol : [m, rad]; allowed : of the first run [m/s, rad/s]
     power : κ; order : of the scheme
+    names : of the results that the tolerance holds for; every coordinate without
     """
     regular = power <= REGULAR
     ratio = PILOT if regular else CHECK ** (1.0 / power)
-    search = Search(tol, power, order, regular, ratio)
+    search = Search(tol, power, order, regular, ratio, names)
     first = run(PILOT * allowed if regular else allowed)
     if not first.problem and first.run.stats["steps"] == 0:  # it ended where it began
         return _told([first], replace(first, error=0.0), search, "")
@@ -92,7 +95,7 @@ def _told(trials: Sequence[Trial], best: Trial, search: Search, problem: str) ->
     """The run that counts, with what the trials have shown among its statistics."""
     stats, tol = best.run.record.stats, search.tol
     stats["tolerance"] = {
-        "requested": tol, "estimated": float(best.error), "growth": float(best.growth),
+        "requested": tol, "of": list(search.names), "estimated": float(best.error), "growth": float(best.growth),
         "event_shift": best.gap.shift if best.gap is not None else 0.0,
         "runs": [
             {"allowed": trial.allowed, "estimated": float(trial.error), "steps": trial.run.stats["steps"],
@@ -101,7 +104,7 @@ def _told(trials: Sequence[Trial], best: Trial, search: Search, problem: str) ->
         ],
         "comparing_seconds": search.comparing,
     }  # fmt: skip
-    if not problem and best.growth > GROWING and not is_rounding(best):
+    if not problem and best.growth > GROWING and not is_rounding(best) and not search.names:
         stats["notes"].append(
             f"errors grew {best.growth:.2g}-fold: the motion is so sensitive that small differences decide it"
         )

@@ -54,14 +54,21 @@ class Trial:
         return self.error / self.spent if self.spent > 0.0 else np.nan
 
 
-def least_error(trial: Trial, other: Trial) -> float:
-    """Error by round-off: of the largest coordinate in each step, grown as local errors did in another run."""
+def least_error(trial: Trial, other: Trial, names: tuple[str, ...] = ()) -> float:
+    """Error by round-off: of the largest coordinate in each step, grown as local errors did in another run.
+
+    The growth from coordinates to named results, of other units, may be anything; these are rounded themselves too.
+    """
     growth = other.growth if np.isfinite(other.growth) else 1.0
+    if names:
+        return growth * rounding(trial) * float(trial.run.stats["steps"]) + rounding(trial, names)
     return max(growth, 1.0) * rounding(trial) * float(trial.run.stats["steps"])
 
 
-def rounding(trial: Trial) -> float:
-    """Round-off of the largest coordinate [m, rad]."""
+def rounding(trial: Trial, names: tuple[str, ...] = ()) -> float:
+    """Round-off of the largest coordinate [m, rad], or of the largest of the results named."""
+    if names:
+        return EPS * max(float(np.max(np.abs(trial.run[name]), initial=0.0)) for name in names)
     return EPS * float(np.max(np.abs(trial.run.record.q), initial=0.0))
 
 
