@@ -170,6 +170,8 @@ def contacts(found: Faults, bodies: Bodies, acting: Loads, run: Any) -> None:
                 closed & ~np.bool_(mentioned),
             )
         found.small("a closed contact touches", word.name, gap.value, HELD * size, closed)
+        if located:
+            found.small("a closed contact stays", word.name, rate, HELD * (fast + np.abs(rate)), closed)
         if not mentioned and word.only_while is None and not word.releases:
             found.small(
                 "an open contact is outside", word.name, np.minimum(gap.value, 0.0), 10.0 * HELD * size, ~closed

@@ -44,7 +44,8 @@ class Scene:
     number : what it was made from; form : its mechanism
     cut : which joints are cut; start : arguments of `mbd.assemble`
     options : arguments of `mbd.simulate` besides model and start
-    check : what is compared beside the laws: '', 'restart', 'file', 'cut', 'twin', 'between', 'step there'
+    check : what is compared beside the laws: '', 'restart', 'file', 'cut', 'twin', 'between', 'step there', 'one ulp',
+        'tolerance'
     """
 
     number: int
@@ -96,7 +97,9 @@ def scene(number: int, structures: int = STRUCTURES) -> Scene:
             ["auto", "events", "events", "nonsmooth"] if "dt" in options else ["auto", "events"]
         )
         options["impact"] = rng.choice(["newton", "newton", "poisson", "sequential"])
-    check = rng.choice(["", "", "restart", "file", "cut", "between", "between", "step there"])
+    check = rng.choice(["", "", "restart", "file", "cut", "between", "between", "step there", "one ulp"])
+    if "tol" in options and check in ("restart", "file", "step there"):
+        check = "tolerance"
     if rng.random() < 0.02:
         check = "twin"
     return Scene(number, form, cut, _start(rng, form), options, check)

@@ -34,6 +34,8 @@ def motion(found: Faults, told: Readings, smooth: bool = True, rates: bool = Tru
         return
     h = h[steps]
     there = found.at(told.time[steps])
+    rated = [told[name] for name in told.values if name.endswith(".rate")]
+    fastest = 3.0 * np.max(np.abs(rated)) if rated else 0.0
     for name in [name for name in told.values if f"{name}.rate" in told and f"{name}.acceleration" in told]:
         q, v, a = told.coordinate(name)
         change = _around(np.abs(np.diff(a))[steps]) + 1e-3 * (np.abs(a[steps]) + np.abs(a[steps + 1]))
@@ -41,8 +43,11 @@ def motion(found: Faults, told: Readings, smooth: bool = True, rates: bool = Tru
         off = np.diff(q)[steps] - h * (v[steps] + v[steps + 1]) / 2.0
         if smooth:
             off = off + h**2 * np.diff(a)[steps] / 12.0
-        limit = 3.0 * h**2 * change + 1e-8 * (1.0 + np.abs(q[steps]) + h * fast)
-        limit = limit if smooth and rates else limit + (0.2 if smooth else 10.0) * h * _range(v)[steps]
+        limit = 6.0 * h**2 * change + 1e-8 * (1.0 + np.abs(q[steps]) + h * fast)
+        if not smooth:  # bodies are lifted out of surfaces
+            limit = limit + h * (10.0 * _range(v)[steps] + fastest)
+        elif not rates:
+            limit = limit + 0.2 * h * _range(v)[steps]
         there.small("a coordinate is the integral of its rate", name, off, limit)
         if smooth and rates:
             off = np.diff(v)[steps] - h * (a[steps] + a[steps + 1]) / 2.0

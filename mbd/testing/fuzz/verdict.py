@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 import traceback
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -84,6 +85,10 @@ def _compared(made: Scene, run: mbd.Trajectory) -> list[str]:
         return _other_cut(made, run)
     if check == "twin":
         return _twin(made, run)
+    if check == "one ulp":
+        return _one_ulp(made, run)
+    if check == "tolerance":
+        return _tolerance(made, run)
     return []
 
 
@@ -182,3 +187,52 @@ def _twin(made: Scene, run: mbd.Trajectory) -> list[str]:
     off = np.max(np.abs(fast.record.q - plain.record.q), initial=0.0)
     scale = 1.0 + np.max(np.abs(fast.record.q), initial=0.0)
     return [] if off <= 1e-9 * scale else [f"compiled code and its twin differ by {off:.3g} after {k} steps"]
+
+
+def _one_ulp(made: Scene, run: mbd.Trajectory) -> list[str]:
+    """One ulp more of every position and rate of the start changes no decision, and the end as much as it must.
+
+    What it must is measured by a change of 10⁻¹¹ of the size of a radian or metre.
+    """
+    if made.form.loops:
+        return []
+    start = mbd.assemble(made.model, **made.start)
+    ends = []
+    for q, v in (
+        (np.nextafter(start.q, np.inf), np.nextafter(start.v, np.inf)),
+        (start.q + 1e-11, start.v + 1e-11),
+        (start.q - 1e-11, start.v - 1e-11),
+    ):
+        ends.append(run_of(made, start=replace(start, q=q, v=v, memory=None)))
+    ulp, *moved = ends
+    if any(not other.success or _story(other) != _story(run) for other in moved):
+        return []  # the motion itself changes
+    if not ulp.success or _story(ulp) != _story(run):
+        return [f"one ulp more at the start: {len(ulp)} rows instead of {len(run)}, events {_story(ulp)[1][:5]}"]
+    growth = max(float(np.max(np.abs(other.record.q[-1] - run.record.q[-1]))) for other in moved) / 1e-11
+    off = float(np.max(np.abs(ulp.record.q[-1] - run.record.q[-1])))
+    size = 1.0 + max(float(np.max(np.abs(values), initial=0.0)) for values in (run.record.q, run.record.v))
+    allowed = 1e-14 * size * (1.0 + growth) * len(run) * 10.0
+    return [] if off <= allowed else [f"one ulp more at the start: the end differs by {off:.3g}, allowed {allowed:.1g}"]
+
+
+def _story(run: mbd.Trajectory) -> tuple[int, list[tuple[str, str]]]:
+    """What a run decided: its rows and its events."""
+    return len(run), [(event.kind, event.name) for event in run.events]
+
+
+def _tolerance(made: Scene, run: mbd.Trajectory) -> list[str]:
+    """A run with a tolerance keeps it at its end, against one of order 8 or 5 with a hundredth of it."""
+    if "tol" not in made.options:
+        return []
+    tol = made.options["tol"]
+    scheme = mbd.RadauIIA() if made.number % 2 else mbd.RungeKutta853()
+    fine = run_of(made, integrator=scheme, tol=max(0.01 * tol, 1e-10))
+    if not fine.success or _story(fine)[1] != _story(run)[1]:
+        return []
+    names = [name for joint in made.model.joints for name in joint.coordinate_names]
+    off = {name: abs(float(run[name][-1]) - float(fine[name][-1])) for name in names}
+    worst = max(off, key=lambda name: off[name])
+    if off[worst] <= 4.0 * tol + 1e-9:
+        return []
+    return [f"tolerance: {worst!r} ends {off[worst]:.3g} from a finer run, tol = {tol:.3g}"]
