@@ -109,8 +109,8 @@ def _choice(run: mbd.Trajectory, n: int) -> Array:
 def between(run: mbd.Trajectory, model: mbd.Model, parameters: Mapping[str, float] | None = None) -> Judgement:
     """Whether what a run tells between its rows keeps the laws as its rows do.
 
-    Where the scheme's own interpolation is of low order, loops and constraints are left to its error, and forces may miss
-    a fiftieth of what they are made of.
+    Where the scheme's own interpolation is of low order, loops and constraints are left to its error, and forces may
+    miss a fiftieth of what they are made of.
     """
     time = run.time
     steps_of = np.flatnonzero(np.diff(time) > 0.0)

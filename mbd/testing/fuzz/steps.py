@@ -36,6 +36,8 @@ def motion(found: Faults, told: Readings, smooth: bool = True, rates: bool = Tru
     there = found.at(told.time[steps])
     rated = [told[name] for name in told.values if name.endswith(".rate")]
     fastest = 3.0 * np.max(np.abs(rated)) if rated else 0.0
+    accelerations = [_around(np.abs(np.diff(told[n]))[steps]) for n in told.values if n.endswith(".acceleration")]
+    leaps = 0.05 * np.max(accelerations, axis=0) if accelerations else 0.0  # corrections onto rows move everything
     for name in [name for name in told.values if f"{name}.rate" in told and f"{name}.acceleration" in told]:
         q, v, a = told.coordinate(name)
         change = _around(np.abs(np.diff(a))[steps]) + 1e-3 * (np.abs(a[steps]) + np.abs(a[steps + 1]))
@@ -43,7 +45,7 @@ def motion(found: Faults, told: Readings, smooth: bool = True, rates: bool = Tru
         off = np.diff(q)[steps] - h * (v[steps] + v[steps + 1]) / 2.0
         if smooth:
             off = off + h**2 * np.diff(a)[steps] / 12.0
-        limit = 6.0 * h**2 * change + 1e-8 * (1.0 + np.abs(q[steps]) + h * fast)
+        limit = 6.0 * h**2 * (change + leaps) + 1e-8 * (1.0 + np.abs(q[steps]) + h * fast)
         if not smooth:  # bodies are lifted out of surfaces
             limit = limit + h * (10.0 * _range(v)[steps] + fastest)
         elif not rates:
