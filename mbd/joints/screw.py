@@ -14,7 +14,7 @@ from mbd.errors import ModelError
 from mbd.joints.base import Joint, JointLoss, Label
 from mbd.joints.parts import Z, across_rows, align_rows, sine_cosine
 from mbd.scope import Rotation, Scope, Triple
-from mbd.tape.functions import cos, sin
+from mbd.tape.functions import atan2, cos, sin
 from mbd.tape.node import Scalar
 
 __all__ = ["Screw"]
@@ -86,12 +86,21 @@ class Screw(Joint):
         return [(self.axis, scaled(self.advance(scope), self.axis))]
 
     def rows(self, R: Rotation, p: Triple, scope: Scope) -> Sequence[tuple[str, Scalar]]:
-        """No place across the axis, the axes align, and sin(turn − turn that belongs to the shift) = 0."""
-        sine, cosine = sine_cosine(R, self.axis)
-        (angle,) = self.recover(R, p, scope)
-        thread = sine * cos(angle) - cosine * sin(angle)
-        return [*across_rows(p, self.axis), *align_rows(R, self.axis), ("turn about", thread)]
+        """No place across the axis, the axes align, and the turn is that which belongs to the shift."""
+        return [*across_rows(p, self.axis), *align_rows(R, self.axis), ("turn about", self._thread(R, p, scope)[1])]
 
     def recover(self, R: Rotation, p: Triple, scope: Scope) -> Sequence[Scalar]:
-        """The angle that belongs to the shift, which counts full turns too."""
-        return [dot(self.axis, p) / self.advance(scope)]
+        """The angle of the turn, with as many full turns as belong to the shift.
+
+        Its virtual displacement is that of turning, so that what acts on it is a torque about the axis, as in a tree.
+        """
+        shift, off = self._thread(R, p, scope)
+        return [shift + off]
+
+    def _thread(self, R: Rotation, p: Triple, scope: Scope) -> tuple[Scalar, Scalar]:
+        """The angle that belongs to the shift, and how far the turn is from it, between −π and π [rad]."""
+        sine, cosine = sine_cosine(R, self.axis)
+        shift = dot(self.axis, p) / self.advance(scope)
+        c, s = cos(shift), sin(shift)
+        off: Scalar = atan2(sine * c - cosine * s, cosine * c + sine * s)
+        return shift, off

@@ -155,13 +155,37 @@ def floating_joint(model: Model, body: Body, planar: bool) -> Joint:
 
 
 def _is_turned(model: Model, body: Body) -> bool:
-    """Whether a joint without an angle holds the body's axes to those of a moving body or of a turned frame."""
+    """Whether a joint without an angle holds the body's axes to those of a moving body or of a turned frame.
+
+    Also where it has to give a torque, which its rows must carry, since something else acts beside the body's origin.
+    """
     for joint in model.joints:
         for own, other in (joint.parent, joint.child), (joint.child, joint.parent):
             holds = own.body is body and all(label.unit != "rad" for label in joint.labels)
             if holds and not (_is_level(own) and _is_level(other) and isinstance(other.body, Ground)):
                 return True
+            if holds and _has_moments(model, body, joint):
+                return True
     return False
+
+
+def _has_moments(model: Model, body: Body, holding: Joint) -> bool:
+    """Whether more than the joint that holds it can turn a point mass: joints, surfaces that it carries, arms."""
+    for joint in model.joints:
+        if joint is not holding and body in (joint.parent.body, joint.child.body) and _gives_torque(model, joint):
+            return True
+    carriers = [getattr(getattr(word, "measure", None), "carrier", None) for word in model.constraints]
+    mentioned = [mention for mention in model.mentions() if isinstance(mention, Frame) and mention.landmark is None]
+    frames = [frame for frame in (*carriers, *mentioned) if frame is not None]
+    return any(frame.body is body for frame in frames)
+
+
+def _gives_torque(model: Model, joint: Joint) -> bool:
+    """Whether anything acts along a joint's coordinates: its loss or spring, or a word that mentions it."""
+    names = [mention for mention in model.mentions() if isinstance(mention, str)]
+    mentioned = joint in model.mentions() or any(name.startswith(f"{joint.name}.") for name in names)
+    tunable = any(name.startswith(f"{joint.name} ") for name in model.tunable)
+    return mentioned or tunable or joint.loss is not None or joint.stiffness != 0.0
 
 
 def _is_level(frame: Frame) -> bool:

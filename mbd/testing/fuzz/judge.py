@@ -69,6 +69,13 @@ def judge(run: mbd.Trajectory, model: mbd.Model, parameters: Mapping[str, float]
     return Judgement(tuple(found.found), found.tried)
 
 
+def _unresolved(run: mbd.Trajectory, times: Array) -> Array:
+    """Change of the accelerations over the step that holds a time, over their size (n,)."""
+    a, k = run.record.a, np.searchsorted(run.time, times, side="right") - 1
+    change = np.linalg.norm(a[k + 1] - a[k], axis=1)
+    return np.asarray(change / (np.linalg.norm(a[k + 1], axis=1) + np.linalg.norm(a[k], axis=1) + 1e-9))
+
+
 def _until(run: mbd.Trajectory) -> float:
     """The instant from which on a failed run says that its rows are none [s]."""
     head = run.message.partition(" s: ")[0].removeprefix("t = ")
@@ -89,7 +96,7 @@ def _rows(found: Faults, run: mbd.Trajectory, model: mbd.Model, told: Readings, 
     bodies = Bodies(model, told.part(chosen))
     there = found.at(bodies.told.time)
     laws.places(there, bodies)
-    laws.closure(there, bodies, rates="index3" not in run.settings["integrator"])
+    laws.closure(there, bodies, rates=smooth and "index3" not in run.settings["integrator"])
     laws.constraints(there, bodies)
     acting = loads(bodies)
     if smooth:
@@ -127,7 +134,7 @@ def between(run: mbd.Trajectory, model: mbd.Model, parameters: Mapping[str, floa
             bodies = Bodies(model, told)
             laws.places(found, bodies)
             laws.closure(found, bodies, 1e-6 if precise else 1e-3, rates=precise)
-            laws.balance(found, bodies, loads(bodies), 1e-5 if precise else 0.02)
+            laws.balance(found, bodies, loads(bodies), 1e-5 if precise else 0.02 + _unresolved(run, times))
             if precise:
                 laws.constraints(found, bodies, 1e-6)
         except NotImplementedError as error:
