@@ -25,12 +25,14 @@ all levels give the same bits, it does not matter to any result when that happen
 from __future__ import annotations
 
 import ctypes
+import os
 import re
 import sys
 import time
 import weakref
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from functools import cache
 from typing import Any
 
@@ -50,7 +52,7 @@ from mbd.errors import CapabilityError, ModelError
 from mbd.tape.node import Node
 
 __all__ = [
-    "HASTY", "LEVEL", "Build", "Host", "Library", "Machine", "MachineFunction", "cached_object", "call",
+    "HASTY", "LEVEL", "TURNED_OFF", "Build", "Host", "Library", "Machine", "MachineFunction", "cached_object", "call",
     "compile_functions", "emit_object", "host", "load_object",
 ]  # fmt: skip
 
@@ -65,6 +67,9 @@ CUTS = {0: {"large": 150, "part": 120}}
 
 PASSES = {"from level": 3, "speed_level": 3, "slp_vectorization": True}
 """Passes over the IR, and from which level on; part of the key of every object file."""
+
+TURNED_OFF = "MBD_CPU_FEATURES"
+"""Environment variable: features of the processor that machine code is to do without, '-fma,-avx512f'."""
 
 _PROTOTYPE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
 
@@ -85,7 +90,13 @@ class Host:
 
 @cache
 def host() -> Host:
-    """This machine."""
+    """This machine, without the features that `TURNED_OFF` names.
+
+    Raises
+    ------
+    CapabilityError
+        for a feature that is none of this processor, or one that is not to be turned off.
+    """
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     try:
@@ -93,9 +104,25 @@ def host() -> Host:
     except RuntimeError:  # LLVM does not know how to ask this processor
         features = llvm.FeatureMap()
     triple = llvm.get_process_triple()
-    fused = bool(features.get("fma")) or triple.startswith(("aarch64", "arm64"))
+    off = _turned_off(features)
+    fused = (bool(features.get("fma")) and "fma" not in off) or triple.startswith(("aarch64", "arm64"))
     version = ".".join(map(str, llvm.llvm_version_info))
-    return Host(triple, llvm.get_host_cpu_name(), features.flatten(), version, fused)
+    flat = ",".join([features.flatten(), *(f"-{name}" for name in off)])  # the last word on a feature counts
+    return Host(triple, llvm.get_host_cpu_name(), flat, version, fused)
+
+
+def _turned_off(features: Mapping[str, bool]) -> list[str]:
+    """Names of the features that the environment asks to do without."""
+    asked = [word.strip() for word in os.environ.get(TURNED_OFF, "").split(",") if word.strip()]
+    for word in asked:
+        if not word.startswith("-") or word[1:] not in features:
+            near = get_close_matches(word.lstrip("+-"), features, 3)
+            hint = f"; did you mean {' or '.join(f'-{name}' for name in near)}?" if near else ""
+            raise CapabilityError(
+                f"{TURNED_OFF} lists features of this processor ({llvm.get_host_cpu_name()}) to do without, each with "
+                f"a minus, such as '-fma'; it says {word!r}{hint}"
+            )
+    return [word[1:] for word in asked]
 
 
 @cache

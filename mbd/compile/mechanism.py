@@ -85,6 +85,9 @@ class Mechanism:
         self.common: Functions = self.backend.functions(self.layout)
         self.common.add(common)
         self.common.add({"scales": programs.scales(equations)}, rarely=True)  # twice a restart, and nowhere else
+        self.judged = programs.is_judged(equations)
+        if self.judged:
+            self.common.add({"terms": programs.guard_terms(equations)}, rarely=True)
         self.vector = composed is None
         self.named: dict[str, Any] = {}
         self.notes: list[str] = []

@@ -34,8 +34,8 @@ from mbd.tape.elimination import factors
 from mbd.tape.node import Node
 
 __all__ = [
-    "Correction", "accelerations", "balance_with", "compose", "constraint_jacobian", "correction", "guards",
-    "mass_matrix", "newton", "residual", "scales",
+    "Correction", "accelerations", "balance_with", "compose", "constraint_jacobian", "correction", "guard_terms",
+    "guards", "is_judged", "mass_matrix", "newton", "residual", "scales",
 ]  # fmt: skip
 
 
@@ -93,7 +93,8 @@ def correction(
     if not 0 < n + m <= LARGEST:
         return None
     matrix, tail = _system(equations, rows, penalties, stabilized, sliding)
-    found = factors(matrix, n, MOST_OPERATIONS)
+    inertia = substitute([matrix[k][k] for k in range(n)], {inputs.c[0]: 0.0, inputs.c[1]: 0.0})
+    found = factors(matrix, n, MOST_OPERATIONS, {k for k in range(n) if inertia[k].is_zero})
     if found is None:
         return None
     r, values = tail[:n], tail[n : n + m]
@@ -218,6 +219,19 @@ def scales(equations: Equations) -> list[Node]:
     h = [row.value for row in equations.rows]
     hv = [row.rate for row in equations.rows]
     return magnitudes(equations.tape, [*r, *h, *hv])
+
+
+def is_judged(equations: Equations) -> bool:
+    """Whether the sign of a user's measure decides: an event, or contacts that are watched while it is positive."""
+    return bool(equations.guards) or any(isinstance(contact.only_while, Node) for contact in equations.contacts)
+
+
+def guard_terms(equations: Equations) -> list[Node]:
+    """Σ|terms| of users' guards and of the conditions of contacts, 1 where there is none."""
+    one = equations.tape.one
+    values = [guard.value for guard in equations.guards]
+    values += [c.only_while if isinstance(c.only_while, Node) else one for c in equations.contacts]
+    return magnitudes(equations.tape, values)
 
 
 def compose(equations: Equations) -> list[Node] | None:

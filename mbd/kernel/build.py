@@ -17,7 +17,16 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-__all__ = ["MODULES", "constants_of", "entry", "functions_of", "kernel_object", "object_of", "source_digest"]
+__all__ = [
+    "MODULES",
+    "constants_of",
+    "entry",
+    "functions_of",
+    "kernel_object",
+    "kernel_text",
+    "object_of",
+    "source_digest",
+]
 
 ENTRY = "mbd_kernel"
 
@@ -25,8 +34,8 @@ MODULES = (
     "candidate", "linear", "ordered", "orthogonal", "lemke", "redundancy", "saddle", "restart", "pivoting",
     "complementarity", "blow", "impact", "settle", "pairs", "iteration", "memory", "leftovers", "passage", "newton",
     "newmark", "complex_linear", "ordered_complex", "stages", "straddle", "runge_kutta", "astride", "radau", "hermite",
-    "guards", "control", "interior", "refine", "locate", "switching", "nonsmooth", "takeover", "observe", "starting",
-    "trying", "events", "advance",
+    "significance", "guards", "control", "interior", "refine", "locate", "switching", "nonsmooth", "takeover",
+    "observe", "starting", "trying", "events", "advance",
 )  # fmt: skip
 
 APART = (
@@ -80,7 +89,7 @@ def _source(name: str) -> str:
 def source_digest() -> str:
     """Hash of everything the kernel is made from."""
     digest = hashlib.sha256()
-    for name in ("fields", "hooks", "expressions", "translate", "build", *MODULES):
+    for name in ("fields", "hooks", "roots", "expressions", "translate", "build", *MODULES):
         digest.update(_source(name).encode())
     return digest.hexdigest()
 
@@ -101,22 +110,22 @@ def constants_of(*modules: str) -> dict[str, float]:
     return found
 
 
-def object_of(text: str) -> bytes:
-    """The object file of an IR text, optimized for this machine."""
+def object_of(text: str, level: int = 2) -> bytes:
+    """The object file of an IR text, optimized for this machine; every level from 0 to 3 gives the same bits."""
     from mbd.compile.forking import COMPILING
     from mbd.compile.llvm import host
 
     with COMPILING:
-        return _compiled(text, host())
+        return _compiled(text, host(), level)
 
 
-def _compiled(text: str, here: Any) -> bytes:
+def _compiled(text: str, here: Any, level: int) -> bytes:
     import llvmlite.binding as llvm
 
     module = llvm.parse_assembly(text)
     target = llvm.Target.from_triple(here.triple)
-    machine = target.create_target_machine(cpu=here.cpu, features=here.features, opt=3)
-    tuning = llvm.create_pipeline_tuning_options(speed_level=2)
+    machine = target.create_target_machine(cpu=here.cpu, features=here.features, opt=min(level + 1, 3))
+    tuning = llvm.create_pipeline_tuning_options(speed_level=level)
     tuning.loop_vectorization = tuning.loop_unrolling = False  # loops of a few turns
     tuning.slp_vectorization = True
     builder = llvm.create_pass_builder(machine, tuning)
@@ -126,11 +135,16 @@ def _compiled(text: str, here: Any) -> bytes:
 
 def kernel_object() -> bytes:
     """The kernel's object file, with its entry under the name ENTRY."""
+    print("mbd: building the stepping kernel, once for this machine …", file=sys.stderr, flush=True)
+    return object_of(kernel_text())
+
+
+def kernel_text() -> str:
+    """The kernel in LLVM's words."""
     from mbd.kernel.translate import translate
 
-    print("mbd: building the stepping kernel, once for this machine …", file=sys.stderr, flush=True)
     functions = functions_of(*map(_source, MODULES), SHIMS)
-    return object_of(translate(functions, constants_of("fields", *MODULES), ENTRY, ["kernel"], APART))
+    return translate(functions, constants_of("fields", *MODULES), ENTRY, ["kernel"], APART)
 
 
 @lru_cache(maxsize=1)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.kernel.roots import sqrt
 
 __all__ = ["RADAU", "Collocation", "radau_iia"]
 
@@ -44,7 +45,7 @@ class Collocation:
 
 def radau_iia() -> Collocation:
     """The method of order 5, whose last point is the end of the step."""
-    root = 6.0**0.5
+    root = sqrt(6.0)
     c = np.array([(4.0 - root) / 10.0, (4.0 + root) / 10.0, 1.0])
     A = np.array([
         [(88.0 - 7.0 * root) / 360.0, (296.0 - 169.0 * root) / 1800.0, (-2.0 + 3.0 * root) / 225.0],

@@ -38,6 +38,7 @@ from mbd.kernel.fields import (
 from mbd.kernel.guards import try_step
 from mbd.kernel.hooks import scheme_error
 from mbd.kernel.restart import compose, consistent, fill_block, refresh_scales
+from mbd.kernel.roots import sqrt
 from mbd.kernel.straddle import step_by_pose, stirred, stirs
 
 __all__ = ["controlled_step", "first_step", "newmark_error", "smallest_step"]
@@ -185,7 +186,7 @@ def first_step(K: Any) -> None:
         if i < K.n_v:
             speed = max(speed, abs(K.y[i]))
     size = 10.0 * K.allowed * K.longest
-    ahead = 1e-2 * (speed + (size * force) ** 0.5) / force if force > 0.0 else K.dt
+    ahead = 1e-2 * (speed + sqrt(size * force)) / force if force > 0.0 else K.dt
     ahead = min(max(ahead, 1e-3 * K.dt), K.dt)
     t = K.clock[NOW]
     fill_block(K, t, K.q, K.y)

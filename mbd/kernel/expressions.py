@@ -2,8 +2,8 @@
 
 Kinds of values: 'bool', 'int' (64 bits), 'real' (double), 'ints' and 'reals' (addresses of arrays), 'kernel' (of the
 table of fields), 'none'. Operators mean what they mean in Python for these: ``//`` and ``%`` round down, ``max``
-keeps its first argument unless a later one is larger, nothing is reordered or contracted. Only the bounds of int do
-not grow, and x/0 is ±∞ or NaN.
+keeps its first argument unless a later one is larger, ``sqrt`` is rounded once, powers are those of the C library,
+nothing is reordered or contracted. Only the bounds of int do not grow, and x/0 is ±∞ or NaN.
 """
 
 from __future__ import annotations
@@ -241,8 +241,10 @@ class Expressions:
             return self.emit(f"shl i64 1, {right[0]}"), "int"
         if "real" not in (left[1], right[1]):
             raise CapabilityError("a power of integers, other than of 2")
+        if right == self.number(0.5):
+            raise CapabilityError("x ** 0.5 is a root or a power by the level of optimization: write sqrt(x)")
         a, b = self.cast(left, "real"), self.cast(right, "real")
-        return self.emit(f"call double @llvm.pow.f64(double {a}, double {b})"), "real"
+        return self.emit(f"call double @pow(double {a}, double {b}) nobuiltin"), "real"
 
     def _UnaryOp(self, node: ast.UnaryOp) -> Value:
         if isinstance(node.op, ast.Not):
@@ -319,6 +321,8 @@ class Expressions:
             return self._extreme(name, values)
         if name == "abs":
             return self._magnitude(values[0])
+        if name == "sqrt":
+            return self.emit(f"call double @llvm.sqrt.f64(double {self.cast(values[0], 'real')})"), "real"
         if name in ("call", "call_on"):
             return self._model(values)
         symbol, kinds, result = self.callee(name, tuple(kind for _, kind in values))

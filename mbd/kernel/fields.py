@@ -63,6 +63,7 @@ REAL_ARRAYS = (
     "weight",  # the inverse of those of r
     "deepest", "sinking",  # lowest gap of each contact while ignored; time of its first release into its surface
     "side",  # sign of each user guard since it last crossed
+    "doubt",  # guard values, then round-off of positions and velocities, where a guard's own round-off is asked for
     "restitution",
     "seen",  # at which switch of an instant these were noted, 0 for none: who is closed, sticks, …, and the state
     "pick",  # the fired guard: estimate, bracket, sizes
@@ -129,7 +130,7 @@ PAST_TIME, LIFTED = 6, 7
 # the step that the candidate took with its local error, the sum of local errors, and when rows will lose rank
 NOW, BASE, AUX_STEP, LAST_SWITCH, STEP, NEXT, WIDTH, TRIED, LOCAL, SPENT, POSE = range(11)
 # functions in `code`; modes follow: tangent, residual and, where straight-line code pays, correction and solution
-ACCELERATIONS, GUARDS, SCALES, COMPOSE = range(4)
+ACCELERATIONS, GUARDS, SCALES, COMPOSE, TERMS = range(5)
 # what advance returns
 DONE, FULL, NEW_MODE, EVENT, PAUSE, LAST = range(6)
 (

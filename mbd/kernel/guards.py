@@ -33,10 +33,11 @@ from mbd.kernel.fields import (
 from mbd.kernel.hermite import crossing, hermite, hermite_turn
 from mbd.kernel.hooks import call, scheme_step
 from mbd.kernel.restart import compose, consistent, evaluate_loaded, fill_block, limit_of, share_out
+from mbd.kernel.significance import condition_round_off, guard_round_off
 
 __all__ = [
-    "frictions_at", "gap_scale", "gap_tolerance", "guard_value", "is_watched", "judge", "try_step", "update_armed",
-    "update_sides", "watch",
+    "frictions_at", "gap_scale", "gap_tolerance", "goes_back", "guard_value", "is_watched", "judge", "try_step",
+    "update_armed", "update_sides", "watch",
 ]  # fmt: skip
 
 
@@ -190,11 +191,16 @@ def update_sides(K: Any) -> None:
     """
     for e in range(K.n_guards):
         value = K.guards0[4 * K.n_contacts + e]
-        if K.side[e] == 0.0 and value != 0.0:
+        if K.side[e] == 0.0 and value != 0.0 and abs(value) > guard_round_off(K, e, K.clock[NOW], K.q, K.y):
             K.side[e] = 1.0 if value > 0.0 else -1.0
-        back = -K.direction[e]
-        if back * K.side[e] < 0.0 and back * value > 0.0:
-            K.side[e] = float(back)
+        if goes_back(K, e, value, K.clock[NOW], K.q, K.y):
+            K.side[e] = float(-K.direction[e])
+
+
+def goes_back(K: Any, e: int, value: float, t: float, q: Any, y: Any) -> bool:
+    """Whether a guard that fires in one direction only is clearly on the side again from which it fires."""
+    back = -K.direction[e]
+    return bool(back * K.side[e] < 0.0 and back * value > 0.0 and abs(value) > guard_round_off(K, e, t, q, y))
 
 
 def consider(K: Any, kind: int, index: int, estimate: float, low: float) -> None:
@@ -235,7 +241,7 @@ def judge(K: Any, h: float) -> bool:
         d1 = K.guards1[nC + c] * h
         tiny = gap_tolerance(K, c)
         if K.closed[c] == 0:
-            if K.while_kind[c] == 2 and K.guards0[3 * nC + c] <= 0.0 < K.guards1[3 * nC + c]:
+            if begins_to_be_watched(K, c, h):
                 consider(K, WATCH, c, crossing(K.guards0[3 * nC + c], K.guards1[3 * nC + c]), 0.0)
                 continue
             if K.armed[c] == 2 and g1 < 0.0 and K.guards1[2 * nC + c] > 0.0:
@@ -278,13 +284,26 @@ def judge(K: Any, h: float) -> bool:
     return bool(K.fired[0] >= 0)
 
 
+def begins_to_be_watched(K: Any, c: int, h: float) -> bool:
+    """Whether the measure that contact c is watched by has risen through zero, by more than its round-off."""
+    place = 3 * K.n_contacts + c
+    if K.while_kind[c] != 2 or not K.guards0[place] <= 0.0 < K.guards1[place]:
+        return False
+    return bool(K.guards1[place] > condition_round_off(K, c, K.clock[NOW] + h, K.q1, K.y1))
+
+
 def judge_user(K: Any, e: int, h: float) -> None:
-    """Whether a user's guard crosses zero from its side; one that still rises from there does so after its top."""
+    """Whether a user's guard crosses zero from its side; one that still rises from there does so after its top.
+
+    A sign that has changed by no more than round-off is no crossing: it is judged again after the next step.
+    """
     place = 4 * K.n_contacts + e
     side = K.side[e]
     v0 = side * K.guards0[place]
     v1 = side * K.guards1[place]
     if K.active[K.n_contacts + e] == 1 or v1 >= 0.0 or K.direction[e] * side > 0.0:
+        return
+    if -v1 <= guard_round_off(K, e, K.clock[NOW] + h, K.q1, K.y1):
         return
     d0 = side * K.guards0[place + K.n_guards] * h
     d1 = side * K.guards1[place + K.n_guards] * h

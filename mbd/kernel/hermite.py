@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from mbd.kernel.roots import sqrt
+
 __all__ = ["crossing", "first_guess", "hermite", "hermite_turn"]
 
 
@@ -12,7 +14,7 @@ def hermite_turn(g0: float, g1: float, d0: float, d1: float, rising: bool) -> fl
     root = b * b - 4.0 * a * d0
     if root < 0.0:
         return -1.0
-    root = root**0.5
+    root = sqrt(root)
     for attempt in range(2):
         far = b + root if b >= 0.0 else b - root
         place = -2.0 * d0 / far if attempt == 0 and far != 0.0 else (-far / (2.0 * a) if a != 0.0 else -1.0)

@@ -19,6 +19,7 @@ from typing import Any
 from mbd.kernel.blow import blow, energy_gain, gather, let_rebound, loosen, prepare, restitution_of, speed, start_over
 from mbd.kernel.fields import ENERGY_GAIN, IMPACTS, NO_IMPACT, PLASTIC, PULL, STRONGE
 from mbd.kernel.restart import row_speed
+from mbd.kernel.roots import sqrt
 
 __all__ = ["impact"]
 
@@ -178,7 +179,7 @@ def give_back_work(K: Any, work: float) -> int:
     if status != 0:
         return status
     done = work_given_back(K)
-    factor = (work / done) ** 0.5 if done > 0.0 else 0.0
+    factor = sqrt(work / done) if done > 0.0 else 0.0
     status = give_back(K, factor)
     if status != 0 or (abs(work_given_back(K) - work) <= 1e-12 * work and energy_gain(K) <= 1e-13):
         return status

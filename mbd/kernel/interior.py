@@ -15,11 +15,14 @@ from __future__ import annotations
 from typing import Any
 
 from mbd.kernel.candidate import accept_guards, carry
-from mbd.kernel.fields import NOW
-from mbd.kernel.guards import gap_scale, gap_tolerance, is_watched, judge, watch
+from mbd.kernel.fields import EPS, NOW
+from mbd.kernel.guards import gap_scale, gap_tolerance, goes_back, is_watched, judge, watch
 from mbd.kernel.restart import compose, consistent, fill_block
 
 __all__ = ["parts_to_take"]
+
+FINEST = 16.0
+"""Distance over the round-off of a position below which the interpolant need not meet it at the end of a step [-]."""
 
 
 def parts_to_take(K: Any, h: float) -> int:
@@ -40,7 +43,7 @@ def parts_to_take(K: Any, h: float) -> int:
         if fired:
             answer = part - 1 if part > 1 else -1
             break
-        if part < K.looks and rearms(K):
+        if part < K.looks and rearms(K, t + part / K.looks * h):
             answer = part
             break
         accept_guards(K)
@@ -98,6 +101,8 @@ def look_at(K: Any, t: float, h: float, s: float, asked: bool) -> None:
             whole = 0.5 * (y0 + y1) + (d0 - d1) / 12.0
             if K.vector == 1:
                 gap = K.inside[place + i] - K.q[i] - h * whole
+                if abs(gap) <= FINEST * EPS * abs(K.q[i]):  # round-off over h would be a velocity
+                    gap = 0.0
             x = y0 * (s + u * s * (0.5 * s - 1.0)) + y1 * u * s * (1.0 - 0.5 * s)
             x += d0 * u * (0.5 + s * (0.25 * s - 2.0 / 3.0)) + d1 * u * s * (0.25 * s - 1.0 / 3.0)
             K.block[K.o_x + i] = h * x + gap * u * s * (10.0 + s * (6.0 * s - 15.0))
@@ -114,7 +119,7 @@ def look_at(K: Any, t: float, h: float, s: float, asked: bool) -> None:
     watch(K, t + s * h, K.q1, K.y1, K.rate1, K.lam1, K.guards1)
 
 
-def rearms(K: Any) -> bool:
+def rearms(K: Any, t: float) -> bool:
     """Whether a contact or a guard of the user would be ready to fire, or no longer, after the place just looked at."""
     for c in range(K.n_contacts):
         if K.closed[c] == 1:
@@ -127,8 +132,7 @@ def rearms(K: Any) -> bool:
             changes = changes or (K.armed[c] == 0 and gap > 1e-8 * gap_scale(K, c))
         if changes:
             return True
+    back = False
     for e in range(K.n_guards):
-        back = -K.direction[e]
-        if back * K.side[e] < 0.0 and back * K.guards1[4 * K.n_contacts + e] > 0.0:
-            return True
-    return False
+        back = back or goes_back(K, e, K.guards1[4 * K.n_contacts + e], t, K.q1, K.y1)
+    return back

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from mbd.kernel.roots import sqrt
+
 __all__ = ["common_part", "leftovers_of_many"]
 
 NOTHING_LEFT = 1e-15
@@ -38,7 +40,7 @@ def leftovers_of_many(
             K.columns[longest] = K.columns[done]
             K.columns[done] = row
         row = K.columns[done]
-        K.spare[place + done] = max(K.spare[G + row * (m + 1)], 0.0) ** 0.5
+        K.spare[place + done] = sqrt(max(K.spare[G + row * (m + 1)], 0.0))
         K.spare[3 * m + done] = K.spare[4 * m + row]
         take_out(K, m, done, G)
 
@@ -48,7 +50,7 @@ def find_support(K: Any, m: int, o_S: int, stride: int, o_H: int, width: int) ->
     n = K.n_v
     for j in range(n):
         weight = abs(K.out[o_S + stride * j])
-        K.basis[m * n + j] = 1.0 / weight**0.5 if weight > 0.0 else 1.0
+        K.basis[m * n + j] = 1.0 / sqrt(weight) if weight > 0.0 else 1.0
     for row in range(m):
         K.columns[row] = row
         count = 0
@@ -74,7 +76,7 @@ def scaled_row(K: Any, m: int, row: int, h: float, ratio: float, ahead: float, o
         length += entry * entry
         turned += turn * turn
         K.basis[row * n + j] = entry + moves * ahead * turn
-    length = length**0.5 + moves * h * turned**0.5 + 1e-300
+    length = sqrt(length) + moves * h * sqrt(turned) + 1e-300
     for e in range(K.support[row * (n + 1)]):
         K.basis[row * n + K.support[row * (n + 1) + 1 + e]] /= length
     return float(length)

@@ -14,6 +14,7 @@ from __future__ import annotations
 from typing import Any
 
 from mbd.kernel.linear import factor, solve
+from mbd.kernel.roots import sqrt
 
 __all__ = [
     "LCP_BOUND", "LCP_NOT_FINITE", "LCP_RAY", "LCP_SOLVED", "LCP_UNRESOLVED", "lemke", "lemke_places",
@@ -105,7 +106,7 @@ def lcp_scales(M: Any, n: int, q: Any, work: Any, o_scale: int) -> float:
             for j in range(n):
                 big = max(big, max(abs(M[i * n + j]), abs(M[j * n + i])) * work[o_scale + j])
             big *= work[o_scale + i]
-            work[o_scale + n + i] = 1.0 / big**0.5 if big > 1e-300 else 1.0
+            work[o_scale + n + i] = 1.0 / sqrt(big) if big > 1e-300 else 1.0
         for i in range(n):
             work[o_scale + i] *= work[o_scale + n + i]
     size = 0.0

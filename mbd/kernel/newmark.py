@@ -12,7 +12,7 @@ from typing import Any
 from mbd.kernel.fields import AUX_STEP, NEAR, NOW, PASSING
 from mbd.kernel.iteration import predict
 from mbd.kernel.memory import forget_steps, look_a_step_ahead
-from mbd.kernel.newton import solve_step
+from mbd.kernel.newton import SEARCHED, UNSOUND, solve_step
 from mbd.kernel.passage import passing_step
 from mbd.kernel.restart import compose, consistent, fill_block, refresh_scales
 
@@ -69,7 +69,11 @@ def newmark_step(K: Any, h: float, t1: float) -> int:
     c_C = K.gamma * h * c
     c_K = K.beta * h * h * c
     predict(K, h, t1, c_C, c_K)
-    return solve_step(K, h, t1, c_C, c_K)
+    status = solve_step(K, h, t1, c_C, c_K, 0)
+    if status == UNSOUND:  # pivots in a fixed order were round-off: from the prediction again, with a search for pivots
+        predict(K, h, t1, c_C, c_K)
+        status = solve_step(K, h, t1, c_C, c_K, SEARCHED)
+    return status
 
 
 def newmark_accept(K: Any, h: float) -> None:

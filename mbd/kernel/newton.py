@@ -38,7 +38,7 @@ from mbd.kernel.passage import WITHIN, misses, passing_step, steps_of_fall, step
 from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import add_shares, raise_scales, share_loads
 
-__all__ = ["solve_step"]
+__all__ = ["SEARCHED", "UNSOUND", "solve_step"]
 
 MOST_HALVINGS = 10
 """How often a Newton correction is halved before the iteration goes on from where it is."""
@@ -46,20 +46,26 @@ FAR = 1e4
 """Residual over its tolerance above which a correction that does not reduce it is halved."""
 MOST_STRAIGHT = 2
 """Tangents of a step that straight-line code may factor: where it takes more, pivots are searched for."""
+SEARCHED = 3
+"""More than `MOST_STRAIGHT`: counted as the tangents before the first of a step whose pivots are all searched for."""
+UNSOUND = -1
+"""Result of `solve_step` where factors in a fixed order led to a correction that is no solution at all."""
 
 
-def solve_step(K: Any, h: float, t1: float, c_C: float, c_K: float) -> int:
-    """The candidate from the prediction in the block; 0, or why there is none.
+def solve_step(K: Any, h: float, t1: float, c_C: float, c_K: float, tangents: int) -> int:
+    """The candidate from the prediction in the block; 0, or why there is none; `UNSOUND`.
 
     Newton's method, its corrections halved where the residual grows: one tangent, then residuals with its factors; a
-    new tangent where the residual falls by less than a factor of three.
+    new tangent where the residual falls by less than a factor of three. Factors in a fixed order are tried where fewer
+    than `MOST_STRAIGHT` `tangents` were counted; a pivot of round-off passes for one of its own size, so it is the
+    residual that judges them.
     """
     m = K.state[ROWS]
     tolerance = min(4.0 * EPS, K.tolerance) if K.exact == 1 else 1e-3 * K.tolerance
     before = 1e300
     left = 1e300  # the error where the last correction started
     halvings = 0
-    tangents = 0
+    fixed = False  # whether the last correction came from pivots in a fixed order
     straight = False  # whether the factors at hand are those of straight-line code
     fresh = False
     together = sharing(K)
@@ -76,6 +82,9 @@ def solve_step(K: Any, h: float, t1: float, c_C: float, c_K: float) -> int:
         o_r = (K.n + m) * (K.n + m) if tangent and not straight else 0
         error = residual_size(K, o_r, m, c_C, c_K, tolerance, K.stabilized)
         if halvings < MOST_HALVINGS and iteration > 0 and (error < 0.0 or (error > FAR and error > 0.9 * left)):
+            if fixed:
+                K.detail[PIVOT] = 0.0
+                return UNSOUND
             retreat(K, m, c_C, c_K)  # a full Newton step jumped over a steep place
             halvings += 1
             continue
@@ -108,6 +117,7 @@ def solve_step(K: Any, h: float, t1: float, c_C: float, c_K: float) -> int:
                 return status
         if not ready:
             solve_corrections(K, m, c_C, tangent, shifting, straight)
+        fixed = straight or K.state[ORDERED] > 0
         biggest = correct(K, m, c_C, c_K, ready, shifting)
         if iteration == 0 and K.exact == 0:  # the predictor's error measures that of the step: stay far below it
             tolerance = min(K.tolerance, max(1e-4 * biggest, tolerance))

@@ -42,6 +42,7 @@ from mbd.kernel.orthogonal import clear_row, square
 from mbd.kernel.pairs import is_of_pair, is_whole
 from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import add_shares, raise_scales, share_loads
+from mbd.kernel.roots import sqrt
 
 __all__ = ["misses", "passing_step", "steps_of_fall", "steps_to_pose"]
 
@@ -114,7 +115,7 @@ def steps_to_pose(K: Any, m: int, h: float, ratio: float, straight: bool) -> flo
         if here < fewest * change:
             fewest = here / change
             across = 4.0 * EPS * K.scale[K.n + K.rows[K.columns[k]]] / (here * K.spare[3 * m + k] + 1e-300)
-            K.detail[KICK] = across / (K.clock[STEP] * speed**0.5 + 1e-300)
+            K.detail[KICK] = across / (K.clock[STEP] * sqrt(speed) + 1e-300)
     return fewest
 
 
@@ -150,13 +151,13 @@ def leftovers(
         turned = 0.0
         for j in range(n):
             weight = abs(K.out[o_S + stride * j])
-            weight = 1.0 / weight**0.5 if weight > 0.0 else 1.0
+            weight = 1.0 / sqrt(weight) if weight > 0.0 else 1.0
             turn = K.turning[row * n + j] * weight
             entry = K.out[o_H + row * width + j] * weight - ratio * turn
             length += entry * entry
             turned += turn * turn
             Q[k * n + j] = entry + moves * ahead * turn
-        length = length**0.5 + moves * h * turned**0.5 + 1e-300
+        length = sqrt(length) + moves * h * sqrt(turned) + 1e-300
         K.spare[3 * m + k] = length
         for j in range(n):
             Q[k * n + j] /= length
@@ -168,7 +169,7 @@ def leftovers(
             if length > left:
                 left = length
                 longest = k
-        left = left**0.5
+        left = sqrt(left)
         K.spare[place + done] = left
         row = K.columns[longest]
         K.columns[longest] = K.columns[done]
@@ -198,7 +199,8 @@ def passing_step(K: Any, h: float, t1: float) -> int:
     c_K = K.beta * h * h * c
     K.state[NEAR] = PASSING
     predict(K, h, t1, c_C, c_K)
-    cube = min(h / K.clock[AUX_STEP], 1.0) ** 3
+    stretch = min(h / K.clock[AUX_STEP], 1.0)
+    cube = stretch * stretch * stretch
     for i in range(K.n):
         K.y1[i] = K.block[K.o_v + i]
         if i < K.n_v:

@@ -12,6 +12,7 @@ from typing import Any
 from mbd.kernel.fields import N_DROPPED
 from mbd.kernel.linear import factor, solve
 from mbd.kernel.orthogonal import clear_row, square
+from mbd.kernel.roots import sqrt
 
 __all__ = ["find_dependent", "find_mix", "find_shares", "shared", "sharing", "spread", "take_shares"]
 
@@ -64,7 +65,7 @@ def leftover(K: Any, row: int, kept: int) -> float:
     base = kept * n
     for j in range(n):
         weight = K.acc[j * n + j]
-        K.basis[base + j] = K.acc[o_B + row * n + j] / (weight**0.5 if weight > 0.0 else 1.0)
+        K.basis[base + j] = K.acc[o_B + row * n + j] / (sqrt(weight) if weight > 0.0 else 1.0)
     size = square(K.basis, base, n)
     for i in range(kept):
         K.lower[kept * K.n_rows + i] = 0.0
@@ -72,13 +73,13 @@ def leftover(K: Any, row: int, kept: int) -> float:
         for i in range(kept):
             K.lower[kept * K.n_rows + i] += clear_row(K.basis, base, i * n, n)
     left = square(K.basis, base, n)
-    return float((left / size) ** 0.5) if size > 0.0 else 0.0
+    return float(sqrt(left / size)) if size > 0.0 else 0.0
 
 
 def keep_row(K: Any, row: int, kept: int) -> None:
     """The next vector of K.basis, which `leftover` has found, gets length 1; its row number into K.columns."""
     n = K.n
-    left = square(K.basis, kept * n, n) ** 0.5 + 1e-300
+    left = sqrt(square(K.basis, kept * n, n)) + 1e-300
     K.lower[kept * K.n_rows + kept] = left
     for j in range(n):
         K.basis[kept * n + j] /= left

@@ -30,6 +30,7 @@ from mbd.kernel.memory import forget_steps
 from mbd.kernel.ordered import LOSS_AT_ONCE, OF_ACCELERATIONS, SYMMETRIC, factor_ordered, order_at, solve_kkt
 from mbd.kernel.passage import CONTINUOUS
 from mbd.kernel.restart import consistent, evaluate, fill_block, raise_scales, refresh_scales
+from mbd.kernel.roots import sqrt
 from mbd.kernel.straddle import forget_leftovers, keep_leftovers, note_leftovers
 
 __all__ = ["runge_kutta_accept", "runge_kutta_start", "runge_kutta_step"]
@@ -266,13 +267,13 @@ def explicit_error(K: Any, h: float) -> None:
             e3 += K.tableau[third + j] * slope
         K.error[i] = h * e5
         if i >= 2 * n_v:
-            size = (e5 * e5 + 0.01 * e3 * e3) ** 0.5
+            size = sqrt(e5 * e5 + 0.01 * e3 * e3)
             K.error[i] *= abs(e5) / size if size > 0.0 else 0.0
             continue
         weight = 1.0 if i < n_v else h
         five = max(five, weight * abs(e5))
         three = max(three, weight * abs(e3))
-    size = (five * five + 0.01 * three * three) ** 0.5
+    size = sqrt(five * five + 0.01 * three * three)
     share = five / size if size > 0.0 else 0.0
     for i in range(2 * n_v):
         K.error[i] *= share

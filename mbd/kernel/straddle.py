@@ -24,6 +24,7 @@ from mbd.kernel.leftovers import common_part
 from mbd.kernel.ordered import order_at
 from mbd.kernel.orthogonal import clear_row, square
 from mbd.kernel.restart import compose, evaluate, fill_block
+from mbd.kernel.roots import sqrt
 
 __all__ = [
     "forget_leftovers", "is_resolved", "keep_leftovers", "longest_over", "note_leftovers", "step_by_pose", "stirred",
@@ -123,7 +124,7 @@ def keep_leftovers(K: Any, h: float) -> None:
         if K.left[k] < 0.0 or K.left1[k] < GLANCE * fall:
             near = 1.0
         elif K.left1[k] < far_glance(K) * fall and K.adaptive == 0 and may_stretch(K):
-            reach = (stirring(K, k, fall / h, K.left1[m]) / HUSHED) ** 0.5
+            reach = sqrt(stirring(K, k, fall / h, K.left1[m]) / HUSHED)
             if reach > amid(K) * h and K.left1[k] * h < (2.0 * reach + GLANCE * h) * fall:
                 near = 1.0
         K.left[k] = K.left1[k]
@@ -135,7 +136,7 @@ def motion(K: Any, y: Any) -> float:
     size = 0.0
     for j in range(K.n_v):
         size += abs(K.acc[j * K.n + j]) * y[j] * y[j]
-    return float(size**0.5 + 1e-300)
+    return float(sqrt(size) + 1e-300)
 
 
 def stirring(K: Any, k: int, fall: float, speed: float) -> float:
@@ -154,7 +155,7 @@ def weigh_columns(K: Any) -> None:
     """1/√M_jj into K.spare, with M in K.acc."""
     for j in range(K.n):
         weight = K.acc[j * K.n + j]
-        K.spare[j] = 1.0 / weight**0.5 if weight > 0.0 else 1.0
+        K.spare[j] = 1.0 / sqrt(weight) if weight > 0.0 else 1.0
 
 
 def load_row(K: Any, k: int) -> None:
@@ -173,7 +174,7 @@ def leftovers_here(K: Any, m: int) -> None:
         load_row(K, k)
         for i in range(k):
             clear_row(K.basis, k * n, i * n, n)
-        left = square(K.basis, k * n, n) ** 0.5
+        left = sqrt(square(K.basis, k * n, n))
         K.work[k] = left
         inverse = 1.0 / (left + 1e-300)
         for j in range(n):
@@ -199,7 +200,7 @@ def lengths_of_many(K: Any, m: int) -> None:
             K.spare[n + k * m + i] = common_part(K, n, k, i)
     for k in range(m):
         pivot = max(K.spare[n + k * (m + 1)], 0.0)
-        K.work[k] = pivot**0.5
+        K.work[k] = sqrt(pivot)
         for a in range(k + 1, m):
             part = K.spare[n + a * m + k]
             if part != 0.0 and pivot > 0.0:
@@ -263,7 +264,7 @@ def horizon(K: Any, m: int, unit: float, first: float) -> float:
         speed = max(motion(K, K.y), motion(K, K.y1))
         for k in range(m):
             if K.work[m + k] == first:
-                reach = (stirring(K, k, K.work[2 * m + k] / first, speed) / HUSHED) ** 0.5
+                reach = sqrt(stirring(K, k, K.work[2 * m + k] / first, speed) / HUSHED)
                 limit = max(limit, 4.0 * min(reach, LONGEST_RADAU * unit))
     return limit
 
@@ -285,7 +286,7 @@ def step_by_pose(K: Any, unit: float, longest: float) -> float:
         K.clock[POSE] = K.clock[NOW] + first
     span = unit
     if may_stretch(K):
-        span = min(max((K.detail[KICK] / HUSHED) ** 0.5 / amid(K), unit), longest * unit)
+        span = min(max(sqrt(K.detail[KICK] / HUSHED) / amid(K), unit), longest * unit)
     rest = (first - amid(K) * span) / unit
     if rest >= 2.0:
         K.detail[KICK] = 0.0  # far: what may come of it is judged nearer

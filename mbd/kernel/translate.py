@@ -18,7 +18,8 @@ __all__ = ["translate"]
 
 KINDS = {"int": "int", "float": "real", "bool": "bool", "None": "none"}
 HEAD = """\
-declare double @llvm.pow.f64(double, double)
+declare double @pow(double, double) nounwind nobuiltin willreturn memory(none)
+declare double @llvm.sqrt.f64(double)
 declare double @llvm.fabs.f64(double)
 declare double @llvm.copysign.f64(double, double)
 declare i64 @llvm.abs.i64(i64, i1)

@@ -130,8 +130,12 @@ def guard_values(run: Run) -> Vector:
 
 def set_side(run: Run, e: int, guards: Vector) -> None:
     """The sign from which a user's guard will cross next: that of its value, however near to zero, so that a start
-    just before its surface fires it. At zero itself its rate decides, and where that is zero as well the first step.
+    just before its surface fires it. At zero itself, and where the value is round-off, its rate decides; where that
+    leads nowhere in a step, the first steps that do.
     """
     n_contacts, n_guards = run.values["n_contacts"], run.values["n_guards"]
     value, rate = guards[4 * n_contacts + e], guards[4 * n_contacts + n_guards + e]
-    run.values["side"][e] = float(np.sign(value if value != 0.0 else rate))
+    doubt = run.stepper.guard_round_off(e)
+    if abs(value) <= doubt:
+        value = rate if abs(rate) * run.values["clock"][F.STEP] > doubt else 0.0
+    run.values["side"][e] = float(np.sign(value))

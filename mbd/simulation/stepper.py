@@ -114,6 +114,7 @@ class Stepper:
         self.scheme = PlainScheme(integrator, self.system, manager)
         self.functions: list[Any] = [mechanism.common[name] for name in ("accelerations", "guards", "scales")]
         self.functions.append(None if mechanism.vector else mechanism.common["compose"])
+        self.functions.append(mechanism.common["terms"] if mechanism.judged else None)
         self.modes: list[Any] = []
         self.dependent: dict[int, tuple[int, ...]] = {}
         self._table: CallTable | None = None
@@ -265,6 +266,17 @@ class Stepper:
         fill_block(
             F.Kernel(**{name: values[name] for name in F.FIELDS}), values["clock"][F.NOW], values["q"], values["y"]
         )
+
+    def guard_round_off(self, e: int) -> float:
+        """Round-off of a user's guard at the accepted state."""
+        from mbd.kernel.restart import fill_block, refresh_scales
+        from mbd.kernel.significance import guard_round_off
+
+        values = {**self.values, "code": self.functions, "hooks": self.scheme}
+        K = F.Kernel(**{name: values[name] for name in F.FIELDS})
+        fill_block(K, values["clock"][F.NOW], values["q"], values["y"])
+        refresh_scales(K)
+        return guard_round_off(K, e, values["clock"][F.NOW], values["q"], values["y"])
 
     def _advance_plain(self) -> int:
         from mbd.kernel.advance import advance

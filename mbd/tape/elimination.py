@@ -4,7 +4,8 @@
 and ones of the matrix are known while the code is written, so that they cost nothing. In turn the cheapest of these is
 eliminated (Markowitz 1957, Management Science 3:255, with pivots on the diagonal):
 
-- a coordinate by its own equation, pivot S_ii;
+- a coordinate by its own equation, pivot S_ii; not a massless one that rows act on, whose S_ii is stiffness alone
+  and may be round-off;
 - a multiplier by its own row, pivot the −H S⁻¹ R that is left there once all coordinates of the row are eliminated
   (with fewer of them, two rows may have the same left);
 - a coordinate by a row, and that row's multiplier by the equation of the coordinate, where both pivots are numbers: a
@@ -15,7 +16,7 @@ Nothing is exchanged at run time. Instead every pivot is compared with what it w
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 
@@ -94,14 +95,17 @@ def _parts(pivot: Pivot) -> Iterator[Node]:
     yield from (node for _, node in (*pivot.lower, *pivot.upper))
 
 
-def factors(matrix: Sequence[Sequence[Node]], coordinates: int, most: float = inf) -> Factors | None:
+def factors(
+    matrix: Sequence[Sequence[Node]], coordinates: int, most: float = inf, massless: Collection[int] = ()
+) -> Factors | None:
     """Eliminate a matrix whose first rows and columns belong to coordinates, the others to rows and multipliers.
 
     None where the pivots named above do not suffice, a pivot being an exact zero, or where factors and one solution
     take more than about so many operations.
     """
     kinds = [[_kind(entry) for entry in line] for line in matrix]
-    found = [order for order in (_order(kinds, coordinates, first) for first in (False, True)) if order is not None]
+    tries = (_order(kinds, coordinates, first, massless) for first in (False, True))
+    found = [order for order in tries if order is not None]
     if not found or min(found)[0] > most:
         return None
     work = _Elimination(matrix, coordinates)
@@ -126,9 +130,11 @@ def _kind(entry: Node) -> int:
     return NUMBER if entry.is_constant and 0.1 < abs(entry.data) < 10.0 else EXPRESSION
 
 
-def _order(kinds: Sequence[Sequence[int]], coordinates: int, pairs_first: bool) -> tuple[float, Places] | None:
+def _order(
+    kinds: Sequence[Sequence[int]], coordinates: int, pairs_first: bool, massless: Collection[int]
+) -> tuple[float, Places] | None:
     """What an elimination costs and its pivots, always the cheapest next; those by rows before all others on demand."""
-    work = _Pattern(kinds, coordinates)
+    work = _Pattern(kinds, coordinates, massless)
     cost, places = 0.0, list[tuple[int, int]]()
     while work.rows:
         choices = [*work.pairs()] if pairs_first else [*work.pairs(), *work.single()]
@@ -146,15 +152,17 @@ def _order(kinds: Sequence[Sequence[int]], coordinates: int, pairs_first: bool) 
 class _Pattern:
     """Which entries are left, and of what kind."""
 
-    def __init__(self, kinds: Sequence[Sequence[int]], coordinates: int) -> None:
+    def __init__(self, kinds: Sequence[Sequence[int]], coordinates: int, massless: Collection[int]) -> None:
         self.A, self.n = [list(line) for line in kinds], coordinates
         self.involved = {k: {c for c in range(coordinates) if kinds[k][c]} for k in range(coordinates, len(kinds))}
+        self.barred = {k for k in massless if any(k in known for known in self.involved.values())}
         self.rows, self.columns = list(range(len(kinds))), list(range(len(kinds)))
 
     def single(self) -> Iterator[tuple[float, int, Places]]:
         """Pivots on the diagonal (cost, a place to settle ties, pivots), of rows after those of their coordinates."""
         for k in self.rows:
-            if k in self.columns and self.A[k][k] and self.involved.get(k, set()).isdisjoint(self.columns):
+            may = k in self.columns and self.A[k][k] and k not in self.barred
+            if may and self.involved.get(k, set()).isdisjoint(self.columns):
                 yield self.cost(k, k), k, ((k, k),)
 
     def pairs(self) -> Iterator[tuple[float, int, Places]]:

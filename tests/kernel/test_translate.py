@@ -13,6 +13,7 @@ from hypothesis import given, settings, strategies as st
 from mbd.compile.llvm import load_object
 from mbd.errors import CapabilityError
 from mbd.kernel.build import functions_of, object_of
+from mbd.kernel.roots import sqrt
 from mbd.kernel.translate import translate
 
 reals = st.lists(st.floats(-1e3, 1e3) | st.sampled_from([0.0, -0.0, np.inf, -np.inf, np.nan]), min_size=4, max_size=4)
@@ -48,6 +49,14 @@ def extremes(x, k):
     x[3] = max(x[3], k[3])
     k[0] = max(k[0], 0, k[1])
     k[1] = min(2, k[2])
+    return 0
+
+
+def roots(x, k):
+    x[0] = sqrt(x[0])
+    x[1] = 1.0 / sqrt(abs(x[1])) if x[1] != 0.0 else sqrt(HALF * x[1])
+    x[2] = sqrt(x[2] * x[2] + x[3] * x[3])
+    x[3] = abs(x[3]) ** 1.3 + abs(x[3]) ** 3.0
     return 0
 
 
@@ -111,27 +120,28 @@ def whole(x):
     return x
 
 
-CASES = (arithmetic, rounding_down, extremes, decisions, loops, widening)
+CASES = (arithmetic, rounding_down, extremes, roots, decisions, loops, widening)
 
 
 @lru_cache
-def machine_code(function):
+def machine_code(function, level):
     functions = functions_of(*(inspect.getsource(one) for one in (function, inner, whole)))
-    name = f"translated_{function.__name__}"
+    name = f"translated_{function.__name__}_{level}"
     functions[name] = functions.pop(function.__name__)
     functions[name].name = name
     text = translate(functions, {"HALF": HALF, "MOST": MOST}, name, ["reals", "ints"])
-    return ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p)(load_object(object_of(text), name))
+    return ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p)(load_object(object_of(text, level), name))
 
 
+@pytest.mark.parametrize("level", [0, 2, 3])
 @pytest.mark.parametrize("function", CASES, ids=lambda function: function.__name__)
 @settings(max_examples=150)
 @given(x=reals, k=integers)
-def test_the_same_bits_as_python(function, x, k):
+def test_the_same_bits_as_python_at_every_level(function, level, x, k):
     plain, fast = [(np.array(x), np.array(k, dtype=np.int64)) for _ in range(2)]
     with np.errstate(all="ignore"):
         expected = int(function(*plain))
-    found = machine_code(function)(*(array.ctypes.data for array in fast))
+    found = machine_code(function, level)(*(array.ctypes.data for array in fast))
     assert found == expected
     numbers = ~np.isnan(plain[0])
     np.testing.assert_array_equal(np.isnan(fast[0]), ~numbers)
@@ -152,6 +162,7 @@ def test_the_same_bits_as_python(function, x, k):
         ("def f(x):\n    return x.size", "'x.size' is no field of the kernel"),
         ("def f(x) -> int:\n    return x", "a value of kind 'reals' where one of kind 'int' is needed"),
         ("def f(x):\n    return 3**int(x[0])", "a power of integers"),
+        ("def f(x):\n    return x[0] ** 0.5", r"write sqrt\(x\)"),
     ],
 )
 def test_what_the_kernel_may_not_use_is_named(source, message):

@@ -107,6 +107,69 @@ def test_a_start_at_rest_on_the_surface_fires_as_it_comes_back(place):
     assert [event.name for event in events] == ["turn"] and events[0].time == pytest.approx(0.5, abs=1e-3)
 
 
+# round-off ----------------------------------------------------------------------------------------------------------
+WATCHED = (mbd.HHT(0.05), mbd.GeneralizedAlpha(0.8, formulation="index3"), mbd.RadauIIA(), mbd.RungeKutta853())
+
+
+@pytest.mark.parametrize("scheme", WATCHED, ids=repr)
+@pytest.mark.parametrize("size", [1.0, 1e-9, 1e-100])
+@pytest.mark.parametrize("guard", ["slide.displacement", "slide.rate"])
+def test_a_motion_of_any_size_crosses_as_often(guard, size, scheme):
+    model = oscillator(
+        mbd.Event("zero", mbd.measure(guard)), mbd.Event("tiny", mbd.measure(lambda x: 1e-30 * x, guard))
+    )
+    events = run(model, {"slide.displacement": size}, dt=4e-3, until=5.2, integrator=scheme).events
+    assert [event.name for event in events].count("zero") == [event.name for event in events].count("tiny") == 10
+
+
+def watching_rates(model, names):
+    """The model with an event on the rate of each of these coordinates, and on their sum."""
+    model.constrain(
+        *(mbd.Event(f"rate {k}", mbd.measure(f"{name}.rate")) for k, name in enumerate(names)),
+        mbd.Event("sum", mbd.measure(lambda *rates: sum(rates), *(f"{name}.rate" for name in names))),
+    )
+    return model
+
+
+def hanging(seed):
+    """Links of any size that hang at rest from each other, from a base anywhere, turned by whole turns."""
+    rng = np.random.default_rng(seed)
+    model = mbd.Model("hanging")
+    end, position = model.ground.point(*rng.normal(size=2), name="base"), {}
+    for k in range(rng.integers(1, 5)):
+        length, mass = np.exp(rng.normal(size=2))
+        link = mbd.Link(f"link {k}", mass=mass, length=length, center=0.4 * length, inertia=0.1 * mass * length**2)
+        model.connect(mbd.Revolute(f"hinge {k}", end, link.start))
+        position[f"hinge {k}.angle"] = 2.0 * np.pi * rng.integers(-2, 3)
+        end = link.end
+    return watching_rates(model, list(position)), {"position": position}
+
+
+def resting(seed):
+    """A body on its two feet, somewhere on the floor, at rest."""
+    rng = np.random.default_rng(seed)
+    model = mbd.Model("resting")
+    width, height, mass = np.exp(rng.normal(size=3))
+    body = mbd.RigidBody("box", mass, (mass * width**2,) * 3)
+    model.connect(mbd.Planar("place", model.ground.origin, body.origin))
+    for side, name in ((-0.5, "left"), (0.5, "right")):
+        foot = body.point(side * width, -0.5 * height, name=name)
+        model.constrain(mbd.Unilateral(name, mbd.touchdown(foot), friction=0.6 if seed % 2 else 0))
+    return watching_rates(model, ["place.x", "place.y", "place.angle"]), {
+        "position": {"place.y": 0.5 * height, "place.x": rng.normal()}, "closed": ["left", "right"],
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("scheme", WATCHED, ids=repr)
+@pytest.mark.parametrize("make", [hanging, resting])
+@pytest.mark.parametrize("seed", range(6))
+def test_what_rests_crosses_nothing(make, seed, scheme):
+    model, start = make(seed)
+    found = mbd.simulate(model, mbd.assemble(model, **start), scheme, dt=2e-3, until=0.4)
+    assert [event.name for event in found.events] == []
+    assert found.stats["restarts"] <= 2
+
+
 # resets -------------------------------------------------------------------------------------------------------------
 RESETS = {
     "function of named values": lambda named: {"fall.rate": -0.5 * named["fall.rate"]},

@@ -1,0 +1,42 @@
+"""The kernel without optimization takes the same steps, bit by bit."""
+
+from __future__ import annotations
+
+import ctypes
+
+import numpy as np
+import pytest
+
+import mbd
+from mbd.compile.llvm import Machine, cached_object
+from mbd.kernel import build
+from tests.kernel.test_decisions import scenes
+
+SCHEMES = (mbd.GeneralizedAlpha(0.9), mbd.GeneralizedAlpha(0.5, formulation="index3"), mbd.RadauIIA(),
+           mbd.RungeKutta853())  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def plain_kernel():
+    """The entry of a kernel that no pass has worked on."""
+    machine = Machine()
+    code = cached_object(f"level 0 {build.source_digest()}", lambda: build.object_of(build.kernel_text(), 0))
+    yield ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)(machine.load(code, [build.ENTRY])[0])
+    del machine
+
+
+def steps(name, scheme):
+    model, start, until = scenes()[name]
+    run = mbd.simulate(model, start, scheme, dt=until / 150, until=until, on_failure="return")
+    return run.record, run.stats["steps"]
+
+
+@pytest.mark.parametrize("scheme", SCHEMES, ids=repr)
+@pytest.mark.parametrize("name", ["equal rods", "walker", "box", "driven, all cut"])
+def test_every_level_of_optimization_gives_the_same_bits(name, scheme, plain_kernel, monkeypatch):
+    optimized, count = steps(name, scheme)
+    monkeypatch.setattr(build, "entry", lambda: plain_kernel)
+    plain, same = steps(name, scheme)
+    assert count == same > 100
+    for part in ("time", "q", "v", "a", "lam"):
+        np.testing.assert_array_equal(getattr(optimized, part), getattr(plain, part), err_msg=part)
