@@ -1,10 +1,14 @@
-"""Settings of every test: seeded random examples, no window."""
+"""Settings of every test: seeded random examples, no window, interrupts that arrive."""
 
 import os
+import signal
 
 os.environ.setdefault("MPLBACKEND", "Agg")
 
 from hypothesis import HealthCheck, settings
+
+# where SIGINT is ignored (nohup, jobs in the background), it is not so for the tests and the processes they start
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 settings.register_profile(
     "ci",

@@ -276,6 +276,8 @@ def test_a_reader_that_stops_reading_ends_a_command_quietly(unbuffered):
     read, write = os.pipe()
     os.close(read)
     environment = {**os.environ, "PYTHONUNBUFFERED": unbuffered}
-    ended = subprocess.run([sys.executable, "-c", program], stdout=write, stderr=subprocess.PIPE, env=environment)
+    ended = subprocess.run(
+        [sys.executable, "-c", program], stdout=write, stderr=subprocess.PIPE, env=environment, timeout=300
+    )
     os.close(write)
     assert (ended.returncode, ended.stderr) == (141, b"")

@@ -133,7 +133,7 @@ def test_describing_a_model_loads_no_heavy_library():
         "import sys; from tests.topology.mechanisms import kneed_walker; kneed_walker().parameters;"
         "print([m for m in ('sympy', 'scipy', 'matplotlib', 'networkx') if m in sys.modules])"
     )
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, timeout=300)
     assert done.stdout.strip() == "[]"
 
 

@@ -24,6 +24,7 @@ def loaded(program: str) -> set[str]:
         capture_output=True,
         text=True,
         check=True,
+        timeout=300,
     )
     return set(report.stdout.split())
 

@@ -180,6 +180,6 @@ def by_c(programs: Mapping[str, Sequence[Node]], folder: Path, layout: Layout = 
     assert COMPILER is not None
     (folder / "graph.c").write_text(source(programs, layout))
     flags = ["-std=c99", "-O1", "-ffp-contract=off", "-Wall", "-Werror", "-Wno-unused-variable", "-shared", "-fPIC"]
-    subprocess.run([COMPILER, *flags, "graph.c", "-o", "graph.so", "-lm"], cwd=folder, check=True)
+    subprocess.run([COMPILER, *flags, "graph.c", "-o", "graph.so", "-lm"], cwd=folder, check=True, timeout=300)
     library = ctypes.CDLL(str(folder / "graph.so"))
     return {name: call(ctypes.cast(getattr(library, name), ctypes.c_void_p).value or 0) for name in programs}

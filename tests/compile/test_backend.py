@@ -88,5 +88,5 @@ functions.add({"f": [2.0 * Tape().input("t")]})
 functions["f"](numpy.array([3.0, 0.0, 0.0]), numpy.zeros(0), out)
 print(out[0])
 """
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=300)
     assert done.stdout.strip() == "6.0"

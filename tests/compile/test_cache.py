@@ -193,6 +193,7 @@ print(library.builds[0].cached)
             capture_output=True,
             text=True,
             check=True,
+            timeout=300,
         ).stdout.strip()
         for _ in range(2)
     ]

@@ -208,7 +208,7 @@ def _until_lost(seeds: list[int], limit: float) -> list[dict]:
             lost = {"seed": seed, "kind": "bad", "message": why, "reasons": [why], "scene": "", "seconds": limit}
             return [*verdicts, lost]
         verdicts.append(json.loads(line))
-    process.wait()
+    process.wait(limit)
     return verdicts
 
 

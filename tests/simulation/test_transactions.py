@@ -351,7 +351,7 @@ start = kneed_walker_start(walker)
 mbd.simulate(walker, start, dt=1e-3, until=0.01)
 print("ready", flush=True)
 how = {"dt": 1e-6, "store": 10**5, "on_failure": "return"}
-first = mbd.simulate(walker, start, **how, until=1e4)
+first = mbd.simulate(walker, start, **how, until=20.0)
 until = first.final.time + 0.1
 second = mbd.simulate(walker, first.final, **how, until=until)
 whole = mbd.simulate(walker, start, **how, until=until)
@@ -364,13 +364,17 @@ print(first.success, first.message, len(first.time) > 1, same and events and sec
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT between processes there")
 def test_a_signal_to_another_process_keeps_its_run_which_goes_on_to_the_bit():
     import signal
+    import threading
     import time
 
     with subprocess.Popen(
         [sys.executable, "-c", PROGRAM], stdout=subprocess.PIPE, text=True, cwd=ROOT, env=None
     ) as process:
+        late = threading.Timer(300.0, process.kill)
+        late.start()
         assert process.stdout is not None and process.stdout.readline() == "ready\n"
         time.sleep(0.5)
         process.send_signal(signal.SIGINT)
         told = process.stdout.read()
+        late.cancel()
     assert told.startswith("False interrupted at t = ") and told.endswith("kept True True\n"), told

@@ -160,6 +160,22 @@ def resting(seed):
     }  # fmt: skip
 
 
+def landing(seed):
+    """The same body, dropped flat and not far: its feet close without a rebound, and stay."""
+    model, start = resting(seed)
+    start["position"]["place.y"] += 0.02
+    return model, {"position": start["position"]}
+
+
+@pytest.mark.parametrize("scheme", WATCHED, ids=repr)
+@pytest.mark.parametrize("seed", range(6))
+def test_what_has_landed_crosses_nothing(seed, scheme):
+    model, start = landing(seed)
+    found = mbd.simulate(model, mbd.assemble(model, **start), scheme, dt=2e-3, until=0.5)
+    landed = max(event.time for event in found.events if event.kind == "closed")
+    assert [event.name for event in found.events if event.kind == "event" and event.time > landed] == []
+
+
 @pytest.mark.parametrize("scheme", WATCHED, ids=repr)
 @pytest.mark.parametrize("make", [hanging, resting])
 @pytest.mark.parametrize("seed", range(6))

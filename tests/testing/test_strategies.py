@@ -79,7 +79,8 @@ def test_the_same_seed_makes_the_same_mechanism():
 
 
 def fresh(program: str) -> str:
-    return subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout
+    words = [sys.executable, "-c", program]
+    return subprocess.run(words, capture_output=True, text=True, check=True, timeout=300).stdout
 
 
 def test_the_kit_loads_lazily_and_checks_need_no_hypothesis():
