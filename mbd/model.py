@@ -23,7 +23,7 @@ from mbd.forces.base import Force
 from mbd.forces.quantities import Mention
 from mbd.joints.base import Joint
 
-__all__ = ["Model", "on_slope"]
+__all__ = ["Model", "all_are", "on_slope"]
 
 Word = TypeVar("Word")
 
@@ -87,7 +87,7 @@ class Model:
     def connect(self, *joints: Joint) -> None:
         """Add joints, and with them the bodies that they connect."""
         example = "connect takes joints such as mbd.Revolute('knee', thigh.end, shank.start)"
-        self.joints += _all_are(Joint, joints, example)
+        self.joints += all_are(Joint, joints, example)
 
     def constrain(self, *constraints: Constraint) -> None:
         """Add constraints and events."""
@@ -95,12 +95,12 @@ class Model:
             "constrain takes constraints such as mbd.Unilateral('foot', mbd.touchdown(shank.end)), and events; "
             "forces and controllers go to apply"
         )
-        self.constraints += _all_are(Constraint, constraints, example)
+        self.constraints += all_are(Constraint, constraints, example)
 
     def apply(self, *forces: Force | Controller) -> None:
         """Add forces and controllers."""
         example = "apply takes forces such as mbd.Motor('drive', hip, torque=1.0), and controllers"
-        known = _all_are((Force, Controller), forces, example)
+        known = all_are((Force, Controller), forces, example)
         self.forces += [word for word in known if isinstance(word, Force)]
         self.controllers += [word for word in known if isinstance(word, Controller)]
 
@@ -283,7 +283,8 @@ def _title(name: Any) -> str:
     return name
 
 
-def _all_are(kind: Any, words: Iterable[Word], sentence: str) -> list[Word]:
+def all_are(kind: Any, words: Iterable[Word], sentence: str) -> list[Word]:
+    """Words of a kind, or the sentence of what is expected."""
     given = list(words)
     for word in given:
         if not isinstance(word, kind):

@@ -11,7 +11,7 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.errors import UnknownNameError, nearest
 
-__all__ = ["Memory", "Mode", "State", "malformed"]
+__all__ = ["Memory", "Mode", "State", "are_names", "malformed"]
 
 
 def _empty() -> Vector:
@@ -139,9 +139,9 @@ def malformed(state: State) -> list[str]:
         if not _is_vector(value)
     ]
     closed = state.mode.closed if isinstance(state.mode, Mode) else None
-    if not _are_names(closed):
+    if not are_names(closed):
         faults.append(f"the mode of the start must be a Mode(frozenset of names of contacts), not {state.mode!r:.80}")
-    if state.armed is not None and not _are_names(state.armed):
+    if state.armed is not None and not are_names(state.armed):
         faults.append(f"armed of the start must be None or a frozenset of names of contacts, not {state.armed!r:.80}")
     for name in ("names", "velocity_names"):
         value = getattr(state, name)
@@ -165,5 +165,6 @@ def _is_vector(value: Any) -> bool:
     return array.ndim == 1 and (array.dtype.kind in "fiu" or array.size == 0)
 
 
-def _are_names(value: Any) -> bool:
+def are_names(value: Any) -> bool:
+    """Whether a value is a set of names."""
     return isinstance(value, set | frozenset) and all(isinstance(one, str) for one in value)

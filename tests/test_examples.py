@@ -25,8 +25,8 @@ from mbd.cli import Script, examples
 g = 9.81
 NAMES = (
     "chapter-walker", "compass-gait", "double-pendulum", "four-bar", "kneed-walker", "lagrangian-double-pendulum",
-    "long-pendulum", "pendulum", "prosthetic-leg", "rimless-wheel", "shaken-block", "slider-crank", "user-constraint",
-    "user-integrator",
+    "long-pendulum", "pendulum", "prosthetic-leg", "rimless-wheel", "shaken-block",
+    "simplest-walker-lagrangian", "slider-crank", "user-constraint", "user-integrator",
 )  # fmt: skip
 COARSE = ("long-pendulum", "user-integrator")
 """Of steps so long, for very many periods, or of order so low that other schemes differ."""
@@ -181,6 +181,13 @@ def test_energies_in_sympy_move_like_bodies() -> None:
     assert energies["upper"] == pytest.approx(bodies["pin.angle"], abs=1e-8)
     assert energies["lower"] == pytest.approx(bodies["pin.angle"] + bodies["elbow.angle"], abs=1e-8)
     assert energies.energy.total[0] == pytest.approx(7.470868984694769, abs=1e-12)
+
+
+def test_the_simplest_walker_of_energies_keeps_its_published_step() -> None:
+    """τ = 3.882463752851374 √(L/g), from two solutions that agree to 3e-15."""
+    strikes = [event.time for event in run_of("simplest-walker-lagrangian").events]
+    assert len(strikes) == 5
+    assert np.diff([0.0, *strikes]) == pytest.approx(3.882463752851374, abs=1e-7)
 
 
 # linkages ---------------------------------------------------------------------------------------------------------

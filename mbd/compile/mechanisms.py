@@ -24,7 +24,8 @@ free_in_child(_LOCK)
 def _description(model: Any) -> Any:
     """What the equations depend on, by identity of the words."""
     words = [getattr(model, kind, ()) for kind in ("joints", "forces", "constraints", "controllers")]
-    return tuple(tuple(group) for group in words), *(getattr(model, key, None) for key in ("gravity", "cut", "tunable"))
+    groups = tuple(tuple(group.values() if isinstance(group, Mapping) else group) for group in words)
+    return groups, *(getattr(model, key, None) for key in ("gravity", "cut", "tunable"))
 
 
 def _same(old: Any, new: Any) -> bool:

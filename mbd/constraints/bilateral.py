@@ -7,7 +7,9 @@ from typing import Any
 
 from mbd.bodies.values import name_of
 from mbd.constraints.base import Constraint, Measure
+from mbd.constraints.expressions import is_expression
 from mbd.constraints.measures import JointMeasure
+from mbd.constraints.user_measure import measure
 from mbd.errors import ModelError
 from mbd.forces.base import joint_of
 from mbd.forces.quantities import Mention, arguments_of, kinks, mentioned, quantity_of, scalar, value_parameters
@@ -41,6 +43,8 @@ class Bilateral(Constraint):
         name_of(self.name, "Bilateral")
         if isinstance(self.subject, Joint):
             joint_of(self.subject, f"joint of Bilateral '{self.name}'")
+        elif is_expression(self.subject):
+            object.__setattr__(self, "subject", measure(self.subject))
         elif not isinstance(self.subject, Measure):
             raise ModelError(
                 f"Bilateral '{self.name}' needs a joint or a measure such as mbd.distance(a, b), got {self.subject!r}"

@@ -8,6 +8,7 @@ from typing import Any
 
 from mbd.bodies.values import flag, name_of, names_of
 from mbd.constraints.base import Constraint, Measure
+from mbd.constraints.expressions import is_expression, plain
 from mbd.constraints.unilateral import measure_of
 from mbd.errors import ModelError
 from mbd.forces.quantities import Mention
@@ -23,7 +24,8 @@ class Event(Constraint):
     ----------
     name : its name, under which it stands in the run
     guard : the measure
-    reset : named values to set, {'hip.rate': 0.0}, or a function that makes them from named values; None for no change
+    reset : named values to set, {'hip.rate': 0.0}, or a function that makes them from named values; None for no change.
+        A value may be a function of named values, or a sympy expression: ``{theta.q: -theta.q, phi.v: 0}``
     terminal : whether the run ends there
     direction : −1 as the guard falls through zero, +1 as it rises, 0 both
     """
@@ -36,10 +38,12 @@ class Event(Constraint):
 
     def __post_init__(self) -> None:
         name_of(self.name, "Event")
-        measure_of(self.guard, f"Event '{self.name}'")
+        object.__setattr__(self, "guard", measure_of(self.guard, f"Event '{self.name}'"))
         if not (self.reset is None or isinstance(self.reset, Mapping) or callable(self.reset)):
             raise ModelError(f"reset of Event '{self.name}' maps names to values, got {self.reset!r}")
         if isinstance(self.reset, Mapping):
+            named = {str(key) if is_expression(key) else key: plain(value) for key, value in self.reset.items()}
+            object.__setattr__(self, "reset", named)
             names_of(self.reset, f"each key of the reset of Event '{self.name}'")
         object.__setattr__(self, "terminal", flag(self.terminal, f"terminal of Event '{self.name}'"))
         if self.direction not in (-1, 0, 1):

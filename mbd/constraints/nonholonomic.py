@@ -8,6 +8,7 @@ from typing import Any
 
 from mbd.bodies.values import is_number, name_of
 from mbd.constraints.base import VelocityConstraint
+from mbd.constraints.expressions import is_expression, plain, quantities_in
 from mbd.errors import ModelError
 from mbd.forces.quantities import (
     Mention,
@@ -42,7 +43,8 @@ class Nonholonomic(VelocityConstraint):
     row : a Python function or sympy expression of the arguments, linear in velocities [unit/s]
     bias : b, a number (the run-time parameter 'name.bias'), a function or sympy expression of t, or `Samples` [unit/s]
     arguments : what the row is called with, in order: names of rates ('body.x.rate', 'blade.start.vx') and of places
-        or times, frames (their positions), joints (their coordinates), or (label, any of these or a number)
+        or times, frames (their positions), joints (their coordinates), or (label, any of these or a number); without
+        them the symbols of an expression are names themselves, as in `measure`
     unit : 'm' or 'rad', that of the row times seconds
 
     Results are 'name.force', −λ, by which the constraint gives the power ``force · (a · v)`` [N for 'm', N m for
@@ -58,6 +60,9 @@ class Nonholonomic(VelocityConstraint):
     def __post_init__(self) -> None:
         name_of(self.name, "Nonholonomic")
         put = object.__setattr__
+        if not self.arguments and is_expression(self.row):
+            put(self, "row", plain(self.row))
+            put(self, "arguments", quantities_in([self.row]))
         put(self, "row", quantity_of(self.row, f"row of '{self.name}'"))
         put(self, "bias", quantity_of(self.bias, f"bias of '{self.name}'"))
         put(self, "arguments", arguments_of(self.arguments, f"Nonholonomic '{self.name}'"))

@@ -59,7 +59,7 @@ class Penalty(Constraint):
 
     def __post_init__(self) -> None:
         name_of(self.name, "Penalty")
-        measure_of(self.measure, f"Penalty '{self.name}'")
+        object.__setattr__(self, "measure", measure_of(self.measure, f"Penalty '{self.name}'"))
         for field in ("stiffness", "damping", "exponent", "restitution", "effective_mass"):
             if getattr(self, field) is not None or field in ("stiffness", "damping", "exponent"):
                 object.__setattr__(self, field, number(getattr(self, field), f"{field} of '{self.name}'"))

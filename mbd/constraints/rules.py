@@ -8,6 +8,8 @@ from typing import Any
 
 from mbd.bodies.values import flag
 from mbd.constraints.base import Measure
+from mbd.constraints.expressions import is_expression
+from mbd.constraints.user_measure import measure
 from mbd.errors import ModelError
 
 __all__ = ["When", "condition_of", "releases_of"]
@@ -52,7 +54,9 @@ def releases_of(value: Any, what: str) -> tuple[When, ...]:
 
 
 def condition_of(value: Any, what: str) -> str | Measure | None:
-    """The `only_while=` of a contact: a name, a measure that must be positive, or None."""
+    """The `only_while=` of a contact: a name, a measure or expression that must be positive, or None."""
+    if is_expression(value):
+        return measure(value)
     if value is None or isinstance(value, str | Measure):
         return value
     raise ModelError(f"only_while of '{what}' is the name of a contact, or a measure, got {value!r}")

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from mbd.bodies.domains import Domain
 from mbd.bodies.values import name_of, number
 from mbd.constraints.base import Constraint, Measure
+from mbd.constraints.expressions import is_expression
 from mbd.constraints.rules import When, condition_of, releases_of
+from mbd.constraints.user_measure import measure
 from mbd.errors import ModelError
 from mbd.forces.quantities import Mention
 
@@ -42,8 +44,8 @@ class Unilateral(Constraint):
 
     def __post_init__(self) -> None:
         name_of(self.name, "Unilateral")
-        measure_of(self.measure, f"Unilateral '{self.name}'")
         put = object.__setattr__
+        put(self, "measure", measure_of(self.measure, f"Unilateral '{self.name}'"))
         put(self, "restitution", number(self.restitution, f"restitution of '{self.name}'"))
         if self.friction is not None:
             put(self, "friction", number(self.friction, f"friction of '{self.name}'"))
@@ -112,7 +114,9 @@ class Unilateral(Constraint):
 
 
 def measure_of(value: object, what: str) -> Measure:
-    """A measure, checked at the border."""
+    """A measure, checked at the border; a sympy expression of a `Lagrangian`'s coordinates is one [m]."""
+    if is_expression(value):
+        return measure(value)
     if not isinstance(value, Measure):
         raise ModelError(f"{what} needs a measure such as mbd.touchdown(shank.end) or mbd.flexion(knee), got {value!r}")
     return value

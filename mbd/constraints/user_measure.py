@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from mbd.constraints.base import Measure
+from mbd.constraints.expressions import plain, quantities_in
 from mbd.errors import ModelError
 from mbd.forces.quantities import ArgumentSpec, Mention, arguments_of, mentioned, quantity_of, resolved
 from mbd.scope import Scope
@@ -74,7 +75,9 @@ def measure(function: Any, *arguments: Any, unit: str = "m", tangents: Any = Non
     ----------
     function : g; it may depend on the posture and the time
     arguments : what it is called with, in order: names of quantities ('t', 'left hip.angle'), frames (their positions),
-        joints (their coordinates), or (label, one of these) to match the symbols of an expression
+        joints (their coordinates), or (label, one of these) to match the symbols of an expression. Without them the
+        symbols of an expression, or the arguments of a function, are names of quantities themselves: those of a
+        `Lagrangian`, ``measure(sympy.cos(theta.q))``
     unit : of g, 'm' or 'rad'
     tangents : functions of the same arguments whose values are held while the contact sticks [m]
     """
@@ -88,9 +91,12 @@ def measure(function: Any, *arguments: Any, unit: str = "m", tangents: Any = Non
         if given or tangents is not None:
             raise ModelError(f"measure({function!r}) is a named quantity and takes no arguments and no tangents")
         return UserMeasure(function, (), unit)
+    several = () if tangents is None else tangents if isinstance(tangents, tuple | list) else (tangents,)
+    if not given:
+        function, several = plain(function), tuple(map(plain, several))
+        given = arguments_of(quantities_in([function, *several]), "measure")
     if not given:
         raise ModelError("measure: say what the function depends on, such as measure(f, 'left hip.angle')")
-    several = () if tangents is None else tangents if isinstance(tangents, tuple | list) else (tangents,)
     return UserMeasure(
         quantity_of(function, "function of a measure"),
         given,

@@ -9,12 +9,12 @@ from mbd.constraints.bilateral import Bilateral
 from mbd.constraints.event import Event
 from mbd.constraints.penalty import Penalty
 from mbd.constraints.unilateral import Unilateral
-from mbd.equations.dynamics import Dynamics, Work
+from mbd.equations.derivation_scope import DerivationScope, Generalized
+from mbd.equations.dynamics import Work
 from mbd.equations.effects import penalty_effect
 from mbd.equations.equations import Contact, Guard, Row
 from mbd.equations.frictions import dry_joint, sliding_contact
 from mbd.equations.laws import Laws
-from mbd.equations.surroundings import Surroundings
 from mbd.joints.base import Joint, row_unit
 from mbd.tape.derivatives import gradient, live
 from mbd.tape.evaluate import evaluate
@@ -27,15 +27,19 @@ FITS = 1e-9
 
 
 def laws(
-    scope: Surroundings,
-    dynamics: Dynamics,
+    scope: DerivationScope,
+    dynamics: Generalized,
     joints: Sequence[Joint],
     bilaterals: Sequence[Bilateral | VelocityConstraint],
     contacts: Sequence[Unilateral | Penalty],
     events: Sequence[Event],
+    before: Laws | None = None,
 ) -> Laws:
-    """Cut joints, what always acts (positions first), dry joints, contacts and events, in the order of the model."""
-    found = Laws()
+    """Cut joints, what always acts (positions first), dry joints, contacts and events, in the order of the model.
+
+    They are added to those `before`.
+    """
+    found = Laws() if before is None else before
     for joint in scope.cuts:
         for part, value in scope.cut_rows(joint)[0]:
             if _row(found, scope, joint.name, part, value, unit=row_unit(part), may_fold=True) < 0:
@@ -57,20 +61,20 @@ def laws(
     return found
 
 
-def anchors_held(scope: Surroundings, contacts: Sequence[Unilateral | Penalty]) -> int:
+def anchors_held(scope: DerivationScope, contacts: Sequence[Unilateral | Penalty]) -> int:
     """How many values all contacts store as they close."""
     zero = scope.tape.zero
     return sum(len(law.captured(zero) if isinstance(law, Penalty) else _captured(scope, law)) for law in contacts)
 
 
-def _captured(scope: Surroundings, law: Unilateral) -> Sequence[Scalar]:
+def _captured(scope: DerivationScope, law: Unilateral) -> Sequence[Scalar]:
     """What a contact that holds its place stores as it closes."""
     return law.measure.captured(scope) if law.sticks or law.slides else ()
 
 
 def _row(
     found: Laws,
-    scope: Surroundings,
+    scope: DerivationScope,
     owner: str,
     part: str,
     value: Scalar,
@@ -94,7 +98,7 @@ def _row(
     return len(found.rows) - 1
 
 
-def _velocity_rows(found: Laws, scope: Surroundings, law: VelocityConstraint) -> None:
+def _velocity_rows(found: Laws, scope: DerivationScope, law: VelocityConstraint) -> None:
     """Rows ``a(q, t) · v + b(q, t) = 0``, with what is wrong with them."""
     for part, value in law.rates(scope):
         view = scope.tape.lift(value)
@@ -118,7 +122,7 @@ def _velocity_rows(found: Laws, scope: Surroundings, law: VelocityConstraint) ->
             found.viewed.append(view)
 
 
-def _idle(scope: Surroundings, node: Node, title: str, kinds: set[str], unit: str, may_fold: bool) -> list[str]:
+def _idle(scope: DerivationScope, node: Node, title: str, kinds: set[str], unit: str, may_fold: bool) -> list[str]:
     """What is wrong with a row that no motion changes."""
     if "anchor" in kinds:
         return []
@@ -133,7 +137,7 @@ def _idle(scope: Surroundings, node: Node, title: str, kinds: set[str], unit: st
     return [] if may_fold else [f"{title} is 0 whatever the motion, so it constrains nothing; remove it"]
 
 
-def _unilateral(found: Laws, scope: Surroundings, dynamics: Dynamics, law: Unilateral, number: int) -> None:
+def _unilateral(found: Laws, scope: DerivationScope, dynamics: Generalized, law: Unilateral, number: int) -> None:
     """A normal row, and tangent rows that hold the place of touchdown where and while it sticks."""
     gap = scope.tape.lift(law.measure.gap(scope))
     unit = law.measure.unit
@@ -158,14 +162,16 @@ def _unilateral(found: Laws, scope: Surroundings, dynamics: Dynamics, law: Unila
     )  # fmt: skip
 
 
-def _anchored(found: Laws, scope: Surroundings, values: Sequence[Scalar]) -> tuple[tuple[Node, ...], tuple[int, ...]]:
+def _anchored(
+    found: Laws, scope: DerivationScope, values: Sequence[Scalar]
+) -> tuple[tuple[Node, ...], tuple[int, ...]]:
     """What a contact stores as it closes, and the numbers of its anchors."""
     captured = tuple(scope.real(value) for value in values)
     first = sum(len(contact.anchors) for contact in found.contacts)
     return captured, tuple(range(first, first + len(captured)))
 
 
-def _penalty(found: Laws, scope: Surroundings, dynamics: Dynamics, law: Penalty, number: int) -> None:
+def _penalty(found: Laws, scope: DerivationScope, dynamics: Generalized, law: Penalty, number: int) -> None:
     """A force law on a gap: −p ∂g/∂q on the left-hand side while it acts."""
     gap = scope.tape.lift(law.measure.gap(scope))
     if not any(node.op == "input" and node.data[0] == "x" for node in live([scope.real(gap)])):
@@ -187,7 +193,7 @@ def _penalty(found: Laws, scope: Surroundings, dynamics: Dynamics, law: Penalty,
     found.effects.append(penalty_effect(law.name, number, gap, rate, force, generalized, scope, elastic))
 
 
-def _guard(scope: Surroundings, event: Event) -> Guard:
+def _guard(scope: DerivationScope, event: Event) -> Guard:
     """A user's event; its measure may depend on velocities."""
     value = event.guard.gap(scope)
     return Guard(event.name, scope.real(value), scope.change(value), event.direction, event.terminal, event.reset)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from mbd.equations.changes import partials, rates
 from mbd.equations.contacts import anchors_held, laws
+from mbd.equations.derivation_scope import DerivationScope
 from mbd.equations.dynamics import Dynamics, Work
 from mbd.equations.effects import Cause, causes, effect_of, weight_of
 from mbd.equations.equations import Equations
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from mbd.model import Model
     from mbd.topology.plan import Plan
 
-__all__ = ["FrontDoor", "derive"]
+__all__ = ["FrontDoor", "derive", "state_balance"]
 
 
 @runtime_checkable
@@ -62,7 +63,7 @@ def _derived(model: Model, plan: Plan) -> Equations:
     dynamics = Dynamics(moving, masses, scope.placement, scope.views, scope.inputs)
     found = causes(scope, (*plan.edges, *plan.cut), model.forces)
     work = sum((cause.work for cause in found), Work())
-    rests = _state_balance(scope, found)
+    rests = state_balance(scope, found)
     joints = (*plan.edges, *plan.cut)
     constraints = laws(scope, dynamics, joints, [*model.bilaterals, *model.nonholonomic], model.contacts, model.events)
     if constraints.faults:
@@ -106,7 +107,7 @@ def _closed(scope: Surroundings, constraints: Laws) -> Work:
     return work
 
 
-def _state_balance(scope: Surroundings, found: Sequence[Cause]) -> list[Node]:
+def state_balance(scope: DerivationScope, found: Sequence[Cause]) -> list[Node]:
     """ż − s of every first-order state."""
     given = {state.index: rate for cause in found for state, rate in cause.rates}
     missing = [coordinate.name for coordinate, node in scope.states if node.index not in given]

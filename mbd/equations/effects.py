@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
+from mbd.equations.derivation_scope import DerivationScope, Generalized
 from mbd.equations.dynamics import Dynamics, Work
 from mbd.equations.equations import Effect
 from mbd.equations.surroundings import Surroundings
@@ -40,7 +41,7 @@ class Cause:
         return bool(self.rates) or any(not isinstance(part, float) and not part.is_zero for part in parts)
 
 
-def causes(scope: Surroundings, joints: Iterable[Joint], forces: Iterable[Force]) -> list[Cause]:
+def causes(scope: DerivationScope, joints: Iterable[Joint], forces: Iterable[Force]) -> list[Cause]:
     """Springs and losses of all joints, then the forces, without what folds away.
 
     A force may be named like the spring that a joint could have: then the parameters of that name are the force's.
@@ -56,7 +57,7 @@ def causes(scope: Surroundings, joints: Iterable[Joint], forces: Iterable[Force]
     return [cause for cause in found if cause.acts]
 
 
-def _joint_spring(joint: Joint, scope: Surroundings) -> Cause:
+def _joint_spring(joint: Joint, scope: DerivationScope) -> Cause:
     """``½ k (q − rest)²``; nothing for a stiffness that folds."""
     cause = Cause(f"{joint.name} spring", "potential")
     if len(joint.labels) == 1 and not scope.parameter(cause.name, "stiffness", joint.stiffness).is_zero:
@@ -64,7 +65,7 @@ def _joint_spring(joint: Joint, scope: Surroundings) -> Cause:
     return cause
 
 
-def _joint_loss(joint: Joint, scope: Surroundings) -> Cause:
+def _joint_loss(joint: Joint, scope: DerivationScope) -> Cause:
     """``∂D/∂q̇`` on each rate."""
     cause = Cause(f"{joint.name} loss", "loss", "joint loss")
     if joint.losses():
@@ -74,7 +75,7 @@ def _joint_loss(joint: Joint, scope: Surroundings) -> Cause:
     return cause
 
 
-def _force(force: Force, scope: Surroundings) -> Cause:
+def _force(force: Force, scope: DerivationScope) -> Cause:
     """The action of a force."""
     action: Action = force.act(scope)
     cause = Cause(force.name, force.kind, force.column, rates=action.rates)
@@ -86,13 +87,13 @@ def _force(force: Force, scope: Surroundings) -> Cause:
     return cause
 
 
-def _store(cause: Cause, energy: Scalar, scope: Surroundings) -> None:
+def _store(cause: Cause, energy: Scalar, scope: DerivationScope) -> None:
     """V: +∂V/∂q on the left-hand side."""
     cause.potential = scope.tape.lift(energy)
     cause.work.on_value(cause.potential, 0.0 if cause.potential.is_constant else scope.tape.one)
 
 
-def _apply(cause: Cause, pairs: Iterable[tuple[Scalar, Scalar]], scope: Surroundings) -> None:
+def _apply(cause: Cause, pairs: Iterable[tuple[Scalar, Scalar]], scope: DerivationScope) -> None:
     """(velocity, force) pairs: −force on the left-hand side, power force · velocity."""
     lift = scope.tape.lift
     for velocity, force in pairs:
@@ -101,7 +102,7 @@ def _apply(cause: Cause, pairs: Iterable[tuple[Scalar, Scalar]], scope: Surround
         cause.power = power if cause.power is None else cause.power + power
 
 
-def _dissipate(cause: Cause, D: Node, scope: Surroundings) -> None:
+def _dissipate(cause: Cause, D: Node, scope: DerivationScope) -> None:
     """D(v): +∂D/∂v on the left-hand side, power −v · ∂D/∂v."""
     cause.work.on_velocity(D, scope.tape.one)
     own = {view.node: view.node for view in scope.views.inside([D]) if view.motion}  # velocities are linear in v
@@ -117,7 +118,7 @@ def weight_of(scope: Surroundings, dynamics: Dynamics) -> Cause:
     return cause
 
 
-def effect_of(cause: Cause, scope: Surroundings, dynamics: Dynamics) -> Effect:
+def effect_of(cause: Cause, scope: DerivationScope, dynamics: Generalized) -> Effect:
     """The record of a cause; its generalized forces are made when they are asked for."""
     power = None if cause.power is None or cause.power.is_zero else scope.real(cause.power)
     potential = None if cause.potential is None else scope.real(cause.potential)
@@ -125,7 +126,7 @@ def effect_of(cause: Cause, scope: Surroundings, dynamics: Dynamics) -> Effect:
 
 
 def penalty_effect(
-    name: str, contact: int, gap: Node, rate: Node, force: Node, generalized: Sequence[Node], scope: Surroundings,
+    name: str, contact: int, gap: Node, rate: Node, force: Node, generalized: Sequence[Node], scope: DerivationScope,
     elastic: Node | None = None,
 ) -> Effect:  # fmt: skip
     """A penalty contact as an effect; its power on the mechanism is force · (ġ − ∂g/∂t) while it acts."""
@@ -133,5 +134,5 @@ def penalty_effect(
     return Effect(name, "penalty", lambda: generalized, force * (rate - drift), contact=contact, elastic=elastic)
 
 
-def _lazily(scope: Surroundings, dynamics: Dynamics, work: Work) -> Callable[[], Sequence[Node]]:
+def _lazily(scope: DerivationScope, dynamics: Generalized, work: Work) -> Callable[[], Sequence[Node]]:
     return lambda: (*dynamics.generalized(work), *[scope.tape.zero] * len(scope.states))

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from mbd.constraints.unilateral import Unilateral
-from mbd.equations.dynamics import Dynamics, Work
+from mbd.equations.derivation_scope import DerivationScope, Generalized
+from mbd.equations.dynamics import Work
 from mbd.equations.equations import Effect, Friction, Row
 from mbd.equations.laws import Laws
-from mbd.equations.surroundings import Surroundings
 from mbd.errors import CapabilityError
 from mbd.joints.base import Joint
 from mbd.tape.derivatives import substitute
@@ -20,7 +20,12 @@ __all__ = ["dry_joint", "sliding_contact"]
 
 
 def sliding_contact(
-    found: Laws, scope: Surroundings, dynamics: Dynamics, law: Unilateral, numbers: list[int], captured: dict[int, Node]
+    found: Laws,
+    scope: DerivationScope,
+    dynamics: Generalized,
+    law: Unilateral,
+    numbers: list[int],
+    captured: dict[int, Node],
 ) -> None:
     """Coulomb friction along the tangent of a contact, ``|λ_T| ≤ μ p``; the direction is that at the point of now."""
     normal, *tangents = [k for k in numbers if k >= 0]
@@ -39,7 +44,7 @@ def sliding_contact(
     _add(found, scope, dynamics, law.name, row, found.rows[row].contact, view, limit)
 
 
-def dry_joint(found: Laws, scope: Surroundings, dynamics: Dynamics, joint: Joint) -> None:
+def dry_joint(found: Laws, scope: DerivationScope, dynamics: Generalized, joint: Joint) -> None:
     """Set-valued losses of a joint: a row on each of its rates, held while ``|λ| ≤ limit``."""
     rates: Sequence[Scalar] | None = None
     for place, owner, loss in joint.losses():
@@ -56,7 +61,7 @@ def dry_joint(found: Laws, scope: Surroundings, dynamics: Dynamics, joint: Joint
         _add(found, scope, dynamics, name, len(found.rows) - 1, -1, view, scope.tape.lift(limit))
 
 
-def _pin_load(found: Laws, scope: Surroundings, joint: Joint) -> Node:
+def _pin_load(found: Laws, scope: DerivationScope, joint: Joint) -> Node:
     """Resultant of the reaction at a cut joint [N]; rounded below 1e-9 N, where it has no direction."""
     square = scope.tape.lift(1e-18)
     for k, row in enumerate(found.rows):
@@ -66,7 +71,14 @@ def _pin_load(found: Laws, scope: Surroundings, joint: Joint) -> Node:
 
 
 def _add(
-    found: Laws, scope: Surroundings, dynamics: Dynamics, name: str, row: int, contact: int, view: Node, limit: Node
+    found: Laws,
+    scope: DerivationScope,
+    dynamics: Generalized,
+    name: str,
+    row: int,
+    contact: int,
+    view: Node,
+    limit: Node,
 ) -> None:
     """A direction of dry friction, its row marked as held by it, and its loss as an effect."""
     number = len(found.frictions)

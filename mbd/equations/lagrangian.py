@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-import inspect
-import re
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
 
 from mbd.bodies.domains import ParameterCheck
 from mbd.bodies.values import named_number_faults, names_of, number
-from mbd.equations import equations as records
-from mbd.equations.equations import Effect, Equations, Row
-from mbd.equations.inputs import Inputs
-from mbd.equations.outputs import Outputs
-from mbd.equations.parameters import ParameterTable
-from mbd.errors import ModelError, TraceError, UnknownNameError, nearest
-from mbd.tape.derivatives import gradient, jvp, live
-from mbd.tape.node import Node, Scalar, Tape
-from mbd.tape.tracing import traced_scalar
+from mbd.constraints.base import Constraint
+from mbd.constraints.controller import Controller
+from mbd.constraints.event import Event
+from mbd.constraints.penalty import Penalty
+from mbd.constraints.unilateral import Unilateral
+from mbd.equations.energies import Lowering, assembled
+from mbd.equations.equations import Equations
+from mbd.equations.lagrangian_words import described, word_faults
+from mbd.errors import ModelError, UnknownNameError, nearest
+from mbd.forces.base import Force
+from mbd.model import all_are
 
 __all__ = ["Coordinate", "Expression", "Lagrangian"]
 
@@ -85,10 +85,23 @@ class Lagrangian:
     potential : V(q, t) [J]
     dissipation : D(v, q, t) [W]; its gradient ∂D/∂v resists the motion
     forces : generalized forces Q(t, q, v) by coordinate (or its name)
-    constraints : h by name, or (name, h) pairs, or bare expressions called 'constraint 1', …
+    constraints : h by name, or (name, h) pairs, or bare expressions called 'constraint 1', …; and words, as `constrain`
+        takes them
     nonholonomic : ``a(q, t) · v + b(q, t) = 0`` by name, rows on velocities whose B is a
     parameters : values by sympy symbol or by name; run-time inputs, where exact 0 and ±1 fold unless `tunable`
     tunable : names of parameters that stay inputs even at 0 or ±1
+    controllers : as `apply` takes them
+
+    `constrain` and `apply` add contacts, friction, events and controllers, as to a `Model`; gaps, guards and rows are
+    sympy expressions of the coordinates, the parameters and ``t``, or measures of them:
+
+    >>> import sympy, mbd
+    >>> y = Coordinate("y", unit="m")
+    >>> m, g = sympy.symbols("m g")
+    >>> ball = Lagrangian("ball", [y], m * y.v**2 / 2, m * g * y.q, parameters={m: 0.2, g: 9.81})
+    >>> ball.constrain(mbd.Unilateral("floor", y.q, restitution=0.5))
+    >>> ball.check()
+    []
     """
 
     name: str
@@ -101,40 +114,131 @@ class Lagrangian:
     parameters: Mapping[Any, float] = field(default_factory=dict)
     tunable: Collection[str] = ()
     nonholonomic: Mapping[str, Expression] = field(default_factory=dict)
+    controllers: Sequence[Controller] = ()
 
     def __post_init__(self) -> None:
         _check_shapes(self)
-        object.__setattr__(self, "coordinates", tuple(_coordinate(c) for c in self.coordinates))
-        object.__setattr__(self, "parameters", {_name(key): float(value) for key, value in self.parameters.items()})
-        object.__setattr__(self, "tunable", names_of(self.tunable, f"tunable of {self.name!r}"))
-        object.__setattr__(self, "forces", {_name(key): value for key, value in self.forces.items()})
-        object.__setattr__(self, "constraints", _named(self.constraints))
-        object.__setattr__(self, "nonholonomic", dict(self.nonholonomic))
+        put = object.__setattr__
+        put(self, "coordinates", tuple(_coordinate(c) for c in self.coordinates))
+        put(self, "tunable", names_of(self.tunable, f"tunable of {self.name!r}"))
+        put(self, "forces", {_name(key): value for key, value in self.forces.items()})
+        put(self, "constraints", _named(self.constraints))
+        put(self, "nonholonomic", dict(self.nonholonomic))
+        put(self, "controllers", list(self.controllers))
+        given = {_name(key): float(value) for key, value in self.parameters.items()}
+        put(self, "parameters", given | self._of_words())
 
+    # the two verbs ------------------------------------------------------------------------------------------------
+    def constrain(self, *constraints: Constraint) -> None:
+        """Add constraints and events, as to a `Model`."""
+        example = (
+            "constrain takes constraints such as mbd.Unilateral('floor', y.q), and events; "
+            "forces and controllers go to apply"
+        )
+        self._add(all_are(Constraint, constraints, example), self.constraints)
+
+    def apply(self, *forces: Force | Controller) -> None:
+        """Add forces on coordinates, such as `mbd.Potential` or a force class of one's own, and controllers."""
+        example = "apply takes forces such as mbd.Potential('spring', lambda q: 5.0 * q**2, 'theta'), and controllers"
+        known = all_are((Force, Controller), forces, example)
+        self._add([word for word in known if isinstance(word, Force)], self.forces)
+        controllers = [*self.controllers, *(word for word in known if isinstance(word, Controller))]
+        object.__setattr__(self, "controllers", controllers)
+
+    def _add(self, words: Sequence[Any], known: Any) -> None:
+        """Put words under their names."""
+        for word in words:
+            if word.name in known:
+                raise ModelError(f"{self.name!r} has a {word.name!r} already; give each its own name")
+            known[word.name] = word
+        object.__setattr__(self, "parameters", {**self.parameters, **self._of_words()})
+
+    # what it contains ---------------------------------------------------------------------------------------------
+    @property
+    def words(self) -> list[Constraint]:
+        """Its constraints and events that are not bare expressions."""
+        return [word for word in self._constraints.values() if isinstance(word, Constraint)]
+
+    @property
+    def rows(self) -> dict[str, Expression]:
+        """Those that are, by name."""
+        return {name: h for name, h in self._constraints.items() if not isinstance(h, Constraint)}
+
+    @property
+    def applied(self) -> list[Force]:
+        """The forces that `apply` added."""
+        return [force for force in self.forces.values() if isinstance(force, Force)]
+
+    @property
+    def generalized(self) -> dict[str, Expression]:
+        """The generalized forces by coordinate."""
+        return {name: force for name, force in self.forces.items() if not isinstance(force, Force)}
+
+    @property
+    def contacts(self) -> list[Unilateral | Penalty]:
+        """Constraints that open and close, in order."""
+        return [word for word in self.words if isinstance(word, Unilateral | Penalty)]
+
+    @property
+    def events(self) -> list[Event]:
+        """The user's own events."""
+        return [word for word in self.words if isinstance(word, Event)]
+
+    @property
+    def own_parameters(self) -> dict[str, float]:
+        """The parameters without those of its words."""
+        others = self._of_words()
+        return {name: value for name, value in self.parameters.items() if name not in others}
+
+    @property
+    def instants(self) -> list[float]:
+        """Times at which sampled signals have a kink, in order: steps end there [s]."""
+        words: list[Force | Constraint] = [*self.applied, *self.words]
+        return sorted({instant for word in words for instant in word.instants()})
+
+    @property
+    def _constraints(self) -> Mapping[str, Any]:
+        assert isinstance(self.constraints, Mapping)
+        return self.constraints
+
+    def _of_words(self) -> dict[str, float]:
+        """The parameters of its words by full name."""
+        return {name: value for word in (*self.applied, *self.words) for name, value in word.parameters().items()}
+
+    # what follows from it -----------------------------------------------------------------------------------------
     def check(self) -> list[str]:
         """Every fault of the description, one sentence each."""
         faults = _name_faults(self)
-        return faults or _Lowering(self).faults
+        if faults:
+            return faults
+        lowering = Lowering(self)
+        return lowering.faults or word_faults(self, lowering.scope)
 
     def parameter_check(self) -> ParameterCheck:
-        """The judgement of values that differ from those of the description; any finite one may be given."""
-        return ParameterCheck((), self.parameters)
+        """The judgement of values that differ from those of the description; its own may have any finite one."""
+        return ParameterCheck([*self.applied, *self.words], self.parameters)
 
     def equations_of_motion(self) -> Equations:
         """The same equations that a model of bodies gives; faults are raised together as a `ModelError`."""
-        faults = _name_faults(self)
+        faults = self.check()
         if faults:
             raise ModelError(faults)
-        lowering = _Lowering(self)
-        if lowering.faults:
-            raise ModelError(lowering.faults)
-        return _assembled(self, lowering)
+        return assembled(self, Lowering(self))
 
     def equations(self, *, latex: bool = False) -> str:
         """M, f, B and h as text, or as LaTeX."""
         from mbd.equations.printing import report
 
         return report(self.equations_of_motion(), latex=latex)
+
+    def describe(self, mobility: bool = False) -> str:
+        """The mechanism in a page of text; with `mobility` the degrees of freedom too, see `mbd.mobility`."""
+        said = described(self)
+        if mobility and not self.check():
+            from mbd.analysis.mobility import mobility as of
+
+            said += f"\n{of(self)}"
+        return said
 
     def cost(self) -> Any:
         """Operations of the equations, and of each effect."""
@@ -143,28 +247,33 @@ class Lagrangian:
         return cost(self)
 
     def without(self, *names: str) -> Lagrangian:
-        """A copy that lacks some of its 'potential', 'dissipation', forces ('theta force') and constraints."""
-        forces = {f"{name} force": name for name in self.forces}
-        known = {"potential", "dissipation", *forces, *self.constraints, *self.nonholonomic}
+        """A copy that lacks some of its 'potential', 'dissipation', forces ('theta force'), constraints, controllers.
+
+        'box friction' is the dry friction of a contact alone.
+        """
+        forces = {name if isinstance(force, Force) else f"{name} force": name for name, force in self.forces.items()}
+        rubbing = {
+            f"{word.name} friction": word for word in self.contacts if isinstance(word, Unilateral) and word.slides
+        }
+        known = {"potential", "dissipation", *forces, *self._constraints, *self.nonholonomic, *rubbing}
+        known |= {controller.name for controller in self.controllers}
         for name in names:
             if name not in known:
                 raise UnknownNameError("without: " + nearest(name, known, "effect or constraint"))
+        smooth = {word.name: replace(word, friction=0.0) for title, word in rubbing.items() if title in names}
+        constraints = {name: h for name, h in {**self._constraints, **smooth}.items() if name not in names}
         bare: dict[str, Any] = {name: 0.0 for name in ("potential", "dissipation") if name in names}
         bare["forces"] = {name: self.forces[name] for title, name in forces.items() if title not in names}
-        bare["constraints"] = {name: h for name, h in self._rows.items() if name not in names}
+        bare["constraints"] = constraints
         bare["nonholonomic"] = {name: rate for name, rate in self.nonholonomic.items() if name not in names}
-        return replace(self, **bare)
+        bare["controllers"] = [controller for controller in self.controllers if controller.name not in names]
+        bare["parameters"], bare["tunable"] = self.own_parameters, ()
+        made = replace(self, **bare)
+        return made.with_tunable(*(name for name in self.tunable if name in made.parameters))
 
     def with_tunable(self, *names: str) -> Lagrangian:
         """A copy in which some parameters stay inputs even at an exact 0 or ±1."""
         return replace(self, tunable=(*self.tunable, *names))
-
-    @property
-    def _rows(self) -> Mapping[str, Expression]:
-        """The constraints by name."""
-        rows = self.constraints
-        assert isinstance(rows, Mapping)
-        return rows
 
 
 # reading the description --------------------------------------------------------------------------------------------
@@ -178,9 +287,11 @@ def _name(given: Any) -> str:
 
 
 def _named(constraints: Mapping[str, Expression] | Sequence[Any]) -> dict[str, Expression]:
+    """Constraints by name; words have their own."""
     if isinstance(constraints, Mapping):
-        return dict(constraints)
-    pairs = [c if isinstance(c, tuple) else (f"constraint {k}", c) for k, c in enumerate(constraints, start=1)]
+        return {h.name if isinstance(h, Constraint) else name: h for name, h in constraints.items()}
+    numbered = list(enumerate(constraints, start=1))
+    pairs = [c if isinstance(c, tuple) else (getattr(c, "name", f"constraint {k}"), c) for k, c in numbered]
     return dict(pairs)
 
 
@@ -199,6 +310,8 @@ def _check_shapes(system: Lagrangian) -> None:
         faults += named_number_faults({_name(key): value for key, value in system.parameters.items()}, "parameters")
     if isinstance(system.constraints, str) or not isinstance(system.constraints, Iterable):
         faults.append(f"constraints must be a mapping {{name: h}} or a list of expressions, got {system.constraints!r}")
+    if not isinstance(system.controllers, Iterable) or not all(isinstance(c, Controller) for c in system.controllers):
+        faults.append(f"controllers must be a list of mbd.Controller, got {system.controllers!r}")
     if faults:
         raise ModelError([f"Lagrangian {system.name!r}: {fault}" for fault in faults])
 
@@ -207,176 +320,19 @@ def _name_faults(system: Lagrangian) -> list[str]:
     names = [coordinate.name for coordinate in system.coordinates]
     faults = [] if names else [f"{system.name!r} has no coordinates; give at least one mbd.Coordinate"]
     taken: set[str] = set()
-    for name in (*names, *system.parameters):
+    for name in (*names, *system.own_parameters):
         if name in taken:
             faults.append(f"the name {name!r} is given twice among the coordinates and parameters of {system.name!r}")
         taken.add(name)
     faults += [
         f"two constraints of {system.name!r} are named {name!r}; give each its own name"
-        for name in system._rows
+        for name in system.constraints
         if name in system.nonholonomic
     ]
-    faults += [nearest(name, names, "coordinate") for name in system.forces if name not in names]
+    faults += [nearest(name, names, "coordinate") for name in system.generalized if name not in names]
     faults += [
         nearest(name, system.parameters, "parameter", "There are")
         for name in system.tunable
         if name not in system.parameters
     ]
     return faults
-
-
-def _identifier(name: str) -> str:
-    """The name as a Python argument: 'hip.angle' → 'hip_angle'."""
-    return re.sub(r"\W", "_", name)
-
-
-class _Lowering:
-    """The expressions of a description on one tape; `faults` tells which could not be read."""
-
-    def __init__(self, system: Lagrangian) -> None:
-        self.tape = tape = Tape()
-        n = len(system.coordinates)
-        self.inputs = Inputs.sized(tape, n, n, 0, len(system.constraints) + len(system.nonholonomic))
-        self.table = ParameterTable(tape, system.tunable)
-        self.faults: list[str] = []
-        self.q = [q + x for q, x in zip(self.inputs.q, self.inputs.x, strict=True)]
-        self._known: dict[str, Scalar] = {"t": self.inputs.t}
-        for coordinate, q, v in zip(system.coordinates, self.q, self.inputs.v, strict=True):
-            self._known |= {coordinate.name: q, f"{coordinate.name}_rate": v}
-        self._known |= {name: self.table.node(name, value) for name, value in system.parameters.items()}
-        self.T = self._scalar(system.kinetic, "the kinetic energy")
-        self.V = self._scalar(system.potential, "the potential")
-        self.D = self._scalar(system.dissipation, "the dissipation")
-        self.Q = {name: self._scalar(force, f"the force on {name!r}") for name, force in system.forces.items()}
-        self.h = {name: self._scalar(value, f"the constraint {name!r}") for name, value in system._rows.items()}
-        self.rates = {name: self._scalar(value, f"the row {name!r}") for name, value in system.nonholonomic.items()}
-        self._check(system)
-
-    def _scalar(self, expression: Expression, what: str) -> Node:
-        """One expression on the tape; zero, and a fault, where it cannot be read."""
-        try:
-            return traced_scalar(expression, self._arguments(expression), what, self.tape, symbols=self._dynamic())
-        except TraceError as exc:
-            self.faults.append(str(exc))
-        except ModelError as exc:
-            self.faults += [f"{what}: {fault}" for fault in exc.faults]
-        return self.tape.zero
-
-    def _arguments(self, expression: Expression) -> list[tuple[str, Scalar]]:
-        """What an expression may use, by name; a function gets what its own arguments are named after."""
-        if not inspect.isfunction(expression) and not inspect.ismethod(expression):
-            return list(self._known.items())
-        offered = {_identifier(name): value for name, value in self._known.items()}
-        wanted = list(inspect.signature(expression).parameters)
-        unknown = [name for name in wanted if name not in offered]
-        if unknown:
-            raise ModelError([nearest(name, offered, "quantity", "Known are") for name in unknown])
-        return [(name, offered[name]) for name in wanted]
-
-    def _dynamic(self) -> dict[Any, Scalar]:
-        """Coordinates written as functions of time, θ(t) and its derivative."""
-        import sys
-
-        sympy = sys.modules.get("sympy")
-        if sympy is None:
-            return {}
-        t = sympy.Symbol("t")
-        found: dict[Any, Scalar] = {}
-        for name, value in self._known.items():
-            if f"{name}_rate" in self._known:
-                motion = sympy.Function(name)(t)
-                found |= {motion: value, motion.diff(t): self._known[f"{name}_rate"]}
-        return found
-
-    def _check(self, system: Lagrangian) -> None:
-        """An energy of the wrong variables is a fault."""
-        still = [("the potential", self.V), *((f"the constraint {name!r}", h) for name, h in self.h.items())]
-        for what, node in still:
-            for coordinate, slope in zip(system.coordinates, gradient(node, self.inputs.v), strict=True):
-                if not slope.is_zero:
-                    self.faults.append(f"{what} depends on the rate of '{coordinate.name}'; only q and t may enter it")
-        for name, h in self.h.items():
-            if h.is_constant:
-                self.faults.append(f"the constraint {name!r} is the constant {h.data}; it depends on no coordinate")
-        for name, rate in self.rates.items():
-            slopes = gradient(rate, self.inputs.v)
-            if any(other.op == "input" and other.data[0] == "v" for other in live(slopes)):
-                self.faults.append(f"the row {name!r} is not linear in rates; give a(q, t) · v + b(q, t)")
-            elif all(slope.is_zero for slope in slopes):
-                self.faults.append(f"no rate enters the row {name!r}; a row of q and t belongs to constraints")
-
-
-# the equations ------------------------------------------------------------------------------------------------------
-def _assembled(system: Lagrangian, lowering: _Lowering) -> Equations:
-    """Lagrange's equations by reverse gradients and one forward sweep in time."""
-    tape, inputs = lowering.tape, lowering.inputs
-    T, V, D = lowering.T, lowering.V, lowering.D
-    clock: dict[Node, Scalar] = {inputs.t: 1.0, **dict(zip(inputs.x, inputs.v, strict=True))}
-    motion = {**clock, **dict(zip(inputs.v, inputs.a, strict=True))}
-    momentum_rates = jvp(gradient(T, inputs.v), motion)
-    dT, dV, dD = gradient(T, inputs.x), gradient(V, inputs.x), gradient(D, inputs.v)
-    Q = [lowering.Q.get(c.name, tape.zero) for c in system.coordinates]
-    balance = [p - t + v + d - f for p, t, v, d, f in zip(momentum_rates, dT, dV, dD, Q, strict=True)]
-    rates = jvp(list(lowering.h.values()), clock)
-    rows = [Row(name, "", h, rate, unit="") for (name, h), rate in zip(lowering.h.items(), rates, strict=True)]
-    rows += [Row(name, "", tape.zero, rate, unit="", kind="velocity") for name, rate in lowering.rates.items()]
-    effects = _effects(system, lowering, dV, dD)
-    outputs = _outputs(system, lowering, rows, effects)
-    return Equations(
-        name=system.name, tape=tape,
-        coordinates=tuple(records.Coordinate(c.name, c.unit, c.default) for c in system.coordinates), states=(),
-        parameters=lowering.table.found, balance=tuple(balance), rows=tuple(rows), contacts=(), guards=(),
-        effects=effects, kinetic=T, potential=V, compose=None, output=outputs, output_names=outputs.names,
-        velocity_names=tuple(f"{c.name}.rate" for c in system.coordinates),
-    )  # fmt: skip
-
-
-def _effects(system: Lagrangian, lowering: _Lowering, dV: Sequence[Node], dD: Sequence[Node]) -> tuple[Effect, ...]:
-    """The causes of forces: potential, dissipation, and each generalized force."""
-    tape, v = lowering.tape, lowering.inputs.v
-    found = []
-    if any(not node.is_zero for node in dV):
-        found.append(Effect("potential", "potential", lambda: tuple(dV), potential=lowering.V))
-    if any(not node.is_zero for node in dD):
-        power = -_sum(tape, [d * rate for d, rate in zip(dD, v, strict=True)])
-        found.append(Effect("dissipation", "loss", lambda: tuple(dD), power=power))
-    for k, coordinate in enumerate(system.coordinates):
-        force = lowering.Q.get(coordinate.name, tape.zero)
-        if not force.is_zero:
-            found.append(Effect(f"{coordinate.name} force", "applied", _alone(tape, len(v), k, -force), force * v[k]))
-    return tuple(found)
-
-
-def _alone(tape: Tape, size: int, place: int, value: Node) -> Callable[[], Sequence[Node]]:
-    return lambda: tuple(value if k == place else tape.zero for k in range(size))
-
-
-def _sum(tape: Tape, terms: Sequence[Node]) -> Node:
-    total = tape.zero
-    for term in terms:
-        total = total + term
-    return total
-
-
-def _outputs(system: Lagrangian, lowering: _Lowering, rows: Sequence[Row], effects: Sequence[Effect]) -> Outputs:
-    """θ, its rate and acceleration, forces, multipliers, energies and powers."""
-    outputs, inputs = Outputs(lowering.tape), lowering.inputs
-    for k, coordinate in enumerate(system.coordinates):
-        outputs.value(coordinate.name, lowering.q[k])
-        outputs.value(f"{coordinate.name}.rate", inputs.v[k])
-        outputs.value(f"{coordinate.name}.acceleration", inputs.a[k])
-    for name, force in lowering.Q.items():
-        outputs.value(f"{name}.force", force)
-    for k, row in enumerate(rows):
-        outputs.value(f"{row.owner}.multiplier", inputs.lam[k])
-        outputs.value(f"{row.owner}.residual", row.rate if row.is_velocity else row.value)
-        if row.is_velocity:
-            outputs.value(f"{row.owner}.force", -inputs.lam[k])
-    for effect in effects:
-        if effect.power is not None:
-            outputs.value(f"{effect.name}.power", effect.power)
-        if effect.potential is not None:
-            outputs.value(f"{effect.name}.energy", effect.potential)
-    outputs.value("kinetic_energy", lowering.T)
-    outputs.value("potential_energy", lowering.V)
-    return outputs

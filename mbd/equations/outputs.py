@@ -26,6 +26,11 @@ class Outputs:
         self._tape = tape
         self._makers: dict[str, Callable[[], Scalar]] = {} if base is None else dict(base._makers)
         self._made: dict[str, Node] = {}
+        self._spelled: dict[str, str] = {}
+
+    def alias(self, spelled: str, name: str) -> None:
+        """Another spelling of a name, which is not listed."""
+        self._spelled[spelled] = name
 
     def add(self, name: str, make: Callable[[], Scalar]) -> None:
         """Offer a scalar; the first offer of a name stays."""
@@ -49,6 +54,7 @@ class Outputs:
 
     def __call__(self, name: str) -> Node:
         """The node of a result; an unknown name is answered with the nearest known ones."""
+        name = self._spelled.get(name, name)
         node = self._made.get(name)
         if node is None:
             make = self._makers.get(name)

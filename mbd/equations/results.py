@@ -22,7 +22,7 @@ from mbd.tape.node import Scalar, Tape
 if TYPE_CHECKING:
     from mbd.model import Model
 
-__all__ = ["offer_results"]
+__all__ = ["offer_contacts", "offer_effects", "offer_results", "offer_rows"]
 
 
 def offer_results(
@@ -39,9 +39,9 @@ def offer_results(
     work : all forces, with all rows and penalties; hidden : names of joints that no user made
     """
     tape, rows, contacts = scope.tape, equations.rows, equations.contacts
-    _offer_rows(outputs, tape, rows, model.bilaterals)
-    _offer_contacts(outputs, tape, rows, contacts)
-    _offer_effects(outputs, tape, equations.effects)
+    offer_rows(outputs, tape, rows, model.bilaterals)
+    offer_contacts(outputs, tape, rows, contacts)
+    offer_effects(outputs, tape, equations.effects)
     _offer_motors(outputs, scope, model.forces)
     for name, energy in ("kinetic_energy", equations.kinetic), ("potential_energy", equations.potential):
         outputs.value(name, energy)
@@ -74,7 +74,7 @@ def _acceleration(scope: Surroundings, joint: str, place: int) -> Scalar:
     return scope.change(scope.joint(joint).rates[place])
 
 
-def _offer_rows(outputs: Outputs, tape: Tape, rows: Sequence[Row], bilaterals: Iterable[Bilateral]) -> None:
+def offer_rows(outputs: Outputs, tape: Tape, rows: Sequence[Row], bilaterals: Iterable[Bilateral]) -> None:
     """Multiplier and residual of each bilateral row; tension of rods, force or torque that drives a joint.
 
     A row on velocities has its rate as residual, and the force −λ along the row.
@@ -100,7 +100,7 @@ def _offer_rows(outputs: Outputs, tape: Tape, rows: Sequence[Row], bilaterals: I
             outputs.value(f"{name}.force", multiplier)
 
 
-def _offer_contacts(outputs: Outputs, tape: Tape, rows: Sequence[Row], contacts: Iterable[Contact]) -> None:
+def offer_contacts(outputs: Outputs, tape: Tape, rows: Sequence[Row], contacts: Iterable[Contact]) -> None:
     """Force (≥ 0 pushes), friction (of the ground on the body), gap and its rate."""
     for number, contact in enumerate(contacts):
         outputs.value(f"{contact.name}.gap", contact.gap)
@@ -116,7 +116,7 @@ def _offer_contacts(outputs: Outputs, tape: Tape, rows: Sequence[Row], contacts:
                 outputs.value(f"{contact.name}.friction.{rows[k].part}", push)
 
 
-def _offer_effects(outputs: Outputs, tape: Tape, effects: Iterable[Effect]) -> None:
+def offer_effects(outputs: Outputs, tape: Tape, effects: Iterable[Effect]) -> None:
     """Power of what does work, energy of what stores it."""
     for effect in effects:
         switch = tape.one if effect.contact < 0 else tape.input("switch", effect.contact)

@@ -26,7 +26,7 @@ def dt_of_blows(run: Run, record: Record, number: int, rows: Iterable[int]) -> f
     where these cannot be told.
     """
     name = run.manager.contacts[number].name
-    laws = [word for word in getattr(run.model, "constraints", ()) if isinstance(word, Penalty) and word.name == name]
+    laws = [word for word in run.model.contacts if isinstance(word, Penalty) and word.name == name]
     if not laws:
         return np.inf
     law, inputs = laws[0], run.mechanism.equations.parameters

@@ -11,6 +11,7 @@ from mbd.arrays import Vector
 from mbd.bodies.values import is_finite_number
 from mbd.compile.mechanism import rate_names
 from mbd.compile.python import scalar_function
+from mbd.constraints.expressions import evaluated, is_expression
 from mbd.equations.equations import Guard
 from mbd.errors import ModelError, SimulationError, UnknownNameError, nearest
 from mbd.kernel import fields as F
@@ -34,6 +35,10 @@ class Named(Mapping[str, float]):
         run = self._run
         mechanism, v = run.mechanism, run.values
         known = mechanism.named.get(name)
+        if known is None and name not in mechanism.equations.output_names():
+            given = {**run.model.parameters, **run.changed}.get(name)
+            if given is not None:
+                return float(given)
         if known is None:
             with mechanism.equations.tape.lock:
                 output = mechanism.equations.output(name)
@@ -65,6 +70,7 @@ def apply_reset(run: Run, guard: Guard) -> None:
     rates = {name: k for name, k in rate_names(equations).items() if name not in positions}
     states = {state.name: equations.n_v + k for k, state in enumerate(equations.states)}
     places = rates | states
+    wanted = {_spelled(name, places): number for name, number in wanted.items()}
     unknown = [name for name in wanted if name not in positions and name not in places]
     if unknown:
         raise UnknownNameError(f"{what}: " + nearest(unknown[0], [*positions, *places], "quantity"))
@@ -78,12 +84,25 @@ def apply_reset(run: Run, guard: Guard) -> None:
         raise SimulationError(f"{what} breaks constraints: {'; '.join(off)}; reset all that they bind, velocities too")
 
 
+def _spelled(name: str, rates: Mapping[str, int]) -> str:
+    """'theta.rate' where a reset says 'theta_rate', as its symbol in energies is called."""
+    rate = f"{name.removesuffix('_rate')}.rate"
+    return rate if name.endswith("_rate") and name not in rates and rate in rates else name
+
+
 def _reset_values(reset: Any, named: Named) -> dict[str, Any]:
     """What a reset sets, by name."""
     wanted = reset(named) if callable(reset) else reset
     if not isinstance(wanted, Mapping):
         raise ModelError(f"a reset maps names to values, such as {{'hip.rate': 0.0}}, not {wanted!r}")
-    return {name: value(named) if callable(value) else value for name, value in wanted.items()}
+    return {name: _reset_value(value, named) for name, value in wanted.items()}
+
+
+def _reset_value(value: Any, named: Named) -> Any:
+    """A value that a reset sets: a number, an expression or a function of named values before it."""
+    if is_expression(value):
+        return evaluated(value, named)
+    return value(named) if callable(value) else value
 
 
 def _finite_numbers(what: str, values: Mapping[str, Any]) -> dict[str, float]:

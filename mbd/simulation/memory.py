@@ -83,8 +83,8 @@ def take_up(run: Run, start: State) -> bool:
     if memory is None:
         return False
     run.damage = damage(memory)
-    if run.damage or memory.belongs != belongs(run):
-        return False
+    if run.damage or memory.belongs != belongs(run) or len(memory.parameters) != len(run.values["params"]):
+        return False  # other values of parameters may make other run-time inputs, which is no damage
     run.damage = out_of_range(run, memory)
     if run.damage:
         return False

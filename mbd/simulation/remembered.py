@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbd.kernel import fields as F
-from mbd.state import Memory
+from mbd.state import Memory, Mode, are_names
 
 if TYPE_CHECKING:
     from mbd.simulation.run import Run
@@ -65,6 +65,8 @@ def damage(memory: Memory) -> str:
     words = words and isinstance(memory.digest, str) and isinstance(memory.seal, str) and _are_pairs(memory.pending)
     if not words or not isinstance(memory.time, float):
         return "its words are none"
+    if not isinstance(memory.mode, Mode) or not are_names(memory.mode.closed):
+        return "its closed contacts are no names"
     if not _are_samples(memory.controllers):
         return "what it holds of controllers is nothing that a run has written"
     return "" if memory.seal == _seal(memory) else "it was changed after the run had written it"

@@ -78,7 +78,7 @@ class Run:
         self.model = model
         self.mechanism, self.manager, self.start, self.end, self.stop = mechanism, manager, start, end, stop
         self.settings, self.changed, self.dt = settings, dict(changed), dt
-        forces = [force for force in getattr(model, "forces", ()) if isinstance(force, Force)]
+        forces: list[Force] = getattr(model, "applied", getattr(model, "forces", []))
         self.places = {force.name: _places(force) for force in forces}
         rows = int(min(ROWS_AT_ONCE, (end - start.time) / dt / options.get("store", 1) + 64))
         parameters = self._parameters()

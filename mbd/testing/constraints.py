@@ -103,8 +103,8 @@ def _scene(given: Any) -> tuple[Any, Any, list[Constraint]]:
             "check_constraint takes a constraint, a function of (a, b, hinge) that makes one, or a function without "
             f"arguments that returns a model or (model, start); got {model!r}"
         )
-    own = [word for word in getattr(model, "constraints", ()) if isinstance(word, Constraint)]
-    return model, start, own  # those of a Lagrangian are functions, tried in its equations and runs
+    own = model.words if isinstance(model, mbd.Lagrangian) else model.constraints
+    return model, start, list(own)  # expressions of a Lagrangian are tried in its equations and runs
 
 
 def _around(constraints: list[Constraint], joints: list[Joint]) -> mbd.Model:

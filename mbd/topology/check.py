@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Protocol
 
 from mbd.bodies.base import Body, Frame
 from mbd.bodies.domains import ParameterCheck, Parameterized
@@ -19,9 +19,10 @@ from mbd.topology.plan import cut_names, is_planar
 
 if TYPE_CHECKING:
     from mbd.constraints.base import Constraint
+    from mbd.constraints.controller import Controller
     from mbd.model import Model
 
-__all__ = ["faults", "parameter_check", "quantities"]
+__all__ = ["faults", "parameter_check", "quantities", "rule_faults"]
 
 
 def faults(model: Model) -> list[str]:
@@ -172,13 +173,29 @@ def mention_faults(model: Model) -> list[str]:
     return found
 
 
-def rule_faults(model: Model) -> list[str]:
+class Ruled(Protocol):
+    """What has constraints that follow rules, and controllers."""
+
+    @property
+    def contacts(self) -> Sequence[Constraint]: ...
+
+    @property
+    def events(self) -> Sequence[Constraint]: ...
+
+    @property
+    def parameters(self) -> Mapping[Any, float]: ...
+
+    @property
+    def controllers(self) -> Sequence[Controller]: ...
+
+
+def rule_faults(model: Ruled) -> list[str]:
     """Names in When, only_while and the controllers' on= and writes= that do not exist."""
     contacts = [word.name for word in model.contacts]
     instants = contacts + [event.name for event in model.events]
     parameters = model.parameters
     found = []
-    for word in model.constraints:
+    for word in (*model.contacts, *model.events):
         unknown = [other for other in word.others if other not in contacts]
         found += [f"'{word.name}': " + nearest(other, contacts, "contact") for other in unknown]
     for controller in model.controllers:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from mbd.joints.base import Joint
     from mbd.model import Model
 
-__all__ = ["description"]
+__all__ = ["described_constraint", "description", "section"]
 
 UNITS = {"mass": "kg", "length": "m", "center": "m", "inertia": "kg m²"}
 
@@ -28,19 +28,20 @@ def description(model: Model) -> str:
     """Bodies, joints, forces, constraints, coordinates and faults."""
     g = ", ".join(f"{value:.6g}" for value in model.gravity)
     lines = [f"{model.name}: gravity ({g}) m/s²"]
-    lines += _section("bodies", [_body(body) for body in model.bodies.values() if body is not model.ground])
-    lines += _section("joints", [_joint(joint) for joint in model.joints])
-    lines += _section("forces", [f"{force.name}: {type(force).__name__}, {force.kind}" for force in model.forces])
-    lines += _section("constraints", [_constraint(word) for word in model.constraints])
-    lines += _section("controllers", [controller.name for controller in model.controllers])
+    lines += section("bodies", [_body(body) for body in model.bodies.values() if body is not model.ground])
+    lines += section("joints", [_joint(joint) for joint in model.joints])
+    lines += section("forces", [f"{force.name}: {type(force).__name__}, {force.kind}" for force in model.forces])
+    lines += section("constraints", [described_constraint(word) for word in model.constraints])
+    lines += section("controllers", [controller.name for controller in model.controllers])
     found = model.check()
     if not found:
-        lines += _section("coordinates", _choice(model))
-    lines += _section("faults", found)
+        lines += section("coordinates", _choice(model))
+    lines += section("faults", found)
     return "\n".join(lines)
 
 
-def _section(title: str, entries: Iterable[str]) -> list[str]:
+def section(title: str, entries: Iterable[str]) -> list[str]:
+    """A title and its entries, nothing if there are none."""
     listed = list(entries)
     return [f"{title}:", *(f"  {entry}" for entry in listed)] if listed else []
 
@@ -60,7 +61,8 @@ def _joint(joint: Joint) -> str:
     return said + (f", stiffness {joint.stiffness:.6g}, rest {joint.rest:.6g}" if joint.stiffness else "")
 
 
-def _constraint(word: Constraint) -> str:
+def described_constraint(word: Constraint) -> str:
+    """A constraint in a line."""
     said = f"{word.name}: {type(word).__name__}"
     if isinstance(word, Unilateral):
         said += f", {_measure(word.measure)}" + (", sticks" if word.sticks else "")

@@ -1,0 +1,143 @@
+"""The derivation as words see it where there are generalized coordinates and no bodies."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Mapping, Sequence
+from typing import NoReturn
+
+from mbd.bodies.base import Frame
+from mbd.equations.dynamics import Work
+from mbd.equations.equations import Coordinate
+from mbd.equations.inputs import Inputs
+from mbd.equations.parameters import ParameterTable
+from mbd.equations.views import View
+from mbd.errors import ModelError, UnknownNameError, nearest
+from mbd.joints.base import Joint
+from mbd.tape.derivatives import jvp, vjp
+from mbd.tape.node import Node, Scalar, Table, Tape
+
+__all__ = ["CoordinateScope", "identifier"]
+
+
+def identifier(name: str) -> str:
+    """The name as a Python argument: 'hip.angle' → 'hip_angle'."""
+    return re.sub(r"\W", "_", name)
+
+
+class _NoViews:
+    """Expressions contain the motion itself: nothing stands for places and velocities."""
+
+    def real(self, outputs: Sequence[Node]) -> list[Node]:
+        return list(outputs)
+
+    def inside(self, outputs: Sequence[Node]) -> list[View]:
+        return []
+
+    def rates(self, outputs: Sequence[Node]) -> dict[Node, Scalar]:
+        return {}
+
+
+class CoordinateScope:
+    """`mbd.equations.derivation_scope.DerivationScope` over coordinates that form a vector; forces act on these.
+
+    Parameters
+    ----------
+    coordinates : their names
+    values : parameters by name
+    tunable : names of parameters that stay inputs even at an exact 0 or ±1
+
+    Attributes
+    ----------
+    q : q ⊕ x of each coordinate
+    known : what words and expressions may ask for by name: 't', coordinates, rates ('theta_rate', 'theta.rate'),
+        parameters, and these with '_' in place of other characters
+    """
+
+    def __init__(self, coordinates: Sequence[str], values: Mapping[str, float], tunable: Collection[str]) -> None:
+        self.tape = Tape()
+        self.inputs = Inputs.sized(self.tape, len(coordinates), len(coordinates))
+        self.parameters = ParameterTable(self.tape, tunable)
+        self.views = _NoViews()
+        self.cuts: tuple[Joint, ...] = ()
+        self.states: list[tuple[Coordinate, Node]] = []
+        self._tables: dict[str, Table] = {}
+        self.q = [q + x for q, x in zip(self.inputs.q, self.inputs.x, strict=True)]
+        self.known: dict[str, Scalar] = {"t": self.inputs.t}
+        for name, q, v in zip(coordinates, self.q, self.inputs.v, strict=True):
+            self.known |= {name: q, f"{name}_rate": v}
+        self.known |= {name: self.parameters.node(name, value) for name, value in values.items()}
+        self._spelled = {identifier(name): name for name in self.known}
+        self._spelled |= {f"{name}.rate": f"{name}_rate" for name in coordinates}
+
+    # what words ask -------------------------------------------------------------------------------------------------
+    @property
+    def time(self) -> Node:
+        """t [s]."""
+        return self.inputs.t
+
+    def parameter(self, owner: str, field: str, value: float) -> Node:
+        """The run-time input named ``owner.field``."""
+        return self.parameters.node(f"{owner}.{field}", value)
+
+    def table(self, owner: str, breaks: Sequence[float], coefficients: Sequence[Sequence[float]]) -> Table:
+        """A piecewise cubic, one for each owner."""
+        if owner not in self._tables:
+            self._tables[owner] = self.tape.table(owner, breaks, coefficients)
+        return self._tables[owner]
+
+    def frame(self, frame: Frame) -> NoReturn:
+        """There are none."""
+        raise ModelError(f"a Lagrangian has no bodies, and no frame '{frame.full_name}'; use its coordinates")
+
+    def joint(self, name: str) -> NoReturn:
+        """There are none."""
+        raise ModelError(f"a Lagrangian has no joints, and no '{name}'; use its coordinates")
+
+    def named(self, name: str) -> Node:
+        """A coordinate, a rate or a parameter."""
+        found = self._spelled.get(name, name)
+        if found not in self.known:
+            raise UnknownNameError(nearest(name, self.known, "quantity", "Known are"))
+        return self.tape.lift(self.known[found])
+
+    def knows(self, name: str) -> bool:
+        """Whether `named` does."""
+        return self._spelled.get(name, name) in self.known
+
+    def state(self, owner: str, field: str, initial: float) -> Node:
+        """A first-order state; registered on first use."""
+        name = f"{owner}.{field}"
+        if name not in self.known:
+            self.known[name] = self.tape.input("z", len(self.states))
+            self.states.append((Coordinate(name, "", initial), self.tape.lift(self.known[name])))
+        return self.tape.lift(self.known[name])
+
+    # derivatives ----------------------------------------------------------------------------------------------------
+    def cut_rows(self, joint: Joint) -> NoReturn:
+        """There are none."""
+        self.joint(joint.name)
+
+    def real(self, value: Scalar) -> Node:
+        """The expression itself."""
+        return self.tape.lift(value)
+
+    def rates(self, values: Sequence[Node]) -> list[Node]:
+        """d/dt of functions of t and q ⊕ x."""
+        return jvp(values, {self.time: 1.0, **dict(zip(self.inputs.x, self.inputs.v, strict=True))})
+
+    def change(self, value: Scalar) -> Node:
+        """d/dt of a function of t, q ⊕ x, v and z."""
+        seeds: dict[Node, Scalar] = {self.time: 1.0, **dict(zip(self.inputs.x, self.inputs.v, strict=True))}
+        seeds |= dict(zip(self.inputs.v, self.inputs.a, strict=True))
+        seeds |= {node: self.tape.input("s", k) for k, (_, node) in enumerate(self.states)}
+        return jvp([self.tape.lift(value)], seeds)[0]
+
+    def generalized(self, work: Work) -> list[Node]:
+        """Σ multiplier ∂value/∂x + Σ force ∂velocity/∂v (length n_v)."""
+        total = [self.tape.zero] * len(self.inputs.x)
+        if work.values:
+            total = [a + b for a, b in zip(total, vjp(work.values, work.multipliers, self.inputs.x), strict=True)]
+        if work.velocities:
+            total = [a + b for a, b in zip(total, vjp(work.velocities, work.forces, self.inputs.v), strict=True)]
+        return total

@@ -1,0 +1,201 @@
+"""Lagrange's equations of a mechanism that is given by its energies."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+from mbd.constraints.base import VelocityConstraint
+from mbd.constraints.bilateral import Bilateral
+from mbd.equations import equations as records
+from mbd.equations.contacts import laws
+from mbd.equations.coordinate_scope import CoordinateScope, identifier
+from mbd.equations.derivation import state_balance
+from mbd.equations.dynamics import Work
+from mbd.equations.effects import causes, effect_of
+from mbd.equations.equations import Effect, Equations, Row
+from mbd.equations.laws import Laws
+from mbd.equations.outputs import Outputs
+from mbd.equations.results import offer_contacts, offer_effects, offer_rows
+from mbd.errors import ModelError, TraceError, nearest
+from mbd.tape.derivatives import gradient, jvp, live
+from mbd.tape.node import Node, Scalar, Tape
+from mbd.tape.tracing import traced_scalar
+
+if TYPE_CHECKING:
+    from mbd.equations.lagrangian import Lagrangian
+
+__all__ = ["Lowering", "assembled"]
+
+
+class Lowering:
+    """The expressions of a description on one tape; `faults` tells which could not be read."""
+
+    def __init__(self, system: Lagrangian) -> None:
+        names = [coordinate.name for coordinate in system.coordinates]
+        self.scope = CoordinateScope(names, system.own_parameters, system.tunable)
+        self.tape, self.inputs, self.q, self._known = self.scope.tape, self.scope.inputs, self.scope.q, self.scope.known
+        self.faults: list[str] = []
+        self.T = self._scalar(system.kinetic, "the kinetic energy")
+        self.V = self._scalar(system.potential, "the potential")
+        self.D = self._scalar(system.dissipation, "the dissipation")
+        self.Q = {name: self._scalar(force, f"the force on {name!r}") for name, force in system.generalized.items()}
+        self.h = {name: self._scalar(value, f"the constraint {name!r}") for name, value in system.rows.items()}
+        self.rates = {name: self._scalar(value, f"the row {name!r}") for name, value in system.nonholonomic.items()}
+        self._check(system)
+
+    def _scalar(self, expression: Any, what: str) -> Node:
+        """One expression on the tape; zero, and a fault, where it cannot be read."""
+        try:
+            return traced_scalar(expression, self._arguments(expression), what, self.tape, symbols=self._dynamic())
+        except TraceError as exc:
+            self.faults.append(str(exc))
+        except ModelError as exc:
+            self.faults += [f"{what}: {fault}" for fault in exc.faults]
+        return self.tape.zero
+
+    def _arguments(self, expression: Any) -> list[tuple[str, Scalar]]:
+        """What an expression may use, by name; a function gets what its own arguments are named after."""
+        if not inspect.isfunction(expression) and not inspect.ismethod(expression):
+            return list(self._known.items())
+        offered = {identifier(name): value for name, value in self._known.items()}
+        wanted = list(inspect.signature(expression).parameters)
+        unknown = [name for name in wanted if name not in offered]
+        if unknown:
+            raise ModelError([nearest(name, offered, "quantity", "Known are") for name in unknown])
+        return [(name, offered[name]) for name in wanted]
+
+    def _dynamic(self) -> dict[Any, Scalar]:
+        """Coordinates written as functions of time, θ(t) and its derivative."""
+        import sys
+
+        sympy = sys.modules.get("sympy")
+        if sympy is None:
+            return {}
+        t = sympy.Symbol("t")
+        found: dict[Any, Scalar] = {}
+        for name, value in self._known.items():
+            if f"{name}_rate" in self._known:
+                motion = sympy.Function(name)(t)
+                found |= {motion: value, motion.diff(t): self._known[f"{name}_rate"]}
+        return found
+
+    def _check(self, system: Lagrangian) -> None:
+        """An energy of the wrong variables is a fault."""
+        still = [("the potential", self.V), *((f"the constraint {name!r}", h) for name, h in self.h.items())]
+        for what, node in still:
+            for coordinate, slope in zip(system.coordinates, gradient(node, self.inputs.v), strict=True):
+                if not slope.is_zero:
+                    self.faults.append(f"{what} depends on the rate of '{coordinate.name}'; only q and t may enter it")
+        for name, h in self.h.items():
+            if h.is_constant:
+                self.faults.append(f"the constraint {name!r} is the constant {h.data}; it depends on no coordinate")
+        for name, rate in self.rates.items():
+            slopes = gradient(rate, self.inputs.v)
+            if any(other.op == "input" and other.data[0] == "v" for other in live(slopes)):
+                self.faults.append(f"the row {name!r} is not linear in rates; give a(q, t) · v + b(q, t)")
+            elif all(slope.is_zero for slope in slopes):
+                self.faults.append(f"no rate enters the row {name!r}; a row of q and t belongs to constraints")
+
+
+# the equations ------------------------------------------------------------------------------------------------------
+def assembled(system: Lagrangian, lowering: Lowering) -> Equations:
+    """Lagrange's equations by reverse gradients and one forward sweep in time, with the words that were added."""
+    tape, inputs, scope = lowering.tape, lowering.inputs, lowering.scope
+    T, V, D = lowering.T, lowering.V, lowering.D
+    clock: dict[Node, Scalar] = {inputs.t: 1.0, **dict(zip(inputs.x, inputs.v, strict=True))}
+    motion = {**clock, **dict(zip(inputs.v, inputs.a, strict=True))}
+    momentum_rates = jvp(gradient(T, inputs.v), motion)
+    dT, dV, dD = gradient(T, inputs.x), gradient(V, inputs.x), gradient(D, inputs.v)
+    Q = [lowering.Q.get(c.name, tape.zero) for c in system.coordinates]
+    balance = [p - t + v + d - f for p, t, v, d, f in zip(momentum_rates, dT, dV, dD, Q, strict=True)]
+    own = _effects(system, lowering, dV, dD)
+    found = causes(scope, (), system.applied)
+    acting = scope.generalized(sum((cause.work for cause in found), Work()))
+    balance = [r + f for r, f in zip(balance, acting, strict=True)] + state_balance(scope, found)
+    known = _laws(system, lowering)
+    effects = (*own, *(effect_of(cause, scope, scope) for cause in found), *known.effects)
+    potential = V
+    for effect in effects[len(own) :]:
+        potential = potential if effect.potential is None else potential + effect.potential
+    outputs = _outputs(system, lowering, known, effects, potential)
+    return Equations(
+        name=system.name, tape=tape,
+        coordinates=tuple(records.Coordinate(c.name, c.unit, c.default) for c in system.coordinates),
+        states=tuple(coordinate for coordinate, _ in scope.states), parameters=scope.parameters.found,
+        balance=tuple(balance), rows=tuple(known.rows), contacts=tuple(known.contacts), guards=tuple(known.guards),
+        effects=effects, kinetic=T, potential=potential, compose=None, output=outputs, output_names=outputs.names,
+        velocity_names=tuple(f"{c.name}.rate" for c in system.coordinates), frictions=tuple(known.frictions),
+    )  # fmt: skip
+
+
+def _laws(system: Lagrangian, lowering: Lowering) -> Laws:
+    """Constraints given as expressions, then those given as words.
+
+    Raises
+    ------
+    ModelError
+        for words that constrain nothing, or what they cannot.
+    """
+    scope, tape = lowering.scope, lowering.tape
+    rates = scope.rates(list(lowering.h.values()))
+    known = Laws(viewed=[*lowering.h.values(), *lowering.rates.values()])
+    known.rows += [Row(name, "", h, rate, unit="") for (name, h), rate in zip(lowering.h.items(), rates, strict=True)]
+    known.rows += [Row(name, "", tape.zero, rate, unit="", kind="velocity") for name, rate in lowering.rates.items()]
+    always = [word for word in system.words if isinstance(word, Bilateral | VelocityConstraint)]
+    laws(scope, scope, (), always, system.contacts, system.events, before=known)
+    if known.faults:
+        raise ModelError(known.faults)
+    return known
+
+
+def _effects(system: Lagrangian, lowering: Lowering, dV: Sequence[Node], dD: Sequence[Node]) -> tuple[Effect, ...]:
+    """The causes of forces: potential, dissipation, and each generalized force."""
+    tape, v = lowering.tape, lowering.inputs.v
+    found = []
+    if any(not node.is_zero for node in dV):
+        found.append(Effect("potential", "potential", lambda: tuple(dV), potential=lowering.V))
+    if any(not node.is_zero for node in dD):
+        power = -_sum(tape, [d * rate for d, rate in zip(dD, v, strict=True)])
+        found.append(Effect("dissipation", "loss", lambda: tuple(dD), power=power))
+    for k, coordinate in enumerate(system.coordinates):
+        force = lowering.Q.get(coordinate.name, tape.zero)
+        if not force.is_zero:
+            found.append(Effect(f"{coordinate.name} force", "applied", _alone(tape, len(v), k, -force), force * v[k]))
+    return tuple(found)
+
+
+def _alone(tape: Tape, size: int, place: int, value: Node) -> Callable[[], Sequence[Node]]:
+    return lambda: tuple(value if k == place else tape.zero for k in range(size))
+
+
+def _sum(tape: Tape, terms: Sequence[Node]) -> Node:
+    total = tape.zero
+    for term in terms:
+        total = total + term
+    return total
+
+
+def _outputs(
+    system: Lagrangian, lowering: Lowering, known: Laws, effects: Sequence[Effect], potential: Node
+) -> Outputs:
+    """θ, its rate and acceleration, forces, multipliers, contacts, energies and powers."""
+    tape, inputs, scope = lowering.tape, lowering.inputs, lowering.scope
+    outputs = Outputs(tape)
+    outputs.value("t", inputs.t)
+    for k, coordinate in enumerate(system.coordinates):
+        outputs.value(coordinate.name, lowering.q[k])
+        outputs.value(f"{coordinate.name}.rate", inputs.v[k])
+        outputs.value(f"{coordinate.name}.acceleration", inputs.a[k])
+        outputs.alias(f"{coordinate.name}_rate", f"{coordinate.name}.rate")
+    for state, node in scope.states:
+        outputs.value(state.name, node)
+    for name, force in lowering.Q.items():
+        outputs.value(f"{name}.force", force)
+    offer_rows(outputs, tape, known.rows, [word for word in system.words if isinstance(word, Bilateral)])
+    offer_contacts(outputs, tape, known.rows, known.contacts)
+    offer_effects(outputs, tape, effects)
+    outputs.value("kinetic_energy", lowering.T)
+    outputs.value("potential_energy", potential)
+    return outputs
