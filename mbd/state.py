@@ -134,23 +134,23 @@ def malformed(state: State) -> list[str]:
     Assembled states and those at the end of a run are well formed; one made or changed by hand may not be.
     """
     faults = [
-        f"the {name} of the start must be an array of numbers (n,), not {value!r:.80}"
+        f"the {name} of the start must be an array of numbers (n,), not {_shown(value)}"
         for name, value in ((name, getattr(state, name)) for name in ("q", "v", "z", "anchors"))
         if not _is_vector(value)
     ]
     closed = state.mode.closed if isinstance(state.mode, Mode) else None
     if not are_names(closed):
-        faults.append(f"the mode of the start must be a Mode(frozenset of names of contacts), not {state.mode!r:.80}")
+        faults.append(f"the mode of the start must be a Mode(frozenset of names of contacts), not {_shown(state.mode)}")
     if state.armed is not None and not are_names(state.armed):
-        faults.append(f"armed of the start must be None or a frozenset of names of contacts, not {state.armed!r:.80}")
+        faults.append(f"armed of the start must be None or a frozenset of names of contacts, not {_shown(state.armed)}")
     for name in ("names", "velocity_names"):
         value = getattr(state, name)
         if not isinstance(value, tuple) or not all(isinstance(one, str) for one in value):
-            faults.append(f"{name} of the start must be a tuple of names, not {value!r:.80}")
+            faults.append(f"{name} of the start must be a tuple of names, not {_shown(value)}")
     if not isinstance(state.parameters, Mapping):
-        faults.append(f"parameters of the start must map names to numbers, not {state.parameters!r:.80}")
+        faults.append(f"parameters of the start must map names to numbers, not {_shown(state.parameters)}")
     if state.memory is not None and not isinstance(state.memory, Memory):
-        faults.append(f"memory of the start must be that of a run, or None, not {state.memory!r:.80}")
+        faults.append(f"memory of the start must be that of a run, or None, not {_shown(state.memory)}")
     return faults
 
 
@@ -168,3 +168,11 @@ def _is_vector(value: Any) -> bool:
 def are_names(value: Any) -> bool:
     """Whether a value is a set of names."""
     return isinstance(value, set | frozenset) and all(isinstance(one, str) for one in value)
+
+
+def _shown(value: Any) -> str:
+    """The beginning of a value for a message."""
+    try:
+        return f"{value!r:.80}"
+    except ValueError:  # an integer of thousands of digits inside
+        return f"this {type(value).__name__}"

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mbd.arrays import Matrix, Vector
+from mbd.bodies.values import shown
 from mbd.errors import TrajectoryError
 from mbd.results.columns import Columns, ModelColumns, gather
 from mbd.results.facts import Facts
@@ -267,8 +268,8 @@ class Moments(Mapping[str, Any]):
     def __init__(self, columns: Columns, times: ArrayLike, side: Side) -> None:
         try:
             self.time = np.asarray(times, dtype=np.float64)
-        except (TypeError, ValueError):
-            raise TrajectoryError(f"times must be one number or several [s], not {times!r}") from None
+        except (TypeError, ValueError, OverflowError):
+            raise TrajectoryError(f"times must be one number or several [s], not {shown(times)}") from None
         self.side = side
         self._columns = columns
         self._places = columns.grid.places(self.time, side)

@@ -12,7 +12,7 @@ from mbd.errors import ModelError
 
 __all__ = [
     "Vector3", "flag", "is_finite_number", "is_number", "name_of", "named_number_faults", "names_of", "number",
-    "numbers", "triple", "unit_vector",
+    "numbers", "shown", "triple", "unit_vector",
 ]  # fmt: skip
 
 Vector3: TypeAlias = tuple[float, float, float]
@@ -50,7 +50,18 @@ def flag(value: Any, what: str) -> bool:
 
 
 def is_number(value: Any) -> bool:
-    """Whether a value is one real number, finite or not."""
+    """Whether a value is one real number that a float can hold, finite or not."""
+    if not _is_numeric(value):
+        return False
+    try:
+        float(value)
+    except (TypeError, ValueError, OverflowError):  # an integer beyond 1.8e308 among them
+        return False
+    return True
+
+
+def _is_numeric(value: Any) -> bool:
+    """Whether a value may be turned into a float."""
     if isinstance(value, bool | np.bool_ | str | type):
         return False
     return hasattr(value, "__float__") and not getattr(value, "ndim", 0) and not getattr(value, "free_symbols", ())
@@ -62,24 +73,27 @@ def number(value: Any, what: str) -> float:
     >>> number(2, "mass of 'rod'")
     2.0
     """
-    if not is_number(value):
-        raise ModelError(f"{what} must be a number, got {_shown(value)}")
+    if not _is_numeric(value):
+        raise ModelError(f"{what} must be a number, got {shown(value)}")
     try:
         result = float(value)
     except (TypeError, ValueError):
-        raise ModelError(f"{what} must be a number, got {_shown(value)}") from None
+        raise ModelError(f"{what} must be a number, got {shown(value)}") from None
     except OverflowError:
-        raise ModelError(f"{what} must be below 1.8e308, got {_shown(value)}") from None
+        raise ModelError(f"{what} must be below 1.8e308, got {shown(value)}") from None
     if not math.isfinite(result):
-        raise ModelError(f"{what} must be finite, got {_shown(value)}")
+        raise ModelError(f"{what} must be finite, got {shown(value)}")
     return result
 
 
-def _shown(value: Any) -> str:
+def shown(value: Any) -> str:
     """A value for a message; an integer of thousands of digits is not written out."""
     if isinstance(value, int) and value.bit_length() > 1024:
         return f"an integer of {value.bit_length()} bits"
-    return repr(value)
+    try:
+        return repr(value)
+    except ValueError:  # one of those inside
+        return f"a {type(value).__name__} with integers of thousands of digits"
 
 
 def named_number_faults(values: Any, what: str) -> list[str]:
@@ -92,7 +106,7 @@ def named_number_faults(values: Any, what: str) -> list[str]:
         if not isinstance(name, str):
             found.append(f"{what}: {name!r} is no name; give names such as 'left hip.angle'")
         elif not is_finite_number(value):
-            found.append(f"{what}: the value of {name!r} must be a finite number, not {_shown(value)}")
+            found.append(f"{what}: the value of {name!r} must be a finite number, not {shown(value)}")
     return found
 
 

@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from mbd.bodies.base import Frame
-from mbd.bodies.values import is_number, number, numbers
+from mbd.bodies.values import is_number, number, numbers, shown
 from mbd.errors import ModelError
 from mbd.joints.base import Joint
 from mbd.scope import Scope
@@ -47,9 +47,9 @@ class Samples:
     def __init__(self, time: Any, values: Any, kind: str = "cubic") -> None:
         try:
             table = np.asarray(values, dtype=float)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise ModelError(
-                f"values of Samples must be numbers, one for each time or a row (x, y, z) for each; got {values!r}"
+                f"values of Samples must be numbers, one for each time or a row (x, y, z) for each; got {shown(values)}"
             ) from None
         object.__setattr__(self, "time", numbers(time, "times of Samples"))
         if kind not in ("cubic", "linear"):

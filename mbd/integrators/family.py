@@ -20,7 +20,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from mbd.arrays import Vector
-from mbd.bodies.values import is_number
+from mbd.bodies.values import is_number, shown
 from mbd.errors import CapabilityError
 from mbd.integrators.base import Integrator, StepResult, System, consistent_rates
 from mbd.integrators.coefficients import Coefficients
@@ -61,7 +61,7 @@ class NewmarkFamily(Integrator):
             raise CapabilityError(f"start is 'jerk' or 'consistent', not {start!r}")
         if not is_number(tolerance) or not 0.0 < tolerance < 1e-3:
             raise CapabilityError(
-                f"tolerance must be a number between 0 and 1e-3, not {tolerance!r}; leave it out for 1e-9"
+                f"tolerance must be a number between 0 and 1e-3, not {shown(tolerance)}; leave it out for 1e-9"
             )
         values = {**own, "formulation": formulation, "starting": start, "tolerance": float(tolerance)}
         for name, value in values.items():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mbd.bodies.values import is_number
+from mbd.bodies.values import is_number, shown
 from mbd.errors import CapabilityError
 from mbd.integrators.family import DEFAULT_TOLERANCE, Coefficients, Formulation, NewmarkFamily, Starting
 
@@ -38,7 +38,9 @@ class GeneralizedAlpha(NewmarkFamily):
         tolerance: float = DEFAULT_TOLERANCE,
     ) -> None:
         if not is_number(rho_inf) or not 0.0 <= rho_inf <= 1.0:
-            raise CapabilityError(f"GeneralizedAlpha needs rho_inf between 0 and 1, not {rho_inf!r}; 0.9 is common")
+            raise CapabilityError(
+                f"GeneralizedAlpha needs rho_inf between 0 and 1, not {shown(rho_inf)}; 0.9 is common"
+            )
         super().__init__(formulation, start, tolerance, rho_inf=float(rho_inf))
 
     @property

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from mbd.bodies.values import is_number
+from mbd.bodies.values import is_number, shown
 from mbd.errors import CapabilityError
 from mbd.integrators.averaged import AveragedStep
 from mbd.integrators.base import StepResult, System
@@ -52,7 +52,7 @@ class HHT(NewmarkFamily):
         tolerance: float = DEFAULT_TOLERANCE,
     ) -> None:
         if not is_number(alpha) or not 0.0 <= alpha <= 1.0 / 3.0:
-            raise CapabilityError(f"HHT needs alpha between 0 and 1/3, not {alpha!r}; 0.05 is common")
+            raise CapabilityError(f"HHT needs alpha between 0 and 1/3, not {shown(alpha)}; 0.05 is common")
         if form not in ("endpoint", "averaged"):
             raise CapabilityError(f"form is 'endpoint' or 'averaged', not {form!r}")
         if form == "averaged" and formulation == "ggl":

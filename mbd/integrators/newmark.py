@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-import math
-
-from mbd.bodies.values import is_number
+from mbd.bodies.values import is_number, shown
 from mbd.errors import CapabilityError
 from mbd.integrators.family import DEFAULT_TOLERANCE, Coefficients, Formulation, NewmarkFamily, Starting
 
 __all__ = ["Newmark"]
+
+
+LARGEST = 10.0
+"""Coefficient above which the scheme is none: published ones have γ ≤ 3/2 and β ≤ 1 [-]."""
 
 
 class Newmark(NewmarkFamily):
@@ -22,7 +24,7 @@ class Newmark(NewmarkFamily):
     Raises
     ------
     CapabilityError
-        for γ < ½ (unstable) or β ≤ 0.
+        for γ < ½ (unstable), β ≤ 0, or either above 10.
 
     >>> Newmark().order()
     2
@@ -42,11 +44,11 @@ class Newmark(NewmarkFamily):
         start: Starting = "jerk",
         tolerance: float = DEFAULT_TOLERANCE,
     ) -> None:
-        good = is_number(beta) and is_number(gamma) and math.isfinite(beta) and math.isfinite(gamma)
-        if not good or not gamma >= 0.5 or not beta > 0.0:
+        good = is_number(beta) and is_number(gamma)
+        if not good or not 0.5 <= gamma <= LARGEST or not 0.0 < beta <= LARGEST:
             raise CapabilityError(
-                f"Newmark needs gamma ≥ 1/2 (below it every step is unstable) and beta > 0, not beta={beta!r}, "
-                f"gamma={gamma!r}; Newmark(0.25, 0.5) is the trapezoidal rule"
+                f"Newmark needs gamma ≥ 1/2 (below it every step is unstable) and beta > 0, neither above {LARGEST:g}, "
+                f"not beta={shown(beta)}, gamma={shown(gamma)}; Newmark(0.25, 0.5) is the trapezoidal rule"
             )
         super().__init__(formulation, start, tolerance, beta=float(beta), gamma=float(gamma))
 

@@ -18,7 +18,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
-from mbd.bodies.values import is_number
+from mbd.bodies.values import is_number, shown
 from mbd.errors import CapabilityError
 from mbd.integrators.base import Integrator, Point, StepReport, StepResult, System, Terms, consistent_rates
 from mbd.integrators.family import DEFAULT_TOLERANCE
@@ -87,7 +87,7 @@ class RadauIIA(Integrator):
     def __post_init__(self) -> None:
         if not is_number(self.tolerance) or not 0.0 < self.tolerance < 1e-3:
             raise CapabilityError(
-                f"tolerance must be a number between 0 and 1e-3, not {self.tolerance!r}; leave it out for 1e-9"
+                f"tolerance must be a number between 0 and 1e-3, not {shown(self.tolerance)}; leave it out for 1e-9"
             )
 
     def __repr__(self) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from mbd.bodies.values import is_number
+from mbd.bodies.values import is_number, shown
 from mbd.equations.equations import Equations
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.integrators import Integrator
@@ -20,6 +20,11 @@ __all__ = ["callbacks", "choices", "end_of", "fits", "numbers"]
 
 HUGE = 1e6
 """Step over the latest time above which a run is refused: ends and events are told apart to 1e-12 dt [-]."""
+
+LARGEST_ERROR = 1e30
+"""Error of coordinates above which nobody can mean to ask for it; products with it must stay finite [m, rad]."""
+MOST_STEPS = 1 << 53
+"""Steps between two rows above which there is no run of so many [-]."""
 
 CHOICES = {
     "contact": ("auto", "events", "nonsmooth"), "impact": ("newton", "poisson", "sequential"),
@@ -46,20 +51,22 @@ def numbers(scheme: Any, start: Any, dt: Any, tol: Any, until: Any, store: Any, 
     else:
         faults += malformed(start)
     if tol is not None and dt is not None:
-        faults.append(f"give dt={dt!r} for fixed steps or tol={tol!r} for steps that follow their error, not both")
-    elif tol is not None and (not is_number(tol) or not math.isfinite(tol) or tol <= 0.0):
-        faults.append(f"tol must be a positive error of coordinates [m, rad], not {tol!r}; 1e-6 is common")
+        faults.append(
+            f"give dt={shown(dt)} for fixed steps or tol={shown(tol)} for steps that follow their error, not both"
+        )
+    elif tol is not None and (not is_number(tol) or not 0.0 < tol <= LARGEST_ERROR):
+        faults.append(f"tol must be a positive error of coordinates [m, rad], not {shown(tol)}; 1e-6 is common")
     elif tol is not None and store != 1:
-        faults.append(f"tol= compares runs at all their steps; use store=1, not {store!r}")
+        faults.append(f"tol= compares runs at all their steps; use store=1, not {shown(store)}")
     elif tol is None and dt is None:
         faults.append("a step or a tolerance is needed: simulate(…, dt=1e-3) or simulate(…, tol=1e-6)")
     elif tol is None and (not is_number(dt) or not math.isfinite(dt) or dt <= 0.0):
-        faults.append(f"dt must be a positive number of seconds, not {dt!r}; 1e-3 suits a walker")
+        faults.append(f"dt must be a positive number of seconds, not {shown(dt)}; 1e-3 suits a walker")
     faults += _times(start, dt, until)
-    if not isinstance(store, Integral) or isinstance(store, bool) or store < 1:
-        faults.append(f"store must be a whole number of steps ≥ 1, not {store!r}")
+    if not isinstance(store, Integral) or isinstance(store, bool) or not 1 <= int(store) <= MOST_STEPS:
+        faults.append(f"store must be a whole number of steps ≥ 1, not {shown(store)}")
     if not is_number(rest_speed) or not rest_speed >= 0.0:
-        faults.append(f"rest_speed must be a speed ≥ 0, not {rest_speed!r}")
+        faults.append(f"rest_speed must be a speed ≥ 0, not {shown(rest_speed)}")
     return faults
 
 
@@ -67,13 +74,13 @@ def _times(start: Any, dt: Any, until: Any) -> list[str]:
     """What is wrong with the end of the run, and a step that the clock cannot tell."""
     begin = start.time if isinstance(start, State) else 0.0
     if not is_number(begin) or not math.isfinite(begin):
-        return [f"the time of the start must be finite, not {begin!r}"]
+        return [f"the time of the start must be finite, not {shown(begin)}"]
     pair = isinstance(until, tuple) and len(until) == 2 and isinstance(until[0], str)
     last = until[1] if pair else until
     if isinstance(until, str):
         last = begin
     if not is_number(last) or not math.isfinite(last):
-        return [f"until must be a finite time [s], an event's name, or (name, latest time), not {until!r}"]
+        return [f"until must be a finite time [s], an event's name, or (name, latest time), not {shown(until)}"]
     if last < begin:
         return [f"until = {last:g} s lies before the start at {begin:g} s"]
     if is_number(dt) and 0.0 < dt < 8.0 * np.spacing(max(abs(float(begin)), abs(float(last)))):

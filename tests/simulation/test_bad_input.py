@@ -209,3 +209,46 @@ def test_values_that_are_not_finite_are_refused_where_they_are_given(value):
         mbd.Model("m", gravity=(0, value, 0))
     with pytest.raises(mbd.ModelError, match="finite"):
         mbd.PointMass("m", mass=value)
+
+
+HUGE = (10**400, -(10**400), 10**5000)
+"""Integers that no float holds; the last is not even written out."""
+PLACES = {
+    "dt": lambda model, start, x: mbd.simulate(model, start, dt=x, until=0.1),
+    "tol": lambda model, start, x: mbd.simulate(model, start, tol=x, until=0.1),
+    "until": lambda model, start, x: mbd.simulate(model, start, dt=0.01, until=x),
+    "store": lambda model, start, x: mbd.simulate(model, start, dt=0.01, until=0.1, store=x),
+    "rest_speed": lambda model, start, x: mbd.simulate(model, start, dt=0.01, until=0.1, rest_speed=x),
+    "a parameter": lambda model, start, x: mbd.simulate(model, start, dt=0.01, until=0.1, parameters={"rod.length": x}),
+    "a start": lambda model, start, x: mbd.assemble(model, {"hinge.angle": x}),
+    "the time of a state": lambda model, start, x: mbd.simulate(model, replace(start, time=x), dt=0.01, until=0.1),
+    "q of a state": lambda model, start, x: mbd.simulate(model, replace(start, q=[x]), dt=0.01, until=0.1),
+    "Newmark": lambda model, start, x: mbd.Newmark(x, x),
+    "HHT": lambda model, start, x: mbd.HHT(x),
+    "GeneralizedAlpha": lambda model, start, x: mbd.GeneralizedAlpha(x),
+    "a tolerance": lambda model, start, x: mbd.RadauIIA(tolerance=x),
+    "a mass": lambda model, start, x: mbd.PointMass("body", mass=x),
+    "samples": lambda model, start, x: mbd.Samples([0.0, 1.0], [0.0, x]),
+    "a time of a run": lambda model, start, x: mbd.simulate(model, start, dt=0.01, until=0.1).at(x),
+}
+
+
+@pytest.mark.parametrize("place", PLACES)
+def test_integers_beyond_every_float_are_refused_by_name(place):
+    model = rod(1.0)
+    start = mbd.assemble(model, {"hinge.angle": 0.3})
+    for value in HUGE:
+        with pytest.raises(mbd.MbdError):
+            PLACES[place](model, start, value)
+
+
+@pytest.mark.parametrize(("beta", "gamma"), [(1e300, 1e300), (0.25, 1e300), (11.0, 0.5), (math.inf, 0.5)])
+def test_coefficients_of_newmark_that_are_no_scheme_are_refused(beta, gamma):
+    with pytest.raises(mbd.CapabilityError, match="neither above 10"):
+        mbd.Newmark(beta, gamma)
+    assert mbd.Newmark(1.0, 1.5).order() == 1
+
+
+def test_a_tolerance_that_overflows_is_refused():
+    with pytest.raises(mbd.ModelError, match="tol must be a positive error"):
+        mbd.simulate(rod(1.0), mbd.assemble(rod(1.0)), tol=1e308, until=0.1)

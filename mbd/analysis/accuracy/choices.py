@@ -12,7 +12,7 @@ import numpy as np
 from mbd.analysis.accuracy.published import Published, published
 from mbd.analysis.accuracy.settings import Setting, is_high, long_steps, steps_of, tolerances
 from mbd.analysis.accuracy.truth import motion, stopped
-from mbd.bodies.values import is_number
+from mbd.bodies.values import is_number, shown
 from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import ModelError, SimulationError, UnknownNameError, nearest
 from mbd.integrators import HHT, GeneralizedAlpha, Integrator, Newmark, RadauIIA, RungeKutta853
@@ -170,7 +170,9 @@ def _wrong_numbers(given: Any, name: str, what: str, rule: str) -> list[str]:
         return []
     if isinstance(given, str) or not isinstance(given, Sequence | np.ndarray) or len(given) == 0:
         return [f"{name} must be a list of {what}, not {given!r}"]
-    return [f"{rule}, not {each!r}" for each in given if not is_number(each) or not math.isfinite(each) or each <= 0.0]
+    return [
+        f"{rule}, not {shown(each)}" for each in given if not is_number(each) or not math.isfinite(each) or each <= 0.0
+    ]
 
 
 def _schemes(able: Able, rows: bool, also: Any) -> tuple[Integrator, ...]:
