@@ -249,7 +249,7 @@ def _terms(equations: Equations) -> tuple[ArrayFunction, bool]:
     """
     if equations.tape not in _KNOWN:
         with equations.tape.lock:
-            nodes = programs.accelerations(equations)
+            nodes = list(getattr(equations, "terms", ())) or programs.accelerations(equations)
             follows = any(node.op == "input" and node.data[0] == "lam" for node in live(nodes[: _last_of_R(equations)]))
             _KNOWN[equations.tape] = array_function(nodes), follows
     return _KNOWN[equations.tape]

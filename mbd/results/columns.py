@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from mbd.equations.equations import Equations
     from mbd.tape.node import Node, Scalar
 
-__all__ = ["Alias", "Columns", "ModelColumns", "StoredColumns", "gather"]
+__all__ = ["Alias", "Columns", "ModelColumns", "SavedColumns", "StoredColumns", "gather"]
 
 Alias = tuple[str, int]
 """A named quantity that is itself part of the state: ('q', 0), ('v', 3), …"""
@@ -64,6 +64,11 @@ class Columns(ABC):
     @abstractmethod
     def q_rate(self) -> Matrix:
         """q̇ at every stored row (R, n_q)."""
+
+    @property
+    @abstractmethod
+    def between_rows(self) -> ModelColumns | None:
+        """What evaluates quantities between the rows; None where only columns are known."""
 
     @abstractmethod
     def identity(self, name: str) -> tuple[Alias | None, Hashable]:
@@ -109,6 +114,10 @@ class ModelColumns(Columns):
         if self._names is None:
             self._names = tuple(self.equations.output_names())
         return self._names
+
+    @property
+    def between_rows(self) -> ModelColumns:
+        return self
 
     def knows(self, name: str) -> bool:
         if name not in self._nodes:
@@ -234,18 +243,32 @@ class ModelColumns(Columns):
         return ((part, node.data[1]) if part in STATE else None), key
 
 
+class SavedColumns(ModelColumns):
+    """Quantities between the rows of a run that was read from a file, from the expressions in it."""
+
+    def __init__(self, record: Record, expressions: Any, anchors: Matrix, q_rate: Matrix) -> None:
+        super().__init__(record, expressions)
+        self._anchors, self._rates = anchors, q_rate
+
+    @property
+    def q_rate(self) -> Matrix:
+        return self._rates
+
+
 class StoredColumns(Columns):
     """Quantities read from a file: each name with its values at the stored rows, or its place in the state.
 
-    Between the rows, parts of the state are interpolated like in a live run; other quantities by cubic Hermite, with
-    their rates where these are stored too ('foot.vx' for 'foot.x'), else with three-point slopes.
+    Between the rows `model` evaluates them like in a live run. Without it, as in older files, parts of the state are
+    interpolated; other quantities by cubic Hermite, with their rates where these are stored too ('foot.vx' for
+    'foot.x'), else with three-point slopes.
     """
 
     def __init__(
         self, record: Record, aliases: Mapping[str, Alias], values: Mapping[str, Vector], order: Sequence[str],
-        anchors: Matrix, q_rate: Matrix,
+        anchors: Matrix, q_rate: Matrix, model: SavedColumns | None = None,
     ) -> None:  # fmt: skip
         super().__init__(record)
+        self._model = model
         self._aliases, self._values, self._order = dict(aliases), dict(values), tuple(order)
         self._anchors, self._rates = anchors, q_rate
 
@@ -276,7 +299,13 @@ class StoredColumns(Columns):
             return np.asarray(getattr(state, part)[:, index])
         return np.broadcast_to(self._values[name], (len(self.record.time),))
 
+    @property
+    def between_rows(self) -> ModelColumns | None:
+        return self._model
+
     def at_places(self, names: Sequence[str], places: Places) -> list[Vector]:
+        if self._model is not None:
+            return self._model.at_places(names, places)
         plain = np.array_equal(self._rates, self.record.v)
         state = self.grid.between(self.record.rows(self._anchors), places, self._rates, is_smooth(self.record, plain))
         found = []

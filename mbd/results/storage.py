@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbd.results.archive import Arrays, read, write
-from mbd.results.columns import Alias, Columns, StoredColumns
+from mbd.results.archive import Arrays, Members, read, write
+from mbd.results.columns import Alias, Columns, SavedColumns, StoredColumns
 from mbd.results.content import arrays_of_run, expect
+from mbd.results.expressions import arrays_of_expressions, read_expressions, write_expressions
 from mbd.results.facts import Facts
 from mbd.results.ledger import Ledger, Part
 from mbd.results.record import EventRecord, Record
@@ -65,6 +66,7 @@ def save(run: Trajectory, path: str | Path, names: Sequence[str] | None = None) 
     for number, (_, values) in enumerate(record.parameter_changes):
         arrays[f"change {number}"] = values
     meta["aliases"], meta["values"], meta["names"] = _columns(run.columns, names, arrays)
+    meta["expressions"] = _expressions(run.columns, meta["names"], arrays)
     meta["parts"], meta["stored"] = _ledger(run.energy, arrays)
     meta["withheld"] = [[part.name, part.withheld] for part in run.energy.parts if part.withheld]
     write(target, arrays, meta)
@@ -108,6 +110,14 @@ def _columns(
     return aliases, values, list(dict.fromkeys(wanted))
 
 
+def _expressions(columns: Columns, names: Sequence[str], arrays: Arrays) -> dict[str, Any] | None:
+    """What the columns need between their rows; None for those of an older file."""
+    model = columns.between_rows
+    if model is None:
+        return None
+    return write_expressions(model.equations, {name: model.node(name) for name in names}, arrays)
+
+
 def _ledger(ledger: Ledger, arrays: Arrays) -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:
     """Names and kinds of what changed the energy, and of what stores it."""
     arrays["kinetic"], arrays["potential"] = ledger.kinetic, ledger.potential
@@ -133,7 +143,12 @@ def _read_ledger(record: Record, arrays: Arrays, meta: Mapping[str, Any]) -> Led
 
 def load(path: str | Path) -> Trajectory:
     """Read a run; see `mbd.load`."""
-    return read(Path(path), FORMAT, VERSION, "run.save(…)", arrays_of_run, _run)
+    return read(Path(path), FORMAT, VERSION, "run.save(…)", _wanted, _run)
+
+
+def _wanted(meta: Mapping[str, Any], members: Members) -> set[str]:
+    """Names of the arrays that the words call for."""
+    return arrays_of_run(meta, members) | arrays_of_expressions(meta.get("expressions"), members)
 
 
 def _run(meta: dict[str, Any], arrays: Arrays) -> Trajectory:
@@ -145,7 +160,11 @@ def _run(meta: dict[str, Any], arrays: Arrays) -> Trajectory:
     expect(bool(np.all(record.closed <= 1) and np.all(record.closed >= 0)), "'closed'")
     values = {name: arrays[f"value {number}"] for name, number in meta["values"].items()}
     aliases = {name: (part, index) for name, (part, index) in meta["aliases"].items()}
-    columns = StoredColumns(record, aliases, values, meta["names"], arrays["anchors"], arrays.get("q_rate", record.v))
+    anchors, q_rate = arrays["anchors"], arrays.get("q_rate", record.v)
+    words, model = meta.get("expressions"), None
+    if words is not None:
+        model = SavedColumns(record, read_expressions(words, arrays, len(record.parameters)), anchors, q_rate)
+    columns = StoredColumns(record, aliases, values, meta["names"], anchors, q_rate, model)
     ledger = _read_ledger(record, arrays, meta)
     return Trajectory(record, Archive(columns, ledger, Violation(**meta["violation"]), Facts.read(meta["facts"])))
 
