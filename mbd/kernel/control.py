@@ -37,7 +37,7 @@ from mbd.kernel.fields import (
 )
 from mbd.kernel.guards import try_step
 from mbd.kernel.hooks import scheme_error
-from mbd.kernel.restart import compose, consistent, fill_block, refresh_scales
+from mbd.kernel.restart import compose, consistent, fill_block, lower_scales
 from mbd.kernel.roots import sqrt
 from mbd.kernel.straddle import step_by_pose, stirred, stirs
 
@@ -110,19 +110,6 @@ def growth(K: Any, ratio: float) -> float:
     if K.scheme != 1 and AGAIN <= factor <= UNCHANGED:
         return 1.0
     return factor
-
-
-def lower_scales(K: Any) -> None:
-    """Magnitudes of forces down towards those of the accepted state, by a hundred at most.
-
-    After a moment of huge forces residuals are judged too mildly otherwise, which the estimated error shows.
-    """
-    for i in range(K.n):
-        K.work[i] = K.scale[i]
-    fill_block(K, K.clock[NOW], K.q, K.y)
-    refresh_scales(K)
-    for i in range(K.n):
-        K.scale[i] = max(K.scale[i], 0.01 * K.work[i])
 
 
 def is_to_shorten(status: int) -> bool:

@@ -60,6 +60,7 @@ REAL_ARRAYS = (
     "lcp_matrix", "lcp_shift", "lcp_found", "lcp_work", "lcp_limit", "lcp_slope",  # Lemke's method
     "guards0", "guards1",  # guard values at the accepted state and at the candidate
     "scale",  # magnitudes of r, h, ḣ term by term
+    "known",  # the same before they were raised at an iterate
     "weight",  # the inverse of those of r
     "deepest", "sinking",  # lowest gap of each contact while ignored; time of its first release into its surface
     "side",  # sign of each user guard since it last crossed
@@ -110,7 +111,8 @@ KEPT_INTEGERS = ("closed", "armed", "touched", "dropped", "rows", "state", "stic
     PLASTIC, HALVED, HALVES, PAIRED, STRAIGHT,
     ORDERED,  # where the order of the factors in K.kkt begins in K.orders, 0 if pivots were searched for
     CALMED,  # 1: the scheme has been started again at the accepted state because a contact seemed to pull in the step
-) = range(20)  # fmt: skip
+    RAISED,  # 1: magnitudes were raised far above those of the accepted state
+) = range(21)  # fmt: skip
 # places in `counts`
 (
     STEPS, ITERATIONS, TANGENTS, RESIDUALS, FACTORIZATIONS, EVENTS, RESTARTS, IMPACTS, LOCATIONS, STAGNATIONS, CAREFUL,
@@ -121,6 +123,8 @@ KEPT_INTEGERS = ("closed", "armed", "touched", "dropped", "rows", "state", "stic
 ) = range(17)  # fmt: skip
 # values of state[NEAR]: within a few steps of a pose in which rows lose rank, and just beyond it
 PASSING, LEFT = 1, 2
+# place in `detail` of the growth of a change that nothing foretold (see `mbd.kernel.unresolved`)
+GROWN = 3
 # places in `detail` of the largest inverse pivot of rows in the last step, of what round-off makes of velocities there
 PIVOT, KICK = 4, 5
 # and of the time that K.past covers, of the last correction of positions by contacts
@@ -135,8 +139,8 @@ ACCELERATIONS, GUARDS, SCALES, COMPOSE, TERMS = range(5)
 DONE, FULL, NEW_MODE, EVENT, PAUSE, LAST = range(6)
 (
     NOT_FINITE, NOT_CONVERGED, SINGULAR, STAGNATED, CHATTER, NO_IMPACT, DEPENDENT, CONFLICT, NO_LOCATION, ENERGY_GAIN,
-    NO_FORCE, TOO_TIGHT, TOO_NEAR, TOO_SMALL, STIRRED,
-) = range(10, 25)  # fmt: skip
+    NO_FORCE, TOO_TIGHT, TOO_NEAR, TOO_SMALL, STIRRED, OUTGROWN, GAINED,
+) = range(10, 27)  # fmt: skip
 # kinds of fired guards
 CLOSE, OPEN_PULL, OPEN_GAP, OPEN_FORCE, CROSS, WATCH, GRAZE, PRESS, STICK, SLIP, STICK_BRIEF = range(11)
 # kinds in the log

@@ -32,7 +32,7 @@ from mbd.kernel.fields import (
 )  # fmt: skip
 from mbd.kernel.hermite import crossing, hermite, hermite_turn
 from mbd.kernel.hooks import call, scheme_step
-from mbd.kernel.restart import compose, consistent, evaluate_loaded, fill_block, limit_of, share_out
+from mbd.kernel.restart import compose, consistent, evaluate_loaded, fill_block, holds_rows, limit_of, share_out
 from mbd.kernel.significance import condition_round_off, guard_round_off
 
 __all__ = [
@@ -98,6 +98,10 @@ def try_step(K: Any, h: float, t1: float) -> int:
                 return status
             for i in range(K.n):
                 K.rate1[i] = K.jump[i]
+        if not holds_rows(K, K.state[ROWS]):
+            K.detail[0] = t1
+            K.detail[1] = 0.0
+            return NOT_CONVERGED
         for i in range(K.n):
             K.rate1[i] = K.jump[i]
             K.aux1[i] = K.jump[i]

@@ -73,14 +73,14 @@ def residual_size(K: Any, o_r: int, m: int, c_C: float, c_K: float, tolerance: f
         row = K.rows[k]
         h = abs(K.out[o_h + k])
         finite += h
-        limit = tolerance * c_K * fastest
+        limit = tolerance * min(c_K * fastest, K.scale[K.n + row])
         floor = 16.0 * EPS * K.scale[K.n + row]
         if both == 1:
             limit = tolerance * min(c_C * speed, K.scale[K.n + row])
         elif K.row_level[row] == 1:  # a rate stands in the place of h
             if K.stabilized == 1:
                 h = abs(K.out[o_h + m + k])
-            limit = tolerance * c_C * fastest
+            limit = tolerance * min(c_C * fastest, K.scale[K.n + K.n_rows + row])
             floor = 16.0 * EPS * K.scale[K.n + K.n_rows + row]
         size = max(size, h / (max(floor, limit) + 1e-300))
         if both == 1:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from mbd.kernel.fields import AUX_STEP, NEAR, PIVOT
-from mbd.kernel.restart import raise_scales
+from mbd.kernel.restart import note_scales, raise_scales, retain_scales
 
 __all__ = ["forget_steps", "look_a_step_ahead"]
 
@@ -34,4 +34,6 @@ def look_a_step_ahead(K: Any) -> None:
         K.block[K.o_v + i] += K.dt * K.rate[i]
         if i < K.n_v:
             K.block[K.o_x + i] = K.dt * (K.y[i] + 0.5 * K.dt * K.rate[i])
+    note_scales(K)
     raise_scales(K, False)
+    retain_scales(K)

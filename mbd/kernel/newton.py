@@ -36,7 +36,14 @@ from mbd.kernel.ordered import LOSS_OF_STEP, OF_TANGENT, factor_ordered, order_a
 from mbd.kernel.pairs import is_whole
 from mbd.kernel.passage import WITHIN, misses, passing_step, steps_of_fall, steps_to_pose
 from mbd.kernel.redundancy import sharing
-from mbd.kernel.restart import add_shares, raise_scales, share_loads
+from mbd.kernel.restart import (
+    add_shares,
+    note_scales,
+    raise_scales,
+    restore_scales,
+    retain_scales,
+    share_loads,
+)
 
 __all__ = ["SEARCHED", "UNSOUND", "solve_step"]
 
@@ -146,18 +153,26 @@ def second_look(K: Any, o_r: int, m: int, c_C: float, c_K: float, tolerance: flo
 
     −status where the iteration is to end.
     """
+    note_scales(K)
     raise_scales(K, True)
     if runs_away(K, m):
+        restore_scales(K)
         return -float(NOT_CONVERGED)
     error = residual_size(K, o_r, m, c_C, c_K, tolerance, K.stabilized)
-    if error > 1.0 and residual_size(K, o_r, m, 0.0, 0.0, 256.0 * EPS, K.stabilized) <= 16.0:
-        if residual_size(K, o_r, m, c_C, c_K, K.tolerance, K.stabilized) > 1.0:
-            return -float(TOO_TIGHT)
-        K.counts[STAGNATIONS] += 1
-        return 1.0
-    if error > 1.0 and iteration >= 6 and K.exact == 0:
-        if residual_size(K, o_r, m, 0.0, 0.0, 1e5 * EPS, K.stabilized) <= 1e3:
-            return -float(STAGNATED)
+    if error > 1.0:
+        if residual_size(K, o_r, m, 0.0, 0.0, 256.0 * EPS, K.stabilized) <= 16.0:
+            if residual_size(K, o_r, m, c_C, c_K, K.tolerance, K.stabilized) > 1.0:
+                error = -float(TOO_TIGHT)
+            else:
+                K.counts[STAGNATIONS] += 1
+                error = 1.0
+        elif iteration >= 6 and K.exact == 0:
+            if residual_size(K, o_r, m, 0.0, 0.0, 1e5 * EPS, K.stabilized) <= 1e3:
+                error = -float(STAGNATED)
+    if 0.0 <= error <= 1.0:
+        retain_scales(K)
+    else:
+        restore_scales(K)
     return error
 
 

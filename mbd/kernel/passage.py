@@ -41,7 +41,14 @@ from mbd.kernel.ordered import LOSS_OF_STEP, OF_TANGENT, factor_ordered, order_a
 from mbd.kernel.orthogonal import clear_row, square
 from mbd.kernel.pairs import is_of_pair, is_whole
 from mbd.kernel.redundancy import sharing
-from mbd.kernel.restart import add_shares, raise_scales, share_loads
+from mbd.kernel.restart import (
+    add_shares,
+    note_scales,
+    raise_scales,
+    restore_scales,
+    retain_scales,
+    share_loads,
+)
 from mbd.kernel.roots import sqrt
 
 __all__ = ["misses", "passing_step", "steps_of_fall", "steps_to_pose"]
@@ -221,13 +228,19 @@ def passing_step(K: Any, h: float, t1: float) -> int:
         if error < 0.0:
             return NOT_FINITE
         if error > 1.0 and iteration >= 2 and error > 0.5 * before:
+            note_scales(K)
             raise_scales(K, True)
             if runs_away(K, m):
+                restore_scales(K)
                 return NOT_CONVERGED
             error = residual_size(K, o_r, m, c_C, c_K, tolerance, 0)
             if error > 1.0 and residual_size(K, o_r, m, 0.0, 0.0, 256.0 * EPS, 0) <= 16.0:
                 K.counts[STAGNATIONS] += 1
                 error = 1.0
+            if error <= 1.0:
+                retain_scales(K)
+            else:
+                restore_scales(K)
         K.detail[1] = error
         if iteration == 0:
             for k in range(m * K.n_v):

@@ -35,9 +35,13 @@ from mbd.kernel.restart import (
     evaluate,
     fill_block,
     find_sliding_friction,
+    holds_rows,
     load_accelerations,
+    note_scales,
     raise_scales,
     refresh_scales,
+    restore_scales,
+    retain_scales,
 )
 from mbd.kernel.runge_kutta import factor_saddle
 from mbd.kernel.stages import (
@@ -256,6 +260,17 @@ def judge_stagnation(K: Any, h: float, t1: float, m: int, tolerance: float, stuc
 
     K.detail[1] < 0 where multipliers run away.
     """
+    note_scales(K)
+    status = judge_raised(K, h, t1, m, tolerance, stuck)
+    if status == 0:
+        retain_scales(K)
+    else:
+        restore_scales(K)
+    return status
+
+
+def judge_raised(K: Any, h: float, t1: float, m: int, tolerance: float, stuck: bool) -> int:
+    """The same with magnitudes raised to those of the stages."""
     c = K.stages[MU_REAL] * h
     for turn in range(3):
         load_stage(K, 2 - turn, h, t1)
@@ -319,6 +334,9 @@ def complete(K: Any, h: float, t1: float, m: int, renew: bool) -> int:
             for k in range(K.n_rows):
                 K.lam1[k] = K.impulse[k]
         if m > 0:
+            if not holds_rows(K, m):
+                K.detail[1] = 0.0
+                return NOT_CONVERGED
             note_leftovers(K)
         for k in range(K.n_rows):
             K.block[K.o_lam + k] = K.lam1[k]

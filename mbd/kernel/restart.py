@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from typing import Any
 
-from mbd.kernel.fields import ACCELERATIONS, COMPOSE, N_DROPPED, SCALES
+from mbd.kernel.fields import ACCELERATIONS, COMPOSE, EPS, N_DROPPED, NOW, RAISED, SCALES
 from mbd.kernel.hooks import call
 from mbd.kernel.redundancy import find_mix, find_shares, shared, sharing, spread, take_shares
 from mbd.kernel.saddle import solve_rows
 
 __all__ = [
     "active_rows", "add_shares", "capture", "compose", "consistent", "evaluate", "evaluate_loaded",
-    "fill_block", "limit_of", "load_accelerations", "raise_scales", "refresh_scales", "row_speed", "share_loads",
-    "share_out", "stepping_rows",
+    "fill_block", "holds_rows", "limit_of", "load_accelerations", "lower_scales", "note_scales", "raise_scales",
+    "refresh_scales", "restore_scales", "retain_scales", "row_speed", "share_loads", "share_out", "stepping_rows",
 ]  # fmt: skip
 
+FAR_ABOVE = 100.0
+"""Magnitudes over those of the accepted state above which they are lowered again, and the most in one step [-]."""
+ROW_GROWTH = 16.0
+"""Most by which the terms of a row may grow in a step: beyond that an iterate was thrown far away [-]."""
 MOST_LOADS = 30
 """How often multipliers that friction follows are solved for again [-]."""
 
@@ -88,17 +92,58 @@ def weigh(K: Any) -> None:
 def raise_scales(K: Any, rows: bool) -> None:
     """Magnitudes at the state now in the block where they exceed those known; where a force passes zero it has none.
 
-    Those of rows, by which gaps are judged too, only on demand: a state far ahead says nothing of the round-off here.
+    Those of rows, by which gaps are judged too, only on demand and as far as coordinates may grow in a step: a state
+    far ahead says nothing of the round-off here.
     """
     known = K.n + 2 * K.n_rows
     for i in range(known):
         K.work[i] = K.scale[i]
     refresh_scales(K)
     for i in range(known):
-        if i < K.n or rows:
-            K.scale[i] = max(K.scale[i], K.work[i])
+        if i < K.n:
+            K.scale[i] = max(K.scale[i] if K.scale[i] < 1e300 else 0.0, K.work[i])
+        elif rows:
+            K.scale[i] = max(min(K.scale[i], ROW_GROWTH * K.work[i]), K.work[i])
         else:
             K.scale[i] = K.work[i]
+    weigh(K)
+
+
+def note_scales(K: Any) -> None:
+    """Keep the magnitudes known so far, which an iterate that is not accepted must leave as they are."""
+    for i in range(K.n + 2 * K.n_rows):
+        K.known[i] = K.scale[i]
+
+
+def restore_scales(K: Any) -> None:
+    """The magnitudes of `note_scales`: where an iterate was thrown far away, its forces excuse nothing."""
+    for i in range(K.n + 2 * K.n_rows):
+        K.scale[i] = K.known[i]
+    weigh(K)
+
+
+def retain_scales(K: Any) -> None:
+    """Go on with raised magnitudes, those of a candidate; told where they are far above what was known."""
+    for i in range(K.n):
+        if K.scale[i] > FAR_ABOVE * K.known[i]:
+            K.state[RAISED] = 1
+
+
+def lower_scales(K: Any) -> None:
+    """Magnitudes of forces down towards those of the accepted state, by a hundred at most.
+
+    After a moment of huge forces residuals are judged too mildly otherwise.
+    """
+    for i in range(K.n):
+        K.work[i] = K.scale[i]
+    fill_block(K, K.clock[NOW], K.q, K.y)
+    refresh_scales(K)
+    K.state[RAISED] = 0
+    for i in range(K.n):
+        floor = K.work[i] / FAR_ABOVE
+        if floor > K.scale[i]:
+            K.scale[i] = floor
+            K.state[RAISED] = 1
     weigh(K)
 
 
@@ -240,6 +285,17 @@ def add_shares(K: Any, A: Any, m: int) -> None:
     for i in range(K.n):
         for k in range(m):
             A[i * size + K.n + k] += shared(K, i, K.rows[k])
+
+
+def holds_rows(K: Any, m: int) -> bool:
+    """Whether the rows on positions hold at the candidate, at which K.acc is."""
+    o_h = K.n * K.n + K.n + 2 * K.n * K.n_rows
+    for k in range(m):
+        row = K.rows[k]
+        size = max(K.scale[K.n + row], 1e-3)
+        if K.row_level[row] == 0 and not abs(K.acc[o_h + row]) <= max(K.tolerance, 1024.0 * EPS) * size:
+            return False
+    return True
 
 
 def find_sliding_friction(K: Any) -> None:

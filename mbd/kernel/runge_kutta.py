@@ -307,10 +307,12 @@ def hold_error(K: Any) -> bool:
 
 def runge_kutta_accept(K: Any, h: float) -> None:
     """The candidate becomes the accepted state."""
+    inverse = 1.0 / h
     for i in range(K.n_q):
         K.q[i] = K.q1[i]
     for i in range(K.n):
         K.y[i] = K.y1[i]
+        K.slope[i] = (K.rate1[i] - K.rate[i]) * inverse
         K.rate[i] = K.rate1[i]
         K.aux[i] = K.rate1[i]
     for k in range(K.n_rows):

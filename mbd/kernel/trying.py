@@ -7,11 +7,14 @@ from typing import Any
 from mbd.kernel.control import controlled_step
 from mbd.kernel.fields import (
     BASE,
+    GAINED,
     GRID,
     LAST,
     NOT_CONVERGED,
+    NOT_FINITE,
     NOW,
     PAIRED,
+    RAISED,
     ROWS,
     SINGULAR,
     STAGNATED,
@@ -24,7 +27,9 @@ from mbd.kernel.fields import (
 )
 from mbd.kernel.guards import try_step
 from mbd.kernel.pairs import ALONE, FIRST, LONGER, SECOND, SHORTER, WHOLE, may_pair
+from mbd.kernel.restart import consistent, lower_scales
 from mbd.kernel.straddle import is_resolved, longest_over, step_by_pose, stirs
+from mbd.kernel.unresolved import judge_change
 
 __all__ = ["part_end", "step_end", "tried_step"]
 
@@ -37,9 +42,21 @@ No power of it is a simple fraction, so that tries do not meet a pose that repea
 """
 
 
-def is_shortened(status: int) -> bool:
-    """Whether a step that ended so is tried again with another size."""
-    return status == NOT_CONVERGED or status == STAGNATED or status == SINGULAR or status == TOO_NEAR
+def is_shortened(K: Any, status: int) -> bool:
+    """Whether a step that ended so is tried again with another size; an explicit one beyond its stability is not."""
+    stalled = status == NOT_CONVERGED or status == STAGNATED or status == SINGULAR
+    return stalled or status == TOO_NEAR or (status == GAINED and K.scheme != 1)
+
+
+def strays(K: Any, h: float) -> bool:
+    """Whether forces that are not finite within a step are so for where it strayed to, not for the time of its end."""
+    return bool(consistent(K, K.clock[NOW] + h, K.q, K.y) == 0)
+
+
+def judged_step(K: Any, h: float, t1: float) -> int:
+    """A candidate at t1 = t + h that may be a continuation of the motion."""
+    status = try_step(K, h, t1)
+    return judge_change(K, h, t1) if status == 0 else status
 
 
 def step_end(K: Any) -> float:
@@ -63,6 +80,8 @@ def tried_step(K: Any, h: float, t1: float) -> int:
 
     A pose in which rows lose rank is stepped over by a pair of steps, or a shortened one; stiff places get smaller.
     """
+    if K.state[RAISED] == 1:
+        lower_scales(K)
     if K.adaptive == 1:
         return controlled_step(K, h)
     if K.state[PAIRED] == FIRST or K.state[PAIRED] == ALONE:  # the step is taken once more
@@ -76,18 +95,18 @@ def tried_step(K: Any, h: float, t1: float) -> int:
             return status
         full = h
     else:
-        status = try_step(K, h, t1)
+        status = judged_step(K, h, t1)
     if status == TOO_NEAR and may_pair(K, h):
         if K.clock[NOW] + (SHORTER + LONGER) * step < K.until - WHOLE * step:
             h = SHORTER * step
             full = h
             K.state[PAIRED] = FIRST
-            status = try_step(K, h, K.clock[NOW] + h)
+            status = judged_step(K, h, K.clock[NOW] + h)
         elif K.until >= K.end:
             return LAST
-    while is_shortened(status) and h > SHORTEST * full:
+    while h > SHORTEST * full and (is_shortened(K, status) or (status == NOT_FINITE and strays(K, h))):
         h *= SHORTENING
-        status = try_step(K, h, K.clock[NOW] + h)
+        status = judged_step(K, h, K.clock[NOW] + h)
     if h < full and (K.state[PAIRED] == FIRST or K.state[PAIRED] == ALONE):
         K.state[PAIRED] = 0
     K.clock[TRIED] = h
@@ -106,7 +125,7 @@ def step_past_pose(K: Any, unit: float) -> int:
                 return LAST
             h = step_by_pose(K, unit, 1.0)
         else:
-            status = try_step(K, h, K.clock[NOW] + h)
+            status = judged_step(K, h, K.clock[NOW] + h)
             K.clock[TRIED] = h
             K.state[PAIRED] = ALONE
             if status == 0 and is_resolved(K, h):
@@ -116,4 +135,4 @@ def step_past_pose(K: Any, unit: float) -> int:
     K.state[PAIRED] = ALONE if h != unit else 0
     if stirs(K, h):
         return STIRRED
-    return try_step(K, h, K.clock[NOW] + h)
+    return judged_step(K, h, K.clock[NOW] + h)

@@ -89,7 +89,7 @@ def residual_names(stepper: Stepper, rows: Sequence[int]) -> list[str]:
 
 def explanation(
     stepper: Stepper, status: int, events: Sequence[EventRecord] = (), places: Mapping[str, str] | None = None,
-    swiftest: float = 0.0,
+    swiftest: float = 0.0, beyond: str = "",
 ) -> str:  # fmt: skip
     """A sentence for a failure status of the kernel.
 
@@ -97,13 +97,14 @@ def explanation(
     ----------
     places : the frames that forces act on, by their names
     swiftest : largest rate of a coordinate in any row so far [m/s, rad/s]
+    beyond : what `out_of_reach` says: the cause of whatever else is found
     """
     values = stepper.values
     now = float(values["clock"][F.NOW])
     time = float(values["detail"][0]) if values["detail"][0] > now else now
     names = sorted(stepper.manager.mode(values["closed"][: values["n_contacts"]]).closed)
     closed = f" with {', '.join(map(repr, names))} closed" if names else ""
-    what = _what(stepper, status, closed, events, places or {}, _rushing(stepper, swiftest))
+    what = beyond or _what(stepper, status, closed, events, places or {}, _rushing(stepper, swiftest))
     return f"t = {time:.9g} s (last accepted {now:.9g} s): {what}"
 
 
@@ -115,6 +116,8 @@ def _what(
         return f"{_not_finite(stepper, places)}{closed}; nothing after the last accepted step is kept"
     if status in (F.NOT_CONVERGED, F.STAGNATED, F.TOO_TIGHT):
         return _no_end(stepper, status, closed, rushing)
+    if status in (F.OUTGROWN, F.GAINED):
+        return _unresolved(stepper, status, closed)
     if status in (F.SINGULAR, F.TOO_NEAR):
         return f"the Newton matrix is singular at {_unknown(stepper)}{closed}; {_why_singular(stepper)}"
     if status in (F.TOO_SMALL, F.STIRRED):
@@ -161,6 +164,28 @@ def _no_end(stepper: Stepper, status: int, closed: str, rushing: str) -> str:
         f"iterations{own}{closed}{worst}; try a smaller dt or softer stiffness; a force that jumps with "
         "the state (mbd.where, sign) must be made continuous, or be switched by an Event or Controller"
         f"{rushing}"
+    )
+
+
+def _unresolved(stepper: Stepper, status: int, closed: str) -> str:
+    """A step whose change cannot be that of the motion: which rate, from what to what, and what to try."""
+    values = stepper.values
+    h, growth, dt = float(values["detail"][2]), float(values["detail"][F.GROWN]), float(values["clock"][F.STEP])
+    who = int(values["state"][F.BLOCKED])
+    change = (
+        f"a step of {h:.2g} s takes the rate of {_unknown(stepper).removeprefix('the motion of ')} from "
+        f"{values['y'][who]:.3g} to {values['y1'][who]:.3g}{closed}"
+    )
+    if status == F.OUTGROWN:
+        return (
+            f"{change}, by forces that grow with the motion, {growth:.2g} of what nothing foretold by itself in a step "
+            f"of dt: dt does not resolve the motion, or a force lets it run away; try a smaller dt, such as "
+            f"{0.1 * dt / max(growth, 1.0):.1g} s"
+        )
+    shorter = "" if int(values["scheme"]) == RUNGE_KUTTA else ", as do steps down to a tenth of dt"
+    return (
+        f"{change}, more than the forces along the way can do{shorter}: dt does not resolve a force that is steep "
+        f"there; try a smaller dt, such as {0.05 * dt:.1g} s, or a softer force"
     )
 
 

@@ -27,6 +27,7 @@ from mbd.simulation.fastest import stability
 from mbd.simulation.memory import carry_on, take_up
 from mbd.simulation.outcome import trajectory_of
 from mbd.simulation.parameters import ParameterJudge
+from mbd.simulation.reach import out_of_reach
 from mbd.simulation.room import Room
 from mbd.simulation.savepoints import Savepoint, rewind, save
 from mbd.simulation.stepper import Stepper
@@ -244,7 +245,9 @@ class Run:
         n_q, n_v = self.values["n_q"], self.values["n_v"]
         rates = np.abs(self.table[: self.stored, 1 + n_q : 1 + n_q + n_v])
         swiftest = float(np.max(rates, initial=0.0))
-        return explanation(self.stepper, status, [*self.earlier, *self.events], self.places, swiftest)
+        events = [*self.earlier, *self.events]
+        beyond = out_of_reach(self, status)
+        return explanation(self.stepper, status, events, self.places, swiftest, beyond)
 
     @property
     def now(self) -> float:

@@ -9,7 +9,6 @@ import pytest
 import sympy
 
 import mbd
-from mbd.hardcases.mass_ratios import heavy_below_light
 from mbd.results.energy import doubted_ledger
 from mbd.simulation.energy import EnergyWatch, judgement
 from mbd.simulation.simulate import prepared
@@ -49,7 +48,6 @@ def chain(stiffness, mass=0.1, count=5):
 
 
 EXPLODING = {
-    "light above heavy": (lambda: heavy_below_light(), mbd.Newmark(), 1e-2, 0.5),
     "stiff chain": (lambda: chain(1e5), mbd.Newmark(), 1e-2, 1.0),
     "stiff chain, damped scheme": (lambda: chain(1e5), DAMPED, 3e-3, 1.0),
     "soft chain, huge steps": (lambda: chain(1e3), DAMPED, 0.1, 3.0),
@@ -75,7 +73,7 @@ def test_a_run_whose_energy_explodes_ends_in_an_error_that_keeps_it(name):
 
 def test_a_run_that_fails_after_an_explosion_names_both():
     model, start = thrown()
-    run = mbd.simulate(model, start, DAMPED, dt=0.02, until=3.0, on_failure="return")
+    run = mbd.simulate(model, start, DAMPED, dt=0.05, until=3.0, on_failure="return")
     assert not run.success
     first, _, second = run.message.partition("; before that, ")
     assert "scheme itself" not in first and "scheme itself has put" in second

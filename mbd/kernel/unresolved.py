@@ -1,0 +1,227 @@
+"""Whether a step of fixed size resolves what it changes: its estimated error, judged by the forces themselves.
+
+A step has found *a* solution of its equations, which need not be the motion: beyond a pole of the forces, or where a
+Newton iterate was thrown far away, there are others. A cheap look compares the estimated error of each rate with the
+rate. Where that is large, accelerations are asked for again, by two tests that stiff forces pass at any step:
+
+- *growth*: the change D of (v, z) that the previous accelerations did not foretell, and what accelerations a owe to it,
+  ``ζ = h D·M (a(y₁) − a(y₁ − D)) / D·M D``. A force that depends on time has ζ = 0, a stiff spring or damper ζ < 0,
+  ``v̇ = c v`` has ζ = c h: more than `GROWTH` grows by more than e in a step, which no scheme of order 2 follows;
+- *gain*: along the way from the old to the new state the forces do at most the work W⁺ = Σ_i ∫ max(v_i (M a)_i, 0) dt.
+  Where more than half of the new kinetic energy is neither the old one nor that, it comes from nowhere.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mbd.kernel.candidate import carry
+from mbd.kernel.fields import (
+    BLOCKED,
+    COMPOSE,
+    GAINED,
+    GROWN,
+    N_DROPPED,
+    NEAR,
+    NOT_FINITE,
+    NOW,
+    OUTGROWN,
+    STEP,
+)
+from mbd.kernel.hooks import call, scheme_error
+from mbd.kernel.redundancy import sharing
+from mbd.kernel.restart import compose, consistent, evaluate, fill_block
+
+__all__ = ["judge_change"]
+
+LOOK_TWICE = 0.01
+"""Estimated error of a rate, over the rate, above which a step of order 2 is looked at more closely [-]."""
+LOOK_TWICE_EIGHT = 0.1
+"""The same of the explicit scheme of order 8 [-]."""
+LOOK_TWICE_FIVE = 0.25
+"""The same of Radau IIA, whose estimate is of order 3 [-]."""
+BYSTANDER = 0.01
+"""Part of the fastest rate below which another one hardly takes part in the motion [-]."""
+GROWTH = 0.8
+"""ζ in a whole step that the trapezoidal rule still follows; less where the error of a scheme is larger [-]."""
+TRAPEZOID = 1.0 / 12.0
+"""Constant of its error, in h³ times the rate of accelerations [-]."""
+ROUGH = 0.2
+"""Estimated error of a rate, over the rate, above which the work of the forces is asked for [-]."""
+UNEXPLAINED = 0.5
+"""Part of the kinetic energy at the end of a step that may be neither old nor work of forces [-]."""
+FEWEST = 1.0 / 4096.0
+"""Least part of D that is tried where accelerations are not finite at its other end [-]."""
+
+
+def judge_change(K: Any, h: float, t1: float) -> int:
+    """0 where the candidate may be a continuation of the motion, OUTGROWN or GAINED where it cannot."""
+    stretch = max(1.0, K.clock[STEP] / h)
+    worst = largest_share(K, h, stretch)
+    allowed = LOOK_TWICE
+    if K.scheme != 0:
+        allowed = LOOK_TWICE_EIGHT if K.scheme == 1 else LOOK_TWICE_FIVE
+    if worst <= allowed or K.state[NEAR] > 0 or sharing(K):
+        return 0
+    return look_closer(K, h, t1, stretch)
+
+
+def look_closer(K: Any, h: float, t1: float, stretch: float) -> int:
+    """The same of a candidate that a glance does not clear, which is left as it was."""
+    rough = K.detail[1]
+    blocked = K.state[BLOCKED]
+    at_y = carry(K.q1, K.inside, 0, K.n_q, True)
+    at_D = carry(K.y1, K.inside, at_y, K.n, True)
+    status = 0
+    if outgrows(K, h, t1, stretch, at_y, at_D):
+        status = OUTGROWN
+    elif rough > ROUGH and gains(K, h, t1, at_y):
+        status = GAINED
+    carry(K.q1, K.inside, 0, K.n_q, False)
+    carry(K.y1, K.inside, at_y, K.n, False)
+    if K.state[N_DROPPED] > 0:
+        evaluate(K, t1, K.q1, K.y1)
+    fill_block(K, t1, K.q1, K.y1)
+    for i in range(K.n):
+        K.block[K.o_a + i] = K.rate1[i]
+    for k in range(K.n_rows):
+        K.block[K.o_lam + k] = K.lam1[k]
+    if status != 0:
+        K.state[BLOCKED] = blocked
+        K.detail[0] = t1
+        K.detail[2] = h
+    return status
+
+
+def largest_share(K: Any, h: float, stretch: float) -> float:
+    """Largest estimated error of a rate over that rate, as it were after a whole step; in K.detail[1] after this one.
+
+    K.state[BLOCKED] tells which. Rates below the rest speed count as that, those far below the fastest as a part of it.
+    """
+    fastest = 0.0
+    for i in range(K.n_v):
+        fastest = max(fastest, max(abs(K.y[i]), abs(K.y1[i])))
+    floor = max(K.rest_speed, BYSTANDER * fastest)
+    cube = stretch * stretch * stretch
+    twelfth = h / 12.0
+    worst = 0.0
+    who = 0
+    if K.scheme != 0:
+        scheme_error(K, h)
+    for i in range(K.n):
+        if K.scheme == 0:
+            error = twelfth * abs(K.rate1[i] - K.rate[i] - h * K.slope[i])
+        else:
+            error = abs(K.error[K.n_v + i])
+        share = error / max(floor, max(abs(K.y[i]), abs(K.y1[i])))
+        if share > worst:
+            worst = share
+            who = i
+    if worst * cube > LOOK_TWICE:
+        K.state[BLOCKED] = who
+        K.detail[1] = worst
+    return worst * cube
+
+
+def outgrows(K: Any, h: float, t1: float, stretch: float, at_y: int, at_D: int) -> bool:
+    """Whether the change that was not foretold feeds itself by more than `GROWTH`; (q₁, y₁) are in K.inside."""
+    n = K.n
+    if consistent(K, t1, K.q1, K.y1) != 0:
+        return False
+    for i in range(n):
+        K.trial_jump[i] = K.jump[i]  # as exact as can be: the step's own rates err by its tolerance
+        K.inside[at_D + i] = K.inside[at_y + i] - K.y[i] - h * (K.rate[i] + 0.5 * h * K.slope[i])
+    part = 1.0
+    while part >= FEWEST:
+        for i in range(n):
+            K.y1[i] = K.inside[at_y + i] - part * K.inside[at_D + i]
+        if K.vector == 1:
+            for i in range(K.n_q):
+                K.q1[i] = K.inside[i] - 0.5 * h * part * K.inside[at_D + i]
+        else:
+            for i in range(K.n_q):
+                K.block[K.o_q + i] = K.inside[i]
+            for i in range(K.n_v):
+                K.block[K.o_x + i] = -0.5 * h * part * K.inside[at_D + i]
+            call(K, COMPOSE, K.q1)
+        if consistent(K, t1, K.q1, K.y1) == 0:
+            moved = growth_between(K, h, stretch, part, at_D, 0, K.n_v)
+            states = growth_between(K, h, stretch, part, at_D, K.n_v, n)
+            K.detail[GROWN] = max(moved, states)
+            return max(moved, states) > resolved_growth(K)
+        part *= 0.0625
+    return False
+
+
+def resolved_growth(K: Any) -> float:
+    """`GROWTH`, less where the error of the scheme is larger than that of the trapezoidal rule."""
+    if K.scheme != 0:
+        return GROWTH
+    error = abs(1.0 / 6.0 - K.beta - 0.5 * (K.alpha_m - K.alpha_f))
+    return GROWTH * TRAPEZOID / error if error > TRAPEZOID else GROWTH
+
+
+def growth_between(K: Any, h: float, stretch: float, part: float, at_D: int, first: int, last: int) -> float:
+    """ζ of the module's text over some components, over a whole step; K.trial_jump has a(y₁), K.jump a(y₁ − part D)."""
+    fed = 0.0
+    size = 0.0
+    for i in range(first, last):
+        for j in range(first, last):
+            weight = K.inside[at_D + i] * K.acc[i * K.n + j]
+            fed += weight * (K.trial_jump[j] - K.jump[j])
+            size += weight * K.inside[at_D + j]
+    if size <= 0.0:
+        return 0.0
+    return float(h * stretch * fed / (part * size))
+
+
+def gains(K: Any, h: float, t1: float, at_y: int) -> bool:
+    """Whether more than half of the kinetic energy at the end is neither old nor work of forces along the way.
+
+    Forces may change with time at any instant of the step: of those of its start and of its end the larger work counts.
+    """
+    old = 0.0
+    new = 0.0
+    most = 0.0
+    for turn in range(2):
+        t = K.clock[NOW] if turn == 0 else t1
+        work = 0.0
+        for node in range(5):  # Lobatto's formula
+            s = 0.5
+            weight = 16.0 / 45.0
+            if node == 0 or node == 4:
+                s = 0.25 * node
+                weight = 0.05
+            elif node != 2:
+                s = 0.5 + (0.25 * node - 0.5) * 2.0 * 0.6546536707079771
+                weight = 49.0 / 180.0
+            fill_block(K, t, K.q, K.y)
+            for i in range(K.n):
+                change = K.inside[at_y + i] - K.y[i]
+                K.y1[i] = K.y[i] + s * change
+                if i < K.n_v:  # a cubic between both states
+                    mean = 0.5 * (K.y[i] + K.inside[at_y + i]) + h * (K.rate[i] - K.rate1[i]) / 12.0
+                    if K.vector == 1:
+                        mean = (K.inside[i] - K.q[i]) / h
+                    bulge = mean - 0.5 * (K.y[i] + K.inside[at_y + i])
+                    K.block[K.o_x + i] = h * s * (K.y[i] + s * (0.5 * change + bulge * (3.0 - 2.0 * s)))
+                    K.y1[i] += 6.0 * bulge * s * (1.0 - s)
+            compose(K, K.q1)
+            status = consistent(K, t, K.q1, K.y1)
+            if status != 0:
+                return status == NOT_FINITE
+            energy = 0.0
+            for i in range(K.n_v):
+                force = 0.0
+                momentum = 0.0
+                for j in range(K.n_v):
+                    force += K.acc[i * K.n + j] * K.jump[j]
+                    momentum += K.acc[i * K.n + j] * K.y1[j]
+                energy += 0.5 * momentum * K.y1[i]
+                work += weight * h * max(K.y1[i] * force, 0.0)
+            if node == 0:
+                old = max(old, energy)
+            if node == 4:
+                new = energy
+        most = max(most, work)
+    return new > 1.1 * old and new - old - most > UNEXPLAINED * new

@@ -1,0 +1,125 @@
+"""Forces of users that grow, overflow or have poles: rows that are kept are those of the motion, whatever the scheme."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import mbd
+
+FAMILY = [
+    mbd.Newmark(), mbd.HHT(0.05), mbd.HHT(0.1, formulation="index3"), mbd.GeneralizedAlpha(0.9),
+    mbd.GeneralizedAlpha(0.5), mbd.GeneralizedAlpha(0.0),
+]  # fmt: skip
+SCHEMES = [*FAMILY, mbd.RadauIIA(), mbd.RungeKutta853()]
+STEPS = (0.3, 0.1, 0.03, 0.01)
+
+
+def particle(law: Any, of: str = "x.rate", mass: float = 1.0, place: float = 0.0, speed: float = 1.0) -> Any:
+    """A particle under a force along x that follows its place or its speed."""
+    model = mbd.Model("particle", gravity=(0.0, 0.0, 0.0))
+    body = mbd.PointMass("particle", mass)
+    model.connect(mbd.Translation("p", model.ground.origin, body.origin, axes="x"))
+    push = mbd.Applied("push", body.origin, force=lambda s: (law(s), 0.0), arguments=(f"p.{of}",))
+    model.apply(push)
+    return model, mbd.assemble(model, position={"p.x": place}, velocity={"p.x": speed})
+
+
+def motion(law: Any, of: str, mass: float, place: float, speed: float, until: float) -> Any:
+    """Place and speed by scipy, up to a pole."""
+
+    def slope(t: float, y: Any) -> list[float]:
+        return [y[1], float(np.real(law(y[0] if of == "x" else y[1]))) / mass]
+
+    def far(t: float, y: Any) -> float:
+        return float(np.max(np.abs(y)) - 1e8)
+
+    far.terminal = True  # type: ignore[attr-defined]
+    with np.errstate(all="ignore"):
+        return solve_ivp(slope, (0.0, until), [place, speed], "DOP853", rtol=1e-10, atol=1e-12, events=far,
+                         dense_output=True)  # fmt: skip
+
+
+GROWING = {
+    "square of the speed": ("x.rate", lambda c: lambda v: c * v * v),
+    "cube of the speed": ("x.rate", lambda c: lambda v: c * v * v * v),
+    "exponential of the speed": ("x.rate", lambda c: lambda v: c * mbd.exp(v)),
+    "fifth power of the place": ("x", lambda c: lambda x: c * x**5),
+    "square of the place": ("x", lambda c: lambda x: c * x * x),
+    "exponential of the place": ("x", lambda c: lambda x: c * mbd.exp(3.0 * x)),
+    "speed": ("x.rate", lambda c: lambda v: c * v),
+}
+
+
+@pytest.mark.parametrize("name", GROWING)
+def test_a_motion_that_runs_away_is_followed_or_refused_before_its_rows_are_wrong(name: str) -> None:
+    of, family = GROWING[name]
+    rng = np.random.default_rng(len(name))
+    for mass, c, speed in zip(
+        rng.uniform(0.3, 3.0, 2), rng.uniform(0.5, 2.0, 2), rng.uniform(0.5, 2.0, 2), strict=True
+    ):
+        law, until = family(c), 2.0
+        true = motion(law, of, mass, 0.2, speed, until)
+        model, start = particle(law, of, mass, 0.2, speed)
+        for scheme in SCHEMES:
+            for dt in STEPS:
+                run = mbd.simulate(model, start, scheme, dt=dt, until=until, on_failure="return")
+                told = (name, scheme, dt, mass, c, speed, run.message)
+                assert run.time[-1] <= true.t[-1] + 1e-9, told
+                v = true.sol(run.time)[1]
+                off = np.abs(run["p.x.rate"] - v) / np.maximum.accumulate(np.abs(v))
+                bound = 1.0 if scheme in FAMILY else 0.1  # the last row before a pole errs most
+                assert np.max(off) < bound and np.median(off) < 0.5 * bound, told
+                assert run.success or "try a smaller dt" in run.message or "not finite" in run.message, told
+                assert not run.success or true.t[-1] == until, told
+
+
+def wall(x: Any) -> Any:
+    """A wall at 1 m that no number holds 4 m behind it."""
+    return -mbd.exp(200.0 * (x - 1.0))
+
+
+def hardening(x: Any) -> Any:
+    return mbd.exp(-30.0 * x) - mbd.exp(30.0 * x)
+
+
+@pytest.mark.parametrize("law", [wall, hardening])
+@pytest.mark.parametrize("scheme", SCHEMES, ids=repr)
+def test_every_row_is_balanced_and_none_is_faster_than_the_forces_allow(law: Any, scheme: Any) -> None:
+    """A trial step meets forces that overflow: they must excuse no residual afterwards."""
+    rng = np.random.default_rng(7)
+    for dt in (0.3, 0.1, 0.05, 0.02):
+        speed = float(rng.uniform(0.7, 2.0))
+        model, start = particle(law, "x", 1.0, 0.0, speed)
+        run = mbd.simulate(model, start, scheme, dt=dt, until=2.0, on_failure="return")
+        force = np.array([float(np.real(law(float(x)))) for x in run["p.x"]])
+        size = 1e-6 * np.maximum.accumulate(np.maximum(np.abs(force), 1e-3))
+        assert np.all(np.abs(run["p.x.acceleration"] - force) <= size), (scheme, dt, run.message)
+        assert np.max(np.abs(run["p.x.rate"])) < 4.0 * speed, (scheme, dt, run.message)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES, ids=repr)
+def test_forces_that_begin_at_once_are_no_runaway(scheme: Any) -> None:
+    """From rest all of the change is unforeseen: but it does not feed itself."""
+    model = mbd.Model("particle", gravity=(0.0, 0.0, 0.0))
+    body = mbd.PointMass("particle", 1.3)
+    model.connect(mbd.Translation("p", model.ground.origin, body.origin, axes="x"))
+    model.apply(
+        mbd.Applied("push", body.origin, force=lambda t: (mbd.where(t < 0.111, 0.0, 5.0), 0.0), arguments=("t",))
+    )
+    for dt in (0.1, 0.04, 0.007):
+        run = mbd.simulate(model, mbd.assemble(model), scheme, dt=dt, until=1.0)
+        assert run["p.x.rate"][-1] == pytest.approx(5.0 / 1.3 * 0.889, abs=5.0 / 1.3 * dt)
+
+
+@pytest.mark.parametrize("scheme", FAMILY, ids=repr)
+@pytest.mark.parametrize(("stiffness", "damping"), [(1e8, 0.0), (1e8, 3e3), (0.0, 1e6)])
+def test_stiff_forces_are_none_either(scheme: Any, stiffness: float, damping: float) -> None:
+    """ω dt and c dt/m of a thousand and more: coarse, but neither growth nor speed from nowhere."""
+    model, start = particle(lambda v: -damping * v, speed=0.3, place=0.01)
+    model.apply(mbd.Potential("spring", lambda x: 0.5 * stiffness * x * x, arguments=("p.x",)))
+    run = mbd.simulate(model, start, scheme, dt=0.1, until=3.0, on_failure="return")
+    assert "forces that grow" not in run.message and "more than the forces" not in run.message
