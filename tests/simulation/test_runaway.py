@@ -1,4 +1,4 @@
-"""Forces of users that grow, overflow or have poles: rows that are kept are those of the motion, whatever the scheme."""
+"""Forces of users that grow, overflow or have poles: rows that are kept are those of the motion."""
 
 from __future__ import annotations
 
