@@ -46,7 +46,7 @@ GROWTH = 0.8
 """ζ in a whole step that the trapezoidal rule still follows; less where the error of a scheme is larger [-]."""
 TRAPEZOID = 1.0 / 12.0
 """Constant of its error, in h³ times the rate of accelerations [-]."""
-ROUGH = 0.2
+COARSE = 0.2
 """Estimated error of a rate, over the rate, above which the work of the forces is asked for [-]."""
 UNEXPLAINED = 0.5
 """Part of the kinetic energy at the end of a step that may be neither old nor work of forces [-]."""
@@ -75,7 +75,7 @@ def look_closer(K: Any, h: float, t1: float, stretch: float) -> int:
     status = 0
     if outgrows(K, h, t1, stretch, at_y, at_D):
         status = OUTGROWN
-    elif rough > ROUGH and gains(K, h, t1, at_y):
+    elif rough > COARSE and gains(K, h, t1, at_y):
         status = GAINED
     carry(K.q1, K.inside, 0, K.n_q, False)
     carry(K.y1, K.inside, at_y, K.n, False)
