@@ -127,9 +127,11 @@ class ParameterCheck:
     ) -> None:
         self._values, self._whole, self._decisive = dict(values), whole, frozenset(decisive)
         self._owner: dict[str, Parameterized] = {}
+        self._names: dict[int, list[str]] = {}
         for word in words:
             for name in word.parameters():
-                self._owner.setdefault(name, word)
+                if self._owner.setdefault(name, word) is word:
+                    self._names.setdefault(id(word), []).append(name)
 
     def faults(self, changed: Mapping[str, float], names: Iterable[str] | None = None) -> list[str]:
         """What is wrong with changed values; with those of some names only, if these are given."""
@@ -137,11 +139,10 @@ class ParameterCheck:
         found = named_number_faults({name: changed[name] for name in names}, "parameters")
         if found:
             return found
-        values = {**self._values, **changed}
         owners = {id(self._owner[name]): self._owner[name] for name in names if name in self._owner}
-        for word in owners.values():
-            own = {name: value for name, value in values.items() if self._owner.get(name) is word}
+        for number, word in owners.items():
+            own = {name: changed.get(name, self._values.get(name, 0.0)) for name in self._names[number]}
             found += word.value_faults(own)
         if not self._decisive.isdisjoint(names):
-            found += self._whole(values)
+            found += self._whole({**self._values, **changed})
         return list(dict.fromkeys(found))
