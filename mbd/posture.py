@@ -12,6 +12,7 @@ from mbd.arrays import Matrix, Vector
 from mbd.compile.mechanism import Mechanism
 from mbd.conditions import Condition
 from mbd.equations.equations import Equations
+from mbd.facings import faced
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.turns import choose_turns, hold_directions
 
@@ -28,6 +29,8 @@ ACTS = 1e-14
 """Derivative [m/rad, -] of a row below which a coordinate does not act on it: what cancellation leaves of zero."""
 NUDGE, NUDGES = 0.01, 3
 """Step [m, rad] out of a flat spot of the rows, and how often it is tried."""
+AWAY = 0.2
+"""Turn [rad] of the free angles out of a pose in which a joint is half a turn off."""
 TRIES, DESCENT = 4, 400
 """Starts of a descent of the sum of squares of the rows, and its most steps [-]."""
 CLOSE = 1e-3
@@ -166,6 +169,7 @@ def _weighted_rows(work: Posture, rows: Sequence[int], weights: Vector) -> tuple
     terms = work.mechanism.acceleration_terms(work.time, work.q, work.y, work.parameters, work.anchors)
     picked = list(rows)
     h, B = work.with_conditions(terms.h[picked], terms.B[picked][:, : work.equations.n_v], work.places)
+    h, B, _ = faced(work, picked, h, B)
     return weights * h, weights[:, None] * B
 
 
@@ -195,6 +199,10 @@ def _newton(work: Posture, rows: Sequence[int], free: Matrix, start: Vector) -> 
         work.iterations += 1
         terms = work.mechanism.acceleration_terms(work.time, work.q, work.y, work.parameters, work.anchors)
         h, B = work.with_conditions(terms.h[picked], terms.B[picked][:, :n_v], work.places)
+        h, B, opposite = faced(work, picked, h, B)
+        if opposite and iteration < NUDGES:
+            _turn_away(work, free)
+            continue
         size = float(np.max(np.abs(h)))
         places = _involved(B, free)
         if not len(places) and size > TOLERANCE and work.mechanism.vector and iteration < NUDGES:
@@ -217,7 +225,14 @@ def _newton(work: Posture, rows: Sequence[int], free: Matrix, start: Vector) -> 
         x[places] = change / limit
         move(work, x)
     terms = work.mechanism.acceleration_terms(work.time, work.q, work.y, work.parameters, work.anchors)
-    return work.with_conditions(terms.h[picked], terms.B[picked][:, :n_v], work.places)[0]
+    return faced(work, picked, *work.with_conditions(terms.h[picked], terms.B[picked][:, :n_v], work.places))[0]
+
+
+def _turn_away(work: Posture, free: Matrix) -> None:
+    """Leave a pose in which a joint is half a turn off, where its rows say nothing about the way back."""
+    angles = np.array([coordinate.unit == "rad" for coordinate in work.equations.coordinates])
+    if work.mechanism.vector:
+        work.q = work.q + np.where(free & angles, AWAY * (1.0 + np.arange(len(work.q)) / 7.0), 0.0)
 
 
 def _nudge(work: Posture, rows: Sequence[int], free: Matrix) -> None:

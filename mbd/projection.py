@@ -13,6 +13,7 @@ from mbd.bodies.values import named_number_faults
 from mbd.compile.mechanisms import mechanism_of
 from mbd.consistency import residuals, violations
 from mbd.errors import AssemblyError, ModelError
+from mbd.facings import reversed_joints
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.posture import TOLERANCE, Posture, capture, close_nearby, close_velocities, position_rows
 from mbd.simulation.arguments import fits
@@ -104,6 +105,7 @@ def _close(work: Posture) -> None:
     close_velocities(work, free)
     speed = float(np.max(np.abs(work.y[: work.equations.n_v]), initial=0.0))
     left = violations(work.equations.rows, active, found(), speed)
+    left += reversed_joints(work.mechanism, work.time, work.q, work.parameters, work.anchors)
     if left:
         raise AssemblyError(
             f"no consistent state was found near the given one: {'; '.join(left)}; mbd.assemble(model, position=…, "

@@ -29,6 +29,7 @@ RANKS = [
         "consistency",
         "contradictions",
         "dependence",
+        "facings",
         "not_finite",
         "opening",
         "posture",

@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
+from mbd.bodies.algebra import dot
 from mbd.equations.changes import partials, rates
 from mbd.equations.contacts import anchors_held, laws
 from mbd.equations.derivation_scope import DerivationScope
 from mbd.equations.dynamics import Dynamics, Work
 from mbd.equations.effects import Cause, causes, effect_of, weight_of
-from mbd.equations.equations import Equations
+from mbd.equations.equations import Equations, Facing
 from mbd.equations.figure import figure_of
 from mbd.equations.laws import Laws
 from mbd.equations.outputs import Outputs
@@ -87,10 +88,25 @@ def _derived(model: Model, plan: Plan) -> Equations:
         figure=figure_of(model),
         geometry=TreeGeometry(scope, dynamics, work, rests, constraints, plan.planar and vectors),
         frictions=tuple(constraints.frictions), turns=tuple(scope.turns.values()),
+        facings=_facings(scope, constraints),
     )  # fmt: skip
     whole = work + _closed(scope, constraints)
     offer_results(outputs, scope, dynamics, whole, equations, model, {joint.name for joint in plan.floating})
     return equations
+
+
+def _facings(scope: Surroundings, constraints: Laws) -> tuple[Facing, ...]:
+    """Of cut joints with rows on directions that are not angles themselves."""
+    found = []
+    for joint in scope.cuts:
+        owned = [k for k, row in enumerate(constraints.rows) if row.owner == joint.name and row.contact < 0]
+        rows = tuple(k for k in owned if constraints.rows[k].unit == "rad" and constraints.rows[k].friction < 0)
+        if rows and joint.is_vector and joint.name not in scope.turns:
+            R, p = scope.relative(joint)
+            S, _ = joint.transform(joint.recover(R, p, scope), scope)
+            trace = sum((dot(a, b) for a, b in zip(S, R, strict=True)), scope.tape.zero)
+            found.append(Facing(joint.name, rows, scope.real(0.5 * (trace - 1.0))))
+    return tuple(found)
 
 
 def _closed(scope: Surroundings, constraints: Laws) -> Work:

@@ -24,7 +24,10 @@ from typing import Any, Literal, Protocol
 
 from mbd.tape.node import Node, Table, Tape
 
-__all__ = ["Contact", "Coordinate", "Effect", "Equations", "Friction", "Geometry", "Guard", "Parameter", "Row", "Turn"]
+__all__ = [
+    "Contact", "Coordinate", "Effect", "Equations", "Facing", "Friction", "Geometry", "Guard", "Parameter", "Row",
+    "Turn",
+]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -166,6 +169,20 @@ class Turn:
 
 
 @dataclass(frozen=True)
+class Facing:
+    """Which way round a cut joint is put together, where its rows hold sines of angles.
+
+    joint : its name; rows : numbers of those rows
+    cosine : ``(tr(R(q)ᵀ R) − 1)/2`` on the tape, with R the rotation between its frames and R(q) that of the joint's
+        own coordinates read off them: 1 where it is put together as described, −1 half a turn off
+    """
+
+    joint: str
+    rows: tuple[int, ...]
+    cosine: Node
+
+
+@dataclass(frozen=True)
 class Effect:
     """One cause of forces: a loss, a spring, a motor, a penalty stop, gravity.
 
@@ -243,6 +260,7 @@ class Equations:
     output : any named result as a node ('left hip.angle', 'left shank.end.x', 'left knee.reaction_force.x', …)
     output_names : the names that `output` certainly knows
     turns : of the planar cut joints, see `Turn`
+    facings : of the cut joints whose rows hold sines, see `Facing`
     idle : (owner, part) of rows of cut joints that hold whatever the motion, and were left out
     memory : what follows from the rest, kept once it was found
     """
@@ -269,6 +287,7 @@ class Equations:
     geometry: Geometry | None = field(default=None, repr=False)
     frictions: tuple[Friction, ...] = ()
     turns: tuple[Turn, ...] = ()
+    facings: tuple[Facing, ...] = ()
     memory: dict[str, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @property

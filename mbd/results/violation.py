@@ -15,8 +15,9 @@ __all__ = ["Violation", "violation"]
 class Violation:
     """Largest |h| of the active rows over a run, by unit, and where it occurred.
 
-    length [m], angle [rad], rate: largest |ḣ|, also of rows on velocities [m/s or rad/s]; worst : owner and part of the
-    row with the largest |h|, '' without rows
+    length [m], angle [rad] (about π where a cut joint in space is put together the wrong way round), rate: largest
+    |ḣ|, also of rows on velocities [m/s or rad/s]; worst : owner and part of the row with the largest |h|, '' without
+    rows
     """
 
     length: float = 0.0
@@ -43,6 +44,11 @@ def violation(columns: ModelColumns) -> Violation:
     values = columns.evaluate([row.value for row in rows] + [row.rate for row in rows], columns.rows)
     largest: dict[str, float] = {}
     fastest, worst, highest = 0.0, "", -1.0
+    facings = columns.equations.facings
+    for facing, cosine in zip(facings, columns.evaluate([f.cosine for f in facings], columns.rows), strict=True):
+        if float(np.min(cosine)) < 0.0:  # its rows are small, but those of a joint half a turn off
+            highest, worst = float(np.arccos(max(-1.0, float(np.min(cosine))))), facing.joint
+            largest["rad"] = max(largest.get("rad", 0.0), highest)
     for number, row in enumerate(rows):
         if row.friction >= 0:
             continue

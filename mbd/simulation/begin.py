@@ -11,6 +11,7 @@ from mbd.arrays import Vector
 from mbd.assembly import BELOW, undetermined
 from mbd.consistency import residuals
 from mbd.errors import ModelError
+from mbd.facings import reversed_joints
 from mbd.kernel import fields as F
 from mbd.posture import Posture
 from mbd.simulation.memory import memory_of_end
@@ -73,6 +74,7 @@ def require_consistent(run: Run, start: State) -> None:
     if memory is not None and len(memory.parameters) == len(v["params"]):
         usual = residuals(mechanism, start.time, q, y, memory.parameters, anchors)[:2]
     faults = violations_now(run, residuals_now(run), usual)
+    faults += reversed_joints(mechanism, start.time, q, v["params"], anchors)
     if faults:
         advice = (
             "mbd.project(model, state) gives the nearest state that does, mbd.assemble(model, …) one of named values"

@@ -12,10 +12,12 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.compile.mechanism import Mechanism
 from mbd.errors import MemoryLimitError, SimulationError, UnknownNameError
+from mbd.facings import first_reversed, reversed_joints
 from mbd.forces.base import Force
 from mbd.integrators.base import Integrator
 from mbd.kernel import fields as F
 from mbd.kernel.active_set import ActiveSetManager
+from mbd.results.columns import ModelColumns
 from mbd.results.failure import Failure
 from mbd.simulation.asked import asked
 from mbd.simulation.begin import begin, check_rank, guard_values, notify, set_side
@@ -156,7 +158,7 @@ class Run:
         if self.stop and not problem and not message.startswith("ended"):
             message = f"{self.stop!r} did not happen before t = {self.end:g} s"
         if not problem:
-            problem = fed or self._told(self._guarded(self._last_show)[0])
+            problem = fed or self._reversed() or self._told(self._guarded(self._last_show)[0])
         if problem:
             self.failure = (tried or attempt(self))(problem, final)  # a replay finds its sentence again
         if fed not in ("", problem):
@@ -262,6 +264,22 @@ class Run:
     def _judge_energy(self) -> tuple[str, str]:
         """Whether the scheme itself has put energy in; a replay of a few steps is not asked."""
         return (self.energy.judge(self) if self.limit is None else ""), ""
+
+    def _reversed(self) -> str:
+        """A cut joint that a step too long has put together the wrong way round, in a sentence; '' without one."""
+        v = self.values
+        q, anchors = v["q"][: v["n_q"]], v["anchors"][: v["n_anchors"]]
+        if self.limit is not None or not reversed_joints(self.mechanism, self.now, q, v["params"], anchors):
+            return ""
+        found = first_reversed(ModelColumns(whole_record(self), self.mechanism.equations))
+        return (
+            ""
+            if found is None
+            else (
+                f"t = {found[1]:.9g} s: {found[0]!r} was turned by half a turn in one step, and is put together the wrong "
+                "way round from there on; its rows cannot tell. Take a smaller dt, or tol=, or do not cut it"
+            )
+        )
 
     def _last_show(self) -> tuple[str, str]:
         self._show(finished=True)
