@@ -272,13 +272,10 @@ class Run:
         if self.limit is not None or not reversed_joints(self.mechanism, self.now, q, v["params"], anchors):
             return ""
         found = first_reversed(ModelColumns(whole_record(self), self.mechanism.equations))
+        joint, time = ("a cut joint", self.now) if found is None else found
         return (
-            ""
-            if found is None
-            else (
-                f"t = {found[1]:.9g} s: {found[0]!r} was turned by half a turn in one step, and is put together the wrong "
-                "way round from there on; its rows cannot tell. Take a smaller dt, or tol=, or do not cut it"
-            )
+            f"t = {time:.9g} s: {joint!r} was turned by half a turn in one step and is the wrong way round "
+            "since then, which its rows cannot tell; take a smaller dt, or tol=, or do not cut it"
         )
 
     def _last_show(self) -> tuple[str, str]:
