@@ -19,7 +19,9 @@ from mbd.equations.outputs import Outputs
 from mbd.equations.results import offer_results
 from mbd.equations.surroundings import Surroundings
 from mbd.errors import ModelError
+from mbd.joints.base import Joint
 from mbd.tape.derivatives import live
+from mbd.tape.functions import cos
 from mbd.tape.node import Node
 
 if TYPE_CHECKING:
@@ -52,9 +54,13 @@ def derive(model: Model | FrontDoor) -> Equations:
     return _derived(model, plan(model))
 
 
-def _derived(model: Model, plan: Plan) -> Equations:
-    """Kinematics, causes of forces, balance, constraints, results."""
-    scope = Surroundings(model.ground, plan.edges, plan.cut, model.gravity, model.tunable, plan.planar)
+def _derived(model: Model, plan: Plan, carried: Sequence[tuple[str, int]] = ()) -> Equations:
+    """Kinematics, causes of forces, balance, constraints, results.
+
+    Angles of cut joints that forces, rows, contacts, events or controllers depend on, and that only a rotation shows,
+    are `carried` as coordinates of their own in a second derivation.
+    """
+    scope = Surroundings(model.ground, plan.edges, plan.cut, model.gravity, model.tunable, plan.planar, carried)
     scope.offer_frames(model.frames.values())
     if plan.planar and plan.cut:
         scope.count_turns(anchors_held(scope, model.contacts))
@@ -86,13 +92,44 @@ def _derived(model: Model, plan: Plan) -> Equations:
         idle=tuple(constraints.idle), output=outputs, output_names=outputs.names,
         velocity_names=tuple(f"{coordinate.name}.rate" for coordinate in scope.coordinates), notes=plan.notes,
         figure=figure_of(model),
-        geometry=TreeGeometry(scope, dynamics, work, rests, constraints, plan.planar and vectors),
+        geometry=TreeGeometry(scope, dynamics, work, rests, constraints, plan.planar and vectors and not carried),
         frictions=tuple(constraints.frictions), turns=tuple(scope.turns.values()),
         facings=_facings(scope, constraints),
     )  # fmt: skip
+    seen = () if carried else _wrapped(scope, equations, model)
+    if seen:
+        return _derived(model, plan, seen)
     whole = work + _closed(scope, constraints)
     offer_results(outputs, scope, dynamics, whole, equations, model, {joint.name for joint in plan.floating})
     return equations
+
+
+def _wrapped(scope: Surroundings, equations: Equations, model: Model) -> list[tuple[str, int]]:
+    """(joint, number) of the angles of cut joints that jump by a turn, and on which the motion depends.
+
+    So does a controller that reads one. A `Bilateral` on the joint alone compares modulo a turn and needs no more.
+    """
+    angles: dict[int, tuple[str, int]] = {}
+    for joint in scope.cuts:
+        known = scope.joint(joint.name).coordinates if joint.labels and joint.is_vector else ()
+        for k, value in enumerate(known):
+            node = scope.real(value)
+            if any(each.op == "atan2" for each in live([node])):
+                angles[node.index] = joint.name, k
+    if not angles:
+        return []
+    alone = {law.name for law in model.bilaterals if isinstance(law.subject, Joint)}
+    nodes = [*equations.balance, equations.potential, *(row.value for row in equations.rows if row.owner not in alone)]
+    nodes += [row.rate for row in equations.rows if row.is_velocity] + [f.limit for f in equations.frictions]
+    for contact in equations.contacts:
+        nodes += [each for each in (contact.gap, contact.force, contact.only_while) if isinstance(each, Node)]
+    nodes += [guard.value for guard in equations.guards]
+    nodes += [effect.power for effect in equations.effects if effect.power is not None]
+    read = {name for controller in model.controllers for name in controller.reads}
+    labels = {joint.name: joint.labels for joint in scope.cuts}
+    found = {angles[node.index] for node in live(nodes) if node.index in angles}
+    found |= {(joint, k) for joint, k in angles.values() if f"{joint}.{labels[joint][k].name}" in read}
+    return sorted(found)
 
 
 def _facings(scope: Surroundings, constraints: Laws) -> tuple[Facing, ...]:
@@ -106,6 +143,11 @@ def _facings(scope: Surroundings, constraints: Laws) -> tuple[Facing, ...]:
             S, _ = joint.transform(joint.recover(R, p, scope), scope)
             trace = sum((dot(a, b) for a, b in zip(S, R, strict=True)), scope.tape.zero)
             found.append(Facing(joint.name, rows, scope.real(0.5 * (trace - 1.0))))
+    for (name, k), number in scope.carried.items():
+        joint = next(each for each in scope.cuts if each.name == name)
+        row = next(i for i, each in enumerate(constraints.rows) if each.owner == f"{name}.{joint.labels[k].name}")
+        off = scope.read(joint)[k] - scope.composed[number]
+        found.append(Facing(f"{name}.{joint.labels[k].name}", (row,), scope.real(cos(off))))
     return tuple(found)
 
 
@@ -198,7 +240,7 @@ class TreeGeometry:
 
     def partials(self, outputs: Sequence[Node]) -> list[dict[Node, Node]]:
         """∂node/∂x_j of the places and rotations inside the outputs."""
-        return partials(self.scope.placement, outputs)
+        return [*partials(self.scope.placement, outputs), *({} for _ in self.scope.carried)]
 
     def rates(self, outputs: Sequence[Node]) -> dict[Node, Node]:
         """d node/dt of the places and rotations inside the outputs."""

@@ -43,6 +43,8 @@ class Surroundings:
     gravity : (x, y, z) [m/s²]; run-time parameters 'gravity.x', …
     tunable : names of parameters that stay inputs even at an exact 0 or ±1
     planar : whether all moves in x–y and turns about z
+    carried : (joint, number of its angle) of angles of cut joints that are coordinates of their own, behind those of
+        the tree, so that they count turns
 
     Attributes
     ----------
@@ -60,11 +62,14 @@ class Surroundings:
         gravity: Vector3,
         tunable: Collection[str],
         planar: bool,
+        carried: Sequence[tuple[str, int]] = (),
     ) -> None:
         self.tape = Tape()
         self.parameters = ParameterTable(self.tape, tunable)
         self.tree, self.cuts = tuple(tree), tuple(cuts)
         size = sum(len(joint.labels) for joint in tree)
+        self.carried = {key: size + k for k, key in enumerate(carried)}
+        size += len(self.carried)
         self.inputs = Inputs.sized(self.tape, size, size)
         self.gravity = tuple(self.parameters.node(f"gravity.{a}", g) for a, g in zip(AXES, gravity, strict=True))
         self.states: list[tuple[Coordinate, Node]] = []
@@ -72,6 +77,7 @@ class Surroundings:
         self._joints: dict[str, JointMotion] = {}
         self.bodies = self._grown(ground)
         values = [node for joint in tree for node in self._tree_motion(joint).coordinates]
+        values += [self._own_angle(*key) for key in self.carried]
         self.composed = tuple(self.tape.lift(value) for value in values)
         self.placement = Placement(self.tape, list(self.bodies.values()), self.composed)
         self.views = Views(self.placement, self.composed, planar)
@@ -106,7 +112,18 @@ class Surroundings:
     @property
     def coordinates(self) -> tuple[Coordinate, ...]:
         """The entries of q."""
-        return tuple(Coordinate(f"{j.name}.{label.name}", label.unit) for j in self.tree for label in j.labels)
+        own = [Coordinate(f"{j.name}.{label.name}", label.unit) for j in self.tree for label in j.labels]
+        labels = {joint.name: joint.labels for joint in self.cuts}
+        return (*own, *(Coordinate(f"{name}.{labels[name][k].name}", labels[name][k].unit) for name, k in self.carried))
+
+    def _own_angle(self, joint: str, place: int) -> Node:
+        """An angle of a cut joint that is a coordinate of its own."""
+        k = self.carried[joint, place]
+        return self.inputs.q[k] + self.inputs.x[k]
+
+    def read(self, joint: Joint) -> list[Node]:
+        """The coordinates of a cut joint as its frames show them, angles between −π and π."""
+        return [self.tape.lift(value) for value in joint.recover(*self.relative(joint), self)]
 
     # what words ask -------------------------------------------------------------------------------------------------
     @property
@@ -147,11 +164,15 @@ class Surroundings:
             joint = next((joint for joint in self.cuts if joint.name == name), None)
             if joint is None:
                 raise UnknownNameError(nearest(name, [j.name for j in (*self.tree, *self.cuts)], "joint"))
-            values = [self.tape.lift(value) for value in joint.recover(*self.relative(joint), self)]
+            values = self.read(joint)
+            rates = self.rates(values)
             place, angle = self._angles.get(name, (-1, 0.0))
             if place >= 0:
                 values[place] = self.tape.lift(angle)
-            known = self._joints[name] = JointMotion(tuple(values), tuple(self.rates(values)))
+            for k in range(len(values)):
+                if (name, k) in self.carried:
+                    values[k] = self._own_angle(name, k)
+            known = self._joints[name] = JointMotion(tuple(values), tuple(rates))
         return known
 
     def named(self, name: str) -> Node:
