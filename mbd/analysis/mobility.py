@@ -223,7 +223,10 @@ def _idle(model: Any, work: Posture, active: list[int]) -> list[str]:
     chosen, titles = plan(model), list[str]()
     for joint in chosen.cut:
         parts = [part for owner, part in work.equations.idle if owner == joint.name]
-        present = sum(work.equations.rows[k].owner == joint.name for k in active)
+        present = sum(
+            work.equations.rows[k].owner == joint.name and not work.equations.rows[k].part.startswith("turns of")
+            for k in active
+        )
         count = max((3 if chosen.planar else 6) - len(joint.labels) - present, 0)
         parts.sort(key=lambda part: part not in IN_PLANE)
         titles += [f"{joint.name!r} ({part})" for part in parts[:count]]

@@ -18,7 +18,6 @@ from mbd.equations.laws import Laws
 from mbd.joints.base import Joint, row_unit
 from mbd.tape.derivatives import gradient, live
 from mbd.tape.evaluate import evaluate
-from mbd.tape.functions import sin
 from mbd.tape.node import Node, Scalar
 
 __all__ = ["anchors_held", "laws"]
@@ -45,11 +44,6 @@ def laws(
         for part, value in scope.cut_rows(joint)[0]:
             if _row(found, scope, joint.name, part, value, unit=row_unit(part), may_fold=True) < 0:
                 found.idle.append((joint.name, part))
-    for joint in scope.cuts:
-        for k, label in enumerate(joint.labels):
-            if (joint.name, k) in scope.carried:
-                shown, own = scope.read(joint)[k], scope.joint(joint.name).coordinates[k]
-                _row(found, scope, f"{joint.name}.{label.name}", "turns", sin(shown - own), unit="rad")
     for constraint in bilaterals:
         if isinstance(constraint, VelocityConstraint):
             _velocity_rows(found, scope, constraint)

@@ -137,6 +137,7 @@ def _facings(scope: Surroundings, constraints: Laws) -> tuple[Facing, ...]:
     found = []
     for joint in scope.cuts:
         owned = [k for k, row in enumerate(constraints.rows) if row.owner == joint.name and row.contact < 0]
+        owned = [k for k in owned if not constraints.rows[k].part.startswith("turns of")]
         rows = tuple(k for k in owned if constraints.rows[k].unit == "rad" and constraints.rows[k].friction < 0)
         if rows and joint.is_vector and joint.name not in scope.turns:
             R, p = scope.relative(joint)
@@ -145,7 +146,8 @@ def _facings(scope: Surroundings, constraints: Laws) -> tuple[Facing, ...]:
             found.append(Facing(joint.name, rows, scope.real(0.5 * (trace - 1.0))))
     for (name, k), number in scope.carried.items():
         joint = next(each for each in scope.cuts if each.name == name)
-        row = next(i for i, each in enumerate(constraints.rows) if each.owner == f"{name}.{joint.labels[k].name}")
+        part = f"turns of {joint.labels[k].name}"
+        row = next(i for i, each in enumerate(constraints.rows) if (each.owner, each.part) == (name, part))
         off = scope.read(joint)[k] - scope.composed[number]
         found.append(Facing(f"{name}.{joint.labels[k].name}", (row,), scope.real(cos(off))))
     return tuple(found)

@@ -22,6 +22,7 @@ from mbd.errors import UnknownNameError, nearest
 from mbd.joints.base import Joint, row_unit
 from mbd.scope import FrameMotion, JointMotion, Rotation, Triple
 from mbd.tape.derivatives import jvp, live
+from mbd.tape.functions import sin
 from mbd.tape.node import Node, Scalar, Table, Tape
 
 __all__ = ["Surroundings", "placeholders"]
@@ -211,6 +212,9 @@ class Surroundings:
         place, angle = self._angles.get(joint.name, (0, 0.0))
         if place < 0:
             rows = [(part, self.tape.lift(angle) if self._holds_turn(part, value) else value) for part, value in rows]
+        own = [k for k in range(len(joint.labels)) if (joint.name, k) in self.carried]
+        shown = self.read(joint) if own else []
+        rows += [(f"turns of {joint.labels[k].name}", sin(shown[k] - self._own_angle(joint.name, k))) for k in own]
         return rows, level
 
     def _holds_turn(self, part: str, value: Node) -> bool:
