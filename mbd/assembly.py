@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,9 +20,17 @@ from mbd.errors import AssemblyError, ModelError, UnknownNameError, nearest
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.not_finite import first_cause, tape_inputs
 from mbd.opening import opening
-from mbd.posture import TOLERANCE, Posture, capture, close_positions, close_velocities, position_rows
+from mbd.posture import (
+    TOLERANCE,
+    Posture,
+    capture,
+    close_nearby,
+    close_positions,
+    close_velocities,
+    position_rows,
+)  # fmt: skip
 from mbd.state import State
-from mbd.turns import nearest_turns
+from mbd.turns import choose_turns, nearest_turns
 
 __all__ = ["assemble", "undetermined"]
 
@@ -161,6 +169,8 @@ def _values(equations: Equations, named: _Named, guess: Mapping[str, float]) -> 
 
 def _closed(work: Posture, named: _Named, project: bool, model: Any) -> list[str]:
     """Close positions, then velocities; what contradicts them."""
+    if project and _closed_as_named(work, named):
+        return []
     equations = work.equations
     q, y, rows = work.q.copy(), work.y.copy(), position_rows(work)
     held_q, held_v = ([], []) if project else _held(equations, named)
@@ -176,6 +186,25 @@ def _closed(work: Posture, named: _Named, project: bool, model: Any) -> list[str
     speed_misfit = close_velocities(work, free[1])
     capture(work)  # approach speeds
     return contradictions(work, Attempt(rows, q, y, held_q, held_v, misfit, speed_misfit), model)
+
+
+def _closed_as_named(work: Posture, named: _Named) -> bool:
+    """Close around the named values without moving them, if that can be done from here."""
+    trial, rows = replace(work, q=work.q.copy(), y=work.y.copy(), anchors=work.anchors.copy()), position_rows(work)
+    held_q, held_v = _held(work.equations, named)
+    free = np.ones((2, work.equations.n_v), dtype=bool)
+    free[0, [each.place for each in held_q]] = free[1, [each.place for each in held_v]] = False
+    choose_turns(trial, rows)
+    if not np.max(np.abs(close_nearby(trial, rows, free[0])), initial=0.0) <= TOLERANCE:
+        return False
+    nearest_turns(trial, rows, list(named.q), TOLERANCE)
+    capture(trial)
+    speed = 1.0 + float(np.max(np.abs(trial.y[: work.equations.n_v]), initial=0.0))
+    if not np.max(np.abs(close_velocities(trial, free[1])), initial=0.0) <= TOLERANCE * speed:
+        return False
+    capture(trial)
+    work.q, work.y, work.anchors = trial.q, trial.y, trial.anchors
+    return True
 
 
 def _held(equations: Equations, named: _Named) -> tuple[list[Held], list[Held]]:

@@ -291,3 +291,11 @@ def test_both_backends_assemble_alike(backend):
     state = mbd.assemble(LINKAGE, {"a.angle": 1.1}, {"a.angle": -3.0})
     np.testing.assert_allclose(other.q, state.q, atol=1e-12)
     np.testing.assert_allclose(other.v, state.v, atol=1e-11)
+
+
+def test_projection_moves_no_named_value_that_need_not_move():
+    named = {"a.angle": 0.3}
+    held = mbd.assemble(LINKAGE, named, {"a.angle": 300.0})
+    state = mbd.assemble(LINKAGE, named, {"a.angle": 300.0}, project=True)
+    assert state["a.angle"] == 0.3 and state["a.angle.rate"] == 300.0
+    np.testing.assert_allclose(state.q, held.q, atol=1e-12)
