@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 from mbd.bodies.base import Body, Frame
 from mbd.bodies.domains import ParameterCheck
 from mbd.bodies.ground import Ground
-from mbd.bodies.values import Vector3, names_of, number, triple
+from mbd.bodies.values import Vector3, names_of, number, printable, triple
 from mbd.constraints.base import Constraint, VelocityConstraint
 from mbd.constraints.bilateral import Bilateral
 from mbd.constraints.controller import Controller
@@ -280,7 +280,7 @@ def _bare(joint: Joint, tunable: Iterable[str]) -> dict[str, dict[str, Any]]:
 def _title(name: Any) -> str:
     if not isinstance(name, str) or not name.strip():
         raise ModelError(f"Model needs a name as its first argument, such as Model('kneed walker'); got {name!r}")
-    return name
+    return printable(name, "Model")
 
 
 def all_are(kind: Any, words: Iterable[Word], sentence: str) -> list[Word]:

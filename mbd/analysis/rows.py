@@ -7,6 +7,7 @@ from abc import ABC, abstractmethod
 from pathlib import Path
 from typing import Any
 
+from mbd.results.archive import write_whole
 from mbd.results.tables import library
 
 __all__ = ["Rows"]
@@ -26,10 +27,13 @@ class Rows(ABC):
     def to_csv(self, path: str | Path) -> Path:
         """The same as a file of comma-separated values."""
         target = Path(path)
-        target.parent.mkdir(parents=True, exist_ok=True)
         rows = self.rows()
-        with target.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, list(rows[0]) if rows else [])
-            writer.writeheader()
-            writer.writerows(rows)
+
+        def fill(partial: Path) -> None:
+            with partial.open("w", newline="", encoding="utf-8") as file:
+                writer = csv.DictWriter(file, list(rows[0]) if rows else [])
+                writer.writeheader()
+                writer.writerows(rows)
+
+        write_whole(target, fill)
         return target

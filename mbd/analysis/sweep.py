@@ -15,6 +15,7 @@ import numpy as np
 
 from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import MbdError, ModelError, SimulationError, UnknownNameError, nearest
+from mbd.results.archive import write_whole
 from mbd.simulation.asked import asked
 from mbd.simulation.simulate import simulate
 from mbd.state import State
@@ -78,11 +79,14 @@ class Sweep:
         import csv
 
         path = Path(path)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with path.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(self.columns)
-            writer.writerows(zip(*self.columns.values(), strict=True))
+
+        def fill(partial: Path) -> None:
+            with partial.open("w", newline="", encoding="utf-8") as file:
+                writer = csv.writer(file)
+                writer.writerow(self.columns)
+                writer.writerows(zip(*self.columns.values(), strict=True))
+
+        write_whole(path, fill)
         return path
 
     def __repr__(self) -> str:

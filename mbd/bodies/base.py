@@ -10,7 +10,7 @@ from typing import Any
 from mbd.bodies.algebra import IDENTITY, constant_rotation, product
 from mbd.bodies.domains import Domain, Parameterized, at_least_zero
 from mbd.bodies.mass import MassProperties
-from mbd.bodies.values import Vector3, number, triple, unit_vector
+from mbd.bodies.values import Vector3, number, printable, triple, unit_vector
 from mbd.errors import ModelError, nearest
 from mbd.scope import Rotation, Scope, Triple
 from mbd.tape.node import Scalar
@@ -99,6 +99,8 @@ class Body(Parameterized, ABC):
             name = f"point({offset[0]:.12g}, {offset[1]:.12g}, {offset[2]:.12g})"
         elif name in self.frames:
             raise ModelError(f"body '{self.name}' has a frame '{name}' already; give the point another name")
+        else:
+            printable(name, f"a point of '{self.name}'")
         return Frame(self, name, offset)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import unicodedata
 from collections.abc import Iterable, Mapping
 from typing import Any, TypeAlias
 
@@ -12,11 +13,15 @@ from mbd.errors import ModelError
 
 __all__ = [
     "Vector3", "flag", "is_finite_number", "is_number", "name_of", "named_number_faults", "names_of", "number",
-    "numbers", "shown", "triple", "unit_vector",
+    "numbers", "printable", "shown", "triple", "unit_vector",
 ]  # fmt: skip
 
 Vector3: TypeAlias = tuple[float, float, float]
 """Three plain numbers, known when the model is described."""
+
+
+TURNING = "\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069"
+"""Signs after which text runs the other way."""
 
 
 def name_of(name: Any, what: str) -> str:
@@ -25,6 +30,18 @@ def name_of(name: Any, what: str) -> str:
         raise ModelError(f"{what} needs a name as its first argument, such as {what}('left knee', …); got {name!r}")
     if "." in name:
         raise ModelError(f"{what} {name!r}: a name holds no dot, since dots part names as in 'left knee.angle'")
+    return printable(name, what)
+
+
+def printable(name: str, what: str) -> str:
+    """A name that can be shown anywhere: what would move a terminal's cursor or turn its text around is no part of one.
+
+    >>> printable("left knee", "Revolute")
+    'left knee'
+    """
+    wrong = [sign for sign in name if unicodedata.category(sign) in ("Cc", "Cs", "Zl", "Zp") or sign in TURNING]
+    if wrong:
+        raise ModelError(f"{what} {name!r}: a name holds no control characters such as {wrong[0]!r}; leave them out")
     return name
 
 

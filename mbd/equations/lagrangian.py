@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
 
 from mbd.bodies.domains import ParameterCheck
-from mbd.bodies.values import named_number_faults, names_of, number
+from mbd.bodies.values import named_number_faults, names_of, number, printable
 from mbd.constraints.base import Constraint
 from mbd.constraints.controller import Controller
 from mbd.constraints.event import Event
@@ -48,6 +48,7 @@ class Coordinate:
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name.strip():
             raise ModelError(f"Coordinate needs a name, such as Coordinate('theta'); got {self.name!r}")
+        printable(self.name, "Coordinate")
         if not isinstance(self.unit, str):
             raise ModelError(f"unit of Coordinate {self.name!r} must be a text such as 'rad' or 'm', got {self.unit!r}")
         object.__setattr__(self, "default", number(self.default, f"default of Coordinate {self.name!r}"))
@@ -299,6 +300,7 @@ def _check_shapes(system: Lagrangian) -> None:
     """Arguments of a wrong kind, all of them at once."""
     if not isinstance(system.name, str) or not system.name.strip():
         raise ModelError(f"Lagrangian needs a name as its first argument, got {system.name!r}")
+    printable(system.name, "Lagrangian")
     faults = []
     if isinstance(system.coordinates, str | Mapping) or not isinstance(system.coordinates, Iterable):
         faults.append(f"coordinates must be a list of mbd.Coordinate or names, got {system.coordinates!r}")

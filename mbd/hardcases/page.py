@@ -17,6 +17,7 @@ import numpy as np
 from mbd.hardcases.case import Curve, Figure, definition
 from mbd.hardcases.judging import Judged, Verdict, ratio, short
 from mbd.hardcases.table import number, summary, worst_by_scheme
+from mbd.results.archive import write_whole
 from mbd.view.report import machine, versions
 from mbd.view.style import CYCLE, rules
 
@@ -68,7 +69,7 @@ def write_page(verdicts: Sequence[Verdict], path: str | Path, note: str = "") ->
 </body>
 </html>
 """
-    place.write_text(text, encoding="utf-8")
+    write_whole(place, lambda partial: partial.write_text(text, encoding="utf-8"))
     return place
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from mbd.errors import ModelError
 from mbd.hardcases.case import Figure
 from mbd.hardcases.judging import Judged, Verdict, ratio, short
+from mbd.results.archive import write_whole
 
 __all__ = [
     "BEGIN", "END", "as_markdown", "as_text", "figure_text", "number", "summary", "worst_by_scheme", "worst_text",
@@ -157,6 +158,6 @@ def write_markdown(verdicts: Sequence[Verdict], path: str | Path) -> Path:
         raise ModelError(f"{place} needs the line {BEGIN} once and below it {END} once; the table goes between them")
     head, _, rest = text.partition(BEGIN)
     tail = rest.partition(END)[2]
-    place.parent.mkdir(parents=True, exist_ok=True)
-    place.write_text(f"{head}{BEGIN}\n{as_markdown(verdicts)}\n{END}{tail}", encoding="utf-8")
+    page = f"{head}{BEGIN}\n{as_markdown(verdicts)}\n{END}{tail}"
+    write_whole(place, lambda partial: partial.write_text(page, encoding="utf-8"))
     return place

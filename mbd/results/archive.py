@@ -77,9 +77,12 @@ def write(target: Path, arrays: Arrays, meta: Mapping[str, Any]) -> None:
 
 
 def write_whole(target: Path, fill: Callable[[Path], Any]) -> None:
-    """Write beside the target, then rename, so that a reader never sees half a file."""
+    """Write beside the target, then rename, so that a reader never sees half a file; not beside a device or a pipe."""
     target.parent.mkdir(parents=True, exist_ok=True)
-    partial = target.with_name(f".{target.name}.{os.getpid()}")
+    if target.exists() and not target.is_file():
+        fill(target)
+        return
+    partial = target.with_name(f".{target.name}.{os.getpid()}.{os.urandom(4).hex()}")
     try:
         fill(partial)
         partial.replace(target)

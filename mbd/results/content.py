@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from mbd.bodies.values import printable
 from mbd.results.archive import Head, Members, Unreadable
 
 __all__ = ["arrays_of_run", "arrays_within", "expect", "of_kind"]
@@ -83,6 +84,7 @@ def arrays_of_run(meta: Mapping[str, Any], members: Members) -> set[str]:
     wanted |= _columns(meta, members, heads, count)
     _events(meta["events"], count)
     _words(meta)
+    _printable(meta)
     return wanted | _ledger(meta, members, count) | arrays_within(meta["final"]) | arrays_within(meta["failure"])
 
 
@@ -157,3 +159,12 @@ def _words(meta: Mapping[str, Any]) -> None:
     of_kind(violation.get("worst", ""), str, "'violation'")
     for name in ("length", "angle", "rate"):
         of_kind(violation.get(name, 0.0), int | float, "'violation'")
+
+
+def _printable(meta: Mapping[str, Any]) -> None:
+    """Names as models have them, without signs that a terminal obeys."""
+    facts = meta["facts"]
+    names = [facts["model"], *meta["names"], *(name for name, _ in facts["coordinates"])]
+    names += [contact["name"] for contact in facts["contacts"]] + [event["name"] for event in meta["events"]]
+    for name in names:
+        printable(name, "the file")

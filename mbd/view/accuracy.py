@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mbd.view.plots import drawing
-from mbd.view.style import CYCLE
+from mbd.view.style import CYCLE, as_label
 
 if TYPE_CHECKING:
     from mbd.analysis.accuracy import Accuracy, Point
@@ -55,7 +55,7 @@ def work_precision(found: Accuracy, path: str | Path | None = None) -> Any:
             axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.3)
             figure.draw_without_rendering()  # the legend takes its room first
             _labelled(axes, labels)
-        figure.suptitle(f"{found.model}: what accuracy costs", x=0.01, ha="left", fontweight="bold")
+        figure.suptitle(f"{as_label(found.model)}: what accuracy costs", x=0.01, ha="left", fontweight="bold")
     return figure
 
 
@@ -65,7 +65,7 @@ def _scheme(axes: Any, number: int, scheme: str, points: list[Point]) -> None:
     fixed = [point for point in points if point.tol is None]
     to_tolerance = [point for point in points if point.tol is not None]
     for line, dashes, size in ((fixed, "-", 4.5), (to_tolerance, "--", 3.0)):
-        named = {"label": scheme} if line is (fixed or to_tolerance) and line else {}
+        named = {"label": as_label(scheme)} if line is (fixed or to_tolerance) and line else {}
         axes.plot(
             [1e3 * point.seconds for point in line], [height(point) for point in line], dashes, markersize=size,
             linewidth=1.5 if dashes == "-" else 1.0, **named, **style,

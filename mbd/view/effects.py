@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mbd.view.plots import drawing
-from mbd.view.style import CYCLE
+from mbd.view.style import CYCLE, as_label
 
 if TYPE_CHECKING:
     from mbd.analysis.effects import Contribution, Effects
@@ -39,14 +39,13 @@ def bars(found: Effects, path: str | Path | None = None) -> Any:
         cost.barh(places, [one.operations for one in each], color=shades, height=0.62)
         _label(cost, [one.operations for one in each], [_cost(one) for one in each])
         cost.set_xlabel("operations (ns a step)")
-        share.set_yticks(places, [one.name for one in each])
+        share.set_yticks(places, [as_label(one.name) for one in each])
         share.set_ylim(len(each) - 0.4, -0.6)
         for axes in (share, change, cost):
             axes.grid(False, axis="y")
             axes.tick_params(axis="y", length=0)
-        figure.suptitle(
-            f"{found.model}: what each effect carries, changes and costs", x=0.01, ha="left", fontweight="bold"
-        )
+        title = f"{as_label(found.model)}: what each effect carries, changes and costs"
+        figure.suptitle(title, x=0.01, ha="left", fontweight="bold")
     return figure
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from mbd.errors import ModelError
 from mbd.view.plots import drawing
-from mbd.view.style import CYCLE, NEUTRAL
+from mbd.view.style import CYCLE, NEUTRAL, as_label
 
 if TYPE_CHECKING:
     from mbd.analysis.linearization import Linearization, NaturalMode
@@ -40,10 +40,10 @@ def modes(linear: Linearization, path: str | Path | None = None, most: int = 6) 
             axes.set_xlim(-1.12, 1.12)
             axes.set_title(_title(mode), fontsize=8.5, fontweight="normal")
             axes.grid(False, axis="y")
-        panels[0].set_yticks(height, names)
+        panels[0].set_yticks(height, [as_label(name) for name in names])
         panels[0].set_ylim(len(names) - 0.4, -0.6)
         figure.supxlabel("part of the largest" + (", pale: a quarter period later" if turned else ""), fontsize=8.5)
-        figure.suptitle(f"{linear.model}: natural modes", x=0.01, ha="left", fontweight="bold")
+        figure.suptitle(f"{as_label(linear.model)}: natural modes", x=0.01, ha="left", fontweight="bold")
     return figure
 
 

@@ -13,12 +13,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mbd.results.archive import write_whole
 from mbd.results.interpolation import Grid
 from mbd.results.ledger import SPENT, Ledger, Part
 from mbd.results.tables import library
 from mbd.results.units import unit
 from mbd.view.curves import curves
-from mbd.view.style import CYCLE, NEUTRAL, color, rules
+from mbd.view.style import CYCLE, NEUTRAL, as_label, color, rules
 
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
@@ -52,8 +53,9 @@ def drawing(path: str | Path | None, width: float, height: float) -> Iterator[An
             figure = Figure(figsize=(width, height), layout="constrained")
         yield figure
         if path is not None:
-            Path(path).parent.mkdir(parents=True, exist_ok=True)
-            figure.savefig(path)
+            kind = Path(path).suffix.removeprefix(".") or str(matplotlib.rcParams["savefig.format"])
+            target = Path(path) if Path(path).suffix else Path(path).with_name(f"{Path(path).name}.{kind}")
+            write_whole(target, lambda partial: figure.savefig(partial, format=kind))
 
 
 def histories(run: Trajectory, *names: str, path: str | Path | None = None) -> Any:
@@ -75,8 +77,8 @@ def histories(run: Trajectory, *names: str, path: str | Path | None = None) -> A
         for axes, (kind, group) in zip(grid, panels.items(), strict=False):
             for number, name in enumerate(group):
                 style = ("-", "--")[number // len(CYCLE) % 2]
-                axes.plot(time, values[name], style, color=CYCLE[number % len(CYCLE)], label=name)
-            axes.set_ylabel(f"{QUANTITIES.get(kind, 'value')} [{kind}]" if kind else "value")
+                axes.plot(time, values[name], style, color=CYCLE[number % len(CYCLE)], label=as_label(name))
+            axes.set_ylabel(f"{QUANTITIES.get(kind, 'value')} [{as_label(kind)}]" if kind else "value")
             _mark(axes, run)
             _legend(axes, len(group))
         if bars:
@@ -84,7 +86,7 @@ def histories(run: Trajectory, *names: str, path: str | Path | None = None) -> A
         grid[-1].set_xlabel("time [s]")
         if len(run) and run.time[-1] > run.time[0]:
             grid[-1].set_xlim(run.time[0], run.time[-1])
-        figure.suptitle(run.name, x=0.01, ha="left", fontweight="bold")
+        figure.suptitle(as_label(run.name), x=0.01, ha="left", fontweight="bold")
     return figure
 
 
@@ -114,7 +116,7 @@ def _bars(axes: Any, run: Trajectory) -> None:
     for row, name in enumerate(names):
         spans = stretches(run.time, run.record.closed[:, row])
         axes.broken_barh([(a, b - a) for a, b in spans], (row - 0.32, 0.64), color=color(name), alpha=0.85, linewidth=0)
-    axes.set_yticks(range(len(names)), names)
+    axes.set_yticks(range(len(names)), [as_label(name) for name in names])
     axes.set_ylim(len(names) - 0.4, -0.6)
     axes.tick_params(axis="y", length=0)
     axes.grid(False, axis="y")
@@ -134,7 +136,7 @@ def contacts(run: Trajectory, path: str | Path | None = None) -> Any:
         axes = figure.subplots()
         _bars(axes, run)
         axes.set_xlabel("time [s]")
-        axes.set_title(f"{run.name}: closed contacts")
+        axes.set_title(f"{as_label(run.name)}: closed contacts")
     return figure
 
 
@@ -147,7 +149,7 @@ def energy(ledger: Ledger, path: str | Path | None = None) -> Any:
     time, floor = ledger.time, float(np.min(ledger.potential, initial=np.inf))
     spent, given = _spent(ledger), [part for part in ledger.parts if part.kind not in SPENT]
     layers = [ledger.kinetic, ledger.potential - floor, *(-part.energy for part in spent)]
-    labels = ["kinetic", "potential (above its least)", *(f"lost: {part.name}" for part in spent)]
+    labels = ["kinetic", "potential (above its least)", *(f"lost: {as_label(part.name)}" for part in spent)]
     ceiling = ledger.total[:1] - floor + sum((part.energy for part in given), np.zeros(len(time)))
     with drawing(path, 7.4, 4.4 + 0.17 * (len(layers) // 3)) as figure:
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[3.0, 1.0])
@@ -197,14 +199,14 @@ def phase_portrait(run: Trajectory, *coordinates: str, path: str | Path | None =
             place, rate = values[name], values[f"{name}.rate"]
             shade = CYCLE[number % len(CYCLE)]
             width = 3.0 if "left" in name.split() else 1.1  # the two sides of a repeating walk lie on each other
-            axes.plot([], [], color=shade, linewidth=width, label=name)
+            axes.plot([], [], color=shade, linewidth=width, label=as_label(name))
             axes.plot(place[:1], rate[:1], "o", color=shade, markersize=5)
             for start, stop in pairwise(cuts):
                 axes.plot(place[start:stop], rate[start:stop], color=shade, linewidth=width)
                 axes.plot(place[stop - 1 : stop + 1], rate[stop - 1 : stop + 1], ":", color=shade, linewidth=width)
         kinds = {unit(name, run.facts) for name in wanted}
         kind = kinds.pop() if len(kinds) == 1 else ""
-        axes.set_xlabel(f"{QUANTITIES.get(kind, 'coordinate')} [{kind}]" if kind else "coordinate")
-        axes.set_ylabel(f"rate [{kind}/s]" if kind else "rate")
+        axes.set_xlabel(f"{QUANTITIES.get(kind, 'coordinate')} [{as_label(kind)}]" if kind else "coordinate")
+        axes.set_ylabel(f"rate [{as_label(kind)}/s]" if kind else "rate")
         _legend(axes, min(len(wanted), 2))
     return figure

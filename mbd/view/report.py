@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mbd.analysis.gait import gait
-from mbd.results.archive import plain
+from mbd.results.archive import plain, write_whole
 from mbd.results.storage import SUFFIX
 from mbd.results.summary import facts
 
@@ -102,5 +102,5 @@ def write(run: Trajectory, folder: str | Path, wall: Mapping[str, float], plots:
             run.plot(*forces, path=place / "forces.png")
             paths.append(place / "forces.png")
     text = json.dumps(record(run, wall), indent=2, default=plain)
-    (place / "record.json").write_text(text + "\n", encoding="utf-8")
+    write_whole(place / "record.json", lambda partial: partial.write_text(text + "\n", encoding="utf-8"))
     return [*paths, place / "record.json"]

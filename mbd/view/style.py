@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-__all__ = ["CYCLE", "NEUTRAL", "SIDES", "color", "rules"]
+__all__ = ["CYCLE", "NEUTRAL", "SIDES", "as_label", "color", "rules"]
 
 CYCLE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F6A00", "#4D4D4D")
 """Colors that stay apart for color-blind readers (Okabe & Ito 2008), the yellow darkened for white paper."""
@@ -19,6 +19,12 @@ def color(name: str) -> str:
     """The color of a body or contact: its side's, or neutral."""
     words = name.replace(".", " ").split()
     return next((value for side, value in SIDES.items() if side in words), NEUTRAL)
+
+
+def as_label(name: str) -> str:
+    """A name as matplotlib draws it: without formulas between dollar signs; one that begins with _ is not left out."""
+    text = name.replace("$", r"\$")
+    return f" {text}" if text.startswith("_") else text
 
 
 def rules() -> dict[str, Any]:

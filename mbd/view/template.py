@@ -9,6 +9,8 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from mbd.results.archive import write_whole
+
 __all__ = ["filled", "written"]
 
 
@@ -34,6 +36,5 @@ def filled(folder: str, content: Any, parts: Mapping[str, str], scripts: Sequenc
 def written(page: str, path: str | Path) -> Path:
     """Where the page was written; folders are made."""
     target = Path(path)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    target.write_text(page, encoding="utf-8")
+    write_whole(target, lambda partial: partial.write_text(page, encoding="utf-8"))
     return target

@@ -1,0 +1,94 @@
+"""Names that mean something to matplotlib, to a terminal or to a file are shown as they are, or refused."""
+
+from __future__ import annotations
+
+import io
+import json
+import warnings
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import mbd
+from mbd.bodies.values import printable
+from mbd.results import archive
+
+ODD = ("_left", "$m", "$a$ b_c^{", r"50 \frac", "a & b < c", "колено", "膝")
+CONTROL = ("a\x1b[2Jb", "a\nb", "a\rb", "a\x00", "a\u202eb", "a\x9b", "a\u2028b", "\ud800x")
+
+
+def ball(name: str) -> mbd.Trajectory:
+    model = mbd.Model(name)
+    body = mbd.PointMass(f"{name} body", mass=1.0)
+    model.connect(mbd.Translation(name, model.ground.origin, body.origin))
+    model.constrain(mbd.Unilateral(f"{name} floor", mbd.touchdown(body.origin)))
+    model.apply(mbd.Applied(f"{name} air", body.origin, force=lambda v: (-0.3 * v[0], 0, 0), arguments=(body.origin,)))
+    return mbd.simulate(model, mbd.assemble(model, {f"{name}.x": 0.3, f"{name}.y": 0.1}), dt=5e-3, until=0.3)
+
+
+@pytest.mark.parametrize("name", ODD[:3])
+def test_odd_names_are_drawn_as_they_are(name, tmp_path):
+    pytest.importorskip("matplotlib")
+    run = ball(name)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message=".*Glyph.*")
+        warnings.filterwarnings("error", message=".*legend.*")
+        figure = run.plot(path=tmp_path / "plot.png")
+        run.energy.plot(path=tmp_path / "energy.svg")
+        figure.canvas.draw()
+    shown = [text.get_text().replace(r"\$", "$").strip() for text in figure.axes[0].get_legend().get_texts()]
+    assert shown == [f"{name}.x", f"{name}.y"]
+    assert all("$" not in text.get_text().replace(r"\$", "") for text in figure.axes[-1].get_yticklabels())
+
+
+@pytest.mark.parametrize("name", CONTROL, ids=ascii)
+def test_names_with_control_characters_are_refused(name):
+    ground = mbd.Model("ground").ground.origin
+    words = (
+        lambda: mbd.Model(name), lambda: mbd.PointMass(name, mass=1.0), lambda: mbd.Translation(name, ground, ground),
+        lambda: mbd.Lagrangian(name, ["q"], lambda q_rate: q_rate**2), lambda: mbd.Coordinate(name),
+        lambda: mbd.PointMass("b", mass=1.0).point(1.0, 0.0, name=name), lambda: mbd.Event(name, mbd.height(ground)),
+    )  # fmt: skip
+    for word in words:
+        with pytest.raises(mbd.ModelError, match="control characters") as told:
+            word()
+        assert str(told.value).isprintable()
+
+
+def test_ordinary_names_of_any_language_are_kept():
+    for name in (*ODD, "left knee", "نیم\u200cفاصله", "e\u0301", "non\u00a0breaking"):
+        assert printable(name, "Model") == name
+
+
+def test_a_file_whose_names_a_terminal_would_obey_is_refused(tmp_path):
+    path = ball("ball").save(tmp_path / "run")
+    with zipfile.ZipFile(path) as source:
+        arrays = {name.removesuffix(".npy"): np.load(io.BytesIO(source.read(name))) for name in source.namelist()}
+    meta = json.loads(arrays.pop("meta").tobytes())
+    del arrays["hash"]
+    archive.write(path, arrays, meta)
+    assert mbd.load(path).success
+    meta["facts"]["model"] = "ball\x1b]0;title\x07"
+    archive.write(path, arrays, meta)
+    with pytest.raises(mbd.TrajectoryError, match="control characters") as told:
+        mbd.load(path)
+    assert "\x1b" not in str(told.value)
+
+
+@pytest.mark.parametrize("kind", ["page", "plot", "save"])
+def test_a_page_that_fails_while_it_is_written_leaves_the_one_before(kind, tmp_path, monkeypatch):
+    run = ball("ball")
+    path = tmp_path / {"page": "page.html", "plot": "plot.png", "save": "run.npz"}[kind]
+    write = {"page": run.page, "plot": lambda place: run.plot(path=place), "save": run.save}[kind]
+    write(path)
+    before = path.read_bytes()
+
+    def full(partial, *_, **__):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "replace", full)
+    with pytest.raises(OSError, match="No space left"):
+        write(path)
+    assert path.read_bytes() == before and list(tmp_path.iterdir()) == [path]
