@@ -185,7 +185,7 @@ def _closed(work: Posture, named: _Named, project: bool, model: Any) -> list[str
     capture(work)
     speed_misfit = close_velocities(work, free[1])
     capture(work)  # approach speeds
-    return contradictions(work, Attempt(rows, q, y, held_q, held_v, misfit, speed_misfit), model)
+    return contradictions(work, Attempt(rows, q, y, held_q, held_v, misfit, speed_misfit, project), model)
 
 
 def _closed_as_named(work: Posture, named: _Named) -> bool:

@@ -16,12 +16,17 @@ from mbd.posture import TOLERANCE, Posture
 __all__ = ["Attempt", "contradictions", "infeasible"]
 
 
+PROJECT = ", or use assemble(..., project=True) to move all"
+"""Advice to those who have not followed it yet."""
+
+
 @dataclass(frozen=True)
 class Attempt:
     """How a start was to be closed.
 
     rows : numbers of the rows on positions; q, y : the values from which closing began
     held_q, held_v : named coordinates and rates, which stay
+    projected : whether named coordinates and rates were free to move
     misfit, speed_misfit : what is left of `rows` and named positions, of the active rows and named rates
     """
 
@@ -32,6 +37,7 @@ class Attempt:
     held_v: Sequence[Held]
     misfit: Vector
     speed_misfit: Vector
+    projected: bool = False
 
 
 def infeasible(work: Posture, rows: Sequence[int], start: Vector, misfit: Vector, model: Any, named: bool) -> list[str]:
@@ -79,7 +85,7 @@ def contradictions(work: Posture, attempt: Attempt, model: Any) -> list[str]:
             place = "" if row.is_velocity else f"position residual {position:.6g} {row.unit}, "
             found.append(
                 f"the start contradicts {row.title}: {place}velocity residual {velocity:.6g} {row.unit}/s; "
-                "name fewer values, or use assemble(..., project=True) to move all" + sets.get(repr(row.owner), "")
+                f"name fewer values{'' if attempt.projected else PROJECT}" + sets.get(repr(row.owner), "")
             )
     return found
 

@@ -10,12 +10,12 @@ from mbd.bodies.base import Body, Frame
 from mbd.bodies.domains import ParameterCheck, Parameterized
 from mbd.bodies.ground import Ground
 from mbd.bodies.point_mass import PointMass
-from mbd.errors import ModelError, nearest
+from mbd.errors import MbdError, ModelError, nearest
 from mbd.forces.base import Force
 from mbd.joints.base import Joint
 from mbd.joints.screw import Screw
 from mbd.topology.graph import disconnected
-from mbd.topology.plan import cut_names, is_planar
+from mbd.topology.plan import cut_names, is_planar, plan
 
 if TYPE_CHECKING:
     from mbd.constraints.base import Constraint
@@ -56,7 +56,7 @@ def parameter_check(model: Model) -> ParameterCheck:
 def quantities(model: Model) -> list[str]:
     """Names that functions, measures and controllers may ask for: 't', coordinates, rates, places, velocities."""
     names = ["t"]
-    for joint in model.joints:
+    for joint in (*model.joints, *_floating(model)):
         for coordinate in joint.coordinate_names:
             names += [coordinate, f"{coordinate}.rate"]
         if len(joint.labels) == 1:
@@ -64,6 +64,14 @@ def quantities(model: Model) -> list[str]:
     for frame in model.frames:
         names += [f"{frame}.{part}" for part in ("x", "y", "z", "vx", "vy", "vz")]
     return names
+
+
+def _floating(model: Model) -> Sequence[Joint]:
+    """The joints by which bodies float because of the choice of cuts; none where that choice is a fault itself."""
+    try:
+        return plan(model).floating
+    except MbdError:
+        return ()
 
 
 RESULTS = (

@@ -237,3 +237,14 @@ def test_a_state_turned_by_hand_holds_the_directions_of_the_same_pose():
     run, turned = (mbd.simulate(model, s, mbd.HHT(), dt=1e-3, until=0.1) for s in (start, replace(start, q=q)))
     assert turned["wrist.angle"] == pytest.approx(run["wrist.angle"] + 2 * TURN, abs=1e-9)
     assert turned.violation.angle < 1e-9
+
+
+def test_coordinates_of_a_floating_body_serve_in_measures_as_in_starts_and_results():
+    model = mbd.Model("pendulum", cut="all")
+    rod = mbd.Link("rod", 1.0, 1.0, 0.5)
+    model.connect(mbd.Revolute("pin", model.ground.origin, rod.start))
+    model.constrain(mbd.Event("turned", mbd.measure(lambda q: q - 7.5, "rod floating.angle")))
+    start = mbd.assemble(model, position={"rod floating.angle": 7.2}, velocity={"pin.angle": 6.0})
+    run = mbd.simulate(model, start, dt=1e-3, until=0.2)
+    assert [event.name for event in run.events] == ["turned"]
+    assert run["pin.angle"][-1] == pytest.approx(run["rod floating.angle"][-1] - 2 * np.pi, abs=1e-6)
