@@ -58,6 +58,8 @@ class Samples:
             raise ModelError(
                 f"Samples needs as many values as times; got {len(self.time)} times and values of shape {table.shape}"
             )
+        if len(table) == 0:
+            raise ModelError("Samples needs one time and value at least, got none")
         rows: Any = table.tolist()
         object.__setattr__(self, "values", tuple(rows if table.ndim == 1 else map(tuple, rows)))
         object.__setattr__(self, "kind", kind)

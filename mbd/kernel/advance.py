@@ -50,6 +50,7 @@ from mbd.kernel.interior import parts_to_take
 from mbd.kernel.locate import locate
 from mbd.kernel.nonsmooth import lands, lets_go
 from mbd.kernel.observe import is_awaited, store_row
+from mbd.kernel.pace import relax_pace
 from mbd.kernel.pairs import ALONE, FIRST, SECOND
 from mbd.kernel.restart import consistent
 from mbd.kernel.settle import room_to_log
@@ -163,6 +164,8 @@ def conclude(K: Any, h: float, full: float, t1: float, cut: bool, within: bool, 
             K.state[GRID] = 0
         if K.adaptive == 1 and not within:
             K.clock[STEP] = K.clock[NEXT]
+        elif K.clock[STEP] < K.dt:
+            relax_pace(K)
         if K.state[NEAR] == LEFT:
             status = leave_pose(K, h)
             if status != 0:

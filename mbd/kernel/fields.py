@@ -66,6 +66,7 @@ REAL_ARRAYS = (
     "side",  # sign of each user guard since it last crossed
     "doubt",  # guard values, then round-off of positions and velocities, where a guard's own round-off is asked for
     "restitution",
+    "pace",  # of each contact, as a penalty contact closes: see the places in `pace`
     "seen",  # at which switch of an instant these were noted, 0 for none: who is closed, sticks, …, and the state
     "pick",  # the fired guard: estimate, bracket, sizes
     "store", "log", "detail",
@@ -99,7 +100,7 @@ Kernel = namedtuple("Kernel", FIELDS)  # type: ignore[misc]
 
 KEPT_REALS = (
     "clock", "q", "y", "rate", "aux", "slope", "lam", "lam_slope", "shift", "shift_change", "anchors", "guards0",
-    "scale", "weight", "mix", "deepest", "sinking", "side", "detail", "slip", "lean", "past_stages", "left",
+    "scale", "weight", "mix", "deepest", "sinking", "side", "detail", "slip", "lean", "past_stages", "left", "pace",
 )  # fmt: skip
 """What of the real arrays the next step depends on: restored before a step, they make it the same to the bit."""
 KEPT_INTEGERS = ("closed", "armed", "touched", "dropped", "rows", "state", "sticks", "loose", "was")
@@ -139,8 +140,8 @@ ACCELERATIONS, GUARDS, SCALES, COMPOSE, TERMS = range(5)
 DONE, FULL, NEW_MODE, EVENT, PAUSE, LAST = range(6)
 (
     NOT_FINITE, NOT_CONVERGED, SINGULAR, STAGNATED, CHATTER, NO_IMPACT, DEPENDENT, CONFLICT, NO_LOCATION, ENERGY_GAIN,
-    NO_FORCE, TOO_TIGHT, TOO_NEAR, TOO_SMALL, STIRRED, OUTGROWN, GAINED,
-) = range(10, 27)  # fmt: skip
+    NO_FORCE, TOO_TIGHT, TOO_NEAR, TOO_SMALL, STIRRED, OUTGROWN, GAINED, TOO_BRIEF,
+) = range(10, 28)  # fmt: skip
 # kinds of fired guards
 CLOSE, OPEN_PULL, OPEN_GAP, OPEN_FORCE, CROSS, WATCH, GRAZE, PRESS, STICK, SLIP, STICK_BRIEF = range(11)
 # kinds in the log

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
-from mbd.kernel.fields import AUX_STEP, NEAR, PIVOT
+from mbd.kernel.fields import AUX_STEP, NEAR, PIVOT, STEP
 from mbd.kernel.restart import note_scales, raise_scales, retain_scales
 
-__all__ = ["forget_steps", "look_a_step_ahead"]
+__all__ = ["forget_steps", "look_a_step_ahead", "start_step"]
+
+
+def start_step(K: Any) -> float:
+    """The step that a start prepares for."""
+    return float(K.dt if K.adaptive == 1 else K.clock[STEP])
 
 
 def forget_steps(K: Any) -> None:
@@ -19,7 +24,7 @@ def forget_steps(K: Any) -> None:
         K.shift_change[i] = 0.0
     for k in range(K.n_rows):
         K.lam_slope[k] = 0.0
-    K.clock[AUX_STEP] = K.dt
+    K.clock[AUX_STEP] = start_step(K)
     K.state[NEAR] = 0
     K.detail[PIVOT] = 0.0
 
@@ -29,11 +34,12 @@ def look_a_step_ahead(K: Any) -> None:
 
     A force that is zero just now has its size then.
     """
+    step = start_step(K)
     for i in range(K.n):
-        K.block[K.o_a + i] += K.dt * K.slope[i]
-        K.block[K.o_v + i] += K.dt * K.rate[i]
+        K.block[K.o_a + i] += step * K.slope[i]
+        K.block[K.o_v + i] += step * K.rate[i]
         if i < K.n_v:
-            K.block[K.o_x + i] = K.dt * (K.y[i] + 0.5 * K.dt * K.rate[i])
+            K.block[K.o_x + i] = step * (K.y[i] + 0.5 * step * K.rate[i])
     note_scales(K)
     raise_scales(K, False)
     retain_scales(K)

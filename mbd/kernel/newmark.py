@@ -11,7 +11,7 @@ from typing import Any
 
 from mbd.kernel.fields import AUX_STEP, NEAR, NOW, PASSING
 from mbd.kernel.iteration import predict
-from mbd.kernel.memory import forget_steps, look_a_step_ahead
+from mbd.kernel.memory import forget_steps, look_a_step_ahead, start_step
 from mbd.kernel.newton import SEARCHED, UNSOUND, solve_step
 from mbd.kernel.passage import passing_step
 from mbd.kernel.restart import compose, consistent, fill_block, refresh_scales
@@ -21,7 +21,8 @@ __all__ = ["newmark_accept", "newmark_resume", "newmark_start", "newmark_step"]
 
 def newmark_start(K: Any) -> int:
     """Memory of the scheme at a consistent state: a₀ = v̇₀ + (α_m − α_f) dt j₀, j₀ by a difference (or a₀ = v̇₀)."""
-    step = K.dt / 16.0
+    full = start_step(K)
+    step = full / 16.0
     t = K.clock[NOW]
     forget_steps(K)
     fill_block(K, t, K.q, K.y)
@@ -33,7 +34,7 @@ def newmark_start(K: Any) -> int:
     status = consistent(K, t + step, K.q1, K.y1)
     for i in range(K.n):
         K.slope[i] = (K.jump[i] - K.rate[i]) / step if status == 0 else 0.0
-        K.aux[i] = K.rate[i] + (K.jerk * (K.alpha_m - K.alpha_f) * K.dt) * K.slope[i]
+        K.aux[i] = K.rate[i] + (K.jerk * (K.alpha_m - K.alpha_f) * full) * K.slope[i]
     for k in range(K.n_rows):
         K.lam_slope[k] = (K.impulse[k] - K.lam[k]) / step if status == 0 else 0.0
     fill_block(K, t, K.q, K.y)
@@ -54,7 +55,7 @@ def unresolved(K: Any) -> bool:
     change = 0.0
     known = 0.0
     for i in range(K.n_v):
-        change = max(change, abs(K.slope[i]) * K.dt)
+        change = max(change, abs(K.slope[i]) * start_step(K))
         known = max(known, abs(K.rate[i]))
         if K.acc[i * K.n + i] > 0.0:
             known = max(known, K.scale[i] / K.acc[i * K.n + i])
@@ -101,7 +102,7 @@ def newmark_resume(K: Any, h: float) -> int:
     Only the auxiliary a is carried over: it keeps its distance from v̇, where a start would err by dt².
     """
     for i in range(K.n):
-        K.aux1[i] = (K.aux[i] - K.rate[i]) * (K.dt / h)
+        K.aux1[i] = (K.aux[i] - K.rate[i]) * (start_step(K) / h)
         K.rate[i] = K.jump[i]
     for k in range(K.n_rows):
         K.lam[k] = K.impulse[k]

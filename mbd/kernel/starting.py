@@ -18,6 +18,7 @@ from mbd.kernel.fields import (
 )
 from mbd.kernel.guards import update_armed, watch
 from mbd.kernel.hooks import scheme_start
+from mbd.kernel.pace import find_pace
 from mbd.kernel.redundancy import find_dependent, sharing, spread
 from mbd.kernel.restart import active_rows, stepping_rows
 from mbd.kernel.settle import settle
@@ -52,6 +53,10 @@ def restart(K: Any) -> int:
     if K.state[N_DROPPED] > 0 and not sharing(K):
         spread(K, K.lam)
     K.state[ROWS] = stepping_rows(K)
+    if K.adaptive == 0 and K.n_contacts > 0:
+        status = find_pace(K)
+        if status != 0:
+            return status
     status = scheme_start(K)
     if status != 0:
         return status

@@ -120,6 +120,12 @@ def _what(
         return _unresolved(stepper, status, closed)
     if status in (F.SINGULAR, F.TOO_NEAR):
         return f"the Newton matrix is singular at {_unknown(stepper)}{closed}; {_why_singular(stepper)}"
+    if status == F.TOO_BRIEF:
+        name = stepper.manager.names[int(stepper.values["state"][F.BLOCKED])]
+        return (
+            f"{name!r} is so stiff that its blow asks for steps below {float(stepper.values['detail'][2]):.2g} s, a "
+            f"millionth of dt{closed}; use a softer stiffness, mbd.Unilateral, or a smaller dt"
+        )
     if status in (F.TOO_SMALL, F.STIRRED):
         return _no_size(stepper, status, closed)
     if status in (F.DEPENDENT, F.CONFLICT):

@@ -58,7 +58,7 @@ def array_lengths(sizes: Mapping[str, Any], block: int, accelerations: int) -> t
         "kkt": size * size, "rhs": size, "spare": 2 * size * (size + 1) + tail, "turning": rows * n,
         "work": 3 * size, "force": n, "bias": rows, "jump": n, "impulse": rows,
         "guards0": watched, "guards1": watched, "doubt": 2 * watched + 2 * n, "scale": n + 2 * rows, "weight": n,
-        "known": n + 2 * rows,
+        "known": n + 2 * rows, "pace": 5 * contacts,
         "seen": 1 + 2 * contacts + 2 * frictions + guards + n_q + n,
         "deepest": contacts, "sinking": contacts, "side": guards, "pick": 8, "detail": 8,
         "slip": frictions, "limit": frictions, "base_limit": frictions, "lean": frictions, "typical": n,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -10,8 +11,9 @@ import numpy as np
 
 from mbd.equations.equations import Contact
 from mbd.kernel import fields as F
+from mbd.kernel.pace import LEAST_PACE
 from mbd.results.columns import ModelColumns
-from mbd.results.record import Record
+from mbd.results.record import EventRecord, Record
 from mbd.simulation.blows import dt_of_blows
 from mbd.simulation.fastest import fastest, resolving_dt, sane_rows
 from mbd.simulation.redundant import redundancy
@@ -174,6 +176,14 @@ def _short_touch(run: Run, record: Record, number: int, contact: Contact) -> tup
     if contact.kind != "penalty" or run.values["adaptive"]:
         return [], []
     events = [event for event in run.events if event.name == contact.name]
+    least = float(run.values["pace"][5 * number + LEAST_PACE])
+    if least > 0.0:
+        safe = dt_of_blows(run, record, number, _closings(record, events)[:LOOKED_AT])
+        enough = f"; dt below {safe:.2g} s has" if np.isfinite(safe) else ""
+        return [
+            f"{contact.name!r} took steps of down to {least:.2g} s while it was closed: dt = {run.dt:g} s has too few "
+            f"for its blows{enough}, and a softer stiffness or mbd.Unilateral needs none of them"
+        ], []
     spans = [b.time - a.time for a, b in pairwise(events) if (a.kind, b.kind) == ("closed", "opened")]
     shortest = min(spans, default=np.inf)
     said = f"closed for {shortest / run.dt:.2g} steps only"
@@ -183,15 +193,19 @@ def _short_touch(run: Run, record: Record, number: int, contact: Contact) -> tup
         said = f"closed to stay and lost half of its speed within {half / run.dt:.2g} steps"
     if shortest >= RESOLVED * run.dt:
         return [], []
-    last = len(record.time) - 1
-    closings = [min(event.row, last) for event in events if event.kind == "closed"]
-    safe = dt_of_blows(run, record, number, closings[:LOOKED_AT])
+    safe = dt_of_blows(run, record, number, _closings(record, events)[:LOOKED_AT])
     safe = safe if np.isfinite(safe) else shortest / RESOLVED
     note = (
         f"{contact.name!r} {said}, too few: its peak force and energy are not resolved; use dt below {safe:.2g} s, "
         "a softer stiffness, or mbd.Unilateral"
     )
     return [note], [note] if shortest < BLIND * run.dt else []
+
+
+def _closings(record: Record, events: Sequence[EventRecord]) -> list[int]:
+    """The rows in which a contact closed."""
+    last = len(record.time) - 1
+    return [min(event.row, last) for event in events if event.kind == "closed"]
 
 
 def _halved(run: Run, contact: Contact, row: int) -> float:

@@ -14,6 +14,7 @@ from mbd.errors import SimulationError
 from mbd.integrators.base import Integrator, Point, StepReport, StepResult, Terms
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.kernel.fields import CAREFUL, ITERATIONS, NEAR, NOT_CONVERGED, NOT_FINITE, NOW, ROWS, TOO_NEAR
+from mbd.kernel.memory import start_step
 from mbd.kernel.restart import MOST_LOADS, evaluate, fill_block, refresh_scales
 from mbd.kernel.straddle import forget_leftovers, keep_leftovers, note_leftovers
 from mbd.simulation.asked import asked
@@ -238,14 +239,14 @@ class PlainScheme:
         """Memory at the accepted state, whose rates are consistent; sizes of the residual for the guards."""
         state, mode, _ = self._state(K)
         what = f"the start of {self.integrator!r} at t = {state.time:.6g} s"
-        return self._begin(K, asked(what, self.integrator.start, self.system, state, mode, float(K.dt)))
+        return self._begin(K, asked(what, self.integrator.start, self.system, state, mode, start_step(K)))
 
     def resume(self, K: Any, h: float) -> int:
         """The same after a step that told `LEFT`, from the rates in K.jump and the multipliers in K.impulse."""
         K.rate[:], K.lam[:] = K.jump[: K.n], K.impulse[: K.n_rows]
         state, mode, _ = self._state(K)
         scheme: Any = self.integrator  # one of the family: no other tells that
-        return self._begin(K, scheme.resume(self.system, state, mode, float(K.dt), self.memory))
+        return self._begin(K, scheme.resume(self.system, state, mode, start_step(K), self.memory))
 
     def _begin(self, K: Any, memory: Any) -> int:
         self.memory = memory

@@ -148,7 +148,7 @@ def _of_state(v: Mapping[str, Any]) -> dict[str, tuple[int, int]]:
         "ROWS": (0, v["n_rows"]), "GRID": (0, UNBOUNDED), "RESTART": (0, 2), "SWITCHES": (0, UNBOUNDED),
         "SINCE_STORE": (0, UNBOUNDED), "BLOCKED": (-1, indices), "N_DROPPED": (0, v["n_rows"]), "NEAR": (0, 2),
         "INCHING": (0, UNBOUNDED), "REDONE": (0, UNBOUNDED), "PLASTIC": (0, 1), "HALVED": (0, 16),
-        "HALVES": (0, 1 << 17), "PAIRED": (0, 3), "STRAIGHT": (0, 1), "RAISED": (0, 1),
+        "HALVES": (0, 1 << 17), "PAIRED": (0, 3), "STRAIGHT": (0, 1), "RAISED": (0, 1), "CALMED": (0, 1),
     }  # fmt: skip
 
 

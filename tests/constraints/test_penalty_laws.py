@@ -306,15 +306,14 @@ def test_a_stiff_spring_gives_the_reference_to_second_order(scheme):
 
 @pytest.mark.parametrize("scheme", SCHEMES, ids=lambda scheme: type(scheme).__name__)
 @pytest.mark.parametrize("factor", [0.15, 1.1, 3.0, 10.0, 100.0])
-def test_a_step_longer_than_the_blow_is_told_and_creates_no_energy_in_silence(scheme, factor):
+def test_a_step_longer_than_the_blow_is_told_and_gives_way_to_shorter_ones(scheme, factor):
     run = dropped(scheme, factor * J6["contact duration"].value)
     total = energy_of(run)
-    (note,) = [note for note in run.stats["notes"] if "closed for" in note]
-    assert "peak force and energy are not resolved" in note
-    if isinstance(scheme, mbd.Newmark) and factor < 50.0:
-        assert total[-1] <= total[0] + 1e-9
-    lost = run.energy["numerical"][-1]
-    assert total[-1] - total[0] == pytest.approx(lost + run.energy["mat"][-1], abs=1e-9)
+    (note,) = run.stats["notes"]
+    assert note.startswith("'mat' took steps of down to")
+    assert run["mat.force"].max() == pytest.approx(J6["peak contact force"].value, rel=0.02)
+    assert total[0] * 0.98 < total[-1] <= total[0] * (1.0 + 1e-3)
+    assert abs(run.energy["numerical"][-1]) < 0.01 * total[0]
 
 
 # what is refused ----------------------------------------------------------------------------------------------------

@@ -133,6 +133,7 @@ def test_columns_of_samples_are_components():
         (lambda: mbd.Motor("m", mbd.Planar("p", GROUND.origin, ROD.start), 1.0), "'p.x', 'p.y', 'p.angle'"),
         (lambda: mbd.Motor("m", HINGE, torque="full"), "must be a number, a function"),
         (lambda: mbd.Motor("m", HINGE, torque=mbd.Samples([0, 1], [[1, 2], [3, 4]])), "one component"),
+        (lambda: mbd.Samples([], []), "one time and value at least"),
         (lambda: mbd.Applied("f", BALL.origin), "does nothing"),
         (lambda: mbd.Applied("f", BALL.origin, force=1.0), "three components"),
         (lambda: mbd.Applied("f", BALL.origin, force=(1.0, 2.0, 3.0, 4.0)), "got 4"),

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-
 import numpy as np
 import pytest
 import sympy
@@ -265,17 +263,15 @@ def dropped_on_a_mat(scheme, dt):
 
 
 @pytest.mark.parametrize("dt", [3e-4, 1e-3])
-def test_a_stiff_contact_that_throws_higher_is_refused_although_its_work_is_anything(dt):
+def test_a_stiff_contact_throws_no_higher(dt):
     run = dropped_on_a_mat(mbd.RungeKutta853(), dt)
-    assert not run.success and "the scheme itself has put up to" in run.message
-    assert float(re.search(r"put up to (\S+) J", run.message)[1]) > 0.5, "what it has gained, not what works say"
+    assert run.success and run["fall.displacement"].max() == pytest.approx(0.1, rel=1e-6)
 
 
-def test_a_blow_that_ends_in_rest_within_a_step_is_told():
+def test_a_blow_far_below_a_step_gives_back_what_it_took():
     run = dropped_on_a_mat(mbd.RadauIIA(), 1e-2)
-    assert run.success and [event.kind for event in run.events] == ["closed"]
-    (note,) = [note for note in run.stats["notes"] if "not resolved" in note]
-    assert "'mat' closed to stay and lost half of its speed within" in note and "use dt below" in note
+    assert run.success and [event.kind for event in run.events[:2]] == ["closed", "opened"]
+    assert run.energy.total[-1] == pytest.approx(run.energy.total[0], rel=1e-4)
 
 
 def test_a_contact_that_was_closed_at_the_start_gives_what_it_holds():

@@ -36,8 +36,8 @@ def oscillator(stiffness, integrator, dt, damping=0.0):
     "law", [{}, {"exponent": 1.5}, {"restitution": 0.5, "exponent": 1.5}, {"damping": 2e4}], ids=str
 )
 def test_the_step_asked_for_is_that_of_penalty_parameters(law):
-    told = dropped(mbd.HHT(0.05), 1e-3, **law).message
-    (asked,) = re.findall(r"'floor' closed .* use dt below ([\d.e-]+) s", told)
+    (told,) = dropped(mbd.HHT(0.05), 1e-3, **law).stats["notes"]
+    (asked,) = re.findall(r"'floor' took steps of .*; dt below ([\d.e-]+) s has", told)
     speed, e = np.sqrt(2.0 * 9.81 * 0.1), law.get("restitution", 1.0)
     if "damping" in law:
         ratio = law["damping"] / (2.0 * np.sqrt(STIFF * 2.0))
@@ -55,10 +55,10 @@ def test_a_blow_that_is_resolved_leaves_the_message_alone():
     assert found.message == "reached t = 0.2 s" and not found.stats["notes"]
 
 
-def test_an_explicit_blow_that_makes_energy_out_of_nothing_is_an_error():
+def test_an_explicit_blow_takes_steps_of_its_own_and_makes_no_energy():
     found = dropped(mbd.RungeKutta853(), 1e-3)
-    assert not found.success and "more than the forces along the way can do" in found.message
-    assert np.max(np.abs(found["fall.displacement.rate"])) < 1.01 * np.sqrt(2.0 * 9.81 * 0.1)
+    assert found.success and found.message == "reached t = 0.2 s"
+    assert found.energy.total[-1] == pytest.approx(found.energy.total[0], rel=1e-3)
 
 
 def test_a_scheme_that_takes_all_energy_of_a_stiff_spring_says_so_in_the_message():
