@@ -156,8 +156,9 @@ def linear_conflict(
 
 def member_of(row: Row, equations: Equations, loops: Mapping[str, tuple[str, ...]]) -> Member:
     """The member that a row belongs to; `loops` maps cut joints to the joints of their loops."""
-    kind = "contact" if row.contact >= 0 else "joint" if row.owner in loops else "constraint"
-    name = equations.contacts[row.contact].name if row.contact >= 0 else row.owner
+    of_contact = row.contact >= 0 and not row.is_velocity
+    kind = "contact" if of_contact else "joint" if row.owner in loops else "constraint"
+    name = equations.contacts[row.contact].name if of_contact else row.owner
     return Member(name, kind, loops.get(row.owner, ()) if kind == "joint" else ())
 
 

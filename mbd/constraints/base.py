@@ -107,3 +107,8 @@ class VelocityConstraint(Constraint):
     def kind(self) -> str:
         """'nonholonomic'."""
         return "nonholonomic"
+
+    @property
+    def contact(self) -> str | None:
+        """The contact that must be closed for its rows to hold; None: they hold at all times."""
+        return None

@@ -27,8 +27,8 @@ class Rolling(VelocityConstraint):
 
     n is the plane's normal and t the direction forward along it (x on level ground), r the radius, C the center, v_P
     the velocity of the plane there, where it lies on another body (which then feels the friction) or runs. Only
-    the slip is held at zero; the wheel stays on the plane by what you give it, such as ``Bilateral`` or ``Unilateral``
-    on ``touchdown(center, Plane(offset=radius))`` without friction, or a joint.
+    the slip is held at zero; the wheel stays on the plane by what you give it: a joint, ``Bilateral`` on
+    ``touchdown(center, Plane(offset=radius))``, or ``Unilateral`` there without friction, named in `only_while`.
 
     Parameters
     ----------
@@ -36,6 +36,8 @@ class Rolling(VelocityConstraint):
     center : the center of the wheel, a frame of the body that turns
     radius : r, the run-time parameter 'name.radius' [m]
     ground : the plane it rolls on, y = 0 by default
+    only_while : name of the `Unilateral` contact that presses the wheel onto the plane: it rolls while that is closed,
+        and takes part in its impacts without slip; None: it rolls at all times, also where it has left the plane
 
     'name.force' is the friction on the wheel along t [N], −λ; 'name.residual' the slip [m/s].
 
@@ -49,6 +51,7 @@ class Rolling(VelocityConstraint):
     center: Frame
     radius: float
     ground: Plane = field(default_factory=Plane)
+    only_while: str | None = None
 
     def __post_init__(self) -> None:
         name_of(self.name, "Rolling")
@@ -56,6 +59,8 @@ class Rolling(VelocityConstraint):
         object.__setattr__(self, "radius", number(self.radius, f"radius of '{self.name}'"))
         if not isinstance(self.ground, Plane):
             raise ModelError(f"ground of Rolling '{self.name}' is a mbd.Plane, got {self.ground!r}")
+        if self.only_while is not None and not isinstance(self.only_while, str):
+            raise ModelError(f"only_while of Rolling '{self.name}' is the name of a contact, got {self.only_while!r}")
         if self.ground.normal[2] != 0.0:
             raise ModelError(
                 f"ground of Rolling '{self.name}': its normal must lie in the x-y plane, in which the wheel rolls, "
@@ -71,6 +76,16 @@ class Rolling(VelocityConstraint):
     def unit(self) -> str:
         """'m'."""
         return "m"
+
+    @property
+    def contact(self) -> str | None:
+        """The contact of `only_while`."""
+        return self.only_while
+
+    @property
+    def others(self) -> tuple[str, ...]:
+        """The contact of `only_while`."""
+        return () if self.only_while is None else (self.only_while,)
 
     def rates(self, scope: Scope) -> Sequence[tuple[str, Scalar]]:
         """Velocity of the touching point along the plane."""

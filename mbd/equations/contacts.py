@@ -46,7 +46,7 @@ def laws(
                 found.idle.append((joint.name, part))
     for constraint in bilaterals:
         if isinstance(constraint, VelocityConstraint):
-            _velocity_rows(found, scope, constraint)
+            _velocity_rows(found, scope, constraint, contacts)
             continue
         _row(found, scope, constraint.name, "", constraint.residual(scope), unit=constraint.measure.unit)
     for joint in joints:
@@ -98,8 +98,16 @@ def _row(
     return len(found.rows) - 1
 
 
-def _velocity_rows(found: Laws, scope: DerivationScope, law: VelocityConstraint) -> None:
-    """Rows ``a(q, t) · v + b(q, t) = 0``, with what is wrong with them."""
+def _velocity_rows(
+    found: Laws, scope: DerivationScope, law: VelocityConstraint, contacts: Sequence[Unilateral | Penalty]
+) -> None:
+    """Rows ``a(q, t) · v + b(q, t) = 0``, with what is wrong with them; some hold while a contact is closed."""
+    numbers = [k for k, contact in enumerate(contacts) if contact.name == law.contact]
+    number = numbers[0] if numbers else -1
+    if number >= 0 and isinstance(contacts[number], Penalty):
+        found.faults.append(
+            f"'{law.name}': only_while='{law.contact}' is a penalty contact, whose impacts take time; name a Unilateral"
+        )
     for part, value in law.rates(scope):
         view = scope.tape.lift(value)
         rate = scope.real(view)
@@ -118,7 +126,9 @@ def _velocity_rows(found: Laws, scope: DerivationScope, law: VelocityConstraint)
                 "use mbd.Bilateral for positions"
             )
         else:
-            found.rows.append(Row(law.name, part, scope.tape.zero, rate, unit=law.unit, kind="velocity"))
+            found.rows.append(
+                Row(law.name, part, scope.tape.zero, rate, unit=law.unit, kind="velocity", contact=number)
+            )
             found.viewed.append(view)
 
 

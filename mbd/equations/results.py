@@ -81,7 +81,7 @@ def offer_rows(outputs: Outputs, tape: Tape, rows: Sequence[Row], bilaterals: It
     """
     words = {constraint.name: constraint for constraint in bilaterals}
     for k, row in enumerate(rows):
-        if row.contact >= 0:
+        if row.contact >= 0 and not row.is_velocity:
             continue
         multiplier = tape.input("lam", k)
         if row.friction >= 0:

@@ -73,10 +73,10 @@ def pace_of(K: Any, c: int) -> float:
         rate = K.pace[5 * c + FIRST_RATE]
         outside = touches and K.guards1[c] > 0.0 and change > 0.0
         if rate * h <= gap_tolerance(K, c) or (change <= share * rate and not outside):
-            return h
+            return float(h)
         share = ENOUGH
         h *= 0.5
-    return h
+    return float(h)
 
 
 def acceleration_of(K: Any, c: int, h: float) -> float:
@@ -107,7 +107,7 @@ def acceleration_of(K: Any, c: int, h: float) -> float:
     rate = abs(K.guards1[K.n_contacts + c])
     watch(K, t + h, K.q1, K.y1, K.rate, K.lam, K.guards1)
     K.pace[5 * c + FIRST_RATE] = max(rate, abs(K.guards1[K.n_contacts + c]))
-    return difference / scale
+    return float(difference / scale)
 
 
 def relax_pace(K: Any) -> None:

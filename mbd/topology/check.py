@@ -203,7 +203,8 @@ def rule_faults(model: Ruled) -> list[str]:
     instants = contacts + [event.name for event in model.events]
     parameters = model.parameters
     found = []
-    for word in (*model.contacts, *model.events):
+    rolling = [word for word in getattr(model, "nonholonomic", ()) if not isinstance(word, str)]
+    for word in (*model.contacts, *model.events, *rolling):
         unknown = [other for other in word.others if other not in contacts]
         found += [f"'{word.name}': " + nearest(other, contacts, "contact") for other in unknown]
     for controller in model.controllers:
