@@ -6,6 +6,7 @@ import random
 from collections.abc import Callable
 
 import mbd
+from mbd.errors import AssemblyError
 from mbd.hardcases.redundant_rows import bricard, parallel_cranks
 from mbd.testing.mechanisms import furnished, random_loop, random_tree
 
@@ -15,7 +16,11 @@ __all__ = ["KINDS"]
 def tree(seed: int) -> tuple[mbd.Model, mbd.State]:
     """A planar or spatial tree with springs, losses, forces and a rod of prescribed length."""
     model = furnished(random_tree(seed, 3, spatial=seed % 2 == 0), seed).without("foot", "pad")
-    return model, mbd.assemble(model, project=True)
+    try:
+        return model, mbd.assemble(model, project=True)
+    except AssemblyError:  # a rod too far away to be reached
+        model = model.without("rod")
+        return model, mbd.assemble(model)
 
 
 def loop(seed: int) -> tuple[mbd.Model, mbd.State]:

@@ -22,13 +22,15 @@ from tests.asked import KINDS
 UNTIL = 0.4
 PARTS = (0.15, 0.8)
 """Where times are asked for, about, over the length of a run [-]."""
-STEPS = {"RadauIIA": 5e-3, "RungeKutta853": 2e-2}
+STEPS = {"RadauIIA": 2.5e-3, "RungeKutta853": 2e-2}
 """dt of schemes of high order; others take the usual one [s]."""
 USUAL = 4e-3
 FACTOR = 6.0
 """Error between rows over the largest one of rows at the same times, by kind of quantity [-]."""
 FLOOR = 1e-10
 """The same where both are round-off, relative to the quantity [-]."""
+NOTHING = 1e-12
+"""What counts as zero of a mechanism of meters, kilograms and seconds, which may stand still."""
 
 
 def kinds_of(run: mbd.Trajectory) -> Mapping[str, list[str]]:
@@ -74,7 +76,9 @@ def check(kind: str, seed: int, scheme: mbd.Integrator, dt: float) -> None:
                 errors = abs(value - true[name][-1]), row, float(np.max(np.abs(run[name])))
                 found[group] = tuple(map(max, found[group], errors))
     for group, (between, row, size) in found.items():
-        assert between <= FACTOR * row + FLOOR * size, f"{group}: {between:.2g} between rows, {row:.2g} at them"
+        assert between <= FACTOR * row + FLOOR * size + NOTHING, (
+            f"{group}: {between:.2g} between rows, {row:.2g} at them"
+        )
 
 
 @pytest.mark.parametrize("name", SCHEMES)
