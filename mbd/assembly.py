@@ -34,6 +34,9 @@ from mbd.turns import choose_turns, nearest_turns
 
 __all__ = ["assemble", "undetermined"]
 
+SQUARED_ROUND_OFF = 1e-26
+"""Kinetic energy of a motion over that of its coordinates one by one, below which it is that of round-off [-]."""
+
 BELOW = 1e-6
 """Depth [m, rad] below which an open contact is told to start inside the ground."""
 LIFTED = 1e-8
@@ -233,15 +236,33 @@ def undetermined(work: Posture) -> list[str]:
     _, sizes, right = np.linalg.svd(matrix / np.outer(scale, scale))
     faults = []
     for direction in right[sizes < 1e-12 * max(sizes[0], 1e-300)]:
-        weights = np.abs(direction / scale)
+        motion = direction / scale
+        weights = np.abs(motion)
         place = int(np.argmax(weights))
-        if np.max(weights[:n], initial=0.0) > 1e-6 * weights[place]:
+        if np.max(weights[:n], initial=0.0) > 1e-6 * weights[place] and not _resisted(work, motion[:n], terms.M):
             name = equations.velocity_names[int(np.argmax(weights[: equations.n_v]))].removesuffix(".rate")
             faults.append(
                 f"nothing determines the motion of {name!r}: no mass or inertia resists it and no constraint holds it; "
                 "give the bodies it moves a mass, or lock it"
             )
     return faults or _negative(work, terms.M[: equations.n_v, : equations.n_v], terms.B[picked][:, : equations.n_v])
+
+
+def _resisted(work: Posture, motion: Vector, M: Matrix) -> bool:
+    """Whether a motion has kinetic energy of its own, however little beside that of its coordinates one by one.
+
+    A long chain that folds up to and fro hardly moves, and M, whose entries are sums over all bodies outboard, tells its
+    energy as a difference of large numbers. As a sum over bodies it has no cancellation.
+    """
+
+    def kinetic(y: Vector) -> float:
+        terms = work.mechanism.acceleration_terms(work.time, work.q, y, work.parameters, work.anchors)
+        return float(np.asarray(terms.kinetic).item())
+
+    if work.equations.n_z or kinetic(0.0 * motion) != 0.0:  # a moving ground has energy of its own
+        return False
+    apart = 0.5 * float(np.abs(np.diag(M)) @ motion**2)
+    return kinetic(motion) > SQUARED_ROUND_OFF * apart
 
 
 def _negative(work: Posture, M: Matrix, B: Matrix) -> list[str]:

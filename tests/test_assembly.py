@@ -293,6 +293,34 @@ def test_both_backends_assemble_alike(backend):
     np.testing.assert_allclose(other.v, state.v, atol=1e-11)
 
 
+def chain_with_tip(count: int, mass: float, tip: float) -> mbd.Model:
+    """Links one after the other, the last with a heavy bob at its end."""
+    model = mbd.Model("chain")
+    before = model.ground.origin
+    for k in range(count):
+        link = mbd.Link(f"link {k}", mass, 0.3, 0.15)
+        model.connect(mbd.Revolute(f"joint {k}", before, link.start))
+        before = link.end
+    bob = mbd.PointMass("bob", tip)
+    model.connect(mbd.Weld("weld", before, bob.origin))
+    return model
+
+
+@pytest.mark.parametrize("ratio", [1e6, 1e12, 1e14])
+def test_links_that_are_far_lighter_than_what_they_carry_still_have_a_motion_of_their_own(ratio: float) -> None:
+    rng = np.random.default_rng(3)
+    model = chain_with_tip(5, 1.0, ratio)
+    mbd.assemble(model, position={f"joint {k}.angle": float(angle) for k, angle in enumerate(rng.uniform(-1, 1, 5))})
+
+
+def test_links_without_mass_have_none() -> None:
+    rng = np.random.default_rng(4)
+    for tip in (1.0, 1e9):
+        model = chain_with_tip(5, 0.0, tip)
+        with pytest.raises(mbd.AssemblyError, match="nothing determines the motion"):
+            mbd.assemble(model, position={f"joint {k}.angle": float(a) for k, a in enumerate(rng.uniform(-1, 1, 5))})
+
+
 def test_projection_moves_no_named_value_that_need_not_move():
     named = {"a.angle": 0.3}
     held = mbd.assemble(LINKAGE, named, {"a.angle": 300.0})
