@@ -251,8 +251,8 @@ def undetermined(work: Posture) -> list[str]:
 def _resisted(work: Posture, motion: Vector, M: Matrix) -> bool:
     """Whether a motion has kinetic energy of its own, however little beside that of its coordinates one by one.
 
-    A long chain that folds up to and fro hardly moves, and M, whose entries are sums over all bodies outboard, tells its
-    energy as a difference of large numbers. As a sum over bodies it has no cancellation.
+    A long chain that folds up to and fro hardly moves, and M, whose entries are sums over all bodies outboard, tells
+    its energy as a difference of large numbers. As a sum over bodies it has no cancellation.
     """
 
     def kinetic(y: Vector) -> float:

@@ -45,7 +45,7 @@ DOUBTFUL = 0.25
 """Part of the forces below which the sign of a multiplier of index 3 is asked of consistent accelerations [-]."""
 REST = 1e-12
 """Speed along a friction, relative to its terms, that is no turn: other rows may hold it still as it pulls [-]."""
-DEPARTED = 1e-6
+DEPARTED = 1e-8
 """Part of its terms that a row which was left out may be off in a step; less starts the scheme anew with other rows."""
 APART = 1e-6
 """Gap [m, rad] above which a contact is clearly open."""

@@ -131,7 +131,10 @@ def _what(
     if status in (F.DEPENDENT, F.CONFLICT):
         if int(stepper.values["state"][F.BLOCKED]) < stepper.values["n"]:
             return f"neither mass nor rows determine {_unknown(stepper)}{closed}; give it a mass, or lock it"
-        return f"{_clashing(stepper, status)}{closed}; leave one out, or hold fewer contacts closed"
+        return (
+            f"{_clashing(stepper, status)}{closed}; leave one out, hold fewer contacts closed, or, where they do so in "
+            "this singular configuration only, start beside it"
+        )
     if status in (F.CHATTER, F.NO_IMPACT, F.ENERGY_GAIN, F.NO_FORCE):
         return _no_contact(stepper, status, closed, events)
     return f"the instant of an event could not be isolated{closed}{_worst(stepper)}; try a smaller dt"

@@ -59,6 +59,8 @@ DAMAGED = (
 )
 """Of a run that goes on from a state whose memory no run has written."""
 
+MOVED = 0.05
+"""Way [m, rad] beyond which rows that still depend on each other do so anywhere."""
 COUNTED = (
     (
         F.SHORTENED,
@@ -89,7 +91,8 @@ def notes_of(run: Run, record: Record) -> tuple[list[str], list[str]]:
     equations = run.mechanism.equations
     loaded = bool(run.values["loaded"]) or any(friction.contact >= 0 for friction in equations.frictions)
     rubs = loaded and any(code.borne for code in run.stepper.modes)
-    dependent = redundancy(equations.rows, run.stepper.dependent, rubs)
+    moved = len(record.q) > 1 and bool(np.max(np.ptp(record.q, axis=0), initial=0.0) > MOVED)
+    dependent = redundancy(equations.rows, run.stepper.dependent, rubs, moved)
     notes += [dependent] if dependent else []
     notes += [DAMAGED.format(run.damage)] if run.damage else []
     if run.start.memory is not None and not run.carried and run.boundaries.controllers:

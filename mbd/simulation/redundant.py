@@ -17,7 +17,7 @@ MOST_TOLD = 8
 """Redundant rows that a note tells one by one."""
 
 
-def redundancy(rows: Sequence[Row], dependent: Mapping[int, tuple[int, ...]], rubs: bool) -> str:
+def redundancy(rows: Sequence[Row], dependent: Mapping[int, tuple[int, ...]], rubs: bool, moved: bool = True) -> str:
     """The note on rows that left the solve; '' if none did.
 
     Parameters
@@ -25,6 +25,7 @@ def redundancy(rows: Sequence[Row], dependent: Mapping[int, tuple[int, ...]], ru
     rows : of the equations
     dependent : numbers of the rows that left, and of those on which each depends
     rubs : whether friction that follows multipliers has slid beside them
+    moved : whether the run went far enough to tell a singular configuration from rows that depend on others anywhere
     """
     if not dependent:
         return ""
@@ -38,6 +39,9 @@ def redundancy(rows: Sequence[Row], dependent: Mapping[int, tuple[int, ...]], ru
         "are taken"
         if rubs
         else "the motion is unique, their multipliers are not: those of least norm are given"
+        if moved
+        else "their multipliers are not unique; nor is the motion, if this is a singular configuration, where branches "
+        "of motions cross: start beside it"
     )
     return f"redundant constraints: {len(told)} ({'; '.join(told[:MOST_TOLD] + more)}); {what}"
 

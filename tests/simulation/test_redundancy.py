@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import mbd
+from tests.cases.linkages import four_bars
 
 G = 9.81
 SCHEMES = [mbd.GeneralizedAlpha(0.9), mbd.HHT(0.05), mbd.HHT(0.05, formulation="index3"), mbd.Newmark()]
@@ -106,3 +107,15 @@ def test_redundant_rows_that_conflict_are_an_error_at_assembly():
         model.constrain(mbd.Bilateral(name, mbd.distance(model.ground.origin, bob.origin), length))
     with pytest.raises(mbd.AssemblyError, match="constraint 'short', constraint 'long' cannot hold together"):
         mbd.assemble(model, position={"place.x": 0.6})
+
+
+@pytest.mark.parametrize("scheme", [mbd.HHT(), mbd.RadauIIA(), mbd.RungeKutta853()], ids=repr)
+def test_at_a_flat_start_nobody_says_that_the_motion_is_unique(scheme):
+    """Both cranks of a parallelogram lie flat: it may go on as a parallelogram or as an antiparallelogram."""
+    model = four_bars(1)
+    flat = dict.fromkeys(("base 0.angle", "base 1.angle"), np.pi / 2)
+    start = mbd.assemble(model, position=flat, velocity=dict.fromkeys(flat, 2.0))
+    run = mbd.simulate(model, start, scheme, dt=1e-2, until=0.3, on_failure="return")
+    assert max(run.violation.length, run.violation.angle) < 1e-7
+    notes = " ".join(run.stats["notes"])
+    assert run.success or ("the motion is unique" not in notes and "singular configuration" in notes)
