@@ -77,7 +77,7 @@ class Step:
         self.lam = memory.lam + dt * memory.lam_slope
         self.size = dt / (memory.whole or memory.step)
         cube = stretch**3 if self.size <= 1.0 + WHOLE else 1.0  # in a pair round-off is not made larger
-        self.shift = (memory.shift + stretch * memory.shift_change) * cube
+        self.shift = self.predicted_shift = (memory.shift + stretch * memory.shift_change) * cube
         self.tolerance = 4.0 * EPS if scheme.exact else 1e-3 * scheme.tolerance
         a1 = self._aux()
         self.y = y0 + dt * ((1.0 - k.gamma) * self.a0 + k.gamma * a1)
@@ -237,6 +237,15 @@ class Step:
         self.x = self.x - self.c_K * change[: self.n_v]
         self.lam = self.lam - multiplier
 
+    def _part_of_change(self) -> float:
+        """Part of the last change of the position correction that the next prediction goes on with.
+
+        None of it where the correction is its own prediction, whose part along the motion shows nowhere.
+        """
+        if np.array_equal(self.shift, self.predicted_shift):
+            return 0.0
+        return 1.0 if np.any(self.memory.shift_change) else 0.5
+
     def _result(self, t1: float, report: StepReport) -> StepResult:
         if not report.converged:
             return StepResult(self.state, self.memory, report)
@@ -248,7 +257,7 @@ class Step:
             (self.rate - memory.rate) / dt,
             (self.lam - memory.lam) / dt,
             self.shift,
-            self.shift - memory.shift,
+            self._part_of_change() * (self.shift - memory.shift),
             dt,
             self.near,
             memory.whole,

@@ -9,16 +9,13 @@ from mbd.kernel.hooks import call
 from mbd.kernel.pairs import WHOLE
 from mbd.kernel.restart import compose
 
-__all__ = ["finish", "overturns", "predict", "residual_size", "runs_away", "soundness_at"]
+__all__ = ["finish", "overturns", "predict", "predicted_shift", "residual_size", "runs_away", "soundness_at"]
 
 
 def predict(K: Any, h: float, t1: float, c_C: float, c_K: float) -> None:
     """The block at t₁ with rates, multipliers and position correction extrapolated."""
     block = K.block
     stretch = h / K.clock[AUX_STEP]
-    cube = stretch * stretch * stretch
-    if h > (1.0 + WHOLE) * K.clock[STEP]:  # the longer of a pair: round-off of the shorter does not grow
-        cube = 1.0
     mean = 1.0 / (1.0 - K.alpha_m)
     by_rate = (1.0 - K.alpha_f) * mean
     by_last = K.alpha_f * mean
@@ -42,9 +39,18 @@ def predict(K: Any, h: float, t1: float, c_C: float, c_K: float) -> None:
         block[K.o_a + i] = rate
         block[K.o_v + i] = K.y[i] + h * ((1.0 - K.gamma) * a0 + K.gamma * a1)
         if i < K.n_v:
-            shift = (K.shift[i] + stretch * K.shift_change[i]) * cube
+            shift = predicted_shift(K, i, h)
             K.shift1[i] = shift
             block[K.o_x + i] = h * K.y[i] + h * h * ((0.5 - K.beta) * a0 + K.beta * a1) + shift
+
+
+def predicted_shift(K: Any, i: int, h: float) -> float:
+    """The position correction of a coordinate extrapolated to the end of a step."""
+    stretch = h / K.clock[AUX_STEP]
+    cube = stretch * stretch * stretch
+    if h > (1.0 + WHOLE) * K.clock[STEP]:  # the longer of a pair: round-off of the shorter does not grow
+        cube = 1.0
+    return float((K.shift[i] + stretch * K.shift_change[i]) * cube)
 
 
 def soundness_at(K: Any, m: int) -> int:

@@ -16,6 +16,7 @@ from mbd.kernel.fields import (
     OPEN_GAP,
     OPEN_PULL,
     SLIP,
+    STEP,
     STICK,
     STICK_BRIEF,
     WATCH,
@@ -183,8 +184,13 @@ def left_alone(K: Any, c: int) -> bool:
     """Whether contact c is not watched at the candidate; a condition that ends at the same instant has ended."""
     if not is_watched(K, c, K.guards1):
         return True
+    if K.while_kind[c] != 2:
+        return False
     place = 3 * K.n_contacts + c
-    return bool(K.while_kind[c] == 2 and K.guards1[place] <= SAME * K.guards0[place])
+    change = abs(K.guards0[place] - K.guards1[place])
+    fall = abs(K.guards0[c] - K.guards1[c])
+    apart = SAME * K.clock[STEP] / K.pick[2] + gap_tolerance(K, c) / (fall + 1e-300)  # of the way here, at most
+    return bool(K.guards1[place] <= apart * change)
 
 
 def guard_rate(K: Any, kind: int, index: int) -> float:

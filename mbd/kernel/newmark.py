@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from mbd.kernel.fields import AUX_STEP, NEAR, NOW, PASSING
-from mbd.kernel.iteration import predict
+from mbd.kernel.fields import AUX_STEP, NEAR, NOW, PASSING, ROWS
+from mbd.kernel.iteration import predict, predicted_shift
 from mbd.kernel.memory import forget_steps, look_a_step_ahead, start_step
 from mbd.kernel.newton import SEARCHED, UNSOUND, solve_step
 from mbd.kernel.passage import passing_step
@@ -79,6 +79,7 @@ def newmark_step(K: Any, h: float, t1: float) -> int:
 
 def newmark_accept(K: Any, h: float) -> None:
     """The candidate becomes the accepted state."""
+    part = part_of_change(K, h)
     for i in range(K.n_q):
         K.q[i] = K.q1[i]
     inverse = 1.0 / h
@@ -88,12 +89,30 @@ def newmark_accept(K: Any, h: float) -> None:
         K.rate[i] = K.rate1[i]
         K.aux[i] = K.aux1[i]
         if i < K.n_v:
-            K.shift_change[i] = K.shift1[i] - K.shift[i]
+            K.shift_change[i] = part * (K.shift1[i] - K.shift[i])
             K.shift[i] = K.shift1[i]
     for k in range(K.n_rows):
         K.lam_slope[k] = (K.lam1[k] - K.lam[k]) * inverse
         K.lam[k] = K.lam1[k]
     K.clock[AUX_STEP] = h
+
+
+def part_of_change(K: Any, h: float) -> float:
+    """Part of the last change of the position correction that the next prediction goes on with.
+
+    Where h was below round-off, the correction is its own prediction, and a part of it along the motion shows nowhere:
+    extrapolated again, such parts would grow. Then nothing of the change is used, and half of the next one.
+    """
+    if K.stabilized == 0 or K.state[ROWS] == 0:
+        return 1.0
+    predicted = True
+    known = False
+    for i in range(K.n_v):
+        predicted = predicted and K.shift1[i] == predicted_shift(K, i, h)
+        known = known or K.shift_change[i] != 0.0
+    if predicted:
+        return 0.0
+    return 1.0 if known else 0.5
 
 
 def newmark_resume(K: Any, h: float) -> int:

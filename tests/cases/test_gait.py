@@ -216,3 +216,13 @@ def test_a_thousand_steps_stay_at_the_fixed_point(name: str) -> None:
     angles = [after["left hip.angle"] - gait.slope, after["right hip.angle"] - gait.slope]
     assert angles == pytest.approx(gait.fixed[:2], abs=2e-5)
     assert run.violation.length < 1e-10
+
+
+@pytest.mark.parametrize("scheme", [mbd.HHT(), mbd.GeneralizedAlpha(0.9)], ids=repr)
+def test_legs_that_pass_each_other_do_not_strike_whatever_the_step(scheme: mbd.Integrator) -> None:
+    """The gap of the trailing foot and its condition vanish together, at any place of a step."""
+    name, shares = FALLING[2]
+    gait = GAITS[name]()
+    state = slope_angles(gait.fixed, gait.slope, shares)
+    for dt in [6.25e-5, 3.125e-5, *np.geomspace(1e-4, 2e-3, 40)]:
+        assert not strikes(gait.walk(state, scheme, dt, 1.0), gait.slope)
