@@ -48,7 +48,9 @@ def gather_closing(K: Any) -> float:
         if fired or (near and ready and K.kind[c] == 0 and approach > STILL):
             K.closing[c] = 1
             if K.kind[c] == 0:
-                fastest = max(fastest, abs(approach))  # located roughly it may part already, which is no rest
+                # located by interpolation it may part already, which is no rest; located exactly it parts only where
+                # its next contact cannot be told from this instant
+                fastest = max(fastest, abs(approach) if K.linear == 1 else approach)
         elif near and ready and K.kind[c] == 0 and (approach >= -STILL or K.state[PLASTIC] == 1):
             K.closing[c] = 2
     return fastest
