@@ -19,7 +19,9 @@ from mbd.simulation.redundant import clash
 from mbd.simulation.round_off import remainder
 from mbd.simulation.stepper import Stepper
 from mbd.state import State
+from mbd.tape.derivatives import live
 from mbd.tape.evaluate import evaluate
+from mbd.tape.node import Node
 
 if TYPE_CHECKING:
     from mbd.simulation.run import Run
@@ -130,7 +132,8 @@ def _what(
         return _no_size(stepper, status, closed)
     if status in (F.DEPENDENT, F.CONFLICT):
         if int(stepper.values["state"][F.BLOCKED]) < stepper.values["n"]:
-            return f"neither mass nor rows determine {_unknown(stepper)}{closed}; give it a mass, or lock it"
+            what = f"neither mass nor rows determine {_unknown(stepper)}{closed}; give it a mass, or lock it"
+            return _may_jam(stepper) + what
         return (
             f"{_clashing(stepper, status)}{closed}; leave one out, hold fewer contacts closed, or, where they do so in "
             "this singular configuration only, start beside it"
@@ -169,7 +172,8 @@ def _no_end(stepper: Stepper, status: int, closed: str, rushing: str) -> str:
         )
     own = f" ({said})" if said else ""
     return (
-        f"Newton stalled at {residual:.3g} times the tolerance after {stepper.values['max_iterations']} "
+        f"{_may_jam(stepper)}Newton stalled at {residual:.3g} times the tolerance after "
+        f"{stepper.values['max_iterations']} "
         f"iterations{own}{closed}{worst}; try a smaller dt or softer stiffness; a force that jumps with "
         "the state (mbd.where, sign) must be made continuous, or be switched by an Event or Controller"
         f"{rushing}"
@@ -196,6 +200,24 @@ def _unresolved(stepper: Stepper, status: int, closed: str) -> str:
         f"{change}, more than the forces along the way can do{shorter}: dt does not resolve a force that is steep "
         f"there; try a smaller dt, such as {0.05 * dt:.1g} s, or a softer force"
     )
+
+
+def _may_jam(stepper: Stepper) -> str:
+    """What dry friction in pins may do, where there is any: the more it brakes, the more it loads its pin."""
+    loaded = int(stepper.values["loaded"]) == 1
+    frictions = stepper.manager.frictions if loaded else ()
+    names = [friction.name for friction in frictions if friction.contact < 0 and is_of_load(friction.limit)]
+    if not names:
+        return ""
+    return (
+        f"pin friction of {', '.join(map(repr, names))} may jam: where μ r reaches the lever arm of the load on a pin, "
+        "no force balances what friction adds to it; use a smaller mu or radius of PinFriction, or mbd.Coulomb; "
+    )
+
+
+def is_of_load(limit: Node) -> bool:
+    """Whether the limit of a friction follows multipliers."""
+    return any(node.op == "input" and node.data[0] == "lam" for node in live([limit]))
 
 
 def _no_size(stepper: Stepper, status: int, closed: str) -> str:

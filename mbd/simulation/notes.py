@@ -99,6 +99,8 @@ def notes_of(run: Run, record: Record) -> tuple[list[str], list[str]]:
         notes.append(ANEW)
     counts, impact = run.values["counts"], run.settings["impact"]
     notes += [text.format(count=int(counts[place]), impact=impact) for place, text in COUNTED if counts[place]]
+    if run.values["strategy"] == 1 and run.settings["contact_reason"]:
+        notes.append(f"{run.settings['contact_reason']}; impacts are of first order: errors of the size of dt")
     doubts = _energy_lost(run, record)
     notes += doubts or ([run.energy.note] if run.energy.note else [])
     notes += [run.room.note] if run.room.note else []

@@ -60,6 +60,7 @@ def test_many_balls_in_a_box_are_stepped_over_and_never_overlap():
     assert trajectory.settings["contact"] == "nonsmooth"
     assert "18 contacts" in trajectory.settings["contact_reason"]
     assert trajectory.settings["contact_reason"] in str(trajectory)
+    assert any(note.startswith(trajectory.settings["contact_reason"]) for note in trajectory.stats["notes"])
     gaps = np.array([trajectory[f"{contact.name}.gap"] for contact in balls(4).constraints])
     assert gaps.min() > -1e-10
     assert len(trajectory.events) > 15 and trajectory.stats["steps"] < 320
