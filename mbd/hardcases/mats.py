@@ -120,8 +120,9 @@ def resolved(given: dict[str, float], scheme: Any) -> tuple[list[Figure], list[C
 
 
 def _unresolved(run: Any) -> list[str]:
-    """Notes that say that a blow is not resolved, or the error that ended the run."""
-    return [note for note in (*run.stats["notes"], run.message) if "not resolve" in note]
+    """Notes that dt does not resolve a blow, which took shorter steps then or was left so, or the error of the run."""
+    words = "not resolve", "has too few for its blows"
+    return [note for note in (*run.stats["notes"], run.message) if any(word in note for word in words)]
 
 
 def too_long(given: dict[str, float], scheme: Any) -> list[Figure]:

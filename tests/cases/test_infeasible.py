@@ -177,7 +177,7 @@ def test_motions_prescribed_with_different_accelerations_are_found_by_the_mobili
     (conflict,) = mbd.mobility(model).conflicts
     assert (conflict.level, conflict.names) == ("acceleration", ("still", "lift"))
     assert conflict.error == pytest.approx(6.0, abs=1e-6)
-    with pytest.raises(mbd.SimulationError, match="rows conflict: 'still', 'lift'"):
+    with pytest.raises(mbd.SimulationError, match="constraint 'still', constraint 'lift' cannot hold together"):
         mbd.simulate(model, mbd.assemble(model), dt=1e-3, until=0.1)
 
 
@@ -244,5 +244,5 @@ def test_rows_that_agree_at_first_and_part_later_end_the_run_and_are_named() -> 
         ],
     )
     run = mbd.simulate(model, mbd.assemble(model), dt=1e-2, until=1.0, on_failure="return")
-    assert not run.success and "rows conflict: 'still', 'late'" in run.message
+    assert not run.success and "constraint 'still', constraint 'late' cannot hold together" in run.message
     assert 0.29 < run.time[-1] < 0.35
