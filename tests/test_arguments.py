@@ -96,7 +96,10 @@ def test_a_wrong_argument_is_taken_or_told_in_words(word):
         (lambda: mbd.Translation("slide", *FRAMES, stiffness=1.0), "would act on several coordinates"),
         (lambda: mbd.Dissipation(5), "needs D"),
         (lambda: mbd.Motor("m", HINGE, 1.0, arguments=5), "arguments must be a list"),
-        (lambda: mbd.Lagrangian("p", 5, 0.0, parameters={"m": "x"}), "the value of 'm' must be a finite number, not 'x'"),
+        (
+            lambda: mbd.Lagrangian("p", 5, 0.0, parameters={"m": "x"}),
+            "the value of 'm' must be a finite number, not 'x'",
+        ),
     ],
 )
 def test_the_sentence_names_the_argument_and_what_came(make, said):
