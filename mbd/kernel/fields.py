@@ -101,6 +101,7 @@ Kernel = namedtuple("Kernel", FIELDS)  # type: ignore[misc]
 KEPT_REALS = (
     "clock", "q", "y", "rate", "aux", "slope", "lam", "lam_slope", "shift", "shift_change", "anchors", "guards0",
     "scale", "weight", "mix", "deepest", "sinking", "side", "detail", "slip", "lean", "past_stages", "left", "pace",
+    "seen",
 )  # fmt: skip
 """What of the real arrays the next step depends on: restored before a step, they make it the same to the bit."""
 KEPT_INTEGERS = ("closed", "armed", "touched", "dropped", "rows", "state", "sticks", "loose", "was")
