@@ -148,7 +148,6 @@ def test_what_was_used_last_stays_and_the_kernel_longest(tmp_path, monkeypatch):
 
 def test_drafts_that_nobody_finished_are_removed(tmp_path):
     cache = ObjectCache(tmp_path)
-    cache.store("key", b"code")
     stale, fresh = tmp_path / "a.1.x.draft", tmp_path / "b.1.x.draft"
     for draft in (stale, fresh):
         draft.write_bytes(b"half")
