@@ -17,7 +17,6 @@ from mbd.conditions import Condition, conditions
 from mbd.contradictions import Attempt, contradictions, infeasible
 from mbd.equations.equations import Equations
 from mbd.errors import AssemblyError, ModelError, UnknownNameError, nearest
-from mbd.kernel.active_set import ActiveSetManager
 from mbd.not_finite import first_cause, tape_inputs
 from mbd.opening import opening
 from mbd.posture import (
@@ -30,6 +29,7 @@ from mbd.posture import (
     position_rows,
 )  # fmt: skip
 from mbd.state import State
+from mbd.trivial_rows import manager_of
 from mbd.turns import choose_turns, nearest_turns
 
 __all__ = ["assemble", "undetermined"]
@@ -101,14 +101,14 @@ def assemble(
         raise ModelError(faults + more + others)
     changed = dict(parameters or {})
     mechanism = mechanism_of(model, backend, changed)
-    manager, equations = ActiveSetManager(mechanism.equations), mechanism.equations
+    equations, values = mechanism.equations, mechanism.parameters(changed, getattr(model, "parameters", {}))
+    manager = manager_of(mechanism, values)
     named, faults = _named(mechanism, position or {}, velocity or {})
     faults += [nearest(name, manager.names, "contact") for name in [*closed, *opened] if name not in manager.names]
     faults += [f"contact {name!r} is named both closed and open" for name in set(closed) & set(opened)]
     if faults:
         raise UnknownNameError(faults)
     q, y = _values(equations, named, {})
-    values = mechanism.parameters(changed, getattr(model, "parameters", {}))
     guess, _ = _values(equations, named, opening(model, mechanism, values, position or {}))
     anchors = np.zeros(mechanism.layout.n_anchors)
     work = Posture(

@@ -14,10 +14,10 @@ from mbd.compile.mechanisms import mechanism_of
 from mbd.consistency import residuals, violations
 from mbd.errors import AssemblyError, ModelError
 from mbd.facings import reversed_joints
-from mbd.kernel.active_set import ActiveSetManager
 from mbd.posture import TOLERANCE, Posture, capture, close_nearby, close_velocities, position_rows
 from mbd.simulation.arguments import fits
 from mbd.state import State, malformed
+from mbd.trivial_rows import manager_of
 
 __all__ = ["project"]
 
@@ -67,9 +67,9 @@ def project(model: Any, state: State, parameters: Mapping[str, float] | None = N
         raise ModelError(faults)
     changed = {**state.parameters, **(parameters or {})}
     mechanism = mechanism_of(model, backend, changed)
-    equations, manager = mechanism.equations, ActiveSetManager(mechanism.equations)
+    equations, values = mechanism.equations, mechanism.parameters(changed, model.parameters)
+    manager = manager_of(mechanism, values)
     fits(state, equations, manager)
-    values = mechanism.parameters(changed, model.parameters)
     q, y = np.array(state.q, dtype=float), np.concatenate([state.v, state.z]).astype(float)
     given = np.array(state.anchors, dtype=float)
     anchors = given if len(given) == mechanism.layout.n_anchors else np.zeros(mechanism.layout.n_anchors)

@@ -37,6 +37,7 @@ RANKS = [
         "results",
         "simulation",
         "trajectory",
+        "trivial_rows",
         "turns",
     ),
     ("analysis", "view"),

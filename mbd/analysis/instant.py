@@ -19,7 +19,6 @@ from mbd.equations.linearization import LinearTerms, linearization
 from mbd.errors import ModelError
 from mbd.integrators.hht import HHT
 from mbd.kernel import fields as F
-from mbd.kernel.active_set import ActiveSetManager
 from mbd.kernel.redundancy import find_dependent, sharing, spread
 from mbd.kernel.restart import active_rows
 from mbd.kernel.settle import settle
@@ -28,6 +27,7 @@ from mbd.simulation.plain import MechanismSystem
 from mbd.simulation.shares import shares
 from mbd.simulation.stepper import Stepper
 from mbd.state import State, malformed
+from mbd.trivial_rows import manager_of
 
 __all__ = ["Instant", "instant"]
 
@@ -133,9 +133,9 @@ def instant(model: Any, state: State, parameters: Mapping[str, float] | None = N
         raise ModelError(faults)
     changed = {**state.parameters, **(parameters or {})}
     mechanism = mechanism_of(model, backend, changed)
-    manager = ActiveSetManager(mechanism.equations)
-    fits(state, mechanism.equations, manager)
     values = mechanism.parameters(changed, getattr(model, "parameters", {}))
+    manager = manager_of(mechanism, values)
+    fits(state, mechanism.equations, manager)
     stepper = Stepper(mechanism, manager, HHT(), values, 1.0, {"capacity": 1})
     K, flags = _kernel(stepper, state), manager.flags(state.mode.closed)
     with np.errstate(all="ignore"):

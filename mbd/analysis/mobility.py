@@ -15,7 +15,6 @@ from mbd.compile.mechanisms import mechanism_of
 from mbd.conflicts import Conflict, loops_of
 from mbd.dependence import Dependence, dependences, rank_of
 from mbd.errors import ModelError, UnknownNameError, nearest
-from mbd.kernel.active_set import ActiveSetManager
 from mbd.posture import (
     TOLERANCE,
     Posture,
@@ -27,6 +26,7 @@ from mbd.posture import (
     position_rows,
 )
 from mbd.state import State
+from mbd.trivial_rows import manager_of
 
 __all__ = ["Mobility", "mobility"]
 
@@ -184,12 +184,13 @@ def _posture(
     model: Any, mechanism: Mechanism, state: State | None, closed: Iterable[str] | None, changed: Mapping[str, float]
 ) -> Posture:
     """Where to look: the state, or the defaults."""
-    equations, manager = mechanism.equations, ActiveSetManager(mechanism.equations)
+    equations = mechanism.equations
+    values = mechanism.parameters(changed, getattr(model, "parameters", {}))
+    manager = manager_of(mechanism, values)
     names = (closed,) if isinstance(closed, str) else tuple(closed or ())
     faults = [nearest(str(name), manager.names, "contact") for name in names if name not in manager.names]
     if faults:
         raise UnknownNameError(faults)
-    values = mechanism.parameters(changed, getattr(model, "parameters", {}))
     q = np.array([coordinate.default for coordinate in equations.coordinates], dtype=float)
     y = np.array([0.0] * equations.n_v + [float(each.default) for each in equations.states])
     anchors, time = np.zeros(mechanism.layout.n_anchors), 0.0
@@ -220,13 +221,11 @@ def _idle(model: Any, work: Posture, active: list[int]) -> list[str]:
         return []
     from mbd.topology.plan import plan
 
-    chosen, titles = plan(model), list[str]()
+    chosen, titles, rows = plan(model), list[str](), work.equations.rows
     for joint in chosen.cut:
         parts = [part for owner, part in work.equations.idle if owner == joint.name]
-        present = sum(
-            work.equations.rows[k].owner == joint.name and not work.equations.rows[k].part.startswith("turns of")
-            for k in active
-        )
+        parts += [rows[k].part for k in sorted(work.manager.trivial) if rows[k].owner == joint.name]
+        present = sum(rows[k].owner == joint.name and not rows[k].part.startswith("turns of") for k in active)
         count = max((3 if chosen.planar else 6) - len(joint.labels) - present, 0)
         parts.sort(key=lambda part: part not in IN_PLANE)
         titles += [f"{joint.name!r} ({part})" for part in parts[:count]]

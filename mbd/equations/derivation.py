@@ -17,6 +17,7 @@ from mbd.equations.figure import figure_of
 from mbd.equations.laws import Laws
 from mbd.equations.outputs import Outputs
 from mbd.equations.results import offer_results
+from mbd.equations.row_sizes import row_sizes
 from mbd.equations.surroundings import Surroundings
 from mbd.errors import ModelError
 from mbd.joints.base import Joint
@@ -243,6 +244,13 @@ class TreeGeometry:
     def partials(self, outputs: Sequence[Node]) -> list[dict[Node, Node]]:
         """∂node/∂x_j of the places and rotations inside the outputs."""
         return [*partials(self.scope.placement, outputs), *({} for _ in self.scope.carried)]
+
+    def row_sizes(self, row: int) -> list[Node]:
+        """Σ|parts| of the derivative of a row by each coordinate, before they cancel."""
+        laws, scope = self.constraints, self.scope
+        moving = laws.rows[row].is_velocity
+        inputs = scope.inputs.v if moving else scope.inputs.x
+        return row_sizes(scope.placement, scope.views, laws.viewed[row], inputs, moving)
 
     def rates(self, outputs: Sequence[Node]) -> dict[Node, Node]:
         """d node/dt of the places and rotations inside the outputs."""

@@ -250,6 +250,9 @@ class Geometry(Protocol):
     def rates(self, outputs: Sequence[Node]) -> dict[Node, Node]:
         """d node/dt of the nodes inside `outputs` where it is known."""
 
+    def row_sizes(self, row: int) -> list[Node]:
+        """Σ|parts| of the derivative of a row by each x_j, by v_j of one on velocities, before they cancel."""
+
 
 @dataclass
 class Equations:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,9 +25,14 @@ class ActiveSetManager:
     Bilateral rows are always active. A contact registers with its gap, its rows or force law, and its rules;
     the manager turns the rules into tables for the kernel, which judges every step by them, and turns the
     kernel's closed flags into a `Mode` and into lists of active rows.
+
+    Parameters
+    ----------
+    trivial : numbers of rows that hold whatever the motion, and never act (see `mbd.trivial_rows`)
     """
 
-    def __init__(self, equations: Equations) -> None:
+    def __init__(self, equations: Equations, trivial: Collection[int] = ()) -> None:
+        self.trivial = frozenset(trivial)
         self.contacts: list[Contact] = []
         self.guards: list[Guard] = []
         self._row_contact = [row.contact for row in equations.rows]
@@ -71,7 +76,9 @@ class ActiveSetManager:
         return tuple(
             k
             for k, (contact, friction) in enumerate(rows)
-            if (contact < 0 or flags[contact]) and (friction < 0 or (sticks is not None and sticks[friction]))
+            if k not in self.trivial
+            and (contact < 0 or flags[contact])
+            and (friction < 0 or (sticks is not None and sticks[friction]))
         )
 
     def penalties(self, flags: Sequence[int] | Integers) -> tuple[int, ...]:
@@ -99,6 +106,7 @@ class ActiveSetManager:
             "row_contact": self._row_contact, "row_level": self._row_level, "row_friction": self._row_friction,
             "friction_row": [friction.row for friction in self.frictions],
             "friction_contact": [friction.contact for friction in self.frictions],
+            "row_trivial": [int(k in self.trivial) for k in range(len(self._row_contact))],
             "row_normal": [int(k in normals) for k in range(len(self._row_contact))],
             "kind": [int(contact.kind == "penalty") for contact in self.contacts],
             "opens": [opens[contact.opens_on] for contact in self.contacts],

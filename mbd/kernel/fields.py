@@ -73,6 +73,7 @@ REAL_ARRAYS = (
 )  # fmt: skip
 INTEGER_ARRAYS = (
     "row_contact", "row_normal",  # contact of each row; 1 for its normal row
+    "row_trivial",  # 1: a row that holds whatever the motion, and never acts
     "row_level",  # of each row: 0 holds positions, 1 velocities only
     "row_friction",  # friction of each row that holds only while it sticks, −1 otherwise
     "friction_row", "friction_contact",

@@ -150,13 +150,13 @@ def lower_scales(K: Any) -> None:
 def is_held(K: Any, row: int, flags: Any) -> bool:
     """Whether a row acts: always, while its contact is closed and does not part, and while its friction sticks.
 
-    Rows with K.lifting = 1 are left out while contacts are lifted out of their surfaces.
+    Trivial rows never do, and those with K.lifting = 1 are left out while contacts are lifted out of their surfaces.
     """
     contact = K.row_contact[row]
     friction = K.row_friction[row]
     if contact >= 0 and (flags[contact] == 0 or (K.row_normal[row] == 1 and K.parting[contact] == 1)):
         return False
-    if K.lifting[row] == 1:
+    if K.lifting[row] == 1 or K.row_trivial[row] == 1:
         return False
     return bool(friction < 0 or K.sticks[friction] == 1)
 

@@ -14,9 +14,11 @@ from mbd.assembly import undetermined
 from mbd.bodies.domains import ParameterCheck
 from mbd.compile.mechanism import Mechanism
 from mbd.consistency import residuals, violations
+from mbd.errors import ModelError
 from mbd.posture import Posture
 from mbd.tape.derivatives import live
 from mbd.tape.node import Node
+from mbd.trivial_rows import trivial_rows
 
 if TYPE_CHECKING:
     from mbd.simulation.run import Run
@@ -69,7 +71,21 @@ class ParameterJudge:
             found = undetermined(Posture(self._mechanism, run.manager, parameters, q, y, flags, anchors, time=run.now))
         if not found and not self._binding.isdisjoint(values):
             found = violations_now(run, residuals_now(run, parameters), residuals_now(run)[:2])
+            found = found or self._trivial(run, parameters)
         return found
+
+    def _trivial(self, run: Run, parameters: Vector) -> list[str]:
+        """Rows that held whatever the motion and do not with these values, or the other way round."""
+        try:
+            changed = sorted(trivial_rows(self._mechanism, parameters) ^ run.manager.trivial)
+        except ModelError as error:
+            return [str(error)]
+        rows = self._mechanism.equations.rows
+        return [
+            f"{rows[k].title} {'no longer holds' if k in run.manager.trivial else 'now holds'} whatever the motion: "
+            "the mechanism is another; start a run with these values"
+            for k in changed
+        ]
 
 
 def residuals_now(run: Run, parameters: Vector | None = None) -> NDArray[np.float64]:

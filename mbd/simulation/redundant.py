@@ -58,6 +58,7 @@ def clash(rows: Sequence[Row], values: Mapping[str, Any]) -> str:
     B = values["acc"][n * n + n + n * count :][: n * count].reshape(count, n)
     on = [int(values[flags][row.contact]) for row in rows for flags in ("closed", "closing", "active")]
     acting = [k for k, row in enumerate(rows) if row.contact < 0 or any(on[3 * k : 3 * k + 3])]
+    acting = [k for k in acting if not values["row_trivial"][k]]
     right, jacobian = -values["bias"][acting], B[acting]
     if not np.isfinite(jacobian).all() or not np.isfinite(right).all():
         return ""

@@ -17,7 +17,6 @@ from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import CapabilityError, MemoryLimitError, ModelError, SimulationError
 from mbd.integrators import HHT, Integrator
-from mbd.kernel.active_set import ActiveSetManager
 from mbd.simulation.arguments import callbacks, choices, end_of, fits, numbers
 from mbd.simulation.capabilities import refusals
 from mbd.simulation.judged import judged
@@ -28,6 +27,7 @@ from mbd.simulation.tolerance import calibrated, first_allowed
 from mbd.simulation.trials import Trial
 from mbd.state import State
 from mbd.trajectory import Trajectory
+from mbd.trivial_rows import manager_of
 from mbd.turns import directed
 
 __all__ = ["prepared", "simulate"]
@@ -186,7 +186,7 @@ def prepared(
 ) -> Run:
     """A run ready to be completed; `watch` may put something in the place of the mechanism."""
     mechanism = mechanism_of(model, options["backend"], changed)
-    manager = ActiveSetManager(mechanism.equations)
+    manager = manager_of(mechanism, mechanism.parameters(changed, getattr(model, "parameters", {})))
     fits(start, mechanism.equations, manager)
     start = directed(mechanism, start)
     end, stop = end_of(until, manager, dt, start.time)

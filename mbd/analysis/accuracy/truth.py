@@ -15,9 +15,9 @@ from mbd.arrays import Vector
 from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import MbdError
 from mbd.integrators import Integrator, RadauIIA, RungeKutta853
-from mbd.kernel.active_set import ActiveSetManager
 from mbd.simulation.simulate import simulate
 from mbd.state import State
+from mbd.trivial_rows import manager_of
 
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
@@ -279,7 +279,7 @@ def _growth(
 def _nudged(model: Any, start: State, reference: Trajectory, options: Mapping[str, Any]) -> State:
     """The start with velocities changed by `NUDGE` of their range, as far as the closed rows let them."""
     mechanism = mechanism_of(model, options.get("backend", "auto"), options.get("parameters"))
-    manager = ActiveSetManager(mechanism.equations)
+    manager = manager_of(mechanism, reference.record.parameters)
     y = np.concatenate([start.v, start.z])
     terms = mechanism.acceleration_terms(start.time, start.q, y, reference.record.parameters, start.anchors)
     rows = list(manager.active_rows(manager.flags(start.mode.closed)))

@@ -1,0 +1,150 @@
+"""Rows that hold whatever the motion, to round-off: redundant parts of joints on one axis or in one plane.
+
+Three joints on one tilted axis close a loop in which the third holds no direction that the others leave free. Its rows
+are zero identically, but the numbers that come out are round-off, and so is their Jacobian: to solve with it would hold
+the mechanism at rest by forces that do not exist. Such rows never act. Whether a row is one depends on the shape of the
+bodies, that is on parameters: it is judged for their values, at positions anywhere, by the parts of its Jacobian
+before they cancel (`mbd.equations.row_sizes`).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from mbd.arrays import Vector
+from mbd.compile.mechanism import Mechanism
+from mbd.compile.python import ScalarFunction, scalar_function
+from mbd.equations.equations import Equations, Row
+from mbd.equations.magnitudes import magnitudes
+from mbd.errors import ModelError
+from mbd.kernel.active_set import ActiveSetManager
+from mbd.tape.derivatives import gradient, live
+from mbd.tape.node import Node
+
+__all__ = ["manager_of", "trivial_rows"]
+
+POSES = 3
+"""Positions at which rows are looked at [-]."""
+NEGLIGIBLE = 1e-12
+"""Derivative relative to the parts that it is made of, below which it is round-off [-]."""
+DOUBTFUL = 1e-6
+"""Largest derivative of a row, beside 1 and those of others, above which no closer look is needed [m, rad, -]."""
+FITS = 1e-9
+"""Misfit of a row that no motion changes which counts as none [m, rad]."""
+
+
+def manager_of(mechanism: Mechanism, parameters: Vector) -> ActiveSetManager:
+    """The active set of a mechanism in which the rows that are trivial with these parameters never act.
+
+    Raises
+    ------
+    ModelError
+        see `trivial_rows`.
+    """
+    return ActiveSetManager(mechanism.equations, trivial_rows(mechanism, parameters))
+
+
+def trivial_rows(mechanism: Mechanism, parameters: Vector) -> frozenset[int]:
+    """Numbers of the rows that hold whatever the motion, with these values of the parameters.
+
+    Raises
+    ------
+    ModelError
+        for rows of joints and constraints that no motion changes and that do not hold.
+    """
+    if not mechanism.equations.rows:
+        return frozenset()
+    places = _places(mechanism)
+    values = np.array(parameters[places])
+    known = mechanism.named.get("trivial rows")
+    if known is None or not np.array_equal(known[0], values):
+        known = mechanism.named["trivial rows"] = values, _found(mechanism, parameters)
+    _, (rows, faults) = known
+    if faults:
+        raise ModelError(faults)
+    return frozenset(rows)
+
+
+def _places(mechanism: Mechanism) -> list[int]:
+    """Places of the parameters on which rows depend."""
+    known = mechanism.named.get("parameters of rows")
+    if known is None:
+        nodes = [row.rate if row.is_velocity else row.value for row in mechanism.equations.rows]
+        found = {node.data[1] for node in live(nodes) if node.op == "input" and node.data[0] == "p"}
+        known = mechanism.named["parameters of rows"] = sorted(found)
+    places: list[int] = known
+    return places
+
+
+def _found(mechanism: Mechanism, parameters: Vector) -> tuple[frozenset[int], list[str]]:
+    """The rows, and what is wrong with them."""
+    equations, n_v = mechanism.equations, mechanism.equations.n_v
+    blocks = _blocks(mechanism)
+    with np.errstate(all="ignore"):
+        terms = [mechanism.terms_of(block, parameters) for block in blocks]
+    B = np.abs(np.stack([each.B[:, :n_v] for each in terms]))
+    largest = np.max(B, axis=(0, 2), initial=0.0)
+    bound = DOUBTFUL * max(1.0, float(np.max(largest, initial=0.0)))
+    normals = {contact.rows[0] for contact in equations.contacts if contact.rows}
+    doubtful = [k for k in range(len(equations.rows)) if largest[k] <= bound and k not in normals]
+    if not doubtful:
+        return frozenset(), []
+    sizes, out = _sizes(mechanism, tuple(doubtful)), np.zeros(len(doubtful) * n_v)
+    trivial = np.ones(len(doubtful), dtype=bool)
+    for block, slopes in zip(blocks, B, strict=True):
+        with np.errstate(all="ignore"):
+            sizes(block, parameters, out)
+        trivial &= np.all(slopes[doubtful] <= NEGLIGIBLE * out.reshape(len(doubtful), n_v), axis=1)
+    rows, faults = [k for k, small in zip(doubtful, trivial, strict=True) if small], list[str]()
+    for k in rows:
+        faults += _misfit(
+            equations.rows[k], [float((each.rate if equations.rows[k].is_velocity else each.h)[k]) for each in terms]
+        )
+    return frozenset(rows), faults
+
+
+def _blocks(mechanism: Mechanism) -> list[Any]:
+    """Inputs at rest at positions anywhere near the defaults, and at different times."""
+    equations, layout = mechanism.equations, mechanism.layout
+    q = np.array([coordinate.default for coordinate in equations.coordinates], dtype=float)
+    found, places = list[Any](), np.arange(1, equations.n_v + 1)
+    for number in range(POSES):
+        block = mechanism.block(0.37 * number, q, np.zeros(layout.n), np.zeros(layout.n_anchors))
+        block[layout.x : layout.v] = 1.2 * np.sin(2.3 * places + 5.1 * number + 0.4)
+        found.append(block)
+    return found
+
+
+def _sizes(mechanism: Mechanism, rows: tuple[int, ...]) -> ScalarFunction:
+    """Σ|parts| of the derivatives of rows."""
+    key = f"sizes of rows {rows}"
+    known = mechanism.named.get(key)
+    if known is None:
+        with mechanism.equations.tape.lock:
+            nodes = [node for k in rows for node in _parts(mechanism.equations, k)]
+            known = mechanism.named[key] = scalar_function(nodes, mechanism.layout, "row_sizes")
+    function: ScalarFunction = known
+    return function
+
+
+def _parts(equations: Equations, k: int) -> list[Node]:
+    """Those of one row; of equations without bodies by the terms of its derivatives."""
+    if equations.geometry is not None:
+        return equations.geometry.row_sizes(k)
+    row = equations.rows[k]
+    inputs = [equations.tape.input("v" if row.is_velocity else "x", j) for j in range(equations.n_v)]
+    return magnitudes(equations.tape, gradient(row.rate if row.is_velocity else row.value, inputs))
+
+
+def _misfit(row: Row, values: list[float]) -> list[str]:
+    """What is wrong with a row that no motion changes; anchors are chosen so that rows with them hold."""
+    node: Node = row.rate if row.is_velocity else row.value
+    if any(each.op == "input" and each.data[0] == "anchor" for each in live([node])):
+        return []
+    size = max(values, key=abs)
+    if abs(size) <= FITS:
+        return []
+    unit = f"{row.unit}/s" if row.is_velocity else row.unit
+    return [f"{row.title} is {size:.6g} {unit} whatever the motion, so it can never be 0"]
