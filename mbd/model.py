@@ -74,7 +74,7 @@ class Model:
         tunable: Iterable[str] = (),
     ) -> None:
         self.name = _title(name)
-        self.gravity = triple(gravity, f"gravity of '{name}'")
+        self.gravity = gravity
         self.cut: str | tuple[str, ...] = cut if isinstance(cut, str) else names_of(cut, f"cut of '{name}'")
         self.tunable = names_of(tunable, f"tunable of '{name}'")
         self.ground = Ground()
@@ -120,6 +120,15 @@ class Model:
         for frame in self.points():
             result.setdefault(frame.full_name, frame)
         return result
+
+    @property
+    def gravity(self) -> Vector3:
+        """Gravity in ground axes [m/s²]; another one is checked as that of a new model."""
+        return self._gravity
+
+    @gravity.setter
+    def gravity(self, value: Any) -> None:
+        self._gravity = triple(value, f"gravity of '{self.name}'")
 
     @property
     def bilaterals(self) -> list[Bilateral]:

@@ -143,3 +143,17 @@ def test_steps_end_where_sampled_signals_have_a_kink():
     model.apply(mbd.Motor("drive", joint, torque=mbd.Samples([0.0, 0.5, 2.0], [0, 1, 0], kind="linear")))
     model.apply(mbd.Applied("push", joint.child, force=(mbd.Samples([0.1, 0.2, 0.3], [0, 1, 0]), 0.0)))
     assert model.instants == [0.0, 0.1, 0.3, 0.5, 2.0]
+
+
+@pytest.mark.parametrize(
+    "gravity", ["down", None, 3.0, (0.0, math.nan, 0.0), (0.0, 10**400, 0.0), (1.0, 2.0, 3.0, 4.0)]
+)
+def test_gravity_is_checked_alike_when_a_model_is_made_and_later(gravity):
+    model = Model("m")
+    with pytest.raises(ModelError, match="gravity of 'm'") as made:
+        Model("m", gravity=gravity)
+    with pytest.raises(ModelError) as changed:
+        model.gravity = gravity
+    assert str(made.value) == str(changed.value)
+    model.gravity = [1, 2]
+    assert model.gravity == Model("m", gravity=(1, 2)).gravity == (1.0, 2.0, 0.0)

@@ -119,15 +119,26 @@ def assembled(system: Lagrangian, lowering: Lowering) -> Equations:
     potential = V
     for effect in effects[len(own) :]:
         potential = potential if effect.potential is None else potential + effect.potential
-    outputs = _outputs(system, lowering, known, effects, potential)
+    kinetic = energy_of_motion(lowering)
+    outputs = _outputs(system, lowering, known, effects, kinetic, potential)
     return Equations(
         name=system.name, tape=tape,
         coordinates=tuple(records.Coordinate(c.name, c.unit, c.default) for c in system.coordinates),
         states=tuple(coordinate for coordinate, _ in scope.states), parameters=scope.parameters.found,
         balance=tuple(balance), rows=tuple(known.rows), contacts=tuple(known.contacts), guards=tuple(known.guards),
-        effects=effects, kinetic=T, potential=potential, compose=None, output=outputs, output_names=outputs.names,
+        effects=effects, kinetic=kinetic, potential=potential, compose=None, output=outputs, output_names=outputs.names,
         velocity_names=tuple(f"{c.name}.rate" for c in system.coordinates), frictions=tuple(known.frictions),
     )  # fmt: skip
+
+
+def energy_of_motion(lowering: Lowering) -> Node:
+    """T; where T is not quadratic in rates, the energy v · ∂T/∂v − T that takes its place in the balance of energy."""
+    T, v = lowering.T, lowering.inputs.v
+    momenta = gradient(T, v)
+    masses = [mass for momentum in momenta for mass in gradient(momentum, v)]
+    if not any(node.op == "input" and node.data[0] == "v" for node in live(masses)):
+        return T
+    return _sum(lowering.tape, [momentum * rate for momentum, rate in zip(momenta, v, strict=True)]) - T
 
 
 def _laws(system: Lagrangian, lowering: Lowering) -> Laws:
@@ -178,7 +189,7 @@ def _sum(tape: Tape, terms: Sequence[Node]) -> Node:
 
 
 def _outputs(
-    system: Lagrangian, lowering: Lowering, known: Laws, effects: Sequence[Effect], potential: Node
+    system: Lagrangian, lowering: Lowering, known: Laws, effects: Sequence[Effect], kinetic: Node, potential: Node
 ) -> Outputs:
     """θ, its rate and acceleration, forces, multipliers, contacts, energies and powers."""
     tape, inputs, scope = lowering.tape, lowering.inputs, lowering.scope
@@ -196,6 +207,6 @@ def _outputs(
     offer_rows(outputs, tape, known.rows, [word for word in system.words if isinstance(word, Bilateral)])
     offer_contacts(outputs, tape, known.rows, known.contacts)
     offer_effects(outputs, tape, effects)
-    outputs.value("kinetic_energy", lowering.T)
+    outputs.value("kinetic_energy", kinetic)
     outputs.value("potential_energy", potential)
     return outputs

@@ -13,6 +13,7 @@ from mbd.constraints.controller import Controller
 from mbd.constraints.event import Event
 from mbd.constraints.penalty import Penalty
 from mbd.constraints.unilateral import Unilateral
+from mbd.equations.coordinate_scope import identifier
 from mbd.equations.energies import Lowering, assembled
 from mbd.equations.equations import Equations
 from mbd.equations.lagrangian_words import described, word_faults
@@ -318,6 +319,22 @@ def _check_shapes(system: Lagrangian) -> None:
         raise ModelError([f"Lagrangian {system.name!r}: {fault}" for fault in faults])
 
 
+def _ambiguous(coordinates: Sequence[str], parameters: Iterable[str]) -> list[str]:
+    """Names under which an expression would find two quantities: 't' is the time, 'theta_rate' the rate of 'theta'."""
+    quantities = {"the time": "t"}
+    quantities |= {f"the coordinate {name!r}": name for name in coordinates}
+    quantities |= {f"the rate of {name!r}": f"{name}_rate" for name in coordinates}
+    quantities |= {f"the parameter {name!r}": name for name in parameters}
+    found: dict[str, str] = {}
+    faults = []
+    for what, name in quantities.items():
+        other = found.setdefault(identifier(name), what)
+        twice = what == f"the parameter {name!r}" and other == f"the coordinate {name!r}"  # told already
+        if other != what and not twice:
+            faults.append(f"{what} is written {identifier(name)!r} in expressions, as is {other}; give it another name")
+    return faults
+
+
 def _name_faults(system: Lagrangian) -> list[str]:
     names = [coordinate.name for coordinate in system.coordinates]
     faults = [] if names else [f"{system.name!r} has no coordinates; give at least one mbd.Coordinate"]
@@ -326,6 +343,7 @@ def _name_faults(system: Lagrangian) -> list[str]:
         if name in taken:
             faults.append(f"the name {name!r} is given twice among the coordinates and parameters of {system.name!r}")
         taken.add(name)
+    faults += _ambiguous(names, system.own_parameters)
     faults += [
         f"two constraints of {system.name!r} are named {name!r}; give each its own name"
         for name in system.constraints

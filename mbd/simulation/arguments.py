@@ -14,6 +14,7 @@ from mbd.equations.equations import Equations
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.integrators import Integrator
 from mbd.kernel.active_set import ActiveSetManager
+from mbd.simulation.turning import beyond_angles
 from mbd.state import State, malformed
 
 __all__ = ["callbacks", "choices", "end_of", "fits", "numbers"]
@@ -129,6 +130,7 @@ def fits(start: State, equations: Equations, manager: ActiveSetManager) -> None:
     bad = [
         f"the start has {name!r} = {value}; give a finite number" for name, value in values if not np.isfinite(value)
     ]
+    bad += [f"the start has {said}; take whole turns away" for said in beyond_angles(equations, start.q)]
     if bad:
         raise ModelError(bad)
 

@@ -140,6 +140,9 @@ class EnergyWatch:
         if np.isinf(self._seen[:, 0]).any():
             self._overflow(run)
             return self.problem
+        if np.isnan(self._seen[:, 1]).any():
+            self._undefined(run)
+            return self.problem
         if not self._looks_strange(run):
             return ""
         columns = ModelColumns(whole_record(run), run.mechanism.equations)
@@ -183,6 +186,21 @@ class EnergyWatch:
                 f"speeds of {top:.2g} at the start make an energy beyond the largest number: energies cannot be told, "
                 "and the run was not judged by them; use larger units"
             )
+
+    def _undefined(self, run: Run) -> None:
+        """A potential that has no value where the motion has got: it has passed a pole, which no motion does."""
+        columns = ModelColumns(whole_record(run), run.mechanism.equations)
+        effects = run.mechanism.equations.effects
+        known = {effect.name: effect.potential for effect in effects if effect.potential is not None}
+        energies = zip(known, columns.evaluate(list(known.values()), columns.rows), strict=True)
+        bad = {name: int(np.argmax(np.isnan(energy))) for name, energy in energies if np.isnan(energy).any()}
+        self.row = min(bad.values())
+        names = ", ".join(f"'{name}'" for name, row in bad.items() if row == self.row)
+        self.problem = (
+            f"t = {run.table[self.row, 0]:.9g} s: from here on the potential of {names} is not a number, though its "
+            "force is one: a step has passed a place where it has no value, such as the pole of a logarithm; use a "
+            "smaller dt to see what happens there, or a potential that is defined wherever the motion goes"
+        )
 
     def _looks_strange(self, run: Run) -> bool:
         """Whether only the ledger can tell that the energies seen are right."""

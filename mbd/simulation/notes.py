@@ -18,6 +18,7 @@ from mbd.simulation.blows import dt_of_blows
 from mbd.simulation.fastest import fastest, resolving_dt, sane_rows
 from mbd.simulation.redundant import redundancy
 from mbd.simulation.stored import record_of
+from mbd.simulation.turning import unresolved_turns
 
 if TYPE_CHECKING:
     from mbd.simulation.run import Run
@@ -110,6 +111,7 @@ def notes_of(run: Run, record: Record) -> tuple[list[str], list[str]]:
             f"estimated errors of velocities add up to {spent:.2g} m/s or rad/s over all steps: dt is large for the "
             "motion; use a smaller dt, or tol="
         )
+    notes += unresolved_turns(run, record)
     for number, contact in enumerate(run.manager.contacts):
         short, blind = _short_touch(run, record, number, contact)
         notes += _ignored(run, number, contact) + _overshot(run, record, contact) + short

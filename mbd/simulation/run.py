@@ -34,6 +34,7 @@ from mbd.simulation.room import Room
 from mbd.simulation.savepoints import Savepoint, rewind, save
 from mbd.simulation.stepper import Stepper
 from mbd.simulation.stored import whole_record
+from mbd.simulation.turning import overturned
 from mbd.state import State
 from mbd.trajectory import EventRecord, Trajectory
 
@@ -158,7 +159,7 @@ class Run:
         if self.stop and not problem and not message.startswith("ended"):
             message = f"{self.stop!r} did not happen before t = {self.end:g} s"
         if not problem:
-            problem = fed or self._reversed() or self._told(self._guarded(self._last_show)[0])
+            problem = fed or self._reversed() or overturned(self) or self._told(self._guarded(self._last_show)[0])
         if problem:
             self.failure = (tried or attempt(self))(problem, final)  # a replay finds its sentence again
         if fed not in ("", problem):

@@ -15,6 +15,9 @@ Beyond: TypeAlias = Literal["constant", "linear"]
 
 Coefficients: TypeAlias = tuple[float, float, float, float]
 
+STEEPEST = 1e290
+"""Change over the cube of its width beyond which the coefficients of a cubic are no numbers [-]."""
+
 
 class Pieces(NamedTuple):
     """n breaks and n rows of cubic coefficients, as `Tape.table` takes them: ``table(name, *pieces)``."""
@@ -36,6 +39,7 @@ def linear(xs: Sequence[float], ys: Sequence[float], beyond: Beyond = "constant"
     ((1.0, 0.0, 0.0, 0.0), (1.0, 2.0, 0.0, 0.0), (5.0, 0.0, 0.0, 0.0))
     """
     x, y = _checked(xs, ys, what)
+    _checked_slopes(x, y, what)
     rows = [(y[k], (y[k + 1] - y[k]) / (x[k + 1] - x[k]), 0.0, 0.0) for k in range(len(x) - 1)]
     return _continued(x, y, rows, rows[0][1], rows[-1][1], beyond)
 
@@ -54,6 +58,7 @@ def monotone(xs: Sequence[float], ys: Sequence[float], beyond: Beyond = "linear"
     from scipy.interpolate import PchipInterpolator
 
     x, y = _checked(xs, ys, what)
+    _checked_slopes(x, y, what)
     curve = PchipInterpolator(x, y)
     rows: list[Coefficients] = [tuple(float(c) for c in reversed(column)) for column in curve.c.T]  # type: ignore[misc]
     first, last = (float(slope) for slope in curve.derivative()([x[0], x[-1]]))
@@ -73,6 +78,17 @@ def _continued(
         before = (y[0] - first * width, first, 0.0, 0.0)
         after = (y[-1], last, 0.0, 0.0)
     return Pieces((x[0] - width, *x), (before, *rows, after))
+
+
+def _checked_slopes(x: list[float], y: list[float], what: str) -> None:
+    """Samples so close in time, or so far apart in value, that no number tells how steep they are."""
+    for k in range(len(x) - 1):
+        width, slope = x[k + 1] - x[k], abs(y[k + 1] - y[k])
+        if slope > 0.0 and not slope < STEEPEST * min(width, 1.0) ** 3:  # the last coefficient divides by the cube
+            raise ModelError(
+                f"{what}: from number {k} to number {k + 1} the ordinate changes by {slope:.3g} over {width:.3g}, too "
+                "steep for numbers; check the units, or take samples further apart"
+            )
 
 
 def _checked(xs: Sequence[float], ys: Sequence[float], what: str) -> tuple[list[float], list[float]]:

@@ -135,6 +135,8 @@ def _component(value: Any, what: str, source: str, tape: Tape) -> Node:
             number = math.nan if isinstance(value, bool | str) else float(value)
         except (TypeError, ValueError):
             number = math.nan
+        except OverflowError:  # an integer beyond every float
+            number = math.inf
         if number != number and not isinstance(value, float):
             raise TraceError(f"{what}: {source} gives {value!r} where a number is expected")
         node = tape.constant(number)

@@ -162,3 +162,27 @@ def test_it_pickles_and_prints():
     theta = mbd.Coordinate("theta")
     swing = mbd.Lagrangian("swing", [theta], m * theta.v**2 / 2, dissipation=k * theta.v**2, parameters={m: 2, k: 3})
     assert r"f_{1} &= 2 \dot{\theta} k" in swing.equations(latex=True)
+
+
+@pytest.mark.parametrize(
+    ("coordinates", "parameters", "said"),
+    [
+        (["t"], {}, "the coordinate 't' is written 't' in expressions, as is the time"),
+        (["q"], {"t": 1.0}, "the parameter 't' is written 't'"),
+        (["q", "q_rate"], {}, "the rate of 'q' is written 'q_rate' in expressions, as is the coordinate 'q_rate'"),
+        (["q"], {"q_rate": 1.0}, "the parameter 'q_rate' is written 'q_rate' in expressions, as is the rate of 'q'"),
+        (["q.x", "q_x"], {}, "the coordinate 'q_x' is written 'q_x' in expressions, as is the coordinate 'q.x'"),
+    ],
+)
+def test_a_name_that_would_mean_two_quantities_is_refused(coordinates, parameters, said):
+    system = mbd.Lagrangian("odd", coordinates, lambda: 1.0, parameters=parameters)
+    assert any(said in fault for fault in system.check())
+
+
+@pytest.mark.parametrize(
+    ("kinetic", "speed"), [(lambda q_rate: q_rate**4, 1.1), (lambda q_rate: -mbd.sqrt(1.0 - q_rate**2), 0.6)]
+)
+def test_energy_is_kept_also_where_the_kinetic_term_is_not_quadratic_in_rates(kinetic, speed):
+    system = mbd.Lagrangian("odd", ["q"], kinetic, lambda q: 0.3 * q**2)
+    run = mbd.simulate(system, mbd.assemble(system, {}, {"q": speed}), mbd.RadauIIA(), dt=1e-3, until=0.5)
+    assert np.ptp(run.energy.total) < 1e-9 * np.ptp(run.energy.potential)

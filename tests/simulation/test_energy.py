@@ -301,3 +301,23 @@ def test_a_right_run_is_looked_at_in_few_rows_and_without_a_ledger(until, most):
 def test_a_watch_begins_with_nothing():
     watch = EnergyWatch()
     assert (watch.problem, watch.note, watch.rows, watch.ledgers) == ("", "", 0, 0)
+
+
+@pytest.mark.parametrize("scheme", [mbd.HHT(), mbd.Newmark(), mbd.GeneralizedAlpha(0.8), mbd.RadauIIA()], ids=repr)
+def test_a_step_beyond_the_pole_of_a_potential_is_no_motion(scheme):
+    """V = log(x − a) has no value beyond a, but a force."""
+    rng = np.random.default_rng(4)
+    for pole in rng.uniform(0.2, 0.6, 3):
+        model = mbd.Model("well", gravity=(0.0, 0.0, 0.0))
+        point = mbd.PointMass("point", mass=0.4)
+        model.connect(mbd.Prismatic("rail", model.ground.origin, point.origin))
+        model.apply(mbd.Potential("well", lambda x, a=pole: mbd.log(x - a), "rail.displacement"))
+        start = mbd.assemble(model, {"rail.displacement": pole + 0.05})
+        run = mbd.simulate(model, start, scheme, dt=2e-3, until=0.1, on_failure="return")
+        assert not run.success
+        if "is not a number" in run.message:
+            assert "the potential of 'well'" in run.message
+            first = np.flatnonzero(run["rail.displacement"] < pole)[0]
+            assert f"t = {run.time[first]:.9g} s" in run.message
+        else:
+            assert (run["rail.displacement"] > pole).all(), run.message

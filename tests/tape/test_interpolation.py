@@ -63,3 +63,11 @@ def test_impossible_samples_are_named(make, xs, ys, said):
 def test_an_unknown_continuation_is_an_error():
     with pytest.raises(ModelError, match="use 'constant' or 'linear'"):
         linear(XS, YS, "periodic")
+
+
+@pytest.mark.parametrize("through", [linear, monotone])
+def test_samples_too_steep_for_numbers_are_refused(through):
+    for x, y in ([0.0, 1e-300], [0.0, 1.0]), ([0.0, 1e-110], [0.0, 1.0]), ([0.0, 1.0], [-1.7e308, 1.7e308]):
+        with pytest.raises(ModelError, match="from number 0 to number 1 the ordinate changes by .* too steep"):
+            through(x, y)
+    assert np.isfinite(through([0.0, 1e-300], [2.0, 2.0]).coefficients).all()

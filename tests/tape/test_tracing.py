@@ -137,3 +137,10 @@ def test_a_nan_in_a_branch_is_left_for_the_run(scene):
     node = traced(lambda t, angle, p: where(t < 0.5, 1.0, math.nan), arguments, "f", tape)
     assert evaluate([node], {("t", 0): 0.25}) == [1.0]
     assert math.isnan(evaluate([node], {("t", 0): 0.75})[0])
+
+
+@pytest.mark.parametrize("value", [10**400, -(10**5000)], ids=["large", "larger"])
+def test_an_integer_beyond_every_float_is_refused(scene, value):
+    tape, arguments = scene
+    with pytest.raises(TraceError, match="gives inf, which is not a finite number"):
+        traced_scalar(lambda t: value, arguments[:1], "the torque", tape)
