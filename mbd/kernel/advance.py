@@ -68,11 +68,11 @@ Without rows ten times as many.
 
 
 def rings(K: Any) -> bool:
-    """Whether a step ends with a contact that pulls, although it has been judged to push.
+    """Whether a step ends with a contact that pulls, or a friction that sticks beyond its limit, judged to do neither.
 
     The multipliers of a step belong to its own accelerations, which satisfy the constraints on average only: those of
     index 3 err for some steps after a start, and undamped ones alternate where dt is long for the motion. Consistent
-    ones take the place of such a row's.
+    ones, by which such a row was judged, take the place of the step's.
     """
     force = 0.0
     for i in range(K.n_v):
@@ -80,6 +80,10 @@ def rings(K: Any) -> bool:
     for c in range(K.n_contacts):
         if K.kind[c] == 0 and K.closed[c] == 1 and K.opens[c] == 0 and K.lam1[K.normal[c]] > PULL * force:
             return True
+    if K.strategy == 0:
+        for f in range(K.n_frictions):
+            if K.sticks[f] == 1 and abs(K.lam1[K.friction_row[f]]) > K.limit[f] + PULL * force:
+                return True
     return False
 
 

@@ -324,14 +324,19 @@ def pull_of(K: Any, c: int, h: float) -> float:
     That of index 3 lags behind after a start; where it is small beside the forces the consistent one is asked.
     """
     pull = float(K.lam1[K.normal[c]])
-    if K.stabilized == 1 or K.strategy == 1:
-        return pull
-    force = 0.0
-    for i in range(K.n_v):
-        force = max(force, K.scale[i])
-    if abs(pull) < DOUBTFUL * force and consistent(K, K.clock[NOW] + h, K.q1, K.y1) == 0:
+    if is_doubtful(K, pull) and consistent(K, K.clock[NOW] + h, K.q1, K.y1) == 0:
         return float(K.impulse[K.normal[c]])
     return pull
+
+
+def is_doubtful(K: Any, force: float) -> bool:
+    """Whether the sign of a force that follows from multipliers of index 3 is asked of consistent ones."""
+    if K.stabilized == 1 or K.strategy == 1:
+        return False
+    largest = 0.0
+    for i in range(K.n_v):
+        largest = max(largest, K.scale[i])
+    return abs(force) < DOUBTFUL * largest
 
 
 def judge_friction(K: Any, f: int, h: float) -> None:
@@ -344,6 +349,8 @@ def judge_friction(K: Any, f: int, h: float) -> None:
         row = K.friction_row[f]
         m0 = K.guards0[place + 2 * nF] - abs(K.lam[row])
         m1 = K.guards1[place + 2 * nF] - abs(K.lam1[row])
+        if is_doubtful(K, m1):
+            m1 = margin(K, f, K.clock[NOW] + h)
         if m1 < -1e-12 * abs(K.lam1[row]):
             consider(K, SLIP, f, crossing(max(m0, 0.0), m1), 0.0)
         return

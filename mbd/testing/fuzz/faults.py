@@ -44,13 +44,16 @@ class Faults:
     found: list[Fault] = field(default_factory=list)
     tried: dict[str, int] = field(default_factory=dict)
 
-    def small(self, law: str, what: str, size: Any, limit: Any, where: Any = True) -> None:
-        """Note where ``|size| ≤ limit`` does not hold, or is not a number; (n,), looked at `where` only."""
+    def small(self, law: str, what: str, size: Any, limit: Any, where: Any = True, told: int = 0) -> None:
+        """Note where ``|size| ≤ limit`` does not hold, or is not a number; (n,), looked at `where` only.
+
+        As many instants as the run has `told` of in a note may miss it.
+        """
         size = np.abs(np.broadcast_to(np.asarray(size, dtype=float), self.time.shape))
         limit = np.broadcast_to(np.asarray(limit, dtype=float), self.time.shape)
         self.tried[law] = self.tried.get(law, 0) + 1
         wrong = ~(size <= limit) & where
-        if not np.any(wrong):
+        if np.count_nonzero(wrong) <= told:
             return
         excess = np.where(wrong, np.nan_to_num(size / np.maximum(limit, 1e-300), nan=np.inf), 0.0)
         k = int(np.argmax(excess))

@@ -59,7 +59,7 @@ def judge(run: mbd.Trajectory, model: mbd.Model, parameters: Mapping[str, float]
     smooth = run.settings["contact"] != "nonsmooth"
     with np.errstate(all="ignore"):
         if run.settings["store"] == 1:
-            steps.motion(found, told, smooth, rates="index3" not in run.settings["integrator"])
+            steps.motion(found, told, smooth, "index3" not in run.settings["integrator"], int(run.stats["careful"]))
         try:
             _rows(found, run, model, told, smooth)
         except NotImplementedError as error:
@@ -96,7 +96,8 @@ def _rows(found: Faults, run: mbd.Trajectory, model: mbd.Model, told: Readings, 
     bodies = Bodies(model, told.part(chosen))
     there = found.at(bodies.told.time)
     laws.places(there, bodies)
-    laws.closure(there, bodies, rates=smooth and "index3" not in run.settings["integrator"])
+    careful = int(run.stats["careful"])
+    laws.closure(there, bodies, rates=smooth and "index3" not in run.settings["integrator"], told=careful)
     laws.constraints(there, bodies)
     acting = loads(bodies)
     if smooth:

@@ -45,12 +45,13 @@ def places(found: Faults, bodies: Bodies) -> None:
             found.small("velocity of a frame", name, np.max(np.abs(reported - own), axis=1), EQUAL * fast)
 
 
-def closure(found: Faults, bodies: Bodies, loose: float = HELD, rates: bool = True) -> None:
+def closure(found: Faults, bodies: Bodies, loose: float = HELD, rates: bool = True, told: int = 0) -> None:
     """Joints that close loops fit: their frames, seen over both branches, differ by the joint's own motion alone.
 
     Parameters
     ----------
     loose : what places may miss, over the size of the mechanism [-]; rates : whether velocities are held too
+    told : how many instants are next to singular poses, where the run says that they are not
     """
     size = size_of(bodies)
     for joint in bodies.closing:
@@ -63,7 +64,7 @@ def closure(found: Faults, bodies: Bodies, loose: float = HELD, rates: bool = Tr
         apart = twist(gap)
         slip = np.linalg.norm(apart.angular, axis=1) + np.linalg.norm(apart.linear, axis=1)
         motion = np.abs(across.first).max(axis=(1, 2))
-        found.small("velocities fit at a joint", joint.name, slip, loose * size * (1.0 + motion))
+        found.small("velocities fit at a joint", joint.name, slip, loose * size * (1.0 + motion), told=told)
 
 
 def balance(found: Faults, bodies: Bodies, acting: Loads, share: Any) -> None:
@@ -243,12 +244,20 @@ def _limit(loss: Any, owner: str, load: Array, parameters: Any) -> Any:
 def _dry(found: Faults, name: str, friction: Array, rate: Array, limit: Any, largest: Array, located: bool) -> None:
     """|F| ≤ limit; where it is located when sliding begins and ends, F against the motion and all of it in motion."""
     scale = 1e-5 * (largest + np.max(np.abs(limit), initial=0.0))
-    found.small("friction within its limit", name, np.maximum(np.abs(friction) - limit, 0.0), scale)
+    excess = np.abs(friction) - limit
+    lag = 0.0 if located else 0.02 * _change(excess)  # index 3 judges before it corrects velocities
+    found.small("friction within its limit", name, np.maximum(excess, 0.0), scale + lag)
     if not located:
         return
     found.small("friction opposes sliding", name, np.maximum(friction * np.sign(rate), 0.0), scale, np.abs(rate) > 1e-6)
     moving = np.abs(rate) > 1e-4
     found.small("sliding friction is all of it", name, np.abs(friction) - limit, scale, moving)
+
+
+def _change(values: Array) -> Array:
+    """The larger change of each value from the one before and to the one after."""
+    steps = np.abs(np.diff(values))
+    return np.asarray(np.maximum(np.append(steps, 0.0), np.append(0.0, steps)))
 
 
 def energies(found: Faults, bodies: Bodies, acting: Loads) -> tuple[Array, Array]:

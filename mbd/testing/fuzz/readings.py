@@ -11,6 +11,7 @@ import numpy as np
 import mbd
 from mbd.joints.base import Joint
 from mbd.testing.fuzz.geometry import Array, Signal
+from mbd.topology.plan import plan
 
 __all__ = ["Readings", "names_for", "readings"]
 
@@ -23,7 +24,8 @@ class Readings:
     values : reported quantities by name
     closed : by contact, whether it is closed, (n,) booleans
     parameters : values of the parameters, one number or (n,) each
-    tree : names of the coordinates that the run integrates
+    tree : names of the coordinates of the tree, from which bodies are placed; not those of cut joints, whose
+        accelerations agree with theirs to the order of the scheme only
     """
 
     time: Array
@@ -86,9 +88,7 @@ def readings(run: mbd.Trajectory, model: mbd.Model, given: Mapping[str, float], 
     """
     record, names = run.record, names_for(run, model)
     parameters = {**model.parameters, **given}
-    tree = (
-        frozenset(coordinate.name for coordinate in record.equations.coordinates) if record.equations else frozenset()
-    )
+    tree = frozenset(plan(model).coordinate_names)
     if times is None:
         found = dict(zip(names, run.columns.at_rows(names), strict=True))
         time, source = record.time, np.arange(len(record.time))

@@ -17,7 +17,7 @@ PASSIVE = ("joint loss", "damper", "friction", "penalty", "impact")
 """Kinds of parts of the ledger that only take energy."""
 
 
-def motion(found: Faults, told: Readings, smooth: bool = True, rates: bool = True) -> None:
+def motion(found: Faults, told: Readings, smooth: bool = True, rates: bool = True, careful: int = 0) -> None:
     """Each coordinate is the integral of its rate, and that of its acceleration, from one row to the next.
 
     ``Δq = h (v₀+v₁)/2 − h² (a₁−a₀)/12`` and ``Δv = h (a₀+a₁)/2`` but for what accelerations change meanwhile: h² and
@@ -27,6 +27,7 @@ def motion(found: Faults, told: Readings, smooth: bool = True, rates: bool = Tru
     ----------
     smooth : whether velocities change by accelerations alone, not by impulses within steps
     rates : whether those of velocities count, which index 3 corrects without
+    careful : how many steps next to singular poses the run says to have less accurate velocities
     """
     h = np.diff(told.time)
     steps = np.flatnonzero(h > 0.0)
@@ -53,7 +54,8 @@ def motion(found: Faults, told: Readings, smooth: bool = True, rates: bool = Tru
         there.small("a coordinate is the integral of its rate", name, off, limit)
         if smooth and rates:
             off = np.diff(v)[steps] - h * (a[steps] + a[steps + 1]) / 2.0
-            there.small("a rate is the integral of the acceleration", name, off, 2.0 * h * change + 1e-7 * (1.0 + fast))
+            limit = 2.0 * h * change + 1e-7 * (1.0 + fast)
+            there.small("a rate is the integral of the acceleration", name, off, limit, told=2 * careful)
 
 
 def _around(values: Array) -> Array:
