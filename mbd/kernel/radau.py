@@ -284,8 +284,9 @@ def judge_raised(K: Any, h: float, t1: float, m: int, tolerance: float, stuck: b
             return TOO_TIGHT
         K.counts[STAGNATIONS] += 1
         return 0
-    if stuck and evaluate_stages(K, h, t1, m, 1e5 * EPS, 0.0, 0.0, False) <= 1e3:
-        return STAGNATED
+    if stuck and evaluate_stages(K, h, t1, m, K.tolerance, c, c * c, False) > 1.0:  # else they do for what was asked
+        if evaluate_stages(K, h, t1, m, 1e5 * EPS, 0.0, 0.0, False) <= 1e3:
+            return STAGNATED
     if evaluate_stages(K, h, t1, m, tolerance, c, c * c, False) <= 1.0:
         return 0
     return NOT_CONVERGED

@@ -138,7 +138,7 @@ def test_what_was_used_last_stays_and_the_kernel_longest(tmp_path, monkeypatch):
     cache.store("kernel", bytes(900), lasting=True)
     for key in ("used", "unused"):
         cache.store(key, bytes(900))
-    for number, path in enumerate(sorted(tmp_path.iterdir())):
+    for number, path in enumerate(sorted(tmp_path.iterdir(), reverse=True)):  # 'used' was written first
         os.utime(path, (1e9 + number, 1e9 + number))
     assert cache.load("used") == bytes(900)
     cache.store("new", bytes(900))

@@ -41,6 +41,12 @@ def driven_slider_crank(cut):
 
 
 @cache
+def slow_slider_crank():
+    """Crank and rod of 0.7 m, flat twice."""
+    return singular.slider_crank(0.7, turn=5.0, until=0.6)
+
+
+@cache
 def scenes():
     """Name → model and start, end, steps: poses in which rows lose rank are passed, contacts close, slip and open."""
     walker, tumbling = kneed_walker(), box(0.3)
@@ -86,6 +92,19 @@ def test_the_last_bit_of_a_start_decides_nothing(seed):
     expected = decisions(model, start, *rest)
     for nudge in range(2):
         assert decisions(model, last_bits(start, nudge), *rest) == expected
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_last_bit_decides_nothing_where_residuals_of_collocation_fall_no_more(seed):
+    """Next to a pose in which rows lose rank round-off stays above the tighter tolerance, below the one asked for."""
+    rng = np.random.default_rng(seed)
+    dts = [0.0003108964665420226, 0.0004457383265439875, *10.0 ** rng.uniform(-3.5, -2.5, 2)]
+    case = slow_slider_crank()
+    model, start = case.start
+    for dt in dts if seed == 0 else dts[2:]:
+        expected = decisions(model, start, mbd.RadauIIA(), dt, case.until)
+        for nudge in range(3):
+            assert decisions(model, last_bits(start, nudge), mbd.RadauIIA(), dt, case.until) == expected
 
 
 @pytest.mark.parametrize("seed", range(12))
