@@ -33,9 +33,9 @@ ENTRY = "mbd_kernel"
 MODULES = (
     "candidate", "linear", "ordered", "orthogonal", "lemke", "redundancy", "saddle", "restart", "pivoting",
     "complementarity", "blow", "impact", "settle", "pairs", "iteration", "memory", "leftovers", "passage", "newton",
-    "newmark", "complex_linear", "ordered_complex", "stages", "straddle", "runge_kutta", "astride", "radau", "hermite",
-    "significance", "guards", "pace", "control", "interior", "refine", "locate", "switching", "nonsmooth", "takeover",
-    "observe", "starting", "unresolved", "trying", "events", "advance",
+    "newmark", "complex_linear", "ordered_complex", "stages", "straddle", "uneven", "runge_kutta", "astride", "radau",
+    "hermite", "significance", "guards", "pace", "control", "interior", "refine", "locate", "switching", "nonsmooth",
+    "takeover", "observe", "starting", "unresolved", "trying", "events", "advance",
 )  # fmt: skip
 
 APART = (

@@ -115,7 +115,8 @@ KEPT_INTEGERS = ("closed", "armed", "touched", "dropped", "rows", "state", "stic
     ORDERED,  # where the order of the factors in K.kkt begins in K.orders, 0 if pivots were searched for
     CALMED,  # 1: the scheme has been started again at the accepted state because a contact seemed to pull in the step
     RAISED,  # 1: magnitudes were raised far above those of the accepted state
-) = range(21)  # fmt: skip
+    UNEVEN,  # 1: masses differ so much that accelerations of stages are corrected by the balance
+) = range(22)  # fmt: skip
 # places in `counts`
 (
     STEPS, ITERATIONS, TANGENTS, RESIDUALS, FACTORIZATIONS, EVENTS, RESTARTS, IMPACTS, LOCATIONS, STAGNATIONS, CAREFUL,

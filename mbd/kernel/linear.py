@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-__all__ = ["eliminate", "factor", "solve", "solve_definite"]
+__all__ = ["eliminate", "factor", "solve", "solve_again", "solve_definite"]
 
 
 def factor(A: Any, n: int, pivots: Any) -> int:
@@ -81,17 +81,21 @@ def solve(A: Any, n: int, pivots: Any, b: Any) -> None:
             b[i] -= A[i * n + k] * left
 
 
-def solve_definite(M: Any, n: int, b: Any, work: Any) -> bool:
-    """b ← M⁻¹ b by M = Uᵀ D U, D U in the upper half of M; false where M is not clearly positive definite.
+def solve_definite(M: Any, n: int, b: Any, work: Any) -> float:
+    """b ← M⁻¹ b by M = Uᵀ D U, D U in the upper half of M; 0 where M is not clearly positive definite.
 
-    `work` needs n places, for the diagonal of M.
+    What returns else is the least part that a pivot keeps of its diagonal entry. `work` needs n places, for the
+    diagonal of M.
     """
     for k in range(n):
         work[k] = abs(M[k * n + k])
+    kept = 1.0
     for k in range(n):
         pivot = M[k * n + k]
         if not pivot > 1e-12 * work[k]:
-            return False
+            return 0.0
+        if pivot < kept * work[k]:
+            kept = pivot / work[k]
         inverse = 1.0 / pivot
         M[k * n + k] = inverse
         for i in range(k + 1, n):
@@ -99,6 +103,21 @@ def solve_definite(M: Any, n: int, b: Any, work: Any) -> bool:
                 left = M[k * n + i] * inverse
                 b[i] -= left * b[k]
                 subtract_row(M, n, i, k, left, i)
+    substitute_back(M, n, b)
+    return kept
+
+
+def solve_again(M: Any, n: int, b: Any) -> None:
+    """b ← M⁻¹ b with the factors of `solve_definite`."""
+    for k in range(n):
+        left = b[k] * M[k * n + k]
+        for i in range(k + 1, n):
+            b[i] -= M[k * n + i] * left
+    substitute_back(M, n, b)
+
+
+def substitute_back(M: Any, n: int, b: Any) -> None:
+    """b ← (D U)⁻¹ b with the factors of `solve_definite`."""
     for c in range(n):
         k = n - 1 - c
         left = b[k]
@@ -111,7 +130,6 @@ def solve_definite(M: Any, n: int, b: Any, work: Any) -> bool:
         if j < n:
             left -= M[k * n + j] * b[j]
         b[k] = (left + even) * M[k * n + k]
-    return True
 
 
 def eliminate(A: Any, n: int, b: Any, columns: Any, work: Any, rank_tolerance: float) -> int:

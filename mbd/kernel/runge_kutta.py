@@ -15,6 +15,7 @@ from typing import Any
 from mbd.kernel.fields import (
     AUX_STEP,
     EPS,
+    N_DROPPED,
     NEAR,
     NOT_CONVERGED,
     NOT_FINITE,
@@ -24,6 +25,7 @@ from mbd.kernel.fields import (
     RESIDUALS,
     ROWS,
     SINGULAR,
+    UNEVEN,
 )
 from mbd.kernel.linear import factor, solve_definite
 from mbd.kernel.memory import forget_steps
@@ -32,6 +34,7 @@ from mbd.kernel.passage import CONTINUOUS
 from mbd.kernel.restart import consistent, evaluate, fill_block, raise_scales, refresh_scales
 from mbd.kernel.roots import sqrt
 from mbd.kernel.straddle import forget_leftovers, keep_leftovers, note_leftovers
+from mbd.kernel.uneven import LOSS, is_uneven, polish_rates, polish_with_rows
 
 __all__ = ["runge_kutta_accept", "runge_kutta_start", "runge_kutta_step"]
 
@@ -47,8 +50,18 @@ def runge_kutta_start(K: Any) -> int:
     """Sizes of forces and rows at the consistent state; the scheme remembers nothing but its rates."""
     forget_steps(K)
     forget_leftovers(K)
+    evaluate(K, K.clock[NOW], K.q, K.y)
+    note_uneven(K)
     find_sizes(K)
     return 0
+
+
+def note_uneven(K: Any) -> None:
+    """Whether stages with rows are corrected by the balance, by the masses in K.acc; not with rows that share loads."""
+    m = K.state[ROWS]
+    K.state[UNEVEN] = 0
+    if m > 0 and K.n_frictions == 0 and K.state[N_DROPPED] == 0 and is_uneven(K, m):
+        K.state[UNEVEN] = 1
 
 
 def find_sizes(K: Any) -> None:
@@ -92,6 +105,9 @@ def runge_kutta_step(K: Any, h: float, t1: float) -> int:
             K.impulse[k] = 0.0
     else:
         status = consistent(K, t1, K.q1, K.y1)
+        note_uneven(K)
+        if status == 0 and K.state[UNEVEN] == 1 and factor_saddle(K, K.state[ROWS], False, LOSS_AT_ONCE):
+            polish_with_rows(K, K.state[ROWS])
     if status != 0:
         return status
     for i in range(n):
@@ -150,9 +166,12 @@ def explicit_rates(K: Any, t: float) -> int:
     if m == 0:
         for i in range(n):
             K.jump[i] = -K.acc[n * n + i]
-        if solve_definite(K.acc, n, K.jump, K.spare):
-            return 0
-        return consistent(K, t, K.q1, K.y1)
+        kept = solve_definite(K.acc, n, K.jump, K.spare)
+        if kept == 0.0:
+            return consistent(K, t, K.q1, K.y1)
+        if kept < LOSS:
+            polish_rates(K, kept)
+        return 0
     o_bias = n * n + n + 2 * n * K.n_rows + 2 * K.n_rows
     if not factor_saddle(K, m, False, LOSS_AT_ONCE):
         return SINGULAR
@@ -163,6 +182,12 @@ def explicit_rates(K: Any, t: float) -> int:
     solve_kkt(K, n + m, K.rhs)
     for i in range(n):
         K.jump[i] = K.rhs[i]
+    if K.state[UNEVEN] == 1:
+        for k in range(K.n_rows):
+            K.impulse[k] = 0.0
+        for k in range(m):
+            K.impulse[K.rows[k]] = K.rhs[n + k]
+        polish_with_rows(K, m)
     return 0
 
 

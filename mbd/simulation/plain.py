@@ -17,6 +17,7 @@ from mbd.kernel.fields import CAREFUL, ITERATIONS, NEAR, NOT_CONVERGED, NOT_FINI
 from mbd.kernel.memory import start_step
 from mbd.kernel.restart import MOST_LOADS, evaluate, fill_block, refresh_scales
 from mbd.kernel.straddle import forget_leftovers, keep_leftovers, note_leftovers
+from mbd.kernel.uneven import LOSS
 from mbd.simulation.asked import asked
 from mbd.simulation.shares import shares
 from mbd.state import Mode, State
@@ -171,6 +172,12 @@ class MechanismSystem:
                 lam[borne] = part @ solved[n:]
             if not self.slip.any() or change <= 1e-13 * np.max(np.abs(lam)):
                 break
+        if not self.slip.any() and not any(self.dropped) and _least_pivot(terms.M) < LOSS:
+            block = self._block(Point(t, q, np.zeros(self.n_v), y, solved[:n], solved[n:]), rows, penalties)
+            out = np.zeros(n + (2 if self.stabilized else 1) * m)
+            self._code(rows, penalties, ()).residual(block, self.parameters, out)
+            off = np.concatenate([out[:n], terms.B[picked] @ solved[:n] + terms.bias[picked]])
+            solved = solved - np.linalg.solve(matrix, off)
         return solved[:n], solved[n:]
 
     def compose(self, q: Vector, x: Vector) -> Vector:
@@ -182,6 +189,16 @@ class MechanismSystem:
         out = np.zeros(self.mechanism.layout.n_q)
         self.mechanism.common["compose"](block, self.parameters, out)
         return out
+
+
+def _least_pivot(M: Matrix) -> float:
+    """Least pivot of the mass matrix over its largest diagonal entry; of its diagonal alone where it is singular."""
+    diagonal = np.diag(M)
+    try:
+        pivots = np.diag(np.linalg.cholesky(M)) ** 2
+    except np.linalg.LinAlgError:
+        pivots = diagonal[diagonal > 0.0]
+    return float(np.min(pivots, initial=np.inf) / np.max(diagonal, initial=np.finfo(float).tiny))
 
 
 def _by_unit(scale: Vector, mechanism: Mechanism) -> Vector:

@@ -36,11 +36,15 @@ class Room:
     ----------
     problem : why the run had to end, in a sentence; '' if it did not
     note : what was foretold; '' if nothing
+    patience : rows above which a run that is foretold to have them is ended
+    is_long : whether it was
+    foretold : rows that were foretold last
     """
 
     def __init__(self, width: int) -> None:
         self.size = 8 * width
         self.problem = self.note = ""
+        self.patience, self.foretold, self.is_long = float("inf"), 0.0, False
         self._most, self._seen = -1, 0
 
     def exhausted(self, run: Run) -> str:
@@ -68,7 +72,10 @@ class Room:
             return ""
         if run.stored >= 2 * self._seen:
             self._look(run.stored)
-        rows = _foretold(run)
+        rows = self.foretold = _foretold(run)
+        if rows > self.patience:
+            self.is_long, self.problem = True, f"t = {run.now:.9g} s: about {rows:.2g} rows are foretold"
+            return self.problem
         if run.stored >= self.most:
             self.problem = (
                 f"t = {run.now:.9g} s: {run.stored} rows fill {memory(run.stored * self.size)}, a quarter of the free "
@@ -85,13 +92,13 @@ class Room:
             warnings.warn(self.note, UserWarning, stacklevel=2)
         return ""
 
-    def refused(self, rows: float) -> str:
-        """Why a run of so many rows is not even begun; '' if there is room for it."""
+    def refused(self, rows: float, seconds: float) -> str:
+        """Why a run of so many rows that takes so long is not even begun; '' if there is room for it."""
         if rows <= self.most:
             return ""
         return (
-            f"about {rows:.2g} steps would be needed, whose rows take {memory(rows * self.size)}, more than a quarter "
-            "of the free memory"
+            f"about {rows:.2g} steps would be needed, which take about {_duration(seconds)} and whose rows take "
+            f"{memory(rows * self.size)}, more than a quarter of the free memory"
         )
 
 
@@ -101,6 +108,13 @@ def _foretold(run: Run) -> float:
     if run.stop or not run.now > begin:
         return float(run.stored)
     return float(run.stored * max(span / (run.now - begin), 1.0))
+
+
+def _duration(seconds: float) -> str:
+    """In seconds, minutes or hours."""
+    if seconds < 120.0:
+        return f"{seconds:.2g} s"
+    return f"{seconds / 60.0:.2g} min" if seconds < 7200.0 else f"{seconds / 3600.0:.2g} h"
 
 
 def _remedy(run: Run) -> str:

@@ -75,8 +75,9 @@ def simulate(
     integrator : default ``HHT(alpha=0.05)``
     dt : step [s]
     tol : in place of dt: the largest error of any coordinate [m, rad] over the whole run. It is estimated from two to
-        five runs at different tolerances, see ``run.stats["tolerance"]``; what controllers and observers do besides
-        answering happens in each of them. A tolerance that cannot be reached is a `SimulationError`
+        five runs at different tolerances (nine while each comes nearer), see ``run.stats["tolerance"]``; what
+        controllers and observers do besides answering happens in each of them. A tolerance that cannot be reached is a
+        `SimulationError`
     tol_of : names of the results that `tol` holds for, each in its own unit, at rows and between them: forces,
         reactions, multipliers, rates or energies too, or coordinates without one that does not matter, such as the
         angle of a fast spin; by default every coordinate
@@ -125,8 +126,9 @@ def simulate(
         "backend": backend,
     }  # fmt: skip
 
-    def complete(step: float, more: Mapping[str, Any]) -> tuple[Run, Trajectory, str]:
+    def complete(step: float, more: Mapping[str, Any], most: float = np.inf) -> tuple[Run, Trajectory, str]:
         run = prepared(model, start, scheme, step, until, changed, {**options, **more})
+        run.room.patience = most
         run.observe(observers, _bar(progress, start.time, run.end))
         return run, *run.complete()
 
@@ -149,7 +151,7 @@ def _span(until: Any, begin: float) -> float | None:
 
 
 def _to_tolerance(
-    complete: Callable[[float, Mapping[str, Any]], tuple[Run, Trajectory, str]],
+    complete: Callable[[float, Mapping[str, Any], float], tuple[Run, Trajectory, str]],
     scheme: Integrator,
     tol: float,
     names: tuple[str, ...],
@@ -160,11 +162,11 @@ def _to_tolerance(
     finer = scheme.order() / scheme.error_order()  # power of the allowed error with which that of the run falls
     first, power = first_allowed(tol, length, finer), 1.0 / scheme.error_order()
 
-    def trial(allowed: float) -> Trial:
+    def trial(allowed: float, most: float = np.inf) -> Trial:
         # shrinks and grows as steps do, so that runs of a motion so easy that its steps are the longest have others
         share = min(max((allowed / first) ** power, SHORTEST_CAP), LARGEST / LONGEST)
         more: dict[str, Any] = {"tol": tol, "tol_of": names, "longest": LONGEST * length * share, "allowed": allowed}
-        run, trajectory, problem = complete(INSTANT * min(length, 1.0), more)
+        run, trajectory, problem = complete(INSTANT * min(length, 1.0), more, most)
         return Trial(allowed, trajectory, problem, run, widest=share == LARGEST / LONGEST)
 
     found = calibrated(trial, tol, first, finer, scheme.order(), names)

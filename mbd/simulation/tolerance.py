@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mbd.errors import MemoryLimitError
+from mbd.simulation.foresight import LONG, foreseen
 from mbd.simulation.search import CHECK, PILOT, REGULAR, WELL, Search
 from mbd.simulation.trials import Trial, is_rounding
 
@@ -18,12 +19,16 @@ FIRST = 0.5
 BEYOND = 3.0
 """Estimated error over the tolerance above which it counts as missed once repeats are used up [-]."""
 MOST_RUNS = 5
-"""Runs in all."""
+"""Runs in all, unless the last one came much nearer."""
+FURTHER_RUNS = 4
+"""Runs beyond these, each while the one before has come nearer [-]."""
+NEARER = 0.5
+"""Error over that of the most accurate run before up to which a run has come nearer [-]."""
 FAR_FINER = 1.5
 """Order of a scheme over that of its estimate from which runs are much better than their estimates say [-]."""
 GROWING = 1e3
 """Growth of errors above which a run says so [-]."""
-ASK = "ask for less accuracy or a shorter time, or take a scheme of higher order"
+ASK = "ask for less accuracy or a shorter time, or take a scheme of higher order, RungeKutta853 or RadauIIA"
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,34 +45,38 @@ def first_allowed(tol: float, length: float, power: float) -> float:
 
 
 def calibrated(
-    run: Callable[[float], Trial], tol: float, allowed: float, power: float, order: int, names: tuple[str, ...] = ()
+    run: Callable[..., Trial], tol: float, allowed: float, power: float, order: int, names: tuple[str, ...] = ()
 ) -> Outcome:
     """Runs until the estimated error of one agrees with the tolerance.
 
     Parameters
     ----------
-    run : makes a run with a local error per second; tol : [m, rad]; allowed : of the first run [m/s, rad/s]
+    run : makes a run with a local error per second, which it ends where more rows than a second argument are foretold
+    tol : [m, rad]; allowed : of the first run [m/s, rad/s]
     power : κ; order : of the scheme
     names : of the results that the tolerance holds for; every coordinate without
     """
     regular = power <= REGULAR
     ratio = PILOT if regular else CHECK ** (1.0 / power)
     search = Search(tol, power, order, regular, ratio, names)
-    first = run(PILOT * allowed if regular else allowed)
+    first = run(PILOT * allowed, LONG) if regular else run(allowed)
+    if first.source.room.is_long:
+        loose, refused = foreseen(run, first, tol, power, order, names)
+        if refused or (loose and loose[-1].source.interrupted):
+            return _given_up(loose, search, refused)
+        first = run(PILOT * allowed)
     if not first.problem and first.run.stats["steps"] == 0:  # it ended where it began
         return _told([first], replace(first, error=0.0), search, "")
     if first.source.interrupted or first.source.room.problem:
         return _told([first], first, search, first.problem)
     trials = [] if first.problem else [first]
     wanted: float | None = first.allowed / (ratio if trials else PILOT)
-    for _ in range(MOST_RUNS - 1):
-        if wanted is None:
+    for count in range(1, MOST_RUNS + FURTHER_RUNS):
+        if wanted is None or (count >= MOST_RUNS and not _coming_nearer(trials, tol)):
             break
         refused = _no_room(trials, wanted, power, order)
-        best = search.best(trials) if trials else None
-        if refused and best is not None and not best.error <= tol:
-            best.source.cause = MemoryLimitError(refused)
-            return _told(trials, best, search, f"tol = {tol:g} was not reached: {refused}; {ASK}")
+        if refused and not search.best(trials).error <= tol:
+            return _given_up(trials, search, refused)
         if refused:
             break
         found = run(wanted)
@@ -82,13 +91,30 @@ def calibrated(
     return _told(trials, best, search, _unreached(trials, best, tol) if missed else "")
 
 
+def _given_up(trials: Sequence[Trial], search: Search, refused: str) -> Outcome:
+    """The best of the runs that show that the next one needs too much, or the last one where a user ended it."""
+    if trials[-1].problem:
+        return _told(trials, trials[-1], search, trials[-1].problem)
+    trials = search.estimated(trials)
+    best = search.best(trials)
+    best.source.cause = MemoryLimitError(refused)
+    return _told(trials, best, search, f"tol = {search.tol:g} was not reached: {refused}; {ASK}")
+
+
 def _no_room(trials: Sequence[Trial], wanted: float, power: float, order: int) -> str:
     """Why a run that allows so much is not begun: its rows would fill the memory. '' if they do not."""
     if not trials:
         return ""
     near = min(trials, key=lambda trial: trial.allowed)
-    steps = len(near.run.time) * (near.allowed / wanted) ** (power / order)
-    return near.source.room.refused(steps)
+    longer = (near.allowed / wanted) ** (power / order)
+    return near.source.room.refused(len(near.run.time) * longer, near.run.stats["wall_seconds"] * longer)
+
+
+def _coming_nearer(trials: Sequence[Trial], tol: float) -> bool:
+    """Whether no run is good yet, but the last and finest one is much better than the others."""
+    *others, last = trials
+    least = min((trial.error for trial in others), default=np.inf)
+    return last.error > tol and last.allowed <= min(t.allowed for t in others) and last.error < NEARER * least
 
 
 def _told(trials: Sequence[Trial], best: Trial, search: Search, problem: str) -> Outcome:

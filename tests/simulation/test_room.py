@@ -8,10 +8,11 @@ import warnings
 
 import numpy as np
 import pytest
+from hypothesis import given, settings, strategies as st
 
 import mbd
 from mbd.results import free
-from mbd.simulation import room, run as running
+from mbd.simulation import room, run as running, tolerance
 from tests.simulation.mechanisms import falling
 
 
@@ -22,15 +23,14 @@ def stiff():
     return model, mbd.assemble(model, {"fall.displacement": 1.001})
 
 
-@pytest.mark.parametrize("how", [{"dt": 1e-6}, {"tol": 1e-9}], ids=str)
-def test_a_run_that_fills_the_memory_is_foretold_and_ends_with_its_rows(how, monkeypatch):
+def test_a_run_that_fills_the_memory_is_foretold_and_ends_with_its_rows(monkeypatch):
     monkeypatch.setattr(room, "available", lambda: 4.0 * 8 * 5 * 150_000)  # 150 000 rows of 5 numbers are a quarter
     model, start = stiff()
     with (
         pytest.warns(UserWarning, match=r"at this rate the run will have about .* rows|which take .*will be ended"),
         pytest.raises(mbd.MemoryLimitError, match=r"a quarter of the free memory; the whole run needs about") as told,
     ):
-        mbd.simulate(model, start, mbd.HHT(0.05), until=5.0, **how)
+        mbd.simulate(model, start, mbd.HHT(0.05), dt=1e-6, until=5.0)
     found = told.value.run
     assert 100_000 < len(found) < 250_000 and 0.0 < found.time[-1] < 5.0 and not found.success
     assert np.all(np.isfinite(found["fall.displacement"]))
@@ -41,9 +41,48 @@ def test_a_finer_trial_run_that_has_no_room_is_not_begun(monkeypatch):
     """The pilot fits; what it tells of the next run is enough to stop there, with the pilot's rows."""
     monkeypatch.setattr(room, "available", lambda: 4.0 * 8 * 5 * 2_000)
     model, start = stiff()
-    with pytest.raises(mbd.MemoryLimitError, match=r"about .* steps would be needed, whose rows take") as told:
+    with pytest.raises(
+        mbd.MemoryLimitError, match=r"about .* steps would be needed, which take .* whose rows take"
+    ) as told:
         mbd.simulate(model, start, mbd.HHT(0.05), tol=1e-6, until=1.5e-3)
     assert told.value.run.time[-1] == pytest.approx(1.5e-3)
+
+
+@pytest.mark.parametrize("scheme", [mbd.HHT(0.05), mbd.Newmark()], ids=str)
+def test_a_tolerance_that_needs_too_many_steps_is_refused_after_a_small_part_of_them(scheme, monkeypatch):
+    monkeypatch.setattr(room, "available", lambda: 4.0 * 8 * 5 * 2e6)
+    model, start = stiff()
+    with pytest.raises(mbd.MemoryLimitError, match="steps would be needed, which take about") as told:
+        mbd.simulate(model, start, scheme, tol=1e-7, until=2.0)
+    needed = float(str(told.value).split("about ")[1].split(" ")[0])
+    taken = sum(trial["steps"] for trial in told.value.run.stats["tolerance"]["runs"])
+    assert needed > 4e6 and taken < 0.1 * needed and "RungeKutta853" in str(told.value)
+
+
+@settings(max_examples=3, deadline=None)
+@given(
+    stiffness=st.floats(1e3, 1e5),
+    tol=st.sampled_from([1e-5, 1e-6]),
+    scheme=st.sampled_from([mbd.HHT(0.05), mbd.Newmark()]),
+)
+def test_a_tolerance_takes_the_steps_that_loose_runs_foresee_or_more(stiffness, tol, scheme):
+    model, body = falling(mass=1.0)
+    model.apply(mbd.Spring("spring", model.ground.origin, body.origin, stiffness=stiffness, length=1.0))
+    start = mbd.assemble(model, {"fall.displacement": 1.001})
+
+    def refused():
+        with pytest.raises(mbd.MemoryLimitError) as told:
+            mbd.simulate(model, start, scheme, tol=tol, until=1.0)
+        return float(str(told.value).split("about ")[1].split(" ")[0])
+
+    taken = mbd.simulate(model, start, scheme, tol=tol, until=1.0).stats
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(room, "available", lambda: 4.0 * 8 * 5 * 200.0)
+        patch.setattr(room, "EARLIEST", 64)
+        patch.setattr(tolerance, "LONG", 100)
+        needed = refused()
+    reached = taken["steps"] * (taken["tolerance"]["estimated"] / tol) ** 0.5
+    assert 0.05 < needed / reached < 2.0  # less where errors of loose runs have the size of the motion
 
 
 def test_a_run_that_fits_says_nothing():

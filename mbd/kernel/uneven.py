@@ -1,0 +1,95 @@
+"""Accelerations to all their digits where masses differ by many orders of magnitude.
+
+A mass matrix adds up masses: of a light link above a heavy one, M₁₁ = m₁ l₁² + m₂ (…) keeps m₁ to ε m₂ only, and
+elimination takes M₁₁ − M₁₂²/M₂₂ = m₁ l₁² + m₂ l₁² sin²φ from it, whose relative round-off is ε m₂/m₁ where the links
+are in line. The balance r = M v̇ + f + R λ itself, body by body, adds up no masses: corrections by it,
+``v̇ ← v̇ − M⁻¹ r(v̇)`` (Wilkinson's iterative refinement), leave round-off of single forces. Each takes the round-off by
+the factor that elimination has lost, so one or two suffice. Where nothing is lost none is made.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mbd.kernel.fields import MODE, RESIDUALS
+from mbd.kernel.hooks import call
+from mbd.kernel.linear import solve_again, solve_definite
+from mbd.kernel.ordered import order_at, solve_kkt
+
+__all__ = ["LOSS", "polish_with_rows", "polish_rates", "is_uneven"]
+
+LOSS = 1e-4
+"""Part of a diagonal entry that is left as its pivot below which rates are corrected [-]."""
+GREAT_LOSS = 1e-8
+"""The same below which they are corrected twice [-]."""
+
+
+def is_uneven(K: Any, m: int) -> bool:
+    """Whether a pivot of M, which is in K.acc, is far below the largest diagonal entry of its unit; with m active rows.
+
+    Where M is singular its diagonal entries are compared.
+
+    Matrices that are eliminated in an order chosen beforehand keep four digits as it is, or pivots are searched for.
+    """
+    if order_at(K, m) > 0:
+        return False
+    n = K.n
+    for k in range(n * n):
+        K.kkt[k] = K.acc[k]
+    for i in range(n):
+        K.rhs[i] = 0.0
+    definite = solve_definite(K.kkt, n, K.rhs, K.spare) > 0.0  # rows may carry what no mass moves with
+    for unit in range(2):
+        big = 0.0
+        least = 1e300
+        for i in range(K.n_v):
+            entry = K.acc[i * n + i]
+            if K.unit[i] == unit and entry > 0.0:
+                big = max(big, entry)
+                least = min(least, 1.0 / K.kkt[i * n + i] if definite else entry)
+        if least < LOSS * big:
+            return True
+    return False
+
+
+def polish_rates(K: Any, kept: float) -> None:
+    """K.jump corrected by the balance at the state in the block; pivots of the factors in K.acc keep `kept`."""
+    n = K.n
+    for _ in range(2 if kept < GREAT_LOSS else 1):
+        find_imbalance(K)
+        for i in range(n):
+            K.rhs[i] = -K.out[i]
+        solve_again(K.acc, n, K.rhs)
+        for i in range(n):
+            K.jump[i] += K.rhs[i]
+
+
+def polish_with_rows(K: Any, m: int) -> None:
+    """The same of K.jump and of K.impulse for the m rows in K.rows, with the factors of `[M R; B 0]` in K.kkt."""
+    n = K.n
+    o_B = n * n + n + n * K.n_rows
+    o_bias = o_B + n * K.n_rows + 2 * K.n_rows
+    for k in range(K.n_rows):
+        K.block[K.o_lam + k] = K.impulse[k]
+    find_imbalance(K)
+    for i in range(n):
+        K.rhs[i] = -K.out[i]
+    for k in range(m):
+        row = K.rows[k]
+        off = K.acc[o_bias + row]
+        for i in range(n):
+            off += K.acc[o_B + row * n + i] * K.jump[i]
+        K.rhs[n + k] = -off
+    solve_kkt(K, n + m, K.rhs)
+    for i in range(n):
+        K.jump[i] += K.rhs[i]
+    for k in range(m):
+        K.impulse[K.rows[k]] += K.rhs[n + k]
+
+
+def find_imbalance(K: Any) -> None:
+    """r of the mode at the state in the block, with the rates in K.jump, into K.out."""
+    for i in range(K.n):
+        K.block[K.o_a + i] = K.jump[i]
+    call(K, K.mode_code[4 * K.state[MODE] + 1], K.out)
+    K.counts[RESIDUALS] += 1

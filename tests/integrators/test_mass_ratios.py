@@ -1,0 +1,84 @@
+"""Masses that differ by many orders of magnitude: explicit steps keep the digits of accelerations."""
+
+from __future__ import annotations
+
+import mpmath as mp
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+
+import mbd
+
+DIGITS = 60
+"""Decimal digits of the accelerations that are compared with [-]."""
+LEFT = 32.0 * float(np.finfo(float).eps)
+"""Error of accelerations over what the largest force would give the lightest mass: directions are rounded [-]."""
+TOL = 1e-7
+"""Error of angles that is asked for [rad]."""
+
+
+def chain(masses, lengths, cut="auto"):
+    """Point masses at the ends of links in a row, hung up at the ground."""
+    model = mbd.Model("chain", cut=cut)
+    links = [
+        mbd.Link(f"link {k}", mass, length, length)
+        for k, (mass, length) in enumerate(zip(masses, lengths, strict=True))
+    ]
+    ends = [model.ground.origin, *(link.end for link in links)]
+    model.connect(*(mbd.Revolute(f"joint {k}", ends[k], link.start) for k, link in enumerate(links)))
+    return model
+
+
+def exact(masses, lengths, q, v):
+    """Accelerations of the joint angles by the closed form in absolute angles, with 60 digits."""
+    with mp.workdps(DIGITS):
+        m, length, g = [mp.mpf(x) for x in masses], [mp.mpf(x) for x in lengths], mp.mpf(9.81)
+        angles, rates = ([mp.fsum(mp.mpf(float(x)) for x in part[: k + 1]) for k in range(len(m))] for part in (q, v))
+        carried = [mp.fsum(m[k:]) for k in range(len(m))]
+        M, f = mp.matrix(len(m)), mp.matrix(len(m), 1)
+        for i in range(len(m)):
+            f[i] = -carried[i] * g * length[i] * mp.sin(angles[i])
+            for j in range(len(m)):
+                common = carried[max(i, j)] * length[i] * length[j]
+                M[i, j] = common * mp.cos(angles[i] - angles[j])
+                f[i] -= common * mp.sin(angles[i] - angles[j]) * rates[j] ** 2
+        found = mp.lu_solve(M, f)
+        return np.array([float(found[k] - (found[k - 1] if k else 0)) for k in range(len(m))])
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    links=st.integers(2, 4),
+    spread=st.sampled_from([0.0, 3.0, 6.0, 8.0]),
+    line=st.sampled_from([1.0, 1e-3, 1e-5]),
+)
+def test_accelerations_are_those_of_exact_arithmetic_whatever_the_masses(seed, links, spread, line):
+    rng = np.random.default_rng(seed)
+    masses = 10.0 ** rng.uniform(-0.5 * spread, 0.5 * spread, links)
+    lengths = rng.uniform(0.5, 1.5, links)
+    position = {f"joint {k}.angle": rng.normal() * (line if k else 1.0) for k in range(links)}  # nearly in line
+    velocity = {f"joint {k}.angle": 10.0 * rng.normal() for k in range(links)}
+    model = chain(masses, lengths)
+    run = mbd.simulate(model, mbd.assemble(model, position, velocity), mbd.RungeKutta853(), dt=1e-8, until=3e-8)
+    for k in range(1, len(run.time)):
+        wanted = exact(masses, lengths, run.record.q[k], run.record.v[k])
+        pulled = np.sum(masses) * (9.81 + np.sum(lengths * np.cumsum(run.record.v[k]) ** 2))
+        bound = pulled / np.min(masses) / np.min(lengths)
+        np.testing.assert_allclose(run.record.a[k], wanted, rtol=0, atol=LEFT * bound)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_heavy_mass_below_a_light_one_follows_a_tolerance_with_joint_angles_and_with_free_bodies(seed):
+    rng = np.random.default_rng(seed)
+    masses, lengths, angles = (1.0, 10.0 ** rng.uniform(5.5, 6.5)), rng.uniform(0.5, 1.5, 2), rng.uniform(0.3, 1.0, 2)
+    times, found = np.linspace(0.0, 1.0, 41), []
+    for cut in ("auto", "all"):
+        model, second = chain(masses, lengths, cut), angles.sum()
+        names = (
+            ("joint 0.angle", "joint 1.angle") if cut == "auto" else ("link 0 floating.angle", "link 1 floating.angle")
+        )
+        start = mbd.assemble(model, dict(zip(names, (angles[0], angles[1] if cut == "auto" else second), strict=True)))
+        run = mbd.simulate(model, start, mbd.RungeKutta853(), tol=TOL, until=1.0)
+        found.append(run.at(times)[names[0]])
+    assert np.max(np.abs(found[0] - found[1])) < 2.0 * TOL
