@@ -72,7 +72,11 @@ def conditions(mechanism: Mechanism, values: Mapping[str, float], rates: bool) -
         if not kinds <= allowed or (rates and kinds & {"q", "x"} and "v" not in kinds):  # a place is no rate
             wrong.append(name)
             continue
-        function = scalar_function([node, *gradient(node, inputs)], mechanism.layout, "condition")
+        key = f"condition on {kind}: {node.index}"
+        function = mechanism.named.get(key)
+        if function is None:
+            function = scalar_function([node, *gradient(node, inputs)], mechanism.layout, "condition")
+            mechanism.named[key] = function
         periodic = not rates and name not in turns and name.rpartition(".")[2] in ("angle", "first", "second")
         found.append(Condition(name, float(target), periodic, function))
     return found, wrong

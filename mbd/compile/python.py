@@ -12,6 +12,7 @@ from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from mbd.compile.layout import Layout
 from mbd.compile.statements import Dialect, arguments, statements
 from mbd.errors import UnknownNameError, nearest
 from mbd.tape.derivatives import live
-from mbd.tape.node import Node, Table
+from mbd.tape.node import Node, Table, Tape
 
 __all__ = ["ArrayFunction", "ScalarFunction", "array_function", "scalar_function"]
 
@@ -228,6 +229,11 @@ def array_source(outputs: Sequence[Node]) -> tuple[str, dict[str, int], dict[str
     return "\n".join(lines) + "\n", kinds, tables
 
 
+MOST_KNOWN = 256
+"""Functions of one tape that are kept at most [-]."""
+_KNOWN: WeakKeyDictionary[Tape, dict[tuple[int, ...], ArrayFunction]] = WeakKeyDictionary()
+
+
 class ArrayFunction:
     """Outputs at many states at once: ``f({'t': (R,), 'q': (R, n_q), …}, parameters) → one (R,) array per output``.
 
@@ -265,5 +271,14 @@ class ArrayFunction:
 
 
 def array_function(outputs: Sequence[Node]) -> ArrayFunction:
-    """The vectorized twin for results after a run."""
-    return ArrayFunction(outputs)
+    """The vectorized twin for results after a run, made once for the same outputs of a tape."""
+    if not outputs:
+        return ArrayFunction(outputs)
+    known = _KNOWN.setdefault(outputs[0].tape, {})
+    key = tuple(node.index for node in outputs)
+    made = known.get(key)
+    if made is None:
+        if len(known) >= MOST_KNOWN:
+            known.clear()
+        made = known[key] = ArrayFunction(outputs)
+    return made
