@@ -118,7 +118,8 @@ def between(run: mbd.Trajectory, model: mbd.Model, parameters: Mapping[str, floa
     """Whether what a run tells between its rows keeps the laws as its rows do.
 
     Where the scheme's own interpolation is of low order, loops and constraints are left to its error, and forces may
-    miss a fiftieth of what they are made of.
+    miss a fiftieth of what they are made of. Where a tolerance was asked for, it is what coordinates may be off, and so
+    what loops may miss; rates by as much in the time in which the mechanism moves by its own size.
     """
     time = run.time
     steps_of = np.flatnonzero(np.diff(time) > 0.0)
@@ -129,12 +130,13 @@ def between(run: mbd.Trajectory, model: mbd.Model, parameters: Mapping[str, floa
     times = np.sort(times[(times > np.repeat(0.0, len(times)))])
     told = readings(run, model, dict(parameters or {}), times)
     found = Faults(told.time)
+    tol = run.settings["tol"] if run.settings.get("tol") else 0.0
     precise = run.settings["integrator"].startswith(("Runge", "Radau"))
     with np.errstate(all="ignore"):
         try:
             bodies = Bodies(model, told)
             laws.places(found, bodies)
-            laws.closure(found, bodies, 1e-6 if precise else 1e-3, rates=precise)
+            laws.closure(found, bodies, (1e-6 if precise else 1e-3) + 0.3 * tol, rates=precise)
             laws.balance(found, bodies, loads(bodies), 1e-5 if precise else 0.02 + _unresolved(run, times))
             if precise:
                 laws.constraints(found, bodies, 1e-6)
