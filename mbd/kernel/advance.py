@@ -52,7 +52,7 @@ from mbd.kernel.nonsmooth import lands, lets_go
 from mbd.kernel.observe import is_awaited, store_row
 from mbd.kernel.pace import relax_pace
 from mbd.kernel.pairs import ALONE, FIRST, SECOND
-from mbd.kernel.restart import consistent
+from mbd.kernel.restart import consistent, largest_force
 from mbd.kernel.settle import room_to_log
 from mbd.kernel.starting import find_mode, restart, still_dependent
 from mbd.kernel.takeover import leave_pose, take_over
@@ -74,15 +74,14 @@ def rings(K: Any) -> bool:
     index 3 err for some steps after a start, and undamped ones alternate where dt is long for the motion. Consistent
     ones, by which such a row was judged, take the place of the step's.
     """
-    force = 0.0
-    for i in range(K.n_v):
-        force = max(force, K.scale[i])
     for c in range(K.n_contacts):
-        if K.kind[c] == 0 and K.closed[c] == 1 and K.opens[c] == 0 and K.lam1[K.normal[c]] > PULL * force:
-            return True
+        if K.closed[c] == 1 and K.kind[c] == 0 and K.opens[c] == 0 and K.lam1[K.normal[c]] > 0.0:
+            if K.lam1[K.normal[c]] > PULL * largest_force(K):
+                return True
     if K.strategy == 0:
         for f in range(K.n_frictions):
-            if K.sticks[f] == 1 and abs(K.lam1[K.friction_row[f]]) > K.limit[f] + PULL * force:
+            excess = abs(K.lam1[K.friction_row[f]]) - K.limit[f]
+            if K.sticks[f] == 1 and excess > 0.0 and excess > PULL * largest_force(K):
                 return True
     return False
 

@@ -32,7 +32,16 @@ from mbd.kernel.fields import (
 )  # fmt: skip
 from mbd.kernel.hermite import crossing, hermite, hermite_turn
 from mbd.kernel.hooks import call, scheme_step
-from mbd.kernel.restart import compose, consistent, evaluate_loaded, fill_block, holds_rows, limit_of, share_out
+from mbd.kernel.restart import (
+    compose,
+    consistent,
+    evaluate_loaded,
+    fill_block,
+    holds_rows,
+    largest_force,
+    limit_of,
+    share_out,
+)
 from mbd.kernel.significance import condition_round_off, guard_round_off
 
 __all__ = [
@@ -333,10 +342,7 @@ def is_doubtful(K: Any, force: float) -> bool:
     """Whether the sign of a force that follows from multipliers of index 3 is asked of consistent ones."""
     if K.stabilized == 1 or K.strategy == 1:
         return False
-    largest = 0.0
-    for i in range(K.n_v):
-        largest = max(largest, K.scale[i])
-    return abs(force) < DOUBTFUL * largest
+    return bool(abs(force) < DOUBTFUL * largest_force(K))
 
 
 def judge_friction(K: Any, f: int, h: float) -> None:

@@ -9,13 +9,14 @@ from mbd.kernel.hooks import call
 from mbd.kernel.pairs import WHOLE
 from mbd.kernel.restart import compose
 
-__all__ = ["finish", "overturns", "predict", "predicted_shift", "residual_size", "runs_away", "soundness_at"]
+__all__ = ["finish", "overturns", "predict", "residual_size", "runs_away", "shift_growth", "soundness_at"]
 
 
 def predict(K: Any, h: float, t1: float, c_C: float, c_K: float) -> None:
     """The block at t₁ with rates, multipliers and position correction extrapolated."""
     block = K.block
     stretch = h / K.clock[AUX_STEP]
+    cube = shift_growth(K, h)
     mean = 1.0 / (1.0 - K.alpha_m)
     by_rate = (1.0 - K.alpha_f) * mean
     by_last = K.alpha_f * mean
@@ -39,18 +40,17 @@ def predict(K: Any, h: float, t1: float, c_C: float, c_K: float) -> None:
         block[K.o_a + i] = rate
         block[K.o_v + i] = K.y[i] + h * ((1.0 - K.gamma) * a0 + K.gamma * a1)
         if i < K.n_v:
-            shift = predicted_shift(K, i, h)
+            shift = (K.shift[i] + stretch * K.shift_change[i]) * cube
             K.shift1[i] = shift
             block[K.o_x + i] = h * K.y[i] + h * h * ((0.5 - K.beta) * a0 + K.beta * a1) + shift
 
 
-def predicted_shift(K: Any, i: int, h: float) -> float:
-    """The position correction of a coordinate extrapolated to the end of a step."""
-    stretch = h / K.clock[AUX_STEP]
-    cube = stretch * stretch * stretch
+def shift_growth(K: Any, h: float) -> float:
+    """The factor by which a position correction, that of order h³, grows from the last step to this one."""
     if h > (1.0 + WHOLE) * K.clock[STEP]:  # the longer of a pair: round-off of the shorter does not grow
-        cube = 1.0
-    return float((K.shift[i] + stretch * K.shift_change[i]) * cube)
+        return 1.0
+    stretch = h / K.clock[AUX_STEP]
+    return float(stretch * stretch * stretch)
 
 
 def soundness_at(K: Any, m: int) -> int:

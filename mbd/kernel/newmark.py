@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Any
 
 from mbd.kernel.fields import AUX_STEP, NEAR, NOW, PASSING, ROWS
-from mbd.kernel.iteration import predict, predicted_shift
+from mbd.kernel.iteration import predict, shift_growth
 from mbd.kernel.memory import forget_steps, look_a_step_ahead, start_step
 from mbd.kernel.newton import SEARCHED, UNSOUND, solve_step
 from mbd.kernel.passage import passing_step
@@ -69,12 +69,13 @@ def newmark_step(K: Any, h: float, t1: float) -> int:
     c = (1.0 - K.alpha_f) / (1.0 - K.alpha_m)
     c_C = K.gamma * h * c
     c_K = K.beta * h * h * c
-    predict(K, h, t1, c_C, c_K)
-    status = solve_step(K, h, t1, c_C, c_K, 0)
-    if status == UNSOUND:  # pivots in a fixed order were round-off: from the prediction again, with a search for pivots
+    tangents = 0
+    while True:  # at most twice; called from one place, the iteration stays in one piece with the step
         predict(K, h, t1, c_C, c_K)
-        status = solve_step(K, h, t1, c_C, c_K, SEARCHED)
-    return status
+        status = solve_step(K, h, t1, c_C, c_K, tangents)
+        if status != UNSOUND:
+            return status
+        tangents = SEARCHED  # pivots in a fixed order were round-off: from the prediction again, with a search for them
 
 
 def newmark_accept(K: Any, h: float) -> None:
@@ -105,14 +106,16 @@ def part_of_change(K: Any, h: float) -> float:
     """
     if K.stabilized == 0 or K.state[ROWS] == 0:
         return 1.0
+    stretch = h / K.clock[AUX_STEP]
+    cube = shift_growth(K, h)
     predicted = True
     known = False
     for i in range(K.n_v):
-        predicted = predicted and K.shift1[i] == predicted_shift(K, i, h)
+        predicted = predicted and K.shift1[i] == (K.shift[i] + stretch * K.shift_change[i]) * cube
         known = known or K.shift_change[i] != 0.0
-    if predicted:
-        return 0.0
-    return 1.0 if known else 0.5
+        if known and not predicted:
+            return 1.0
+    return 0.0 if predicted else 0.5
 
 
 def newmark_resume(K: Any, h: float) -> int:

@@ -31,7 +31,7 @@ from mbd.kernel.fields import (
 )  # fmt: skip
 from mbd.kernel.guards import frictions_at, gap_scale, gap_tolerance, is_watched, watch
 from mbd.kernel.hooks import call
-from mbd.kernel.restart import consistent, evaluate
+from mbd.kernel.restart import consistent, evaluate, largest_force
 from mbd.kernel.settle import NO_IMPULSE, STILL, log_event
 from mbd.kernel.switching import close_by_impact, mark_touching
 
@@ -50,9 +50,7 @@ def lets_go(K: Any, t1: float) -> int:
 
     What has let go for a step does not hold again in it, even where frictions that depend on each other share a load.
     """
-    force = 0.0
-    for i in range(K.n_v):
-        force = max(force, K.scale[i])
+    force = largest_force(K)
     count = 0
     for c in range(K.n_contacts):
         if K.kind[c] == 0 and K.closed[c] == 1 and K.opens[c] == 0 and pulls(K, c, PULL * force, t1):

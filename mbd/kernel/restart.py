@@ -11,8 +11,9 @@ from mbd.kernel.saddle import solve_rows
 
 __all__ = [
     "active_rows", "add_shares", "capture", "compose", "consistent", "evaluate", "evaluate_loaded",
-    "fill_block", "holds_rows", "limit_of", "load_accelerations", "lower_scales", "note_scales", "raise_scales",
-    "refresh_scales", "restore_scales", "retain_scales", "row_speed", "share_loads", "share_out", "stepping_rows",
+    "fill_block", "holds_rows", "largest_force", "limit_of", "load_accelerations", "lower_scales", "note_scales",
+    "raise_scales", "refresh_scales", "restore_scales", "retain_scales", "row_speed", "share_loads",
+    "share_out", "stepping_rows",
 ]  # fmt: skip
 
 FAR_ABOVE = 100.0
@@ -107,6 +108,14 @@ def raise_scales(K: Any, rows: bool) -> None:
         else:
             K.scale[i] = K.work[i]
     weigh(K)
+
+
+def largest_force(K: Any) -> float:
+    """The largest magnitude that forces have in the balance [N, N m]."""
+    force = 0.0
+    for i in range(K.n_v):
+        force = max(force, K.scale[i])
+    return float(force)
 
 
 def note_scales(K: Any) -> None:

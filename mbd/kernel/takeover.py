@@ -8,7 +8,7 @@ from mbd.kernel.candidate import adopt
 from mbd.kernel.fields import NOW, PULL
 from mbd.kernel.guards import update_armed, update_sides, watch
 from mbd.kernel.hooks import scheme_resume
-from mbd.kernel.restart import active_rows, consistent, evaluate, stepping_rows
+from mbd.kernel.restart import active_rows, consistent, evaluate, largest_force, stepping_rows
 from mbd.kernel.saddle import solve_rows
 
 __all__ = ["leave_pose", "take_over"]
@@ -36,9 +36,7 @@ def project_velocity(K: Any, m: int, dropping: bool) -> int:
 
 def would_pull(K: Any) -> bool:
     """Whether a contact that pushes by the multipliers of the step pulls by those in K.impulse."""
-    force = 0.0
-    for i in range(K.n_v):
-        force = max(force, K.scale[i])
+    force = largest_force(K)
     for c in range(K.n_contacts):
         if K.kind[c] == 0 and K.closed[c] == 1 and K.opens[c] == 0:
             if K.lam[K.normal[c]] <= 0.0 and K.impulse[K.normal[c]] > PULL * force:

@@ -57,6 +57,8 @@ FEWEST = 1.0 / 4096.0
 def judge_change(K: Any, h: float, t1: float) -> int:
     """0 where the candidate may be a continuation of the motion, OUTGROWN or GAINED where it cannot."""
     stretch = max(1.0, K.clock[STEP] / h)
+    if K.scheme == 0 and changes_little(K, h, stretch):
+        return 0
     worst = largest_share(K, h, stretch)
     allowed = LOOK_TWICE
     if K.scheme != 0:
@@ -64,6 +66,19 @@ def judge_change(K: Any, h: float, t1: float) -> int:
     if worst <= allowed or K.state[NEAR] > 0 or sharing(K):
         return 0
     return look_closer(K, h, t1, stretch)
+
+
+def changes_little(K: Any, h: float, stretch: float) -> bool:
+    """Whether the errors of all rates are small beside a part of the fastest one: no share is large, most steps."""
+    largest = 0.0
+    fastest = 0.0
+    for i in range(K.n_v):
+        largest = max(largest, abs(K.rate1[i] - K.rate[i] - h * K.slope[i]))
+        fastest = max(fastest, abs(K.y1[i]))
+    for i in range(K.n_v, K.n):
+        largest = max(largest, abs(K.rate1[i] - K.rate[i] - h * K.slope[i]))
+    cube = stretch * stretch * stretch
+    return bool(h * largest * cube <= 12.0 * LOOK_TWICE * max(K.rest_speed, BYSTANDER * fastest))
 
 
 def look_closer(K: Any, h: float, t1: float, stretch: float) -> int:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from mbd.arrays import Vector
+from mbd.arrays import Matrix, Vector
 from mbd.compile.mechanism import Mechanism
 from mbd.errors import MemoryLimitError, SimulationError, UnknownNameError
 from mbd.facings import first_reversed, reversed_joints
@@ -48,8 +48,8 @@ USUAL_SIZE = 10
 """Unknowns above which there are fewer such steps, as the square: large mechanisms get better code at these looks."""
 SHOW_EVERY = 0.1
 """Wall time between two calls of progress and observers [s]."""
-FIRST_TABLE = 1 << 26
-"""Size of the table that is laid out at the start; longer runs double it as it fills [bytes]."""
+FIRST_TABLE = 1 << 28
+"""Largest table laid out at the start, of which only rows written take memory; it doubles as it fills [bytes]."""
 INTERRUPTED = "interrupted"
 """The problem of a run that was interrupted, until its time is known."""
 OVERFULL = (
@@ -93,8 +93,7 @@ class Run:
         self.values["chunk"] = _steps_at_once(self.stepper)
         width, capacity = self.values["width"], self.values["capacity"]
         expected = 1.25 * (end - start.time) / dt / options.get("store", 1) + 1024
-        expected = max(min(expected, FIRST_TABLE / (8 * width)), 3 * capacity)
-        self.table = np.empty((int(expected), width))  # memory is taken as rows are written
+        self.table = _first_table(max(int(min(expected, FIRST_TABLE / (8 * width))), 3 * capacity), width)
         self.events: list[EventRecord] = []
         self.parameter_changes: list[tuple[int, Vector]] = []
         self.stored = 0
@@ -425,3 +424,14 @@ def _places(force: Force) -> str:
     """The frames and joints of a force, for messages."""
     named = [getattr(mention, "full_name", getattr(mention, "name", None)) for mention in force.mentions()]
     return ", ".join(repr(name) for name in named if name)
+
+
+def _first_table(rows: int, width: int) -> Matrix:
+    """A table of so many rows, or of fewer where addresses are limited."""
+    while True:
+        try:
+            return np.empty((rows, width))
+        except MemoryError:
+            if rows < 1024:
+                raise
+            rows //= 4
