@@ -147,7 +147,7 @@ def test_a_long_run_lays_out_no_more_than_it_fills(monkeypatch):
         model, start, mbd.HHT(0.05), dt=1e-6, until=1e3, on_failure="return",
         observers=[lambda time, state: seen.append(time) or (_ for _ in ()).throw(KeyboardInterrupt)],
     )  # fmt: skip
-    assert seen and run.record.q.base.nbytes <= 1 << 26
+    assert seen and run.record.q.base.nbytes <= running.FIRST_TABLE
     one = mbd.simulate(model, start, mbd.HHT(0.05), dt=1e-5, until=1.0)
     monkeypatch.setattr(running, "FIRST_TABLE", 1 << 10)
     other = mbd.simulate(model, start, mbd.HHT(0.05), dt=1e-5, until=1.0)
