@@ -7,6 +7,7 @@ from typing import Any
 from mbd.kernel.candidate import accept_guards
 from mbd.kernel.events import handle_event, land
 from mbd.kernel.fields import (
+    AT_POSE,
     BASE,
     CALMED,
     CHATTER,
@@ -54,6 +55,7 @@ from mbd.kernel.pace import relax_pace
 from mbd.kernel.pairs import ALONE, FIRST, SECOND
 from mbd.kernel.restart import consistent, largest_force
 from mbd.kernel.settle import room_to_log
+from mbd.kernel.singular import find_passed_events, log_passed_events, may_pass_events, refuses
 from mbd.kernel.starting import find_mode, restart, still_dependent
 from mbd.kernel.takeover import leave_pose, take_over
 from mbd.kernel.trying import part_end, step_end, tried_step
@@ -97,14 +99,16 @@ def accept(K: Any, h: float, t1: float, quiet: bool) -> None:
 
 
 def forget_found(K: Any) -> None:
-    """No guard has been found to be no event yet."""
+    """No guard has been found to be no event yet, but for events that the step passes."""
     for c in range(K.n_contacts + K.n_guards + K.n_frictions):
         K.active[c] = 0
+    for e in range(K.n_guards):
+        K.active[K.n_contacts + e] = 1 if K.crossed[e] >= 0.0 else 0
 
 
 def begin(K: Any) -> int:
     """What comes before a step: room for its rows, a start of the scheme, code of the mode; −1 if it can be taken."""
-    if K.state[STORED] + 4 > K.capacity or K.state[LOGGED] + room_to_log(K) > K.event_capacity:
+    if K.state[STORED] + 4 + 2 * K.n_guards > K.capacity or K.state[LOGGED] + room_to_log(K) > K.event_capacity:
         return FULL
     if K.state[RESTART] > 0:
         visible = K.state[RESTART] == 1
@@ -153,6 +157,9 @@ def conclude(K: Any, h: float, full: float, t1: float, cut: bool, within: bool, 
     uneven = K.stabilized == 0 and K.state[ROWS] > 0 and h < (1.0 - 1e-6) * K.clock[STEP]
     uneven = uneven or (not quiet and rings(K))
     K.state[CALMED] = 0
+    if cut and K.stabilized == 0 and refuses(K, h):
+        K.fired[0] = -1
+        return AT_POSE
     if (h < 1e-3 * K.clock[STEP] and K.scheme != 1) or uneven:  # index 3 rings after a change of step
         take_over(K, t1)
         K.state[RESTART] = 2
@@ -219,6 +226,16 @@ def in_parts(K: Any) -> bool:
     return bool(K.looks > 1 and K.n_watched > 0 and K.state[STRAIGHT] == 0)
 
 
+def passes_events(K: Any, h: float) -> bool:
+    """Whether the step passes events without effect next to a singular configuration: they do not end it."""
+    for e in range(K.n_guards):
+        K.crossed[e] = -1.0
+    if not may_pass_events(K, h):
+        return False
+    forget_found(K)
+    return bool(find_passed_events(K, h) > 0)
+
+
 def find_event(K: Any, h: float, t1: float) -> int:
     """−1 with the candidate at the first event of the step, which K.fired tells; 0 without one; else a failure."""
     forget_found(K)
@@ -231,7 +248,7 @@ def find_event(K: Any, h: float, t1: float) -> int:
         return 0
     if K.strategy == 1 and lands(K):  # the contact comes first
         return try_step(K, h, t1)
-    return -1
+    return AT_POSE if refuses(K, K.pick[2]) else -1
 
 
 def add_error(K: Any, h: float, fired: bool) -> None:
@@ -309,6 +326,7 @@ def judge_step(K: Any, h: float, full: float, t1: float, cut: bool, within: bool
     holds = K.state[N_DROPPED] == 0 or still_dependent(K) or K.state[NEAR] > 0  # nothing is told apart there
     looked = in_parts(K)
     quiet = not looked and is_quiet(K)
+    passes = K.n_guards > 0 and passes_events(K, h)
     parts = look_inside(K, h)
     if parts != 0:
         within = True
@@ -326,6 +344,8 @@ def judge_step(K: Any, h: float, full: float, t1: float, cut: bool, within: bool
     if event == 0 and not quiet and K.state[ROWS] > 0 and calm(K):
         return -1
     add_error(K, h, event < 0)
+    if passes:
+        log_passed_events(K, K.pick[2] if event < 0 else h)
     if event < 0:
         return handle_event(K)
     if K.strategy == 1 and not quiet:

@@ -35,16 +35,17 @@ MODULES = (
     "complementarity", "blow", "impact", "settle", "pairs", "iteration", "memory", "leftovers", "passage", "newton",
     "newmark", "complex_linear", "ordered_complex", "stages", "straddle", "uneven", "runge_kutta", "astride", "radau",
     "hermite", "significance", "guards", "pace", "control", "interior", "refine", "locate", "switching", "nonsmooth",
-    "takeover", "observe", "starting", "unresolved", "trying", "events", "advance",
+    "takeover", "observe", "starting", "unresolved", "trying", "singular", "events", "advance",
 )  # fmt: skip
 
 APART = (
     "factor", "solve", "solve_definite", "factor_ordered", "solve_ordered", "factor_pair_ordered", "solve_pair_ordered",
     "leftovers_of_many", "parts_to_take", "locate", "handle_event", "land", "look_closer",
+    "find_passed_events", "log_passed_events", "refuses",
 )  # fmt: skip
 """Their loops keep their shape wherever they are called; where they are not, nobody carries them along.
 
-The last five are what few steps need: with them inside, the loop over steps would be too large to stay in one piece.
+The last eight are what few steps need: with them inside, the loop over steps would be too large to stay in one piece.
 """
 
 SHIMS = """

@@ -64,6 +64,7 @@ REAL_ARRAYS = (
     "weight",  # the inverse of those of r
     "deepest", "sinking",  # lowest gap of each contact while ignored; time of its first release into its surface
     "side",  # sign of each user guard since it last crossed
+    "crossed",  # time from the start of the step to an event that it passes without a restart, < 0 for none
     "doubt",  # guard values, then round-off of positions and velocities, where a guard's own round-off is asked for
     "restitution",
     "pace",  # of each contact, as a penalty contact closes: see the places in `pace`
@@ -144,7 +145,8 @@ DONE, FULL, NEW_MODE, EVENT, PAUSE, LAST = range(6)
 (
     NOT_FINITE, NOT_CONVERGED, SINGULAR, STAGNATED, CHATTER, NO_IMPACT, DEPENDENT, CONFLICT, NO_LOCATION, ENERGY_GAIN,
     NO_FORCE, TOO_TIGHT, TOO_NEAR, TOO_SMALL, STIRRED, OUTGROWN, GAINED, TOO_BRIEF,
-) = range(10, 28)  # fmt: skip
+    AT_POSE,
+) = range(10, 29)  # fmt: skip
 # kinds of fired guards
 CLOSE, OPEN_PULL, OPEN_GAP, OPEN_FORCE, CROSS, WATCH, GRAZE, PRESS, STICK, SLIP, STICK_BRIEF = range(11)
 # kinds in the log

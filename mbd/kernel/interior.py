@@ -19,7 +19,7 @@ from mbd.kernel.fields import EPS, NOW
 from mbd.kernel.guards import gap_scale, gap_tolerance, goes_back, is_watched, judge, watch
 from mbd.kernel.restart import compose, consistent, fill_block
 
-__all__ = ["parts_to_take"]
+__all__ = ["copy_ends", "look_at", "parts_to_take", "put_candidate_back"]
 
 FINEST = 16.0
 """Distance over the round-off of a position below which the interpolant need not meet it at the end of a step [-]."""

@@ -16,20 +16,25 @@ from mbd.kernel.fields import (
     STORED,
 )
 
-__all__ = ["is_awaited", "store_row"]
+__all__ = ["is_awaited", "store_row", "store_state"]
 
 
 def store_row(K: Any) -> None:
+    """One row of results: the accepted state."""
+    store_state(K, K.q, K.y, K.rate, K.lam)
+
+
+def store_state(K: Any, q: Any, y: Any, rate: Any, lam: Any) -> None:
     """One row of results: t, q, (v, z), (v̇, ż), λ, closed, and what frictions do: 2 sticks, ±1 slides, 0 off."""
     if K.state[STORED] >= K.capacity:  # never beyond the array; the run ends with an error
         K.counts[LOST] += 1
         return
     o = K.state[STORED] * K.width
     K.store[o] = K.clock[NOW]
-    o = carry(K.q, K.store, o + 1, K.n_q, True)
-    o = carry(K.y, K.store, o, K.n, True)
-    o = carry(K.rate, K.store, o, K.n, True)
-    o = carry(K.lam, K.store, o, K.n_rows, True)
+    o = carry(q, K.store, o + 1, K.n_q, True)
+    o = carry(y, K.store, o, K.n, True)
+    o = carry(rate, K.store, o, K.n, True)
+    o = carry(lam, K.store, o, K.n_rows, True)
     for c in range(K.n_contacts):
         K.store[o + c] = float(K.closed[c])
     for f in range(K.n_frictions):

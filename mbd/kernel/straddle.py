@@ -27,8 +27,8 @@ from mbd.kernel.restart import compose, evaluate, fill_block
 from mbd.kernel.roots import sqrt
 
 __all__ = [
-    "forget_leftovers", "is_resolved", "keep_leftovers", "longest_over", "note_leftovers", "step_by_pose", "stirred",
-    "stirs",
+    "HUSHED", "LOUD", "forget_leftovers", "is_resolved", "keep_leftovers", "leftovers_here", "longest_over", "motion",
+    "note_leftovers", "step_by_pose", "stirred", "stirring", "stirs",
 ]  # fmt: skip
 
 AMID = 0.46666666666666667

@@ -34,6 +34,8 @@ DEPENDENCE = 1e-6
 The largest over some stored states counts: at one of them rows may depend on each other for an instant, and an error of
 1e-9 in positions leaves as much of a row that depends on others.
 """
+TELLING = 1e-5
+"""What is left of a row, over its length elsewhere, below which its direction is too much that of round-off [-]."""
 SAMPLES = 16
 """Stored states at which the dependence of rows is judged, at most [-]."""
 LEAST_SIZE = -1e6
@@ -201,7 +203,11 @@ def _mix(M: Any, B: Any, held: _Held) -> Any:
 def _least_norm(mix: Any, weight: Matrix) -> Any:
     """S (k, every, kept) of λ = S λ_kept: of all λ with the same forces that with the least λᵀ W⁻¹ λ."""
     heavy = weight[:, :, None] * mix
-    return np.swapaxes(np.linalg.solve(np.swapaxes(mix, 1, 2) @ heavy, np.swapaxes(heavy, 1, 2)), 1, 2)
+    square = np.swapaxes(mix, 1, 2) @ heavy
+    lost = ~np.isfinite(square).all(axis=(1, 2))  # at a singular configuration, where no such λ is used
+    square[lost] = 0.0
+    square[lost | (np.linalg.slogdet(square)[0] == 0.0)] = np.eye(mix.shape[2])
+    return np.swapaxes(np.linalg.solve(square, np.swapaxes(heavy, 1, 2)), 1, 2)
 
 
 def _shared(mix: Any, weight: Matrix, held: _Held) -> Any:
@@ -227,14 +233,21 @@ def _saddle(M: Any, f: Matrix, R: Any, B: Any, bias: Matrix) -> tuple[Matrix, Ma
 
 
 def _independent(B: Any) -> list[int]:
-    """The rows that do not depend on earlier ones at every one of k states, from B (k, m, n)."""
+    """The rows that do not depend on earlier ones at every one of k states, from B (k, m, n).
+
+    A state next to a singular configuration tells nothing of later rows, since what is left of an earlier one is
+    round-off there.
+    """
     basis, kept = np.zeros((len(B), 0, B.shape[2])), []
+    telling = np.ones(len(B), dtype=bool)
     for row in range(B.shape[1]):
         left, size = B[:, row], np.linalg.norm(B[:, row], axis=1)
         for _ in range(2):
             left = left - np.einsum("kbn,kb->kn", basis, np.einsum("kbn,kn->kb", basis, left))
         length = np.linalg.norm(left, axis=1)
-        if np.any(length > DEPENDENCE * size):
+        asked = telling if telling.any() else ~telling
+        if np.any((length > DEPENDENCE * size)[asked]):
+            telling &= length > TELLING * np.max(size)  # a row may vanish by itself there
             there = (length > DEPENDENCE**2 * size)[:, None]
             unit = np.divide(left, length[:, None], out=np.zeros_like(left), where=there)
             basis = np.concatenate([basis, unit[:, None]], axis=1)

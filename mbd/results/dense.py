@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 __all__ = ["Restepping"]
 
 NEAR_POSE = 0.2
-"""Distance of a stage from a pose of lost rank, over that of the row before, below which it is not used [-]."""
+"""Distance of a stage from a pose of lost rank, over that of the farther row, below which it is not used [-]."""
 
 
 class Restepping:
@@ -59,7 +59,10 @@ class Restepping:
         there: dict[str, Any] = {name: put(getattr(found, name), inside, new) for name, new in changed.items()}
         found = replace(found, **there)
         near = np.zeros(len(inside), dtype=bool)
-        near[inside] = np.minimum(least, end.size - self._rates(begin).size) < 2.0 * np.log(NEAR_POSE)
+        before, after = self._rates(begin).size, self._rates(rows.part(places.upper[inside])).size
+        far = np.maximum(before, after)  # the row of an event may lie at the pose itself
+        least = np.minimum(np.minimum(least, 0.0) + before, end.size)
+        near[inside] = least - far < 2.0 * np.log(NEAR_POSE)
         near[inside] |= ~end.sound
         return self._smoothed(rows, places, found, near) if near.any() else found
 

@@ -17,6 +17,7 @@ from mbd.results.record import EventRecord, Record
 from mbd.simulation.blows import dt_of_blows
 from mbd.simulation.fastest import fastest, resolving_dt, sane_rows
 from mbd.simulation.redundant import redundancy
+from mbd.simulation.singular import singular_start
 from mbd.simulation.stored import record_of
 from mbd.simulation.turning import unresolved_turns
 
@@ -93,8 +94,8 @@ def notes_of(run: Run, record: Record) -> tuple[list[str], list[str]]:
     loaded = bool(run.values["loaded"]) or any(friction.contact >= 0 for friction in equations.frictions)
     rubs = loaded and any(code.borne for code in run.stepper.modes)
     moved = len(record.q) > 1 and bool(np.max(np.ptp(record.q, axis=0), initial=0.0) > MOVED)
-    dependent = redundancy(equations.rows, run.stepper.dependent, rubs, moved)
-    notes += [dependent] if dependent else []
+    dependent = redundancy(equations.rows, run.stepper.dependent, rubs, moved, _left_singular(run))
+    notes += [dependent] if dependent else singular_start(run)
     notes += [DAMAGED.format(run.damage)] if run.damage else []
     if run.start.memory is not None and not run.carried and run.boundaries.controllers:
         notes.append(ANEW)
@@ -118,6 +119,16 @@ def notes_of(run: Run, record: Record) -> tuple[list[str], list[str]]:
         notes += _pulled(record, number, contact)
         doubts += blind
     return notes, doubts
+
+
+def _left_singular(run: Run) -> bool:
+    """Whether rows that depended on each other act still and are independent now: so the configuration was singular."""
+    v = run.values
+    acting = run.manager.active_rows(v["closed"][: v["n_contacts"]], v["sticks"][: v["n_frictions"]])
+    held = set(acting)
+    return any(
+        row in held and held.issuperset(on) and not v["dropped"][row] for row, on in run.stepper.dependent.items()
+    )
 
 
 def _energy_lost(run: Run, record: Record) -> list[str]:

@@ -17,7 +17,9 @@ MOST_TOLD = 8
 """Redundant rows that a note tells one by one."""
 
 
-def redundancy(rows: Sequence[Row], dependent: Mapping[int, tuple[int, ...]], rubs: bool, moved: bool = True) -> str:
+def redundancy(
+    rows: Sequence[Row], dependent: Mapping[int, tuple[int, ...]], rubs: bool, moved: bool = True, passed: bool = False
+) -> str:
     """The note on rows that left the solve; '' if none did.
 
     Parameters
@@ -26,6 +28,7 @@ def redundancy(rows: Sequence[Row], dependent: Mapping[int, tuple[int, ...]], ru
     dependent : numbers of the rows that left, and of those on which each depends
     rubs : whether friction that follows multipliers has slid beside them
     moved : whether the run went far enough to tell a singular configuration from rows that depend on others anywhere
+    passed : whether rows that depended on each other do so no longer, all of them acting: a singular configuration
     """
     if not dependent:
         return ""
@@ -38,6 +41,9 @@ def redundancy(rows: Sequence[Row], dependent: Mapping[int, tuple[int, ...]], ru
         "how they share a load is not determined, nor is the drag of friction that slides: multipliers of least norm "
         "are taken"
         if rubs
+        else "they did so in a singular configuration only, where branches of motions cross: the motion from there is "
+        "not unique; start beside it"
+        if passed
         else "the motion is unique, their multipliers are not: those of least norm are given"
         if moved
         else "their multipliers are not unique; nor is the motion, if this is a singular configuration, where branches "

@@ -32,6 +32,7 @@ from mbd.simulation.parameters import ParameterJudge
 from mbd.simulation.reach import out_of_reach
 from mbd.simulation.room import Room
 from mbd.simulation.savepoints import Savepoint, rewind, save
+from mbd.simulation.singular import at_singular_configuration
 from mbd.simulation.stepper import Stepper
 from mbd.simulation.stored import whole_record
 from mbd.simulation.turning import overturned
@@ -87,7 +88,7 @@ class Run:
         rows = int(min(ROWS_AT_ONCE, (end - start.time) / dt / options.get("store", 1) + 64))
         parameters = self._parameters()
         self.first_parameters = parameters.copy()
-        compiled_options = {**options, "capacity": rows + 8, "end": end}
+        compiled_options = {**options, "capacity": rows + 8 + 2 * len(manager.guards), "end": end}
         self.stepper = Stepper(mechanism, manager, integrator, parameters, dt, compiled_options)
         self.values = self.stepper.values
         self.values["chunk"] = _steps_at_once(self.stepper)
@@ -248,7 +249,7 @@ class Run:
         rates = np.abs(self.table[: self.stored, 1 + n_q : 1 + n_q + n_v])
         swiftest = float(np.max(rates, initial=0.0))
         events = [*self.earlier, *self.events]
-        beyond = out_of_reach(self, status)
+        beyond = out_of_reach(self, status) or at_singular_configuration(self, status)
         return explanation(self.stepper, status, events, self.places, swiftest, beyond)
 
     @property
