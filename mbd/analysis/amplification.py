@@ -14,7 +14,7 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.errors import CapabilityError
-from mbd.integrators.base import Integrator, Point, Terms
+from mbd.integrators.base import Integrator, Point, System, Terms
 from mbd.state import Mode, State
 
 __all__ = ["LinearOscillator", "amplification_matrix", "oscillated"]
@@ -31,7 +31,7 @@ MODE = Mode()
 
 
 @dataclass(frozen=True)
-class LinearOscillator:
+class LinearOscillator(System):
     """``ü + 2 ξ ω u̇ + ω² u = 0`` as an integrator sees a mechanism.
 
     frequency : ω [rad/s]; damping : ξ [-]
@@ -39,6 +39,7 @@ class LinearOscillator:
 
     frequency: float
     damping: float = 0.0
+    constant_mass = True
 
     def evaluate(self, point: Point, mode: Mode, tangent: tuple[float, float] | None) -> Terms:
         """Balance and tangent at a point."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mbd.arrays import Vector
-from mbd.integrators.base import Point, StepReport, StepResult, System, Terms
+from mbd.integrators.base import Point, StepReport, StepResult, System, Terms, composed
 from mbd.integrators.newton import EPS, MAX_ITERATIONS, NewmarkMemory
 from mbd.state import Mode, State
 
@@ -83,8 +83,7 @@ class AveragedStep:
         after = NewmarkMemory(
             a1, a1, lam, (a1 - memory.rate) / dt, (lam - memory.lam) / dt, np.zeros(n_v), np.zeros(n_v), dt
         )
-        own = getattr(self.system, "compose", None)
-        q1 = own(old.q, x) if own is not None else old.q + x
+        q1 = composed(self.system, old.q, x)
         state = State(
             t1, q1, y1[:n_v], y1[n_v:], old.mode, old.armed, old.anchors, old.names, old.velocity_names, {},
             old.parameters,

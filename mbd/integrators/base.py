@@ -8,14 +8,18 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.errors import CapabilityError
 from mbd.state import Mode, State
 
-__all__ = ["Advance", "Integrator", "Point", "StepReport", "StepResult", "System", "Terms", "consistent_rates"]
+__all__ = [
+    "Advance", "Integrator", "Point", "StepReport", "StepResult", "System", "Terms", "completed", "composed",
+    "consistent_rates",
+]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -44,7 +48,7 @@ class Terms:
     S : (n, n) = M + c_C ∂r/∂y + c_K ∂r/∂x, or None if no tangent was asked for
     h, rate : (m,) row values and their rates ḣ = B v + h_t
     R : (n, m) ∂r/∂λ, equal to Bᵀ unless forces depend on multipliers
-    H : (m, n) row tangent: B for index 3, B + (c_K/c_C) ∂ḣ/∂x for the stabilized form; zero columns for z
+    H : (m, n) row tangent: B for index 3 and where c_C = 0, else B + (c_K/c_C) ∂ḣ/∂x; zero columns for z
     scale_r, scale_h, scale_rate : magnitudes term by term before cancellation; None: taken from the values
     velocity : (m,) booleans, rows that hold velocities only: h = 0, `rate` and H = B + (c_K/c_C) ∂rate/∂x in both
         forms; None: no such row
@@ -65,27 +69,80 @@ class Terms:
     turning: Matrix | None = None
 
 
+@runtime_checkable
 class System(Protocol):
-    """A mechanism as numbers. `accelerations` is needed only where rows are active."""
+    """A mechanism as numbers: everything that integrators ask of it.
+
+    A class that inherits from it gives `evaluate` alone where its positions add and no rows are active; the rest has
+    defaults. Integrators take any class with an `evaluate` as well, with those of the other members that it has.
+
+    n_z : how many first-order states stand behind the velocities in y
+    constant_mass : whether neither posture nor time enters the mass matrix
+    angles : (n_v,) booleans, velocities that turn [rad/s]; None: not known
+    """
+
+    n_z: int = 0
+    constant_mass: bool = False
+    angles: Any = None
+
+    @abstractmethod
+    def evaluate(self, point: Point, mode: Mode, tangent: tuple[float, float] | None) -> Terms:
+        """Terms at a point; with ``tangent = (c_C, c_K)``, any two numbers, also S, R and H; (0, 0) gives S = M."""
+
+    def accelerations(self, t: float, q: Vector, y: Vector, mode: Mode) -> tuple[Vector, Vector]:
+        """(v̇, ż) (n,) and λ (m,) that satisfy the balance and, at acceleration level, the rows.
+
+        By default r, affine in the rates, is solved for them; a system with active rows gives its own.
+        """
+        point = Point(t, q, np.zeros(len(y) - self.n_z), y, np.zeros(len(y)), np.zeros(0))
+        terms = self.evaluate(point, mode, (0.0, 0.0))
+        if len(terms.h):
+            raise CapabilityError(
+                f"{type(self).__name__} has {len(terms.h)} active rows and no accelerations(t, q, y, mode) of its own; "
+                "return (v̇, ż) and λ that satisfy the balance and the second derivatives of the rows"
+            )
+        return -np.linalg.solve(np.asarray(terms.S), terms.r), np.zeros(0)
+
+    def compose(self, q: Vector, x: Vector) -> Vector:
+        """q ⊕ x (n_q,): positions moved by a local increment, q + x by default."""
+        return q + x
+
+    @property
+    def is_vector(self) -> bool:
+        """Whether q ⊕ x is q + x everywhere."""
+        return type(self).compose is System.compose
+
+
+class _Completed(System):
+    """A class with an `evaluate`, and the defaults of `System` for what it lacks."""
+
+    is_vector = True
+
+    def __init__(self, own: Any) -> None:
+        self.evaluate = own.evaluate  # type: ignore[method-assign]
+        for name in ("n_z", "constant_mass", "angles", "accelerations", "compose"):
+            if hasattr(own, name):
+                setattr(self, name, getattr(own, name))
+        self.is_vector = not hasattr(own, "compose")
 
     def evaluate(self, point: Point, mode: Mode, tangent: tuple[float, float] | None) -> Terms:
-        """Terms at a point; with ``tangent = (c_C, c_K)`` also S, R and H."""
+        """Its own."""
+        raise NotImplementedError
+
+
+def completed(system: Any) -> System:
+    """The system itself, or a class with an `evaluate` made whole by the defaults of `System`."""
+    return system if isinstance(system, System) else _Completed(system)
 
 
 def consistent_rates(system: System, t: float, q: Vector, y: Vector, mode: Mode) -> tuple[Vector, Vector]:
-    """(v̇, ż) and λ that satisfy the balance and the rows at acceleration level.
+    """(v̇, ż) and λ that satisfy the balance and the rows at acceleration level: `System.accelerations`."""
+    return completed(system).accelerations(t, q, y, mode)
 
-    A system with active rows offers ``accelerations(t, q, y, mode)``; otherwise r is solved for the rates,
-    in which it is affine: ``S`` at zero factors is M.
-    """
-    own = getattr(system, "accelerations", None)
-    if own is not None:
-        rate, lam = own(t, q, y, mode)
-        return rate, lam
-    n = len(y)
-    point = Point(t, q, np.zeros(getattr(system, "n_v", n)), y, np.zeros(n), np.zeros(0))
-    terms = system.evaluate(point, mode, (0.0, 0.0))
-    return -np.linalg.solve(np.asarray(terms.S), terms.r), np.zeros(0)
+
+def composed(system: System, q: Vector, x: Vector) -> Vector:
+    """Positions moved by x, q ⊕ x: `System.compose`."""
+    return completed(system).compose(q, x)
 
 
 @dataclass(frozen=True)
@@ -131,11 +188,13 @@ class Integrator(ABC):
     as accelerations and multipliers of the results (without them they come from `consistent_rates`).
     """
 
-    any_chart: ClassVar[bool] = True
-    """Whether positions may move in any chart q ⊕ x; False: along q + x only."""
+    any_chart: ClassVar[bool] = False
+    """Whether a step moves positions by `System.compose`, in any chart q ⊕ x, at its full order; False: it needs q + x."""
     between: ClassVar[str] = "hermite"
     """How a run is read between its rows: 'hermite', 'quintic' where accelerations are as accurate as positions, or
     'stages' where steps of `RungeKutta853` are taken again."""
+    stabilized: bool = True
+    """Whether rows on positions are held at velocity level too."""
 
     @abstractmethod
     def order(self, system: System | None = None) -> int:

@@ -15,16 +15,16 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import replace
-from typing import Any, Literal, TypeAlias
+from typing import Any, ClassVar, Literal, TypeAlias
 
 import numpy as np
 
 from mbd.arrays import Vector
 from mbd.bodies.values import is_number, shown
 from mbd.errors import CapabilityError
-from mbd.integrators.base import Integrator, StepResult, System, consistent_rates
+from mbd.integrators.base import Integrator, StepResult, System, composed, consistent_rates
 from mbd.integrators.coefficients import Coefficients
-from mbd.integrators.newton import NewmarkMemory, Step, composed
+from mbd.integrators.newton import NewmarkMemory, Step
 from mbd.kernel.fields import LEFT
 from mbd.state import Mode, State
 
@@ -50,6 +50,8 @@ class NewmarkFamily(Integrator):
     tolerance : of the balance, relative to the sum of its terms, at which Newton stops
     """
 
+    any_chart: ClassVar[bool] = True
+    form: Literal["endpoint", "averaged"] = "endpoint"
     formulation: Formulation
     starting: Starting
     tolerance: float
@@ -88,7 +90,7 @@ class NewmarkFamily(Integrator):
         """α_m, α_f, β, γ of the scheme."""
 
     @property
-    def stabilized(self) -> bool:
+    def stabilized(self) -> bool:  # type: ignore[override]
         return self.formulation == "ggl"
 
     @property
@@ -111,7 +113,7 @@ class NewmarkFamily(Integrator):
 
     def check_tolerance(self, rows: int) -> str | None:
         """Steps that change need order 2, rows the stabilized form: index 3 diverges under changing steps."""
-        if self.order() < 2 or getattr(self, "form", "endpoint") != "endpoint":
+        if self.order() < 2 or self.form != "endpoint":
             return f"{self!r} is of first order, which follows no tolerance; use dt=, or mbd.HHT(0.05)"
         if rows and not self.stabilized:
             return f"{self!r} diverges where steps change with rows on positions; use formulation='ggl', or dt="

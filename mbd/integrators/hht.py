@@ -7,7 +7,7 @@ from typing import Literal
 from mbd.bodies.values import is_number, shown
 from mbd.errors import CapabilityError
 from mbd.integrators.averaged import AveragedStep
-from mbd.integrators.base import StepResult, System
+from mbd.integrators.base import StepResult, System, completed
 from mbd.integrators.family import (
     DEFAULT_TOLERANCE,
     Coefficients,
@@ -66,7 +66,7 @@ class HHT(NewmarkFamily):
 
     def order(self, system: System | None = None) -> int:
         """2; the averaged form has 1 unless the system says that its mass matrix is constant."""
-        if self.form == "averaged" and self.alpha > 0.0 and not getattr(system, "constant_mass", False):
+        if self.form == "averaged" and self.alpha > 0.0 and not (system is not None and completed(system).constant_mass):
             return 1
         return super().order(system)
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbd.arrays import Vector
-from mbd.integrators.base import Point, StepReport, StepResult, System, Terms
+from mbd.integrators.base import Point, StepReport, StepResult, System, Terms, composed
 from mbd.integrators.passage import CONTINUOUS, WHOLE, WITHIN, Distance, distance_to_pose
 from mbd.kernel.fields import LEFT, PASSING
 from mbd.state import Mode, State
@@ -20,7 +20,7 @@ from mbd.state import Mode, State
 if TYPE_CHECKING:
     from mbd.integrators.family import NewmarkFamily
 
-__all__ = ["EPS", "MAX_ITERATIONS", "NewmarkMemory", "Step", "composed"]
+__all__ = ["EPS", "MAX_ITERATIONS", "NewmarkMemory", "Step"]
 
 EPS = float(np.finfo(float).eps)
 MAX_ITERATIONS = 50
@@ -51,12 +51,6 @@ class NewmarkMemory:
     step: float
     near: int = 0
     whole: float = 0.0
-
-
-def composed(system: System, q: Vector, x: Vector) -> Vector:
-    """Positions moved by x, in the way of systems whose positions are no vectors."""
-    own = getattr(system, "compose", None)
-    return own(q, x) if own is not None else q + x
 
 
 class Step:

@@ -20,7 +20,7 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.bodies.values import is_number, shown
 from mbd.errors import CapabilityError
-from mbd.integrators.base import Integrator, Point, StepReport, StepResult, System, Terms, consistent_rates
+from mbd.integrators.base import Integrator, Point, StepReport, StepResult, System, Terms, completed, consistent_rates
 from mbd.integrators.family import DEFAULT_TOLERANCE
 from mbd.kernel.astride import MOST_SETTLED
 from mbd.kernel.collocation import RADAU
@@ -94,8 +94,8 @@ class RadauIIA(Integrator):
         return "RadauIIA()" if self.tolerance == DEFAULT_TOLERANCE else f"RadauIIA(tolerance={self.tolerance!r})"
 
     def order(self, system: System | None = None) -> int:
-        """5."""
-        return 5
+        """5; 2 where positions do not add, since its stages take ẋ = v."""
+        return 5 if system is None or completed(system).is_vector else 2
 
     def error_order(self) -> int:
         """3: the estimate falls with dt⁴ in a step."""
@@ -150,7 +150,7 @@ class _RadauStep:
     def __init__(
         self, tolerance: float, system: System, state: State, dt: float, mode: Mode, memory: RadauMemory
     ) -> None:
-        self.system, self.state, self.dt, self.mode, self.memory = system, state, dt, mode, memory
+        self.system, self.state, self.dt, self.mode, self.memory = completed(system), state, dt, mode, memory
         self.c = RADAU.real * dt
         self.y0, self.n_v = np.concatenate([state.v, state.z]), len(state.v)
         self.upper, self.tolerance = tolerance, 1e-3 * tolerance
@@ -349,12 +349,11 @@ class _RadauStep:
             error = self._local_error(matrices)
         except np.linalg.LinAlgError:
             return self._failed(iterations, residual, "the Newton matrix is singular")
-        units = getattr(self.system, "angles", None)
+        units = self.system.angles
         if units is not None and not np.all(np.abs(error[:n_v][units]) <= HALF_TURN):
             return self._failed(iterations, residual, "an angle would be missed by more than half a radian")
         point = self._point(2)
-        composed = getattr(self.system, "compose", None)
-        q = old.q + point.x if composed is None else composed(old.q, point.x)
+        q = self.system.compose(old.q, point.x)
         rate, lam = point.rate, point.lam
         if len(lam):
             with suppress(np.linalg.LinAlgError):  # else those of the stage

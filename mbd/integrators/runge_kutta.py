@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
-from mbd.integrators.base import Integrator, Point, StepReport, StepResult, System, Terms, consistent_rates
+from mbd.integrators.base import Integrator, Point, StepReport, StepResult, System, Terms, completed, consistent_rates
 from mbd.integrators.dormand_prince import END, FIFTH, NODES, STAGES, THIRD, WEIGHTS
 from mbd.state import Mode, State
 
@@ -48,14 +48,12 @@ class RungeKutta853(Integrator):
     It has no parameters: ``mbd.simulate(model, start, mbd.RungeKutta853(), tol=1e-9, until=10.0)``.
     """
 
-    any_chart: ClassVar[bool] = False
-    """Positions move along q₀ + x only."""
     between: ClassVar[str] = "stages"
     """Between rows its steps are taken again."""
 
     def order(self, system: System | None = None) -> int:
-        """8, with and without rows."""
-        return 8
+        """8, with and without rows; 2 where positions do not add, since its stages take ẋ = v."""
+        return 8 if system is None or completed(system).is_vector else 2
 
     def start(self, system: System, state: State, mode: Mode, dt: float) -> RungeKuttaMemory:
         """Consistent rates and multipliers; the scheme remembers nothing else."""
@@ -65,7 +63,7 @@ class RungeKutta853(Integrator):
 
     def step(self, system: System, state: State, dt: float, mode: Mode, memory: RungeKuttaMemory) -> StepResult:
         """One step; the readable twin of the compiled kernel."""
-        t1, n_v = state.time + dt, len(state.v)
+        system, t1, n_v = completed(system), state.time + dt, len(state.v)
         y0 = np.concatenate([state.v, state.z])
         slopes = np.zeros((STAGES + 1, n_v + len(y0)))
         slopes[0] = np.concatenate([state.v, memory.rate])
@@ -73,10 +71,11 @@ class RungeKutta853(Integrator):
             for i in range(1, STAGES):
                 move = dt * (WEIGHTS[i, :i] @ slopes[:i])
                 y = y0 + move[n_v:]
-                rate, _ = consistent_rates(system, state.time + NODES[i] * dt, state.q + move[:n_v], y, mode)
+                q = system.compose(state.q, move[:n_v])
+                rate, _ = consistent_rates(system, state.time + NODES[i] * dt, q, y, mode)
                 slopes[i] = np.concatenate([y[:n_v], rate])
             move = dt * (END @ slopes[:STAGES])
-            q1, y1 = state.q + move[:n_v], y0 + move[n_v:]
+            q1, y1 = system.compose(state.q, move[:n_v]), y0 + move[n_v:]
             if len(memory.lam):
                 q1, y1 = projected(system, t1, q1, y1, len(memory.lam), mode)
             rate, lam = consistent_rates(system, t1, q1, y1, mode)
@@ -122,7 +121,7 @@ def estimated_error(slopes: Matrix, dt: float, n_v: int) -> Vector:
 
 def projected(system: System, t: float, q: Vector, y: Vector, m: int, mode: Mode) -> tuple[Vector, Vector]:
     """The nearest positions with h = 0 and velocities with ḣ = 0, in the metric of M."""
-    n, n_v, before = len(y), len(q), np.inf
+    n, n_v, before = len(y), len(y) - system.n_z, np.inf
     for _ in range(MOST_PROJECTIONS):
         terms, matrix = _saddle(system, t, q, y, m, mode)
         held = np.zeros(m, dtype=bool) if terms.velocity is None else np.asarray(terms.velocity)
@@ -131,7 +130,8 @@ def projected(system: System, t: float, q: Vector, y: Vector, m: int, mode: Mode
         size = float(np.max(np.abs(h) / floor, initial=0.0))
         if size <= 1.0 or size >= before:
             break
-        q, before = q - np.linalg.solve(matrix, np.concatenate([np.zeros(n), h]))[:n_v], size
+        q = system.compose(q, -np.linalg.solve(matrix, np.concatenate([np.zeros(n), h]))[:n_v])
+        before = size
     if size > 1e3:
         raise ArithmeticError(f"positions do not come back onto the rows: {size:.2g} times round-off is left")
     return q, y - np.linalg.solve(matrix, np.concatenate([np.zeros(n), terms.rate]))[:n]
@@ -139,7 +139,7 @@ def projected(system: System, t: float, q: Vector, y: Vector, m: int, mode: Mode
 
 def _saddle(system: System, t: float, q: Vector, y: Vector, m: int, mode: Mode) -> tuple[Terms, Matrix]:
     """``[M Bᵀ; B 0]`` and the terms, with zero accelerations and multipliers."""
-    point = Point(t, q, np.zeros(len(q)), y, np.zeros(len(y)), np.zeros(m))
+    point = Point(t, q, np.zeros(len(y) - system.n_z), y, np.zeros(len(y)), np.zeros(m))
     terms = system.evaluate(point, mode, (0.0, 0.0))
     B = np.zeros((m, len(y)))
     H = np.asarray(terms.H)

@@ -11,7 +11,7 @@ from mbd.arrays import Matrix, Vector
 from mbd.compile.mechanism import Mechanism, ModeCode
 from mbd.equations.programs import mass_matrix
 from mbd.errors import SimulationError
-from mbd.integrators.base import Integrator, Point, StepReport, StepResult, Terms
+from mbd.integrators.base import Integrator, Point, StepReport, StepResult, System, Terms
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.kernel.fields import CAREFUL, ITERATIONS, NEAR, NOT_CONVERGED, NOT_FINITE, NOW, ROWS, TOO_NEAR
 from mbd.kernel.memory import start_step
@@ -26,7 +26,7 @@ from mbd.tape.derivatives import live
 __all__ = ["MechanismSystem", "PlainScheme", "row_units", "unit_blocks"]
 
 
-class MechanismSystem:
+class MechanismSystem(System):
     """A mechanism as the numbers an integrator sees; bound to parameters and to the anchors held now."""
 
     def __init__(
@@ -49,7 +49,12 @@ class MechanismSystem:
         self.n_q, self.n_v, self.n_z = layout.n_q, layout.n_v, layout.n_z
 
     @property
-    def constant_mass(self) -> bool:
+    def is_vector(self) -> bool:
+        """Whether q ⊕ x is q + x: of every joint whose coordinates add."""
+        return self.mechanism.vector
+
+    @property
+    def constant_mass(self) -> bool:  # type: ignore[override]
         """Whether neither posture nor time enters the mass matrix."""
         equations = self.mechanism.equations
         with equations.tape.lock:
@@ -100,18 +105,19 @@ class MechanismSystem:
             code.residual(block, self.parameters, out)
             matrix = None
         else:
-            factors = tangent if tangent[0] > 0.0 else (1.0, 0.0)
+            factors = tangent if tangent[0] != 0.0 else (1.0, tangent[1])
             block[1:3] = factors
             out = np.zeros(full)
             code.tangent(block, self.parameters, out)
             if self.stabilized:
                 turning = out[(n + m) ** 2 + tail :].reshape(m, self.n_v)
             matrix, out = out[: (n + m) ** 2].reshape(n + m, n + m), out[(n + m) ** 2 : (n + m) ** 2 + tail]
-            if tangent != factors:  # S is affine in the factors: M is its value at (0, 0)
+            if tangent != factors:  # S is affine in c_C, and B + (c_K/c_C) ∂ḣ/∂x in its inverse: without these parts
                 other = np.zeros(full)
-                block[1:3] = (2.0, 0.0)
+                block[1:3] = (2.0, tangent[1])
                 code.tangent(block, self.parameters, other)
-                matrix = 2.0 * matrix - other[: (n + m) ** 2].reshape(n + m, n + m)
+                double = other[: (n + m) ** 2].reshape(n + m, n + m)
+                matrix = np.vstack([(2.0 * matrix - double)[:n], (2.0 * double - matrix)[n:]])
         velocity = np.array([self.mechanism.equations.rows[row].is_velocity for row in rows], dtype=bool)
         h, rate = out[n : n + m], out[n + m :]
         if not self.stabilized:  # index 3 has the rate of a row on velocities in the place of h

@@ -49,7 +49,7 @@ def own_scheme(integrator: Integrator) -> int | None:
     for kind, number in ((RungeKutta853, RUNGE_KUTTA), (RadauIIA, RADAU_IIA)):
         if isinstance(integrator, kind):
             return number if step is kind.step else None
-    endpoint = getattr(integrator, "form", "endpoint") == "endpoint" and isinstance(integrator, NewmarkFamily)
+    endpoint = isinstance(integrator, NewmarkFamily) and integrator.form == "endpoint"
     return NEWMARK if endpoint and step in (NewmarkFamily.step, _hht_step()) else None
 
 
@@ -100,7 +100,7 @@ class Stepper:
         self.mechanism, self.manager, self.integrator = mechanism, manager, integrator
         self.compiled = is_compiled(mechanism, integrator)
         self.straight = self.compiled and isinstance(integrator, NewmarkFamily)  # factored in straight-line code
-        self.stabilized = getattr(integrator, "stabilized", True)
+        self.stabilized = integrator.stabilized
         layout = mechanism.layout
         self.values: dict[str, Any] = {}
         self._places: dict[str, slice] = {}  # of arrays on their shelves

@@ -51,7 +51,7 @@ def check_integrator(
     for name in problems:
         if name not in PROBLEMS:
             raise ModelError("check_integrator: " + nearest(name, PROBLEMS, "problem", "There are"))
-        posed = problem(name, bool(getattr(scheme, "stabilized", True)))
+        posed = problem(name, scheme.stabilized)
         refusal = scheme.check(posed.rows) if posed.rows else None
         if refusal:
             findings.note(f"problem '{name}': {refusal}")

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from mbd.arrays import Vector
-from mbd.integrators.base import Point, Terms
+from mbd.integrators.base import Point, System, Terms
 from mbd.state import Mode, State
 
 __all__ = ["PROBLEMS", "Problem", "broken", "problem"]
@@ -22,14 +22,14 @@ class Problem:
     duration : from t = 0 [s]; rows : how many rows it has
     """
 
-    system: Any
+    system: System
     start: State
     end: Vector
     duration: float
     rows: int = 0
 
 
-class VaryingMass:
+class VaryingMass(System):
     """``(1 + q²) v̇ + q v² + sin q = 0``: T = ½ (1 + q²) v², V = −cos q."""
 
     def evaluate(self, point: Point, mode: Mode, tangent: tuple[float, float] | None) -> Terms:
@@ -42,7 +42,7 @@ class VaryingMass:
         return Terms(r, S.reshape(1, 1), scale_r=parts)
 
 
-class Driven:
+class Driven(System):
     """``v̇ + 0.3 v + sin q = cos 2t``, a damped pendulum that is driven."""
 
     constant_mass = True
@@ -57,10 +57,11 @@ class Driven:
         return Terms(r, (1.0 + 0.3 * tangent[0] + tangent[1] * np.cos(q)).reshape(1, 1), scale_r=scale)
 
 
-class Actuated:
+class Actuated(System):
     """``v̇ + q = z``, ``ż = cos t − z``: an oscillator and a first-order state that pulls it."""
 
     constant_mass = True
+    n_z = 1
 
     def evaluate(self, point: Point, mode: Mode, tangent: tuple[float, float] | None) -> Terms:
         q, z, rate = float(point.q[0] + point.x[0]), float(point.y[1]), point.rate
@@ -73,7 +74,7 @@ class Actuated:
 
 
 @dataclass(frozen=True)
-class Rod:
+class Rod(System):
     """A pendulum in x and y: ``v̇ + (0, g) + λ (x, y) = 0``, ``h = ½ (x² + y² − 1) = 0``, in g = 1 units."""
 
     stabilized: bool = True
@@ -90,7 +91,7 @@ class Rod:
             return Terms(r, None, h, told, **sizes)
         c_C, c_K = tangent
         H = p.reshape(1, 2).copy()
-        if self.stabilized and c_C > 0.0:
+        if self.stabilized and c_C != 0.0:
             H = H + (c_K / c_C) * v
         return Terms(r, (1.0 + c_K * lam) * np.eye(2), h, told, p.reshape(2, 1).copy(), H, **sizes)
 
@@ -100,18 +101,25 @@ class Rod:
         return -np.array([0.0, 1.0]) - lam * q, np.array([lam])
 
 
-def broken(system: Any) -> Any:
+class _Broken(System):
+    def __init__(self, system: System) -> None:
+        self.whole, self.n_z = system, system.n_z
+
+    def evaluate(self, point: Point, mode: Mode, tangent: tuple[float, float] | None) -> Terms:
+        terms = self.whole.evaluate(point, mode, tangent)
+        return replace(terms, r=np.full_like(terms.r, np.nan))
+
+    def accelerations(self, t: float, q: Vector, y: Vector, mode: Mode) -> tuple[Vector, Vector]:
+        rate, lam = self.whole.accelerations(t, q, y, mode)
+        return np.nan * rate, np.nan * lam
+
+    def compose(self, q: Vector, x: Vector) -> Vector:
+        return self.whole.compose(q, x)
+
+
+def broken(system: System) -> System:
     """The system, whose balance is not a number."""
-
-    class Broken:
-        def evaluate(self, point: Point, mode: Mode, tangent: tuple[float, float] | None) -> Terms:
-            terms = system.evaluate(point, mode, tangent)
-            return Terms(np.full_like(terms.r, np.nan), terms.S, terms.h, terms.rate, terms.R, terms.H)
-
-    if hasattr(system, "accelerations"):
-        nothing = (np.full(2, np.nan), np.full(1, np.nan))
-        Broken.accelerations = lambda self, t, q, y, mode: nothing  # type: ignore[attr-defined]
-    return Broken()
+    return _Broken(system)
 
 
 def _solved(slope: Callable[[float, Vector], Any], start: list[float], duration: float) -> Vector:
