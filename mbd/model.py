@@ -6,24 +6,21 @@ import copy
 import math
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from mbd.bodies.base import Body, Frame
 from mbd.bodies.domains import ParameterCheck
 from mbd.bodies.ground import Ground
 from mbd.bodies.values import Vector3, names_of, number, printable, triple
-from mbd.constraints.base import Constraint, VelocityConstraint
-from mbd.constraints.bilateral import Bilateral
+from mbd.constraints.base import Constraint
 from mbd.constraints.controller import Controller
 from mbd.constraints.event import Event
-from mbd.constraints.penalty import Penalty
-from mbd.constraints.unilateral import Unilateral
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.forces.base import Force
 from mbd.forces.quantities import Mention
 from mbd.joints.base import Joint
 
-__all__ = ["Model", "all_are", "on_slope"]
+__all__ = ["Model", "all_are", "on_slope", "served"]
 
 Word = TypeVar("Word")
 
@@ -90,12 +87,18 @@ class Model:
         self.joints += all_are(Joint, joints, example)
 
     def constrain(self, *constraints: Constraint) -> None:
-        """Add constraints and events."""
+        """Add constraints and events.
+
+        Raises
+        ------
+        ModelError
+            for what is no constraint, or a class of one's own that lacks what the equations ask it for, by name.
+        """
         example = (
             "constrain takes constraints such as mbd.Unilateral('foot', mbd.touchdown(shank.end)), and events; "
             "forces and controllers go to apply"
         )
-        self.constraints += all_are(Constraint, constraints, example)
+        self.constraints += served(all_are(Constraint, constraints, example))
 
     def apply(self, *forces: Force | Controller) -> None:
         """Add forces and controllers."""
@@ -131,24 +134,24 @@ class Model:
         self._gravity = triple(value, f"gravity of '{self.name}'")
 
     @property
-    def bilaterals(self) -> list[Bilateral]:
-        """Constraints that always act."""
-        return [word for word in self.constraints if isinstance(word, Bilateral)]
+    def bilaterals(self) -> list[Constraint]:
+        """Constraints on positions that always act."""
+        return [word for word in self.constraints if word.kind == "bilateral"]
 
     @property
-    def nonholonomic(self) -> list[VelocityConstraint]:
+    def nonholonomic(self) -> list[Constraint]:
         """Constraints on velocities, which always act."""
-        return [word for word in self.constraints if isinstance(word, VelocityConstraint)]
+        return [word for word in self.constraints if word.kind == "nonholonomic"]
 
     @property
-    def contacts(self) -> list[Unilateral | Penalty]:
+    def contacts(self) -> list[Constraint]:
         """Constraints that open and close, in order."""
-        return [word for word in self.constraints if isinstance(word, Unilateral | Penalty)]
+        return [word for word in self.constraints if word.kind in ("unilateral", "penalty")]
 
     @property
     def events(self) -> list[Event]:
         """The user's own events."""
-        return [word for word in self.constraints if isinstance(word, Event)]
+        return [cast(Event, word) for word in self.constraints if word.kind == "event"]
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -201,10 +204,10 @@ class Model:
                 if effect in changes:
                     model.joints[place] = replace(model.joints[place], **changes[effect])  # type: ignore[type-var]
         for place, word in enumerate(model.constraints):
-            if isinstance(word, Unilateral) and word.slides:
-                known.add(f"{word.name} friction")
-                if f"{word.name} friction" in names:
-                    model.constraints[place] = replace(word, friction=0.0)
+            parts = word.bare()
+            known |= set(parts)
+            for effect in [effect for effect in parts if effect in names]:
+                model.constraints[place] = parts[effect]
         if "gravity" in names:
             model.gravity = (0.0, 0.0, 0.0)
         for name in names:
@@ -299,3 +302,11 @@ def all_are(kind: Any, words: Iterable[Word], sentence: str) -> list[Word]:
         if not isinstance(word, kind):
             raise ModelError(f"{sentence}; got {word!r}")
     return given
+
+
+def served(words: list[Constraint]) -> list[Constraint]:
+    """Constraints that equations and active-set manager can serve, or a `ModelError` of what the others lack."""
+    lacking = [fault for word in words for fault in word.missing()]
+    if lacking:
+        raise ModelError(lacking)
+    return words

@@ -64,6 +64,9 @@ class Scope(Protocol):
     def joint(self, name: str) -> JointMotion:
         """Coordinates and rates of a joint."""
 
+    def rate(self, value: Scalar) -> Node:
+        """d/dt of a function of the posture and the time: ġ of a gap g."""
+
     def named(self, name: str) -> Node:
         """Any named quantity: 't', 'left hip.angle', 'left hip.rate', 'left shank.end.x', 'left shank.end.vx', …"""
 

@@ -134,8 +134,9 @@ def criteria(integrator: Integrator, damping: float = 0.0, turns: Sequence[float
     spectra = _spectra(integrator, turns, damping)
     fading, coefficient = _leading(integrator, damping, "damping")
     stretching, elongation = _leading(integrator, damping, "elongation")
+    promised = integrator.order(LinearOscillator(1.0))
     return Criteria(
-        integrator, damping, min(_order(integrator, xi) for xi in (damping, DAMPED)), integrator.order(LinearOscillator(1.0)),
+        integrator, damping, min(_order(integrator, xi) for xi in (damping, DAMPED)), promised,
         _at_infinity(integrator, damping), _stability_limit(integrator, damping), fading, coefficient, stretching,
         elongation, spectra, closed_form(integrator) if damping == 0.0 else None,
     )  # fmt: skip

@@ -5,6 +5,7 @@ from mbd.constraints.bilateral import Bilateral
 from mbd.constraints.controller import Controller
 from mbd.constraints.event import Event
 from mbd.constraints.knife_edge import KnifeEdge
+from mbd.constraints.law import Closing, Drag, Equation, Law
 from mbd.constraints.measures import distance, extension, flexion, height, separation
 from mbd.constraints.nonholonomic import Nonholonomic
 from mbd.constraints.penalty import Penalty
@@ -17,7 +18,7 @@ from mbd.constraints.unilateral import Unilateral
 from mbd.constraints.user_measure import measure
 
 __all__ = [
-    "Bilateral", "Constraint", "Controller", "Event", "KnifeEdge", "Measure", "Nonholonomic", "Penalty",
-    "PenaltyParameters", "Plane", "Rolling", "Unilateral", "VelocityConstraint", "When", "distance", "extension",
-    "flexion", "height", "measure", "penalty_parameters", "separation", "touchdown",
+    "Bilateral", "Closing", "Constraint", "Controller", "Drag", "Equation", "Event", "KnifeEdge", "Law", "Measure",
+    "Nonholonomic", "Penalty", "PenaltyParameters", "Plane", "Rolling", "Unilateral", "VelocityConstraint", "When",
+    "distance", "extension", "flexion", "height", "measure", "penalty_parameters", "separation", "touchdown",
 ]  # fmt: skip

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
+from mbd.bodies.base import Frame
 from mbd.bodies.domains import Parameterized
+from mbd.constraints.law import Equation, Hold, Law
 from mbd.forces.quantities import Mention
 from mbd.scope import Scope
 from mbd.tape.node import Scalar
 
-__all__ = ["Constraint", "Measure", "VelocityConstraint"]
+__all__ = ["KINDS", "Constraint", "Measure", "VelocityConstraint"]
+
+KINDS = ("bilateral", "nonholonomic", "unilateral", "penalty", "event")
+"""What a constraint may be to the active-set manager."""
 
 
 class Measure(ABC):
@@ -57,8 +63,13 @@ class Measure(ABC):
 
     @property
     def reaction(self) -> str:
-        """What its multiplier is called in results: 'force', or 'tension'."""
+        """What a multiplier is called in results: 'force', 'tension', or 'drive' of a joint (its force or torque)."""
         return "force"
+
+    @property
+    def said(self) -> str:
+        """What it measures of what, for a page of text."""
+        return f"{self.title} of " + mentioned_names(self.mentions())
 
     def faults(self, owner: str) -> list[str]:
         """What is geometrically impossible about it, one sentence each."""
@@ -66,16 +77,41 @@ class Measure(ABC):
 
 
 class Constraint(Parameterized, ABC):
-    """A law on a measure; a new constraint is a frozen dataclass with a `name`."""
+    """A law on a measure; a new constraint is a frozen dataclass with a `name`: see `mbd.constraints.law`."""
 
     @property
     @abstractmethod
     def kind(self) -> str:
-        """'bilateral', 'nonholonomic', 'unilateral', 'penalty' or 'event'."""
+        """What it is to the active-set manager.
+
+        'bilateral' (rows that always act), 'nonholonomic' (those on velocities), 'unilateral' (rows that close and
+        open), 'penalty' (a force law that does), or 'event'.
+        """
 
     @abstractmethod
     def mentions(self) -> list[Mention]:
         """The frames, joints and named quantities it refers to."""
+
+    def act(self, scope: Scope, hold: Hold) -> Law:
+        """Its rows or forces, and when they act; of every kind but 'event'.
+
+        Parameters
+        ----------
+        scope : motions, parameters and named quantities
+        hold : gives values as they were at the instant of closing; for laws that close
+        """
+        raise NotImplementedError(f"{type(self).__name__} '{self.name}' has no act(scope, hold)")
+
+    def anchors(self, scope: Scope) -> int:
+        """How many values it holds from the instant of closing."""
+        held: list[Scalar] = []
+
+        def hold(values: Sequence[Scalar]) -> Sequence[Scalar]:
+            held.extend(values)
+            return values
+
+        self.act(scope, hold)
+        return len(held)
 
     @property
     def others(self) -> tuple[str, ...]:
@@ -85,6 +121,42 @@ class Constraint(Parameterized, ABC):
     def instants(self) -> tuple[float, ...]:
         """Times at which its sampled signals have a kink [s]."""
         return ()
+
+    def bare(self) -> dict[str, Constraint]:
+        """Effects of it that a model can be `without`, by name, each with the constraint that lacks it."""
+        return {}
+
+    def resolving_dt(self, values: Mapping[str, float], mass: float, speed: float) -> float:
+        """The step that resolves a blow of an effective mass [kg, kg m²] at an approach speed [m/s, rad/s]; [s].
+
+        Parameters
+        ----------
+        values : of its parameters by full name
+        """
+        return math.inf
+
+    @property
+    def said(self) -> str:
+        """What a page of text says of it behind its name and class."""
+        return f", {self.kind}, on " + self._mentioned()
+
+    def _mentioned(self) -> str:
+        return mentioned_names(self.mentions())
+
+    def missing(self) -> list[str]:
+        """What it lacks that equations and active-set manager would ask for, one sentence each."""
+        title = f"'{self.name}' ({type(self).__name__})"
+        if self.kind not in KINDS:
+            return [f"{title} is of kind {self.kind!r}, which nothing serves; the kinds are {', '.join(KINDS)}"]
+        if self.kind == "event":
+            lacks = [name for name in ("guard", "direction", "terminal", "reset") if not hasattr(self, name)]
+            return [f"{title} is an event without {', '.join(lacks)}; use mbd.Event"] if lacks else []
+        if type(self).act is not Constraint.act:
+            return []
+        return [
+            f"{title} has no act(scope, hold), which says by which rows or force it acts: it would act by none; return "
+            "an mbd.constraints.Law, or use mbd.Bilateral, mbd.Nonholonomic, mbd.Unilateral or mbd.Penalty"
+        ]
 
 
 class VelocityConstraint(Constraint):
@@ -112,3 +184,19 @@ class VelocityConstraint(Constraint):
     def contact(self) -> str | None:
         """The contact that must be closed for its rows to hold; None: they hold at all times."""
         return None
+
+    def act(self, scope: Scope, hold: Hold) -> Law:
+        """Its rows."""
+        rows = [Equation(value, part, self.unit, "velocity") for part, value in self.rates(scope)]
+        return Law(rows, while_closed=self.contact)
+
+    @property
+    def said(self) -> str:
+        """What it holds the velocities of."""
+        return ", on the velocities of " + self._mentioned()
+
+
+def mentioned_names(mentions: Sequence[Mention]) -> str:
+    """Frames, joints and quantities by name."""
+    names = [m if isinstance(m, str) else m.full_name if isinstance(m, Frame) else m.name for m in mentions]
+    return ", ".join(f"'{name}'" for name in names)

@@ -8,6 +8,7 @@ from typing import Any
 from mbd.bodies.values import name_of
 from mbd.constraints.base import Constraint, Measure
 from mbd.constraints.expressions import is_expression
+from mbd.constraints.law import Equation, Hold, Law
 from mbd.constraints.measures import JointMeasure
 from mbd.constraints.user_measure import measure
 from mbd.errors import ModelError
@@ -72,6 +73,16 @@ class Bilateral(Constraint):
         h = gap - scalar(self.value, self.arguments, scope, self.name, "value")
         wraps = isinstance(self.subject, Joint) and isinstance(gap, Node) and any(n.op == "atan2" for n in live([gap]))
         return atan2(sin(h), cos(h)) if wraps else h
+
+    def act(self, scope: Scope, hold: Hold) -> Law:
+        """Its row."""
+        measure, wraps = self.measure, isinstance(self.subject, Joint)
+        return Law([Equation(self.residual(scope), unit=measure.unit, reaction=measure.reaction, wraps=wraps)])
+
+    @property
+    def said(self) -> str:
+        """What it holds at which value."""
+        return f", {self.measure.said} = {self.value}"
 
     def mentions(self) -> list[Mention]:
         """What its measure and its value depend on."""

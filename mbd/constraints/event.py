@@ -54,6 +54,11 @@ class Event(Constraint):
         """'event'."""
         return "event"
 
+    @property
+    def said(self) -> str:
+        """Nothing more."""
+        return ""
+
     def mentions(self) -> list[Mention]:
         """What its guard depends on, and the names that it resets."""
         return [*self.guard.mentions(), *(self.reset if isinstance(self.reset, Mapping) else ())]

@@ -39,6 +39,11 @@ class JointMeasure(Measure):
         return "flexion" if self.sign < 0.0 else "extension"
 
     @property
+    def reaction(self) -> str:
+        """'drive'."""
+        return "drive"
+
+    @property
     def unit(self) -> str:
         """That of the coordinate."""
         return self.joint.labels[0].unit

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 from mbd.bodies.domains import Domain, at_least_zero, positive
 from mbd.bodies.values import name_of, number
 from mbd.constraints.base import Constraint, Measure
+from mbd.constraints.law import Closing, Hold, Law
+from mbd.constraints.penalty_parameters import largest_dt
 from mbd.constraints.restitution import KELVIN_VOIGT, LEAST_RESTITUTION, chi_for, damping_ratio_for, law_of, wanted
 from mbd.constraints.unilateral import measure_of
 from mbd.errors import ModelError
@@ -126,9 +130,32 @@ class Penalty(Constraint):
         return 2.0 * ratio * math.sqrt(max(self.stiffness, 0.0) * self.effective_mass)
 
     @property
-    def opens_on(self) -> str:
+    def opens_on(self) -> Literal["gap", "pull"]:
         """'gap' or 'pull'."""
-        return "gap" if self.chi is not None else self.release
+        return "gap" if self.chi is not None or self.release == "gap" else "pull"
+
+    def act(self, scope: Scope, hold: Hold) -> Law:
+        """Its force, and the energy of its spring."""
+        gap = self.measure.gap(scope)
+        rate = scope.rate(gap)
+        push = self.force(gap, rate, scope, *hold(self.captured(rate)))
+        contact = Closing(gap, self.measure.unit, self.opens_on)
+        return Law(contact=contact, push=push, elastic=self.elastic_energy(gap, scope))
+
+    def anchors(self, scope: Scope) -> int:
+        """The approach speed, where its loss follows it."""
+        return len(self.captured(0.0))
+
+    def resolving_dt(self, values: Mapping[str, float], mass: float, speed: float) -> float:
+        """A fifth of the time until the deepest point, as `mbd.penalty_parameters` has it."""
+        k, c, chi = (values.get(f"{self.name}.{field}", 0.0) for field in ("stiffness", "damping", "chi"))
+        return largest_dt(k, self.exponent, c, chi, mass, speed)
+
+    @property
+    def said(self) -> str:
+        """Where, how stiff, and what it loses."""
+        loss = f"damping {self.damper:.6g}" if self.chi is None else f"chi {self.chi:.6g}"
+        return f", {self.measure.said}, stiffness {self.stiffness:.6g}, {loss}"
 
     def captured(self, gap_rate: Scalar) -> tuple[Scalar, ...]:
         """What is held from the instant of closing: the approach speed −ġ, where χ needs it."""

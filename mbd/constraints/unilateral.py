@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Literal
 
 from mbd.bodies.domains import Domain
 from mbd.bodies.values import name_of, number
 from mbd.constraints.base import Constraint, Measure
 from mbd.constraints.expressions import is_expression
+from mbd.constraints.law import Closing, Equation, Hold, Law
 from mbd.constraints.rules import When, condition_of, releases_of
 from mbd.constraints.user_measure import measure
 from mbd.errors import ModelError
 from mbd.forces.quantities import Mention
+from mbd.scope import Scope
+from mbd.tape.functions import maximum
+from mbd.tape.node import Scalar
 
 __all__ = ["Unilateral"]
 
@@ -63,7 +69,7 @@ class Unilateral(Constraint):
         return releases_of(self.release, self.name)
 
     @property
-    def opens_on(self) -> str:
+    def opens_on(self) -> Literal["pull", "when"]:
         """'pull', or 'when' where every rule lets it pull until then."""
         return "when" if self.release and all(rule.may_pull is not False for rule in self.releases) else "pull"
 
@@ -76,6 +82,42 @@ class Unilateral(Constraint):
     def slides(self) -> bool:
         """Whether Coulomb friction resists its sliding."""
         return self.friction is not None and self.friction > 0.0
+
+    def act(self, scope: Scope, hold: Hold) -> Law:
+        """A normal row, and tangent rows that hold the place of touchdown where and while it sticks."""
+        gap, unit = self.measure.gap(scope), self.measure.unit
+        rows = [Equation(gap, "normal", unit)]
+        if self.sticks or self.slides:
+            limit = partial(self._limit, scope) if self.slides else None
+            tangents = self.measure.tangents(scope, hold(self.measure.captured(scope)))
+            rows += [Equation(slip, part, limit=limit, may_fold=True) for part, slip in tangents]
+        contact = Closing(gap, unit, self.opens_on, self.releases, self.only_while, self.restitution)
+        return Law(rows, contact)
+
+    def anchors(self, scope: Scope) -> int:
+        """The place of touchdown, where it holds one."""
+        return len(self.measure.captured(scope)) if self.sticks or self.slides else 0
+
+    def _limit(self, scope: Scope, push: Scalar) -> Scalar:
+        """μ p, none while a rule lets it pull."""
+        coefficient = scope.parameter(self.name, "mu", self.friction or 0.0)
+        return coefficient * (maximum(push, 0.0) if self.opens_on == "when" else push)
+
+    def bare(self) -> dict[str, Constraint]:
+        """Its friction."""
+        return {f"{self.name} friction": replace(self, friction=0.0)} if self.slides else {}
+
+    @property
+    def said(self) -> str:
+        """Where, and when it opens."""
+        said = f", {self.measure.said}" + (", sticks" if self.sticks else "")
+        rules = [f"'{rule.other}' closes{' (after the impact)' if rule.after_impact else ''}" for rule in self.releases]
+        on_pull = ["on pull"] if self.opens_on == "pull" else []
+        said += ", opens " + " or ".join((["as " + " or ".join(rules)] if rules else []) + on_pull)
+        if self.only_while is None:
+            return said
+        other = self.only_while
+        return said + (f", only while {other.said} > 0" if isinstance(other, Measure) else f", only while '{other}'")
 
     def parameters(self) -> dict[str, float]:
         """'<name>.mu' where it slides with friction."""

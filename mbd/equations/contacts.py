@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 
-from mbd.constraints.base import Measure, VelocityConstraint
-from mbd.constraints.bilateral import Bilateral
+from mbd.constraints.base import Constraint, Measure
 from mbd.constraints.event import Event
-from mbd.constraints.penalty import Penalty
-from mbd.constraints.unilateral import Unilateral
+from mbd.constraints.law import Closing, Equation, Law
 from mbd.equations.derivation_scope import DerivationScope, Generalized
 from mbd.equations.dynamics import Work
-from mbd.equations.effects import penalty_effect
+from mbd.equations.effects import drag_effect, penalty_effect
 from mbd.equations.equations import Contact, Guard, Row
-from mbd.equations.frictions import dry_joint, sliding_contact
+from mbd.equations.frictions import dry_friction, dry_joint, sliding_contact
 from mbd.equations.laws import Laws
+from mbd.errors import ModelError
 from mbd.joints.base import Joint, row_unit
 from mbd.tape.derivatives import gradient, live
 from mbd.tape.evaluate import evaluate
@@ -30,8 +30,8 @@ def laws(
     scope: DerivationScope,
     dynamics: Generalized,
     joints: Sequence[Joint],
-    bilaterals: Sequence[Bilateral | VelocityConstraint],
-    contacts: Sequence[Unilateral | Penalty],
+    always: Sequence[Constraint],
+    contacts: Sequence[Constraint],
     events: Sequence[Event],
     before: Laws | None = None,
 ) -> Laws:
@@ -42,94 +42,139 @@ def laws(
     found = Laws() if before is None else before
     for joint in scope.cuts:
         for part, value in scope.cut_rows(joint)[0]:
-            if _row(found, scope, joint.name, part, value, unit=row_unit(part), may_fold=True) < 0:
+            if _row(found, scope, joint.name, Equation(value, part, row_unit(part), may_fold=True)) < 0:
                 found.idle.append((joint.name, part))
-    for constraint in bilaterals:
-        if isinstance(constraint, VelocityConstraint):
-            _velocity_rows(found, scope, constraint, contacts)
-            continue
-        _row(found, scope, constraint.name, "", constraint.residual(scope), unit=constraint.measure.unit)
+    for word in always:
+        _always(found, scope, dynamics, word, contacts)
     for joint in joints:
         dry_joint(found, scope, dynamics, joint)
-    for number, contact in enumerate(contacts):
-        if isinstance(contact, Penalty):
-            _penalty(found, scope, dynamics, contact, number)
-        else:
-            _unilateral(found, scope, dynamics, contact, number)
+    for number, word in enumerate(contacts):
+        _contact(found, scope, dynamics, word, number)
     for event in events:
         found.guards.append(_guard(scope, event))
     return found
 
 
-def anchors_held(scope: DerivationScope, contacts: Sequence[Unilateral | Penalty]) -> int:
+def anchors_held(scope: DerivationScope, contacts: Sequence[Constraint]) -> int:
     """How many values all contacts store as they close."""
-    zero = scope.tape.zero
-    return sum(len(law.captured(zero) if isinstance(law, Penalty) else _captured(scope, law)) for law in contacts)
+    return sum(word.anchors(scope) for word in contacts)
 
 
-def _captured(scope: DerivationScope, law: Unilateral) -> Sequence[Scalar]:
-    """What a contact that holds its place stores as it closes."""
-    return law.measure.captured(scope) if law.sticks or law.slides else ()
+@dataclass
+class _Holding:
+    """What a contact stores as it closes: `captured` on the tape, in the anchors that stand for it."""
+
+    scope: DerivationScope
+    first: int
+    captured: list[Node] = field(default_factory=list)
+
+    def __call__(self, values: Sequence[Scalar]) -> list[Node]:
+        begin = self.first + len(self.captured)
+        self.captured += [self.scope.real(value) for value in values]
+        return [self.scope.tape.input("anchor", begin + k) for k in range(len(values))]
+
+    @property
+    def anchors(self) -> tuple[int, ...]:
+        return tuple(range(self.first, self.first + len(self.captured)))
 
 
-def _row(
-    found: Laws,
-    scope: DerivationScope,
-    owner: str,
-    part: str,
-    value: Scalar,
-    *,
-    unit: str,
-    contact: int = -1,
-    may_fold: bool = False,
-) -> int:
-    """Add a row and give its number, or −1 for one that holds by itself."""
-    view = scope.tape.lift(value)
+def _law(word: Constraint, holding: _Holding) -> Law:
+    """The law of a word.
+
+    Raises
+    ------
+    ModelError
+        where it is not what its kind promises.
+    """
+    law, faults = word.act(holding.scope, holding), []
+    title = f"'{word.name}' ({type(word).__name__}) of kind '{word.kind}'"
+    if not isinstance(law, Law):
+        raise ModelError([f"{title}: act(scope, hold) must return an mbd.constraints.Law, got {law!r}"])
+    closes = word.kind in ("unilateral", "penalty")
+    if closes != (law.contact is not None):
+        faults.append(f"{title} {'needs' if closes else 'acts at all times and takes no'} Law(contact=Closing(gap))")
+    if bool(law.rows) != (word.kind != "penalty"):
+        faults.append(f"{title} {'acts by a force: give push=, not rows' if law.rows else 'needs Law(rows=[…])'}")
+    if (law.push is None) != (word.kind != "penalty") or (law.drags and law.push is None):
+        faults.append(f"{title}: push= and drags= are the forces of laws of kind 'penalty', which need push=")
+    if holding.captured and not closes:
+        faults.append(f"{title} never closes, so that hold() has no instant; only laws with a contact hold values")
+    at = law.contact
+    if at is not None:
+        rules = ("gap", "pull") if word.kind == "penalty" else ("pull", "when")
+        if at.opens_on not in rules:
+            faults.append(f"{title}: opens_on is {' or '.join(map(repr, rules))}, got {at.opens_on!r}")
+        if word.kind == "penalty" and (at.releases or at.only_while is not None or at.restitution):
+            faults.append(f"{title}: releases, only_while and restitution serve contacts by rows; leave them out")
+        if not 0.0 <= at.restitution <= 1.0:
+            faults.append(f"{title}: restitution {at.restitution:g} is not between 0 and 1")
+    if faults:
+        raise ModelError(faults)
+    return law
+
+
+def _always(
+    found: Laws, scope: DerivationScope, dynamics: Generalized, word: Constraint, contacts: Sequence[Constraint]
+) -> None:
+    """Rows that act at all times, or as long as another contact is closed."""
+    law = _law(word, _Holding(scope, 0))
+    numbers = [k for k, contact in enumerate(contacts) if contact.name == law.while_closed]
+    number = numbers[0] if numbers else -1
+    if number >= 0 and contacts[number].kind == "penalty":
+        found.faults.append(
+            f"'{word.name}': only_while='{law.while_closed}' is a penalty contact, whose impacts take time; name a "
+            "Unilateral"
+        )
+    for row in law.rows:
+        if row.level == "position" and row.limit is None:
+            _row(found, scope, word.name, row)
+            continue
+        if _velocity_row(found, scope, word.name, row, number) and row.limit is not None:
+            name = f"{word.name}.{row.part}" if row.part else word.name
+            limit = row.limit(scope.tape.zero) if callable(row.limit) else row.limit
+            dry_friction(found, scope, dynamics, name, len(found.rows) - 1, number, scope.tape.lift(limit))
+
+
+def _row(found: Laws, scope: DerivationScope, owner: str, row: Equation, contact: int = -1) -> int:
+    """Add a row of positions and give its number, or −1 for one that holds by itself."""
+    part, unit = row.part, row.unit
+    view = scope.tape.lift(row.value)
     node, rate = scope.views.real([view, *scope.rates([view])])
     title = f"'{owner}'" + (f", row '{part}'" if part else "")
     kinds = {other.data[0] for other in live([node]) if other.op == "input"}
     if kinds & {"v", "z"}:
         found.faults.append(f"{title} depends on velocities or states; a constraint may depend on positions and t only")
     elif "x" not in kinds:
-        found.faults += _idle(scope, node, title, kinds, unit, may_fold)
+        found.faults += _idle(scope, node, title, kinds, unit, row.may_fold)
         return -1
-    found.rows.append(Row(owner, part, node, rate, contact, unit))
+    found.rows.append(Row(owner, part, node, rate, contact, unit, reaction=row.reaction, wraps=row.wraps))
     found.viewed.append(view)
     return len(found.rows) - 1
 
 
-def _velocity_rows(
-    found: Laws, scope: DerivationScope, law: VelocityConstraint, contacts: Sequence[Unilateral | Penalty]
-) -> None:
-    """Rows ``a(q, t) · v + b(q, t) = 0``, with what is wrong with them; some hold while a contact is closed."""
-    numbers = [k for k, contact in enumerate(contacts) if contact.name == law.contact]
-    number = numbers[0] if numbers else -1
-    if number >= 0 and isinstance(contacts[number], Penalty):
+def _velocity_row(found: Laws, scope: DerivationScope, owner: str, row: Equation, contact: int) -> bool:
+    """Add a row ``a(q, t) · v + b(q, t) = 0``, or what is wrong with it; whether it was added."""
+    view = scope.tape.lift(row.value)
+    rate = scope.real(view)
+    title = f"'{owner}'" + (f", row '{row.part}'" if row.part else "")
+    slopes = gradient(rate, scope.inputs.v)
+    if {other.data[0] for other in live([rate]) if other.op == "input"} & {"z", "s", "a"}:
+        found.faults.append(f"{title} depends on states; it may depend on velocities, positions and t only")
+    elif any(other.op == "input" and other.data[0] == "v" for other in live(slopes)):
         found.faults.append(
-            f"'{law.name}': only_while='{law.contact}' is a penalty contact, whose impacts take time; name a Unilateral"
+            f"{title} is not linear in velocities; give a row a(q) · v + b(t), a sum of rates times functions of "
+            "positions and t"
         )
-    for part, value in law.rates(scope):
-        view = scope.tape.lift(value)
-        rate = scope.real(view)
-        title = f"'{law.name}'" + (f", row '{part}'" if part else "")
-        slopes = gradient(rate, scope.inputs.v)
-        if {other.data[0] for other in live([rate]) if other.op == "input"} & {"z", "s", "a"}:
-            found.faults.append(f"{title} depends on states; it may depend on velocities, positions and t only")
-        elif any(other.op == "input" and other.data[0] == "v" for other in live(slopes)):
-            found.faults.append(
-                f"{title} is not linear in velocities; give a row a(q) · v + b(t), a sum of rates times functions of "
-                "positions and t"
-            )
-        elif all(slope.is_zero for slope in slopes):
-            found.faults.append(
-                f"{title} holds no velocity, so it constrains nothing; let rates such as 'body.x.rate' enter it, or "
-                "use mbd.Bilateral for positions"
-            )
-        else:
-            found.rows.append(
-                Row(law.name, part, scope.tape.zero, rate, unit=law.unit, kind="velocity", contact=number)
-            )
-            found.viewed.append(view)
+    elif all(slope.is_zero for slope in slopes):
+        found.faults.append(
+            f"{title} holds no velocity, so it constrains nothing; let rates such as 'body.x.rate' enter it, or "
+            "use mbd.Bilateral for positions"
+        )
+    else:
+        found.rows.append(Row(owner, row.part, scope.tape.zero, rate, unit=row.unit, kind="velocity", contact=contact))
+        found.viewed.append(view)
+        return True
+    return False
 
 
 def _idle(scope: DerivationScope, node: Node, title: str, kinds: set[str], unit: str, may_fold: bool) -> list[str]:
@@ -147,60 +192,67 @@ def _idle(scope: DerivationScope, node: Node, title: str, kinds: set[str], unit:
     return [] if may_fold else [f"{title} is 0 whatever the motion, so it constrains nothing; remove it"]
 
 
-def _unilateral(found: Laws, scope: DerivationScope, dynamics: Generalized, law: Unilateral, number: int) -> None:
-    """A normal row, and tangent rows that hold the place of touchdown where and while it sticks."""
-    gap = scope.tape.lift(law.measure.gap(scope))
-    unit = law.measure.unit
-    numbers = [_row(found, scope, law.name, "normal", gap, unit=unit, contact=number)]
-    held_by = law.sticks or law.slides
-    captured, anchors = _anchored(found, scope, _captured(scope, law))
-    if held_by:
-        held = [scope.tape.input("anchor", k) for k in anchors]
-        for part, value in law.measure.tangents(scope, held):
-            numbers.append(_row(found, scope, law.name, part, value, unit="m", contact=number, may_fold=True))
-    if law.slides:
-        sliding_contact(found, scope, dynamics, law, numbers, dict(zip(anchors, captured, strict=True)))
-    condition = law.only_while
+def _contact(found: Laws, scope: DerivationScope, dynamics: Generalized, word: Constraint, number: int) -> None:
+    """A law that closes and opens, by rows or by a force."""
+    holding = _Holding(scope, sum(len(contact.anchors) for contact in found.contacts))
+    law = _law(word, holding)
+    if law.contact is not None:
+        by = _by_force if law.push is not None else _by_rows
+        found.contacts.append(by(found, scope, dynamics, word, law, law.contact, holding, number))
+
+
+def _by_rows(
+    found: Laws, scope: DerivationScope, dynamics: Generalized, word: Constraint, law: Law, at: Closing,
+    holding: _Holding, number: int,
+) -> Contact:  # fmt: skip
+    """A normal row, and tangent rows that hold a place, or resist sliding up to a limit."""
+    numbers = [_row(found, scope, word.name, row, number) for row in law.rows]
+    acting = tuple(k for k in numbers if k >= 0)
+    limits = [(k, row.limit) for k, row in zip(numbers, law.rows, strict=True) if row.limit is not None]
+    if limits:
+        captured = dict(zip(holding.anchors, holding.captured, strict=True))
+        sliding_contact(found, scope, dynamics, word.name, acting, limits, captured)
+    condition = at.only_while
+    gap = scope.tape.lift(at.gap)
     gap, rate = scope.views.real([gap, *scope.rates([gap])])
-    found.contacts.append(
-        Contact(
-            law.name, law.kind, gap, rate, tuple(k for k in numbers if k >= 0), captured, anchors,
-            opens_on=law.opens_on, when=tuple((rule.other, rule.after_impact) for rule in law.releases),
-            only_while=scope.real(condition.gap(scope)) if isinstance(condition, Measure) else condition,
-            restitution=law.restitution, unit=unit, may_pull=any(rule.may_pull for rule in law.releases),
-        )
+    return Contact(
+        word.name, word.kind, gap, rate, acting, tuple(holding.captured), holding.anchors, opens_on=at.opens_on,
+        when=tuple((rule.other, rule.after_impact) for rule in at.releases),
+        only_while=scope.real(condition.gap(scope)) if isinstance(condition, Measure) else condition,
+        restitution=at.restitution, unit=at.unit, may_pull=any(rule.may_pull for rule in at.releases),
     )  # fmt: skip
 
 
-def _anchored(
-    found: Laws, scope: DerivationScope, values: Sequence[Scalar]
-) -> tuple[tuple[Node, ...], tuple[int, ...]]:
-    """What a contact stores as it closes, and the numbers of its anchors."""
-    captured = tuple(scope.real(value) for value in values)
-    first = sum(len(contact.anchors) for contact in found.contacts)
-    return captured, tuple(range(first, first + len(captured)))
-
-
-def _penalty(found: Laws, scope: DerivationScope, dynamics: Generalized, law: Penalty, number: int) -> None:
-    """A force law on a gap: −p ∂g/∂q on the left-hand side while it acts."""
-    gap = scope.tape.lift(law.measure.gap(scope))
-    if not any(node.op == "input" and node.data[0] == "x" for node in live([scope.real(gap)])):
-        found.faults.append(f"the gap of '{law.name}' is the same whatever the motion; let it depend on the posture")
-    rate = scope.rates([gap])[0]
-    captured, anchors = _anchored(found, scope, law.captured(rate))
-    force = scope.tape.lift(law.force(gap, rate, scope, *[scope.tape.input("anchor", k) for k in anchors]))
-    generalized = (*dynamics.generalized(Work([gap], [-force])), *[scope.tape.zero] * len(scope.states))
+def _by_force(
+    found: Laws, scope: DerivationScope, dynamics: Generalized, word: Constraint, law: Law, at: Closing,
+    holding: _Holding, number: int,
+) -> Contact:  # fmt: skip
+    """A force law: −p ∂g/∂q on the left-hand side while it acts, −p ∂g/∂v where g is a velocity, and its drags."""
+    lift, rest = scope.tape.lift, [scope.tape.zero] * len(scope.states)
+    gap, force = lift(at.gap), lift(law.push if law.push is not None else 0.0)
+    inside = {node.data[0] for node in live([scope.real(gap)]) if node.op == "input"}
+    fast = "v" in inside
+    if not inside & {"x", "v"}:
+        found.faults.append(f"the gap of '{word.name}' is the same whatever the motion; let it depend on the posture")
+    work = Work([], [], [gap], [-force]) if fast else Work([gap], [-force])
+    generalized = (*dynamics.generalized(work), *rest)
     found.penalties.append((number, gap, force))
-    energy = law.elastic_energy(gap, scope)
-    elastic = None if energy is None else scope.real(energy)
+    elastic = None if law.elastic is None else scope.real(law.elastic)
+    rate = scope.change(gap) if fast else scope.rates([gap])[0]
     gap, rate, force = scope.views.real([gap, rate, force])
-    found.contacts.append(
-        Contact(
-            law.name, law.kind, gap, rate, captured=captured, anchors=anchors, force=force, generalized=generalized,
-            opens_on=law.opens_on, unit=law.measure.unit,
-        )
+    found.effects.append(penalty_effect(word.name, number, gap, rate, force, generalized, scope, elastic, fast))
+    drags: list[tuple[str, Node, Node]] = []
+    for drag in law.drags:
+        velocity, resistance = lift(drag.velocity), lift(drag.force)
+        found.drags.append((number, velocity, resistance))
+        along = (*dynamics.generalized(Work([], [], [velocity], [-resistance])), *rest)
+        speed, size = scope.views.real([velocity, resistance])
+        found.effects.append(drag_effect(f"{word.name} {drag.part}", number, speed, size, along, scope))
+        drags.append((drag.part, speed, size))
+    return Contact(
+        word.name, word.kind, gap, rate, captured=tuple(holding.captured), anchors=holding.anchors, force=force,
+        generalized=generalized, opens_on=at.opens_on, unit=at.unit, drags=tuple(drags), is_velocity=fast,
     )  # fmt: skip
-    found.effects.append(penalty_effect(law.name, number, gap, rate, force, generalized, scope, elastic))
 
 
 def _guard(scope: DerivationScope, event: Event) -> Guard:

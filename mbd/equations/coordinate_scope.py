@@ -126,6 +126,10 @@ class CoordinateScope:
         """d/dt of functions of t and q ⊕ x."""
         return jvp(values, {self.time: 1.0, **dict(zip(self.inputs.x, self.inputs.v, strict=True))})
 
+    def rate(self, value: Scalar) -> Node:
+        """d/dt of one of them."""
+        return self.rates([self.tape.lift(value)])[0]
+
     def change(self, value: Scalar) -> Node:
         """d/dt of a function of t, q ⊕ x, v and z."""
         seeds: dict[Node, Scalar] = {self.time: 1.0, **dict(zip(self.inputs.x, self.inputs.v, strict=True))}

@@ -20,7 +20,6 @@ from mbd.equations.results import offer_results
 from mbd.equations.row_sizes import row_sizes
 from mbd.equations.surroundings import Surroundings
 from mbd.errors import ModelError
-from mbd.joints.base import Joint
 from mbd.tape.derivatives import live
 from mbd.tape.functions import cos
 from mbd.tape.node import Node
@@ -119,11 +118,11 @@ def _wrapped(scope: Surroundings, equations: Equations, model: Model) -> list[tu
                 angles[node.index] = joint.name, k
     if not angles:
         return []
-    alone = {law.name for law in model.bilaterals if isinstance(law.subject, Joint)}
-    nodes = [*equations.balance, equations.potential, *(row.value for row in equations.rows if row.owner not in alone)]
+    nodes = [*equations.balance, equations.potential, *(row.value for row in equations.rows if not row.wraps)]
     nodes += [row.rate for row in equations.rows if row.is_velocity] + [f.limit for f in equations.frictions]
     for contact in equations.contacts:
         nodes += [each for each in (contact.gap, contact.force, contact.only_while) if isinstance(each, Node)]
+        nodes += [force for _, _, force in contact.drags]
     nodes += [guard.value for guard in equations.guards]
     nodes += [effect.power for effect in equations.effects if effect.power is not None]
     read = {name for controller in model.controllers for name in controller.reads}
@@ -164,7 +163,10 @@ def _closed(scope: Surroundings, constraints: Laws) -> Work:
         act = work.on_velocity if row.is_velocity else work.on_value
         act(view, scope.tape.input("lam", k))
     for number, gap, force in constraints.penalties:
-        work.on_value(gap, -(scope.tape.input("switch", number) * force))
+        act = work.on_velocity if constraints.contacts[number].is_velocity else work.on_value
+        act(gap, -(scope.tape.input("switch", number) * force))
+    for number, velocity, force in constraints.drags:
+        work.on_velocity(velocity, -(scope.tape.input("switch", number) * force))
     return work
 
 
@@ -226,7 +228,10 @@ class TreeGeometry:
         viewed = {row.value.index: view for row, view in rows if not row.is_velocity}
         moving = {row.rate.index: view for row, view in rows if row.is_velocity}
         moving |= {f.rate.index: view for f, view in zip(laws.frictions, laws.sliding, strict=True)}
-        viewed |= {laws.contacts[number].gap.index: gap for number, gap, _ in laws.penalties}
+        for number, gap, _ in laws.penalties:
+            (moving if laws.contacts[number].is_velocity else viewed)[laws.contacts[number].gap.index] = gap
+        reals = [velocity for contact in laws.contacts for _, velocity, _ in contact.drags]
+        moving |= {real.index: view for real, (_, view, _) in zip(reals, laws.drags, strict=True)}
         return Work(
             [viewed.get(value.index, value) for value in values], list(multipliers),
             [moving.get(rate.index, rate) for rate in rates], list(forces),
@@ -235,6 +240,7 @@ class TreeGeometry:
     def mass_matrix(self) -> list[list[Node]] | None:
         """M of the bodies, where no force and no state depends on accelerations."""
         forces = [contact.force for contact in self.constraints.contacts if contact.force is not None]
+        forces += [force for contact in self.constraints.contacts for _, _, force in contact.drags]
         forces += [friction.limit for friction in self.constraints.frictions]
         inside = live([*self.dynamics.generalized(self.work), *forces])
         if self.rests or any(node.op == "input" and node.data[0] == "a" for node in inside):

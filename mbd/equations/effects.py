@@ -127,11 +127,27 @@ def effect_of(cause: Cause, scope: DerivationScope, dynamics: Generalized) -> Ef
 
 def penalty_effect(
     name: str, contact: int, gap: Node, rate: Node, force: Node, generalized: Sequence[Node], scope: DerivationScope,
-    elastic: Node | None = None,
+    elastic: Node | None = None, fast: bool = False,
 ) -> Effect:  # fmt: skip
-    """A penalty contact as an effect; its power on the mechanism is force · (ġ − ∂g/∂t) while it acts."""
-    drift = jvp([gap], {scope.time: 1.0})[0]
-    return Effect(name, "penalty", lambda: generalized, force * (rate - drift), contact=contact, elastic=elastic)
+    """A force law as an effect; its power on the mechanism is force · (ġ − ∂g/∂t) while it acts.
+
+    It is force · (∂g/∂v · v) of a gap that is a velocity (`fast`).
+    """
+    speed = _of_motion(gap, scope) if fast else rate - jvp([gap], {scope.time: 1.0})[0]
+    return Effect(name, "penalty", lambda: generalized, force * speed, contact=contact, elastic=elastic)
+
+
+def drag_effect(
+    name: str, contact: int, velocity: Node, force: Node, generalized: Sequence[Node], scope: DerivationScope
+) -> Effect:
+    """A force along a velocity while a contact is closed."""
+    power = force * _of_motion(velocity, scope)
+    return Effect(name, "loss", lambda: generalized, power, contact=contact, column="friction")
+
+
+def _of_motion(velocity: Node, scope: DerivationScope) -> Node:
+    """∂γ/∂v · v: a velocity without that of surfaces that are moved."""
+    return jvp([velocity], {rate: rate for rate in scope.inputs.v})[0]
 
 
 def _lazily(scope: DerivationScope, dynamics: Generalized, work: Work) -> Callable[[], Sequence[Node]]:

@@ -6,8 +6,6 @@ import inspect
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from mbd.constraints.base import VelocityConstraint
-from mbd.constraints.bilateral import Bilateral
 from mbd.equations import equations as records
 from mbd.equations.contacts import laws
 from mbd.equations.coordinate_scope import CoordinateScope, identifier
@@ -154,7 +152,7 @@ def _laws(system: Lagrangian, lowering: Lowering) -> Laws:
     known = Laws(viewed=[*lowering.h.values(), *lowering.rates.values()])
     known.rows += [Row(name, "", h, rate, unit="") for (name, h), rate in zip(lowering.h.items(), rates, strict=True)]
     known.rows += [Row(name, "", tape.zero, rate, unit="", kind="velocity") for name, rate in lowering.rates.items()]
-    always = [word for word in system.words if isinstance(word, Bilateral | VelocityConstraint)]
+    always = [word for word in system.words if word.kind in ("bilateral", "nonholonomic")]
     laws(scope, scope, (), always, system.contacts, system.events, before=known)
     if known.faults:
         raise ModelError(known.faults)
@@ -204,7 +202,7 @@ def _outputs(
         outputs.value(state.name, node)
     for name, force in lowering.Q.items():
         outputs.value(f"{name}.force", force)
-    offer_rows(outputs, tape, known.rows, [word for word in system.words if isinstance(word, Bilateral)])
+    offer_rows(outputs, tape, known.rows)
     offer_contacts(outputs, tape, known.rows, known.contacts)
     offer_effects(outputs, tape, effects)
     outputs.value("kinetic_energy", kinetic)

@@ -57,6 +57,7 @@ class Row:
     unit : of h, 'm' or 'rad'; that of the rate times seconds for a row on velocities
     kind : 'position', B = ∂h/∂q; or 'velocity', B = ∂rate/∂v, which need not come from a position
     friction : number of the dry friction that holds it only while it sticks, −1 otherwise
+    reaction, wraps : see `mbd.constraints.law.Equation`
     """
 
     owner: str
@@ -67,6 +68,8 @@ class Row:
     unit: str = "m"
     kind: Literal["position", "velocity"] = "position"
     friction: int = -1
+    reaction: str = "force"
+    wraps: bool = False
 
     @property
     def is_velocity(self) -> bool:
@@ -94,6 +97,8 @@ class Contact:
     restitution : e of Newton's law
     unit : of the gap
     may_pull : whether its rule says that it may, so that no note tells that it did
+    drags : (part, velocity, force) of a force law's further forces, whose power is force · velocity
+    is_velocity : whether its gap is a velocity, along which its force acts then
     """
 
     name: str
@@ -111,6 +116,8 @@ class Contact:
     restitution: float = 0.0
     unit: str = "m"
     may_pull: bool = False
+    drags: tuple[tuple[str, Node, Node], ...] = ()
+    is_velocity: bool = False
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
-from mbd.constraints.unilateral import Unilateral
 from mbd.equations.derivation_scope import DerivationScope, Generalized
 from mbd.equations.dynamics import Work
 from mbd.equations.equations import Effect, Friction, Row
@@ -13,35 +13,40 @@ from mbd.equations.laws import Laws
 from mbd.errors import CapabilityError
 from mbd.joints.base import Joint
 from mbd.tape.derivatives import substitute
-from mbd.tape.functions import maximum, sqrt
+from mbd.tape.functions import sqrt
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["dry_joint", "sliding_contact"]
+__all__ = ["dry_friction", "dry_joint", "sliding_contact"]
 
 
 def sliding_contact(
     found: Laws,
     scope: DerivationScope,
     dynamics: Generalized,
-    law: Unilateral,
-    numbers: list[int],
+    name: str,
+    numbers: Sequence[int],
+    limits: Sequence[tuple[int, Any]],
     captured: dict[int, Node],
 ) -> None:
-    """Coulomb friction along the tangent of a contact, ``|λ_T| ≤ μ p``; the direction is that at the point of now."""
-    normal, *tangents = [k for k in numbers if k >= 0]
-    if len(tangents) != 1:
+    """Friction along the tangent of a contact, ``|λ_T| ≤ limit(p)``; the direction is that at the point of now."""
+    tangents = [(row, limit) for row, limit in limits if row >= 0]
+    if len(tangents) != 1 or len(numbers) != 2:
         raise CapabilityError(
-            f"Unilateral '{law.name}': friction {law.friction:g} needs one direction of sliding, but its point can "
-            f"slide in {len(tangents)}; friction is solved in planar models: in space use friction=None (it sticks) or "
-            "0"
+            f"'{name}': friction needs one direction of sliding, but its point can slide in {len(numbers) - 1}; "
+            "friction is solved in planar models: in space use friction=None (it sticks) or 0"
         )
-    (row,) = tangents
+    ((row, law),) = tangents
     here = {scope.tape.input("anchor", k): value for k, value in captured.items()}
     view = substitute(scope.rates([found.viewed[row]]), here)[0]
-    coefficient = scope.parameter(law.name, "mu", law.friction or 0.0)
-    push = -scope.tape.input("lam", normal)
-    limit = coefficient * (maximum(push, 0.0) if law.opens_on == "when" else push)  # none while a rule lets it pull
-    _add(found, scope, dynamics, law.name, row, found.rows[row].contact, view, limit)
+    limit = scope.tape.lift(law(-scope.tape.input("lam", numbers[0])) if callable(law) else law)
+    _add(found, scope, dynamics, name, row, found.rows[row].contact, view, limit)
+
+
+def dry_friction(
+    found: Laws, scope: DerivationScope, dynamics: Generalized, name: str, row: int, contact: int, limit: Node
+) -> None:
+    """Dry friction along a row on velocities, ``|λ| ≤ limit``."""
+    _add(found, scope, dynamics, name, row, contact, found.viewed[row], limit)
 
 
 def dry_joint(found: Laws, scope: DerivationScope, dynamics: Generalized, joint: Joint) -> None:

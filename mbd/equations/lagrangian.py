@@ -4,22 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, cast
 
 from mbd.bodies.domains import ParameterCheck
 from mbd.bodies.values import named_number_faults, names_of, number, printable
 from mbd.constraints.base import Constraint
 from mbd.constraints.controller import Controller
 from mbd.constraints.event import Event
-from mbd.constraints.penalty import Penalty
-from mbd.constraints.unilateral import Unilateral
 from mbd.equations.coordinate_scope import identifier
 from mbd.equations.energies import Lowering, assembled
 from mbd.equations.equations import Equations
 from mbd.equations.lagrangian_words import described, word_faults
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.forces.base import Force
-from mbd.model import all_are
+from mbd.model import all_are, served
 
 __all__ = ["Coordinate", "Expression", "Lagrangian"]
 
@@ -137,7 +135,7 @@ class Lagrangian:
             "constrain takes constraints such as mbd.Unilateral('floor', y.q), and events; "
             "forces and controllers go to apply"
         )
-        self._add(all_are(Constraint, constraints, example), self.constraints)
+        self._add(served(all_are(Constraint, constraints, example)), self.constraints)
 
     def apply(self, *forces: Force | Controller) -> None:
         """Add forces on coordinates, such as `mbd.Potential` or a force class of one's own, and controllers."""
@@ -177,14 +175,14 @@ class Lagrangian:
         return {name: force for name, force in self.forces.items() if not isinstance(force, Force)}
 
     @property
-    def contacts(self) -> list[Unilateral | Penalty]:
+    def contacts(self) -> list[Constraint]:
         """Constraints that open and close, in order."""
-        return [word for word in self.words if isinstance(word, Unilateral | Penalty)]
+        return [word for word in self.words if word.kind in ("unilateral", "penalty")]
 
     @property
     def events(self) -> list[Event]:
         """The user's own events."""
-        return [word for word in self.words if isinstance(word, Event)]
+        return [cast(Event, word) for word in self.words if word.kind == "event"]
 
     @property
     def own_parameters(self) -> dict[str, float]:
@@ -254,15 +252,13 @@ class Lagrangian:
         'box friction' is the dry friction of a contact alone.
         """
         forces = {name if isinstance(force, Force) else f"{name} force": name for name, force in self.forces.items()}
-        rubbing = {
-            f"{word.name} friction": word for word in self.contacts if isinstance(word, Unilateral) and word.slides
-        }
+        rubbing = {title: bare for word in self.words for title, bare in word.bare().items()}
         known = {"potential", "dissipation", *forces, *self._constraints, *self.nonholonomic, *rubbing}
         known |= {controller.name for controller in self.controllers}
         for name in names:
             if name not in known:
                 raise UnknownNameError("without: " + nearest(name, known, "effect or constraint"))
-        smooth = {word.name: replace(word, friction=0.0) for title, word in rubbing.items() if title in names}
+        smooth = {bare.name: bare for title, bare in rubbing.items() if title in names}
         constraints = {name: h for name, h in {**self._constraints, **smooth}.items() if name not in names}
         bare: dict[str, Any] = {name: 0.0 for name in ("potential", "dissipation") if name in names}
         bare["forces"] = {name: self.forces[name] for title, name in forces.items() if title not in names}

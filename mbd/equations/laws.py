@@ -16,6 +16,7 @@ class Laws:
 
     viewed : the values of `rows`, the rates of those on velocities, in views
     penalties : (number, gap, force) of penalty contacts in views
+    drags : (number, velocity, force) of their forces along velocities in views
     sliding : the sliding velocities of `frictions` in views
     idle : (owner, part) of rows of cut joints that hold by themselves
     """
@@ -23,6 +24,7 @@ class Laws:
     rows: list[Row] = field(default_factory=list)
     viewed: list[Node] = field(default_factory=list)
     penalties: list[tuple[int, Node, Node]] = field(default_factory=list)
+    drags: list[tuple[int, Node, Node]] = field(default_factory=list)
     contacts: list[Contact] = field(default_factory=list)
     guards: list[Guard] = field(default_factory=list)
     frictions: list[Friction] = field(default_factory=list)

@@ -287,8 +287,14 @@ def _forces(
         forces.append(equations.tape.input("slip", k) * equations.frictions[k].limit)
     for c, switch in penalties:
         contact = equations.contacts[c]
-        if contact.force is not None:
+        if contact.force is not None and not contact.is_velocity:
             work.append((contact.gap, -(switch * contact.force)))
+        elif contact.force is not None:
+            rates.append(contact.gap)
+            forces.append(-(switch * contact.force))
+        for _, velocity, drag in contact.drags:
+            rates.append(velocity)
+            forces.append(-(switch * drag))
     return [value for value, _ in work], [multiplier for _, multiplier in work], rates, forces
 
 

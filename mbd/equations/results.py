@@ -6,8 +6,6 @@ from collections.abc import Collection, Iterable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
-from mbd.constraints.bilateral import Bilateral
-from mbd.constraints.measures import JointMeasure
 from mbd.equations.dynamics import Dynamics, Work
 from mbd.equations.equations import Contact, Effect, Equations, Row
 from mbd.equations.outputs import Outputs
@@ -39,7 +37,7 @@ def offer_results(
     work : all forces, with all rows and penalties; hidden : names of joints that no user made
     """
     tape, rows, contacts = scope.tape, equations.rows, equations.contacts
-    offer_rows(outputs, tape, rows, model.bilaterals)
+    offer_rows(outputs, tape, rows)
     offer_contacts(outputs, tape, rows, contacts)
     offer_effects(outputs, tape, equations.effects)
     _offer_motors(outputs, scope, model.forces)
@@ -74,12 +72,11 @@ def _acceleration(scope: Surroundings, joint: str, place: int) -> Scalar:
     return scope.change(scope.joint(joint).rates[place])
 
 
-def offer_rows(outputs: Outputs, tape: Tape, rows: Sequence[Row], bilaterals: Iterable[Bilateral]) -> None:
+def offer_rows(outputs: Outputs, tape: Tape, rows: Sequence[Row]) -> None:
     """Multiplier and residual of each bilateral row; tension of rods, force or torque that drives a joint.
 
     A row on velocities has its rate as residual, and the force −λ along the row.
     """
-    words = {constraint.name: constraint for constraint in bilaterals}
     for k, row in enumerate(rows):
         if row.contact >= 0 and not row.is_velocity:
             continue
@@ -92,10 +89,9 @@ def offer_rows(outputs: Outputs, tape: Tape, rows: Sequence[Row], bilaterals: It
         outputs.value(f"{name}.residual", row.rate if row.is_velocity else row.value)
         if row.is_velocity:
             outputs.value(f"{name}.force", -multiplier)
-        measure = words[row.owner].measure if row.owner in words else None
-        if isinstance(measure, JointMeasure):
+        if row.reaction == "drive":
             outputs.value(f"{name}.{'torque' if row.unit == 'rad' else 'force'}", -multiplier)
-        elif measure is not None and measure.reaction == "tension":
+        elif row.reaction == "tension":
             outputs.value(f"{name}.tension", multiplier)
             outputs.value(f"{name}.force", multiplier)
 
@@ -107,6 +103,8 @@ def offer_contacts(outputs: Outputs, tape: Tape, rows: Sequence[Row], contacts: 
         outputs.value(f"{contact.name}.gap_rate", contact.gap_rate)
         if contact.force is not None:
             outputs.value(f"{contact.name}.force", tape.input("switch", number) * contact.force)
+        for part, _, force in contact.drags:
+            outputs.value(f"{contact.name}.{part}", tape.input("switch", number) * force)
         for k in contact.rows:
             push = -tape.input("lam", k)
             if rows[k].part == "normal":

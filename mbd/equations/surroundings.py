@@ -266,6 +266,10 @@ class Surroundings:
         seeds: dict[Node, Scalar] = {self.time: 1.0, **dict(zip(self.inputs.x, self.inputs.v, strict=True))}
         return jvp(values, seeds | self.views.rates(values))
 
+    def rate(self, value: Scalar) -> Node:
+        """d/dt of one of them."""
+        return self.rates([self.tape.lift(value)])[0]
+
     def change(self, value: Scalar) -> Node:
         """d/dt of a word's function of t, q ⊕ x, v and z; no view is left in it."""
         values = [self.real(value)]

@@ -66,7 +66,8 @@ class HHT(NewmarkFamily):
 
     def order(self, system: System | None = None) -> int:
         """2; the averaged form has 1 unless the system says that its mass matrix is constant."""
-        if self.form == "averaged" and self.alpha > 0.0 and not (system is not None and completed(system).constant_mass):
+        constant = system is not None and completed(system).constant_mass
+        if self.form == "averaged" and self.alpha > 0.0 and not constant:
             return 1
         return super().order(system)
 

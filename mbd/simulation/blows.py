@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mbd.arrays import Vector
-from mbd.constraints.penalty import Penalty
-from mbd.constraints.penalty_parameters import largest_dt
 from mbd.results.record import Record
 from mbd.simulation.fastest import free_motions, matrices
 
@@ -26,19 +24,16 @@ def dt_of_blows(run: Run, record: Record, number: int, rows: Iterable[int]) -> f
     where these cannot be told.
     """
     name = run.manager.contacts[number].name
-    laws = [word for word in run.model.contacts if isinstance(word, Penalty) and word.name == name]
-    if not laws:
-        return np.inf
-    law, inputs = laws[0], run.mechanism.equations.parameters
+    law = next(word for word in run.model.contacts if word.name == name)
+    inputs = run.mechanism.equations.parameters
     values = {parameter.name: float(v) for parameter, v in zip(inputs, run.values["params"], strict=False)}
     given = {**law.parameters(), **values}
-    k, c, chi = (given.get(f"{name}.{field}", 0.0) for field in ("stiffness", "damping", "chi"))
     found = np.inf
     with np.errstate(all="ignore"):
         for row in rows:
             speed, mass = _approach(run, record, number, row)
             if speed > 0.0 and 0.0 < mass < np.inf:
-                found = min(found, largest_dt(k, law.exponent, c, chi, mass, speed))
+                found = min(found, law.resolving_dt(given, mass, speed))
     return float(found)
 
 

@@ -187,9 +187,8 @@ def _words(findings: Findings, measure: Measure, scope: FreeScope, gap: Node) ->
     units = ("m", "rad")
     findings.holds("unit is 'm' or 'rad'", measure.unit in units, f"unit {measure.unit!r}", "angles are 'rad'")
     sentence = f"reaction {measure.reaction!r}"
-    findings.holds(
-        "reaction is 'force' or 'tension'", measure.reaction in ("force", "tension"), sentence, "see Measure"
-    )
+    law = "reaction is 'force', 'drive' or 'tension'"
+    findings.holds(law, measure.reaction in ("force", "drive", "tension"), sentence, "see Measure")
     kinds = sorted({node.data[0] for node in live([gap]) if node.op == "input"} & {"v", "z", "a", "lam"})
     hint = "rows and contacts need positions and time only; velocities belong to losses, events and controllers"
     findings.holds("it depends on the posture and the time", not kinds, f"it depends on inputs {kinds}", hint)

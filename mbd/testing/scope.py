@@ -87,11 +87,11 @@ class FreeScope:
         self.numbers |= dict(zip(self.coordinates(body), place, strict=True))
         self.numbers |= dict(zip(self.rates(body), speed, strict=True))
 
-    def rate(self, node: Node) -> Node:
+    def rate(self, value: Scalar) -> Node:
         """d/dt along the motion."""
         seeds: dict[Node, Scalar] = {self.time: 1.0}
         seeds |= dict(zip(self.all_coordinates, self.all_rates, strict=True))
-        return jvp([node], seeds)[0]
+        return jvp([self.tape.lift(value)], seeds)[0]
 
     def frame(self, frame: Frame) -> FrameMotion:
         R_frame, place = frame.placement(self)

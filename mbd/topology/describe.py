@@ -5,11 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from mbd.bodies.base import Frame
-from mbd.constraints.base import Measure, VelocityConstraint
-from mbd.constraints.bilateral import Bilateral
-from mbd.constraints.penalty import Penalty
-from mbd.constraints.unilateral import Unilateral
 from mbd.errors import ModelError
 from mbd.topology.plan import plan
 
@@ -63,31 +58,7 @@ def _joint(joint: Joint) -> str:
 
 def described_constraint(word: Constraint) -> str:
     """A constraint in a line."""
-    said = f"{word.name}: {type(word).__name__}"
-    if isinstance(word, Unilateral):
-        said += f", {_measure(word.measure)}" + (", sticks" if word.sticks else "")
-        rules = [f"'{rule.other}' closes{' (after the impact)' if rule.after_impact else ''}" for rule in word.releases]
-        on_pull = ["on pull"] if word.opens_on == "pull" else []
-        said += ", opens " + " or ".join((["as " + " or ".join(rules)] if rules else []) + on_pull)
-        if word.only_while is not None:
-            other = word.only_while
-            said += f", only while {_measure(other)} > 0" if isinstance(other, Measure) else f", only while '{other}'"
-    if isinstance(word, Bilateral):
-        said += f", {_measure(word.measure)} = {word.value}"
-    if isinstance(word, VelocityConstraint):
-        said += ", on the velocities of " + ", ".join(f"'{name}'" for name in _mentioned(word))
-    if isinstance(word, Penalty):
-        loss = f"damping {word.damper:.6g}" if word.chi is None else f"chi {word.chi:.6g}"
-        said += f", {_measure(word.measure)}, stiffness {word.stiffness:.6g}, {loss}"
-    return said
-
-
-def _measure(measure: Measure) -> str:
-    return f"{measure.title} of " + ", ".join(f"'{name}'" for name in _mentioned(measure))
-
-
-def _mentioned(word: Measure | Constraint) -> list[str]:
-    return [m if isinstance(m, str) else m.full_name if isinstance(m, Frame) else m.name for m in word.mentions()]
+    return f"{word.name}: {type(word).__name__}{word.said}"
 
 
 def _choice(model: Model) -> list[str]:

@@ -148,7 +148,8 @@ def contacts(found: Faults, bodies: Bodies, acting: Loads, run: Any) -> None:
     notes = " ".join(map(str, run.stats["notes"]))
     located = run.settings["contact"] != "nonsmooth" and "index3" not in run.settings["integrator"]
     largest = np.max([load.force_size for load in acting.on.values()], axis=0, initial=1e-9)
-    for word in bodies.model.contacts:
+    contacts: list[Any] = bodies.model.contacts  # Unilateral and Penalty
+    for word in contacts:
         gap = gap_of(word.measure, bodies)
         closed, force = told.closed[word.name], told[f"{word.name}.force"]
         found.small("gap as reported", word.name, gap.value - told[f"{word.name}.gap"], EQUAL * size)

@@ -382,6 +382,7 @@ def structure(number: int) -> Structure:
     cuts: list[Any] = [] if spatial else ["all", some]
     if spatial and loops:
         cuts = [(rng.choice([name for name in names if name.startswith(("joint", "closer"))]),)]
-    drives = [word.subject for word in model.bilaterals if isinstance(word.subject, Joint)]
+    held_by = [word for word in model.bilaterals if isinstance(word, mbd.Bilateral)]
+    drives = [word.subject for word in held_by if isinstance(word.subject, Joint)]
     held = tuple(name for joint in drives for name in joint.coordinate_names)
     return Structure(number, kind, model, position, cuts, loops or pins, held)
