@@ -298,10 +298,15 @@ def _below(work: Posture, opened: set[str]) -> list[str]:
         named_off = isinstance(contact.only_while, str) and contact.only_while not in work.manager.mode(work.flags)
         off = named_off or (contact.only_while is not None and values[3 * count + c] <= 0.0)
         if values[c] < -BELOW and not work.flags[c] and contact.name not in opened and not off:
-            faults.append(
+            inside = (
                 f"{contact.name!r} starts {-values[c]:.6g} {contact.unit} inside its surface; raise the mechanism, "
                 f"name it in closed=[…] to set it on the surface, or in open=[…] to ignore it until it has risen"
             )
+            against = (
+                f"{contact.name!r} starts open at {values[c]:.6g} {contact.unit}, a velocity at which it acts; name it "
+                "in closed=[…], or give a velocity that it lets pass"
+            )
+            faults.append(against if contact.is_velocity else inside)
     return faults
 
 

@@ -203,11 +203,11 @@ class Model:
                 changes = _bare(model.joints[place], self.tunable)  # a second friction is left out beside the first
                 if effect in changes:
                     model.joints[place] = replace(model.joints[place], **changes[effect])  # type: ignore[type-var]
-        for place, word in enumerate(model.constraints):
+        for place, word in reversed(list(enumerate(model.constraints))):
             parts = word.bare()
             known |= set(parts)
-            for effect in [effect for effect in parts if effect in names]:
-                model.constraints[place] = parts[effect]
+            left = [parts[effect] for effect in parts if effect in names] or [word]
+            model.constraints[place : place + 1] = [each for each in left[-1:] if each is not None]
         if "gravity" in names:
             model.gravity = (0.0, 0.0, 0.0)
         for name in names:

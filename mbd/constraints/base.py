@@ -122,9 +122,12 @@ class Constraint(Parameterized, ABC):
         """Times at which its sampled signals have a kink [s]."""
         return ()
 
-    def bare(self) -> dict[str, Constraint]:
-        """Effects of it that a model can be `without`, by name, each with the constraint that lacks it."""
-        return {}
+    def bare(self) -> dict[str, Constraint | None]:
+        """Effects of it that a model can be `without`, by name, each with the constraint that lacks it; None: nothing.
+
+        By default the friction of rows on velocities that have a limit.
+        """
+        return {f"{self.name} friction": None} if self.kind == "nonholonomic" else {}
 
     def resolving_dt(self, values: Mapping[str, float], mass: float, speed: float) -> float:
         """The step that resolves a blow of an effective mass [kg, kg m²] at an approach speed [m/s, rad/s]; [s].
@@ -184,6 +187,10 @@ class VelocityConstraint(Constraint):
     def contact(self) -> str | None:
         """The contact that must be closed for its rows to hold; None: they hold at all times."""
         return None
+
+    def bare(self) -> dict[str, Constraint | None]:
+        """Nothing: its rows have no limit."""
+        return {}
 
     def act(self, scope: Scope, hold: Hold) -> Law:
         """Its rows."""

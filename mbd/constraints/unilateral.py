@@ -103,7 +103,7 @@ class Unilateral(Constraint):
         coefficient = scope.parameter(self.name, "mu", self.friction or 0.0)
         return coefficient * (maximum(push, 0.0) if self.opens_on == "when" else push)
 
-    def bare(self) -> dict[str, Constraint]:
+    def bare(self) -> dict[str, Constraint | None]:
         """Its friction."""
         return {f"{self.name} friction": replace(self, friction=0.0)} if self.slides else {}
 

@@ -251,7 +251,8 @@ def _by_force(
         drags.append((drag.part, speed, size))
     return Contact(
         word.name, word.kind, gap, rate, captured=tuple(holding.captured), anchors=holding.anchors, force=force,
-        generalized=generalized, opens_on=at.opens_on, unit=at.unit, drags=tuple(drags), is_velocity=fast,
+        generalized=generalized, opens_on=at.opens_on, unit=f"{at.unit}/s" if fast else at.unit, drags=tuple(drags),
+        is_velocity=fast,
     )  # fmt: skip
 
 

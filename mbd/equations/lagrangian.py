@@ -252,14 +252,15 @@ class Lagrangian:
         'box friction' is the dry friction of a contact alone.
         """
         forces = {name if isinstance(force, Force) else f"{name} force": name for name, force in self.forces.items()}
-        rubbing = {title: bare for word in self.words for title, bare in word.bare().items()}
+        rubbing = {title: (word.name, bare) for word in self.words for title, bare in word.bare().items()}
         known = {"potential", "dissipation", *forces, *self._constraints, *self.nonholonomic, *rubbing}
         known |= {controller.name for controller in self.controllers}
         for name in names:
             if name not in known:
                 raise UnknownNameError("without: " + nearest(name, known, "effect or constraint"))
-        smooth = {bare.name: bare for title, bare in rubbing.items() if title in names}
-        constraints = {name: h for name, h in {**self._constraints, **smooth}.items() if name not in names}
+        smooth = dict(pair for title, pair in rubbing.items() if title in names)
+        kept = {**self._constraints, **smooth}
+        constraints = {name: h for name, h in kept.items() if name not in names and h is not None}
         bare: dict[str, Any] = {name: 0.0 for name in ("potential", "dissipation") if name in names}
         bare["forces"] = {name: self.forces[name] for title, name in forces.items() if title not in names}
         bare["constraints"] = constraints

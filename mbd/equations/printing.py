@@ -53,7 +53,8 @@ def _parts(equations: Equations) -> Parts:
         "B": {(rows[k], names[j]): node for k, line in enumerate(B) for j, node in enumerate(line)},
         "h": {(name,): row.value for name, row in zip(rows, equations.rows, strict=True)},
         "b": {(name,): row.rate for name, row in zip(rows, equations.rows, strict=True) if row.is_velocity},
-        "p": {(_plain(c.name),): c.force for c in equations.contacts if c.force is not None},
+        "p": {(_plain(c.name),): c.force for c in equations.contacts if c.force is not None}
+        | {(_plain(c.name), _plain(part)): force for c in equations.contacts for part, _, force in c.drags},
     }
     still = {**here, **dict.fromkeys(inputs.v, 0.0)}
     for letter, entries in parts.items():

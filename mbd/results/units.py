@@ -30,7 +30,7 @@ def unit(name: str, facts: Facts) -> str:
     if last == "friction" and stem in dict(facts.frictions):
         return dict(facts.frictions)[stem]
     if contact is not None and last == "force":
-        return "N m" if contact.unit == "rad" else "N"
+        return "N m" if contact.unit.startswith("rad") else "N"
     if last in ("rate", "acceleration"):
         power = "/s" if last == "rate" else "/s²"
         base = own.get(stem) or next((value for key, value in own.items() if key.rpartition(".")[0] == stem), "")

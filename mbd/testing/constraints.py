@@ -75,7 +75,9 @@ def check_constraint(
     equations = mechanism.equations
     equation_laws(findings, equations, postures=postures, seed=seed)
     for contact in equations.contacts:
-        if contact.force is not None:
+        if contact.is_velocity:
+            _starts_from_zero(findings, equations, contact, seed)
+        elif contact.force is not None:
             _force_law(findings, equations, contact, seed)
     scheme = mbd.HHT(alpha=0.05) if integrator is None else integrator
     starts = [("the start given", start)] if start is not None else list(_starts(findings, model, equations, seed))
@@ -167,9 +169,22 @@ def _force_law(findings: Findings, equations: Equations, contact: Contact, seed:
     findings.where = ""
 
 
+def _starts_from_zero(findings: Findings, equations: Equations, contact: Contact, seed: int) -> None:
+    """A force law whose gap is a velocity: no force at the instant of closing, where that passes zero."""
+    point = inputs(equations, seed)
+    slope = _slope(equations, contact, point)
+    excess = float(at([contact.gap], point)[0]) / float(slope @ slope)
+    moved: Point = {("v", j): point["v", j] - excess * float(slope[j]) for j in range(equations.n_v)}
+    point = point | moved
+    point |= dict(zip((("anchor", k) for k in contact.anchors), map(float, at(contact.captured, point)), strict=True))
+    found, law = float(at([contact.force], point)[0]), "a penalty starts from zero"  # type: ignore[list-item]
+    findings.equal(law, "p as it closes", found, 0.0, "a jump cannot be integrated", 1e-6)
+
+
 def _slope(equations: Equations, contact: Contact, point: Point) -> Numbers:
-    """∂g/∂q."""
-    return np.array([derivative([contact.gap], point, {("x", j): 1.0})[0] for j in range(equations.n_v)])
+    """∂g/∂q, or ∂g/∂v of a gap that is a velocity."""
+    kind = "v" if contact.is_velocity else "x"
+    return np.array([derivative([contact.gap], point, {(kind, j): 1.0})[0] for j in range(equations.n_v)])
 
 
 def _at_gap(equations: Equations, contact: Contact, point: Point, gap: float) -> Point | None:
@@ -199,6 +214,14 @@ def _starts(findings: Findings, model: Any, equations: Equations, seed: int) -> 
         if contact.kind == "unilateral":
             others = [name for name in names if name != contact.name]
             asked.append((f"'{contact.name}' closed, at rest", {"closed": [contact.name], "open": others}))
+        if contact.is_velocity:
+            slope = _slope(equations, contact, inputs(equations, seed) | {("t", 0): 0.0})
+            for sign, how in (0.5, "open"), (-0.5, "closed"):
+                rates = sign * slope / (slope @ slope)
+                speed = {name: float(each) for name, each in zip(equations.velocity_names, rates, strict=True)}
+                label = f"'{contact.name}' {how} at {sign:g} {contact.unit}"
+                asked.append((label, {"velocity": speed, how: [contact.name]}))
+            continue
         above = _falling(equations, contact, seed)
         if above is not None:
             place, speed = above

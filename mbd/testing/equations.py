@@ -73,9 +73,9 @@ def _speeds(equations: Equations, point: Point, kind: str = "v") -> Numbers:
     return np.array([point[kind, k] for k in range(equations.n_v)])
 
 
-def _gradient(equations: Equations, nodes: Any, point: Point) -> Numbers:
-    """∂ nodes/∂x by differences (nodes, n_v)."""
-    return np.array([derivative(nodes, point, {("x", j): 1.0}) for j in range(equations.n_v)]).T
+def _gradient(equations: Equations, nodes: Any, point: Point, kind: str = "x") -> Numbers:
+    """∂ nodes/∂x, or ∂v, by differences (nodes, n_v)."""
+    return np.array([derivative(nodes, point, {(kind, j): 1.0}) for j in range(equations.n_v)]).T
 
 
 def _inertia(findings: Findings, equations: Equations, point: Point) -> None:
@@ -165,11 +165,14 @@ def _rows(findings: Findings, equations: Equations, point: Point) -> None:
 
 def _contact(findings: Findings, equations: Equations, contact: Contact, point: Point) -> None:
     motion, title = _along(equations, point), f"'{contact.name}'"
+    if contact.is_velocity:
+        motion |= {("v", k): point["a", k] for k in range(equations.n_v)}
     rate = derivative([contact.gap], point, motion)[0]
     hint = "ġ must be the derivative of g along the motion"
     findings.equal("ġ is the rate of g", title, at([contact.gap_rate], point)[0], rate, hint, DIFFERENCE)
     if contact.force is not None:
-        force, slope = at([contact.force], point)[0], _gradient(equations, [contact.gap], point)[0]
+        kind = "v" if contact.is_velocity else "x"
+        force, slope = at([contact.force], point)[0], _gradient(equations, [contact.gap], point, kind)[0]
         found = at(list(contact.generalized), point)[: equations.n_v]
         hint = "the force acts along ∂g/∂q with equal and opposite parts on both sides"
         law = "a penalty force acts along the gradient of its gap"
