@@ -189,7 +189,7 @@ class Integrator(ABC):
     """
 
     any_chart: ClassVar[bool] = False
-    """Whether a step moves positions by `System.compose`, at its full order in any chart; False: it needs q + x."""
+    """Whether a step moves positions by `System.compose`, in any chart q ⊕ x; False: along q + x only."""
     between: ClassVar[str] = "hermite"
     """How a run is read between its rows: 'hermite', 'quintic' where accelerations are as accurate as positions, or
     'stages' where steps of `RungeKutta853` are taken again."""

@@ -80,6 +80,7 @@ class RadauIIA(Integrator):
     5
     """
 
+    any_chart: ClassVar[bool] = True
     between: ClassVar[str] = "quintic"
 
     tolerance: float = DEFAULT_TOLERANCE

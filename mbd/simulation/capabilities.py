@@ -117,7 +117,7 @@ def refusals(equations: Equations, scheme: Integrator, options: Mapping[str, Any
         found += [text for (argument, value), text in WITH_TOLERANCE.items() if options.get(argument) == value]
     found += [f"{text} (rows on positions: {_listed(held)})" if held else text for text in told if text]
     if equations.compose is not None and not scheme.any_chart:
-        found.append(f"{scheme!r} keeps its order along q + x only, which {CHARTS}; use mbd.HHT(0.05)")
+        found.append(f"{scheme!r} moves coordinates along q + x, which {CHARTS}; use mbd.HHT(0.05)")
     return found
 
 

@@ -62,7 +62,7 @@ def assert_tangent_of_residual(system, point, mode, stabilized):
         assert not np.asarray(terms.H)[:, n_v:].any()
 
 
-@pytest.mark.parametrize(("name", "stabilized"), itertools.product(PROBLEMS, (True, False)))
+@pytest.mark.parametrize(("name", "stabilized"), list(itertools.product(PROBLEMS, (True, False))))
 def test_the_tangent_of_a_problem_is_the_derivative_of_its_residual(name, stabilized):
     posed, rng = problem(name, stabilized), np.random.default_rng(3)
     n, n_v = len(posed.start.v) + len(posed.start.z), len(posed.start.v)
@@ -91,7 +91,9 @@ def scene():
     return model
 
 
-@pytest.mark.parametrize(("stabilized", "closed"), itertools.product((True, False), ([], ["floor"], ["floor", "mat"])))
+@pytest.mark.parametrize(
+    ("stabilized", "closed"), list(itertools.product((True, False), ([], ["floor"], ["floor", "mat"])))
+)
 def test_the_tangent_of_a_mechanism_is_the_derivative_of_its_residual(stabilized, closed):
     mechanism = mechanism_of(scene())
     manager, layout = ActiveSetManager(mechanism.equations), mechanism.layout
@@ -213,7 +215,7 @@ def test_rows_without_accelerations_of_the_system_are_an_error_that_says_what_to
 def test_a_scheme_that_does_not_say_that_it_moves_in_any_chart_is_refused_where_positions_turn():
     equations = mechanism_of(scene()).equations
     turning = replace(equations, compose=tuple(equations.tape.input("q", k) for k in range(equations.n_q)))
-    for scheme in (ProjectedMidpoint(), mbd.RungeKutta853(), mbd.RadauIIA()):
+    for scheme in (ProjectedMidpoint(), mbd.RungeKutta853()):
         assert not refusals(equations, scheme, {})
         assert "q + x" in refusals(turning, scheme, {})[0]
-    assert not refusals(turning, mbd.HHT(0.05), {})
+    assert not any(refusals(turning, scheme, {}) for scheme in (mbd.HHT(0.05), mbd.RadauIIA()))
