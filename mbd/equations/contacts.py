@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 
 from mbd.constraints.base import Constraint, Measure
 from mbd.constraints.event import Event
@@ -13,12 +12,12 @@ from mbd.equations.dynamics import Work
 from mbd.equations.effects import drag_effect, penalty_effect
 from mbd.equations.equations import Contact, Guard, Row
 from mbd.equations.frictions import dry_friction, dry_joint, sliding_contact
+from mbd.equations.law_of import Holding, law_of
 from mbd.equations.laws import Laws
-from mbd.errors import ModelError
 from mbd.joints.base import Joint, row_unit
 from mbd.tape.derivatives import gradient, live
 from mbd.tape.evaluate import evaluate
-from mbd.tape.node import Node, Scalar
+from mbd.tape.node import Node
 
 __all__ = ["anchors_held", "laws"]
 
@@ -49,7 +48,7 @@ def laws(
     for joint in joints:
         dry_joint(found, scope, dynamics, joint)
     for number, word in enumerate(contacts):
-        _contact(found, scope, dynamics, word, number)
+        _contact(found, scope, dynamics, word, number, contacts)
     for event in events:
         found.guards.append(_guard(scope, event))
     return found
@@ -60,64 +59,11 @@ def anchors_held(scope: DerivationScope, contacts: Sequence[Constraint]) -> int:
     return sum(word.anchors(scope) for word in contacts)
 
 
-@dataclass
-class _Holding:
-    """What a contact stores as it closes: `captured` on the tape, in the anchors that stand for it."""
-
-    scope: DerivationScope
-    first: int
-    captured: list[Node] = field(default_factory=list)
-
-    def __call__(self, values: Sequence[Scalar]) -> list[Node]:
-        begin = self.first + len(self.captured)
-        self.captured += [self.scope.real(value) for value in values]
-        return [self.scope.tape.input("anchor", begin + k) for k in range(len(values))]
-
-    @property
-    def anchors(self) -> tuple[int, ...]:
-        return tuple(range(self.first, self.first + len(self.captured)))
-
-
-def _law(word: Constraint, holding: _Holding) -> Law:
-    """The law of a word.
-
-    Raises
-    ------
-    ModelError
-        where it is not what its kind promises.
-    """
-    law, faults = word.act(holding.scope, holding), []
-    title = f"'{word.name}' ({type(word).__name__}) of kind '{word.kind}'"
-    if not isinstance(law, Law):
-        raise ModelError([f"{title}: act(scope, hold) must return an mbd.constraints.Law, got {law!r}"])
-    closes = word.kind in ("unilateral", "penalty")
-    if closes != (law.contact is not None):
-        faults.append(f"{title} {'needs' if closes else 'acts at all times and takes no'} Law(contact=Closing(gap))")
-    if bool(law.rows) != (word.kind != "penalty"):
-        faults.append(f"{title} {'acts by a force: give push=, not rows' if law.rows else 'needs Law(rows=[…])'}")
-    if (law.push is None) != (word.kind != "penalty") or (law.drags and law.push is None):
-        faults.append(f"{title}: push= and drags= are the forces of laws of kind 'penalty', which need push=")
-    if holding.captured and not closes:
-        faults.append(f"{title} never closes, so that hold() has no instant; only laws with a contact hold values")
-    at = law.contact
-    if at is not None:
-        rules = ("gap", "pull") if word.kind == "penalty" else ("pull", "when")
-        if at.opens_on not in rules:
-            faults.append(f"{title}: opens_on is {' or '.join(map(repr, rules))}, got {at.opens_on!r}")
-        if word.kind == "penalty" and (at.releases or at.only_while is not None or at.restitution):
-            faults.append(f"{title}: releases, only_while and restitution serve contacts by rows; leave them out")
-        if not 0.0 <= at.restitution <= 1.0:
-            faults.append(f"{title}: restitution {at.restitution:g} is not between 0 and 1")
-    if faults:
-        raise ModelError(faults)
-    return law
-
-
 def _always(
     found: Laws, scope: DerivationScope, dynamics: Generalized, word: Constraint, contacts: Sequence[Constraint]
 ) -> None:
     """Rows that act at all times, or as long as another contact is closed."""
-    law = _law(word, _Holding(scope, 0))
+    law = law_of(word, Holding(scope, 0), contacts)
     numbers = [k for k, contact in enumerate(contacts) if contact.name == law.while_closed]
     number = numbers[0] if numbers else -1
     if number >= 0 and contacts[number].kind == "penalty":
@@ -192,10 +138,13 @@ def _idle(scope: DerivationScope, node: Node, title: str, kinds: set[str], unit:
     return [] if may_fold else [f"{title} is 0 whatever the motion, so it constrains nothing; remove it"]
 
 
-def _contact(found: Laws, scope: DerivationScope, dynamics: Generalized, word: Constraint, number: int) -> None:
+def _contact(
+    found: Laws, scope: DerivationScope, dynamics: Generalized, word: Constraint, number: int,
+    contacts: Sequence[Constraint],
+) -> None:  # fmt: skip
     """A law that closes and opens, by rows or by a force."""
-    holding = _Holding(scope, sum(len(contact.anchors) for contact in found.contacts))
-    law = _law(word, holding)
+    holding = Holding(scope, sum(len(contact.anchors) for contact in found.contacts))
+    law = law_of(word, holding, contacts)
     if law.contact is not None:
         by = _by_force if law.push is not None else _by_rows
         found.contacts.append(by(found, scope, dynamics, word, law, law.contact, holding, number))
@@ -203,7 +152,7 @@ def _contact(found: Laws, scope: DerivationScope, dynamics: Generalized, word: C
 
 def _by_rows(
     found: Laws, scope: DerivationScope, dynamics: Generalized, word: Constraint, law: Law, at: Closing,
-    holding: _Holding, number: int,
+    holding: Holding, number: int,
 ) -> Contact:  # fmt: skip
     """A normal row, and tangent rows that hold a place, or resist sliding up to a limit."""
     numbers = [_row(found, scope, word.name, row, number) for row in law.rows]
@@ -225,7 +174,7 @@ def _by_rows(
 
 def _by_force(
     found: Laws, scope: DerivationScope, dynamics: Generalized, word: Constraint, law: Law, at: Closing,
-    holding: _Holding, number: int,
+    holding: Holding, number: int,
 ) -> Contact:  # fmt: skip
     """A force law: −p ∂g/∂q on the left-hand side while it acts, −p ∂g/∂v where g is a velocity, and its drags."""
     lift, rest = scope.tape.lift, [scope.tape.zero] * len(scope.states)

@@ -234,6 +234,20 @@ WRONG = {
     "restitution": (
         "unilateral", lambda s, h: Law([Equation(height(s))], Closing(height(s), restitution=2.0)), "between 0 and 1",
     ),
+    "first row": (
+        "unilateral", lambda s, h: Law([Equation(s.named("p.x"), "normal")], Closing(height(s))), "its first row is",
+    ),
+    "unknown contact": (
+        "nonholonomic",
+        lambda s, h: Law([Equation(s.named("p.x.rate"), level="velocity")], while_closed="food"),
+        "no contact named 'food'",
+    ),
+    "crooked drag": (
+        "penalty",
+        lambda s, h: Law(contact=Closing(height(s)), push=1.0, drags=[Drag(s.named("p.x.rate") ** 2, 1.0)]),
+        "the velocity of its friction is not linear",
+    ),
+    "state": ("penalty", lambda s, h: Law(contact=Closing(height(s)), push=s.state("a", "b", 0.0)), "no first-order"),
     "held for ever": ("bilateral", lambda s, h: Law([Equation(height(s) - h([height(s)])[0])]), "never closes"),
     "gap that nothing moves": (
         "penalty", lambda s, h: Law(contact=Closing(s.tape.lift(1.0)), push=1.0), "the same whatever the motion",
