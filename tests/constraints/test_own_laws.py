@@ -232,7 +232,7 @@ WRONG = {
     ),
     "rule": ("penalty", lambda s, h: Law(contact=Closing(height(s), opens_on="when"), push=1.0), "opens_on is 'gap'"),
     "restitution": (
-        "unilateral", lambda s, h: Law([Equation(height(s))], Closing(height(s), restitution=2.0)), "between 0 and 1",
+        "unilateral", lambda s, h: Law([Equation(height(s))], Closing(height(s), restitution=-0.5)), "is negative",
     ),
     "first row": (
         "unilateral", lambda s, h: Law([Equation(s.named("p.x"), "normal")], Closing(height(s))), "its first row is",
