@@ -119,7 +119,7 @@ def between(run: mbd.Trajectory, model: mbd.Model, parameters: Mapping[str, floa
 
     Where the scheme's own interpolation is of low order, loops and constraints are left to its error, and forces may
     miss a fiftieth of what they are made of. Where a tolerance was asked for, it is what coordinates may be off, and so
-    what loops may miss; rates by as much in the time in which the mechanism moves by its own size.
+    what loops may miss; rates by as much in the time of a step.
     """
     time = run.time
     steps_of = np.flatnonzero(np.diff(time) > 0.0)
@@ -136,7 +136,8 @@ def between(run: mbd.Trajectory, model: mbd.Model, parameters: Mapping[str, floa
         try:
             bodies = Bodies(model, told)
             laws.places(found, bodies)
-            laws.closure(found, bodies, (1e-6 if precise else 1e-3) + 0.3 * tol, rates=precise)
+            h = np.diff(time)[np.searchsorted(time, times, side="right") - 1]
+            laws.closure(found, bodies, (1e-6 if precise else 1e-3) + 0.3 * tol, rates=precise, more=tol / h)
             laws.balance(found, bodies, loads(bodies), 1e-5 if precise else 0.02 + _unresolved(run, times))
             if precise:
                 laws.constraints(found, bodies, 1e-6)

@@ -152,7 +152,10 @@ def _step_there(made: Scene, run: mbd.Trajectory) -> list[str]:
 
 
 def _other_cut(made: Scene, run: mbd.Trajectory) -> list[str]:
-    """The same motion whichever joints are cut, within what half of the step changes."""
+    """The same motion whichever joints are cut, within what two thirds of the step change.
+
+    Half of it would change nothing in blows, whose steps are dt halved until they are short enough.
+    """
     others = [cut for cut in ("auto", *made.form.cuts) if cut != made.cut]
     if not others or run.settings["contact"] == "nonsmooth":
         return []
@@ -163,7 +166,7 @@ def _other_cut(made: Scene, run: mbd.Trajectory) -> list[str]:
     other_model = made.form.with_cut(cut)
     again = mbd.assemble(other_model, position=place, velocity=speed, parameters=made.parameters, project=True)
     changes: dict[str, Any] = (
-        {"dt": made.options["dt"] / 2.0} if "dt" in made.options else {"tol": made.options["tol"] / 4.0}
+        {"dt": made.options["dt"] / 1.5} if "dt" in made.options else {"tol": made.options["tol"] / 4.0}
     )
     other, finer = run_of(made, model=other_model, start=again), run_of(made, **changes)
     if not other.success or not finer.success or [e.name for e in finer.events] != [e.name for e in run.events]:
@@ -172,10 +175,10 @@ def _other_cut(made: Scene, run: mbd.Trajectory) -> list[str]:
     faults = [f"other cut: with {cut!r} {fault}" for fault in judge(other, other_model, made.parameters).faults]
     for name in names:
         a, b, c = (float(each[name][-1]) for each in (run, other, finer))
-        allowed = 20.0 * abs(a - c) + 1e-6 * (1.0 + abs(a)) + 30.0 * made.options.get("tol", 0.0)
-        if not abs(a - b) <= allowed + 20.0 * moved:
+        allowed = 27.0 * abs(a - c) + 1e-6 * (1.0 + abs(a)) + 30.0 * made.options.get("tol", 0.0)
+        if not abs(a - b) <= allowed + 27.0 * moved:
             faults.append(
-                f"other cut: with {cut!r} {name!r} ends at {b:.9g} instead of {a:.9g}, half of the step at {c:.9g}"
+                f"other cut: with {cut!r} {name!r} ends at {b:.9g} instead of {a:.9g}, with 2/3 of the step at {c:.9g}"
             )
     return faults
 
