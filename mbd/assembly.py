@@ -30,7 +30,7 @@ from mbd.posture import (
 )  # fmt: skip
 from mbd.state import State
 from mbd.trivial_rows import manager_of
-from mbd.turns import choose_turns, nearest_turns
+from mbd.turns import choose_turns, name_wrapped, nearest_turns
 
 __all__ = ["assemble", "undetermined"]
 
@@ -117,6 +117,7 @@ def assemble(
     bad = _closed(work, named, project, model) or undetermined(work) + _below(work, set(opened))
     if bad:
         raise AssemblyError(bad)
+    name_wrapped(work)
     return State(
         0.0, work.q, work.y[: equations.n_v].copy(), work.y[equations.n_v :].copy(), manager.mode(work.flags),
         _armed(work, set(opened)), work.anchors, tuple(coordinate.name for coordinate in equations.coordinates),

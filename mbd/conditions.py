@@ -61,6 +61,7 @@ def conditions(mechanism: Mechanism, values: Mapping[str, float], rates: bool) -
     kind, allowed = ("v", PLACES | {"v"}) if rates else ("x", PLACES)
     turns = {turn.name: turn.anchor for turn in equations.turns if turn.name}
     counts = {equations.tape.input("anchor", anchor).index for anchor in turns.values()}
+    wrapped = {turn.name for turn in equations.wrapped}
     inputs = [equations.tape.input(kind, k) for k in range(equations.n_v)]
     for name, target in values.items():
         node = _result(equations, f"{name}.rate") if rates else None  # 'pin.angle' of a cut joint means its rate
@@ -77,6 +78,7 @@ def conditions(mechanism: Mechanism, values: Mapping[str, float], rates: bool) -
         if function is None:
             function = scalar_function([node, *gradient(node, inputs)], mechanism.layout, "condition")
             mechanism.named[key] = function
-        periodic = not rates and name not in turns and name.rpartition(".")[2] in ("angle", "first", "second")
+        shown = name in wrapped or name not in turns  # by a rotation, modulo a turn
+        periodic = not rates and shown and name.rpartition(".")[2] in ("angle", "first", "second")
         found.append(Condition(name, float(target), periodic, function))
     return found, wrong

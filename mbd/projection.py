@@ -18,6 +18,7 @@ from mbd.posture import TOLERANCE, Posture, capture, close_nearby, close_velocit
 from mbd.simulation.arguments import fits
 from mbd.state import State, malformed
 from mbd.trivial_rows import manager_of
+from mbd.turns import keep_wrapped
 
 __all__ = ["project"]
 
@@ -73,10 +74,10 @@ def project(model: Any, state: State, parameters: Mapping[str, float] | None = N
     q, y = np.array(state.q, dtype=float), np.concatenate([state.v, state.z]).astype(float)
     given = np.array(state.anchors, dtype=float)
     anchors = given if len(given) == mechanism.layout.n_anchors else np.zeros(mechanism.layout.n_anchors)
-    work = Posture(
-        mechanism, manager, values, q.copy(), y.copy(), manager.flags(state.mode.closed), anchors, time=state.time
-    )
+    flags = manager.flags(state.mode.closed)
+    work = Posture(mechanism, manager, values, q.copy(), y.copy(), flags, anchors.copy(), time=state.time)
     _close(work)
+    keep_wrapped(work, q, anchors)
     moved = _moved(equations.coordinates, work.q - q) | _moved(
         equations.velocity_names, work.y[: equations.n_v] - y[: equations.n_v]
     )

@@ -18,7 +18,15 @@ from mbd.tape.derivatives import live
 if TYPE_CHECKING:
     from mbd.posture import Posture
 
-__all__ = ["choose_turns", "directed", "hold_directions", "nearest_turns", "whole_turns"]
+__all__ = [
+    "choose_turns",
+    "directed",
+    "hold_directions",
+    "keep_wrapped",
+    "name_wrapped",
+    "nearest_turns",
+    "whole_turns",
+]
 
 EDGE = 1e-9
 """An angle this near to −π [rad] is called π, so that round-off does not choose between the two."""
@@ -102,6 +110,26 @@ def _residuals(work: Posture, rows: Sequence[int]) -> Vector:
     terms = work.mechanism.acceleration_terms(work.time, work.q, work.y, work.parameters, work.anchors)
     picked = list(rows)
     return work.with_conditions(terms.h[picked], terms.B[picked][:, : work.equations.n_v], work.places)[0]
+
+
+def keep_wrapped(work: Posture, q: Vector, anchors: Vector) -> None:
+    """Let angles that only a rotation shows be next to what they are at `q`: they may have passed the end of a turn."""
+    if work.equations.wrapped:
+        before = _angles(work.mechanism, work.time, q, work.parameters, anchors)
+        now = _angles(work.mechanism, work.time, work.q, work.parameters, work.anchors)
+        for turn, old, new in zip(work.equations.turns, before, now, strict=True):
+            if turn.rate is not None:
+                work.anchors[turn.anchor] -= round(float(new - old) / (2.0 * math.pi))
+
+
+def name_wrapped(work: Posture) -> None:
+    """Turns of angles that only a rotation shows: next to their named values, else between −π and π."""
+    if work.equations.wrapped:
+        targets = {condition.name: condition.target for condition in work.places}
+        angles = _angles(work.mechanism, work.time, work.q, work.parameters, work.anchors)
+        for turn, angle in zip(work.equations.turns, angles, strict=True):
+            if turn.rate is not None:
+                work.anchors[turn.anchor] -= whole_turns(float(angle) - targets.get(turn.name, 0.0))
 
 
 def nearest_turns(work: Posture, rows: Sequence[int], held: Collection[int], tolerance: float) -> None:

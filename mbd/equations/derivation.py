@@ -64,6 +64,8 @@ def _derived(model: Model, plan: Plan, carried: Sequence[tuple[str, int]] = ()) 
     scope.offer_frames(model.frames.values())
     if plan.planar and plan.cut:
         scope.count_turns(anchors_held(scope, model.contacts))
+    elif plan.cut:
+        scope.count_turns_in_space(anchors_held(scope, model.contacts))
     moving = list(scope.bodies.values())
     vectors = all(joint.is_vector for joint in plan.edges)
     masses = {body.body.name: body.body.mass_properties(scope) for body in moving}
@@ -93,7 +95,7 @@ def _derived(model: Model, plan: Plan, carried: Sequence[tuple[str, int]] = ()) 
         velocity_names=tuple(f"{coordinate.name}.rate" for coordinate in scope.coordinates), notes=plan.notes,
         figure=figure_of(model),
         geometry=TreeGeometry(scope, dynamics, work, rests, constraints, plan.planar and vectors and not carried),
-        frictions=tuple(constraints.frictions), turns=tuple(scope.turns.values()),
+        frictions=tuple(constraints.frictions), turns=(*scope.turns.values(), *scope.wrapped.values()),
         facings=_facings(scope, constraints),
     )  # fmt: skip
     seen = () if carried else _wrapped(scope, equations, model)

@@ -161,11 +161,15 @@ class Turn:
     number n is a constant of the motion, since the angle is continuous: which of the angles that give the same pose is
     meant. The start chooses it.
 
+    The angle of a cut joint in space on which no equation depends is read off a rotation, modulo a turn; its n changes
+    as it turns, and is counted from row to row by its rate.
+
     name : of the coordinate, 'knee.angle'; '' for a joint that does not turn, whose row is the angle
     joint : name of the joint
     anchor : number of the anchor that holds n
     angle : on the tape [rad]
     sign : ±1, so that one more turn changes the angle by 2π · sign
+    rate : of an angle that is read off a rotation [rad/s]; None in the plane, where n is constant
     """
 
     name: str
@@ -173,6 +177,7 @@ class Turn:
     anchor: int
     angle: Node
     sign: float
+    rate: Node | None = None
 
 
 @dataclass(frozen=True)
@@ -269,7 +274,7 @@ class Equations:
     kinetic, potential : T and V; V includes gravity and every effect with a potential
     output : any named result as a node ('left hip.angle', 'left shank.end.x', 'left knee.reaction_force.x', …)
     output_names : the names that `output` certainly knows
-    turns : of the planar cut joints, see `Turn`
+    turns : of the cut joints, see `Turn`
     facings : of the cut joints whose rows hold sines, see `Facing`
     idle : (owner, part) of rows of cut joints that hold whatever the motion, and were left out
     memory : what follows from the rest, kept once it was found
@@ -316,6 +321,11 @@ class Equations:
     def n_anchors(self) -> int:
         """Values that contacts hold, followed by the whole turns of cut joints."""
         return sum(len(contact.anchors) for contact in self.contacts) + len(self.turns)
+
+    @property
+    def wrapped(self) -> tuple[Turn, ...]:
+        """The turns that are counted along the motion."""
+        return tuple(turn for turn in self.turns if turn.rate is not None)
 
     @property
     def tables(self) -> list[Table]:

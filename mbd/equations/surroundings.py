@@ -53,6 +53,7 @@ class Surroundings:
     placement : everything in ground axes
     quantities : named results that words may ask for
     turns : of the cut joints of a planar mechanism, by joint
+    wrapped : of angles of cut joints that only a rotation shows, by joint and number
     """
 
     def __init__(
@@ -84,6 +85,7 @@ class Surroundings:
         self.views = Views(self.placement, self.composed, planar)
         self.quantities = Outputs(self.tape)
         self.turns: dict[str, Turn] = {}
+        self.wrapped: dict[tuple[str, int], Turn] = {}
         self._angles: dict[str, tuple[int, Scalar]] = {}
         self._offer_quantities()
 
@@ -249,6 +251,23 @@ class Surroundings:
             self._angles[joint.name] = (place, angle)
             self.turns[joint.name] = Turn(name, joint.name, anchor, self.real(angle), sign)
 
+    def count_turns_in_space(self, first: int) -> None:
+        """Give results the whole turns of angles that only a rotation shows.
+
+        Parameters
+        ----------
+        first : number of the first anchor that is free to hold whole turns
+        """
+        for joint in self.cuts:
+            motion = self.joint(joint.name) if joint.labels and joint.is_vector else JointMotion((), ())
+            for k, value in enumerate(motion.coordinates):
+                node = self.real(value)
+                if joint.labels[k].unit == "rad" and any(each.op == "atan2" for each in live([node])):
+                    anchor = first + len(self.wrapped)
+                    angle = node + (2.0 * math.pi) * self.tape.input("anchor", anchor)
+                    name, rate = joint.coordinate_names[k], self.real(motion.rates[k])
+                    self.wrapped[joint.name, k] = Turn(name, joint.name, anchor, angle, 1.0, rate)
+
     def _holds_points(self, joint: Joint) -> bool:
         """Whether the rows that depend on p are its three components."""
         R, p = placeholders(self.tape)
@@ -303,7 +322,8 @@ class Surroundings:
                 self.quantities.add(f"{joint.name}.rate", partial(self._rate, joint.name, 0))
 
     def _coordinate(self, joint: str, place: int) -> Scalar:
-        return self.joint(joint).coordinates[place]
+        value, turn = self.joint(joint).coordinates[place], self.wrapped.get((joint, place))
+        return value if turn is None else value + (2.0 * math.pi) * self.tape.input("anchor", turn.anchor)
 
     def _rate(self, joint: str, place: int) -> Scalar:
         return self.joint(joint).rates[place]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +19,7 @@ from mbd.results.forces import Forces
 from mbd.results.interpolation import Grid, Places
 from mbd.results.names import AXES, rate_name
 from mbd.results.record import Record, Rows
+from mbd.results.turning import counted, doubtful, function_of, turns_to
 
 if TYPE_CHECKING:
     from mbd.equations.equations import Equations
@@ -154,6 +156,9 @@ class ModelColumns(Columns):
 
         forces : whether accelerations, ż and multipliers count, which then come from the balance of forces
         """
+        return self._turned(self._between(places, forces), places)
+
+    def _between(self, places: Places, forces: bool) -> Rows:
         if self._steps is None and Restepping.serves(self):
             self._steps = Restepping(self)
         if self._steps is not None:
@@ -232,7 +237,37 @@ class ModelColumns(Columns):
                     captured[0] = self.record.start.anchors[list(contact.anchors)]
                 held[np.ix_(closed, np.array(contact.anchors))] = captured[np.cumsum(fresh)[closed] - 1]
             self._anchors = held
+            wrapped = self.equations.wrapped
+            for turn, (angle, rate) in zip(wrapped, self._turning(self.record.rows(held)), strict=True):
+                held[:, turn.anchor] += counted(self.record.time, angle, rate)
         return self._anchors
+
+    def _turning(self, rows: Rows) -> list[tuple[Vector, Vector]]:
+        """Angle and rate of every cut joint whose turns are counted along the motion."""
+        wrapped = self.equations.wrapped
+        if not wrapped:
+            return []
+        found = function_of(wrapped)(self.inputs(rows), self.record.parameters_at(rows.source))
+        return list(zip(found[::2], found[1::2], strict=True))
+
+    def doubtful_turns(self) -> list[tuple[str, float]]:
+        """(name, time) of angles of cut joints whose turns are a guess from some row on."""
+        found = []
+        for turn, (angle, rate) in zip(self.equations.wrapped, self._turning(self.rows), strict=True):
+            doubts = np.flatnonzero(doubtful(self.record.time, angle, rate))
+            if len(doubts):
+                found.append((turn.name, float(self.record.time[doubts[0]])))
+        return found
+
+    def _turned(self, found: Rows, places: Places) -> Rows:
+        """States between the rows with the turns made there."""
+        if not self.equations.wrapped:
+            return found
+        anchors = found.anchors.copy()
+        ends, inside = self._turning(self.rows), self._turning(found)
+        for turn, (angle, rate), (shown, _) in zip(self.equations.wrapped, ends, inside, strict=True):
+            anchors[:, turn.anchor] += turns_to(shown, places.blend(angle, rate))
+        return replace(found, anchors=anchors)
 
     def identity(self, name: str) -> tuple[Alias | None, Hashable]:
         node = self.node(name)

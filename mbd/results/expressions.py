@@ -55,6 +55,13 @@ class _Friction:
 
 
 @dataclass(frozen=True, eq=False)
+class _Wrapped:
+    anchor: int
+    angle: Node
+    rate: Node
+
+
+@dataclass(frozen=True, eq=False)
 class Expressions:
     """What results read of `mbd.equations.Equations`, made from a file; coordinates add (q ⊕ x = q + x) or are given.
 
@@ -72,6 +79,7 @@ class Expressions:
     terms: tuple[Node, ...]
     adds: bool
     parameters: tuple[Any, ...] = ()
+    wrapped: tuple[_Wrapped, ...] = ()
 
     @property
     def balance(self) -> tuple[Node, ...]:
@@ -99,7 +107,8 @@ def write_expressions(equations: Any, nodes: Mapping[str, Node], arrays: Arrays)
         terms: Sequence[Node] = equations.terms if own else ()
         if not own and Balance.serves(equations):
             terms = programs.accelerations(equations)
-        order = live([*nodes.values(), *terms])
+        turning = [node for turn in equations.wrapped for node in (turn.angle, turn.rate)]
+        order = live([*nodes.values(), *terms, *turning])
     place = {node.index: k for k, node in enumerate(order)}
     tables = list({node.data[0].index: node.data[0] for node in order if node.op == "table"}.values())
     where = {table.index: k for k, table in enumerate(tables)}
@@ -124,6 +133,7 @@ def write_expressions(equations: Any, nodes: Mapping[str, Node], arrays: Arrays)
         "contacts": [list(contact.anchors) for contact in equations.contacts],
         "frictions": [[friction.contact, friction.row] for friction in equations.frictions],
         "adds": equations.compose is None,
+        "wrapped": [[turn.anchor, place[turn.angle.index], place[turn.rate.index]] for turn in equations.wrapped],
     }  # fmt: skip
 
 
@@ -153,6 +163,8 @@ def arrays_of_expressions(words: Any, members: Members) -> set[str]:
     for held in words["contacts"]:
         for place in of_kind(held, list, what):
             expect(0 <= of_kind(place, int, what) < anchors, what)
+    wrapped = words.get("wrapped", [])  # older files have none
+    _indices(wrapped, len(of_kind(wrapped, list, what)), ((0, anchors), (0, count), (0, count)), what)
     n = v + z
     wanted = n * n + n + 2 * n * rows + 3 * rows + anchors + 1 + frictions
     expect(members.head("graph terms").shape in ((0,), (wanted,)), "'graph terms'")
@@ -193,7 +205,8 @@ def read_expressions(words: Mapping[str, Any], arrays: Mapping[str, Any], parame
         tape, sizes["q"], sizes["v"], sizes["z"], tuple(_Row(*row) for row in rows),
         tuple(_Contact(tuple(held)) for held in contacts), tuple(_Friction(*friction) for friction in frictions),
         {name: nodes[k] for name, k in zip(words["names"], outputs, strict=True)}, tuple(nodes[k] for k in terms),
-        words["adds"],
+        words["adds"], (),
+        tuple(_Wrapped(anchor, nodes[angle], nodes[rate]) for anchor, angle, rate in words.get("wrapped", ())),
     )  # fmt: skip
 
 

@@ -27,6 +27,7 @@ OPTIONS = ("dt", "tol", "allowed", "longest", "contact", "impact", "locate", "re
 def memory_of(run: Run, time: float) -> Memory:
     """The memory of the accepted state, which must be settled; `time` is what its state says."""
     stepper = run.stepper
+    run.turns.count(run)
     parameters, reals, integers = run.values["params"].copy(), stepper.reals.copy(), stepper.integers.copy()
     place = _place(run)
     for array in (parameters, reals, integers, place):

@@ -113,6 +113,7 @@ def notes_of(run: Run, record: Record) -> tuple[list[str], list[str]]:
             "motion; use a smaller dt, or tol="
         )
     notes += unresolved_turns(run, record)
+    notes += _uncounted(run, record)
     for number, contact in enumerate(run.manager.contacts):
         short, blind = _short_touch(run, record, number, contact)
         notes += _ignored(run, number, contact) + _overshot(run, record, contact) + short
@@ -129,6 +130,15 @@ def _left_singular(run: Run) -> bool:
     return any(
         row in held and held.issuperset(on) and not v["dropped"][row] for row, on in run.stepper.dependent.items()
     )
+
+
+def _uncounted(run: Run, record: Record) -> list[str]:
+    """The note on angles of cut joints in space that may have made more turns than their rates at the rows tell."""
+    if not run.mechanism.equations.wrapped:
+        return []
+    found = ModelColumns(record, run.mechanism.equations).doubtful_turns()
+    told = ", ".join(f"{name!r} after t = {time:.6g} s" for name, time in found)
+    return [f"whole turns are a guess of {told}: store more rows, take a smaller dt, or do not cut it"] if found else []
 
 
 def _energy_lost(run: Run, record: Record) -> list[str]:

@@ -36,6 +36,7 @@ from mbd.simulation.singular import at_singular_configuration
 from mbd.simulation.stepper import Stepper
 from mbd.simulation.stored import whole_record
 from mbd.simulation.turning import overturned
+from mbd.simulation.whole_turns import TurnCounter
 from mbd.state import State
 from mbd.trajectory import EventRecord, Trajectory
 
@@ -113,6 +114,7 @@ class Run:
         self.observers: Sequence[Callable[[float, State], None]] = ()
         self.progress: Callable[[float, float], None] | None = None
         controllers, instants = getattr(model, "controllers", ()), getattr(model, "instants", ())
+        self.turns = TurnCounter()
         self.boundaries = Boundaries(controllers, instants, start.time, dt, end)
         self.damage = ""  # of the memory of the start
         self.resumed = take_up(self, start)
@@ -389,6 +391,7 @@ class Run:
     # the result ---------------------------------------------------------------------------------------------------
     def state(self) -> State:
         """The accepted state."""
+        self.turns.count(self)
         v = self.values
         names = np.array(self.manager.names)
         armed = frozenset(str(name) for name in names[v["armed"][: len(names)] == 1])

@@ -65,3 +65,64 @@ def test_an_angle_that_nothing_depends_on_costs_no_coordinate():
     driven.connect(*shafts(["drive"], sees=False).joints)
     driven.constrain(mbd.Bilateral("turned", driven.joints[0], value=lambda t: 2.0 * t))
     assert len(derive(driven).coordinates) == 6
+
+
+def test_results_count_turns_of_angles_that_nothing_depends_on_as_if_another_joint_were_cut():
+    found = []
+    for cut in ["first"], ["output"]:
+        model = shafts(cut, sees=False)
+        named = {"drive.angle": 7.0, "output.angle": OUTPUT}
+        start = mbd.assemble(model, position=named, velocity={"drive.angle": 12.0})
+        found.append(mbd.simulate(model, start, mbd.HHT(), dt=8e-3, until=0.7, backend="python"))
+    whole, run = found
+    assert whole["output.angle"][-1] > whole["output.angle"][0] + 2.0 * np.pi
+    times = np.linspace(0.0, 0.7, 57)
+    np.testing.assert_allclose(run["output.angle"], whole["output.angle"], atol=0.02)
+    np.testing.assert_allclose(run.at(times)["output.angle"], whole.at(times)["output.angle"], atol=0.02)
+
+
+def spindle(torque=0.0):
+    """A hinge and a sleeve on one axis; the angle of the hinge is a mere result."""
+    model = mbd.Model("spindle", gravity=(0.0, 0.0, 0.0), cut=["hinge"])
+    shaft = mbd.RigidBody("shaft", mass=1.0, inertia=(0.1, 0.1, 0.1))
+    model.connect(
+        mbd.Revolute("hinge", model.ground.origin, shaft.origin, axis=(0.6, 0.0, 0.8)),
+        mbd.Cylindrical("sleeve", model.ground.origin, shaft.origin, axis=(0.6, 0.0, 0.8)),
+    )
+    model.apply(mbd.Potential("spring", lambda q: 0.5 * torque * q * q, arguments=("sleeve.angle",)))
+    return model
+
+
+def spun(model, until, start=None, **settings):
+    if start is None:
+        start = mbd.assemble(model, position={"hinge.angle": 20.0}, velocity={"sleeve.angle": 30.0})
+    return mbd.simulate(model, start, mbd.HHT(), dt=0.01, until=until, backend="python", **settings)
+
+
+def test_counted_turns_are_kept_between_rows_in_files_and_in_the_states_from_which_a_run_goes_on(tmp_path):
+    model = spindle()
+    run = spun(model, 1.0)
+    np.testing.assert_allclose(run["hinge.angle"], 20.0 + 30.0 * run.time, rtol=1e-9)
+    times = np.linspace(0.0, 1.0, 333)
+    np.testing.assert_allclose(run.at(times)["hinge.angle"], 20.0 + 30.0 * times, rtol=1e-9)
+    run.save(tmp_path / "run.mbd")
+    read = mbd.load(tmp_path / "run.mbd")
+    assert np.array_equal(read["hinge.angle"], run["hinge.angle"])
+    assert np.array_equal(read.at(times)["hinge.angle"], run.at(times)["hinge.angle"])
+    half = spun(model, 0.5)
+    rest = spun(model, 1.0, half.final)
+    assert rest["hinge.angle"][0] == half["hinge.angle"][-1]
+    assert rest["hinge.angle"][-1] == run["hinge.angle"][-1]
+    assert np.array_equal(rest.final.anchors, run.final.anchors)
+    seen = []
+    spun(model, 1.0, observers=[lambda t, state: seen.append(20.0 + 30.0 * t - 2.0 * np.pi * state.anchors[0])])
+    assert np.all(np.abs(seen) <= np.pi + 1e-9)
+
+
+def test_turns_between_rows_too_far_apart_are_told_to_be_a_guess():
+    """A shaft that swings by three turns three times a second, stored six times a second."""
+    model = spindle(torque=40.0)
+    start = mbd.assemble(model, velocity={"sleeve.angle": 200.0})
+    notes = [spun(model, 1.0, start, **settings).stats["notes"] for settings in ({}, {"store": 17})]
+    told = [any("whole turns are a guess of 'hinge.angle'" in note for note in each) for each in notes]
+    assert told == [False, True]

@@ -82,10 +82,10 @@ def reduced(scene: Scene, run: Trajectory, names: Iterable[str], backend: str) -
 def _anchors(equations: Equations, whole: Equations, start: State) -> Any:
     """What the contacts that are left hold, and the whole turns of cut joints."""
     held = np.zeros(equations.n_anchors)
-    counted = {turn.joint: turn.anchor for turn in whole.turns}
+    counted = {(turn.joint, turn.name): turn.anchor for turn in whole.turns}
     for turn in equations.turns:
-        if len(start.anchors) and turn.joint in counted:
-            held[turn.anchor] = start.anchors[counted[turn.joint]]
+        if len(start.anchors) and (turn.joint, turn.name) in counted:
+            held[turn.anchor] = start.anchors[counted[turn.joint, turn.name]]
     known = {contact.name: contact.anchors for contact in whole.contacts}
     for contact in equations.contacts:
         places = known.get(contact.name, ())
