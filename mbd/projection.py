@@ -9,15 +9,12 @@ from typing import Any
 import numpy as np
 
 from mbd.arrays import Vector
-from mbd.bodies.values import named_number_faults
-from mbd.compile.mechanisms import mechanism_of
 from mbd.consistency import residuals, violations
-from mbd.errors import AssemblyError, ModelError
+from mbd.errors import AssemblyError
 from mbd.facings import reversed_joints
 from mbd.posture import TOLERANCE, Posture, capture, close_nearby, close_velocities, position_rows
-from mbd.simulation.arguments import fits
-from mbd.state import State, malformed
-from mbd.trivial_rows import manager_of
+from mbd.simulation.given_state import given_state
+from mbd.state import State
 from mbd.turns import keep_wrapped
 
 __all__ = ["project"]
@@ -61,19 +58,12 @@ def project(model: Any, state: State, parameters: Mapping[str, float] | None = N
     >>> print(f"{faster['place.x.rate']:.2f} {faster['place.y.rate']:.2f}")
     0.64 0.48
     """
-    if not isinstance(state, State):
-        raise ModelError(f"state must be a State from mbd.assemble(model, …), not {state!r}")
-    faults = malformed(state) + named_number_faults(parameters, "parameters")
-    if faults:
-        raise ModelError(faults)
-    changed = {**state.parameters, **(parameters or {})}
-    mechanism = mechanism_of(model, backend, changed)
-    equations, values = mechanism.equations, mechanism.parameters(changed, model.parameters)
-    manager = manager_of(mechanism, values)
-    fits(state, equations, manager)
+    given = given_state(model, state, parameters, backend)
+    mechanism, manager, values = given.mechanism, given.manager, given.values
+    equations = mechanism.equations
     q, y = np.array(state.q, dtype=float), np.concatenate([state.v, state.z]).astype(float)
-    given = np.array(state.anchors, dtype=float)
-    anchors = given if len(given) == mechanism.layout.n_anchors else np.zeros(mechanism.layout.n_anchors)
+    anchors = np.array(state.anchors, dtype=float)
+    anchors = anchors if len(anchors) == mechanism.layout.n_anchors else np.zeros(mechanism.layout.n_anchors)
     flags = manager.flags(state.mode.closed)
     work = Posture(mechanism, manager, values, q.copy(), y.copy(), flags, anchors.copy(), time=state.time)
     _close(work)
@@ -83,7 +73,7 @@ def project(model: Any, state: State, parameters: Mapping[str, float] | None = N
     )
     return replace(
         state, q=work.q, v=work.y[: equations.n_v].copy(), z=work.y[equations.n_v :].copy(), anchors=work.anchors,
-        moved=moved, parameters=changed, memory=None,
+        moved=moved, parameters=given.changed, memory=None,
     )  # fmt: skip
 
 

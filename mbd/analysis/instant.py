@@ -9,9 +9,7 @@ from typing import Any
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
-from mbd.bodies.values import named_number_faults
 from mbd.compile.mechanism import Mechanism
-from mbd.compile.mechanisms import mechanism_of
 from mbd.compile.python import scalar_function
 from mbd.consistency import residuals, violations
 from mbd.equations.equations import Row
@@ -22,12 +20,11 @@ from mbd.kernel import fields as F
 from mbd.kernel.redundancy import find_dependent, sharing, spread
 from mbd.kernel.restart import active_rows
 from mbd.kernel.settle import settle
-from mbd.simulation.arguments import fits
+from mbd.simulation.given_state import given_state
 from mbd.simulation.plain import MechanismSystem
 from mbd.simulation.shares import shares
 from mbd.simulation.stepper import Stepper
-from mbd.state import State, malformed
-from mbd.trivial_rows import manager_of
+from mbd.state import State
 
 __all__ = ["Instant", "instant"]
 
@@ -126,16 +123,8 @@ def instant(model: Any, state: State, parameters: Mapping[str, float] | None = N
     ModelError
         if the state is that of another model, is not consistent, or closes a contact that would pull there.
     """
-    if not isinstance(state, State):
-        raise ModelError(f"state must be a State from mbd.assemble(model, …), not {state!r}")
-    faults = malformed(state) + named_number_faults(parameters, "parameters")
-    if faults:
-        raise ModelError(faults)
-    changed = {**state.parameters, **(parameters or {})}
-    mechanism = mechanism_of(model, backend, changed)
-    values = mechanism.parameters(changed, getattr(model, "parameters", {}))
-    manager = manager_of(mechanism, values)
-    fits(state, mechanism.equations, manager)
+    given = given_state(model, state, parameters, backend)
+    mechanism, manager, values = given.mechanism, given.manager, given.values
     stepper = Stepper(mechanism, manager, HHT(), values, 1.0, {"capacity": 1})
     K, flags = _kernel(stepper, state), manager.flags(state.mode.closed)
     with np.errstate(all="ignore"):

@@ -9,13 +9,12 @@ from typing import NoReturn
 from mbd.bodies.base import Frame
 from mbd.equations.dynamics import Work
 from mbd.equations.equations import Coordinate
-from mbd.equations.inputs import Inputs
-from mbd.equations.parameters import ParameterTable
+from mbd.equations.parameter_scope import ParameterScope
 from mbd.equations.views import View
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.joints.base import Joint
 from mbd.tape.derivatives import jvp, vjp
-from mbd.tape.node import Node, Scalar, Table, Tape
+from mbd.tape.node import Node, Scalar
 
 __all__ = ["CoordinateScope", "identifier"]
 
@@ -38,7 +37,7 @@ class _NoViews:
         return {}
 
 
-class CoordinateScope:
+class CoordinateScope(ParameterScope):
     """`mbd.equations.derivation_scope.DerivationScope` over coordinates that form a vector; forces act on these.
 
     Parameters
@@ -55,13 +54,10 @@ class CoordinateScope:
     """
 
     def __init__(self, coordinates: Sequence[str], values: Mapping[str, float], tunable: Collection[str]) -> None:
-        self.tape = Tape()
-        self.inputs = Inputs.sized(self.tape, len(coordinates), len(coordinates))
-        self.parameters = ParameterTable(self.tape, tunable)
+        super().__init__(len(coordinates), tunable)
         self.views = _NoViews()
         self.cuts: tuple[Joint, ...] = ()
         self.states: list[tuple[Coordinate, Node]] = []
-        self._tables: dict[str, Table] = {}
         self.q = [q + x for q, x in zip(self.inputs.q, self.inputs.x, strict=True)]
         self.known: dict[str, Scalar] = {"t": self.inputs.t}
         for name, q, v in zip(coordinates, self.q, self.inputs.v, strict=True):
@@ -71,21 +67,6 @@ class CoordinateScope:
         self._spelled |= {f"{name}.rate": f"{name}_rate" for name in coordinates}
 
     # what words ask -------------------------------------------------------------------------------------------------
-    @property
-    def time(self) -> Node:
-        """t [s]."""
-        return self.inputs.t
-
-    def parameter(self, owner: str, field: str, value: float) -> Node:
-        """The run-time input named ``owner.field``."""
-        return self.parameters.node(f"{owner}.{field}", value)
-
-    def table(self, owner: str, breaks: Sequence[float], coefficients: Sequence[Sequence[float]]) -> Table:
-        """A piecewise cubic, one for each owner."""
-        if owner not in self._tables:
-            self._tables[owner] = self.tape.table(owner, breaks, coefficients)
-        return self._tables[owner]
-
     def frame(self, frame: Frame) -> NoReturn:
         """There are none."""
         raise ModelError(f"a Lagrangian has no bodies, and no frame '{frame.full_name}'; use its coordinates")

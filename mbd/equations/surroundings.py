@@ -12,10 +12,9 @@ from mbd.bodies.values import Vector3
 from mbd.equations import changes
 from mbd.equations.equations import Coordinate, Turn
 from mbd.equations.headings import Headings, direction, spin
-from mbd.equations.inputs import Inputs
 from mbd.equations.kinematics import Edge, Moving, ground_motion, moving_body
 from mbd.equations.outputs import AXES, Outputs
-from mbd.equations.parameters import ParameterTable
+from mbd.equations.parameter_scope import ParameterScope
 from mbd.equations.placement import Placement
 from mbd.equations.views import Views
 from mbd.errors import UnknownNameError, nearest
@@ -23,7 +22,7 @@ from mbd.joints.base import Joint, row_unit
 from mbd.scope import FrameMotion, JointMotion, Rotation, Triple
 from mbd.tape.derivatives import jvp, live
 from mbd.tape.functions import sin
-from mbd.tape.node import Node, Scalar, Table, Tape
+from mbd.tape.node import Node, Scalar, Tape
 
 __all__ = ["Surroundings", "placeholders"]
 
@@ -34,7 +33,7 @@ def placeholders(tape: Tape) -> tuple[Rotation, Triple]:
     return ((a, b, c), (d, e, f), (g, h, i)), (x, y, z)
 
 
-class Surroundings:
+class Surroundings(ParameterScope):
     """`mbd.scope.Scope` over a spanning tree; words see places and velocities as views, which `real` resolves.
 
     Parameters
@@ -66,16 +65,13 @@ class Surroundings:
         planar: bool,
         carried: Sequence[tuple[str, int]] = (),
     ) -> None:
-        self.tape = Tape()
-        self.parameters = ParameterTable(self.tape, tunable)
         self.tree, self.cuts = tuple(tree), tuple(cuts)
         size = sum(len(joint.labels) for joint in tree)
         self.carried = {key: size + k for k, key in enumerate(carried)}
         size += len(self.carried)
-        self.inputs = Inputs.sized(self.tape, size, size)
+        super().__init__(size, tunable)
         self.gravity = tuple(self.parameters.node(f"gravity.{a}", g) for a, g in zip(AXES, gravity, strict=True))
         self.states: list[tuple[Coordinate, Node]] = []
-        self._tables: dict[str, Table] = {}
         self._joints: dict[str, JointMotion] = {}
         self.bodies = self._grown(ground)
         values = [node for joint in tree for node in self._tree_motion(joint).coordinates]
@@ -129,21 +125,6 @@ class Surroundings:
         return [self.tape.lift(value) for value in joint.recover(*self.relative(joint), self)]
 
     # what words ask -------------------------------------------------------------------------------------------------
-    @property
-    def time(self) -> Node:
-        """t [s]."""
-        return self.inputs.t
-
-    def parameter(self, owner: str, field: str, value: float) -> Node:
-        """The run-time input named ``owner.field``."""
-        return self.parameters.node(f"{owner}.{field}", value)
-
-    def table(self, owner: str, breaks: Sequence[float], coefficients: Sequence[Sequence[float]]) -> Table:
-        """A piecewise cubic, one for each owner."""
-        if owner not in self._tables:
-            self._tables[owner] = self.tape.table(owner, breaks, coefficients)
-        return self._tables[owner]
-
     def frame(self, frame: Frame) -> FrameMotion:
         """Motion of a frame, in ground axes."""
         body = self._body(frame.body.name)

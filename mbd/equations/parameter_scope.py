@@ -1,0 +1,42 @@
+"""What every derivation offers to words, with bodies or without: the time, parameters, tables."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+from mbd.equations.inputs import Inputs
+from mbd.equations.parameters import ParameterTable
+from mbd.tape.node import Node, Table, Tape
+
+__all__ = ["ParameterScope"]
+
+
+class ParameterScope:
+    """A tape with the inputs of the equations and the run-time parameters.
+
+    Parameters
+    ----------
+    size : generalized coordinates
+    tunable : names of parameters that stay inputs even at an exact 0 or ±1
+    """
+
+    def __init__(self, size: int, tunable: Collection[str]) -> None:
+        self.tape = Tape()
+        self.inputs = Inputs.sized(self.tape, size, size)
+        self.parameters = ParameterTable(self.tape, tunable)
+        self._tables: dict[str, Table] = {}
+
+    @property
+    def time(self) -> Node:
+        """t [s]."""
+        return self.inputs.t
+
+    def parameter(self, owner: str, field: str, value: float) -> Node:
+        """The run-time input named ``owner.field``."""
+        return self.parameters.node(f"{owner}.{field}", value)
+
+    def table(self, owner: str, breaks: Sequence[float], coefficients: Sequence[Sequence[float]]) -> Table:
+        """A piecewise cubic, one for each owner."""
+        if owner not in self._tables:
+            self._tables[owner] = self.tape.table(owner, breaks, coefficients)
+        return self._tables[owner]
