@@ -8,7 +8,7 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.kernel.pairs import WHOLE, is_of_pair
-from mbd.kernel.passage import CONTINUOUS, FORESEEN, NEAREST, WITHIN
+from mbd.kernel.passage import CONTINUOUS, FORESEEN, NEAREST, VANISHING, WITHIN
 
 __all__ = ["CONTINUOUS", "WHOLE", "WITHIN", "Distance", "distance_to_pose"]
 
@@ -48,7 +48,13 @@ def distance_to_pose(B: Matrix, turning: Matrix, mass: Vector, v: Vector, scale:
     around = [_leftovers((rows + ahead * turns) / lengths[:, None], order)[1] for ahead in (-dt, dt)]
     change = np.max([np.abs(left - here) for left in around], axis=0)
     steps = here / (change + 1e-300)
-    k = int(np.argmin(steps))
+    k, near = int(np.argmin(steps)), float(np.min(steps))
+    if NEAREST < near < WITHIN + 2.0:  # a row that turns with others changes but does not vanish
+        there = [
+            _leftovers((rows + ahead * turns) / lengths[:, None], order)[1][k] for ahead in (-near * dt, near * dt)
+        ]
+        if min(there) > VANISHING * here[k]:
+            return Distance(1e300, 0.0)
     across = 4.0 * EPS * scale[order[k]] / (here[k] * lengths[order[k]] + 1e-300)
     return Distance(float(steps[k]), float(across / (dt * np.sqrt(mass @ v**2) + 1e-300)))
 

@@ -59,6 +59,8 @@ NEAREST = 0.2
 """Steps from a pose of lost rank below which no step ends where round-off of h makes too much of velocities [-]."""
 FORESEEN = 0.25
 """The same, of the end of a step still to come: more, since how far the pose is then is only estimated [-]."""
+VANISHING = 0.5
+"""What is left of a row where it should vanish, over what is left of it now: more, and no pose is there [-]."""
 CONTINUOUS = 0.05
 """Part of the speed by which a step near such a pose may differ from its prediction: the branch goes on in v [-]."""
 
@@ -89,6 +91,8 @@ def steps_of_fall(K: Any, m: int, straight: bool) -> float:
 def steps_to_pose(K: Any, m: int, h: float, ratio: float, straight: bool) -> float:
     """Steps of size h until a row of B depends on the others: how far it is from that, over what a step changes of it.
 
+    1e300 where the row does not vanish there: it turns, and others with it.
+
     K.out holds the diagonal of S and H = B + ratio ∂ḣ/∂x, in the tangent or, of straight-line code, behind the shift;
     K.turning holds ∂ḣ/∂x, which is the rate of B. K.detail[KICK] tells what round-off of that row makes of velocities,
     over the speed, in a whole step that holds positions.
@@ -104,26 +108,40 @@ def steps_to_pose(K: Any, m: int, h: float, ratio: float, straight: bool) -> flo
         for k in range(m * K.n_v):
             K.turning[k] = K.out[K.n + 2 * m + k]
     stride = 1 if straight else size + 1
-    if order_at(K, m) > 0:
-        leftovers_of_many(K, m, h, ratio, 0.0, 0, o_S, stride, o_H, width)
-        leftovers_of_many(K, m, h, ratio, -h, m, o_S, stride, o_H, width)
-        leftovers_of_many(K, m, h, ratio, h, 2 * m, o_S, stride, o_H, width)
-    else:
-        leftovers(K, m, h, ratio, 0.0, 0, o_S, stride, o_H, width)
-        leftovers(K, m, h, ratio, -h, m, o_S, stride, o_H, width)
-        leftovers(K, m, h, ratio, h, 2 * m, o_S, stride, o_H, width)
+    find_leftovers(K, m, h, ratio, 0.0, 0, o_S, stride, o_H, width)
+    find_leftovers(K, m, h, ratio, -h, m, o_S, stride, o_H, width)
+    find_leftovers(K, m, h, ratio, h, 2 * m, o_S, stride, o_H, width)
     speed = 0.0
     for j in range(K.n_v):
         speed += abs(K.out[o_S + stride * j]) * K.block[K.o_v + j] * K.block[K.o_v + j]
     fewest = 1e300
+    nearest = 0
     for k in range(m):
         here = K.spare[k]
         change = max(abs(K.spare[m + k] - here), abs(K.spare[2 * m + k] - here))
         if here < fewest * change:
             fewest = here / change
+            nearest = k
             across = 4.0 * EPS * K.scale[K.n + K.rows[K.columns[k]]] / (here * K.spare[3 * m + k] + 1e-300)
             K.detail[KICK] = across / (K.clock[STEP] * sqrt(speed) + 1e-300)
+    if (
+        NEAREST < fewest < WITHIN + 2.0
+    ):  # a row that turns, beside others that turn with it, changes but does not vanish
+        find_leftovers(K, m, h, ratio, -fewest * h, m, o_S, stride, o_H, width)
+        find_leftovers(K, m, h, ratio, fewest * h, 2 * m, o_S, stride, o_H, width)
+        if min(K.spare[m + nearest], K.spare[2 * m + nearest]) > VANISHING * K.spare[nearest]:
+            return 1e300
     return fewest
+
+
+def find_leftovers(
+    K: Any, m: int, h: float, ratio: float, ahead: float, place: int, o_S: int, stride: int, o_H: int, width: int
+) -> None:
+    """`leftovers`, by products of rows where most of them have nothing in common."""
+    if order_at(K, m) > 0:
+        leftovers_of_many(K, m, h, ratio, ahead, place, o_S, stride, o_H, width)
+    else:
+        leftovers(K, m, h, ratio, ahead, place, o_S, stride, o_H, width)
 
 
 def misses(K: Any, away: float, h: float) -> bool:
