@@ -125,7 +125,8 @@ KEPT_INTEGERS = ("closed", "armed", "touched", "dropped", "rows", "state", "stic
     PIVOTED,  # factorizations by the pivoted LU where an order chosen beforehand was not sound
     REJECTED,
     LOST,  # rows and lines for which there was no room: none, as `room_to_log` and the rows kept free see to
-) = range(17)  # fmt: skip
+    COARSENED,  # steps whose rates changed otherwise than was foreseen by more than a fifth
+) = range(18)  # fmt: skip
 # values of state[NEAR]: within a few steps of a pose in which rows lose rank, and just beyond it
 PASSING, LEFT = 1, 2
 # place in `detail` of the growth of a change that nothing foretold (see `mbd.kernel.unresolved`)
@@ -134,6 +135,8 @@ GROWN = 3
 PIVOT, KICK = 4, 5
 # and of the time that K.past covers, of the last correction of positions by contacts
 PAST_TIME, LIFTED = 6, 7
+# and where the last such step of `COARSENED` began, where the one with the largest change ended, and that change
+COARSE_FROM, COARSEST_AT, COARSEST = 8, 9, 10
 # places in `clock`: time, base time of the grid, step size of aux, time of the last switch, the present full step,
 # the step that will follow the candidate, the width of a step that is looked at as a whole (state[STRAIGHT] = 1), and
 # the step that the candidate took with its local error, the sum of local errors, and when rows will lose rank

@@ -18,6 +18,10 @@ from typing import Any
 from mbd.kernel.candidate import carry
 from mbd.kernel.fields import (
     BLOCKED,
+    COARSE_FROM,
+    COARSENED,
+    COARSEST,
+    COARSEST_AT,
     COMPOSE,
     GAINED,
     GROWN,
@@ -92,6 +96,8 @@ def look_closer(K: Any, h: float, t1: float, stretch: float) -> int:
         status = OUTGROWN
     elif rough > COARSE and gains(K, h, t1, at_y):
         status = GAINED
+    elif (rough > COARSE or K.scheme != 0) and K.strategy == 0:
+        note_coarse(K, t1, rough)
     carry(K.q1, K.inside, 0, K.n_q, False)
     carry(K.y1, K.inside, at_y, K.n, False)
     if K.state[N_DROPPED] > 0:
@@ -106,6 +112,17 @@ def look_closer(K: Any, h: float, t1: float, stretch: float) -> int:
         K.detail[0] = t1
         K.detail[2] = h
     return status
+
+
+def note_coarse(K: Any, t1: float, rough: float) -> None:
+    """Count a step to t1 that forces changed within, once however often it is tried, for a note of the run."""
+    if K.counts[COARSENED] > 0 and K.detail[COARSE_FROM] == K.clock[NOW]:
+        return
+    K.counts[COARSENED] += 1
+    K.detail[COARSE_FROM] = K.clock[NOW]
+    if K.counts[COARSENED] == 1 or rough > K.detail[COARSEST]:
+        K.detail[COARSEST] = rough
+        K.detail[COARSEST_AT] = t1
 
 
 def largest_share(K: Any, h: float, stretch: float) -> float:

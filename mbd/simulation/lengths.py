@@ -60,7 +60,7 @@ def array_lengths(sizes: Mapping[str, Any], block: int, accelerations: int) -> t
         "guards0": watched, "guards1": watched, "doubt": 2 * watched + 2 * n, "scale": n + 2 * rows, "weight": n,
         "known": n + 2 * rows, "pace": 5 * contacts,
         "seen": 1 + 2 * contacts + 2 * frictions + guards + n_q + n,
-        "deepest": contacts, "sinking": contacts, "side": guards, "crossed": guards, "pick": 8, "detail": 8,
+        "deepest": contacts, "sinking": contacts, "side": guards, "crossed": guards, "pick": 8, "detail": 12,
         "slip": frictions, "limit": frictions, "base_limit": frictions, "lean": frictions, "typical": n,
         "given": rows, "total": rows, "total_jump": n, "loads": rows, "before": contacts, "past": rows,
         "past_limit": frictions, "trial": rows, "trial_given": rows, "trial_jump": n,

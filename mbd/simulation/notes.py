@@ -15,6 +15,7 @@ from mbd.kernel.pace import LEAST_PACE
 from mbd.results.columns import ModelColumns
 from mbd.results.record import EventRecord, Record
 from mbd.simulation.blows import dt_of_blows
+from mbd.simulation.coarse import coarse_steps
 from mbd.simulation.fastest import fastest, resolving_dt, sane_rows
 from mbd.simulation.redundant import redundancy
 from mbd.simulation.singular import singular_start
@@ -103,6 +104,7 @@ def notes_of(run: Run, record: Record) -> tuple[list[str], list[str]]:
     notes += [text.format(count=int(counts[place]), impact=impact) for place, text in COUNTED if counts[place]]
     if run.values["strategy"] == 1 and run.settings["contact_reason"]:
         notes.append(f"{run.settings['contact_reason']}; impacts are of first order: errors of the size of dt")
+    notes += coarse_steps(run, record)
     doubts = _energy_lost(run, record)
     notes += doubts or ([run.energy.note] if run.energy.note else [])
     notes += [run.room.note] if run.room.note else []

@@ -93,3 +93,47 @@ def test_a_mass_that_vanishes_is_no_matter_of_rows():
     with pytest.raises(mbd.SimulationError, match="no row acts there, so its mass matrix is") as failed:
         mbd.simulate(fading, start, mbd.HHT(0.05), dt=1e-2, until=1.0)
     assert "rows depend" not in str(failed.value)
+
+
+COARSE = [mbd.HHT(0.05), mbd.Newmark(), mbd.GeneralizedAlpha(0.9), mbd.RadauIIA(), mbd.RungeKutta853()]
+
+
+def between_walls(seed):
+    """A mass that flies to and fro between two steep walls; how deep it goes into them, its speed, the way to them."""
+    rng = np.random.default_rng(seed)
+    speed, depth, reach = rng.uniform(0.5, 2.0), 10.0 ** rng.uniform(-3.0, -2.0), rng.uniform(0.5, 1.5)
+    energy = 0.5 * speed**2
+    walls = [
+        lambda x: energy * (mbd.exp((x - reach) / depth) + mbd.exp((-x - reach) / depth)),
+        lambda x: energy / depth**2 * mbd.where(abs(x) > reach, (abs(x) - reach) ** 2, 0.0),
+    ]
+    model = mbd.Model("between walls", gravity=(0.0, 0.0, 0.0))
+    body = mbd.PointMass("body", mass=1.0)
+    model.connect(mbd.Prismatic("slide", model.ground.origin, body.origin))
+    model.apply(mbd.Potential("walls", walls[seed % 2], ("slide.displacement",)))
+    return model, mbd.assemble(model, velocity={"slide.displacement": speed}), depth, speed, reach
+
+
+def coarse_notes(found):
+    return [note for note in found.stats["notes"] if "not resolved by dt" in note]
+
+
+@pytest.mark.parametrize("integrator", COARSE, ids=lambda scheme: type(scheme).__name__)
+@pytest.mark.parametrize("seed", range(4))
+def test_a_wall_that_is_thinner_than_a_step_is_told_with_a_step_that_resolves_it(seed, integrator):
+    model, start, depth, speed, reach = between_walls(seed)
+    until, dt = 6.0 * reach / speed, min(20.0 * depth, 0.3 * reach) / speed
+    found = mbd.simulate(model, start, integrator, dt=dt, until=until, on_failure="return")
+    if not found.success:
+        return  # the other way to say it
+    times = np.linspace(0.0, until, 101)
+    exact = mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.1 * depth / speed, until=until).at(times)
+    off = np.max(np.abs(found.at(times)["slide.displacement"] - exact["slide.displacement"]))
+    (note,) = coarse_notes(found) or [""]
+    assert note or off < 0.1 * reach
+    if note:
+        asked = float(re.findall(r"try dt <= ([\d.e-]+) s", note)[0])
+        assert 0.02 * depth / speed < asked < 5.0 * depth / speed
+        finer = mbd.simulate(model, start, integrator, dt=asked, until=until)
+        assert not coarse_notes(finer)
+        assert np.max(np.abs(finer.at(times)["slide.displacement"] - exact["slide.displacement"])) < 0.1 * reach
