@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias, cast
 
-from mbd.bodies.domains import ParameterCheck
+from mbd.bodies.domains import Domain, ParameterCheck, Parameterized
 from mbd.bodies.values import named_number_faults, names_of, number, printable
 from mbd.constraints.base import Constraint
 from mbd.constraints.controller import Controller
@@ -67,6 +67,26 @@ class Coordinate:
         return sympy.Symbol(f"{self.name}_rate", real=True)
 
 
+@dataclass(frozen=True)
+class _OwnParameters(Parameterized):
+    """The parameters of a description itself, apart from those of its forces and constraints."""
+
+    name: str
+    values: Mapping[str, float]
+    limits: Mapping[str, Domain]
+
+    def parameters(self) -> dict[str, float]:
+        return dict(self.values)
+
+    def value_faults(self, values: Mapping[str, float]) -> list[str]:
+        return [
+            fault
+            for name, domain in self.limits.items()
+            if name in values
+            for fault in domain.faults(self.known_as, name, values[name])
+        ]
+
+
 @dataclass(frozen=True, eq=False)
 class Lagrangian:
     """A mechanism given by its energies in generalized coordinates q, with v = q̇.
@@ -91,6 +111,8 @@ class Lagrangian:
     parameters : values by sympy symbol or by name; run-time inputs, where exact 0 and ±1 fold unless `tunable`
     tunable : names of parameters that stay inputs even at 0 or ±1
     controllers : as `apply` takes them
+    domains : what its parameters may be, by sympy symbol or by name: ``{m: mbd.Domain(low=0.0, unit="kg")}``; others
+        may have any finite value
 
     `constrain` and `apply` add contacts, friction, events and controllers, as to a `Model`; gaps, guards and rows are
     sympy expressions of the coordinates, the parameters and ``t``, or measures of them:
@@ -115,6 +137,7 @@ class Lagrangian:
     tunable: Collection[str] = ()
     nonholonomic: Mapping[str, Expression] = field(default_factory=dict)
     controllers: Sequence[Controller] = ()
+    domains: Mapping[Any, Domain] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         _check_shapes(self)
@@ -127,6 +150,7 @@ class Lagrangian:
         put(self, "controllers", list(self.controllers))
         given = {_name(key): float(value) for key, value in self.parameters.items()}
         put(self, "parameters", given | self._of_words())
+        put(self, "domains", {_name(key): domain for key, domain in self.domains.items()})
 
     # the two verbs ------------------------------------------------------------------------------------------------
     def constrain(self, *constraints: Constraint) -> None:
@@ -190,6 +214,9 @@ class Lagrangian:
         others = self._of_words()
         return {name: value for name, value in self.parameters.items() if name not in others}
 
+    def _own_word(self) -> _OwnParameters:
+        return _OwnParameters(self.name, self.own_parameters, self.domains)
+
     @property
     def instants(self) -> list[float]:
         """Times at which sampled signals have a kink, in order: steps end there [s]."""
@@ -208,21 +235,25 @@ class Lagrangian:
     # what follows from it -----------------------------------------------------------------------------------------
     def check(self) -> list[str]:
         """Every fault of the description, one sentence each."""
-        faults = _name_faults(self)
+        faults = _name_faults(self) + self._own_word().faults()
         if faults:
             return faults
         lowering = Lowering(self)
         return lowering.faults or word_faults(self, lowering.scope)
 
-    def parameter_check(self) -> ParameterCheck:
-        """The judgement of values that differ from those of the description; its own may have any finite one."""
-        return ParameterCheck([*self.applied, *self.words], self.parameters)
-
-    def equations_of_motion(self) -> Equations:
-        """The same equations that a model of bodies gives; faults are raised together as a `ModelError`."""
+    def require_valid(self) -> None:
+        """Raise a `ModelError` with every fault, if there is one."""
         faults = self.check()
         if faults:
             raise ModelError(faults)
+
+    def parameter_check(self) -> ParameterCheck:
+        """The judgement of values that differ from those of the description."""
+        return ParameterCheck([self._own_word(), *self.applied, *self.words], self.parameters)
+
+    def equations_of_motion(self) -> Equations:
+        """The same equations that a model of bodies gives; faults are raised together as a `ModelError`."""
+        self.require_valid()
         return assembled(self, Lowering(self))
 
     def equations(self, *, latex: bool = False) -> str:
@@ -302,12 +333,18 @@ def _check_shapes(system: Lagrangian) -> None:
     faults = []
     if isinstance(system.coordinates, str | Mapping) or not isinstance(system.coordinates, Iterable):
         faults.append(f"coordinates must be a list of mbd.Coordinate or names, got {system.coordinates!r}")
-    for field_name in ("forces", "parameters", "nonholonomic"):
+    for field_name in ("forces", "parameters", "nonholonomic", "domains"):
         value = getattr(system, field_name)
         if not isinstance(value, Mapping):
             faults.append(f"{field_name} must be a mapping from names, such as {{'theta': …}}, got {value!r}")
     if isinstance(system.parameters, Mapping):
         faults += named_number_faults({_name(key): value for key, value in system.parameters.items()}, "parameters")
+    if isinstance(system.domains, Mapping):
+        faults += [
+            f"domains[{_name(key)!r}] must be an mbd.Domain, such as mbd.Domain(low=0.0), got {domain!r}"
+            for key, domain in system.domains.items()
+            if not isinstance(domain, Domain)
+        ]
     if isinstance(system.constraints, str) or not isinstance(system.constraints, Iterable):
         faults.append(f"constraints must be a mapping {{name: h}} or a list of expressions, got {system.constraints!r}")
     if not isinstance(system.controllers, Iterable) or not all(isinstance(c, Controller) for c in system.controllers):
@@ -341,6 +378,11 @@ def _name_faults(system: Lagrangian) -> list[str]:
             faults.append(f"the name {name!r} is given twice among the coordinates and parameters of {system.name!r}")
         taken.add(name)
     faults += _ambiguous(names, system.own_parameters)
+    faults += [
+        "domains: " + nearest(name, system.own_parameters, "parameter", "There are")
+        for name in system.domains
+        if name not in system.own_parameters
+    ]
     faults += [
         f"two constraints of {system.name!r} are named {name!r}; give each its own name"
         for name in system.constraints

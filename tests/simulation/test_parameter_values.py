@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import sympy
 
 import mbd
 from mbd.bodies.base import Body
@@ -108,7 +109,18 @@ def wheel(radius: Any) -> mbd.Model:
     return scene(lambda model, joint, body: mbd.Rolling("wheel", body.origin, radius))
 
 
+def bead(value: Any) -> mbd.Lagrangian:
+    """A bead on a straight wire with a spring, in sympy, whose mass must be positive."""
+    x = mbd.Coordinate("x", unit="m")
+    m, k = sympy.symbols("m k")
+    return mbd.Lagrangian(
+        "bead", [x], m * x.v**2 / 2, k * (x.q - 0.4) ** 2 / 2,
+        parameters={m: value, k: 3.0}, domains={m: mbd.Domain(low=0.0, excluded=(0.0,), unit="kg")},
+    )  # fmt: skip
+
+
 PLACES = [
+    Place("m", bead),
     Place("box.mass", lambda v: scene(
         body=mbd.PointMass("box", v), joint=lambda m, b: mbd.Translation("place", m.ground.origin, b.origin))),
     Place("rod.mass", lambda v: link(mass=v)),
