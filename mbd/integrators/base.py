@@ -54,6 +54,8 @@ class Terms:
         forms; None: no such row
     turning : (m, n_v) ∂ḣ/∂x, the rate of B, zero for rows on velocities, whose H it does not enter then; stabilized
         only; None: poses in which rows lose rank are not looked for
+    shared : multipliers of dependent rows follow those of the others at each point, which the tangent takes as linear:
+        r may rise in an iteration that converges
     """
 
     r: Vector
@@ -67,6 +69,7 @@ class Terms:
     scale_rate: Vector | None = None
     velocity: Any = None
     turning: Matrix | None = None
+    shared: bool = False
 
 
 @runtime_checkable

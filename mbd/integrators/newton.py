@@ -146,7 +146,7 @@ class Step:
             if iteration == 0:
                 reference = np.maximum(np.abs(terms.r), 1e-200) if terms.scale_r is None else terms.scale_r
             imbalance = float(np.max(np.abs(terms.r) / np.maximum(reference, 1e-200), initial=0.0))
-            stuck = not (error <= FAR or imbalance <= 0.9 * left)
+            stuck = not (error <= FAR or imbalance <= 0.9 * left or (terms.shared and np.isfinite(error)))
             if halvings < MOST_HALVINGS and iteration > 0 and stuck:
                 self._retreat()
                 halvings += 1

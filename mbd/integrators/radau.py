@@ -175,7 +175,8 @@ class _RadauStep:
                 matrices = self._matrices(len(terms[0].h))
             sizes = [_size(self._error(i, each)) for i, each in enumerate(terms)]
             error = max(sizes)
-            if retreats < MOST_RETREATS and iteration > 0 and not (error <= FAR_OFF or error <= 0.9 * left):
+            shared = np.isfinite(error) and any(each.shared for each in terms)
+            if retreats < MOST_RETREATS and iteration > 0 and not (error <= FAR_OFF or error <= 0.9 * left or shared):
                 self._retreat()
                 retreats += 1
                 continue

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from mbd.kernel.candidate import accept_guards
+from mbd.kernel.crowding import crowds
 from mbd.kernel.events import handle_event, land
 from mbd.kernel.fields import (
     AT_POSE,
@@ -347,7 +348,8 @@ def judge_step(K: Any, h: float, full: float, t1: float, cut: bool, within: bool
     if passes:
         log_passed_events(K, K.pick[2] if event < 0 else h)
     if event < 0:
-        return handle_event(K)
+        status = handle_event(K)
+        return PAUSE if crowds(K) and status < 0 else status
     if K.strategy == 1 and not quiet:
         status = end_unlocated(K, h, t1)
         if status != 0:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from mbd.kernel.candidate import carry
+from mbd.kernel.crowding import count_blow
 from mbd.kernel.fields import (
     CHATTER,
     CLOSE,
@@ -133,6 +134,8 @@ def handle_event(K: Any) -> int:
     K.state[PLASTIC] = 0
     if status != 0:
         return status
+    if K.auto == 1 and kind == CLOSE:
+        count_blow(K)
     status = restart(K)
     store_row(K)  # also where no accelerations are consistent: the velocities after the event are known
     if status != 0:

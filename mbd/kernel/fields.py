@@ -20,6 +20,7 @@ INTEGERS = (
     "width", "capacity", "stride", "event_width", "event_capacity",  # storage
     "chunk",  # steps before control returns
     "strategy",  # 0 located events, 1 non-smooth steps
+    "auto",  # 1: non-smooth steps follow where located blows crowd
     "impact_law",  # 0 Newton, 1 Poisson, 2 sequential
     "n_watched",  # guard values in all
     "loaded",  # a friction follows multipliers other than linearly: 1 as that of a pin, 2 not at all where one pulls
@@ -117,7 +118,8 @@ KEPT_INTEGERS = ("closed", "armed", "touched", "dropped", "rows", "state", "stic
     CALMED,  # 1: the scheme has been started again at the accepted state because a contact seemed to pull in the step
     RAISED,  # 1: magnitudes were raised far above those of the accepted state
     UNEVEN,  # 1: masses differ so much that accelerations of stages are corrected by the balance
-) = range(22)  # fmt: skip
+    UNLOCATED,  # 1: non-smooth steps have followed as located blows crowded, 2: as locating could not go on
+) = range(23)  # fmt: skip
 # places in `counts`
 (
     STEPS, ITERATIONS, TANGENTS, RESIDUALS, FACTORIZATIONS, EVENTS, RESTARTS, IMPACTS, LOCATIONS, STAGNATIONS, CAREFUL,
@@ -139,8 +141,11 @@ PAST_TIME, LIFTED = 6, 7
 COARSE_FROM, COARSEST_AT, COARSEST = 8, 9, 10
 # places in `clock`: time, base time of the grid, step size of aux, time of the last switch, the present full step,
 # the step that will follow the candidate, the width of a step that is looked at as a whole (state[STRAIGHT] = 1), and
-# the step that the candidate took with its local error, the sum of local errors, and when rows will lose rank
-NOW, BASE, AUX_STEP, LAST_SWITCH, STEP, NEXT, WIDTH, TRIED, LOCAL, SPENT, POSE = range(11)
+# the step that the candidate took with its local error, the sum of local errors, when rows will lose rank, how much
+# located blows crowd, when that was counted last, and since when non-smooth steps are taken in their place
+(
+    NOW, BASE, AUX_STEP, LAST_SWITCH, STEP, NEXT, WIDTH, TRIED, LOCAL, SPENT, POSE, CROWD, CROWD_TIME, UNLOCATED_SINCE,
+) = range(14)  # fmt: skip
 # functions in `code`; modes follow: tangent, residual and, where straight-line code pays, correction and solution
 ACCELERATIONS, GUARDS, SCALES, COMPOSE, TERMS = range(5)
 # what advance returns

@@ -88,7 +88,8 @@ def solve_step(K: Any, h: float, t1: float, c_C: float, c_K: float, tangents: in
             K.counts[RESIDUALS] += 1
         o_r = (K.n + m) * (K.n + m) if tangent and not straight else 0
         error = residual_size(K, o_r, m, c_C, c_K, tolerance, K.stabilized)
-        if halvings < MOST_HALVINGS and iteration > 0 and (error < 0.0 or (error > FAR and error > 0.9 * left)):
+        grown = error > FAR and error > 0.9 * left and not together  # shares that follow loads change it as well
+        if halvings < MOST_HALVINGS and iteration > 0 and (error < 0.0 or grown):
             if fixed:
                 K.detail[PIVOT] = 0.0
                 return UNSOUND

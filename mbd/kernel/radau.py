@@ -29,6 +29,7 @@ from mbd.kernel.fields import (
 from mbd.kernel.iteration import runs_away
 from mbd.kernel.memory import forget_steps, look_a_step_ahead
 from mbd.kernel.ordered import LOSS_AT_ONCE, solve_kkt
+from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import (
     compose,
     consistent,
@@ -158,7 +159,8 @@ def plain_step(K: Any, h: float, t1: float, m: int) -> int:
     moved = 0.0
     for iteration in range(K.max_iterations):
         error = evaluate_stages(K, h, t1, m, tolerance, c, c * c, renew)
-        if retreats < MOST_RETREATS and iteration > 0 and (error < 0.0 or (error > FAR_OFF and error > 0.9 * left)):
+        grown = error > FAR_OFF and error > 0.9 * left and not sharing(K)  # shares that follow loads change it as well
+        if retreats < MOST_RETREATS and iteration > 0 and (error < 0.0 or grown):
             retreat_stages(K, m, 0.5)  # a full Newton step jumped over a steep place
             retreats += 1
             continue

@@ -11,6 +11,7 @@ from mbd.errors import SimulationError
 from mbd.kernel import fields as F
 from mbd.simulation.memory import memory_of
 from mbd.simulation.savepoints import called, restore, save
+from mbd.simulation.strategy import may_go_on_unlocated
 from mbd.state import State
 
 if TYPE_CHECKING:
@@ -32,6 +33,8 @@ def advance(run: Run, target: float, due: bool) -> int:
         return status
     before, counts = save(run), v["counts"].copy()
     status = _one_step(run)
+    if may_go_on_unlocated(run, status):  # as a longer run would
+        return status
     near = run.boundaries.near
     if status in (F.PAUSE, F.EVENT, F.NEW_MODE) and run.now <= target + near:
         return F.DONE if status == F.PAUSE and run.now >= target - near else status

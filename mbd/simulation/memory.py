@@ -46,13 +46,17 @@ def _place(run: Run) -> Vector:
     return np.concatenate([v["q"][: v["n_q"]], v["y"][: v["n"]]])
 
 
-def belongs(run: Run) -> tuple[str, ...]:
-    """Words that two runs must share for the memory of one to be of use to the other."""
+def belongs(run: Run, contact: str = "") -> tuple[str, ...]:
+    """Words that two runs must share for the memory of one to be of use to the other.
+
+    contact : the strategy, by default the one that the run takes now
+    """
     integrator, equations = run.stepper.integrator, run.mechanism.equations
     kind = type(integrator)
     words = [f"{kind.__module__}.{kind.__qualname__}", repr(integrator), f"compiled {run.stepper.compiled}"]
-    words += [f"{name} {run.settings[name]!r}" for name in OPTIONS]
-    words.append(f"mbd {run.settings['versions']['mbd']}")
+    settings = run.settings if not contact else {**run.settings, "contact": contact}
+    words += [f"{name} {settings[name]!r}" for name in OPTIONS]
+    words.append(f"mbd {settings['versions']['mbd']}")
     words += [f"{name} {len(run.values[name])}" for name in (*F.KEPT_REALS, *F.KEPT_INTEGERS)]
     words += [row.title for row in equations.rows] + run.manager.names
     words += [guard.name for guard in run.manager.guards]
@@ -84,15 +88,19 @@ def take_up(run: Run, start: State) -> bool:
     if memory is None:
         return False
     run.damage = damage(memory)
-    if run.damage or memory.belongs != belongs(run) or len(memory.parameters) != len(run.values["params"]):
+    if run.damage or len(memory.parameters) != len(run.values["params"]):
         return False  # other values of parameters may make other run-time inputs, which is no damage
+    unlocated = bool(run.values["auto"]) and memory.belongs == belongs(run, "nonsmooth")
+    if memory.belongs != belongs(run) and not unlocated:
+        return False
     run.damage = out_of_range(run, memory)
     if run.damage:
         return False
     stepper, v = run.stepper, run.values
     fresh = stepper.reals.copy(), stepper.integers.copy()
     stepper.reals[:], stepper.integers[:] = memory.reals, memory.integers
-    if not (_is_of(run, memory, start) and memory.digest == digest(run)):
+    taken = not unlocated or run.values["state"][F.UNLOCATED] > 0  # it came to them by itself
+    if not (taken and _is_of(run, memory, start) and memory.digest == digest(run)):
         stepper.reals[:], stepper.integers[:] = fresh
         return False
     stepper.scheme.memory = memory.scheme

@@ -102,8 +102,8 @@ def notes_of(run: Run, record: Record) -> tuple[list[str], list[str]]:
         notes.append(ANEW)
     counts, impact = run.values["counts"], run.settings["impact"]
     notes += [text.format(count=int(counts[place]), impact=impact) for place, text in COUNTED if counts[place]]
-    if run.values["strategy"] == 1 and run.settings["contact_reason"]:
-        notes.append(f"{run.settings['contact_reason']}; impacts are of first order: errors of the size of dt")
+    if "nonsmooth_since" in run.settings:
+        notes.append(f"{run.settings['contact_reason']}; since then errors of impacts are of the size of dt")
     notes += coarse_steps(run, record)
     doubts = _energy_lost(run, record)
     notes += doubts or ([run.energy.note] if run.energy.note else [])

@@ -134,6 +134,7 @@ class MechanismSystem(System):
             rate_size[picked],
             velocity if velocity.any() else None,
             turning if turning is None else np.where(velocity[:, None], 0.0, turning),
+            bool(borne),
         )
 
     def _block(self, point: Point, rows: Sequence[int], penalties: Sequence[int]) -> Vector:

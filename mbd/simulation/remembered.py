@@ -149,6 +149,7 @@ def _of_state(v: Mapping[str, Any]) -> dict[str, tuple[int, int]]:
         "SINCE_STORE": (0, UNBOUNDED), "BLOCKED": (-1, indices), "N_DROPPED": (0, v["n_rows"]), "NEAR": (0, 2),
         "INCHING": (0, UNBOUNDED), "REDONE": (0, UNBOUNDED), "PLASTIC": (0, 1), "HALVED": (0, 16),
         "HALVES": (0, 1 << 17), "PAIRED": (0, 3), "STRAIGHT": (0, 1), "RAISED": (0, 1), "CALMED": (0, 1),
+        "UNLOCATED": (0, 2),
     }  # fmt: skip
 
 

@@ -35,6 +35,7 @@ from mbd.simulation.savepoints import Savepoint, rewind, save
 from mbd.simulation.singular import at_singular_configuration
 from mbd.simulation.stepper import Stepper
 from mbd.simulation.stored import whole_record
+from mbd.simulation.strategy import go_on_unlocated, may_go_on_unlocated, told_settings
 from mbd.simulation.turning import overturned
 from mbd.simulation.whole_turns import TurnCounter
 from mbd.state import State
@@ -83,7 +84,7 @@ class Run:
         self.began = perf_counter()
         self.model = model
         self.mechanism, self.manager, self.start, self.end, self.stop = mechanism, manager, start, end, stop
-        self.settings, self.changed, self.dt = settings, dict(changed), dt
+        self.asked, self.changed, self.dt = settings, dict(changed), dt
         forces: list[Force] = getattr(model, "applied", getattr(model, "forces", []))
         self.places = {force.name: _places(force) for force in forces}
         rows = int(min(ROWS_AT_ONCE, (end - start.time) / dt / options.get("store", 1) + 64))
@@ -105,6 +106,7 @@ class Run:
         self.earlier: Sequence[EventRecord] = ()  # of the run that is repeated, for its message
         self.limit: int | None = None
         self.tried = 0
+        self.gave_up: tuple[float, str] | None = None
         self.label: float | None = None
         self.failure: Failure | None = None
         self.interrupted = False
@@ -222,7 +224,7 @@ class Run:
             elif status == F.EVENT:
                 save(self, self.events[known:])
                 ended = self._react(self.events[known:])
-            elif status not in (F.FULL, F.PAUSE):
+            elif status not in (F.FULL, F.PAUSE) and not self._goes_on_unlocated(status):
                 return self._explained(status), ""
             save(self)
             problem = crowded(self.events, self.now, self.dt) or self.room.check(self)
@@ -246,7 +248,25 @@ class Run:
         ended = status in (F.DONE, F.EVENT, F.NEW_MODE)
         return ("", message) if ended else (self._explained(status), "")
 
+    def _goes_on_unlocated(self, status: int) -> bool:
+        """Whether the step that failed was taken back, and non-smooth steps follow in the place of located instants."""
+        if not may_go_on_unlocated(self, status):
+            return False
+        told = self._explained(status)
+        if not rewind(self, failed=True):
+            return False
+        self.gave_up = self.now, told
+        go_on_unlocated(self)
+        return True
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """What was asked for, with the strategy that contacts are treated by now."""
+        return told_settings(self, self.asked)
+
     def _explained(self, status: int) -> str:
+        if self.gave_up is not None and self.gave_up[0] == self.now:
+            return f"{self.gave_up[1]}; non-smooth steps do not go on from there either"
         n_q, n_v = self.values["n_q"], self.values["n_v"]
         rates = np.abs(self.table[: self.stored, 1 + n_q : 1 + n_q + n_v])
         swiftest = float(np.max(rates, initial=0.0))

@@ -85,8 +85,8 @@ def simulate(
         or (name, latest time)
     contact : 'events' locates the instants at which contacts close, open, stick and slip, which keeps the order of the
         scheme; 'nonsmooth' takes fixed steps and corrects positions and velocities at their ends, of first order at
-        impacts but of bounded work whatever happens; 'auto' takes 'events' up to 16 contacts, and says why in
-        ``run.settings["contact_reason"]``
+        impacts but of bounded work whatever happens; 'auto' takes 'events', and non-smooth steps from where
+        located instants crowd or cannot be located; ``run.settings["contact_reason"]`` says why, and a note when
     impact : law of restitution over all contacts of an instant: 'newton' on gap rates, 'poisson' on impulses,
         'sequential' one contact after the other; where it would create energy, Stronge's law takes its place
     locate : 'root' finds event instants to round-off; 'linear' by one linear interpolation back, second order
@@ -194,7 +194,9 @@ def prepared(
     end, stop = end_of(until, manager, dt, start.time)
     tol = options.get("tol")
     strategy, reason = chosen(options["contact"], manager, options["locate"], tol is not None)
+    auto = options["contact"] == "auto" and bool(reason) and tol is None
     options = {**options, "contact": strategy}
+    auto = auto and not refusals(mechanism.equations, scheme, {**options, "contact": "nonsmooth"})
     refused = refusals(mechanism.equations, scheme, options)
     if refused:
         raise CapabilityError(refused)
@@ -206,6 +208,7 @@ def prepared(
         "versions": dict(_versions()),
     }  # fmt: skip
     own = {name: options[name] for name in ("contact", "impact", "locate", "store", "rest_speed")}
+    own["auto"] = auto
     own |= {name: value for name, value in adaptive.items() if value is not None}
     return Run(
         model, mechanism if watch is None else watch(mechanism), manager, scheme, start, dt, end, stop, changed, own,

@@ -131,7 +131,7 @@ class Stepper:
             o_lam=layout.lam, o_anchor=layout.anchor, o_switch=layout.switch, o_slip=layout.slip,
             n_frictions=layout.n_frictions, n_watched=self.mechanism.sizes["guards"],
             loaded=follows(self.mechanism.equations), impact_law=LAWS.index(options.get("impact", "newton")),
-            strategy=int(options.get("contact") == "nonsmooth"),
+            strategy=int(options.get("contact") == "nonsmooth"), auto=int(options.get("auto", False)),
             vector=int(self.mechanism.vector),
             stabilized=int(self.stabilized), max_iterations=MAX_ITERATIONS,
             max_switches=20 + 4 * (n_contacts + n_guards + layout.n_frictions),
@@ -143,8 +143,7 @@ class Stepper:
             alpha_m=0.0, alpha_f=0.0, beta=0.25, gamma=0.5, tolerance=1e-9, jerk=1, exact=0,
             scheme=own_scheme(self.integrator) or NEWMARK,
             adaptive=int("allowed" in options), allowed=float(options.get("allowed", 0.0)),
-            longest=float(options.get("longest", np.inf)), error_order=self.integrator.error_order(),
-            looks=LOOKS if self.integrator.order() > 2 and options.get("contact") != "nonsmooth" else 1,
+            longest=float(options.get("longest", np.inf)), error_order=self.integrator.error_order(), looks=1,
         )  # fmt: skip
         values["event_capacity"] = max(EVENT_CAPACITY, 2 * room_to_log(SimpleNamespace(**values)))
         if isinstance(self.integrator, NewmarkFamily):
@@ -243,7 +242,11 @@ class Stepper:
 
     def advance(self, until: float) -> int:
         """Run the kernel until it returns; its status."""
-        self.values["until"] = until
+        v = self.values
+        v["until"] = until
+        if v["auto"]:
+            v["strategy"] = int(v["state"][F.UNLOCATED] > 0)
+        v["looks"] = LOOKS if self.integrator.order() > 2 and not v["strategy"] else 1
         return self._advance_compiled() if self.compiled else self._advance_plain()
 
     def keep_row(self) -> None:

@@ -136,7 +136,7 @@ def test_many_contacts_that_are_to_be_located_roughly_are_located():
     start = mbd.assemble(model, position={f"slide {k}.displacement": 1.0 for k in range(17)})
     chosen = {locate: mbd.simulate(model, start, dt=1e-2, until=0.02, locate=locate) for locate in ("root", "linear")}
     assert {locate: run.settings["contact"] for locate, run in chosen.items()} == {
-        "root": "nonsmooth", "linear": "events",
+        "root": "events", "linear": "events",
     }  # fmt: skip
     assert "locate='linear'" in chosen["linear"].settings["contact_reason"]
 

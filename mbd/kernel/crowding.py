@@ -1,0 +1,52 @@
+"""Whether located blows crowd, as in a pile, whose contacts close and open faster than they can be told apart.
+
+A blow among contacts that are closed already makes them take part in its impact, and those that it opens strike again.
+The more contacts lie on each other, the more such blows follow until all rest, closer and closer; at last some contacts
+touch by round-off only, and rows seem independent that are not. Contacts that strike apart from each other, however
+many, take part in no other's blow. What is counted depends on the motion alone: a run decides at the same instant
+wherever it is cut.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mbd.kernel.fields import CROWD, CROWD_TIME, NOW, UNLOCATED, UNLOCATED_SINCE
+
+__all__ = ["count_blow", "crowd", "crowds"]
+
+MOST_CROWDED = 64.0
+"""Blows through several contacts, less one for each dt, from which on steps are non-smooth [-]."""
+SEVERAL = 2
+"""Contacts closed already that take part in such a blow [-]."""
+PART = 1e-6
+"""Impulse over the largest of a blow that is more than round-off [-]."""
+
+
+def crowd(K: Any) -> float:
+    """Blows through several contacts, less one for each dt since."""
+    return float(max(K.clock[CROWD] - (K.clock[NOW] - K.clock[CROWD_TIME]) / K.dt, 0.0))
+
+
+def count_blow(K: Any) -> None:
+    """Count the blow of this instant, whose impulses are in K.impulse, if it goes through several closed contacts."""
+    largest = 0.0
+    for c in range(K.n_contacts):
+        if K.kind[c] == 0:
+            largest = max(largest, abs(K.impulse[K.normal[c]]))
+    several = 0
+    for c in range(K.n_contacts):
+        if K.kind[c] == 0 and K.closing[c] == 0 and abs(K.impulse[K.normal[c]]) > PART * largest:
+            several += 1
+    if several >= SEVERAL:
+        K.clock[CROWD] = crowd(K) + 1.0
+        K.clock[CROWD_TIME] = K.clock[NOW]
+
+
+def crowds(K: Any) -> bool:
+    """Whether non-smooth steps follow from now on, as blows have crowded; told once."""
+    if K.auto == 0 or K.state[UNLOCATED] > 0 or K.clock[CROWD] <= MOST_CROWDED:
+        return False
+    K.state[UNLOCATED] = 1
+    K.clock[UNLOCATED_SINCE] = K.clock[NOW]
+    return True
