@@ -162,7 +162,7 @@ def second_look(K: Any, o_r: int, m: int, c_C: float, c_K: float, tolerance: flo
     error = residual_size(K, o_r, m, c_C, c_K, tolerance, K.stabilized)
     if error > 1.0:
         if residual_size(K, o_r, m, 0.0, 0.0, 256.0 * EPS, K.stabilized) <= 16.0:
-            if residual_size(K, o_r, m, c_C, c_K, K.tolerance, K.stabilized) > 1.0:
+            if residual_size(K, o_r, 0, c_C, c_K, K.tolerance, K.stabilized) > 1.0:  # rows at round-off hold
                 error = -float(TOO_TIGHT)
             else:
                 K.counts[STAGNATIONS] += 1
