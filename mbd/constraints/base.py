@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 
 from mbd.bodies.base import Frame
 from mbd.bodies.domains import Parameterized
+from mbd.bodies.values import name_of
 from mbd.constraints.law import Equation, Hold, Law
 from mbd.forces.quantities import Mention
 from mbd.scope import Scope
@@ -148,6 +149,7 @@ class Constraint(Parameterized, ABC):
 
     def missing(self) -> list[str]:
         """What it lacks that equations and active-set manager would ask for, one sentence each."""
+        name_of(self.name, type(self).__name__)
         title = f"'{self.name}' ({type(self).__name__})"
         if self.kind not in KINDS:
             return [f"{title} is of kind {self.kind!r}, which nothing serves; the kinds are {', '.join(KINDS)}"]

@@ -9,7 +9,7 @@ from mbd.bodies.base import Frame
 from mbd.constraints import Closing, Constraint, Drag, Equation, Law
 from mbd.joints.base import Joint
 
-__all__ = ["Clutch", "OneWayBearing", "Sole"]
+__all__ = ["Clutch", "Foot", "OneWayBearing", "Sole"]
 
 
 @dataclass(frozen=True)
@@ -95,3 +95,28 @@ class OneWayBearing(Constraint):
         k = scope.parameter(self.name, "stiffness", self.stiffness)
         push = k * (grip - angle) - self.damping * rate
         return Law(contact=Closing(rate, "rad"), push=push, elastic=0.5 * k * (grip - angle) ** 2)
+
+
+@dataclass(frozen=True)
+class Foot(Constraint):
+    """A point that comes down on level ground with restitution e and Coulomb friction: `mbd.Unilateral` once more."""
+
+    name: str
+    point: Frame
+    restitution: float
+    friction: float
+
+    kind = "unilateral"
+
+    def mentions(self):
+        return [self.point]
+
+    def parameters(self):
+        return {f"{self.name}.mu": self.friction}
+
+    def act(self, scope, hold):
+        x, y, _ = scope.frame(self.point).position
+        (place,) = hold([x])
+        mu = scope.parameter(self.name, "mu", self.friction)
+        rows = [Equation(y, "normal"), Equation(x - place, "forward", limit=lambda push: mu * push)]
+        return Law(rows, Closing(y, restitution=self.restitution))

@@ -10,7 +10,7 @@ import pytest
 
 import mbd
 from mbd.constraints import Closing, Constraint, Drag, Equation, Law
-from tests.constraints.own import Clutch, OneWayBearing, Sole
+from tests.constraints.own import Clutch, Foot, OneWayBearing, Sole
 
 g, LOOSE = 9.81, {"rtol": 1e-9, "atol": 1e-10}
 
@@ -109,6 +109,44 @@ def test_a_one_way_bearing_takes_the_blow_of_a_wheel_that_is_thrown_back():
         assert run.events[2].time - run.events[1].time < np.pi / omega
 
 
+@pytest.mark.parametrize("contact", ["events", "nonsmooth"])
+def test_a_foot_written_anew_moves_as_that_of_the_library(contact):
+    """A brick thrown on its two lower corners: bounces, slides, sticks."""
+    runs, sides = [], {"left": -0.2, "right": 0.2}
+    for make in (Foot, lambda name, point, e, mu: mbd.Unilateral(name, mbd.touchdown(point), e, friction=mu)):
+        model = mbd.Model("brick")
+        brick = mbd.RigidBody("brick", 2.0, (0.1, 0.1, 0.05))
+        model.connect(mbd.Planar("p", model.ground.origin, brick.origin))
+        model.constrain(*(make(f"{side} corner", brick.point(x, -0.1), 0.3, 0.4) for side, x in sides.items()))
+        place, speed = {"p.x": 0, "p.y": 0.3, "p.angle": 0.3}, {"p.x": 1.5, "p.y": 0, "p.angle": -1}
+        start = mbd.assemble(model, position=place, velocity=speed)
+        runs.append(mbd.simulate(model, start, mbd.HHT(0.05), dt=1e-3, until=0.6, contact=contact))
+    own, library = runs
+    assert [(e.kind, e.name) for e in own.events] == [(e.kind, e.name) for e in library.events]
+    assert len(own.events) > 5
+    np.testing.assert_allclose(own.final.q, library.final.q, **LOOSE)
+    np.testing.assert_allclose(own["right corner.friction"], library["right corner.friction"], rtol=1e-7, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_it_moves_alike_in_absolute_coordinates(name):
+    model, start = SCENES[name]()
+    if name == "clutch":
+        model.apply(mbd.Motor("steady", model.joints[1], torque=0.5))
+    cut = mbd.Model(model.name, model.gravity, cut="all")
+    for kind in ("joints", "forces", "constraints"):
+        setattr(cut, kind, list(getattr(model, kind)))
+    named = {n: float(v) for n, v in zip(start.names, start.q, strict=True)}
+    rates = {n.removesuffix(".rate"): float(v) for n, v in zip(start.velocity_names, start.v, strict=True)}
+    again = mbd.assemble(cut, position=named, velocity=rates, closed=sorted(start.mode.closed))
+    usual, run = (
+        mbd.simulate(each, state, mbd.HHT(0.05), dt=1e-3, until=1.8) for each, state in ((model, start), (cut, again))
+    )
+    assert [(e.kind, e.name) for e in run.events] == [(e.kind, e.name) for e in usual.events]
+    for coordinate in named:
+        assert run[coordinate][-1] == pytest.approx(usual[coordinate][-1], rel=1e-6, abs=1e-7)
+
+
 # everything else that asks ------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("name", SCENES)
 def test_a_law_of_ones_own_runs_in_machine_code_as_in_plain_python(name):
@@ -196,6 +234,8 @@ class Silent(Constraint):
 def test_a_class_that_nothing_could_serve_is_refused_by_name_as_it_is_given(door):
     with pytest.raises(mbd.ModelError, match=r"'stop' \(Silent\) has no act\(scope, hold\)"):
         door.constrain(Silent("stop"))
+    with pytest.raises(mbd.ModelError, match="a name holds no dot"):
+        door.constrain(Silent("left.stop"))
     with pytest.raises(mbd.ModelError, match=r"'stop' \(Silent\) is of kind 'ratchet'.*bilateral, nonholonomic"):
         door.constrain(Silent("stop", "ratchet"))
     with pytest.raises(mbd.ModelError, match=r"'stop' \(Silent\) is an event without guard"):
