@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from mbd.kernel.fields import ACCELERATIONS, COMPOSE, EPS, N_DROPPED, NOW, RAISED, SCALES
+from mbd.kernel.fields import ACCELERATIONS, COMPOSE, EPS, N_DROPPED, NOT_CONVERGED, NOW, RAISED, SCALES
 from mbd.kernel.hooks import call
 from mbd.kernel.redundancy import find_mix, find_shares, shared, sharing, spread, take_shares
 from mbd.kernel.saddle import solve_rows
@@ -20,6 +20,8 @@ FAR_ABOVE = 100.0
 """Magnitudes over those of the accepted state above which they are lowered again, and the most in one step [-]."""
 ROW_GROWTH = 16.0
 """Most by which the terms of a row may grow in a step: beyond that an iterate was thrown far away [-]."""
+SETTLED_LOADS = 1e-6
+"""Relative change of the last of these above which there are no such multipliers: friction locks the motion [-]."""
 MOST_LOADS = 30
 """How often multipliers that friction follows are solved for again [-]."""
 
@@ -235,14 +237,21 @@ def consistent(K: Any, t: float, q: Any, y: Any) -> int:
     load_accelerations(K)
     status = solve_rows(K, m, False)
     if K.loaded > 0 or together:  # R follows multipliers: of degree one, so that to solve again is Newton's method
+        change = 0.0
         for _ in range(MOST_LOADS):
-            if status != 0 or evaluate_loaded(K, K.impulse) < 1e-13:
+            if status != 0:
+                break
+            change = evaluate_loaded(K, K.impulse)
+            if change < 1e-13:
                 break
             if together:
                 find_limits_of_loads(K)
                 find_shares(K)
             load_accelerations(K)
             status = solve_rows(K, m, False)
+        if status == 0 and change > SETTLED_LOADS:
+            K.detail[1] = change / SETTLED_LOADS
+            return NOT_CONVERGED
     if K.state[N_DROPPED] > 0 and status == 0:
         share_out(K, K.impulse)
     if status == 0 and K.n_frictions > 0:

@@ -14,14 +14,13 @@ from mbd.kernel import fields as F
 from mbd.not_finite import first_cause, tape_inputs
 from mbd.results.failure import Failure
 from mbd.results.record import EventRecord
+from mbd.simulation.jamming import may_jam
 from mbd.simulation.lengths import RUNGE_KUTTA
 from mbd.simulation.redundant import clash
 from mbd.simulation.round_off import remainder
 from mbd.simulation.stepper import Stepper
 from mbd.state import State
-from mbd.tape.derivatives import live
 from mbd.tape.evaluate import evaluate
-from mbd.tape.node import Node
 
 if TYPE_CHECKING:
     from mbd.simulation.run import Run
@@ -35,6 +34,9 @@ SLOW = 1e-3
 MOST_EVENTS = 5000
 """Events within one dt above which a run stops: they follow each other ever faster, or are located too roughly [-]."""
 
+STALLED = frozenset({F.NOT_CONVERGED, F.SINGULAR, F.STAGNATED, F.TOO_TIGHT, F.TOO_NEAR, F.TOO_SMALL, F.DEPENDENT,
+                     F.OUTGROWN, F.GAINED})  # fmt: skip
+"""What steps fail with where friction locks a motion."""
 LATEST = 12
 """Events that a failure tells."""
 
@@ -107,6 +109,8 @@ def explanation(
     names = sorted(stepper.manager.mode(values["closed"][: values["n_contacts"]]).closed)
     closed = f" with {', '.join(map(repr, names))} closed" if names else ""
     what = beyond or _what(stepper, status, closed, events, places or {}, _rushing(stepper, swiftest))
+    if status in STALLED and not beyond:
+        what = may_jam(stepper) + what
     return f"t = {time:.9g} s (last accepted {now:.9g} s): {what}"
 
 
@@ -132,8 +136,7 @@ def _what(
         return _no_size(stepper, status, closed)
     if status in (F.DEPENDENT, F.CONFLICT):
         if int(stepper.values["state"][F.BLOCKED]) < stepper.values["n"]:
-            what = f"neither mass nor rows determine {_unknown(stepper)}{closed}; give it a mass, or lock it"
-            return _may_jam(stepper) + what
+            return f"neither mass nor rows determine {_unknown(stepper)}{closed}; give it a mass, or lock it"
         return (
             f"{_clashing(stepper, status)}{closed}; leave one out, hold fewer contacts closed, or, where they do so in "
             "this singular configuration only, start beside it"
@@ -172,7 +175,7 @@ def _no_end(stepper: Stepper, status: int, closed: str, rushing: str) -> str:
         )
     own = f" ({said})" if said else ""
     return (
-        f"{_may_jam(stepper)}Newton stalled at {residual:.3g} times the tolerance after "
+        f"Newton stalled at {residual:.3g} times the tolerance after "
         f"{stepper.values['max_iterations']} "
         f"iterations{own}{closed}{worst}; try a smaller dt or softer stiffness; a force that jumps with "
         "the state (mbd.where, sign) must be made continuous, or be switched by an Event or Controller"
@@ -200,24 +203,6 @@ def _unresolved(stepper: Stepper, status: int, closed: str) -> str:
         f"{change}, more than the forces along the way can do{shorter}: dt does not resolve a force that is steep "
         f"there; try a smaller dt, such as {0.05 * dt:.1g} s, or a softer force"
     )
-
-
-def _may_jam(stepper: Stepper) -> str:
-    """What dry friction in pins may do, where there is any: the more it brakes, the more it loads its pin."""
-    loaded = int(stepper.values["loaded"]) == 1
-    frictions = stepper.manager.frictions if loaded else ()
-    names = [friction.name for friction in frictions if friction.contact < 0 and is_of_load(friction.limit)]
-    if not names:
-        return ""
-    return (
-        f"pin friction of {', '.join(map(repr, names))} may jam: where μ r reaches the lever arm of the load on a pin, "
-        "no force balances what friction adds to it; use a smaller mu or radius of PinFriction, or mbd.Coulomb; "
-    )
-
-
-def is_of_load(limit: Node) -> bool:
-    """Whether the limit of a friction follows multipliers."""
-    return any(node.op == "input" and node.data[0] == "lam" for node in live([limit]))
 
 
 def _no_size(stepper: Stepper, status: int, closed: str) -> str:
