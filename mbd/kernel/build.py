@@ -35,7 +35,7 @@ MODULES = (
     "complementarity", "blow", "impact", "settle", "pairs", "iteration", "memory", "leftovers", "passage", "newton",
     "newmark", "complex_linear", "ordered_complex", "stages", "straddle", "uneven", "runge_kutta", "astride", "radau",
     "hermite", "significance", "guards", "pace", "control", "interior", "refine", "locate", "switching", "nonsmooth",
-    "takeover", "observe", "starting", "unresolved", "trying", "crowding", "singular", "events", "advance",
+    "takeover", "observe", "starting", "poles", "unresolved", "trying", "crowding", "singular", "events", "advance",
 )  # fmt: skip
 
 APART = (

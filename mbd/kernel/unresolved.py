@@ -25,6 +25,7 @@ from mbd.kernel.fields import (
     COMPOSE,
     GAINED,
     GROWN,
+    LEAPT,
     N_DROPPED,
     NEAR,
     NOT_FINITE,
@@ -33,6 +34,7 @@ from mbd.kernel.fields import (
     STEP,
 )
 from mbd.kernel.hooks import call, scheme_error
+from mbd.kernel.poles import leaps
 from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import compose, consistent, evaluate, fill_block
 
@@ -44,6 +46,8 @@ LOOK_TWICE_EIGHT = 0.1
 """The same of the explicit scheme of order 8 [-]."""
 LOOK_TWICE_FIVE = 0.25
 """The same of Radau IIA, whose estimate is of order 3 [-]."""
+BENT = 0.1
+"""Change of accelerations in a step, times its size, over the fastest rate, above which poles are looked for [-]."""
 BYSTANDER = 0.01
 """Part of the fastest rate below which another one hardly takes part in the motion [-]."""
 GROWTH = 0.8
@@ -59,7 +63,7 @@ FEWEST = 1.0 / 4096.0
 
 
 def judge_change(K: Any, h: float, t1: float) -> int:
-    """0 where the candidate may be a continuation of the motion, OUTGROWN or GAINED where it cannot."""
+    """0 where the candidate may be a continuation of the motion, OUTGROWN, GAINED or LEAPT where it cannot."""
     stretch = max(1.0, K.clock[STEP] / h)
     if K.scheme == 0 and changes_little(K, h, stretch):
         return 0
@@ -67,36 +71,57 @@ def judge_change(K: Any, h: float, t1: float) -> int:
     allowed = LOOK_TWICE
     if K.scheme != 0:
         allowed = LOOK_TWICE_EIGHT if K.scheme == 1 else LOOK_TWICE_FIVE
-    if worst <= allowed or K.state[NEAR] > 0 or sharing(K):
+    if (worst <= LOOK_TWICE and not bends(K, h)) or K.state[NEAR] > 0 or sharing(K):
         return 0
-    return look_closer(K, h, t1, stretch)
+    return look_closer(K, h, t1, stretch, worst > allowed)
 
 
 def changes_little(K: Any, h: float, stretch: float) -> bool:
-    """Whether the errors of all rates are small beside a part of the fastest one: no share is large, most steps."""
+    """Whether the errors of all rates are small beside a part of the fastest one, and none `bends`: in most steps."""
     largest = 0.0
+    most = 0.0
     fastest = 0.0
     for i in range(K.n_v):
+        most = max(most, abs(K.rate1[i] - K.rate[i]))
         largest = max(largest, abs(K.rate1[i] - K.rate[i] - h * K.slope[i]))
         fastest = max(fastest, abs(K.y1[i]))
     for i in range(K.n_v, K.n):
         largest = max(largest, abs(K.rate1[i] - K.rate[i] - h * K.slope[i]))
     cube = stretch * stretch * stretch
-    return bool(h * largest * cube <= 12.0 * LOOK_TWICE * max(K.rest_speed, BYSTANDER * fastest))
+    small = h * largest * cube <= 12.0 * LOOK_TWICE * max(K.rest_speed, BYSTANDER * fastest)
+    return bool(small and h * most <= BENT * max(K.rest_speed, fastest))
 
 
-def look_closer(K: Any, h: float, t1: float, stretch: float) -> int:
-    """The same of a candidate that a glance does not clear, which is left as it was."""
+def bends(K: Any, h: float) -> bool:
+    """Whether accelerations change so much that a pole may lie between, even if so foretold; K.state[BLOCKED] whose."""
+    most = 0.0
+    fastest = 0.0
+    who = 0
+    for i in range(K.n_v):
+        if abs(K.rate1[i] - K.rate[i]) > most:
+            most = abs(K.rate1[i] - K.rate[i])
+            who = i
+        fastest = max(fastest, abs(K.y1[i]))
+    if h * most > BENT * max(K.rest_speed, fastest):
+        K.state[BLOCKED] = who
+        return True
+    return False
+
+
+def look_closer(K: Any, h: float, t1: float, stretch: float, rough_enough: bool) -> int:
+    """The same of a candidate that a glance does not clear, which is left as it was; if not rough, `leaps` alone."""
     rough = K.detail[1]
     blocked = K.state[BLOCKED]
     at_y = carry(K.q1, K.inside, 0, K.n_q, True)
     at_D = carry(K.y1, K.inside, at_y, K.n, True)
     status = 0
-    if outgrows(K, h, t1, stretch, at_y, at_D):
+    if rough_enough and outgrows(K, h, t1, stretch, at_y, at_D):
         status = OUTGROWN
-    elif rough > COARSE and gains(K, h, t1, at_y):
+    elif rough_enough and rough > COARSE and gains(K, h, t1, at_y):
         status = GAINED
-    elif (rough > COARSE or K.scheme != 0) and K.strategy == 0:
+    elif leaps(K, h, at_y):
+        status = LEAPT
+    elif rough_enough and (rough > COARSE or K.scheme != 0) and K.strategy == 0:
         note_coarse(K, t1, rough)
     carry(K.q1, K.inside, 0, K.n_q, False)
     carry(K.y1, K.inside, at_y, K.n, False)

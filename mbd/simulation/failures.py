@@ -122,7 +122,7 @@ def _what(
         return f"{_not_finite(stepper, places)}{closed}; nothing after the last accepted step is kept"
     if status in (F.NOT_CONVERGED, F.STAGNATED, F.TOO_TIGHT):
         return _no_end(stepper, status, closed, rushing)
-    if status in (F.OUTGROWN, F.GAINED):
+    if status in (F.OUTGROWN, F.GAINED, F.LEAPT):
         return _unresolved(stepper, status, closed)
     if status in (F.SINGULAR, F.TOO_NEAR):
         return f"the Newton matrix is singular at {_unknown(stepper)}{closed}; {_why_singular(stepper)}"
@@ -197,6 +197,12 @@ def _unresolved(stepper: Stepper, status: int, closed: str) -> str:
             f"{change}, by forces that grow with the motion, {growth:.2g} of what nothing foretold by itself in a step "
             f"of dt: dt does not resolve the motion, or a force lets it run away; try a smaller dt, such as "
             f"{0.1 * dt / max(growth, 1.0):.1g} s"
+        )
+    if status == F.LEAPT:
+        return (
+            f"{change}, over a place where forces are over a hundred times those before and after it, such as the pole "
+            "of 1/x: the scheme sees nothing of them; use a smaller dt to see what happens there, or a force that is "
+            "bounded wherever the motion goes"
         )
     shorter = "" if int(values["scheme"]) == RUNGE_KUTTA else ", as do steps down to a tenth of dt"
     return (

@@ -21,7 +21,7 @@ AHEAD = (1.0, 4.0, 16.0)
 STEP_FAILURES = frozenset(
     {
         F.NOT_FINITE, F.NOT_CONVERGED, F.SINGULAR, F.STAGNATED, F.DEPENDENT, F.CONFLICT, F.NO_LOCATION, F.TOO_TIGHT,
-        F.TOO_NEAR, F.TOO_SMALL, F.STIRRED, F.OUTGROWN, F.GAINED,
+        F.TOO_NEAR, F.TOO_SMALL, F.STIRRED, F.OUTGROWN, F.GAINED, F.LEAPT,
     }
 )  # fmt: skip
 """What steps fail with next to such a limit."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -123,3 +124,44 @@ def test_stiff_forces_are_none_either(scheme: Any, stiffness: float, damping: fl
     model.apply(mbd.Potential("spring", lambda x: 0.5 * stiffness * x * x, arguments=("p.x",)))
     run = mbd.simulate(model, start, scheme, dt=0.1, until=3.0, on_failure="return")
     assert "forces that grow" not in run.message and "more than the forces" not in run.message
+
+
+# poles in space -------------------------------------------------------------------------------------------------------
+PULLS = {
+    "1/x": lambda x: -0.7 / x, "1/x²": lambda x: -0.7 / x**2, "1/x³": lambda x: -0.7 / x**3,
+    "1/x |x|": lambda x: -0.7 / (x * mbd.sqrt(x * x)), "softened": lambda x: -0.7 * x / mbd.sqrt(x * x + 0.01) ** 3,
+}  # fmt: skip
+
+
+@cache
+def falling(law):
+    """A point that is pulled towards the origin of a rail."""
+    model = mbd.Model("fall", gravity=(0.0, 0.0, 0.0))
+    point = mbd.PointMass("point", mass=1.0)
+    rail = mbd.Prismatic("rail", model.ground.origin, point.origin)
+    model.connect(rail)
+    model.apply(mbd.Motor("pull", rail, lambda t, x: PULLS[law](x), arguments=("t", "rail.displacement")))
+    return model
+
+
+@pytest.mark.parametrize("scheme", [mbd.HHT(0.05), mbd.Newmark(), mbd.GeneralizedAlpha(0.8), mbd.RadauIIA()], ids=repr)
+@pytest.mark.parametrize("law", [law for law in PULLS if law != "softened"])
+def test_no_step_leaps_over_the_pole_of_a_force(law, scheme):
+    """Both ends of such a step may look alike, or go on as the slope of accelerations foretold."""
+    rng = np.random.default_rng(5)
+    for _ in range(15):
+        start = mbd.assemble(falling(law), {"rail.displacement": rng.uniform(0.05, 0.4)})
+        dt = 10.0 ** rng.uniform(-4.0, -1.5)
+        run = mbd.simulate(falling(law), start, scheme, dt=dt, until=1.0, on_failure="return")
+        assert not run.success and (run["rail.displacement"] > 0.0).all(), (dt, run.message)
+        assert "dt" in run.message, run.message
+
+
+@pytest.mark.parametrize("scheme", [mbd.HHT(0.05), mbd.RadauIIA(), mbd.RungeKutta853()], ids=repr)
+def test_a_steep_place_that_steps_resolve_is_passed(scheme):
+    for place in np.random.default_rng(6).uniform(0.2, 0.6, 4):
+        start = mbd.assemble(falling("softened"), {"rail.displacement": place})
+        run = mbd.simulate(falling("softened"), start, scheme, dt=1e-3, until=1.0)
+        x, v = run["rail.displacement"], run["rail.displacement.rate"]
+        energy = 0.5 * v**2 - 0.7 / np.sqrt(x**2 + 0.01)
+        assert np.ptp(energy) < 0.03 and x.min() < 0.0
