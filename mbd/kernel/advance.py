@@ -131,11 +131,13 @@ def begin(K: Any) -> int:
     return -1
 
 
-def conclude(K: Any, h: float, full: float, t1: float, cut: bool, within: bool, quiet: bool, holds: bool) -> int:
+def conclude(
+    K: Any, h: float, full: float, t1: float, cut: bool, within: bool, quiet: bool, holds: bool, pulls: bool
+) -> int:
     """Accept a candidate without events; 0, or a failure.
 
     h of the `full` step that was to be; `cut` at a boundary inside the run; `within` a step of the grid;
-    `quiet`: no guard can have changed; `holds`: so do the rows that were left out.
+    `quiet`: no guard can have changed; `holds`: so do the rows that were left out; `pulls`: a contact does (`rings`).
     """
     paired = K.state[PAIRED] > 0
     if h < full and not within:
@@ -156,7 +158,7 @@ def conclude(K: Any, h: float, full: float, t1: float, cut: bool, within: bool, 
             K.counts[SHORTENED] += 1 if K.state[PAIRED] == ALONE else 0
             K.state[PAIRED] = 0
     uneven = K.stabilized == 0 and K.state[ROWS] > 0 and h < (1.0 - 1e-6) * K.clock[STEP]
-    uneven = uneven or (not quiet and rings(K))
+    uneven = uneven or pulls
     K.state[CALMED] = 0
     if cut and K.stabilized == 0 and refuses(K, h):
         K.fired[0] = -1
@@ -193,7 +195,7 @@ def calm(K: Any) -> bool:
 
     Accelerations and multipliers are made consistent there, which ends their oscillation; the step is taken again.
     """
-    if K.state[CALMED] == 1 or K.state[NEAR] > 0 or not rings(K):
+    if K.state[CALMED] == 1 or K.state[NEAR] > 0:
         return False
     if consistent(K, K.clock[NOW], K.q, K.y) != 0:
         return False
@@ -342,7 +344,8 @@ def judge_step(K: Any, h: float, full: float, t1: float, cut: bool, within: bool
         event = find_event(K, h, t1)
         if event > 0:
             return event
-    if event == 0 and not quiet and K.state[ROWS] > 0 and calm(K):
+    pulls = event == 0 and not quiet and rings(K)
+    if pulls and K.state[ROWS] > 0 and calm(K):
         return -1
     add_error(K, h, event < 0)
     if passes:
@@ -354,7 +357,7 @@ def judge_step(K: Any, h: float, full: float, t1: float, cut: bool, within: bool
         status = end_unlocated(K, h, t1)
         if status != 0:
             return status
-    status = conclude(K, h, full, t1, cut, within, quiet, holds)
+    status = conclude(K, h, full, t1, cut, within, quiet, holds, pulls)
     if status != 0:
         return status
     K.state[SINCE_STORE] += 1
