@@ -28,6 +28,7 @@ from mbd.posture import (
     close_velocities,
     position_rows,
 )  # fmt: skip
+from mbd.projected import nearest_positions, nearest_velocities
 from mbd.state import State
 from mbd.trivial_rows import manager_of
 from mbd.turns import choose_turns, name_wrapped, nearest_turns
@@ -75,7 +76,8 @@ def assemble(
     closed : names of contacts that start closed
     open : names of contacts that start open even if they touch or lie below their surface; ignored until risen
     parameters : values that differ from the model's, by name
-    project : move named values too, to the nearest consistent ones; `State.moved` tells how far
+    project : move named values too, to the nearest consistent ones, results such as angles of cut joints by the sum of
+        squares; `State.moved` tells how far coordinates were
     backend : see `mbd.simulate`
 
     Returns
@@ -181,13 +183,24 @@ def _closed(work: Posture, named: _Named, project: bool, model: Any) -> list[str
     free = np.ones((2, equations.n_v), dtype=bool)
     free[0, [each.place for each in held_q]] = free[1, [each.place for each in held_v]] = False
     misfit = close_positions(work, rows, free[0])
+    if project and np.max(np.abs(misfit), initial=0.0) > TOLERANCE and work.places and work.mechanism.vector:
+        reached, work.q = work.q.copy(), q.copy()
+        if nearest_positions(work, rows, named.q):
+            misfit = np.zeros(len(misfit))
+        else:
+            work.q = reached
     if np.max(np.abs(misfit), initial=0.0) <= TOLERANCE:
-        nearest_turns(work, rows, list(named.q), TOLERANCE)
+        nearest_turns(work, rows, named.q, TOLERANCE)
     never = infeasible(work, rows, q, misfit, model, named=bool(work.places or held_q))
     if never:
         return never
     capture(work)
     speed_misfit = close_velocities(work, free[1])
+    speed = 1.0 + float(np.max(np.abs(work.y[: equations.n_v]), initial=0.0))
+    if project and np.max(np.abs(speed_misfit), initial=0.0) > TOLERANCE * speed and work.rates:
+        work.y = y.copy()
+        if nearest_velocities(work, work.manager.active_rows(work.flags), named.v):
+            speed_misfit = np.zeros(len(speed_misfit))
     capture(work)  # approach speeds
     return contradictions(work, Attempt(rows, q, y, held_q, held_v, misfit, speed_misfit, project), model)
 
@@ -201,7 +214,7 @@ def _closed_as_named(work: Posture, named: _Named) -> bool:
     choose_turns(trial, rows)
     if not np.max(np.abs(close_nearby(trial, rows, free[0])), initial=0.0) <= TOLERANCE:
         return False
-    nearest_turns(trial, rows, list(named.q), TOLERANCE)
+    nearest_turns(trial, rows, named.q, TOLERANCE)
     capture(trial)
     speed = 1.0 + float(np.max(np.abs(trial.y[: work.equations.n_v]), initial=0.0))
     if not np.max(np.abs(close_velocities(trial, free[1])), initial=0.0) <= TOLERANCE * speed:

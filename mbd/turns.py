@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -132,29 +132,30 @@ def name_wrapped(work: Posture) -> None:
                 work.anchors[turn.anchor] -= whole_turns(float(angle) - targets.get(turn.name, 0.0))
 
 
-def nearest_turns(work: Posture, rows: Sequence[int], held: Collection[int], tolerance: float) -> None:
-    """Take the whole turns out of angles that nobody named, where the rows and the named values allow it.
+def nearest_turns(work: Posture, rows: Sequence[int], named: Mapping[int, float], tolerance: float) -> None:
+    """Bring angles next to their named values, others next to their defaults, where the rows allow it in the same pose.
 
     Parameters
     ----------
     work : a posture that closes; its q and its whole turns are changed, not its pose
-    held : numbers of the coordinates that were named
-    tolerance : largest residual that the rows and named results may have afterwards
+    named : coordinates that were named, by number
+    tolerance : largest residual that the rows may have afterwards, and by which named results may be further off
     """
     if not work.mechanism.vector:
         return
     for k, coordinate in enumerate(work.equations.coordinates):
-        turns = whole_turns(float(work.q[k]) - coordinate.default) if coordinate.unit == "rad" else 0
-        if turns and k not in held:
+        wanted = named.get(k, coordinate.default)
+        turns = whole_turns(float(work.q[k]) - wanted) if coordinate.unit == "rad" else 0
+        if turns:
             q, anchors = work.q.copy(), work.anchors.copy()
             work.q[k] -= 2.0 * math.pi * turns
             _keep_angles(work, q, anchors)
             _keep_if_closed(work, rows, q, anchors, tolerance)
-    targets = {condition.name for condition in work.places}
+    targets = {condition.name: condition.target for condition in work.places}
     for number, turn in enumerate(work.equations.turns):
         angles = _angles(work.mechanism, work.time, work.q, work.parameters, work.anchors)
-        turns = whole_turns(float(angles[number]))
-        if turn.name and turn.name not in targets and turns:
+        turns = whole_turns(float(angles[number]) - targets.get(turn.name, 0.0))
+        if turn.name and turns:
             anchors = work.anchors.copy()
             work.anchors[turn.anchor] -= turn.sign * turns
             _keep_if_closed(work, rows, work.q, anchors, tolerance)
@@ -171,6 +172,11 @@ def _keep_angles(work: Posture, q: Vector, anchors: Vector) -> None:
 
 
 def _keep_if_closed(work: Posture, rows: Sequence[int], q: Vector, anchors: Vector, tolerance: float) -> None:
-    """Go back where a change of whole turns opens the mechanism."""
-    if not np.max(np.abs(_residuals(work, rows)), initial=0.0) <= tolerance:
-        work.q, work.anchors[:] = q, anchors
+    """Go back where a change of whole turns opens the mechanism, or moves a named result away from its value."""
+    now = np.abs(_residuals(work, rows))
+    changed = work.q, work.anchors.copy()
+    work.q, work.anchors[:] = q, anchors
+    bound = np.maximum(np.abs(_residuals(work, rows)) + tolerance, tolerance)
+    bound[: len(rows)] = tolerance
+    if np.all(now <= bound):
+        work.q, work.anchors[:] = changed

@@ -33,6 +33,7 @@ RANKS = [
         "not_finite",
         "opening",
         "posture",
+        "projected",
         "projection",
         "results",
         "simulation",
