@@ -9,7 +9,7 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.compile.mechanism import Mechanism
-from mbd.compile.python import scalar_function
+from mbd.compile.python import array_function, scalar_function
 from mbd.tape.derivatives import gradient
 
 if TYPE_CHECKING:
@@ -62,14 +62,23 @@ def reversed_joints(mechanism: Mechanism, time: float, q: Vector, parameters: Ve
     ]
 
 
-def first_reversed(columns: ModelColumns) -> tuple[str, float] | None:
-    """The cut joint that a run has first turned the wrong way round, and the time of the stored row."""
-    facings = columns.equations.facings
-    found = []
-    for facing, cosine in zip(facings, columns.evaluate([each.cosine for each in facings], columns.rows), strict=True):
-        if np.min(cosine, initial=1.0) < 0.0:
-            found.append((float(columns.record.time[int(np.argmax(cosine < 0.0))]), facing.joint))
-    return (min(found)[1], min(found)[0]) if found else None
+def first_reversed(mechanism: Mechanism, columns: ModelColumns) -> tuple[str, float] | None:
+    """The cut joint that is first the wrong way round in a stored row, and the time of that row."""
+    facings, record = mechanism.equations.facings, columns.record
+    if not facings or not len(record.time):
+        return None
+    known = mechanism.named.get("facings of rows")
+    if known is None:
+        with mechanism.equations.tape.lock:
+            known = mechanism.named["facings of rows"] = array_function([facing.cosine for facing in facings])
+    rows = columns.rows
+    found = known(columns.inputs(rows), record.parameters_at(rows.source))
+    opposite = [
+        (float(record.time[int(np.argmax(cosine < 0.0))]), facing.joint)
+        for facing, cosine in zip(facings, found, strict=True)
+        if np.min(cosine) < 0.0
+    ]
+    return (min(opposite)[1], min(opposite)[0]) if opposite else None
 
 
 def faced(work: Posture, rows: Sequence[int], h: Vector, B: Matrix) -> tuple[Vector, Matrix, bool]:

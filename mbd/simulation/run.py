@@ -12,7 +12,7 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.compile.mechanism import Mechanism
 from mbd.errors import MemoryLimitError, SimulationError, UnknownNameError
-from mbd.facings import first_reversed, reversed_joints
+from mbd.facings import first_reversed
 from mbd.forces.base import Force
 from mbd.integrators.base import Integrator
 from mbd.kernel import fields as F
@@ -289,16 +289,17 @@ class Run:
         return (self.energy.judge(self) if self.limit is None else ""), ""
 
     def _reversed(self) -> str:
-        """A cut joint that a step too long has put together the wrong way round, in a sentence; '' without one."""
-        v = self.values
-        q, anchors = v["q"][: v["n_q"]], v["anchors"][: v["n_anchors"]]
-        if self.limit is not None or not reversed_joints(self.mechanism, self.now, q, v["params"], anchors):
+        """A cut joint that a step too long has turned the wrong way round in a stored row, in a sentence; else ''."""
+        if self.limit is not None or not self.mechanism.equations.facings:
             return ""
-        found = first_reversed(ModelColumns(whole_record(self), self.mechanism.equations))
-        joint, time = ("a cut joint", self.now) if found is None else found
+        found = first_reversed(self.mechanism, ModelColumns(whole_record(self), self.mechanism.equations))
+        if found is None:
+            return ""
+        joint, time = found
         return (
-            f"t = {time:.9g} s: {joint!r} was turned by half a turn in one step and is the wrong way round "
-            "since then, which its rows cannot tell; take a smaller dt, or tol=, or do not cut it"
+            f"t = {time:.9g} s: {joint!r} was turned by half a turn in one step and is the wrong way round there, "
+            "which its rows cannot tell; results from then on are of another mechanism; take a smaller dt, or tol=, "
+            "or do not cut it"
         )
 
     def _last_show(self) -> tuple[str, str]:

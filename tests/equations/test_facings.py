@@ -10,6 +10,7 @@ import mbd
 from mbd.compile.mechanisms import mechanism_of
 from mbd.results.columns import ModelColumns
 from mbd.results.violation import violation
+from mbd.simulation.stored import whole_record
 from tests.forward import misfit, placed, poses, relative
 
 KINDS = ["Weld", "Prismatic", "Revolute", "Cylindrical", "Translation", "Screw", "Universal"]
@@ -114,3 +115,27 @@ def test_a_weld_half_a_turn_off_is_told_by_the_violation_and_refused_as_a_start(
     run = mbd.simulate(model, start, dt=1e-3, until=1e-3, backend="python")
     columns = ModelColumns(replace(run.record, q=run.record.q + HALF), mechanism_of(model, "python").equations)
     assert violation(columns).angle == pytest.approx(np.pi) and violation(columns).worst == "weld"
+
+
+def test_a_run_that_is_the_wrong_way_round_for_a_while_only_is_refused(monkeypatch):
+    """A long step may turn a joint over, and another one back: every stored row is looked at."""
+    model = mbd.Model("slide", gravity=(0.0, 0.0, 0.0), cut=["slide"])
+    a, b = (mbd.RigidBody(name, mass=1.0, inertia=(0.2, 0.3, 0.25)) for name in "ab")
+    model.connect(
+        mbd.Cylindrical("first", model.ground.origin, a.origin, axis=(1.0, 0.0, 0.0)),
+        mbd.Revolute("second", a.origin, b.origin, axis=(1.0, 0.0, 0.0)),
+        mbd.Prismatic("slide", model.ground.origin, b.origin),
+    )
+    start = mbd.assemble(model, velocity={"first.displacement": 1.0, "first.angle": 0.5})
+    settings = {"dt": 1e-2, "until": 0.1, "backend": "python"}
+    assert mbd.simulate(model, start, **settings).success
+
+    def turned_over(run):
+        record = whole_record(run)
+        q = record.q.copy()
+        q[4:6, start.names.index("second.angle")] += np.pi
+        return replace(record, q=q)
+
+    monkeypatch.setattr("mbd.simulation.run.whole_record", turned_over)
+    with pytest.raises(mbd.SimulationError, match=r"t = 0\.04 s: 'slide' was turned by half a turn"):
+        mbd.simulate(model, start, **settings)
