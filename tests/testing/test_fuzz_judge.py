@@ -27,6 +27,8 @@ SLIPPING = [2159]
 """A foot in index 3 with uneven steps, which sticks by the multipliers of the step and slips by consistent ones."""
 ROUND_OFF = [2473, 3433]
 """Rows of a cut screw whose round-off is a little larger than their terms foretell."""
+TIED = [4378]
+"""Two steps of a quarter of the run: whether they are half of it must not be decided by the last bit."""
 
 
 def laws_broken(run, model, parameters=None):
@@ -86,7 +88,7 @@ def test_impacts_friction_and_loops_of_sound_runs_break_no_law():
     assert between(run, model).faults == ()
 
 
-@pytest.mark.parametrize("number", SOUND + CUT + BOUNCING + SLIPPING + ROUND_OFF)
+@pytest.mark.parametrize("number", SOUND + CUT + BOUNCING + SLIPPING + ROUND_OFF + TIED)
 def test_fuzzed_scenes_are_judged_sound(number):
     told = verdict(number)
     assert told["kind"] == "ok", told
