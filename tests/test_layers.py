@@ -12,7 +12,7 @@ import mbd
 PACKAGE = Path(mbd.__file__).parent
 
 RANKS = [
-    ("errors", "arrays", "state"),
+    ("errors", "arrays", "state", "free_memory"),
     ("tape",),
     ("scope",),
     ("bodies", "joints", "forces", "constraints"),

@@ -18,6 +18,7 @@ from mbd.equations.laws import Laws
 from mbd.equations.outputs import Outputs
 from mbd.equations.results import offer_results
 from mbd.equations.row_sizes import row_sizes
+from mbd.equations.sizes import require_room
 from mbd.equations.surroundings import Surroundings
 from mbd.errors import ModelError
 from mbd.tape.derivatives import live
@@ -51,7 +52,9 @@ def derive(model: Model | FrontDoor) -> Equations:
     from mbd.topology.plan import plan
 
     model.require_valid()
-    return _derived(model, plan(model))
+    chosen = plan(model)
+    require_room(chosen)
+    return _derived(model, chosen)
 
 
 def _derived(model: Model, plan: Plan, carried: Sequence[tuple[str, int]] = ()) -> Equations:

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.errors import MbdError, TrajectoryError
-from mbd.results.free import available, size_in_words
+from mbd.free_memory import available, size_in_words
 
 __all__ = ["Arrays", "Head", "Members", "Unreadable", "plain", "read", "write", "write_whole"]
 

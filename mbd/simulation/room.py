@@ -9,7 +9,7 @@ from __future__ import annotations
 import warnings
 from typing import TYPE_CHECKING
 
-from mbd.results.free import available, size_in_words as memory
+from mbd.free_memory import available, size_in_words as memory
 
 if TYPE_CHECKING:
     from mbd.simulation.run import Run

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 import mbd
-from mbd.results import free
+from mbd import free_memory as free
 from mbd.simulation import room, run as running, tolerance
 from tests.simulation.mechanisms import falling
 
@@ -99,7 +99,7 @@ SHORT = """
 import resource, sys
 import numpy as np
 import mbd
-from mbd.results import free
+from mbd import free_memory as free
 from mbd.simulation import room, run as running
 from tests.simulation.mechanisms import falling
 

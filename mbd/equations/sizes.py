@@ -1,0 +1,58 @@
+"""How large the equations of a model become, foretold from its joints before anything is derived.
+
+Each pair of coordinates on one path from the ground has an entry in the mass matrix, so that a chain of n joints needs
+some n² operations; bodies beside each other, and joints that are cut, add to each other only.
+"""
+
+from __future__ import annotations
+
+from mbd.errors import ModelError
+from mbd.free_memory import available, size_in_words
+from mbd.topology.plan import Plan
+
+__all__ = ["operations", "require_room"]
+
+OF_PAIR = {True: 10.0, False: 40.0}
+"""Operations for each pair of coordinates on one path, of planar and of spatial models [-]."""
+OF_COORDINATE = {True: 285.0, False: 920.0}
+"""Operations for each coordinate beside that [-]."""
+BYTES, SECONDS = 720.0, 25e-6
+"""Memory and time of an operation as it is derived and compiled; both measured, on chains of 30 to 320 links."""
+LARGE = 1e6
+"""Operations below which the free memory is not asked for [-]."""
+
+
+def operations(plan: Plan) -> float:
+    """About how many operations assembling takes: ``a Σ (coordinates on the path to each) + b n``."""
+    depth: dict[str, int] = {}
+    pairs = count = 0
+    for joint in plan.edges:
+        above, own = depth.get(joint.parent.body.name, 0), len(joint.coordinate_names)
+        pairs += own * above + own * (own + 1) // 2
+        count += own
+        depth[joint.child.body.name] = above + own
+    return OF_PAIR[plan.planar] * pairs + OF_COORDINATE[plan.planar] * count
+
+
+def require_room(plan: Plan) -> None:
+    """Refuse, before anything is derived, what would not fit into the memory that is free.
+
+    Raises
+    ------
+    ModelError
+        with the numbers of bodies and joints, the memory and the time foretold, and what to try.
+    """
+    expected = operations(plan)
+    if expected < LARGE:
+        return
+    needed, free = BYTES * expected, available()
+    if needed <= free:
+        return
+    time = f"{SECONDS * expected / 60.0:.2g} minutes"
+    joints = len(plan.edges) - len(plan.floating) + len(plan.cut)
+    raise ModelError(
+        f"{len(plan.bodies)} bodies and {joints} joints with {plan.dof} coordinates make about {expected:.2g} "
+        f"operations: their equations need at least {size_in_words(needed)} and {time}, "
+        f"and {size_in_words(free)} of memory is free; describe fewer bodies, branches in place of one long chain, or "
+        "cut='all', whose bodies do not follow each other"
+    )

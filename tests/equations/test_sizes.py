@@ -1,0 +1,49 @@
+"""Models whose equations do not fit into the free memory are refused before anything is derived."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import mbd
+from mbd.compile.mechanisms import mechanism_of
+from mbd.equations import sizes
+from mbd.topology.plan import plan
+
+
+def chain(count, axis=(0.0, 0.0, 1.0), spread=1, **more):
+    """Links that follow each other, or `spread` such chains beside each other."""
+    model = mbd.Model("chain", **more)
+    ends = [model.ground.origin] * spread
+    for k in range(count):
+        link = mbd.RigidBody(f"link {k}", 0.01, (1e-6, 2e-6, 2e-6))
+        turned = tuple(np.roll(axis, k % 2))
+        model.connect(mbd.Revolute(f"hinge {k}", ends[k % spread], link.origin, axis=axis if axis[2] else turned))
+        ends[k % spread] = link.point(1e-3, 0.0, 0.0)
+    return model
+
+
+@pytest.mark.parametrize("axis", [(0.0, 0.0, 1.0), (1.0, 1.0, 0.0)], ids=["planar", "spatial"])
+@pytest.mark.parametrize("spread", [1, 4])
+def test_the_size_foretold_is_that_of_the_equations_within_a_factor_of_three(axis, spread):
+    model = chain(24, axis, spread)
+    mbd.assemble(model)
+    made = len(mechanism_of(model).equations.tape.nodes)
+    assert made / 3.0 < sizes.operations(plan(model)) < 3.0 * made
+
+
+def test_a_chain_that_does_not_fit_is_refused_at_once_with_its_figure(monkeypatch):
+    monkeypatch.setattr(sizes, "available", lambda: 2e9)
+    figure = r"(?s)1000 bodies and 1000 joints.*3\.8 GB and 2\.2 minutes.*2 GB.*cut='all'"
+    with pytest.raises(mbd.ModelError, match=figure):
+        mbd.assemble(chain(1000))
+    sizes.require_room(plan(chain(1000, spread=100)))
+    sizes.require_room(plan(chain(1000, cut="all")))
+
+
+def test_chains_of_usual_length_ask_for_no_memory(monkeypatch):
+    def asked():
+        raise AssertionError
+
+    monkeypatch.setattr(sizes, "available", asked)
+    sizes.require_room(plan(chain(200)))
