@@ -37,7 +37,8 @@ class Rolling(VelocityConstraint):
     radius : r, the run-time parameter 'name.radius' [m]
     ground : the plane it rolls on, y = 0 by default
     only_while : name of the `Unilateral` contact that presses the wheel onto the plane: it rolls while that is closed,
-        and takes part in its impacts without slip; None: it rolls at all times, also where it has left the plane
+        and takes part in its impacts without slip; None: it rolls at all times, also where it has left the plane. Where
+        rolling needs grip although nothing presses any more, a run ends with an error; use friction instead
 
     'name.force' is the friction on the wheel along t [N], −λ; 'name.residual' the slip [m/s].
 

@@ -14,6 +14,7 @@ from mbd.kernel import fields as F
 from mbd.not_finite import first_cause, tape_inputs
 from mbd.results.failure import Failure
 from mbd.results.record import EventRecord
+from mbd.simulation.grip import lost_grip
 from mbd.simulation.jamming import may_jam
 from mbd.simulation.lengths import RUNGE_KUTTA
 from mbd.simulation.redundant import clash
@@ -231,6 +232,9 @@ def _no_size(stepper: Stepper, status: int, closed: str) -> str:
 
 def _no_contact(stepper: Stepper, status: int, closed: str, events: Sequence[EventRecord]) -> str:
     """Contacts and frictions that have no forces, no impulses, or no end of switching."""
+    grip = lost_grip(stepper, events) if status in (F.CHATTER, F.NO_IMPACT) else ""
+    if grip:
+        return grip
     if status == F.CHATTER:
         state, most = stepper.values["state"], stepper.values["max_switches"]
         many = max(state[F.SWITCHES], state[F.REDONE]) > most
