@@ -8,9 +8,9 @@ import mbd
 ANGLES = ("crank.angle", "pin.angle", "rocker.angle", "joint.angle")
 
 
-def four_bar(seed, cut):
+def four_bar(seed, cut, lengths=None):
     random = np.random.default_rng(seed)
-    crank, coupler, rocker, base = 0.3 + 0.1 * random.random(), *(0.9 + 0.3 * random.random(3))
+    crank, coupler, rocker, base = lengths or (0.3 + 0.1 * random.random(), *(0.9 + 0.3 * random.random(3)))
     model = mbd.Model("four-bar", cut=cut)
     a, b, c = (
         mbd.Link(name, mass=1.0, length=length, center=0.5 * length)
@@ -62,3 +62,12 @@ def test_a_projected_crank_is_no_further_than_half_a_turn_from_the_angle_that_wa
         run = mbd.simulate(model, start, dt=1e-3, until=1e-3, backend="python")
         for name, value in named.items():
             assert abs(run[name][0] - value) <= np.pi + 1e-9, name
+
+
+def test_angles_named_a_turn_away_from_a_pose_are_projected_to_that_pose_next_to_them():
+    """An angle of 8.87 rad that was asked for is moved to 10.84 rad, not to 4.56 rad, the same pose."""
+    lengths = np.random.default_rng(0).uniform(0.3, 1.5, 4).tolist()
+    named = {"crank.angle": -5.0, "joint.angle": 8.87}
+    start = mbd.assemble(four_bar(0, ["rocker"], lengths), named, project=True)
+    for name, value in named.items():
+        assert abs(start[name] - value) <= np.pi + 1e-9, name
