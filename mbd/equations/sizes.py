@@ -16,8 +16,8 @@ OF_PAIR = {True: 10.0, False: 40.0}
 """Operations for each pair of coordinates on one path, of planar and of spatial models [-]."""
 OF_COORDINATE = {True: 285.0, False: 920.0}
 """Operations for each coordinate beside that [-]."""
-BYTES, SECONDS = 720.0, 25e-6
-"""Memory and time of an operation as it is derived and compiled; both measured, on chains of 30 to 320 links."""
+BYTES, SECONDS = 800.0, 25e-6
+"""Memory and time of an operation as it is derived and compiled; both measured, on chains of 30 to 1000 links."""
 LARGE = 1e6
 """Operations below which the free memory is not asked for [-]."""
 
