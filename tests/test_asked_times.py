@@ -112,6 +112,40 @@ def test_no_instant_between_long_steps_is_worse_than_the_others(kind):
         assert np.max(found) <= 30.0 * max(row, np.median(found)) + 1e-9 * size, name
 
 
+@pytest.mark.parametrize(("kind", "seed"), [("tree", 0), ("tree", 4), ("loop", 1), ("loop", 4), ("redundant", 0)])
+@pytest.mark.parametrize("tol", [1e-4, 1e-7])
+def test_rates_between_long_implicit_steps_are_as_accurate_as_at_rows(kind, seed, tol):
+    """Local errors of single steps are no motion: polynomials through rows missed rates by these over the step."""
+    run = mbd.simulate(*mechanism(kind, seed), mbd.RadauIIA(), tol=tol, until=0.6)
+    fine = mbd.simulate(*mechanism(kind, seed), mbd.RungeKutta853(), dt=5e-3, until=0.6)
+    steps = np.diff(run.time)
+    times = np.concatenate([run.time[:-1] + part * steps for part in (0.15, 0.5, 0.8)])
+    errors, names = [], run.record.equations.velocity_names
+    for asked in (run.time, times):
+        ours, theirs = run.at(asked).read(*names), fine.at(asked).read(*names)
+        errors.append(max(np.max(np.abs(ours[name] - theirs[name])) for name in names))
+    assert errors[1] < 1.5 * errors[0] + NOTHING
+
+
+def test_between_implicit_steps_of_a_stiff_mechanism_results_stay_with_the_rows():
+    """A stiff damped spring, which explicit steps of that length cannot follow, under a pendulum that swings."""
+    model = mbd.Model("stiff base")
+    base, rod = mbd.PointMass("base", 1.0), mbd.Link("rod", 1.0, 1.0, 1.0)
+    model.connect(
+        mbd.Prismatic("slide", model.ground.origin, base.origin, stiffness=1e8, loss=mbd.Viscous(1e4)),
+        mbd.Revolute("hinge", base.origin, rod.start),
+    )
+    start = mbd.assemble(model, position={"hinge.angle": 1.0})
+    run = mbd.simulate(model, start, mbd.RadauIIA(), dt=2e-2, until=1.0)
+    fine = mbd.simulate(model, start, mbd.RadauIIA(), dt=5e-4, until=1.0)
+    late = run.time[run.time > 0.2]
+    between = 0.5 * (late[1:] + late[:-1])
+    for name in ("hinge.angle", "hinge.angle.rate", "slide.displacement"):
+        rows = np.max(np.abs(run.at(late)[name] - fine.at(late)[name]))
+        size = np.max(np.abs(run[name]))
+        assert np.max(np.abs(run.at(between)[name] - fine.at(between)[name])) < 10.0 * rows + 1e-5 * size, name
+
+
 @pytest.mark.parametrize("tol", [1e-4, 1e-9])
 def test_explicit_steps_with_a_redundant_row_keep_their_tolerance_between_rows(tol):
     model, start = bricard()

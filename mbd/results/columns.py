@@ -15,6 +15,7 @@ from mbd.arrays import Matrix, Vector
 from mbd.errors import TrajectoryError, UnknownNameError, nearest
 from mbd.results.balance import Balance
 from mbd.results.dense import Restepping
+from mbd.results.dense_implicit import LedSteps
 from mbd.results.forces import Forces
 from mbd.results.interpolation import Grid, Places
 from mbd.results.names import AXES, rate_name
@@ -172,7 +173,10 @@ class ModelColumns(Columns):
         rows, plain = self.rows, self.equations.compose is None
         smooth = is_smooth(self.record, plain)
         found = self.grid.between(rows, places, self.q_rate, smooth)
-        return found, self.grid.rougher(rows, places, found, plain, smooth)
+        rougher = self.grid.rougher(rows, places, found, plain, smooth)
+        if smooth and LedSteps.serves(self) and Balance.serves(self.equations):
+            found = LedSteps(self).at(rows, places, found)
+        return found, rougher
 
     @cached_property
     def _forces(self) -> Forces:
