@@ -236,7 +236,7 @@ class ModelColumns(Columns):
                     continue
                 fresh = closed.copy()
                 fresh[1:] &= ~closed[:-1]
-                captured = np.column_stack(self.evaluate(contact.captured, rows.part(fresh)))
+                captured = np.column_stack(self.evaluate(contact.captured, rows.part(np.flatnonzero(fresh))))
                 if closed[0] and self.record.start is not None and contact.name in self.record.start.mode.closed:
                     captured[0] = self.record.start.anchors[list(contact.anchors)]
                 held[np.ix_(closed, np.array(contact.anchors))] = captured[np.cumsum(fresh)[closed] - 1]

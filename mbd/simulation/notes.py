@@ -20,7 +20,7 @@ from mbd.simulation.fastest import fastest, resolving_dt, sane_rows
 from mbd.simulation.redundant import redundancy
 from mbd.simulation.singular import singular_start
 from mbd.simulation.stored import record_of
-from mbd.simulation.turning import unresolved_turns
+from mbd.simulation.turning import blocks, unresolved_turns
 
 if TYPE_CHECKING:
     from mbd.simulation.run import Run
@@ -94,7 +94,7 @@ def notes_of(run: Run, record: Record) -> tuple[list[str], list[str]]:
     equations = run.mechanism.equations
     loaded = bool(run.values["loaded"]) or any(friction.contact >= 0 for friction in equations.frictions)
     rubs = loaded and any(code.borne for code in run.stepper.modes)
-    moved = len(record.q) > 1 and bool(np.max(np.ptp(record.q, axis=0), initial=0.0) > MOVED)
+    moved = any(np.max(np.abs(part - record.q[0]), initial=0.0) > MOVED for part in blocks(record.q))
     dependent = redundancy(equations.rows, run.stepper.dependent, rubs, moved, _left_singular(run))
     notes += [dependent] if dependent else singular_start(run)
     notes += [DAMAGED.format(run.damage)] if run.damage else []
@@ -116,9 +116,10 @@ def notes_of(run: Run, record: Record) -> tuple[list[str], list[str]]:
         )
     notes += unresolved_turns(run, record)
     notes += _uncounted(run, record)
+    columns = ModelColumns(record, equations)
     for number, contact in enumerate(run.manager.contacts):
         short, blind = _short_touch(run, record, number, contact)
-        notes += _ignored(run, number, contact) + _overshot(run, record, contact) + short
+        notes += _ignored(run, number, contact) + _overshot(run, columns, contact) + short
         notes += _pulled(record, number, contact)
         doubts += blind
     return notes, doubts
@@ -182,15 +183,15 @@ def _pulled(record: Record, number: int, contact: Contact) -> list[str]:
     ]
 
 
-def _overshot(run: Run, record: Record, contact: Contact) -> list[str]:
+def _overshot(run: Run, columns: ModelColumns, contact: Contact) -> list[str]:
     """A located contact that closes below its surface: it was passed in a step too long to see it come."""
     if contact.kind == "penalty" or run.values["strategy"] == 1 or run.values["linear"] == 1:
         return []
+    record = columns.record
     last = len(record.time) - 1
     rows = [min(event.row, last) for event in run.events if event.name == contact.name and event.kind == "closed"]
     if not rows:
         return []
-    columns = ModelColumns(record, run.mechanism.equations)
     (gaps,) = columns.evaluate([contact.gap], columns.rows.part(np.array(rows)))
     worst = int(np.argmin(gaps))
     if not gaps[worst] < -OVERSHOT:

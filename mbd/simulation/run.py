@@ -434,13 +434,13 @@ def _steps_at_once(stepper: Stepper) -> int:
 
 def _impulses(manager: ActiveSetManager, own: int, line: Vector) -> dict[str, Vector]:
     """Impulses of contacts, and of dry frictions in joints, by name: that of contact `own`, and others if any."""
-    found = {manager.names[own]: line[list(manager.contacts[own].rows)]}
-    for name, contact in zip(manager.names, manager.contacts, strict=True):
-        rows = list(contact.rows)
-        if name != manager.names[own] and line[rows].any():
-            found[name] = line[rows]
+    mine, numbers = manager.contacts[own], line.tolist()
+    found = {mine.name: line[list(mine.rows)]}
+    for contact in manager.contacts:
+        if contact is not mine and any(numbers[row] for row in contact.rows):
+            found[contact.name] = line[list(contact.rows)]
     for friction in manager.frictions:
-        if friction.contact < 0 and line[friction.row] != 0.0:
+        if friction.contact < 0 and numbers[friction.row]:
             found[friction.name] = line[[friction.row]]
     return found
 

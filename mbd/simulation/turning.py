@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mbd.arrays import Vector
+from mbd.arrays import Matrix, Vector
 from mbd.equations.equations import Equations
 from mbd.results.record import Record
 from mbd.simulation.lengths import RUNGE_KUTTA
@@ -15,12 +16,20 @@ from mbd.tape.derivatives import live
 if TYPE_CHECKING:
     from mbd.simulation.run import Run
 
-__all__ = ["LARGEST_ANGLE", "beyond_angles", "overturned", "unresolved_turns"]
+__all__ = ["LARGEST_ANGLE", "beyond_angles", "blocks", "overturned", "unresolved_turns"]
 
 LARGEST_ANGLE = 1e12
 """Beyond this, neighbouring numbers differ by more than 1e-4 rad: poses, and what depends on them, are round-off."""
 HALF_TURN = np.pi
 """Turn in a step above which forces that follow the angle are read at too few places of a turn [rad]."""
+BLOCK = 4096
+"""Rows that are looked at together."""
+
+
+def blocks(values: Matrix) -> Iterator[Matrix]:
+    """Successive rows of a large table, few enough to need little memory; each begins with the end of the last."""
+    for first in range(0, max(len(values) - 1, 1), BLOCK):
+        yield values[first : first + BLOCK + 1]
 
 
 def beyond_angles(equations: Equations, q: Vector) -> list[str]:
@@ -47,7 +56,11 @@ def unresolved_turns(run: Run, record: Record) -> list[str]:
     if run.values["adaptive"] or run.values["scheme"] == RUNGE_KUTTA or len(record.time) < 2:
         return []
     equations = run.mechanism.equations
-    ways = np.max(np.abs(np.diff(record.q, axis=0)), axis=0) / record.settings.get("store", 1)
+    ways = np.zeros(equations.n_q)
+    for part in blocks(record.q):
+        if len(part) > 1:
+            ways = np.maximum(ways, np.max(np.abs(np.diff(part, axis=0)), axis=0))
+    ways /= record.settings.get("store", 1)
     fast = [k for k, coordinate in enumerate(equations.coordinates) if coordinate.unit == "rad" and ways[k] > HALF_TURN]
     if not fast:
         return []
