@@ -15,7 +15,7 @@ from tests.simulation.judging import complaints
 SCHEMES = [mbd.HHT(), mbd.Newmark(), mbd.GeneralizedAlpha(0.8), mbd.HHT(0.1, formulation="index3"), mbd.RadauIIA(),
            mbd.RungeKutta853()]  # fmt: skip
 NAMES = [f"{type(scheme).__name__}-{k}" for k, scheme in enumerate(SCHEMES)]
-WILD = [21, 40, 84, 109, 113, 261, 370, 372, 711]
+WILD = [21, 40, 84, 109, 113, 261, 370, pytest.param(372, marks=pytest.mark.slow), 711]
 """Scenes of 1400 whose closed contacts pulled, or had impulses that did, before consistent multipliers were asked."""
 
 
