@@ -94,7 +94,7 @@ def notes_of(run: Run, record: Record) -> tuple[list[str], list[str]]:
     equations = run.mechanism.equations
     loaded = bool(run.values["loaded"]) or any(friction.contact >= 0 for friction in equations.frictions)
     rubs = loaded and any(code.borne for code in run.stepper.modes)
-    moved = any(np.max(np.abs(part - record.q[0]), initial=0.0) > MOVED for part in blocks(record.q))
+    moved = any(np.max(np.abs(part - record.q[:1]), initial=0.0) > MOVED for part in blocks(record.q))
     dependent = redundancy(equations.rows, run.stepper.dependent, rubs, moved, _left_singular(run))
     notes += [dependent] if dependent else singular_start(run)
     notes += [DAMAGED.format(run.damage)] if run.damage else []

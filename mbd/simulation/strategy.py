@@ -6,9 +6,11 @@ from collections.abc import Mapping
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from mbd.kernel import fields as F
 from mbd.kernel.active_set import ActiveSetManager
-from mbd.kernel.crowding import crowd
+from mbd.kernel.crowding import SEVERAL, crowd
 
 if TYPE_CHECKING:
     from mbd.simulation.run import Run
@@ -67,7 +69,8 @@ def may_go_on_unlocated(run: Run, status: int) -> bool:
     if run.limit is not None or not v["auto"] or v["state"][F.UNLOCATED] or status <= F.NOT_FINITE:
         return False
     crowded = crowd(SimpleNamespace(clock=clock, dt=v["dt"])) > CROWDED
-    return bool(status in ENDLESS or crowded)
+    several = np.count_nonzero(v["closed"][: v["n_contacts"]]) >= SEVERAL  # a single one has no other to be told from
+    return bool(crowded or (status in ENDLESS and several))
 
 
 def go_on_unlocated(run: Run) -> None:
