@@ -96,7 +96,7 @@ def test_the_last_bit_of_a_start_decides_nothing(seed):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_the_last_bit_decides_nothing_where_residuals_of_collocation_fall_no_more(seed):
-    """Next to a pose in which rows lose rank round-off stays above the tighter tolerance, below the one asked for."""
+    """Next to a singular configuration round-off stays above the tighter tolerance, below the one asked for."""
     rng = np.random.default_rng(seed)
     dts = [0.0003108964665420226, 0.0004457383265439875, *10.0 ** rng.uniform(-3.5, -2.5, 2)]
     case = slow_slider_crank()

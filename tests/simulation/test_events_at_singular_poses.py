@@ -63,7 +63,7 @@ def plain(seed: int, scheme: mbd.Integrator, dt: float) -> mbd.Trajectory:
 
 @pytest.mark.parametrize("scheme", SCHEMES, ids=repr)
 @pytest.mark.parametrize("seed", range(5))
-def test_an_event_without_effect_next_to_a_singular_configuration_is_told_and_changes_nothing(seed, scheme):
+def test_an_event_without_effect_next_to_a_singular_configuration_is_logged_and_changes_nothing(seed, scheme):
     found, place = linkage(seed)
     rng = random.Random(f"{seed} {scheme!r}")
     dt = 10.0 ** rng.uniform(-3.0, -2.2)

@@ -1,4 +1,4 @@
-"""Pins are told to jam where their friction can lock the motion, and only those, by every scheme."""
+"""Pins are said to jam where their friction can lock the motion, and only those, by every scheme."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def test_a_point_mass_on_a_pin_that_reaches_its_lever_arm_does_not_move_and_is_n
 
 @pytest.mark.parametrize("scheme", [mbd.HHT(0.05), mbd.RadauIIA()], ids=repr)
 @pytest.mark.parametrize("seed", range(6))
-def test_a_pin_is_told_to_jam_where_it_reaches_the_lever_arm_and_not_below(seed, scheme):
+def test_a_pin_is_said_to_jam_where_it_reaches_the_lever_arm_and_not_below(seed, scheme):
     for part, jams in ((0.3, False), (0.9, False), (1.1, True)):
         run = mbd.simulate(*spoiled(seed, part), scheme, dt=1e-2, until=2.0, on_failure="return")
         assert run.success or ("may jam" in run.message) == jams, (part, run.message)

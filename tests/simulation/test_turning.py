@@ -1,4 +1,4 @@
-"""Angles that no number tells are refused, and turns that steps do not resolve are told."""
+"""Angles that no number tells are refused, and turns that steps do not resolve are reported."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def test_a_run_that_turns_beyond_all_numbers_ends_in_an_error(scheme, center):
 
 
 @pytest.mark.parametrize("scheme", [mbd.HHT(), mbd.GeneralizedAlpha(0.8), mbd.RadauIIA()], ids=repr)
-def test_turns_that_steps_do_not_resolve_are_told_where_the_motion_follows_from_them(scheme):
+def test_turns_that_steps_do_not_resolve_are_reported_where_the_motion_follows_from_them(scheme):
     rng = np.random.default_rng(11)
     for speed in np.pi / 1e-2 * np.append(rng.uniform(0.1, 0.9, 2), rng.uniform(1.1, 50.0, 3)):
         notes = spun(rotor(0.4), speed, scheme).stats["notes"]
