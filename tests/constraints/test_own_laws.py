@@ -1,4 +1,4 @@
-"""Laws of a user's own: they move as the mechanics says, run compiled, and are refused by name where they cannot act."""
+"""Laws of a user's own: they move as the mechanics says, run compiled, and are refused by name where they cannot."""
 
 from __future__ import annotations
 
