@@ -121,8 +121,10 @@ def look_closer(K: Any, h: float, t1: float, stretch: float, rough_enough: bool)
         status = GAINED
     elif leaps(K, h, at_y):
         status = LEAPT
-    elif rough_enough and (rough > COARSE or K.scheme != 0) and K.strategy == 0:
-        note_coarse(K, t1, rough)
+    elif rough_enough and K.strategy == 0:
+        rough = max(rough, lag(K, h, at_y))
+        if rough > COARSE or K.scheme != 0:
+            note_coarse(K, t1, rough)
     carry(K.q1, K.inside, 0, K.n_q, False)
     carry(K.y1, K.inside, at_y, K.n, False)
     if K.state[N_DROPPED] > 0:
@@ -137,6 +139,24 @@ def look_closer(K: Any, h: float, t1: float, stretch: float, rough_enough: bool)
         K.detail[0] = t1
         K.detail[2] = h
     return status
+
+
+def lag(K: Any, h: float, at_y: int) -> float:
+    """Largest part of a rate by which it misses ``h (a₀ + a₁)/2``, as the auxiliary a of the scheme lags behind v̇ [-].
+
+    A scheme with strong numerical damping carries the a of a steep start on for some steps.
+    """
+    if K.scheme != 0:
+        return 0.0
+    fastest = 0.0
+    for i in range(K.n_v):
+        fastest = max(fastest, max(abs(K.y[i]), abs(K.inside[at_y + i])))
+    floor = max(K.rest_speed, BYSTANDER * fastest)
+    worst = 0.0
+    for i in range(K.n):
+        missed = abs(K.inside[at_y + i] - K.y[i] - 0.5 * h * (K.rate[i] + K.rate1[i]))
+        worst = max(worst, missed / max(floor, max(abs(K.y[i]), abs(K.inside[at_y + i]))))
+    return worst
 
 
 def note_coarse(K: Any, t1: float, rough: float) -> None:

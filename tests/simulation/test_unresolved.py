@@ -137,3 +137,20 @@ def test_a_wall_that_is_thinner_than_a_step_is_told_with_a_step_that_resolves_it
         finer = mbd.simulate(model, start, integrator, dt=asked, until=until)
         assert not coarse_notes(finer)
         assert np.max(np.abs(finer.at(times)["slide.displacement"] - exact["slide.displacement"])) < 0.1 * reach
+
+
+@pytest.mark.parametrize("share", [0.2, 1.0, 2.6])
+@pytest.mark.parametrize("scheme", [mbd.GeneralizedAlpha(rho_inf=0.0), mbd.GeneralizedAlpha(rho_inf=0.5), mbd.HHT(0.3)])
+def test_a_scheme_that_lags_behind_a_steep_brake_says_so(scheme, share):
+    """``v̇ = −c v³`` from v₀ has ``v = v₀ / √(1 + 2 c v₀² t)``; the first step brakes v₀ by about `share`."""
+    speed, dt = 33.0, 1e-3
+    model = mbd.Model("braked wheel", gravity=(0.0, 0.0, 0.0))
+    wheel = mbd.RigidBody("wheel", mass=1.0, inertia=0.01)
+    model.connect(mbd.Revolute("pin", model.ground.origin, wheel.origin))
+    c = share / (speed**2 * dt)
+    model.apply(mbd.Motor("brake", model.joints[0], lambda v: -0.01 * c * v**3, arguments=["pin.rate"]))
+    start = mbd.assemble(model, velocity={"pin.angle": speed})
+    run = mbd.simulate(model, start, scheme, dt=dt, until=10.0 * dt)
+    exact = speed / np.sqrt(1.0 + 2.0 * c * speed**2 * run.time)
+    off = np.max(np.abs(run["pin.rate"] - exact) / exact)
+    assert off < 0.5 or any("not resolved by dt" in note for note in run.stats["notes"])
