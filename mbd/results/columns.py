@@ -145,6 +145,15 @@ class ModelColumns(Columns):
         """The stored states."""
         return self.record.rows(self.anchors)
 
+    def part(self, chosen: NDArray[np.intp], nodes: Sequence[Node]) -> Rows:
+        """Some of the stored states; what contacts have captured is found only where these expressions need it."""
+        from mbd.tape.derivatives import live
+
+        with self.equations.tape.lock:
+            needed = any(node.op == "input" and node.data[0] == "anchor" for node in live(nodes))
+        anchors = self.anchors if needed else np.zeros((len(self.record.time), self.equations.n_anchors))
+        return self.record.rows(anchors).part(chosen)
+
     def at_rows(self, names: Sequence[str]) -> list[Vector]:
         return self.evaluate([self.node(name) for name in names], self.rows)
 

@@ -192,7 +192,7 @@ def _overshot(run: Run, columns: ModelColumns, contact: Contact) -> list[str]:
     rows = [min(event.row, last) for event in run.events if event.name == contact.name and event.kind == "closed"]
     if not rows:
         return []
-    (gaps,) = columns.evaluate([contact.gap], columns.rows.part(np.array(rows)))
+    (gaps,) = columns.evaluate([contact.gap], columns.part(np.array(rows), [contact.gap]))
     worst = int(np.argmin(gaps))
     if not gaps[worst] < -OVERSHOT:
         return []
