@@ -70,7 +70,7 @@ Without rows ten times as many.
 """
 
 
-def rings(K: Any) -> bool:
+def has_spurious_reaction(K: Any) -> bool:
     """Whether a step ends with a contact that pulls, or a friction that sticks beyond its limit, judged to do neither.
 
     The multipliers of a step belong to its own accelerations, which satisfy the constraints on average only: those of
@@ -137,7 +137,7 @@ def conclude(
     """Accept a candidate without events; 0, or a failure.
 
     h of the `full` step that was to be; `cut` at a boundary inside the run; `within` a step of the grid;
-    `quiet`: no guard can have changed; `holds`: so do the rows that were left out; `pulls`: a contact does (`rings`).
+    `quiet`: no guard can have changed; `holds`: so do the rows that were left out; `pulls`: a reaction is spurious.
     """
     paired = K.state[PAIRED] > 0
     if h < full and not within:
@@ -163,7 +163,7 @@ def conclude(
     if cut and K.stabilized == 0 and refuses(K, h):
         K.fired[0] = -1
         return AT_POSE
-    if (h < 1e-3 * K.clock[STEP] and K.scheme != 1) or uneven:  # index 3 rings after a change of step
+    if (h < 1e-3 * K.clock[STEP] and K.scheme != 1) or uneven:  # index-3 multipliers oscillate after a change of step
         take_over(K, t1)
         K.state[RESTART] = 2
     else:
@@ -344,7 +344,7 @@ def judge_step(K: Any, h: float, full: float, t1: float, cut: bool, within: bool
         event = find_event(K, h, t1)
         if event > 0:
             return event
-    pulls = event == 0 and not quiet and rings(K)
+    pulls = event == 0 and not quiet and has_spurious_reaction(K)
     if pulls and K.state[ROWS] > 0 and calm(K):
         return -1
     add_error(K, h, event < 0)
