@@ -177,7 +177,7 @@ class Step:
         return distance_to_pose(B, terms.turning, mass, self.y[:n_v], scale, self.memory.whole or self.memory.step)
 
     def _hold_positions(self) -> None:
-        """Hold h alone in this step, with the last correction of positions: see `mbd.kernel.passage`."""
+        """Hold h alone in this step, with the last correction of positions: see `mbd.kernel.singular.newmark_step`."""
         self.both, self.near, self.predicted = False, PASSING, self.y
         shift = self.memory.shift * min(self.dt / self.memory.step, 1.0) ** 3
         self.x = self.x - self.shift + shift

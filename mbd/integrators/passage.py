@@ -1,4 +1,4 @@
-"""How many steps off a pose is in which rows lose rank: the readable twin of `mbd.kernel.passage`."""
+"""How many steps off a pose is in which rows lose rank: the readable twin of `mbd.kernel.singular.newmark_step`."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
-from mbd.kernel.pairs import WHOLE, is_of_pair
-from mbd.kernel.passage import CONTINUOUS, FORESEEN, NEAREST, VANISHING, WITHIN
+from mbd.kernel.singular.newmark_step import CONTINUOUS, FORESEEN, NEAREST, VANISHING, WITHIN
+from mbd.kernel.singular.step_pairs import WHOLE, is_of_pair
 
 __all__ = ["CONTINUOUS", "WHOLE", "WITHIN", "Distance", "distance_to_pose"]
 

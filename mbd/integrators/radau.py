@@ -22,10 +22,10 @@ from mbd.bodies.values import is_number, shown
 from mbd.errors import CapabilityError
 from mbd.integrators.base import Integrator, Point, StepReport, StepResult, System, Terms, completed, consistent_rates
 from mbd.integrators.family import DEFAULT_TOLERANCE
-from mbd.kernel.astride import MOST_SETTLED
-from mbd.kernel.collocation import RADAU
-from mbd.kernel.radau import FAR_OFF, MOST_RETREATS, PATIENT, SLOW, is_settled
-from mbd.kernel.stages import MOST_STRETCHED
+from mbd.kernel.schemes.collocation import RADAU
+from mbd.kernel.schemes.radau import FAR_OFF, MOST_RETREATS, PATIENT, SLOW, is_settled
+from mbd.kernel.schemes.stages import MOST_STRETCHED
+from mbd.kernel.singular.stages import MOST_SETTLED
 from mbd.state import Mode, State
 
 __all__ = ["RadauIIA", "RadauMemory"]
@@ -370,7 +370,7 @@ class _RadauStep:
 
 
 class _AstrideStep(_RadauStep):
-    """A step with stages on both sides of a pose in which rows lose rank: see `mbd.kernel.astride`."""
+    """A step with stages on both sides of a pose in which rows lose rank: see `mbd.kernel.singular.stages`."""
 
     astride = True
 

@@ -53,10 +53,10 @@ from mbd.kernel.locate import locate
 from mbd.kernel.nonsmooth import lands, lets_go
 from mbd.kernel.observe import is_awaited, store_row
 from mbd.kernel.pace import relax_pace
-from mbd.kernel.pairs import ALONE, FIRST, SECOND
 from mbd.kernel.restart import consistent, largest_force
 from mbd.kernel.settle import room_to_log
-from mbd.kernel.singular import find_passed_events, log_passed_events, may_pass_events, refuses
+from mbd.kernel.singular.events import find_passed_events, log_passed_events, may_pass_events, refuses
+from mbd.kernel.singular.step_pairs import ALONE, FIRST, SECOND
 from mbd.kernel.starting import find_mode, restart, still_dependent
 from mbd.kernel.takeover import leave_pose, take_over
 from mbd.kernel.trying import part_end, step_end, tried_step

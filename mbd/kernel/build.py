@@ -32,10 +32,12 @@ ENTRY = "mbd_kernel"
 
 MODULES = (
     "candidate", "linear", "ordered", "orthogonal", "lemke", "redundancy", "saddle", "restart", "pivoting",
-    "complementarity", "blow", "impact", "settle", "pairs", "iteration", "memory", "leftovers", "passage", "newton",
-    "newmark", "complex_linear", "ordered_complex", "stages", "straddle", "uneven", "runge_kutta", "astride", "radau",
-    "hermite", "significance", "guards", "pace", "control", "interior", "refine", "locate", "switching", "nonsmooth",
-    "takeover", "observe", "starting", "poles", "unresolved", "trying", "crowding", "singular", "events", "advance",
+    "complementarity", "blow", "impact", "settle", "singular.step_pairs", "schemes.iteration", "schemes.memory",
+    "singular.gram_norms", "singular.newmark_step", "schemes.newton", "schemes.newmark", "complex_linear",
+    "ordered_complex", "schemes.stages", "singular.step_size", "uneven", "schemes.runge_kutta", "singular.stages",
+    "schemes.radau", "hermite", "significance", "guards", "pace", "control", "interior", "refine", "locate",
+    "switching", "nonsmooth", "takeover", "observe", "starting", "poles", "unresolved", "trying", "crowding",
+    "singular.events", "events", "advance",
 )  # fmt: skip
 
 APART = (
@@ -84,7 +86,7 @@ def mbd_kernel(K: Any) -> int:
 
 
 def _source(name: str) -> str:
-    return Path(__file__).with_name(f"{name}.py").read_text(encoding="utf-8")
+    return Path(__file__).parent.joinpath(*name.split(".")).with_suffix(".py").read_text(encoding="utf-8")
 
 
 def source_digest() -> str:

@@ -39,7 +39,7 @@ from mbd.kernel.guards import try_step
 from mbd.kernel.hooks import scheme_error
 from mbd.kernel.restart import compose, consistent, fill_block, lower_scales
 from mbd.kernel.roots import sqrt
-from mbd.kernel.straddle import step_by_pose, stirred, stirs
+from mbd.kernel.singular.step_size import step_by_pose, stirred, stirs
 
 __all__ = ["controlled_step", "first_step", "newmark_error", "smallest_step"]
 

@@ -26,9 +26,9 @@ from mbd.kernel.fields import (
     WIDTH,
 )
 from mbd.kernel.guards import try_step
-from mbd.kernel.pairs import ALONE, FIRST, LONGER, SECOND, SHORTER, WHOLE, may_pair
 from mbd.kernel.restart import consistent, lower_scales
-from mbd.kernel.straddle import is_resolved, longest_over, step_by_pose, stirs
+from mbd.kernel.singular.step_pairs import ALONE, FIRST, LONGER, SECOND, SHORTER, WHOLE, may_pair
+from mbd.kernel.singular.step_size import is_resolved, longest_over, step_by_pose, stirs
 from mbd.kernel.unresolved import judge_change
 
 __all__ = ["part_end", "step_end", "tried_step"]

@@ -24,7 +24,7 @@ from typing import Any
 
 from mbd.integrators.dormand_prince import STAGES
 from mbd.kernel.lemke import lemke_places
-from mbd.kernel.stages import STAGES_END, stage_place
+from mbd.kernel.schemes.stages import STAGES_END, stage_place
 
 __all__ = ["NEWMARK", "PROGRAMS", "RADAU_IIA", "RUNGE_KUTTA", "array_lengths"]
 

@@ -14,9 +14,9 @@ from mbd.errors import SimulationError
 from mbd.integrators.base import Integrator, Point, StepReport, StepResult, System, Terms
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.kernel.fields import CAREFUL, ITERATIONS, NEAR, NOT_CONVERGED, NOT_FINITE, NOW, ROWS, TOO_NEAR
-from mbd.kernel.memory import start_step
 from mbd.kernel.restart import MOST_LOADS, evaluate, fill_block, refresh_scales
-from mbd.kernel.straddle import forget_leftovers, keep_leftovers, note_leftovers
+from mbd.kernel.schemes.memory import start_step
+from mbd.kernel.singular.step_size import forget_leftovers, keep_leftovers, note_leftovers
 from mbd.kernel.uneven import LOSS
 from mbd.simulation.asked import asked
 from mbd.simulation.shares import shares

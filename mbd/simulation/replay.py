@@ -16,9 +16,9 @@ from mbd.errors import ModelError
 from mbd.integrators import Integrator
 from mbd.integrators.base import StepReport
 from mbd.kernel.control import newmark_error
-from mbd.kernel.newmark import newmark_accept, newmark_resume, newmark_start, newmark_step
-from mbd.kernel.radau import radau_accept, radau_start, radau_step
-from mbd.kernel.runge_kutta import runge_kutta_accept, runge_kutta_start, runge_kutta_step
+from mbd.kernel.schemes.newmark import newmark_accept, newmark_resume, newmark_start, newmark_step
+from mbd.kernel.schemes.radau import radau_accept, radau_start, radau_step
+from mbd.kernel.schemes.runge_kutta import runge_kutta_accept, runge_kutta_start, runge_kutta_step
 from mbd.results.capsule import load
 from mbd.results.failure import Failure
 from mbd.simulation.failures import residual_names

@@ -21,7 +21,7 @@ from mbd.integrators.radau import RadauIIA
 from mbd.integrators.runge_kutta import RungeKutta853
 from mbd.kernel import fields as F
 from mbd.kernel.active_set import ActiveSetManager
-from mbd.kernel.collocation import RADAU
+from mbd.kernel.schemes.collocation import RADAU
 from mbd.kernel.settle import room_to_log
 from mbd.simulation.call_table import CallTable
 from mbd.simulation.lengths import NEWMARK, PROGRAMS, RADAU_IIA, RUNGE_KUTTA, array_lengths

@@ -7,7 +7,7 @@ import pytest
 
 import mbd
 from mbd.integrators.dormand_prince import NODES
-from mbd.kernel.straddle import AMID
+from mbd.kernel.singular.step_size import AMID
 from tests.cases.linkages import four_bars, upright
 from tests.integrators.flat import T, flat, pendulum_like, started, wanted
 

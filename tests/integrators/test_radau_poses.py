@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import mbd
-from mbd.kernel.collocation import RADAU
-from mbd.kernel.straddle import AMID_RADAU
+from mbd.kernel.schemes.collocation import RADAU
+from mbd.kernel.singular.step_size import AMID_RADAU
 from tests.cases.linkages import four_bars, upright
 from tests.integrators.flat import T, flat, pendulum_like, started, wanted
 

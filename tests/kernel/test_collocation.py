@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mbd.kernel.collocation import RADAU
+from mbd.kernel.schemes.collocation import RADAU
 
 DEGREE = np.arange(1.0, 4.0)
 

@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 from hypothesis import given, strategies as st
 
-from mbd.kernel.leftovers import leftovers_of_many
-from mbd.kernel.passage import leftovers
+from mbd.kernel.singular.gram_norms import leftovers_of_many
+from mbd.kernel.singular.newmark_step import leftovers
 
 
 def kernel(rng, n, m, density):

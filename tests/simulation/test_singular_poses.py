@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import mbd
-from mbd.kernel.pairs import LONGER, SHORTER
+from mbd.kernel.singular.step_pairs import LONGER, SHORTER
 from tests.simulation.singular import Passage, four_bars, kite, platform, slider_crank, stopped
 
 MECHANISMS = {

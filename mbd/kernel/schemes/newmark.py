@@ -1,6 +1,6 @@
 """One implicit step of the Newmark family, and its start (Arnold & Brüls 2007, Multibody Syst. Dyn. 18:185).
 
-Newton (`mbd.kernel.newton`) on (v̇₁, ż₁, λ) with the exact tangent S = M + c_C C_t + c_K K_t; the stabilized form adds
+Newton's method (`newton`) on (v̇₁, ż₁, λ) with the exact tangent S = M + c_C C_t + c_K K_t; the stabilized form adds
 the position correction U in the metric of the same matrix (Gear, Gupta & Leimkuhler 1985). First-order states z follow
 the velocity formulas of the scheme with their own rate ż, of order 2 as well (Jansen, Whiting & Hulbert 2000).
 """
@@ -10,11 +10,11 @@ from __future__ import annotations
 from typing import Any
 
 from mbd.kernel.fields import AUX_STEP, NEAR, NOW, PASSING, ROWS
-from mbd.kernel.iteration import predict, shift_growth
-from mbd.kernel.memory import forget_steps, look_a_step_ahead, start_step
-from mbd.kernel.newton import SEARCHED, UNSOUND, solve_step
-from mbd.kernel.passage import passing_step
 from mbd.kernel.restart import compose, consistent, fill_block, refresh_scales
+from mbd.kernel.schemes.iteration import predict, shift_growth
+from mbd.kernel.schemes.memory import forget_steps, look_a_step_ahead, start_step
+from mbd.kernel.schemes.newton import SEARCHED, UNSOUND, solve_step
+from mbd.kernel.singular.newmark_step import passing_step
 
 __all__ = ["newmark_accept", "newmark_resume", "newmark_start", "newmark_step"]
 

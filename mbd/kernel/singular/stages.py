@@ -22,8 +22,8 @@ from mbd.kernel.fields import EPS, NEAR, NOT_FINITE, NOW, PASSING, POSE, SINGULA
 from mbd.kernel.ordered import LOSS_OF_STEP, solve_kkt
 from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import compose, evaluate
-from mbd.kernel.runge_kutta import factor_saddle
-from mbd.kernel.stages import (
+from mbd.kernel.schemes.runge_kutta import factor_saddle
+from mbd.kernel.schemes.stages import (
     A2_,
     CHANGES,
     PAIR,

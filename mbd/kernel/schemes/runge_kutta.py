@@ -28,12 +28,12 @@ from mbd.kernel.fields import (
     UNEVEN,
 )
 from mbd.kernel.linear import factor, solve_definite
-from mbd.kernel.memory import forget_steps
 from mbd.kernel.ordered import LOSS_AT_ONCE, OF_ACCELERATIONS, SYMMETRIC, factor_ordered, order_at, solve_kkt
-from mbd.kernel.passage import CONTINUOUS
 from mbd.kernel.restart import consistent, evaluate, fill_block, raise_scales, refresh_scales
 from mbd.kernel.roots import sqrt
-from mbd.kernel.straddle import forget_leftovers, keep_leftovers, note_leftovers
+from mbd.kernel.schemes.memory import forget_steps
+from mbd.kernel.singular.newmark_step import CONTINUOUS
+from mbd.kernel.singular.step_size import forget_leftovers, keep_leftovers, note_leftovers
 from mbd.kernel.uneven import LOSS, is_uneven, polish_rates, polish_with_rows
 
 __all__ = ["runge_kutta_accept", "runge_kutta_start", "runge_kutta_step"]

@@ -1,6 +1,6 @@
 """Events next to a singular configuration, where constraints depend on each other for an instant.
 
-Within τ of such a configuration round-off δ of a row makes velocities wrong by the share c/τ² (`mbd.kernel.straddle`).
+Within τ of such a configuration round-off δ of a row makes velocities wrong by the share c/τ² (`step_size`).
 No step may end there, and no scheme can restart from there. An event that changes nothing needs neither: the step over
 the configuration stays as it is, and time and state of the event come from the quintic Hermite interpolant of the step
 (`mbd.kernel.interior`). One that changes something ends the run with an error of its own (`refuses`).
@@ -19,7 +19,7 @@ from mbd.kernel.orthogonal import square
 from mbd.kernel.restart import evaluate
 from mbd.kernel.roots import sqrt
 from mbd.kernel.settle import NO_IMPULSE, log_event
-from mbd.kernel.straddle import HUSHED, LOUD, leftovers_here, motion, stirring
+from mbd.kernel.singular.step_size import HUSHED, LOUD, leftovers_here, motion, stirring
 
 __all__ = ["find_passed_events", "log_passed_events", "may_pass_events", "refuses"]
 

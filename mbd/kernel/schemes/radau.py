@@ -1,16 +1,15 @@
 """One step of the three-stage Radau IIA method of order 5 (Hairer & Wanner 1996, Solving ODEs II, IV.8 and VII.4).
 
-Rows are held in the stabilized form at every stage (`mbd.kernel.stages`), the last of which is the end of the step.
-Newton's method has one pair of matrices a step; next to a pose in which rows lose rank stages are held to rows of their
-own (`mbd.kernel.astride`). Accelerations and multipliers of the end come from the balance and the rows at acceleration
-level, which makes them as accurate as positions and velocities.
+Rows are held in the stabilized form at every stage (`stages`), the last of which is the end of the step.
+Newton's method has one pair of matrices a step; next to a singular configuration stages are held to rows of their own
+(`mbd.kernel.singular.stages`). Accelerations and multipliers of the end come from the balance and the rows at
+acceleration level, which makes them as accurate as positions and velocities.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-from mbd.kernel.astride import LOUDER, is_astride, is_beside, settle_stages, turn_rows
 from mbd.kernel.fields import (
     AUX_STEP,
     EPS,
@@ -26,8 +25,6 @@ from mbd.kernel.fields import (
     STAGNATIONS,
     TOO_TIGHT,
 )  # fmt: skip
-from mbd.kernel.iteration import runs_away
-from mbd.kernel.memory import forget_steps, look_a_step_ahead
 from mbd.kernel.ordered import LOSS_AT_ONCE, solve_kkt
 from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import (
@@ -44,8 +41,10 @@ from mbd.kernel.restart import (
     restore_scales,
     retain_scales,
 )
-from mbd.kernel.runge_kutta import factor_saddle
-from mbd.kernel.stages import (
+from mbd.kernel.schemes.iteration import runs_away
+from mbd.kernel.schemes.memory import forget_steps, look_a_step_ahead
+from mbd.kernel.schemes.runge_kutta import factor_saddle
+from mbd.kernel.schemes.stages import (
     A_,
     BALANCES,
     E_,
@@ -64,7 +63,8 @@ from mbd.kernel.stages import (
     retreat_stages,
     stage_place,
 )  # fmt: skip
-from mbd.kernel.straddle import forget_leftovers, keep_leftovers, note_leftovers
+from mbd.kernel.singular.stages import LOUDER, is_astride, is_beside, settle_stages, turn_rows
+from mbd.kernel.singular.step_size import forget_leftovers, keep_leftovers, note_leftovers
 
 __all__ = ["radau_accept", "radau_start", "radau_step"]
 
@@ -212,7 +212,7 @@ def is_settled(moved: float, last: float, first: float) -> bool:
 
 
 def step_astride(K: Any, h: float, t1: float) -> int:
-    """The candidate of a step with stages on both sides of a pose in which rows lose rank: see `mbd.kernel.astride`.
+    """The candidate of a step with stages on both sides of a singular configuration: see `mbd.kernel.singular.stages`.
 
     Newton's method is linear there, with matrices made anew each time.
     """

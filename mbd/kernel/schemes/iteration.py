@@ -6,8 +6,8 @@ from typing import Any
 
 from mbd.kernel.fields import AUX_STEP, EPS, MODE, STEP
 from mbd.kernel.hooks import call
-from mbd.kernel.pairs import WHOLE
 from mbd.kernel.restart import compose
+from mbd.kernel.singular.step_pairs import WHOLE
 
 __all__ = ["finish", "overturns", "predict", "residual_size", "runs_away", "shift_growth", "soundness_at"]
 

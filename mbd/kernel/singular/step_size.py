@@ -12,7 +12,7 @@ scaled by √M_ii, passes zero. A glance at |w| of the ends of steps tells where
 along ``q + τ v + τ²/2 v̇`` as well, and where it vanishes by a secant.
 
 Radau IIA holds rows at its stages, so that ḣ = 0 magnifies round-off there as the projection does; how its Newton's
-method gets across the pose is in `mbd.kernel.astride`.
+method gets across the pose is in `mbd.kernel.singular.stages`.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from __future__ import annotations
 from typing import Any
 
 from mbd.kernel.fields import BLOCKED, EPS, KICK, NEAR, NOW, PASSING, POSE, ROWS
-from mbd.kernel.leftovers import common_part
 from mbd.kernel.ordered import order_at
 from mbd.kernel.orthogonal import clear_row, square
 from mbd.kernel.restart import compose, evaluate, fill_block
 from mbd.kernel.roots import sqrt
+from mbd.kernel.singular.gram_norms import common_part
 
 __all__ = [
     "HUSHED", "LOUD", "forget_leftovers", "is_resolved", "keep_leftovers", "leftovers_here", "longest_over", "motion",
@@ -184,7 +184,7 @@ def leftovers_here(K: Any, m: int) -> None:
 def lengths_of_many(K: Any, m: int) -> None:
     """|w| into K.work where most rows have nothing in common: roots of the pivots of their products, in their order.
 
-    Rows keep their zeros there, which Gram–Schmidt fills; see `mbd.kernel.leftovers`.
+    Rows keep their zeros there, which Gram–Schmidt fills; see `mbd.kernel.singular.gram_norms`.
     """
     n = K.n
     weigh_columns(K)

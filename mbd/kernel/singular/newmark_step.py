@@ -34,12 +34,9 @@ from mbd.kernel.fields import (
     TANGENTS,
 )  # fmt: skip
 from mbd.kernel.hooks import call
-from mbd.kernel.iteration import finish, overturns, predict, residual_size, runs_away, soundness_at
-from mbd.kernel.leftovers import leftovers_of_many
 from mbd.kernel.linear import factor
 from mbd.kernel.ordered import LOSS_OF_STEP, OF_TANGENT, factor_ordered, order_at, solve_kkt, weakest_pivot
 from mbd.kernel.orthogonal import clear_row, square
-from mbd.kernel.pairs import is_of_pair, is_whole
 from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import (
     add_shares,
@@ -50,6 +47,9 @@ from mbd.kernel.restart import (
     share_loads,
 )
 from mbd.kernel.roots import sqrt
+from mbd.kernel.schemes.iteration import finish, overturns, predict, residual_size, runs_away, soundness_at
+from mbd.kernel.singular.gram_norms import leftovers_of_many
+from mbd.kernel.singular.step_pairs import is_of_pair, is_whole
 
 __all__ = ["misses", "passing_step", "steps_of_fall", "steps_to_pose"]
 
@@ -148,7 +148,7 @@ def misses(K: Any, away: float, h: float) -> bool:
     """Whether whole steps from the end of this one would end too close to the pose: then it gets another size.
 
     While ḣ is held too, steps may do that; those that hold h alone start to ring. It is the last whole one before these
-    that is looked at, or one that was shortened for another reason; those of a pair (`mbd.kernel.pairs`) are not.
+    that is looked at, or one that was shortened for another reason; those of a pair (`step_pairs`) are not.
     """
     if away < 1.0 or away >= WITHIN + 1.0 or is_of_pair(h / K.clock[STEP]):
         return False

@@ -1,4 +1,4 @@
-"""Newton's method for the unknowns of one step of the Newmark family (see `mbd.kernel.newmark`): rates, multipliers.
+"""Newton's method for the unknowns of one step of the Newmark family (`newmark`): rates, multipliers.
 
 The tangent K is that of the compiled model at the iterate, or factors of it and the first correction made by
 straight-line code. The stabilized form corrects positions by U first, then the rates, in the metric of the same matrix.
@@ -30,11 +30,8 @@ from mbd.kernel.fields import (
     TOO_TIGHT,
 )  # fmt: skip
 from mbd.kernel.hooks import call, call_on
-from mbd.kernel.iteration import finish, overturns, residual_size, runs_away, soundness_at
 from mbd.kernel.linear import factor
 from mbd.kernel.ordered import LOSS_OF_STEP, OF_TANGENT, factor_ordered, order_at, solve_kkt
-from mbd.kernel.pairs import is_whole
-from mbd.kernel.passage import WITHIN, misses, passing_step, steps_of_fall, steps_to_pose
 from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import (
     add_shares,
@@ -44,6 +41,9 @@ from mbd.kernel.restart import (
     retain_scales,
     share_loads,
 )
+from mbd.kernel.schemes.iteration import finish, overturns, residual_size, runs_away, soundness_at
+from mbd.kernel.singular.newmark_step import WITHIN, misses, passing_step, steps_of_fall, steps_to_pose
+from mbd.kernel.singular.step_pairs import is_whole
 
 __all__ = ["SEARCHED", "UNSOUND", "solve_step"]
 

@@ -33,19 +33,19 @@ from mbd.kernel.fields import (
     TANGENTS,
 )  # fmt: skip
 from mbd.kernel.hooks import call
-from mbd.kernel.iteration import residual_size
 from mbd.kernel.linear import factor
 from mbd.kernel.ordered import LOSS_OF_STEP, OF_TANGENT, factor_ordered, order_at, solve_kkt
 from mbd.kernel.ordered_complex import factor_pair_ordered, solve_pair_ordered
 from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import add_shares, share_loads
+from mbd.kernel.schemes.iteration import residual_size
 
 __all__ = [
     "correct_rates", "correct_stages", "evaluate_stages", "factor_stages", "hold_block", "load_stage", "matrices",
     "predict_stages", "retreat_stages", "stage_place",
 ]  # fmt: skip
 
-# where the numbers of the method lie in K.stages (see `mbd.kernel.collocation`)
+# where the numbers of the method lie in K.stages (see `mbd.kernel.schemes.collocation`)
 C_, A_, A2_, MU_REAL, MU_RE, MU_IM, T_REAL, S_REAL, T_RE, T_IM, S_RE, S_IM, E_, N_NUMBERS = (
     0, 3, 12, 21, 22, 23, 24, 27, 30, 33, 36, 39, 42, 45,
 )  # fmt: skip

@@ -1,0 +1,1 @@
+"""Integration schemes as compiled functions of the kernel."""

@@ -1,0 +1,1 @@
+"""Singular configurations, where the constraint Jacobian loses rank for an instant."""
