@@ -11,10 +11,11 @@ if TYPE_CHECKING:
     from mbd.analysis.accuracy import Accuracy as Accuracy, Known as Known, accuracy as accuracy
     from mbd.analysis.effects import Effects as Effects, effects as effects
     from mbd.analysis.linearization import Linearization as Linearization, linearize as linearize
-    from mbd.analysis.mobility import Mobility as Mobility, mobility as mobility
     from mbd.analysis.numerical import Criteria as Criteria, criteria as criteria
     from mbd.analysis.sweep import Sweep as Sweep, sweep as sweep
-    from mbd.assembly import assemble as assemble
+    from mbd.assembly.assemble import assemble as assemble
+    from mbd.assembly.mobility import Mobility as Mobility, mobility as mobility
+    from mbd.assembly.projection import project as project
     from mbd.bodies import (
         Domain as Domain,
         Link as Link,
@@ -95,9 +96,8 @@ if TYPE_CHECKING:
         Viscous as Viscous,
     )
     from mbd.model import Model as Model, on_slope as on_slope
-    from mbd.projection import project as project
     from mbd.results.failure import Failure as Failure
-    from mbd.simulation.replay import Replay as Replay, replay as replay
+    from mbd.simulation.diagnostics.replay import Replay as Replay, replay as replay
     from mbd.simulation.simulate import simulate as simulate
     from mbd.state import State as State
     from mbd.tape.functions import (
@@ -127,10 +127,10 @@ _HOMES = {
     "mbd.analysis.linearization": "Linearization linearize",
     "mbd.analysis.accuracy": "Accuracy Known accuracy",
     "mbd.analysis.effects": "Effects effects",
-    "mbd.analysis.mobility": "Mobility mobility",
+    "mbd.assembly.mobility": "Mobility mobility",
     "mbd.analysis.numerical": "Criteria criteria",
     "mbd.analysis.sweep": "Sweep sweep",
-    "mbd.assembly": "assemble",
+    "mbd.assembly.assemble": "assemble",
     "mbd.bodies": "Domain Link PointMass RigidBody box cylinder disk rod segment sphere",
     "mbd.constraints": "Bilateral Controller Event KnifeEdge Nonholonomic Penalty PenaltyParameters Plane "
     "Rolling Unilateral When distance extension flexion height measure penalty_parameters separation touchdown",
@@ -142,9 +142,9 @@ _HOMES = {
     "mbd.joints": "Cylindrical Planar Prismatic Revolute Screw Translation Universal Weld",
     "mbd.joints.losses": "Coulomb Dissipation PinFriction Quadratic Tabulated Viscous",
     "mbd.model": "Model on_slope",
-    "mbd.projection": "project",
+    "mbd.assembly.projection": "project",
     "mbd.results.failure": "Failure",
-    "mbd.simulation.replay": "Replay replay",
+    "mbd.simulation.diagnostics.replay": "Replay replay",
     "mbd.simulation.simulate": "simulate",
     "mbd.state": "State",
     "mbd.tape.functions": "acos asin atan atan2 cos cosh exp log maximum minimum sign sin sinh sqrt tan tanh where",

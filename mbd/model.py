@@ -255,7 +255,7 @@ class Model:
 
         said = description(self)
         if mobility and not self.check():
-            from mbd.analysis.mobility import mobility as of
+            from mbd.assembly.mobility import mobility as of
 
             said += f"\n{of(self)}"
         return said

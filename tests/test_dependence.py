@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from mbd.conflicts import Member, irreducible, linear_conflict, solvable
-from mbd.dependence import dependences, rank_of
+from mbd.assembly.conflicts import Member, irreducible, linear_conflict, solvable
+from mbd.assembly.dependence import dependences, rank_of
 
 
 @st.composite

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
-from mbd.dependence import NEGLIGIBLE
+from mbd.assembly.dependence import NEGLIGIBLE
 
 __all__ = ["Independent", "independent", "row_sizes"]
 

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.assembly.consistency import residuals, violations
+from mbd.assembly.given_state import given_state
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.python import scalar_function
-from mbd.consistency import residuals, violations
 from mbd.equations.equations import Row
 from mbd.equations.linearization import LinearTerms, linearization
 from mbd.errors import ModelError
@@ -20,10 +21,9 @@ from mbd.kernel import fields as F
 from mbd.kernel.redundancy import find_dependent, sharing, spread
 from mbd.kernel.restart import active_rows
 from mbd.kernel.settle import settle
-from mbd.simulation.given_state import given_state
-from mbd.simulation.plain import MechanismSystem
-from mbd.simulation.shares import shares
-from mbd.simulation.stepper import Stepper
+from mbd.simulation.run.plain import MechanismSystem
+from mbd.simulation.run.shares import shares
+from mbd.simulation.run.stepper import Stepper
 from mbd.state import State
 
 __all__ = ["Instant", "instant"]

@@ -12,7 +12,7 @@ import numpy as np
 from mbd.analysis.independent import Independent, independent, row_sizes
 from mbd.analysis.instant import Instant, instant
 from mbd.arrays import Matrix, Vector
-from mbd.dependence import NEGLIGIBLE
+from mbd.assembly.dependence import NEGLIGIBLE
 from mbd.equations.linearization import LinearTerms
 from mbd.errors import CapabilityError, ModelError
 from mbd.state import State

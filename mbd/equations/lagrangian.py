@@ -266,7 +266,7 @@ class Lagrangian:
         """The mechanism in a page of text; with `mobility` the degrees of freedom too, see `mbd.mobility`."""
         said = described(self)
         if mobility and not self.check():
-            from mbd.analysis.mobility import mobility as of
+            from mbd.assembly.mobility import mobility as of
 
             said += f"\n{of(self)}"
         return said

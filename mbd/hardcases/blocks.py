@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from mbd.assembly import assemble
+from mbd.assembly.assemble import assemble
 from mbd.bodies import RigidBody
 from mbd.constraints import Unilateral, touchdown
 from mbd.hardcases.case import Curve, Figure, Outcome, hard_case

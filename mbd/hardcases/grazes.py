@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from mbd.assembly import assemble
+from mbd.assembly.assemble import assemble
 from mbd.bodies import PointMass
 from mbd.constraints import Unilateral, measure
 from mbd.hardcases.case import Curve, Figure, Outcome, definition, hard_case

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mbd.assembly import assemble
+from mbd.assembly.assemble import assemble
 from mbd.bodies import PointMass
 from mbd.constraints import Penalty, height
 from mbd.hardcases.case import Curve, Figure, Outcome, hard_case

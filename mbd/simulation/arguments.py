@@ -10,14 +10,12 @@ from typing import Any
 import numpy as np
 
 from mbd.bodies.values import is_number, shown
-from mbd.equations.equations import Equations
-from mbd.errors import ModelError, UnknownNameError, nearest
+from mbd.errors import UnknownNameError, nearest
 from mbd.integrators import Integrator
 from mbd.kernel.active_set import ActiveSetManager
-from mbd.simulation.turning import beyond_angles
 from mbd.state import State, malformed
 
-__all__ = ["callbacks", "choices", "end_of", "fits", "numbers"]
+__all__ = ["callbacks", "choices", "end_of", "numbers"]
 
 HUGE = 1e6
 """Step over the latest time above which a run is refused: ends and events are told apart to 1e-12 dt [-]."""
@@ -100,39 +98,6 @@ def callbacks(observers: Any, progress: Any) -> list[str]:
     if not callable(progress) and not isinstance(progress, bool | None):
         return [f"progress must be True, None or a function progress(t, until), not {progress!r}"]
     return []
-
-
-def fits(start: State, equations: Equations, manager: ActiveSetManager) -> None:
-    """The state must be one of this model, of finite numbers."""
-    faults = malformed(start)
-    if faults:
-        raise ModelError(faults)
-    names = tuple(coordinate.name for coordinate in equations.coordinates)
-    anchors = equations.n_anchors
-    sizes = (len(start.q), len(start.v), len(start.z)) == (equations.n_q, equations.n_v, equations.n_z)
-    if start.names != names or not sizes:
-        raise ModelError(
-            f"the start has the coordinates {', '.join(start.names) or 'none'} and {len(start.z)} states, but "
-            f"the model has {', '.join(names)} and {equations.n_z} states; assemble it from this model"
-        )
-    contacts = [*sorted(start.mode.closed), *sorted(start.armed or ())]
-    unknown = [nearest(name, manager.names, "contact") for name in dict.fromkeys(contacts) if name not in manager.names]
-    if unknown:
-        raise UnknownNameError(unknown)
-    if len(start.anchors) != anchors and (start.mode.closed or (len(start.anchors) and equations.turns)):
-        raise ModelError(
-            f"the start holds {len(start.anchors)} anchors of contacts and turns of cut joints, but the model has "
-            f"{anchors}; assemble it from this model, with the same parameters="
-        )
-    parts = ((start.q, names), (start.v, equations.velocity_names), (start.z, [s.name for s in equations.states]))
-    values = [(name, value) for part, known in parts for name, value in zip(known, part, strict=True)]
-    values += [(f"anchor {k} of its contacts", value) for k, value in enumerate(start.anchors)]
-    bad = [
-        f"the start has {name!r} = {value}; give a finite number" for name, value in values if not np.isfinite(value)
-    ]
-    bad += [f"the start has {said}; take whole turns away" for said in beyond_angles(equations, start.q)]
-    if bad:
-        raise ModelError(bad)
 
 
 def end_of(until: Any, manager: ActiveSetManager, dt: float, begin: float) -> tuple[float, str | None]:

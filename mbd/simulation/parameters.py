@@ -10,18 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Vector
-from mbd.assembly import undetermined
+from mbd.assembly.assemble import undetermined
+from mbd.assembly.consistency import residuals, violations
+from mbd.assembly.posture import Posture
+from mbd.assembly.trivial_rows import trivial_rows
 from mbd.bodies.domains import ParameterCheck
 from mbd.compile.mechanism import Mechanism
-from mbd.consistency import residuals, violations
 from mbd.errors import ModelError
-from mbd.posture import Posture
 from mbd.tape.derivatives import live
 from mbd.tape.node import Node
-from mbd.trivial_rows import trivial_rows
 
 if TYPE_CHECKING:
-    from mbd.simulation.run import Run
+    from mbd.simulation.run.run import Run
 
 __all__ = ["ParameterJudge", "residuals_now", "violations_now"]
 
@@ -89,14 +89,14 @@ class ParameterJudge:
 
 
 def residuals_now(run: Run, parameters: Vector | None = None) -> NDArray[np.float64]:
-    """`mbd.consistency.residuals` of the accepted state, with other values of parameters if these are given."""
+    """Residuals (`mbd.assembly.consistency`) of the accepted state, with other values of parameters if given."""
     v = run.values
     q, y, anchors = v["q"][: v["n_q"]], v["y"][: v["n"]], v["anchors"][: v["n_anchors"]]
     return residuals(run.mechanism, run.now, q, y, v["params"] if parameters is None else parameters, anchors)
 
 
 def violations_now(run: Run, found: NDArray[np.float64], usual: NDArray[np.float64] | None = None) -> list[str]:
-    """`mbd.consistency.violations` of the rows that are active now."""
+    """`mbd.assembly.consistency.violations` of the rows that are active now."""
     v = run.values
     active = run.manager.active_rows(v["closed"][: v["n_contacts"]])
     speed = float(np.max(np.abs(v["y"][: v["n_v"]]), initial=0.0))

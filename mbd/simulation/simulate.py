@@ -12,23 +12,24 @@ from typing import Any, Literal
 
 import numpy as np
 
+from mbd.assembly.given_state import fits
+from mbd.assembly.trivial_rows import manager_of
+from mbd.assembly.turns import directed
 from mbd.bodies.values import named_number_faults
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import CapabilityError, MemoryLimitError, ModelError, SimulationError
 from mbd.integrators import HHT, Integrator
-from mbd.simulation.arguments import callbacks, choices, end_of, fits, numbers
+from mbd.simulation.arguments import callbacks, choices, end_of, numbers
 from mbd.simulation.capabilities import refusals
-from mbd.simulation.judged import judged
-from mbd.simulation.run import Run
-from mbd.simulation.search import LARGEST
-from mbd.simulation.strategy import chosen
-from mbd.simulation.tolerance import calibrated, first_allowed
-from mbd.simulation.trials import Trial
+from mbd.simulation.run.run import Run
+from mbd.simulation.run.strategy import chosen
+from mbd.simulation.tolerance.calibrate import calibrated, first_allowed
+from mbd.simulation.tolerance.judged import judged
+from mbd.simulation.tolerance.search import LARGEST
+from mbd.simulation.tolerance.trials import Trial
 from mbd.state import State
 from mbd.trajectory import Trajectory
-from mbd.trivial_rows import manager_of
-from mbd.turns import directed
 
 __all__ = ["prepared", "simulate"]
 

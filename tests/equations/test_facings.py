@@ -10,7 +10,7 @@ import mbd
 from mbd.compile.mechanisms import mechanism_of
 from mbd.results.columns import ModelColumns
 from mbd.results.violation import violation
-from mbd.simulation.stored import whole_record
+from mbd.simulation.run.stored import whole_record
 from tests.forward import misfit, placed, poses, relative
 
 KINDS = ["Weld", "Prismatic", "Revolute", "Cylindrical", "Translation", "Screw", "Universal"]
@@ -136,6 +136,6 @@ def test_a_run_that_is_the_wrong_way_round_for_a_while_only_is_refused(monkeypat
         q[4:6, start.names.index("second.angle")] += np.pi
         return replace(record, q=q)
 
-    monkeypatch.setattr("mbd.simulation.run.whole_record", turned_over)
+    monkeypatch.setattr("mbd.simulation.run.run.whole_record", turned_over)
     with pytest.raises(mbd.SimulationError, match=r"t = 0\.04 s: 'slide' was turned by half a turn"):
         mbd.simulate(model, start, **settings)

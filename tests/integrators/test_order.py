@@ -10,7 +10,7 @@ import pytest
 import mbd
 from mbd.compile.mechanisms import mechanism_of
 from mbd.kernel.active_set import ActiveSetManager
-from mbd.simulation.stepper import Stepper
+from mbd.simulation.run.stepper import Stepper
 
 T = 0.5
 """Length of every run [s]."""

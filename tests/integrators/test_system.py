@@ -15,7 +15,7 @@ from mbd.integrators import Point, System, Terms
 from mbd.integrators.base import consistent_rates
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.simulation.capabilities import refusals
-from mbd.simulation.plain import MechanismSystem
+from mbd.simulation.run.plain import MechanismSystem
 from mbd.state import Mode, State
 from mbd.testing.order import observed_order
 from mbd.testing.problems import PROBLEMS, problem

@@ -21,8 +21,8 @@ import numpy as np
 
 import mbd
 from mbd.kernel import fields as F
-from mbd.simulation import run, stepper
-from mbd.simulation.stepper import Stepper
+from mbd.simulation.run import run, stepper
+from mbd.simulation.run.stepper import Stepper
 from mbd.testing.wild import wild_scene
 from mbd.trajectory import Trajectory
 from tests.kernel.test_room_to_log import sliders

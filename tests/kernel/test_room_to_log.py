@@ -7,7 +7,7 @@ import pytest
 
 import mbd
 from mbd.kernel import advance
-from mbd.simulation import stepper
+from mbd.simulation.run import stepper
 
 
 def sliders(count: int) -> mbd.Model:

@@ -14,7 +14,7 @@ import mbd
 from mbd.compile.mechanisms import mechanism_of
 from mbd.forces.base import Action, Force
 from mbd.kernel.active_set import ActiveSetManager
-from mbd.simulation.stepper import Stepper
+from mbd.simulation.run.stepper import Stepper
 from mbd.state import Mode
 from tests.equations.mechanisms import four_bar, furnished, random_tree
 from tests.simulation.mechanisms import ball, box, falling, kneed_walker, kneed_walker_start, pendulum, run

@@ -24,7 +24,7 @@ import numpy as np
 
 import mbd
 from mbd.results import archive
-from mbd.simulation import remembered
+from mbd.simulation.run import remembered
 from mbd.state import Memory, State
 from mbd.trajectory import Trajectory
 

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from mbd.kernel import fields as F
-from mbd.simulation.call_table import PLACES, CallTable
+from mbd.simulation.run.call_table import PLACES, CallTable
 
 
 def filled():

@@ -8,7 +8,7 @@ import sympy
 
 import mbd
 from mbd.results.energy import doubted_ledger
-from mbd.simulation.energy import EnergyWatch, judgement
+from mbd.simulation.diagnostics.energy import EnergyWatch, judgement
 from mbd.simulation.simulate import prepared
 from tests.simulation.mechanisms import kneed_walker, kneed_walker_start
 

@@ -50,7 +50,7 @@ def test_a_scene_is_made_again_from_its_seed():
 
 
 def test_events_that_follow_each_other_without_end_are_bounded(monkeypatch):
-    from mbd.simulation import failures
+    from mbd.simulation.diagnostics import failures
 
     monkeypatch.setattr(failures, "MOST_EVENTS", 10)
     model, ball = mbd.Model("ball"), mbd.PointMass("ball", 1.0)

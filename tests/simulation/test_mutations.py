@@ -15,7 +15,7 @@ import pytest
 
 import mbd
 from mbd.results import archive
-from mbd.simulation import remembered
+from mbd.simulation.run import remembered
 from mbd.state import Mode
 from tests.simulation.mutations import go_on, outcome_of_file, outcome_of_memory, scene
 

@@ -11,10 +11,10 @@ import mbd
 from mbd.errors import CapabilityError, ModelError, SimulationError
 from mbd.kernel import fields as F
 from mbd.results.matching import apart
-from mbd.simulation.begin import notify
-from mbd.simulation.comparison import gap
-from mbd.simulation.replay import Twin
+from mbd.simulation.diagnostics.replay import Twin
+from mbd.simulation.run.begin import notify
 from mbd.simulation.simulate import prepared
+from mbd.simulation.tolerance.comparison import gap
 from tests.equations.mechanisms import four_bar
 from tests.integrators.test_order import double_pendulum
 from tests.simulation.mechanisms import ball, box, kneed_walker, kneed_walker_start, pendulum, run

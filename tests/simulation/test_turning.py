@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import mbd
-from mbd.simulation.turning import LARGEST_ANGLE
+from mbd.assembly.given_state import LARGEST_ANGLE
 
 
 def rotor(center=0.0, **more):

@@ -18,8 +18,8 @@ from mbd.errors import ModelError, SimulationError, UnknownNameError, nearest
 from mbd.integrators import HHT, GeneralizedAlpha, Integrator, Newmark, RadauIIA, RungeKutta853
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.simulation.capabilities import refusals
+from mbd.simulation.run.strategy import chosen as strategy_of
 from mbd.simulation.simulate import simulate
-from mbd.simulation.strategy import chosen as strategy_of
 from mbd.state import State
 
 if TYPE_CHECKING:

@@ -22,7 +22,7 @@ from scipy.integrate import DOP853, Radau
 
 from mbd.arrays import Vector
 from mbd.integrators import Integrator, StepReport, StepResult
-from mbd.simulation.plain import MechanismSystem
+from mbd.simulation.run.plain import MechanismSystem
 from mbd.state import Mode, State
 
 __all__ = ["Method", "RungeKuttaReference"]

@@ -23,7 +23,7 @@ from mbd.equations.cost import cost
 from mbd.errors import MbdError, ModelError, SimulationError, UnknownNameError, nearest
 from mbd.integrators import Integrator
 from mbd.results.ledger import Ledger
-from mbd.simulation.memory import without_memory
+from mbd.simulation.run.memory import without_memory
 from mbd.simulation.simulate import simulate
 from mbd.state import State
 from mbd.trajectory import Trajectory

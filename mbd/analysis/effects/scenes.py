@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbd.assembly import assemble
+from mbd.assembly.assemble import assemble
 from mbd.compile.mechanisms import mechanism_of
 from mbd.equations.cost import Cost
 from mbd.equations.equations import Equations

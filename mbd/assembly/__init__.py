@@ -1,0 +1,1 @@
+"""A consistent start: named values held, the rest completed, every conflict named."""

@@ -1,0 +1,353 @@
+"""A consistent start: named values held, the rest completed, every conflict named."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from mbd.arrays import Matrix, Vector
+from mbd.assembly.conditions import Condition, conditions
+from mbd.assembly.contradictions import Attempt, contradictions, infeasible
+from mbd.assembly.infeasibility import Held
+from mbd.assembly.initial_pose import opening
+from mbd.assembly.named_projection import nearest_positions, nearest_velocities
+from mbd.assembly.not_finite import first_cause, tape_inputs
+from mbd.assembly.posture import (
+    TOLERANCE,
+    Posture,
+    capture,
+    close_nearby,
+    close_positions,
+    close_velocities,
+    position_rows,
+)  # fmt: skip
+from mbd.assembly.trivial_rows import manager_of
+from mbd.assembly.turns import choose_turns, name_wrapped, nearest_turns
+from mbd.bodies.values import named_number_faults
+from mbd.compile.mechanism import Mechanism, rate_names
+from mbd.compile.mechanisms import mechanism_of
+from mbd.equations.equations import Equations
+from mbd.errors import AssemblyError, ModelError, UnknownNameError, nearest
+from mbd.state import State
+
+__all__ = ["assemble", "undetermined"]
+
+SQUARED_ROUND_OFF = 1e-26
+"""Kinetic energy of a motion over that of its coordinates one by one, below which it is that of round-off [-]."""
+
+BELOW = 1e-6
+"""Depth [m, rad] below which an open contact is told to start inside the ground."""
+LIFTED = 1e-8
+"""Height [m, rad] above which an open contact is armed from the start."""
+
+
+def _names(value: Any, what: str) -> tuple[tuple[str, ...], list[str]]:
+    """Names given as one or several."""
+    several = (value,) if isinstance(value, str) else tuple(value) if isinstance(value, Iterable) else (value,)
+    if all(isinstance(name, str) for name in several):
+        return several, []
+    return (), [f"{what} lists names of contacts, such as ['left foot'], not {value!r}"]
+
+
+def assemble(
+    model: Any,
+    position: Mapping[str, float] | None = None,
+    velocity: Mapping[str, float] | None = None,
+    closed: Iterable[str] = (),
+    open: Iterable[str] = (),
+    parameters: Mapping[str, float] | None = None,
+    project: bool = False,
+    backend: str = "auto",
+) -> State:
+    """A consistent start of a model: named values held exactly, the rest completed.
+
+    Positions satisfy ``h(q, t₀) = 0`` of every active row; values that are not named move least from their defaults
+    in the metric of the mass matrix. Then velocities satisfy ``B v + h_t = 0``.
+
+    Parameters
+    ----------
+    model : a `Model` or `Lagrangian`
+    position : {'left hip.angle': 0.2} coordinates [m, rad], first-order states, and any named position
+        ('left shank.end.x', the angle of a cut joint), which then holds like a row
+    velocity : {'left hip.angle': −1.1} or {'left hip.rate': …} rates by coordinate or rate name [m/s, rad/s]
+    closed : names of contacts that start closed
+    open : names of contacts that start open even if they touch or lie below their surface; ignored until risen
+    parameters : values that differ from the model's, by name
+    project : move named values too, to the nearest consistent ones, results such as angles of cut joints by the sum of
+        squares; `State.moved` tells how far coordinates were
+    backend : see `mbd.simulate`
+
+    Returns
+    -------
+    State
+        with `moved`: how far each coordinate is from the value asked for, or from its default.
+
+    Raises
+    ------
+    UnknownNameError
+        for wrong names, with the nearest valid ones.
+    AssemblyError
+        if constraints cannot hold together (the closure error, an irreducible set of them and what to relax), if the
+        named values contradict rows (both residuals of each, and which names are in conflict), if nothing determines
+        the motion of a coordinate, or if an open contact starts inside its surface.
+    ModelError
+        if the model itself has faults.
+    """
+    wanted = {"position": position, "velocity": velocity, "parameters": parameters}
+    faults = [fault for what, values in wanted.items() for fault in named_number_faults(values, what)]
+    (opened, more), (closed, others) = _names(open, "open"), _names(closed, "closed")
+    if faults + more + others:
+        raise ModelError(faults + more + others)
+    changed = dict(parameters or {})
+    mechanism = mechanism_of(model, backend, changed)
+    equations, values = mechanism.equations, mechanism.parameters(changed, getattr(model, "parameters", {}))
+    manager = manager_of(mechanism, values)
+    named, faults = _named(mechanism, position or {}, velocity or {})
+    faults += [nearest(name, manager.names, "contact") for name in [*closed, *opened] if name not in manager.names]
+    faults += [f"contact {name!r} is named both closed and open" for name in set(closed) & set(opened)]
+    if faults:
+        raise UnknownNameError(faults)
+    q, y = _values(equations, named, {})
+    guess, _ = _values(equations, named, opening(model, mechanism, values, position or {}))
+    anchors = np.zeros(mechanism.layout.n_anchors)
+    work = Posture(
+        mechanism, manager, values, guess, y.copy(), manager.flags(closed), anchors, named.places, named.speeds
+    )
+    bad = _closed(work, named, project, model) or undetermined(work) + _below(work, set(opened))
+    if bad:
+        raise AssemblyError(bad)
+    name_wrapped(work)
+    return State(
+        0.0, work.q, work.y[: equations.n_v].copy(), work.y[equations.n_v :].copy(), manager.mode(work.flags),
+        _armed(work, set(opened)), work.anchors, tuple(coordinate.name for coordinate in equations.coordinates),
+        equations.velocity_names, _moved(work, q, y, named), changed,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Named:
+    """Values that a start names: q, v and z by number, any other position or rate as a condition."""
+
+    q: Mapping[int, float]
+    v: Mapping[int, float]
+    z: Mapping[int, float]
+    places: Sequence[Condition]
+    speeds: Sequence[Condition]
+
+
+def _named(
+    mechanism: Mechanism, position: Mapping[str, float], velocity: Mapping[str, float]
+) -> tuple[_Named, list[str]]:
+    """The values by number, and what is wrong with their names."""
+    equations = mechanism.equations
+    coordinates = {coordinate.name: k for k, coordinate in enumerate(equations.coordinates)}
+    states = {state.name: k for k, state in enumerate(equations.states)}
+    rates = rate_names(equations)
+    elsewhere = {name: value for name, value in position.items() if name not in states and name not in coordinates}
+    places, unknown = conditions(mechanism, elsewhere, rates=False)
+    speeds, strange = conditions(mechanism, {k: v for k, v in velocity.items() if k not in rates}, rates=True)
+    faults = [
+        f"position: {name!r} is a rate; give it in velocity={{{name!r}: …}}"
+        if name in rates
+        else "position: " + nearest(name, coordinates, "coordinate")
+        for name in unknown
+    ]
+    faults += ["velocity: " + nearest(name, rates, "rate") for name in strange]
+    q, z, v = (
+        {numbers[name]: float(value) for name, value in given.items() if name in numbers}
+        for numbers, given in ((coordinates, position), (states, position), (rates, velocity))
+    )
+    return _Named(q, v, z, places, speeds), faults
+
+
+def _values(equations: Equations, named: _Named, guess: Mapping[str, float]) -> tuple[Vector, Vector]:
+    """q and (v, z) as named; elsewhere the guess, or defaults, and no velocity."""
+    q = np.array(
+        [named.q.get(k, guess.get(c.name, c.default)) for k, c in enumerate(equations.coordinates)], dtype=float
+    )
+    v = [named.v.get(k, 0.0) for k in range(equations.n_v)]
+    z = [named.z.get(k, float(state.default)) for k, state in enumerate(equations.states)]
+    return q, np.array([*v, *z], dtype=float)
+
+
+def _closed(work: Posture, named: _Named, project: bool, model: Any) -> list[str]:
+    """Close positions, then velocities; what contradicts them."""
+    if project and _closed_as_named(work, named):
+        return []
+    equations = work.equations
+    q, y, rows = work.q.copy(), work.y.copy(), position_rows(work)
+    held_q, held_v = ([], []) if project else _held(equations, named)
+    free = np.ones((2, equations.n_v), dtype=bool)
+    free[0, [each.place for each in held_q]] = free[1, [each.place for each in held_v]] = False
+    misfit = close_positions(work, rows, free[0])
+    if project and np.max(np.abs(misfit), initial=0.0) > TOLERANCE and work.places and work.mechanism.vector:
+        reached, work.q = work.q.copy(), q.copy()
+        if nearest_positions(work, rows, named.q):
+            misfit = np.zeros(len(misfit))
+        else:
+            work.q = reached
+    if np.max(np.abs(misfit), initial=0.0) <= TOLERANCE:
+        nearest_turns(work, rows, named.q, TOLERANCE)
+    never = infeasible(work, rows, q, misfit, model, named=bool(work.places or held_q))
+    if never:
+        return never
+    capture(work)
+    speed_misfit = close_velocities(work, free[1])
+    speed = 1.0 + float(np.max(np.abs(work.y[: equations.n_v]), initial=0.0))
+    if project and np.max(np.abs(speed_misfit), initial=0.0) > TOLERANCE * speed and work.rates:
+        work.y = y.copy()
+        if nearest_velocities(work, work.manager.active_rows(work.flags), named.v):
+            speed_misfit = np.zeros(len(speed_misfit))
+    capture(work)  # approach speeds
+    return contradictions(work, Attempt(rows, q, y, held_q, held_v, misfit, speed_misfit, project), model)
+
+
+def _closed_as_named(work: Posture, named: _Named) -> bool:
+    """Close around the named values without moving them, if that can be done from here."""
+    trial, rows = replace(work, q=work.q.copy(), y=work.y.copy(), anchors=work.anchors.copy()), position_rows(work)
+    held_q, held_v = _held(work.equations, named)
+    free = np.ones((2, work.equations.n_v), dtype=bool)
+    free[0, [each.place for each in held_q]] = free[1, [each.place for each in held_v]] = False
+    choose_turns(trial, rows)
+    if not np.max(np.abs(close_nearby(trial, rows, free[0])), initial=0.0) <= TOLERANCE:
+        return False
+    nearest_turns(trial, rows, named.q, TOLERANCE)
+    capture(trial)
+    speed = 1.0 + float(np.max(np.abs(trial.y[: work.equations.n_v]), initial=0.0))
+    if not np.max(np.abs(close_velocities(trial, free[1])), initial=0.0) <= TOLERANCE * speed:
+        return False
+    capture(trial)
+    work.q, work.y, work.anchors = trial.q, trial.y, trial.anchors
+    return True
+
+
+def _held(equations: Equations, named: _Named) -> tuple[list[Held], list[Held]]:
+    """Coordinates and rates that stay as named."""
+    names = [coordinate.name for coordinate in equations.coordinates]
+    places = [Held(names[k], value, k) for k, value in named.q.items()]
+    return places, [Held(equations.velocity_names[k], value, k) for k, value in named.v.items()]
+
+
+def undetermined(work: Posture) -> list[str]:
+    """Coordinates whose acceleration neither mass nor rows determine, rows that depend on others, negative inertia."""
+    equations = work.equations
+    picked = list(work.manager.active_rows(work.flags))
+    terms = work.mechanism.acceleration_terms(work.time, work.q, work.y, work.parameters, work.anchors)
+    n, m = len(terms.f), len(picked)
+    if n == 0:
+        return ["nothing can move: the model has no coordinate; connect a body by a joint that lets it move"]
+    matrix = np.block([[terms.M, terms.R[:, picked]], [terms.B[picked], np.zeros((m, m))]])
+    if not np.isfinite(matrix).all() or not np.isfinite(terms.f).all():
+        block = work.mechanism.block(work.time, work.q, work.y, work.anchors)
+        inputs = tape_inputs(work.mechanism, block, work.parameters)
+        cause = first_cause(equations, inputs, when=" at the start")
+        return [cause or "a mass or a derivative is not finite at the start; check the parameters and functions used"]
+    scale = np.sqrt(np.max(np.abs(matrix), axis=1))
+    scale[scale == 0.0] = 1.0
+    _, sizes, right = np.linalg.svd(matrix / np.outer(scale, scale))
+    faults = []
+    for direction in right[sizes < 1e-12 * max(sizes[0], 1e-300)]:
+        motion = direction / scale
+        weights = np.abs(motion)
+        place = int(np.argmax(weights))
+        if np.max(weights[:n], initial=0.0) > 1e-6 * weights[place] and not _resisted(work, motion[:n], terms.M):
+            name = equations.velocity_names[int(np.argmax(weights[: equations.n_v]))].removesuffix(".rate")
+            faults.append(
+                f"nothing determines the motion of {name!r}: no mass or inertia resists it and no constraint holds it; "
+                "give the bodies it moves a mass, or lock it"
+            )
+    return faults or _negative(work, terms.M[: equations.n_v, : equations.n_v], terms.B[picked][:, : equations.n_v])
+
+
+def _resisted(work: Posture, motion: Vector, M: Matrix) -> bool:
+    """Whether a motion has kinetic energy of its own, however little beside that of its coordinates one by one.
+
+    A long chain that folds up to and fro hardly moves, and M, whose entries are sums over all bodies outboard, tells
+    its energy as a difference of large numbers. As a sum over bodies it has no cancellation.
+    """
+
+    def kinetic(y: Vector) -> float:
+        terms = work.mechanism.acceleration_terms(work.time, work.q, y, work.parameters, work.anchors)
+        return float(np.asarray(terms.kinetic).item())
+
+    if work.equations.n_z or kinetic(0.0 * motion) != 0.0:  # a moving ground has energy of its own
+        return False
+    apart = 0.5 * float(np.abs(np.diag(M)) @ motion**2)
+    return kinetic(motion) > SQUARED_ROUND_OFF * apart
+
+
+def _negative(work: Posture, M: Matrix, B: Matrix) -> list[str]:
+    """Motions that the rows allow and whose kinetic energy would be negative."""
+    scale = np.sqrt(np.abs(np.diag(M)) + 1e-300)
+    free = np.linalg.svd(B / scale, full_matrices=True)[2][len(B) :].T if len(B) else np.eye(len(M))
+    values, directions = np.linalg.eigh(free.T @ (M / np.outer(scale, scale)) @ free)
+    if not len(values) or values[0] > -1e-9:
+        return []
+    motion = np.abs(free @ directions[:, 0]) / scale
+    name = work.equations.velocity_names[int(np.argmax(motion))].removesuffix(".rate")
+    guilty = [
+        f"{each.name!r} is {value:g}"
+        for each, value in zip(work.equations.parameters, work.parameters, strict=False)
+        if value < 0.0 and each.name.rpartition(".")[2] in ("mass", "inertia", "xx", "yy", "zz")
+    ]
+    told = ", ".join(guilty) or "check the parameters given"
+    return [f"the mass or inertia that resists the motion of {name!r} is negative; {told}"]
+
+
+def _gaps(work: Posture) -> Vector:
+    out = np.zeros(work.mechanism.sizes["guards"])
+    block = work.mechanism.block(work.time, work.q, work.y, work.anchors)
+    work.mechanism.common["guards"](block, work.parameters, out)
+    return out
+
+
+def _below(work: Posture, opened: set[str]) -> list[str]:
+    """Open contacts that start inside their surface without having been named open."""
+    faults = []
+    values, count = _gaps(work), len(work.manager.contacts)
+    for c, contact in enumerate(work.manager.contacts):
+        named_off = isinstance(contact.only_while, str) and contact.only_while not in work.manager.mode(work.flags)
+        off = named_off or (contact.only_while is not None and values[3 * count + c] <= 0.0)
+        if values[c] < -BELOW and not work.flags[c] and contact.name not in opened and not off:
+            inside = (
+                f"{contact.name!r} starts {-values[c]:.6g} {contact.unit} inside its surface; raise the mechanism, "
+                f"name it in closed=[…] to set it on the surface, or in open=[…] to ignore it until it has risen"
+            )
+            against = (
+                f"{contact.name!r} starts open at {values[c]:.6g} {contact.unit}, a velocity at which it acts; name it "
+                "in closed=[…], or give a velocity that it lets pass"
+            )
+            faults.append(against if contact.is_velocity else inside)
+    return faults
+
+
+def _armed(work: Posture, opened: set[str]) -> frozenset[str]:
+    """Open contacts that may close from the start.
+
+    One that touches (|g| below 1e-8) and waits for another by `When` is a trailing foot: ignored until it has risen.
+    """
+    armed = set()
+    values = _gaps(work)
+    for c, contact in enumerate(work.manager.contacts):
+        lifted = values[c] > LIFTED
+        trailing = bool(contact.when) or contact.name in opened
+        if not work.flags[c] and (lifted or (not trailing and values[c] > -BELOW)):
+            armed.add(contact.name)
+    return frozenset(armed)
+
+
+def _moved(work: Posture, q: Vector, y: Vector, named: _Named) -> dict[str, float]:
+    """How far named values, and unnamed ones from their defaults, were moved."""
+    moved = {}
+    for k, coordinate in enumerate(work.equations.coordinates):
+        change = float(work.q[k] - q[k])
+        if change != 0.0 and (k in named.q or abs(change) > 1e-15):
+            moved[coordinate.name] = change
+    for k, name in enumerate(work.equations.velocity_names):
+        change = float(work.y[k] - y[k])
+        if change != 0.0 and (k in named.v or abs(change) > 1e-15):
+            moved[name] = change
+    return moved

@@ -1,0 +1,111 @@
+"""What is wrong with a start that does not close: constraints in conflict, or named values that contradict them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mbd.arrays import Vector
+from mbd.assembly.conflicts import loops_of
+from mbd.assembly.infeasibility import MOST_SETS, Held, named_conflict, position_conflicts, velocity_conflict
+from mbd.assembly.posture import TOLERANCE, Posture
+
+__all__ = ["Attempt", "contradictions", "infeasible"]
+
+
+PROJECT = ", or use assemble(..., project=True) to move all"
+"""Advice to those who have not followed it yet."""
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """How a start was to be closed.
+
+    rows : numbers of the rows on positions; q, y : the values from which closing began
+    held_q, held_v : named coordinates and rates, which stay
+    projected : whether named coordinates and rates were free to move
+    misfit, speed_misfit : what is left of `rows` and named positions, of the active rows and named rates
+    """
+
+    rows: Sequence[int]
+    q: Vector
+    y: Vector
+    held_q: Sequence[Held]
+    held_v: Sequence[Held]
+    misfit: Vector
+    speed_misfit: Vector
+    projected: bool = False
+
+
+def infeasible(work: Posture, rows: Sequence[int], start: Vector, misfit: Vector, model: Any, named: bool) -> list[str]:
+    """Rows on positions that cannot hold together, whatever is named: each irreducible set, and what to relax.
+
+    Parameters
+    ----------
+    work : the posture that closing reached
+    rows, start : numbers of the rows, and q from which closing began
+    misfit : what is left of the rows and of named positions
+    named : whether values were held, so that the rows alone might close
+    """
+    if np.max(np.abs(misfit), initial=0.0) <= TOLERANCE or not np.isfinite(misfit).all():
+        return []
+    return [str(each) for each in position_conflicts(work, rows, start, loops_of(model), tried=not named)]
+
+
+def contradictions(work: Posture, attempt: Attempt, model: Any) -> list[str]:
+    """Every row and named result that the named values contradict, with both residuals and who is in conflict."""
+    equations, rows, misfit, speed_misfit = work.equations, attempt.rows, attempt.misfit, attempt.speed_misfit
+    active = list(work.manager.active_rows(work.flags))
+    speed = 1.0 + float(np.max(np.abs(work.y[: equations.n_v]), initial=0.0))
+    fast = bool(np.max(np.abs(speed_misfit), initial=0.0) > TOLERANCE * speed)
+    if fast and np.isfinite(speed_misfit).all():
+        conflict = velocity_conflict(work, loops_of(model))
+        if conflict is not None:
+            return [str(conflict)]
+    sets = _sets(work, attempt, bool(np.max(np.abs(misfit), initial=0.0) > TOLERANCE), fast, model)
+    h = dict(zip(rows, misfit, strict=False))
+    rate = dict(zip(active, speed_misfit, strict=False))
+    wanted = [
+        *zip(work.places, misfit[len(rows) :], strict=True),
+        *zip(work.rates, speed_misfit[len(active) :], strict=True),
+    ]
+    found = [
+        f"{condition.name!r} = {condition.target:.9g} cannot be reached: off by {off:.6g}; name fewer values"
+        + sets.get(repr(condition.name), "")
+        for condition, off in wanted
+        if not abs(off) <= TOLERANCE * speed
+    ]
+    for k in active:
+        row = equations.rows[k]
+        position, velocity = float(h.get(k, 0.0)), float(rate[k])
+        if abs(position) > TOLERANCE or abs(velocity) > TOLERANCE * speed or not np.isfinite(position + velocity):
+            place = "" if row.is_velocity else f"position residual {position:.6g} {row.unit}, "
+            found.append(
+                f"the start contradicts {row.title}: {place}velocity residual {velocity:.6g} {row.unit}/s; "
+                f"name fewer values{'' if attempt.projected else PROJECT}" + sets.get(repr(row.owner), "")
+            )
+    return found
+
+
+def _sets(work: Posture, attempt: Attempt, off: bool, fast: bool, model: Any) -> Mapping[str, str]:
+    """For each name, the irreducible set of rows and named values in conflict that it belongs to."""
+    loops, told = loops_of(model), dict[str, str]()
+    finite = np.isfinite(attempt.misfit).all() and np.isfinite(attempt.speed_misfit).all()
+    levels = [(False, attempt.rows, attempt.q, attempt.held_q)] if off else []
+    levels += [(True, list(work.manager.active_rows(work.flags)), attempt.y, attempt.held_v)] if fast else []
+    for speeds, rows, start, held in levels if finite else ():
+        left = list(rows)
+        for _ in range(MOST_SETS):
+            names = named_conflict(work, left, start, held, loops, speeds)
+            if not names:
+                break
+            for name in names:
+                told.setdefault(name, f" (in conflict: {', '.join(names)})")
+            fewer = [k for k in left if repr(work.equations.rows[k].owner) not in names]
+            if len(fewer) == len(left):
+                break
+            left = fewer
+    return told

@@ -1,0 +1,104 @@
+"""A model at a state that somebody gives: its compiled equations with the parameters that are valid there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mbd.arrays import Vector
+from mbd.assembly.trivial_rows import manager_of
+from mbd.bodies.values import named_number_faults
+from mbd.compile.mechanism import Mechanism
+from mbd.compile.mechanisms import mechanism_of
+from mbd.equations.equations import Equations
+from mbd.errors import ModelError, UnknownNameError, nearest
+from mbd.kernel.active_set import ActiveSetManager
+from mbd.state import State, malformed
+
+__all__ = ["LARGEST_ANGLE", "GivenState", "beyond_angles", "fits", "given_state"]
+
+LARGEST_ANGLE = 1e12
+"""Beyond this, neighbouring numbers differ by more than 1e-4 rad: poses, and what depends on them, are round-off."""
+
+
+@dataclass(frozen=True)
+class GivenState:
+    """What a state is judged and continued with.
+
+    Parameters
+    ----------
+    mechanism, manager : compiled equations and their contacts
+    values : the parameter vector
+    changed : parameters other than the model's, by name
+    """
+
+    mechanism: Mechanism
+    manager: ActiveSetManager
+    values: Vector
+    changed: dict[str, float]
+
+
+def given_state(model: Any, state: Any, parameters: Mapping[str, float] | None, backend: str) -> GivenState:
+    """The model with the parameters of the state, and others on top of them.
+
+    Raises
+    ------
+    ModelError
+        if the state is not one of this model, or not of finite numbers.
+    """
+    if not isinstance(state, State):
+        raise ModelError(f"state must be a State from mbd.assemble(model, …), not {state!r}")
+    faults = malformed(state) + named_number_faults(parameters, "parameters")
+    if faults:
+        raise ModelError(faults)
+    changed = {**state.parameters, **(parameters or {})}
+    mechanism = mechanism_of(model, backend, changed)
+    values = mechanism.parameters(changed, getattr(model, "parameters", {}))
+    manager = manager_of(mechanism, values)
+    fits(state, mechanism.equations, manager)
+    return GivenState(mechanism, manager, values, changed)
+
+
+def fits(start: State, equations: Equations, manager: ActiveSetManager) -> None:
+    """The state must be one of this model, of finite numbers."""
+    faults = malformed(start)
+    if faults:
+        raise ModelError(faults)
+    names = tuple(coordinate.name for coordinate in equations.coordinates)
+    anchors = equations.n_anchors
+    sizes = (len(start.q), len(start.v), len(start.z)) == (equations.n_q, equations.n_v, equations.n_z)
+    if start.names != names or not sizes:
+        raise ModelError(
+            f"the start has the coordinates {', '.join(start.names) or 'none'} and {len(start.z)} states, but "
+            f"the model has {', '.join(names)} and {equations.n_z} states; assemble it from this model"
+        )
+    contacts = [*sorted(start.mode.closed), *sorted(start.armed or ())]
+    unknown = [nearest(name, manager.names, "contact") for name in dict.fromkeys(contacts) if name not in manager.names]
+    if unknown:
+        raise UnknownNameError(unknown)
+    if len(start.anchors) != anchors and (start.mode.closed or (len(start.anchors) and equations.turns)):
+        raise ModelError(
+            f"the start holds {len(start.anchors)} anchors of contacts and turns of cut joints, but the model has "
+            f"{anchors}; assemble it from this model, with the same parameters="
+        )
+    parts = ((start.q, names), (start.v, equations.velocity_names), (start.z, [s.name for s in equations.states]))
+    values = [(name, value) for part, known in parts for name, value in zip(known, part, strict=True)]
+    values += [(f"anchor {k} of its contacts", value) for k, value in enumerate(start.anchors)]
+    bad = [
+        f"the start has {name!r} = {value}; give a finite number" for name, value in values if not np.isfinite(value)
+    ]
+    bad += [f"the start has {said}; take whole turns away" for said in beyond_angles(equations, start.q)]
+    if bad:
+        raise ModelError(bad)
+
+
+def beyond_angles(equations: Equations, q: Vector) -> list[str]:
+    """Which angles of a position (n_q,) are too large, one phrase each."""
+    return [
+        f"{coordinate.name!r} = {value:.6g} rad, where neighbouring numbers are {np.spacing(abs(value)):.2g} rad apart"
+        for coordinate, value in zip(equations.coordinates, q, strict=True)
+        if coordinate.unit == "rad" and abs(value) > LARGEST_ANGLE
+    ]

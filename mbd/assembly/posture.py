@@ -1,0 +1,269 @@
+"""Closing a mechanism: positions and velocities that satisfy its rows, moved least in the metric of the mass matrix."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mbd.arrays import Matrix, Vector
+from mbd.assembly.conditions import Condition
+from mbd.assembly.orientation import faced
+from mbd.assembly.turns import choose_turns, hold_directions
+from mbd.compile.mechanism import Mechanism
+from mbd.equations.equations import Equations
+from mbd.kernel.active_set import ActiveSetManager
+
+__all__ = [
+    "Posture", "TOLERANCE", "capture", "close_nearby", "close_positions", "close_velocities", "descend",
+    "descents", "move", "position_rows",
+]  # fmt: skip
+
+TOLERANCE = 1e-9
+"""Largest row residual [m, rad, m/s, rad/s] of a start, relative to 1 or the speed, that counts as consistent."""
+REFINEMENTS = 3
+"""Solutions of the linear equations for velocities: bodies without mass leave an error in the first [-]."""
+ACTS = 1e-14
+"""Derivative [m/rad, -] of a row below which a coordinate does not act on it: what cancellation leaves of zero."""
+NUDGE, NUDGES = 0.01, 3
+"""Step [m, rad] out of a flat spot of the rows, and how often it is tried."""
+AWAY = 0.2
+"""Turn [rad] of the free angles out of a pose in which a joint is half a turn off."""
+TRIES, DESCENT = 4, 400
+"""Starts of a descent of the sum of squares of the rows, and its most steps [-]."""
+CLOSE = 1e-3
+"""Row residual [m, rad] at the end of a descent from which Newton's method may go on."""
+RESTARTS = 12
+"""Other starts of Newton's method before positions count as out of reach [-]."""
+
+
+@dataclass
+class Posture:
+    """A mechanism on the way to a consistent start."""
+
+    mechanism: Mechanism
+    manager: ActiveSetManager
+    parameters: Vector
+    q: Vector
+    y: Vector
+    flags: Any
+    anchors: Vector
+    places: Sequence[Condition] = ()
+    rates: Sequence[Condition] = ()
+    time: float = 0.0
+    iterations: int = 0
+
+    @property
+    def equations(self) -> Equations:
+        return self.mechanism.equations
+
+    def with_conditions(self, h: Vector, B: Matrix, conditions: Sequence[Condition]) -> tuple[Vector, Matrix]:
+        """Rows and their Jacobian, followed by those of named conditions."""
+        block = self.mechanism.block(self.time, self.q, self.y, self.anchors)
+        found = [condition.at(block, self.parameters) for condition in conditions]
+        return np.append(h, [r for r, _ in found]), np.vstack([B, *(slope for _, slope in found)])
+
+
+def position_rows(work: Posture) -> list[int]:
+    """Active rows that fix positions: bilateral ones and the gaps of closed contacts; anchors adapt to the position.
+
+    Rows on velocities leave positions free.
+    """
+    normals = {contact.rows[0] for contact in work.manager.contacts if contact.rows}
+    rows, active = work.equations.rows, work.manager.active_rows(work.flags)
+    return [k for k in active if not rows[k].is_velocity and (rows[k].contact < 0 or k in normals)]
+
+
+def _involved(B: Matrix, free: Matrix) -> Any:
+    """The free coordinates that the rows act on; the others stay where they are."""
+    size = float(np.max(np.abs(B), initial=0.0))
+    return np.flatnonzero(free & (np.max(np.abs(B), axis=0, initial=0.0) > max(1e-12 * size, ACTS)))
+
+
+def _weighted(M: Matrix) -> Matrix:
+    """The mass matrix made definite, so that coordinates without inertia move at almost no cost."""
+    size = float(np.max(np.abs(np.diag(M)), initial=0.0)) or 1.0
+    return np.asarray(M + 1e-9 * size * np.eye(len(M)))
+
+
+def _least_change(M: Matrix, B: Matrix, residual: Vector, pull: Vector) -> Vector:
+    """The change d with B d = −residual nearest to `pull` in the M-norm; least squares where rows depend."""
+    inverse = np.linalg.inv(_weighted(M))
+    flow = inverse @ B.T
+    multiplier = np.linalg.lstsq(B @ flow, residual + B @ pull, rcond=1e-12)[0]
+    return np.asarray(pull - flow @ multiplier)
+
+
+def close_positions(work: Posture, rows: Sequence[int], free: Matrix) -> Vector:
+    """The free coordinates that satisfy the rows nearest to the given ones; the remaining residual of each row.
+
+    Newton's method from the given values; where it gets stuck, from others with the free angles turned, and at last
+    from where the sum of squares of the rows is least, which Newton's method misses near singular poses.
+    """
+    if not rows and not work.places:
+        return np.zeros(0)
+    start = work.q.copy()
+    choose_turns(work, rows)
+    misfit = _newton(work, rows, free, start)
+    if np.max(np.abs(misfit)) <= TOLERANCE:
+        return misfit
+    first, angles = work.q, np.array([c.unit == "rad" for c in work.equations.coordinates])
+    turns = np.random.default_rng(0).uniform(-1.5, 1.5, (RESTARTS, len(start)))
+    for turn in turns if work.mechanism.vector and bool((free & angles).any()) else ():
+        work.q = start + np.where(free & angles, turn, 0.0)
+        choose_turns(work, rows)
+        again = _newton(work, rows, free, start)
+        if np.max(np.abs(again)) <= TOLERANCE:
+            return again
+    weights = np.ones(len(rows) + len(work.places))
+    for q in descents(work, start, free) if np.max(np.abs(misfit)) > TOLERANCE else ():
+        work.q = q
+        missing, _ = descend(work, rows, free, weights)
+        if np.max(np.abs(missing)) < CLOSE:
+            again = _newton(work, rows, free, work.q.copy())
+            if np.max(np.abs(again)) <= TOLERANCE:
+                return again
+    work.q = first
+    return misfit
+
+
+def descents(work: Posture, start: Vector, free: Matrix) -> list[Vector]:
+    """Positions to descend from: the given one, and others with the free angles turned and the rest shifted."""
+    if not work.mechanism.vector or not bool(np.any(free)):
+        return [start.copy()]
+    reach = np.array([1.5 if c.unit == "rad" else 0.5 for c in work.equations.coordinates])
+    turns = np.random.default_rng(1).uniform(-1.0, 1.0, (TRIES, len(start)))
+    turns[0] = 0.0
+    return [start + np.where(free, reach * turn, 0.0) for turn in turns]
+
+
+def descend(work: Posture, rows: Sequence[int], free: Matrix, weights: Vector) -> tuple[Vector, Matrix]:
+    """(h, B) at the end of a descent of Σ (w h)² from the position of `work`, which moves there."""
+    choose_turns(work, rows)
+    n_v, moving = work.equations.n_v, np.flatnonzero(free)
+    h, B = _weighted_rows(work, rows, weights)
+    damping = 1e-3
+    for _ in range(DESCENT):
+        J = B[:, moving]
+        slope = J.T @ h
+        if not len(moving) or np.linalg.norm(slope) <= 1e-13 * (1.0 + np.linalg.norm(h)):
+            break
+        before, x = work.q.copy(), np.zeros(n_v)
+        x[moving] = -np.linalg.solve(J.T @ J + damping * np.eye(len(moving)), slope)
+        x *= min(1.0, 0.5 / float(np.max(np.abs(x))))
+        move(work, x)
+        new_h, new_B = _weighted_rows(work, rows, weights)
+        if np.linalg.norm(new_h) < np.linalg.norm(h):
+            h, B, damping = new_h, new_B, max(damping / 3.0, 1e-12)
+        else:
+            work.q, damping = before, 4.0 * damping
+            if damping > 1e12:
+                break
+    return h / weights, B / weights[:, None]
+
+
+def _weighted_rows(work: Posture, rows: Sequence[int], weights: Vector) -> tuple[Vector, Matrix]:
+    """w h and w B of rows and named results."""
+    terms = work.mechanism.acceleration_terms(work.time, work.q, work.y, work.parameters, work.anchors)
+    picked = list(rows)
+    h, B = work.with_conditions(terms.h[picked], terms.B[picked][:, : work.equations.n_v], work.places)
+    h, B, _ = faced(work, picked, h, B)
+    return weights * h, weights[:, None] * B
+
+
+def close_nearby(work: Posture, rows: Sequence[int], free: Matrix) -> Vector:
+    """Newton's method from the present position alone; the remaining residual of each row."""
+    hold_directions(work.mechanism, work.time, work.q, work.parameters, work.anchors)
+    return _newton(work, rows, free, work.q.copy()) if rows or work.places else np.zeros(0)
+
+
+def move(work: Posture, x: Vector) -> None:
+    """q ← q ⊕ x."""
+    if work.mechanism.vector:
+        work.q = work.q + x
+        return
+    block = work.mechanism.block(work.time, work.q, work.y, work.anchors)
+    block[work.mechanism.layout.x : work.mechanism.layout.v] = x
+    out = np.zeros(len(work.q))
+    work.mechanism.common["compose"](block, work.parameters, out)
+    work.q = out
+
+
+def _newton(work: Posture, rows: Sequence[int], free: Matrix, start: Vector) -> Vector:
+    """Newton on the free coordinates, close to `start` at the end; the remaining residual of each row."""
+    n_v = work.equations.n_v
+    before, picked = np.inf, list(rows)
+    for iteration in range(200):
+        work.iterations += 1
+        terms = work.mechanism.acceleration_terms(work.time, work.q, work.y, work.parameters, work.anchors)
+        h, B = work.with_conditions(terms.h[picked], terms.B[picked][:, :n_v], work.places)
+        h, B, opposite = faced(work, picked, h, B)
+        if opposite and iteration < NUDGES:
+            _turn_away(work, free)
+            continue
+        size = float(np.max(np.abs(h)))
+        places = _involved(B, free)
+        if not len(places) and size > TOLERANCE and work.mechanism.vector and iteration < NUDGES:
+            _nudge(work, rows, free)
+            continue
+        if not np.isfinite(size) or not len(places):
+            return h
+        B = B[:, places]
+        M = terms.M[:n_v, :n_v][np.ix_(places, places)]
+        near = size < 1e-3 or iteration > 20
+        pull = (start - work.q)[places] if near and iteration < 100 else np.zeros(len(places))
+        change = _least_change(M, B, h, pull)
+        limit = max(1.0, float(np.max(np.abs(change))) / 0.5)
+        if size < 1e-13 and float(np.max(np.abs(change))) < 1e-12:
+            return h
+        if iteration > 60 and size > 0.5 * before and size < 1e-12:
+            return h
+        before = size
+        x = np.zeros(n_v)
+        x[places] = change / limit
+        move(work, x)
+    terms = work.mechanism.acceleration_terms(work.time, work.q, work.y, work.parameters, work.anchors)
+    return faced(work, picked, *work.with_conditions(terms.h[picked], terms.B[picked][:, :n_v], work.places))[0]
+
+
+def _turn_away(work: Posture, free: Matrix) -> None:
+    """Leave a pose in which a joint is half a turn off, where its rows say nothing about the way back."""
+    angles = np.array([coordinate.unit == "rad" for coordinate in work.equations.coordinates])
+    if work.mechanism.vector:
+        work.q = work.q + np.where(free & angles, AWAY * (1.0 + np.arange(len(work.q)) / 7.0), 0.0)
+
+
+def _nudge(work: Posture, rows: Sequence[int], free: Matrix) -> None:
+    """Leave a flat spot, where no free coordinate acts on the rows, along those that act on them nearby."""
+    nearby = work.q + np.where(free, NUDGE * (1.0 + np.arange(len(work.q)) / 7.0), 0.0)
+    terms = work.mechanism.acceleration_terms(work.time, nearby, work.y, work.parameters, work.anchors)
+    places = _involved(terms.B[list(rows)][:, : work.equations.n_v], free)
+    work.q[places] = nearby[places]
+
+
+def capture(work: Posture) -> None:
+    """Store what closed contacts hold, such as the place of touchdown, into the anchors."""
+    terms = work.mechanism.acceleration_terms(work.time, work.q, work.y, work.parameters, work.anchors)
+    for contact, flag in zip(work.manager.contacts, work.flags, strict=True):
+        if flag:
+            for anchor in contact.anchors:
+                work.anchors[anchor] = terms.captured[anchor]
+
+
+def close_velocities(work: Posture, free: Matrix) -> Vector:
+    """Complete the free velocities; the remaining rate of each active row."""
+    picked = list(work.manager.active_rows(work.flags))
+    if not picked and not work.rates:
+        return np.zeros(0)
+    n_v = work.equations.n_v
+    for refinement in range(REFINEMENTS + 1):
+        terms = work.mechanism.acceleration_terms(work.time, work.q, work.y, work.parameters, work.anchors)
+        rate, B = work.with_conditions(terms.rate[picked], terms.B[picked][:, :n_v], work.rates)
+        places = _involved(B, free)
+        if refinement == REFINEMENTS or not len(places):
+            break
+        M = terms.M[:n_v, :n_v][np.ix_(places, places)]
+        work.y[places] += _least_change(M, B[:, places], rate, np.zeros(len(places)))
+    return rate

@@ -1,0 +1,62 @@
+"""The step that resolves the blows of a penalty contact in a run: what `mbd.penalty_parameters` would say of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mbd.arrays import Vector
+from mbd.results.record import Record
+from mbd.simulation.diagnostics.fastest import free_motions, matrices
+
+if TYPE_CHECKING:
+    from mbd.simulation.run.run import Run
+
+__all__ = ["dt_of_blows"]
+
+
+def dt_of_blows(run: Run, record: Record, number: int, rows: Iterable[int]) -> float:
+    """A fifth of the time until the deepest point of the blows of contact `number` that begin at some rows [s].
+
+    With the effective mass ``1/(J M⁻¹ Jᵀ)`` along the rows that hold, J = ∂ġ/∂v, and the approach speed there; infinite
+    where these cannot be told.
+    """
+    name = run.manager.contacts[number].name
+    law = next(word for word in run.model.contacts if word.name == name)
+    inputs = run.mechanism.equations.parameters
+    values = {parameter.name: float(v) for parameter, v in zip(inputs, run.values["params"], strict=False)}
+    given = {**law.parameters(), **values}
+    found = np.inf
+    with np.errstate(all="ignore"):
+        for row in rows:
+            speed, mass = _approach(run, record, number, row)
+            if speed > 0.0 and 0.0 < mass < np.inf:
+                found = min(found, law.resolving_dt(given, mass, speed))
+    return float(found)
+
+
+def _approach(run: Run, record: Record, number: int, row: int) -> tuple[float, float]:
+    """(approach speed [m/s, rad/s], effective mass [kg, kg m²]) of a contact at a row; zeros where not known."""
+    y, n_v = np.concatenate([record.v[row], record.z[row]]), record.v.shape[1]
+    rate = _gap_rate(run, record, number, row, y)
+    J = np.zeros(len(y))
+    for k in range(n_v):  # linear in v
+        moved = y.copy()
+        moved[k] += 1.0
+        J[k] = _gap_rate(run, record, number, row, moved) - rate
+    found = matrices(run, record, row)
+    if found is None:
+        return 0.0, 0.0
+    free = free_motions(found.B, len(y))
+    along = free.T @ J
+    return -rate, float(1.0 / (along @ np.linalg.lstsq(free.T @ found.M @ free, along)[0]))
+
+
+def _gap_rate(run: Run, record: Record, number: int, row: int, y: Vector) -> float:
+    anchors = run.values["anchors"][: run.values["n_anchors"]]
+    block = run.mechanism.block(float(record.time[row]), record.q[row], y, anchors)
+    out = np.zeros(run.mechanism.sizes["guards"])
+    run.mechanism.common["guards"](block, run.values["params"], out)
+    return float(out[run.values["n_contacts"] + number])

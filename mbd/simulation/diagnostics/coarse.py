@@ -1,0 +1,78 @@
+"""Steps of fixed size within which forces changed as nothing before them foretold, and the step that resolves them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mbd.kernel import fields as F
+from mbd.results.record import Record
+from mbd.simulation.diagnostics.fastest import resolving_dt
+
+if TYPE_CHECKING:
+    from mbd.simulation.run.run import Run
+
+__all__ = ["coarse_steps"]
+
+SAMPLES = 64
+"""Parts of a step at whose ends forces are evaluated [-]."""
+BLIND = 0.1
+"""Step that is asked for, over the present one, where forces tell nothing [-]."""
+
+
+def coarse_steps(run: Run, record: Record) -> list[str]:
+    """The note on steps whose estimated errors of rates are more than a fifth of the rates; [] if there are none.
+
+    A scheme of any order passes over a wall that is thinner than a step, as if it were elsewhere: the energy may be
+    right by then, and the instant is not.
+    """
+    count = int(run.values["counts"][F.COARSENED])
+    if not count or run.values["adaptive"] or len(record.time) < 2:
+        return []
+    detail = run.values["detail"]
+    worst, when = float(detail[F.COARSEST]), float(detail[F.COARSEST_AT])
+    row = int(np.clip(np.searchsorted(record.time, when - 1e-9 * run.dt), 1, len(record.time) - 1))
+    asked = _asked(run, record, row)
+    steps = "a step was" if count == 1 else f"{count} steps were"
+    return [
+        f"{steps} not resolved by dt = {run.dt:g} s: forces changed within one so that rates are uncertain by "
+        f"{100.0 * worst:.0f} % (the most, at t = {when:.6g} s), and times and places after it as well; try "
+        f"dt <= {asked:.1g} s, or tol="
+    ]
+
+
+def _asked(run: Run, record: Record, row: int) -> float:
+    """The step that resolves the steepest change of forces between a row and the one before [s].
+
+    ``ω² = max |Δa|/|Δq|`` along the cubic through both rows, as far as the kinetic energy reaches against the forces.
+    """
+    system, h = run.stepper.system, float(record.time[row] - record.time[row - 1])
+    blind = BLIND * run.dt
+    if record.q.shape[1] != record.v.shape[1] or not h > 0.0:
+        return blind
+    mode = run.manager.mode(record.closed[row])
+    s = np.linspace(0.0, 1.0, SAMPLES + 1)[:, None]
+    one, other, slope, end = record.q[row - 1], record.q[row], h * record.v[row - 1], h * record.v[row]
+    q = one + s * slope + s**2 * (3.0 * (other - one) - 2.0 * slope - end) + s**3 * (slope + end - 2.0 * (other - one))
+    v = record.v[row - 1] + s * (record.v[row] - record.v[row - 1])
+    z, n_v = record.z[row - 1], record.v.shape[1]
+    M = run.mechanism.acceleration_terms(
+        float(record.time[row - 1]), one, np.concatenate([v[0], z]), run.values["params"], system.anchors
+    ).M[:n_v, :n_v]
+    try:
+        times = record.time[row - 1] + h * s[:, 0]
+        a = np.array([
+            system.accelerations(float(t), q[k], np.concatenate([v[k], z]), mode)[0][:n_v] for k, t in enumerate(times)
+        ])  # fmt: skip
+    except (ArithmeticError, np.linalg.LinAlgError):
+        return blind
+    moved, changed = np.diff(q, axis=0), np.diff(a, axis=0)
+    work = np.cumsum(np.einsum("ki,ij,kj->k", 0.5 * (a[1:] + a[:-1]), M, moved))
+    energy = 0.5 * float(np.max([v[0] @ M @ v[0], v[-1] @ M @ v[-1]]))
+    beyond = np.flatnonzero(np.abs(work) > energy)
+    kept = slice(0, int(beyond[0]) + 1 if len(beyond) else None)
+    ways, changes = np.linalg.norm(moved, axis=1)[kept], np.linalg.norm(changed, axis=1)[kept]
+    steep = changes[ways > 0.0] / ways[ways > 0.0]
+    rate = float(np.sqrt(np.max(steep, initial=0.0)))
+    return min(resolving_dt(rate), blind) if np.isfinite(rate) and rate > 0.0 else blind

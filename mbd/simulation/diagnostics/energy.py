@@ -1,0 +1,278 @@
+"""Whether the scheme itself has put energy into a mechanism: what no other test of a run tells.
+
+With E = T + V, the first row 0 and row k, what a mechanism has by right is
+
+``S_k = T_0 + max_{j ≤ k} (V_0 − V_j) + G_k``,  ``G_k = Σ_parts max_{j ≤ k} W_part,j``
+
+its energy of motion at the start, the potential that it has given off, and the works of forces, motors, drives, resets
+and impacts where they have given any. Where ``E_k − E_0 − G_k > S_k``, the scheme has more than doubled that: an error.
+Losses do not enter, so that one that rows integrate roughly cannot pass for a gain; nor does the work of a penalty
+contact that was open at the start, which gives back less than it took, but in a blow of few rows adds up to anything.
+The doubt about the other works is taken off.
+
+A glance at E in some of the rows comes first. Only where that looks strange is the ledger of all rows made.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Container
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from mbd.arrays import Matrix, Vector
+from mbd.compile.mechanism import Mechanism
+from mbd.results.columns import ModelColumns
+from mbd.results.energy import doubted_ledger, kinds_of_work
+from mbd.simulation.run.stored import record_of, whole_record
+
+if TYPE_CHECKING:
+    from mbd.results.ledger import Ledger
+    from mbd.simulation.run.run import Run
+
+__all__ = ["EnergyWatch", "Judgement", "judgement"]
+
+FIRST_LOOK = 20000
+"""Stored rows after which a run that goes on is looked at; the next looks at four times as many, and at its end."""
+LOOKS = 4
+"""Looks at a run that goes on."""
+SPREAD, EARLY = 30, tuple(2**k for k in range(10))
+"""Rows of a look: so many from the last look to now, and the first rows of a run at these numbers."""
+TELLING = 0.1
+"""Share of the energy that a mechanism has, above which a note tells what the scheme gained or lost [-]."""
+ABSURD = 1e6
+"""Gain of energy over all that there was before, above which a single row is a verdict [-]."""
+LEAP = 100.0
+"""Rise of energy over all earlier swings that looks strange where something is driven [-]."""
+ROUND_OFF = 1e-9
+"""Share of the largest energies below which changes mean nothing [-]."""
+MOVED = 1e-6
+"""Way of the fastest coordinate [m, rad] below which a mechanism is at rest, and its energy round-off."""
+UNDRIVEN = frozenset({"joint loss", "damper", "friction", "penalty"})
+"""Kinds of works that take energy, or give back what they took."""
+
+KINDS: WeakKeyDictionary[Mechanism, frozenset[str]] = WeakKeyDictionary()
+"""What may change the energy of a mechanism, found when it is first looked at."""
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What the ledger says of a scheme.
+
+    row : the first row from which on the energy is the scheme's own, −1 if there is none
+    numerical : the most that the scheme has given (positive) or taken at a time [J]
+    owned : what the mechanism has by right at that row, or in all [J]
+    """
+
+    row: int
+    numerical: float
+    owned: float
+
+    @property
+    def share(self) -> float:
+        """numerical / owned [-]; infinite where nothing is owned, 0 where neither is anything."""
+        if self.owned > 0.0:
+            return self.numerical / self.owned
+        return float(np.copysign(np.inf, self.numerical)) if self.numerical != 0.0 else 0.0
+
+
+def judgement(ledger: Ledger, doubt: Matrix, way: Vector, lending: Container[str] = ()) -> Judgement:
+    """Judge a scheme by the ledger, its doubts (2, R) [J] and the largest way of a coordinate since the start (R,).
+
+    lending : names of the parts that only give back what they took
+
+    A row alone, as next to a pose in which rows lose rank, is no verdict: of those from the first one on, at least two
+    and at least half must say the same, unless its gain is `ABSURD` times all energy until then.
+    """
+    givers = [part.energy for part in ledger.parts if part.name not in lending and not part.withheld]
+    given = sum((np.maximum.accumulate(np.maximum(energy, 0.0)) for energy in givers), np.zeros(len(way)))
+    fallen = np.maximum.accumulate(ledger.potential[0] - ledger.potential)
+    owned = ledger.kinetic[0] + fallen + given
+    noise = ROUND_OFF * np.maximum.accumulate(np.abs(ledger.kinetic) + np.abs(ledger.potential))
+    moves = np.maximum.accumulate(way) > MOVED
+    gain = np.where(moves, np.maximum(ledger.total - ledger.total[0] - given - noise - doubt[0], 0.0), 0.0)
+    loss = np.where(moves, np.maximum(-ledger.numerical - noise - doubt[1], 0.0), 0.0)
+    bad = gain > owned
+    rest = np.cumsum(bad[::-1])[::-1]  # bad rows from each on
+    size = np.abs(ledger.kinetic) + np.abs(ledger.potential)
+    before = np.maximum.accumulate(np.concatenate([[0.0], size[:-1]]))
+    known = np.maximum(owned, before)
+    absurd = (known > 0.0) & (gain > ABSURD * known)
+    firm = absurd | (bad & (rest >= 2) & (2 * rest >= np.arange(len(bad), 0, -1)))
+    if firm.any():
+        row = int(np.argmax(firm))
+        return Judgement(row, float(np.max(gain[row:])), float(owned[row]))
+    most, least = float(np.max(gain)), float(np.max(loss))
+    return Judgement(-1, most if most >= least else -least, float(owned[-1]))
+
+
+class EnergyWatch:
+    """Looks at the energy of a run now and then.
+
+    Attributes
+    ----------
+    problem, note : what was found, in a sentence; '' if nothing
+    row : the first from which on the energy is the scheme's own, −1 if there is none
+    share : of the energy that the mechanism had, what the scheme gave (positive) or took [-]
+    rows, ledgers : rows in which T + V was evaluated, and ledgers made
+    """
+
+    def __init__(self) -> None:
+        self.problem = self.note = ""
+        self.share, self.row = 0.0, -1
+        self.rows = self.ledgers = 0
+        self._due, self._looks, self._upto = FIRST_LOOK, 0, 0
+        self._seen = np.zeros((0, 3))  # T, V and the way of the fastest coordinate, of the rows looked at so far
+        self._cleared = 0.0  # a rise of energy that a ledger has explained
+
+    def is_due(self, run: Run) -> bool:
+        """Whether a run that goes on is to be looked at now."""
+        return run.stored >= self._due and self._looks < LOOKS
+
+    @np.errstate(all="ignore")
+    def judge(self, run: Run) -> str:
+        """Look at the run as far as it is stored; a sentence if the energy is the scheme's own, '' otherwise."""
+        if self.problem or run.stored < 2 or run.values["n_v"] == 0:
+            return self.problem
+        self._look(run)
+        if np.isinf(self._seen[:, 0]).any():
+            self._overflow(run)
+            return self.problem
+        if np.isnan(self._seen[:, 1]).any():
+            self._undefined(run)
+            return self.problem
+        if not self._looks_strange(run):
+            return ""
+        columns = ModelColumns(whole_record(run), run.mechanism.equations)
+        lending = _lending(run)
+        ledger, doubt = doubted_ledger(columns, lending)
+        found = judgement(ledger, doubt, _way(columns.record.q, columns.record.q[0]), lending)
+        self.ledgers += 1
+        self._cleared = float(np.nanmax(ledger.total - ledger.total[0]))
+        if found.row >= 0:
+            self.problem, self.row = _sentence(run, found), found.row
+        elif abs(found.share) > TELLING:
+            self.note, self.share = _note(found), found.share
+        return self.problem
+
+    def _look(self, run: Run) -> None:
+        """Evaluate T and V at some rows that were not looked at yet."""
+        last = run.stored - 1
+        first, early = min(self._upto, last), EARLY if self._looks == 0 else ()
+        spread = {first + k * (last - first) // (SPREAD - 1) for k in range(SPREAD)}
+        chosen = np.array(sorted(spread.union(row for row in early if row <= last)), dtype=np.intp)
+        record = record_of(run, run.table[chosen])
+        anchors = np.tile(run.values["anchors"][: run.values["n_anchors"]], (len(chosen), 1))
+        inputs = ModelColumns.inputs(record.rows(anchors))
+        kinetic, potential = run.mechanism.energies(inputs, record.parameters_at(chosen))
+        way = _way(record.q, run.table[0, 1 : 1 + run.values["n_q"]])
+        self._seen = np.concatenate([self._seen, np.column_stack([kinetic, potential, way])])
+        self.rows += len(chosen)
+        self._upto, self._due, self._looks = run.stored, 4 * max(self._due, run.stored // 4), self._looks + 1
+
+    def _overflow(self, run: Run) -> None:
+        """Energies beyond the largest number: the scheme's own where the run began with less, else not judged."""
+        top = float(np.max(np.abs(run.table[run.stored - 1, 1 + run.values["n_q"] :][: run.values["n_v"]])))
+        if np.isfinite(self._seen[0, 0]):
+            setting = "the tolerance" if run.values["adaptive"] else f"dt = {run.dt:g} s"
+            self.problem = (
+                f"t = {run.now:.9g} s: the energy has grown beyond the largest number, at speeds of {top:.2g}: "
+                f"{setting} does not resolve the motion; use a smaller one, or slower motion"
+            )
+        else:
+            self.note = (
+                f"speeds of {top:.2g} at the start make an energy beyond the largest number: energies cannot be told, "
+                "and the run was not judged by them; use larger units"
+            )
+
+    def _undefined(self, run: Run) -> None:
+        """A potential that has no value where the motion has got: it has passed a pole, which no motion does."""
+        columns = ModelColumns(whole_record(run), run.mechanism.equations)
+        effects = run.mechanism.equations.effects
+        known = {effect.name: effect.potential for effect in effects if effect.potential is not None}
+        energies = zip(known, columns.evaluate(list(known.values()), columns.rows), strict=True)
+        bad = {name: int(np.argmax(np.isnan(energy))) for name, energy in energies if np.isnan(energy).any()}
+        self.row = min(bad.values())
+        names = ", ".join(f"'{name}'" for name, row in bad.items() if row == self.row)
+        self.problem = (
+            f"t = {run.table[self.row, 0]:.9g} s: from here on the potential of {names} is not a number, though its "
+            "force is one: a step has passed a place where it has no value, such as the pole of a logarithm; use a "
+            "smaller dt to see what happens there, or a potential that is defined wherever the motion goes"
+        )
+
+    def _looks_strange(self, run: Run) -> bool:
+        """Whether only the ledger can tell that the energies seen are right."""
+        kinetic, potential, way = self._seen.T
+        if np.max(way) <= MOVED:
+            return False
+        total = kinetic + potential
+        fallen = np.maximum.accumulate(potential[0] - potential)
+        noise = ROUND_OFF * np.max(np.abs(self._seen[:, :2]))
+        owned = kinetic[0] + fallen
+        rise = total - total[0]
+        risen = ~(rise <= np.maximum(TELLING * owned + noise, 2.0 * self._cleared))  # NaN is strange too
+        sunk = rise < -TELLING * owned[-1] - noise
+        if not (risen.any() or sunk.any()):
+            return False
+        kinds = _kinds(run.mechanism)
+        if kinds <= UNDRIVEN:
+            sudden = bool(run.parameter_changes) or any(event.kind in ("closed", "event") for event in run.events)
+            return bool(risen.any()) or not (kinds or sudden)
+        swing = kinetic[0] + _swing(kinetic) + _swing(potential)
+        leaps = rise[1:] > LEAP * swing[:-1]
+        return bool(np.any(leaps[3:] & risen[4:]))
+
+
+def _way(q: Vector, start: Vector) -> Vector:
+    """The largest way of a coordinate from the start, at each row (R,) [m, rad]."""
+    return np.asarray(np.max(np.abs(q - start), axis=1, initial=0.0))
+
+
+def _swing(values: Vector) -> Vector:
+    """Highest less lowest value up to each row."""
+    return np.asarray(np.maximum.accumulate(values) - np.minimum.accumulate(values))
+
+
+def _kinds(mechanism: Mechanism) -> frozenset[str]:
+    if mechanism not in KINDS:
+        KINDS[mechanism] = kinds_of_work(mechanism.equations)
+    return KINDS[mechanism]
+
+
+def _lending(run: Run) -> frozenset[str]:
+    """Penalty contacts that were open at the start and whose numbers did not change."""
+    contacts = () if run.parameter_changes else run.manager.contacts
+    return frozenset(each.name for each in contacts if each.kind == "penalty" and each.name not in run.start.mode)
+
+
+def _sentence(run: Run, found: Judgement) -> str:
+    """Since when, how much, which coordinate moves fastest, and what to try."""
+    v = run.values
+    table = run.table[: found.row + 1]
+    first = 1 + v["n_q"]
+    speeds = np.abs(table[:, first : first + v["n_v"]])
+    changes = np.abs(table[:, first + v["n"] : first + v["n"] + v["n_v"]])
+    fastest = int(np.argmax(np.nan_to_num(speeds[-1])))
+    name = run.mechanism.equations.velocity_names[fastest].removesuffix(".rate")
+    top = float(np.max(speeds[:, fastest]))
+    turn = run.dt * float(np.max(changes[:, fastest])) / top if top > 0.0 else 1.0  # share of v that a step changes
+    way, finer = speeds[-1, fastest] * run.dt, 0.1 * run.dt / max(1.0, turn)
+    setting = "the tolerance" if run.values["adaptive"] else f"dt = {run.dt:g} s"
+    remedy = "a smaller one" if run.values["adaptive"] else f"dt below {finer:.1g} s"
+    return (
+        f"t = {table[-1, 0]:.9g} s: from here on the energy is not the mechanism's: the scheme itself has put up to "
+        f"{found.numerical:.3g} J into a mechanism that had {found.owned:.3g} J of its own to move with by then; "
+        f"{setting} does not resolve the motion, of which {name!r} is the fastest, {way:.3g} in one step; try "
+        f"{remedy}, or a larger mass or a softer stiffness there"
+    )
+
+
+def _note(found: Judgement) -> str:
+    done, what = ("put", "into") if found.numerical > 0.0 else ("taken", "from")
+    share = f" ({100.0 * abs(found.share):.2g} %)" if np.isfinite(found.share) else ""
+    return (
+        f"the scheme itself has {done} up to {abs(found.numerical):.3g} J {what} a mechanism that had "
+        f"{found.owned:.3g} J of its own to move with{share}: see run.energy.numerical, and use a smaller dt"
+    )

@@ -1,0 +1,373 @@
+"""What a failed run says: time, rows, sizes, names, and what to try."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mbd.arrays import Vector
+from mbd.assembly.not_finite import first_cause, tape_inputs
+from mbd.integrators.base import Point
+from mbd.kernel import fields as F
+from mbd.results.failure import Failure
+from mbd.results.record import EventRecord
+from mbd.simulation.diagnostics.grip import lost_grip
+from mbd.simulation.diagnostics.jamming import may_jam
+from mbd.simulation.diagnostics.redundant import clash
+from mbd.simulation.diagnostics.round_off import remainder
+from mbd.simulation.run.lengths import RUNGE_KUTTA
+from mbd.simulation.run.stepper import Stepper
+from mbd.state import State
+from mbd.tape.evaluate import evaluate
+
+if TYPE_CHECKING:
+    from mbd.simulation.run.run import Run
+
+__all__ = ["attempt", "crowded", "explanation"]
+
+RUSHING = 3.0
+"""How many times the largest rate so far a step changes one, above which dt is told not to resolve the motion [-]."""
+SLOW = 1e-3
+"""Largest rate so far [m/s, rad/s] below which that is not asked: a start from rest is no motion that runs away."""
+MOST_EVENTS = 5000
+"""Events within one dt above which a run stops: they follow each other ever faster, or are located too roughly [-]."""
+
+STALLED = frozenset({F.NOT_CONVERGED, F.SINGULAR, F.STAGNATED, F.TOO_TIGHT, F.TOO_NEAR, F.TOO_SMALL, F.DEPENDENT,
+                     F.OUTGROWN, F.GAINED})  # fmt: skip
+"""What steps fail with where friction locks a motion."""
+LATEST = 12
+"""Events that a failure tells."""
+
+
+def attempt(run: Run) -> Callable[[str, State], Failure]:
+    """What a run has just tried, noted before it is taken back; the failure, given its sentence and the state kept."""
+    v = run.values
+    newton = v["detail"][0] > run.now and v["block"][0] == v["detail"][0]
+    time = max(float(v["detail"][0]), run.now)
+    candidate = _iterate(run, time) if newton else run.state()
+    residuals = residuals_of(run.stepper, v["block"]) if newton else {}
+    residual = float(v["detail"][1]) if newton else 0.0
+    happened = tuple(run.events)
+
+    def failure(problem: str, final: State) -> Failure:
+        return Failure(
+            problem, final.time, time, final, candidate, residuals, residual, run.tried, run.dt,
+            run.stepper.integrator, run.settings, dict(run.changed),
+            (*run.earlier, *run.events)[-LATEST:], happened[len(run.events) :], run.model,
+        )  # fmt: skip
+
+    return failure
+
+
+def _iterate(run: Run, time: float) -> State:
+    """Newton's last iterate, which is in the block."""
+    block, layout, system = run.values["block"], run.mechanism.layout, run.stepper.system
+    y = block[layout.v : layout.a].copy()
+    q = system.compose(block[layout.q : layout.x].copy(), block[layout.x : layout.v].copy())
+    return replace(run.state(), time=time, q=q, v=y[: layout.n_v], z=y[layout.n_v :])
+
+
+def residuals_of(stepper: Stepper, block: Vector) -> dict[str, float]:
+    """The balance by coordinate, and the rows that are closed with their rates, at the inputs in a block."""
+    mode = int(stepper.values["state"][F.MODE])
+    if mode < 0:
+        return {}
+    code, n = stepper.modes[mode], stepper.values["n"]
+    out = np.zeros(n + 2 * len(code.rows) + 1)
+    with np.errstate(all="ignore"):
+        program = getattr(code.residual, "program", code.residual)  # a replay watches that of the step
+        program(block, stepper.values["params"], out)
+    return dict(zip(residual_names(stepper, code.rows), out.tolist(), strict=False))
+
+
+def residual_names(stepper: Stepper, rows: Sequence[int]) -> list[str]:
+    """Names of the balance and of rows in the order in which a mode's code gives them."""
+    equations = stepper.mechanism.equations
+    names = [name.removesuffix(".rate") for name in equations.velocity_names]
+    names += [state.name for state in equations.states]
+    titles = [equations.rows[row].title for row in rows]
+    return names + titles + ([f"{title} (rate)" for title in titles] if stepper.stabilized else [])
+
+
+def explanation(
+    stepper: Stepper, status: int, events: Sequence[EventRecord] = (), places: Mapping[str, str] | None = None,
+    swiftest: float = 0.0, beyond: str = "",
+) -> str:  # fmt: skip
+    """A sentence for a failure status of the kernel.
+
+    Parameters
+    ----------
+    places : the frames that forces act on, by their names
+    swiftest : largest rate of a coordinate in any row so far [m/s, rad/s]
+    beyond : what `out_of_reach` says: the cause of whatever else is found
+    """
+    values = stepper.values
+    now = float(values["clock"][F.NOW])
+    time = float(values["detail"][0]) if values["detail"][0] > now else now
+    names = sorted(stepper.manager.mode(values["closed"][: values["n_contacts"]]).closed)
+    closed = f" with {', '.join(map(repr, names))} closed" if names else ""
+    what = beyond or _what(stepper, status, closed, events, places or {}, _rushing(stepper, swiftest))
+    if status in STALLED and not beyond:
+        what = may_jam(stepper) + what
+    return f"t = {time:.9g} s (last accepted {now:.9g} s): {what}"
+
+
+def _what(
+    stepper: Stepper, status: int, closed: str, events: Sequence[EventRecord], places: Mapping[str, str], rushing: str
+) -> str:
+    """What went wrong and what to try; `closed` and `rushing` tell in words which contacts are, and what runs away."""
+    if status == F.NOT_FINITE:
+        return f"{_not_finite(stepper, places)}{closed}; nothing after the last accepted step is kept"
+    if status in (F.NOT_CONVERGED, F.STAGNATED, F.TOO_TIGHT):
+        return _no_end(stepper, status, closed, rushing)
+    if status in (F.OUTGROWN, F.GAINED, F.LEAPT):
+        return _unresolved(stepper, status, closed)
+    if status in (F.SINGULAR, F.TOO_NEAR):
+        return f"the Newton matrix is singular at {_unknown(stepper)}{closed}; {_why_singular(stepper)}"
+    if status == F.TOO_BRIEF:
+        name = stepper.manager.names[int(stepper.values["state"][F.BLOCKED])]
+        return (
+            f"{name!r} is so stiff that its blow asks for steps below {float(stepper.values['detail'][2]):.2g} s, a "
+            f"millionth of dt{closed}; use a softer stiffness, mbd.Unilateral, or a smaller dt"
+        )
+    if status in (F.TOO_SMALL, F.STIRRED):
+        return _no_size(stepper, status, closed)
+    if status in (F.DEPENDENT, F.CONFLICT):
+        if int(stepper.values["state"][F.BLOCKED]) < stepper.values["n"]:
+            return f"neither mass nor rows determine {_unknown(stepper)}{closed}; give it a mass, or lock it"
+        return (
+            f"{_clashing(stepper, status)}{closed}; leave one out, hold fewer contacts closed, or, where they do so in "
+            "this singular configuration only, start beside it"
+        )
+    if status in (F.CHATTER, F.NO_IMPACT, F.ENERGY_GAIN, F.NO_FORCE):
+        return _no_contact(stepper, status, closed, events)
+    return f"the instant of an event could not be isolated{closed}{_worst(stepper)}; try a smaller dt"
+
+
+def _no_end(stepper: Stepper, status: int, closed: str, rushing: str) -> str:
+    """A Newton iteration that does not come to its end."""
+    worst, residual = _worst(stepper), float(stepper.values["detail"][1])
+    if status != F.NOT_CONVERGED:
+        left = remainder(stepper)
+        how = "stagnated" if rushing else "stagnated at round-off"
+        return (
+            f"{how}: residual {left.residual:.3g}, attainable {left.attainable:.3g} of the forces{closed}{worst}"
+            f"{rushing or '; use a larger tolerance= of the integrator or a larger dt'}"
+        )
+    if residual < 0.0:
+        return (
+            f"a step would miss an angle by more than half a radian, down to a tenth of dt{closed}"
+            f"{worst}: the motion is too fast to be resolved; use a smaller dt"
+        )
+    said = "" if stepper.compiled else stepper.scheme.report.message
+    if residual <= 1.0 and said:
+        return (
+            f"steps fail down to a tenth of dt; {type(stepper.scheme.integrator).__name__} says: {said}"
+            f"{closed}{worst}; try a smaller dt{rushing}"
+        )
+    if residual <= 1.0:
+        return (
+            f"steps fail or leave the branch continuous in velocity, down to a tenth of dt{closed}"
+            f"{worst}: next to a pose in which rows lose rank, or in a force too steep for dt; try a smaller dt, or, "
+            f"at such a pose, {_passing(stepper)}{rushing}"
+        )
+    own = f" ({said})" if said else ""
+    return (
+        f"Newton stalled at {residual:.3g} times the tolerance after "
+        f"{stepper.values['max_iterations']} "
+        f"iterations{own}{closed}{worst}; try a smaller dt or softer stiffness; a force that jumps with "
+        "the state (mbd.where, sign) must be made continuous, or be switched by an Event or Controller"
+        f"{rushing}"
+    )
+
+
+def _unresolved(stepper: Stepper, status: int, closed: str) -> str:
+    """A step whose change cannot be that of the motion: which rate, from what to what, and what to try."""
+    values = stepper.values
+    h, growth, dt = float(values["detail"][2]), float(values["detail"][F.GROWN]), float(values["clock"][F.STEP])
+    who = int(values["state"][F.BLOCKED])
+    change = (
+        f"a step of {h:.2g} s takes the rate of {_unknown(stepper).removeprefix('the motion of ')} from "
+        f"{values['y'][who]:.3g} to {values['y1'][who]:.3g}{closed}"
+    )
+    if status == F.OUTGROWN:
+        return (
+            f"{change}, by forces that grow with the motion, {growth:.2g} of what nothing foretold by itself in a step "
+            f"of dt: dt does not resolve the motion, or a force lets it run away; try a smaller dt, such as "
+            f"{0.1 * dt / max(growth, 1.0):.1g} s"
+        )
+    if status == F.LEAPT:
+        return (
+            f"{change}, over a place where forces are over a hundred times those before and after it, such as the pole "
+            "of 1/x: the scheme sees nothing of them; use a smaller dt to see what happens there, or a force that is "
+            "bounded wherever the motion goes"
+        )
+    shorter = "" if int(values["scheme"]) == RUNGE_KUTTA else ", as do steps down to a tenth of dt"
+    return (
+        f"{change}, more than the forces along the way can do{shorter}: dt does not resolve a force that is steep "
+        f"there; try a smaller dt, such as {0.05 * dt:.1g} s, or a softer force"
+    )
+
+
+def _no_size(stepper: Stepper, status: int, closed: str) -> str:
+    """A step for which no size is right: by its estimated error, or at a pose in which rows lose rank."""
+    _, residual, h = stepper.values["detail"][:3].tolist()
+    if status == F.TOO_SMALL:
+        return (
+            f"steps fell below {h:.2g} s without an error of "
+            f"{stepper.values['allowed']:.2g} per second{closed}; a force that jumps with the state (mbd.where, sign) "
+            "must be made continuous, or be switched by an Event or Controller; or ask for less by tol="
+        )
+    explicit = int(stepper.values["scheme"]) == RUNGE_KUTTA
+    others = "mbd.GeneralizedAlpha, mbd.HHT or mbd.RadauIIA" if explicit else "mbd.GeneralizedAlpha or mbd.HHT"
+    return (
+        f"a pose in which rows lose rank, at {_unknown(stepper)}{closed}: round-off would make "
+        f"{residual:.1g} of the velocities in a step of {h:.2g} s over it; use {others}, or longer steps (a larger "
+        "dt= or tol=)"
+    )
+
+
+def _no_contact(stepper: Stepper, status: int, closed: str, events: Sequence[EventRecord]) -> str:
+    """Contacts and frictions that have no forces, no impulses, or no end of switching."""
+    grip = lost_grip(stepper, events) if status in (F.CHATTER, F.NO_IMPACT) else ""
+    if grip:
+        return grip
+    if status == F.CHATTER:
+        state, most = stepper.values["state"], stepper.values["max_switches"]
+        many = max(state[F.SWITCHES], state[F.REDONE]) > most
+        said = f"more than {most} switches" if many else "the same switches again and again"
+        return (
+            f"{said} at one instant: {_last_events(events)}; they "
+            "follow each other without motion; give a contact a release rule, friction or a penalty law, or an event "
+            "a reset that leaves zero"
+        )
+    if status == F.NO_IMPACT:
+        return (
+            f"no forces or impulses let every contact push or open{_touching(stepper)}: one that sticks "
+            "whatever its force may have none; use friction=0, a release rule or a penalty contact"
+        )
+    if status == F.ENERGY_GAIN:
+        return (
+            f"the impact law would create energy{_touching(stepper)}, and Stronge's in its place as well: a "
+            "restitution above 1 does; use one from 0 to 1"
+        )
+    name = stepper.manager.names[int(stepper.values["state"][F.BLOCKED])]
+    return (
+        f"Painlevé: no consistent contact force at {name!r}, which slides with friction so that a push "
+        f"makes it approach{closed}; rigid bodies with Coulomb friction have no motion there: lower the "
+        "friction coefficient, or make the contact compliant with mbd.Penalty"
+    )
+
+
+def _why_singular(stepper: Stepper) -> str:
+    """What makes a Newton matrix singular, and what to try: rows, the mass matrix, or the step."""
+    v, system = stepper.values, stepper.system
+    if int(v["state"][F.ROWS]) > 0:
+        return "rows depend on each other: leave one out, or try another dt"
+    mode = stepper.manager.mode(v["closed"][: v["n_contacts"]])
+    zero, y, layout = np.zeros(v["n_v"]), v["y"][: v["n"]], stepper.mechanism.layout
+    time, q = float(v["clock"][F.NOW]), v["q"][: v["n_q"]]
+    if v["block"][0] > time:  # what the step was tried at
+        y, time = v["block"][layout.v : layout.a].copy(), float(v["block"][0])
+        q = system.compose(v["block"][layout.q : layout.x].copy(), v["block"][layout.x : layout.v].copy())
+    with np.errstate(all="ignore"):
+        terms = system.evaluate(Point(time, q, zero, y, np.zeros(v["n"]), np.zeros(0)), mode, (0.0, 0.0))
+        M = np.asarray(terms.S)
+        size = np.sqrt(np.abs(np.diag(M)))
+        sizes = np.linalg.svd(M / np.outer(size, size), compute_uv=False) if np.all(size > 0.0) else np.zeros(1)
+    if not np.isfinite(sizes).all() or sizes[-1] < 1e-12:
+        return "no row acts there, so its mass matrix is: nothing resists that motion; give what it moves a mass"
+    return (
+        "no row acts there and its mass matrix is regular: dt is too large for a force that grows along the motion "
+        "(a negative stiffness or damping); use a smaller dt"
+    )
+
+
+def crowded(events: Sequence[EventRecord], now: float, dt: float) -> str:
+    """A sentence if there were too many events within the last dt, '' otherwise."""
+    if len(events) <= MOST_EVENTS or events[-MOST_EVENTS].time < now - dt:
+        return ""
+    return (
+        f"t = {now:.9g} s: more than {MOST_EVENTS} events within one dt: {_last_events(events)}; use a smaller dt, "
+        "or where it applies a softer stiffness, a larger rest_speed or locate='root'"
+    )
+
+
+def _clashing(stepper: Stepper, status: int) -> str:
+    """Which rows depend on each other or conflict."""
+    told = clash(stepper.mechanism.equations.rows, stepper.values)
+    what = "depend on each other" if status == F.DEPENDENT else "conflict"
+    return f"rows {what}: {told}" if told else f"rows {what} at {_unknown(stepper)}"
+
+
+def _worst(stepper: Stepper) -> str:
+    """Where the residual of the step that failed is largest, in words; '' where that is not known."""
+    values = stepper.values
+    if values["block"][0] != values["detail"][0]:
+        return ""
+    sizes = {name: abs(size) for name, size in residuals_of(stepper, values["block"]).items() if np.isfinite(size)}
+    if not sizes:
+        return ""
+    worst = max(sizes, key=lambda name: sizes[name])
+    return f", furthest from balance at {worst if worst.startswith(chr(39)) else repr(worst)}"
+
+
+def _touching(stepper: Stepper) -> str:
+    """The contacts that are closed or about to close, and the frictions of joints, in words."""
+    values, names = stepper.values, stepper.manager.names
+    near = [name for c, name in enumerate(names) if values["closed"][c] == 1 or values["closing"][c] != 0]
+    near += [friction.name for friction in stepper.manager.frictions if friction.contact < 0]
+    return f" at {', '.join(map(repr, near))}" if near else ""
+
+
+def _unknown(stepper: Stepper) -> str:
+    """The coordinate or row behind a column of the KKT matrix."""
+    equations, values = stepper.mechanism.equations, stepper.values
+    column, n = int(values["state"][F.BLOCKED]), values["n"]
+    if column < equations.n_v:
+        return f"the motion of {equations.velocity_names[column].removesuffix('.rate')!r}"
+    if column < n:
+        return f"the state {equations.states[column - equations.n_v].name!r}"
+    row = equations.rows[int(values["rows"][min(column - n, values["n_rows"] - 1)])]
+    return row.title
+
+
+def _passing(stepper: Stepper) -> str:
+    """What passes poses in which rows lose rank where a scheme did not."""
+    explicit = int(stepper.values["scheme"]) == RUNGE_KUTTA
+    return "mbd.GeneralizedAlpha or mbd.RadauIIA" if explicit else "formulation='index3' with a damped scheme"
+
+
+def _last_events(events: Sequence[EventRecord]) -> str:
+    """The last switches, oldest first."""
+    shown = [f"{event.name!r} {'crossed' if event.kind == 'event' else event.kind}" for event in events[-6:]]
+    return ", ".join(shown) or "no contact changed"
+
+
+def _not_finite(stepper: Stepper, places: Mapping[str, str]) -> str:
+    """The first cause whose force is not finite where the step failed."""
+    equations, values = stepper.mechanism.equations, stepper.values
+    inputs = tape_inputs(stepper.mechanism, values["block"], values["params"])
+    cause = first_cause(equations, inputs, places)
+    if cause is None and not np.isfinite(evaluate(list(equations.balance), inputs)).all():
+        return "the inertia forces are not finite (velocities have run away)"
+    return cause or "a derivative of a force or constraint is not finite"
+
+
+def _rushing(stepper: Stepper, swiftest: float) -> str:
+    """What a fixed step makes of velocities, where that is far more than any has been so far; '' elsewhere."""
+    values = stepper.values
+    if values["adaptive"] or swiftest < SLOW:
+        return ""
+    gains = np.abs(values["rate"][: values["n_v"]]) * values["dt"]
+    times = float(np.max(gains, initial=0.0)) / swiftest
+    if not RUSHING < times < np.inf:
+        return ""
+    name = stepper.mechanism.equations.velocity_names[int(np.argmax(gains))]
+    return (
+        f"; in a step of dt {name!r} changes by {times:.2g} times the largest rate so far: dt does not resolve the "
+        f"motion, or a force lets it run away; try dt = {0.1 * values['dt'] / times:.1g} s"
+    )

@@ -1,0 +1,258 @@
+"""What a run tells its user in ``stats["notes"]``: what happened on purpose but might surprise."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mbd.equations.equations import Contact
+from mbd.kernel import fields as F
+from mbd.kernel.pace import LEAST_PACE
+from mbd.results.columns import ModelColumns
+from mbd.results.record import EventRecord, Record
+from mbd.simulation.diagnostics.blows import dt_of_blows
+from mbd.simulation.diagnostics.coarse import coarse_steps
+from mbd.simulation.diagnostics.fastest import fastest, resolving_dt, sane_rows
+from mbd.simulation.diagnostics.redundant import redundancy
+from mbd.simulation.diagnostics.singular import singular_start
+from mbd.simulation.diagnostics.turning import blocks, unresolved_turns
+from mbd.simulation.run.stored import record_of
+
+if TYPE_CHECKING:
+    from mbd.simulation.run.run import Run
+
+__all__ = ["notes_of"]
+
+RESOLVED = 10.0
+"""Steps that a penalty contact must last to be resolved at all."""
+HALVING = 3.0
+"""A blow over the time in which half of its speed is gone: half a sine has cos(π/3) = ½ [-]."""
+
+BLIND = 2.0
+"""Steps of a penalty contact below which its blow is the scheme's, not the law's: the run's message says so [-]."""
+
+TAKEN = 0.5
+"""Share of its energy that a scheme may take from a mechanism before the run's message says so [-]."""
+
+OVERSHOT = 1e-8
+"""Depth at which a contact may close that is no more than round-off of large coordinates [m, rad]."""
+
+PULL = 1e-9
+"""Pull of a contact over all multipliers that is more than round-off [-]."""
+
+LOOKED_AT = 8
+"""Blows of a contact from which the step that resolves them is found."""
+
+TELLING = 1e-4
+"""Sum of the local errors of velocities of an explicit scheme that a run tells [m/s, rad/s]."""
+
+ANEW = (
+    "controllers began anew, with their first state and a sample at the start: they or the state are not those "
+    "that the run before ended with"
+)
+"""Of a run that goes on from another one without what its controllers kept."""
+
+DAMAGED = (
+    "what the start remembers of the run before is damaged: {}; the scheme restarted from its positions, velocities "
+    "and contacts alone, so that the motion is that of a new run"
+)
+"""Of a run that goes on from a state whose memory no run has written."""
+
+MOVED = 0.05
+"""Way [m, rad] beyond which rows that still depend on each other do so anywhere."""
+COUNTED = (
+    (
+        F.SHORTENED,
+        "{count} steps were shortened where Newton's method or the impact law failed at the full dt, or got another "
+        "size where one would have come too close to a pose in which rows lose rank",
+    ),
+    (
+        F.CAREFUL,
+        "poses in which rows lose rank were passed: {count} steps next to them held positions alone on the rows; their "
+        "velocities and multipliers are less accurate",
+    ),
+    (
+        F.STRONGE,
+        "{count} impacts took Stronge's energetic restitution, where the {impact} law would have created energy",
+    ),
+    (
+        F.ENDLESS,
+        "{count} times contacts struck by turns without end at one instant; they were closed together, which is the "
+        "limit of these impacts",
+    ),
+)
+"""Places of the kernel's counts, and what to say where they are not zero."""
+
+
+def notes_of(run: Run, record: Record) -> tuple[list[str], list[str]]:
+    """The notes of a run that is over, in sentences, and those of them that put its result in doubt."""
+    notes = [*run.mechanism.notes, *getattr(run.mechanism.common, "notes", ())]
+    equations = run.mechanism.equations
+    loaded = bool(run.values["loaded"]) or any(friction.contact >= 0 for friction in equations.frictions)
+    rubs = loaded and any(code.borne for code in run.stepper.modes)
+    moved = any(np.max(np.abs(part - record.q[:1]), initial=0.0) > MOVED for part in blocks(record.q))
+    dependent = redundancy(equations.rows, run.stepper.dependent, rubs, moved, _left_singular(run))
+    notes += [dependent] if dependent else singular_start(run)
+    notes += [DAMAGED.format(run.damage)] if run.damage else []
+    if run.start.memory is not None and not run.carried and run.boundaries.controllers:
+        notes.append(ANEW)
+    counts, impact = run.values["counts"], run.settings["impact"]
+    notes += [text.format(count=int(counts[place]), impact=impact) for place, text in COUNTED if counts[place]]
+    if "nonsmooth_since" in run.settings:
+        notes.append(f"{run.settings['contact_reason']}; since then errors of impacts are of the size of dt")
+    notes += coarse_steps(run, record)
+    doubts = _energy_lost(run, record)
+    notes += doubts or ([run.energy.note] if run.energy.note else [])
+    notes += [run.room.note] if run.room.note else []
+    spent = float(run.values["clock"][F.SPENT])
+    if spent > TELLING and not run.values["adaptive"]:
+        notes.append(
+            f"estimated errors of velocities add up to {spent:.2g} m/s or rad/s over all steps: dt is large for the "
+            "motion; use a smaller dt, or tol="
+        )
+    notes += unresolved_turns(run, record)
+    notes += _uncounted(run, record)
+    columns = ModelColumns(record, equations)
+    for number, contact in enumerate(run.manager.contacts):
+        short, blind = _short_touch(run, record, number, contact)
+        notes += _ignored(run, number, contact) + _overshot(run, columns, contact) + short
+        notes += _pulled(record, number, contact)
+        doubts += blind
+    return notes, doubts
+
+
+def _left_singular(run: Run) -> bool:
+    """Whether rows that depended on each other act still and are independent now: so the configuration was singular."""
+    v = run.values
+    acting = run.manager.active_rows(v["closed"][: v["n_contacts"]], v["sticks"][: v["n_frictions"]])
+    held = set(acting)
+    return any(
+        row in held and held.issuperset(on) and not v["dropped"][row] for row, on in run.stepper.dependent.items()
+    )
+
+
+def _uncounted(run: Run, record: Record) -> list[str]:
+    """The note on angles of cut joints in space that may have made more turns than their rates at the rows tell."""
+    if not run.mechanism.equations.wrapped:
+        return []
+    found = ModelColumns(record, run.mechanism.equations).doubtful_turns()
+    told = ", ".join(f"{name!r} after t = {time:.6g} s" for name, time in found)
+    return [f"whole turns are a guess of {told}: store more rows, take a smaller dt, or do not cut it"] if found else []
+
+
+def _energy_lost(run: Run, record: Record) -> list[str]:
+    """The note on the energy with the dt that resolves the fastest motion, where most of the energy is gone."""
+    if not run.energy.share < -TAKEN or run.values["adaptive"]:
+        return []
+    rate = fastest(run, record, sane_rows(run))
+    told = f": dt = {run.dt:g} s does not resolve its fastest motion of {rate:.3g} rad/s, dt below "
+    return [run.energy.note + (f"{told}{resolving_dt(rate):.2g} s does" if rate * run.dt > 1.0 else "")]
+
+
+def _ignored(run: Run, number: int, contact: Contact) -> list[str]:
+    """A contact that lay below its surface or went into it while it was left out on purpose."""
+    deepest, sinking = run.values["deepest"][number], run.values["sinking"][number]
+    notes = []
+    if deepest < -1e-9:
+        notes.append(f"{contact.name!r} lay up to {-deepest:.3g} {contact.unit} below its surface while ignored")
+    if np.isfinite(sinking):
+        notes.append(f"{contact.name!r} was released at t = {sinking:.6g} s while moving into its surface")
+    return notes
+
+
+def _pulled(record: Record, number: int, contact: Contact) -> list[str]:
+    """A foot that stays until another contact closes, and pulled meanwhile, which a ground cannot do."""
+    if contact.kind == "penalty" or contact.opens_on != "when" or contact.may_pull or contact.unit != "m":
+        return []
+    pull = np.where(record.closed[:, number] == 1, record.lam[:, contact.rows[0]], 0.0)
+    worst = int(np.argmax(pull)) if len(pull) else 0
+    if not len(pull) or not pull[worst] > PULL * float(np.max(np.abs(record.lam[worst]))):
+        return []
+    pull = np.maximum(pull, 0.0)
+    steps = np.diff(record.time)
+    when = record.time[pull > 0.0]
+    impulse = 0.5 * float(np.sum(steps * (pull[1:] + pull[:-1])))
+    return [
+        f"{contact.name!r} pulled with up to {pull[worst]:.3g} N at t = {record.time[worst]:.6g} s, {impulse:.3g} N s "
+        f"in all from {when[0]:.6g} to {when[-1]:.6g} s, since its When rule alone opens it: may_pull=False lets it "
+        "open then too, may_pull=True leaves this note out"
+    ]
+
+
+def _overshot(run: Run, columns: ModelColumns, contact: Contact) -> list[str]:
+    """A located contact that closes below its surface: it was passed in a step too long to see it come."""
+    if contact.kind == "penalty" or run.values["strategy"] == 1 or run.values["linear"] == 1:
+        return []
+    record = columns.record
+    last = len(record.time) - 1
+    rows = [min(event.row, last) for event in run.events if event.name == contact.name and event.kind == "closed"]
+    if not rows:
+        return []
+    (gaps,) = columns.evaluate([contact.gap], columns.part(np.array(rows), [contact.gap]))
+    worst = int(np.argmin(gaps))
+    if not gaps[worst] < -OVERSHOT:
+        return []
+    return [
+        f"{contact.name!r} closed {-gaps[worst]:.2g} {contact.unit} below its surface at t = "
+        f"{record.time[rows[worst]]:.6g} s: steps were too long to see it come; use a smaller dt"
+    ]
+
+
+def _short_touch(run: Run, record: Record, number: int, contact: Contact) -> tuple[list[str], list[str]]:
+    """A penalty contact over within a few steps is not resolved: its energy is anyone's guess. (note, doubt)"""
+    if contact.kind != "penalty" or run.values["adaptive"]:
+        return [], []
+    events = [event for event in run.events if event.name == contact.name]
+    least = float(run.values["pace"][5 * number + LEAST_PACE])
+    if least > 0.0:
+        safe = dt_of_blows(run, record, number, _closings(record, events)[:LOOKED_AT])
+        enough = f"; dt below {safe:.2g} s has" if np.isfinite(safe) else ""
+        return [
+            f"{contact.name!r} took steps of down to {least:.2g} s while it was closed: dt = {run.dt:g} s has too few "
+            f"for its blows{enough}, and a softer stiffness or mbd.Unilateral needs none of them"
+        ], []
+    spans = [b.time - a.time for a, b in pairwise(events) if (a.kind, b.kind) == ("closed", "opened")]
+    shortest = min(spans, default=np.inf)
+    said = f"closed for {shortest / run.dt:.2g} steps only"
+    if shortest >= RESOLVED * run.dt and events and events[-1].kind == "closed":
+        half = _halved(run, contact, events[-1].row)
+        shortest = HALVING * half
+        said = f"closed to stay and lost half of its speed within {half / run.dt:.2g} steps"
+    if shortest >= RESOLVED * run.dt:
+        return [], []
+    safe = dt_of_blows(run, record, number, _closings(record, events)[:LOOKED_AT])
+    safe = safe if np.isfinite(safe) else shortest / RESOLVED
+    note = (
+        f"{contact.name!r} {said}, too few: its peak force and energy are not resolved; use dt below {safe:.2g} s, "
+        "a softer stiffness, or mbd.Unilateral"
+    )
+    return [note], [note] if shortest < BLIND * run.dt else []
+
+
+def _closings(record: Record, events: Sequence[EventRecord]) -> list[int]:
+    """The rows in which a contact closed."""
+    last = len(record.time) - 1
+    return [min(event.row, last) for event in events if event.kind == "closed"]
+
+
+def _halved(run: Run, contact: Contact, row: int) -> float:
+    """Time from the row in which a contact closed until it approaches half as fast, by the rows stored [s].
+
+    Infinite where that takes longer than a resolved blow, or the run ends before.
+    """
+    table = run.table[row : min(run.stored, row + 2 + int(RESOLVED))]
+    table = table[table[:, 0] <= table[0, 0] + RESOLVED / HALVING * run.dt]
+    if len(table) < 2:
+        return np.inf
+    columns = ModelColumns(replace(record_of(run, table), parameter_changes=[]), run.mechanism.equations)
+    (rate,) = columns.evaluate([contact.gap_rate], columns.rows)
+    slow = np.flatnonzero(rate > 0.5 * rate[0])
+    if rate[0] >= 0.0 or not len(slow):
+        return np.inf
+    k = int(slow[0])
+    share = (rate[k - 1] - 0.5 * rate[0]) / (rate[k - 1] - rate[k])
+    return float(table[k - 1, 0] - table[0, 0] + share * (table[k, 0] - table[k - 1, 0]))

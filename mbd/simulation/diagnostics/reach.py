@@ -1,0 +1,87 @@
+"""Whether constraints that follow time ask for positions that do not exist, shortly after a run has failed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mbd.assembly.conflicts import Conflict, loops_of
+from mbd.assembly.infeasibility import position_conflicts
+from mbd.assembly.posture import TOLERANCE, Posture, close_positions, position_rows
+from mbd.kernel import fields as F
+
+if TYPE_CHECKING:
+    from mbd.simulation.run.run import Run
+
+__all__ = ["out_of_reach"]
+
+AHEAD = (1.0, 4.0, 16.0)
+"""How many steps beyond the last accepted state are looked at, one after the other [-]."""
+STEP_FAILURES = frozenset(
+    {
+        F.NOT_FINITE, F.NOT_CONVERGED, F.SINGULAR, F.STAGNATED, F.DEPENDENT, F.CONFLICT, F.NO_LOCATION, F.TOO_TIGHT,
+        F.TOO_NEAR, F.TOO_SMALL, F.STIRRED, F.OUTGROWN, F.GAINED, F.LEAPT,
+    }
+)  # fmt: skip
+"""What steps fail with next to such a limit."""
+
+
+def out_of_reach(run: Run, status: int) -> str:
+    """A sentence on the constraints that cannot hold together soon after the accepted state, '' if none.
+
+    A linkage that a driver pulls to its limit ends next to a singular configuration, where steps fail for reasons of
+    their own; that no position exists beyond it is the cause.
+    """
+    if status not in STEP_FAILURES or not _follows_time(run):
+        return ""
+    try:
+        return _first_conflict(run)
+    except np.linalg.LinAlgError:
+        return ""
+
+
+def _first_conflict(run: Run) -> str:
+    """The same of rows that follow time."""
+    for steps in AHEAD:
+        found = _conflict(run, steps * run.dt)
+        if found is not None:
+            return f"by t = {run.now + steps * run.dt:.6g} s {found}"
+    return ""
+
+
+def _follows_time(run: Run) -> bool:
+    """Whether a row on positions that acts changes with time while nothing moves."""
+    rows = position_rows(_posture(run, 0.0))
+    off = [np.max(np.abs(_heights(_posture(run, ahead * run.dt), rows)), initial=0.0) for ahead in AHEAD]
+    return bool(rows) and bool(np.isfinite(off).all()) and max(off) > TOLERANCE
+
+
+def _posture(run: Run, ahead: float) -> Posture:
+    """The accepted positions at a later time."""
+    v = run.values
+    return Posture(
+        run.mechanism, run.manager, v["params"], v["q"][: v["n_q"]].copy(), v["y"][: v["n"]].copy(),
+        v["closed"][: v["n_contacts"]].copy(), v["anchors"].copy(), time=run.now + ahead,
+    )  # fmt: skip
+
+
+def _heights(work: Posture, rows: list[int]) -> np.ndarray:
+    """What the rows are off."""
+    terms = work.mechanism.acceleration_terms(work.time, work.q, work.y, work.parameters, work.anchors, ())
+    return np.asarray(terms.h[rows])
+
+
+def _closes(run: Run, ahead: float) -> bool:
+    work = _posture(run, ahead)
+    left = close_positions(work, position_rows(work), np.ones(work.equations.n_v, dtype=bool))
+    return bool(np.max(np.abs(left), initial=0.0) <= TOLERANCE)
+
+
+def _conflict(run: Run, ahead: float) -> Conflict | None:
+    """The first irreducible set of constraints that no position satisfies at a later time."""
+    if _closes(run, ahead):
+        return None
+    work = _posture(run, ahead)
+    found = position_conflicts(work, position_rows(work), work.q.copy(), loops_of(run.model), tried=True)
+    return found[0] if found else None

@@ -1,0 +1,77 @@
+"""What a run says of rows that depend on each other, and of rows that conflict."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from mbd.assembly.conflicts import Member, linear_conflict
+from mbd.assembly.dependence import Dependence, dependences
+from mbd.equations.equations import Row
+
+__all__ = ["clash", "redundancy"]
+
+MOST_TOLD = 8
+"""Redundant rows that a note tells one by one."""
+
+
+def redundancy(
+    rows: Sequence[Row], dependent: Mapping[int, tuple[int, ...]], rubs: bool, moved: bool = True, passed: bool = False
+) -> str:
+    """The note on rows that left the solve; '' if none did.
+
+    Parameters
+    ----------
+    rows : of the equations
+    dependent : numbers of the rows that left, and of those on which each depends
+    rubs : whether friction that follows multipliers has slid beside them
+    moved : whether the run went far enough to tell a singular configuration from rows that depend on others anywhere
+    passed : whether rows that depended on each other do so no longer, all of them acting: a singular configuration
+    """
+    if not dependent:
+        return ""
+    told = [
+        str(Dependence(rows[row].title, tuple((rows[k].title, 1.0) for k in on), row, on))
+        for row, on in sorted(dependent.items())
+    ]
+    more = ["…"] if len(told) > MOST_TOLD else []
+    what = (
+        "how they share a load is not determined, nor is the drag of friction that slides: multipliers of least norm "
+        "are taken"
+        if rubs
+        else "they did so in a singular configuration only, where branches of motions cross: the motion from there is "
+        "not unique; start beside it"
+        if passed
+        else "the motion is unique, their multipliers are not: those of least norm are given"
+        if moved
+        else "their multipliers are not unique; nor is the motion, if this is a singular configuration, where branches "
+        "of motions cross: start beside it"
+    )
+    return f"redundant constraints: {len(told)} ({'; '.join(told[:MOST_TOLD] + more)}); {what}"
+
+
+def clash(rows: Sequence[Row], values: Mapping[str, Any]) -> str:
+    """Which rows conflict or depend on each other in the kernel's last solve; '' where none can be told apart.
+
+    Parameters
+    ----------
+    rows : of the equations
+    values : the arrays of the kernel; B and the right-hand sides are those of the solve that failed
+    """
+    n, count = values["n"], values["n_rows"]
+    B = values["acc"][n * n + n + n * count :][: n * count].reshape(count, n)
+    on = [int(values[flags][row.contact]) for row in rows for flags in ("closed", "closing", "active")]
+    acting = [k for k, row in enumerate(rows) if row.contact < 0 or any(on[3 * k : 3 * k + 3])]
+    acting = [k for k in acting if not values["row_trivial"][k]]
+    right, jacobian = -values["bias"][acting], B[acting]
+    if not np.isfinite(jacobian).all() or not np.isfinite(right).all():
+        return ""
+    members = [Member(rows[k].title, "row") for k in acting]
+    units = [rows[k].unit for k in acting]
+    tolerance = 1e-9 * (1.0 + float(np.max(np.abs(right), initial=0.0)))
+    found = linear_conflict(jacobian, right, members, units, "velocity", tolerance)
+    if found is not None:
+        return ", ".join(found.names)
+    return "; ".join(str(row) for row in dependences(jacobian, [member.name for member in members])[:MOST_TOLD])

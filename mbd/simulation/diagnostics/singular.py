@@ -1,0 +1,171 @@
+"""Whether a run ends because something is to happen at a singular configuration, and what."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mbd.kernel import fields as F
+
+if TYPE_CHECKING:
+    from mbd.compile.mechanism import AccelerationTerms
+    from mbd.simulation.run.run import Run
+
+__all__ = ["at_singular_configuration", "singular_start"]
+
+SMALL = 1e-3
+"""Smallest singular value of the rows there, over that a step away, below which they depend on each other [-]."""
+CLOSE = 0.1
+"""How far from there something that is to happen may be to be the cause, in steps [-]."""
+SINGULAR_START = 1e-7
+"""Smallest singular value of the rows at a start, over the largest, below which branches of motions cross there [-]."""
+MOST_ROWS = 200
+"""Rows above which a start is not asked for that [-]."""
+STEP_FAILURES = frozenset(
+    {
+        F.NOT_CONVERGED, F.SINGULAR, F.STAGNATED, F.DEPENDENT, F.CONFLICT, F.TOO_NEAR, F.STIRRED, F.OUTGROWN, F.GAINED,
+        F.NO_LOCATION, F.TOO_TIGHT, F.AT_POSE,
+    }
+)  # fmt: skip
+"""What steps fail with there."""
+WORDS = {
+    F.CLOSE: "closing of {!r}", F.OPEN_PULL: "opening of {!r}", F.OPEN_GAP: "opening of {!r}",
+    F.OPEN_FORCE: "opening of {!r}", F.PRESS: "closing of {!r}", F.CROSS: "event {!r}", F.STICK: "sticking of {!r}",
+    F.SLIP: "sliding of {!r}",
+}  # fmt: skip
+"""What happens, by the kernel's kind of guard."""
+
+
+def at_singular_configuration(run: Run, status: int) -> str:
+    """A sentence on what is to happen where constraints depend on each other for an instant, '' if nothing is.
+
+    Such a configuration is stepped over. It cannot be stepped to: the velocities across the motion follow from
+    round-off there, so that neither an event that changes something nor the end of a run may lie at it.
+    """
+    v = run.values
+    if status not in STEP_FAILURES or int(v["state"][F.ROWS]) == 0:
+        return ""
+    if status == F.AT_POSE:
+        share = f" (round-off would make up {float(v['detail'][1]):.1g} of them)"
+        fired = int(v["fired"][0])
+        cause = _guard(run, fired, int(v["fired"][1])) if fired in WORDS else _boundary(run, np.inf)[0]
+        return _sentence(run, float(v["detail"][0]), int(v["state"][F.BLOCKED]) - v["n"], cause, share)
+    with np.errstate(all="ignore"):
+        found = _nearest(run)
+    if found is None:
+        return ""
+    away, row = found
+    cause = _cause(run, away)
+    return _sentence(run, run.now + away, row, cause, "") if cause else ""
+
+
+def _sentence(run: Run, time: float, row: int, cause: str, share: str) -> str:
+    """The sentence; `row` counts among those that are stepped with."""
+    v = run.values
+    title = run.mechanism.equations.rows[int(v["rows"][min(max(row, 0), int(v["state"][F.ROWS]) - 1)])].title
+    advice = (
+        "choose another end or period" if cause.startswith(("the end", "a sample", "a jump")) else
+        "move the event or contact"
+    )  # fmt: skip
+    return (
+        f"{cause} lies at a singular configuration (t = {time:.6g} s), where constraint {title} depends on the others "
+        f"and branches of motions cross: velocities are not determined there{share}, so that nothing can restart from "
+        f"it; {advice}, or take another start"
+    )
+
+
+def _guard(run: Run, kind: int, index: int) -> str:
+    """What a guard of the kernel is, in words."""
+    manager = run.manager
+    if kind == F.CROSS:
+        name = manager.guards[index].name
+    elif kind in (F.STICK, F.SLIP):
+        name = manager.frictions[index].name
+    else:
+        name = manager.names[index]
+    return "the " + WORDS[kind].format(name)
+
+
+def _boundary(run: Run, most: float) -> tuple[str, float]:
+    """The boundary of steps that comes next, and in what time; '' if it is further than `most`."""
+    target, due = run.boundaries.next(run.end)
+    away = target - run.now
+    if not away <= most:
+        return "", away
+    return ("a sample of a controller or a jump of a signal" if due else "the end of the run"), away
+
+
+def _cause(run: Run, away: float) -> str:
+    """What is to happen at that time from now, '' if nothing is: a boundary, an event, a contact that closes."""
+    v, near = run.values, CLOSE * run.dt
+    cause, time = _boundary(run, np.inf)
+    if abs(time - away) < near:
+        return cause
+    contacts, guards, values = v["n_contacts"], v["n_guards"], v["guards0"]
+    found = [(F.CROSS, e, 4 * contacts + e, 4 * contacts + guards + e) for e in range(guards)]
+    found += [(F.CLOSE, c, c, contacts + c) for c in range(contacts) if v["closed"][c] == 0]
+    for kind, index, place, rate in found:
+        fall = -values[rate]
+        if fall != 0.0 and abs(values[place] / fall - away) < near + CLOSE * abs(away):
+            return _guard(run, kind, index)
+    return ""
+
+
+def _nearest(run: Run) -> tuple[float, int] | None:
+    """Time from now to a singular configuration within two steps, and the row that depends on the others there."""
+    span = 2.0 * run.dt
+    times = np.linspace(-span, span, 17)
+    sizes = [_smallest(run, time)[0] for time in times]
+    k = int(np.argmin(sizes))
+    low, high = times[max(k - 1, 0)], times[min(k + 1, len(times) - 1)]
+    for _ in range(60):
+        first, second = low + (high - low) * 0.382, low + (high - low) * 0.618
+        if _smallest(run, first)[0] < _smallest(run, second)[0]:
+            high = second
+        else:
+            low = first
+    place = 0.5 * (low + high)
+    size, row = _smallest(run, place)
+    return (float(place), row) if size < SMALL * max(sizes) else None
+
+
+def singular_start(run: Run) -> list[str]:
+    """A note where the run started at a singular configuration, or so close to one that round-off chose the branch."""
+    v, start = run.values, run.start
+    acting = run.manager.active_rows(run.manager.flags(start.mode.closed), np.zeros(v["n_frictions"]))
+    rows = [row for row in acting if not v["dropped"][row]]
+    if not 0 < len(rows) <= MOST_ROWS or run.resumed or len(start.anchors) != v["n_anchors"]:
+        return []
+    y = np.concatenate([start.v, start.z])
+    terms = run.mechanism.acceleration_terms(start.time, start.q, y, run.first_parameters, start.anchors)
+    found = _part_left(terms, rows)
+    if not found[0] < SINGULAR_START * found[2]:
+        return []
+    title = run.mechanism.equations.rows[rows[found[1]]].title
+    return [
+        f"the start lies at a singular configuration, where {title} depends on other constraints and branches of "
+        "motions cross: the motion from there is not unique; start beside it"
+    ]
+
+
+def _smallest(run: Run, ahead: float) -> tuple[float, int]:
+    """Smallest singular value of the rows that act, `ahead` along the motion, and the row with the largest part."""
+    v, mechanism = run.values, run.mechanism
+    n_v = v["n_v"]
+    y, rate = v["y"][: v["n"]], v["rate"][: v["n"]]
+    q = run.stepper.system.compose(v["q"][: v["n_q"]].copy(), ahead * (y[:n_v] + 0.5 * ahead * rate[:n_v]))
+    anchors = v["anchors"][: v["n_anchors"]]
+    terms = mechanism.acceleration_terms(run.now + ahead, q, y + ahead * rate, v["params"], anchors)
+    return _part_left(terms, v["rows"][: int(v["state"][F.ROWS])])[:2]
+
+
+def _part_left(terms: AccelerationTerms, rows: Sequence[int]) -> tuple[float, int, float]:
+    """Smallest singular value of rows of B on columns scaled by √M_ii, the row with most part in it; the largest."""
+    mass = np.abs(np.diag(terms.M))
+    jacobian = terms.B[list(rows)] / np.sqrt(np.where(mass > 0.0, mass, 1.0))
+    if not np.isfinite(jacobian).all():
+        return np.inf, 0, 0.0
+    left, sizes, _ = np.linalg.svd(jacobian, full_matrices=False)
+    return float(sizes[-1]), int(np.argmax(np.abs(left[:, -1]))), float(sizes[0])

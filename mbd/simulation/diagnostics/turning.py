@@ -1,0 +1,87 @@
+"""Angles that are too large to tell a pose, and turns that the steps of a run do not resolve."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mbd.arrays import Matrix
+from mbd.assembly.given_state import beyond_angles
+from mbd.compile.mechanism import Mechanism
+from mbd.compile.python import array_function
+from mbd.results.columns import ModelColumns
+from mbd.results.record import Record
+from mbd.simulation.run.lengths import RUNGE_KUTTA
+from mbd.tape.derivatives import live
+
+if TYPE_CHECKING:
+    from mbd.simulation.run.run import Run
+
+__all__ = ["blocks", "first_reversed", "overturned", "unresolved_turns"]
+
+HALF_TURN = np.pi
+"""Turn in a step above which forces that follow the angle are read at too few places of a turn [rad]."""
+BLOCK = 4096
+"""Rows that are looked at together."""
+
+
+def blocks(values: Matrix) -> Iterator[Matrix]:
+    """Successive rows of a large table, few enough to need little memory; each begins with the end of the last."""
+    for first in range(0, max(len(values) - 1, 1), BLOCK):
+        yield values[first : first + BLOCK + 1]
+
+
+def overturned(run: Run) -> str:
+    """An angle at the end of a run that is too large to tell a pose, in a sentence; '' without one."""
+    found = beyond_angles(run.mechanism.equations, run.values["q"][: run.values["n_q"]])
+    return f"t = {run.now:.9g} s: {found[0]}: poses can no longer be told apart; end the run earlier" if found else ""
+
+
+def unresolved_turns(run: Run, record: Record) -> list[str]:
+    """A note on each angle that turns by more than half a turn in a step, where the motion follows from the angle.
+
+    Forces are then read at instants that may fall on the same angle again and again. Steps that follow a tolerance, and
+    the explicit scheme, estimate that error themselves.
+    """
+    if run.values["adaptive"] or run.values["scheme"] == RUNGE_KUTTA or len(record.time) < 2:
+        return []
+    equations = run.mechanism.equations
+    ways = np.zeros(equations.n_q)
+    for part in blocks(record.q):
+        if len(part) > 1:
+            ways = np.maximum(ways, np.max(np.abs(np.diff(part, axis=0)), axis=0))
+    ways /= record.settings.get("store", 1)
+    fast = [k for k, coordinate in enumerate(equations.coordinates) if coordinate.unit == "rad" and ways[k] > HALF_TURN]
+    if not fast:
+        return []
+    with equations.tape.lock:
+        nodes = [*equations.balance, *(node for row in equations.rows for node in (row.value, row.rate))]
+        known = {node.data[1] for node in live(nodes) if node.op == "input" and node.data[0] == "q"}
+    return [
+        f"{equations.coordinates[k].name!r} turns by up to {ways[k]:.3g} rad in one step, and forces or masses follow "
+        f"from it: read at so few places of a turn they may be far off; use dt below "
+        f"{0.1 * run.dt * HALF_TURN / ways[k]:.1g} s"
+        for k in fast
+        if k in known
+    ]
+
+
+def first_reversed(mechanism: Mechanism, columns: ModelColumns) -> tuple[str, float] | None:
+    """The cut joint that is first the wrong way round in a stored row, and the time of that row."""
+    facings, record = mechanism.equations.facings, columns.record
+    if not facings or not len(record.time):
+        return None
+    known = mechanism.named.get("facings of rows")
+    if known is None:
+        with mechanism.equations.tape.lock:
+            known = mechanism.named["facings of rows"] = array_function([facing.cosine for facing in facings])
+    rows = columns.rows
+    found = known(columns.inputs(rows), record.parameters_at(rows.source))
+    opposite = [
+        (float(record.time[int(np.argmax(cosine < 0.0))]), facing.joint)
+        for facing, cosine in zip(facings, found, strict=True)
+        if np.min(cosine) < 0.0
+    ]
+    return (min(opposite)[1], min(opposite)[0]) if opposite else None

@@ -1,0 +1,1 @@
+"""One run: the kernel called again and again, and what happens in Python between the calls."""

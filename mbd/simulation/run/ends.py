@@ -1,0 +1,77 @@
+"""Where a run stops: its last step, its last row, and the state to go on from."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mbd.errors import SimulationError
+from mbd.kernel import fields as F
+from mbd.simulation.run.memory import memory_of
+from mbd.simulation.run.savepoints import called, restore, save
+from mbd.simulation.run.strategy import may_go_on_unlocated
+from mbd.state import State
+
+if TYPE_CHECKING:
+    from mbd.simulation.run.run import Run
+
+__all__ = ["advance", "call", "close"]
+
+
+def advance(run: Run, target: float, due: bool) -> int:
+    """Call the kernel; a step that would pass the end of the run ends there, unless a longer run's would too.
+
+    `due` says that a boundary is at the target, where a longer run would end a step as well.
+    """
+    v = run.values
+    if run.limit is not None:
+        v["chunk"] = max(min(v["chunk"], run.limit - int(v["counts"][F.STEPS])), 0)
+    status = call(run, target, np.inf if due else target)
+    if status != F.LAST:
+        return status
+    before, counts = save(run), v["counts"].copy()
+    status = _one_step(run)
+    if may_go_on_unlocated(run, status):  # as a longer run would
+        return status
+    near = run.boundaries.near
+    if status in (F.PAUSE, F.EVENT, F.NEW_MODE) and run.now <= target + near:
+        return F.DONE if status == F.PAUSE and run.now >= target - near else status
+    restore(run, before)
+    v["counts"][:] = counts
+    run.history = [*run.history[:-1], before]
+    return call(run, target, np.inf)
+
+
+def call(run: Run, until: float, end: float) -> int:
+    """Call the kernel from the last savepoint; a step that would pass `until` is cut, or left to us if it is `end`."""
+    called(run, until, end)
+    run.values["end"] = end
+    return run.stepper.advance(until)
+
+
+def _one_step(run: Run) -> int:
+    """A step of the grid, wherever it ends."""
+    chunk, run.values["chunk"] = run.values["chunk"], 1
+    try:
+        return call(run, np.inf, np.inf)
+    except SimulationError:  # an integrator of the user's raised beyond the end that was asked for
+        return -1
+    finally:
+        run.values["chunk"] = chunk
+
+
+def close(run: Run, settled: bool) -> State:
+    """Store the last row, give the end the time that was asked for; the state to go on from."""
+    if not settled:  # not even the scheme's start succeeded
+        return run.start
+    final = run.state()
+    final = replace(final, memory=memory_of(run, final.time))
+    run.stepper.keep_row()
+    run.collect()
+    if run.label is not None and run.label != run.now:  # round-off of the sum of steps
+        last = run.table[: run.stored]
+        last[last[:, 0] >= min(run.now, run.label), 0] = run.label
+        run.events = [replace(event, time=run.label) if event.time == run.now else event for event in run.events]
+    return final

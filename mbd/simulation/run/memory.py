@@ -1,0 +1,171 @@
+"""What lets a run go on as if it had never been cut: written into its final state, read by the run that goes on."""
+
+from __future__ import annotations
+
+import hashlib
+from copy import deepcopy
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mbd.arrays import Vector
+from mbd.kernel import fields as F
+from mbd.results.record import EventRecord
+from mbd.simulation.run.remembered import damage, out_of_range, sealed
+from mbd.state import Memory, State
+
+if TYPE_CHECKING:
+    from mbd.simulation.run.run import Run
+
+__all__ = ["carry_on", "memory_of", "memory_of_end", "take_up", "without_memory", "without_sharing"]
+
+OPTIONS = ("dt", "tol", "allowed", "longest", "contact", "impact", "locate", "rest_speed", "backend")
+"""Settings that a memory depends on."""
+
+
+def memory_of(run: Run, time: float) -> Memory:
+    """The memory of the accepted state, which must be settled; `time` is what its state says."""
+    stepper = run.stepper
+    run.turns.count(run)
+    parameters, reals, integers = run.values["params"].copy(), stepper.reals.copy(), stepper.integers.copy()
+    place = _place(run)
+    for array in (parameters, reals, integers, place):
+        array.flags.writeable = False
+    return sealed(Memory(
+        belongs(run), digest(run), time, parameters, reals, integers, stepper.scheme.memory,
+        run.boundaries.remembered(), tuple((event.kind, event.name) for event in run.pending), place,
+        run.manager.mode(run.values["closed"][: run.values["n_contacts"]]),
+        run.values["anchors"][: run.values["n_anchors"]].copy(),
+    ))  # fmt: skip
+
+
+def _place(run: Run) -> Vector:
+    """(q, v, z) as the kernel has them."""
+    v = run.values
+    return np.concatenate([v["q"][: v["n_q"]], v["y"][: v["n"]]])
+
+
+def belongs(run: Run, contact: str = "") -> tuple[str, ...]:
+    """Words that two runs must share for the memory of one to be of use to the other.
+
+    contact : the strategy, by default the one that the run takes now
+    """
+    integrator, equations = run.stepper.integrator, run.mechanism.equations
+    kind = type(integrator)
+    words = [f"{kind.__module__}.{kind.__qualname__}", repr(integrator), f"compiled {run.stepper.compiled}"]
+    settings = run.settings if not contact else {**run.settings, "contact": contact}
+    words += [f"{name} {settings[name]!r}" for name in OPTIONS]
+    words.append(f"mbd {settings['versions']['mbd']}")
+    words += [f"{name} {len(run.values[name])}" for name in (*F.KEPT_REALS, *F.KEPT_INTEGERS)]
+    words += [row.title for row in equations.rows] + run.manager.names
+    words += [guard.name for guard in run.manager.guards]
+    return (*words, *_controllers(run))
+
+
+def _controllers(run: Run) -> tuple[str, ...]:
+    """The words of controllers, the last ones of `belongs`."""
+    return tuple(f"{c.name} {c.period!r} {c.on!r}" for c in run.boundaries.controllers)
+
+
+def digest(run: Run) -> str:
+    """Of masses, forces, rows and guards at the accepted state: a model that was changed there has another one."""
+    v, mechanism = run.values, run.mechanism
+    acting = run.manager.penalties(v["closed"][: v["n_contacts"]])
+    block = mechanism.block(run.now, v["q"][: v["n_q"]], v["y"][: v["n"]], v["anchors"][: v["n_anchors"]], acting)
+    told = hashlib.sha256()
+    for name in ("accelerations", "guards"):
+        out = np.zeros(max(mechanism.sizes[name], 1))
+        if mechanism.sizes[name]:
+            mechanism.common[name](block, v["params"], out)
+        told.update(out.tobytes())
+    return told.hexdigest()
+
+
+def take_up(run: Run, start: State) -> bool:
+    """Go on from the memory of a state, if it is one of this run; whether it was."""
+    memory = start.memory
+    if memory is None:
+        return False
+    run.damage = damage(memory)
+    if run.damage or len(memory.parameters) != len(run.values["params"]):
+        return False  # other values of parameters may make other run-time inputs, which is no damage
+    unlocated = bool(run.values["auto"]) and memory.belongs == belongs(run, "nonsmooth")
+    if memory.belongs != belongs(run) and not unlocated:
+        return False
+    run.damage = out_of_range(run, memory)
+    if run.damage:
+        return False
+    stepper, v = run.stepper, run.values
+    fresh = stepper.reals.copy(), stepper.integers.copy()
+    stepper.reals[:], stepper.integers[:] = memory.reals, memory.integers
+    taken = not unlocated or run.values["state"][F.UNLOCATED] > 0  # it came to them by itself
+    if not (taken and _is_of(run, memory, start) and memory.digest == digest(run)):
+        stepper.reals[:], stepper.integers[:] = fresh
+        return False
+    stepper.scheme.memory = memory.scheme
+    run.boundaries.take_up(memory.controllers, run.now)
+    run.pending = tuple(EventRecord(run.now, kind, name) for kind, name in memory.pending)
+    v["state"][F.STORED] = v["state"][F.LOGGED] = 0
+    v["state"][F.MODE], v["state"][F.ORDERED] = -1, 0
+    phase = int(v["state"][F.SINCE_STORE])
+    stepper.hold()
+    stepper.store_row()
+    v["store"][0] = start.time
+    v["state"][F.SINCE_STORE] = phase
+    stepper.resumed_at = run.now
+    return True
+
+
+def carry_on(run: Run, start: State) -> bool:
+    """Let controllers go on with their samples and states, where a scheme has begun anew at a state; whether they do.
+
+    What they keep belongs to the mechanism, not to how it is integrated: another dt, or the trial runs of a tolerance,
+    must not make another motion.
+    """
+    memory, own = start.memory, _controllers(run)
+    if memory is None or run.damage or not own or memory.belongs[-len(own) :] != own:
+        return False
+    if set(memory.controllers["samples"]) != set(run.boundaries.samples):
+        return False
+    if memory.time != start.time or not np.array_equal(memory.place, _place(run)):
+        return False
+    run.boundaries.take_up(memory.controllers, run.now)
+    return True
+
+
+def memory_of_end(run: Run, start: State) -> Memory | None:
+    """The memory of a state, which is in the kernel's arrays, if it is the end of an earlier run as that left it."""
+    memory = start.memory
+    if memory is None or damage(memory) or memory.time != start.time or memory.mode != start.mode:
+        return None
+    same = np.array_equal(memory.place, _place(run)) and np.array_equal(memory.anchors, start.anchors)
+    return memory if same else None
+
+
+def without_memory(state: State) -> State:
+    """The same state, from which a scheme starts afresh; that a run has ended in it is still known."""
+    return state if state.memory is None else replace(state, memory=sealed(replace(state.memory, belongs=())))
+
+
+def _is_of(run: Run, memory: Memory, start: State) -> bool:
+    """Whether a state and the parameters are those of a memory, to the bit; the memory is in the kernel's arrays."""
+    v, manager = run.values, run.manager
+    n_contacts, n_anchors = v["n_contacts"], v["n_anchors"]
+    pairs = (
+        (v["q"][: v["n_q"]], start.q),
+        (v["y"][: v["n"]], np.concatenate([start.v, start.z])),
+        (v["closed"][:n_contacts], manager.flags(start.mode.closed)),
+        (v["armed"][:n_contacts] == 1, manager.flags(start.armed or ()) == 1),
+        (v["anchors"][:n_anchors], start.anchors if n_anchors else v["anchors"][:n_anchors]),
+        (v["params"], memory.parameters),
+    )
+    return memory.time == start.time and all(np.array_equal(one, other) for one, other in pairs)
+
+
+def without_sharing(value: Any) -> Any:
+    """A copy that changes apart, of anything that can be copied."""
+    try:
+        return deepcopy(value)
+    except Exception:  # an open file, a lock, a generator: the user's, and shared then
+        return value

@@ -1,0 +1,53 @@
+"""What a run hands over: its rows as a record, its counts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+from mbd.kernel import fields as F
+from mbd.simulation.diagnostics.notes import notes_of
+from mbd.simulation.run.lengths import RUNGE_KUTTA
+from mbd.simulation.run.stored import whole_record
+from mbd.state import State
+from mbd.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from mbd.simulation.run.run import Run
+
+__all__ = ["trajectory_of"]
+
+COUNTS = (
+    "steps", "iterations", "tangents", "residuals", "factorizations", "events", "restarts", "impacts",
+    "locations", "stagnations", "careful", "shortened", "energetic_impacts",
+    "endless", "pivoted",
+)  # fmt: skip
+"""Names of the kernel's counts, in the order of their places."""
+
+
+def trajectory_of(run: Run, problem: str, message: str, final: State) -> Trajectory:
+    """The run by name; `problem` is '' if it went as far as it was asked to. Its message tells what is in doubt."""
+    record = whole_record(run)
+    notes, doubts = notes_of(run, record)
+    told = problem or "; but ".join([message, *doubts])
+    ended = replace(
+        record, success=not problem, message=told, failure=run.failure, final=final, stats=_statistics(run, notes)
+    )
+    return Trajectory(ended)
+
+
+def _statistics(run: Run, notes: list[str]) -> dict[str, Any]:
+    counts = run.values["counts"]
+    numbers: dict[str, Any] = {name: int(counts[place]) for place, name in enumerate(COUNTS)}
+    if run.values["adaptive"]:
+        numbers["rejected"] = int(counts[F.REJECTED])
+    if run.values["adaptive"] or run.values["scheme"] == RUNGE_KUTTA:
+        numbers["local_errors"] = float(run.values["clock"][F.SPENT])
+    numbers["modes"] = len(run.stepper.modes)
+    numbers["compiled"] = run.stepper.compiled
+    numbers["optimized"] = run.stepper.compiled and not run.stepper.provisional
+    numbers["derive_and_compile_seconds"] = run.mechanism.seconds
+    numbers["notes"] = notes
+    numbers["wall_seconds"] = perf_counter() - run.began
+    return numbers

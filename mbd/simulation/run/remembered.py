@@ -1,0 +1,191 @@
+"""What a state remembers, judged before any of it reaches the kernel, which takes indices as they come.
+
+A memory may have been read from a file, or put together by hand. Its kind and lengths must be those of the run; every
+flag and index must lie where the kernel itself puts them; and the seal, a hash of all numbers, tells of any other
+change.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mbd.kernel import fields as F
+from mbd.state import Memory, Mode, are_names
+
+if TYPE_CHECKING:
+    from mbd.simulation.run.run import Run
+
+__all__ = ["damage", "out_of_range", "sealed"]
+
+UNBOUNDED = 1 << 53
+"""Most that is counted of anything [-]."""
+ENDLESS = ("sinking", "left")
+"""Arrays that may hold infinities where nothing has happened yet."""
+OPEN_TIMES = (F.LAST_SWITCH, F.POSE)
+"""Places in `clock` that may be infinite."""
+FLAGS = {
+    "closed": (0, 1), "armed": (-1, 2), "touched": (0, 1), "dropped": (0, 1), "sticks": (0, 1), "loose": (0, 3),
+}  # fmt: skip
+"""Least and largest value of each flag that is kept."""
+
+
+def sealed(memory: Memory) -> Memory:
+    """The memory with its seal."""
+    return replace(memory, seal=_seal(memory))
+
+
+def _seal(memory: Memory) -> str:
+    """Hash of what the kernel and the clocks of controllers go on from."""
+    told = hashlib.sha256(repr((memory.belongs, memory.digest, memory.time, memory.pending)).encode())
+    told.update(repr(sorted(memory.mode.closed)).encode())
+    told.update(repr((memory.controllers.get("begin"), sorted(dict(memory.controllers["samples"]).items()))).encode())
+    for array in (memory.parameters, memory.reals, memory.integers, memory.place, memory.anchors):
+        told.update(array.tobytes())
+    return told.hexdigest()
+
+
+def damage(memory: Memory) -> str:
+    """Why a memory cannot be what a run has written, in a few words; '' if it can."""
+    for name, kind in (
+        ("parameters", float),
+        ("reals", float),
+        ("integers", np.int64),
+        ("place", float),
+        ("anchors", float),
+    ):
+        array = getattr(memory, name)
+        if not isinstance(array, np.ndarray) or array.ndim != 1 or array.dtype != kind:
+            return f"its {name} are no array of numbers"
+    words = isinstance(memory.belongs, tuple) and all(isinstance(word, str) for word in memory.belongs)
+    words = words and isinstance(memory.digest, str) and isinstance(memory.seal, str) and _are_pairs(memory.pending)
+    if not words or not isinstance(memory.time, float):
+        return "its words are none"
+    if not isinstance(memory.mode, Mode) or not are_names(memory.mode.closed):
+        return "its closed contacts are no names"
+    if not _are_samples(memory.controllers):
+        return "what it holds of controllers is nothing that a run has written"
+    return "" if memory.seal == _seal(memory) else "it was changed after the run had written it"
+
+
+def _are_pairs(pending: Any) -> bool:
+    """Whether these are (kind, name) pairs."""
+    return isinstance(pending, tuple) and all(
+        isinstance(pair, tuple) and len(pair) == 2 and all(isinstance(word, str) for word in pair) for pair in pending
+    )
+
+
+def _are_samples(told: Any) -> bool:
+    """Whether this is what `Boundaries.remembered` gives: the instant samples count from, their numbers, states."""
+    if not isinstance(told, Mapping) or not {"begin", "samples", "states"} <= set(told):
+        return False
+    samples, states = told["samples"], told["states"]
+    counted = isinstance(samples, Mapping) and all(
+        isinstance(name, str) and isinstance(count, int) and 0 <= count < UNBOUNDED for name, count in samples.items()
+    )
+    return (
+        counted
+        and isinstance(states, Mapping)
+        and isinstance(told["begin"], int | float)
+        and bool(np.isfinite(told["begin"]))
+    )
+
+
+def out_of_range(run: Run, memory: Memory) -> str:
+    """What of a memory no run of this mechanism could have left, in a few words; '' if nothing.
+
+    `memory` has passed `damage`, and its lengths are asked first; then its numbers lie in the kernel's arrays, where
+    they are judged by name.
+    """
+    stepper, controllers = run.stepper, run.boundaries.controllers
+    if len(memory.reals) != len(stepper.reals) or len(memory.integers) != len(stepper.integers):
+        return "it has the numbers of another mechanism"
+    if len(memory.parameters) != len(run.values["params"]):
+        return "it has the parameters of another mechanism"
+    sampled = {c.name for c in controllers if c.period is not None}
+    if set(memory.controllers["samples"]) != sampled or set(memory.controllers["states"]) != {
+        c.name for c in controllers
+    }:
+        return "it has the samples of other controllers"
+    if stepper.compiled and memory.scheme is not None:
+        return "it has the memory of another scheme"
+    return _judged(stepper.place_of, memory, run)
+
+
+def _judged(place_of: Callable[[str], slice], memory: Memory, run: Run) -> str:
+    """Flags, indices, counts and times of a memory of the right lengths."""
+    v = run.values
+
+    def kept(name: str) -> Any:
+        source = memory.reals if name in F.KEPT_REALS else memory.integers
+        return source[place_of(name)]
+
+    for name, (least, most) in FLAGS.items():
+        if not _within(kept(name), least, most):
+            return f"{name!r} is none of {least} … {most}"
+    was = kept("was")
+    if not np.all((was == F.UNKNOWN) | ((was >= -1) & (was <= 2))):
+        return "'was' is no state of a friction"
+    for name in ("slip", "side", "lean"):
+        if not np.all(np.isin(kept(name), (-1.0, 0.0, 1.0))):
+            return f"{name!r} is no sign"
+    for name, (least, most) in _of_state(v).items():
+        value = kept("state")[getattr(F, name)]
+        if not least <= value <= most:
+            return f"'state' has {name} = {value}, not {least} … {most}"
+    told = _rows_differ(kept, run)
+    return told or _times_differ(kept, memory, v)
+
+
+def _of_state(v: Mapping[str, Any]) -> dict[str, tuple[int, int]]:
+    """Least and largest value of each place in `state`; those of rows and lines of results are set to 0 anyway."""
+    indices = max(v["n_rows"], v["n_contacts"], v["n_frictions"], v["n"])
+    return {
+        "ROWS": (0, v["n_rows"]), "GRID": (0, UNBOUNDED), "RESTART": (0, 2), "SWITCHES": (0, UNBOUNDED),
+        "SINCE_STORE": (0, UNBOUNDED), "BLOCKED": (-1, indices), "N_DROPPED": (0, v["n_rows"]), "NEAR": (0, 2),
+        "INCHING": (0, UNBOUNDED), "REDONE": (0, UNBOUNDED), "PLASTIC": (0, 1), "HALVED": (0, 16),
+        "HALVES": (0, 1 << 17), "PAIRED": (0, 3), "STRAIGHT": (0, 1), "RAISED": (0, 1), "CALMED": (0, 1),
+        "UNLOCATED": (0, 2),
+    }  # fmt: skip
+
+
+def _rows_differ(kept: Callable[[str], Any], run: Run) -> str:
+    """Whether the rows of the next step are other than those of the closed contacts and sticking frictions."""
+    v, state = run.values, kept("state")
+    dropped = kept("dropped")[: v["n_rows"]]
+    if int(state[F.N_DROPPED]) != int(np.sum(dropped)):
+        return "'dropped' does not agree with its count"
+    if state[F.RESTART] != 0:  # they are found anew
+        return ""
+    held = run.manager.active_rows(kept("closed")[: v["n_contacts"]], kept("sticks")[: v["n_frictions"]])
+    rows = [row for row in held if not dropped[row]]
+    if int(state[F.ROWS]) != len(rows) or not np.array_equal(kept("rows")[: len(rows)], rows):
+        return "'rows' are not those of the closed contacts"
+    return ""
+
+
+def _times_differ(kept: Callable[[str], Any], memory: Memory, v: Mapping[str, Any]) -> str:
+    """Whether numbers are not finite, or the clock does not agree with the time of the memory."""
+    for name in F.KEPT_REALS:
+        values = np.delete(kept(name), OPEN_TIMES) if name == "clock" else kept(name)
+        if np.any(np.isnan(kept(name))) or (name not in ENDLESS and not np.all(np.isfinite(values))):
+            return f"{name!r} is not finite"
+    clock, state = kept("clock"), kept("state")
+    step = float(clock[F.STEP])
+    longest = v["longest"] if v["adaptive"] else v["dt"]
+    if not 0.0 < step <= longest * (1.0 + 1e-9):
+        return f"its step is {step:.3g} s"
+    if abs(clock[F.NOW] - memory.time) > 1e-6 * step + 1e-12 * abs(memory.time):
+        return "its clock is at another time"
+    ahead = float(clock[F.BASE]) + (int(state[F.GRID]) + 1) * step - memory.time
+    if state[F.PAIRED] != 2 and state[F.RESTART] == 0 and not 0.0 < ahead < 2.5 * step:
+        return "its grid is elsewhere"
+    return ""
+
+
+def _within(values: Any, least: int, most: int) -> bool:
+    return bool(np.all((values >= least) & (values <= most)))

@@ -1,0 +1,461 @@
+"""One run: the kernel called again and again, and what happens in Python between the calls."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from mbd.arrays import Matrix, Vector
+from mbd.compile.mechanism import Mechanism
+from mbd.errors import MemoryLimitError, SimulationError, UnknownNameError
+from mbd.forces.base import Force
+from mbd.integrators.base import Integrator
+from mbd.kernel import fields as F
+from mbd.kernel.active_set import ActiveSetManager
+from mbd.results.columns import ModelColumns
+from mbd.results.failure import Failure
+from mbd.simulation.asked import asked
+from mbd.simulation.diagnostics.energy import EnergyWatch
+from mbd.simulation.diagnostics.failures import attempt, crowded, explanation
+from mbd.simulation.diagnostics.fastest import stability
+from mbd.simulation.diagnostics.reach import out_of_reach
+from mbd.simulation.diagnostics.singular import at_singular_configuration
+from mbd.simulation.diagnostics.turning import first_reversed, overturned
+from mbd.simulation.parameters import ParameterJudge
+from mbd.simulation.run.begin import begin, check_rank, guard_values, notify, set_side
+from mbd.simulation.run.control import Boundaries, Named, apply_reset
+from mbd.simulation.run.ends import advance, call, close
+from mbd.simulation.run.memory import carry_on, take_up
+from mbd.simulation.run.outcome import trajectory_of
+from mbd.simulation.run.room import Room
+from mbd.simulation.run.savepoints import Savepoint, rewind, save
+from mbd.simulation.run.stepper import Stepper
+from mbd.simulation.run.stored import whole_record
+from mbd.simulation.run.strategy import go_on_unlocated, may_go_on_unlocated, told_settings
+from mbd.simulation.run.whole_turns import TurnCounter
+from mbd.state import State
+from mbd.trajectory import EventRecord, Trajectory
+
+__all__ = ["Run"]
+
+ROWS_AT_ONCE = 1 << 14
+"""Rows of results that the kernel may fill before it hands them over."""
+STEPS_AT_ONCE = {True: 20000, False: 200}
+"""Steps between two looks at the clock, compiled and interpreted: some 20 ms."""
+USUAL_SIZE = 10
+"""Unknowns above which there are fewer such steps, as the square: large mechanisms get better code at these looks."""
+SHOW_EVERY = 0.1
+"""Wall time between two calls of progress and observers [s]."""
+FIRST_TABLE = 1 << 28
+"""Largest table laid out at the start, of which only rows written take memory; it doubles as it fills [bytes]."""
+INTERRUPTED = "interrupted"
+"""The problem of a run that was interrupted, until its time is known."""
+OVERFULL = (
+    "t = {:.9g} s: more rows or events came in one step than there was room for: a fault of mbd, please report the "
+    "model; a smaller dt has fewer events in a step"
+)
+"""The problem of a run whose rows and events outgrew what `advance` keeps free for a step."""
+KINDS = ("closed", "opened", "event", "stuck", "slipped")
+"""Names of the kinds of events that the kernel logs by number."""
+
+
+class Run:
+    """Drives the kernel from a state to the end of a run and keeps what it stores."""
+
+    def __init__(
+        self,
+        model: Any,
+        mechanism: Mechanism,
+        manager: ActiveSetManager,
+        integrator: Integrator,
+        start: State,
+        dt: float,
+        end: float,
+        stop: str | None,
+        changed: Mapping[str, float],
+        options: dict[str, Any],
+        settings: dict[str, Any],
+    ) -> None:
+        self.began = perf_counter()
+        self.model = model
+        self.mechanism, self.manager, self.start, self.end, self.stop = mechanism, manager, start, end, stop
+        self.asked, self.changed, self.dt = settings, dict(changed), dt
+        forces: list[Force] = getattr(model, "applied", getattr(model, "forces", []))
+        self.places = {force.name: _places(force) for force in forces}
+        rows = int(min(ROWS_AT_ONCE, (end - start.time) / dt / options.get("store", 1) + 64))
+        parameters = self._parameters()
+        self.first_parameters = parameters.copy()
+        compiled_options = {**options, "capacity": rows + 8 + 2 * len(manager.guards), "end": end}
+        self.stepper = Stepper(mechanism, manager, integrator, parameters, dt, compiled_options)
+        self.values = self.stepper.values
+        self.values["chunk"] = _steps_at_once(self.stepper)
+        width, capacity = self.values["width"], self.values["capacity"]
+        expected = 1.25 * (end - start.time) / dt / options.get("store", 1) + 1024
+        self.table = _first_table(max(int(min(expected, FIRST_TABLE / (8 * width))), 3 * capacity), width)
+        self.events: list[EventRecord] = []
+        self.parameter_changes: list[tuple[int, Vector]] = []
+        self.stored = 0
+        self.cause: BaseException | None = None
+        self.history: list[Savepoint] = []
+        self.pending: tuple[EventRecord, ...] = ()
+        self.earlier: Sequence[EventRecord] = ()  # of the run that is repeated, for its message
+        self.limit: int | None = None
+        self.tried = 0
+        self.gave_up: tuple[float, str] | None = None
+        self.label: float | None = None
+        self.failure: Failure | None = None
+        self.interrupted = False
+        self.energy = EnergyWatch()
+        self.judge = ParameterJudge(model, mechanism)
+        self.room = Room(self.values["width"])
+        self.observers: Sequence[Callable[[float, State], None]] = ()
+        self.progress: Callable[[float, float], None] | None = None
+        controllers, instants = getattr(model, "controllers", ()), getattr(model, "instants", ())
+        self.turns = TurnCounter()
+        self.boundaries = Boundaries(controllers, instants, start.time, dt, end)
+        self.damage = ""  # of the memory of the start
+        self.resumed = take_up(self, start)
+        notify(self)
+        self.carried = self.resumed  # so do controllers
+        if not self.resumed:
+            begin(self, start)
+            self.carried = carry_on(self, start)
+            if changed:
+                check_rank(self, start, parameters)
+
+    def _parameters(self) -> Vector:
+        """The parameter vector; which parameters are folded into the equations is asked only where it counts."""
+        folded = getattr(self.model, "parameters", {}) if self.changed else {}
+        return self.mechanism.parameters(self.changed, folded)
+
+    def observe(
+        self, observers: Sequence[Callable[[float, State], None]], progress: Callable[[float, float], None] | None
+    ) -> None:
+        """Who is told how far the run is."""
+        self.observers, self.progress = observers, progress
+
+    # the run ------------------------------------------------------------------------------------------------------
+    def complete(self) -> tuple[Trajectory, str]:
+        """Run to the end; the trajectory, and what went wrong ('' if nothing did)."""
+        problem, message = self.march()
+        try:
+            return self._concluded(problem, message)
+        except MemoryError:  # with what there is, and nothing that takes more
+            self.history, self.cause = [], MemoryLimitError(self.room.exhausted(self))
+            record = replace(
+                whole_record(self), success=False, message=self.room.problem, final=self.state(), stats={"notes": []}
+            )
+            return Trajectory(record), self.room.problem
+
+    def _concluded(self, problem: str, message: str) -> tuple[Trajectory, str]:
+        """The trajectory of a march that is over, and what went wrong with either."""
+        self.collect()
+        settled, tried = True, attempt(self) if problem else None
+        if problem:
+            settled = rewind(self, failed=problem not in (INTERRUPTED, self.energy.problem, self.room.problem))
+        final = close(self, settled)
+        problem, fed = self._told(problem), self._told(self._guarded(self._judge_energy)[0])
+        if self.stop and not problem and not message.startswith("ended"):
+            message = f"{self.stop!r} did not happen before t = {self.end:g} s"
+        if not problem:
+            problem = fed or self._reversed() or overturned(self) or self._told(self._guarded(self._last_show)[0])
+        if problem:
+            self.failure = (tried or attempt(self))(problem, final)  # a replay finds its sentence again
+        if fed not in ("", problem):
+            problem = f"{problem}; before that, {fed}"
+        if problem and not self.interrupted and self.stored:
+            problem += stability(self, whole_record(self))
+        return trajectory_of(self, problem, message, final), problem
+
+    def march(self) -> tuple[str, str]:
+        """Run until the end or a failure, of which nothing is taken back yet; (problem, message)."""
+        return self._guarded(self._march)
+
+    def _guarded(self, part: Callable[[], tuple[str, str]]) -> tuple[str, str]:
+        """(problem, message) of a part of the run; what users' functions raise ends it in order."""
+        try:
+            return part()
+        except (KeyboardInterrupt, SystemExit) as error:
+            self.interrupted = True
+            self.cause = error if isinstance(error, SystemExit) else None
+            return INTERRUPTED, ""
+        except MemoryError:
+            self.cause = MemoryLimitError(self.room.exhausted(self))
+            return self.room.problem, ""
+        except (SimulationError, UnknownNameError) as error:
+            self.cause = self.cause or error
+            return str(error), ""
+
+    def _told(self, problem: str) -> str:
+        """A problem in words; an interruption happened at the state that was kept."""
+        if problem == INTERRUPTED:
+            return f"interrupted at t = {self.now:.6g} s; everything until then is kept"
+        return problem
+
+    def _march(self) -> tuple[str, str]:
+        """Kernel, reaction, kernel, … until the end; (problem, message)."""
+        shown = 0.0
+        if not self.carried:
+            self.boundaries.begin(self)
+        save(self, self.pending)
+        ended = self._react(self.pending)
+        self.pending = ()
+        save(self)
+        while not ended:
+            known = len(self.events)
+            target, due = self.boundaries.next(self.end)
+            self._make_room(2 * self.values["capacity"])  # before they are made: then none is lost
+            status = advance(self, target, due)
+            self.collect()
+            if self.values["counts"][F.LOST]:
+                return OVERFULL.format(self.now), ""
+            if status == F.NEW_MODE:
+                self.stepper.add_mode()
+            elif status == F.DONE:
+                save(self)
+                if not self.boundaries.arrive(self, target, self.end):
+                    self.label = self.end
+                    return "", f"reached t = {self.end:g} s"
+            elif status == F.EVENT:
+                save(self, self.events[known:])
+                ended = self._react(self.events[known:])
+            elif status not in (F.FULL, F.PAUSE) and not self._goes_on_unlocated(status):
+                return self._explained(status), ""
+            save(self)
+            problem = crowded(self.events, self.now, self.dt) or self.room.check(self)
+            if not problem and self.limit is None and self.energy.is_due(self):
+                problem = self.energy.judge(self)
+            if problem:
+                self.cause = MemoryLimitError(problem) if problem == self.room.problem else self.cause
+                return problem, ""
+            if self.limit is not None and self.values["counts"][F.STEPS] >= self.limit:
+                return "", f"stopped after {self.limit} steps at t = {self.now:g} s"
+            if perf_counter() - shown > SHOW_EVERY:
+                shown = perf_counter()
+                self._show()
+        return self._finish(f"ended by {ended!r} at t = {self.now:.6g} s")
+
+    def _finish(self, message: str) -> tuple[str, str]:
+        """Store the row after the event that ends the run."""
+        save(self)
+        status = call(self, self.now, np.inf)
+        self.collect()
+        ended = status in (F.DONE, F.EVENT, F.NEW_MODE)
+        return ("", message) if ended else (self._explained(status), "")
+
+    def _goes_on_unlocated(self, status: int) -> bool:
+        """Whether the step that failed was taken back, and non-smooth steps follow in the place of located instants."""
+        if not may_go_on_unlocated(self, status):
+            return False
+        told = self._explained(status)
+        if not rewind(self, failed=True):
+            return False
+        self.gave_up = self.now, told
+        go_on_unlocated(self)
+        return True
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """What was asked for, with the strategy that contacts are treated by now."""
+        return told_settings(self, self.asked)
+
+    def _explained(self, status: int) -> str:
+        if self.gave_up is not None and self.gave_up[0] == self.now:
+            return f"{self.gave_up[1]}; non-smooth steps do not go on from there either"
+        n_q, n_v = self.values["n_q"], self.values["n_v"]
+        rates = np.abs(self.table[: self.stored, 1 + n_q : 1 + n_q + n_v])
+        swiftest = float(np.max(rates, initial=0.0))
+        events = [*self.earlier, *self.events]
+        beyond = out_of_reach(self, status) or at_singular_configuration(self, status)
+        return explanation(self.stepper, status, events, self.places, swiftest, beyond)
+
+    @property
+    def now(self) -> float:
+        return float(self.values["clock"][F.NOW])
+
+    def _show(self, finished: bool = False) -> None:
+        if self.progress is not None:
+            asked("progress", self.progress, self.now, self.now if finished else self.end)
+        for observer in self.observers:
+            asked("an observer", observer, self.now, self.state())
+
+    def _judge_energy(self) -> tuple[str, str]:
+        """Whether the scheme itself has put energy in; a replay of a few steps is not asked."""
+        return (self.energy.judge(self) if self.limit is None else ""), ""
+
+    def _reversed(self) -> str:
+        """A cut joint that a step too long has turned the wrong way round in a stored row, in a sentence; else ''."""
+        if self.limit is not None or not self.mechanism.equations.facings:
+            return ""
+        found = first_reversed(self.mechanism, ModelColumns(whole_record(self), self.mechanism.equations))
+        if found is None:
+            return ""
+        joint, time = found
+        return (
+            f"t = {time:.9g} s: {joint!r} was turned by half a turn in one step and is the wrong way round there, "
+            "which its rows cannot tell; results from then on are of another mechanism; take a smaller dt, or tol=, "
+            "or do not cut it"
+        )
+
+    def _last_show(self) -> tuple[str, str]:
+        self._show(finished=True)
+        return "", ""
+
+    def collect(self) -> None:
+        """Take over the rows and events that the kernel has stored."""
+        v = self.values
+        count, logged = int(v["state"][F.STORED]), int(v["state"][F.LOGGED])
+        if logged:
+            self._collect_events(logged)
+        if count:
+            self._make_room(count)
+            self.table[self.stored : self.stored + count] = v["store"].reshape(-1, v["width"])[:count]
+        self.stored += count
+        v["state"][F.STORED] = v["state"][F.LOGGED] = 0
+
+    def _make_room(self, count: int) -> None:
+        """Have places for so many more rows; a MemoryError leaves all as it is."""
+        if self.stored + count <= len(self.table):
+            return
+        try:
+            table = np.empty((2 * len(self.table) + count, self.values["width"]))
+        except MemoryError:
+            table = np.empty((self.stored + count, self.values["width"]))
+        table[: self.stored] = self.table[: self.stored]
+        self.table = table
+
+    def _collect_events(self, logged: int) -> None:
+        """Events from the lines of the log."""
+        manager, width = self.manager, self.values["event_width"]
+        contacts, frictions = manager.names, [friction.name for friction in manager.frictions]
+        guards = [guard.name for guard in manager.guards]
+        known = {"event": guards, "stuck": frictions, "slipped": frictions}
+        for line in self.values["log"][: logged * width].reshape(logged, width):
+            kind, index = KINDS[int(line[1])], int(line[2])
+            name, told, impulse = known.get(kind, contacts)[index], {}, np.zeros(0)
+            if kind in ("closed", "opened"):
+                told = _impulses(manager, index, line[5:])
+                impulse = told[name]
+            row = self.stored + int(line[4])
+            self.events.append(EventRecord(float(line[0]), kind, name, impulse, float(line[3]), row, told))
+
+    def _react(self, happened: Sequence[EventRecord]) -> str:
+        """Resets, controllers and endings of the events just logged; the name of the event that ends the run."""
+        guards = {guard.name: e for e, guard in enumerate(self.manager.guards)}
+        ended = ""
+        for event in happened:
+            if event.kind not in ("closed", "event"):
+                continue
+            guard = self.manager.guards[guards[event.name]] if event.kind == "event" else None
+            if guard is not None and guard.reset is not None:
+                self._reset(guards[event.name])
+            self.boundaries.call(self, event.name)
+            if event.name == self.stop or (guard is not None and guard.terminal):
+                ended = event.name
+        return ended
+
+    def _reset(self, e: int) -> None:
+        """Apply the reset of a user's guard at zero; one that turns its motion around will cross from the same side."""
+        place = 4 * self.values["n_contacts"] + e
+        before = guard_values(self)
+        apply_reset(self, self.manager.guards[e])
+        guards, rate = guard_values(self), place + self.values["n_guards"]
+        stays = guards[place] == before[place]  # 'linear' location leaves it near zero, on either side
+        if abs(guards[place]) > 1e-9 and not stays:
+            set_side(self, e, guards)
+        elif before[rate] * guards[rate] <= 0.0:
+            self.values["side"][e] *= -1.0
+
+    def change_parameters(self, values: Mapping[str, float], what: str) -> None:
+        """New parameter values from now on; the scheme restarts from them if they differ.
+
+        Raises
+        ------
+        SimulationError
+            for values with which the mechanism cannot go on; it keeps those that it has. `what` gives them.
+        """
+        equations = self.mechanism.equations
+        present = {parameter.name: v for parameter, v in zip(equations.parameters, self.values["params"], strict=False)}
+        if all(present.get(name) == value for name, value in values.items()):
+            return
+        faults = self.judge.faults(self, values)
+        if faults:
+            given = ", ".join(f"{name!r} to {value:g}" for name, value in values.items())
+            raise SimulationError(f"{what} sets {given}, which cannot be: {'; '.join(faults)}")
+        self.stepper.keep_row()
+        self.set_parameters({**self.changed, **values})
+        self.parameter_changes.append((self.stored + int(self.values["state"][F.STORED]), self.values["params"].copy()))
+        self.values["state"][F.RESTART] = 1
+
+    def set_parameters(self, changed: Mapping[str, float]) -> None:
+        """Parameters that differ from the model's."""
+        self.changed = dict(changed)
+        self.values["params"][: len(self.first_parameters)] = self._parameters()
+
+    def move_to(self, time: float) -> None:
+        """Put the clock, and the row just stored as the left side of a break, on its instant."""
+        self.stepper.keep_row()
+        self.collect()
+        if self.stored and self.table[self.stored - 1, 0] == self.now:
+            self.table[self.stored - 1, 0] = time
+        self.values["clock"][F.NOW] = time
+
+    def named(self) -> Named:
+        """Named quantities at the present state."""
+        return Named(self)
+
+    # the result ---------------------------------------------------------------------------------------------------
+    def state(self) -> State:
+        """The accepted state."""
+        self.turns.count(self)
+        v = self.values
+        names = np.array(self.manager.names)
+        armed = frozenset(str(name) for name in names[v["armed"][: len(names)] == 1])
+        y = v["y"][: v["n"]].copy()
+        n_v = v["n_v"]
+        return State(
+            self.now if self.label is None else self.label, v["q"][: v["n_q"]].copy(), y[:n_v], y[n_v:],
+            self.manager.mode(v["closed"][: len(names)]), armed,
+            v["anchors"][: v["n_anchors"]].copy(), self.start.names, self.start.velocity_names, {}, dict(self.changed),
+        )  # fmt: skip
+
+
+def _steps_at_once(stepper: Stepper) -> int:
+    """Steps of a call of the kernel; they follow from the size alone, as what is judged between calls must."""
+    layout = stepper.mechanism.layout
+    size = max((layout.n + layout.n_rows) // USUAL_SIZE, 1)
+    return max(STEPS_AT_ONCE[stepper.compiled] // (size * size), STEPS_AT_ONCE[False])
+
+
+def _impulses(manager: ActiveSetManager, own: int, line: Vector) -> dict[str, Vector]:
+    """Impulses of contacts, and of dry frictions in joints, by name: that of contact `own`, and others if any."""
+    mine, numbers = manager.contacts[own], line.tolist()
+    found = {mine.name: line[list(mine.rows)]}
+    for contact in manager.contacts:
+        if contact is not mine and any(numbers[row] for row in contact.rows):
+            found[contact.name] = line[list(contact.rows)]
+    for friction in manager.frictions:
+        if friction.contact < 0 and numbers[friction.row]:
+            found[friction.name] = line[[friction.row]]
+    return found
+
+
+def _places(force: Force) -> str:
+    """The frames and joints of a force, for messages."""
+    named = [getattr(mention, "full_name", getattr(mention, "name", None)) for mention in force.mentions()]
+    return ", ".join(repr(name) for name in named if name)
+
+
+def _first_table(rows: int, width: int) -> Matrix:
+    """A table of so many rows, or of fewer where addresses are limited."""
+    while True:
+        try:
+            return np.empty((rows, width))
+        except MemoryError:
+            if rows < 1024:
+                raise
+            rows //= 4

@@ -1,0 +1,307 @@
+"""The kernel's arrays for one run, and the call into the kernel, compiled or interpreted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import lru_cache
+from itertools import accumulate
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from mbd.arrays import Vector
+from mbd.compile.mechanism import Mechanism
+from mbd.equations.equations import Equations
+from mbd.integrators.base import Integrator
+from mbd.integrators.dormand_prince import tableau
+from mbd.integrators.family import NewmarkFamily
+from mbd.integrators.newton import MAX_ITERATIONS
+from mbd.integrators.radau import RadauIIA
+from mbd.integrators.runge_kutta import RungeKutta853
+from mbd.kernel import fields as F
+from mbd.kernel.active_set import ActiveSetManager
+from mbd.kernel.schemes.collocation import RADAU
+from mbd.kernel.settle import room_to_log
+from mbd.simulation.run.call_table import CallTable
+from mbd.simulation.run.lengths import NEWMARK, PROGRAMS, RADAU_IIA, RUNGE_KUTTA, array_lengths
+from mbd.simulation.run.plain import MechanismSystem, PlainScheme, row_units, unit_blocks
+from mbd.tape.derivatives import live
+
+__all__ = ["Stepper", "is_compiled"]
+
+EVENT_CAPACITY = 512
+"""Events that the kernel may log before it hands them over, at least."""
+LAWS = ("newton", "poisson", "sequential")
+"""Impact laws in the order of their numbers in the kernel."""
+TAKES_PART = 1e-7
+"""Coefficient of a row below which another does not depend on it [-]."""
+
+LINE = 64
+"""Length of a cache line [bytes]."""
+LOOKS = 4
+"""Parts in which a step of a scheme of order 3 or more is looked at for guards [-]."""
+
+
+def own_scheme(integrator: Integrator) -> int | None:
+    """Number of the kernel's scheme that takes this integrator's steps, None if it is written in Python only."""
+    step = type(integrator).step
+    for kind, number in ((RungeKutta853, RUNGE_KUTTA), (RadauIIA, RADAU_IIA)):
+        if isinstance(integrator, kind):
+            return number if step is kind.step else None
+    endpoint = isinstance(integrator, NewmarkFamily) and integrator.form == "endpoint"
+    return NEWMARK if endpoint and step in (NewmarkFamily.step, _hht_step()) else None
+
+
+def is_compiled(mechanism: Mechanism, integrator: Integrator) -> bool:
+    """Whether the compiled kernel can run this scheme: machine code exists and it is one of the kernel's own."""
+    return own_scheme(integrator) is not None and mechanism.common["accelerations"].address != 0
+
+
+def _hht_step() -> Any:
+    from mbd.integrators.hht import HHT
+
+    return HHT.step
+
+
+def follows(equations: Equations) -> int:
+    """How frictions follow multipliers: 0 linearly, 1 as that of a pin does, 2 those of contacts that may pull."""
+    limits = [friction.limit for friction in equations.frictions if friction.contact < 0]
+    if any(node.op == "input" and node.data[0] == "lam" for node in live(limits)):
+        return 1
+    rubbing = [equations.contacts[friction.contact] for friction in equations.frictions if friction.contact >= 0]
+    return 2 if any(contact.opens_on == "when" for contact in rubbing) else 0
+
+
+@lru_cache(maxsize=256)
+def _side_by_side(lengths: Iterable[int]) -> tuple[tuple[slice, ...], int]:
+    """Places of arrays of 8-byte numbers, each at the beginning of a cache line, and their end."""
+    lengths = [max(length, 1) for length in lengths]
+    starts = list(accumulate((-8 * (-length // 8) for length in lengths), initial=0))
+    return tuple(slice(start, start + length) for start, length in zip(starts, lengths, strict=False)), starts[-1]
+
+
+class Stepper:
+    """One run's numbers: everything the kernel reads and writes.
+
+    The accepted state, its guards and the stored rows live in flat arrays; `advance` calls the
+    kernel, which returns when something needs Python: a full store, a new mode, an event, a failure.
+    """
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        manager: ActiveSetManager,
+        integrator: Integrator,
+        parameters: Vector,
+        dt: float,
+        options: dict[str, Any],
+    ) -> None:
+        self.mechanism, self.manager, self.integrator = mechanism, manager, integrator
+        self.compiled = is_compiled(mechanism, integrator)
+        self.straight = self.compiled and isinstance(integrator, NewmarkFamily)  # factored in straight-line code
+        self.stabilized = integrator.stabilized
+        layout = mechanism.layout
+        self.values: dict[str, Any] = {}
+        self._places: dict[str, slice] = {}  # of arrays on their shelves
+        self._shelved: dict[str, tuple[Any, int]] = {}  # arrays and their addresses
+        self._sizes(dt, options)
+        self._arrays(parameters, manager)
+        self.system = MechanismSystem(
+            mechanism, manager, self.values["params"], self.values["anchors"], self.stabilized, self.values["dropped"],
+            self.values["sticks"], self.values["slip"],
+        )  # fmt: skip
+        self.scheme = PlainScheme(integrator, self.system, manager)
+        self.functions: list[Any] = [mechanism.common[name] for name in ("accelerations", "guards", "scales")]
+        self.functions.append(None if mechanism.vector else mechanism.common["compose"])
+        self.functions.append(mechanism.common["terms"] if mechanism.judged else None)
+        self.modes: list[Any] = []
+        self.dependent: dict[int, tuple[int, ...]] = {}
+        self._table: CallTable | None = None
+        self._provisional = False  # whether addresses in the table may have changed
+        self.resumed_at = float("nan")  # the instant whose row was stored as a run was taken up again
+        assert layout.n == self.values["n"]
+
+    def _sizes(self, dt: float, options: dict[str, Any]) -> None:
+        layout, values = self.mechanism.layout, self.values
+        n_contacts, n_guards = layout.n_contacts, len(self.manager.guards)
+        values.update(
+            n_q=layout.n_q, n_v=layout.n_v, n=layout.n, n_rows=layout.n_rows, n_anchors=layout.n_anchors,
+            n_contacts=n_contacts, n_guards=n_guards, o_q=layout.q, o_x=layout.x, o_v=layout.v, o_a=layout.a,
+            o_lam=layout.lam, o_anchor=layout.anchor, o_switch=layout.switch, o_slip=layout.slip,
+            n_frictions=layout.n_frictions, n_watched=self.mechanism.sizes["guards"],
+            loaded=follows(self.mechanism.equations), impact_law=LAWS.index(options.get("impact", "newton")),
+            strategy=int(options.get("contact") == "nonsmooth"), auto=int(options.get("auto", False)),
+            vector=int(self.mechanism.vector),
+            stabilized=int(self.stabilized), max_iterations=MAX_ITERATIONS,
+            max_switches=20 + 4 * (n_contacts + n_guards + layout.n_frictions),
+            linear=int(options.get("locate") == "linear"),
+            width=1 + layout.n_q + 2 * layout.n + layout.n_rows + n_contacts + layout.n_frictions,
+            capacity=int(options["capacity"]), stride=int(options.get("store", 1)), event_width=5 + layout.n_rows,
+            chunk=1, hooks=0,
+            rest_speed=float(options.get("rest_speed", 1e-6)), dt=dt, until=0.0, end=float(options.get("end", 0.0)),
+            alpha_m=0.0, alpha_f=0.0, beta=0.25, gamma=0.5, tolerance=1e-9, jerk=1, exact=0,
+            scheme=own_scheme(self.integrator) or NEWMARK,
+            adaptive=int("allowed" in options), allowed=float(options.get("allowed", 0.0)),
+            longest=float(options.get("longest", np.inf)), error_order=self.integrator.error_order(), looks=1,
+        )  # fmt: skip
+        values["event_capacity"] = max(EVENT_CAPACITY, 2 * room_to_log(SimpleNamespace(**values)))
+        if isinstance(self.integrator, NewmarkFamily):
+            c = self.integrator.coefficients
+            values.update(
+                alpha_m=c.alpha_m, alpha_f=c.alpha_f, beta=c.beta, gamma=c.gamma, tolerance=self.integrator.tolerance,
+                jerk=int(self.integrator.starting == "jerk"), exact=int(self.integrator.exact),
+            )  # fmt: skip
+        elif isinstance(self.integrator, RadauIIA):
+            values.update(tolerance=self.integrator.tolerance)
+
+    def _arrays(self, parameters: Vector, manager: ActiveSetManager) -> None:
+        v = self.values
+        reals, integers = array_lengths(v, self.mechanism.layout.size, self.mechanism.sizes["accelerations"])
+        tables = manager.tables()
+        for name, table in tables.items():
+            (reals if table.dtype == float else integers)[name] = len(table)
+        self.reals = self._shelve({name: reals.pop(name) for name in F.KEPT_REALS}, float)
+        self.integers = self._shelve({name: integers.pop(name) for name in F.KEPT_INTEGERS}, np.int64)
+        self._shelve(reals, float)
+        self._shelve(integers, np.int64)
+        for name, table in tables.items():
+            v[name][: len(table)] = table
+        v["shift1"] = v["block"][self.mechanism.layout.shift :]  # read by model code as well
+        v["tableau"] = tableau()
+        v["params"] = np.ascontiguousarray(parameters, dtype=float) if len(parameters) else np.zeros(1)
+        v["clock"][F.STEP] = v["dt"]
+        v["sinking"][:] = np.inf
+        v["was"][:] = F.UNKNOWN
+        if v["scheme"] == RADAU_IIA:
+            v["stages"][: len(RADAU.numbers())] = RADAU.numbers()
+        v["unit"] = unit_blocks(self.mechanism)
+        v["row_unit"] = np.array([*row_units(self.mechanism), 2], dtype=np.int64)
+        if not v["n_anchors"]:
+            v["anchors"] = np.zeros(0)
+
+    def _shelve(self, lengths: dict[str, int], kind: Any) -> Any:
+        """Arrays side by side on one shelf, which is copied at once; each begins on a cache line."""
+        places, whole = _side_by_side(tuple(lengths.values()))
+        room = np.zeros(whole + LINE // 8 - 1, dtype=kind)  # numpy begins anywhere
+        first = -room.ctypes.data % LINE // 8
+        shelf = room[first : first + whole]
+        base = shelf.ctypes.data
+        for name, place in zip(lengths, places, strict=True):
+            self._places[name] = place
+            array = self.values[name] = shelf[place]
+            self._shelved[name] = array, base + 8 * place.start
+        return shelf
+
+    def place_of(self, name: str) -> slice:
+        """Where a kept array stands in `reals` or `integers`."""
+        return self._places[name]
+
+    def add_mode(self) -> None:
+        """Make code for the contacts closed now."""
+        v = self.values
+        flags, dropped = v["closed"][: v["n_contacts"]], v["dropped"][: v["n_rows"]]
+        sticks, slip = v["sticks"][: v["n_frictions"]], v["slip"][: v["n_frictions"]]
+        held = self.manager.active_rows(flags, sticks)
+        rows = tuple(row for row in held if not dropped[row])
+        sliding = tuple(int(f) for f in np.flatnonzero(slip))
+        borne = tuple(row for row in held if dropped[row]) if sliding else ()
+        make = self._maker()
+        code = make(rows, self.manager.penalties(flags), self.stabilized, sliding, borne)
+        count, width = int(v["mode_count"][0]), v["n_contacts"] + v["n_rows"] + v["n_frictions"]
+        phases = np.where(sticks == 1, 2, slip != 0.0)
+        if PROGRAMS * (count + 1) > len(v["mode_code"]):
+            v["mode_key"] = np.concatenate([v["mode_key"], np.zeros_like(v["mode_key"])])
+            v["mode_code"] = np.concatenate([v["mode_code"], np.zeros_like(v["mode_code"])])
+            v["mode_order"] = np.concatenate([v["mode_order"], np.zeros_like(v["mode_order"])])
+        v["mode_key"][count * width : (count + 1) * width] = np.concatenate([flags, dropped, phases])
+        known = [code.tangent, code.residual] + ([] if code.correction is None else [code.correction, code.solution])
+        places = [*range(len(self.functions), len(self.functions) + len(known)), 0, 0]
+        v["mode_code"][PROGRAMS * count : PROGRAMS * (count + 1)] = places[:PROGRAMS]
+        if code.order is not None:
+            v["mode_order"][count] = len(v["orders"])
+            v["orders"] = np.concatenate([v["orders"], code.order])
+        self.functions += known
+        self.modes.append(code)
+        mix = v["mix"].reshape(v["n_rows"], -1) if v["n_rows"] else v["mix"]
+        for row in range(v["n_rows"]):
+            if dropped[row]:  # as they were found first
+                self.dependent.setdefault(row, tuple(int(k) for k in np.flatnonzero(np.abs(mix[row]) > TAKES_PART)))
+        v["mode_count"][0] = count + 1  # at last: an interrupt may come between any two lines
+
+    def _maker(self) -> Any:
+        """What makes the code of a mode, no more of it than the scheme calls."""
+        if own_scheme(self.integrator) == RUNGE_KUTTA:
+            return self.mechanism.explicit
+        return self.mechanism.stepping if self.straight else self.mechanism.mode
+
+    @property
+    def provisional(self) -> bool:
+        """Whether some function is waiting for faster code; the kernel gets that between two of its calls."""
+        return any(getattr(function, "provisional", False) for function in self.functions)
+
+    def advance(self, until: float) -> int:
+        """Run the kernel until it returns; its status."""
+        v = self.values
+        v["until"] = until
+        if v["auto"]:
+            v["strategy"] = int(v["state"][F.UNLOCATED] > 0)
+        v["looks"] = LOOKS if self.integrator.order() > 2 and not v["strategy"] else 1
+        return self._advance_compiled() if self.compiled else self._advance_plain()
+
+    def keep_row(self) -> None:
+        """Store the accepted state, unless it is the last row anyway."""
+        if self.values["state"][F.SINCE_STORE] > 0 and self.values["clock"][F.NOW] != self.resumed_at:
+            self.store_row()
+
+    def store_row(self) -> None:
+        """Store the accepted state as a row of the results."""
+        from mbd.kernel.observe import store_row
+
+        values = {**self.values, "code": self.functions, "hooks": self.scheme}
+        store_row(F.Kernel(**{name: values[name] for name in F.FIELDS}))
+
+    def hold(self) -> None:
+        """Give the inputs of the forces the closed contacts, as a start of the scheme would leave them."""
+        from mbd.kernel.restart import fill_block
+
+        values = {**self.values, "code": self.functions, "hooks": self.scheme}
+        fill_block(
+            F.Kernel(**{name: values[name] for name in F.FIELDS}), values["clock"][F.NOW], values["q"], values["y"]
+        )
+
+    def guard_round_off(self, e: int) -> float:
+        """Round-off of a user's guard at the accepted state."""
+        from mbd.kernel.restart import fill_block, refresh_scales
+        from mbd.kernel.significance import guard_round_off
+
+        values = {**self.values, "code": self.functions, "hooks": self.scheme}
+        K = F.Kernel(**{name: values[name] for name in F.FIELDS})
+        fill_block(K, values["clock"][F.NOW], values["q"], values["y"])
+        refresh_scales(K)
+        return guard_round_off(K, e, values["clock"][F.NOW], values["q"], values["y"])
+
+    def _advance_plain(self) -> int:
+        from mbd.kernel.advance import advance
+
+        values = {**self.values, "code": self.functions, "hooks": self.scheme}
+        with np.errstate(all="ignore"):
+            return int(advance(F.Kernel(**{name: values[name] for name in F.FIELDS})))
+
+    def _advance_compiled(self) -> int:
+        from mbd.kernel.build import entry
+
+        if self._table is None or self._provisional:
+            self._provisional = self.provisional  # before the addresses: whoever settles in between is looked at again
+            self._table = CallTable(self.functions, self.values, self._shelved)
+        else:
+            self._table.fill(self.functions, self.values)
+        postponed = [tangent for tangent in self.mechanism.postponed if not tangent.made]
+        status = entry()(self._table.address)
+        for tangent in postponed:
+            if tangent.raised is not None:
+                raised, tangent.raised = tangent.raised, None
+                raise raised
+            if tangent.made:
+                self._table = None  # it has another address now
+        return status

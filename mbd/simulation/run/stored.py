@@ -1,0 +1,42 @@
+"""The rows that a run has stored until now, as a record."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mbd.arrays import Matrix
+from mbd.results.record import EventRecord, Record
+
+if TYPE_CHECKING:
+    from mbd.simulation.run.run import Run
+
+__all__ = ["record_of", "whole_record"]
+
+
+def record_of(run: Run, table: Matrix, events: Sequence[EventRecord] = ()) -> Record:
+    """Rows that the kernel has stored, (R, width), as a record without a verdict."""
+    v, equations = run.values, run.mechanism.equations
+    n_q, n_v, n, rows = v["n_q"], v["n_v"], v["n"], v["n_rows"]
+    at_v, at_a = 1 + n_q, 1 + n_q + n
+    at_lam, at_closed = at_a + n, at_a + n + rows
+    at_friction = at_closed + v["n_contacts"]
+    return Record(
+        equations=equations, parameters=run.first_parameters,
+        parameter_names=[parameter.name for parameter in equations.parameters], time=table[:, 0], q=table[:, 1:at_v],
+        v=table[:, at_v : at_v + n_v], z=table[:, at_v + n_v : at_a], a=table[:, at_a : at_a + n_v],
+        s=table[:, at_a + n_v : at_lam], lam=table[:, at_lam:at_closed],
+        closed=table[:, at_closed:at_friction].astype(np.uint8), phase=table[:, at_friction:].astype(np.int8),
+        events=events, settings=run.settings,
+        parameter_changes=run.parameter_changes, start=run.start,
+    )  # fmt: skip
+
+
+def whole_record(run: Run) -> Record:
+    """All rows and events until now, without a verdict."""
+    last = run.stored - 1  # a run that failed right at an event has no row after it
+    events = [event if event.row <= last else replace(event, row=last) for event in run.events]
+    return record_of(run, run.table[: run.stored], events)

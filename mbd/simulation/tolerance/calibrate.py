@@ -1,0 +1,165 @@
+"""A tolerance on the whole run: trial runs until the error of one agrees with it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mbd.errors import MemoryLimitError
+from mbd.simulation.tolerance.foresight import LONG, foreseen
+from mbd.simulation.tolerance.search import CHECK, PILOT, REGULAR, WELL, Search
+from mbd.simulation.tolerance.trials import Trial, is_rounding
+
+__all__ = ["Outcome", "calibrated", "first_allowed"]
+
+FIRST = 0.5
+"""Local errors of the first run, summed up, over the tolerance [-]."""
+BEYOND = 3.0
+"""Estimated error over the tolerance above which it counts as missed once repeats are used up [-]."""
+MOST_RUNS = 5
+"""Runs in all, unless the last one came much nearer."""
+FURTHER_RUNS = 4
+"""Runs beyond these, each while the one before has come nearer [-]."""
+NEARER = 0.5
+"""Error over that of the most accurate run before up to which a run has come nearer [-]."""
+FAR_FINER = 1.5
+"""Order of a scheme over that of its estimate from which runs are much better than their estimates say [-]."""
+GROWING = 1e3
+"""Growth of errors above which a run says so [-]."""
+ASK = "ask for less accuracy or a shorter time, or take a scheme of higher order, RungeKutta853 or RadauIIA"
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """The run that counts and what went wrong ('' if nothing did)."""
+
+    trial: Trial
+    problem: str
+
+
+def first_allowed(tol: float, length: float, power: float) -> float:
+    """Local error per second of a first run: `tol` over its length, less where κ is far above 1 [m/s, rad/s]."""
+    return FIRST * (max(tol, tol ** (1.0 / power)) if power > FAR_FINER else tol) / length
+
+
+def calibrated(
+    run: Callable[..., Trial], tol: float, allowed: float, power: float, order: int, names: tuple[str, ...] = ()
+) -> Outcome:
+    """Runs until the estimated error of one agrees with the tolerance.
+
+    Parameters
+    ----------
+    run : makes a run with a local error per second, which it ends where more rows than a second argument are foretold
+    tol : [m, rad]; allowed : of the first run [m/s, rad/s]
+    power : κ; order : of the scheme
+    names : of the results that the tolerance holds for; every coordinate without
+    """
+    regular = power <= REGULAR
+    ratio = PILOT if regular else CHECK ** (1.0 / power)
+    search = Search(tol, power, order, regular, ratio, names)
+    first = run(PILOT * allowed, LONG) if regular else run(allowed)
+    if first.source.room.is_long:
+        loose, refused = foreseen(run, first, tol, power, order, names)
+        if refused or (loose and loose[-1].source.interrupted):
+            return _given_up(loose, search, refused)
+        first = run(PILOT * allowed)
+    if not first.problem and first.run.stats["steps"] == 0:  # it ended where it began
+        return _told([first], replace(first, error=0.0), search, "")
+    if first.source.interrupted or first.source.room.problem:
+        return _told([first], first, search, first.problem)
+    trials = [] if first.problem else [first]
+    wanted: float | None = first.allowed / (ratio if trials else PILOT)
+    for count in range(1, MOST_RUNS + FURTHER_RUNS):
+        if wanted is None or (count >= MOST_RUNS and not _coming_nearer(trials, tol)):
+            break
+        refused = _no_room(trials, wanted, power, order)
+        if refused and not search.best(trials).error <= tol:
+            return _given_up(trials, search, refused)
+        if refused:
+            break
+        found = run(wanted)
+        if found.problem and not found.source.interrupted and any(trial.error <= tol for trial in trials):
+            break  # a looser run that fails takes nothing away
+        if found.problem:
+            return _told([*trials, found], found, search, found.problem)
+        trials = search.estimated([*trials, found])
+        wanted = search.next(trials)
+    best = search.best(trials)
+    missed = not best.error <= BEYOND * tol
+    return _told(trials, best, search, _unreached(trials, best, tol) if missed else "")
+
+
+def _given_up(trials: Sequence[Trial], search: Search, refused: str) -> Outcome:
+    """The best of the runs that show that the next one needs too much, or the last one where a user ended it."""
+    if trials[-1].problem:
+        return _told(trials, trials[-1], search, trials[-1].problem)
+    trials = search.estimated(trials)
+    best = search.best(trials)
+    best.source.cause = MemoryLimitError(refused)
+    return _told(trials, best, search, f"tol = {search.tol:g} was not reached: {refused}; {ASK}")
+
+
+def _no_room(trials: Sequence[Trial], wanted: float, power: float, order: int) -> str:
+    """Why a run that allows so much is not begun: its rows would fill the memory. '' if they do not."""
+    if not trials:
+        return ""
+    near = min(trials, key=lambda trial: trial.allowed)
+    longer = (near.allowed / wanted) ** (power / order)
+    return near.source.room.refused(len(near.run.time) * longer, near.run.stats["wall_seconds"] * longer)
+
+
+def _coming_nearer(trials: Sequence[Trial], tol: float) -> bool:
+    """Whether no run is good yet, but the last and finest one is much better than the others."""
+    *others, last = trials
+    least = min((trial.error for trial in others), default=np.inf)
+    return last.error > tol and last.allowed <= min(t.allowed for t in others) and last.error < NEARER * least
+
+
+def _told(trials: Sequence[Trial], best: Trial, search: Search, problem: str) -> Outcome:
+    """The run that counts, with what the trials have shown among its statistics."""
+    stats, tol = best.run.record.stats, search.tol
+    stats["tolerance"] = {
+        "requested": tol, "of": list(search.names), "estimated": float(best.error), "growth": float(best.growth),
+        "event_shift": best.gap.shift if best.gap is not None else 0.0,
+        "runs": [
+            {"allowed": trial.allowed, "estimated": float(trial.error), "steps": trial.run.stats["steps"],
+             "rejected": trial.run.stats["rejected"], "seconds": trial.run.stats["wall_seconds"]}
+            for trial in trials
+        ],
+        "comparing_seconds": search.comparing,
+    }  # fmt: skip
+    if not problem and best.growth > GROWING and not is_rounding(best) and not search.names:
+        stats["notes"].append(
+            f"errors grew {best.growth:.2g}-fold: the motion is so sensitive that small differences decide it"
+        )
+    if not problem and best.error > tol:
+        stats["notes"].append(f"the estimated error {best.error:.2g} is above tol = {tol:g}")
+    if not problem and best.error < WELL * tol and stats["steps"] > 0:
+        better = search.why_better(trials, best) or f"{len(trials)} runs came no nearer"
+        stats["notes"].append(f"the estimated error {best.error:.2g} is far below tol = {tol:g}: {better}")
+    if best.gap is not None and not best.gap.same:
+        stats["notes"].append("runs at different tolerances have different events; their error is not known")
+    return Outcome(best, problem)
+
+
+def _unreached(trials: Sequence[Trial], best: Trial, tol: float) -> str:
+    """Why no run is as accurate as was asked for."""
+    name = best.gap.name if best.gap is not None else ""
+    where = f" (of {name!r})" if name else ""
+    if not np.isfinite(best.error):
+        why = (
+            "took the same steps, so that their error is not known; give dt=" if best.gap is None else
+            "have different events, so that their error is not known; the motion is too sensitive, or give dt="
+        )  # fmt: skip
+        return f"tol = {tol:g} was not reached: runs at tolerances down to {trials[-1].allowed:.2g} per second {why}"
+    stuck = any(is_rounding(trial) for trial in trials)
+    why = "smaller steps do not make it smaller, which is the floor of round-off" if stuck else (
+        f"{len(trials)} runs did not come nearer"
+    )  # fmt: skip
+    grew = f"; errors grew {best.growth:.2g}-fold" if best.growth > 1.0 else ""
+    return (
+        f"tol = {tol:g} was not reached: the best run has an estimated error of {best.error:.2g}{where}; {why}{grew}; "
+        "ask for less, or for a shorter time"
+    )
