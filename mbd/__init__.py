@@ -49,7 +49,8 @@ if TYPE_CHECKING:
         separation as separation,
         touchdown as touchdown,
     )
-    from mbd.equations.lagrangian import Coordinate as Coordinate, Lagrangian as Lagrangian
+    from mbd.description import on_slope as on_slope
+    from mbd.equations.energy_description import Coordinate as Coordinate
     from mbd.errors import (
         AssemblyError as AssemblyError,
         CapabilityError as CapabilityError,
@@ -95,7 +96,8 @@ if TYPE_CHECKING:
         Tabulated as Tabulated,
         Viscous as Viscous,
     )
-    from mbd.model import Model as Model, on_slope as on_slope
+    from mbd.lagrangian import Lagrangian as Lagrangian
+    from mbd.model import Model as Model
     from mbd.results.failure import Failure as Failure
     from mbd.simulation.diagnostics.replay import Replay as Replay, replay as replay
     from mbd.simulation.simulate import simulate as simulate
@@ -134,14 +136,16 @@ _HOMES = {
     "mbd.bodies": "Domain Link PointMass RigidBody box cylinder disk rod segment sphere",
     "mbd.constraints": "Bilateral Controller Event KnifeEdge Nonholonomic Penalty PenaltyParameters Plane "
     "Rolling Unilateral When distance extension flexion height measure penalty_parameters separation touchdown",
-    "mbd.equations.lagrangian": "Coordinate Lagrangian",
+    "mbd.equations.energy_description": "Coordinate",
+    "mbd.lagrangian": "Lagrangian",
     "mbd.errors": "AssemblyError CapabilityError MbdError MemoryLimitError ModelError SimulationError TraceError "
     "TrajectoryError UnknownNameError",
     "mbd.forces": "Applied Damper Motor Potential Samples Spring TorsionSpring",
     "mbd.integrators": "HHT GeneralizedAlpha Newmark RadauIIA RungeKutta853",
     "mbd.joints": "Cylindrical Planar Prismatic Revolute Screw Translation Universal Weld",
     "mbd.joints.losses": "Coulomb Dissipation PinFriction Quadratic Tabulated Viscous",
-    "mbd.model": "Model on_slope",
+    "mbd.description": "on_slope",
+    "mbd.model": "Model",
     "mbd.assembly.projection": "project",
     "mbd.results.failure": "Failure",
     "mbd.simulation.diagnostics.replay": "Replay replay",

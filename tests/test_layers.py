@@ -16,12 +16,14 @@ RANKS = [
     ("tape",),
     ("scope",),
     ("bodies", "joints", "forces", "constraints"),
-    ("topology", "model"),
+    ("description",),
+    ("topology",),
     ("equations",),
     ("compile",),
     ("kernel",),
     ("integrators",),
     ("assembly",),
+    ("model", "lagrangian"),
     ("results", "simulation", "trajectory"),
     ("analysis", "view"),
     ("cli", "hardcases", "testing"),
@@ -30,7 +32,7 @@ RANKS = [
 
 RANK = {part: rank for rank, parts in enumerate(RANKS) for part in parts}
 
-DOORS = {"model": ("equations", "assembly.mobility"), "trajectory": ("view",), "results.ledger": ("view",)}
+DOORS = {"trajectory": ("view",), "results.ledger": ("view",)}
 """Methods of the objects in users' hands that only call a later stage, and import it when they are called."""
 
 FILES = sorted(file for file in PACKAGE.rglob("*.py") if file != PACKAGE / "__init__.py")

@@ -7,8 +7,8 @@ from typing import Any
 
 from mbd.arrays import Vector
 from mbd.compile.mechanism import Mechanism
+from mbd.description import Description
 from mbd.equations.surroundings import Surroundings
-from mbd.model import Model
 from mbd.tape.evaluate import evaluate
 from mbd.tape.node import Node
 from mbd.topology.plan import plan, uncut
@@ -27,7 +27,7 @@ def opening(model: Any, mechanism: Mechanism, parameters: Vector, position: Mapp
     parameters : values of the run-time parameters
     position : the named positions
     """
-    if not isinstance(model, Model):
+    if not isinstance(model, Description):
         return {}
     known = mechanism.named.get("opening")
     if known is None:
@@ -44,7 +44,7 @@ def opening(model: Any, mechanism: Mechanism, parameters: Vector, position: Mapp
     return dict(zip(names, evaluate(nodes, given), strict=True))
 
 
-def _asked(model: Model) -> tuple[list[str], list[Node], list[str], Any]:
+def _asked(model: Description) -> tuple[list[str], list[Node], list[str], Any]:
     """(names of coordinates, their values on a tape, names of its coordinates, its parameters)."""
     here, whole = plan(model), uncut(model)
     apart = {joint.name for joint in (*here.floating, *whole.cut)}

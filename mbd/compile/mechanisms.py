@@ -9,10 +9,10 @@ from weakref import WeakKeyDictionary
 
 from mbd.compile.forking import free_in_child
 from mbd.compile.mechanism import Mechanism
-from mbd.equations.derivation import derive
-from mbd.equations.lagrangian import Lagrangian
+from mbd.description import Description
+from mbd.equations.derivation import FrontDoor, derive
 from mbd.errors import ModelError
-from mbd.model import Model
+from mbd.topology.check import parameter_check
 
 __all__ = ["mechanism_of"]
 
@@ -48,11 +48,12 @@ def mechanism_of(model: Any, backend: str = "auto", changed: Mapping[str, float]
     ModelError
         for values that the words of the model do not allow, as if it had been described with them.
     """
-    if not isinstance(model, Model | Lagrangian):
+    if not isinstance(model, Description | FrontDoor):
         raise ModelError(f"a Model or a Lagrangian is expected, not {model!r}")
     if not isinstance(backend, str):
         raise ModelError(f"backend must be 'auto', 'llvm' or 'python', not {backend!r}")
-    faults = model.parameter_check().faults(changed) if changed else []
+    checked = parameter_check(model) if isinstance(model, Description) else model.parameter_check()
+    faults = checked.faults(changed) if changed else []
     if faults:
         raise ModelError(faults)
     mechanism = _mechanism(model, backend, frozenset())

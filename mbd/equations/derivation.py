@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from mbd.bodies.algebra import dot
+from mbd.bodies.domains import ParameterCheck
 from mbd.equations.changes import partials, rates
 from mbd.equations.contacts import anchors_held, laws
 from mbd.equations.derivation_scope import DerivationScope
@@ -24,10 +25,11 @@ from mbd.errors import ModelError
 from mbd.tape.derivatives import live
 from mbd.tape.functions import cos
 from mbd.tape.node import Node
+from mbd.topology.check import require_valid
+from mbd.topology.plan import Plan, plan
 
 if TYPE_CHECKING:
-    from mbd.model import Model
-    from mbd.topology.plan import Plan
+    from mbd.description import Description
 
 __all__ = ["FrontDoor", "derive", "state_balance"]
 
@@ -39,8 +41,11 @@ class FrontDoor(Protocol):
     def equations_of_motion(self) -> Equations:
         """The equations."""
 
+    def parameter_check(self) -> ParameterCheck:
+        """The judgement of values of its parameters."""
 
-def derive(model: Model | FrontDoor) -> Equations:
+
+def derive(model: Description | FrontDoor) -> Equations:
     """The equations of motion ``M a + f + Bᵀ λ = 0``, ``h = 0`` of a model.
 
     Parameters
@@ -49,15 +54,13 @@ def derive(model: Model | FrontDoor) -> Equations:
     """
     if isinstance(model, FrontDoor):
         return model.equations_of_motion()
-    from mbd.topology.plan import plan
-
-    model.require_valid()
+    require_valid(model)
     chosen = plan(model)
     require_room(chosen)
     return _derived(model, chosen)
 
 
-def _derived(model: Model, plan: Plan, carried: Sequence[tuple[str, int]] = ()) -> Equations:
+def _derived(model: Description, plan: Plan, carried: Sequence[tuple[str, int]] = ()) -> Equations:
     """Kinematics, causes of forces, balance, constraints, results.
 
     Angles of cut joints that forces, rows, contacts, events or controllers depend on, and that only a rotation shows,
@@ -109,7 +112,7 @@ def _derived(model: Model, plan: Plan, carried: Sequence[tuple[str, int]] = ()) 
     return equations
 
 
-def _wrapped(scope: Surroundings, equations: Equations, model: Model) -> list[tuple[str, int]]:
+def _wrapped(scope: Surroundings, equations: Equations, model: Description) -> list[tuple[str, int]]:
     """(joint, number) of the angles of cut joints that jump by a turn, and on which the motion depends.
 
     So does a controller that reads one. A `Bilateral` on the joint alone compares modulo a turn and needs no more.

@@ -22,7 +22,7 @@ from mbd.tape.node import Node, Scalar, Tape
 from mbd.tape.tracing import traced_scalar
 
 if TYPE_CHECKING:
-    from mbd.equations.lagrangian import Lagrangian
+    from mbd.equations.energy_description import EnergyDescription
 
 __all__ = ["Lowering", "assembled"]
 
@@ -30,7 +30,7 @@ __all__ = ["Lowering", "assembled"]
 class Lowering:
     """The expressions of a description on one tape; `faults` tells which could not be read."""
 
-    def __init__(self, system: Lagrangian) -> None:
+    def __init__(self, system: EnergyDescription) -> None:
         names = [coordinate.name for coordinate in system.coordinates]
         self.scope = CoordinateScope(names, system.own_parameters, system.tunable)
         self.tape, self.inputs, self.q, self._known = self.scope.tape, self.scope.inputs, self.scope.q, self.scope.known
@@ -79,7 +79,7 @@ class Lowering:
                 found |= {motion: value, motion.diff(t): self._known[f"{name}_rate"]}
         return found
 
-    def _check(self, system: Lagrangian) -> None:
+    def _check(self, system: EnergyDescription) -> None:
         """An energy of the wrong variables is a fault."""
         still = [("the potential", self.V), *((f"the constraint {name!r}", h) for name, h in self.h.items())]
         for what, node in still:
@@ -98,7 +98,7 @@ class Lowering:
 
 
 # the equations ------------------------------------------------------------------------------------------------------
-def assembled(system: Lagrangian, lowering: Lowering) -> Equations:
+def assembled(system: EnergyDescription, lowering: Lowering) -> Equations:
     """Lagrange's equations by reverse gradients and one forward sweep in time, with the words that were added."""
     tape, inputs, scope = lowering.tape, lowering.inputs, lowering.scope
     T, V, D = lowering.T, lowering.V, lowering.D
@@ -139,7 +139,7 @@ def energy_of_motion(lowering: Lowering) -> Node:
     return _sum(lowering.tape, [momentum * rate for momentum, rate in zip(momenta, v, strict=True)]) - T
 
 
-def _laws(system: Lagrangian, lowering: Lowering) -> Laws:
+def _laws(system: EnergyDescription, lowering: Lowering) -> Laws:
     """Constraints given as expressions, then those given as words.
 
     Raises
@@ -159,7 +159,9 @@ def _laws(system: Lagrangian, lowering: Lowering) -> Laws:
     return known
 
 
-def _effects(system: Lagrangian, lowering: Lowering, dV: Sequence[Node], dD: Sequence[Node]) -> tuple[Effect, ...]:
+def _effects(
+    system: EnergyDescription, lowering: Lowering, dV: Sequence[Node], dD: Sequence[Node]
+) -> tuple[Effect, ...]:
     """The causes of forces: potential, dissipation, and each generalized force."""
     tape, v = lowering.tape, lowering.inputs.v
     found = []
@@ -187,7 +189,12 @@ def _sum(tape: Tape, terms: Sequence[Node]) -> Node:
 
 
 def _outputs(
-    system: Lagrangian, lowering: Lowering, known: Laws, effects: Sequence[Effect], kinetic: Node, potential: Node
+    system: EnergyDescription,
+    lowering: Lowering,
+    known: Laws,
+    effects: Sequence[Effect],
+    kinetic: Node,
+    potential: Node,
 ) -> Outputs:
     """θ, its rate and acceleration, forces, multipliers, contacts, energies and powers."""
     tape, inputs, scope = lowering.tape, lowering.inputs, lowering.scope

@@ -9,7 +9,7 @@ from mbd.bodies.base import Frame
 from mbd.bodies.link import Link
 
 if TYPE_CHECKING:
-    from mbd.model import Model
+    from mbd.description import Description
 
 __all__ = ["Segments", "figure_of"]
 
@@ -17,7 +17,7 @@ Segments = list[tuple[str, tuple[str, ...]]]
 """(body, its frames in the order of a line); one frame alone is a point. Places are the results 'body.frame.x', …"""
 
 
-def figure_of(model: Model) -> Callable[[], Segments]:
+def figure_of(model: Description) -> Callable[[], Segments]:
     """The figure of the model as it is now: a link from start to end, other bodies through the frames in use.
 
     It holds names only: equations are kept as long as the model is there, which they must not keep themselves.
@@ -26,7 +26,7 @@ def figure_of(model: Model) -> Callable[[], Segments]:
     return lambda: found
 
 
-def _segments(model: Model) -> Segments:
+def _segments(model: Description) -> Segments:
     used: dict[str, list[Frame]] = {name: [] for name in model.bodies}
     joints = [frame for joint in model.joints for frame in (joint.child, joint.parent)]
     for frame in [*joints, *(mention for mention in model.mentions() if isinstance(mention, Frame))]:

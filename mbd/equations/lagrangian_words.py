@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from mbd.constraints.expressions import quantities_in
@@ -12,13 +13,13 @@ from mbd.topology.describe import described_constraint, section
 
 if TYPE_CHECKING:
     from mbd.constraints.base import Constraint
-    from mbd.equations.lagrangian import Lagrangian
+    from mbd.equations.energy_description import EnergyDescription
     from mbd.forces.base import Force
 
 __all__ = ["described", "word_faults"]
 
 
-def word_faults(system: Lagrangian, scope: CoordinateScope) -> list[str]:
+def word_faults(system: EnergyDescription, scope: CoordinateScope) -> list[str]:
     """What is wrong with its words, one sentence each."""
     words: list[Force | Constraint] = [*system.applied, *system.words]
     found = [fault for word in words for fault in (*word.faults(), *word.value_faults(word.parameters()))]
@@ -47,7 +48,7 @@ def word_faults(system: Lagrangian, scope: CoordinateScope) -> list[str]:
     return list(dict.fromkeys(found + rule_faults(system)))
 
 
-def described(system: Lagrangian) -> str:
+def described(system: EnergyDescription, faults: Sequence[str]) -> str:
     """Coordinates, energies, parameters, forces, constraints and faults."""
     lines = [f"{system.name}: given by its energies"]
     lines += section("coordinates", [f"{c.name} [{c.unit}]" for c in system.coordinates])
@@ -60,7 +61,7 @@ def described(system: Lagrangian) -> str:
     rows = [f"{name}: {_said(h)} = 0" for name, h in (*system.rows.items(), *system.nonholonomic.items())]
     lines += section("constraints", [*rows, *(described_constraint(word) for word in system.words)])
     lines += section("controllers", [controller.name for controller in system.controllers])
-    lines += section("faults", system.check())
+    lines += section("faults", faults)
     return "\n".join(lines)
 
 

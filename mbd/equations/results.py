@@ -18,7 +18,7 @@ from mbd.scope import Triple
 from mbd.tape.node import Scalar, Tape
 
 if TYPE_CHECKING:
-    from mbd.model import Model
+    from mbd.description import Description
 
 __all__ = ["offer_contacts", "offer_effects", "offer_results", "offer_rows"]
 
@@ -29,7 +29,7 @@ def offer_results(
     dynamics: Dynamics,
     work: Work,
     equations: Equations,
-    model: Model,
+    model: Description,
     hidden: Collection[str],
 ) -> None:
     """Everything that a run can be asked for besides what words may ask for.

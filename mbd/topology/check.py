@@ -20,12 +20,12 @@ from mbd.topology.plan import cut_names, is_planar, plan
 if TYPE_CHECKING:
     from mbd.constraints.base import Constraint
     from mbd.constraints.controller import Controller
-    from mbd.model import Model
+    from mbd.description import Description
 
-__all__ = ["faults", "parameter_check", "quantities", "rule_faults"]
+__all__ = ["faults", "parameter_check", "quantities", "require_valid", "rule_faults"]
 
 
-def faults(model: Model) -> list[str]:
+def faults(model: Description) -> list[str]:
     """All faults of a model, one sentence each."""
     if not model.joints:
         return [
@@ -43,7 +43,14 @@ def faults(model: Model) -> list[str]:
     return list(dict.fromkeys(found))
 
 
-def parameter_check(model: Model) -> ParameterCheck:
+def require_valid(model: Description) -> None:
+    """Raise a `ModelError` with every fault, if there is one."""
+    found = faults(model)
+    if found:
+        raise ModelError(found)
+
+
+def parameter_check(model: Description) -> ParameterCheck:
     """The same judgement of other values of the parameters, without the faults that values cannot change."""
     bodies = list(model.bodies.values())
     words: list[Parameterized] = [*bodies, *model.forces]  # before joints, whose missing springs they may be named like
@@ -53,7 +60,7 @@ def parameter_check(model: Model) -> ParameterCheck:
     return ParameterCheck(words, model.parameters, lambda values: massless_faults(model, values), decisive)
 
 
-def quantities(model: Model) -> list[str]:
+def quantities(model: Description) -> list[str]:
     """Names that functions, measures and controllers may ask for: 't', coordinates, rates, places, velocities."""
     names = ["t"]
     for joint in (*model.joints, *_floating(model)):
@@ -66,7 +73,7 @@ def quantities(model: Model) -> list[str]:
     return names
 
 
-def _floating(model: Model) -> Sequence[Joint]:
+def _floating(model: Description) -> Sequence[Joint]:
     """The joints by which bodies float because of the choice of cuts; none where that choice is a fault itself."""
     try:
         return plan(model).floating
@@ -81,7 +88,7 @@ RESULTS = (
 """What a run knows of joints, forces and constraints besides places and rates."""
 
 
-def readable(model: Model) -> list[str]:
+def readable(model: Description) -> list[str]:
     """Names that controllers may read: quantities and results; which of these a word has shows when a run begins."""
     words: list[Joint | Force | Constraint] = [*model.joints, *model.forces, *model.constraints]
     owners = [word.name for word in words] + [name for joint in model.joints for name in joint.coordinate_names]
@@ -89,7 +96,7 @@ def readable(model: Model) -> list[str]:
 
 
 # names ----------------------------------------------------------------------------------------------------------
-def name_faults(model: Model) -> list[str]:
+def name_faults(model: Description) -> list[str]:
     """Two things of one name."""
     found = []
     bodies: dict[str, list[Body]] = {}
@@ -120,14 +127,14 @@ def name_faults(model: Model) -> list[str]:
     return found
 
 
-def _all_bodies(model: Model) -> Iterable[Body]:
+def _all_bodies(model: Description) -> Iterable[Body]:
     yield model.ground
     for frame in model.points():
         yield frame.body
 
 
 # what hangs together ----------------------------------------------------------------------------------------------
-def reach_faults(model: Model) -> list[str]:
+def reach_faults(model: Description) -> list[str]:
     """Bodies without a chain of joints to the ground."""
     lost = disconnected(model)
     found = []
@@ -148,12 +155,12 @@ def reach_faults(model: Model) -> list[str]:
     return found
 
 
-def _users(model: Model, body: str) -> list[Force | Constraint]:
+def _users(model: Description, body: str) -> list[Force | Constraint]:
     words: list[Force | Constraint] = [*model.forces, *model.constraints]
     return [w for w in words if any(isinstance(m, Frame) and m.body.name == body for m in w.mentions())]
 
 
-def mention_faults(model: Model) -> list[str]:
+def mention_faults(model: Description) -> list[str]:
     """Joints that were never connected, names of quantities that do not exist."""
     found = []
     joints = {joint.name for joint in model.joints}
@@ -217,7 +224,7 @@ def rule_faults(model: Ruled) -> list[str]:
     return found
 
 
-def choice_faults(model: Model) -> list[str]:
+def choice_faults(model: Description) -> list[str]:
     """Names in cut= and tunable= that do not exist."""
     parameters = model.parameters
     found = [
@@ -233,7 +240,7 @@ def choice_faults(model: Model) -> list[str]:
 
 
 # what nothing determines ------------------------------------------------------------------------------------------
-def massless_faults(model: Model, values: Mapping[str, float]) -> list[str]:
+def massless_faults(model: Description, values: Mapping[str, float]) -> list[str]:
     """Bodies whose motion nothing determines, as far as the description shows it; assembly finds the others.
 
     A massless body at the end of the tree may move freely; a point mass all of whose joints turn about its own point
@@ -269,7 +276,7 @@ def massless_faults(model: Model, values: Mapping[str, float]) -> list[str]:
     return found
 
 
-def _constrained(model: Model) -> list[Frame | Joint | str]:
+def _constrained(model: Description) -> list[Frame | Joint | str]:
     return [mention for word in model.constraints for mention in word.mentions()]
 
 

@@ -6,20 +6,21 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from mbd.errors import ModelError
+from mbd.topology.check import faults
 from mbd.topology.plan import plan
 
 if TYPE_CHECKING:
     from mbd.bodies.base import Body
     from mbd.constraints.base import Constraint
+    from mbd.description import Description
     from mbd.joints.base import Joint
-    from mbd.model import Model
 
 __all__ = ["described_constraint", "description", "section"]
 
 UNITS = {"mass": "kg", "length": "m", "center": "m", "inertia": "kg m²"}
 
 
-def description(model: Model) -> str:
+def description(model: Description) -> str:
     """Bodies, joints, forces, constraints, coordinates and faults."""
     g = ", ".join(f"{value:.6g}" for value in model.gravity)
     lines = [f"{model.name}: gravity ({g}) m/s²"]
@@ -28,7 +29,7 @@ def description(model: Model) -> str:
     lines += section("forces", [f"{force.name}: {type(force).__name__}, {force.kind}" for force in model.forces])
     lines += section("constraints", [described_constraint(word) for word in model.constraints])
     lines += section("controllers", [controller.name for controller in model.controllers])
-    found = model.check()
+    found = faults(model)
     if not found:
         lines += section("coordinates", _choice(model))
     lines += section("faults", found)
@@ -61,7 +62,7 @@ def described_constraint(word: Constraint) -> str:
     return f"{word.name}: {type(word).__name__}{word.said}"
 
 
-def _choice(model: Model) -> list[str]:
+def _choice(model: Description) -> list[str]:
     try:
         chosen = plan(model)
     except ModelError as error:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from mbd.joints.base import Joint
 
 if TYPE_CHECKING:
-    from mbd.model import Model
+    from mbd.description import Description
 
 __all__ = ["disconnected", "graph_of", "links_of", "mobility", "spanning_tree"]
 
@@ -17,7 +17,7 @@ Links = dict[str, dict[str, dict[str, Joint]]]
 """The joints by name between a body and each of its neighbors, by their names: the adjacency of the graph."""
 
 
-def links_of(model: Model, without: Collection[str] = ()) -> Links:
+def links_of(model: Description, without: Collection[str] = ()) -> Links:
     """Who is connected to whom, in order of connection, in plain words: every model is asked this at its start.
 
     Parameters
@@ -35,7 +35,7 @@ def links_of(model: Model, without: Collection[str] = ()) -> Links:
     return links
 
 
-def graph_of(model: Model, without: Collection[str] = ()) -> Any:
+def graph_of(model: Description, without: Collection[str] = ()) -> Any:
     """The same as a `networkx.MultiGraph` of body names, for questions of one's own; edges carry their `joint`."""
     import networkx as nx  # takes longer to load than a walker takes to derive
 
@@ -48,7 +48,7 @@ def graph_of(model: Model, without: Collection[str] = ()) -> Any:
     return graph
 
 
-def disconnected(model: Model) -> list[str]:
+def disconnected(model: Description) -> list[str]:
     """Names of the bodies without a chain of joints to the ground."""
     links = links_of(model)
     _, _, reached = spanning_tree(links, model.ground.name)

@@ -17,7 +17,7 @@ from mbd.joints.translation import Translation
 from mbd.topology.graph import links_of, mobility, spanning_tree
 
 if TYPE_CHECKING:
-    from mbd.model import Model
+    from mbd.description import Description
 
 __all__ = ["Plan", "plan", "uncut"]
 
@@ -70,17 +70,17 @@ class Plan:
         return tuple(reversed(found))
 
 
-def plan(model: Model) -> Plan:
+def plan(model: Description) -> Plan:
     """The tree, the cut joints and the floating bodies of a model whose `cut` is 'auto', 'loops', 'all' or names."""
     return _plan(model, cut_names(model) | {joint.name for joint in model.joints if needs_reaction(joint)})
 
 
-def uncut(model: Model) -> Plan:
+def uncut(model: Description) -> Plan:
     """The same as `plan`, of the model that has nothing but its loops cut."""
     return _plan(model, set())
 
 
-def _plan(model: Model, wanted: set[str]) -> Plan:
+def _plan(model: Description, wanted: set[str]) -> Plan:
     """The tree without some joints."""
     planar = is_planar(model)
     links = links_of(model, without=wanted)
@@ -109,7 +109,7 @@ def _plan(model: Model, wanted: set[str]) -> Plan:
     )
 
 
-def cut_names(model: Model) -> set[str]:
+def cut_names(model: Description) -> set[str]:
     """Names of the joints that the user wants cut, besides those that close a loop."""
     names = [joint.name for joint in model.joints]
     if isinstance(model.cut, str):
@@ -129,12 +129,12 @@ def needs_reaction(joint: Joint) -> bool:
     return any(loss.needs_reaction for _, _, loss in joint.losses())
 
 
-def is_planar(model: Model) -> bool:
+def is_planar(model: Description) -> bool:
     """Whether every joint turns about z only and shifts in x–y only."""
     return all(joint.is_planar and joint.parent.is_planar and joint.child.is_planar for joint in model.joints)
 
 
-def floating_joint(model: Model, body: Body, planar: bool) -> Joint:
+def floating_joint(model: Description, body: Body, planar: bool) -> Joint:
     """The joint by which a body floats against the ground, without constraining it."""
     name, origin = f"{body.name} floating", model.ground.origin
     if isinstance(body, PointMass) and not _is_turned(model, body):
@@ -154,7 +154,7 @@ def floating_joint(model: Model, body: Body, planar: bool) -> Joint:
     )
 
 
-def _is_turned(model: Model, body: Body) -> bool:
+def _is_turned(model: Description, body: Body) -> bool:
     """Whether a joint without an angle holds the body's axes to those of a moving body or of a turned frame.
 
     Also where it has to give a torque, which its rows must carry, since something else acts beside the body's origin.
@@ -169,7 +169,7 @@ def _is_turned(model: Model, body: Body) -> bool:
     return False
 
 
-def _has_moments(model: Model, body: Body, holding: Joint) -> bool:
+def _has_moments(model: Description, body: Body, holding: Joint) -> bool:
     """Whether more than the joint that holds it can turn a point mass: joints, surfaces that it carries, arms."""
     for joint in model.joints:
         if joint is not holding and body in (joint.parent.body, joint.child.body) and _gives_torque(model, joint):
@@ -180,7 +180,7 @@ def _has_moments(model: Model, body: Body, holding: Joint) -> bool:
     return any(frame.body is body for frame in frames)
 
 
-def _gives_torque(model: Model, joint: Joint) -> bool:
+def _gives_torque(model: Description, joint: Joint) -> bool:
     """Whether anything acts along a joint's coordinates: its loss or spring, or a word that mentions it."""
     names = [mention for mention in model.mentions() if isinstance(mention, str)]
     mentioned = joint in model.mentions() or any(name.startswith(f"{joint.name}.") for name in names)

@@ -1,25 +1,21 @@
-"""The second front door: textbook problems given by their energies, without bodies."""
+"""A mechanism in energies: textbook problems, without bodies."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, TypeAlias, cast
+from typing import Any, Self, TypeAlias, cast
 
-from mbd.bodies.domains import Domain, ParameterCheck, Parameterized
+from mbd.bodies.domains import Domain, Parameterized
 from mbd.bodies.values import named_number_faults, names_of, number, printable
 from mbd.constraints.base import Constraint
 from mbd.constraints.controller import Controller
 from mbd.constraints.event import Event
-from mbd.equations.coordinate_scope import identifier
-from mbd.equations.energies import Lowering, assembled
-from mbd.equations.equations import Equations
-from mbd.equations.lagrangian_words import described, word_faults
+from mbd.description import all_are, served
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.forces.base import Force
-from mbd.model import all_are, served
 
-__all__ = ["Coordinate", "Expression", "Lagrangian"]
+__all__ = ["Coordinate", "EnergyDescription", "Expression"]
 
 Expression: TypeAlias = Any
 """A sympy expression, a number, or a plain Python function whose arguments are named after what they mean."""
@@ -88,43 +84,8 @@ class _OwnParameters(Parameterized):
 
 
 @dataclass(frozen=True, eq=False)
-class Lagrangian:
-    """A mechanism given by its energies in generalized coordinates q, with v = q̇.
-
-    ``d/dt ∂T/∂v − ∂T/∂q + ∂V/∂q + ∂D/∂v − Q + (∂h/∂q)ᵀ λ = 0``, ``h(q, t) = 0``
-
-    Every expression is sympy in the coordinates' symbols, the parameters' symbols and ``t``, or a plain Python
-    function whose arguments are named 'theta', 'theta_rate', 't' or after a parameter (other characters than letters
-    and digits become '_').
-
-    Parameters
-    ----------
-    name : of the mechanism
-    coordinates : `Coordinate` objects, names, or sympy's ``dynamicsymbols``
-    kinetic : T(q, v, t) [J]
-    potential : V(q, t) [J]
-    dissipation : D(v, q, t) [W]; its gradient ∂D/∂v resists the motion
-    forces : generalized forces Q(t, q, v) by coordinate (or its name)
-    constraints : h by name, or (name, h) pairs, or bare expressions called 'constraint 1', …; and words, as `constrain`
-        takes them
-    nonholonomic : ``a(q, t) · v + b(q, t) = 0`` by name, rows on velocities whose B is a
-    parameters : values by sympy symbol or by name; run-time inputs, where exact 0 and ±1 fold unless `tunable`
-    tunable : names of parameters that stay inputs even at 0 or ±1
-    controllers : as `apply` takes them
-    domains : what its parameters may be, by sympy symbol or by name: ``{m: mbd.Domain(low=0.0, unit="kg")}``; others
-        may have any finite value
-
-    `constrain` and `apply` add contacts, friction, events and controllers, as to a `Model`; gaps, guards and rows are
-    sympy expressions of the coordinates, the parameters and ``t``, or measures of them:
-
-    >>> import sympy, mbd
-    >>> y = Coordinate("y", unit="m")
-    >>> m, g = sympy.symbols("m g")
-    >>> ball = Lagrangian("ball", [y], m * y.v**2 / 2, m * g * y.q, parameters={m: 0.2, g: 9.81})
-    >>> ball.constrain(mbd.Unilateral("floor", y.q, restitution=0.5))
-    >>> ball.check()
-    []
-    """
+class EnergyDescription:
+    """The words of a mechanism that is given by its energies; `Lagrangian` is this with all that follows from it."""
 
     name: str
     coordinates: Sequence[Coordinate | Any]
@@ -214,7 +175,7 @@ class Lagrangian:
         others = self._of_words()
         return {name: value for name, value in self.parameters.items() if name not in others}
 
-    def _own_word(self) -> _OwnParameters:
+    def own_word(self) -> _OwnParameters:
         return _OwnParameters(self.name, self.own_parameters, self.domains)
 
     @property
@@ -232,52 +193,7 @@ class Lagrangian:
         """The parameters of its words by full name."""
         return {name: value for word in (*self.applied, *self.words) for name, value in word.parameters().items()}
 
-    # what follows from it -----------------------------------------------------------------------------------------
-    def check(self) -> list[str]:
-        """Every fault of the description, one sentence each."""
-        faults = _name_faults(self) + self._own_word().faults()
-        if faults:
-            return faults
-        lowering = Lowering(self)
-        return lowering.faults or word_faults(self, lowering.scope)
-
-    def require_valid(self) -> None:
-        """Raise a `ModelError` with every fault, if there is one."""
-        faults = self.check()
-        if faults:
-            raise ModelError(faults)
-
-    def parameter_check(self) -> ParameterCheck:
-        """The judgement of values that differ from those of the description."""
-        return ParameterCheck([self._own_word(), *self.applied, *self.words], self.parameters)
-
-    def equations_of_motion(self) -> Equations:
-        """The same equations that a model of bodies gives; faults are raised together as a `ModelError`."""
-        self.require_valid()
-        return assembled(self, Lowering(self))
-
-    def equations(self, *, latex: bool = False) -> str:
-        """M, f, B and h as text, or as LaTeX."""
-        from mbd.equations.printing import report
-
-        return report(self.equations_of_motion(), latex=latex)
-
-    def describe(self, mobility: bool = False) -> str:
-        """The mechanism in a page of text; with `mobility` the degrees of freedom too, see `mbd.mobility`."""
-        said = described(self)
-        if mobility and not self.check():
-            from mbd.assembly.mobility import mobility as of
-
-            said += f"\n{of(self)}"
-        return said
-
-    def cost(self) -> Any:
-        """Operations of the equations, and of each effect."""
-        from mbd.equations.cost import cost
-
-        return cost(self)
-
-    def without(self, *names: str) -> Lagrangian:
+    def without(self, *names: str) -> Self:
         """A copy that lacks some of its 'potential', 'dissipation', forces ('theta force'), constraints, controllers.
 
         'box friction' is the dry friction of a contact alone.
@@ -301,7 +217,7 @@ class Lagrangian:
         made = replace(self, **bare)
         return made.with_tunable(*(name for name in self.tunable if name in made.parameters))
 
-    def with_tunable(self, *names: str) -> Lagrangian:
+    def with_tunable(self, *names: str) -> Self:
         """A copy in which some parameters stay inputs even at an exact 0 or ±1."""
         return replace(self, tunable=(*self.tunable, *names))
 
@@ -325,7 +241,7 @@ def _named(constraints: Mapping[str, Expression] | Sequence[Any]) -> dict[str, E
     return dict(pairs)
 
 
-def _check_shapes(system: Lagrangian) -> None:
+def _check_shapes(system: EnergyDescription) -> None:
     """Arguments of a wrong kind, all of them at once."""
     if not isinstance(system.name, str) or not system.name.strip():
         raise ModelError(f"Lagrangian needs a name as its first argument, got {system.name!r}")
@@ -351,47 +267,3 @@ def _check_shapes(system: Lagrangian) -> None:
         faults.append(f"controllers must be a list of mbd.Controller, got {system.controllers!r}")
     if faults:
         raise ModelError([f"Lagrangian {system.name!r}: {fault}" for fault in faults])
-
-
-def _ambiguous(coordinates: Sequence[str], parameters: Iterable[str]) -> list[str]:
-    """Names under which an expression would find two quantities: 't' is the time, 'theta_rate' the rate of 'theta'."""
-    quantities = {"the time": "t"}
-    quantities |= {f"the coordinate {name!r}": name for name in coordinates}
-    quantities |= {f"the rate of {name!r}": f"{name}_rate" for name in coordinates}
-    quantities |= {f"the parameter {name!r}": name for name in parameters}
-    found: dict[str, str] = {}
-    faults = []
-    for what, name in quantities.items():
-        other = found.setdefault(identifier(name), what)
-        twice = what == f"the parameter {name!r}" and other == f"the coordinate {name!r}"  # told already
-        if other != what and not twice:
-            faults.append(f"{what} is written {identifier(name)!r} in expressions, as is {other}; give it another name")
-    return faults
-
-
-def _name_faults(system: Lagrangian) -> list[str]:
-    names = [coordinate.name for coordinate in system.coordinates]
-    faults = [] if names else [f"{system.name!r} has no coordinates; give at least one mbd.Coordinate"]
-    taken: set[str] = set()
-    for name in (*names, *system.own_parameters):
-        if name in taken:
-            faults.append(f"the name {name!r} is given twice among the coordinates and parameters of {system.name!r}")
-        taken.add(name)
-    faults += _ambiguous(names, system.own_parameters)
-    faults += [
-        "domains: " + nearest(name, system.own_parameters, "parameter", "There are")
-        for name in system.domains
-        if name not in system.own_parameters
-    ]
-    faults += [
-        f"two constraints of {system.name!r} are named {name!r}; give each its own name"
-        for name in system.constraints
-        if name in system.nonholonomic
-    ]
-    faults += [nearest(name, names, "coordinate") for name in system.generalized if name not in names]
-    faults += [
-        nearest(name, system.parameters, "parameter", "There are")
-        for name in system.tunable
-        if name not in system.parameters
-    ]
-    return faults

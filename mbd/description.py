@@ -1,0 +1,245 @@
+"""A mechanism in words: what is connected to what."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any, Self, TypeVar, cast
+
+from mbd.bodies.base import Body, Frame
+from mbd.bodies.ground import Ground
+from mbd.bodies.values import Vector3, names_of, number, printable, triple
+from mbd.constraints.base import Constraint
+from mbd.constraints.controller import Controller
+from mbd.constraints.event import Event
+from mbd.errors import ModelError, UnknownNameError, nearest
+from mbd.forces.base import Force
+from mbd.forces.quantities import Mention
+from mbd.joints.base import Joint
+
+__all__ = ["Description", "all_are", "on_slope", "served"]
+
+Word = TypeVar("Word")
+
+
+def on_slope(slope: float, g: float = 9.81) -> Vector3:
+    """Gravity in axes that lie on a slope: ``(g sin γ, −g cos γ, 0)``, so that +x walks downhill.
+
+    Angles published from the vertical become angles from the slope's normal by adding γ.
+
+    Parameters
+    ----------
+    slope : γ [rad], positive where +x goes down
+    g : [m/s²]
+    """
+    gamma, size = number(slope, "slope"), number(g, "g")
+    return (size * math.sin(gamma), -size * math.cos(gamma), 0.0)
+
+
+class Description:
+    """The words of a mechanism: bodies connected by joints, under forces and constraints.
+
+    `Model` is what users hold: this with all that follows from it. Topology and equations ask for these words alone.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        gravity: Any = (0.0, -9.81, 0.0),
+        cut: str | Iterable[str] = "auto",
+        tunable: Iterable[str] = (),
+    ) -> None:
+        self.name = _title(name)
+        self.gravity = gravity
+        self.cut: str | tuple[str, ...] = cut if isinstance(cut, str) else names_of(cut, f"cut of '{name}'")
+        self.tunable = names_of(tunable, f"tunable of '{name}'")
+        self.ground = Ground()
+        self.joints: list[Joint] = []
+        self.forces: list[Force] = []
+        self.constraints: list[Constraint] = []
+        self.controllers: list[Controller] = []
+
+    # the three verbs ----------------------------------------------------------------------------------------------
+    def connect(self, *joints: Joint) -> None:
+        """Add joints, and with them the bodies that they connect."""
+        example = "connect takes joints such as mbd.Revolute('knee', thigh.end, shank.start)"
+        self.joints += all_are(Joint, joints, example)
+
+    def constrain(self, *constraints: Constraint) -> None:
+        """Add constraints and events.
+
+        Raises
+        ------
+        ModelError
+            for what is no constraint, or a class of one's own that lacks what the equations ask it for, by name.
+        """
+        example = (
+            "constrain takes constraints such as mbd.Unilateral('foot', mbd.touchdown(shank.end)), and events; "
+            "forces and controllers go to apply"
+        )
+        self.constraints += served(all_are(Constraint, constraints, example))
+
+    def apply(self, *forces: Force | Controller) -> None:
+        """Add forces and controllers."""
+        example = "apply takes forces such as mbd.Motor('drive', hip, torque=1.0), and controllers"
+        known = all_are((Force, Controller), forces, example)
+        self.forces += [word for word in known if isinstance(word, Force)]
+        self.controllers += [word for word in known if isinstance(word, Controller)]
+
+    # what it contains ---------------------------------------------------------------------------------------------
+    @property
+    def bodies(self) -> dict[str, Body]:
+        """The ground and the bodies in the order in which joints first named them; then bodies named elsewhere."""
+        result: dict[str, Body] = {self.ground.name: self.ground}
+        for frame in self.points():
+            result.setdefault(frame.body.name, frame.body)
+        return result
+
+    @property
+    def frames(self) -> dict[str, Frame]:
+        """Every named frame by full name: those of the bodies, and the points that words refer to."""
+        result = {frame.full_name: frame for body in self.bodies.values() for frame in body.frames.values()}
+        for frame in self.points():
+            result.setdefault(frame.full_name, frame)
+        return result
+
+    @property
+    def gravity(self) -> Vector3:
+        """Gravity in ground axes [m/s²]; another one is checked as that of a new model."""
+        return self._gravity
+
+    @gravity.setter
+    def gravity(self, value: Any) -> None:
+        self._gravity = triple(value, f"gravity of '{self.name}'")
+
+    @property
+    def bilaterals(self) -> list[Constraint]:
+        """Constraints on positions that always act."""
+        return [word for word in self.constraints if word.kind == "bilateral"]
+
+    @property
+    def nonholonomic(self) -> list[Constraint]:
+        """Constraints on velocities, which always act."""
+        return [word for word in self.constraints if word.kind == "nonholonomic"]
+
+    @property
+    def contacts(self) -> list[Constraint]:
+        """Constraints that open and close, in order."""
+        return [word for word in self.constraints if word.kind in ("unilateral", "penalty")]
+
+    @property
+    def events(self) -> list[Event]:
+        """The user's own events."""
+        return [cast(Event, word) for word in self.constraints if word.kind == "event"]
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Every run-time parameter and its value in this description: {'left thigh.mass': 0.5, …}."""
+        result = {f"gravity.{axis}": value for axis, value in zip("xyz", self.gravity, strict=True)}
+        words: list[Body | Frame | Joint] = [*self.bodies.values(), *self.points(), *self.joints]
+        for word in words:
+            result |= word.parameters()
+        taken = {force.name for force in self.forces}  # one may be named like the spring that a joint could have
+        result = {name: value for name, value in result.items() if name.rpartition(".")[0] not in taken}
+        actions: list[Force | Constraint] = [*self.forces, *self.constraints]
+        for action in actions:
+            result |= action.parameters()
+        return result
+
+    def mentions(self) -> list[Mention]:
+        """The frames, joints and named quantities that forces and constraints refer to."""
+        words: list[Force | Constraint] = [*self.forces, *self.constraints]
+        return [mention for word in words for mention in word.mentions()]
+
+    def points(self) -> list[Frame]:
+        """The frames that joints, forces and constraints refer to."""
+        frames = [frame for joint in self.joints for frame in (joint.parent, joint.child)]
+        return frames + [mention for mention in self.mentions() if isinstance(mention, Frame)]
+
+    @property
+    def instants(self) -> list[float]:
+        """Times at which sampled signals have a kink, in order: steps end there [s]."""
+        words: list[Force | Constraint] = [*self.forces, *self.constraints]
+        return sorted({instant for word in words for instant in word.instants()})
+
+    def without(self, *names: str) -> Self:
+        """A copy that lacks some joints, constraints or effects.
+
+        Effects are those that `cost` lists: 'gravity', losses ('left knee loss', all of it), springs of joints, forces,
+        penalty contacts, and dry friction alone ('left knee friction', 'box friction'), which leaves the rest of the
+        loss or the contact.
+        """
+        model = copy.copy(self)
+        known = {"gravity"}
+        for kind in ("joints", "forces", "constraints", "controllers"):
+            words = getattr(self, kind)
+            known |= {word.name for word in words}
+            setattr(model, kind, [word for word in words if word.name not in names])
+        for place, joint in enumerate(model.joints):
+            changes = _bare(joint, self.tunable)
+            known |= set(changes)
+            for effect in [effect for effect in changes if effect in names]:
+                changes = _bare(model.joints[place], self.tunable)  # a second friction is left out beside the first
+                if effect in changes:
+                    model.joints[place] = replace(model.joints[place], **changes[effect])  # type: ignore[type-var]
+        for place, word in reversed(list(enumerate(model.constraints))):
+            parts = word.bare()
+            known |= set(parts)
+            left = [parts[effect] for effect in parts if effect in names] or [word]
+            model.constraints[place : place + 1] = [each for each in left[-1:] if each is not None]
+        if "gravity" in names:
+            model.gravity = (0.0, 0.0, 0.0)
+        for name in names:
+            if name not in known:
+                raise UnknownNameError("without: " + nearest(name, known, "joint, loss, force or constraint"))
+        gone = set(self.parameters) - set(model.parameters)
+        gone |= {parameter for parameter in self.tunable if parameter.rpartition(".")[0] in names}
+        model.tunable = tuple(parameter for parameter in self.tunable if parameter not in gone)
+        return model
+
+    def with_tunable(self, *names: str) -> Self:
+        """A copy in which more parameters stay run-time inputs although they are 0 or ±1."""
+        model = copy.copy(self)
+        model.tunable = (*self.tunable, *names)
+        return model
+
+    def __repr__(self) -> str:
+        counts = {"bodies": len(self.bodies) - 1, "joints": len(self.joints), "forces": len(self.forces)}
+        counts["constraints"] = len(self.constraints)
+        said = ", ".join(f"{count} {kind}" for kind, count in counts.items())
+        return f"{type(self).__name__}({self.name!r}: {said})"
+
+
+def _bare(joint: Joint, tunable: Iterable[str]) -> dict[str, dict[str, Any]]:
+    """The effects of a joint by name, each with the fields of the joint that lacks it."""
+    found: dict[str, dict[str, Any]] = {name: {"loss": rest} for name, rest in joint.frictions().items()}
+    if joint.loss is not None:
+        found[f"{joint.name} loss"] = {"loss": None}
+    if joint.stiffness != 0.0 or f"{joint.name} spring.stiffness" in tunable:
+        found[f"{joint.name} spring"] = {"stiffness": 0.0}
+    return found
+
+
+def _title(name: Any) -> str:
+    if not isinstance(name, str) or not name.strip():
+        raise ModelError(f"Model needs a name as its first argument, such as Model('kneed walker'); got {name!r}")
+    return printable(name, "Model")
+
+
+def all_are(kind: Any, words: Iterable[Word], sentence: str) -> list[Word]:
+    """Words of a kind, or the sentence of what is expected."""
+    given = list(words)
+    for word in given:
+        if not isinstance(word, kind):
+            raise ModelError(f"{sentence}; got {word!r}")
+    return given
+
+
+def served(words: list[Constraint]) -> list[Constraint]:
+    """Constraints that equations and active-set manager can serve, or a `ModelError` of what the others lack."""
+    lacking = [fault for word in words for fault in word.missing()]
+    if lacking:
+        raise ModelError(lacking)
+    return words
