@@ -78,7 +78,5 @@ def conditions(mechanism: Mechanism, values: Mapping[str, float], rates: bool) -
         if function is None:
             function = scalar_function([node, *gradient(node, inputs)], mechanism.layout, "condition")
             mechanism.named[key] = function
-        shown = name in wrapped or name not in turns  # by a rotation, modulo a turn
-        periodic = not rates and shown and name.rpartition(".")[2] in ("angle", "first", "second")
-        found.append(Condition(name, float(target), periodic, function))
+        found.append(Condition(name, float(target), not rates and name in wrapped, function))  # modulo a turn
     return found, wrong

@@ -122,7 +122,7 @@ def _wrapped(scope: Surroundings, equations: Equations, model: Description) -> l
         known = scope.joint(joint.name).coordinates if joint.labels and joint.is_vector else ()
         for k, value in enumerate(known):
             node = scope.real(value)
-            if any(each.op == "atan2" for each in live([node])):
+            if scope.is_wrapped(joint, k, node):
                 angles[node.index] = joint.name, k
     if not angles:
         return []

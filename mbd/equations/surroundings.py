@@ -243,11 +243,23 @@ class Surroundings(ParameterScope):
             motion = self.joint(joint.name) if joint.labels and joint.is_vector else JointMotion((), ())
             for k, value in enumerate(motion.coordinates):
                 node = self.real(value)
-                if joint.labels[k].unit == "rad" and any(each.op == "atan2" for each in live([node])):
+                if self.is_wrapped(joint, k, node):
                     anchor = first + len(self.wrapped)
                     angle = node + (2.0 * math.pi) * self.tape.input("anchor", anchor)
                     name, rate = joint.coordinate_names[k], self.real(motion.rates[k])
                     self.wrapped[joint.name, k] = Turn(name, joint.name, anchor, angle, 1.0, rate)
+
+    def is_wrapped(self, joint: Joint, k: int, angle: Node) -> bool:
+        """Whether a rotation alone shows an angle of a cut joint, so that it is known up to whole turns.
+
+        That of a thread is not: the shift tells its turns.
+        """
+        if joint.labels[k].unit != "rad" or not any(each.op == "atan2" for each in live([angle])):
+            return False
+        R, p = placeholders(self.tape)
+        shifts = {self.tape.lift(part).index for part in p}
+        shown = self.tape.lift(joint.recover(R, p, self)[k])
+        return not any(each.index in shifts for each in live([shown]))
 
     def _holds_points(self, joint: Joint) -> bool:
         """Whether the rows that depend on p are its three components."""

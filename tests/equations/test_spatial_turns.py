@@ -126,3 +126,36 @@ def test_turns_between_rows_too_far_apart_are_told_to_be_a_guess():
     notes = [spun(model, 1.0, start, **settings).stats["notes"] for settings in ({}, {"store": 17})]
     told = [any("whole turns are a guess of 'hinge.angle'" in note for note in each) for each in notes]
     assert told == [False, True]
+
+
+def press(cut, pitch, wound):
+    """A nut on a thread along an inclined axis, held up by a guide: one degree of freedom, in a loop."""
+    model = mbd.Model("press", gravity=(0.3, -2.0, 0.5), cut=cut)
+    nut = mbd.RigidBody("nut", mass=1.0, inertia=(0.02, 0.03, 0.025))
+    head = mbd.RigidBody("head", mass=0.7, inertia=(0.02, 0.02, 0.02))
+    model.connect(
+        mbd.Screw("thread", model.ground.origin, nut.origin, pitch=pitch, axis=Z),
+        mbd.Revolute("collar", nut.origin, head.origin, axis=Z),
+        mbd.Prismatic("guide", model.ground.point(0.2, 0.0, 0.1), head.point(0.2, 0.0, 0.1), axis=Z),
+    )
+    if wound:
+        model.apply(mbd.TorsionSpring("winding", model.joints[0], stiffness=0.8, rest=1.0))
+    return model
+
+
+@pytest.mark.parametrize("wound", [False, True])
+def test_a_thread_that_is_cut_tells_its_turns_by_its_shift(wound):
+    """No angle of it is another's modulo a turn: starts, springs and results see the one that belongs to the shift."""
+    rng = np.random.default_rng(7)
+    for _ in range(2):
+        pitch, angle = float(rng.choice([-1.0, 1.0]) * rng.uniform(0.05, 0.4)), float(rng.uniform(-25.0, 25.0))
+        ends = []
+        for cut in ["collar"], ["thread"]:
+            model = press(cut, pitch, wound)
+            start = mbd.assemble(model, position={"thread.angle": angle}, velocity={"thread.angle": 9.0})
+            run = mbd.simulate(model, start, mbd.RadauIIA(), dt=0.02, until=0.3, backend="python")
+            assert run["thread.angle"][0] == pytest.approx(angle, abs=1e-8)
+            shift = pitch * run["thread.angle"] / (2.0 * np.pi)
+            np.testing.assert_allclose(run["guide.displacement"], shift, atol=1e-8)
+            ends.append(run["thread.angle"][-1])
+        assert ends[1] == pytest.approx(ends[0], abs=1e-6)
