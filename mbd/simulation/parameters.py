@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import cached_property
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,88 +12,95 @@ from mbd.assembly.assemble import undetermined
 from mbd.assembly.consistency import residuals, violations
 from mbd.assembly.posture import Posture
 from mbd.assembly.trivial_rows import trivial_rows
-from mbd.bodies.domains import ParameterCheck
 from mbd.compile.mechanism import Mechanism
-from mbd.errors import ModelError
+from mbd.errors import ModelError, SimulationError
+from mbd.kernel import fields as F
+from mbd.simulation.run.data import RunData
 from mbd.tape.derivatives import live
 from mbd.tape.node import Node
 
-if TYPE_CHECKING:
-    from mbd.simulation.run.run import Run
-
-__all__ = ["ParameterJudge", "residuals_now", "violations_now"]
+__all__ = ["change_parameters", "residuals_now", "violations_now"]
 
 
-class ParameterJudge:
-    """What is wrong with new values of parameters at the present state of a run.
+def change_parameters(run: RunData, values: Mapping[str, float], what: str) -> None:
+    """New parameter values from now on; the scheme restarts from them if they differ.
 
-    Parameters
-    ----------
-    model, mechanism : those of the run
+    Raises
+    ------
+    SimulationError
+        for values with which the mechanism cannot go on; it keeps those that it has. `what` gives them.
     """
+    equations = run.mechanism.equations
+    present = {parameter.name: v for parameter, v in zip(equations.parameters, run.values["params"], strict=False)}
+    if all(present.get(name) == value for name, value in values.items()):
+        return
+    faults = parameter_faults(run, values)
+    if faults:
+        given = ", ".join(f"{name!r} to {value:g}" for name, value in values.items())
+        raise SimulationError(f"{what} sets {given}, which cannot be: {'; '.join(faults)}")
+    run.stepper.keep_row()
+    run.set_parameters({**run.changed, **values})
+    run.parameter_changes.append((run.stored + int(run.values["state"][F.STORED]), run.values["params"].copy()))
+    run.values["state"][F.RESTART] = 1
 
-    def __init__(self, model: Any, mechanism: Mechanism) -> None:
-        self._model, self._mechanism = model, mechanism
 
-    @cached_property
-    def _check(self) -> ParameterCheck:
-        check: ParameterCheck = self._model.parameter_check()
-        return check
+def parameter_faults(run: RunData, values: Mapping[str, float]) -> list[str]:
+    """What is wrong with new values of parameters at the present state of a run, one sentence each.
 
-    @cached_property
-    def _inert(self) -> frozenset[str]:
-        """Names of the parameters on which the kinetic energy, and with it the mass matrix, depends."""
-        return self._in([self._mechanism.equations.kinetic])
-
-    @cached_property
-    def _binding(self) -> frozenset[str]:
-        """Names of the parameters on which rows depend."""
-        return self._in([node for row in self._mechanism.equations.rows for node in (row.value, row.rate)])
-
-    def _in(self, nodes: Sequence[Node]) -> frozenset[str]:
-        """Names of the parameters in some expressions."""
-        places = {n.data[1] for n in live(nodes) if n.op == "input" and n.data[0] == "p"}
-        return frozenset(p.name for k, p in enumerate(self._mechanism.equations.parameters) if k in places)
-
-    def faults(self, run: Run, values: Mapping[str, float]) -> list[str]:
-        """One sentence for each; of the state only what the values may have changed is looked at."""
-        changed = {**run.changed, **values}
-        found = self._check.faults(changed, values)
-        if found or (self._inert.isdisjoint(values) and self._binding.isdisjoint(values)):
-            return found
-        parameters = self._mechanism.parameters(changed, self._model.parameters)
-        if not self._inert.isdisjoint(values):
-            v = run.values
-            q, y, anchors = v["q"][: v["n_q"]].copy(), v["y"][: v["n"]].copy(), np.array(v["anchors"])
-            flags = v["closed"][: v["n_contacts"]]
-            found = undetermined(Posture(self._mechanism, run.manager, parameters, q, y, flags, anchors, time=run.now))
-        if not found and not self._binding.isdisjoint(values):
-            found = violations_now(run, residuals_now(run, parameters), residuals_now(run)[:2])
-            found = found or self._trivial(run, parameters)
+    Of the state only what the values may have changed is looked at.
+    """
+    changed, mechanism = {**run.changed, **values}, run.mechanism
+    found: list[str] = run.parameter_check.faults(changed, values)
+    equations = mechanism.equations
+    inert = not _in(mechanism, "inertia", [equations.kinetic]).isdisjoint(values)
+    rows = [node for row in equations.rows for node in (row.value, row.rate)]
+    binding = not _in(mechanism, "rows", rows).isdisjoint(values)
+    if found or not (inert or binding):
         return found
-
-    def _trivial(self, run: Run, parameters: Vector) -> list[str]:
-        """Rows that held whatever the motion and do not with these values, or the other way round."""
-        try:
-            changed = sorted(trivial_rows(self._mechanism, parameters) ^ run.manager.trivial)
-        except ModelError as error:
-            return [str(error)]
-        rows = self._mechanism.equations.rows
-        return [
-            f"{rows[k].title} {'no longer holds' if k in run.manager.trivial else 'now holds'} whatever the motion: "
-            "the mechanism is another; start a run with these values"
-            for k in changed
-        ]
+    parameters = mechanism.parameters(changed, run.model.parameters)
+    if inert:
+        v = run.values
+        q, y, anchors = v["q"][: v["n_q"]].copy(), v["y"][: v["n"]].copy(), np.array(v["anchors"])
+        flags = v["closed"][: v["n_contacts"]]
+        found = undetermined(Posture(mechanism, run.manager, parameters, q, y, flags, anchors, time=run.now))
+    if not found and binding:
+        found = violations_now(run, residuals_now(run, parameters), residuals_now(run)[:2])
+        found = found or _no_longer_trivial(run, parameters)
+    return found
 
 
-def residuals_now(run: Run, parameters: Vector | None = None) -> NDArray[np.float64]:
+def _in(mechanism: Mechanism, what: str, nodes: Sequence[Node]) -> frozenset[str]:
+    """Names of the parameters in some expressions of a mechanism, which are looked through once."""
+    known: frozenset[str] | None = mechanism.named.get(f"parameters that enter {what}")
+    if known is None:
+        places = {n.data[1] for n in live(nodes) if n.op == "input" and n.data[0] == "p"}
+        known = frozenset(p.name for k, p in enumerate(mechanism.equations.parameters) if k in places)
+        mechanism.named[f"parameters that enter {what}"] = known
+    return known
+
+
+def _no_longer_trivial(run: RunData, parameters: Vector) -> list[str]:
+    """Rows that held whatever the motion and do not with these values, or the other way round."""
+    try:
+        changed = sorted(trivial_rows(run.mechanism, parameters) ^ run.manager.trivial)
+    except ModelError as error:
+        return [str(error)]
+    rows = run.mechanism.equations.rows
+    return [
+        f"{rows[k].title} {'no longer holds' if k in run.manager.trivial else 'now holds'} whatever the motion: "
+        "the mechanism is another; start a run with these values"
+        for k in changed
+    ]
+
+
+def residuals_now(run: RunData, parameters: Vector | None = None) -> NDArray[np.float64]:
     """Residuals (`mbd.assembly.consistency`) of the accepted state, with other values of parameters if given."""
     v = run.values
     q, y, anchors = v["q"][: v["n_q"]], v["y"][: v["n"]], v["anchors"][: v["n_anchors"]]
     return residuals(run.mechanism, run.now, q, y, v["params"] if parameters is None else parameters, anchors)
 
 
-def violations_now(run: Run, found: NDArray[np.float64], usual: NDArray[np.float64] | None = None) -> list[str]:
+def violations_now(run: RunData, found: NDArray[np.float64], usual: NDArray[np.float64] | None = None) -> list[str]:
     """`mbd.assembly.consistency.violations` of the rows that are active now."""
     v = run.values
     active = run.manager.active_rows(v["closed"][: v["n_contacts"]])

@@ -12,7 +12,7 @@ from hypothesis import given, settings, strategies as st
 
 import mbd
 from mbd import free_memory as free
-from mbd.simulation.run import room, run as running
+from mbd.simulation.run import data as running, room
 from mbd.simulation.tolerance import calibrate as tolerance
 from tests.simulation.mechanisms import falling
 
@@ -101,7 +101,7 @@ import resource, sys
 import numpy as np
 import mbd
 from mbd import free_memory as free
-from mbd.simulation.run import room, run as running
+from mbd.simulation.run import room, data as running
 from tests.simulation.mechanisms import falling
 
 model, _ = falling(mass=1.0)

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mbd.arrays import Vector
 from mbd.results.record import Record
 from mbd.simulation.diagnostics.fastest import free_motions, matrices
-
-if TYPE_CHECKING:
-    from mbd.simulation.run.run import Run
+from mbd.simulation.run.data import RunData
 
 __all__ = ["dt_of_blows"]
 
 
-def dt_of_blows(run: Run, record: Record, number: int, rows: Iterable[int]) -> float:
+def dt_of_blows(run: RunData, record: Record, number: int, rows: Iterable[int]) -> float:
     """A fifth of the time until the deepest point of the blows of contact `number` that begin at some rows [s].
 
     With the effective mass ``1/(J M⁻¹ Jᵀ)`` along the rows that hold, J = ∂ġ/∂v, and the approach speed there; infinite
@@ -37,7 +34,7 @@ def dt_of_blows(run: Run, record: Record, number: int, rows: Iterable[int]) -> f
     return float(found)
 
 
-def _approach(run: Run, record: Record, number: int, row: int) -> tuple[float, float]:
+def _approach(run: RunData, record: Record, number: int, row: int) -> tuple[float, float]:
     """(approach speed [m/s, rad/s], effective mass [kg, kg m²]) of a contact at a row; zeros where not known."""
     y, n_v = np.concatenate([record.v[row], record.z[row]]), record.v.shape[1]
     rate = _gap_rate(run, record, number, row, y)
@@ -54,7 +51,7 @@ def _approach(run: Run, record: Record, number: int, row: int) -> tuple[float, f
     return -rate, float(1.0 / (along @ np.linalg.lstsq(free.T @ found.M @ free, along)[0]))
 
 
-def _gap_rate(run: Run, record: Record, number: int, row: int, y: Vector) -> float:
+def _gap_rate(run: RunData, record: Record, number: int, row: int, y: Vector) -> float:
     anchors = run.values["anchors"][: run.values["n_anchors"]]
     block = run.mechanism.block(float(record.time[row]), record.q[row], y, anchors)
     out = np.zeros(run.mechanism.sizes["guards"])

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from mbd.kernel import fields as F
 from mbd.results.record import Record
 from mbd.simulation.diagnostics.fastest import resolving_dt
-
-if TYPE_CHECKING:
-    from mbd.simulation.run.run import Run
+from mbd.simulation.run.data import RunData
 
 __all__ = ["coarse_steps"]
 
@@ -21,7 +17,7 @@ BLIND = 0.1
 """Step that is asked for, over the present one, where forces tell nothing [-]."""
 
 
-def coarse_steps(run: Run, record: Record) -> list[str]:
+def coarse_steps(run: RunData, record: Record) -> list[str]:
     """The note on steps whose estimated errors of rates are more than a fifth of the rates; [] if there are none.
 
     A scheme of any order passes over a wall that is thinner than a step, as if it were elsewhere: the energy may be
@@ -42,7 +38,7 @@ def coarse_steps(run: Run, record: Record) -> list[str]:
     ]
 
 
-def _asked(run: Run, record: Record, row: int) -> float:
+def _asked(run: RunData, record: Record, row: int) -> float:
     """The step that resolves the steepest change of forces between a row and the one before [s].
 
     ``ω² = max |Δa|/|Δq|`` along the cubic through both rows, as far as the kinetic energy reaches against the forces.

@@ -30,7 +30,8 @@ from mbd.simulation.run.stored import record_of, whole_record
 
 if TYPE_CHECKING:
     from mbd.results.ledger import Ledger
-    from mbd.simulation.run.run import Run
+
+from mbd.simulation.run.data import EnergyFindings, RunData
 
 __all__ = ["EnergyWatch", "Judgement", "judgement"]
 
@@ -108,31 +109,27 @@ def judgement(ledger: Ledger, doubt: Matrix, way: Vector, lending: Container[str
     return Judgement(-1, most if most >= least else -least, float(owned[-1]))
 
 
-class EnergyWatch:
+class EnergyWatch(EnergyFindings):
     """Looks at the energy of a run now and then.
 
     Attributes
     ----------
-    problem, note : what was found, in a sentence; '' if nothing
-    row : the first from which on the energy is the scheme's own, −1 if there is none
-    share : of the energy that the mechanism had, what the scheme gave (positive) or took [-]
     rows, ledgers : rows in which T + V was evaluated, and ledgers made
     """
 
     def __init__(self) -> None:
-        self.problem = self.note = ""
-        self.share, self.row = 0.0, -1
+        super().__init__()
         self.rows = self.ledgers = 0
         self._due, self._looks, self._upto = FIRST_LOOK, 0, 0
         self._seen = np.zeros((0, 3))  # T, V and the way of the fastest coordinate, of the rows looked at so far
         self._cleared = 0.0  # a rise of energy that a ledger has explained
 
-    def is_due(self, run: Run) -> bool:
+    def is_due(self, run: RunData) -> bool:
         """Whether a run that goes on is to be looked at now."""
         return run.stored >= self._due and self._looks < LOOKS
 
     @np.errstate(all="ignore")
-    def judge(self, run: Run) -> str:
+    def judge(self, run: RunData) -> str:
         """Look at the run as far as it is stored; a sentence if the energy is the scheme's own, '' otherwise."""
         if self.problem or run.stored < 2 or run.values["n_v"] == 0:
             return self.problem
@@ -157,7 +154,7 @@ class EnergyWatch:
             self.note, self.share = _note(found), found.share
         return self.problem
 
-    def _look(self, run: Run) -> None:
+    def _look(self, run: RunData) -> None:
         """Evaluate T and V at some rows that were not looked at yet."""
         last = run.stored - 1
         first, early = min(self._upto, last), EARLY if self._looks == 0 else ()
@@ -172,7 +169,7 @@ class EnergyWatch:
         self.rows += len(chosen)
         self._upto, self._due, self._looks = run.stored, 4 * max(self._due, run.stored // 4), self._looks + 1
 
-    def _overflow(self, run: Run) -> None:
+    def _overflow(self, run: RunData) -> None:
         """Energies beyond the largest number: the scheme's own where the run began with less, else not judged."""
         top = float(np.max(np.abs(run.table[run.stored - 1, 1 + run.values["n_q"] :][: run.values["n_v"]])))
         if np.isfinite(self._seen[0, 0]):
@@ -187,7 +184,7 @@ class EnergyWatch:
                 "and the run was not judged by them; use larger units"
             )
 
-    def _undefined(self, run: Run) -> None:
+    def _undefined(self, run: RunData) -> None:
         """A potential that has no value where the motion has got: it has passed a pole, which no motion does."""
         columns = ModelColumns(whole_record(run), run.mechanism.equations)
         effects = run.mechanism.equations.effects
@@ -202,7 +199,7 @@ class EnergyWatch:
             "smaller dt to see what happens there, or a potential that is defined wherever the motion goes"
         )
 
-    def _looks_strange(self, run: Run) -> bool:
+    def _looks_strange(self, run: RunData) -> bool:
         """Whether only the ledger can tell that the energies seen are right."""
         kinetic, potential, way = self._seen.T
         if np.max(way) <= MOVED:
@@ -241,13 +238,13 @@ def _kinds(mechanism: Mechanism) -> frozenset[str]:
     return KINDS[mechanism]
 
 
-def _lending(run: Run) -> frozenset[str]:
+def _lending(run: RunData) -> frozenset[str]:
     """Penalty contacts that were open at the start and whose numbers did not change."""
     contacts = () if run.parameter_changes else run.manager.contacts
     return frozenset(each.name for each in contacts if each.kind == "penalty" and each.name not in run.start.mode)
 
 
-def _sentence(run: Run, found: Judgement) -> str:
+def _sentence(run: RunData, found: Judgement) -> str:
     """Since when, how much, which coordinate moves fastest, and what to try."""
     v = run.values
     table = run.table[: found.row + 1]

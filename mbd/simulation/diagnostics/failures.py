@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,13 +17,11 @@ from mbd.simulation.diagnostics.grip import lost_grip
 from mbd.simulation.diagnostics.jamming import may_jam
 from mbd.simulation.diagnostics.redundant import clash
 from mbd.simulation.diagnostics.round_off import remainder
+from mbd.simulation.run.data import RunData
 from mbd.simulation.run.lengths import RUNGE_KUTTA
 from mbd.simulation.run.stepper import Stepper
 from mbd.state import State
 from mbd.tape.evaluate import evaluate
-
-if TYPE_CHECKING:
-    from mbd.simulation.run.run import Run
 
 __all__ = ["attempt", "crowded", "explanation"]
 
@@ -42,7 +39,7 @@ LATEST = 12
 """Events that a failure tells."""
 
 
-def attempt(run: Run) -> Callable[[str, State], Failure]:
+def attempt(run: RunData) -> Callable[[str, State], Failure]:
     """What a run has just tried, noted before it is taken back; the failure, given its sentence and the state kept."""
     v = run.values
     newton = v["detail"][0] > run.now and v["block"][0] == v["detail"][0]
@@ -62,7 +59,7 @@ def attempt(run: Run) -> Callable[[str, State], Failure]:
     return failure
 
 
-def _iterate(run: Run, time: float) -> State:
+def _iterate(run: RunData, time: float) -> State:
     """Newton's last iterate, which is in the block."""
     block, layout, system = run.values["block"], run.mechanism.layout, run.stepper.system
     y = block[layout.v : layout.a].copy()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,10 +12,8 @@ from mbd.constraints.penalty_parameters import STEPS_OF_APPROACH
 from mbd.integrators.base import Point
 from mbd.kernel import fields as F
 from mbd.results.record import Record
+from mbd.simulation.run.data import RunData
 from mbd.simulation.run.lengths import RUNGE_KUTTA
-
-if TYPE_CHECKING:
-    from mbd.simulation.run.run import Run
 
 __all__ = ["Matrices", "fastest", "free_motions", "matrices", "resolving_dt", "sane_rows", "stability"]
 
@@ -30,7 +27,7 @@ SANE = 1e6
 """Growth of speeds since the start above which a state is no longer one of the mechanism [-]."""
 
 
-def fastest(run: Run, record: Record, rows: Iterable[int]) -> float:
+def fastest(run: RunData, record: Record, rows: Iterable[int]) -> float:
     """Largest |s| of the small motions ``exp(s t)`` about some of a run's rows [1/s]; 0 where that cannot be told.
 
     Of ``M δv̇ + C δv + K δq = 0`` along the rows that hold: ``ω = √(k/m)`` of a spring, ``c/m`` of a strong damper.
@@ -52,7 +49,7 @@ class Matrices:
     B: Matrix
 
 
-def matrices(run: Run, record: Record, row: int) -> Matrices | None:
+def matrices(run: RunData, record: Record, row: int) -> Matrices | None:
     """Those at a row of a run; None where they cannot be evaluated, or are too large to derive them for this alone."""
     system = run.stepper.system
     if run.values["n"] > LARGEST:
@@ -79,7 +76,7 @@ def free_motions(B: Matrix, n: int) -> Matrix:
     return np.asarray(right[int(np.sum(sizes > 1e-9 * max(sizes[0], 1e-300))) :].T)
 
 
-def _at(run: Run, record: Record, row: int) -> float:
+def _at(run: RunData, record: Record, row: int) -> float:
     """Spectral radius of the state matrix of M, C, K on the motions that the rows leave free."""
     found = matrices(run, record, row)
     if found is None:
@@ -102,7 +99,7 @@ def resolving_dt(rate: float) -> float:
     return float(np.pi / 2.0 / rate / STEPS_OF_APPROACH)
 
 
-def sane_rows(run: Run) -> list[int]:
+def sane_rows(run: RunData) -> list[int]:
     """Some rows until speeds have grown absurdly, or the energy is the scheme's own."""
     n_q, n_v = run.values["n_q"], run.values["n_v"]
     speeds: Vector = np.max(np.abs(run.table[: run.stored, 1 + n_q : 1 + n_q + n_v]), axis=1, initial=0.0)
@@ -113,7 +110,7 @@ def sane_rows(run: Run) -> list[int]:
     return sorted(set(np.linspace(0, last - 1, LOOKED_AT).astype(int).tolist())) if last > 0 else []
 
 
-def stability(run: Run, record: Record) -> str:
+def stability(run: RunData, record: Record) -> str:
     """What bounds dt, where an explicit scheme took steps above its limit of stability; '' elsewhere."""
     if run.values["scheme"] != RUNGE_KUTTA or run.values["adaptive"] or run.values["state"][F.MODE] < 0:
         return ""

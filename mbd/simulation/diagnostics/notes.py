@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,10 +19,8 @@ from mbd.simulation.diagnostics.fastest import fastest, resolving_dt, sane_rows
 from mbd.simulation.diagnostics.redundant import redundancy
 from mbd.simulation.diagnostics.singular import singular_start
 from mbd.simulation.diagnostics.turning import blocks, unresolved_turns
+from mbd.simulation.run.data import RunData
 from mbd.simulation.run.stored import record_of
-
-if TYPE_CHECKING:
-    from mbd.simulation.run.run import Run
 
 __all__ = ["notes_of"]
 
@@ -88,7 +85,7 @@ COUNTED = (
 """Places of the kernel's counts, and what to say where they are not zero."""
 
 
-def notes_of(run: Run, record: Record) -> tuple[list[str], list[str]]:
+def notes_of(run: RunData, record: Record) -> tuple[list[str], list[str]]:
     """The notes of a run that is over, in sentences, and those of them that put its result in doubt."""
     notes = [*run.mechanism.notes, *getattr(run.mechanism.common, "notes", ())]
     equations = run.mechanism.equations
@@ -125,7 +122,7 @@ def notes_of(run: Run, record: Record) -> tuple[list[str], list[str]]:
     return notes, doubts
 
 
-def _left_singular(run: Run) -> bool:
+def _left_singular(run: RunData) -> bool:
     """Whether rows that depended on each other act still and are independent now: so the configuration was singular."""
     v = run.values
     acting = run.manager.active_rows(v["closed"][: v["n_contacts"]], v["sticks"][: v["n_frictions"]])
@@ -135,7 +132,7 @@ def _left_singular(run: Run) -> bool:
     )
 
 
-def _uncounted(run: Run, record: Record) -> list[str]:
+def _uncounted(run: RunData, record: Record) -> list[str]:
     """The note on angles of cut joints in space that may have made more turns than their rates at the rows tell."""
     if not run.mechanism.equations.wrapped:
         return []
@@ -144,7 +141,7 @@ def _uncounted(run: Run, record: Record) -> list[str]:
     return [f"whole turns are a guess of {told}: store more rows, take a smaller dt, or do not cut it"] if found else []
 
 
-def _energy_lost(run: Run, record: Record) -> list[str]:
+def _energy_lost(run: RunData, record: Record) -> list[str]:
     """The note on the energy with the dt that resolves the fastest motion, where most of the energy is gone."""
     if not run.energy.share < -TAKEN or run.values["adaptive"]:
         return []
@@ -153,7 +150,7 @@ def _energy_lost(run: Run, record: Record) -> list[str]:
     return [run.energy.note + (f"{told}{resolving_dt(rate):.2g} s does" if rate * run.dt > 1.0 else "")]
 
 
-def _ignored(run: Run, number: int, contact: Contact) -> list[str]:
+def _ignored(run: RunData, number: int, contact: Contact) -> list[str]:
     """A contact that lay below its surface or went into it while it was left out on purpose."""
     deepest, sinking = run.values["deepest"][number], run.values["sinking"][number]
     notes = []
@@ -183,7 +180,7 @@ def _pulled(record: Record, number: int, contact: Contact) -> list[str]:
     ]
 
 
-def _overshot(run: Run, columns: ModelColumns, contact: Contact) -> list[str]:
+def _overshot(run: RunData, columns: ModelColumns, contact: Contact) -> list[str]:
     """A located contact that closes below its surface: it was passed in a step too long to see it come."""
     if contact.kind == "penalty" or run.values["strategy"] == 1 or run.values["linear"] == 1:
         return []
@@ -202,7 +199,7 @@ def _overshot(run: Run, columns: ModelColumns, contact: Contact) -> list[str]:
     ]
 
 
-def _short_touch(run: Run, record: Record, number: int, contact: Contact) -> tuple[list[str], list[str]]:
+def _short_touch(run: RunData, record: Record, number: int, contact: Contact) -> tuple[list[str], list[str]]:
     """A penalty contact over within a few steps is not resolved: its energy is anyone's guess. (note, doubt)"""
     if contact.kind != "penalty" or run.values["adaptive"]:
         return [], []
@@ -239,7 +236,7 @@ def _closings(record: Record, events: Sequence[EventRecord]) -> list[int]:
     return [min(event.row, last) for event in events if event.kind == "closed"]
 
 
-def _halved(run: Run, contact: Contact, row: int) -> float:
+def _halved(run: RunData, contact: Contact, row: int) -> float:
     """Time from the row in which a contact closed until it approaches half as fast, by the rows stored [s].
 
     Infinite where that takes longer than a resolved blow, or the run ends before.

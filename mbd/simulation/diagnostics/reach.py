@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from mbd.assembly.conflicts import Conflict, loops_of
 from mbd.assembly.infeasibility import position_conflicts
 from mbd.assembly.posture import TOLERANCE, Posture, close_positions, position_rows
 from mbd.kernel import fields as F
-
-if TYPE_CHECKING:
-    from mbd.simulation.run.run import Run
+from mbd.simulation.run.data import RunData
 
 __all__ = ["out_of_reach"]
 
@@ -27,7 +23,7 @@ STEP_FAILURES = frozenset(
 """What steps fail with next to such a limit."""
 
 
-def out_of_reach(run: Run, status: int) -> str:
+def out_of_reach(run: RunData, status: int) -> str:
     """A sentence on the constraints that cannot hold together soon after the accepted state, '' if none.
 
     A linkage that a driver pulls to its limit ends next to a singular configuration, where steps fail for reasons of
@@ -41,7 +37,7 @@ def out_of_reach(run: Run, status: int) -> str:
         return ""
 
 
-def _first_conflict(run: Run) -> str:
+def _first_conflict(run: RunData) -> str:
     """The same of rows that follow time."""
     for steps in AHEAD:
         found = _conflict(run, steps * run.dt)
@@ -50,14 +46,14 @@ def _first_conflict(run: Run) -> str:
     return ""
 
 
-def _follows_time(run: Run) -> bool:
+def _follows_time(run: RunData) -> bool:
     """Whether a row on positions that acts changes with time while nothing moves."""
     rows = position_rows(_posture(run, 0.0))
     off = [np.max(np.abs(_heights(_posture(run, ahead * run.dt), rows)), initial=0.0) for ahead in AHEAD]
     return bool(rows) and bool(np.isfinite(off).all()) and max(off) > TOLERANCE
 
 
-def _posture(run: Run, ahead: float) -> Posture:
+def _posture(run: RunData, ahead: float) -> Posture:
     """The accepted positions at a later time."""
     v = run.values
     return Posture(
@@ -72,13 +68,13 @@ def _heights(work: Posture, rows: list[int]) -> np.ndarray:
     return np.asarray(terms.h[rows])
 
 
-def _closes(run: Run, ahead: float) -> bool:
+def _closes(run: RunData, ahead: float) -> bool:
     work = _posture(run, ahead)
     left = close_positions(work, position_rows(work), np.ones(work.equations.n_v, dtype=bool))
     return bool(np.max(np.abs(left), initial=0.0) <= TOLERANCE)
 
 
-def _conflict(run: Run, ahead: float) -> Conflict | None:
+def _conflict(run: RunData, ahead: float) -> Conflict | None:
     """The first irreducible set of constraints that no position satisfies at a later time."""
     if _closes(run, ahead):
         return None

@@ -11,7 +11,8 @@ from mbd.kernel import fields as F
 
 if TYPE_CHECKING:
     from mbd.compile.mechanism import AccelerationTerms
-    from mbd.simulation.run.run import Run
+
+from mbd.simulation.run.data import RunData
 
 __all__ = ["at_singular_configuration", "singular_start"]
 
@@ -38,7 +39,7 @@ WORDS = {
 """What happens, by the kernel's kind of guard."""
 
 
-def at_singular_configuration(run: Run, status: int) -> str:
+def at_singular_configuration(run: RunData, status: int) -> str:
     """A sentence on what is to happen where constraints depend on each other for an instant, '' if nothing is.
 
     Such a configuration is stepped over. It cannot be stepped to: the velocities across the motion follow from
@@ -61,7 +62,7 @@ def at_singular_configuration(run: Run, status: int) -> str:
     return _sentence(run, run.now + away, row, cause, "") if cause else ""
 
 
-def _sentence(run: Run, time: float, row: int, cause: str, share: str) -> str:
+def _sentence(run: RunData, time: float, row: int, cause: str, share: str) -> str:
     """The sentence; `row` counts among those that are stepped with."""
     v = run.values
     title = run.mechanism.equations.rows[int(v["rows"][min(max(row, 0), int(v["state"][F.ROWS]) - 1)])].title
@@ -76,7 +77,7 @@ def _sentence(run: Run, time: float, row: int, cause: str, share: str) -> str:
     )
 
 
-def _guard(run: Run, kind: int, index: int) -> str:
+def _guard(run: RunData, kind: int, index: int) -> str:
     """What a guard of the kernel is, in words."""
     manager = run.manager
     if kind == F.CROSS:
@@ -88,7 +89,7 @@ def _guard(run: Run, kind: int, index: int) -> str:
     return "the " + WORDS[kind].format(name)
 
 
-def _boundary(run: Run, most: float) -> tuple[str, float]:
+def _boundary(run: RunData, most: float) -> tuple[str, float]:
     """The boundary of steps that comes next, and in what time; '' if it is further than `most`."""
     target, due = run.boundaries.next(run.end)
     away = target - run.now
@@ -97,7 +98,7 @@ def _boundary(run: Run, most: float) -> tuple[str, float]:
     return ("a sample of a controller or a jump of a signal" if due else "the end of the run"), away
 
 
-def _cause(run: Run, away: float) -> str:
+def _cause(run: RunData, away: float) -> str:
     """What is to happen at that time from now, '' if nothing is: a boundary, an event, a contact that closes."""
     v, near = run.values, CLOSE * run.dt
     cause, time = _boundary(run, np.inf)
@@ -113,7 +114,7 @@ def _cause(run: Run, away: float) -> str:
     return ""
 
 
-def _nearest(run: Run) -> tuple[float, int] | None:
+def _nearest(run: RunData) -> tuple[float, int] | None:
     """Time from now to a singular configuration within two steps, and the row that depends on the others there."""
     span = 2.0 * run.dt
     times = np.linspace(-span, span, 17)
@@ -131,7 +132,7 @@ def _nearest(run: Run) -> tuple[float, int] | None:
     return (float(place), row) if size < SMALL * max(sizes) else None
 
 
-def singular_start(run: Run) -> list[str]:
+def singular_start(run: RunData) -> list[str]:
     """A note where the run started at a singular configuration, or so close to one that round-off chose the branch."""
     v, start = run.values, run.start
     acting = run.manager.active_rows(run.manager.flags(start.mode.closed), np.zeros(v["n_frictions"]))
@@ -150,7 +151,7 @@ def singular_start(run: Run) -> list[str]:
     ]
 
 
-def _smallest(run: Run, ahead: float) -> tuple[float, int]:
+def _smallest(run: RunData, ahead: float) -> tuple[float, int]:
     """Smallest singular value of the rows that act, `ahead` along the motion, and the row with the largest part."""
     v, mechanism = run.values, run.mechanism
     n_v = v["n_v"]

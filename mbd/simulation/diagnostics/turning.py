@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,11 +12,9 @@ from mbd.compile.mechanism import Mechanism
 from mbd.compile.python import array_function
 from mbd.results.columns import ModelColumns
 from mbd.results.record import Record
+from mbd.simulation.run.data import RunData
 from mbd.simulation.run.lengths import RUNGE_KUTTA
 from mbd.tape.derivatives import live
-
-if TYPE_CHECKING:
-    from mbd.simulation.run.run import Run
 
 __all__ = ["blocks", "first_reversed", "overturned", "unresolved_turns"]
 
@@ -33,13 +30,13 @@ def blocks(values: Matrix) -> Iterator[Matrix]:
         yield values[first : first + BLOCK + 1]
 
 
-def overturned(run: Run) -> str:
+def overturned(run: RunData) -> str:
     """An angle at the end of a run that is too large to tell a pose, in a sentence; '' without one."""
     found = beyond_angles(run.mechanism.equations, run.values["q"][: run.values["n_q"]])
     return f"t = {run.now:.9g} s: {found[0]}: poses can no longer be told apart; end the run earlier" if found else ""
 
 
-def unresolved_turns(run: Run, record: Record) -> list[str]:
+def unresolved_turns(run: RunData, record: Record) -> list[str]:
     """A note on each angle that turns by more than half a turn in a step, where the motion follows from the angle.
 
     Forces are then read at instants that may fall on the same angle again and again. Steps that follow a tolerance, and

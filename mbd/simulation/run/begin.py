@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,16 +14,14 @@ from mbd.assembly.posture import Posture
 from mbd.errors import ModelError
 from mbd.kernel import fields as F
 from mbd.simulation.parameters import residuals_now, violations_now
+from mbd.simulation.run.data import RunData
 from mbd.simulation.run.memory import memory_of_end
 from mbd.state import State
-
-if TYPE_CHECKING:
-    from mbd.simulation.run.run import Run
 
 __all__ = ["begin", "check_rank", "guard_values", "notify", "require_consistent", "set_side"]
 
 
-def notify(run: Run) -> None:
+def notify(run: RunData) -> None:
     """Of which contacts and events Python must hear."""
     told = run.values["notify"]
     ends = {run.stop} | {name for controller in run.boundaries.controllers for name in controller.on}
@@ -35,7 +32,7 @@ def notify(run: Run) -> None:
         told[run.values["n_contacts"] + e] = int(wanted)
 
 
-def begin(run: Run, start: State) -> None:
+def begin(run: RunData, start: State) -> None:
     """Put a start that is not the end of an earlier run into the kernel's arrays."""
     v = run.values
     v["q"][: v["n_q"]] = start.q
@@ -58,7 +55,7 @@ def begin(run: Run, start: State) -> None:
         set_side(run, e, guards)
 
 
-def require_consistent(run: Run, start: State) -> None:
+def require_consistent(run: RunData, start: State) -> None:
     """A start must satisfy the rows that are active in it, as far as the run that it is the end of left them.
 
     Raises
@@ -84,7 +81,7 @@ def require_consistent(run: Run, start: State) -> None:
         raise ModelError([f"the start does not satisfy its constraints: {'; '.join(faults)}. {advice}"])
 
 
-def _touch(run: Run, start: State, guards: Vector) -> list[str]:
+def _touch(run: RunData, start: State, guards: Vector) -> list[str]:
     """Note which contacts touch at the start; complaints of those that are open inside their surface."""
     v, inside = run.values, []
     n_contacts = v["n_contacts"]
@@ -110,7 +107,7 @@ def _touch(run: Run, start: State, guards: Vector) -> list[str]:
     return inside
 
 
-def check_rank(run: Run, start: State, parameters: Vector) -> None:
+def check_rank(run: RunData, start: State, parameters: Vector) -> None:
     """Values of parameters may take away what determines the motion."""
     v = run.values
     y, flags = np.concatenate([start.v, start.z]), v["closed"][: v["n_contacts"]]
@@ -120,7 +117,7 @@ def check_rank(run: Run, start: State, parameters: Vector) -> None:
         raise ModelError(faults)
 
 
-def guard_values(run: Run) -> Vector:
+def guard_values(run: RunData) -> Vector:
     """Gaps, their rates and users' guards at the accepted state, in the order of the kernel."""
     v = run.values
     out = np.zeros(max(v["n_watched"], 1))
@@ -130,7 +127,7 @@ def guard_values(run: Run) -> Vector:
     return out
 
 
-def set_side(run: Run, e: int, guards: Vector) -> None:
+def set_side(run: RunData, e: int, guards: Vector) -> None:
     """The sign from which a user's guard will cross next: that of its value, however near to zero, so that a start
     just before its surface fires it. At zero itself, and where the value is round-off, its rate decides; where that
     leads nowhere in a step, the first steps that do.

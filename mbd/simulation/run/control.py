@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from mbd.arrays import Vector
 from mbd.bodies.values import is_finite_number
 from mbd.compile.mechanism import rate_names
 from mbd.compile.python import scalar_function
@@ -16,19 +15,17 @@ from mbd.equations.equations import Guard
 from mbd.errors import ModelError, SimulationError, UnknownNameError, nearest
 from mbd.kernel import fields as F
 from mbd.simulation.asked import asked
-from mbd.simulation.parameters import residuals_now, violations_now
-from mbd.simulation.run.memory import without_sharing
+from mbd.simulation.parameters import change_parameters, residuals_now, violations_now
+from mbd.simulation.run.boundaries import without_sharing
+from mbd.simulation.run.data import RunData
 
-if TYPE_CHECKING:
-    from mbd.simulation.run.run import Run
-
-__all__ = ["Boundaries", "Named", "apply_reset"]
+__all__ = ["Named", "apply_reset", "arrive", "begin_controllers", "call_controllers"]
 
 
 class Named(Mapping[str, float]):
     """Any named quantity at the present state of a run, evaluated when it is asked for."""
 
-    def __init__(self, run: Run) -> None:
+    def __init__(self, run: RunData) -> None:
         self._run = run
 
     def __getitem__(self, name: str) -> float:
@@ -60,10 +57,10 @@ class Named(Mapping[str, float]):
         return len(self._run.mechanism.equations.output_names())
 
 
-def apply_reset(run: Run, guard: Guard) -> None:
+def apply_reset(run: RunData, guard: Guard) -> None:
     """Set the coordinates and rates that a user's event resets; rows must still hold."""
     what = f"the reset of {guard.name!r} at t = {run.now:.6g} s"
-    wanted = _finite_numbers(f"{what} sets", asked(what, _reset_values, guard.reset, run.named()))
+    wanted = _finite_numbers(f"{what} sets", asked(what, _reset_values, guard.reset, Named(run)))
     equations, v = run.mechanism.equations, run.values
     usual = residuals_now(run)[:2]
     positions = {coordinate.name: k for k, coordinate in enumerate(equations.coordinates)}
@@ -138,118 +135,51 @@ def _written(what: str, answer: Any, writes: Sequence[str]) -> dict[str, float]:
     return _finite_numbers(f"{what} sets", answer)
 
 
-NEAR = 8.0 * F.EPS
-"""Two instants are one where they differ by less, relative: round-off of a sum of steps [-]."""
-CROWD = 32
-"""Breaks within 64 steps before and after one, above which it is stepped over as one of a dense signal."""
+def begin_controllers(run: RunData) -> None:
+    """The first call of every sampled controller; names that no result has are errors before the first step."""
+    boundaries = run.boundaries
+    for controller in boundaries.controllers:
+        for name in controller.reads:
+            run.mechanism.equations.output(name)
+    for controller in boundaries.controllers:
+        if controller.period is not None:
+            _call(run, controller)
+            boundaries.count(controller)
 
 
-def _sparse(instants: Vector, dt: float) -> Vector:
-    """The breaks at which steps end: not those of samples about as dense as the steps.
+def arrive(run: RunData, target: float) -> bool:
+    """Do what is due at a boundary; False at the end of the run, where it is left to a run that goes on."""
+    boundaries = run.boundaries
+    if target >= run.end - boundaries.near:
+        return False
+    ahead = boundaries.breaks[boundaries.place : boundaries.place + 1]
+    if len(ahead) and ahead[0] <= np.nextafter(target, np.inf):
+        run.move_to(float(ahead[0]))
+        boundaries.place += 1
+        run.values["state"][F.RESTART] = 1
+    for controller in boundaries.controllers:
+        if controller.period is not None and boundaries.sample(controller) <= target:
+            _call(run, controller)
+            boundaries.count(controller)
+    return True
 
-    Judged around each of them, so that it does not depend on where a run begins or ends.
-    """
-    if not len(instants):
-        return instants
-    window = 64.0 * dt
-    around = np.searchsorted(instants, instants + window) - np.searchsorted(instants, instants - window)
-    return np.asarray(instants[around <= CROWD])
+
+def call_controllers(run: RunData, name: str) -> None:
+    """Call the controllers that listen to an event."""
+    for controller in run.boundaries.controllers:
+        if name in controller.on:
+            _call(run, controller)
 
 
-class Boundaries:
-    """Instants at which a step must end: samples of controllers, jumps and kinks of signals in time."""
-
-    def __init__(
-        self, controllers: Sequence[Any], instants: Sequence[float], begin: float, dt: float, end: float
-    ) -> None:
-        self.controllers = tuple(controllers)
-        fast = [c for c in self.controllers if c.period is not None and c.period < 1e-6 * dt]
-        if fast:
-            raise ModelError(
-                [f"the period of {c.name!r}, {c.period:g} s, is far below dt = {dt:g} s; lower dt too" for c in fast]
-            )
-        self.states = {controller.name: without_sharing(controller.state) for controller in self.controllers}
-        self.begin_time = begin
-        self.samples = {c.name: 0 for c in self.controllers if c.period is not None}
-        self.breaks = _sparse(np.asarray(instants, dtype=float), dt)
-        self.place = int(np.searchsorted(self.breaks, begin, side="right"))
-        self.near = min(NEAR * abs(end), 1e-6 * dt)
-
-    # what a run keeps of it -----------------------------------------------------------------------------------------
-    def kept(self) -> tuple[Any, ...]:
-        """What changes as the run goes on; for `restore`."""
-        return self.begin_time, self.samples, self.states, self.place
-
-    def restore(self, kept: tuple[Any, ...]) -> None:
-        """As it was."""
-        self.begin_time, self.samples, self.states, self.place = kept
-
-    def remembered(self) -> dict[str, Any]:
-        """For a run that goes on from here."""
-        return {"begin": self.begin_time, "samples": dict(self.samples), "states": without_sharing(self.states)}
-
-    def take_up(self, remembered: Mapping[str, Any], now: float) -> None:
-        """Go on with the samples and states of an earlier run."""
-        self.begin_time, self.samples = remembered["begin"], dict(remembered["samples"])
-        self.states = without_sharing(dict(remembered["states"]))
-        self.place = int(np.searchsorted(self.breaks, now, side="right"))
-
-    # the run --------------------------------------------------------------------------------------------------------
-    def _sample(self, controller: Any) -> float:
-        return float(self.begin_time + self.samples[controller.name] * controller.period)
-
-    def _count(self, controller: Any) -> None:
-        self.samples = {**self.samples, controller.name: self.samples[controller.name] + 1}
-
-    def begin(self, run: Run) -> None:
-        """The first call of every sampled controller; names that no result has are errors before the first step."""
-        for controller in self.controllers:
-            for name in controller.reads:
-                run.mechanism.equations.output(name)
-        for controller in self.controllers:
-            if controller.period is not None:
-                self._call(run, controller)
-                self._count(controller)
-
-    def next(self, end: float) -> tuple[float, bool]:
-        """Where the kernel must stop next, and whether a boundary is there; one at round-off of the end is the end.
-
-        Just before a break, so that the step sees its left side.
-        """
-        due = [float(np.nextafter(time, -np.inf)) for time in self.breaks[self.place : self.place + 1]]
-        due += [self._sample(controller) for controller in self.controllers if controller.period is not None]
-        first = min(due, default=np.inf)
-        return (first, True) if first <= end + self.near else (end, False)
-
-    def arrive(self, run: Run, target: float, end: float) -> bool:
-        """Do what is due at a boundary; False at the end of the run, where it is left to a run that goes on."""
-        if target >= end - self.near:
-            return False
-        if self.place < len(self.breaks) and self.breaks[self.place] <= np.nextafter(target, np.inf):
-            run.move_to(float(self.breaks[self.place]))
-            self.place += 1
-            run.values["state"][F.RESTART] = 1
-        for controller in self.controllers:
-            if controller.period is not None and self._sample(controller) <= target:
-                self._call(run, controller)
-                self._count(controller)
-        return True
-
-    def call(self, run: Run, name: str) -> None:
-        """Call the controllers that listen to an event."""
-        for controller in self.controllers:
-            if name in controller.on:
-                self._call(run, controller)
-
-    def _call(self, run: Run, controller: Any) -> None:
-        named = run.named()
-        what = f"Controller {controller.name!r} at t = {run.now:.6g} s"
-        values = Readings(what, {name: named[name] for name in controller.reads})
-        state = without_sharing(self.states[controller.name])  # the one before the call stays as it was
-        answer = asked(what, controller.update, run.now, values, state)
-        if isinstance(answer, tuple) and len(answer) == 2:
-            answer, state = answer
-        written = _written(what, answer, controller.writes)
-        self.states = {**self.states, controller.name: state}
-        if written:
-            run.change_parameters(written, what)
+def _call(run: RunData, controller: Any) -> None:
+    boundaries, named = run.boundaries, Named(run)
+    what = f"Controller {controller.name!r} at t = {run.now:.6g} s"
+    values = Readings(what, {name: named[name] for name in controller.reads})
+    state = without_sharing(boundaries.states[controller.name])  # the one before the call stays as it was
+    answer = asked(what, controller.update, run.now, values, state)
+    if isinstance(answer, tuple) and len(answer) == 2:
+        answer, state = answer
+    written = _written(what, answer, controller.writes)
+    boundaries.states = {**boundaries.states, controller.name: state}
+    if written:
+        change_parameters(run, written, what)

@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mbd.errors import SimulationError
 from mbd.kernel import fields as F
+from mbd.simulation.run.data import RunData
 from mbd.simulation.run.memory import memory_of
 from mbd.simulation.run.savepoints import called, restore, save
 from mbd.simulation.run.strategy import may_go_on_unlocated
 from mbd.state import State
 
-if TYPE_CHECKING:
-    from mbd.simulation.run.run import Run
-
 __all__ = ["advance", "call", "close"]
 
 
-def advance(run: Run, target: float, due: bool) -> int:
+def advance(run: RunData, target: float, due: bool) -> int:
     """Call the kernel; a step that would pass the end of the run ends there, unless a longer run's would too.
 
     `due` says that a boundary is at the target, where a longer run would end a step as well.
@@ -44,14 +41,14 @@ def advance(run: Run, target: float, due: bool) -> int:
     return call(run, target, np.inf)
 
 
-def call(run: Run, until: float, end: float) -> int:
+def call(run: RunData, until: float, end: float) -> int:
     """Call the kernel from the last savepoint; a step that would pass `until` is cut, or left to us if it is `end`."""
     called(run, until, end)
     run.values["end"] = end
     return run.stepper.advance(until)
 
 
-def _one_step(run: Run) -> int:
+def _one_step(run: RunData) -> int:
     """A step of the grid, wherever it ends."""
     chunk, run.values["chunk"] = run.values["chunk"], 1
     try:
@@ -62,7 +59,7 @@ def _one_step(run: Run) -> int:
         run.values["chunk"] = chunk
 
 
-def close(run: Run, settled: bool) -> State:
+def close(run: RunData, settled: bool) -> State:
     """Store the last row, give the end the time that was asked for; the state to go on from."""
     if not settled:  # not even the scheme's start succeeded
         return run.start

@@ -3,31 +3,27 @@
 from __future__ import annotations
 
 import hashlib
-from copy import deepcopy
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mbd.arrays import Vector
 from mbd.kernel import fields as F
 from mbd.results.record import EventRecord
+from mbd.simulation.run.data import RunData
 from mbd.simulation.run.remembered import damage, out_of_range, sealed
 from mbd.state import Memory, State
 
-if TYPE_CHECKING:
-    from mbd.simulation.run.run import Run
-
-__all__ = ["carry_on", "memory_of", "memory_of_end", "take_up", "without_memory", "without_sharing"]
+__all__ = ["carry_on", "memory_of", "memory_of_end", "take_up", "without_memory"]
 
 OPTIONS = ("dt", "tol", "allowed", "longest", "contact", "impact", "locate", "rest_speed", "backend")
 """Settings that a memory depends on."""
 
 
-def memory_of(run: Run, time: float) -> Memory:
+def memory_of(run: RunData, time: float) -> Memory:
     """The memory of the accepted state, which must be settled; `time` is what its state says."""
     stepper = run.stepper
-    run.turns.count(run)
+    run.count_turns()
     parameters, reals, integers = run.values["params"].copy(), stepper.reals.copy(), stepper.integers.copy()
     place = _place(run)
     for array in (parameters, reals, integers, place):
@@ -40,13 +36,13 @@ def memory_of(run: Run, time: float) -> Memory:
     ))  # fmt: skip
 
 
-def _place(run: Run) -> Vector:
+def _place(run: RunData) -> Vector:
     """(q, v, z) as the kernel has them."""
     v = run.values
     return np.concatenate([v["q"][: v["n_q"]], v["y"][: v["n"]]])
 
 
-def belongs(run: Run, contact: str = "") -> tuple[str, ...]:
+def belongs(run: RunData, contact: str = "") -> tuple[str, ...]:
     """Words that two runs must share for the memory of one to be of use to the other.
 
     contact : the strategy, by default the one that the run takes now
@@ -63,12 +59,12 @@ def belongs(run: Run, contact: str = "") -> tuple[str, ...]:
     return (*words, *_controllers(run))
 
 
-def _controllers(run: Run) -> tuple[str, ...]:
+def _controllers(run: RunData) -> tuple[str, ...]:
     """The words of controllers, the last ones of `belongs`."""
     return tuple(f"{c.name} {c.period!r} {c.on!r}" for c in run.boundaries.controllers)
 
 
-def digest(run: Run) -> str:
+def digest(run: RunData) -> str:
     """Of masses, forces, rows and guards at the accepted state: a model that was changed there has another one."""
     v, mechanism = run.values, run.mechanism
     acting = run.manager.penalties(v["closed"][: v["n_contacts"]])
@@ -82,7 +78,7 @@ def digest(run: Run) -> str:
     return told.hexdigest()
 
 
-def take_up(run: Run, start: State) -> bool:
+def take_up(run: RunData, start: State) -> bool:
     """Go on from the memory of a state, if it is one of this run; whether it was."""
     memory = start.memory
     if memory is None:
@@ -117,7 +113,7 @@ def take_up(run: Run, start: State) -> bool:
     return True
 
 
-def carry_on(run: Run, start: State) -> bool:
+def carry_on(run: RunData, start: State) -> bool:
     """Let controllers go on with their samples and states, where a scheme has begun anew at a state; whether they do.
 
     What they keep belongs to the mechanism, not to how it is integrated: another dt, or the trial runs of a tolerance,
@@ -134,7 +130,7 @@ def carry_on(run: Run, start: State) -> bool:
     return True
 
 
-def memory_of_end(run: Run, start: State) -> Memory | None:
+def memory_of_end(run: RunData, start: State) -> Memory | None:
     """The memory of a state, which is in the kernel's arrays, if it is the end of an earlier run as that left it."""
     memory = start.memory
     if memory is None or damage(memory) or memory.time != start.time or memory.mode != start.mode:
@@ -148,7 +144,7 @@ def without_memory(state: State) -> State:
     return state if state.memory is None else replace(state, memory=sealed(replace(state.memory, belongs=())))
 
 
-def _is_of(run: Run, memory: Memory, start: State) -> bool:
+def _is_of(run: RunData, memory: Memory, start: State) -> bool:
     """Whether a state and the parameters are those of a memory, to the bit; the memory is in the kernel's arrays."""
     v, manager = run.values, run.manager
     n_contacts, n_anchors = v["n_contacts"], v["n_anchors"]
@@ -161,11 +157,3 @@ def _is_of(run: Run, memory: Memory, start: State) -> bool:
         (v["params"], memory.parameters),
     )
     return memory.time == start.time and all(np.array_equal(one, other) for one, other in pairs)
-
-
-def without_sharing(value: Any) -> Any:
-    """A copy that changes apart, of anything that can be copied."""
-    try:
-        return deepcopy(value)
-    except Exception:  # an open file, a lock, a generator: the user's, and shared then
-        return value

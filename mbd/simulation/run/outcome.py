@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mbd.kernel import fields as F
 from mbd.simulation.diagnostics.notes import notes_of
+from mbd.simulation.run.data import RunData
 from mbd.simulation.run.lengths import RUNGE_KUTTA
 from mbd.simulation.run.stored import whole_record
 from mbd.state import State
 from mbd.trajectory import Trajectory
-
-if TYPE_CHECKING:
-    from mbd.simulation.run.run import Run
 
 __all__ = ["trajectory_of"]
 
@@ -26,7 +24,7 @@ COUNTS = (
 """Names of the kernel's counts, in the order of their places."""
 
 
-def trajectory_of(run: Run, problem: str, message: str, final: State) -> Trajectory:
+def trajectory_of(run: RunData, problem: str, message: str, final: State) -> Trajectory:
     """The run by name; `problem` is '' if it went as far as it was asked to. Its message tells what is in doubt."""
     record = whole_record(run)
     notes, doubts = notes_of(run, record)
@@ -37,7 +35,7 @@ def trajectory_of(run: Run, problem: str, message: str, final: State) -> Traject
     return Trajectory(ended)
 
 
-def _statistics(run: Run, notes: list[str]) -> dict[str, Any]:
+def _statistics(run: RunData, notes: list[str]) -> dict[str, Any]:
     counts = run.values["counts"]
     numbers: dict[str, Any] = {name: int(counts[place]) for place, name in enumerate(COUNTS)}
     if run.values["adaptive"]:

@@ -10,15 +10,13 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from mbd.kernel import fields as F
+from mbd.simulation.run.data import RunData
 from mbd.state import Memory, Mode, are_names
-
-if TYPE_CHECKING:
-    from mbd.simulation.run.run import Run
 
 __all__ = ["damage", "out_of_range", "sealed"]
 
@@ -95,7 +93,7 @@ def _are_samples(told: Any) -> bool:
     )
 
 
-def out_of_range(run: Run, memory: Memory) -> str:
+def out_of_range(run: RunData, memory: Memory) -> str:
     """What of a memory no run of this mechanism could have left, in a few words; '' if nothing.
 
     `memory` has passed `damage`, and its lengths are asked first; then its numbers lie in the kernel's arrays, where
@@ -116,7 +114,7 @@ def out_of_range(run: Run, memory: Memory) -> str:
     return _judged(stepper.place_of, memory, run)
 
 
-def _judged(place_of: Callable[[str], slice], memory: Memory, run: Run) -> str:
+def _judged(place_of: Callable[[str], slice], memory: Memory, run: RunData) -> str:
     """Flags, indices, counts and times of a memory of the right lengths."""
     v = run.values
 
@@ -153,7 +151,7 @@ def _of_state(v: Mapping[str, Any]) -> dict[str, tuple[int, int]]:
     }  # fmt: skip
 
 
-def _rows_differ(kept: Callable[[str], Any], run: Run) -> str:
+def _rows_differ(kept: Callable[[str], Any], run: RunData) -> str:
     """Whether the rows of the next step are other than those of the closed contacts and sticking frictions."""
     v, state = run.values, kept("state")
     dropped = kept("dropped")[: v["n_rows"]]

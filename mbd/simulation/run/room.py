@@ -7,12 +7,9 @@ each; where an event may end it sooner only those that it has are counted.
 from __future__ import annotations
 
 import warnings
-from typing import TYPE_CHECKING
 
 from mbd.free_memory import available, size_in_words as memory
-
-if TYPE_CHECKING:
-    from mbd.simulation.run.run import Run
+from mbd.simulation.run.data import RoomFindings, RunData
 
 __all__ = ["Room", "available", "memory"]
 
@@ -26,7 +23,7 @@ LARGE = 1.0e9
 """Memory above which every run says how much it will need [bytes]."""
 
 
-class Room:
+class Room(RoomFindings):
     """What the rows of one run may fill.
 
     The system is asked for the free memory, which takes 50 µs, once it matters: after some ten thousand rows, and as
@@ -34,8 +31,6 @@ class Room:
 
     Attributes
     ----------
-    problem : why the run had to end, in a sentence; '' if it did not
-    note : what was foretold; '' if nothing
     patience : rows above which a run that is foretold to have them is ended
     is_long : whether it was
     foretold : rows that were foretold last
@@ -43,11 +38,11 @@ class Room:
 
     def __init__(self, width: int) -> None:
         self.size = 8 * width
-        self.problem = self.note = ""
+        super().__init__()
         self.patience, self.foretold, self.is_long = float("inf"), 0.0, False
         self._most, self._seen = -1, 0
 
-    def exhausted(self, run: Run) -> str:
+    def exhausted(self, run: RunData) -> str:
         """The sentence of a run that was refused memory."""
         self.problem = (
             f"t = {run.now:.9g} s: the system has no memory left; {run.stored} rows fill "
@@ -66,7 +61,7 @@ class Room:
         """Ask for the free memory, of which these rows have taken some."""
         self._most, self._seen = int(SHARE * (available() + stored * self.size)) // self.size, stored
 
-    def check(self, run: Run) -> str:
+    def check(self, run: RunData) -> str:
         """Look at a run that goes on; a sentence if it must not store any more rows."""
         if run.stored < EARLIEST and run.stored * self.size < NOTABLE:
             return ""
@@ -102,7 +97,7 @@ class Room:
         )
 
 
-def _foretold(run: Run) -> float:
+def _foretold(run: RunData) -> float:
     """Rows of the whole run."""
     begin, span = run.start.time, run.end - run.start.time
     if run.stop or not run.now > begin:
@@ -117,7 +112,7 @@ def _duration(seconds: float) -> str:
     return f"{seconds / 60.0:.2g} min" if seconds < 7200.0 else f"{seconds / 3600.0:.2g} h"
 
 
-def _remedy(run: Run) -> str:
+def _remedy(run: RunData) -> str:
     if run.values["adaptive"]:
         return "ask for less accuracy or a shorter time, take a scheme of higher order, or dt= with store="
     return "use store= to keep fewer rows, a larger dt, or a shorter time"

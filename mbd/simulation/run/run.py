@@ -9,15 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from mbd.arrays import Matrix, Vector
 from mbd.compile.mechanism import Mechanism
 from mbd.errors import MemoryLimitError, SimulationError, UnknownNameError
-from mbd.forces.base import Force
 from mbd.integrators.base import Integrator
 from mbd.kernel import fields as F
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.results.columns import ModelColumns
-from mbd.results.failure import Failure
 from mbd.simulation.asked import asked
 from mbd.simulation.diagnostics.energy import EnergyWatch
 from mbd.simulation.diagnostics.failures import attempt, crowded, explanation
@@ -25,33 +22,23 @@ from mbd.simulation.diagnostics.fastest import stability
 from mbd.simulation.diagnostics.reach import out_of_reach
 from mbd.simulation.diagnostics.singular import at_singular_configuration
 from mbd.simulation.diagnostics.turning import first_reversed, overturned
-from mbd.simulation.parameters import ParameterJudge
 from mbd.simulation.run.begin import begin, check_rank, guard_values, notify, set_side
-from mbd.simulation.run.control import Boundaries, Named, apply_reset
+from mbd.simulation.run.control import apply_reset, arrive, begin_controllers, call_controllers
+from mbd.simulation.run.data import RunData
 from mbd.simulation.run.ends import advance, call, close
 from mbd.simulation.run.memory import carry_on, take_up
 from mbd.simulation.run.outcome import trajectory_of
 from mbd.simulation.run.room import Room
-from mbd.simulation.run.savepoints import Savepoint, rewind, save
-from mbd.simulation.run.stepper import Stepper
+from mbd.simulation.run.savepoints import rewind, save
 from mbd.simulation.run.stored import whole_record
-from mbd.simulation.run.strategy import go_on_unlocated, may_go_on_unlocated, told_settings
-from mbd.simulation.run.whole_turns import TurnCounter
+from mbd.simulation.run.strategy import go_on_unlocated, may_go_on_unlocated
 from mbd.state import State
 from mbd.trajectory import EventRecord, Trajectory
 
 __all__ = ["Run"]
 
-ROWS_AT_ONCE = 1 << 14
-"""Rows of results that the kernel may fill before it hands them over."""
-STEPS_AT_ONCE = {True: 20000, False: 200}
-"""Steps between two looks at the clock, compiled and interpreted: some 20 ms."""
-USUAL_SIZE = 10
-"""Unknowns above which there are fewer such steps, as the square: large mechanisms get better code at these looks."""
 SHOW_EVERY = 0.1
 """Wall time between two calls of progress and observers [s]."""
-FIRST_TABLE = 1 << 28
-"""Largest table laid out at the start, of which only rows written take memory; it doubles as it fills [bytes]."""
 INTERRUPTED = "interrupted"
 """The problem of a run that was interrupted, until its time is known."""
 OVERFULL = (
@@ -59,12 +46,13 @@ OVERFULL = (
     "model; a smaller dt has fewer events in a step"
 )
 """The problem of a run whose rows and events outgrew what `advance` keeps free for a step."""
-KINDS = ("closed", "opened", "event", "stuck", "slipped")
-"""Names of the kinds of events that the kernel logs by number."""
 
 
-class Run:
-    """Drives the kernel from a state to the end of a run and keeps what it stores."""
+class Run(RunData):
+    """Drives the kernel from a state to the end of a run."""
+
+    energy: EnergyWatch
+    room: Room
 
     def __init__(
         self,
@@ -80,44 +68,13 @@ class Run:
         options: dict[str, Any],
         settings: dict[str, Any],
     ) -> None:
-        self.began = perf_counter()
-        self.model = model
-        self.mechanism, self.manager, self.start, self.end, self.stop = mechanism, manager, start, end, stop
-        self.asked, self.changed, self.dt = settings, dict(changed), dt
-        forces: list[Force] = getattr(model, "applied", getattr(model, "forces", []))
-        self.places = {force.name: _places(force) for force in forces}
-        rows = int(min(ROWS_AT_ONCE, (end - start.time) / dt / options.get("store", 1) + 64))
-        parameters = self._parameters()
-        self.first_parameters = parameters.copy()
-        compiled_options = {**options, "capacity": rows + 8 + 2 * len(manager.guards), "end": end}
-        self.stepper = Stepper(mechanism, manager, integrator, parameters, dt, compiled_options)
-        self.values = self.stepper.values
-        self.values["chunk"] = _steps_at_once(self.stepper)
-        width, capacity = self.values["width"], self.values["capacity"]
-        expected = 1.25 * (end - start.time) / dt / options.get("store", 1) + 1024
-        self.table = _first_table(max(int(min(expected, FIRST_TABLE / (8 * width))), 3 * capacity), width)
-        self.events: list[EventRecord] = []
-        self.parameter_changes: list[tuple[int, Vector]] = []
-        self.stored = 0
+        super().__init__(model, mechanism, manager, integrator, start, dt, end, stop, changed, options, settings)
         self.cause: BaseException | None = None
-        self.history: list[Savepoint] = []
-        self.pending: tuple[EventRecord, ...] = ()
-        self.earlier: Sequence[EventRecord] = ()  # of the run that is repeated, for its message
-        self.limit: int | None = None
-        self.tried = 0
         self.gave_up: tuple[float, str] | None = None
-        self.label: float | None = None
-        self.failure: Failure | None = None
         self.interrupted = False
-        self.energy = EnergyWatch()
-        self.judge = ParameterJudge(model, mechanism)
-        self.room = Room(self.values["width"])
+        self.energy, self.room = EnergyWatch(), Room(self.values["width"])
         self.observers: Sequence[Callable[[float, State], None]] = ()
         self.progress: Callable[[float, float], None] | None = None
-        controllers, instants = getattr(model, "controllers", ()), getattr(model, "instants", ())
-        self.turns = TurnCounter()
-        self.boundaries = Boundaries(controllers, instants, start.time, dt, end)
-        self.damage = ""  # of the memory of the start
         self.resumed = take_up(self, start)
         notify(self)
         self.carried = self.resumed  # so do controllers
@@ -125,12 +82,7 @@ class Run:
             begin(self, start)
             self.carried = carry_on(self, start)
             if changed:
-                check_rank(self, start, parameters)
-
-    def _parameters(self) -> Vector:
-        """The parameter vector; which parameters are folded into the equations is asked only where it counts."""
-        folded = getattr(self.model, "parameters", {}) if self.changed else {}
-        return self.mechanism.parameters(self.changed, folded)
+                check_rank(self, start, self.first_parameters)
 
     def observe(
         self, observers: Sequence[Callable[[float, State], None]], progress: Callable[[float, float], None] | None
@@ -200,7 +152,7 @@ class Run:
         """Kernel, reaction, kernel, … until the end; (problem, message)."""
         shown = 0.0
         if not self.carried:
-            self.boundaries.begin(self)
+            begin_controllers(self)
         save(self, self.pending)
         ended = self._react(self.pending)
         self.pending = ()
@@ -217,7 +169,7 @@ class Run:
                 self.stepper.add_mode()
             elif status == F.DONE:
                 save(self)
-                if not self.boundaries.arrive(self, target, self.end):
+                if not arrive(self, target):
                     self.label = self.end
                     return "", f"reached t = {self.end:g} s"
             elif status == F.EVENT:
@@ -258,11 +210,6 @@ class Run:
         go_on_unlocated(self)
         return True
 
-    @property
-    def settings(self) -> dict[str, Any]:
-        """What was asked for, with the strategy that contacts are treated by now."""
-        return told_settings(self, self.asked)
-
     def _explained(self, status: int) -> str:
         if self.gave_up is not None and self.gave_up[0] == self.now:
             return f"{self.gave_up[1]}; non-smooth steps do not go on from there either"
@@ -272,10 +219,6 @@ class Run:
         events = [*self.earlier, *self.events]
         beyond = out_of_reach(self, status) or at_singular_configuration(self, status)
         return explanation(self.stepper, status, events, self.places, swiftest, beyond)
-
-    @property
-    def now(self) -> float:
-        return float(self.values["clock"][F.NOW])
 
     def _show(self, finished: bool = False) -> None:
         if self.progress is not None:
@@ -305,44 +248,6 @@ class Run:
         self._show(finished=True)
         return "", ""
 
-    def collect(self) -> None:
-        """Take over the rows and events that the kernel has stored."""
-        v = self.values
-        count, logged = int(v["state"][F.STORED]), int(v["state"][F.LOGGED])
-        if logged:
-            self._collect_events(logged)
-        if count:
-            self._make_room(count)
-            self.table[self.stored : self.stored + count] = v["store"].reshape(-1, v["width"])[:count]
-        self.stored += count
-        v["state"][F.STORED] = v["state"][F.LOGGED] = 0
-
-    def _make_room(self, count: int) -> None:
-        """Have places for so many more rows; a MemoryError leaves all as it is."""
-        if self.stored + count <= len(self.table):
-            return
-        try:
-            table = np.empty((2 * len(self.table) + count, self.values["width"]))
-        except MemoryError:
-            table = np.empty((self.stored + count, self.values["width"]))
-        table[: self.stored] = self.table[: self.stored]
-        self.table = table
-
-    def _collect_events(self, logged: int) -> None:
-        """Events from the lines of the log."""
-        manager, width = self.manager, self.values["event_width"]
-        contacts, frictions = manager.names, [friction.name for friction in manager.frictions]
-        guards = [guard.name for guard in manager.guards]
-        known = {"event": guards, "stuck": frictions, "slipped": frictions}
-        for line in self.values["log"][: logged * width].reshape(logged, width):
-            kind, index = KINDS[int(line[1])], int(line[2])
-            name, told, impulse = known.get(kind, contacts)[index], {}, np.zeros(0)
-            if kind in ("closed", "opened"):
-                told = _impulses(manager, index, line[5:])
-                impulse = told[name]
-            row = self.stored + int(line[4])
-            self.events.append(EventRecord(float(line[0]), kind, name, impulse, float(line[3]), row, told))
-
     def _react(self, happened: Sequence[EventRecord]) -> str:
         """Resets, controllers and endings of the events just logged; the name of the event that ends the run."""
         guards = {guard.name: e for e, guard in enumerate(self.manager.guards)}
@@ -353,7 +258,7 @@ class Run:
             guard = self.manager.guards[guards[event.name]] if event.kind == "event" else None
             if guard is not None and guard.reset is not None:
                 self._reset(guards[event.name])
-            self.boundaries.call(self, event.name)
+            call_controllers(self, event.name)
             if event.name == self.stop or (guard is not None and guard.terminal):
                 ended = event.name
         return ended
@@ -369,93 +274,3 @@ class Run:
             set_side(self, e, guards)
         elif before[rate] * guards[rate] <= 0.0:
             self.values["side"][e] *= -1.0
-
-    def change_parameters(self, values: Mapping[str, float], what: str) -> None:
-        """New parameter values from now on; the scheme restarts from them if they differ.
-
-        Raises
-        ------
-        SimulationError
-            for values with which the mechanism cannot go on; it keeps those that it has. `what` gives them.
-        """
-        equations = self.mechanism.equations
-        present = {parameter.name: v for parameter, v in zip(equations.parameters, self.values["params"], strict=False)}
-        if all(present.get(name) == value for name, value in values.items()):
-            return
-        faults = self.judge.faults(self, values)
-        if faults:
-            given = ", ".join(f"{name!r} to {value:g}" for name, value in values.items())
-            raise SimulationError(f"{what} sets {given}, which cannot be: {'; '.join(faults)}")
-        self.stepper.keep_row()
-        self.set_parameters({**self.changed, **values})
-        self.parameter_changes.append((self.stored + int(self.values["state"][F.STORED]), self.values["params"].copy()))
-        self.values["state"][F.RESTART] = 1
-
-    def set_parameters(self, changed: Mapping[str, float]) -> None:
-        """Parameters that differ from the model's."""
-        self.changed = dict(changed)
-        self.values["params"][: len(self.first_parameters)] = self._parameters()
-
-    def move_to(self, time: float) -> None:
-        """Put the clock, and the row just stored as the left side of a break, on its instant."""
-        self.stepper.keep_row()
-        self.collect()
-        if self.stored and self.table[self.stored - 1, 0] == self.now:
-            self.table[self.stored - 1, 0] = time
-        self.values["clock"][F.NOW] = time
-
-    def named(self) -> Named:
-        """Named quantities at the present state."""
-        return Named(self)
-
-    # the result ---------------------------------------------------------------------------------------------------
-    def state(self) -> State:
-        """The accepted state."""
-        self.turns.count(self)
-        v = self.values
-        names = np.array(self.manager.names)
-        armed = frozenset(str(name) for name in names[v["armed"][: len(names)] == 1])
-        y = v["y"][: v["n"]].copy()
-        n_v = v["n_v"]
-        return State(
-            self.now if self.label is None else self.label, v["q"][: v["n_q"]].copy(), y[:n_v], y[n_v:],
-            self.manager.mode(v["closed"][: len(names)]), armed,
-            v["anchors"][: v["n_anchors"]].copy(), self.start.names, self.start.velocity_names, {}, dict(self.changed),
-        )  # fmt: skip
-
-
-def _steps_at_once(stepper: Stepper) -> int:
-    """Steps of a call of the kernel; they follow from the size alone, as what is judged between calls must."""
-    layout = stepper.mechanism.layout
-    size = max((layout.n + layout.n_rows) // USUAL_SIZE, 1)
-    return max(STEPS_AT_ONCE[stepper.compiled] // (size * size), STEPS_AT_ONCE[False])
-
-
-def _impulses(manager: ActiveSetManager, own: int, line: Vector) -> dict[str, Vector]:
-    """Impulses of contacts, and of dry frictions in joints, by name: that of contact `own`, and others if any."""
-    mine, numbers = manager.contacts[own], line.tolist()
-    found = {mine.name: line[list(mine.rows)]}
-    for contact in manager.contacts:
-        if contact is not mine and any(numbers[row] for row in contact.rows):
-            found[contact.name] = line[list(contact.rows)]
-    for friction in manager.frictions:
-        if friction.contact < 0 and numbers[friction.row]:
-            found[friction.name] = line[[friction.row]]
-    return found
-
-
-def _places(force: Force) -> str:
-    """The frames and joints of a force, for messages."""
-    named = [getattr(mention, "full_name", getattr(mention, "name", None)) for mention in force.mentions()]
-    return ", ".join(repr(name) for name in named if name)
-
-
-def _first_table(rows: int, width: int) -> Matrix:
-    """A table of so many rows, or of fewer where addresses are limited."""
-    while True:
-        try:
-            return np.empty((rows, width))
-        except MemoryError:
-            if rows < 1024:
-                raise
-            rows //= 4

@@ -6,17 +6,13 @@ steps give the same bits, the state before any step of the call is reached again
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from dataclasses import replace
 
-from mbd.arrays import Vector
 from mbd.errors import SimulationError
 from mbd.kernel import fields as F
 from mbd.results.record import EventRecord
-
-if TYPE_CHECKING:
-    from mbd.simulation.run.run import Run
+from mbd.simulation.run.data import RunData, Savepoint
 
 __all__ = ["Savepoint", "called", "restore", "rewind", "save"]
 
@@ -26,33 +22,7 @@ FAILED = -1
 """In place of a kernel's status: an integrator written in Python raised."""
 
 
-@dataclass(frozen=True, eq=False)
-class Savepoint:
-    """A run between two calls of the kernel.
-
-    reals, integers : what the next step depends on
-    scheme, boundaries, changed : memory of a Python integrator; samples and controllers; parameters by name
-    stored, events, changes, steps : how many there were of each
-    settled : no restart is pending
-    pending : events at this very instant that nobody has reacted to yet
-    call : `until` and `end` of the call of the kernel that was made from here, if one was
-    """
-
-    reals: Vector
-    integers: Vector
-    scheme: Any
-    boundaries: Any
-    changed: Mapping[str, float]
-    stored: int
-    events: int
-    changes: int
-    steps: int
-    settled: bool
-    pending: tuple[EventRecord, ...] = ()
-    call: tuple[float, float] | None = None
-
-
-def save(run: Run, pending: Sequence[EventRecord] = ()) -> Savepoint:
+def save(run: RunData, pending: Sequence[EventRecord] = ()) -> Savepoint:
     """Note where the run is; kept are this point, those since the last step, and the last one with steps after it."""
     run.collect()
     stepper = run.stepper
@@ -68,12 +38,12 @@ def save(run: Run, pending: Sequence[EventRecord] = ()) -> Savepoint:
     return point
 
 
-def called(run: Run, until: float, end: float) -> None:
+def called(run: RunData, until: float, end: float) -> None:
     """Note the call that is made from the last savepoint."""
     run.history = [*run.history[:-1], replace(run.history[-1], call=(until, end))]
 
 
-def restore(run: Run, point: Savepoint) -> None:
+def restore(run: RunData, point: Savepoint) -> None:
     """The run as it was at a savepoint."""
     stepper = run.stepper
     stepper.reals[:] = point.reals
@@ -86,7 +56,7 @@ def restore(run: Run, point: Savepoint) -> None:
     del run.events[point.events :], run.parameter_changes[point.changes :]
 
 
-def rewind(run: Run, failed: bool) -> bool:
+def rewind(run: RunData, failed: bool) -> bool:
     """Take back what was not finished: the step that failed with all it caused, or what an interrupt cut in two.
 
     Returns whether there was a settled state to go back to; there is none before the scheme has started.
@@ -102,7 +72,7 @@ def rewind(run: Run, failed: bool) -> bool:
         run.values["counts"][:] = counts
 
 
-def _settled(run: Run, point: Savepoint) -> bool:
+def _settled(run: RunData, point: Savepoint) -> bool:
     """Go to a savepoint; whether it is settled, after a restart if need be, or waits for a reaction to an event."""
     restore(run, point)
     if point.settled or point.pending:
@@ -114,7 +84,7 @@ def _settled(run: Run, point: Savepoint) -> bool:
     return True
 
 
-def _before_failure(run: Run, point: Savepoint, steps: int) -> bool:
+def _before_failure(run: RunData, point: Savepoint, steps: int) -> bool:
     """Go to the settled state before the last step of the call made from a savepoint; whether there is one."""
     assert point.call is not None
     restore(run, point)
@@ -134,7 +104,7 @@ def _before_failure(run: Run, point: Savepoint, steps: int) -> bool:
     return True
 
 
-def _go(run: Run, until: float, end: float, chunk: int) -> int:
+def _go(run: RunData, until: float, end: float, chunk: int) -> int:
     """Call the kernel for so many steps."""
     usual = run.values["chunk"]
     run.values["chunk"], run.values["end"] = chunk, end

@@ -4,20 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mbd.arrays import Matrix
 from mbd.results.record import EventRecord, Record
-
-if TYPE_CHECKING:
-    from mbd.simulation.run.run import Run
+from mbd.simulation.run.data import RunData
 
 __all__ = ["record_of", "whole_record"]
 
 
-def record_of(run: Run, table: Matrix, events: Sequence[EventRecord] = ()) -> Record:
+def record_of(run: RunData, table: Matrix, events: Sequence[EventRecord] = ()) -> Record:
     """Rows that the kernel has stored, (R, width), as a record without a verdict."""
     v, equations = run.values, run.mechanism.equations
     n_q, n_v, n, rows = v["n_q"], v["n_v"], v["n"], v["n_rows"]
@@ -35,7 +32,7 @@ def record_of(run: Run, table: Matrix, events: Sequence[EventRecord] = ()) -> Re
     )  # fmt: skip
 
 
-def whole_record(run: Run) -> Record:
+def whole_record(run: RunData) -> Record:
     """All rows and events until now, without a verdict."""
     last = run.stored - 1  # a run that failed right at an event has no row after it
     events = [event if event.row <= last else replace(event, row=last) for event in run.events]

@@ -2,30 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mbd.kernel import fields as F
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.kernel.crowding import SEVERAL, crowd
+from mbd.simulation.run.data import RunData
 
-if TYPE_CHECKING:
-    from mbd.simulation.run.run import Run
-
-__all__ = ["chosen", "go_on_unlocated", "may_go_on_unlocated", "told_settings"]
+__all__ = ["chosen", "go_on_unlocated", "may_go_on_unlocated"]
 
 ENDLESS = (F.CHATTER, F.NO_LOCATION, F.NO_IMPACT)
 """Failures of locating itself: switches without end at one instant, no root, no set of branches that obeys all laws."""
 CROWDED = 1.0
 """Blows through several contacts, less one for each dt, from which a step that fails is taken to fail of them [-]."""
-WHY = {
-    1: "blows through several closed contacts crowded",
-    2: "locating could not go on",
-}
-"""Reasons for non-smooth steps, by their number in `state[UNLOCATED]`."""
 
 
 def chosen(contact: str, manager: ActiveSetManager, locate: str = "root", tolerance: bool = False) -> tuple[str, str]:
@@ -49,21 +40,7 @@ def chosen(contact: str, manager: ActiveSetManager, locate: str = "root", tolera
     )
 
 
-def told_settings(run: Run, asked: Mapping[str, Any]) -> dict[str, Any]:
-    """The settings of a run, with the strategy that it has taken since."""
-    cause = int(run.values["state"][F.UNLOCATED]) if run.values["auto"] else 0
-    if cause == 0:
-        return {**asked}
-    since = float(run.values["clock"][F.UNLOCATED_SINCE])
-    count = sum(item.kind == "unilateral" for item in run.manager.contacts)
-    reason = (
-        f"contact='events' was chosen for {count} contacts until t = {since:.6g} s, then 'nonsmooth': {WHY[cause]}; "
-        "contact='events' locates all the same, contact='nonsmooth' takes fixed steps from the start"
-    )
-    return {**asked, "contact": "nonsmooth", "contact_reason": reason, "nonsmooth_since": since}
-
-
-def may_go_on_unlocated(run: Run, status: int) -> bool:
+def may_go_on_unlocated(run: RunData, status: int) -> bool:
     """Whether a step that failed while instants were located is to be taken as a non-smooth one."""
     v, clock = run.values, run.values["clock"]
     if run.limit is not None or not v["auto"] or v["state"][F.UNLOCATED] or status <= F.NOT_FINITE:
@@ -73,7 +50,7 @@ def may_go_on_unlocated(run: Run, status: int) -> bool:
     return bool(crowded or (status in ENDLESS and several))
 
 
-def go_on_unlocated(run: Run) -> None:
+def go_on_unlocated(run: RunData) -> None:
     """Take non-smooth steps from the accepted state on, before which the step that failed was taken back."""
     v = run.values
     v["state"][F.UNLOCATED], v["state"][F.RESTART] = 2, 2

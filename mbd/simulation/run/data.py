@@ -1,0 +1,289 @@
+"""What a run holds between two calls of the kernel, which all that drives, saves and judges it takes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from mbd.arrays import Matrix, Vector
+from mbd.bodies.domains import ParameterCheck
+from mbd.compile.mechanism import Mechanism
+from mbd.forces.base import Force
+from mbd.integrators.base import Integrator
+from mbd.kernel import fields as F
+from mbd.kernel.active_set import ActiveSetManager
+from mbd.results.failure import Failure
+from mbd.results.record import EventRecord
+from mbd.simulation.run.boundaries import Boundaries
+from mbd.simulation.run.stepper import Stepper
+from mbd.simulation.run.whole_turns import TurnCounter
+from mbd.state import State
+
+__all__ = ["EnergyFindings", "RoomFindings", "RunData", "Savepoint"]
+
+ROWS_AT_ONCE = 1 << 14
+"""Rows of results that the kernel may fill before it hands them over."""
+STEPS_AT_ONCE = {True: 20000, False: 200}
+"""Steps between two looks at the clock, compiled and interpreted: some 20 ms."""
+USUAL_SIZE = 10
+"""Unknowns above which there are fewer such steps, as the square: large mechanisms get better code at these looks."""
+FIRST_TABLE = 1 << 28
+"""Largest table laid out at the start, of which only rows written take memory; it doubles as it fills [bytes]."""
+KINDS = ("closed", "opened", "event", "stuck", "slipped")
+"""Names of the kinds of events that the kernel logs by number."""
+
+WHY = {
+    1: "blows through several closed contacts crowded",
+    2: "locating could not go on",
+}
+"""Reasons for non-smooth steps, by their number in `state[UNLOCATED]`."""
+
+
+@dataclass
+class EnergyFindings:
+    """What the energy of a run tells.
+
+    problem, note : what was found, in a sentence; '' if nothing
+    row : the first from which on the energy is the scheme's own, −1 if there is none
+    share : of the energy that the mechanism had, what the scheme gave (positive) or took [-]
+    """
+
+    problem: str = ""
+    note: str = ""
+    row: int = -1
+    share: float = 0.0
+
+
+@dataclass
+class RoomFindings:
+    """What is foretold of the memory of a run.
+
+    problem : why the run had to end, in a sentence; '' if it did not
+    note : what was foretold; '' if nothing
+    """
+
+    problem: str = ""
+    note: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Savepoint:
+    """A run between two calls of the kernel.
+
+    reals, integers : what the next step depends on
+    scheme, boundaries, changed : memory of a Python integrator; samples and controllers; parameters by name
+    stored, events, changes, steps : how many there were of each
+    settled : no restart is pending
+    pending : events at this very instant that nobody has reacted to yet
+    call : `until` and `end` of the call of the kernel that was made from here, if one was
+    """
+
+    reals: Vector
+    integers: Vector
+    scheme: Any
+    boundaries: Any
+    changed: Mapping[str, float]
+    stored: int
+    events: int
+    changes: int
+    steps: int
+    settled: bool
+    pending: tuple[EventRecord, ...] = ()
+    call: tuple[float, float] | None = None
+
+
+class RunData:
+    """What a run was asked for, the kernel's arrays, and what was stored until now."""
+
+    def __init__(
+        self,
+        model: Any,
+        mechanism: Mechanism,
+        manager: ActiveSetManager,
+        integrator: Integrator,
+        start: State,
+        dt: float,
+        end: float,
+        stop: str | None,
+        changed: Mapping[str, float],
+        options: dict[str, Any],
+        settings: dict[str, Any],
+    ) -> None:
+        self.began = perf_counter()
+        self.model = model
+        self.mechanism, self.manager, self.start, self.end, self.stop = mechanism, manager, start, end, stop
+        self.asked, self.changed, self.dt = settings, dict(changed), dt
+        forces: list[Force] = getattr(model, "applied", getattr(model, "forces", []))
+        self.places = {force.name: _places(force) for force in forces}
+        rows = int(min(ROWS_AT_ONCE, (end - start.time) / dt / options.get("store", 1) + 64))
+        parameters = self._parameters()
+        self.first_parameters = parameters.copy()
+        compiled_options = {**options, "capacity": rows + 8 + 2 * len(manager.guards), "end": end}
+        self.stepper = Stepper(mechanism, manager, integrator, parameters, dt, compiled_options)
+        self.values = self.stepper.values
+        self.values["chunk"] = _steps_at_once(self.stepper)
+        width, capacity = self.values["width"], self.values["capacity"]
+        expected = 1.25 * (end - start.time) / dt / options.get("store", 1) + 1024
+        self.table = _first_table(max(int(min(expected, FIRST_TABLE / (8 * width))), 3 * capacity), width)
+        self.events: list[EventRecord] = []
+        self.parameter_changes: list[tuple[int, Vector]] = []
+        self.stored = 0
+        self.history: list[Savepoint] = []
+        self.pending: tuple[EventRecord, ...] = ()
+        self.earlier: Sequence[EventRecord] = ()  # of the run that is repeated, for its message
+        self.limit: int | None = None
+        self.tried = 0
+        self.label: float | None = None
+        self.failure: Failure | None = None
+        self.energy = EnergyFindings()
+        self.room = RoomFindings()
+        controllers, instants = getattr(model, "controllers", ()), getattr(model, "instants", ())
+        self.turns = TurnCounter()
+        self.boundaries = Boundaries(controllers, instants, start.time, dt, end)
+        self.damage = ""  # of the memory of the start
+        self.resumed = self.carried = False
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """What was asked for, with the strategy that contacts are treated by now."""
+        return _settings_now(self.values, self.manager, self.asked)
+
+    @property
+    def now(self) -> float:
+        return float(self.values["clock"][F.NOW])
+
+    def _parameters(self) -> Vector:
+        """The parameter vector; which parameters are folded into the equations is asked only where it counts."""
+        folded = getattr(self.model, "parameters", {}) if self.changed else {}
+        return self.mechanism.parameters(self.changed, folded)
+
+    def set_parameters(self, changed: Mapping[str, float]) -> None:
+        """Parameters that differ from the model's."""
+        self.changed = dict(changed)
+        self.values["params"][: len(self.first_parameters)] = self._parameters()
+
+    def collect(self) -> None:
+        """Take over the rows and events that the kernel has stored."""
+        v = self.values
+        count, logged = int(v["state"][F.STORED]), int(v["state"][F.LOGGED])
+        if logged:
+            self._collect_events(logged)
+        if count:
+            self._make_room(count)
+            self.table[self.stored : self.stored + count] = v["store"].reshape(-1, v["width"])[:count]
+        self.stored += count
+        v["state"][F.STORED] = v["state"][F.LOGGED] = 0
+
+    def _make_room(self, count: int) -> None:
+        """Have places for so many more rows; a MemoryError leaves all as it is."""
+        if self.stored + count <= len(self.table):
+            return
+        try:
+            table = np.empty((2 * len(self.table) + count, self.values["width"]))
+        except MemoryError:
+            table = np.empty((self.stored + count, self.values["width"]))
+        table[: self.stored] = self.table[: self.stored]
+        self.table = table
+
+    def _collect_events(self, logged: int) -> None:
+        """Events from the lines of the log."""
+        manager, width = self.manager, self.values["event_width"]
+        contacts, frictions = manager.names, [friction.name for friction in manager.frictions]
+        guards = [guard.name for guard in manager.guards]
+        known = {"event": guards, "stuck": frictions, "slipped": frictions}
+        for line in self.values["log"][: logged * width].reshape(logged, width):
+            kind, index = KINDS[int(line[1])], int(line[2])
+            name, told, impulse = known.get(kind, contacts)[index], {}, np.zeros(0)
+            if kind in ("closed", "opened"):
+                told = _impulses(manager, index, line[5:])
+                impulse = told[name]
+            row = self.stored + int(line[4])
+            self.events.append(EventRecord(float(line[0]), kind, name, impulse, float(line[3]), row, told))
+
+    @cached_property
+    def parameter_check(self) -> ParameterCheck:
+        """The judgement of values of the model's parameters."""
+        check: ParameterCheck = self.model.parameter_check()
+        return check
+
+    def count_turns(self) -> None:
+        """Write the whole turns of spatial cut joints at the accepted state into the anchors."""
+        self.turns.count(self.mechanism, self.values, self.stored, self.table)
+
+    def move_to(self, time: float) -> None:
+        """Put the clock, and the row just stored as the left side of a break, on its instant."""
+        self.stepper.keep_row()
+        self.collect()
+        if self.stored and self.table[self.stored - 1, 0] == self.now:
+            self.table[self.stored - 1, 0] = time
+        self.values["clock"][F.NOW] = time
+
+    def state(self) -> State:
+        """The accepted state."""
+        self.count_turns()
+        v = self.values
+        names = np.array(self.manager.names)
+        armed = frozenset(str(name) for name in names[v["armed"][: len(names)] == 1])
+        y = v["y"][: v["n"]].copy()
+        n_v = v["n_v"]
+        return State(
+            self.now if self.label is None else self.label, v["q"][: v["n_q"]].copy(), y[:n_v], y[n_v:],
+            self.manager.mode(v["closed"][: len(names)]), armed,
+            v["anchors"][: v["n_anchors"]].copy(), self.start.names, self.start.velocity_names, {}, dict(self.changed),
+        )  # fmt: skip
+
+
+def _settings_now(values: Mapping[str, Any], manager: ActiveSetManager, asked: Mapping[str, Any]) -> dict[str, Any]:
+    """The settings of a run, with the strategy that it has taken since."""
+    cause = int(values["state"][F.UNLOCATED]) if values["auto"] else 0
+    if cause == 0:
+        return {**asked}
+    since = float(values["clock"][F.UNLOCATED_SINCE])
+    count = sum(item.kind == "unilateral" for item in manager.contacts)
+    reason = (
+        f"contact='events' was chosen for {count} contacts until t = {since:.6g} s, then 'nonsmooth': {WHY[cause]}; "
+        "contact='events' locates all the same, contact='nonsmooth' takes fixed steps from the start"
+    )
+    return {**asked, "contact": "nonsmooth", "contact_reason": reason, "nonsmooth_since": since}
+
+
+def _steps_at_once(stepper: Stepper) -> int:
+    """Steps of a call of the kernel; they follow from the size alone, as what is judged between calls must."""
+    layout = stepper.mechanism.layout
+    size = max((layout.n + layout.n_rows) // USUAL_SIZE, 1)
+    return max(STEPS_AT_ONCE[stepper.compiled] // (size * size), STEPS_AT_ONCE[False])
+
+
+def _impulses(manager: ActiveSetManager, own: int, line: Vector) -> dict[str, Vector]:
+    """Impulses of contacts, and of dry frictions in joints, by name: that of contact `own`, and others if any."""
+    mine, numbers = manager.contacts[own], line.tolist()
+    found = {mine.name: line[list(mine.rows)]}
+    for contact in manager.contacts:
+        if contact is not mine and any(numbers[row] for row in contact.rows):
+            found[contact.name] = line[list(contact.rows)]
+    for friction in manager.frictions:
+        if friction.contact < 0 and numbers[friction.row]:
+            found[friction.name] = line[[friction.row]]
+    return found
+
+
+def _places(force: Force) -> str:
+    """The frames and joints of a force, for messages."""
+    named = [getattr(mention, "full_name", getattr(mention, "name", None)) for mention in force.mentions()]
+    return ", ".join(repr(name) for name in named if name)
+
+
+def _first_table(rows: int, width: int) -> Matrix:
+    """A table of so many rows, or of fewer where addresses are limited."""
+    while True:
+        try:
+            return np.empty((rows, width))
+        except MemoryError:
+            if rows < 1024:
+                raise
+            rows //= 4
