@@ -17,7 +17,7 @@ RANKS = [
     ("scope",),
     ("bodies", "joints", "forces", "constraints"),
     ("description",),
-    ("topology",),
+    ("configuration", "topology"),
     ("equations",),
     ("compile",),
     ("kernel",),

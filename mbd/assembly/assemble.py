@@ -40,6 +40,8 @@ SQUARED_ROUND_OFF = 1e-26
 
 BELOW = 1e-6
 """Depth [m, rad] below which an open contact is told to start inside the ground."""
+ROUNDED = 1e-3
+"""Most by which named coordinates, such as those of a quaternion, are taken for rounded values of a placement [-]."""
 LIFTED = 1e-8
 """Height [m, rad] above which an open contact is armed from the start."""
 
@@ -111,7 +113,10 @@ def assemble(
     if faults:
         raise UnknownNameError(faults)
     q, y = _values(equations, named, {})
+    if faults := _off_manifold(equations, named, q):
+        raise ModelError(faults)
     guess, _ = _values(equations, named, opening(model, mechanism, values, position or {}))
+    guess = equations.configuration.normalise(guess)
     anchors = np.zeros(mechanism.layout.n_anchors)
     work = Posture(
         mechanism, manager, values, guess, y.copy(), manager.flags(closed), anchors, named.places, named.speeds
@@ -181,7 +186,7 @@ def _closed(work: Posture, named: _Named, project: bool, model: Any) -> list[str
     q, y, rows = work.q.copy(), work.y.copy(), position_rows(work)
     held_q, held_v = ([], []) if project else _held(equations, named)
     free = np.ones((2, equations.n_v), dtype=bool)
-    free[0, [each.place for each in held_q]] = free[1, [each.place for each in held_v]] = False
+    _hold(free, held_q, held_v)
     misfit = close_positions(work, rows, free[0])
     if project and np.max(np.abs(misfit), initial=0.0) > TOLERANCE and work.places and work.mechanism.vector:
         reached, work.q = work.q.copy(), q.copy()
@@ -210,7 +215,7 @@ def _closed_as_named(work: Posture, named: _Named) -> bool:
     trial, rows = replace(work, q=work.q.copy(), y=work.y.copy(), anchors=work.anchors.copy()), position_rows(work)
     held_q, held_v = _held(work.equations, named)
     free = np.ones((2, work.equations.n_v), dtype=bool)
-    free[0, [each.place for each in held_q]] = free[1, [each.place for each in held_v]] = False
+    _hold(free, held_q, held_v)
     choose_turns(trial, rows)
     if not np.max(np.abs(close_nearby(trial, rows, free[0])), initial=0.0) <= TOLERANCE:
         return False
@@ -226,9 +231,36 @@ def _closed_as_named(work: Posture, named: _Named) -> bool:
 
 def _held(equations: Equations, named: _Named) -> tuple[list[Held], list[Held]]:
     """Coordinates and rates that stay as named."""
-    names = [coordinate.name for coordinate in equations.coordinates]
-    places = [Held(names[k], value, k) for k, value in named.q.items()]
-    return places, [Held(equations.velocity_names[k], value, k) for k, value in named.v.items()]
+    configuration = equations.configuration
+    joints = {first + k: (joint, first) for joint, first, _ in configuration.charts for k in range(len(joint.labels))}
+    places = [
+        Held(joints[k][0].name if k in joints else configuration.names[k], value, configuration.velocities_of[k])
+        for k, value in named.q.items()
+        if k not in joints or k == joints[k][1]
+    ]
+    return places, [Held(equations.velocity_names[k], value, (k,)) for k, value in named.v.items()]
+
+
+def _hold(free: Any, held_q: Sequence[Held], held_v: Sequence[Held]) -> None:
+    """Take what is named from the increments and the velocities that are free (2, n_v)."""
+    for level, held in enumerate((held_q, held_v)):
+        free[level, [k for each in held for k in each.moves]] = False
+
+
+def _off_manifold(equations: Equations, named: _Named, q: Vector) -> list[str]:
+    """Coordinates of joints that must be named together, or that no placement has; what to give."""
+    faults = []
+    for joint, first, _ in equations.configuration.charts:
+        own = range(first, first + len(joint.labels))
+        given, names = [k for k in own if k in named.q], ", ".join(map(repr, joint.coordinate_names))
+        if 0 < len(given) < len(own):
+            faults.append(f"position: {names} of {joint.known_as} belong together; name all of them or none")
+            continue
+        near = np.asarray(joint.normalise([float(q[k]) for k in own]), dtype=float)
+        if given and not np.max(np.abs(near - q[own.start : own.stop])) <= ROUNDED:
+            shown = ", ".join(f"{value:.6g}" for value in near)
+            faults.append(f"position: no placement of {joint.known_as} has these {names}; the nearest are {shown}")
+    return faults
 
 
 def undetermined(work: Posture) -> list[str]:

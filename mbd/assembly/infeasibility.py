@@ -20,11 +20,11 @@ MOST_SETS = 5
 
 @dataclass(frozen=True)
 class Held:
-    """A coordinate or rate whose value a start names; place: its number."""
+    """A coordinate or rate whose value a start names, or all of a joint; moves: numbers of the velocities that it fixes."""
 
     name: str
     value: float
-    place: int
+    moves: tuple[int, ...]
 
 
 Item = Member | Condition | Held
@@ -163,7 +163,7 @@ def named_conflict(
         if speeds:
             return _moves(work, start, picked, wanted, [each for each in held if each in chosen])
         free = np.ones(work.equations.n_v, dtype=bool)
-        free[[each.place for each in held if each in chosen]] = False
+        free[[k for each in held if each in chosen for k in each.moves]] = False
         return _closes(work, start, picked, wanted, free)
 
     items: list[Item] = [*dict.fromkeys(members.values()), *conditions, *held]
@@ -180,13 +180,14 @@ def _suspects(
 ) -> list[Item]:
     """Those that push against each other at the nearest posture, where Σ h ∇h = 0 along all that may move."""
     free = np.ones(work.equations.n_v, dtype=bool)
-    free[[each.place for each in held]] = False
+    free[[k for each in held for k in each.moves]] = False
     h, B = _nearest(work, start, rows, work.places, free)
     large = 1e-6 * float(np.max(np.abs(h), initial=0.0))
     items: list[Item] = list(dict.fromkeys(m for m, off in zip(members.values(), h, strict=False) if abs(off) > large))
     items += [c for c, off in zip(work.places, h[len(rows) :], strict=True) if abs(off) > large]
     push = np.abs(B.T @ h)
-    return [*items, *(each for each in held if push[each.place] > 1e-6 * float(np.max(push)))]
+    large = 1e-6 * float(np.max(push, initial=0.0))
+    return [*items, *(each for each in held if any(push[k] > large for k in each.moves))]
 
 
 def _moves(work: Posture, y: Vector, rows: Sequence[int], wanted: Sequence[Condition], held: Sequence[Held]) -> bool:
@@ -196,7 +197,7 @@ def _moves(work: Posture, y: Vector, rows: Sequence[int], wanted: Sequence[Condi
     terms = still.mechanism.acceleration_terms(still.time, still.q, still.y, still.parameters, still.anchors)
     picked = list(rows)
     rate, B = still.with_conditions(terms.rate[picked], terms.B[picked][:, :n_v], wanted)
-    unit = np.eye(n_v)[[each.place for each in held]]
+    unit = np.eye(n_v)[[k for each in held for k in each.moves]]
     right = np.concatenate([-rate, [each.value for each in held]])
     scale = 1.0 + float(np.max(np.abs(right), initial=0.0))
     return solvable(np.vstack([B, unit]), right, TOLERANCE * scale)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from mbd.arrays import Vector
@@ -32,28 +32,28 @@ def opening(model: Any, mechanism: Mechanism, parameters: Vector, position: Mapp
     known = mechanism.named.get("opening")
     if known is None:
         known = mechanism.named["opening"] = _asked(model)
-    names, nodes, coordinates, inputs = known
+    names, nodes, coordinates, defaults, inputs = known
     if not names:
         return {}
     given: dict[Node | tuple[str, int], float] = {("t", 0): 0.0}
-    for k, name in enumerate(coordinates):
-        given["q", k], given["x", k] = float(position.get(name, 0.0)), 0.0
+    for k, (name, default) in enumerate(zip(coordinates, defaults, strict=True)):
+        given["q", k], given["x", k] = float(position.get(name, default)), 0.0
     values = dict(zip((each.name for each in mechanism.equations.parameters), parameters, strict=False))
     for k, parameter in enumerate(inputs):
         given["p", k] = float(values.get(parameter.name, parameter.value))
     return dict(zip(names, evaluate(nodes, given), strict=True))
 
 
-def _asked(model: Description) -> tuple[list[str], list[Node], list[str], Any]:
-    """(names of coordinates, their values on a tape, names of its coordinates, its parameters)."""
+def _asked(model: Description) -> tuple[list[str], list[Node], list[str], Sequence[float], Any]:
+    """(names of coordinates, their values on a tape, names of its coordinates, their defaults, its parameters)."""
     here, whole = plan(model), uncut(model)
     apart = {joint.name for joint in (*here.floating, *whole.cut)}
     moved = [joint for joint in here.edges if joint.name in apart]
     if not moved:
-        return [], [], [], ()
+        return [], [], [], (), ()
     scope = Surroundings(model.ground, whole.edges, whole.cut, model.gravity, model.tunable, whole.planar)
     names, nodes = list[str](), list[Node]()
     for joint in moved:
         names += joint.coordinate_names
         nodes += [scope.real(value) for value in joint.recover(*scope.relative(joint), scope)]
-    return names, nodes, list(whole.coordinate_names), scope.parameters.found
+    return names, nodes, list(whole.coordinate_names), scope.configuration.defaults, scope.parameters.found

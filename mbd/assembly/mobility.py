@@ -226,7 +226,7 @@ def _idle(model: Any, work: Posture, active: list[int]) -> list[str]:
         parts = [part for owner, part in work.equations.idle if owner == joint.name]
         parts += [rows[k].part for k in sorted(work.manager.trivial) if rows[k].owner == joint.name]
         present = sum(rows[k].owner == joint.name and not rows[k].part.startswith("turns of") for k in active)
-        count = max((3 if chosen.planar else 6) - len(joint.labels) - present, 0)
+        count = max((3 if chosen.planar else 6) - len(joint.freedoms) - present, 0)
         parts.sort(key=lambda part: part not in IN_PLANE)
         titles += [f"{joint.name!r} ({part})" for part in parts[:count]]
     return titles

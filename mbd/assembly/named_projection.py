@@ -115,6 +115,10 @@ def _step(B: Matrix, off: Vector, slopes: Matrix, damping: float) -> Vector:
 def _off(work: Posture, places: Sequence[Condition], named: Mapping[int, float]) -> tuple[Vector, Matrix]:
     """How far named coordinates and places are off, and the derivatives of that."""
     off, slopes = _misfits(work, places, named, work.q)
+    configuration = work.equations.configuration
+    if len(named):
+        turning = configuration.rates(work.q, np.eye(configuration.n_v)).T  # N(q), n_q × n_v
+        slopes[: len(named)] = turning[list(named)]
     angles = [work.equations.coordinates[k].unit == "rad" for k in named] + [_turns(work, each.name) for each in places]
     return np.where(angles, np.remainder(off + np.pi, 2.0 * np.pi) - np.pi, off), slopes
 
@@ -132,7 +136,7 @@ def _misfits(work: Posture, found: Sequence[Condition], named: Mapping[int, floa
     off = np.array([*(values[k] - value for k, value in named.items()), *(residual for residual, _ in others)])
     slopes = np.zeros((len(off), n_v))
     for line, k in enumerate(named):
-        slopes[line, k] = 1.0
+        slopes[line, min(k, n_v - 1)] = 1.0  # of rates; those of coordinates are N(q)
     for line, (_, slope) in enumerate(others, start=len(named)):
         slopes[line] = slope
     return off, slopes

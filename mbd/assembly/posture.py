@@ -109,10 +109,10 @@ def close_positions(work: Posture, rows: Sequence[int], free: Matrix) -> Vector:
     misfit = _newton(work, rows, free, start)
     if np.max(np.abs(misfit)) <= TOLERANCE:
         return misfit
-    first, angles = work.q, np.array([c.unit == "rad" for c in work.equations.coordinates])
-    turns = np.random.default_rng(0).uniform(-1.5, 1.5, (RESTARTS, len(start)))
-    for turn in turns if work.mechanism.vector and bool((free & angles).any()) else ():
-        work.q = start + np.where(free & angles, turn, 0.0)
+    first, angles, moved = work.q, _angles(work), work.equations.configuration.compose
+    turns = np.random.default_rng(0).uniform(-1.5, 1.5, (RESTARTS, len(free)))
+    for turn in turns if bool((free & angles).any()) else ():
+        work.q = moved(start, np.where(free & angles, turn, 0.0))
         choose_turns(work, rows)
         again = _newton(work, rows, free, start)
         if np.max(np.abs(again)) <= TOLERANCE:
@@ -131,12 +131,17 @@ def close_positions(work: Posture, rows: Sequence[int], free: Matrix) -> Vector:
 
 def descents(work: Posture, start: Vector, free: Matrix) -> list[Vector]:
     """Positions to descend from: the given one, and others with the free angles turned and the rest shifted."""
-    if not work.mechanism.vector or not bool(np.any(free)):
+    if not bool(np.any(free)):
         return [start.copy()]
-    reach = np.array([1.5 if c.unit == "rad" else 0.5 for c in work.equations.coordinates])
-    turns = np.random.default_rng(1).uniform(-1.0, 1.0, (TRIES, len(start)))
+    reach = np.where(_angles(work), 1.5, 0.5)
+    turns = np.random.default_rng(1).uniform(-1.0, 1.0, (TRIES, len(free)))
     turns[0] = 0.0
-    return [start + np.where(free, reach * turn, 0.0) for turn in turns]
+    return [work.equations.configuration.compose(start, np.where(free, reach * turn, 0.0)) for turn in turns]
+
+
+def _angles(work: Posture) -> Any:
+    """(n_v,) booleans, increments that are angles."""
+    return np.array([unit == "rad" for _, unit in work.equations.configuration.freedoms], dtype=bool)
 
 
 def descend(work: Posture, rows: Sequence[int], free: Matrix, weights: Vector) -> tuple[Vector, Matrix]:
@@ -181,14 +186,7 @@ def close_nearby(work: Posture, rows: Sequence[int], free: Matrix) -> Vector:
 
 def move(work: Posture, x: Vector) -> None:
     """q ← q ⊕ x."""
-    if work.mechanism.vector:
-        work.q = work.q + x
-        return
-    block = work.mechanism.block(work.time, work.q, work.y, work.anchors)
-    block[work.mechanism.layout.x : work.mechanism.layout.v] = x
-    out = np.zeros(len(work.q))
-    work.mechanism.common["compose"](block, work.parameters, out)
-    work.q = out
+    work.q = work.equations.configuration.compose(work.q, x)
 
 
 def _newton(work: Posture, rows: Sequence[int], free: Matrix, start: Vector) -> Vector:
@@ -205,7 +203,7 @@ def _newton(work: Posture, rows: Sequence[int], free: Matrix, start: Vector) -> 
             continue
         size = float(np.max(np.abs(h)))
         places = _involved(B, free)
-        if not len(places) and size > TOLERANCE and work.mechanism.vector and iteration < NUDGES:
+        if not len(places) and size > TOLERANCE and iteration < NUDGES:
             _nudge(work, rows, free)
             continue
         if not np.isfinite(size) or not len(places):
@@ -213,7 +211,8 @@ def _newton(work: Posture, rows: Sequence[int], free: Matrix, start: Vector) -> 
         B = B[:, places]
         M = terms.M[:n_v, :n_v][np.ix_(places, places)]
         near = size < 1e-3 or iteration > 20
-        pull = (start - work.q)[places] if near and iteration < 100 else np.zeros(len(places))
+        near = near and iteration < 100
+        pull = work.equations.configuration.difference(work.q, start)[places] if near else np.zeros(len(places))
         change = _least_change(M, B, h, pull)
         limit = max(1.0, float(np.max(np.abs(change))) / 0.5)
         if size < 1e-13 and float(np.max(np.abs(change))) < 1e-12:
@@ -230,17 +229,17 @@ def _newton(work: Posture, rows: Sequence[int], free: Matrix, start: Vector) -> 
 
 def _turn_away(work: Posture, free: Matrix) -> None:
     """Leave a pose in which a joint is half a turn off, where its rows say nothing about the way back."""
-    angles = np.array([coordinate.unit == "rad" for coordinate in work.equations.coordinates])
-    if work.mechanism.vector:
-        work.q = work.q + np.where(free & angles, AWAY * (1.0 + np.arange(len(work.q)) / 7.0), 0.0)
+    move(work, np.where(free & _angles(work), AWAY * (1.0 + np.arange(len(free)) / 7.0), 0.0))
 
 
 def _nudge(work: Posture, rows: Sequence[int], free: Matrix) -> None:
     """Leave a flat spot, where no free coordinate acts on the rows, along those that act on them nearby."""
-    nearby = work.q + np.where(free, NUDGE * (1.0 + np.arange(len(work.q)) / 7.0), 0.0)
+    step = np.where(free, NUDGE * (1.0 + np.arange(len(free)) / 7.0), 0.0)
+    nearby = work.equations.configuration.compose(work.q, step)
     terms = work.mechanism.acceleration_terms(work.time, nearby, work.y, work.parameters, work.anchors)
-    places = _involved(terms.B[list(rows)][:, : work.equations.n_v], free)
-    work.q[places] = nearby[places]
+    acting = np.zeros(len(free))
+    acting[_involved(terms.B[list(rows)][:, : work.equations.n_v], free)] = 1.0
+    move(work, acting * step)
 
 
 def capture(work: Posture) -> None:

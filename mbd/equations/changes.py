@@ -1,8 +1,11 @@
 """How places and rotations change: derivatives by geometry instead of through the chain of rotations.
 
-For a coordinate x_j that turns all bodies beyond its joint at o_j about ω̂_j and moves them by û_j,
+Along a velocity v_j that turns all bodies beyond its joint at o_j about ω̂_j and moves them by û_j, places and rotations
+change by
 
-``∂p/∂x_j = û_j + ω̂_j × (p − o_j)``,  ``∂R/∂x_j = ω̂_j × R``,  ``ṗ`` and ``ω × R`` in time.
+``û_j + ω̂_j × (p − o_j)``,  ``ω̂_j × R``,  and by ``ṗ`` and ``ω × R`` in time.
+
+Where coordinates add these are ∂p/∂x_j and ∂R/∂x_j; else see `Inputs.by_increments`.
 """
 
 from __future__ import annotations
@@ -20,7 +23,7 @@ __all__ = ["partials", "rates"]
 
 
 def partials(placement: Placement, outputs: Sequence[Node]) -> list[dict[Node, Node]]:
-    """For each coordinate x_j, ∂node/∂x_j of the places and rotations that the outputs are made of."""
+    """For each velocity v_j, the derivative along it of the places and rotations that the outputs are made of."""
     lift = placement.tape.lift
     found: list[dict[Node, Node]] = [{} for _ in placement.movers]
     for node, mark in _marked(placement, outputs):

@@ -54,7 +54,7 @@ class CoordinateScope(ParameterScope):
     """
 
     def __init__(self, coordinates: Sequence[str], values: Mapping[str, float], tunable: Collection[str]) -> None:
-        super().__init__(len(coordinates), tunable)
+        super().__init__(len(coordinates), len(coordinates), tunable)
         self.views = _NoViews()
         self.cuts: tuple[Joint, ...] = ()
         self.states: list[tuple[Coordinate, Node]] = []

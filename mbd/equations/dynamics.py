@@ -152,6 +152,7 @@ class Dynamics:
         x, v, pulls = self._inputs.x, self._inputs.v, self._views.pulls
         still, on_x = pulls(work.values, work.multipliers, x, motion=False, attributed=attributed)
         moving, on_v = pulls(work.velocities, work.forces, v, motion=True, attributed=attributed)
+        on_x = self._inputs.along_velocities(on_x)
         return still + moving, [a + b for a, b in zip(on_x, on_v, strict=True)]
 
     def _gather(self, forces: Sequence[Pull], direct: Sequence[Node]) -> list[Node]:

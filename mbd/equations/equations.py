@@ -22,10 +22,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, Protocol
 
+from mbd.configuration import Configuration
 from mbd.tape.node import Node, Table, Tape
 
 __all__ = [
-    "Contact", "Coordinate", "Effect", "Equations", "Facing", "Friction", "Geometry", "Guard", "Parameter", "Row",
+    "Chart", "Contact", "Coordinate", "Effect", "Equations", "Facing", "Friction", "Geometry", "Guard", "Parameter", "Row",
     "Turn",
 ]  # fmt: skip
 
@@ -37,6 +38,18 @@ class Coordinate:
     name: str
     unit: str
     default: float = 0.0
+
+
+@dataclass(frozen=True)
+class Chart:
+    """How increments x move, where q ⊕ x is not q + x: ``v = D(x) ẋ``, ``D(0) = 1`` (see `mbd.configuration`).
+
+    rates : (n_v) ẋ = D⁻¹ v on the tape
+    velocities : (n_v × n_v) the entries of D, line by line
+    """
+
+    rates: tuple[Node, ...]
+    velocities: tuple[tuple[Node, ...], ...]
 
 
 @dataclass(frozen=True)
@@ -274,6 +287,8 @@ class Equations:
     kinetic, potential : T and V; V includes gravity and every effect with a potential
     output : any named result as a node ('left hip.angle', 'left shank.end.x', 'left knee.reaction_force.x', …)
     output_names : the names that `output` certainly knows
+    compose, chart : q ⊕ x (n_q) and how x moves; None where all coordinates add
+    configuration : what the joints say of coordinates and velocities; made from `coordinates` where it is not given
     turns : of the cut joints, see `Turn`
     facings : of the cut joints whose rows hold sines, see `Facing`
     idle : (owner, part) of rows of cut joints that hold whatever the motion, and were left out
@@ -303,7 +318,14 @@ class Equations:
     frictions: tuple[Friction, ...] = ()
     turns: tuple[Turn, ...] = ()
     facings: tuple[Facing, ...] = ()
+    chart: Chart | None = None
+    configuration: Configuration = field(default=None, repr=False)  # type: ignore[assignment]
     memory: dict[str, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        if self.configuration is None:
+            names, units = [c.name for c in self.coordinates], [c.unit for c in self.coordinates]
+            self.configuration = Configuration.of_vectors(names, units, [c.default for c in self.coordinates])
 
     @property
     def n_q(self) -> int:

@@ -59,8 +59,8 @@ def dry_joint(found: Laws, scope: DerivationScope, dynamics: Generalized, joint:
             continue
         rates = scope.joint(joint.name).rates if rates is None else rates
         view = scope.tape.lift(rates[place])
-        name = joint.name if len(joint.labels) == 1 else f"{joint.name}.{joint.labels[place].name}"
-        unit = joint.labels[place].unit
+        name = joint.name if len(joint.freedoms) == 1 else f"{joint.name}.{joint.freedoms[place].name}"
+        unit = joint.freedoms[place].unit
         found.rows.append(Row(name, "dry", scope.tape.zero, scope.real(view), unit=unit, kind="velocity"))
         found.viewed.append(view)
         _add(found, scope, dynamics, name, len(found.rows) - 1, -1, view, scope.tape.lift(limit))

@@ -27,7 +27,7 @@ __all__ = ["Column", "Edge", "Moving", "Twist", "ground_motion", "moving_body", 
 
 @dataclass(frozen=True)
 class Column:
-    """Motion of the child per unit rate of one coordinate: angular in child axes, linear in the parent's axes."""
+    """Motion of the child per unit of one velocity: angular in child axes, linear in the parent's axes."""
 
     angular: Triple
     linear: Triple
@@ -37,8 +37,8 @@ class Column:
 class Edge:
     """A joint of the spanning tree and its motion.
 
-    first : number of its first coordinate in v and x
-    values, rates, accelerations : q ⊕ x, v and a of the joint; increments : its x
+    first : number of its first velocity in v and x
+    values, rates, accelerations : q ⊕ x, v and a of the joint; increments, increment_rates : its x and ẋ
     """
 
     joint: Joint
@@ -47,6 +47,7 @@ class Edge:
     rates: tuple[Node, ...]
     accelerations: tuple[Node, ...]
     increments: tuple[Node, ...]
+    increment_rates: tuple[Node, ...]
 
 
 @dataclass(frozen=True)
@@ -62,12 +63,12 @@ class Moving:
     """A body of the tree.
 
     turn : R, child axes in parent axes; arm : d, the joint in the parent; shift : the joint in the child
-    columns : motion per unit rate of each coordinate
+    columns : motion per unit of each velocity
     turning, sliding : ω_r in child axes; ṗ of the joint's child frame against the parent in parent axes
     sliding_rate : p̈ of the same
     angular_velocity, angular_acceleration, acceleration : ω, α, and a − g of the origin, child axes
     spin : A = [α]ₓ + [ω]ₓ²
-    path : numbers of the coordinates that move it
+    path : numbers of the velocities that move it
     """
 
     body: Body
@@ -138,7 +139,7 @@ def _joint_motion(edge: Edge, columns: Sequence[Column], tape: Tape) -> tuple[Tr
     """ω_r, ω̇_r in child axes and ṗ, p̈ in parent axes."""
     turning, sliding = _combined(columns, edge.rates)
     turning_rate, sliding_rate = _combined(columns, edge.accelerations)
-    clock = dict(zip(edge.increments, edge.rates, strict=True))
+    clock = dict(zip(edge.increments, edge.increment_rates, strict=True))
     for column, rate in zip(columns, edge.rates, strict=True):
         turning_rate = total(turning_rate, scaled(rate, _jvp(column.angular, clock, tape)))
         sliding_rate = total(sliding_rate, scaled(rate, _jvp(column.linear, clock, tape)))

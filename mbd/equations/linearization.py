@@ -13,7 +13,7 @@ from mbd.equations.equations import Equations
 from mbd.equations.inputs import Inputs
 from mbd.equations.programs import balance_with, constraint_jacobian
 from mbd.tape.derivatives import jvp, jvps
-from mbd.tape.node import Node
+from mbd.tape.node import Node, Scalar
 
 __all__ = ["LinearTerms", "linearization"]
 
@@ -77,7 +77,7 @@ def linearization(
     r = balance_with(equations, rows, penalties, sliding)
     B = constraint_jacobian(equations, rows)
     h, rate = [equations.rows[k].value for k in rows], [equations.rows[k].rate for k in rows]
-    seeds: dict[Node, Node | float] = {inputs.t: 1.0, **dict(zip(inputs.x, inputs.v, strict=True))}
+    seeds: dict[Node, Scalar] = {inputs.t: 1.0, **inputs.clock}
     known = {} if equations.geometry is None else equations.geometry.rates(rate)
     change = jvp(rate, {**seeds, **known})
     for k, line in enumerate(B):
@@ -100,10 +100,10 @@ def linearization(
 
 
 def _places(equations: Equations, values: Sequence[Node]) -> list[list[Node]]:
-    """∂value/∂x, one list a coordinate."""
-    x = Inputs.of(equations).x
-    known = [{} for _ in x] if equations.geometry is None else equations.geometry.partials(values)
-    return jvps(values, [{place: 1.0, **known[j]} for j, place in enumerate(x)])
+    """Derivatives along each velocity, ∂value/∂x where coordinates add, one list a velocity."""
+    along = Inputs.of(equations).along
+    known = [{} for _ in along] if equations.geometry is None else equations.geometry.partials(values)
+    return jvps(values, [{**seeds, **known[j]} for j, seeds in enumerate(along)])
 
 
 def _across(columns: Sequence[Sequence[Node]], height: int) -> list[Node]:

@@ -16,13 +16,13 @@ class ParameterScope:
 
     Parameters
     ----------
-    size : generalized coordinates
+    n_q, n_v : coordinates and velocities
     tunable : names of parameters that stay inputs even at an exact 0 or ±1
     """
 
-    def __init__(self, size: int, tunable: Collection[str]) -> None:
+    def __init__(self, n_q: int, n_v: int, tunable: Collection[str]) -> None:
         self.tape = Tape()
-        self.inputs = Inputs.sized(self.tape, size, size)
+        self.inputs = Inputs.sized(self.tape, n_q, n_v)
         self.parameters = ParameterTable(self.tape, tunable)
         self._tables: dict[str, Table] = {}
 

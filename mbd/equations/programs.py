@@ -132,7 +132,7 @@ def _system(
     inputs = Inputs.of(equations)
     r = balance_with(equations, sorted({*rows, *borne}), penalties, sliding)
     B = constraint_jacobian(equations, rows)
-    bottom, turning = list(B), list[Node]()
+    bottom, turning = [inputs.row_by_increments(line) for line in B], list[Node]()
     fast = [place for place, k in enumerate(rows) if stabilized or equations.rows[k].is_velocity]
     ratio = inputs.c[1] / inputs.c[0]
     changes = _jacobian_rates(equations, [rows[place] for place in fast], [B[place] for place in fast])
@@ -299,7 +299,7 @@ def _forces(
 
 
 def constraint_jacobian(equations: Equations, rows: Sequence[int]) -> list[list[Node]]:
-    """B = ∂h/∂x of the rows, ∂rate/∂v of those on velocities; one list of n_v entries a row."""
+    """B = ∂ḣ/∂v of the rows, ∂h/∂x where coordinates add, ∂rate/∂v of those on velocities; n_v entries a row."""
     inputs = Inputs.of(equations)
     h = [equations.rows[k].value for k in rows]
     B = _slopes(equations, h)
@@ -310,12 +310,12 @@ def constraint_jacobian(equations: Equations, rows: Sequence[int]) -> list[list[
 
 
 def _slopes(equations: Equations, values: Sequence[Node]) -> list[list[Node]]:
-    """∂value/∂x, one list of n_v entries a value."""
+    """Derivatives along each velocity, ∂value/∂x where coordinates add, one list of n_v entries a value."""
     inputs = Inputs.of(equations)
     if equations.geometry is None or not values:
         return [gradient(value, inputs.x) for value in values]
     known = equations.geometry.partials(values)
-    return _transposed(jvps(values, [{x: 1.0, **known[j]} for j, x in enumerate(inputs.x)]))
+    return _transposed(jvps(values, [{**inputs.along[j], **known[j]} for j in range(len(known))]))
 
 
 def mass_matrix(equations: Equations, balance: Sequence[Node] | None = None) -> list[list[Node]]:
@@ -355,7 +355,7 @@ def _time_rates(equations: Equations, values: Sequence[Node]) -> list[Node]:
     """d/dt of functions of t and q ⊕ x."""
     inputs = Inputs.of(equations)
     known = {} if equations.geometry is None else equations.geometry.rates(values)
-    return jvp(values, {inputs.t: 1.0, **dict(zip(inputs.x, inputs.v, strict=True)), **known})
+    return jvp(values, {inputs.t: 1.0, **inputs.clock, **known})
 
 
 def _dot(a: Sequence[Node], b: Sequence[Node]) -> Node:

@@ -58,10 +58,10 @@ def _offer_joints(
         return known[joint.name].force if kind == "force" else known[joint.name].torque
 
     for joint in (*scope.tree, *scope.cuts):
-        for k, label in enumerate(joint.labels):
+        for k, label in enumerate(joint.freedoms):
             name = f"{joint.name}.{label.name}.acceleration"
             outputs.add(name, partial(_acceleration, scope, joint.name, k))
-        if len(joint.labels) == 1:
+        if len(joint.freedoms) == 1:
             outputs.add(f"{joint.name}.acceleration", partial(_acceleration, scope, joint.name, 0))
         if joint.name not in hidden:
             outputs.triple(f"{joint.name}.reaction_force", partial(part, joint, "force"))

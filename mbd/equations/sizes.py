@@ -27,7 +27,7 @@ def operations(plan: Plan) -> float:
     depth: dict[str, int] = {}
     pairs = count = 0
     for joint in plan.edges:
-        above, own = depth.get(joint.parent.body.name, 0), len(joint.coordinate_names)
+        above, own = depth.get(joint.parent.body.name, 0), len(joint.freedoms)
         pairs += own * above + own * (own + 1) // 2
         count += own
         depth[joint.child.body.name] = above + own

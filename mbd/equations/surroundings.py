@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Sequence
+from dataclasses import replace
 from functools import partial
 
 from mbd.bodies.algebra import IDENTITY, difference, product, rotate, transpose
 from mbd.bodies.base import Body, Frame
 from mbd.bodies.values import Vector3
+from mbd.configuration import Configuration
 from mbd.equations import changes
-from mbd.equations.equations import Coordinate, Turn
+from mbd.equations.equations import Chart, Coordinate, Turn
 from mbd.equations.headings import Headings, direction, spin
 from mbd.equations.kinematics import Edge, Moving, ground_motion, moving_body
 from mbd.equations.outputs import AXES, Outputs
@@ -20,7 +22,7 @@ from mbd.equations.views import Views
 from mbd.errors import UnknownNameError, nearest
 from mbd.joints.base import Joint, row_unit
 from mbd.scope import FrameMotion, JointMotion, Rotation, Triple
-from mbd.tape.derivatives import jvp, live
+from mbd.tape.derivatives import jvp, live, substitute
 from mbd.tape.functions import sin
 from mbd.tape.node import Node, Scalar, Tape
 
@@ -66,15 +68,18 @@ class Surroundings(ParameterScope):
         carried: Sequence[tuple[str, int]] = (),
     ) -> None:
         self.tree, self.cuts = tuple(tree), tuple(cuts)
-        size = sum(len(joint.labels) for joint in tree)
-        self.carried = {key: size + k for k, key in enumerate(carried)}
-        size += len(self.carried)
-        super().__init__(size, tunable)
+        labels = {joint.name: joint.labels for joint in cuts}
+        more = [(f"{name}.{labels[name][k].name}", labels[name][k].unit) for name, k in carried]
+        self.configuration = Configuration.of_joints(tree, more)
+        n_q, n_v = self.configuration.n_q, self.configuration.n_v
+        self.carried = {key: n_v - len(carried) + k for k, key in enumerate(carried)}
+        super().__init__(n_q, n_v, tunable)
+        self._chart()
         self.gravity = tuple(self.parameters.node(f"gravity.{a}", g) for a, g in zip(AXES, gravity, strict=True))
         self.states: list[tuple[Coordinate, Node]] = []
         self._joints: dict[str, JointMotion] = {}
         self.bodies = self._grown(ground)
-        values = [node for joint in tree for node in self._tree_motion(joint).coordinates]
+        values: list[Scalar] = [node for joint in tree for node in self._tree_motion(joint).coordinates]
         values += [self._own_angle(*key) for key in self.carried]
         self.composed = tuple(self.tape.lift(value) for value in values)
         self.placement = Placement(self.tape, list(self.bodies.values()), self.composed)
@@ -91,18 +96,43 @@ class Surroundings(ParameterScope):
         x, y, z = self.gravity
         bodies = {ground.name: ground_motion(ground, (x, y, z))}
         self._edges: dict[str, Edge] = {}
-        first = 0
+        place = first = 0
         for joint in self.tree:
-            edge = self._edges[joint.name] = self._edge(joint, first)
+            edge = self._edges[joint.name] = self._edge(joint, place, first)
             child = joint.child.body
             bodies[child.name] = moving_body(child, bodies[joint.parent.body.name], edge, self)
-            first += len(joint.labels)
+            place, first = place + len(joint.labels), first + len(joint.freedoms)
         return bodies
 
-    def _edge(self, joint: Joint, first: int) -> Edge:
-        own, inputs = slice(first, first + len(joint.labels)), self.inputs
-        values = tuple(self.tape.lift(value) for value in joint.compose(inputs.q[own], inputs.x[own]))
-        return Edge(joint, first, values, inputs.v[own], inputs.a[own], inputs.x[own])
+    def _edge(self, joint: Joint, place: int, first: int) -> Edge:
+        """place : number of its first coordinate."""
+        inputs, places, own = (
+            self.inputs,
+            slice(place, place + len(joint.labels)),
+            slice(first, first + len(joint.freedoms)),
+        )
+        values = tuple(self.tape.lift(value) for value in joint.compose(inputs.q[places], inputs.x[own]))
+        moving = [inputs.clock[x] for x in inputs.x[own]]
+        rates = tuple(self.tape.lift(rate) for rate in moving)
+        return Edge(joint, first, values, inputs.v[own], inputs.a[own], inputs.x[own], rates)
+
+    def _chart(self) -> None:
+        """How increments move, of joints whose coordinates do not add."""
+        if self.configuration.is_vector:
+            return
+        inputs, tape = self.inputs, self.tape
+        rates = list(inputs.v)
+        n_v = len(rates)
+        D = [[tape.one if i == j else tape.zero for j in range(n_v)] for i in range(n_v)]
+        for joint, _, first in self.configuration.charts:
+            own = slice(first, first + len(joint.freedoms))
+            x, v = inputs.x[own], inputs.v[own]
+            rates[own] = [tape.lift(rate) for rate in joint.increment_rates(x, v)]
+            speeds = [tape.lift(speed) for speed in joint.increment_velocities(x, v)]
+            for j, rate in enumerate(v):
+                for i, entry in enumerate(jvp(speeds, {rate: 1.0})):
+                    D[first + i][first + j] = entry
+        self.inputs = replace(inputs, chart=Chart(tuple(rates), tuple(tuple(line) for line in D)))
 
     def _tree_motion(self, joint: Joint) -> JointMotion:
         edge = self._edges[joint.name]
@@ -111,14 +141,13 @@ class Surroundings(ParameterScope):
     @property
     def coordinates(self) -> tuple[Coordinate, ...]:
         """The entries of q."""
-        own = [Coordinate(f"{j.name}.{label.name}", label.unit) for j in self.tree for label in j.labels]
-        labels = {joint.name: joint.labels for joint in self.cuts}
-        return (*own, *(Coordinate(f"{name}.{labels[name][k].name}", labels[name][k].unit) for name, k in self.carried))
+        known = self.configuration
+        return tuple(Coordinate(*each) for each in zip(known.names, known.units, known.defaults, strict=True))
 
     def _own_angle(self, joint: str, place: int) -> Node:
         """An angle of a cut joint that is a coordinate of its own."""
-        k = self.carried[joint, place]
-        return self.inputs.q[k] + self.inputs.x[k]
+        k = self.carried[joint, place]  # behind the coordinates of the tree
+        return self.inputs.q[k - len(self.inputs.v)] + self.inputs.x[k]
 
     def read(self, joint: Joint) -> list[Node]:
         """The coordinates of a cut joint as its frames show them, angles between −π and π."""
@@ -149,7 +178,7 @@ class Surroundings(ParameterScope):
             if joint is None:
                 raise UnknownNameError(nearest(name, [j.name for j in (*self.tree, *self.cuts)], "joint"))
             values = self.read(joint)
-            rates = self.rates(values)
+            rates = self._velocities(joint, values)
             place, angle = self._angles.get(name, (-1, 0.0))
             if place >= 0:
                 values[place] = self.tape.lift(angle)
@@ -275,8 +304,18 @@ class Surroundings(ParameterScope):
 
     def rates(self, values: Sequence[Node]) -> list[Node]:
         """d/dt, in views, of words' functions of t and q ⊕ x."""
-        seeds: dict[Node, Scalar] = {self.time: 1.0, **dict(zip(self.inputs.x, self.inputs.v, strict=True))}
+        seeds: dict[Node, Scalar] = {self.time: 1.0, **self.inputs.clock}
         return jvp(values, seeds | self.views.rates(values))
+
+    def _velocities(self, joint: Joint, values: Sequence[Node]) -> list[Node]:
+        """The velocities of a cut joint: the rates of its coordinates, or of ``q ⊖ q₀`` at q = q₀."""
+        rates = self.rates(values)
+        if joint.is_vector:
+            return rates
+        fresh = [self.tape.input("virtual", k) for k in range(len(values))]
+        moved = [self.tape.lift(x) for x in joint.difference(values, fresh)]
+        found = jvp(moved, dict(zip(fresh, rates, strict=True)))
+        return substitute(found, dict(zip(fresh, values, strict=True)))
 
     def rate(self, value: Scalar) -> Node:
         """d/dt of one of them."""
@@ -286,7 +325,7 @@ class Surroundings(ParameterScope):
         """d/dt of a word's function of t, q ⊕ x, v and z; no view is left in it."""
         values = [self.real(value)]
         inputs = self.inputs
-        seeds: dict[Node, Scalar] = {self.time: 1.0, **dict(zip(inputs.x, inputs.v, strict=True))}
+        seeds: dict[Node, Scalar] = {self.time: 1.0, **inputs.clock}
         seeds |= dict(zip(inputs.v, inputs.a, strict=True))
         seeds |= {node: self.tape.input("s", k) for k, (_, node) in enumerate(self.states)}
         return jvp(values, seeds | changes.rates(self.placement, values))[0]
@@ -308,10 +347,16 @@ class Surroundings(ParameterScope):
         """Time, coordinates and rates of every joint."""
         self.quantities.value("t", self.time)
         for joint in (*self.tree, *self.cuts):
-            for k, label in enumerate(joint.labels):
-                self.quantities.add(f"{joint.name}.{label.name}", partial(self._coordinate, joint.name, k))
-                self.quantities.add(f"{joint.name}.{label.name}.rate", partial(self._rate, joint.name, k))
-            if len(joint.labels) == 1:
+            if joint.is_vector:
+                for k, label in enumerate(joint.labels):
+                    self.quantities.add(f"{joint.name}.{label.name}", partial(self._coordinate, joint.name, k))
+                    self.quantities.add(f"{joint.name}.{label.name}.rate", partial(self._rate, joint.name, k))
+            else:
+                for k, name in enumerate(joint.coordinate_names):
+                    self.quantities.add(name, partial(self._coordinate, joint.name, k))
+                for k, name in enumerate(joint.velocity_names):
+                    self.quantities.add(name, partial(self._rate, joint.name, k))
+            if len(joint.freedoms) == 1:
                 self.quantities.add(f"{joint.name}.rate", partial(self._rate, joint.name, 0))
 
     def _coordinate(self, joint: str, place: int) -> Scalar:

@@ -21,7 +21,10 @@ JointLoss = Loss | Mapping[str, Loss] | None
 
 
 class Label(NamedTuple):
-    """A coordinate of a joint: its name ('angle') and unit ('rad' or 'm')."""
+    """A coordinate of a joint: its name ('angle') and unit ('rad', 'm', '' for a part of a quaternion).
+
+    A velocity of a joint: its name ('angle.rate', 'spin x') and unit ('rad/s' or 'm/s').
+    """
 
     name: str
     unit: str
@@ -38,6 +41,11 @@ class Joint(Parameterized, ABC):
     The relative motion is ``child = parent · (R(q), p(q))``. As a tree edge the joint generates its
     coordinates through `transform` and `subspace`; as a cut edge it gives `rows`, and `recover`
     reads the coordinates off the two frames. Both uses describe the same mechanics.
+
+    A joint whose coordinates form no vector (n_q ≥ n_v, such as a unit quaternion) declares `velocity_labels` and
+    `defaults`, says so by `is_vector`, and gives its chart: `compose`, `difference`, `normalise`, `coordinate_rates`,
+    `increment_rates` and `increment_velocities`, written with functions of scalars that also take arrays (see
+    `mbd.configuration`). For all others these have defaults.
 
     A new joint is a frozen dataclass with the fields below; `stiffness` and `rest` are fields only of joints with one
     coordinate, whose linear spring has the energy ``½ k (q − rest)²``. It calls `settle` when it is made.
@@ -60,7 +68,7 @@ class Joint(Parameterized, ABC):
 
     @abstractmethod
     def subspace(self, q: Sequence[Scalar], scope: Scope) -> Sequence[tuple[Triple, Triple]]:
-        """For each coordinate, (angular, linear) velocity of the child frame per unit rate, in child axes."""
+        """For each velocity, (angular, linear) velocity of the child frame per unit of it, in child axes."""
 
     @abstractmethod
     def rows(self, R: Rotation, p: Triple, scope: Scope) -> Sequence[tuple[str, Scalar]]:
@@ -83,30 +91,67 @@ class Joint(Parameterized, ABC):
         """Whether it is seen from its child (see `mbd.joints.reversed.Reversed`)."""
         return False
 
-    def compose(self, q: Sequence[Scalar], x: Sequence[Scalar]) -> Sequence[Scalar]:
-        """q ⊕ x, the coordinates after a local increment x; + for every joint whose coordinates form a vector."""
-        return [a + b for a, b in zip(q, x, strict=True)]
-
+    # the chart of its coordinates ---------------------------------------------------------------------------------
     @property
     def is_vector(self) -> bool:
-        """Whether ⊕ is +."""
+        """Whether ⊕ is + and the velocities are the rates of the coordinates."""
         return True
+
+    @property
+    def velocity_labels(self) -> tuple[Label, ...]:
+        """The velocities, in order; the rates of the coordinates for every joint whose coordinates form a vector."""
+        return tuple(Label(f"{label.name}.rate", f"{label.unit}/s") for label in self.labels)
+
+    @property
+    def freedoms(self) -> tuple[Label, ...]:
+        """The degrees of freedom: each velocity's label without '.rate' and '/s', ('angle', 'rad')."""
+        found = ((label.name.removesuffix(".rate"), label.unit.removesuffix("/s")) for label in self.velocity_labels)
+        return tuple(Label(name, unit) for name, unit in found)
+
+    @property
+    def defaults(self) -> tuple[float, ...]:
+        """The coordinates at which it is unless told otherwise, (1, 0, 0, 0) of a quaternion."""
+        return (0.0,) * len(self.labels)
+
+    def compose(self, q: Sequence[Scalar], x: Sequence[Scalar]) -> Sequence[Scalar]:
+        """q ⊕ x (n_q), the coordinates after a local increment x (n_v)."""
+        return [a + b for a, b in zip(q, x, strict=True)]
+
+    def difference(self, q: Sequence[Scalar], other: Sequence[Scalar]) -> Sequence[Scalar]:
+        """other ⊖ q (n_v), the increment x with q ⊕ x = other."""
+        return [b - a for a, b in zip(q, other, strict=True)]
+
+    def normalise(self, q: Sequence[Scalar]) -> Sequence[Scalar]:
+        """The nearest coordinates (n_q) that the joint can have: a quaternion of length 1."""
+        return list(q)
+
+    def coordinate_rates(self, q: Sequence[Scalar], v: Sequence[Scalar]) -> Sequence[Scalar]:
+        """q̇ = N(q) v (n_q), which is ∂(q ⊕ x)/∂x · v at x = 0."""
+        return list(v)
+
+    def increment_rates(self, x: Sequence[Scalar], v: Sequence[Scalar]) -> Sequence[Scalar]:
+        """ẋ = D(x)⁻¹ v (n_v) of the motion q ⊕ x(t) with velocities v; D(0) = 1."""
+        return list(v)
+
+    def increment_velocities(self, x: Sequence[Scalar], rates: Sequence[Scalar]) -> Sequence[Scalar]:
+        """v = D(x) ẋ (n_v), the inverse of `increment_rates`."""
+        return list(rates)
 
     # effects of the joint itself ---------------------------------------------------------------------------------
     def losses(self) -> list[tuple[int, str, Loss]]:
-        """(place of the coordinate, owner of the parameters, loss): (0, 'left knee loss', Viscous(0.1))."""
+        """(place of the velocity, owner of the parameters, loss): (0, 'left knee loss', Viscous(0.1))."""
         if isinstance(self.loss, Mapping):
-            places = {label.name: place for place, label in enumerate(self.labels)}
+            places = {label.name: place for place, label in enumerate(self.freedoms)}
             return [(places[label], f"{self.name} loss.{label}", loss) for label, loss in self.loss.items()]
         if self.loss is None:
             return []
-        return [(place, f"{self.name} loss", self.loss) for place in range(len(self.labels))]
+        return [(place, f"{self.name} loss", self.loss) for place in range(len(self.freedoms))]
 
     def frictions(self) -> dict[str, Any]:
         """Its loss without each friction that truly sticks: {'left knee friction': Viscous(0.1)}."""
         found: dict[str, Any] = {}
-        alone = len(self.labels) == 1
-        each = {self.labels[place].name: loss for place, _, loss in self.losses()}
+        alone = len(self.freedoms) == 1
+        each = {self.freedoms[place].name: loss for place, _, loss in self.losses()}
         for label, loss in each.items():
             if loss.smooth is loss or loss.smooth == loss:
                 continue
@@ -117,8 +162,8 @@ class Joint(Parameterized, ABC):
         return found
 
     def resistance(self, rates: Sequence[Scalar], scope: Scope) -> list[Scalar]:
-        """Generalized force ∂D/∂q̇ of its losses for each coordinate, positive on the left-hand side [N m or N]."""
-        forces: list[Scalar] = [0.0] * len(self.labels)
+        """Generalized force ∂D/∂v of its losses for each velocity, positive on the left-hand side [N m or N]."""
+        forces: list[Scalar] = [0.0] * len(self.freedoms)
         for place, owner, loss in self.losses():
             forces[place] = forces[place] + loss.force(rates[place], scope, owner)
         return forces
@@ -159,10 +204,9 @@ class Joint(Parameterized, ABC):
         faults = [fault for _, owner, loss in self.losses() for fault in loss.faults(owner)]
         faults += super().faults()
         for place, owner, loss in self.losses():
-            if loss.needs_reaction and self.labels[place].unit != "rad":
-                faults.append(
-                    f"'{owner}': friction of a pin on '{self.labels[place].name}', which does not turn; use mbd.Coulomb"
-                )
+            if loss.needs_reaction and self.freedoms[place].unit != "rad":
+                name = self.freedoms[place].name
+                faults.append(f"'{owner}': friction of a pin on '{name}', which does not turn; use mbd.Coulomb")
         if self.parent.body is self.child.body:
             faults.append(
                 f"joint '{self.name}' connects '{self.parent.body.name}' to itself; give a frame of another body"
@@ -173,6 +217,11 @@ class Joint(Parameterized, ABC):
     def coordinate_names(self) -> tuple[str, ...]:
         """'left knee.angle', …"""
         return tuple(f"{self.name}.{label.name}" for label in self.labels)
+
+    @property
+    def velocity_names(self) -> tuple[str, ...]:
+        """'left knee.angle.rate', …"""
+        return tuple(f"{self.name}.{label.name}" for label in self.velocity_labels)
 
     def settle(self) -> None:
         """Check the fields at the border; every joint calls this when it is made."""
@@ -188,13 +237,13 @@ class Joint(Parameterized, ABC):
         if isinstance(self.loss, Mapping) and not self.loss:
             put(self, "loss", None)
         if isinstance(self.loss, Mapping):
-            known = [label.name for label in self.labels]
+            known = [label.name for label in self.freedoms]
             for label in self.loss:
                 if label not in known:
                     raise ModelError(f"loss of '{self.name}': " + nearest(label, known, "coordinate", "The joint has"))
             put(self, "loss", {label: loss_of(loss, f"{self.name}.{label}") for label, loss in self.loss.items()})
-        elif loss_of(self.loss, self.name) is not None and len({label.unit for label in self.labels}) != 1:
-            labels = ", ".join(f"'{label.name}' [{label.unit}]" for label in self.labels)
+        elif loss_of(self.loss, self.name) is not None and len({label.unit for label in self.freedoms}) != 1:
+            labels = ", ".join(f"'{label.name}' [{label.unit}]" for label in self.freedoms)
             raise ModelError(
                 f"{kind} '{self.name}': one loss cannot serve its coordinates ({labels or 'it has none'}); "
                 "say on which each acts, such as loss={'angle': mbd.Viscous(0.1)}"

@@ -83,6 +83,36 @@ class Reversed(Joint):
         """As the joint."""
         return self.joint.compose(q, x)
 
+    @property
+    def velocity_labels(self) -> tuple[Label, ...]:
+        """The joint's velocities."""
+        return self.joint.velocity_labels
+
+    @property
+    def defaults(self) -> tuple[float, ...]:
+        """As the joint."""
+        return self.joint.defaults
+
+    def difference(self, q: Sequence[Scalar], other: Sequence[Scalar]) -> Sequence[Scalar]:
+        """As the joint."""
+        return self.joint.difference(q, other)
+
+    def normalise(self, q: Sequence[Scalar]) -> Sequence[Scalar]:
+        """As the joint."""
+        return self.joint.normalise(q)
+
+    def coordinate_rates(self, q: Sequence[Scalar], v: Sequence[Scalar]) -> Sequence[Scalar]:
+        """As the joint."""
+        return self.joint.coordinate_rates(q, v)
+
+    def increment_rates(self, x: Sequence[Scalar], v: Sequence[Scalar]) -> Sequence[Scalar]:
+        """As the joint."""
+        return self.joint.increment_rates(x, v)
+
+    def increment_velocities(self, x: Sequence[Scalar], rates: Sequence[Scalar]) -> Sequence[Scalar]:
+        """As the joint."""
+        return self.joint.increment_velocities(x, rates)
+
     def parameters(self) -> dict[str, float]:
         """As the joint."""
         return self.joint.parameters()

@@ -64,9 +64,11 @@ def quantities(model: Description) -> list[str]:
     """Names that functions, measures and controllers may ask for: 't', coordinates, rates, places, velocities."""
     names = ["t"]
     for joint in (*model.joints, *_floating(model)):
-        for coordinate in joint.coordinate_names:
-            names += [coordinate, f"{coordinate}.rate"]
-        if len(joint.labels) == 1:
+        if joint.is_vector:
+            names += [name for coordinate in joint.coordinate_names for name in (coordinate, f"{coordinate}.rate")]
+        else:
+            names += [*joint.coordinate_names, *joint.velocity_names]
+        if len(joint.freedoms) == 1:
             names.append(f"{joint.name}.rate")
     for frame in model.frames:
         names += [f"{frame}.{part}" for part in ("x", "y", "z", "vx", "vy", "vz")]
@@ -282,7 +284,7 @@ def _constrained(model: Description) -> list[Frame | Joint | str]:
 
 def _spins(joint: Joint, body: Body, values: Mapping[str, float]) -> bool:
     frame = joint.parent if joint.parent.body is body else joint.child
-    turns = any(label.unit == "rad" for label in joint.labels) and not isinstance(joint, Screw)
+    turns = any(label.unit == "rad" for label in joint.freedoms) and not isinstance(joint, Screw)
     offset = [values.get(f"{frame.full_name}.{axis}", at) for axis, at in zip("xyz", frame.offset, strict=True)]
     return turns and not any(offset)
 

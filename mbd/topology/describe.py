@@ -53,6 +53,9 @@ def _joint(joint: Joint) -> str:
     )
     said = f"{joint.name}: {type(joint).__name__} {joint.parent.full_name} → {joint.child.full_name}"
     said += f", {coordinates}" if coordinates else ""
+    if not joint.is_vector:
+        pairs = zip(joint.velocity_names, joint.velocity_labels, strict=True)
+        said += f", velocities {', '.join(f'{name} [{label.unit}]' for name, label in pairs)}"
     said += f", loss {joint.loss}" if joint.loss is not None else ""
     return said + (f", stiffness {joint.stiffness:.6g}, rest {joint.rest:.6g}" if joint.stiffness else "")
 

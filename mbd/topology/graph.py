@@ -88,8 +88,8 @@ def mobility(bodies: int, joints: Sequence[Joint], planar: bool) -> int:
     Parameters
     ----------
     bodies : n, without the ground
-    joints : with f_j coordinates each
+    joints : with f_j velocities each
     planar : whether all moves in x–y
     """
     d = 3 if planar else 6
-    return d * bodies - sum(d - len(joint.labels) for joint in joints)
+    return d * bodies - sum(d - len(joint.freedoms) for joint in joints)

@@ -161,7 +161,7 @@ def _is_turned(model: Description, body: Body) -> bool:
     """
     for joint in model.joints:
         for own, other in (joint.parent, joint.child), (joint.child, joint.parent):
-            holds = own.body is body and all(label.unit != "rad" for label in joint.labels)
+            holds = own.body is body and all(label.unit != "rad" for label in joint.freedoms)
             if holds and not (_is_level(own) and _is_level(other) and isinstance(other.body, Ground)):
                 return True
             if holds and _has_moments(model, body, joint):

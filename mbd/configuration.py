@@ -1,0 +1,198 @@
+"""The configuration of a mechanism: coordinates q (n_q) and velocities v (n_v), and how one moves the other.
+
+Coordinates of most joints form a vector: n_q = n_v, ``q ⊕ x = q + x``, ``q̇ = v``. Those of others, such as a unit
+quaternion for the orientation of a ball joint, lie on a manifold, with n_q ≥ n_v. Around an accepted q₀ they are
+described by a local increment x (n_v), the chart of a step:
+
+    q = q₀ ⊕ x,   x = q ⊖ q₀,   v = D(x) ẋ,   ẋ = D(x)⁻¹ v,   D(0) = 1,   q̇ = N(q) v = ∂(q ⊕ x)/∂x · v at x = 0
+
+On the rotation group with v in body axes and ``R = R₀ exp(x̂)``, D is the right tangent operator
+``T(x) = 1 − (1−cos θ)/θ² x̂ + (θ−sin θ)/θ³ x̂²``, θ = |x|. Equations are exact at any x of a chart: B and generalized
+forces are derivatives along velocities, at ``q₀ ⊕ x``; Newton's matrices are derivatives by x, larger by D.
+
+What schemes make of it, each with the order that it has where coordinates add:
+
+- The Newmark family takes ``x = dt v₀ + dt² ((½−β) a₀ + β a₁)``, ``v₁ = v₀ + dt ((1−γ) a₀ + γ a₁)`` (Brüls & Cardona
+  2010; Arnold, Brüls & Cardona 2015): ẋ = v + O(|x|) leaves an error of third order in a step, as the scheme does, if
+  the part of D⁻¹ that is linear in x is skew in x and v, ``½ [x, v]``, as in the exponential and the Cayley chart.
+- Runge–Kutta and Radau stages integrate ``ẋ = D(x)⁻¹ v`` in the chart of the step (Munthe-Kaas 1999), an equation in a
+  vector space: its order is kept.
+- Between the rows of a run x is interpolated in the chart of the row before, with ẋ and ẍ from D.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from mbd.arrays import Vector
+from mbd.joints.base import Joint
+
+__all__ = ["Configuration"]
+
+
+@dataclass(frozen=True, eq=False)
+class Configuration:
+    """Coordinates and velocities of all joints; arrays may have any number of leading axes.
+
+    Attributes
+    ----------
+    names, units, defaults : (n_q) of the coordinates
+    velocity_names, velocity_units : (n_v) of the velocities
+    charts : (joint, first of its coordinates, first of its velocities) of joints whose coordinates do not add
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    defaults: tuple[float, ...]
+    velocity_names: tuple[str, ...]
+    velocity_units: tuple[str, ...]
+    charts: tuple[tuple[Joint, int, int], ...] = ()
+
+    @classmethod
+    def of_joints(cls, joints: Sequence[Joint], more: Sequence[tuple[str, str]] = ()) -> Configuration:
+        """Coordinates and velocities of joints, in order, followed by `more` coordinates (name, unit) that add."""
+        names, units, defaults = list[str](), list[str](), list[float]()
+        speeds, speed_units, charts = list[str](), list[str](), list[tuple[Joint, int, int]]()
+        for joint in joints:
+            if not joint.is_vector:
+                charts.append((joint, len(names), len(speeds)))
+            names += joint.coordinate_names
+            units += [label.unit for label in joint.labels]
+            defaults += joint.defaults
+            speeds += joint.velocity_names
+            speed_units += [label.unit for label in joint.velocity_labels]
+        for name, unit in more:
+            names.append(name)
+            units.append(unit)
+            defaults.append(0.0)
+            speeds.append(f"{name}.rate")
+            speed_units.append(f"{unit}/s")
+        return cls(tuple(names), tuple(units), tuple(defaults), tuple(speeds), tuple(speed_units), tuple(charts))
+
+    @classmethod
+    def of_vectors(cls, names: Sequence[str], units: Sequence[str], defaults: Sequence[float]) -> Configuration:
+        """Coordinates that add, with their rates as velocities."""
+        rates = tuple(f"{name}.rate" for name in names)
+        return cls(tuple(names), tuple(units), tuple(defaults), rates, tuple(f"{unit}/s" for unit in units))
+
+    @property
+    def n_q(self) -> int:
+        """Coordinates."""
+        return len(self.names)
+
+    @property
+    def n_v(self) -> int:
+        """Velocities."""
+        return len(self.velocity_names)
+
+    @property
+    def is_vector(self) -> bool:
+        """Whether q ⊕ x is q + x everywhere."""
+        return not self.charts
+
+    @cached_property
+    def freedoms(self) -> tuple[tuple[str, str], ...]:
+        """(name, unit) of each increment: of its coordinate, or of its velocity without '.rate' and '/s'."""
+        pairs = zip(self.velocity_names, self.velocity_units, strict=True)
+        return tuple((name.removesuffix(".rate"), unit.removesuffix("/s")) for name, unit in pairs)
+
+    @cached_property
+    def places(self) -> Any:
+        """(n_v,) numbers of the coordinates that have a velocity of their own, −1 for those of charts."""
+        found: list[int] = []
+        charts = {first_v: (joint, first_q) for joint, first_q, first_v in self.charts}
+        q = 0
+        while len(found) < self.n_v:
+            if len(found) in charts:
+                joint, q = charts[len(found)]
+                q += len(joint.labels)
+                found += [-1] * len(joint.velocity_labels)
+            else:
+                found.append(q)
+                q += 1
+        return np.array(found, dtype=np.intp)
+
+    @cached_property
+    def velocities_of(self) -> tuple[tuple[int, ...], ...]:
+        """(n_q) numbers of the velocities that move each coordinate."""
+        found: dict[int, tuple[int, ...]] = {int(q): (v,) for v, q in enumerate(self.places) if q >= 0}
+        for joint, first_q, first_v in self.charts:
+            own = tuple(range(first_v, first_v + len(joint.velocity_labels)))
+            found |= {first_q + k: own for k in range(len(joint.labels))}
+        return tuple(found[k] for k in range(self.n_q))
+
+    # the operations -----------------------------------------------------------------------------------------------
+    def compose(self, q: Any, x: Any) -> Vector:
+        """q ⊕ x (…, n_q)."""
+        q, x = np.asarray(q, dtype=float), np.asarray(x, dtype=float)
+        if self.is_vector:
+            return np.asarray(q + x)
+        return self._made("q", lambda joint: joint.compose, (q, "q"), (x, "v"), lambda a, b: a + b)
+
+    def difference(self, q: Any, other: Any) -> Vector:
+        """other ⊖ q (…, n_v), the increment x with q ⊕ x = other."""
+        q, other = np.asarray(q, dtype=float), np.asarray(other, dtype=float)
+        if self.is_vector:
+            return np.asarray(other - q)
+        return self._made("v", lambda joint: joint.difference, (q, "q"), (other, "q"), lambda a, b: b - a)
+
+    def normalise(self, q: Any) -> Vector:
+        """The nearest coordinates that the joints can have (…, n_q)."""
+        q = np.asarray(q, dtype=float)
+        if self.is_vector:
+            return q
+        return self._made("q", lambda joint: lambda own, _: joint.normalise(own), (q, "q"), (q, "q"), lambda a, b: a)
+
+    def rates(self, q: Any, v: Any) -> Vector:
+        """q̇ = N(q) v (…, n_q)."""
+        q, v = np.asarray(q, dtype=float), np.asarray(v, dtype=float)
+        if self.is_vector:
+            return v
+        return self._made("q", lambda joint: joint.coordinate_rates, (q, "q"), (v, "v"), lambda a, b: b)
+
+    def increment_rates(self, x: Any, v: Any) -> Vector:
+        """ẋ = D(x)⁻¹ v (…, n_v)."""
+        x, v = np.asarray(x, dtype=float), np.asarray(v, dtype=float)
+        if self.is_vector:
+            return v
+        return self._made("v", lambda joint: joint.increment_rates, (x, "v"), (v, "v"), lambda a, b: b)
+
+    def increment_velocities(self, x: Any, rates: Any) -> Vector:
+        """v = D(x) ẋ (…, n_v)."""
+        x, rates = np.asarray(x, dtype=float), np.asarray(rates, dtype=float)
+        if self.is_vector:
+            return rates
+        return self._made("v", lambda joint: joint.increment_velocities, (x, "v"), (rates, "v"), lambda a, b: b)
+
+    def interpolate(self, q: Any, other: Any, s: Any) -> Vector:
+        """``q ⊕ s (other ⊖ q)`` (…, n_q): q at s = 0, the other at s = 1."""
+        x = np.asarray(s, dtype=float)[..., np.newaxis] * self.difference(q, other)
+        return self.compose(q, x)
+
+    def _made(
+        self, target: str, method: Callable[[Joint], Callable[..., Sequence[Any]]], one: tuple[Any, str],
+        two: tuple[Any, str], adding: Callable[[Any, Any], Any],
+    ) -> Vector:  # fmt: skip
+        """A function of two arrays, by each joint's method, and by `adding` where coordinates add."""
+        lead = np.broadcast_shapes(one[0].shape[:-1], two[0].shape[:-1])
+        (a, kind_a), (b, kind_b) = (
+            (np.broadcast_to(array, (*lead, array.shape[-1])).reshape(-1, array.shape[-1]), kind) for array, kind in (one, two)
+        )  # fmt: skip
+        size = self.n_q if target == "q" else self.n_v
+        out = np.empty((len(a), size))
+        own_v = np.flatnonzero(self.places >= 0)
+        own = {"q": self.places[own_v], "v": own_v}
+        out[:, own[target]] = adding(a[:, own[kind_a]], b[:, own[kind_b]])
+        for joint, first_q, first_v in self.charts:
+            part = {
+                "q": slice(first_q, first_q + len(joint.labels)),
+                "v": slice(first_v, first_v + len(joint.velocity_labels)),
+            }
+            values = method(joint)(list(a[:, part[kind_a]].T), list(b[:, part[kind_b]].T))
+            out[:, part[target]] = np.column_stack([np.broadcast_to(value, len(a)) for value in values])
+        return out.reshape(*lead, size)
