@@ -132,59 +132,60 @@ class Configuration:
         q, x = np.asarray(q, dtype=float), np.asarray(x, dtype=float)
         if self.is_vector:
             return np.asarray(q + x)
-        return self._made("q", lambda joint: joint.compose, (q, "q"), (x, "v"), lambda a, b: a + b)
+        return self._by_joints("q", lambda joint: joint.compose, (q, "q"), (x, "v"), lambda a, b: a + b)
 
     def difference(self, q: Any, other: Any) -> Vector:
         """other ⊖ q (…, n_v), the increment x with q ⊕ x = other."""
         q, other = np.asarray(q, dtype=float), np.asarray(other, dtype=float)
         if self.is_vector:
             return np.asarray(other - q)
-        return self._made("v", lambda joint: joint.difference, (q, "q"), (other, "q"), lambda a, b: b - a)
+        return self._by_joints("v", lambda joint: joint.difference, (q, "q"), (other, "q"), lambda a, b: b - a)
 
     def normalise(self, q: Any) -> Vector:
         """The nearest coordinates that the joints can have (…, n_q)."""
         q = np.asarray(q, dtype=float)
         if self.is_vector:
-            return q
-        return self._made("q", lambda joint: lambda own, _: joint.normalise(own), (q, "q"), (q, "q"), lambda a, b: a)
+            return np.asarray(q)
+        return self._by_joints(
+            "q", lambda joint: lambda own, _: joint.normalise(own), (q, "q"), (q, "q"), lambda a, b: a
+        )
 
     def rates(self, q: Any, v: Any) -> Vector:
         """q̇ = N(q) v (…, n_q)."""
         q, v = np.asarray(q, dtype=float), np.asarray(v, dtype=float)
         if self.is_vector:
-            return v
-        return self._made("q", lambda joint: joint.coordinate_rates, (q, "q"), (v, "v"), lambda a, b: b)
+            return np.asarray(v)
+        return self._by_joints("q", lambda joint: joint.coordinate_rates, (q, "q"), (v, "v"), lambda a, b: b)
 
     def increment_rates(self, x: Any, v: Any) -> Vector:
         """ẋ = D(x)⁻¹ v (…, n_v)."""
         x, v = np.asarray(x, dtype=float), np.asarray(v, dtype=float)
         if self.is_vector:
-            return v
-        return self._made("v", lambda joint: joint.increment_rates, (x, "v"), (v, "v"), lambda a, b: b)
+            return np.asarray(v)
+        return self._by_joints("v", lambda joint: joint.increment_rates, (x, "v"), (v, "v"), lambda a, b: b)
 
     def increment_velocities(self, x: Any, rates: Any) -> Vector:
         """v = D(x) ẋ (…, n_v)."""
         x, rates = np.asarray(x, dtype=float), np.asarray(rates, dtype=float)
         if self.is_vector:
-            return rates
-        return self._made("v", lambda joint: joint.increment_velocities, (x, "v"), (rates, "v"), lambda a, b: b)
+            return np.asarray(rates)
+        return self._by_joints("v", lambda joint: joint.increment_velocities, (x, "v"), (rates, "v"), lambda a, b: b)
 
     def interpolate(self, q: Any, other: Any, s: Any) -> Vector:
         """``q ⊕ s (other ⊖ q)`` (…, n_q): q at s = 0, the other at s = 1."""
         x = np.asarray(s, dtype=float)[..., np.newaxis] * self.difference(q, other)
         return self.compose(q, x)
 
-    def _made(
+    def _by_joints(
         self, target: str, method: Callable[[Joint], Callable[..., Sequence[Any]]], one: tuple[Any, str],
         two: tuple[Any, str], adding: Callable[[Any, Any], Any],
     ) -> Vector:  # fmt: skip
         """A function of two arrays, by each joint's method, and by `adding` where coordinates add."""
         lead = np.broadcast_shapes(one[0].shape[:-1], two[0].shape[:-1])
-        (a, kind_a), (b, kind_b) = (
-            (np.broadcast_to(array, (*lead, array.shape[-1])).reshape(-1, array.shape[-1]), kind) for array, kind in (one, two)
-        )  # fmt: skip
+        a, b = (np.broadcast_to(x, (*lead, x.shape[-1])).reshape(-1, x.shape[-1]) for x, _ in (one, two))
+        kind_a, kind_b = one[1], two[1]
         size = self.n_q if target == "q" else self.n_v
-        out = np.empty((len(a), size))
+        out: Vector = np.empty((len(a), size))
         own_v = np.flatnonzero(self.places >= 0)
         own = {"q": self.places[own_v], "v": own_v}
         out[:, own[target]] = adding(a[:, own[kind_a]], b[:, own[kind_b]])
@@ -195,4 +196,4 @@ class Configuration:
             }
             values = method(joint)(list(a[:, part[kind_a]].T), list(b[:, part[kind_b]].T))
             out[:, part[target]] = np.column_stack([np.broadcast_to(value, len(a)) for value in values])
-        return out.reshape(*lead, size)
+        return np.asarray(out.reshape(*lead, size))

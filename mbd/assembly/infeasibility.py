@@ -20,7 +20,10 @@ MOST_SETS = 5
 
 @dataclass(frozen=True)
 class Held:
-    """A coordinate or rate whose value a start names, or all of a joint; moves: numbers of the velocities that it fixes."""
+    """A coordinate or rate whose value a start names, or all of a joint.
+
+    moves : numbers of the velocities that it fixes
+    """
 
     name: str
     value: float

@@ -26,8 +26,8 @@ from mbd.configuration import Configuration
 from mbd.tape.node import Node, Table, Tape
 
 __all__ = [
-    "Chart", "Contact", "Coordinate", "Effect", "Equations", "Facing", "Friction", "Geometry", "Guard", "Parameter", "Row",
-    "Turn",
+    "Chart", "Contact", "Coordinate", "Effect", "Equations", "Facing", "Friction", "Geometry", "Guard", "Parameter",
+    "Row", "Turn",
 ]  # fmt: skip
 
 

@@ -45,7 +45,7 @@ def equation_laws(findings: Findings, model: Any, *, postures: int = 2, seed: in
     equations = model if isinstance(model, Equations) else derive(model)
     outside = findings.where
     for k in range(postures):
-        point = inputs(equations, seed + k, x=0.1)
+        point = inputs(equations, seed + k, x=0.1 if equations.configuration.is_vector else 0.5)
         findings.where = f"posture {seed + k} of the model '{equations.name}': {_shown(equations, point)}"
         with np.errstate(all="ignore"):
             _inertia(findings, equations, point)
@@ -65,8 +65,14 @@ def _shown(equations: Equations, point: Point) -> str:
 
 
 def _along(equations: Equations, point: Point) -> Point:
-    """The direction of the motion: ẋ = v, ṫ = 1."""
-    return {("x", k): point["v", k] for k in range(equations.n_v)} | {("t", 0): 1.0}
+    """The direction of the motion: ẋ = D⁻¹ v, ṫ = 1."""
+    return _increments(equations, point, _speeds(equations, point)) | {("t", 0): 1.0}
+
+
+def _increments(equations: Equations, point: Point, v: Numbers) -> dict[tuple[str, int], float]:
+    """ẋ = D⁻¹ v as a direction of the inputs."""
+    rates = equations.configuration.increment_rates(_speeds(equations, point, "x"), v)
+    return {("x", k): float(rate) for k, rate in enumerate(rates)}
 
 
 def _speeds(equations: Equations, point: Point, kind: str = "v") -> Numbers:
@@ -74,8 +80,10 @@ def _speeds(equations: Equations, point: Point, kind: str = "v") -> Numbers:
 
 
 def _gradient(equations: Equations, nodes: Any, point: Point, kind: str = "x") -> Numbers:
-    """∂ nodes/∂x, or ∂v, by differences (nodes, n_v)."""
-    return np.array([derivative(nodes, point, {(kind, j): 1.0}) for j in range(equations.n_v)]).T
+    """Derivatives along each velocity, or ∂ nodes/∂v, by differences (nodes, n_v)."""
+    axes = np.eye(equations.n_v)
+    along = [{(kind, j): 1.0} if kind == "v" else _increments(equations, point, axes[j]) for j in range(equations.n_v)]
+    return np.array([derivative(nodes, point, each) for each in along]).T
 
 
 def _inertia(findings: Findings, equations: Equations, point: Point) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 import mbd
 from mbd.bodies import Ground
 from mbd.bodies.base import Frame
+from mbd.configuration import Configuration
 from mbd.joints import Reversed
 from mbd.joints.base import Joint
 from mbd.tape.derivatives import jvp
@@ -67,7 +68,7 @@ def check_joint(joint: Joint | Callable[[Frame, Frame], Joint], *, postures: int
     _words(findings, joint)
     rng = np.random.default_rng(seed)
     for k in range(postures):
-        values = rng.uniform(-1.4, 1.4, len(joint.labels))
+        values = np.array(joint.normalise(list(rng.uniform(-1.4, 1.4, len(joint.labels)))), dtype=float)
         shown = ", ".join(f"{label.name} = {value:.4f}" for label, value in zip(joint.labels, values, strict=True))
         for each, side in (joint, ""), (Reversed(joint), ", seen from the child"):
             findings.where = f"{shown or 'its one posture'}{side} (seed {seed}, posture {k})"
@@ -75,6 +76,8 @@ def check_joint(joint: Joint | Callable[[Frame, Frame], Joint], *, postures: int
             _transform_laws(findings, placed)
             _row_laws(findings, placed)
         _composition(findings, joint, values)
+        if not joint.is_vector:
+            _chart_laws(findings, joint, values, rng)
     findings.where = f"seed {seed}"
     _planarity(findings, joint)
     if not findings.broken:
@@ -92,13 +95,13 @@ def _transform_laws(findings: Findings, placed: Placed) -> None:
     again = Placed.at(joint, scope.value(*placed.q)).numbers()
     findings.equal("determinism", "transform asked again", again, place, "it may depend on q alone", 0.0)
     law = "the subspace is the derivative of the transform"
-    hint = "subspace() gives (ω, v) of the child frame per unit rate in CHILD axes: [ω×] = Rᵀ ∂R/∂q, v = Rᵀ ∂p/∂q"
-    subspace = joint.subspace(placed.q, scope)
-    if not findings.equal(law, "number of directions", len(subspace), len(placed.q), hint):
+    hint = "subspace() gives (ω, v) of the child frame per unit velocity in CHILD axes: [ω×] = Rᵀ ∂R/∂q, v = Rᵀ ∂p/∂q"
+    subspace, here = joint.subspace(placed.q, scope), scope.value(*placed.q)
+    if not findings.equal(law, "number of directions", len(subspace), len(joint.freedoms), hint):
         return
-    for label, q, (angular, linear) in zip(joint.labels, placed.q, subspace, strict=True):
-        here = scope.numbers[q]
-        sides = [placed.numbers({q: here + side * STEP}) for side in (1.0, -1.0, 2.0, -2.0)]
+    for k, (label, (angular, linear)) in enumerate(zip(joint.freedoms, subspace, strict=True)):
+        shifts = [[side * STEP * (j == k) for j in range(len(subspace))] for side in (1.0, -1.0, 2.0, -2.0)]
+        sides = [placed.numbers(dict(zip(placed.q, _moved(joint, here, x), strict=True))) for x in shifts]
         slopes = (8.0 * (sides[0] - sides[1]) - (sides[2] - sides[3])) / (12.0 * STEP)
         turn = R.T @ slopes[:3]
         spin = [turn[2, 1], turn[0, 2], turn[1, 0]]
@@ -106,7 +109,13 @@ def _transform_laws(findings: Findings, placed: Placed) -> None:
         findings.equal(law, f"linear velocity of '{label.name}'", scope.value(*linear), R.T @ slopes[3], hint, 1e-8)
     found = scope.value(*joint.recover(placed.R, placed.p, scope))
     hint = "recover() reads the coordinates off R, p; angles between −π and π"
-    findings.equal("recover inverts the transform", "q", found, scope.value(*placed.q), hint, 1e-10)
+    off = np.array(joint.difference(list(here), list(found)), dtype=float)
+    findings.equal("recover inverts the transform", "q less what it is", off, 0.0, hint, 1e-10)
+
+
+def _moved(joint: Joint, q: Sequence[float], x: Sequence[float]) -> list[float]:
+    """q ⊕ x in numbers."""
+    return [float(value) for value in joint.compose(list(q), list(x))]
 
 
 def _row_laws(findings: Findings, placed: Placed) -> None:
@@ -115,8 +124,8 @@ def _row_laws(findings: Findings, placed: Placed) -> None:
     residuals = [value for _, value in joint.rows(placed.R, placed.p, scope)]
     hint = "rows() are the constraints that the joint's own motion satisfies at every q"
     findings.equal("rows vanish on the joint's own motion", "h", scope.value(*residuals), 0.0, hint, 1e-11)
-    law, freedom = "rows and coordinates share the six freedoms", len(joint.labels)
-    hint = "a joint with n coordinates has 6 − n independent rows"
+    law, freedom = "rows and coordinates share the six freedoms", len(joint.freedoms)
+    hint = "a joint with n velocities has 6 − n independent rows"
     if not findings.equal(law, "number of rows", len(residuals), 6 - freedom, hint):
         return
     jacobian = _row_jacobian(placed)
@@ -124,7 +133,7 @@ def _row_laws(findings: Findings, placed: Placed) -> None:
     sentence = f"the rows depend on each other: smallest singular value {smallest:.3g} of their Jacobian"
     findings.holds(law, smallest > 1e-6, sentence, hint)
     hint = "a row resists a motion that the joint allows, or the subspace is wrong"
-    for label, (angular, linear) in zip(joint.labels, joint.subspace(placed.q, scope), strict=True):
+    for label, (angular, linear) in zip(joint.freedoms, joint.subspace(placed.q, scope), strict=True):
         along = jacobian @ np.array(scope.value(*angular, *linear))
         findings.equal("rows do not resist the joint's motion", f"ḣ along '{label.name}'", along, 0.0, hint, 1e-10)
 
@@ -151,7 +160,8 @@ def _row_jacobian(placed: Placed) -> Numbers:
 def _composition(findings: Findings, joint: Joint, values: Numbers) -> None:
     """q ⊕ x."""
     scope = FreeScope()
-    q, x = ([scope.tape.input(kind, k) for k in range(len(joint.labels))] for kind in "qx")
+    sizes = {"q": len(joint.labels), "x": len(joint.freedoms)}
+    q, x = ([scope.tape.input(kind, k) for k in range(size)] for kind, size in sizes.items())
     composed, scope.numbers = joint.compose(q, x), scope.numbers | dict(zip(q, map(float, values), strict=True))
     rest = dict.fromkeys(x, 0.0)
     hint = "compose(q, x) is q ⊕ x, and q where x is zero"
@@ -159,6 +169,40 @@ def _composition(findings: Findings, joint: Joint, values: Numbers) -> None:
     if joint.is_vector:
         sum_ = scope.value(*composed, given=dict.fromkeys(x, 0.25))
         findings.equal("⊕ is + where is_vector says so", "q ⊕ x", sum_, values + 0.25, hint, 1e-12)
+
+
+def _chart_laws(findings: Findings, joint: Joint, values: Numbers, rng: np.random.Generator) -> None:
+    """⊖ inverts ⊕, N(q) is the derivative of ⊕, and D(x) tells how increments move (see `mbd.configuration`)."""
+    findings.where = f"q = {np.array2string(values, precision=4)}"
+    whole = Configuration.of_joints([joint])
+    n, reach = whole.n_v, rng.uniform(0.0, 1.2)
+    x, v = rng.uniform(-reach, reach, n), rng.uniform(-1.0, 1.0, n)
+    there = whole.compose(values, x)
+    hint = "difference(q, other) is the increment x with q ⊕ x = other"
+    findings.equal("(q ⊕ x) ⊖ q = x", "x", whole.difference(values, there), x, hint, 1e-12)
+    tiny = whole.difference(values, whole.compose(values, 1e-9 * x))
+    findings.equal("(q ⊕ x) ⊖ q = x", "a tiny x", tiny, 1e-9 * x, hint, 1e-15)
+    back = whole.compose(values, whole.difference(values, there))
+    findings.equal("q ⊕ (q' ⊖ q) = q'", "q'", back, there, hint, 1e-12)
+    hint = "normalise(q) is q of every placement, and q ⊕ x is one"
+    findings.equal("q ⊕ x is a placement", "q", whole.normalise(there), there, hint, 1e-14)
+    sides = (1.0, -1.0, 2.0, -2.0)
+
+    def slope(points: list[Numbers]) -> Numbers:
+        return np.asarray((8.0 * (points[0] - points[1]) - (points[2] - points[3])) / (12.0 * STEP))
+
+    rates = slope([whole.compose(values, side * STEP * v) for side in sides])
+    hint = "coordinate_rates(q, v) is ∂(q ⊕ x)/∂x · v at x = 0"
+    findings.equal("q̇ = N(q) v is the rate of q ⊕ s v", "q̇", whole.rates(values, v), rates, hint, 1e-9)
+    moving = whole.increment_rates(x, v)
+    points = [whole.difference(there, whole.compose(values, x + side * STEP * moving)) for side in sides]
+    hint = "increment_rates(x, v) is ẋ of the motion q ⊕ x(t) with velocities v"
+    findings.equal("ẋ = D(x)⁻¹ v moves q ⊕ x with v", "v", slope(points), v, hint, 1e-9)
+    hint = "increment_velocities is the inverse of increment_rates"
+    findings.equal("v = D(x) ẋ", "v", whole.increment_velocities(x, moving), v, hint, 1e-12)
+    bent = slope([whole.increment_rates(side * STEP * v, v) for side in sides])
+    hint = "ẋ = v + ½ [x, v] + O(x²), skew in x and v; else schemes of second order lose one"
+    findings.equal("the part of D⁻¹ that is linear in x is skew", "d/ds D(s v)⁻¹ v at s = 0", bent, 0.0, hint, 1e-9)
 
 
 def _words(findings: Findings, joint: Joint) -> None:
@@ -169,14 +213,15 @@ def _words(findings: Findings, joint: Joint) -> None:
     joint.subspace(placed.q, scope)
     joint.recover(placed.R, placed.p, scope)
     joint.elastic_energy(placed.q, scope)
-    joint.resistance(placed.q, scope)
+    joint.resistance([scope.tape.input("v", k) for k in range(len(joint.freedoms))], scope)
     declared = joint.parameters()
     undeclared = {name: value for name, value in scope.recorded.items() if declared.get(name) != value}
     hint = "parameters() must name every scope.parameter(…) with the same value"
     findings.holds("parameters are declared before they are used", not undeclared, f"undeclared: {undeclared}", hint)
-    units = {label.unit for label in joint.labels}
+    units = {label.unit for label in joint.freedoms}
     findings.holds("units are 'rad' or 'm'", units <= {"rad", "m"}, f"units {sorted(units)}", "see Label")
-    for kind, names in ("coordinate", [label.name for label in joint.labels]), ("row", rows):
+    named = {"coordinate": joint.labels, "velocity": joint.velocity_labels}
+    for kind, names in *((kind, [label.name for label in labels]) for kind, labels in named.items()), ("row", rows):
         sentence = f"{kind} names {names}"
         findings.holds("names are told apart", len(set(names)) == len(names), sentence, "give each its own label")
     faults = joint.faults()

@@ -32,6 +32,9 @@ def inputs(equations: Equations, seed: int = 0, x: float = 0.0, spread: float = 
     found: Point = {("t", 0): 0.37, ("c", 0): 0.7, ("c", 1): 0.23}
     for kind, size in sizes.items():
         found |= {(kind, k): float(value) for k, value in enumerate(rng.uniform(-1, 1, size) * spread)}
+    if not equations.configuration.is_vector:
+        q = equations.configuration.normalise([found["q", k] for k in range(equations.n_q)])
+        found |= {("q", k): float(value) for k, value in enumerate(q)}
     found |= {("x", k): float(value) for k, value in enumerate(rng.uniform(-1, 1, equations.n_v) * x)}
     found |= {("p", k): parameter.value for k, parameter in enumerate(equations.parameters)}
     found |= {("switch", k): 1.0 for k in range(len(equations.contacts))}
