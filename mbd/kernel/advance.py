@@ -340,7 +340,7 @@ def judge_step(K: Any, h: float, full: float, t1: float, cut: bool, within: bool
         if status != 0:
             return status
     event = 0
-    if parts < 0 or not (quiet or looked):
+    if parts != 0 or not (quiet or looked):  # a shorter step is one of its own: what was looked at is interpolated
         event = find_event(K, h, t1)
         if event > 0:
             return event

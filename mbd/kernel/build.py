@@ -35,8 +35,8 @@ MODULES = (
     "complementarity", "blow", "impact", "settle", "singular.step_pairs", "schemes.iteration", "schemes.memory",
     "singular.gram_norms", "singular.newmark_step", "schemes.newton", "schemes.newmark", "complex_linear",
     "ordered_complex", "schemes.stages", "singular.step_size", "uneven", "schemes.runge_kutta", "singular.stages",
-    "schemes.radau", "hermite", "significance", "guards", "pace", "control", "interior", "refine", "locate",
-    "switching", "nonsmooth", "takeover", "observe", "starting", "poles", "unresolved", "trying", "crowding",
+    "schemes.radau", "hermite", "significance", "guards", "pace", "control", "interior", "takeover", "refine",
+    "locate", "switching", "nonsmooth", "observe", "starting", "poles", "unresolved", "trying", "crowding",
     "singular.events", "events", "advance",
 )  # fmt: skip
 

@@ -21,6 +21,8 @@ from mbd.kernel.fields import (
     LOGGED,
     NO_IMPACT,
     NOW,
+    OPEN_FORCE,
+    OPEN_PULL,
     PLASTIC,
     REDONE,
     RESTART,
@@ -115,13 +117,17 @@ def handle_event(K: Any) -> int:
     kind = K.fired[0]
     index = K.fired[1]
     first = K.state[LOGGED]
+    at_start = K.pick[2] <= 0.0 and K.stabilized == 0 and (kind == OPEN_FORCE or kind == OPEN_PULL)
+    if at_start:  # the accepted row, which does not pull, is the one before
+        store_row(K)
     take_over(K, K.clock[NOW] + K.pick[2])
     if same_instant(K):
         return CHATTER
     if kind == WATCH:
         K.state[RESTART] = 2
         return switch(K) - 1
-    store_row(K)
+    if not at_start:
+        store_row(K)
     if kind == CROSS:
         log_event(K, LOG_EVENT, index, 0.0, NO_IMPULSE)
         K.side[index] = -K.side[index]

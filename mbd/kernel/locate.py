@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from mbd.kernel.candidate import stay
 from mbd.kernel.fields import (
     CLOSE,
     CROSS,
@@ -24,6 +23,7 @@ from mbd.kernel.fields import (
 from mbd.kernel.guards import frictions_at, gap_tolerance, guard_value, is_watched, judge, try_step
 from mbd.kernel.hermite import first_guess
 from mbd.kernel.refine import refine
+from mbd.kernel.takeover import look, look_at_start, put_on_rows
 
 __all__ = ["locate"]
 
@@ -215,7 +215,7 @@ def find_way(K: Any, kind: int, index: int, high: float) -> float:
     low = high
     for _ in range(MOST_LOOKS):
         low *= 0.5
-        status = try_step(K, low, K.clock[NOW] + low)
+        status = look(K, low, K.clock[NOW] + low)
         if status != 0:
             return -float(status)
         if guard_value(K, kind, index, K.clock[NOW] + low) > tiny:
@@ -227,6 +227,7 @@ def bracket(K: Any, kind: int, index: int, low: float, high: float) -> int:
     """Root of the fired guard between two distances from the accepted state; K.pick[2] its distance."""
     t = K.clock[NOW]
     K.counts[LOCATIONS] += 1
+    put_on_rows(K, t + high)
     f_high = guard_value(K, kind, index, t + high)
     if f_high >= 0.0:
         if kind == OPEN_PULL:  # only the multiplier of the step was negative, not that of the motion
@@ -235,30 +236,33 @@ def bracket(K: Any, kind: int, index: int, low: float, high: float) -> int:
         elif kind == STICK or kind == SLIP:
             K.active[K.n_contacts + K.n_guards + index] = 1
             K.fired[0] = -1
+        elif kind == CROSS:  # with velocities on the rows it has not crossed yet
+            K.active[K.n_contacts + index] = 1
+            K.fired[0] = -1
         K.pick[2] = high
         return 0
     d_high = guard_rate(K, kind, index)
     if low > 0.0:
-        status = try_step(K, low, t + low)
+        status = look(K, low, t + low)
         if status != 0:
             return status
     else:
-        stay(K)
+        look_at_start(K)
     f_low = guard_value(K, kind, index, t + low)
     if f_low <= 0.0 and (kind == STICK or kind == CLOSE):
         low = find_way(K, kind, index, high)
         if low < 0.0:
             return int(-low)
         if low == 0.0:
-            stay(K)
+            look_at_start(K)
         f_low = guard_value(K, kind, index, t + low)
     if f_low <= 0.0:
         if (kind == OPEN_GAP or kind == OPEN_FORCE) and K.guards0[K.n_contacts + index] < 0.0:
             K.pick[2] = high  # a touch too short to be seen within the step: it is over at its end
-            return try_step(K, high, t + high)
+            return look(K, high, t + high)
         if low > 0.0 and kind != CROSS:
             low = 0.0
-            stay(K)
+            look_at_start(K)
         K.pick[2] = low
         return 0
     width = high - low
@@ -266,5 +270,5 @@ def bracket(K: Any, kind: int, index: int, low: float, high: float) -> int:
     if K.linear == 1 and kind != WATCH and kind != OPEN_PULL:  # no contact is stored that pulls
         place = low + width * f_low / (f_low - f_high)
         K.pick[2] = place
-        return try_step(K, place, t + place)
+        return look(K, place, t + place)
     return refine(K, kind, index, low, f_low, high, f_high, low + width * guess)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from mbd.kernel.fields import CLOSE, CROSS, EPS, NOW, OPEN_GAP, WATCH
-from mbd.kernel.guards import gap_tolerance, guard_value, try_step
+from mbd.kernel.guards import gap_tolerance, guard_value
+from mbd.kernel.takeover import look
 
 __all__ = ["refine"]
 
@@ -57,7 +58,7 @@ def refine(K: Any, kind: int, index: int, low: float, f_low: float, high: float,
             b += move
         else:
             b += limit if half > 0.0 else -limit
-        status = try_step(K, b, t + b)
+        status = look(K, b, t + b)
         if status != 0:
             return status
         at = b
@@ -66,7 +67,7 @@ def refine(K: Any, kind: int, index: int, low: float, f_low: float, high: float,
     if kind == WATCH and fb >= 0.0:  # end where it is watched, or it fires again
         place = c
     K.pick[2] = place
-    return 0 if at == place else try_step(K, place, t + place)
+    return 0 if at == place else look(K, place, t + place)
 
 
 def enough(K: Any, kind: int, index: int, f_low: float, f_high: float) -> float:

@@ -1,27 +1,31 @@
-"""Taking over a candidate before a restart (at events, after uneven steps), and going on beyond singular poses."""
+"""Taking over a candidate before a restart (at events, after uneven steps), and going on beyond singular poses.
+
+Steps of index 3 leave B v + h_t of the size of their error, which a candidate loses as it is taken over. Forces and
+guards change with it: where an event is looked for, they are those of the velocities that it will leave.
+"""
 
 from __future__ import annotations
 
 from typing import Any
 
-from mbd.kernel.candidate import adopt
-from mbd.kernel.fields import NOW, PULL
-from mbd.kernel.guards import update_armed, update_sides, watch
+from mbd.kernel.candidate import adopt, stay
+from mbd.kernel.fields import NOW, PULL, ROWS
+from mbd.kernel.guards import frictions_at, try_step, update_armed, update_sides, watch
 from mbd.kernel.hooks import scheme_resume
 from mbd.kernel.restart import active_rows, consistent, evaluate, largest_force, stepping_rows
 from mbd.kernel.saddle import solve_rows
 
-__all__ = ["leave_pose", "take_over"]
+__all__ = ["leave_pose", "look", "look_at_start", "put_on_rows", "take_over"]
 
 
-def project_velocity(K: Any, m: int, dropping: bool) -> int:
-    """The nearest velocities, in the metric of M, with B v + h_t = 0 on the m rows in K.rows.
+def project_velocity(K: Any, t: float, q: Any, y: Any, m: int, dropping: bool) -> int:
+    """The nearest velocities to y, in the metric of M, with B v + h_t = 0 on the m rows in K.rows.
 
     They may depend on each other where `dropping` finds out anew which do.
     """
     if m == 0:
         return 0
-    evaluate(K, K.clock[NOW], K.q, K.y)
+    evaluate(K, t, q, y)
     o_rate = K.n * K.n + K.n + 2 * K.n * K.n_rows + K.n_rows
     for i in range(K.n):
         K.force[i] = 0.0
@@ -30,8 +34,32 @@ def project_velocity(K: Any, m: int, dropping: bool) -> int:
     status = solve_rows(K, m, dropping)
     if status == 0:
         for i in range(K.n):
-            K.y[i] += K.jump[i]
+            y[i] += K.jump[i]
     return status
+
+
+def put_on_rows(K: Any, t1: float) -> None:
+    """A candidate of index 3 with the velocities and guards that it has once it is taken over."""
+    if K.stabilized == 1 or K.scheme != 0 or K.state[ROWS] == 0:
+        return
+    if project_velocity(K, t1, K.q1, K.y1, stepping_rows(K), False) == 0:
+        watch(K, t1, K.q1, K.y1, K.rate1, K.lam1, K.guards1)
+        for f in range(K.n_frictions):
+            K.limit[f] = K.guards1[frictions_at(K) + 2 * K.n_frictions + f]
+
+
+def look(K: Any, h: float, t1: float) -> int:
+    """A candidate at t1 = t + h as an event there would take it over."""
+    status = try_step(K, h, t1)
+    if status == 0:
+        put_on_rows(K, t1)
+    return status
+
+
+def look_at_start(K: Any) -> None:
+    """The accepted state as the candidate of an event at the very start of the step."""
+    stay(K)
+    put_on_rows(K, K.clock[NOW])
 
 
 def would_pull(K: Any) -> bool:
@@ -44,15 +72,33 @@ def would_pull(K: Any) -> bool:
     return False
 
 
+def turns_to_pull(K: Any) -> bool:
+    """Whether a closed penalty contact that pushes with the velocities of the candidate pulls with those in K.y."""
+    place = 2 * K.n_contacts
+    looked = False
+    for c in range(K.n_contacts):
+        if K.kind[c] == 1 and K.closed[c] == 1 and K.opens[c] == 0 and K.guards0[place + c] >= 0.0:
+            if not looked:
+                watch(K, K.clock[NOW], K.q, K.y, K.rate, K.lam, K.guards1)
+                looked = True
+            if K.guards1[place + c] < 0.0:
+                return True
+    return False
+
+
 def take_over(K: Any, t1: float) -> None:
     """The candidate becomes the accepted state ahead of a restart, consistent in the old mode at every level.
 
     A shortened index-3 step leaves B v + h_t of the size of its error; it would survive a release, so it is removed.
-    Where dt is so long that a contact pushes by the step but would pull by consistent multipliers, those of the step
-    stay, and the restart decides.
+    Where dt is so long that a contact pushes by the step but would pull by consistent multipliers or velocities, those
+    of the step stay, and the restart decides.
     """
     adopt(K, t1)
-    if project_velocity(K, active_rows(K, K.closed), True) == 0 and consistent(K, t1, K.q, K.y) == 0:
+    status = project_velocity(K, t1, K.q, K.y, active_rows(K, K.closed), True)
+    if status == 0 and K.stabilized == 0 and turns_to_pull(K):
+        for i in range(K.n):
+            K.y[i] = K.y1[i]
+    if status == 0 and consistent(K, t1, K.q, K.y) == 0:
         if would_pull(K):
             return
         for i in range(K.n):
@@ -67,7 +113,7 @@ def leave_pose(K: Any, h: float) -> int:
     The scheme starts anew, but for the average of accelerations that it carries. The rows are those that were stepped
     with: which depend on which is judged too badly here.
     """
-    status = project_velocity(K, stepping_rows(K), False)
+    status = project_velocity(K, K.clock[NOW], K.q, K.y, stepping_rows(K), False)
     if status == 0:
         status = consistent(K, K.clock[NOW], K.q, K.y)
     if status != 0:

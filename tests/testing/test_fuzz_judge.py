@@ -31,6 +31,8 @@ TIED = [4378]
 """Two steps of a quarter of the run: whether they are half of it must not be decided by the last bit."""
 BETWEEN = [4644]
 """A joint was open, and velocities did not fit it, between long steps of `RadauIIA`."""
+STIFF = [22904]
+"""Forces of a penalty between long steps, known as far as its stiffness times the tolerance."""
 CANCELLED = [10250]
 """Errors of one cut cancel by the end, those of the other do not: both are of order 2."""
 
@@ -92,7 +94,7 @@ def test_impacts_friction_and_loops_of_sound_runs_break_no_law():
     assert between(run, model).faults == ()
 
 
-@pytest.mark.parametrize("number", SOUND + CUT + BOUNCING + SLIPPING + ROUND_OFF + TIED + BETWEEN + CANCELLED)
+@pytest.mark.parametrize("number", SOUND + CUT + BOUNCING + SLIPPING + ROUND_OFF + TIED + BETWEEN + STIFF + CANCELLED)
 def test_fuzzed_scenes_are_judged_sound(number):
     told = verdict(number)
     assert told["kind"] == "ok", told
@@ -160,6 +162,22 @@ def test_a_wrong_reaction_between_rows_is_seen(monkeypatch):
     monkeypatch.setattr(ModelColumns, "between", wrong)
     assert "balance of torques" in {fault.law for fault in between(run, model).faults}
     assert judge(run, model).faults == ()
+
+
+def test_a_tolerance_excuses_no_reaction_where_nothing_is_stiff(monkeypatch):
+    model, start = four_bar()[0], {"one.angle": 0.4}
+    start = mbd.assemble(model, position=start, velocity={"one.angle": 2.0})
+    run = mbd.simulate(model, start, mbd.RadauIIA(), tol=1e-3, until=0.5)
+    assert between(run, model).faults == ()
+    right = ModelColumns.between
+
+    def wrong(self, places, *forces):
+        rows = right(self, places, *forces)
+        rows.lam[:] *= 1.001
+        return rows
+
+    monkeypatch.setattr(ModelColumns, "between", wrong)
+    assert "balance of torques" in {fault.law for fault in between(run, model).faults}
 
 
 def test_a_row_off_its_constraint_is_seen():

@@ -71,12 +71,13 @@ def closure(
         found.small("velocities fit at a joint", joint.name, slip, limit, told=told)
 
 
-def balance(found: Faults, bodies: Bodies, acting: Loads, share: Any) -> None:
+def balance(found: Faults, bodies: Bodies, acting: Loads, share: Any, more: Any = 0.0) -> None:
     """Newton's and Euler's equations of every body: ``m a_c = Σ F``, ``I ω̇ + ω × I ω = Σ T`` about the mass center.
 
     Parameters
     ----------
     share : what is allowed of the sum of the terms, a number or (n,) [-]
+    more : what forces may miss besides, (n,) [N]
     """
     planar = all(j.is_planar and j.parent.is_planar and j.child.is_planar for j in bodies.model.joints)
     sizes = [load.force_size for load in acting.on.values()]
@@ -102,9 +103,9 @@ def balance(found: Faults, bodies: Bodies, acting: Loads, share: Any) -> None:
         heavy = mass.mass * (np.linalg.norm(a, axis=1) + whirl) + load.force_size
         twisted = np.linalg.norm(turn, axis=1) + np.linalg.norm(gyro, axis=1) + load.torque_size
         twisted = twisted + mass.mass * reach * whirl
-        limit = share * heavy + 1e-3 * share * whole + 1e-9
+        limit = share * heavy + 1e-3 * share * whole + 1e-9 + more
         found.small("balance of forces", name, np.linalg.norm(force, axis=1), limit)
-        limit = share * twisted + 1e-3 * share * reach * whole + 1e-9
+        limit = share * twisted + 1e-3 * share * reach * whole + 1e-9 + reach * more
         if not (mass.planar and not planar):
             found.small("balance of torques", name, np.linalg.norm(torque, axis=1), limit)
 

@@ -1,0 +1,55 @@
+"""Penalty feet that may not pull do at no stored row, however long the steps are, whatever joints are cut."""
+
+import numpy as np
+import pytest
+
+import mbd
+from mbd.testing.fuzz.judge import judge
+from mbd.testing.fuzz.scenes import scene
+from mbd.testing.fuzz.verdict import run_of
+
+SCHEMES = {
+    "tolerance": (mbd.RungeKutta853(), "auto", [2, 9, 15, 18]),
+    "long steps": (mbd.RadauIIA(), "auto", [4, 7]),
+    "index 3": (mbd.HHT(0.05, formulation="index3"), "all", [2, 14, 20, 24]),
+}
+"""Schemes, joints that are cut, seeds."""
+EXACT = 1e-9
+"""Pull over the largest push of a run that is round-off [-]."""
+
+
+def thrown(seed, cut):
+    """A body with an arm above the ground, on two feet that open as they would pull."""
+    rng = np.random.default_rng(seed)
+    model = mbd.Model("thrown", cut=cut)
+    body = mbd.RigidBody("body", rng.uniform(0.5, 2.0), rng.uniform(0.02, 0.2))
+    model.connect(mbd.Planar("flight", model.ground.origin, body.origin))
+    arm = mbd.Link("arm", rng.uniform(0.3, 1.0), rng.uniform(0.3, 0.8), 0.2, 0.02)
+    place, spring = body.point(rng.uniform(-0.2, 0.2), 0.1), rng.uniform(2.0, 20.0)
+    model.connect(mbd.Revolute("hinge", place, arm.start, stiffness=spring, loss=mbd.Viscous(0.1)))
+    for k, sole in enumerate((body.point(-0.3, -0.2), body.point(0.3, -0.2))):
+        stiffness, damping = 10.0 ** rng.uniform(3.0, 4.5), rng.uniform(2.0, 20.0)
+        model.constrain(mbd.Penalty(f"foot {k}", mbd.touchdown(sole), stiffness, damping=damping, release="pull"))
+    places = "flight.y", "flight.angle", "hinge.angle"
+    return model, dict(zip(places, rng.uniform([0.3, -0.5, -1.0], [0.5, 0.5, 1.0]), strict=True))
+
+
+@pytest.mark.parametrize("kind", SCHEMES)
+def test_no_penalty_pulls_that_opens_before(kind):
+    scheme, cut, seeds = SCHEMES[kind]
+    for seed in seeds:
+        model, start = thrown(seed, cut)
+        draw = np.random.default_rng(1000 + seed).random()
+        pace = {"tol": 10.0 ** (-4.0 + 2.0 * draw)} if kind == "tolerance" else {"dt": 10.0 ** (-3.0 + 1.2 * draw)}
+        run = mbd.simulate(model, mbd.assemble(model, position=start), scheme, until=1.0, **pace)
+        forces = np.stack([run[f"foot {k}.force"] for k in range(2)])
+        assert np.max(forces) > 1.0, seed
+        assert np.min(forces) >= -EXACT * np.max(forces), seed
+
+
+@pytest.mark.parametrize("number", [10524, 10858, 23384])
+def test_fuzzed_feet_do_not_pull_just_before_they_open(number):
+    made = scene(number)
+    run = run_of(made)
+    faults = judge(run, made.model, made.parameters).faults
+    assert not faults, list(map(str, faults))
