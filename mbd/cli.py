@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mbd.errors import MbdError, ModelError, SimulationError, UnknownNameError, nearest
+from mbd.progress import Progress, progress_bar
 from mbd.view import lab_arguments
-from mbd.view.progress import Progress, progress_bar
 
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory

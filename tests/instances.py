@@ -14,7 +14,8 @@ from collections.abc import Callable
 
 import mbd
 from mbd.bodies.base import Frame
-from mbd.constraints.base import Constraint, Measure
+from mbd.constraints.base import Constraint
+from mbd.constraints.measure import Measure
 from mbd.forces.base import Force
 from mbd.integrators import Integrator
 from mbd.joints.base import Joint

@@ -28,8 +28,8 @@ from mbd.hardcases.schemes import (
     scheme,
 )
 from mbd.hardcases.table import BEGIN, END, as_markdown, as_text, figure_text, worst_by_scheme, write_markdown
+from mbd.progress import counted
 from mbd.simulation.arguments import CHOICES
-from mbd.view.progress import counted
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "hardcases.md"
 

@@ -15,12 +15,12 @@ import numpy as np
 
 from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import MbdError, ModelError, SimulationError, UnknownNameError, nearest
+from mbd.progress import share_bar
 from mbd.results.archive import write_whole
 from mbd.simulation.asked import asked
 from mbd.simulation.simulate import simulate
 from mbd.state import State
 from mbd.trajectory import Trajectory
-from mbd.view.progress import share_bar
 
 __all__ = ["Sweep", "sweep"]
 

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.assembly.pose import Posture
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.python import scalar_function
 from mbd.tape.derivatives import gradient
-
-if TYPE_CHECKING:
-    from mbd.assembly.posture import Posture
 
 __all__ = ["REVERSED", "faced", "facing_cosines", "reversed_joints"]
 

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
-from mbd.assembly.conditions import Condition
 from mbd.assembly.orientation import faced
+from mbd.assembly.pose import Posture
 from mbd.assembly.turns import choose_turns, hold_directions
-from mbd.compile.mechanism import Mechanism
-from mbd.equations.equations import Equations
-from mbd.kernel.active_set import ActiveSetManager
 
 __all__ = [
     "Posture", "TOLERANCE", "capture", "close_nearby", "close_positions", "close_velocities", "descend",
@@ -37,33 +33,6 @@ CLOSE = 1e-3
 """Row residual [m, rad] at the end of a descent from which Newton's method may go on."""
 RESTARTS = 12
 """Other starts of Newton's method before positions count as out of reach [-]."""
-
-
-@dataclass
-class Posture:
-    """A mechanism on the way to a consistent start."""
-
-    mechanism: Mechanism
-    manager: ActiveSetManager
-    parameters: Vector
-    q: Vector
-    y: Vector
-    flags: Any
-    anchors: Vector
-    places: Sequence[Condition] = ()
-    rates: Sequence[Condition] = ()
-    time: float = 0.0
-    iterations: int = 0
-
-    @property
-    def equations(self) -> Equations:
-        return self.mechanism.equations
-
-    def with_conditions(self, h: Vector, B: Matrix, conditions: Sequence[Condition]) -> tuple[Vector, Matrix]:
-        """Rows and their Jacobian, followed by those of named conditions."""
-        block = self.mechanism.block(self.time, self.q, self.y, self.anchors)
-        found = [condition.at(block, self.parameters) for condition in conditions]
-        return np.append(h, [r for r, _ in found]), np.vstack([B, *(slope for _, slope in found)])
 
 
 def position_rows(work: Posture) -> list[int]:

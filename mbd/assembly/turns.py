@@ -5,18 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mbd.arrays import Vector
+from mbd.assembly.pose import Posture
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.python import ScalarFunction, scalar_function
 from mbd.state import State
 from mbd.tape.derivatives import live
-
-if TYPE_CHECKING:
-    from mbd.assembly.posture import Posture
 
 __all__ = [
     "choose_turns",

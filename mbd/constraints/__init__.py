@@ -1,11 +1,12 @@
 """Constraints: where (measures), what law, and when."""
 
-from mbd.constraints.base import Constraint, Measure, VelocityConstraint
+from mbd.constraints.base import Constraint, VelocityConstraint
 from mbd.constraints.bilateral import Bilateral
 from mbd.constraints.controller import Controller
 from mbd.constraints.event import Event
 from mbd.constraints.knife_edge import KnifeEdge
 from mbd.constraints.law import Closing, Drag, Equation, Law
+from mbd.constraints.measure import Measure
 from mbd.constraints.measures import distance, extension, flexion, height, separation
 from mbd.constraints.nonholonomic import Nonholonomic
 from mbd.constraints.penalty import Penalty

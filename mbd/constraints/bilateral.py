@@ -6,9 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from mbd.bodies.values import name_of
-from mbd.constraints.base import Constraint, Measure
+from mbd.constraints.base import Constraint
 from mbd.constraints.expressions import is_expression
 from mbd.constraints.law import Equation, Hold, Law
+from mbd.constraints.measure import Measure
 from mbd.constraints.measures import JointMeasure
 from mbd.constraints.user_measure import measure
 from mbd.errors import ModelError

@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from mbd.bodies.values import flag, name_of, names_of
-from mbd.constraints.base import Constraint, Measure
+from mbd.constraints.base import Constraint
 from mbd.constraints.expressions import is_expression, plain
+from mbd.constraints.measure import Measure
 from mbd.constraints.unilateral import measure_of
 from mbd.errors import ModelError
 from mbd.forces.quantities import Mention

@@ -31,7 +31,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 from mbd.tape.node import Scalar
 
 if TYPE_CHECKING:
-    from mbd.constraints.base import Measure
+    from mbd.constraints.measure import Measure
     from mbd.constraints.rules import When
 
 __all__ = ["Closing", "Drag", "Equation", "Hold", "Law"]

@@ -9,8 +9,9 @@ from typing import Literal
 
 from mbd.bodies.domains import Domain, at_least_zero, positive
 from mbd.bodies.values import name_of, number
-from mbd.constraints.base import Constraint, Measure
+from mbd.constraints.base import Constraint
 from mbd.constraints.law import Closing, Hold, Law
+from mbd.constraints.measure import Measure
 from mbd.constraints.penalty_parameters import largest_dt
 from mbd.constraints.restitution import KELVIN_VOIGT, LEAST_RESTITUTION, chi_for, damping_ratio_for, law_of, wanted
 from mbd.constraints.unilateral import measure_of

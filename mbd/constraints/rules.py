@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from mbd.bodies.values import flag
-from mbd.constraints.base import Measure
 from mbd.constraints.expressions import is_expression
+from mbd.constraints.measure import Measure
 from mbd.constraints.user_measure import measure
 from mbd.errors import ModelError
 

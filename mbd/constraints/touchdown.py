@@ -8,7 +8,7 @@ from typing import Any
 
 from mbd.bodies.algebra import dot
 from mbd.bodies.base import Frame
-from mbd.constraints.base import Measure
+from mbd.constraints.measure import Measure
 from mbd.constraints.surfaces import Plane, Surface, surface_of
 from mbd.forces.base import frame_of
 from mbd.forces.quantities import Mention

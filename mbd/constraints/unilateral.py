@@ -8,9 +8,10 @@ from typing import Literal
 
 from mbd.bodies.domains import Domain
 from mbd.bodies.values import name_of, number
-from mbd.constraints.base import Constraint, Measure
+from mbd.constraints.base import Constraint
 from mbd.constraints.expressions import is_expression
 from mbd.constraints.law import Closing, Equation, Hold, Law
+from mbd.constraints.measure import Measure
 from mbd.constraints.rules import When, condition_of, releases_of
 from mbd.constraints.user_measure import measure
 from mbd.errors import ModelError

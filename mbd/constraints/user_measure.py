@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from mbd.constraints.base import Measure
 from mbd.constraints.expressions import plain, quantities_in
+from mbd.constraints.measure import Measure
 from mbd.errors import ModelError
 from mbd.forces.quantities import ArgumentSpec, Mention, arguments_of, mentioned, quantity_of, resolved
 from mbd.scope import Scope

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from mbd.constraints.base import Constraint, Measure
+from mbd.constraints.base import Constraint
 from mbd.constraints.event import Event
 from mbd.constraints.law import Closing, Equation, Law
+from mbd.constraints.measure import Measure
 from mbd.equations.derivation_scope import DerivationScope, Generalized
 from mbd.equations.dynamics import Work
 from mbd.equations.effects import drag_effect, penalty_effect

@@ -17,7 +17,7 @@ from mbd.hardcases.case import HardCase
 from mbd.hardcases.judging import Verdict, chosen, judged, named_schemes, short, with_schemes
 from mbd.hardcases.page import write_page
 from mbd.hardcases.table import as_text, write_markdown
-from mbd.view.progress import counted
+from mbd.progress import counted
 
 __all__ = ["run"]
 

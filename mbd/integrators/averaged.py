@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from mbd.arrays import Vector
 from mbd.integrators.base import Point, StepReport, StepResult, System, Terms, composed
-from mbd.integrators.newton import EPS, MAX_ITERATIONS, NewmarkMemory
+from mbd.integrators.newton import EPS, MAX_ITERATIONS, NewmarkMemory, NewmarkScheme
 from mbd.state import Mode, State
-
-if TYPE_CHECKING:
-    from mbd.integrators.hht import HHT
 
 __all__ = ["AveragedStep"]
 
@@ -23,7 +18,9 @@ class AveragedStep:
     Forces are averaged over the step, the mass matrix is not, which costs one order unless M is constant.
     """
 
-    def __init__(self, scheme: HHT, system: System, state: State, dt: float, mode: Mode, memory: NewmarkMemory) -> None:
+    def __init__(
+        self, scheme: NewmarkScheme, system: System, state: State, dt: float, mode: Mode, memory: NewmarkMemory
+    ) -> None:
         self.scheme, self.system, self.state, self.dt, self.mode, self.memory = scheme, system, state, dt, mode, memory
 
     def _evaluate(self, t: float, x: Vector, y: Vector, rate: Vector, lam: Vector, c: tuple[float, float]) -> Terms:
@@ -32,7 +29,7 @@ class AveragedStep:
     def run(self) -> StepResult:
         """Newton on (a₁, λ₁); the part α M a₁ enters with the mass matrix of the iterate."""
         k, dt, memory = self.scheme.coefficients, self.dt, self.memory
-        alpha, n_v = self.scheme.alpha, len(self.state.v)
+        alpha, n_v = k.alpha_f, len(self.state.v)
         c_C, c_K = k.gamma * dt, k.beta * dt * dt
         y0 = np.concatenate([self.state.v, self.state.z])
         a0 = memory.aux

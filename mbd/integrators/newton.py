@@ -7,18 +7,16 @@ where the form is stabilized, the position correction U.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from mbd.arrays import Vector
 from mbd.integrators.base import Point, StepReport, StepResult, System, Terms, composed
+from mbd.integrators.coefficients import Coefficients
 from mbd.integrators.passage import CONTINUOUS, WHOLE, WITHIN, Distance, distance_to_pose
 from mbd.kernel.fields import LEFT, PASSING
 from mbd.state import Mode, State
-
-if TYPE_CHECKING:
-    from mbd.integrators.family import NewmarkFamily
 
 __all__ = ["EPS", "MAX_ITERATIONS", "NewmarkMemory", "Step"]
 
@@ -53,11 +51,29 @@ class NewmarkMemory:
     whole: float = 0.0
 
 
+class NewmarkScheme(Protocol):
+    """What a step asks of its scheme."""
+
+    tolerance: float
+
+    @property
+    def coefficients(self) -> Coefficients:
+        """α_m, α_f, β, γ."""
+
+    @property
+    def exact(self) -> bool:
+        """Whether Newton iterates until round-off."""
+
+    @property
+    def stabilized(self) -> bool:
+        """Whether ḣ is held beside h."""
+
+
 class Step:
     """The unknowns of one step while Newton iterates."""
 
     def __init__(
-        self, scheme: NewmarkFamily, system: System, state: State, dt: float, mode: Mode, memory: NewmarkMemory
+        self, scheme: NewmarkScheme, system: System, state: State, dt: float, mode: Mode, memory: NewmarkMemory
     ) -> None:
         self.scheme, self.system, self.state, self.dt, self.mode, self.memory = scheme, system, state, dt, mode, memory
         k = self.k = scheme.coefficients

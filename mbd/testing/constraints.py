@@ -13,7 +13,8 @@ from mbd.bodies.base import Body, Frame
 from mbd.bodies.ground import Ground
 from mbd.bodies.point_mass import PointMass
 from mbd.compile.mechanisms import mechanism_of
-from mbd.constraints.base import Constraint, Measure
+from mbd.constraints.base import Constraint
+from mbd.constraints.measure import Measure
 from mbd.equations.equations import Contact, Equations
 from mbd.equations.programs import constraint_jacobian
 from mbd.errors import MbdError, ModelError

@@ -10,7 +10,7 @@ import numpy as np
 import mbd
 from mbd.bodies.base import Frame
 from mbd.bodies.ground import Ground
-from mbd.constraints.base import Measure
+from mbd.constraints.measure import Measure
 from mbd.constraints.user_measure import UserMeasure
 from mbd.forces.quantities import Mention
 from mbd.joints.base import Joint

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 import mbd
-from mbd.constraints.base import Measure
+from mbd.constraints.measure import Measure
 from mbd.constraints.measures import Distance, JointMeasure, Separation
 from mbd.constraints.touchdown import Touchdown
 from mbd.tape.derivatives import gradient

@@ -10,7 +10,7 @@ import pytest
 import mbd
 from mbd.bodies.algebra import difference, dot, norm
 from mbd.bodies.base import Frame
-from mbd.constraints.base import Measure
+from mbd.constraints.measure import Measure
 from mbd.forces.base import Action, Force
 from mbd.testing import LawBroken, check_force, check_measure
 

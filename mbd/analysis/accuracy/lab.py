@@ -17,8 +17,8 @@ from mbd.analysis.accuracy.truth import Truth, truth
 from mbd.bodies.values import is_number
 from mbd.errors import ModelError
 from mbd.integrators import Integrator
+from mbd.progress import Progress, share_bar
 from mbd.state import State
-from mbd.view.progress import Progress, share_bar
 
 __all__ = ["OPTIONS", "accuracy", "with_orders"]
 

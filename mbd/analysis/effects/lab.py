@@ -22,12 +22,12 @@ from mbd.compile.mechanisms import mechanism_of
 from mbd.equations.cost import cost
 from mbd.errors import MbdError, ModelError, SimulationError, UnknownNameError, nearest
 from mbd.integrators import Integrator
+from mbd.progress import Progress, share_bar
 from mbd.results.ledger import Ledger
 from mbd.simulation.run.memory import without_memory
 from mbd.simulation.simulate import simulate
 from mbd.state import State
 from mbd.trajectory import Trajectory
-from mbd.view.progress import Progress, share_bar
 
 __all__ = ["effects"]
 

@@ -1,0 +1,44 @@
+"""A mechanism on the way to a consistent start, as numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mbd.arrays import Matrix, Vector
+from mbd.assembly.conditions import Condition
+from mbd.compile.mechanism import Mechanism
+from mbd.equations.equations import Equations
+from mbd.kernel.active_set import ActiveSetManager
+
+__all__ = ["Posture"]
+
+
+@dataclass
+class Posture:
+    """A mechanism on the way to a consistent start."""
+
+    mechanism: Mechanism
+    manager: ActiveSetManager
+    parameters: Vector
+    q: Vector
+    y: Vector
+    flags: Any
+    anchors: Vector
+    places: Sequence[Condition] = ()
+    rates: Sequence[Condition] = ()
+    time: float = 0.0
+    iterations: int = 0
+
+    @property
+    def equations(self) -> Equations:
+        return self.mechanism.equations
+
+    def with_conditions(self, h: Vector, B: Matrix, conditions: Sequence[Condition]) -> tuple[Vector, Matrix]:
+        """Rows and their Jacobian, followed by those of named conditions."""
+        block = self.mechanism.block(self.time, self.q, self.y, self.anchors)
+        found = [condition.at(block, self.parameters) for condition in conditions]
+        return np.append(h, [r for r, _ in found]), np.vstack([B, *(slope for _, slope in found)])

@@ -1,0 +1,76 @@
+"""The promise of measures: where."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+
+from mbd.bodies.base import Frame
+from mbd.forces.quantities import Mention
+from mbd.scope import Scope
+from mbd.tape.node import Scalar
+
+__all__ = ["Measure", "mentioned_names"]
+
+
+class Measure(ABC):
+    """Where: a signed distance or angle g of the posture, with ``g ≥ 0`` open where it serves a contact.
+
+    A new measure is a frozen dataclass; it knows the geometry and nothing of laws or of when they act.
+    """
+
+    @abstractmethod
+    def gap(self, scope: Scope) -> Scalar:
+        """g [unit], scaled so that ``|∇g| = 1`` at contact where it is a distance."""
+
+    @property
+    @abstractmethod
+    def unit(self) -> str:
+        """'m' or 'rad'."""
+
+    @abstractmethod
+    def mentions(self) -> list[Mention]:
+        """The frames, joints and named quantities it refers to."""
+
+    def captured(self, scope: Scope) -> Sequence[Scalar]:
+        """Quantities whose values are held from the instant of closing, the anchors; by default none."""
+        return ()
+
+    def tangents(self, scope: Scope, anchors: Sequence[Scalar]) -> Sequence[tuple[str, Scalar]]:
+        """(part, residual) of the rows that hold a sticking contact; zero at the anchors. None without a tangent.
+
+        Parameters
+        ----------
+        anchors : one for each of `captured`
+        """
+        return ()
+
+    @property
+    def has_tangents(self) -> bool:
+        """Whether it can stick."""
+        return False
+
+    @property
+    def title(self) -> str:
+        """What it measures, in a word: 'distance'."""
+        return type(self).__name__.lower()
+
+    @property
+    def reaction(self) -> str:
+        """What a multiplier is called in results: 'force', 'tension', or 'drive' of a joint (its force or torque)."""
+        return "force"
+
+    @property
+    def said(self) -> str:
+        """What it measures of what, for a page of text."""
+        return f"{self.title} of " + mentioned_names(self.mentions())
+
+    def faults(self, owner: str) -> list[str]:
+        """What is geometrically impossible about it, one sentence each."""
+        return []
+
+
+def mentioned_names(mentions: Sequence[Mention]) -> str:
+    """Frames, joints and quantities by name."""
+    names = [m if isinstance(m, str) else m.full_name if isinstance(m, Frame) else m.name for m in mentions]
+    return ", ".join(f"'{name}'" for name in names)
