@@ -17,7 +17,8 @@ from mbd.equations.equations import Row
 from mbd.equations.linearization import LinearTerms, linearization
 from mbd.errors import ModelError
 from mbd.integrators.hht import HHT
-from mbd.kernel import fields as F
+from mbd.kernel import codes
+from mbd.kernel.records import Kernel
 from mbd.kernel.redundancy import find_dependent, sharing, spread
 from mbd.kernel.restart import active_rows
 from mbd.kernel.settle import settle
@@ -29,10 +30,10 @@ from mbd.state import State
 __all__ = ["Instant", "instant"]
 
 REASONS = {
-    F.NOT_FINITE: "a force, a mass or a row is not finite there",
-    F.CONFLICT: "no accelerations satisfy all rows there",
-    F.DEPENDENT: "neither mass nor rows determine all accelerations there",
-    F.NO_FORCE: "no contact forces are consistent with its frictions",
+    codes.NOT_FINITE: "a force, a mass or a row is not finite there",
+    codes.CONFLICT: "no accelerations satisfy all rows there",
+    codes.DEPENDENT: "neither mass nor rows determine all accelerations there",
+    codes.NO_FORCE: "no contact forces are consistent with its frictions",
 }
 
 
@@ -136,7 +137,7 @@ def instant(model: Any, state: State, parameters: Mapping[str, float] | None = N
     if opened:
         raise ModelError([_pulls(name) for name in opened])
     find_dependent(K, active_rows(K, K.closed))
-    if K.state[F.N_DROPPED] > 0 and not sharing(K):
+    if K.n_dropped > 0 and not sharing(K):
         spread(K, K.lam)
     rows = manager.active_rows(flags, K.sticks)
     layout = mechanism.layout
@@ -151,18 +152,17 @@ def instant(model: Any, state: State, parameters: Mapping[str, float] | None = N
     return found
 
 
-def _kernel(stepper: Stepper, state: State) -> Any:
+def _kernel(stepper: Stepper, state: State) -> Kernel:
     """The kernel's arrays at the state."""
-    values = stepper.values
-    values["q"][: values["n_q"]] = state.q
-    values["y"][: values["n"]] = np.concatenate([state.v, state.z])
-    values["closed"][: values["n_contacts"]] = stepper.manager.flags(state.mode.closed)
-    if len(state.anchors) == values["n_anchors"]:
-        values["anchors"][: values["n_anchors"]] = state.anchors
-    values["clock"][F.NOW] = state.time
-    values["chunk"] = 1
-    values = {**values, "code": stepper.functions, "hooks": stepper.scheme}
-    return F.Kernel(**{name: values[name] for name in F.FIELDS})
+    values = stepper.kernel
+    values.q[: values.n_q] = state.q
+    values.y[: values.n] = np.concatenate([state.v, state.z])
+    values.closed[: values.n_contacts] = stepper.manager.flags(state.mode.closed)
+    if len(state.anchors) == values.n_anchors:
+        values.anchors[: values.n_anchors] = state.anchors
+    values.time = state.time
+    values.chunk = 1
+    return values
 
 
 def _pulls(name: str) -> str:

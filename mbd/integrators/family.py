@@ -25,7 +25,7 @@ from mbd.errors import CapabilityError
 from mbd.integrators.base import Integrator, StepResult, System, composed, consistent_rates
 from mbd.integrators.coefficients import Coefficients
 from mbd.integrators.newton import NewmarkMemory, Step
-from mbd.kernel.fields import LEFT
+from mbd.kernel.codes import LEFT
 from mbd.state import Mode, State
 
 __all__ = ["DEFAULT_TOLERANCE", "Coefficients", "Formulation", "NewmarkFamily", "NewmarkMemory", "Starting"]

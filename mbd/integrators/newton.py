@@ -15,7 +15,7 @@ from mbd.arrays import Vector
 from mbd.integrators.base import Point, StepReport, StepResult, System, Terms, composed
 from mbd.integrators.coefficients import Coefficients
 from mbd.integrators.passage import CONTINUOUS, WHOLE, WITHIN, Distance, distance_to_pose
-from mbd.kernel.fields import LEFT, PASSING
+from mbd.kernel.codes import LEFT, PASSING
 from mbd.state import Mode, State
 
 __all__ = ["EPS", "MAX_ITERATIONS", "NewmarkMemory", "Step"]

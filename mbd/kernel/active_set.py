@@ -86,7 +86,7 @@ class ActiveSetManager:
         return tuple(c for c, contact in enumerate(self.contacts) if contact.kind == "penalty" and flags[c])
 
     def tables(self) -> ContactTables:
-        """Rules as arrays; see `mbd.kernel.fields`."""
+        """Rules as arrays; see `mbd.kernel.records`."""
         number = {contact.name: c for c, contact in enumerate(self.contacts)}
         opens = {"pull": 0, "gap": 1, "when": 2}
         starts, targets, afters = [0], [], []

@@ -2,50 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from mbd.kernel.candidate import accept_guards
+from mbd.kernel.codes import AT_POSE, CHATTER, DONE, EVENT, FULL, LAST, LEFT, NEW_MODE, NOT_CONVERGED, PAUSE, PULL
 from mbd.kernel.crowding import crowds
 from mbd.kernel.events import handle_event, land
-from mbd.kernel.fields import (
-    AT_POSE,
-    BASE,
-    CALMED,
-    CHATTER,
-    DONE,
-    EVENT,
-    FULL,
-    GRID,
-    HALVED,
-    HALVES,
-    INCHING,
-    LAST,
-    LEFT,
-    LOCAL,
-    LOGGED,
-    MODE,
-    N_DROPPED,
-    NEAR,
-    NEW_MODE,
-    NEXT,
-    NOT_CONVERGED,
-    NOW,
-    PAIRED,
-    PAUSE,
-    PULL,
-    REDONE,
-    RESTART,
-    ROWS,
-    SHORTENED,
-    SINCE_STORE,
-    SPENT,
-    STEP,
-    STEPS,
-    STORED,
-    STRAIGHT,
-    TRIED,
-    WIDTH,
-)  # fmt: skip
 from mbd.kernel.guards import is_quiet, judge, try_step, update_armed, update_sides
 from mbd.kernel.hooks import scheme_accept
 from mbd.kernel.interior import parts_to_take
@@ -53,6 +13,7 @@ from mbd.kernel.locate import locate
 from mbd.kernel.nonsmooth import lands, lets_go
 from mbd.kernel.observe import is_awaited, store_row
 from mbd.kernel.pace import relax_pace
+from mbd.kernel.records import Kernel
 from mbd.kernel.restart import consistent, largest_force
 from mbd.kernel.settle import room_to_log
 from mbd.kernel.singular.events import find_passed_events, log_passed_events, may_pass_events, refuses
@@ -70,7 +31,7 @@ Without rows ten times as many.
 """
 
 
-def has_spurious_reaction(K: Any) -> bool:
+def has_spurious_reaction(K: Kernel) -> bool:
     """Whether a step ends with a contact that pulls, or a friction that sticks beyond its limit, judged to do neither.
 
     The multipliers of a step belong to its own accelerations, which satisfy the constraints on average only: those of
@@ -89,17 +50,17 @@ def has_spurious_reaction(K: Any) -> bool:
     return False
 
 
-def accept(K: Any, h: float, t1: float, quiet: bool) -> None:
+def accept(K: Kernel, h: float, t1: float, quiet: bool) -> None:
     """The candidate becomes the accepted state; guards follow."""
     scheme_accept(K, h)
-    K.clock[NOW] = t1
+    K.time = t1
     accept_guards(K)
     if not quiet:
         update_armed(K)
         update_sides(K)
 
 
-def forget_found(K: Any) -> None:
+def forget_found(K: Kernel) -> None:
     """No guard has been found to be no event yet, but for events that the step passes."""
     for c in range(K.n_contacts + K.n_guards + K.n_frictions):
         K.active[c] = 0
@@ -107,129 +68,129 @@ def forget_found(K: Any) -> None:
         K.active[K.n_contacts + e] = 1 if K.crossed[e] >= 0.0 else 0
 
 
-def begin(K: Any) -> int:
+def begin(K: Kernel) -> int:
     """What comes before a step: room for its rows, a start of the scheme, code of the mode; −1 if it can be taken."""
-    if K.state[STORED] + 4 + 2 * K.n_guards > K.capacity or K.state[LOGGED] + room_to_log(K) > K.event_capacity:
+    if K.n_stored + 4 + 2 * K.n_guards > K.capacity or K.n_logged + room_to_log(K) > K.event_capacity:
         return FULL
-    if K.state[RESTART] > 0:
-        visible = K.state[RESTART] == 1
-        first = K.state[LOGGED]
+    if K.restart_due > 0:
+        visible = K.restart_due == 1
+        first = K.n_logged
         status = restart(K)
         if status != 0:
             return status
-        K.state[RESTART] = 0
-        if visible or K.state[LOGGED] > first:
+        K.restart_due = 0
+        if visible or K.n_logged > first:
             store_row(K)
         if is_awaited(K, first):
             return EVENT
-    if K.clock[NOW] >= K.until - 1e-12 * K.dt:
+    if K.time >= K.until - 1e-12 * K.dt:
         return DONE
-    if K.state[MODE] < 0:
-        K.state[MODE] = find_mode(K)
-        if K.state[MODE] < 0:
+    if K.mode_id < 0:
+        K.mode_id = find_mode(K)
+        if K.mode_id < 0:
             return NEW_MODE
     return -1
 
 
 def conclude(
-    K: Any, h: float, full: float, t1: float, cut: bool, within: bool, quiet: bool, holds: bool, pulls: bool
+    K: Kernel, h: float, full: float, t1: float, cut: bool, within: bool, quiet: bool, holds: bool, pulls: bool
 ) -> int:
     """Accept a candidate without events; 0, or a failure.
 
     h of the `full` step that was to be; `cut` at a boundary inside the run; `within` a step of the grid;
     `quiet`: no guard can have changed; `holds`: so do the rows that were left out; `pulls`: a reaction is spurious.
     """
-    paired = K.state[PAIRED] > 0
+    paired = K.paired_step > 0
     if h < full and not within:
-        K.counts[SHORTENED] += 1
-        K.state[INCHING] += 2
-        patience = 2 * MOST_SHORTENED if K.state[ROWS] > 0 else 20 * MOST_SHORTENED
-        if K.state[INCHING] > patience:
-            K.detail[0] = t1
-            K.detail[1] = 0.0
+        K.n_shortened += 1
+        K.short_steps += 2
+        patience = 2 * MOST_SHORTENED if K.n_active > 0 else 20 * MOST_SHORTENED
+        if K.short_steps > patience:
+            K.failure_time = t1
+            K.failure_size = 0.0
             return NOT_CONVERGED
-    elif K.state[INCHING] > 0:
-        K.state[INCHING] -= 1
+    elif K.short_steps > 0:
+        K.short_steps -= 1
     if not within:
-        if K.state[PAIRED] == FIRST:
-            K.state[PAIRED] = SECOND
-            K.counts[SHORTENED] += 1
+        if K.paired_step == FIRST:
+            K.paired_step = SECOND
+            K.n_shortened += 1
         else:
-            K.counts[SHORTENED] += 1 if K.state[PAIRED] == ALONE else 0
-            K.state[PAIRED] = 0
-    uneven = K.stabilized == 0 and K.state[ROWS] > 0 and h < (1.0 - 1e-6) * K.clock[STEP]
+            K.n_shortened += 1 if K.paired_step == ALONE else 0
+            K.paired_step = 0
+    uneven = K.stabilized == 0 and K.n_active > 0 and h < (1.0 - 1e-6) * K.step
     uneven = uneven or pulls
-    K.state[CALMED] = 0
+    K.restarted_here = 0
     if cut and K.stabilized == 0 and refuses(K, h):
-        K.fired[0] = -1
+        K.event_kind = -1
         return AT_POSE
-    if (h < 1e-3 * K.clock[STEP] and K.scheme != 1) or uneven:  # index-3 multipliers oscillate after a change of step
+    if (h < 1e-3 * K.step and K.scheme != 1) or uneven:  # index-3 multipliers oscillate after a change of step
         take_over(K, t1)
-        K.state[RESTART] = 2
+        K.restart_due = 2
     else:
         accept(K, h, t1, quiet)
         if not within:
-            K.state[GRID] += 1
+            K.grid_steps += 1
         if not holds:  # the pose has changed its rank
-            K.state[RESTART] = 2
-        if (h < full and not within) or K.state[HALVED] > 0 or paired or cut or K.adaptive == 1:
-            K.clock[BASE] = t1  # the grid goes on from here
-            K.state[GRID] = 0
+            K.restart_due = 2
+        if (h < full and not within) or K.halvings > 0 or paired or cut or K.adaptive == 1:
+            K.grid_start = t1  # the grid goes on from here
+            K.grid_steps = 0
         if K.adaptive == 1 and not within:
-            K.clock[STEP] = K.clock[NEXT]
-        elif K.clock[STEP] < K.dt:
+            K.step = K.next_step
+        elif K.step < K.dt:
             relax_pace(K)
-        if K.state[NEAR] == LEFT:
+        if K.near_singular == LEFT:
             status = leave_pose(K, h)
             if status != 0:
                 return status
-    if K.state[HALVED] > 0:  # the end that had no impulses may not come at all
-        K.state[HALVES] -= 1
-        if K.state[HALVES] == 0:
-            K.state[HALVED] = 0
+    if K.halvings > 0:  # the end that had no impulses may not come at all
+        K.halves_left -= 1
+        if K.halves_left == 0:
+            K.halvings = 0
     return 0
 
 
-def calm(K: Any) -> bool:
+def calm(K: Kernel) -> bool:
     """Where a contact seems to pull at the end of a step: start the scheme again before it, once; True if so.
 
     Accelerations and multipliers are made consistent there, which ends their oscillation; the step is taken again.
     """
-    if K.state[CALMED] == 1 or K.state[NEAR] > 0:
+    if K.restarted_here == 1 or K.near_singular > 0:
         return False
-    if consistent(K, K.clock[NOW], K.q, K.y) != 0:
+    if consistent(K, K.time, K.q, K.y) != 0:
         return False
     for i in range(K.n):
         K.rate[i] = K.jump[i]
     for k in range(K.n_rows):
         K.lam[k] = K.impulse[k]
-    K.state[CALMED] = 1
-    K.state[RESTART] = 2
+    K.restarted_here = 1
+    K.restart_due = 2
     return True
 
 
-def look_inside(K: Any, h: float) -> int:
+def look_inside(K: Kernel, h: float) -> int:
     """Where a step is long enough to be looked at in parts: after how many it must end (see `parts_to_take`).
 
     A step of such parts begins then; 0 as well where this one is part of it already, or no step is looked at so.
     """
     if not in_parts(K):
-        K.state[STRAIGHT] = 0
+        K.in_substeps = 0
         return 0
     forget_found(K)
     parts = parts_to_take(K, h)
     if parts != 0:
-        K.state[STRAIGHT] = 1
-        K.clock[WIDTH] = h / K.looks
+        K.in_substeps = 1
+        K.substep = h / K.looks
     return parts
 
 
-def in_parts(K: Any) -> bool:
+def in_parts(K: Kernel) -> bool:
     """Whether guards are looked at inside the step that was just tried."""
-    return bool(K.looks > 1 and K.n_watched > 0 and K.state[STRAIGHT] == 0)
+    return bool(K.looks > 1 and K.n_watched > 0 and K.in_substeps == 0)
 
 
-def passes_events(K: Any, h: float) -> bool:
+def passes_events(K: Kernel, h: float) -> bool:
     """Whether the step passes events without effect next to a singular configuration: they do not end it."""
     for e in range(K.n_guards):
         K.crossed[e] = -1.0
@@ -239,7 +200,7 @@ def passes_events(K: Any, h: float) -> bool:
     return bool(find_passed_events(K, h) > 0)
 
 
-def find_event(K: Any, h: float, t1: float) -> int:
+def find_event(K: Kernel, h: float, t1: float) -> int:
     """−1 with the candidate at the first event of the step, which K.fired tells; 0 without one; else a failure."""
     forget_found(K)
     if not judge(K, h):
@@ -247,36 +208,36 @@ def find_event(K: Any, h: float, t1: float) -> int:
     status = locate(K, h)
     if status != 0:
         return status
-    if K.fired[0] < 0:
+    if K.event_kind < 0:
         return 0
     if K.strategy == 1 and lands(K):  # the contact comes first
         return try_step(K, h, t1)
-    return AT_POSE if refuses(K, K.pick[2]) else -1
+    return AT_POSE if refuses(K, K.event_after) else -1
 
 
-def add_error(K: Any, h: float, fired: bool) -> None:
+def add_error(K: Kernel, h: float, fired: bool) -> None:
     """The local error of the candidate, or of the part of it before an event, to the sum of all."""
     if K.adaptive == 1:
-        part = max(K.pick[2], 0.0) / h if fired else 1.0
-        K.clock[SPENT] += K.clock[LOCAL] * part ** (K.error_order + 1.0)
+        part = max(K.event_after, 0.0) / h if fired else 1.0
+        K.error_sum += K.local_error * part ** (K.error_order + 1.0)
     elif K.scheme == 1:
         largest = 0.0
         for i in range(K.n_v):
             largest = max(largest, abs(K.error[K.n_v + i]))
-        K.clock[SPENT] += largest
+        K.error_sum += largest
 
 
-def end_unlocated(K: Any, h: float, t1: float) -> int:
+def end_unlocated(K: Kernel, h: float, t1: float) -> int:
     """End of a non-smooth step; 0 if nothing happens there, −1 if that is dealt with, else a status for the caller."""
     if lets_go(K, t1) > 0:
-        return CHATTER if K.state[REDONE] > K.max_switches else -1
+        return CHATTER if K.n_repeats > K.max_switches else -1
     if lands(K):
         return land(K, h, t1)
-    K.state[REDONE] = 0
+    K.n_repeats = 0
     return 0
 
 
-def advance(K: Any) -> int:
+def advance(K: Kernel) -> int:
     """Step until `until`, a full store, a mode without code, an event to report, or a failure."""
     steps = 0
     while True:
@@ -291,42 +252,42 @@ def advance(K: Any) -> int:
             return status
 
 
-def take_step(K: Any) -> int:
+def take_step(K: Kernel) -> int:
     """One step: to where it is to end, tried, and judged; −1 where the run goes on."""
-    t = K.clock[NOW]
+    t = K.time
     on_grid = step_end(K)
     t1 = part_end(K, on_grid)
     within = t1 < on_grid  # the step ends inside one of the grid, where guards are looked at
-    cut = t1 > K.until - 1e-6 * K.clock[STEP]
+    cut = t1 > K.until - 1e-6 * K.step
     if cut and K.until >= K.end:  # the caller decides: a step of the grid as in a longer run, or one cut
         return LAST
     if cut:
         t1 = K.until
     h = t1 - t
-    if K.state[HALVED] > 0:
-        h *= 0.5 ** K.state[HALVED]
+    if K.halvings > 0:
+        h *= 0.5**K.halvings
         t1 = t + h
         cut = False
     full = h
     status = tried_step(K, h, t1)
     if status != 0:
         return status
-    if K.clock[TRIED] != h:
-        h = K.clock[TRIED]
+    if K.step_taken != h:
+        h = K.step_taken
         t1 = t + h
         cut = cut and h >= full
-    if K.adaptive == 1 or K.state[PAIRED] == FIRST or K.state[PAIRED] == ALONE:
+    if K.adaptive == 1 or K.paired_step == FIRST or K.paired_step == ALONE:
         full = h
-    K.counts[STEPS] += 1
+    K.n_steps += 1
     return judge_step(K, h, full, t1, cut, within)
 
 
-def judge_step(K: Any, h: float, full: float, t1: float, cut: bool, within: bool) -> int:
+def judge_step(K: Kernel, h: float, full: float, t1: float, cut: bool, within: bool) -> int:
     """Take the candidate, or the event that it holds; −1 where the run goes on. The arguments are those of `conclude`.
 
     Where guards are looked at inside it, only as many of its parts are taken as are free of events.
     """
-    holds = K.state[N_DROPPED] == 0 or still_dependent(K) or K.state[NEAR] > 0  # nothing is told apart there
+    holds = K.n_dropped == 0 or still_dependent(K) or K.near_singular > 0  # nothing is told apart there
     looked = in_parts(K)
     quiet = not looked and is_quiet(K)
     passes = K.n_guards > 0 and passes_events(K, h)
@@ -335,7 +296,7 @@ def judge_step(K: Any, h: float, full: float, t1: float, cut: bool, within: bool
         within = True
         cut = False
         h = abs(parts) * h / K.looks
-        t1 = K.clock[NOW] + h
+        t1 = K.time + h
         status = try_step(K, h, t1)
         if status != 0:
             return status
@@ -345,11 +306,11 @@ def judge_step(K: Any, h: float, full: float, t1: float, cut: bool, within: bool
         if event > 0:
             return event
     pulls = event == 0 and not quiet and has_spurious_reaction(K)
-    if pulls and K.state[ROWS] > 0 and calm(K):
+    if pulls and K.n_active > 0 and calm(K):
         return -1
     add_error(K, h, event < 0)
     if passes:
-        log_passed_events(K, K.pick[2] if event < 0 else h)
+        log_passed_events(K, K.event_after if event < 0 else h)
     if event < 0:
         status = handle_event(K)
         return PAUSE if crowds(K) and status < 0 else status
@@ -360,7 +321,7 @@ def judge_step(K: Any, h: float, full: float, t1: float, cut: bool, within: bool
     status = conclude(K, h, full, t1, cut, within, quiet, holds, pulls)
     if status != 0:
         return status
-    K.state[SINCE_STORE] += 1
-    if K.state[SINCE_STORE] >= K.stride:
+    K.steps_since_row += 1
+    if K.steps_since_row >= K.stride:
         store_row(K)
     return -1

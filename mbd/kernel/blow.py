@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from mbd.kernel.complementarity import complementarity
-from mbd.kernel.fields import NOW, PAST_TIME, PLASTIC
+from mbd.kernel.records import Kernel
 from mbd.kernel.restart import capture, evaluate, evaluate_loaded, limit_of, row_speed
 
 __all__ = [
@@ -14,9 +12,9 @@ __all__ = [
 ]  # fmt: skip
 
 
-def prepare(K: Any) -> None:
+def prepare(K: Kernel) -> None:
     """K.acc at the instant, directions of sliding where contacts are now, force zero; all frictions begin stuck."""
-    evaluate(K, K.clock[NOW], K.q, K.y)
+    evaluate(K, K.time, K.q, K.y)
     if K.n_frictions > 0:
         for f in range(K.n_frictions):
             c = K.friction_contact[f]
@@ -24,18 +22,18 @@ def prepare(K: Any) -> None:
                 capture(K, c)
         for k in range(K.n_rows):
             K.given[k] = 0.0
-        evaluate(K, K.clock[NOW], K.q, K.y)
+        evaluate(K, K.time, K.q, K.y)
         evaluate_loaded(K, K.given)
         for f in range(K.n_frictions):
             K.base_limit[f] = limit_of(K, f)  # no impulse comes from a force that stays finite
         if K.strategy == 1:
             evaluate_loaded(K, K.past)
             for f in range(K.n_frictions):
-                K.past_limit[f] = limit_of(K, f) + (K.detail[PAST_TIME] - 1.0) * K.base_limit[f]
+                K.past_limit[f] = limit_of(K, f) + (K.past_time - 1.0) * K.base_limit[f]
     start_over(K)
 
 
-def start_over(K: Any) -> None:
+def start_over(K: Kernel) -> None:
     """No jump and no impulse yet."""
     for i in range(K.n):
         K.jump[i] = K.total_jump[i] = 0.0
@@ -43,14 +41,14 @@ def start_over(K: Any) -> None:
         K.impulse[k] = K.total[k] = 0.0
 
 
-def gather(K: Any, slow: bool, hold: bool) -> None:
+def gather(K: Kernel, slow: bool, hold: bool) -> None:
     """All closed and closing contacts take part; those that open on pull may choose.
 
     With `hold` all are held; where blows follow without end, the one that fired and cannot rise.
     """
     for c in range(K.n_contacts):
         both = K.closed[c] == 1 or K.closing[c] > 0
-        held = hold and (K.state[PLASTIC] == 0 or K.strategy == 1 or K.fired[1] == c)
+        held = hold and (K.plastic_impact == 0 or K.strategy == 1 or K.event_index == c)
         K.active[c] = 1 if (both and K.kind[c] == 0) else 0
         K.free[c] = 1 if (K.active[c] == 1 and K.opens[c] == 0 and not held) else 0
     if not slow or K.strategy == 1:
@@ -61,7 +59,7 @@ def gather(K: Any, slow: bool, hold: bool) -> None:
         K.slip[f] = 0.0
 
 
-def loosen(K: Any) -> None:
+def loosen(K: Kernel) -> None:
     """Frictions of this blow may choose, from sticking."""
     for f in range(K.n_frictions):
         c = K.friction_contact[f]
@@ -71,16 +69,16 @@ def loosen(K: Any) -> None:
             K.slip[f] = 0.0
 
 
-def speed(K: Any, row: int) -> float:
+def speed(K: Kernel, row: int) -> float:
     """γ of a row after the jumps so far."""
-    o_B = K.n * K.n + K.n + K.n * K.n_rows
+    o_B = K.acc_B
     value = row_speed(K, row)
     for j in range(K.n):
         value += K.acc[o_B + row * K.n + j] * K.total_jump[j]
     return value
 
 
-def blow(K: Any) -> int:
+def blow(K: Kernel) -> int:
     """The next jump and its impulses, beside the impulses in K.given: bias is in place, contacts have been gathered."""
     for k in range(K.n_rows):
         K.impulse[k] = 0.0
@@ -99,12 +97,12 @@ def blow(K: Any) -> int:
     return 0
 
 
-def restitution_of(K: Any, c: int) -> float:
+def restitution_of(K: Kernel, c: int) -> float:
     """e, or 0 at the end of impacts without end."""
-    return 0.0 if K.state[PLASTIC] == 1 else float(K.restitution[c])
+    return 0.0 if K.plastic_impact == 1 else float(K.restitution[c])
 
 
-def let_rebound(K: Any) -> None:
+def let_rebound(K: Kernel) -> None:
     """Contacts that closed with a restitution leave again."""
     for c in range(K.n_contacts):
         rests = K.strategy == 1 and K.before[c] >= 0.0
@@ -112,10 +110,10 @@ def let_rebound(K: Any) -> None:
             K.active[c] = 0
 
 
-def energy_gain(K: Any) -> float:
+def energy_gain(K: Kernel) -> float:
     """Work of all impulses on the mechanism, ½ Σ λ̂ (γ⁻ + γ⁺), relative to its terms."""
     n = K.n
-    o_B = n * n + n + n * K.n_rows
+    o_B = K.acc_B
     loss = 0.0
     size = 1e-300
     for k in range(K.n_rows):
@@ -129,6 +127,6 @@ def energy_gain(K: Any) -> float:
     return -loss / size
 
 
-def strikes(K: Any, c: int) -> bool:
+def strikes(K: Kernel, c: int) -> bool:
     """Whether a contact closes in the impact just found; one that only touches takes no impulse."""
     return bool(K.kind[c] == 0 and K.closing[c] > 0 and (K.closing[c] == 1 or K.impulse[K.normal[c]] != 0.0))

@@ -51,14 +51,14 @@ The last eight are what few steps need: with them inside, the loop over steps wo
 """
 
 SHIMS = """
-def scheme_step(K: Any, h: float, t1: float) -> int:
+def scheme_step(K: Kernel, h: float, t1: float) -> int:
     if K.scheme == 1:
         return runge_kutta_step(K, h, t1)
     if K.scheme == 2:
         return radau_step(K, h, t1)
     return newmark_step(K, h, t1)
 
-def scheme_accept(K: Any, h: float) -> None:
+def scheme_accept(K: Kernel, h: float) -> None:
     if K.scheme == 1:
         runge_kutta_accept(K, h)
     elif K.scheme == 2:
@@ -66,21 +66,21 @@ def scheme_accept(K: Any, h: float) -> None:
     else:
         newmark_accept(K, h)
 
-def scheme_resume(K: Any, h: float) -> int:
+def scheme_resume(K: Kernel, h: float) -> int:
     return newmark_resume(K, h)
 
-def scheme_start(K: Any) -> int:
+def scheme_start(K: Kernel) -> int:
     if K.scheme == 1:
         return runge_kutta_start(K)
     if K.scheme == 2:
         return radau_start(K)
     return newmark_start(K)
 
-def scheme_error(K: Any, h: float) -> None:
+def scheme_error(K: Kernel, h: float) -> None:
     if K.scheme == 0:
         newmark_error(K, h)
 
-def mbd_kernel(K: Any) -> int:
+def mbd_kernel(K: Kernel) -> int:
     return advance(K)
 """
 
@@ -92,7 +92,7 @@ def _source(name: str) -> str:
 def source_digest() -> str:
     """Hash of everything the kernel is made from."""
     digest = hashlib.sha256()
-    for name in ("fields", "hooks", "roots", "expressions", "translate", "build", *MODULES):
+    for name in ("codes", "record", "records", "hooks", "roots", "expressions", "translate", "build", *MODULES):
         digest.update(_source(name).encode())
     return digest.hexdigest()
 
@@ -147,7 +147,7 @@ def kernel_text() -> str:
     from mbd.kernel.translate import translate
 
     functions = functions_of(*map(_source, MODULES), SHIMS)
-    return translate(functions, constants_of("fields", *MODULES), ENTRY, ["kernel"], APART)
+    return translate(functions, constants_of("codes", *MODULES), ENTRY, ["kernel"], APART)
 
 
 @lru_cache(maxsize=1)

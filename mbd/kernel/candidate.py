@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from mbd.kernel.fields import NOW
+from mbd.kernel.records import Kernel
 
 __all__ = ["accept_guards", "adopt", "carry", "stay"]
 
@@ -19,20 +19,20 @@ def carry(values: Any, kept: Any, place: int, count: int, out: bool) -> int:
     return place + count
 
 
-def adopt(K: Any, t1: float) -> None:
+def adopt(K: Kernel, t1: float) -> None:
     """The candidate becomes the accepted state ahead of a restart: what the scheme remembers stays behind."""
     exchange(K, False)
-    K.clock[NOW] = t1
+    K.time = t1
     accept_guards(K)
 
 
-def accept_guards(K: Any) -> None:
+def accept_guards(K: Kernel) -> None:
     """Guards of the candidate become those of the accepted state."""
     for i in range(K.n_watched):
         K.guards0[i] = K.guards1[i]
 
 
-def stay(K: Any) -> None:
+def stay(K: Kernel) -> None:
     """The candidate becomes the accepted state itself: an event at the very start of the step."""
     exchange(K, True)
     for i in range(K.n):
@@ -41,7 +41,7 @@ def stay(K: Any) -> None:
         K.guards1[i] = K.guards0[i]
 
 
-def exchange(K: Any, out: bool) -> None:
+def exchange(K: Kernel, out: bool) -> None:
     """q, (v, z), their rates and multipliers of the accepted state into the candidate, or back."""
     carry(K.q, K.q1, 0, K.n_q, out)
     carry(K.y, K.y1, 0, K.n, out)

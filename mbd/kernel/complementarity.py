@@ -13,8 +13,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from mbd.kernel.fields import BLOCKED, CONFLICT, N_DROPPED, NO_IMPACT, PAST_TIME
+from mbd.kernel.codes import CONFLICT, NO_IMPACT
 from mbd.kernel.pivoting import pivoted
+from mbd.kernel.records import Kernel
 from mbd.kernel.redundancy import sharing, spread
 from mbd.kernel.restart import MOST_LOADS, active_rows, evaluate_loaded, limit_of, load_accelerations, refresh_scales
 from mbd.kernel.saddle import solve_rows
@@ -31,7 +32,7 @@ MOST_CHOICES = 6561
 """Sets of branches that are tried one after the other when nothing else has led to a solution [-]."""
 
 
-def complementarity(K: Any, level: int) -> int:
+def complementarity(K: Kernel, level: int) -> int:
     """Choose K.active of contacts with K.free = 1 and K.sticks, K.slip of frictions with K.loose = 1 or 2, and solve.
 
     Others keep theirs. With K.free = 2 a contact chooses K.parting: its normal row is off, its tangents stay. With
@@ -75,7 +76,7 @@ def complementarity(K: Any, level: int) -> int:
     return nothing
 
 
-def solve_branches(K: Any, level: int) -> int:
+def solve_branches(K: Kernel, level: int) -> int:
     """Solve with the present branches; the friction that slides is put into K.impulse of its row."""
     if K.n_frictions == 0:
         load(K, level)
@@ -92,7 +93,7 @@ def solve_branches(K: Any, level: int) -> int:
         if change < 1e-13 or (K.loaded == 0 and not sharing(K)):
             break
     find_limits(K, level)
-    if K.state[N_DROPPED] > 0 and not sharing(K):
+    if K.n_dropped > 0 and not sharing(K):
         for _ in range(MOST_LOADS):  # frictions that hold together share by their limits, which follow their loads
             spread(K, K.impulse)
             change = evaluate_loaded(K, whole(K, level))
@@ -106,27 +107,27 @@ def solve_branches(K: Any, level: int) -> int:
     return status
 
 
-def find_limits(K: Any, level: int) -> None:
+def find_limits(K: Kernel, level: int) -> None:
     """Largest frictions at the multipliers now in the block, of impulses without those of forces that stay finite."""
     for f in range(K.n_frictions):
         K.limit[f] = limit_of(K, f)
         if level == 1:  # only over the time of a non-smooth step
-            K.limit[f] += (K.detail[PAST_TIME] - 1.0) * K.base_limit[f]
+            K.limit[f] += (K.past_time - 1.0) * K.base_limit[f]
 
 
-def whole(K: Any, level: int) -> Any:
+def whole(K: Kernel, level: int) -> Any:
     """The multipliers that friction follows: with the impulses that are given, and those of a smooth step before."""
     for k in range(K.n_rows):
         K.loads[k] = K.impulse[k] + (K.given[k] + K.past[k] if level == 1 else 0.0)
     return K.loads
 
 
-def load(K: Any, level: int) -> None:
+def load(K: Kernel, level: int) -> None:
     """Force and bias of the accelerations, or the force of the impulses that are given."""
     if level == 0:
         load_accelerations(K)
         return
-    o_R = K.n * K.n + K.n
+    o_R = K.acc_R
     for i in range(K.n):
         K.force[i] = 0.0
         for k in range(K.n_rows):
@@ -139,18 +140,18 @@ def load(K: Any, level: int) -> None:
                     K.force[i] += K.acc[o_R + i * K.n_rows + row] * (K.slip[f] * K.past_limit[f] - K.past[row])
 
 
-def is_on(K: Any, f: int) -> bool:
+def is_on(K: Kernel, f: int) -> bool:
     """Whether a friction acts: its contact is closed, or it always does."""
     c = K.friction_contact[f]
     return bool(c < 0 or K.active[c] == 1)
 
 
-def slides(K: Any, f: int) -> bool:
+def slides(K: Kernel, f: int) -> bool:
     """Whether a friction acts and slides."""
     return bool(is_on(K, f) and K.sticks[f] == 0)
 
 
-def measure_free(K: Any, level: int) -> None:
+def measure_free(K: Kernel, level: int) -> None:
     """Sizes of w where no row acted, by which its round-off is judged: where all rests w itself is nothing else."""
     if level == 0 and K.scale[0] == 0.0:
         refresh_scales(K)
@@ -159,10 +160,10 @@ def measure_free(K: Any, level: int) -> None:
         K.typical[i] = abs(K.y[i]) if level == 1 else (K.scale[i] / mass if mass > 0.0 else 0.0)
 
 
-def departure(K: Any, row: int, sign: float, tolerance: float) -> float:
+def departure(K: Kernel, row: int, sign: float, tolerance: float) -> float:
     """How far sign (B w + bias) of a row is below zero, beyond a tolerance relative to its terms."""
     n = K.n
-    o_B = n * n + n + n * K.n_rows
+    o_B = K.acc_B
     value = K.bias[row]
     size = abs(K.bias[row])
     for j in range(n):
@@ -172,14 +173,14 @@ def departure(K: Any, row: int, sign: float, tolerance: float) -> float:
     return float(-sign * value - tolerance * size)
 
 
-def contact_fault(K: Any, c: int, largest: float) -> float:
+def contact_fault(K: Kernel, c: int, largest: float) -> float:
     """How badly contact c breaks its law; ≤ 0 if it does not."""
     if K.active[c] == 1 and K.parting[c] == 0:
         return float(K.impulse[K.normal[c]] - ROUND_OFF * largest)  # λ > 0 would pull
     return departure(K, K.normal[c], 1.0, ROUND_OFF)
 
 
-def friction_fault(K: Any, f: int, largest: float) -> float:
+def friction_fault(K: Kernel, f: int, largest: float) -> float:
     """How badly friction f breaks its law; ≤ 0 if it does not."""
     row = K.friction_row[f]
     if K.sticks[f] == 1:
@@ -187,7 +188,7 @@ def friction_fault(K: Any, f: int, largest: float) -> float:
     return departure(K, row, K.slip[f], SURE if K.loose[f] == 2 else ROUND_OFF)  # it slides against its own friction
 
 
-def give_way(K: Any) -> int:
+def give_way(K: Kernel) -> int:
     """Where held rows contradict each other, a friction that may choose slides, or a contact opens; 0 if none can.
 
     It is the one whose row is blamed if it can. Its direction is other than the one it had last.
@@ -196,7 +197,7 @@ def give_way(K: Any) -> int:
     chosen = -1
     for k in range(m):
         f = K.row_friction[K.rows[k]]
-        if f >= 0 and K.loose[f] > 0 and (chosen < 0 or K.n + k == K.state[BLOCKED]):
+        if f >= 0 and K.loose[f] > 0 and (chosen < 0 or K.n + k == K.failure_index):
             chosen = f
     if chosen >= 0:
         K.sticks[chosen] = 0
@@ -210,7 +211,7 @@ def give_way(K: Any) -> int:
     return 0
 
 
-def largest_impulse(K: Any) -> float:
+def largest_impulse(K: Kernel) -> float:
     """Size of the multipliers."""
     largest = 0.0
     for k in range(K.n_rows):
@@ -218,7 +219,7 @@ def largest_impulse(K: Any) -> float:
     return largest
 
 
-def toggle(K: Any, c: int) -> None:
+def toggle(K: Kernel, c: int) -> None:
     """The other branch of a contact."""
     if K.free[c] == 2:
         K.parting[c] = 1 - K.parting[c]
@@ -226,7 +227,7 @@ def toggle(K: Any, c: int) -> None:
         K.active[c] = 1 - K.active[c]
 
 
-def turn(K: Any, f: int) -> None:
+def turn(K: Kernel, f: int) -> None:
     """The other branch of a friction: from sticking to sliding as its multiplier pulls, and back."""
     if K.sticks[f] == 1:
         K.sticks[f] = 0
@@ -238,7 +239,7 @@ def turn(K: Any, f: int) -> None:
         K.slip[f] = 0.0
 
 
-def change_all(K: Any) -> int:
+def change_all(K: Kernel) -> int:
     """Every contact and friction takes the branch that the solution asks for; how many changed."""
     largest = largest_impulse(K)
     count = 0
@@ -253,7 +254,7 @@ def change_all(K: Any) -> int:
     return count
 
 
-def worst(K: Any, first: bool) -> int:
+def worst(K: Kernel, first: bool) -> int:
     """1 + number of the contact or friction that must change (frictions after contacts), 0 if none."""
     largest = largest_impulse(K)
     found = 0
@@ -274,7 +275,7 @@ def worst(K: Any, first: bool) -> int:
     return found
 
 
-def change_one(K: Any, the_worst: bool) -> int:
+def change_one(K: Kernel, the_worst: bool) -> int:
     """One contact or friction takes its other branch; 0 if none needs to."""
     place = worst(K, not the_worst)
     if place == 0:
@@ -286,7 +287,7 @@ def change_one(K: Any, the_worst: bool) -> int:
     return 1
 
 
-def choose(K: Any, number: int) -> None:
+def choose(K: Kernel, number: int) -> None:
     """The set of branches of that number."""
     for c in range(K.n_contacts):
         if K.free[c] == 1:

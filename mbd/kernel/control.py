@@ -3,8 +3,8 @@
 What a scheme owes to it: in a run with K.adaptive = 1, `scheme_step` leaves an estimate of its local error in K.error,
 (n_v + n,): that of the increment x of positions [m, rad], then that of (v, z); `scheme_error` fills it in where a
 scheme finds it from its memory. K.error_order is the power of the step with which that error per second falls. A scheme
-takes any step, without a fixed grid: the present full step is K.clock[STEP] (K.dt is a short time that stands for
-nothing else in such a run), and the state it keeps tells the size of its own last step (as K.clock[AUX_STEP] does).
+takes any step, without a fixed grid: the present full step is K.step (K.dt is a short time that stands for
+nothing else in such a run), and the state it keeps tells the size of its own last step (as K.aux_step does).
 
 The error is controlled per unit of time: positions may err by K.allowed per second, and by their round-off in each
 step, ``err = max |e| / (allowed h + round-off)``, where e is also h times the error of velocities and, relative to
@@ -15,28 +15,10 @@ factors keep their step between 0.8 and 1.25.
 
 from __future__ import annotations
 
-from typing import Any
-
-from mbd.kernel.fields import (
-    AUX_STEP,
-    EPS,
-    LOCAL,
-    NEXT,
-    NOT_CONVERGED,
-    NOT_FINITE,
-    NOW,
-    REJECTED,
-    ROWS,
-    SINGULAR,
-    STAGNATED,
-    STEP,
-    STIRRED,
-    TOO_NEAR,
-    TOO_SMALL,
-    TRIED,
-)
+from mbd.kernel.codes import EPS, NOT_CONVERGED, NOT_FINITE, SINGULAR, STAGNATED, STIRRED, TOO_NEAR, TOO_SMALL
 from mbd.kernel.guards import try_step
 from mbd.kernel.hooks import scheme_error
+from mbd.kernel.records import Kernel
 from mbd.kernel.restart import compose, consistent, fill_block, lower_scales
 from mbd.kernel.roots import sqrt
 from mbd.kernel.singular.step_size import step_by_pose, stirred, stirs
@@ -59,17 +41,17 @@ CANCELLED = 64.0
 """The same for what a step adds to them: stages and estimates are sums in which large terms cancel [-]."""
 
 
-def smallest_step(K: Any) -> float:
+def smallest_step(K: Kernel) -> float:
     """Below it the clock does not move, or a run would never end: a motion that turns ever faster."""
-    return float(max(64.0 * EPS * max(abs(K.clock[NOW]), K.longest), LEAST * K.longest))
+    return float(max(64.0 * EPS * max(abs(K.time), K.longest), LEAST * K.longest))
 
 
-def newmark_error(K: Any, h: float) -> None:
+def newmark_error(K: Kernel, h: float) -> None:
     """K.error of the Newmark family: ``h² (1/6 − β − (α_m − α_f)/2) (a₁ − a₀)`` of positions.
 
     That of velocities and first-order states is ``h²/12`` times the change of the slope of their rates.
     """
-    stretch = h / K.clock[AUX_STEP]
+    stretch = h / K.aux_step
     share = h * h * (1.0 / 6.0 - K.beta - 0.5 * (K.alpha_m - K.alpha_f))
     for i in range(K.n):
         a0 = K.rate[i] + stretch * (K.aux[i] - K.rate[i])
@@ -78,7 +60,7 @@ def newmark_error(K: Any, h: float) -> None:
         K.error[K.n_v + i] = h * h / 12.0 * ((K.rate1[i] - K.rate[i]) / h - K.slope[i])
 
 
-def error_ratio(K: Any, h: float) -> float:
+def error_ratio(K: Kernel, h: float) -> float:
     """err of the module's text for the candidate."""
     n_v = K.n_v
     far = 0.0
@@ -88,7 +70,7 @@ def error_ratio(K: Any, h: float) -> float:
     for i in range(n_v):
         fast = max(fast, abs(K.y1[i]))
     floor = EPS * (NEIGHBOURS * far + CANCELLED * h * fast)
-    if K.scheme != 0 and K.state[ROWS] > 0:
+    if K.scheme != 0 and K.n_active > 0:
         floor += stirred(K, h) * h * fast
     largest = 0.0
     for i in range(n_v):
@@ -101,7 +83,7 @@ def error_ratio(K: Any, h: float) -> float:
     return ratio if ratio < 1e300 else 1e300
 
 
-def growth(K: Any, ratio: float) -> float:
+def growth(K: Kernel, ratio: float) -> float:
     """Factor from this step to the next."""
     most = 5.0 if K.scheme != 0 else 2.0
     factor = most
@@ -118,12 +100,12 @@ def is_to_shorten(status: int) -> bool:
     return stalled or status == SINGULAR or status == TOO_NEAR or status == NOT_FINITE
 
 
-def controlled_step(K: Any, h: float) -> int:
-    """A candidate whose error is allowed, after a step of h or less: K.clock[TRIED]; K.clock[NEXT] is the next step."""
-    t = K.clock[NOW]
+def controlled_step(K: Kernel, h: float) -> int:
+    """A candidate whose error is allowed, after a step of h or less: K.step_taken; K.next_step is the next step."""
+    t = K.time
     while True:
         wanted = h
-        if K.scheme != 0 and K.state[ROWS] > 0:
+        if K.scheme != 0 and K.n_active > 0:
             h = step_by_pose(K, wanted, 1.0)
             if stirs(K, h):
                 return STIRRED
@@ -135,14 +117,12 @@ def controlled_step(K: Any, h: float) -> int:
             ratio = error_ratio(K, h)
             factor = growth(K, ratio)
             if factor >= AGAIN:
-                K.clock[LOCAL] = ratio * K.allowed * h
-                K.clock[TRIED] = h
+                K.local_error = ratio * K.allowed * h
+                K.step_taken = h
                 following = h * factor
-                if (
-                    wanted < (1.0 - 1e-6) * K.clock[STEP] or h < wanted
-                ):  # it was cut: its error says little of longer ones
-                    following = max(following, K.clock[STEP])
-                K.clock[NEXT] = min(following, K.longest)
+                if wanted < (1.0 - 1e-6) * K.step or h < wanted:  # it was cut: its error says little of longer ones
+                    following = max(following, K.step)
+                K.next_step = min(following, K.longest)
                 return 0
             h *= factor
             lower_scales(K)
@@ -150,18 +130,18 @@ def controlled_step(K: Any, h: float) -> int:
             h *= 0.5  # a long step may also have left the region where forces are defined
         else:
             return status
-        K.counts[REJECTED] += 1
+        K.n_rejected += 1
         if h < smallest_step(K):
             if status == 0:
-                K.detail[0] = t + h
-                K.detail[2] = h
+                K.failure_time = t + h
+                K.failure_step = h
                 return TOO_SMALL
             return status
-        K.clock[STEP] = h  # no step is tiny beside the one that may be taken here
+        K.step = h  # no step is tiny beside the one that may be taken here
 
 
-def first_step(K: Any) -> None:
-    """K.clock[STEP] at an accepted, consistent state (Hairer, Nørsett & Wanner 1993, II.4).
+def first_step(K: Kernel) -> None:
+    """K.step at an accepted, consistent state (Hairer, Nørsett & Wanner 1993, II.4).
 
     ``h = (0.01 tol / max(|ẏ|, |ÿ|))^(1/(p+1))`` with y = (q, v) and ÿ by one difference.
     """
@@ -175,7 +155,7 @@ def first_step(K: Any) -> None:
     size = 10.0 * K.allowed * K.longest
     ahead = 1e-2 * (speed + sqrt(size * force)) / force if force > 0.0 else K.dt
     ahead = min(max(ahead, 1e-3 * K.dt), K.dt)
-    t = K.clock[NOW]
+    t = K.time
     fill_block(K, t, K.q, K.y)
     for i in range(K.n_v):
         K.block[K.o_x + i] = ahead * K.y[i]
@@ -190,4 +170,4 @@ def first_step(K: Any) -> None:
     h = K.longest
     if change > 0.0 and change < 1e300:
         h = (0.01 * size / change) ** (1.0 / (K.error_order + 1.0))
-    K.clock[STEP] = min(max(h, 4.0 * smallest_step(K)), K.longest)
+    K.step = min(max(h, 4.0 * smallest_step(K)), K.longest)

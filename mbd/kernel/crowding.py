@@ -9,9 +9,7 @@ wherever it is cut.
 
 from __future__ import annotations
 
-from typing import Any
-
-from mbd.kernel.fields import CROWD, CROWD_TIME, NOW, UNLOCATED, UNLOCATED_SINCE
+from mbd.kernel.records import Kernel
 
 __all__ = ["count_blow", "crowd", "crowds"]
 
@@ -23,12 +21,12 @@ PART = 1e-6
 """Impulse over the largest of a blow that is more than round-off [-]."""
 
 
-def crowd(K: Any) -> float:
+def crowd(K: Kernel) -> float:
     """Blows through several contacts, less one for each dt since."""
-    return float(max(K.clock[CROWD] - (K.clock[NOW] - K.clock[CROWD_TIME]) / K.dt, 0.0))
+    return float(max(K.crowding - (K.time - K.crowding_time) / K.dt, 0.0))
 
 
-def count_blow(K: Any) -> None:
+def count_blow(K: Kernel) -> None:
     """Count the blow of this instant, whose impulses are in K.impulse, if it goes through several closed contacts."""
     largest = 0.0
     for c in range(K.n_contacts):
@@ -39,14 +37,14 @@ def count_blow(K: Any) -> None:
         if K.kind[c] == 0 and K.closing[c] == 0 and abs(K.impulse[K.normal[c]]) > PART * largest:
             several += 1
     if several >= SEVERAL:
-        K.clock[CROWD] = crowd(K) + 1.0
-        K.clock[CROWD_TIME] = K.clock[NOW]
+        K.crowding = crowd(K) + 1.0
+        K.crowding_time = K.time
 
 
-def crowds(K: Any) -> bool:
+def crowds(K: Kernel) -> bool:
     """Whether non-smooth steps follow from now on, as blows have crowded; told once."""
-    if K.auto == 0 or K.state[UNLOCATED] > 0 or K.clock[CROWD] <= MOST_CROWDED:
+    if K.auto == 0 or K.fallback > 0 or K.crowding <= MOST_CROWDED:
         return False
-    K.state[UNLOCATED] = 1
-    K.clock[UNLOCATED_SINCE] = K.clock[NOW]
+    K.fallback = 1
+    K.fallback_time = K.time
     return True

@@ -2,37 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from mbd.kernel.candidate import carry
+from mbd.kernel.codes import CHATTER, CLOSE, CONFLICT, CROSS, EVENT, LOG_EVENT, NO_IMPACT, OPEN_FORCE, OPEN_PULL, WATCH
 from mbd.kernel.crowding import count_blow
-from mbd.kernel.fields import (
-    CHATTER,
-    CLOSE,
-    CONFLICT,
-    CROSS,
-    ENDLESS,
-    EVENT,
-    EVENTS,
-    HALVED,
-    HALVES,
-    LAST_SWITCH,
-    LOG_EVENT,
-    LOGGED,
-    NO_IMPACT,
-    NOW,
-    OPEN_FORCE,
-    OPEN_PULL,
-    PLASTIC,
-    REDONE,
-    RESTART,
-    SHORTENED,
-    STORED,
-    SWITCHES,
-    WATCH,
-)  # fmt: skip
 from mbd.kernel.nonsmooth import keep, put_back, rebound, strike
 from mbd.kernel.observe import is_awaited, store_row
+from mbd.kernel.records import Kernel
 from mbd.kernel.settle import NO_IMPULSE, log_event
 from mbd.kernel.starting import restart
 from mbd.kernel.switching import switch
@@ -44,30 +19,30 @@ MOST_HALVED = 3
 """How often a non-smooth step whose end has no impulses is halved [-]."""
 
 
-def same_instant(K: Any) -> bool:
+def same_instant(K: Kernel) -> bool:
     """Count switches without progress in time; true when there were too many, or when they repeat themselves."""
-    now = K.clock[NOW]
-    if now - K.clock[LAST_SWITCH] <= 1e-10 * K.dt:
-        K.state[SWITCHES] += 1
+    now = K.time
+    if now - K.last_switch <= 1e-10 * K.dt:
+        K.n_switches += 1
     else:
-        K.state[SWITCHES] = 0
-        K.seen[0] = 0.0
-    K.clock[LAST_SWITCH] = now
+        K.n_switches = 0
+        K.seen_at = 0.0
+    K.last_switch = now
     if repeats(K):
-        if K.state[SWITCHES] > K.max_switches // 2:
+        if K.n_switches > K.max_switches // 2:
             return True
-        K.state[SWITCHES] = K.max_switches // 2  # from the next blow on they are plastic, all at once
-        K.seen[0] = 0.0
-    return bool(K.state[SWITCHES] > K.max_switches)
+        K.n_switches = K.max_switches // 2  # from the next blow on they are plastic, all at once
+        K.seen_at = 0.0
+    return bool(K.n_switches > K.max_switches)
 
 
-def repeats(K: Any) -> bool:
+def repeats(K: Kernel) -> bool:
     """Whether everything is as it was after an earlier switch of this instant, so that they go on without end.
 
     The state is compared with the one noted when there were half as many switches or fewer, so that a cycle of any
     length is found (Brent 1980, BIT 20:176).
     """
-    same = K.seen[0] > 0.0
+    same = K.seen_at > 0.0
     o = 1
     for c in range(K.n_contacts):
         same = same and K.seen[o + 2 * c] == K.closed[c] and K.seen[o + 2 * c + 1] == K.armed[c]
@@ -85,15 +60,15 @@ def repeats(K: Any) -> bool:
         same = same and K.seen[o + i] == K.y[i]
     if same:
         return True
-    number = int(K.state[SWITCHES])
-    if number > 0 and number >= 2.0 * K.seen[0]:
+    number = int(K.n_switches)
+    if number > 0 and number >= 2.0 * K.seen_at:
         note_state(K, number)
     return False
 
 
-def note_state(K: Any, number: int) -> None:
+def note_state(K: Kernel, number: int) -> None:
     """What `repeats` compares with, at this switch of the instant."""
-    K.seen[0] = float(number)
+    K.seen_at = float(number)
     o = 1
     for c in range(K.n_contacts):
         K.seen[o + 2 * c] = float(K.closed[c])
@@ -107,37 +82,37 @@ def note_state(K: Any, number: int) -> None:
     carry(K.y, K.seen, o, K.n, True)
 
 
-def was_closed(K: Any, c: int) -> bool:
+def was_closed(K: Kernel, c: int) -> bool:
     """Whether a contact was closed in the row before the last."""
-    return bool(K.store[(K.state[STORED] - 1) * K.width - K.n_frictions - K.n_contacts + c] == 1.0)
+    return bool(K.store[(K.n_stored - 1) * K.width - K.n_frictions - K.n_contacts + c] == 1.0)
 
 
-def handle_event(K: Any) -> int:
+def handle_event(K: Kernel) -> int:
     """Take the located event: rows before and after, impact, restart. Negative: nothing for the caller to do."""
-    kind = K.fired[0]
-    index = K.fired[1]
-    first = K.state[LOGGED]
-    at_start = K.pick[2] <= 0.0 and K.stabilized == 0 and (kind == OPEN_FORCE or kind == OPEN_PULL)
+    kind = K.event_kind
+    index = K.event_index
+    first = K.n_logged
+    at_start = K.event_after <= 0.0 and K.stabilized == 0 and (kind == OPEN_FORCE or kind == OPEN_PULL)
     if at_start:  # the accepted row, which does not pull, is the one before
         store_row(K)
-    take_over(K, K.clock[NOW] + K.pick[2])
+    take_over(K, K.time + K.event_after)
     if same_instant(K):
         return CHATTER
     if kind == WATCH:
-        K.state[RESTART] = 2
+        K.restart_due = 2
         return switch(K) - 1
     if not at_start:
         store_row(K)
     if kind == CROSS:
         log_event(K, LOG_EVENT, index, 0.0, NO_IMPULSE)
         K.side[index] = -K.side[index]
-        K.state[RESTART] = 1
+        K.restart_due = 1
         return EVENT if is_awaited(K, first) else -1
-    if kind == CLOSE and K.state[SWITCHES] > K.max_switches // 2:  # blows by turns: their limit is plastic, all at once
-        K.state[PLASTIC] = 1
-        K.counts[ENDLESS] += 1
+    if kind == CLOSE and K.n_switches > K.max_switches // 2:  # blows by turns: their limit is plastic, all at once
+        K.plastic_impact = 1
+        K.n_endless += 1
     status = switch(K)
-    K.state[PLASTIC] = 0
+    K.plastic_impact = 0
     if status != 0:
         return status
     if K.auto == 1 and kind == CLOSE:
@@ -148,19 +123,19 @@ def handle_event(K: Any) -> int:
         return status
     for c in range(K.n_contacts):
         if was_closed(K, c) and K.closed[c] == 0 and K.armed[c] != 1 and K.guards0[K.n_contacts + c] < -1e-6:
-            K.sinking[c] = min(K.sinking[c], K.clock[NOW])
+            K.sinking[c] = min(K.sinking[c], K.time)
     return EVENT if is_awaited(K, first) else -1
 
 
-def land(K: Any, h: float, t1: float) -> int:
+def land(K: Kernel, h: float, t1: float) -> int:
     """End a non-smooth step: rows before and after, impact, restart. Negative: nothing for the caller to do.
 
     Where no impulses obey all laws, the step is tried again with half its size, down to an eighth.
     """
-    first = K.state[LOGGED]
-    stored = K.state[STORED]
-    t = K.clock[NOW]
-    events = K.counts[EVENTS]
+    first = K.n_logged
+    stored = K.n_stored
+    t = K.time
+    events = K.n_events
     keep(K)
     status = strike(K, h, t1)
     if status == 0:
@@ -168,19 +143,19 @@ def land(K: Any, h: float, t1: float) -> int:
         status = rebound(K)
     if status == 0:
         status = restart(K)
-    if (status == NO_IMPACT or status == CONFLICT) and K.state[HALVED] < MOST_HALVED:
-        K.state[HALVED] += 1
-        K.state[HALVES] = 2 ** (K.state[HALVED] + 1)
-        K.counts[SHORTENED] += 1
-        K.state[LOGGED] = first
-        K.state[STORED] = stored
-        K.counts[EVENTS] = events
+    if (status == NO_IMPACT or status == CONFLICT) and K.halvings < MOST_HALVED:
+        K.halvings += 1
+        K.halves_left = 2 ** (K.halvings + 1)
+        K.n_shortened += 1
+        K.n_logged = first
+        K.n_stored = stored
+        K.n_events = events
         put_back(K, t)
-        K.state[RESTART] = 2
+        K.restart_due = 2
         return -1
     if status != 0:
         return status
     store_row(K)
-    K.state[REDONE] = 0
-    K.state[HALVED] = 0
+    K.n_repeats = 0
+    K.halvings = 0
     return EVENT if is_awaited(K, first) else -1

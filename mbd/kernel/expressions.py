@@ -9,18 +9,23 @@ nothing is reordered or contracted. Only the bounds of int do not grow, and x/0 
 from __future__ import annotations
 
 import ast
+import inspect
+import re
 from collections.abc import Callable, Mapping
 from struct import pack
+from textwrap import dedent
 
 from mbd.errors import CapabilityError
-from mbd.kernel.fields import FIELDS, INTEGER_ARRAYS, INTEGERS, REAL_ARRAYS, REALS
+from mbd.kernel.records import TABLE
 
 __all__ = ["LLVM", "Callee", "Expressions", "Function", "join", "tags"]
 
 LLVM = {"bool": "i1", "int": "i64", "real": "double", "ints": "ptr", "reals": "ptr", "kernel": "ptr", "none": "void"}
 NUMBERS = ("bool", "int", "real")
-PLACES: dict[str, int] = {field: place for place, field in enumerate(FIELDS)}
-TAGS = {what: 2 * place + 3 for place, what in enumerate(("real", "int", *REAL_ARRAYS, *INTEGER_ARRAYS, "code"))}
+PLACES: dict[str, int] = {field: place for place, field in enumerate(TABLE.addresses)}
+TAGS = {
+    what: 2 * place + 3 for place, what in enumerate(("real", "int", *TABLE.real_arrays, *TABLE.integer_arrays, "code"))
+}
 """Numbers of LLVM's tags of memory, see `tags`."""
 WITHIN_ANOTHER = {"shift1": "block"}
 """Fields that lie in the array of another, whose tag they have."""
@@ -57,9 +62,17 @@ def tags() -> str:
     for what, tag in TAGS.items():
         if what in WITHIN_ANOTHER:
             continue
-        parent = 1 if what in ("real", "int") else TAGS["real" if what in REAL_ARRAYS else "int"] - 1
+        parent = 1 if what in ("real", "int") else TAGS["real" if what in TABLE.real_arrays else "int"] - 1
         lines += [f'!{tag - 1} = !{{!"{what}", !{parent}}}', f"!{tag} = !{{!{tag - 1}, !{tag - 1}, i64 0}}"]
     return "\n".join(lines)
+
+
+def formula(name: str, record: ast.expr) -> ast.expr:
+    """The expression that a property of the records returns, of the fields of `record`."""
+    tree = ast.parse(dedent(inspect.getsource(TABLE.formulas[name])))
+    own = next(node for node in ast.walk(tree) if isinstance(node, ast.Return)).value
+    assert own is not None
+    return ast.parse(re.sub(r"\bself\b", ast.unparse(record), ast.unparse(own)), mode="eval").body
 
 
 class Expressions:
@@ -165,27 +178,35 @@ class Expressions:
         raise CapabilityError(f"{node.id!r} has no value here")
 
     def _Attribute(self, node: ast.Attribute) -> Value:
+        if node.attr in TABLE.places:
+            place, kind, what = self.element(node)
+            return self.load(place, kind, what), kind
+        if node.attr in TABLE.formulas:
+            return self.value(formula(node.attr, node.value))
         table, kind = self.value(node.value)
-        if kind != "kernel" or node.attr not in PLACES:
+        if kind != "kernel" or node.attr not in TABLE.kinds:
             raise CapabilityError(f"{ast.unparse(node)!r} is no field of the kernel")
         place = self.emit(f"getelementptr inbounds i64, ptr {table}, i64 {PLACES[node.attr]}")
-        if node.attr in REALS:
-            kind = "real"
-        elif node.attr in INTEGERS:
-            kind = "int"
-        else:
-            kind = "reals" if node.attr in REAL_ARRAYS else "ints"
+        kind = TABLE.kinds[node.attr]
         return self.emit(f"load {LLVM[kind]}, ptr {place}, !invariant.load !0"), kind
 
-    def element(self, node: ast.Subscript) -> tuple[str, str, str]:
-        """Address of an element of an array, its kind, and what can be at that address: 'real', 'int', or a field."""
-        array, kind = self.value(node.value)
+    def element(self, node: ast.Subscript | ast.Attribute) -> tuple[str, str, str]:
+        """Address of an element of an array, its kind, and what can be at that address: 'real', 'int', or a field.
+
+        A number that a record names by its place in an array is such an element.
+        """
+        if isinstance(node, ast.Attribute):
+            if node.attr not in TABLE.places:
+                raise CapabilityError(f"{ast.unparse(node)!r} cannot be assigned")
+            array, index = TABLE.places[node.attr]
+            node = ast.Subscript(ast.Attribute(node.value, array, ast.Load()), ast.Constant(index), ast.Load())
+        base, kind = self.value(node.value)
         if kind not in ("ints", "reals"):
             raise CapabilityError(f"{ast.unparse(node.value)!r} is no array")
         own = kind[:-1]
         place = self.as_kind(node.slice, "int")
         what = node.value.attr if isinstance(node.value, ast.Attribute) else own
-        return self.emit(f"getelementptr inbounds {LLVM[own]}, ptr {array}, i64 {place}"), own, what
+        return self.emit(f"getelementptr inbounds {LLVM[own]}, ptr {base}, i64 {place}"), own, what
 
     def load(self, place: str, kind: str, what: str) -> str:
         return self.emit(f"load {LLVM[kind]}, ptr {place}, !tbaa !{TAGS[what]}")

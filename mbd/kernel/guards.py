@@ -9,29 +9,26 @@ from __future__ import annotations
 
 from typing import Any
 
-from mbd.kernel.fields import (
+from mbd.kernel.codes import (
     CLOSE,
     CROSS,
     EPS,
     GRAZE,
     GUARDS,
-    N_DROPPED,
     NOT_CONVERGED,
     NOT_FINITE,
-    NOW,
     OPEN_FORCE,
     OPEN_GAP,
     OPEN_PULL,
     PRESS,
-    ROWS,
     SLIP,
-    STEP,
     STICK,
     STICK_BRIEF,
     WATCH,
-)  # fmt: skip
+)
 from mbd.kernel.hermite import crossing, hermite, hermite_turn
 from mbd.kernel.hooks import call, scheme_step
+from mbd.kernel.records import Kernel
 from mbd.kernel.restart import (
     compose,
     consistent,
@@ -60,7 +57,7 @@ APART = 1e-6
 """Gap [m, rad] above which a contact is clearly open."""
 
 
-def watch(K: Any, t: float, q: Any, y: Any, rate: Any, lam: Any, values: Any) -> None:
+def watch(K: Kernel, t: float, q: Any, y: Any, rate: Any, lam: Any, values: Any) -> None:
     """Gaps, gap rates, penalty forces, conditions and user guards at a state."""
     fill_block(K, t, q, y)
     for i in range(K.n):
@@ -70,18 +67,18 @@ def watch(K: Any, t: float, q: Any, y: Any, rate: Any, lam: Any, values: Any) ->
     call(K, GUARDS, values)
 
 
-def try_step(K: Any, h: float, t1: float) -> int:
+def try_step(K: Kernel, h: float, t1: float) -> int:
     """A candidate at t1 = t + h with its guards; a step far below dt with rows is one of Heun's method.
 
     There an implicit step would divide the round-off of positions by h²; an explicit scheme takes it as any other.
     A scheme leaves velocities, rates and multipliers of the candidate in the block; only its positions are centered.
     """
-    full = K.clock[STEP]
-    if h >= 1e-3 * full or (K.state[ROWS] == 0 and h >= 1e-9 * full) or K.scheme == 1:
+    full = K.step
+    if h >= 1e-3 * full or (K.n_active == 0 and h >= 1e-9 * full) or K.scheme == 1:
         status = scheme_step(K, h, t1)
         if status != 0:
             return status
-        if K.state[N_DROPPED] > 0:  # a scheme leaves the multipliers of the rows that it was solved with
+        if K.n_dropped > 0:  # a scheme leaves the multipliers of the rows that it was solved with
             for k in range(K.n_rows):
                 if K.dropped[k] == 1 and K.scheme != 1:  # the explicit one has shared them out already
                     K.lam1[k] = 0.0
@@ -89,14 +86,14 @@ def try_step(K: Any, h: float, t1: float) -> int:
             for k in range(K.n_rows):
                 K.block[K.o_lam + k] = K.lam1[k]
             if departs(K):
-                K.detail[0] = t1
-                K.detail[1] = 0.0
+                K.failure_time = t1
+                K.failure_size = 0.0
                 return NOT_CONVERGED
     else:
         for i in range(K.n):
             K.rate1[i] = K.rate[i]
         for _ in range(2):
-            fill_block(K, K.clock[NOW], K.q, K.y)
+            fill_block(K, K.time, K.q, K.y)
             for i in range(K.n_v):
                 K.block[K.o_x + i] = h * (K.y[i] + h * (K.rate[i] / 3.0 + K.rate1[i] / 6.0))
             compose(K, K.q1)
@@ -107,9 +104,9 @@ def try_step(K: Any, h: float, t1: float) -> int:
                 return status
             for i in range(K.n):
                 K.rate1[i] = K.jump[i]
-        if not holds_rows(K, K.state[ROWS]):
-            K.detail[0] = t1
-            K.detail[1] = 0.0
+        if not holds_rows(K, K.n_active):
+            K.failure_time = t1
+            K.failure_size = 0.0
             return NOT_CONVERGED
         for i in range(K.n):
             K.rate1[i] = K.jump[i]
@@ -128,7 +125,7 @@ def try_step(K: Any, h: float, t1: float) -> int:
         for i in range(K.n_watched):
             finite += abs(K.guards1[i])
         if not finite < 1e300:
-            K.detail[0] = t1
+            K.failure_time = t1
             return NOT_FINITE
         for f in range(K.n_frictions):
             K.limit[f] = K.guards1[frictions_at(K) + 2 * K.n_frictions + f]
@@ -137,21 +134,21 @@ def try_step(K: Any, h: float, t1: float) -> int:
     return 0
 
 
-def departs(K: Any) -> bool:
+def departs(K: Kernel) -> bool:
     """Whether a row that was left out is far from holding at the candidate, at which K.acc is: another branch."""
-    o_h = K.n * K.n + K.n + 2 * K.n * K.n_rows
+    o_h = K.acc_h
     for k in range(K.n_rows):
         if K.dropped[k] == 1 and K.row_level[k] == 0 and abs(K.acc[o_h + k]) > DEPARTED * max(K.scale[K.n + k], 1e-3):
             return True
     return False
 
 
-def frictions_at(K: Any) -> int:
+def frictions_at(K: Kernel) -> int:
     """Where the sliding velocities begin among the guard values; their rates and the limits follow."""
     return int(4 * K.n_contacts + 2 * K.n_guards)
 
 
-def is_watched(K: Any, c: int, values: Any) -> bool:
+def is_watched(K: Kernel, c: int, values: Any) -> bool:
     """Whether an open contact may close."""
     if K.while_kind[c] == 0:
         return True
@@ -160,19 +157,19 @@ def is_watched(K: Any, c: int, values: Any) -> bool:
     return bool(values[3 * K.n_contacts + c] > 0.0)
 
 
-def gap_scale(K: Any, c: int) -> float:
+def gap_scale(K: Kernel, c: int) -> float:
     """Size of the terms a gap is made of [m, rad]; 1 for a penalty contact."""
     row = K.normal[c]
     size = K.scale[K.n + row] if row >= 0 else 1.0
     return float(max(size, 1e-3))
 
 
-def gap_tolerance(K: Any, c: int) -> float:
+def gap_tolerance(K: Kernel, c: int) -> float:
     """Round-off of the gap."""
     return 16.0 * EPS * gap_scale(K, c)
 
 
-def update_armed(K: Any) -> None:
+def update_armed(K: Kernel) -> None:
     """A contact is armed (1) once its gap has risen above zero; one that becomes watched (−1), if it is above or rests.
 
     One that sinks through zero together with its own condition is below as long as it is watched, so it is ignored.
@@ -197,35 +194,35 @@ def update_armed(K: Any) -> None:
                 K.armed[c] = 1
 
 
-def update_sides(K: Any) -> None:
+def update_sides(K: Kernel) -> None:
     """A guard that fires in one direction only is ready again once it has gone back.
 
     One that started at rest on its surface (side 0) is on the side to which it has moved.
     """
     for e in range(K.n_guards):
         value = K.guards0[4 * K.n_contacts + e]
-        if K.side[e] == 0.0 and value != 0.0 and abs(value) > guard_round_off(K, e, K.clock[NOW], K.q, K.y):
+        if K.side[e] == 0.0 and value != 0.0 and abs(value) > guard_round_off(K, e, K.time, K.q, K.y):
             K.side[e] = 1.0 if value > 0.0 else -1.0
-        if goes_back(K, e, value, K.clock[NOW], K.q, K.y):
+        if goes_back(K, e, value, K.time, K.q, K.y):
             K.side[e] = float(-K.direction[e])
 
 
-def goes_back(K: Any, e: int, value: float, t: float, q: Any, y: Any) -> bool:
+def goes_back(K: Kernel, e: int, value: float, t: float, q: Any, y: Any) -> bool:
     """Whether a guard that fires in one direction only is clearly on the side again from which it fires."""
     back = -K.direction[e]
     return bool(back * K.side[e] < 0.0 and back * value > 0.0 and abs(value) > guard_round_off(K, e, t, q, y))
 
 
-def consider(K: Any, kind: int, index: int, estimate: float, low: float) -> None:
+def consider(K: Kernel, kind: int, index: int, estimate: float, low: float) -> None:
     """Keep the candidate that fires first; all in fractions of the step."""
-    if estimate < K.pick[0]:
-        K.pick[0] = estimate
-        K.pick[1] = low
-        K.fired[0] = kind
-        K.fired[1] = index
+    if estimate < K.event_place:
+        K.event_place = estimate
+        K.event_low = low
+        K.event_kind = kind
+        K.event_index = index
 
 
-def is_quiet(K: Any) -> bool:
+def is_quiet(K: Kernel) -> bool:
     """Whether no guard can have fired: every contact open, armed, always watched and clearly apart."""
     if K.n_guards + K.n_frictions > 0:
         return False
@@ -240,11 +237,11 @@ def is_quiet(K: Any) -> bool:
     return True
 
 
-def judge(K: Any, h: float) -> bool:
+def judge(K: Kernel, h: float) -> bool:
     """Whether a guard fired between the accepted state and the candidate; the earliest in K.fired, K.pick."""
     nC = K.n_contacts
-    K.fired[0] = -1
-    K.pick[0] = 2.0
+    K.event_kind = -1
+    K.event_place = 2.0
     for c in range(nC):
         if K.active[c] == 1 or (K.strategy == 1 and K.kind[c] == 0):  # found to be no event, or not located
             continue
@@ -294,18 +291,18 @@ def judge(K: Any, h: float) -> bool:
     if K.strategy == 0:
         for f in range(K.n_frictions):
             judge_friction(K, f, h)
-    return bool(K.fired[0] >= 0)
+    return bool(K.event_kind >= 0)
 
 
-def begins_to_be_watched(K: Any, c: int, h: float) -> bool:
+def begins_to_be_watched(K: Kernel, c: int, h: float) -> bool:
     """Whether the measure that contact c is watched by has risen through zero, by more than its round-off."""
     place = 3 * K.n_contacts + c
     if K.while_kind[c] != 2 or not K.guards0[place] <= 0.0 < K.guards1[place]:
         return False
-    return bool(K.guards1[place] > condition_round_off(K, c, K.clock[NOW] + h, K.q1, K.y1))
+    return bool(K.guards1[place] > condition_round_off(K, c, K.time + h, K.q1, K.y1))
 
 
-def judge_user(K: Any, e: int, h: float) -> None:
+def judge_user(K: Kernel, e: int, h: float) -> None:
     """Whether a user's guard crosses zero from its side; one that still rises from there does so after its top.
 
     A sign that has changed by no more than round-off is no crossing: it is judged again after the next step.
@@ -316,7 +313,7 @@ def judge_user(K: Any, e: int, h: float) -> None:
     v1 = side * K.guards1[place]
     if K.active[K.n_contacts + e] == 1 or v1 >= 0.0 or K.direction[e] * side > 0.0:
         return
-    if -v1 <= guard_round_off(K, e, K.clock[NOW] + h, K.q1, K.y1):
+    if -v1 <= guard_round_off(K, e, K.time + h, K.q1, K.y1):
         return
     d0 = side * K.guards0[place + K.n_guards] * h
     d1 = side * K.guards1[place + K.n_guards] * h
@@ -327,25 +324,25 @@ def judge_user(K: Any, e: int, h: float) -> None:
         consider(K, CROSS, e, crossing(v0, v1) if v0 > 0.0 else 0.0, 0.0)
 
 
-def pull_of(K: Any, c: int, h: float) -> float:
+def pull_of(K: Kernel, c: int, h: float) -> float:
     """The multiplier of a closed contact at the candidate, positive where it pulls.
 
     That of index 3 lags behind after a start; where it is small beside the forces the consistent one is asked.
     """
     pull = float(K.lam1[K.normal[c]])
-    if is_doubtful(K, pull) and consistent(K, K.clock[NOW] + h, K.q1, K.y1) == 0:
+    if is_doubtful(K, pull) and consistent(K, K.time + h, K.q1, K.y1) == 0:
         return float(K.impulse[K.normal[c]])
     return pull
 
 
-def is_doubtful(K: Any, force: float) -> bool:
+def is_doubtful(K: Kernel, force: float) -> bool:
     """Whether the sign of a force that follows from multipliers of index 3 is asked of consistent ones."""
     if K.stabilized == 1 or K.strategy == 1:
         return False
     return bool(abs(force) < DOUBTFUL * largest_force(K))
 
 
-def judge_friction(K: Any, f: int, h: float) -> None:
+def judge_friction(K: Kernel, f: int, h: float) -> None:
     """Whether a friction that slides comes to rest, or one that sticks is pulled beyond its limit."""
     place = frictions_at(K) + f
     nF = K.n_frictions
@@ -356,7 +353,7 @@ def judge_friction(K: Any, f: int, h: float) -> None:
         m0 = K.guards0[place + 2 * nF] - abs(K.lam[row])
         m1 = K.guards1[place + 2 * nF] - abs(K.lam1[row])
         if is_doubtful(K, m1):
-            m1 = margin(K, f, K.clock[NOW] + h)
+            m1 = margin(K, f, K.time + h)
         if m1 < -1e-12 * abs(K.lam1[row]):
             consider(K, SLIP, f, crossing(max(m0, 0.0), m1), 0.0)
         return
@@ -382,7 +379,7 @@ def judge_friction(K: Any, f: int, h: float) -> None:
             consider(K, STICK_BRIEF, f, bottom, 0.0)
 
 
-def margin(K: Any, f: int, t1: float) -> float:
+def margin(K: Kernel, f: int, t1: float) -> float:
     """What is left of a sticking friction at the candidate, limit − |λ_T| of consistent multipliers."""
     row = K.friction_row[f]
     if consistent(K, t1, K.q1, K.y1) != 0:
@@ -393,7 +390,7 @@ def margin(K: Any, f: int, t1: float) -> float:
     return float(limit_of(K, f) - abs(K.impulse[row]))
 
 
-def guard_value(K: Any, kind: int, index: int, t1: float) -> float:
+def guard_value(K: Kernel, kind: int, index: int, t1: float) -> float:
     """The fired guard at the candidate, counted so that it is ≥ 0 before and < 0 after its event."""
     nC = K.n_contacts
     if kind == CLOSE:

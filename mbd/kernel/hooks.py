@@ -8,39 +8,41 @@ from __future__ import annotations
 
 from typing import Any
 
+from mbd.kernel.records import Kernel
+
 __all__ = ["call", "call_on", "scheme_accept", "scheme_error", "scheme_resume", "scheme_start", "scheme_step"]
 
 
-def call(K: Any, number: int, out: Any) -> None:
+def call(K: Kernel, number: int, out: Any) -> None:
     """Evaluate model function `number` on the block and parameters."""
     K.code[number](K.block, K.params, out)
 
 
-def call_on(K: Any, number: int, numbers: Any, out: Any) -> None:
+def call_on(K: Kernel, number: int, numbers: Any, out: Any) -> None:
     """Evaluate function `number` on other numbers than the block."""
     K.code[number](numbers, K.params, out)
 
 
-def scheme_step(K: Any, h: float, t1: float) -> int:
+def scheme_step(K: Kernel, h: float, t1: float) -> int:
     """Fill the candidate with the state at t1 = t + h; 0 or a failure code."""
     return int(K.hooks.step(K, h, t1))
 
 
-def scheme_accept(K: Any, h: float) -> None:
+def scheme_accept(K: Kernel, h: float) -> None:
     """Make the candidate the accepted state."""
     K.hooks.accept(K, h)
 
 
-def scheme_resume(K: Any, h: float) -> int:
+def scheme_resume(K: Kernel, h: float) -> int:
     """Start with what the scheme averages kept, after a step of size h; rates in K.jump, multipliers in K.impulse."""
     return int(K.hooks.resume(K, h))
 
 
-def scheme_error(K: Any, h: float) -> None:
+def scheme_error(K: Kernel, h: float) -> None:
     """Fill K.error with the local error of the candidate, which a step of h has just made."""
     K.hooks.error(K, h)
 
 
-def scheme_start(K: Any) -> int:
+def scheme_start(K: Kernel) -> int:
     """Start the scheme from the accepted, consistent state."""
     return int(K.hooks.start(K))

@@ -14,10 +14,9 @@ Stronge       as Poisson, with one factor on all impulses of the second phase, s
 
 from __future__ import annotations
 
-from typing import Any
-
 from mbd.kernel.blow import blow, energy_gain, gather, let_rebound, loosen, prepare, restitution_of, speed, start_over
-from mbd.kernel.fields import ENERGY_GAIN, IMPACTS, NO_IMPACT, PLASTIC, PULL, STRONGE
+from mbd.kernel.codes import ENERGY_GAIN, NO_IMPACT, PULL
+from mbd.kernel.records import Kernel
 from mbd.kernel.restart import row_speed
 from mbd.kernel.roots import sqrt
 
@@ -31,7 +30,7 @@ APPROACH = 1e-11
 """Approach speed, relative to the fastest, that counts as none [-]."""
 
 
-def impact(K: Any, slow: bool) -> int:
+def impact(K: Kernel, slow: bool) -> int:
     """The velocities in K.y jump, by K.jump; impulses, negative where they push, are left in K.impulse.
 
     A slow impact (below the rest speed) sticks; in non-smooth steps, whose speeds are of the size of dt, only where
@@ -39,7 +38,7 @@ def impact(K: Any, slow: bool) -> int:
     """
     prepare(K)
     status = 0
-    if slow or K.impact_law == 0 or K.state[PLASTIC] == 1:
+    if slow or K.impact_law == 0 or K.plastic_impact == 1:
         status = newton_law(K, slow, True)
         if slow and K.strategy == 1 and status == 0 and would_hold_back(K):
             start_over(K)
@@ -54,7 +53,7 @@ def impact(K: Any, slow: bool) -> int:
         for c in range(K.n_contacts):
             if K.closing[c] > 0 and K.restitution[c] > 1.0:
                 return ENERGY_GAIN
-        K.counts[STRONGE] += 1
+        K.n_energetic_impacts += 1
         start_over(K)
         status = poisson_law(K, True)
         if status != 0:
@@ -65,11 +64,11 @@ def impact(K: Any, slow: bool) -> int:
         rest(K)
     for i in range(K.n):
         K.y[i] += K.jump[i]
-    K.counts[IMPACTS] += 1
+    K.n_impacts += 1
     return 0
 
 
-def would_hold_back(K: Any) -> bool:
+def would_hold_back(K: Kernel) -> bool:
     """Whether a contact that opens on pull would have to pull in the blow just found, its smooth step included."""
     largest = 0.0
     for k in range(K.n_rows):
@@ -82,7 +81,7 @@ def would_hold_back(K: Any) -> bool:
     return False
 
 
-def rest(K: Any) -> None:
+def rest(K: Kernel) -> None:
     """What holds a contact at rest that would leave more slowly than the rest speed is no impulse of the contact."""
     for c in range(K.n_contacts):
         if K.kind[c] == 0 and K.active[c] == 1 and K.opens[c] == 0 and K.impulse[K.normal[c]] > 0.0:
@@ -91,7 +90,7 @@ def rest(K: Any) -> None:
                     K.impulse[k] = 0.0
 
 
-def newton_law(K: Any, slow: bool, held: bool) -> int:
+def newton_law(K: Kernel, slow: bool, held: bool) -> int:
     """One blow that reverses the gap rates of closing contacts by their restitutions; a slow one may be `held`."""
     gather(K, slow, slow and held)
     for k in range(K.n_rows):
@@ -106,7 +105,7 @@ def newton_law(K: Any, slow: bool, held: bool) -> int:
     return status
 
 
-def poisson_law(K: Any, energetic: bool) -> int:
+def poisson_law(K: Kernel, energetic: bool) -> int:
     """Compression, then restitution of its impulses (Poisson) or of their work (Stronge)."""
     gather(K, False, False)
     for k in range(K.n_rows):
@@ -136,7 +135,7 @@ def poisson_law(K: Any, energetic: bool) -> int:
     return status
 
 
-def give_back(K: Any, factor: float) -> int:
+def give_back(K: Kernel, factor: float) -> int:
     """The second phase with this factor on the impulses K.trial_given, from the end of the first.
 
     Contacts that are given an impulse part under it, unless they would approach; their tangents stay.
@@ -156,9 +155,9 @@ def give_back(K: Any, factor: float) -> int:
     return blow(K)
 
 
-def work_given_back(K: Any) -> float:
+def work_given_back(K: Kernel) -> float:
     """Work of the normal impulses of the second phase, ½ Σ Λ (γ_c + γ⁺)."""
-    o_B = K.n * K.n + K.n + K.n * K.n_rows
+    o_B = K.acc_B
     work = 0.0
     for k in range(K.n_rows):
         if K.trial_given[k] != 0.0:
@@ -169,7 +168,7 @@ def work_given_back(K: Any) -> float:
     return work
 
 
-def give_back_work(K: Any, work: float) -> int:
+def give_back_work(K: Kernel, work: float) -> int:
     """The second phase with the largest factor that gives back no more than this work, and no energy in all.
 
     The work grows with the square of the factor while no branch changes; where one does, the factor is bisected. Less
@@ -197,12 +196,12 @@ def give_back_work(K: Any, work: float) -> int:
     return give_back(K, low)
 
 
-def is_held_through(K: Any, c: int) -> bool:
+def is_held_through(K: Kernel, c: int) -> bool:
     """Whether a contact acts in every blow whatever the sign of its impulse: it has a rule, and does not rebound."""
     return bool(K.opens[c] != 0 and (K.closed[c] == 1 or K.restitution[c] == 0.0))
 
 
-def sequential_law(K: Any) -> int:
+def sequential_law(K: Kernel) -> int:
     """Blow after blow of the contacts that approach fastest, each as if the others that push were not there."""
     gather(K, False, False)
     for c in range(K.n_contacts):
@@ -238,7 +237,7 @@ def sequential_law(K: Any) -> int:
     return NO_IMPACT
 
 
-def end_together(K: Any, fastest: float) -> None:
+def end_together(K: Kernel, fastest: float) -> None:
     """Contacts that took part, and neither part nor closed with a restitution, stay closed."""
     for c in range(K.n_contacts):
         K.active[c] = 0

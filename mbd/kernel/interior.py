@@ -12,11 +12,10 @@ like one between two short steps.
 
 from __future__ import annotations
 
-from typing import Any
-
 from mbd.kernel.candidate import accept_guards, carry
-from mbd.kernel.fields import EPS, NOW
+from mbd.kernel.codes import EPS
 from mbd.kernel.guards import gap_scale, gap_tolerance, goes_back, is_watched, judge, watch
+from mbd.kernel.records import Kernel
 from mbd.kernel.restart import compose, consistent, fill_block
 
 __all__ = ["copy_ends", "look_at", "parts_to_take", "put_candidate_back"]
@@ -25,13 +24,13 @@ FINEST = 16.0
 """Distance over the round-off of a position below which the interpolant need not meet it at the end of a step [-]."""
 
 
-def parts_to_take(K: Any, h: float) -> int:
+def parts_to_take(K: Kernel, h: float) -> int:
     """After how many parts the candidate's step must end; −1: after the first, which holds an event; 0: never.
 
     Guards and multipliers of the accepted state and of the candidate are as before afterwards.
     """
     copy_ends(K, True)
-    t = K.clock[NOW]
+    t = K.time
     asked = needs_multipliers(K)
     answer = 0
     for part in range(1, K.looks + 1):
@@ -50,11 +49,11 @@ def parts_to_take(K: Any, h: float) -> int:
         for k in range(K.n_rows):
             K.lam[k] = K.lam1[k]
     copy_ends(K, False)
-    K.fired[0] = -1
+    K.event_kind = -1
     return answer
 
 
-def copy_ends(K: Any, out: bool) -> None:
+def copy_ends(K: Kernel, out: bool) -> None:
     """What is overwritten, into K.inside or back: guards and multipliers at both ends, the candidate."""
     o = carry(K.guards0, K.inside, 0, K.n_watched, out)
     o = carry(K.guards1, K.inside, o, K.n_watched, out)
@@ -65,7 +64,7 @@ def copy_ends(K: Any, out: bool) -> None:
     carry(K.rate1, K.inside, o, K.n, out)
 
 
-def put_candidate_back(K: Any) -> None:
+def put_candidate_back(K: Kernel) -> None:
     """The candidate with its guards and multipliers; those of the accepted state stay what they are."""
     o = carry(K.guards1, K.inside, K.n_watched, K.n_watched, False)
     o = carry(K.lam1, K.inside, o + K.n_rows, K.n_rows, False)
@@ -74,7 +73,7 @@ def put_candidate_back(K: Any) -> None:
     carry(K.rate1, K.inside, o, K.n, False)
 
 
-def needs_multipliers(K: Any) -> bool:
+def needs_multipliers(K: Kernel) -> bool:
     """Whether a guard asks for multipliers: of a contact that opens as it pulls, of friction."""
     if K.n_frictions > 0:
         return True
@@ -85,7 +84,7 @@ def needs_multipliers(K: Any) -> bool:
     return count > 0
 
 
-def look_at(K: Any, t: float, h: float, s: float, asked: bool) -> None:
+def look_at(K: Kernel, t: float, h: float, s: float, asked: bool) -> None:
     """Guards (and multipliers) of the interpolant at the part s of the step, in place of those of the candidate."""
     place = 2 * K.n_watched + 2 * K.n_rows
     o_y = place + K.n_q
@@ -119,7 +118,7 @@ def look_at(K: Any, t: float, h: float, s: float, asked: bool) -> None:
     watch(K, t + s * h, K.q1, K.y1, K.rate1, K.lam1, K.guards1)
 
 
-def rearms(K: Any, t: float) -> bool:
+def rearms(K: Kernel, t: float) -> bool:
     """Whether a contact or a guard of the user would be ready to fire, or no longer, after the place just looked at."""
     for c in range(K.n_contacts):
         if K.closed[c] == 1:

@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from mbd.kernel.fields import (
+from mbd.kernel.codes import (
     CLOSE,
     CROSS,
     GRAZE,
-    LOCATIONS,
     NO_LOCATION,
-    NOW,
     OPEN_FORCE,
     OPEN_GAP,
     OPEN_PULL,
     SLIP,
-    STEP,
     STICK,
     STICK_BRIEF,
     WATCH,
 )
 from mbd.kernel.guards import frictions_at, gap_tolerance, guard_value, is_watched, judge, try_step
 from mbd.kernel.hermite import first_guess
+from mbd.kernel.records import Kernel
 from mbd.kernel.refine import refine
 from mbd.kernel.takeover import look, look_at_start, put_on_rows
 
@@ -35,24 +31,24 @@ EARLIER, LATER = -2, -1
 """Where `fall_back` has seen another guard fire: before the place looked at, or in the full step."""
 
 
-def dip(K: Any, h: float) -> int:
+def dip(K: Kernel, h: float) -> int:
     """Step to the lowest point of a grazing gap; a real dip becomes a closing, else the guard keeps quiet."""
-    t = K.clock[NOW]
-    c = K.fired[1]
+    t = K.time
+    c = K.event_index
     nC = K.n_contacts
     low = 0.0
     high = h
     rate_low = K.guards0[nC + c]
     rate_high = K.guards1[nC + c]
-    place = K.pick[0] * h
+    place = K.event_place * h
     for _ in range(30):
         status = try_step(K, place, t + place)
         if status != 0:
             return status
         if K.guards1[c] < -gap_tolerance(K, c):
-            K.fired[0] = CLOSE
-            K.pick[0] = place
-            K.pick[1] = 0.0
+            K.event_kind = CLOSE
+            K.event_place = place
+            K.event_low = 0.0
             return 0
         rate = K.guards1[nC + c]
         if rate == 0.0 or high - low < 1e-7 * h:
@@ -65,43 +61,43 @@ def dip(K: Any, h: float) -> int:
             rate_high = rate
         place = low + (high - low) * min(max(rate_low / (rate_low - rate_high), 0.02), 0.98)
     K.active[c] = 1
-    K.fired[0] = -1
+    K.event_kind = -1
     return try_step(K, h, t + h)
 
 
-def locate(K: Any, h: float) -> int:
-    """Move the candidate to the instant of the first event of the step; K.pick[2] its distance from the start.
+def locate(K: Kernel, h: float) -> int:
+    """Move the candidate to the instant of the first event of the step; K.event_after its distance from the start.
 
     A bracketing root finder on steps of varying size from the same accepted state, until the guard is at round-off.
-    K.fired[0] < 0 afterwards: there was no event, the candidate is the full step.
+    K.event_kind < 0 afterwards: there was no event, the candidate is the full step.
     """
     end = h
     found_kind = -1  # the event at `end`, before which others are looked for
     found_index = 0
     for _ in range(4 * (K.n_contacts + K.n_guards + K.n_frictions) + 4):
-        kind = K.fired[0]
-        index = K.fired[1]
-        low = K.pick[1] * end
+        kind = K.event_kind
+        index = K.event_index
+        low = K.event_low * end
         status = 0
         if kind == GRAZE or kind == STICK_BRIEF:
             low = 0.0
             status = dip(K, end) if kind == GRAZE else come_to_rest(K, index, end)
-            kind = K.fired[0]
-            if kind == CLOSE or (kind == STICK and K.pick[0] < end):
-                end = K.pick[0]
+            kind = K.event_kind
+            if kind == CLOSE or (kind == STICK and K.event_place < end):
+                end = K.event_place
                 found_kind = -1
         if status == 0 and kind >= 0:
             status = root_before(K, kind, index, low, end)
         if status != 0:
             return status
-        if K.fired[0] < 0:
+        if K.event_kind < 0:
             status = fall_back(K, h, end, found_kind, found_index)
             if status >= 0:
                 return status
             if status == LATER:
                 end = h
             continue
-        found = K.pick[2]
+        found = K.event_after
         if found <= 0.0:
             return 0
         together = found_kind >= 0 and found > (1.0 - SAME) * end  # as the one it was looked for before
@@ -114,31 +110,33 @@ def locate(K: Any, h: float) -> int:
     return NO_LOCATION
 
 
-def come_to_rest(K: Any, index: int, end: float) -> int:
+def come_to_rest(K: Kernel, index: int, end: float) -> int:
     """A step to where a friction comes nearest to rest within `end`: at rest on the way, or not at all.
 
-    K.pick[0] is the distance of that place, or `end` where it slides on.
+    K.event_place is the distance of that place, or `end` where it slides on.
     """
-    place = K.pick[0] * end
-    status = try_step(K, place, K.clock[NOW] + place)
+    place = K.event_place * end
+    status = try_step(K, place, K.time + place)
     if status == 0:
-        K.fired[0] = STICK
-        K.pick[0] = place if guard_value(K, STICK, index, K.clock[NOW] + place) < 0.0 else end
+        K.event_kind = STICK
+        K.event_place = place if guard_value(K, STICK, index, K.time + place) < 0.0 else end
     return status
 
 
-def root_before(K: Any, kind: int, index: int, low: float, end: float) -> int:
+def root_before(K: Kernel, kind: int, index: int, low: float, end: float) -> int:
     """`bracket`, and the candidate at `end` again where there was no event after all."""
     status = bracket(K, kind, index, low, end)
     if status != 0:
         return status
-    if K.fired[0] >= 0 and K.pick[2] > 0.0 and kind == CLOSE and left_alone(K, index):  # not watched any more there
+    if (
+        K.event_kind >= 0 and K.event_after > 0.0 and kind == CLOSE and left_alone(K, index)
+    ):  # not watched any more there
         K.active[index] = 1
-        K.fired[0] = -1
-    return 0 if K.fired[0] >= 0 else try_step(K, end, K.clock[NOW] + end)
+        K.event_kind = -1
+    return 0 if K.event_kind >= 0 else try_step(K, end, K.time + end)
 
 
-def another_before(K: Any, kind: int, index: int, found: float) -> bool:
+def another_before(K: Kernel, kind: int, index: int, found: float) -> bool:
     """Whether another guard fired before this one, which is at round-off and may look fired itself."""
     place = index
     if kind == CROSS:
@@ -147,19 +145,19 @@ def another_before(K: Any, kind: int, index: int, found: float) -> bool:
         place += K.n_contacts + K.n_guards
     quiet = K.active[place]
     K.active[place] = 1
-    other = judge(K, found) and K.pick[0] < 1.0 - SAME
+    other = judge(K, found) and K.event_place < 1.0 - SAME
     K.active[place] = quiet
     return other
 
 
-def take_event(K: Any, kind: int, index: int, place: float) -> None:
+def take_event(K: Kernel, kind: int, index: int, place: float) -> None:
     """The event that the step ends with."""
-    K.fired[0] = kind
-    K.fired[1] = index
-    K.pick[2] = place
+    K.event_kind = kind
+    K.event_index = index
+    K.event_after = place
 
 
-def fall_back(K: Any, h: float, end: float, kind: int, index: int) -> int:
+def fall_back(K: Kernel, h: float, end: float, kind: int, index: int) -> int:
     """Where no guard has fired before `end` after all: the event found there stands (kind ≥ 0), else the full step h.
 
     The candidate is at `end`. `EARLIER`: another guard has fired before that. `LATER`: one has fired in the full step,
@@ -171,16 +169,16 @@ def fall_back(K: Any, h: float, end: float, kind: int, index: int) -> int:
         take_event(K, kind, index, end)
         return 0
     if end < h:
-        status = try_step(K, h, K.clock[NOW] + h)
+        status = try_step(K, h, K.time + h)
         if status != 0:
             return status
         if judge(K, h):
             return LATER
-    K.pick[2] = h
+    K.event_after = h
     return 0
 
 
-def left_alone(K: Any, c: int) -> bool:
+def left_alone(K: Kernel, c: int) -> bool:
     """Whether contact c is not watched at the candidate; a condition that ends at the same instant has ended."""
     if not is_watched(K, c, K.guards1):
         return True
@@ -189,11 +187,11 @@ def left_alone(K: Any, c: int) -> bool:
     place = 3 * K.n_contacts + c
     change = abs(K.guards0[place] - K.guards1[place])
     fall = abs(K.guards0[c] - K.guards1[c])
-    apart = SAME * K.clock[STEP] / K.pick[2] + gap_tolerance(K, c) / (fall + 1e-300)  # of the way here, at most
+    apart = SAME * K.step / K.event_after + gap_tolerance(K, c) / (fall + 1e-300)  # of the way here, at most
     return bool(K.guards1[place] <= apart * change)
 
 
-def guard_rate(K: Any, kind: int, index: int) -> float:
+def guard_rate(K: Kernel, kind: int, index: int) -> float:
     """Rate of `guard_value` at the candidate; 0 where it is not known."""
     if kind == CLOSE:
         return float(K.guards1[K.n_contacts + index])
@@ -206,7 +204,7 @@ def guard_rate(K: Any, kind: int, index: int) -> float:
     return 0.0
 
 
-def find_way(K: Any, kind: int, index: int, high: float) -> float:
+def find_way(K: Kernel, kind: int, index: int, high: float) -> float:
     """Distance at which what began just now, sliding or parting, is seen by shorter steps than one that misses it.
 
     0 if none sees it; − status if a step fails.
@@ -215,31 +213,31 @@ def find_way(K: Any, kind: int, index: int, high: float) -> float:
     low = high
     for _ in range(MOST_LOOKS):
         low *= 0.5
-        status = look(K, low, K.clock[NOW] + low)
+        status = look(K, low, K.time + low)
         if status != 0:
             return -float(status)
-        if guard_value(K, kind, index, K.clock[NOW] + low) > tiny:
+        if guard_value(K, kind, index, K.time + low) > tiny:
             return low
     return 0.0
 
 
-def bracket(K: Any, kind: int, index: int, low: float, high: float) -> int:
-    """Root of the fired guard between two distances from the accepted state; K.pick[2] its distance."""
-    t = K.clock[NOW]
-    K.counts[LOCATIONS] += 1
+def bracket(K: Kernel, kind: int, index: int, low: float, high: float) -> int:
+    """Root of the fired guard between two distances from the accepted state; K.event_after its distance."""
+    t = K.time
+    K.n_locations += 1
     put_on_rows(K, t + high)
     f_high = guard_value(K, kind, index, t + high)
     if f_high >= 0.0:
         if kind == OPEN_PULL:  # only the multiplier of the step was negative, not that of the motion
             K.active[index] = 1
-            K.fired[0] = -1
+            K.event_kind = -1
         elif kind == STICK or kind == SLIP:
             K.active[K.n_contacts + K.n_guards + index] = 1
-            K.fired[0] = -1
+            K.event_kind = -1
         elif kind == CROSS:  # with velocities on the rows it has not crossed yet
             K.active[K.n_contacts + index] = 1
-            K.fired[0] = -1
-        K.pick[2] = high
+            K.event_kind = -1
+        K.event_after = high
         return 0
     d_high = guard_rate(K, kind, index)
     if low > 0.0:
@@ -258,17 +256,17 @@ def bracket(K: Any, kind: int, index: int, low: float, high: float) -> int:
         f_low = guard_value(K, kind, index, t + low)
     if f_low <= 0.0:
         if (kind == OPEN_GAP or kind == OPEN_FORCE) and K.guards0[K.n_contacts + index] < 0.0:
-            K.pick[2] = high  # a touch too short to be seen within the step: it is over at its end
+            K.event_after = high  # a touch too short to be seen within the step: it is over at its end
             return look(K, high, t + high)
         if low > 0.0 and kind != CROSS:
             low = 0.0
             look_at_start(K)
-        K.pick[2] = low
+        K.event_after = low
         return 0
     width = high - low
     guess = first_guess(f_low, f_high, guard_rate(K, kind, index) * width, d_high * width)
     if K.linear == 1 and kind != WATCH and kind != OPEN_PULL:  # no contact is stored that pulls
         place = low + width * f_low / (f_low - f_high)
-        K.pick[2] = place
+        K.event_after = place
         return look(K, place, t + place)
     return refine(K, kind, index, low, f_low, high, f_high, low + width * guess)

@@ -14,23 +14,12 @@ beyond its limit, let go before it, and the step is taken again.
 
 from __future__ import annotations
 
-from typing import Any
-
 from mbd.kernel.candidate import adopt, carry
+from mbd.kernel.codes import COMPOSE, LOG_OPENED, NO_IMPACT, PULL
 from mbd.kernel.complementarity import complementarity
-from mbd.kernel.fields import (
-    COMPOSE,
-    LIFTED,
-    LOG_OPENED,
-    NO_IMPACT,
-    NOW,
-    PAST_TIME,
-    PULL,
-    REDONE,
-    RESTART,
-)  # fmt: skip
 from mbd.kernel.guards import frictions_at, gap_scale, gap_tolerance, is_watched, watch
 from mbd.kernel.hooks import call
+from mbd.kernel.records import Kernel
 from mbd.kernel.restart import consistent, evaluate, largest_force
 from mbd.kernel.settle import NO_IMPULSE, STILL, log_event
 from mbd.kernel.switching import close_by_impact, mark_touching
@@ -45,7 +34,7 @@ RESTING = 2.0
 """Approach speed over the change of speed in a step below which a contact rests instead of rebounding [-]."""
 
 
-def lets_go(K: Any, t1: float) -> int:
+def lets_go(K: Kernel, t1: float) -> int:
     """Contacts that pulled and frictions beyond their limits in the step just tried let go before it; how many.
 
     What has let go for a step does not hold again in it, even where frictions that depend on each other share a load.
@@ -66,7 +55,7 @@ def lets_go(K: Any, t1: float) -> int:
             K.slip[f] = 0.0
             continue
         pull = K.lam1[K.friction_row[f]]
-        if K.state[REDONE] == 0:
+        if K.n_repeats == 0:
             K.let_go[f] = 0
         if K.sticks[f] == 1 and abs(pull) - K.guards1[limits + f] > PULL * force:
             K.sticks[f] = 0
@@ -77,12 +66,12 @@ def lets_go(K: Any, t1: float) -> int:
         for f in range(K.n_frictions):
             if K.let_go[f] == 1 and K.slip[f] != 0.0:
                 K.loose[f] = 3
-        K.state[RESTART] = 2
-        K.state[REDONE] += 1
+        K.restart_due = 2
+        K.n_repeats += 1
     return count
 
 
-def pulls(K: Any, c: int, least: float, t1: float) -> bool:
+def pulls(K: Kernel, c: int, least: float, t1: float) -> bool:
     """Whether a contact pulled at the candidate, by consistent multipliers: those of a step may oscillate."""
     row = K.normal[c]
     if K.lam1[row] <= least:
@@ -90,7 +79,7 @@ def pulls(K: Any, c: int, least: float, t1: float) -> bool:
     return bool(consistent(K, t1, K.q1, K.y1) != 0 or K.impulse[row] > least)
 
 
-def lands(K: Any) -> bool:
+def lands(K: Kernel) -> bool:
     """Whether open contacts lie below their surfaces at the candidate, or a friction has turned around.
 
     The contacts are marked in K.closing.
@@ -110,7 +99,7 @@ def lands(K: Any) -> bool:
     return found
 
 
-def lift(K: Any) -> int:
+def lift(K: Kernel) -> int:
     """Positions of K.q moved least, in the metric of M, until no contact lies below its surface."""
     for f in range(K.n_frictions):
         K.base_limit[f] = K.slip[f]  # kept here: friction moves nothing
@@ -137,12 +126,12 @@ def lift(K: Any) -> int:
         for c in range(K.n_contacts):  # one that was lifted stays at its surface while others follow
             if K.closing[c] == 1 and K.kind[c] == 0 and K.impulse[K.normal[c]] < 0.0:
                 K.closing[c] = 3
-        watch(K, K.clock[NOW], K.q, K.y, K.rate, K.lam, K.guards0)
+        watch(K, K.time, K.q, K.y, K.rate, K.lam, K.guards0)
         left = 0.0
         for c in range(K.n_contacts):
             if K.kind[c] == 0 and K.armed[c] == 1 and K.closed[c] == 0 and is_watched(K, c, K.guards0):
                 left = max(left, -K.guards0[c] / gap_tolerance(K, c))
-        if left <= 1.0 and K.detail[LIFTED] <= 1e-12:
+        if left <= 1.0 and K.correction_size <= 1e-12:
             break
     for f in range(K.n_frictions):
         K.slip[f] = K.base_limit[f]
@@ -153,11 +142,11 @@ def lift(K: Any) -> int:
     return status
 
 
-def lift_once(K: Any) -> int:
-    """One Newton step of `lift`; the size of the correction relative to 1 is left in K.detail[LIFTED]."""
+def lift_once(K: Kernel) -> int:
+    """One Newton step of `lift`; the size of the correction relative to 1 is left in K.correction_size."""
     n = K.n
-    evaluate(K, K.clock[NOW], K.q, K.y)
-    o_h = n * n + n + 2 * n * K.n_rows
+    evaluate(K, K.time, K.q, K.y)
+    o_h = K.acc_h
     for i in range(n):
         K.force[i] = 0.0
     for k in range(K.n_rows):
@@ -169,7 +158,7 @@ def lift_once(K: Any) -> int:
     moved = 0.0
     for i in range(K.n_v):
         moved = max(moved, abs(K.jump[i]))
-    K.detail[LIFTED] = moved
+    K.correction_size = moved
     if K.vector == 1:
         for i in range(K.n_q):
             K.q[i] += K.jump[i]
@@ -184,7 +173,7 @@ def lift_once(K: Any) -> int:
     return 0
 
 
-def strike(K: Any, h: float, t1: float) -> int:
+def strike(K: Kernel, h: float, t1: float) -> int:
     """The candidate becomes the accepted state, lifted out of the surfaces."""
     nC = K.n_contacts
     for c in range(nC):
@@ -195,11 +184,11 @@ def strike(K: Any, h: float, t1: float) -> int:
         return status
     for k in range(K.n_rows):
         K.past[k] = h * K.lam[k]
-    K.detail[PAST_TIME] = h
+    K.past_time = h
     return 0
 
 
-def rebound(K: Any) -> int:
+def rebound(K: Kernel) -> int:
     """The impact of a step, after `strike`; where all that come down rest, none of the closed contacts leaves."""
     nC = K.n_contacts
     fastest = 0.0
@@ -223,24 +212,24 @@ def rebound(K: Any) -> int:
         mark_touching(K)
     for k in range(K.n_rows):
         K.past[k] = 0.0
-    K.detail[PAST_TIME] = 0.0
+    K.past_time = 0.0
     return status
 
 
-def keep(K: Any) -> None:
+def keep(K: Kernel) -> None:
     """Remember the accepted state, from which a step whose end has no impulses is tried again."""
     copy(K, True)
     copy_flags(K, True)
 
 
-def put_back(K: Any, t: float) -> None:
+def put_back(K: Kernel, t: float) -> None:
     """The state as `keep` found it, at time t."""
     copy(K, False)
     copy_flags(K, False)
-    K.clock[NOW] = t
+    K.time = t
 
 
-def copy(K: Any, out: bool) -> None:
+def copy(K: Kernel, out: bool) -> None:
     """The state into K.kept, or back."""
     o = carry(K.q, K.kept, 0, K.n_q, out)
     o = carry(K.y, K.kept, o, K.n, out)
@@ -251,7 +240,7 @@ def copy(K: Any, out: bool) -> None:
     carry(K.slip, K.kept, o, K.n_frictions, out)
 
 
-def copy_flags(K: Any, out: bool) -> None:
+def copy_flags(K: Kernel, out: bool) -> None:
     """Who is closed, armed, … into K.kept_flags, or back."""
     o = carry(K.closed, K.kept_flags, 0, K.n_contacts, out)
     o = carry(K.armed, K.kept_flags, o, K.n_contacts, out)

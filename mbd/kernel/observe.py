@@ -5,32 +5,24 @@ from __future__ import annotations
 from typing import Any
 
 from mbd.kernel.candidate import carry
-from mbd.kernel.fields import (
-    LOG_EVENT,
-    LOG_SLIPPED,
-    LOG_STUCK,
-    LOGGED,
-    LOST,
-    NOW,
-    SINCE_STORE,
-    STORED,
-)
+from mbd.kernel.codes import LOG_EVENT, LOG_SLIPPED, LOG_STUCK
+from mbd.kernel.records import Kernel
 
 __all__ = ["is_awaited", "store_row", "store_state"]
 
 
-def store_row(K: Any) -> None:
+def store_row(K: Kernel) -> None:
     """One row of results: the accepted state."""
     store_state(K, K.q, K.y, K.rate, K.lam)
 
 
-def store_state(K: Any, q: Any, y: Any, rate: Any, lam: Any) -> None:
+def store_state(K: Kernel, q: Any, y: Any, rate: Any, lam: Any) -> None:
     """One row of results: t, q, (v, z), (v̇, ż), λ, closed, and what frictions do: 2 sticks, ±1 slides, 0 off."""
-    if K.state[STORED] >= K.capacity:  # never beyond the array; the run ends with an error
-        K.counts[LOST] += 1
+    if K.n_stored >= K.capacity:  # never beyond the array; the run ends with an error
+        K.n_lost += 1
         return
-    o = K.state[STORED] * K.width
-    K.store[o] = K.clock[NOW]
+    o = K.n_stored * K.width
+    K.store[o] = K.time
     o = carry(q, K.store, o + 1, K.n_q, True)
     o = carry(y, K.store, o, K.n, True)
     o = carry(rate, K.store, o, K.n, True)
@@ -39,13 +31,13 @@ def store_state(K: Any, q: Any, y: Any, rate: Any, lam: Any) -> None:
         K.store[o + c] = float(K.closed[c])
     for f in range(K.n_frictions):
         K.store[o + K.n_contacts + f] = 2.0 if K.sticks[f] == 1 else K.slip[f]
-    K.state[STORED] += 1
-    K.state[SINCE_STORE] = 0
+    K.n_stored += 1
+    K.steps_since_row = 0
 
 
-def is_awaited(K: Any, first: int) -> bool:
+def is_awaited(K: Kernel, first: int) -> bool:
     """Whether someone waits for an event logged since the line `first`."""
-    for line in range(first, K.state[LOGGED]):
+    for line in range(first, K.n_logged):
         index = int(K.log[line * K.event_width + 2])
         kind = int(K.log[line * K.event_width + 1])
         if kind == LOG_EVENT:

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from mbd.kernel.fields import MODE, ORDERED
 from mbd.kernel.linear import solve
+from mbd.kernel.records import Kernel
 
 __all__ = [
     "HEAD", "OF_ACCELERATIONS", "OF_TANGENT", "SYMMETRIC", "factor_ordered", "order_at", "solve_kkt", "solve_ordered",
@@ -32,10 +32,10 @@ LOSS_AT_ONCE = 1e-4
 """The same where a solution is taken as it is: at most four digits of sixteen are lost [-]."""
 
 
-def order_at(K: Any, m: int) -> int:
+def order_at(K: Kernel, m: int) -> int:
     """Where the order for the m rows in K.rows begins in K.orders, 0 if there is none."""
-    mode = K.state[MODE]
-    if mode < 0 or mode >= K.mode_count[0]:
+    mode = K.mode_id
+    if mode < 0 or mode >= K.n_modes:
         return 0
     o = K.mode_order[mode]
     if o == 0 or K.orders[o + 1] != m:
@@ -46,7 +46,7 @@ def order_at(K: Any, m: int) -> int:
     return int(o)
 
 
-def factor_ordered(K: Any, A: Any, o: int, source: int, loss: float) -> bool:
+def factor_ordered(K: Kernel, A: Any, o: int, source: int, loss: float) -> bool:
     """Factors of the matrix in A by the order at o, into K.kkt, inverse pivots among them; false if one is not sound.
 
     K.spare holds what is left of a row, by turns of its columns, and behind it the factors.
@@ -59,7 +59,7 @@ def factor_ordered(K: Any, A: Any, o: int, source: int, loss: float) -> bool:
     o_turn = o_own + size
     o_from = o_turn + entries * (1 + source)
     V = K.spare
-    K.state[ORDERED] = 0
+    K.order_start = 0
     for k in range(size):
         first = K.orders[o_start + k]
         own = K.orders[o_own + k]
@@ -91,7 +91,7 @@ def factor_ordered(K: Any, A: Any, o: int, source: int, loss: float) -> bool:
             V[size + e] = V[K.orders[o_turn + e]]
     for e in range(entries):
         K.kkt[e] = V[size + e]
-    K.state[ORDERED] = o
+    K.order_start = o
     return True
 
 
@@ -109,9 +109,9 @@ def is_sound(size: float, before: float, terms: float, diagonal: bool, multiplie
     return loss * before < size and loss * size < before
 
 
-def weakest_pivot(K: Any) -> float:
+def weakest_pivot(K: Kernel) -> float:
     """Largest inverse pivot of multipliers among the factors at hand."""
-    o = K.state[ORDERED]
+    o = K.order_start
     size = K.orders[o]
     o_row = o + HEAD + K.orders[o + 1]
     o_own = o_row + 3 * size + 1
@@ -123,9 +123,9 @@ def weakest_pivot(K: Any) -> float:
     return largest
 
 
-def solve_ordered(K: Any, b: Any) -> None:
+def solve_ordered(K: Kernel, b: Any) -> None:
     """b ← A⁻¹ b with the factors of `factor_ordered`; K.spare is written to."""
-    o = K.state[ORDERED]
+    o = K.order_start
     size = K.orders[o]
     o_row = o + HEAD + K.orders[o + 1]
     o_start = o_row + 2 * size
@@ -146,9 +146,9 @@ def solve_ordered(K: Any, b: Any) -> None:
         b[K.orders[o_row + size + k]] = K.spare[k]
 
 
-def solve_kkt(K: Any, size: int, b: Any) -> None:
+def solve_kkt(K: Kernel, size: int, b: Any) -> None:
     """b ← A⁻¹ b with the factors in K.kkt, whichever they are."""
-    if K.state[ORDERED] > 0:
+    if K.order_start > 0:
         solve_ordered(K, b)
     else:
         solve(K.kkt, size, K.pivots, b)

@@ -10,10 +10,9 @@ for a spring ``(ω h)²`` with ω² = k/m. Steps stay that short until the conta
 
 from __future__ import annotations
 
-from typing import Any
-
-from mbd.kernel.fields import BLOCKED, NOW, RESTART, STEP, TOO_BRIEF
+from mbd.kernel.codes import TOO_BRIEF
 from mbd.kernel.guards import gap_tolerance, watch
+from mbd.kernel.records import Kernel
 from mbd.kernel.restart import compose, consistent, fill_block
 
 __all__ = ["find_pace", "relax_pace"]
@@ -34,7 +33,7 @@ PACE, FIRST_RATE, LARGEST_RATE, TAKEN, LEAST_PACE = range(5)
 """Places of a contact in K.pace: step (0: not asked), |γ| as it closed and in the window, steps, least step ever."""
 
 
-def find_pace(K: Any) -> int:
+def find_pace(K: Kernel) -> int:
     """The present full step from the penalty contacts that act; those that have just closed are asked for theirs."""
     step = K.dt
     for c in range(K.n_contacts):
@@ -47,8 +46,8 @@ def find_pace(K: Any) -> int:
                 K.pace[o + LARGEST_RATE] = 0.0
                 K.pace[o + TAKEN] = 0.0
                 if K.pace[o + PACE] < BRIEFEST * K.dt:
-                    K.detail[2] = K.pace[o + PACE]
-                    K.state[BLOCKED] = c
+                    K.failure_step = K.pace[o + PACE]
+                    K.failure_index = c
                     return TOO_BRIEF
                 if K.pace[o + PACE] < K.dt and (
                     K.pace[o + LEAST_PACE] == 0.0 or K.pace[o + PACE] < K.pace[o + LEAST_PACE]
@@ -56,14 +55,14 @@ def find_pace(K: Any) -> int:
                     K.pace[o + LEAST_PACE] = K.pace[o + PACE]
             if K.closed[c] == 1:
                 step = min(step, K.pace[o + PACE])
-    K.clock[STEP] = step
+    K.step = step
     return 0
 
 
-def pace_of(K: Any, c: int) -> float:
+def pace_of(K: Kernel, c: int) -> float:
     """The step that resolves the blow of contact c from the accepted state on; dt where that does."""
     h = K.dt
-    watch(K, K.clock[NOW], K.q, K.y, K.rate, K.lam, K.guards1)
+    watch(K, K.time, K.q, K.y, K.rate, K.lam, K.guards1)
     here = K.guards1[c]
     touches = abs(here) <= 1e6 * gap_tolerance(K, c)
     first = 0.0 if touches else acceleration_of(K, c, 0.0)
@@ -79,12 +78,12 @@ def pace_of(K: Any, c: int) -> float:
     return float(h)
 
 
-def acceleration_of(K: Any, c: int, h: float) -> float:
+def acceleration_of(K: Kernel, c: int, h: float) -> float:
     """What the force of contact c does to its gap rate [m/s², rad/s²], as the accelerations of now lead on for h.
 
     The larger of the rates now and then is left in K.pace, the guards then in K.guards1.
     """
-    t = K.clock[NOW]
+    t = K.time
     fill_block(K, t, K.q, K.y)
     for i in range(K.n_v):
         K.block[K.o_x + i] = h * (K.y[i] + 0.5 * h * K.rate[i])
@@ -110,7 +109,7 @@ def acceleration_of(K: Any, c: int, h: float) -> float:
     return float(difference / scale)
 
 
-def relax_pace(K: Any) -> None:
+def relax_pace(K: Kernel) -> None:
     """After a short step: longer ones where the contact rests, or goes on vibrating for long."""
     for c in range(K.n_contacts):
         o = 5 * c
@@ -121,5 +120,5 @@ def relax_pace(K: Any) -> None:
                 rests = K.pace[o + LARGEST_RATE] < RESTS * K.pace[o + FIRST_RATE]
                 if rests or K.pace[o + TAKEN] >= PATIENCE:
                     K.pace[o + PACE] = min(2.0 * K.pace[o + PACE], K.dt)
-                    K.state[RESTART] = 2
+                    K.restart_due = 2
                 K.pace[o + LARGEST_RATE] = 0.0

@@ -12,11 +12,9 @@ What is found are branches only: the caller solves their equations again and jud
 
 from __future__ import annotations
 
-from typing import Any
-
-from mbd.kernel.fields import N_DROPPED, PAST_TIME
 from mbd.kernel.lemke import LCP_SOLVED, lemke
 from mbd.kernel.linear import factor, solve
+from mbd.kernel.records import Kernel
 from mbd.kernel.redundancy import shared, sharing
 from mbd.kernel.restart import active_rows, evaluate_loaded, limit_of, load_accelerations
 from mbd.kernel.saddle import solve_rows
@@ -27,7 +25,7 @@ NOTHING = 1e-10
 """Unknowns below this part of the largest of their kind are zero [-]."""
 
 
-def pivoted(K: Any, level: int) -> int:
+def pivoted(K: Kernel, level: int) -> int:
     """1 if Lemke's method has chosen the branches of all that may choose, 0 if it cannot.
 
     It cannot where friction follows multipliers as that of a pin does, where a contact that may open holds tangents
@@ -55,7 +53,7 @@ def pivoted(K: Any, level: int) -> int:
     return 1
 
 
-def gather_pushes(K: Any) -> int:
+def gather_pushes(K: Kernel) -> int:
     """Contacts that may choose, into K.lcp_who, their normal rows into K.lcp_rows; −1 if one sticks without limit."""
     pushes = 0
     for c in range(K.n_contacts):
@@ -72,7 +70,7 @@ def gather_pushes(K: Any) -> int:
     return pushes
 
 
-def gather_drags(K: Any, pushes: int) -> int:
+def gather_drags(K: Kernel, pushes: int) -> int:
     """Frictions that may choose, behind the contacts."""
     drags = 0
     for f in range(K.n_frictions):
@@ -84,7 +82,7 @@ def gather_drags(K: Any, pushes: int) -> int:
     return drags
 
 
-def let_go(K: Any, pushes: int, drags: int) -> None:
+def let_go(K: Kernel, pushes: int, drags: int) -> None:
     """All that may choose is off."""
     for u in range(pushes):
         c = K.lcp_who[u]
@@ -97,7 +95,7 @@ def let_go(K: Any, pushes: int, drags: int) -> None:
         K.slip[K.lcp_who[u]] = 0.0
 
 
-def limits_of_pushes(K: Any, level: int, pushes: int, drags: int) -> None:
+def limits_of_pushes(K: Kernel, level: int, pushes: int, drags: int) -> None:
     """Limits without the unknown pushes and their slopes, into K.lcp_limit and K.lcp_slope."""
     for k in range(K.n_rows):
         K.loads[k] = (K.given[k] + K.past[k]) if level == 1 else 0.0
@@ -117,15 +115,15 @@ def limits_of_pushes(K: Any, level: int, pushes: int, drags: int) -> None:
     evaluate_loaded(K, K.loads)
     if level == 1:  # a force that stays finite has an impulse only over the time of a non-smooth step
         for u in range(drags):
-            K.lcp_limit[u] += (K.detail[PAST_TIME] - 1.0) * K.base_limit[K.lcp_who[pushes + u]]
+            K.lcp_limit[u] += (K.past_time - 1.0) * K.base_limit[K.lcp_who[pushes + u]]
 
 
-def hold(K: Any, level: int, pushes: int, drags: int) -> int:
+def hold(K: Kernel, level: int, pushes: int, drags: int) -> int:
     """The KKT matrix of the held rows in factors, K.jump and K.impulse without the unknowns; how many rows, −1: none.
 
     The impulses of a smooth step that friction has had are taken away, so that the unknowns are all of it.
     """
-    o_R = K.n * K.n + K.n
+    o_R = K.acc_R
     if level == 0:
         load_accelerations(K)
     else:
@@ -138,17 +136,17 @@ def hold(K: Any, level: int, pushes: int, drags: int) -> int:
         for i in range(K.n):
             K.force[i] -= K.acc[o_R + i * K.n_rows + row] * K.past[row]
     m = active_rows(K, K.active)
-    K.state[N_DROPPED] = 0
+    K.n_dropped = 0
     if solve_rows(K, m, True) != 0:
         return -1
     held = 0
     for k in range(m):
-        if K.state[N_DROPPED] == 0 or K.dropped[K.rows[k]] == 0:
+        if K.n_dropped == 0 or K.dropped[K.rows[k]] == 0:
             K.rows[held] = K.rows[k]
             held += 1
     n = K.n
     size = n + held
-    o_B = o_R + n * K.n_rows
+    o_B = K.acc_B
     together = sharing(K)
     for i in range(size * size):
         K.kkt[i] = 0.0
@@ -163,11 +161,11 @@ def hold(K: Any, level: int, pushes: int, drags: int) -> int:
     return held if factor(K.kkt, size, K.pivots) == 0 else -1
 
 
-def fill_problem(K: Any, held: int, pushes: int, drags: int) -> None:
+def fill_problem(K: Kernel, held: int, pushes: int, drags: int) -> None:
     """M and q, column by column, of unit pushes and drags."""
     n = K.n
-    o_R = n * n + n
-    o_B = o_R + n * K.n_rows
+    o_R = K.acc_R
+    o_B = K.acc_B
     size = pushes + 3 * drags
     for i in range(size * size):
         K.lcp_matrix[i] = 0.0
@@ -199,16 +197,16 @@ def fill_problem(K: Any, held: int, pushes: int, drags: int) -> None:
             K.lcp_matrix[friction * size + j + drags] -= 1.0
 
 
-def normal_of(K: Any, u: int) -> int:
+def normal_of(K: Kernel, u: int) -> int:
     """The row by which friction u of the unknowns is loaded, −1 if none."""
     c = K.friction_contact[K.lcp_who[u]]
     return int(K.normal[c]) if c >= 0 else -1
 
 
-def fill_column(K: Any, column: int, sign: float, held: int, pushes: int, drags: int) -> None:
+def fill_column(K: Kernel, column: int, sign: float, held: int, pushes: int, drags: int) -> None:
     """What an unknown does to all γ and limits: ± the solution in K.rhs."""
     n = K.n
-    o_B = n * n + n + n * K.n_rows
+    o_B = K.acc_B
     size = pushes + 3 * drags
     for i in range(pushes + drags):
         row = K.lcp_rows[i]
@@ -228,7 +226,7 @@ def fill_column(K: Any, column: int, sign: float, held: int, pushes: int, drags:
                     K.lcp_matrix[(i + 2 * drags) * size + column] += slope
 
 
-def take_branches(K: Any, pushes: int, drags: int) -> None:
+def take_branches(K: Kernel, pushes: int, drags: int) -> None:
     """Who pushes, sticks and slides in the solution."""
     most_push = 0.0
     most_speed = 0.0
@@ -249,7 +247,7 @@ def take_branches(K: Any, pushes: int, drags: int) -> None:
         take_drag(K, u, most_push, most_speed, pushes, drags)
 
 
-def take_drag(K: Any, u: int, most_push: float, most_speed: float, pushes: int, drags: int) -> None:
+def take_drag(K: Kernel, u: int, most_push: float, most_speed: float, pushes: int, drags: int) -> None:
     """Whether a friction sticks; one at its limit slides, even where other rows keep it at rest."""
     size = pushes + 3 * drags
     f = K.lcp_who[u]

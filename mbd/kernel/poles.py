@@ -7,9 +7,8 @@ at a pole they grow at each halving, at a bump that the step does not resolve th
 
 from __future__ import annotations
 
-from typing import Any
-
-from mbd.kernel.fields import NOT_FINITE, NOW
+from mbd.kernel.codes import NOT_FINITE
+from mbd.kernel.records import Kernel
 from mbd.kernel.restart import compose, consistent, fill_block
 
 __all__ = ["leaps"]
@@ -30,7 +29,7 @@ NOT_FOUND = -1.0
 """Of accelerations that cannot be found."""
 
 
-def leaps(K: Any, h: float, at_y: int) -> bool:
+def leaps(K: Kernel, h: float, at_y: int) -> bool:
     """Whether accelerations within the step are `BEYOND` those at its ends, and decide on the motion if they last.
 
     The new state is in K.inside, its velocities from `at_y` on; K.q1, K.y1 and the block are overwritten.
@@ -74,9 +73,9 @@ def leaps(K: Any, h: float, at_y: int) -> bool:
     return False
 
 
-def pull_at(K: Any, h: float, part: float, at_y: int) -> float:
+def pull_at(K: Kernel, h: float, part: float, at_y: int) -> float:
     """v̇·M v̇ at a part of the way; as good as infinite where it is not finite, `NOT_FOUND` where it cannot be found."""
-    t = K.clock[NOW] + h * part
+    t = K.time + h * part
     fill_block(K, t, K.q, K.y)
     for i in range(K.n):
         start = K.y[i]
@@ -100,7 +99,7 @@ def pull_at(K: Any, h: float, part: float, at_y: int) -> float:
     return float(total)
 
 
-def motion_at(K: Any, at_y: int) -> float:
+def motion_at(K: Kernel, at_y: int) -> float:
     """v·M v of the new state, with the masses that were evaluated last."""
     total = 0.0
     for i in range(K.n_v):

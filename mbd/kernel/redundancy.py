@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from mbd.kernel.fields import N_DROPPED
 from mbd.kernel.linear import factor, solve
 from mbd.kernel.orthogonal import clear_row, square
+from mbd.kernel.records import Kernel
 from mbd.kernel.roots import sqrt
 
 __all__ = ["find_dependent", "find_mix", "find_shares", "shared", "sharing", "spread", "take_shares"]
@@ -23,13 +23,13 @@ LEAST_SHARE = 1e-4
 """Part of the largest limit of friction that even one without load counts as, where several hold together [-]."""
 
 
-def find_dependent(K: Any, m: int) -> None:
+def find_dependent(K: Kernel, m: int) -> None:
     """Mark rows among the m in K.rows that depend on earlier ones in K.dropped, with B_d = C B_kept in K.mix.
 
     Gram–Schmidt in the order of the rows, on columns scaled by √M_ii; B is that of K.acc.
     """
     kept = 0
-    K.state[N_DROPPED] = 0
+    K.n_dropped = 0
     for k in range(K.n_rows):
         K.dropped[k] = 0
     for k in range(m):
@@ -40,11 +40,11 @@ def find_dependent(K: Any, m: int) -> None:
             kept += 1
             continue
         K.dropped[row] = 1
-        K.state[N_DROPPED] += 1
+        K.n_dropped += 1
         combine(K, row, kept)
 
 
-def find_mix(K: Any, m: int) -> None:
+def find_mix(K: Kernel, m: int) -> None:
     """C in K.mix at another place, that of K.acc, with the m rows in K.rows kept and the others told by K.dropped."""
     for k in range(m):
         leftover(K, K.rows[k], k)
@@ -55,13 +55,13 @@ def find_mix(K: Any, m: int) -> None:
             combine(K, row, m)
 
 
-def leftover(K: Any, row: int, kept: int) -> float:
+def leftover(K: Kernel, row: int, kept: int) -> float:
     """What is left of a row beside the `kept` first vectors of K.basis, relative to it, as the next vector there.
 
     Its parts along them are left in the next line of K.lower.
     """
     n = K.n
-    o_B = n * n + n + n * K.n_rows
+    o_B = K.acc_B
     base = kept * n
     for j in range(n):
         weight = K.acc[j * n + j]
@@ -76,7 +76,7 @@ def leftover(K: Any, row: int, kept: int) -> float:
     return float(sqrt(left / size)) if size > 0.0 else 0.0
 
 
-def keep_row(K: Any, row: int, kept: int) -> None:
+def keep_row(K: Kernel, row: int, kept: int) -> None:
     """The next vector of K.basis, which `leftover` has found, gets length 1; its row number into K.columns."""
     n = K.n
     left = sqrt(square(K.basis, kept * n, n)) + 1e-300
@@ -86,7 +86,7 @@ def keep_row(K: Any, row: int, kept: int) -> None:
     K.columns[kept] = row
 
 
-def combine(K: Any, row: int, kept: int) -> None:
+def combine(K: Kernel, row: int, kept: int) -> None:
     """The coefficients of a row in the kept rows from those in the basis, ``c L = `` the next line of K.lower."""
     for i in range(K.n_rows):
         K.mix[row * K.n_rows + i] = 0.0
@@ -98,16 +98,16 @@ def combine(K: Any, row: int, kept: int) -> None:
         K.mix[row * K.n_rows + K.columns[i]] = value / K.lower[i * K.n_rows + i]
 
 
-def sharing(K: Any) -> bool:
+def sharing(K: Kernel) -> bool:
     """Whether a friction slides while rows depend on others: then the shares are part of the solve."""
-    if K.state[N_DROPPED] > 0:
+    if K.n_dropped > 0:
         for f in range(K.n_frictions):
             if K.slip[f] != 0.0:
                 return True
     return False
 
 
-def find_shares(K: Any) -> None:
+def find_shares(K: Kernel) -> None:
     """W_d C W_kept⁻¹ into K.shares, from K.mix and the limits in K.limit."""
     largest = largest_limit(K)
     for d in range(K.n_rows):
@@ -120,7 +120,7 @@ def find_shares(K: Any) -> None:
             K.shares[d * K.n_rows + k] = part
 
 
-def take_shares(K: Any, lam: Any) -> None:
+def take_shares(K: Kernel, lam: Any) -> None:
     """The multipliers of dependent rows from those of the others."""
     for d in range(K.n_rows):
         if K.dropped[d] == 1:
@@ -129,16 +129,16 @@ def take_shares(K: Any, lam: Any) -> None:
                 lam[d] += K.shares[d * K.n_rows + k] * lam[k] if K.dropped[k] == 0 else 0.0
 
 
-def shared(K: Any, i: int, row: int) -> float:
+def shared(K: Kernel, i: int, row: int) -> float:
     """What the multiplier 1 of a row brings into component i of the balance through dependent rows, ``Σ R_d share``."""
     value = 0.0
     for d in range(K.n_rows):
         if K.dropped[d] == 1:
-            value += K.acc[K.n * K.n + K.n + i * K.n_rows + d] * K.shares[d * K.n_rows + row]
+            value += K.acc[K.acc_R + i * K.n_rows + d] * K.shares[d * K.n_rows + row]
     return value
 
 
-def largest_limit(K: Any) -> float:
+def largest_limit(K: Kernel) -> float:
     """The largest limit of all frictions."""
     largest = 0.0
     for f in range(K.n_frictions):
@@ -146,7 +146,7 @@ def largest_limit(K: Any) -> float:
     return largest
 
 
-def share(K: Any, row: int, largest: float) -> float:
+def share(K: Kernel, row: int, largest: float) -> float:
     """Size W by which a multiplier counts: parallel frictions then share their load in the ratio of their limits."""
     f = K.row_friction[row]
     if f < 0 or largest == 0.0:
@@ -154,7 +154,7 @@ def share(K: Any, row: int, largest: float) -> float:
     return float(max(K.limit[f] / largest, LEAST_SHARE))
 
 
-def spread(K: Any, lam: Any) -> None:
+def spread(K: Kernel, lam: Any) -> None:
     """The multipliers of least norm with the same forces: λ_d = y, λ_kept = μ − Cᵀ y.
 
     (W_d⁻¹ + C W⁻¹ Cᵀ) y = C W⁻¹ μ, with W of `share`.

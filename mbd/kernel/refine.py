@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from mbd.kernel.fields import CLOSE, CROSS, EPS, NOW, OPEN_GAP, WATCH
+from mbd.kernel.codes import CLOSE, CROSS, EPS, OPEN_GAP, WATCH
 from mbd.kernel.guards import gap_tolerance, guard_value
+from mbd.kernel.records import Kernel
 from mbd.kernel.takeover import look
 
 __all__ = ["refine"]
@@ -14,9 +13,9 @@ NO_MOVE = 1e300
 """What `interpolated` gives where its move is not to be trusted."""
 
 
-def refine(K: Any, kind: int, index: int, low: float, f_low: float, high: float, f_high: float, guess: float) -> int:
+def refine(K: Kernel, kind: int, index: int, low: float, f_low: float, high: float, f_high: float, guess: float) -> int:
     """Brent's root finder (Brent 1973, ch. 4) from a bracket and a first guess; leaves the candidate at the root."""
-    t = K.clock[NOW]
+    t = K.time
     tiny = enough(K, kind, index, f_low, f_high)
     a = low  # the iterate before
     fa = f_low
@@ -66,11 +65,11 @@ def refine(K: Any, kind: int, index: int, low: float, f_low: float, high: float,
     place = b
     if kind == WATCH and fb >= 0.0:  # end where it is watched, or it fires again
         place = c
-    K.pick[2] = place
+    K.event_after = place
     return 0 if at == place else look(K, place, t + place)
 
 
-def enough(K: Any, kind: int, index: int, f_low: float, f_high: float) -> float:
+def enough(K: Kernel, kind: int, index: int, f_low: float, f_high: float) -> float:
     """Size of a guard that is round-off; 0 for a user's, which has a scale of its own: its instant is found instead."""
     if kind == CLOSE or kind == OPEN_GAP:
         return float(0.25 * gap_tolerance(K, index))

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from mbd.kernel.fields import ACCELERATIONS, COMPOSE, EPS, N_DROPPED, NOT_CONVERGED, NOW, RAISED, SCALES
+from mbd.kernel.codes import ACCELERATIONS, COMPOSE, EPS, NOT_CONVERGED, SCALES
 from mbd.kernel.hooks import call
+from mbd.kernel.records import Kernel
 from mbd.kernel.redundancy import find_mix, find_shares, shared, sharing, spread, take_shares
 from mbd.kernel.saddle import solve_rows
 
@@ -26,7 +27,7 @@ MOST_LOADS = 30
 """How often multipliers that friction follows are solved for again [-]."""
 
 
-def fill_block(K: Any, t: float, q: Any, y: Any) -> None:
+def fill_block(K: Kernel, t: float, q: Any, y: Any) -> None:
     """The block at a state, with the accepted rates and multipliers; penalties act where closed."""
     block = K.block
     block[0] = t
@@ -49,7 +50,7 @@ def fill_block(K: Any, t: float, q: Any, y: Any) -> None:
         block[K.o_slip + f] = K.slip[f]
 
 
-def compose(K: Any, q1: Any) -> None:
+def compose(K: Kernel, q1: Any) -> None:
     """q₁ = q ⊕ x with the accepted q and the increment x in the block."""
     if K.vector == 1:
         for i in range(K.n_q):
@@ -60,7 +61,7 @@ def compose(K: Any, q1: Any) -> None:
         call(K, COMPOSE, q1)
 
 
-def refresh_scales(K: Any) -> None:
+def refresh_scales(K: Kernel) -> None:
     """Magnitudes of r, h and ḣ, term by term before cancellation, at the state now in the block."""
     call(K, SCALES, K.scale)
     for i in range(K.n):
@@ -86,13 +87,13 @@ def refresh_scales(K: Any) -> None:
         K.scale[K.n + K.n_rows + k] = max(K.scale[K.n + K.n_rows + k], speed)
 
 
-def weigh(K: Any) -> None:
+def weigh(K: Kernel) -> None:
     """Residuals are compared with their scale so often that its inverse is kept."""
     for i in range(K.n):
         K.weight[i] = 1.0 / K.scale[i]
 
 
-def raise_scales(K: Any, rows: bool) -> None:
+def raise_scales(K: Kernel, rows: bool) -> None:
     """Magnitudes at the state now in the block where they exceed those known; where a force passes zero it has none.
 
     Those of rows, by which gaps are judged too, only on demand and as far as coordinates may grow in a step: a state
@@ -112,7 +113,7 @@ def raise_scales(K: Any, rows: bool) -> None:
     weigh(K)
 
 
-def largest_force(K: Any) -> float:
+def largest_force(K: Kernel) -> float:
     """The largest magnitude that forces have in the balance [N, N m]."""
     force = 0.0
     for i in range(K.n_v):
@@ -120,45 +121,45 @@ def largest_force(K: Any) -> float:
     return float(force)
 
 
-def note_scales(K: Any) -> None:
+def note_scales(K: Kernel) -> None:
     """Keep the magnitudes known so far, which an iterate that is not accepted must leave as they are."""
     for i in range(K.n + 2 * K.n_rows):
         K.known[i] = K.scale[i]
 
 
-def restore_scales(K: Any) -> None:
+def restore_scales(K: Kernel) -> None:
     """The magnitudes of `note_scales`: where an iterate was thrown far away, its forces excuse nothing."""
     for i in range(K.n + 2 * K.n_rows):
         K.scale[i] = K.known[i]
     weigh(K)
 
 
-def retain_scales(K: Any) -> None:
+def retain_scales(K: Kernel) -> None:
     """Go on with raised magnitudes, those of a candidate; told where they are far above what was known."""
     for i in range(K.n):
         if K.scale[i] > FAR_ABOVE * K.known[i]:
-            K.state[RAISED] = 1
+            K.scales_raised = 1
 
 
-def lower_scales(K: Any) -> None:
+def lower_scales(K: Kernel) -> None:
     """Magnitudes of forces down towards those of the accepted state, by a hundred at most.
 
     After a moment of huge forces residuals are judged too mildly otherwise.
     """
     for i in range(K.n):
         K.work[i] = K.scale[i]
-    fill_block(K, K.clock[NOW], K.q, K.y)
+    fill_block(K, K.time, K.q, K.y)
     refresh_scales(K)
-    K.state[RAISED] = 0
+    K.scales_raised = 0
     for i in range(K.n):
         floor = K.work[i] / FAR_ABOVE
         if floor > K.scale[i]:
             K.scale[i] = floor
-            K.state[RAISED] = 1
+            K.scales_raised = 1
     weigh(K)
 
 
-def is_held(K: Any, row: int, flags: Any) -> bool:
+def is_held(K: Kernel, row: int, flags: Any) -> bool:
     """Whether a row acts: always, while its contact is closed and does not part, and while its friction sticks.
 
     Trivial rows never do, and those with K.lifting = 1 are left out while contacts are lifted out of their surfaces.
@@ -172,7 +173,7 @@ def is_held(K: Any, row: int, flags: Any) -> bool:
     return bool(friction < 0 or K.sticks[friction] == 1)
 
 
-def stepping_rows(K: Any) -> int:
+def stepping_rows(K: Kernel) -> int:
     """The active rows of the closed contacts that do not depend on others, into K.rows; how many."""
     m = 0
     for row in range(K.n_rows):
@@ -182,7 +183,7 @@ def stepping_rows(K: Any) -> int:
     return m
 
 
-def active_rows(K: Any, flags: Any) -> int:
+def active_rows(K: Kernel, flags: Any) -> int:
     """Numbers of the active rows into K.rows, ascending; how many."""
     m = 0
     for row in range(K.n_rows):
@@ -192,13 +193,13 @@ def active_rows(K: Any, flags: Any) -> int:
     return m
 
 
-def evaluate(K: Any, t: float, q: Any, y: Any) -> None:
+def evaluate(K: Kernel, t: float, q: Any, y: Any) -> None:
     """M, f, R, B, h, ḣ, bias, captured, kinetic energy, limits at a state, into K.acc."""
     fill_block(K, t, q, y)
     call(K, ACCELERATIONS, K.acc)
 
 
-def evaluate_loaded(K: Any, lam: Any) -> float:
+def evaluate_loaded(K: Kernel, lam: Any) -> float:
     """K.acc again with other multipliers, at the state already in the block; how far they differ from those before.
 
     Only R and the limits of frictions follow them.
@@ -215,17 +216,17 @@ def evaluate_loaded(K: Any, lam: Any) -> float:
     return change / size
 
 
-def limit_of(K: Any, f: int) -> float:
+def limit_of(K: Kernel, f: int) -> float:
     """Largest friction at the multipliers now in the block."""
-    return float(K.acc[K.n * K.n + K.n + 2 * K.n * K.n_rows + 3 * K.n_rows + K.n_anchors + 1 + f])
+    return float(K.acc[K.acc_limit + f])
 
 
-def row_speed(K: Any, row: int) -> float:
+def row_speed(K: Kernel, row: int) -> float:
     """ḣ of a row, from K.acc."""
-    return float(K.acc[K.n * K.n + K.n + 2 * K.n * K.n_rows + K.n_rows + row])
+    return float(K.acc[K.acc_rate + row])
 
 
-def consistent(K: Any, t: float, q: Any, y: Any) -> int:
+def consistent(K: Kernel, t: float, q: Any, y: Any) -> int:
     """Rates and multipliers of the closed rows at a state, in K.jump and K.impulse."""
     evaluate(K, t, q, y)
     m = stepping_rows(K)
@@ -250,22 +251,22 @@ def consistent(K: Any, t: float, q: Any, y: Any) -> int:
             load_accelerations(K)
             status = solve_rows(K, m, False)
         if status == 0 and change > SETTLED_LOADS:
-            K.detail[1] = change / SETTLED_LOADS
+            K.failure_size = change / SETTLED_LOADS
             return NOT_CONVERGED
-    if K.state[N_DROPPED] > 0 and status == 0:
+    if K.n_dropped > 0 and status == 0:
         share_out(K, K.impulse)
     if status == 0 and K.n_frictions > 0:
         find_sliding_friction(K)
     return status
 
 
-def find_limits_of_loads(K: Any) -> None:
+def find_limits_of_loads(K: Kernel) -> None:
     """Largest frictions at the multipliers now in the block."""
     for f in range(K.n_frictions):
         K.limit[f] = limit_of(K, f)
 
 
-def share_out(K: Any, lam: Any) -> None:
+def share_out(K: Kernel, lam: Any) -> None:
     """Multipliers of dependent rows beside those of K.rows, which were solved with, at the state now in the block.
 
     Frictions that hold together share by their limits, which follow their loads: they are found by turns.
@@ -284,7 +285,7 @@ def share_out(K: Any, lam: Any) -> None:
             break
 
 
-def share_loads(K: Any, m: int) -> None:
+def share_loads(K: Kernel, m: int) -> None:
     """Multipliers of dependent rows in the block, where they are part of the step's equations, at its iterate."""
     call(K, ACCELERATIONS, K.acc)
     find_mix(K, m)
@@ -297,7 +298,7 @@ def share_loads(K: Any, m: int) -> None:
         K.block[K.o_lam + k] = K.loads[k]
 
 
-def add_shares(K: Any, A: Any, m: int) -> None:
+def add_shares(K: Kernel, A: Any, m: int) -> None:
     """What the multipliers of a step bring along through dependent rows, into the tangent A of m rows."""
     size = K.n + m
     for i in range(K.n):
@@ -305,9 +306,9 @@ def add_shares(K: Any, A: Any, m: int) -> None:
             A[i * size + K.n + k] += shared(K, i, K.rows[k])
 
 
-def holds_rows(K: Any, m: int) -> bool:
+def holds_rows(K: Kernel, m: int) -> bool:
     """Whether the rows on positions hold at the candidate, at which K.acc is."""
-    o_h = K.n * K.n + K.n + 2 * K.n * K.n_rows
+    o_h = K.acc_h
     for k in range(m):
         row = K.rows[k]
         size = max(K.scale[K.n + row], 1e-3)
@@ -316,7 +317,7 @@ def holds_rows(K: Any, m: int) -> bool:
     return True
 
 
-def find_sliding_friction(K: Any) -> None:
+def find_sliding_friction(K: Kernel) -> None:
     """Friction that slides follows the multipliers of the held rows in K.impulse."""
     evaluate_loaded(K, K.impulse)
     for f in range(K.n_frictions):
@@ -324,18 +325,18 @@ def find_sliding_friction(K: Any) -> None:
             K.impulse[K.friction_row[f]] = K.slip[f] * limit_of(K, f)
 
 
-def load_accelerations(K: Any) -> None:
+def load_accelerations(K: Kernel) -> None:
     """Right-hand sides of the acceleration level."""
     n = K.n
-    o_bias = n * n + n + 2 * n * K.n_rows + 2 * K.n_rows
+    o_bias = K.acc_bias
     for i in range(n):
-        K.force[i] = K.acc[n * n + i]
+        K.force[i] = K.acc[K.acc_f + i]
     for k in range(K.n_rows):
         K.bias[k] = K.acc[o_bias + k]
 
 
-def capture(K: Any, c: int) -> None:
+def capture(K: Kernel, c: int) -> None:
     """Hold the anchors of a contact that closes; K.acc is evaluated at the instant."""
-    o_captured = K.n * K.n + K.n + 2 * K.n * K.n_rows + 3 * K.n_rows
+    o_captured = K.acc_captured
     for k in range(K.anchor_start[c], K.anchor_start[c + 1]):
         K.anchors[k] = K.acc[o_captured + k]

@@ -6,17 +6,16 @@ of velocity and λ the impulse. M may be singular; only the whole matrix is ever
 
 from __future__ import annotations
 
-from typing import Any
-
-from mbd.kernel.fields import BLOCKED, CONFLICT, DEPENDENT, NOT_FINITE
+from mbd.kernel.codes import CONFLICT, DEPENDENT, NOT_FINITE
 from mbd.kernel.linear import eliminate
 from mbd.kernel.ordered import LOSS_AT_ONCE, OF_ACCELERATIONS, factor_ordered, order_at, solve_ordered
+from mbd.kernel.records import Kernel
 from mbd.kernel.redundancy import find_dependent, find_shares, shared, sharing, spread, take_shares
 
 __all__ = ["solve_rows"]
 
 
-def solve_rows(K: Any, m: int, dropping: bool) -> int:
+def solve_rows(K: Kernel, m: int, dropping: bool) -> int:
     """w and λ for the m rows in K.rows; w in K.jump, λ of all rows in K.impulse.
 
     Rows may depend on each other where `dropping` allows it: then K.dropped tells which, and λ has the least norm; with
@@ -43,25 +42,25 @@ def solve_rows(K: Any, m: int, dropping: bool) -> int:
             find_shares(K)
             return solve_shared(K, dependent_last(K, m))
     if undetermined < size:
-        K.state[BLOCKED] = undetermined
+        K.failure_index = undetermined
         return DEPENDENT
     spread(K, K.impulse)
     return 0
 
 
-def solve_shared(K: Any, m: int) -> int:
+def solve_shared(K: Kernel, m: int) -> int:
     """w and λ with the shares of dependent rows in K.shares, for the m independent rows that come first in K.rows."""
     rank = solve_matrix(K, m, True)
     if rank < 0:
         return -rank
     if rank < K.n + m:
-        K.state[BLOCKED] = K.columns[rank]
+        K.failure_index = K.columns[rank]
         return DEPENDENT
     take_shares(K, K.impulse)
     return 0
 
 
-def dependent_last(K: Any, m: int) -> int:
+def dependent_last(K: Kernel, m: int) -> int:
     """The m rows in K.rows with those that depend on others behind the rest; how many the rest are."""
     kept = 0
     for k in range(m):
@@ -80,15 +79,15 @@ def dependent_last(K: Any, m: int) -> int:
     return int(kept)
 
 
-def solve_matrix(K: Any, m: int, together: bool) -> int:
+def solve_matrix(K: Kernel, m: int, together: bool) -> int:
     """w and λ of the m rows in K.rows, as far as they are independent, others 0; the rank, or minus a failure.
 
     With `together` each multiplier brings the shares of the rows that depend on its row along.
     """
     n = K.n
     size = n + m
-    o_R = n * n + n
-    o_B = o_R + n * K.n_rows
+    o_R = K.acc_R
+    o_B = K.acc_B
     o = 0 if together else order_at(K, m)
     if o > 0 and factor_ordered(K, K.acc, o, OF_ACCELERATIONS, LOSS_AT_ONCE):  # far from any loss of rank
         return solve_in_order(K, m)
@@ -117,13 +116,13 @@ def solve_matrix(K: Any, m: int, together: bool) -> int:
         return -NOT_FINITE
     rank = int(eliminate(A, size, K.rhs, K.columns, K.work, 1e-12))
     if rank < 0:
-        K.state[BLOCKED] = K.columns[-1 - rank]
+        K.failure_index = K.columns[-1 - rank]
         return -CONFLICT
     take_solution(K, m)
     return rank
 
 
-def solve_in_order(K: Any, m: int) -> int:
+def solve_in_order(K: Kernel, m: int) -> int:
     """w and λ of the m rows in K.rows with the ordered factors at hand; all unknowns, or minus a failure."""
     for i in range(K.n):
         K.rhs[i] = -K.force[i]
@@ -139,7 +138,7 @@ def solve_in_order(K: Any, m: int) -> int:
     return int(K.n + m)
 
 
-def take_solution(K: Any, m: int) -> None:
+def take_solution(K: Kernel, m: int) -> None:
     """The solution in K.rhs to where others find it; multipliers of rows without part in it are 0."""
     for i in range(K.n):
         K.jump[i] = K.rhs[i]

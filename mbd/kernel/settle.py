@@ -2,26 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from mbd.kernel.blow import strikes
+from mbd.kernel.codes import LOG_CLOSED, LOG_OPENED, LOG_SLIPPED, LOG_STUCK, NO_FORCE, NO_IMPACT, SLIP, UNKNOWN
 from mbd.kernel.complementarity import complementarity
-from mbd.kernel.fields import (
-    BLOCKED,
-    EVENTS,
-    LOG_CLOSED,
-    LOG_OPENED,
-    LOG_SLIPPED,
-    LOG_STUCK,
-    LOGGED,
-    LOST,
-    NO_FORCE,
-    NO_IMPACT,
-    NOW,
-    SLIP,
-    STORED,
-    UNKNOWN,
-)  # fmt: skip
+from mbd.kernel.records import Kernel
 from mbd.kernel.restart import active_rows, capture, evaluate, row_speed
 from mbd.kernel.saddle import solve_rows
 
@@ -35,7 +19,7 @@ NO_IMPULSE, OWN_IMPULSE, ALL_IMPULSES = 0, 1, 2
 """Which impulses a line of the event log holds [-]."""
 
 
-def room_to_log(K: Any) -> int:
+def room_to_log(K: Kernel) -> int:
     """Lines of the event log that one step with its event and two restarts may fill.
 
     A restart logs each contact and each friction at most once. An event logs one guard, a step over a singular
@@ -45,36 +29,36 @@ def room_to_log(K: Any) -> int:
     return int(5 * K.n_contacts + 2 * K.n_frictions + K.n_guards + 8)
 
 
-def log_event(K: Any, kind: int, index: int, loss: float, impulses: int) -> None:
+def log_event(K: Kernel, kind: int, index: int, loss: float, impulses: int) -> None:
     """One line of the event log: t, kind, index, energy loss, row of results, impulses.
 
     impulses : NO_IMPULSE; OWN_IMPULSE, those of the rows of contact `index`; ALL_IMPULSES, with those of the rows that
         belong to no contact that closes in this impact
     """
-    if K.state[LOGGED] >= K.event_capacity:  # never beyond the array; the run ends with an error
-        K.counts[LOST] += 1
+    if K.n_logged >= K.event_capacity:  # never beyond the array; the run ends with an error
+        K.n_lost += 1
         return
-    o = K.state[LOGGED] * K.event_width
-    K.log[o] = K.clock[NOW]
+    o = K.n_logged * K.event_width
+    K.log[o] = K.time
     K.log[o + 1] = float(kind)
     K.log[o + 2] = float(index)
     K.log[o + 3] = loss
-    K.log[o + 4] = float(K.state[STORED])
+    K.log[o + 4] = float(K.n_stored)
     for k in range(K.n_rows):
         c = K.row_contact[k]
         told = impulses != NO_IMPULSE and (c == index or (impulses == ALL_IMPULSES and (c < 0 or not strikes(K, c))))
         K.log[o + 5 + k] = 0.0 - K.impulse[k] if told else 0.0
-    K.state[LOGGED] += 1
-    K.counts[EVENTS] += 1
+    K.n_logged += 1
+    K.n_events += 1
 
 
-def settle(K: Any) -> int:
+def settle(K: Kernel) -> int:
     """Consistent accelerations and multipliers; contacts that would pull open, touching ones that press close.
 
     Frictions that do not move stick or begin to slide.
     """
     find_slips(K)
-    evaluate(K, K.clock[NOW], K.q, K.y)
+    evaluate(K, K.time, K.q, K.y)
     for k in range(K.n_rows):
         K.impulse[k] = K.lam[k]
     for c in range(K.n_contacts):
@@ -87,7 +71,7 @@ def settle(K: Any) -> int:
     if status == NO_IMPACT or status == 0:
         jammed = find_jammed(K)
         if jammed >= 0:
-            K.state[BLOCKED] = jammed
+            K.failure_index = jammed
             return NO_FORCE
     if status != 0:
         return status
@@ -122,26 +106,26 @@ def settle(K: Any) -> int:
     return 0
 
 
-def frictional_state(K: Any, f: int) -> int:
+def frictional_state(K: Kernel, f: int) -> int:
     """0 off, 2 sticking, ±1 sliding."""
     if K.sticks[f] == 1:
         return 2
     return int(K.slip[f])
 
 
-def find_slips(K: Any) -> None:
+def find_slips(K: Kernel) -> None:
     """Which frictions slide, by their velocity, and which may choose; K.loose tells what an event has found out.
 
     On entry K.loose[f] is 0, 2 where an event found the velocity to be zero, 3 where it found that it must slide.
     """
     if K.n_frictions == 0:
         return
-    evaluate(K, K.clock[NOW], K.q, K.y)
+    evaluate(K, K.time, K.q, K.y)
     for f in range(K.n_frictions):  # its direction is that at the point of now, unless it is held already
         c = K.friction_contact[f]
         if c >= 0 and (K.closed[c] == 0 or K.sticks[f] == 0):
             capture(K, c)
-    evaluate(K, K.clock[NOW], K.q, K.y)
+    evaluate(K, K.time, K.q, K.y)
     for f in range(K.n_frictions):
         c = K.friction_contact[f]
         told = K.loose[f]
@@ -157,7 +141,9 @@ def find_slips(K: Any) -> None:
             continue
         small = max(1.0, 1e-2 * K.scale[K.n + K.n_rows + K.friction_row[f]])
         still = abs(gamma) <= STILL * small
-        if (told == 2 and abs(gamma) <= CLOSE_TO_STILL * small) or (still and (K.slip[f] == 0.0 or K.fired[0] != SLIP)):
+        if (told == 2 and abs(gamma) <= CLOSE_TO_STILL * small) or (
+            still and (K.slip[f] == 0.0 or K.event_kind != SLIP)
+        ):
             K.loose[f] = 1
             K.sticks[f] = 1
             K.slip[f] = 0.0
@@ -168,15 +154,15 @@ def find_slips(K: Any) -> None:
             K.slip[f] = 1.0 if gamma > 0.0 else -1.0
 
 
-def find_jammed(K: Any) -> int:
+def find_jammed(K: Kernel) -> int:
     """A contact that slides so that pushing on it makes it approach: no force or several are consistent; −1 if none.
 
     ``dg̈/dp = B_n K⁻¹ (B_n − μ s B_T)ᵀ ≤ 0`` with the other rows held (Painlevé 1895; Génot & Brogliato 1999,
     Eur. J. Mech. A 18:653). K.jump and K.impulse are kept.
     """
     n = K.n
-    o_R = n * n + n
-    o_B = o_R + n * K.n_rows
+    o_R = K.acc_R
+    o_B = K.acc_B
     for f in range(K.n_frictions):
         c = K.friction_contact[f]
         if c < 0 or K.sticks[f] == 1 or K.slip[f] == 0.0 or K.loose[f] > 0 or K.closed[c] == 0:

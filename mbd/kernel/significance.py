@@ -19,8 +19,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from mbd.kernel.fields import EPS, GUARDS, STEP, TERMS
+from mbd.kernel.codes import EPS, GUARDS, TERMS
 from mbd.kernel.hooks import call
+from mbd.kernel.records import Kernel
 from mbd.kernel.restart import evaluate, is_held
 
 __all__ = ["condition_round_off", "guard_round_off"]
@@ -35,17 +36,17 @@ MAGNIFIED = 2.0**20
 """Times round-off by which a coordinate is moved to see what it does to a guard, so that it is seen at all [-]."""
 
 
-def guard_round_off(K: Any, e: int, t: float, q: Any, y: Any) -> float:
+def guard_round_off(K: Kernel, e: int, t: float, q: Any, y: Any) -> float:
     """Round-off of user guard e at a state; K.acc and the block are overwritten."""
     return inherited(K, 4 * K.n_contacts + e, e, t, q, y)
 
 
-def condition_round_off(K: Any, c: int, t: float, q: Any, y: Any) -> float:
+def condition_round_off(K: Kernel, c: int, t: float, q: Any, y: Any) -> float:
     """The same of the measure that contact c is watched by."""
     return inherited(K, 3 * K.n_contacts + c, K.n_guards + c, t, q, y)
 
 
-def inherited(K: Any, place: int, term: int, t: float, q: Any, y: Any) -> float:
+def inherited(K: Kernel, place: int, term: int, t: float, q: Any, y: Any) -> float:
     """Round-off of the guard value at a place, whose terms have another in their program."""
     evaluate(K, t, q, y)
     o_x = 2 * K.n_watched
@@ -62,7 +63,7 @@ def inherited(K: Any, place: int, term: int, t: float, q: Any, y: Any) -> float:
     return float(doubt)
 
 
-def change_by(K: Any, place: int, here: float, at: int, doubt: float) -> float:
+def change_by(K: Kernel, place: int, here: float, at: int, doubt: float) -> float:
     """What round-off of one input of the block does to a guard value, which is `here` without it."""
     kept = K.block[at]
     K.block[at] = kept + MAGNIFIED * doubt
@@ -71,10 +72,10 @@ def change_by(K: Any, place: int, here: float, at: int, doubt: float) -> float:
     return float(abs(K.doubt[place] - here) / MAGNIFIED)
 
 
-def doubts_of_state(K: Any, q: Any, y: Any, o_x: int, o_v: int) -> None:
+def doubts_of_state(K: Kernel, q: Any, y: Any, o_x: int, o_v: int) -> None:
     """Round-off of positions and velocities into K.doubt, with M, B in K.acc."""
     n = K.n
-    h = K.clock[STEP]
+    h = K.step
     largest = 0.0
     for i in range(K.n_q):
         largest = max(largest, abs(q[i]))
@@ -86,7 +87,7 @@ def doubts_of_state(K: Any, q: Any, y: Any, o_x: int, o_v: int) -> None:
         K.doubt[o_v + i] = OWN * EPS * abs(y[i]) + LASTING * EPS * h * acceleration
     for i in range(K.n_v):
         K.doubt[o_x + i] = OWN * EPS * (abs(q[i]) if K.vector == 1 else largest)
-    o_B = n * n + n + n * K.n_rows
+    o_B = K.acc_B
     loose = K.tolerance / (ROUGH * EPS) * h * h * fastest
     for k in range(K.n_rows):
         if not is_held(K, k, K.closed) or K.dropped[k] == 1:
@@ -105,7 +106,7 @@ def doubts_of_state(K: Any, q: Any, y: Any, o_x: int, o_v: int) -> None:
         K.doubt[o_x + i] += h * K.doubt[o_v + i]
 
 
-def lightness(K: Any, i: int) -> float:
+def lightness(K: Kernel, i: int) -> float:
     """1/M_ii, with M in K.acc; 1 of a coordinate without mass, which rows alone determine."""
     mass = abs(K.acc[i * K.n + i])
     return 1.0 / mass if mass > 0.0 else 1.0

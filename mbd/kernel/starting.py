@@ -2,23 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from mbd.kernel.control import first_step
-from mbd.kernel.fields import (
-    BASE,
-    GRID,
-    MODE,
-    N_DROPPED,
-    NOW,
-    PAIRED,
-    RESTARTS,
-    ROWS,
-    STRAIGHT,
-)
 from mbd.kernel.guards import update_armed, watch
 from mbd.kernel.hooks import scheme_start
 from mbd.kernel.pace import find_pace
+from mbd.kernel.records import Kernel
 from mbd.kernel.redundancy import find_dependent, sharing, spread
 from mbd.kernel.restart import active_rows, stepping_rows
 from mbd.kernel.settle import settle
@@ -26,10 +14,10 @@ from mbd.kernel.settle import settle
 __all__ = ["find_mode", "restart", "still_dependent"]
 
 
-def find_mode(K: Any) -> int:
+def find_mode(K: Kernel) -> int:
     """Number of the mode of the closed contacts and dependent rows, −1 if its code is not made yet."""
     width = K.n_contacts + K.n_rows + K.n_frictions
-    for mode in range(K.mode_count[0]):
+    for mode in range(K.n_modes):
         same = True
         for c in range(K.n_contacts):
             same = same and K.mode_key[mode * width + c] == K.closed[c]
@@ -43,16 +31,16 @@ def find_mode(K: Any) -> int:
     return -1
 
 
-def restart(K: Any) -> int:
+def restart(K: Kernel) -> int:
     """Make the state consistent in its mode and start the scheme from it."""
     status = settle(K)
     if status != 0:
         return status
-    K.counts[RESTARTS] += 1
+    K.n_restarts += 1
     find_dependent(K, active_rows(K, K.closed))
-    if K.state[N_DROPPED] > 0 and not sharing(K):
+    if K.n_dropped > 0 and not sharing(K):
         spread(K, K.lam)
-    K.state[ROWS] = stepping_rows(K)
+    K.n_active = stepping_rows(K)
     if K.adaptive == 0 and K.n_contacts > 0:
         status = find_pace(K)
         if status != 0:
@@ -60,23 +48,23 @@ def restart(K: Any) -> int:
     status = scheme_start(K)
     if status != 0:
         return status
-    K.state[ROWS] = stepping_rows(K)
-    K.state[MODE] = find_mode(K)
-    K.state[PAIRED] = 0
-    K.clock[BASE] = K.clock[NOW]
-    K.state[GRID] = 0
-    K.state[STRAIGHT] = 0
+    K.n_active = stepping_rows(K)
+    K.mode_id = find_mode(K)
+    K.paired_step = 0
+    K.grid_start = K.time
+    K.grid_steps = 0
+    K.in_substeps = 0
     if K.adaptive == 1:
         first_step(K)
     if K.n_watched > 0:
-        watch(K, K.clock[NOW], K.q, K.y, K.rate, K.lam, K.guards0)
+        watch(K, K.time, K.q, K.y, K.rate, K.lam, K.guards0)
         update_armed(K)
     return 0
 
 
-def still_dependent(K: Any) -> bool:
+def still_dependent(K: Kernel) -> bool:
     """Whether the rows that were left out hold at the candidate, at which K.acc is."""
-    o_h = K.n * K.n + K.n + 2 * K.n * K.n_rows
+    o_h = K.acc_h
     for k in range(K.n_rows):
         if K.dropped[k] == 1:
             size = max(K.scale[K.n + k], 1e-3)

@@ -2,34 +2,30 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from mbd.kernel.blow import strikes
-from mbd.kernel.fields import (
-    BLOCKED,
+from mbd.kernel.codes import (
     CLOSE,
     CROSS,
     LOG_CLOSED,
     LOG_OPENED,
     NO_FORCE,
-    NOW,
     OPEN_FORCE,
     OPEN_PULL,
-    PLASTIC,
     PRESS,
     SLIP,
     STICK,
     WATCH,
-)  # fmt: skip
+)
 from mbd.kernel.guards import gap_scale, is_watched
 from mbd.kernel.impact import impact
+from mbd.kernel.records import Kernel
 from mbd.kernel.restart import capture, evaluate, row_speed
 from mbd.kernel.settle import ALL_IMPULSES, NO_IMPULSE, OWN_IMPULSE, STILL, log_event
 
 __all__ = ["switch"]
 
 
-def gather_closing(K: Any) -> float:
+def gather_closing(K: Kernel) -> float:
     """Mark the contacts that close at this instant in K.closing; the fastest closing speed of unilateral ones.
 
     Contacts that touch and approach close together with the fired one, whatever their order; those that touch and
@@ -41,7 +37,7 @@ def gather_closing(K: Any) -> float:
         K.closing[c] = 0
         if K.closed[c] == 1:
             continue
-        fired = K.fired[0] == CLOSE and K.fired[1] == c
+        fired = K.event_kind == CLOSE and K.event_index == c
         near = abs(K.guards0[c]) <= 1e-10 * gap_scale(K, c)
         ready = K.armed[c] == 1 and is_watched(K, c, K.guards0)
         approach = -K.guards0[nC + c]
@@ -51,12 +47,12 @@ def gather_closing(K: Any) -> float:
                 # located by interpolation it may part already, which is no rest; located exactly it parts only where
                 # its next contact cannot be told from this instant
                 fastest = max(fastest, abs(approach) if K.linear == 1 else approach)
-        elif near and ready and K.kind[c] == 0 and (approach >= -STILL or K.state[PLASTIC] == 1):
+        elif near and ready and K.kind[c] == 0 and (approach >= -STILL or K.plastic_impact == 1):
             K.closing[c] = 2
     return fastest
 
 
-def release_for(K: Any, after: int) -> None:
+def release_for(K: Kernel, after: int) -> None:
     """Open the contacts whose rule names one that closes now."""
     for c in range(K.n_contacts):
         if K.closed[c] == 1:
@@ -69,9 +65,9 @@ def release_for(K: Any, after: int) -> None:
                     break
 
 
-def close_by_impact(K: Any, fastest: float) -> int:
+def close_by_impact(K: Kernel, fastest: float) -> int:
     """Impact of all closing unilateral contacts, the releases it causes, anchors and log."""
-    slow = fastest < K.rest_speed or (K.state[PLASTIC] == 1 and fastest == 0.0)  # a rebound too small to rise at all
+    slow = fastest < K.rest_speed or (K.plastic_impact == 1 and fastest == 0.0)  # a rebound too small to rise at all
     if not slow:
         release_for(K, 0)
     status = impact(K, slow)
@@ -107,16 +103,16 @@ def close_by_impact(K: Any, fastest: float) -> int:
     return 0
 
 
-def loss_of(K: Any, row: int) -> float:
+def loss_of(K: Kernel, row: int) -> float:
     """What the impulse of a row took, −½ Λ (γ⁻ + γ⁺): its part of the kinetic energy lost."""
-    o_B = K.n * K.n + K.n + K.n * K.n_rows
+    o_B = K.acc_B
     rate = row_speed(K, row)
     for j in range(K.n):
         rate += 0.5 * K.acc[o_B + row * K.n + j] * K.jump[j]
     return float(K.impulse[row] * rate)
 
 
-def loss_in(K: Any, c: int) -> float:
+def loss_in(K: Kernel, c: int) -> float:
     """What the impulses of a contact took."""
     loss = 0.0
     for k in range(K.n_rows):
@@ -125,7 +121,7 @@ def loss_in(K: Any, c: int) -> float:
     return loss
 
 
-def loss_elsewhere(K: Any) -> float:
+def loss_elsewhere(K: Kernel) -> float:
     """What friction in joints, and contacts that were closed before, took in an impact."""
     loss = 0.0
     for k in range(K.n_rows):
@@ -135,10 +131,10 @@ def loss_elsewhere(K: Any) -> float:
     return loss
 
 
-def mark_touching(K: Any) -> None:
+def mark_touching(K: Kernel) -> None:
     """Contacts at g = 0 and ġ = 0 are left to their acceleration."""
-    evaluate(K, K.clock[NOW], K.q, K.y)
-    o_rate = K.n * K.n + K.n + 2 * K.n * K.n_rows + K.n_rows
+    evaluate(K, K.time, K.q, K.y)
+    o_rate = K.acc_rate
     for c in range(K.n_contacts):
         K.touched[c] = 0
         near = abs(K.guards0[c]) <= 1e-10 * gap_scale(K, c)
@@ -150,15 +146,15 @@ def mark_touching(K: Any) -> None:
             K.touched[c] = 1 if still else 0
 
 
-def capture_approach(K: Any) -> None:
+def capture_approach(K: Kernel) -> None:
     """Penalty contacts that close hold their approach speed, as an impact at the same instant leaves it."""
     for c in range(K.n_contacts):
         if K.closing[c] == 1 and K.kind[c] == 1 and K.anchor_start[c] < K.anchor_start[c + 1]:
-            evaluate(K, K.clock[NOW], K.q, K.y)
+            evaluate(K, K.time, K.q, K.y)
             capture(K, c)
 
 
-def bursts(K: Any, c: int) -> bool:
+def bursts(K: Kernel, c: int) -> bool:
     """Whether the force of a sliding contact changed its sign through a pole, not through zero."""
     for f in range(K.n_frictions):
         if K.friction_contact[f] == c and K.slip[f] != 0.0:
@@ -169,10 +165,10 @@ def bursts(K: Any, c: int) -> bool:
     return False
 
 
-def switch(K: Any) -> int:
+def switch(K: Kernel) -> int:
     """What the fired guard does to the closed contacts and the velocities; the state is at its instant."""
-    kind = K.fired[0]
-    index = K.fired[1]
+    kind = K.event_kind
+    index = K.event_index
     for c in range(K.n_contacts):
         K.closing[c] = 0
         K.active[c] = 0
@@ -205,7 +201,7 @@ def switch(K: Any) -> int:
         K.sticks[index] = 0
         K.slip[index] = 1.0 if K.lam[K.friction_row[index]] > 0.0 else -1.0
     elif kind == OPEN_PULL and bursts(K, index):
-        K.state[BLOCKED] = index
+        K.failure_index = index
         return NO_FORCE
     elif kind != CROSS and kind != WATCH:
         K.closed[index] = 0

@@ -9,16 +9,17 @@ from __future__ import annotations
 from typing import Any
 
 from mbd.kernel.candidate import adopt, stay
-from mbd.kernel.fields import NOW, PULL, ROWS
+from mbd.kernel.codes import PULL
 from mbd.kernel.guards import frictions_at, try_step, update_armed, update_sides, watch
 from mbd.kernel.hooks import scheme_resume
+from mbd.kernel.records import Kernel
 from mbd.kernel.restart import active_rows, consistent, evaluate, largest_force, stepping_rows
 from mbd.kernel.saddle import solve_rows
 
 __all__ = ["leave_pose", "look", "look_at_start", "put_on_rows", "take_over"]
 
 
-def project_velocity(K: Any, t: float, q: Any, y: Any, m: int, dropping: bool) -> int:
+def project_velocity(K: Kernel, t: float, q: Any, y: Any, m: int, dropping: bool) -> int:
     """The nearest velocities to y, in the metric of M, with B v + h_t = 0 on the m rows in K.rows.
 
     They may depend on each other where `dropping` finds out anew which do.
@@ -26,7 +27,7 @@ def project_velocity(K: Any, t: float, q: Any, y: Any, m: int, dropping: bool) -
     if m == 0:
         return 0
     evaluate(K, t, q, y)
-    o_rate = K.n * K.n + K.n + 2 * K.n * K.n_rows + K.n_rows
+    o_rate = K.acc_rate
     for i in range(K.n):
         K.force[i] = 0.0
     for k in range(K.n_rows):
@@ -38,9 +39,9 @@ def project_velocity(K: Any, t: float, q: Any, y: Any, m: int, dropping: bool) -
     return status
 
 
-def put_on_rows(K: Any, t1: float) -> None:
+def put_on_rows(K: Kernel, t1: float) -> None:
     """A candidate of index 3 with the velocities and guards that it has once it is taken over."""
-    if K.stabilized == 1 or K.scheme != 0 or K.state[ROWS] == 0:
+    if K.stabilized == 1 or K.scheme != 0 or K.n_active == 0:
         return
     if project_velocity(K, t1, K.q1, K.y1, stepping_rows(K), False) == 0:
         watch(K, t1, K.q1, K.y1, K.rate1, K.lam1, K.guards1)
@@ -48,7 +49,7 @@ def put_on_rows(K: Any, t1: float) -> None:
             K.limit[f] = K.guards1[frictions_at(K) + 2 * K.n_frictions + f]
 
 
-def look(K: Any, h: float, t1: float) -> int:
+def look(K: Kernel, h: float, t1: float) -> int:
     """A candidate at t1 = t + h as an event there would take it over."""
     status = try_step(K, h, t1)
     if status == 0:
@@ -56,13 +57,13 @@ def look(K: Any, h: float, t1: float) -> int:
     return status
 
 
-def look_at_start(K: Any) -> None:
+def look_at_start(K: Kernel) -> None:
     """The accepted state as the candidate of an event at the very start of the step."""
     stay(K)
-    put_on_rows(K, K.clock[NOW])
+    put_on_rows(K, K.time)
 
 
-def would_pull(K: Any) -> bool:
+def would_pull(K: Kernel) -> bool:
     """Whether a contact that pushes by the multipliers of the step pulls by those in K.impulse."""
     force = largest_force(K)
     for c in range(K.n_contacts):
@@ -72,21 +73,21 @@ def would_pull(K: Any) -> bool:
     return False
 
 
-def turns_to_pull(K: Any) -> bool:
+def turns_to_pull(K: Kernel) -> bool:
     """Whether a closed penalty contact that pushes with the velocities of the candidate pulls with those in K.y."""
     place = 2 * K.n_contacts
     looked = False
     for c in range(K.n_contacts):
         if K.kind[c] == 1 and K.closed[c] == 1 and K.opens[c] == 0 and K.guards0[place + c] >= 0.0:
             if not looked:
-                watch(K, K.clock[NOW], K.q, K.y, K.rate, K.lam, K.guards1)
+                watch(K, K.time, K.q, K.y, K.rate, K.lam, K.guards1)
                 looked = True
             if K.guards1[place + c] < 0.0:
                 return True
     return False
 
 
-def take_over(K: Any, t1: float) -> None:
+def take_over(K: Kernel, t1: float) -> None:
     """The candidate becomes the accepted state ahead of a restart, consistent in the old mode at every level.
 
     A shortened index-3 step leaves B v + h_t of the size of its error; it would survive a release, so it is removed.
@@ -107,20 +108,20 @@ def take_over(K: Any, t1: float) -> None:
             K.lam[k] = K.impulse[k]
 
 
-def leave_pose(K: Any, h: float) -> int:
+def leave_pose(K: Kernel, h: float) -> int:
     """Just beyond a pose in which rows lost rank: velocities on the rows again, rates and multipliers consistent.
 
     The scheme starts anew, but for the average of accelerations that it carries. The rows are those that were stepped
     with: which depend on which is judged too badly here.
     """
-    status = project_velocity(K, K.clock[NOW], K.q, K.y, stepping_rows(K), False)
+    status = project_velocity(K, K.time, K.q, K.y, stepping_rows(K), False)
     if status == 0:
-        status = consistent(K, K.clock[NOW], K.q, K.y)
+        status = consistent(K, K.time, K.q, K.y)
     if status != 0:
         return status
     status = scheme_resume(K, h)
     if K.n_watched > 0:
-        watch(K, K.clock[NOW], K.q, K.y, K.rate, K.lam, K.guards0)
+        watch(K, K.time, K.q, K.y, K.rate, K.lam, K.guards0)
         update_armed(K)
         update_sides(K)
     return status

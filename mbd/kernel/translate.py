@@ -16,7 +16,7 @@ from mbd.kernel.expressions import LLVM, Callee, Expressions, Function, join, ta
 
 __all__ = ["translate"]
 
-KINDS = {"int": "int", "float": "real", "bool": "bool", "None": "none"}
+KINDS = {"int": "int", "float": "real", "bool": "bool", "None": "none", "Integers": "ints", "Reals": "reals"}
 HEAD = """\
 declare double @pow(double, double) nounwind nobuiltin willreturn memory(none)
 declare double @llvm.sqrt.f64(double)
@@ -135,7 +135,7 @@ class _Body(Expressions):
             self.assign(target, value)
 
     def assign(self, target: ast.expr, value: tuple[str, str]) -> None:
-        if isinstance(target, ast.Subscript):
+        if isinstance(target, ast.Subscript | ast.Attribute):
             place, kind, what = self.element(target)
             self.store(self.cast(value, kind), place, kind, what)
         elif isinstance(target, ast.Name):
@@ -145,7 +145,7 @@ class _Body(Expressions):
             raise CapabilityError(f"{ast.unparse(target)!r} cannot be assigned")
 
     def _AugAssign(self, node: ast.AugAssign) -> None:
-        if isinstance(node.target, ast.Subscript):
+        if isinstance(node.target, ast.Subscript | ast.Attribute):
             place, kind, what = self.element(node.target)
             value = self.operation(node.op, (self.load(place, kind, what), kind), self.value(node.value))
             self.store(self.cast(value, kind), place, kind, what)

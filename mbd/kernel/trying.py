@@ -2,30 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
+from mbd.kernel.codes import GAINED, LAST, NOT_CONVERGED, NOT_FINITE, SINGULAR, STAGNATED, STIRRED, TOO_NEAR
 from mbd.kernel.control import controlled_step
-from mbd.kernel.fields import (
-    BASE,
-    GAINED,
-    GRID,
-    LAST,
-    NOT_CONVERGED,
-    NOT_FINITE,
-    NOW,
-    PAIRED,
-    RAISED,
-    ROWS,
-    SINGULAR,
-    STAGNATED,
-    STEP,
-    STIRRED,
-    STRAIGHT,
-    TOO_NEAR,
-    TRIED,
-    WIDTH,
-)
 from mbd.kernel.guards import try_step
+from mbd.kernel.records import Kernel
 from mbd.kernel.restart import consistent, lower_scales
 from mbd.kernel.singular.step_pairs import ALONE, FIRST, LONGER, SECOND, SHORTER, WHOLE, may_pair
 from mbd.kernel.singular.step_size import is_resolved, longest_over, step_by_pose, stirs
@@ -42,97 +22,97 @@ No power of it is a simple fraction, so that tries do not meet a pose that repea
 """
 
 
-def is_shortened(K: Any, status: int) -> bool:
+def is_shortened(K: Kernel, status: int) -> bool:
     """Whether a step that ended so is tried again with another size; an explicit one beyond its stability is not."""
     stalled = status == NOT_CONVERGED or status == STAGNATED or status == SINGULAR
     return stalled or status == TOO_NEAR or (status == GAINED and K.scheme != 1)
 
 
-def strays(K: Any, h: float) -> bool:
+def strays(K: Kernel, h: float) -> bool:
     """Whether forces that are not finite within a step are so for where it strayed to, not for the time of its end."""
-    return bool(consistent(K, K.clock[NOW] + h, K.q, K.y) == 0)
+    return bool(consistent(K, K.time + h, K.q, K.y) == 0)
 
 
-def judged_step(K: Any, h: float, t1: float) -> int:
+def judged_step(K: Kernel, h: float, t1: float) -> int:
     """A candidate at t1 = t + h that may be a continuation of the motion."""
     status = try_step(K, h, t1)
     return judge_change(K, h, t1) if status == 0 else status
 
 
-def step_end(K: Any) -> float:
+def step_end(K: Kernel) -> float:
     """Where the next step of the grid ends; the second of a pair has its own size."""
-    if K.state[PAIRED] == SECOND:
-        return float(K.clock[NOW] + LONGER * K.clock[STEP])
-    return float(K.clock[BASE] + (K.state[GRID] + 1) * K.clock[STEP])
+    if K.paired_step == SECOND:
+        return float(K.time + LONGER * K.step)
+    return float(K.grid_start + (K.grid_steps + 1) * K.step)
 
 
-def part_end(K: Any, on_grid: float) -> float:
+def part_end(K: Kernel, on_grid: float) -> float:
     """Where the next step ends: on the grid, or after the part of a step in which a guard may have fired."""
-    if K.state[STRAIGHT] == 1:
-        near = K.clock[NOW] + K.clock[WIDTH]
-        if near < on_grid - 1e-6 * K.clock[WIDTH]:
+    if K.in_substeps == 1:
+        near = K.time + K.substep
+        if near < on_grid - 1e-6 * K.substep:
             return float(near)
     return on_grid
 
 
-def tried_step(K: Any, h: float, t1: float) -> int:
-    """A candidate at t1, or earlier where Newton's method or the allowed error asks for it; K.clock[TRIED] its step.
+def tried_step(K: Kernel, h: float, t1: float) -> int:
+    """A candidate at t1, or earlier where Newton's method or the allowed error asks for it; K.step_taken its step.
 
     A pose in which rows lose rank is stepped over by a pair of steps, or a shortened one; stiff places get smaller.
     """
-    if K.state[RAISED] == 1:
+    if K.scales_raised == 1:
         lower_scales(K)
     if K.adaptive == 1:
         return controlled_step(K, h)
-    if K.state[PAIRED] == FIRST or K.state[PAIRED] == ALONE:  # the step is taken once more
-        K.state[PAIRED] = 0
+    if K.paired_step == FIRST or K.paired_step == ALONE:  # the step is taken once more
+        K.paired_step = 0
     full = h
-    step = K.clock[STEP]
-    if K.scheme != 0 and K.state[ROWS] > 0:
+    step = K.step
+    if K.scheme != 0 and K.n_active > 0:
         status = step_past_pose(K, h)
-        h = K.clock[TRIED]
+        h = K.step_taken
         if status == LAST or status == STIRRED:
             return status
         full = h
     else:
         status = judged_step(K, h, t1)
     if status == TOO_NEAR and may_pair(K, h):
-        if K.clock[NOW] + (SHORTER + LONGER) * step < K.until - WHOLE * step:
+        if K.time + (SHORTER + LONGER) * step < K.until - WHOLE * step:
             h = SHORTER * step
             full = h
-            K.state[PAIRED] = FIRST
-            status = judged_step(K, h, K.clock[NOW] + h)
+            K.paired_step = FIRST
+            status = judged_step(K, h, K.time + h)
         elif K.until >= K.end:
             return LAST
     while h > SHORTEST * full and (is_shortened(K, status) or (status == NOT_FINITE and strays(K, h))):
         h *= SHORTENING
-        status = judged_step(K, h, K.clock[NOW] + h)
-    if h < full and (K.state[PAIRED] == FIRST or K.state[PAIRED] == ALONE):
-        K.state[PAIRED] = 0
-    K.clock[TRIED] = h
+        status = judged_step(K, h, K.time + h)
+    if h < full and (K.paired_step == FIRST or K.paired_step == ALONE):
+        K.paired_step = 0
+    K.step_taken = h
     return status
 
 
-def step_past_pose(K: Any, unit: float) -> int:
-    """A candidate of a scheme of several stages after a step of this size, or another near a pose: K.clock[TRIED].
+def step_past_pose(K: Kernel, unit: float) -> int:
+    """A candidate of a scheme of several stages after a step of this size, or another near a pose: K.step_taken.
 
     A step over the pose that is longer than others must be resolved like these; else they lead up to it.
     """
     h = step_by_pose(K, unit, longest_over(K))
     if h > unit:
-        if K.clock[NOW] + h > K.until - WHOLE * unit:
+        if K.time + h > K.until - WHOLE * unit:
             if K.until >= K.end:
                 return LAST
             h = step_by_pose(K, unit, 1.0)
         else:
-            status = judged_step(K, h, K.clock[NOW] + h)
-            K.clock[TRIED] = h
-            K.state[PAIRED] = ALONE
+            status = judged_step(K, h, K.time + h)
+            K.step_taken = h
+            K.paired_step = ALONE
             if status == 0 and is_resolved(K, h):
                 return status
             h = step_by_pose(K, unit, 1.0)
-    K.clock[TRIED] = h
-    K.state[PAIRED] = ALONE if h != unit else 0
+    K.step_taken = h
+    K.paired_step = ALONE if h != unit else 0
     if stirs(K, h):
         return STIRRED
-    return judged_step(K, h, K.clock[NOW] + h)
+    return judged_step(K, h, K.time + h)

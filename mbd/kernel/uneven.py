@@ -9,12 +9,10 @@ the factor that elimination has lost, so one or two suffice. Where nothing is lo
 
 from __future__ import annotations
 
-from typing import Any
-
-from mbd.kernel.fields import MODE, RESIDUALS
 from mbd.kernel.hooks import call
 from mbd.kernel.linear import solve_again, solve_definite
 from mbd.kernel.ordered import order_at, solve_kkt
+from mbd.kernel.records import Kernel
 
 __all__ = ["LOSS", "polish_with_rows", "polish_rates", "is_uneven"]
 
@@ -24,7 +22,7 @@ GREAT_LOSS = 1e-8
 """The same below which they are corrected twice [-]."""
 
 
-def is_uneven(K: Any, m: int) -> bool:
+def is_uneven(K: Kernel, m: int) -> bool:
     """Whether a pivot of M, which is in K.acc, is far below the largest diagonal entry of its unit; with m active rows.
 
     Where M is singular its diagonal entries are compared.
@@ -52,7 +50,7 @@ def is_uneven(K: Any, m: int) -> bool:
     return False
 
 
-def polish_rates(K: Any, kept: float) -> None:
+def polish_rates(K: Kernel, kept: float) -> None:
     """K.jump corrected by the balance at the state in the block; pivots of the factors in K.acc keep `kept`."""
     n = K.n
     for _ in range(2 if kept < GREAT_LOSS else 1):
@@ -64,11 +62,11 @@ def polish_rates(K: Any, kept: float) -> None:
             K.jump[i] += K.rhs[i]
 
 
-def polish_with_rows(K: Any, m: int) -> None:
+def polish_with_rows(K: Kernel, m: int) -> None:
     """The same of K.jump and of K.impulse for the m rows in K.rows, with the factors of `[M R; B 0]` in K.kkt."""
     n = K.n
-    o_B = n * n + n + n * K.n_rows
-    o_bias = o_B + n * K.n_rows + 2 * K.n_rows
+    o_B = K.acc_B
+    o_bias = K.acc_bias
     for k in range(K.n_rows):
         K.block[K.o_lam + k] = K.impulse[k]
     find_imbalance(K)
@@ -87,9 +85,9 @@ def polish_with_rows(K: Any, m: int) -> None:
         K.impulse[K.rows[k]] += K.rhs[n + k]
 
 
-def find_imbalance(K: Any) -> None:
+def find_imbalance(K: Kernel) -> None:
     """r of the mode at the state in the block, with the rates in K.jump, into K.out."""
     for i in range(K.n):
         K.block[K.o_a + i] = K.jump[i]
-    call(K, K.mode_code[4 * K.state[MODE] + 1], K.out)
-    K.counts[RESIDUALS] += 1
+    call(K, K.mode_code[4 * K.mode_id + 1], K.out)
+    K.n_residuals += 1

@@ -13,28 +13,11 @@ rate. Where that is large, accelerations are asked for again, by two tests that 
 
 from __future__ import annotations
 
-from typing import Any
-
 from mbd.kernel.candidate import carry
-from mbd.kernel.fields import (
-    BLOCKED,
-    COARSE_FROM,
-    COARSENED,
-    COARSEST,
-    COARSEST_AT,
-    COMPOSE,
-    GAINED,
-    GROWN,
-    LEAPT,
-    N_DROPPED,
-    NEAR,
-    NOT_FINITE,
-    NOW,
-    OUTGROWN,
-    STEP,
-)
+from mbd.kernel.codes import COMPOSE, GAINED, LEAPT, NOT_FINITE, OUTGROWN
 from mbd.kernel.hooks import call, scheme_error
 from mbd.kernel.poles import leaps
+from mbd.kernel.records import Kernel
 from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import compose, consistent, evaluate, fill_block
 
@@ -62,21 +45,21 @@ FEWEST = 1.0 / 4096.0
 """Least part of D that is tried where accelerations are not finite at its other end [-]."""
 
 
-def judge_change(K: Any, h: float, t1: float) -> int:
+def judge_change(K: Kernel, h: float, t1: float) -> int:
     """0 where the candidate may be a continuation of the motion, OUTGROWN, GAINED or LEAPT where it cannot."""
-    stretch = max(1.0, K.clock[STEP] / h)
+    stretch = max(1.0, K.step / h)
     if K.scheme == 0 and changes_little(K, h, stretch):
         return 0
     worst = largest_share(K, h, stretch)
     allowed = LOOK_TWICE
     if K.scheme != 0:
         allowed = LOOK_TWICE_EIGHT if K.scheme == 1 else LOOK_TWICE_FIVE
-    if (worst <= LOOK_TWICE and not bends(K, h)) or K.state[NEAR] > 0 or sharing(K):
+    if (worst <= LOOK_TWICE and not bends(K, h)) or K.near_singular > 0 or sharing(K):
         return 0
     return look_closer(K, h, t1, stretch, worst > allowed)
 
 
-def changes_little(K: Any, h: float, stretch: float) -> bool:
+def changes_little(K: Kernel, h: float, stretch: float) -> bool:
     """Whether the errors of all rates are small beside a part of the fastest one, and none `bends`: in most steps."""
     largest = 0.0
     most = 0.0
@@ -92,8 +75,8 @@ def changes_little(K: Any, h: float, stretch: float) -> bool:
     return bool(small and h * most <= BENT * max(K.rest_speed, fastest))
 
 
-def bends(K: Any, h: float) -> bool:
-    """Whether accelerations change so much that a pole may lie between, even if so foretold; K.state[BLOCKED] whose."""
+def bends(K: Kernel, h: float) -> bool:
+    """Whether accelerations change so much that a pole may lie between, even if so foretold; K.failure_index whose."""
     most = 0.0
     fastest = 0.0
     who = 0
@@ -103,15 +86,15 @@ def bends(K: Any, h: float) -> bool:
             who = i
         fastest = max(fastest, abs(K.y1[i]))
     if h * most > BENT * max(K.rest_speed, fastest):
-        K.state[BLOCKED] = who
+        K.failure_index = who
         return True
     return False
 
 
-def look_closer(K: Any, h: float, t1: float, stretch: float, rough_enough: bool) -> int:
+def look_closer(K: Kernel, h: float, t1: float, stretch: float, rough_enough: bool) -> int:
     """The same of a candidate that a glance does not clear, which is left as it was; if not rough, `leaps` alone."""
-    rough = K.detail[1]
-    blocked = K.state[BLOCKED]
+    rough = K.failure_size
+    blocked = K.failure_index
     at_y = carry(K.q1, K.inside, 0, K.n_q, True)
     at_D = carry(K.y1, K.inside, at_y, K.n, True)
     status = 0
@@ -127,7 +110,7 @@ def look_closer(K: Any, h: float, t1: float, stretch: float, rough_enough: bool)
             note_coarse(K, t1, rough)
     carry(K.q1, K.inside, 0, K.n_q, False)
     carry(K.y1, K.inside, at_y, K.n, False)
-    if K.state[N_DROPPED] > 0:
+    if K.n_dropped > 0:
         evaluate(K, t1, K.q1, K.y1)
     fill_block(K, t1, K.q1, K.y1)
     for i in range(K.n):
@@ -135,13 +118,13 @@ def look_closer(K: Any, h: float, t1: float, stretch: float, rough_enough: bool)
     for k in range(K.n_rows):
         K.block[K.o_lam + k] = K.lam1[k]
     if status != 0:
-        K.state[BLOCKED] = blocked
-        K.detail[0] = t1
-        K.detail[2] = h
+        K.failure_index = blocked
+        K.failure_time = t1
+        K.failure_step = h
     return status
 
 
-def lag(K: Any, h: float, at_y: int) -> float:
+def lag(K: Kernel, h: float, at_y: int) -> float:
     """Largest part of a rate by which it misses ``h (a₀ + a₁)/2``, as the auxiliary a of the scheme lags behind v̇ [-].
 
     A scheme with strong numerical damping carries the a of a steep start on for some steps.
@@ -159,21 +142,21 @@ def lag(K: Any, h: float, at_y: int) -> float:
     return worst
 
 
-def note_coarse(K: Any, t1: float, rough: float) -> None:
+def note_coarse(K: Kernel, t1: float, rough: float) -> None:
     """Count a step to t1 that forces changed within, once however often it is tried, for a note of the run."""
-    if K.counts[COARSENED] > 0 and K.detail[COARSE_FROM] == K.clock[NOW]:
+    if K.n_coarse > 0 and K.coarse_start == K.time:
         return
-    K.counts[COARSENED] += 1
-    K.detail[COARSE_FROM] = K.clock[NOW]
-    if K.counts[COARSENED] == 1 or rough > K.detail[COARSEST]:
-        K.detail[COARSEST] = rough
-        K.detail[COARSEST_AT] = t1
+    K.n_coarse += 1
+    K.coarse_start = K.time
+    if K.n_coarse == 1 or rough > K.coarsest_change:
+        K.coarsest_change = rough
+        K.coarsest_end = t1
 
 
-def largest_share(K: Any, h: float, stretch: float) -> float:
-    """Largest estimated error of a rate over that rate, as it were after a whole step; in K.detail[1] after this one.
+def largest_share(K: Kernel, h: float, stretch: float) -> float:
+    """Largest estimated error of a rate over that rate, as if after a whole step; in K.failure_size after this one.
 
-    K.state[BLOCKED] tells which. Rates below the rest speed count as that, those far below the fastest as a part of it.
+    K.failure_index tells which. Rates below the rest speed count as that, those far below the fastest as a part of it.
     """
     fastest = 0.0
     for i in range(K.n_v):
@@ -195,12 +178,12 @@ def largest_share(K: Any, h: float, stretch: float) -> float:
             worst = share
             who = i
     if worst * cube > LOOK_TWICE:
-        K.state[BLOCKED] = who
-        K.detail[1] = worst
+        K.failure_index = who
+        K.failure_size = worst
     return worst * cube
 
 
-def outgrows(K: Any, h: float, t1: float, stretch: float, at_y: int, at_D: int) -> bool:
+def outgrows(K: Kernel, h: float, t1: float, stretch: float, at_y: int, at_D: int) -> bool:
     """Whether the change that was not foretold feeds itself by more than `GROWTH`; (q₁, y₁) are in K.inside."""
     n = K.n
     if consistent(K, t1, K.q1, K.y1) != 0:
@@ -224,13 +207,13 @@ def outgrows(K: Any, h: float, t1: float, stretch: float, at_y: int, at_D: int) 
         if consistent(K, t1, K.q1, K.y1) == 0:
             moved = growth_between(K, h, stretch, part, at_D, 0, K.n_v)
             states = growth_between(K, h, stretch, part, at_D, K.n_v, n)
-            K.detail[GROWN] = max(moved, states)
+            K.unforeseen_change = max(moved, states)
             return max(moved, states) > resolved_growth(K)
         part *= 0.0625
     return False
 
 
-def resolved_growth(K: Any) -> float:
+def resolved_growth(K: Kernel) -> float:
     """`GROWTH`, less where the error of the scheme is larger than that of the trapezoidal rule."""
     if K.scheme != 0:
         return GROWTH
@@ -238,7 +221,7 @@ def resolved_growth(K: Any) -> float:
     return GROWTH * TRAPEZOID / error if error > TRAPEZOID else GROWTH
 
 
-def growth_between(K: Any, h: float, stretch: float, part: float, at_D: int, first: int, last: int) -> float:
+def growth_between(K: Kernel, h: float, stretch: float, part: float, at_D: int, first: int, last: int) -> float:
     """ζ of the module's text over some components, over a whole step; K.trial_jump has a(y₁), K.jump a(y₁ − part D)."""
     fed = 0.0
     size = 0.0
@@ -252,7 +235,7 @@ def growth_between(K: Any, h: float, stretch: float, part: float, at_D: int, fir
     return float(h * stretch * fed / (part * size))
 
 
-def gains(K: Any, h: float, t1: float, at_y: int) -> bool:
+def gains(K: Kernel, h: float, t1: float, at_y: int) -> bool:
     """Whether more than half of the kinetic energy at the end is neither old nor work of forces along the way.
 
     Forces may change with time at any instant of the step: of those of its start and of its end the larger work counts.
@@ -261,7 +244,7 @@ def gains(K: Any, h: float, t1: float, at_y: int) -> bool:
     new = 0.0
     most = 0.0
     for turn in range(2):
-        t = K.clock[NOW] if turn == 0 else t1
+        t = K.time if turn == 0 else t1
         work = 0.0
         for node in range(5):  # Lobatto's formula
             s = 0.5

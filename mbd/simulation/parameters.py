@@ -14,7 +14,6 @@ from mbd.assembly.posture import Posture
 from mbd.assembly.trivial_rows import trivial_rows
 from mbd.compile.mechanism import Mechanism
 from mbd.errors import ModelError, SimulationError
-from mbd.kernel import fields as F
 from mbd.simulation.run.data import RunData
 from mbd.tape.derivatives import live
 from mbd.tape.node import Node
@@ -31,7 +30,7 @@ def change_parameters(run: RunData, values: Mapping[str, float], what: str) -> N
         for values with which the mechanism cannot go on; it keeps those that it has. `what` gives them.
     """
     equations = run.mechanism.equations
-    present = {parameter.name: v for parameter, v in zip(equations.parameters, run.values["params"], strict=False)}
+    present = {parameter.name: v for parameter, v in zip(equations.parameters, run.kernel.params, strict=False)}
     if all(present.get(name) == value for name, value in values.items()):
         return
     faults = parameter_faults(run, values)
@@ -40,8 +39,8 @@ def change_parameters(run: RunData, values: Mapping[str, float], what: str) -> N
         raise SimulationError(f"{what} sets {given}, which cannot be: {'; '.join(faults)}")
     run.stepper.keep_row()
     run.set_parameters({**run.changed, **values})
-    run.parameter_changes.append((run.stored + int(run.values["state"][F.STORED]), run.values["params"].copy()))
-    run.values["state"][F.RESTART] = 1
+    run.parameter_changes.append((run.stored + int(run.kernel.n_stored), run.kernel.params.copy()))
+    run.kernel.restart_due = 1
 
 
 def parameter_faults(run: RunData, values: Mapping[str, float]) -> list[str]:
@@ -59,9 +58,9 @@ def parameter_faults(run: RunData, values: Mapping[str, float]) -> list[str]:
         return found
     parameters = mechanism.parameters(changed, run.model.parameters)
     if inert:
-        v = run.values
-        q, y, anchors = v["q"][: v["n_q"]].copy(), v["y"][: v["n"]].copy(), np.array(v["anchors"])
-        flags = v["closed"][: v["n_contacts"]]
+        v = run.kernel
+        q, y, anchors = v.q[: v.n_q].copy(), v.y[: v.n].copy(), np.array(v.anchors)
+        flags = v.closed[: v.n_contacts]
         found = undetermined(Posture(mechanism, run.manager, parameters, q, y, flags, anchors, time=run.now))
     if not found and binding:
         found = violations_now(run, residuals_now(run, parameters), residuals_now(run)[:2])
@@ -95,14 +94,14 @@ def _no_longer_trivial(run: RunData, parameters: Vector) -> list[str]:
 
 def residuals_now(run: RunData, parameters: Vector | None = None) -> NDArray[np.float64]:
     """Residuals (`mbd.assembly.consistency`) of the accepted state, with other values of parameters if given."""
-    v = run.values
-    q, y, anchors = v["q"][: v["n_q"]], v["y"][: v["n"]], v["anchors"][: v["n_anchors"]]
-    return residuals(run.mechanism, run.now, q, y, v["params"] if parameters is None else parameters, anchors)
+    v = run.kernel
+    q, y, anchors = v.q[: v.n_q], v.y[: v.n], v.anchors[: v.n_anchors]
+    return residuals(run.mechanism, run.now, q, y, v.params if parameters is None else parameters, anchors)
 
 
 def violations_now(run: RunData, found: NDArray[np.float64], usual: NDArray[np.float64] | None = None) -> list[str]:
     """`mbd.assembly.consistency.violations` of the rows that are active now."""
-    v = run.values
-    active = run.manager.active_rows(v["closed"][: v["n_contacts"]])
-    speed = float(np.max(np.abs(v["y"][: v["n_v"]]), initial=0.0))
+    v = run.kernel
+    active = run.manager.active_rows(v.closed[: v.n_contacts])
+    speed = float(np.max(np.abs(v.y[: v.n_v]), initial=0.0))
     return violations(run.mechanism.equations.rows, active, found, speed, usual)

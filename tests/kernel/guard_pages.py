@@ -20,7 +20,7 @@ from dataclasses import replace
 import numpy as np
 
 import mbd
-from mbd.kernel import fields as F
+from mbd.kernel.records import TABLE
 from mbd.simulation.run import run, stepper
 from mbd.simulation.run.stepper import Stepper
 from mbd.testing.wild import wild_scene
@@ -53,7 +53,8 @@ def guard_every_call(at_end: bool, short: str = "") -> None:
     advance = Stepper._advance_compiled
 
     def guarded(self: Stepper) -> int:
-        own = {name: self.values[name] for name in (*F.REAL_ARRAYS, *F.INTEGER_ARRAYS) if name != "shift1"}
+        arrays = (*TABLE.real_arrays, *TABLE.integer_arrays)
+        own = {name: getattr(self.kernel, name) for name in arrays if name != "shift1"}
         own = {name: array[: array.size - (name == short)] for name, array in own.items()}
         pages = self.__dict__.setdefault("pages", {})
         for name, array in own.items():
@@ -61,15 +62,15 @@ def guard_every_call(at_end: bool, short: str = "") -> None:
                 pages[name] = between_guards(array, at_end)
             pages[name][:] = array
         pages["shift1"] = pages["block"][self.mechanism.layout.shift :]  # as it is outside
-        unguarded = dict(self.values)
-        self.values.update(pages)
+        unguarded = dict(vars(self.kernel))
+        vars(self.kernel).update(pages)
         self._table = None
         try:
             return advance(self)
         finally:
             for name, array in own.items():
                 array[:] = pages[name]
-            self.values.update({name: unguarded[name] for name in pages})
+            vars(self.kernel).update({name: unguarded[name] for name in pages})
 
     Stepper._advance_compiled = guarded  # type: ignore[method-assign]
 

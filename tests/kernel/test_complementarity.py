@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
 import mbd
-from mbd.kernel import fields as F
+from mbd.kernel import codes
 from mbd.kernel.complementarity import complementarity
+from mbd.kernel.records import TABLE, Kernel
 
 
-class Scene(SimpleNamespace):
+class Scene(Kernel):
     """`n` bodies' coordinates with contacts, each of a normal row, and with friction a tangent row after it."""
 
 
@@ -49,13 +48,13 @@ def scene(M, normals, tangents, mu, velocity, closed=None):
         parting=np.zeros(contacts, dtype=int), free=np.ones(contacts, dtype=int), normal=normal,
         friction_row=friction_row, friction_contact=np.arange(max(contacts, 1)), row_contact=row_contact,
         row_normal=is_normal, row_friction=row_friction, rows=np.zeros(rows, dtype=int),
-        dropped=np.zeros(rows, dtype=int), state=np.zeros(16, dtype=int), counts=np.zeros(16, dtype=int),
-        detail=np.zeros(8), hooks=None, strategy=0, past=np.zeros(rows), past_limit=np.zeros(max(frictions, 1)),
+        dropped=np.zeros(rows, dtype=int), state=np.zeros(24, dtype=int), counts=np.zeros(24, dtype=int),
+        detail=np.zeros(12), hooks=None, strategy=0, past=np.zeros(rows), past_limit=np.zeros(max(frictions, 1)),
     )  # fmt: skip
 
-    for name in F.REAL_ARRAYS + F.INTEGER_ARRAYS:  # what does not matter here
-        if not hasattr(K, name):
-            setattr(K, name, np.zeros(4 * size * size, dtype=float if name in F.REAL_ARRAYS else int))
+    for name in TABLE.real_arrays + TABLE.integer_arrays:  # what does not matter here
+        if name not in vars(K):
+            setattr(K, name, np.zeros(4 * size * size, dtype=float if name in TABLE.real_arrays else int))
 
     def accelerations(block, params, out):
         """M | f | ∂r/∂λ | B | h | ḣ | γ | captured | T | limits, of friction μ p that slides."""
@@ -77,7 +76,7 @@ def scene(M, normals, tangents, mu, velocity, closed=None):
             ]
         )
 
-    K.code = {F.ACCELERATIONS: accelerations}
+    K.code = {codes.ACCELERATIONS: accelerations}
     accelerations(K.block, None, K.acc)
     return K, B
 
@@ -144,7 +143,7 @@ def test_contacts_with_friction_obey_coulombs_law(seed, contacts, mu):
     velocity = rng.normal(size=n)
     K, B = scene(M, normals, tangents, mu, velocity)
     status = complementarity(K, 1)
-    assert status in (0, F.NO_IMPACT)
+    assert status in (0, codes.NO_IMPACT)
     if status == 0:
         check(K, B, M, mu, velocity)
     else:  # no answer may be given up that is there
@@ -192,7 +191,7 @@ def test_where_no_set_of_branches_holds_it_says_so():
     normal, tangent = np.array([[0.1, 1.0]]), np.array([[1.0, 0.0]])
     K, _ = scene(np.eye(2), normal, tangent, 50.0, np.array([-3.0, -1.0]))
     K.loose[0], K.sticks[0], K.slip[0] = 0, 0, 1.0
-    assert complementarity(K, 1) == F.NO_IMPACT
+    assert complementarity(K, 1) == codes.NO_IMPACT
     K, B = scene(np.eye(2), normal, tangent, 50.0, np.array([-3.0, -1.0]))
     assert complementarity(K, 1) == 0, "free to choose, it sticks"
     check(K, B, np.eye(2), 50.0, np.array([-3.0, -1.0]))

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from mbd.kernel import fields as F
+from mbd.kernel.records import TABLE
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="pages are protected with mprotect")
 QUICK = [shape + 120 * k for k, shape in enumerate(range(0, 120, 8))]
@@ -36,5 +36,5 @@ def test_no_array_of_the_kernel_is_left_in_many_scenes(place, part):
 
 @pytest.mark.parametrize("short", ["rhs", "sticks"])
 def test_an_index_one_too_far_is_caught(short):
-    assert short in (*F.REAL_ARRAYS, *F.INTEGER_ARRAYS)
+    assert short in (*TABLE.real_arrays, *TABLE.integer_arrays)
     assert between_pages("end", short, []).returncode == -signal.SIGSEGV

@@ -13,7 +13,7 @@ def test_no_two_modules_of_the_kernel_share_a_name():
     owners = defaultdict(set)
     for module in MODULES:
         source = import_module(f"mbd.kernel.{module}")
-        imported = {name for name in vars(import_module("mbd.kernel.fields")) if name.isupper()}
+        imported = {name for name in vars(import_module("mbd.kernel.codes")) if name.isupper()}
         for name, value in vars(source).items():
             own = isinstance(value, FunctionType) and value.__module__ == source.__name__
             number = name.isupper() and name not in imported and isinstance(value, int | float)

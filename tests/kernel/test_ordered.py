@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
@@ -12,7 +10,6 @@ import mbd
 from mbd.compile import orders
 from mbd.compile.mechanisms import mechanism_of
 from mbd.compile.orders import flat_order
-from mbd.kernel.fields import MODE, ORDERED
 from mbd.kernel.ordered import (
     LOSS_AT_ONCE,
     LOSS_OF_STEP,
@@ -24,6 +21,7 @@ from mbd.kernel.ordered import (
     solve_kkt,
     weakest_pivot,
 )  # fmt: skip
+from mbd.kernel.records import Kernel
 from mbd.tape.ordering import Order, order
 from tests.simulation.singular import four_bars
 
@@ -48,10 +46,9 @@ def kernel(A, n, m):
     rows = list(range(1, n_rows, 2))
     places = {(int(i), int(j)) for i, j in np.argwhere(A != 0.0)}
     flat = flat_order(order(places, set(), n, size), n, n_rows, rows)
-    state = np.zeros(24, dtype=np.int64)
-    state[MODE] = 0
-    return SimpleNamespace(
-        n=n, state=state, mode_count=np.array([1]), mode_order=np.array([1]), orders=np.append(0, flat),
+    return Kernel(
+        n=n, state=np.zeros(24, dtype=np.int64), mode_count=np.array([1]), mode_order=np.array([1]),
+        orders=np.append(0, flat),
         rows=np.array([*rows, 0]), kkt=np.zeros(size * size), spare=np.full(2 * size * size + size, np.nan),
         pivots=np.zeros(size, dtype=np.int64),
     )  # fmt: skip
@@ -118,7 +115,7 @@ def test_rows_that_nearly_depend_on_each_other_are_not_sound(n, seed, apart):
     A = matrix(M, B.T, B)
     K = kernel(A, n, 3)
     assert not factor_ordered(K, A.ravel(), 1, OF_TANGENT, LOSS_OF_STEP)
-    assert K.state[ORDERED] == 0
+    assert K.order_start == 0
 
 
 @pytest.mark.parametrize("wrong", [0.0, np.nan, np.inf])

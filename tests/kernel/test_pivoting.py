@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from mbd.kernel import complementarity as solver, fields as F, pivoting
+from mbd.kernel import codes, complementarity as solver, pivoting
 from mbd.kernel.complementarity import complementarity
 from mbd.kernel.lemke import lemke_places
+from mbd.kernel.records import TABLE, Kernel
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -45,14 +46,14 @@ class Problem:
     def _kernel(self, contact, normal, friction):
         n, rows, contacts, frictions = self.n, len(self.B), self.contacts, len(self.who)
         size, unknowns, most = n + rows, contacts + 3 * frictions, 64
-        values = dict.fromkeys(F.INTEGERS, 0) | dict.fromkeys(F.REALS, 0.0)
-        values |= {name: np.zeros(most * most) for name in F.REAL_ARRAYS}
-        values |= {name: np.zeros(most * most, dtype=np.int64) for name in F.INTEGER_ARRAYS}
+        values = dict.fromkeys(TABLE.integers, 0) | dict.fromkeys(TABLE.reals, 0.0)
+        values |= {name: np.zeros(most * most) for name in TABLE.real_arrays}
+        values |= {name: np.zeros(most * most, dtype=np.int64) for name in TABLE.integer_arrays}
         values |= {"n_v": n, "n": n, "n_rows": rows, "n_contacts": contacts, "n_frictions": frictions}
         values |= {"o_lam": 0, "o_slip": rows, "code": [self.evaluate], "hooks": None}
         values["lcp_work"] = np.zeros(lemke_places(max(unknowns, 1)))
         values["kkt"], values["scale"] = np.zeros(size * size), np.ones(most * most)
-        K = F.Kernel(**{name: values[name] for name in F.FIELDS})
+        K = Kernel(**values)
         K.row_contact[:rows], K.row_normal[:rows], K.row_friction[:rows] = contact, normal, friction
         K.normal[:contacts] = self.places
         for f, (row, c, _) in enumerate(self.who):
@@ -228,7 +229,7 @@ def test_a_vice_has_no_solution_and_says_so():
     """Two walls that come together: neither Lemke's method nor trying every set finds forces."""
     problem = Problem(np.eye(2), np.zeros(2), N=[[1, 0], [-1, 0]], mu=[0.0, 0.0], bias=[-1.0, -1.0])
     assert pivots(problem) == 0
-    assert problem.solve() in (F.NO_IMPACT, F.CONFLICT)
+    assert problem.solve() in (codes.NO_IMPACT, codes.CONFLICT)
 
 
 def test_masses_that_only_contacts_determine_are_left_to_the_other_methods():
@@ -246,7 +247,7 @@ def test_tangents_without_limit_and_friction_that_follows_a_pin_are_left_to_the_
     sticking.check()
     pin = Problem(np.eye(2), [0.3, 1.0], N=[[0, 1]], T=[[1, 0]], mu=[0.1])
     assert pivots(pin) == 1
-    assert pivoting.pivoted(pin.K._replace(loaded=1), 0) == 0
+    assert pivoting.pivoted(Kernel(**vars(pin.K) | {"loaded": 1}), 0) == 0
 
 
 def test_nothing_to_choose_is_nothing_found():

@@ -7,16 +7,16 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from mbd.kernel import fields as F
-from mbd.simulation.run.call_table import PLACES, CallTable
+from mbd.kernel.records import TABLE, Kernel
+from mbd.simulation.run.call_table import ARRAYS, PLACES, CallTable
 
 
 def filled():
-    values = {name: k for k, name in enumerate((*F.INTEGERS, "hooks"))}
-    values |= {name: 0.1 * k for k, name in enumerate(F.REALS)}
-    values |= {name: np.zeros(3) for name in F.REAL_ARRAYS}
-    values |= {name: np.zeros(3, dtype=np.int64) for name in F.INTEGER_ARRAYS}
-    return values
+    values = {name: k for k, name in enumerate(TABLE.integers)}
+    values |= {name: 0.1 * k for k, name in enumerate(TABLE.reals)}
+    values |= {name: np.zeros(3) for name in TABLE.real_arrays}
+    values |= {name: np.zeros(3, dtype=np.int64) for name in TABLE.integer_arrays}
+    return Kernel(**values)
 
 
 def words(table):
@@ -26,21 +26,21 @@ def words(table):
 def test_the_table_holds_numbers_as_bits_and_arrays_as_addresses():
     values = filled()
     table = words(CallTable([SimpleNamespace(address=77), None], values, {}))
-    assert table[PLACES["n_q"]] == values["n_q"]
-    assert struct.pack("q", table[PLACES["dt"]]) == struct.pack("d", values["dt"])
-    assert all(table[PLACES[name]] == values[name].ctypes.data for name in (*F.REAL_ARRAYS, *F.INTEGER_ARRAYS))
+    assert table[PLACES["n_q"]] == values.n_q
+    assert struct.pack("q", table[PLACES["dt"]]) == struct.pack("d", values.dt)
+    assert all(table[PLACES[name]] == vars(values)[name].ctypes.data for name in ARRAYS)
 
 
 def test_an_array_that_takes_the_place_of_another_is_found():
     """Also one that took it after its address was noted, before the table was made."""
     values = filled()
-    known = {"q": (values["q"], values["q"].ctypes.data), "y": (np.zeros(3), 123456)}
+    known = {"q": (values.q, values.q.ctypes.data), "y": (np.zeros(3), 123456)}
     table = CallTable([], values, known)
-    assert words(table)[PLACES["y"]] == values["y"].ctypes.data
-    values["mode_key"] = np.zeros(9, dtype=np.int64)
+    assert words(table)[PLACES["y"]] == values.y.ctypes.data
+    values.mode_key = np.zeros(9, dtype=np.int64)
     table.fill([], values)
-    assert words(table)[PLACES["mode_key"]] == values["mode_key"].ctypes.data
-    assert words(table)[PLACES["q"]] == values["q"].ctypes.data
+    assert words(table)[PLACES["mode_key"]] == values.mode_key.ctypes.data
+    assert words(table)[PLACES["q"]] == values.q.ctypes.data
 
 
 def test_functions_that_are_added_are_found():

@@ -9,7 +9,7 @@ import pytest
 
 import mbd
 from mbd.kernel import events as kernel_events
-from mbd.kernel.fields import NO_IMPACT, NOW
+from mbd.kernel.codes import NO_IMPACT
 from tests.simulation.mechanisms import G
 
 DT = 2e-3
@@ -141,9 +141,7 @@ def test_who_forces_located_instants_after_the_crowd_gets_them():
 def test_where_no_impulses_are_found_the_run_goes_on_from_before_that_blow(monkeypatch):
     """A failure put in by hand from 0.5 s on, in the plain twin, while two more balls lie on the floor."""
     found = kernel_events.switch
-    monkeypatch.setattr(
-        kernel_events, "switch", lambda K: NO_IMPACT if K.strategy == 0 and K.clock[NOW] > 0.5 else found(K)
-    )
+    monkeypatch.setattr(kernel_events, "switch", lambda K: NO_IMPACT if K.strategy == 0 and K.time > 0.5 else found(K))
     heights = [0.5, 0.7, 0.0, 0.0]
     model, position = bouncing(heights, 0.6)
     start = mbd.assemble(model, position=position, closed=[word.name for word in model.constraints][2:])

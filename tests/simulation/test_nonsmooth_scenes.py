@@ -11,7 +11,7 @@ import pytest
 
 import mbd
 from mbd.kernel import events as kernel_events
-from mbd.kernel.fields import NO_IMPACT
+from mbd.kernel.codes import NO_IMPACT
 from tests.simulation.mechanisms import G, ball, falling, kneed_walker, kneed_walker_start, point, run, two_balls
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -259,7 +259,7 @@ def test_a_step_whose_end_has_no_impulses_is_tried_down_to_an_eighth(monkeypatch
 
     def refuse(K):
         if len(refused) < until_works:
-            refused.append(float(K.clock[0]))
+            refused.append(float(K.time))
             return NO_IMPACT
         return rebound(K)
 

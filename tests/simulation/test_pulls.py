@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
 import mbd
 from mbd.kernel.events import same_instant
+from mbd.kernel.records import Kernel
 from mbd.testing.wild import wild_scene
 from tests.simulation.judging import complaints
 
@@ -141,7 +140,7 @@ def test_any_number_of_events_may_happen_at_one_instant(scheme, at_start):
 
 def instants(states, limit=100):
     """After how many switches of one instant, each with the next of some states, there were too many; None: never."""
-    kernel = SimpleNamespace(
+    kernel = Kernel(
         clock=np.zeros(20), state=np.zeros(40, dtype=int), seen=np.zeros(20), closed=[0], armed=[1], sticks=[0],
         slip=[0.0], side=[1.0], q=[0.0], y=np.zeros(1), dt=1.0, max_switches=limit, n_contacts=1, n_frictions=1,
         n_guards=1, n_q=1, n=1,

@@ -9,7 +9,7 @@ import pytest
 
 import mbd
 from mbd.errors import CapabilityError, ModelError, SimulationError
-from mbd.kernel import fields as F
+from mbd.kernel.records import TABLE
 from mbd.results.matching import apart
 from mbd.simulation.diagnostics.replay import Twin
 from mbd.simulation.run.begin import notify
@@ -259,7 +259,7 @@ def test_the_interpreted_kernel_takes_the_steps_of_the_compiled_one(scene, schem
     model, start, _, _ = reference(scene)
     fast, slow = (following(model, start, scheme, 0.3) for _ in range(2))
     assert fast.stepper.compiled
-    slow.stepper.compiled, slow.stepper.scheme = False, Twin(slow.stepper.values["scheme"])
+    slow.stepper.compiled, slow.stepper.scheme = False, Twin(slow.stepper.kernel.scheme)
     one, two = (each.complete()[0] for each in (fast, slow))
     assert one.success and one.stats["rejected"] == two.stats["rejected"]
     np.testing.assert_allclose(one.time, two.time, rtol=0, atol=1e-9)
@@ -279,13 +279,13 @@ def test_a_run_that_is_taken_back_takes_the_same_steps_again(scheme):
     """What the next step depends on is kept with the state: the same bits after going back."""
     model, start, _, _ = reference("walker")
     whole = following(model, start, scheme, 0.6)
-    whole.values["chunk"] = 7  # many calls of the kernel, with a savepoint before each
+    whole.kernel.chunk = 7  # many calls of the kernel, with a savepoint before each
     once = following(model, start, scheme, 0.6).complete()[0]
     again = whole.complete()[0]
     np.testing.assert_array_equal(once.time, again.time)
     np.testing.assert_array_equal(once.record.q, again.record.q)
     kept = {"clock", "q", "y", "rate", "aux", "slope"}
-    assert kept <= set(F.KEPT_REALS) and "state" in F.KEPT_INTEGERS
+    assert kept <= set(TABLE.kept_reals) and "state" in TABLE.kept_integers
 
 
 def test_a_run_goes_on_from_another_to_the_bit():

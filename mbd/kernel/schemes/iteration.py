@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from mbd.kernel.fields import AUX_STEP, EPS, MODE, STEP
+from mbd.kernel.codes import EPS
 from mbd.kernel.hooks import call
+from mbd.kernel.records import Kernel
 from mbd.kernel.restart import compose
 from mbd.kernel.singular.step_pairs import WHOLE
 
 __all__ = ["finish", "overturns", "predict", "residual_size", "runs_away", "shift_growth", "soundness_at"]
 
 
-def predict(K: Any, h: float, t1: float, c_C: float, c_K: float) -> None:
+def predict(K: Kernel, h: float, t1: float, c_C: float, c_K: float) -> None:
     """The block at t₁ with rates, multipliers and position correction extrapolated."""
     block = K.block
-    stretch = h / K.clock[AUX_STEP]
+    stretch = h / K.aux_step
     cube = shift_growth(K, h)
     mean = 1.0 / (1.0 - K.alpha_m)
     by_rate = (1.0 - K.alpha_f) * mean
@@ -45,22 +44,22 @@ def predict(K: Any, h: float, t1: float, c_C: float, c_K: float) -> None:
             block[K.o_x + i] = h * K.y[i] + h * h * ((0.5 - K.beta) * a0 + K.beta * a1) + shift
 
 
-def shift_growth(K: Any, h: float) -> float:
+def shift_growth(K: Kernel, h: float) -> float:
     """The factor by which a position correction, that of order h³, grows from the last step to this one."""
-    if h > (1.0 + WHOLE) * K.clock[STEP]:  # the longer of a pair: round-off of the shorter does not grow
+    if h > (1.0 + WHOLE) * K.step:  # the longer of a pair: round-off of the shorter does not grow
         return 1.0
-    stretch = h / K.clock[AUX_STEP]
+    stretch = h / K.aux_step
     return float(stretch * stretch * stretch)
 
 
-def soundness_at(K: Any, m: int) -> int:
+def soundness_at(K: Kernel, m: int) -> int:
     """Where the output of straight-line factors goes on behind r, h, ḣ, ∂ḣ/∂x: sound, weakest, the correction."""
     if K.stabilized == 0:
         return int(K.n + m)
     return int(K.n + 2 * m + m * K.n_v)
 
 
-def residual_size(K: Any, o_r: int, m: int, c_C: float, c_K: float, tolerance: float, both: int) -> float:
+def residual_size(K: Kernel, o_r: int, m: int, c_C: float, c_K: float, tolerance: float, both: int) -> float:
     """Largest residual over its tolerance: balance, h and, with `both`, ḣ, each block apart; −1 if not finite."""
     size = 0.0
     finite = 0.0
@@ -99,13 +98,13 @@ def residual_size(K: Any, o_r: int, m: int, c_C: float, c_K: float, tolerance: f
     return size
 
 
-def runs_away(K: Any, m: int) -> bool:
+def runs_away(K: Kernel, m: int) -> bool:
     """Whether multipliers fight each other: their forces cancel to less than 1e-7 of their size.
 
     Then r would vanish beside its terms whatever the motion, and a step must not be accepted for it.
     """
     size = K.n + m
-    call(K, K.mode_code[4 * K.state[MODE]], K.spare)
+    call(K, K.mode_code[4 * K.mode_id], K.spare)
     largest = 0.0
     total = 0.0
     for i in range(K.n):
@@ -120,9 +119,9 @@ def runs_away(K: Any, m: int) -> bool:
     return largest > 1e7 * total and largest > 1e3 * K.work[0]
 
 
-def finish(K: Any, h: float) -> None:
+def finish(K: Kernel, h: float) -> None:
     """The converged block becomes the candidate."""
-    stretch = h / K.clock[AUX_STEP]
+    stretch = h / K.aux_step
     mean = 1.0 / (1.0 - K.alpha_m)
     by_rate = (1.0 - K.alpha_f) * mean
     by_last = K.alpha_f * mean
@@ -139,7 +138,7 @@ def finish(K: Any, h: float) -> None:
     compose(K, K.q1)
 
 
-def overturns(K: Any, h: float) -> bool:
+def overturns(K: Kernel, h: float) -> bool:
     """Whether the estimated error of an angle in this step exceeds half a radian: it is not resolved at all.
 
     ``e = h² |1/6 − β − (α_m − α_f)/2| |v̇₁ − v̇₀|``

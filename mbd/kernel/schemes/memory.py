@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from mbd.kernel.fields import AUX_STEP, NEAR, PIVOT, STEP
+from mbd.kernel.records import Kernel
 from mbd.kernel.restart import note_scales, raise_scales, retain_scales
 
 __all__ = ["forget_steps", "look_a_step_ahead", "start_step"]
 
 
-def start_step(K: Any) -> float:
+def start_step(K: Kernel) -> float:
     """The step that a start prepares for."""
-    return float(K.dt if K.adaptive == 1 else K.clock[STEP])
+    return float(K.dt if K.adaptive == 1 else K.step)
 
 
-def forget_steps(K: Any) -> None:
+def forget_steps(K: Kernel) -> None:
     """Nothing is known of steps before: rates and multipliers do not change, no pose of lost rank is near."""
     for i in range(K.n):
         K.slope[i] = 0.0
@@ -24,12 +22,12 @@ def forget_steps(K: Any) -> None:
         K.shift_change[i] = 0.0
     for k in range(K.n_rows):
         K.lam_slope[k] = 0.0
-    K.clock[AUX_STEP] = start_step(K)
-    K.state[NEAR] = 0
-    K.detail[PIVOT] = 0.0
+    K.aux_step = start_step(K)
+    K.near_singular = 0
+    K.inverse_pivot = 0.0
 
 
-def look_a_step_ahead(K: Any) -> None:
+def look_a_step_ahead(K: Kernel) -> None:
     """Raise the sizes noted at the accepted state, which is in the block, to those a step later.
 
     A force that is zero just now has its size then.

@@ -7,9 +7,8 @@ the velocity formulas of the scheme with their own rate ż, of order 2 as well (
 
 from __future__ import annotations
 
-from typing import Any
-
-from mbd.kernel.fields import AUX_STEP, NEAR, NOW, PASSING, ROWS
+from mbd.kernel.codes import PASSING
+from mbd.kernel.records import Kernel
 from mbd.kernel.restart import compose, consistent, fill_block, refresh_scales
 from mbd.kernel.schemes.iteration import predict, shift_growth
 from mbd.kernel.schemes.memory import forget_steps, look_a_step_ahead, start_step
@@ -19,11 +18,11 @@ from mbd.kernel.singular.newmark_step import passing_step
 __all__ = ["newmark_accept", "newmark_resume", "newmark_start", "newmark_step"]
 
 
-def newmark_start(K: Any) -> int:
+def newmark_start(K: Kernel) -> int:
     """Memory of the scheme at a consistent state: a₀ = v̇₀ + (α_m − α_f) dt j₀, j₀ by a difference (or a₀ = v̇₀)."""
     full = start_step(K)
     step = full / 16.0
-    t = K.clock[NOW]
+    t = K.time
     forget_steps(K)
     fill_block(K, t, K.q, K.y)
     for i in range(K.n_v):  # a little later along the tangent: a parabola would blow stiff forces up by (ω dt)²
@@ -47,7 +46,7 @@ def newmark_start(K: Any) -> int:
     return 0
 
 
-def unresolved(K: Any) -> bool:
+def unresolved(K: Kernel) -> bool:
     """Whether accelerations would change within dt to a hundred times what all terms of the balance make up now.
 
     A jerk like that (a stiff contact that closes, shorter than dt) is no start for anything: a₀ = v̇₀ then.
@@ -62,9 +61,9 @@ def unresolved(K: Any) -> bool:
     return change > 100.0 * known
 
 
-def newmark_step(K: Any, h: float, t1: float) -> int:
+def newmark_step(K: Kernel, h: float, t1: float) -> int:
     """Candidate state (q1, y1, rate1, aux1, lam1) after a step of size h; the accepted state is untouched."""
-    if K.state[NEAR] == PASSING:
+    if K.near_singular == PASSING:
         return passing_step(K, h, t1)
     c = (1.0 - K.alpha_f) / (1.0 - K.alpha_m)
     c_C = K.gamma * h * c
@@ -78,7 +77,7 @@ def newmark_step(K: Any, h: float, t1: float) -> int:
         tangents = SEARCHED  # pivots in a fixed order were round-off: from the prediction again, with a search for them
 
 
-def newmark_accept(K: Any, h: float) -> None:
+def newmark_accept(K: Kernel, h: float) -> None:
     """The candidate becomes the accepted state."""
     part = part_of_change(K, h)
     for i in range(K.n_q):
@@ -95,18 +94,18 @@ def newmark_accept(K: Any, h: float) -> None:
     for k in range(K.n_rows):
         K.lam_slope[k] = (K.lam1[k] - K.lam[k]) * inverse
         K.lam[k] = K.lam1[k]
-    K.clock[AUX_STEP] = h
+    K.aux_step = h
 
 
-def part_of_change(K: Any, h: float) -> float:
+def part_of_change(K: Kernel, h: float) -> float:
     """Part of the last change of the position correction that the next prediction goes on with.
 
     Where h was below round-off, the correction is its own prediction, and a part of it along the motion shows nowhere:
     extrapolated again, such parts would grow. Then nothing of the change is used, and half of the next one.
     """
-    if K.stabilized == 0 or K.state[ROWS] == 0:
+    if K.stabilized == 0 or K.n_active == 0:
         return 1.0
-    stretch = h / K.clock[AUX_STEP]
+    stretch = h / K.aux_step
     cube = shift_growth(K, h)
     predicted = True
     known = False
@@ -118,7 +117,7 @@ def part_of_change(K: Any, h: float) -> float:
     return 0.0 if predicted else 0.5
 
 
-def newmark_resume(K: Any, h: float) -> int:
+def newmark_resume(K: Kernel, h: float) -> int:
     """Start from the accepted state, the end of a step of size h, with the rates in K.jump, multipliers in K.impulse.
 
     Only the auxiliary a is carried over: it keeps its distance from v̇, where a start would err by dt².

@@ -8,30 +8,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from mbd.kernel.fields import (
-    BLOCKED,
-    EPS,
-    FACTORIZATIONS,
-    ITERATIONS,
-    MODE,
-    NOT_CONVERGED,
-    NOT_FINITE,
-    ORDERED,
-    PIVOT,
-    PIVOTED,
-    RESIDUALS,
-    ROWS,
-    SINGULAR,
-    STAGNATED,
-    STAGNATIONS,
-    STEP,
-    TANGENTS,
-    TOO_NEAR,
-    TOO_TIGHT,
-)  # fmt: skip
+from mbd.kernel.codes import EPS, NOT_CONVERGED, NOT_FINITE, SINGULAR, STAGNATED, TOO_NEAR, TOO_TIGHT
 from mbd.kernel.hooks import call, call_on
 from mbd.kernel.linear import factor
 from mbd.kernel.ordered import LOSS_OF_STEP, OF_TANGENT, factor_ordered, order_at, solve_kkt
+from mbd.kernel.records import Kernel
 from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import (
     add_shares,
@@ -59,7 +40,7 @@ UNSOUND = -1
 """Result of `solve_step` where factors in a fixed order led to a correction that is no solution at all."""
 
 
-def solve_step(K: Any, h: float, t1: float, c_C: float, c_K: float, tangents: int) -> int:
+def solve_step(K: Kernel, h: float, t1: float, c_C: float, c_K: float, tangents: int) -> int:
     """The candidate from the prediction in the block; 0, or why there is none; `UNSOUND`.
 
     Newton's method, its corrections halved where the residual grows: one tangent, then residuals with its factors; a
@@ -67,7 +48,7 @@ def solve_step(K: Any, h: float, t1: float, c_C: float, c_K: float, tangents: in
     than `MOST_STRAIGHT` `tangents` were counted; a pivot of round-off passes for one of its own size, so it is the
     residual that judges them.
     """
-    m = K.state[ROWS]
+    m = K.n_active
     tolerance = min(4.0 * EPS, K.tolerance) if K.exact == 1 else 1e-3 * K.tolerance
     before = 1e300
     left = 1e300  # the error where the last correction started
@@ -84,21 +65,21 @@ def solve_step(K: Any, h: float, t1: float, c_C: float, c_K: float, tangents: in
             straight = renew(K, m, tangents)
             tangents += 1
         else:
-            call(K, K.mode_code[4 * K.state[MODE] + 1], K.out)
-            K.counts[RESIDUALS] += 1
+            call(K, K.mode_code[4 * K.mode_id + 1], K.out)
+            K.n_residuals += 1
         o_r = (K.n + m) * (K.n + m) if tangent and not straight else 0
         error = residual_size(K, o_r, m, c_C, c_K, tolerance, K.stabilized)
         grown = error > FAR and error > 0.9 * left and not together  # shares that follow loads change it as well
         if halvings < MOST_HALVINGS and iteration > 0 and (error < 0.0 or grown):
             if fixed:
-                K.detail[PIVOT] = 0.0
+                K.inverse_pivot = 0.0
                 return UNSOUND
             retreat(K, m, c_C, c_K)  # a full Newton step jumped over a steep place
             halvings += 1
             continue
         if error < 0.0:
             return no_candidate(K, h, t1, NOT_FINITE)
-        K.detail[1] = error
+        K.failure_size = error
         if error > 1.0 and iteration >= 2 and error > 0.5 * before:
             error = second_look(K, o_r, m, c_C, c_K, tolerance, iteration)
             if error < 0.0:
@@ -125,7 +106,7 @@ def solve_step(K: Any, h: float, t1: float, c_C: float, c_K: float, tangents: in
                 return status
         if not ready:
             solve_corrections(K, m, c_C, tangent, shifting, straight)
-        fixed = straight or K.state[ORDERED] > 0
+        fixed = straight or K.order_start > 0
         biggest = correct(K, m, c_C, c_K, ready, shifting)
         if iteration == 0 and K.exact == 0:  # the predictor's error measures that of the step: stay far below it
             tolerance = min(K.tolerance, max(1e-4 * biggest, tolerance))
@@ -133,23 +114,23 @@ def solve_step(K: Any, h: float, t1: float, c_C: float, c_K: float, tangents: in
     return no_candidate(K, h, t1, NOT_CONVERGED)
 
 
-def no_candidate(K: Any, h: float, t1: float, status: int) -> int:
+def no_candidate(K: Kernel, h: float, t1: float, status: int) -> int:
     """The status, after noting which step has none."""
-    K.detail[0] = t1
-    K.detail[2] = h
+    K.failure_time = t1
+    K.failure_step = h
     return status
 
 
-def conclude_step(K: Any, h: float, t1: float) -> int:
+def conclude_step(K: Kernel, h: float, t1: float) -> int:
     """The iterate becomes the candidate, unless the step is far too long for it."""
     finish(K, h)
     if overturns(K, h):
-        K.detail[1] = -1.0
+        K.failure_size = -1.0
         return no_candidate(K, h, t1, NOT_CONVERGED)
     return 0
 
 
-def second_look(K: Any, o_r: int, m: int, c_C: float, c_K: float, tolerance: float, iteration: int) -> float:
+def second_look(K: Kernel, o_r: int, m: int, c_C: float, c_K: float, tolerance: float, iteration: int) -> float:
     """A residual that falls no more, over its tolerance with sizes of forces as they are here; 1 if it is round-off.
 
     −status where the iteration is to end.
@@ -165,7 +146,7 @@ def second_look(K: Any, o_r: int, m: int, c_C: float, c_K: float, tolerance: flo
             if residual_size(K, o_r, 0, c_C, c_K, K.tolerance, K.stabilized) > 1.0:  # rows at round-off hold
                 error = -float(TOO_TIGHT)
             else:
-                K.counts[STAGNATIONS] += 1
+                K.n_stagnations += 1
                 error = 1.0
         elif iteration >= 6 and K.exact == 0:
             if residual_size(K, o_r, m, 0.0, 0.0, 1e5 * EPS, K.stabilized) <= 1e3:
@@ -177,40 +158,40 @@ def second_look(K: Any, o_r: int, m: int, c_C: float, c_K: float, tolerance: flo
     return error
 
 
-def pass_pose(K: Any, h: float, t1: float, m: int, c_C: float, c_K: float, straight: bool) -> int:
+def pass_pose(K: Kernel, h: float, t1: float, m: int, c_C: float, c_K: float, straight: bool) -> int:
     """−1 where no pose in which rows lose rank is near; else how a step that passes it ends, or that this must not."""
     fall = steps_of_fall(K, m, straight)
     if not fall < WITHIN + 2.0:
         return -1
-    away = steps_to_pose(K, m, h, c_K / c_C, straight) * h / K.clock[STEP]
+    away = steps_to_pose(K, m, h, c_K / c_C, straight) * h / K.step
     if misses(K, away, h):
-        K.detail[PIVOT] = 0.0
+        K.inverse_pivot = 0.0
         return TOO_NEAR
     if fall < WITHIN and away < WITHIN and (away < 1.0 or is_whole(K, h)):
         return passing_step(K, h, t1)
     return -1
 
 
-def renew(K: Any, m: int, tangents: int) -> bool:
+def renew(K: Kernel, m: int, tangents: int) -> bool:
     """Residual and tangent in K.out; whether its factors and the correction are there instead of it.
 
     Straight-line code exchanges no rows: where a pivot is too small, or the correction was not what it should be, the
     tangent itself is asked for and pivots are searched for.
     """
-    K.counts[TANGENTS] += 1
-    first = K.mode_code[4 * K.state[MODE] + 2]
+    K.n_tangents += 1
+    first = K.mode_code[4 * K.mode_id + 2]
     if first > 0:
         if tangents < MOST_STRAIGHT:
             call(K, first, K.out)
             if K.out[soundness_at(K, m)] == 1.0:
-                K.counts[FACTORIZATIONS] += 1
+                K.n_factorizations += 1
                 return True
-        K.counts[PIVOTED] += 1
-    call(K, K.mode_code[4 * K.state[MODE]], K.out)
+        K.n_pivoted += 1
+    call(K, K.mode_code[4 * K.mode_id], K.out)
     return False
 
 
-def take_shift(K: Any, m: int) -> bool:
+def take_shift(K: Kernel, m: int) -> bool:
     """Whether positions need correcting by what has come with the tangent: the change of the shift, then in K.work."""
     if K.stabilized == 0:
         return False
@@ -226,7 +207,7 @@ def take_shift(K: Any, m: int) -> bool:
     return shifting
 
 
-def right_hand_sides(K: Any, o_r: int, m: int, c_C: float, c_K: float, tangent: bool, straight: bool) -> bool:
+def right_hand_sides(K: Kernel, o_r: int, m: int, c_C: float, c_K: float, tangent: bool, straight: bool) -> bool:
     """−r and −h/c_K (index 3) or −ḣ/c_C in K.rhs; for the stabilized form the position residual in K.work.
 
     Rows on velocities have −rate/c_C in both forms and take no part in the correction of positions.
@@ -263,7 +244,7 @@ def right_hand_sides(K: Any, o_r: int, m: int, c_C: float, c_K: float, tangent: 
     return shifting
 
 
-def factorize(K: Any, size: int, tangents: int) -> bool:
+def factorize(K: Kernel, size: int, tangents: int) -> bool:
     """LU factors of the tangent in K.out; false where a pivot is missing.
 
     Those of a step's first few tangents keep to the order of the mode, if it has one and its pivots are sound.
@@ -272,22 +253,22 @@ def factorize(K: Any, size: int, tangents: int) -> bool:
     o = 0 if sharing(K) else order_at(K, m)
     if o > 0 and tangents <= MOST_STRAIGHT:
         if factor_ordered(K, K.out, o, OF_TANGENT, LOSS_OF_STEP):
-            K.counts[FACTORIZATIONS] += 1
+            K.n_factorizations += 1
             return True
     if o > 0:
-        K.counts[PIVOTED] += 1
-    K.state[ORDERED] = 0
+        K.n_pivoted += 1
+    K.order_start = 0
     for k in range(size * size):
         K.kkt[k] = K.out[k]
     if sharing(K):
         add_shares(K, K.kkt, m)
     column = factor(K.kkt, size, K.pivots)
-    K.counts[FACTORIZATIONS] += 1
-    K.state[BLOCKED] = column - 1
+    K.n_factorizations += 1
+    K.failure_index = column - 1
     return bool(column == 0)
 
 
-def solve_corrections(K: Any, m: int, c_C: float, tangent: bool, shifting: bool, straight: bool) -> None:
+def solve_corrections(K: Kernel, m: int, c_C: float, tangent: bool, shifting: bool, straight: bool) -> None:
     """The change of the position shift in K.work, the corrections of rates and multipliers in K.rhs."""
     if shifting:  # positions first: what that changes of ḣ, the accelerations make good in the same iteration
         solve_with_factors(K, m, K.work, straight)
@@ -304,19 +285,19 @@ def solve_corrections(K: Any, m: int, c_C: float, tangent: bool, shifting: bool,
     solve_with_factors(K, m, K.rhs, straight)
 
 
-def solve_with_factors(K: Any, m: int, b: Any, straight: bool) -> None:
+def solve_with_factors(K: Kernel, m: int, b: Any, straight: bool) -> None:
     """b ← K⁻¹ b with the factors at hand."""
     size = K.n + m
     if straight:
         place = soundness_at(K, m) + 2
         for i in range(size):
             K.out[place + i] = b[i]
-        call_on(K, K.mode_code[4 * K.state[MODE] + 3], K.out, b)
+        call_on(K, K.mode_code[4 * K.mode_id + 3], K.out, b)
     else:
         solve_kkt(K, size, b)
 
 
-def correct(K: Any, m: int, c_C: float, c_K: float, ready: bool, shifting: bool) -> float:
+def correct(K: Kernel, m: int, c_C: float, c_K: float, ready: bool, shifting: bool) -> float:
     """Apply a Newton correction to the block; its size relative to the largest rate."""
     n = K.n
     block = K.block
@@ -327,7 +308,7 @@ def correct(K: Any, m: int, c_C: float, c_K: float, ready: bool, shifting: bool)
         for i in range(K.n_v):
             K.shift1[i] += K.work[i]
             block[K.o_x + i] += K.work[i]
-    K.counts[ITERATIONS] += 1
+    K.n_iterations += 1
     for i in range(n):
         change = K.out[place + i] if ready else K.rhs[i]
         rate = block[K.o_a + i]
@@ -345,7 +326,7 @@ def correct(K: Any, m: int, c_C: float, c_K: float, ready: bool, shifting: bool)
     return biggest / fastest
 
 
-def retreat(K: Any, m: int, c_C: float, c_K: float) -> None:
+def retreat(K: Kernel, m: int, c_C: float, c_K: float) -> None:
     """Take back half of the last correction of rates, velocities, positions and multipliers."""
     n = K.n
     for i in range(n + m):

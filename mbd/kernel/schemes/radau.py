@@ -8,24 +8,9 @@ acceleration level, which makes them as accurate as positions and velocities.
 
 from __future__ import annotations
 
-from typing import Any
-
-from mbd.kernel.fields import (
-    AUX_STEP,
-    EPS,
-    N_DROPPED,
-    NEAR,
-    NOT_CONVERGED,
-    NOT_FINITE,
-    NOW,
-    PASSING,
-    ROWS,
-    SINGULAR,
-    STAGNATED,
-    STAGNATIONS,
-    TOO_TIGHT,
-)  # fmt: skip
+from mbd.kernel.codes import EPS, NOT_CONVERGED, NOT_FINITE, PASSING, SINGULAR, STAGNATED, TOO_TIGHT
 from mbd.kernel.ordered import LOSS_AT_ONCE, solve_kkt
+from mbd.kernel.records import Kernel
 from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import (
     compose,
@@ -86,18 +71,18 @@ NEGLIGIBLE = 1e-2
 """The same over the square of the first correction, the size of the step's own error [-]."""
 
 
-def radau_start(K: Any) -> int:
+def radau_start(K: Kernel) -> int:
     """The memory at a consistent state: stages of a step before it at rates and multipliers that do not change."""
     forget_steps(K)
     forget_stages(K)
     forget_leftovers(K)
-    fill_block(K, K.clock[NOW], K.q, K.y)
+    fill_block(K, K.time, K.q, K.y)
     refresh_scales(K)
     look_a_step_ahead(K)
     return 0
 
 
-def forget_stages(K: Any) -> None:
+def forget_stages(K: Kernel) -> None:
     """Stages to predict the next step from: those of rates and multipliers that do not change."""
     n = K.n
     for i in range(3):
@@ -109,7 +94,7 @@ def forget_stages(K: Any) -> None:
             K.past_stages[3 * n + 3 * K.n_rows + i * K.n_v + j] = 0.0
 
 
-def radau_accept(K: Any, h: float) -> None:
+def radau_accept(K: Kernel, h: float) -> None:
     """The candidate becomes the accepted state, its stages those to predict the next from."""
     inverse = 1.0 / h
     for i in range(K.n_q):
@@ -125,24 +110,24 @@ def radau_accept(K: Any, h: float) -> None:
     o = stage_place(K, STAGE_RATES)
     for k in range(3 * (K.n + K.n_rows + K.n_v)):
         K.past_stages[k] = K.stages[o + k]
-    if K.state[ROWS] > 0:
+    if K.n_active > 0:
         keep_leftovers(K, h)
-    K.clock[AUX_STEP] = h
+    K.aux_step = h
 
 
-def radau_step(K: Any, h: float, t1: float) -> int:
+def radau_step(K: Kernel, h: float, t1: float) -> int:
     """Candidate state (q1, y1, rate1, aux1, lam1) after a step of size h; the accepted state is untouched."""
-    m = K.state[ROWS]
+    m = K.n_active
     if m > 0 and is_astride(K, h):
         return step_astride(K, h, t1)
-    K.state[NEAR] = 0
+    K.near_singular = 0
     status = plain_step(K, h, t1, m)
     if (status == NOT_CONVERGED or status == STAGNATED or status == TOO_TIGHT) and m > 0 and is_beside(K, h, LOUDER):
         return step_astride(K, h, t1)
     return status
 
 
-def plain_step(K: Any, h: float, t1: float, m: int) -> int:
+def plain_step(K: Kernel, h: float, t1: float, m: int) -> int:
     """The same with one pair of matrices for all stages."""
     c = K.stages[MU_REAL] * h
     hold_block(K)
@@ -153,8 +138,8 @@ def plain_step(K: Any, h: float, t1: float, m: int) -> int:
     retreats = 0
     renew = True
     status = NOT_CONVERGED
-    K.detail[0] = t1
-    K.detail[2] = h
+    K.failure_time = t1
+    K.failure_step = h
     first = 0.0  # what the first correction changed, and the last
     moved = 0.0
     for iteration in range(K.max_iterations):
@@ -167,12 +152,12 @@ def plain_step(K: Any, h: float, t1: float, m: int) -> int:
         if error < 0.0:
             status = NOT_FINITE
             break
-        K.detail[1] = error
+        K.failure_size = error
         if error > 1.0 and iteration >= 2 and error > 0.5 * before:
             status = judge_stagnation(K, h, t1, m, tolerance, iteration >= PATIENT and error > STUCK * before)
             if status == 0:
                 error = 1.0
-            elif status != NOT_CONVERGED or K.detail[1] < 0.0:
+            elif status != NOT_CONVERGED or K.failure_size < 0.0:
                 break
         if error > 1.0 and was_enough(K, h, t1, m, iteration, error, left):
             return complete(K, h, t1, m, renew)
@@ -198,8 +183,8 @@ def plain_step(K: Any, h: float, t1: float, m: int) -> int:
             first = moved
             tolerance = min(K.tolerance, max(1e-3 * first * first, tolerance))
         renew = False
-    if K.detail[1] < 0.0:
-        K.detail[1] = 1e300
+    if K.failure_size < 0.0:
+        K.failure_size = 1e300
     return status
 
 
@@ -211,16 +196,16 @@ def is_settled(moved: float, last: float, first: float) -> bool:
     return moved <= max(SETTLED, NEGLIGIBLE * first * first) or (last > 0.0 and moved > 0.5 * last)
 
 
-def step_astride(K: Any, h: float, t1: float) -> int:
+def step_astride(K: Kernel, h: float, t1: float) -> int:
     """The candidate of a step with stages on both sides of a singular configuration: see `mbd.kernel.singular.stages`.
 
     Newton's method is linear there, with matrices made anew each time.
     """
-    m = K.state[ROWS]
+    m = K.n_active
     c = K.stages[MU_REAL] * h
-    K.state[NEAR] = PASSING
-    K.detail[0] = t1
-    K.detail[2] = h
+    K.near_singular = PASSING
+    K.failure_time = t1
+    K.failure_step = h
     hold_block(K)
     predict_stages(K, h, m)
     tolerance = 1e-3 * K.tolerance
@@ -235,7 +220,7 @@ def step_astride(K: Any, h: float, t1: float) -> int:
         error = evaluate_stages(K, h, t1, m, tolerance, c, c * c, True)
         if error < 0.0:
             return NOT_FINITE
-        K.detail[1] = error
+        K.failure_size = error
         if error > 1.0 and iteration > 2 and error > SLOW * before:
             if evaluate_stages(K, h, t1, m, K.tolerance, c, c * c, False) <= 1.0:
                 return complete(K, h, t1, m, True)
@@ -257,10 +242,10 @@ def step_astride(K: Any, h: float, t1: float) -> int:
     return NOT_CONVERGED
 
 
-def judge_stagnation(K: Any, h: float, t1: float, m: int, tolerance: float, stuck: bool) -> int:
+def judge_stagnation(K: Kernel, h: float, t1: float, m: int, tolerance: float, stuck: bool) -> int:
     """What residuals that fall no more mean: 0 round-off, NOT_CONVERGED go on, else the end of the iteration.
 
-    K.detail[1] < 0 where multipliers run away.
+    K.failure_size < 0 where multipliers run away.
     """
     note_scales(K)
     status = judge_raised(K, h, t1, m, tolerance, stuck)
@@ -271,20 +256,20 @@ def judge_stagnation(K: Any, h: float, t1: float, m: int, tolerance: float, stuc
     return status
 
 
-def judge_raised(K: Any, h: float, t1: float, m: int, tolerance: float, stuck: bool) -> int:
+def judge_raised(K: Kernel, h: float, t1: float, m: int, tolerance: float, stuck: bool) -> int:
     """The same with magnitudes raised to those of the stages."""
     c = K.stages[MU_REAL] * h
     for turn in range(3):
         load_stage(K, 2 - turn, h, t1)
         raise_scales(K, True)
         if turn == 0 and m > 0 and runs_away(K, m):
-            K.detail[1] = -1.0
+            K.failure_size = -1.0
             return NOT_CONVERGED
     rough = evaluate_stages(K, h, t1, m, 256.0 * EPS, 0.0, 0.0, False)
     if rough <= 16.0:
         if evaluate_stages(K, h, t1, m, K.tolerance, c, c * c, False) > 1.0:
             return TOO_TIGHT
-        K.counts[STAGNATIONS] += 1
+        K.n_stagnations += 1
         return 0
     if stuck and evaluate_stages(K, h, t1, m, K.tolerance, c, c * c, False) > 1.0:  # else they do for what was asked
         if evaluate_stages(K, h, t1, m, 1e5 * EPS, 0.0, 0.0, False) <= 1e3:
@@ -294,7 +279,7 @@ def judge_raised(K: Any, h: float, t1: float, m: int, tolerance: float, stuck: b
     return NOT_CONVERGED
 
 
-def was_enough(K: Any, h: float, t1: float, m: int, iteration: int, error: float, left: float) -> bool:
+def was_enough(K: Kernel, h: float, t1: float, m: int, iteration: int, error: float, left: float) -> bool:
     """Whether residuals meet the tolerance that was asked for where the tighter one of the step is not reached.
 
     Where they fall slowly, as they are; where they grow, as they were: the last correction is taken back.
@@ -312,7 +297,7 @@ def was_enough(K: Any, h: float, t1: float, m: int, iteration: int, error: float
     return evaluate_stages(K, h, t1, m, K.tolerance, c, c * c, False) <= 1.0
 
 
-def complete(K: Any, h: float, t1: float, m: int, renew: bool) -> int:
+def complete(K: Kernel, h: float, t1: float, m: int, renew: bool) -> int:
     """The converged last stage becomes the candidate, with consistent rates and multipliers where rows are active."""
     if renew and not factor_stages(K, K.n + m):
         return SINGULAR
@@ -327,7 +312,7 @@ def complete(K: Any, h: float, t1: float, m: int, renew: bool) -> int:
     estimate_error(K, h, m)
     for i in range(K.n_v):
         if K.unit[i] == 1 and not abs(K.error[i]) <= 0.5:
-            K.detail[1] = -1.0
+            K.failure_size = -1.0
             return NOT_CONVERGED
     compose(K, K.q1)
     if m > 0 or K.n_frictions > 0:
@@ -338,7 +323,7 @@ def complete(K: Any, h: float, t1: float, m: int, renew: bool) -> int:
                 K.lam1[k] = K.impulse[k]
         if m > 0:
             if not holds_rows(K, m):
-                K.detail[1] = 0.0
+                K.failure_size = 0.0
                 return NOT_CONVERGED
             note_leftovers(K)
         for k in range(K.n_rows):
@@ -349,13 +334,13 @@ def complete(K: Any, h: float, t1: float, m: int, renew: bool) -> int:
     return 0
 
 
-def end_rates(K: Any, t1: float, m: int) -> bool:
+def end_rates(K: Kernel, t1: float, m: int) -> bool:
     """Consistent rates and multipliers of the candidate in K.jump and K.impulse; false where there are none.
 
     Rows that were stepped with are independent, so that plain factors do for `consistent`, except where R follows
     multipliers. Frictions that feel rows left out, whose multipliers are known later, keep those of the stage.
     """
-    if K.state[N_DROPPED] > 0 and K.n_frictions > 0:
+    if K.n_dropped > 0 and K.n_frictions > 0:
         evaluate(K, t1, K.q1, K.y1)
         return False
     if K.loaded > 0:
@@ -381,7 +366,7 @@ def end_rates(K: Any, t1: float, m: int) -> bool:
     return True
 
 
-def estimate_error(K: Any, h: float, m: int) -> None:
+def estimate_error(K: Kernel, h: float, m: int) -> None:
     """Error of order 3 of x and (v, z) over the step, into K.error (Hairer & Wanner 1996, eq. IV.8.20).
 
     ``μ h f(y₀) + Σ e_i (Y_i − y₀)``, along the rows, filtered by (1 − hμ ∂f/∂y)⁻¹: stiff components do not count.
@@ -425,7 +410,7 @@ def estimate_error(K: Any, h: float, m: int) -> None:
             K.error[i] += c * K.rhs[i]
 
 
-def stage_speed(K: Any, k: int, j: int, h: float) -> float:
+def stage_speed(K: Kernel, k: int, j: int, h: float) -> float:
     """v of component j at stage k."""
     S = K.stages
     o = stage_place(K, STAGE_RATES) + j

@@ -10,25 +10,10 @@ must form a vector space (q ⊕ x = q + x).
 
 from __future__ import annotations
 
-from typing import Any
-
-from mbd.kernel.fields import (
-    AUX_STEP,
-    EPS,
-    N_DROPPED,
-    NEAR,
-    NOT_CONVERGED,
-    NOT_FINITE,
-    NOW,
-    ORDERED,
-    PASSING,
-    RESIDUALS,
-    ROWS,
-    SINGULAR,
-    UNEVEN,
-)
+from mbd.kernel.codes import EPS, NOT_CONVERGED, NOT_FINITE, PASSING, SINGULAR
 from mbd.kernel.linear import factor, solve_definite
 from mbd.kernel.ordered import LOSS_AT_ONCE, OF_ACCELERATIONS, SYMMETRIC, factor_ordered, order_at, solve_kkt
+from mbd.kernel.records import Kernel
 from mbd.kernel.restart import consistent, evaluate, fill_block, raise_scales, refresh_scales
 from mbd.kernel.roots import sqrt
 from mbd.kernel.schemes.memory import forget_steps
@@ -46,47 +31,47 @@ MOST_RETURNS = 8
 """Newton corrections of positions onto the rows after a step; it takes one or two [-]."""
 
 
-def runge_kutta_start(K: Any) -> int:
+def runge_kutta_start(K: Kernel) -> int:
     """Sizes of forces and rows at the consistent state; the scheme remembers nothing but its rates."""
     forget_steps(K)
     forget_leftovers(K)
-    evaluate(K, K.clock[NOW], K.q, K.y)
+    evaluate(K, K.time, K.q, K.y)
     note_uneven(K)
     find_sizes(K)
     return 0
 
 
-def note_uneven(K: Any) -> None:
+def note_uneven(K: Kernel) -> None:
     """Whether stages with rows are corrected by the balance, by the masses in K.acc; not with rows that share loads."""
-    m = K.state[ROWS]
-    K.state[UNEVEN] = 0
-    if m > 0 and K.n_frictions == 0 and K.state[N_DROPPED] == 0 and is_uneven(K, m):
-        K.state[UNEVEN] = 1
+    m = K.n_active
+    K.uneven_masses = 0
+    if m > 0 and K.n_frictions == 0 and K.n_dropped == 0 and is_uneven(K, m):
+        K.uneven_masses = 1
 
 
-def find_sizes(K: Any) -> None:
+def find_sizes(K: Kernel) -> None:
     """Sizes at the accepted state; those of a candidate that is refused must not excuse the next one."""
-    fill_block(K, K.clock[NOW], K.q, K.y)
+    fill_block(K, K.time, K.q, K.y)
     refresh_scales(K)
 
 
-def runge_kutta_step(K: Any, h: float, t1: float) -> int:
+def runge_kutta_step(K: Kernel, h: float, t1: float) -> int:
     """Candidate state (q1, y1, rate1, lam1) and K.error after a step of size h; the accepted state is untouched."""
     n = K.n
     n_v = K.n_v
     width = n_v + n
     at_end = EXPLICIT_STAGES * EXPLICIT_STAGES
     at_nodes = at_end + EXPLICIT_STAGES
-    K.detail[0] = t1
-    K.detail[1] = 0.0
-    K.detail[2] = h
+    K.failure_time = t1
+    K.failure_size = 0.0
+    K.failure_step = h
     for i in range(n):
         K.stages[n_v + i] = K.rate[i]
         if i < n_v:
             K.stages[i] = K.y[i]
     for s in range(1, EXPLICIT_STAGES):
         explicit_move(K, h, s * EXPLICIT_STAGES, s)
-        status = explicit_rates(K, K.clock[NOW] + K.tableau[at_nodes + s] * h)
+        status = explicit_rates(K, K.time + K.tableau[at_nodes + s] * h)
         if status != 0:
             return status
         for i in range(n):
@@ -94,20 +79,20 @@ def runge_kutta_step(K: Any, h: float, t1: float) -> int:
             if i < n_v:
                 K.stages[s * width + i] = K.y1[i]
     explicit_move(K, h, at_end, EXPLICIT_STAGES)
-    if K.state[ROWS] > 0:
+    if K.n_active > 0:
         status = return_to_rows(K, t1)
         if status != 0:
             find_sizes(K)
             return status
-    if K.state[ROWS] == 0 and K.n_frictions == 0:
+    if K.n_active == 0 and K.n_frictions == 0:
         status = explicit_rates(K, t1)
         for k in range(K.n_rows):
             K.impulse[k] = 0.0
     else:
         status = consistent(K, t1, K.q1, K.y1)
         note_uneven(K)
-        if status == 0 and K.state[UNEVEN] == 1 and factor_saddle(K, K.state[ROWS], False, LOSS_AT_ONCE):
-            polish_with_rows(K, K.state[ROWS])
+        if status == 0 and K.uneven_masses == 1 and factor_saddle(K, K.n_active, False, LOSS_AT_ONCE):
+            polish_with_rows(K, K.n_active)
     if status != 0:
         return status
     for i in range(n):
@@ -120,20 +105,20 @@ def runge_kutta_step(K: Any, h: float, t1: float) -> int:
     for k in range(K.n_rows):
         K.lam1[k] = K.impulse[k]
         K.block[K.o_lam + k] = K.impulse[k]
-    if K.state[ROWS] > 0:
+    if K.n_active > 0:
         note_leftovers(K)
     explicit_error(K, h)
-    if K.state[NEAR] == PASSING and not hold_error(K):
+    if K.near_singular == PASSING and not hold_error(K):
         return SINGULAR
     for i in range(n_v):  # an angle that is wrong by half a radian is not resolved at all
         if K.unit[i] == 1 and not abs(K.error[i]) <= 0.5:
-            K.detail[1] = -1.0
+            K.failure_size = -1.0
             find_sizes(K)
             return NOT_CONVERGED
     return 0
 
 
-def explicit_move(K: Any, h: float, weights: int, count: int) -> None:
+def explicit_move(K: Kernel, h: float, weights: int, count: int) -> None:
     """(q1, y1) moved from the accepted state by h times the weighted slopes of the first stages."""
     n_v = K.n_v
     width = n_v + K.n
@@ -150,39 +135,39 @@ def explicit_move(K: Any, h: float, weights: int, count: int) -> None:
         K.y1[i] = K.y[i] + K.spare[n_v + i]
 
 
-def explicit_rates(K: Any, t: float) -> int:
+def explicit_rates(K: Kernel, t: float) -> int:
     """Rates at (q1, y1), in K.jump; where friction follows multipliers by the iteration of `consistent`."""
     n = K.n
-    m = K.state[ROWS]
+    m = K.n_active
     if K.loaded > 0 and K.n_frictions > 0:
         return consistent(K, t, K.q1, K.y1)
     evaluate(K, t, K.q1, K.y1)
-    K.counts[RESIDUALS] += 1
+    K.n_residuals += 1
     finite = 0.0
     for i in range(n):
-        finite += abs(K.acc[n * n + i])
+        finite += abs(K.acc[K.acc_f + i])
     if not finite < 1e300:
         return NOT_FINITE
     if m == 0:
         for i in range(n):
-            K.jump[i] = -K.acc[n * n + i]
+            K.jump[i] = -K.acc[K.acc_f + i]
         kept = solve_definite(K.acc, n, K.jump, K.spare)
         if kept == 0.0:
             return consistent(K, t, K.q1, K.y1)
         if kept < LOSS:
             polish_rates(K, kept)
         return 0
-    o_bias = n * n + n + 2 * n * K.n_rows + 2 * K.n_rows
+    o_bias = K.acc_bias
     if not factor_saddle(K, m, False, LOSS_AT_ONCE):
         return SINGULAR
     for i in range(n):
-        K.rhs[i] = -K.acc[n * n + i]
+        K.rhs[i] = -K.acc[K.acc_f + i]
     for k in range(m):
         K.rhs[n + k] = -K.acc[o_bias + K.rows[k]]
     solve_kkt(K, n + m, K.rhs)
     for i in range(n):
         K.jump[i] = K.rhs[i]
-    if K.state[UNEVEN] == 1:
+    if K.uneven_masses == 1:
         for k in range(K.n_rows):
             K.impulse[k] = 0.0
         for k in range(m):
@@ -191,7 +176,7 @@ def explicit_rates(K: Any, t: float) -> int:
     return 0
 
 
-def factor_saddle(K: Any, m: int, symmetric: bool, loss: float) -> bool:
+def factor_saddle(K: Kernel, m: int, symmetric: bool, loss: float) -> bool:
     """LU factors in K.kkt of [M R; B 0] from K.acc, or of [M Bᵀ; B 0]; false where a pivot is missing.
 
     Pivots of an order chosen beforehand must keep the part `loss` of their terms, else they are searched for.
@@ -201,9 +186,9 @@ def factor_saddle(K: Any, m: int, symmetric: bool, loss: float) -> bool:
     o = order_at(K, m)
     if o > 0 and factor_ordered(K, K.acc, o, SYMMETRIC if symmetric else OF_ACCELERATIONS, loss):
         return True
-    K.state[ORDERED] = 0
-    o_R = n * n + n
-    o_B = o_R + n * K.n_rows
+    K.order_start = 0
+    o_R = K.acc_R
+    o_B = K.acc_B
     for i in range(n):
         for j in range(n):
             K.kkt[i * size + j] = K.acc[i * n + j]
@@ -218,16 +203,16 @@ def factor_saddle(K: Any, m: int, symmetric: bool, loss: float) -> bool:
     return bool(factor(K.kkt, size, K.pivots) == 0)
 
 
-def return_to_rows(K: Any, t1: float) -> int:
+def return_to_rows(K: Kernel, t1: float) -> int:
     """The nearest positions with h = 0 and velocities with ḣ = 0, in the metric of M, in place of (q1, y1)."""
     n = K.n
-    m = K.state[ROWS]
-    o_h = n * n + n + 2 * n * K.n_rows
+    m = K.n_active
+    o_h = K.acc_h
     before = 1e300
     size = 0.0
     for _ in range(MOST_RETURNS):
         evaluate(K, t1, K.q1, K.y1)
-        K.counts[RESIDUALS] += 1
+        K.n_residuals += 1
         size = 0.0
         for i in range(n):
             K.rhs[i] = 0.0
@@ -252,7 +237,7 @@ def return_to_rows(K: Any, t1: float) -> int:
         for k in range(m):
             size = max(size, abs(K.rhs[n + k]) / (16.0 * EPS * K.scale[n + K.rows[k]]))
     if size > 1e3:
-        K.detail[1] = size
+        K.failure_size = size
         return NOT_CONVERGED
     for i in range(n):
         K.rhs[i] = 0.0
@@ -267,12 +252,12 @@ def return_to_rows(K: Any, t1: float) -> int:
             fastest = max(fastest, max(abs(K.y[i]), abs(K.y1[i])))
         K.y1[i] += K.rhs[i]
     if change > max(CONTINUOUS * fastest, K.rest_speed + STILL):  # rows that lose rank take the branch for another
-        K.detail[1] = 0.0
+        K.failure_size = 0.0
         return NOT_CONVERGED
     return 0
 
 
-def explicit_error(K: Any, h: float) -> None:
+def explicit_error(K: Kernel, h: float) -> None:
     """K.error: local error by the embedded formulas, ``h e₅ · |e₅| / √(|e₅|² + |e₃|²/100)`` (Hairer et al., II.10).
 
     The sizes |e| are the largest over positions and h times velocities; first-order states have sizes of their own.
@@ -304,15 +289,15 @@ def explicit_error(K: Any, h: float) -> None:
         K.error[i] *= share
 
 
-def hold_error(K: Any) -> bool:
+def hold_error(K: Kernel) -> bool:
     """K.error less what the projection onto the rows takes of it, in the metric of M; false if that is singular.
 
     Stages next to a pose in which rows lose rank err across the rows, most of which is gone at the end of the step.
     """
     n = K.n
     n_v = K.n_v
-    m = K.state[ROWS]
-    o_B = n * n + n + n * K.n_rows
+    m = K.n_active
+    o_B = K.acc_B
     if not factor_saddle(K, m, True, LOSS_AT_ONCE):
         return False
     for level in range(2):
@@ -330,7 +315,7 @@ def hold_error(K: Any) -> bool:
     return True
 
 
-def runge_kutta_accept(K: Any, h: float) -> None:
+def runge_kutta_accept(K: Kernel, h: float) -> None:
     """The candidate becomes the accepted state."""
     inverse = 1.0 / h
     for i in range(K.n_q):
@@ -342,6 +327,6 @@ def runge_kutta_accept(K: Any, h: float) -> None:
         K.aux[i] = K.rate1[i]
     for k in range(K.n_rows):
         K.lam[k] = K.lam1[k]
-    if K.state[ROWS] > 0:
+    if K.n_active > 0:
         keep_leftovers(K, h)
-    K.clock[AUX_STEP] = h
+    K.aux_step = h

@@ -13,29 +13,13 @@ tangent itself; that of the pair is put together from three of them.
 
 from __future__ import annotations
 
-from typing import Any
-
+from mbd.kernel.codes import EPS, PASSING
 from mbd.kernel.complex_linear import factor_complex, solve_complex
-from mbd.kernel.fields import (
-    AUX_STEP,
-    BLOCKED,
-    EPS,
-    FACTORIZATIONS,
-    ITERATIONS,
-    MODE,
-    NEAR,
-    NOW,
-    ORDERED,
-    PASSING,
-    PIVOTED,
-    RESIDUALS,
-    ROWS,
-    TANGENTS,
-)  # fmt: skip
 from mbd.kernel.hooks import call
 from mbd.kernel.linear import factor
 from mbd.kernel.ordered import LOSS_OF_STEP, OF_TANGENT, factor_ordered, order_at, solve_kkt
 from mbd.kernel.ordered_complex import factor_pair_ordered, solve_pair_ordered
+from mbd.kernel.records import Kernel
 from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import add_shares, share_loads
 from mbd.kernel.schemes.iteration import residual_size
@@ -60,7 +44,7 @@ MOST_STRETCHED = 4.0
 """Size of a step over that of the last above which its stages predict nothing: a parabola would go far astray [-]."""
 
 
-def stage_place(K: Any, part: int) -> int:
+def stage_place(K: Kernel, part: int) -> int:
     """Where a part of K.stages begins.
 
     W (3, n) | λ (3, rows) | U (3, n_v) | last changes of W and λ | r and ḣ of each stage | h | H U | M | c² K |
@@ -95,7 +79,7 @@ def stage_place(K: Any, part: int) -> int:
     return int(place)
 
 
-def hold_block(K: Any) -> None:
+def hold_block(K: Kernel) -> None:
     """What all stages of a step share, into the block: the center of the chart, anchors, sliding."""
     for i in range(K.n_q):
         K.block[K.o_q + i] = K.q[i]
@@ -105,7 +89,7 @@ def hold_block(K: Any) -> None:
         K.block[K.o_slip + f] = K.slip[f]
 
 
-def predict_stages(K: Any, h: float, m: int) -> None:
+def predict_stages(K: Kernel, h: float, m: int) -> None:
     """W_i, λ_i and U_i from the parabola through those of the last step, as they are now after one far shorter."""
     S = K.stages
     P = K.past_stages
@@ -113,7 +97,7 @@ def predict_stages(K: Any, h: float, m: int) -> None:
     o_W = stage_place(K, STAGE_RATES)
     o_L = stage_place(K, STAGE_LAM)
     o_U = stage_place(K, STAGE_SHIFT)
-    stretch = h / K.clock[AUX_STEP]
+    stretch = h / K.aux_step
     for i in range(3):
         s = 1.0 + stretch * S[C_ + i]
         l0 = (s - S[C_ + 1]) * (s - S[C_ + 2]) / ((S[C_] - S[C_ + 1]) * (S[C_] - S[C_ + 2]))
@@ -137,7 +121,7 @@ def predict_stages(K: Any, h: float, m: int) -> None:
             S[o_U + i * K.n_v + j] = shift if stretch <= MOST_STRETCHED else 0.0
 
 
-def load_stage(K: Any, i: int, h: float, t1: float) -> None:
+def load_stage(K: Kernel, i: int, h: float, t1: float) -> None:
     """Stage i into the block."""
     S = K.stages
     n = K.n
@@ -145,7 +129,7 @@ def load_stage(K: Any, i: int, h: float, t1: float) -> None:
     o_W = stage_place(K, STAGE_RATES)
     o_L = stage_place(K, STAGE_LAM) + i * K.n_rows
     o_U = stage_place(K, STAGE_SHIFT) + i * K.n_v
-    block[0] = t1 if i == 2 else K.clock[NOW] + S[C_ + i] * h
+    block[0] = t1 if i == 2 else K.time + S[C_ + i] * h
     for j in range(n):
         w0 = S[o_W + j]
         w1 = S[o_W + n + j]
@@ -158,11 +142,11 @@ def load_stage(K: Any, i: int, h: float, t1: float) -> None:
     for k in range(K.n_rows):
         block[K.o_lam + k] = S[o_L + k]
     if sharing(K):
-        share_loads(K, K.state[ROWS])
+        share_loads(K, K.n_active)
 
 
 def evaluate_stages(
-    K: Any, h: float, t1: float, m: int, tolerance: float, c_C: float, c_K: float, renew: bool
+    K: Kernel, h: float, t1: float, m: int, tolerance: float, c_C: float, c_K: float, renew: bool
 ) -> float:
     """r, ḣ and h of all stages into K.stages; the largest over its tolerance (see `residual_size`), −1 if not finite.
 
@@ -179,8 +163,8 @@ def evaluate_stages(
             matrices(K, m, h)
             o = (n + m) * (n + m)
         else:
-            call(K, K.mode_code[4 * K.state[MODE] + 1], K.out)
-            K.counts[RESIDUALS] += 1
+            call(K, K.mode_code[4 * K.mode_id + 1], K.out)
+            K.n_residuals += 1
         size = residual_size(K, o, m, c_C, c_K, tolerance, 1)
         if size < 0.0:  # the stage stays in the block, which tells why
             return -1.0
@@ -193,7 +177,7 @@ def evaluate_stages(
     return largest
 
 
-def matrices(K: Any, m: int, h: float) -> None:
+def matrices(K: Kernel, m: int, h: float) -> None:
     """The real and the complex matrix at the block, whose r, h and ḣ stay in K.out.
 
     ``P(c) = M + c C + c² K`` and the rows ``B + c ∂ḣ/∂x``: at c = μh, (c, 0) and (−c, 0) the compiled tangent gives
@@ -206,20 +190,20 @@ def matrices(K: Any, m: int, h: float) -> None:
     o_M = stage_place(K, MASS_PART)
     o_K = stage_place(K, STIFF_PART)
     o_P = stage_place(K, PAIR)
-    K.block[1] = c
-    K.block[2] = c * c
+    K.block_c_C = c
+    K.block_c_K = c * c
     tangent_of_stage(K, m)
     for k in range(size * size):
         K.kkt[k] = K.out[k]
     for k in range(m * K.n_v):
         K.turning[k] = K.out[size * size + n + 2 * m + k]
-    K.block[2] = 0.0
+    K.block_c_K = 0.0
     tangent_of_stage(K, m)
     for k in range(size * size):
         S[o_P + k] = K.out[k]
-    K.block[1] = -c
+    K.block_c_C = -c
     tangent_of_stage(K, m)
-    K.counts[TANGENTS] += 3
+    K.n_tangents += 3
     inverse = 1.0 / S[MU_REAL]
     re = S[MU_RE] * inverse
     im = S[MU_IM] * inverse
@@ -229,7 +213,7 @@ def matrices(K: Any, m: int, h: float) -> None:
             full = K.kkt[k]
             part = S[o_P + k]
             if i >= n:
-                if K.state[NEAR] == PASSING:
+                if K.near_singular == PASSING:
                     K.kkt[k] = part
                     full = part
                 S[o_P + k] = part + re * (full - part)
@@ -246,14 +230,14 @@ def matrices(K: Any, m: int, h: float) -> None:
     keep_held(K, m)
 
 
-def tangent_of_stage(K: Any, m: int) -> None:
+def tangent_of_stage(K: Kernel, m: int) -> None:
     """The tangent at the block in K.out, with what dependent rows bear where a friction slides."""
-    call(K, K.mode_code[4 * K.state[MODE]], K.out)
+    call(K, K.mode_code[4 * K.mode_id], K.out)
     if sharing(K):
         add_shares(K, K.out, m)
 
 
-def keep_held(K: Any, m: int) -> None:
+def keep_held(K: Kernel, m: int) -> None:
     """H U_i with the new H, from which U_i are found anew: they stay in the range of the rows in one metric."""
     size = K.n + m
     o_U = stage_place(K, STAGE_SHIFT)
@@ -266,25 +250,25 @@ def keep_held(K: Any, m: int) -> None:
             K.stages[o_H + i * m + k] = total
 
 
-def factor_stages(K: Any, size: int) -> bool:
+def factor_stages(K: Kernel, size: int) -> bool:
     """LU factors of both matrices; false where a pivot is missing."""
     o = 0 if sharing(K) else order_at(K, size - K.n)
     column = 0
     if o == 0 or not factor_ordered(K, K.kkt, o, OF_TANGENT, LOSS_OF_STEP):
-        K.state[ORDERED] = 0
-        K.counts[PIVOTED] += 1 if o > 0 else 0
+        K.order_start = 0
+        K.n_pivoted += 1 if o > 0 else 0
         column = factor(K.kkt, size, K.pivots)
     o_P = stage_place(K, PAIR_PIVOTS)
     if column == 0 and o > 0 and factor_pair_ordered(K, stage_place(K, PAIR), o, LOSS_OF_STEP):
         K.stages[o_P] = -float(o)  # in the place of a row, which is not negative
     elif column == 0:
         column = factor_complex(K.stages, stage_place(K, PAIR), size, o_P)
-    K.counts[FACTORIZATIONS] += 1
-    K.state[BLOCKED] = column - 1
+    K.n_factorizations += 1
+    K.failure_index = column - 1
     return bool(column == 0)
 
 
-def is_off(K: Any, m: int) -> bool:
+def is_off(K: Kernel, m: int) -> bool:
     """Whether rows on positions are above round-off at a stage: below, correcting would only stir the velocities."""
     o_h = stage_place(K, HEIGHTS)
     for i in range(3):
@@ -295,7 +279,7 @@ def is_off(K: Any, m: int) -> bool:
     return False
 
 
-def correct_positions_of_stages(K: Any, m: int, h: float, whole: bool) -> None:
+def correct_positions_of_stages(K: Kernel, m: int, h: float, whole: bool) -> None:
     """New U_i; what they change of ḣ and of the balance, the rates make good in the same iteration.
 
     What is left of h once the rates have done away with ḣ at all stages, ``h_i − h Σ a_ij ḣ_j``, is theirs.
@@ -340,21 +324,21 @@ def correct_positions_of_stages(K: Any, m: int, h: float, whole: bool) -> None:
             S[o_r + i * size + k] += pulled / (c * c)
 
 
-def correct_stages(K: Any, m: int, h: float, whole: bool) -> float:
+def correct_stages(K: Kernel, m: int, h: float, whole: bool) -> float:
     """One simplified Newton correction of all stages; its size relative to the largest rate."""
     if m > 0 and (whole or is_off(K, m)):
         correct_positions_of_stages(K, m, h, whole)
     return correct_rates(K, m, h)
 
 
-def correct_rates(K: Any, m: int, h: float) -> float:
+def correct_rates(K: Kernel, m: int, h: float) -> float:
     """The correction of rates and multipliers by the residuals in K.stages; its size relative to the largest rate."""
     n = K.n
     size = n + m
     S = K.stages
     solve_real(K, m, h)
     solve_pair(K, m, h)
-    K.counts[ITERATIONS] += 1
+    K.n_iterations += 1
     o_W = stage_place(K, STAGE_RATES)
     o_L = stage_place(K, STAGE_LAM)
     o_D = stage_place(K, CHANGES)
@@ -374,7 +358,7 @@ def correct_rates(K: Any, m: int, h: float) -> float:
     return biggest / fastest
 
 
-def solve_real(K: Any, m: int, h: float) -> None:
+def solve_real(K: Kernel, m: int, h: float) -> None:
     """The component along the real eigenvector, into K.rhs."""
     size = K.n + m
     S = K.stages
@@ -388,7 +372,7 @@ def solve_real(K: Any, m: int, h: float) -> None:
     solve_kkt(K, size, K.rhs)
 
 
-def solve_pair(K: Any, m: int, h: float) -> None:
+def solve_pair(K: Kernel, m: int, h: float) -> None:
     """The component along one vector of the pair, into K.stages."""
     size = K.n + m
     S = K.stages
@@ -414,7 +398,7 @@ def solve_pair(K: Any, m: int, h: float) -> None:
         solve_complex(S, stage_place(K, PAIR), size, o_P, o_b)
 
 
-def retreat_stages(K: Any, m: int, part: float) -> None:
+def retreat_stages(K: Kernel, m: int, part: float) -> None:
     """Take back a part of the last correction of rates and multipliers; all, 1, and then −1 does it again."""
     n = K.n
     size = n + m

@@ -8,14 +8,13 @@ the configuration stays as it is, and time and state of the event come from the 
 
 from __future__ import annotations
 
-from typing import Any
-
 from mbd.kernel.candidate import accept_guards
-from mbd.kernel.fields import BLOCKED, CROSS, LOG_EVENT, NEAR, NOW, POSE, ROWS, STEP
+from mbd.kernel.codes import CROSS, LOG_EVENT
 from mbd.kernel.guards import judge_user
 from mbd.kernel.interior import copy_ends, look_at, put_candidate_back
 from mbd.kernel.observe import store_state
 from mbd.kernel.orthogonal import square
+from mbd.kernel.records import Kernel
 from mbd.kernel.restart import evaluate
 from mbd.kernel.roots import sqrt
 from mbd.kernel.settle import NO_IMPULSE, log_event
@@ -33,36 +32,36 @@ MOST_ROOT_STEPS = 100
 """Steps to the root of an event's measure on the interpolant; it takes about ten [-]."""
 
 
-def may_pass_events(K: Any, h: float) -> bool:
+def may_pass_events(K: Kernel, h: float) -> bool:
     """Whether the candidate's step may hold a singular configuration; where rows are held as index 3 any may."""
-    if K.state[ROWS] == 0 or K.strategy == 1:
+    if K.n_active == 0 or K.strategy == 1:
         return False
     if K.scheme == 0:
-        return bool(K.stabilized == 0 or K.state[NEAR] > 0)
-    return bool(0.0 <= K.clock[POSE] - K.clock[NOW] <= h)
+        return bool(K.stabilized == 0 or K.near_singular > 0)
+    return bool(0.0 <= K.singular_time - K.time <= h)
 
 
-def find_passed_events(K: Any, h: float) -> int:
+def find_passed_events(K: Kernel, h: float) -> int:
     """Times from the start of the step to events without effect next to a singular configuration, into K.crossed.
 
     Those are left out when events are looked for. Returns how many there are; the candidate stays as it is.
     """
     found = 0
-    t = K.clock[NOW]
+    t = K.time
     copy_ends(K, True)
     for part in range(1, K.looks + 1):
         show(K, t, h, part / K.looks)
         for e in range(K.n_guards):
             if K.notify[K.n_contacts + e] == 1 or K.crossed[e] != -1.0:
                 continue
-            K.fired[0] = -1
-            K.pick[0] = 2.0
+            K.event_kind = -1
+            K.event_place = 2.0
             judge_user(K, e, h / K.looks)
-            if K.fired[0] != CROSS:
+            if K.event_kind != CROSS:
                 continue
             K.crossed[e] = ELSEWHERE
-            place = (part - 1 + K.pick[0]) / K.looks
-            low = (part - 1 + K.pick[1]) / K.looks
+            place = (part - 1 + K.event_place) / K.looks
+            low = (part - 1 + K.event_low) / K.looks
             if share_inside(K, t, h, place) > 0.0:
                 place = root_inside(K, e, t, h, low, part / K.looks)
                 if share_inside(K, t, h, place) > HUSHED:
@@ -71,11 +70,11 @@ def find_passed_events(K: Any, h: float) -> int:
             show(K, t, h, part / K.looks)
         accept_guards(K)
     copy_ends(K, False)
-    K.fired[0] = -1
+    K.event_kind = -1
     return found
 
 
-def show(K: Any, t: float, h: float, s: float) -> None:
+def show(K: Kernel, t: float, h: float, s: float) -> None:
     """The interpolant at the part s of the step in place of the candidate; at its end the candidate itself."""
     if s < 1.0:
         look_at(K, t, h, s, False)
@@ -83,7 +82,7 @@ def show(K: Any, t: float, h: float, s: float) -> None:
         put_candidate_back(K)
 
 
-def root_inside(K: Any, e: int, t: float, h: float, low: float, high: float) -> float:
+def root_inside(K: Kernel, e: int, t: float, h: float, low: float, high: float) -> float:
     """Where the measure of event e vanishes on the interpolant, as a part of the step: by regula falsi."""
     place = 4 * K.n_contacts + e
     side = K.side[e]
@@ -119,7 +118,7 @@ def root_inside(K: Any, e: int, t: float, h: float, low: float, high: float) -> 
     return middle
 
 
-def share_inside(K: Any, t: float, h: float, s: float) -> float:
+def share_inside(K: Kernel, t: float, h: float, s: float) -> float:
     """Share of the velocities that round-off makes up at the part s of the step; 0 far from such a configuration.
 
     The candidate's place holds the interpolant afterwards.
@@ -127,7 +126,7 @@ def share_inside(K: Any, t: float, h: float, s: float) -> float:
     look_at(K, t, h, s, False)
     if not comes_close(K, t + s * h, DISTANT):
         return 0.0
-    m = K.state[ROWS]
+    m = K.n_active
     keep_parts(K, m)
     other = 0.0 if s >= 0.5 else 1.0
     show(K, t, h, other)
@@ -136,15 +135,15 @@ def share_inside(K: Any, t: float, h: float, s: float) -> float:
     return most_stirred(K, m, abs(s - other) * h)
 
 
-def comes_close(K: Any, t: float, part: float) -> bool:
+def comes_close(K: Kernel, t: float, part: float) -> bool:
     """Whether what is left of some row beside the others at (q1, y1) is a small part of the longest row.
 
     K.work holds these lengths, K.basis the directions.
     """
-    m = K.state[ROWS]
+    m = K.n_active
     evaluate(K, t, K.q1, K.y1)
     leftovers_here(K, m)
-    o_B = K.n * K.n + K.n + K.n * K.n_rows
+    o_B = K.acc_B
     longest = 0.0  # a row may vanish by itself there
     least = 1e300
     for k in range(m):
@@ -157,7 +156,7 @@ def comes_close(K: Any, t: float, part: float) -> bool:
     return bool(least * least < part * part * longest)
 
 
-def keep_parts(K: Any, m: int) -> None:
+def keep_parts(K: Kernel, m: int) -> None:
     """The independent parts of rows in K.turning and their lengths in K.work[2m:3m]."""
     for k in range(m * K.n):
         K.turning[k] = K.basis[k]
@@ -165,8 +164,8 @@ def keep_parts(K: Any, m: int) -> None:
         K.work[2 * m + k] = K.work[k]
 
 
-def most_stirred(K: Any, m: int, apart: float) -> float:
-    """c/τ² of the parts kept, from those in K.basis at a time `apart` from them; K.state[BLOCKED] names the row."""
+def most_stirred(K: Kernel, m: int, apart: float) -> float:
+    """c/τ² of the parts kept, from those in K.basis at a time `apart` from them; K.failure_index names the row."""
     n = K.n
     speed = max(motion(K, K.y), motion(K, K.y1))
     largest = 0.0
@@ -179,34 +178,34 @@ def most_stirred(K: Any, m: int, apart: float) -> float:
         share = stirring(K, k, fall, speed) * fall * fall / (here * here + 1e-300) if fall > 0.0 else 0.0
         if share > largest:
             largest = share
-            K.state[BLOCKED] = K.n + k
+            K.failure_index = K.n + k
     return largest
 
 
-def refuses(K: Any, h: float) -> bool:
+def refuses(K: Kernel, h: float) -> bool:
     """Whether the candidate ends where round-off makes too much of velocities to restart from there.
 
-    K.detail tells when it ends, the share and the size of the step; K.state[BLOCKED] the row.
+    K.detail tells when it ends, the share and the size of the step; K.failure_index the row.
     """
-    t = K.clock[NOW]
-    if K.state[ROWS] == 0 or h < 1e-6 * K.clock[STEP] or not comes_close(K, t + h, NEXT_TO):
+    t = K.time
+    if K.n_active == 0 or h < 1e-6 * K.step or not comes_close(K, t + h, NEXT_TO):
         return False
-    m = K.state[ROWS]
+    m = K.n_active
     keep_parts(K, m)
     evaluate(K, t, K.q, K.y)
     leftovers_here(K, m)
     share = most_stirred(K, m, h)
     if share <= LOUD:
         return False
-    K.detail[0] = t + h
-    K.detail[1] = min(share, 1.0)
-    K.detail[2] = h
+    K.failure_time = t + h
+    K.failure_size = min(share, 1.0)
+    K.failure_step = h
     return True
 
 
-def log_passed_events(K: Any, h: float) -> None:
+def log_passed_events(K: Kernel, h: float) -> None:
     """Rows and lines of the log of events in K.crossed up to h, in order of time, from the candidate's interpolant."""
-    t = K.clock[NOW]
+    t = K.time
     copy_ends(K, True)
     for _ in range(K.n_guards):
         first = -1
@@ -219,13 +218,13 @@ def log_passed_events(K: Any, h: float) -> None:
         show(K, t, h, at / h)
         for k in range(K.n_rows):
             K.lam1[k] = K.lam[k] + at / h * (K.lam1[k] - K.lam[k])
-        K.clock[NOW] = t + at
+        K.time = t + at
         store_state(K, K.q1, K.y1, K.rate1, K.lam1)
         log_event(K, LOG_EVENT, first, 0.0, NO_IMPULSE)
         store_state(K, K.q1, K.y1, K.rate1, K.lam1)
-        K.clock[NOW] = t
+        K.time = t
         put_candidate_back(K)
         K.side[first] = -K.side[first]
         K.crossed[first] = -1.0
     copy_ends(K, False)
-    K.fired[0] = -1
+    K.event_kind = -1

@@ -9,34 +9,12 @@ projected onto the rows and the scheme starts again, but for the average that it
 
 from __future__ import annotations
 
-from typing import Any
-
-from mbd.kernel.fields import (
-    AUX_STEP,
-    CAREFUL,
-    EPS,
-    FACTORIZATIONS,
-    ITERATIONS,
-    KICK,
-    LEFT,
-    MODE,
-    NEAR,
-    NOT_CONVERGED,
-    NOT_FINITE,
-    ORDERED,
-    PASSING,
-    PIVOT,
-    PIVOTED,
-    ROWS,
-    SINGULAR,
-    STAGNATIONS,
-    STEP,
-    TANGENTS,
-)  # fmt: skip
+from mbd.kernel.codes import EPS, LEFT, NOT_CONVERGED, NOT_FINITE, PASSING, SINGULAR
 from mbd.kernel.hooks import call
 from mbd.kernel.linear import factor
 from mbd.kernel.ordered import LOSS_OF_STEP, OF_TANGENT, factor_ordered, order_at, solve_kkt, weakest_pivot
 from mbd.kernel.orthogonal import clear_row, square
+from mbd.kernel.records import Kernel
 from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import (
     add_shares,
@@ -65,7 +43,7 @@ CONTINUOUS = 0.05
 """Part of the speed by which a step near such a pose may differ from its prediction: the branch goes on in v [-]."""
 
 
-def steps_of_fall(K: Any, m: int, straight: bool) -> float:
+def steps_of_fall(K: Kernel, m: int, straight: bool) -> float:
     """Steps until the smallest pivot of the rows vanishes, if it goes on as since the last step; a cheap first look.
 
     Pivots in an order given beforehand tell their own; where they gave way to a search for pivots, they do not compare:
@@ -75,27 +53,27 @@ def steps_of_fall(K: Any, m: int, straight: bool) -> float:
     largest = 0.0
     if straight:
         largest = K.out[soundness_at(K, m) + 1]
-    elif K.state[ORDERED] > 0:
+    elif K.order_start > 0:
         largest = weakest_pivot(K)
     else:
         for k in range(K.n, size):  # the inverses are on the diagonal
             largest = max(largest, abs(K.kkt[k * size + k]))
-        if K.mode_code[4 * K.state[MODE] + 2] > 0 or order_at(K, m) > 0:
-            K.detail[PIVOT] = 0.0
+        if K.mode_code[4 * K.mode_id + 2] > 0 or order_at(K, m) > 0:
+            K.inverse_pivot = 0.0
             return 0.0
-    before = K.detail[PIVOT]
-    K.detail[PIVOT] = largest
+    before = K.inverse_pivot
+    K.inverse_pivot = largest
     return float(before / (largest - before)) if largest > before else 1e300
 
 
-def steps_to_pose(K: Any, m: int, h: float, ratio: float, straight: bool) -> float:
+def steps_to_pose(K: Kernel, m: int, h: float, ratio: float, straight: bool) -> float:
     """Steps of size h until a row of B depends on the others: how far it is from that, over what a step changes of it.
 
     1e300 where the row does not vanish there: it turns, and others with it.
 
     K.out holds the diagonal of S and H = B + ratio ∂ḣ/∂x, in the tangent or, of straight-line code, behind the shift;
-    K.turning holds ∂ḣ/∂x, which is the rate of B. K.detail[KICK] tells what round-off of that row makes of velocities,
-    over the speed, in a whole step that holds positions.
+    K.turning holds ∂ḣ/∂x, which is the rate of B. K.velocity_noise tells what round-off of that row makes of
+    velocities, over the speed, in a whole step that holds positions.
     """
     size = K.n + m
     o_S = 0
@@ -123,7 +101,7 @@ def steps_to_pose(K: Any, m: int, h: float, ratio: float, straight: bool) -> flo
             fewest = here / change
             nearest = k
             across = 4.0 * EPS * K.scale[K.n + K.rows[K.columns[k]]] / (here * K.spare[3 * m + k] + 1e-300)
-            K.detail[KICK] = across / (K.clock[STEP] * sqrt(speed) + 1e-300)
+            K.velocity_noise = across / (K.step * sqrt(speed) + 1e-300)
     if (
         NEAREST < fewest < WITHIN + 2.0
     ):  # a row that turns, beside others that turn with it, changes but does not vanish
@@ -135,7 +113,7 @@ def steps_to_pose(K: Any, m: int, h: float, ratio: float, straight: bool) -> flo
 
 
 def find_leftovers(
-    K: Any, m: int, h: float, ratio: float, ahead: float, place: int, o_S: int, stride: int, o_H: int, width: int
+    K: Kernel, m: int, h: float, ratio: float, ahead: float, place: int, o_S: int, stride: int, o_H: int, width: int
 ) -> None:
     """`leftovers`, by products of rows where most of them have nothing in common."""
     if order_at(K, m) > 0:
@@ -144,23 +122,23 @@ def find_leftovers(
         leftovers(K, m, h, ratio, ahead, place, o_S, stride, o_H, width)
 
 
-def misses(K: Any, away: float, h: float) -> bool:
+def misses(K: Kernel, away: float, h: float) -> bool:
     """Whether whole steps from the end of this one would end too close to the pose: then it gets another size.
 
     While ḣ is held too, steps may do that; those that hold h alone start to ring. It is the last whole one before these
     that is looked at, or one that was shortened for another reason; those of a pair (`step_pairs`) are not.
     """
-    if away < 1.0 or away >= WITHIN + 1.0 or is_of_pair(h / K.clock[STEP]):
+    if away < 1.0 or away >= WITHIN + 1.0 or is_of_pair(h / K.step):
         return False
     part = away - int(away)
     part = min(part, 1.0 - part)
     foreseen = away >= WITHIN - FORESEEN and is_whole(K, h)  # nearer it was judged already, as a rule
     doubt = FORESEEN - NEAREST if foreseen else 0.0
-    return bool(part < NEAREST + doubt and K.detail[KICK] * away > K.tolerance * max(part - doubt, 1e-3))
+    return bool(part < NEAREST + doubt and K.velocity_noise * away > K.tolerance * max(part - doubt, 1e-3))
 
 
 def leftovers(
-    K: Any, m: int, h: float, ratio: float, ahead: float, place: int, o_S: int, stride: int, o_H: int, width: int
+    K: Kernel, m: int, h: float, ratio: float, ahead: float, place: int, o_S: int, stride: int, o_H: int, width: int
 ) -> None:
     """Lengths of the rows of B, `ahead` of now, less their parts along earlier ones, into K.spare from `place` on.
 
@@ -210,21 +188,21 @@ def leftovers(
             clear_row(Q, k * n, done * n, n)
 
 
-def passing_step(K: Any, h: float, t1: float) -> int:
+def passing_step(K: Kernel, h: float, t1: float) -> int:
     """The step with h held and ḣ left alone: the scheme's own, so that the motion along the branch errs as before.
 
     The correction of positions stays what it was in the last step that held both: without it, accelerations would have
     to make it good and multipliers begin with a transient of order dt. The steps are too few for undamped multipliers
     to grow. Newton's method has a tangent each time.
     """
-    m = K.state[ROWS]
+    m = K.n_active
     o_r = (K.n + m) * (K.n + m)
     c = (1.0 - K.alpha_f) / (1.0 - K.alpha_m)
     c_C = K.gamma * h * c
     c_K = K.beta * h * h * c
-    K.state[NEAR] = PASSING
+    K.near_singular = PASSING
     predict(K, h, t1, c_C, c_K)
-    stretch = min(h / K.clock[AUX_STEP], 1.0)
+    stretch = min(h / K.aux_step, 1.0)
     cube = stretch * stretch * stretch
     for i in range(K.n):
         K.y1[i] = K.block[K.o_v + i]
@@ -232,16 +210,16 @@ def passing_step(K: Any, h: float, t1: float) -> int:
             K.block[K.o_x + i] -= K.shift1[i]
             K.shift1[i] = K.shift[i] * cube
             K.block[K.o_x + i] += K.shift1[i]
-    K.detail[0] = t1
-    K.detail[2] = h
+    K.failure_time = t1
+    K.failure_step = h
     tolerance = 4.0 * EPS if K.exact == 1 else 1e-3 * K.tolerance
     before = 1e300
     away = 0.0
     for iteration in range(K.max_iterations):
         if sharing(K):
             share_loads(K, m)
-        call(K, K.mode_code[4 * K.state[MODE]], K.out)
-        K.counts[TANGENTS] += 1
+        call(K, K.mode_code[4 * K.mode_id], K.out)
+        K.n_tangents += 1
         error = residual_size(K, o_r, m, c_C, c_K, tolerance, 0)
         if error < 0.0:
             return NOT_FINITE
@@ -253,29 +231,29 @@ def passing_step(K: Any, h: float, t1: float) -> int:
                 return NOT_CONVERGED
             error = residual_size(K, o_r, m, c_C, c_K, tolerance, 0)
             if error > 1.0 and residual_size(K, o_r, m, 0.0, 0.0, 256.0 * EPS, 0) <= 16.0:
-                K.counts[STAGNATIONS] += 1
+                K.n_stagnations += 1
                 error = 1.0
             if error <= 1.0:
                 retain_scales(K)
             else:
                 restore_scales(K)
-        K.detail[1] = error
+        K.failure_size = error
         if iteration == 0:
             for k in range(m * K.n_v):
                 K.turning[k] = K.out[o_r + K.n + 2 * m + k]
             away = steps_to_pose(K, m, h, c_K / c_C, False)
-            if away < NEAREST and K.detail[KICK] > K.tolerance:
+            if away < NEAREST and K.velocity_noise > K.tolerance:
                 return SINGULAR
         if error <= 1.0:
-            K.detail[1] = 0.0
+            K.failure_size = 0.0
             if leaves_branch(K, h):
                 return NOT_CONVERGED
             finish(K, h)
             if overturns(K, h):
-                K.detail[1] = -1.0
+                K.failure_size = -1.0
                 return NOT_CONVERGED
-            K.counts[CAREFUL] += 1
-            K.state[NEAR] = PASSING if away < WITHIN else LEFT
+            K.n_careful += 1
+            K.near_singular = PASSING if away < WITHIN else LEFT
             return 0
         before = error
         if not correct_positions(K, m, c_C, c_K):
@@ -283,7 +261,7 @@ def passing_step(K: Any, h: float, t1: float) -> int:
     return NOT_CONVERGED
 
 
-def correct_positions(K: Any, m: int, c_C: float, c_K: float) -> bool:
+def correct_positions(K: Kernel, m: int, c_C: float, c_K: float) -> bool:
     """One Newton correction of the index-3 step from the tangent in K.out; false if singular."""
     n = K.n
     size = n + m
@@ -300,8 +278,8 @@ def correct_positions(K: Any, m: int, c_C: float, c_K: float) -> bool:
     if not factor_positions(K, m):
         return False
     solve_kkt(K, size, K.rhs)
-    K.counts[FACTORIZATIONS] += 1
-    K.counts[ITERATIONS] += 1
+    K.n_factorizations += 1
+    K.n_iterations += 1
     for i in range(n):
         K.block[K.o_a + i] += K.rhs[i]
         K.block[K.o_v + i] += c_C * K.rhs[i]
@@ -312,14 +290,14 @@ def correct_positions(K: Any, m: int, c_C: float, c_K: float) -> bool:
     return True
 
 
-def factor_positions(K: Any, m: int) -> bool:
+def factor_positions(K: Kernel, m: int) -> bool:
     """LU factors of the index-3 tangent in K.out; false if a pivot is missing."""
     size = K.n + m
     o = 0 if sharing(K) else order_at(K, m)
     if o > 0 and factor_ordered(K, K.out, o, OF_TANGENT, LOSS_OF_STEP):
         return True
-    K.counts[PIVOTED] += 1 if o > 0 else 0
-    K.state[ORDERED] = 0
+    K.n_pivoted += 1 if o > 0 else 0
+    K.order_start = 0
     for k in range(size * size):
         K.kkt[k] = K.out[k]
     if sharing(K):
@@ -327,7 +305,7 @@ def factor_positions(K: Any, m: int) -> bool:
     return bool(factor(K.kkt, size, K.pivots) == 0)
 
 
-def leaves_branch(K: Any, h: float) -> bool:
+def leaves_branch(K: Kernel, h: float) -> bool:
     """Whether velocities are no continuation of those before the step (the predicted ones are in K.y1)."""
     fastest = 0.0
     change = 0.0

@@ -16,10 +16,9 @@ linearly, the faster the shorter the step.
 
 from __future__ import annotations
 
-from typing import Any
-
-from mbd.kernel.fields import EPS, NEAR, NOT_FINITE, NOW, PASSING, POSE, SINGULAR
+from mbd.kernel.codes import EPS, NOT_FINITE, PASSING, SINGULAR
 from mbd.kernel.ordered import LOSS_OF_STEP, solve_kkt
+from mbd.kernel.records import Kernel
 from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import compose, evaluate
 from mbd.kernel.schemes.runge_kutta import factor_saddle
@@ -45,18 +44,18 @@ MOST_SETTLED = 8
 """Newton corrections of positions onto the rows of a stage; it takes one or two [-]."""
 
 
-def is_astride(K: Any, h: float) -> bool:
+def is_astride(K: Kernel, h: float) -> bool:
     """Whether a step of size h goes over a pose in which rows lose rank, or close by it."""
-    return bool(K.state[NEAR] == PASSING and K.loaded == 0 and not sharing(K)) or is_beside(K, h, BESIDE)
+    return bool(K.near_singular == PASSING and K.loaded == 0 and not sharing(K)) or is_beside(K, h, BESIDE)
 
 
-def is_beside(K: Any, h: float, steps: float) -> bool:
+def is_beside(K: Kernel, h: float, steps: float) -> bool:
     """Whether a step of size h lies within so many steps of the pose found last; not where loads are shared out."""
-    away = K.clock[POSE] - K.clock[NOW]
+    away = K.singular_time - K.time
     return bool(-steps * h < away < (1.0 + steps) * h) and K.loaded == 0 and not sharing(K)
 
 
-def settle_stages(K: Any, h: float, t1: float, m: int, anew: bool) -> int:
+def settle_stages(K: Kernel, h: float, t1: float, m: int, anew: bool) -> int:
     """U_i and λ_i of all stages at their rates, s_i into the changes; 0, or a failure. The block is overwritten.
 
     Where not `anew`, the last correction of rates has moved stages: U_i takes back what that is across their rows. So
@@ -72,7 +71,7 @@ def settle_stages(K: Any, h: float, t1: float, m: int, anew: bool) -> int:
     return 0
 
 
-def keep_moves(K: Any, h: float, m: int) -> None:
+def keep_moves(K: Kernel, h: float, m: int) -> None:
     """What the last correction of rates moves positions, ``h² Σ a²_ij ΔW_j``, in the place of the pair's matrix."""
     S = K.stages
     o_D = stage_place(K, CHANGES)
@@ -85,14 +84,14 @@ def keep_moves(K: Any, h: float, m: int) -> None:
             S[o_P + i * K.n_v + j] = h * h * move
 
 
-def settle_stage(K: Any, i: int, h: float, t1: float, m: int, anew: bool) -> int:
+def settle_stage(K: Kernel, i: int, h: float, t1: float, m: int, anew: bool) -> int:
     """The same of stage i."""
     n = K.n
     S = K.stages
     o_W = stage_place(K, STAGE_RATES) + i * n
     o_L = stage_place(K, STAGE_LAM) + i * K.n_rows
     o_s = stage_place(K, CHANGES) + i * (n + m)
-    o_rate = n * n + n + 2 * n * K.n_rows + K.n_rows
+    o_rate = K.acc_rate
     status = settle_positions(K, i, h, t1, m, anew)
     if status != 0:
         return status
@@ -109,7 +108,7 @@ def settle_stage(K: Any, i: int, h: float, t1: float, m: int, anew: bool) -> int
     if K.n_frictions > 0 and not factor_saddle(K, m, False, LOSS_OF_STEP):
         return SINGULAR
     for j in range(n):
-        load = K.acc[n * n + j]
+        load = K.acc[K.acc_f + j]
         for k in range(n):
             load += K.acc[j * n + k] * S[o_W + k]
         K.rhs[j] = -load
@@ -121,10 +120,10 @@ def settle_stage(K: Any, i: int, h: float, t1: float, m: int, anew: bool) -> int
     return 0
 
 
-def settle_positions(K: Any, i: int, h: float, t1: float, m: int, anew: bool) -> int:
+def settle_positions(K: Kernel, i: int, h: float, t1: float, m: int, anew: bool) -> int:
     """U_i, with K.acc at the stage and the factors of [M Bᵀ; B 0] there."""
     n = K.n
-    o_h = n * n + n + 2 * n * K.n_rows
+    o_h = K.acc_h
     o_U = stage_place(K, STAGE_SHIFT) + i * K.n_v
     for j in range(K.n_v):
         K.stages[o_U + j] *= 0.0 if anew else 1.0
@@ -135,11 +134,11 @@ def settle_positions(K: Any, i: int, h: float, t1: float, m: int, anew: bool) ->
         compose(K, K.q1)
         for j in range(n):
             K.y1[j] = K.block[K.o_v + j]
-        evaluate(K, K.block[0], K.q1, K.y1)
+        evaluate(K, K.block_time, K.q1, K.y1)
         size = 0.0
         for j in range(n):
             K.rhs[j] = 0.0
-            if not abs(K.acc[n * n + j]) < 1e300:
+            if not abs(K.acc[K.acc_f + j]) < 1e300:
                 return NOT_FINITE
         for k in range(m):
             row = K.rows[k]
@@ -162,10 +161,10 @@ def settle_positions(K: Any, i: int, h: float, t1: float, m: int, anew: bool) ->
     return 0
 
 
-def take_back(K: Any, i: int, m: int) -> None:
+def take_back(K: Kernel, i: int, m: int) -> None:
     """−B Δx into the right-hand side, with Δx what `keep_moves` kept of stage i."""
     n = K.n
-    o_B = n * n + n + n * K.n_rows
+    o_B = K.acc_B
     o_x = stage_place(K, PAIR) + i * K.n_v
     for k in range(m):
         row = K.rows[k]
@@ -176,7 +175,7 @@ def take_back(K: Any, i: int, m: int) -> None:
         K.rhs[n + k] = -across
 
 
-def turn_rows(K: Any, o_r: int, m: int) -> None:
+def turn_rows(K: Kernel, o_r: int, m: int) -> None:
     """``−B₂ s_i`` in place of ḣ_i in the residuals, which begin at o_r; B₂ are the rows of the matrix in K.kkt."""
     size = K.n + m
     o_s = stage_place(K, CHANGES)

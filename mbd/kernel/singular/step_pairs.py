@@ -8,9 +8,7 @@ grid happens to lie: enough to hide that the sum of all errors falls as dt².
 
 from __future__ import annotations
 
-from typing import Any
-
-from mbd.kernel.fields import HALVED, PAIRED, STEP
+from mbd.kernel.records import Kernel
 
 __all__ = ["ALONE", "FIRST", "LONGER", "SECOND", "SHORTER", "WHOLE", "is_of_pair", "is_whole", "may_pair"]
 
@@ -19,7 +17,7 @@ LONGER = 0.75 + 0.38188130791298669
 SHORTER = 0.75 - 0.38188130791298669
 """3/4 − √(7/48), part of dt, of the first [-]."""
 SECOND, FIRST, ALONE = 1, 2, 3
-"""Values of state[PAIRED]: the longer of a pair is next, the shorter is tried; one that has its size for a pose is."""
+"""Values of paired_step: the longer of a pair is next, the shorter is tried; one that has its size for a pose is."""
 WHOLE = 1e-6
 """Part of dt by which a step may differ from the size it counts as: round-off of instants [-]."""
 
@@ -29,11 +27,11 @@ def is_of_pair(size: float) -> bool:
     return abs(size - SHORTER) <= WHOLE or abs(size - LONGER) <= WHOLE
 
 
-def is_whole(K: Any, h: float) -> bool:
+def is_whole(K: Kernel, h: float) -> bool:
     """Whether a step of size h is one of the grid."""
-    return bool(abs(h - K.clock[STEP]) <= WHOLE * K.clock[STEP])
+    return bool(abs(h - K.step) <= WHOLE * K.step)
 
 
-def may_pair(K: Any, h: float) -> bool:
+def may_pair(K: Kernel, h: float) -> bool:
     """Whether a step of size h that would lead too near to a pose may be replaced by a pair: one of the grid."""
-    return bool(K.state[PAIRED] == 0 and K.state[HALVED] == 0 and is_whole(K, h))
+    return bool(K.paired_step == 0 and K.halvings == 0 and is_whole(K, h))

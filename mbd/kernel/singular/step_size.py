@@ -19,9 +19,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from mbd.kernel.fields import BLOCKED, EPS, KICK, NEAR, NOW, PASSING, POSE, ROWS
+from mbd.kernel.codes import EPS, PASSING
 from mbd.kernel.ordered import order_at
 from mbd.kernel.orthogonal import clear_row, square
+from mbd.kernel.records import Kernel
 from mbd.kernel.restart import compose, evaluate, fill_block
 from mbd.kernel.roots import sqrt
 from mbd.kernel.singular.gram_norms import common_part
@@ -72,37 +73,37 @@ NOWHERE = 1e300
 """Time to a pose where there is none [s]."""
 
 
-def amid(K: Any) -> float:
+def amid(K: Kernel) -> float:
     """Part of a step at which a pose lies best."""
     return AMID_RADAU if K.scheme == 2 else AMID
 
 
-def far_glance(K: Any) -> float:
+def far_glance(K: Kernel) -> float:
     """Steps to a pose below which is looked closer where round-off asks for it."""
     return FAR_GLANCE_RADAU if K.scheme == 2 else FAR_GLANCE
 
 
-def longest_over(K: Any) -> float:
+def longest_over(K: Kernel) -> float:
     """Steps of the grid that one over a pose may last."""
     return LONGEST_RADAU if K.scheme == 2 else LONGEST
 
 
-def may_stretch(K: Any) -> bool:
+def may_stretch(K: Kernel) -> bool:
     """Whether a step over a pose may be longer than others: of an explicit scheme only where no guard is watched."""
     return bool(K.n_watched == 0 or K.scheme == 2)
 
 
-def forget_leftovers(K: Any) -> None:
+def forget_leftovers(K: Kernel) -> None:
     """Nothing is known at the start of the scheme: whether a pose is near is looked at before the first step."""
-    K.clock[POSE] = -NOWHERE
+    K.singular_time = -NOWHERE
     for k in range(K.n_rows):
         K.left[k] = -1.0
-    K.left[K.state[ROWS]] = 1.0
+    K.left[K.n_active] = 1.0
 
 
-def note_leftovers(K: Any) -> None:
+def note_leftovers(K: Kernel) -> None:
     """|w| of each row at the candidate, at which K.acc is, and √(2 T): accepted with it by `keep_leftovers`."""
-    m = K.state[ROWS]
+    m = K.n_active
     if order_at(K, m) > 0:
         lengths_of_many(K, m)
     else:
@@ -112,12 +113,12 @@ def note_leftovers(K: Any) -> None:
     K.left1[m] = motion(K, K.y1)
 
 
-def keep_leftovers(K: Any, h: float) -> None:
+def keep_leftovers(K: Kernel, h: float) -> None:
     """The candidate is accepted after a step of h: |w| of each row, and whether one falls so that a pose may be near.
 
     K.left[m] = 1 where it is to be looked for, else 0.
     """
-    m = K.state[ROWS]
+    m = K.n_active
     near = 0.0
     for k in range(m):
         fall = K.left[k] - K.left1[k]
@@ -131,7 +132,7 @@ def keep_leftovers(K: Any, h: float) -> None:
     K.left[m] = near
 
 
-def motion(K: Any, y: Any) -> float:
+def motion(K: Kernel, y: Any) -> float:
     """√(Σ M_jj v_j²), of the size of √(2 T), with M in K.acc."""
     size = 0.0
     for j in range(K.n_v):
@@ -139,7 +140,7 @@ def motion(K: Any, y: Any) -> float:
     return float(sqrt(size) + 1e-300)
 
 
-def stirring(K: Any, k: int, fall: float, speed: float) -> float:
+def stirring(K: Kernel, k: int, fall: float, speed: float) -> float:
     """c [s²] of the share c/τ² of the velocities that round-off makes of them where a step ends τ from a pose.
 
     Round-off δ of a row leaves positions open by δ/|w|; ḣ = 0 makes velocities δ/(|w| τ) of that, with |w| = fall τ.
@@ -151,22 +152,22 @@ def stirring(K: Any, k: int, fall: float, speed: float) -> float:
     return float(STIR * EPS * turned * K.scale[K.n + K.rows[k]] / (fall * speed + 1e-300))
 
 
-def weigh_columns(K: Any) -> None:
+def weigh_columns(K: Kernel) -> None:
     """1/√M_jj into K.spare, with M in K.acc."""
     for j in range(K.n):
         weight = K.acc[j * K.n + j]
         K.spare[j] = 1.0 / sqrt(weight) if weight > 0.0 else 1.0
 
 
-def load_row(K: Any, k: int) -> None:
+def load_row(K: Kernel, k: int) -> None:
     """Row k of those in K.rows, of B in K.acc, on the columns weighed by `weigh_columns`, into line k of K.basis."""
     n = K.n
-    row = n * n + n + n * K.n_rows + K.rows[k] * n
+    row = K.acc_B + K.rows[k] * n
     for j in range(n):
         K.basis[k * n + j] = K.acc[row + j] * K.spare[j]
 
 
-def leftovers_here(K: Any, m: int) -> None:
+def leftovers_here(K: Kernel, m: int) -> None:
     """Gram–Schmidt on the rows of B in K.acc, in their order: |w| into K.work, w/|w| into K.basis."""
     n = K.n
     weigh_columns(K)
@@ -181,7 +182,7 @@ def leftovers_here(K: Any, m: int) -> None:
             K.basis[k * n + j] *= inverse
 
 
-def lengths_of_many(K: Any, m: int) -> None:
+def lengths_of_many(K: Kernel, m: int) -> None:
     """|w| into K.work where most rows have nothing in common: roots of the pivots of their products, in their order.
 
     Rows keep their zeros there, which Gram–Schmidt fills; see `mbd.kernel.singular.gram_norms`.
@@ -208,19 +209,19 @@ def lengths_of_many(K: Any, m: int) -> None:
                     K.spare[n + a * m + b] -= part / pivot * K.spare[n + b * m + k]
 
 
-def evaluate_ahead(K: Any, ahead: float) -> None:
+def evaluate_ahead(K: Kernel, ahead: float) -> None:
     """K.acc at the state that is `ahead` of the accepted one, along its velocities and accelerations."""
-    fill_block(K, K.clock[NOW], K.q, K.y)
+    fill_block(K, K.time, K.q, K.y)
     for i in range(K.n_v):
         K.block[K.o_x + i] = ahead * (K.y[i] + 0.5 * ahead * K.rate[i])
     compose(K, K.q1)
     for i in range(K.n):
         K.y1[i] = K.y[i] + ahead * K.rate[i]
-    evaluate(K, K.clock[NOW] + ahead, K.q1, K.y1)
+    evaluate(K, K.time + ahead, K.q1, K.y1)
 
 
-def times_to_poses(K: Any, m: int, unit: float) -> float:
-    """Times from now to where each row loses rank, into K.work[m:2m]; the first of them. K.detail[KICK] is its c."""
+def times_to_poses(K: Kernel, m: int, unit: float) -> float:
+    """Times from now to where each row loses rank, into K.work[m:2m]; the first of them. K.velocity_noise is its c."""
     n = K.n
     evaluate_ahead(K, 0.0)
     leftovers_here(K, m)
@@ -249,15 +250,15 @@ def times_to_poses(K: Any, m: int, unit: float) -> float:
         if first > horizon(K, m, unit, first) or abs(first - ahead) < NEAR_ENOUGH * unit:
             break
         ahead = first
-    K.detail[KICK] = 0.0
+    K.velocity_noise = 0.0
     speed = max(motion(K, K.y), motion(K, K.y1))  # it may start from rest
     for k in range(m):
         if K.work[m + k] < 1.1 * first and first < NOWHERE:
-            K.detail[KICK] += stirring(K, k, K.work[2 * m + k] / K.work[m + k], speed)
+            K.velocity_noise += stirring(K, k, K.work[2 * m + k] / K.work[m + k], speed)
     return first
 
 
-def horizon(K: Any, m: int, unit: float, first: float) -> float:
+def horizon(K: Kernel, m: int, unit: float, first: float) -> float:
     """Time beyond which a pose is not looked for: nothing is arranged so early, and the motion is not known so far."""
     limit = 4.0 * FAR_GLANCE * unit
     if K.scheme == 2 and first < NOWHERE:
@@ -269,61 +270,61 @@ def horizon(K: Any, m: int, unit: float, first: float) -> float:
     return limit
 
 
-def step_by_pose(K: Any, unit: float, longest: float) -> float:
+def step_by_pose(K: Kernel, unit: float, longest: float) -> float:
     """The step to take in place of one of this size, so that none has a stage next to a pose; `unit` far from one.
 
     Where round-off would make much of velocities that near, the step over the pose lasts up to `longest` units.
     """
-    m = K.state[ROWS]
-    K.state[NEAR] = 0
-    K.detail[KICK] = 0.0
+    m = K.n_active
+    K.near_singular = 0
+    K.velocity_noise = 0.0
     if K.left[m] == 0.0:
         return unit
     first = times_to_poses(K, m, unit)
     limit = horizon(K, m, unit, first)
     stretched = limit > 4.0 * FAR_GLANCE * unit and first <= limit
     if K.scheme != 2 or first <= CERTAIN * unit or stretched:
-        K.clock[POSE] = K.clock[NOW] + first
+        K.singular_time = K.time + first
     span = unit
     if may_stretch(K):
-        span = min(max(sqrt(K.detail[KICK] / HUSHED) / amid(K), unit), longest * unit)
+        span = min(max(sqrt(K.velocity_noise / HUSHED) / amid(K), unit), longest * unit)
     rest = (first - amid(K) * span) / unit
     if rest >= 2.0:
-        K.detail[KICK] = 0.0  # far: what may come of it is judged nearer
+        K.velocity_noise = 0.0  # far: what may come of it is judged nearer
         return unit
     if rest > 1.0:
         return 0.5 * rest * unit
     if rest >= SMALLEST:
         return rest * unit
-    K.state[NEAR] = PASSING
+    K.near_singular = PASSING
     return clearest(K, m, span, min(1.0, first / amid(K) / span))
 
 
-def stirred(K: Any, h: float) -> float:
+def stirred(K: Kernel, h: float) -> float:
     """Share of the velocities that round-off makes of them in a step of size h to or over a pose; 0 far from one."""
-    if K.detail[KICK] == 0.0:
+    if K.velocity_noise == 0.0:
         return 0.0
-    away = K.clock[POSE] - K.clock[NOW] - h
-    return float(min(K.detail[KICK] / (away * away + 1e-300), 1.0))
+    away = K.singular_time - K.time - h
+    return float(min(K.velocity_noise / (away * away + 1e-300), 1.0))
 
 
-def stirs(K: Any, h: float) -> bool:
+def stirs(K: Kernel, h: float) -> bool:
     """Whether round-off makes too much of velocities in such a step; K.detail then tells when, where, how much."""
     share = stirred(K, h)
     if share <= LOUD:
         return False
-    m = K.state[ROWS]
+    m = K.n_active
     first = times_to_poses(K, m, h)
     for k in range(m):
         if K.work[m + k] == first:
-            K.state[BLOCKED] = K.n + k
-    K.detail[0] = K.clock[POSE]
-    K.detail[1] = share
-    K.detail[2] = h
+            K.failure_index = K.n + k
+    K.failure_time = K.singular_time
+    K.failure_size = share
+    K.failure_step = h
     return True
 
 
-def is_resolved(K: Any, h: float) -> bool:
+def is_resolved(K: Kernel, h: float) -> bool:
     """Whether the candidate errs little enough after a step over a pose that was longer than others."""
     fastest = 0.0
     for i in range(K.n_v):
@@ -335,7 +336,7 @@ def is_resolved(K: Any, h: float) -> bool:
     return True
 
 
-def clearest(K: Any, m: int, unit: float, wanted: float) -> float:
+def clearest(K: Kernel, m: int, unit: float, wanted: float) -> float:
     """The step over poses nearest below the wanted part of a unit with none of them close to a node."""
     best = wanted
     widest = -1.0
@@ -353,7 +354,7 @@ def clearest(K: Any, m: int, unit: float, wanted: float) -> float:
     return best * unit
 
 
-def clearance(K: Any, place: float) -> float:
+def clearance(K: Kernel, place: float) -> float:
     """Distance of a place, part of a step, from the nearest node or the end [-]."""
     clear = abs(place - 1.0)
     if K.scheme == 2:

@@ -23,7 +23,7 @@ def dt_of_blows(run: RunData, record: Record, number: int, rows: Iterable[int]) 
     name = run.manager.contacts[number].name
     law = next(word for word in run.model.contacts if word.name == name)
     inputs = run.mechanism.equations.parameters
-    values = {parameter.name: float(v) for parameter, v in zip(inputs, run.values["params"], strict=False)}
+    values = {parameter.name: float(v) for parameter, v in zip(inputs, run.kernel.params, strict=False)}
     given = {**law.parameters(), **values}
     found = np.inf
     with np.errstate(all="ignore"):
@@ -52,8 +52,8 @@ def _approach(run: RunData, record: Record, number: int, row: int) -> tuple[floa
 
 
 def _gap_rate(run: RunData, record: Record, number: int, row: int, y: Vector) -> float:
-    anchors = run.values["anchors"][: run.values["n_anchors"]]
+    anchors = run.kernel.anchors[: run.kernel.n_anchors]
     block = run.mechanism.block(float(record.time[row]), record.q[row], y, anchors)
     out = np.zeros(run.mechanism.sizes["guards"])
-    run.mechanism.common["guards"](block, run.values["params"], out)
-    return float(out[run.values["n_contacts"] + number])
+    run.mechanism.common["guards"](block, run.kernel.params, out)
+    return float(out[run.kernel.n_contacts + number])

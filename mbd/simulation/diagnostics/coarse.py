@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from mbd.kernel import fields as F
 from mbd.results.record import Record
 from mbd.simulation.diagnostics.fastest import resolving_dt
 from mbd.simulation.run.data import RunData
@@ -23,11 +22,10 @@ def coarse_steps(run: RunData, record: Record) -> list[str]:
     A scheme of any order passes over a wall that is thinner than a step, as if it were elsewhere: the energy may be
     right by then, and the instant is not.
     """
-    count = int(run.values["counts"][F.COARSENED])
-    if not count or run.values["adaptive"] or len(record.time) < 2:
+    count = int(run.kernel.n_coarse)
+    if not count or run.kernel.adaptive or len(record.time) < 2:
         return []
-    detail = run.values["detail"]
-    worst, when = float(detail[F.COARSEST]), float(detail[F.COARSEST_AT])
+    worst, when = float(run.kernel.coarsest_change), float(run.kernel.coarsest_end)
     row = int(np.clip(np.searchsorted(record.time, when - 1e-9 * run.dt), 1, len(record.time) - 1))
     asked = _asked(run, record, row)
     steps = "a step was" if count == 1 else f"{count} steps were"
@@ -54,7 +52,7 @@ def _asked(run: RunData, record: Record, row: int) -> float:
     v = record.v[row - 1] + s * (record.v[row] - record.v[row - 1])
     z, n_v = record.z[row - 1], record.v.shape[1]
     M = run.mechanism.acceleration_terms(
-        float(record.time[row - 1]), one, np.concatenate([v[0], z]), run.values["params"], system.anchors
+        float(record.time[row - 1]), one, np.concatenate([v[0], z]), run.kernel.params, system.anchors
     ).M[:n_v, :n_v]
     try:
         times = record.time[row - 1] + h * s[:, 0]

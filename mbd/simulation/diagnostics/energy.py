@@ -131,7 +131,7 @@ class EnergyWatch(EnergyFindings):
     @np.errstate(all="ignore")
     def judge(self, run: RunData) -> str:
         """Look at the run as far as it is stored; a sentence if the energy is the scheme's own, '' otherwise."""
-        if self.problem or run.stored < 2 or run.values["n_v"] == 0:
+        if self.problem or run.stored < 2 or run.kernel.n_v == 0:
             return self.problem
         self._look(run)
         if np.isinf(self._seen[:, 0]).any():
@@ -161,19 +161,19 @@ class EnergyWatch(EnergyFindings):
         spread = {first + k * (last - first) // (SPREAD - 1) for k in range(SPREAD)}
         chosen = np.array(sorted(spread.union(row for row in early if row <= last)), dtype=np.intp)
         record = record_of(run, run.table[chosen])
-        anchors = np.tile(run.values["anchors"][: run.values["n_anchors"]], (len(chosen), 1))
+        anchors = np.tile(run.kernel.anchors[: run.kernel.n_anchors], (len(chosen), 1))
         inputs = ModelColumns.inputs(record.rows(anchors))
         kinetic, potential = run.mechanism.energies(inputs, record.parameters_at(chosen))
-        way = _way(record.q, run.table[0, 1 : 1 + run.values["n_q"]])
+        way = _way(record.q, run.table[0, 1 : 1 + run.kernel.n_q])
         self._seen = np.concatenate([self._seen, np.column_stack([kinetic, potential, way])])
         self.rows += len(chosen)
         self._upto, self._due, self._looks = run.stored, 4 * max(self._due, run.stored // 4), self._looks + 1
 
     def _overflow(self, run: RunData) -> None:
         """Energies beyond the largest number: the scheme's own where the run began with less, else not judged."""
-        top = float(np.max(np.abs(run.table[run.stored - 1, 1 + run.values["n_q"] :][: run.values["n_v"]])))
+        top = float(np.max(np.abs(run.table[run.stored - 1, 1 + run.kernel.n_q :][: run.kernel.n_v])))
         if np.isfinite(self._seen[0, 0]):
-            setting = "the tolerance" if run.values["adaptive"] else f"dt = {run.dt:g} s"
+            setting = "the tolerance" if run.kernel.adaptive else f"dt = {run.dt:g} s"
             self.problem = (
                 f"t = {run.now:.9g} s: the energy has grown beyond the largest number, at speeds of {top:.2g}: "
                 f"{setting} does not resolve the motion; use a smaller one, or slower motion"
@@ -246,18 +246,18 @@ def _lending(run: RunData) -> frozenset[str]:
 
 def _sentence(run: RunData, found: Judgement) -> str:
     """Since when, how much, which coordinate moves fastest, and what to try."""
-    v = run.values
+    v = run.kernel
     table = run.table[: found.row + 1]
-    first = 1 + v["n_q"]
-    speeds = np.abs(table[:, first : first + v["n_v"]])
-    changes = np.abs(table[:, first + v["n"] : first + v["n"] + v["n_v"]])
+    first = 1 + v.n_q
+    speeds = np.abs(table[:, first : first + v.n_v])
+    changes = np.abs(table[:, first + v.n : first + v.n + v.n_v])
     fastest = int(np.argmax(np.nan_to_num(speeds[-1])))
     name = run.mechanism.equations.velocity_names[fastest].removesuffix(".rate")
     top = float(np.max(speeds[:, fastest]))
     turn = run.dt * float(np.max(changes[:, fastest])) / top if top > 0.0 else 1.0  # share of v that a step changes
     way, finer = speeds[-1, fastest] * run.dt, 0.1 * run.dt / max(1.0, turn)
-    setting = "the tolerance" if run.values["adaptive"] else f"dt = {run.dt:g} s"
-    remedy = "a smaller one" if run.values["adaptive"] else f"dt below {finer:.1g} s"
+    setting = "the tolerance" if run.kernel.adaptive else f"dt = {run.dt:g} s"
+    remedy = "a smaller one" if run.kernel.adaptive else f"dt below {finer:.1g} s"
     return (
         f"t = {table[-1, 0]:.9g} s: from here on the energy is not the mechanism's: the scheme itself has put up to "
         f"{found.numerical:.3g} J into a mechanism that had {found.owned:.3g} J of its own to move with by then; "

@@ -10,7 +10,7 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.assembly.not_finite import first_cause, tape_inputs
 from mbd.integrators.base import Point
-from mbd.kernel import fields as F
+from mbd.kernel import codes
 from mbd.results.failure import Failure
 from mbd.results.record import EventRecord
 from mbd.simulation.diagnostics.grip import lost_grip
@@ -32,8 +32,9 @@ SLOW = 1e-3
 MOST_EVENTS = 5000
 """Events within one dt above which a run stops: they follow each other ever faster, or are located too roughly [-]."""
 
-STALLED = frozenset({F.NOT_CONVERGED, F.SINGULAR, F.STAGNATED, F.TOO_TIGHT, F.TOO_NEAR, F.TOO_SMALL, F.DEPENDENT,
-                     F.OUTGROWN, F.GAINED})  # fmt: skip
+STALLED = frozenset({codes.NOT_CONVERGED, codes.SINGULAR, codes.STAGNATED, codes.TOO_TIGHT, codes.TOO_NEAR,
+codes.TOO_SMALL, codes.DEPENDENT,
+                     codes.OUTGROWN, codes.GAINED})  # fmt: skip
 """What steps fail with where friction locks a motion."""
 LATEST = 12
 """Events that a failure tells."""
@@ -41,12 +42,12 @@ LATEST = 12
 
 def attempt(run: RunData) -> Callable[[str, State], Failure]:
     """What a run has just tried, noted before it is taken back; the failure, given its sentence and the state kept."""
-    v = run.values
-    newton = v["detail"][0] > run.now and v["block"][0] == v["detail"][0]
-    time = max(float(v["detail"][0]), run.now)
+    v = run.kernel
+    newton = v.failure_time > run.now and v.block_time == v.failure_time
+    time = max(float(v.failure_time), run.now)
     candidate = _iterate(run, time) if newton else run.state()
-    residuals = residuals_of(run.stepper, v["block"]) if newton else {}
-    residual = float(v["detail"][1]) if newton else 0.0
+    residuals = residuals_of(run.stepper, v.block) if newton else {}
+    residual = float(v.failure_size) if newton else 0.0
     happened = tuple(run.events)
 
     def failure(problem: str, final: State) -> Failure:
@@ -61,7 +62,7 @@ def attempt(run: RunData) -> Callable[[str, State], Failure]:
 
 def _iterate(run: RunData, time: float) -> State:
     """Newton's last iterate, which is in the block."""
-    block, layout, system = run.values["block"], run.mechanism.layout, run.stepper.system
+    block, layout, system = run.kernel.block, run.mechanism.layout, run.stepper.system
     y = block[layout.v : layout.a].copy()
     q = system.compose(block[layout.q : layout.x].copy(), block[layout.x : layout.v].copy())
     return replace(run.state(), time=time, q=q, v=y[: layout.n_v], z=y[layout.n_v :])
@@ -69,14 +70,14 @@ def _iterate(run: RunData, time: float) -> State:
 
 def residuals_of(stepper: Stepper, block: Vector) -> dict[str, float]:
     """The balance by coordinate, and the rows that are closed with their rates, at the inputs in a block."""
-    mode = int(stepper.values["state"][F.MODE])
+    mode = int(stepper.kernel.mode_id)
     if mode < 0:
         return {}
-    code, n = stepper.modes[mode], stepper.values["n"]
+    code, n = stepper.modes[mode], stepper.kernel.n
     out = np.zeros(n + 2 * len(code.rows) + 1)
     with np.errstate(all="ignore"):
         program = getattr(code.residual, "program", code.residual)  # a replay watches that of the step
-        program(block, stepper.values["params"], out)
+        program(block, stepper.kernel.params, out)
     return dict(zip(residual_names(stepper, code.rows), out.tolist(), strict=False))
 
 
@@ -101,10 +102,10 @@ def explanation(
     swiftest : largest rate of a coordinate in any row so far [m/s, rad/s]
     beyond : what `out_of_reach` says: the cause of whatever else is found
     """
-    values = stepper.values
-    now = float(values["clock"][F.NOW])
-    time = float(values["detail"][0]) if values["detail"][0] > now else now
-    names = sorted(stepper.manager.mode(values["closed"][: values["n_contacts"]]).closed)
+    values = stepper.kernel
+    now = float(values.time)
+    time = float(values.failure_time) if values.failure_time > now else now
+    names = sorted(stepper.manager.mode(values.closed[: values.n_contacts]).closed)
     closed = f" with {', '.join(map(repr, names))} closed" if names else ""
     what = beyond or _what(stepper, status, closed, events, places or {}, _rushing(stepper, swiftest))
     if status in STALLED and not beyond:
@@ -116,38 +117,38 @@ def _what(
     stepper: Stepper, status: int, closed: str, events: Sequence[EventRecord], places: Mapping[str, str], rushing: str
 ) -> str:
     """What went wrong and what to try; `closed` and `rushing` tell in words which contacts are, and what runs away."""
-    if status == F.NOT_FINITE:
+    if status == codes.NOT_FINITE:
         return f"{_not_finite(stepper, places)}{closed}; nothing after the last accepted step is kept"
-    if status in (F.NOT_CONVERGED, F.STAGNATED, F.TOO_TIGHT):
+    if status in (codes.NOT_CONVERGED, codes.STAGNATED, codes.TOO_TIGHT):
         return _no_end(stepper, status, closed, rushing)
-    if status in (F.OUTGROWN, F.GAINED, F.LEAPT):
+    if status in (codes.OUTGROWN, codes.GAINED, codes.LEAPT):
         return _unresolved(stepper, status, closed)
-    if status in (F.SINGULAR, F.TOO_NEAR):
+    if status in (codes.SINGULAR, codes.TOO_NEAR):
         return f"the Newton matrix is singular at {_unknown(stepper)}{closed}; {_why_singular(stepper)}"
-    if status == F.TOO_BRIEF:
-        name = stepper.manager.names[int(stepper.values["state"][F.BLOCKED])]
+    if status == codes.TOO_BRIEF:
+        name = stepper.manager.names[int(stepper.kernel.failure_index)]
         return (
-            f"{name!r} is so stiff that its blow asks for steps below {float(stepper.values['detail'][2]):.2g} s, a "
+            f"{name!r} is so stiff that its blow asks for steps below {float(stepper.kernel.failure_step):.2g} s, a "
             f"millionth of dt{closed}; use a softer stiffness, mbd.Unilateral, or a smaller dt"
         )
-    if status in (F.TOO_SMALL, F.STIRRED):
+    if status in (codes.TOO_SMALL, codes.STIRRED):
         return _no_size(stepper, status, closed)
-    if status in (F.DEPENDENT, F.CONFLICT):
-        if int(stepper.values["state"][F.BLOCKED]) < stepper.values["n"]:
+    if status in (codes.DEPENDENT, codes.CONFLICT):
+        if int(stepper.kernel.failure_index) < stepper.kernel.n:
             return f"neither mass nor rows determine {_unknown(stepper)}{closed}; give it a mass, or lock it"
         return (
             f"{_clashing(stepper, status)}{closed}; leave one out, hold fewer contacts closed, or, where they do so in "
             "this singular configuration only, start beside it"
         )
-    if status in (F.CHATTER, F.NO_IMPACT, F.ENERGY_GAIN, F.NO_FORCE):
+    if status in (codes.CHATTER, codes.NO_IMPACT, codes.ENERGY_GAIN, codes.NO_FORCE):
         return _no_contact(stepper, status, closed, events)
     return f"the instant of an event could not be isolated{closed}{_worst(stepper)}; try a smaller dt"
 
 
 def _no_end(stepper: Stepper, status: int, closed: str, rushing: str) -> str:
     """A Newton iteration that does not come to its end."""
-    worst, residual = _worst(stepper), float(stepper.values["detail"][1])
-    if status != F.NOT_CONVERGED:
+    worst, residual = _worst(stepper), float(stepper.kernel.failure_size)
+    if status != codes.NOT_CONVERGED:
         left = remainder(stepper)
         how = "stagnated" if rushing else "stagnated at round-off"
         return (
@@ -174,7 +175,7 @@ def _no_end(stepper: Stepper, status: int, closed: str, rushing: str) -> str:
     own = f" ({said})" if said else ""
     return (
         f"Newton stalled at {residual:.3g} times the tolerance after "
-        f"{stepper.values['max_iterations']} "
+        f"{stepper.kernel.max_iterations} "
         f"iterations{own}{closed}{worst}; try a smaller dt or softer stiffness; a force that jumps with "
         "the state (mbd.where, sign) must be made continuous, or be switched by an Event or Controller"
         f"{rushing}"
@@ -183,26 +184,26 @@ def _no_end(stepper: Stepper, status: int, closed: str, rushing: str) -> str:
 
 def _unresolved(stepper: Stepper, status: int, closed: str) -> str:
     """A step whose change cannot be that of the motion: which rate, from what to what, and what to try."""
-    values = stepper.values
-    h, growth, dt = float(values["detail"][2]), float(values["detail"][F.GROWN]), float(values["clock"][F.STEP])
-    who = int(values["state"][F.BLOCKED])
+    values = stepper.kernel
+    h, growth, dt = float(values.failure_step), float(values.unforeseen_change), float(values.step)
+    who = int(values.failure_index)
     change = (
         f"a step of {h:.2g} s takes the rate of {_unknown(stepper).removeprefix('the motion of ')} from "
-        f"{values['y'][who]:.3g} to {values['y1'][who]:.3g}{closed}"
+        f"{values.y[who]:.3g} to {values.y1[who]:.3g}{closed}"
     )
-    if status == F.OUTGROWN:
+    if status == codes.OUTGROWN:
         return (
             f"{change}, by forces that grow with the motion, {growth:.2g} of what nothing foretold by itself in a step "
             f"of dt: dt does not resolve the motion, or a force lets it run away; try a smaller dt, such as "
             f"{0.1 * dt / max(growth, 1.0):.1g} s"
         )
-    if status == F.LEAPT:
+    if status == codes.LEAPT:
         return (
             f"{change}, over a place where forces are over a hundred times those before and after it, such as the pole "
             "of 1/x: the scheme sees nothing of them; use a smaller dt to see what happens there, or a force that is "
             "bounded wherever the motion goes"
         )
-    shorter = "" if int(values["scheme"]) == RUNGE_KUTTA else ", as do steps down to a tenth of dt"
+    shorter = "" if int(values.scheme) == RUNGE_KUTTA else ", as do steps down to a tenth of dt"
     return (
         f"{change}, more than the forces along the way can do{shorter}: dt does not resolve a force that is steep "
         f"there; try a smaller dt, such as {0.05 * dt:.1g} s, or a softer force"
@@ -211,14 +212,14 @@ def _unresolved(stepper: Stepper, status: int, closed: str) -> str:
 
 def _no_size(stepper: Stepper, status: int, closed: str) -> str:
     """A step for which no size is right: by its estimated error, or at a pose in which rows lose rank."""
-    _, residual, h = stepper.values["detail"][:3].tolist()
-    if status == F.TOO_SMALL:
+    _, residual, h = stepper.kernel.detail[:3].tolist()
+    if status == codes.TOO_SMALL:
         return (
             f"steps fell below {h:.2g} s without an error of "
-            f"{stepper.values['allowed']:.2g} per second{closed}; a force that jumps with the state (mbd.where, sign) "
+            f"{stepper.kernel.allowed:.2g} per second{closed}; a force that jumps with the state (mbd.where, sign) "
             "must be made continuous, or be switched by an Event or Controller; or ask for less by tol="
         )
-    explicit = int(stepper.values["scheme"]) == RUNGE_KUTTA
+    explicit = int(stepper.kernel.scheme) == RUNGE_KUTTA
     others = "mbd.GeneralizedAlpha, mbd.HHT or mbd.RadauIIA" if explicit else "mbd.GeneralizedAlpha or mbd.HHT"
     return (
         f"a pose in which rows lose rank, at {_unknown(stepper)}{closed}: round-off would make "
@@ -229,29 +230,29 @@ def _no_size(stepper: Stepper, status: int, closed: str) -> str:
 
 def _no_contact(stepper: Stepper, status: int, closed: str, events: Sequence[EventRecord]) -> str:
     """Contacts and frictions that have no forces, no impulses, or no end of switching."""
-    grip = lost_grip(stepper, events) if status in (F.CHATTER, F.NO_IMPACT) else ""
+    grip = lost_grip(stepper, events) if status in (codes.CHATTER, codes.NO_IMPACT) else ""
     if grip:
         return grip
-    if status == F.CHATTER:
-        state, most = stepper.values["state"], stepper.values["max_switches"]
-        many = max(state[F.SWITCHES], state[F.REDONE]) > most
+    if status == codes.CHATTER:
+        most = stepper.kernel.max_switches
+        many = max(stepper.kernel.n_switches, stepper.kernel.n_repeats) > most
         said = f"more than {most} switches" if many else "the same switches again and again"
         return (
             f"{said} at one instant: {_last_events(events)}; they "
             "follow each other without motion; give a contact a release rule, friction or a penalty law, or an event "
             "a reset that leaves zero"
         )
-    if status == F.NO_IMPACT:
+    if status == codes.NO_IMPACT:
         return (
             f"no forces or impulses let every contact push or open{_touching(stepper)}: one that sticks "
             "whatever its force may have none; use friction=0, a release rule or a penalty contact"
         )
-    if status == F.ENERGY_GAIN:
+    if status == codes.ENERGY_GAIN:
         return (
             f"the impact law would create energy{_touching(stepper)}, and Stronge's in its place as well: a "
             "restitution above 1 does; use one from 0 to 1"
         )
-    name = stepper.manager.names[int(stepper.values["state"][F.BLOCKED])]
+    name = stepper.manager.names[int(stepper.kernel.failure_index)]
     return (
         f"Painlevé: no consistent contact force at {name!r}, which slides with friction so that a push "
         f"makes it approach{closed}; rigid bodies with Coulomb friction have no motion there: lower the "
@@ -261,17 +262,17 @@ def _no_contact(stepper: Stepper, status: int, closed: str, events: Sequence[Eve
 
 def _why_singular(stepper: Stepper) -> str:
     """What makes a Newton matrix singular, and what to try: rows, the mass matrix, or the step."""
-    v, system = stepper.values, stepper.system
-    if int(v["state"][F.ROWS]) > 0:
+    v, system = stepper.kernel, stepper.system
+    if int(v.n_active) > 0:
         return "rows depend on each other: leave one out, or try another dt"
-    mode = stepper.manager.mode(v["closed"][: v["n_contacts"]])
-    zero, y, layout = np.zeros(v["n_v"]), v["y"][: v["n"]], stepper.mechanism.layout
-    time, q = float(v["clock"][F.NOW]), v["q"][: v["n_q"]]
-    if v["block"][0] > time:  # what the step was tried at
-        y, time = v["block"][layout.v : layout.a].copy(), float(v["block"][0])
-        q = system.compose(v["block"][layout.q : layout.x].copy(), v["block"][layout.x : layout.v].copy())
+    mode = stepper.manager.mode(v.closed[: v.n_contacts])
+    zero, y, layout = np.zeros(v.n_v), v.y[: v.n], stepper.mechanism.layout
+    time, q = float(v.time), v.q[: v.n_q]
+    if v.block_time > time:  # what the step was tried at
+        y, time = v.block[layout.v : layout.a].copy(), float(v.block_time)
+        q = system.compose(v.block[layout.q : layout.x].copy(), v.block[layout.x : layout.v].copy())
     with np.errstate(all="ignore"):
-        terms = system.evaluate(Point(time, q, zero, y, np.zeros(v["n"]), np.zeros(0)), mode, (0.0, 0.0))
+        terms = system.evaluate(Point(time, q, zero, y, np.zeros(v.n), np.zeros(0)), mode, (0.0, 0.0))
         M = np.asarray(terms.S)
         size = np.sqrt(np.abs(np.diag(M)))
         sizes = np.linalg.svd(M / np.outer(size, size), compute_uv=False) if np.all(size > 0.0) else np.zeros(1)
@@ -295,17 +296,17 @@ def crowded(events: Sequence[EventRecord], now: float, dt: float) -> str:
 
 def _clashing(stepper: Stepper, status: int) -> str:
     """Which rows depend on each other or conflict."""
-    told = clash(stepper.mechanism.equations.rows, stepper.values)
-    what = "depend on each other" if status == F.DEPENDENT else "conflict"
+    told = clash(stepper.mechanism.equations.rows, stepper.kernel)
+    what = "depend on each other" if status == codes.DEPENDENT else "conflict"
     return f"rows {what}: {told}" if told else f"rows {what} at {_unknown(stepper)}"
 
 
 def _worst(stepper: Stepper) -> str:
     """Where the residual of the step that failed is largest, in words; '' where that is not known."""
-    values = stepper.values
-    if values["block"][0] != values["detail"][0]:
+    values = stepper.kernel
+    if values.block_time != values.failure_time:
         return ""
-    sizes = {name: abs(size) for name, size in residuals_of(stepper, values["block"]).items() if np.isfinite(size)}
+    sizes = {name: abs(size) for name, size in residuals_of(stepper, values.block).items() if np.isfinite(size)}
     if not sizes:
         return ""
     worst = max(sizes, key=lambda name: sizes[name])
@@ -314,27 +315,27 @@ def _worst(stepper: Stepper) -> str:
 
 def _touching(stepper: Stepper) -> str:
     """The contacts that are closed or about to close, and the frictions of joints, in words."""
-    values, names = stepper.values, stepper.manager.names
-    near = [name for c, name in enumerate(names) if values["closed"][c] == 1 or values["closing"][c] != 0]
+    values, names = stepper.kernel, stepper.manager.names
+    near = [name for c, name in enumerate(names) if values.closed[c] == 1 or values.closing[c] != 0]
     near += [friction.name for friction in stepper.manager.frictions if friction.contact < 0]
     return f" at {', '.join(map(repr, near))}" if near else ""
 
 
 def _unknown(stepper: Stepper) -> str:
     """The coordinate or row behind a column of the KKT matrix."""
-    equations, values = stepper.mechanism.equations, stepper.values
-    column, n = int(values["state"][F.BLOCKED]), values["n"]
+    equations, values = stepper.mechanism.equations, stepper.kernel
+    column, n = int(values.failure_index), values.n
     if column < equations.n_v:
         return f"the motion of {equations.velocity_names[column].removesuffix('.rate')!r}"
     if column < n:
         return f"the state {equations.states[column - equations.n_v].name!r}"
-    row = equations.rows[int(values["rows"][min(column - n, values["n_rows"] - 1)])]
+    row = equations.rows[int(values.rows[min(column - n, values.n_rows - 1)])]
     return row.title
 
 
 def _passing(stepper: Stepper) -> str:
     """What passes poses in which rows lose rank where a scheme did not."""
-    explicit = int(stepper.values["scheme"]) == RUNGE_KUTTA
+    explicit = int(stepper.kernel.scheme) == RUNGE_KUTTA
     return "mbd.GeneralizedAlpha or mbd.RadauIIA" if explicit else "formulation='index3' with a damped scheme"
 
 
@@ -346,8 +347,8 @@ def _last_events(events: Sequence[EventRecord]) -> str:
 
 def _not_finite(stepper: Stepper, places: Mapping[str, str]) -> str:
     """The first cause whose force is not finite where the step failed."""
-    equations, values = stepper.mechanism.equations, stepper.values
-    inputs = tape_inputs(stepper.mechanism, values["block"], values["params"])
+    equations, values = stepper.mechanism.equations, stepper.kernel
+    inputs = tape_inputs(stepper.mechanism, values.block, values.params)
     cause = first_cause(equations, inputs, places)
     if cause is None and not np.isfinite(evaluate(list(equations.balance), inputs)).all():
         return "the inertia forces are not finite (velocities have run away)"
@@ -356,15 +357,15 @@ def _not_finite(stepper: Stepper, places: Mapping[str, str]) -> str:
 
 def _rushing(stepper: Stepper, swiftest: float) -> str:
     """What a fixed step makes of velocities, where that is far more than any has been so far; '' elsewhere."""
-    values = stepper.values
-    if values["adaptive"] or swiftest < SLOW:
+    values = stepper.kernel
+    if values.adaptive or swiftest < SLOW:
         return ""
-    gains = np.abs(values["rate"][: values["n_v"]]) * values["dt"]
+    gains = np.abs(values.rate[: values.n_v]) * values.dt
     times = float(np.max(gains, initial=0.0)) / swiftest
     if not RUSHING < times < np.inf:
         return ""
     name = stepper.mechanism.equations.velocity_names[int(np.argmax(gains))]
     return (
         f"; in a step of dt {name!r} changes by {times:.2g} times the largest rate so far: dt does not resolve the "
-        f"motion, or a force lets it run away; try dt = {0.1 * values['dt'] / times:.1g} s"
+        f"motion, or a force lets it run away; try dt = {0.1 * values.dt / times:.1g} s"
     )

@@ -10,7 +10,6 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.constraints.penalty_parameters import STEPS_OF_APPROACH
 from mbd.integrators.base import Point
-from mbd.kernel import fields as F
 from mbd.results.record import Record
 from mbd.simulation.run.data import RunData
 from mbd.simulation.run.lengths import RUNGE_KUTTA
@@ -52,7 +51,7 @@ class Matrices:
 def matrices(run: RunData, record: Record, row: int) -> Matrices | None:
     """Those at a row of a run; None where they cannot be evaluated, or are too large to derive them for this alone."""
     system = run.stepper.system
-    if run.values["n"] > LARGEST:
+    if run.kernel.n > LARGEST:
         return None
     mode = run.manager.mode(record.closed[row])
     active = list(system.active(mode)[0])
@@ -81,7 +80,7 @@ def _at(run: RunData, record: Record, row: int) -> float:
     found = matrices(run, record, row)
     if found is None:
         return 0.0
-    free, n_v = free_motions(found.B, len(found.M)), run.values["n_v"]
+    free, n_v = free_motions(found.B, len(found.M)), run.kernel.n_v
     if not free.size:
         return 0.0
     try:
@@ -101,7 +100,7 @@ def resolving_dt(rate: float) -> float:
 
 def sane_rows(run: RunData) -> list[int]:
     """Some rows until speeds have grown absurdly, or the energy is the scheme's own."""
-    n_q, n_v = run.values["n_q"], run.values["n_v"]
+    n_q, n_v = run.kernel.n_q, run.kernel.n_v
     speeds: Vector = np.max(np.abs(run.table[: run.stored, 1 + n_q : 1 + n_q + n_v]), axis=1, initial=0.0)
     early = speeds[: max(2, len(speeds) // 100)]
     wild = np.flatnonzero(~(speeds <= SANE * max(1e-3, float(early[0]) if len(early) else 0.0)))
@@ -112,9 +111,9 @@ def sane_rows(run: RunData) -> list[int]:
 
 def stability(run: RunData, record: Record) -> str:
     """What bounds dt, where an explicit scheme took steps above its limit of stability; '' elsewhere."""
-    if run.values["scheme"] != RUNGE_KUTTA or run.values["adaptive"] or run.values["state"][F.MODE] < 0:
+    if run.kernel.scheme != RUNGE_KUTTA or run.kernel.adaptive or run.kernel.mode_id < 0:
         return ""
-    if run.values["n"] > LARGEST:
+    if run.kernel.n > LARGEST:
         return "; steps of an explicit scheme may be above its limit of stability: try dt/4, tol=, or mbd.RadauIIA()"
     rate = fastest(run, record, sane_rows(run))
     if rate * run.dt <= EXPLICIT_LIMIT:

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mbd.kernel import fields as F
 from mbd.results.record import EventRecord
 
 if TYPE_CHECKING:
@@ -22,15 +21,15 @@ __all__ = ["lost_grip"]
 
 def lost_grip(stepper: Stepper, events: Sequence[EventRecord]) -> str:
     """A sentence on the wheel among the last switches that needs grip without a normal force, '' if there is none."""
-    v, names = stepper.values, stepper.manager.names
+    v, names = stepper.kernel, stepper.manager.names
     for name in dict.fromkeys(event.name for event in events[-6:] if event.kind in ("closed", "opened")):
         contact = names.index(name)
         rows = stepper.mechanism.equations.rows
-        grips = [k for k, row in enumerate(rows) if row.contact == contact and v["row_level"][k] == 1]
+        grips = [k for k, row in enumerate(rows) if row.contact == contact and v.row_level[k] == 1]
         forces = _forces_with(stepper, contact) if grips else None
         if forces is None:
             continue
-        normal = float(forces[int(v["normal"][contact])])
+        normal = float(forces[int(v.normal[contact])])
         grip = max(grips, key=lambda k: abs(forces[k]))
         pull = abs(float(forces[grip]))
         if pull > max(normal, 0.0):
@@ -44,21 +43,21 @@ def lost_grip(stepper: Stepper, events: Sequence[EventRecord]) -> str:
 
 def _forces_with(stepper: Stepper, contact: int) -> np.ndarray | None:
     """−λ of all rows with this contact closed at the accepted state, 0 of those that do not act; None if singular."""
-    v, mechanism = stepper.values, stepper.mechanism
-    flags = v["closed"][: v["n_contacts"]].copy()
+    v, mechanism = stepper.kernel, stepper.mechanism
+    flags = v.closed[: v.n_contacts].copy()
     flags[contact] = 1
-    held = [k for k in stepper.manager.active_rows(flags, v["sticks"][: v["n_frictions"]]) if not v["dropped"][k]]
-    time, anchors = float(v["clock"][F.NOW]), v["anchors"][: v["n_anchors"]]
+    held = [k for k in stepper.manager.active_rows(flags, v.sticks[: v.n_frictions]) if not v.dropped[k]]
+    time, anchors = float(v.time), v.anchors[: v.n_anchors]
     penalties = stepper.manager.penalties(flags)
-    q, y = v["q"][: v["n_q"]], v["y"][: v["n"]]
-    terms = mechanism.acceleration_terms(time, q, y, v["params"], anchors, penalties)
-    n, m = v["n"], len(held)
+    q, y = v.q[: v.n_q], v.y[: v.n]
+    terms = mechanism.acceleration_terms(time, q, y, v.params, anchors, penalties)
+    n, m = v.n, len(held)
     matrix = np.zeros((n + m, n + m))
     matrix[:n, :n], matrix[:n, n:], matrix[n:, :n] = terms.M, terms.R[:, held], terms.B[held]
     try:
         solved = np.linalg.solve(matrix, -np.concatenate([terms.f, terms.bias[held]]))
     except np.linalg.LinAlgError:
         return None
-    forces = np.zeros(v["n_rows"])
+    forces = np.zeros(v.n_rows)
     forces[held] = -solved[n:]
     return forces

@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mbd.kernel import fields as F
 from mbd.tape.derivatives import live
 from mbd.tape.node import Node
 
@@ -36,12 +35,12 @@ LEFT = 0.01
 
 def may_jam(stepper: Stepper) -> str:
     """The beginning of a sentence that names the pins whose friction can lock the motion at the accepted state."""
-    if int(stepper.values["loaded"]) != 1:
+    if int(stepper.kernel.loaded) != 1:
         return ""
     with np.errstate(all="ignore"):
         names = [
             friction.name for f, friction in enumerate(stepper.manager.frictions)
-            if friction.contact < 0 and stepper.values["slip"][f] != 0.0 and _locks(stepper, f, _loads(friction.limit))
+            if friction.contact < 0 and stepper.kernel.slip[f] != 0.0 and _locks(stepper, f, _loads(friction.limit))
         ]  # fmt: skip
     if not names:
         return ""
@@ -64,8 +63,8 @@ def _locks(stepper: Stepper, f: int, loads: list[int]) -> bool:
     free = _determinant(stepper, None, loads, np.zeros(len(loads)))
     if not np.isfinite(free[1]) or free[0] == 0.0:
         return False
-    slips = np.zeros(stepper.values["n_frictions"])
-    slips[f] = stepper.values["slip"][f]
+    slips = np.zeros(stepper.kernel.n_frictions)
+    slips[f] = stepper.kernel.slip[f]
     for direction in _directions(len(loads)):
         sign, size = _determinant(stepper, slips, loads, direction)
         if np.isfinite(size) and sign * free[0] * np.exp(min(size - free[1], 50.0)) < LEFT:
@@ -84,15 +83,13 @@ def _directions(count: int) -> Vector:
 
 def _determinant(stepper: Stepper, slips: Vector | None, loads: list[int], direction: Vector) -> tuple[float, float]:
     """Sign and log |det| of the matrix, with the friction of the slips given and the force in that direction."""
-    v = stepper.values
-    lam = np.zeros(v["n_rows"])
+    v = stepper.kernel
+    lam = np.zeros(v.n_rows)
     lam[loads] = direction
-    time, anchors = float(v["clock"][F.NOW]), v["anchors"][: v["n_anchors"]]
-    terms = stepper.mechanism.acceleration_terms(
-        time, v["q"][: v["n_q"]], v["y"][: v["n"]], v["params"], anchors, (), slips, lam
-    )
-    rows = v["rows"][: int(v["state"][F.ROWS])]
-    n, m = v["n"], len(rows)
+    time, anchors = float(v.time), v.anchors[: v.n_anchors]
+    terms = stepper.mechanism.acceleration_terms(time, v.q[: v.n_q], v.y[: v.n], v.params, anchors, (), slips, lam)
+    rows = v.rows[: int(v.n_active)]
+    n, m = v.n, len(rows)
     matrix = np.zeros((n + m, n + m))
     matrix[:n, :n], matrix[:n, n:], matrix[n:, :n] = terms.M, terms.R[:, rows], terms.B[rows]
     if not np.isfinite(matrix).all():

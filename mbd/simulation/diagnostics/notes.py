@@ -9,7 +9,6 @@ from itertools import pairwise
 import numpy as np
 
 from mbd.equations.equations import Contact
-from mbd.kernel import fields as F
 from mbd.kernel.pace import LEAST_PACE
 from mbd.results.columns import ModelColumns
 from mbd.results.record import EventRecord, Record
@@ -63,33 +62,33 @@ MOVED = 0.05
 """Way [m, rad] beyond which rows that still depend on each other do so anywhere."""
 COUNTED = (
     (
-        F.SHORTENED,
+        "n_shortened",
         "{count} steps were shortened where Newton's method or the impact law failed at the full dt, or got another "
         "size where one would have come too close to a pose in which rows lose rank",
     ),
     (
-        F.CAREFUL,
+        "n_careful",
         "poses in which rows lose rank were passed: {count} steps next to them held positions alone on the rows; their "
         "velocities and multipliers are less accurate",
     ),
     (
-        F.STRONGE,
+        "n_energetic_impacts",
         "{count} impacts took Stronge's energetic restitution, where the {impact} law would have created energy",
     ),
     (
-        F.ENDLESS,
+        "n_endless",
         "{count} times contacts struck by turns without end at one instant; they were closed together, which is the "
         "limit of these impacts",
     ),
 )
-"""Places of the kernel's counts, and what to say where they are not zero."""
+"""Counts of the kernel, and what to say where they are not zero."""
 
 
 def notes_of(run: RunData, record: Record) -> tuple[list[str], list[str]]:
     """The notes of a run that is over, in sentences, and those of them that put its result in doubt."""
     notes = [*run.mechanism.notes, *getattr(run.mechanism.common, "notes", ())]
     equations = run.mechanism.equations
-    loaded = bool(run.values["loaded"]) or any(friction.contact >= 0 for friction in equations.frictions)
+    loaded = bool(run.kernel.loaded) or any(friction.contact >= 0 for friction in equations.frictions)
     rubs = loaded and any(code.borne for code in run.stepper.modes)
     moved = any(np.max(np.abs(part - record.q[:1]), initial=0.0) > MOVED for part in blocks(record.q))
     dependent = redundancy(equations.rows, run.stepper.dependent, rubs, moved, _left_singular(run))
@@ -97,16 +96,16 @@ def notes_of(run: RunData, record: Record) -> tuple[list[str], list[str]]:
     notes += [DAMAGED.format(run.damage)] if run.damage else []
     if run.start.memory is not None and not run.carried and run.boundaries.controllers:
         notes.append(ANEW)
-    counts, impact = run.values["counts"], run.settings["impact"]
-    notes += [text.format(count=int(counts[place]), impact=impact) for place, text in COUNTED if counts[place]]
+    counts = [(int(getattr(run.kernel, name)), text) for name, text in COUNTED]
+    notes += [text.format(count=count, impact=run.settings["impact"]) for count, text in counts if count]
     if "nonsmooth_since" in run.settings:
         notes.append(f"{run.settings['contact_reason']}; since then errors of impacts are of the size of dt")
     notes += coarse_steps(run, record)
     doubts = _energy_lost(run, record)
     notes += doubts or ([run.energy.note] if run.energy.note else [])
     notes += [run.room.note] if run.room.note else []
-    spent = float(run.values["clock"][F.SPENT])
-    if spent > TELLING and not run.values["adaptive"]:
+    spent = float(run.kernel.error_sum)
+    if spent > TELLING and not run.kernel.adaptive:
         notes.append(
             f"estimated errors of velocities add up to {spent:.2g} m/s or rad/s over all steps: dt is large for the "
             "motion; use a smaller dt, or tol="
@@ -124,12 +123,10 @@ def notes_of(run: RunData, record: Record) -> tuple[list[str], list[str]]:
 
 def _left_singular(run: RunData) -> bool:
     """Whether rows that depended on each other act still and are independent now: so the configuration was singular."""
-    v = run.values
-    acting = run.manager.active_rows(v["closed"][: v["n_contacts"]], v["sticks"][: v["n_frictions"]])
+    v = run.kernel
+    acting = run.manager.active_rows(v.closed[: v.n_contacts], v.sticks[: v.n_frictions])
     held = set(acting)
-    return any(
-        row in held and held.issuperset(on) and not v["dropped"][row] for row, on in run.stepper.dependent.items()
-    )
+    return any(row in held and held.issuperset(on) and not v.dropped[row] for row, on in run.stepper.dependent.items())
 
 
 def _uncounted(run: RunData, record: Record) -> list[str]:
@@ -143,7 +140,7 @@ def _uncounted(run: RunData, record: Record) -> list[str]:
 
 def _energy_lost(run: RunData, record: Record) -> list[str]:
     """The note on the energy with the dt that resolves the fastest motion, where most of the energy is gone."""
-    if not run.energy.share < -TAKEN or run.values["adaptive"]:
+    if not run.energy.share < -TAKEN or run.kernel.adaptive:
         return []
     rate = fastest(run, record, sane_rows(run))
     told = f": dt = {run.dt:g} s does not resolve its fastest motion of {rate:.3g} rad/s, dt below "
@@ -152,7 +149,7 @@ def _energy_lost(run: RunData, record: Record) -> list[str]:
 
 def _ignored(run: RunData, number: int, contact: Contact) -> list[str]:
     """A contact that lay below its surface or went into it while it was left out on purpose."""
-    deepest, sinking = run.values["deepest"][number], run.values["sinking"][number]
+    deepest, sinking = run.kernel.deepest[number], run.kernel.sinking[number]
     notes = []
     if deepest < -1e-9:
         notes.append(f"{contact.name!r} lay up to {-deepest:.3g} {contact.unit} below its surface while ignored")
@@ -182,7 +179,7 @@ def _pulled(record: Record, number: int, contact: Contact) -> list[str]:
 
 def _overshot(run: RunData, columns: ModelColumns, contact: Contact) -> list[str]:
     """A located contact that closes below its surface: it was passed in a step too long to see it come."""
-    if contact.kind == "penalty" or run.values["strategy"] == 1 or run.values["linear"] == 1:
+    if contact.kind == "penalty" or run.kernel.strategy == 1 or run.kernel.linear == 1:
         return []
     record = columns.record
     last = len(record.time) - 1
@@ -201,10 +198,10 @@ def _overshot(run: RunData, columns: ModelColumns, contact: Contact) -> list[str
 
 def _short_touch(run: RunData, record: Record, number: int, contact: Contact) -> tuple[list[str], list[str]]:
     """A penalty contact over within a few steps is not resolved: its energy is anyone's guess. (note, doubt)"""
-    if contact.kind != "penalty" or run.values["adaptive"]:
+    if contact.kind != "penalty" or run.kernel.adaptive:
         return [], []
     events = [event for event in run.events if event.name == contact.name]
-    least = float(run.values["pace"][5 * number + LEAST_PACE])
+    least = float(run.kernel.pace[5 * number + LEAST_PACE])
     if least > 0.0:
         safe = dt_of_blows(run, record, number, _closings(record, events)[:LOOKED_AT])
         enough = f"; dt below {safe:.2g} s has" if np.isfinite(safe) else ""

@@ -7,7 +7,7 @@ import numpy as np
 from mbd.assembly.conflicts import Conflict, loops_of
 from mbd.assembly.infeasibility import position_conflicts
 from mbd.assembly.posture import TOLERANCE, Posture, close_positions, position_rows
-from mbd.kernel import fields as F
+from mbd.kernel import codes
 from mbd.simulation.run.data import RunData
 
 __all__ = ["out_of_reach"]
@@ -16,8 +16,9 @@ AHEAD = (1.0, 4.0, 16.0)
 """How many steps beyond the last accepted state are looked at, one after the other [-]."""
 STEP_FAILURES = frozenset(
     {
-        F.NOT_FINITE, F.NOT_CONVERGED, F.SINGULAR, F.STAGNATED, F.DEPENDENT, F.CONFLICT, F.NO_LOCATION, F.TOO_TIGHT,
-        F.TOO_NEAR, F.TOO_SMALL, F.STIRRED, F.OUTGROWN, F.GAINED, F.LEAPT,
+        codes.NOT_FINITE, codes.NOT_CONVERGED, codes.SINGULAR, codes.STAGNATED, codes.DEPENDENT, codes.CONFLICT,
+        codes.NO_LOCATION, codes.TOO_TIGHT,
+        codes.TOO_NEAR, codes.TOO_SMALL, codes.STIRRED, codes.OUTGROWN, codes.GAINED, codes.LEAPT,
     }
 )  # fmt: skip
 """What steps fail with next to such a limit."""
@@ -55,10 +56,10 @@ def _follows_time(run: RunData) -> bool:
 
 def _posture(run: RunData, ahead: float) -> Posture:
     """The accepted positions at a later time."""
-    v = run.values
+    v = run.kernel
     return Posture(
-        run.mechanism, run.manager, v["params"], v["q"][: v["n_q"]].copy(), v["y"][: v["n"]].copy(),
-        v["closed"][: v["n_contacts"]].copy(), v["anchors"].copy(), time=run.now + ahead,
+        run.mechanism, run.manager, v.params, v.q[: v.n_q].copy(), v.y[: v.n].copy(),
+        v.closed[: v.n_contacts].copy(), v.anchors.copy(), time=run.now + ahead,
     )  # fmt: skip
 
 

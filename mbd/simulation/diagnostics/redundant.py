@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
 from mbd.assembly.conflicts import Member, linear_conflict
 from mbd.assembly.dependence import Dependence, dependences
 from mbd.equations.equations import Row
+from mbd.kernel.records import Kernel
 
 __all__ = ["clash", "redundancy"]
 
@@ -52,20 +52,19 @@ def redundancy(
     return f"redundant constraints: {len(told)} ({'; '.join(told[:MOST_TOLD] + more)}); {what}"
 
 
-def clash(rows: Sequence[Row], values: Mapping[str, Any]) -> str:
+def clash(rows: Sequence[Row], K: Kernel) -> str:
     """Which rows conflict or depend on each other in the kernel's last solve; '' where none can be told apart.
 
     Parameters
     ----------
     rows : of the equations
-    values : the arrays of the kernel; B and the right-hand sides are those of the solve that failed
+    K : of which B and the right-hand sides are those of the solve that failed
     """
-    n, count = values["n"], values["n_rows"]
-    B = values["acc"][n * n + n + n * count :][: n * count].reshape(count, n)
-    on = [int(values[flags][row.contact]) for row in rows for flags in ("closed", "closing", "active")]
+    B = K.acc[K.acc_B : K.acc_h].reshape(K.n_rows, K.n)
+    on = [int(flags[row.contact]) for row in rows for flags in (K.closed, K.closing, K.active)]
     acting = [k for k, row in enumerate(rows) if row.contact < 0 or any(on[3 * k : 3 * k + 3])]
-    acting = [k for k in acting if not values["row_trivial"][k]]
-    right, jacobian = -values["bias"][acting], B[acting]
+    acting = [k for k in acting if not K.row_trivial[k]]
+    right, jacobian = -K.bias[acting], B[acting]
     if not np.isfinite(jacobian).all() or not np.isfinite(right).all():
         return ""
     members = [Member(rows[k].title, "row") for k in acting]

@@ -147,7 +147,7 @@ def replay(
     trajectory, problem = run.complete()
     again, seen = _prepared(told, trajectory.final if problem else told.state, model, scheme, step, 1)
     if again.stepper.compiled:
-        again.stepper.compiled, again.stepper.scheme = False, Twin(again.stepper.values["scheme"])  # type: ignore[assignment]
+        again.stepper.compiled, again.stepper.scheme = False, Twin(again.stepper.kernel.scheme)  # type: ignore[assignment]
     again.march()
     same = bool(problem) and problem == told.message
     return Replay(told, not problem, same, trajectory.message, seen.tries(again), trajectory)

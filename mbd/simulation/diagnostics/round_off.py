@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from mbd.arrays import Vector
-from mbd.kernel import fields as F
 from mbd.simulation.run.stepper import Stepper
 
 __all__ = ["Remainder", "remainder"]
@@ -28,9 +27,9 @@ class Remainder:
 
 def remainder(stepper: Stepper) -> Remainder:
     """The remainder at Newton's last iterate, which is in the block; NaN before the first step."""
-    values, layout = stepper.values, stepper.mechanism.layout
-    block = values["block"]
-    if int(values["state"][F.MODE]) < 0:
+    values, layout = stepper.kernel, stepper.mechanism.layout
+    block = values.block
+    if int(values.mode_id) < 0:
         return Remainder(np.nan, np.nan)
     here = _balance(stepper, block)
     blurred = np.zeros_like(here)
@@ -38,16 +37,16 @@ def remainder(stepper: Stepper) -> Remainder:
         moved = block.copy()
         moved[place] = np.nextafter(block[place], np.inf)
         blurred += np.abs(_balance(stepper, moved) - here)
-    scale = np.maximum(values["scale"][: len(here)], np.finfo(float).tiny)
+    scale = np.maximum(values.scale[: len(here)], np.finfo(float).tiny)
     least = float(np.finfo(float).eps)  # the terms themselves are rounded when they are summed
     return Remainder(float(np.max(np.abs(here) / scale)), max(least, float(np.max(blurred / scale))))
 
 
 def _balance(stepper: Stepper, block: Vector) -> Vector:
     """M v̇ + f + Bᵀλ and ż − s at the inputs in a block."""
-    code, n = stepper.modes[int(stepper.values["state"][F.MODE])], int(stepper.values["n"])
+    code, n = stepper.modes[int(stepper.kernel.mode_id)], int(stepper.kernel.n)
     out = np.zeros(n + 2 * len(code.rows) + 1)
     with np.errstate(all="ignore"):
         program = getattr(code.residual, "program", code.residual)  # a replay watches that of the step
-        program(block, stepper.values["params"], out)
+        program(block, stepper.kernel.params, out)
     return out[:n]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mbd.kernel import fields as F
+from mbd.kernel import codes
 
 if TYPE_CHECKING:
     from mbd.compile.mechanism import AccelerationTerms
@@ -26,15 +26,17 @@ MOST_ROWS = 200
 """Rows above which a start is not asked for that [-]."""
 STEP_FAILURES = frozenset(
     {
-        F.NOT_CONVERGED, F.SINGULAR, F.STAGNATED, F.DEPENDENT, F.CONFLICT, F.TOO_NEAR, F.STIRRED, F.OUTGROWN, F.GAINED,
-        F.NO_LOCATION, F.TOO_TIGHT, F.AT_POSE,
+        codes.NOT_CONVERGED, codes.SINGULAR, codes.STAGNATED, codes.DEPENDENT, codes.CONFLICT, codes.TOO_NEAR,
+        codes.STIRRED, codes.OUTGROWN, codes.GAINED,
+        codes.NO_LOCATION, codes.TOO_TIGHT, codes.AT_POSE,
     }
 )  # fmt: skip
 """What steps fail with there."""
 WORDS = {
-    F.CLOSE: "closing of {!r}", F.OPEN_PULL: "opening of {!r}", F.OPEN_GAP: "opening of {!r}",
-    F.OPEN_FORCE: "opening of {!r}", F.PRESS: "closing of {!r}", F.CROSS: "event {!r}", F.STICK: "sticking of {!r}",
-    F.SLIP: "sliding of {!r}",
+    codes.CLOSE: "closing of {!r}", codes.OPEN_PULL: "opening of {!r}", codes.OPEN_GAP: "opening of {!r}",
+    codes.OPEN_FORCE: "opening of {!r}", codes.PRESS: "closing of {!r}", codes.CROSS: "event {!r}",
+    codes.STICK: "sticking of {!r}",
+    codes.SLIP: "sliding of {!r}",
 }  # fmt: skip
 """What happens, by the kernel's kind of guard."""
 
@@ -45,14 +47,14 @@ def at_singular_configuration(run: RunData, status: int) -> str:
     Such a configuration is stepped over. It cannot be stepped to: the velocities across the motion follow from
     round-off there, so that neither an event that changes something nor the end of a run may lie at it.
     """
-    v = run.values
-    if status not in STEP_FAILURES or int(v["state"][F.ROWS]) == 0:
+    v = run.kernel
+    if status not in STEP_FAILURES or int(v.n_active) == 0:
         return ""
-    if status == F.AT_POSE:
-        share = f" (round-off would make up {float(v['detail'][1]):.1g} of them)"
-        fired = int(v["fired"][0])
-        cause = _guard(run, fired, int(v["fired"][1])) if fired in WORDS else _boundary(run, np.inf)[0]
-        return _sentence(run, float(v["detail"][0]), int(v["state"][F.BLOCKED]) - v["n"], cause, share)
+    if status == codes.AT_POSE:
+        share = f" (round-off would make up {float(v.failure_size):.1g} of them)"
+        fired = int(v.event_kind)
+        cause = _guard(run, fired, int(v.event_index)) if fired in WORDS else _boundary(run, np.inf)[0]
+        return _sentence(run, float(v.failure_time), int(v.failure_index) - v.n, cause, share)
     with np.errstate(all="ignore"):
         found = _nearest(run)
     if found is None:
@@ -64,8 +66,8 @@ def at_singular_configuration(run: RunData, status: int) -> str:
 
 def _sentence(run: RunData, time: float, row: int, cause: str, share: str) -> str:
     """The sentence; `row` counts among those that are stepped with."""
-    v = run.values
-    title = run.mechanism.equations.rows[int(v["rows"][min(max(row, 0), int(v["state"][F.ROWS]) - 1)])].title
+    v = run.kernel
+    title = run.mechanism.equations.rows[int(v.rows[min(max(row, 0), int(v.n_active) - 1)])].title
     advice = (
         "choose another end or period" if cause.startswith(("the end", "a sample", "a jump")) else
         "move the event or contact"
@@ -80,9 +82,9 @@ def _sentence(run: RunData, time: float, row: int, cause: str, share: str) -> st
 def _guard(run: RunData, kind: int, index: int) -> str:
     """What a guard of the kernel is, in words."""
     manager = run.manager
-    if kind == F.CROSS:
+    if kind == codes.CROSS:
         name = manager.guards[index].name
-    elif kind in (F.STICK, F.SLIP):
+    elif kind in (codes.STICK, codes.SLIP):
         name = manager.frictions[index].name
     else:
         name = manager.names[index]
@@ -100,13 +102,13 @@ def _boundary(run: RunData, most: float) -> tuple[str, float]:
 
 def _cause(run: RunData, away: float) -> str:
     """What is to happen at that time from now, '' if nothing is: a boundary, an event, a contact that closes."""
-    v, near = run.values, CLOSE * run.dt
+    v, near = run.kernel, CLOSE * run.dt
     cause, time = _boundary(run, np.inf)
     if abs(time - away) < near:
         return cause
-    contacts, guards, values = v["n_contacts"], v["n_guards"], v["guards0"]
-    found = [(F.CROSS, e, 4 * contacts + e, 4 * contacts + guards + e) for e in range(guards)]
-    found += [(F.CLOSE, c, c, contacts + c) for c in range(contacts) if v["closed"][c] == 0]
+    contacts, guards, values = v.n_contacts, v.n_guards, v.guards0
+    found = [(codes.CROSS, e, 4 * contacts + e, 4 * contacts + guards + e) for e in range(guards)]
+    found += [(codes.CLOSE, c, c, contacts + c) for c in range(contacts) if v.closed[c] == 0]
     for kind, index, place, rate in found:
         fall = -values[rate]
         if fall != 0.0 and abs(values[place] / fall - away) < near + CLOSE * abs(away):
@@ -134,10 +136,10 @@ def _nearest(run: RunData) -> tuple[float, int] | None:
 
 def singular_start(run: RunData) -> list[str]:
     """A note where the run started at a singular configuration, or so close to one that round-off chose the branch."""
-    v, start = run.values, run.start
-    acting = run.manager.active_rows(run.manager.flags(start.mode.closed), np.zeros(v["n_frictions"]))
-    rows = [row for row in acting if not v["dropped"][row]]
-    if not 0 < len(rows) <= MOST_ROWS or run.resumed or len(start.anchors) != v["n_anchors"]:
+    v, start = run.kernel, run.start
+    acting = run.manager.active_rows(run.manager.flags(start.mode.closed))
+    rows = [row for row in acting if not v.dropped[row]]
+    if not 0 < len(rows) <= MOST_ROWS or run.resumed or len(start.anchors) != v.n_anchors:
         return []
     y = np.concatenate([start.v, start.z])
     terms = run.mechanism.acceleration_terms(start.time, start.q, y, run.first_parameters, start.anchors)
@@ -153,13 +155,13 @@ def singular_start(run: RunData) -> list[str]:
 
 def _smallest(run: RunData, ahead: float) -> tuple[float, int]:
     """Smallest singular value of the rows that act, `ahead` along the motion, and the row with the largest part."""
-    v, mechanism = run.values, run.mechanism
-    n_v = v["n_v"]
-    y, rate = v["y"][: v["n"]], v["rate"][: v["n"]]
-    q = run.stepper.system.compose(v["q"][: v["n_q"]].copy(), ahead * (y[:n_v] + 0.5 * ahead * rate[:n_v]))
-    anchors = v["anchors"][: v["n_anchors"]]
-    terms = mechanism.acceleration_terms(run.now + ahead, q, y + ahead * rate, v["params"], anchors)
-    return _part_left(terms, v["rows"][: int(v["state"][F.ROWS])])[:2]
+    v, mechanism = run.kernel, run.mechanism
+    n_v = v.n_v
+    y, rate = v.y[: v.n], v.rate[: v.n]
+    q = run.stepper.system.compose(v.q[: v.n_q].copy(), ahead * (y[:n_v] + 0.5 * ahead * rate[:n_v]))
+    anchors = v.anchors[: v.n_anchors]
+    terms = mechanism.acceleration_terms(run.now + ahead, q, y + ahead * rate, v.params, anchors)
+    return _part_left(terms, v.rows[: v.n_active].tolist())[:2]
 
 
 def _part_left(terms: AccelerationTerms, rows: Sequence[int]) -> tuple[float, int, float]:

@@ -32,7 +32,7 @@ def blocks(values: Matrix) -> Iterator[Matrix]:
 
 def overturned(run: RunData) -> str:
     """An angle at the end of a run that is too large to tell a pose, in a sentence; '' without one."""
-    found = beyond_angles(run.mechanism.equations, run.values["q"][: run.values["n_q"]])
+    found = beyond_angles(run.mechanism.equations, run.kernel.q[: run.kernel.n_q])
     return f"t = {run.now:.9g} s: {found[0]}: poses can no longer be told apart; end the run earlier" if found else ""
 
 
@@ -42,7 +42,7 @@ def unresolved_turns(run: RunData, record: Record) -> list[str]:
     Forces are then read at instants that may fall on the same angle again and again. Steps that follow a tolerance, and
     the explicit scheme, estimate that error themselves.
     """
-    if run.values["adaptive"] or run.values["scheme"] == RUNGE_KUTTA or len(record.time) < 2:
+    if run.kernel.adaptive or run.kernel.scheme == RUNGE_KUTTA or len(record.time) < 2:
         return []
     equations = run.mechanism.equations
     ways = np.zeros(equations.n_q)

@@ -12,7 +12,6 @@ from mbd.assembly.consistency import residuals
 from mbd.assembly.orientation import reversed_joints
 from mbd.assembly.posture import Posture
 from mbd.errors import ModelError
-from mbd.kernel import fields as F
 from mbd.simulation.parameters import residuals_now, violations_now
 from mbd.simulation.run.data import RunData
 from mbd.simulation.run.memory import memory_of_end
@@ -23,30 +22,30 @@ __all__ = ["begin", "check_rank", "guard_values", "notify", "require_consistent"
 
 def notify(run: RunData) -> None:
     """Of which contacts and events Python must hear."""
-    told = run.values["notify"]
+    told = run.kernel.notify
     ends = {run.stop} | {name for controller in run.boundaries.controllers for name in controller.on}
     for c, contact in enumerate(run.manager.contacts):
         told[c] = int(contact.name in ends)
     for e, guard in enumerate(run.manager.guards):
         wanted = guard.terminal or guard.reset is not None or guard.name in ends
-        told[run.values["n_contacts"] + e] = int(wanted)
+        told[run.kernel.n_contacts + e] = int(wanted)
 
 
 def begin(run: RunData, start: State) -> None:
     """Put a start that is not the end of an earlier run into the kernel's arrays."""
-    v = run.values
-    v["q"][: v["n_q"]] = start.q
-    v["y"][: v["n"]] = np.concatenate([start.v, start.z])
-    if len(start.anchors) == v["n_anchors"]:  # else all contacts are open, and store theirs as they close
-        v["anchors"][: v["n_anchors"]] = start.anchors
-    n_contacts, n_guards = v["n_contacts"], v["n_guards"]
-    v["closed"][:n_contacts] = run.manager.flags(start.mode.closed)
+    v = run.kernel
+    v.q[: v.n_q] = start.q
+    v.y[: v.n] = np.concatenate([start.v, start.z])
+    if len(start.anchors) == v.n_anchors:  # else all contacts are open, and store theirs as they close
+        v.anchors[: v.n_anchors] = start.anchors
+    n_contacts, n_guards = v.n_contacts, v.n_guards
+    v.closed[:n_contacts] = run.manager.flags(start.mode.closed)
     armed: Iterable[str] = set(run.manager.names) - start.mode.closed if start.armed is None else start.armed
-    v["armed"][:n_contacts] = run.manager.flags(armed)
-    v["clock"][F.NOW] = v["clock"][F.BASE] = start.time
-    v["clock"][F.LAST_SWITCH] = -np.inf
+    v.armed[:n_contacts] = run.manager.flags(armed)
+    v.time = v.grid_start = start.time
+    v.last_switch = -np.inf
     require_consistent(run, start)
-    v["state"][F.RESTART], v["state"][F.MODE] = 1, -1
+    v.restart_due, v.mode_id = 1, -1
     guards = guard_values(run)
     inside = _touch(run, start, guards)
     if inside:
@@ -63,15 +62,15 @@ def require_consistent(run: RunData, start: State) -> None:
     ModelError
         with the rows that it violates, and how far.
     """
-    v, mechanism = run.values, run.mechanism
-    if not run.manager.active_rows(v["closed"][: v["n_contacts"]]):
+    v, mechanism = run.kernel, run.mechanism
+    if not run.manager.active_rows(v.closed[: v.n_contacts]):
         return
-    q, y, anchors = v["q"][: v["n_q"]], v["y"][: v["n"]], v["anchors"][: v["n_anchors"]]
+    q, y, anchors = v.q[: v.n_q], v.y[: v.n], v.anchors[: v.n_anchors]
     usual, memory = None, memory_of_end(run, start)
-    if memory is not None and len(memory.parameters) == len(v["params"]):
+    if memory is not None and len(memory.parameters) == len(v.params):
         usual = residuals(mechanism, start.time, q, y, memory.parameters, anchors)[:2]
     faults = violations_now(run, residuals_now(run), usual)
-    faults += reversed_joints(mechanism, start.time, q, v["params"], anchors)
+    faults += reversed_joints(mechanism, start.time, q, v.params, anchors)
     if faults:
         advice = (
             "mbd.project(model, state) gives the nearest state that does, mbd.assemble(model, …) one of named values"
@@ -83,22 +82,20 @@ def require_consistent(run: RunData, start: State) -> None:
 
 def _touch(run: RunData, start: State, guards: Vector) -> list[str]:
     """Note which contacts touch at the start; complaints of those that are open inside their surface."""
-    v, inside = run.values, []
-    n_contacts = v["n_contacts"]
+    v, inside = run.kernel, []
+    n_contacts = v.n_contacts
     if n_contacts == 0:
         return []
-    rates = run.mechanism.acceleration_terms(
-        start.time, start.q, v["y"][: v["n"]], v["params"], v["anchors"][: v["n_anchors"]]
-    ).rate
+    rates = run.mechanism.acceleration_terms(start.time, start.q, v.y[: v.n], v.params, v.anchors[: v.n_anchors]).rate
     for c in range(n_contacts):
         close, slow = abs(guards[c]) <= 1e-8, abs(guards[n_contacts + c]) <= 1e-9
-        target = v["while_target"][c]
-        watched = (True, v["closed"][target] == 1, guards[3 * n_contacts + c] > 0.0)[v["while_kind"][c]]
-        ready = v["armed"][c] == 1 and watched
+        target = v.while_target[c]
+        watched = (True, v.closed[target] == 1, guards[3 * n_contacts + c] > 0.0)[v.while_kind[c]]
+        ready = v.armed[c] == 1 and watched
         held = [row for row in run.manager.contacts[c].rows if run.mechanism.equations.rows[row].friction < 0]
         still = all(abs(rates[row]) <= 1e-9 for row in held)
-        v["touched"][c] = int(ready and v["kind"][c] == 0 and close and slow and still)
-        if ready and v["closed"][c] == 0 and guards[c] < -BELOW:
+        v.touched[c] = int(ready and v.kind[c] == 0 and close and slow and still)
+        if ready and v.closed[c] == 0 and guards[c] < -BELOW:
             contact = run.manager.contacts[c]
             inside.append(
                 f"{contact.name!r} starts {-guards[c]:.6g} {contact.unit} inside its surface; assemble the start "
@@ -109,9 +106,9 @@ def _touch(run: RunData, start: State, guards: Vector) -> list[str]:
 
 def check_rank(run: RunData, start: State, parameters: Vector) -> None:
     """Values of parameters may take away what determines the motion."""
-    v = run.values
-    y, flags = np.concatenate([start.v, start.z]), v["closed"][: v["n_contacts"]]
-    posture = Posture(run.mechanism, run.manager, parameters, start.q, y, flags, v["anchors"], time=start.time)
+    v = run.kernel
+    y, flags = np.concatenate([start.v, start.z]), v.closed[: v.n_contacts]
+    posture = Posture(run.mechanism, run.manager, parameters, start.q, y, flags, v.anchors, time=start.time)
     faults = undetermined(posture)
     if faults:
         raise ModelError(faults)
@@ -119,11 +116,11 @@ def check_rank(run: RunData, start: State, parameters: Vector) -> None:
 
 def guard_values(run: RunData) -> Vector:
     """Gaps, their rates and users' guards at the accepted state, in the order of the kernel."""
-    v = run.values
-    out = np.zeros(max(v["n_watched"], 1))
-    if v["n_watched"]:
-        q, y, anchors = v["q"][: v["n_q"]], v["y"][: v["n"]], v["anchors"][: v["n_anchors"]]
-        run.mechanism.common["guards"](run.mechanism.block(v["clock"][F.NOW], q, y, anchors), v["params"], out)
+    v = run.kernel
+    out = np.zeros(max(v.n_watched, 1))
+    if v.n_watched:
+        q, y, anchors = v.q[: v.n_q], v.y[: v.n], v.anchors[: v.n_anchors]
+        run.mechanism.common["guards"](run.mechanism.block(v.time, q, y, anchors), v.params, out)
     return out
 
 
@@ -132,9 +129,9 @@ def set_side(run: RunData, e: int, guards: Vector) -> None:
     just before its surface fires it. At zero itself, and where the value is round-off, its rate decides; where that
     leads nowhere in a step, the first steps that do.
     """
-    n_contacts, n_guards = run.values["n_contacts"], run.values["n_guards"]
+    n_contacts, n_guards = run.kernel.n_contacts, run.kernel.n_guards
     value, rate = guards[4 * n_contacts + e], guards[4 * n_contacts + n_guards + e]
     doubt = run.stepper.guard_round_off(e)
     if abs(value) <= doubt:
-        value = rate if abs(rate) * run.values["clock"][F.STEP] > doubt else 0.0
-    run.values["side"][e] = float(np.sign(value))
+        value = rate if abs(rate) * run.kernel.step > doubt else 0.0
+    run.kernel.side[e] = float(np.sign(value))

@@ -10,11 +10,11 @@ import numpy as np
 
 from mbd.arrays import Vector
 from mbd.errors import ModelError
-from mbd.kernel import fields as F
+from mbd.kernel import codes
 
 __all__ = ["Boundaries", "without_sharing"]
 
-NEAR = 8.0 * F.EPS
+NEAR = 8.0 * codes.EPS
 """Two instants are one where they differ by less, relative: round-off of a sum of steps [-]."""
 CROWD = 32
 """Breaks within 64 steps before and after one, above which it is stepped over as one of a dense signal."""

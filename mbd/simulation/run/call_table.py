@@ -8,17 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from mbd.kernel import fields as F
+from mbd.kernel.records import TABLE, Kernel
 
 __all__ = ["CallTable"]
 
-PLACES = {name: place for place, name in enumerate(F.FIELDS)}
-ARRAYS = (*F.REAL_ARRAYS, *F.INTEGER_ARRAYS)
+PLACES = {name: place for place, name in enumerate(TABLE.addresses)}
+ARRAYS = (*TABLE.real_arrays, *TABLE.integer_arrays)
 """Names of arrays, which stand side by side, as integers and reals do."""
-WHOLE = slice(0, len(F.INTEGERS))
-REAL = slice(WHOLE.stop, WHOLE.stop + len(F.REALS))
+WHOLE = slice(0, len(TABLE.integers))
+REAL = slice(WHOLE.stop, WHOLE.stop + len(TABLE.reals))
 BOUND = slice(REAL.stop, REAL.stop + len(ARRAYS))
-_whole, _real, _arrays = itemgetter(*F.INTEGERS), itemgetter(*F.REALS), itemgetter(*ARRAYS)
+_whole, _real, _arrays = itemgetter(*TABLE.integers), itemgetter(*TABLE.reals), itemgetter(*ARRAYS)
 
 
 class CallTable:
@@ -27,24 +27,22 @@ class CallTable:
     Parameters
     ----------
     functions : compiled functions, in the order of the kernel's `code`; more may follow later
-    values : everything that the kernel reads and writes, by name
+    kernel : everything that the kernel reads and writes
     known : arrays and their addresses, so that numpy, which takes microseconds for each, need not be asked
     """
 
-    def __init__(
-        self, functions: Sequence[Any], values: Mapping[str, Any], known: Mapping[str, tuple[Any, int]]
-    ) -> None:
-        self._words = np.zeros(len(F.FIELDS), dtype=np.int64)
+    def __init__(self, functions: Sequence[Any], kernel: Kernel, known: Mapping[str, tuple[Any, int]]) -> None:
+        self._words = np.zeros(len(PLACES), dtype=np.int64)
         self._reals = self._words.view(np.float64)
         self._code = np.zeros(0, dtype=np.int64)
         self._bound, self._words[BOUND] = zip(*[known.get(name, (None, 0)) for name in ARRAYS], strict=True)
         self.address = self._words.ctypes.data
-        self.fill(functions, values)
+        self.fill(functions, kernel)
 
-    def fill(self, functions: Sequence[Any], values: Mapping[str, Any]) -> None:
+    def fill(self, functions: Sequence[Any], kernel: Kernel) -> None:
         """Bring the table up to what the next call needs."""
+        values = vars(kernel)
         self._words[WHOLE] = _whole(values)
-        self._words[PLACES["hooks"]] = values["hooks"]
         self._reals[REAL] = _real(values)
         arrays = _arrays(values)
         if not all(map(is_, arrays, self._bound)):

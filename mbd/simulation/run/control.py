@@ -13,7 +13,6 @@ from mbd.compile.python import scalar_function
 from mbd.constraints.expressions import evaluated, is_expression
 from mbd.equations.equations import Guard
 from mbd.errors import ModelError, SimulationError, UnknownNameError, nearest
-from mbd.kernel import fields as F
 from mbd.simulation.asked import asked
 from mbd.simulation.parameters import change_parameters, residuals_now, violations_now
 from mbd.simulation.run.boundaries import without_sharing
@@ -30,7 +29,7 @@ class Named(Mapping[str, float]):
 
     def __getitem__(self, name: str) -> float:
         run = self._run
-        mechanism, v = run.mechanism, run.values
+        mechanism, v = run.mechanism, run.kernel
         known = mechanism.named.get(name)
         if known is None and name not in mechanism.equations.output_names():
             given = {**run.model.parameters, **run.changed}.get(name)
@@ -40,14 +39,14 @@ class Named(Mapping[str, float]):
             with mechanism.equations.tape.lock:
                 output = mechanism.equations.output(name)
                 known = mechanism.named[name] = scalar_function([output], mechanism.layout, "named")
-        layout, flags = mechanism.layout, v["closed"][: v["n_contacts"]]
+        layout, flags = mechanism.layout, v.closed[: v.n_contacts]
         block = mechanism.block(
-            run.now, v["q"][: v["n_q"]], v["y"][: v["n"]], v["anchors"][: v["n_anchors"]], run.manager.penalties(flags)
+            run.now, v.q[: v.n_q], v.y[: v.n], v.anchors[: v.n_anchors], run.manager.penalties(flags)
         )
-        block[layout.a : layout.lam] = v["rate"][: v["n"]]
-        block[layout.lam : layout.anchor] = v["lam"][: v["n_rows"]]
+        block[layout.a : layout.lam] = v.rate[: v.n]
+        block[layout.lam : layout.anchor] = v.lam[: v.n_rows]
         out = np.zeros(1)
-        known(block, v["params"], out)
+        known(block, v.params, out)
         return float(out[0])
 
     def __iter__(self) -> Iterator[str]:
@@ -61,7 +60,7 @@ def apply_reset(run: RunData, guard: Guard) -> None:
     """Set the coordinates and rates that a user's event resets; rows must still hold."""
     what = f"the reset of {guard.name!r} at t = {run.now:.6g} s"
     wanted = _finite_numbers(f"{what} sets", asked(what, _reset_values, guard.reset, Named(run)))
-    equations, v = run.mechanism.equations, run.values
+    equations, v = run.mechanism.equations, run.kernel
     usual = residuals_now(run)[:2]
     positions = {coordinate.name: k for k, coordinate in enumerate(equations.coordinates)}
     rates = {name: k for name, k in rate_names(equations).items() if name not in positions}
@@ -73,9 +72,9 @@ def apply_reset(run: RunData, guard: Guard) -> None:
         raise UnknownNameError(f"{what}: " + nearest(unknown[0], [*positions, *places], "quantity"))
     for name, number in wanted.items():
         if name in positions:
-            v["q"][positions[name]] = number
+            v.q[positions[name]] = number
         else:
-            v["y"][places[name]] = number
+            v.y[places[name]] = number
     off = violations_now(run, residuals_now(run), usual)
     if off:
         raise SimulationError(f"{what} breaks constraints: {'; '.join(off)}; reset all that they bind, velocities too")
@@ -156,7 +155,7 @@ def arrive(run: RunData, target: float) -> bool:
     if len(ahead) and ahead[0] <= np.nextafter(target, np.inf):
         run.move_to(float(ahead[0]))
         boundaries.place += 1
-        run.values["state"][F.RESTART] = 1
+        run.kernel.restart_due = 1
     for controller in boundaries.controllers:
         if controller.period is not None and boundaries.sample(controller) <= target:
             _call(run, controller)

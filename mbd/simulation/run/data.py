@@ -15,8 +15,8 @@ from mbd.bodies.domains import ParameterCheck
 from mbd.compile.mechanism import Mechanism
 from mbd.forces.base import Force
 from mbd.integrators.base import Integrator
-from mbd.kernel import fields as F
 from mbd.kernel.active_set import ActiveSetManager
+from mbd.kernel.records import Kernel
 from mbd.results.failure import Failure
 from mbd.results.record import EventRecord
 from mbd.simulation.run.boundaries import Boundaries
@@ -125,9 +125,9 @@ class RunData:
         self.first_parameters = parameters.copy()
         compiled_options = {**options, "capacity": rows + 8 + 2 * len(manager.guards), "end": end}
         self.stepper = Stepper(mechanism, manager, integrator, parameters, dt, compiled_options)
-        self.values = self.stepper.values
-        self.values["chunk"] = _steps_at_once(self.stepper)
-        width, capacity = self.values["width"], self.values["capacity"]
+        self.kernel = self.stepper.kernel
+        self.kernel.chunk = _steps_at_once(self.stepper)
+        width, capacity = self.kernel.width, self.kernel.capacity
         expected = 1.25 * (end - start.time) / dt / options.get("store", 1) + 1024
         self.table = _first_table(max(int(min(expected, FIRST_TABLE / (8 * width))), 3 * capacity), width)
         self.events: list[EventRecord] = []
@@ -151,11 +151,11 @@ class RunData:
     @property
     def settings(self) -> dict[str, Any]:
         """What was asked for, with the strategy that contacts are treated by now."""
-        return _settings_now(self.values, self.manager, self.asked)
+        return _settings_now(self.kernel, self.manager, self.asked)
 
     @property
     def now(self) -> float:
-        return float(self.values["clock"][F.NOW])
+        return float(self.kernel.time)
 
     def _parameters(self) -> Vector:
         """The parameter vector; which parameters are folded into the equations is asked only where it counts."""
@@ -165,38 +165,38 @@ class RunData:
     def set_parameters(self, changed: Mapping[str, float]) -> None:
         """Parameters that differ from the model's."""
         self.changed = dict(changed)
-        self.values["params"][: len(self.first_parameters)] = self._parameters()
+        self.kernel.params[: len(self.first_parameters)] = self._parameters()
 
     def collect(self) -> None:
         """Take over the rows and events that the kernel has stored."""
-        v = self.values
-        count, logged = int(v["state"][F.STORED]), int(v["state"][F.LOGGED])
+        v = self.kernel
+        count, logged = int(v.n_stored), int(v.n_logged)
         if logged:
             self._collect_events(logged)
         if count:
             self._make_room(count)
-            self.table[self.stored : self.stored + count] = v["store"].reshape(-1, v["width"])[:count]
+            self.table[self.stored : self.stored + count] = v.store.reshape(-1, v.width)[:count]
         self.stored += count
-        v["state"][F.STORED] = v["state"][F.LOGGED] = 0
+        v.n_stored = v.n_logged = 0
 
     def _make_room(self, count: int) -> None:
         """Have places for so many more rows; a MemoryError leaves all as it is."""
         if self.stored + count <= len(self.table):
             return
         try:
-            table = np.empty((2 * len(self.table) + count, self.values["width"]))
+            table = np.empty((2 * len(self.table) + count, self.kernel.width))
         except MemoryError:
-            table = np.empty((self.stored + count, self.values["width"]))
+            table = np.empty((self.stored + count, self.kernel.width))
         table[: self.stored] = self.table[: self.stored]
         self.table = table
 
     def _collect_events(self, logged: int) -> None:
         """Events from the lines of the log."""
-        manager, width = self.manager, self.values["event_width"]
+        manager, width = self.manager, self.kernel.event_width
         contacts, frictions = manager.names, [friction.name for friction in manager.frictions]
         guards = [guard.name for guard in manager.guards]
         known = {"event": guards, "stuck": frictions, "slipped": frictions}
-        for line in self.values["log"][: logged * width].reshape(logged, width):
+        for line in self.kernel.log[: logged * width].reshape(logged, width):
             kind, index = KINDS[int(line[1])], int(line[2])
             name, told, impulse = known.get(kind, contacts)[index], {}, np.zeros(0)
             if kind in ("closed", "opened"):
@@ -213,7 +213,7 @@ class RunData:
 
     def count_turns(self) -> None:
         """Write the whole turns of spatial cut joints at the accepted state into the anchors."""
-        self.turns.count(self.mechanism, self.values, self.stored, self.table)
+        self.turns.count(self.mechanism, self.kernel, self.stored, self.table)
 
     def move_to(self, time: float) -> None:
         """Put the clock, and the row just stored as the left side of a break, on its instant."""
@@ -221,29 +221,29 @@ class RunData:
         self.collect()
         if self.stored and self.table[self.stored - 1, 0] == self.now:
             self.table[self.stored - 1, 0] = time
-        self.values["clock"][F.NOW] = time
+        self.kernel.time = time
 
     def state(self) -> State:
         """The accepted state."""
         self.count_turns()
-        v = self.values
+        v = self.kernel
         names = np.array(self.manager.names)
-        armed = frozenset(str(name) for name in names[v["armed"][: len(names)] == 1])
-        y = v["y"][: v["n"]].copy()
-        n_v = v["n_v"]
+        armed = frozenset(str(name) for name in names[v.armed[: len(names)] == 1])
+        y = v.y[: v.n].copy()
+        n_v = v.n_v
         return State(
-            self.now if self.label is None else self.label, v["q"][: v["n_q"]].copy(), y[:n_v], y[n_v:],
-            self.manager.mode(v["closed"][: len(names)]), armed,
-            v["anchors"][: v["n_anchors"]].copy(), self.start.names, self.start.velocity_names, {}, dict(self.changed),
+            self.now if self.label is None else self.label, v.q[: v.n_q].copy(), y[:n_v], y[n_v:],
+            self.manager.mode(v.closed[: len(names)]), armed,
+            v.anchors[: v.n_anchors].copy(), self.start.names, self.start.velocity_names, {}, dict(self.changed),
         )  # fmt: skip
 
 
-def _settings_now(values: Mapping[str, Any], manager: ActiveSetManager, asked: Mapping[str, Any]) -> dict[str, Any]:
+def _settings_now(values: Kernel, manager: ActiveSetManager, asked: Mapping[str, Any]) -> dict[str, Any]:
     """The settings of a run, with the strategy that it has taken since."""
-    cause = int(values["state"][F.UNLOCATED]) if values["auto"] else 0
+    cause = int(values.fallback) if values.auto else 0
     if cause == 0:
         return {**asked}
-    since = float(values["clock"][F.UNLOCATED_SINCE])
+    since = float(values.fallback_time)
     count = sum(item.kind == "unilateral" for item in manager.contacts)
     reason = (
         f"contact='events' was chosen for {count} contacts until t = {since:.6g} s, then 'nonsmooth': {WHY[cause]}; "

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from mbd.errors import SimulationError
-from mbd.kernel import fields as F
+from mbd.kernel import codes
 from mbd.simulation.run.data import RunData
 from mbd.simulation.run.memory import memory_of
 from mbd.simulation.run.savepoints import called, restore, save
@@ -22,21 +22,21 @@ def advance(run: RunData, target: float, due: bool) -> int:
 
     `due` says that a boundary is at the target, where a longer run would end a step as well.
     """
-    v = run.values
+    v = run.kernel
     if run.limit is not None:
-        v["chunk"] = max(min(v["chunk"], run.limit - int(v["counts"][F.STEPS])), 0)
+        v.chunk = max(min(v.chunk, run.limit - int(v.n_steps)), 0)
     status = call(run, target, np.inf if due else target)
-    if status != F.LAST:
+    if status != codes.LAST:
         return status
-    before, counts = save(run), v["counts"].copy()
+    before, counts = save(run), v.counts.copy()
     status = _one_step(run)
     if may_go_on_unlocated(run, status):  # as a longer run would
         return status
     near = run.boundaries.near
-    if status in (F.PAUSE, F.EVENT, F.NEW_MODE) and run.now <= target + near:
-        return F.DONE if status == F.PAUSE and run.now >= target - near else status
+    if status in (codes.PAUSE, codes.EVENT, codes.NEW_MODE) and run.now <= target + near:
+        return codes.DONE if status == codes.PAUSE and run.now >= target - near else status
     restore(run, before)
-    v["counts"][:] = counts
+    v.counts[:] = counts
     run.history = [*run.history[:-1], before]
     return call(run, target, np.inf)
 
@@ -44,19 +44,19 @@ def advance(run: RunData, target: float, due: bool) -> int:
 def call(run: RunData, until: float, end: float) -> int:
     """Call the kernel from the last savepoint; a step that would pass `until` is cut, or left to us if it is `end`."""
     called(run, until, end)
-    run.values["end"] = end
+    run.kernel.end = end
     return run.stepper.advance(until)
 
 
 def _one_step(run: RunData) -> int:
     """A step of the grid, wherever it ends."""
-    chunk, run.values["chunk"] = run.values["chunk"], 1
+    chunk, run.kernel.chunk = run.kernel.chunk, 1
     try:
         return call(run, np.inf, np.inf)
     except SimulationError:  # an integrator of the user's raised beyond the end that was asked for
         return -1
     finally:
-        run.values["chunk"] = chunk
+        run.kernel.chunk = chunk
 
 
 def close(run: RunData, settled: bool) -> State:

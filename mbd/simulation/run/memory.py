@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from mbd.arrays import Vector
-from mbd.kernel import fields as F
+from mbd.kernel.records import TABLE
 from mbd.results.record import EventRecord
 from mbd.simulation.run.data import RunData
 from mbd.simulation.run.remembered import damage, out_of_range, sealed
@@ -24,22 +24,22 @@ def memory_of(run: RunData, time: float) -> Memory:
     """The memory of the accepted state, which must be settled; `time` is what its state says."""
     stepper = run.stepper
     run.count_turns()
-    parameters, reals, integers = run.values["params"].copy(), stepper.reals.copy(), stepper.integers.copy()
+    parameters, reals, integers = run.kernel.params.copy(), stepper.reals.copy(), stepper.integers.copy()
     place = _place(run)
     for array in (parameters, reals, integers, place):
         array.flags.writeable = False
     return sealed(Memory(
         belongs(run), digest(run), time, parameters, reals, integers, stepper.scheme.memory,
         run.boundaries.remembered(), tuple((event.kind, event.name) for event in run.pending), place,
-        run.manager.mode(run.values["closed"][: run.values["n_contacts"]]),
-        run.values["anchors"][: run.values["n_anchors"]].copy(),
+        run.manager.mode(run.kernel.closed[: run.kernel.n_contacts]),
+        run.kernel.anchors[: run.kernel.n_anchors].copy(),
     ))  # fmt: skip
 
 
 def _place(run: RunData) -> Vector:
     """(q, v, z) as the kernel has them."""
-    v = run.values
-    return np.concatenate([v["q"][: v["n_q"]], v["y"][: v["n"]]])
+    v = run.kernel
+    return np.concatenate([v.q[: v.n_q], v.y[: v.n]])
 
 
 def belongs(run: RunData, contact: str = "") -> tuple[str, ...]:
@@ -53,7 +53,7 @@ def belongs(run: RunData, contact: str = "") -> tuple[str, ...]:
     settings = run.settings if not contact else {**run.settings, "contact": contact}
     words += [f"{name} {settings[name]!r}" for name in OPTIONS]
     words.append(f"mbd {settings['versions']['mbd']}")
-    words += [f"{name} {len(run.values[name])}" for name in (*F.KEPT_REALS, *F.KEPT_INTEGERS)]
+    words += [f"{name} {len(getattr(run.kernel, name))}" for name in (*TABLE.kept_reals, *TABLE.kept_integers)]
     words += [row.title for row in equations.rows] + run.manager.names
     words += [guard.name for guard in run.manager.guards]
     return (*words, *_controllers(run))
@@ -66,14 +66,14 @@ def _controllers(run: RunData) -> tuple[str, ...]:
 
 def digest(run: RunData) -> str:
     """Of masses, forces, rows and guards at the accepted state: a model that was changed there has another one."""
-    v, mechanism = run.values, run.mechanism
-    acting = run.manager.penalties(v["closed"][: v["n_contacts"]])
-    block = mechanism.block(run.now, v["q"][: v["n_q"]], v["y"][: v["n"]], v["anchors"][: v["n_anchors"]], acting)
+    v, mechanism = run.kernel, run.mechanism
+    acting = run.manager.penalties(v.closed[: v.n_contacts])
+    block = mechanism.block(run.now, v.q[: v.n_q], v.y[: v.n], v.anchors[: v.n_anchors], acting)
     told = hashlib.sha256()
     for name in ("accelerations", "guards"):
         out = np.zeros(max(mechanism.sizes[name], 1))
         if mechanism.sizes[name]:
-            mechanism.common[name](block, v["params"], out)
+            mechanism.common[name](block, v.params, out)
         told.update(out.tobytes())
     return told.hexdigest()
 
@@ -84,31 +84,31 @@ def take_up(run: RunData, start: State) -> bool:
     if memory is None:
         return False
     run.damage = damage(memory)
-    if run.damage or len(memory.parameters) != len(run.values["params"]):
+    if run.damage or len(memory.parameters) != len(run.kernel.params):
         return False  # other values of parameters may make other run-time inputs, which is no damage
-    unlocated = bool(run.values["auto"]) and memory.belongs == belongs(run, "nonsmooth")
+    unlocated = bool(run.kernel.auto) and memory.belongs == belongs(run, "nonsmooth")
     if memory.belongs != belongs(run) and not unlocated:
         return False
     run.damage = out_of_range(run, memory)
     if run.damage:
         return False
-    stepper, v = run.stepper, run.values
+    stepper, v = run.stepper, run.kernel
     fresh = stepper.reals.copy(), stepper.integers.copy()
     stepper.reals[:], stepper.integers[:] = memory.reals, memory.integers
-    taken = not unlocated or run.values["state"][F.UNLOCATED] > 0  # it came to them by itself
+    taken = not unlocated or run.kernel.fallback > 0  # it came to them by itself
     if not (taken and _is_of(run, memory, start) and memory.digest == digest(run)):
         stepper.reals[:], stepper.integers[:] = fresh
         return False
     stepper.scheme.memory = memory.scheme
     run.boundaries.take_up(memory.controllers, run.now)
     run.pending = tuple(EventRecord(run.now, kind, name) for kind, name in memory.pending)
-    v["state"][F.STORED] = v["state"][F.LOGGED] = 0
-    v["state"][F.MODE], v["state"][F.ORDERED] = -1, 0
-    phase = int(v["state"][F.SINCE_STORE])
+    v.n_stored = v.n_logged = 0
+    v.mode_id, v.order_start = -1, 0
+    phase = int(v.steps_since_row)
     stepper.hold()
     stepper.store_row()
-    v["store"][0] = start.time
-    v["state"][F.SINCE_STORE] = phase
+    v.store[0] = start.time
+    v.steps_since_row = phase
     stepper.resumed_at = run.now
     return True
 
@@ -146,14 +146,14 @@ def without_memory(state: State) -> State:
 
 def _is_of(run: RunData, memory: Memory, start: State) -> bool:
     """Whether a state and the parameters are those of a memory, to the bit; the memory is in the kernel's arrays."""
-    v, manager = run.values, run.manager
-    n_contacts, n_anchors = v["n_contacts"], v["n_anchors"]
+    v, manager = run.kernel, run.manager
+    n_contacts, n_anchors = v.n_contacts, v.n_anchors
     pairs = (
-        (v["q"][: v["n_q"]], start.q),
-        (v["y"][: v["n"]], np.concatenate([start.v, start.z])),
-        (v["closed"][:n_contacts], manager.flags(start.mode.closed)),
-        (v["armed"][:n_contacts] == 1, manager.flags(start.armed or ()) == 1),
-        (v["anchors"][:n_anchors], start.anchors if n_anchors else v["anchors"][:n_anchors]),
-        (v["params"], memory.parameters),
+        (v.q[: v.n_q], start.q),
+        (v.y[: v.n], np.concatenate([start.v, start.z])),
+        (v.closed[:n_contacts], manager.flags(start.mode.closed)),
+        (v.armed[:n_contacts] == 1, manager.flags(start.armed or ()) == 1),
+        (v.anchors[:n_anchors], start.anchors if n_anchors else v.anchors[:n_anchors]),
+        (v.params, memory.parameters),
     )
     return memory.time == start.time and all(np.array_equal(one, other) for one, other in pairs)

@@ -6,7 +6,6 @@ from dataclasses import replace
 from time import perf_counter
 from typing import Any
 
-from mbd.kernel import fields as F
 from mbd.simulation.diagnostics.notes import notes_of
 from mbd.simulation.run.data import RunData
 from mbd.simulation.run.lengths import RUNGE_KUTTA
@@ -21,7 +20,7 @@ COUNTS = (
     "locations", "stagnations", "careful", "shortened", "energetic_impacts",
     "endless", "pivoted",
 )  # fmt: skip
-"""Names of the kernel's counts, in the order of their places."""
+"""Counts of the kernel that results tell."""
 
 
 def trajectory_of(run: RunData, problem: str, message: str, final: State) -> Trajectory:
@@ -36,12 +35,11 @@ def trajectory_of(run: RunData, problem: str, message: str, final: State) -> Tra
 
 
 def _statistics(run: RunData, notes: list[str]) -> dict[str, Any]:
-    counts = run.values["counts"]
-    numbers: dict[str, Any] = {name: int(counts[place]) for place, name in enumerate(COUNTS)}
-    if run.values["adaptive"]:
-        numbers["rejected"] = int(counts[F.REJECTED])
-    if run.values["adaptive"] or run.values["scheme"] == RUNGE_KUTTA:
-        numbers["local_errors"] = float(run.values["clock"][F.SPENT])
+    numbers: dict[str, Any] = {name: int(getattr(run.kernel, f"n_{name}")) for name in COUNTS}
+    if run.kernel.adaptive:
+        numbers["rejected"] = int(run.kernel.n_rejected)
+    if run.kernel.adaptive or run.kernel.scheme == RUNGE_KUTTA:
+        numbers["local_errors"] = float(run.kernel.error_sum)
     numbers["modes"] = len(run.stepper.modes)
     numbers["compiled"] = run.stepper.compiled
     numbers["optimized"] = run.stepper.compiled and not run.stepper.provisional

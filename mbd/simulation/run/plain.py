@@ -13,7 +13,7 @@ from mbd.equations.programs import mass_matrix
 from mbd.errors import SimulationError
 from mbd.integrators.base import Integrator, Point, StepReport, StepResult, System, Terms
 from mbd.kernel.active_set import ActiveSetManager
-from mbd.kernel.fields import CAREFUL, ITERATIONS, NEAR, NOT_CONVERGED, NOT_FINITE, NOW, ROWS, TOO_NEAR
+from mbd.kernel.codes import NOT_CONVERGED, NOT_FINITE, TOO_NEAR
 from mbd.kernel.restart import MOST_LOADS, evaluate, fill_block, refresh_scales
 from mbd.kernel.schemes.memory import start_step
 from mbd.kernel.singular.step_size import forget_leftovers, keep_leftovers, note_leftovers
@@ -256,7 +256,7 @@ class PlainScheme:
         flags = K.closed[: K.n_contacts]
         mode = self.manager.mode(flags)
         n_v = K.n_v
-        state = State(float(K.clock[NOW]), K.q.copy(), K.y[:n_v].copy(), K.y[n_v:].copy(), mode)
+        state = State(float(K.time), K.q.copy(), K.y[:n_v].copy(), K.y[n_v:].copy(), mode)
         return state, mode, [row for row in self.manager.active_rows(flags, K.sticks) if not K.dropped[row]]
 
     def start(self, K: Any) -> int:
@@ -274,10 +274,10 @@ class PlainScheme:
 
     def _begin(self, K: Any, memory: Any) -> int:
         self.memory = memory
-        K.state[NEAR] = 0
+        K.near_singular = 0
         K.slope[:] = getattr(memory, "slope", 0.0)
         forget_leftovers(K)
-        fill_block(K, K.clock[NOW], K.q, K.y)
+        fill_block(K, K.time, K.q, K.y)
         refresh_scales(K)
         return 0
 
@@ -289,9 +289,9 @@ class PlainScheme:
         if not isinstance(result, StepResult):
             raise SimulationError(f"{what} must return a StepResult(state, memory, report), not {result!r}")
         self.report = result.report
-        K.counts[ITERATIONS] += result.report.iterations
+        K.n_iterations += result.report.iterations
         if not result.report.converged:
-            K.detail[0], K.detail[1], K.detail[2] = t1, result.report.residual, h
+            K.failure_time, K.failure_size, K.failure_step = t1, result.report.residual, h
             if self.system.evaluated is not None:
                 K.block[:] = self.system.evaluated
             if result.report.too_near:
@@ -299,11 +299,11 @@ class PlainScheme:
             return NOT_CONVERGED if np.isfinite(result.report.residual) else NOT_FINITE
         y = np.concatenate([result.state.v, result.state.z])
         if not (np.isfinite(y).all() and np.isfinite(result.state.q).all()):
-            K.detail[0] = t1
+            K.failure_time = t1
             return NOT_FINITE
         self.pending = result.memory
-        K.state[NEAR] = getattr(result.memory, "near", 0)
-        K.counts[CAREFUL] += int(K.state[NEAR] > 0)
+        K.near_singular = getattr(result.memory, "near", 0)
+        K.n_careful += int(K.near_singular > 0)
         rate, lam = getattr(result.memory, "rate", None), getattr(result.memory, "lam", None)
         if rate is None or lam is None:
             rate, lam = self.system.accelerations(t1, result.state.q, y, mode)
@@ -326,7 +326,7 @@ class PlainScheme:
 
     def accept(self, K: Any, h: float) -> None:
         """The candidate becomes the accepted state, its memory the memory."""
-        if K.scheme != 0 and K.state[ROWS] > 0:
+        if K.scheme != 0 and K.n_active > 0:
             keep_leftovers(K, h)
         self.memory = self.pending
         K.slope[:] = (K.rate1 - K.rate) / h

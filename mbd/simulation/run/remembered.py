@@ -8,13 +8,14 @@ change.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from mbd.kernel import fields as F
+from mbd.kernel import codes
+from mbd.kernel.records import TABLE, Kernel
 from mbd.simulation.run.data import RunData
 from mbd.state import Memory, Mode, are_names
 
@@ -24,7 +25,7 @@ UNBOUNDED = 1 << 53
 """Most that is counted of anything [-]."""
 ENDLESS = ("sinking", "left")
 """Arrays that may hold infinities where nothing has happened yet."""
-OPEN_TIMES = (F.LAST_SWITCH, F.POSE)
+OPEN_TIMES = [TABLE.places[name][1] for name in ("last_switch", "singular_time")]
 """Places in `clock` that may be infinite."""
 FLAGS = {
     "closed": (0, 1), "armed": (-1, 2), "touched": (0, 1), "dropped": (0, 1), "sticks": (0, 1), "loose": (0, 3),
@@ -102,7 +103,7 @@ def out_of_range(run: RunData, memory: Memory) -> str:
     stepper, controllers = run.stepper, run.boundaries.controllers
     if len(memory.reals) != len(stepper.reals) or len(memory.integers) != len(stepper.integers):
         return "it has the numbers of another mechanism"
-    if len(memory.parameters) != len(run.values["params"]):
+    if len(memory.parameters) != len(run.kernel.params):
         return "it has the parameters of another mechanism"
     sampled = {c.name for c in controllers if c.period is not None}
     if set(memory.controllers["samples"]) != sampled or set(memory.controllers["states"]) != {
@@ -111,76 +112,69 @@ def out_of_range(run: RunData, memory: Memory) -> str:
         return "it has the samples of other controllers"
     if stepper.compiled and memory.scheme is not None:
         return "it has the memory of another scheme"
-    return _judged(stepper.place_of, memory, run)
+    kept = {name: memory.reals[stepper.place_of(name)] for name in TABLE.kept_reals}
+    kept |= {name: memory.integers[stepper.place_of(name)] for name in TABLE.kept_integers}
+    return _judged(Kernel(**kept), memory, run)
 
 
-def _judged(place_of: Callable[[str], slice], memory: Memory, run: RunData) -> str:
+def _judged(kept: Kernel, memory: Memory, run: RunData) -> str:
     """Flags, indices, counts and times of a memory of the right lengths."""
-    v = run.values
-
-    def kept(name: str) -> Any:
-        source = memory.reals if name in F.KEPT_REALS else memory.integers
-        return source[place_of(name)]
-
     for name, (least, most) in FLAGS.items():
-        if not _within(kept(name), least, most):
+        if not _within(getattr(kept, name), least, most):
             return f"{name!r} is none of {least} … {most}"
-    was = kept("was")
-    if not np.all((was == F.UNKNOWN) | ((was >= -1) & (was <= 2))):
+    if not np.all((kept.was == codes.UNKNOWN) | ((kept.was >= -1) & (kept.was <= 2))):
         return "'was' is no state of a friction"
     for name in ("slip", "side", "lean"):
-        if not np.all(np.isin(kept(name), (-1.0, 0.0, 1.0))):
+        if not np.all(np.isin(getattr(kept, name), (-1.0, 0.0, 1.0))):
             return f"{name!r} is no sign"
-    for name, (least, most) in _of_state(v).items():
-        value = kept("state")[getattr(F, name)]
+    for name, (least, most) in _of_state(run.kernel).items():
+        value = getattr(kept, name)
         if not least <= value <= most:
-            return f"'state' has {name} = {value}, not {least} … {most}"
-    told = _rows_differ(kept, run)
-    return told or _times_differ(kept, memory, v)
+            return f"{name!r} is {value}, not {least} … {most}"
+    return _rows_differ(kept, run) or _times_differ(kept, memory, run.kernel)
 
 
-def _of_state(v: Mapping[str, Any]) -> dict[str, tuple[int, int]]:
-    """Least and largest value of each place in `state`; those of rows and lines of results are set to 0 anyway."""
-    indices = max(v["n_rows"], v["n_contacts"], v["n_frictions"], v["n"])
+def _of_state(v: Kernel) -> dict[str, tuple[int, int]]:
+    """Least and largest value of each number in `state`; those of rows and lines of results are set to 0 anyway."""
+    indices = max(v.n_rows, v.n_contacts, v.n_frictions, v.n)
     return {
-        "ROWS": (0, v["n_rows"]), "GRID": (0, UNBOUNDED), "RESTART": (0, 2), "SWITCHES": (0, UNBOUNDED),
-        "SINCE_STORE": (0, UNBOUNDED), "BLOCKED": (-1, indices), "N_DROPPED": (0, v["n_rows"]), "NEAR": (0, 2),
-        "INCHING": (0, UNBOUNDED), "REDONE": (0, UNBOUNDED), "PLASTIC": (0, 1), "HALVED": (0, 16),
-        "HALVES": (0, 1 << 17), "PAIRED": (0, 3), "STRAIGHT": (0, 1), "RAISED": (0, 1), "CALMED": (0, 1),
-        "UNLOCATED": (0, 2),
+        "n_active": (0, v.n_rows), "grid_steps": (0, UNBOUNDED), "restart_due": (0, 2), "n_switches": (0, UNBOUNDED),
+        "steps_since_row": (0, UNBOUNDED), "failure_index": (-1, indices), "n_dropped": (0, v.n_rows),
+        "near_singular": (0, 2), "short_steps": (0, UNBOUNDED), "n_repeats": (0, UNBOUNDED), "plastic_impact": (0, 1),
+        "halvings": (0, 16), "halves_left": (0, 1 << 17), "paired_step": (0, 3), "in_substeps": (0, 1),
+        "scales_raised": (0, 1), "restarted_here": (0, 1), "fallback": (0, 2),
     }  # fmt: skip
 
 
-def _rows_differ(kept: Callable[[str], Any], run: RunData) -> str:
+def _rows_differ(kept: Kernel, run: RunData) -> str:
     """Whether the rows of the next step are other than those of the closed contacts and sticking frictions."""
-    v, state = run.values, kept("state")
-    dropped = kept("dropped")[: v["n_rows"]]
-    if int(state[F.N_DROPPED]) != int(np.sum(dropped)):
+    v, dropped = run.kernel, kept.dropped[: run.kernel.n_rows]
+    if int(kept.n_dropped) != int(np.sum(dropped)):
         return "'dropped' does not agree with its count"
-    if state[F.RESTART] != 0:  # they are found anew
+    if kept.restart_due != 0:  # they are found anew
         return ""
-    held = run.manager.active_rows(kept("closed")[: v["n_contacts"]], kept("sticks")[: v["n_frictions"]])
+    held = run.manager.active_rows(kept.closed[: v.n_contacts], kept.sticks[: v.n_frictions])
     rows = [row for row in held if not dropped[row]]
-    if int(state[F.ROWS]) != len(rows) or not np.array_equal(kept("rows")[: len(rows)], rows):
+    if int(kept.n_active) != len(rows) or not np.array_equal(kept.rows[: len(rows)], rows):
         return "'rows' are not those of the closed contacts"
     return ""
 
 
-def _times_differ(kept: Callable[[str], Any], memory: Memory, v: Mapping[str, Any]) -> str:
+def _times_differ(kept: Kernel, memory: Memory, v: Kernel) -> str:
     """Whether numbers are not finite, or the clock does not agree with the time of the memory."""
-    for name in F.KEPT_REALS:
-        values = np.delete(kept(name), OPEN_TIMES) if name == "clock" else kept(name)
-        if np.any(np.isnan(kept(name))) or (name not in ENDLESS and not np.all(np.isfinite(values))):
+    for name in TABLE.kept_reals:
+        values = getattr(kept, name)
+        finite = np.delete(values, OPEN_TIMES) if name == "clock" else values
+        if np.any(np.isnan(values)) or (name not in ENDLESS and not np.all(np.isfinite(finite))):
             return f"{name!r} is not finite"
-    clock, state = kept("clock"), kept("state")
-    step = float(clock[F.STEP])
-    longest = v["longest"] if v["adaptive"] else v["dt"]
+    step = float(kept.step)
+    longest = v.longest if v.adaptive else v.dt
     if not 0.0 < step <= longest * (1.0 + 1e-9):
         return f"its step is {step:.3g} s"
-    if abs(clock[F.NOW] - memory.time) > 1e-6 * step + 1e-12 * abs(memory.time):
+    if abs(kept.time - memory.time) > 1e-6 * step + 1e-12 * abs(memory.time):
         return "its clock is at another time"
-    ahead = float(clock[F.BASE]) + (int(state[F.GRID]) + 1) * step - memory.time
-    if state[F.PAIRED] != 2 and state[F.RESTART] == 0 and not 0.0 < ahead < 2.5 * step:
+    ahead = float(kept.grid_start) + (int(kept.grid_steps) + 1) * step - memory.time
+    if kept.paired_step != 2 and kept.restart_due == 0 and not 0.0 < ahead < 2.5 * step:
         return "its grid is elsewhere"
     return ""
 

@@ -77,7 +77,7 @@ class Room(RoomFindings):
                 f"memory; the whole run needs about {rows:.2g} rows, {memory(rows * self.size)}; {_remedy(run)}"
             )
             return self.problem
-        told = (rows > MANY and run.values["adaptive"]) or rows * self.size > LARGE or rows > self.most
+        told = (rows > MANY and run.kernel.adaptive) or rows * self.size > LARGE or rows > self.most
         if told and not self.note:
             last = f"; it will be ended at {self.most} rows" if rows > self.most else ""
             self.note = (
@@ -113,6 +113,6 @@ def _duration(seconds: float) -> str:
 
 
 def _remedy(run: RunData) -> str:
-    if run.values["adaptive"]:
+    if run.kernel.adaptive:
         return "ask for less accuracy or a shorter time, take a scheme of higher order, or dt= with store="
     return "use store= to keep fewer rows, a larger dt, or a shorter time"

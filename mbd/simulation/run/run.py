@@ -12,7 +12,7 @@ import numpy as np
 from mbd.compile.mechanism import Mechanism
 from mbd.errors import MemoryLimitError, SimulationError, UnknownNameError
 from mbd.integrators.base import Integrator
-from mbd.kernel import fields as F
+from mbd.kernel import codes
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.results.columns import ModelColumns
 from mbd.simulation.asked import asked
@@ -72,7 +72,7 @@ class Run(RunData):
         self.cause: BaseException | None = None
         self.gave_up: tuple[float, str] | None = None
         self.interrupted = False
-        self.energy, self.room = EnergyWatch(), Room(self.values["width"])
+        self.energy, self.room = EnergyWatch(), Room(self.kernel.width)
         self.observers: Sequence[Callable[[float, State], None]] = ()
         self.progress: Callable[[float, float], None] | None = None
         self.resumed = take_up(self, start)
@@ -160,22 +160,22 @@ class Run(RunData):
         while not ended:
             known = len(self.events)
             target, due = self.boundaries.next(self.end)
-            self._make_room(2 * self.values["capacity"])  # before they are made: then none is lost
+            self._make_room(2 * self.kernel.capacity)  # before they are made: then none is lost
             status = advance(self, target, due)
             self.collect()
-            if self.values["counts"][F.LOST]:
+            if self.kernel.n_lost:
                 return OVERFULL.format(self.now), ""
-            if status == F.NEW_MODE:
+            if status == codes.NEW_MODE:
                 self.stepper.add_mode()
-            elif status == F.DONE:
+            elif status == codes.DONE:
                 save(self)
                 if not arrive(self, target):
                     self.label = self.end
                     return "", f"reached t = {self.end:g} s"
-            elif status == F.EVENT:
+            elif status == codes.EVENT:
                 save(self, self.events[known:])
                 ended = self._react(self.events[known:])
-            elif status not in (F.FULL, F.PAUSE) and not self._goes_on_unlocated(status):
+            elif status not in (codes.FULL, codes.PAUSE) and not self._goes_on_unlocated(status):
                 return self._explained(status), ""
             save(self)
             problem = crowded(self.events, self.now, self.dt) or self.room.check(self)
@@ -184,7 +184,7 @@ class Run(RunData):
             if problem:
                 self.cause = MemoryLimitError(problem) if problem == self.room.problem else self.cause
                 return problem, ""
-            if self.limit is not None and self.values["counts"][F.STEPS] >= self.limit:
+            if self.limit is not None and self.kernel.n_steps >= self.limit:
                 return "", f"stopped after {self.limit} steps at t = {self.now:g} s"
             if perf_counter() - shown > SHOW_EVERY:
                 shown = perf_counter()
@@ -196,7 +196,7 @@ class Run(RunData):
         save(self)
         status = call(self, self.now, np.inf)
         self.collect()
-        ended = status in (F.DONE, F.EVENT, F.NEW_MODE)
+        ended = status in (codes.DONE, codes.EVENT, codes.NEW_MODE)
         return ("", message) if ended else (self._explained(status), "")
 
     def _goes_on_unlocated(self, status: int) -> bool:
@@ -213,7 +213,7 @@ class Run(RunData):
     def _explained(self, status: int) -> str:
         if self.gave_up is not None and self.gave_up[0] == self.now:
             return f"{self.gave_up[1]}; non-smooth steps do not go on from there either"
-        n_q, n_v = self.values["n_q"], self.values["n_v"]
+        n_q, n_v = self.kernel.n_q, self.kernel.n_v
         rates = np.abs(self.table[: self.stored, 1 + n_q : 1 + n_q + n_v])
         swiftest = float(np.max(rates, initial=0.0))
         events = [*self.earlier, *self.events]
@@ -265,12 +265,12 @@ class Run(RunData):
 
     def _reset(self, e: int) -> None:
         """Apply the reset of a user's guard at zero; one that turns its motion around will cross from the same side."""
-        place = 4 * self.values["n_contacts"] + e
+        place = 4 * self.kernel.n_contacts + e
         before = guard_values(self)
         apply_reset(self, self.manager.guards[e])
-        guards, rate = guard_values(self), place + self.values["n_guards"]
+        guards, rate = guard_values(self), place + self.kernel.n_guards
         stays = guards[place] == before[place]  # 'linear' location leaves it near zero, on either side
         if abs(guards[place]) > 1e-9 and not stays:
             set_side(self, e, guards)
         elif before[rate] * guards[rate] <= 0.0:
-            self.values["side"][e] *= -1.0
+            self.kernel.side[e] *= -1.0

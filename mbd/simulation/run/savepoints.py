@@ -10,13 +10,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from mbd.errors import SimulationError
-from mbd.kernel import fields as F
+from mbd.kernel import codes
 from mbd.results.record import EventRecord
 from mbd.simulation.run.data import RunData, Savepoint
 
 __all__ = ["Savepoint", "called", "restore", "rewind", "save"]
 
-SETTLED = (F.DONE, F.FULL, F.NEW_MODE, F.PAUSE, F.LAST)
+SETTLED = (codes.DONE, codes.FULL, codes.NEW_MODE, codes.PAUSE, codes.LAST)
 """What the kernel returns with an accepted state that nobody has to react to."""
 FAILED = -1
 """In place of a kernel's status: an integrator written in Python raised."""
@@ -28,8 +28,8 @@ def save(run: RunData, pending: Sequence[EventRecord] = ()) -> Savepoint:
     stepper = run.stepper
     point = Savepoint(
         stepper.reals.copy(), stepper.integers.copy(), stepper.scheme.memory, run.boundaries.kept(), run.changed,
-        run.stored, len(run.events), len(run.parameter_changes), int(run.values["counts"][F.STEPS]),
-        int(run.values["state"][F.RESTART]) == 0, tuple(pending),
+        run.stored, len(run.events), len(run.parameter_changes), int(run.kernel.n_steps),
+        int(run.kernel.restart_due) == 0, tuple(pending),
     )  # fmt: skip
     earlier = run.history
     if earlier and earlier[-1].steps < point.steps:
@@ -61,15 +61,15 @@ def rewind(run: RunData, failed: bool) -> bool:
 
     Returns whether there was a settled state to go back to; there is none before the scheme has started.
     """
-    counts = run.values["counts"].copy()
+    counts, reached = run.kernel.counts.copy(), int(run.kernel.n_steps)
     try:
         for point in reversed(run.history):
-            steps = int(counts[F.STEPS]) - point.steps
+            steps = reached - point.steps
             if _before_failure(run, point, steps) if failed and point.call else _settled(run, point):
                 return True
         return False
     finally:
-        run.values["counts"][:] = counts
+        run.kernel.counts[:] = counts
 
 
 def _settled(run: RunData, point: Savepoint) -> bool:
@@ -94,11 +94,11 @@ def _before_failure(run: RunData, point: Savepoint, steps: int) -> bool:
         return False
     history = run.history
     last = save(run)
-    while status == F.PAUSE:
+    while status == codes.PAUSE:
         last = save(run)
-        iterations = int(run.values["counts"][F.ITERATIONS])
+        iterations = int(run.kernel.n_iterations)
         status = _go(run, until, end, 1)
-        run.tried = int(run.values["counts"][F.ITERATIONS]) - iterations
+        run.tried = int(run.kernel.n_iterations) - iterations
     run.history = history
     restore(run, last)
     return True
@@ -106,11 +106,11 @@ def _before_failure(run: RunData, point: Savepoint, steps: int) -> bool:
 
 def _go(run: RunData, until: float, end: float, chunk: int) -> int:
     """Call the kernel for so many steps."""
-    usual = run.values["chunk"]
-    run.values["chunk"], run.values["end"] = chunk, end
+    usual = run.kernel.chunk
+    run.kernel.chunk, run.kernel.end = chunk, end
     try:
         return run.stepper.advance(until)
     except SimulationError:
         return FAILED
     finally:
-        run.values["chunk"] = usual
+        run.kernel.chunk = usual

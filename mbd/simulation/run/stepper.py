@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from functools import lru_cache
 from itertools import accumulate
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -19,12 +18,13 @@ from mbd.integrators.family import NewmarkFamily
 from mbd.integrators.newton import MAX_ITERATIONS
 from mbd.integrators.radau import RadauIIA
 from mbd.integrators.runge_kutta import RungeKutta853
-from mbd.kernel import fields as F
+from mbd.kernel import codes
 from mbd.kernel.active_set import ActiveSetManager
+from mbd.kernel.records import PROGRAMS, TABLE, Kernel
 from mbd.kernel.schemes.collocation import RADAU
 from mbd.kernel.settle import room_to_log
 from mbd.simulation.run.call_table import CallTable
-from mbd.simulation.run.lengths import NEWMARK, PROGRAMS, RADAU_IIA, RUNGE_KUTTA, array_lengths
+from mbd.simulation.run.lengths import NEWMARK, RADAU_IIA, RUNGE_KUTTA, scheme_memory
 from mbd.simulation.run.plain import MechanismSystem, PlainScheme, row_units, unit_blocks
 from mbd.tape.derivatives import live
 
@@ -102,30 +102,30 @@ class Stepper:
         self.straight = self.compiled and isinstance(integrator, NewmarkFamily)  # factored in straight-line code
         self.stabilized = integrator.stabilized
         layout = mechanism.layout
-        self.values: dict[str, Any] = {}
         self._places: dict[str, slice] = {}  # of arrays on their shelves
         self._shelved: dict[str, tuple[Any, int]] = {}  # arrays and their addresses
-        self._sizes(dt, options)
+        self.kernel = self._sizes(dt, options)
         self._arrays(parameters, manager)
         self.system = MechanismSystem(
-            mechanism, manager, self.values["params"], self.values["anchors"], self.stabilized, self.values["dropped"],
-            self.values["sticks"], self.values["slip"],
+            mechanism, manager, self.kernel.params, self.kernel.anchors, self.stabilized, self.kernel.dropped,
+            self.kernel.sticks, self.kernel.slip,
         )  # fmt: skip
         self.scheme = PlainScheme(integrator, self.system, manager)
         self.functions: list[Any] = [mechanism.common[name] for name in ("accelerations", "guards", "scales")]
         self.functions.append(None if mechanism.vector else mechanism.common["compose"])
         self.functions.append(mechanism.common["terms"] if mechanism.judged else None)
+        self.kernel.code = self.functions
         self.modes: list[Any] = []
         self.dependent: dict[int, tuple[int, ...]] = {}
         self._table: CallTable | None = None
         self._provisional = False  # whether addresses in the table may have changed
         self.resumed_at = float("nan")  # the instant whose row was stored as a run was taken up again
-        assert layout.n == self.values["n"]
+        assert layout.n == self.kernel.n
 
-    def _sizes(self, dt: float, options: dict[str, Any]) -> None:
-        layout, values = self.mechanism.layout, self.values
+    def _sizes(self, dt: float, options: dict[str, Any]) -> Kernel:
+        layout = self.mechanism.layout
         n_contacts, n_guards = layout.n_contacts, len(self.manager.guards)
-        values.update(
+        K = Kernel(
             n_q=layout.n_q, n_v=layout.n_v, n=layout.n, n_rows=layout.n_rows, n_anchors=layout.n_anchors,
             n_contacts=n_contacts, n_guards=n_guards, o_q=layout.q, o_x=layout.x, o_v=layout.v, o_a=layout.a,
             o_lam=layout.lam, o_anchor=layout.anchor, o_switch=layout.switch, o_slip=layout.slip,
@@ -138,47 +138,53 @@ class Stepper:
             linear=int(options.get("locate") == "linear"),
             width=1 + layout.n_q + 2 * layout.n + layout.n_rows + n_contacts + layout.n_frictions,
             capacity=int(options["capacity"]), stride=int(options.get("store", 1)), event_width=5 + layout.n_rows,
-            chunk=1, hooks=0,
+            chunk=1,
             rest_speed=float(options.get("rest_speed", 1e-6)), dt=dt, until=0.0, end=float(options.get("end", 0.0)),
             alpha_m=0.0, alpha_f=0.0, beta=0.25, gamma=0.5, tolerance=1e-9, jerk=1, exact=0,
             scheme=own_scheme(self.integrator) or NEWMARK,
             adaptive=int("allowed" in options), allowed=float(options.get("allowed", 0.0)),
             longest=float(options.get("longest", np.inf)), error_order=self.integrator.error_order(), looks=1,
         )  # fmt: skip
-        values["event_capacity"] = max(EVENT_CAPACITY, 2 * room_to_log(SimpleNamespace(**values)))
+        K.event_capacity = max(EVENT_CAPACITY, 2 * room_to_log(K))
         if isinstance(self.integrator, NewmarkFamily):
             c = self.integrator.coefficients
-            values.update(
+            vars(K).update(
                 alpha_m=c.alpha_m, alpha_f=c.alpha_f, beta=c.beta, gamma=c.gamma, tolerance=self.integrator.tolerance,
                 jerk=int(self.integrator.starting == "jerk"), exact=int(self.integrator.exact),
             )  # fmt: skip
         elif isinstance(self.integrator, RadauIIA):
-            values.update(tolerance=self.integrator.tolerance)
+            K.tolerance = self.integrator.tolerance
+        return K
 
     def _arrays(self, parameters: Vector, manager: ActiveSetManager) -> None:
-        v = self.values
-        reals, integers = array_lengths(v, self.mechanism.layout.size, self.mechanism.sizes["accelerations"])
-        tables = manager.tables()
+        v = self.kernel
+        block, tables = self.mechanism.layout.size, manager.tables()
+        given = scheme_memory(v) | {name: len(table) for name, table in tables.items()}
+        given |= {"block": block, "out": max(v.n_tangent, block), "acc": self.mechanism.sizes["accelerations"]}
+        lengths = TABLE.lengths(v, given)
+        self.reals, self.integers, *_ = (
+            self._shelve({name: lengths[name] for name in names if name in lengths}, kind)
+            for names, kind in (
+                (TABLE.kept_reals, float),
+                (TABLE.kept_integers, np.int64),
+                ([name for name in TABLE.real_arrays if name not in TABLE.kept_reals], float),
+                ([name for name in TABLE.integer_arrays if name not in TABLE.kept_integers], np.int64),
+            )
+        )
         for name, table in tables.items():
-            (reals if table.dtype == float else integers)[name] = len(table)
-        self.reals = self._shelve({name: reals.pop(name) for name in F.KEPT_REALS}, float)
-        self.integers = self._shelve({name: integers.pop(name) for name in F.KEPT_INTEGERS}, np.int64)
-        self._shelve(reals, float)
-        self._shelve(integers, np.int64)
-        for name, table in tables.items():
-            v[name][: len(table)] = table
-        v["shift1"] = v["block"][self.mechanism.layout.shift :]  # read by model code as well
-        v["tableau"] = tableau()
-        v["params"] = np.ascontiguousarray(parameters, dtype=float) if len(parameters) else np.zeros(1)
-        v["clock"][F.STEP] = v["dt"]
-        v["sinking"][:] = np.inf
-        v["was"][:] = F.UNKNOWN
-        if v["scheme"] == RADAU_IIA:
-            v["stages"][: len(RADAU.numbers())] = RADAU.numbers()
-        v["unit"] = unit_blocks(self.mechanism)
-        v["row_unit"] = np.array([*row_units(self.mechanism), 2], dtype=np.int64)
-        if not v["n_anchors"]:
-            v["anchors"] = np.zeros(0)
+            getattr(v, name)[: len(table)] = table
+        v.shift1 = v.block[self.mechanism.layout.shift :]  # read by model code as well
+        v.tableau = tableau()
+        v.params = np.ascontiguousarray(parameters, dtype=float) if len(parameters) else np.zeros(1)
+        v.step = v.dt
+        v.sinking[:] = np.inf
+        v.was[:] = codes.UNKNOWN
+        if v.scheme == RADAU_IIA:
+            v.stages[: len(RADAU.numbers())] = RADAU.numbers()
+        v.unit = unit_blocks(self.mechanism)
+        v.row_unit = np.array([*row_units(self.mechanism), 2], dtype=np.int64)
+        if not v.n_anchors:
+            v.anchors = np.zeros(0)
 
     def _shelve(self, lengths: dict[str, int], kind: Any) -> Any:
         """Arrays side by side on one shelf, which is copied at once; each begins on a cache line."""
@@ -189,8 +195,8 @@ class Stepper:
         base = shelf.ctypes.data
         for name, place in zip(lengths, places, strict=True):
             self._places[name] = place
-            array = self.values[name] = shelf[place]
-            self._shelved[name] = array, base + 8 * place.start
+            self._shelved[name] = shelf[place], base + 8 * place.start
+            setattr(self.kernel, name, shelf[place])
         return shelf
 
     def place_of(self, name: str) -> slice:
@@ -199,35 +205,35 @@ class Stepper:
 
     def add_mode(self) -> None:
         """Make code for the contacts closed now."""
-        v = self.values
-        flags, dropped = v["closed"][: v["n_contacts"]], v["dropped"][: v["n_rows"]]
-        sticks, slip = v["sticks"][: v["n_frictions"]], v["slip"][: v["n_frictions"]]
+        v = self.kernel
+        flags, dropped = v.closed[: v.n_contacts], v.dropped[: v.n_rows]
+        sticks, slip = v.sticks[: v.n_frictions], v.slip[: v.n_frictions]
         held = self.manager.active_rows(flags, sticks)
         rows = tuple(row for row in held if not dropped[row])
         sliding = tuple(int(f) for f in np.flatnonzero(slip))
         borne = tuple(row for row in held if dropped[row]) if sliding else ()
         make = self._maker()
         code = make(rows, self.manager.penalties(flags), self.stabilized, sliding, borne)
-        count, width = int(v["mode_count"][0]), v["n_contacts"] + v["n_rows"] + v["n_frictions"]
+        count, width = int(v.n_modes), v.n_contacts + v.n_rows + v.n_frictions
         phases = np.where(sticks == 1, 2, slip != 0.0)
-        if PROGRAMS * (count + 1) > len(v["mode_code"]):
-            v["mode_key"] = np.concatenate([v["mode_key"], np.zeros_like(v["mode_key"])])
-            v["mode_code"] = np.concatenate([v["mode_code"], np.zeros_like(v["mode_code"])])
-            v["mode_order"] = np.concatenate([v["mode_order"], np.zeros_like(v["mode_order"])])
-        v["mode_key"][count * width : (count + 1) * width] = np.concatenate([flags, dropped, phases])
+        if PROGRAMS * (count + 1) > len(v.mode_code):
+            v.mode_key = np.concatenate([v.mode_key, np.zeros_like(v.mode_key)])
+            v.mode_code = np.concatenate([v.mode_code, np.zeros_like(v.mode_code)])
+            v.mode_order = np.concatenate([v.mode_order, np.zeros_like(v.mode_order)])
+        v.mode_key[count * width : (count + 1) * width] = np.concatenate([flags, dropped, phases])
         known = [code.tangent, code.residual] + ([] if code.correction is None else [code.correction, code.solution])
         places = [*range(len(self.functions), len(self.functions) + len(known)), 0, 0]
-        v["mode_code"][PROGRAMS * count : PROGRAMS * (count + 1)] = places[:PROGRAMS]
+        v.mode_code[PROGRAMS * count : PROGRAMS * (count + 1)] = places[:PROGRAMS]
         if code.order is not None:
-            v["mode_order"][count] = len(v["orders"])
-            v["orders"] = np.concatenate([v["orders"], code.order])
+            v.mode_order[count] = len(v.orders)
+            v.orders = np.concatenate([v.orders, code.order])
         self.functions += known
         self.modes.append(code)
-        mix = v["mix"].reshape(v["n_rows"], -1) if v["n_rows"] else v["mix"]
-        for row in range(v["n_rows"]):
+        mix = v.mix.reshape(v.n_rows, -1) if v.n_rows else v.mix
+        for row in range(v.n_rows):
             if dropped[row]:  # as they were found first
                 self.dependent.setdefault(row, tuple(int(k) for k in np.flatnonzero(np.abs(mix[row]) > TAKES_PART)))
-        v["mode_count"][0] = count + 1  # at last: an interrupt may come between any two lines
+        v.n_modes = count + 1  # at last: an interrupt may come between any two lines
 
     def _maker(self) -> Any:
         """What makes the code of a mode, no more of it than the scheme calls."""
@@ -242,60 +248,55 @@ class Stepper:
 
     def advance(self, until: float) -> int:
         """Run the kernel until it returns; its status."""
-        v = self.values
-        v["until"] = until
-        if v["auto"]:
-            v["strategy"] = int(v["state"][F.UNLOCATED] > 0)
-        v["looks"] = LOOKS if self.integrator.order() > 2 and not v["strategy"] else 1
+        v = self.kernel
+        v.until = until
+        if v.auto:
+            v.strategy = int(v.fallback > 0)
+        v.looks = LOOKS if self.integrator.order() > 2 and not v.strategy else 1
         return self._advance_compiled() if self.compiled else self._advance_plain()
 
     def keep_row(self) -> None:
         """Store the accepted state, unless it is the last row anyway."""
-        if self.values["state"][F.SINCE_STORE] > 0 and self.values["clock"][F.NOW] != self.resumed_at:
+        if self.kernel.steps_since_row > 0 and self.kernel.time != self.resumed_at:
             self.store_row()
 
     def store_row(self) -> None:
         """Store the accepted state as a row of the results."""
         from mbd.kernel.observe import store_row
 
-        values = {**self.values, "code": self.functions, "hooks": self.scheme}
-        store_row(F.Kernel(**{name: values[name] for name in F.FIELDS}))
+        store_row(self.kernel)
 
     def hold(self) -> None:
         """Give the inputs of the forces the closed contacts, as a start of the scheme would leave them."""
         from mbd.kernel.restart import fill_block
 
-        values = {**self.values, "code": self.functions, "hooks": self.scheme}
-        fill_block(
-            F.Kernel(**{name: values[name] for name in F.FIELDS}), values["clock"][F.NOW], values["q"], values["y"]
-        )
+        fill_block(self.kernel, self.kernel.time, self.kernel.q, self.kernel.y)
 
     def guard_round_off(self, e: int) -> float:
         """Round-off of a user's guard at the accepted state."""
         from mbd.kernel.restart import fill_block, refresh_scales
         from mbd.kernel.significance import guard_round_off
 
-        values = {**self.values, "code": self.functions, "hooks": self.scheme}
-        K = F.Kernel(**{name: values[name] for name in F.FIELDS})
-        fill_block(K, values["clock"][F.NOW], values["q"], values["y"])
+        K = self.kernel
+        fill_block(K, K.time, K.q, K.y)
         refresh_scales(K)
-        return guard_round_off(K, e, values["clock"][F.NOW], values["q"], values["y"])
+        return guard_round_off(K, e, K.time, K.q, K.y)
 
     def _advance_plain(self) -> int:
         from mbd.kernel.advance import advance
 
-        values = {**self.values, "code": self.functions, "hooks": self.scheme}
+        self.kernel.hooks = self.scheme
         with np.errstate(all="ignore"):
-            return int(advance(F.Kernel(**{name: values[name] for name in F.FIELDS})))
+            return int(advance(self.kernel))
 
     def _advance_compiled(self) -> int:
         from mbd.kernel.build import entry
 
         if self._table is None or self._provisional:
             self._provisional = self.provisional  # before the addresses: whoever settles in between is looked at again
-            self._table = CallTable(self.functions, self.values, self._shelved)
+            self._table = CallTable(self.functions, self.kernel, self._shelved)
         else:
-            self._table.fill(self.functions, self.values)
+            self._table.fill(self.functions, self.kernel)
         postponed = [tangent for tangent in self.mechanism.postponed if not tangent.made]
         status = entry()(self._table.address)
         for tangent in postponed:

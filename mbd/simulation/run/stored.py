@@ -16,11 +16,11 @@ __all__ = ["record_of", "whole_record"]
 
 def record_of(run: RunData, table: Matrix, events: Sequence[EventRecord] = ()) -> Record:
     """Rows that the kernel has stored, (R, width), as a record without a verdict."""
-    v, equations = run.values, run.mechanism.equations
-    n_q, n_v, n, rows = v["n_q"], v["n_v"], v["n"], v["n_rows"]
+    v, equations = run.kernel, run.mechanism.equations
+    n_q, n_v, n, rows = v.n_q, v.n_v, v.n, v.n_rows
     at_v, at_a = 1 + n_q, 1 + n_q + n
     at_lam, at_closed = at_a + n, at_a + n + rows
-    at_friction = at_closed + v["n_contacts"]
+    at_friction = at_closed + v.n_contacts
     return Record(
         equations=equations, parameters=run.first_parameters,
         parameter_names=[parameter.name for parameter in equations.parameters], time=table[:, 0], q=table[:, 1:at_v],

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 
-from mbd.kernel import fields as F
+from mbd.kernel import codes
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.kernel.crowding import SEVERAL, crowd
 from mbd.simulation.run.data import RunData
 
 __all__ = ["chosen", "go_on_unlocated", "may_go_on_unlocated"]
 
-ENDLESS = (F.CHATTER, F.NO_LOCATION, F.NO_IMPACT)
+ENDLESS = (codes.CHATTER, codes.NO_LOCATION, codes.NO_IMPACT)
 """Failures of locating itself: switches without end at one instant, no root, no set of branches that obeys all laws."""
 CROWDED = 1.0
 """Blows through several contacts, less one for each dt, from which a step that fails is taken to fail of them [-]."""
@@ -42,16 +40,16 @@ def chosen(contact: str, manager: ActiveSetManager, locate: str = "root", tolera
 
 def may_go_on_unlocated(run: RunData, status: int) -> bool:
     """Whether a step that failed while instants were located is to be taken as a non-smooth one."""
-    v, clock = run.values, run.values["clock"]
-    if run.limit is not None or not v["auto"] or v["state"][F.UNLOCATED] or status <= F.NOT_FINITE:
+    v = run.kernel
+    if run.limit is not None or not v.auto or v.fallback or status <= codes.NOT_FINITE:
         return False
-    crowded = crowd(SimpleNamespace(clock=clock, dt=v["dt"])) > CROWDED
-    several = np.count_nonzero(v["closed"][: v["n_contacts"]]) >= SEVERAL  # a single one has no other to be told from
+    crowded = crowd(v) > CROWDED
+    several = np.count_nonzero(v.closed[: v.n_contacts]) >= SEVERAL  # a single one has no other to be told from
     return bool(crowded or (status in ENDLESS and several))
 
 
 def go_on_unlocated(run: RunData) -> None:
     """Take non-smooth steps from the accepted state on, before which the step that failed was taken back."""
-    v = run.values
-    v["state"][F.UNLOCATED], v["state"][F.RESTART] = 2, 2
-    v["clock"][F.UNLOCATED_SINCE] = run.now
+    v = run.kernel
+    v.fallback, v.restart_due = 2, 2
+    v.fallback_time = run.now

@@ -1,0 +1,25 @@
+"""Numbers that the kernel tells things by: modes of steps, functions, statuses, guards, the log; and its round-off."""
+
+from __future__ import annotations
+
+PASSING, LEFT = 1, 2
+"""Values of `near_singular`: within a few steps of a singular configuration, and just beyond it."""
+ACCELERATIONS, GUARDS, SCALES, COMPOSE, TERMS = range(5)
+"""Functions in `code`; modes follow: tangent, residual and, where straight-line code pays, correction and solution."""
+DONE, FULL, NEW_MODE, EVENT, PAUSE, LAST = range(6)
+"""What `advance` returns; or one of the failures below."""
+(
+    NOT_FINITE, NOT_CONVERGED, SINGULAR, STAGNATED, CHATTER, NO_IMPACT, DEPENDENT, CONFLICT, NO_LOCATION, ENERGY_GAIN,
+    NO_FORCE, TOO_TIGHT, TOO_NEAR, TOO_SMALL, STIRRED, OUTGROWN, GAINED, TOO_BRIEF,
+    AT_POSE, LEAPT,
+) = range(10, 30)  # fmt: skip
+CLOSE, OPEN_PULL, OPEN_GAP, OPEN_FORCE, CROSS, WATCH, GRAZE, PRESS, STICK, SLIP, STICK_BRIEF = range(11)
+"""Kinds of fired guards."""
+LOG_CLOSED, LOG_OPENED, LOG_EVENT, LOG_STUCK, LOG_SLIPPED = range(5)
+"""Kinds in the log."""
+UNKNOWN = -9
+"""State of a friction before the first restart, in `was`: what it begins with is no event [-]."""
+PULL = 1e-9
+"""Pull of a contact, relative to the forces, that is more than round-off [-]."""
+EPS = 2.220446049250313e-16
+"""Distance from 1 to the next double [-]."""
