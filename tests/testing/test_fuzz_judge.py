@@ -33,6 +33,8 @@ BETWEEN = [4644]
 """A joint was open, and velocities did not fit it, between long steps of `RadauIIA`."""
 STIFF = [22904]
 """Forces of a penalty between long steps, known as far as its stiffness times the tolerance."""
+CORRECTED = [26404, 12577]
+"""Cut hinges: what places of their bodies err in a long step is corrected onto the rows, and turns them."""
 CANCELLED = [10250]
 """Errors of one cut cancel by the end, those of the other do not: both are of order 2."""
 
@@ -94,7 +96,9 @@ def test_impacts_friction_and_loops_of_sound_runs_break_no_law():
     assert between(run, model).faults == ()
 
 
-@pytest.mark.parametrize("number", SOUND + CUT + BOUNCING + SLIPPING + ROUND_OFF + TIED + BETWEEN + STIFF + CANCELLED)
+@pytest.mark.parametrize(
+    "number", SOUND + CUT + BOUNCING + SLIPPING + ROUND_OFF + TIED + BETWEEN + STIFF + CORRECTED + CANCELLED
+)
 def test_fuzzed_scenes_are_judged_sound(number):
     told = verdict(number)
     assert told["kind"] == "ok", told

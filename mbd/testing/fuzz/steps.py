@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ast
+
 import numpy as np
 
 import mbd
@@ -11,13 +13,31 @@ from mbd.testing.fuzz.geometry import Array
 from mbd.testing.fuzz.quantities import gap_of
 from mbd.testing.fuzz.readings import Readings
 
-__all__ = ["crossings", "impacts", "motion", "passive"]
+__all__ = ["crossings", "error_share", "impacts", "motion", "passive"]
 
 PASSIVE = ("joint loss", "damper", "friction", "penalty", "impact")
 """Kinds of parts of the ledger that only take energy."""
 
 
-def motion(found: Faults, told: Readings, smooth: bool = True, rates: bool = True, careful: int = 0) -> None:
+def error_share(integrator: str) -> float:
+    """Error of a position in a step, over h² times the change of its acceleration: ``|1/6 − β − (α_m − α_f)/2|``."""
+    call = ast.parse(integrator, mode="eval").body
+    assert isinstance(call, ast.Call)
+    assert isinstance(call.func, ast.Name)
+    given = {str(word.arg): ast.literal_eval(word.value) for word in call.keywords}
+    c = getattr(getattr(mbd, call.func.id)(**given), "coefficients", None)
+    return 0.0 if c is None else float(abs(1.0 / 6.0 - c.beta - 0.5 * (c.alpha_m - c.alpha_f)))
+
+
+def motion(
+    found: Faults,
+    told: Readings,
+    smooth: bool = True,
+    rates: bool = True,
+    careful: int = 0,
+    tied: bool = True,
+    share: float = 0.0,
+) -> None:
     """Each coordinate is the integral of its rate, and that of its acceleration, from one row to the next.
 
     ``Δq = h (v₀+v₁)/2 − h² (a₁−a₀)/12`` and ``Δv = h (a₀+a₁)/2`` but for what accelerations change meanwhile: h² and
@@ -28,6 +48,8 @@ def motion(found: Faults, told: Readings, smooth: bool = True, rates: bool = Tru
     smooth : whether velocities change by accelerations alone, not by impulses within steps
     rates : whether those of velocities count, which index 3 corrects without
     careful : how many steps next to singular poses the run says to have less accurate velocities
+    tied : whether there are rows, onto which corrections move all velocities by what one of them errs
+    share : error of a position in a step over h² times the change of its acceleration [-]
     """
     h = np.diff(told.time)
     steps = np.flatnonzero(h > 0.0)
@@ -38,7 +60,8 @@ def motion(found: Faults, told: Readings, smooth: bool = True, rates: bool = Tru
     rated = [told[name] for name in told.values if name.endswith(".rate")]
     fastest = 3.0 * np.max(np.abs(rated)) if rated else 0.0
     accelerations = [_around(np.abs(np.diff(told[n]))[steps]) for n in told.values if n.endswith(".acceleration")]
-    leaps = 0.05 * np.max(accelerations, axis=0) if accelerations else 0.0  # corrections onto rows move everything
+    part = max(0.05, share / 3.0)  # corrections onto rows move everything by twice what one position errs
+    leaps = part * np.max(accelerations, axis=0) if accelerations else 0.0
     for name in [name for name in told.values if f"{name}.rate" in told and f"{name}.acceleration" in told]:
         q, v, a = told.coordinate(name)
         change = _around(np.abs(np.diff(a))[steps]) + 1e-3 * (np.abs(a[steps]) + np.abs(a[steps + 1]))
@@ -54,7 +77,7 @@ def motion(found: Faults, told: Readings, smooth: bool = True, rates: bool = Tru
         there.small("a coordinate is the integral of its rate", name, off, limit)
         if smooth and rates:
             off = np.diff(v)[steps] - h * (a[steps] + a[steps + 1]) / 2.0
-            limit = 2.0 * h * change + 1e-7 * (1.0 + fast)
+            limit = 2.0 * h * (change + tied * leaps) + 1e-7 * (1.0 + fast)
             there.small("a rate is the integral of the acceleration", name, off, limit, told=2 * careful)
 
 
