@@ -17,18 +17,29 @@ def store_row(K: Kernel) -> None:
 
 
 def store_state(K: Kernel, q: Any, y: Any, rate: Any, lam: Any) -> None:
-    """One row of results: t, q, (v, z), (v̇, ż), λ, closed, and what frictions do: 2 sticks, ±1 slides, 0 off."""
+    """One row of results: t, q, (v, z), (v̇, ż), λ, closed, and what frictions do: 2 sticks, ±1 slides, 0 off.
+
+    K.row_bounds follows the rows, so that notes on turns and pulls need no look at all of them.
+    """
     if K.n_stored >= K.capacity:  # never beyond the array; the run ends with an error
         K.n_lost += 1
         return
     o = K.n_stored * K.width
+    before = K.width if K.n_stored > 0 else 0  # the row before, or this one where there is none
     K.store[o] = K.time
-    o = carry(q, K.store, o + 1, K.n_q, True)
-    o = carry(y, K.store, o, K.n, True)
+    o += 1
+    change = K.row_bounds[0]
+    for i in range(K.n_q):
+        K.store[o + i] = q[i]
+        change = max(change, abs(q[i] - K.store[o + i - before]))
+    K.row_bounds[0] = change
+    o = carry(y, K.store, o + K.n_q, K.n, True)
     o = carry(rate, K.store, o, K.n, True)
     o = carry(lam, K.store, o, K.n_rows, True)
     for c in range(K.n_contacts):
         K.store[o + c] = float(K.closed[c])
+        if K.normal[c] >= 0:
+            K.row_bounds[1 + c] = max(K.row_bounds[1 + c], lam[K.normal[c]])
     for f in range(K.n_frictions):
         K.store[o + K.n_contacts + f] = 2.0 if K.sticks[f] == 1 else K.slip[f]
     K.n_stored += 1

@@ -374,6 +374,7 @@ class Kernel(LinearAlgebra):
 
     hooks: Any  # the scheme of the interpreted kernel
     store: Reals = reals(lambda s: s.capacity * s.width)
+    row_bounds: Reals = reals(lambda s: 1 + s.n_contacts)  # largest change between rows, then λ_N of each contact
     n_stored: int = place("state")
     steps_since_row: int = place("state")
     log: Reals = reals(lambda s: s.event_capacity * s.event_width)

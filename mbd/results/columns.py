@@ -151,8 +151,8 @@ class ModelColumns(Columns):
 
         with self.equations.tape.lock:
             needed = any(node.op == "input" and node.data[0] == "anchor" for node in live(nodes))
-        anchors = self.anchors if needed else np.zeros((len(self.record.time), self.equations.n_anchors))
-        return self.record.rows(anchors).part(chosen)
+        anchors = self.anchors[chosen] if needed else np.zeros((len(chosen), self.equations.n_anchors))
+        return self.record.part(chosen, anchors)
 
     def at_rows(self, names: Sequence[str]) -> list[Vector]:
         return self.evaluate([self.node(name) for name in names], self.rows)

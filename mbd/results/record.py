@@ -150,6 +150,13 @@ class Record:
             np.arange(len(self.time), dtype=np.intp), self.phase,
         )  # fmt: skip
 
+    def part(self, chosen: NDArray[np.intp], anchors: Matrix) -> Rows:
+        """Some of the stored states, by their numbers, with what closed contacts hold there."""
+        return Rows(
+            self.time[chosen], self.q[chosen], self.v[chosen], self.z[chosen], self.a[chosen], self.s[chosen],
+            self.lam[chosen], self.closed[chosen], anchors, chosen, self.phase[chosen],
+        )  # fmt: skip
+
     def parameters_at(self, source: NDArray[np.intp]) -> Vector | Matrix:
         """The parameters that hold in stored rows: one vector if they never change, else a row each."""
         if not self.parameter_changes:

@@ -116,7 +116,8 @@ def notes_of(run: RunData, record: Record) -> tuple[list[str], list[str]]:
     for number, contact in enumerate(run.manager.contacts):
         short, blind = _short_touch(run, record, number, contact)
         notes += _ignored(run, number, contact) + _overshot(run, columns, contact) + short
-        notes += _pulled(record, number, contact)
+        if run.kernel.row_bounds[1 + number] > 0.0:
+            notes += _pulled(record, number, contact)
         doubts += blind
     return notes, doubts
 

@@ -44,6 +44,8 @@ def unresolved_turns(run: RunData, record: Record) -> list[str]:
     """
     if run.kernel.adaptive or run.kernel.scheme == RUNGE_KUTTA or len(record.time) < 2:
         return []
+    if run.kernel.row_bounds[0] <= HALF_TURN:  # no coordinate changes so much from row to row
+        return []
     equations = run.mechanism.equations
     ways = np.zeros(equations.n_q)
     for part in blocks(record.q):

@@ -20,6 +20,7 @@ from mbd.kernel.records import Kernel
 from mbd.results.failure import Failure
 from mbd.results.record import EventRecord
 from mbd.simulation.run.boundaries import Boundaries
+from mbd.simulation.run.event_log import EventLog
 from mbd.simulation.run.stepper import Stepper
 from mbd.simulation.run.whole_turns import TurnCounter
 from mbd.state import State
@@ -34,8 +35,6 @@ USUAL_SIZE = 10
 """Unknowns above which there are fewer such steps, as the square: large mechanisms get better code at these looks."""
 FIRST_TABLE = 1 << 28
 """Largest table laid out at the start, of which only rows written take memory; it doubles as it fills [bytes]."""
-KINDS = ("closed", "opened", "event", "stuck", "slipped")
-"""Names of the kinds of events that the kernel logs by number."""
 
 WHY = {
     1: "blows through several closed contacts crowded",
@@ -130,6 +129,7 @@ class RunData:
         width, capacity = self.kernel.width, self.kernel.capacity
         expected = 1.25 * (end - start.time) / dt / options.get("store", 1) + 1024
         self.table = _first_table(max(int(min(expected, FIRST_TABLE / (8 * width))), 3 * capacity), width)
+        self.log = EventLog(manager)
         self.events: list[EventRecord] = []
         self.parameter_changes: list[tuple[int, Vector]] = []
         self.stored = 0
@@ -172,10 +172,15 @@ class RunData:
         v = self.kernel
         count, logged = int(v.n_stored), int(v.n_logged)
         if logged:
-            self._collect_events(logged)
+            width = v.event_width
+            self.events += self.log.events(v.log[: logged * width].reshape(logged, width), self.stored)
         if count:
             self._make_room(count)
-            self.table[self.stored : self.stored + count] = v.store.reshape(-1, v.width)[:count]
+            rows = v.store.reshape(-1, v.width)[:count]
+            self.table[self.stored : self.stored + count] = rows
+            if self.stored:  # the kernel compares with rows of the same call
+                change = np.abs(rows[0] - self.table[self.stored - 1])[1 : 1 + v.n_q]
+                v.row_bounds[0] = np.max(change, initial=v.row_bounds[0])
         self.stored += count
         v.n_stored = v.n_logged = 0
 
@@ -189,21 +194,6 @@ class RunData:
             table = np.empty((self.stored + count, self.kernel.width))
         table[: self.stored] = self.table[: self.stored]
         self.table = table
-
-    def _collect_events(self, logged: int) -> None:
-        """Events from the lines of the log."""
-        manager, width = self.manager, self.kernel.event_width
-        contacts, frictions = manager.names, [friction.name for friction in manager.frictions]
-        guards = [guard.name for guard in manager.guards]
-        known = {"event": guards, "stuck": frictions, "slipped": frictions}
-        for line in self.kernel.log[: logged * width].reshape(logged, width):
-            kind, index = KINDS[int(line[1])], int(line[2])
-            name, told, impulse = known.get(kind, contacts)[index], {}, np.zeros(0)
-            if kind in ("closed", "opened"):
-                told = _impulses(manager, index, line[5:])
-                impulse = told[name]
-            row = self.stored + int(line[4])
-            self.events.append(EventRecord(float(line[0]), kind, name, impulse, float(line[3]), row, told))
 
     @cached_property
     def parameter_check(self) -> ParameterCheck:
@@ -257,19 +247,6 @@ def _steps_at_once(stepper: Stepper) -> int:
     layout = stepper.mechanism.layout
     size = max((layout.n + layout.n_rows) // USUAL_SIZE, 1)
     return max(STEPS_AT_ONCE[stepper.compiled] // (size * size), STEPS_AT_ONCE[False])
-
-
-def _impulses(manager: ActiveSetManager, own: int, line: Vector) -> dict[str, Vector]:
-    """Impulses of contacts, and of dry frictions in joints, by name: that of contact `own`, and others if any."""
-    mine, numbers = manager.contacts[own], line.tolist()
-    found = {mine.name: line[list(mine.rows)]}
-    for contact in manager.contacts:
-        if contact is not mine and any(numbers[row] for row in contact.rows):
-            found[contact.name] = line[list(contact.rows)]
-    for friction in manager.frictions:
-        if friction.contact < 0 and numbers[friction.row]:
-            found[friction.name] = line[[friction.row]]
-    return found
 
 
 def _places(force: Force) -> str:

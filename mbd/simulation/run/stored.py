@@ -4,14 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mbd.arrays import Matrix
 from mbd.results.record import EventRecord, Record
 from mbd.simulation.run.data import RunData
 
 __all__ = ["record_of", "whole_record"]
+
+BLOCK = 4096
+"""Rows that are read together."""
 
 
 def record_of(run: RunData, table: Matrix, events: Sequence[EventRecord] = ()) -> Record:
@@ -26,10 +31,19 @@ def record_of(run: RunData, table: Matrix, events: Sequence[EventRecord] = ()) -
         parameter_names=[parameter.name for parameter in equations.parameters], time=table[:, 0], q=table[:, 1:at_v],
         v=table[:, at_v : at_v + n_v], z=table[:, at_v + n_v : at_a], a=table[:, at_a : at_a + n_v],
         s=table[:, at_a + n_v : at_lam], lam=table[:, at_lam:at_closed],
-        closed=table[:, at_closed:at_friction].astype(np.uint8), phase=table[:, at_friction:].astype(np.int8),
+        closed=_bytes(table[:, at_closed:at_friction], np.uint8), phase=_bytes(table[:, at_friction:], np.int8),
         events=events, settings=run.settings,
         parameter_changes=run.parameter_changes, start=run.start,
     )  # fmt: skip
+
+
+def _bytes(values: Matrix, kind: Any) -> NDArray[Any]:
+    """A few columns of a large table as small integers (R, C), column by column of rows that stay in the cache."""
+    found = np.empty(values.shape, dtype=kind)
+    for first in range(0, len(values), BLOCK):
+        for column in range(values.shape[1]):
+            found[first : first + BLOCK, column] = values[first : first + BLOCK, column]
+    return found
 
 
 def whole_record(run: RunData) -> Record:
