@@ -178,3 +178,29 @@ def test_forces_between_rows_of_a_stiff_mechanism_stay_with_the_rows():
             between = run.at(0.5 * (run.time[rows] + run.time[rows + 1]))[name]
             room = 0.05 * np.max(np.abs(values)) + (high - low)
             assert np.all((between > low - room) & (between < high + room)), (stiffness, name)
+
+
+@pytest.mark.parametrize("part", [1e-3, 1e-2, 0.1])
+@pytest.mark.parametrize("seed", range(4))
+def test_within_a_short_last_step_accelerations_are_those_of_its_ends(part, seed):
+    """Rows of index 3 have velocities off their constraints, the last one has not: that is no acceleration."""
+    rng, dt = np.random.default_rng(seed), 4e-3
+    model = mbd.Model("flail", gravity=(1.5, -9.81, 0.0), cut="all")
+    rod = mbd.Link("rod", 0.5, 1.0, rng.uniform(0.6, 0.9), 0.3)
+    bob = mbd.RigidBody("bob", 0.6, 0.16, center=(0.2, 0.03, 0.0))
+    model.connect(
+        mbd.Revolute("hinge", model.ground.origin, rod.point(-0.1, -0.7), stiffness=rng.uniform(10.0, 30.0)),
+        mbd.Prismatic("rail", model.ground.point(2.0, 0.0), bob.origin, axis=(0.6, 0.8, 0.0), stiffness=14.0, rest=0.1),
+    )
+    position = {"hinge.angle": rng.uniform(-3.0, 3.0), "rail.displacement": -0.4}
+    start = mbd.assemble(model, position=position, velocity={"hinge.angle": rng.uniform(5.0, 20.0)})
+    scheme = mbd.HHT(0.05, formulation="index3")
+    run = mbd.simulate(model, start, scheme, dt=dt, until=(100 + part) * dt)
+    times = run.time[-2] + np.linspace(0.1, 0.9, 9) * (run.time[-1] - run.time[-2])
+    names = [name for name in run.names if name.endswith("acceleration")]
+    size = max(np.max(np.abs(run[name])) for name in names)
+    for name in names:
+        ends = run[name][-2:]
+        room = 0.02 * size + np.ptp(ends)
+        between = run.at(times)[name]
+        assert np.all((between > np.min(ends) - room) & (between < np.max(ends) + room)), name

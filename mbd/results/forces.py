@@ -79,7 +79,7 @@ class Forces:
         """Where the balance changes less with the degree of interpolation than the polynomials, (k,) intervals.
 
         Both are compared at several points of an interval: at some a difference may pass zero. Accelerations are
-        weighed by inertia.
+        weighed by inertia and count together with multipliers, which may be a little steadier where they are wild.
         """
         time = self.rows.time
         begin, step = np.repeat(lower, len(POINTS)), np.repeat(time[lower + 1] - time[lower], len(POINTS))
@@ -90,9 +90,9 @@ class Forces:
         moved = _largest(np.einsum("kij,kj->ki", here.inertia, here.rate - there.rate))
         bent = _largest(np.einsum("kij,kj->ki", here.inertia, rate - rough_rate))
         pushed, bowed = _largest(here.lam - there.lam), _largest(found.lam - rougher.lam)
-        least = NEGLIGIBLE * _largest(here.load)
+        least = NEGLIGIBLE * (_largest(here.load) + _largest(here.lam))
         sound = (here.sound & there.sound).reshape(-1, len(POINTS)).all(axis=1)
-        steady = (moved <= bent + least) & (pushed <= bowed + NEGLIGIBLE * _largest(here.lam) + least)
+        steady = moved + pushed <= bent + bowed + least
         return np.asarray(sound & steady)
 
 

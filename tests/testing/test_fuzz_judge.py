@@ -29,8 +29,9 @@ ROUND_OFF = [2473, 3433]
 """Rows of a cut screw whose round-off is a little larger than their terms foretell."""
 TIED = [4378]
 """Two steps of a quarter of the run: whether they are half of it must not be decided by the last bit."""
-BETWEEN = [4644]
-"""A joint was open, and velocities did not fit it, between long steps of `RadauIIA`."""
+BETWEEN = [4644, 21327, 26660]
+"""A joint was open, and velocities did not fit it, between long steps of `RadauIIA`; accelerations of index 3 before the
+end of a run, or of a step cut short."""
 STIFF = [22904]
 """Forces of a penalty between long steps, known as far as its stiffness times the tolerance."""
 CORRECTED = [26404, 12577]
