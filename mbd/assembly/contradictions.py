@@ -69,13 +69,13 @@ def contradictions(work: Posture, attempt: Attempt, model: Any) -> list[str]:
     h = dict(zip(rows, misfit, strict=False))
     rate = dict(zip(active, speed_misfit, strict=False))
     wanted = [
-        *zip(work.places, misfit[len(rows) :], strict=True),
-        *zip(work.rates, speed_misfit[len(active) :], strict=True),
+        *(("", *each) for each in zip(work.places, misfit[len(rows) :], strict=True)),
+        *(("the rate of ", *each) for each in zip(work.rates, speed_misfit[len(active) :], strict=True)),
     ]
     found = [
-        f"{condition.name!r} = {condition.target:.9g} cannot be reached: off by {off:.6g}; name fewer values"
-        + sets.get(repr(condition.name), "")
-        for condition, off in wanted
+        f"{'' if condition.name.endswith('.rate') else which}{condition.name!r} = {condition.target:.9g} cannot be "
+        f"reached: off by {off:.6g}; name fewer values" + sets.get(repr(condition.name), "")
+        for which, condition, off in wanted
         if not abs(off) <= TOLERANCE * speed
     ]
     for k in active:

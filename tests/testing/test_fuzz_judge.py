@@ -30,8 +30,8 @@ ROUND_OFF = [2473, 3433]
 TIED = [4378]
 """Two steps of a quarter of the run: whether they are half of it must not be decided by the last bit."""
 BETWEEN = [4644, 21327, 26660]
-"""A joint was open, and velocities did not fit it, between long steps of `RadauIIA`; accelerations of index 3 before the
-end of a run, or of a step cut short."""
+"""A joint was open, and velocities did not fit it, between long steps of `RadauIIA`; accelerations of index 3 within
+a short last step."""
 STIFF = [22904]
 """Forces of a penalty between long steps, known as far as its stiffness times the tolerance."""
 CORRECTED = [26404, 12577]
