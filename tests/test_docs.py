@@ -87,7 +87,7 @@ def run_block(page: Path, before: int, code: str, namespace: dict[str, Any]) -> 
         said.setdefault(known[line], []).append(" ".join(map(str, values)))
 
     namespace["print"] = show
-    exec(compile("\n" * before + code, str(page), "exec"), namespace)
+    exec(compile("\n" * before + code, str(page), "exec", dont_inherit=True), namespace)
     differ = []
     for printed in dict.fromkeys(known.values()):
         came = "\n".join(said.get(printed, ["nothing"]))

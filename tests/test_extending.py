@@ -1,0 +1,38 @@
+"""What docs/extending.md adds to the library: a copy of the package with these files finds it as its own."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import mbd
+
+PAGE = Path(__file__).resolve().parents[1] / "docs" / "extending.md"
+BLOCK = re.compile(r"^```python\n# (\S+)( of \w+)?\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+
+
+def test_a_new_joint_loss_and_measure_are_one_file_and_one_line(tmp_path):
+    shutil.copytree(Path(mbd.__file__).parent, tmp_path / "mbd", ignore=shutil.ignore_patterns("__pycache__"))
+    tests, added = [], []
+    for title, _, code in BLOCK.findall(PAGE.read_text(encoding="utf-8")):
+        if title.startswith("mbd/"):
+            path, name = tmp_path / title, re.search(r"^class (\w+)", code, re.MULTILINE)[1]
+            path.write_text(code, encoding="utf-8")
+            package = ".".join(path.parent.relative_to(tmp_path).parts)
+            with (path.parent / "__init__.py").open("a", encoding="utf-8") as lines:
+                lines.write(f"from {package}.{path.stem} import {name}\n")
+            tests.append(f"from {package} import {name}")
+            added.append(name)
+        elif title == "test":
+            tests.append(code)
+    assert added == ["PinInSlot", "Root", "Clearance"]
+    done = subprocess.run(
+        [sys.executable, "-c", "\n".join(tests)], cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(tmp_path)},
+        capture_output=True, text=True, timeout=600,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "change of energy" in done.stdout
