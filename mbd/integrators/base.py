@@ -17,8 +17,8 @@ from mbd.errors import CapabilityError
 from mbd.state import Mode, State
 
 __all__ = [
-    "Advance", "Integrator", "Point", "StepReport", "StepResult", "System", "Terms", "completed", "composed",
-    "consistent_rates",
+    "Advance", "CompiledIntegrator", "Integrator", "Point", "StepReport", "StepResult", "System", "Terms", "completed",
+    "composed", "consistent_rates",
 ]  # fmt: skip
 
 
@@ -198,6 +198,20 @@ class Integrator(ABC):
     'stages' where steps of `RungeKutta853` are taken again."""
     stabilized: bool = True
     """Whether rows on positions are held at velocity level too."""
+    scheme: ClassVar[str | None] = None
+    """Name of the kernel's scheme that takes the very same steps (`mbd.kernel.schemes`), None where there is none."""
+
+    @property
+    def compiled_scheme(self) -> str | None:
+        """The same of this integrator: a subclass with a `step` of its own has none, unless it names one."""
+        for kind in type(self).__mro__:
+            if "scheme" in vars(kind) or "step" in vars(kind):
+                return vars(kind).get("scheme")
+        return None
+
+    def numbers(self) -> dict[str, float]:
+        """Its parameters by the names that the kernel has for them (`mbd.kernel.fields`)."""
+        return {}
 
     @abstractmethod
     def order(self, system: System | None = None) -> int:
@@ -253,3 +267,15 @@ class Integrator(ABC):
     def check(self, rows: int) -> str | None:
         """Why this scheme cannot integrate a mechanism with that many rows on positions, or None."""
         return None
+
+
+class CompiledIntegrator(Integrator):
+    """Parameters of a scheme that the kernel alone knows, machine code or interpreted: it names a `scheme`."""
+
+    def start(self, system: System, state: State, mode: Mode, dt: float) -> Any:
+        """Refused: it steps no `System`."""
+        raise CapabilityError(f"{self!r} has no step in Python: it takes those of mbd.simulate only")
+
+    def step(self, system: System, state: State, dt: float, mode: Mode, memory: Any) -> StepResult:
+        """Refused: it steps no `System`."""
+        return self.start(system, state, mode, dt)  # type: ignore[no-any-return]

@@ -51,6 +51,7 @@ class NewmarkFamily(Integrator):
     """
 
     any_chart: ClassVar[bool] = True
+    scheme: ClassVar[str | None] = "newmark"
     form: Literal["endpoint", "averaged"] = "endpoint"
     formulation: Formulation
     starting: Starting
@@ -97,6 +98,15 @@ class NewmarkFamily(Integrator):
     def exact(self) -> bool:
         """Without damping Newton iterates to round-off: a loose tolerance would bias energy over long runs."""
         return self.coefficients.undamped
+
+    def numbers(self) -> dict[str, float]:
+        """Its coefficients, and how it starts and ends its iterations."""
+        c = self.coefficients
+        return {
+            "alpha_m": c.alpha_m, "alpha_f": c.alpha_f, "beta": c.beta, "gamma": c.gamma, "tolerance": self.tolerance,
+            "jerk": int(self.starting == "jerk"), "exact": int(self.exact),
+            "error_constant": 1.0 / 6.0 - c.beta - 0.5 * (c.alpha_m - c.alpha_f),
+        }  # fmt: skip
 
     def order(self, system: System | None = None) -> int:
         """2 if γ = ½ + α_f − α_m, else 1."""

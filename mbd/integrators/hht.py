@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 from mbd.bodies.values import is_number, shown
 from mbd.errors import CapabilityError
@@ -39,6 +39,7 @@ class HHT(NewmarkFamily):
     Coefficients(alpha_m=0.0, alpha_f=0.05, beta=0.275625, gamma=0.55)
     """
 
+    scheme: ClassVar[str | None] = "newmark"
     alpha: float
     form: Literal["endpoint", "averaged"]
 
@@ -63,6 +64,11 @@ class HHT(NewmarkFamily):
     @property
     def coefficients(self) -> Coefficients:
         return Coefficients(0.0, self.alpha, 0.25 * (1.0 + self.alpha) ** 2, 0.5 + self.alpha)
+
+    @property
+    def compiled_scheme(self) -> str | None:
+        """That of the family; the averaged form is written in Python only."""
+        return super().compiled_scheme if self.form == "endpoint" else None
 
     def order(self, system: System | None = None) -> int:
         """2; the averaged form has 1 unless the system says that its mass matrix is constant."""

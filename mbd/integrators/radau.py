@@ -82,6 +82,7 @@ class RadauIIA(Integrator):
 
     any_chart: ClassVar[bool] = True
     between: ClassVar[str] = "quintic"
+    scheme: ClassVar[str | None] = "radau"
 
     tolerance: float = DEFAULT_TOLERANCE
 
@@ -97,6 +98,10 @@ class RadauIIA(Integrator):
     def order(self, system: System | None = None) -> int:
         """5; 2 where positions do not add, since its stages take ẋ = v."""
         return 5 if system is None or completed(system).is_vector else 2
+
+    def numbers(self) -> dict[str, float]:
+        """Newton's tolerance."""
+        return {"tolerance": self.tolerance}
 
     def error_order(self) -> int:
         """3: the estimate falls with dt⁴ in a step."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.integrators.base import Integrator, Point, StepReport, StepResult, System, Terms, completed, consistent_rates
-from mbd.integrators.dormand_prince import END, FIFTH, NODES, STAGES, THIRD, WEIGHTS
+from mbd.kernel.schemes.dormand_prince import END, FIFTH, NODES, STAGES, THIRD, WEIGHTS
 from mbd.state import Mode, State
 
 __all__ = ["RungeKutta853", "RungeKuttaMemory", "estimated_error"]
@@ -50,6 +50,7 @@ class RungeKutta853(Integrator):
 
     between: ClassVar[str] = "stages"
     """Between rows its steps are taken again."""
+    scheme: ClassVar[str | None] = "runge-kutta"
 
     def order(self, system: System | None = None) -> int:
         """8, with and without rows; 2 where positions do not add, since its stages take ẋ = v."""

@@ -124,7 +124,7 @@ def conclude(
     if cut and K.stabilized == 0 and refuses(K, h):
         K.event_kind = -1
         return AT_POSE
-    if (h < 1e-3 * K.step and K.scheme != 1) or uneven:  # index-3 multipliers oscillate after a change of step
+    if (h < 1e-3 * K.step and K.explicit == 0) or uneven:  # index-3 multipliers oscillate after a change of step
         take_over(K, t1)
         K.restart_due = 2
     else:
@@ -220,7 +220,7 @@ def add_error(K: Kernel, h: float, fired: bool) -> None:
     if K.adaptive == 1:
         part = max(K.event_after, 0.0) / h if fired else 1.0
         K.error_sum += K.local_error * part ** (K.error_order + 1.0)
-    elif K.scheme == 1:
+    elif K.explicit == 1 and K.estimates == 1:
         largest = 0.0
         for i in range(K.n_v):
             largest = max(largest, abs(K.error[K.n_v + i]))

@@ -17,6 +17,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from mbd.kernel.schemes.contract import SCHEMES, dispatch, schemes
+
 __all__ = [
     "MODULES",
     "constants_of",
@@ -24,6 +26,7 @@ __all__ = [
     "functions_of",
     "kernel_object",
     "kernel_text",
+    "modules",
     "object_of",
     "source_digest",
 ]
@@ -32,67 +35,47 @@ ENTRY = "mbd_kernel"
 
 MODULES = (
     "candidate", "linear", "ordered", "orthogonal", "lemke", "redundancy", "saddle", "restart", "pivoting",
-    "complementarity", "blow", "impact", "settle", "singular.step_pairs", "schemes.iteration", "schemes.memory",
-    "singular.gram_norms", "singular.newmark_step", "schemes.newton", "schemes.newmark", "complex_linear",
-    "ordered_complex", "schemes.stages", "singular.step_size", "uneven", "schemes.runge_kutta", "singular.stages",
-    "schemes.radau", "hermite", "significance", "guards", "pace", "control", "interior", "takeover", "refine",
-    "locate", "switching", "nonsmooth", "observe", "starting", "poles", "unresolved", "trying", "crowding",
-    "singular.events", "events", "advance",
+    "complementarity", "blow", "impact", "settle", "singular.step_pairs", "singular.gram_norms", "singular.step_size",
+    "hermite", "significance", "guards", "pace", "control", "interior", "takeover", "refine", "locate", "switching",
+    "nonsmooth", "observe", "starting", "poles", "unresolved", "trying", "crowding", "singular.events", "events",
+    "advance",
 )  # fmt: skip
+"""Those that know no scheme."""
 
 APART = (
     "factor", "solve", "solve_definite", "factor_ordered", "solve_ordered", "factor_pair_ordered", "solve_pair_ordered",
     "leftovers_of_many", "parts_to_take", "locate", "handle_event", "land", "look_closer",
-    "find_passed_events", "log_passed_events", "refuses",
+    "find_passed_events", "log_passed_events", "refuses", "scheme_accept",
 )  # fmt: skip
 """Their loops keep their shape wherever they are called; where they are not, nobody carries them along.
 
 The last eight are what few steps need: with them inside, the loop over steps would be too large to stay in one piece.
 """
 
-SHIMS = """
-def scheme_step(K: Kernel, h: float, t1: float) -> int:
-    if K.scheme == 1:
-        return runge_kutta_step(K, h, t1)
-    if K.scheme == 2:
-        return radau_step(K, h, t1)
-    return newmark_step(K, h, t1)
-
-def scheme_accept(K: Kernel, h: float) -> None:
-    if K.scheme == 1:
-        runge_kutta_accept(K, h)
-    elif K.scheme == 2:
-        radau_accept(K, h)
-    else:
-        newmark_accept(K, h)
-
-def scheme_resume(K: Kernel, h: float) -> int:
-    return newmark_resume(K, h)
-
-def scheme_start(K: Kernel) -> int:
-    if K.scheme == 1:
-        return runge_kutta_start(K)
-    if K.scheme == 2:
-        return radau_start(K)
-    return newmark_start(K)
-
-def scheme_error(K: Kernel, h: float) -> None:
-    if K.scheme == 0:
-        newmark_error(K, h)
-
+ENTRY_FUNCTION = """
 def mbd_kernel(K: Kernel) -> int:
     return advance(K)
 """
 
 
+def modules() -> tuple[str, ...]:
+    """Full names of all modules with functions of the kernel: its own, and those of its schemes."""
+    named = (module for path, scheme in zip(SCHEMES, schemes(), strict=True) for module in (path, *scheme.modules))
+    return tuple(dict.fromkeys([*(f"mbd.kernel.{module}" for module in MODULES), *named]))
+
+
 def _source(name: str) -> str:
-    return Path(__file__).parent.joinpath(*name.split(".")).with_suffix(".py").read_text(encoding="utf-8")
+    inside = name.removeprefix("mbd.kernel.")
+    known = Path(__file__).parent.joinpath(*inside.split(".")).with_suffix(".py")
+    path = known if inside != name else Path(str(import_module(name).__file__))
+    return path.read_text(encoding="utf-8")
 
 
 def source_digest() -> str:
     """Hash of everything the kernel is made from."""
     digest = hashlib.sha256()
-    for name in ("codes", "record", "records", "hooks", "roots", "expressions", "translate", "build", *MODULES):
+    beside = ("codes", "record", "records", "hooks", "roots", "expressions", "translate", "build", "schemes.contract")
+    for name in (*(f"mbd.kernel.{module}" for module in beside), *modules()):
         digest.update(_source(name).encode())
     return digest.hexdigest()
 
@@ -104,10 +87,10 @@ def functions_of(*sources: str) -> dict[str, ast.FunctionDef]:
 
 
 def constants_of(*modules: str) -> dict[str, float]:
-    """All numbers in capitals of some modules of the kernel, by name."""
+    """All numbers in capitals of some modules, by name."""
     found: dict[str, float] = {}
     for module in modules:
-        for name, value in vars(import_module(f"mbd.kernel.{module}")).items():
+        for name, value in vars(import_module(module)).items():
             if name.isupper() and isinstance(value, int | float):
                 found[name] = value
     return found
@@ -146,8 +129,8 @@ def kernel_text() -> str:
     """The kernel in LLVM's words."""
     from mbd.kernel.translate import translate
 
-    functions = functions_of(*map(_source, MODULES), SHIMS)
-    return translate(functions, constants_of("codes", *MODULES), ENTRY, ["kernel"], APART)
+    functions = functions_of(*map(_source, modules()), dispatch(), ENTRY_FUNCTION)
+    return translate(functions, constants_of("mbd.kernel.codes", *modules()), ENTRY, ["kernel"], APART)
 
 
 @lru_cache(maxsize=1)

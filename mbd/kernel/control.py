@@ -23,7 +23,7 @@ from mbd.kernel.restart import compose, consistent, fill_block, lower_scales
 from mbd.kernel.roots import sqrt
 from mbd.kernel.singular.step_size import step_by_pose, stirred, stirs
 
-__all__ = ["controlled_step", "first_step", "newmark_error", "smallest_step"]
+__all__ = ["controlled_step", "first_step", "smallest_step"]
 
 LEAST = 1e-10
 """Shortest step over the longest [-]."""
@@ -46,20 +46,6 @@ def smallest_step(K: Kernel) -> float:
     return float(max(64.0 * EPS * max(abs(K.time), K.longest), LEAST * K.longest))
 
 
-def newmark_error(K: Kernel, h: float) -> None:
-    """K.error of the Newmark family: ``h² (1/6 − β − (α_m − α_f)/2) (a₁ − a₀)`` of positions.
-
-    That of velocities and first-order states is ``h²/12`` times the change of the slope of their rates.
-    """
-    stretch = h / K.aux_step
-    share = h * h * (1.0 / 6.0 - K.beta - 0.5 * (K.alpha_m - K.alpha_f))
-    for i in range(K.n):
-        a0 = K.rate[i] + stretch * (K.aux[i] - K.rate[i])
-        if i < K.n_v:
-            K.error[i] = share * (K.aux1[i] - a0)
-        K.error[K.n_v + i] = h * h / 12.0 * ((K.rate1[i] - K.rate[i]) / h - K.slope[i])
-
-
 def error_ratio(K: Kernel, h: float) -> float:
     """err of the module's text for the candidate."""
     n_v = K.n_v
@@ -70,7 +56,7 @@ def error_ratio(K: Kernel, h: float) -> float:
     for i in range(n_v):
         fast = max(fast, abs(K.y1[i]))
     floor = EPS * (NEIGHBOURS * far + CANCELLED * h * fast)
-    if K.scheme != 0 and K.n_active > 0:
+    if K.singular_size == 1 and K.n_active > 0:
         floor += stirred(K, h) * h * fast
     largest = 0.0
     for i in range(n_v):
@@ -85,11 +71,10 @@ def error_ratio(K: Kernel, h: float) -> float:
 
 def growth(K: Kernel, ratio: float) -> float:
     """Factor from this step to the next."""
-    most = 5.0 if K.scheme != 0 else 2.0
-    factor = most
+    factor = float(K.most_growth)
     if ratio > 0.0:
-        factor = min(max(SAFETY * ratio ** (-1.0 / K.error_order), FALL), most)
-    if K.scheme != 1 and AGAIN <= factor <= UNCHANGED:
+        factor = min(max(SAFETY * ratio ** (-1.0 / K.error_order), FALL), factor)
+    if K.explicit == 0 and AGAIN <= factor <= UNCHANGED:
         return 1.0
     return factor
 
@@ -105,7 +90,7 @@ def controlled_step(K: Kernel, h: float) -> int:
     t = K.time
     while True:
         wanted = h
-        if K.scheme != 0 and K.n_active > 0:
+        if K.singular_size == 1 and K.n_active > 0:
             h = step_by_pose(K, wanted, 1.0)
             if stirs(K, h):
                 return STIRRED

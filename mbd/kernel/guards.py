@@ -74,13 +74,13 @@ def try_step(K: Kernel, h: float, t1: float) -> int:
     A scheme leaves velocities, rates and multipliers of the candidate in the block; only its positions are centered.
     """
     full = K.step
-    if h >= 1e-3 * full or (K.n_active == 0 and h >= 1e-9 * full) or K.scheme == 1:
+    if h >= 1e-3 * full or (K.n_active == 0 and h >= 1e-9 * full) or K.explicit == 1:
         status = scheme_step(K, h, t1)
         if status != 0:
             return status
         if K.n_dropped > 0:  # a scheme leaves the multipliers of the rows that it was solved with
             for k in range(K.n_rows):
-                if K.dropped[k] == 1 and K.scheme != 1:  # the explicit one has shared them out already
+                if K.dropped[k] == 1 and K.explicit == 0:  # the explicit one has shared them out already
                     K.lam1[k] = 0.0
             share_out(K, K.lam1)
             for k in range(K.n_rows):

@@ -130,7 +130,6 @@ class Settings(Sizes):
     auto: int  # 1: non-smooth steps follow where located impacts crowd
     impact_law: int  # 0 Newton, 1 Poisson, 2 sequential
     loaded: int  # a friction follows multipliers other than linearly: 1 as that of a pin, 2 not at all where one pulls
-    scheme: int  # 0 Newmark family, 1 explicit Runge–Kutta, 2 Radau IIA
     adaptive: int  # 1: steps follow the estimated error, 0: they are all dt
     error_order: int  # power of the step with which the estimated error per second falls
     looks: int  # substeps of a step at whose ends guards are evaluated; 1: at those of the step only
@@ -147,7 +146,25 @@ class Settings(Sizes):
     longest: float  # step
 
 
-class Model(Settings):
+class SchemeAbilities(Settings):
+    """The number of the scheme, and what it is able to do: see `mbd.kernel.schemes.contract`."""
+
+    scheme: int
+    explicit: int
+    estimates: int
+    singular_size: int
+    stretches: int
+    n_nodes: int
+    look_twice: float
+    error_constant: float
+    most_growth: float
+    middle: float
+    far_look: float
+    longest_over: float
+    nodes: Reals = reals(lambda s: s.n_nodes)  # parts of a step at which it has stages, its end not counted
+
+
+class Model(SchemeAbilities):
     """What model code reads and writes."""
 
     code: Sequence[Any]  # functions: see the numbers in `mbd.kernel.codes`; those of modes follow
@@ -222,9 +239,9 @@ class Memory(State):
     shift_change: Reals = reals(lambda s: s.n, kept=True)
     aux_step: float = place("clock")  # step size of aux
     turning: Reals = reals(lambda s: s.n_rows * s.n)  # ∂ḣ/∂x of the active rows, stabilized only
-    stages: Reals = reals()  # what a scheme of several stages works on
-    past_stages: Reals = reals(kept=True)  # those of the last step, which predict the next
-    tableau: Reals = reals()  # coefficients of its formula
+    stages: Reals = reals(lambda s: 0)  # what a scheme of several stages works on
+    past_stages: Reals = reals(lambda s: 0, kept=True)  # those of the last step, which predict the next
+    tableau: Reals = reals(lambda s: 0)  # coefficients of its formula
     error: Reals = reals(lambda s: s.n_v + s.n)  # local error of the candidate: of positions x, then of (v, z)
     local_error: float = place("clock")  # of the step that the candidate took
     error_sum: float = place("clock")

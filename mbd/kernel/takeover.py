@@ -41,7 +41,7 @@ def project_velocity(K: Kernel, t: float, q: Any, y: Any, m: int, dropping: bool
 
 def put_on_rows(K: Kernel, t1: float) -> None:
     """A candidate of index 3 with the velocities and guards that it has once it is taken over."""
-    if K.stabilized == 1 or K.scheme != 0 or K.n_active == 0:
+    if K.stabilized == 1 or K.n_active == 0:
         return
     if project_velocity(K, t1, K.q1, K.y1, stepping_rows(K), False) == 0:
         watch(K, t1, K.q1, K.y1, K.rate1, K.lam1, K.guards1)

@@ -8,7 +8,7 @@ from mbd.kernel.guards import try_step
 from mbd.kernel.records import Kernel
 from mbd.kernel.restart import consistent, lower_scales
 from mbd.kernel.singular.step_pairs import ALONE, FIRST, LONGER, SECOND, SHORTER, WHOLE, may_pair
-from mbd.kernel.singular.step_size import is_resolved, longest_over, step_by_pose, stirs
+from mbd.kernel.singular.step_size import is_resolved, step_by_pose, stirs
 from mbd.kernel.unresolved import judge_change
 
 __all__ = ["part_end", "step_end", "tried_step"]
@@ -25,7 +25,7 @@ No power of it is a simple fraction, so that tries do not meet a pose that repea
 def is_shortened(K: Kernel, status: int) -> bool:
     """Whether a step that ended so is tried again with another size; an explicit one beyond its stability is not."""
     stalled = status == NOT_CONVERGED or status == STAGNATED or status == SINGULAR
-    return stalled or status == TOO_NEAR or (status == GAINED and K.scheme != 1)
+    return stalled or status == TOO_NEAR or (status == GAINED and K.explicit == 0)
 
 
 def strays(K: Kernel, h: float) -> bool:
@@ -68,7 +68,7 @@ def tried_step(K: Kernel, h: float, t1: float) -> int:
         K.paired_step = 0
     full = h
     step = K.step
-    if K.scheme != 0 and K.n_active > 0:
+    if K.singular_size == 1 and K.n_active > 0:
         status = step_past_pose(K, h)
         h = K.step_taken
         if status == LAST or status == STIRRED:
@@ -98,7 +98,7 @@ def step_past_pose(K: Kernel, unit: float) -> int:
 
     A step over the pose that is longer than others must be resolved like these; else they lead up to it.
     """
-    h = step_by_pose(K, unit, longest_over(K))
+    h = step_by_pose(K, unit, K.longest_over)
     if h > unit:
         if K.time + h > K.until - WHOLE * unit:
             if K.until >= K.end:

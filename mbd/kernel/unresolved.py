@@ -24,11 +24,7 @@ from mbd.kernel.restart import compose, consistent, evaluate, fill_block
 __all__ = ["judge_change"]
 
 LOOK_TWICE = 0.01
-"""Estimated error of a rate, over the rate, above which a step of order 2 is looked at more closely [-]."""
-LOOK_TWICE_EIGHT = 0.1
-"""The same of the explicit scheme of order 8 [-]."""
-LOOK_TWICE_FIVE = 0.25
-"""The same of Radau IIA, whose estimate is of order 3 [-]."""
+"""Estimated error of a rate, over the rate, up to which a step needs no closer look, whatever the scheme [-]."""
 BENT = 0.1
 """Change of accelerations in a step, times its size, over the fastest rate, above which poles are looked for [-]."""
 BYSTANDER = 0.01
@@ -48,15 +44,12 @@ FEWEST = 1.0 / 4096.0
 def judge_change(K: Kernel, h: float, t1: float) -> int:
     """0 where the candidate may be a continuation of the motion, OUTGROWN, GAINED or LEAPT where it cannot."""
     stretch = max(1.0, K.step / h)
-    if K.scheme == 0 and changes_little(K, h, stretch):
+    if K.estimates == 0 and changes_little(K, h, stretch):
         return 0
     worst = largest_share(K, h, stretch)
-    allowed = LOOK_TWICE
-    if K.scheme != 0:
-        allowed = LOOK_TWICE_EIGHT if K.scheme == 1 else LOOK_TWICE_FIVE
     if (worst <= LOOK_TWICE and not bends(K, h)) or K.near_singular > 0 or sharing(K):
         return 0
-    return look_closer(K, h, t1, stretch, worst > allowed)
+    return look_closer(K, h, t1, stretch, worst > K.look_twice)
 
 
 def changes_little(K: Kernel, h: float, stretch: float) -> bool:
@@ -106,7 +99,7 @@ def look_closer(K: Kernel, h: float, t1: float, stretch: float, rough_enough: bo
         status = LEAPT
     elif rough_enough and K.strategy == 0:
         rough = max(rough, lag(K, h, at_y))
-        if rough > COARSE or K.scheme != 0:
+        if rough > COARSE or K.estimates == 1:
             note_coarse(K, t1, rough)
     carry(K.q1, K.inside, 0, K.n_q, False)
     carry(K.y1, K.inside, at_y, K.n, False)
@@ -129,7 +122,7 @@ def lag(K: Kernel, h: float, at_y: int) -> float:
 
     A scheme with strong numerical damping carries the a of a steep start on for some steps.
     """
-    if K.scheme != 0:
+    if K.estimates == 1:
         return 0.0
     fastest = 0.0
     for i in range(K.n_v):
@@ -166,10 +159,10 @@ def largest_share(K: Kernel, h: float, stretch: float) -> float:
     twelfth = h / 12.0
     worst = 0.0
     who = 0
-    if K.scheme != 0:
+    if K.estimates == 1:
         scheme_error(K, h)
     for i in range(K.n):
-        if K.scheme == 0:
+        if K.estimates == 0:
             error = twelfth * abs(K.rate1[i] - K.rate[i] - h * K.slope[i])
         else:
             error = abs(K.error[K.n_v + i])
@@ -215,9 +208,7 @@ def outgrows(K: Kernel, h: float, t1: float, stretch: float, at_y: int, at_D: in
 
 def resolved_growth(K: Kernel) -> float:
     """`GROWTH`, less where the error of the scheme is larger than that of the trapezoidal rule."""
-    if K.scheme != 0:
-        return GROWTH
-    error = abs(1.0 / 6.0 - K.beta - 0.5 * (K.alpha_m - K.alpha_f))
+    error = abs(K.error_constant)
     return GROWTH * TRAPEZOID / error if error > TRAPEZOID else GROWTH
 
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
-from mbd.integrators.dormand_prince import END, NODES, STAGES, WEIGHTS
+from mbd.kernel.schemes.dormand_prince import END, NODES, STAGES, WEIGHTS
 from mbd.results.balance import Solved, put
 from mbd.results.record import Rows
 

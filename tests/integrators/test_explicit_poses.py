@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import mbd
-from mbd.integrators.dormand_prince import NODES
-from mbd.kernel.singular.step_size import AMID
+from mbd.kernel.schemes import runge_kutta
+from mbd.kernel.schemes.dormand_prince import NODES
 from tests.cases.linkages import four_bars, upright
 from tests.integrators.flat import T, flat, pendulum_like, started, wanted
 
@@ -41,7 +41,7 @@ def test_no_step_ends_next_to_a_pose():
     for dt in (3e-2, 7e-3, 2e-3):
         run = mbd.simulate(model, start, SCHEME, dt=dt, until=T)
         away = np.min(np.abs(run.time[:, None] - flat(2)), axis=0)
-        assert np.all(away > 0.9 * AMID * dt)
+        assert np.all(away > 0.9 * runge_kutta.SCHEME.abilities.middle * dt)
         assert run.stats["shortened"] >= len(flat(2))
 
 

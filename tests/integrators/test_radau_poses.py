@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import mbd
+from mbd.kernel.schemes import radau
 from mbd.kernel.schemes.collocation import RADAU
-from mbd.kernel.singular.step_size import AMID_RADAU
 from tests.cases.linkages import four_bars, upright
 from tests.integrators.flat import T, flat, pendulum_like, started, wanted
 
@@ -50,7 +50,7 @@ def test_no_step_ends_next_to_a_pose():
     for dt in (3e-2, 7e-3, 2e-3):
         run = ran(2, dt=dt)
         away = np.min(np.abs(run.time[:, None] - flat(2)), axis=0)
-        assert np.all(away > 0.9 * AMID_RADAU * dt)
+        assert np.all(away > 0.9 * radau.SCHEME.abilities.middle * dt)
         assert run.stats["shortened"] >= len(flat(2))
 
 

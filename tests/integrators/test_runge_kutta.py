@@ -12,8 +12,8 @@ import mbd
 from mbd.compile.mechanisms import mechanism_of
 from mbd.hardcases.governor import governor
 from mbd.hardcases.user_force import pushed_particle
-from mbd.integrators.dormand_prince import END, FIFTH, NODES, STAGES, THIRD, WEIGHTS
 from mbd.integrators.runge_kutta import RungeKutta853
+from mbd.kernel.schemes.dormand_prince import END, FIFTH, NODES, STAGES, THIRD, WEIGHTS
 from mbd.results.interpolation import Grid, quintic
 from mbd.simulation.capabilities import refusals
 from mbd.testing.wild import wild_scene

@@ -6,13 +6,13 @@ from collections import defaultdict
 from importlib import import_module
 from types import FunctionType
 
-from mbd.kernel.build import MODULES
+from mbd.kernel.build import modules
 
 
 def test_no_two_modules_of_the_kernel_share_a_name():
     owners = defaultdict(set)
-    for module in MODULES:
-        source = import_module(f"mbd.kernel.{module}")
+    for module in modules():
+        source = import_module(module)
         imported = {name for name in vars(import_module("mbd.kernel.codes")) if name.isupper()}
         for name, value in vars(source).items():
             own = isinstance(value, FunctionType) and value.__module__ == source.__name__

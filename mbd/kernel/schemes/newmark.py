@@ -10,12 +10,13 @@ from __future__ import annotations
 from mbd.kernel.codes import PASSING
 from mbd.kernel.records import Kernel
 from mbd.kernel.restart import compose, consistent, fill_block, refresh_scales
+from mbd.kernel.schemes.contract import Scheme
 from mbd.kernel.schemes.iteration import predict, shift_growth
 from mbd.kernel.schemes.memory import forget_steps, look_a_step_ahead, start_step
 from mbd.kernel.schemes.newton import SEARCHED, UNSOUND, solve_step
 from mbd.kernel.singular.newmark_step import passing_step
 
-__all__ = ["newmark_accept", "newmark_resume", "newmark_start", "newmark_step"]
+__all__ = ["SCHEME", "newmark_accept", "newmark_error", "newmark_resume", "newmark_start", "newmark_step"]
 
 
 def newmark_start(K: Kernel) -> int:
@@ -131,3 +132,27 @@ def newmark_resume(K: Kernel, h: float) -> int:
     for i in range(K.n):
         K.aux[i] = K.rate[i] + K.aux1[i]
     return status
+
+
+def newmark_error(K: Kernel, h: float) -> None:
+    """K.error: ``h² (1/6 − β − (α_m − α_f)/2) (a₁ − a₀)`` of positions, the first factor being K.error_constant.
+
+    That of velocities and first-order states is ``h²/12`` times the change of the slope of their rates.
+    """
+    stretch = h / K.aux_step
+    share = h * h * K.error_constant
+    for i in range(K.n):
+        a0 = K.rate[i] + stretch * (K.aux[i] - K.rate[i])
+        if i < K.n_v:
+            K.error[i] = share * (K.aux1[i] - a0)
+        K.error[K.n_v + i] = h * h / 12.0 * ((K.rate1[i] - K.rate[i]) / h - K.slope[i])
+
+
+SCHEME = Scheme(
+    "newmark", newmark_start, newmark_step, newmark_accept, newmark_resume, newmark_error,
+    modules=tuple(
+        f"mbd.kernel.{name}"
+        for name in ("schemes.iteration", "schemes.memory", "schemes.newton", "singular.newmark_step")
+    ),
+    programs="stepping",
+)  # fmt: skip

@@ -26,6 +26,8 @@ from mbd.kernel.restart import (
     restore_scales,
     retain_scales,
 )
+from mbd.kernel.schemes.collocation import RADAU
+from mbd.kernel.schemes.contract import Abilities, Scheme
 from mbd.kernel.schemes.iteration import runs_away
 from mbd.kernel.schemes.memory import forget_steps, look_a_step_ahead
 from mbd.kernel.schemes.runge_kutta import factor_saddle
@@ -37,6 +39,7 @@ from mbd.kernel.schemes.stages import (
     MU_REAL,
     STAGE_LAM,
     STAGE_RATES,
+    STAGES_END,
     STIFF_PART,
     correct_rates,
     correct_stages,
@@ -51,7 +54,7 @@ from mbd.kernel.schemes.stages import (
 from mbd.kernel.singular.stages import LOUDER, is_astride, is_beside, settle_stages, turn_rows
 from mbd.kernel.singular.step_size import forget_leftovers, keep_leftovers, note_leftovers
 
-__all__ = ["radau_accept", "radau_start", "radau_step"]
+__all__ = ["SCHEME", "radau_accept", "radau_start", "radau_step"]
 
 MOST_RETREATS = 10
 """How often a Newton correction is halved before the iteration goes on from where it is."""
@@ -416,3 +419,28 @@ def stage_speed(K: Kernel, k: int, j: int, h: float) -> float:
     o = stage_place(K, STAGE_RATES) + j
     n = K.n
     return float(K.y[j] + h * (S[A_ + 3 * k] * S[o] + S[A_ + 3 * k + 1] * S[o + n] + S[A_ + 3 * k + 2] * S[o + 2 * n]))
+
+
+def radau_memory(K: Kernel) -> dict[str, int]:
+    """Lengths of what stages take, and of those of the last step."""
+    return {"stages": stage_place(K, STAGES_END), "past_stages": 3 * (K.n + K.n_rows + K.n_v)}
+
+
+SCHEME = Scheme(
+    "radau", radau_start, radau_step, radau_accept,
+    modules=tuple(
+        f"mbd.kernel.{name}"
+        for name in (
+            "schemes.iteration", "schemes.memory", "schemes.stages", "schemes.runge_kutta", "singular.stages",
+            "complex_linear", "ordered_complex",
+        )
+    ),
+    abilities=Abilities(
+        estimates=1, singular_size=1, stretches=1, look_twice=0.25, most_growth=5.0,
+        middle=0.4,  # between the nodes at (4 ± √6)/10
+        far_look=400.0, longest_over=512.0,  # it takes such steps where forces are stiff, too
+    ),
+    nodes=(RADAU.c[0], RADAU.c[1]),
+    memory=radau_memory,
+    coefficients=lambda: {"stages": RADAU.numbers()},
+)  # fmt: skip

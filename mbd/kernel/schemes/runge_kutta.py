@@ -1,5 +1,5 @@
 """One explicit Runge–Kutta step of order 8 with its embedded error estimate (Dormand & Prince 1980, in the form of
-Hairer, Nørsett & Wanner 1993, II.5; coefficients in `mbd.integrators.dormand_prince`).
+Hairer, Nørsett & Wanner 1993, II.5; coefficients in `mbd.kernel.schemes.dormand_prince`).
 
     x_i = h Σ_j a_ij v_j,   y_i = y₀ + h Σ_j a_ij rate_j,   rate_i = rate(t₀ + c_i h, q₀ + x_i, y_i)
 
@@ -16,12 +16,14 @@ from mbd.kernel.ordered import LOSS_AT_ONCE, OF_ACCELERATIONS, SYMMETRIC, factor
 from mbd.kernel.records import Kernel
 from mbd.kernel.restart import consistent, evaluate, fill_block, raise_scales, refresh_scales
 from mbd.kernel.roots import sqrt
+from mbd.kernel.schemes.contract import Abilities, Scheme
+from mbd.kernel.schemes.dormand_prince import NODES, STAGES, tableau
 from mbd.kernel.schemes.memory import forget_steps
 from mbd.kernel.singular.newmark_step import CONTINUOUS
 from mbd.kernel.singular.step_size import forget_leftovers, keep_leftovers, note_leftovers
 from mbd.kernel.uneven import LOSS, is_uneven, polish_rates, polish_with_rows
 
-__all__ = ["runge_kutta_accept", "runge_kutta_start", "runge_kutta_step"]
+__all__ = ["SCHEME", "runge_kutta_accept", "runge_kutta_start", "runge_kutta_step"]
 
 EXPLICIT_STAGES = 12
 """Stages of a step, the end not counted."""
@@ -330,3 +332,18 @@ def runge_kutta_accept(K: Kernel, h: float) -> None:
     if K.n_active > 0:
         keep_leftovers(K, h)
     K.aux_step = h
+
+
+SCHEME = Scheme(
+    "runge-kutta", runge_kutta_start, runge_kutta_step, runge_kutta_accept,
+    modules=("mbd.kernel.schemes.memory", "mbd.kernel.uneven"),
+    abilities=Abilities(
+        explicit=1, estimates=1, singular_size=1, look_twice=0.1, most_growth=5.0,
+        middle=0.46666666666666667,  # between the nodes at 1/3 and 3/5
+    ),
+    nodes=tuple(NODES),
+    programs="explicit",
+    stability=6.0,
+    memory=lambda K: {"stages": (STAGES + 1) * (K.n_v + K.n), "tableau": len(tableau())},
+    coefficients=lambda: {"tableau": tableau()},
+)  # fmt: skip

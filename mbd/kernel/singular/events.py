@@ -36,7 +36,7 @@ def may_pass_events(K: Kernel, h: float) -> bool:
     """Whether the candidate's step may hold a singular configuration; where rows are held as index 3 any may."""
     if K.n_active == 0 or K.strategy == 1:
         return False
-    if K.scheme == 0:
+    if K.singular_size == 0:
         return bool(K.stabilized == 0 or K.near_singular > 0)
     return bool(0.0 <= K.singular_time - K.time <= h)
 

@@ -28,25 +28,16 @@ from mbd.kernel.roots import sqrt
 from mbd.kernel.singular.gram_norms import common_part
 
 __all__ = [
-    "HUSHED", "LOUD", "forget_leftovers", "is_resolved", "keep_leftovers", "leftovers_here", "longest_over", "motion",
+    "HUSHED", "LOUD", "forget_leftovers", "is_resolved", "keep_leftovers", "leftovers_here", "motion",
     "note_leftovers", "step_by_pose", "stirred", "stirring", "stirs",
 ]  # fmt: skip
 
-AMID = 0.46666666666666667
-"""The middle of the widest gap between nodes of the explicit scheme, those at 1/3 and 3/5 [-]."""
-AMID_RADAU = 0.4
-"""The same of Radau IIA, between (4 ± √6)/10 [-]."""
 GLANCE = 3.5
 """Steps to a pose, as the last step tells, below which is looked closer [-]."""
 CERTAIN = 6.0
 """Steps to a pose below which it is taken for one; beyond, where nothing else asks for it, it may be none [-]."""
 FAR_GLANCE = 14.0
-"""The same where round-off asks for longer steps over the pose [-]."""
-LONGEST = 16.0
-"""Steps of the grid that one over a pose may last, where round-off makes too much of velocities in shorter ones [-]."""
-FAR_GLANCE_RADAU = 400.0
-LONGEST_RADAU = 512.0
-"""Both of Radau IIA, which can take such steps where forces are stiff, too [-]."""
+"""The same where round-off asks for longer steps over the pose; of a scheme K.far_look [-]."""
 STIR = 16.0
 """What round-off of a row makes of velocities over what it would if it were one unit in the last place [-]."""
 HUSHED = 1e-9
@@ -65,32 +56,13 @@ NEAR_ENOUGH = 0.01
 """Part of a step by which the last of these may differ from where w vanishes [-]."""
 VANISHED = 0.2
 """Length of w at a pose, over that of now: more, and rows only come close to losing rank [-]."""
-EXPLICIT_NODES = 12
-"""Nodes of the formulas, the end not counted."""
-EXPLICIT_PLACES = EXPLICIT_NODES * EXPLICIT_NODES + EXPLICIT_NODES
-"""Where they begin in the tableau."""
 NOWHERE = 1e300
 """Time to a pose where there is none [s]."""
 
 
-def amid(K: Kernel) -> float:
-    """Part of a step at which a pose lies best."""
-    return AMID_RADAU if K.scheme == 2 else AMID
-
-
-def far_glance(K: Kernel) -> float:
-    """Steps to a pose below which is looked closer where round-off asks for it."""
-    return FAR_GLANCE_RADAU if K.scheme == 2 else FAR_GLANCE
-
-
-def longest_over(K: Kernel) -> float:
-    """Steps of the grid that one over a pose may last."""
-    return LONGEST_RADAU if K.scheme == 2 else LONGEST
-
-
 def may_stretch(K: Kernel) -> bool:
     """Whether a step over a pose may be longer than others: of an explicit scheme only where no guard is watched."""
-    return bool(K.n_watched == 0 or K.scheme == 2)
+    return bool(K.n_watched == 0 or K.stretches == 1)
 
 
 def forget_leftovers(K: Kernel) -> None:
@@ -124,9 +96,9 @@ def keep_leftovers(K: Kernel, h: float) -> None:
         fall = K.left[k] - K.left1[k]
         if K.left[k] < 0.0 or K.left1[k] < GLANCE * fall:
             near = 1.0
-        elif K.left1[k] < far_glance(K) * fall and K.adaptive == 0 and may_stretch(K):
+        elif K.left1[k] < K.far_look * fall and K.adaptive == 0 and may_stretch(K):
             reach = sqrt(stirring(K, k, fall / h, K.left1[m]) / HUSHED)
-            if reach > amid(K) * h and K.left1[k] * h < (2.0 * reach + GLANCE * h) * fall:
+            if reach > K.middle * h and K.left1[k] * h < (2.0 * reach + GLANCE * h) * fall:
                 near = 1.0
         K.left[k] = K.left1[k]
     K.left[m] = near
@@ -261,12 +233,12 @@ def times_to_poses(K: Kernel, m: int, unit: float) -> float:
 def horizon(K: Kernel, m: int, unit: float, first: float) -> float:
     """Time beyond which a pose is not looked for: nothing is arranged so early, and the motion is not known so far."""
     limit = 4.0 * FAR_GLANCE * unit
-    if K.scheme == 2 and first < NOWHERE:
+    if K.stretches == 1 and first < NOWHERE:
         speed = max(motion(K, K.y), motion(K, K.y1))
         for k in range(m):
             if K.work[m + k] == first:
                 reach = sqrt(stirring(K, k, K.work[2 * m + k] / first, speed) / HUSHED)
-                limit = max(limit, 4.0 * min(reach, LONGEST_RADAU * unit))
+                limit = max(limit, 4.0 * min(reach, K.longest_over * unit))
     return limit
 
 
@@ -283,12 +255,12 @@ def step_by_pose(K: Kernel, unit: float, longest: float) -> float:
     first = times_to_poses(K, m, unit)
     limit = horizon(K, m, unit, first)
     stretched = limit > 4.0 * FAR_GLANCE * unit and first <= limit
-    if K.scheme != 2 or first <= CERTAIN * unit or stretched:
+    if K.stretches == 0 or first <= CERTAIN * unit or stretched:
         K.singular_time = K.time + first
     span = unit
     if may_stretch(K):
-        span = min(max(sqrt(K.velocity_noise / HUSHED) / amid(K), unit), longest * unit)
-    rest = (first - amid(K) * span) / unit
+        span = min(max(sqrt(K.velocity_noise / HUSHED) / K.middle, unit), longest * unit)
+    rest = (first - K.middle * span) / unit
     if rest >= 2.0:
         K.velocity_noise = 0.0  # far: what may come of it is judged nearer
         return unit
@@ -297,7 +269,7 @@ def step_by_pose(K: Kernel, unit: float, longest: float) -> float:
     if rest >= SMALLEST:
         return rest * unit
     K.near_singular = PASSING
-    return clearest(K, m, span, min(1.0, first / amid(K) / span))
+    return clearest(K, m, span, min(1.0, first / K.middle / span))
 
 
 def stirred(K: Kernel, h: float) -> float:
@@ -342,7 +314,7 @@ def clearest(K: Kernel, m: int, unit: float, wanted: float) -> float:
     widest = -1.0
     for k in range(17):
         part = wanted * (1.0 - 0.05 * k)
-        clear = 0.5 * amid(K)
+        clear = 0.5 * K.middle
         for row in range(m):
             place = K.work[m + row] / (part * unit)
             clear = min(clear, clearance(K, place))
@@ -357,10 +329,6 @@ def clearest(K: Kernel, m: int, unit: float, wanted: float) -> float:
 def clearance(K: Kernel, place: float) -> float:
     """Distance of a place, part of a step, from the nearest node or the end [-]."""
     clear = abs(place - 1.0)
-    if K.scheme == 2:
-        for node in range(2):
-            clear = min(clear, abs(place - K.stages[node]))
-    else:
-        for node in range(EXPLICIT_NODES):
-            clear = min(clear, abs(place - K.tableau[EXPLICIT_PLACES + node]))
+    for node in range(K.n_nodes):
+        clear = min(clear, abs(place - K.nodes[node]))
     return clear

@@ -18,7 +18,6 @@ from mbd.simulation.diagnostics.jamming import may_jam
 from mbd.simulation.diagnostics.redundant import clash
 from mbd.simulation.diagnostics.round_off import remainder
 from mbd.simulation.run.data import RunData
-from mbd.simulation.run.lengths import RUNGE_KUTTA
 from mbd.simulation.run.stepper import Stepper
 from mbd.state import State
 from mbd.tape.evaluate import evaluate
@@ -203,7 +202,7 @@ def _unresolved(stepper: Stepper, status: int, closed: str) -> str:
             "of 1/x: the scheme sees nothing of them; use a smaller dt to see what happens there, or a force that is "
             "bounded wherever the motion goes"
         )
-    shorter = "" if int(values.scheme) == RUNGE_KUTTA else ", as do steps down to a tenth of dt"
+    shorter = "" if values.explicit else ", as do steps down to a tenth of dt"
     return (
         f"{change}, more than the forces along the way can do{shorter}: dt does not resolve a force that is steep "
         f"there; try a smaller dt, such as {0.05 * dt:.1g} s, or a softer force"
@@ -219,7 +218,7 @@ def _no_size(stepper: Stepper, status: int, closed: str) -> str:
             f"{stepper.kernel.allowed:.2g} per second{closed}; a force that jumps with the state (mbd.where, sign) "
             "must be made continuous, or be switched by an Event or Controller; or ask for less by tol="
         )
-    explicit = int(stepper.kernel.scheme) == RUNGE_KUTTA
+    explicit = stepper.kernel.explicit
     others = "mbd.GeneralizedAlpha, mbd.HHT or mbd.RadauIIA" if explicit else "mbd.GeneralizedAlpha or mbd.HHT"
     return (
         f"a pose in which rows lose rank, at {_unknown(stepper)}{closed}: round-off would make "
@@ -335,7 +334,7 @@ def _unknown(stepper: Stepper) -> str:
 
 def _passing(stepper: Stepper) -> str:
     """What passes poses in which rows lose rank where a scheme did not."""
-    explicit = int(stepper.kernel.scheme) == RUNGE_KUTTA
+    explicit = stepper.kernel.explicit
     return "mbd.GeneralizedAlpha or mbd.RadauIIA" if explicit else "formulation='index3' with a damped scheme"
 
 

@@ -12,12 +12,9 @@ from mbd.constraints.penalty_parameters import STEPS_OF_APPROACH
 from mbd.integrators.base import Point
 from mbd.results.record import Record
 from mbd.simulation.run.data import RunData
-from mbd.simulation.run.lengths import RUNGE_KUTTA
 
 __all__ = ["Matrices", "fastest", "free_motions", "matrices", "resolving_dt", "sane_rows", "stability"]
 
-EXPLICIT_LIMIT = 6.0
-"""ω dt below which `RungeKutta853` is stable [-]."""
 LOOKED_AT = 6
 """Rows at which a motion is looked for that may be too fast."""
 LARGEST = 40
@@ -111,14 +108,14 @@ def sane_rows(run: RunData) -> list[int]:
 
 def stability(run: RunData, record: Record) -> str:
     """What bounds dt, where an explicit scheme took steps above its limit of stability; '' elsewhere."""
-    if run.kernel.scheme != RUNGE_KUTTA or run.kernel.adaptive or run.kernel.mode_id < 0:
+    if not run.kernel.explicit or run.kernel.adaptive or run.kernel.mode_id < 0:
         return ""
     if run.kernel.n > LARGEST:
         return "; steps of an explicit scheme may be above its limit of stability: try dt/4, tol=, or mbd.RadauIIA()"
     rate = fastest(run, record, sane_rows(run))
-    if rate * run.dt <= EXPLICIT_LIMIT:
+    if rate * run.dt <= run.stepper.own.stability:
         return ""
     return (
         f"; its fastest motion has {rate:.3g} rad/s, where an explicit scheme is stable for dt below "
-        f"{EXPLICIT_LIMIT / rate:.2g} s only: use less, tol=, or mbd.RadauIIA()"
+        f"{run.stepper.own.stability / rate:.2g} s only: use less, tol=, or mbd.RadauIIA()"
     )

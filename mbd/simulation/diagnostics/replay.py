@@ -14,21 +14,16 @@ from mbd.arrays import Vector
 from mbd.compile.mechanism import Mechanism, ModeCode
 from mbd.errors import ModelError
 from mbd.integrators import Integrator
-from mbd.integrators.base import StepReport
-from mbd.kernel.control import newmark_error
-from mbd.kernel.schemes.newmark import newmark_accept, newmark_resume, newmark_start, newmark_step
-from mbd.kernel.schemes.radau import radau_accept, radau_start, radau_step
-from mbd.kernel.schemes.runge_kutta import runge_kutta_accept, runge_kutta_start, runge_kutta_step
 from mbd.results.capsule import load
 from mbd.results.failure import Failure
 from mbd.simulation.diagnostics.failures import residual_names
-from mbd.simulation.run.lengths import NEWMARK, RADAU_IIA, RUNGE_KUTTA
+from mbd.simulation.run.plain import KernelScheme
 from mbd.simulation.run.run import Run
 from mbd.simulation.simulate import prepared
 from mbd.state import State
 from mbd.trajectory import Trajectory
 
-__all__ = ["Iteration", "Replay", "Try", "Twin", "replay"]
+__all__ = ["Iteration", "Replay", "Try", "replay"]
 
 
 SHOWN = 10
@@ -147,7 +142,7 @@ def replay(
     trajectory, problem = run.complete()
     again, seen = _prepared(told, trajectory.final if problem else told.state, model, scheme, step, 1)
     if again.stepper.compiled:
-        again.stepper.compiled, again.stepper.scheme = False, Twin(again.stepper.kernel.scheme)  # type: ignore[assignment]
+        again.stepper.compiled, again.stepper.scheme = False, KernelScheme(again.stepper.own)
     again.march()
     same = bool(problem) and problem == told.message
     return Replay(told, not problem, same, trajectory.message, seen.tries(again), trajectory)
@@ -170,28 +165,6 @@ def _prepared(
     run = prepared(model, replace(start), scheme, dt, until, dict(start.parameters), options, watch)
     run.limit, run.earlier = steps, told.events
     return run, watched[0]
-
-
-class Twin:
-    """The kernel's own scheme in plain Python, step by step what its compiled form does."""
-
-    memory = None
-    report = StepReport(True)
-
-    def __init__(self, scheme: int) -> None:
-        self.start, self.step, self.accept, self.resume, self.error = SCHEMES[scheme]
-
-
-def _nothing_to_add(K: Any, h: float) -> None:
-    """The step has left its error already."""
-
-
-SCHEMES: dict[int, tuple[Any, ...]] = {
-    NEWMARK: (newmark_start, newmark_step, newmark_accept, newmark_resume, newmark_error),
-    RUNGE_KUTTA: (runge_kutta_start, runge_kutta_step, runge_kutta_accept, None, _nothing_to_add),
-    RADAU_IIA: (radau_start, radau_step, radau_accept, None, _nothing_to_add),
-}
-"""Start, step, accept, resume and error of the kernel's schemes; only the family has to resume beyond a pose."""
 
 
 class _Watched:

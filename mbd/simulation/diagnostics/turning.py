@@ -13,7 +13,6 @@ from mbd.compile.python import array_function
 from mbd.results.columns import ModelColumns
 from mbd.results.record import Record
 from mbd.simulation.run.data import RunData
-from mbd.simulation.run.lengths import RUNGE_KUTTA
 from mbd.tape.derivatives import live
 
 __all__ = ["blocks", "first_reversed", "overturned", "unresolved_turns"]
@@ -42,7 +41,7 @@ def unresolved_turns(run: RunData, record: Record) -> list[str]:
     Forces are then read at instants that may fall on the same angle again and again. Steps that follow a tolerance, and
     the explicit scheme, estimate that error themselves.
     """
-    if run.kernel.adaptive or run.kernel.scheme == RUNGE_KUTTA or len(record.time) < 2:
+    if run.kernel.adaptive or run.kernel.explicit or len(record.time) < 2:
         return []
     if run.kernel.row_bounds[0] <= HALF_TURN:  # no coordinate changes so much from row to row
         return []

@@ -8,7 +8,6 @@ from typing import Any
 
 from mbd.simulation.diagnostics.notes import notes_of
 from mbd.simulation.run.data import RunData
-from mbd.simulation.run.lengths import RUNGE_KUTTA
 from mbd.simulation.run.stored import whole_record
 from mbd.state import State
 from mbd.trajectory import Trajectory
@@ -38,7 +37,7 @@ def _statistics(run: RunData, notes: list[str]) -> dict[str, Any]:
     numbers: dict[str, Any] = {name: int(getattr(run.kernel, f"n_{name}")) for name in COUNTS}
     if run.kernel.adaptive:
         numbers["rejected"] = int(run.kernel.n_rejected)
-    if run.kernel.adaptive or run.kernel.scheme == RUNGE_KUTTA:
+    if run.kernel.adaptive or (run.kernel.explicit and run.kernel.estimates):
         numbers["local_errors"] = float(run.kernel.error_sum)
     numbers["modes"] = len(run.stepper.modes)
     numbers["compiled"] = run.stepper.compiled

@@ -15,6 +15,7 @@ from mbd.integrators.base import Integrator, Point, StepReport, StepResult, Syst
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.kernel.codes import NOT_CONVERGED, NOT_FINITE, TOO_NEAR
 from mbd.kernel.restart import MOST_LOADS, evaluate, fill_block, refresh_scales
+from mbd.kernel.schemes.contract import Scheme
 from mbd.kernel.schemes.memory import start_step
 from mbd.kernel.singular.step_size import forget_leftovers, keep_leftovers, note_leftovers
 from mbd.kernel.uneven import LOSS
@@ -243,6 +244,20 @@ def unit_blocks(mechanism: Mechanism) -> Any:
     return np.array(units, dtype=np.int64)
 
 
+class KernelScheme:
+    """Hooks of the interpreted kernel: the functions of a compiled scheme, step by step what machine code does."""
+
+    memory = None
+    report = StepReport(True)
+
+    def __init__(self, scheme: Scheme) -> None:
+        self.start, self.step, self.accept, self.resume = scheme.start, scheme.step, scheme.accept, scheme.resume
+        self.error = scheme.error or self._has_left_its_error
+
+    def _has_left_its_error(self, K: Any, h: float) -> None:
+        pass
+
+
 class PlainScheme:
     """Hooks of the interpreted kernel: an integrator's `start` and `step` on the kernel's arrays."""
 
@@ -310,7 +325,7 @@ class PlainScheme:
         K.q1[:], K.y1[:], K.rate1[:], K.aux1[:] = result.state.q, y, rate, rate
         K.lam1[:] = 0.0
         K.lam1[rows] = lam
-        if K.scheme != 0 and rows:
+        if K.singular_size == 1 and rows:
             evaluate(K, t1, K.q1, K.y1)
             note_leftovers(K)
         fill_block(K, t1, K.q1, K.y1)
@@ -326,7 +341,7 @@ class PlainScheme:
 
     def accept(self, K: Any, h: float) -> None:
         """The candidate becomes the accepted state, its memory the memory."""
-        if K.scheme != 0 and K.n_active > 0:
+        if K.singular_size == 1 and K.n_active > 0:
             keep_leftovers(K, h)
         self.memory = self.pending
         K.slope[:] = (K.rate1 - K.rate) / h

@@ -12,20 +12,15 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.compile.mechanism import Mechanism
 from mbd.equations.equations import Equations
-from mbd.integrators.base import Integrator
-from mbd.integrators.dormand_prince import tableau
-from mbd.integrators.family import NewmarkFamily
+from mbd.integrators.base import CompiledIntegrator, Integrator
 from mbd.integrators.newton import MAX_ITERATIONS
-from mbd.integrators.radau import RadauIIA
-from mbd.integrators.runge_kutta import RungeKutta853
 from mbd.kernel import codes
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.kernel.records import PROGRAMS, TABLE, Kernel
-from mbd.kernel.schemes.collocation import RADAU
+from mbd.kernel.schemes.contract import NO_SCHEME, Scheme, schemes
 from mbd.kernel.settle import room_to_log
 from mbd.simulation.run.call_table import CallTable
-from mbd.simulation.run.lengths import NEWMARK, RADAU_IIA, RUNGE_KUTTA, scheme_memory
-from mbd.simulation.run.plain import MechanismSystem, PlainScheme, row_units, unit_blocks
+from mbd.simulation.run.plain import KernelScheme, MechanismSystem, PlainScheme, row_units, unit_blocks
 from mbd.tape.derivatives import live
 
 __all__ = ["Stepper", "is_compiled"]
@@ -43,25 +38,14 @@ LOOKS = 4
 """Parts in which a step of a scheme of order 3 or more is looked at for guards [-]."""
 
 
-def own_scheme(integrator: Integrator) -> int | None:
-    """Number of the kernel's scheme that takes this integrator's steps, None if it is written in Python only."""
-    step = type(integrator).step
-    for kind, number in ((RungeKutta853, RUNGE_KUTTA), (RadauIIA, RADAU_IIA)):
-        if isinstance(integrator, kind):
-            return number if step is kind.step else None
-    endpoint = isinstance(integrator, NewmarkFamily) and integrator.form == "endpoint"
-    return NEWMARK if endpoint and step in (NewmarkFamily.step, _hht_step()) else None
+def own_scheme(integrator: Integrator) -> Scheme:
+    """The kernel's scheme that takes this integrator's steps; `NO_SCHEME` if it is written in Python only."""
+    return next((scheme for scheme in schemes() if scheme.name == integrator.compiled_scheme), NO_SCHEME)
 
 
 def is_compiled(mechanism: Mechanism, integrator: Integrator) -> bool:
     """Whether the compiled kernel can run this scheme: machine code exists and it is one of the kernel's own."""
-    return own_scheme(integrator) is not None and mechanism.common["accelerations"].address != 0
-
-
-def _hht_step() -> Any:
-    from mbd.integrators.hht import HHT
-
-    return HHT.step
+    return own_scheme(integrator) is not NO_SCHEME and mechanism.common["accelerations"].address != 0
 
 
 def follows(equations: Equations) -> int:
@@ -99,7 +83,7 @@ class Stepper:
     ) -> None:
         self.mechanism, self.manager, self.integrator = mechanism, manager, integrator
         self.compiled = is_compiled(mechanism, integrator)
-        self.straight = self.compiled and isinstance(integrator, NewmarkFamily)  # factored in straight-line code
+        self.own = own_scheme(integrator)
         self.stabilized = integrator.stabilized
         layout = mechanism.layout
         self._places: dict[str, slice] = {}  # of arrays on their shelves
@@ -110,7 +94,8 @@ class Stepper:
             mechanism, manager, self.kernel.params, self.kernel.anchors, self.stabilized, self.kernel.dropped,
             self.kernel.sticks, self.kernel.slip,
         )  # fmt: skip
-        self.scheme = PlainScheme(integrator, self.system, manager)
+        alone = isinstance(integrator, CompiledIntegrator)
+        self.scheme: Any = KernelScheme(self.own) if alone else PlainScheme(integrator, self.system, manager)
         self.functions: list[Any] = [mechanism.common[name] for name in ("accelerations", "guards", "scales")]
         self.functions.append(None if mechanism.vector else mechanism.common["compose"])
         self.functions.append(mechanism.common["terms"] if mechanism.judged else None)
@@ -141,25 +126,18 @@ class Stepper:
             chunk=1,
             rest_speed=float(options.get("rest_speed", 1e-6)), dt=dt, until=0.0, end=float(options.get("end", 0.0)),
             alpha_m=0.0, alpha_f=0.0, beta=0.25, gamma=0.5, tolerance=1e-9, jerk=1, exact=0,
-            scheme=own_scheme(self.integrator) or NEWMARK,
             adaptive=int("allowed" in options), allowed=float(options.get("allowed", 0.0)),
             longest=float(options.get("longest", np.inf)), error_order=self.integrator.error_order(), looks=1,
+            **self.own.numbers(),
         )  # fmt: skip
         K.event_capacity = max(EVENT_CAPACITY, 2 * room_to_log(K))
-        if isinstance(self.integrator, NewmarkFamily):
-            c = self.integrator.coefficients
-            vars(K).update(
-                alpha_m=c.alpha_m, alpha_f=c.alpha_f, beta=c.beta, gamma=c.gamma, tolerance=self.integrator.tolerance,
-                jerk=int(self.integrator.starting == "jerk"), exact=int(self.integrator.exact),
-            )  # fmt: skip
-        elif isinstance(self.integrator, RadauIIA):
-            K.tolerance = self.integrator.tolerance
+        vars(K).update(self.integrator.numbers())
         return K
 
     def _arrays(self, parameters: Vector, manager: ActiveSetManager) -> None:
         v = self.kernel
         block, tables = self.mechanism.layout.size, manager.tables()
-        given = scheme_memory(v) | {name: len(table) for name, table in tables.items()}
+        given = self.own.memory(v) | {name: len(table) for name, table in tables.items()}
         given |= {"block": block, "out": max(v.n_tangent, block), "acc": self.mechanism.sizes["accelerations"]}
         lengths = TABLE.lengths(v, given)
         self.reals, self.integers, *_ = (
@@ -174,13 +152,12 @@ class Stepper:
         for name, table in tables.items():
             getattr(v, name)[: len(table)] = table
         v.shift1 = v.block[self.mechanism.layout.shift :]  # read by model code as well
-        v.tableau = tableau()
         v.params = np.ascontiguousarray(parameters, dtype=float) if len(parameters) else np.zeros(1)
         v.step = v.dt
         v.sinking[:] = np.inf
         v.was[:] = codes.UNKNOWN
-        if v.scheme == RADAU_IIA:
-            v.stages[: len(RADAU.numbers())] = RADAU.numbers()
+        for name, numbers in (*self.own.coefficients().items(), ("nodes", self.own.nodes)):
+            getattr(v, name)[: len(numbers)] = numbers
         v.unit = unit_blocks(self.mechanism)
         v.row_unit = np.array([*row_units(self.mechanism), 2], dtype=np.int64)
         if not v.n_anchors:
@@ -237,9 +214,8 @@ class Stepper:
 
     def _maker(self) -> Any:
         """What makes the code of a mode, no more of it than the scheme calls."""
-        if own_scheme(self.integrator) == RUNGE_KUTTA:
-            return self.mechanism.explicit
-        return self.mechanism.stepping if self.straight else self.mechanism.mode
+        straight = self.own.programs == "stepping"  # code for factors that machine code alone is worth
+        return getattr(self.mechanism, "mode" if straight and not self.compiled else self.own.programs)
 
     @property
     def provisional(self) -> bool:
