@@ -18,9 +18,9 @@ from mbd.testing.fuzz.scenes import STRUCTURES, scene
 from mbd.testing.fuzz.verdict import verdict
 
 SOUND = [2, 10, 12, 40, 68, 98, 112, 128, 138]
-CUT = [23, 19, 1328, 2523]
+CUT = [23, 19, 1328, 2523, 27153]
 """A cut screw with a loss; point masses that are held by cut joints and turned by motors and by what they carry; the
-counted angle of a cut joint."""
+counted angle of a cut joint; a cut weld beside one that is not."""
 BOUNCING = [4, 8164]
 """A stop that bounces until its next contact cannot be told from the last, and rests then."""
 SLIPPING = [2159]

@@ -135,11 +135,11 @@ class Bodies:
         self.closing = left
 
     def _in_order(self) -> list[Joint]:
-        """Joints whose coordinates are integrated first, then those without any, then those that are read off."""
+        """Joints of the tree first, then others without coordinates, then those whose coordinates are read off."""
 
         def rank(joint: Joint) -> int:
             if not joint.labels:
-                return 1
+                return 0 if joint.name in self.told.tree else 1
             return 0 if all(name in self.told.tree for name in joint.coordinate_names) else 2
 
         return sorted(self.model.joints, key=rank)

@@ -24,8 +24,8 @@ class Readings:
     values : reported quantities by name
     closed : by contact, whether it is closed, (n,) booleans
     parameters : values of the parameters, one number or (n,) each
-    tree : names of the coordinates of the tree, from which bodies are placed; not those of cut joints, whose
-        accelerations agree with theirs to the order of the scheme only
+    tree : names of the joints of the tree and of their coordinates, from which bodies are placed; not those of cut
+        joints, whose rates and accelerations agree with theirs to the order of the scheme only
     """
 
     time: Array
@@ -88,7 +88,8 @@ def readings(run: mbd.Trajectory, model: mbd.Model, given: Mapping[str, float], 
     """
     record, names = run.record, names_for(run, model)
     parameters = {**model.parameters, **given}
-    tree = frozenset(plan(model).coordinate_names)
+    chosen = plan(model)
+    tree = frozenset([*chosen.coordinate_names, *(joint.name for joint in chosen.edges)])
     if times is None:
         found = dict(zip(names, run.columns.at_rows(names), strict=True))
         time, source = record.time, np.arange(len(record.time))
