@@ -7,45 +7,28 @@ the addresses of arrays. They do not change while the kernel runs, which the mac
 
 from __future__ import annotations
 
-import ast
 import ctypes
 import hashlib
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
+from types import FunctionType
 from typing import Any
 
-from mbd.kernel.schemes.contract import SCHEMES, dispatch, schemes
+from mbd.kernel.schemes.contract import SCHEMES, dispatch
 
-__all__ = [
-    "MODULES",
-    "constants_of",
-    "entry",
-    "functions_of",
-    "kernel_object",
-    "kernel_text",
-    "modules",
-    "object_of",
-    "source_digest",
-]
+__all__ = ["entry", "kernel_object", "kernel_text", "object_of", "source_digest"]
 
 ENTRY = "mbd_kernel"
 
-MODULES = (
-    "candidate", "linear", "ordered", "orthogonal", "lemke", "redundancy", "saddle", "restart", "pivoting",
-    "complementarity", "blow", "impact", "settle", "singular.step_pairs", "singular.gram_norms", "singular.step_size",
-    "hermite", "significance", "guards", "pace", "control", "interior", "takeover", "refine", "locate", "switching",
-    "nonsmooth", "observe", "starting", "poles", "unresolved", "trying", "crowding", "singular.events", "events",
-    "advance",
-)  # fmt: skip
-"""Those that know no scheme."""
-
 APART = (
-    "factor", "solve", "solve_definite", "factor_ordered", "solve_ordered", "factor_pair_ordered", "solve_pair_ordered",
-    "leftovers_of_many", "parts_to_take", "locate", "handle_event", "land", "look_closer",
-    "find_passed_events", "log_passed_events", "refuses", "scheme_accept",
+    "linear.factor", "linear.solve", "linear.solve_definite", "ordered.factor_ordered", "ordered.solve_ordered",
+    "ordered_complex.factor_pair_ordered", "ordered_complex.solve_pair_ordered",
+    "singular.gram_norms.leftovers_of_many", "interior.parts_to_take", "locate.locate", "events.handle_event",
+    "events.land", "unresolved.look_closer", "singular.events.find_passed_events", "singular.events.log_passed_events",
+    "singular.events.refuses", "hooks.scheme_accept",
 )  # fmt: skip
 """Their loops keep their shape wherever they are called; where they are not, nobody carries them along.
 
@@ -58,42 +41,26 @@ def mbd_kernel(K: Kernel) -> int:
 """
 
 
-def modules() -> tuple[str, ...]:
-    """Full names of all modules with functions of the kernel: its own, and those of its schemes."""
-    named = (module for path, scheme in zip(SCHEMES, schemes(), strict=True) for module in (path, *scheme.modules))
-    return tuple(dict.fromkeys([*(f"mbd.kernel.{module}" for module in MODULES), *named]))
-
-
-def _source(name: str) -> str:
-    inside = name.removeprefix("mbd.kernel.")
-    known = Path(__file__).parent.joinpath(*inside.split(".")).with_suffix(".py")
-    path = known if inside != name else Path(str(import_module(name).__file__))
-    return path.read_text(encoding="utf-8")
-
-
 def source_digest() -> str:
-    """Hash of everything the kernel is made from."""
-    digest = hashlib.sha256()
-    beside = ("codes", "record", "records", "hooks", "roots", "expressions", "translate", "build", "schemes.contract")
-    for name in (*(f"mbd.kernel.{module}" for module in beside), *modules()):
-        digest.update(_source(name).encode())
+    """Hash of everything the kernel is made from: this folder, and schemes from elsewhere with what they import."""
+    folder, digest = Path(__file__).parent, hashlib.sha256()
+    for path in sorted({*folder.rglob("*.py"), *_beside(SCHEMES)}):
+        digest.update(f"{path.name}\n".encode() + path.read_bytes())
     return digest.hexdigest()
 
 
-def functions_of(*sources: str) -> dict[str, ast.FunctionDef]:
-    """All functions that some modules define, by name."""
-    trees = [ast.parse(source) for source in sources]
-    return {node.name: node for tree in trees for node in tree.body if isinstance(node, ast.FunctionDef)}
-
-
-def constants_of(*modules: str) -> dict[str, float]:
-    """All numbers in capitals of some modules, by name."""
-    found: dict[str, float] = {}
-    for module in modules:
-        for name, value in vars(import_module(module)).items():
-            if name.isupper() and isinstance(value, int | float):
-                found[name] = value
-    return found
+def _beside(modules: Sequence[str]) -> set[Path]:
+    """Files of modules outside of this folder, and of those whose functions they use."""
+    found: dict[str, Path] = {}
+    waiting = list(modules)
+    while waiting:
+        module = waiting.pop()
+        if module not in found and not module.startswith("mbd.kernel."):
+            found[module] = Path(str(import_module(module).__file__))
+            waiting += [
+                each.__module__ for each in vars(import_module(module)).values() if isinstance(each, FunctionType)
+            ]
+    return set(found.values())
 
 
 def object_of(text: str, level: int = 2) -> bytes:
@@ -127,10 +94,13 @@ def kernel_object() -> bytes:
 
 def kernel_text() -> str:
     """The kernel in LLVM's words."""
-    from mbd.kernel.translate import translate
+    from mbd.kernel.advance import advance
+    from mbd.kernel.llvm import llvm_text
+    from mbd.kernel.translate import Source, functions_of, translate
 
-    functions = functions_of(*map(_source, modules()), dispatch(), ENTRY_FUNCTION)
-    return translate(functions, constants_of("mbd.kernel.codes", *modules()), ENTRY, ["kernel"], APART)
+    text, names = dispatch()
+    hooks = Source("hooks", functions_of(text, ENTRY_FUNCTION), {**names, "advance": advance})
+    return llvm_text(translate(hooks, ENTRY, ["kernel"], APART, {"mbd.kernel.hooks": hooks}), ENTRY)
 
 
 @lru_cache(maxsize=1)

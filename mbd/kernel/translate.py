@@ -1,229 +1,359 @@
-"""Functions of the kernel's Python → LLVM IR text.
+"""Functions of the kernel's Python → typed trees (`mbd.kernel.tree`).
 
-The kernel uses little of Python: numbers, flat arrays, fields of `Kernel`, ``if``, ``while``, ``for … in range``, calls
-of its own functions by position. A scalar argument or result has the kind of its annotation; one annotated ``Any`` has
-the kind it is called with, and a function is translated once for each combination of these. Local names hold what all
-their assignments have in common: int and float make float.
+The kernel uses little of Python: numbers, flat arrays, fields of its records, ``if``, ``while``, ``for … in range``,
+calls of its own functions by position. A name means what it means in its module: two modules may each have a `step`.
+A scalar argument or result has the kind of its annotation; one annotated ``Any`` has the kind it is called with, and a
+function is translated once for each combination of these. Local names hold what all their assignments have in common:
+int and float make float.
 """
 
 from __future__ import annotations
 
 import ast
+import inspect
+import re
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from importlib import import_module
+from textwrap import dedent
+from types import FunctionType, ModuleType
+from typing import Any
 
 from mbd.errors import CapabilityError
-from mbd.kernel.expressions import LLVM, Callee, Expressions, Function, join, tags
+from mbd.kernel import tree
+from mbd.kernel.records import TABLE
 
-__all__ = ["translate"]
+__all__ = ["Source", "functions_of", "source_of", "translate"]
 
 KINDS = {"int": "int", "float": "real", "bool": "bool", "None": "none", "Integers": "ints", "Reals": "reals"}
-HEAD = """\
-declare double @pow(double, double) nounwind nobuiltin willreturn memory(none)
-declare double @llvm.sqrt.f64(double)
-declare double @llvm.fabs.f64(double)
-declare double @llvm.copysign.f64(double, double)
-declare i64 @llvm.abs.i64(i64, i1)
-"""
+OPERATORS = {
+    ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.FloorDiv: "//", ast.Mod: "%", ast.Pow: "**",
+    ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!=",
+}  # fmt: skip
+
+
+class Source:
+    """A module of the kernel: its title, its functions as trees of Python, and what names mean in it."""
+
+    def __init__(self, title: str, functions: Mapping[str, ast.FunctionDef], names: Mapping[str, Any]) -> None:
+        self.title, self.functions, self.names = title, functions, names
+
+
+def functions_of(*sources: str) -> dict[str, ast.FunctionDef]:
+    """All functions that some texts define, by name."""
+    trees = [ast.parse(source) for source in sources]
+    return {node.name: node for tree in trees for node in tree.body if isinstance(node, ast.FunctionDef)}
+
+
+@lru_cache(maxsize=256)
+def source_of(module: str) -> Source:
+    """A module by its full name."""
+    found = import_module(module)
+    return Source(module.removeprefix("mbd.kernel."), functions_of(inspect.getsource(found)), vars(found))
 
 
 def translate(
-    functions: Mapping[str, ast.FunctionDef],
-    constants: Mapping[str, float],
+    source: Source,
     entry: str,
     kinds: Sequence[str],
     apart: Sequence[str] = (),
-) -> str:
-    """LLVM IR of a function and all that it calls.
+    instead: Mapping[str, Source] | None = None,
+) -> list[tree.Function]:
+    """A function and all that it calls; the function itself is the last.
 
     Parameters
     ----------
-    functions, constants : by their names
-    entry, kinds : the function that is called from outside, under this name, and the kinds of its arguments
-    apart : functions that are never inlined
+    source, entry, kinds : the function that is called from outside, where it is, and the kinds of its arguments
+    apart : functions that are never inlined, as ``module.function``
+    instead : sources in place of modules, by their full names
     """
-    return _Module(functions, constants, apart).text(entry, tuple(kinds))
+    translation = _Translation(apart, instead or {})
+    translation.callee(source, entry, tuple(kinds))
+    return translation.found
 
 
-class _Module:
-    def __init__(
-        self, functions: Mapping[str, ast.FunctionDef], constants: Mapping[str, float], apart: Sequence[str]
-    ) -> None:
-        self.functions, self.constants, self.apart = functions, constants, apart
-        self.done: dict[tuple[str, tuple[str, ...]], Function] = {}
-        self.texts: list[str] = []
+class _Translation:
+    def __init__(self, apart: Sequence[str], instead: Mapping[str, Source]) -> None:
+        self.apart, self.instead = apart, instead
+        self.done: dict[str, tree.Function] = {}
+        self.found: list[tree.Function] = []
         self.open: list[str] = []
 
-    def text(self, entry: str, kinds: tuple[str, ...]) -> str:
-        symbol, _, _ = self.callee(entry, kinds)
-        whole = "\n".join([HEAD, tags(), *self.texts])
-        return whole.replace(f"internal i64 @{symbol}(", f"i64 @{entry}(")
-
-    def callee(self, name: str, given: tuple[str, ...]) -> Function:
-        """The function of a name for arguments of the given kinds, translated when it is first asked for."""
-        if name not in self.functions:
+    def callee(self, source: Source, name: str, given: tuple[str, ...]) -> tree.Function:
+        """What a name means in a module, for arguments of the given kinds, translated when it is first asked for."""
+        meant = source.names.get(name)
+        if name not in source.functions and isinstance(meant, FunctionType):
+            source, name = self.instead.get(meant.__module__) or source_of(meant.__module__), meant.__name__
+        if name not in source.functions:
             raise CapabilityError(f"no function {name!r} in the kernel")
-        node = self.functions[name]
+        node, title = source.functions[name], f"{source.title}.{name}"
         notes = [ast.unparse(argument.annotation) if argument.annotation else "Any" for argument in node.args.args]
         if len(notes) != len(given):
             raise CapabilityError(f"{name!r} takes {len(notes)} arguments and is given {len(given)}")
-        kinds = tuple(KINDS.get(note, kind) for note, kind in zip(notes, given, strict=True))
-        if (name, kinds) not in self.done:
-            if name in self.open:
+        kinds = [KINDS.get(note, kind) for note, kind in zip(notes, given, strict=True)]
+        symbol = ".".join([title, *kinds])
+        if symbol not in self.done:
+            if title in self.open:
                 raise CapabilityError(f"{name!r} calls itself")
-            self.open.append(name)
-            self.done[name, kinds] = self._translated(node, kinds)
+            self.open.append(title)
+            arguments = dict(zip((argument.arg for argument in node.args.args), kinds, strict=True))
+            result = KINDS.get(ast.unparse(node.returns), "") if node.returns else ""
+            self.done[symbol] = self._translated(
+                source, node, tree.Function(symbol, arguments, result, title in self.apart)
+            )
+            self.found.append(self.done[symbol])
             self.open.pop()
-        return self.done[name, kinds]
+        return self.done[symbol]
 
-    def _translated(self, node: ast.FunctionDef, kinds: tuple[str, ...]) -> Function:
-        result = KINDS.get(ast.unparse(node.returns), "") if node.returns else ""
-        arguments = dict(zip((argument.arg for argument in node.args.args), kinds, strict=True))
-        names: dict[str, str] = dict(arguments)
-        while True:  # until no assignment widens a name any more
-            known = dict(names)
-            body = _Body(names, self.constants, self.callee, result)
-            body.function(node, arguments)
-            if names == known:
-                break
-        symbol = f"{node.name}.{'.'.join(kinds)}"
-        given = ", ".join(f"{LLVM[kind]} %in.{name}" for name, kind in arguments.items())
-        apart = " noinline" if node.name in self.apart else ""
-        lines = [f"define internal {LLVM[body.result]} @{symbol}({given}) nounwind{apart} align 64 {{", "entry:"]
-        lines += [f"%own.{name} = alloca {LLVM[kind]}" for name, kind in names.items()]
-        self.texts.append("\n".join([*lines, *body.slots, *body.lines, "}"]))
-        return symbol, kinds, body.result
+    def _translated(self, source: Source, node: ast.FunctionDef, function: tree.Function) -> tree.Function:
+        function.locals = dict(function.arguments)
+        stated, known = function.result, None
+        while known != function.locals:  # until no assignment widens a name any more
+            known, function.result = dict(function.locals), stated
+            function.body = _Body(source, function, self).block(node.body)
+            function.result = function.result or "none"
+        return function
 
 
-class _Body(Expressions):
-    """Statements of one function."""
+class _Body:
+    """Statements and expressions of one function; its local names widen as it is read."""
 
-    def __init__(self, names: dict[str, str], constants: Mapping[str, float], callee: Callee, result: str) -> None:
-        super().__init__(names, constants, callee)
-        self.result = result
-        self.loops: list[tuple[str, str]] = []
+    def __init__(self, source: Source, function: tree.Function, translation: _Translation) -> None:
+        self.source, self.function, self.translation = source, function, translation
 
-    def function(self, node: ast.FunctionDef, arguments: Mapping[str, str]) -> None:
-        """The whole body, its arguments in places like local names."""
-        for name, kind in arguments.items():
-            self.lines.append(f"store {LLVM[kind]} %in.{name}, ptr %own.{name}")
-        self.block(node.body)
-        self.result = self.result or "none"
-        self.lines.append("ret void" if self.result == "none" else "unreachable")
-
-    def block(self, statements: Sequence[ast.stmt]) -> None:
+    # statements -----------------------------------------------------------------------------------------------------
+    def block(self, statements: Sequence[ast.stmt]) -> list[tree.Statement]:
+        found: list[tree.Statement] = []
         for statement in statements:
             try:
-                getattr(self, f"_{type(statement).__name__}", self._unknown)(statement)
+                found += getattr(self, f"_{type(statement).__name__}", self._unknown)(statement)
             except CapabilityError as error:
                 if "line" in str(error):
                     raise
                 raise CapabilityError(f"line {statement.lineno}: {error}") from None
+        return found
 
-    def _unknown(self, node: ast.stmt) -> None:
+    def _unknown(self, node: ast.stmt) -> list[tree.Statement]:
         raise CapabilityError(f"{ast.unparse(node)!r} is no statement that the kernel may use")
 
-    def _Pass(self, node: ast.Pass) -> None:
-        pass
+    def _Pass(self, node: ast.Pass) -> list[tree.Statement]:
+        return []
 
-    def _Expr(self, node: ast.Expr) -> None:
-        if not isinstance(node.value, ast.Constant):  # a docstring
-            self.value(node.value)
+    def _Expr(self, node: ast.Expr) -> list[tree.Statement]:
+        return [] if isinstance(node.value, ast.Constant) else [tree.Do(self.value(node.value))]  # a docstring
 
-    def _Assign(self, node: ast.Assign) -> None:
+    def _Assign(self, node: ast.Assign) -> list[tree.Statement]:
         value = self.value(node.value)
-        for target in node.targets:
-            self.assign(target, value)
+        targets = tuple(self.target(target, value.kind) for target in node.targets)
+        for target in targets:
+            _converts(value.kind, target.kind)
+        return [tree.Assign(targets, value)]
 
-    def assign(self, target: ast.expr, value: tuple[str, str]) -> None:
-        if isinstance(target, ast.Subscript | ast.Attribute):
-            place, kind, what = self.element(target)
-            self.store(self.cast(value, kind), place, kind, what)
-        elif isinstance(target, ast.Name):
-            kind = self.names[target.id] = join(self.names.get(target.id, value[1]), value[1])
-            self.lines.append(f"store {LLVM[kind]} {self.cast(value, kind)}, ptr %own.{target.id}")
-        else:
-            raise CapabilityError(f"{ast.unparse(target)!r} cannot be assigned")
+    def target(self, node: ast.expr, kind: str) -> tree.Local | tree.Element:
+        """What is assigned to; a local name widens."""
+        if isinstance(node, ast.Subscript | ast.Attribute):
+            return self.element(node)
+        if not isinstance(node, ast.Name):
+            raise CapabilityError(f"{ast.unparse(node)!r} cannot be assigned")
+        names = self.function.locals
+        names[node.id] = tree.joined(names.get(node.id, kind), kind)
+        return tree.Local(node.id, names[node.id])
 
-    def _AugAssign(self, node: ast.AugAssign) -> None:
-        if isinstance(node.target, ast.Subscript | ast.Attribute):
-            place, kind, what = self.element(node.target)
-            value = self.operation(node.op, (self.load(place, kind, what), kind), self.value(node.value))
-            self.store(self.cast(value, kind), place, kind, what)
-        else:
-            own = ast.Name(ast.unparse(node.target), ast.Load())
-            self.assign(node.target, self.operation(node.op, self.value(own), self.value(node.value)))
+    def _AugAssign(self, node: ast.AugAssign) -> list[tree.Statement]:
+        if isinstance(node.target, ast.Name):
+            value = self.operation(node.op, self._Name(node.target), self.value(node.value))
+            return [tree.Assign((self.target(node.target, value.kind),), value)]
+        target = self.element(node.target)
+        changed = self.operation(node.op, target, self.value(node.value))
+        return [tree.Update(target, changed.operator, changed.right, changed.kind)]
 
-    def _Return(self, node: ast.Return) -> None:
-        if node.value is None:
-            self.lines.append("ret void")
-        else:
-            value = self.value(node.value)
-            self.result = self.result or value[1]
-            self.lines.append(f"ret {LLVM[self.result]} {self.cast(value, self.result)}")
-        self.begin(self.label())  # what follows is never reached
+    def _Return(self, node: ast.Return) -> list[tree.Statement]:
+        value = None if node.value is None else self.value(node.value)
+        if value is not None:
+            self.function.result = self.function.result or value.kind
+            _converts(value.kind, self.function.result)
+        return [tree.Return(value)]
 
-    def _If(self, node: ast.If) -> None:
-        yes, no, end = self.label(), self.label(), self.label()
-        self.branch(self.test(node.test), yes, no)
-        for label, statements in ((yes, node.body), (no, node.orelse)):
-            self.begin(label)
-            self.block(statements)
-            self.go(end)
-        self.begin(end)
+    def _If(self, node: ast.If) -> list[tree.Statement]:
+        return [tree.If(self.test(node.test), self.block(node.body), self.block(node.orelse))]
 
-    def _While(self, node: ast.While) -> None:
+    def _While(self, node: ast.While) -> list[tree.Statement]:
         if node.orelse:
             self._unknown(node)
-        again, body, end = self.label(), self.label(), self.label()
-        self.go(again)
-        self.begin(again)
-        self.branch(self.test(node.test), body, end)
-        self._turn(body, again, end, node.body)
+        return [tree.While(self.test(node.test), self.block(node.body))]
 
-    def _For(self, node: ast.For) -> None:
-        """A loop over a range, whose bounds are found once."""
+    def _For(self, node: ast.For) -> list[tree.Statement]:
         call = node.iter
         plain = isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id == "range"
         if not plain or node.orelse:
             raise CapabilityError(f"a loop over {ast.unparse(node.iter)!r}, not over a range")
         assert isinstance(call, ast.Call)
-        bounds = [self.as_kind(bound, "int") for bound in call.args]
-        first, last = ("0", bounds[0]) if len(bounds) == 1 else bounds[:2]
+        bounds = [self.value(bound) for bound in call.args]
+        first, last = (tree.Number(0, "int"), bounds[0]) if len(bounds) == 1 else (bounds[0], bounds[1])
         try:
             step = int(ast.literal_eval(call.args[2])) if len(bounds) == 3 else 1
         except ValueError:
             raise CapabilityError(f"{ast.unparse(call)!r}: the step of a range is a number") from None
-        place = self.slot("int")
-        again, body, more, end = self.label(), self.label(), self.label(), self.label()
-        self.lines.append(f"store i64 {first}, ptr {place}")
-        self.go(again)
-        self.begin(again)
-        now = self.emit(f"load i64, ptr {place}")
-        self.branch(self.emit(f"icmp {'slt' if step > 0 else 'sgt'} i64 {now}, {last}"), body, end)
-        self.begin(body)
-        self.assign(node.target, (now, "int"))
-        inner = self.label()
-        self.go(inner)
-        self._turn(inner, more, end, node.body, leave_open=True)
-        self.begin(more)
-        self.lines.append(f"store i64 {self.emit(f'add nsw i64 {now}, {step}')}, ptr {place}")
-        self.go(again)
-        self.begin(end)
+        target = self.target(node.target, "int")
+        if not isinstance(target, tree.Local):
+            raise CapabilityError(f"{ast.unparse(node.target)!r} cannot count a loop")
+        return [tree.Range(target, first, last, step, self.block(node.body))]
 
-    def _turn(self, body: str, more: str, end: str, statements: Sequence[ast.stmt], leave_open: bool = False) -> None:
-        """The body of a loop; `continue` goes to `more`, `break` to `end`."""
-        self.begin(body)
-        self.loops.append((more, end))
-        self.block(statements)
-        self.loops.pop()
-        self.go(more)
-        if not leave_open:
-            self.begin(end)
+    def _Continue(self, node: ast.Continue) -> list[tree.Statement]:
+        return [tree.Continue()]
 
-    def _Continue(self, node: ast.Continue) -> None:
-        self.go(self.loops[-1][0])
-        self.begin(self.label())
+    def _Break(self, node: ast.Break) -> list[tree.Statement]:
+        return [tree.Break()]
 
-    def _Break(self, node: ast.Break) -> None:
-        self.go(self.loops[-1][1])
-        self.begin(self.label())
+    # expressions ----------------------------------------------------------------------------------------------------
+    def value(self, node: ast.expr) -> tree.Expression:
+        found = getattr(self, f"_{type(node).__name__}", None)
+        if found is None or not isinstance(node, ast.expr):
+            raise CapabilityError(f"{ast.unparse(node)!r} is no expression that the kernel may use")
+        return found(node)  # type: ignore[no-any-return]
+
+    def test(self, node: ast.expr) -> tree.Expression:
+        """The truth of an expression, in any kind of number."""
+        value = self.value(node)
+        _converts(value.kind, "bool")
+        return value
+
+    def _Constant(self, node: ast.Constant) -> tree.Number:
+        return _number(node.value)
+
+    def _Name(self, node: ast.Name) -> tree.Expression:
+        if node.id in self.function.locals:
+            return tree.Local(node.id, self.function.locals[node.id])
+        if node.id.isupper() and isinstance(self.source.names.get(node.id), int | float):
+            return _number(self.source.names[node.id])
+        raise CapabilityError(f"{node.id!r} has no value here")
+
+    def _Attribute(self, node: ast.Attribute) -> tree.Expression:
+        if node.attr in TABLE.places:
+            return self.element(node)
+        if node.attr in TABLE.formulas:
+            return self.value(_formula(node.attr, node.value))
+        record = self.value(node.value)
+        if record.kind != "kernel" or node.attr not in TABLE.kinds:
+            raise CapabilityError(f"{ast.unparse(node)!r} is no field of the kernel")
+        return tree.Field(record, node.attr, TABLE.kinds[node.attr])
+
+    def element(self, node: ast.expr) -> tree.Element:
+        """An element of an array, or a number that a record names by its place in one."""
+        if isinstance(node, ast.Attribute):
+            if node.attr not in TABLE.places:
+                raise CapabilityError(f"{ast.unparse(node)!r} cannot be assigned")
+            array, index = TABLE.places[node.attr]
+            node = ast.Subscript(ast.Attribute(node.value, array, ast.Load()), ast.Constant(index), ast.Load())
+        if not isinstance(node, ast.Subscript):
+            raise CapabilityError(f"{ast.unparse(node)!r} cannot be assigned")
+        base = self.value(node.value)
+        if base.kind not in ("ints", "reals"):
+            raise CapabilityError(f"{ast.unparse(node.value)!r} is no array")
+        own = base.kind[:-1]
+        return tree.Element(base, self.value(node.slice), own, base.name if isinstance(base, tree.Field) else own)
+
+    def _Subscript(self, node: ast.Subscript) -> tree.Element:
+        return self.element(node)
+
+    def _BinOp(self, node: ast.BinOp) -> tree.Operation:
+        return self.operation(node.op, self.value(node.left), self.value(node.right))
+
+    def operation(self, operator: ast.operator, left: tree.Expression, right: tree.Expression) -> tree.Operation:
+        """A binary operation."""
+        sign = OPERATORS.get(type(operator), "")
+        if sign == "**":
+            return _power(left, right)
+        kind = "real" if sign == "/" else tree.joined(tree.joined(left.kind, right.kind), "int")
+        if not sign or (sign == "//" and kind != "int"):
+            raise CapabilityError(f"no operator {type(operator).__name__} for values of kind {kind!r}")
+        return tree.Operation(sign, left, right, kind)
+
+    def _UnaryOp(self, node: ast.UnaryOp) -> tree.Expression:
+        if isinstance(node.op, ast.Not):
+            return tree.Unary("not", self.test(node.operand), "bool")
+        value = self.value(node.operand)
+        if not isinstance(node.op, ast.USub) or value.kind not in ("int", "real"):
+            raise CapabilityError(f"{ast.unparse(node)!r} is no expression that the kernel may use")
+        return tree.Unary("-", value, value.kind)
+
+    def _Compare(self, node: ast.Compare) -> tree.Compare:
+        first = last = self.value(node.left)
+        rest = []
+        for operator, operand in zip(node.ops, node.comparators, strict=True):
+            right, sign = self.value(operand), OPERATORS.get(type(operator), "")
+            kind = tree.joined(last.kind, right.kind)
+            if not sign or kind not in ("bool", "int", "real"):
+                raise CapabilityError(f"no comparison {type(operator).__name__} for values of kind {kind!r}")
+            rest.append((sign, right))
+            last = right
+        return tree.Compare(first, tuple(rest))
+
+    def _BoolOp(self, node: ast.BoolOp) -> tree.Junction:
+        return tree.Junction(isinstance(node.op, ast.And), tuple(self.test(operand) for operand in node.values))
+
+    def _IfExp(self, node: ast.IfExp) -> tree.Choice:
+        test, yes, no = self.test(node.test), self.value(node.body), self.value(node.orelse)
+        return tree.Choice(test, yes, no, tree.joined(yes.kind, no.kind))
+
+    def _Call(self, node: ast.Call) -> tree.Expression:
+        function, source = node.func, self.source
+        if isinstance(function, ast.Attribute) and isinstance(function.value, ast.Name):
+            module = self.source.names.get(function.value.id)
+            if isinstance(module, ModuleType):
+                function, source = ast.Name(function.attr, ast.Load()), source_of(module.__name__)
+        if not isinstance(function, ast.Name) or node.keywords:
+            raise CapabilityError(f"{ast.unparse(node)!r}: only functions of the kernel, without names of arguments")
+        name = function.id
+        values = tuple(self.value(argument) for argument in node.args)
+        kinds = tuple(value.kind for value in values)
+        if name in ("float", "int", "bool"):
+            return tree.Convert(values[0], KINDS[name])
+        if name in ("max", "min"):
+            return tree.Extreme(
+                ">" if name == "max" else "<", values, tree.joined("bool", *kinds) if len(kinds) else "bool"
+            )
+        if name == "abs":
+            return tree.Unary("abs", values[0], "real" if kinds[0] == "real" else "int")
+        if name == "sqrt":
+            return tree.Unary("sqrt", values[0], "real")
+        if name == "call":
+            return tree.Evaluate(values[0], values[1], None, values[2])
+        if name == "call_on":
+            return tree.Evaluate(values[0], values[1], values[2], values[3])
+        called = self.translation.callee(source, name, kinds)
+        for kind, needed in zip(kinds, called.arguments.values(), strict=True):
+            _converts(kind, needed)
+        return tree.Call(called, values, called.result)
+
+
+def _converts(kind: str, needed: str) -> None:
+    """Whether a value of one kind may stand where another is needed."""
+    numbers = ("bool", "int", "real")
+    if kind != needed and (kind not in numbers or needed not in numbers):
+        raise CapabilityError(f"a value of kind {kind!r} where one of kind {needed!r} is needed")
+
+
+def _number(value: object) -> tree.Number:
+    for kind, name in ((bool, "bool"), (int, "int"), (float, "real")):
+        if isinstance(value, kind):
+            return tree.Number(value, name)
+    raise CapabilityError(f"{value!r} is no number")
+
+
+def _power(left: tree.Expression, right: tree.Expression) -> tree.Operation:
+    if left == tree.Number(2, "int") and right.kind == "int":
+        return tree.Operation("<<", tree.Number(1, "int"), right, "int")
+    if "real" not in (left.kind, right.kind):
+        raise CapabilityError("a power of integers, other than of 2")
+    if right == tree.Number(0.5, "real"):
+        raise CapabilityError("x ** 0.5 is a root or a power by the level of optimization: write sqrt(x)")
+    return tree.Operation("**", left, right, "real")
+
+
+def _formula(name: str, record: ast.expr) -> ast.expr:
+    """The expression that a property of the records returns, of the fields of `record`."""
+    parsed = ast.parse(dedent(inspect.getsource(TABLE.formulas[name])))
+    own = next(node for node in ast.walk(parsed) if isinstance(node, ast.Return)).value
+    assert own is not None
+    return ast.parse(re.sub(r"\bself\b", ast.unparse(record), ast.unparse(own)), mode="eval").body

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import ctypes
-import inspect
 import itertools
 from functools import lru_cache
 
 import numpy as np
 
 from mbd.compile.llvm import load_object
-from mbd.kernel import lemke as lemke_module, linear
-from mbd.kernel.build import constants_of, functions_of, object_of
+from mbd.kernel.build import object_of
 from mbd.kernel.lemke import lemke, lemke_places
-from mbd.kernel.translate import translate
+from mbd.kernel.llvm import llvm_text
+from mbd.kernel.translate import source_of, translate
 
 __all__ = ["compiled", "enumerated", "is_solution", "root", "solved"]
 
@@ -56,9 +55,8 @@ def root(rng, n, rank):
 @lru_cache(maxsize=1)
 def compiled():
     """The same functions as machine code, as in the kernel."""
-    functions = functions_of(*(inspect.getsource(module) for module in (linear, lemke_module)))
     kinds = ["reals", "int", "reals", "reals", "reals", "ints", "int"]
-    text = translate(functions, constants_of("linear", "lemke"), "lemke", kinds)
+    text = llvm_text(translate(source_of("mbd.kernel.lemke"), "lemke", kinds), "lemke")
     address, number = ctypes.c_void_p, ctypes.c_int64
     function = ctypes.CFUNCTYPE(number, address, number, address, address, address, address, number)(
         load_object(object_of(text), "lemke")

@@ -1,24 +1,40 @@
-"""The compiled kernel has one namespace: a name that two of its modules give to different things would be a trap."""
+"""What the records of the kernel declare is what its functions and its arrays go by."""
 
 from __future__ import annotations
 
-from collections import defaultdict
-from importlib import import_module
-from types import FunctionType
+import subprocess
+import sys
 
-from mbd.kernel.build import modules
+import pytest
+
+import mbd
+from mbd.compile.mechanisms import mechanism_of
+from mbd.kernel.active_set import ActiveSetManager
+from mbd.kernel.records import TABLE, Kernel
+from mbd.simulation.run.stepper import Stepper
+from tests.simulation.mechanisms import ball
 
 
-def test_no_two_modules_of_the_kernel_share_a_name():
-    owners = defaultdict(set)
-    for module in modules():
-        source = import_module(module)
-        imported = {name for name in vars(import_module("mbd.kernel.codes")) if name.isupper()}
-        for name, value in vars(source).items():
-            own = isinstance(value, FunctionType) and value.__module__ == source.__name__
-            number = name.isupper() and name not in imported and isinstance(value, int | float)
-            if own or number:
-                owners[name].add((module, value if number else id(value)))
-    functions = {name: places for name, places in owners.items() if len({value for _, value in places}) > 1}
-    assert not functions
-    assert len(owners) > 100
+def test_every_declared_field_has_a_value_in_a_run():
+    mechanism = mechanism_of(ball())
+    manager = ActiveSetManager(mechanism.equations)
+    K = Stepper(mechanism, manager, mbd.HHT(), mechanism.parameters(), 1e-3, {"capacity": 8}).kernel
+    assert {*TABLE.kinds} - {*TABLE.places} <= {*vars(K)}
+    assert all(len(getattr(K, array)) > index for array, index in TABLE.places.values())
+    assert len(set(TABLE.places.values())) == len(TABLE.places)
+
+
+def test_a_number_is_read_and_written_at_its_place():
+    K = Kernel(clock=[0.0] * TABLE.length_of("clock"))
+    for name, (array, index) in TABLE.places.items():
+        if array == "clock":
+            setattr(K, name, 1.0 + index)
+            assert K.clock[index] == getattr(K, name) == 1.0 + index
+
+
+@pytest.mark.slow
+def test_a_wrong_name_of_a_field_is_an_error_for_mypy(tmp_path):
+    script = tmp_path / "wrong.py"
+    script.write_text("from mbd.kernel.records import Kernel\n\ndef f(K: Kernel) -> int:\n    return K.n_rws\n")
+    told = subprocess.run([sys.executable, "-m", "mypy", "--strict", str(script)], capture_output=True, text=True)
+    assert '"Kernel" has no attribute "n_rws"' in told.stdout

@@ -12,9 +12,10 @@ from hypothesis import given, settings, strategies as st
 
 from mbd.compile.llvm import load_object
 from mbd.errors import CapabilityError
-from mbd.kernel.build import functions_of, object_of
+from mbd.kernel.build import object_of
+from mbd.kernel.llvm import llvm_text
 from mbd.kernel.roots import sqrt
-from mbd.kernel.translate import translate
+from mbd.kernel.translate import Source, functions_of, source_of, translate
 
 reals = st.lists(st.floats(-1e3, 1e3) | st.sampled_from([0.0, -0.0, np.inf, -np.inf, np.nan]), min_size=4, max_size=4)
 integers = st.lists(st.integers(-9, 9), min_size=4, max_size=4)
@@ -127,9 +128,8 @@ CASES = (arithmetic, rounding_down, extremes, roots, decisions, loops, widening)
 def machine_code(function, level):
     functions = functions_of(*(inspect.getsource(one) for one in (function, inner, whole)))
     name = f"translated_{function.__name__}_{level}"
-    functions[name] = functions.pop(function.__name__)
-    functions[name].name = name
-    text = translate(functions, {"HALF": HALF, "MOST": MOST}, name, ["reals", "ints"])
+    source = Source("test", functions, {"HALF": HALF, "MOST": MOST})
+    text = llvm_text(translate(source, function.__name__, ["reals", "ints"]), name)
     return ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p)(load_object(object_of(text, level), name))
 
 
@@ -167,4 +167,23 @@ def test_the_same_bits_as_python_at_every_level(function, level, x, k):
 )
 def test_what_the_kernel_may_not_use_is_named(source, message):
     with pytest.raises(CapabilityError, match=message):
-        translate(functions_of(source), {}, "f", ["reals"])
+        translate(Source("test", functions_of(source), {}), "f", ["reals"])
+
+
+def test_a_name_means_what_it_means_in_its_module(tmp_path, monkeypatch):
+    """Two modules with a `step` and a LIMIT each: a call goes to the one that was imported, under any name."""
+    (tmp_path / "one_scheme.py").write_text("LIMIT = 3.0\n\ndef step(x):\n    x[0] += LIMIT\n    return 1\n")
+    (tmp_path / "other_scheme.py").write_text("LIMIT = 5.0\n\ndef step(x):\n    x[1] += LIMIT\n    return 2\n")
+    (tmp_path / "both_schemes.py").write_text(
+        "import one_scheme\nfrom other_scheme import step as other\n\n"
+        "def step(x):\n    return 10 * one_scheme.step(x) + other(x)\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    functions = translate(source_of("both_schemes"), "step", ["reals"])
+    assert [function.symbol for function in functions] == [
+        "one_scheme.step.reals", "other_scheme.step.reals", "both_schemes.step.reals"
+    ]  # fmt: skip
+    x = np.zeros(2)
+    run = load_object(object_of(llvm_text(functions, "both_steps")), "both_steps")
+    assert ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)(run)(x.ctypes.data) == 12
+    np.testing.assert_array_equal(x, [3.0, 5.0])

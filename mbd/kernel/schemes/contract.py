@@ -5,7 +5,8 @@ it (`mbd.integrators.base.Integrator.scheme`) and gives its parameters (`numbers
 is: its abilities are numbers of the kernel's record, and its functions are called as ``scheme_start``, ``scheme_step``,
 ``scheme_accept``, ``scheme_resume`` and ``scheme_error`` (`mbd.kernel.hooks`), which `dispatch` makes.
 
-The functions are compiled: they use what `mbd.kernel.translate` knows of Python, and their names are theirs alone.
+The functions are compiled with all that they call, from any module: they use what `mbd.kernel.translate` knows of
+Python.
 """
 
 from __future__ import annotations
@@ -79,7 +80,6 @@ class Scheme:
     resume : ``resume(K, h) → status``: a start with the rates in K.jump and the multipliers in K.impulse that keeps
         what the scheme averages; only of schemes that set K.near_singular to `LEFT`
     error : ``error(K, h)``: K.error of the candidate; None: steps have left it there
-    modules : of which the functions of the entry need functions of their own, by the full name
     abilities : see `Abilities`
     nodes : of a step, in parts of it, but for its end
     programs : kind of the model code that steps call: 'mode', 'stepping' with factors in straight-line code, 'explicit'
@@ -94,7 +94,6 @@ class Scheme:
     accept: Callable[[Kernel, float], None]
     resume: Callable[[Kernel, float], int] | None = None
     error: Callable[[Kernel, float], None] | None = None
-    modules: tuple[str, ...] = ()
     abilities: Abilities = Abilities()
     nodes: tuple[float, ...] = ()
     programs: Literal["mode", "stepping", "explicit"] = "mode"
@@ -142,12 +141,16 @@ HOOKS = {
 """Arguments and results of the functions of an entry."""
 
 
-def dispatch() -> str:
-    """Python text of the kernel's ``scheme_step`` and its neighbours, which call those of the scheme ``K.scheme``."""
-    lines = []
+def dispatch() -> tuple[str, dict[str, Any]]:
+    """Python text of the kernel's ``scheme_step`` and its neighbours, and what the names in it mean.
+
+    Each calls the function of the scheme ``K.scheme``; which one is not asked for that all schemes share or one has.
+    """
+    lines, names = list[str](), dict[str, Any]()
     for hook, (arguments, result) in HOOKS.items():
         given = ", ".join(argument.partition(":")[0] for argument in arguments.split(", "))
-        own = [(k, getattr(each, hook).__name__) for k, each in enumerate(schemes()) if getattr(each, hook)]
+        own = [(k, f"{hook}_{k}") for k, each in enumerate(schemes()) if getattr(each, hook)]
+        names |= {alias: getattr(schemes()[k], hook) for k, alias in own}
         lines.append(f"def scheme_{hook}({arguments}) -> {result}:")
         answer = "return " if result == "int" else ""
         last = own.pop(0) if result == "int" or len(own) == len(schemes()) else None  # who has none is never asked
@@ -157,4 +160,4 @@ def dispatch() -> str:
             indent = "    else:\n        " if own else "    "
             lines.append(f"{indent}{answer}{last[1]}({given})")
         lines.append("")
-    return "\n".join(lines)
+    return "\n".join(lines), names

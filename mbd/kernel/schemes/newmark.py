@@ -150,9 +150,5 @@ def newmark_error(K: Kernel, h: float) -> None:
 
 SCHEME = Scheme(
     "newmark", newmark_start, newmark_step, newmark_accept, newmark_resume, newmark_error,
-    modules=tuple(
-        f"mbd.kernel.{name}"
-        for name in ("schemes.iteration", "schemes.memory", "schemes.newton", "singular.newmark_step")
-    ),
     programs="stepping",
 )  # fmt: skip

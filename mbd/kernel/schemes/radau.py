@@ -428,13 +428,6 @@ def radau_memory(K: Kernel) -> dict[str, int]:
 
 SCHEME = Scheme(
     "radau", radau_start, radau_step, radau_accept,
-    modules=tuple(
-        f"mbd.kernel.{name}"
-        for name in (
-            "schemes.iteration", "schemes.memory", "schemes.stages", "schemes.runge_kutta", "singular.stages",
-            "complex_linear", "ordered_complex",
-        )
-    ),
     abilities=Abilities(
         estimates=1, singular_size=1, stretches=1, look_twice=0.25, most_growth=5.0,
         middle=0.4,  # between the nodes at (4 ± √6)/10

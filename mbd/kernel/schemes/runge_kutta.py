@@ -336,7 +336,6 @@ def runge_kutta_accept(K: Kernel, h: float) -> None:
 
 SCHEME = Scheme(
     "runge-kutta", runge_kutta_start, runge_kutta_step, runge_kutta_accept,
-    modules=("mbd.kernel.schemes.memory", "mbd.kernel.uneven"),
     abilities=Abilities(
         explicit=1, estimates=1, singular_size=1, look_twice=0.1, most_growth=5.0,
         middle=0.46666666666666667,  # between the nodes at 1/3 and 3/5
