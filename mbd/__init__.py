@@ -161,23 +161,25 @@ _HOME = {name: module for module, names in _HOMES.items() for name in names.spli
 __all__ = ["__version__", *_HOME]
 
 
-def __getattr__(name: str) -> Any:
-    """A public name, from its module (PEP 562)."""
-    import importlib
+if not TYPE_CHECKING:  # type checkers know the names above, and that there are no others
 
-    if name == "testing":  # the law kit, a module of its own
-        return importlib.import_module("mbd.testing")
-    if name in _HOME:
-        value = globals()[name] = getattr(importlib.import_module(_HOME[name]), name)
-        return value
-    if name.startswith("__"):
-        raise AttributeError(f"module 'mbd' has no attribute {name!r}")
-    import difflib
+    def __getattr__(name: str) -> Any:
+        """A public name, from its module (PEP 562)."""
+        import importlib
 
-    close = difflib.get_close_matches(name, _HOME, n=3, cutoff=0.6)
-    known = "it has Model, Revolute, assemble, simulate and others, which dir(mbd) lists"
-    guess = f"did you mean {' or '.join(repr(one) for one in close)}?" if close else known
-    raise AttributeError(f"mbd has no {name!r}; {guess}")
+        if name == "testing":  # the law kit, a module of its own
+            return importlib.import_module("mbd.testing")
+        if name in _HOME:
+            value = globals()[name] = getattr(importlib.import_module(_HOME[name]), name)
+            return value
+        if name.startswith("__"):
+            raise AttributeError(f"module 'mbd' has no attribute {name!r}")
+        import difflib
+
+        close = difflib.get_close_matches(name, _HOME, n=3, cutoff=0.6)
+        known = "it has Model, Revolute, assemble, simulate and others, which dir(mbd) lists"
+        guess = f"did you mean {' or '.join(repr(one) for one in close)}?" if close else known
+        raise AttributeError(f"mbd has no {name!r}; {guess}")
 
 
 def __dir__() -> list[str]:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from mbd.bodies.domains import ParameterCheck
 from mbd.equations.coordinate_scope import identifier
+from mbd.equations.cost import Cost
 from mbd.equations.energies import Lowering, assembled
 from mbd.equations.energy_description import EnergyDescription
 from mbd.equations.equations import Equations
@@ -94,7 +94,7 @@ class Lagrangian(EnergyDescription):
             said += f"\n{of(self)}"
         return said
 
-    def cost(self) -> Any:
+    def cost(self) -> Cost:
         """Operations of the equations, and of each effect."""
         from mbd.equations.cost import cost
 

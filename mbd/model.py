@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 from mbd.bodies.domains import ParameterCheck
 from mbd.description import Description
+
+if TYPE_CHECKING:
+    from mbd.equations.cost import Cost
 
 __all__ = ["Model"]
 
@@ -76,7 +79,7 @@ class Model(Description):
 
         return report(derive(self), latex)
 
-    def cost(self) -> Any:
+    def cost(self) -> Cost:
         """Operations of each effect."""
         from mbd.equations.cost import cost
 

@@ -69,7 +69,7 @@ class Trajectory:
         """`time`, under the name of ``scipy.integrate.solve_ivp``."""
         return self.record.time
 
-    def __getitem__(self, name: str) -> Any:
+    def __getitem__(self, name: str) -> Vector:
         """A named quantity at every stored row: (R,), or (R, 3) for a vector."""
         if not isinstance(name, str):
             raise TrajectoryError(

@@ -101,3 +101,9 @@ def test_a_wrong_name_offers_the_nearest():
         _ = mbd.Revolut
     with pytest.raises(AttributeError, match="Model"):
         _ = mbd.zzzz
+
+
+def test_type_checkers_see_no_names_but_the_listed():
+    tree = ast.parse(Path(mbd.__file__).read_text(encoding="utf-8"))
+    dynamic = [node for node in tree.body if isinstance(node, ast.FunctionDef) and node.name == "__getattr__"]
+    assert not dynamic, "a __getattr__ that type checkers see makes every wrong name right"

@@ -141,7 +141,7 @@ def judge_knife_edge(integrator: Any) -> Outcome:
             Figure("error of the multiplier over what is allowed, at every dt [-]", max(forces), 1.0),
             Figure(
                 "error of the farthest place downhill [m]",
-                abs(np.max(run["body.x"]) - lowest.value),
+                abs(float(np.max(run["body.x"])) - float(lowest.value)),
                 allowance(EDGE, rate, dt, lowest.size),
             ),
             Figure(
@@ -149,7 +149,7 @@ def judge_knife_edge(integrator: Any) -> Outcome:
             ),
             Figure(
                 "error of the mean speed sideways [m/s]",
-                abs(run["body.y"][-1] / run.time[-1] - drift.value),
+                abs(float(run["body.y"][-1] / run.time[-1]) - float(drift.value)),
                 allowance(EDGE, rate, dt, drift.size),
             ),
             Figure("slip [m/s]", max(slips), SLIP),
