@@ -17,7 +17,7 @@ from pathlib import Path
 from types import FunctionType
 from typing import Any
 
-from mbd.kernel.schemes.contract import SCHEMES, dispatch
+from mbd.kernel.schemes import contract
 
 __all__ = ["entry", "kernel_object", "kernel_text", "object_of", "source_digest"]
 
@@ -44,7 +44,7 @@ def mbd_kernel(K: Kernel) -> int:
 def source_digest() -> str:
     """Hash of everything the kernel is made from: this folder, and schemes from elsewhere with what they import."""
     folder, digest = Path(__file__).parent, hashlib.sha256()
-    for path in sorted({*folder.rglob("*.py"), *_beside(SCHEMES)}):
+    for path in sorted({*folder.rglob("*.py"), *_beside(contract.SCHEMES)}):
         digest.update(f"{path.name}\n".encode() + path.read_bytes())
     return digest.hexdigest()
 
@@ -98,7 +98,7 @@ def kernel_text() -> str:
     from mbd.kernel.llvm import llvm_text
     from mbd.kernel.translate import Source, functions_of, translate
 
-    text, names = dispatch()
+    text, names = contract.dispatch()
     hooks = Source("hooks", functions_of(text, ENTRY_FUNCTION), {**names, "advance": advance})
     return llvm_text(translate(hooks, ENTRY, ["kernel"], APART, {"mbd.kernel.hooks": hooks}), ENTRY)
 

@@ -82,11 +82,6 @@ def note_state(K: Kernel, number: int) -> None:
     carry(K.y, K.seen, o, K.n, True)
 
 
-def was_closed(K: Kernel, c: int) -> bool:
-    """Whether a contact was closed in the row before the last."""
-    return bool(K.store[(K.n_stored - 1) * K.width - K.n_frictions - K.n_contacts + c] == 1.0)
-
-
 def handle_event(K: Kernel) -> int:
     """Take the located event: rows before and after, impact, restart. Negative: nothing for the caller to do."""
     kind = K.event_kind
@@ -111,6 +106,7 @@ def handle_event(K: Kernel) -> int:
     if kind == CLOSE and K.n_switches > K.max_switches // 2:  # blows by turns: their limit is plastic, all at once
         K.plastic_impact = 1
         K.n_endless += 1
+    carry(K.closed, K.kept_flags, 0, K.n_contacts, True)
     status = switch(K)
     K.plastic_impact = 0
     if status != 0:
@@ -122,7 +118,7 @@ def handle_event(K: Kernel) -> int:
     if status != 0:
         return status
     for c in range(K.n_contacts):
-        if was_closed(K, c) and K.closed[c] == 0 and K.armed[c] != 1 and K.guards0[K.n_contacts + c] < -1e-6:
+        if K.kept_flags[c] == 1 and K.closed[c] == 0 and K.armed[c] != 1 and K.guards0[K.n_contacts + c] < -1e-6:
             K.sinking[c] = min(K.sinking[c], K.time)
     return EVENT if is_awaited(K, first) else -1
 

@@ -340,7 +340,9 @@ class Complementarity(Events):
     kept: Reals = reals(  # what a non-smooth step began from
         lambda s: s.n_q + 2 * s.n + s.n_rows + s.n_watched + s.n_anchors + s.n_frictions
     )
-    kept_flags: Integers = integers(lambda s: 3 * s.n_contacts + 3 * s.n_frictions)
+    kept_flags: Integers = integers(
+        lambda s: 3 * s.n_contacts + 3 * s.n_frictions
+    )  # and who was closed before an event
     before: Reals = reals(lambda s: s.n_contacts)  # gap rates before a non-smooth step
     past: Reals = reals(lambda s: s.n_rows)  # impulses of its smooth part
     past_limit: Reals = reals(lambda s: s.n_frictions)  # and largest frictions
