@@ -11,11 +11,9 @@ Delassus matrix is a P-matrix; then Lemke's method (`pivoting`); at last every c
 
 from __future__ import annotations
 
-from typing import Any
-
 from mbd.kernel.codes import CONFLICT, NO_IMPACT
 from mbd.kernel.pivoting import pivoted
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import Kernel, Reals
 from mbd.kernel.redundancy import sharing, spread
 from mbd.kernel.restart import MOST_LOADS, active_rows, evaluate_loaded, limit_of, load_accelerations, refresh_scales
 from mbd.kernel.saddle import solve_rows
@@ -115,7 +113,7 @@ def find_limits(K: Kernel, level: int) -> None:
             K.limit[f] += (K.past_time - 1.0) * K.base_limit[f]
 
 
-def whole(K: Kernel, level: int) -> Any:
+def whole(K: Kernel, level: int) -> Reals:
     """The multipliers that friction follows: with the impulses that are given, and those of a smooth step before."""
     for k in range(K.n_rows):
         K.loads[k] = K.impulse[k] + (K.given[k] + K.past[k] if level == 1 else 0.0)

@@ -5,12 +5,12 @@ A complex N×N elimination takes half the operations of the real one of 2N × 2N
 
 from __future__ import annotations
 
-from typing import Any
+from mbd.kernel.records import Reals
 
 __all__ = ["factor_complex", "solve_complex"]
 
 
-def factor_complex(A: Any, o: int, n: int, o_pivots: int) -> int:
+def factor_complex(A: Reals, o: int, n: int, o_pivots: int) -> int:
     """LU factors in place of the matrix at A[o:], n² real parts and n² imaginary ones; 0, or 1 + the bad column.
 
     Inverse pivots are on the diagonal, numbers of the rows exchanged at A[o_pivots:].
@@ -56,7 +56,7 @@ def factor_complex(A: Any, o: int, n: int, o_pivots: int) -> int:
     return 0
 
 
-def solve_complex(A: Any, o: int, n: int, o_pivots: int, o_b: int) -> None:
+def solve_complex(A: Reals, o: int, n: int, o_pivots: int, o_b: int) -> None:
     """b ← A⁻¹ b with the factors of `factor_complex`; b is at A[o_b:], n real parts and n imaginary ones."""
     o_im = o + n * n
     b_im = o_b + n

@@ -7,8 +7,6 @@ armed is ignored until its gap has risen above zero. Closed contacts fire by the
 
 from __future__ import annotations
 
-from typing import Any
-
 from mbd.kernel.codes import (
     CLOSE,
     CROSS,
@@ -28,7 +26,7 @@ from mbd.kernel.codes import (
 )
 from mbd.kernel.hermite import crossing, hermite, hermite_turn
 from mbd.kernel.hooks import call, scheme_step
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import Kernel, Reals
 from mbd.kernel.restart import (
     compose,
     consistent,
@@ -57,7 +55,7 @@ APART = 1e-6
 """Gap [m, rad] above which a contact is clearly open."""
 
 
-def watch(K: Kernel, t: float, q: Any, y: Any, rate: Any, lam: Any, values: Any) -> None:
+def watch(K: Kernel, t: float, q: Reals, y: Reals, rate: Reals, lam: Reals, values: Reals) -> None:
     """Gaps, gap rates, penalty forces, conditions and user guards at a state."""
     fill_block(K, t, q, y)
     for i in range(K.n):
@@ -148,7 +146,7 @@ def frictions_at(K: Kernel) -> int:
     return int(4 * K.n_contacts + 2 * K.n_guards)
 
 
-def is_watched(K: Kernel, c: int, values: Any) -> bool:
+def is_watched(K: Kernel, c: int, values: Reals) -> bool:
     """Whether an open contact may close."""
     if K.while_kind[c] == 0:
         return True
@@ -207,7 +205,7 @@ def update_sides(K: Kernel) -> None:
             K.side[e] = float(-K.direction[e])
 
 
-def goes_back(K: Kernel, e: int, value: float, t: float, q: Any, y: Any) -> bool:
+def goes_back(K: Kernel, e: int, value: float, t: float, q: Reals, y: Reals) -> bool:
     """Whether a guard that fires in one direction only is clearly on the side again from which it fires."""
     back = -K.direction[e]
     return bool(back * K.side[e] < 0.0 and back * value > 0.0 and abs(value) > guard_round_off(K, e, t, q, y))

@@ -11,9 +11,8 @@ these properties of M; the solution is corrected with the numbers given, free of
 
 from __future__ import annotations
 
-from typing import Any
-
 from mbd.kernel.linear import factor, solve
+from mbd.kernel.records import Integers, Reals
 from mbd.kernel.roots import sqrt
 
 __all__ = [
@@ -50,7 +49,7 @@ def lemke_places(n: int) -> int:
     return n * (2 * n + 4)
 
 
-def lemke(M: Any, n: int, q: Any, z: Any, work: Any, basis: Any, most: int) -> int:
+def lemke(M: Reals, n: int, q: Reals, z: Reals, work: Reals, basis: Integers, most: int) -> int:
     """Solve the problem of n unknowns; what is returned says how it ended, z is 0 where it is not `LCP_SOLVED`.
 
     Parameters
@@ -87,7 +86,7 @@ def lemke(M: Any, n: int, q: Any, z: Any, work: Any, basis: Any, most: int) -> i
     return worst
 
 
-def lcp_scales(M: Any, n: int, q: Any, work: Any, o_scale: int) -> float:
+def lcp_scales(M: Reals, n: int, q: Reals, work: Reals, o_scale: int) -> float:
     """D, so that the largest entry of each row and column of D M D together is about 1; returns max |D q|, or inf.
 
     Symmetric scaling in the largest norm (Ruiz 2001, RAL-TR-2001-034).
@@ -115,7 +114,7 @@ def lcp_scales(M: Any, n: int, q: Any, work: Any, o_scale: int) -> float:
     return size
 
 
-def lcp_tableau(M: Any, n: int, q: Any, size: float, spread: float, work: Any, o_scale: int) -> None:
+def lcp_tableau(M: Reals, n: int, q: Reals, size: float, spread: float, work: Reals, o_scale: int) -> None:
     """The rows ``1 w − M z − 1 z₀ = q``, scaled: columns of w (the inverse basis from then on), of z, and of q.
 
     The column of z₀ is left out: z₀ enters first, and is basic until the end. Rows of w stretched by different
@@ -130,7 +129,7 @@ def lcp_tableau(M: Any, n: int, q: Any, size: float, spread: float, work: Any, o
         work[i * width + 2 * n] = work[o_scale + i] * q[i] / size * stretch
 
 
-def lcp_path(n: int, work: Any, basis: Any, most: int, smallest: float) -> int:
+def lcp_path(n: int, work: Reals, basis: Integers, most: int, smallest: float) -> int:
     """Complementary pivots from w = q until z₀ leaves; `basis` tells the unknown of each row: w 0…, z n…, z₀ 2 n."""
     width = 2 * n + 1
     for i in range(n):
@@ -164,14 +163,14 @@ def lcp_path(n: int, work: Any, basis: Any, most: int, smallest: float) -> int:
     return LCP_BOUND
 
 
-def lcp_subtract(work: Any, place: int, change: float) -> None:
+def lcp_subtract(work: Reals, place: int, change: float) -> None:
     """Subtract; what cancels is zero, so that ties are seen."""
     old = work[place]
     new = old - change
     work[place] = new if abs(new) > LCP_CANCELLED * (abs(old) + abs(change)) else 0.0
 
 
-def lcp_pivot(n: int, work: Any, row: int, column: int) -> None:
+def lcp_pivot(n: int, work: Reals, row: int, column: int) -> None:
     """Solve the equation of a row for the unknown of a column and put it into the others."""
     width = 2 * n + 1
     inverse = 1.0 / work[row * width + column]
@@ -187,7 +186,7 @@ def lcp_pivot(n: int, work: Any, row: int, column: int) -> None:
             work[i * width + column] = 0.0
 
 
-def lcp_leaving(n: int, work: Any, basis: Any, entering: int, smallest: float) -> int:
+def lcp_leaving(n: int, work: Reals, basis: Integers, entering: int, smallest: float) -> int:
     """The row whose unknown reaches zero first as another enters, lexicographically; −1 if none ever does."""
     width = 2 * n + 1
     big = 0.0
@@ -214,7 +213,7 @@ def lcp_leaving(n: int, work: Any, basis: Any, entering: int, smallest: float) -
     return found
 
 
-def lcp_compare(work: Any, a: int, slope_a: float, b: int, slope_b: float) -> int:
+def lcp_compare(work: Reals, a: int, slope_a: float, b: int, slope_b: float) -> int:
     """−1, 0 or 1: whether the ratio of the entry at a to its slope is smaller than that at b, equal, or larger."""
     one = work[a] * slope_b
     two = work[b] * slope_a
@@ -223,7 +222,7 @@ def lcp_compare(work: Any, a: int, slope_a: float, b: int, slope_b: float) -> in
     return -1 if one < two else 1
 
 
-def lcp_finish(M: Any, n: int, q: Any, size: float, z: Any, work: Any, basis: Any, o_scale: int) -> int:
+def lcp_finish(M: Reals, n: int, q: Reals, size: float, z: Reals, work: Reals, basis: Integers, o_scale: int) -> int:
     """z as the pivots left it, corrected by ``(M_BB + ε 1) δ = −(M z + q)_B`` with the numbers given.
 
     ε makes a last basis that round-off alone keeps regular harmless; where it is regular, one correction does.
@@ -265,7 +264,7 @@ def lcp_finish(M: Any, n: int, q: Any, size: float, z: Any, work: Any, basis: An
     return LCP_SOLVED if best <= LCP_TOLERANCE else LCP_UNRESOLVED
 
 
-def lcp_block(M: Any, n: int, work: Any, basis: Any, o_scale: int) -> int:
+def lcp_block(M: Reals, n: int, work: Reals, basis: Integers, o_scale: int) -> int:
     """``M_BB + ε 1``, scaled, of the basic z at the beginning of `work`; how many these are."""
     m = 0
     for i in range(n):
@@ -280,7 +279,7 @@ def lcp_block(M: Any, n: int, work: Any, basis: Any, o_scale: int) -> int:
     return m
 
 
-def lcp_slack(M: Any, n: int, q: Any, size: float, work: Any, o_z: int, o_scale: int, i: int) -> float:
+def lcp_slack(M: Reals, n: int, q: Reals, size: float, work: Reals, o_z: int, o_scale: int, i: int) -> float:
     """Row i of w, scaled; z scaled is in `work`."""
     w = q[i] / size
     for j in range(n):
@@ -288,7 +287,7 @@ def lcp_slack(M: Any, n: int, q: Any, size: float, work: Any, o_z: int, o_scale:
     return float(work[o_scale + i] * w)
 
 
-def lcp_violation(M: Any, n: int, q: Any, size: float, work: Any, o_z: int, o_scale: int) -> float:
+def lcp_violation(M: Reals, n: int, q: Reals, size: float, work: Reals, o_z: int, o_scale: int) -> float:
     """How far scaled z ≥ 0 is from w ≥ 0 and zᵀ w = 0: the largest |min(z, w)|, of the terms of its row."""
     worst = 0.0
     for i in range(n):

@@ -5,12 +5,12 @@ Hand-written because it runs inside the compiled kernel, where below about 28 un
 
 from __future__ import annotations
 
-from typing import Any
+from mbd.kernel.records import Integers, Reals
 
 __all__ = ["eliminate", "factor", "solve", "solve_again", "solve_definite"]
 
 
-def factor(A: Any, n: int, pivots: Any) -> int:
+def factor(A: Reals, n: int, pivots: Integers) -> int:
     """LU factors of the row-major n×n matrix A, in place, inverse pivots on the diagonal; 0, or 1 + the bad column."""
     for k in range(n):
         p = k
@@ -35,7 +35,7 @@ def factor(A: Any, n: int, pivots: Any) -> int:
     return 0
 
 
-def swap_rows(A: Any, n: int, i: int, k: int) -> None:
+def swap_rows(A: Reals, n: int, i: int, k: int) -> None:
     """Rows i and k of the row-major n×n matrix A change places."""
     for j in range(n):
         swap = A[i * n + j]
@@ -43,7 +43,7 @@ def swap_rows(A: Any, n: int, i: int, k: int) -> None:
         A[k * n + j] = swap
 
 
-def subtract_row(A: Any, n: int, i: int, k: int, part: float, first: int) -> None:
+def subtract_row(A: Reals, n: int, i: int, k: int, part: float, first: int) -> None:
     """Row i less `part` times row k, from the column `first` on."""
     j = first
     while j + 3 < n:  # four at once, which become one instruction
@@ -61,7 +61,7 @@ def subtract_row(A: Any, n: int, i: int, k: int, part: float, first: int) -> Non
         j += 1
 
 
-def solve(A: Any, n: int, pivots: Any, b: Any) -> None:
+def solve(A: Reals, n: int, pivots: Integers, b: Reals) -> None:
     """b ← A⁻¹ b with the factors of `factor`."""
     for k in range(n):
         p = pivots[k]
@@ -81,7 +81,7 @@ def solve(A: Any, n: int, pivots: Any, b: Any) -> None:
             b[i] -= A[i * n + k] * left
 
 
-def solve_definite(M: Any, n: int, b: Any, work: Any) -> float:
+def solve_definite(M: Reals, n: int, b: Reals, work: Reals) -> float:
     """b ← M⁻¹ b by M = Uᵀ D U, D U in the upper half of M; 0 where M is not clearly positive definite.
 
     What returns else is the least part that a pivot keeps of its diagonal entry. `work` needs n places, for the
@@ -107,7 +107,7 @@ def solve_definite(M: Any, n: int, b: Any, work: Any) -> float:
     return kept
 
 
-def solve_again(M: Any, n: int, b: Any) -> None:
+def solve_again(M: Reals, n: int, b: Reals) -> None:
     """b ← M⁻¹ b with the factors of `solve_definite`."""
     for k in range(n):
         left = b[k] * M[k * n + k]
@@ -116,7 +116,7 @@ def solve_again(M: Any, n: int, b: Any) -> None:
     substitute_back(M, n, b)
 
 
-def substitute_back(M: Any, n: int, b: Any) -> None:
+def substitute_back(M: Reals, n: int, b: Reals) -> None:
     """b ← (D U)⁻¹ b with the factors of `solve_definite`."""
     for c in range(n):
         k = n - 1 - c
@@ -132,7 +132,7 @@ def substitute_back(M: Any, n: int, b: Any) -> None:
         b[k] = (left + even) * M[k * n + k]
 
 
-def eliminate(A: Any, n: int, b: Any, columns: Any, work: Any, rank_tolerance: float) -> int:
+def eliminate(A: Reals, n: int, b: Reals, columns: Integers, work: Reals, rank_tolerance: float) -> int:
     """Solve A x = b by complete pivoting after equilibration; x in b, free unknowns 0.
 
     Returns the rank; a negative value −1−rank if the leftover equations conflict.
@@ -171,7 +171,7 @@ def eliminate(A: Any, n: int, b: Any, columns: Any, work: Any, rank_tolerance: f
     return -1 - rank if conflict else rank
 
 
-def equilibrate(A: Any, n: int, b: Any, work: Any) -> None:
+def equilibrate(A: Reals, n: int, b: Reals, work: Reals) -> None:
     """Scale rows (and b), then columns, of A x = b to largest entries of 1; the factors go into work[: 2 n]."""
     for i in range(n):
         big = 0.0
@@ -190,7 +190,7 @@ def equilibrate(A: Any, n: int, b: Any, work: Any) -> None:
             A[i * n + j] *= work[n + j]
 
 
-def bring_largest(A: Any, n: int, k: int, b: Any, columns: Any, least: float) -> bool:
+def bring_largest(A: Reals, n: int, k: int, b: Reals, columns: Integers, least: float) -> bool:
     """The largest entry from (k, k) on comes to (k, k), its row with that of b, its column with its number.
 
     False where none is above `least`: nothing moves then.

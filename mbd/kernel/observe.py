@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from mbd.kernel.candidate import carry
 from mbd.kernel.codes import LOG_EVENT, LOG_SLIPPED, LOG_STUCK
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import Kernel, Reals
 
 __all__ = ["is_awaited", "store_row", "store_state"]
 
@@ -16,7 +14,7 @@ def store_row(K: Kernel) -> None:
     store_state(K, K.q, K.y, K.rate, K.lam)
 
 
-def store_state(K: Kernel, q: Any, y: Any, rate: Any, lam: Any) -> None:
+def store_state(K: Kernel, q: Reals, y: Reals, rate: Reals, lam: Reals) -> None:
     """One row of results: t, q, (v, z), (v̇, ż), λ, closed, and what frictions do: 2 sticks, ±1 slides, 0 off.
 
     K.row_bounds follows the rows, so that notes on turns and pulls need no look at all of them.

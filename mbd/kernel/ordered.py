@@ -8,10 +8,8 @@ knows which concern it. Nothing is exchanged; instead every pivot is compared wi
 
 from __future__ import annotations
 
-from typing import Any
-
 from mbd.kernel.linear import solve
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import Kernel, Reals
 
 __all__ = [
     "HEAD", "OF_ACCELERATIONS", "OF_TANGENT", "SYMMETRIC", "factor_ordered", "order_at", "solve_kkt", "solve_ordered",
@@ -46,7 +44,7 @@ def order_at(K: Kernel, m: int) -> int:
     return int(o)
 
 
-def factor_ordered(K: Kernel, A: Any, o: int, source: int, loss: float) -> bool:
+def factor_ordered(K: Kernel, A: Reals, o: int, source: int, loss: float) -> bool:
     """Factors of the matrix in A by the order at o, into K.kkt, inverse pivots among them; false if one is not sound.
 
     K.spare holds what is left of a row, by turns of its columns, and behind it the factors.
@@ -123,7 +121,7 @@ def weakest_pivot(K: Kernel) -> float:
     return largest
 
 
-def solve_ordered(K: Kernel, b: Any) -> None:
+def solve_ordered(K: Kernel, b: Reals) -> None:
     """b ← A⁻¹ b with the factors of `factor_ordered`; K.spare is written to."""
     o = K.order_start
     size = K.orders[o]
@@ -146,7 +144,7 @@ def solve_ordered(K: Kernel, b: Any) -> None:
         b[K.orders[o_row + size + k]] = K.spare[k]
 
 
-def solve_kkt(K: Kernel, size: int, b: Any) -> None:
+def solve_kkt(K: Kernel, size: int, b: Reals) -> None:
     """b ← A⁻¹ b with the factors in K.kkt, whichever they are."""
     if K.order_start > 0:
         solve_ordered(K, b)

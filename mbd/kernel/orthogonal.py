@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
+from mbd.kernel.records import Reals
 
 __all__ = ["clear_row", "square"]
 
 
-def square(V: Any, row: int, n: int) -> float:
+def square(V: Reals, row: int, n: int) -> float:
     """w · w of the row that begins at `row`."""
     total = 0.0
     for j in range(n):
@@ -15,7 +15,7 @@ def square(V: Any, row: int, n: int) -> float:
     return total
 
 
-def clear_row(V: Any, row: int, unit: int, n: int) -> float:
+def clear_row(V: Reals, row: int, unit: int, n: int) -> float:
     """Take from the row w that begins at `row` its part along the unit vector u that begins at `unit`; w · u."""
     part = 0.0
     for j in range(n):

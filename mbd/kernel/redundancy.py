@@ -7,11 +7,9 @@ Where one does, its force depends on how a load is shared (other μ, other drag)
 
 from __future__ import annotations
 
-from typing import Any
-
 from mbd.kernel.linear import factor, solve
 from mbd.kernel.orthogonal import clear_row, square
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import Kernel, Reals
 from mbd.kernel.roots import sqrt
 
 __all__ = ["find_dependent", "find_mix", "find_shares", "shared", "sharing", "spread", "take_shares"]
@@ -120,7 +118,7 @@ def find_shares(K: Kernel) -> None:
             K.shares[d * K.n_rows + k] = part
 
 
-def take_shares(K: Kernel, lam: Any) -> None:
+def take_shares(K: Kernel, lam: Reals) -> None:
     """The multipliers of dependent rows from those of the others."""
     for d in range(K.n_rows):
         if K.dropped[d] == 1:
@@ -154,7 +152,7 @@ def share(K: Kernel, row: int, largest: float) -> float:
     return float(max(K.limit[f] / largest, LEAST_SHARE))
 
 
-def spread(K: Kernel, lam: Any) -> None:
+def spread(K: Kernel, lam: Reals) -> None:
     """The multipliers of least norm with the same forces: λ_d = y, λ_kept = μ − Cᵀ y.
 
     (W_d⁻¹ + C W⁻¹ Cᵀ) y = C W⁻¹ μ, with W of `share`.

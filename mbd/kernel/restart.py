@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from mbd.kernel.codes import ACCELERATIONS, COMPOSE, EPS, NOT_CONVERGED, SCALES
 from mbd.kernel.hooks import call
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import Integers, Kernel, Reals
 from mbd.kernel.redundancy import find_mix, find_shares, shared, sharing, spread, take_shares
 from mbd.kernel.saddle import solve_rows
 
@@ -27,7 +25,7 @@ MOST_LOADS = 30
 """How often multipliers that friction follows are solved for again [-]."""
 
 
-def fill_block(K: Kernel, t: float, q: Any, y: Any) -> None:
+def fill_block(K: Kernel, t: float, q: Reals, y: Reals) -> None:
     """The block at a state, with the accepted rates and multipliers; penalties act where closed."""
     block = K.block
     block[0] = t
@@ -50,7 +48,7 @@ def fill_block(K: Kernel, t: float, q: Any, y: Any) -> None:
         block[K.o_slip + f] = K.slip[f]
 
 
-def compose(K: Kernel, q1: Any) -> None:
+def compose(K: Kernel, q1: Reals) -> None:
     """q₁ = q ⊕ x with the accepted q and the increment x in the block."""
     if K.vector == 1:
         for i in range(K.n_q):
@@ -159,7 +157,7 @@ def lower_scales(K: Kernel) -> None:
     weigh(K)
 
 
-def is_held(K: Kernel, row: int, flags: Any) -> bool:
+def is_held(K: Kernel, row: int, flags: Integers) -> bool:
     """Whether a row acts: always, while its contact is closed and does not part, and while its friction sticks.
 
     Trivial rows never do, and those with K.lifting = 1 are left out while contacts are lifted out of their surfaces.
@@ -183,7 +181,7 @@ def stepping_rows(K: Kernel) -> int:
     return m
 
 
-def active_rows(K: Kernel, flags: Any) -> int:
+def active_rows(K: Kernel, flags: Integers) -> int:
     """Numbers of the active rows into K.rows, ascending; how many."""
     m = 0
     for row in range(K.n_rows):
@@ -193,13 +191,13 @@ def active_rows(K: Kernel, flags: Any) -> int:
     return m
 
 
-def evaluate(K: Kernel, t: float, q: Any, y: Any) -> None:
+def evaluate(K: Kernel, t: float, q: Reals, y: Reals) -> None:
     """M, f, R, B, h, ḣ, bias, captured, kinetic energy, limits at a state, into K.acc."""
     fill_block(K, t, q, y)
     call(K, ACCELERATIONS, K.acc)
 
 
-def evaluate_loaded(K: Kernel, lam: Any) -> float:
+def evaluate_loaded(K: Kernel, lam: Reals) -> float:
     """K.acc again with other multipliers, at the state already in the block; how far they differ from those before.
 
     Only R and the limits of frictions follow them.
@@ -226,7 +224,7 @@ def row_speed(K: Kernel, row: int) -> float:
     return float(K.acc[K.acc_rate + row])
 
 
-def consistent(K: Kernel, t: float, q: Any, y: Any) -> int:
+def consistent(K: Kernel, t: float, q: Reals, y: Reals) -> int:
     """Rates and multipliers of the closed rows at a state, in K.jump and K.impulse."""
     evaluate(K, t, q, y)
     m = stepping_rows(K)
@@ -266,7 +264,7 @@ def find_limits_of_loads(K: Kernel) -> None:
         K.limit[f] = limit_of(K, f)
 
 
-def share_out(K: Kernel, lam: Any) -> None:
+def share_out(K: Kernel, lam: Reals) -> None:
     """Multipliers of dependent rows beside those of K.rows, which were solved with, at the state now in the block.
 
     Frictions that hold together share by their limits, which follow their loads: they are found by turns.
@@ -298,7 +296,7 @@ def share_loads(K: Kernel, m: int) -> None:
         K.block[K.o_lam + k] = K.loads[k]
 
 
-def add_shares(K: Kernel, A: Any, m: int) -> None:
+def add_shares(K: Kernel, A: Reals, m: int) -> None:
     """What the multipliers of a step bring along through dependent rows, into the tangent A of m rows."""
     size = K.n + m
     for i in range(K.n):

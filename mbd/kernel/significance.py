@@ -17,11 +17,9 @@ own scale; nothing of this is evaluated unless a sign has changed.
 
 from __future__ import annotations
 
-from typing import Any
-
 from mbd.kernel.codes import EPS, GUARDS, TERMS
 from mbd.kernel.hooks import call
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import Kernel, Reals
 from mbd.kernel.restart import evaluate, is_held
 
 __all__ = ["condition_round_off", "guard_round_off"]
@@ -36,17 +34,17 @@ MAGNIFIED = 2.0**20
 """Times round-off by which a coordinate is moved to see what it does to a guard, so that it is seen at all [-]."""
 
 
-def guard_round_off(K: Kernel, e: int, t: float, q: Any, y: Any) -> float:
+def guard_round_off(K: Kernel, e: int, t: float, q: Reals, y: Reals) -> float:
     """Round-off of user guard e at a state; K.acc and the block are overwritten."""
     return inherited(K, 4 * K.n_contacts + e, e, t, q, y)
 
 
-def condition_round_off(K: Kernel, c: int, t: float, q: Any, y: Any) -> float:
+def condition_round_off(K: Kernel, c: int, t: float, q: Reals, y: Reals) -> float:
     """The same of the measure that contact c is watched by."""
     return inherited(K, 3 * K.n_contacts + c, K.n_guards + c, t, q, y)
 
 
-def inherited(K: Kernel, place: int, term: int, t: float, q: Any, y: Any) -> float:
+def inherited(K: Kernel, place: int, term: int, t: float, q: Reals, y: Reals) -> float:
     """Round-off of the guard value at a place, whose terms have another in their program."""
     evaluate(K, t, q, y)
     o_x = 2 * K.n_watched
@@ -72,7 +70,7 @@ def change_by(K: Kernel, place: int, here: float, at: int, doubt: float) -> floa
     return float(abs(K.doubt[place] - here) / MAGNIFIED)
 
 
-def doubts_of_state(K: Kernel, q: Any, y: Any, o_x: int, o_v: int) -> None:
+def doubts_of_state(K: Kernel, q: Reals, y: Reals, o_x: int, o_v: int) -> None:
     """Round-off of positions and velocities into K.doubt, with M, B in K.acc."""
     n = K.n
     h = K.step

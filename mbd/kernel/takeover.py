@@ -6,20 +6,18 @@ guards change with it: where an event is looked for, they are those of the veloc
 
 from __future__ import annotations
 
-from typing import Any
-
 from mbd.kernel.candidate import adopt, stay
 from mbd.kernel.codes import PULL
 from mbd.kernel.guards import frictions_at, try_step, update_armed, update_sides, watch
 from mbd.kernel.hooks import scheme_resume
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import Kernel, Reals
 from mbd.kernel.restart import active_rows, consistent, evaluate, largest_force, stepping_rows
 from mbd.kernel.saddle import solve_rows
 
 __all__ = ["leave_pose", "look", "look_at_start", "put_on_rows", "take_over"]
 
 
-def project_velocity(K: Kernel, t: float, q: Any, y: Any, m: int, dropping: bool) -> int:
+def project_velocity(K: Kernel, t: float, q: Reals, y: Reals, m: int, dropping: bool) -> int:
     """The nearest velocities to y, in the metric of M, with B v + h_t = 0 on the m rows in K.rows.
 
     They may depend on each other where `dropping` finds out anew which do.

@@ -6,13 +6,11 @@ straight-line code. The stabilized form corrects positions by U first, then the 
 
 from __future__ import annotations
 
-from typing import Any
-
 from mbd.kernel.codes import EPS, NOT_CONVERGED, NOT_FINITE, SINGULAR, STAGNATED, TOO_NEAR, TOO_TIGHT
 from mbd.kernel.hooks import call, call_on
 from mbd.kernel.linear import factor
 from mbd.kernel.ordered import LOSS_OF_STEP, OF_TANGENT, factor_ordered, order_at, solve_kkt
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import Kernel, Reals
 from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import (
     add_shares,
@@ -285,7 +283,7 @@ def solve_corrections(K: Kernel, m: int, c_C: float, tangent: bool, shifting: bo
     solve_with_factors(K, m, K.rhs, straight)
 
 
-def solve_with_factors(K: Kernel, m: int, b: Any, straight: bool) -> None:
+def solve_with_factors(K: Kernel, m: int, b: Reals, straight: bool) -> None:
     """b ← K⁻¹ b with the factors at hand."""
     size = K.n + m
     if straight:

@@ -17,12 +17,10 @@ method gets across the pose is in `mbd.kernel.singular.stages`.
 
 from __future__ import annotations
 
-from typing import Any
-
 from mbd.kernel.codes import EPS, PASSING
 from mbd.kernel.ordered import order_at
 from mbd.kernel.orthogonal import clear_row, square
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import Kernel, Reals
 from mbd.kernel.restart import compose, evaluate, fill_block
 from mbd.kernel.roots import sqrt
 from mbd.kernel.singular.gram_norms import common_part
@@ -104,7 +102,7 @@ def keep_leftovers(K: Kernel, h: float) -> None:
     K.left[m] = near
 
 
-def motion(K: Kernel, y: Any) -> float:
+def motion(K: Kernel, y: Reals) -> float:
     """√(Σ M_jj v_j²), of the size of √(2 T), with M in K.acc."""
     size = 0.0
     for j in range(K.n_v):

@@ -14,6 +14,7 @@ from mbd.errors import SimulationError
 from mbd.integrators.base import Integrator, Point, StepReport, StepResult, System, Terms
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.kernel.codes import NOT_CONVERGED, NOT_FINITE, TOO_NEAR
+from mbd.kernel.records import Kernel
 from mbd.kernel.restart import MOST_LOADS, evaluate, fill_block, refresh_scales
 from mbd.kernel.schemes.contract import Scheme
 from mbd.kernel.schemes.memory import start_step
@@ -254,7 +255,7 @@ class KernelScheme:
         self.start, self.step, self.accept, self.resume = scheme.start, scheme.step, scheme.accept, scheme.resume
         self.error = scheme.error or self._has_left_its_error
 
-    def _has_left_its_error(self, K: Any, h: float) -> None:
+    def _has_left_its_error(self, K: Kernel, h: float) -> None:
         pass
 
 
@@ -267,27 +268,27 @@ class PlainScheme:
         self.pending: Any = None
         self.report = StepReport(True)
 
-    def _state(self, K: Any) -> tuple[State, Mode, list[int]]:
+    def _state(self, K: Kernel) -> tuple[State, Mode, list[int]]:
         flags = K.closed[: K.n_contacts]
         mode = self.manager.mode(flags)
         n_v = K.n_v
         state = State(float(K.time), K.q.copy(), K.y[:n_v].copy(), K.y[n_v:].copy(), mode)
         return state, mode, [row for row in self.manager.active_rows(flags, K.sticks) if not K.dropped[row]]
 
-    def start(self, K: Any) -> int:
+    def start(self, K: Kernel) -> int:
         """Memory at the accepted state, whose rates are consistent; sizes of the residual for the guards."""
         state, mode, _ = self._state(K)
         what = f"the start of {self.integrator!r} at t = {state.time:.6g} s"
         return self._begin(K, asked(what, self.integrator.start, self.system, state, mode, start_step(K)))
 
-    def resume(self, K: Any, h: float) -> int:
+    def resume(self, K: Kernel, h: float) -> int:
         """The same after a step that told `LEFT`, from the rates in K.jump and the multipliers in K.impulse."""
         K.rate[:], K.lam[:] = K.jump[: K.n], K.impulse[: K.n_rows]
         state, mode, _ = self._state(K)
         scheme: Any = self.integrator  # one of the family: no other tells that
         return self._begin(K, scheme.resume(self.system, state, mode, start_step(K), self.memory))
 
-    def _begin(self, K: Any, memory: Any) -> int:
+    def _begin(self, K: Kernel, memory: Any) -> int:
         self.memory = memory
         K.near_singular = 0
         K.slope[:] = getattr(memory, "slope", 0.0)
@@ -296,7 +297,7 @@ class PlainScheme:
         refresh_scales(K)
         return 0
 
-    def step(self, K: Any, h: float, t1: float) -> int:
+    def step(self, K: Kernel, h: float, t1: float) -> int:
         """A candidate from the integrator's own step."""
         state, mode, rows = self._state(K)
         what = f"a step of {self.integrator!r} from t = {state.time:.6g} s"
@@ -333,13 +334,13 @@ class PlainScheme:
         K.block[K.o_lam : K.o_lam + K.n_rows] = K.lam1[: K.n_rows]
         return 0
 
-    def error(self, K: Any, h: float) -> None:
+    def error(self, K: Kernel, h: float) -> None:
         """The integrator's estimate of the local error of the candidate."""
         estimate = self.integrator.local_error(self.memory, self.pending, h)
         if estimate is not None:
             K.error[:] = estimate
 
-    def accept(self, K: Any, h: float) -> None:
+    def accept(self, K: Kernel, h: float) -> None:
         """The candidate becomes the accepted state, its memory the memory."""
         if K.singular_size == 1 and K.n_active > 0:
             keep_leftovers(K, h)
