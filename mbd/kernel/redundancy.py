@@ -17,6 +17,12 @@ __all__ = ["find_dependent", "find_mix", "find_shares", "shared", "sharing", "sp
 DEPENDENCE = 1e-9
 """What is left of a row beside the earlier ones, relative, below which it depends on them [-]."""
 
+SHORT = 1e-2
+"""Length of a row over that of the longest of its unit below which it comes after the others [-].
+
+It vanishes at a singular configuration nearby: what errors of positions leave of it is no part of its own length.
+"""
+
 LEAST_SHARE = 1e-4
 """Part of the largest limit of friction that even one without load counts as, where several hold together [-]."""
 
@@ -24,22 +30,54 @@ LEAST_SHARE = 1e-4
 def find_dependent(K: Kernel, m: int) -> None:
     """Mark rows among the m in K.rows that depend on earlier ones in K.dropped, with B_d = C B_kept in K.mix.
 
-    Gram–Schmidt in the order of the rows, on columns scaled by √M_ii; B is that of K.acc.
+    Gram–Schmidt in the order of the rows, short ones last, on columns scaled by √M_ii; B is that of K.acc.
     """
     kept = 0
     K.n_dropped = 0
     for k in range(K.n_rows):
         K.dropped[k] = 0
+    if m == 0:
+        return
+    lengths = longest_row(K, m, 0)
+    angles = longest_row(K, m, 1)
+    others = longest_row(K, m, 2)
+    for late in range(2):
+        for k in range(m):
+            row = K.rows[k]
+            unit = K.row_unit[row]
+            far = lengths if unit == 0 else (angles if unit == 1 else others)
+            part = length_of(K, row) / far if far > 0.0 else 1.0
+            if (part < SHORT) != (late == 1):
+                continue
+            left = leftover(K, row, kept) * (part if late == 1 else 1.0)
+            if left > DEPENDENCE:
+                keep_row(K, row, kept)
+                kept += 1
+                continue
+            K.dropped[row] = 1
+            K.n_dropped += 1
+            combine(K, row, kept)
+
+
+def longest_row(K: Kernel, m: int, unit: int) -> float:
+    """The largest length of the m rows in K.rows that have this unit."""
+    longest = 0.0
     for k in range(m):
-        row = K.rows[k]
-        left = leftover(K, row, kept)
-        if left > DEPENDENCE:
-            keep_row(K, row, kept)
-            kept += 1
-            continue
-        K.dropped[row] = 1
-        K.n_dropped += 1
-        combine(K, row, kept)
+        if K.row_unit[K.rows[k]] == unit:
+            longest = max(longest, length_of(K, K.rows[k]))
+    return longest
+
+
+def length_of(K: Kernel, row: int) -> float:
+    """Length of a row on columns scaled by √M_ii."""
+    n = K.n
+    o_B = K.acc_B
+    total = 0.0
+    for j in range(n):
+        slope = K.acc[o_B + row * n + j]
+        weight = K.acc[j * n + j]
+        total += slope * slope / weight if weight > 0.0 else slope * slope
+    return float(sqrt(total))
 
 
 def find_mix(K: Kernel, m: int) -> None:

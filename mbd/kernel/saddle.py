@@ -6,13 +6,18 @@ of velocity and λ the impulse. M may be singular; only the whole matrix is ever
 
 from __future__ import annotations
 
+from typing import Any
+
 from mbd.kernel.codes import CONFLICT, DEPENDENT, NOT_FINITE
 from mbd.kernel.linear import eliminate
 from mbd.kernel.ordered import LOSS_AT_ONCE, OF_ACCELERATIONS, factor_ordered, order_at, solve_ordered
 from mbd.kernel.records import Kernel
 from mbd.kernel.redundancy import find_dependent, find_shares, shared, sharing, spread, take_shares
 
-__all__ = ["solve_rows"]
+__all__ = ["correct_velocities", "solve_rows"]
+
+INCOMPATIBLE = 1e-6
+"""Part of the terms of rows that a row which depends on others may be missed by, for errors of positions [-]."""
 
 
 def solve_rows(K: Kernel, m: int, dropping: bool) -> int:
@@ -22,8 +27,20 @@ def solve_rows(K: Kernel, m: int, dropping: bool) -> int:
     a friction that slides the shares of the limits in K.limit are solved with. K.rows has the dependent ones last then.
     Without `dropping` the rows are those that K.dropped has left, and K.shares are in place.
     """
+    return int(solve_change(K, K.y, m, dropping, False))
+
+
+def correct_velocities(K: Kernel, y: Any, m: int, dropping: bool) -> int:
+    """The same for a change w of the velocities y alone, which contradictions are measured by."""
+    return int(solve_change(K, y, m, dropping, True))
+
+
+def solve_change(K: Kernel, y: Any, m: int, dropping: bool, moving: bool) -> int:
+    """The same, of the velocities y where `moving`."""
     size = K.n + m
     rank = solve_matrix(K, m, not dropping and sharing(K))
+    if rank == -CONFLICT and dropping:
+        return solve_kept(K, y, m, moving)
     if rank < 0:
         return -rank
     if rank == size:
@@ -46,6 +63,20 @@ def solve_rows(K: Kernel, m: int, dropping: bool) -> int:
         return DEPENDENT
     spread(K, K.impulse)
     return 0
+
+
+def solve_kept(K: Kernel, y: Any, m: int, moving: bool) -> int:
+    """w and λ of an independent set of rows, where what is left over of all of them seems to be a contradiction."""
+    blocked = K.failure_index
+    find_dependent(K, m)
+    kept = dependent_last(K, m)
+    if kept < m and not sharing(K):
+        rank = solve_matrix(K, kept, False)
+        if rank == K.n + kept and not contradicts(K, y, m, moving):
+            spread(K, K.impulse)
+            return 0
+    K.failure_index = blocked
+    return CONFLICT
 
 
 def solve_shared(K: Kernel, m: int) -> int:
@@ -120,6 +151,35 @@ def solve_matrix(K: Kernel, m: int, together: bool) -> int:
         return -CONFLICT
     take_solution(K, m)
     return rank
+
+
+def contradicts(K: Kernel, y: Any, m: int, moving: bool) -> bool:
+    """Whether the rows in K.rows that were left out of a solution contradict it, beyond errors of positions.
+
+    Next to a singular configuration a row may be as short as its distance from there: what such errors leave of it is
+    much of its own terms, but little of those of the rows beside it. So each row is judged by the largest terms of all
+    rows of its unit, those of the velocities y included where they are what is corrected (`moving`).
+    """
+    n = K.n
+    o_B = K.acc_B
+    for unit in range(3):
+        worst = 0.0
+        size = 0.0
+        for k in range(m):
+            row = K.rows[k]
+            if K.row_unit[row] == unit:
+                missed = K.bias[row]
+                terms = abs(missed)
+                for j in range(n):
+                    slope = K.acc[o_B + row * n + j]
+                    missed += slope * K.jump[j]
+                    terms += abs(slope * K.jump[j])
+                    terms += abs(slope * y[j]) if moving else 0.0
+                worst = max(worst, abs(missed))
+                size = max(size, terms)
+        if worst > INCOMPATIBLE * size:
+            return True
+    return False
 
 
 def solve_in_order(K: Kernel, m: int) -> int:

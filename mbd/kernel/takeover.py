@@ -12,7 +12,7 @@ from mbd.kernel.guards import frictions_at, try_step, update_armed, update_sides
 from mbd.kernel.hooks import scheme_resume
 from mbd.kernel.records import Kernel, Reals
 from mbd.kernel.restart import active_rows, consistent, evaluate, largest_force, stepping_rows
-from mbd.kernel.saddle import solve_rows
+from mbd.kernel.saddle import correct_velocities, solve_rows
 
 __all__ = ["leave_pose", "look", "look_at_start", "put_on_rows", "take_over"]
 
@@ -30,7 +30,7 @@ def project_velocity(K: Kernel, t: float, q: Reals, y: Reals, m: int, dropping: 
         K.force[i] = 0.0
     for k in range(K.n_rows):
         K.bias[k] = K.acc[o_rate + k]
-    status = solve_rows(K, m, dropping)
+    status = correct_velocities(K, y, m, dropping)
     if status == 0:
         for i in range(K.n):
             y[i] += K.jump[i]
@@ -85,12 +85,27 @@ def turns_to_pull(K: Kernel) -> bool:
     return False
 
 
+def balance(K: Kernel) -> None:
+    """Accelerations from the multipliers K.lam at the accepted state, where M determines them."""
+    n = K.n
+    evaluate(K, K.time, K.q, K.y)
+    for i in range(n):
+        K.force[i] = K.acc[K.acc_f + i]
+    for k in range(active_rows(K, K.closed)):
+        row = K.rows[k]
+        for i in range(n):
+            K.force[i] += K.acc[K.acc_R + i * K.n_rows + row] * K.lam[row]
+    if solve_rows(K, 0, False) == 0:
+        for i in range(n):
+            K.rate[i] = K.jump[i]
+
+
 def take_over(K: Kernel, t1: float) -> None:
     """The candidate becomes the accepted state ahead of a restart, consistent in the old mode at every level.
 
     A shortened index-3 step leaves B v + h_t of the size of its error; it would survive a release, so it is removed.
     Where dt is so long that a contact pushes by the step but would pull by consistent multipliers or velocities, those
-    of the step stay, and the restart decides.
+    of the step stay, and the restart decides; accelerations follow from them.
     """
     adopt(K, t1)
     status = project_velocity(K, t1, K.q, K.y, active_rows(K, K.closed), True)
@@ -99,6 +114,7 @@ def take_over(K: Kernel, t1: float) -> None:
             K.y[i] = K.y1[i]
     if status == 0 and consistent(K, t1, K.q, K.y) == 0:
         if would_pull(K):
+            balance(K)
             return
         for i in range(K.n):
             K.rate[i] = K.jump[i]

@@ -36,6 +36,14 @@ STIFF = [22904]
 """Forces of a penalty between long steps, known as far as its stiffness times the tolerance."""
 CORRECTED = [26404, 12577]
 """Cut hinges: what places of their bodies err in a long step is corrected onto the rows, and turns them."""
+STEEP = [22940]
+"""Steps of `RadauIIA` that converge slowly: residuals are small beside the largest forces, not beside those of now."""
+WELDED = [32593]
+"""A weld that is cut: in index 3 its rates fit the bodies of the tree to the order of the scheme only."""
+FIRST_ORDER = [32503]
+"""A scheme of first order whose velocities miss h times the change of accelerations, which rows pass on."""
+TWINS = [33555]
+"""A coarse step, whose corrections the twin makes in the metric of another iterate."""
 CANCELLED = [10250]
 """Errors of one cut cancel by the end, those of the other do not: both are of order 2."""
 
@@ -98,11 +106,31 @@ def test_impacts_friction_and_loops_of_sound_runs_break_no_law():
 
 
 @pytest.mark.parametrize(
-    "number", SOUND + CUT + BOUNCING + SLIPPING + ROUND_OFF + TIED + BETWEEN + STIFF + CORRECTED + CANCELLED
+    "number",
+    SOUND
+    + CUT
+    + BOUNCING
+    + SLIPPING
+    + ROUND_OFF
+    + TIED
+    + BETWEEN
+    + STIFF
+    + CORRECTED
+    + CANCELLED
+    + STEEP
+    + WELDED
+    + FIRST_ORDER
+    + TWINS,
 )
 def test_fuzzed_scenes_are_judged_sound(number):
     told = verdict(number)
     assert told["kind"] == "ok", told
+
+
+def test_a_contact_that_would_pull_by_consistent_multipliers_leaves_a_row_in_balance():
+    """The run ends there with a named error; its last row has the forces of the step, and accelerations from them."""
+    told = verdict(24029)
+    assert told["kind"] == "error", told
 
 
 def test_a_scene_is_made_again_from_its_number():

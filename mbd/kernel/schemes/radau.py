@@ -163,7 +163,7 @@ def plain_step(K: Kernel, h: float, t1: float, m: int) -> int:
             elif status != NOT_CONVERGED or K.failure_size < 0.0:
                 break
         if error > 1.0 and was_enough(K, h, t1, m, iteration, error, left):
-            return complete(K, h, t1, m, renew)
+            return complete(K, h, t1, m, renew, True)
         if error > 1.0 and not renew and error > SLOW * before:
             renew = True  # the old matrices have done their work: make them anew at the same iterate
             before = 1e300
@@ -179,7 +179,7 @@ def plain_step(K: Kernel, h: float, t1: float, m: int) -> int:
             moved = correct_stages(K, m, h, renew)
             renew = False
             if is_settled(moved, last, first):
-                return complete(K, h, t1, m, False)
+                return complete(K, h, t1, m, False, iteration >= PATIENT)
             continue
         moved = correct_stages(K, m, h, renew)
         if iteration == 0:  # the predictor is of order 3, the step of order 5: stay far below its error
@@ -226,12 +226,12 @@ def step_astride(K: Kernel, h: float, t1: float) -> int:
         K.failure_size = error
         if error > 1.0 and iteration > 2 and error > SLOW * before:
             if evaluate_stages(K, h, t1, m, K.tolerance, c, c * c, False) <= 1.0:
-                return complete(K, h, t1, m, True)
+                return complete(K, h, t1, m, True, False)
             if iteration >= PATIENT:
                 return NOT_CONVERGED
             evaluate_stages(K, h, t1, m, tolerance, c, c * c, False)
         if error <= 1.0 and iteration > 0 and is_settled(moved, last, first):
-            return complete(K, h, t1, m, True)
+            return complete(K, h, t1, m, True, False)
         before = error
         turn_rows(K, stage_place(K, BALANCES), m)
         if not factor_stages(K, K.n + m):
@@ -300,8 +300,12 @@ def was_enough(K: Kernel, h: float, t1: float, m: int, iteration: int, error: fl
     return evaluate_stages(K, h, t1, m, K.tolerance, c, c * c, False) <= 1.0
 
 
-def complete(K: Kernel, h: float, t1: float, m: int, renew: bool) -> int:
-    """The converged last stage becomes the candidate, with consistent rates and multipliers where rows are active."""
+def complete(K: Kernel, h: float, t1: float, m: int, renew: bool, slow: bool) -> int:
+    """The converged last stage becomes the candidate, with consistent rates and multipliers where rows are active.
+
+    So they are where the iteration was `slow`: its residual is small beside the largest forces that it met, which may
+    be far above those at the end.
+    """
     if renew and not factor_stages(K, K.n + m):
         return SINGULAR
     load_stage(K, 2, h, t1)
@@ -318,7 +322,7 @@ def complete(K: Kernel, h: float, t1: float, m: int, renew: bool) -> int:
             K.failure_size = -1.0
             return NOT_CONVERGED
     compose(K, K.q1)
-    if m > 0 or K.n_frictions > 0:
+    if m > 0 or K.n_frictions > 0 or slow:
         if end_rates(K, t1, m):
             for i in range(K.n):
                 K.rate1[i] = K.jump[i]

@@ -129,7 +129,7 @@ def between(run: mbd.Trajectory, model: mbd.Model, parameters: Mapping[str, floa
 
     Where the scheme's own interpolation is of low order, loops and constraints are left to its error, and forces may
     miss a fiftieth of what they are made of. Where a tolerance was asked for, it is what coordinates may be off, and so
-    what loops may miss; rates by as much in the time of a step; forces by what these change of them.
+    what loops may miss; forces by what rates off by as much in the time of a step change of them.
     """
     time = run.time
     steps_of = np.flatnonzero(np.diff(time) > 0.0)
@@ -147,7 +147,7 @@ def between(run: mbd.Trajectory, model: mbd.Model, parameters: Mapping[str, floa
             bodies = Bodies(model, told)
             laws.places(found, bodies)
             h = np.diff(time)[np.searchsorted(time, times, side="right") - 1]
-            laws.closure(found, bodies, (1e-6 if precise else 1e-3) + 0.3 * tol, rates=precise, more=tol / h)
+            laws.closure(found, bodies, (1e-6 if precise else 1e-3) + 0.3 * tol, rates=precise)
             share = 1e-5 if precise else 0.02 + _unresolved(run, times)
             again = run.settings["between"] == "stages"  # steps are taken again, and end in balance
             more = unknown_force(bodies, tol, h, laws.size_of(bodies)) if tol and not again else 0.0

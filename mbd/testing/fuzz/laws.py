@@ -45,16 +45,13 @@ def places(found: Faults, bodies: Bodies) -> None:
             found.small("velocity of a frame", name, np.max(np.abs(reported - own), axis=1), EQUAL * fast)
 
 
-def closure(
-    found: Faults, bodies: Bodies, loose: float = HELD, rates: bool = True, told: int = 0, more: Any = 0.0
-) -> None:
+def closure(found: Faults, bodies: Bodies, loose: float = HELD, rates: bool = True, told: int = 0) -> None:
     """Joints that close loops fit: their frames, seen over both branches, differ by the joint's own motion alone.
 
     Parameters
     ----------
     loose : what places may miss, over the size of the mechanism [-]; rates : whether velocities are held too
     told : how many instants are next to singular poses, where the run says that they are not
-    more : what velocities may miss besides, (n,) [m/s, rad/s]
     """
     size = size_of(bodies)
     for joint in bodies.closing:
@@ -67,7 +64,7 @@ def closure(
         apart = twist(gap)
         slip = np.linalg.norm(apart.angular, axis=1) + np.linalg.norm(apart.linear, axis=1)
         motion = np.abs(across.first).max(axis=(1, 2))
-        limit = loose * size * (1.0 + motion) + size * more
+        limit = loose * size * (1.0 + motion)
         found.small("velocities fit at a joint", joint.name, slip, limit, told=told)
 
 

@@ -205,7 +205,10 @@ def _twin(made: Scene, run: mbd.Trajectory) -> list[str]:
     same = slice(None) if len(fast) == len(plain) else slice(-1, None)  # an event just before, then a step just after
     off = np.max(np.abs(fast.record.q[same] - plain.record.q[same]), initial=0.0)
     scale = 1.0 + np.max(np.abs(fast.record.q), initial=0.0)
-    missed = 4.0 * SHARE * np.diff(fast.time) ** 2 @ np.max(np.abs(fast.record.a[1:]), axis=1)  # Newton's tolerance
+    h = np.diff(fast.time)
+    missed = 4.0 * SHARE * h**2 @ np.max(np.abs(fast.record.a[1:]), axis=1)  # Newton's tolerance
+    if len(plain.record.lam.T) and fast.settings["between"] == "hermite":  # corrections in the metric of other iterates
+        missed += np.sum((h**2 * np.max(np.abs(np.diff(fast.record.a, axis=0)), axis=1)) ** 2)
     return [] if off <= 1e-9 * scale + missed else [f"compiled code and its twin differ by {off:.3g} after {k} steps"]
 
 
