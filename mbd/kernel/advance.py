@@ -57,7 +57,8 @@ def accept(K: Kernel, h: float, t1: float, quiet: bool) -> None:
     accept_guards(K)
     if not quiet:
         update_armed(K)
-        update_sides(K)
+        if K.n_guards > 0:
+            update_sides(K)
 
 
 def forget_found(K: Kernel) -> None:
@@ -305,7 +306,7 @@ def judge_step(K: Kernel, h: float, full: float, t1: float, cut: bool, within: b
         event = find_event(K, h, t1)
         if event > 0:
             return event
-    pulls = event == 0 and not quiet and has_spurious_reaction(K)
+    pulls = K.n_judged > 0 and event == 0 and not quiet and has_spurious_reaction(K)
     if pulls and K.n_active > 0 and calm(K):
         return -1
     add_error(K, h, event < 0)

@@ -28,11 +28,13 @@ APART = (
     "ordered_complex.factor_pair_ordered", "ordered_complex.solve_pair_ordered",
     "singular.gram_norms.leftovers_of_many", "interior.parts_to_take", "locate.locate", "events.handle_event",
     "events.land", "unresolved.look_closer", "singular.events.find_passed_events", "singular.events.log_passed_events",
-    "singular.events.refuses", "hooks.scheme_accept",
+    "singular.events.refuses", "hooks.scheme_accept", "guards.brief_step", "guards.share_multipliers",
+    "singular.newmark_step.passing_step", "schemes.newton.second_look", "schemes.newton.retreat",
+    "schemes.radau.radau_step", "schemes.runge_kutta.runge_kutta_step",
 )  # fmt: skip
 """Their loops keep their shape wherever they are called; where they are not, nobody carries them along.
 
-The last eight are what few steps need: with them inside, the loop over steps would be too large to stay in one piece.
+All from `parts_to_take` on are what few steps need: with them inside, the loop over steps would be too large to stay in one piece.
 """
 
 ENTRY_FUNCTION = """

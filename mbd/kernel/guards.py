@@ -76,43 +76,14 @@ def try_step(K: Kernel, h: float, t1: float) -> int:
         status = scheme_step(K, h, t1)
         if status != 0:
             return status
-        if K.n_dropped > 0:  # a scheme leaves the multipliers of the rows that it was solved with
-            for k in range(K.n_rows):
-                if K.dropped[k] == 1 and K.explicit == 0:  # the explicit one has shared them out already
-                    K.lam1[k] = 0.0
-            share_out(K, K.lam1)
-            for k in range(K.n_rows):
-                K.block[K.o_lam + k] = K.lam1[k]
-            if departs(K):
-                K.failure_time = t1
-                K.failure_size = 0.0
-                return NOT_CONVERGED
-    else:
-        for i in range(K.n):
-            K.rate1[i] = K.rate[i]
-        for _ in range(2):
-            fill_block(K, K.time, K.q, K.y)
-            for i in range(K.n_v):
-                K.block[K.o_x + i] = h * (K.y[i] + h * (K.rate[i] / 3.0 + K.rate1[i] / 6.0))
-            compose(K, K.q1)
-            for i in range(K.n):
-                K.y1[i] = K.y[i] + 0.5 * h * (K.rate[i] + K.rate1[i])
-            status = consistent(K, t1, K.q1, K.y1)
+        if K.n_dropped > 0:
+            status = share_multipliers(K, t1)
             if status != 0:
                 return status
-            for i in range(K.n):
-                K.rate1[i] = K.jump[i]
-        if not holds_rows(K, K.n_active):
-            K.failure_time = t1
-            K.failure_size = 0.0
-            return NOT_CONVERGED
-        for i in range(K.n):
-            K.rate1[i] = K.jump[i]
-            K.aux1[i] = K.jump[i]
-            K.block[K.o_a + i] = K.jump[i]
-        for k in range(K.n_rows):
-            K.lam1[k] = K.impulse[k]
-            K.block[K.o_lam + k] = K.impulse[k]
+    else:
+        status = brief_step(K, h, t1)
+        if status != 0:
+            return status
     if K.n_watched > 0:
         for i in range(K.n_q):
             K.block[K.o_q + i] = K.q1[i]
@@ -129,6 +100,51 @@ def try_step(K: Kernel, h: float, t1: float) -> int:
             K.limit[f] = K.guards1[frictions_at(K) + 2 * K.n_frictions + f]
             if K.slip[f] != 0.0:
                 K.lam1[K.friction_row[f]] = K.slip[f] * K.limit[f]
+    return 0
+
+
+def share_multipliers(K: Kernel, t1: float) -> int:
+    """Multipliers of dependent rows; a scheme leaves those of the rows that it was solved with."""
+    for k in range(K.n_rows):
+        if K.dropped[k] == 1 and K.explicit == 0:  # the explicit one has shared them out already
+            K.lam1[k] = 0.0
+    share_out(K, K.lam1)
+    for k in range(K.n_rows):
+        K.block[K.o_lam + k] = K.lam1[k]
+    if departs(K):
+        K.failure_time = t1
+        K.failure_size = 0.0
+        return NOT_CONVERGED
+    return 0
+
+
+def brief_step(K: Kernel, h: float, t1: float) -> int:
+    """A step of Heun's method."""
+    for i in range(K.n):
+        K.rate1[i] = K.rate[i]
+    for _ in range(2):
+        fill_block(K, K.time, K.q, K.y)
+        for i in range(K.n_v):
+            K.block[K.o_x + i] = h * (K.y[i] + h * (K.rate[i] / 3.0 + K.rate1[i] / 6.0))
+        compose(K, K.q1)
+        for i in range(K.n):
+            K.y1[i] = K.y[i] + 0.5 * h * (K.rate[i] + K.rate1[i])
+        status = consistent(K, t1, K.q1, K.y1)
+        if status != 0:
+            return status
+        for i in range(K.n):
+            K.rate1[i] = K.jump[i]
+    if not holds_rows(K, K.n_active):
+        K.failure_time = t1
+        K.failure_size = 0.0
+        return NOT_CONVERGED
+    for i in range(K.n):
+        K.rate1[i] = K.jump[i]
+        K.aux1[i] = K.jump[i]
+        K.block[K.o_a + i] = K.jump[i]
+    for k in range(K.n_rows):
+        K.lam1[k] = K.impulse[k]
+        K.block[K.o_lam + k] = K.impulse[k]
     return 0
 
 

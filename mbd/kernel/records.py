@@ -129,6 +129,7 @@ class Settings(Sizes):
     strategy: int  # 0 located events, 1 non-smooth steps
     auto: int  # 1: non-smooth steps follow where located impacts crowd
     impact_law: int  # 0 Newton, 1 Poisson, 2 sequential
+    n_judged: int  # unilateral contacts that open where they pull, and frictions
     loaded: int  # a friction follows multipliers other than linearly: 1 as that of a pin, 2 not at all where one pulls
     adaptive: int  # 1: steps follow the estimated error, 0: they are all dt
     error_order: int  # power of the step with which the estimated error per second falls
@@ -304,6 +305,7 @@ class Events(Frictions):
     pick: Reals = reals()  # the event that fired first
     event_place: float = place("pick")  # its estimated distance, part of the step
     event_low: float = place("pick")  # the lower end of its bracket
+    changes_little: float = place("pick")  # 1: rates of the candidate change so little that it needs no other look
     event_after: float = place("pick")  # its distance from the start of the step [s]
     fired: Integers = integers()
     event_kind: int = place("fired")  # −1: none

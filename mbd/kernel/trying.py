@@ -35,8 +35,11 @@ def strays(K: Kernel, h: float) -> bool:
 
 def judged_step(K: Kernel, h: float, t1: float) -> int:
     """A candidate at t1 = t + h that may be a continuation of the motion."""
+    K.changes_little = 0.0
     status = try_step(K, h, t1)
-    return judge_change(K, h, t1) if status == 0 else status
+    if status != 0 or (K.changes_little == 1.0 and K.estimates == 0):
+        return status
+    return judge_change(K, h, t1)
 
 
 def step_end(K: Kernel) -> float:

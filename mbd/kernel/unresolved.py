@@ -20,15 +20,10 @@ from mbd.kernel.poles import leaps
 from mbd.kernel.records import Kernel
 from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import compose, consistent, evaluate, fill_block
+from mbd.kernel.schemes.iteration import BENT, BYSTANDER, LOOK_TWICE, is_small
 
 __all__ = ["judge_change"]
 
-LOOK_TWICE = 0.01
-"""Estimated error of a rate, over the rate, up to which a step needs no closer look, whatever the scheme [-]."""
-BENT = 0.1
-"""Change of accelerations in a step, times its size, over the fastest rate, above which poles are looked for [-]."""
-BYSTANDER = 0.01
-"""Part of the fastest rate below which another one hardly takes part in the motion [-]."""
 GROWTH = 0.8
 """ζ in a whole step that the trapezoidal rule still follows; less where the error of a scheme is larger [-]."""
 TRAPEZOID = 1.0 / 12.0
@@ -63,9 +58,7 @@ def changes_little(K: Kernel, h: float, stretch: float) -> bool:
         fastest = max(fastest, abs(K.y1[i]))
     for i in range(K.n_v, K.n):
         largest = max(largest, abs(K.rate1[i] - K.rate[i] - h * K.slope[i]))
-    cube = stretch * stretch * stretch
-    small = h * largest * cube <= 12.0 * LOOK_TWICE * max(K.rest_speed, BYSTANDER * fastest)
-    return bool(small and h * most <= BENT * max(K.rest_speed, fastest))
+    return is_small(K, h, stretch, most, largest, fastest)
 
 
 def bends(K: Kernel, h: float) -> bool:

@@ -8,7 +8,17 @@ from mbd.kernel.records import Kernel
 from mbd.kernel.restart import compose
 from mbd.kernel.singular.step_pairs import WHOLE
 
-__all__ = ["finish", "overturns", "predict", "residual_size", "runs_away", "shift_growth", "soundness_at"]
+__all__ = [
+    "BENT", "BYSTANDER", "LOOK_TWICE", "finish", "is_small", "overturns", "predict", "residual_size", "runs_away",
+    "shift_growth", "soundness_at",
+]  # fmt: skip
+
+LOOK_TWICE = 0.01
+"""Estimated error of a rate, over the rate, up to which a step needs no closer look, whatever the scheme [-]."""
+BENT = 0.1
+"""Change of accelerations in a step, times its size, over the fastest rate, above which poles are looked for [-]."""
+BYSTANDER = 0.01
+"""Part of the fastest rate below which another one hardly takes part in the motion [-]."""
 
 
 def predict(K: Kernel, h: float, t1: float, c_C: float, c_K: float) -> None:
@@ -119,8 +129,15 @@ def runs_away(K: Kernel, m: int) -> bool:
     return largest > 1e7 * total and largest > 1e3 * K.work[0]
 
 
-def finish(K: Kernel, h: float) -> None:
-    """The converged block becomes the candidate."""
+def finish(K: Kernel, h: float) -> bool:
+    """The converged block becomes the candidate; whether it changes little, so that no other look at it is needed.
+
+    That is: it neither `overturns` nor fails the first look of `mbd.kernel.unresolved`, as in most steps of a motion.
+    """
+    compose(K, K.q1)
+    most = 0.0
+    unforeseen = 0.0
+    fastest = 0.0
     stretch = h / K.aux_step
     mean = 1.0 / (1.0 - K.alpha_m)
     by_rate = (1.0 - K.alpha_f) * mean
@@ -130,12 +147,32 @@ def finish(K: Kernel, h: float) -> None:
         last = K.rate[i]
         a0 = last + stretch * (K.aux[i] - last)
         rate = K.block[K.o_a + i]
+        speed = K.block[K.o_v + i]
+        change = rate - last
+        most = max(most, abs(change))
+        unforeseen = max(unforeseen, abs(change - h * K.slope[i]))
+        fastest = max(fastest, abs(speed))
         K.rate1[i] = rate
-        K.y1[i] = K.block[K.o_v + i]
+        K.y1[i] = speed
         K.aux1[i] = by_rate * rate + by_last * last - by_aux * a0
     for k in range(K.n_rows):
         K.lam1[k] = K.block[K.o_lam + k]
-    compose(K, K.q1)
+    if K.n > K.n_v or error_share(K, h) * most > 0.5:
+        return False
+    whole = K.step / h if K.step > h else 1.0
+    return is_small(K, h, whole, most, unforeseen, fastest)
+
+
+def is_small(K: Kernel, h: float, stretch: float, most: float, unforeseen: float, fastest: float) -> bool:
+    """Whether changes of rates in a step (the most, and the most not foretold) are small beside the fastest of them."""
+    cube = stretch * stretch * stretch
+    small = h * unforeseen * cube <= 12.0 * LOOK_TWICE * max(K.rest_speed, BYSTANDER * fastest)
+    return bool(small and h * most <= BENT * max(K.rest_speed, fastest))
+
+
+def error_share(K: Kernel, h: float) -> float:
+    """Estimated error of a coordinate in a step over the change of its acceleration [s²]."""
+    return abs(1.0 / 6.0 - K.beta - 0.5 * (K.alpha_m - K.alpha_f)) * h * h
 
 
 def overturns(K: Kernel, h: float) -> bool:
@@ -143,7 +180,7 @@ def overturns(K: Kernel, h: float) -> bool:
 
     ``e = h² |1/6 − β − (α_m − α_f)/2| |v̇₁ − v̇₀|``
     """
-    share = abs(1.0 / 6.0 - K.beta - 0.5 * (K.alpha_m - K.alpha_f)) * h * h
+    share = error_share(K, h)
     change = 0.0
     for i in range(K.n_v):
         if K.unit[i] == 1:

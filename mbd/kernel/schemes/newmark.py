@@ -89,9 +89,9 @@ def newmark_accept(K: Kernel, h: float) -> None:
         K.slope[i] = (K.rate1[i] - K.rate[i]) * inverse
         K.rate[i] = K.rate1[i]
         K.aux[i] = K.aux1[i]
-        if i < K.n_v:
-            K.shift_change[i] = part * (K.shift1[i] - K.shift[i])
-            K.shift[i] = K.shift1[i]
+    for i in range(K.n_v):
+        K.shift_change[i] = part * (K.shift1[i] - K.shift[i])
+        K.shift[i] = K.shift1[i]
     for k in range(K.n_rows):
         K.lam_slope[k] = (K.lam1[k] - K.lam[k]) * inverse
         K.lam[k] = K.lam1[k]

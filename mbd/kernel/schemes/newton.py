@@ -121,8 +121,9 @@ def no_candidate(K: Kernel, h: float, t1: float, status: int) -> int:
 
 def conclude_step(K: Kernel, h: float, t1: float) -> int:
     """The iterate becomes the candidate, unless the step is far too long for it."""
-    finish(K, h)
-    if overturns(K, h):
+    if finish(K, h):
+        K.changes_little = 1.0
+    elif overturns(K, h):
         K.failure_size = -1.0
         return no_candidate(K, h, t1, NOT_CONVERGED)
     return 0

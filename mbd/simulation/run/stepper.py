@@ -115,6 +115,8 @@ class Stepper:
             n_contacts=n_contacts, n_guards=n_guards, o_q=layout.q, o_x=layout.x, o_v=layout.v, o_a=layout.a,
             o_lam=layout.lam, o_anchor=layout.anchor, o_switch=layout.switch, o_slip=layout.slip,
             n_frictions=layout.n_frictions, n_watched=self.mechanism.sizes["guards"],
+            n_judged=layout.n_frictions
+            + sum(contact.kind != "penalty" and contact.opens_on == "pull" for contact in self.manager.contacts),
             loaded=follows(self.mechanism.equations), impact_law=LAWS.index(options.get("impact", "newton")),
             strategy=int(options.get("contact") == "nonsmooth"), auto=int(options.get("auto", False)),
             vector=int(self.mechanism.vector),
