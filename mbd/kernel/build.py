@@ -34,7 +34,8 @@ APART = (
 )  # fmt: skip
 """Their loops keep their shape wherever they are called; where they are not, nobody carries them along.
 
-All from `parts_to_take` on are what few steps need: with them inside, the loop over steps would be too large to stay in one piece.
+All from `parts_to_take` on are what few steps need: with them inside, the loop over steps would be too large to stay
+in one piece.
 """
 
 ENTRY_FUNCTION = """
