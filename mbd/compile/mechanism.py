@@ -80,6 +80,7 @@ class Mechanism:
         composed = programs.compose(equations)
         if composed is not None:
             common["compose"] = composed
+            common["increment_rates"] = programs.increment_rates(equations)
         self.layout = Layout.of(equations)
         self._accelerations = common["accelerations"]
         self.common: Functions = self.backend.functions(self.layout)
@@ -303,6 +304,7 @@ class Mechanism:
             "guards": 4 * layout.n_contacts + 2 * len(self.equations.guards) + 3 * layout.n_frictions,
             "scales": n + 2 * rows,
             "compose": layout.n_q,
+            "increment_rates": layout.n_v,
         }
 
 

@@ -13,6 +13,7 @@ With N = n_v + n_z rates, m active rows in ascending number, R rows and nC conta
                    sliding velocity | its rate | limit of each friction
 `scales`           magnitudes of r (N) | of h (R) | of ḣ (R), term by term before cancellation
 `compose`          q ⊕ x, or None where it is q + x
+`increment_rates`  ẋ = D(x)⁻¹ v (n_v)
 =================  ==================================================================================
 
 Of a row on velocities h is zero; index 3 has its rate in the place of h.
@@ -35,7 +36,7 @@ from mbd.tape.node import Node
 
 __all__ = [
     "Correction", "accelerations", "balance_with", "compose", "constraint_jacobian", "correction", "guard_terms",
-    "guards", "is_judged", "mass_matrix", "newton", "residual", "scales",
+    "guards", "increment_rates", "is_judged", "mass_matrix", "newton", "residual", "scales",
 ]  # fmt: skip
 
 
@@ -237,6 +238,12 @@ def guard_terms(equations: Equations) -> list[Node]:
 def compose(equations: Equations) -> list[Node] | None:
     """q ⊕ x, or None where every coordinate adds."""
     return None if equations.compose is None else list(equations.compose)
+
+
+def increment_rates(equations: Equations) -> list[Node]:
+    """ẋ = D(x)⁻¹ v, v itself where coordinates add."""
+    inputs = Inputs.of(equations)
+    return list(inputs.v if inputs.chart is None else inputs.chart.rates)
 
 
 # parts --------------------------------------------------------------------------------------------------------------

@@ -110,23 +110,34 @@ class System(Protocol):
         """q ⊕ x (n_q,): positions moved by a local increment, q + x by default."""
         return q + x
 
+    def increment_rates(self, x: Vector, v: Vector) -> Vector:
+        """ẋ = D(x)⁻¹ v (n_v,) of the motion q ⊕ x(t) with velocities v, by default v (see `mbd.configuration`)."""
+        return v
+
     @property
     def is_vector(self) -> bool:
         """Whether q ⊕ x is q + x everywhere."""
         return type(self).compose is System.compose
+
+    @property
+    def follows_charts(self) -> bool:
+        """Whether ẋ is known anywhere in a chart; else stages of high order are not of the order that they promise."""
+        return self.is_vector or type(self).increment_rates is not System.increment_rates
 
 
 class _Completed(System):
     """A class with an `evaluate`, and the defaults of `System` for what it lacks."""
 
     is_vector = True
+    follows_charts = True
 
     def __init__(self, own: Any) -> None:
         self.evaluate = own.evaluate  # type: ignore[method-assign]
-        for name in ("n_z", "constant_mass", "angles", "accelerations", "compose"):
+        for name in ("n_z", "constant_mass", "angles", "accelerations", "compose", "increment_rates"):
             if hasattr(own, name):
                 setattr(self, name, getattr(own, name))
         self.is_vector = not hasattr(own, "compose")
+        self.follows_charts = self.is_vector or hasattr(own, "increment_rates")
 
     def evaluate(self, point: Point, mode: Mode, tangent: tuple[float, float] | None) -> Terms:
         """Its own."""

@@ -24,7 +24,7 @@ from mbd.integrators.base import Integrator, Point, StepReport, StepResult, Syst
 from mbd.integrators.family import DEFAULT_TOLERANCE
 from mbd.kernel.schemes.collocation import RADAU
 from mbd.kernel.schemes.radau import FAR_OFF, MOST_RETREATS, PATIENT, SLOW, is_settled
-from mbd.kernel.schemes.stages import MOST_STRETCHED
+from mbd.kernel.schemes.stages import MOST_BENDS, MOST_STRETCHED
 from mbd.kernel.singular.stages import MOST_SETTLED
 from mbd.state import Mode, State
 
@@ -96,8 +96,8 @@ class RadauIIA(Integrator):
         return "RadauIIA()" if self.tolerance == DEFAULT_TOLERANCE else f"RadauIIA(tolerance={self.tolerance!r})"
 
     def order(self, system: System | None = None) -> int:
-        """5; 2 where positions do not add, since its stages take ẋ = v."""
-        return 5 if system is None or completed(system).is_vector else 2
+        """5; 2 where positions do not add and a system does not tell ẋ."""
+        return 5 if system is None or completed(system).follows_charts else 2
 
     def numbers(self) -> dict[str, float]:
         """Newton's tolerance."""
@@ -168,6 +168,7 @@ class _RadauStep:
         point = Point(state.time, state.q, np.zeros(self.n_v), self.y0, memory.rate, memory.lam)
         scale = system.evaluate(point, mode, None).scale_r
         self.size_at_start = np.zeros(len(self.y0)) if scale is None else scale
+        self.bend = np.zeros((3, self.n_v))
         self.last: tuple[Any, Any] = np.zeros_like(self.W), np.zeros_like(self.lam)
 
     def run(self) -> StepResult:
@@ -230,9 +231,23 @@ class _RadauStep:
     def _point(self, i: int) -> Point:
         t = self.state.time + (self.dt if i == 2 else RADAU.c[i] * self.dt)
         y = self.y0 + self.dt * RADAU.A[i] @ self.W
-        speeds = self.y0 + self.dt * RADAU.A @ self.W
-        x = self.dt * RADAU.A[i] @ speeds[:, : self.n_v] + self.U[i]
+        x = self.dt * RADAU.A[i] @ self._increment_rates() + self.U[i]
         return Point(t, self.state.q, x, y, self.W[i], self.lam[i])
+
+    def _increment_rates(self) -> Matrix:
+        """ẋ of all stages (3, n_v): v where positions add, else by iteration."""
+        speeds = (self.y0 + self.dt * RADAU.A @ self.W)[:, : self.n_v]
+        if self.system.is_vector:
+            return np.asarray(speeds)
+        rates = speeds + self.bend
+        for _ in range(MOST_BENDS):
+            before = rates
+            x = self.dt * RADAU.A @ rates + self.U
+            rates = np.array([self.system.increment_rates(*pair) for pair in zip(x, speeds, strict=True)])
+            if not np.max(np.abs(rates - before), initial=0.0) > 4.0 * EPS * np.max(np.abs(rates), initial=0.0):
+                break
+        self.bend = rates - speeds
+        return np.asarray(rates)
 
     def _terms(self, i: int, tangent: tuple[float, float] | None = None) -> Terms:
         return self.system.evaluate(self._point(i), self.mode, tangent)
@@ -339,9 +354,8 @@ class _RadauStep:
     def _local_error(self, matrices: _Matrices) -> Vector:
         """``μ h f(y₀) + Σ e_i (Y_i − y₀)`` of x and (v, z), filtered by (1 − hμ ∂f/∂y)⁻¹ along the rows."""
         dt, c, n_v, e = self.dt, self.c, self.n_v, RADAU.e
-        speeds = self.y0 + dt * RADAU.A @ self.W
         along = c * self.memory.rate + e @ (dt * RADAU.A @ self.W)
-        moved = c * self.y0[:n_v] + e @ (dt * RADAU.A @ speeds[:, :n_v])
+        moved = c * self.y0[:n_v] + e @ (dt * RADAU.A @ self._increment_rates())
         right = np.concatenate([matrices.M @ along - matrices.stiff @ moved / c, -matrices.turning @ moved])
         found = np.linalg.solve(matrices.real, right)[: len(self.y0)]
         return np.concatenate([moved + c * found[:n_v], found])

@@ -37,8 +37,10 @@ class RungeKutta853(Integrator):
 
     Twelve accelerations a step, ``ẋ = v``, ``(v̇, ż)`` from the balance and the rows at acceleration level::
 
-        x_i = dt Σ_j a_ij v_j,   y_i = y₀ + dt Σ_j a_ij rate_j,   rate_i = rate(t₀ + c_i dt, q₀ + x_i, y_i)
-        q₁ = q₀ + dt Σ_i b_i v_i,   y₁ = y₀ + dt Σ_i b_i rate_i
+        x_i = dt Σ_j a_ij ẋ_j,   y_i = y₀ + dt Σ_j a_ij rate_j,   rate_i = rate(t₀ + c_i dt, q₀ ⊕ x_i, y_i)
+        q₁ = q₀ ⊕ dt Σ_i b_i ẋ_i,   y₁ = y₀ + dt Σ_i b_i rate_i
+
+    with ẋ = v where positions add, else ``ẋ = D(x)⁻¹ v`` in the chart of the step (Munthe-Kaas 1999).
 
     Where rows are active, positions and velocities are projected onto them after each step, in the metric of M, which
     keeps the order (Hairer, Lubich & Wanner 2006, Geometric Numerical Integration, IV.4); accelerations and multipliers
@@ -48,13 +50,14 @@ class RungeKutta853(Integrator):
     It has no parameters: ``mbd.simulate(model, start, mbd.RungeKutta853(), tol=1e-9, until=10.0)``.
     """
 
+    any_chart: ClassVar[bool] = True
     between: ClassVar[str] = "stages"
     """Between rows its steps are taken again."""
     scheme: ClassVar[str | None] = "runge-kutta"
 
     def order(self, system: System | None = None) -> int:
-        """8, with and without rows; 2 where positions do not add, since its stages take ẋ = v."""
-        return 8 if system is None or completed(system).is_vector else 2
+        """8, with and without rows; 2 where positions do not add and a system does not tell ẋ."""
+        return 8 if system is None or completed(system).follows_charts else 2
 
     def start(self, system: System, state: State, mode: Mode, dt: float) -> RungeKuttaMemory:
         """Consistent rates and multipliers; the scheme remembers nothing else."""
@@ -74,7 +77,7 @@ class RungeKutta853(Integrator):
                 y = y0 + move[n_v:]
                 q = system.compose(state.q, move[:n_v])
                 rate, _ = consistent_rates(system, state.time + NODES[i] * dt, q, y, mode)
-                slopes[i] = np.concatenate([y[:n_v], rate])
+                slopes[i] = np.concatenate([system.increment_rates(move[:n_v], y[:n_v]), rate])
             move = dt * (END @ slopes[:STAGES])
             q1, y1 = system.compose(state.q, move[:n_v]), y0 + move[n_v:]
             if len(memory.lam):
@@ -84,7 +87,7 @@ class RungeKutta853(Integrator):
             return StepResult(state, memory, StepReport(False, 1, np.inf, str(failure)))
         if not np.isfinite(np.concatenate([q1, y1, rate, lam])).all():
             return StepResult(state, memory, StepReport(False, 1, np.inf, "the state is not finite"))
-        slopes[STAGES] = np.concatenate([y1[:n_v], rate])
+        slopes[STAGES] = np.concatenate([system.increment_rates(move[:n_v], y1[:n_v]), rate])
         new = State(t1, q1, y1[:n_v], y1[n_v:], state.mode, state.armed, state.anchors, state.names,
                     state.velocity_names, {}, state.parameters)  # fmt: skip
         return StepResult(new, RungeKuttaMemory(rate, lam, estimated_error(slopes, dt, n_v)), StepReport(True, 1))

@@ -15,12 +15,11 @@ beyond its limit, let go before it, and the step is taken again.
 from __future__ import annotations
 
 from mbd.kernel.candidate import adopt, carry
-from mbd.kernel.codes import COMPOSE, LOG_OPENED, NO_IMPACT, PULL
+from mbd.kernel.codes import LOG_OPENED, NO_IMPACT, PULL
 from mbd.kernel.complementarity import complementarity
 from mbd.kernel.guards import frictions_at, gap_scale, gap_tolerance, is_watched, watch
-from mbd.kernel.hooks import call
 from mbd.kernel.records import Kernel
-from mbd.kernel.restart import consistent, evaluate, largest_force
+from mbd.kernel.restart import consistent, displace, evaluate, largest_force
 from mbd.kernel.settle import NO_IMPULSE, STILL, log_event
 from mbd.kernel.switching import close_by_impact, mark_touching
 
@@ -159,17 +158,7 @@ def lift_once(K: Kernel) -> int:
     for i in range(K.n_v):
         moved = max(moved, abs(K.jump[i]))
     K.correction_size = moved
-    if K.vector == 1:
-        for i in range(K.n_q):
-            K.q[i] += K.jump[i]
-    else:
-        for i in range(K.n_q):
-            K.block[K.o_q + i] = K.q[i]
-        for i in range(K.n_v):
-            K.block[K.o_x + i] = K.jump[i]
-        call(K, COMPOSE, K.q)
-        for i in range(K.n_v):
-            K.block[K.o_x + i] = 0.0
+    displace(K, K.q, K.jump)
     return 0
 
 

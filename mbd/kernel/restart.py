@@ -9,7 +9,7 @@ from mbd.kernel.redundancy import find_mix, find_shares, shared, sharing, spread
 from mbd.kernel.saddle import solve_rows
 
 __all__ = [
-    "active_rows", "add_shares", "capture", "compose", "consistent", "evaluate", "evaluate_loaded",
+    "active_rows", "add_shares", "capture", "compose", "consistent", "displace", "evaluate", "evaluate_loaded",
     "fill_block", "holds_rows", "largest_force", "limit_of", "load_accelerations", "lower_scales", "note_scales",
     "raise_scales", "refresh_scales", "restore_scales", "retain_scales", "row_speed", "share_loads",
     "share_out", "stepping_rows",
@@ -59,6 +59,21 @@ def compose(K: Kernel, q1: Reals) -> None:
         call(K, COMPOSE, q1)
 
 
+def displace(K: Kernel, q: Any, x: Any) -> None:
+    """q ← q ⊕ x."""
+    if K.vector == 1:
+        for i in range(K.n_q):
+            q[i] += x[i]
+        return
+    for i in range(K.n_q):
+        K.block[K.o_q + i] = q[i]
+    for i in range(K.n_v):
+        K.block[K.o_x + i] = x[i]
+    call(K, COMPOSE, q)
+    for i in range(K.n_v):
+        K.block[K.o_x + i] = 0.0
+
+
 def refresh_scales(K: Kernel) -> None:
     """Magnitudes of r, h and ḣ, term by term before cancellation, at the state now in the block."""
     call(K, SCALES, K.scale)
@@ -73,13 +88,17 @@ def refresh_scales(K: Kernel) -> None:
             if K.unit[i] == unit:
                 K.scale[i] = big
     weigh(K)
+    far = 1e-3
+    if K.vector == 0:  # a coordinate without a velocity of its own has none of the units
+        for i in range(K.n_q):
+            far = max(far, abs(K.block[K.o_q + i]))
     for k in range(K.n_rows):  # a row that vanishes term by term still inherits the round-off of its coordinates
-        size = 1e-3
+        size = far
         speed = 1e-3
         for i in range(K.n_v):
             if K.unit[i] == K.row_unit[k]:
                 speed = max(speed, abs(K.block[K.o_v + i]))
-                if i < K.n_q:
+                if K.vector == 1:
                     size = max(size, abs(K.block[K.o_q + i]))
         K.scale[K.n + k] = max(K.scale[K.n + k], size)
         K.scale[K.n + K.n_rows + k] = max(K.scale[K.n + K.n_rows + k], speed)

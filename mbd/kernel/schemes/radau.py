@@ -37,6 +37,7 @@ from mbd.kernel.schemes.stages import (
     E_,
     MASS_PART,
     MU_REAL,
+    STAGE_BEND,
     STAGE_LAM,
     STAGE_RATES,
     STAGES_END,
@@ -418,11 +419,14 @@ def estimate_error(K: Kernel, h: float, m: int) -> None:
 
 
 def stage_speed(K: Kernel, k: int, j: int, h: float) -> float:
-    """v of component j at stage k."""
+    """ẋ of component j at stage k."""
     S = K.stages
     o = stage_place(K, STAGE_RATES) + j
     n = K.n
-    return float(K.y[j] + h * (S[A_ + 3 * k] * S[o] + S[A_ + 3 * k + 1] * S[o + n] + S[A_ + 3 * k + 2] * S[o + 2 * n]))
+    speed = K.y[j] + h * (S[A_ + 3 * k] * S[o] + S[A_ + 3 * k + 1] * S[o + n] + S[A_ + 3 * k + 2] * S[o + 2 * n])
+    if K.vector == 0 and j < K.n_v:
+        speed += S[stage_place(K, STAGE_BEND) + k * K.n_v + j]
+    return float(speed)
 
 
 def radau_memory(K: Kernel) -> dict[str, int]:

@@ -1,20 +1,22 @@
 """One explicit Runge–Kutta step of order 8 with its embedded error estimate (Dormand & Prince 1980, in the form of
 Hairer, Nørsett & Wanner 1993, II.5; coefficients in `mbd.kernel.schemes.dormand_prince`).
 
-    x_i = h Σ_j a_ij v_j,   y_i = y₀ + h Σ_j a_ij rate_j,   rate_i = rate(t₀ + c_i h, q₀ + x_i, y_i)
+    x_i = h Σ_j a_ij ẋ_j,   y_i = y₀ + h Σ_j a_ij rate_j,   ẋ_i = D(x_i)⁻¹ v_i,   rate_i = rate(t₀ + c_i h, q₀ ⊕ x_i, y_i)
 
 with accelerations that satisfy the balance and the rows at acceleration level. Positions and velocities at the end are
-projected onto the rows in the metric of M, whose rates and multipliers are the consistent ones of that state. Positions
-must form a vector space (q ⊕ x = q + x).
+projected onto the rows in the metric of M, whose rates and multipliers are the consistent ones of that state. Where
+positions add, ẋ = v; else the increments x of the step's chart form the vector space that the formula needs (Munthe-Kaas
+1999, Appl. Numer. Math. 29:115).
 """
 
 from __future__ import annotations
 
-from mbd.kernel.codes import EPS, NOT_CONVERGED, NOT_FINITE, PASSING, SINGULAR
+from mbd.kernel.codes import EPS, INCREMENT_RATES, NOT_CONVERGED, NOT_FINITE, PASSING, SINGULAR
+from mbd.kernel.hooks import call
 from mbd.kernel.linear import factor, solve_definite
 from mbd.kernel.ordered import LOSS_AT_ONCE, OF_ACCELERATIONS, SYMMETRIC, factor_ordered, order_at, solve_kkt
 from mbd.kernel.records import Kernel
-from mbd.kernel.restart import consistent, evaluate, fill_block, raise_scales, refresh_scales
+from mbd.kernel.restart import compose, consistent, displace, evaluate, fill_block, raise_scales, refresh_scales
 from mbd.kernel.roots import sqrt
 from mbd.kernel.schemes.contract import Abilities, Scheme
 from mbd.kernel.schemes.dormand_prince import NODES, STAGES, tableau
@@ -78,7 +80,7 @@ def runge_kutta_step(K: Kernel, h: float, t1: float) -> int:
             return status
         for i in range(n):
             K.stages[s * width + n_v + i] = K.jump[i]
-            if i < n_v:
+            if i < n_v and K.vector == 1:
                 K.stages[s * width + i] = K.y1[i]
     explicit_move(K, h, at_end, EXPLICIT_STAGES)
     if K.n_active > 0:
@@ -102,7 +104,7 @@ def runge_kutta_step(K: Kernel, h: float, t1: float) -> int:
         K.aux1[i] = K.jump[i]
         K.block[K.o_a + i] = K.jump[i]
         K.stages[EXPLICIT_STAGES * width + n_v + i] = K.jump[i]
-        if i < n_v:
+        if i < n_v and K.vector == 1:
             K.stages[EXPLICIT_STAGES * width + i] = K.y1[i]
     for k in range(K.n_rows):
         K.lam1[k] = K.impulse[k]
@@ -121,7 +123,7 @@ def runge_kutta_step(K: Kernel, h: float, t1: float) -> int:
 
 
 def explicit_move(K: Kernel, h: float, weights: int, count: int) -> None:
-    """(q1, y1) moved from the accepted state by h times the weighted slopes of the first stages."""
+    """(q1, y1) moved from the accepted state by h times the weighted slopes of the first stages; ẋ there as a slope."""
     n_v = K.n_v
     width = n_v + K.n
     for i in range(width):
@@ -131,10 +133,19 @@ def explicit_move(K: Kernel, h: float, weights: int, count: int) -> None:
         if weight != 0.0:
             for i in range(width):
                 K.spare[i] += weight * K.stages[j * width + i]
-    for i in range(n_v):
-        K.q1[i] = K.q[i] + K.spare[i]
     for i in range(K.n):
         K.y1[i] = K.y[i] + K.spare[n_v + i]
+    if K.vector == 1:
+        for i in range(n_v):
+            K.q1[i] = K.q[i] + K.spare[i]
+        return
+    for i in range(n_v):
+        K.block[K.o_x + i] = K.spare[i]
+        K.block[K.o_v + i] = K.y1[i]
+    compose(K, K.q1)
+    call(K, INCREMENT_RATES, K.spare)
+    for i in range(n_v):
+        K.stages[count * width + i] = K.spare[i]
 
 
 def explicit_rates(K: Kernel, t: float) -> int:
@@ -231,8 +242,7 @@ def return_to_rows(K: Kernel, t1: float) -> int:
             break
         before = size
         solve_kkt(K, n + m, K.rhs)
-        for i in range(K.n_v):
-            K.q1[i] += K.rhs[i]
+        displace(K, K.q1, K.rhs)
     if size > 1e3:  # coordinates may have grown since their sizes were noted
         raise_scales(K, True)
         size = 0.0

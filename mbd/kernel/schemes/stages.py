@@ -4,6 +4,9 @@ With W_i the rates (v̇, ż) at the points c_i of a step of size h, and U_i corr
 
     Y_i = y₀ + h Σ a_ij W_j,   X_i = h Σ a_ij V_j + U_i,   r(X_i, Y_i, W_i, λ_i) = 0,   h(X_i) = 0,   ḣ(X_i, V_i) = 0
 
+Where positions do not add, D(X_j)⁻¹ V_j = V_j + E_j takes the place of V_j in X_i; E_j are found by iteration, which
+Newton's matrices leave out.
+
 U_i stay in the range of the rows in the metric of the Newton matrix, Z = the columns of its inverse that belong to
 rows: with x' = v − Z η this is the stabilized form of Gear, Gupta & Leimkuhler (1985), whose metric may be any that is
 held over the step. Newton's matrices come from one transformation of A = (a_ij) (Hairer & Wanner 1996, IV.8): for each
@@ -13,7 +16,7 @@ tangent itself; that of the pair is put together from three of them.
 
 from __future__ import annotations
 
-from mbd.kernel.codes import EPS, PASSING
+from mbd.kernel.codes import EPS, INCREMENT_RATES, PASSING
 from mbd.kernel.complex_linear import factor_complex, solve_complex
 from mbd.kernel.hooks import call
 from mbd.kernel.linear import factor
@@ -36,10 +39,12 @@ C_, A_, A2_, MU_REAL, MU_RE, MU_IM, T_REAL, S_REAL, T_RE, T_IM, S_RE, S_IM, E_, 
 # parts of K.stages behind them
 (
     STAGE_RATES, STAGE_LAM, STAGE_SHIFT, CHANGES, BALANCES, HEIGHTS, HELD, MASS_PART, STIFF_PART, PAIR, PAIR_PIVOTS,
-    PAIR_RHS, STAGES_END,
-) = range(13)  # fmt: skip
+    PAIR_RHS, STAGE_BEND, STAGES_END,
+) = range(14)  # fmt: skip
 
 
+MOST_BENDS = 60
+"""Rounds of the iteration for E_j: it converges by a factor of half the largest increment or so [-]."""
 MOST_STRETCHED = 4.0
 """Size of a step over that of the last above which its stages predict nothing: a parabola would go far astray [-]."""
 
@@ -48,7 +53,7 @@ def stage_place(K: Kernel, part: int) -> int:
     """Where a part of K.stages begins.
 
     W (3, n) | λ (3, rows) | U (3, n_v) | last changes of W and λ | r and ḣ of each stage | h | H U | M | c² K |
-    complex matrix | its pivots | its right-hand side
+    complex matrix | its pivots | its right-hand side | E (3, n_v) where positions do not add
     """
     size = K.n + K.n_rows
     place = N_NUMBERS
@@ -76,6 +81,8 @@ def stage_place(K: Kernel, part: int) -> int:
         place += size
     if part > PAIR_RHS:
         place += 2 * size
+    if part > STAGE_BEND and K.vector == 0:
+        place += 3 * K.n_v
     return int(place)
 
 
@@ -87,6 +94,10 @@ def hold_block(K: Kernel) -> None:
         K.block[K.o_anchor + k] = K.anchors[k]
     for f in range(K.n_frictions):
         K.block[K.o_slip + f] = K.slip[f]
+    if K.vector == 0:
+        o_E = stage_place(K, STAGE_BEND)
+        for j in range(3 * K.n_v):
+            K.stages[o_E + j] = 0.0
 
 
 def predict_stages(K: Kernel, h: float, m: int) -> None:
@@ -123,13 +134,25 @@ def predict_stages(K: Kernel, h: float, m: int) -> None:
 
 def load_stage(K: Kernel, i: int, h: float, t1: float) -> None:
     """Stage i into the block."""
+    if K.vector == 0:
+        bend_stages(K, h)
+    load_state(K, i, h)
+    S = K.stages
+    o_L = stage_place(K, STAGE_LAM) + i * K.n_rows
+    K.block[0] = t1 if i == 2 else K.time + S[C_ + i] * h
+    for k in range(K.n_rows):
+        K.block[K.o_lam + k] = S[o_L + k]
+    if sharing(K):
+        share_loads(K, K.n_active)
+
+
+def load_state(K: Kernel, i: int, h: float) -> None:
+    """X_i, Y_i and W_i into the block."""
     S = K.stages
     n = K.n
     block = K.block
     o_W = stage_place(K, STAGE_RATES)
-    o_L = stage_place(K, STAGE_LAM) + i * K.n_rows
     o_U = stage_place(K, STAGE_SHIFT) + i * K.n_v
-    block[0] = t1 if i == 2 else K.time + S[C_ + i] * h
     for j in range(n):
         w0 = S[o_W + j]
         w1 = S[o_W + n + j]
@@ -139,10 +162,29 @@ def load_stage(K: Kernel, i: int, h: float, t1: float) -> None:
         if j < K.n_v:
             bend = S[A2_ + 3 * i] * w0 + S[A2_ + 3 * i + 1] * w1 + S[A2_ + 3 * i + 2] * w2
             block[K.o_x + j] = h * (S[C_ + i] * K.y[j] + h * bend) + S[o_U + j]
-    for k in range(K.n_rows):
-        block[K.o_lam + k] = S[o_L + k]
-    if sharing(K):
-        share_loads(K, K.n_active)
+    if K.vector == 0:
+        o_E = stage_place(K, STAGE_BEND)
+        for j in range(K.n_v):
+            for k in range(3):
+                block[K.o_x + j] += h * S[A_ + 3 * i + k] * S[o_E + k * K.n_v + j]
+
+
+def bend_stages(K: Kernel, h: float) -> None:
+    """E_j of all stages at their rates, by iteration; it takes as many rounds as the increments are large."""
+    o_E = stage_place(K, STAGE_BEND)
+    for _ in range(MOST_BENDS):
+        change = 0.0
+        speed = 0.0
+        for i in range(3):
+            load_state(K, i, h)
+            call(K, INCREMENT_RATES, K.spare)
+            for j in range(K.n_v):
+                bend = K.spare[j] - K.block[K.o_v + j]
+                change = max(change, abs(bend - K.stages[o_E + i * K.n_v + j]))
+                speed = max(speed, abs(K.spare[j]))
+                K.stages[o_E + i * K.n_v + j] = bend
+        if not change > 4.0 * EPS * speed:  # NaN ends it too: the stage tells
+            return
 
 
 def evaluate_stages(

@@ -116,7 +116,7 @@ def stirring(K: Kernel, k: int, fall: float, speed: float) -> float:
     Round-off δ of a row leaves positions open by δ/|w|; ḣ = 0 makes velocities δ/(|w| τ) of that, with |w| = fall τ.
     """
     turned = 1.0
-    for i in range(K.n_q):
+    for i in range(K.n_v if K.vector == 1 else 0):  # quaternions do not grow
         if K.unit[i] == 1:
             turned = max(turned, abs(K.q[i]))
     return float(STIR * EPS * turned * K.scale[K.n + K.rows[k]] / (fall * speed + 1e-300))

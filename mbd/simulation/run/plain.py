@@ -191,13 +191,11 @@ class MechanismSystem(System):
 
     def compose(self, q: Vector, x: Vector) -> Vector:
         """q ⊕ x."""
-        if self.mechanism.vector:
-            return np.asarray(q + x)
-        block = self.mechanism.block(0.0, q, np.zeros(self.mechanism.layout.n), self.anchors)
-        block[self.mechanism.layout.x : self.mechanism.layout.v] = x
-        out = np.zeros(self.mechanism.layout.n_q)
-        self.mechanism.common["compose"](block, self.parameters, out)
-        return out
+        return self.mechanism.equations.configuration.compose(q, x)
+
+    def increment_rates(self, x: Vector, v: Vector) -> Vector:
+        """ẋ = D(x)⁻¹ v."""
+        return self.mechanism.equations.configuration.increment_rates(x, v)
 
 
 def _least_pivot(M: Matrix) -> float:
@@ -224,8 +222,9 @@ def _by_unit(scale: Vector, mechanism: Mechanism) -> Vector:
 def _by_coordinate(point: Point, mechanism: Mechanism) -> tuple[Vector, Vector]:
     """Size of the coordinates and speeds of each row's unit, whose round-off the row inherits."""
     units, n_v = unit_blocks(mechanism), mechanism.layout.n_v
-    q, v = np.abs(point.q[:n_v]), np.abs(point.y[:n_v])
-    size = [float(np.max(q[units[: len(q)] == unit], initial=1e-3)) for unit in range(3)]
+    q, v = np.abs(point.q), np.abs(point.y[:n_v])
+    mine = units[:n_v] if mechanism.vector else None  # else a coordinate has no unit of its own
+    size = [float(np.max(q if mine is None else q[mine == unit], initial=1e-3)) for unit in range(3)]
     speed = [float(np.max(v[units[:n_v] == unit], initial=1e-3)) for unit in range(3)]
     rows = row_units(mechanism)
     return np.array(size)[rows], np.array(speed)[rows]
@@ -240,8 +239,8 @@ def unit_blocks(mechanism: Mechanism) -> Any:
     """0 for balance components that are forces, 1 for torques, 2 for others, each judged alone."""
     numbers = {"m": 0, "rad": 1}
     equations = mechanism.equations
-    units = [numbers.get(c.unit, 2) for c in equations.coordinates][: equations.n_v]
-    units += [2] * (equations.n_v - len(units) + equations.n_z)
+    units = [numbers.get(unit, 2) for _, unit in equations.configuration.freedoms]
+    units += [2] * equations.n_z
     return np.array(units, dtype=np.int64)
 
 

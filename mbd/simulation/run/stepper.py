@@ -99,6 +99,7 @@ class Stepper:
         self.functions: list[Any] = [mechanism.common[name] for name in ("accelerations", "guards", "scales")]
         self.functions.append(None if mechanism.vector else mechanism.common["compose"])
         self.functions.append(mechanism.common["terms"] if mechanism.judged else None)
+        self.functions.append(None if mechanism.vector else mechanism.common["increment_rates"])
         self.kernel.code = self.functions
         self.modes: list[Any] = []
         self.dependent: dict[int, tuple[int, ...]] = {}
