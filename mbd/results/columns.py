@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from mbd.arrays import Matrix, Vector
 from mbd.errors import TrajectoryError, UnknownNameError, nearest
 from mbd.results.balance import Balance
+from mbd.results.charts import Charts
 from mbd.results.dense import Restepping
 from mbd.results.dense_implicit import LedSteps
 from mbd.results.forces import Forces
@@ -180,8 +181,9 @@ class ModelColumns(Columns):
     def _interpolated(self, places: Places) -> tuple[Rows, Rows]:
         """States by polynomials, and by polynomials of a lower degree."""
         rows, plain = self.rows, self.equations.compose is None
-        smooth = is_smooth(self.record, plain)
-        found = self.grid.between(rows, places, self.q_rate, smooth)
+        charts = Charts.of(self.equations)
+        smooth = is_smooth(self.record, plain or charts is not None)
+        found = self.grid.between(rows, places, self.q_rate, smooth, charts)
         rougher = self.grid.rougher(rows, places, found, plain, smooth)
         if smooth and LedSteps.serves(self) and Balance.serves(self.equations):
             found = LedSteps(self).at(rows, places, found)
@@ -376,7 +378,10 @@ def asks_for_forces(nodes: Sequence[Node]) -> bool:
 
 
 def is_smooth(record: Record, plain: bool) -> bool:
-    """Whether the scheme is of high order, with accelerations as accurate as positions; `plain`: q̇ = v."""
+    """Whether the scheme is of high order, with accelerations as accurate as positions.
+
+    plain : whether q̇ = v, or charts are known in which positions are interpolated
+    """
     return plain and record.settings.get("between", "hermite") != "hermite"
 
 

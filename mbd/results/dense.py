@@ -16,6 +16,7 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.kernel.schemes.dormand_prince import END, NODES, STAGES, WEIGHTS
 from mbd.results.balance import Solved, put
+from mbd.results.charts import Charts
 from mbd.results.record import Rows
 
 if TYPE_CHECKING:
@@ -33,6 +34,7 @@ class Restepping:
 
     def __init__(self, columns: ModelColumns) -> None:
         self.columns, self.equations = columns, columns.equations
+        self.charts = Charts.of(columns.equations)
 
     @staticmethod
     def serves(columns: ModelColumns) -> bool:
@@ -42,7 +44,8 @@ class Restepping:
         """
         settings, equations = columns.record.settings, columns.equations
         stepped = settings.get("between") == "stages" and settings.get("store") == 1
-        return stepped and equations.compose is None and not equations.frictions
+        known = equations.compose is None or Charts.of(equations) is not None
+        return stepped and known and not equations.frictions
 
     def at(self, rows: Rows, places: Places) -> Rows:
         """The states at places; those that meet a row are that row."""
@@ -52,7 +55,7 @@ class Restepping:
             return found
         begin, time = found.part(inside), places.time[inside]
         state, least = self._stepped(begin, (time - begin.time)[:, None])
-        q, v, z = self._parts(state)
+        q, v, z = self._parts(begin, state)
         end = self._rates(replace(begin, time=time, q=q, v=v, z=z))
         changed: dict[str, Any] = {"time": time, "q": q, "v": v, "z": z, "lam": end.lam}
         changed["a"], changed["s"] = np.split(end.rate, [self.equations.n_v], axis=1)
@@ -68,27 +71,36 @@ class Restepping:
 
     def _smoothed(self, rows: Rows, places: Places, found: Rows, near: Any) -> Rows:
         """The states with those told by `near` interpolated."""
-        between = self.columns.grid.between(rows, places, self.columns.record.v, True)
+        between = self.columns.grid.between(rows, places, self.columns.q_rate, True, self.charts)
         names = ("q", "v", "z", "a", "s", "lam")
         new: dict[str, Any] = {name: put(getattr(found, name), near, getattr(between, name)[near]) for name in names}
         return replace(found, **new)
 
     def _stepped(self, begin: Rows, h: Matrix) -> tuple[Matrix, Vector]:
-        """(q, v, z) after a step of h (k, 1) from each of the rows, and the least change of log |det| at its stages."""
-        base = np.hstack([begin.q, begin.v, begin.z])
+        """(q, v, z) after a step of h (k, 1) from each of the rows, and the least change of log |det| at its stages.
+
+        Where coordinates do not add, the increment x stands in the place of q.
+        """
+        still = begin.q if self.charts is None else np.zeros_like(begin.v)  # the increment of a chart
+        base = np.hstack([still, begin.v, begin.z])
         slopes = np.zeros((STAGES, *base.shape))
         slopes[0] = np.hstack([begin.v, begin.a, begin.s])
         before = self._rates(begin).size
         least = np.zeros(len(begin))
         for stage in range(1, STAGES):
-            q, v, z = self._parts(base + h * np.tensordot(WEIGHTS[stage, :stage], slopes[:stage], 1))
+            moved = base + h * np.tensordot(WEIGHTS[stage, :stage], slopes[:stage], 1)
+            q, v, z = self._parts(begin, moved)
             there = self._rates(replace(begin, time=begin.time + NODES[stage] * h[:, 0], q=q, v=v, z=z))
-            slopes[stage] = np.hstack([v, there.rate])
+            flow = v if self.charts is None else self.charts.increment_rates(moved[:, : v.shape[1]], v)
+            slopes[stage] = np.hstack([flow, there.rate])
             least = np.minimum(least, there.size - before)
         return np.asarray(base + h * np.tensordot(END, slopes, 1)), least
 
-    def _parts(self, state: Matrix) -> tuple[Matrix, Matrix, Matrix]:
+    def _parts(self, begin: Rows, state: Matrix) -> tuple[Matrix, Matrix, Matrix]:
         n_q, n_v = self.equations.n_q, self.equations.n_v
+        if self.charts is not None:
+            x, v, z = np.split(state, [n_v, 2 * n_v], axis=1)
+            return self.charts.composed(begin.q, x), v, z
         return state[:, :n_q], state[:, n_q : n_q + n_v], state[:, n_q + n_v :]
 
     def _rates(self, rows: Rows) -> Solved:

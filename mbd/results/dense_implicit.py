@@ -71,7 +71,7 @@ class LedSteps:
         theta, begin = places.theta[:, None], rows.part(places.lower)
         with np.errstate(all="ignore"):
             state, _ = self.steps._stepped(begin, theta * places.step[:, None])
-        q, v, z = self.steps._parts(state + theta * off[back])
+        q, v, z = self.steps._parts(begin, state + theta * off[back])
         here = self.steps._rates(replace(begin, time=places.time, q=q, v=v, z=z))
         first, last = (self._unbalanced(rows.part(number)) for number in (which, which + 1))
         both = np.hstack([here.rate, here.lam]) + (1.0 - theta) * first[back] + theta * last[back]

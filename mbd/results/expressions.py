@@ -8,7 +8,7 @@ executed but these operations.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ import numpy as np
 from mbd.equations import programs
 from mbd.results.archive import Arrays, Members
 from mbd.results.balance import Balance
+from mbd.results.charts import Charts
 from mbd.results.content import expect, of_kind
 from mbd.tape.derivatives import live
 from mbd.tape.node import Node, Table, Tape
@@ -80,6 +81,7 @@ class Expressions:
     adds: bool
     parameters: tuple[Any, ...] = ()
     wrapped: tuple[_Wrapped, ...] = ()
+    memory: dict[str, Any] = field(default_factory=dict)
 
     @property
     def balance(self) -> tuple[Node, ...]:
@@ -88,8 +90,9 @@ class Expressions:
 
     @property
     def compose(self) -> tuple[Node, ...] | None:
-        """None where coordinates add."""
-        return None if self.adds else ()
+        """None where coordinates add; () where they do not and a file does not tell how."""
+        charts: Charts | None = self.memory.get("charts")
+        return None if self.adds else () if charts is None else charts.compose
 
     def output(self, name: str) -> Node:
         """A named result; KeyError for one that was not saved."""
@@ -107,8 +110,10 @@ def write_expressions(equations: Any, nodes: Mapping[str, Node], arrays: Arrays)
         terms: Sequence[Node] = equations.terms if own else ()
         if not own and Balance.serves(equations):
             terms = programs.accelerations(equations)
+        charts = Charts.of(equations)
+        moving = () if charts is None else charts.nodes
         turning = [node for turn in equations.wrapped for node in (turn.angle, turn.rate)]
-        order = live([*nodes.values(), *terms, *turning])
+        order = live([*nodes.values(), *terms, *turning, *moving])
     place = {node.index: k for k, node in enumerate(order)}
     tables = list({node.data[0].index: node.data[0] for node in order if node.op == "table"}.values())
     where = {table.index: k for k, table in enumerate(tables)}
@@ -132,7 +137,7 @@ def write_expressions(equations: Any, nodes: Mapping[str, Node], arrays: Arrays)
         "rows": [[row.contact, row.friction] for row in equations.rows],
         "contacts": [list(contact.anchors) for contact in equations.contacts],
         "frictions": [[friction.contact, friction.row] for friction in equations.frictions],
-        "adds": equations.compose is None,
+        "adds": equations.compose is None, "charts": [place[node.index] for node in moving],
         "wrapped": [[turn.anchor, place[turn.angle.index], place[turn.rate.index]] for turn in equations.wrapped],
     }  # fmt: skip
 
@@ -163,6 +168,8 @@ def arrays_of_expressions(words: Any, members: Members) -> set[str]:
     for held in words["contacts"]:
         for place in of_kind(held, list, what):
             expect(0 <= of_kind(place, int, what) < anchors, what)
+    charts = of_kind(words.get("charts", []), list, what)  # older files have none
+    expect(len(charts) in (0, q + 5 * v) and all(0 <= of_kind(k, int, what) < count for k in charts), what)
     wrapped = words.get("wrapped", [])  # older files have none
     _indices(wrapped, len(of_kind(wrapped, list, what)), ((0, anchors), (0, count), (0, count)), what)
     n = v + z
@@ -189,7 +196,8 @@ def read_expressions(words: Mapping[str, Any], arrays: Mapping[str, Any], parame
     sizes = dict(zip("qvz", words["sizes"], strict=True))
     rows, contacts, frictions = (words[name] for name in ("rows", "contacts", "frictions"))
     room = {
-        "t": 1, "q": sizes["q"], "x": sizes["v"], "v": sizes["v"], "a": sizes["v"], "z": sizes["z"], "s": sizes["z"],
+        "t": 1, "q": (1 if words["adds"] else 2) * sizes["q"],
+        "x": sizes["v"], "v": sizes["v"], "a": sizes["v"], "z": sizes["z"], "s": sizes["z"],
         "lam": len(rows), "anchor": arrays["anchors"].shape[1], "switch": len(contacts), "slip": len(frictions),
         "p": parameters,
     }  # fmt: skip
@@ -201,12 +209,14 @@ def read_expressions(words: Mapping[str, Any], arrays: Mapping[str, Any], parame
     outputs, terms = (arrays[f"graph {name}"] for name in ("outputs", "terms"))
     for places in outputs, terms:
         expect(bool(np.all((places >= 0) & (places < len(nodes)))), "'graph'")
+    charts = [nodes[k] for k in words.get("charts", ())]
+    known = {"charts": Charts.from_nodes(charts, sizes["q"], sizes["v"]) if charts else None}
     return Expressions(
         tape, sizes["q"], sizes["v"], sizes["z"], tuple(_Row(*row) for row in rows),
         tuple(_Contact(tuple(held)) for held in contacts), tuple(_Friction(*friction) for friction in frictions),
         {name: nodes[k] for name, k in zip(words["names"], outputs, strict=True)}, tuple(nodes[k] for k in terms),
         words["adds"], (),
-        tuple(_Wrapped(anchor, nodes[angle], nodes[rate]) for anchor, angle, rate in words.get("wrapped", ())),
+        tuple(_Wrapped(anchor, nodes[angle], nodes[rate]) for anchor, angle, rate in words.get("wrapped", ())), known,
     )  # fmt: skip
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any, Literal
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -102,6 +102,13 @@ def parabola(places: Places, y0: Matrix, rate0: Matrix, y1: Matrix) -> tuple[Mat
     return np.asarray(y0 + x * h * rate0 + x * x * bend), np.asarray(rate)
 
 
+class Chart(Protocol):
+    """Positions, velocities and accelerations between rows, of coordinates that do not add."""
+
+    def between(self, rows: Rows, places: Places, smooth: bool) -> tuple[Matrix, Matrix, Matrix]:
+        """q, v and v̇ at places."""
+
+
 @dataclass(frozen=True, eq=False)
 class Grid:
     """The times of the stored rows; two equal neighbours are the two sides of a switch."""
@@ -160,18 +167,26 @@ class Grid:
                 rates[start:stop] = np.gradient(values[start:stop], self.time[start:stop], axis=0, edge_order=order)
         return rates
 
-    def between(self, rows: Rows, places: Places, q_rate: Matrix, smooth: bool = False) -> Rows:
+    def between(
+        self, rows: Rows, places: Places, q_rate: Matrix, smooth: bool = False, charts: Chart | None = None
+    ) -> Rows:
         """The states at places between the rows.
 
         q by Hermite with q̇, v with v̇, z with ż; accelerations and ż are the slopes of those
         curves; multipliers by Hermite with three-point slopes; contacts, frictions and anchors as they hold in the
         interval. `smooth`, for rows whose accelerations are as accurate as the rest and q̇ = v: q of degree 8 through
-        three rows, v and v̇ its slopes, and z of degree 5 (`results.osculating`).
+        three rows, v and v̇ its slopes, and z of degree 5 (`results.osculating`). Where coordinates do not add,
+        `charts` interpolate q, v and v̇ (`results.charts`).
         """
         low, high = places.lower, places.upper
         ends = (rows.v[low], rows.a[low], rows.v[high], rows.a[high])
         states = (rows.z[low], rows.s[low], rows.z[high], rows.s[high])
-        if smooth:
+        if charts is not None:
+            q, v, a = charts.between(rows, places, smooth)
+            z, change = hermite(places, *states), hermite_rate(places, *states)
+            if smooth:
+                z, change = osculating(rows.time, places, (rows.z, rows.s)).values
+        elif smooth:
             q, v, a = osculating(rows.time, places, (rows.q, rows.v, rows.a)).values
             z, change = osculating(rows.time, places, (rows.z, rows.s)).values
         else:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
+from mbd.results.charts import Charts
 from mbd.results.columns import is_smooth
 from mbd.results.dense import Restepping
 from mbd.results.interpolation import Places
@@ -36,7 +37,8 @@ def readable(columns: ModelColumns) -> NDArray[np.bool_]:
     """Between which rows the states of a run are as accurate as the rows, (R − 1,)."""
     record = columns.record
     step = np.diff(record.time)
-    smooth = is_smooth(record, columns.equations.compose is None) and record.settings.get("store", 1) == 1
+    known = columns.equations.compose is None or Charts.of(columns.equations) is not None
+    smooth = is_smooth(record, known) and record.settings.get("store", 1) == 1
     return np.asarray((step > 0.0) & (smooth or Restepping.serves(columns)))
 
 

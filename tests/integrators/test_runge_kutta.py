@@ -9,13 +9,11 @@ import numpy as np
 import pytest
 
 import mbd
-from mbd.compile.mechanisms import mechanism_of
 from mbd.hardcases.governor import governor
 from mbd.hardcases.user_force import pushed_particle
 from mbd.integrators.runge_kutta import RungeKutta853
 from mbd.kernel.schemes.dormand_prince import END, FIFTH, NODES, STAGES, THIRD, WEIGHTS
 from mbd.results.interpolation import Grid, quintic
-from mbd.simulation.capabilities import refusals
 from mbd.testing.wild import wild_scene
 from tests.integrators.test_order import double_pendulum
 from tests.simulation.mechanisms import ball, kneed_walker, kneed_walker_start, pendulum, run
@@ -132,14 +130,6 @@ def test_a_walker_strikes_and_locks_at_the_same_instants_with_steps_of_a_twentie
     assert [(e.name, e.kind) for e in coarse.events] == [(e.name, e.kind) for e in fine.events]
     np.testing.assert_allclose([e.time for e in coarse.events], [e.time for e in fine.events], rtol=0, atol=1e-8)
     assert len(coarse.events) == 5
-
-
-def test_coordinates_that_do_not_add_are_refused():
-    model, _ = started("double pendulum")
-    equations = mechanism_of(model).equations
-    turned = replace(equations, compose=[equations.tape.input("q", 0)])
-    assert not refusals(equations, SCHEME, {})
-    assert any("q + x" in text and "mbd.HHT" in text for text in refusals(turned, SCHEME, {}))
 
 
 def test_long_steps_are_looked_at_on_a_quintic():

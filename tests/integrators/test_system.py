@@ -203,7 +203,8 @@ def test_a_class_with_an_evaluate_alone_runs_through_every_scheme(scheme, system
 def test_where_positions_turn_a_scheme_has_the_order_that_it_tells(scheme, system):
     start = State(0.0, np.array([1.0, 0.0, 0.0, 0.0]), np.array([2.0, -3.0, 1.5]))
     exact = end_of_top(start, 0.8)
-    errors = [np.abs(steps(scheme, system, start, 0.8 / count, count) - exact).max() for count in (20, 40, 80)]
+    counts = (3, 6, 12) if scheme.order(system) == 8 else (20, 40, 80)
+    errors = [np.abs(steps(scheme, system, start, 0.8 / count, count) - exact).max() for count in counts]
     assert observed_order(errors, 1e-11) == pytest.approx(scheme.order(system), abs=0.15)
 
 
@@ -227,4 +228,4 @@ def test_a_scheme_that_does_not_say_that_it_moves_in_any_chart_is_refused_where_
     turning = replace(equations, compose=tuple(equations.tape.input("q", k) for k in range(equations.n_q)))
     assert not refusals(equations, ProjectedMidpoint(), {})
     assert "q + x" in refusals(turning, ProjectedMidpoint(), {})[0]
-    assert not any(refusals(turning, scheme, {}) for scheme in INTEGRATORS)
+    assert not any(refusals(turning, scheme, {}) for scheme in (mbd.HHT(0.05), mbd.RadauIIA(), mbd.RungeKutta853()))
