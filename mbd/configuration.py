@@ -97,9 +97,12 @@ class Configuration:
 
     @cached_property
     def freedoms(self) -> tuple[tuple[str, str], ...]:
-        """(name, unit) of each increment: of its coordinate, or of its velocity without '.rate' and '/s'."""
-        pairs = zip(self.velocity_names, self.velocity_units, strict=True)
-        return tuple((name.removesuffix(".rate"), unit.removesuffix("/s")) for name, unit in pairs)
+        """(name, unit) of each increment: its coordinate's, or 'displacement along ball.spin x'."""
+        pairs = zip(self.places, self.velocity_names, self.velocity_units, strict=True)
+        return tuple(
+            (self.names[place] if place >= 0 else f"displacement along {name}", unit.removesuffix("/s"))
+            for place, name, unit in pairs
+        )
 
     @cached_property
     def places(self) -> Any:
@@ -170,6 +173,18 @@ class Configuration:
         if self.is_vector:
             return np.asarray(rates)
         return self._by_joints("v", lambda joint: joint.increment_velocities, (x, "v"), (rates, "v"), lambda a, b: b)
+
+    def misplaced(self, q: Vector, tolerance: float) -> list[str]:
+        """What is wrong with coordinates (n_q,) that no placement has, one phrase for each joint."""
+        found = []
+        for joint, first, _ in self.charts:
+            own = np.asarray(q[first : first + len(joint.labels)], dtype=float)
+            near = np.asarray(joint.normalise(own.tolist()), dtype=float)
+            if not np.max(np.abs(near - own)) <= tolerance:
+                names, values = ", ".join(map(repr, joint.coordinate_names)), ", ".join(f"{x:.9g}" for x in own)
+                shown = ", ".join(f"{value:.9g}" for value in near)
+                found.append(f"{names} = {values}, which no placement of {joint.known_as} has; the nearest are {shown}")
+        return found
 
     def interpolate(self, q: Any, other: Any, s: Any) -> Vector:
         """``q ⊕ s (other ⊖ q)`` (…, n_q): q at s = 0, the other at s = 1."""

@@ -149,6 +149,7 @@ def _states(run: Trajectory, rows: Sequence[int]) -> dict[str, Any]:
             found[name] = run[name][list(rows)]
         if f"{name}.rate" in run:
             found[f"{name}.rate"] = run[f"{name}.rate"][list(rows)]
+    found |= {name: run[name][list(rows)] for name, _ in facts.velocities}
     return found
 
 

@@ -13,8 +13,9 @@ from mbd.analysis.independent import Independent, independent, row_sizes
 from mbd.analysis.instant import Instant, instant
 from mbd.arrays import Matrix, Vector
 from mbd.assembly.dependence import NEGLIGIBLE
+from mbd.configuration import Configuration
 from mbd.equations.linearization import LinearTerms
-from mbd.errors import CapabilityError, ModelError
+from mbd.errors import ModelError
 from mbd.state import State
 
 __all__ = ["Linearization", "NaturalMode", "linearize"]
@@ -49,14 +50,15 @@ class Linearization:
     Attributes
     ----------
     model : its name; time : of the state [s]
-    coordinates : n_v names of the coordinates, in the order of M, C, K and the columns of B
+    coordinates : n_v names of the coordinates, in the order of M, C, K and the columns of B; those of velocities for
+        joints whose coordinates do not add, with small displacements along these in axes that move with the child
     rows : m titles of the active rows
     M, C, K : (n_v, n_v) derivatives of the balance r by v̇, v and q, with the accelerations and multipliers of the
         state held: K has the geometric stiffness of multipliers, C gyroscopic terms; unsymmetric where forces are
     B : (m, n_v) ∂h/∂q of the rows; of rows on velocities ∂ḣ/∂v
     A : (N, N) state matrix; states : its N names: independent coordinates, independent rates, first-order states
     basis : (2 n_v + n_z, N) small changes of (q, v, z) for a unit change of each of `states`
-    y : (2 n_v + n_z,) the state (q, v, z); drift : its rate (q̇, v̇, ż)
+    y : (n_q + n_v + n_z,) the state (q, v, z); drift : (2 n_v + n_z,) the rates of displacements, v and z: (v, v̇, ż)
     eigenvalues : (N,) of A by growing magnitude, conjugate pairs side by side [1/s]
     shapes : (n_v, N) the coordinates' part of each motion, largest part 1; of motions that move no coordinate 0
     """
@@ -109,7 +111,15 @@ class Linearization:
     @property
     def x(self) -> Vector:
         """(N,) values of `states` [m, rad, m/s, rad/s, …]."""
-        return self.y[list(self.picked)]
+        configuration = self._configuration
+        if configuration.is_vector:
+            return self.y[list(self.picked)]
+        places = np.append(self.y, 0.0)[configuration.places]  # increments of charts are 0 here
+        return np.append(places, self.y[configuration.n_q :])[list(self.picked)]
+
+    @property
+    def _configuration(self) -> Configuration:
+        return self.instant.mechanism.equations.configuration
 
     @property
     def is_equilibrium(self) -> bool:
@@ -124,10 +134,10 @@ class Linearization:
         Accelerations satisfy ``[M Bᵀ; B 0] (v̇, λ) = −(f, γ)``. Nothing switches, and rows are held in their
         accelerations only: h grows with the error of the integrator.
         """
-        system, n = self.instant.system, len(self.coordinates)
-        y = np.asarray(y, dtype=float)
-        rate, _ = system.accelerations(float(t), y[:n], y[n:], self.instant.state.mode)
-        return np.concatenate([y[n : 2 * n], rate])
+        system, n, configuration = self.instant.system, len(self.coordinates), self._configuration
+        q, speeds = np.split(np.asarray(y, dtype=float), [configuration.n_q])
+        rate, _ = system.accelerations(float(t), q, speeds, self.instant.state.mode)
+        return np.concatenate([configuration.rates(q, speeds[:n]), rate])
 
     def linear_rhs(self, t: float, x: Vector) -> Vector:
         """``ẋ = ẋ₀ + A (x − x₀)`` of the independent states, x₀ = `x`: for `solve_ivp`."""
@@ -169,8 +179,6 @@ def linearize(
     ------
     ModelError
         if the state is not consistent, a closed contact would pull, or rows lose rank at this posture only.
-    CapabilityError
-        for a joint whose coordinates do not add, such as a ball joint.
 
     Examples
     --------
@@ -185,10 +193,6 @@ def linearize(
           4.42945    0.704968     0.0452  pin.angle
     """
     found = instant(model, state, parameters, backend)
-    if not found.mechanism.vector:
-        raise CapabilityError(
-            "linearize needs coordinates that add; a joint of this model has others: use revolute joints in its place"
-        )
     equations, terms = found.mechanism.equations, found.terms()
     n_v = equations.n_v
     if n_v == 0:
@@ -200,7 +204,7 @@ def linearize(
     picked = (*chosen.places, *(n_v + k for k in chosen.speeds), *range(2 * n_v, 2 * n_v + equations.n_z))
     A = _motion(found, terms, n_v)[list(picked)] @ chosen.basis
     eigenvalues, shapes = _modes(A, chosen.basis[:n_v])
-    places = tuple(coordinate.name for coordinate in equations.coordinates)
+    places = tuple(name for name, _ in equations.configuration.freedoms)
     names = (*places, *equations.velocity_names, *(each.name for each in equations.states))
     return Linearization(
         equations.name, state.time, places, found.titles, tuple(names[k] for k in picked), terms.M[:n_v, :n_v],
@@ -222,6 +226,7 @@ def _motion(found: Instant, terms: LinearTerms, n_v: int) -> Matrix:
     right = np.vstack([np.hstack([terms.K, terms.C]), np.hstack([place, speed, still])])
     full = np.zeros((n_v + n, n_v + n))
     full[:n_v, n_v : 2 * n_v] = np.eye(n_v)
+    full[:n_v, :n_v] = terms.carried
     full[n_v:] = -np.linalg.solve(matrix, right)[:n]
     return full
 

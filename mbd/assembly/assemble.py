@@ -255,12 +255,7 @@ def _off_manifold(equations: Equations, named: _Named, q: Vector) -> list[str]:
         given, names = [k for k in own if k in named.q], ", ".join(map(repr, joint.coordinate_names))
         if 0 < len(given) < len(own):
             faults.append(f"position: {names} of {joint.known_as} belong together; name all of them or none")
-            continue
-        near = np.asarray(joint.normalise([float(q[k]) for k in own]), dtype=float)
-        if given and not np.max(np.abs(near - q[own.start : own.stop])) <= ROUNDED:
-            shown = ", ".join(f"{value:.6g}" for value in near)
-            faults.append(f"position: no placement of {joint.known_as} has these {names}; the nearest are {shown}")
-    return faults
+    return faults or [f"position: {said}" for said in equations.configuration.misplaced(q, ROUNDED)]
 
 
 def undetermined(work: Posture) -> list[str]:

@@ -23,6 +23,9 @@ __all__ = ["LARGEST_ANGLE", "GivenState", "beyond_angles", "fits", "given_state"
 LARGEST_ANGLE = 1e12
 """Beyond this, neighbouring numbers differ by more than 1e-4 rad: poses, and what depends on them, are round-off."""
 
+ROUND_OFF = 1e-9
+"""Most by which coordinates of a state may be off those of a placement, such as a quaternion's of length 1 [-]."""
+
 
 @dataclass(frozen=True)
 class GivenState:
@@ -91,6 +94,7 @@ def fits(start: State, equations: Equations, manager: ActiveSetManager) -> None:
         f"the start has {name!r} = {value}; give a finite number" for name, value in values if not np.isfinite(value)
     ]
     bad += [f"the start has {said}; take whole turns away" for said in beyond_angles(equations, start.q)]
+    bad = bad or [f"the start has {said}" for said in equations.configuration.misplaced(start.q, ROUND_OFF)]
     if bad:
         raise ModelError(bad)
 

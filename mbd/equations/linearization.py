@@ -32,6 +32,10 @@ class LinearTerms:
     B : (m, n_v) ∂h/∂x = ∂ḣ/∂v, of rows on velocities ∂rate/∂v
     turning : (m, n_v) ∂ḣ/∂x
     change_speed, change_place : (m, n_v) ∂ḧ/∂v and ∂ḧ/∂x with accelerations held
+    carried : (n_v, n_v) ``ẋ = v + carried x`` of a small displacement x from a motion with velocities v: −[v, x], with
+        which displacements measured in axes that turn change; 0 where coordinates add
+
+    Where coordinates do not add, derivatives by x are those along velocities, at the state that is reached.
     """
 
     r: Vector
@@ -46,12 +50,14 @@ class LinearTerms:
     turning: Matrix
     change_speed: Matrix
     change_place: Matrix
+    carried: Matrix
 
     @classmethod
     def shapes(cls, n: int, n_v: int, m: int) -> list[tuple[int, ...]]:
         """The shapes of the fields, in the order in which the program lists them."""
         return [
-            (n,), (n, n), (n, n), (n, n_v), (n, m), (m,), (m,), (m,), (m, n_v), (m, n_v), (m, n_v), (m, n_v)
+            (n,), (n, n), (n, n), (n, n_v), (n, m), (m,), (m,), (m,), (m, n_v), (m, n_v), (m, n_v), (m, n_v),
+            (n_v, n_v),
         ]  # fmt: skip
 
     @classmethod
@@ -95,6 +101,7 @@ def linearization(
         _across(_places(equations, rate), len(rows)),
         _across(jvps(change, [{speed: 1.0} for speed in inputs.v]), len(rows)),
         _across(_places(equations, change), len(rows)),
+        _across(_carried(inputs), len(inputs.v)),
     ]
     return [*r, *chain(*matrices), *h, *rate, *change, *chain(*of_rows)]
 
@@ -104,6 +111,17 @@ def _places(equations: Equations, values: Sequence[Node]) -> list[list[Node]]:
     along = Inputs.of(equations).along
     known = [{} for _ in along] if equations.geometry is None else equations.geometry.partials(values)
     return jvps(values, [{**seeds, **known[j]} for j, seeds in enumerate(along)])
+
+
+def _carried(inputs: Inputs) -> list[list[Node]]:
+    """Columns of ``x ↦ D⁻¹(x) v − D⁻¹(v) x`` to first order, which is [x, v]."""
+    if inputs.chart is None:
+        zero = 0.0 * inputs.t
+        return [[zero] * len(inputs.v) for _ in inputs.v]
+    flow, along = inputs.chart.rates, dict(zip(inputs.x, inputs.v, strict=True))
+    moved = jvps(flow, [{x: 1.0} for x in inputs.x])
+    turned = [jvp(jvp(flow, {v: 1.0}), along) for v in inputs.v]
+    return [[a - b for a, b in zip(*pair, strict=True)] for pair in zip(moved, turned, strict=True)]
 
 
 def _across(columns: Sequence[Sequence[Node]], height: int) -> list[Node]:

@@ -102,6 +102,7 @@ def _facts(facts: Any, heads: Mapping[str, Head]) -> int:
         expect(len(segment) == 2 and isinstance(segment[0], str), "'segments'")
         _list(segment[1], str, "'segments'")
     _pairs(facts.get("frictions", []), "'frictions'")
+    _pairs(facts.get("velocities", []), "'velocities'")
     return len(facts["contacts"])
 
 

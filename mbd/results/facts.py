@@ -37,6 +37,7 @@ class Facts:
     contacts : in the order of the columns of `closed`
     segments : (body, (frame, …)) lines of the stick figure, whose points are the results 'body.frame'
     frictions : (name, unit) of the dry frictions of joints, 'N' or 'N m'
+    velocities : (name, unit) of velocities that are not the rates of coordinates
     """
 
     model: str = ""
@@ -45,6 +46,12 @@ class Facts:
     contacts: tuple[ContactFacts, ...] = ()
     segments: tuple[tuple[str, tuple[str, ...]], ...] = ()
     frictions: tuple[tuple[str, str], ...] = ()
+    velocities: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def rates(self) -> tuple[str, ...]:
+        """Names that velocities may have: rates of coordinates, not all of which there are, and `velocities`."""
+        return (*(f"{name}.rate" for name, _ in self.coordinates[: self.coordinate_count]), *dict(self.velocities))
 
     @classmethod
     def of(cls, equations: Equations) -> Facts:
@@ -64,6 +71,7 @@ class Facts:
                 for friction in equations.frictions
                 if friction.contact < 0
             ),
+            _own_velocities(equations),
         )
 
     @classmethod
@@ -76,11 +84,19 @@ class Facts:
             tuple(ContactFacts(**contact) for contact in data["contacts"]),
             tuple((body, tuple(frames)) for body, frames in data["segments"]),
             tuple((name, unit) for name, unit in data.get("frictions", ())),
+            tuple((name, unit) for name, unit in data.get("velocities", ())),
         )
 
     def as_json(self) -> dict[str, Any]:
         """Plain lists and dictionaries."""
         return asdict(self)
+
+
+def _own_velocities(equations: Equations) -> tuple[tuple[str, str], ...]:
+    """(name, unit) of velocities of joints whose coordinates do not add."""
+    whole = equations.configuration
+    pairs = zip(whole.places, whole.velocity_names, whole.velocity_units, strict=True)
+    return tuple((name, unit) for place, name, unit in pairs if place < 0)
 
 
 def _places(equations: Equations) -> list[str]:

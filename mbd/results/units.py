@@ -20,7 +20,7 @@ def unit(name: str, facts: Facts) -> str:
     A coordinate has its own unit, its rate and acceleration that unit per second and per second squared; a contact's
     gap has the contact's, and the force of a contact in radians is a torque.
     """
-    own = dict(facts.coordinates)
+    own = dict(facts.coordinates) | dict(facts.velocities)
     if name in own:
         return own[name]
     stem, _, last = name.rpartition(".")
@@ -32,6 +32,8 @@ def unit(name: str, facts: Facts) -> str:
     if contact is not None and last == "force":
         return "N m" if contact.unit.startswith("rad") else "N"
     if last in ("rate", "acceleration"):
+        if last == "acceleration" and stem in dict(facts.velocities):  # of a velocity that is no rate
+            return own[stem].removesuffix("/s") + "/s²"
         power = "/s" if last == "rate" else "/s²"
         base = own.get(stem) or next((value for key, value in own.items() if key.rpartition(".")[0] == stem), "")
         return base + power if base else ""

@@ -152,7 +152,7 @@ def _charts(run: Trajectory, instants: Instants) -> list[dict[str, Any]]:
     columns = [(name, shade, instants.blend(run, column)) for name, shade, column in series]
     charts = [_chart("energy", "J", columns)]
     coordinates = [name for name, _ in run.facts.coordinates]
-    rates = [f"{name}.rate" for name in coordinates[: run.facts.coordinate_count] if f"{name}.rate" in run]
+    rates = [name for name in run.facts.rates if name in run]
     values = dict(zip([*coordinates, *rates], instants.read(run, [*coordinates, *rates]).T, strict=True))
     groups: dict[str, list[str]] = {}
     for name in values:

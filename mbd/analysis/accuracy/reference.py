@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from scipy.integrate import DOP853, Radau
@@ -56,6 +56,7 @@ class Balance:
         self.block = mechanism.block(0.0, np.zeros(layout.n_q), np.zeros(layout.n), system.anchors, self.penalties)
         self.block[layout.slip : layout.shift] = system.slip
         self.out = np.zeros(mechanism.sizes["accelerations"])
+        self.configuration = mechanism.equations.configuration
 
     def _evaluate(self, t: float, q: Vector, y: Vector) -> tuple[Vector, Vector, Vector, Vector]:
         """The matrix of the rows, f, and (h, ḣ, bias) of the active ones."""
@@ -93,7 +94,8 @@ class Balance:
             metric = matrix.copy()
             metric[:n, n:] = H.T
             moves = np.linalg.solve(metric, right)
-            q, y = q + moves[:n_v, 0], y + np.where(np.arange(n) < n_v, moves[:n, 1], 0.0)
+            q = self.configuration.compose(q, moves[:n_v, 0])
+            y = y + np.where(np.arange(n) < n_v, moves[:n, 1], 0.0)
         return q, y
 
 
@@ -126,7 +128,7 @@ class Course:
                 break
             piece = each
         found, n_q = piece(t), len(self.q)
-        return self.balance.on_rows(t, found[:n_q], found[n_q:])
+        return self.balance.on_rows(t, self.balance.configuration.normalise(found[:n_q]), found[n_q:])
 
     def _stride(self, step: float) -> None:
         """One more stride, moved back to the rows at its end."""
@@ -135,7 +137,7 @@ class Course:
         def slope(time: float, both: Vector) -> Vector:
             y = both[n_q:]
             rate, _ = self.balance.accelerations(time, both[:n_q], y)
-            return np.concatenate([y[:n_v], rate])
+            return np.concatenate([self.balance.configuration.rates(both[:n_q], y[:n_v]), rate])
 
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of a first guess too long
@@ -150,7 +152,8 @@ class Course:
         if len(self.pieces) > KEPT:
             del self.pieces[: KEPT // 2]
         self.pieces.append(solver.dense_output())
-        self.q, self.y = self.balance.on_rows(solver.t, solver.y[:n_q], solver.y[n_q:])
+        q = self.balance.configuration.normalise(solver.y[:n_q])
+        self.q, self.y = self.balance.on_rows(solver.t, q, solver.y[n_q:])
         self.reached, self.stride = float(solver.t), float(solver.h_abs)
 
 
@@ -173,6 +176,8 @@ class RungeKuttaReference(Integrator):
     sizes : of q, v and z [m, rad, …]; () stands for 1
     method : 'DOP853', or 'Radau' for stiff scenes
     """
+
+    any_chart: ClassVar[bool] = True
 
     tolerance: float = 1e-12
     sizes: tuple[float, ...] = ()

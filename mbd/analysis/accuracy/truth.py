@@ -250,10 +250,8 @@ def stopped(run: Trajectory) -> bool:
 
 def motion(run: Trajectory) -> list[str]:
     """Names of all coordinates and their rates."""
-    count = run.facts.coordinate_count
     names = [name for name, _ in run.facts.coordinates]
-    rates = [f"{name}.rate" for name in names[:count]]
-    return [*names, *(name for name in rates if name in run)]
+    return [*names, *(name for name in run.facts.rates if name in run)]
 
 
 def _growth(

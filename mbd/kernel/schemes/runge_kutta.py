@@ -1,12 +1,12 @@
 """One explicit Runge–Kutta step of order 8 with its embedded error estimate (Dormand & Prince 1980, in the form of
 Hairer, Nørsett & Wanner 1993, II.5; coefficients in `mbd.kernel.schemes.dormand_prince`).
 
-    x_i = h Σ_j a_ij ẋ_j,   y_i = y₀ + h Σ_j a_ij rate_j,   ẋ_i = D(x_i)⁻¹ v_i,   rate_i = rate(t₀ + c_i h, q₀ ⊕ x_i, y_i)
+    x_i = h Σ_j a_ij ẋ_j,   y_i = y₀ + h Σ_j a_ij rate_j,   rate_i = rate(t₀ + c_i h, q₀ ⊕ x_i, y_i)
 
 with accelerations that satisfy the balance and the rows at acceleration level. Positions and velocities at the end are
 projected onto the rows in the metric of M, whose rates and multipliers are the consistent ones of that state. Where
-positions add, ẋ = v; else the increments x of the step's chart form the vector space that the formula needs (Munthe-Kaas
-1999, Appl. Numer. Math. 29:115).
+positions add, ẋ = v; else ``ẋ = D(x)⁻¹ v`` of the increments x in the chart of the step, which form the vector space
+that the formula needs (Munthe-Kaas 1999, Appl. Numer. Math. 29:115).
 """
 
 from __future__ import annotations

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from mbd.assembly.given_state import ROUND_OFF
 from mbd.bodies.values import is_finite_number
 from mbd.compile.mechanism import rate_names
 from mbd.compile.python import scalar_function
@@ -75,6 +76,8 @@ def apply_reset(run: RunData, guard: Guard) -> None:
             v.q[positions[name]] = number
         else:
             v.y[places[name]] = number
+    if misplaced := equations.configuration.misplaced(v.q, ROUND_OFF):
+        raise SimulationError(f"{what} gives {'; '.join(misplaced)}")
     off = violations_now(run, residuals_now(run), usual)
     if off:
         raise SimulationError(f"{what} breaks constraints: {'; '.join(off)}; reset all that they bind, velocities too")
