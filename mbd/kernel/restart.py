@@ -59,7 +59,7 @@ def compose(K: Kernel, q1: Reals) -> None:
         call(K, COMPOSE, q1)
 
 
-def displace(K: Kernel, q: Any, x: Any) -> None:
+def displace(K: Kernel, q: Reals, x: Reals) -> None:
     """q ← q ⊕ x."""
     if K.vector == 1:
         for i in range(K.n_q):
