@@ -14,7 +14,7 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.integrators.base import Point, StepReport, StepResult, System, Terms, composed
 from mbd.integrators.coefficients import Coefficients
-from mbd.integrators.passage import CONTINUOUS, WHOLE, WITHIN, Distance, distance_to_pose
+from mbd.integrators.singular import CONTINUOUS, WHOLE, WITHIN, Distance, distance_to_singularity
 from mbd.kernel.codes import LEFT, PASSING
 from mbd.state import Mode, State
 
@@ -190,7 +190,9 @@ class Step:
         n_v = self.n_v
         B = terms.H[:, :n_v] - self.c_K / self.c_C * terms.turning
         mass = np.abs(np.diag(terms.S))[:n_v]
-        return distance_to_pose(B, terms.turning, mass, self.y[:n_v], scale, self.memory.whole or self.memory.step)
+        return distance_to_singularity(
+            B, terms.turning, mass, self.y[:n_v], scale, self.memory.whole or self.memory.step
+        )
 
     def _hold_positions(self) -> None:
         """Hold h alone in this step, with the last correction of positions: see `mbd.kernel.singular.newmark_step`."""

@@ -25,7 +25,7 @@ from mbd.integrators.family import DEFAULT_TOLERANCE
 from mbd.kernel.schemes.collocation import RADAU
 from mbd.kernel.schemes.radau import FAR_OFF, MOST_RETREATS, PATIENT, SLOW, is_settled
 from mbd.kernel.schemes.stages import MOST_BENDS, MOST_STRETCHED
-from mbd.kernel.singular.stages import MOST_SETTLED
+from mbd.kernel.singular.stages import MOST_STAGE_PROJECTIONS
 from mbd.state import Mode, State
 
 __all__ = ["RadauIIA", "RadauMemory"]
@@ -150,7 +150,7 @@ class _Matrices:
 class _RadauStep:
     """The stages of one step while Newton iterates."""
 
-    astride: ClassVar[bool] = False
+    at_singularity: ClassVar[bool] = False
     """Whether stages are held to rows of their own."""
 
     def __init__(
@@ -283,7 +283,7 @@ class _RadauStep:
             return _Matrices(S, pair, M, stiff[:, :n_v], np.zeros((0, n_v)), np.zeros((0, n_v)))
         H, B, zero = np.asarray(full.H), np.asarray(part.H), np.zeros((m, m))
         R, turning = np.asarray(full.R), (H - B)[:, :n_v] / c
-        if self.astride:
+        if self.at_singularity:
             H = B
         real = np.block([[S, R], [H, zero]])
         pair = np.block([[pair, R], [B + ratio * (H - B), zero]])
@@ -391,7 +391,7 @@ class _RadauStep:
 class _AstrideStep(_RadauStep):
     """A step with stages on both sides of a pose in which rows lose rank: see `mbd.kernel.singular.stages`."""
 
-    astride = True
+    at_singularity = True
 
     def run(self) -> StepResult:
         """Positions and multipliers settle stage by stage; Newton corrects rates, with new matrices each time."""
@@ -429,7 +429,7 @@ class _AstrideStep(_RadauStep):
         """U_i and λ_i at the rates of stage i; the least change of velocities (n,) that does away with ḣ."""
         n, n_v, before = len(self.y0), self.n_v, np.inf
         self.U[i] = 0.0
-        for turn in range(MOST_SETTLED):
+        for turn in range(MOST_STAGE_PROJECTIONS):
             terms = self._terms(i, (0.0, 0.0))
             M, R, m = np.asarray(terms.S), np.asarray(terms.R), len(terms.h)
             if not np.isfinite(np.concatenate([terms.r, terms.h])).all():

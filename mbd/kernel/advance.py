@@ -19,7 +19,7 @@ from mbd.kernel.settle import room_to_log
 from mbd.kernel.singular.events import find_passed_events, log_passed_events, may_pass_events, refuses
 from mbd.kernel.singular.step_pairs import ALONE, FIRST, SECOND
 from mbd.kernel.starting import find_mode, restart, still_dependent
-from mbd.kernel.takeover import leave_pose, take_over
+from mbd.kernel.takeover import leave_singularity, take_over
 from mbd.kernel.trying import part_end, step_end, tried_step
 
 __all__ = ["advance"]
@@ -142,7 +142,7 @@ def conclude(
         elif K.step < K.dt:
             relax_pace(K)
         if K.near_singular == LEFT:
-            status = leave_pose(K, h)
+            status = leave_singularity(K, h)
             if status != 0:
                 return status
     if K.halvings > 0:  # the end that had no impulses may not come at all

@@ -21,7 +21,7 @@ from mbd.kernel.hooks import scheme_error
 from mbd.kernel.records import Kernel
 from mbd.kernel.restart import compose, consistent, fill_block, lower_scales
 from mbd.kernel.roots import sqrt
-from mbd.kernel.singular.step_size import step_by_pose, stirred, stirs
+from mbd.kernel.singular.step_size import is_too_noisy, noise_share, singular_step_size
 
 __all__ = ["controlled_step", "first_step", "smallest_step"]
 
@@ -57,7 +57,7 @@ def error_ratio(K: Kernel, h: float) -> float:
         fast = max(fast, abs(K.y1[i]))
     floor = EPS * (NEIGHBOURS * far + CANCELLED * h * fast)
     if K.singular_size == 1 and K.n_active > 0:
-        floor += stirred(K, h) * h * fast
+        floor += noise_share(K, h) * h * fast
     largest = 0.0
     for i in range(n_v):
         largest = max(largest, max(abs(K.error[i]), h * abs(K.error[n_v + i])))
@@ -91,8 +91,8 @@ def controlled_step(K: Kernel, h: float) -> int:
     while True:
         wanted = h
         if K.singular_size == 1 and K.n_active > 0:
-            h = step_by_pose(K, wanted, 1.0)
-            if stirs(K, h):
+            h = singular_step_size(K, wanted, 1.0)
+            if is_too_noisy(K, h):
                 return STIRRED
         for i in range(K.n_v + K.n):
             K.error[i] = 0.0

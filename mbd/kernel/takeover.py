@@ -14,7 +14,7 @@ from mbd.kernel.records import Kernel, Reals
 from mbd.kernel.restart import active_rows, consistent, evaluate, largest_force, stepping_rows
 from mbd.kernel.saddle import correct_velocities, solve_rows
 
-__all__ = ["leave_pose", "look", "look_at_start", "put_on_rows", "take_over"]
+__all__ = ["leave_singularity", "look", "look_at_start", "put_on_rows", "take_over"]
 
 
 def project_velocity(K: Kernel, t: float, q: Reals, y: Reals, m: int, dropping: bool) -> int:
@@ -122,7 +122,7 @@ def take_over(K: Kernel, t1: float) -> None:
             K.lam[k] = K.impulse[k]
 
 
-def leave_pose(K: Kernel, h: float) -> int:
+def leave_singularity(K: Kernel, h: float) -> int:
     """Just beyond a pose in which rows lost rank: velocities on the rows again, rates and multipliers consistent.
 
     The scheme starts anew, but for the average of accelerations that it carries. The rows are those that were stepped

@@ -8,7 +8,7 @@ from mbd.kernel.guards import try_step
 from mbd.kernel.records import Kernel
 from mbd.kernel.restart import consistent, lower_scales
 from mbd.kernel.singular.step_pairs import ALONE, FIRST, LONGER, SECOND, SHORTER, WHOLE, may_pair
-from mbd.kernel.singular.step_size import is_resolved, step_by_pose, stirs
+from mbd.kernel.singular.step_size import is_resolved, is_too_noisy, singular_step_size
 from mbd.kernel.unresolved import judge_change
 
 __all__ = ["part_end", "step_end", "tried_step"]
@@ -72,7 +72,7 @@ def tried_step(K: Kernel, h: float, t1: float) -> int:
     full = h
     step = K.step
     if K.singular_size == 1 and K.n_active > 0:
-        status = step_past_pose(K, h)
+        status = step_past_singularity(K, h)
         h = K.step_taken
         if status == LAST or status == STIRRED:
             return status
@@ -96,26 +96,26 @@ def tried_step(K: Kernel, h: float, t1: float) -> int:
     return status
 
 
-def step_past_pose(K: Kernel, unit: float) -> int:
+def step_past_singularity(K: Kernel, unit: float) -> int:
     """A candidate of a scheme of several stages after a step of this size, or another near a pose: K.step_taken.
 
     A step over the pose that is longer than others must be resolved like these; else they lead up to it.
     """
-    h = step_by_pose(K, unit, K.longest_over)
+    h = singular_step_size(K, unit, K.longest_over)
     if h > unit:
         if K.time + h > K.until - WHOLE * unit:
             if K.until >= K.end:
                 return LAST
-            h = step_by_pose(K, unit, 1.0)
+            h = singular_step_size(K, unit, 1.0)
         else:
             status = judged_step(K, h, K.time + h)
             K.step_taken = h
             K.paired_step = ALONE
             if status == 0 and is_resolved(K, h):
                 return status
-            h = step_by_pose(K, unit, 1.0)
+            h = singular_step_size(K, unit, 1.0)
     K.step_taken = h
     K.paired_step = ALONE if h != unit else 0
-    if stirs(K, h):
+    if is_too_noisy(K, h):
         return STIRRED
     return judged_step(K, h, K.time + h)

@@ -16,7 +16,7 @@ from mbd.kernel.restart import consistent, fill_block, refresh_scales
 from mbd.kernel.schemes.contract import Abilities, Scheme
 from mbd.kernel.schemes.memory import forget_steps
 from mbd.kernel.schemes.runge_kutta import explicit_rates, return_to_rows
-from mbd.kernel.singular.step_size import forget_leftovers, keep_leftovers, note_leftovers
+from mbd.kernel.singular.step_size import accept_row_norms, forget_row_norms, note_row_norms
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Midpoint(CompiledIntegrator):
 def start(K: Kernel) -> int:
     """Sizes of forces at the consistent state; nothing is remembered but rates."""
     forget_steps(K)
-    forget_leftovers(K)
+    forget_row_norms(K)
     fill_block(K, K.time, K.q, K.y)
     refresh_scales(K)
     return 0
@@ -65,7 +65,7 @@ def step(K: Kernel, h: float, t1: float) -> int:
         K.lam1[k] = K.impulse[k]
         K.block[K.o_lam + k] = K.impulse[k]
     if K.n_active > 0:
-        note_leftovers(K)
+        note_row_norms(K)
     return 0
 
 
@@ -90,7 +90,7 @@ def accept(K: Kernel, h: float) -> None:
         K.lam_slope[k] = (K.lam1[k] - K.lam[k]) / h
         K.lam[k] = K.lam1[k]
     if K.n_active > 0:
-        keep_leftovers(K, h)
+        accept_row_norms(K, h)
     K.aux_step = h
 
 

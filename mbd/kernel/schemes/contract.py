@@ -43,7 +43,7 @@ class Abilities:
     error_constant : of the error in positions, over the third power of the step times the rate of accelerations [-]
     most_growth : factor from one step to the next where steps follow a tolerance [-]
     singular_size : 1: next to singular configurations the size of steps is chosen so that none has a node there
-        (`mbd.kernel.singular.step_size`), for which the scheme calls `note_leftovers` and its neighbours; 0: it steps
+        (`mbd.kernel.singular.step_size`), for which the scheme calls `note_row_norms` and its neighbours; 0: it steps
         over them itself, or does not notice them
     stretches : 1: the step over one may last longer than others even where guards are watched
     middle : part of a step at which a singular configuration lies best, amid the widest gap between nodes [-]

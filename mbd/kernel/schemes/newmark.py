@@ -14,7 +14,7 @@ from mbd.kernel.schemes.contract import Scheme
 from mbd.kernel.schemes.iteration import predict, shift_growth
 from mbd.kernel.schemes.memory import forget_steps, look_a_step_ahead, start_step
 from mbd.kernel.schemes.newton import SEARCHED, UNSOUND, solve_step
-from mbd.kernel.singular.newmark_step import passing_step
+from mbd.kernel.singular.newmark_step import singular_newmark_step
 
 __all__ = ["SCHEME", "newmark_accept", "newmark_error", "newmark_resume", "newmark_start", "newmark_step"]
 
@@ -65,7 +65,7 @@ def unresolved(K: Kernel) -> bool:
 def newmark_step(K: Kernel, h: float, t1: float) -> int:
     """Candidate state (q1, y1, rate1, aux1, lam1) after a step of size h; the accepted state is untouched."""
     if K.near_singular == PASSING:
-        return passing_step(K, h, t1)
+        return singular_newmark_step(K, h, t1)
     c = (1.0 - K.alpha_f) / (1.0 - K.alpha_m)
     c_C = K.gamma * h * c
     c_K = K.beta * h * h * c

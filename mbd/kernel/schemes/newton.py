@@ -21,7 +21,7 @@ from mbd.kernel.restart import (
     share_loads,
 )
 from mbd.kernel.schemes.iteration import finish, overturns, residual_size, runs_away, soundness_at
-from mbd.kernel.singular.newmark_step import WITHIN, misses, passing_step, steps_of_fall, steps_to_pose
+from mbd.kernel.singular.newmark_step import WITHIN, misses, singular_newmark_step, steps_by_pivot, steps_to_singularity
 from mbd.kernel.singular.step_pairs import is_whole
 
 __all__ = ["SEARCHED", "UNSOUND", "solve_step"]
@@ -99,7 +99,7 @@ def solve_step(K: Kernel, h: float, t1: float, c_C: float, c_K: float, tangents:
         if tangent and not straight and not factorize(K, K.n + m, tangents):
             return no_candidate(K, h, t1, SINGULAR)
         if iteration == 0 and m > 0 and K.stabilized == 1:
-            status = pass_pose(K, h, t1, m, c_C, c_K, straight)
+            status = pass_singularity(K, h, t1, m, c_C, c_K, straight)
             if status >= 0:
                 return status
         if not ready:
@@ -157,17 +157,17 @@ def second_look(K: Kernel, o_r: int, m: int, c_C: float, c_K: float, tolerance: 
     return error
 
 
-def pass_pose(K: Kernel, h: float, t1: float, m: int, c_C: float, c_K: float, straight: bool) -> int:
+def pass_singularity(K: Kernel, h: float, t1: float, m: int, c_C: float, c_K: float, straight: bool) -> int:
     """−1 where no pose in which rows lose rank is near; else how a step that passes it ends, or that this must not."""
-    fall = steps_of_fall(K, m, straight)
+    fall = steps_by_pivot(K, m, straight)
     if not fall < WITHIN + 2.0:
         return -1
-    away = steps_to_pose(K, m, h, c_K / c_C, straight) * h / K.step
+    away = steps_to_singularity(K, m, h, c_K / c_C, straight) * h / K.step
     if misses(K, away, h):
         K.inverse_pivot = 0.0
         return TOO_NEAR
     if fall < WITHIN and away < WITHIN and (away < 1.0 or is_whole(K, h)):
-        return passing_step(K, h, t1)
+        return singular_newmark_step(K, h, t1)
     return -1
 
 

@@ -52,8 +52,14 @@ from mbd.kernel.schemes.stages import (
     retreat_stages,
     stage_place,
 )  # fmt: skip
-from mbd.kernel.singular.stages import LOUDER, is_astride, is_beside, settle_stages, turn_rows
-from mbd.kernel.singular.step_size import forget_leftovers, keep_leftovers, note_leftovers
+from mbd.kernel.singular.stages import (
+    BESIDE_NOISY,
+    is_beside_singularity,
+    replace_row_rates,
+    solve_singular_stages,
+    spans_singularity,
+)
+from mbd.kernel.singular.step_size import accept_row_norms, forget_row_norms, note_row_norms
 
 __all__ = ["SCHEME", "radau_accept", "radau_start", "radau_step"]
 
@@ -79,7 +85,7 @@ def radau_start(K: Kernel) -> int:
     """The memory at a consistent state: stages of a step before it at rates and multipliers that do not change."""
     forget_steps(K)
     forget_stages(K)
-    forget_leftovers(K)
+    forget_row_norms(K)
     fill_block(K, K.time, K.q, K.y)
     refresh_scales(K)
     look_a_step_ahead(K)
@@ -115,19 +121,23 @@ def radau_accept(K: Kernel, h: float) -> None:
     for k in range(3 * (K.n + K.n_rows + K.n_v)):
         K.past_stages[k] = K.stages[o + k]
     if K.n_active > 0:
-        keep_leftovers(K, h)
+        accept_row_norms(K, h)
     K.aux_step = h
 
 
 def radau_step(K: Kernel, h: float, t1: float) -> int:
     """Candidate state (q1, y1, rate1, aux1, lam1) after a step of size h; the accepted state is untouched."""
     m = K.n_active
-    if m > 0 and is_astride(K, h):
-        return step_astride(K, h, t1)
+    if m > 0 and spans_singularity(K, h):
+        return singular_stages_step(K, h, t1)
     K.near_singular = 0
     status = plain_step(K, h, t1, m)
-    if (status == NOT_CONVERGED or status == STAGNATED or status == TOO_TIGHT) and m > 0 and is_beside(K, h, LOUDER):
-        return step_astride(K, h, t1)
+    if (
+        (status == NOT_CONVERGED or status == STAGNATED or status == TOO_TIGHT)
+        and m > 0
+        and is_beside_singularity(K, h, BESIDE_NOISY)
+    ):
+        return singular_stages_step(K, h, t1)
     return status
 
 
@@ -200,7 +210,7 @@ def is_settled(moved: float, last: float, first: float) -> bool:
     return moved <= max(SETTLED, NEGLIGIBLE * first * first) or (last > 0.0 and moved > 0.5 * last)
 
 
-def step_astride(K: Kernel, h: float, t1: float) -> int:
+def singular_stages_step(K: Kernel, h: float, t1: float) -> int:
     """The candidate of a step with stages on both sides of a singular configuration: see `mbd.kernel.singular.stages`.
 
     Newton's method is linear there, with matrices made anew each time.
@@ -218,7 +228,7 @@ def step_astride(K: Kernel, h: float, t1: float) -> int:
     moved = 1e300
     last = 0.0
     for iteration in range(K.max_iterations):
-        status = settle_stages(K, h, t1, m, iteration == 0)
+        status = solve_singular_stages(K, h, t1, m, iteration == 0)
         if status != 0:
             return status
         error = evaluate_stages(K, h, t1, m, tolerance, c, c * c, True)
@@ -234,7 +244,7 @@ def step_astride(K: Kernel, h: float, t1: float) -> int:
         if error <= 1.0 and iteration > 0 and is_settled(moved, last, first):
             return complete(K, h, t1, m, True, False)
         before = error
-        turn_rows(K, stage_place(K, BALANCES), m)
+        replace_row_rates(K, stage_place(K, BALANCES), m)
         if not factor_stages(K, K.n + m):
             return SINGULAR
         last = moved
@@ -333,7 +343,7 @@ def complete(K: Kernel, h: float, t1: float, m: int, renew: bool, slow: bool) ->
             if not holds_rows(K, m):
                 K.failure_size = 0.0
                 return NOT_CONVERGED
-            note_leftovers(K)
+            note_row_norms(K)
         for k in range(K.n_rows):
             K.block[K.o_lam + k] = K.lam1[k]
     for i in range(K.n):

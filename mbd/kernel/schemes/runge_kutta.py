@@ -22,7 +22,7 @@ from mbd.kernel.schemes.contract import Abilities, Scheme
 from mbd.kernel.schemes.dormand_prince import NODES, STAGES, tableau
 from mbd.kernel.schemes.memory import forget_steps
 from mbd.kernel.singular.newmark_step import CONTINUOUS
-from mbd.kernel.singular.step_size import forget_leftovers, keep_leftovers, note_leftovers
+from mbd.kernel.singular.step_size import accept_row_norms, forget_row_norms, note_row_norms
 from mbd.kernel.uneven import LOSS, is_uneven, polish_rates, polish_with_rows
 
 __all__ = ["SCHEME", "runge_kutta_accept", "runge_kutta_start", "runge_kutta_step"]
@@ -38,7 +38,7 @@ MOST_RETURNS = 8
 def runge_kutta_start(K: Kernel) -> int:
     """Sizes of forces and rows at the consistent state; the scheme remembers nothing but its rates."""
     forget_steps(K)
-    forget_leftovers(K)
+    forget_row_norms(K)
     evaluate(K, K.time, K.q, K.y)
     note_uneven(K)
     find_sizes(K)
@@ -110,7 +110,7 @@ def runge_kutta_step(K: Kernel, h: float, t1: float) -> int:
         K.lam1[k] = K.impulse[k]
         K.block[K.o_lam + k] = K.impulse[k]
     if K.n_active > 0:
-        note_leftovers(K)
+        note_row_norms(K)
     explicit_error(K, h)
     if K.near_singular == PASSING and not hold_error(K):
         return SINGULAR
@@ -340,7 +340,7 @@ def runge_kutta_accept(K: Kernel, h: float) -> None:
     for k in range(K.n_rows):
         K.lam[k] = K.lam1[k]
     if K.n_active > 0:
-        keep_leftovers(K, h)
+        accept_row_norms(K, h)
     K.aux_step = h
 
 

@@ -18,7 +18,7 @@ from mbd.kernel.records import Kernel
 from mbd.kernel.restart import evaluate
 from mbd.kernel.roots import sqrt
 from mbd.kernel.settle import NO_IMPULSE, log_event
-from mbd.kernel.singular.step_size import HUSHED, LOUD, leftovers_here, motion, stirring
+from mbd.kernel.singular.step_size import NEGLIGIBLE_NOISE, TOO_NOISY, motion, noise_coefficient, row_norms
 
 __all__ = ["find_passed_events", "log_passed_events", "may_pass_events", "refuses"]
 
@@ -64,7 +64,7 @@ def find_passed_events(K: Kernel, h: float) -> int:
             low = (part - 1 + K.event_low) / K.looks
             if share_inside(K, t, h, place) > 0.0:
                 place = root_inside(K, e, t, h, low, part / K.looks)
-                if share_inside(K, t, h, place) > HUSHED:
+                if share_inside(K, t, h, place) > NEGLIGIBLE_NOISE:
                     K.crossed[e] = place * h
                     found += 1
             show(K, t, h, part / K.looks)
@@ -131,8 +131,8 @@ def share_inside(K: Kernel, t: float, h: float, s: float) -> float:
     other = 0.0 if s >= 0.5 else 1.0
     show(K, t, h, other)
     evaluate(K, t + other * h, K.q1, K.y1)
-    leftovers_here(K, m)
-    return most_stirred(K, m, abs(s - other) * h)
+    row_norms(K, m)
+    return largest_noise_share(K, m, abs(s - other) * h)
 
 
 def comes_close(K: Kernel, t: float, part: float) -> bool:
@@ -142,7 +142,7 @@ def comes_close(K: Kernel, t: float, part: float) -> bool:
     """
     m = K.n_active
     evaluate(K, t, K.q1, K.y1)
-    leftovers_here(K, m)
+    row_norms(K, m)
     o_B = K.acc_B
     longest = 0.0  # a row may vanish by itself there
     least = 1e300
@@ -164,7 +164,7 @@ def keep_parts(K: Kernel, m: int) -> None:
         K.work[2 * m + k] = K.work[k]
 
 
-def most_stirred(K: Kernel, m: int, apart: float) -> float:
+def largest_noise_share(K: Kernel, m: int, apart: float) -> float:
     """c/τ² of the parts kept, from those in K.basis at a time `apart` from them; K.failure_index names the row."""
     n = K.n
     speed = max(motion(K, K.y), motion(K, K.y1))
@@ -175,7 +175,7 @@ def most_stirred(K: Kernel, m: int, apart: float) -> float:
             K.basis[k * n + j] = K.work[k] * K.basis[k * n + j] - here * K.turning[k * n + j]
         change = square(K.basis, k * n, n)
         fall = sqrt(change) / (apart + 1e-300)
-        share = stirring(K, k, fall, speed) * fall * fall / (here * here + 1e-300) if fall > 0.0 else 0.0
+        share = noise_coefficient(K, k, fall, speed) * fall * fall / (here * here + 1e-300) if fall > 0.0 else 0.0
         if share > largest:
             largest = share
             K.failure_index = K.n + k
@@ -193,9 +193,9 @@ def refuses(K: Kernel, h: float) -> bool:
     m = K.n_active
     keep_parts(K, m)
     evaluate(K, t, K.q, K.y)
-    leftovers_here(K, m)
-    share = most_stirred(K, m, h)
-    if share <= LOUD:
+    row_norms(K, m)
+    share = largest_noise_share(K, m, h)
+    if share <= TOO_NOISY:
         return False
     K.failure_time = t + h
     K.failure_size = min(share, 1.0)

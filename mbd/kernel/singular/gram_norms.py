@@ -10,16 +10,16 @@ from __future__ import annotations
 from mbd.kernel.records import Kernel
 from mbd.kernel.roots import sqrt
 
-__all__ = ["common_part", "leftovers_of_many"]
+__all__ = ["common_part", "pivoted_gram_norms_of_many"]
 
 NOTHING_LEFT = 1e-15
 """Square of a scaled row below which it is round-off of its terms [-]."""
 
 
-def leftovers_of_many(
+def pivoted_gram_norms_of_many(
     K: Kernel, m: int, h: float, ratio: float, ahead: float, place: int, o_S: int, stride: int, o_H: int, width: int
 ) -> None:
-    """What `leftovers` finds, in the same places of K.spare and K.columns."""
+    """What `pivoted_gram_norms` finds, in the same places of K.spare and K.columns."""
     if place == 0:
         find_support(K, m, o_S, stride, o_H, width)
     G = 5 * m

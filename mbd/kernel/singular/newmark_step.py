@@ -26,10 +26,10 @@ from mbd.kernel.restart import (
 )
 from mbd.kernel.roots import sqrt
 from mbd.kernel.schemes.iteration import finish, overturns, predict, residual_size, runs_away, soundness_at
-from mbd.kernel.singular.gram_norms import leftovers_of_many
+from mbd.kernel.singular.gram_norms import pivoted_gram_norms_of_many
 from mbd.kernel.singular.step_pairs import is_of_pair, is_whole
 
-__all__ = ["misses", "passing_step", "steps_of_fall", "steps_to_pose"]
+__all__ = ["misses", "singular_newmark_step", "steps_by_pivot", "steps_to_singularity"]
 
 WITHIN = 4.0
 """Steps to a pose of lost rank, at the present speed, below which positions alone are held [-]."""
@@ -43,7 +43,7 @@ CONTINUOUS = 0.05
 """Part of the speed by which a step near such a pose may differ from its prediction: the branch goes on in v [-]."""
 
 
-def steps_of_fall(K: Kernel, m: int, straight: bool) -> float:
+def steps_by_pivot(K: Kernel, m: int, straight: bool) -> float:
     """Steps until the smallest pivot of the rows vanishes, if it goes on as since the last step; a cheap first look.
 
     Pivots in an order given beforehand tell their own; where they gave way to a search for pivots, they do not compare:
@@ -66,7 +66,7 @@ def steps_of_fall(K: Kernel, m: int, straight: bool) -> float:
     return float(before / (largest - before)) if largest > before else 1e300
 
 
-def steps_to_pose(K: Kernel, m: int, h: float, ratio: float, straight: bool) -> float:
+def steps_to_singularity(K: Kernel, m: int, h: float, ratio: float, straight: bool) -> float:
     """Steps of size h until a row of B depends on the others: how far it is from that, over what a step changes of it.
 
     1e300 where the row does not vanish there: it turns, and others with it.
@@ -86,9 +86,9 @@ def steps_to_pose(K: Kernel, m: int, h: float, ratio: float, straight: bool) -> 
         for k in range(m * K.n_v):
             K.turning[k] = K.out[K.n + 2 * m + k]
     stride = 1 if straight else size + 1
-    find_leftovers(K, m, h, ratio, 0.0, 0, o_S, stride, o_H, width)
-    find_leftovers(K, m, h, ratio, -h, m, o_S, stride, o_H, width)
-    find_leftovers(K, m, h, ratio, h, 2 * m, o_S, stride, o_H, width)
+    find_gram_norms(K, m, h, ratio, 0.0, 0, o_S, stride, o_H, width)
+    find_gram_norms(K, m, h, ratio, -h, m, o_S, stride, o_H, width)
+    find_gram_norms(K, m, h, ratio, h, 2 * m, o_S, stride, o_H, width)
     speed = 0.0
     for j in range(K.n_v):
         speed += abs(K.out[o_S + stride * j]) * K.block[K.o_v + j] * K.block[K.o_v + j]
@@ -105,21 +105,21 @@ def steps_to_pose(K: Kernel, m: int, h: float, ratio: float, straight: bool) -> 
     if (
         NEAREST < fewest < WITHIN + 2.0
     ):  # a row that turns, beside others that turn with it, changes but does not vanish
-        find_leftovers(K, m, h, ratio, -fewest * h, m, o_S, stride, o_H, width)
-        find_leftovers(K, m, h, ratio, fewest * h, 2 * m, o_S, stride, o_H, width)
+        find_gram_norms(K, m, h, ratio, -fewest * h, m, o_S, stride, o_H, width)
+        find_gram_norms(K, m, h, ratio, fewest * h, 2 * m, o_S, stride, o_H, width)
         if min(K.spare[m + nearest], K.spare[2 * m + nearest]) > VANISHING * K.spare[nearest]:
             return 1e300
     return fewest
 
 
-def find_leftovers(
+def find_gram_norms(
     K: Kernel, m: int, h: float, ratio: float, ahead: float, place: int, o_S: int, stride: int, o_H: int, width: int
 ) -> None:
-    """`leftovers`, by products of rows where most of them have nothing in common."""
+    """`pivoted_gram_norms`, by products of rows where most of them have nothing in common."""
     if order_at(K, m) > 0:
-        leftovers_of_many(K, m, h, ratio, ahead, place, o_S, stride, o_H, width)
+        pivoted_gram_norms_of_many(K, m, h, ratio, ahead, place, o_S, stride, o_H, width)
     else:
-        leftovers(K, m, h, ratio, ahead, place, o_S, stride, o_H, width)
+        pivoted_gram_norms(K, m, h, ratio, ahead, place, o_S, stride, o_H, width)
 
 
 def misses(K: Kernel, away: float, h: float) -> bool:
@@ -137,7 +137,7 @@ def misses(K: Kernel, away: float, h: float) -> bool:
     return bool(part < NEAREST + doubt and K.velocity_noise * away > K.tolerance * max(part - doubt, 1e-3))
 
 
-def leftovers(
+def pivoted_gram_norms(
     K: Kernel, m: int, h: float, ratio: float, ahead: float, place: int, o_S: int, stride: int, o_H: int, width: int
 ) -> None:
     """Lengths of the rows of B, `ahead` of now, less their parts along earlier ones, into K.spare from `place` on.
@@ -188,7 +188,7 @@ def leftovers(
             clear_row(Q, k * n, done * n, n)
 
 
-def passing_step(K: Kernel, h: float, t1: float) -> int:
+def singular_newmark_step(K: Kernel, h: float, t1: float) -> int:
     """The step with h held and ḣ left alone: the scheme's own, so that the motion along the branch errs as before.
 
     The correction of positions stays what it was in the last step that held both: without it, accelerations would have
@@ -241,7 +241,7 @@ def passing_step(K: Kernel, h: float, t1: float) -> int:
         if iteration == 0:
             for k in range(m * K.n_v):
                 K.turning[k] = K.out[o_r + K.n + 2 * m + k]
-            away = steps_to_pose(K, m, h, c_K / c_C, False)
+            away = steps_to_singularity(K, m, h, c_K / c_C, False)
             if away < NEAREST and K.velocity_noise > K.tolerance:
                 return SINGULAR
         if error <= 1.0:

@@ -34,28 +34,28 @@ from mbd.kernel.schemes.stages import (
     stage_place,
 )
 
-__all__ = ["LOUDER", "is_astride", "is_beside", "settle_stages", "turn_rows"]
+__all__ = ["BESIDE_NOISY", "spans_singularity", "is_beside_singularity", "solve_singular_stages", "replace_row_rates"]
 
 BESIDE = 2.0
 """Steps to or from a pose within which rows change too much from stage to stage for one matrix [-]."""
-LOUDER = 1000.0
+BESIDE_NOISY = 1000.0
 """The same within which round-off of rows may keep the residuals of a step with one matrix from falling [-]."""
-MOST_SETTLED = 8
+MOST_STAGE_PROJECTIONS = 8
 """Newton corrections of positions onto the rows of a stage; it takes one or two [-]."""
 
 
-def is_astride(K: Kernel, h: float) -> bool:
+def spans_singularity(K: Kernel, h: float) -> bool:
     """Whether a step of size h goes over a pose in which rows lose rank, or close by it."""
-    return bool(K.near_singular == PASSING and K.loaded == 0 and not sharing(K)) or is_beside(K, h, BESIDE)
+    return bool(K.near_singular == PASSING and K.loaded == 0 and not sharing(K)) or is_beside_singularity(K, h, BESIDE)
 
 
-def is_beside(K: Kernel, h: float, steps: float) -> bool:
+def is_beside_singularity(K: Kernel, h: float, steps: float) -> bool:
     """Whether a step of size h lies within so many steps of the pose found last; not where loads are shared out."""
     away = K.singular_time - K.time
     return bool(-steps * h < away < (1.0 + steps) * h) and K.loaded == 0 and not sharing(K)
 
 
-def settle_stages(K: Kernel, h: float, t1: float, m: int, anew: bool) -> int:
+def solve_singular_stages(K: Kernel, h: float, t1: float, m: int, anew: bool) -> int:
     """U_i and λ_i of all stages at their rates, s_i into the changes; 0, or a failure. The block is overwritten.
 
     Where not `anew`, the last correction of rates has moved stages: U_i takes back what that is across their rows. So
@@ -64,7 +64,7 @@ def settle_stages(K: Kernel, h: float, t1: float, m: int, anew: bool) -> int:
     if not anew:
         keep_moves(K, h, m)
     for i in range(3):
-        status = settle_stage(K, i, h, t1, m, anew)
+        status = solve_singular_stage(K, i, h, t1, m, anew)
         if status != 0:
             return status
     hold_block(K)
@@ -84,7 +84,7 @@ def keep_moves(K: Kernel, h: float, m: int) -> None:
             S[o_P + i * K.n_v + j] = h * h * move
 
 
-def settle_stage(K: Kernel, i: int, h: float, t1: float, m: int, anew: bool) -> int:
+def solve_singular_stage(K: Kernel, i: int, h: float, t1: float, m: int, anew: bool) -> int:
     """The same of stage i."""
     n = K.n
     S = K.stages
@@ -92,7 +92,7 @@ def settle_stage(K: Kernel, i: int, h: float, t1: float, m: int, anew: bool) -> 
     o_L = stage_place(K, STAGE_LAM) + i * K.n_rows
     o_s = stage_place(K, CHANGES) + i * (n + m)
     o_rate = K.acc_rate
-    status = settle_positions(K, i, h, t1, m, anew)
+    status = project_stage_positions(K, i, h, t1, m, anew)
     if status != 0:
         return status
     for j in range(n):
@@ -120,7 +120,7 @@ def settle_stage(K: Kernel, i: int, h: float, t1: float, m: int, anew: bool) -> 
     return 0
 
 
-def settle_positions(K: Kernel, i: int, h: float, t1: float, m: int, anew: bool) -> int:
+def project_stage_positions(K: Kernel, i: int, h: float, t1: float, m: int, anew: bool) -> int:
     """U_i, with K.acc at the stage and the factors of [M Bᵀ; B 0] there."""
     n = K.n
     o_h = K.acc_h
@@ -128,7 +128,7 @@ def settle_positions(K: Kernel, i: int, h: float, t1: float, m: int, anew: bool)
     for j in range(K.n_v):
         K.stages[o_U + j] *= 0.0 if anew else 1.0
     before = 1e300
-    for turn in range(MOST_SETTLED):
+    for turn in range(MOST_STAGE_PROJECTIONS):
         hold_block(K)
         load_stage(K, i, h, t1)
         compose(K, K.q1)
@@ -175,7 +175,7 @@ def take_back(K: Kernel, i: int, m: int) -> None:
         K.rhs[n + k] = -across
 
 
-def turn_rows(K: Kernel, o_r: int, m: int) -> None:
+def replace_row_rates(K: Kernel, o_r: int, m: int) -> None:
     """``−B₂ s_i`` in place of ḣ_i in the residuals, which begin at o_r; B₂ are the rows of the matrix in K.kkt."""
     size = K.n + m
     o_s = stage_place(K, CHANGES)

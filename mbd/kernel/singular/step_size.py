@@ -26,21 +26,21 @@ from mbd.kernel.roots import sqrt
 from mbd.kernel.singular.gram_norms import common_part
 
 __all__ = [
-    "HUSHED", "LOUD", "forget_leftovers", "is_resolved", "keep_leftovers", "leftovers_here", "motion",
-    "note_leftovers", "step_by_pose", "stirred", "stirring", "stirs",
+    "NEGLIGIBLE_NOISE", "TOO_NOISY", "forget_row_norms", "is_resolved", "accept_row_norms", "row_norms", "motion",
+    "note_row_norms", "singular_step_size", "noise_share", "noise_coefficient", "is_too_noisy",
 ]  # fmt: skip
 
-GLANCE = 3.5
+NEAR_STEPS = 3.5
 """Steps to a pose, as the last step tells, below which is looked closer [-]."""
 CERTAIN = 6.0
 """Steps to a pose below which it is taken for one; beyond, where nothing else asks for it, it may be none [-]."""
-FAR_GLANCE = 14.0
+FAR_STEPS = 14.0
 """The same where round-off asks for longer steps over the pose; of a scheme K.far_look [-]."""
-STIR = 16.0
+NOISE_GROWTH = 16.0
 """What round-off of a row makes of velocities over what it would if it were one unit in the last place [-]."""
-HUSHED = 1e-9
+NEGLIGIBLE_NOISE = 1e-9
 """Share of velocities that round-off may make up before the step over a pose is longer than others [-]."""
-LOUD = 1e-5
+TOO_NOISY = 1e-5
 """The same above which a step over a pose is refused [-]."""
 RESOLVED = 1e-8
 """Share of velocities by which a step over a pose that is longer than others may err [-]."""
@@ -58,12 +58,12 @@ NOWHERE = 1e300
 """Time to a pose where there is none [s]."""
 
 
-def may_stretch(K: Kernel) -> bool:
+def may_take_long_step(K: Kernel) -> bool:
     """Whether a step over a pose may be longer than others: of an explicit scheme only where no guard is watched."""
     return bool(K.n_watched == 0 or K.stretches == 1)
 
 
-def forget_leftovers(K: Kernel) -> None:
+def forget_row_norms(K: Kernel) -> None:
     """Nothing is known at the start of the scheme: whether a pose is near is looked at before the first step."""
     K.singular_time = -NOWHERE
     for k in range(K.n_rows):
@@ -71,19 +71,19 @@ def forget_leftovers(K: Kernel) -> None:
     K.left[K.n_active] = 1.0
 
 
-def note_leftovers(K: Kernel) -> None:
-    """|w| of each row at the candidate, at which K.acc is, and √(2 T): accepted with it by `keep_leftovers`."""
+def note_row_norms(K: Kernel) -> None:
+    """|w| of each row at the candidate, at which K.acc is, and √(2 T): accepted with it by `accept_row_norms`."""
     m = K.n_active
     if order_at(K, m) > 0:
-        lengths_of_many(K, m)
+        row_norms_of_many(K, m)
     else:
-        leftovers_here(K, m)
+        row_norms(K, m)
     for k in range(m):
         K.left1[k] = K.work[k]
     K.left1[m] = motion(K, K.y1)
 
 
-def keep_leftovers(K: Kernel, h: float) -> None:
+def accept_row_norms(K: Kernel, h: float) -> None:
     """The candidate is accepted after a step of h: |w| of each row, and whether one falls so that a pose may be near.
 
     K.left[m] = 1 where it is to be looked for, else 0.
@@ -92,11 +92,11 @@ def keep_leftovers(K: Kernel, h: float) -> None:
     near = 0.0
     for k in range(m):
         fall = K.left[k] - K.left1[k]
-        if K.left[k] < 0.0 or K.left1[k] < GLANCE * fall:
+        if K.left[k] < 0.0 or K.left1[k] < NEAR_STEPS * fall:
             near = 1.0
-        elif K.left1[k] < K.far_look * fall and K.adaptive == 0 and may_stretch(K):
-            reach = sqrt(stirring(K, k, fall / h, K.left1[m]) / HUSHED)
-            if reach > K.middle * h and K.left1[k] * h < (2.0 * reach + GLANCE * h) * fall:
+        elif K.left1[k] < K.far_look * fall and K.adaptive == 0 and may_take_long_step(K):
+            reach = sqrt(noise_coefficient(K, k, fall / h, K.left1[m]) / NEGLIGIBLE_NOISE)
+            if reach > K.middle * h and K.left1[k] * h < (2.0 * reach + NEAR_STEPS * h) * fall:
                 near = 1.0
         K.left[k] = K.left1[k]
     K.left[m] = near
@@ -110,7 +110,7 @@ def motion(K: Kernel, y: Reals) -> float:
     return float(sqrt(size) + 1e-300)
 
 
-def stirring(K: Kernel, k: int, fall: float, speed: float) -> float:
+def noise_coefficient(K: Kernel, k: int, fall: float, speed: float) -> float:
     """c [s²] of the share c/τ² of the velocities that round-off makes of them where a step ends τ from a pose.
 
     Round-off δ of a row leaves positions open by δ/|w|; ḣ = 0 makes velocities δ/(|w| τ) of that, with |w| = fall τ.
@@ -119,7 +119,7 @@ def stirring(K: Kernel, k: int, fall: float, speed: float) -> float:
     for i in range(K.n_v if K.vector == 1 else 0):  # quaternions do not grow
         if K.unit[i] == 1:
             turned = max(turned, abs(K.q[i]))
-    return float(STIR * EPS * turned * K.scale[K.n + K.rows[k]] / (fall * speed + 1e-300))
+    return float(NOISE_GROWTH * EPS * turned * K.scale[K.n + K.rows[k]] / (fall * speed + 1e-300))
 
 
 def weigh_columns(K: Kernel) -> None:
@@ -137,7 +137,7 @@ def load_row(K: Kernel, k: int) -> None:
         K.basis[k * n + j] = K.acc[row + j] * K.spare[j]
 
 
-def leftovers_here(K: Kernel, m: int) -> None:
+def row_norms(K: Kernel, m: int) -> None:
     """Gram–Schmidt on the rows of B in K.acc, in their order: |w| into K.work, w/|w| into K.basis."""
     n = K.n
     weigh_columns(K)
@@ -152,7 +152,7 @@ def leftovers_here(K: Kernel, m: int) -> None:
             K.basis[k * n + j] *= inverse
 
 
-def lengths_of_many(K: Kernel, m: int) -> None:
+def row_norms_of_many(K: Kernel, m: int) -> None:
     """|w| into K.work where most rows have nothing in common: roots of the pivots of their products, in their order.
 
     Rows keep their zeros there, which Gram–Schmidt fills; see `mbd.kernel.singular.gram_norms`.
@@ -190,11 +190,11 @@ def evaluate_ahead(K: Kernel, ahead: float) -> None:
     evaluate(K, K.time + ahead, K.q1, K.y1)
 
 
-def times_to_poses(K: Kernel, m: int, unit: float) -> float:
+def times_to_singularities(K: Kernel, m: int, unit: float) -> float:
     """Times from now to where each row loses rank, into K.work[m:2m]; the first of them. K.velocity_noise is its c."""
     n = K.n
     evaluate_ahead(K, 0.0)
-    leftovers_here(K, m)
+    row_norms(K, m)
     for k in range(m * n):
         K.turning[k] = K.basis[k]
     for k in range(m):
@@ -204,7 +204,7 @@ def times_to_poses(K: Kernel, m: int, unit: float) -> float:
     first = NOWHERE
     for _ in range(LOOKS_AHEAD):
         evaluate_ahead(K, ahead)
-        leftovers_here(K, m)
+        row_norms(K, m)
         first = NOWHERE
         for k in range(m):
             along = 0.0
@@ -224,23 +224,23 @@ def times_to_poses(K: Kernel, m: int, unit: float) -> float:
     speed = max(motion(K, K.y), motion(K, K.y1))  # it may start from rest
     for k in range(m):
         if K.work[m + k] < 1.1 * first and first < NOWHERE:
-            K.velocity_noise += stirring(K, k, K.work[2 * m + k] / K.work[m + k], speed)
+            K.velocity_noise += noise_coefficient(K, k, K.work[2 * m + k] / K.work[m + k], speed)
     return first
 
 
 def horizon(K: Kernel, m: int, unit: float, first: float) -> float:
     """Time beyond which a pose is not looked for: nothing is arranged so early, and the motion is not known so far."""
-    limit = 4.0 * FAR_GLANCE * unit
+    limit = 4.0 * FAR_STEPS * unit
     if K.stretches == 1 and first < NOWHERE:
         speed = max(motion(K, K.y), motion(K, K.y1))
         for k in range(m):
             if K.work[m + k] == first:
-                reach = sqrt(stirring(K, k, K.work[2 * m + k] / first, speed) / HUSHED)
+                reach = sqrt(noise_coefficient(K, k, K.work[2 * m + k] / first, speed) / NEGLIGIBLE_NOISE)
                 limit = max(limit, 4.0 * min(reach, K.longest_over * unit))
     return limit
 
 
-def step_by_pose(K: Kernel, unit: float, longest: float) -> float:
+def singular_step_size(K: Kernel, unit: float, longest: float) -> float:
     """The step to take in place of one of this size, so that none has a stage next to a pose; `unit` far from one.
 
     Where round-off would make much of velocities that near, the step over the pose lasts up to `longest` units.
@@ -250,14 +250,14 @@ def step_by_pose(K: Kernel, unit: float, longest: float) -> float:
     K.velocity_noise = 0.0
     if K.left[m] == 0.0:
         return unit
-    first = times_to_poses(K, m, unit)
+    first = times_to_singularities(K, m, unit)
     limit = horizon(K, m, unit, first)
-    stretched = limit > 4.0 * FAR_GLANCE * unit and first <= limit
+    stretched = limit > 4.0 * FAR_STEPS * unit and first <= limit
     if K.stretches == 0 or first <= CERTAIN * unit or stretched:
         K.singular_time = K.time + first
     span = unit
-    if may_stretch(K):
-        span = min(max(sqrt(K.velocity_noise / HUSHED) / K.middle, unit), longest * unit)
+    if may_take_long_step(K):
+        span = min(max(sqrt(K.velocity_noise / NEGLIGIBLE_NOISE) / K.middle, unit), longest * unit)
     rest = (first - K.middle * span) / unit
     if rest >= 2.0:
         K.velocity_noise = 0.0  # far: what may come of it is judged nearer
@@ -270,7 +270,7 @@ def step_by_pose(K: Kernel, unit: float, longest: float) -> float:
     return clearest(K, m, span, min(1.0, first / K.middle / span))
 
 
-def stirred(K: Kernel, h: float) -> float:
+def noise_share(K: Kernel, h: float) -> float:
     """Share of the velocities that round-off makes of them in a step of size h to or over a pose; 0 far from one."""
     if K.velocity_noise == 0.0:
         return 0.0
@@ -278,13 +278,13 @@ def stirred(K: Kernel, h: float) -> float:
     return float(min(K.velocity_noise / (away * away + 1e-300), 1.0))
 
 
-def stirs(K: Kernel, h: float) -> bool:
+def is_too_noisy(K: Kernel, h: float) -> bool:
     """Whether round-off makes too much of velocities in such a step; K.detail then tells when, where, how much."""
-    share = stirred(K, h)
-    if share <= LOUD:
+    share = noise_share(K, h)
+    if share <= TOO_NOISY:
         return False
     m = K.n_active
-    first = times_to_poses(K, m, h)
+    first = times_to_singularities(K, m, h)
     for k in range(m):
         if K.work[m + k] == first:
             K.failure_index = K.n + k

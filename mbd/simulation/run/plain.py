@@ -18,7 +18,7 @@ from mbd.kernel.records import Kernel
 from mbd.kernel.restart import MOST_LOADS, evaluate, fill_block, refresh_scales
 from mbd.kernel.schemes.contract import Scheme
 from mbd.kernel.schemes.memory import start_step
-from mbd.kernel.singular.step_size import forget_leftovers, keep_leftovers, note_leftovers
+from mbd.kernel.singular.step_size import accept_row_norms, forget_row_norms, note_row_norms
 from mbd.kernel.uneven import LOSS
 from mbd.simulation.asked import asked
 from mbd.simulation.run.shares import shares
@@ -291,7 +291,7 @@ class PlainScheme:
         self.memory = memory
         K.near_singular = 0
         K.slope[:] = getattr(memory, "slope", 0.0)
-        forget_leftovers(K)
+        forget_row_norms(K)
         fill_block(K, K.time, K.q, K.y)
         refresh_scales(K)
         return 0
@@ -327,7 +327,7 @@ class PlainScheme:
         K.lam1[rows] = lam
         if K.singular_size == 1 and rows:
             evaluate(K, t1, K.q1, K.y1)
-            note_leftovers(K)
+            note_row_norms(K)
         fill_block(K, t1, K.q1, K.y1)
         K.block[K.o_a : K.o_a + K.n] = rate
         K.block[K.o_lam : K.o_lam + K.n_rows] = K.lam1[: K.n_rows]
@@ -342,7 +342,7 @@ class PlainScheme:
     def accept(self, K: Kernel, h: float) -> None:
         """The candidate becomes the accepted state, its memory the memory."""
         if K.singular_size == 1 and K.n_active > 0:
-            keep_leftovers(K, h)
+            accept_row_norms(K, h)
         self.memory = self.pending
         K.slope[:] = (K.rate1 - K.rate) / h
         K.lam_slope[:] = (K.lam1 - K.lam) / h

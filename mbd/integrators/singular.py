@@ -10,7 +10,7 @@ from mbd.arrays import Matrix, Vector
 from mbd.kernel.singular.newmark_step import CONTINUOUS, FORESEEN, NEAREST, VANISHING, WITHIN
 from mbd.kernel.singular.step_pairs import WHOLE, is_of_pair
 
-__all__ = ["CONTINUOUS", "WHOLE", "WITHIN", "Distance", "distance_to_pose"]
+__all__ = ["CONTINUOUS", "WHOLE", "WITHIN", "Distance", "distance_to_singularity"]
 
 EPS = float(np.finfo(float).eps)
 
@@ -35,7 +35,7 @@ class Distance:
         return part < NEAREST + doubt and self.kick * self.steps > tolerance * max(part - doubt, 1e-3)
 
 
-def distance_to_pose(B: Matrix, turning: Matrix, mass: Vector, v: Vector, scale: Vector, dt: float) -> Distance:
+def distance_to_singularity(B: Matrix, turning: Matrix, mass: Vector, v: Vector, scale: Vector, dt: float) -> Distance:
     """How far the nearest row is from depending on others, over what a step changes of that.
 
     B : (m, n_v) rows; turning : (m, n_v) their rates; mass : (n_v,) weights of the coordinates; v : (n_v,)
@@ -44,14 +44,15 @@ def distance_to_pose(B: Matrix, turning: Matrix, mass: Vector, v: Vector, scale:
     weight = 1.0 / np.sqrt(np.where(mass > 0.0, mass, 1.0))
     rows, turns = B * weight, turning * weight
     lengths = np.linalg.norm(rows, axis=1) + dt * np.linalg.norm(turns, axis=1) + 1e-300
-    order, here = _leftovers(rows / lengths[:, None], None)
-    around = [_leftovers((rows + ahead * turns) / lengths[:, None], order)[1] for ahead in (-dt, dt)]
+    order, here = _pivoted_gram_norms(rows / lengths[:, None], None)
+    around = [_pivoted_gram_norms((rows + ahead * turns) / lengths[:, None], order)[1] for ahead in (-dt, dt)]
     change = np.max([np.abs(left - here) for left in around], axis=0)
     steps = here / (change + 1e-300)
     k, near = int(np.argmin(steps)), float(np.min(steps))
     if NEAREST < near < WITHIN + 2.0:  # a row that turns with others changes but does not vanish
         there = [
-            _leftovers((rows + ahead * turns) / lengths[:, None], order)[1][k] for ahead in (-near * dt, near * dt)
+            _pivoted_gram_norms((rows + ahead * turns) / lengths[:, None], order)[1][k]
+            for ahead in (-near * dt, near * dt)
         ]
         if min(there) > VANISHING * here[k]:
             return Distance(1e300, 0.0)
@@ -59,7 +60,7 @@ def distance_to_pose(B: Matrix, turning: Matrix, mass: Vector, v: Vector, scale:
     return Distance(float(steps[k]), float(across / (dt * np.sqrt(mass @ v**2) + 1e-300)))
 
 
-def _leftovers(rows: Matrix, order: list[int] | None) -> tuple[list[int], Vector]:
+def _pivoted_gram_norms(rows: Matrix, order: list[int] | None) -> tuple[list[int], Vector]:
     """Lengths of rows less their parts along earlier ones; the longest remaining first, or in a given order."""
     rows, taken, left = rows.copy(), list[int](), list[float]()
     for place in range(len(rows)):

@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 from hypothesis import given, strategies as st
 
-from mbd.kernel.singular.gram_norms import leftovers_of_many
-from mbd.kernel.singular.newmark_step import leftovers
+from mbd.kernel.singular.gram_norms import pivoted_gram_norms_of_many
+from mbd.kernel.singular.newmark_step import pivoted_gram_norms
 
 
 def kernel(rng, n, m, density):
@@ -26,7 +26,7 @@ def kernel(rng, n, m, density):
 @given(n=st.integers(2, 16), m=st.integers(1, 10), seed=st.integers(0, 2**32 - 1), density=st.floats(0.05, 1.0))
 def test_both_ways_leave_the_same_of_every_row_in_the_same_order(n, m, seed, density):
     m, found = min(m, n), []
-    for way in (leftovers, leftovers_of_many):
+    for way in (pivoted_gram_norms, pivoted_gram_norms_of_many):
         K = kernel(np.random.default_rng(seed), n, m, density)
         for place, ahead in enumerate((0.0, -0.01, 0.01)):
             way(K, m, 0.01, 0.005, ahead, place * m, 0, 1, n, n)
@@ -41,5 +41,5 @@ def test_nothing_is_left_of_a_row_that_depends_on_others():
     K = kernel(np.random.default_rng(3), 8, 4, 0.5)
     rows, turning = K.out[8:].reshape(4, 8), K.turning.reshape(4, 8)
     rows[3], turning[3] = rows[0] - 2.0 * rows[1], 0.0
-    leftovers_of_many(K, 4, 0.0, 0.0, 0.0, 0, 0, 1, 8, 8)
+    pivoted_gram_norms_of_many(K, 4, 0.0, 0.0, 0.0, 0, 0, 1, 8, 8)
     assert K.spare[3] < 1e-7 < K.spare[2]
