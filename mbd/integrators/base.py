@@ -53,7 +53,7 @@ class Terms:
     velocity : (m,) booleans, rows that hold velocities only: h = 0, `rate` and H = B + (c_K/c_C) ∂rate/∂x in both
         forms; None: no such row
     turning : (m, n_v) ∂ḣ/∂x, the rate of B, zero for rows on velocities, whose H it does not enter then; stabilized
-        only; None: poses in which rows lose rank are not looked for
+        only; None: singular configurations are not looked for
     shared : multipliers of dependent rows follow those of the others at each point, which the tangent takes as linear:
         r may rise in an iteration that converges
     """
@@ -163,7 +163,7 @@ def composed(system: System, q: Vector, x: Vector) -> Vector:
 class StepReport:
     """How a step went: converged or why not, Newton iterations, largest residual over its tolerance.
 
-    too_near : the step, or whole ones after it, would end too near to a pose in which rows lose rank; with another size
+    too_near : the step, or whole ones after it, would end too near to a singular configuration; with another size
         they may not
     """
 

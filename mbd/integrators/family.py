@@ -150,7 +150,7 @@ class NewmarkFamily(Integrator):
         return NewmarkMemory(rate, rate + jerk * slope, lam, slope, lam_slope, np.zeros(n_v), np.zeros(n_v), dt, 0, dt)
 
     def resume(self, system: System, state: State, mode: Mode, dt: float, memory: NewmarkMemory) -> NewmarkMemory:
-        """A start, but that a keeps its distance from v̇, as beyond a pose in which rows lost rank."""
+        """A start, but that a keeps its distance from v̇, as beyond a singular configuration."""
         fresh = self.start(system, state, mode, dt)
         return replace(fresh, aux=fresh.rate + (dt / memory.step) * (memory.aux - memory.rate))
 

@@ -35,7 +35,7 @@ class NewmarkMemory:
 
     rate (n,) true v̇ and ż; aux (n,) the auxiliary a for steps of size `step`; lam (m,) multipliers;
     slope, lam_slope: their last rates of change, which predict the next step; shift (n_v,) the position correction and
-    shift_change what it changed by in the last step; near 1 within a few steps of a pose in which rows lose rank, and 2
+    shift_change what it changed by in the last step; near 1 within a few steps of a singular configuration, and 2
     just beyond it, where the scheme is started again; whole: the dt that steps have unless they must not [s].
     """
 
@@ -151,7 +151,7 @@ class Step:
             if iteration == 0 and terms.turning is not None and len(terms.turning):
                 away = self._distance(terms)
                 if away.too_close(self.scheme.tolerance, self.near > 0, self.size):
-                    why = "a pose in which rows lose rank is too close"
+                    why = "a singular configuration is too close"
                     return self._result(t1, StepReport(False, 0, 0.0, why, too_near=self.near == 0))
                 if self.near:
                     self.near = PASSING if away.steps < WITHIN else LEFT
@@ -182,7 +182,7 @@ class Step:
         return self._result(t1, StepReport(False, MAX_ITERATIONS, error, "Newton did not converge"))
 
     def _distance(self, terms: Terms) -> Distance:
-        """How many whole steps a pose is away in which the rows lose rank."""
+        """How many whole steps a singular configuration is away."""
         assert terms.S is not None
         assert terms.H is not None
         assert terms.turning is not None

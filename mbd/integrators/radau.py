@@ -389,7 +389,7 @@ class _RadauStep:
 
 
 class _AstrideStep(_RadauStep):
-    """A step with stages on both sides of a pose in which rows lose rank: see `mbd.kernel.singular.stages`."""
+    """A step with stages on both sides of a singular configuration: see `mbd.kernel.singular.stages`."""
 
     at_singularity = True
 

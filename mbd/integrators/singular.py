@@ -1,4 +1,4 @@
-"""How many steps off a pose is in which rows lose rank: the readable twin of `mbd.kernel.singular.newmark_step`."""
+"""How many steps off a singular configuration is: the readable twin of `mbd.kernel.singular.newmark_step`."""
 
 from __future__ import annotations
 

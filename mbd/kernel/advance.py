@@ -17,9 +17,10 @@ from mbd.kernel.records import Kernel
 from mbd.kernel.restart import consistent, largest_force
 from mbd.kernel.settle import room_to_log
 from mbd.kernel.singular.events import find_passed_events, log_passed_events, may_pass_events, refuses
+from mbd.kernel.singular.leave import leave_singularity
 from mbd.kernel.singular.step_pairs import ALONE, FIRST, SECOND
 from mbd.kernel.starting import find_mode, restart, still_dependent
-from mbd.kernel.takeover import leave_singularity, take_over
+from mbd.kernel.takeover import take_over
 from mbd.kernel.trying import part_end, step_end, tried_step
 
 __all__ = ["advance"]
@@ -132,7 +133,7 @@ def conclude(
         accept(K, h, t1, quiet)
         if not within:
             K.grid_steps += 1
-        if not holds:  # the pose has changed its rank
+        if not holds:  # the constraint Jacobian has changed its rank
             K.restart_due = 2
         if (h < full and not within) or K.halvings > 0 or paired or cut or K.adaptive == 1:
             K.grid_start = t1  # the grid goes on from here

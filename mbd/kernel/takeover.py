@@ -1,4 +1,4 @@
-"""Taking over a candidate before a restart (at events, after uneven steps), and going on beyond singular poses.
+"""Taking over a candidate before a restart (at events, after uneven steps).
 
 Steps of index 3 leave B v + h_t of the size of their error, which a candidate loses as it is taken over. Forces and
 guards change with it: where an event is looked for, they are those of the velocities that it will leave.
@@ -8,13 +8,12 @@ from __future__ import annotations
 
 from mbd.kernel.candidate import adopt, stay
 from mbd.kernel.codes import PULL
-from mbd.kernel.guards import frictions_at, try_step, update_armed, update_sides, watch
-from mbd.kernel.hooks import scheme_resume
+from mbd.kernel.guards import frictions_at, try_step, watch
 from mbd.kernel.records import Kernel, Reals
 from mbd.kernel.restart import active_rows, consistent, evaluate, largest_force, stepping_rows
 from mbd.kernel.saddle import correct_velocities, solve_rows
 
-__all__ = ["leave_singularity", "look", "look_at_start", "put_on_rows", "take_over"]
+__all__ = ["look", "look_at_start", "put_on_rows", "take_over"]
 
 
 def project_velocity(K: Kernel, t: float, q: Reals, y: Reals, m: int, dropping: bool) -> int:
@@ -120,22 +119,3 @@ def take_over(K: Kernel, t1: float) -> None:
             K.rate[i] = K.jump[i]
         for k in range(K.n_rows):
             K.lam[k] = K.impulse[k]
-
-
-def leave_singularity(K: Kernel, h: float) -> int:
-    """Just beyond a pose in which rows lost rank: velocities on the rows again, rates and multipliers consistent.
-
-    The scheme starts anew, but for the average of accelerations that it carries. The rows are those that were stepped
-    with: which depend on which is judged too badly here.
-    """
-    status = project_velocity(K, K.time, K.q, K.y, stepping_rows(K), False)
-    if status == 0:
-        status = consistent(K, K.time, K.q, K.y)
-    if status != 0:
-        return status
-    status = scheme_resume(K, h)
-    if K.n_watched > 0:
-        watch(K, K.time, K.q, K.y, K.rate, K.lam, K.guards0)
-        update_armed(K)
-        update_sides(K)
-    return status

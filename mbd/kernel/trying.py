@@ -18,7 +18,7 @@ SHORTEST = 0.1
 SHORTENING = 0.6180339887498949
 """Golden ratio: what is left of a step whose Newton iteration failed, for the next try (at most five) [-].
 
-No power of it is a simple fraction, so that tries do not meet a pose that repeats with the grid again.
+No power of it is a simple fraction, so that tries do not meet a configuration that repeats with the grid again.
 """
 
 
@@ -61,7 +61,7 @@ def part_end(K: Kernel, on_grid: float) -> float:
 def tried_step(K: Kernel, h: float, t1: float) -> int:
     """A candidate at t1, or earlier where Newton's method or the allowed error asks for it; K.step_taken its step.
 
-    A pose in which rows lose rank is stepped over by a pair of steps, or a shortened one; stiff places get smaller.
+    A singular configuration is stepped over by a pair of steps, or a shortened one; stiff places get smaller.
     """
     if K.scales_raised == 1:
         lower_scales(K)
@@ -97,9 +97,9 @@ def tried_step(K: Kernel, h: float, t1: float) -> int:
 
 
 def step_past_singularity(K: Kernel, unit: float) -> int:
-    """A candidate of a scheme of several stages after a step of this size, or another near a pose: K.step_taken.
+    """A candidate of a scheme of several stages after a step of this size, or another near a singularity: K.step_taken.
 
-    A step over the pose that is longer than others must be resolved like these; else they lead up to it.
+    A step over the singularity that is longer than others must be resolved like these; else they lead up to it.
     """
     h = singular_step_size(K, unit, K.longest_over)
     if h > unit:

@@ -14,7 +14,7 @@ def start_step(K: Kernel) -> float:
 
 
 def forget_steps(K: Kernel) -> None:
-    """Nothing is known of steps before: rates and multipliers do not change, no pose of lost rank is near."""
+    """Nothing is known of steps before: rates and multipliers do not change, no singular configuration is near."""
     for i in range(K.n):
         K.slope[i] = 0.0
         K.aux[i] = K.rate[i]

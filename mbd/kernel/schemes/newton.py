@@ -158,7 +158,7 @@ def second_look(K: Kernel, o_r: int, m: int, c_C: float, c_K: float, tolerance: 
 
 
 def pass_singularity(K: Kernel, h: float, t1: float, m: int, c_C: float, c_K: float, straight: bool) -> int:
-    """−1 where no pose in which rows lose rank is near; else how a step that passes it ends, or that this must not."""
+    """−1 where no singular configuration is near; else how a step that passes it ends, or that this must not."""
     fall = steps_by_pivot(K, m, straight)
     if not fall < WITHIN + 2.0:
         return -1

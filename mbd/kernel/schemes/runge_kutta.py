@@ -304,7 +304,7 @@ def explicit_error(K: Kernel, h: float) -> None:
 def hold_error(K: Kernel) -> bool:
     """K.error less what the projection onto the rows takes of it, in the metric of M; false if that is singular.
 
-    Stages next to a pose in which rows lose rank err across the rows, most of which is gone at the end of the step.
+    Stages next to a singular configuration err across the rows, most of which is gone at the end of the step.
     """
     n = K.n
     n_v = K.n_v

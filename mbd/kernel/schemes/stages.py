@@ -223,7 +223,7 @@ def matrices(K: Kernel, m: int, h: float) -> None:
     """The real and the complex matrix at the block, whose r, h and ḣ stay in K.out.
 
     ``P(c) = M + c C + c² K`` and the rows ``B + c ∂ḣ/∂x``: at c = μh, (c, 0) and (−c, 0) the compiled tangent gives
-    ``M + c C + c² K``, ``M + c C`` and ``M − c C``. Next to a pose in which rows lose rank they are B alone.
+    ``M + c C + c² K``, ``M + c C`` and ``M − c C``. Next to a singular configuration they are B alone.
     """
     n = K.n
     size = n + m

@@ -1,10 +1,7 @@
-"""Passing a pose in which rows lose rank for an instant: a few steps of the stabilized form taken as index 3.
+"""The Newmark family next to a singular configuration: a few steps of the stabilized form taken as index 3.
 
-Let x be the distance from the pose along the motion and y a coordinate across it, where another branch crosses: the
-row is like h = x y there. Round-off δ of h leaves y open by δ/x, and ḣ = ẋ y + x ẏ = 0 then makes ẏ wrong by ẋ δ/x²,
-while a step that holds h alone makes it wrong by δ/(x dt). The second is less wrong where |x| < ẋ dt: within a step of
-the pose. So within `WITHIN` steps of it h alone is held, with ∂h/∂x = B = H − (c_K/c_C) ∂ḣ/∂x; then the velocities are
-projected onto the rows and the scheme starts again, but for the average that it carries.
+Within `WITHIN` steps of it h alone is held, with ∂h/∂x = B = H − (c_K/c_C) ∂ḣ/∂x; then the velocities are projected
+onto the rows and the scheme starts again, but for the average that it carries. Why: see `mbd.kernel.singular`.
 """
 
 from __future__ import annotations
@@ -32,15 +29,15 @@ from mbd.kernel.singular.step_pairs import is_of_pair, is_whole
 __all__ = ["misses", "singular_newmark_step", "steps_by_pivot", "steps_to_singularity"]
 
 WITHIN = 4.0
-"""Steps to a pose of lost rank, at the present speed, below which positions alone are held [-]."""
+"""Steps to a singular configuration, at the present speed, below which positions alone are held [-]."""
 NEAREST = 0.2
-"""Steps from a pose of lost rank below which no step ends where round-off of h makes too much of velocities [-]."""
+"""Steps from one below which no step ends where round-off of h makes too much of velocities [-]."""
 FORESEEN = 0.25
-"""The same, of the end of a step still to come: more, since how far the pose is then is only estimated [-]."""
+"""The same, of the end of a step still to come: more, since how far the singularity is then is only estimated [-]."""
 VANISHING = 0.5
-"""What is left of a row where it should vanish, over what is left of it now: more, and no pose is there [-]."""
+"""What is left of a row where it should vanish, over that of now: more, and there is no singularity [-]."""
 CONTINUOUS = 0.05
-"""Part of the speed by which a step near such a pose may differ from its prediction: the branch goes on in v [-]."""
+"""Part of the speed by which a step near it may differ from its prediction: the branch goes on in v [-]."""
 
 
 def steps_by_pivot(K: Kernel, m: int, straight: bool) -> float:
@@ -123,7 +120,7 @@ def find_gram_norms(
 
 
 def misses(K: Kernel, away: float, h: float) -> bool:
-    """Whether whole steps from the end of this one would end too close to the pose: then it gets another size.
+    """Whether whole steps from the end of this one would end too close to the singularity: then it gets another size.
 
     While ḣ is held too, steps may do that; those that hold h alone start to ring. It is the last whole one before these
     that is looked at, or one that was shortened for another reason; those of a pair (`step_pairs`) are not.

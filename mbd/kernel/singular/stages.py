@@ -1,10 +1,9 @@
-"""Stages of an implicit step on both sides of a pose in which rows lose rank: each is held to its own rows.
+"""Stages of an implicit step on both sides of a singular configuration: each is held to its own rows.
 
-With x the distance from the pose along the motion and y across it, rows are like h = x y there. A Newton matrix with
-the rows of one stage fails the others: beyond the pose x has the other sign. But across the motion stages do not wait
-for each other: h = 0 makes y_i = 0 at each, ḣ = 0 makes ẏ_i = 0. So, at given rates W_i, positions go onto the rows by
-the correction U_i that is least in the metric of M_i, multipliers are those that leave least of the balance, and s_i is
-the least change of velocities that does away with ḣ:
+Across the motion stages do not wait for each other: h = 0 makes y_i = 0 at each, ḣ = 0 makes ẏ_i = 0 (see
+`mbd.kernel.singular`). So, at given rates W_i, positions go onto the rows by the correction U_i that is least in the
+metric of M_i, multipliers are those that leave least of the balance, and s_i is the least change of velocities that
+does away with ḣ:
 
     [M_i B_iᵀ; B_i 0] (U_i, ·) = −(0, h),   [M_i B_iᵀ; B_i 0] (s_i, ·) = −(0, ḣ),
     [M_i R_i; B_i 0] (·, λ_i) = −(M_i W_i + f_i, 0)
@@ -37,7 +36,7 @@ from mbd.kernel.schemes.stages import (
 __all__ = ["BESIDE_NOISY", "spans_singularity", "is_beside_singularity", "solve_singular_stages", "replace_row_rates"]
 
 BESIDE = 2.0
-"""Steps to or from a pose within which rows change too much from stage to stage for one matrix [-]."""
+"""Steps to or from a singularity within which rows change too much from stage to stage for one matrix [-]."""
 BESIDE_NOISY = 1000.0
 """The same within which round-off of rows may keep the residuals of a step with one matrix from falling [-]."""
 MOST_STAGE_PROJECTIONS = 8
@@ -45,12 +44,12 @@ MOST_STAGE_PROJECTIONS = 8
 
 
 def spans_singularity(K: Kernel, h: float) -> bool:
-    """Whether a step of size h goes over a pose in which rows lose rank, or close by it."""
+    """Whether a step of size h goes over a singular configuration, or close by it."""
     return bool(K.near_singular == PASSING and K.loaded == 0 and not sharing(K)) or is_beside_singularity(K, h, BESIDE)
 
 
 def is_beside_singularity(K: Kernel, h: float, steps: float) -> bool:
-    """Whether a step of size h lies within so many steps of the pose found last; not where loads are shared out."""
+    """Whether a step of size h lies so near to the singularity found last; not where loads are shared out."""
     away = K.singular_time - K.time
     return bool(-steps * h < away < (1.0 + steps) * h) and K.loaded == 0 and not sharing(K)
 

@@ -1,18 +1,12 @@
-"""Steps of a scheme of several stages that pass a pose in which rows lose rank between two of these.
+"""The size of a step next to a singular configuration, which has to lie between two stages of a scheme.
 
-With x the distance from the pose along the motion and y across it, rows are like h = x y there. Accelerations that
-satisfy ``ḧ = x ÿ + 2 ẋ ẏ + ẍ y = 0`` make of a velocity ẏ that a stage is off the branch ``ÿ = −2 ẋ ẏ / x``, and the
-projection at the end of a step makes of round-off δ of h a velocity ẋ δ/x². So no stage may lie close to the pose. The
-widest gap between nodes of the formulas is amid the step: one that has the pose there begins and ends half a step from
-it. The steps before are shortened for that, those behind it go on from where it ends. Where steps of the grid are so
-short that x would be too small, the one over the pose is longer; where round-off counts even so, the run ends.
+The widest gap between the nodes of a scheme is where it lies best, at K.middle. The steps before are shortened for
+that, those behind go on from where this one ends. Where steps of the grid are so short that round-off counts at its
+ends, the one over the singularity is longer; where round-off counts even so, the run ends.
 
-The pose is where a row of B depends on earlier ones: where its part w beside these, found by Gram–Schmidt on columns
-scaled by √M_ii, passes zero. A glance at |w| of the ends of steps tells where it falls fast enough; then w is found
-along ``q + τ v + τ²/2 v̇`` as well, and where it vanishes by a secant.
-
-Radau IIA holds rows at its stages, so that ḣ = 0 magnifies round-off there as the projection does; how its Newton's
-method gets across the pose is in `mbd.kernel.singular.stages`.
+The singularity is where a row of B depends on earlier ones: where its part w beside these, found by Gram–Schmidt on
+columns scaled by √M_ii, passes zero. |w| at the ends of steps tells where it falls fast enough; then w is found along
+``q + τ v + τ²/2 v̇`` as well, and where it vanishes by a secant.
 """
 
 from __future__ import annotations
@@ -31,40 +25,40 @@ __all__ = [
 ]  # fmt: skip
 
 NEAR_STEPS = 3.5
-"""Steps to a pose, as the last step tells, below which is looked closer [-]."""
+"""Steps to a singularity, as the last step tells, below which is looked closer [-]."""
 CERTAIN = 6.0
-"""Steps to a pose below which it is taken for one; beyond, where nothing else asks for it, it may be none [-]."""
+"""Steps to it below which it is taken for one; beyond, where nothing else asks for it, it may be none [-]."""
 FAR_STEPS = 14.0
-"""The same where round-off asks for longer steps over the pose; of a scheme K.far_look [-]."""
+"""The same where round-off asks for longer steps over the singularity; of a scheme K.far_look [-]."""
 NOISE_GROWTH = 16.0
 """What round-off of a row makes of velocities over what it would if it were one unit in the last place [-]."""
 NEGLIGIBLE_NOISE = 1e-9
-"""Share of velocities that round-off may make up before the step over a pose is longer than others [-]."""
+"""Share of velocities that round-off may make up before the step over a singularity is longer than others [-]."""
 TOO_NOISY = 1e-5
-"""The same above which a step over a pose is refused [-]."""
+"""The same above which a step over a singularity is refused [-]."""
 RESOLVED = 1e-8
-"""Share of velocities by which a step over a pose that is longer than others may err [-]."""
+"""Share of velocities by which a step over a singularity that is longer than others may err [-]."""
 SMALLEST = 0.1
-"""Part of a step below which none is made to lead up to a pose [-]."""
+"""Part of a step below which none is made to lead up to a singularity [-]."""
 CLEAR = 0.06
-"""Part of a step by which a pose must be away from all nodes [-]."""
+"""Part of a step by which a singularity must be away from all nodes [-]."""
 LOOKS_AHEAD = 4
 """Places along the motion at which w is found [-]."""
 NEAR_ENOUGH = 0.01
 """Part of a step by which the last of these may differ from where w vanishes [-]."""
 VANISHED = 0.2
-"""Length of w at a pose, over that of now: more, and rows only come close to losing rank [-]."""
+"""Length of w at a singularity, over that of now: more, and rows only come close to losing rank [-]."""
 NOWHERE = 1e300
-"""Time to a pose where there is none [s]."""
+"""Time to a singularity where there is none [s]."""
 
 
 def may_take_long_step(K: Kernel) -> bool:
-    """Whether a step over a pose may be longer than others: of an explicit scheme only where no guard is watched."""
+    """Whether a step over a singularity may be longer than others: of most schemes only where no guard is watched."""
     return bool(K.n_watched == 0 or K.stretches == 1)
 
 
 def forget_row_norms(K: Kernel) -> None:
-    """Nothing is known at the start of the scheme: whether a pose is near is looked at before the first step."""
+    """Nothing is known at the start of the scheme: whether a singularity is near is looked at before the first step."""
     K.singular_time = -NOWHERE
     for k in range(K.n_rows):
         K.left[k] = -1.0
@@ -84,7 +78,7 @@ def note_row_norms(K: Kernel) -> None:
 
 
 def accept_row_norms(K: Kernel, h: float) -> None:
-    """The candidate is accepted after a step of h: |w| of each row, and whether one falls so that a pose may be near.
+    """The candidate is accepted after a step of h: |w| of each row, and whether one falls to a singularity.
 
     K.left[m] = 1 where it is to be looked for, else 0.
     """
@@ -111,7 +105,7 @@ def motion(K: Kernel, y: Reals) -> float:
 
 
 def noise_coefficient(K: Kernel, k: int, fall: float, speed: float) -> float:
-    """c [s²] of the share c/τ² of the velocities that round-off makes of them where a step ends τ from a pose.
+    """c [s²] of the share c/τ² of the velocities that round-off makes of them where a step ends τ from a singularity.
 
     Round-off δ of a row leaves positions open by δ/|w|; ḣ = 0 makes velocities δ/(|w| τ) of that, with |w| = fall τ.
     """
@@ -229,7 +223,7 @@ def times_to_singularities(K: Kernel, m: int, unit: float) -> float:
 
 
 def horizon(K: Kernel, m: int, unit: float, first: float) -> float:
-    """Time beyond which a pose is not looked for: nothing is arranged so early, and the motion is not known so far."""
+    """Time beyond which none is looked for: nothing is arranged so early, and the motion is not known so far."""
     limit = 4.0 * FAR_STEPS * unit
     if K.stretches == 1 and first < NOWHERE:
         speed = max(motion(K, K.y), motion(K, K.y1))
@@ -241,9 +235,9 @@ def horizon(K: Kernel, m: int, unit: float, first: float) -> float:
 
 
 def singular_step_size(K: Kernel, unit: float, longest: float) -> float:
-    """The step to take in place of one of this size, so that none has a stage next to a pose; `unit` far from one.
+    """The step to take in place of one of this size, so that no stage is next to a singularity; `unit` far off.
 
-    Where round-off would make much of velocities that near, the step over the pose lasts up to `longest` units.
+    Where round-off would make much of velocities that near, the step over the singularity lasts up to `longest` units.
     """
     m = K.n_active
     K.near_singular = 0
@@ -271,7 +265,7 @@ def singular_step_size(K: Kernel, unit: float, longest: float) -> float:
 
 
 def noise_share(K: Kernel, h: float) -> float:
-    """Share of the velocities that round-off makes of them in a step of size h to or over a pose; 0 far from one."""
+    """Share of the velocities that round-off makes of them in a step of size h to or over it; 0 far off."""
     if K.velocity_noise == 0.0:
         return 0.0
     away = K.singular_time - K.time - h
@@ -295,7 +289,7 @@ def is_too_noisy(K: Kernel, h: float) -> bool:
 
 
 def is_resolved(K: Kernel, h: float) -> bool:
-    """Whether the candidate errs little enough after a step over a pose that was longer than others."""
+    """Whether the candidate errs little enough after a step over a singularity that was longer than others."""
     fastest = 0.0
     for i in range(K.n_v):
         fastest = max(fastest, max(abs(K.y[i]), abs(K.y1[i])))
@@ -307,7 +301,7 @@ def is_resolved(K: Kernel, h: float) -> bool:
 
 
 def clearest(K: Kernel, m: int, unit: float, wanted: float) -> float:
-    """The step over poses nearest below the wanted part of a unit with none of them close to a node."""
+    """The step over singularities nearest below the wanted part of a unit with none of them close to a node."""
     best = wanted
     widest = -1.0
     for k in range(17):

@@ -1,0 +1,30 @@
+"""The restart just beyond a singular configuration."""
+
+from __future__ import annotations
+
+from mbd.kernel.guards import update_armed, update_sides, watch
+from mbd.kernel.hooks import scheme_resume
+from mbd.kernel.records import Kernel
+from mbd.kernel.restart import consistent, stepping_rows
+from mbd.kernel.takeover import project_velocity
+
+__all__ = ["leave_singularity"]
+
+
+def leave_singularity(K: Kernel, h: float) -> int:
+    """Just beyond a singularity: velocities on the rows again, rates and multipliers consistent.
+
+    The scheme restarts, but for the average of accelerations that it carries. The rows are those that were stepped
+    with: which depend on which is judged too badly here.
+    """
+    status = project_velocity(K, K.time, K.q, K.y, stepping_rows(K), False)
+    if status == 0:
+        status = consistent(K, K.time, K.q, K.y)
+    if status != 0:
+        return status
+    status = scheme_resume(K, h)
+    if K.n_watched > 0:
+        watch(K, K.time, K.q, K.y, K.rate, K.lam, K.guards0)
+        update_armed(K)
+        update_sides(K)
+    return status
