@@ -29,7 +29,7 @@ APART = (
     "singular.gram_norms.pivoted_gram_norms_of_many", "interior.parts_to_take", "locate.locate", "events.handle_event",
     "events.land", "unresolved.look_closer", "singular.events.find_passed_events", "singular.events.log_passed_events",
     "singular.events.refuses", "hooks.scheme_accept", "guards.brief_step", "guards.share_multipliers",
-    "singular.newmark_step.passing_step", "schemes.newton.second_look", "schemes.newton.retreat",
+    "singular.newmark_step.singular_newmark_step", "schemes.newton.second_look", "schemes.newton.retreat",
     "schemes.radau.radau_step", "schemes.runge_kutta.runge_kutta_step",
 )  # fmt: skip
 """Their loops keep their shape wherever they are called; where they are not, nobody carries them along.

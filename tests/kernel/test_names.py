@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from importlib import import_module
 
 import pytest
 
 import mbd
 from mbd.compile.mechanisms import mechanism_of
+from mbd.kernel import build
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.kernel.records import TABLE, Kernel
 from mbd.simulation.run.stepper import Stepper
@@ -38,3 +40,9 @@ def test_a_wrong_name_of_a_field_is_an_error_for_mypy(tmp_path):
     script.write_text("from mbd.kernel.records import Kernel\n\ndef f(K: Kernel) -> int:\n    return K.n_rws\n")
     told = subprocess.run([sys.executable, "-m", "mypy", "--strict", str(script)], capture_output=True, text=True)
     assert '"Kernel" has no attribute "n_rws"' in told.stdout
+
+
+def test_every_function_that_is_compiled_apart_exists():
+    for name in build.APART:
+        module, _, function = name.rpartition(".")
+        assert callable(getattr(import_module(f"mbd.kernel.{module}"), function)), name
