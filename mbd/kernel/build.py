@@ -18,8 +18,9 @@ from types import FunctionType
 from typing import Any
 
 from mbd.kernel.schemes import contract
+from mbd.kernel.tree import Function
 
-__all__ = ["entry", "kernel_object", "kernel_text", "object_of", "source_digest"]
+__all__ = ["entry", "kernel_functions", "kernel_object", "kernel_text", "object_of", "source_digest"]
 
 ENTRY = "mbd_kernel"
 
@@ -97,13 +98,19 @@ def kernel_object() -> bytes:
 
 def kernel_text() -> str:
     """The kernel in LLVM's words."""
-    from mbd.kernel.advance import advance
     from mbd.kernel.llvm import llvm_text
+
+    return llvm_text(kernel_functions(), ENTRY)
+
+
+def kernel_functions() -> list[Function]:
+    """The kernel as typed trees."""
+    from mbd.kernel.advance import advance
     from mbd.kernel.translate import Source, functions_of, translate
 
     text, names = contract.dispatch()
     hooks = Source("hooks", functions_of(text, ENTRY_FUNCTION), {**names, "advance": advance})
-    return llvm_text(translate(hooks, ENTRY, ["kernel"], APART, {"mbd.kernel.hooks": hooks}), ENTRY)
+    return translate(hooks, ENTRY, ["kernel"], APART, {"mbd.kernel.hooks": hooks})
 
 
 @lru_cache(maxsize=1)

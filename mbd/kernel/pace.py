@@ -29,8 +29,6 @@ RESTS = 1e-2
 """Share of the gap rate at closing below which, over a window, it does [-]."""
 PATIENCE = 880
 """Short steps after which those of a contact that goes on vibrating become longer all the same [-]."""
-PACE, FIRST_RATE, LARGEST_RATE, TAKEN, LEAST_PACE = range(5)
-"""Places of a contact in K.pace: step (0: not asked), |γ| as it closed and in the window, steps, least step ever."""
 
 
 def find_pace(K: Kernel) -> int:
@@ -38,23 +36,22 @@ def find_pace(K: Kernel) -> int:
     step = K.dt
     for c in range(K.n_contacts):
         if K.kind[c] == 1:
-            o = 5 * c
             if K.closed[c] == 0:
-                K.pace[o + PACE] = 0.0
-            elif K.pace[o + PACE] == 0.0:
-                K.pace[o + PACE] = pace_of(K, c)
-                K.pace[o + LARGEST_RATE] = 0.0
-                K.pace[o + TAKEN] = 0.0
-                if K.pace[o + PACE] < BRIEFEST * K.dt:
-                    K.failure_step = K.pace[o + PACE]
+                K.contact_step[c] = 0.0
+            elif K.contact_step[c] == 0.0:
+                K.contact_step[c] = pace_of(K, c)
+                K.largest_rate[c] = 0.0
+                K.contact_steps[c] = 0.0
+                if K.contact_step[c] < BRIEFEST * K.dt:
+                    K.failure_step = K.contact_step[c]
                     K.failure_index = c
                     return TOO_BRIEF
-                if K.pace[o + PACE] < K.dt and (
-                    K.pace[o + LEAST_PACE] == 0.0 or K.pace[o + PACE] < K.pace[o + LEAST_PACE]
+                if K.contact_step[c] < K.dt and (
+                    K.least_contact_step[c] == 0.0 or K.contact_step[c] < K.least_contact_step[c]
                 ):
-                    K.pace[o + LEAST_PACE] = K.pace[o + PACE]
+                    K.least_contact_step[c] = K.contact_step[c]
             if K.closed[c] == 1:
-                step = min(step, K.pace[o + PACE])
+                step = min(step, K.contact_step[c])
     K.step = step
     return 0
 
@@ -69,7 +66,7 @@ def pace_of(K: Kernel, c: int) -> float:
     share = FEW
     while h >= BRIEFEST * K.dt:
         change = h * abs(acceleration_of(K, c, h) - first)
-        rate = K.pace[5 * c + FIRST_RATE]
+        rate = K.closing_rate[c]
         outside = touches and K.guards1[c] > 0.0 and change > 0.0
         if rate * h <= gap_tolerance(K, c) or (change <= share * rate and not outside):
             return float(h)
@@ -81,7 +78,7 @@ def pace_of(K: Kernel, c: int) -> float:
 def acceleration_of(K: Kernel, c: int, h: float) -> float:
     """What the force of contact c does to its gap rate [m/s², rad/s²], as the accelerations of now lead on for h.
 
-    The larger of the rates now and then is left in K.pace, the guards then in K.guards1.
+    The larger of the rates now and then is left in K.closing_rate, the guards then in K.guards1.
     """
     t = K.time
     fill_block(K, t, K.q, K.y)
@@ -105,20 +102,19 @@ def acceleration_of(K: Kernel, c: int, h: float) -> float:
     watch(K, t, K.q, K.y, K.rate, K.lam, K.guards1)
     rate = abs(K.guards1[K.n_contacts + c])
     watch(K, t + h, K.q1, K.y1, K.rate, K.lam, K.guards1)
-    K.pace[5 * c + FIRST_RATE] = max(rate, abs(K.guards1[K.n_contacts + c]))
+    K.closing_rate[c] = max(rate, abs(K.guards1[K.n_contacts + c]))
     return float(difference / scale)
 
 
 def relax_pace(K: Kernel) -> None:
     """After a short step: longer ones where the contact rests, or goes on vibrating for long."""
     for c in range(K.n_contacts):
-        o = 5 * c
-        if K.kind[c] == 1 and K.closed[c] == 1 and 0.0 < K.pace[o + PACE] < K.dt:
-            K.pace[o + LARGEST_RATE] = max(K.pace[o + LARGEST_RATE], abs(K.guards0[K.n_contacts + c]))
-            K.pace[o + TAKEN] += 1.0
-            if K.pace[o + TAKEN] % WINDOW == 0.0:
-                rests = K.pace[o + LARGEST_RATE] < RESTS * K.pace[o + FIRST_RATE]
-                if rests or K.pace[o + TAKEN] >= PATIENCE:
-                    K.pace[o + PACE] = min(2.0 * K.pace[o + PACE], K.dt)
+        if K.kind[c] == 1 and K.closed[c] == 1 and 0.0 < K.contact_step[c] < K.dt:
+            K.largest_rate[c] = max(K.largest_rate[c], abs(K.guards0[K.n_contacts + c]))
+            K.contact_steps[c] += 1.0
+            if K.contact_steps[c] % WINDOW == 0.0:
+                rests = K.largest_rate[c] < RESTS * K.closing_rate[c]
+                if rests or K.contact_steps[c] >= PATIENCE:
+                    K.contact_step[c] = min(2.0 * K.contact_step[c], K.dt)
                     K.restart_due = 2
-                K.pace[o + LARGEST_RATE] = 0.0
+                K.largest_rate[c] = 0.0

@@ -271,7 +271,11 @@ class Contacts(Memory):
     lifting: Integers = integers(lambda s: s.n_rows)  # 1: a row that is left out of the correction of positions
     deepest: Reals = reals(lambda s: s.n_contacts, kept=True)  # lowest gap while ignored
     sinking: Reals = reals(lambda s: s.n_contacts, kept=True)  # time of the first release into the surface
-    pace: Reals = reals(lambda s: 5 * s.n_contacts, kept=True)  # as a penalty contact closes: see `mbd.kernel.pace`
+    contact_step: Reals = reals(lambda s: s.n_contacts, kept=True)  # while a penalty contact acts, 0: not found yet
+    closing_rate: Reals = reals(lambda s: s.n_contacts, kept=True)  # |γ| as it closed
+    largest_rate: Reals = reals(lambda s: s.n_contacts, kept=True)  # in the present window of steps
+    contact_steps: Reals = reals(lambda s: s.n_contacts, kept=True)
+    least_contact_step: Reals = reals(lambda s: s.n_contacts, kept=True)  # ever
     correction_size: float = place("detail")  # of the last correction of positions by contacts
     plastic_impact: int = place("state")  # 1: without restitution
 

@@ -9,7 +9,6 @@ from itertools import pairwise
 import numpy as np
 
 from mbd.equations.equations import Contact
-from mbd.kernel.pace import LEAST_PACE
 from mbd.results.columns import ModelColumns
 from mbd.results.record import EventRecord, Record
 from mbd.simulation.diagnostics.blows import dt_of_blows
@@ -202,7 +201,7 @@ def _short_touch(run: RunData, record: Record, number: int, contact: Contact) ->
     if contact.kind != "penalty" or run.kernel.adaptive:
         return [], []
     events = [event for event in run.events if event.name == contact.name]
-    least = float(run.kernel.pace[5 * number + LEAST_PACE])
+    least = float(run.kernel.least_contact_step[number])
     if least > 0.0:
         safe = dt_of_blows(run, record, number, _closings(record, events)[:LOOKED_AT])
         enough = f"; dt below {safe:.2g} s has" if np.isfinite(safe) else ""
