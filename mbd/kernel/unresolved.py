@@ -19,7 +19,8 @@ from mbd.kernel.hooks import call, scheme_error
 from mbd.kernel.poles import leaps
 from mbd.kernel.records import Kernel
 from mbd.kernel.redundancy import sharing
-from mbd.kernel.restart import compose, consistent, evaluate, fill_block
+from mbd.kernel.restart import compose, consistent, evaluate, fill_block, stepping_rows
+from mbd.kernel.saddle import solve_rows
 from mbd.kernel.schemes.iteration import BENT, BYSTANDER, LOOK_TWICE, is_small
 
 __all__ = ["judge_change"]
@@ -177,6 +178,8 @@ def outgrows(K: Kernel, h: float, t1: float, stretch: float, at_y: int, at_D: in
     for i in range(n):
         K.trial_jump[i] = K.jump[i]  # as exact as can be: the step's own rates err by its tolerance
         K.inside[at_D + i] = K.inside[at_y + i] - K.y[i] - h * (K.rate[i] + 0.5 * h * K.slope[i])
+    if K.n_active > 0:
+        leave_rows_alone(K, at_D)
     part = 1.0
     while part >= FEWEST:
         for i in range(n):
@@ -197,6 +200,19 @@ def outgrows(K: Kernel, h: float, t1: float, stretch: float, at_y: int, at_D: in
             return max(moved, states) > resolved_growth(K)
         part *= 0.0625
     return False
+
+
+def leave_rows_alone(K: Kernel, at_D: int) -> None:
+    """Take from D what moves rows: no motion, but what index 3 leaves of velocities; K.acc is at the candidate."""
+    for i in range(K.n):
+        K.force[i] = 0.0
+    for k in range(K.n_rows):
+        K.bias[k] = 0.0
+        for j in range(K.n):
+            K.bias[k] += K.acc[K.acc_B + k * K.n + j] * K.inside[at_D + j]
+    if solve_rows(K, stepping_rows(K), False) == 0:
+        for i in range(K.n):
+            K.inside[at_D + i] += K.jump[i]
 
 
 def resolved_growth(K: Kernel) -> float:
