@@ -303,3 +303,10 @@ def test_a_state_whose_quaternion_is_none_is_refused_by_name():
     model, start = top()
     with pytest.raises(mbd.ModelError, match="which no placement of joint 'ball' has; the nearest are 1, 0, 0, 0"):
         mbd.simulate(model, replace(start, q=np.array([2.0, 0.0, 0.0, 0.0])), dt=0.01, until=0.1)
+
+
+def test_steps_that_turn_a_ball_joint_too_far_are_noted():
+    model, start = top()
+    near, far = (mbd.simulate(model, start, mbd.RungeKutta853(), dt=dt, until=1.0).stats["notes"] for dt in (0.1, 0.5))
+    assert not any("turns by up to" in said for said in near)
+    assert any("'ball' turns by up to" in said and "use dt below" in said for said in far)

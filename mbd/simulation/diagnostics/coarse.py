@@ -43,7 +43,7 @@ def _asked(run: RunData, record: Record, row: int) -> float:
     """
     system, h = run.stepper.system, float(record.time[row] - record.time[row - 1])
     blind = BLIND * run.dt
-    if record.q.shape[1] != record.v.shape[1] or not h > 0.0:
+    if not run.mechanism.vector or not h > 0.0:
         return blind
     mode = run.manager.mode(record.closed[row])
     s = np.linspace(0.0, 1.0, SAMPLES + 1)[:, None]

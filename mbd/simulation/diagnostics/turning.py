@@ -19,6 +19,8 @@ __all__ = ["blocks", "first_reversed", "overturned", "unresolved_turns"]
 
 HALF_TURN = np.pi
 """Turn in a step above which forces that follow the angle are read at too few places of a turn [rad]."""
+QUARTER_TURN = np.pi / 2.0
+"""Turn in a step above which increments of a rotation, which wrap around at a turn, are not resolved [rad]."""
 BLOCK = 4096
 """Rows that are looked at together."""
 
@@ -41,7 +43,11 @@ def unresolved_turns(run: RunData, record: Record) -> list[str]:
     Forces are then read at instants that may fall on the same angle again and again. Steps that follow a tolerance, and
     the explicit scheme, estimate that error themselves.
     """
-    if run.kernel.adaptive or run.kernel.explicit or len(record.time) < 2:
+    if run.kernel.adaptive or len(record.time) < 2:
+        return []
+    if not run.mechanism.vector:
+        return _long_increments(run, record)
+    if run.kernel.explicit:
         return []
     if run.kernel.row_bounds[0] <= HALF_TURN:  # no coordinate changes so much from row to row
         return []
@@ -64,6 +70,21 @@ def unresolved_turns(run: RunData, record: Record) -> list[str]:
         for k in fast
         if k in known
     ]
+
+
+def _long_increments(run: RunData, record: Record) -> list[str]:
+    """A note on each joint whose coordinates do not add that turns by more than a quarter of a turn in a step."""
+    found, step = [], np.minimum(np.diff(record.time) / record.settings.get("store", 1), run.dt)
+    for joint, _, first in run.mechanism.equations.configuration.charts:
+        turning = [first + k for k, label in enumerate(joint.freedoms) if label.unit == "rad"]
+        speed = np.sqrt(np.sum(record.v[:, turning] ** 2, axis=1))
+        way = float(np.max(step * np.maximum(speed[:-1], speed[1:]), initial=0.0))
+        if way > QUARTER_TURN:
+            found.append(
+                f"{joint.name!r} turns by up to {way:.3g} rad in one step, too much to tell how its axis moves "
+                f"meanwhile; unless that stands still, use dt below {run.dt * QUARTER_TURN / way:.1g} s"
+            )
+    return found
 
 
 def first_reversed(mechanism: Mechanism, columns: ModelColumns) -> tuple[str, float] | None:
