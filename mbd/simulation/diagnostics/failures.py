@@ -165,6 +165,11 @@ def _no_end(stepper: Stepper, status: int, closed: str, rushing: str) -> str:
             f"steps fail down to a tenth of dt; {type(stepper.scheme.integrator).__name__} says: {said}"
             f"{closed}{worst}; try a smaller dt{rushing}"
         )
+    if residual <= 1.0 and stepper.kernel.n_active == 0:
+        return (
+            f"steps fail down to a tenth of dt{closed}{worst}: a force changes too much within dt; try a smaller dt, "
+            f"such as {stepper.kernel.dt / 10.0:.1g} s{rushing}"
+        )
     if residual <= 1.0:
         return (
             f"steps fail or leave the branch continuous in velocity, down to a tenth of dt{closed}"
