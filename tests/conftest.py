@@ -1,10 +1,12 @@
-"""Settings of every test: seeded random examples, no window, interrupts that arrive."""
+"""Settings of every test: seeded random examples, no window, interrupts that arrive, few passes of the collector."""
 
+import gc
 import os
 import signal
 
 os.environ.setdefault("MPLBACKEND", "Agg")
 
+import pytest
 from hypothesis import HealthCheck, settings
 
 # where SIGINT is ignored (nohup, jobs in the background), it is not so for the tests and the processes they start
@@ -20,3 +22,18 @@ settings.register_profile(
 )
 settings.register_profile("thorough", parent=settings.get_profile("ci"), derandomize=False, max_examples=1000)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection():
+    """Collect without the garbage collector, which then leaves alone what lives as long as the tests do anyway.
+
+    Thousands of collected items would else be gone through again and again: a quarter of the time of collecting them
+    and a twentieth of that of the tests.
+    """
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
