@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,7 @@ from mbd.testing.wild import wild_scene
 from tests.simulation.mechanisms import kneed_walker, kneed_walker_start
 
 
+@cache
 def folding(order=(0, 1), friction=0.4, loss=None):
     """Two bars hinged with friction that stand on one foot; the far ends of both come down together."""
     model = mbd.Model("folding")
