@@ -7,7 +7,11 @@ from mbd.integrators.newmark import Newmark
 from mbd.integrators.radau import RadauIIA
 from mbd.integrators.runge_kutta import RungeKutta853
 
+KINDS: tuple[type[Integrator], ...] = (GeneralizedAlpha, Newmark, HHT, RadauIIA, RungeKutta853)
+"""The schemes of the library."""
+
 __all__ = [
+    "KINDS",
     "Advance",
     "GeneralizedAlpha",
     "HHT",

@@ -220,8 +220,13 @@ class Integrator(ABC):
                 return vars(kind).get("scheme")
         return None
 
+    @classmethod
+    def examples(cls) -> dict[str, tuple[Integrator, ...]]:
+        """Integrators that stand for all of their kind in tables of what goes with what, by the name of a column."""
+        return {}
+
     def numbers(self) -> dict[str, float]:
-        """Its parameters by the names that the kernel has for them (`mbd.kernel.fields`)."""
+        """Its parameters by the names that the kernel has for them (`mbd.kernel.records`)."""
         return {}
 
     @abstractmethod

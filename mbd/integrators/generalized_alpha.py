@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from mbd.bodies.values import is_number, shown
 from mbd.errors import CapabilityError
+from mbd.integrators.base import Integrator
 from mbd.integrators.family import DEFAULT_TOLERANCE, Coefficients, Formulation, NewmarkFamily, Starting
 
 __all__ = ["GeneralizedAlpha"]
@@ -42,6 +43,15 @@ class GeneralizedAlpha(NewmarkFamily):
                 f"GeneralizedAlpha needs rho_inf between 0 and 1, not {shown(rho_inf)}; 0.9 is common"
             )
         super().__init__(formulation, start, tolerance, rho_inf=float(rho_inf))
+
+    @classmethod
+    def examples(cls) -> dict[str, tuple[Integrator, ...]]:
+        """Those of the table of what goes with what."""
+        return {
+            "ggl": (cls(0.0), cls(1.0)),
+            "index3, ρ∞ < 1": (cls(0.5, formulation="index3"),),
+            "index3, ρ∞ = 1": (cls(1.0, formulation="index3"),),
+        }
 
     @property
     def coefficients(self) -> Coefficients:

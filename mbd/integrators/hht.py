@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 from mbd.bodies.values import is_number, shown
 from mbd.errors import CapabilityError
 from mbd.integrators.averaged import AveragedStep
-from mbd.integrators.base import StepResult, System, completed
+from mbd.integrators.base import Integrator, StepResult, System, completed
 from mbd.integrators.family import (
     DEFAULT_TOLERANCE,
     Coefficients,
@@ -60,6 +60,15 @@ class HHT(NewmarkFamily):
             raise CapabilityError("HHT(form='averaged') enforces rows at position level; use formulation='index3'")
         chosen: Formulation = formulation if formulation is not None else ("index3" if form == "averaged" else "ggl")
         super().__init__(chosen, start, tolerance, alpha=float(alpha), form=form)
+
+    @classmethod
+    def examples(cls) -> dict[str, tuple[Integrator, ...]]:
+        """Those of the table of what goes with what."""
+        return {
+            "ggl": (cls(0.05),),
+            "index3, ρ∞ < 1": (cls(0.05, formulation="index3"),),
+            "HHT averaged": (cls(0.05, form="averaged"),),
+        }
 
     @property
     def coefficients(self) -> Coefficients:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from mbd.bodies.values import is_number, shown
 from mbd.errors import CapabilityError
+from mbd.integrators.base import Integrator
 from mbd.integrators.family import DEFAULT_TOLERANCE, Coefficients, Formulation, NewmarkFamily, Starting
 
 __all__ = ["Newmark"]
@@ -51,6 +52,11 @@ class Newmark(NewmarkFamily):
                 f"not beta={shown(beta)}, gamma={shown(gamma)}; Newmark(0.25, 0.5) is the trapezoidal rule"
             )
         super().__init__(formulation, start, tolerance, beta=float(beta), gamma=float(gamma))
+
+    @classmethod
+    def examples(cls) -> dict[str, tuple[Integrator, ...]]:
+        """Those of the table of what goes with what."""
+        return {"ggl": (cls(), cls(0.31, 0.6)), "index3, ρ∞ = 1": (cls(formulation="index3"),)}
 
     @property
     def coefficients(self) -> Coefficients:

@@ -95,6 +95,11 @@ class RadauIIA(Integrator):
     def __repr__(self) -> str:
         return "RadauIIA()" if self.tolerance == DEFAULT_TOLERANCE else f"RadauIIA(tolerance={self.tolerance!r})"
 
+    @classmethod
+    def examples(cls) -> dict[str, tuple[Integrator, ...]]:
+        """Those of the table of what goes with what."""
+        return {"RadauIIA": (cls(),)}
+
     def order(self, system: System | None = None) -> int:
         """5; 2 where positions do not add and a system does not tell ẋ."""
         return 5 if system is None or completed(system).follows_charts else 2

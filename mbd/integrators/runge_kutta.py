@@ -55,6 +55,11 @@ class RungeKutta853(Integrator):
     """Between rows its steps are taken again."""
     scheme: ClassVar[str | None] = "runge-kutta"
 
+    @classmethod
+    def examples(cls) -> dict[str, tuple[Integrator, ...]]:
+        """Those of the table of what goes with what."""
+        return {"RungeKutta853": (cls(),)}
+
     def order(self, system: System | None = None) -> int:
         """8, with and without rows; 2 where positions do not add and a system does not tell ẋ."""
         return 8 if system is None or completed(system).follows_charts else 2

@@ -226,7 +226,7 @@ class State(Model):
     restart_due: int = place("state")  # 1: and the restart is stored as a row, 2: it is not
     halvings: int = place("state")  # how often the step is halved
     halves_left: int = place("state")  # of it
-    paired_step: int = place("state")  # see `mbd.kernel.pairs`
+    paired_step: int = place("state")  # see `mbd.kernel.singular.step_pairs`
     short_steps: int = place("state")  # twice the shortened steps, less the full ones since
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from mbd.equations.equations import Equations
-from mbd.integrators import HHT, GeneralizedAlpha, Integrator, Newmark, RadauIIA, RungeKutta853
+from mbd.integrators import KINDS, Integrator
 
 __all__ = ["LAWS", "SCHEMES", "STRATEGIES", "SPACE", "Law", "as_markdown", "as_text", "refusals", "supports"]
 
@@ -57,14 +57,10 @@ LAWS: tuple[Law, ...] = (
 )
 """Laws by the words that users know them by; a loop, and a joint with `PinFriction`, gives rows on positions."""
 
-SCHEMES: dict[str, tuple[Integrator, ...]] = {
-    "ggl": (Newmark(), Newmark(0.31, 0.6), HHT(0.05), GeneralizedAlpha(0.0), GeneralizedAlpha(1.0)),
-    "index3, ρ∞ < 1": (HHT(0.05, formulation="index3"), GeneralizedAlpha(0.5, formulation="index3")),
-    "index3, ρ∞ = 1": (Newmark(formulation="index3"), GeneralizedAlpha(1.0, formulation="index3")),
-    "HHT averaged": (HHT(0.05, form="averaged"),),
-    "RadauIIA": (RadauIIA(),),
-    "RungeKutta853": (RungeKutta853(),),
-}
+SCHEMES: dict[str, tuple[Integrator, ...]] = {}
+for _kind in KINDS:
+    for _column, _schemes in _kind.examples().items():
+        SCHEMES[_column] = (*SCHEMES.get(_column, ()), *_schemes)
 """Columns of the table: schemes that stand for all with this formulation."""
 
 STRATEGIES: tuple[Mapping[str, str], ...] = (
