@@ -131,7 +131,7 @@ def test_the_kernel_estimates_the_same_error_as_the_plain_twin():
         once = prepared(model, start, mbd.RadauIIA(), 0.02, 0.06, {}, options)
         once.complete()
         memory = once.stepper.scheme.memory
-        found.append(memory.error if isinstance(memory, RadauMemory) else once.kernel["error"].copy())
+        found.append(memory.error if isinstance(memory, RadauMemory) else once.kernel.error.copy())
     np.testing.assert_allclose(*found, rtol=1e-6, atol=1e-16)
     assert np.max(np.abs(found[0])) > 1e-8
 
