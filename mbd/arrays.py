@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Matrix", "Vector"]
+__all__ = ["Matrix", "Vector", "read_only"]
 
 Vector: TypeAlias = NDArray[np.float64]
 """(n,) array of float64."""
 
 Matrix: TypeAlias = NDArray[np.float64]
 """(m, n) array of float64, row-major."""
+
+
+def read_only(array: Any) -> Any:
+    """The same numbers as an array that cannot be written to; where they came from they still can be."""
+    view = np.asarray(array).view()
+    view.flags.writeable = False
+    return view

@@ -88,10 +88,30 @@ class Description:
         self.forces += [word for word in known if isinstance(word, Force)]
         self.controllers += [word for word in known if isinstance(word, Controller)]
 
+    def foreign(self) -> list[str]:
+        """What was put into `joints`, `forces`, … that does not belong there, one sentence each."""
+        kinds: dict[str, tuple[type, str]] = {
+            "joints": (Joint, "connect"), "forces": (Force, "apply"), "constraints": (Constraint, "constrain"),
+            "controllers": (Controller, "apply"),
+        }  # fmt: skip
+        return [
+            f"model.{name} of '{self.name}' holds {word!r}, which is no {kind.__name__}; add them by model.{verb}(…)"
+            for name, (kind, verb) in kinds.items()
+            for word in getattr(self, name)
+            if not isinstance(word, kind)
+        ]
+
+    def require_own(self) -> None:
+        """Raise a `ModelError` with all of `foreign`, if there is some."""
+        strange = self.foreign()
+        if strange:
+            raise ModelError(strange)
+
     # what it contains ---------------------------------------------------------------------------------------------
     @property
     def bodies(self) -> dict[str, Body]:
         """The ground and the bodies in the order in which joints first named them; then bodies named elsewhere."""
+        self.require_own()
         result: dict[str, Body] = {self.ground.name: self.ground}
         for frame in self.points():
             result.setdefault(frame.body.name, frame.body)

@@ -65,6 +65,7 @@ class Model(Description):
         """
         from mbd.topology.describe import description
 
+        self.require_own()
         said = description(self)
         if mobility and not self.check():
             from mbd.assembly.mobility import mobility as of

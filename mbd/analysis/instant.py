@@ -33,6 +33,7 @@ REASONS = {
     codes.NOT_FINITE: "a force, a mass or a row is not finite there",
     codes.CONFLICT: "no accelerations satisfy all rows there",
     codes.DEPENDENT: "neither mass nor rows determine all accelerations there",
+    codes.ILL_CONDITIONED: "accelerations have no correct digits there",
     codes.NO_FORCE: "no contact forces are consistent with its frictions",
 }
 

@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from pathlib import Path
 from typing import Any
 
-from mbd.results.archive import write_whole
+from mbd.results.archive import named_file, write_whole
 from mbd.results.tables import library
 
 __all__ = ["Rows"]
@@ -26,7 +26,7 @@ class Rows(ABC):
 
     def to_csv(self, path: str | Path) -> Path:
         """The same as a file of comma-separated values."""
-        target = Path(path)
+        target = named_file(path)
         rows = self.rows()
 
         def fill(partial: Path) -> None:

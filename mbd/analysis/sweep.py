@@ -16,7 +16,7 @@ import numpy as np
 from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import MbdError, ModelError, SimulationError, UnknownNameError, nearest
 from mbd.progress import share_bar
-from mbd.results.archive import write_whole
+from mbd.results.archive import named_file, write_whole
 from mbd.simulation.asked import asked
 from mbd.simulation.simulate import simulate
 from mbd.state import State
@@ -78,7 +78,7 @@ class Sweep:
         """Write the table with a line for each run."""
         import csv
 
-        path = Path(path)
+        path = named_file(path)
 
         def fill(partial: Path) -> None:
             with partial.open("w", newline="", encoding="utf-8") as file:
@@ -182,7 +182,7 @@ def _one(
     parameters = {**(settings.get("parameters") or {}), **{n: v for n, v in given.items() if n not in SETTINGS}}
     count = len(results)
     try:
-        begin = start(parameters) if callable(start) else start
+        begin = asked(_calling(start, given), start, parameters) if callable(start) else start
         run = simulate(model, begin, **{**settings, **own, "parameters": parameters, "on_failure": "return"})
     except MbdError as error:
         return [float("nan")] * count, False, str(error)
@@ -198,6 +198,12 @@ def _one(
             found.append(float("nan"))
             missing.append(str(error))
     return found, not missing, "; ".join(missing) or run.message
+
+
+def _calling(start: Any, given: Mapping[str, Any]) -> str:
+    """Which function makes the start, and with which values of the sweep."""
+    values = ", ".join(f"{name} = {_cell(value)}" for name, value in given.items())
+    return f"start={getattr(start, '__qualname__', None) or repr(start)} at {values}"
 
 
 def _number(function: Callable[[Trajectory], float], run: Trajectory) -> float:

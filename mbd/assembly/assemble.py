@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from mbd.arrays import Matrix, Vector
+from mbd.arrays import Vector
 from mbd.assembly.conditions import Condition, conditions
 from mbd.assembly.contradictions import Attempt, contradictions, infeasible
+from mbd.assembly.foreseen import require_inertia
+from mbd.assembly.inertia import undetermined
 from mbd.assembly.infeasibility import Held
 from mbd.assembly.initial_pose import opening
 from mbd.assembly.named_projection import nearest_positions, nearest_velocities
-from mbd.assembly.not_finite import first_cause, tape_inputs
 from mbd.assembly.posture import (
     TOLERANCE,
     Posture,
@@ -33,10 +34,7 @@ from mbd.equations.equations import Equations
 from mbd.errors import AssemblyError, ModelError, UnknownNameError, nearest
 from mbd.state import State
 
-__all__ = ["assemble", "undetermined"]
-
-SQUARED_ROUND_OFF = 1e-26
-"""Kinetic energy of a motion over that of its coordinates one by one, below which it is that of round-off [-]."""
+__all__ = ["assemble"]
 
 BELOW = 1e-6
 """Depth [m, rad] below which an open contact is told to start inside the ground."""
@@ -104,6 +102,7 @@ def assemble(
     if faults + more + others:
         raise ModelError(faults + more + others)
     changed = dict(parameters or {})
+    require_inertia(model, position or {}, changed)
     mechanism = mechanism_of(model, backend, changed)
     equations, values = mechanism.equations, mechanism.parameters(changed, getattr(model, "parameters", {}))
     manager = manager_of(mechanism, values)
@@ -256,72 +255,6 @@ def _off_manifold(equations: Equations, named: _Named, q: Vector) -> list[str]:
         if 0 < len(given) < len(own):
             faults.append(f"position: {names} of {joint.known_as} belong together; name all of them or none")
     return faults or [f"position: {said}" for said in equations.configuration.misplaced(q, ROUNDED)]
-
-
-def undetermined(work: Posture) -> list[str]:
-    """Coordinates whose acceleration neither mass nor rows determine, rows that depend on others, negative inertia."""
-    equations = work.equations
-    picked = list(work.manager.active_rows(work.flags))
-    terms = work.mechanism.acceleration_terms(work.time, work.q, work.y, work.parameters, work.anchors)
-    n, m = len(terms.f), len(picked)
-    if n == 0:
-        return ["nothing can move: the model has no coordinate; connect a body by a joint that lets it move"]
-    matrix = np.block([[terms.M, terms.R[:, picked]], [terms.B[picked], np.zeros((m, m))]])
-    if not np.isfinite(matrix).all() or not np.isfinite(terms.f).all():
-        block = work.mechanism.block(work.time, work.q, work.y, work.anchors)
-        inputs = tape_inputs(work.mechanism, block, work.parameters)
-        cause = first_cause(equations, inputs, when=" at the start")
-        return [cause or "a mass or a derivative is not finite at the start; check the parameters and functions used"]
-    scale = np.sqrt(np.max(np.abs(matrix), axis=1))
-    scale[scale == 0.0] = 1.0
-    _, sizes, right = np.linalg.svd(matrix / np.outer(scale, scale))
-    faults = []
-    for direction in right[sizes < 1e-12 * max(sizes[0], 1e-300)]:
-        motion = direction / scale
-        weights = np.abs(motion)
-        place = int(np.argmax(weights))
-        if np.max(weights[:n], initial=0.0) > 1e-6 * weights[place] and not _resisted(work, motion[:n], terms.M):
-            name = equations.velocity_names[int(np.argmax(weights[: equations.n_v]))].removesuffix(".rate")
-            faults.append(
-                f"nothing determines the motion of {name!r}: no mass or inertia resists it and no constraint holds it; "
-                "give the bodies it moves a mass, or lock it"
-            )
-    return faults or _negative(work, terms.M[: equations.n_v, : equations.n_v], terms.B[picked][:, : equations.n_v])
-
-
-def _resisted(work: Posture, motion: Vector, M: Matrix) -> bool:
-    """Whether a motion has kinetic energy of its own, however little beside that of its coordinates one by one.
-
-    A long chain that folds up to and fro hardly moves, and M, whose entries are sums over all bodies outboard, tells
-    its energy as a difference of large numbers. As a sum over bodies it has no cancellation.
-    """
-
-    def kinetic(y: Vector) -> float:
-        terms = work.mechanism.acceleration_terms(work.time, work.q, y, work.parameters, work.anchors)
-        return float(np.asarray(terms.kinetic).item())
-
-    if work.equations.n_z or kinetic(0.0 * motion) != 0.0:  # a moving ground has energy of its own
-        return False
-    apart = 0.5 * float(np.abs(np.diag(M)) @ motion**2)
-    return kinetic(motion) > SQUARED_ROUND_OFF * apart
-
-
-def _negative(work: Posture, M: Matrix, B: Matrix) -> list[str]:
-    """Motions that the rows allow and whose kinetic energy would be negative."""
-    scale = np.sqrt(np.abs(np.diag(M)) + 1e-300)
-    free = np.linalg.svd(B / scale, full_matrices=True)[2][len(B) :].T if len(B) else np.eye(len(M))
-    values, directions = np.linalg.eigh(free.T @ (M / np.outer(scale, scale)) @ free)
-    if not len(values) or values[0] > -1e-9:
-        return []
-    motion = np.abs(free @ directions[:, 0]) / scale
-    name = work.equations.velocity_names[int(np.argmax(motion))].removesuffix(".rate")
-    guilty = [
-        f"{each.name!r} is {value:g}"
-        for each, value in zip(work.equations.parameters, work.parameters, strict=False)
-        if value < 0.0 and each.name.rpartition(".")[2] in ("mass", "inertia", "xx", "yy", "zz")
-    ]
-    told = ", ".join(guilty) or "check the parameters given"
-    return [f"the mass or inertia that resists the motion of {name!r} is negative; {told}"]
 
 
 def _gaps(work: Posture) -> Vector:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from mbd.constraints.base import Constraint
 from mbd.constraints.event import Event
@@ -34,10 +34,11 @@ def laws(
     contacts: Sequence[Constraint],
     events: Sequence[Event],
     before: Laws | None = None,
+    written: Collection[str] = (),
 ) -> Laws:
     """Cut joints, what always acts (positions first), dry joints, contacts and events, in the order of the model.
 
-    They are added to those `before`.
+    They are added to those `before`. Parameters that controllers have `written` may make an event happen.
     """
     found = Laws() if before is None else before
     for joint in scope.cuts:
@@ -52,6 +53,7 @@ def laws(
         _contact(found, scope, dynamics, word, number, contacts)
     for event in events:
         found.guards.append(_guard(scope, event))
+        found.faults += _never(scope, found.guards[-1], written)
     return found
 
 
@@ -210,3 +212,14 @@ def _guard(scope: DerivationScope, event: Event) -> Guard:
     """A user's event; its measure may depend on velocities."""
     value = event.guard.gap(scope)
     return Guard(event.name, scope.real(value), scope.change(value), event.direction, event.terminal, event.reset)
+
+
+def _never(scope: DerivationScope, guard: Guard, written: Collection[str]) -> list[str]:
+    """What is wrong with an event whose measure nothing changes."""
+    inputs = [node.data for node in live([guard.value]) if node.op == "input"]
+    if any(kind != "p" or scope.parameters.found[k].name in written for kind, k in inputs):
+        return []
+    return [
+        f"the guard of Event '{guard.name}' never changes, so the event cannot happen; let it depend on a "
+        "coordinate, a rate, a force, the time 't', or a parameter that a controller writes"
+    ]

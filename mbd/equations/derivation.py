@@ -80,7 +80,9 @@ def _derived(model: Description, plan: Plan, carried: Sequence[tuple[str, int]] 
     work = sum((cause.work for cause in found), Work())
     rests = state_balance(scope, found)
     joints = (*plan.edges, *plan.cut)
-    constraints = laws(scope, dynamics, joints, [*model.bilaterals, *model.nonholonomic], model.contacts, model.events)
+    written = {name for controller in model.controllers for name in controller.writes}
+    always = [*model.bilaterals, *model.nonholonomic]
+    constraints = laws(scope, dynamics, joints, always, model.contacts, model.events, written=written)
     if constraints.faults:
         raise ModelError(constraints.faults)
     weight = weight_of(scope, dynamics)

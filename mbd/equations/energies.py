@@ -153,7 +153,8 @@ def _laws(system: EnergyDescription, lowering: Lowering) -> Laws:
     known.rows += [Row(name, "", h, rate, unit="") for (name, h), rate in zip(lowering.h.items(), rates, strict=True)]
     known.rows += [Row(name, "", tape.zero, rate, unit="", kind="velocity") for name, rate in lowering.rates.items()]
     always = [word for word in system.words if word.kind in ("bilateral", "nonholonomic")]
-    laws(scope, scope, (), always, system.contacts, system.events, before=known)
+    written = {name for controller in system.controllers for name in controller.writes}
+    laws(scope, scope, (), always, system.contacts, system.events, before=known, written=written)
     if known.faults:
         raise ModelError(known.faults)
     return known

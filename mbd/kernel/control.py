@@ -60,7 +60,10 @@ def error_ratio(K: Kernel, h: float) -> float:
         floor += noise_share(K, h) * h * fast
     largest = 0.0
     for i in range(n_v):
-        largest = max(largest, max(abs(K.error[i]), h * abs(K.error[n_v + i])))
+        error = max(abs(K.error[i]), h * abs(K.error[n_v + i]))
+        if not error < 1e300:
+            return 1e300
+        largest = max(largest, error)
     ratio = largest / (K.allowed * h + floor)
     for i in range(n_v, K.n):
         size = max(max(abs(K.y[i]), abs(K.y1[i])), h * max(abs(K.rate[i]), abs(K.rate1[i])))

@@ -5,9 +5,13 @@ Hand-written because it runs inside the compiled kernel, where below about 28 un
 
 from __future__ import annotations
 
+from mbd.kernel.codes import EPS
 from mbd.kernel.records import Integers, Reals
 
-__all__ = ["eliminate", "factor", "solve", "solve_again", "solve_definite"]
+__all__ = ["eliminate", "factor", "round_off", "solve", "solve_again", "solve_definite"]
+
+MOST_ROUND_OFF = 1e-12
+"""Part of the entries that a pivot came from which is more than round-off in any size of matrix [-]."""
 
 
 def factor(A: Reals, n: int, pivots: Integers) -> int:
@@ -81,6 +85,11 @@ def solve(A: Reals, n: int, pivots: Integers, b: Reals) -> None:
             b[i] -= A[i * n + k] * left
 
 
+def round_off(n: int) -> float:
+    """What elimination of n unknowns may leave of a pivot that is zero, of the entries that it came from."""
+    return min(MOST_ROUND_OFF, 8.0 * EPS * (n + 8.0))
+
+
 def solve_definite(M: Reals, n: int, b: Reals, work: Reals) -> float:
     """b ← M⁻¹ b by M = Uᵀ D U, D U in the upper half of M; 0 where M is not clearly positive definite.
 
@@ -90,9 +99,10 @@ def solve_definite(M: Reals, n: int, b: Reals, work: Reals) -> float:
     for k in range(n):
         work[k] = abs(M[k * n + k])
     kept = 1.0
+    lost = round_off(n)
     for k in range(n):
         pivot = M[k * n + k]
-        if not pivot > 1e-12 * work[k]:
+        if not pivot > lost * work[k]:
             return 0.0
         if pivot < kept * work[k]:
             kept = pivot / work[k]

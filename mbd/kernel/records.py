@@ -413,6 +413,8 @@ class Kernel(LinearAlgebra):
     coarse_start: float = place("detail")  # where the last of the steps `n_coarse` began
     coarsest_end: float = place("detail")  # where the one with the largest change ended
     coarsest_change: float = place("detail")
+    least_pivot: float = place("detail")  # of the equations of accelerations since the last start, scaled
+    lost_digits: float = place("detail")  # relative error of accelerations that were known there
     counts: Integers = integers()
     n_steps: int = place("counts")
     n_iterations: int = place("counts")

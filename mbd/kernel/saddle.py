@@ -9,12 +9,12 @@ from __future__ import annotations
 from typing import Any
 
 from mbd.kernel.codes import CONFLICT, DEPENDENT, NOT_FINITE
-from mbd.kernel.linear import eliminate
-from mbd.kernel.ordered import LOSS_AT_ONCE, OF_ACCELERATIONS, factor_ordered, order_at, solve_ordered
+from mbd.kernel.linear import MOST_ROUND_OFF, eliminate, factor, round_off
+from mbd.kernel.ordered import LOSS_AT_ONCE, OF_ACCELERATIONS, SYMMETRIC, factor_ordered, order_at, solve_ordered
 from mbd.kernel.records import Kernel
 from mbd.kernel.redundancy import find_dependent, find_shares, shared, sharing, spread, take_shares
 
-__all__ = ["correct_velocities", "solve_rows"]
+__all__ = ["correct_velocities", "factor_saddle", "solve_rows"]
 
 INCOMPATIBLE = 1e-6
 """Part of the terms of rows that a row which depends on others may be missed by, for errors of positions [-]."""
@@ -38,9 +38,11 @@ def correct_velocities(K: Kernel, y: Any, m: int, dropping: bool) -> int:
 def solve_change(K: Kernel, y: Any, m: int, dropping: bool, moving: bool) -> int:
     """The same, of the velocities y where `moving`."""
     size = K.n + m
-    rank = solve_matrix(K, m, not dropping and sharing(K))
+    rank = solve_matrix(K, m, not dropping and sharing(K), MOST_ROUND_OFF)
     if rank == -CONFLICT and dropping:
         return solve_kept(K, y, m, moving)
+    if rank == -CONFLICT and K.failure_index < K.n:  # forces push along a motion of little inertia
+        return solve_to_round_off(K, m, False)
     if rank < 0:
         return -rank
     if rank == size:
@@ -58,6 +60,8 @@ def solve_change(K: Kernel, y: Any, m: int, dropping: bool, moving: bool) -> int
         if sharing(K):  # how loads are shared moves the mechanism: any unknown may be the one without a pivot
             find_shares(K)
             return solve_shared(K, dependent_last(K, m))
+    if undetermined < K.n:
+        return solve_to_round_off(K, dependent_last(K, m) if dropping else m, dropping)
     if undetermined < size:
         K.failure_index = undetermined
         return DEPENDENT
@@ -66,22 +70,48 @@ def solve_change(K: Kernel, y: Any, m: int, dropping: bool, moving: bool) -> int
 
 
 def solve_kept(K: Kernel, y: Any, m: int, moving: bool) -> int:
-    """w and λ of an independent set of rows, where what is left over of all of them seems to be a contradiction."""
+    """w and λ of an independent set of rows, where what is left over of all of them seems to be a contradiction.
+
+    Forces along a motion of little inertia seem to be one too.
+    """
     blocked = K.failure_index
     find_dependent(K, m)
     kept = dependent_last(K, m)
-    if kept < m and not sharing(K):
-        rank = solve_matrix(K, kept, False)
-        if rank == K.n + kept and not contradicts(K, y, m, moving):
+    little = blocked < K.n
+    if (kept < m or little) and not sharing(K):
+        rank = solve_matrix(K, kept, False, round_off(K.n + kept) if little else MOST_ROUND_OFF)
+        if rank == K.n + kept and (kept == m or not contradicts(K, y, m, moving)):
             spread(K, K.impulse)
             return 0
     K.failure_index = blocked
     return CONFLICT
 
 
+def solve_to_round_off(K: Kernel, m: int, dropping: bool) -> int:
+    """w and λ for the m independent rows that come first in K.rows, where pivots of coordinates are small.
+
+    The inertia of a motion may be a small difference of large ones: it is there as long as it is more than round-off.
+    """
+    size = K.n + m
+    together = not dropping and sharing(K)
+    rank = solve_matrix(K, m, together, round_off(size))
+    if rank < 0:
+        return -rank
+    if rank < size:
+        K.failure_index = K.columns[rank]
+        for k in range(rank, size):
+            K.failure_index = min(K.failure_index, K.columns[k])
+        return DEPENDENT
+    if together:
+        take_shares(K, K.impulse)
+    elif dropping:
+        spread(K, K.impulse)
+    return 0
+
+
 def solve_shared(K: Kernel, m: int) -> int:
     """w and λ with the shares of dependent rows in K.shares, for the m independent rows that come first in K.rows."""
-    rank = solve_matrix(K, m, True)
+    rank = solve_matrix(K, m, True, MOST_ROUND_OFF)
     if rank < 0:
         return -rank
     if rank < K.n + m:
@@ -110,10 +140,11 @@ def dependent_last(K: Kernel, m: int) -> int:
     return int(kept)
 
 
-def solve_matrix(K: Kernel, m: int, together: bool) -> int:
+def solve_matrix(K: Kernel, m: int, together: bool, tolerance: float) -> int:
     """w and λ of the m rows in K.rows, as far as they are independent, others 0; the rank, or minus a failure.
 
-    With `together` each multiplier brings the shares of the rows that depend on its row along.
+    With `together` each multiplier brings the shares of the rows that depend on its row along. Pivots below
+    `tolerance` are round-off.
     """
     n = K.n
     size = n + m
@@ -145,9 +176,15 @@ def solve_matrix(K: Kernel, m: int, together: bool) -> int:
         finite += abs(K.rhs[k])
     if not finite < 1e300:
         return -NOT_FINITE
-    rank = int(eliminate(A, size, K.rhs, K.columns, K.work, 1e-12))
+    rank = int(eliminate(A, size, K.rhs, K.columns, K.work, tolerance))
+    for k in range(rank):
+        K.least_pivot = min(K.least_pivot, abs(A[k * size + k]))
     if rank < 0:
         K.failure_index = K.columns[-1 - rank]
+        for k in range(-1 - rank, size):
+            i = K.columns[k]
+            if i < n and K.acc[i * n + i] > 0.0:
+                K.failure_index = i
         return -CONFLICT
     take_solution(K, m)
     return rank
@@ -180,6 +217,33 @@ def contradicts(K: Kernel, y: Any, m: int, moving: bool) -> bool:
         if worst > INCOMPATIBLE * size:
             return True
     return False
+
+
+def factor_saddle(K: Kernel, m: int, symmetric: bool, loss: float) -> bool:
+    """LU factors in K.kkt of [M R; B 0] from K.acc, or of [M Bᵀ; B 0]; false where a pivot is missing.
+
+    Pivots of an order chosen beforehand must keep the part `loss` of their terms, else they are searched for.
+    """
+    n = K.n
+    size = n + m
+    o = order_at(K, m)
+    if o > 0 and factor_ordered(K, K.acc, o, SYMMETRIC if symmetric else OF_ACCELERATIONS, loss):
+        return True
+    K.order_start = 0
+    o_R = K.acc_R
+    o_B = K.acc_B
+    for i in range(n):
+        for j in range(n):
+            K.kkt[i * size + j] = K.acc[i * n + j]
+    for k in range(m):
+        row = K.rows[k]
+        for i in range(n):
+            entry = K.acc[o_B + row * n + i]
+            K.kkt[(n + k) * size + i] = entry
+            K.kkt[i * size + n + k] = entry if symmetric else K.acc[o_R + i * K.n_rows + row]
+        for j in range(m):
+            K.kkt[(n + k) * size + n + j] = 0.0
+    return bool(factor(K.kkt, size, K.pivots) == 0)
 
 
 def solve_in_order(K: Kernel, m: int) -> int:

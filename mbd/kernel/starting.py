@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from mbd.kernel.codes import NEW_MODE
+from mbd.kernel.conditioning import is_ill_conditioned, refine_accelerations
 from mbd.kernel.control import first_step
 from mbd.kernel.guards import update_armed, watch
 from mbd.kernel.hooks import scheme_start
 from mbd.kernel.pace import find_pace
 from mbd.kernel.records import Kernel
 from mbd.kernel.redundancy import find_dependent, sharing, spread
-from mbd.kernel.restart import active_rows, stepping_rows
+from mbd.kernel.restart import active_rows, evaluate, refresh_scales, stepping_rows
 from mbd.kernel.settle import settle
 
 __all__ = ["find_mode", "restart", "still_dependent"]
@@ -33,6 +35,7 @@ def find_mode(K: Kernel) -> int:
 
 def restart(K: Kernel) -> int:
     """Make the state consistent in its mode and start the scheme from it."""
+    K.least_pivot = 1.0
     status = settle(K)
     if status != 0:
         return status
@@ -41,6 +44,10 @@ def restart(K: Kernel) -> int:
     if K.n_dropped > 0 and not sharing(K):
         spread(K, K.lam)
     K.n_active = stepping_rows(K)
+    if is_ill_conditioned(K):
+        status = correct_start(K)
+        if status != 0:
+            return status
     if K.adaptive == 0 and K.n_contacts > 0:
         status = find_pace(K)
         if status != 0:
@@ -60,6 +67,26 @@ def restart(K: Kernel) -> int:
         watch(K, K.time, K.q, K.y, K.rate, K.lam, K.guards0)
         update_armed(K)
     return 0
+
+
+def correct_start(K: Kernel) -> int:
+    """Rates and multipliers of an ill-conditioned start corrected by the balance, for which the mode needs its code."""
+    K.mode_id = find_mode(K)
+    if K.mode_id < 0:
+        return NEW_MODE
+    evaluate(K, K.time, K.q, K.y)
+    refresh_scales(K)
+    for i in range(K.n):
+        K.jump[i] = K.rate[i]
+    for k in range(K.n_rows):
+        K.impulse[k] = K.lam[k]
+    status = refine_accelerations(K)
+    if status == 0:
+        for i in range(K.n):
+            K.rate[i] = K.jump[i]
+        for k in range(K.n_rows):
+            K.lam[k] = K.impulse[k]
+    return status
 
 
 def still_dependent(K: Kernel) -> bool:

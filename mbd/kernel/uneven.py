@@ -14,12 +14,16 @@ from mbd.kernel.linear import solve_again, solve_definite
 from mbd.kernel.ordered import order_at, solve_kkt
 from mbd.kernel.records import Kernel
 
-__all__ = ["LOSS", "polish_with_rows", "polish_rates", "is_uneven"]
+__all__ = ["LOSS", "find_imbalance", "is_uneven", "polish_rates", "polish_with_rows"]
 
 LOSS = 1e-4
 """Part of a diagonal entry that is left as its pivot below which rates are corrected [-]."""
 GREAT_LOSS = 1e-8
-"""The same below which they are corrected twice [-]."""
+"""The same below which they are corrected until corrections are small [-]."""
+MOST_CORRECTIONS = 8
+"""Corrections of rates at one state [-]."""
+SMALL_CORRECTION = 1e-9
+"""Correction over the largest rate, both as they are, after which none follows [-]."""
 
 
 def is_uneven(K: Kernel, m: int) -> bool:
@@ -51,15 +55,26 @@ def is_uneven(K: Kernel, m: int) -> bool:
 
 
 def polish_rates(K: Kernel, kept: float) -> None:
-    """K.jump corrected by the balance at the state in the block; pivots of the factors in K.acc keep `kept`."""
+    """K.jump corrected by the balance at the state in the block; pivots of the factors in K.acc keep `kept`.
+
+    Where much was lost a correction leaves a part of the error: they go on until they grow small, or no smaller.
+    """
     n = K.n
-    for _ in range(2 if kept < GREAT_LOSS else 1):
+    before = 1e300
+    for _ in range(MOST_CORRECTIONS if kept < GREAT_LOSS else 1):
         find_imbalance(K)
         for i in range(n):
             K.rhs[i] = -K.out[i]
         solve_again(K.acc, n, K.rhs)
+        change = 0.0
+        size = 0.0
         for i in range(n):
             K.jump[i] += K.rhs[i]
+            change = max(change, abs(K.rhs[i]))
+            size = max(size, abs(K.jump[i]))
+        if change < SMALL_CORRECTION * size or change > 0.5 * before:
+            break
+        before = change
 
 
 def polish_with_rows(K: Kernel, m: int) -> None:

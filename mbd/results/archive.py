@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from mbd.errors import MbdError, TrajectoryError
 from mbd.free_memory import available, size_in_words
 
-__all__ = ["Arrays", "Head", "Members", "Unreadable", "plain", "read", "write", "write_whole"]
+__all__ = ["Arrays", "Head", "Members", "Unreadable", "named_file", "plain", "read", "write", "write_whole"]
 
 COMPRESSION = 1
 """Level of zlib: higher levels take five times as long for a few percent [-]."""
@@ -58,6 +58,15 @@ def plain(value: Any) -> Any:
     if isinstance(value, np.ndarray):
         return value.tolist()
     return repr(value)
+
+
+def named_file(path: Any, suffix: str = "") -> Path:
+    """Where a file is to be written, with `suffix` if its name has none; a `TrajectoryError` for what names no file."""
+    target = Path(path) if isinstance(path, str | os.PathLike) else Path()
+    if not target.name or target.is_dir():
+        known = ", which is a folder" if target.name and target.is_dir() else ""
+        raise TrajectoryError(f"a file to write to is expected, such as 'run{suffix}', not {path!r}{known}")
+    return target if target.suffix or not suffix else target.with_name(target.name + suffix)
 
 
 def write(target: Path, arrays: Arrays, meta: Mapping[str, Any]) -> None:

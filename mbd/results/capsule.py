@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from mbd.errors import TrajectoryError
-from mbd.results.archive import Arrays, Members, Unreadable, plain, read, write
+from mbd.results.archive import Arrays, Members, Unreadable, named_file, plain, read, write
 from mbd.results.content import arrays_within, expect, of_kind
 from mbd.results.failure import Failure
 from mbd.results.record import EventRecord
@@ -82,9 +82,7 @@ def _made(described: Mapping[str, Any]) -> Any:
 
 def save(failure: Failure, path: str | Path) -> Path:
     """Write a failure; see `Failure.save`."""
-    target = Path(path)
-    if not target.suffix:
-        target = target.with_name(target.name + SUFFIX)
+    target = named_file(path, SUFFIX)
     arrays: Arrays = {}
     meta = {"format": FORMAT, "version": VERSION, "failure": packed(failure, arrays), "model": ""}
     own = {"model": failure.model, "integrator": failure.integrator, "state": failure.state}

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from mbd.arrays import Vector
+from mbd.arrays import Vector, read_only
 from mbd.errors import ModelError, UnknownNameError, nearest
 
 __all__ = ["KINDS", "SPENT", "Ledger", "Part"]
@@ -38,6 +38,9 @@ class Part:
     energy: Vector
     withheld: str = ""
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "energy", read_only(self.energy))
+
     @property
     def passed(self) -> float:
         """Energy that went through it, ``Σ |ΔE|`` over the rows [J]: what a loss took, and twice a spring's swing."""
@@ -65,6 +68,10 @@ class Ledger:
     stride: int = 1
     stored: tuple[Part, ...] = ()
     marks: tuple[tuple[float, str], ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("time", "kinetic", "potential"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @property
     def total(self) -> Vector:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mbd.arrays import Matrix, Vector
+from mbd.arrays import Matrix, Vector, read_only
 
 if TYPE_CHECKING:
     from mbd.equations.equations import Equations
@@ -48,6 +48,10 @@ class EventRecord:
     energy_loss: float = 0.0
     row: int = 0
     impulses: Mapping[str, Vector] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "impulse", read_only(self.impulse))
+        object.__setattr__(self, "impulses", {name: read_only(values) for name, values in self.impulses.items()})
 
     def __repr__(self) -> str:
         extra = ""
@@ -142,6 +146,9 @@ class Record:
             shape = getattr(self, name).shape
             if len(shape) != 2 or shape[0] != count:
                 raise ValueError(f"a record of {count} rows needs {name} of shape ({count}, n), got {shape}")
+
+        for name in ("time", "q", "v", "z", "a", "s", "lam", "closed", "phase", "parameters"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
 
     def rows(self, anchors: Matrix) -> Rows:
         """The stored states, with the values that closed contacts hold."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbd.results.archive import Arrays, Members, read, write
+from mbd.results.archive import Arrays, Members, named_file, read, write
 from mbd.results.columns import Alias, Columns, SavedColumns, StoredColumns
 from mbd.results.content import arrays_of_run, expect
 from mbd.results.expressions import arrays_of_expressions, read_expressions, write_expressions
@@ -47,9 +47,7 @@ def save(run: Trajectory, path: str | Path, names: Sequence[str] | None = None) 
     """Write a run; see `Trajectory.save`."""
     from mbd.results.capsule import packed
 
-    target = Path(path)
-    if not target.suffix:
-        target = target.with_name(target.name + SUFFIX)
+    target = named_file(path, SUFFIX)
     record = run.record
     arrays: Arrays = {name: getattr(record, name) for name in ROWS}
     arrays["anchors"], q_rate = run.columns.anchors, run.columns.q_rate

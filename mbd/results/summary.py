@@ -58,8 +58,10 @@ def accuracy(told: Mapping[str, Any]) -> str:
 
 
 def strategy(run: Trajectory) -> str:
-    """How contacts were treated, and why; '' without contacts."""
+    """How contacts were treated, and why; '' without contacts, and where a choice left open came to the usual."""
     if not run.record.closed.shape[1] or "contact" not in run.settings:
+        return ""
+    if run.settings.get("contact_reason") and run.settings["contact"] == "events":
         return ""
     return str(run.settings.get("contact_reason") or f"contact='{run.settings['contact']}', as asked")
 

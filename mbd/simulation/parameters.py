@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Vector
-from mbd.assembly.assemble import undetermined
 from mbd.assembly.consistency import residuals, violations
+from mbd.assembly.inertia import undetermined
 from mbd.assembly.posture import Posture
 from mbd.assembly.trivial_rows import trivial_rows
 from mbd.compile.mechanism import Mechanism

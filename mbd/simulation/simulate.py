@@ -18,10 +18,11 @@ from mbd.assembly.turns import directed
 from mbd.bodies.values import named_number_faults
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of
-from mbd.errors import CapabilityError, MemoryLimitError, ModelError, SimulationError
+from mbd.errors import CapabilityError, MemoryLimitError, ModelError, SimulationError, UnknownNameError
 from mbd.integrators import HHT, Integrator
 from mbd.simulation.arguments import callbacks, choices, end_of, numbers
 from mbd.simulation.capabilities import refusals
+from mbd.simulation.run.control import reset_faults
 from mbd.simulation.run.run import Run
 from mbd.simulation.run.strategy import chosen
 from mbd.simulation.tolerance.calibrate import calibrated, first_allowed
@@ -201,6 +202,9 @@ def prepared(
     refused = refusals(mechanism.equations, scheme, options)
     if refused:
         raise CapabilityError(refused)
+    strange = reset_faults(mechanism.equations)
+    if strange:
+        raise UnknownNameError(strange)
     adaptive = {name: options.get(name) for name in ("tol", "allowed", "longest")}
     settings = {
         "model": getattr(model, "name", ""), "integrator": repr(scheme), "dt": dt if tol is None else None,

@@ -27,6 +27,9 @@ __all__ = ["faults", "parameter_check", "quantities", "require_valid", "rule_fau
 
 def faults(model: Description) -> list[str]:
     """All faults of a model, one sentence each."""
+    strange = model.foreign()
+    if strange:
+        return strange
     if not model.joints:
         return [
             f"model '{model.name}' has no joints; connect a body to the ground, such as "

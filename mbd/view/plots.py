@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbd.results.archive import write_whole
+from mbd.results.archive import named_file, write_whole
 from mbd.results.interpolation import Grid
 from mbd.results.ledger import SPENT, Ledger, Part
 from mbd.results.tables import library
@@ -53,6 +53,7 @@ def drawing(path: str | Path | None, width: float, height: float) -> Iterator[An
             figure = Figure(figsize=(width, height), layout="constrained")
         yield figure
         if path is not None:
+            named_file(path)
             kind = Path(path).suffix.removeprefix(".") or str(matplotlib.rcParams["savefig.format"])
             target = Path(path) if Path(path).suffix else Path(path).with_name(f"{Path(path).name}.{kind}")
             write_whole(target, lambda partial: figure.savefig(partial, format=kind))

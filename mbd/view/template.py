@@ -9,7 +9,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from mbd.results.archive import write_whole
+from mbd.results.archive import named_file, write_whole
 
 __all__ = ["filled", "written"]
 
@@ -35,6 +35,6 @@ def filled(folder: str, content: Any, parts: Mapping[str, str], scripts: Sequenc
 
 def written(page: str, path: str | Path) -> Path:
     """Where the page was written; folders are made."""
-    target = Path(path)
+    target = named_file(path)
     write_whole(target, lambda partial: partial.write_text(page, encoding="utf-8"))
     return target

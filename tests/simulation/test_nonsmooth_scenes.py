@@ -74,11 +74,12 @@ def test_the_order_in_which_balls_are_named_changes_nothing():
     assert sorted((e.time, e.name) for e in one.events) == sorted((e.time, e.name) for e in other.events)
 
 
-def test_few_contacts_are_located_and_the_choice_is_told():
-    for contact, said in ("auto", "contact='events' was chosen"), ("nonsmooth", "contact='nonsmooth', as asked"):
+def test_contacts_are_located_and_only_what_differs_from_that_is_printed():
+    for contact, said in ("auto", ""), ("events", "contact='events', as asked"), ("nonsmooth", "contact='nonsmooth',"):
         trajectory = run(ball(), {"fall.displacement": 1.0}, contact=contact, backend="python")
-        assert trajectory.settings["contact"] == ("events" if contact == "auto" else "nonsmooth")
+        assert trajectory.settings["contact"] == ("events" if contact == "auto" else contact)
         assert said in str(trajectory)
+        assert bool(said) == ("contact  " in str(trajectory)) == (not trajectory.settings["contact_reason"])
     model, _ = falling()
     assert "contact  " not in str(run(model, until=0.1, backend="python"))
 

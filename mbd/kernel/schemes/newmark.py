@@ -8,6 +8,7 @@ the velocity formulas of the scheme with their own rate ż, of order 2 as well (
 from __future__ import annotations
 
 from mbd.kernel.codes import PASSING
+from mbd.kernel.conditioning import is_ill_conditioned, refine_accelerations
 from mbd.kernel.records import Kernel
 from mbd.kernel.restart import compose, consistent, fill_block, refresh_scales
 from mbd.kernel.schemes.contract import Scheme
@@ -32,6 +33,8 @@ def newmark_start(K: Kernel) -> int:
     for i in range(K.n):
         K.y1[i] = K.y[i] + step * K.rate[i]
     status = consistent(K, t + step, K.q1, K.y1)
+    if status == 0 and is_ill_conditioned(K):
+        status = refine_accelerations(K)
     for i in range(K.n):
         K.slope[i] = (K.jump[i] - K.rate[i]) / step if status == 0 else 0.0
         K.aux[i] = K.rate[i] + (K.jerk * (K.alpha_m - K.alpha_f) * full) * K.slope[i]

@@ -26,11 +26,11 @@ from mbd.kernel.restart import (
     restore_scales,
     retain_scales,
 )
+from mbd.kernel.saddle import factor_saddle
 from mbd.kernel.schemes.collocation import RADAU
 from mbd.kernel.schemes.contract import Abilities, Scheme
 from mbd.kernel.schemes.iteration import runs_away
 from mbd.kernel.schemes.memory import forget_steps, look_a_step_ahead
-from mbd.kernel.schemes.runge_kutta import factor_saddle
 from mbd.kernel.schemes.stages import (
     A_,
     BALANCES,

@@ -13,11 +13,12 @@ from __future__ import annotations
 
 from mbd.kernel.codes import EPS, INCREMENT_RATES, NOT_CONVERGED, NOT_FINITE, PASSING, SINGULAR
 from mbd.kernel.hooks import call
-from mbd.kernel.linear import factor, solve_definite
-from mbd.kernel.ordered import LOSS_AT_ONCE, OF_ACCELERATIONS, SYMMETRIC, factor_ordered, order_at, solve_kkt
+from mbd.kernel.linear import solve_definite
+from mbd.kernel.ordered import LOSS_AT_ONCE, solve_kkt
 from mbd.kernel.records import Kernel
 from mbd.kernel.restart import compose, consistent, displace, evaluate, fill_block, raise_scales, refresh_scales
 from mbd.kernel.roots import sqrt
+from mbd.kernel.saddle import factor_saddle
 from mbd.kernel.schemes.contract import Abilities, Scheme
 from mbd.kernel.schemes.dormand_prince import NODES, STAGES, tableau
 from mbd.kernel.schemes.memory import forget_steps
@@ -189,33 +190,6 @@ def explicit_rates(K: Kernel, t: float) -> int:
     return 0
 
 
-def factor_saddle(K: Kernel, m: int, symmetric: bool, loss: float) -> bool:
-    """LU factors in K.kkt of [M R; B 0] from K.acc, or of [M Bᵀ; B 0]; false where a pivot is missing.
-
-    Pivots of an order chosen beforehand must keep the part `loss` of their terms, else they are searched for.
-    """
-    n = K.n
-    size = n + m
-    o = order_at(K, m)
-    if o > 0 and factor_ordered(K, K.acc, o, SYMMETRIC if symmetric else OF_ACCELERATIONS, loss):
-        return True
-    K.order_start = 0
-    o_R = K.acc_R
-    o_B = K.acc_B
-    for i in range(n):
-        for j in range(n):
-            K.kkt[i * size + j] = K.acc[i * n + j]
-    for k in range(m):
-        row = K.rows[k]
-        for i in range(n):
-            entry = K.acc[o_B + row * n + i]
-            K.kkt[(n + k) * size + i] = entry
-            K.kkt[i * size + n + k] = entry if symmetric else K.acc[o_R + i * K.n_rows + row]
-        for j in range(m):
-            K.kkt[(n + k) * size + n + j] = 0.0
-    return bool(factor(K.kkt, size, K.pivots) == 0)
-
-
 def return_to_rows(K: Kernel, t1: float) -> int:
     """The nearest positions with h = 0 and velocities with ḣ = 0, in the metric of M, in place of (q1, y1)."""
     n = K.n
@@ -289,16 +263,25 @@ def explicit_error(K: Kernel, h: float) -> None:
             e3 += K.tableau[third + j] * slope
         K.error[i] = h * e5
         if i >= 2 * n_v:
-            size = sqrt(e5 * e5 + 0.01 * e3 * e3)
-            K.error[i] *= abs(e5) / size if size > 0.0 else 0.0
+            K.error[i] *= part_of(abs(e5), abs(e3))
             continue
         weight = 1.0 if i < n_v else h
         five = max(five, weight * abs(e5))
         three = max(three, weight * abs(e3))
-    size = sqrt(five * five + 0.01 * three * three)
-    share = five / size if size > 0.0 else 0.0
+    share = part_of(five, three)
     for i in range(2 * n_v):
         K.error[i] *= share
+
+
+def part_of(five: float, three: float) -> float:
+    """``e₅ / √(e₅² + e₃²/100)`` of sizes however large: a step into a steep wall has some whose squares overflow."""
+    large = max(five, three)
+    if large == 0.0:
+        return 0.0
+    if large > 1e150:
+        five /= large
+        three /= large
+    return five / sqrt(five * five + 0.01 * three * three)
 
 
 def hold_error(K: Kernel) -> bool:

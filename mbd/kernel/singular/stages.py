@@ -20,7 +20,7 @@ from mbd.kernel.ordered import LOSS_OF_STEP, solve_kkt
 from mbd.kernel.records import Kernel
 from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import compose, evaluate
-from mbd.kernel.schemes.runge_kutta import factor_saddle
+from mbd.kernel.saddle import factor_saddle
 from mbd.kernel.schemes.stages import (
     A2_,
     CHANGES,

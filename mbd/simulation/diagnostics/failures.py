@@ -8,7 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from mbd.arrays import Vector
+from mbd.assembly.inertia import lost_inertia
 from mbd.assembly.not_finite import first_cause, tape_inputs
+from mbd.assembly.posture import Posture
 from mbd.integrators.base import Point
 from mbd.kernel import codes
 from mbd.results.failure import Failure
@@ -132,8 +134,18 @@ def _what(
         )
     if status in (codes.TOO_SMALL, codes.STIRRED):
         return _no_size(stepper, status, closed)
+    if status == codes.ILL_CONDITIONED:
+        error, who = float(stepper.kernel.lost_digits), _unknown(stepper).removeprefix("the motion of ")
+        return (
+            f"accelerations have no correct digits{closed}: ones that are known are found with a relative error of "
+            f"{error:.1g} at {who}, as the inertia of some motion is a small difference of large ones; give light and "
+            "slender bodies an inertia about their own center, put fewer of them into one chain, or try cut='all'"
+        )
     if status in (codes.DEPENDENT, codes.CONFLICT):
         if int(stepper.kernel.failure_index) < stepper.kernel.n:
+            lost = lost_inertia(_accepted(stepper))
+            if lost:
+                return f"{lost}{closed}"
             return f"neither mass nor rows determine {_unknown(stepper)}{closed}; give it a mass, or lock it"
         return (
             f"{_clashing(stepper, status)}{closed}; leave one out, hold fewer contacts closed, or, where they do so in "
@@ -296,6 +308,13 @@ def crowded(events: Sequence[EventRecord], now: float, dt: float) -> str:
         f"t = {now:.9g} s: more than {MOST_EVENTS} events within one dt: {_last_events(events)}; use a smaller dt, "
         "or where it applies a softer stiffness, a larger rest_speed or locate='root'"
     )
+
+
+def _accepted(stepper: Stepper) -> Posture:
+    """The accepted state with the constraints that are active."""
+    K = stepper.kernel
+    q, y, flags, anchors = K.q[: K.n_q].copy(), K.y[: K.n].copy(), K.closed[: K.n_contacts], K.anchors[: K.n_anchors]
+    return Posture(stepper.mechanism, stepper.manager, K.params, q, y, flags, anchors.copy(), time=float(K.time))
 
 
 def _clashing(stepper: Stepper, status: int) -> str:

@@ -7,8 +7,9 @@ from collections.abc import Iterable
 import numpy as np
 
 from mbd.arrays import Vector
-from mbd.assembly.assemble import BELOW, undetermined
+from mbd.assembly.assemble import BELOW
 from mbd.assembly.consistency import residuals
+from mbd.assembly.inertia import undetermined
 from mbd.assembly.orientation import reversed_joints
 from mbd.assembly.posture import Posture
 from mbd.errors import ModelError

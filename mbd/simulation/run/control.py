@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,14 +12,14 @@ from mbd.bodies.values import is_finite_number
 from mbd.compile.mechanism import rate_names
 from mbd.compile.python import scalar_function
 from mbd.constraints.expressions import evaluated, is_expression
-from mbd.equations.equations import Guard
+from mbd.equations.equations import Equations, Guard
 from mbd.errors import ModelError, SimulationError, UnknownNameError, nearest
 from mbd.simulation.asked import asked
 from mbd.simulation.parameters import change_parameters, residuals_now, violations_now
 from mbd.simulation.run.boundaries import without_sharing
 from mbd.simulation.run.data import RunData
 
-__all__ = ["Named", "apply_reset", "arrive", "begin_controllers", "call_controllers"]
+__all__ = ["Named", "apply_reset", "arrive", "begin_controllers", "call_controllers", "reset_faults"]
 
 
 class Named(Mapping[str, float]):
@@ -68,9 +68,9 @@ def apply_reset(run: RunData, guard: Guard) -> None:
     states = {state.name: equations.n_v + k for k, state in enumerate(equations.states)}
     places = rates | states
     wanted = {_spelled(name, places): number for name, number in wanted.items()}
-    unknown = [name for name in wanted if name not in positions and name not in places]
+    unknown = _not_reset(equations, wanted, f"{what}: ")
     if unknown:
-        raise UnknownNameError(f"{what}: " + nearest(unknown[0], [*positions, *places], "quantity"))
+        raise UnknownNameError(unknown)
     for name, number in wanted.items():
         if name in positions:
             v.q[positions[name]] = number
@@ -81,6 +81,36 @@ def apply_reset(run: RunData, guard: Guard) -> None:
     off = violations_now(run, residuals_now(run), usual)
     if off:
         raise SimulationError(f"{what} breaks constraints: {'; '.join(off)}; reset all that they bind, velocities too")
+
+
+def reset_faults(equations: Equations) -> list[str]:
+    """What is wrong with the names that events reset, as far as they are known before a run."""
+    return [
+        fault
+        for guard in equations.guards
+        if isinstance(guard.reset, Mapping)
+        for fault in _not_reset(equations, guard.reset, f"the reset of {guard.name!r}: ")
+    ]
+
+
+def _not_reset(equations: Equations, wanted: Iterable[str], what: str) -> list[str]:
+    """Names among those `wanted` that are no coordinate, rate or state, with what to reset in their place."""
+    known = [coordinate.name for coordinate in equations.coordinates]
+    known += [*rate_names(equations), *(state.name for state in equations.states)]
+    places = dict.fromkeys(known, 0)
+    known, faults = list(places), []
+    for name in wanted:
+        if _spelled(name, places) in places:
+            continue
+        if name in equations.output_names():
+            faults.append(
+                f"{what}{name!r} is a result, such as what a cut joint or a place has, and cannot be set; reset the "
+                f"coordinates and rates that it follows from: {', '.join(map(repr, known[:12]))}"
+                f"{', …' if len(known) > 12 else ''}"
+            )
+        else:
+            faults.append(what + nearest(name, known, "quantity"))
+    return faults
 
 
 def _spelled(name: str, rates: Mapping[str, int]) -> str:

@@ -1,0 +1,130 @@
+"""Whether masses and constraints determine every motion, and whether double precision can carry the inertia of each.
+
+The mass matrix of relative coordinates adds up everything outboard. What a motion that folds a chain up to and fro
+has of inertia is a small difference of its entries; the kinetic energy, a sum over bodies, has no such cancellation.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mbd.arrays import Matrix, Vector
+from mbd.assembly.not_finite import first_cause, tape_inputs
+from mbd.assembly.posture import Posture
+from mbd.compile.mechanism import AccelerationTerms
+
+__all__ = ["lost_inertia", "lost_sentence", "undetermined"]
+
+SQUARED_ROUND_OFF = 1e-26
+"""Kinetic energy of a motion, over what M adds up for it, below which it is that of round-off in velocities [-]."""
+LOST = 1e-17
+"""The same below which not a digit of it is left in M, a tenth of the round-off in its entries [-]."""
+SUSPECT = 1e-12
+"""Smallest singular value of the equations, over the largest, above which no motion is asked for its energy [-]."""
+
+
+def undetermined(work: Posture) -> list[str]:
+    """Coordinates whose acceleration neither mass nor rows determine, rows that depend on others, negative inertia."""
+    equations = work.equations
+    picked = list(work.manager.active_rows(work.flags))
+    terms = work.mechanism.acceleration_terms(work.time, work.q, work.y, work.parameters, work.anchors)
+    n = len(terms.f)
+    if n == 0:
+        return ["nothing can move: the model has no coordinate; connect a body by a joint that lets it move"]
+    matrix = _equations(terms, picked)
+    if not np.isfinite(matrix).all() or not np.isfinite(terms.f).all():
+        block = work.mechanism.block(work.time, work.q, work.y, work.anchors)
+        inputs = tape_inputs(work.mechanism, block, work.parameters)
+        cause = first_cause(equations, inputs, when=" at the start")
+        return [cause or "a mass or a derivative is not finite at the start; check the parameters and functions used"]
+    faults, lost = [], []
+    for _, motion in _weak_motions(matrix):
+        weights = np.abs(motion)
+        place = int(np.argmax(weights))
+        if np.max(weights[:n], initial=0.0) <= 1e-6 * weights[place]:
+            continue
+        name = equations.velocity_names[int(np.argmax(weights[: equations.n_v]))].removesuffix(".rate")
+        share = _share(work, motion[:n], terms.M)
+        if share > SQUARED_ROUND_OFF:
+            lost += [lost_sentence(name, share)] if share < LOST else []
+            continue
+        faults.append(
+            f"nothing determines the motion of {name!r}: no mass or inertia resists it and no constraint holds it; "
+            "give the bodies it moves a mass, or lock it"
+        )
+    faults = faults or lost[:1]
+    return faults or _negative(work, terms.M[: equations.n_v, : equations.n_v], terms.B[picked][:, : equations.n_v])
+
+
+def lost_inertia(work: Posture) -> str:
+    """A sentence on the motion of least inertia where elimination has lost it; '' if it has none at all."""
+    terms = work.mechanism.acceleration_terms(work.time, work.q, work.y, work.parameters, work.anchors)
+    n, n_v = len(terms.f), work.equations.n_v
+    matrix = _equations(terms, list(work.manager.active_rows(work.flags)))
+    if not np.isfinite(matrix).all():
+        return ""
+    for size, motion in reversed(_weak_motions(matrix)):
+        if np.max(np.abs(motion[:n_v]), initial=0.0) > 1e-6 * np.max(np.abs(motion)):
+            name = work.equations.velocity_names[int(np.argmax(np.abs(motion[:n_v])))].removesuffix(".rate")
+            return lost_sentence(name, size) if _share(work, motion[:n], terms.M) > SQUARED_ROUND_OFF else ""
+    return ""
+
+
+def _equations(terms: AccelerationTerms, picked: list[int]) -> Matrix:
+    """The matrix of accelerations and multipliers."""
+    m = len(picked)
+    return np.block([[terms.M, terms.R[:, picked]], [terms.B[picked], np.zeros((m, m))]])
+
+
+def _weak_motions(matrix: Matrix) -> list[tuple[float, Vector]]:
+    """Unknowns that the equations, scaled, hardly determine, the weakest last, with their relative singular values."""
+    scale = np.sqrt(np.max(np.abs(matrix), axis=1))
+    scale[scale == 0.0] = 1.0
+    _, sizes, right = np.linalg.svd(matrix / np.outer(scale, scale))
+    relative = sizes / max(sizes[0], 1e-300)
+    return [(float(size), way / scale) for size, way in zip(relative, right, strict=True) if size < SUSPECT]
+
+
+def lost_sentence(name: str, size: float) -> str:
+    """What is said of a motion whose inertia, that part of what equations add up, is lost."""
+    return (
+        f"the motion of {name!r} has an inertia that double precision cannot carry: at most {size:.1g} of what the "
+        "equations add up of everything that it moves, no more than round-off; give light and slender bodies an "
+        "inertia about their own center, put fewer of them into one chain, or try cut='all', whose equations add up "
+        "no masses"
+    )
+
+
+def _share(work: Posture, motion: Vector, M: Matrix) -> float:
+    """Kinetic energy of a motion over what M adds up for it, ``(Σ √M_ii |v_i|)²/2``, however little; 0 if not known.
+
+    A long chain that folds up to and fro hardly moves, and M, whose entries are sums over all bodies outboard, tells
+    its energy as a difference of large numbers. As a sum over bodies it has no cancellation.
+    """
+
+    def kinetic(y: Vector) -> float:
+        terms = work.mechanism.acceleration_terms(work.time, work.q, y, work.parameters, work.anchors)
+        return float(np.asarray(terms.kinetic).item())
+
+    if work.equations.n_z or kinetic(0.0 * motion) != 0.0:  # a moving ground has energy of its own
+        return 0.0
+    added = 0.5 * float(np.sqrt(np.abs(np.diag(M))) @ np.abs(motion)) ** 2
+    return kinetic(motion) / added if added > 0.0 else 0.0
+
+
+def _negative(work: Posture, M: Matrix, B: Matrix) -> list[str]:
+    """Motions that the rows allow and whose kinetic energy would be negative."""
+    scale = np.sqrt(np.abs(np.diag(M)) + 1e-300)
+    free = np.linalg.svd(B / scale, full_matrices=True)[2][len(B) :].T if len(B) else np.eye(len(M))
+    values, directions = np.linalg.eigh(free.T @ (M / np.outer(scale, scale)) @ free)
+    if not len(values) or values[0] > -1e-9:
+        return []
+    motion = np.abs(free @ directions[:, 0]) / scale
+    name = work.equations.velocity_names[int(np.argmax(motion))].removesuffix(".rate")
+    guilty = [
+        f"{each.name!r} is {value:g}"
+        for each, value in zip(work.equations.parameters, work.parameters, strict=False)
+        if value < 0.0 and each.name.rpartition(".")[2] in ("mass", "inertia", "xx", "yy", "zz")
+    ]
+    told = ", ".join(guilty) or "check the parameters given"
+    return [f"the mass or inertia that resists the motion of {name!r} is negative; {told}"]
