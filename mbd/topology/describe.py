@@ -49,7 +49,7 @@ def _body(body: Body) -> str:
 
 def _joint(joint: Joint) -> str:
     coordinates = ", ".join(
-        f"{name} [{label.unit}]" for name, label in zip(joint.coordinate_names, joint.labels, strict=True)
+        f"{name} [{label.unit or '-'}]" for name, label in zip(joint.coordinate_names, joint.labels, strict=True)
     )
     said = f"{joint.name}: {type(joint).__name__} {joint.parent.full_name} → {joint.child.full_name}"
     said += f", {coordinates}" if coordinates else ""
