@@ -127,8 +127,8 @@ def test_fuzzed_scenes_are_judged_sound(number):
     assert told["kind"] == "ok", told
 
 
-def test_a_contact_that_would_pull_by_consistent_multipliers_leaves_a_row_in_balance():
-    """The run ends there with a named error; its last row has the forces of the step, and accelerations from them."""
+def test_the_rows_of_a_run_that_ends_at_a_contact_without_a_force_keep_the_laws():
+    """A foot that sticks whatever its force, in index 3: neither closed nor open; the row before has its forces."""
     told = verdict(24029)
     assert told["kind"] == "error", told
 
