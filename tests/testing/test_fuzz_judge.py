@@ -27,8 +27,9 @@ SLIPPING = [2159]
 """A foot in index 3 with uneven steps, which sticks by the multipliers of the step and slips by consistent ones."""
 ROUND_OFF = [2473, 3433]
 """Rows of a cut screw whose round-off is a little larger than their terms foretell."""
-TIED = [4378]
-"""Two steps of a quarter of the run: whether they are half of it must not be decided by the last bit."""
+TIED = [4378, 30308]
+"""Two steps of a quarter of the run: whether they are half of it must not be decided by the last bit; two runs
+of a flight without any error but round-off, of which that with longer steps is kept."""
 BETWEEN = [4644, 21327, 26660]
 """A joint was open, and velocities did not fit it, between long steps of `RadauIIA`; accelerations of index 3 within
 a short last step."""

@@ -42,6 +42,8 @@ BLIND = 1e3
 """How much finer the next run is where two runs took the same steps [-]."""
 ROUND_OFF = 1e-14
 """Difference of two runs that is no more than round-off [m, rad]."""
+NOTHING = 1e-6
+"""Errors over the tolerance below which they do not tell runs apart [-]."""
 CHANGE = 1e4
 """Most by which the allowed error shrinks from one run to the next [-]."""
 LOOSER = 1e10
@@ -65,9 +67,14 @@ class Search:
 
     # which run counts, and which is next -----------------------------------------------------------------------------
     def best(self, trials: Sequence[Trial]) -> Trial:
-        """The run whose error comes nearest the tolerance from below; else the most accurate."""
+        """The run whose error comes nearest the tolerance from below; else the most accurate.
+
+        Of runs whose errors are nothing beside the tolerance, and may be round-off, the one that allows most.
+        """
         below = [trial for trial in trials if trial.error <= self.tol]
-        return max(below, key=lambda trial: trial.error) if below else min(trials, key=lambda trial: trial.error)
+        if not below:
+            return min(trials, key=lambda trial: trial.error)
+        return max(below, key=lambda trial: (max(trial.error, NOTHING * self.tol), trial.allowed))
 
     def next(self, trials: Sequence[Trial]) -> float | None:
         """What the next run allows; None: the best is good, or as good as it gets."""
