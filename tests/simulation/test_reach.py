@@ -45,6 +45,19 @@ def test_a_driver_beyond_reach_is_named_and_no_row_leaves_its_constraints(scheme
         assert "constraints cannot be satisfied" in run.message and "'winch'" in run.message, run.message
 
 
+def test_long_steps_of_collocation_store_no_row_beyond_the_reach() -> None:
+    """Newton's method ends with small corrections there, some microns off the constraints; the rows are asked again."""
+    rng = np.random.default_rng(4)
+    for cut in ("auto", "all"):
+        upper, lower = rng.uniform(0.4, 1.2, 2)
+        model, straight = pulled(upper, lower, 0.95 * (upper + lower), float(rng.uniform(0.3, 1.5)), cut)
+        start = mbd.assemble(model, project=True)
+        for dt in straight / rng.uniform(2.0, 15.0, 6):
+            run = mbd.simulate(model, start, mbd.RadauIIA(), dt=dt, until=2.0 * straight, on_failure="return")
+            assert not run.success and "'winch'" in run.message, run.message
+            assert max(run.violation.length, run.violation.angle) < 1e-7, (dt, run.violation, run.message)
+
+
 def test_a_driver_within_reach_is_not_blamed() -> None:
     """Another cause of failure stays what it is."""
     model, _ = pulled.__wrapped__(1.0, 0.7, 1.2, 0.1, "auto")  # one of its own, which is added to
