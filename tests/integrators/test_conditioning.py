@@ -79,7 +79,7 @@ def test_a_chain_whose_masses_sit_near_its_joints_is_right_or_refused_by_name(co
         told = str(refused)
     else:
         told = ""
-    if count > 18 and told:
+    if count > 20 and told:
         assert "their own center" in told
         return
     assert not told
