@@ -30,7 +30,7 @@ TOLD = (
     MbdError, OSError, ArithmeticError, AssertionError, AttributeError, ImportError, LookupError, NameError,
     RuntimeError, SyntaxError, TypeError, ValueError,
 )  # fmt: skip
-"""Errors of users' scripts that are told in a sentence; ``--debug`` shows where they came from."""
+"""Errors of users' scripts that are reported in a sentence; ``--debug`` shows where they came from."""
 
 OPTIONS = ("dt", "tol", "contact", "impact", "locate", "parameters", "store", "observers", "rest_speed", "backend")
 """Names that a script may define to pass them on to `simulate`."""
@@ -303,7 +303,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run a command; returns the exit code: 0, or 1 after an error that was told."""
+    """Run a command; returns the exit code: 0, or 1 after an error that was reported."""
     arguments = _parser().parse_args(argv)
     try:
         code: int = arguments.function(arguments)

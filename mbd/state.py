@@ -37,7 +37,7 @@ class Memory:
 
     With it a run goes on as if it had not been cut: accelerations and auxiliary ones, multipliers, what predicts the
     next step, rows left out, sides of guards, the grid of instants, samples and states of controllers. It is used only
-    where everything that it belongs to is the same to the bit, else the scheme is started anew; controllers go on also
+    where everything that it belongs to is the same to the bit, else the scheme is restarted; controllers go on also
     then, if the state is the same.
 
     Attributes

@@ -181,10 +181,18 @@ def test_the_worst_figure_of_every_scheme_is_told():
 
 
 def test_what_is_known_not_to_hold_is_told_with_its_reason_and_when_it_holds(monkeypatch):
-    monkeypatch.setattr(judging, "reason", lambda case, name: "rows lose rank" if name == "HHT" else "")
+    monkeypatch.setattr(
+        judging, "reason", lambda case, name: "the constraint Jacobian loses rank" if name == "HHT" else ""
+    )
     failing = judged(stand_in(3.0))
-    assert failing.word == "does not hold" and failing.reasons == ["rows lose rank"] and not failing.passed
-    assert "does not hold: rows lose rank" in as_markdown([failing]) and "g1: rows lose rank" in as_text([failing], 120)
+    assert (
+        failing.word == "does not hold"
+        and failing.reasons == ["the constraint Jacobian loses rank"]
+        and not failing.passed
+    )
+    assert "does not hold: the constraint Jacobian loses rank" in as_markdown(
+        [failing]
+    ) and "g1: the constraint Jacobian loses rank" in as_text([failing], 120)
     assert judged(stand_in(0.5)).word == "holds now with HHT: take it from the list of what does not"
 
 

@@ -1,4 +1,4 @@
-"""Small mistakes are told by name, where they were made."""
+"""Small mistakes are reported by name, where they were made."""
 
 from __future__ import annotations
 

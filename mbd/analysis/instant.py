@@ -18,12 +18,12 @@ from mbd.equations.linearization import LinearTerms, linearization
 from mbd.errors import ModelError
 from mbd.integrators.hht import HHT
 from mbd.kernel import codes
+from mbd.kernel.contact_modes import resolve_contact_modes
 from mbd.kernel.records import Kernel
 from mbd.kernel.redundancy import find_dependent, sharing, spread
 from mbd.kernel.restart import active_rows
-from mbd.kernel.settle import settle
 from mbd.simulation.run.plain import MechanismSystem
-from mbd.simulation.run.shares import shares
+from mbd.simulation.run.shared_loads import shares
 from mbd.simulation.run.stepper import Stepper
 from mbd.state import State
 
@@ -130,7 +130,7 @@ def instant(model: Any, state: State, parameters: Mapping[str, float] | None = N
     stepper = Stepper(mechanism, manager, HHT(), values, 1.0, {"capacity": 1})
     K, flags = _kernel(stepper, state), manager.flags(state.mode.closed)
     with np.errstate(all="ignore"):
-        status = settle(K)
+        status = resolve_contact_modes(K)
     if status != 0:
         why = REASONS.get(status, "no consistent contact forces were found")
         raise ModelError(f"no accelerations at t = {state.time:.6g} s: {why}")

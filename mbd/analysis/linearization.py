@@ -178,7 +178,8 @@ def linearize(
     Raises
     ------
     ModelError
-        if the state is not consistent, a closed contact would pull, or rows lose rank at this posture only.
+        if the state is not consistent, a closed contact would pull, or the constraint Jacobian loses rank at this
+        posture only.
 
     Examples
     --------
@@ -248,8 +249,8 @@ def _singular(found: Instant, terms: LinearTerms, chosen: Independent) -> list[s
         if np.max(np.abs(free.T @ bent @ free), initial=0.0) > VANISHES * float(np.max(np.abs(bent), initial=0.0)):
             lost = [found.titles[k] for k in held[np.abs(idle) > 1e-6]]
             return [
-                f"rows lose rank at this posture only ({', '.join(lost)}), where branches of motion meet, so that no "
-                "linear motion exists; move the state off it"
+                f"the constraint Jacobian loses rank at this posture only ({', '.join(lost)}), where branches of "
+                "motion meet, so that no linear motion exists; move the state off it"
             ]
     return []
 

@@ -17,8 +17,8 @@ from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import MbdError, ModelError, SimulationError, UnknownNameError, nearest
 from mbd.progress import share_bar
 from mbd.results.archive import named_file, write_whole
-from mbd.simulation.asked import asked
 from mbd.simulation.simulate import simulate
+from mbd.simulation.user_calls import asked
 from mbd.state import State
 from mbd.trajectory import Trajectory
 

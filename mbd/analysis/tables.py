@@ -18,12 +18,12 @@ MOVES = 0.1
 NAMED = 4
 """Coordinates that are named in a line at most."""
 NULL = 3e-8
-"""Eigenvalue, relative to the largest, that is told as zero: double ones are known to √ε only [-]."""
+"""Eigenvalue, relative to the largest, that is reported as zero: double ones are known to √ε only [-]."""
 
 SHOWN = 11
 """Lines of spectra in a table at most."""
 ROUND_OFF = 1e-11
-"""Damping ratio or elongation that is told as zero [-]."""
+"""Damping ratio or elongation that is reported as zero [-]."""
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 

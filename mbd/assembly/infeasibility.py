@@ -15,7 +15,7 @@ from mbd.assembly.posture import TOLERANCE, Posture, close_positions, descend, d
 __all__ = ["Held", "acceleration_conflict", "named_conflict", "position_conflicts", "velocity_conflict"]
 
 MOST_SETS = 5
-"""Conflicting sets that are told at once."""
+"""Conflicting sets that are reported at once."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ def position_conflicts(
 
     Parameters
     ----------
-    work : where closing gave up; its `iterations` are told
+    work : where closing gave up; its `iterations` are reported
     rows : numbers of the rows on positions
     start : q from which closing began
     loops : see `loops_of`

@@ -8,7 +8,7 @@ from typing import Any
 from mbd.arrays import Vector
 from mbd.compile.mechanism import Mechanism
 from mbd.description import Description
-from mbd.equations.surroundings import Surroundings
+from mbd.equations.derivation_context import DerivationContext
 from mbd.tape.evaluate import evaluate
 from mbd.tape.node import Node
 from mbd.topology.plan import plan, uncut
@@ -51,7 +51,7 @@ def _asked(model: Description) -> tuple[list[str], list[Node], list[str], Sequen
     moved = [joint for joint in here.edges if joint.name in apart]
     if not moved:
         return [], [], [], (), ()
-    scope = Surroundings(model.ground, whole.edges, whole.cut, model.gravity, model.tunable, whole.planar)
+    scope = DerivationContext(model.ground, whole.edges, whole.cut, model.gravity, model.tunable, whole.planar)
     names, nodes = list[str](), list[Node]()
     for joint in moved:
         names += joint.coordinate_names

@@ -77,7 +77,7 @@ class Mobility:
 
     @property
     def singular(self) -> bool:
-        """Whether rows lose rank at the posture looked at, and not nearby."""
+        """Whether the constraint Jacobian loses rank at the posture looked at, and not nearby."""
         return self.rank_here < self.rank
 
     def __str__(self) -> str:

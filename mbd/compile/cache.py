@@ -113,7 +113,7 @@ class ObjectCache:
         if problem:
             _tell(
                 f"the code cache '{self.directory}' {problem}, and what is in it is executed: it is not used, and code "
-                "is compiled anew in every process; name a directory of your own in MBD_CACHE, or take the rights of "
+                "is compiled again in every process; name a directory of your own in MBD_CACHE, or take the rights of "
                 "others away (chmod go-w)"
             )
         return not problem
@@ -199,7 +199,7 @@ def default_cache() -> ObjectCache:
     if directory.is_absolute():
         return ObjectCache(directory)
     _tell(
-        "there is no home directory to keep compiled code in: it is compiled anew in every process; name a directory "
+        "there is no home directory to keep compiled code in: it is compiled again in every process; name a directory "
         "in MBD_CACHE"
     )
     return ObjectCache()

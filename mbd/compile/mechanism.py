@@ -30,7 +30,7 @@ class ModeCode:
     """Code of one contact mode: Newton tangent with residual, and residual alone.
 
     correction, solution : the tangent with its factors and what solves with these (see `programs.correction`), or None
-    borne : rows that depend on `rows`; their multipliers are given and act
+    given_rows : rows that depend on `rows`; their multipliers are given and act
     order : in which the matrices of many unknowns are eliminated (see `orders`), or None
     """
 
@@ -41,7 +41,7 @@ class ModeCode:
     residual: Any
     correction: Any = None
     solution: Any = None
-    borne: tuple[int, ...] = ()
+    given_rows: tuple[int, ...] = ()
     order: Any = None
 
 
@@ -103,23 +103,23 @@ class Mechanism:
         penalties: Sequence[int],
         stabilized: bool,
         sliding: Sequence[int] = (),
-        borne: Sequence[int] = (),
+        given_rows: Sequence[int] = (),
     ) -> ModeCode:
         """Code of the mode with these rows, penalty contacts and sliding frictions, made on first use.
 
-        borne : rows that depend on those, with given multipliers
+        given_rows : rows that depend on those, with given multipliers
         """
-        key = (tuple(rows), tuple(penalties), tuple(sliding), tuple(borne), stabilized)
+        key = (tuple(rows), tuple(penalties), tuple(sliding), tuple(given_rows), stabilized)
         with self.equations.tape.lock:  # runs in other threads share this mechanism
             if key not in self._modes:
                 started = perf_counter()
-                outputs = programs.newton(self.equations, rows, penalties, stabilized, sliding, borne)
+                outputs = programs.newton(self.equations, rows, penalties, stabilized, sliding, given_rows)
                 order = self._order(outputs, key[0])
                 self.seconds += perf_counter() - started
                 tangent, residual = self._add(
                     key, len(self._modes), tangent=lambda *_: outputs, residual=programs.residual
                 )
-                self._modes[key] = ModeCode(key[0], key[1], key[2], tangent, residual, borne=key[3], order=order)
+                self._modes[key] = ModeCode(key[0], key[1], key[2], tangent, residual, given_rows=key[3], order=order)
             return self._modes[key]
 
     def stepping(
@@ -128,14 +128,14 @@ class Mechanism:
         penalties: Sequence[int],
         stabilized: bool,
         sliding: Sequence[int] = (),
-        borne: Sequence[int] = (),
+        given_rows: Sequence[int] = (),
     ) -> ModeCode:
-        """The same for the compiled kernel: with factors in straight-line code where that pays and no row is `borne`.
+        """The same for the compiled kernel: with factors in straight-line code where that pays and no row is `given`.
 
         The tangent as a matrix is then needed only where a pivot of these is too small; it is made the first time.
         """
-        if borne:
-            return self.mode(rows, penalties, stabilized, sliding, borne)
+        if given_rows:
+            return self.mode(rows, penalties, stabilized, sliding, given_rows)
         mode = (tuple(rows), tuple(penalties), tuple(sliding), (), stabilized)
         key = (*mode, "stepping")
         with self.equations.tape.lock:
@@ -149,10 +149,10 @@ class Mechanism:
         penalties: Sequence[int],
         stabilized: bool,
         sliding: Sequence[int] = (),
-        borne: Sequence[int] = (),
+        given_rows: Sequence[int] = (),
     ) -> ModeCode:
         """The same for steps that ask for accelerations alone: tangent and residual are made if somebody calls them."""
-        mode = (tuple(rows), tuple(penalties), tuple(sliding), tuple(borne), stabilized)
+        mode = (tuple(rows), tuple(penalties), tuple(sliding), tuple(given_rows), stabilized)
         key = (*mode, "explicit")
         with self.equations.tape.lock:
             if key not in self._modes:
@@ -163,9 +163,9 @@ class Mechanism:
                 residual = self._later(mode, number, tail, residual=programs.residual)
                 order = None
                 if may_pay(self._accelerations, n, self.layout.n_rows, sorted(rows)):  # its pattern is that of both
-                    outputs = programs.newton(self.equations, rows, penalties, stabilized, sliding, borne)
+                    outputs = programs.newton(self.equations, rows, penalties, stabilized, sliding, given_rows)
                     order = self._order(outputs, rows)
-                self._modes[key] = ModeCode(*mode[:3], tangent, residual, borne=mode[3], order=order)
+                self._modes[key] = ModeCode(*mode[:3], tangent, residual, given_rows=mode[3], order=order)
                 self.seconds += perf_counter() - started
             return self._modes[key]
 
@@ -196,14 +196,14 @@ class Mechanism:
         return elimination_order(tangent, self._accelerations, self.layout.n, self.layout.n_rows, sorted(rows))
 
     def _add(self, mode: Any, number: int, **makers: Callable[..., Sequence[Node]]) -> list[Function]:
-        """Compile programs of a mode (rows, penalties, frictions, borne rows, form), with its number in their names."""
-        rows, penalties, sliding, borne, stabilized = mode
+        """Compile programs of a mode (rows, penalties, frictions, given rows, form), with its number in their names."""
+        rows, penalties, sliding, given_rows, stabilized = mode
         with self.equations.tape.lock:
             started = perf_counter()
             names = {f"{name}_{number}": make for name, make in makers.items()}
             self.common.add(
                 {
-                    name: make(self.equations, rows, penalties, stabilized, sliding, borne)
+                    name: make(self.equations, rows, penalties, stabilized, sliding, given_rows)
                     for name, make in names.items()
                 }
             )

@@ -74,7 +74,7 @@ class Constraint(Parameterized, ABC):
         return {f"{self.name} friction": None} if self.kind == "nonholonomic" else {}
 
     def resolving_dt(self, values: Mapping[str, float], mass: float, speed: float) -> float:
-        """The step that resolves a blow of an effective mass [kg, kg m²] at an approach speed [m/s, rad/s]; [s].
+        """The step that resolves an impact of an effective mass [kg, kg m²] at an approach speed [m/s, rad/s]; [s].
 
         Parameters
         ----------

@@ -8,7 +8,7 @@ A constraint enters the balance ``M a + f + Bᵀ λ = 0`` in one of two ways::
 
 Laws without a `contact` act at all times. The others open and close: the active-set manager watches a gap g, closes the
 contact as g falls through zero, stores what the law holds from that instant (a place, an approach speed), and opens it
-by its rule. Rows close with an impact, ``γ⁺ = −e γ⁻``; a force law takes time for its blows.
+by its rule. Rows close with an impact, ``γ⁺ = −e γ⁻``; a force law takes time for its impacts.
 
 A constraint of one's own is a frozen dataclass with a `name`, derived from `mbd.constraints.Constraint`; it gives
 `kind`, `mentions` and `act`, which returns a `Law`::

@@ -43,7 +43,7 @@ class Penalty(Constraint):
     stiffness : k [N/mⁿ, or N m/radⁿ]
     damping : c [N s/m, or N m s/rad]
     exponent : n ≥ 1, fixed when the model is built (3/2 for Hertz)
-    restitution : e of a blow without other forces, 0.05 to 1, instead of `damping`
+    restitution : e of an impact without other forces, 0.05 to 1, instead of `damping`
     law : how e becomes a loss: 'exact' (default), 'hunt-crossley', 'lankarani-nikravesh', 'flores', 'gonthier', or
         'kelvin-voigt', a damper for the `effective_mass` (n = 1)
     release : of Kelvin–Voigt. 'gap': it acts until g > 0 again and may pull just before; 'pull': until the force would
@@ -176,7 +176,7 @@ class Penalty(Constraint):
     def elastic_energy(self, gap: Scalar, scope: Scope) -> Scalar | None:
         """∫ k δⁿ dδ [J] from touch to the depth δ = −g: what the contact can give back; None where its law is another.
 
-        The energy ledger books it apart from what is lost, so that a blow of few steps is booked rightly too.
+        The energy ledger books it apart from what is lost, so that an impact of few steps is booked rightly too.
         """
         own = type(self)
         if own.force is not Penalty.force or own._power is not Penalty._power:

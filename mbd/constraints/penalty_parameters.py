@@ -23,18 +23,18 @@ from mbd.errors import ModelError
 __all__ = ["PenaltyParameters", "largest_dt", "penalty_parameters"]
 
 STEPS_OF_APPROACH = 5.0
-"""Steps until the deepest point that resolve a blow: its restitution and depth are right to about a hundredth."""
+"""Steps until the deepest point that resolve an impact: its restitution and depth are right to about a hundredth."""
 
 
 @dataclass(frozen=True)
 class PenaltyParameters:
-    """A penalty contact of a wanted blow.
+    """A penalty contact of a wanted impact.
 
     stiffness : k [N/mⁿ, or N m/radⁿ]
     damping : c of Kelvin–Voigt [N s/m, or N m s/rad]; 0 for the χ laws
     chi : χ of the other laws; 0 for Kelvin–Voigt
     restitution : what the law gives, which a published χ only comes near
-    duration : of the blow [s]
+    duration : of the impact [s]
     largest_dt : a fifth of the time until the deepest point, which is a tenth of `duration` without loss [s]
     """
 
@@ -55,9 +55,9 @@ def penalty_parameters(
     law: str | None = None,
     release: str = "gap",
 ) -> PenaltyParameters:
-    """Stiffness, loss, duration and largest safe dt of the blow that goes so deep and leaves with so much speed.
+    """Stiffness, loss, duration and largest safe dt of the impact that goes so deep and leaves with so much speed.
 
-    Other forces than that of the contact are neglected, as they are in a short blow. χ laws, with `chi_for(e, law)`:
+    Other forces than that of the contact are neglected, as they are in a short impact. χ laws, with `chi_for(e, law)`:
 
         k = (n+1) m δ̇₀² Φ/δ_maxⁿ⁺¹,   Φ = (χ − ln(1+χ))/χ²
         T = (m δ̇₀/k) ((n+1) m δ̇₀²/k)^(−n/(n+1)) ∫_{−e}¹ P^(−n/(n+1)) dw/(1+χ w),   P = ∫_w¹ s ds/(1+χ s)
@@ -73,9 +73,9 @@ def penalty_parameters(
     Parameters
     ----------
     restitution : e, 0.05 to 1
-    penetration : δ_max, how deep the blow may go [m or rad]
+    penetration : δ_max, how deep the impact may go [m or rad]
     effective_mass : mass that the contact feels, ``1/(J M⁻¹ Jᵀ)`` with J = ∂g/∂q [kg, or kg m²]
-    approach_speed : δ̇₀ of the fastest blow [m/s or rad/s]
+    approach_speed : δ̇₀ of the fastest impact [m/s or rad/s]
     exponent : n
     law, release : as for `Penalty`
 
@@ -105,7 +105,7 @@ def penalty_parameters(
 
 
 def largest_dt(stiffness: float, exponent: float, damping: float, chi: float, mass: float, speed: float) -> float:
-    """A fifth of the time until the deepest point of a blow of an effective mass that arrives at a speed [s].
+    """A fifth of the time until the deepest point of an impact of an effective mass that arrives at a speed [s].
 
     Of Kelvin–Voigt with n = 1 and of χ laws as `penalty_parameters` gives it; with other n damping is left out.
     """

@@ -1,8 +1,8 @@
 """What a force law of contact makes of the approach speed: its loss for a restitution, and back.
 
-A blow without other forces, of the effective mass m at the approach speed δ̇₀; w = δ̇/δ̇₀ falls from 1 to −e.
+An impact without other forces, of the effective mass m at the approach speed δ̇₀; w = δ̇/δ̇₀ falls from 1 to −e.
 
-χ laws, ``F = k δⁿ (1 + χ w)``: from ``m δ̈ = −F`` follows ``k δⁿ⁺¹/(n+1) = m δ̇₀² ∫_w¹ s/(1 + χ s) ds``. The blow ends
+χ laws, ``F = k δⁿ (1 + χ w)``: from ``m δ̈ = −F`` follows ``k δⁿ⁺¹/(n+1) = m δ̇₀² ∫_w¹ s/(1 + χ s) ds``. The impact ends
 where the integral from −e to 1 is zero, ``(1 + e) χ = ln((1 + χ)/(1 − e χ))``, whatever k, m and n are.
 
 Kelvin–Voigt, ``F = k δ + c δ̇`` with the damping ratio ``ζ = c/(2 √(k m))``, ends at δ = 0 ('gap') or F = 0 ('pull').

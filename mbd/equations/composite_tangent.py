@@ -30,9 +30,9 @@ from mbd.bodies.algebra import difference
 from mbd.bodies.mass import MassProperties
 from mbd.equations.changes import partials
 from mbd.equations.inputs import Inputs
+from mbd.equations.kinematic_proxies import Wrench
 from mbd.equations.kinematics import Moving
 from mbd.equations.placement import Placement
-from mbd.equations.views import Pull
 from mbd.scope import Rotation, Triple
 from mbd.tape.derivatives import jvp, jvps
 from mbd.tape.node import Node, Scalar, Tape
@@ -197,7 +197,7 @@ class Branches:
         own.moved = _plus(own.moved, moved)
         own.moment = own.moment + (other.moment + (_dot(other.first, rise) + _dot(way, moved)))
 
-    def _loads(self, pulls: Sequence[Pull]) -> dict[Moving, _Load]:
+    def _loads(self, pulls: Sequence[Wrench]) -> dict[Moving, _Load]:
         """Σ F and V of every branch under all its forces, those of inertia among them."""
         loads = {body: _Load() for body in self._bodies}
         for pull in pulls:
@@ -261,7 +261,7 @@ class Branches:
         return _plus(led, _plus(_times(2.0 * parent.angular_velocity[2], _quarter(speed)), rate))
 
     # entries --------------------------------------------------------------------------------------------------------
-    def tangent(self, pulls: Sequence[Pull]) -> list[list[Node]]:
+    def tangent(self, pulls: Sequence[Wrench]) -> list[list[Node]]:
         """The columns of S of bodies under forces that keep their direction in ground axes (n_v × n_v).
 
         pulls : these forces, and those of inertia
@@ -304,7 +304,7 @@ class Branches:
             column[row.number] = lift(entry)
 
     # forces that change ---------------------------------------------------------------------------------------------
-    def changes(self, pulls: Sequence[Pull], others: Sequence[Node]) -> list[list[Node]]:
+    def changes(self, pulls: Sequence[Wrench], others: Sequence[Node]) -> list[list[Node]]:
         """What changes of forces on bodies, in ground axes, add to the columns of S, and those of `others`.
 
         One list a direction, of coordinates and of states: n_v entries, then one for each of the others.
@@ -317,7 +317,7 @@ class Branches:
             [*self._generalized(pulls, found[: len(parts)]), *found[len(parts) :]] for found in jvps(nodes, directions)
         ]
 
-    def _generalized(self, pulls: Sequence[Pull], parts: Sequence[Node]) -> list[Node]:
+    def _generalized(self, pulls: Sequence[Wrench], parts: Sequence[Node]) -> list[Node]:
         """Forces (x, y) and torques on bodies, in the places of `pulls`, as generalized forces (n_v)."""
         sums: dict[Moving, tuple[Flat, Scalar]] = {body: (NOWHERE, 0.0) for body in self._bodies}
         for k, pull in enumerate(pulls):

@@ -9,8 +9,8 @@ from typing import NoReturn
 from mbd.bodies.base import Frame
 from mbd.equations.dynamics import Work
 from mbd.equations.equations import Coordinate
+from mbd.equations.kinematic_proxies import View
 from mbd.equations.parameter_scope import ParameterScope
-from mbd.equations.views import View
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.joints.base import Joint
 from mbd.tape.derivatives import jvp, vjp

@@ -10,6 +10,7 @@ from mbd.bodies.algebra import dot
 from mbd.bodies.domains import ParameterCheck
 from mbd.equations.changes import partials, rates
 from mbd.equations.contacts import anchors_held, laws
+from mbd.equations.derivation_context import DerivationContext
 from mbd.equations.derivation_scope import DerivationScope
 from mbd.equations.dynamics import Dynamics, Work
 from mbd.equations.effects import Cause, causes, effect_of, weight_of
@@ -20,7 +21,6 @@ from mbd.equations.outputs import Outputs
 from mbd.equations.results import offer_results
 from mbd.equations.row_sizes import row_sizes
 from mbd.equations.sizes import require_room
-from mbd.equations.surroundings import Surroundings
 from mbd.errors import ModelError
 from mbd.tape.derivatives import live
 from mbd.tape.functions import cos
@@ -66,7 +66,7 @@ def _derived(model: Description, plan: Plan, carried: Sequence[tuple[str, int]] 
     Angles of cut joints that forces, rows, contacts, events or controllers depend on, and that only a rotation shows,
     are `carried` as coordinates of their own in a second derivation.
     """
-    scope = Surroundings(model.ground, plan.edges, plan.cut, model.gravity, model.tunable, plan.planar, carried)
+    scope = DerivationContext(model.ground, plan.edges, plan.cut, model.gravity, model.tunable, plan.planar, carried)
     scope.offer_frames(model.frames.values())
     if plan.planar and plan.cut:
         scope.count_turns(anchors_held(scope, model.contacts))
@@ -114,7 +114,7 @@ def _derived(model: Description, plan: Plan, carried: Sequence[tuple[str, int]] 
     return equations
 
 
-def _wrapped(scope: Surroundings, equations: Equations, model: Description) -> list[tuple[str, int]]:
+def _wrapped(scope: DerivationContext, equations: Equations, model: Description) -> list[tuple[str, int]]:
     """(joint, number) of the angles of cut joints that jump by a turn, and on which the motion depends.
 
     So does a controller that reads one. A `Bilateral` on the joint alone compares modulo a turn and needs no more.
@@ -142,7 +142,7 @@ def _wrapped(scope: Surroundings, equations: Equations, model: Description) -> l
     return sorted(found)
 
 
-def _facings(scope: Surroundings, constraints: Laws) -> tuple[Facing, ...]:
+def _facings(scope: DerivationContext, constraints: Laws) -> tuple[Facing, ...]:
     """Of cut joints with rows on directions that are not angles themselves."""
     found = []
     for joint in scope.cuts:
@@ -163,7 +163,7 @@ def _facings(scope: Surroundings, constraints: Laws) -> tuple[Facing, ...]:
     return tuple(found)
 
 
-def _closed(scope: Surroundings, constraints: Laws) -> Work:
+def _closed(scope: DerivationContext, constraints: Laws) -> Work:
     """The work of every row, and of every penalty contact behind its switch."""
     work = Work()
     for k, (row, view) in enumerate(zip(constraints.rows, constraints.viewed, strict=True)):
@@ -193,7 +193,7 @@ def state_balance(scope: DerivationScope, found: Sequence[Cause]) -> list[Node]:
 class TreeGeometry:
     """`mbd.equations.equations.Geometry` of a tree of bodies; `planar` if so, with coordinates that add."""
 
-    scope: Surroundings
+    scope: DerivationContext
     dynamics: Dynamics
     work: Work
     rests: Sequence[Node]

@@ -8,8 +8,8 @@ from typing import Protocol
 from mbd.equations.dynamics import Work
 from mbd.equations.equations import Coordinate
 from mbd.equations.inputs import Inputs
+from mbd.equations.kinematic_proxies import View
 from mbd.equations.parameters import ParameterTable
-from mbd.equations.views import View
 from mbd.joints.base import Joint
 from mbd.scope import Scope
 from mbd.tape.node import Node, Scalar, Tape
@@ -31,7 +31,7 @@ class Resolving(Protocol):
 
 
 class DerivationScope(Scope, Protocol):
-    """A `Scope` in which equations are derived; see `Surroundings` for what its members mean."""
+    """A `Scope` in which equations are derived; see `DerivationContext` for what its members mean."""
 
     tape: Tape
     inputs: Inputs

@@ -16,9 +16,9 @@ from mbd.bodies.mass import MassProperties
 from mbd.equations.composite_mass import composite_mass_matrix
 from mbd.equations.composite_tangent import Branches, turns_by_numbers
 from mbd.equations.inputs import Inputs
+from mbd.equations.kinematic_proxies import KinematicProxies, Wrench
 from mbd.equations.kinematics import Moving, Twist, twists
 from mbd.equations.placement import Placement
-from mbd.equations.views import Pull, Views
 from mbd.scope import Triple
 from mbd.tape.derivatives import vjp
 from mbd.tape.node import Node, Scalar
@@ -69,7 +69,7 @@ class Dynamics:
         bodies: Sequence[Moving],
         masses: Mapping[str, MassProperties],
         placement: Placement,
-        views: Views,
+        views: KinematicProxies,
         inputs: Inputs,
     ) -> None:
         self._bodies, self._masses, self._inputs = bodies, masses, inputs
@@ -139,15 +139,15 @@ class Dynamics:
         tx, ty, tz, fx, fy, fz = self._sweep([*self._inertia, *pulls_on], twists(self._bodies, extra), increments)
         return (fx, fy, fz), (tx, ty, tz)
 
-    def _inertia_of(self, body: Moving) -> list[Pull]:
+    def _inertia_of(self, body: Moving) -> list[Wrench]:
         """Force m (a_C − g) at the center, torque I α + ω × I ω."""
         mass = self._masses[body.body.name]
         force = scaled(mass.mass, body.acceleration_at(mass.center))
         momentum = rotate(mass.inertia, body.angular_velocity)
         torque = total(rotate(mass.inertia, body.angular_acceleration), cross(body.angular_velocity, momentum))
-        return [Pull(body, mass.center, force, torque)]
+        return [Wrench(body, mass.center, force, torque)]
 
-    def _read(self, work: Work, attributed: bool = False) -> tuple[list[Pull], list[Node]]:
+    def _read(self, work: Work, attributed: bool = False) -> tuple[list[Wrench], list[Node]]:
         """Forces on bodies, and forces on coordinates."""
         x, v, pulls = self._inputs.x, self._inputs.v, self._views.pulls
         still, on_x = pulls(work.values, work.multipliers, x, motion=False, attributed=attributed)
@@ -155,11 +155,11 @@ class Dynamics:
         on_x = self._inputs.along_velocities(on_x)
         return still + moving, [a + b for a, b in zip(on_x, on_v, strict=True)]
 
-    def _gather(self, forces: Sequence[Pull], direct: Sequence[Node]) -> list[Node]:
+    def _gather(self, forces: Sequence[Wrench], direct: Sequence[Node]) -> list[Node]:
         swept = self._sweep(forces, self._twists, self._inputs.v)
         return [a + b for a, b in zip(swept, direct, strict=True)]
 
-    def _sweep(self, forces: Sequence[Pull], motion: Mapping[str, Twist], inputs: Sequence[Node]) -> list[Node]:
+    def _sweep(self, forces: Sequence[Wrench], motion: Mapping[str, Twist], inputs: Sequence[Node]) -> list[Node]:
         """The reverse sweep."""
         velocities: list[Scalar] = []
         adjoints: list[Scalar] = []

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
+from mbd.equations.derivation_context import DerivationContext
 from mbd.equations.derivation_scope import DerivationScope, Generalized
 from mbd.equations.dynamics import Dynamics, Work
 from mbd.equations.equations import Effect
-from mbd.equations.surroundings import Surroundings
 from mbd.forces.base import Action, Force
 from mbd.joints.base import Joint
 from mbd.tape.derivatives import jvp
@@ -110,7 +110,7 @@ def _dissipate(cause: Cause, D: Node, scope: DerivationScope) -> None:
     cause.power = loss if cause.power is None else cause.power + loss
 
 
-def weight_of(scope: Surroundings, dynamics: Dynamics) -> Cause:
+def weight_of(scope: DerivationContext, dynamics: Dynamics) -> Cause:
     """Gravity, which enters the balance as an acceleration of the ground, as an effect of its own."""
     cause = Cause("gravity", "gravity")
     x, y, z = scope.gravity

@@ -6,7 +6,7 @@ With N = n_v + n_z rates, m active rows in ascending number, R rows and nC conta
 `newton`           K ((N+m) × (N+m), row-major) | r (N) | h (m) | ḣ (m) | ∂ḣ/∂x (m × n_v), both stabilized only
 `residual`         r (N) | h (m) | ḣ (m, stabilized only)
 `correction`       r, h and more as behind K in `newton` | sound | weakest | K⁻¹b (N+m) | change of U (n_v, stabilized
-                   only) | S_ii (n_v) and B̃ (m × n_v) where rows may lose rank | factors of K
+                   only) | S_ii (n_v) and B̃ (m × n_v) where the constraint Jacobian may lose rank | factors of K
 `solution`         K⁻¹b from the factors in the output of `correction`, b in the place of the solution there
 `accelerations`    M (N × N) | f (N) | ∂r/∂λ (N × R) | B (R × N) | h (R) | ḣ (R) | γ (R) | captured | T | limits
 `guards`           g (nC) | ġ (nC) | penalty force (nC) | only_while (nC) | event values | event rates |
@@ -46,17 +46,17 @@ def newton(
     penalties: Sequence[int],
     stabilized: bool,
     sliding: Sequence[int] = (),
-    borne: Sequence[int] = (),
+    given_rows: Sequence[int] = (),
 ) -> list[Node]:
     """Tangent and residual of one Newton iteration of the Newmark family.
 
-    The rows `borne` take part with their multipliers alone, which are given.
+    The rows `given_rows` take part with their multipliers alone, which are given.
 
     ``K = [S  ∂r/∂λ; B̃  0]`` with ``S = M + c_C C_t + c_K K_t`` (`mbd.equations.tangents`) and
     ``B̃ = B`` (index 3) or ``B + (c_K/c_C) ∂ḣ/∂x`` (stabilized, and rows on velocities in both); the columns of
     first-order states are zero in B̃.
     """
-    matrix, tail = _system(equations, sorted(rows), penalties, stabilized, sliding, borne)
+    matrix, tail = _system(equations, sorted(rows), penalties, stabilized, sliding, given_rows)
     return [entry for line in matrix for entry in line] + tail
 
 
@@ -127,11 +127,11 @@ def _system(
     penalties: Sequence[int],
     stabilized: bool,
     sliding: Sequence[int],
-    borne: Sequence[int] = (),
+    given_rows: Sequence[int] = (),
 ) -> tuple[list[list[Node]], list[Node]]:
     """K, line by line, and r | h | ḣ | ∂ḣ/∂x, the last two stabilized only."""
     inputs = Inputs.of(equations)
-    r = balance_with(equations, sorted({*rows, *borne}), penalties, sliding)
+    r = balance_with(equations, sorted({*rows, *given_rows}), penalties, sliding)
     B = constraint_jacobian(equations, rows)
     bottom, turning = [inputs.row_by_increments(line) for line in B], list[Node]()
     fast = [place for place, k in enumerate(rows) if stabilized or equations.rows[k].is_velocity]
@@ -143,7 +143,7 @@ def _system(
         turning = [entry for change in changes for entry in change]
     right = _row_forces(equations, r, rows, B)
     levels = _levels(equations, rows, stabilized)
-    forces = _forces(equations, sorted({*rows, *borne}), [(c, equations.tape.one) for c in penalties], sliding)
+    forces = _forces(equations, sorted({*rows, *given_rows}), [(c, equations.tape.one) for c in penalties], sliding)
     others = [*(entry for line in (*bottom, *right) for entry in line), *levels, *turning]
     S = tangent(equations, r, forces, others)
     zero = equations.tape.zero
@@ -159,11 +159,11 @@ def residual(
     penalties: Sequence[int],
     stabilized: bool,
     sliding: Sequence[int] = (),
-    borne: Sequence[int] = (),
+    given_rows: Sequence[int] = (),
 ) -> list[Node]:
-    """r | h | ḣ of one contact mode; of the rows `borne` only the given multipliers."""
+    """r | h | ḣ of one contact mode; of the rows `given_rows` only the given multipliers."""
     rows = sorted(rows)
-    r = balance_with(equations, sorted({*rows, *borne}), penalties, sliding)
+    r = balance_with(equations, sorted({*rows, *given_rows}), penalties, sliding)
     return r + _levels(equations, rows, stabilized)
 
 

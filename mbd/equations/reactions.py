@@ -12,10 +12,10 @@ from collections.abc import Sequence
 from typing import NamedTuple, TypeAlias
 
 from mbd.bodies.algebra import cross, difference, dot, rotate, scaled, total, transpose
+from mbd.equations.derivation_context import DerivationContext, placeholders
 from mbd.equations.dynamics import Dynamics, Work
 from mbd.equations.equations import Row
 from mbd.equations.kinematics import Moving
-from mbd.equations.surroundings import Surroundings, placeholders
 from mbd.joints.base import Joint
 from mbd.joints.reversed import Reversed
 from mbd.scope import Triple
@@ -36,7 +36,7 @@ class Wrench(NamedTuple):
     torque: Triple
 
 
-def reaction(joint: Joint, scope: Surroundings, dynamics: Dynamics, work: Work, rows: Sequence[Row]) -> Wrench:
+def reaction(joint: Joint, scope: DerivationContext, dynamics: Dynamics, work: Work, rows: Sequence[Row]) -> Wrench:
     """The reaction of a joint; `work` holds every force, with all rows and penalties."""
     if any(cut.name == joint.name for cut in scope.cuts):
         return _of_cut_joint(joint, scope, rows)
@@ -57,7 +57,7 @@ def _columns(body: Moving) -> list[Direction]:
     return [(column.angular, rotate(back, column.linear)) for column in body.columns]
 
 
-def _directions(joint: Joint, scope: Surroundings) -> list[Direction]:
+def _directions(joint: Joint, scope: DerivationContext) -> list[Direction]:
     """The free directions of a joint as the user described it, in ground axes."""
     R = scope.frame(joint.child).rotation
     columns = joint.subspace(scope.joint(joint.name).coordinates, scope)
@@ -104,7 +104,7 @@ def _solved(matrix: list[list[Scalar]], right: list[Scalar]) -> list[Scalar]:
     return b
 
 
-def _of_cut_joint(joint: Joint, scope: Surroundings, rows: Sequence[Row]) -> Wrench:
+def _of_cut_joint(joint: Joint, scope: DerivationContext, rows: Sequence[Row]) -> Wrench:
     """From the multipliers of the joint's own rows."""
     tape = scope.tape
     R_free, p_free = placeholders(tape)

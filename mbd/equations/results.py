@@ -6,11 +6,11 @@ from collections.abc import Collection, Iterable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
+from mbd.equations.derivation_context import DerivationContext
 from mbd.equations.dynamics import Dynamics, Work
 from mbd.equations.equations import Contact, Effect, Equations, Row
 from mbd.equations.outputs import Outputs
 from mbd.equations.reactions import Wrench, reaction
-from mbd.equations.surroundings import Surroundings
 from mbd.forces.base import Force
 from mbd.forces.motor import Motor
 from mbd.joints.base import Joint
@@ -25,7 +25,7 @@ __all__ = ["offer_contacts", "offer_effects", "offer_results", "offer_rows"]
 
 def offer_results(
     outputs: Outputs,
-    scope: Surroundings,
+    scope: DerivationContext,
     dynamics: Dynamics,
     work: Work,
     equations: Equations,
@@ -47,7 +47,12 @@ def offer_results(
 
 
 def _offer_joints(
-    outputs: Outputs, scope: Surroundings, dynamics: Dynamics, work: Work, rows: Sequence[Row], hidden: Collection[str]
+    outputs: Outputs,
+    scope: DerivationContext,
+    dynamics: Dynamics,
+    work: Work,
+    rows: Sequence[Row],
+    hidden: Collection[str],
 ) -> None:
     """Accelerations and reactions of the joints; `hidden` are those that no user made."""
     known: dict[str, Wrench] = {}
@@ -68,7 +73,7 @@ def _offer_joints(
             outputs.triple(f"{joint.name}.reaction_torque", partial(part, joint, "torque"))
 
 
-def _acceleration(scope: Surroundings, joint: str, place: int) -> Scalar:
+def _acceleration(scope: DerivationContext, joint: str, place: int) -> Scalar:
     return scope.change(scope.joint(joint).rates[place])
 
 
@@ -124,7 +129,7 @@ def offer_effects(outputs: Outputs, tape: Tape, effects: Iterable[Effect]) -> No
             outputs.value(f"{effect.name}.energy", effect.potential)
 
 
-def _offer_motors(outputs: Outputs, scope: Surroundings, forces: Iterable[Force]) -> None:
+def _offer_motors(outputs: Outputs, scope: DerivationContext, forces: Iterable[Force]) -> None:
     """Torque (or force) of motors."""
     for force in forces:
         if isinstance(force, Motor):

@@ -14,15 +14,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from mbd.bodies.algebra import norm
+from mbd.equations.kinematic_proxies import KinematicProxies, View
 from mbd.equations.placement import Placement, Point
-from mbd.equations.views import View, Views
 from mbd.tape.derivatives import gradient
 from mbd.tape.node import Node, Scalar
 
 __all__ = ["row_sizes"]
 
 
-def row_sizes(placement: Placement, views: Views, viewed: Node, inputs: Sequence[Node], motion: bool) -> list[Node]:
+def row_sizes(
+    placement: Placement, views: KinematicProxies, viewed: Node, inputs: Sequence[Node], motion: bool
+) -> list[Node]:
     """Σ|parts| of the derivative of a row by each coordinate.
 
     Parameters

@@ -48,7 +48,7 @@ def double_pendulum(effects: bool, cut: str = "auto") -> tuple[mbd.Model, mbd.St
 
 
 def judge_absent(integrator: Any) -> Outcome:
-    """The motion is the bare model's, bit for bit, and so are operations and the list of effects; the time is told."""
+    """The motion is the bare model's, to the bit, as are operations and the list of effects; the time is reported."""
     difference = quantity(J17, "max difference")
     worst, differing, events = 0.0, 0, 0
     for cut in "auto", "all":

@@ -22,7 +22,7 @@ from mbd.simulation import simulate
 __all__ = ["CASES"]
 
 BEYOND = 1.5
-"""Times the last published impact, which is past the instant at which the blows pile up."""
+"""Times the last published impact, which is past the instant at which the impacts pile up."""
 
 CORNERS = ("front-top", "front-bottom", "rear-top", "rear-bottom")
 """As the reference counts them."""
@@ -95,10 +95,10 @@ def settled_figures(run: Any) -> list[Figure]:
     struck = {event.name for event in run.events}
     gains = np.diff(run.energy.kinetic)[[event.row - 1 for event in run.events if event.impulse.any()]]
     return [
-        Figure("runs that stop at blows without end [-]", float(not run.success), 0.0),
+        Figure("runs that stop at impacts without end [-]", float(not run.success), 0.0),
         Figure("corners that are not closed after them [-]", sum(not closed[name] for name in struck), 0.0),
         Figure("gap of these corners [m]", size([run[f"{name}.gap"][-1] for name in struck]), 1e-10),
-        Figure("energy gained at a blow, relative [-]", float(np.max(gains)) / float(run.energy.kinetic[0]), 1e-12),
+        Figure("energy gained at an impact, relative [-]", float(np.max(gains)) / float(run.energy.kinetic[0]), 1e-12),
     ]
 
 

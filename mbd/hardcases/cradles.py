@@ -49,7 +49,7 @@ def row(masses: tuple[float, ...], e: float, turned: bool = False) -> Model:
     return model
 
 
-def blow(model: Model, speeds: Sequence[float], scheme: Any, impact: str, named: bool = True) -> Any:
+def collide(model: Model, speeds: Sequence[float], scheme: Any, impact: str, named: bool = True) -> Any:
     """Balls that approach each other all meet after 1 s; equally fast neighbours touch, `named` as closed or not."""
     places = [0.0]
     for a, b in pairwise(speeds):
@@ -70,13 +70,13 @@ def law_figures(id: str, law: str, scheme: Any) -> tuple[list[Figure], Any]:
     given = numbers(id)
     masses, speeds, e = tuple(map(float, given["masses"])), [float(v) for v in given["v"]], float(given["e"])
     model = row(masses, e)
-    run, other = (blow(row(masses, e, turned), speeds, scheme, law) for turned in (False, True))
+    run, other = (collide(row(masses, e, turned), speeds, scheme, law) for turned in (False, True))
     reference = published(id, LAWS[law])
     final = run.record.v[-1]
     momentum = run.record.v @ np.array(masses)
     kinetic = run.energy.kinetic
     scale = published(id, "momentum")
-    unnamed = blow(model, speeds, scheme, law, named=False).record.v[-1]
+    unnamed = collide(model, speeds, scheme, law, named=False).record.v[-1]
     figures = [
         Figure("error of the velocities after [m/s]", size(final - reference), accuracy(id, LAWS[law])),
         Figure(

@@ -183,7 +183,9 @@ def jamming(id: str, scheme: Any) -> Outcome:
     for much in (mu, 1.001 * critical):
         run = slide(id, much, -1.0, scheme)
         told = not run.success and "Painlevé: no consistent contact force at 'tip'" in run.message
-        figures.append(Figure(f"μ = {much:.4g}, jammed at the start and not told [-]", float(not told), 0.0))
+        figures.append(
+            Figure(f"μ = {much:.4g}, a Painlevé contact at the start and not told [-]", float(not told), 0.0)
+        )
         figures.append(Figure(f"μ = {much:.4g}, rows with a force all the same [-]", float(len(run.time)), 0.0))
     shares = 1.0 - np.logspace(0.0, -3.0, 13)
     forces = [float(slide(id, share * critical, -1.0, scheme, until=1e-3)["tip.force"][0]) for share in shares]

@@ -64,7 +64,7 @@ class Verdict:
     def word(self) -> str:
         """'holds', or 'does not hold' with the schemes, where not all are meant; `reasons` tells why.
 
-        A scheme that holds although it is listed as one that does not is told too.
+        A scheme that holds although it is listed as one that does not is reported too.
         """
         failing = [part.scheme for part in self.parts if not part.passed]
         mended = [part.scheme for part in self.parts if part.passed and part.reason]

@@ -24,7 +24,7 @@ STIFFER = (1.0, 10.0)
 """Stiffness over that of the definition."""
 
 LONGER = (0.15, 0.3, 1.1, 3.0, 10.0, 100.0)
-"""Steps over the duration of the blow that do not resolve it."""
+"""Steps over the duration of the impact that do not resolve it."""
 
 
 @cache
@@ -37,8 +37,8 @@ def mat(m: float, g: float, k: float, c: float) -> Model:
     return model
 
 
-def blow(m: float, g: float, k: float, c: float, drop: float) -> dict[str, float]:
-    """The blow in closed form: m ẍ = m g − k x − c ẋ from x = 0 at the speed √(2 g h), until x = 0 again."""
+def exact_impact(m: float, g: float, k: float, c: float, drop: float) -> dict[str, float]:
+    """The impact in closed form: m ẍ = m g − k x − c ẋ from x = 0 at the speed √(2 g h), until x = 0 again."""
     from scipy.optimize import brentq
 
     w, d, v = math.sqrt(k / m), 0.5 * c / m, math.sqrt(2.0 * g * drop)
@@ -63,12 +63,12 @@ def blow(m: float, g: float, k: float, c: float, drop: float) -> dict[str, float
 
 
 def dropped(given: dict[str, float], scheme: Any, dt: float) -> Any:
-    """The end of the fall, from just above the mat and as fast as it is there, and the blow."""
+    """The end of the fall, from just above the mat and as fast as it is there, and the impact."""
     near = min(given["drop"], (2.3 * dt) * math.sqrt(2.0 * given["g"] * given["drop"]))
     speed = math.sqrt(2.0 * given["g"] * (given["drop"] - near))
     model = mat(given["m"], given["g"], given["k"], given["c"])
     start = assemble(model, position={"fall.displacement": near}, velocity={"fall.displacement": -speed})
-    return simulate(model, start, scheme, dt=dt, until=6.0 * dt + 1.5 * blow(**given)["contact duration"],
+    return simulate(model, start, scheme, dt=dt, until=6.0 * dt + 1.5 * exact_impact(**given)["contact duration"],
                     on_failure="return")  # fmt: skip
 
 
@@ -77,7 +77,7 @@ LIMITS = {"contact duration": 2e-4, "rebound speed": 1e-4, "max penetration": 1e
 
 
 def blow_errors(given: dict[str, float], wanted: dict[str, float], run: Any) -> dict[str, float]:
-    """Errors of the first blow of one run, relative."""
+    """Errors of the first impact of one run, relative."""
     closed, opened = [event for event in run.events if event.name == "mat"][:2]
     fine = run.at(np.linspace(closed.time, opened.time, 4001))["fall.displacement"]
     found = {
@@ -92,8 +92,8 @@ def blow_errors(given: dict[str, float], wanted: dict[str, float], run: Any) -> 
 
 
 def resolved(given: dict[str, float], scheme: Any) -> tuple[list[Figure], list[Curve]]:
-    """Steps that resolve the blow: depth, duration, rebound and work to second order; nothing gained, no note."""
-    wanted = blow(**given)
+    """Steps that resolve the impact: depth, duration, rebound and work to second order; nothing gained, no note."""
+    wanted = exact_impact(**given)
     steps = halved(wanted["contact duration"] / 40.0)
     runs = [dropped(given, scheme, float(dt)) for dt in steps]
     errors = [blow_errors(given, wanted, run) for run in runs]
@@ -110,7 +110,7 @@ def resolved(given: dict[str, float], scheme: Any) -> tuple[list[Figure], list[C
     notes = [note for run in runs for note in _unresolved(run)]
     figures += [
         Figure(f"{told}: notes of a step that is too long [-]", len(notes), 0.0),
-        Figure(f"{told}: energy gained in the blow, relative [-]", float(np.max(gains)), 1e-9),
+        Figure(f"{told}: energy gained in the impact, relative [-]", float(np.max(gains)), 1e-9),
     ]
     run, late = runs[-1], [each["contact duration"] for each in errors]
     return figures, [
@@ -120,14 +120,14 @@ def resolved(given: dict[str, float], scheme: Any) -> tuple[list[Figure], list[C
 
 
 def _unresolved(run: Any) -> list[str]:
-    """Notes that dt does not resolve a blow, which took shorter steps then or was left so, or the error of the run."""
-    words = "not resolve", "has too few for its blows"
+    """Notes that dt does not resolve an impact, which took shorter steps or was left so, or the error of the run."""
+    words = "not resolve", "has too few for its impacts"
     return [note for note in (*run.stats["notes"], run.message) if any(word in note for word in words)]
 
 
 def too_long(given: dict[str, float], scheme: Any) -> list[Figure]:
-    """Steps longer than the blow: told, and without energy from nowhere, or refused."""
-    duration = blow(**given)["contact duration"]
+    """Steps longer than the impact: told, and without energy from nowhere, or refused."""
+    duration = exact_impact(**given)["contact duration"]
     silent, gains = 0, []
     for factor in LONGER:
         run = dropped(given, scheme, factor * duration)
@@ -136,7 +136,7 @@ def too_long(given: dict[str, float], scheme: Any) -> list[Figure]:
         gains.append((total[-1] - total[0]) / given_energy(given) if run.success else 0.0)
     told = f"k = {given['k']:g}"
     return [
-        Figure(f"{told}: steps of 0.15 to 100 blows that are not told [-]", silent, 0.0),
+        Figure(f"{told}: steps of 0.15 to 100 impacts that are not told [-]", silent, 0.0),
         Figure(f"{told}: energy gained in silence with such steps, relative [-]", float(np.max(gains)), 1e-9),
     ]
 
@@ -147,9 +147,9 @@ def given_energy(given: dict[str, float]) -> float:
 
 
 def stiff(id: str, scheme: Any) -> Outcome:
-    """A blow of microseconds is right where it is resolved, and told where it is not."""
+    """An impact of microseconds is right where it is resolved, and told where it is not."""
     given = {name: float(numbers(id)[name]) for name in ("m", "g", "k", "c", "drop")}
-    closed_form = blow(**given)
+    closed_form = exact_impact(**given)
     figures = [
         Figure(
             f"closed form against the reference, {name} [-]",
@@ -174,7 +174,8 @@ def stiff(id: str, scheme: Any) -> Outcome:
 CASES = (
     hard_case(
         "j6-stiff-penalty-1e9",
-        "A blow of microseconds is of second order where steps resolve it; where not, it is told and makes no energy.",
+        "An impact of microseconds is of second order where steps resolve it; where not, it is reported and makes no "
+        "energy.",
         stiff,
     ),
 )

@@ -161,8 +161,9 @@ def _largest(runs: Any) -> float:
 
 
 CASES = (
-    HardCase(J2, "The motion is unique and of order 2, the sum of forces exact; what is redundant is told once.",
+    HardCase(J2, "The motion is unique and of order 2, the sum of forces exact; what is redundant is reported once.",
              judge_parallel_cranks, EVERY),
-    HardCase(B4, "The mechanism moves with its one freedom, on its rows, with order 2; what is redundant is told once.",
+    HardCase(B4, "The mechanism moves with its one freedom, on its rows, with order 2; what is redundant is reported "
+             "once.",
              judge_bricard, EVERY),
 )  # fmt: skip

@@ -139,7 +139,7 @@ def _told(run: Any) -> bool:
 
 
 CASES = (
-    HardCase(J11, "The table rests; its legs share the weight with least norm, in any order, and that is told.",
+    HardCase(J11, "The table rests; its legs share the weight with least norm, in any order, and that is reported.",
              judge_table, EVERY),
     HardCase(J11B, "The block rests on two points and on three, with determinate forces and those of least norm.",
              judge_block, EVERY),

@@ -1,4 +1,4 @@
-"""Linkages that pass poses in which their rows lose rank and another branch of motions begins: j3 and j3b."""
+"""Linkages that pass singular configurations and another branch of motions begins: j3 and j3b."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ EPS = float(np.finfo(float).eps)
 
 @dataclass(frozen=True)
 class Distance:
-    """Steps until the rows lose rank, and what round-off makes of velocities there, over the speed."""
+    """Steps until the constraint Jacobian loses rank, and what round-off makes of velocities there, over the speed."""
 
     steps: float
     kick: float

@@ -223,7 +223,7 @@ class Joint(Parameterized, ABC):
         """'left knee.angle.rate', …"""
         return tuple(f"{self.name}.{label.name}" for label in self.velocity_labels)
 
-    def settle(self) -> None:
+    def validate(self) -> None:
         """Check the fields at the border; every joint calls this when it is made."""
         kind, put = type(self).__name__, object.__setattr__
         name_of(self.name, kind)

@@ -34,7 +34,7 @@ class Planar(Joint):
     loss: JointLoss = field(default=None, hash=False)
 
     def __post_init__(self) -> None:
-        self.settle()
+        self.validate()
 
     @property
     def labels(self) -> tuple[Label, ...]:

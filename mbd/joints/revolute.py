@@ -41,7 +41,7 @@ class Revolute(Joint):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "axis", unit_vector(self.axis, f"axis of '{self.name}'"))
-        self.settle()
+        self.validate()
 
     @property
     def labels(self) -> tuple[Label, ...]:

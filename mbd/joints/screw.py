@@ -53,7 +53,7 @@ class Screw(Joint):
         faults = PITCH.faults(f"Screw '{self.name}'", "pitch", self.pitch)
         if faults:
             raise ModelError(faults)
-        self.settle()
+        self.validate()
 
     @property
     def labels(self) -> tuple[Label, ...]:

@@ -44,7 +44,7 @@ class Translation(Joint):
         if not isinstance(axes, str) or not axes or len(set(axes)) < len(axes) or not set(axes) <= set("xyz"):
             raise ModelError(f"axes of '{self.name}' must be some of 'xyz', each once, such as 'xy'; got {axes!r}")
         object.__setattr__(self, "axes", "".join(sorted(axes)))
-        self.settle()
+        self.validate()
 
     @property
     def labels(self) -> tuple[Label, ...]:

@@ -47,7 +47,7 @@ class Universal(Joint):
             raise ModelError(f"Universal '{self.name}': its axes must be across each other, got {axis} and {second}")
         object.__setattr__(self, "axis", axis)
         object.__setattr__(self, "second_axis", second)
-        self.settle()
+        self.validate()
 
     @property
     def labels(self) -> tuple[Label, ...]:

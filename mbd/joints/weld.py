@@ -31,7 +31,7 @@ class Weld(Joint):
     loss = None
 
     def __post_init__(self) -> None:
-        self.settle()
+        self.validate()
 
     @property
     def labels(self) -> tuple[Label, ...]:

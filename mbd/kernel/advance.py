@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
+from mbd.kernel.accept_restart import accept_for_restart
 from mbd.kernel.candidate import accept_guards
 from mbd.kernel.codes import AT_POSE, CHATTER, DONE, EVENT, FULL, LAST, LEFT, NEW_MODE, NOT_CONVERGED, PAUSE, PULL
+from mbd.kernel.contact_modes import room_to_log
+from mbd.kernel.contact_step import relax_pace
 from mbd.kernel.crowding import crowds
 from mbd.kernel.events import handle_event, land
+from mbd.kernel.guard_substeps import parts_to_take
 from mbd.kernel.guards import is_quiet, judge, try_step, update_armed, update_sides
 from mbd.kernel.hooks import scheme_accept
-from mbd.kernel.interior import parts_to_take
 from mbd.kernel.locate import locate
-from mbd.kernel.nonsmooth import lands, lets_go
+from mbd.kernel.nonsmooth import closes_below_surface, must_release
 from mbd.kernel.observe import is_awaited, store_row
-from mbd.kernel.pace import relax_pace
 from mbd.kernel.records import Kernel
 from mbd.kernel.restart import consistent, largest_force
-from mbd.kernel.settle import room_to_log
 from mbd.kernel.singular.events import find_passed_events, log_passed_events, may_pass_events, refuses
 from mbd.kernel.singular.leave import leave_singularity
 from mbd.kernel.singular.step_pairs import ALONE, FIRST, SECOND
 from mbd.kernel.starting import find_mode, restart, still_dependent
-from mbd.kernel.takeover import take_over
-from mbd.kernel.trying import part_end, step_end, tried_step
+from mbd.kernel.step_retry import part_end, step_end, tried_step
 
 __all__ = ["advance"]
 
@@ -127,7 +127,7 @@ def conclude(
         K.event_kind = -1
         return AT_POSE
     if (h < 1e-3 * K.step and K.explicit == 0) or uneven:  # index-3 multipliers oscillate after a change of step
-        take_over(K, t1)
+        accept_for_restart(K, t1)
         K.restart_due = 2
     else:
         accept(K, h, t1, quiet)
@@ -212,7 +212,7 @@ def find_event(K: Kernel, h: float, t1: float) -> int:
         return status
     if K.event_kind < 0:
         return 0
-    if K.strategy == 1 and lands(K):  # the contact comes first
+    if K.strategy == 1 and closes_below_surface(K):  # the contact comes first
         return try_step(K, h, t1)
     return AT_POSE if refuses(K, K.event_after) else -1
 
@@ -231,9 +231,9 @@ def add_error(K: Kernel, h: float, fired: bool) -> None:
 
 def end_unlocated(K: Kernel, h: float, t1: float) -> int:
     """End of a non-smooth step; 0 if nothing happens there, −1 if that is dealt with, else a status for the caller."""
-    if lets_go(K, t1) > 0:
+    if must_release(K, t1) > 0:
         return CHATTER if K.n_repeats > K.max_switches else -1
-    if lands(K):
+    if closes_below_surface(K):
         return land(K, h, t1)
     K.n_repeats = 0
     return 0

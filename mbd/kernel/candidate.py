@@ -6,7 +6,7 @@ from typing import Any
 
 from mbd.kernel.records import Kernel
 
-__all__ = ["accept_guards", "adopt", "carry", "stay"]
+__all__ = ["accept_guards", "accept_candidate", "carry", "revert_candidate"]
 
 
 def carry(values: Any, kept: Any, place: int, count: int, out: bool) -> int:
@@ -19,7 +19,7 @@ def carry(values: Any, kept: Any, place: int, count: int, out: bool) -> int:
     return place + count
 
 
-def adopt(K: Kernel, t1: float) -> None:
+def accept_candidate(K: Kernel, t1: float) -> None:
     """The candidate becomes the accepted state ahead of a restart: what the scheme remembers stays behind."""
     exchange(K, False)
     K.time = t1
@@ -32,7 +32,7 @@ def accept_guards(K: Kernel) -> None:
         K.guards0[i] = K.guards1[i]
 
 
-def stay(K: Kernel) -> None:
+def revert_candidate(K: Kernel) -> None:
     """The candidate becomes the accepted state itself: an event at the very start of the step."""
     exchange(K, True)
     for i in range(K.n):

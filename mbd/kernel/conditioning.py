@@ -10,12 +10,12 @@ error e is what each correction by the balance leaves of the error before (Wilki
 from __future__ import annotations
 
 from mbd.kernel.codes import EPS, ILL_CONDITIONED
+from mbd.kernel.mass_ratios import find_imbalance, polish_with_rows
 from mbd.kernel.ordered import LOSS_AT_ONCE, solve_kkt
 from mbd.kernel.records import Kernel
 from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import stepping_rows
 from mbd.kernel.saddle import factor_saddle
-from mbd.kernel.uneven import find_imbalance, polish_with_rows
 
 __all__ = ["refine_accelerations", "is_ill_conditioned"]
 

@@ -15,7 +15,16 @@ factors keep their step between 0.8 and 1.25.
 
 from __future__ import annotations
 
-from mbd.kernel.codes import EPS, NOT_CONVERGED, NOT_FINITE, SINGULAR, STAGNATED, STIRRED, TOO_NEAR, TOO_SMALL
+from mbd.kernel.codes import (
+    EPS,
+    NOT_CONVERGED,
+    NOT_FINITE,
+    SINGULAR,
+    SINGULAR_ROWS_MOVE,
+    STAGNATED,
+    TOO_NEAR,
+    TOO_SMALL,
+)
 from mbd.kernel.guards import try_step
 from mbd.kernel.hooks import scheme_error
 from mbd.kernel.records import Kernel
@@ -96,7 +105,7 @@ def controlled_step(K: Kernel, h: float) -> int:
         if K.singular_size == 1 and K.n_active > 0:
             h = singular_step_size(K, wanted, 1.0)
             if is_too_noisy(K, h):
-                return STIRRED
+                return SINGULAR_ROWS_MOVE
         for i in range(K.n_v + K.n):
             K.error[i] = 0.0
         status = try_step(K, h, t + h)

@@ -1,10 +1,10 @@
-"""Whether located blows crowd, as in a pile, whose contacts close and open faster than they can be told apart.
+"""Whether located impacts crowd, as in a pile, whose contacts close and open faster than they can be told apart.
 
-A blow among contacts that are closed already makes them take part in its impact, and those that it opens strike again.
-The more contacts lie on each other, the more such blows follow until all rest, closer and closer; at last some contacts
-touch by round-off only, and rows seem independent that are not. Contacts that strike apart from each other, however
-many, take part in no other's blow. What is counted depends on the motion alone: a run decides at the same instant
-wherever it is cut.
+An impact among contacts that are closed already makes them take part in it, and those that it opens strike again.
+The more contacts lie on each other, the more such impacts follow until all rest, closer and closer; at last some
+contacts touch by round-off only, and rows seem independent that are not. Contacts that strike apart from each other,
+however many, take part in no other's impact. What is counted depends on the motion alone: a run decides at the same
+instant wherever it is cut.
 """
 
 from __future__ import annotations
@@ -14,20 +14,20 @@ from mbd.kernel.records import Kernel
 __all__ = ["count_blow", "crowd", "crowds"]
 
 MOST_CROWDED = 64.0
-"""Blows through several contacts, less one for each dt, from which on steps are non-smooth [-]."""
+"""Impacts through several contacts, less one for each dt, from which on steps are non-smooth [-]."""
 SEVERAL = 2
-"""Contacts closed already that take part in such a blow [-]."""
+"""Contacts closed already that take part in such an impact [-]."""
 PART = 1e-6
-"""Impulse over the largest of a blow that is more than round-off [-]."""
+"""Impulse over the largest of an impact that is more than round-off [-]."""
 
 
 def crowd(K: Kernel) -> float:
-    """Blows through several contacts, less one for each dt since."""
+    """Impacts through several contacts, less one for each dt since."""
     return float(max(K.crowding - (K.time - K.crowding_time) / K.dt, 0.0))
 
 
 def count_blow(K: Kernel) -> None:
-    """Count the blow of this instant, whose impulses are in K.impulse, if it goes through several closed contacts."""
+    """Count the impact of this instant, whose impulses are in K.impulse, if it goes through several closed contacts."""
     largest = 0.0
     for c in range(K.n_contacts):
         if K.kind[c] == 0:
@@ -42,7 +42,7 @@ def count_blow(K: Kernel) -> None:
 
 
 def crowds(K: Kernel) -> bool:
-    """Whether non-smooth steps follow from now on, as blows have crowded; told once."""
+    """Whether non-smooth steps follow from now on, as impacts have crowded; told once."""
     if K.auto == 0 or K.fallback > 0 or K.crowding <= MOST_CROWDED:
         return False
     K.fallback = 1

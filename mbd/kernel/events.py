@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+from mbd.kernel.accept_restart import accept_for_restart
 from mbd.kernel.candidate import carry
 from mbd.kernel.codes import CHATTER, CLOSE, CONFLICT, CROSS, EVENT, LOG_EVENT, NO_IMPACT, OPEN_FORCE, OPEN_PULL, WATCH
+from mbd.kernel.contact_modes import NO_IMPULSE, log_event
 from mbd.kernel.crowding import count_blow
 from mbd.kernel.nonsmooth import keep, put_back, rebound, strike
 from mbd.kernel.observe import is_awaited, store_row
 from mbd.kernel.records import Kernel
-from mbd.kernel.settle import NO_IMPULSE, log_event
 from mbd.kernel.starting import restart
 from mbd.kernel.switching import switch
-from mbd.kernel.takeover import take_over
 
 __all__ = ["handle_event", "land"]
 
@@ -31,7 +31,7 @@ def same_instant(K: Kernel) -> bool:
     if repeats(K):
         if K.n_switches > K.max_switches // 2:
             return True
-        K.n_switches = K.max_switches // 2  # from the next blow on they are plastic, all at once
+        K.n_switches = K.max_switches // 2  # from the next impact on they are plastic, all at once
         K.seen_at = 0.0
     return bool(K.n_switches > K.max_switches)
 
@@ -90,7 +90,7 @@ def handle_event(K: Kernel) -> int:
     at_start = K.event_after <= 0.0 and K.stabilized == 0 and (kind == OPEN_FORCE or kind == OPEN_PULL)
     if at_start:  # the accepted row, which does not pull, is the one before
         store_row(K)
-    take_over(K, K.time + K.event_after)
+    accept_for_restart(K, K.time + K.event_after)
     if same_instant(K):
         return CHATTER
     if kind == WATCH:
@@ -103,7 +103,7 @@ def handle_event(K: Kernel) -> int:
         K.side[index] = -K.side[index]
         K.restart_due = 1
         return EVENT if is_awaited(K, first) else -1
-    if kind == CLOSE and K.n_switches > K.max_switches // 2:  # blows by turns: their limit is plastic, all at once
+    if kind == CLOSE and K.n_switches > K.max_switches // 2:  # impacts by turns: their limit is plastic, all at once
         K.plastic_impact = 1
         K.n_endless += 1
     carry(K.closed, K.kept_flags, 0, K.n_contacts, True)

@@ -24,6 +24,7 @@ from mbd.kernel.codes import (
     STICK_BRIEF,
     WATCH,
 )
+from mbd.kernel.guard_round_off import condition_round_off, guard_round_off
 from mbd.kernel.hermite import crossing, hermite, hermite_turn
 from mbd.kernel.hooks import call, scheme_step
 from mbd.kernel.records import Kernel, Reals
@@ -35,9 +36,8 @@ from mbd.kernel.restart import (
     holds_rows,
     largest_force,
     limit_of,
-    share_out,
+    minimum_norm_multipliers,
 )
-from mbd.kernel.significance import condition_round_off, guard_round_off
 
 __all__ = [
     "frictions_at", "gap_scale", "gap_tolerance", "goes_back", "guard_value", "is_watched", "judge", "try_step",
@@ -50,7 +50,7 @@ DOUBTFUL = 0.25
 REST = 1e-12
 """Speed along a friction, relative to its terms, that is no turn: other rows may hold it still as it pulls [-]."""
 DEPARTED = 1e-8
-"""Part of its terms that a row which was left out may be off in a step; less starts the scheme anew with other rows."""
+"""Part of its terms that a row which was left out may be off in a step; less restarts the scheme with other rows."""
 APART = 1e-6
 """Gap [m, rad] above which a contact is clearly open."""
 
@@ -108,7 +108,7 @@ def share_multipliers(K: Kernel, t1: float) -> int:
     for k in range(K.n_rows):
         if K.dropped[k] == 1 and K.explicit == 0:  # the explicit one has shared them out already
             K.lam1[k] = 0.0
-    share_out(K, K.lam1)
+    minimum_norm_multipliers(K, K.lam1)
     for k in range(K.n_rows):
         K.block[K.o_lam + k] = K.lam1[k]
     if departs(K):

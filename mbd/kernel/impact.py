@@ -14,8 +14,18 @@ Stronge       as Poisson, with one factor on all impulses of the second phase, s
 
 from __future__ import annotations
 
-from mbd.kernel.blow import blow, energy_gain, gather, let_rebound, loosen, prepare, restitution_of, speed, start_over
 from mbd.kernel.codes import ENERGY_GAIN, NO_IMPACT, PULL
+from mbd.kernel.impact_solve import (
+    energy_gain,
+    gather,
+    let_rebound,
+    loosen,
+    prepare,
+    restitution_of,
+    solve_impact,
+    speed,
+    start_over,
+)
 from mbd.kernel.records import Kernel
 from mbd.kernel.restart import row_speed
 from mbd.kernel.roots import sqrt
@@ -23,7 +33,7 @@ from mbd.kernel.roots import sqrt
 __all__ = ["impact"]
 
 MOST_BLOWS = 1000
-"""Blows of the sequential law at one instant [-]."""
+"""Impacts of the sequential law at one instant [-]."""
 GAIN = 1e-12
 """Energy that impulses add, relative to its terms, above which a law is given up: restitution that sticks can [-]."""
 APPROACH = 1e-11
@@ -69,7 +79,7 @@ def impact(K: Kernel, slow: bool) -> int:
 
 
 def would_hold_back(K: Kernel) -> bool:
-    """Whether a contact that opens on pull would have to pull in the blow just found, its smooth step included."""
+    """Whether a contact that opens on pull would have to pull in the impact just found, its smooth step included."""
     largest = 0.0
     for k in range(K.n_rows):
         largest = max(largest, abs(K.impulse[k] + K.past[k]))
@@ -91,7 +101,7 @@ def rest(K: Kernel) -> None:
 
 
 def newton_law(K: Kernel, slow: bool, held: bool) -> int:
-    """One blow that reverses the gap rates of closing contacts by their restitutions; a slow one may be `held`."""
+    """One impact that reverses the gap rates of closing contacts by their restitutions; a slow one may be `held`."""
     gather(K, slow, slow and held)
     for k in range(K.n_rows):
         c = K.row_contact[k]
@@ -99,7 +109,7 @@ def newton_law(K: Kernel, slow: bool, held: bool) -> int:
         K.bias[k] = row_speed(K, k)
         if c >= 0 and K.closing[c] > 0 and not slow and K.row_normal[k] == 1:
             K.bias[k] += restitution_of(K, c) * (K.before[c] if K.strategy == 1 else K.bias[k])
-    status = blow(K)
+    status = solve_impact(K)
     if status == 0 and not slow:
         let_rebound(K)
     return status
@@ -111,7 +121,7 @@ def poisson_law(K: Kernel, energetic: bool) -> int:
     for k in range(K.n_rows):
         K.given[k] = 0.0
         K.bias[k] = row_speed(K, k)
-    status = blow(K)
+    status = solve_impact(K)
     if status != 0:
         return status
     work = 0.0  # of the normal impulses in compression, each counted with its e²
@@ -152,7 +162,7 @@ def give_back(K: Kernel, factor: float) -> int:
             K.free[c] = 2
     for k in range(K.n_rows):
         K.bias[k] = speed(K, k)
-    return blow(K)
+    return solve_impact(K)
 
 
 def work_given_back(K: Kernel) -> float:
@@ -197,12 +207,12 @@ def give_back_work(K: Kernel, work: float) -> int:
 
 
 def is_held_through(K: Kernel, c: int) -> bool:
-    """Whether a contact acts in every blow whatever the sign of its impulse: it has a rule, and does not rebound."""
+    """Whether a contact acts in every impact whatever the sign of its impulse: it has a rule, and does not rebound."""
     return bool(K.opens[c] != 0 and (K.closed[c] == 1 or K.restitution[c] == 0.0))
 
 
 def sequential_law(K: Kernel) -> int:
-    """Blow after blow of the contacts that approach fastest, each as if the others that push were not there."""
+    """Impact after impact of the contacts that approach fastest, each as if the others that push were not there."""
     gather(K, False, False)
     for c in range(K.n_contacts):
         K.touched[c] = K.active[c]  # takes part
@@ -231,7 +241,7 @@ def sequential_law(K: Kernel) -> int:
             K.bias[k] = speed(K, k)
             if c >= 0 and K.free[c] == 1 and K.row_normal[k] == 1:
                 K.bias[k] *= 1.0 + K.restitution[c]
-        status = blow(K)
+        status = solve_impact(K)
         if status != 0:
             return status
     return NO_IMPACT

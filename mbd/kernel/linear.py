@@ -145,7 +145,7 @@ def substitute_back(M: Reals, n: int, b: Reals) -> None:
 def eliminate(A: Reals, n: int, b: Reals, columns: Integers, work: Reals, rank_tolerance: float) -> int:
     """Solve A x = b by complete pivoting after equilibration; x in b, free unknowns 0.
 
-    Returns the rank; a negative value −1−rank if the leftover equations conflict.
+    Returns the rank; a negative value −1−rank if the remaining equations conflict.
     `work` needs 3 n places: row scales, column scales, solution. The number of the unknown
     eliminated k-th is left in columns[k], those beyond the rank being the dependent ones.
     """

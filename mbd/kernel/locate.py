@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from mbd.kernel.accept_restart import look, look_at_start, put_on_rows
 from mbd.kernel.codes import (
     CLOSE,
     CROSS,
@@ -19,7 +20,6 @@ from mbd.kernel.guards import frictions_at, gap_tolerance, guard_value, is_watch
 from mbd.kernel.hermite import first_guess
 from mbd.kernel.records import Kernel
 from mbd.kernel.refine import refine
-from mbd.kernel.takeover import look, look_at_start, put_on_rows
 
 __all__ = ["locate"]
 

@@ -14,16 +14,16 @@ beyond its limit, let go before it, and the step is taken again.
 
 from __future__ import annotations
 
-from mbd.kernel.candidate import adopt, carry
+from mbd.kernel.candidate import accept_candidate, carry
 from mbd.kernel.codes import LOG_OPENED, NO_IMPACT, PULL
 from mbd.kernel.complementarity import complementarity
+from mbd.kernel.contact_modes import NO_IMPULSE, STILL, log_event
 from mbd.kernel.guards import frictions_at, gap_scale, gap_tolerance, is_watched, watch
 from mbd.kernel.records import Kernel
 from mbd.kernel.restart import consistent, displace, evaluate, largest_force
-from mbd.kernel.settle import NO_IMPULSE, STILL, log_event
 from mbd.kernel.switching import close_by_impact, mark_touching
 
-__all__ = ["keep", "lands", "lets_go", "put_back", "rebound", "strike"]
+__all__ = ["keep", "closes_below_surface", "must_release", "put_back", "rebound", "strike"]
 
 SUNK = 1e4
 """Depth over the round-off of a gap at which a correction of positions has failed [-]."""
@@ -33,7 +33,7 @@ RESTING = 2.0
 """Approach speed over the change of speed in a step below which a contact rests instead of rebounding [-]."""
 
 
-def lets_go(K: Kernel, t1: float) -> int:
+def must_release(K: Kernel, t1: float) -> int:
     """Contacts that pulled and frictions beyond their limits in the step just tried let go before it; how many.
 
     What has let go for a step does not hold again in it, even where frictions that depend on each other share a load.
@@ -78,7 +78,7 @@ def pulls(K: Kernel, c: int, least: float, t1: float) -> bool:
     return bool(consistent(K, t1, K.q1, K.y1) != 0 or K.impulse[row] > least)
 
 
-def lands(K: Kernel) -> bool:
+def closes_below_surface(K: Kernel) -> bool:
     """Whether open contacts lie below their surfaces at the candidate, or a friction has turned around.
 
     The contacts are marked in K.closing.
@@ -98,7 +98,7 @@ def lands(K: Kernel) -> bool:
     return found
 
 
-def lift(K: Kernel) -> int:
+def project_gaps(K: Kernel) -> int:
     """Positions of K.q moved least, in the metric of M, until no contact lies below its surface."""
     for f in range(K.n_frictions):
         K.base_limit[f] = K.slip[f]  # kept here: friction moves nothing
@@ -119,7 +119,7 @@ def lift(K: Kernel) -> int:
             K.active[c] = 1 if (near and K.kind[c] == 0) else 0
             K.free[c] = 1 if (K.active[c] == 1 and K.closed[c] == 0 and K.closing[c] == 1) else 0
             K.parting[c] = 0
-        status = lift_once(K)
+        status = project_gaps_once(K)
         if status != 0:
             break
         for c in range(K.n_contacts):  # one that was lifted stays at its surface while others follow
@@ -141,8 +141,8 @@ def lift(K: Kernel) -> int:
     return status
 
 
-def lift_once(K: Kernel) -> int:
-    """One Newton step of `lift`; the size of the correction relative to 1 is left in K.correction_size."""
+def project_gaps_once(K: Kernel) -> int:
+    """One Newton step of `project_gaps`; the size of the correction relative to 1 is left in K.correction_size."""
     n = K.n
     evaluate(K, K.time, K.q, K.y)
     o_h = K.acc_h
@@ -167,8 +167,8 @@ def strike(K: Kernel, h: float, t1: float) -> int:
     nC = K.n_contacts
     for c in range(nC):
         K.before[c] = K.guards0[nC + c]
-    adopt(K, t1)
-    status = lift(K)
+    accept_candidate(K, t1)
+    status = project_gaps(K)
     if status != 0:
         return status
     for k in range(K.n_rows):

@@ -409,7 +409,7 @@ class Kernel(LinearAlgebra):
     failure_size: float = place("detail")  # its residual, or whatever is too large
     failure_step: float = place("detail")
     failure_index: int = place("state")  # contact, column or row
-    unforeseen_change: float = place("detail")  # growth of rates that nothing foretold: see `mbd.kernel.unresolved`
+    unforeseen_change: float = place("detail")  # growth of rates that nothing foretold: see `mbd.kernel.resolution`
     coarse_start: float = place("detail")  # where the last of the steps `n_coarse` began
     coarsest_end: float = place("detail")  # where the one with the largest change ended
     coarsest_change: float = place("detail")

@@ -49,7 +49,7 @@ def find_dependent(K: Kernel, m: int) -> None:
             part = length_of(K, row) / far if far > 0.0 else 1.0
             if (part < SHORT) != (late == 1):
                 continue
-            left = leftover(K, row, kept) * (part if late == 1 else 1.0)
+            left = remaining_norm(K, row, kept) * (part if late == 1 else 1.0)
             if left > DEPENDENCE:
                 keep_row(K, row, kept)
                 kept += 1
@@ -83,15 +83,15 @@ def length_of(K: Kernel, row: int) -> float:
 def find_mix(K: Kernel, m: int) -> None:
     """C in K.mix at another place, that of K.acc, with the m rows in K.rows kept and the others told by K.dropped."""
     for k in range(m):
-        leftover(K, K.rows[k], k)
+        remaining_norm(K, K.rows[k], k)
         keep_row(K, K.rows[k], k)
     for row in range(K.n_rows):
         if K.dropped[row] == 1:
-            leftover(K, row, m)
+            remaining_norm(K, row, m)
             combine(K, row, m)
 
 
-def leftover(K: Kernel, row: int, kept: int) -> float:
+def remaining_norm(K: Kernel, row: int, kept: int) -> float:
     """What is left of a row beside the `kept` first vectors of K.basis, relative to it, as the next vector there.
 
     Its parts along them are left in the next line of K.lower.
@@ -113,7 +113,7 @@ def leftover(K: Kernel, row: int, kept: int) -> float:
 
 
 def keep_row(K: Kernel, row: int, kept: int) -> None:
-    """The next vector of K.basis, which `leftover` has found, gets length 1; its row number into K.columns."""
+    """The next vector of K.basis, which `remaining_norm` has found, gets length 1; its row number into K.columns."""
     n = K.n
     left = sqrt(square(K.basis, kept * n, n)) + 1e-300
     K.lower[kept * K.n_rows + kept] = left

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from mbd.kernel.accept_restart import look
 from mbd.kernel.codes import CLOSE, CROSS, EPS, OPEN_GAP, WATCH
 from mbd.kernel.guards import gap_tolerance, guard_value
 from mbd.kernel.records import Kernel
-from mbd.kernel.takeover import look
 
 __all__ = ["refine"]
 

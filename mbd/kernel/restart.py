@@ -12,7 +12,7 @@ __all__ = [
     "active_rows", "add_shares", "capture", "compose", "consistent", "displace", "evaluate", "evaluate_loaded",
     "fill_block", "holds_rows", "largest_force", "limit_of", "load_accelerations", "lower_scales", "note_scales",
     "raise_scales", "refresh_scales", "restore_scales", "retain_scales", "row_speed", "share_loads",
-    "share_out", "stepping_rows",
+    "minimum_norm_multipliers", "stepping_rows",
 ]  # fmt: skip
 
 FAR_ABOVE = 100.0
@@ -271,7 +271,7 @@ def consistent(K: Kernel, t: float, q: Reals, y: Reals) -> int:
             K.failure_size = change / SETTLED_LOADS
             return NOT_CONVERGED
     if K.n_dropped > 0 and status == 0:
-        share_out(K, K.impulse)
+        minimum_norm_multipliers(K, K.impulse)
     if status == 0 and K.n_frictions > 0:
         find_sliding_friction(K)
     return status
@@ -283,7 +283,7 @@ def find_limits_of_loads(K: Kernel) -> None:
         K.limit[f] = limit_of(K, f)
 
 
-def share_out(K: Kernel, lam: Reals) -> None:
+def minimum_norm_multipliers(K: Kernel, lam: Reals) -> None:
     """Multipliers of dependent rows beside those of K.rows, which were solved with, at the state now in the block.
 
     Frictions that hold together share by their limits, which follow their loads: they are found by turns.

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from mbd.kernel.codes import NEW_MODE
 from mbd.kernel.conditioning import is_ill_conditioned, refine_accelerations
+from mbd.kernel.contact_modes import resolve_contact_modes
+from mbd.kernel.contact_step import find_pace
 from mbd.kernel.control import first_step
 from mbd.kernel.guards import update_armed, watch
 from mbd.kernel.hooks import scheme_start
-from mbd.kernel.pace import find_pace
 from mbd.kernel.records import Kernel
 from mbd.kernel.redundancy import find_dependent, sharing, spread
 from mbd.kernel.restart import active_rows, evaluate, refresh_scales, stepping_rows
-from mbd.kernel.settle import settle
 
 __all__ = ["find_mode", "restart", "still_dependent"]
 
@@ -36,7 +36,7 @@ def find_mode(K: Kernel) -> int:
 def restart(K: Kernel) -> int:
     """Make the state consistent in its mode and start the scheme from it."""
     K.least_pivot = 1.0
-    status = settle(K)
+    status = resolve_contact_modes(K)
     if status != 0:
         return status
     K.n_restarts += 1

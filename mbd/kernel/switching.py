@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from mbd.kernel.blow import strikes
 from mbd.kernel.codes import (
     CLOSE,
     CROSS,
@@ -16,11 +15,12 @@ from mbd.kernel.codes import (
     STICK,
     WATCH,
 )
+from mbd.kernel.contact_modes import ALL_IMPULSES, NO_IMPULSE, OWN_IMPULSE, STILL, log_event
 from mbd.kernel.guards import gap_scale, is_watched
 from mbd.kernel.impact import impact
+from mbd.kernel.impact_solve import strikes
 from mbd.kernel.records import Kernel
 from mbd.kernel.restart import capture, evaluate, row_speed
-from mbd.kernel.settle import ALL_IMPULSES, NO_IMPULSE, OWN_IMPULSE, STILL, log_event
 
 __all__ = ["switch"]
 
@@ -80,7 +80,7 @@ def close_by_impact(K: Kernel, fastest: float) -> int:
             count += 1
             own += abs(loss_in(K, c))
     others = loss_elsewhere(K) if count > 0 else 0.0
-    told = ALL_IMPULSES  # in the first line, so that each impulse of this impact is told once
+    told = ALL_IMPULSES  # in the first line, so that each impulse of this impact is reported once
     for c in range(K.n_contacts):
         if K.kind[c] != 0 or (K.closed[c] == 0 and not strikes(K, c)):
             continue

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 __all__ = ["Restepping"]
 
 NEAR_POSE = 0.2
-"""Distance of a stage from a pose of lost rank, over that of the farther row, below which it is not used [-]."""
+"""Distance of a stage from a singular configuration, over that of the farther row, below which it is not used [-]."""
 
 
 class Restepping:

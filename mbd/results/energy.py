@@ -41,7 +41,7 @@ Nor are works integrated again whose error in one interval is below it.
 ALIKE = 1e-14
 """Difference of two works of an interval, over the largest, that is round-off [-]."""
 RESOLVED = 0.05
-"""Error of the work of a blow, over its largest, up to which rows tell it [-]."""
+"""Error of the work of an impact, over its largest, up to which rows tell it [-]."""
 UNSURE = 10.0
 """Gain of a penalty contact of a user's own law over its error below which it is not told [-]."""
 MOST_AGAIN = 20000
@@ -90,7 +90,7 @@ def doubted_ledger(columns: ModelColumns, lending: Container[str] = ()) -> tuple
 def kinds_of_work(equations: Equations) -> frozenset[str]:
     """The kinds of everything that may change T + V while the mechanism moves smoothly: 'joint loss', 'force', …
 
-    Empty where nothing does; what belongs to moving coordinates is told as far as it depends on time explicitly.
+    Empty where nothing does; what belongs to moving coordinates is reported as far as it depends on time explicitly.
     """
     with equations.tape.lock:
         return frozenset(power.kind for power in powers(equations))
@@ -154,18 +154,18 @@ def _told(part: Part, doubt: float, least: float) -> Part:
     if not least < gain <= UNSURE * doubt:
         return part
     reason = (
-        f"its power, added up over the rows, gives {gain:.3g} J, with an error of up to {doubt:.3g} J; blows of so few "
-        "steps do not tell its work: use a smaller dt, or define elastic_energy of its law"
+        f"its power, added up over the rows, gives {gain:.3g} J, with an error of up to {doubt:.3g} J; impacts of so "
+        "few steps do not tell its work: use a smaller dt, or define elastic_energy of its law"
     )
     return replace(part, energy=np.full(len(part.energy), np.nan), withheld=reason)
 
 
 def _of_stop(columns: ModelColumns, lost: Lost, direct: Vector, unsure: Vector, least: float) -> Vector:
-    """Work of a penalty contact: ∫ p ġ dt of the blows whose rows tell it, else −U(g) and what was lost.
+    """Work of a penalty contact: ∫ p ġ dt of the impacts whose rows tell it, else −U(g) and what was lost.
 
-    ∫ p ġ dt is the more accurate where rows resolve a blow, as they balance forces; of a few rows it may be anything.
-    What a contact still holds as it opens is lost, what it holds as it closes it owes: neither is given to the
-    mechanism.
+    ∫ p ġ dt is the more accurate where rows resolve an impact, as they balance forces; of a few rows it may be
+    anything. What a contact still holds as it opens is lost, what it holds as it closes it owes: neither is given to
+    the mechanism.
     """
     time, closed = columns.record.time, columns.record.closed[:, lost.contact].astype(bool)
     nodes = [node for node in (lost.elastic, lost.value, lost.rate) if node is not None]
@@ -180,16 +180,16 @@ def _of_stop(columns: ModelColumns, lost: Lost, direct: Vector, unsure: Vector, 
     begins = closed & ~np.concatenate([[False], closed[:-1]])
     if not begins.any():
         return direct
-    blow = np.maximum(np.cumsum(begins) - 1, 0)  # that of each row, or the last before it
-    since = np.where(closed, direct - direct[np.flatnonzero(begins)][blow], 0.0)
-    size, doubt, gain = (np.zeros(blow[-1] + 1) for _ in range(3))
-    np.maximum.at(size, blow, np.abs(since))
-    np.maximum.at(gain, blow, since)
-    np.add.at(doubt, blow[1:], unsure)
+    episode = np.maximum(np.cumsum(begins) - 1, 0)  # that of each row, or the last before it
+    since = np.where(closed, direct - direct[np.flatnonzero(begins)][episode], 0.0)
+    size, doubt, gain = (np.zeros(episode[-1] + 1) for _ in range(3))
+    np.maximum.at(size, episode, np.abs(since))
+    np.maximum.at(gain, episode, since)
+    np.add.at(doubt, episode[1:], unsure)
     allowed = ROUND_OFF * size
     allowed[0] += held[0]
     told = (doubt <= RESOLVED * size) & (gain <= allowed)
-    return np.concatenate([[0.0], np.cumsum(np.where(told[blow[1:]], np.diff(direct), steps))])
+    return np.concatenate([[0.0], np.cumsum(np.where(told[episode[1:]], np.diff(direct), steps))])
 
 
 def _refined(
@@ -253,7 +253,7 @@ def _losses(struck: list[EventRecord]) -> dict[str, float]:
     """What the contacts of one impact took, by name; together where one of them would seem to give.
 
     ``−½ Σ Λ (γ⁻ + γ⁺)`` is right in all, and for a contact as far as its speed changes in proportion to its impulse:
-    where blows follow each other, as through a row of balls, that of the second has none before.
+    where impacts follow each other, as through a row of balls, that of the second has none before.
     """
     total = sum(event.energy_loss for event in struck)
     least = ROUND_OFF * sum(abs(event.energy_loss) for event in struck)

@@ -16,7 +16,7 @@ __all__ = ["KINDS", "SPENT", "Ledger", "Part"]
 KINDS = (
     "joint loss", "damper", "friction", "penalty", "impact", "motor", "force", "constraint", "reset",
 )  # fmt: skip
-"""Kinds of causes, in the order in which they are told; one of a user's own comes behind them."""
+"""Kinds of causes, in the order in which they are reported; one of a user's own comes behind them."""
 
 SPENT = ("joint loss", "damper", "friction", "penalty", "impact")
 """Kinds that take energy out; the others may give or take."""

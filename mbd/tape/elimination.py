@@ -47,7 +47,8 @@ class Factors:
 
     pivots : in turn
     sound : 1.0 where every pivot keeps more than `LOSS` of its terms, which ±∞ and NaN do not; else 0.0
-    weakest : largest inverse pivot of multipliers, 0 where all of theirs are numbers; grows as rows lose rank
+    weakest : largest inverse pivot of multipliers, 0 where all of theirs are numbers; grows towards a
+        singular configuration
     """
 
     pivots: tuple[Pivot, ...]

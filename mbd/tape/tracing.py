@@ -100,7 +100,7 @@ def _called(
         pass  # builtins without a signature
     try:
         result = function(*values)
-    except Exception as exc:  # the user's code may raise anything; all of it is told as one kind of error
+    except Exception as exc:  # the user's code may raise anything; all of it is reported as one kind of error
         raise TraceError(_failure(what, title, names, exc)) from exc
     parts = _parts(result)
     if parts is None:
@@ -124,7 +124,7 @@ def _component(value: Any, what: str, source: str, tape: Tape) -> Node:
                 "write mbd.where(condition, x, y)"
             )
         if value.tape is not tape:
-            raise TraceError(f"{what}: {source} gives a value kept from an earlier derivation; compute it anew")
+            raise TraceError(f"{what}: {source} gives a value kept from an earlier derivation; compute it again")
         node = value
     elif value is None:
         raise TraceError(f"{what}: {source} gives None where a number is expected; is a 'return' missing?")

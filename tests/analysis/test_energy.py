@@ -112,7 +112,7 @@ def stopped_leg(dt: float) -> Trajectory:
 
 @pytest.mark.parametrize("steps", [(4e-3, 2e-3, 1e-3), (5e-4, 2.5e-4, 1.25e-4)])
 def test_what_the_ledger_leaves_over_falls_with_the_step_as_the_scheme_promises(steps):
-    """Steps that do not resolve the blow on the stop, which takes shorter ones of its own, and such that do."""
+    """Steps that do not resolve the impact on the stop, which takes shorter ones of its own, and such that do."""
     runs = [stopped_leg(dt) for dt in steps]
     assert all((len(run.time) > 1.5 / dt) is (steps[0] > 1e-3) for run, dt in zip(runs, steps, strict=True))
     left = [abs(float(run.energy.numerical[-1])) for run in runs]

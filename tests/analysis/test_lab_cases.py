@@ -131,7 +131,7 @@ def test_a3_a_damped_bar(which: int) -> None:
 def assert_instants_agree(
     scene: Scene, wanted: Sequence[float], accuracy: float, of: Any, all_published: bool = True
 ) -> mbd.Accuracy:
-    """Published instants against those of the reference, and the largest shift that is told against the true one.
+    """Published instants against those of the reference, and the largest shift that is reported against the true one.
 
     of : (run) → the instants of a run that are published; all_published : whether it has no others
     """

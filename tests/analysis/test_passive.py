@@ -121,7 +121,7 @@ def bounced(dt: float, stiffness: float, store: int = 1) -> mbd.Trajectory:
 
 @pytest.mark.parametrize("store", [15, 20, 25])
 def test_a_law_of_ones_own_is_withheld_where_rows_do_not_tell_its_work(tmp_path, store):
-    """The blow lasts for 70 ms: seventy steps of 1 ms, of which a few are rows."""
+    """The impact lasts for 70 ms: seventy steps of 1 ms, of which a few are rows."""
     thinned, full = bounced(1e-3, 2e3, store), bounced(1e-3, 2e3)
     (part,) = thinned.energy.of("penalty")
     assert part.withheld and np.isnan(part.energy).all()
@@ -132,7 +132,7 @@ def test_a_law_of_ones_own_is_withheld_where_rows_do_not_tell_its_work(tmp_path,
 
 
 def test_a_law_of_ones_own_is_told_where_dt_alone_would_not_resolve_its_blow():
-    """A blow of 22 ms at dt = 20 ms takes shorter steps of its own, each of which is a row."""
+    """An impact of 22 ms at dt = 20 ms takes shorter steps of its own, each of which is a row."""
     ledger = bounced(2e-2, 2e4).energy
     (part,) = ledger.of("penalty")
     assert not part.withheld and gains(ledger)["stop"] < 1e-12

@@ -37,7 +37,7 @@ def test_a_light_bob_over_a_heavy_one_meets_the_reference_where_its_blows_are_re
 @pytest.mark.parametrize("form", WITH_ROWS)
 @pytest.mark.parametrize("scheme", SCHEMES, ids=name_of)
 def test_coarse_steps_hold_the_joints_together_or_end_in_an_error(form: str, scheme: NewmarkFamily) -> None:
-    """Steps of 1 ms cannot follow the blows."""
+    """Steps of 1 ms cannot follow the impacts."""
     swing = FORMS[form](**SIZES)
     run = mbd.simulate(swing.model, swing.start(MOTION), scheme, dt=1e-3, until=1.0, on_failure="return")
     assert max(run.violation.length, run.violation.angle) < 1e-6

@@ -1,4 +1,4 @@
-"""Linkages of the cases j3, j3b and b2 at many steps: poses in which their rows lose rank, and where branches meet.
+"""Linkages of the cases j3, j3b and b2 at many steps: singular configurations, and where branches meet.
 
 What `mbd hardcases` judges is not repeated here.
 

@@ -222,7 +222,7 @@ def test_stiffness_damping_and_chi_are_inputs_of_a_run():
 # limits -------------------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("exponent", [1.0, 1.5])
 def test_with_growing_stiffness_a_penalty_becomes_a_unilateral_contact(exponent):
-    """What other forces do during the blow, and its duration, vanish with it."""
+    """What other forces do during the impact, and its duration, vanish with it."""
 
     def rebound(contact: type, dt: float, **law) -> list[float]:
         model = mbd.Model("ball")

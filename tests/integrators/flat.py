@@ -1,4 +1,4 @@
-"""Parallelograms whose cranks lie flat, where rows lose rank, and the one rod that they are on their branch."""
+"""Parallelograms whose cranks lie flat, a singular configuration, and the one rod that they are on their branch."""
 
 from __future__ import annotations
 

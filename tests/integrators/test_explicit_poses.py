@@ -1,4 +1,4 @@
-"""Explicit steps of order 8 over poses in which rows lose rank: between their stages, or with a named error."""
+"""Explicit steps of order 8 over singular configurations: between their stages, or with a named error."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Poses in which rows lose rank, passed by schemes of high order between two of their stages."""
+"""Singular configurations, passed by schemes of high order between two of their stages."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Steps of Radau IIA over poses in which rows lose rank: of order 5, whatever the step."""
+"""Steps of Radau IIA over singular configurations: of order 5, whatever the step."""
 
 from __future__ import annotations
 

@@ -72,7 +72,7 @@ class QuaternionBall(Joint):
     loss: JointLoss = None
 
     def __post_init__(self) -> None:
-        self.settle()
+        self.validate()
 
     @property
     def labels(self) -> tuple[Label, ...]:
@@ -174,7 +174,7 @@ class CayleyBall(QuaternionBall):
     """The same ball joint in Cayley charts, which are rational: ``q ⊗ (1, x/2)/√(1 + |x|²/4)``."""
 
     def __post_init__(self) -> None:
-        self.settle()
+        self.validate()
 
     def _turn(self, x):
         size = 1.0 / sqrt(1.0 + 0.25 * squared(x))

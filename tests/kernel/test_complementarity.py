@@ -17,7 +17,7 @@ class Scene(Kernel):
 
 
 def scene(M, normals, tangents, mu, velocity, closed=None):
-    """A kernel's arrays at velocity level: ``M w + R λ = 0``, bias = B v, one blow of contacts that may choose."""
+    """A kernel's arrays at velocity level: ``M w + R λ = 0``, bias = B v, one impact of contacts that may choose."""
     n, contacts = len(M), len(normals)
     with_friction = tangents is not None
     B = np.array([row for pair in zip(normals, tangents, strict=True) for row in pair]) if with_friction else normals

@@ -48,7 +48,7 @@ def slow_slider_crank():
 
 @cache
 def scenes():
-    """Name → model and start, end, steps: poses in which rows lose rank are passed, contacts close, slip and open."""
+    """Name → model and start, end, steps: singular configurations are passed, contacts close, slip and open."""
     walker, tumbling = kneed_walker(), box(0.3)
     falls = mbd.assemble(tumbling, {"place.y": 0.6, "place.angle": 0.3}, {"place.angle": 0.5, "place.x": 0.2})
     found = {name: (*make.start, until) for name, make, until in (

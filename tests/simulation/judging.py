@@ -109,7 +109,7 @@ def _penetration(run: mbd.Trajectory, floor: float) -> list[str]:
 
 
 def _pulls(run: mbd.Trajectory, contact) -> list[str]:
-    """A closed contact that opens on pull pushes in every row and in every blow, to round-off of all multipliers."""
+    """A closed contact that opens on pull pushes in every row and in every impact, to round-off of all multipliers."""
     if contact.opens_on != "pull":
         return []
     lam = run.record.lam

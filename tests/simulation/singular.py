@@ -1,4 +1,4 @@
-"""Linkages that pass poses in which their rows lose rank, each with its motion on one coordinate."""
+"""Linkages that pass singular configurations, each with its motion on one coordinate."""
 
 from __future__ import annotations
 

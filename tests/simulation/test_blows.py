@@ -1,4 +1,4 @@
-"""Blows of penalty contacts take the steps that they need: nothing passive gains energy, whatever dt."""
+"""Impacts of penalty contacts take the steps that they need: nothing passive gains energy, whatever dt."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_a_blow_gives_back_what_its_law_says_whatever_the_step(scheme, contact):
     ball = mbd.PointMass("ball", mass=2.0)
     model.connect(mbd.Translation("flight", model.ground.origin, ball.origin, axes="y"))
     model.constrain(mbd.Penalty("mat", mbd.height(ball.origin), stiffness=1e6, exponent=1.5, restitution=0.8))
-    for steps in 8.0, 1.5, 0.3, 1e-3:  # in the time of the blow, some 2.5 ms
+    for steps in 8.0, 1.5, 0.3, 1e-3:  # in the time of the impact, some 2.5 ms
         dt = 2.5e-3 / steps
         start = mbd.assemble(model, position={"flight.y": 1.37 * dt}, velocity={"flight.y": -1.0})
         run = mbd.simulate(model, start, scheme, dt=dt, until=4.0 * dt + 0.02, contact=contact)
@@ -76,7 +76,7 @@ def test_steps_become_long_again_where_a_contact_rests():
 def test_a_contact_far_too_stiff_for_the_step_is_refused_by_name():
     model = rod()
     start = mbd.assemble(model, position={"place.y": 0.7})
-    with pytest.raises(mbd.SimulationError, match=r"'(left|right)' is so stiff that its blow .*softer stiffness"):
+    with pytest.raises(mbd.SimulationError, match=r"'(left|right)' is so stiff that its impact .*softer stiffness"):
         mbd.simulate(model, start, dt=1e-2, until=1.0, parameters={"left.stiffness": 1e22, "right.stiffness": 1e22})
 
 

@@ -48,7 +48,7 @@ def test_balls_that_bounce_apart_are_located_however_many_they_are(count, restit
 
 
 def test_balls_that_strike_all_at_once_until_they_rest_are_located():
-    """As many blows within one step as there are balls, again and again; none goes through another contact."""
+    """As many impacts within one step as there are balls, again and again; none goes through another contact."""
     model, position = bouncing(np.full(40, 0.3), 0.8)
     run = mbd.simulate(model, mbd.assemble(model, position=position), dt=DT, until=3.0)
     assert run.settings["contact"] == "events" and len(run.events) > 40 * 40

@@ -1,4 +1,4 @@
-"""No silent explosion of energy: what a scheme puts into a mechanism is told, and right runs hear nothing."""
+"""No silent explosion of energy: what a scheme puts into a mechanism is reported, and right runs hear nothing."""
 
 from __future__ import annotations
 
@@ -253,7 +253,7 @@ def test_a_single_step_that_makes_energy_where_there_is_none_is_refused():
 
 
 def dropped_on_a_mat(scheme, dt):
-    """1 kg from 0.1 m onto 1e9 N/m: a blow of 99 µs."""
+    """1 kg from 0.1 m onto 1e9 N/m: an impact of 99 µs."""
     model = mbd.Model("ball", gravity=G)
     body = mbd.PointMass("ball", 1.0)
     model.connect(mbd.Prismatic("fall", model.ground.origin, body.origin, axis=(0, 1, 0)))

@@ -101,7 +101,7 @@ def kane(mu, forward, law):
 @pytest.mark.parametrize("mu", [None, 0.2, 0.5, 2.0])
 @pytest.mark.parametrize("forward", [-1.5, -0.71, -0.3, 0.0, 0.3, 0.71, 1.5])
 def test_restitution_where_the_tip_also_sticks_never_raises_the_energy(mu, forward, law):
-    """Kane & Levinson 1985: Newton's law can, where the tip stops or turns around in the blow."""
+    """Kane & Levinson 1985: Newton's law can, where the tip stops or turns around in the impact."""
     trajectory, before, after = kane(mu, forward, law)
     kinetic = trajectory.energy.kinetic
     assert kinetic[after] <= kinetic[before] * (1.0 + 1e-12)
@@ -221,7 +221,7 @@ def test_a_cradle_tells_the_laws_apart():
     "scheme", [mbd.HHT(), mbd.GeneralizedAlpha(0.8), mbd.RadauIIA(), mbd.RungeKutta853()], ids=repr
 )
 def test_a_stop_that_bounces_comes_to_rest_whatever_pushes_it(scheme):
-    """The series of bounces has an end; near it a contact may part too slowly for its next instant to be told."""
+    """The series of bounces has an end; near it a contact may part too slowly for its next instant to be reported."""
     rng = np.random.default_rng(4)
     for _ in range(6):
         model = mbd.Model("stop", gravity=(0.0, 0.0, 0.0))

@@ -1,4 +1,4 @@
-"""Impulses of events: each contact that takes part in an impact is told once; together they change the momentum."""
+"""Impulses of events: each contact that takes part in an impact is reported once; together they change the momentum."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Files that were damaged or made up are refused by one named error, or what they hold goes on and is told."""
+"""Files that were damaged or made up are refused by one named error, or what they hold goes on and is reported."""
 
 from __future__ import annotations
 

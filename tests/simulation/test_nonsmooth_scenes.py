@@ -135,7 +135,7 @@ def test_a_belt_carries_off_what_falls_on_it():
         model.constrain(mbd.Unilateral("foot", mbd.touchdown(body.origin, belt), friction=0.4))
         trajectory = nonsmooth(model, {"place.y": 0.1}, dt=dt)
         fall = np.sqrt(0.2 / G)
-        slip = 1.2 / (0.4 * G) - fall  # friction acts from the blow on, whose impulse is μ m √(2 g h)
+        slip = 1.2 / (0.4 * G) - fall  # friction acts from the impact on, whose impulse is μ m √(2 g h)
         assert trajectory["place.x.rate"][-1] == pytest.approx(-1.2, abs=1e-12)
         assert [event.kind for event in trajectory.events] == ["closed", "stuck"]
         assert trajectory.events[0].time == pytest.approx(fall, abs=dt)

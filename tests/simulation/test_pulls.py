@@ -1,4 +1,4 @@
-"""No contact pulls that may not: in rows, in impulses, by its friction; what a rule lets pull is told."""
+"""No contact pulls that may not: in rows, in impulses, by its friction; what a rule lets pull is reported."""
 
 from __future__ import annotations
 
@@ -156,5 +156,5 @@ def instants(states, limit=100):
 def test_switches_that_come_back_are_found_before_there_are_too_many(length):
     cycle = [(k % 2, float(k)) for k in range(length)]
     assert instants([*[(0, -1.0 - k) for k in range(5)], *cycle * 40]) < 100 - 20
-    assert instants([(k % 2, 0.5**k) for k in range(100)]) is None  # blows that become slower come to an end
+    assert instants([(k % 2, 0.5**k) for k in range(100)]) is None  # impacts that become slower come to an end
     assert instants([(k % 2, 0.5**k) for k in range(200)]) == 100

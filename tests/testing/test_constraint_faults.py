@@ -32,7 +32,7 @@ class Rubber(mbd.Penalty):
 
 @dataclass(frozen=True)
 class Superball(mbd.Unilateral):
-    """It gives energy at each blow and finds no fault with that."""
+    """It gives energy at each impact and finds no fault with that."""
 
     def faults(self):
         return []

@@ -64,7 +64,7 @@ class Loose(Revolute):
 
 
 class Drawn(Revolute):
-    """A joint with play, drawn anew each time it is asked."""
+    """A joint with play, drawn again each time it is asked."""
 
     def transform(self, q, scope):
         COUNT.append(1)

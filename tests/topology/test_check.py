@@ -1,4 +1,4 @@
-"""Every fault of a description is told at once, by name, with what to try."""
+"""Every fault of a description is reported at once, by name, with what to try."""
 
 import pytest
 

@@ -40,7 +40,7 @@ def study() -> Effects:
 
 
 def lab() -> Accuracy:
-    """Two schemes: a clear error, one that is below what can be told, and a failure."""
+    """Two schemes: a clear error, one that is below what can be determined, and a failure."""
     errors = {"errors": {"pin.angle": 1e-3}, "end_errors": {"pin.angle": 5e-4}}
     points = (
         Point("a", 0.1, 1e-3, 1e-3, seconds=0.01, steps=10, **errors),

@@ -10,7 +10,7 @@ from mbd.analysis.accuracy.points import Point
 __all__ = ["advice", "cheapest", "decades", "milliseconds"]
 
 MORE = 10.0
-"""Times more accuracy whose cost is told."""
+"""Times more accuracy whose cost is reported."""
 
 
 def cheapest(points: Sequence[Point], target: float) -> Point | None:
@@ -131,7 +131,7 @@ def _unreached(points: Sequence[Point], target: float, bound: float) -> list[str
         return [*said, f"The reference itself is known to {bound:.1g} only, so no run can be shown to do better."]
     guess = _extrapolated(points, target)
     if guess is None:
-        return [*said, "No order can be observed, so that the step it needs cannot be told."]
+        return [*said, "No order can be observed, so that the step it needs cannot be determined."]
     scheme, dt, seconds = guess
     return [
         *said,

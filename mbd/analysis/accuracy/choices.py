@@ -188,7 +188,7 @@ def _probe(
 ) -> tuple[Trajectory, Any]:
     """A run that finds the end and the time scales; and the end as (event, latest time) or a time.
 
-    wanted : names of results, whose faults are told before a run fails
+    wanted : names of results, whose faults are reported before a run fails
     steps : that will be taken, where time scales are of no use: the run is short then
     """
     scheme = GeneralizedAlpha(rho_inf=0.8)

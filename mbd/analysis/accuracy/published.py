@@ -14,7 +14,7 @@ from mbd.analysis.accuracy.compare import Difference
 from mbd.arrays import Vector
 from mbd.bodies.values import is_number
 from mbd.errors import ModelError, SimulationError, UnknownNameError, nearest
-from mbd.simulation.asked import asked
+from mbd.simulation.user_calls import asked
 
 if TYPE_CHECKING:
     from mbd.integrators import Integrator

@@ -39,7 +39,7 @@ NEAR = 3.0
 CHECK_SECONDS = 3.0
 """Wall time of such a run after which no finer one is made [s]."""
 CLEAR = 10.0
-"""An error is told where it is this many times the bound of what it was judged by [-]."""
+"""An error is reported where it is this many times the bound of what it was judged by [-]."""
 WORDS = {"DOP853": "Dormand–Prince 8(5,3)", "Radau": "Radau IIA of order 5"}
 KIN: dict[Method, type[Integrator]] = {"DOP853": RungeKutta853, "Radau": RadauIIA}
 """Schemes with the formulas of a reference."""

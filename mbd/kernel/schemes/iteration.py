@@ -132,7 +132,7 @@ def runs_away(K: Kernel, m: int) -> bool:
 def finish(K: Kernel, h: float) -> bool:
     """The converged block becomes the candidate; whether it changes little, so that no other look at it is needed.
 
-    That is: it neither `overturns` nor fails the first look of `mbd.kernel.unresolved`, as in most steps of a motion.
+    That is: it neither `overturns` nor fails the first look of `mbd.kernel.resolution`, as in most steps of a motion.
     """
     compose(K, K.q1)
     most = 0.0

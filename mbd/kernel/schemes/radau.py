@@ -68,7 +68,7 @@ MOST_RETREATS = 10
 FAR_OFF = 1e4
 """Residual over its tolerance above which a correction that does not reduce it is halved."""
 SLOW = 0.5
-"""Part of the residual left by a correction above which the matrices are made anew."""
+"""Part of the residual left by a correction above which the matrices are made again."""
 
 PATIENT = 6
 """Corrections after which residuals that meet the tolerance asked for are taken for what they are [-]."""
@@ -176,7 +176,7 @@ def plain_step(K: Kernel, h: float, t1: float, m: int) -> int:
         if error > 1.0 and was_enough(K, h, t1, m, iteration, error, left):
             return complete(K, h, t1, m, renew, True)
         if error > 1.0 and not renew and error > SLOW * before:
-            renew = True  # the old matrices have done their work: make them anew at the same iterate
+            renew = True  # the old matrices have done their work: make them again at the same iterate
             before = 1e300
             continue
         before = error
@@ -213,7 +213,7 @@ def is_settled(moved: float, last: float, first: float) -> bool:
 def singular_stages_step(K: Kernel, h: float, t1: float) -> int:
     """The candidate of a step with stages on both sides of a singular configuration: see `mbd.kernel.singular.stages`.
 
-    Newton's method is linear there, with matrices made anew each time.
+    Newton's method is linear there, with matrices made again each time.
     """
     m = K.n_active
     c = K.stages[MU_REAL] * h
@@ -400,12 +400,12 @@ def estimate_error(K: Kernel, h: float, m: int) -> None:
         bend = c * K.y[j] if j < K.n_v else 0.0
         for i in range(3):
             load = 0.0
-            lift = 0.0
+            project_gaps = 0.0
             for k in range(3):
                 load += S[A_ + 3 * i + k] * S[o_W + k * n + j]
-                lift += S[A_ + 3 * i + k] * stage_speed(K, k, j, h)
+                project_gaps += S[A_ + 3 * i + k] * stage_speed(K, k, j, h)
             raw += S[E_ + i] * h * load
-            bend += S[E_ + i] * h * lift if j < K.n_v else 0.0
+            bend += S[E_ + i] * h * project_gaps if j < K.n_v else 0.0
         K.error[K.n_v + j] = raw
         if j < K.n_v:
             K.error[j] = bend

@@ -14,6 +14,7 @@ from __future__ import annotations
 from mbd.kernel.codes import EPS, INCREMENT_RATES, NOT_CONVERGED, NOT_FINITE, PASSING, SINGULAR
 from mbd.kernel.hooks import call
 from mbd.kernel.linear import solve_definite
+from mbd.kernel.mass_ratios import LOSS, is_uneven, polish_rates, polish_with_rows
 from mbd.kernel.ordered import LOSS_AT_ONCE, solve_kkt
 from mbd.kernel.records import Kernel
 from mbd.kernel.restart import compose, consistent, displace, evaluate, fill_block, raise_scales, refresh_scales
@@ -24,7 +25,6 @@ from mbd.kernel.schemes.dormand_prince import NODES, STAGES, tableau
 from mbd.kernel.schemes.memory import forget_steps
 from mbd.kernel.singular.newmark_step import CONTINUOUS
 from mbd.kernel.singular.step_size import accept_row_norms, forget_row_norms, note_row_norms
-from mbd.kernel.uneven import LOSS, is_uneven, polish_rates, polish_with_rows
 
 __all__ = ["SCHEME", "runge_kutta_accept", "runge_kutta_start", "runge_kutta_step"]
 
@@ -237,7 +237,9 @@ def return_to_rows(K: Kernel, t1: float) -> int:
             change = max(change, abs(K.rhs[i]))
             fastest = max(fastest, max(abs(K.y[i]), abs(K.y1[i])))
         K.y1[i] += K.rhs[i]
-    if change > max(CONTINUOUS * fastest, K.rest_speed + STILL):  # rows that lose rank take the branch for another
+    if change > max(
+        CONTINUOUS * fastest, K.rest_speed + STILL
+    ):  # rows near a singular configuration take the branch for another
         K.failure_size = 0.0
         return NOT_CONVERGED
     return 0

@@ -280,7 +280,7 @@ def tangent_of_stage(K: Kernel, m: int) -> None:
 
 
 def keep_held(K: Kernel, m: int) -> None:
-    """H U_i with the new H, from which U_i are found anew: they stay in the range of the rows in one metric."""
+    """H U_i with the new H, from which U_i are found again: they stay in the range of the rows in one metric."""
     size = K.n + m
     o_U = stage_place(K, STAGE_SHIFT)
     o_H = stage_place(K, HELD)

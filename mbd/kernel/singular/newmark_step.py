@@ -31,7 +31,7 @@ __all__ = ["misses", "singular_newmark_step", "steps_by_pivot", "steps_to_singul
 WITHIN = 4.0
 """Steps to a singular configuration, at the present speed, below which positions alone are held [-]."""
 NEAREST = 0.2
-"""Steps from one below which no step ends where round-off of h makes too much of velocities [-]."""
+"""Steps from one below which no step ends where round-off of h makes too much of rates [-]."""
 FORESEEN = 0.25
 """The same, of the end of a step still to come: more, since how far the singularity is then is only estimated [-]."""
 VANISHING = 0.5

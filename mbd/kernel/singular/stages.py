@@ -54,16 +54,16 @@ def is_beside_singularity(K: Kernel, h: float, steps: float) -> bool:
     return bool(-steps * h < away < (1.0 + steps) * h) and K.loaded == 0 and not sharing(K)
 
 
-def solve_singular_stages(K: Kernel, h: float, t1: float, m: int, anew: bool) -> int:
+def solve_singular_stages(K: Kernel, h: float, t1: float, m: int, afresh: bool) -> int:
     """U_i and λ_i of all stages at their rates, s_i into the changes; 0, or a failure. The block is overwritten.
 
-    Where not `anew`, the last correction of rates has moved stages: U_i takes back what that is across their rows. So
+    Where not `afresh`, the last correction of rates has moved stages: U_i takes back what that is across their rows. So
     round-off of h, which is large across the motion, does not become another one each time, and stiff forces with it.
     """
-    if not anew:
+    if not afresh:
         keep_moves(K, h, m)
     for i in range(3):
-        status = solve_singular_stage(K, i, h, t1, m, anew)
+        status = solve_singular_stage(K, i, h, t1, m, afresh)
         if status != 0:
             return status
     hold_block(K)
@@ -83,7 +83,7 @@ def keep_moves(K: Kernel, h: float, m: int) -> None:
             S[o_P + i * K.n_v + j] = h * h * move
 
 
-def solve_singular_stage(K: Kernel, i: int, h: float, t1: float, m: int, anew: bool) -> int:
+def solve_singular_stage(K: Kernel, i: int, h: float, t1: float, m: int, afresh: bool) -> int:
     """The same of stage i."""
     n = K.n
     S = K.stages
@@ -91,7 +91,7 @@ def solve_singular_stage(K: Kernel, i: int, h: float, t1: float, m: int, anew: b
     o_L = stage_place(K, STAGE_LAM) + i * K.n_rows
     o_s = stage_place(K, CHANGES) + i * (n + m)
     o_rate = K.acc_rate
-    status = project_stage_positions(K, i, h, t1, m, anew)
+    status = project_stage_positions(K, i, h, t1, m, afresh)
     if status != 0:
         return status
     for j in range(n):
@@ -99,7 +99,7 @@ def solve_singular_stage(K: Kernel, i: int, h: float, t1: float, m: int, anew: b
     for k in range(m):
         row = K.rows[k]
         rate = K.acc[o_rate + row]
-        below = not anew and abs(rate) <= 16.0 * EPS * K.scale[n + K.n_rows + row]
+        below = not afresh and abs(rate) <= 16.0 * EPS * K.scale[n + K.n_rows + row]
         K.rhs[n + k] = 0.0 if below else -rate
     solve_kkt(K, n + m, K.rhs)
     for j in range(n):
@@ -119,13 +119,13 @@ def solve_singular_stage(K: Kernel, i: int, h: float, t1: float, m: int, anew: b
     return 0
 
 
-def project_stage_positions(K: Kernel, i: int, h: float, t1: float, m: int, anew: bool) -> int:
+def project_stage_positions(K: Kernel, i: int, h: float, t1: float, m: int, afresh: bool) -> int:
     """U_i, with K.acc at the stage and the factors of [M Bᵀ; B 0] there."""
     n = K.n
     o_h = K.acc_h
     o_U = stage_place(K, STAGE_SHIFT) + i * K.n_v
     for j in range(K.n_v):
-        K.stages[o_U + j] *= 0.0 if anew else 1.0
+        K.stages[o_U + j] *= 0.0 if afresh else 1.0
     before = 1e300
     for turn in range(MOST_STAGE_PROJECTIONS):
         hold_block(K)
@@ -148,9 +148,9 @@ def project_stage_positions(K: Kernel, i: int, h: float, t1: float, m: int, anew
             size = max(size, abs(off) / (16.0 * EPS * K.scale[n + row] + 1e-300))
         if not factor_saddle(K, m, True, LOSS_OF_STEP):
             return SINGULAR
-        if turn == 0 and not anew:
+        if turn == 0 and not afresh:
             take_back(K, i, m)
-        elif (turn > 0 and size <= 1.0) or size >= before:  # anew once more: what is left of h counts in velocities
+        elif (turn > 0 and size <= 1.0) or size >= before:  # once more: what is left of h counts in velocities
             break
         else:
             before = size

@@ -185,7 +185,10 @@ def evaluate_ahead(K: Kernel, ahead: float) -> None:
 
 
 def times_to_singularities(K: Kernel, m: int, unit: float) -> float:
-    """Times from now to where each row loses rank, into K.work[m:2m]; the first of them. K.velocity_noise is its c."""
+    """Times from now to where each row comes to depend on others, into K.work[m:2m]; the first.
+
+    K.velocity_noise is its c.
+    """
     n = K.n
     evaluate_ahead(K, 0.0)
     row_norms(K, m)

@@ -7,8 +7,8 @@ With E = T + V, the first row 0 and row k, what a mechanism has by right is
 its energy of motion at the start, the potential that it has given off, and the works of forces, motors, drives, resets
 and impacts where they have given any. Where ``E_k − E_0 − G_k > S_k``, the scheme has more than doubled that: an error.
 Losses do not enter, so that one that rows integrate roughly cannot pass for a gain; nor does the work of a penalty
-contact that was open at the start, which gives back less than it took, but in a blow of few rows adds up to anything.
-The doubt about the other works is taken off.
+contact that was open at the start, which gives back less than it took, but in an impact of few rows adds up to
+anything. The doubt about the other works is taken off.
 
 A glance at E in some of the rows comes first. Only where that looks strange is the ledger of all rows made.
 """
@@ -84,7 +84,7 @@ def judgement(ledger: Ledger, doubt: Matrix, way: Vector, lending: Container[str
 
     lending : names of the parts that only give back what they took
 
-    A row alone, as next to a pose in which rows lose rank, is no verdict: of those from the first one on, at least two
+    A row alone, as next to a singular configuration, is no verdict: of those from the first one on, at least two
     and at least half must say the same, unless its gain is `ABSURD` times all energy until then.
     """
     givers = [part.energy for part in ledger.parts if part.name not in lending and not part.withheld]
@@ -180,8 +180,8 @@ class EnergyWatch(EnergyFindings):
             )
         else:
             self.note = (
-                f"speeds of {top:.2g} at the start make an energy beyond the largest number: energies cannot be told, "
-                "and the run was not judged by them; use larger units"
+                f"speeds of {top:.2g} at the start make an energy beyond the largest number: energies cannot be "
+                "determined, and the run was not judged by them; use larger units"
             )
 
     def _undefined(self, run: RunData) -> None:

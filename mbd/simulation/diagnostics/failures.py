@@ -27,7 +27,7 @@ from mbd.tape.evaluate import evaluate
 __all__ = ["attempt", "crowded", "explanation"]
 
 RUSHING = 3.0
-"""How many times the largest rate so far a step changes one, above which dt is told not to resolve the motion [-]."""
+"""Change of a rate in a step over the largest so far, above which dt is reported not to resolve the motion [-]."""
 SLOW = 1e-3
 """Largest rate so far [m/s, rad/s] below which that is not asked: a start from rest is no motion that runs away."""
 MOST_EVENTS = 5000
@@ -129,10 +129,10 @@ def _what(
     if status == codes.TOO_BRIEF:
         name = stepper.manager.names[int(stepper.kernel.failure_index)]
         return (
-            f"{name!r} is so stiff that its blow asks for steps below {float(stepper.kernel.failure_step):.2g} s, a "
+            f"{name!r} is so stiff that its impact asks for steps below {float(stepper.kernel.failure_step):.2g} s, a "
             f"millionth of dt{closed}; use a softer stiffness, mbd.Unilateral, or a smaller dt"
         )
-    if status in (codes.TOO_SMALL, codes.STIRRED):
+    if status in (codes.TOO_SMALL, codes.SINGULAR_ROWS_MOVE):
         return _no_size(stepper, status, closed)
     if status == codes.ILL_CONDITIONED:
         error, who = float(stepper.kernel.lost_digits), _unknown(stepper).removeprefix("the motion of ")
@@ -185,7 +185,7 @@ def _no_end(stepper: Stepper, status: int, closed: str, rushing: str) -> str:
     if residual <= 1.0:
         return (
             f"steps fail or leave the branch continuous in velocity, down to a tenth of dt{closed}"
-            f"{worst}: next to a pose in which rows lose rank, or in a force too steep for dt; try a smaller dt, or, "
+            f"{worst}: next to a singular configuration, or in a force too steep for dt; try a smaller dt, or, "
             f"at such a pose, {_passing(stepper)}{rushing}"
         )
     own = f" ({said})" if said else ""
@@ -227,7 +227,7 @@ def _unresolved(stepper: Stepper, status: int, closed: str) -> str:
 
 
 def _no_size(stepper: Stepper, status: int, closed: str) -> str:
-    """A step for which no size is right: by its estimated error, or at a pose in which rows lose rank."""
+    """A step for which no size is right: by its estimated error, or at a singular configuration."""
     _, residual, h = stepper.kernel.detail[:3].tolist()
     if status == codes.TOO_SMALL:
         return (
@@ -238,7 +238,7 @@ def _no_size(stepper: Stepper, status: int, closed: str) -> str:
     explicit = stepper.kernel.explicit
     others = "mbd.GeneralizedAlpha, mbd.HHT or mbd.RadauIIA" if explicit else "mbd.GeneralizedAlpha or mbd.HHT"
     return (
-        f"a pose in which rows lose rank, at {_unknown(stepper)}{closed}: round-off would make "
+        f"a singular configuration, at {_unknown(stepper)}{closed}: round-off would make "
         f"{residual:.1g} of the velocities in a step of {h:.2g} s over it; use {others}, or longer steps (a larger "
         "dt= or tol=)"
     )
@@ -357,7 +357,7 @@ def _unknown(stepper: Stepper) -> str:
 
 
 def _passing(stepper: Stepper) -> str:
-    """What passes poses in which rows lose rank where a scheme did not."""
+    """What passes singular configurations where a scheme did not."""
     explicit = stepper.kernel.explicit
     return "mbd.GeneralizedAlpha or mbd.RadauIIA" if explicit else "formulation='index3' with a damped scheme"
 

@@ -24,7 +24,7 @@ SANE = 1e6
 
 
 def fastest(run: RunData, record: Record, rows: Iterable[int]) -> float:
-    """Largest |s| of the small motions ``exp(s t)`` about some of a run's rows [1/s]; 0 where that cannot be told.
+    """Largest |s| of the small motions ``exp(s t)`` about some of a run's rows [1/s]; 0 if not to be determined.
 
     Of ``M δv̇ + C δv + K δq = 0`` along the rows that hold: ``ω = √(k/m)`` of a spring, ``c/m`` of a strong damper.
     """
@@ -91,7 +91,7 @@ def _at(run: RunData, record: Record, row: int) -> float:
 
 
 def resolving_dt(rate: float) -> float:
-    """A fifth of a quarter period, ``π/(10 ω)`` [s]: what `mbd.penalty_parameters` gives for a blow without loss."""
+    """A fifth of a quarter period, ``π/(10 ω)`` [s]: what `mbd.penalty_parameters` gives for an impact without loss."""
     return float(np.pi / 2.0 / rate / STEPS_OF_APPROACH)
 
 

@@ -11,9 +11,9 @@ import numpy as np
 from mbd.equations.equations import Contact
 from mbd.results.columns import ModelColumns
 from mbd.results.record import EventRecord, Record
-from mbd.simulation.diagnostics.blows import dt_of_blows
 from mbd.simulation.diagnostics.coarse import coarse_steps
 from mbd.simulation.diagnostics.fastest import fastest, resolving_dt, sane_rows
+from mbd.simulation.diagnostics.impact_step import dt_of_impacts
 from mbd.simulation.diagnostics.redundant import redundancy
 from mbd.simulation.diagnostics.singular import singular_start
 from mbd.simulation.diagnostics.turning import blocks, unresolved_turns
@@ -25,10 +25,10 @@ __all__ = ["notes_of"]
 RESOLVED = 10.0
 """Steps that a penalty contact must last to be resolved at all."""
 HALVING = 3.0
-"""A blow over the time in which half of its speed is gone: half a sine has cos(π/3) = ½ [-]."""
+"""An impact over the time in which half of its speed is gone: half a sine has cos(π/3) = ½ [-]."""
 
 BLIND = 2.0
-"""Steps of a penalty contact below which its blow is the scheme's, not the law's: the run's message says so [-]."""
+"""Steps of a penalty contact below which its impact is the scheme's, not the law's: the run's message says so [-]."""
 
 TAKEN = 0.5
 """Share of its energy that a scheme may take from a mechanism before the run's message says so [-]."""
@@ -40,13 +40,13 @@ PULL = 1e-9
 """Pull of a contact over all multipliers that is more than round-off [-]."""
 
 LOOKED_AT = 8
-"""Blows of a contact from which the step that resolves them is found."""
+"""Impacts of a contact from which the step that resolves them is found."""
 
 TELLING = 1e-4
 """Sum of the local errors of velocities of an explicit scheme that a run tells [m/s, rad/s]."""
 
-ANEW = (
-    "controllers began anew, with their first state and a sample at the start: they or the state are not those "
+RESTARTED = (
+    "controllers restarted, with their first state and a sample at the start: they or the state are not those "
     "that the run before ended with"
 )
 """Of a run that goes on from another one without what its controllers kept."""
@@ -63,11 +63,11 @@ COUNTED = (
     (
         "n_shortened",
         "{count} steps were shortened where Newton's method or the impact law failed at the full dt, or got another "
-        "size where one would have come too close to a pose in which rows lose rank",
+        "size where one would have come too close to a singular configuration",
     ),
     (
         "n_careful",
-        "poses in which rows lose rank were passed: {count} steps next to them held positions alone on the rows; their "
+        "singular configurations were passed: {count} steps next to them held positions alone on the rows; their "
         "velocities and multipliers are less accurate",
     ),
     (
@@ -88,13 +88,13 @@ def notes_of(run: RunData, record: Record) -> tuple[list[str], list[str]]:
     notes = [*run.mechanism.notes, *getattr(run.mechanism.common, "notes", ())]
     equations = run.mechanism.equations
     loaded = bool(run.kernel.loaded) or any(friction.contact >= 0 for friction in equations.frictions)
-    rubs = loaded and any(code.borne for code in run.stepper.modes)
+    rubs = loaded and any(code.given_rows for code in run.stepper.modes)
     moved = any(np.max(np.abs(part - record.q[:1]), initial=0.0) > MOVED for part in blocks(record.q))
     dependent = redundancy(equations.rows, run.stepper.dependent, rubs, moved, _left_singular(run))
     notes += [dependent] if dependent else singular_start(run)
     notes += [DAMAGED.format(run.damage)] if run.damage else []
     if run.start.memory is not None and not run.carried and run.boundaries.controllers:
-        notes.append(ANEW)
+        notes.append(RESTARTED)
     counts = [(int(getattr(run.kernel, name)), text) for name, text in COUNTED]
     notes += [text.format(count=count, impact=run.settings["impact"]) for count, text in counts if count]
     if "nonsmooth_since" in run.settings:
@@ -203,11 +203,11 @@ def _short_touch(run: RunData, record: Record, number: int, contact: Contact) ->
     events = [event for event in run.events if event.name == contact.name]
     least = float(run.kernel.least_contact_step[number])
     if least > 0.0:
-        safe = dt_of_blows(run, record, number, _closings(record, events)[:LOOKED_AT])
+        safe = dt_of_impacts(run, record, number, _closings(record, events)[:LOOKED_AT])
         enough = f"; dt below {safe:.2g} s has" if np.isfinite(safe) else ""
         return [
             f"{contact.name!r} took steps of down to {least:.2g} s while it was closed: dt = {run.dt:g} s has too few "
-            f"for its blows{enough}, and a softer stiffness or mbd.Unilateral needs none of them"
+            f"for its impacts{enough}, and a softer stiffness or mbd.Unilateral needs none of them"
         ], []
     spans = [b.time - a.time for a, b in pairwise(events) if (a.kind, b.kind) == ("closed", "opened")]
     shortest = min(spans, default=np.inf)
@@ -218,7 +218,7 @@ def _short_touch(run: RunData, record: Record, number: int, contact: Contact) ->
         said = f"closed to stay and lost half of its speed within {half / run.dt:.2g} steps"
     if shortest >= RESOLVED * run.dt:
         return [], []
-    safe = dt_of_blows(run, record, number, _closings(record, events)[:LOOKED_AT])
+    safe = dt_of_impacts(run, record, number, _closings(record, events)[:LOOKED_AT])
     safe = safe if np.isfinite(safe) else shortest / RESOLVED
     note = (
         f"{contact.name!r} {said}, too few: its peak force and energy are not resolved; use dt below {safe:.2g} s, "
@@ -236,7 +236,7 @@ def _closings(record: Record, events: Sequence[EventRecord]) -> list[int]:
 def _halved(run: RunData, contact: Contact, row: int) -> float:
     """Time from the row in which a contact closed until it approaches half as fast, by the rows stored [s].
 
-    Infinite where that takes longer than a resolved blow, or the run ends before.
+    Infinite where that takes longer than a resolved impact, or the run ends before.
     """
     table = run.table[row : min(run.stored, row + 2 + int(RESOLVED))]
     table = table[table[:, 0] <= table[0, 0] + RESOLVED / HALVING * run.dt]

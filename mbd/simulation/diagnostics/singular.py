@@ -27,7 +27,7 @@ MOST_ROWS = 200
 STEP_FAILURES = frozenset(
     {
         codes.NOT_CONVERGED, codes.SINGULAR, codes.STAGNATED, codes.DEPENDENT, codes.CONFLICT, codes.TOO_NEAR,
-        codes.STIRRED, codes.OUTGROWN, codes.GAINED,
+        codes.SINGULAR_ROWS_MOVE, codes.OUTGROWN, codes.GAINED,
         codes.NO_LOCATION, codes.TOO_TIGHT, codes.AT_POSE,
     }
 )  # fmt: skip

@@ -14,10 +14,10 @@ from mbd.compile.python import scalar_function
 from mbd.constraints.expressions import evaluated, is_expression
 from mbd.equations.equations import Equations, Guard
 from mbd.errors import ModelError, SimulationError, UnknownNameError, nearest
-from mbd.simulation.asked import asked
 from mbd.simulation.parameters import change_parameters, residuals_now, violations_now
 from mbd.simulation.run.boundaries import without_sharing
 from mbd.simulation.run.data import RunData
+from mbd.simulation.user_calls import asked
 
 __all__ = ["Named", "apply_reset", "arrive", "begin_controllers", "call_controllers", "reset_faults"]
 

@@ -37,7 +37,7 @@ FIRST_TABLE = 1 << 28
 """Largest table laid out at the start, of which only rows written take memory; it doubles as it fills [bytes]."""
 
 WHY = {
-    1: "blows through several closed contacts crowded",
+    1: "impacts through several closed contacts crowded",
     2: "locating could not go on",
 }
 """Reasons for non-smooth steps, by their number in `state[UNLOCATED]`."""

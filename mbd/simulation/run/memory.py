@@ -114,7 +114,7 @@ def take_up(run: RunData, start: State) -> bool:
 
 
 def carry_on(run: RunData, start: State) -> bool:
-    """Let controllers go on with their samples and states, where a scheme has begun anew at a state; whether they do.
+    """Let controllers go on with their samples and states, where a scheme has restarted at a state; whether they do.
 
     What they keep belongs to the mechanism, not to how it is integrated: another dt, or the trial runs of a tolerance,
     must not make another motion.

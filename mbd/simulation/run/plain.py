@@ -14,14 +14,14 @@ from mbd.errors import SimulationError
 from mbd.integrators.base import Integrator, Point, StepReport, StepResult, System, Terms
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.kernel.codes import NOT_CONVERGED, NOT_FINITE, TOO_NEAR
+from mbd.kernel.mass_ratios import LOSS
 from mbd.kernel.records import Kernel
 from mbd.kernel.restart import MOST_LOADS, evaluate, fill_block, refresh_scales
 from mbd.kernel.schemes.contract import Scheme
 from mbd.kernel.schemes.memory import start_step
 from mbd.kernel.singular.step_size import accept_row_norms, forget_row_norms, note_row_norms
-from mbd.kernel.uneven import LOSS
-from mbd.simulation.asked import asked
-from mbd.simulation.run.shares import shares
+from mbd.simulation.run.shared_loads import shares
+from mbd.simulation.user_calls import asked
 from mbd.state import Mode, State
 from mbd.tape.derivatives import live
 
@@ -74,11 +74,11 @@ class MechanismSystem(System):
         rows = tuple(row for row in self.manager.active_rows(flags, self.sticks) if not self.dropped[row])
         return rows, self.manager.penalties(flags)
 
-    def _code(self, rows: tuple[int, ...], penalties: tuple[int, ...], borne: tuple[int, ...]) -> ModeCode:
+    def _code(self, rows: tuple[int, ...], penalties: tuple[int, ...], given_rows: tuple[int, ...]) -> ModeCode:
         sliding = tuple(int(f) for f in np.flatnonzero(self.slip))
-        return self.mechanism.mode(rows, penalties, self.stabilized, sliding, borne)
+        return self.mechanism.mode(rows, penalties, self.stabilized, sliding, given_rows)
 
-    def _borne(self, mode: Mode) -> tuple[int, ...]:
+    def _given_rows(self, mode: Mode) -> tuple[int, ...]:
         """Rows that act and depend on others, where how loads are shared moves the mechanism: a friction slides."""
         if not self.slip.any() or not any(self.dropped):
             return ()
@@ -88,11 +88,11 @@ class MechanismSystem(System):
     def evaluate(self, point: Point, mode: Mode, tangent: tuple[float, float] | None) -> Terms:
         """Terms of `Terms` at a point of the mechanism."""
         rows, penalties = self.active(mode)
-        borne = self._borne(mode)
-        code = self._code(rows, penalties, borne)
+        given_rows = self._given_rows(mode)
+        code = self._code(rows, penalties, given_rows)
         n, m = self.mechanism.layout.n, len(rows)
         block = self.evaluated = self._block(point, rows, penalties)
-        brought = self._share_loads(block, rows, borne) if borne else 0.0
+        brought = self._share_loads(block, rows, given_rows) if given_rows else 0.0
         scale = np.zeros(n + 2 * self.mechanism.layout.n_rows)
         self.mechanism.common["scales"](block, self.parameters, scale)
         picked = list(rows)
@@ -136,7 +136,7 @@ class MechanismSystem(System):
             rate_size[picked],
             velocity if velocity.any() else None,
             turning if turning is None else np.where(velocity[:, None], 0.0, turning),
-            bool(borne),
+            bool(given_rows),
         )
 
     def _block(self, point: Point, rows: Sequence[int], penalties: Sequence[int]) -> Vector:
@@ -148,9 +148,9 @@ class MechanismSystem(System):
         block[layout.slip : layout.shift] = self.slip
         return block
 
-    def _share_loads(self, block: Vector, rows: tuple[int, ...], borne: tuple[int, ...]) -> Matrix:
-        """Multipliers of the rows `borne` into the block; (n, m) what those of `rows` bring along through them."""
-        lam, kept, dependent = self.mechanism.layout.lam, list(rows), list(borne)
+    def _share_loads(self, block: Vector, rows: tuple[int, ...], given_rows: tuple[int, ...]) -> Matrix:
+        """Multipliers of the rows `given_rows` into the block; (n, m) what those of `rows` bring along through them."""
+        lam, kept, dependent = self.mechanism.layout.lam, list(rows), list(given_rows)
         places = [lam + k for k in dependent]
         for _ in range(MOST_LOADS):  # frictions that hold together share by their limits, which follow the loads
             terms = self.mechanism.terms_of(block, self.parameters)
@@ -163,22 +163,22 @@ class MechanismSystem(System):
     def accelerations(self, t: float, q: Vector, y: Vector, mode: Mode) -> tuple[Vector, Vector]:
         """Consistent (v̇, ż) and λ of the active rows."""
         rows, penalties = self.active(mode)
-        n, m, picked, borne = self.mechanism.layout.n, len(rows), list(rows), list(self._borne(mode))
+        n, m, picked, given_rows = self.mechanism.layout.n, len(rows), list(rows), list(self._given_rows(mode))
         lam = np.zeros(self.mechanism.layout.n_rows)
         for _ in range(MOST_LOADS):  # friction follows multipliers: of degree one, so that this is Newton's method
             terms = self.mechanism.acceleration_terms(
                 t, q, y, self.parameters, self.anchors, penalties, slips=self.slip, lam=lam
             )
             R = terms.R[:, picked]
-            if borne:
-                part = shares(self.mechanism.equations.rows, terms, picked, borne)
-                R = R + terms.R[:, borne] @ part
+            if given_rows:
+                part = shares(self.mechanism.equations.rows, terms, picked, given_rows)
+                R = R + terms.R[:, given_rows] @ part
             matrix = np.block([[terms.M, R], [terms.B[picked], np.zeros((m, m))]])
             solved = np.linalg.solve(matrix, -np.concatenate([terms.f, terms.bias[picked]]))
             change = np.max(np.abs(lam[picked] - solved[n:]), initial=0.0)
             lam[picked] = solved[n:]
-            if borne:
-                lam[borne] = part @ solved[n:]
+            if given_rows:
+                lam[given_rows] = part @ solved[n:]
             if not self.slip.any() or change <= 1e-13 * np.max(np.abs(lam)):
                 break
         if not self.slip.any() and not any(self.dropped) and _least_pivot(terms.M) < LOSS:

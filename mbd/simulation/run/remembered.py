@@ -151,7 +151,7 @@ def _rows_differ(kept: Kernel, run: RunData) -> str:
     v, dropped = run.kernel, kept.dropped[: run.kernel.n_rows]
     if int(kept.n_dropped) != int(np.sum(dropped)):
         return "'dropped' does not agree with its count"
-    if kept.restart_due != 0:  # they are found anew
+    if kept.restart_due != 0:  # they are found again
         return ""
     held = run.manager.active_rows(kept.closed[: v.n_contacts], kept.sticks[: v.n_frictions])
     rows = [row for row in held if not dropped[row]]

@@ -15,7 +15,6 @@ from mbd.integrators.base import Integrator
 from mbd.kernel import codes
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.results.columns import ModelColumns
-from mbd.simulation.asked import asked
 from mbd.simulation.diagnostics.energy import EnergyWatch
 from mbd.simulation.diagnostics.failures import attempt, crowded, explanation
 from mbd.simulation.diagnostics.fastest import stability
@@ -32,6 +31,7 @@ from mbd.simulation.run.room import Room
 from mbd.simulation.run.savepoints import rewind, save
 from mbd.simulation.run.stored import whole_record
 from mbd.simulation.run.strategy import go_on_unlocated, may_go_on_unlocated
+from mbd.simulation.user_calls import asked
 from mbd.state import State
 from mbd.trajectory import EventRecord, Trajectory
 
@@ -87,7 +87,7 @@ class Run(RunData):
     def observe(
         self, observers: Sequence[Callable[[float, State], None]], progress: Callable[[float, float], None] | None
     ) -> None:
-        """Who is told how far the run is."""
+        """Who is informed how far the run is."""
         self.observers, self.progress = observers, progress
 
     # the run ------------------------------------------------------------------------------------------------------

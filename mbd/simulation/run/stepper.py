@@ -16,9 +16,9 @@ from mbd.integrators.base import CompiledIntegrator, Integrator
 from mbd.integrators.newton import MAX_ITERATIONS
 from mbd.kernel import codes
 from mbd.kernel.active_set import ActiveSetManager
+from mbd.kernel.contact_modes import room_to_log
 from mbd.kernel.records import PROGRAMS, TABLE, Kernel
 from mbd.kernel.schemes.contract import NO_SCHEME, Scheme, schemes
-from mbd.kernel.settle import room_to_log
 from mbd.simulation.run.call_table import CallTable
 from mbd.simulation.run.plain import KernelScheme, MechanismSystem, PlainScheme, row_units, unit_blocks
 from mbd.tape.derivatives import live
@@ -191,9 +191,9 @@ class Stepper:
         held = self.manager.active_rows(flags, sticks)
         rows = tuple(row for row in held if not dropped[row])
         sliding = tuple(int(f) for f in np.flatnonzero(slip))
-        borne = tuple(row for row in held if dropped[row]) if sliding else ()
+        given_rows = tuple(row for row in held if dropped[row]) if sliding else ()
         make = self._maker()
-        code = make(rows, self.manager.penalties(flags), self.stabilized, sliding, borne)
+        code = make(rows, self.manager.penalties(flags), self.stabilized, sliding, given_rows)
         count, width = int(v.n_modes), v.n_contacts + v.n_rows + v.n_frictions
         phases = np.where(sticks == 1, 2, slip != 0.0)
         if PROGRAMS * (count + 1) > len(v.mode_code):
@@ -253,8 +253,8 @@ class Stepper:
 
     def guard_round_off(self, e: int) -> float:
         """Round-off of a user's guard at the accepted state."""
+        from mbd.kernel.guard_round_off import guard_round_off
         from mbd.kernel.restart import fill_block, refresh_scales
-        from mbd.kernel.significance import guard_round_off
 
         K = self.kernel
         fill_block(K, K.time, K.q, K.y)

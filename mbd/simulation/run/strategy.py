@@ -14,7 +14,7 @@ __all__ = ["chosen", "go_on_unlocated", "may_go_on_unlocated"]
 ENDLESS = (codes.CHATTER, codes.NO_LOCATION, codes.NO_IMPACT)
 """Failures of locating itself: switches without end at one instant, no root, no set of branches that obeys all laws."""
 CROWDED = 1.0
-"""Blows through several contacts, less one for each dt, from which a step that fails is taken to fail of them [-]."""
+"""Impacts through several contacts, less one for each dt, from which a step that fails is taken to fail of them [-]."""
 
 
 def chosen(contact: str, manager: ActiveSetManager, locate: str = "root", tolerance: bool = False) -> tuple[str, str]:

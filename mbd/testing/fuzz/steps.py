@@ -144,7 +144,7 @@ def impacts(found: Faults, bodies: Bodies, run: mbd.Trajectory, T: Array) -> Non
         wanted = 0.0 if slow else -word.restitution * before
         speeds = 1.0 + np.max(np.abs(rate[k - 1 : k + 1]))
         there.small(
-            "a blow rebounds with its restitution", event.name, after - wanted, 1e-6 * speeds + float(slow) * 1e-3
+            "an impact rebounds with its restitution", event.name, after - wanted, 1e-6 * speeds + float(slow) * 1e-3
         )
 
 

@@ -154,7 +154,7 @@ def _step_there(made: Scene, run: mbd.Trajectory) -> list[str]:
 def _other_cut(made: Scene, run: mbd.Trajectory) -> list[str]:
     """The same motion whichever joints are cut, within what two thirds of the step change.
 
-    Half of it would change nothing in blows, whose steps are dt halved until they are short enough.
+    Half of it would change nothing in impacts, whose steps are dt halved until they are short enough.
     """
     others = [cut for cut in ("auto", *made.form.cuts) if cut != made.cut]
     if not others or run.settings["contact"] == "nonsmooth":

@@ -14,11 +14,11 @@ from mbd.configuration import Configuration
 from mbd.equations import changes
 from mbd.equations.equations import Chart, Coordinate, Turn
 from mbd.equations.headings import Headings, direction, spin
+from mbd.equations.kinematic_proxies import KinematicProxies
 from mbd.equations.kinematics import Edge, Moving, ground_motion, moving_body
 from mbd.equations.outputs import AXES, Outputs
 from mbd.equations.parameter_scope import ParameterScope
 from mbd.equations.placement import Placement
-from mbd.equations.views import Views
 from mbd.errors import UnknownNameError, nearest
 from mbd.joints.base import Joint, row_unit
 from mbd.scope import FrameMotion, JointMotion, Rotation, Triple
@@ -26,7 +26,7 @@ from mbd.tape.derivatives import jvp, live, substitute
 from mbd.tape.functions import sin
 from mbd.tape.node import Node, Scalar, Tape
 
-__all__ = ["Surroundings", "placeholders"]
+__all__ = ["DerivationContext", "placeholders"]
 
 
 def placeholders(tape: Tape) -> tuple[Rotation, Triple]:
@@ -35,7 +35,7 @@ def placeholders(tape: Tape) -> tuple[Rotation, Triple]:
     return ((a, b, c), (d, e, f), (g, h, i)), (x, y, z)
 
 
-class Surroundings(ParameterScope):
+class DerivationContext(ParameterScope):
     """`mbd.scope.Scope` over a spanning tree; words see places and velocities as views, which `real` resolves.
 
     Parameters
@@ -83,7 +83,7 @@ class Surroundings(ParameterScope):
         values += [self._own_angle(*key) for key in self.carried]
         self.composed = tuple(self.tape.lift(value) for value in values)
         self.placement = Placement(self.tape, list(self.bodies.values()), self.composed)
-        self.views = Views(self.placement, self.composed, planar)
+        self.views = KinematicProxies(self.placement, self.composed, planar)
         self.quantities = Outputs(self.tape)
         self.turns: dict[str, Turn] = {}
         self.wrapped: dict[tuple[str, int], Turn] = {}

@@ -1,4 +1,4 @@
-"""The step that resolves the blows of a penalty contact in a run: what `mbd.penalty_parameters` would say of them."""
+"""The step that resolves the impacts of a penalty contact in a run: what `mbd.penalty_parameters` would say of them."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from mbd.results.record import Record
 from mbd.simulation.diagnostics.fastest import free_motions, matrices
 from mbd.simulation.run.data import RunData
 
-__all__ = ["dt_of_blows"]
+__all__ = ["dt_of_impacts"]
 
 
-def dt_of_blows(run: RunData, record: Record, number: int, rows: Iterable[int]) -> float:
-    """A fifth of the time until the deepest point of the blows of contact `number` that begin at some rows [s].
+def dt_of_impacts(run: RunData, record: Record, number: int, rows: Iterable[int]) -> float:
+    """A fifth of the time until the deepest point of the impacts of contact `number` that begin at some rows [s].
 
     With the effective mass ``1/(J M⁻¹ Jᵀ)`` along the rows that hold, J = ∂ġ/∂v, and the approach speed there; infinite
-    where these cannot be told.
+    where these cannot be determined.
     """
     name = run.manager.contacts[number].name
     law = next(word for word in run.model.contacts if word.name == name)

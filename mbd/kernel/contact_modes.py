@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from mbd.kernel.blow import strikes
 from mbd.kernel.codes import LOG_CLOSED, LOG_OPENED, LOG_SLIPPED, LOG_STUCK, NO_FORCE, NO_IMPACT, SLIP, UNKNOWN
 from mbd.kernel.complementarity import complementarity
+from mbd.kernel.impact_solve import strikes
 from mbd.kernel.records import Kernel
 from mbd.kernel.restart import active_rows, capture, evaluate, row_speed
 from mbd.kernel.saddle import solve_rows
 
-__all__ = ["ALL_IMPULSES", "NO_IMPULSE", "OWN_IMPULSE", "STILL", "log_event", "room_to_log", "settle"]
+__all__ = ["ALL_IMPULSES", "NO_IMPULSE", "OWN_IMPULSE", "STILL", "log_event", "room_to_log", "resolve_contact_modes"]
 
 STILL = 1e-9
 """Speed [m/s, rad/s] of a gap or along a friction that counts as none."""
@@ -52,7 +52,7 @@ def log_event(K: Kernel, kind: int, index: int, loss: float, impulses: int) -> N
     K.n_events += 1
 
 
-def settle(K: Kernel) -> int:
+def resolve_contact_modes(K: Kernel) -> int:
     """Consistent accelerations and multipliers; contacts that would pull open, touching ones that press close.
 
     Frictions that do not move stick or begin to slide.
@@ -69,9 +69,9 @@ def settle(K: Kernel) -> int:
                 K.free[c] = 1
     status = complementarity(K, 0)
     if status == NO_IMPACT or status == 0:
-        jammed = find_jammed(K)
-        if jammed >= 0:
-            K.failure_index = jammed
+        painleve_contacts = find_painleve_contacts(K)
+        if painleve_contacts >= 0:
+            K.failure_index = painleve_contacts
             return NO_FORCE
     if status != 0:
         return status
@@ -154,7 +154,7 @@ def find_slips(K: Kernel) -> None:
             K.slip[f] = 1.0 if gamma > 0.0 else -1.0
 
 
-def find_jammed(K: Kernel) -> int:
+def find_painleve_contacts(K: Kernel) -> int:
     """A contact that slides so that pushing on it makes it approach: no force or several are consistent; −1 if none.
 
     ``dg̈/dp = B_n K⁻¹ (B_n − μ s B_T)ᵀ ≤ 0`` with the other rows held (Painlevé 1895; Génot & Brogliato 1999,

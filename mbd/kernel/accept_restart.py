@@ -6,20 +6,20 @@ guards change with it: where an event is looked for, they are those of the veloc
 
 from __future__ import annotations
 
-from mbd.kernel.candidate import adopt, stay
+from mbd.kernel.candidate import accept_candidate, revert_candidate
 from mbd.kernel.codes import PULL
 from mbd.kernel.guards import frictions_at, try_step, watch
 from mbd.kernel.records import Kernel, Reals
 from mbd.kernel.restart import active_rows, consistent, evaluate, largest_force, stepping_rows
 from mbd.kernel.saddle import correct_velocities, solve_rows
 
-__all__ = ["look", "look_at_start", "put_on_rows", "take_over"]
+__all__ = ["look", "look_at_start", "put_on_rows", "accept_for_restart"]
 
 
 def project_velocity(K: Kernel, t: float, q: Reals, y: Reals, m: int, dropping: bool) -> int:
     """The nearest velocities to y, in the metric of M, with B v + h_t = 0 on the m rows in K.rows.
 
-    They may depend on each other where `dropping` finds out anew which do.
+    They may depend on each other where `dropping` finds out again which do.
     """
     if m == 0:
         return 0
@@ -56,7 +56,7 @@ def look(K: Kernel, h: float, t1: float) -> int:
 
 def look_at_start(K: Kernel) -> None:
     """The accepted state as the candidate of an event at the very start of the step."""
-    stay(K)
+    revert_candidate(K)
     put_on_rows(K, K.time)
 
 
@@ -99,14 +99,14 @@ def balance(K: Kernel) -> None:
             K.rate[i] = K.jump[i]
 
 
-def take_over(K: Kernel, t1: float) -> None:
+def accept_for_restart(K: Kernel, t1: float) -> None:
     """The candidate becomes the accepted state ahead of a restart, consistent in the old mode at every level.
 
     A shortened index-3 step leaves B v + h_t of the size of its error; it would survive a release, so it is removed.
     Where dt is so long that a contact pushes by the step but would pull by consistent multipliers or velocities, those
     of the step stay, and the restart decides; accelerations follow from them.
     """
-    adopt(K, t1)
+    accept_candidate(K, t1)
     status = project_velocity(K, t1, K.q, K.y, active_rows(K, K.closed), True)
     if status == 0 and K.stabilized == 0 and turns_to_pull(K):
         for i in range(K.n):

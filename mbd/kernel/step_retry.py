@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from mbd.kernel.codes import GAINED, LAST, NOT_CONVERGED, NOT_FINITE, SINGULAR, STAGNATED, STIRRED, TOO_NEAR
+from mbd.kernel.codes import GAINED, LAST, NOT_CONVERGED, NOT_FINITE, SINGULAR, SINGULAR_ROWS_MOVE, STAGNATED, TOO_NEAR
 from mbd.kernel.control import controlled_step
 from mbd.kernel.guards import try_step
 from mbd.kernel.records import Kernel
+from mbd.kernel.resolution import judge_change
 from mbd.kernel.restart import consistent, lower_scales
 from mbd.kernel.singular.step_pairs import ALONE, FIRST, LONGER, SECOND, SHORTER, WHOLE, may_pair
 from mbd.kernel.singular.step_size import is_resolved, is_too_noisy, singular_step_size
-from mbd.kernel.unresolved import judge_change
 
 __all__ = ["part_end", "step_end", "tried_step"]
 
@@ -74,7 +74,7 @@ def tried_step(K: Kernel, h: float, t1: float) -> int:
     if K.singular_size == 1 and K.n_active > 0:
         status = step_past_singularity(K, h)
         h = K.step_taken
-        if status == LAST or status == STIRRED:
+        if status == LAST or status == SINGULAR_ROWS_MOVE:
             return status
         full = h
     else:
@@ -117,5 +117,5 @@ def step_past_singularity(K: Kernel, unit: float) -> int:
     K.step_taken = h
     K.paired_step = ALONE if h != unit else 0
     if is_too_noisy(K, h):
-        return STIRRED
+        return SINGULAR_ROWS_MOVE
     return judged_step(K, h, K.time + h)

@@ -1,4 +1,4 @@
-"""One blow: the jump of velocities and its impulses, of all contacts and frictions that take part in it."""
+"""One impact: the jump of velocities and its impulses, of all contacts and frictions that take part in it."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from mbd.kernel.records import Kernel
 from mbd.kernel.restart import capture, evaluate, evaluate_loaded, limit_of, row_speed
 
 __all__ = [
-    "blow", "energy_gain", "gather", "let_rebound", "loosen", "prepare", "restitution_of", "speed", "start_over",
-    "strikes",
+    "energy_gain", "gather", "let_rebound", "loosen", "prepare", "restitution_of", "solve_impact", "speed",
+    "start_over", "strikes",
 ]  # fmt: skip
 
 
@@ -44,7 +44,7 @@ def start_over(K: Kernel) -> None:
 def gather(K: Kernel, slow: bool, hold: bool) -> None:
     """All closed and closing contacts take part; those that open on pull may choose.
 
-    With `hold` all are held; where blows follow without end, the one that fired and cannot rise.
+    With `hold` all are held; where impacts follow without end, the one that fired and cannot rise.
     """
     for c in range(K.n_contacts):
         both = K.closed[c] == 1 or K.closing[c] > 0
@@ -60,7 +60,7 @@ def gather(K: Kernel, slow: bool, hold: bool) -> None:
 
 
 def loosen(K: Kernel) -> None:
-    """Frictions of this blow may choose, from sticking."""
+    """Frictions of this impact may choose, from sticking."""
     for f in range(K.n_frictions):
         c = K.friction_contact[f]
         K.loose[f] = 1 if (c < 0 or K.active[c] == 1) else 0
@@ -78,7 +78,7 @@ def speed(K: Kernel, row: int) -> float:
     return value
 
 
-def blow(K: Kernel) -> int:
+def solve_impact(K: Kernel) -> int:
     """The next jump and its impulses, beside the impulses in K.given: bias is in place, contacts have been gathered."""
     for k in range(K.n_rows):
         K.impulse[k] = 0.0

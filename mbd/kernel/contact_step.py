@@ -1,6 +1,6 @@
-"""The step while a penalty contact acts: short enough for its blow, whatever dt.
+"""The step while a penalty contact acts: short enough for its impact, whatever dt.
 
-A blow that lasts less than a few steps is not the force law's but the scheme's, which may give back more energy than
+An impact that lasts less than a few steps is not the force law's but the scheme's, which may give back more energy than
 went in. As a contact closes the step is found in which its force changes the gap rate by a share of itself,
 
 ``h |A(h) − A(0)| ≤ share · |γ|,    A = J M⁻¹ Jᵀ p``  along the rows that hold,
@@ -18,7 +18,7 @@ from mbd.kernel.restart import compose, consistent, fill_block
 __all__ = ["find_pace", "relax_pace"]
 
 FEW = 0.2
-"""Share above which a blow has too few steps: half a period has π/√share, seven [-]."""
+"""Share above which an impact has too few steps: half a period has π/√share, seven [-]."""
 ENOUGH = 0.02
 """Share of the steps taken instead, 22 in half a period [-]."""
 BRIEFEST = 1e-6
@@ -57,7 +57,7 @@ def find_pace(K: Kernel) -> int:
 
 
 def pace_of(K: Kernel, c: int) -> float:
-    """The step that resolves the blow of contact c from the accepted state on; dt where that does."""
+    """The step that resolves the impact of contact c from the accepted state on; dt where that does."""
     h = K.dt
     watch(K, K.time, K.q, K.y, K.rate, K.lam, K.guards1)
     here = K.guards1[c]

@@ -1,7 +1,8 @@
 """What words see of places and velocities: inputs of their own, each with the body that carries it.
 
 A word writes its forces and measures in views, so that the virtual work of each is known to be done on a place or a
-rotation of a certain body, whatever the tape finds equal afterwards; `Views.real` then puts the motion itself in.
+rotation of a certain body, whatever the tape finds equal afterwards; `KinematicProxies.real` then puts
+the motion itself in.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from mbd.scope import Rotation, Triple
 from mbd.tape.derivatives import live, substitute, vjp
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["Pull", "View", "Views"]
+__all__ = ["Wrench", "View", "KinematicProxies"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +33,7 @@ class View:
 
 
 @dataclass(frozen=True, eq=False)
-class Pull:
+class Wrench:
     """A force at a place of a body [N], and a torque on it [N m], in body axes; `ground`: the force in ground axes."""
 
     carrier: Moving
@@ -42,7 +43,7 @@ class Pull:
     ground: Triple = ZERO
 
 
-class Views:
+class KinematicProxies:
     """Places and velocities of a tree as words see them.
 
     A component that never changes is a view too where a virtual motion would change it; only what is constant out of
@@ -142,7 +143,7 @@ class Views:
         *,
         motion: bool,
         attributed: bool,
-    ) -> tuple[list[Pull], list[Node]]:
+    ) -> tuple[list[Wrench], list[Node]]:
         """Forces on bodies, and the part that acts on the `inputs` themselves.
 
         Their virtual work is ``Σ multiplier · δvalue``. The values are functions of the configuration, or, if `motion`,
@@ -164,15 +165,15 @@ class Views:
     def _is_coordinate(self, node: Node) -> bool:
         return node.op == "input" or node in self._coordinates
 
-    def _pull(self, of: Point | Axes | Heading, share: Sequence[Sequence[Scalar]], motion: bool) -> Pull:
+    def _pull(self, of: Point | Axes | Heading, share: Sequence[Sequence[Scalar]], motion: bool) -> Wrench:
         """From ground axes to a force or a torque in body axes; ``δR = δθ × R`` gives the torque Σ_k e_k × Rᵀ bar_k."""
         if isinstance(of, Heading):
-            return Pull(of.carrier, torque=(0.0, 0.0, share[0][2]))
+            return Wrench(of.carrier, torque=(0.0, 0.0, share[0][2]))
         back = transpose(self._placement.axes(of.carrier).rotation)
         columns = [rotate(back, (bar[0], bar[1], bar[2])) for bar in share]
         if isinstance(of, Point):
-            return Pull(of.carrier, of.place, force=columns[0], ground=(share[0][0], share[0][1], share[0][2]))
+            return Wrench(of.carrier, of.place, force=columns[0], ground=(share[0][0], share[0][1], share[0][2]))
         if motion:
-            return Pull(of.carrier, torque=columns[0])
+            return Wrench(of.carrier, torque=columns[0])
         (_, a, b), (c, _, d), (e, f, _) = columns
-        return Pull(of.carrier, torque=(d - f, e - b, a - c))
+        return Wrench(of.carrier, torque=(d - f, e - b, a - c))
