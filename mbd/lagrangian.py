@@ -48,9 +48,9 @@ class Lagrangian(EnergyDescription):
     sympy expressions of the coordinates, the parameters and ``t``, or measures of them:
 
     >>> import sympy, mbd
-    >>> y = Coordinate("y", unit="m")
+    >>> y = mbd.Coordinate("y", unit="m")
     >>> m, g = sympy.symbols("m g")
-    >>> ball = Lagrangian("ball", [y], m * y.v**2 / 2, m * g * y.q, parameters={m: 0.2, g: 9.81})
+    >>> ball = mbd.Lagrangian("ball", [y], m * y.v**2 / 2, m * g * y.q, parameters={m: 0.2, g: 9.81})
     >>> ball.constrain(mbd.Unilateral("floor", y.q, restitution=0.5))
     >>> ball.check()
     []

@@ -68,7 +68,7 @@ def test_steps_too_fine_to_pass_say_so():
     start = upright(model, 1, angle=0.5 * np.pi + 1e-6, speed=-3.0)
     run = mbd.simulate(model, start, SCHEME, dt=1e-8, until=1e-6, on_failure="return")
     assert not run.success
-    for word in ("lose rank", "'right 0'", "mbd.GeneralizedAlpha", "mbd.RadauIIA"):
+    for word in ("singular configuration", "'right 0'", "mbd.GeneralizedAlpha", "mbd.RadauIIA"):
         assert word in run.message
 
 

@@ -24,7 +24,7 @@ def library(text, folder, *flags):
     """A C text as a loaded library."""
     (folder / "kernel.c").write_text(text)
     options = ["-std=gnu11", "-ffp-contract=off", "-fno-strict-aliasing", "-fPIC", "-shared", "-w", *flags]
-    subprocess.run([COMPILER, *options, "-o", "kernel.so", "kernel.c", "-lm"], cwd=folder, check=True)
+    subprocess.run([COMPILER, *options, "-o", "kernel.so", "kernel.c", "-lm"], cwd=folder, check=True, timeout=300)
     return ctypes.CDLL(str(folder / "kernel.so"))
 
 

@@ -38,7 +38,9 @@ def test_a_number_is_read_and_written_at_its_place():
 def test_a_wrong_name_of_a_field_is_an_error_for_mypy(tmp_path):
     script = tmp_path / "wrong.py"
     script.write_text("from mbd.kernel.records import Kernel\n\ndef f(K: Kernel) -> int:\n    return K.n_rws\n")
-    told = subprocess.run([sys.executable, "-m", "mypy", "--strict", str(script)], capture_output=True, text=True)
+    told = subprocess.run(
+        [sys.executable, "-m", "mypy", "--strict", str(script)], capture_output=True, text=True, timeout=600
+    )
     assert '"Kernel" has no attribute "n_rws"' in told.stdout
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import mbd
-from mbd.kernel import pace
+from mbd.kernel import contact_step
 
 SCHEMES = [mbd.HHT(), mbd.HHT(0.3), mbd.Newmark(), mbd.GeneralizedAlpha(0.5), mbd.HHT(0.1, formulation="index3"),
            mbd.RadauIIA(), mbd.RungeKutta853()]  # fmt: skip
@@ -70,7 +70,7 @@ def test_steps_become_long_again_where_a_contact_rests():
     start = mbd.assemble(model, position={"flight.y": 1e-3})
     run = mbd.simulate(model, start, dt=0.05, until=20.0)
     assert run["mat.force"][-1] == pytest.approx(2.0 * 9.81, rel=1e-6)
-    assert run.stats["steps"] < 20.0 / 0.05 + 40 * pace.WINDOW
+    assert run.stats["steps"] < 20.0 / 0.05 + 40 * contact_step.WINDOW
 
 
 def test_a_contact_far_too_stiff_for_the_step_is_refused_by_name():
@@ -94,7 +94,7 @@ def test_without_shorter_steps_energy_would_be_gained(monkeypatch):
     model.connect(mbd.Translation("flight", model.ground.origin, ball.origin, axes="y"))
     model.constrain(mbd.Penalty("mat", mbd.height(ball.origin), stiffness=2e4))
     start = mbd.assemble(model, position={"flight.y": 0.01}, velocity={"flight.y": -1.0})
-    monkeypatch.setattr(pace, "pace_of", lambda K, c: K.dt)
+    monkeypatch.setattr(contact_step, "pace_of", lambda K, c: K.dt)
     backs = [
         mbd.simulate(model, start, dt=dt, until=0.3, backend="python")["flight.y.rate"][-1] for dt in (1e-2, 2e-2, 5e-2)
     ]

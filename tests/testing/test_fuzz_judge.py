@@ -16,6 +16,7 @@ from mbd.testing.fuzz.geometry import Signal, inverse, product, shift, turn, twi
 from mbd.testing.fuzz.judge import between, judge
 from mbd.testing.fuzz.scenes import STRUCTURES, scene
 from mbd.testing.fuzz.verdict import verdict
+from tests.helpers import altered
 
 SOUND = [2, 10, 12, 40, 68, 98, 112, 128, 138]
 CUT = [23, 19, 1328, 2523, 27153]
@@ -30,7 +31,7 @@ ROUND_OFF = [2473, 3433]
 TIED = [4378, 30308]
 """Two steps of a quarter of the run: whether they are half of it must not be decided by the last bit; two runs
 of a flight without any error but round-off, of which that with longer steps is kept."""
-BETWEEN = [4644, 21327, 26660]
+BETWEEN = [4644, 21327]
 """A joint was open, and velocities did not fit it, between long steps of `RadauIIA`; accelerations of index 3 within
 a short last step."""
 STIFF = [22904]
@@ -173,20 +174,19 @@ def test_placements_are_differentiated_in_time():
 
 # planted faults ------------------------------------------------------------------------------------------------------
 def test_a_wrapped_angle_is_seen():
-    run = swung(arm())
-    run.record.q[60:, 0] -= 2.0 * np.pi
+    run = altered(swung(arm()), "q", np.s_[60:, 0], lambda q: q - 2.0 * np.pi)
     assert laws_broken(run, arm()) == {"a coordinate is the integral of its rate"}
 
 
 def test_a_contact_that_pulls_is_seen():
     model, run = skidding()
-    run.record.lam[-1, 0] = 30.0
+    run = altered(run, "lam", (-1, 0), lambda lam: 30.0)
     assert "a closed contact does not pull" in laws_broken(run, model)
 
 
 def test_friction_with_a_wrong_sign_is_seen():
     model, run = skidding()
-    run.record.lam[-1, 1] *= -1.0
+    run = altered(run, "lam", (-1, 1), lambda lam: -lam)
     assert {"friction opposes sliding", "balance of forces"} <= laws_broken(run, model)
 
 
@@ -222,7 +222,7 @@ def test_a_tolerance_excuses_no_reaction_where_nothing_is_stiff(monkeypatch):
 
 def test_a_row_off_its_constraint_is_seen():
     model, run = four_bar()
-    run.record.q[30, 1] += 1e-5
+    run = altered(run, "q", (30, 1), lambda q: q + 1e-5)
     assert "joint holds its frames together" in laws_broken(run, model)
 
 
@@ -242,10 +242,10 @@ def test_energy_that_a_loss_gives_is_seen(monkeypatch):
     assert {"balance of torques", "a passive part gives no energy"} <= laws_broken(swung(model), model)
 
 
-def test_a_blow_that_gives_energy_is_seen():
+def test_an_impact_that_gives_energy_is_seen():
     model, run = skidding()
     row = run.events[0].row
-    run.record.v[row:, 1] *= 20.0
+    run = altered(run, "v", np.s_[row:, 1], lambda v: 20.0 * v)
     broken = laws_broken(run, model)
     assert {"an impact makes no energy", "an impact rebounds with its restitution"} <= broken
 
