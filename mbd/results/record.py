@@ -50,8 +50,10 @@ class EventRecord:
     impulses: Mapping[str, Vector] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "impulse", read_only(self.impulse))
-        object.__setattr__(self, "impulses", {name: read_only(values) for name, values in self.impulses.items()})
+        if self.impulse.flags.writeable:
+            object.__setattr__(self, "impulse", read_only(self.impulse))
+        if isinstance(self.impulses, dict):  # others, which are asked later, give arrays that cannot be written to
+            object.__setattr__(self, "impulses", {name: read_only(values) for name, values in self.impulses.items()})
 
     def __repr__(self) -> str:
         extra = ""

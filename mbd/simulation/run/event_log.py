@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from mbd.arrays import Matrix, Vector
+from mbd.arrays import Matrix, Vector, read_only
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.results.record import EventRecord
 
@@ -38,7 +38,7 @@ class EventLog:
 
     def events(self, lines: Matrix, stored: int) -> list[EventRecord]:
         """The events of some lines (L, width), in rows counted from the `stored` ones on."""
-        impulses, bearers, found = lines[:, FIRST:].copy(), self._bearers, []
+        impulses, bearers, found = read_only(lines[:, FIRST:].copy()), self._bearers, []
         for number, (time, code, index, loss, row) in enumerate(lines[:, :FIRST].tolist()):
             kind, who = int(code), int(index)
             name, own, all_of_them = self._names[kind][who], impulses[number, :0], NONE
