@@ -34,12 +34,14 @@ from mbd.simulation.arguments import CHOICES
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "hardcases.md"
 
 SLOW = [pytest.mark.slow]
+LONG = {(case, name) for case in ("g3", "j1", "j4", "j5") for name in ("RadauIIA", "RungeKutta853")}
+"""Cases whose steps of high order take seconds: `pytest -m slow` and ``mbd hardcases`` judge them."""
 
 
 def marks(case: HardCase, name: str) -> list:
     """Strict where it is known not to hold: once it does, the list has to be shortened."""
     known = [pytest.mark.xfail(strict=True, reason=reason(case.id, name))] if reason(case.id, name) else []
-    return known + (SLOW if case.slow else [])
+    return known + (SLOW if case.slow or (short(case), name) in LONG else [])
 
 
 EVERY = [
