@@ -69,11 +69,12 @@ def check(kind: str, seed: int, scheme: mbd.Integrator, dt: float) -> None:
             continue
         put, true = mbd.simulate(model, start, scheme, dt=dt, until=t), exact(kind, seed, t)
         moments, before = run.at(t), int(np.searchsorted(run.time, t)) - 1
-        nearby = true.at(run.time[before])
         for group, names in kinds_of(run).items():
+            end, right = (one.at(one.time[-1]).read(*names) for one in (put, true))
+            nearby = true.at(run.time[before]).read(*names)
             for name, (value,) in moments.read(*names).items():
-                row = max(abs(put[name][-1] - true[name][-1]), abs(run[name][before] - nearby[name]))
-                errors = abs(value - true[name][-1]), row, float(np.max(np.abs(run[name])))
+                row = max(abs(end[name][0] - right[name][0]), abs(run[name][before] - nearby[name][0]))
+                errors = abs(value - right[name][0]), row, float(np.max(np.abs(run[name])))
                 found[group] = tuple(map(max, found[group], errors))
     for group, (between, row, size) in found.items():
         assert between <= FACTOR * row + FLOOR * size + NOTHING, (
