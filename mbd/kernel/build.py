@@ -47,9 +47,10 @@ def mbd_kernel(K: Kernel) -> int:
 
 def source_digest() -> str:
     """Hash of everything the kernel is made from: this folder, and schemes from elsewhere with what they import."""
-    folder, digest = Path(__file__).parent, hashlib.sha256()
+    folder, digest = Path(__file__).parent, hashlib.sha256(repr(contract.SCHEMES).encode())  # the order is the number
     for path in sorted({*folder.rglob("*.py"), *_beside(contract.SCHEMES)}):
-        digest.update(f"{path.name}\n".encode() + path.read_bytes())
+        name = path.relative_to(folder) if path.is_relative_to(folder) else path.name
+        digest.update(f"{name}\n".encode() + path.read_bytes())
     return digest.hexdigest()
 
 

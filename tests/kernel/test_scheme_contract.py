@@ -87,3 +87,15 @@ def test_what_it_cannot_do_is_refused_by_its_name():
         mbd.simulate(model, start, Midpoint(), tol=1e-6, until=0.1)
     with pytest.raises(CapabilityError, match=r"Midpoint\(\) has no step in Python"):
         Midpoint().start(None, State(0.0, np.zeros(1), np.zeros(1), np.zeros(0), Mode()), Mode(), 0.1)
+
+
+def test_the_kernel_of_another_order_of_schemes_is_another():
+    with pytest.MonkeyPatch.context() as patch:
+        digest = build.source_digest()
+        patch.setattr(contract, "SCHEMES", contract.SCHEMES[::-1])
+        assert build.source_digest() != digest
+
+
+def test_a_scheme_that_is_not_listed_is_refused_by_name():
+    with pytest.raises(CapabilityError, match="'bdf 7', which no entry has: there are 'newmark'"):
+        contract.scheme_named("bdf 7")

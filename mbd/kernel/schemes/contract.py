@@ -20,9 +20,10 @@ from typing import Any, Literal
 import numpy as np
 
 from mbd.arrays import Vector
+from mbd.errors import CapabilityError
 from mbd.kernel.records import Kernel
 
-__all__ = ["NO_SCHEME", "SCHEMES", "Abilities", "Scheme", "dispatch", "number_of", "schemes"]
+__all__ = ["MEMORY", "NO_SCHEME", "SCHEMES", "Abilities", "Scheme", "dispatch", "number_of", "scheme_named", "schemes"]
 
 SCHEMES: tuple[str, ...] = (
     "mbd.kernel.schemes.newmark",
@@ -30,6 +31,10 @@ SCHEMES: tuple[str, ...] = (
     "mbd.kernel.schemes.radau",
 )
 """Modules of the schemes that the kernel is built with; a scheme has its place here as its number."""
+
+
+MEMORY = ("stages", "past_stages", "tableau")
+"""Arrays whose lengths an entry may ask for."""
 
 
 @dataclass(frozen=True)
@@ -124,6 +129,25 @@ def _entries(modules: tuple[str, ...]) -> tuple[Scheme, ...]:
 def schemes() -> tuple[Scheme, ...]:
     """All entries, in the order of `SCHEMES`."""
     return _entries(SCHEMES)
+
+
+def scheme_named(name: str) -> Scheme:
+    """The entry of a name; `NO_SCHEME` for ''.
+
+    Raises
+    ------
+    CapabilityError
+        for a name that none in the list has.
+    """
+    if not name:
+        return NO_SCHEME
+    found = {scheme.name: scheme for scheme in schemes()}
+    if name not in found:
+        raise CapabilityError(
+            f"the integrator names the compiled scheme {name!r}, which no entry has: there are "
+            f"{', '.join(map(repr, found))}; add its module to mbd.kernel.schemes.contract.SCHEMES"
+        )
+    return found[name]
 
 
 def number_of(name: str) -> int:

@@ -12,13 +12,14 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.compile.mechanism import Mechanism
 from mbd.equations.equations import Equations
+from mbd.errors import CapabilityError
 from mbd.integrators.base import CompiledIntegrator, Integrator
 from mbd.integrators.newton import MAX_ITERATIONS
 from mbd.kernel import codes
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.kernel.contact_modes import room_to_log
 from mbd.kernel.records import PROGRAMS, TABLE, Kernel
-from mbd.kernel.schemes.contract import NO_SCHEME, Scheme, schemes
+from mbd.kernel.schemes.contract import MEMORY, NO_SCHEME, Scheme, scheme_named
 from mbd.simulation.run.call_table import CallTable
 from mbd.simulation.run.plain import KernelScheme, MechanismSystem, PlainScheme, row_units, unit_blocks
 from mbd.tape.derivatives import live
@@ -40,7 +41,7 @@ LOOKS = 4
 
 def own_scheme(integrator: Integrator) -> Scheme:
     """The kernel's scheme that takes this integrator's steps; `NO_SCHEME` if it is written in Python only."""
-    return next((scheme for scheme in schemes() if scheme.name == integrator.compiled_scheme), NO_SCHEME)
+    return scheme_named(integrator.compiled_scheme or "")
 
 
 def is_compiled(mechanism: Mechanism, integrator: Integrator) -> bool:
@@ -140,7 +141,13 @@ class Stepper:
     def _arrays(self, parameters: Vector, manager: ActiveSetManager) -> None:
         v = self.kernel
         block, tables = self.mechanism.layout.size, manager.tables()
-        given = self.own.memory(v) | {name: len(table) for name, table in tables.items()}
+        own = self.own.memory(v)
+        unknown = [name for name in own if name not in MEMORY]
+        if unknown:
+            raise CapabilityError(
+                f"the scheme {self.own.name!r} asks for memory {unknown[0]!r}; the kernel has {', '.join(MEMORY)}"
+            )
+        given = own | {name: len(table) for name, table in tables.items()}
         given |= {"block": block, "out": max(v.n_tangent, block), "acc": self.mechanism.sizes["accelerations"]}
         lengths = TABLE.lengths(v, given)
         self.reals, self.integers, *_ = (
