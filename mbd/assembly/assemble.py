@@ -37,7 +37,7 @@ from mbd.state import State
 __all__ = ["assemble"]
 
 BELOW = 1e-6
-"""Depth [m, rad] below which an open contact is told to start inside the ground."""
+"""Depth [m, rad] below which an open contact is reported to start inside the ground."""
 ROUNDED = 1e-3
 """Most by which named coordinates, such as those of a quaternion, are taken for rounded values of a placement [-]."""
 LIFTED = 1e-8

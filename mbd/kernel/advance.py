@@ -289,7 +289,7 @@ def judge_step(K: Kernel, h: float, full: float, t1: float, cut: bool, within: b
 
     Where guards are looked at inside it, only as many of its parts are taken as are free of events.
     """
-    holds = K.n_dropped == 0 or still_dependent(K) or K.near_singular > 0  # nothing is told apart there
+    holds = K.n_dropped == 0 or still_dependent(K) or K.near_singular > 0  # ranks are round-off there
     looked = in_parts(K)
     quiet = not looked and is_quiet(K)
     passes = K.n_guards > 0 and passes_events(K, h)

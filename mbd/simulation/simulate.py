@@ -215,10 +215,8 @@ def prepared(
     own = {name: options[name] for name in ("contact", "impact", "locate", "store", "rest_speed")}
     own["auto"] = auto
     own |= {name: value for name, value in adaptive.items() if value is not None}
-    return Run(
-        model, mechanism if watch is None else watch(mechanism), manager, scheme, start, dt, end, stop, changed, own,
-        settings,
-    )  # fmt: skip
+    watched = mechanism if watch is None else watch(mechanism)
+    return Run(model, watched, manager, scheme, start, dt, end, stop, changed, own, settings).at_start()
 
 
 @cache

@@ -129,7 +129,7 @@ def test_a_foot_opened_before_the_impact_takes_no_impulse_and_a_lock_opened_afte
     assert trajectory["left foot.force"][after] == 0.0 < trajectory["left foot.force"][before]
 
 
-def test_a_knee_lock_that_lets_go_before_the_impact_bends_in_it():
+def test_a_knee_lock_that_opens_before_the_impact_bends_in_it():
     model = kneed_walker()
     model.constraints = [
         mbd.Unilateral(c.name, c.measure, release=mbd.When(c.release[0].other)) if "lock" in c.name else c
@@ -140,7 +140,7 @@ def test_a_knee_lock_that_lets_go_before_the_impact_bends_in_it():
     assert abs(trajectory["left knee.rate"][strike.row]) > 0.1
 
 
-def test_a_contact_lets_go_as_a_penalty_contact_closes():
+def test_a_contact_opens_as_a_penalty_contact_closes():
     model, a, b = two_balls()
     model.constrain(
         mbd.Penalty("A", mbd.height(a.origin), stiffness=1e4, damping=20.0),

@@ -1,4 +1,4 @@
-"""What the lab does unless it is told otherwise: schemes, steps from the model's time scales, all coordinates."""
+"""What the lab does by default: schemes, steps from the model's time scales, all coordinates."""
 
 from __future__ import annotations
 

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from time import perf_counter
-from typing import Any
+from typing import Self
 
 import numpy as np
 
-from mbd.compile.mechanism import Mechanism
 from mbd.errors import MemoryLimitError, SimulationError, UnknownNameError
-from mbd.integrators.base import Integrator
 from mbd.kernel import codes
-from mbd.kernel.active_set import ActiveSetManager
 from mbd.results.columns import ModelColumns
 from mbd.simulation.diagnostics.energy import EnergyWatch
 from mbd.simulation.diagnostics.failures import attempt, crowded, explanation
@@ -53,36 +50,25 @@ class Run(RunData):
 
     energy: EnergyWatch
     room: Room
+    cause: BaseException | None = None
+    gave_up: tuple[float, str] | None = None
+    interrupted = False
+    observers: Sequence[Callable[[float, State], None]] = ()
+    progress: Callable[[float, float], None] | None = None
 
-    def __init__(
-        self,
-        model: Any,
-        mechanism: Mechanism,
-        manager: ActiveSetManager,
-        integrator: Integrator,
-        start: State,
-        dt: float,
-        end: float,
-        stop: str | None,
-        changed: Mapping[str, float],
-        options: dict[str, Any],
-        settings: dict[str, Any],
-    ) -> None:
-        super().__init__(model, mechanism, manager, integrator, start, dt, end, stop, changed, options, settings)
-        self.cause: BaseException | None = None
-        self.gave_up: tuple[float, str] | None = None
-        self.interrupted = False
+    def at_start(self) -> Self:
+        """The run with its start in the kernel's arrays, or with what that remembers of an earlier run."""
+        start = self.start
         self.energy, self.room = EnergyWatch(), Room(self.kernel.width)
-        self.observers: Sequence[Callable[[float, State], None]] = ()
-        self.progress: Callable[[float, float], None] | None = None
         self.resumed = take_up(self, start)
         notify(self)
         self.carried = self.resumed  # so do controllers
         if not self.resumed:
             begin(self, start)
             self.carried = carry_on(self, start)
-            if changed:
+            if self.changed:
                 check_rank(self, start, self.first_parameters)
+        return self
 
     def observe(
         self, observers: Sequence[Callable[[float, State], None]], progress: Callable[[float, float], None] | None
