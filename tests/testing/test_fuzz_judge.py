@@ -44,8 +44,10 @@ WELDED = [32593]
 """A weld that is cut: in index 3 its rates fit the bodies of the tree to the order of the scheme only."""
 FIRST_ORDER = [32503]
 """A scheme of first order whose velocities miss h times the change of accelerations, which rows pass on."""
-TWINS = [33555]
-"""A coarse step, whose corrections the twin makes in the metric of another iterate."""
+TWINS = [33555, 45761]
+"""A coarse step, whose corrections the twin makes in the metric of another iterate; a last row that is an event."""
+LAST_BIT = [30070]
+"""Whether Newton's method makes one more correction hangs on the last bit, and step sizes on it."""
 CANCELLED = [10250]
 """Errors of one cut cancel by the end, those of the other do not: both are of order 2."""
 
@@ -122,7 +124,8 @@ def test_impacts_friction_and_loops_of_sound_runs_break_no_law():
     + STEEP
     + WELDED
     + FIRST_ORDER
-    + TWINS,
+    + TWINS
+    + LAST_BIT,
 )
 def test_fuzzed_scenes_are_judged_sound(number):
     told = verdict(number)
