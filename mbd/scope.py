@@ -9,17 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol, TypeAlias
+from typing import Protocol
 
+from mbd.bodies.algebra import Rotation, Triple
+from mbd.bodies.base import Frame, ParameterScope
 from mbd.tape.node import Node, Scalar, Table, Tape
 
-if TYPE_CHECKING:
-    from mbd.bodies.base import Frame
-
 __all__ = ["FrameMotion", "JointMotion", "Rotation", "Scope", "Triple"]
-
-Triple: TypeAlias = tuple[Scalar, Scalar, Scalar]
-Rotation: TypeAlias = tuple[Triple, Triple, Triple]
 
 
 @dataclass(frozen=True)
@@ -43,7 +39,7 @@ class JointMotion:
     rates: tuple[Scalar, ...]
 
 
-class Scope(Protocol):
+class Scope(ParameterScope, Protocol):
     """The derivation as words see it."""
 
     tape: Tape
@@ -51,9 +47,6 @@ class Scope(Protocol):
     @property
     def time(self) -> Node:
         """t [s]."""
-
-    def parameter(self, owner: str, field: str, value: float) -> Node:
-        """The run-time input named ``owner.field``; an exact 0 or ±1 is structural and folds, unless tunable."""
 
     def table(self, owner: str, breaks: Sequence[float], coefficients: Sequence[Sequence[float]]) -> Table:
         """A piecewise cubic stored beside the parameters; evaluate it with ``scope.tape.lookup(table, x)``."""

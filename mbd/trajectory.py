@@ -227,9 +227,9 @@ class Trajectory:
 
         Read it with `mbd.load`.
         """
-        from mbd.results.storage import save
+        from mbd.results.storage import Archive, save
 
-        return save(self, path, names)
+        return save(self.record, Archive(self.columns, self.energy, self.violation, self.facts), path, names)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """To another process it travels as the file that `save` writes."""
@@ -308,4 +308,4 @@ def load(path: str | Path) -> Trajectory:
     """A run read from a file that `Trajectory.save` wrote; its names, plots and pages need no model."""
     from mbd.results.storage import load as read
 
-    return read(path)
+    return Trajectory(*read(path))

@@ -79,14 +79,14 @@ def weighted_velocities(
     for joint in chosen.edges:
         above = joint.parent.body.name
         R, p = poses.get(above, (np.eye(3), np.zeros(3)))
-        R, p = _after(R, p, *_placed(joint.parent.placement(scope)))  # type: ignore[arg-type]
+        R, p = _after(R, p, *_placed(joint.parent.placement(scope)))
         q = [scope.tape.lift(float(position.get(name, 0.0))) for name in joint.coordinate_names]
         R, p = _after(R, p, *_placed(joint.transform(q, scope)))  # type: ignore[arg-type]
         own = list(range(count, count + len(q)))
         for k, (turn, shift) in zip(own, joint.subspace(q, scope), strict=True):  # type: ignore[arg-type]
             turns[k], shifts[k], places[k] = R @ _floats(turn), R @ _floats(shift), p
         count += len(q)
-        inward, offset = _placed(joint.child.placement(scope))  # type: ignore[arg-type]
+        inward, offset = _placed(joint.child.placement(scope))
         R = R @ inward.T
         p = p - R @ offset
         body = joint.child.body

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from typing import TypeAlias
 
 from mbd.bodies.values import Vector3
-from mbd.scope import Rotation, Triple
 from mbd.tape.derivatives import jvp, substitute
 from mbd.tape.functions import cos, sin, sqrt
 from mbd.tape.node import Node, Scalar, Tape
 
 __all__ = [
-    "IDENTITY", "ZERO", "axis_rotation", "basis", "constant_rotation", "cross", "derivatives_at", "difference", "dot",
-    "norm", "product", "rotate", "scaled", "total", "transpose",
+    "IDENTITY", "ZERO", "Rotation", "Triple", "axis_rotation", "basis", "constant_rotation", "cross", "derivatives_at",
+    "difference", "dot", "norm", "product", "rotate", "scaled", "total", "transpose",
 ]  # fmt: skip
+
+Triple: TypeAlias = tuple[Scalar, Scalar, Scalar]
+Rotation: TypeAlias = tuple[Triple, Triple, Triple]
 
 ZERO: Vector3 = (0.0, 0.0, 0.0)
 IDENTITY: tuple[Vector3, Vector3, Vector3] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

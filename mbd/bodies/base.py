@@ -5,20 +5,26 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
-from mbd.bodies.algebra import IDENTITY, constant_rotation, product
+from mbd.bodies.algebra import IDENTITY, Rotation, Triple, constant_rotation, product
 from mbd.bodies.domains import Domain, Parameterized, at_least_zero
 from mbd.bodies.mass import MassProperties
 from mbd.bodies.values import Vector3, number, printable, triple, unit_vector
 from mbd.errors import ModelError, nearest
-from mbd.scope import Rotation, Scope, Triple
-from mbd.tape.node import Scalar
+from mbd.tape.node import Node, Scalar
 
-__all__ = ["Body", "Frame", "Parameter"]
+__all__ = ["Body", "Frame", "Parameter", "ParameterScope"]
 
 Parameter = Callable[[str], Scalar]
 """Gives the value of a field of a body, a number or a run-time input."""
+
+
+class ParameterScope(Protocol):
+    """What bodies ask of a `Scope`."""
+
+    def parameter(self, owner: str, field: str, value: float) -> Node:
+        """The run-time input named ``owner.field``; an exact 0 or ±1 is structural and folds, unless tunable."""
 
 
 class Body(Parameterized, ABC):
@@ -36,7 +42,7 @@ class Body(Parameterized, ABC):
         """Positions of its own frames in body axes [m], from its fields."""
 
     @abstractmethod
-    def mass_properties(self, scope: Scope) -> MassProperties:
+    def mass_properties(self, scope: ParameterScope) -> MassProperties:
         """Mass, center and inertia as run-time scalars."""
 
     def domains(self) -> dict[str, Domain]:
@@ -52,7 +58,7 @@ class Body(Parameterized, ABC):
         """ "body 'left thigh'"."""
         return f"body '{self.name}'"
 
-    def parameter(self, scope: Scope) -> Parameter:
+    def parameter(self, scope: ParameterScope) -> Parameter:
         """The run-time inputs of its fields."""
         values = self.fields()
         return lambda field: scope.parameter(self.name, field, values[field])
@@ -131,7 +137,7 @@ class Frame:
         """'left shank.end'."""
         return f"{self.body.name}.{self.name}"
 
-    def placement(self, scope: Scope) -> tuple[Rotation, Triple]:
+    def placement(self, scope: ParameterScope) -> tuple[Rotation, Triple]:
         """R, p of the frame in body axes at the body's origin; lengths are run-time inputs, zeros fold."""
         R: Rotation = IDENTITY if self.rotation is None else self.rotation
         if self.landmark is not None:

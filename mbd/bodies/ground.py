@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from mbd.bodies.algebra import ZERO
-from mbd.bodies.base import Body, Parameter
+from mbd.bodies.algebra import ZERO, Triple
+from mbd.bodies.base import Body, Parameter, ParameterScope
 from mbd.bodies.mass import MassProperties
-from mbd.scope import Scope, Triple
 
 __all__ = ["Ground"]
 
@@ -26,6 +25,6 @@ class Ground(Body):
         """`origin`."""
         return {"origin": ZERO}
 
-    def mass_properties(self, scope: Scope) -> MassProperties:
+    def mass_properties(self, scope: ParameterScope) -> MassProperties:
         """Zero: the ground does not move, so its mass enters nowhere."""
         return MassProperties()

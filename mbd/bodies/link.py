@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from mbd.bodies.algebra import ZERO
-from mbd.bodies.base import Body, Frame, Parameter
+from mbd.bodies.algebra import ZERO, Triple
+from mbd.bodies.base import Body, Frame, Parameter, ParameterScope
 from mbd.bodies.domains import Domain, at_least_zero
 from mbd.bodies.mass import (
     Inertia,
@@ -18,7 +18,6 @@ from mbd.bodies.mass import (
     inertia_of,
 )
 from mbd.bodies.values import name_of, number
-from mbd.scope import Scope, Triple
 
 __all__ = ["Link"]
 
@@ -76,7 +75,7 @@ class Link(Body):
         """The frame at the lower end."""
         return self.frame("end")
 
-    def mass_properties(self, scope: Scope) -> MassProperties:
+    def mass_properties(self, scope: ParameterScope) -> MassProperties:
         """m, center, I."""
         parameter = self.parameter(scope)
         return MassProperties(

@@ -8,10 +8,9 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from mbd.bodies.algebra import IDENTITY, ZERO
+from mbd.bodies.algebra import IDENTITY, ZERO, Rotation, Triple
 from mbd.bodies.values import number, numbers
 from mbd.errors import ModelError
-from mbd.scope import Rotation, Triple
 from mbd.tape.node import Scalar
 
 __all__ = ["Inertia", "MassProperties", "inertia_faults", "inertia_fields", "inertia_matrix", "inertia_of"]

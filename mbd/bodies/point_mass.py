@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from mbd.bodies.algebra import ZERO
-from mbd.bodies.base import Body, Parameter
+from mbd.bodies.algebra import ZERO, Triple
+from mbd.bodies.base import Body, Parameter, ParameterScope
 from mbd.bodies.mass import MassProperties
 from mbd.bodies.values import name_of, number
-from mbd.scope import Scope, Triple
 
 __all__ = ["PointMass"]
 
@@ -38,6 +37,6 @@ class PointMass(Body):
         """`origin` and `center`, the point itself."""
         return {"origin": ZERO, "center": ZERO}
 
-    def mass_properties(self, scope: Scope) -> MassProperties:
+    def mass_properties(self, scope: ParameterScope) -> MassProperties:
         """m at the origin."""
         return MassProperties(self.parameter(scope)("mass"))

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from mbd.bodies.algebra import ZERO
-from mbd.bodies.base import Body, Parameter
+from mbd.bodies.algebra import ZERO, Triple
+from mbd.bodies.base import Body, Parameter, ParameterScope
 from mbd.bodies.mass import (
     Inertia,
     MassProperties,
@@ -17,7 +17,6 @@ from mbd.bodies.mass import (
     inertia_of,
 )
 from mbd.bodies.values import Vector3, name_of, number, triple
-from mbd.scope import Scope, Triple
 
 __all__ = ["RigidBody"]
 
@@ -56,7 +55,7 @@ class RigidBody(Body):
         """`origin` and `center`."""
         return {"origin": ZERO, "center": (parameter("center.x"), parameter("center.y"), parameter("center.z"))}
 
-    def mass_properties(self, scope: Scope) -> MassProperties:
+    def mass_properties(self, scope: ParameterScope) -> MassProperties:
         """m, center, I."""
         parameter = self.parameter(scope)
         return MassProperties(

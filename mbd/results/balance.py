@@ -9,7 +9,7 @@ other. Their multipliers are those of least norm among all that give the same fo
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -20,11 +20,9 @@ from mbd.compile.python import ArrayFunction, array_function
 from mbd.equations import programs
 from mbd.equations.equations import Equations
 from mbd.results.record import Rows
+from mbd.results.stored_states import StoredStates
 from mbd.tape.derivatives import live
 from mbd.tape.node import Tape
-
-if TYPE_CHECKING:
-    from mbd.results.columns import ModelColumns
 
 __all__ = ["Balance", "Solved", "put"]
 
@@ -89,8 +87,8 @@ class _Held:
 class Balance:
     """Solves for accelerations and multipliers at states of a run."""
 
-    def __init__(self, columns: ModelColumns) -> None:
-        self.columns, self.equations = columns, columns.equations
+    def __init__(self, states: StoredStates) -> None:
+        self.states, self.equations = states, states.equations
         self.terms, self.follows = _terms(self.equations)
         self._held: dict[bytes, _Held] = {}
 
@@ -159,7 +157,7 @@ class Balance:
     def _terms_at(self, rows: Rows) -> tuple[Any, ...]:
         """M (k, n, n), f (k, n), R (k, n, m), B (k, m, n), γ (k, m), limits of frictions (k, n_frictions)."""
         n, m, count = self.equations.n_v + self.equations.n_z, len(self.equations.rows), len(rows)
-        flat = np.array(self.terms(self.columns.inputs(rows), self.columns.record.parameters_at(rows.source))).T
+        flat = np.array(self.terms(self.states.inputs(rows), self.states.record.parameters_at(rows.source))).T
         cuts = np.cumsum([n * n, n, n * m, m * n, m, m, m])
         M, f, R, B, _, _, bias, rest = np.split(flat.reshape(count, -1), cuts, axis=1)
         limits = rest[:, rest.shape[1] - len(self.equations.frictions) :]
@@ -175,11 +173,11 @@ class Balance:
         ]  # fmt: skip
         if not every:
             return _Held([], [])
-        record = self.columns.record
+        record = self.states.record
         same = np.all(record.closed == closed, axis=1) & np.all(record.phase == phase, axis=1)
         places = np.flatnonzero(same)
         chosen = places[np.linspace(0, len(places) - 1, min(len(places), SAMPLES)).astype(np.intp)]
-        M, _, _, B, *_ = self._terms_at(self.columns.rows.part(chosen))
+        M, _, _, B, *_ = self._terms_at(self.states.rows.part(chosen))
         independent = _independent(B[:, every] / _weights(M))
         return _Held(every, [every[k] for k in independent])
 

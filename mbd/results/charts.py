@@ -15,7 +15,7 @@ import numpy as np
 
 from mbd.arrays import Matrix
 from mbd.compile.python import array_function
-from mbd.results.interpolation import Places, hermite, hermite_rate, quintics
+from mbd.results.polynomials import Places, hermite, hermite_rate, quintics
 from mbd.results.record import Rows
 from mbd.tape.derivatives import jvp
 from mbd.tape.node import Node, Scalar, Tape

@@ -9,7 +9,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
 from mbd.errors import TrajectoryError, UnknownNameError, nearest
@@ -18,14 +17,16 @@ from mbd.results.charts import Charts
 from mbd.results.dense import Restepping
 from mbd.results.dense_implicit import LedSteps
 from mbd.results.forces import Forces
-from mbd.results.interpolation import Grid, Places
+from mbd.results.interpolation import Grid
 from mbd.results.names import AXES, rate_name
+from mbd.results.polynomials import Places
 from mbd.results.record import Record, Rows
-from mbd.results.turning import counted, doubtful, function_of, turns_to
+from mbd.results.stored_states import StoredStates, is_smooth
+from mbd.results.turning import turns_to
 
 if TYPE_CHECKING:
     from mbd.equations.equations import Equations
-    from mbd.tape.node import Node, Scalar
+    from mbd.tape.node import Node
 
 __all__ = ["Alias", "Columns", "ModelColumns", "SavedColumns", "StoredColumns", "gather"]
 
@@ -102,22 +103,16 @@ class Columns(ABC):
         raise UnknownNameError(nearest(name, (*self.names, *self.vectors), "result", "The run has"))
 
 
-class ModelColumns(Columns):
+class ModelColumns(StoredStates, Columns):
     """Quantities evaluated by the model's own equations."""
 
     def __init__(self, record: Record, equations: Equations) -> None:
-        super().__init__(record)
-        self.equations = equations
-        self._names: tuple[str, ...] | None = None
+        StoredStates.__init__(self, record, equations)
         self._nodes: dict[str, Node] = {}
-        self._anchors: Matrix | None = None
-        self._steps: Restepping | None = None
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
-        if self._names is None:
-            self._names = tuple(self.equations.output_names())
-        return self._names
+        return tuple(self.equations.output_names())
 
     @property
     def between_rows(self) -> ModelColumns:
@@ -141,20 +136,6 @@ class ModelColumns(Columns):
             raise UnknownNameError(nearest(name, (*self.names, *self.vectors), "result", "The run has"))
         return self._nodes[name]
 
-    @property
-    def rows(self) -> Rows:
-        """The stored states."""
-        return self.record.rows(self.anchors)
-
-    def part(self, chosen: NDArray[np.intp], nodes: Sequence[Node]) -> Rows:
-        """Some of the stored states; what contacts have captured is found only where these expressions need it."""
-        from mbd.tape.derivatives import live
-
-        with self.equations.tape.lock:
-            needed = any(node.op == "input" and node.data[0] == "anchor" for node in live(nodes))
-        anchors = self.anchors[chosen] if needed else np.zeros((len(chosen), self.equations.n_anchors))
-        return self.record.part(chosen, anchors)
-
     def at_rows(self, names: Sequence[str]) -> list[Vector]:
         return self.evaluate([self.node(name) for name in names], self.rows)
 
@@ -170,8 +151,6 @@ class ModelColumns(Columns):
         return self._turned(self._between(places, forces), places)
 
     def _between(self, places: Places, forces: bool) -> Rows:
-        if self._steps is None and Restepping.serves(self):
-            self._steps = Restepping(self)
         if self._steps is not None:
             return self._steps.at(self.rows, places)
         if forces and Balance.serves(self.equations):
@@ -186,8 +165,12 @@ class ModelColumns(Columns):
         found = self.grid.between(rows, places, self.q_rate, smooth, charts)
         rougher = self.grid.rougher(rows, places, found, plain, smooth)
         if smooth and LedSteps.serves(self) and Balance.serves(self.equations):
-            found = LedSteps(self).at(rows, places, found)
+            found = LedSteps(Restepping(self, self.balance)).at(rows, places, found)
         return found, rougher
+
+    @cached_property
+    def _steps(self) -> Restepping | None:
+        return Restepping(self, self.balance) if Restepping.serves(self) else None
 
     @cached_property
     def _forces(self) -> Forces:
@@ -197,82 +180,6 @@ class ModelColumns(Columns):
     def balance(self) -> Balance:
         """The equations of motion, to be solved at any state."""
         return Balance(self)
-
-    @property
-    def q_rate(self) -> Matrix:
-        """q̇ = ∂(q ⊕ x)/∂x · v at x = 0; v itself where ⊕ is +."""
-        compose = self.equations.compose
-        if compose is None:
-            return self.record.v
-        from mbd.tape.derivatives import jvp
-
-        tape = self.equations.tape
-        with tape.lock:
-            seeds: dict[Node, Scalar] = {tape.input("x", k): tape.input("v", k) for k in range(self.equations.n_v)}
-            rates = jvp(compose, seeds)
-        return np.column_stack(self.evaluate(rates, self.rows))
-
-    def evaluate(self, nodes: Sequence[Node], rows: Rows) -> list[Vector]:
-        """Each expression at each row, (R,)."""
-        if not nodes:
-            return []
-        from mbd.compile.python import array_function
-
-        unique = list({node.index: node for node in nodes}.values())
-        values = array_function(unique)(self.inputs(rows), self.record.parameters_at(rows.source))
-        found = {node.index: value for node, value in zip(unique, values, strict=True)}
-        return [found[node.index] for node in nodes]
-
-    @staticmethod
-    def inputs(rows: Rows) -> Mapping[str, NDArray[Any]]:
-        """The inputs of expressions, at the center of each chart (x = 0)."""
-        return {
-            "t": rows.time, "q": rows.q, "v": rows.v, "z": rows.z, "a": rows.a, "s": rows.s, "lam": rows.lam,
-            "anchor": rows.anchors, "switch": rows.closed, "slip": np.where(np.abs(rows.phase) == 1, rows.phase, 0),
-        }  # fmt: skip
-
-    @property
-    def anchors(self) -> Matrix:
-        """What each contact captured in the row where it closed, or holds from the start, until it opens."""
-        if self._anchors is None:
-            contacts = self.equations.contacts
-            held = np.zeros((len(self.record.time), self.equations.n_anchors))
-            counts = [turn.anchor for turn in self.equations.turns]
-            if counts and self.record.start is not None and len(self.record.start.anchors) == held.shape[1]:
-                held[:, counts] = self.record.start.anchors[counts]
-            rows = self.record.rows(held)
-            for number, contact in enumerate(contacts):
-                closed = self.record.closed[:, number].astype(bool)
-                if not contact.anchors or not closed.any():
-                    continue
-                fresh = closed.copy()
-                fresh[1:] &= ~closed[:-1]
-                captured = np.column_stack(self.evaluate(contact.captured, rows.part(np.flatnonzero(fresh))))
-                if closed[0] and self.record.start is not None and contact.name in self.record.start.mode.closed:
-                    captured[0] = self.record.start.anchors[list(contact.anchors)]
-                held[np.ix_(closed, np.array(contact.anchors))] = captured[np.cumsum(fresh)[closed] - 1]
-            self._anchors = held
-            wrapped = self.equations.wrapped
-            for turn, (angle, rate) in zip(wrapped, self._turning(self.record.rows(held)), strict=True):
-                held[:, turn.anchor] += counted(self.record.time, angle, rate)
-        return self._anchors
-
-    def _turning(self, rows: Rows) -> list[tuple[Vector, Vector]]:
-        """Angle and rate of every cut joint whose turns are counted along the motion."""
-        wrapped = self.equations.wrapped
-        if not wrapped:
-            return []
-        found = function_of(wrapped)(self.inputs(rows), self.record.parameters_at(rows.source))
-        return list(zip(found[::2], found[1::2], strict=True))
-
-    def doubtful_turns(self) -> list[tuple[str, float]]:
-        """(name, time) of angles of cut joints whose turns are a guess from some row on."""
-        found = []
-        for turn, (angle, rate) in zip(self.equations.wrapped, self._turning(self.rows), strict=True):
-            doubts = np.flatnonzero(doubtful(self.record.time, angle, rate))
-            if len(doubts):
-                found.append((turn.name, float(self.record.time[doubts[0]])))
-        return found
 
     def _turned(self, found: Rows, places: Places) -> Rows:
         """States between the rows with the turns made there."""
@@ -299,6 +206,10 @@ class SavedColumns(ModelColumns):
     def __init__(self, record: Record, expressions: Any, anchors: Matrix, q_rate: Matrix) -> None:
         super().__init__(record, expressions)
         self._anchors, self._rates = anchors, q_rate
+
+    @property
+    def anchors(self) -> Matrix:
+        return self._anchors
 
     @property
     def q_rate(self) -> Matrix:
@@ -375,14 +286,6 @@ def asks_for_forces(nodes: Sequence[Node]) -> bool:
     from mbd.tape.derivatives import live
 
     return any(node.op == "input" and node.data[0] in ("a", "s", "lam") for node in live(nodes))
-
-
-def is_smooth(record: Record, plain: bool) -> bool:
-    """Whether the scheme is of high order, with accelerations as accurate as positions.
-
-    plain : whether q̇ = v, or charts are known in which positions are interpolated
-    """
-    return plain and record.settings.get("between", "hermite") != "hermite"
 
 
 def gather(columns: Columns, read: Callable[[Sequence[str]], list[Vector]], name: str) -> Vector | Matrix:

@@ -9,19 +9,17 @@ lie far enough from such poses, take its place.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.kernel.schemes.dormand_prince import END, NODES, STAGES, WEIGHTS
-from mbd.results.balance import Solved, put
+from mbd.results.balance import Balance, Solved, put
 from mbd.results.charts import Charts
+from mbd.results.polynomials import Places
 from mbd.results.record import Rows
-
-if TYPE_CHECKING:
-    from mbd.results.columns import ModelColumns
-    from mbd.results.interpolation import Places
+from mbd.results.stored_states import StoredStates
 
 __all__ = ["Restepping"]
 
@@ -32,17 +30,17 @@ NEAR_POSE = 0.2
 class Restepping:
     """States between the rows of a run of `RungeKutta853` that stored every step."""
 
-    def __init__(self, columns: ModelColumns) -> None:
-        self.columns, self.equations = columns, columns.equations
-        self.charts = Charts.of(columns.equations)
+    def __init__(self, states: StoredStates, balance: Balance) -> None:
+        self.states, self.equations, self.balance = states, states.equations, balance
+        self.charts = Charts.of(states.equations)
 
     @staticmethod
-    def serves(columns: ModelColumns) -> bool:
+    def serves(states: StoredStates) -> bool:
         """Whether the steps of this run can be taken again: all stored, in one mode each, with no dry friction.
 
         Frictions that follow loads would need a search at every stage.
         """
-        settings, equations = columns.record.settings, columns.equations
+        settings, equations = states.record.settings, states.equations
         stepped = settings.get("between") == "stages" and settings.get("store") == 1
         known = equations.compose is None or Charts.of(equations) is not None
         return stepped and known and not equations.frictions
@@ -71,7 +69,7 @@ class Restepping:
 
     def _smoothed(self, rows: Rows, places: Places, found: Rows, near: Any) -> Rows:
         """The states with those told by `near` interpolated."""
-        between = self.columns.grid.between(rows, places, self.columns.q_rate, True, self.charts)
+        between = self.states.grid.between(rows, places, self.states.q_rate, True, self.charts)
         names = ("q", "v", "z", "a", "s", "lam")
         new: dict[str, Any] = {name: put(getattr(found, name), near, getattr(between, name)[near]) for name in names}
         return replace(found, **new)
@@ -104,4 +102,4 @@ class Restepping:
         return state[:, :n_q], state[:, n_q : n_q + n_v], state[:, n_q + n_v :]
 
     def _rates(self, rows: Rows) -> Solved:
-        return self.columns.balance.solve(rows)
+        return self.balance.solve(rows)

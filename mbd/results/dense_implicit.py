@@ -12,18 +12,15 @@ short steps, in which δ is no matter.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
 from mbd.results.dense import NEAR_POSE, Restepping
-from mbd.results.interpolation import Places, hermite, quintic
+from mbd.results.polynomials import Places, hermite, quintic
 from mbd.results.record import Rows
-
-if TYPE_CHECKING:
-    from mbd.results.columns import ModelColumns
+from mbd.results.stored_states import StoredStates
 
 __all__ = ["LedSteps"]
 
@@ -39,13 +36,13 @@ SHORT = 1e-9
 class LedSteps:
     """States between the rows of a run of `RadauIIA` that stored every step."""
 
-    def __init__(self, columns: ModelColumns) -> None:
-        self.columns, self.steps = columns, Restepping(columns)
+    def __init__(self, steps: Restepping) -> None:
+        self.steps = steps
 
     @staticmethod
-    def serves(columns: ModelColumns) -> bool:
+    def serves(states: StoredStates) -> bool:
         """Whether its steps can be followed: all stored, of q + x, with no dry friction."""
-        settings, equations = columns.record.settings, columns.equations
+        settings, equations = states.record.settings, states.equations
         stepped = settings.get("between") == "quintic" and settings.get("store") == 1
         return stepped and equations.compose is None and not equations.frictions and equations.n_v > 0
 

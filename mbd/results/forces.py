@@ -22,7 +22,7 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.results.balance import Balance, Flags, put
-from mbd.results.interpolation import Places
+from mbd.results.polynomials import Places
 from mbd.results.record import Rows
 
 __all__ = ["Forces"]

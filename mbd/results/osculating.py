@@ -14,16 +14,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import perm
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
+from mbd.results.polynomials import Index, Places
 from mbd.results.quadrature import stretches
-
-if TYPE_CHECKING:
-    from mbd.results.interpolation import Places
 
 __all__ = ["DOUBT", "Osculation", "osculating"]
 
@@ -35,8 +31,6 @@ AT_ONCE = 4096
 """Intervals whose polynomials are found together."""
 SHORT = 120.0
 """Difference of C and Q over that of Q and P, times (ω h)² [-]."""
-
-Index = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -19,9 +19,6 @@ from mbd.results.record import EventRecord, Record
 from mbd.results.states import pack_state, unpack
 from mbd.results.violation import Violation
 from mbd.state import State, malformed
-
-if TYPE_CHECKING:
-    from mbd.trajectory import Trajectory
 
 __all__ = ["SUFFIX", "Archive", "load", "save"]
 
@@ -37,18 +34,17 @@ ROWS = ("time", "q", "v", "z", "a", "s", "lam", "closed", "phase", "parameters")
 class Archive:
     """What a file holds besides the record."""
 
-    columns: StoredColumns
+    columns: Columns
     ledger: Ledger
     violation: Violation
     facts: Facts
 
 
-def save(run: Trajectory, path: str | Path, names: Sequence[str] | None = None) -> Path:
+def save(record: Record, run: Archive, path: str | Path, names: Sequence[str] | None = None) -> Path:
     """Write a run; see `Trajectory.save`."""
     from mbd.results.capsule import packed
 
     target = named_file(path, SUFFIX)
-    record = run.record
     arrays: Arrays = {name: getattr(record, name) for name in ROWS}
     arrays["anchors"], q_rate = run.columns.anchors, run.columns.q_rate
     if q_rate is not record.v:
@@ -65,8 +61,8 @@ def save(run: Trajectory, path: str | Path, names: Sequence[str] | None = None) 
         arrays[f"change {number}"] = values
     meta["aliases"], meta["values"], meta["names"] = _columns(run.columns, names, arrays)
     meta["expressions"] = _expressions(run.columns, meta["names"], arrays)
-    meta["parts"], meta["stored"] = _ledger(run.energy, arrays)
-    meta["withheld"] = [[part.name, part.withheld] for part in run.energy.parts if part.withheld]
+    meta["parts"], meta["stored"] = _ledger(run.ledger, arrays)
+    meta["withheld"] = [[part.name, part.withheld] for part in run.ledger.parts if part.withheld]
     write(target, arrays, meta)
     return target
 
@@ -139,7 +135,7 @@ def _read_ledger(record: Record, arrays: Arrays, meta: Mapping[str, Any]) -> Led
     return Ledger(record.time, arrays["kinetic"], arrays["potential"], parts, stride, stored, marks)
 
 
-def load(path: str | Path) -> Trajectory:
+def load(path: str | Path) -> tuple[Record, Archive]:
     """Read a run; see `mbd.load`."""
     return read(Path(path), FORMAT, VERSION, "run.save(…)", _wanted, _run)
 
@@ -149,10 +145,8 @@ def _wanted(meta: Mapping[str, Any], members: Members) -> set[str]:
     return arrays_of_run(meta, members) | arrays_of_expressions(meta.get("expressions"), members)
 
 
-def _run(meta: dict[str, Any], arrays: Arrays) -> Trajectory:
+def _run(meta: dict[str, Any], arrays: Arrays) -> tuple[Record, Archive]:
     """A run from the words and arrays of a file."""
-    from mbd.trajectory import Trajectory
-
     record = _record(arrays, meta)
     expect(bool(np.all(np.isfinite(record.time)) and np.all(np.diff(record.time) >= 0.0)), "'time'")
     expect(bool(np.all(record.closed <= 1) and np.all(record.closed >= 0)), "'closed'")
@@ -164,7 +158,7 @@ def _run(meta: dict[str, Any], arrays: Arrays) -> Trajectory:
         model = SavedColumns(record, read_expressions(words, arrays, len(record.parameters)), anchors, q_rate)
     columns = StoredColumns(record, aliases, values, meta["names"], anchors, q_rate, model)
     ledger = _read_ledger(record, arrays, meta)
-    return Trajectory(record, Archive(columns, ledger, Violation(**meta["violation"]), Facts.read(meta["facts"])))
+    return record, Archive(columns, ledger, Violation(**meta["violation"]), Facts.read(meta["facts"]))
 
 
 def _record(arrays: Arrays, meta: Mapping[str, Any]) -> Record:

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
 from mbd.results.charts import Charts
-from mbd.results.columns import is_smooth
 from mbd.results.dense import Restepping
-from mbd.results.interpolation import Places
+from mbd.results.polynomials import Places
+from mbd.results.stored_states import is_smooth
 
 if TYPE_CHECKING:
     from mbd.results.columns import ModelColumns

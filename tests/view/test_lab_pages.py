@@ -12,8 +12,7 @@ import pytest
 import mbd
 from mbd.analysis.accuracy import Accuracy, Point
 from mbd.analysis.effects import Effects
-from mbd.analysis.effects.contribution import Change, Contribution
-from mbd.analysis.effects.result import Together
+from mbd.analysis.effects.contribution import Change, Contribution, Together
 from mbd.analysis.effects.timing import Timing
 from mbd.view.effects_page import content
 

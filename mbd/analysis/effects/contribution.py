@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from mbd.analysis.effects.timing import Timing
 
-__all__ = ["Change", "Contribution"]
+__all__ = ["Change", "Contribution", "Together"]
 
 MOST = 0.5
 """Share of the instants between shifted events above which the others say too little of a run [-]."""
@@ -110,3 +110,13 @@ class Contribution:
         if abs(self.timing.added) <= self.timing.noise:
             return f"< {max(self.timing.noise, 1.0):.0f}"
         return f"{self.timing.added:.0f}"
+
+
+@dataclass(frozen=True)
+class Together:
+    """Effects left out at once: their names, those put back before, the change, and the operations that are left."""
+
+    names: tuple[str, ...]
+    back: tuple[str, ...]
+    change: Change
+    operations: int

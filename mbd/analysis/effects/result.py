@@ -9,30 +9,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mbd.analysis.effects.advice import advice
-from mbd.analysis.effects.contribution import Change, Contribution
+from mbd.analysis.effects.contribution import Contribution, Together
 from mbd.analysis.rows import Rows
 from mbd.errors import UnknownNameError, nearest
 
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
 
-__all__ = ["HEADS", "Effects", "Together", "cells"]
+__all__ = ["HEADS", "Effects", "cells"]
 
 HEADS = ("effect", "kind", "operations", "ns/step", "energy [J]", "share", "change", "of", "until [s]")
 """Columns of the table."""
 
 WHEN = {"always": "", "while closed": "*", "while sliding": "†"}
 """Marks of operations that are not always taken."""
-
-
-@dataclass(frozen=True)
-class Together:
-    """Effects left out at once: their names, those put back before, the change, and the operations that are left."""
-
-    names: tuple[str, ...]
-    back: tuple[str, ...]
-    change: Change
-    operations: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +62,9 @@ class Effects(Rows):
     @cached_property
     def recommendation(self) -> tuple[str, ...]:
         """Which effects may be left out, alone and together."""
-        return tuple(advice(self))
+        if not self.complete:
+            return ("The study was interrupted, so nothing is recommended.",)
+        return tuple(advice(self.contributions, self.together, self.tolerance, self.operations))
 
     @property
     def droppable(self) -> tuple[str, ...]:

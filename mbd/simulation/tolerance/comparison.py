@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
 from mbd.results.dense import Restepping
-from mbd.results.interpolation import Places, quintic
 from mbd.results.matching import Matches, apart, matched
 from mbd.results.osculating import DOUBT, osculating
+from mbd.results.polynomials import Places, quintic
 
 if TYPE_CHECKING:
     from mbd.results.columns import ModelColumns

@@ -1,0 +1,124 @@
+"""The stored states of a run with the model's equations, which evaluate any expression there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbd.arrays import Matrix, Vector
+from mbd.results.interpolation import Grid
+from mbd.results.record import Record, Rows
+from mbd.results.turning import counted, doubtful, function_of
+
+if TYPE_CHECKING:
+    from mbd.equations.equations import Equations
+    from mbd.tape.node import Node, Scalar
+
+__all__ = ["StoredStates", "is_smooth"]
+
+
+class StoredStates:
+    """States at the rows of a run, with what contacts and turns hold there."""
+
+    def __init__(self, record: Record, equations: Equations) -> None:
+        self.record, self.equations = record, equations
+        self.grid = Grid(record.time)
+
+    @property
+    def rows(self) -> Rows:
+        """The stored states."""
+        return self.record.rows(self.anchors)
+
+    def part(self, chosen: NDArray[np.intp], nodes: Sequence[Node]) -> Rows:
+        """Some of the stored states; what contacts have captured is found only where these expressions need it."""
+        from mbd.tape.derivatives import live
+
+        with self.equations.tape.lock:
+            needed = any(node.op == "input" and node.data[0] == "anchor" for node in live(nodes))
+        anchors = self.anchors[chosen] if needed else np.zeros((len(chosen), self.equations.n_anchors))
+        return self.record.part(chosen, anchors)
+
+    @property
+    def q_rate(self) -> Matrix:
+        """q̇ = ∂(q ⊕ x)/∂x · v at x = 0; v itself where ⊕ is +."""
+        compose = self.equations.compose
+        if compose is None:
+            return self.record.v
+        from mbd.tape.derivatives import jvp
+
+        tape = self.equations.tape
+        with tape.lock:
+            seeds: dict[Node, Scalar] = {tape.input("x", k): tape.input("v", k) for k in range(self.equations.n_v)}
+            rates = jvp(compose, seeds)
+        return np.column_stack(self.evaluate(rates, self.rows))
+
+    def evaluate(self, nodes: Sequence[Node], rows: Rows) -> list[Vector]:
+        """Each expression at each row, (R,)."""
+        if not nodes:
+            return []
+        from mbd.compile.python import array_function
+
+        unique = list({node.index: node for node in nodes}.values())
+        values = array_function(unique)(self.inputs(rows), self.record.parameters_at(rows.source))
+        found = {node.index: value for node, value in zip(unique, values, strict=True)}
+        return [found[node.index] for node in nodes]
+
+    @staticmethod
+    def inputs(rows: Rows) -> Mapping[str, NDArray[Any]]:
+        """The inputs of expressions, at the center of each chart (x = 0)."""
+        return {
+            "t": rows.time, "q": rows.q, "v": rows.v, "z": rows.z, "a": rows.a, "s": rows.s, "lam": rows.lam,
+            "anchor": rows.anchors, "switch": rows.closed, "slip": np.where(np.abs(rows.phase) == 1, rows.phase, 0),
+        }  # fmt: skip
+
+    @cached_property
+    def anchors(self) -> Matrix:
+        """What each contact captured in the row where it closed, or holds from the start, until it opens."""
+        start, wrapped = self.record.start, self.equations.wrapped
+        held = np.zeros((len(self.record.time), self.equations.n_anchors))
+        counts = [turn.anchor for turn in self.equations.turns]
+        if counts and start is not None and len(start.anchors) == held.shape[1]:
+            held[:, counts] = start.anchors[counts]
+        rows = self.record.rows(held)
+        for number, contact in enumerate(self.equations.contacts):
+            closed = self.record.closed[:, number].astype(bool)
+            if not contact.anchors or not closed.any():
+                continue
+            fresh = closed.copy()
+            fresh[1:] &= ~closed[:-1]
+            captured = np.column_stack(self.evaluate(contact.captured, rows.part(np.flatnonzero(fresh))))
+            if closed[0] and start is not None and contact.name in start.mode.closed:
+                captured[0] = start.anchors[list(contact.anchors)]
+            held[np.ix_(closed, np.array(contact.anchors))] = captured[np.cumsum(fresh)[closed] - 1]
+        for turn, (angle, rate) in zip(wrapped, self._turning(self.record.rows(held)), strict=True):
+            held[:, turn.anchor] += counted(self.record.time, angle, rate)
+        return held
+
+    def _turning(self, rows: Rows) -> list[tuple[Vector, Vector]]:
+        """Angle and rate of every cut joint whose turns are counted along the motion."""
+        wrapped = self.equations.wrapped
+        if not wrapped:
+            return []
+        found = function_of(wrapped)(self.inputs(rows), self.record.parameters_at(rows.source))
+        return list(zip(found[::2], found[1::2], strict=True))
+
+    def doubtful_turns(self) -> list[tuple[str, float]]:
+        """(name, time) of angles of cut joints whose turns are a guess from some row on."""
+        found = []
+        for turn, (angle, rate) in zip(self.equations.wrapped, self._turning(self.rows), strict=True):
+            doubts = np.flatnonzero(doubtful(self.record.time, angle, rate))
+            if len(doubts):
+                found.append((turn.name, float(self.record.time[doubts[0]])))
+        return found
+
+
+def is_smooth(record: Record, plain: bool) -> bool:
+    """Whether the scheme is of high order, with accelerations as accurate as positions.
+
+    plain : whether q̇ = v, or charts are known in which positions are interpolated
+    """
+    return plain and record.settings.get("between", "hermite") != "hermite"
