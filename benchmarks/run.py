@@ -69,7 +69,7 @@ def load() -> float | None:
 
 
 def _machine() -> dict[str, Any]:
-    from mbd.compile.llvm import host
+    from mbd.compile.host import host
 
     return {
         "processor": host().cpu,

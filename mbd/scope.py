@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from mbd.bodies.algebra import Rotation, Triple
-from mbd.bodies.base import Frame, ParameterScope
+from mbd.bodies.base import Frame, ParameterSource
 from mbd.tape.node import Node, Scalar, Table, Tape
 
 __all__ = ["FrameMotion", "JointMotion", "Rotation", "Scope", "Triple"]
@@ -39,7 +39,7 @@ class JointMotion:
     rates: tuple[Scalar, ...]
 
 
-class Scope(ParameterScope, Protocol):
+class Scope(ParameterSource, Protocol):
     """The derivation as words see it."""
 
     tape: Tape

@@ -14,13 +14,13 @@ from mbd.bodies.values import Vector3, number, printable, triple, unit_vector
 from mbd.errors import ModelError, nearest
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["Body", "Frame", "Parameter", "ParameterScope"]
+__all__ = ["Body", "Frame", "Parameter", "ParameterSource"]
 
 Parameter = Callable[[str], Scalar]
 """Gives the value of a field of a body, a number or a run-time input."""
 
 
-class ParameterScope(Protocol):
+class ParameterSource(Protocol):
     """What bodies ask of a `Scope`."""
 
     def parameter(self, owner: str, field: str, value: float) -> Node:
@@ -42,7 +42,7 @@ class Body(Parameterized, ABC):
         """Positions of its own frames in body axes [m], from its fields."""
 
     @abstractmethod
-    def mass_properties(self, scope: ParameterScope) -> MassProperties:
+    def mass_properties(self, scope: ParameterSource) -> MassProperties:
         """Mass, center and inertia as run-time scalars."""
 
     def domains(self) -> dict[str, Domain]:
@@ -58,7 +58,7 @@ class Body(Parameterized, ABC):
         """ "body 'left thigh'"."""
         return f"body '{self.name}'"
 
-    def parameter(self, scope: ParameterScope) -> Parameter:
+    def parameter(self, scope: ParameterSource) -> Parameter:
         """The run-time inputs of its fields."""
         values = self.fields()
         return lambda field: scope.parameter(self.name, field, values[field])
@@ -137,7 +137,7 @@ class Frame:
         """'left shank.end'."""
         return f"{self.body.name}.{self.name}"
 
-    def placement(self, scope: ParameterScope) -> tuple[Rotation, Triple]:
+    def placement(self, scope: ParameterSource) -> tuple[Rotation, Triple]:
         """R, p of the frame in body axes at the body's origin; lengths are run-time inputs, zeros fold."""
         R: Rotation = IDENTITY if self.rotation is None else self.rotation
         if self.landmark is not None:

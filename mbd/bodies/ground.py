@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from mbd.bodies.algebra import ZERO, Triple
-from mbd.bodies.base import Body, Parameter, ParameterScope
+from mbd.bodies.base import Body, Parameter, ParameterSource
 from mbd.bodies.mass import MassProperties
 
 __all__ = ["Ground"]
@@ -25,6 +25,6 @@ class Ground(Body):
         """`origin`."""
         return {"origin": ZERO}
 
-    def mass_properties(self, scope: ParameterScope) -> MassProperties:
+    def mass_properties(self, scope: ParameterSource) -> MassProperties:
         """Zero: the ground does not move, so its mass enters nowhere."""
         return MassProperties()

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from mbd.bodies.algebra import ZERO, Triple
-from mbd.bodies.base import Body, Frame, Parameter, ParameterScope
+from mbd.bodies.base import Body, Frame, Parameter, ParameterSource
 from mbd.bodies.domains import Domain, at_least_zero
 from mbd.bodies.mass import (
     Inertia,
@@ -75,7 +75,7 @@ class Link(Body):
         """The frame at the lower end."""
         return self.frame("end")
 
-    def mass_properties(self, scope: ParameterScope) -> MassProperties:
+    def mass_properties(self, scope: ParameterSource) -> MassProperties:
         """m, center, I."""
         parameter = self.parameter(scope)
         return MassProperties(

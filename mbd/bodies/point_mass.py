@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from mbd.bodies.algebra import ZERO, Triple
-from mbd.bodies.base import Body, Parameter, ParameterScope
+from mbd.bodies.base import Body, Parameter, ParameterSource
 from mbd.bodies.mass import MassProperties
 from mbd.bodies.values import name_of, number
 
@@ -37,6 +37,6 @@ class PointMass(Body):
         """`origin` and `center`, the point itself."""
         return {"origin": ZERO, "center": ZERO}
 
-    def mass_properties(self, scope: ParameterScope) -> MassProperties:
+    def mass_properties(self, scope: ParameterSource) -> MassProperties:
         """m at the origin."""
         return MassProperties(self.parameter(scope)("mass"))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from mbd.bodies.algebra import ZERO, Triple
-from mbd.bodies.base import Body, Parameter, ParameterScope
+from mbd.bodies.base import Body, Parameter, ParameterSource
 from mbd.bodies.mass import (
     Inertia,
     MassProperties,
@@ -55,7 +55,7 @@ class RigidBody(Body):
         """`origin` and `center`."""
         return {"origin": ZERO, "center": (parameter("center.x"), parameter("center.y"), parameter("center.z"))}
 
-    def mass_properties(self, scope: ParameterScope) -> MassProperties:
+    def mass_properties(self, scope: ParameterSource) -> MassProperties:
         """m, center, I."""
         parameter = self.parameter(scope)
         return MassProperties(

@@ -25,14 +25,12 @@ all levels give the same bits, it does not matter to any result when that happen
 from __future__ import annotations
 
 import ctypes
-import os
 import re
 import sys
 import time
 import weakref
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
 from functools import cache
 from typing import Any
 
@@ -45,6 +43,7 @@ from mbd.compile.background import submit, wake
 from mbd.compile.cache import ObjectCache, default_cache, key_of
 from mbd.compile.forking import COMPILING
 from mbd.compile.functions import ByName
+from mbd.compile.host import host
 from mbd.compile.ir import LIBRARY, module
 from mbd.compile.layout import Layout
 from mbd.compile.pieces import pieces
@@ -52,8 +51,8 @@ from mbd.errors import CapabilityError, ModelError
 from mbd.tape.node import Node
 
 __all__ = [
-    "HASTY", "LEVEL", "TURNED_OFF", "Build", "Host", "Library", "Machine", "MachineFunction", "cached_object", "call",
-    "compile_functions", "emit_object", "host", "load_object",
+    "HASTY", "LEVEL", "Build", "Library", "Machine", "MachineFunction", "cached_object", "call", "compile_functions",
+    "emit_object", "load_object",
 ]  # fmt: skip
 
 LEVEL = 2
@@ -68,61 +67,7 @@ CUTS = {0: {"large": 150, "part": 120}}
 PASSES = {"from level": 3, "speed_level": 3, "slp_vectorization": True}
 """Passes over the IR, and from which level on; part of the key of every object file."""
 
-TURNED_OFF = "MBD_CPU_FEATURES"
-"""Environment variable: features of the processor that machine code is to do without, '-fma,-avx512f'."""
-
 _PROTOTYPE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
-
-
-@dataclass(frozen=True)
-class Host:
-    """What the code is made for; part of the key of every object file.
-
-    fused : whether there is a fused multiply-add instruction
-    """
-
-    triple: str
-    cpu: str
-    features: str
-    llvm: str
-    fused: bool
-
-
-@cache
-def host() -> Host:
-    """This machine, without the features that `TURNED_OFF` names.
-
-    Raises
-    ------
-    CapabilityError
-        for a feature that is none of this processor, or one that is not to be turned off.
-    """
-    llvm.initialize_native_target()
-    llvm.initialize_native_asmprinter()
-    try:
-        features = llvm.get_host_cpu_features()
-    except RuntimeError:  # LLVM does not know how to ask this processor
-        features = llvm.FeatureMap()
-    triple = llvm.get_process_triple()
-    off = _turned_off(features)
-    fused = (bool(features.get("fma")) and "fma" not in off) or triple.startswith(("aarch64", "arm64"))
-    version = ".".join(map(str, llvm.llvm_version_info))
-    flat = ",".join([features.flatten(), *(f"-{name}" for name in off)])  # the last word on a feature counts
-    return Host(triple, llvm.get_host_cpu_name(), flat, version, fused)
-
-
-def _turned_off(features: Mapping[str, bool]) -> list[str]:
-    """Names of the features that the environment asks to do without."""
-    asked = [word.strip() for word in os.environ.get(TURNED_OFF, "").split(",") if word.strip()]
-    for word in asked:
-        if not word.startswith("-") or word[1:] not in features:
-            near = get_close_matches(word.lstrip("+-"), features, 3)
-            hint = f"; did you mean {' or '.join(f'-{name}' for name in near)}?" if near else ""
-            raise CapabilityError(
-                f"{TURNED_OFF} lists features of this processor ({llvm.get_host_cpu_name()}) to do without, each with "
-                f"a minus, such as '-fma'; it says {word!r}{hint}"
-            )
-    return [word[1:] for word in asked]
 
 
 @cache

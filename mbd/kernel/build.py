@@ -71,7 +71,7 @@ def _beside(modules: Sequence[str]) -> set[Path]:
 def object_of(text: str, level: int = 2) -> bytes:
     """The object file of an IR text, optimized for this machine; every level from 0 to 3 gives the same bits."""
     from mbd.compile.forking import COMPILING
-    from mbd.compile.llvm import host
+    from mbd.compile.host import host
 
     with COMPILING:
         return _compiled(text, host(), level)

@@ -16,9 +16,9 @@ __all__ = ["pack", "pack_state", "unpack"]
 
 HOMES = (
     "mbd.state", "mbd.results.record", "mbd.integrators.family", "mbd.integrators.newton", "mbd.integrators.radau",
-    "mbd.integrators.runge_kutta",
+    "mbd.integrators.radau_step", "mbd.integrators.runge_kutta",
 )  # fmt: skip
-"""The modules whose dataclasses a file may name; `family` in older files."""
+"""The modules whose dataclasses a file may name; `family` and `radau` in older files."""
 
 
 def pack_state(state: Any, arrays: dict[str, NDArray[Any]]) -> Any:

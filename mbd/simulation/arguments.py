@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from mbd.bodies.values import is_number, shown
-from mbd.errors import UnknownNameError, nearest
+from mbd.bodies.values import is_number, named_number_faults, shown
+from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.integrators import Integrator
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.state import State, malformed
 
-__all__ = ["callbacks", "choices", "end_of", "numbers"]
+__all__ = ["check_arguments", "end_of"]
 
 HUGE = 1e6
 """Step over the latest time above which a run is refused: ends and events are told apart to 1e-12 dt [-]."""
@@ -31,16 +31,28 @@ CHOICES = {
 }  # fmt: skip
 
 
-def choices(words: Mapping[str, Any]) -> list[str]:
-    """Words that are none of those offered."""
-    return [
-        f"{name}={value!r} is not available; use {' or '.join(map(repr, CHOICES[name]))}"
-        for name, value in words.items()
-        if value not in CHOICES[name]
+def check_arguments(
+    scheme: Any, start: Any, dt: Any, tol: Any, tol_of: Any, until: Any, parameters: Any, options: Mapping[str, Any],
+    on_failure: Any, observers: Any, progress: Any,
+) -> None:  # fmt: skip
+    """Every argument of `simulate` besides the model; all that is wrong is one `ModelError`."""
+    words = {**options, "on_failure": on_failure}
+    faults = [
+        f"{name}={words[name]!r} is not available; use {' or '.join(map(repr, known))}"
+        for name, known in CHOICES.items()
+        if words[name] not in known
     ]
+    faults += _numbers(scheme, start, dt, tol, until, options["store"], options["rest_speed"])
+    if tol_of is not None and tol is None:
+        faults.append(f"tol_of={tol_of!r} says what tol holds for; give tol too, or leave it out")
+    faults += _callbacks(observers, progress) + named_number_faults(parameters, "parameters")
+    if isinstance(start, State) and isinstance(start.parameters, Mapping):
+        faults += named_number_faults(start.parameters, "parameters of the start")
+    if faults:
+        raise ModelError(faults)
 
 
-def numbers(scheme: Any, start: Any, dt: Any, tol: Any, until: Any, store: Any, rest_speed: Any) -> list[str]:
+def _numbers(scheme: Any, start: Any, dt: Any, tol: Any, until: Any, store: Any, rest_speed: Any) -> list[str]:
     """What is wrong with the integrator, the start, the step and the end."""
     faults = []
     if not isinstance(scheme, Integrator):
@@ -90,7 +102,7 @@ def _times(start: Any, dt: Any, until: Any) -> list[str]:
     return []
 
 
-def callbacks(observers: Any, progress: Any) -> list[str]:
+def _callbacks(observers: Any, progress: Any) -> list[str]:
     """Observers and progress that cannot be called."""
     several = isinstance(observers, Sequence) and not isinstance(observers, str)
     if not several or not all(map(callable, observers)):

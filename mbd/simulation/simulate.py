@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
@@ -15,12 +15,11 @@ import numpy as np
 from mbd.assembly.given_state import fits
 from mbd.assembly.trivial_rows import manager_of
 from mbd.assembly.turns import directed
-from mbd.bodies.values import named_number_faults
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of
-from mbd.errors import CapabilityError, MemoryLimitError, ModelError, SimulationError, UnknownNameError
+from mbd.errors import CapabilityError, MemoryLimitError, SimulationError, UnknownNameError
 from mbd.integrators import HHT, Integrator
-from mbd.simulation.arguments import callbacks, choices, end_of, numbers
+from mbd.simulation.arguments import check_arguments, end_of
 from mbd.simulation.capabilities import refusals
 from mbd.simulation.run.control import reset_faults
 from mbd.simulation.run.run import Run
@@ -112,70 +111,71 @@ def simulate(
         if the run cannot go on, or if the scheme itself has more than doubled the energy of the mechanism; a
         `MemoryLimitError` if its rows fill a quarter of the memory that was free as it grew long.
     """
-    scheme = integrator if integrator is not None else HHT(alpha=0.05)
-    words = {"contact": contact, "impact": impact, "locate": locate, "on_failure": on_failure}
-    faults = choices(words) + numbers(scheme, start, dt, tol, until, store, rest_speed)
-    if tol_of is not None and tol is None:
-        faults.append(f"tol_of={tol_of!r} says what tol holds for; give tol too, or leave it out")
-    faults += callbacks(observers, progress) + named_number_faults(parameters, "parameters")
-    if isinstance(start, State) and isinstance(start.parameters, Mapping):
-        faults += named_number_faults(start.parameters, "parameters of the start")
-    if faults:
-        raise ModelError(faults)
-    changed = {**start.parameters, **(parameters or {})}
-    options: dict[str, Any] = {
+    scheme = HHT(alpha=0.05) if integrator is None else integrator
+    options = {
         "contact": contact, "impact": impact, "locate": locate, "store": store, "rest_speed": rest_speed,
         "backend": backend,
     }  # fmt: skip
-
-    def complete(step: float, more: Mapping[str, Any], most: float = np.inf) -> tuple[Run, Trajectory, str]:
-        run = prepared(model, start, scheme, step, until, changed, {**options, **more})
-        run.room.patience = most
-        run.observe(observers, _bar(progress, start.time, run.end))
-        return run, *run.complete()
-
-    if dt is not None:
-        run, trajectory, problem = complete(float(dt), {})
-    else:
-        assert tol is not None
-        names = judged(mechanism_of(model, backend, changed).equations, tol_of)
-        run, trajectory, problem = _to_tolerance(complete, scheme, float(tol), names, _span(until, start.time))
+    check_arguments(scheme, start, dt, tol, tol_of, until, parameters, options, on_failure, observers, progress)
+    changed = {**start.parameters, **(parameters or {})}
+    motion = _Motion(model, start, scheme, until, changed, options, observers, progress)
+    run, trajectory, problem = motion.run(dt) if dt is not None else motion.to_tolerance(float(tol or 0.0), tol_of)
     if problem and on_failure == "raise":
-        kind = MemoryLimitError if isinstance(run.cause, MemoryLimitError) else SimulationError
-        raise kind(problem, trajectory) from (None if kind is MemoryLimitError else run.cause)
+        raise _failure(problem, trajectory, run.cause)
     return trajectory
 
 
-def _span(until: Any, begin: float) -> float | None:
-    """Length of a run [s], None where an event ends it."""
-    latest = until[1] if isinstance(until, tuple) else until
-    return None if isinstance(latest, str) or isinstance(until, tuple) else float(latest) - begin
+@dataclass(frozen=True)
+class _Motion:
+    """What `simulate` was asked for, but for the size of steps."""
+
+    model: Any
+    start: State
+    scheme: Integrator
+    until: Any
+    changed: Mapping[str, float]
+    options: Mapping[str, Any]
+    observers: Sequence[Callable[[float, State], None]]
+    progress: Any
+
+    def run(
+        self, step: float, more: Mapping[str, Any] | None = None, most: float = np.inf
+    ) -> tuple[Run, Trajectory, str]:
+        """A run with steps of one size, or from one on, that ends where it has taken `most` seconds."""
+        options = {**self.options, **(more or {})}
+        run = prepared(self.model, self.start, self.scheme, float(step), self.until, self.changed, options)
+        run.room.patience = most
+        run.observe(self.observers, _bar(self.progress, self.start.time, run.end))
+        return run, *run.complete()
+
+    def to_tolerance(self, tol: float, tol_of: Sequence[str] | None) -> tuple[Run, Trajectory, str]:
+        """The run whose error agrees with a tolerance; where an event ends it, the first guess is that it takes 1 s."""
+        equations = mechanism_of(self.model, self.options["backend"], self.changed).equations
+        names, scheme = judged(equations, tol_of), self.scheme
+        length = 1.0 if isinstance(self.until, str | tuple) else (float(self.until) - self.start.time) or 1.0
+        finer = scheme.order() / scheme.error_order()  # power of the allowed error with which that of the run falls
+        first, power = first_allowed(tol, length, finer), 1.0 / scheme.error_order()
+
+        def trial(allowed: float, most: float = np.inf) -> Trial:
+            # shrinks and grows as steps do, so that runs of a motion so easy that its steps are the longest have others
+            share = min(max((allowed / first) ** power, SHORTEST_CAP), LARGEST / LONGEST)
+            more = {"tol": tol, "tol_of": names, "longest": LONGEST * length * share, "allowed": allowed}
+            run, trajectory, problem = self.run(INSTANT * min(length, 1.0), more, most)
+            return Trial(allowed, trajectory, problem, run, widest=share == LARGEST / LONGEST)
+
+        found = calibrated(trial, tol, first, finer, scheme.order(), names)
+        trajectory = found.trial.run
+        if found.problem and trajectory.success:  # no run failed, but none is good enough
+            trajectory = Trajectory(replace(trajectory.record, success=False, message=found.problem))
+        return found.trial.source, trajectory, found.problem
 
 
-def _to_tolerance(
-    complete: Callable[[float, Mapping[str, Any], float], tuple[Run, Trajectory, str]],
-    scheme: Integrator,
-    tol: float,
-    names: tuple[str, ...],
-    span: float | None,
-) -> tuple[Run, Trajectory, str]:
-    """The run whose error agrees with a tolerance; where an event ends it, the first guess is that it takes 1 s."""
-    length = span or 1.0
-    finer = scheme.order() / scheme.error_order()  # power of the allowed error with which that of the run falls
-    first, power = first_allowed(tol, length, finer), 1.0 / scheme.error_order()
-
-    def trial(allowed: float, most: float = np.inf) -> Trial:
-        # shrinks and grows as steps do, so that runs of a motion so easy that its steps are the longest have others
-        share = min(max((allowed / first) ** power, SHORTEST_CAP), LARGEST / LONGEST)
-        more: dict[str, Any] = {"tol": tol, "tol_of": names, "longest": LONGEST * length * share, "allowed": allowed}
-        run, trajectory, problem = complete(INSTANT * min(length, 1.0), more, most)
-        return Trial(allowed, trajectory, problem, run, widest=share == LARGEST / LONGEST)
-
-    found = calibrated(trial, tol, first, finer, scheme.order(), names)
-    trajectory = found.trial.run
-    if found.problem and trajectory.success:  # no run failed, but none is good enough
-        trajectory = Trajectory(replace(trajectory.record, success=False, message=found.problem))
-    return found.trial.source, trajectory, found.problem
+def _failure(problem: str, trajectory: Trajectory, cause: BaseException | None) -> SimulationError:
+    """The error that a run ends with; how memory ran out is in its sentence."""
+    full = isinstance(cause, MemoryLimitError)
+    error = (MemoryLimitError if full else SimulationError)(problem, trajectory)
+    error.__cause__ = None if full else cause
+    return error
 
 
 def prepared(

@@ -1,15 +1,13 @@
 """The scalar expression graph: hash-consed nodes with folding.
 
-All mechanics is written once as plain Python on scalars and recorded here.
-A node is created only if no equal node exists (hash-consing), zeros and
-constants fold away at creation, and signs travel outward, so that
-``-s*x - c*y`` is found again as ``-(s*x + c*y)``. An effect whose factor is an
-exact zero therefore leaves no trace.
+All mechanics is written once as plain Python on scalars and recorded here. A node is created only if no equal node
+exists (hash-consing), zeros and constants fold away at creation, and signs travel outward, so that ``-s*x - c*y`` is
+found again as ``-(s*x + c*y)``. An effect whose factor is an exact zero therefore leaves no trace.
 """
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from threading import RLock
 from typing import Any, NoReturn, TypeAlias
 
@@ -23,6 +21,17 @@ __all__ = ["BINARY", "CONDITIONS", "UNARY", "Node", "Scalar", "Table", "Tape"]
 def _is_scalar(value: object) -> bool:
     """False for arrays, whose own arithmetic then goes element by element."""
     return value.__class__ is Node or not getattr(value, "ndim", 0)
+
+
+def _related(op: str, reflected: bool = False) -> Callable[[Node, Scalar], Node]:
+    """The Python operator of a relation in BINARY; `reflected` for one that is recorded with its sides exchanged."""
+
+    def operator(self: Node, other: Scalar) -> Any:
+        if not _is_scalar(other):
+            return NotImplemented
+        return self.tape.binary(op, other, self) if reflected else self.tape.binary(op, self, other)
+
+    return operator
 
 
 class Node:
@@ -42,7 +51,6 @@ class Node:
     def __init__(self, tape: Tape, index: int, op: str, args: tuple[Node, ...], data: Any) -> None:
         self.tape, self.index, self.op, self.args, self.data = tape, index, op, args, data
 
-    # arithmetic -------------------------------------------------------------------------------------------------
     def __add__(self, other: Scalar) -> Node:
         return self.tape.add(self, other) if _is_scalar(other) else NotImplemented
 
@@ -82,24 +90,9 @@ class Node:
     def __abs__(self) -> Node:
         return self.tape.unary("abs", self)
 
-    # conditions -------------------------------------------------------------------------------------------------
-    def __lt__(self, other: Scalar) -> Node:
-        return self.tape.binary("lt", self, other) if _is_scalar(other) else NotImplemented
-
-    def __le__(self, other: Scalar) -> Node:
-        return self.tape.binary("le", self, other) if _is_scalar(other) else NotImplemented
-
-    def __gt__(self, other: Scalar) -> Node:
-        return self.tape.binary("lt", other, self) if _is_scalar(other) else NotImplemented
-
-    def __ge__(self, other: Scalar) -> Node:
-        return self.tape.binary("le", other, self) if _is_scalar(other) else NotImplemented
-
-    def __and__(self, other: Scalar) -> Node:
-        return self.tape.binary("and", self, other) if _is_scalar(other) else NotImplemented
-
-    def __or__(self, other: Scalar) -> Node:
-        return self.tape.binary("or", self, other) if _is_scalar(other) else NotImplemented
+    __lt__, __gt__ = _related("lt"), _related("lt", reflected=True)
+    __le__, __ge__ = _related("le"), _related("le", reflected=True)
+    __and__, __or__ = _related("and"), _related("or")
 
     def __invert__(self) -> Node:
         return self.tape.unary("not", self)
@@ -107,11 +100,9 @@ class Node:
     __hash__ = object.__hash__
 
     def __eq__(self, other: object) -> bool:
-        if self is other:
-            return True
-        if isinstance(other, Node | int | float):
+        if self is not other and isinstance(other, Node | int | float):
             raise TraceError("'==' on a traced value is not recorded; write mbd.where(abs(a - b) < tolerance, x, y)")
-        return False
+        return self is other
 
     def __bool__(self) -> NoReturn:
         raise TraceError(
@@ -150,7 +141,6 @@ class Node:
 
 
 Scalar: TypeAlias = Node | float
-
 
 _NORMAL = 1e-290
 """Products of constants smaller than this, or larger than its inverse, are left to run time."""
@@ -217,7 +207,6 @@ class Tape:
             raise TraceError(f"the text {value!r} met a traced value; numbers are wanted")
         return self.constant(value)
 
-    # arithmetic -------------------------------------------------------------------------------------------------
     def add(self, left: Scalar, right: Scalar) -> Node:
         a = left if left.__class__ is Node and left.tape is self else self.lift(left)
         b = right if right.__class__ is Node and right.tape is self else self.lift(right)
@@ -264,8 +253,7 @@ class Tape:
             return self.add(a, b.args[0])
         if a.op == "neg":
             return self.neg(self.add(a.args[0], b))
-        swapped = self._known.get(("sub", b.index, a.index))
-        if swapped is not None:
+        if (swapped := self._known.get(("sub", b.index, a.index))) is not None:
             return self.neg(swapped)
         return self._make(("sub", a.index, b.index), "sub", (a, b))
 

@@ -15,9 +15,10 @@ from hypothesis import strategies as st
 
 from mbd.arrays import Vector
 from mbd.compile.c import source
+from mbd.compile.host import host
 from mbd.compile.ir import module
 from mbd.compile.layout import Layout
-from mbd.compile.llvm import Machine, call, emit_object, host
+from mbd.compile.llvm import Machine, call, emit_object
 from mbd.errors import TraceError
 from mbd.tape.derivatives import live
 from mbd.tape.node import CONDITIONS, Node, Tape

@@ -17,6 +17,7 @@ from hypothesis import given, settings
 import mbd
 from mbd.compile import backend, background, llvm, mechanisms
 from mbd.compile.cache import ObjectCache
+from mbd.compile.host import host
 from mbd.compile.ir import module
 from mbd.compile.llvm import Library, Machine, call, emit_object
 from mbd.compile.pieces import pieces
@@ -59,7 +60,7 @@ def do(jobs):
 @settings(max_examples=25)
 def test_pieces_together_give_the_same_bits(graph):
     whole = run(by_llvm({"f": graph.outputs})["f"], graph)
-    texts = pieces(module({"f": graph.outputs}, graph.layout, llvm.host().fused, large=0, part=7), 20)
+    texts = pieces(module({"f": graph.outputs}, graph.layout, host().fused, large=0, part=7), 20)
     for text in texts:
         binding.parse_assembly(text).verify()
     machine = Machine()

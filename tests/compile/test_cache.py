@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ import pytest
 
 from mbd.compile import cache as caching, llvm
 from mbd.compile.cache import ObjectCache, default_cache, key_of
+from mbd.compile.host import host
 from mbd.compile.llvm import Library, compile_functions
 from tests.compile.chains import chain
 from tests.compile.test_llvm import results
@@ -44,9 +46,9 @@ def test_another_level_or_processor_or_version_is_another_entry(tmp_path, monkey
     cache = ObjectCache(tmp_path)
     build(cache)
     assert not build(cache, level=1)[0]
-    this = llvm.host()
+    this = host()
     for change in ({"cpu": "generic"}, {"features": this.features + ",-xop"}, {"llvm": "99.0.0"}):
-        other = llvm.Host(**({name: getattr(this, name) for name in this.__dataclass_fields__} | change))
+        other = replace(this, **change)
         with monkeypatch.context() as patch:
             patch.setattr(llvm, "host", lambda other=other: other)
             assert llvm.cached_object("tag", lambda: b"theirs", cache) == b"theirs"

@@ -11,10 +11,11 @@ import pytest
 from hypothesis import given, settings
 
 from mbd.compile.cache import ObjectCache
+from mbd.compile.host import host
 from mbd.compile.instructions import MANY_ZEROS
 from mbd.compile.ir import LARGE, module
 from mbd.compile.layout import Layout
-from mbd.compile.llvm import Library, call, compile_functions, emit_object, host, load_object
+from mbd.compile.llvm import Library, call, compile_functions, emit_object, load_object
 from mbd.errors import ModelError, UnknownNameError
 from mbd.tape.functions import cos, sin
 from mbd.tape.node import Tape

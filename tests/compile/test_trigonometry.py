@@ -8,9 +8,10 @@ import mpmath
 import numpy as np
 import pytest
 
+from mbd.compile.host import host
 from mbd.compile.ir import module
 from mbd.compile.layout import Layout
-from mbd.compile.llvm import Machine, call, emit_object, host
+from mbd.compile.llvm import Machine, call, emit_object
 from mbd.compile.trigonometry import HALF_PI, LIMIT, WIDTHS
 from mbd.tape.functions import cos, sin
 from mbd.tape.node import Tape

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import mbd
-from mbd.compile.llvm import TURNED_OFF, host
+from mbd.compile.host import TURNED_OFF, host
 from mbd.equations import programs
 from tests.simulation import singular
 from tests.simulation.mechanisms import box, kneed_walker, kneed_walker_start
@@ -150,7 +150,7 @@ def test_without_fused_products_the_same_is_decided():
     ("asked", "said"), [("fma", "with a minus"), ("-fmaa", "did you mean -fma"), ("-nonsense", "-nonsense")]
 )
 def test_a_feature_that_is_none_of_the_processor_is_refused_by_name(asked, said):
-    code = "from mbd.compile.llvm import host; host()"
+    code = "from mbd.compile.host import host; host()"
     found = subprocess.run(
         [sys.executable, "-c", code], env={**os.environ, TURNED_OFF: asked}, capture_output=True, text=True, timeout=120
     )
