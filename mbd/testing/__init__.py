@@ -1,8 +1,9 @@
 """The law kit: checks that a class of one's own keeps the laws of mechanics, and strategies for property tests.
 
-``check_joint``, ``check_loss``, ``check_force``, ``check_measure``, ``check_constraint``, ``check_model`` and
-``check_integrator`` take what a user wrote, try the laws at seeded postures, and raise an `AssertionError` that names
-each broken law, the numbers expected and found, and the posture that shows it; what holds is returned as a `Verdict`.
+``check_joint``, ``check_loss``, ``check_force``, ``check_measure``, ``check_constraint``, ``check_model``,
+``check_integrator`` and ``check_scheme`` take what a user wrote, try the laws at seeded postures or along runs, and
+raise an `AssertionError` that names each broken law, the numbers expected and found, and the posture that shows it;
+what holds is returned as a `Verdict`.
 
 ``postures``, ``frames``, ``trees``, ``loops``, ``scenes`` and ``states`` are Hypothesis strategies (extra `test`).
 """
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
         random_scene as random_scene,
         random_tree as random_tree,
     )
+    from mbd.testing.schemes import check_scheme as check_scheme
     from mbd.testing.strategies import (
         frames as frames,
         loops as loops,
@@ -44,6 +46,7 @@ _HOMES = {
     "losses": "check_loss",
     "measures": "check_measure",
     "mechanisms": "random_loop random_scene random_tree",
+    "schemes": "check_scheme",
     "strategies": "frames loops postures scenes states trees",
 }
 

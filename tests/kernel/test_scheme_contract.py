@@ -12,33 +12,20 @@ from mbd.errors import CapabilityError
 from mbd.kernel import build
 from mbd.kernel.schemes import contract
 from mbd.state import Mode, State
+from mbd.testing import check_scheme
+from tests.kernel.bdf2 import BDF2
 from tests.kernel.midpoint import Midpoint
 from tests.simulation.mechanisms import G, ball, pendulum
 
 
 @pytest.fixture(scope="module", autouse=True)
 def listed():
-    """The kernel with one scheme more: an entry, and a line in the list."""
+    """The kernel with two schemes more: an entry each, and a line in the list."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(contract, "SCHEMES", (*contract.SCHEMES, "tests.kernel.midpoint"))
+        patch.setattr(contract, "SCHEMES", (*contract.SCHEMES, "tests.kernel.midpoint", "tests.kernel.bdf2"))
         build.entry.cache_clear()
         yield
     build.entry.cache_clear()
-
-
-def crank():
-    """A slider-crank that swings under its weight: a loop, whose rows hold positions."""
-    model = mbd.Model("slider-crank")
-    arm = mbd.Link("crank", mass=1.0, length=0.3, center=0.15, inertia=0.01)
-    rod = mbd.Link("rod", mass=0.8, length=1.0, center=0.5, inertia=0.07)
-    slider = mbd.PointMass("slider", mass=1.5)
-    model.connect(
-        mbd.Revolute("main", model.ground.origin, arm.start),
-        mbd.Revolute("crank pin", arm.end, rod.start),
-        mbd.Prismatic("guide", model.ground.origin, slider.origin),
-        mbd.Revolute("slider pin", slider.origin, rod.end),
-    )
-    return model, mbd.assemble(model, position={"main.angle": 0.6}, velocity={"main.angle": 1.5})
 
 
 def swing():
@@ -46,29 +33,12 @@ def swing():
     return model, mbd.assemble(model, position={"hinge.angle": 1.0})
 
 
-def ends(scene, scheme, **settings):
-    model, start = scene()
-    found = mbd.simulate(model, start, scheme, until=0.6, **settings)
-    return np.concatenate([found.record.q[-1], found.record.v[-1]]), found
-
-
-@pytest.mark.parametrize("scene", [swing, crank])
-def test_a_listed_scheme_runs_compiled_at_its_order(scene):
-    exact, _ = ends(scene, mbd.RungeKutta853(), tol=1e-12)
-    errors = []
-    for dt in (0.02, 0.01, 0.005):
-        found, run = ends(scene, Midpoint(), dt=dt)
-        assert run.stats["compiled"]
-        errors.append(np.max(np.abs(found - exact)))
-    orders = np.log2(np.array(errors[:-1]) / errors[1:])
-    assert np.all(np.abs(orders - 2.0) < 0.2), errors
-
-
-def test_it_is_the_same_interpreted():
-    fast, plain = (ends(crank, Midpoint(), dt=0.01, backend=backend)[1] for backend in ("auto", "python"))
-    assert fast.stats["compiled"] and not plain.stats["compiled"]
-    for part in ("time", "q", "v", "a", "lam"):
-        np.testing.assert_allclose(getattr(fast.record, part), getattr(plain.record, part), rtol=0, atol=1e-11)
+@pytest.mark.parametrize("scheme", [Midpoint(), BDF2()], ids=repr)
+def test_a_listed_scheme_keeps_the_laws(scheme):
+    verdict = check_scheme(scheme)
+    assert not verdict.notes
+    assert verdict.laws["order as promised: within 0.15"] == 3
+    assert ("a tolerance is kept" in verdict.laws) is (type(scheme) is BDF2)
 
 
 def test_a_ball_bounces_when_it_should():
