@@ -9,14 +9,14 @@ from __future__ import annotations
 from mbd.kernel.candidate import accept_candidate, revert_candidate
 from mbd.kernel.codes import PULL
 from mbd.kernel.guards import frictions_at, try_step, watch
-from mbd.kernel.records import Kernel, Reals
+from mbd.kernel.records import Balance, Guards, Kernel, Reals, Switching
 from mbd.kernel.restart import active_rows, consistent, evaluate, largest_force, stepping_rows
 from mbd.kernel.saddle import correct_velocities, solve_rows
 
 __all__ = ["look", "look_at_start", "put_on_rows", "accept_for_restart"]
 
 
-def project_velocity(K: Kernel, t: float, q: Reals, y: Reals, m: int, dropping: bool) -> int:
+def project_velocity(K: Balance, t: float, q: Reals, y: Reals, m: int, dropping: bool) -> int:
     """The nearest velocities to y, in the metric of M, with B v + h_t = 0 on the m rows in K.rows.
 
     They may depend on each other where `dropping` finds out again which do.
@@ -36,7 +36,7 @@ def project_velocity(K: Kernel, t: float, q: Reals, y: Reals, m: int, dropping: 
     return status
 
 
-def put_on_rows(K: Kernel, t1: float) -> None:
+def put_on_rows(K: Switching, t1: float) -> None:
     """A candidate of index 3 with the velocities and guards that it has once it is taken over."""
     if K.stabilized == 1 or K.n_active == 0:
         return
@@ -60,7 +60,7 @@ def look_at_start(K: Kernel) -> None:
     put_on_rows(K, K.time)
 
 
-def would_pull(K: Kernel) -> bool:
+def would_pull(K: Balance) -> bool:
     """Whether a contact that pushes by the multipliers of the step pulls by those in K.impulse."""
     force = largest_force(K)
     for c in range(K.n_contacts):
@@ -70,7 +70,7 @@ def would_pull(K: Kernel) -> bool:
     return False
 
 
-def turns_to_pull(K: Kernel) -> bool:
+def turns_to_pull(K: Guards) -> bool:
     """Whether a closed penalty contact that pushes with the velocities of the candidate pulls with those in K.y."""
     place = 2 * K.n_contacts
     looked = False
@@ -84,7 +84,7 @@ def turns_to_pull(K: Kernel) -> bool:
     return False
 
 
-def balance(K: Kernel) -> None:
+def balance(K: Balance) -> None:
     """Accelerations from the multipliers K.lam at the accepted state, where M determines them."""
     n = K.n
     evaluate(K, K.time, K.q, K.y)
@@ -99,7 +99,7 @@ def balance(K: Kernel) -> None:
             K.rate[i] = K.jump[i]
 
 
-def accept_for_restart(K: Kernel, t1: float) -> None:
+def accept_for_restart(K: Switching, t1: float) -> None:
     """The candidate becomes the accepted state ahead of a restart, consistent in the old mode at every level.
 
     A shortened index-3 step leaves B v + h_t of the size of its error; it would survive a release, so it is removed.

@@ -15,7 +15,7 @@ from mbd.kernel.hooks import scheme_accept
 from mbd.kernel.locate import locate
 from mbd.kernel.nonsmooth import closes_below_surface, must_release
 from mbd.kernel.observe import is_awaited, store_row
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import Events, Guards, Kernel, Mechanism, Switching
 from mbd.kernel.restart import consistent, largest_force
 from mbd.kernel.singular.events import find_passed_events, log_passed_events, may_pass_events, refuses
 from mbd.kernel.singular.leave import leave_singularity
@@ -32,7 +32,7 @@ Without rows ten times as many.
 """
 
 
-def has_spurious_reaction(K: Kernel) -> bool:
+def has_spurious_reaction(K: Mechanism) -> bool:
     """Whether a step ends with a contact that pulls, or a friction that sticks beyond its limit, judged to do neither.
 
     The multipliers of a step belong to its own accelerations, which satisfy the constraints on average only: those of
@@ -62,7 +62,7 @@ def accept(K: Kernel, h: float, t1: float, quiet: bool) -> None:
             update_sides(K)
 
 
-def forget_found(K: Kernel) -> None:
+def forget_found(K: Guards) -> None:
     """No guard has been found to be no event yet, but for events that the step passes."""
     for c in range(K.n_contacts + K.n_guards + K.n_frictions):
         K.active[c] = 0
@@ -153,7 +153,7 @@ def conclude(
     return 0
 
 
-def calm(K: Kernel) -> bool:
+def calm(K: Switching) -> bool:
     """Where a contact seems to pull at the end of a step: start the scheme again before it, once; True if so.
 
     Accelerations and multipliers are made consistent there, which ends their oscillation; the step is taken again.
@@ -171,7 +171,7 @@ def calm(K: Kernel) -> bool:
     return True
 
 
-def look_inside(K: Kernel, h: float) -> int:
+def look_inside(K: Switching, h: float) -> int:
     """Where a step is long enough to be looked at in parts: after how many it must end (see `parts_to_take`).
 
     A step of such parts begins then; 0 as well where this one is part of it already, or no step is looked at so.
@@ -187,7 +187,7 @@ def look_inside(K: Kernel, h: float) -> int:
     return parts
 
 
-def in_parts(K: Kernel) -> bool:
+def in_parts(K: Events) -> bool:
     """Whether guards are looked at inside the step that was just tried."""
     return bool(K.looks > 1 and K.n_watched > 0 and K.in_substeps == 0)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import Events, Guards, Kernel, State
 
 __all__ = ["accept_guards", "accept_candidate", "carry", "revert_candidate"]
 
@@ -19,14 +19,14 @@ def carry(values: Any, kept: Any, place: int, count: int, out: bool) -> int:
     return place + count
 
 
-def accept_candidate(K: Kernel, t1: float) -> None:
+def accept_candidate(K: Guards, t1: float) -> None:
     """The candidate becomes the accepted state ahead of a restart: what the scheme remembers stays behind."""
     exchange(K, False)
     K.time = t1
     accept_guards(K)
 
 
-def accept_guards(K: Kernel) -> None:
+def accept_guards(K: Events) -> None:
     """Guards of the candidate become those of the accepted state."""
     for i in range(K.n_watched):
         K.guards0[i] = K.guards1[i]
@@ -41,7 +41,7 @@ def revert_candidate(K: Kernel) -> None:
         K.guards1[i] = K.guards0[i]
 
 
-def exchange(K: Kernel, out: bool) -> None:
+def exchange(K: State, out: bool) -> None:
     """q, (v, z), their rates and multipliers of the accepted state into the candidate, or back."""
     carry(K.q, K.q1, 0, K.n_q, out)
     carry(K.y, K.y1, 0, K.n, out)

@@ -13,7 +13,16 @@ from __future__ import annotations
 
 from mbd.kernel.codes import CONFLICT, NO_IMPACT
 from mbd.kernel.pivoting import pivoted
-from mbd.kernel.records import Kernel, Reals
+from mbd.kernel.records import (
+    Balance,
+    Complementarity,
+    ContactForces,
+    Contacts,
+    DependentRows,
+    Frictions,
+    Motion,
+    Reals,
+)
 from mbd.kernel.redundancy import sharing, spread
 from mbd.kernel.restart import MOST_LOADS, active_rows, evaluate_loaded, limit_of, load_accelerations, refresh_scales
 from mbd.kernel.saddle import solve_rows
@@ -30,7 +39,7 @@ MOST_CHOICES = 6561
 """Sets of branches that are tried one after the other when nothing else has led to a solution [-]."""
 
 
-def complementarity(K: Kernel, level: int) -> int:
+def complementarity(K: Balance, level: int) -> int:
     """Choose K.active of contacts with K.free = 1 and K.sticks, K.slip of frictions with K.loose = 1 or 2, and solve.
 
     Others keep theirs. With K.free = 2 a contact chooses K.parting: its normal row is off, its tangents stay. With
@@ -74,7 +83,7 @@ def complementarity(K: Kernel, level: int) -> int:
     return nothing
 
 
-def solve_branches(K: Kernel, level: int) -> int:
+def solve_branches(K: Balance, level: int) -> int:
     """Solve with the present branches; the friction that slides is put into K.impulse of its row."""
     if K.n_frictions == 0:
         load(K, level)
@@ -105,7 +114,7 @@ def solve_branches(K: Kernel, level: int) -> int:
     return status
 
 
-def find_limits(K: Kernel, level: int) -> None:
+def find_limits(K: ContactForces, level: int) -> None:
     """Largest frictions at the multipliers now in the block, of impulses without those of forces that stay finite."""
     for f in range(K.n_frictions):
         K.limit[f] = limit_of(K, f)
@@ -113,14 +122,14 @@ def find_limits(K: Kernel, level: int) -> None:
             K.limit[f] += (K.past_time - 1.0) * K.base_limit[f]
 
 
-def whole(K: Kernel, level: int) -> Reals:
+def whole(K: Complementarity, level: int) -> Reals:
     """The multipliers that friction follows: with the impulses that are given, and those of a smooth step before."""
     for k in range(K.n_rows):
         K.loads[k] = K.impulse[k] + (K.given[k] + K.past[k] if level == 1 else 0.0)
     return K.loads
 
 
-def load(K: Kernel, level: int) -> None:
+def load(K: ContactForces, level: int) -> None:
     """Force and bias of the accelerations, or the force of the impulses that are given."""
     if level == 0:
         load_accelerations(K)
@@ -138,18 +147,18 @@ def load(K: Kernel, level: int) -> None:
                     K.force[i] += K.acc[o_R + i * K.n_rows + row] * (K.slip[f] * K.past_limit[f] - K.past[row])
 
 
-def is_on(K: Kernel, f: int) -> bool:
+def is_on(K: Frictions, f: int) -> bool:
     """Whether a friction acts: its contact is closed, or it always does."""
     c = K.friction_contact[f]
     return bool(c < 0 or K.active[c] == 1)
 
 
-def slides(K: Kernel, f: int) -> bool:
+def slides(K: Frictions, f: int) -> bool:
     """Whether a friction acts and slides."""
     return bool(is_on(K, f) and K.sticks[f] == 0)
 
 
-def measure_free(K: Kernel, level: int) -> None:
+def measure_free(K: Motion, level: int) -> None:
     """Sizes of w where no row acted, by which its round-off is judged: where all rests w itself is nothing else."""
     if level == 0 and K.scale[0] == 0.0:
         refresh_scales(K)
@@ -158,7 +167,7 @@ def measure_free(K: Kernel, level: int) -> None:
         K.typical[i] = abs(K.y[i]) if level == 1 else (K.scale[i] / mass if mass > 0.0 else 0.0)
 
 
-def departure(K: Kernel, row: int, sign: float, tolerance: float) -> float:
+def departure(K: ContactForces, row: int, sign: float, tolerance: float) -> float:
     """How far sign (B w + bias) of a row is below zero, beyond a tolerance relative to its terms."""
     n = K.n
     o_B = K.acc_B
@@ -171,14 +180,14 @@ def departure(K: Kernel, row: int, sign: float, tolerance: float) -> float:
     return float(-sign * value - tolerance * size)
 
 
-def contact_fault(K: Kernel, c: int, largest: float) -> float:
+def contact_fault(K: ContactForces, c: int, largest: float) -> float:
     """How badly contact c breaks its law; ≤ 0 if it does not."""
     if K.active[c] == 1 and K.parting[c] == 0:
         return float(K.impulse[K.normal[c]] - ROUND_OFF * largest)  # λ > 0 would pull
     return departure(K, K.normal[c], 1.0, ROUND_OFF)
 
 
-def friction_fault(K: Kernel, f: int, largest: float) -> float:
+def friction_fault(K: ContactForces, f: int, largest: float) -> float:
     """How badly friction f breaks its law; ≤ 0 if it does not."""
     row = K.friction_row[f]
     if K.sticks[f] == 1:
@@ -186,7 +195,7 @@ def friction_fault(K: Kernel, f: int, largest: float) -> float:
     return departure(K, row, K.slip[f], SURE if K.loose[f] == 2 else ROUND_OFF)  # it slides against its own friction
 
 
-def give_way(K: Kernel) -> int:
+def give_way(K: DependentRows) -> int:
     """Where held rows contradict each other, a friction that may choose slides, or a contact opens; 0 if none can.
 
     It is the one whose row is blamed if it can. Its direction is other than the one it had last.
@@ -209,7 +218,7 @@ def give_way(K: Kernel) -> int:
     return 0
 
 
-def largest_impulse(K: Kernel) -> float:
+def largest_impulse(K: Complementarity) -> float:
     """Size of the multipliers."""
     largest = 0.0
     for k in range(K.n_rows):
@@ -217,7 +226,7 @@ def largest_impulse(K: Kernel) -> float:
     return largest
 
 
-def toggle(K: Kernel, c: int) -> None:
+def toggle(K: Contacts, c: int) -> None:
     """The other branch of a contact."""
     if K.free[c] == 2:
         K.parting[c] = 1 - K.parting[c]
@@ -225,7 +234,7 @@ def toggle(K: Kernel, c: int) -> None:
         K.active[c] = 1 - K.active[c]
 
 
-def turn(K: Kernel, f: int) -> None:
+def turn(K: ContactForces, f: int) -> None:
     """The other branch of a friction: from sticking to sliding as its multiplier pulls, and back."""
     if K.sticks[f] == 1:
         K.sticks[f] = 0
@@ -237,7 +246,7 @@ def turn(K: Kernel, f: int) -> None:
         K.slip[f] = 0.0
 
 
-def change_all(K: Kernel) -> int:
+def change_all(K: ContactForces) -> int:
     """Every contact and friction takes the branch that the solution asks for; how many changed."""
     largest = largest_impulse(K)
     count = 0
@@ -252,7 +261,7 @@ def change_all(K: Kernel) -> int:
     return count
 
 
-def worst(K: Kernel, first: bool) -> int:
+def worst(K: ContactForces, first: bool) -> int:
     """1 + number of the contact or friction that must change (frictions after contacts), 0 if none."""
     largest = largest_impulse(K)
     found = 0
@@ -273,7 +282,7 @@ def worst(K: Kernel, first: bool) -> int:
     return found
 
 
-def change_one(K: Kernel, the_worst: bool) -> int:
+def change_one(K: ContactForces, the_worst: bool) -> int:
     """One contact or friction takes its other branch; 0 if none needs to."""
     place = worst(K, not the_worst)
     if place == 0:
@@ -285,7 +294,7 @@ def change_one(K: Kernel, the_worst: bool) -> int:
     return 1
 
 
-def choose(K: Kernel, number: int) -> None:
+def choose(K: Frictions, number: int) -> None:
     """The set of branches of that number."""
     for c in range(K.n_contacts):
         if K.free[c] == 1:

@@ -12,7 +12,7 @@ from __future__ import annotations
 from mbd.kernel.codes import EPS, ILL_CONDITIONED
 from mbd.kernel.mass_ratios import find_imbalance, polish_with_rows
 from mbd.kernel.ordered import LOSS_AT_ONCE, solve_kkt
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import Balance, Report
 from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import stepping_rows
 from mbd.kernel.saddle import factor_saddle
@@ -27,12 +27,12 @@ MOST_START_CORRECTIONS = 14
 """Corrections by the balance [-]."""
 
 
-def is_ill_conditioned(K: Kernel) -> bool:
+def is_ill_conditioned(K: Report) -> bool:
     """Whether a pivot of the scaled matrix of accelerations was so small that solutions lose digits."""
     return bool(K.least_pivot < FEW_DIGITS)
 
 
-def refine_accelerations(K: Kernel) -> int:
+def refine_accelerations(K: Balance) -> int:
     """K.jump and K.impulse, solved for at the state in the block and in K.acc, corrected; 0 or ILL_CONDITIONED.
 
     The mode must have its code. Where friction slides or rows depend on others the solution stays as it is.
@@ -59,7 +59,7 @@ def refine_accelerations(K: Kernel) -> int:
     return 0
 
 
-def known_error(K: Kernel, m: int) -> float:
+def known_error(K: Balance, m: int) -> float:
     """Relative error of accelerations x₀ that are known, solved for with the factors at hand from r(x₀) − r(0).
 
     x₀ has no order, so that it has a part in every motion, and the size of the accelerations at hand or of those that

@@ -5,7 +5,7 @@ from __future__ import annotations
 from mbd.kernel.codes import LOG_CLOSED, LOG_OPENED, LOG_SLIPPED, LOG_STUCK, NO_FORCE, NO_IMPACT, SLIP, UNKNOWN
 from mbd.kernel.complementarity import complementarity
 from mbd.kernel.impact_solve import strikes
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import Balance, Frictions, Guards, Sizes, Switching
 from mbd.kernel.restart import active_rows, capture, evaluate, row_speed
 from mbd.kernel.saddle import solve_rows
 
@@ -19,7 +19,7 @@ NO_IMPULSE, OWN_IMPULSE, ALL_IMPULSES = 0, 1, 2
 """Which impulses a line of the event log holds [-]."""
 
 
-def room_to_log(K: Kernel) -> int:
+def room_to_log(K: Sizes) -> int:
     """Lines of the event log that one step with its event and two restarts may fill.
 
     A restart logs each contact and each friction at most once. An event logs one guard, a step over a singular
@@ -29,7 +29,7 @@ def room_to_log(K: Kernel) -> int:
     return int(5 * K.n_contacts + 2 * K.n_frictions + K.n_guards + 8)
 
 
-def log_event(K: Kernel, kind: int, index: int, loss: float, impulses: int) -> None:
+def log_event(K: Switching, kind: int, index: int, loss: float, impulses: int) -> None:
     """One line of the event log: t, kind, index, energy loss, row of results, impulses.
 
     impulses : NO_IMPULSE; OWN_IMPULSE, those of the rows of contact `index`; ALL_IMPULSES, with those of the rows that
@@ -52,7 +52,7 @@ def log_event(K: Kernel, kind: int, index: int, loss: float, impulses: int) -> N
     K.n_events += 1
 
 
-def resolve_contact_modes(K: Kernel) -> int:
+def resolve_contact_modes(K: Switching) -> int:
     """Consistent accelerations and multipliers; contacts that would pull open, touching ones that press close.
 
     Frictions that do not move stick or begin to slide.
@@ -106,14 +106,14 @@ def resolve_contact_modes(K: Kernel) -> int:
     return 0
 
 
-def frictional_state(K: Kernel, f: int) -> int:
+def frictional_state(K: Frictions, f: int) -> int:
     """0 off, 2 sticking, ±1 sliding."""
     if K.sticks[f] == 1:
         return 2
     return int(K.slip[f])
 
 
-def find_slips(K: Kernel) -> None:
+def find_slips(K: Guards) -> None:
     """Which frictions slide, by their velocity, and which may choose; K.loose tells what an event has found out.
 
     On entry K.loose[f] is 0, 2 where an event found the velocity to be zero, 3 where it found that it must slide.
@@ -154,7 +154,7 @@ def find_slips(K: Kernel) -> None:
             K.slip[f] = 1.0 if gamma > 0.0 else -1.0
 
 
-def find_painleve_contacts(K: Kernel) -> int:
+def find_painleve_contacts(K: Balance) -> int:
     """A contact that slides so that pushing on it makes it approach: no force or several are consistent; −1 if none.
 
     ``dg̈/dp = B_n K⁻¹ (B_n − μ s B_T)ᵀ ≤ 0`` with the other rows held (Painlevé 1895; Génot & Brogliato 1999,

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from mbd.kernel.codes import TOO_BRIEF
 from mbd.kernel.guards import gap_tolerance, watch
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import Guards, Switching
 from mbd.kernel.restart import compose, consistent, fill_block
 
 __all__ = ["find_pace", "relax_pace"]
@@ -31,7 +31,7 @@ PATIENCE = 880
 """Short steps after which those of a contact that goes on vibrating become longer all the same [-]."""
 
 
-def find_pace(K: Kernel) -> int:
+def find_pace(K: Switching) -> int:
     """The present full step from the penalty contacts that act; those that have just closed are asked for theirs."""
     step = K.dt
     for c in range(K.n_contacts):
@@ -56,7 +56,7 @@ def find_pace(K: Kernel) -> int:
     return 0
 
 
-def pace_of(K: Kernel, c: int) -> float:
+def pace_of(K: Switching, c: int) -> float:
     """The step that resolves the impact of contact c from the accepted state on; dt where that does."""
     h = K.dt
     watch(K, K.time, K.q, K.y, K.rate, K.lam, K.guards1)
@@ -75,7 +75,7 @@ def pace_of(K: Kernel, c: int) -> float:
     return float(h)
 
 
-def acceleration_of(K: Kernel, c: int, h: float) -> float:
+def acceleration_of(K: Switching, c: int, h: float) -> float:
     """What the force of contact c does to its gap rate [m/s², rad/s²], as the accelerations of now lead on for h.
 
     The larger of the rates now and then is left in K.closing_rate, the guards then in K.guards1.
@@ -106,7 +106,7 @@ def acceleration_of(K: Kernel, c: int, h: float) -> float:
     return float(difference / scale)
 
 
-def relax_pace(K: Kernel) -> None:
+def relax_pace(K: Guards) -> None:
     """After a short step: longer ones where the contact rests, or goes on vibrating for long."""
     for c in range(K.n_contacts):
         if K.kind[c] == 1 and K.closed[c] == 1 and 0.0 < K.contact_step[c] < K.dt:

@@ -27,7 +27,7 @@ from mbd.kernel.codes import (
 )
 from mbd.kernel.guards import try_step
 from mbd.kernel.hooks import scheme_error
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import Balance, Kernel, SchemeAbilities, SingularSteps, State
 from mbd.kernel.restart import compose, consistent, fill_block, lower_scales
 from mbd.kernel.roots import sqrt
 from mbd.kernel.singular.step_size import is_too_noisy, noise_share, singular_step_size
@@ -50,12 +50,12 @@ CANCELLED = 64.0
 """The same for what a step adds to them: stages and estimates are sums in which large terms cancel [-]."""
 
 
-def smallest_step(K: Kernel) -> float:
+def smallest_step(K: State) -> float:
     """Below it the clock does not move, or a run would never end: a motion that turns ever faster."""
     return float(max(64.0 * EPS * max(abs(K.time), K.longest), LEAST * K.longest))
 
 
-def error_ratio(K: Kernel, h: float) -> float:
+def error_ratio(K: SingularSteps, h: float) -> float:
     """err of the module's text for the candidate."""
     n_v = K.n_v
     far = 0.0
@@ -81,7 +81,7 @@ def error_ratio(K: Kernel, h: float) -> float:
     return ratio if ratio < 1e300 else 1e300
 
 
-def growth(K: Kernel, ratio: float) -> float:
+def growth(K: SchemeAbilities, ratio: float) -> float:
     """Factor from this step to the next."""
     factor = float(K.most_growth)
     if ratio > 0.0:
@@ -137,7 +137,7 @@ def controlled_step(K: Kernel, h: float) -> int:
         K.step = h  # no step is tiny beside the one that may be taken here
 
 
-def first_step(K: Kernel) -> None:
+def first_step(K: Balance) -> None:
     """K.step at an accepted, consistent state (Hairer, Nørsett & Wanner 1993, II.4).
 
     ``h = (0.01 tol / max(|ẏ|, |ÿ|))^(1/(p+1))`` with y = (q, v) and ÿ by one difference.

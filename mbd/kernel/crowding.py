@@ -9,7 +9,7 @@ instant wherever it is cut.
 
 from __future__ import annotations
 
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import Guards, Switching
 
 __all__ = ["count_blow", "crowd", "crowds"]
 
@@ -21,12 +21,12 @@ PART = 1e-6
 """Impulse over the largest of an impact that is more than round-off [-]."""
 
 
-def crowd(K: Kernel) -> float:
+def crowd(K: Guards) -> float:
     """Impacts through several contacts, less one for each dt since."""
     return float(max(K.crowding - (K.time - K.crowding_time) / K.dt, 0.0))
 
 
-def count_blow(K: Kernel) -> None:
+def count_blow(K: Switching) -> None:
     """Count the impact of this instant, whose impulses are in K.impulse, if it goes through several closed contacts."""
     largest = 0.0
     for c in range(K.n_contacts):
@@ -41,7 +41,7 @@ def count_blow(K: Kernel) -> None:
         K.crowding_time = K.time
 
 
-def crowds(K: Kernel) -> bool:
+def crowds(K: Guards) -> bool:
     """Whether non-smooth steps follow from now on, as impacts have crowded; told once."""
     if K.auto == 0 or K.fallback > 0 or K.crowding <= MOST_CROWDED:
         return False

@@ -9,7 +9,7 @@ from mbd.kernel.contact_modes import NO_IMPULSE, log_event
 from mbd.kernel.crowding import count_blow
 from mbd.kernel.nonsmooth import keep, put_back, rebound, strike
 from mbd.kernel.observe import is_awaited, store_row
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import Guards, Kernel
 from mbd.kernel.starting import restart
 from mbd.kernel.switching import switch
 
@@ -19,7 +19,7 @@ MOST_HALVED = 3
 """How often a non-smooth step whose end has no impulses is halved [-]."""
 
 
-def same_instant(K: Kernel) -> bool:
+def same_instant(K: Guards) -> bool:
     """Count switches without progress in time; true when there were too many, or when they repeat themselves."""
     now = K.time
     if now - K.last_switch <= 1e-10 * K.dt:
@@ -36,7 +36,7 @@ def same_instant(K: Kernel) -> bool:
     return bool(K.n_switches > K.max_switches)
 
 
-def repeats(K: Kernel) -> bool:
+def repeats(K: Guards) -> bool:
     """Whether everything is as it was after an earlier switch of this instant, so that they go on without end.
 
     The state is compared with the one noted when there were half as many switches or fewer, so that a cycle of any
@@ -66,7 +66,7 @@ def repeats(K: Kernel) -> bool:
     return False
 
 
-def note_state(K: Kernel, number: int) -> None:
+def note_state(K: Guards, number: int) -> None:
     """What `repeats` compares with, at this switch of the instant."""
     K.seen_at = float(number)
     o = 1

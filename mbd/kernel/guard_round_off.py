@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from mbd.kernel.codes import EPS, GUARDS, TERMS
 from mbd.kernel.hooks import call
-from mbd.kernel.records import Kernel, Reals
+from mbd.kernel.records import Guards, Model, Reals, Switching
 from mbd.kernel.restart import evaluate, is_held
 
 __all__ = ["condition_round_off", "guard_round_off"]
@@ -34,17 +34,17 @@ MAGNIFIED = 2.0**20
 """Times round-off by which a coordinate is moved to see what it does to a guard, so that it is seen at all [-]."""
 
 
-def guard_round_off(K: Kernel, e: int, t: float, q: Reals, y: Reals) -> float:
+def guard_round_off(K: Switching, e: int, t: float, q: Reals, y: Reals) -> float:
     """Round-off of user guard e at a state; K.acc and the block are overwritten."""
     return inherited(K, 4 * K.n_contacts + e, e, t, q, y)
 
 
-def condition_round_off(K: Kernel, c: int, t: float, q: Reals, y: Reals) -> float:
+def condition_round_off(K: Switching, c: int, t: float, q: Reals, y: Reals) -> float:
     """The same of the measure that contact c is watched by."""
     return inherited(K, 3 * K.n_contacts + c, K.n_guards + c, t, q, y)
 
 
-def inherited(K: Kernel, place: int, term: int, t: float, q: Reals, y: Reals) -> float:
+def inherited(K: Switching, place: int, term: int, t: float, q: Reals, y: Reals) -> float:
     """Round-off of the guard value at a place, whose terms have another in their program."""
     evaluate(K, t, q, y)
     o_x = 2 * K.n_watched
@@ -61,7 +61,7 @@ def inherited(K: Kernel, place: int, term: int, t: float, q: Reals, y: Reals) ->
     return float(doubt)
 
 
-def change_by(K: Kernel, place: int, here: float, at: int, doubt: float) -> float:
+def change_by(K: Guards, place: int, here: float, at: int, doubt: float) -> float:
     """What round-off of one input of the block does to a guard value, which is `here` without it."""
     kept = K.block[at]
     K.block[at] = kept + MAGNIFIED * doubt
@@ -70,7 +70,7 @@ def change_by(K: Kernel, place: int, here: float, at: int, doubt: float) -> floa
     return float(abs(K.doubt[place] - here) / MAGNIFIED)
 
 
-def doubts_of_state(K: Kernel, q: Reals, y: Reals, o_x: int, o_v: int) -> None:
+def doubts_of_state(K: Switching, q: Reals, y: Reals, o_x: int, o_v: int) -> None:
     """Round-off of positions and velocities into K.doubt, with M, B in K.acc."""
     n = K.n
     h = K.step
@@ -104,7 +104,7 @@ def doubts_of_state(K: Kernel, q: Reals, y: Reals, o_x: int, o_v: int) -> None:
         K.doubt[o_x + i] += h * K.doubt[o_v + i]
 
 
-def lightness(K: Kernel, i: int) -> float:
+def lightness(K: Model, i: int) -> float:
     """1/M_ii, with M in K.acc; 1 of a coordinate without mass, which rows alone determine."""
     mass = abs(K.acc[i * K.n + i])
     return 1.0 / mass if mass > 0.0 else 1.0

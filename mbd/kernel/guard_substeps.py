@@ -15,7 +15,7 @@ from __future__ import annotations
 from mbd.kernel.candidate import accept_guards, carry
 from mbd.kernel.codes import EPS
 from mbd.kernel.guards import gap_scale, gap_tolerance, goes_back, is_watched, judge, watch
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import Contacts, Guards, Switching
 from mbd.kernel.restart import compose, consistent, fill_block
 
 __all__ = ["copy_ends", "look_at", "parts_to_take", "put_candidate_back"]
@@ -24,7 +24,7 @@ FINEST = 16.0
 """Distance over the round-off of a position below which the interpolant need not meet it at the end of a step [-]."""
 
 
-def parts_to_take(K: Kernel, h: float) -> int:
+def parts_to_take(K: Switching, h: float) -> int:
     """After how many parts the candidate's step must end; −1: after the first, which holds an event; 0: never.
 
     Guards and multipliers of the accepted state and of the candidate are as before afterwards.
@@ -53,7 +53,7 @@ def parts_to_take(K: Kernel, h: float) -> int:
     return answer
 
 
-def copy_ends(K: Kernel, out: bool) -> None:
+def copy_ends(K: Guards, out: bool) -> None:
     """What is overwritten, into K.inside or back: guards and multipliers at both ends, the candidate."""
     o = carry(K.guards0, K.inside, 0, K.n_watched, out)
     o = carry(K.guards1, K.inside, o, K.n_watched, out)
@@ -64,7 +64,7 @@ def copy_ends(K: Kernel, out: bool) -> None:
     carry(K.rate1, K.inside, o, K.n, out)
 
 
-def put_candidate_back(K: Kernel) -> None:
+def put_candidate_back(K: Guards) -> None:
     """The candidate with its guards and multipliers; those of the accepted state stay what they are."""
     o = carry(K.guards1, K.inside, K.n_watched, K.n_watched, False)
     o = carry(K.lam1, K.inside, o + K.n_rows, K.n_rows, False)
@@ -73,7 +73,7 @@ def put_candidate_back(K: Kernel) -> None:
     carry(K.rate1, K.inside, o, K.n, False)
 
 
-def needs_multipliers(K: Kernel) -> bool:
+def needs_multipliers(K: Contacts) -> bool:
     """Whether a guard asks for multipliers: of a contact that opens as it pulls, of friction."""
     if K.n_frictions > 0:
         return True
@@ -84,7 +84,7 @@ def needs_multipliers(K: Kernel) -> bool:
     return count > 0
 
 
-def look_at(K: Kernel, t: float, h: float, s: float, asked: bool) -> None:
+def look_at(K: Switching, t: float, h: float, s: float, asked: bool) -> None:
     """Guards (and multipliers) of the interpolant at the part s of the step, in place of those of the candidate."""
     place = 2 * K.n_watched + 2 * K.n_rows
     o_y = place + K.n_q
@@ -118,7 +118,7 @@ def look_at(K: Kernel, t: float, h: float, s: float, asked: bool) -> None:
     watch(K, t + s * h, K.q1, K.y1, K.rate1, K.lam1, K.guards1)
 
 
-def rearms(K: Kernel, t: float) -> bool:
+def rearms(K: Switching, t: float) -> bool:
     """Whether a contact or a guard of the user would be ready to fire, or no longer, after the place just looked at."""
     for c in range(K.n_contacts):
         if K.closed[c] == 1:

@@ -27,7 +27,20 @@ from mbd.kernel.codes import (
 from mbd.kernel.guard_round_off import condition_round_off, guard_round_off
 from mbd.kernel.hermite import crossing, hermite, hermite_turn
 from mbd.kernel.hooks import call, scheme_step
-from mbd.kernel.records import Kernel, Reals
+from mbd.kernel.records import (
+    Balance,
+    ContactRows,
+    Contacts,
+    DependentRows,
+    Events,
+    Guards,
+    Kernel,
+    Mechanism,
+    Model,
+    Reals,
+    Sizes,
+    Switching,
+)
 from mbd.kernel.restart import (
     compose,
     consistent,
@@ -55,7 +68,7 @@ APART = 1e-6
 """Gap [m, rad] above which a contact is clearly open."""
 
 
-def watch(K: Kernel, t: float, q: Reals, y: Reals, rate: Reals, lam: Reals, values: Reals) -> None:
+def watch(K: Mechanism, t: float, q: Reals, y: Reals, rate: Reals, lam: Reals, values: Reals) -> None:
     """Gaps, gap rates, penalty forces, conditions and user guards at a state."""
     fill_block(K, t, q, y)
     for i in range(K.n):
@@ -103,7 +116,7 @@ def try_step(K: Kernel, h: float, t1: float) -> int:
     return 0
 
 
-def share_multipliers(K: Kernel, t1: float) -> int:
+def share_multipliers(K: DependentRows, t1: float) -> int:
     """Multipliers of dependent rows; a scheme leaves those of the rows that it was solved with."""
     for k in range(K.n_rows):
         if K.dropped[k] == 1 and K.explicit == 0:  # the explicit one has shared them out already
@@ -118,7 +131,7 @@ def share_multipliers(K: Kernel, t1: float) -> int:
     return 0
 
 
-def brief_step(K: Kernel, h: float, t1: float) -> int:
+def brief_step(K: Balance, h: float, t1: float) -> int:
     """A step of Heun's method."""
     for i in range(K.n):
         K.rate1[i] = K.rate[i]
@@ -148,7 +161,7 @@ def brief_step(K: Kernel, h: float, t1: float) -> int:
     return 0
 
 
-def departs(K: Kernel) -> bool:
+def departs(K: DependentRows) -> bool:
     """Whether a row that was left out is far from holding at the candidate, at which K.acc is: another branch."""
     o_h = K.acc_h
     for k in range(K.n_rows):
@@ -157,12 +170,12 @@ def departs(K: Kernel) -> bool:
     return False
 
 
-def frictions_at(K: Kernel) -> int:
+def frictions_at(K: Sizes) -> int:
     """Where the sliding velocities begin among the guard values; their rates and the limits follow."""
     return int(4 * K.n_contacts + 2 * K.n_guards)
 
 
-def is_watched(K: Kernel, c: int, values: Reals) -> bool:
+def is_watched(K: Contacts, c: int, values: Reals) -> bool:
     """Whether an open contact may close."""
     if K.while_kind[c] == 0:
         return True
@@ -171,19 +184,19 @@ def is_watched(K: Kernel, c: int, values: Reals) -> bool:
     return bool(values[3 * K.n_contacts + c] > 0.0)
 
 
-def gap_scale(K: Kernel, c: int) -> float:
+def gap_scale(K: ContactRows, c: int) -> float:
     """Size of the terms a gap is made of [m, rad]; 1 for a penalty contact."""
     row = K.normal[c]
     size = K.scale[K.n + row] if row >= 0 else 1.0
     return float(max(size, 1e-3))
 
 
-def gap_tolerance(K: Kernel, c: int) -> float:
+def gap_tolerance(K: ContactRows, c: int) -> float:
     """Round-off of the gap."""
     return 16.0 * EPS * gap_scale(K, c)
 
 
-def update_armed(K: Kernel) -> None:
+def update_armed(K: Guards) -> None:
     """A contact is armed (1) once its gap has risen above zero; one that becomes watched (−1), if it is above or rests.
 
     One that sinks through zero together with its own condition is below as long as it is watched, so it is ignored.
@@ -208,7 +221,7 @@ def update_armed(K: Kernel) -> None:
                 K.armed[c] = 1
 
 
-def update_sides(K: Kernel) -> None:
+def update_sides(K: Switching) -> None:
     """A guard that fires in one direction only is ready again once it has gone back.
 
     One that started at rest on its surface (side 0) is on the side to which it has moved.
@@ -221,13 +234,13 @@ def update_sides(K: Kernel) -> None:
             K.side[e] = float(-K.direction[e])
 
 
-def goes_back(K: Kernel, e: int, value: float, t: float, q: Reals, y: Reals) -> bool:
+def goes_back(K: Switching, e: int, value: float, t: float, q: Reals, y: Reals) -> bool:
     """Whether a guard that fires in one direction only is clearly on the side again from which it fires."""
     back = -K.direction[e]
     return bool(back * K.side[e] < 0.0 and back * value > 0.0 and abs(value) > guard_round_off(K, e, t, q, y))
 
 
-def consider(K: Kernel, kind: int, index: int, estimate: float, low: float) -> None:
+def consider(K: Events, kind: int, index: int, estimate: float, low: float) -> None:
     """Keep the candidate that fires first; all in fractions of the step."""
     if estimate < K.event_place:
         K.event_place = estimate
@@ -236,7 +249,7 @@ def consider(K: Kernel, kind: int, index: int, estimate: float, low: float) -> N
         K.event_index = index
 
 
-def is_quiet(K: Kernel) -> bool:
+def is_quiet(K: Guards) -> bool:
     """Whether no guard can have fired: every contact open, armed, always watched and clearly apart."""
     if K.n_guards + K.n_frictions > 0:
         return False
@@ -251,7 +264,7 @@ def is_quiet(K: Kernel) -> bool:
     return True
 
 
-def judge(K: Kernel, h: float) -> bool:
+def judge(K: Switching, h: float) -> bool:
     """Whether a guard fired between the accepted state and the candidate; the earliest in K.fired, K.pick."""
     nC = K.n_contacts
     K.event_kind = -1
@@ -308,7 +321,7 @@ def judge(K: Kernel, h: float) -> bool:
     return bool(K.event_kind >= 0)
 
 
-def begins_to_be_watched(K: Kernel, c: int, h: float) -> bool:
+def begins_to_be_watched(K: Switching, c: int, h: float) -> bool:
     """Whether the measure that contact c is watched by has risen through zero, by more than its round-off."""
     place = 3 * K.n_contacts + c
     if K.while_kind[c] != 2 or not K.guards0[place] <= 0.0 < K.guards1[place]:
@@ -316,7 +329,7 @@ def begins_to_be_watched(K: Kernel, c: int, h: float) -> bool:
     return bool(K.guards1[place] > condition_round_off(K, c, K.time + h, K.q1, K.y1))
 
 
-def judge_user(K: Kernel, e: int, h: float) -> None:
+def judge_user(K: Switching, e: int, h: float) -> None:
     """Whether a user's guard crosses zero from its side; one that still rises from there does so after its top.
 
     A sign that has changed by no more than round-off is no crossing: it is judged again after the next step.
@@ -338,7 +351,7 @@ def judge_user(K: Kernel, e: int, h: float) -> None:
         consider(K, CROSS, e, crossing(v0, v1) if v0 > 0.0 else 0.0, 0.0)
 
 
-def pull_of(K: Kernel, c: int, h: float) -> float:
+def pull_of(K: Balance, c: int, h: float) -> float:
     """The multiplier of a closed contact at the candidate, positive where it pulls.
 
     That of index 3 lags behind after a start; where it is small beside the forces the consistent one is asked.
@@ -349,14 +362,14 @@ def pull_of(K: Kernel, c: int, h: float) -> float:
     return pull
 
 
-def is_doubtful(K: Kernel, force: float) -> bool:
+def is_doubtful(K: Model, force: float) -> bool:
     """Whether the sign of a force that follows from multipliers of index 3 is asked of consistent ones."""
     if K.stabilized == 1 or K.strategy == 1:
         return False
     return bool(abs(force) < DOUBTFUL * largest_force(K))
 
 
-def judge_friction(K: Kernel, f: int, h: float) -> None:
+def judge_friction(K: Switching, f: int, h: float) -> None:
     """Whether a friction that slides comes to rest, or one that sticks is pulled beyond its limit."""
     place = frictions_at(K) + f
     nF = K.n_frictions
@@ -393,7 +406,7 @@ def judge_friction(K: Kernel, f: int, h: float) -> None:
             consider(K, STICK_BRIEF, f, bottom, 0.0)
 
 
-def margin(K: Kernel, f: int, t1: float) -> float:
+def margin(K: Switching, f: int, t1: float) -> float:
     """What is left of a sticking friction at the candidate, limit − |λ_T| of consistent multipliers."""
     row = K.friction_row[f]
     if consistent(K, t1, K.q1, K.y1) != 0:
@@ -404,7 +417,7 @@ def margin(K: Kernel, f: int, t1: float) -> float:
     return float(limit_of(K, f) - abs(K.impulse[row]))
 
 
-def guard_value(K: Kernel, kind: int, index: int, t1: float) -> float:
+def guard_value(K: Switching, kind: int, index: int, t1: float) -> float:
     """The fired guard at the candidate, counted so that it is ≥ 0 before and < 0 after its event."""
     nC = K.n_contacts
     if kind == CLOSE:

@@ -6,17 +6,17 @@ compiled, functions are called by address and the scheme is one of the kernel's 
 
 from __future__ import annotations
 
-from mbd.kernel.records import Kernel, Reals
+from mbd.kernel.records import Kernel, Model, Reals
 
 __all__ = ["call", "call_on", "scheme_accept", "scheme_error", "scheme_resume", "scheme_start", "scheme_step"]
 
 
-def call(K: Kernel, number: int, out: Reals) -> None:
+def call(K: Model, number: int, out: Reals) -> None:
     """Evaluate model function `number` on the block and parameters."""
     K.code[number](K.block, K.params, out)
 
 
-def call_on(K: Kernel, number: int, numbers: Reals, out: Reals) -> None:
+def call_on(K: Model, number: int, numbers: Reals, out: Reals) -> None:
     """Evaluate function `number` on other numbers than the block."""
     K.code[number](numbers, K.params, out)
 

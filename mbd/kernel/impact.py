@@ -26,7 +26,7 @@ from mbd.kernel.impact_solve import (
     speed,
     start_over,
 )
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import ContactForces, Contacts, Switching
 from mbd.kernel.restart import row_speed
 from mbd.kernel.roots import sqrt
 
@@ -40,7 +40,7 @@ APPROACH = 1e-11
 """Approach speed, relative to the fastest, that counts as none [-]."""
 
 
-def impact(K: Kernel, slow: bool) -> int:
+def impact(K: Switching, slow: bool) -> int:
     """The velocities in K.y jump, by K.jump; impulses, negative where they push, are left in K.impulse.
 
     A slow impact (below the rest speed) sticks; in non-smooth steps, whose speeds are of the size of dt, only where
@@ -78,7 +78,7 @@ def impact(K: Kernel, slow: bool) -> int:
     return 0
 
 
-def would_hold_back(K: Kernel) -> bool:
+def would_hold_back(K: ContactForces) -> bool:
     """Whether a contact that opens on pull would have to pull in the impact just found, its smooth step included."""
     largest = 0.0
     for k in range(K.n_rows):
@@ -91,7 +91,7 @@ def would_hold_back(K: Kernel) -> bool:
     return False
 
 
-def rest(K: Kernel) -> None:
+def rest(K: ContactForces) -> None:
     """What holds a contact at rest that would leave more slowly than the rest speed is no impulse of the contact."""
     for c in range(K.n_contacts):
         if K.kind[c] == 0 and K.active[c] == 1 and K.opens[c] == 0 and K.impulse[K.normal[c]] > 0.0:
@@ -100,7 +100,7 @@ def rest(K: Kernel) -> None:
                     K.impulse[k] = 0.0
 
 
-def newton_law(K: Kernel, slow: bool, held: bool) -> int:
+def newton_law(K: Switching, slow: bool, held: bool) -> int:
     """One impact that reverses the gap rates of closing contacts by their restitutions; a slow one may be `held`."""
     gather(K, slow, slow and held)
     for k in range(K.n_rows):
@@ -115,7 +115,7 @@ def newton_law(K: Kernel, slow: bool, held: bool) -> int:
     return status
 
 
-def poisson_law(K: Kernel, energetic: bool) -> int:
+def poisson_law(K: Switching, energetic: bool) -> int:
     """Compression, then restitution of its impulses (Poisson) or of their work (Stronge)."""
     gather(K, False, False)
     for k in range(K.n_rows):
@@ -145,7 +145,7 @@ def poisson_law(K: Kernel, energetic: bool) -> int:
     return status
 
 
-def give_back(K: Kernel, factor: float) -> int:
+def give_back(K: Switching, factor: float) -> int:
     """The second phase with this factor on the impulses K.trial_given, from the end of the first.
 
     Contacts that are given an impulse part under it, unless they would approach; their tangents stay.
@@ -165,7 +165,7 @@ def give_back(K: Kernel, factor: float) -> int:
     return solve_impact(K)
 
 
-def work_given_back(K: Kernel) -> float:
+def work_given_back(K: ContactForces) -> float:
     """Work of the normal impulses of the second phase, ½ Σ Λ (γ_c + γ⁺)."""
     o_B = K.acc_B
     work = 0.0
@@ -178,7 +178,7 @@ def work_given_back(K: Kernel) -> float:
     return work
 
 
-def give_back_work(K: Kernel, work: float) -> int:
+def give_back_work(K: Switching, work: float) -> int:
     """The second phase with the largest factor that gives back no more than this work, and no energy in all.
 
     The work grows with the square of the factor while no branch changes; where one does, the factor is bisected. Less
@@ -206,12 +206,12 @@ def give_back_work(K: Kernel, work: float) -> int:
     return give_back(K, low)
 
 
-def is_held_through(K: Kernel, c: int) -> bool:
+def is_held_through(K: Contacts, c: int) -> bool:
     """Whether a contact acts in every impact whatever the sign of its impulse: it has a rule, and does not rebound."""
     return bool(K.opens[c] != 0 and (K.closed[c] == 1 or K.restitution[c] == 0.0))
 
 
-def sequential_law(K: Kernel) -> int:
+def sequential_law(K: Switching) -> int:
     """Impact after impact of the contacts that approach fastest, each as if the others that push were not there."""
     gather(K, False, False)
     for c in range(K.n_contacts):
@@ -247,7 +247,7 @@ def sequential_law(K: Kernel) -> int:
     return NO_IMPACT
 
 
-def end_together(K: Kernel, fastest: float) -> None:
+def end_together(K: ContactForces, fastest: float) -> None:
     """Contacts that took part, and neither part nor closed with a restitution, stay closed."""
     for c in range(K.n_contacts):
         K.active[c] = 0

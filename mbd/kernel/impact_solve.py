@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from mbd.kernel.complementarity import complementarity
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import Balance, Complementarity, ContactForces, Contacts, Frictions, Guards
 from mbd.kernel.restart import capture, evaluate, evaluate_loaded, limit_of, row_speed
 
 __all__ = [
@@ -12,7 +12,7 @@ __all__ = [
 ]  # fmt: skip
 
 
-def prepare(K: Kernel) -> None:
+def prepare(K: Balance) -> None:
     """K.acc at the instant, directions of sliding where contacts are now, force zero; all frictions begin stuck."""
     evaluate(K, K.time, K.q, K.y)
     if K.n_frictions > 0:
@@ -33,7 +33,7 @@ def prepare(K: Kernel) -> None:
     start_over(K)
 
 
-def start_over(K: Kernel) -> None:
+def start_over(K: Complementarity) -> None:
     """No jump and no impulse yet."""
     for i in range(K.n):
         K.jump[i] = K.total_jump[i] = 0.0
@@ -41,7 +41,7 @@ def start_over(K: Kernel) -> None:
         K.impulse[k] = K.total[k] = 0.0
 
 
-def gather(K: Kernel, slow: bool, hold: bool) -> None:
+def gather(K: Guards, slow: bool, hold: bool) -> None:
     """All closed and closing contacts take part; those that open on pull may choose.
 
     With `hold` all are held; where impacts follow without end, the one that fired and cannot rise.
@@ -59,7 +59,7 @@ def gather(K: Kernel, slow: bool, hold: bool) -> None:
         K.slip[f] = 0.0
 
 
-def loosen(K: Kernel) -> None:
+def loosen(K: Frictions) -> None:
     """Frictions of this impact may choose, from sticking."""
     for f in range(K.n_frictions):
         c = K.friction_contact[f]
@@ -69,7 +69,7 @@ def loosen(K: Kernel) -> None:
             K.slip[f] = 0.0
 
 
-def speed(K: Kernel, row: int) -> float:
+def speed(K: ContactForces, row: int) -> float:
     """γ of a row after the jumps so far."""
     o_B = K.acc_B
     value = row_speed(K, row)
@@ -78,7 +78,7 @@ def speed(K: Kernel, row: int) -> float:
     return value
 
 
-def solve_impact(K: Kernel) -> int:
+def solve_impact(K: Balance) -> int:
     """The next jump and its impulses, beside the impulses in K.given: bias is in place, contacts have been gathered."""
     for k in range(K.n_rows):
         K.impulse[k] = 0.0
@@ -97,12 +97,12 @@ def solve_impact(K: Kernel) -> int:
     return 0
 
 
-def restitution_of(K: Kernel, c: int) -> float:
+def restitution_of(K: Contacts, c: int) -> float:
     """e, or 0 at the end of impacts without end."""
     return 0.0 if K.plastic_impact == 1 else float(K.restitution[c])
 
 
-def let_rebound(K: Kernel) -> None:
+def let_rebound(K: ContactForces) -> None:
     """Contacts that closed with a restitution leave again."""
     for c in range(K.n_contacts):
         rests = K.strategy == 1 and K.before[c] >= 0.0
@@ -110,7 +110,7 @@ def let_rebound(K: Kernel) -> None:
             K.active[c] = 0
 
 
-def energy_gain(K: Kernel) -> float:
+def energy_gain(K: ContactForces) -> float:
     """Work of all impulses on the mechanism, ½ Σ λ̂ (γ⁻ + γ⁺), relative to its terms."""
     n = K.n
     o_B = K.acc_B
@@ -127,6 +127,6 @@ def energy_gain(K: Kernel) -> float:
     return -loss / size
 
 
-def strikes(K: Kernel, c: int) -> bool:
+def strikes(K: ContactForces, c: int) -> bool:
     """Whether a contact closes in the impact just found; one that only touches takes no impulse."""
     return bool(K.kind[c] == 0 and K.closing[c] > 0 and (K.closing[c] == 1 or K.impulse[K.normal[c]] != 0.0))

@@ -18,7 +18,7 @@ from mbd.kernel.codes import (
 )
 from mbd.kernel.guards import frictions_at, gap_tolerance, guard_value, is_watched, judge, try_step
 from mbd.kernel.hermite import first_guess
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import Events, Guards, Kernel, Switching
 from mbd.kernel.refine import refine
 
 __all__ = ["locate"]
@@ -136,7 +136,7 @@ def root_before(K: Kernel, kind: int, index: int, low: float, end: float) -> int
     return 0 if K.event_kind >= 0 else try_step(K, end, K.time + end)
 
 
-def another_before(K: Kernel, kind: int, index: int, found: float) -> bool:
+def another_before(K: Switching, kind: int, index: int, found: float) -> bool:
     """Whether another guard fired before this one, which is at round-off and may look fired itself."""
     place = index
     if kind == CROSS:
@@ -150,7 +150,7 @@ def another_before(K: Kernel, kind: int, index: int, found: float) -> bool:
     return other
 
 
-def take_event(K: Kernel, kind: int, index: int, place: float) -> None:
+def take_event(K: Events, kind: int, index: int, place: float) -> None:
     """The event that the step ends with."""
     K.event_kind = kind
     K.event_index = index
@@ -178,7 +178,7 @@ def fall_back(K: Kernel, h: float, end: float, kind: int, index: int) -> int:
     return 0
 
 
-def left_alone(K: Kernel, c: int) -> bool:
+def left_alone(K: Guards, c: int) -> bool:
     """Whether contact c is not watched at the candidate; a condition that ends at the same instant has ended."""
     if not is_watched(K, c, K.guards1):
         return True
@@ -191,7 +191,7 @@ def left_alone(K: Kernel, c: int) -> bool:
     return bool(K.guards1[place] <= apart * change)
 
 
-def guard_rate(K: Kernel, kind: int, index: int) -> float:
+def guard_rate(K: Guards, kind: int, index: int) -> float:
     """Rate of `guard_value` at the candidate; 0 where it is not known."""
     if kind == CLOSE:
         return float(K.guards1[K.n_contacts + index])

@@ -12,7 +12,7 @@ from __future__ import annotations
 from mbd.kernel.hooks import call
 from mbd.kernel.linear import solve_again, solve_definite
 from mbd.kernel.ordered import order_at, solve_kkt
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import Balance, Equations
 
 __all__ = ["LOSS", "find_imbalance", "is_uneven", "polish_rates", "polish_with_rows"]
 
@@ -26,7 +26,7 @@ SMALL_CORRECTION = 1e-9
 """Correction over the largest rate, both as they are, after which none follows [-]."""
 
 
-def is_uneven(K: Kernel, m: int) -> bool:
+def is_uneven(K: Equations, m: int) -> bool:
     """Whether a pivot of M, which is in K.acc, is far below the largest diagonal entry of its unit; with m active rows.
 
     Where M is singular its diagonal entries are compared.
@@ -54,7 +54,7 @@ def is_uneven(K: Kernel, m: int) -> bool:
     return False
 
 
-def polish_rates(K: Kernel, kept: float) -> None:
+def polish_rates(K: Balance, kept: float) -> None:
     """K.jump corrected by the balance at the state in the block; pivots of the factors in K.acc keep `kept`.
 
     Where much was lost a correction leaves a part of the error: they go on until they grow small, or no smaller.
@@ -77,7 +77,7 @@ def polish_rates(K: Kernel, kept: float) -> None:
         before = change
 
 
-def polish_with_rows(K: Kernel, m: int) -> None:
+def polish_with_rows(K: Balance, m: int) -> None:
     """The same of K.jump and of K.impulse for the m rows in K.rows, with the factors of `[M R; B 0]` in K.kkt."""
     n = K.n
     o_B = K.acc_B
@@ -100,7 +100,7 @@ def polish_with_rows(K: Kernel, m: int) -> None:
         K.impulse[K.rows[k]] += K.rhs[n + k]
 
 
-def find_imbalance(K: Kernel) -> None:
+def find_imbalance(K: Balance) -> None:
     """r of the mode at the state in the block, with the rates in K.jump, into K.out."""
     for i in range(K.n):
         K.block[K.o_a + i] = K.jump[i]

@@ -19,7 +19,7 @@ from mbd.kernel.codes import LOG_OPENED, NO_IMPACT, PULL
 from mbd.kernel.complementarity import complementarity
 from mbd.kernel.contact_modes import NO_IMPULSE, STILL, log_event
 from mbd.kernel.guards import frictions_at, gap_scale, gap_tolerance, is_watched, watch
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import Balance, ContactForces, Guards, Switching
 from mbd.kernel.restart import consistent, displace, evaluate, largest_force
 from mbd.kernel.switching import close_by_impact, mark_touching
 
@@ -33,7 +33,7 @@ RESTING = 2.0
 """Approach speed over the change of speed in a step below which a contact rests instead of rebounding [-]."""
 
 
-def must_release(K: Kernel, t1: float) -> int:
+def must_release(K: Switching, t1: float) -> int:
     """Contacts that pulled and frictions beyond their limits in the step just tried let go before it; how many.
 
     What has let go for a step does not hold again in it, even where frictions that depend on each other share a load.
@@ -70,7 +70,7 @@ def must_release(K: Kernel, t1: float) -> int:
     return count
 
 
-def pulls(K: Kernel, c: int, least: float, t1: float) -> bool:
+def pulls(K: Balance, c: int, least: float, t1: float) -> bool:
     """Whether a contact pulled at the candidate, by consistent multipliers: those of a step may oscillate."""
     row = K.normal[c]
     if K.lam1[row] <= least:
@@ -78,7 +78,7 @@ def pulls(K: Kernel, c: int, least: float, t1: float) -> bool:
     return bool(consistent(K, t1, K.q1, K.y1) != 0 or K.impulse[row] > least)
 
 
-def closes_below_surface(K: Kernel) -> bool:
+def closes_below_surface(K: Guards) -> bool:
     """Whether open contacts lie below their surfaces at the candidate, or a friction has turned around.
 
     The contacts are marked in K.closing.
@@ -98,7 +98,7 @@ def closes_below_surface(K: Kernel) -> bool:
     return found
 
 
-def project_gaps(K: Kernel) -> int:
+def project_gaps(K: Switching) -> int:
     """Positions of K.q moved least, in the metric of M, until no contact lies below its surface."""
     for f in range(K.n_frictions):
         K.base_limit[f] = K.slip[f]  # kept here: friction moves nothing
@@ -141,7 +141,7 @@ def project_gaps(K: Kernel) -> int:
     return status
 
 
-def project_gaps_once(K: Kernel) -> int:
+def project_gaps_once(K: Balance) -> int:
     """One Newton step of `project_gaps`; the size of the correction relative to 1 is left in K.correction_size."""
     n = K.n
     evaluate(K, K.time, K.q, K.y)
@@ -162,7 +162,7 @@ def project_gaps_once(K: Kernel) -> int:
     return 0
 
 
-def strike(K: Kernel, h: float, t1: float) -> int:
+def strike(K: Switching, h: float, t1: float) -> int:
     """The candidate becomes the accepted state, lifted out of the surfaces."""
     nC = K.n_contacts
     for c in range(nC):
@@ -177,7 +177,7 @@ def strike(K: Kernel, h: float, t1: float) -> int:
     return 0
 
 
-def rebound(K: Kernel) -> int:
+def rebound(K: Switching) -> int:
     """The impact of a step, after `strike`; where all that come down rest, none of the closed contacts leaves."""
     nC = K.n_contacts
     fastest = 0.0
@@ -205,20 +205,20 @@ def rebound(K: Kernel) -> int:
     return status
 
 
-def keep(K: Kernel) -> None:
+def keep(K: Switching) -> None:
     """Remember the accepted state, from which a step whose end has no impulses is tried again."""
     copy(K, True)
     copy_flags(K, True)
 
 
-def put_back(K: Kernel, t: float) -> None:
+def put_back(K: Switching, t: float) -> None:
     """The state as `keep` found it, at time t."""
     copy(K, False)
     copy_flags(K, False)
     K.time = t
 
 
-def copy(K: Kernel, out: bool) -> None:
+def copy(K: Switching, out: bool) -> None:
     """The state into K.kept, or back."""
     o = carry(K.q, K.kept, 0, K.n_q, out)
     o = carry(K.y, K.kept, o, K.n, out)
@@ -229,7 +229,7 @@ def copy(K: Kernel, out: bool) -> None:
     carry(K.slip, K.kept, o, K.n_frictions, out)
 
 
-def copy_flags(K: Kernel, out: bool) -> None:
+def copy_flags(K: ContactForces, out: bool) -> None:
     """Who is closed, armed, … into K.kept_flags, or back."""
     o = carry(K.closed, K.kept_flags, 0, K.n_contacts, out)
     o = carry(K.armed, K.kept_flags, o, K.n_contacts, out)

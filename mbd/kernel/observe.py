@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from mbd.kernel.candidate import carry
 from mbd.kernel.codes import LOG_EVENT, LOG_SLIPPED, LOG_STUCK
-from mbd.kernel.records import Kernel, Reals
+from mbd.kernel.records import Reals, Switching
 
 __all__ = ["is_awaited", "store_row", "store_state"]
 
 
-def store_row(K: Kernel) -> None:
+def store_row(K: Switching) -> None:
     """One row of results: the accepted state."""
     store_state(K, K.q, K.y, K.rate, K.lam)
 
 
-def store_state(K: Kernel, q: Reals, y: Reals, rate: Reals, lam: Reals) -> None:
+def store_state(K: Switching, q: Reals, y: Reals, rate: Reals, lam: Reals) -> None:
     """One row of results: t, q, (v, z), (v̇, ż), λ, closed, and what frictions do: 2 sticks, ±1 slides, 0 off.
 
     K.row_bounds follows the rows, so that notes on turns and pulls need no look at all of them.
@@ -44,7 +44,7 @@ def store_state(K: Kernel, q: Reals, y: Reals, rate: Reals, lam: Reals) -> None:
     K.steps_since_row = 0
 
 
-def is_awaited(K: Kernel, first: int) -> bool:
+def is_awaited(K: Switching, first: int) -> bool:
     """Whether someone waits for an event logged since the line `first`."""
     for line in range(first, K.n_logged):
         index = int(K.log[line * K.event_width + 2])

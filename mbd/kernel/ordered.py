@@ -9,7 +9,7 @@ knows which concern it. Nothing is exchanged; instead every pivot is compared wi
 from __future__ import annotations
 
 from mbd.kernel.linear import solve
-from mbd.kernel.records import Kernel, Reals
+from mbd.kernel.records import Equations, Motion, Reals
 
 __all__ = [
     "HEAD", "OF_ACCELERATIONS", "OF_TANGENT", "SYMMETRIC", "factor_ordered", "order_at", "solve_kkt", "solve_ordered",
@@ -30,7 +30,7 @@ LOSS_AT_ONCE = 1e-4
 """The same where a solution is taken as it is: at most four digits of sixteen are lost [-]."""
 
 
-def order_at(K: Kernel, m: int) -> int:
+def order_at(K: Motion, m: int) -> int:
     """Where the order for the m rows in K.rows begins in K.orders, 0 if there is none."""
     mode = K.mode_id
     if mode < 0 or mode >= K.n_modes:
@@ -44,7 +44,7 @@ def order_at(K: Kernel, m: int) -> int:
     return int(o)
 
 
-def factor_ordered(K: Kernel, A: Reals, o: int, source: int, loss: float) -> bool:
+def factor_ordered(K: Equations, A: Reals, o: int, source: int, loss: float) -> bool:
     """Factors of the matrix in A by the order at o, into K.kkt, inverse pivots among them; false if one is not sound.
 
     K.spare holds what is left of a row, by turns of its columns, and behind it the factors.
@@ -107,7 +107,7 @@ def is_sound(size: float, before: float, terms: float, diagonal: bool, multiplie
     return loss * before < size and loss * size < before
 
 
-def weakest_pivot(K: Kernel) -> float:
+def weakest_pivot(K: Equations) -> float:
     """Largest inverse pivot of multipliers among the factors at hand."""
     o = K.order_start
     size = K.orders[o]
@@ -121,7 +121,7 @@ def weakest_pivot(K: Kernel) -> float:
     return largest
 
 
-def solve_ordered(K: Kernel, b: Reals) -> None:
+def solve_ordered(K: Equations, b: Reals) -> None:
     """b ← A⁻¹ b with the factors of `factor_ordered`; K.spare is written to."""
     o = K.order_start
     size = K.orders[o]
@@ -144,7 +144,7 @@ def solve_ordered(K: Kernel, b: Reals) -> None:
         b[K.orders[o_row + size + k]] = K.spare[k]
 
 
-def solve_kkt(K: Kernel, size: int, b: Reals) -> None:
+def solve_kkt(K: Equations, size: int, b: Reals) -> None:
     """b ← A⁻¹ b with the factors in K.kkt, whichever they are."""
     if K.order_start > 0:
         solve_ordered(K, b)

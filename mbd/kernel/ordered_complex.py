@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from mbd.kernel.ordered import HEAD, is_sound
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import Steps
 
 __all__ = ["factor_pair_ordered", "solve_pair_ordered"]
 
 
-def factor_pair_ordered(K: Kernel, o_A: int, o: int, loss: float) -> bool:
+def factor_pair_ordered(K: Steps, o_A: int, o: int, loss: float) -> bool:
     """Factors by the order at o of the matrix at K.stages[o_A:], in its place; false, and no change, if not sound.
 
     There N² real and N² imaginary parts of the matrix make way for those of the factors, inverse pivots among them.
@@ -72,7 +72,7 @@ def factor_pair_ordered(K: Kernel, o_A: int, o: int, loss: float) -> bool:
     return True
 
 
-def solve_pair_ordered(K: Kernel, o_A: int, o: int, o_b: int) -> None:
+def solve_pair_ordered(K: Steps, o_A: int, o: int, o_b: int) -> None:
     """b ← A⁻¹ b with the factors of `factor_pair_ordered`; b is at K.stages[o_b:], N real and N imaginary parts."""
     size = K.orders[o]
     entries = K.orders[o + 2]

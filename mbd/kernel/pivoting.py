@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from mbd.kernel.lemke import LCP_SOLVED, lemke
 from mbd.kernel.linear import factor, solve
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import Balance, ContactForces
 from mbd.kernel.redundancy import shared, sharing
 from mbd.kernel.restart import active_rows, evaluate_loaded, limit_of, load_accelerations
 from mbd.kernel.saddle import solve_rows
@@ -25,7 +25,7 @@ NOTHING = 1e-10
 """Unknowns below this part of the largest of their kind are zero [-]."""
 
 
-def pivoted(K: Kernel, level: int) -> int:
+def pivoted(K: Balance, level: int) -> int:
     """1 if Lemke's method has chosen the branches of all that may choose, 0 if it cannot.
 
     It cannot where friction follows multipliers as that of a pin does, where a contact that may open holds tangents
@@ -53,7 +53,7 @@ def pivoted(K: Kernel, level: int) -> int:
     return 1
 
 
-def gather_pushes(K: Kernel) -> int:
+def gather_pushes(K: ContactForces) -> int:
     """Contacts that may choose, into K.lcp_who, their normal rows into K.lcp_rows; −1 if one sticks without limit."""
     pushes = 0
     for c in range(K.n_contacts):
@@ -70,7 +70,7 @@ def gather_pushes(K: Kernel) -> int:
     return pushes
 
 
-def gather_drags(K: Kernel, pushes: int) -> int:
+def gather_drags(K: ContactForces, pushes: int) -> int:
     """Frictions that may choose, behind the contacts."""
     drags = 0
     for f in range(K.n_frictions):
@@ -82,7 +82,7 @@ def gather_drags(K: Kernel, pushes: int) -> int:
     return drags
 
 
-def let_go(K: Kernel, pushes: int, drags: int) -> None:
+def let_go(K: ContactForces, pushes: int, drags: int) -> None:
     """All that may choose is off."""
     for u in range(pushes):
         c = K.lcp_who[u]
@@ -95,7 +95,7 @@ def let_go(K: Kernel, pushes: int, drags: int) -> None:
         K.slip[K.lcp_who[u]] = 0.0
 
 
-def limits_of_pushes(K: Kernel, level: int, pushes: int, drags: int) -> None:
+def limits_of_pushes(K: ContactForces, level: int, pushes: int, drags: int) -> None:
     """Limits without the unknown pushes and their slopes, into K.lcp_limit and K.lcp_slope."""
     for k in range(K.n_rows):
         K.loads[k] = (K.given[k] + K.past[k]) if level == 1 else 0.0
@@ -118,7 +118,7 @@ def limits_of_pushes(K: Kernel, level: int, pushes: int, drags: int) -> None:
             K.lcp_limit[u] += (K.past_time - 1.0) * K.base_limit[K.lcp_who[pushes + u]]
 
 
-def hold(K: Kernel, level: int, pushes: int, drags: int) -> int:
+def hold(K: Balance, level: int, pushes: int, drags: int) -> int:
     """The KKT matrix of the held rows in factors, K.jump and K.impulse without the unknowns; how many rows, −1: none.
 
     The impulses of a smooth step that friction has had are taken away, so that the unknowns are all of it.
@@ -161,7 +161,7 @@ def hold(K: Kernel, level: int, pushes: int, drags: int) -> int:
     return held if factor(K.kkt, size, K.pivots) == 0 else -1
 
 
-def fill_problem(K: Kernel, held: int, pushes: int, drags: int) -> None:
+def fill_problem(K: Balance, held: int, pushes: int, drags: int) -> None:
     """M and q, column by column, of unit pushes and drags."""
     n = K.n
     o_R = K.acc_R
@@ -197,13 +197,13 @@ def fill_problem(K: Kernel, held: int, pushes: int, drags: int) -> None:
             K.lcp_matrix[friction * size + j + drags] -= 1.0
 
 
-def normal_of(K: Kernel, u: int) -> int:
+def normal_of(K: ContactForces, u: int) -> int:
     """The row by which friction u of the unknowns is loaded, −1 if none."""
     c = K.friction_contact[K.lcp_who[u]]
     return int(K.normal[c]) if c >= 0 else -1
 
 
-def fill_column(K: Kernel, column: int, sign: float, held: int, pushes: int, drags: int) -> None:
+def fill_column(K: Balance, column: int, sign: float, held: int, pushes: int, drags: int) -> None:
     """What an unknown does to all γ and limits: ± the solution in K.rhs."""
     n = K.n
     o_B = K.acc_B
@@ -226,7 +226,7 @@ def fill_column(K: Kernel, column: int, sign: float, held: int, pushes: int, dra
                     K.lcp_matrix[(i + 2 * drags) * size + column] += slope
 
 
-def take_branches(K: Kernel, pushes: int, drags: int) -> None:
+def take_branches(K: ContactForces, pushes: int, drags: int) -> None:
     """Who pushes, sticks and slides in the solution."""
     most_push = 0.0
     most_speed = 0.0
@@ -247,7 +247,7 @@ def take_branches(K: Kernel, pushes: int, drags: int) -> None:
         take_drag(K, u, most_push, most_speed, pushes, drags)
 
 
-def take_drag(K: Kernel, u: int, most_push: float, most_speed: float, pushes: int, drags: int) -> None:
+def take_drag(K: ContactForces, u: int, most_push: float, most_speed: float, pushes: int, drags: int) -> None:
     """Whether a friction sticks; one at its limit slides, even where other rows keep it at rest."""
     size = pushes + 3 * drags
     f = K.lcp_who[u]

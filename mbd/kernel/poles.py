@@ -8,7 +8,7 @@ at a pole they grow at each halving, at a bump that the step does not resolve th
 from __future__ import annotations
 
 from mbd.kernel.codes import NOT_FINITE
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import Guards, Switching
 from mbd.kernel.restart import compose, consistent, fill_block
 
 __all__ = ["leaps"]
@@ -29,7 +29,7 @@ NOT_FOUND = -1.0
 """Of accelerations that cannot be found."""
 
 
-def leaps(K: Kernel, h: float, at_y: int) -> bool:
+def leaps(K: Switching, h: float, at_y: int) -> bool:
     """Whether accelerations within the step are `BEYOND` those at its ends, and decide on the motion if they last.
 
     The new state is in K.inside, its velocities from `at_y` on; K.q1, K.y1 and the block are overwritten.
@@ -73,7 +73,7 @@ def leaps(K: Kernel, h: float, at_y: int) -> bool:
     return False
 
 
-def pull_at(K: Kernel, h: float, part: float, at_y: int) -> float:
+def pull_at(K: Switching, h: float, part: float, at_y: int) -> float:
     """v̇·M v̇ at a part of the way; as good as infinite where it is not finite, `NOT_FOUND` where it cannot be found."""
     t = K.time + h * part
     fill_block(K, t, K.q, K.y)
@@ -99,7 +99,7 @@ def pull_at(K: Kernel, h: float, part: float, at_y: int) -> float:
     return float(total)
 
 
-def motion_at(K: Kernel, at_y: int) -> float:
+def motion_at(K: Guards, at_y: int) -> float:
     """v·M v of the new state, with the masses that were evaluated last."""
     total = 0.0
     for i in range(K.n_v):

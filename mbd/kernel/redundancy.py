@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from mbd.kernel.linear import factor, solve
 from mbd.kernel.orthogonal import clear_row, square
-from mbd.kernel.records import Kernel, Reals
+from mbd.kernel.records import ContactRows, DependentRows, Frictions, Model, Motion, Reals, Singular
 from mbd.kernel.roots import sqrt
 
 __all__ = ["find_dependent", "find_mix", "find_shares", "shared", "sharing", "spread", "take_shares"]
@@ -27,7 +27,7 @@ LEAST_SHARE = 1e-4
 """Part of the largest limit of friction that even one without load counts as, where several hold together [-]."""
 
 
-def find_dependent(K: Kernel, m: int) -> None:
+def find_dependent(K: DependentRows, m: int) -> None:
     """Mark rows among the m in K.rows that depend on earlier ones in K.dropped, with B_d = C B_kept in K.mix.
 
     Gram–Schmidt in the order of the rows, short ones last, on columns scaled by √M_ii; B is that of K.acc.
@@ -59,7 +59,7 @@ def find_dependent(K: Kernel, m: int) -> None:
             combine(K, row, kept)
 
 
-def longest_row(K: Kernel, m: int, unit: int) -> float:
+def longest_row(K: Motion, m: int, unit: int) -> float:
     """The largest length of the m rows in K.rows that have this unit."""
     longest = 0.0
     for k in range(m):
@@ -68,7 +68,7 @@ def longest_row(K: Kernel, m: int, unit: int) -> float:
     return longest
 
 
-def length_of(K: Kernel, row: int) -> float:
+def length_of(K: Model, row: int) -> float:
     """Length of a row on columns scaled by √M_ii."""
     n = K.n
     o_B = K.acc_B
@@ -80,7 +80,7 @@ def length_of(K: Kernel, row: int) -> float:
     return float(sqrt(total))
 
 
-def find_mix(K: Kernel, m: int) -> None:
+def find_mix(K: DependentRows, m: int) -> None:
     """C in K.mix at another place, that of K.acc, with the m rows in K.rows kept and the others told by K.dropped."""
     for k in range(m):
         remaining_norm(K, K.rows[k], k)
@@ -91,7 +91,7 @@ def find_mix(K: Kernel, m: int) -> None:
             combine(K, row, m)
 
 
-def remaining_norm(K: Kernel, row: int, kept: int) -> float:
+def remaining_norm(K: DependentRows, row: int, kept: int) -> float:
     """What is left of a row beside the `kept` first vectors of K.basis, relative to it, as the next vector there.
 
     Its parts along them are left in the next line of K.lower.
@@ -112,7 +112,7 @@ def remaining_norm(K: Kernel, row: int, kept: int) -> float:
     return float(sqrt(left / size)) if size > 0.0 else 0.0
 
 
-def keep_row(K: Kernel, row: int, kept: int) -> None:
+def keep_row(K: DependentRows, row: int, kept: int) -> None:
     """The next vector of K.basis, which `remaining_norm` has found, gets length 1; its row number into K.columns."""
     n = K.n
     left = sqrt(square(K.basis, kept * n, n)) + 1e-300
@@ -122,7 +122,7 @@ def keep_row(K: Kernel, row: int, kept: int) -> None:
     K.columns[kept] = row
 
 
-def combine(K: Kernel, row: int, kept: int) -> None:
+def combine(K: DependentRows, row: int, kept: int) -> None:
     """The coefficients of a row in the kept rows from those in the basis, ``c L = `` the next line of K.lower."""
     for i in range(K.n_rows):
         K.mix[row * K.n_rows + i] = 0.0
@@ -134,7 +134,7 @@ def combine(K: Kernel, row: int, kept: int) -> None:
         K.mix[row * K.n_rows + K.columns[i]] = value / K.lower[i * K.n_rows + i]
 
 
-def sharing(K: Kernel) -> bool:
+def sharing(K: DependentRows) -> bool:
     """Whether a friction slides while rows depend on others: then the shares are part of the solve."""
     if K.n_dropped > 0:
         for f in range(K.n_frictions):
@@ -143,7 +143,7 @@ def sharing(K: Kernel) -> bool:
     return False
 
 
-def find_shares(K: Kernel) -> None:
+def find_shares(K: DependentRows) -> None:
     """W_d C W_kept⁻¹ into K.shares, from K.mix and the limits in K.limit."""
     largest = largest_limit(K)
     for d in range(K.n_rows):
@@ -156,7 +156,7 @@ def find_shares(K: Kernel) -> None:
             K.shares[d * K.n_rows + k] = part
 
 
-def take_shares(K: Kernel, lam: Reals) -> None:
+def take_shares(K: Singular, lam: Reals) -> None:
     """The multipliers of dependent rows from those of the others."""
     for d in range(K.n_rows):
         if K.dropped[d] == 1:
@@ -165,7 +165,7 @@ def take_shares(K: Kernel, lam: Reals) -> None:
                 lam[d] += K.shares[d * K.n_rows + k] * lam[k] if K.dropped[k] == 0 else 0.0
 
 
-def shared(K: Kernel, i: int, row: int) -> float:
+def shared(K: DependentRows, i: int, row: int) -> float:
     """What the multiplier 1 of a row brings into component i of the balance through dependent rows, ``Σ R_d share``."""
     value = 0.0
     for d in range(K.n_rows):
@@ -174,7 +174,7 @@ def shared(K: Kernel, i: int, row: int) -> float:
     return value
 
 
-def largest_limit(K: Kernel) -> float:
+def largest_limit(K: Frictions) -> float:
     """The largest limit of all frictions."""
     largest = 0.0
     for f in range(K.n_frictions):
@@ -182,7 +182,7 @@ def largest_limit(K: Kernel) -> float:
     return largest
 
 
-def share(K: Kernel, row: int, largest: float) -> float:
+def share(K: ContactRows, row: int, largest: float) -> float:
     """Size W by which a multiplier counts: parallel frictions then share their load in the ratio of their limits."""
     f = K.row_friction[row]
     if f < 0 or largest == 0.0:
@@ -190,7 +190,7 @@ def share(K: Kernel, row: int, largest: float) -> float:
     return float(max(K.limit[f] / largest, LEAST_SHARE))
 
 
-def spread(K: Kernel, lam: Reals) -> None:
+def spread(K: DependentRows, lam: Reals) -> None:
     """The multipliers of least norm with the same forces: λ_d = y, λ_kept = μ − Cᵀ y.
 
     (W_d⁻¹ + C W⁻¹ Cᵀ) y = C W⁻¹ μ, with W of `share`.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from mbd.kernel.accept_restart import look
 from mbd.kernel.codes import CLOSE, CROSS, EPS, OPEN_GAP, WATCH
 from mbd.kernel.guards import gap_tolerance, guard_value
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import ContactRows, Kernel
 
 __all__ = ["refine"]
 
@@ -69,7 +69,7 @@ def refine(K: Kernel, kind: int, index: int, low: float, f_low: float, high: flo
     return 0 if at == place else look(K, place, t + place)
 
 
-def enough(K: Kernel, kind: int, index: int, f_low: float, f_high: float) -> float:
+def enough(K: ContactRows, kind: int, index: int, f_low: float, f_high: float) -> float:
     """Size of a guard that is round-off; 0 for a user's, which has a scale of its own: its instant is found instead."""
     if kind == CLOSE or kind == OPEN_GAP:
         return float(0.25 * gap_tolerance(K, index))

@@ -17,7 +17,7 @@ from mbd.kernel.candidate import carry
 from mbd.kernel.codes import COMPOSE, GAINED, LEAPT, NOT_FINITE, OUTGROWN
 from mbd.kernel.hooks import call, scheme_error
 from mbd.kernel.poles import leaps
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import Equations, Guards, Kernel, SchemeAbilities, Steps, Switching
 from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import compose, consistent, evaluate, fill_block, stepping_rows
 from mbd.kernel.saddle import solve_rows
@@ -48,7 +48,7 @@ def judge_change(K: Kernel, h: float, t1: float) -> int:
     return look_closer(K, h, t1, stretch, worst > K.look_twice)
 
 
-def changes_little(K: Kernel, h: float, stretch: float) -> bool:
+def changes_little(K: Steps, h: float, stretch: float) -> bool:
     """Whether the errors of all rates are small beside a part of the fastest one, and none `bends`: in most steps."""
     largest = 0.0
     most = 0.0
@@ -62,7 +62,7 @@ def changes_little(K: Kernel, h: float, stretch: float) -> bool:
     return is_small(K, h, stretch, most, largest, fastest)
 
 
-def bends(K: Kernel, h: float) -> bool:
+def bends(K: Equations, h: float) -> bool:
     """Whether accelerations change so much that a pole may lie between, even if so foretold; K.failure_index whose."""
     most = 0.0
     fastest = 0.0
@@ -111,7 +111,7 @@ def look_closer(K: Kernel, h: float, t1: float, stretch: float, rough_enough: bo
     return status
 
 
-def lag(K: Kernel, h: float, at_y: int) -> float:
+def lag(K: Guards, h: float, at_y: int) -> float:
     """Largest part of a rate by which it misses ``h (a₀ + a₁)/2``, as the auxiliary a of the scheme lags behind v̇ [-].
 
     A scheme with strong numerical damping carries the a of a steep start on for some steps.
@@ -129,7 +129,7 @@ def lag(K: Kernel, h: float, at_y: int) -> float:
     return worst
 
 
-def note_coarse(K: Kernel, t1: float, rough: float) -> None:
+def note_coarse(K: Equations, t1: float, rough: float) -> None:
     """Count a step to t1 that forces changed within, once however often it is tried, for a note of the run."""
     if K.n_coarse > 0 and K.coarse_start == K.time:
         return
@@ -202,7 +202,7 @@ def outgrows(K: Kernel, h: float, t1: float, stretch: float, at_y: int, at_D: in
     return False
 
 
-def leave_rows_alone(K: Kernel, at_D: int) -> None:
+def leave_rows_alone(K: Switching, at_D: int) -> None:
     """Take from D what moves rows: no motion, but what index 3 leaves of velocities; K.acc is at the candidate."""
     for i in range(K.n):
         K.force[i] = 0.0
@@ -215,13 +215,13 @@ def leave_rows_alone(K: Kernel, at_D: int) -> None:
             K.inside[at_D + i] += K.jump[i]
 
 
-def resolved_growth(K: Kernel) -> float:
+def resolved_growth(K: SchemeAbilities) -> float:
     """`GROWTH`, less where the error of the scheme is larger than that of the trapezoidal rule."""
     error = abs(K.error_constant)
     return GROWTH * TRAPEZOID / error if error > TRAPEZOID else GROWTH
 
 
-def growth_between(K: Kernel, h: float, stretch: float, part: float, at_D: int, first: int, last: int) -> float:
+def growth_between(K: Switching, h: float, stretch: float, part: float, at_D: int, first: int, last: int) -> float:
     """ζ of the module's text over some components, over a whole step; K.trial_jump has a(y₁), K.jump a(y₁ − part D)."""
     fed = 0.0
     size = 0.0
@@ -235,7 +235,7 @@ def growth_between(K: Kernel, h: float, stretch: float, part: float, at_D: int, 
     return float(h * stretch * fed / (part * size))
 
 
-def gains(K: Kernel, h: float, t1: float, at_y: int) -> bool:
+def gains(K: Switching, h: float, t1: float, at_y: int) -> bool:
     """Whether more than half of the kinetic energy at the end is neither old nor work of forces along the way.
 
     Forces may change with time at any instant of the step: of those of its start and of its end the larger work counts.

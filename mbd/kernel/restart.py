@@ -4,7 +4,18 @@ from __future__ import annotations
 
 from mbd.kernel.codes import ACCELERATIONS, COMPOSE, EPS, NOT_CONVERGED, SCALES
 from mbd.kernel.hooks import call
-from mbd.kernel.records import Integers, Kernel, Reals
+from mbd.kernel.records import (
+    Balance,
+    ContactForces,
+    ContactRows,
+    DependentRows,
+    Equations,
+    Integers,
+    Mechanism,
+    Model,
+    Motion,
+    Reals,
+)
 from mbd.kernel.redundancy import find_mix, find_shares, shared, sharing, spread, take_shares
 from mbd.kernel.saddle import solve_rows
 
@@ -25,7 +36,7 @@ MOST_LOADS = 30
 """How often multipliers that friction follows are solved for again [-]."""
 
 
-def fill_block(K: Kernel, t: float, q: Reals, y: Reals) -> None:
+def fill_block(K: Mechanism, t: float, q: Reals, y: Reals) -> None:
     """The block at a state, with the accepted rates and multipliers; penalties act where closed."""
     block = K.block
     block[0] = t
@@ -48,7 +59,7 @@ def fill_block(K: Kernel, t: float, q: Reals, y: Reals) -> None:
         block[K.o_slip + f] = K.slip[f]
 
 
-def compose(K: Kernel, q1: Reals) -> None:
+def compose(K: Motion, q1: Reals) -> None:
     """q₁ = q ⊕ x with the accepted q and the increment x in the block."""
     if K.vector == 1:
         for i in range(K.n_q):
@@ -59,7 +70,7 @@ def compose(K: Kernel, q1: Reals) -> None:
         call(K, COMPOSE, q1)
 
 
-def displace(K: Kernel, q: Reals, x: Reals) -> None:
+def displace(K: Model, q: Reals, x: Reals) -> None:
     """q ← q ⊕ x."""
     if K.vector == 1:
         for i in range(K.n_q):
@@ -74,7 +85,7 @@ def displace(K: Kernel, q: Reals, x: Reals) -> None:
         K.block[K.o_x + i] = 0.0
 
 
-def refresh_scales(K: Kernel) -> None:
+def refresh_scales(K: Model) -> None:
     """Magnitudes of r, h and ḣ, term by term before cancellation, at the state now in the block."""
     call(K, SCALES, K.scale)
     for i in range(K.n):
@@ -104,13 +115,13 @@ def refresh_scales(K: Kernel) -> None:
         K.scale[K.n + K.n_rows + k] = max(K.scale[K.n + K.n_rows + k], speed)
 
 
-def weigh(K: Kernel) -> None:
+def weigh(K: Model) -> None:
     """Residuals are compared with their scale so often that its inverse is kept."""
     for i in range(K.n):
         K.weight[i] = 1.0 / K.scale[i]
 
 
-def raise_scales(K: Kernel, rows: bool) -> None:
+def raise_scales(K: Equations, rows: bool) -> None:
     """Magnitudes at the state now in the block where they exceed those known; where a force passes zero it has none.
 
     Those of rows, by which gaps are judged too, only on demand and as far as coordinates may grow in a step: a state
@@ -130,7 +141,7 @@ def raise_scales(K: Kernel, rows: bool) -> None:
     weigh(K)
 
 
-def largest_force(K: Kernel) -> float:
+def largest_force(K: Model) -> float:
     """The largest magnitude that forces have in the balance [N, N m]."""
     force = 0.0
     for i in range(K.n_v):
@@ -138,27 +149,27 @@ def largest_force(K: Kernel) -> float:
     return float(force)
 
 
-def note_scales(K: Kernel) -> None:
+def note_scales(K: Model) -> None:
     """Keep the magnitudes known so far, which an iterate that is not accepted must leave as they are."""
     for i in range(K.n + 2 * K.n_rows):
         K.known[i] = K.scale[i]
 
 
-def restore_scales(K: Kernel) -> None:
+def restore_scales(K: Model) -> None:
     """The magnitudes of `note_scales`: where an iterate was thrown far away, its forces excuse nothing."""
     for i in range(K.n + 2 * K.n_rows):
         K.scale[i] = K.known[i]
     weigh(K)
 
 
-def retain_scales(K: Kernel) -> None:
+def retain_scales(K: Model) -> None:
     """Go on with raised magnitudes, those of a candidate; told where they are far above what was known."""
     for i in range(K.n):
         if K.scale[i] > FAR_ABOVE * K.known[i]:
             K.scales_raised = 1
 
 
-def lower_scales(K: Kernel) -> None:
+def lower_scales(K: DependentRows) -> None:
     """Magnitudes of forces down towards those of the accepted state, by a hundred at most.
 
     After a moment of huge forces residuals are judged too mildly otherwise.
@@ -176,7 +187,7 @@ def lower_scales(K: Kernel) -> None:
     weigh(K)
 
 
-def is_held(K: Kernel, row: int, flags: Integers) -> bool:
+def is_held(K: ContactRows, row: int, flags: Integers) -> bool:
     """Whether a row acts: always, while its contact is closed and does not part, and while its friction sticks.
 
     Trivial rows never do, and those with K.lifting = 1 are left out while contacts are lifted out of their surfaces.
@@ -190,7 +201,7 @@ def is_held(K: Kernel, row: int, flags: Integers) -> bool:
     return bool(friction < 0 or K.sticks[friction] == 1)
 
 
-def stepping_rows(K: Kernel) -> int:
+def stepping_rows(K: DependentRows) -> int:
     """The active rows of the closed contacts that do not depend on others, into K.rows; how many."""
     m = 0
     for row in range(K.n_rows):
@@ -200,7 +211,7 @@ def stepping_rows(K: Kernel) -> int:
     return m
 
 
-def active_rows(K: Kernel, flags: Integers) -> int:
+def active_rows(K: Mechanism, flags: Integers) -> int:
     """Numbers of the active rows into K.rows, ascending; how many."""
     m = 0
     for row in range(K.n_rows):
@@ -210,13 +221,13 @@ def active_rows(K: Kernel, flags: Integers) -> int:
     return m
 
 
-def evaluate(K: Kernel, t: float, q: Reals, y: Reals) -> None:
+def evaluate(K: Mechanism, t: float, q: Reals, y: Reals) -> None:
     """M, f, R, B, h, ḣ, bias, captured, kinetic energy, limits at a state, into K.acc."""
     fill_block(K, t, q, y)
     call(K, ACCELERATIONS, K.acc)
 
 
-def evaluate_loaded(K: Kernel, lam: Reals) -> float:
+def evaluate_loaded(K: ContactRows, lam: Reals) -> float:
     """K.acc again with other multipliers, at the state already in the block; how far they differ from those before.
 
     Only R and the limits of frictions follow them.
@@ -233,17 +244,17 @@ def evaluate_loaded(K: Kernel, lam: Reals) -> float:
     return change / size
 
 
-def limit_of(K: Kernel, f: int) -> float:
+def limit_of(K: Model, f: int) -> float:
     """Largest friction at the multipliers now in the block."""
     return float(K.acc[K.acc_limit + f])
 
 
-def row_speed(K: Kernel, row: int) -> float:
+def row_speed(K: Model, row: int) -> float:
     """ḣ of a row, from K.acc."""
     return float(K.acc[K.acc_rate + row])
 
 
-def consistent(K: Kernel, t: float, q: Reals, y: Reals) -> int:
+def consistent(K: Balance, t: float, q: Reals, y: Reals) -> int:
     """Rates and multipliers of the closed rows at a state, in K.jump and K.impulse."""
     evaluate(K, t, q, y)
     m = stepping_rows(K)
@@ -277,13 +288,13 @@ def consistent(K: Kernel, t: float, q: Reals, y: Reals) -> int:
     return status
 
 
-def find_limits_of_loads(K: Kernel) -> None:
+def find_limits_of_loads(K: ContactRows) -> None:
     """Largest frictions at the multipliers now in the block."""
     for f in range(K.n_frictions):
         K.limit[f] = limit_of(K, f)
 
 
-def minimum_norm_multipliers(K: Kernel, lam: Reals) -> None:
+def minimum_norm_multipliers(K: DependentRows, lam: Reals) -> None:
     """Multipliers of dependent rows beside those of K.rows, which were solved with, at the state now in the block.
 
     Frictions that hold together share by their limits, which follow their loads: they are found by turns.
@@ -302,7 +313,7 @@ def minimum_norm_multipliers(K: Kernel, lam: Reals) -> None:
             break
 
 
-def share_loads(K: Kernel, m: int) -> None:
+def share_loads(K: Balance, m: int) -> None:
     """Multipliers of dependent rows in the block, where they are part of the step's equations, at its iterate."""
     call(K, ACCELERATIONS, K.acc)
     find_mix(K, m)
@@ -315,7 +326,7 @@ def share_loads(K: Kernel, m: int) -> None:
         K.block[K.o_lam + k] = K.loads[k]
 
 
-def add_shares(K: Kernel, A: Reals, m: int) -> None:
+def add_shares(K: DependentRows, A: Reals, m: int) -> None:
     """What the multipliers of a step bring along through dependent rows, into the tangent A of m rows."""
     size = K.n + m
     for i in range(K.n):
@@ -323,7 +334,7 @@ def add_shares(K: Kernel, A: Reals, m: int) -> None:
             A[i * size + K.n + k] += shared(K, i, K.rows[k])
 
 
-def holds_rows(K: Kernel, m: int) -> bool:
+def holds_rows(K: Motion, m: int) -> bool:
     """Whether the rows on positions hold at the candidate, at which K.acc is."""
     o_h = K.acc_h
     for k in range(m):
@@ -334,7 +345,7 @@ def holds_rows(K: Kernel, m: int) -> bool:
     return True
 
 
-def find_sliding_friction(K: Kernel) -> None:
+def find_sliding_friction(K: ContactForces) -> None:
     """Friction that slides follows the multipliers of the held rows in K.impulse."""
     evaluate_loaded(K, K.impulse)
     for f in range(K.n_frictions):
@@ -342,7 +353,7 @@ def find_sliding_friction(K: Kernel) -> None:
             K.impulse[K.friction_row[f]] = K.slip[f] * limit_of(K, f)
 
 
-def load_accelerations(K: Kernel) -> None:
+def load_accelerations(K: ContactForces) -> None:
     """Right-hand sides of the acceleration level."""
     n = K.n
     o_bias = K.acc_bias
@@ -352,7 +363,7 @@ def load_accelerations(K: Kernel) -> None:
         K.bias[k] = K.acc[o_bias + k]
 
 
-def capture(K: Kernel, c: int) -> None:
+def capture(K: Mechanism, c: int) -> None:
     """Hold the anchors of a contact that closes; K.acc is evaluated at the instant."""
     o_captured = K.acc_captured
     for k in range(K.anchor_start[c], K.anchor_start[c + 1]):

@@ -11,7 +11,7 @@ from typing import Any
 from mbd.kernel.codes import CONFLICT, DEPENDENT, NOT_FINITE
 from mbd.kernel.linear import MOST_ROUND_OFF, eliminate, factor, round_off
 from mbd.kernel.ordered import LOSS_AT_ONCE, OF_ACCELERATIONS, SYMMETRIC, factor_ordered, order_at, solve_ordered
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import Balance, DependentRows, Equations
 from mbd.kernel.redundancy import find_dependent, find_shares, shared, sharing, spread, take_shares
 
 __all__ = ["correct_velocities", "factor_saddle", "solve_rows"]
@@ -20,7 +20,7 @@ INCOMPATIBLE = 1e-6
 """Part of the terms of rows that a row which depends on others may be missed by, for errors of positions [-]."""
 
 
-def solve_rows(K: Kernel, m: int, dropping: bool) -> int:
+def solve_rows(K: Balance, m: int, dropping: bool) -> int:
     """w and λ for the m rows in K.rows; w in K.jump, λ of all rows in K.impulse.
 
     Rows may depend on each other where `dropping` allows it: then K.dropped tells which, and λ has the least norm; with
@@ -30,12 +30,12 @@ def solve_rows(K: Kernel, m: int, dropping: bool) -> int:
     return int(solve_change(K, K.y, m, dropping, False))
 
 
-def correct_velocities(K: Kernel, y: Any, m: int, dropping: bool) -> int:
+def correct_velocities(K: Balance, y: Any, m: int, dropping: bool) -> int:
     """The same for a change w of the velocities y alone, which contradictions are measured by."""
     return int(solve_change(K, y, m, dropping, True))
 
 
-def solve_change(K: Kernel, y: Any, m: int, dropping: bool, moving: bool) -> int:
+def solve_change(K: Balance, y: Any, m: int, dropping: bool, moving: bool) -> int:
     """The same, of the velocities y where `moving`."""
     size = K.n + m
     rank = solve_matrix(K, m, not dropping and sharing(K), MOST_ROUND_OFF)
@@ -69,7 +69,7 @@ def solve_change(K: Kernel, y: Any, m: int, dropping: bool, moving: bool) -> int
     return 0
 
 
-def solve_kept(K: Kernel, y: Any, m: int, moving: bool) -> int:
+def solve_kept(K: Balance, y: Any, m: int, moving: bool) -> int:
     """w and λ of an independent set of rows, where what is left over of all of them seems to be a contradiction.
 
     Forces along a motion of little inertia seem to be one too.
@@ -87,7 +87,7 @@ def solve_kept(K: Kernel, y: Any, m: int, moving: bool) -> int:
     return CONFLICT
 
 
-def solve_to_round_off(K: Kernel, m: int, dropping: bool) -> int:
+def solve_to_round_off(K: Balance, m: int, dropping: bool) -> int:
     """w and λ for the m independent rows that come first in K.rows, where pivots of coordinates are small.
 
     The inertia of a motion may be a small difference of large ones: it is there as long as it is more than round-off.
@@ -109,7 +109,7 @@ def solve_to_round_off(K: Kernel, m: int, dropping: bool) -> int:
     return 0
 
 
-def solve_shared(K: Kernel, m: int) -> int:
+def solve_shared(K: Balance, m: int) -> int:
     """w and λ with the shares of dependent rows in K.shares, for the m independent rows that come first in K.rows."""
     rank = solve_matrix(K, m, True, MOST_ROUND_OFF)
     if rank < 0:
@@ -121,7 +121,7 @@ def solve_shared(K: Kernel, m: int) -> int:
     return 0
 
 
-def dependent_last(K: Kernel, m: int) -> int:
+def dependent_last(K: DependentRows, m: int) -> int:
     """The m rows in K.rows with those that depend on others behind the rest; how many the rest are."""
     kept = 0
     for k in range(m):
@@ -140,7 +140,7 @@ def dependent_last(K: Kernel, m: int) -> int:
     return int(kept)
 
 
-def solve_matrix(K: Kernel, m: int, together: bool, tolerance: float) -> int:
+def solve_matrix(K: Balance, m: int, together: bool, tolerance: float) -> int:
     """w and λ of the m rows in K.rows, as far as they are independent, others 0; the rank, or minus a failure.
 
     With `together` each multiplier brings the shares of the rows that depend on its row along. Pivots below
@@ -190,7 +190,7 @@ def solve_matrix(K: Kernel, m: int, together: bool, tolerance: float) -> int:
     return rank
 
 
-def contradicts(K: Kernel, y: Any, m: int, moving: bool) -> bool:
+def contradicts(K: Balance, y: Any, m: int, moving: bool) -> bool:
     """Whether the rows in K.rows that were left out of a solution contradict it, beyond errors of positions.
 
     Next to a singular configuration a row may be as short as its distance from there: what such errors leave of it is
@@ -219,7 +219,7 @@ def contradicts(K: Kernel, y: Any, m: int, moving: bool) -> bool:
     return False
 
 
-def factor_saddle(K: Kernel, m: int, symmetric: bool, loss: float) -> bool:
+def factor_saddle(K: Equations, m: int, symmetric: bool, loss: float) -> bool:
     """LU factors in K.kkt of [M R; B 0] from K.acc, or of [M Bᵀ; B 0]; false where a pivot is missing.
 
     Pivots of an order chosen beforehand must keep the part `loss` of their terms, else they are searched for.
@@ -246,7 +246,7 @@ def factor_saddle(K: Kernel, m: int, symmetric: bool, loss: float) -> bool:
     return bool(factor(K.kkt, size, K.pivots) == 0)
 
 
-def solve_in_order(K: Kernel, m: int) -> int:
+def solve_in_order(K: Balance, m: int) -> int:
     """w and λ of the m rows in K.rows with the ordered factors at hand; all unknowns, or minus a failure."""
     for i in range(K.n):
         K.rhs[i] = -K.force[i]
@@ -262,7 +262,7 @@ def solve_in_order(K: Kernel, m: int) -> int:
     return int(K.n + m)
 
 
-def take_solution(K: Kernel, m: int) -> None:
+def take_solution(K: Balance, m: int) -> None:
     """The solution in K.rhs to where others find it; multipliers of rows without part in it are 0."""
     for i in range(K.n):
         K.jump[i] = K.rhs[i]

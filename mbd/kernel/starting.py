@@ -9,14 +9,14 @@ from mbd.kernel.contact_step import find_pace
 from mbd.kernel.control import first_step
 from mbd.kernel.guards import update_armed, watch
 from mbd.kernel.hooks import scheme_start
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import Balance, DependentRows, Kernel
 from mbd.kernel.redundancy import find_dependent, sharing, spread
 from mbd.kernel.restart import active_rows, evaluate, refresh_scales, stepping_rows
 
 __all__ = ["find_mode", "restart", "still_dependent"]
 
 
-def find_mode(K: Kernel) -> int:
+def find_mode(K: DependentRows) -> int:
     """Number of the mode of the closed contacts and dependent rows, −1 if its code is not made yet."""
     width = K.n_contacts + K.n_rows + K.n_frictions
     for mode in range(K.n_modes):
@@ -69,7 +69,7 @@ def restart(K: Kernel) -> int:
     return 0
 
 
-def correct_start(K: Kernel) -> int:
+def correct_start(K: Balance) -> int:
     """Rates and multipliers of an ill-conditioned start corrected by the balance, for which the mode needs its code."""
     K.mode_id = find_mode(K)
     if K.mode_id < 0:
@@ -89,7 +89,7 @@ def correct_start(K: Kernel) -> int:
     return status
 
 
-def still_dependent(K: Kernel) -> bool:
+def still_dependent(K: DependentRows) -> bool:
     """Whether the rows that were left out hold at the candidate, at which K.acc is."""
     o_h = K.acc_h
     for k in range(K.n_rows):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from mbd.kernel.codes import GAINED, LAST, NOT_CONVERGED, NOT_FINITE, SINGULAR, SINGULAR_ROWS_MOVE, STAGNATED, TOO_NEAR
 from mbd.kernel.control import controlled_step
 from mbd.kernel.guards import try_step
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import Balance, Guards, Kernel, SchemeAbilities, State
 from mbd.kernel.resolution import judge_change
 from mbd.kernel.restart import consistent, lower_scales
 from mbd.kernel.singular.step_pairs import ALONE, FIRST, LONGER, SECOND, SHORTER, WHOLE, may_pair
@@ -22,13 +22,13 @@ No power of it is a simple fraction, so that tries do not meet a configuration t
 """
 
 
-def is_shortened(K: Kernel, status: int) -> bool:
+def is_shortened(K: SchemeAbilities, status: int) -> bool:
     """Whether a step that ended so is tried again with another size; an explicit one beyond its stability is not."""
     stalled = status == NOT_CONVERGED or status == STAGNATED or status == SINGULAR
     return stalled or status == TOO_NEAR or (status == GAINED and K.explicit == 0)
 
 
-def strays(K: Kernel, h: float) -> bool:
+def strays(K: Balance, h: float) -> bool:
     """Whether forces that are not finite within a step are so for where it strayed to, not for the time of its end."""
     return bool(consistent(K, K.time + h, K.q, K.y) == 0)
 
@@ -42,14 +42,14 @@ def judged_step(K: Kernel, h: float, t1: float) -> int:
     return judge_change(K, h, t1)
 
 
-def step_end(K: Kernel) -> float:
+def step_end(K: State) -> float:
     """Where the next step of the grid ends; the second of a pair has its own size."""
     if K.paired_step == SECOND:
         return float(K.time + LONGER * K.step)
     return float(K.grid_start + (K.grid_steps + 1) * K.step)
 
 
-def part_end(K: Kernel, on_grid: float) -> float:
+def part_end(K: Guards, on_grid: float) -> float:
     """Where the next step ends: on the grid, or after the part of a step in which a guard may have fired."""
     if K.in_substeps == 1:
         near = K.time + K.substep

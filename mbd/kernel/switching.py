@@ -19,13 +19,13 @@ from mbd.kernel.contact_modes import ALL_IMPULSES, NO_IMPULSE, OWN_IMPULSE, STIL
 from mbd.kernel.guards import gap_scale, is_watched
 from mbd.kernel.impact import impact
 from mbd.kernel.impact_solve import strikes
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import ContactForces, Guards, Mechanism, Switching
 from mbd.kernel.restart import capture, evaluate, row_speed
 
 __all__ = ["switch"]
 
 
-def gather_closing(K: Kernel) -> float:
+def gather_closing(K: Guards) -> float:
     """Mark the contacts that close at this instant in K.closing; the fastest closing speed of unilateral ones.
 
     Contacts that touch and approach close together with the fired one, whatever their order; those that touch and
@@ -52,7 +52,7 @@ def gather_closing(K: Kernel) -> float:
     return fastest
 
 
-def release_for(K: Kernel, after: int) -> None:
+def release_for(K: Switching, after: int) -> None:
     """Open the contacts whose rule names one that closes now."""
     for c in range(K.n_contacts):
         if K.closed[c] == 1:
@@ -65,7 +65,7 @@ def release_for(K: Kernel, after: int) -> None:
                     break
 
 
-def close_by_impact(K: Kernel, fastest: float) -> int:
+def close_by_impact(K: Switching, fastest: float) -> int:
     """Impact of all closing unilateral contacts, the releases it causes, anchors and log."""
     slow = fastest < K.rest_speed or (K.plastic_impact == 1 and fastest == 0.0)  # a rebound too small to rise at all
     if not slow:
@@ -103,7 +103,7 @@ def close_by_impact(K: Kernel, fastest: float) -> int:
     return 0
 
 
-def loss_of(K: Kernel, row: int) -> float:
+def loss_of(K: ContactForces, row: int) -> float:
     """What the impulse of a row took, −½ Λ (γ⁻ + γ⁺): its part of the kinetic energy lost."""
     o_B = K.acc_B
     rate = row_speed(K, row)
@@ -112,7 +112,7 @@ def loss_of(K: Kernel, row: int) -> float:
     return float(K.impulse[row] * rate)
 
 
-def loss_in(K: Kernel, c: int) -> float:
+def loss_in(K: ContactForces, c: int) -> float:
     """What the impulses of a contact took."""
     loss = 0.0
     for k in range(K.n_rows):
@@ -121,7 +121,7 @@ def loss_in(K: Kernel, c: int) -> float:
     return loss
 
 
-def loss_elsewhere(K: Kernel) -> float:
+def loss_elsewhere(K: ContactForces) -> float:
     """What friction in joints, and contacts that were closed before, took in an impact."""
     loss = 0.0
     for k in range(K.n_rows):
@@ -131,7 +131,7 @@ def loss_elsewhere(K: Kernel) -> float:
     return loss
 
 
-def mark_touching(K: Kernel) -> None:
+def mark_touching(K: Guards) -> None:
     """Contacts at g = 0 and ġ = 0 are left to their acceleration."""
     evaluate(K, K.time, K.q, K.y)
     o_rate = K.acc_rate
@@ -146,7 +146,7 @@ def mark_touching(K: Kernel) -> None:
             K.touched[c] = 1 if still else 0
 
 
-def capture_approach(K: Kernel) -> None:
+def capture_approach(K: Mechanism) -> None:
     """Penalty contacts that close hold their approach speed, as an impact at the same instant leaves it."""
     for c in range(K.n_contacts):
         if K.closing[c] == 1 and K.kind[c] == 1 and K.anchor_start[c] < K.anchor_start[c + 1]:
@@ -154,7 +154,7 @@ def capture_approach(K: Kernel) -> None:
             capture(K, c)
 
 
-def bursts(K: Kernel, c: int) -> bool:
+def bursts(K: Mechanism, c: int) -> bool:
     """Whether the force of a sliding contact changed its sign through a pole, not through zero."""
     for f in range(K.n_frictions):
         if K.friction_contact[f] == c and K.slip[f] != 0.0:
@@ -165,7 +165,7 @@ def bursts(K: Kernel, c: int) -> bool:
     return False
 
 
-def switch(K: Kernel) -> int:
+def switch(K: Switching) -> int:
     """What the fired guard does to the closed contacts and the velocities; the state is at its instant."""
     kind = K.event_kind
     index = K.event_index

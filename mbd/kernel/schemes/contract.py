@@ -21,7 +21,7 @@ import numpy as np
 
 from mbd.arrays import Vector
 from mbd.errors import CapabilityError
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import Kernel, Sizes
 
 __all__ = ["MEMORY", "NO_SCHEME", "SCHEMES", "Abilities", "Scheme", "dispatch", "number_of", "scheme_named", "schemes"]
 
@@ -68,7 +68,7 @@ class Abilities:
     longest_over: float = 16.0
 
 
-def _nothing(sizes: Kernel) -> dict[str, int]:
+def _nothing(sizes: Sizes) -> dict[str, int]:
     return {}
 
 

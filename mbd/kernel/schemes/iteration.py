@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from mbd.kernel.codes import EPS
 from mbd.kernel.hooks import call
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import Equations, Motion, Settings, SingularSteps, Steps
 from mbd.kernel.restart import compose
 from mbd.kernel.singular.step_pairs import WHOLE
 
@@ -21,7 +21,7 @@ BYSTANDER = 0.01
 """Part of the fastest rate below which another one hardly takes part in the motion [-]."""
 
 
-def predict(K: Kernel, h: float, t1: float, c_C: float, c_K: float) -> None:
+def predict(K: SingularSteps, h: float, t1: float, c_C: float, c_K: float) -> None:
     """The block at t₁ with rates, multipliers and position correction extrapolated."""
     block = K.block
     stretch = h / K.aux_step
@@ -54,7 +54,7 @@ def predict(K: Kernel, h: float, t1: float, c_C: float, c_K: float) -> None:
             block[K.o_x + i] = h * K.y[i] + h * h * ((0.5 - K.beta) * a0 + K.beta * a1) + shift
 
 
-def shift_growth(K: Kernel, h: float) -> float:
+def shift_growth(K: Steps, h: float) -> float:
     """The factor by which a position correction, that of order h³, grows from the last step to this one."""
     if h > (1.0 + WHOLE) * K.step:  # the longer of a pair: round-off of the shorter does not grow
         return 1.0
@@ -62,14 +62,14 @@ def shift_growth(K: Kernel, h: float) -> float:
     return float(stretch * stretch * stretch)
 
 
-def soundness_at(K: Kernel, m: int) -> int:
+def soundness_at(K: Settings, m: int) -> int:
     """Where the output of straight-line factors goes on behind r, h, ḣ, ∂ḣ/∂x: sound, weakest, the correction."""
     if K.stabilized == 0:
         return int(K.n + m)
     return int(K.n + 2 * m + m * K.n_v)
 
 
-def residual_size(K: Kernel, o_r: int, m: int, c_C: float, c_K: float, tolerance: float, both: int) -> float:
+def residual_size(K: Motion, o_r: int, m: int, c_C: float, c_K: float, tolerance: float, both: int) -> float:
     """Largest residual over its tolerance: balance, h and, with `both`, ḣ, each block apart; −1 if not finite."""
     size = 0.0
     finite = 0.0
@@ -108,7 +108,7 @@ def residual_size(K: Kernel, o_r: int, m: int, c_C: float, c_K: float, tolerance
     return size
 
 
-def runs_away(K: Kernel, m: int) -> bool:
+def runs_away(K: Equations, m: int) -> bool:
     """Whether multipliers fight each other: their forces cancel to less than 1e-7 of their size.
 
     Then r would vanish beside its terms whatever the motion, and a step must not be accepted for it.
@@ -129,7 +129,7 @@ def runs_away(K: Kernel, m: int) -> bool:
     return largest > 1e7 * total and largest > 1e3 * K.work[0]
 
 
-def finish(K: Kernel, h: float) -> bool:
+def finish(K: Steps, h: float) -> bool:
     """The converged block becomes the candidate; whether it changes little, so that no other look at it is needed.
 
     That is: it neither `overturns` nor fails the first look of `mbd.kernel.resolution`, as in most steps of a motion.
@@ -163,19 +163,19 @@ def finish(K: Kernel, h: float) -> bool:
     return is_small(K, h, whole, most, unforeseen, fastest)
 
 
-def is_small(K: Kernel, h: float, stretch: float, most: float, unforeseen: float, fastest: float) -> bool:
+def is_small(K: Settings, h: float, stretch: float, most: float, unforeseen: float, fastest: float) -> bool:
     """Whether changes of rates in a step (the most, and the most not foretold) are small beside the fastest of them."""
     cube = stretch * stretch * stretch
     small = h * unforeseen * cube <= 12.0 * LOOK_TWICE * max(K.rest_speed, BYSTANDER * fastest)
     return bool(small and h * most <= BENT * max(K.rest_speed, fastest))
 
 
-def error_share(K: Kernel, h: float) -> float:
+def error_share(K: Settings, h: float) -> float:
     """Estimated error of a coordinate in a step over the change of its acceleration [s²]."""
     return abs(1.0 / 6.0 - K.beta - 0.5 * (K.alpha_m - K.alpha_f)) * h * h
 
 
-def overturns(K: Kernel, h: float) -> bool:
+def overturns(K: Motion, h: float) -> bool:
     """Whether the estimated error of an angle in this step exceeds half a radian: it is not resolved at all.
 
     ``e = h² |1/6 − β − (α_m − α_f)/2| |v̇₁ − v̇₀|``

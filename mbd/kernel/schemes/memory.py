@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import SingularSteps, State, Steps
 from mbd.kernel.restart import note_scales, raise_scales, retain_scales
 
 __all__ = ["forget_steps", "look_a_step_ahead", "start_step"]
 
 
-def start_step(K: Kernel) -> float:
+def start_step(K: State) -> float:
     """The step that a start prepares for."""
     return float(K.dt if K.adaptive == 1 else K.step)
 
 
-def forget_steps(K: Kernel) -> None:
+def forget_steps(K: SingularSteps) -> None:
     """Nothing is known of steps before: rates and multipliers do not change, no singular configuration is near."""
     for i in range(K.n):
         K.slope[i] = 0.0
@@ -27,7 +27,7 @@ def forget_steps(K: Kernel) -> None:
     K.inverse_pivot = 0.0
 
 
-def look_a_step_ahead(K: Kernel) -> None:
+def look_a_step_ahead(K: Steps) -> None:
     """Raise the sizes noted at the accepted state, which is in the block, to those a step later.
 
     A force that is zero just now has its size then.

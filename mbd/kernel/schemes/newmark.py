@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from mbd.kernel.codes import PASSING
 from mbd.kernel.conditioning import is_ill_conditioned, refine_accelerations
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import Kernel, Steps
 from mbd.kernel.restart import compose, consistent, fill_block, refresh_scales
 from mbd.kernel.schemes.contract import Scheme
 from mbd.kernel.schemes.iteration import predict, shift_growth
@@ -50,7 +50,7 @@ def newmark_start(K: Kernel) -> int:
     return 0
 
 
-def unresolved(K: Kernel) -> bool:
+def unresolved(K: Steps) -> bool:
     """Whether accelerations would change within dt to a hundred times what all terms of the balance make up now.
 
     A jerk like that (a stiff contact that closes, shorter than dt) is no start for anything: a₀ = v̇₀ then.
@@ -81,7 +81,7 @@ def newmark_step(K: Kernel, h: float, t1: float) -> int:
         tangents = SEARCHED  # pivots in a fixed order were round-off: from the prediction again, with a search for them
 
 
-def newmark_accept(K: Kernel, h: float) -> None:
+def newmark_accept(K: Steps, h: float) -> None:
     """The candidate becomes the accepted state."""
     part = part_of_change(K, h)
     for i in range(K.n_q):
@@ -101,7 +101,7 @@ def newmark_accept(K: Kernel, h: float) -> None:
     K.aux_step = h
 
 
-def part_of_change(K: Kernel, h: float) -> float:
+def part_of_change(K: Steps, h: float) -> float:
     """Part of the last change of the position correction that the next prediction goes on with.
 
     Where h was below round-off, the correction is its own prediction, and a part of it along the motion shows nowhere:
@@ -137,7 +137,7 @@ def newmark_resume(K: Kernel, h: float) -> int:
     return status
 
 
-def newmark_error(K: Kernel, h: float) -> None:
+def newmark_error(K: Steps, h: float) -> None:
     """K.error: ``h² (1/6 − β − (α_m − α_f)/2) (a₁ − a₀)`` of positions, the first factor being K.error_constant.
 
     That of velocities and first-order states is ``h²/12`` times the change of the slope of their rates.

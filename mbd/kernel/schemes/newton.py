@@ -10,7 +10,7 @@ from mbd.kernel.codes import EPS, NOT_CONVERGED, NOT_FINITE, SINGULAR, STAGNATED
 from mbd.kernel.hooks import call, call_on
 from mbd.kernel.linear import factor
 from mbd.kernel.ordered import LOSS_OF_STEP, OF_TANGENT, factor_ordered, order_at, solve_kkt
-from mbd.kernel.records import Kernel, Reals
+from mbd.kernel.records import DependentRows, Equations, Kernel, Reals, Report, Steps
 from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import (
     add_shares,
@@ -112,7 +112,7 @@ def solve_step(K: Kernel, h: float, t1: float, c_C: float, c_K: float, tangents:
     return no_candidate(K, h, t1, NOT_CONVERGED)
 
 
-def no_candidate(K: Kernel, h: float, t1: float, status: int) -> int:
+def no_candidate(K: Report, h: float, t1: float, status: int) -> int:
     """The status, after noting which step has none."""
     K.failure_time = t1
     K.failure_step = h
@@ -129,7 +129,7 @@ def conclude_step(K: Kernel, h: float, t1: float) -> int:
     return 0
 
 
-def second_look(K: Kernel, o_r: int, m: int, c_C: float, c_K: float, tolerance: float, iteration: int) -> float:
+def second_look(K: Equations, o_r: int, m: int, c_C: float, c_K: float, tolerance: float, iteration: int) -> float:
     """A residual that falls no more, over its tolerance with sizes of forces as they are here; 1 if it is round-off.
 
     −status where the iteration is to end.
@@ -171,7 +171,7 @@ def pass_singularity(K: Kernel, h: float, t1: float, m: int, c_C: float, c_K: fl
     return -1
 
 
-def renew(K: Kernel, m: int, tangents: int) -> bool:
+def renew(K: Equations, m: int, tangents: int) -> bool:
     """Residual and tangent in K.out; whether its factors and the correction are there instead of it.
 
     Straight-line code exchanges no rows: where a pivot is too small, or the correction was not what it should be, the
@@ -190,7 +190,7 @@ def renew(K: Kernel, m: int, tangents: int) -> bool:
     return False
 
 
-def take_shift(K: Kernel, m: int) -> bool:
+def take_shift(K: Equations, m: int) -> bool:
     """Whether positions need correcting by what has come with the tangent: the change of the shift, then in K.work."""
     if K.stabilized == 0:
         return False
@@ -206,7 +206,7 @@ def take_shift(K: Kernel, m: int) -> bool:
     return shifting
 
 
-def right_hand_sides(K: Kernel, o_r: int, m: int, c_C: float, c_K: float, tangent: bool, straight: bool) -> bool:
+def right_hand_sides(K: Steps, o_r: int, m: int, c_C: float, c_K: float, tangent: bool, straight: bool) -> bool:
     """−r and −h/c_K (index 3) or −ḣ/c_C in K.rhs; for the stabilized form the position residual in K.work.
 
     Rows on velocities have −rate/c_C in both forms and take no part in the correction of positions.
@@ -243,7 +243,7 @@ def right_hand_sides(K: Kernel, o_r: int, m: int, c_C: float, c_K: float, tangen
     return shifting
 
 
-def factorize(K: Kernel, size: int, tangents: int) -> bool:
+def factorize(K: DependentRows, size: int, tangents: int) -> bool:
     """LU factors of the tangent in K.out; false where a pivot is missing.
 
     Those of a step's first few tangents keep to the order of the mode, if it has one and its pivots are sound.
@@ -267,7 +267,7 @@ def factorize(K: Kernel, size: int, tangents: int) -> bool:
     return bool(column == 0)
 
 
-def solve_corrections(K: Kernel, m: int, c_C: float, tangent: bool, shifting: bool, straight: bool) -> None:
+def solve_corrections(K: Steps, m: int, c_C: float, tangent: bool, shifting: bool, straight: bool) -> None:
     """The change of the position shift in K.work, the corrections of rates and multipliers in K.rhs."""
     if shifting:  # positions first: what that changes of ḣ, the accelerations make good in the same iteration
         solve_with_factors(K, m, K.work, straight)
@@ -284,7 +284,7 @@ def solve_corrections(K: Kernel, m: int, c_C: float, tangent: bool, shifting: bo
     solve_with_factors(K, m, K.rhs, straight)
 
 
-def solve_with_factors(K: Kernel, m: int, b: Reals, straight: bool) -> None:
+def solve_with_factors(K: Equations, m: int, b: Reals, straight: bool) -> None:
     """b ← K⁻¹ b with the factors at hand."""
     size = K.n + m
     if straight:
@@ -296,7 +296,7 @@ def solve_with_factors(K: Kernel, m: int, b: Reals, straight: bool) -> None:
         solve_kkt(K, size, b)
 
 
-def correct(K: Kernel, m: int, c_C: float, c_K: float, ready: bool, shifting: bool) -> float:
+def correct(K: Equations, m: int, c_C: float, c_K: float, ready: bool, shifting: bool) -> float:
     """Apply a Newton correction to the block; its size relative to the largest rate."""
     n = K.n
     block = K.block
@@ -325,7 +325,7 @@ def correct(K: Kernel, m: int, c_C: float, c_K: float, ready: bool, shifting: bo
     return biggest / fastest
 
 
-def retreat(K: Kernel, m: int, c_C: float, c_K: float) -> None:
+def retreat(K: Equations, m: int, c_C: float, c_K: float) -> None:
     """Take back half of the last correction of rates, velocities, positions and multipliers."""
     n = K.n
     for i in range(n + m):

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from mbd.kernel.codes import EPS, NOT_CONVERGED, NOT_FINITE, PASSING, SINGULAR, STAGNATED, TOO_TIGHT
 from mbd.kernel.ordered import LOSS_AT_ONCE, solve_kkt
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import Balance, Kernel, Settings, SingularSteps, Steps
 from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import (
     compose,
@@ -81,7 +81,7 @@ NEGLIGIBLE = 1e-2
 """The same over the square of the first correction, the size of the step's own error [-]."""
 
 
-def radau_start(K: Kernel) -> int:
+def radau_start(K: SingularSteps) -> int:
     """The memory at a consistent state: stages of a step before it at rates and multipliers that do not change."""
     forget_steps(K)
     forget_stages(K)
@@ -92,7 +92,7 @@ def radau_start(K: Kernel) -> int:
     return 0
 
 
-def forget_stages(K: Kernel) -> None:
+def forget_stages(K: Steps) -> None:
     """Stages to predict the next step from: those of rates and multipliers that do not change."""
     n = K.n
     for i in range(3):
@@ -104,7 +104,7 @@ def forget_stages(K: Kernel) -> None:
             K.past_stages[3 * n + 3 * K.n_rows + i * K.n_v + j] = 0.0
 
 
-def radau_accept(K: Kernel, h: float) -> None:
+def radau_accept(K: SingularSteps, h: float) -> None:
     """The candidate becomes the accepted state, its stages those to predict the next from."""
     inverse = 1.0 / h
     for i in range(K.n_q):
@@ -352,7 +352,7 @@ def complete(K: Kernel, h: float, t1: float, m: int, renew: bool, slow: bool) ->
     return 0
 
 
-def end_rates(K: Kernel, t1: float, m: int) -> bool:
+def end_rates(K: Balance, t1: float, m: int) -> bool:
     """Consistent rates and multipliers of the candidate in K.jump and K.impulse; false where there are none.
 
     Rows that were stepped with are independent, so that plain factors do for `consistent`, except where R follows
@@ -384,7 +384,7 @@ def end_rates(K: Kernel, t1: float, m: int) -> bool:
     return True
 
 
-def estimate_error(K: Kernel, h: float, m: int) -> None:
+def estimate_error(K: Steps, h: float, m: int) -> None:
     """Error of order 3 of x and (v, z) over the step, into K.error (Hairer & Wanner 1996, eq. IV.8.20).
 
     ``μ h f(y₀) + Σ e_i (Y_i − y₀)``, along the rows, filtered by (1 − hμ ∂f/∂y)⁻¹: stiff components do not count.
@@ -428,7 +428,7 @@ def estimate_error(K: Kernel, h: float, m: int) -> None:
             K.error[i] += c * K.rhs[i]
 
 
-def stage_speed(K: Kernel, k: int, j: int, h: float) -> float:
+def stage_speed(K: Steps, k: int, j: int, h: float) -> float:
     """ẋ of component j at stage k."""
     S = K.stages
     o = stage_place(K, STAGE_RATES) + j
@@ -439,7 +439,7 @@ def stage_speed(K: Kernel, k: int, j: int, h: float) -> float:
     return float(speed)
 
 
-def radau_memory(K: Kernel) -> dict[str, int]:
+def radau_memory(K: Settings) -> dict[str, int]:
     """Lengths of what stages take, and of those of the last step."""
     return {"stages": stage_place(K, STAGES_END), "past_stages": 3 * (K.n + K.n_rows + K.n_v)}
 

@@ -16,7 +16,7 @@ from mbd.kernel.hooks import call
 from mbd.kernel.linear import solve_definite
 from mbd.kernel.mass_ratios import LOSS, is_uneven, polish_rates, polish_with_rows
 from mbd.kernel.ordered import LOSS_AT_ONCE, solve_kkt
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import Balance, DependentRows, Kernel, Mechanism, Memory, SingularSteps, Steps
 from mbd.kernel.restart import compose, consistent, displace, evaluate, fill_block, raise_scales, refresh_scales
 from mbd.kernel.roots import sqrt
 from mbd.kernel.saddle import factor_saddle
@@ -36,7 +36,7 @@ MOST_RETURNS = 8
 """Newton corrections of positions onto the rows after a step; it takes one or two [-]."""
 
 
-def runge_kutta_start(K: Kernel) -> int:
+def runge_kutta_start(K: SingularSteps) -> int:
     """Sizes of forces and rows at the consistent state; the scheme remembers nothing but its rates."""
     forget_steps(K)
     forget_row_norms(K)
@@ -46,7 +46,7 @@ def runge_kutta_start(K: Kernel) -> int:
     return 0
 
 
-def note_uneven(K: Kernel) -> None:
+def note_uneven(K: DependentRows) -> None:
     """Whether stages with rows are corrected by the balance, by the masses in K.acc; not with rows that share loads."""
     m = K.n_active
     K.uneven_masses = 0
@@ -54,7 +54,7 @@ def note_uneven(K: Kernel) -> None:
         K.uneven_masses = 1
 
 
-def find_sizes(K: Kernel) -> None:
+def find_sizes(K: Mechanism) -> None:
     """Sizes at the accepted state; those of a candidate that is refused must not excuse the next one."""
     fill_block(K, K.time, K.q, K.y)
     refresh_scales(K)
@@ -123,7 +123,7 @@ def runge_kutta_step(K: Kernel, h: float, t1: float) -> int:
     return 0
 
 
-def explicit_move(K: Kernel, h: float, weights: int, count: int) -> None:
+def explicit_move(K: Steps, h: float, weights: int, count: int) -> None:
     """(q1, y1) moved from the accepted state by h times the weighted slopes of the first stages; ẋ there as a slope."""
     n_v = K.n_v
     width = n_v + K.n
@@ -149,7 +149,7 @@ def explicit_move(K: Kernel, h: float, weights: int, count: int) -> None:
         K.stages[count * width + i] = K.spare[i]
 
 
-def explicit_rates(K: Kernel, t: float) -> int:
+def explicit_rates(K: Balance, t: float) -> int:
     """Rates at (q1, y1), in K.jump; where friction follows multipliers by the iteration of `consistent`."""
     n = K.n
     m = K.n_active
@@ -190,7 +190,7 @@ def explicit_rates(K: Kernel, t: float) -> int:
     return 0
 
 
-def return_to_rows(K: Kernel, t1: float) -> int:
+def return_to_rows(K: DependentRows, t1: float) -> int:
     """The nearest positions with h = 0 and velocities with ḣ = 0, in the metric of M, in place of (q1, y1)."""
     n = K.n
     m = K.n_active
@@ -245,7 +245,7 @@ def return_to_rows(K: Kernel, t1: float) -> int:
     return 0
 
 
-def explicit_error(K: Kernel, h: float) -> None:
+def explicit_error(K: Memory, h: float) -> None:
     """K.error: local error by the embedded formulas, ``h e₅ · |e₅| / √(|e₅|² + |e₃|²/100)`` (Hairer et al., II.10).
 
     The sizes |e| are the largest over positions and h times velocities; first-order states have sizes of their own.
@@ -286,7 +286,7 @@ def part_of(five: float, three: float) -> float:
     return five / sqrt(five * five + 0.01 * three * three)
 
 
-def hold_error(K: Kernel) -> bool:
+def hold_error(K: Steps) -> bool:
     """K.error less what the projection onto the rows takes of it, in the metric of M; false if that is singular.
 
     Stages next to a singular configuration err across the rows, most of which is gone at the end of the step.
@@ -312,7 +312,7 @@ def hold_error(K: Kernel) -> bool:
     return True
 
 
-def runge_kutta_accept(K: Kernel, h: float) -> None:
+def runge_kutta_accept(K: SingularSteps, h: float) -> None:
     """The candidate becomes the accepted state."""
     inverse = 1.0 / h
     for i in range(K.n_q):

@@ -22,7 +22,7 @@ from mbd.kernel.hooks import call
 from mbd.kernel.linear import factor
 from mbd.kernel.ordered import LOSS_OF_STEP, OF_TANGENT, factor_ordered, order_at, solve_kkt
 from mbd.kernel.ordered_complex import factor_pair_ordered, solve_pair_ordered
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import DependentRows, Kernel, Settings, SingularSteps, Steps
 from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import add_shares, share_loads
 from mbd.kernel.schemes.iteration import residual_size
@@ -49,7 +49,7 @@ MOST_STRETCHED = 4.0
 """Size of a step over that of the last above which its stages predict nothing: a parabola would go far astray [-]."""
 
 
-def stage_place(K: Kernel, part: int) -> int:
+def stage_place(K: Settings, part: int) -> int:
     """Where a part of K.stages begins.
 
     W (3, n) | λ (3, rows) | U (3, n_v) | last changes of W and λ | r and ḣ of each stage | h | H U | M | c² K |
@@ -86,7 +86,7 @@ def stage_place(K: Kernel, part: int) -> int:
     return int(place)
 
 
-def hold_block(K: Kernel) -> None:
+def hold_block(K: SingularSteps) -> None:
     """What all stages of a step share, into the block: the center of the chart, anchors, sliding."""
     for i in range(K.n_q):
         K.block[K.o_q + i] = K.q[i]
@@ -100,7 +100,7 @@ def hold_block(K: Kernel) -> None:
             K.stages[o_E + j] = 0.0
 
 
-def predict_stages(K: Kernel, h: float, m: int) -> None:
+def predict_stages(K: Steps, h: float, m: int) -> None:
     """W_i, λ_i and U_i from the parabola through those of the last step, as they are now after one far shorter."""
     S = K.stages
     P = K.past_stages
@@ -146,7 +146,7 @@ def load_stage(K: Kernel, i: int, h: float, t1: float) -> None:
         share_loads(K, K.n_active)
 
 
-def load_state(K: Kernel, i: int, h: float) -> None:
+def load_state(K: Steps, i: int, h: float) -> None:
     """X_i, Y_i and W_i into the block."""
     S = K.stages
     n = K.n
@@ -169,7 +169,7 @@ def load_state(K: Kernel, i: int, h: float) -> None:
                 block[K.o_x + j] += h * S[A_ + 3 * i + k] * S[o_E + k * K.n_v + j]
 
 
-def bend_stages(K: Kernel, h: float) -> None:
+def bend_stages(K: Steps, h: float) -> None:
     """E_j of all stages at their rates, by iteration; it takes as many rounds as the increments are large."""
     o_E = stage_place(K, STAGE_BEND)
     for _ in range(MOST_BENDS):
@@ -219,7 +219,7 @@ def evaluate_stages(
     return largest
 
 
-def matrices(K: Kernel, m: int, h: float) -> None:
+def matrices(K: SingularSteps, m: int, h: float) -> None:
     """The real and the complex matrix at the block, whose r, h and ḣ stay in K.out.
 
     ``P(c) = M + c C + c² K`` and the rows ``B + c ∂ḣ/∂x``: at c = μh, (c, 0) and (−c, 0) the compiled tangent gives
@@ -272,14 +272,14 @@ def matrices(K: Kernel, m: int, h: float) -> None:
     keep_held(K, m)
 
 
-def tangent_of_stage(K: Kernel, m: int) -> None:
+def tangent_of_stage(K: DependentRows, m: int) -> None:
     """The tangent at the block in K.out, with what dependent rows bear where a friction slides."""
     call(K, K.mode_code[4 * K.mode_id], K.out)
     if sharing(K):
         add_shares(K, K.out, m)
 
 
-def keep_held(K: Kernel, m: int) -> None:
+def keep_held(K: Steps, m: int) -> None:
     """H U_i with the new H, from which U_i are found again: they stay in the range of the rows in one metric."""
     size = K.n + m
     o_U = stage_place(K, STAGE_SHIFT)
@@ -292,7 +292,7 @@ def keep_held(K: Kernel, m: int) -> None:
             K.stages[o_H + i * m + k] = total
 
 
-def factor_stages(K: Kernel, size: int) -> bool:
+def factor_stages(K: SingularSteps, size: int) -> bool:
     """LU factors of both matrices; false where a pivot is missing."""
     o = 0 if sharing(K) else order_at(K, size - K.n)
     column = 0
@@ -310,7 +310,7 @@ def factor_stages(K: Kernel, size: int) -> bool:
     return bool(column == 0)
 
 
-def is_off(K: Kernel, m: int) -> bool:
+def is_off(K: Steps, m: int) -> bool:
     """Whether rows on positions are above round-off at a stage: below, correcting would only stir the velocities."""
     o_h = stage_place(K, HEIGHTS)
     for i in range(3):
@@ -321,7 +321,7 @@ def is_off(K: Kernel, m: int) -> bool:
     return False
 
 
-def correct_positions_of_stages(K: Kernel, m: int, h: float, whole: bool) -> None:
+def correct_positions_of_stages(K: Steps, m: int, h: float, whole: bool) -> None:
     """New U_i; what they change of ḣ and of the balance, the rates make good in the same iteration.
 
     What is left of h once the rates have done away with ḣ at all stages, ``h_i − h Σ a_ij ḣ_j``, is theirs.
@@ -366,14 +366,14 @@ def correct_positions_of_stages(K: Kernel, m: int, h: float, whole: bool) -> Non
             S[o_r + i * size + k] += pulled / (c * c)
 
 
-def correct_stages(K: Kernel, m: int, h: float, whole: bool) -> float:
+def correct_stages(K: Steps, m: int, h: float, whole: bool) -> float:
     """One simplified Newton correction of all stages; its size relative to the largest rate."""
     if m > 0 and (whole or is_off(K, m)):
         correct_positions_of_stages(K, m, h, whole)
     return correct_rates(K, m, h)
 
 
-def correct_rates(K: Kernel, m: int, h: float) -> float:
+def correct_rates(K: Steps, m: int, h: float) -> float:
     """The correction of rates and multipliers by the residuals in K.stages; its size relative to the largest rate."""
     n = K.n
     size = n + m
@@ -400,7 +400,7 @@ def correct_rates(K: Kernel, m: int, h: float) -> float:
     return biggest / fastest
 
 
-def solve_real(K: Kernel, m: int, h: float) -> None:
+def solve_real(K: Steps, m: int, h: float) -> None:
     """The component along the real eigenvector, into K.rhs."""
     size = K.n + m
     S = K.stages
@@ -414,7 +414,7 @@ def solve_real(K: Kernel, m: int, h: float) -> None:
     solve_kkt(K, size, K.rhs)
 
 
-def solve_pair(K: Kernel, m: int, h: float) -> None:
+def solve_pair(K: Steps, m: int, h: float) -> None:
     """The component along one vector of the pair, into K.stages."""
     size = K.n + m
     S = K.stages
@@ -440,7 +440,7 @@ def solve_pair(K: Kernel, m: int, h: float) -> None:
         solve_complex(S, stage_place(K, PAIR), size, o_P, o_b)
 
 
-def retreat_stages(K: Kernel, m: int, part: float) -> None:
+def retreat_stages(K: Steps, m: int, part: float) -> None:
     """Take back a part of the last correction of rates and multipliers; all, 1, and then −1 does it again."""
     n = K.n
     size = n + m

@@ -15,7 +15,7 @@ from mbd.kernel.guard_substeps import copy_ends, look_at, put_candidate_back
 from mbd.kernel.guards import judge_user
 from mbd.kernel.observe import store_state
 from mbd.kernel.orthogonal import square
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import DependentRows, Kernel, SingularSteps, Switching
 from mbd.kernel.restart import evaluate
 from mbd.kernel.roots import sqrt
 from mbd.kernel.singular.step_size import NEGLIGIBLE_NOISE, TOO_NOISY, motion, noise_coefficient, row_norms
@@ -32,7 +32,7 @@ MOST_ROOT_STEPS = 100
 """Steps to the root of an event's measure on the interpolant; it takes about ten [-]."""
 
 
-def may_pass_events(K: Kernel, h: float) -> bool:
+def may_pass_events(K: DependentRows, h: float) -> bool:
     """Whether the candidate's step may hold a singular configuration; where rows are held as index 3 any may."""
     if K.n_active == 0 or K.strategy == 1:
         return False
@@ -74,7 +74,7 @@ def find_passed_events(K: Kernel, h: float) -> int:
     return found
 
 
-def show(K: Kernel, t: float, h: float, s: float) -> None:
+def show(K: Switching, t: float, h: float, s: float) -> None:
     """The interpolant at the part s of the step in place of the candidate; at its end the candidate itself."""
     if s < 1.0:
         look_at(K, t, h, s, False)
@@ -82,7 +82,7 @@ def show(K: Kernel, t: float, h: float, s: float) -> None:
         put_candidate_back(K)
 
 
-def root_inside(K: Kernel, e: int, t: float, h: float, low: float, high: float) -> float:
+def root_inside(K: Switching, e: int, t: float, h: float, low: float, high: float) -> float:
     """Where the measure of event e vanishes on the interpolant, as a part of the step: by regula falsi."""
     place = 4 * K.n_contacts + e
     side = K.side[e]
@@ -135,7 +135,7 @@ def share_inside(K: Kernel, t: float, h: float, s: float) -> float:
     return largest_noise_share(K, m, abs(s - other) * h)
 
 
-def comes_close(K: Kernel, t: float, part: float) -> bool:
+def comes_close(K: DependentRows, t: float, part: float) -> bool:
     """Whether what is left of some row beside the others at (q1, y1) is a small part of the longest row.
 
     K.work holds these lengths, K.basis the directions.
@@ -156,7 +156,7 @@ def comes_close(K: Kernel, t: float, part: float) -> bool:
     return bool(least * least < part * part * longest)
 
 
-def keep_parts(K: Kernel, m: int) -> None:
+def keep_parts(K: SingularSteps, m: int) -> None:
     """The independent parts of rows in K.turning and their lengths in K.work[2m:3m]."""
     for k in range(m * K.n):
         K.turning[k] = K.basis[k]
@@ -164,7 +164,7 @@ def keep_parts(K: Kernel, m: int) -> None:
         K.work[2 * m + k] = K.work[k]
 
 
-def largest_noise_share(K: Kernel, m: int, apart: float) -> float:
+def largest_noise_share(K: SingularSteps, m: int, apart: float) -> float:
     """c/τ² of the parts kept, from those in K.basis at a time `apart` from them; K.failure_index names the row."""
     n = K.n
     speed = max(motion(K, K.y), motion(K, K.y1))
@@ -182,7 +182,7 @@ def largest_noise_share(K: Kernel, m: int, apart: float) -> float:
     return largest
 
 
-def refuses(K: Kernel, h: float) -> bool:
+def refuses(K: SingularSteps, h: float) -> bool:
     """Whether the candidate ends where round-off makes too much of velocities to restart from there.
 
     K.detail tells when it ends, the share and the size of the step; K.failure_index the row.
@@ -203,7 +203,7 @@ def refuses(K: Kernel, h: float) -> bool:
     return True
 
 
-def log_passed_events(K: Kernel, h: float) -> None:
+def log_passed_events(K: Switching, h: float) -> None:
     """Rows and lines of the log of events in K.crossed up to h, in order of time, from the candidate's interpolant."""
     t = K.time
     copy_ends(K, True)

@@ -7,7 +7,7 @@ they were cleared of, G keeps its zeros: a row that is done makes neighbours of 
 
 from __future__ import annotations
 
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import DependentRows, Singular, SingularSteps
 from mbd.kernel.roots import sqrt
 
 __all__ = ["common_part", "pivoted_gram_norms_of_many"]
@@ -17,7 +17,16 @@ NOTHING_LEFT = 1e-15
 
 
 def pivoted_gram_norms_of_many(
-    K: Kernel, m: int, h: float, ratio: float, ahead: float, place: int, o_S: int, stride: int, o_H: int, width: int
+    K: SingularSteps,
+    m: int,
+    h: float,
+    ratio: float,
+    ahead: float,
+    place: int,
+    o_S: int,
+    stride: int,
+    o_H: int,
+    width: int,
 ) -> None:
     """What `pivoted_gram_norms` finds, in the same places of K.spare and K.columns."""
     if place == 0:
@@ -44,7 +53,7 @@ def pivoted_gram_norms_of_many(
         take_out(K, m, done, G)
 
 
-def find_support(K: Kernel, m: int, o_S: int, stride: int, o_H: int, width: int) -> None:
+def find_support(K: SingularSteps, m: int, o_S: int, stride: int, o_H: int, width: int) -> None:
     """Which entries of each row are not zero, into K.support; weights of columns behind the rows of the basis."""
     n = K.n_v
     for j in range(n):
@@ -61,7 +70,7 @@ def find_support(K: Kernel, m: int, o_S: int, stride: int, o_H: int, width: int)
         K.support[row * (n + 1)] = count
 
 
-def scaled_row(K: Kernel, m: int, row: int, h: float, ratio: float, ahead: float, o_H: int, width: int) -> float:
+def scaled_row(K: SingularSteps, m: int, row: int, h: float, ratio: float, ahead: float, o_H: int, width: int) -> float:
     """A row of B, `ahead` of now, over the length that is returned, into the basis."""
     n = K.n_v
     moves = 0.0 if K.row_level[K.rows[row]] == 1 else 1.0
@@ -81,7 +90,7 @@ def scaled_row(K: Kernel, m: int, row: int, h: float, ratio: float, ahead: float
     return float(length)
 
 
-def common_part(K: Kernel, n: int, row: int, other: int) -> float:
+def common_part(K: Singular, n: int, row: int, other: int) -> float:
     """The product of two rows of the basis, which are n long, over the entries of the first in K.support."""
     part = 0.0
     for e in range(K.support[row * (n + 1)]):
@@ -90,7 +99,7 @@ def common_part(K: Kernel, n: int, row: int, other: int) -> float:
     return float(part)
 
 
-def take_out(K: Kernel, m: int, done: int, G: int) -> None:
+def take_out(K: DependentRows, m: int, done: int, G: int) -> None:
     """Clear the rows still to come of their parts along the one that is done."""
     row = K.columns[done]
     pivot = K.spare[G + row * (m + 1)]

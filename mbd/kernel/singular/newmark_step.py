@@ -11,7 +11,7 @@ from mbd.kernel.hooks import call
 from mbd.kernel.linear import factor
 from mbd.kernel.ordered import LOSS_OF_STEP, OF_TANGENT, factor_ordered, order_at, solve_kkt, weakest_pivot
 from mbd.kernel.orthogonal import clear_row, square
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import DependentRows, Kernel, Motion, SingularSteps
 from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import (
     add_shares,
@@ -40,7 +40,7 @@ CONTINUOUS = 0.05
 """Part of the speed by which a step near it may differ from its prediction: the branch goes on in v [-]."""
 
 
-def steps_by_pivot(K: Kernel, m: int, straight: bool) -> float:
+def steps_by_pivot(K: DependentRows, m: int, straight: bool) -> float:
     """Steps until the smallest pivot of the rows vanishes, if it goes on as since the last step; a cheap first look.
 
     Pivots in an order given beforehand tell their own; where they gave way to a search for pivots, they do not compare:
@@ -63,7 +63,7 @@ def steps_by_pivot(K: Kernel, m: int, straight: bool) -> float:
     return float(before / (largest - before)) if largest > before else 1e300
 
 
-def steps_to_singularity(K: Kernel, m: int, h: float, ratio: float, straight: bool) -> float:
+def steps_to_singularity(K: SingularSteps, m: int, h: float, ratio: float, straight: bool) -> float:
     """Steps of size h until a row of B depends on the others: how far it is from that, over what a step changes of it.
 
     1e300 where the row does not vanish there: it turns, and others with it.
@@ -110,7 +110,16 @@ def steps_to_singularity(K: Kernel, m: int, h: float, ratio: float, straight: bo
 
 
 def find_gram_norms(
-    K: Kernel, m: int, h: float, ratio: float, ahead: float, place: int, o_S: int, stride: int, o_H: int, width: int
+    K: SingularSteps,
+    m: int,
+    h: float,
+    ratio: float,
+    ahead: float,
+    place: int,
+    o_S: int,
+    stride: int,
+    o_H: int,
+    width: int,
 ) -> None:
     """`pivoted_gram_norms`, by products of rows where most of them have nothing in common."""
     if order_at(K, m) > 0:
@@ -119,7 +128,7 @@ def find_gram_norms(
         pivoted_gram_norms(K, m, h, ratio, ahead, place, o_S, stride, o_H, width)
 
 
-def misses(K: Kernel, away: float, h: float) -> bool:
+def misses(K: DependentRows, away: float, h: float) -> bool:
     """Whether whole steps from the end of this one would end too close to the singularity: then it gets another size.
 
     While ḣ is held too, steps may do that; those that hold h alone start to ring. It is the last whole one before these
@@ -135,7 +144,16 @@ def misses(K: Kernel, away: float, h: float) -> bool:
 
 
 def pivoted_gram_norms(
-    K: Kernel, m: int, h: float, ratio: float, ahead: float, place: int, o_S: int, stride: int, o_H: int, width: int
+    K: SingularSteps,
+    m: int,
+    h: float,
+    ratio: float,
+    ahead: float,
+    place: int,
+    o_S: int,
+    stride: int,
+    o_H: int,
+    width: int,
 ) -> None:
     """Lengths of the rows of B, `ahead` of now, less their parts along earlier ones, into K.spare from `place` on.
 
@@ -258,7 +276,7 @@ def singular_newmark_step(K: Kernel, h: float, t1: float) -> int:
     return NOT_CONVERGED
 
 
-def correct_positions(K: Kernel, m: int, c_C: float, c_K: float) -> bool:
+def correct_positions(K: DependentRows, m: int, c_C: float, c_K: float) -> bool:
     """One Newton correction of the index-3 step from the tangent in K.out; false if singular."""
     n = K.n
     size = n + m
@@ -287,7 +305,7 @@ def correct_positions(K: Kernel, m: int, c_C: float, c_K: float) -> bool:
     return True
 
 
-def factor_positions(K: Kernel, m: int) -> bool:
+def factor_positions(K: DependentRows, m: int) -> bool:
     """LU factors of the index-3 tangent in K.out; false if a pivot is missing."""
     size = K.n + m
     o = 0 if sharing(K) else order_at(K, m)
@@ -302,7 +320,7 @@ def factor_positions(K: Kernel, m: int) -> bool:
     return bool(factor(K.kkt, size, K.pivots) == 0)
 
 
-def leaves_branch(K: Kernel, h: float) -> bool:
+def leaves_branch(K: Motion, h: float) -> bool:
     """Whether velocities are no continuation of those before the step (the predicted ones are in K.y1)."""
     fastest = 0.0
     change = 0.0

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from mbd.kernel.codes import EPS, NOT_FINITE, PASSING, SINGULAR
 from mbd.kernel.ordered import LOSS_OF_STEP, solve_kkt
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import DependentRows, Kernel, Memory, Steps
 from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import compose, evaluate
 from mbd.kernel.saddle import factor_saddle
@@ -43,12 +43,12 @@ MOST_STAGE_PROJECTIONS = 8
 """Newton corrections of positions onto the rows of a stage; it takes one or two [-]."""
 
 
-def spans_singularity(K: Kernel, h: float) -> bool:
+def spans_singularity(K: DependentRows, h: float) -> bool:
     """Whether a step of size h goes over a singular configuration, or close by it."""
     return bool(K.near_singular == PASSING and K.loaded == 0 and not sharing(K)) or is_beside_singularity(K, h, BESIDE)
 
 
-def is_beside_singularity(K: Kernel, h: float, steps: float) -> bool:
+def is_beside_singularity(K: DependentRows, h: float, steps: float) -> bool:
     """Whether a step of size h lies so near to the singularity found last; not where loads are shared out."""
     away = K.singular_time - K.time
     return bool(-steps * h < away < (1.0 + steps) * h) and K.loaded == 0 and not sharing(K)
@@ -70,7 +70,7 @@ def solve_singular_stages(K: Kernel, h: float, t1: float, m: int, afresh: bool) 
     return 0
 
 
-def keep_moves(K: Kernel, h: float, m: int) -> None:
+def keep_moves(K: Memory, h: float, m: int) -> None:
     """What the last correction of rates moves positions, ``h² Σ a²_ij ΔW_j``, in the place of the pair's matrix."""
     S = K.stages
     o_D = stage_place(K, CHANGES)
@@ -160,7 +160,7 @@ def project_stage_positions(K: Kernel, i: int, h: float, t1: float, m: int, afre
     return 0
 
 
-def take_back(K: Kernel, i: int, m: int) -> None:
+def take_back(K: Steps, i: int, m: int) -> None:
     """−B Δx into the right-hand side, with Δx what `keep_moves` kept of stage i."""
     n = K.n
     o_B = K.acc_B
@@ -174,7 +174,7 @@ def take_back(K: Kernel, i: int, m: int) -> None:
         K.rhs[n + k] = -across
 
 
-def replace_row_rates(K: Kernel, o_r: int, m: int) -> None:
+def replace_row_rates(K: Steps, o_r: int, m: int) -> None:
     """``−B₂ s_i`` in place of ḣ_i in the residuals, which begin at o_r; B₂ are the rows of the matrix in K.kkt."""
     size = K.n + m
     o_s = stage_place(K, CHANGES)

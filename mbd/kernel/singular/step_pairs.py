@@ -8,7 +8,7 @@ by where the grid happens to lie: enough to hide that the sum of all errors fall
 
 from __future__ import annotations
 
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import State
 
 __all__ = ["ALONE", "FIRST", "LONGER", "SECOND", "SHORTER", "WHOLE", "is_of_pair", "is_whole", "may_pair"]
 
@@ -27,11 +27,11 @@ def is_of_pair(size: float) -> bool:
     return abs(size - SHORTER) <= WHOLE or abs(size - LONGER) <= WHOLE
 
 
-def is_whole(K: Kernel, h: float) -> bool:
+def is_whole(K: State, h: float) -> bool:
     """Whether a step of size h is one of the grid."""
     return bool(abs(h - K.step) <= WHOLE * K.step)
 
 
-def may_pair(K: Kernel, h: float) -> bool:
+def may_pair(K: State, h: float) -> bool:
     """Whether a step of size h that would lead too near to a singularity may be replaced by a pair: one of the grid."""
     return bool(K.paired_step == 0 and K.halvings == 0 and is_whole(K, h))

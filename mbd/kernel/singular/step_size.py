@@ -14,7 +14,18 @@ from __future__ import annotations
 from mbd.kernel.codes import EPS, PASSING
 from mbd.kernel.ordered import order_at
 from mbd.kernel.orthogonal import clear_row, square
-from mbd.kernel.records import Kernel, Reals
+from mbd.kernel.records import (
+    DependentRows,
+    Equations,
+    LinearAlgebra,
+    Mechanism,
+    Model,
+    Motion,
+    Reals,
+    SchemeAbilities,
+    SingularSteps,
+    Steps,
+)
 from mbd.kernel.restart import compose, evaluate, fill_block
 from mbd.kernel.roots import sqrt
 from mbd.kernel.singular.gram_norms import common_part
@@ -52,12 +63,12 @@ NOWHERE = 1e300
 """Time to a singularity where there is none [s]."""
 
 
-def may_take_long_step(K: Kernel) -> bool:
+def may_take_long_step(K: SchemeAbilities) -> bool:
     """Whether a step over a singularity may be longer than others: of most schemes only where no guard is watched."""
     return bool(K.n_watched == 0 or K.stretches == 1)
 
 
-def forget_row_norms(K: Kernel) -> None:
+def forget_row_norms(K: DependentRows) -> None:
     """Nothing is known at the start of the scheme: whether a singularity is near is looked at before the first step."""
     K.singular_time = -NOWHERE
     for k in range(K.n_rows):
@@ -65,7 +76,7 @@ def forget_row_norms(K: Kernel) -> None:
     K.left[K.n_active] = 1.0
 
 
-def note_row_norms(K: Kernel) -> None:
+def note_row_norms(K: DependentRows) -> None:
     """|w| of each row at the candidate, at which K.acc is, and √(2 T): accepted with it by `accept_row_norms`."""
     m = K.n_active
     if order_at(K, m) > 0:
@@ -77,7 +88,7 @@ def note_row_norms(K: Kernel) -> None:
     K.left1[m] = motion(K, K.y1)
 
 
-def accept_row_norms(K: Kernel, h: float) -> None:
+def accept_row_norms(K: DependentRows, h: float) -> None:
     """The candidate is accepted after a step of h: |w| of each row, and whether one falls to a singularity.
 
     K.left[m] = 1 where it is to be looked for, else 0.
@@ -96,7 +107,7 @@ def accept_row_norms(K: Kernel, h: float) -> None:
     K.left[m] = near
 
 
-def motion(K: Kernel, y: Reals) -> float:
+def motion(K: Model, y: Reals) -> float:
     """√(Σ M_jj v_j²), of the size of √(2 T), with M in K.acc."""
     size = 0.0
     for j in range(K.n_v):
@@ -104,7 +115,7 @@ def motion(K: Kernel, y: Reals) -> float:
     return float(sqrt(size) + 1e-300)
 
 
-def noise_coefficient(K: Kernel, k: int, fall: float, speed: float) -> float:
+def noise_coefficient(K: Motion, k: int, fall: float, speed: float) -> float:
     """c [s²] of the share c/τ² of the velocities that round-off makes of them where a step ends τ from a singularity.
 
     Round-off δ of a row leaves positions open by δ/|w|; ḣ = 0 makes velocities δ/(|w| τ) of that, with |w| = fall τ.
@@ -116,14 +127,14 @@ def noise_coefficient(K: Kernel, k: int, fall: float, speed: float) -> float:
     return float(NOISE_GROWTH * EPS * turned * K.scale[K.n + K.rows[k]] / (fall * speed + 1e-300))
 
 
-def weigh_columns(K: Kernel) -> None:
+def weigh_columns(K: Equations) -> None:
     """1/√M_jj into K.spare, with M in K.acc."""
     for j in range(K.n):
         weight = K.acc[j * K.n + j]
         K.spare[j] = 1.0 / sqrt(weight) if weight > 0.0 else 1.0
 
 
-def load_row(K: Kernel, k: int) -> None:
+def load_row(K: DependentRows, k: int) -> None:
     """Row k of those in K.rows, of B in K.acc, on the columns weighed by `weigh_columns`, into line k of K.basis."""
     n = K.n
     row = K.acc_B + K.rows[k] * n
@@ -131,7 +142,7 @@ def load_row(K: Kernel, k: int) -> None:
         K.basis[k * n + j] = K.acc[row + j] * K.spare[j]
 
 
-def row_norms(K: Kernel, m: int) -> None:
+def row_norms(K: DependentRows, m: int) -> None:
     """Gram–Schmidt on the rows of B in K.acc, in their order: |w| into K.work, w/|w| into K.basis."""
     n = K.n
     weigh_columns(K)
@@ -146,7 +157,7 @@ def row_norms(K: Kernel, m: int) -> None:
             K.basis[k * n + j] *= inverse
 
 
-def row_norms_of_many(K: Kernel, m: int) -> None:
+def row_norms_of_many(K: DependentRows, m: int) -> None:
     """|w| into K.work where most rows have nothing in common: roots of the pivots of their products, in their order.
 
     Rows keep their zeros there, which Gram–Schmidt fills; see `mbd.kernel.singular.gram_norms`.
@@ -173,7 +184,7 @@ def row_norms_of_many(K: Kernel, m: int) -> None:
                     K.spare[n + a * m + b] -= part / pivot * K.spare[n + b * m + k]
 
 
-def evaluate_ahead(K: Kernel, ahead: float) -> None:
+def evaluate_ahead(K: Mechanism, ahead: float) -> None:
     """K.acc at the state that is `ahead` of the accepted one, along its velocities and accelerations."""
     fill_block(K, K.time, K.q, K.y)
     for i in range(K.n_v):
@@ -184,7 +195,7 @@ def evaluate_ahead(K: Kernel, ahead: float) -> None:
     evaluate(K, K.time + ahead, K.q1, K.y1)
 
 
-def times_to_singularities(K: Kernel, m: int, unit: float) -> float:
+def times_to_singularities(K: SingularSteps, m: int, unit: float) -> float:
     """Times from now to where each row comes to depend on others, into K.work[m:2m]; the first.
 
     K.velocity_noise is its c.
@@ -225,7 +236,7 @@ def times_to_singularities(K: Kernel, m: int, unit: float) -> float:
     return first
 
 
-def horizon(K: Kernel, m: int, unit: float, first: float) -> float:
+def horizon(K: Equations, m: int, unit: float, first: float) -> float:
     """Time beyond which none is looked for: nothing is arranged so early, and the motion is not known so far."""
     limit = 4.0 * FAR_STEPS * unit
     if K.stretches == 1 and first < NOWHERE:
@@ -237,7 +248,7 @@ def horizon(K: Kernel, m: int, unit: float, first: float) -> float:
     return limit
 
 
-def singular_step_size(K: Kernel, unit: float, longest: float) -> float:
+def singular_step_size(K: SingularSteps, unit: float, longest: float) -> float:
     """The step to take in place of one of this size, so that no stage is next to a singularity; `unit` far off.
 
     Where round-off would make much of velocities that near, the step over the singularity lasts up to `longest` units.
@@ -267,7 +278,7 @@ def singular_step_size(K: Kernel, unit: float, longest: float) -> float:
     return clearest(K, m, span, min(1.0, first / K.middle / span))
 
 
-def noise_share(K: Kernel, h: float) -> float:
+def noise_share(K: DependentRows, h: float) -> float:
     """Share of the velocities that round-off makes of them in a step of size h to or over it; 0 far off."""
     if K.velocity_noise == 0.0:
         return 0.0
@@ -275,7 +286,7 @@ def noise_share(K: Kernel, h: float) -> float:
     return float(min(K.velocity_noise / (away * away + 1e-300), 1.0))
 
 
-def is_too_noisy(K: Kernel, h: float) -> bool:
+def is_too_noisy(K: SingularSteps, h: float) -> bool:
     """Whether round-off makes too much of velocities in such a step; K.detail then tells when, where, how much."""
     share = noise_share(K, h)
     if share <= TOO_NOISY:
@@ -291,7 +302,7 @@ def is_too_noisy(K: Kernel, h: float) -> bool:
     return True
 
 
-def is_resolved(K: Kernel, h: float) -> bool:
+def is_resolved(K: Steps, h: float) -> bool:
     """Whether the candidate errs little enough after a step over a singularity that was longer than others."""
     fastest = 0.0
     for i in range(K.n_v):
@@ -303,7 +314,7 @@ def is_resolved(K: Kernel, h: float) -> bool:
     return True
 
 
-def clearest(K: Kernel, m: int, unit: float, wanted: float) -> float:
+def clearest(K: LinearAlgebra, m: int, unit: float, wanted: float) -> float:
     """The step over singularities nearest below the wanted part of a unit with none of them close to a node."""
     best = wanted
     widest = -1.0
@@ -321,7 +332,7 @@ def clearest(K: Kernel, m: int, unit: float, wanted: float) -> float:
     return best * unit
 
 
-def clearance(K: Kernel, place: float) -> float:
+def clearance(K: SchemeAbilities, place: float) -> float:
     """Distance of a place, part of a step, from the nearest node or the end [-]."""
     clear = abs(place - 1.0)
     for node in range(K.n_nodes):

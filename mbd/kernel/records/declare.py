@@ -8,7 +8,7 @@ address (see `mbd.kernel.build`), interpreted code as an attribute.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, TypeAlias
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,14 +57,19 @@ def place(array: str) -> Any:
 
 
 class Record:
-    """Numbers and arrays by name."""
+    """Numbers and arrays by name; one put together from others has their fields, in the order of declaration."""
+
+    declared: ClassVar[list[type[Record]]] = []
+
+    def __init_subclass__(cls) -> None:
+        Record.declared.append(cls)
 
     def __init__(self, **fields: Any) -> None:
         self.__dict__.update(fields)
 
 
 class Table:
-    """The fields of a record, of its bases first.
+    """The fields of a record, those of its bases among them.
 
     Attributes
     ----------
@@ -80,7 +85,7 @@ class Table:
         self.places: dict[str, tuple[str, int]] = {}
         self.formulas: dict[str, Any] = {}
         self._arrays: dict[str, Array] = {}
-        for owner in reversed(record.__mro__):
+        for owner in (each for each in Record.declared if issubclass(record, each)):
             for name, annotation in vars(owner).get("__annotations__", {}).items():
                 if annotation not in kinds:
                     continue

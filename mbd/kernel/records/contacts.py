@@ -1,0 +1,102 @@
+"""Contacts, frictions, and the guards and events by which they change."""
+
+from __future__ import annotations
+
+from mbd.kernel.records.declare import Integers, Reals, integers, place, reals
+from mbd.kernel.records.settings import SchemeAbilities
+from mbd.kernel.records.state import Model, Motion
+
+__all__ = ["ContactRows", "Contacts", "Events", "Frictions", "Guards", "Mechanism"]
+
+
+class Contacts(SchemeAbilities):
+    """Contacts: their rules and what is known of each."""
+
+    kind: Integers = integers()  # 0 unilateral, 1 penalty
+    opens: Integers = integers()  # 0 on pull, 1 on gap, 2 by When
+    normal: Integers = integers()  # normal row
+    when_start: Integers = integers()  # who opens it
+    when_target: Integers = integers()
+    when_after: Integers = integers()
+    while_kind: Integers = integers()  # 0 always, 1 while a contact is closed, 2 while a measure is positive
+    while_target: Integers = integers()
+    anchor_start: Integers = integers()
+    restitution: Reals = reals()
+    closed: Integers = integers(lambda s: s.n_contacts, kept=True)
+    armed: Integers = integers(lambda s: s.n_contacts, kept=True)
+    touched: Integers = integers(lambda s: s.n_contacts, kept=True)
+    active: Integers = integers(lambda s: s.n_contacts + s.n_guards + s.n_frictions)
+    free: Integers = integers(lambda s: s.n_contacts)
+    closing: Integers = integers(lambda s: s.n_contacts)
+    parting: Integers = integers(lambda s: s.n_contacts)
+    lifting: Integers = integers(lambda s: s.n_rows)  # 1: a row that is left out of the correction of positions
+    deepest: Reals = reals(lambda s: s.n_contacts, kept=True)  # lowest gap while ignored
+    sinking: Reals = reals(lambda s: s.n_contacts, kept=True)  # time of the first release into the surface
+    contact_step: Reals = reals(lambda s: s.n_contacts, kept=True)  # while a penalty contact acts, 0: not found yet
+    closing_rate: Reals = reals(lambda s: s.n_contacts, kept=True)  # |γ| as it closed
+    largest_rate: Reals = reals(lambda s: s.n_contacts, kept=True)  # in the present window of steps
+    contact_steps: Reals = reals(lambda s: s.n_contacts, kept=True)
+    least_contact_step: Reals = reals(lambda s: s.n_contacts, kept=True)  # ever
+    correction_size: float = place("detail")  # of the last correction of positions by contacts
+    plastic_impact: int = place("state")  # 1: without restitution
+
+
+class Frictions(Contacts):
+    """Frictions: their rows and what each does."""
+
+    friction_row: Integers = integers()
+    friction_contact: Integers = integers()
+    sticks: Integers = integers(lambda s: s.n_frictions, kept=True)
+    loose: Integers = integers(lambda s: s.n_frictions, kept=True)
+    was: Integers = integers(lambda s: s.n_frictions, kept=True)  # at the last restart: 0 off, 2 sticking, ±1 sliding
+    let_go: Integers = integers(lambda s: s.n_frictions)  # 1: a friction that has let go for the step being tried
+    slip: Reals = reals(lambda s: s.n_frictions, kept=True)  # sign of sliding
+    lean: Reals = reals(lambda s: s.n_frictions, kept=True)  # the direction in which each slid last
+    limit: Reals = reals(lambda s: s.n_frictions)  # largest friction
+    base_limit: Reals = reals(lambda s: s.n_frictions)  # the same at zero multipliers
+
+
+class Events(SchemeAbilities):
+    """Guards and the instants at which they fire."""
+
+    guards0: Reals = reals(lambda s: s.n_watched, kept=True)  # at the accepted state
+    guards1: Reals = reals(lambda s: s.n_watched)  # at the candidate
+    side: Reals = reals(lambda s: s.n_guards, kept=True)  # sign of each user guard since it last crossed
+    direction: Integers = integers()
+    notify: Integers = integers(lambda s: s.n_contacts + s.n_guards + s.n_frictions)
+    crossed: Reals = reals(lambda s: s.n_guards)  # from the start of the step to an event without a restart, or < 0
+    doubt: Reals = reals(lambda s: 2 * s.n_watched + 2 * s.n)  # guards, then round-off of positions and velocities
+    inside: Reals = reals(lambda s: 2 * s.n_watched + 2 * s.n_rows + s.n_q + 2 * s.n)  # what substeps began from
+    pick: Reals = reals()  # the event that fired first
+    event_place: float = place("pick")  # its estimated distance, part of the step
+    event_low: float = place("pick")  # the lower end of its bracket
+    changes_little: float = place("pick")  # 1: rates of the candidate change so little that it needs no other look
+    event_after: float = place("pick")  # its distance from the start of the step [s]
+    fired: Integers = integers()
+    event_kind: int = place("fired")  # −1: none
+    event_index: int = place("fired")
+    seen: Reals = reals(  # who was closed, stuck, … at an earlier switch of this instant, and the state
+        lambda s: 1 + 2 * s.n_contacts + 2 * s.n_frictions + s.n_guards + s.n_q + s.n, kept=True
+    )
+    seen_at: float = place("seen")  # at which one, 0 for none
+    n_switches: int = place("state")  # at this instant
+    last_switch: float = place("clock")
+    in_substeps: int = place("state")  # 1: within a step that is taken in substeps
+    substep: float = place("clock")  # the size of such a step
+    crowding: float = place("clock")  # how much located impacts crowd
+    crowding_time: float = place("clock")  # when that was counted last
+    fallback: int = place("state")  # 1: non-smooth steps followed as impacts crowded, 2: as locating could not go on
+    fallback_time: float = place("clock")  # since when
+    restarted_here: int = place("state")  # 1: at the accepted state, as a contact seemed to pull in the step
+
+
+class ContactRows(Frictions, Model):
+    """Contacts and frictions, with what the model says of their rows."""
+
+
+class Mechanism(ContactRows, Motion):
+    """All that model code is evaluated at: the motion, and which contacts and frictions act."""
+
+
+class Guards(Events, Mechanism):
+    """What is watched, at the state at which it is watched."""

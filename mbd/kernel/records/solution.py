@@ -1,0 +1,152 @@
+"""Forces and impulses, dependent rows, systems of equations, results; and what functions that solve or switch take."""
+
+from __future__ import annotations
+
+from mbd.kernel.records.contacts import ContactRows, Guards, Mechanism
+from mbd.kernel.records.declare import Integers, Reals, integers, place, reals
+from mbd.kernel.records.settings import SchemeAbilities
+from mbd.kernel.records.state import Memory, Motion
+
+__all__ = [
+    "Balance", "Complementarity", "ContactForces", "DependentRows", "Equations", "LinearAlgebra", "Report", "Results",
+    "Singular", "SingularSteps", "Steps", "Switching",
+]  # fmt: skip
+
+
+class Complementarity(SchemeAbilities):
+    """Impacts and contact forces: velocities or accelerations, impulses or multipliers that go together."""
+
+    force: Reals = reals(lambda s: s.n)  # right-hand sides
+    bias: Reals = reals(lambda s: s.n_rows)
+    jump: Reals = reals(lambda s: s.n)  # velocities or accelerations
+    impulse: Reals = reals(lambda s: s.n_rows)  # multipliers
+    given: Reals = reals(lambda s: s.n_rows)  # phases of an impact
+    total: Reals = reals(lambda s: s.n_rows)
+    total_jump: Reals = reals(lambda s: s.n)
+    loads: Reals = reals(lambda s: s.n_rows)
+    trial: Reals = reals(lambda s: s.n_rows)
+    trial_given: Reals = reals(lambda s: s.n_rows)
+    trial_jump: Reals = reals(lambda s: s.n)
+    kept: Reals = reals(  # what a non-smooth step began from
+        lambda s: s.n_q + 2 * s.n + s.n_rows + s.n_watched + s.n_anchors + s.n_frictions
+    )
+    kept_flags: Integers = integers(
+        lambda s: 3 * s.n_contacts + 3 * s.n_frictions
+    )  # and who was closed before an event
+    before: Reals = reals(lambda s: s.n_contacts)  # gap rates before a non-smooth step
+    past: Reals = reals(lambda s: s.n_rows)  # impulses of its smooth part
+    past_limit: Reals = reals(lambda s: s.n_frictions)  # and largest frictions
+    past_time: float = place("detail")  # that they cover
+    n_repeats: int = place("state")  # of a non-smooth step
+    lcp_matrix: Reals = reals(lambda s: s.n_lcp * s.n_lcp)  # Lemke's method
+    lcp_shift: Reals = reals(lambda s: s.n_lcp)
+    lcp_found: Reals = reals(lambda s: s.n_lcp)
+    lcp_work: Reals = reals(lambda s: s.n_lcp * (2 * s.n_lcp + 4))
+    lcp_limit: Reals = reals(lambda s: s.n_frictions)
+    lcp_slope: Reals = reals(lambda s: s.n_frictions)
+    lcp_rows: Integers = integers(lambda s: s.n_contacts + s.n_frictions)
+    lcp_who: Integers = integers(lambda s: s.n_contacts + s.n_frictions)
+    lcp_basis: Integers = integers(lambda s: s.n_lcp)
+
+
+class Singular(SchemeAbilities):
+    """Rows that depend on others, for good or near a singular configuration."""
+
+    dropped: Integers = integers(lambda s: s.n_rows, kept=True)  # 1: a row that depends on others
+    n_dropped: int = place("state")
+    basis: Reals = reals(lambda s: (s.n_rows + 1) * s.n)  # dependent rows as combinations of others
+    lower: Reals = reals(lambda s: (s.n_rows + 1) * s.n_rows)
+    mix: Reals = reals(lambda s: s.n_rows * s.n_rows, kept=True)
+    shares: Reals = reals(lambda s: s.n_rows * s.n_rows)  # of the loads that they bear
+    support: Integers = integers(lambda s: s.n_rows * (s.n + 2))  # of each row of the basis: entries that are not zero
+    left: Reals = reals(lambda s: s.n_rows + 1, kept=True)  # of each row beside the earlier ones, at the accepted state
+    left1: Reals = reals(lambda s: s.n_rows + 1)  # and at the candidate; not of the Newmark family
+    near_singular: int = place("state")  # 1: within a few steps of a singular configuration, 2: just beyond it
+    singular_time: float = place("clock")  # when the constraint Jacobian will lose rank
+    inverse_pivot: float = place("detail")  # the largest of rows in the last step
+    velocity_noise: float = place("detail")  # what round-off makes of velocities there
+
+
+class LinearAlgebra(SchemeAbilities):
+    """What systems of equations are solved in."""
+
+    kkt: Reals = reals(lambda s: s.n_kkt * s.n_kkt)
+    rhs: Reals = reals(lambda s: s.n_kkt)
+    work: Reals = reals(lambda s: 3 * s.n_kkt)
+    spare: Reals = reals(lambda s: 2 * s.n_kkt * (s.n_kkt + 1) + s.n + 2 * s.n_rows + s.n_rows * s.n)
+    pivots: Integers = integers(lambda s: s.n_kkt)
+    columns: Integers = integers(lambda s: s.n_kkt)
+
+
+class Results(SchemeAbilities):
+    """Rows of results and the log of events."""
+
+    store: Reals = reals(lambda s: s.capacity * s.width)
+    row_bounds: Reals = reals(lambda s: 1 + s.n_contacts)  # largest change between rows, then λ_N of each contact
+    n_stored: int = place("state")
+    steps_since_row: int = place("state")
+    log: Reals = reals(lambda s: s.event_capacity * s.event_width)
+    n_logged: int = place("state")
+
+
+class Report(SchemeAbilities):
+    """Counts, and what a failure tells."""
+
+    detail: Reals = reals(kept=True)
+    failure_time: float = place("detail")
+    failure_size: float = place("detail")  # its residual, or whatever is too large
+    failure_step: float = place("detail")
+    failure_index: int = place("state")  # contact, column or row
+    unforeseen_change: float = place("detail")  # growth of rates that nothing foretold: see `mbd.kernel.resolution`
+    coarse_start: float = place("detail")  # where the last of the steps `n_coarse` began
+    coarsest_end: float = place("detail")  # where the one with the largest change ended
+    coarsest_change: float = place("detail")
+    least_pivot: float = place("detail")  # of the equations of accelerations since the last start, scaled
+    lost_digits: float = place("detail")  # relative error of accelerations that were known there
+    counts: Integers = integers()
+    n_steps: int = place("counts")
+    n_iterations: int = place("counts")
+    n_tangents: int = place("counts")
+    n_residuals: int = place("counts")
+    n_factorizations: int = place("counts")
+    n_events: int = place("counts")
+    n_restarts: int = place("counts")
+    n_impacts: int = place("counts")
+    n_locations: int = place("counts")
+    n_stagnations: int = place("counts")
+    n_careful: int = place("counts")
+    n_shortened: int = place("counts")
+    n_energetic_impacts: int = place("counts")
+    n_endless: int = place("counts")
+    n_pivoted: int = place("counts")  # factorizations by the pivoted LU where a fixed order was not sound
+    n_rejected: int = place("counts")
+    n_lost: int = place("counts")  # rows and lines for which there was no room: none, as `room_to_log` sees to
+    n_coarse: int = place("counts")  # steps whose rates changed otherwise than was foreseen by more than a fifth
+
+
+class ContactForces(Complementarity, ContactRows):
+    """Forces or impulses of contacts and frictions, with M and B of the model."""
+
+
+class Equations(Report, LinearAlgebra, Motion):
+    """Systems of equations at a state, and what comes of solving them."""
+
+
+class Steps(Memory, Equations):
+    """What a scheme steps with."""
+
+
+class DependentRows(Singular, Mechanism, Equations):
+    """Equations with rows that depend on others, on some of which frictions slide."""
+
+
+class SingularSteps(DependentRows, Steps):
+    """What a scheme steps with beside and over singular configurations."""
+
+
+class Balance(ContactForces, DependentRows):
+    """Consistent accelerations and multipliers, or velocities and impulses, of the whole mechanism."""
+
+
+class Switching(Results, Guards, Balance):
+    """What happens at events: all but the memory of the scheme."""
