@@ -9,9 +9,9 @@ from benchmarks.compiling import MODES
 from benchmarks.figures import Figure
 from benchmarks.walkers import compass, kneed_model, seven
 from mbd.equations import programs
+from mbd.equations.cost import operations as total
 from mbd.equations.derivation import derive
 from mbd.kernel.active_set import ActiveSetManager
-from mbd.tape.counts import total
 
 __all__ = ["measure"]
 

@@ -8,7 +8,8 @@ from collections.abc import Callable
 import mbd
 from mbd.errors import AssemblyError
 from mbd.hardcases.redundant_rows import bricard, parallel_cranks
-from mbd.testing.mechanisms import furnished, random_loop, random_tree
+from mbd.testing.mechanisms import random_loop, random_tree
+from tests.equations.mechanisms import furnished
 
 __all__ = ["KINDS"]
 

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mbd.arrays import Matrix
 from mbd.integrators.base import Integrator
 from mbd.integrators.family import Coefficients, NewmarkFamily
 
-__all__ = ["ClosedForm", "amplification_in_closed_form", "closed_form"]
+__all__ = ["ClosedForm", "closed_form"]
 
 
 @dataclass(frozen=True)
@@ -24,18 +23,6 @@ class ClosedForm:
     damping_coefficient: float
     elongation_order: int
     elongation_coefficient: float
-
-
-def amplification_in_closed_form(k: Coefficients, turn: float, damping: float = 0.0) -> Matrix:
-    """(3, 3) what a step does to (u, dt u̇, dt² a), with ω dt = `turn` and ξ = `damping`.
-
-    ``u₁ = u₀ + dt u̇₀ + dt² ((½−β) a₀ + β a₁)``, ``u̇₁ = u̇₀ + dt ((1−γ) a₀ + γ a₁)`` and
-    ``(1−α_m) a₁ + α_m a₀ + (1−α_f) (2ξω u̇ + ω² u)₁ + α_f (2ξω u̇ + ω² u)₀ = 0`` (Chung & Hulbert 1993, eqs. 1-5).
-    """
-    c, s, f, m = 2.0 * damping * turn, turn * turn, k.alpha_f, k.alpha_m
-    left = np.array([[1.0, 0.0, -k.beta], [0.0, 1.0, -k.gamma], [(1 - f) * s, (1 - f) * c, 1 - m]])
-    right = np.array([[1.0, 1.0, 0.5 - k.beta], [0.0, 1.0, 1.0 - k.gamma], [-f * s, -f * c, -m]])
-    return np.asarray(np.linalg.solve(left, right))
 
 
 def closed_form(integrator: Integrator) -> ClosedForm | None:

@@ -51,8 +51,8 @@ from mbd.errors import CapabilityError, ModelError
 from mbd.tape.node import Node
 
 __all__ = [
-    "HASTY", "LEVEL", "Build", "Library", "Machine", "MachineFunction", "cached_object", "call", "compile_functions",
-    "emit_object", "load_object",
+    "HASTY", "LEVEL", "Build", "Library", "Machine", "MachineFunction", "cached_object", "call", "emit_object",
+    "load_object",
 ]  # fmt: skip
 
 LEVEL = 2
@@ -343,19 +343,3 @@ def _sizes(outputs: Sequence[Node], layout: Layout) -> tuple[int, int, int]:
         last = outputs[0].tape.tables[len(layout.table_offsets) - 1]
         parameters = layout.table_offsets[-1] + 5 * len(last.breaks)
     return layout.size, parameters, len(outputs)
-
-
-def compile_functions(
-    programs: Mapping[str, Sequence[Node]], layout: Layout, level: int = LEVEL, cache: ObjectCache | None = None
-) -> Library:
-    """A library with one function per program, all in one object file.
-
-    Parameters
-    ----------
-    programs : names and what each function writes to ``out``
-    level : optimization level 0 … 3
-    cache : where object files are kept; that of the user by default, ``ObjectCache()`` for none
-    """
-    library = Library(layout, level, cache)
-    library.add(programs)
-    return library

@@ -12,7 +12,7 @@ from mbd.errors import TraceError
 from mbd.tape.node import CONDITIONS, Node, Scalar, Tape
 from mbd.tape.sympy import lower
 
-__all__ = ["Argument", "traced", "traced_scalar", "traced_vector"]
+__all__ = ["Argument", "traced", "traced_scalar"]
 
 Argument: TypeAlias = tuple[str, Scalar | Sequence[Scalar]]
 """Name and value of what a user's function is called with; a value is a scalar or a triple."""
@@ -64,22 +64,6 @@ def traced_scalar(
     if isinstance(result, Node):
         return result
     raise TraceError(f"{what}: one number is expected, {len(result)} came from {_title(function)}")
-
-
-def traced_vector(
-    function: Any,
-    arguments: Sequence[Argument],
-    what: str,
-    tape: Tape,
-    size: int = 3,
-    symbols: Mapping[Any, Scalar] | None = None,
-) -> tuple[Node, ...]:
-    """`traced` where `size` scalars are expected."""
-    result = traced(function, arguments, what, tape, None, symbols)
-    if isinstance(result, tuple) and len(result) == size:
-        return result
-    came = f"{len(result)} numbers" if isinstance(result, tuple) else "one number"
-    raise TraceError(f"{what}: {size} numbers are expected, {came} came from {_title(function)}")
 
 
 # plain functions ----------------------------------------------------------------------------------------------------

@@ -9,11 +9,11 @@ from dataclasses import replace
 from typing import Any
 
 import mbd
-from mbd.bodies.base import Body, Frame
+from mbd.bodies.base import Frame
 from mbd.bodies.ground import Ground
 from mbd.joints.base import Joint
 
-__all__ = ["furnished", "random_body", "random_frame", "random_joint", "random_loop", "random_scene", "random_tree"]
+__all__ = ["random_body", "random_frame", "random_joint", "random_loop", "random_scene", "random_tree"]
 
 
 def random_body(rng: random.Random, name: str, spatial: bool) -> mbd.RigidBody:
@@ -78,32 +78,6 @@ def random_tree(seed: int, bodies: int, spatial: bool, most: int = 6, turned: fl
         coordinates += len(joint.labels)
         model.connect(joint)
         known.append(body)
-    return model
-
-
-def furnished(model: mbd.Model, seed: int) -> mbd.Model:
-    """The model with a spring, a damper, applied forces, and rows between its last body and the ground."""
-    rng = random.Random(seed)
-    bodies = [body for body in model.bodies.values() if body is not model.ground]
-    last, first = bodies[-1], bodies[0]
-    spatial = any(joint.is_planar is False for joint in model.joints)
-
-    def point(body: Body) -> Frame:
-        return body.point(rng.uniform(-0.5, 0.5), rng.uniform(-0.5, 0.5), rng.uniform(-0.5, 0.5) if spatial else 0.0)
-
-    anchor = model.ground.point(2.0, 1.5, 0.7 if spatial else 0.0)
-    model.apply(
-        mbd.Spring("spring", anchor, point(last), stiffness=7.0, length=0.8),
-        mbd.Damper("damper", point(model.ground), point(last), mbd.Viscous(0.7) + mbd.Quadratic(0.3)),
-        mbd.Applied("push", point(last), force=lambda t, p: (mbd.sin(t) * p[0], 2.0, 0.3 * t), torque=(0.3, -0.2, 0.5),
-                    arguments=("t", point(first))),
-        mbd.Potential("well", lambda p: 0.5 * p[0] * p[0] * p[1], arguments=(point(last),)),
-    )  # fmt: skip
-    model.constrain(
-        mbd.Bilateral("rod", mbd.distance(model.ground.point(3.0, 2.0), point(last)), value=lambda t: 2.0 + 0.1 * t**2),
-        mbd.Unilateral("foot", mbd.touchdown(point(last), ground=lambda x: 0.1 * mbd.sin(x))),
-        mbd.Penalty("pad", mbd.height(point(last)), stiffness=50.0, damping=2.0, exponent=2),
-    )
     return model
 
 

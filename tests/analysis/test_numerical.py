@@ -11,7 +11,6 @@ from scipy.optimize import brentq
 
 import mbd
 from mbd.analysis.amplification import amplification_matrix
-from mbd.analysis.closed_forms import amplification_in_closed_form
 from mbd.analysis.numerical import criteria, plot, spectrum
 from mbd.integrators import Integrator, StepReport, StepResult
 from mbd.integrators.base import consistent_rates
@@ -37,6 +36,18 @@ SCHEMES = {
 }
 DAMPED = [(name, xi) for name in SCHEMES for xi in (0.0, 0.05) if any(f"{name}, xi={xi:g}" in q for q in I1.quantities)]
 FEW = (0.1, 1.0)
+
+
+def amplification_in_closed_form(k: Coefficients, turn: float, damping: float = 0.0) -> np.ndarray:
+    """(3, 3) what a step does to (u, dt u̇, dt² a), with ω dt = `turn` and ξ = `damping`.
+
+    ``u₁ = u₀ + dt u̇₀ + dt² ((½−β) a₀ + β a₁)``, ``u̇₁ = u̇₀ + dt ((1−γ) a₀ + γ a₁)`` and
+    ``(1−α_m) a₁ + α_m a₀ + (1−α_f) (2ξω u̇ + ω² u)₁ + α_f (2ξω u̇ + ω² u)₀ = 0`` (Chung & Hulbert 1993, eqs. 1-5).
+    """
+    c, s, f, m = 2.0 * damping * turn, turn * turn, k.alpha_f, k.alpha_m
+    left = np.array([[1.0, 0.0, -k.beta], [0.0, 1.0, -k.gamma], [(1 - f) * s, (1 - f) * c, 1 - m]])
+    right = np.array([[1.0, 1.0, 0.5 - k.beta], [0.0, 1.0, 1.0 - k.gamma], [-f * s, -f * c, -m]])
+    return np.asarray(np.linalg.solve(left, right))
 
 
 @pytest.fixture(scope="module")

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from mbd.compile.cache import ObjectCache
 from mbd.compile.layout import Layout
+from mbd.compile.llvm import LEVEL, Library
 from mbd.tape.derivatives import jvp
 from mbd.tape.functions import cos, sin
 from mbd.tape.node import Node, Scalar, Tape
 
-__all__ = ["Chain", "chain"]
+__all__ = ["Chain", "chain", "compile_functions"]
 
 
 @dataclass(frozen=True)
@@ -70,3 +73,19 @@ def chain(n: int) -> Chain:
     tangent = [columns[j][i] for i in range(n) for j in range(n)]
     layout = Layout(n, n, 0, 0, 0, 0, 1 + 3 * n)
     return Chain(tape, layout, tuple(balance), tuple(tangent), tape.lift(energy))
+
+
+def compile_functions(
+    programs: Mapping[str, Sequence[Node]], layout: Layout, level: int = LEVEL, cache: ObjectCache | None = None
+) -> Library:
+    """A library with one function per program, all in one object file.
+
+    Parameters
+    ----------
+    programs : names and what each function writes to ``out``
+    level : optimization level 0 … 3
+    cache : where object files are kept; that of the user by default, ``ObjectCache()`` for none
+    """
+    library = Library(layout, level, cache)
+    library.add(programs)
+    return library

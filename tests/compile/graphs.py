@@ -14,7 +14,6 @@ import numpy as np
 from hypothesis import strategies as st
 
 from mbd.arrays import Vector
-from mbd.compile.c import source
 from mbd.compile.host import host
 from mbd.compile.ir import module
 from mbd.compile.layout import Layout
@@ -23,6 +22,7 @@ from mbd.errors import TraceError
 from mbd.tape.derivatives import live
 from mbd.tape.node import CONDITIONS, Node, Tape
 from mbd.tape.operations import value
+from tests.compile.c_source import source
 
 __all__ = ["COMPILER", "Graph", "against", "by_c", "by_llvm", "close", "graphs", "inputs_of", "run"]
 

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from mbd.compile.c import source
 from mbd.compile.layout import Layout
 from mbd.compile.python import array_function, scalar_function
 from mbd.errors import ModelError, UnknownNameError
 from mbd.tape.node import CONDITIONS, Tape
+from tests.compile.c_source import source
 from tests.compile.chains import chain
 from tests.compile.graphs import COMPILER, LAYOUT, Graph, against, by_c, by_llvm, graphs, inputs_of, run
 

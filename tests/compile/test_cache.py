@@ -15,8 +15,8 @@ import pytest
 from mbd.compile import cache as caching, llvm
 from mbd.compile.cache import ObjectCache, default_cache, key_of
 from mbd.compile.host import host
-from mbd.compile.llvm import Library, compile_functions
-from tests.compile.chains import chain
+from mbd.compile.llvm import Library
+from tests.compile.chains import chain, compile_functions
 from tests.compile.test_llvm import results
 
 LINKS = chain(2)

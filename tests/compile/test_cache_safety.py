@@ -16,8 +16,7 @@ import pytest
 
 from mbd.compile import cache as caching, llvm
 from mbd.compile.cache import ObjectCache, default_cache
-from mbd.compile.llvm import compile_functions
-from tests.compile.chains import chain
+from tests.compile.chains import chain, compile_functions
 from tests.compile.test_llvm import results
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="rights are of another kind there")

@@ -15,11 +15,11 @@ from mbd.compile.host import host
 from mbd.compile.instructions import MANY_ZEROS
 from mbd.compile.ir import LARGE, module
 from mbd.compile.layout import Layout
-from mbd.compile.llvm import Library, call, compile_functions, emit_object, load_object
+from mbd.compile.llvm import Library, call, emit_object, load_object
 from mbd.errors import ModelError, UnknownNameError
 from mbd.tape.functions import cos, sin
 from mbd.tape.node import Tape
-from tests.compile.chains import chain
+from tests.compile.chains import chain, compile_functions
 from tests.compile.graphs import by_llvm, graphs, run
 
 NONE = ObjectCache()

@@ -12,12 +12,12 @@ from mbd.bodies.base import Frame
 from mbd.equations import derive, programs
 from mbd.equations.tangents import seeded
 from mbd.joints.base import Joint, Label
-from mbd.tape.counts import total
 from mbd.tape.node import Tape
 from mbd.testing.mechanisms import random_loop, random_scene
 from tests.equations.mechanisms import four_bar, furnished, leg, random_tree, walker
 from tests.equations.numbers import at, inputs
 from tests.equations.test_states import model as pulled
+from tests.tape.counts import total
 
 
 def flat(columns):

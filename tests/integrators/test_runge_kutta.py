@@ -15,9 +15,9 @@ from mbd.integrators.runge_kutta import RungeKutta853
 from mbd.kernel.schemes.dormand_prince import END, FIFTH, NODES, STAGES, THIRD, WEIGHTS
 from mbd.results.interpolation import Grid
 from mbd.results.polynomials import quintic
-from mbd.testing.wild import wild_scene
 from tests.integrators.test_order import double_pendulum
 from tests.simulation.mechanisms import ball, kneed_walker, kneed_walker_start, pendulum, run
+from tests.simulation.wild import wild_scene
 
 SCHEME = mbd.RungeKutta853()
 T = 1.0

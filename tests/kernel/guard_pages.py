@@ -23,9 +23,9 @@ import mbd
 from mbd.kernel.records import TABLE
 from mbd.simulation.run import run, stepper
 from mbd.simulation.run.stepper import Stepper
-from mbd.testing.wild import wild_scene
 from mbd.trajectory import Trajectory
 from tests.kernel.test_room_to_log import sliders
+from tests.simulation.wild import wild_scene
 
 __all__ = ["between_guards", "guard_every_call", "wild"]
 

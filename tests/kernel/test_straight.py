@@ -14,9 +14,9 @@ from mbd.compile.postponed import Postponed
 from mbd.equations import programs
 from mbd.equations.derivation import derive
 from mbd.tape import elimination
-from mbd.tape.counts import total
 from tests.simulation.mechanisms import box, kneed_walker, kneed_walker_start, run
 from tests.simulation.singular import slider_crank
+from tests.tape.counts import total
 
 SCHEMES = (
     mbd.HHT(0.05),

@@ -16,7 +16,7 @@ from queue import Empty, Queue
 import numpy as np
 
 import mbd
-from mbd.testing.wild import wild_scene
+from tests.simulation.wild import wild_scene
 
 __all__ = ["complaints", "run_batch", "verdict"]
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import mbd
-from mbd.testing.wild import wild_scene
 from tests.helpers import altered
 from tests.simulation.judging import complaints, explains, run_batch, verdict
+from tests.simulation.wild import wild_scene
 
 SHAPES, SCENES = 120, 2000
 QUICK = [shape + SHAPES * k for shape in range(12) for k in range(1, 6)]

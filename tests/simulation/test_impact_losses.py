@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import mbd
-from mbd.testing.wild import wild_scene
 from tests.simulation.mechanisms import kneed_walker, kneed_walker_start
+from tests.simulation.wild import wild_scene
 
 
 @cache

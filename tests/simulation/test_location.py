@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import mbd
-from mbd.testing.wild import wild_scene
 from tests.simulation.mechanisms import G, ball, falling, kneed_walker, kneed_walker_start, run, two_balls
+from tests.simulation.wild import wild_scene
 
 DROP = np.sqrt(2.0 / G)
 """When a ball dropped from 1 m lands [s]."""

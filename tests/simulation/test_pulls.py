@@ -8,8 +8,8 @@ import pytest
 import mbd
 from mbd.kernel.events import same_instant
 from mbd.kernel.records import Kernel
-from mbd.testing.wild import wild_scene
 from tests.simulation.judging import complaints
+from tests.simulation.wild import wild_scene
 
 SCHEMES = [mbd.HHT(), mbd.Newmark(), mbd.GeneralizedAlpha(0.8), mbd.HHT(0.1, formulation="index3"), mbd.RadauIIA(),
            mbd.RungeKutta853()]  # fmt: skip

@@ -5,11 +5,11 @@ import math
 import pytest
 from hypothesis import given, strategies as st
 
-from mbd.tape.counts import total
 from mbd.tape.derivatives import gradient, jvp, jvps, vjp
 from mbd.tape.evaluate import evaluate
 from mbd.tape.functions import atan2, log, maximum, minimum, sqrt, where
 from mbd.tape.node import Tape
+from tests.tape.counts import total
 from tests.tape.graphs import FUNCTIONS, build, exact, mp, programs
 
 directions = st.lists(st.sampled_from([0.0, 1.0, -1.0, 0.5, 2.0]), min_size=3, max_size=3)

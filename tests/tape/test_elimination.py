@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, strategies as st
 
-from mbd.tape.counts import operations, total
 from mbd.tape.elimination import factors
 from mbd.tape.evaluate import evaluate
 from mbd.tape.node import Tape
+from tests.tape.counts import operations, total
 
 seeds = st.integers(0, 2**32 - 1)
 

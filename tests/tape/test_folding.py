@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 
 from mbd.errors import TraceError
-from mbd.tape.counts import operations, total
 from mbd.tape.derivatives import substitute
 from mbd.tape.evaluate import evaluate
 from mbd.tape.functions import cos, sin, where
 from mbd.tape.node import Tape
+from tests.tape.counts import operations, total
 from tests.tape.graphs import build, exact, programs
 
 

@@ -6,11 +6,11 @@ import pytest
 import sympy as sp
 from hypothesis import given, settings
 
-from mbd.tape.counts import operations
 from mbd.tape.evaluate import evaluate
 from mbd.tape.functions import where
 from mbd.tape.node import Tape
 from mbd.tape.sympy import lower, raise_to_sympy
+from tests.tape.counts import operations
 from tests.tape.graphs import build, exact, programs
 
 x, y = sp.symbols("x y", real=True)

@@ -10,7 +10,7 @@ from mbd.errors import TraceError
 from mbd.tape.evaluate import evaluate
 from mbd.tape.functions import sin, where
 from mbd.tape.node import Tape
-from mbd.tape.tracing import traced, traced_scalar, traced_vector
+from mbd.tape.tracing import traced, traced_scalar
 
 
 @pytest.fixture
@@ -43,11 +43,8 @@ def test_several_results_become_a_tuple(scene, function):
     t, point = arguments[0][1], arguments[2][1]
     result = traced(function, arguments, "f", tape)
     assert result[0] is t and result[1].data == 2.0 and result[2] is point[0]
-    assert traced_vector(function, arguments, "f", tape) == result
     with pytest.raises(TraceError, match="f: one number is expected, 3 came"):
         traced_scalar(function, arguments, "f", tape)
-    with pytest.raises(TraceError, match="f: 2 numbers are expected, 3 numbers came"):
-        traced_vector(function, arguments, "f", tape, size=2)
 
 
 def test_a_number_is_a_constant_or_a_parameter(scene):

@@ -16,8 +16,8 @@ import mbd
 from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import ModelError
 from mbd.integrators import Integrator
-from mbd.testing.shapes import SHAPES, Shape
 from mbd.trajectory import Trajectory
+from tests.simulation.wild_shapes import SHAPES, Shape
 
 __all__ = ["WildScene", "wild_scene"]
 

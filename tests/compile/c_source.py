@@ -1,4 +1,4 @@
-"""Tape outputs → C source, for users who carry a model elsewhere and for benchmarks against a C compiler.
+"""Tape outputs → C source: what a C compiler makes of them is held against the other backends.
 
 Compile with ``-ffp-contract=off`` (gcc contracts by default) to get the numbers of the other backends to round-off.
 """
