@@ -25,10 +25,8 @@ def project_velocity(K: Balance, t: float, q: Reals, y: Reals, m: int, dropping:
         return 0
     evaluate(K, t, q, y)
     o_rate = K.acc_rate
-    for i in range(K.n):
-        K.force[i] = 0.0
-    for k in range(K.n_rows):
-        K.bias[k] = K.acc[o_rate + k]
+    K.force[: K.n] = 0.0
+    K.bias[: K.n_rows] = K.acc[o_rate : o_rate + K.n_rows]
     status = correct_velocities(K, y, m, dropping)
     if status == 0:
         for i in range(K.n):
@@ -88,15 +86,13 @@ def balance(K: Balance) -> None:
     """Accelerations from the multipliers K.lam at the accepted state, where M determines them."""
     n = K.n
     evaluate(K, K.time, K.q, K.y)
-    for i in range(n):
-        K.force[i] = K.acc[K.acc_f + i]
+    K.force[:n] = K.acc[K.acc_f : K.acc_f + n]
     for k in range(active_rows(K, K.closed)):
         row = K.rows[k]
         for i in range(n):
             K.force[i] += K.acc[K.acc_R + i * K.n_rows + row] * K.lam[row]
     if solve_rows(K, 0, False) == 0:
-        for i in range(n):
-            K.rate[i] = K.jump[i]
+        K.rate[:n] = K.jump[:n]
 
 
 def accept_for_restart(K: Switching, t1: float) -> None:
@@ -109,13 +105,10 @@ def accept_for_restart(K: Switching, t1: float) -> None:
     accept_candidate(K, t1)
     status = project_velocity(K, t1, K.q, K.y, active_rows(K, K.closed), True)
     if status == 0 and K.stabilized == 0 and turns_to_pull(K):
-        for i in range(K.n):
-            K.y[i] = K.y1[i]
+        K.y[: K.n] = K.y1[: K.n]
     if status == 0 and consistent(K, t1, K.q, K.y) == 0:
         if would_pull(K):
             balance(K)
             return
-        for i in range(K.n):
-            K.rate[i] = K.jump[i]
-        for k in range(K.n_rows):
-            K.lam[k] = K.impulse[k]
+        K.rate[: K.n] = K.jump[: K.n]
+        K.lam[: K.n_rows] = K.impulse[: K.n_rows]

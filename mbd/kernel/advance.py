@@ -64,8 +64,7 @@ def accept(K: Kernel, h: float, t1: float, quiet: bool) -> None:
 
 def forget_found(K: Guards) -> None:
     """No guard has been found to be no event yet, but for events that the step passes."""
-    for c in range(K.n_contacts + K.n_guards + K.n_frictions):
-        K.active[c] = 0
+    K.active[: K.n_contacts + K.n_guards + K.n_frictions] = 0
     for e in range(K.n_guards):
         K.active[K.n_contacts + e] = 1 if K.crossed[e] >= 0.0 else 0
 
@@ -162,10 +161,8 @@ def calm(K: Switching) -> bool:
         return False
     if consistent(K, K.time, K.q, K.y) != 0:
         return False
-    for i in range(K.n):
-        K.rate[i] = K.jump[i]
-    for k in range(K.n_rows):
-        K.lam[k] = K.impulse[k]
+    K.rate[: K.n] = K.jump[: K.n]
+    K.lam[: K.n_rows] = K.impulse[: K.n_rows]
     K.restarted_here = 1
     K.restart_due = 2
     return True

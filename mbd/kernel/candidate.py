@@ -28,17 +28,14 @@ def accept_candidate(K: Guards, t1: float) -> None:
 
 def accept_guards(K: Events) -> None:
     """Guards of the candidate become those of the accepted state."""
-    for i in range(K.n_watched):
-        K.guards0[i] = K.guards1[i]
+    K.guards0[: K.n_watched] = K.guards1[: K.n_watched]
 
 
 def revert_candidate(K: Kernel) -> None:
     """The candidate becomes the accepted state itself: an event at the very start of the step."""
     exchange(K, True)
-    for i in range(K.n):
-        K.aux1[i] = K.aux[i]
-    for i in range(K.n_watched):
-        K.guards1[i] = K.guards0[i]
+    K.aux1[: K.n] = K.aux[: K.n]
+    K.guards1[: K.n_watched] = K.guards0[: K.n_watched]
 
 
 def exchange(K: State, out: bool) -> None:

@@ -54,8 +54,7 @@ def refine_accelerations(K: Balance) -> int:
         left *= error
         if left < EPS:
             break
-    for i in range(n):
-        K.block[K.o_a + i] = K.jump[i]
+    K.block[K.o_a : K.o_a + n] = K.jump[:n]
     return 0
 
 
@@ -67,8 +66,7 @@ def known_error(K: Balance, m: int) -> float:
     """
     n = K.n
     o_B = K.acc_B
-    for i in range(n):
-        K.trial_jump[i] = K.jump[i]
+    K.trial_jump[:n] = K.jump[:n]
     for unit in range(3):
         size = 0.0
         for i in range(n):
@@ -85,8 +83,7 @@ def known_error(K: Balance, m: int) -> float:
                 part -= 1.0
             if K.unit[i] == unit:
                 K.jump[i] = size * (1.0 + part if i % 2 == 0 else -1.0 - part)
-    for i in range(n):
-        K.force[i] = K.jump[i]
+    K.force[:n] = K.jump[:n]
     for k in range(m):
         K.work[k] = 0.0
         for i in range(n):
@@ -98,8 +95,7 @@ def known_error(K: Balance, m: int) -> float:
     find_imbalance(K)
     for i in range(n):
         K.rhs[i] -= K.out[i]
-    for k in range(m):
-        K.rhs[n + k] = K.work[k]
+    K.rhs[n : n + m] = K.work[:m]
     solve_kkt(K, n + m, K.rhs)
     worst = 0.0
     for i in range(n):

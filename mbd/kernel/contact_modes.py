@@ -59,8 +59,7 @@ def resolve_contact_modes(K: Switching) -> int:
     """
     find_slips(K)
     evaluate(K, K.time, K.q, K.y)
-    for k in range(K.n_rows):
-        K.impulse[k] = K.lam[k]
+    K.impulse[: K.n_rows] = K.lam[: K.n_rows]
     for c in range(K.n_contacts):
         K.active[c] = 1 if (K.closed[c] == 1 and K.kind[c] == 0) else 0
         K.free[c] = 0
@@ -75,10 +74,8 @@ def resolve_contact_modes(K: Switching) -> int:
             return NO_FORCE
     if status != 0:
         return status
-    for i in range(K.n):
-        K.rate[i] = K.jump[i]
-    for k in range(K.n_rows):
-        K.lam[k] = K.impulse[k]
+    K.rate[: K.n] = K.jump[: K.n]
+    K.lam[: K.n_rows] = K.impulse[: K.n_rows]
     for c in range(K.n_contacts):
         K.touched[c] = 0
         if K.kind[c] == 0 and K.active[c] != K.closed[c]:
@@ -186,10 +183,8 @@ def find_painleve_contacts(K: Balance) -> int:
             slope = K.acc[o_B + normal * n + j]
             gained += slope * K.jump[j]
             alone += slope * slope / K.acc[j * n + j] if K.acc[j * n + j] > 0.0 else 0.0
-        for i in range(n):
-            K.jump[i] = K.trial_jump[i]
-        for k in range(K.n_rows):
-            K.impulse[k] = K.trial[k]
+        K.jump[:n] = K.trial_jump[:n]
+        K.impulse[: K.n_rows] = K.trial[: K.n_rows]
         if status == 0 and gained < -1e-9 * alone:
             return int(c)
     return -1

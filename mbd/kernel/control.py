@@ -106,8 +106,7 @@ def controlled_step(K: Kernel, h: float) -> int:
             h = singular_step_size(K, wanted, 1.0)
             if is_too_noisy(K, h):
                 return SINGULAR_ROWS_MOVE
-        for i in range(K.n_v + K.n):
-            K.error[i] = 0.0
+        K.error[: K.n_v + K.n] = 0.0
         status = try_step(K, h, t + h)
         if status == 0:
             scheme_error(K, h)

@@ -46,8 +46,7 @@ def parts_to_take(K: Switching, h: float) -> int:
             answer = part
             break
         accept_guards(K)
-        for k in range(K.n_rows):
-            K.lam[k] = K.lam1[k]
+        K.lam[: K.n_rows] = K.lam1[: K.n_rows]
     copy_ends(K, False)
     K.event_kind = -1
     return answer
@@ -111,10 +110,8 @@ def look_at(K: Switching, t: float, h: float, s: float, asked: bool) -> None:
         K.rate1[i] = (slope + 60.0 * gap / h * s * (1.0 - s) * (1.0 - 2.0 * s)) / h
     compose(K, K.q1)
     if asked and consistent(K, t + s * h, K.q1, K.y1) == 0:
-        for i in range(K.n):
-            K.rate1[i] = K.jump[i]
-        for k in range(K.n_rows):
-            K.lam1[k] = K.impulse[k]
+        K.rate1[: K.n] = K.jump[: K.n]
+        K.lam1[: K.n_rows] = K.impulse[: K.n_rows]
     watch(K, t + s * h, K.q1, K.y1, K.rate1, K.lam1, K.guards1)
 
 

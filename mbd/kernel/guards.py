@@ -71,10 +71,8 @@ APART = 1e-6
 def watch(K: Mechanism, t: float, q: Reals, y: Reals, rate: Reals, lam: Reals, values: Reals) -> None:
     """Gaps, gap rates, penalty forces, conditions and user guards at a state."""
     fill_block(K, t, q, y)
-    for i in range(K.n):
-        K.block[K.o_a + i] = rate[i]
-    for k in range(K.n_rows):
-        K.block[K.o_lam + k] = lam[k]
+    K.block[K.o_a : K.o_a + K.n] = rate[: K.n]
+    K.block[K.o_lam : K.o_lam + K.n_rows] = lam[: K.n_rows]
     call(K, GUARDS, values)
 
 
@@ -98,10 +96,8 @@ def try_step(K: Kernel, h: float, t1: float) -> int:
         if status != 0:
             return status
     if K.n_watched > 0:
-        for i in range(K.n_q):
-            K.block[K.o_q + i] = K.q1[i]
-        for i in range(K.n_v):
-            K.block[K.o_x + i] = 0.0
+        K.block[K.o_q : K.o_q + K.n_q] = K.q1[: K.n_q]
+        K.block[K.o_x : K.o_x + K.n_v] = 0.0
         call(K, GUARDS, K.guards1)
         finite = 0.0
         for i in range(K.n_watched):
@@ -122,8 +118,7 @@ def share_multipliers(K: DependentRows, t1: float) -> int:
         if K.dropped[k] == 1 and K.explicit == 0:  # the explicit one has shared them out already
             K.lam1[k] = 0.0
     minimum_norm_multipliers(K, K.lam1)
-    for k in range(K.n_rows):
-        K.block[K.o_lam + k] = K.lam1[k]
+    K.block[K.o_lam : K.o_lam + K.n_rows] = K.lam1[: K.n_rows]
     if departs(K):
         K.failure_time = t1
         K.failure_size = 0.0
@@ -133,8 +128,7 @@ def share_multipliers(K: DependentRows, t1: float) -> int:
 
 def brief_step(K: Balance, h: float, t1: float) -> int:
     """A step of Heun's method."""
-    for i in range(K.n):
-        K.rate1[i] = K.rate[i]
+    K.rate1[: K.n] = K.rate[: K.n]
     for _ in range(2):
         fill_block(K, K.time, K.q, K.y)
         for i in range(K.n_v):
@@ -145,8 +139,7 @@ def brief_step(K: Balance, h: float, t1: float) -> int:
         status = consistent(K, t1, K.q1, K.y1)
         if status != 0:
             return status
-        for i in range(K.n):
-            K.rate1[i] = K.jump[i]
+        K.rate1[: K.n] = K.jump[: K.n]
     if not holds_rows(K, K.n_active):
         K.failure_time = t1
         K.failure_size = 0.0
@@ -411,8 +404,7 @@ def margin(K: Switching, f: int, t1: float) -> float:
     row = K.friction_row[f]
     if consistent(K, t1, K.q1, K.y1) != 0:
         return float(K.guards1[frictions_at(K) + 2 * K.n_frictions + f] - abs(K.lam1[row]))
-    for k in range(K.n_rows):
-        K.loads[k] = K.impulse[k]
+    K.loads[: K.n_rows] = K.impulse[: K.n_rows]
     evaluate_loaded(K, K.loads)
     return float(limit_of(K, f) - abs(K.impulse[row]))
 

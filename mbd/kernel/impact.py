@@ -125,8 +125,7 @@ def poisson_law(K: Switching, energetic: bool) -> int:
     if status != 0:
         return status
     work = 0.0  # of the normal impulses in compression, each counted with its e²
-    for i in range(K.n):
-        K.trial_jump[i] = K.total_jump[i]
+    K.trial_jump[: K.n] = K.total_jump[: K.n]
     for k in range(K.n_rows):
         K.trial[k] = K.total[k]
         K.trial_given[k] = 0.0
@@ -151,8 +150,7 @@ def give_back(K: Switching, factor: float) -> int:
     Contacts that are given an impulse part under it, unless they would approach; their tangents stay.
     """
     gather(K, False, False)
-    for i in range(K.n):
-        K.total_jump[i] = K.trial_jump[i]
+    K.total_jump[: K.n] = K.trial_jump[: K.n]
     for k in range(K.n_rows):
         K.total[k] = K.trial[k]
         K.given[k] = factor * K.trial_given[k]

@@ -20,8 +20,7 @@ def prepare(K: Balance) -> None:
             c = K.friction_contact[f]
             if c >= 0 and (K.closing[c] > 0 or (K.closed[c] == 1 and K.sticks[f] == 0)):
                 capture(K, c)
-        for k in range(K.n_rows):
-            K.given[k] = 0.0
+        K.given[: K.n_rows] = 0.0
         evaluate(K, K.time, K.q, K.y)
         evaluate_loaded(K, K.given)
         for f in range(K.n_frictions):
@@ -80,8 +79,7 @@ def speed(K: ContactForces, row: int) -> float:
 
 def solve_impact(K: Balance) -> int:
     """The next jump and its impulses, beside the impulses in K.given: bias is in place, contacts have been gathered."""
-    for k in range(K.n_rows):
-        K.impulse[k] = 0.0
+    K.impulse[: K.n_rows] = 0.0
     status = complementarity(K, 1)
     if status != 0:
         return status
@@ -92,8 +90,7 @@ def solve_impact(K: Balance) -> int:
         K.total[k] += K.impulse[k] + K.given[k]
         K.impulse[k] = K.total[k]
         K.given[k] = 0.0
-    for c in range(K.n_contacts):
-        K.parting[c] = 0
+    K.parting[: K.n_contacts] = 0
     return 0
 
 

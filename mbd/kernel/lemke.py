@@ -81,8 +81,7 @@ def lemke(M: Reals, n: int, q: Reals, z: Reals, work: Reals, basis: Integers, mo
                 return status
         if attempt == 0:
             worst = status
-    for i in range(n):
-        z[i] = 0.0
+    z[:n] = 0.0
     return worst
 
 

@@ -36,10 +36,8 @@ def is_uneven(K: Equations, m: int) -> bool:
     if order_at(K, m) > 0:
         return False
     n = K.n
-    for k in range(n * n):
-        K.kkt[k] = K.acc[k]
-    for i in range(n):
-        K.rhs[i] = 0.0
+    K.kkt[: n * n] = K.acc[: n * n]
+    K.rhs[:n] = 0.0
     definite = solve_definite(K.kkt, n, K.rhs, K.spare) > 0.0  # rows may carry what no mass moves with
     for unit in range(2):
         big = 0.0
@@ -82,8 +80,7 @@ def polish_with_rows(K: Balance, m: int) -> None:
     n = K.n
     o_B = K.acc_B
     o_bias = K.acc_bias
-    for k in range(K.n_rows):
-        K.block[K.o_lam + k] = K.impulse[k]
+    K.block[K.o_lam : K.o_lam + K.n_rows] = K.impulse[: K.n_rows]
     find_imbalance(K)
     for i in range(n):
         K.rhs[i] = -K.out[i]
@@ -102,7 +99,6 @@ def polish_with_rows(K: Balance, m: int) -> None:
 
 def find_imbalance(K: Balance) -> None:
     """r of the mode at the state in the block, with the rates in K.jump, into K.out."""
-    for i in range(K.n):
-        K.block[K.o_a + i] = K.jump[i]
+    K.block[K.o_a : K.o_a + K.n] = K.jump[: K.n]
     call(K, K.mode_code[4 * K.mode_id + 1], K.out)
     K.n_residuals += 1

@@ -132,10 +132,8 @@ def project_gaps(K: Switching) -> int:
                 left = max(left, -K.guards0[c] / gap_tolerance(K, c))
         if left <= 1.0 and K.correction_size <= 1e-12:
             break
-    for f in range(K.n_frictions):
-        K.slip[f] = K.base_limit[f]
-    for k in range(K.n_rows):
-        K.lifting[k] = 0
+    K.slip[: K.n_frictions] = K.base_limit[: K.n_frictions]
+    K.lifting[: K.n_rows] = 0
     if status == 0 and left > SUNK:
         return NO_IMPACT
     return status
@@ -146,8 +144,7 @@ def project_gaps_once(K: Balance) -> int:
     n = K.n
     evaluate(K, K.time, K.q, K.y)
     o_h = K.acc_h
-    for i in range(n):
-        K.force[i] = 0.0
+    K.force[:n] = 0.0
     for k in range(K.n_rows):
         K.given[k] = 0.0
         K.bias[k] = K.acc[o_h + k]
@@ -165,8 +162,7 @@ def project_gaps_once(K: Balance) -> int:
 def strike(K: Switching, h: float, t1: float) -> int:
     """The candidate becomes the accepted state, lifted out of the surfaces."""
     nC = K.n_contacts
-    for c in range(nC):
-        K.before[c] = K.guards0[nC + c]
+    K.before[:nC] = K.guards0[nC : nC + nC]
     accept_candidate(K, t1)
     status = project_gaps(K)
     if status != 0:
@@ -199,8 +195,7 @@ def rebound(K: Switching) -> int:
     status = close_by_impact(K, fastest)
     if status == 0:
         mark_touching(K)
-    for k in range(K.n_rows):
-        K.past[k] = 0.0
+    K.past[: K.n_rows] = 0.0
     K.past_time = 0.0
     return status
 

@@ -87,8 +87,7 @@ def factor_ordered(K: Equations, A: Reals, o: int, source: int, loss: float) -> 
         V[k] = 1.0 / V[k]
         for e in range(first, last):
             V[size + e] = V[K.orders[o_turn + e]]
-    for e in range(entries):
-        K.kkt[e] = V[size + e]
+    K.kkt[:entries] = V[size : size + entries]
     K.order_start = o
     return True
 

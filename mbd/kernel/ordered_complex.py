@@ -67,8 +67,7 @@ def factor_pair_ordered(K: Steps, o_A: int, o: int, loss: float) -> bool:
             turn = K.orders[o_turn + e]
             V[re_at + e] = V[turn]
             V[im_at + e] = V[size + turn]
-    for e in range(2 * entries):
-        S[o_A + e] = V[re_at + e]
+    S[o_A : o_A + 2 * entries] = V[re_at : re_at + 2 * entries]
     return True
 
 

@@ -148,11 +148,9 @@ def hold(K: Balance, level: int, pushes: int, drags: int) -> int:
     size = n + held
     o_B = K.acc_B
     together = sharing(K)
-    for i in range(size * size):
-        K.kkt[i] = 0.0
+    K.kkt[: size * size] = 0.0
     for i in range(n):
-        for j in range(n):
-            K.kkt[i * size + j] = K.acc[i * n + j]
+        K.kkt[i * size : i * size + n] = K.acc[i * n : i * n + n]
         for k in range(held):
             K.kkt[i * size + n + k] = K.acc[o_R + i * K.n_rows + K.rows[k]]
             if together:
@@ -167,8 +165,7 @@ def fill_problem(K: Balance, held: int, pushes: int, drags: int) -> None:
     o_R = K.acc_R
     o_B = K.acc_B
     size = pushes + 3 * drags
-    for i in range(size * size):
-        K.lcp_matrix[i] = 0.0
+    K.lcp_matrix[: size * size] = 0.0
     for i in range(pushes + drags):
         row = K.lcp_rows[i]
         value = K.bias[row]
@@ -184,8 +181,7 @@ def fill_problem(K: Balance, held: int, pushes: int, drags: int) -> None:
     for j in range(pushes + drags):
         for i in range(n):
             K.rhs[i] = K.acc[o_R + i * K.n_rows + K.lcp_rows[j]]
-        for k in range(held):
-            K.rhs[n + k] = 0.0
+        K.rhs[n : n + held] = 0.0
         solve(K.kkt, n + held, K.pivots, K.rhs)
         fill_column(K, j, 1.0, held, pushes, drags)
         if j >= pushes:

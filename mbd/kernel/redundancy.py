@@ -34,8 +34,7 @@ def find_dependent(K: DependentRows, m: int) -> None:
     """
     kept = 0
     K.n_dropped = 0
-    for k in range(K.n_rows):
-        K.dropped[k] = 0
+    K.dropped[: K.n_rows] = 0
     if m == 0:
         return
     lengths = longest_row(K, m, 0)
@@ -103,8 +102,7 @@ def remaining_norm(K: DependentRows, row: int, kept: int) -> float:
         weight = K.acc[j * n + j]
         K.basis[base + j] = K.acc[o_B + row * n + j] / (sqrt(weight) if weight > 0.0 else 1.0)
     size = square(K.basis, base, n)
-    for i in range(kept):
-        K.lower[kept * K.n_rows + i] = 0.0
+    K.lower[kept * K.n_rows : kept * K.n_rows + kept] = 0.0
     for _ in range(2):
         for i in range(kept):
             K.lower[kept * K.n_rows + i] += clear_row(K.basis, base, i * n, n)
@@ -124,8 +122,7 @@ def keep_row(K: DependentRows, row: int, kept: int) -> None:
 
 def combine(K: DependentRows, row: int, kept: int) -> None:
     """The coefficients of a row in the kept rows from those in the basis, ``c L = `` the next line of K.lower."""
-    for i in range(K.n_rows):
-        K.mix[row * K.n_rows + i] = 0.0
+    K.mix[row * K.n_rows : row * K.n_rows + K.n_rows] = 0.0
     for back in range(kept):
         i = kept - 1 - back
         value = K.lower[kept * K.n_rows + i]

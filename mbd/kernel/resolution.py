@@ -100,10 +100,8 @@ def look_closer(K: Kernel, h: float, t1: float, stretch: float, rough_enough: bo
     if K.n_dropped > 0:
         evaluate(K, t1, K.q1, K.y1)
     fill_block(K, t1, K.q1, K.y1)
-    for i in range(K.n):
-        K.block[K.o_a + i] = K.rate1[i]
-    for k in range(K.n_rows):
-        K.block[K.o_lam + k] = K.lam1[k]
+    K.block[K.o_a : K.o_a + K.n] = K.rate1[: K.n]
+    K.block[K.o_lam : K.o_lam + K.n_rows] = K.lam1[: K.n_rows]
     if status != 0:
         K.failure_index = blocked
         K.failure_time = t1
@@ -188,8 +186,7 @@ def outgrows(K: Kernel, h: float, t1: float, stretch: float, at_y: int, at_D: in
             for i in range(K.n_q):
                 K.q1[i] = K.inside[i] - 0.5 * h * part * K.inside[at_D + i]
         else:
-            for i in range(K.n_q):
-                K.block[K.o_q + i] = K.inside[i]
+            K.block[K.o_q : K.o_q + K.n_q] = K.inside[: K.n_q]
             for i in range(K.n_v):
                 K.block[K.o_x + i] = -0.5 * h * part * K.inside[at_D + i]
             call(K, COMPOSE, K.q1)
@@ -204,8 +201,7 @@ def outgrows(K: Kernel, h: float, t1: float, stretch: float, at_y: int, at_D: in
 
 def leave_rows_alone(K: Switching, at_D: int) -> None:
     """Take from D what moves rows: no motion, but what index 3 leaves of velocities; K.acc is at the candidate."""
-    for i in range(K.n):
-        K.force[i] = 0.0
+    K.force[: K.n] = 0.0
     for k in range(K.n_rows):
         K.bias[k] = 0.0
         for j in range(K.n):

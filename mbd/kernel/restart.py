@@ -42,21 +42,16 @@ def fill_block(K: Mechanism, t: float, q: Reals, y: Reals) -> None:
     block[0] = t
     block[1] = 0.0
     block[2] = 0.0
-    for i in range(K.n_q):
-        block[K.o_q + i] = q[i]
-    for i in range(K.n_v):
-        block[K.o_x + i] = 0.0
+    block[K.o_q : K.o_q + K.n_q] = q[: K.n_q]
+    block[K.o_x : K.o_x + K.n_v] = 0.0
     for i in range(K.n):
         block[K.o_v + i] = y[i]
         block[K.o_a + i] = K.rate[i]
-    for k in range(K.n_rows):
-        block[K.o_lam + k] = K.lam[k]
-    for k in range(K.n_anchors):
-        block[K.o_anchor + k] = K.anchors[k]
+    block[K.o_lam : K.o_lam + K.n_rows] = K.lam[: K.n_rows]
+    block[K.o_anchor : K.o_anchor + K.n_anchors] = K.anchors[: K.n_anchors]
     for c in range(K.n_contacts):
         block[K.o_switch + c] = 1.0 if (K.kind[c] == 1 and K.closed[c] == 1) else 0.0
-    for f in range(K.n_frictions):
-        block[K.o_slip + f] = K.slip[f]
+    block[K.o_slip : K.o_slip + K.n_frictions] = K.slip[: K.n_frictions]
 
 
 def compose(K: Motion, q1: Reals) -> None:
@@ -65,8 +60,7 @@ def compose(K: Motion, q1: Reals) -> None:
         for i in range(K.n_q):
             q1[i] = K.q[i] + K.block[K.o_x + i]
     else:
-        for i in range(K.n_q):
-            K.block[K.o_q + i] = K.q[i]
+        K.block[K.o_q : K.o_q + K.n_q] = K.q[: K.n_q]
         call(K, COMPOSE, q1)
 
 
@@ -76,13 +70,10 @@ def displace(K: Model, q: Reals, x: Reals) -> None:
         for i in range(K.n_q):
             q[i] += x[i]
         return
-    for i in range(K.n_q):
-        K.block[K.o_q + i] = q[i]
-    for i in range(K.n_v):
-        K.block[K.o_x + i] = x[i]
+    K.block[K.o_q : K.o_q + K.n_q] = q[: K.n_q]
+    K.block[K.o_x : K.o_x + K.n_v] = x[: K.n_v]
     call(K, COMPOSE, q)
-    for i in range(K.n_v):
-        K.block[K.o_x + i] = 0.0
+    K.block[K.o_x : K.o_x + K.n_v] = 0.0
 
 
 def refresh_scales(K: Model) -> None:
@@ -128,8 +119,7 @@ def raise_scales(K: Equations, rows: bool) -> None:
     far ahead says nothing of the round-off here.
     """
     known = K.n + 2 * K.n_rows
-    for i in range(known):
-        K.work[i] = K.scale[i]
+    K.work[:known] = K.scale[:known]
     refresh_scales(K)
     for i in range(known):
         if i < K.n:
@@ -151,14 +141,12 @@ def largest_force(K: Model) -> float:
 
 def note_scales(K: Model) -> None:
     """Keep the magnitudes known so far, which an iterate that is not accepted must leave as they are."""
-    for i in range(K.n + 2 * K.n_rows):
-        K.known[i] = K.scale[i]
+    K.known[: K.n + 2 * K.n_rows] = K.scale[: K.n + 2 * K.n_rows]
 
 
 def restore_scales(K: Model) -> None:
     """The magnitudes of `note_scales`: where an iterate was thrown far away, its forces excuse nothing."""
-    for i in range(K.n + 2 * K.n_rows):
-        K.scale[i] = K.known[i]
+    K.scale[: K.n + 2 * K.n_rows] = K.known[: K.n + 2 * K.n_rows]
     weigh(K)
 
 
@@ -174,8 +162,7 @@ def lower_scales(K: DependentRows) -> None:
 
     After a moment of huge forces residuals are judged too mildly otherwise.
     """
-    for i in range(K.n):
-        K.work[i] = K.scale[i]
+    K.work[: K.n] = K.scale[: K.n]
     fill_block(K, K.time, K.q, K.y)
     refresh_scales(K)
     K.scales_raised = 0
@@ -238,8 +225,7 @@ def evaluate_loaded(K: ContactRows, lam: Reals) -> float:
         change = max(change, abs(K.block[K.o_lam + k] - lam[k]))
         size = max(size, abs(lam[k]))
         K.block[K.o_lam + k] = lam[k]
-    for f in range(K.n_frictions):
-        K.block[K.o_slip + f] = K.slip[f]
+    K.block[K.o_slip : K.o_slip + K.n_frictions] = K.slip[: K.n_frictions]
     call(K, ACCELERATIONS, K.acc)
     return change / size
 
@@ -319,11 +305,9 @@ def share_loads(K: Balance, m: int) -> None:
     find_mix(K, m)
     find_limits_of_loads(K)
     find_shares(K)
-    for k in range(K.n_rows):
-        K.loads[k] = K.block[K.o_lam + k]
+    K.loads[: K.n_rows] = K.block[K.o_lam : K.o_lam + K.n_rows]
     take_shares(K, K.loads)
-    for k in range(K.n_rows):
-        K.block[K.o_lam + k] = K.loads[k]
+    K.block[K.o_lam : K.o_lam + K.n_rows] = K.loads[: K.n_rows]
 
 
 def add_shares(K: DependentRows, A: Reals, m: int) -> None:
@@ -357,10 +341,8 @@ def load_accelerations(K: ContactForces) -> None:
     """Right-hand sides of the acceleration level."""
     n = K.n
     o_bias = K.acc_bias
-    for i in range(n):
-        K.force[i] = K.acc[K.acc_f + i]
-    for k in range(K.n_rows):
-        K.bias[k] = K.acc[o_bias + k]
+    K.force[:n] = K.acc[K.acc_f : K.acc_f + n]
+    K.bias[: K.n_rows] = K.acc[o_bias : o_bias + K.n_rows]
 
 
 def capture(K: Mechanism, c: int) -> None:

@@ -155,8 +155,7 @@ def solve_matrix(K: Balance, m: int, together: bool, tolerance: float) -> int:
         return solve_in_order(K, m)
     A = K.kkt
     for i in range(n):
-        for j in range(n):
-            A[i * size + j] = K.acc[i * n + j]
+        A[i * size : i * size + n] = K.acc[i * n : i * n + n]
         for k in range(m):
             A[i * size + n + k] = K.acc[o_R + i * K.n_rows + K.rows[k]]
             if together:
@@ -164,10 +163,8 @@ def solve_matrix(K: Balance, m: int, together: bool, tolerance: float) -> int:
         K.rhs[i] = -K.force[i]
     for k in range(m):
         row = K.rows[k]
-        for j in range(n):
-            A[(n + k) * size + j] = K.acc[o_B + row * n + j]
-        for j in range(m):
-            A[(n + k) * size + n + j] = 0.0
+        A[(n + k) * size : (n + k) * size + n] = K.acc[o_B + row * n : o_B + row * n + n]
+        A[(n + k) * size + n : (n + k) * size + n + m] = 0.0
         K.rhs[n + k] = -K.bias[row]
     finite = 0.0
     for k in range(size * size):
@@ -233,16 +230,14 @@ def factor_saddle(K: Equations, m: int, symmetric: bool, loss: float) -> bool:
     o_R = K.acc_R
     o_B = K.acc_B
     for i in range(n):
-        for j in range(n):
-            K.kkt[i * size + j] = K.acc[i * n + j]
+        K.kkt[i * size : i * size + n] = K.acc[i * n : i * n + n]
     for k in range(m):
         row = K.rows[k]
         for i in range(n):
             entry = K.acc[o_B + row * n + i]
             K.kkt[(n + k) * size + i] = entry
             K.kkt[i * size + n + k] = entry if symmetric else K.acc[o_R + i * K.n_rows + row]
-        for j in range(m):
-            K.kkt[(n + k) * size + n + j] = 0.0
+        K.kkt[(n + k) * size + n : (n + k) * size + n + m] = 0.0
     return bool(factor(K.kkt, size, K.pivots) == 0)
 
 
@@ -264,9 +259,7 @@ def solve_in_order(K: Balance, m: int) -> int:
 
 def take_solution(K: Balance, m: int) -> None:
     """The solution in K.rhs to where others find it; multipliers of rows without part in it are 0."""
-    for i in range(K.n):
-        K.jump[i] = K.rhs[i]
-    for k in range(K.n_rows):
-        K.impulse[k] = 0.0
+    K.jump[: K.n] = K.rhs[: K.n]
+    K.impulse[: K.n_rows] = 0.0
     for k in range(m):
         K.impulse[K.rows[k]] = K.rhs[K.n + k]

@@ -76,16 +76,12 @@ def correct_start(K: Balance) -> int:
         return NEW_MODE
     evaluate(K, K.time, K.q, K.y)
     refresh_scales(K)
-    for i in range(K.n):
-        K.jump[i] = K.rate[i]
-    for k in range(K.n_rows):
-        K.impulse[k] = K.lam[k]
+    K.jump[: K.n] = K.rate[: K.n]
+    K.impulse[: K.n_rows] = K.lam[: K.n_rows]
     status = refine_accelerations(K)
     if status == 0:
-        for i in range(K.n):
-            K.rate[i] = K.jump[i]
-        for k in range(K.n_rows):
-            K.lam[k] = K.impulse[k]
+        K.rate[: K.n] = K.jump[: K.n]
+        K.lam[: K.n_rows] = K.impulse[: K.n_rows]
     return status
 
 

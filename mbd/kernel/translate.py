@@ -1,9 +1,10 @@
 """Functions of the kernel's Python → typed trees (`mbd.kernel.tree`).
 
 The kernel uses little of Python: numbers, flat arrays, fields of its records, ``if``, ``while``, ``for … in range``,
-calls of its own functions by position. A name means what it means in its module: two modules may each have a `step`.
-A scalar argument or result has the kind of its annotation; one annotated ``Any`` has the kind it is called with, and a
-function is translated once for each combination of these. Local names hold what all their assignments have in common:
+slices that are filled with a number or copied, calls of its own functions by position. A name means what it means in
+its module: two modules may each have a `step`. A scalar argument or result has the kind of its annotation; one
+annotated ``Any`` has the kind it is called with, and a function is translated once for each combination of these.
+Local names hold what all their assignments have in common:
 int and float make float.
 """
 
@@ -30,6 +31,9 @@ OPERATORS = {
     ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.FloorDiv: "//", ast.Mod: "%", ast.Pow: "**",
     ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!=",
 }  # fmt: skip
+
+ELEMENT = "_element"
+"""Name that counts the elements of a slice."""
 
 
 class Source:
@@ -143,6 +147,8 @@ class _Body:
         return [] if isinstance(node.value, ast.Constant) else [tree.Do(self.value(node.value))]  # a docstring
 
     def _Assign(self, node: ast.Assign) -> list[tree.Statement]:
+        if isinstance(node.targets[0], ast.Subscript) and isinstance(node.targets[0].slice, ast.Slice):
+            return self._For(_each(node, node.targets[0], node.targets[0].slice))
         value = self.value(node.value)
         targets = tuple(self.target(target, value.kind) for target in node.targets)
         for target in targets:
@@ -325,6 +331,29 @@ class _Body:
         for kind, needed in zip(kinds, called.arguments.values(), strict=True):
             _converts(kind, needed)
         return tree.Call(called, values, called.result)
+
+
+def _each(node: ast.Assign, target: ast.Subscript, part: ast.Slice) -> ast.For:
+    """``a[i:j] = b[k:l]`` or ``a[i:j] = number``, element by element; slices begin at 0 where they do not say."""
+    value = node.value
+    copied = isinstance(value, ast.Subscript) and isinstance(value.slice, ast.Slice)
+    overlaps = copied and ast.unparse(value.value) == ast.unparse(target.value)  # type: ignore[attr-defined]
+    if part.upper is None or not (copied or isinstance(value, ast.Constant)) or overlaps or len(node.targets) > 1:
+        raise CapabilityError(f"{ast.unparse(node)!r}: a slice is filled with a number or from one of another array")
+    count = part.upper if part.lower is None else ast.BinOp(part.upper, ast.Sub(), part.lower)
+    element = ast.Assign([_element(target)], _element(value) if copied else value, lineno=node.lineno)
+    counts = ast.Call(ast.Name("range", ast.Load()), [count], [])
+    return ast.For(ast.Name(ELEMENT, ast.Store()), counts, [element], [], lineno=node.lineno)
+
+
+def _element(node: ast.expr) -> ast.Subscript:
+    """The element of a slice whose number is counted by `ELEMENT`."""
+    assert isinstance(node, ast.Subscript)
+    assert isinstance(node.slice, ast.Slice)
+    index: ast.expr = ast.Name(ELEMENT, ast.Load())
+    if node.slice.lower is not None:
+        index = ast.BinOp(node.slice.lower, ast.Add(), index)
+    return ast.Subscript(node.value, index, node.ctx)
 
 
 def _converts(kind: str, needed: str) -> None:

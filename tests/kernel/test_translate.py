@@ -121,7 +121,17 @@ def whole(x):
     return x
 
 
-CASES = (arithmetic, rounding_down, extremes, roots, decisions, loops, widening)
+def slices(x, k):
+    m = 1 + k[0] % 2
+    x[m : m + 2] = k[:2]
+    k[:m] = 3
+    x[:0] = 7.0
+    for i in range(2):
+        k[2 * i : 2 * i + m] = 5
+    return 0
+
+
+CASES = (arithmetic, rounding_down, extremes, roots, decisions, loops, slices, widening)
 
 
 @lru_cache
@@ -164,6 +174,9 @@ def test_the_same_bits_as_python_at_every_level(function, x, k):
         ("def f(x) -> int:\n    return x", "a value of kind 'reals' where one of kind 'int' is needed"),
         ("def f(x):\n    return 3**int(x[0])", "a power of integers"),
         ("def f(x):\n    return x[0] ** 0.5", r"write sqrt\(x\)"),
+        ("def f(x):\n    x[1:3] = x[0:2]", "a slice is filled with a number or from one of another array"),
+        ("def f(x):\n    x[:2] = x[2] + 1.0", "a slice is filled with a number or from one of another array"),
+        ("def f(x):\n    x[:] = 0.0", "a slice is filled with a number or from one of another array"),
     ],
 )
 def test_what_the_kernel_may_not_use_is_named(source, message):

@@ -33,14 +33,11 @@ def predict(K: SingularSteps, h: float, t1: float, c_C: float, c_K: float) -> No
     block[0] = t1
     block[1] = c_C
     block[2] = c_K
-    for i in range(K.n_q):
-        block[K.o_q + i] = K.q[i]
+    block[K.o_q : K.o_q + K.n_q] = K.q[: K.n_q]
     for k in range(K.n_rows):
         block[K.o_lam + k] = K.lam[k] + h * K.lam_slope[k]
-    for k in range(K.n_anchors):
-        block[K.o_anchor + k] = K.anchors[k]
-    for f in range(K.n_frictions):
-        block[K.o_slip + f] = K.slip[f]
+    block[K.o_anchor : K.o_anchor + K.n_anchors] = K.anchors[: K.n_anchors]
+    block[K.o_slip : K.o_slip + K.n_frictions] = K.slip[: K.n_frictions]
     for i in range(K.n):
         last = K.rate[i]
         a0 = last + stretch * (K.aux[i] - last)
@@ -155,8 +152,7 @@ def finish(K: Steps, h: float) -> bool:
         K.rate1[i] = rate
         K.y1[i] = speed
         K.aux1[i] = by_rate * rate + by_last * last - by_aux * a0
-    for k in range(K.n_rows):
-        K.lam1[k] = K.block[K.o_lam + k]
+    K.lam1[: K.n_rows] = K.block[K.o_lam : K.o_lam + K.n_rows]
     if K.n > K.n_v or error_share(K, h) * most > 0.5:
         return False
     whole = K.step / h if K.step > h else 1.0

@@ -20,8 +20,7 @@ def forget_steps(K: SingularSteps) -> None:
         K.aux[i] = K.rate[i]
         K.shift[i] = 0.0
         K.shift_change[i] = 0.0
-    for k in range(K.n_rows):
-        K.lam_slope[k] = 0.0
+    K.lam_slope[: K.n_rows] = 0.0
     K.aux_step = start_step(K)
     K.near_singular = 0
     K.inverse_pivot = 0.0

@@ -84,8 +84,7 @@ def newmark_step(K: Kernel, h: float, t1: float) -> int:
 def newmark_accept(K: Steps, h: float) -> None:
     """The candidate becomes the accepted state."""
     part = part_of_change(K, h)
-    for i in range(K.n_q):
-        K.q[i] = K.q1[i]
+    K.q[: K.n_q] = K.q1[: K.n_q]
     inverse = 1.0 / h
     for i in range(K.n):
         K.y[i] = K.y1[i]
@@ -129,8 +128,7 @@ def newmark_resume(K: Kernel, h: float) -> int:
     for i in range(K.n):
         K.aux1[i] = (K.aux[i] - K.rate[i]) * (start_step(K) / h)
         K.rate[i] = K.jump[i]
-    for k in range(K.n_rows):
-        K.lam[k] = K.impulse[k]
+    K.lam[: K.n_rows] = K.impulse[: K.n_rows]
     status = newmark_start(K)
     for i in range(K.n):
         K.aux[i] = K.rate[i] + K.aux1[i]

@@ -201,8 +201,7 @@ def take_shift(K: Equations, m: int) -> bool:
             shifting = True
     if shifting:
         place = soundness_at(K, m) + 2 + K.n + m
-        for i in range(K.n_v):
-            K.work[i] = K.out[place + i]
+        K.work[: K.n_v] = K.out[place : place + K.n_v]
     return shifting
 
 
@@ -238,8 +237,7 @@ def right_hand_sides(K: Steps, o_r: int, m: int, c_C: float, c_K: float, tangent
                 h -= K.out[(n + k) * (n + m) + j] * K.shift1[j]
         K.work[n + k] = -h
     if tangent and K.stabilized == 1:
-        for k in range(m * K.n_v):
-            K.turning[k] = K.out[o_h + 2 * m + k]
+        K.turning[: m * K.n_v] = K.out[o_h + 2 * m : o_h + 2 * m + m * K.n_v]
     return shifting
 
 
@@ -257,8 +255,7 @@ def factorize(K: DependentRows, size: int, tangents: int) -> bool:
     if o > 0:
         K.n_pivoted += 1
     K.order_start = 0
-    for k in range(size * size):
-        K.kkt[k] = K.out[k]
+    K.kkt[: size * size] = K.out[: size * size]
     if sharing(K):
         add_shares(K, K.kkt, m)
     column = factor(K.kkt, size, K.pivots)
@@ -289,8 +286,7 @@ def solve_with_factors(K: Equations, m: int, b: Reals, straight: bool) -> None:
     size = K.n + m
     if straight:
         place = soundness_at(K, m) + 2
-        for i in range(size):
-            K.out[place + i] = b[i]
+        K.out[place : place + size] = b[:size]
         call_on(K, K.mode_code[4 * K.mode_id + 3], K.out, b)
     else:
         solve_kkt(K, size, b)

@@ -96,19 +96,15 @@ def forget_stages(K: Steps) -> None:
     """Stages to predict the next step from: those of rates and multipliers that do not change."""
     n = K.n
     for i in range(3):
-        for j in range(n):
-            K.past_stages[i * n + j] = K.rate[j]
-        for k in range(K.n_rows):
-            K.past_stages[3 * n + i * K.n_rows + k] = K.lam[k]
-        for j in range(K.n_v):
-            K.past_stages[3 * n + 3 * K.n_rows + i * K.n_v + j] = 0.0
+        K.past_stages[i * n : i * n + n] = K.rate[:n]
+        K.past_stages[3 * n + i * K.n_rows : 3 * n + i * K.n_rows + K.n_rows] = K.lam[: K.n_rows]
+        K.past_stages[3 * n + 3 * K.n_rows + i * K.n_v : 3 * n + 3 * K.n_rows + i * K.n_v + K.n_v] = 0.0
 
 
 def radau_accept(K: SingularSteps, h: float) -> None:
     """The candidate becomes the accepted state, its stages those to predict the next from."""
     inverse = 1.0 / h
-    for i in range(K.n_q):
-        K.q[i] = K.q1[i]
+    K.q[: K.n_q] = K.q1[: K.n_q]
     for i in range(K.n):
         K.y[i] = K.y1[i]
         K.slope[i] = (K.rate1[i] - K.rate[i]) * inverse
@@ -118,8 +114,7 @@ def radau_accept(K: SingularSteps, h: float) -> None:
         K.lam_slope[k] = (K.lam1[k] - K.lam[k]) * inverse
         K.lam[k] = K.lam1[k]
     o = stage_place(K, STAGE_RATES)
-    for k in range(3 * (K.n + K.n_rows + K.n_v)):
-        K.past_stages[k] = K.stages[o + k]
+    K.past_stages[: 3 * (K.n + K.n_rows + K.n_v)] = K.stages[o : o + 3 * (K.n + K.n_rows + K.n_v)]
     if K.n_active > 0:
         accept_row_norms(K, h)
     K.aux_step = h
@@ -325,8 +320,7 @@ def complete(K: Kernel, h: float, t1: float, m: int, renew: bool, slow: bool) ->
     for i in range(K.n):
         K.y1[i] = K.block[K.o_v + i]
         K.rate1[i] = K.stages[o_W + i]
-    for k in range(K.n_rows):
-        K.lam1[k] = K.stages[o_L + k]
+    K.lam1[: K.n_rows] = K.stages[o_L : o_L + K.n_rows]
     estimate_error(K, h, m)
     for i in range(K.n_v):
         if K.unit[i] == 1 and not abs(K.error[i]) <= 0.5:
@@ -335,17 +329,14 @@ def complete(K: Kernel, h: float, t1: float, m: int, renew: bool, slow: bool) ->
     compose(K, K.q1)
     if m > 0 or K.n_frictions > 0 or slow:
         if end_rates(K, t1, m):
-            for i in range(K.n):
-                K.rate1[i] = K.jump[i]
-            for k in range(K.n_rows):
-                K.lam1[k] = K.impulse[k]
+            K.rate1[: K.n] = K.jump[: K.n]
+            K.lam1[: K.n_rows] = K.impulse[: K.n_rows]
         if m > 0:
             if not holds_rows(K, m):
                 K.failure_size = 0.0
                 return NOT_CONVERGED
             note_row_norms(K)
-        for k in range(K.n_rows):
-            K.block[K.o_lam + k] = K.lam1[k]
+        K.block[K.o_lam : K.o_lam + K.n_rows] = K.lam1[: K.n_rows]
     for i in range(K.n):
         K.block[K.o_a + i] = K.rate1[i]
         K.aux1[i] = K.rate1[i]
@@ -373,10 +364,8 @@ def end_rates(K: Balance, t1: float, m: int) -> bool:
     for k in range(m):
         K.rhs[n + k] = -K.bias[K.rows[k]]
     solve_kkt(K, n + m, K.rhs)
-    for k in range(K.n_rows):
-        K.impulse[k] = 0.0
-    for i in range(n):
-        K.jump[i] = K.rhs[i]
+    K.impulse[: K.n_rows] = 0.0
+    K.jump[:n] = K.rhs[:n]
     for k in range(m):
         K.impulse[K.rows[k]] = K.rhs[n + k]
     if K.n_frictions > 0:

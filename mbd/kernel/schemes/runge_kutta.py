@@ -91,8 +91,7 @@ def runge_kutta_step(K: Kernel, h: float, t1: float) -> int:
             return status
     if K.n_active == 0 and K.n_frictions == 0:
         status = explicit_rates(K, t1)
-        for k in range(K.n_rows):
-            K.impulse[k] = 0.0
+        K.impulse[: K.n_rows] = 0.0
     else:
         status = consistent(K, t1, K.q1, K.y1)
         note_uneven(K)
@@ -127,8 +126,7 @@ def explicit_move(K: Steps, h: float, weights: int, count: int) -> None:
     """(q1, y1) moved from the accepted state by h times the weighted slopes of the first stages; ẋ there as a slope."""
     n_v = K.n_v
     width = n_v + K.n
-    for i in range(width):
-        K.spare[i] = 0.0
+    K.spare[:width] = 0.0
     for j in range(count):
         weight = h * K.tableau[weights + j]
         if weight != 0.0:
@@ -145,8 +143,7 @@ def explicit_move(K: Steps, h: float, weights: int, count: int) -> None:
         K.block[K.o_v + i] = K.y1[i]
     compose(K, K.q1)
     call(K, INCREMENT_RATES, K.spare)
-    for i in range(n_v):
-        K.stages[count * width + i] = K.spare[i]
+    K.stages[count * width : count * width + n_v] = K.spare[:n_v]
 
 
 def explicit_rates(K: Balance, t: float) -> int:
@@ -179,11 +176,9 @@ def explicit_rates(K: Balance, t: float) -> int:
     for k in range(m):
         K.rhs[n + k] = -K.acc[o_bias + K.rows[k]]
     solve_kkt(K, n + m, K.rhs)
-    for i in range(n):
-        K.jump[i] = K.rhs[i]
+    K.jump[:n] = K.rhs[:n]
     if K.uneven_masses == 1:
-        for k in range(K.n_rows):
-            K.impulse[k] = 0.0
+        K.impulse[: K.n_rows] = 0.0
         for k in range(m):
             K.impulse[K.rows[k]] = K.rhs[n + k]
         polish_with_rows(K, m)
@@ -201,8 +196,7 @@ def return_to_rows(K: DependentRows, t1: float) -> int:
         evaluate(K, t1, K.q1, K.y1)
         K.n_residuals += 1
         size = 0.0
-        for i in range(n):
-            K.rhs[i] = 0.0
+        K.rhs[:n] = 0.0
         for k in range(m):
             row = K.rows[k]
             h = 0.0 if K.row_level[row] == 1 else K.acc[o_h + row]
@@ -225,8 +219,7 @@ def return_to_rows(K: DependentRows, t1: float) -> int:
     if size > 1e3:
         K.failure_size = size
         return NOT_CONVERGED
-    for i in range(n):
-        K.rhs[i] = 0.0
+    K.rhs[:n] = 0.0
     for k in range(m):
         K.rhs[n + k] = -K.acc[o_h + K.n_rows + K.rows[k]]
     solve_kkt(K, n + m, K.rhs)
@@ -298,8 +291,7 @@ def hold_error(K: Steps) -> bool:
     if not factor_saddle(K, m, True, LOSS_AT_ONCE):
         return False
     for level in range(2):
-        for i in range(n):
-            K.rhs[i] = 0.0
+        K.rhs[:n] = 0.0
         for k in range(m):
             row = K.rows[k]
             off = 0.0
@@ -315,15 +307,13 @@ def hold_error(K: Steps) -> bool:
 def runge_kutta_accept(K: SingularSteps, h: float) -> None:
     """The candidate becomes the accepted state."""
     inverse = 1.0 / h
-    for i in range(K.n_q):
-        K.q[i] = K.q1[i]
+    K.q[: K.n_q] = K.q1[: K.n_q]
     for i in range(K.n):
         K.y[i] = K.y1[i]
         K.slope[i] = (K.rate1[i] - K.rate[i]) * inverse
         K.rate[i] = K.rate1[i]
         K.aux[i] = K.rate1[i]
-    for k in range(K.n_rows):
-        K.lam[k] = K.lam1[k]
+    K.lam[: K.n_rows] = K.lam1[: K.n_rows]
     if K.n_active > 0:
         accept_row_norms(K, h)
     K.aux_step = h

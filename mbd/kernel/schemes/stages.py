@@ -88,16 +88,12 @@ def stage_place(K: Settings, part: int) -> int:
 
 def hold_block(K: SingularSteps) -> None:
     """What all stages of a step share, into the block: the center of the chart, anchors, sliding."""
-    for i in range(K.n_q):
-        K.block[K.o_q + i] = K.q[i]
-    for k in range(K.n_anchors):
-        K.block[K.o_anchor + k] = K.anchors[k]
-    for f in range(K.n_frictions):
-        K.block[K.o_slip + f] = K.slip[f]
+    K.block[K.o_q : K.o_q + K.n_q] = K.q[: K.n_q]
+    K.block[K.o_anchor : K.o_anchor + K.n_anchors] = K.anchors[: K.n_anchors]
+    K.block[K.o_slip : K.o_slip + K.n_frictions] = K.slip[: K.n_frictions]
     if K.vector == 0:
         o_E = stage_place(K, STAGE_BEND)
-        for j in range(3 * K.n_v):
-            K.stages[o_E + j] = 0.0
+        K.stages[o_E : o_E + 3 * K.n_v] = 0.0
 
 
 def predict_stages(K: Steps, h: float, m: int) -> None:
@@ -120,8 +116,7 @@ def predict_stages(K: Steps, h: float, m: int) -> None:
             l2 = 1.0
         for j in range(n):
             S[o_W + i * n + j] = l0 * P[j] + l1 * P[n + j] + l2 * P[2 * n + j]
-        for k in range(K.n_rows):
-            S[o_L + i * K.n_rows + k] = K.lam[k]
+        S[o_L + i * K.n_rows : o_L + i * K.n_rows + K.n_rows] = K.lam[: K.n_rows]
         for k in range(m):
             row = K.rows[k]
             o = 3 * n + row
@@ -140,8 +135,7 @@ def load_stage(K: Kernel, i: int, h: float, t1: float) -> None:
     S = K.stages
     o_L = stage_place(K, STAGE_LAM) + i * K.n_rows
     K.block[0] = t1 if i == 2 else K.time + S[C_ + i] * h
-    for k in range(K.n_rows):
-        K.block[K.o_lam + k] = S[o_L + k]
+    K.block[K.o_lam : K.o_lam + K.n_rows] = S[o_L : o_L + K.n_rows]
     if sharing(K):
         share_loads(K, K.n_active)
 
@@ -211,8 +205,7 @@ def evaluate_stages(
         if size < 0.0:  # the stage stays in the block, which tells why
             return -1.0
         largest = max(largest, size)
-        for j in range(n):
-            K.stages[o_r + i * (n + m) + j] = K.out[o + j]
+        K.stages[o_r + i * (n + m) : o_r + i * (n + m) + n] = K.out[o : o + n]
         for k in range(m):
             K.stages[o_h + i * m + k] = K.out[o + n + k]
             K.stages[o_r + i * (n + m) + n + k] = K.out[o + n + m + k]
@@ -235,14 +228,11 @@ def matrices(K: SingularSteps, m: int, h: float) -> None:
     K.block_c_C = c
     K.block_c_K = c * c
     tangent_of_stage(K, m)
-    for k in range(size * size):
-        K.kkt[k] = K.out[k]
-    for k in range(m * K.n_v):
-        K.turning[k] = K.out[size * size + n + 2 * m + k]
+    K.kkt[: size * size] = K.out[: size * size]
+    K.turning[: m * K.n_v] = K.out[size * size + n + 2 * m : size * size + n + 2 * m + m * K.n_v]
     K.block_c_K = 0.0
     tangent_of_stage(K, m)
-    for k in range(size * size):
-        S[o_P + k] = K.out[k]
+    S[o_P : o_P + size * size] = K.out[: size * size]
     K.block_c_C = -c
     tangent_of_stage(K, m)
     K.n_tangents += 3
@@ -347,10 +337,8 @@ def correct_positions_of_stages(K: Steps, m: int, h: float, whole: bool) -> None
     o_K = stage_place(K, STIFF_PART)
     c = S[MU_REAL] * h
     for i in range(3):
-        for j in range(n):
-            K.work[j] = 0.0
-        for k in range(m):
-            K.work[n + k] = S[o_h + i * m + k]
+        K.work[:n] = 0.0
+        K.work[n : n + m] = S[o_h + i * m : o_h + i * m + m]
         solve_kkt(K, size, K.work)
         for j in range(n_v):
             before = S[o_U + i * n_v + j]

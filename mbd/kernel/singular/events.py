@@ -158,8 +158,7 @@ def comes_close(K: DependentRows, t: float, part: float) -> bool:
 
 def keep_parts(K: SingularSteps, m: int) -> None:
     """The independent parts of rows in K.turning and their lengths in K.work[2m:3m]."""
-    for k in range(m * K.n):
-        K.turning[k] = K.basis[k]
+    K.turning[: m * K.n] = K.basis[: m * K.n]
     for k in range(m):
         K.work[2 * m + k] = K.work[k]
 

@@ -80,8 +80,7 @@ def steps_to_singularity(K: SingularSteps, m: int, h: float, ratio: float, strai
         o_S = soundness_at(K, m) + 2 + size + K.n_v
         o_H = o_S + K.n_v
         width = K.n_v
-        for k in range(m * K.n_v):
-            K.turning[k] = K.out[K.n + 2 * m + k]
+        K.turning[: m * K.n_v] = K.out[K.n + 2 * m : K.n + 2 * m + m * K.n_v]
     stride = 1 if straight else size + 1
     find_gram_norms(K, m, h, ratio, 0.0, 0, o_S, stride, o_H, width)
     find_gram_norms(K, m, h, ratio, -h, m, o_S, stride, o_H, width)
@@ -254,8 +253,7 @@ def singular_newmark_step(K: Kernel, h: float, t1: float) -> int:
                 restore_scales(K)
         K.failure_size = error
         if iteration == 0:
-            for k in range(m * K.n_v):
-                K.turning[k] = K.out[o_r + K.n + 2 * m + k]
+            K.turning[: m * K.n_v] = K.out[o_r + K.n + 2 * m : o_r + K.n + 2 * m + m * K.n_v]
             away = steps_to_singularity(K, m, h, c_K / c_C, False)
             if away < NEAREST and K.velocity_noise > K.tolerance:
                 return SINGULAR
@@ -313,8 +311,7 @@ def factor_positions(K: DependentRows, m: int) -> bool:
         return True
     K.n_pivoted += 1 if o > 0 else 0
     K.order_start = 0
-    for k in range(size * size):
-        K.kkt[k] = K.out[k]
+    K.kkt[: size * size] = K.out[: size * size]
     if sharing(K):
         add_shares(K, K.kkt, m)
     return bool(factor(K.kkt, size, K.pivots) == 0)

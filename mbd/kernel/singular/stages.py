@@ -94,16 +94,14 @@ def solve_singular_stage(K: Kernel, i: int, h: float, t1: float, m: int, afresh:
     status = project_stage_positions(K, i, h, t1, m, afresh)
     if status != 0:
         return status
-    for j in range(n):
-        K.rhs[j] = 0.0
+    K.rhs[:n] = 0.0
     for k in range(m):
         row = K.rows[k]
         rate = K.acc[o_rate + row]
         below = not afresh and abs(rate) <= 16.0 * EPS * K.scale[n + K.n_rows + row]
         K.rhs[n + k] = 0.0 if below else -rate
     solve_kkt(K, n + m, K.rhs)
-    for j in range(n):
-        S[o_s + j] = K.rhs[j]
+    S[o_s : o_s + n] = K.rhs[:n]
     if K.n_frictions > 0 and not factor_saddle(K, m, False, LOSS_OF_STEP):
         return SINGULAR
     for j in range(n):
@@ -111,8 +109,7 @@ def solve_singular_stage(K: Kernel, i: int, h: float, t1: float, m: int, afresh:
         for k in range(n):
             load += K.acc[j * n + k] * S[o_W + k]
         K.rhs[j] = -load
-    for k in range(m):
-        K.rhs[n + k] = 0.0
+    K.rhs[n : n + m] = 0.0
     solve_kkt(K, n + m, K.rhs)
     for k in range(m):
         S[o_L + K.rows[k]] = K.rhs[n + k]
@@ -131,8 +128,7 @@ def project_stage_positions(K: Kernel, i: int, h: float, t1: float, m: int, afre
         hold_block(K)
         load_stage(K, i, h, t1)
         compose(K, K.q1)
-        for j in range(n):
-            K.y1[j] = K.block[K.o_v + j]
+        K.y1[:n] = K.block[K.o_v : K.o_v + n]
         evaluate(K, K.block_time, K.q1, K.y1)
         size = 0.0
         for j in range(n):

@@ -83,8 +83,7 @@ def note_row_norms(K: DependentRows) -> None:
         row_norms_of_many(K, m)
     else:
         row_norms(K, m)
-    for k in range(m):
-        K.left1[k] = K.work[k]
+    K.left1[:m] = K.work[:m]
     K.left1[m] = motion(K, K.y1)
 
 
@@ -203,8 +202,7 @@ def times_to_singularities(K: SingularSteps, m: int, unit: float) -> float:
     n = K.n
     evaluate_ahead(K, 0.0)
     row_norms(K, m)
-    for k in range(m * n):
-        K.turning[k] = K.basis[k]
+    K.turning[: m * n] = K.basis[: m * n]
     for k in range(m):
         K.work[2 * m + k] = K.work[k]
         K.work[m + k] = NOWHERE
