@@ -18,6 +18,7 @@ from mbd.compile.orders import elimination_order, may_pay
 from mbd.compile.postponed import Postponed
 from mbd.compile.python import ArrayFunction, array_function
 from mbd.equations import programs
+from mbd.equations.charts import chart_end, chart_motion
 from mbd.equations.equations import Equations
 from mbd.errors import UnknownNameError, nearest
 from mbd.tape.node import Node
@@ -85,6 +86,8 @@ class Mechanism:
         self._accelerations = common["accelerations"]
         self.common: Functions = self.backend.functions(self.layout)
         self.common.add(common)
+        if composed is not None:
+            self.common.add({"chart_end": chart_end(equations), "chart_motion": chart_motion(equations)}, rarely=True)
         self.common.add({"scales": programs.scales(equations)}, rarely=True)  # twice a restart, and nowhere else
         self.judged = programs.is_judged(equations)
         if self.judged:
@@ -305,6 +308,8 @@ class Mechanism:
             "scales": n + 2 * rows,
             "compose": layout.n_q,
             "increment_rates": layout.n_v,
+            "chart_end": 3 * layout.n_v,
+            "chart_motion": 2 * layout.n_v,
         }
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from mbd.kernel.accept_restart import accept_for_restart
 from mbd.kernel.candidate import accept_guards
+from mbd.kernel.charts import turned_end, wants_row
 from mbd.kernel.codes import AT_POSE, CHATTER, DONE, EVENT, FULL, LAST, LEFT, NEW_MODE, NOT_CONVERGED, PAUSE, PULL
 from mbd.kernel.contact_modes import room_to_log
 from mbd.kernel.contact_step import relax_pace
@@ -262,6 +263,12 @@ def take_step(K: Kernel) -> int:
         return LAST
     if cut:
         t1 = K.until
+    if K.vector == 0:
+        near = turned_end(K, t1)
+        if near < t1:
+            t1 = near
+            within = True
+            cut = False
     h = t1 - t
     if K.halvings > 0:
         h *= 0.5**K.halvings
@@ -321,6 +328,6 @@ def judge_step(K: Kernel, h: float, full: float, t1: float, cut: bool, within: b
     if status != 0:
         return status
     K.steps_since_row += 1
-    if K.steps_since_row >= K.stride:
+    if (K.vector == 0 and wants_row(K, h)) or K.steps_since_row >= K.stride:
         store_row(K)
     return -1

@@ -2,8 +2,8 @@
 
 A step of a high-order scheme may be as long as the motion takes to turn around. It is looked at in K.looks parts: at
 their ends the guards are evaluated on the quintic Hermite interpolant of positions, velocities and accelerations (where
-⊕ is not +, on the integral of the cubic one of velocities), with consistent multipliers where a closed contact or a
-friction asks for them, and each part is judged like a step of its own.
+⊕ is not +, of the increment in the chart of the step), with consistent multipliers where a closed contact or a friction
+asks for them, and each part is judged like a step of its own.
 
 What is guaranteed: an excursion of a guard that lasts a fifth of the motion's own time scale or longer is seen, as it
 is by four short steps in place of the long one; one that is shallower than the error of the interpolant may be missed,
@@ -13,6 +13,7 @@ like one between two short steps.
 from __future__ import annotations
 
 from mbd.kernel.candidate import accept_guards, carry
+from mbd.kernel.charts import find_chart_end, leave_chart
 from mbd.kernel.codes import EPS
 from mbd.kernel.guards import gap_scale, gap_tolerance, goes_back, is_watched, judge, watch
 from mbd.kernel.records import Contacts, Guards, Switching
@@ -54,6 +55,8 @@ def parts_to_take(K: Switching, h: float) -> int:
 
 def copy_ends(K: Guards, out: bool) -> None:
     """What is overwritten, into K.inside or back: guards and multipliers at both ends, the candidate."""
+    if out and K.vector == 0:
+        find_chart_end(K)
     o = carry(K.guards0, K.inside, 0, K.n_watched, out)
     o = carry(K.guards1, K.inside, o, K.n_watched, out)
     o = carry(K.lam, K.inside, o, K.n_rows, out)
@@ -96,11 +99,15 @@ def look_at(K: Switching, t: float, h: float, s: float, asked: bool) -> None:
         d1 = h * K.inside[o_y + K.n + i]
         gap = 0.0  # of the position at the end, which the integral of the cubic misses
         if i < K.n_v:
+            if K.vector == 0:
+                y1 = K.chart_end[K.n_v + i]
+                d1 = h * K.chart_end[2 * K.n_v + i]
             whole = 0.5 * (y0 + y1) + (d0 - d1) / 12.0
-            if K.vector == 1:
-                gap = K.inside[place + i] - K.q[i] - h * whole
-                if abs(gap) <= FINEST * EPS * abs(K.q[i]):  # round-off over h would be a velocity
-                    gap = 0.0
+            end = K.inside[place + i] - K.q[i] if K.vector == 1 else K.chart_end[i]
+            size = abs(K.q[i]) if K.vector == 1 else 1.0
+            gap = end - h * whole
+            if abs(gap) <= FINEST * EPS * size:  # round-off over h would be a velocity
+                gap = 0.0
             x = y0 * (s + u * s * (0.5 * s - 1.0)) + y1 * u * s * (1.0 - 0.5 * s)
             x += d0 * u * (0.5 + s * (0.25 * s - 2.0 / 3.0)) + d1 * u * s * (0.25 * s - 1.0 / 3.0)
             K.block[K.o_x + i] = h * x + gap * u * s * (10.0 + s * (6.0 * s - 15.0))
@@ -109,6 +116,8 @@ def look_at(K: Switching, t: float, h: float, s: float, asked: bool) -> None:
         slope = 6.0 * (y1 - y0) * s * (1.0 - s) + d0 * (1.0 - s) * (1.0 - 3.0 * s) + d1 * s * (3.0 * s - 2.0)
         K.rate1[i] = (slope + 60.0 * gap / h * s * (1.0 - s) * (1.0 - 2.0 * s)) / h
     compose(K, K.q1)
+    if K.vector == 0:
+        leave_chart(K)
     if asked and consistent(K, t + s * h, K.q1, K.y1) == 0:
         K.rate1[: K.n] = K.jump[: K.n]
         K.lam1[: K.n_rows] = K.impulse[: K.n_rows]

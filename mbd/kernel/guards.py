@@ -7,6 +7,7 @@ armed is ignored until its gap has risen above zero. Closed contacts fire by the
 
 from __future__ import annotations
 
+from mbd.kernel.charts import turns_too_far
 from mbd.kernel.codes import (
     CLOSE,
     CROSS,
@@ -95,6 +96,10 @@ def try_step(K: Kernel, h: float, t1: float) -> int:
         status = brief_step(K, h, t1)
         if status != 0:
             return status
+    if K.vector == 0 and turns_too_far(K, h):
+        K.failure_time = t1
+        K.failure_size = 0.0
+        return NOT_CONVERGED
     if K.n_watched > 0:
         K.block[K.o_q : K.o_q + K.n_q] = K.q1[: K.n_q]
         K.block[K.o_x : K.o_x + K.n_v] = 0.0

@@ -42,6 +42,7 @@ def store_state(K: Switching, q: Reals, y: Reals, rate: Reals, lam: Reals) -> No
         K.store[o + K.n_contacts + f] = 2.0 if K.sticks[f] == 1 else K.slip[f]
     K.n_stored += 1
     K.steps_since_row = 0
+    K.turned = 0.0
 
 
 def is_awaited(K: Switching, first: int) -> bool:

@@ -14,6 +14,7 @@ rate. Where that is large, accelerations are asked for again, by two tests that 
 from __future__ import annotations
 
 from mbd.kernel.candidate import carry
+from mbd.kernel.charts import whole_step
 from mbd.kernel.codes import COMPOSE, GAINED, LEAPT, NOT_FINITE, OUTGROWN
 from mbd.kernel.hooks import call, scheme_error
 from mbd.kernel.poles import leaps
@@ -39,7 +40,7 @@ FEWEST = 1.0 / 4096.0
 
 def judge_change(K: Kernel, h: float, t1: float) -> int:
     """0 where the candidate may be a continuation of the motion, OUTGROWN, GAINED or LEAPT where it cannot."""
-    stretch = max(1.0, K.step / h)
+    stretch = max(1.0, whole_step(K) / h)
     if K.estimates == 0 and changes_little(K, h, stretch):
         return 0
     worst = largest_share(K, h, stretch)

@@ -15,10 +15,10 @@ import numpy as np
 
 from mbd.arrays import Matrix
 from mbd.compile.python import array_function
+from mbd.equations.charts import chart_maps
 from mbd.results.polynomials import Places, hermite, hermite_rate, quintics
 from mbd.results.record import Rows
-from mbd.tape.derivatives import jvp
-from mbd.tape.node import Node, Scalar, Tape
+from mbd.tape.node import Node
 
 __all__ = ["Charts"]
 
@@ -45,26 +45,7 @@ class Charts:
         if not equations.compose or "charts" in equations.memory:
             found: Charts | None = equations.memory.get("charts")
             return found
-        tape, configuration = equations.tape, equations.configuration
-        with tape.lock:
-            n_q, n_v = equations.n_q, equations.n_v
-            q, x, v = (_inputs(tape, kind, n) for kind, n in (("q", n_q), ("x", n_v), ("v", n_v)))
-            other = [tape.input("q", n_q + k) for k in range(n_q)]
-            places = configuration.places
-            moved = [b - a for a, b in zip(q, other, strict=True)]
-            difference = [moved[k] if k >= 0 else tape.zero for k in places]
-            velocities = list(v)
-            for joint, first_q, first_v in configuration.charts:
-                here, own = slice(first_q, first_q + len(joint.labels)), slice(first_v, first_v + len(joint.freedoms))
-                difference[own] = [tape.lift(value) for value in joint.difference(q[here], other[here])]
-                velocities[own] = [tape.lift(value) for value in joint.increment_velocities(x[own], v[own])]
-            rates = v if equations.chart is None else equations.chart.rates
-            a = dict(zip(v, _inputs(tape, "a", n_v), strict=True))
-            seeds: dict[Node, Scalar] = {**dict(zip(x, rates, strict=True)), **a}
-            accelerations, turned = jvp(rates, seeds), jvp(velocities, {**dict(zip(x, v, strict=True)), **a})
-            parts = (equations.compose, difference, rates, velocities, accelerations, turned)
-            made = cls(*(tuple(part) for part in parts))
-        equations.memory["charts"] = made
+        equations.memory["charts"] = made = cls(*chart_maps(equations))
         return made
 
     @property
@@ -117,7 +98,3 @@ class Charts:
         found = self._at(self.velocities, x=x, v=speed)
         turned = self._at(self.turned, x=x, v=speed, a=change)
         return tuple(np.where(inside, *pair) for pair in ((self.composed(q, x), q), (found, v), (turned, a)))  # type: ignore[return-value]
-
-
-def _inputs(tape: Tape, kind: str, size: int) -> list[Node]:
-    return [tape.input(kind, k) for k in range(size)]

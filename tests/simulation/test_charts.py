@@ -68,7 +68,8 @@ SCHEMES = [*((scheme, (50, 100, 200)) for scheme in SECOND), (mbd.RadauIIA(toler
 @pytest.mark.parametrize("backend", ["auto", "python"])
 def test_every_scheme_has_its_order_on_a_heavy_body_that_turns_about_a_point(scheme, counts, backend):
     model, start = top()
-    counts = counts if backend == "auto" else tuple(count // 2 for count in counts[:2])
+    if backend == "python":  # but for steps that would turn the body so far that they are divided
+        counts = counts[1:] if counts[0] < 10 else tuple(count // 2 for count in counts[:2])
     errors = []
     for count in counts:
         end = mbd.simulate(model, start, scheme, dt=1.0 / count, until=1.0, backend=backend).final
@@ -309,4 +310,4 @@ def test_steps_that_turn_a_ball_joint_too_far_are_noted():
     model, start = top()
     near, far = (mbd.simulate(model, start, mbd.RungeKutta853(), dt=dt, until=1.0).stats["notes"] for dt in (0.1, 0.5))
     assert not any("turns by up to" in said for said in near)
-    assert any("'ball' turns by up to" in said and "use dt below" in said for said in far)
+    assert any("'ball' turns by up to" in said and "steps were divided" in said for said in far)

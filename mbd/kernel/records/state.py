@@ -38,6 +38,10 @@ class Model(SchemeAbilities):
     row_friction: Integers = integers()  # friction of each row that holds only while it sticks, −1 otherwise
     row_unit: Integers = integers()  # 0 [m], 1 [rad], 2 other, of each row
     unit: Integers = integers()  # unit block of each balance component
+    turned_by: Integers = integers(lambda s: s.n_v)  # from 1: the joint in charts that each velocity turns, 0: none
+    chart: Reals = reals()  # what programs of charts are called with
+    chart_end: Reals = reals(lambda s: 3 * s.n_v)  # x, ẋ and ẍ of the candidate in the chart of the step
+    chart_motion: Reals = reals(lambda s: 2 * s.n_v)  # v and v̇ of the interpolant
     n_modes: int = place("mode_count")
     mode_key: Integers = integers(lambda s: MODE_CAPACITY * (s.n_contacts + s.n_rows + s.n_frictions))  # known modes
     mode_code: Integers = integers(lambda s: PROGRAMS * MODE_CAPACITY)
@@ -75,6 +79,7 @@ class State(SchemeAbilities):
     next_step: float = place("clock")  # the one that will follow the candidate
     step_taken: float = place("clock")  # by the candidate
     restart_due: int = place("state")  # 1: and the restart is stored as a row, 2: it is not
+    turned: float = place("clock")  # way of joints whose coordinates do not add since the last row [rad]
     halvings: int = place("state")  # how often the step is halved
     halves_left: int = place("state")  # of it
     paired_step: int = place("state")  # see `mbd.kernel.singular.step_pairs`

@@ -7,6 +7,7 @@ the velocity formulas of the scheme with their own rate ż, of order 2 as well (
 
 from __future__ import annotations
 
+from mbd.kernel.charts import find_chart_end
 from mbd.kernel.codes import PASSING
 from mbd.kernel.conditioning import is_ill_conditioned, refine_accelerations
 from mbd.kernel.records import Kernel, Steps
@@ -138,7 +139,8 @@ def newmark_resume(K: Kernel, h: float) -> int:
 def newmark_error(K: Steps, h: float) -> None:
     """K.error: ``h² (1/6 − β − (α_m − α_f)/2) (a₁ − a₀)`` of positions, the first factor being K.error_constant.
 
-    That of velocities and first-order states is ``h²/12`` times the change of the slope of their rates.
+    That of velocities and first-order states is ``h²/12`` times the change of the slope of their rates. Where positions
+    do not add, ``ẋ = v`` leaves ``∫(ẋ − v) dt = h (ẋ₁ − v₁)/3`` as well, as ẋ − v grows with the square of time.
     """
     stretch = h / K.aux_step
     share = h * h * K.error_constant
@@ -147,6 +149,10 @@ def newmark_error(K: Steps, h: float) -> None:
         if i < K.n_v:
             K.error[i] = share * (K.aux1[i] - a0)
         K.error[K.n_v + i] = h * h / 12.0 * ((K.rate1[i] - K.rate[i]) / h - K.slope[i])
+    if K.vector == 0:
+        find_chart_end(K)
+        for i in range(K.n_v):
+            K.error[i] += h / 3.0 * (K.chart_end[K.n_v + i] - K.y1[i])
 
 
 SCHEME = Scheme(

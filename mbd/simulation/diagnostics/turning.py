@@ -10,6 +10,7 @@ from mbd.arrays import Matrix
 from mbd.assembly.given_state import beyond_angles
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.python import array_function
+from mbd.kernel.charts import QUARTER_TURN
 from mbd.results.columns import ModelColumns
 from mbd.results.record import Record
 from mbd.simulation.run.data import RunData
@@ -19,8 +20,6 @@ __all__ = ["blocks", "first_reversed", "overturned", "unresolved_turns"]
 
 HALF_TURN = np.pi
 """Turn in a step above which forces that follow the angle are read at too few places of a turn [rad]."""
-QUARTER_TURN = np.pi / 2.0
-"""Turn in a step above which increments of a rotation, which wrap around at a turn, are not resolved [rad]."""
 BLOCK = 4096
 """Rows that are looked at together."""
 
@@ -46,7 +45,7 @@ def unresolved_turns(run: RunData, record: Record) -> list[str]:
     if run.kernel.adaptive or len(record.time) < 2:
         return []
     if not run.mechanism.vector:
-        return _long_increments(run, record)
+        return _divided_steps(run, record)
     if run.kernel.explicit:
         return []
     if run.kernel.row_bounds[0] <= HALF_TURN:  # no coordinate changes so much from row to row
@@ -72,17 +71,17 @@ def unresolved_turns(run: RunData, record: Record) -> list[str]:
     ]
 
 
-def _long_increments(run: RunData, record: Record) -> list[str]:
-    """A note on each joint whose coordinates do not add that turns by more than a quarter of a turn in a step."""
-    found, step = [], np.minimum(np.diff(record.time) / record.settings.get("store", 1), run.dt)
+def _divided_steps(run: RunData, record: Record) -> list[str]:
+    """A note on each joint whose coordinates do not add for which steps were divided (`mbd.kernel.charts`)."""
+    found = []
     for joint, _, first in run.mechanism.equations.configuration.charts:
         turning = [first + k for k, label in enumerate(joint.freedoms) if label.unit == "rad"]
-        speed = np.sqrt(np.sum(record.v[:, turning] ** 2, axis=1))
-        way = float(np.max(step * np.maximum(speed[:-1], speed[1:]), initial=0.0))
+        way = run.dt * float(np.sqrt(np.max(np.sum(record.v[:, turning] ** 2, axis=1))))
         if way > QUARTER_TURN:
             found.append(
-                f"{joint.name!r} turns by up to {way:.3g} rad in one step, too much to tell how its axis moves "
-                f"meanwhile; unless that stands still, use dt below {run.dt * QUARTER_TURN / way:.1g} s"
+                f"{joint.name!r} turns by up to {way:.3g} rad in dt = {run.dt:g} s: steps were divided into parts that "
+                f"turn it by a quarter turn at most, within which increments of a rotation are accurate; use dt below "
+                f"{run.dt * QUARTER_TURN / way:.1g} s for steps of one size"
             )
     return found
 

@@ -100,7 +100,8 @@ class Stepper:
         self.functions: list[Any] = [mechanism.common[name] for name in ("accelerations", "guards", "scales")]
         self.functions.append(None if mechanism.vector else mechanism.common["compose"])
         self.functions.append(mechanism.common["terms"] if mechanism.judged else None)
-        self.functions.append(None if mechanism.vector else mechanism.common["increment_rates"])
+        for name in ("increment_rates", "chart_end", "chart_motion"):
+            self.functions.append(None if mechanism.vector else mechanism.common[name])
         self.kernel.code = self.functions
         self.modes: list[Any] = []
         self.dependent: dict[int, tuple[int, ...]] = {}
@@ -149,6 +150,7 @@ class Stepper:
             )
         given = own | {name: len(table) for name, table in tables.items()}
         given |= {"block": block, "out": max(v.n_tangent, block), "acc": self.mechanism.sizes["accelerations"]}
+        given["chart"] = 1 if v.vector else max(block, 2 * v.n_q + 2 * v.n_v)
         lengths = TABLE.lengths(v, given)
         self.reals, self.integers, *_ = (
             self._shelve({name: lengths[name] for name in names if name in lengths}, kind)
@@ -169,6 +171,9 @@ class Stepper:
         for name, numbers in (*self.own.coefficients().items(), ("nodes", self.own.nodes)):
             getattr(v, name)[: len(numbers)] = numbers
         v.unit = unit_blocks(self.mechanism)
+        for number, (joint, _, first) in enumerate(self.mechanism.equations.configuration.charts, 1):
+            turning = [first + k for k, freedom in enumerate(joint.freedoms) if freedom.unit == "rad"]
+            v.turned_by[turning] = number
         v.row_unit = np.array([*row_units(self.mechanism), 2], dtype=np.int64)
         if not v.n_anchors:
             v.anchors = np.zeros(0)
