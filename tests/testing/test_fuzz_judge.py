@@ -31,9 +31,9 @@ ROUND_OFF = [2473, 3433]
 TIED = [4378, 30308]
 """Two steps of a quarter of the run: whether they are half of it must not be decided by the last bit; two runs
 of a flight without any error but round-off, of which that with longer steps is kept."""
-BETWEEN = [4644, 21327]
+BETWEEN = [4644, 21327, 15227]
 """A joint was open, and velocities did not fit it, between long steps of `RadauIIA`; accelerations of index 3 within
-a short last step."""
+a short last step; joints between coarse steps of index 3, whose velocities do not fit."""
 STIFF = [22904]
 """Forces of a penalty between long steps, known as far as its stiffness times the tolerance."""
 CORRECTED = [26404, 12577]
@@ -205,6 +205,23 @@ def test_a_wrong_reaction_between_rows_is_seen(monkeypatch):
     monkeypatch.setattr(ModelColumns, "between", wrong)
     assert "balance of torques" in {fault.law for fault in between(run, model).faults}
     assert judge(run, model).faults == ()
+
+
+def test_joints_between_steps_of_index_3_come_apart_as_their_velocities_lead(monkeypatch):
+    model, start = four_bar()[0], {"one.angle": 0.4}
+    start = mbd.assemble(model, position=start, velocity={"one.angle": 20.0})
+    run = mbd.simulate(model, start, mbd.HHT(0.3, formulation="index3"), dt=2e-2, until=0.5)
+    joints = lambda: [f for f in between(run, model).faults if f.law == "joint holds its frames together"]  # noqa: E731
+    assert joints() == []
+    right = ModelColumns.between
+
+    def wrong(self, places, *forces):
+        rows = right(self, places, *forces)
+        rows.q[:, 0] += 0.2
+        return rows
+
+    monkeypatch.setattr(ModelColumns, "between", wrong)
+    assert len(joints()) == 1
 
 
 def test_a_tolerance_excuses_no_reaction_where_nothing_is_stiff(monkeypatch):

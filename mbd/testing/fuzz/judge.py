@@ -127,9 +127,10 @@ def _choice(run: mbd.Trajectory, n: int) -> Array:
 def between(run: mbd.Trajectory, model: mbd.Model, parameters: Mapping[str, float] | None = None) -> Judgement:
     """Whether what a run tells between its rows keeps the laws as its rows do.
 
-    Where the scheme's own interpolation is of low order, loops and constraints are left to its error, and forces may
-    miss a fiftieth of what they are made of. Where a tolerance was asked for, it is what coordinates may be off, and so
-    what loops may miss; forces by what rates off by as much in the time of a step change of them.
+    Where the scheme's own interpolation is of low order, loops and constraints are left to its error, and in index 3 to
+    where velocities lead that do not fit; forces may miss a fiftieth of what they are made of. Where a tolerance was
+    asked for, it is what coordinates may be off, and so what loops may miss; forces by what rates off by as much in the
+    time of a step change of them.
     """
     time = run.time
     steps_of = np.flatnonzero(np.diff(time) > 0.0)
@@ -138,7 +139,8 @@ def between(run: mbd.Trajectory, model: mbd.Model, parameters: Mapping[str, floa
     some = steps_of[np.unique(np.linspace(0, len(steps_of) - 1, 12).astype(int))]
     times = np.concatenate([(1.0 - part) * time[some] + part * time[some + 1] for part in (0.3, 0.62)])
     times = np.sort(times[(times > np.repeat(0.0, len(times)))])
-    told = readings(run, model, dict(parameters or {}), times)
+    given = dict(parameters or {})
+    told = readings(run, model, given, times)
     found = Faults(told.time)
     tol = run.settings["tol"] if run.settings.get("tol") else 0.0
     precise = run.settings["integrator"].startswith(("Runge", "Radau"))
@@ -147,13 +149,27 @@ def between(run: mbd.Trajectory, model: mbd.Model, parameters: Mapping[str, floa
             bodies = Bodies(model, told)
             laws.places(found, bodies)
             h = np.diff(time)[np.searchsorted(time, times, side="right") - 1]
-            laws.closure(found, bodies, (1e-6 if precise else 1e-3) + 0.3 * tol, rates=precise)
+            more = _cubics_apart(run, model, given, times) if "index3" in run.settings["integrator"] else None
+            laws.closure(found, bodies, (1e-6 if precise else 1e-3) + 0.3 * tol, rates=precise, more=more)
             share = 1e-5 if precise else 0.02 + _unresolved(run, times)
             again = run.settings["between"] == "stages"  # steps are taken again, and end in balance
-            more = unknown_force(bodies, tol, h, laws.size_of(bodies)) if tol and not again else 0.0
-            laws.balance(found, bodies, loads(bodies), share, more)
+            stiff = unknown_force(bodies, tol, h, laws.size_of(bodies)) if tol and not again else 0.0
+            laws.balance(found, bodies, loads(bodies), share, stiff)
             if precise:
                 laws.constraints(found, bodies, 1e-6)
         except NotImplementedError as error:
             return Judgement(tuple(found.found), found.tried, str(error))
     return Judgement(tuple(found.found), found.tried)
+
+
+def _cubics_apart(run: mbd.Trajectory, model: mbd.Model, given: dict[str, float], times: Array) -> dict[str, Array]:
+    """How far frames held together come apart between rows whose positions fit and velocities do not, by joint (n,).
+
+    Cubics through rows that come apart at rates ṡ₀ and ṡ₁ do so by ``h (ṡ₀ ξ (1−ξ)² − ṡ₁ ξ² (1−ξ))``, at most
+    ``h max(|ṡ₀|, |ṡ₁|) / 4``.
+    """
+    k = np.searchsorted(run.time, times, side="right") - 1
+    rows = readings(run, model, given)
+    before, after = (laws.partings(Bodies(model, rows.part(ends))) for ends in (k, k + 1))
+    h = run.time[k + 1] - run.time[k]
+    return {name: 0.25 * h * np.maximum(speed, after[name]) for name, speed in before.items()}

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 import mbd
+from mbd.joints.base import Joint
 from mbd.testing.fuzz.bodies import Bodies, mass_of
 from mbd.testing.fuzz.faults import Faults
-from mbd.testing.fuzz.geometry import Array, cross, inverse, product, twist
+from mbd.testing.fuzz.geometry import Array, Moving, cross, inverse, product, twist
 from mbd.testing.fuzz.loads import Loads
 from mbd.testing.fuzz.quantities import gap_of, named, value_of
 
-__all__ = ["balance", "closure", "constraints", "contacts", "energies", "places", "size_of"]
+__all__ = ["balance", "closure", "constraints", "contacts", "energies", "places", "size_of", "partings"]
 
 HELD = 1e-7
 """What rows may miss, over the size of the mechanism [-]."""
@@ -45,27 +47,49 @@ def places(found: Faults, bodies: Bodies) -> None:
             found.small("velocity of a frame", name, np.max(np.abs(reported - own), axis=1), EQUAL * fast)
 
 
-def closure(found: Faults, bodies: Bodies, loose: float = HELD, rates: bool = True, told: int = 0) -> None:
+def closure(
+    found: Faults,
+    bodies: Bodies,
+    loose: float = HELD,
+    rates: bool = True,
+    told: int = 0,
+    more: Mapping[str, Array] | None = None,
+) -> None:
     """Joints that close loops fit: their frames, seen over both branches, differ by the joint's own motion alone.
 
     Parameters
     ----------
     loose : what places may miss, over the size of the mechanism [-]; rates : whether velocities are held too
     told : how many instants are next to singular poses, where the run says that they are not
+    more : what places may miss besides by joint, (n,) each [m, rad]
     """
     size = size_of(bodies)
     for joint in bodies.closing:
-        across = product(inverse(bodies.frame(joint.parent)), bodies.frame(joint.child))
-        gap = product(inverse(bodies.between(joint)), across)
+        across, gap = _apart(bodies, joint)
         off = np.max(np.abs(gap.H - np.eye(4)), axis=(1, 2))
-        found.small("joint holds its frames together", joint.name, off, loose * size)
+        limit = loose * size + (more[joint.name] if more else 0.0)
+        found.small("joint holds its frames together", joint.name, off, limit)
         if not rates:
             continue
-        apart = twist(gap)
-        slip = np.linalg.norm(apart.angular, axis=1) + np.linalg.norm(apart.linear, axis=1)
         motion = np.abs(across.first).max(axis=(1, 2))
         limit = loose * size * (1.0 + motion)
-        found.small("velocities fit at a joint", joint.name, slip, limit, told=told)
+        found.small("velocities fit at a joint", joint.name, _parting(gap), limit, told=told)
+
+
+def partings(bodies: Bodies) -> dict[str, Array]:
+    """How fast frames that a joint of a loop holds together come apart, by joint (n,) [m/s, rad/s]."""
+    return {joint.name: _parting(_apart(bodies, joint)[1]) for joint in bodies.closing}
+
+
+def _apart(bodies: Bodies, joint: Joint) -> tuple[Moving, Moving]:
+    """The child's frame seen from the parent's over the other branch, and what of that is not the joint's motion."""
+    across = product(inverse(bodies.frame(joint.parent)), bodies.frame(joint.child))
+    return across, product(inverse(bodies.between(joint)), across)
+
+
+def _parting(gap: Moving) -> Array:
+    apart = twist(gap)
+    return np.asarray(np.linalg.norm(apart.angular, axis=1) + np.linalg.norm(apart.linear, axis=1))
 
 
 def balance(found: Faults, bodies: Bodies, acting: Loads, share: Any, more: Any = 0.0) -> None:
