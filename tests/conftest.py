@@ -1,13 +1,24 @@
-"""Settings of every test: seeded random examples, no window, interrupts that arrive, few passes of the collector."""
+"""Settings of every test: seeded random examples, no window, interrupts that arrive, and what keeps the suite quick.
 
+Machine code of models is made at level 0, in a third of the time of level 2: models of tests are many, and their runs
+short. `tests/compile`, where all levels are held to give the same bits, and long tests have the levels of users.
+"""
+
+import contextlib
 import gc
 import os
 import signal
+import sys
+from pathlib import Path
 
 os.environ.setdefault("MPLBACKEND", "Agg")
 
 import pytest
-from hypothesis import HealthCheck, settings
+
+rewriting, sys.meta_path[:] = sys.meta_path[:], [finder for finder in sys.meta_path if not hasattr(finder, "session")]
+from hypothesis import HealthCheck, settings  # without rewriting its assertions, 5 s in every process
+
+sys.meta_path[:] = rewriting
 
 # where SIGINT is ignored (nohup, jobs in the background), it is not so for the tests and the processes they start
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -22,6 +33,40 @@ settings.register_profile(
 )
 settings.register_profile("thorough", parent=settings.get_profile("ci"), derandomize=False, max_examples=1000)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
+
+
+WITHOUT_KERNEL = ("bodies", "equations", "forces", "tape", "topology", "test_layers.py", "test_surface.py")
+"""Parts of the tests that call no compiled kernel, or hardly ever."""
+
+
+def pytest_configure(config):
+    if config.option.markexpr == "not slow":
+        with contextlib.suppress(ImportError):
+            from mbd.compile import llvm
+
+            config.levels_of_users = llvm.LEVEL, llvm.HASTY
+            llvm.LEVEL, llvm.HASTY = 0, None
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """Files in one piece to the workers, which share what they derive and compile; the idle takes from the busy."""
+    from xdist.scheduler import WorkStealingScheduling
+
+    return WorkStealingScheduling(config, log) if config.option.dist == "load" else None
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(items):
+    """Put what needs no kernel in the middle: there the second of two workers begins, while the first builds it."""
+    if len(items) < 1000:
+        return
+    tests = Path(__file__).parent
+    parts = {tests / part for part in WITHOUT_KERNEL}
+    free = [item for item in items if parts.intersection((item.path, item.path.parent))]
+    others = [item for item in items if not parts.intersection((item.path, item.path.parent))]
+    half = len(items) // 2
+    items[:] = others[:half] + free + others[half:]
 
 
 @pytest.hookimpl(wrapper=True)
