@@ -16,7 +16,7 @@ os.environ.setdefault("MPLBACKEND", "Agg")
 import pytest
 
 rewriting, sys.meta_path[:] = sys.meta_path[:], [finder for finder in sys.meta_path if not hasattr(finder, "session")]
-from hypothesis import HealthCheck, settings  # without rewriting its assertions, 5 s in every process
+from hypothesis import HealthCheck, settings  # noqa: E402  (its assertions are not rewritten: 5 s in every process)
 
 sys.meta_path[:] = rewriting
 

@@ -15,7 +15,7 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.assembly.inertia import lost_sentence
 from mbd.description import Description
-from mbd.equations.sizes import LARGE, operations
+from mbd.equations.sizes import FEW, LARGE, operations, require_room
 from mbd.errors import AssemblyError
 from mbd.joints.base import Joint
 from mbd.tape.node import Node, Tape
@@ -44,15 +44,18 @@ def require_inertia(model: Any, position: Mapping[str, float], changed: Mapping[
 
     Raises
     ------
+    ModelError
+        for one whose equations do not fit into the free memory (`require_room`), before its inertia is looked at.
     AssemblyError
         with the coordinate that moves most, the share of inertia, and what to try.
     """
-    if not isinstance(model, Description) or faults(model):
+    if not isinstance(model, Description) or len(model.joints) < FEW or faults(model):
         return
     chosen = plan(model)
     free = not (chosen.cut or model.bilaterals or model.nonholonomic)
     if not free or operations(chosen) < LARGE or not all(joint.is_vector for joint in chosen.edges):
         return
+    require_room(chosen)
     names, velocities = weighted_velocities(chosen, position, changed)
     size = np.linalg.norm(velocities, axis=0)
     if not np.isfinite(size).all() or not size.all():

@@ -20,6 +20,8 @@ BYTES, SECONDS = 800.0, 25e-6
 """Memory and time of an operation as it is derived and compiled; both measured, on chains of 30 to 1000 links."""
 LARGE = 1e6
 """Operations below which the free memory is not asked for [-]."""
+FEW = 12
+"""Joints that are fewer make no `LARGE` tree: with two floating bodies each, 18 coordinates a joint at most."""
 
 
 def operations(plan: Plan) -> float:

@@ -146,7 +146,8 @@ class _Completed(System):
 
 def completed(system: Any) -> System:
     """The system itself, or a class with an `evaluate` made whole by the defaults of `System`."""
-    return system if isinstance(system, System) else _Completed(system)
+    inherits = System in type(system).__mro__  # else every member is looked at, properties evaluated
+    return system if inherits or isinstance(system, System) else _Completed(system)
 
 
 def consistent_rates(system: System, t: float, q: Vector, y: Vector, mode: Mode) -> tuple[Vector, Vector]:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import mbd
+from mbd.assembly import foreseen
 from mbd.compile.mechanisms import mechanism_of
 from mbd.equations import sizes
 from mbd.topology.plan import plan
@@ -34,6 +35,7 @@ def test_the_size_foretold_is_that_of_the_equations_within_a_factor_of_three(axi
 
 def test_a_chain_that_does_not_fit_is_refused_at_once_with_its_figure(monkeypatch):
     monkeypatch.setattr(sizes, "available", lambda: 2e9)
+    monkeypatch.setattr(foreseen, "weighted_velocities", lambda *_: pytest.fail("the refusal comes first"))
     figure = r"(?s)1000 bodies and 1000 joints.*4\.2 GB and 2\.2 minutes.*2 GB.*cut='all'"
     with pytest.raises(mbd.ModelError, match=figure):
         mbd.assemble(chain(1000))

@@ -85,6 +85,7 @@ class Table:
         self.places: dict[str, tuple[str, int]] = {}
         self.formulas: dict[str, Any] = {}
         self._arrays: dict[str, Array] = {}
+        self._counts: dict[str, int] = {}
         for owner in (each for each in Record.declared if issubclass(record, each)):
             for name, annotation in vars(owner).get("__annotations__", {}).items():
                 if annotation not in kinds:
@@ -95,6 +96,7 @@ class Table:
                     self._arrays[name] = declared
                 elif isinstance(declared, Place):
                     declared.index = self.length_of(declared.array)
+                    self._counts[declared.array] = declared.index + 1
                     self.places[name] = declared.array, declared.index
             self.formulas |= {name: found.fget for name, found in vars(owner).items() if isinstance(found, property)}
         own = [name for name in self.kinds if name not in self.places]
@@ -107,7 +109,7 @@ class Table:
 
     def length_of(self, array: str) -> int:
         """How many places of an array have a name."""
-        return sum(whole == array for whole, _ in self.places.values())
+        return self._counts.get(array, 0)
 
     def lengths(self, record: Record, given: dict[str, int]) -> dict[str, int]:
         """Lengths of all arrays: those given, those declared for the sizes of a record, those of places."""

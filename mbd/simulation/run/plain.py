@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
-from mbd.arrays import Matrix, Vector
+from mbd.arrays import Matrix, Vector, read_only
 from mbd.compile.mechanism import Mechanism, ModeCode
 from mbd.equations.programs import mass_matrix
 from mbd.errors import SimulationError
@@ -212,36 +213,43 @@ def _by_unit(scale: Vector, mechanism: Mechanism) -> Vector:
     """Forces and torques as blocks of their own, as the kernel judges them."""
     units = unit_blocks(mechanism)
     result = np.maximum(scale, 1e-300)
-    for unit in (0, 1):
-        chosen = units == unit
-        if chosen.any():
-            result[chosen] = result[chosen].max()
-    return result
+    return np.where(units < 2, _largest(result, units, 0.0)[units], result)
 
 
 def _by_coordinate(point: Point, mechanism: Mechanism) -> tuple[Vector, Vector]:
     """Size of the coordinates and speeds of each row's unit, whose round-off the row inherits."""
     units, n_v = unit_blocks(mechanism), mechanism.layout.n_v
     q, v = np.abs(point.q), np.abs(point.y[:n_v])
-    mine = units[:n_v] if mechanism.vector else None  # else a coordinate has no unit of its own
-    size = [float(np.max(q if mine is None else q[mine == unit], initial=1e-3)) for unit in range(3)]
-    speed = [float(np.max(v[units[:n_v] == unit], initial=1e-3)) for unit in range(3)]
+    if mechanism.vector:
+        size = _largest(q, units[:n_v], 1e-3)
+    else:  # a coordinate has no unit of its own
+        size = np.full(3, np.max(q, initial=1e-3))
     rows = row_units(mechanism)
-    return np.array(size)[rows], np.array(speed)[rows]
+    return size[rows], _largest(v, units[:n_v], 1e-3)[rows]
+
+
+def _largest(values: Vector, units: Any, least: float) -> Vector:
+    """The largest value of each unit, (3,)."""
+    sizes = np.full(3, least)
+    np.maximum.at(sizes, units, values)
+    return sizes
 
 
 def row_units(mechanism: Mechanism) -> Any:
     """0 [m], 1 [rad], 2 other, of each row."""
-    return np.array([{"m": 0, "rad": 1}.get(row.unit, 2) for row in mechanism.equations.rows], dtype=np.int64)
+    return _units(tuple(row.unit for row in mechanism.equations.rows))
 
 
 def unit_blocks(mechanism: Mechanism) -> Any:
     """0 for balance components that are forces, 1 for torques, 2 for others, each judged alone."""
-    numbers = {"m": 0, "rad": 1}
     equations = mechanism.equations
-    units = [numbers.get(unit, 2) for _, unit in equations.configuration.freedoms]
-    units += [2] * equations.n_z
-    return np.array(units, dtype=np.int64)
+    return _units((*(unit for _, unit in equations.configuration.freedoms), *[""] * equations.n_z))
+
+
+@lru_cache(maxsize=256)
+def _units(names: tuple[str, ...]) -> Any:
+    """0 [m], 1 [rad], 2 other."""
+    return read_only(np.array([{"m": 0, "rad": 1}.get(name, 2) for name in names], dtype=np.int64))
 
 
 class KernelScheme:

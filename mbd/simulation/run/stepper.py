@@ -170,7 +170,7 @@ class Stepper:
         v.was[:] = codes.UNKNOWN
         for name, numbers in (*self.own.coefficients().items(), ("nodes", self.own.nodes)):
             getattr(v, name)[: len(numbers)] = numbers
-        v.unit = unit_blocks(self.mechanism)
+        v.unit = unit_blocks(self.mechanism).copy()
         for number, (joint, _, first) in enumerate(self.mechanism.equations.configuration.charts, 1):
             turning = [first + k for k, freedom in enumerate(joint.freedoms) if freedom.unit == "rad"]
             v.turned_by[turning] = number
