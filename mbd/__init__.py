@@ -107,12 +107,17 @@ if TYPE_CHECKING:
         asin as asin,
         atan as atan,
         atan2 as atan2,
+        clip as clip,
         cos as cos,
         cosh as cosh,
         exp as exp,
+        floor as floor,
+        hypot as hypot,
         log as log,
         maximum as maximum,
         minimum as minimum,
+        mod as mod,
+        pi as pi,
         sign as sign,
         sin as sin,
         sinh as sinh,
@@ -151,7 +156,8 @@ _HOMES = {
     "mbd.simulation.diagnostics.replay": "Replay replay",
     "mbd.simulation.simulate": "simulate",
     "mbd.state": "State",
-    "mbd.tape.functions": "acos asin atan atan2 cos cosh exp log maximum minimum sign sin sinh sqrt tan tanh where",
+    "mbd.tape.functions": "acos asin atan atan2 clip cos cosh exp floor hypot log maximum minimum mod pi sign sin sinh "
+    "sqrt tan tanh where",
     "mbd.trajectory": "Trajectory load",
 }
 """The public names, by the module they live in; the block above tells the same to editors and type checkers."""

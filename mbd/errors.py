@@ -75,10 +75,20 @@ def nearest(name: str, valid: Iterable[str], kind: str = "name", known: str = "T
     >>> nearest("left hop", ["left hip", "left knee"], "joint")
     "no joint named 'left hop'; did you mean 'left hip'? The model has 'left hip', 'left knee'"
     """
-    names = sorted(set(valid))
-    close = difflib.get_close_matches(str(name), names, n=1, cutoff=0.6)
+    names, text = sorted(set(valid)), str(name)
+    parts = [each for each in names if each.startswith(f"{text}.")]
+    if parts:
+        return f"no {kind} named {name!r}; it has {_listed(parts)}"
+    close = [each for each in names if each.casefold() == text.casefold()]
+    close = close or difflib.get_close_matches(text, names, n=1, cutoff=0.6)
+    owner = f"{text.rpartition('.')[0]}."
+    names = [each for each in names if each.startswith(owner)] or names
     guess = f"; did you mean {close[0]!r}?" if close else ";"
     known = known if close else known[0].lower() + known[1:]
-    shown = ", ".join(repr(each) for each in names[:12]) + (f", … ({len(names)} in all)" if len(names) > 12 else "")
-    has = f" {known} {shown}" if names else f" {known} none"
+    has = f" {known} {_listed(names)}" if names else f" {known} none"
     return f"no {kind} named {name!r}{guess}{has}"
+
+
+def _listed(names: Sequence[str]) -> str:
+    """The first names of a list, and how many there are."""
+    return ", ".join(repr(each) for each in names[:12]) + (f", … ({len(names)} in all)" if len(names) > 12 else "")

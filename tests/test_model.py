@@ -142,7 +142,7 @@ def test_steps_end_where_sampled_signals_have_a_kink():
     joint = model.joints[0]
     model.apply(mbd.Motor("drive", joint, torque=mbd.Samples([0.0, 0.5, 2.0], [0, 1, 0], kind="linear")))
     model.apply(mbd.Applied("push", joint.child, force=(mbd.Samples([0.1, 0.2, 0.3], [0, 1, 0]), 0.0)))
-    assert model.instants == [0.0, 0.1, 0.3, 0.5, 2.0]
+    assert model.instants(0.0, 3.0) == [0.0, 0.1, 0.3, 0.5, 2.0]
 
 
 @pytest.mark.parametrize(

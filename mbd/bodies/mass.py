@@ -18,6 +18,9 @@ __all__ = ["Inertia", "MassProperties", "inertia_faults", "inertia_fields", "ine
 Inertia: TypeAlias = float | tuple[float, ...]
 """About the center of mass in body axes [kg m²]: a number (about z), (Ixx, Iyy, Izz), or these and (Ixy, Ixz, Iyz)."""
 
+SKEW = 1e-9
+"""Difference of elements of a matrix across its diagonal, over the largest, above which it is not symmetric [-]."""
+
 _ELEMENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
 
 
@@ -35,16 +38,42 @@ def inertia_of(value: Any, what: str) -> Inertia:
 
     >>> inertia_of((1, 2, 3), "inertia")
     (1.0, 2.0, 3.0)
+    >>> inertia_of([[1, 0.1, 0], [0.1, 2, 0], [0, 0, 3]], "inertia")
+    (1.0, 2.0, 3.0, 0.1, 0.0, 0.0)
     """
+    rows = _rows(value)
+    if rows is not None:
+        return _of_matrix([numbers(row, what) for row in rows], what)
     if not isinstance(value, Iterable) or isinstance(value, str | bytes):
         return number(value, what)
     result = numbers(value, what)
     if len(result) not in (3, 6):
         raise ModelError(
-            f"{what} must be a number (about z), (Ixx, Iyy, Izz) or (Ixx, Iyy, Izz, Ixy, Ixz, Iyz); "
+            f"{what} must be a number (about z), (Ixx, Iyy, Izz), (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) or a 3 × 3 matrix; "
             f"got {len(result)} numbers"
         )
     return result
+
+
+def _rows(value: Any) -> list[Any] | None:
+    """The rows of a matrix; None of what is none."""
+    if not isinstance(value, Iterable) or isinstance(value, str | bytes):
+        return None
+    rows = list(value)
+    several = [isinstance(row, Iterable) and not isinstance(row, str | bytes) for row in rows]
+    return rows if rows and all(several) else None
+
+
+def _of_matrix(rows: list[tuple[float, ...]], what: str) -> Inertia:
+    """The elements of a symmetric matrix."""
+    matrix = np.array(rows) if {len(row) for row in rows} == {3} else np.empty(0)
+    if matrix.shape != (3, 3):
+        shape = " and ".join(str(len(row)) for row in rows)
+        raise ModelError(f"{what}: a matrix of 3 rows of 3 numbers is expected, got rows of {shape}")
+    if np.abs(matrix - matrix.T).max() > SKEW * np.abs(matrix).max():
+        raise ModelError(f"{what}: the matrix is not symmetric; Ixy, Ixz and Iyz stand on both sides of its diagonal")
+    moments, products = matrix.diagonal(), matrix[[0, 0, 1], [1, 2, 2]]
+    return tuple(float(each) for each in ((*moments, *products) if products.any() else moments))
 
 
 def inertia_fields(inertia: Inertia) -> dict[str, float]:

@@ -30,7 +30,7 @@ class RigidBody(Body):
     name : its name
     mass : m [kg]
     inertia : I about the center of mass in body axes [kg m²]: a number (about z, for planar motion),
-        (Ixx, Iyy, Izz), or (Ixx, Iyy, Izz, Ixy, Ixz, Iyz), the elements of the matrix
+        (Ixx, Iyy, Izz), (Ixx, Iyy, Izz, Ixy, Ixz, Iyz), the elements of the matrix, or the 3 × 3 matrix itself
     center : place of the center of mass in body axes [m]; kept as `center_offset`, since `center` is the frame there
     """
 

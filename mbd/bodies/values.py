@@ -155,12 +155,23 @@ def triple(values: Any, what: str) -> Vector3:
     return (result[0], result[1], result[2] if len(result) == 3 else 0.0)
 
 
-def unit_vector(values: Any, what: str) -> Vector3:
-    """The direction of a triple; exact for axes along x, y, z.
+LETTERS: dict[str, Vector3] = {
+    "x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0),
+    "-x": (-1.0, 0.0, 0.0), "-y": (0.0, -1.0, 0.0), "-z": (0.0, 0.0, -1.0),
+}  # fmt: skip
+"""Directions by their letters: 'x', 'y', 'z', '-x', '-y', '-z'."""
 
-    >>> unit_vector((0, 0, -2), "axis")
-    (0.0, 0.0, -1.0)
+
+def unit_vector(values: Any, what: str) -> Vector3:
+    """The direction of a triple, or of an axis by its letter; exact for axes along x, y, z.
+
+    >>> unit_vector((0, 0, -2), "axis"), unit_vector("x", "axis")
+    ((0.0, 0.0, -1.0), (1.0, 0.0, 0.0))
     """
+    if isinstance(values, str):
+        if values not in LETTERS:
+            raise ModelError(f"{what} must be a direction such as (0, 0, 1), or 'x', 'y', 'z', '-x' …, got {values!r}")
+        return LETTERS[values]
     x, y, z = triple(values, what)
     size = math.hypot(x, y, z)
     if size == 0.0:

@@ -153,6 +153,10 @@ class Body:
             name = f"llvm.{'fabs' if op == 'abs' else op}.f64"
             self.needs.add(f"declare double @{name}(double)")
             return self.do(f"call double @{name}(double {x})")
+        if op == "floor":
+            self.needs.add("declare double @llvm.floor.f64(double)")
+            whole = self.do(f"call double @llvm.floor.f64(double {x})")
+            return self.do(f"fadd double {whole}, {constant(0.0)}")  # 0 for −0
         if op == "sign":
             zero, above, below = constant(0.0), constant(1.0), constant(-1.0)
             other = self.do(f"fadd double {x}, {zero}")  # 0 for ±0, and NaN stays

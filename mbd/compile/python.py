@@ -28,7 +28,7 @@ __all__ = ["ArrayFunction", "ScalarFunction", "array_function", "scalar_function
 SCALAR = {
     "add": "{} + {}", "sub": "{} - {}", "mul": "{} * {}", "div": "{} / {}", "neg": "-{}",
     "lt": "{} < {}", "le": "{} <= {}", "and": "{} and {}", "or": "{} or {}", "not": "not {}",
-    "where": "{1} if {0} else {2}", "abs": "fabs({})",
+    "where": "{1} if {0} else {2}", "abs": "fabs({})", "floor": "floor({}) + 0.0",
     "min": "{0} if {0} < {1} or {0} != {0} else {1}", "max": "{0} if {0} > {1} or {0} != {0} else {1}",
     "sign": "1.0 if {0} > 0.0 else -1.0 if {0} < 0.0 else {0} + 0.0",
     "atan2": "atan2({}, {})", "pow": "pow({}, {})",
@@ -45,15 +45,18 @@ ARRAYS = SCALAR | {
 _PLAIN: dict[str, Any] = {
     name: getattr(math, name)
     for name in (
-        "acos", "asin", "atan", "atan2", "cos", "cosh", "exp", "fabs", "inf", "log", "nan", "pow", "sin", "sinh",
-        "sqrt", "tan", "tanh",
+        "acos", "asin", "atan", "atan2", "cos", "cosh", "exp", "fabs", "floor", "inf", "log", "nan", "pow", "sin",
+        "sinh", "sqrt", "tan", "tanh",
     )
 }  # fmt: skip
 
 _UFUNCS: dict[str, Any] = {
     "acos": np.arccos, "asin": np.arcsin, "atan": np.arctan, "atan2": np.arctan2, "pow": np.power, "inf": math.inf,
     "nan": math.nan, "where": np.where, "logical_not": np.logical_not,
-    **{name: getattr(np, name) for name in ("cos", "cosh", "exp", "fabs", "log", "sin", "sinh", "sqrt", "tan", "tanh")},
+    **{
+        name: getattr(np, name)
+        for name in ("cos", "cosh", "exp", "fabs", "floor", "log", "sin", "sinh", "sqrt", "tan", "tanh")
+    },
 }  # fmt: skip
 
 

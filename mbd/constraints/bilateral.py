@@ -14,7 +14,16 @@ from mbd.constraints.measures import JointMeasure
 from mbd.constraints.user_measure import measure
 from mbd.errors import ModelError
 from mbd.forces.base import joint_of
-from mbd.forces.quantities import Mention, arguments_of, kinks, mentioned, quantity_of, scalar, value_parameters
+from mbd.forces.quantities import (
+    Instants,
+    Mention,
+    arguments_of,
+    kinks,
+    mentioned,
+    quantity_of,
+    scalar,
+    value_parameters,
+)
 from mbd.joints.base import Joint
 from mbd.scope import Scope
 from mbd.tape.derivatives import live
@@ -93,7 +102,7 @@ class Bilateral(Constraint):
         """`value` where it is a number, and arguments given as numbers."""
         return value_parameters(self.value, self.arguments, self.name, "value")
 
-    def instants(self) -> tuple[float, ...]:
+    def instants(self) -> Instants:
         """Kinks of its samples."""
         return kinks(self.value)
 

@@ -11,6 +11,7 @@ from mbd.constraints.base import VelocityConstraint
 from mbd.constraints.expressions import is_expression, plain, quantities_in
 from mbd.errors import ModelError
 from mbd.forces.quantities import (
+    Instants,
     Mention,
     Samples,
     arguments_of,
@@ -92,6 +93,6 @@ class Nonholonomic(VelocityConstraint):
         """`bias` where it is a number, and arguments given as numbers."""
         return value_parameters(self.bias, self.arguments, self.name, "bias")
 
-    def instants(self) -> tuple[float, ...]:
+    def instants(self) -> Instants:
         """Kinks of its samples."""
         return kinks(self.bias)

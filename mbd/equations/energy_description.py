@@ -14,6 +14,7 @@ from mbd.constraints.event import Event
 from mbd.description import all_are, served
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.forces.base import Force
+from mbd.forces.quantities import instants_of
 
 __all__ = ["Coordinate", "EnergyDescription", "Expression"]
 
@@ -178,11 +179,10 @@ class EnergyDescription:
     def own_word(self) -> _OwnParameters:
         return _OwnParameters(self.name, self.own_parameters, self.domains)
 
-    @property
-    def instants(self) -> list[float]:
+    def instants(self, begin: float, end: float) -> list[float]:
         """Times at which sampled signals have a kink, in order: steps end there [s]."""
         words: list[Force | Constraint] = [*self.applied, *self.words]
-        return sorted({instant for word in words for instant in word.instants()})
+        return instants_of(words, begin, end)
 
     @property
     def _constraints(self) -> Mapping[str, Any]:

@@ -10,6 +10,7 @@ from mbd.bodies.values import name_of
 from mbd.errors import ModelError
 from mbd.forces.base import Action, Force, frame_of
 from mbd.forces.quantities import (
+    Instants,
     Mention,
     arguments_of,
     is_single,
@@ -76,7 +77,7 @@ class Applied(Force):
             self.torque, self.arguments, self.name, "torque"
         )
 
-    def instants(self) -> tuple[float, ...]:
+    def instants(self) -> Instants:
         """Kinks of its samples."""
         return kinks(self.force, self.torque)
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from mbd.bodies.base import Frame
 from mbd.bodies.domains import Parameterized
 from mbd.errors import ModelError
-from mbd.forces.quantities import Mention
+from mbd.forces.quantities import Instants, Mention
 from mbd.joints.base import Joint
 from mbd.scope import Scope
 from mbd.tape.node import Node, Scalar
@@ -63,7 +63,7 @@ class Force(Parameterized, ABC):
     def parameters(self) -> dict[str, float]:
         """Run-time parameters by full name."""
 
-    def instants(self) -> tuple[float, ...]:
+    def instants(self) -> Instants:
         """Times at which its sampled signals have a kink [s]."""
         return ()
 

@@ -7,7 +7,16 @@ from typing import Any
 
 from mbd.bodies.values import name_of
 from mbd.forces.base import Action, Force, joint_of
-from mbd.forces.quantities import Mention, arguments_of, kinks, mentioned, quantity_of, scalar, value_parameters
+from mbd.forces.quantities import (
+    Instants,
+    Mention,
+    arguments_of,
+    kinks,
+    mentioned,
+    quantity_of,
+    scalar,
+    value_parameters,
+)
 from mbd.joints.base import Joint
 from mbd.scope import Scope
 
@@ -56,7 +65,7 @@ class Motor(Force):
         """`torque` where it is a number, and arguments given as numbers."""
         return value_parameters(self.torque, self.arguments, self.name, "torque")
 
-    def instants(self) -> tuple[float, ...]:
+    def instants(self) -> Instants:
         """Kinks of its samples."""
         return kinks(self.torque)
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 
 from mbd.bodies.base import Frame
-from mbd.bodies.values import is_number, number, numbers, shown
+from mbd.bodies.values import flag, is_number, number, numbers, shown
 from mbd.errors import ModelError
 from mbd.joints.base import Joint
 from mbd.scope import Scope
@@ -18,8 +19,8 @@ from mbd.tape.node import Scalar
 from mbd.tape.tracing import Argument, traced, traced_scalar
 
 __all__ = [
-    "ArgumentSpec", "Mention", "Samples", "arguments_of", "is_single", "kinks", "mentioned", "quantity_of",
-    "resolved", "scalar", "triple_at", "triple_of", "value_parameters",
+    "ArgumentSpec", "Instants", "Mention", "Repeated", "Samples", "arguments_of", "instants_of", "is_single", "kinks",
+    "mentioned", "quantity_of", "resolved", "scalar", "triple_at", "triple_of", "value_parameters",
 ]  # fmt: skip
 
 Mention: TypeAlias = Frame | Joint | str
@@ -29,22 +30,42 @@ ArgumentSpec: TypeAlias = tuple[tuple[str, Mention | float], ...]
 """(label, what it stands for): the name of a quantity, a frame (its position), a joint (its coordinates), a number."""
 
 
+class Repeated(NamedTuple):
+    """Instants that come again after every period [s]."""
+
+    times: tuple[float, ...]
+    period: float
+
+    def within(self, begin: float, end: float) -> list[float]:
+        """Those from the period of begin to that of end, a million at most."""
+        first = math.floor((begin - self.times[0]) / self.period)
+        periods = min((end - begin) / self.period + 2.0, 1e6 / len(self.times))
+        return [time + count * self.period for count in range(first, first + int(periods) + 1) for time in self.times]
+
+
+Instants: TypeAlias = tuple[float | Repeated, ...]
+"""Times at which steps are to end [s]."""
+
+
 @dataclass(frozen=True, init=False)
 class Samples:
-    """A signal sampled in time, constant before its first sample and after its last.
+    """A signal sampled in time, constant before its first sample and after its last, or repeated for ever.
 
     Parameters
     ----------
     time : (n,) increasing [s]
     values : (n,) samples, or (n, k) of k components
     kind : 'cubic' keeps the shape of the samples with a continuous slope, 'linear' joins them by straight lines
+    periodic : whether the signal repeats itself, with the period from the first time to the last, as data of a gait
+        cycle do; the last value is the first
     """
 
     time: tuple[float, ...]
     values: tuple[Any, ...]
     kind: str = "cubic"
+    periodic: bool = False
 
-    def __init__(self, time: Any, values: Any, kind: str = "cubic") -> None:
+    def __init__(self, time: Any, values: Any, kind: str = "cubic", periodic: bool = False) -> None:
         try:
             table = np.asarray(values, dtype=float)
         except (TypeError, ValueError, OverflowError):
@@ -63,6 +84,12 @@ class Samples:
         rows: Any = table.tolist()
         object.__setattr__(self, "values", tuple(rows if table.ndim == 1 else map(tuple, rows)))
         object.__setattr__(self, "kind", kind)
+        object.__setattr__(self, "periodic", flag(periodic, "periodic of Samples"))
+        if self.periodic and (len(rows) < 3 or self.values[0] != self.values[-1]):
+            raise ModelError(
+                "Samples that repeat need three values at least, of which the last is the first; got "
+                f"{len(rows)}, from {shown(self.values[0])} to {shown(self.values[-1])}"
+            )
         for part in self.components:
             part.pieces()
 
@@ -71,21 +98,31 @@ class Samples:
         """Each component as a signal of its own."""
         if not isinstance(self.values[0], tuple):
             return (self,)
-        return tuple(Samples(self.time, column, self.kind) for column in zip(*self.values, strict=True))
+        columns = zip(*self.values, strict=True)
+        return tuple(Samples(self.time, column, self.kind, self.periodic) for column in columns)
 
     def pieces(self) -> Pieces:
         """Breaks and rows of coefficients as the tape stores them."""
         through = linear if self.kind == "linear" else monotone
-        return through(self.time, self.values, "constant", "Samples")
+        if not self.periodic:
+            return through(self.time, self.values, "constant", "Samples")
+        period = self.time[-1] - self.time[0]  # a sample of the period before and one of that after give equal slopes
+        time = (self.time[-2] - period, *self.time, self.time[1] + period)
+        return through(time, (self.values[-2], *self.values, self.values[1]), "constant", "Samples")
 
     @property
     def kinks(self) -> tuple[float, ...]:
-        """Times at which its slope jumps [s]: every sample of straight lines, the ends of a cubic."""
+        """Times at which its slope jumps [s]: every sample of straight lines, the ends of a cubic unless it repeats."""
+        if self.periodic and self.kind == "cubic":
+            return ()
         return self.time if self.kind == "linear" else (self.time[0], self.time[-1])
 
     def signal(self, scope: Scope, owner: str) -> Scalar:
         """Its value at the time t."""
-        return scope.tape.lookup(scope.table(owner, *self.pieces()), scope.time)
+        time: Scalar = scope.time
+        if self.periodic:
+            time = self.time[0] + scope.tape.remainder(time - self.time[0], self.time[-1] - self.time[0])
+        return scope.tape.lookup(scope.table(owner, *self.pieces()), time)
 
 
 def is_single(value: Any) -> bool:
@@ -197,10 +234,12 @@ def triple_at(value: Any, arguments: ArgumentSpec, scope: Scope, owner: str, fie
     return result if len(result) == 3 else (*result, 0.0)
 
 
-def kinks(*values: Any) -> tuple[float, ...]:
+def kinks(*values: Any) -> Instants:
     """Times at which quantities given by samples have a kink [s]."""
     parts = [part for value in values for part in (value if isinstance(value, tuple) else (value,))]
-    return tuple(instant for part in parts if isinstance(part, Samples) for instant in part.kinks)
+    samples = [part for part in parts if isinstance(part, Samples)]
+    repeated = [Repeated(part.kinks, part.time[-1] - part.time[0]) for part in samples if part.periodic and part.kinks]
+    return (*(instant for part in samples if not part.periodic for instant in part.kinks), *repeated)
 
 
 def value_parameters(value: Any, arguments: ArgumentSpec, owner: str, field: str) -> dict[str, float]:
@@ -213,3 +252,16 @@ def value_parameters(value: Any, arguments: ArgumentSpec, owner: str, field: str
     elif is_number(value):
         result[f"{owner}.{field}"] = float(value)
     return result
+
+
+class Timed(Protocol):
+    """A word with signals in time."""
+
+    def instants(self) -> Instants: ...
+
+
+def instants_of(words: Iterable[Timed], begin: float, end: float) -> list[float]:
+    """Instants of words in order; of those that repeat, the ones from begin to end [s]."""
+    found = [instant for word in words for instant in word.instants()]
+    plain = [instant for instant in found if not isinstance(instant, Repeated)]
+    return sorted({*plain, *(t for each in found if isinstance(each, Repeated) for t in each.within(begin, end))})

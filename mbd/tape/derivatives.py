@@ -14,7 +14,7 @@ from mbd.tape.operations import CONDITIONS, value
 
 __all__ = ["gradient", "jvp", "jvps", "live", "rebuild", "substitute", "vjp"]
 
-_FLAT = CONDITIONS | {"sign"}
+_FLAT = CONDITIONS | {"floor", "sign"}
 """Operations whose derivative is zero wherever it exists."""
 
 

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from mbd.errors import TraceError
 from mbd.tape.node import BINARY, UNARY, Node
 
 __all__ = [
-    "NUMPY", "acos", "asin", "atan", "atan2", "cos", "cosh", "exp", "log", "maximum", "minimum", "on_numpy", "sign",
-    "sin", "sinh", "sqrt", "tan", "tanh", "where",
+    "NUMPY", "acos", "asin", "atan", "atan2", "clip", "cos", "cosh", "exp", "floor", "hypot", "log", "maximum",
+    "minimum", "mod", "on_numpy", "on_numpy_function", "pi", "sign", "sin", "sinh", "sqrt", "tan", "tanh", "where",
 ]  # fmt: skip
 
 _ARRAY = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "atan2": "arctan2", "min": "minimum", "max": "maximum"}
@@ -75,9 +76,41 @@ exp = _unary("exp", "Exponential")
 log = _unary("log", "Natural logarithm")
 sqrt = _unary("sqrt", "Square root")
 sign = _unary("sign", "Sign, −1, 0 or 1,")
+floor = _unary("floor", "The largest whole number not above it,")
 atan2 = _binary("atan2", "atan2", "Angle of the point (y, x), in that order [rad],")
 minimum = _binary("min", "minimum", "The smaller")
 maximum = _binary("max", "maximum", "The larger")
+
+
+pi = math.pi
+"""Half the circumference of the unit circle, 3.14159…"""
+
+
+def clip(x: Any, low: Any, high: Any) -> Any:
+    """x held between low and high: ``minimum(maximum(x, low), high)``.
+
+    >>> clip(1.5, -1.0, 1.0), clip(0.2, -1.0, 1.0)
+    (1.0, 0.2)
+    """
+    return minimum(maximum(x, low), high)
+
+
+def hypot(x: Any, y: Any) -> Any:
+    """``sqrt(x² + y²)``, whose derivative at 0 is not finite.
+
+    >>> hypot(3.0, 4.0)
+    5.0
+    """
+    return sqrt(x * x + y * y)
+
+
+def mod(x: Any, y: Any) -> Any:
+    """``x − y ⌊x / y⌋``, x modulo y with the sign of y: the phase of what repeats. It jumps where x / y is whole.
+
+    >>> mod(7.5, 2.0), mod(-0.5, 2.0)
+    (1.5, 1.5)
+    """
+    return x % y
 
 
 def where(condition: Any, yes: Any, no: Any) -> Any:
@@ -105,5 +138,23 @@ NUMPY: dict[str, Callable[..., Any]] = {
     "add": lambda x, y: x + y, "subtract": lambda x, y: x - y, "multiply": lambda x, y: x * y,
     "divide": lambda x, y: x / y, "power": lambda x, y: x**y, "less": lambda x, y: x < y,
     "less_equal": lambda x, y: x <= y, "greater": lambda x, y: x > y, "greater_equal": lambda x, y: x >= y,
+    "floor": floor, "hypot": hypot, "remainder": mod,
 }  # fmt: skip
 """The recorded function behind each numpy ufunc name."""
+
+INSTEAD = {
+    "interp": "mbd.Samples(time, values) for a signal in time, mbd.Tabulated for a loss",
+    "piecewise": "mbd.where(condition, x, y)", "select": "mbd.where(condition, x, y)",
+}  # fmt: skip
+"""What to write for functions of numpy that are not recorded."""
+
+
+def on_numpy_function(function: Any, args: Sequence[Any], keywords: Mapping[str, Any]) -> Any:
+    """A function of numpy, other than a ufunc, that met traced values."""
+    name, recorded = function.__name__, {"where": where, "clip": clip}
+    if name in recorded and not keywords and len(args) == 3:
+        return recorded[name](*args)
+    if name in recorded or name in INSTEAD:
+        instead = INSTEAD.get(name, f"mbd.{name} with three arguments")
+        raise TraceError(f"numpy.{name} of traced values is not recorded; write {instead}")
+    return function._implementation(*args, **keywords)

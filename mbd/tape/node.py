@@ -90,6 +90,12 @@ class Node:
     def __abs__(self) -> Node:
         return self.tape.unary("abs", self)
 
+    def __mod__(self, other: Scalar) -> Node:
+        return self.tape.remainder(self, other) if _is_scalar(other) else NotImplemented
+
+    def __rmod__(self, other: Scalar) -> Node:
+        return self.tape.remainder(other, self) if _is_scalar(other) else NotImplemented
+
     __lt__, __gt__ = _related("lt"), _related("lt", reflected=True)
     __le__, __ge__ = _related("le"), _related("le", reflected=True)
     __and__, __or__ = _related("and"), _related("or")
@@ -117,6 +123,12 @@ class Node:
         )
 
     __int__ = __index__ = __round__ = __float__
+
+    def __array_function__(self, function: Any, types: Any, args: Any, kwargs: Any) -> Any:
+        """``np.where`` and ``np.clip`` of traced values; other functions of numpy do what they do with objects."""
+        from mbd.tape.functions import on_numpy_function
+
+        return on_numpy_function(function, args, kwargs)
 
     def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **kwargs: Any) -> Any:
         """Let ``np.sin(node)`` and friends record themselves."""
@@ -344,6 +356,10 @@ class Tape:
             square = self.mul(half, half)
             return self.mul(square, a) if int(n) % 2 else square
         return self.binary("pow", a, b)
+
+    def remainder(self, left: Scalar, right: Scalar) -> Node:
+        """``left − right ⌊left / right⌋``."""
+        return self.sub(left, self.mul(right, self.unary("floor", self.div(left, right))))
 
     def unary(self, op: str, argument: Scalar) -> Node:
         """A function of UNARY."""

@@ -21,7 +21,7 @@ def _sign(x: float) -> float:
 UNARY: dict[str, Callable[[Any], Any]] = {
     "sqrt": math.sqrt, "sin": math.sin, "cos": math.cos, "tan": math.tan, "asin": math.asin, "acos": math.acos,
     "atan": math.atan, "sinh": math.sinh, "cosh": math.cosh, "tanh": math.tanh, "exp": math.exp, "log": math.log,
-    "abs": abs, "sign": _sign, "not": lambda x: not x,
+    "abs": abs, "floor": lambda x: math.floor(x) + 0.0, "sign": _sign, "not": lambda x: not x,
 }  # fmt: skip
 """Operations of one argument and their value on floats."""
 

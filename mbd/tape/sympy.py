@@ -163,12 +163,13 @@ def _log_of(expression: Callable[[Node, Tape], Node]) -> Rule:
     return lambda tape, args: tape.unary("log", expression(args[0], tape))
 
 
-_SAME = ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "sign")
+_SAME = ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "sign", "floor")
 """Functions that have one name in sympy and on the tape."""
 
 _FUNCTIONS: dict[str, Rule] = {
     **{op: _unary(op) for op in _SAME},
     "Abs": _unary("abs"),
+    "Mod": lambda tape, args: tape.remainder(args[0], args[1]),
     "atan2": lambda tape, args: tape.binary("atan2", args[0], args[1]),
     "Min": _many("min"),
     "Max": _many("max"),

@@ -63,7 +63,10 @@ def traced_scalar(
     result = traced(function, arguments, what, tape, parameter, symbols)
     if isinstance(result, Node):
         return result
-    raise TraceError(f"{what}: one number is expected, {len(result)} came from {_title(function)}")
+    raise TraceError(
+        f"{what}: one number is expected, a sequence of {len(result)} came from {_title(function)}; "
+        "return the number itself"
+    )
 
 
 # plain functions ----------------------------------------------------------------------------------------------------

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
+from mbd.bodies.algebra import ZERO
 from mbd.bodies.base import Body, Frame
 from mbd.bodies.domains import ParameterCheck, Parameterized
 from mbd.bodies.ground import Ground
@@ -43,6 +44,7 @@ def faults(model: Description) -> list[str]:
     found += rule_faults(model)
     found += choice_faults(model)
     found += massless_faults(model, model.parameters)
+    found += tilted_faults(model)
     return list(dict.fromkeys(found))
 
 
@@ -279,6 +281,41 @@ def massless_faults(model: Description, values: Mapping[str, float]) -> list[str
                 "determines its motion; give it a mass, or weld it"
             )
     return found
+
+
+def tilted_faults(model: Description) -> list[str]:
+    """Bodies with an inertia about z only that a joint between them and the ground may turn out of x–y."""
+    if is_planar(model):
+        return []
+    by_body: dict[str, list[Joint]] = {}
+    for joint in model.joints:
+        for frame in (joint.parent, joint.child):
+            by_body.setdefault(frame.body.name, []).append(joint)
+    tilted: dict[str, Joint] = {}
+    reached, waiting = {model.ground.name}, [model.ground.name]
+    while waiting:
+        here = waiting.pop()
+        for joint in by_body.get(here, []):
+            ends = {joint.parent.body.name, joint.child.body.name}
+            for there in ends - reached:
+                reached.add(there)
+                waiting.append(there)
+                if here in tilted or _tilts(joint):
+                    tilted[there] = tilted.get(here, joint)
+    return [
+        f"inertia of '{body.name}' is one number, which is about z only, and '{tilted[body.name].name}' turns it out "
+        "of the plane x–y; give (Ixx, Iyy, Izz)"
+        for body in model.bodies.values()
+        if body.name in tilted and body.parameters().get(f"{body.name}.inertia", 0.0) != 0.0
+    ]
+
+
+def _tilts(joint: Joint) -> bool:
+    """Whether a joint may turn its child about another axis than z, or holds it tilted."""
+    if not (joint.parent.is_planar and joint.child.is_planar):
+        return True
+    turns = not joint.freedoms or any(label.unit == "rad" for label in joint.freedoms)
+    return turns and not joint.is_planar and abs(getattr(joint, "axis", ZERO)[2]) != 1.0
 
 
 def _constrained(model: Description) -> list[Frame | Joint | str]:

@@ -37,7 +37,8 @@ RAMP = ((0.0, 3.0, 0.0, 0.0),)
 
 LAYOUT = Layout(2, 2, 1, 1, 1, 1, 3, (3, 3 + 5 * len(BREAKS)))
 
-UNARY = ("sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "abs", "sign")
+UNARY = ("sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "abs", "sign",
+         "floor")  # fmt: skip
 BINARY = ("atan2", "min", "max", "pow")
 STEPS = ("add", "sub", "mul", "div", "neg", *UNARY, *BINARY, "sin", "cos", "lt", "le", "and", "or", "not", "where",
          "where", "table", "table1", "table2", "table3", "ramp", "const", "mixed")  # fmt: skip

@@ -23,7 +23,7 @@ FUNCTIONS: dict[str, Callable[..., Number]] = {
     "neg": lambda x: -x, "where": lambda c, x, y: x if c else y, "pow": lambda x, y: x**y,
     "sqrt": mp.sqrt, "sin": mp.sin, "cos": mp.cos, "tan": mp.tan, "asin": mp.asin, "acos": mp.acos, "atan": mp.atan,
     "sinh": mp.sinh, "cosh": mp.cosh, "tanh": mp.tanh, "exp": mp.exp, "log": mp.log, "abs": abs, "sign": mp.sign,
-    "atan2": mp.atan2, "min": min, "max": max, "lt": lambda x, y: x < y, "le": lambda x, y: x <= y,
+    "floor": mp.floor, "atan2": mp.atan2, "min": min, "max": max, "lt": lambda x, y: x < y, "le": lambda x, y: x <= y,
     "and": lambda x, y: x and y, "or": lambda x, y: x or y, "not": lambda x: not x,
 }  # fmt: skip
 
@@ -96,6 +96,8 @@ def _step(tape: Tape, op: str, places: Sequence[int], nodes: list[Node], values:
         if abs(x) > 20 or (op == "tan" and abs(mp.cos(x)) < 1e-2):
             return False
         value, record = FUNCTIONS[op](x), lambda: tape.unary(op, a)
+    if op == "floor" and abs(x - mp.nint(x)) < 1e-6:
+        return False
     if abs(value) > 1e5 or (value and abs(value) < 1e-5):
         return False
     nodes.append(record())

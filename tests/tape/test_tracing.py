@@ -43,7 +43,7 @@ def test_several_results_become_a_tuple(scene, function):
     t, point = arguments[0][1], arguments[2][1]
     result = traced(function, arguments, "f", tape)
     assert result[0] is t and result[1].data == 2.0 and result[2] is point[0]
-    with pytest.raises(TraceError, match="f: one number is expected, 3 came"):
+    with pytest.raises(TraceError, match="f: one number is expected, a sequence of 3 came"):
         traced_scalar(function, arguments, "f", tape)
 
 

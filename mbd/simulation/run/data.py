@@ -142,7 +142,8 @@ class RunData:
         self.failure: Failure | None = None
         self.energy = EnergyFindings()
         self.room = RoomFindings()
-        controllers, instants = getattr(model, "controllers", ()), getattr(model, "instants", ())
+        controllers = getattr(model, "controllers", ())
+        instants = model.instants(start.time, end) if hasattr(model, "instants") else ()
         self.turns = TurnCounter()
         self.boundaries = Boundaries(controllers, instants, start.time, dt, end)
         self.damage = ""  # of the memory of the start

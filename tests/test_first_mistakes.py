@@ -1,0 +1,122 @@
+"""What people get wrong in their first hour, and what they are told or given."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import mbd
+
+
+def pendulum(**joint: Any) -> tuple[mbd.Model, mbd.Revolute]:
+    """A rod on a pin."""
+    model, rod = mbd.Model("pendulum"), mbd.Link("rod", length=1.0, **mbd.rod(1.0, length=1.0).link)
+    pin = mbd.Revolute("pin", model.ground.origin, rod.start, **joint)
+    model.connect(pin)
+    return model, pin
+
+
+def driven(law: Any) -> mbd.Trajectory:
+    """The pendulum under a motor."""
+    model, pin = pendulum()
+    model.apply(mbd.Motor("drive", pin, law))
+    return mbd.simulate(model, mbd.assemble(model, position={"pin.angle": 0.1}), mbd.HHT(), dt=1e-2, until=0.5)
+
+
+@pytest.mark.parametrize(
+    ("of_numpy", "of_mbd"),
+    [
+        (lambda t: np.where(t > 0.2, 1.0, -1.0), lambda t: mbd.where(t > 0.2, 1.0, -1.0)),
+        (lambda t: np.clip(9.0 * t, 0.5, 2.0), lambda t: mbd.minimum(mbd.maximum(9.0 * t, 0.5), 2.0)),
+        (lambda t: np.hypot(t, 1.0), lambda t: mbd.sqrt(t * t + 1.0)),
+        (lambda t: np.mod(t, 0.17), lambda t: t - 0.17 * mbd.floor(t / 0.17)),
+        (lambda t: t % 0.17, lambda t: mbd.mod(t, 0.17)),
+        (lambda t: np.sin(np.pi * t), lambda t: mbd.sin(mbd.pi * t)),
+        (lambda t: mbd.clip(9.0 * t, 0.5, 2.0), lambda t: np.minimum(np.maximum(9.0 * t, 0.5), 2.0)),
+    ],
+)
+def test_functions_of_numpy_are_those_of_mbd(of_numpy: Callable[[Any], Any], of_mbd: Callable[[Any], Any]) -> None:
+    np.testing.assert_array_equal(driven(of_numpy)["pin.angle"], driven(of_mbd)["pin.angle"])
+
+
+@pytest.mark.parametrize(
+    ("law", "said"),
+    [
+        (lambda t: [t], "one number is expected, a sequence of 1 came .* return the number itself"),
+        (lambda t: np.interp(t, [0.0, 1.0], [0.0, 1.0]), r"numpy.interp .* write mbd.Samples\(time, values\)"),
+        (lambda t: np.clip(t, 0.0, None, out=None), "numpy.clip of traced values is not recorded; write mbd.clip"),
+    ],
+)
+def test_laws_that_cannot_be_recorded_are_told_what_to_write(law: Any, said: str) -> None:
+    with pytest.raises(mbd.TraceError, match=said):
+        driven(law)
+
+
+@pytest.mark.parametrize(("letter", "axis"), [("x", (1, 0, 0)), ("-y", (0, -1, 0)), ("z", (0, 0, 1))])
+def test_an_axis_may_be_a_letter(letter: str, axis: tuple[int, int, int]) -> None:
+    model, _ = pendulum()
+    body = mbd.PointMass("body", mass=1.0)
+    assert mbd.Prismatic("rail", model.ground.origin, body.origin, axis=letter) == mbd.Prismatic(
+        "rail", model.ground.origin, body.origin, axis=axis
+    )
+
+
+def test_a_letter_that_is_no_axis_is_refused() -> None:
+    with pytest.raises(
+        mbd.ModelError, match=r"axis of 'pin' must be a direction such as \(0, 0, 1\), or 'x', .* got 'w'"
+    ):
+        pendulum(axis="w")
+
+
+def test_an_inertia_may_be_a_matrix() -> None:
+    matrix = np.array([[2.0, 0.1, 0.2], [0.1, 3.0, 0.3], [0.2, 0.3, 4.0]])
+    assert mbd.RigidBody("body", mass=1.0, inertia=matrix).inertia == (2.0, 3.0, 4.0, 0.1, 0.2, 0.3)
+    assert mbd.RigidBody("body", mass=1.0, inertia=np.diag([1.0, 2.0, 2.5])).inertia == (1.0, 2.0, 2.5)
+
+
+@pytest.mark.parametrize(
+    ("matrix", "said"),
+    [
+        ([[1.0, 0.2, 0.0], [0.1, 1.0, 0.0], [0.0, 0.0, 1.0]], "the matrix is not symmetric"),
+        ([[1.0, 0.0], [0.0, 1.0]], "a matrix of 3 rows of 3 numbers is expected, got rows of 2 and 2"),
+    ],
+)
+def test_a_matrix_that_is_no_inertia_is_refused(matrix: Any, said: str) -> None:
+    with pytest.raises(mbd.ModelError, match=f"inertia of 'body'.*{said}"):
+        mbd.RigidBody("body", mass=1.0, inertia=matrix)
+
+
+def test_an_inertia_about_z_is_no_inertia_of_a_body_that_turns_about_x() -> None:
+    model, body = mbd.Model("tilting"), mbd.RigidBody("body", mass=1.0, inertia=0.1)
+    model.connect(mbd.Revolute("pin", model.ground.origin, body.point(0.0, 1.0), axis="x"))
+    [fault] = model.check()
+    assert fault == (
+        "inertia of 'body' is one number, which is about z only, and 'pin' turns it out of the plane x–y; "
+        "give (Ixx, Iyy, Izz)"
+    )
+
+
+def test_a_body_that_turns_about_z_on_a_lift_needs_one_number() -> None:
+    model = mbd.Model("lift")
+    cabin, fan = mbd.PointMass("cabin", mass=1.0), mbd.RigidBody("fan", mass=1.0, inertia=0.1)
+    model.connect(
+        mbd.Prismatic("lift", model.ground.origin, cabin.origin, axis="z"),
+        mbd.Revolute("pin", cabin.origin, fan.origin),
+    )
+    assert model.check() == []
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ("pin", r"no result named 'pin'; it has 'pin.acceleration', 'pin.angle'"),
+        ("rod.end.X", r"did you mean 'rod.end.x'\? The run has 'rod.end.vx'"),
+        ("Rod.end.x", r"did you mean 'rod.end.x'\?"),
+    ],
+)
+def test_a_result_that_is_none_is_told_its_neighbours(asked: str, said: str) -> None:
+    with pytest.raises(mbd.UnknownNameError, match=said):
+        driven(0.0)[asked]
