@@ -227,8 +227,8 @@ class Description:
     def __repr__(self) -> str:
         counts = {"bodies": len(self.bodies) - 1, "joints": len(self.joints), "forces": len(self.forces)}
         counts["constraints"] = len(self.constraints)
-        said = ", ".join(f"{count} {kind}" for kind, count in counts.items())
-        return f"{type(self).__name__}({self.name!r}: {said})"
+        counted = ", ".join(f"{count} {kind}" for kind, count in counts.items())
+        return f"{type(self).__name__}({self.name!r}: {counted})"
 
 
 def _bare(joint: Joint, tunable: Iterable[str]) -> dict[str, dict[str, Any]]:

@@ -87,12 +87,12 @@ class Lagrangian(EnergyDescription):
 
     def describe(self, mobility: bool = False) -> str:
         """The mechanism in a page of text; with `mobility` the degrees of freedom too, see `mbd.mobility`."""
-        said = described(self, self.check())
+        text = described(self, self.check())
         if mobility and not self.check():
             from mbd.assembly.mobility import mobility as of
 
-            said += f"\n{of(self)}"
-        return said
+            text += f"\n{of(self)}"
+        return text
 
     def cost(self) -> Cost:
         """Operations of the equations, and of each effect."""

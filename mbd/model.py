@@ -66,12 +66,12 @@ class Model(Description):
         from mbd.topology.describe import description
 
         self.require_own()
-        said = description(self)
+        text = description(self)
         if mobility and not self.check():
             from mbd.assembly.mobility import mobility as of
 
-            said += f"\n{of(self)}"
-        return said
+            text += f"\n{of(self)}"
+        return text
 
     def equations(self, latex: bool = False) -> str:
         """The equations of motion, printed as text or LaTeX."""

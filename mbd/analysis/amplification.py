@@ -84,8 +84,8 @@ def amplification_matrix(integrator: Integrator, turn: float, damping: float = 0
     """
     system = LinearOscillator(turn, damping)
     runs = [oscillated(integrator, turn, damping, np.array(start), WARM_UP) for start in ((1.0, 0.0), (0.3, 1.0))]
-    told = [_numbers(*each) for run in runs for each in run]
-    seen = np.array([numbers for numbers in told if len(numbers) == len(told[-1])])
+    states = [_numbers(*each) for run in runs for each in run]
+    seen = np.array([numbers for numbers in states if len(numbers) == len(states[-1])])
     last = runs[0][-1]
     sizes = np.max(np.abs(seen), axis=0)
     carried = np.flatnonzero(np.any(np.abs(seen - seen[0]) > 1e-14 * sizes, axis=0) & (sizes > 0.0))

@@ -33,10 +33,10 @@ def linear_table(linear: Linearization) -> str:
     kind = "not in equilibrium"
     if linear.is_equilibrium:
         kind = "in steady motion" if np.any(linear.y[count : 2 * count]) else "in equilibrium"
-    told = f"{count} coordinate{'s' * (count != 1)}, {rows or 'no'} row{'s' * (rows != 1)}"
+    size = f"{count} coordinate{'s' * (count != 1)}, {rows or 'no'} row{'s' * (rows != 1)}"
     if not linear.states:
-        return f"{linear.model} at t = {linear.time:g} s: {told}\n  no states: rows determine the motion"
-    lines = [f"{linear.model} at t = {linear.time:g} s, {kind}: {told}", f"  states: {', '.join(linear.states)}"]
+        return f"{linear.model} at t = {linear.time:g} s: {size}\n  no states: rows determine the motion"
+    lines = [f"{linear.model} at t = {linear.time:g} s, {kind}: {size}", f"  states: {', '.join(linear.states)}"]
     zero = NULL * float(np.max(linear.frequencies, initial=0.0))
     still = int(np.count_nonzero(linear.frequencies <= zero))
     lines.append(f"  {'ω [rad/s]':>11} {'f [Hz]':>11} {'damping ζ':>10}  motion")
@@ -75,7 +75,7 @@ def criteria_table(found: Criteria) -> str:
         lines = [name, f"  {'':<32}{'':>14}{titles}"]
     else:
         lines = [f"{name:<34}{'':>14}{titles}"]
-    told = [
+    entries = [
         ("order of consistency", f"{found.order:.2f}", exact and f"{exact.order}"),
         ("spectral radius at infinity", _radius(found.rho_inf), exact and _radius(exact.rho_inf)),
         ("stable up to ω dt", _limit(found.stability_limit),
@@ -85,7 +85,7 @@ def criteria_table(found: Criteria) -> str:
         ("period elongation, ω dt → 0", _power(found.elongation_coefficient, found.elongation_order),
          exact and _power(exact.elongation_coefficient, exact.elongation_order)),
     ]  # fmt: skip
-    lines += [f"  {what:<32}{came:>22}" + (f"{wanted:>22}" if wanted else "") for what, came, wanted in told]
+    lines += [f"  {what:<32}{came:>22}" + (f"{wanted:>22}" if wanted else "") for what, came, wanted in entries]
     lines.append(f"  {'ω dt':>10} {'spectral radius':>16} {'damping ratio':>14} {'elongation':>11}")
     step = max(1, -(-len(found.spectra) // SHOWN))
     for each in found.spectra[::step]:

@@ -254,7 +254,7 @@ def _off_manifold(equations: Equations, named: _Named, q: Vector) -> list[str]:
         given, names = [k for k in own if k in named.q], ", ".join(map(repr, joint.coordinate_names))
         if 0 < len(given) < len(own):
             faults.append(f"position: {names} of {joint.known_as} belong together; name all of them or none")
-    return faults or [f"position: {said}" for said in equations.configuration.misplaced(q, ROUNDED)]
+    return faults or [f"position: {fault}" for fault in equations.configuration.misplaced(q, ROUNDED)]
 
 
 def _gaps(work: Posture) -> Vector:

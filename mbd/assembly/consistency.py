@@ -43,12 +43,12 @@ def violations(
     speed : the largest velocity [m/s, rad/s]
     usual : (2, n_rows) residuals that are not to blame on the state, such as those that a scheme leaves
     """
-    said, fast = [], max(1.0, speed)
+    faults, fast = [], max(1.0, speed)
     for k in active:
         h, rate, h_size, rate_size = (float(value) for value in found[:, k])
         left = (0.0, 0.0) if usual is None else (2.0 * abs(float(usual[0, k])), 2.0 * abs(float(usual[1, k])))
         if not abs(h) <= max(ROUND_OFF, INCONSISTENT * min(1.0, h_size), left[0]):
-            said.append(f"{rows[k].title} is violated by {h:.3g} {rows[k].unit}".rstrip())
+            faults.append(f"{rows[k].title} is violated by {h:.3g} {rows[k].unit}".rstrip())
         elif not abs(rate) <= max(ROUND_OFF * fast, INCONSISTENT * min(fast, rate_size), left[1]):
-            said.append(f"{rows[k].title} is violated by {rate:.3g} {rows[k].unit}/s in its velocity")
-    return said
+            faults.append(f"{rows[k].title} is violated by {rate:.3g} {rows[k].unit}/s in its velocity")
+    return faults

@@ -92,7 +92,7 @@ def contradictions(work: Posture, attempt: Attempt, model: Any) -> list[str]:
 
 def _sets(work: Posture, attempt: Attempt, off: bool, fast: bool, model: Any) -> Mapping[str, str]:
     """For each name, the irreducible set of rows and named values in conflict that it belongs to."""
-    loops, told = loops_of(model), dict[str, str]()
+    loops, conflicts = loops_of(model), dict[str, str]()
     finite = np.isfinite(attempt.misfit).all() and np.isfinite(attempt.speed_misfit).all()
     levels = [(False, attempt.rows, attempt.q, attempt.held_q)] if off else []
     levels += [(True, list(work.manager.active_rows(work.flags)), attempt.y, attempt.held_v)] if fast else []
@@ -103,9 +103,9 @@ def _sets(work: Posture, attempt: Attempt, off: bool, fast: bool, model: Any) ->
             if not names:
                 break
             for name in names:
-                told.setdefault(name, f" (in conflict: {', '.join(names)})")
+                conflicts.setdefault(name, f" (in conflict: {', '.join(names)})")
             fewer = [k for k in left if repr(work.equations.rows[k].owner) not in names]
             if len(fewer) == len(left):
                 break
             left = fewer
-    return told
+    return conflicts

@@ -93,8 +93,8 @@ def fits(start: State, equations: Equations, manager: ActiveSetManager) -> None:
     bad = [
         f"the start has {name!r} = {value}; give a finite number" for name, value in values if not np.isfinite(value)
     ]
-    bad += [f"the start has {said}; take whole turns away" for said in beyond_angles(equations, start.q)]
-    bad = bad or [f"the start has {said}" for said in equations.configuration.misplaced(start.q, ROUND_OFF)]
+    bad += [f"the start has {fault}; take whole turns away" for fault in beyond_angles(equations, start.q)]
+    bad = bad or [f"the start has {fault}" for fault in equations.configuration.misplaced(start.q, ROUND_OFF)]
     if bad:
         raise ModelError(bad)
 

@@ -126,5 +126,5 @@ def _negative(work: Posture, M: Matrix, B: Matrix) -> list[str]:
         for each, value in zip(work.equations.parameters, work.parameters, strict=False)
         if value < 0.0 and each.name.rpartition(".")[2] in ("mass", "inertia", "xx", "yy", "zz")
     ]
-    told = ", ".join(guilty) or "check the parameters given"
-    return [f"the mass or inertia that resists the motion of {name!r} is negative; {told}"]
+    culprits = ", ".join(guilty) or "check the parameters given"
+    return [f"the mass or inertia that resists the motion of {name!r} is negative; {culprits}"]

@@ -83,7 +83,7 @@ class Constraint(Parameterized, ABC):
         return math.inf
 
     @property
-    def said(self) -> str:
+    def details(self) -> str:
         """What a page of text says of it behind its name and class."""
         return f", {self.kind}, on " + self._mentioned()
 
@@ -143,6 +143,6 @@ class VelocityConstraint(Constraint):
         return Law(rows, while_closed=self.contact)
 
     @property
-    def said(self) -> str:
+    def details(self) -> str:
         """What it holds the velocities of."""
         return ", on the velocities of " + self._mentioned()

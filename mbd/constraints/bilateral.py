@@ -90,9 +90,9 @@ class Bilateral(Constraint):
         return Law([Equation(self.residual(scope), unit=measure.unit, reaction=measure.reaction, wraps=wraps)])
 
     @property
-    def said(self) -> str:
+    def details(self) -> str:
         """What it holds at which value."""
-        return f", {self.measure.said} = {self.value}"
+        return f", {self.measure.details} = {self.value}"
 
     def mentions(self) -> list[Mention]:
         """What its measure and its value depend on."""

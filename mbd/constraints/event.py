@@ -56,7 +56,7 @@ class Event(Constraint):
         return "event"
 
     @property
-    def said(self) -> str:
+    def details(self) -> str:
         """Nothing more."""
         return ""
 

@@ -61,7 +61,7 @@ class Measure(ABC):
         return "force"
 
     @property
-    def said(self) -> str:
+    def details(self) -> str:
         """What it measures of what, for a page of text."""
         return f"{self.title} of " + mentioned_names(self.mentions())
 

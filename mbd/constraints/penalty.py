@@ -153,10 +153,10 @@ class Penalty(Constraint):
         return largest_dt(k, self.exponent, c, chi, mass, speed)
 
     @property
-    def said(self) -> str:
+    def details(self) -> str:
         """Where, how stiff, and what it loses."""
         loss = f"damping {self.damper:.6g}" if self.chi is None else f"chi {self.chi:.6g}"
-        return f", {self.measure.said}, stiffness {self.stiffness:.6g}, {loss}"
+        return f", {self.measure.details}, stiffness {self.stiffness:.6g}, {loss}"
 
     def captured(self, gap_rate: Scalar) -> tuple[Scalar, ...]:
         """What is held from the instant of closing: the approach speed −ġ, where χ needs it."""
@@ -218,8 +218,8 @@ class Penalty(Constraint):
             domains["damping"] = at_least_zero("would feed energy in; give a value ≥ 0")
         else:
             largest = chi_for(LEAST_RESTITUTION, law_of(self.law, self.name))
-            said = f"is not between 0 and {largest:g}, which belong to the restitutions 1 and {LEAST_RESTITUTION:g}"
-            domains |= {"chi": Domain(low=0.0, high=largest, problem=said), "slowest": positive(unit="m/s")}
+            problem = f"is not between 0 and {largest:g}, which belong to the restitutions 1 and {LEAST_RESTITUTION:g}"
+            domains |= {"chi": Domain(low=0.0, high=largest, problem=problem), "slowest": positive(unit="m/s")}
         return {f"{self.name}.{field}": domain for field, domain in domains.items()}
 
     def faults(self) -> list[str]:

@@ -109,16 +109,16 @@ class Unilateral(Constraint):
         return {f"{self.name} friction": replace(self, friction=0.0)} if self.slides else {}
 
     @property
-    def said(self) -> str:
+    def details(self) -> str:
         """Where, and when it opens."""
-        said = f", {self.measure.said}" + (", sticks" if self.sticks else "")
+        text = f", {self.measure.details}" + (", sticks" if self.sticks else "")
         rules = [f"'{rule.other}' closes{' (after the impact)' if rule.after_impact else ''}" for rule in self.releases]
         on_pull = ["on pull"] if self.opens_on == "pull" else []
-        said += ", opens " + " or ".join((["as " + " or ".join(rules)] if rules else []) + on_pull)
+        text += ", opens " + " or ".join((["as " + " or ".join(rules)] if rules else []) + on_pull)
         if self.only_while is None:
-            return said
+            return text
         other = self.only_while
-        return said + (f", only while {other.said} > 0" if isinstance(other, Measure) else f", only while '{other}'")
+        return text + (f", only while {other.details} > 0" if isinstance(other, Measure) else f", only while '{other}'")
 
     def parameters(self) -> dict[str, float]:
         """'<name>.mu' where it slides with friction."""

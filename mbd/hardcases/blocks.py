@@ -250,13 +250,13 @@ def landing(id: str, scheme: Any) -> Outcome:
     run, other, stepped = runs
     found = [run[f"place.{name}.rate"][-1] for name in ("x", "y", "angle")]
     wanted, impulses = published(id, "velocity after"), published(id, "corner impulses")
-    told = {event.name: event.impulse[0] for event in strikes(run)}
+    by_corner = {event.name: event.impulse[0] for event in strikes(run)}
     times = [event.time for event in run.events]
     figures = [
         Figure("error of the velocity after [m/s]", size(found - wanted), accuracy(id, "velocity after") + ROUND_OFF),
         Figure("rotation created [rad/s]", abs(found[2] - given["omega"]), ROUND_OFF),
         Figure("error of the impulses [N s]",
-               size([told.get(name, math.nan) for name in ("left", "right")] - impulses), accuracy(id, "corner")),
+               size([by_corner.get(name, math.nan) for name in ("left", "right")] - impulses), accuracy(id, "corner")),
         Figure("events more or less than two [-]", abs(len(run.events) - 2), 0.0),
         Figure("time between the two impacts [s]", max(times) - min(times) if times else math.nan, 0.0),
         Figure("change with the order of the corners, relative [-]", difference(run, other), ROUND_OFF),

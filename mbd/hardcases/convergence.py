@@ -82,9 +82,9 @@ def second_order(
     """
     norms, higher = _norms(errors), order > ORDER
     off = deviation(steps, norms, floor, better or higher)
-    told = "what is missing to order 2" if better or higher else "|order − 2|"
+    judgement = "what is missing to order 2" if better or higher else "|order − 2|"
     figures = [
-        Figure(f"{told}, {what.partition(' [')[0]} [-]", off, MOST_DEVIATION),
+        Figure(f"{judgement}, {what.partition(' [')[0]} [-]", off, MOST_DEVIATION),
         Figure(f"{what} at dt = {float(steps[-1]):.3g} s", float(norms[-1]), limit),
     ]
     if not higher:

@@ -182,9 +182,9 @@ def jamming(id: str, scheme: Any) -> Outcome:
                               abs(found / wanted - 1.0), 1e-9))  # fmt: skip
     for much in (mu, 1.001 * critical):
         run = slide(id, much, -1.0, scheme)
-        told = not run.success and "Painlevé: no consistent contact force at 'tip'" in run.message
+        is_named = not run.success and "Painlevé: no consistent contact force at 'tip'" in run.message
         figures.append(
-            Figure(f"μ = {much:.4g}, a Painlevé contact at the start and not told [-]", float(not told), 0.0)
+            Figure(f"μ = {much:.4g}, a Painlevé contact at the start and not told [-]", float(not is_named), 0.0)
         )
         figures.append(Figure(f"μ = {much:.4g}, rows with a force all the same [-]", float(len(run.time)), 0.0))
     shares = 1.0 - np.logspace(0.0, -3.0, 13)

@@ -116,18 +116,18 @@ def _taken(run: Any) -> list[Figure]:
     if run.success:
         off = np.abs(run.at(slider.times)["sleeve.displacement"] - slider.value)
     rate, *before, last = definition(B5)["initial_conditions"]["shaft_rate"], *slider.times
-    most, told = allowance(FACTOR, rate, LARGE, slider.size), f"error of the slider at dt = {LARGE:g} s"
+    most, what = allowance(FACTOR, rate, LARGE, slider.size), f"error of the slider at dt = {LARGE:g} s"
     return [
-        Figure(f"{told}, t ≤ {before[-1]:g} s [m]", float(np.max(off[:-1])), LARGE_ERROR),
-        Figure(f"{told}, t = {last:g} s [m]", float(off[-1]), most),
+        Figure(f"{what}, t ≤ {before[-1]:g} s [m]", float(np.max(off[:-1])), LARGE_ERROR),
+        Figure(f"{what}, t = {last:g} s [m]", float(off[-1]), most),
     ]
 
 
 def _told(run: Any) -> list[Figure]:
     """Of an explicit scheme that stopped: whether it says below which step it is stable, and that this is smaller."""
     limit = re.search(r"an explicit scheme is stable for dt below ([\d.e+-]+) s", run.message)
-    said = limit is not None and float(limit[1]) < LARGE
-    return [Figure(f"dt = {LARGE:g} s refused without saying which steps are stable", float(not said), 0)]
+    is_said = limit is not None and float(limit[1]) < LARGE
+    return [Figure(f"dt = {LARGE:g} s refused without saying which steps are stable", float(not is_said), 0)]
 
 
 CASES = (

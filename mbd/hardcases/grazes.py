@@ -93,16 +93,16 @@ def graze_figures(id: str, offset: float, name: str, courses: list[Course], runs
         # a motion whose turning point is off by δ gets at most depth + δ behind the wall; its ẍ is off by (ω dt)²/12
         speed = math.sqrt(2.0 * force * max(depth + course.error, 0.0)) * (1.0 + (w * course.dt) ** 2)
         over.append(size([event.impulse[0] for event in each]) - m * (1.0 + e) * speed)
-    told = f"wall at d(1 − {offset:g})"
+    title = f"wall at d(1 − {offset:g})"
     figures = [
-        Figure(f"{told}: impulse above m √(2|ẍ|δ)(1+e) [N s]", float(np.max(over)), 1e-12 * m * A * w),
-        Figure(f"{told}: impacts more than one [-]", max(len(each) for each in hits) - 1.0, 0.0),
-        Figure(f"{told}: penetration [m]", float(np.max([deepest(run) for run in runs])), 1e-10),
+        Figure(f"{title}: impulse above m √(2|ẍ|δ)(1+e) [N s]", float(np.max(over)), 1e-12 * m * A * w),
+        Figure(f"{title}: impacts more than one [-]", max(len(each) for each in hits) - 1.0, 0.0),
+        Figure(f"{title}: penetration [m]", float(np.max([deepest(run) for run in runs])), 1e-10),
     ]
     if np.ndim(published(id, name)) == 0:  # a number of impacts: none, for a wall that the motion does not reach
         count = published(id, name)
         clear = [abs(len(each) - count) for each, course in zip(hits, courses, strict=True) if course.error < -depth]
-        return [*figures, Figure(f"{told}: impacts though the motion stays clear of it [-]", sum(clear), 0.0)]
+        return [*figures, Figure(f"{title}: impacts though the motion stays clear of it [-]", sum(clear), 0.0)]
     able = [(c, run, each) for c, run, each in zip(courses, runs, hits, strict=True) if 2.0 * c.error < depth]
     time, speed = published(id, name)
     late, slow = [], []
@@ -114,9 +114,9 @@ def graze_figures(id: str, offset: float, name: str, courses: list[Course], runs
         slow.append(abs(before - speed) / (2.0 * force * off + speed * (w * course.dt) ** 2 + accuracy(id, name)))
     return [
         *figures,
-        Figure(f"{told}: missed at steps that can find it [-]", sum(not each for _, _, each in able), 0.0),
-        Figure(f"{told}: error of the time over what δ allows [-]", size(late) if late else math.nan, 1.0),
-        Figure(f"{told}: error of the speed over what δ allows [-]", size(slow) if slow else math.nan, 1.0),
+        Figure(f"{title}: missed at steps that can find it [-]", sum(not each for _, _, each in able), 0.0),
+        Figure(f"{title}: error of the time over what δ allows [-]", size(late) if late else math.nan, 1.0),
+        Figure(f"{title}: error of the speed over what δ allows [-]", size(slow) if slow else math.nan, 1.0),
     ]
 
 

@@ -68,7 +68,7 @@ def _defect(mechanism: Any, run: Any, row: int, events: list[EventRecord]) -> De
     rates = terms.B @ after + (terms.rate - terms.B @ before)
     speeds = np.abs(terms.B) @ np.maximum(np.abs(before), np.abs(after)) + np.abs(terms.rate - terms.B @ before)
     change = terms.M @ (after - before)
-    told = np.zeros(len(equations.rows))
+    impulses = np.zeros(len(equations.rows))
     contacts = {contact.name: contact for contact in equations.contacts}
     closing = {event.name for event in events}
     approach = max(-terms.rate[contacts[event.name].rows[0]] for event in events)
@@ -76,19 +76,19 @@ def _defect(mechanism: Any, run: Any, row: int, events: list[EventRecord]) -> De
     worst = 0.0
     for event in events:
         contact = contacts[event.name]
-        told[list(contact.rows)] = event.impulse
+        impulses[list(contact.rows)] = event.impulse
         normal = contact.rows[0]
         e = 0.0 if slow else contact.restitution
         share = (rates[normal] + e * terms.rate[normal]) / speeds[normal]
-        push = told[normal] / size(told[normal]) if told[normal] else 0.0
-        worst = max(worst, -push, -share, abs(share) if told[normal] else 0.0)
+        push = impulses[normal] / size(impulses[normal]) if impulses[normal] else 0.0
+        worst = max(worst, -push, -share, abs(share) if impulses[normal] else 0.0)
     through = {c.name for k, c in enumerate(equations.contacts) if record.closed[row - 1, k]} - closing
     rest = [k for k, each in enumerate(equations.rows) if each.contact < 0 or each.owner in through]
-    missing = change - terms.B.T @ told
+    missing = change - terms.B.T @ impulses
     if rest:
         unknown = np.linalg.lstsq(terms.B[rest].T, missing, rcond=None)[0]
         missing = missing - terms.B[rest].T @ unknown
-    scale = max(size(change), size(np.abs(terms.B.T) @ np.abs(told)), size(terms.M @ before))
+    scale = max(size(change), size(np.abs(terms.B.T) @ np.abs(impulses)), size(terms.M @ before))
     kinetic = [0.5 * v @ terms.M @ v for v in (before, after)]
     closed = {c.name for k, c in enumerate(equations.contacts) if record.closed[row, k]}
     holding = [k for k, each in enumerate(equations.rows) if each.contact < 0 or each.owner in closed]

@@ -68,12 +68,12 @@ class Verdict:
         """
         failing = [part.scheme for part in self.parts if not part.passed]
         mended = [part.scheme for part in self.parts if part.passed and part.reason]
-        told = []
+        texts = []
         if failing:
-            told.append("does not hold" + (f" with {', '.join(failing)}" if len(failing) < len(self.parts) else ""))
+            texts.append("does not hold" + (f" with {', '.join(failing)}" if len(failing) < len(self.parts) else ""))
         if mended:
-            told.append(f"holds now with {', '.join(mended)}: take it from the list of what does not")
-        return "; ".join(told) or "holds"
+            texts.append(f"holds now with {', '.join(mended)}: take it from the list of what does not")
+        return "; ".join(texts) or "holds"
 
     @property
     def reasons(self) -> list[str]:

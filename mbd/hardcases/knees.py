@@ -93,14 +93,14 @@ def linear_figures(id: str, scheme: Any, steps: Any, rooted: float) -> list[Figu
     rooted : the error with roots at the finest step [s]
     """
     what = "the switching times [s]"
-    told = "error of the switching times with one linear step back"
+    title = "error of the switching times with one linear step back"
     if scheme.order() <= 2:
         linear = errors_of(id, swing(id, scheme, float(steps[-1]), "linear"))[what]
-        return [Figure(f"{told}, over that with roots [-]", size(linear) / max(rooted, 1e-300), 1.5)]
+        return [Figure(f"{title}, over that with roots [-]", size(linear) / max(rooted, 1e-300), 1.5)]
     linears = [errors_of(id, swing(id, scheme, float(dt), "linear"))[what] for dt in steps]
     name, limit = LIMITS[what]
     most, floor = limit * size(published(id, name)), 10.0 * accuracy(id, name)
-    return second_order(f"{told} [s]", steps, linears, most, floor, order=scheme.order(), erratic=True)
+    return second_order(f"{title} [s]", steps, linears, most, floor, order=scheme.order(), erratic=True)
 
 
 def stopped(id: str, scheme: Any) -> Outcome:

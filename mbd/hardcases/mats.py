@@ -97,11 +97,11 @@ def resolved(given: dict[str, float], scheme: Any) -> tuple[list[Figure], list[C
     steps = halved(wanted["contact duration"] / 40.0)
     runs = [dropped(given, scheme, float(dt)) for dt in steps]
     errors = [blow_errors(given, wanted, run) for run in runs]
-    told = f"k = {given['k']:g}"
+    title = f"k = {given['k']:g}"
     figures: list[Figure] = []
     for name, limit in LIMITS.items():
         found = [each[name] for each in errors]
-        figures += second_order(f"{told}: relative error of the {name} [-]", steps, found, limit, 1e-7, True,
+        figures += second_order(f"{title}: relative error of the {name} [-]", steps, found, limit, 1e-7, True,
                                 scheme.order())  # fmt: skip
     gains = []
     for run in runs:
@@ -109,13 +109,13 @@ def resolved(given: dict[str, float], scheme: Any) -> tuple[list[Figure], list[C
         gains.append((run.energy.total[opened] - run.energy.total[closed]) / given_energy(given))
     notes = [note for run in runs for note in _unresolved(run)]
     figures += [
-        Figure(f"{told}: notes of a step that is too long [-]", len(notes), 0.0),
-        Figure(f"{told}: energy gained in the impact, relative [-]", float(np.max(gains)), 1e-9),
+        Figure(f"{title}: notes of a step that is too long [-]", len(notes), 0.0),
+        Figure(f"{title}: energy gained in the impact, relative [-]", float(np.max(gains)), 1e-9),
     ]
     run, late = runs[-1], [each["contact duration"] for each in errors]
     return figures, [
-        Curve(f"depth, {told}", run.time, -run["fall.displacement"], y_label="depth [m]"),
-        error_curve(f"error of the duration, {told}", steps, late, "relative error"),
+        Curve(f"depth, {title}", run.time, -run["fall.displacement"], y_label="depth [m]"),
+        error_curve(f"error of the duration, {title}", steps, late, "relative error"),
     ]
 
 
@@ -134,10 +134,10 @@ def too_long(given: dict[str, float], scheme: Any) -> list[Figure]:
         total = run.energy.total
         silent += not _unresolved(run)
         gains.append((total[-1] - total[0]) / given_energy(given) if run.success else 0.0)
-    told = f"k = {given['k']:g}"
+    title = f"k = {given['k']:g}"
     return [
-        Figure(f"{told}: steps of 0.15 to 100 impacts that are not told [-]", silent, 0.0),
-        Figure(f"{told}: energy gained in silence with such steps, relative [-]", float(np.max(gains)), 1e-9),
+        Figure(f"{title}: steps of 0.15 to 100 impacts that are not told [-]", silent, 0.0),
+        Figure(f"{title}: energy gained in silence with such steps, relative [-]", float(np.max(gains)), 1e-9),
     ]
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import io
 from collections.abc import Sequence
-from datetime import UTC, datetime
 from html import escape
 from importlib import import_module, resources
 from importlib.util import find_spec
@@ -18,7 +17,7 @@ from mbd.hardcases.case import Curve, Figure, definition
 from mbd.hardcases.judging import Judged, Verdict, ratio, short
 from mbd.hardcases.table import number, summary, worst_by_scheme
 from mbd.results.archive import write_whole
-from mbd.view.report import machine, versions
+from mbd.view.report import made_with
 from mbd.view.style import CYCLE, rules
 
 __all__ = ["write_page"]
@@ -34,9 +33,6 @@ def write_page(verdicts: Sequence[Verdict], path: str | Path, note: str = "") ->
     place = Path(path)
     place.parent.mkdir(parents=True, exist_ok=True)
     style = (resources.files("mbd.hardcases") / "data" / "page.css").read_text("utf-8")
-    known = versions()
-    made = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
-    told = f"mbd {known['mbd']}, Python {known['python']}, numpy {known['numpy']}, {machine()['processor']}; {made}"
     rows = "\n".join(_row(verdict) for verdict in verdicts)
     sections = "\n".join(_section(verdict) for verdict in verdicts)
     text = f"""<!doctype html>
@@ -53,7 +49,7 @@ def write_page(verdicts: Sequence[Verdict], path: str | Path, note: str = "") ->
 <header>
 <h1>Hard cases</h1>
 <p class="lead">Scenes on which multibody systems fail, often silently: {escape(summary(verdicts))}.{escape(note)}</p>
-<p class="made">{escape(told)}</p>
+<p class="made">{escape(made_with())}</p>
 </header>
 <main>
 <div class="wide">
@@ -123,7 +119,7 @@ def _part(part: Judged) -> str:
         )
     figures = "\n".join(_figure(figure) for figure in part.outcome.figures)
     worst = part.worst
-    told = (
+    headline = (
         f"{len(part.outcome.figures)} figures, nearest to its limit: {worst.what}"
         if worst is not None
         else "no figures"
@@ -131,7 +127,7 @@ def _part(part: Judged) -> str:
     word = "holds" if part.passed else "does not hold"
     why = f"<p class='error'>{escape(part.reason)}</p>" if part.reason and not part.passed else ""
     return f"""<details{"" if part.passed else " open"}>
-<summary>{escape(part.scheme)} {_badge(part.passed, word)} <span>{escape(told)}</span></summary>
+<summary>{escape(part.scheme)} {_badge(part.passed, word)} <span>{escape(headline)}</span></summary>
 {why}
 <table class="figures"><thead><tr><th>figure</th><th>value</th><th>limit</th><th></th></tr></thead>
 <tbody>

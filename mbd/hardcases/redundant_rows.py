@@ -143,8 +143,8 @@ def judge_bricard(integrator: Any) -> Outcome:
 
 def _spare(run: Any) -> float:
     """How many rows the notes call redundant, told once; NaN otherwise."""
-    told = [found for note in run.stats["notes"] if (found := re.search(r"redundant constraints: (\d+)", note))]
-    return float(told[0][1]) if len(told) == 1 else math.nan
+    counts = [found for note in run.stats["notes"] if (found := re.search(r"redundant constraints: (\d+)", note))]
+    return float(counts[0][1]) if len(counts) == 1 else math.nan
 
 
 def _miscount(run: Any, wanted: Any) -> float:

@@ -67,9 +67,9 @@ def law_figures(id: str, kind: str, scheme: Any) -> list[Figure]:
     final = np.array([last[f"place.{part}.rate"] for part in ("x", "y", "angle")])
     event = next(each for each in events if each.name == "lower end")
     scale = size(published(id, name))
-    told = run.success or "'lower end'" in run.message
+    is_named = run.success or "'lower end'" in run.message
     figures = [
-        Figure(f"{kind}: failures that do not name the end [-]", float(not told), 0.0),
+        Figure(f"{kind}: failures that do not name the end [-]", float(not is_named), 0.0),
         Figure(
             f"{kind}: error of the impact time [s]",
             abs(event.time - time), accuracy(id, "impact time") + ROUND_OFF * time,

@@ -47,7 +47,7 @@ def judge_inconsistent_start(integrator: Any) -> Outcome:
     """Refused with both residuals and the name; projected on request, telling how far; then free of transients."""
     model, named = bob(), _named()
     L = definition(J14)["definition"]["L"]
-    told = _residuals(model, named)
+    found, found_rate = _residuals(model, named)
     position, velocity = quantity(J14, "position residual"), quantity(J14, "velocity residual")
     place, speed = (quantity(J14, f"mass-orthogonal projection of the {what}") for what in ("position", "velocity"))
     tension = quantity(J14, "tension")
@@ -61,8 +61,8 @@ def judge_inconsistent_start(integrator: Any) -> Outcome:
     largest = float(start.moved[max(start.moved, key=lambda name: abs(start.moved[name]))])
     return Outcome(
         [
-            Figure("error of the position residual told [-]", _off(told[0], float(position.value) / L), SHOWN),
-            Figure("error of the velocity residual told [-]", _off(told[1], 2.0 * float(velocity.value) / L), SHOWN),
+            Figure("error of the position residual told [-]", _off(found, float(position.value) / L), SHOWN),
+            Figure("error of the velocity residual told [-]", _off(found_rate, 2.0 * float(velocity.value) / L), SHOWN),
             Figure("error of the projected place [m]", _worst(start.q, place), place.accuracy),
             Figure("error of the projected velocity [m/s]", _worst(start.v, speed), speed.accuracy),
             Figure("error of the changes that the start tells [m, m/s]", float(np.max(np.abs(moved - change))), 1e-12),
@@ -95,8 +95,8 @@ def _residuals(model: mbd.Model, named: Mapping[str, Any]) -> tuple[float, float
     return math.nan, math.nan
 
 
-def _off(told: float, value: float) -> float:
-    return abs(told - value) / abs(value)
+def _off(found: float, value: float) -> float:
+    return abs(found - value) / abs(value)
 
 
 def _worst(found: Any, reference: Reference) -> float:
@@ -122,14 +122,16 @@ def judge_infeasible(integrator: Any) -> Outcome:
     model = four_bar_that_cannot_close()
     closure = quantity(J15, "smallest closure error")
     joints = {joint.name for joint in model.joints}
-    said = "constraints cannot be satisfied: closure error " + NUMBER + r" m at joint '([^']+)' after (\d+) iterations"
+    pattern = (
+        "constraints cannot be satisfied: closure error " + NUMBER + r" m at joint '([^']+)' after (\d+) iterations"
+    )
     off, unnamed, begun = math.nan, 1.0, 1.0
     try:
         start = mbd.assemble(model)
         mbd.simulate(model, start, integrator, dt=1e-3, until=1e-2)
     except mbd.AssemblyError as error:
         begun = 0.0
-        found = re.search(said, str(error))
+        found = re.search(pattern, str(error))
         if found:
             off = _off(float(found[1]), float(closure.value))
             unnamed = float(found[2] not in joints or int(found[3]) < 1)

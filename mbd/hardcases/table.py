@@ -43,10 +43,10 @@ def number(value: float) -> str:
 def worst_text(verdict: Verdict) -> str:
     """The worst figure of all schemes, with its scheme, and what is shown without being judged."""
     part = verdict.worst
-    told = part.error
-    if not told:
-        told = figure_text(part.worst) if part.worst is not None else "no figures"
-    return "; ".join([f"{told} ({part.scheme})", *_shown(verdict)])
+    text = part.error
+    if not text:
+        text = figure_text(part.worst) if part.worst is not None else "no figures"
+    return "; ".join([f"{text} ({part.scheme})", *_shown(verdict)])
 
 
 def worst_by_scheme(verdict: Verdict) -> list[str]:
@@ -57,11 +57,11 @@ def worst_by_scheme(verdict: Verdict) -> list[str]:
             kinds.setdefault((part.error, ""), []).append(part)
         elif part.worst is not None:
             kinds.setdefault((part.worst.what, number(part.worst.limit)), []).append(part)
-    told = []
+    texts = []
     for (what, limit), parts in kinds.items():
         values = {part.scheme: number(part.worst.value) if limit and part.worst else "" for part in parts}
-        told.append(f"{what}: {_values(values, verdict)} of {limit}" if limit else f"{what} ({', '.join(values)})")
-    return [*told, *_shown(verdict)]
+        texts.append(f"{what}: {_values(values, verdict)} of {limit}" if limit else f"{what} ({', '.join(values)})")
+    return [*texts, *_shown(verdict)]
 
 
 def _shown(verdict: Verdict) -> list[str]:
@@ -99,9 +99,9 @@ def as_text(verdicts: Sequence[Verdict], width: int = 120) -> str:
             [*(_paragraph(verdict, width) for verdict in verdicts), "", *_wrapped(summary(verdicts), width)]
         )
     ids = max((len(verdict.case.id) for verdict in verdicts), default=4)
-    told = 20
-    free = max(width - ids - told - 6 - 8, 40)
-    columns = (ids, free // 2, free - free // 2, told, 6)
+    verdict_width = 20
+    free = max(width - ids - verdict_width - 6 - 8, 40)
+    columns = (ids, free // 2, free - free // 2, verdict_width, 6)
     lines = [_line(HEADS, columns), "  ".join("─" * size for size in columns)]
     for verdict in verdicts:
         cells = (verdict.case.id, verdict.case.must, worst_text(verdict), verdict.word, f"{verdict.seconds:.2f}")

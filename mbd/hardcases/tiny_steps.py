@@ -63,16 +63,17 @@ def judge_tiny_steps(integrator: Any) -> Outcome:
 
     found = study(errors, numbers["dts"], integrator)
     places, steps = found.errors["error of the place [m]"], found.steps
-    higher, told = integrator.order() > 2, "|order − 2|" if integrator.order() <= 2 else "what is missing to order 2"
+    higher = integrator.order() > 2
+    judgement = "what is missing to order 2" if higher else "|order − 2|"
     rest = 10.0 * EPS * L * np.sqrt(until / steps)
     floors = np.array([force_floor(integrator, dt, until / dt, m, L, speed) for dt in steps])
     figures = [
-        Figure(f"{told} of the place above round-off [-]",
+        Figure(f"{judgement} of the place above round-off [-]",
                deviation(steps, places, float(rest[-1]), higher), 0.15),
         Figure("error of the place over C dt² and round-off [-]",
                float(np.max(places / (SHARE * g * steps**2 + rest))), 1.0),
         Figure(f"error of the place at dt ≤ {NEAR_STEP:g} s [m]", float(np.max(places[steps <= NEAR_STEP])), NEAR),
-        Figure(f"{told} of the tension above its round-off floor [-]",
+        Figure(f"{judgement} of the tension above its round-off floor [-]",
                deviation(steps, found.errors["error of the tension [N]"], floors, higher), 0.15),
         Figure("error of the tension over C dt² and its round-off floor [-]", max(over), 1.0),
         Figure("error of the tension at the start [N]", max(begun), first.accuracy),
@@ -90,9 +91,9 @@ def _refusal(integrator: Any, model: mbd.Model, start: mbd.State, dt: float) -> 
     what = "runs that go on, or stop without saying what is attainable, under a tolerance below round-off"
     run = mbd.simulate(model, start, _with_tolerance(integrator, TOO_SMALL), dt=dt, until=50 * dt, on_failure="return")
     number = r"([\d.]+(?:e[-+]?\d+)?)"
-    said = re.search(rf"stagnated at round-off: residual {number}, attainable {number}", run.message)
-    told = said is not None and all(TOO_SMALL < float(each) < 1e-8 for each in said.groups())
-    return Figure(what, 0.0 if told and not run.success else 1.0, 0.0)
+    match = re.search(rf"stagnated at round-off: residual {number}, attainable {number}", run.message)
+    is_named = match is not None and all(TOO_SMALL < float(each) < 1e-8 for each in match.groups())
+    return Figure(what, 0.0 if is_named and not run.success else 1.0, 0.0)
 
 
 def _with_tolerance(integrator: Any, tolerance: float) -> Any:

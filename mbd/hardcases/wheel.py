@@ -82,9 +82,9 @@ def judge_wheel(integrator: Any) -> Outcome:
     force = max(50.0, 5.0 * math.sqrt(count)) * EPS * numbers["m"] * speed / min(STEPS)
     limits = {"acceleration": force / numbers["m"], "friction force": force, "x(": length,
               "wheel angle": length / numbers["R"], "minimum": force / (numbers["m"] * numbers["g"])}  # fmt: skip
-    said = {"x(": "place at the end [m]", "acceleration": "acceleration [m/s²]", "friction force": "friction force [N]",
+    what = {"x(": "place at the end [m]", "acceleration": "acceleration [m/s²]", "friction force": "friction force [N]",
             "wheel angle": "angle at the end [rad]", "minimum": "least friction coefficient [-]"}  # fmt: skip
-    figures = [Figure(f"error of the {said[name]}, worst of all steps", worst[name], limits[name]) for name in worst]
+    figures = [Figure(f"error of the {what[name]}, worst of all steps", worst[name], limits[name]) for name in worst]
     figures += [Figure("slip [m/s]", slip, 1e-10), Figure("switches of the road", opened, 0)]
     return Outcome(figures, curves[:1])
 

@@ -101,13 +101,13 @@ def write_whole(target: Path, fill: Callable[[Path], Any]) -> None:
 
 def _hash(arrays: Mapping[str, NDArray[Any]]) -> bytes:
     """Hash of names, kinds, shapes and numbers of all arrays but the hash itself."""
-    told = hashlib.sha256()
+    digest = hashlib.sha256()
     for name in sorted(arrays):
         if name != HASH:
             array = np.ascontiguousarray(arrays[name])
-            told.update(f"{name}\0{array.dtype.str}\0{array.shape}\0".encode())
-            told.update(array.reshape(-1).view(np.uint8).data if array.size else b"")
-    return told.digest()
+            digest.update(f"{name}\0{array.dtype.str}\0{array.shape}\0".encode())
+            digest.update(array.reshape(-1).view(np.uint8).data if array.size else b"")
+    return digest.digest()
 
 
 class Members:
@@ -233,11 +233,11 @@ def _words(members: Members, source: Path, kind: str, version: int, refusal: str
     meta = json.loads(members.read(META).tobytes())
     if not isinstance(meta, dict) or meta.get("format") != kind:
         raise TrajectoryError(refusal)
-    told = meta.get("version")
-    if not isinstance(told, int) or isinstance(told, bool) or told < 1:
-        raise Unreadable(f"its version is {told!r}")
-    if told > version:
-        raise TrajectoryError(f"'{source}' was written by a newer mbd (format {told}, here {version}); update mbd")
+    number = meta.get("version")
+    if not isinstance(number, int) or isinstance(number, bool) or number < 1:
+        raise Unreadable(f"its version is {number!r}")
+    if number > version:
+        raise TrajectoryError(f"'{source}' was written by a newer mbd (format {number}, here {version}); update mbd")
     return meta
 
 

@@ -140,8 +140,8 @@ def _events(events: Any, count: int) -> None:
         expect(event["kind"] in KINDS and isinstance(event["name"], str), "'events'")
         expect(0 <= of_kind(event["row"], int, "'events'") <= count, "'events'")
         impulses = of_kind(event.get("impulses", {}), dict, "'events'")
-        told = [of_kind(value, list, "'events'") for value in (event["impulse"], *impulses.values())]
-        for number in (event["time"], event["energy_loss"], *(number for values in told for number in values)):
+        impulse_lists = [of_kind(value, list, "'events'") for value in (event["impulse"], *impulses.values())]
+        for number in (event["time"], event["energy_loss"], *(number for values in impulse_lists for number in values)):
             of_kind(number, int | float, "'events'")
 
 

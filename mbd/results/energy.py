@@ -188,8 +188,8 @@ def _of_stop(columns: ModelColumns, lost: Lost, direct: Vector, unsure: Vector, 
     np.add.at(doubt, episode[1:], unsure)
     allowed = ROUND_OFF * size
     allowed[0] += held[0]
-    told = (doubt <= RESOLVED * size) & (gain <= allowed)
-    return np.concatenate([[0.0], np.cumsum(np.where(told[episode[1:]], np.diff(direct), steps))])
+    is_known = (doubt <= RESOLVED * size) & (gain <= allowed)
+    return np.concatenate([[0.0], np.cumsum(np.where(is_known[episode[1:]], np.diff(direct), steps))])
 
 
 def _refined(

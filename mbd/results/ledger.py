@@ -166,10 +166,10 @@ class Ledger:
         yield "of which"
         for kind in self.kinds:
             parts = self.of(kind)
-            told = [_last(part.energy) for part in parts if not part.withheld]
+            totals = [_last(part.energy) for part in parts if not part.withheld]
             alone = len(parts) == 1
             title, note = (parts[0].name, f"   {kind}") if alone else (kind, "")
-            yield f"  {title:<{width - 2}}{'':>28}{_number(sum(told) if told else None)}{note}"
+            yield f"  {title:<{width - 2}}{'':>28}{_number(sum(totals) if totals else None)}{note}"
             for part in () if alone else parts:
                 yield f"    {part.name:<{width - 4}}{'':>14}{_number(None if part.withheld else _last(part.energy))}"
         withheld = [part for part in self.parts if part.withheld]

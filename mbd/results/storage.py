@@ -77,8 +77,8 @@ def _event(event: EventRecord) -> dict[str, Any]:
 def _read_event(event: Mapping[str, Any]) -> EventRecord:
     """An event; older files have its own impulse only."""
     own = np.asarray(event["impulse"], dtype=np.float64)
-    told = {name: np.asarray(values, dtype=np.float64) for name, values in event.get("impulses", {}).items()}
-    return EventRecord(**{**event, "impulse": own, "impulses": told})
+    impulses = {name: np.asarray(values, dtype=np.float64) for name, values in event.get("impulses", {}).items()}
+    return EventRecord(**{**event, "impulse": own, "impulses": impulses})
 
 
 def _columns(

@@ -37,9 +37,9 @@ def facts(run: Trajectory) -> list[tuple[str, str]]:
         found.append(("energy", f"change {energy.change:.4g} J; numerical {energy.numerical[-1]:.2g} J ({relative})"))
         found.append(("constraints", str(run.violation)))
     found.append(("events", counts(run) or "none"))
-    told = run.stats.get("tolerance")
-    if told:
-        found.append(("accuracy", accuracy(told)))
+    tolerance = run.stats.get("tolerance")
+    if tolerance:
+        found.append(("accuracy", accuracy(tolerance)))
     numbers = {key: value for key, value in run.stats.items() if isinstance(value, int | float)}
     costs = {LABELS.get(key, key.replace("_", " ")): value for key, value in numbers.items()}
     if costs:
@@ -48,12 +48,12 @@ def facts(run: Trajectory) -> list[tuple[str, str]]:
     return found
 
 
-def accuracy(told: Mapping[str, Any]) -> str:
+def accuracy(tolerance: Mapping[str, Any]) -> str:
     """The estimated error beside the one asked for, how errors grew, and what the runs cost."""
-    steps = " + ".join(str(one["steps"]) for one in told["runs"])
+    steps = " + ".join(str(one["steps"]) for one in tolerance["runs"])
     return (
-        f"estimated error of coordinates {told['estimated']:.2g}, asked for {told['requested']:g}; global over local "
-        f"errors {told['growth']:.2g}; runs of {steps} steps"
+        f"estimated error of coordinates {tolerance['estimated']:.2g}, asked for {tolerance['requested']:g}; "
+        f"global over local errors {tolerance['growth']:.2g}; runs of {steps} steps"
     )
 
 

@@ -107,11 +107,11 @@ def refusals(equations: Equations, scheme: Integrator, options: Mapping[str, Any
     """Every pair of a run that is not supported, each named with what to use instead."""
     found = [text for pair, text in TOGETHER.items() if all(options.get(name) == value for name, value in pair)]
     held = [row.owner for row in equations.rows if not row.is_velocity]
-    told = [scheme.check(len(held))]
+    texts = [scheme.check(len(held))]
     if options.get("tol") is not None:
-        told.append(scheme.check_tolerance(len(held)))
+        texts.append(scheme.check_tolerance(len(held)))
         found += [text for (argument, value), text in WITH_TOLERANCE.items() if options.get(argument) == value]
-    found += [f"{text} (rows on positions: {_listed(held)})" if held else text for text in told if text]
+    found += [f"{text} (rows on positions: {_listed(held)})" if held else text for text in texts if text]
     if equations.compose is not None and not scheme.any_chart:
         found.append(f"{scheme!r} moves coordinates along q + x, which {CHARTS}; use mbd.HHT(0.05)")
     return found

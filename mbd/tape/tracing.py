@@ -154,11 +154,11 @@ def _failure(what: str, title: str, names: str, exc: Exception) -> str:
         if not file.startswith(here):
             place = f" at {file}:{step.tb_lineno}"
         step = step.tb_next
-    said = f"{what}: {title} called with {names} raised {type(exc).__name__}{place}: {exc}"
+    text = f"{what}: {title} called with {names} raised {type(exc).__name__}{place}: {exc}"
     if isinstance(exc, TraceError):
-        return said
+        return text
     return (
-        f"{said}. It is called once with values that are not known yet: use arithmetic, mbd.sin, mbd.sqrt, … "
+        f"{text}. It is called once with values that are not known yet: use arithmetic, mbd.sin, mbd.sqrt, … "
         "and mbd.where; what needs plain numbers belongs in an mbd.Controller"
     )
 
@@ -203,5 +203,5 @@ def _applied(function: Any, values: Sequence[Any], tape: Tape) -> Node:
 
 
 def _short(expression: Any, width: int = 60) -> str:
-    said = str(expression)
-    return said if len(said) <= width else said[: width - 1] + "…"
+    text = str(expression)
+    return text if len(text) <= width else text[: width - 1] + "…"

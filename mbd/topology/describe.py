@@ -51,18 +51,18 @@ def _joint(joint: Joint) -> str:
     coordinates = ", ".join(
         f"{name} [{label.unit or '-'}]" for name, label in zip(joint.coordinate_names, joint.labels, strict=True)
     )
-    said = f"{joint.name}: {type(joint).__name__} {joint.parent.full_name} → {joint.child.full_name}"
-    said += f", {coordinates}" if coordinates else ""
+    text = f"{joint.name}: {type(joint).__name__} {joint.parent.full_name} → {joint.child.full_name}"
+    text += f", {coordinates}" if coordinates else ""
     if not joint.is_vector:
         pairs = zip(joint.velocity_names, joint.velocity_labels, strict=True)
-        said += f", velocities {', '.join(f'{name} [{label.unit}]' for name, label in pairs)}"
-    said += f", loss {joint.loss}" if joint.loss is not None else ""
-    return said + (f", stiffness {joint.stiffness:.6g}, rest {joint.rest:.6g}" if joint.stiffness else "")
+        text += f", velocities {', '.join(f'{name} [{label.unit}]' for name, label in pairs)}"
+    text += f", loss {joint.loss}" if joint.loss is not None else ""
+    return text + (f", stiffness {joint.stiffness:.6g}, rest {joint.rest:.6g}" if joint.stiffness else "")
 
 
 def described_constraint(word: Constraint) -> str:
     """A constraint in a line."""
-    return f"{word.name}: {type(word).__name__}{word.said}"
+    return f"{word.name}: {type(word).__name__}{word.details}"
 
 
 def _choice(model: Description) -> list[str]:

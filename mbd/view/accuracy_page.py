@@ -67,8 +67,8 @@ def _row(point: Point, leads: bool) -> str:
     first, dt, *rest = cells(point)
     head = f"<td>{escape(first) if leads else ''}</td><td>{escape(dt)}</td>"
     if point.failure:
-        kind, told = " first" if leads else "", f"failed: {escape(point.failure)}"
-        return f'<tr class="failed{kind}">{head}<td colspan="{len(HEADS) - 2}">{told}</td></tr>'
+        kind, text = " first" if leads else "", f"failed: {escape(point.failure)}"
+        return f'<tr class="failed{kind}">{head}<td colspan="{len(HEADS) - 2}">{text}</td></tr>'
     note = f' title="{escape(remark(point))}"' if remark(point) else ""
     kind = ' class="first"' if leads else ""
     return f"<tr{kind}{note}>{head}{''.join(f'<td>{escape(text)}</td>' for text in rest)}</tr>"

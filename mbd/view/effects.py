@@ -60,15 +60,15 @@ def _changes(axes: Any, found: Effects, shades: Sequence[str]) -> None:
     low = 10.0 ** math.floor(math.log10(min([*known, found.tolerance]) * 0.5))
     high = 10.0 ** math.ceil(math.log10(max([*known, found.tolerance]) * 8.0))
     for place, (one, size) in enumerate(zip(found.contributions, sizes, strict=True)):
-        told = "nothing, to the bit" if one.change.identical else f"{size:.2g}" if size else "0"
+        text = "nothing, to the bit" if one.change.identical else f"{size:.2g}" if size else "0"
         if one.change.failure or not one.change.outputs:
-            told = "cannot be left out" if one.change.failure else "not compared"
+            text = "cannot be left out" if one.change.failure else "not compared"
         if size > 0.0:
             hatch = None if one.change.comparable else "////"
             axes.barh(place, size - low, left=low, color=shades[place], height=0.62, hatch=hatch, edgecolor="white",
                       linewidth=0.0)  # fmt: skip
         axes.annotate(
-            told + _why(one),
+            text + _why(one),
             (size if size > 0.0 else found.tolerance, place),
             xytext=(4, 0),
             textcoords="offset points",

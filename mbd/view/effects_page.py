@@ -54,8 +54,8 @@ def _row(each: Contribution) -> str:
 
     kind = ' class="failed"' if each.change.failure else ""
     note = f' title="{escape(str(each.change))}"' if str(each.change) else ""
-    told = (_cell("td", head, text) for head, text in zip(HEADS, cells(each), strict=True))
-    return f"<tr{kind}{note}>{''.join(told)}</tr>"
+    entries = (_cell("td", head, text) for head, text in zip(HEADS, cells(each), strict=True))
+    return f"<tr{kind}{note}>{''.join(entries)}</tr>"
 
 
 def _cell(tag: str, head: str, text: str) -> str:

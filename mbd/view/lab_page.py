@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from datetime import UTC, datetime
 from html import escape
 from typing import Any
 
-from mbd.view.report import machine, versions
+from mbd.view.report import made_with
 from mbd.view.template import filled
 
 __all__ = ["finite", "lab_page"]
@@ -28,9 +27,6 @@ def lab_page(
     content : what the script draws, as plain lists
     script : its file
     """
-    known = versions()
-    made = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
-    told = f"mbd {known['mbd']}, Python {known['python']}, numpy {known['numpy']}, {machine()['processor']}; {made}"
     parts = {
         "<!--title-->": escape(title),
         "<!--advice-->": "".join(f"<p>{escape(line)}</p>" for line in advice),
@@ -40,7 +36,7 @@ def lab_page(
         "<!--about-->": about,
         "<!--heads-->": "".join(heads),
         "<!--rows-->": "\n".join(rows),
-        "<!--made-->": escape(told),
+        "<!--made-->": escape(made_with()),
     }
     return filled("lab", content, parts, ("shared.js", script))
 

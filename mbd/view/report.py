@@ -19,7 +19,7 @@ from mbd.results.summary import facts
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
 
-__all__ = ["machine", "record", "versions", "write"]
+__all__ = ["machine", "made_with", "record", "versions", "write"]
 
 LIBRARIES = ("numpy", "scipy", "sympy", "networkx", "llvmlite", "matplotlib")
 
@@ -45,6 +45,12 @@ def machine() -> dict[str, Any]:
         "processor": _processor(),
         "processors": os.cpu_count(),
     }
+
+
+def made_with() -> str:
+    """Versions, processor and time, for the foot of a page."""
+    known, now = versions(), datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
+    return f"mbd {known['mbd']}, Python {known['python']}, numpy {known['numpy']}, {machine()['processor']}; {now}"
 
 
 def _processor() -> str:

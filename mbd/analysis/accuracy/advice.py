@@ -85,22 +85,22 @@ def _costs(point: Point) -> str:
 def _more(points: Sequence[Point], best: Point, target: float, bound: float) -> str:
     """What a tenth of the error costs: measured, or extrapolated from the finest step."""
     if best.reaches(target) and best.at_most:
-        told, target = "It is ten times more accurate already; ten times more than that", best.at_most / MORE
+        text, target = "It is ten times more accurate already; ten times more than that", best.at_most / MORE
     else:
-        told = "Ten times more accuracy"
+        text = "Ten times more accuracy"
     finer = cheapest(points, target)
     if finer is not None:
         ratio = finer.seconds / best.seconds
         times = f"{ratio:.2g} times the time" if ratio > 1.05 else "no more time"
-        return f"{told} costs {times}: {_described(finer)}."
+        return f"{text} costs {times}: {_described(finer)}."
     if bound >= target:
-        return f"{told} cannot be shown: the reference itself is known to {bound:.1g} only."
+        return f"{text} cannot be shown: the reference itself is known to {bound:.1g} only."
     guess = _extrapolated(points, target)
     if guess is None:
-        return f"{told} was not reached by any of these, nor do their orders tell what it costs."
+        return f"{text} was not reached by any of these, nor do their orders tell what it costs."
     scheme, dt, seconds = guess
     return (
-        f"{told} was not measured; by its order {scheme} would need dt = {dt:.2g} s and "
+        f"{text} was not measured; by its order {scheme} would need dt = {dt:.2g} s and "
         f"{milliseconds(seconds)}, {seconds / best.seconds:.2g} times the time."
     )
 
@@ -126,15 +126,15 @@ def _best(points: Sequence[Point]) -> Point:
 def _unreached(points: Sequence[Point], target: float, bound: float) -> list[str]:
     """The best that was reached, and why no more."""
     best = _best(points)
-    said = [f"An error of {target:g} is not reached; the best is {_described(best)}."]
+    sentences = [f"An error of {target:g} is not reached; the best is {_described(best)}."]
     if bound >= target:
-        return [*said, f"The reference itself is known to {bound:.1g} only, so no run can be shown to do better."]
+        return [*sentences, f"The reference itself is known to {bound:.1g} only, so no run can be shown to do better."]
     guess = _extrapolated(points, target)
     if guess is None:
-        return [*said, "No order can be observed, so that the step it needs cannot be determined."]
+        return [*sentences, "No order can be observed, so that the step it needs cannot be determined."]
     scheme, dt, seconds = guess
     return [
-        *said,
+        *sentences,
         f"The steps are too large: by its order {scheme} would need dt = {dt:.2g} s and {milliseconds(seconds)}. Give "
         "finer dts; below some error round-off is all that is left.",
     ]

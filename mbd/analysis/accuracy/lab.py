@@ -76,8 +76,8 @@ def accuracy(
     _check(target, options, known)
     options["parameters"] = {**getattr(start, "parameters", {}), **(options.get("parameters") or {})}
     chosen = plan(model, start, until, quantities, integrators, dts, options, also, tols, target, known)
-    with share_bar() if progress is True else nullcontext(progress or None) as told:
-        bench = Bench(model, start, chosen, options, told)
+    with share_bar() if progress is True else nullcontext(progress or None) as report:
+        bench = Bench(model, start, chosen, options, report)
         reference = bench.reference()
         points, complete = bench.points(target)
     notes = _notes(reference, bench.chosen, points, complete)
@@ -91,16 +91,16 @@ class Bench:
     """Where the runs of one measurement are made."""
 
     def __init__(
-        self, model: Any, start: State, chosen: Plan, options: Mapping[str, Any], told: Progress | None
+        self, model: Any, start: State, chosen: Plan, options: Mapping[str, Any], report: Progress | None
     ) -> None:
-        self.subject, self.chosen, self.told = Subject(model, start, chosen.until, options), chosen, told
+        self.subject, self.chosen, self.report = Subject(model, start, chosen.until, options), chosen, report
         self.total = REFERENCE_RUNS + chosen.count + 1
         self.known: Truth | Published | None = None
 
     def share(self, place: int) -> Callable[[float], None]:
         """Progress of one run among all."""
-        told = self.told
-        return (lambda part: None) if told is None else lambda part: told(place + min(max(part, 0.0), 1.0), self.total)
+        report, total = self.report, self.total
+        return (lambda part: None) if report is None else lambda part: report(place + min(max(part, 0.0), 1.0), total)
 
     def reference(self) -> Truth | Published | str:
         """What to judge by, or why there is none."""

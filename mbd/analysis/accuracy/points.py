@@ -171,11 +171,11 @@ def _is_told(run: Trajectory, truth: Truth | Published | None, subject: Subject)
 
 def _tolerance(run: Trajectory, seconds: float) -> dict[str, Any]:
     """What a run to a tolerance says of itself."""
-    told = run.stats.get("tolerance")
-    if told is None:
+    tolerance = run.stats.get("tolerance")
+    if tolerance is None:
         return {}
     return {
-        "estimated": told["estimated"], "runs": len(told["runs"]),
+        "estimated": tolerance["estimated"], "runs": len(tolerance["runs"]),
         "trials": max(1.0 - run.stats["wall_seconds"] / seconds, 0.0),
     }  # fmt: skip
 
@@ -215,11 +215,11 @@ def _judged(run: Trajectory, truth: Truth | Published, scheme: Integrator) -> di
     worst = {name: max(found.largest.get(name, 0.0), found.at_end.get(name, 0.0)) for name in known}
     clear = {name: worst[name] >= CLEAR * bound for name, bound in known.items()}
     leading = max(worst, key=lambda name: worst[name])
-    told = clear[leading]
-    notes = [] if told else [f"no clear error beside the reference's own, {known[leading]:.1g}"]
+    is_clear = clear[leading]
+    notes = [] if is_clear else [f"no clear error beside the reference's own, {known[leading]:.1g}"]
     notes += [remark] if (remark := truth.remark(found)) else []
     return {
-        "error": found.error if told else None,
+        "error": found.error if is_clear else None,
         "at_most": max(worst[name] + bound for name, bound in known.items()),
         "errors": {name: value for name, value in found.largest.items() if clear[name]},
         "end_errors": {name: value for name, value in found.at_end.items() if value >= CLEAR * known[name]},

@@ -75,8 +75,8 @@ class Published:
     @property
     def origin(self) -> str:
         """What they are, in a sentence."""
-        told = (f"{name} = {each.value:.12g} ± {each.accuracy:.1g}" for name, each in self.known.items())
-        return f"{self.method}: {', '.join(told)}"
+        texts = (f"{name} = {each.value:.12g} ± {each.accuracy:.1g}" for name, each in self.known.items())
+        return f"{self.method}: {', '.join(texts)}"
 
     @property
     def struck(self) -> bool:
@@ -117,11 +117,11 @@ class Published:
         """The error of each quantity, where there are several."""
         if len(self.known) == 1:
             return ""
-        told = []
+        texts = []
         for name, size in found.largest.items():
             end = found.at_end[name]
-            told.append(f"{name} {size:.1e}" + (f" ({end:.1e} at the end)" if end < 0.9 * size else ""))
-        return ", ".join(told)
+            texts.append(f"{name} {size:.1e}" + (f" ({end:.1e} at the end)" if end < 0.9 * size else ""))
+        return ", ".join(texts)
 
 
 def _told(name: str, known: Known, run: Trajectory) -> Vector:

@@ -154,8 +154,8 @@ def remark(point: Point) -> str:
         return point.note
     achieved = "–" if point.achieved is None else f"{point.achieved:.1e}"
     estimated = "–" if point.estimated is None else f"{point.estimated:.1e}"
-    said = f"achieved {achieved}, estimated {estimated}; {point.runs} runs, trials {point.trials:.0%} of the time"
-    return f"{said}; {point.note}" if point.note else said
+    text = f"achieved {achieved}, estimated {estimated}; {point.runs} runs, trials {point.trials:.0%} of the time"
+    return f"{text}; {point.note}" if point.note else text
 
 
 def _line(texts: Sequence[str], widths: Sequence[int]) -> str:

@@ -99,8 +99,8 @@ class Truth:
         """What it is and how far it may be trusted, in a sentence or two."""
         events = len(self.run.events)
         growth = "" if self.growth is None else f"; a small change of the start grows {self.growth:.2g} times"
-        told = f", its events ({events}) to {self.event_bound:.1g} s" if events else ""
-        return f"{self.method}, known to {self.error:.1g}{told}{growth}; {self.seconds:.1f} s"
+        text = f", its events ({events}) to {self.event_bound:.1g} s" if events else ""
+        return f"{self.method}, known to {self.error:.1g}{text}{growth}; {self.seconds:.1f} s"
 
     @property
     def struck(self) -> bool:

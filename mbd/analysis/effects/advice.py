@@ -18,28 +18,28 @@ def advice(
     """
     alone = [each for each in contributions if each.change.within(tolerance)]
     if alone:
-        said = [_alone(alone, tolerance), *(_together(together, operations) if together is not None else ())]
+        sentences = [_alone(alone, tolerance), *(_together(together, operations) if together is not None else ())]
     else:
-        said = [_none(contributions, tolerance)]
+        sentences = [_none(contributions, tolerance)]
     idle = [each.name for each in alone if each.change.identical]
     if idle:
-        said.append(f"{_listed(idle)} {'does' if len(idle) == 1 else 'do'} nothing in this run, to the bit.")
+        sentences.append(f"{_listed(idle)} {'does' if len(idle) == 1 else 'do'} nothing in this run, to the bit.")
     vital = [each for each in contributions if each.change.ends or each.change.failure]
     if vital:
-        said.append(f"Without {_listed([each.name for each in vital], 'or')} the run ends otherwise.")
-    return said
+        sentences.append(f"Without {_listed([each.name for each in vital], 'or')} the run ends otherwise.")
+    return sentences
 
 
 def _none(contributions: Sequence[Contribution], tolerance: float) -> str:
     """Why nothing may go."""
     limit = f"{tolerance:g} of its range"
-    told = f"No effect may be left out: each changes an output by more than {limit}, or the events and their times"
+    text = f"No effect may be left out: each changes an output by more than {limit}, or the events and their times"
     able = [each for each in contributions if each.change.telling and each.change.outputs]
     if able:
         best = min(able, key=lambda each: each.change.largest)
-        return f"{told}; least, by {best.change.largest:.2g}, {best.name!r}."
+        return f"{text}; least, by {best.change.largest:.2g}, {best.name!r}."
     longest = max(contributions, key=lambda each: each.change.until)
-    return f"{told}. The events stay the same longest, until {longest.change.until:.4g} s, without {longest.name!r}."
+    return f"{text}. The events stay the same longest, until {longest.change.until:.4g} s, without {longest.name!r}."
 
 
 def _alone(alone: Sequence[Contribution], tolerance: float) -> str:
@@ -50,16 +50,16 @@ def _alone(alone: Sequence[Contribution], tolerance: float) -> str:
 def _together(whole: Together, operations: int) -> list[str]:
     """The set that a run has shown to hold."""
     if len(whole.names) == 1:
-        said = [f"Leave out {whole.names[0]!r}"]
+        sentences = [f"Leave out {whole.names[0]!r}"]
     else:
-        said = [f"Leave out {_listed(whole.names)} together: a run without them changes outputs by "
+        sentences = [f"Leave out {_listed(whole.names)} together: a run without them changes outputs by "
                 f"{whole.change.largest:.1g}"]  # fmt: skip
     less = operations - whole.operations
-    said[0] += f"; {less} of {operations} operations of a Newton iteration go"
-    said[0] += " (contacts that are open take none anyway)." if less == 0 else "."
+    sentences[0] += f"; {less} of {operations} operations of a Newton iteration go"
+    sentences[0] += " (contacts that are open take none anyway)." if less == 0 else "."
     if whole.back:
-        said.append(f"{_listed(whole.back)} had to stay: beside the others the change was more than allowed.")
-    return said
+        sentences.append(f"{_listed(whole.back)} had to stay: beside the others the change was more than allowed.")
+    return sentences
 
 
 def _listed(names: Sequence[str], word: str = "and", quote: bool = True) -> str:

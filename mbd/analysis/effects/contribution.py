@@ -66,15 +66,15 @@ class Change:
         """What else is to be said of it."""
         if self.failure:
             return f"cannot be left out: {self.failure}"
-        told = ["changes nothing, to the bit"] if self.identical else []
-        told += [self.ends] if self.ends else []
+        texts = ["changes nothing, to the bit"] if self.identical else []
+        texts += [self.ends] if self.ends else []
         if self.differs_at is not None:
-            told.append(f"other events from {self.differs_at:.4g} s")
+            texts.append(f"other events from {self.differs_at:.4g} s")
         if self.event_time:
-            told.append(f"events up to {self.event_time:.2g} s off")
+            texts.append(f"events up to {self.event_time:.2g} s off")
         if self.left_out > 0.2:
-            told.append(f"{self.left_out:.0%} of the instants lie between shifted events")
-        return "; ".join(told)
+            texts.append(f"{self.left_out:.0%} of the instants lie between shifted events")
+        return "; ".join(texts)
 
 
 @dataclass(frozen=True)

@@ -82,8 +82,8 @@ def effects(
         if the whole scene fails.
     """
     _check(start, tolerance, options)
-    with share_bar() if progress is True else nullcontext(progress or None) as told:
-        bench = Bench(model, start, until, integrator, dt, options, told)
+    with share_bar() if progress is True else nullcontext(progress or None) as report:
+        bench = Bench(model, start, until, integrator, dt, options, report)
         bench.begin(outputs)
         return bench.study(tolerance)
 
@@ -93,9 +93,9 @@ class Bench:
 
     def __init__(
         self, model: Any, start: State, until: Any, integrator: Integrator | None, dt: float,
-        options: Mapping[str, Any], told: Progress | None,
+        options: Mapping[str, Any], report: Progress | None,
     ) -> None:  # fmt: skip
-        self.until, self.integrator, self.dt, self.told = until, integrator, dt, told
+        self.until, self.integrator, self.dt, self.report = until, integrator, dt, report
         self.backend = options.get("backend", "auto")
         self.options = {name: value for name, value in options.items() if name != "parameters"}
         parameters = {**start.parameters, **(options.get("parameters") or {})}
@@ -136,8 +136,8 @@ class Bench:
 
     def share(self, place: float, size: float = 1.0) -> Callable[[float], None]:
         """Progress of a part of all."""
-        told, total = self.told, 2.0 * len(self.elements) + 1.0
-        return (lambda part: None) if told is None else lambda part: told(min(place + size * part, total), total)
+        report, total = self.report, 2.0 * len(self.elements) + 1.0
+        return (lambda part: None) if report is None else lambda part: report(min(place + size * part, total), total)
 
     def without(self, names: Iterable[str]) -> tuple[Scene | None, Change]:
         """The scene without some effects, and what that changes."""

@@ -78,8 +78,8 @@ class Effects(Rows):
         lines += [_line(rows[0], widths), "  ".join("─" * width for width in widths)]
         for row in rows[1:]:
             lines.append(_line(row, widths).rstrip())
-        told = [f"without {each.name!r}: {each.change}" for each in self.contributions if str(each.change)]
-        lines += ["", *told] if told else []
+        changes = [f"without {each.name!r}: {each.change}" for each in self.contributions if str(each.change)]
+        lines += ["", *changes] if changes else []
         lines += ["", *self.legend, "", *self.recommendation]
         return "\n".join(lines)
 
@@ -104,8 +104,8 @@ class Effects(Rows):
         if times:
             whole = sorted({round(time.whole) for time in times})
             span = f"{whole[0]}" if len(whole) == 1 else f"{whole[0]} to {whole[-1]}"
-            told = f"processor time, of {span} ns in all; least of {times[0].rounds} runs with and without, by turns"
-            found.insert(1, f"ns/step: {told}")
+            text = f"processor time, of {span} ns in all; least of {times[0].rounds} runs with and without, by turns"
+            found.insert(1, f"ns/step: {text}")
         return (*found, *(() if self.complete else ("interrupted: the rest was not measured",)))
 
     # tables ---------------------------------------------------------------------------------------------------------

@@ -171,10 +171,10 @@ def _no_end(stepper: Stepper, status: int, closed: str, rushing: str) -> str:
             f"a step would miss an angle by more than half a radian, down to a tenth of dt{closed}"
             f"{worst}: the motion is too fast to be resolved; use a smaller dt"
         )
-    said = "" if stepper.compiled else stepper.scheme.report.message
-    if residual <= 1.0 and said:
+    message = "" if stepper.compiled else stepper.scheme.report.message
+    if residual <= 1.0 and message:
         return (
-            f"steps fail down to a tenth of dt; {type(stepper.scheme.integrator).__name__} says: {said}"
+            f"steps fail down to a tenth of dt; {type(stepper.scheme.integrator).__name__} says: {message}"
             f"{closed}{worst}; try a smaller dt{rushing}"
         )
     if residual <= 1.0 and stepper.kernel.n_active == 0:
@@ -188,7 +188,7 @@ def _no_end(stepper: Stepper, status: int, closed: str, rushing: str) -> str:
             f"{worst}: next to a singular configuration, or in a force too steep for dt; try a smaller dt, or, "
             f"at such a pose, {_passing(stepper)}{rushing}"
         )
-    own = f" ({said})" if said else ""
+    own = f" ({message})" if message else ""
     return (
         f"Newton stalled at {residual:.3g} times the tolerance after "
         f"{stepper.kernel.max_iterations} "
@@ -252,9 +252,9 @@ def _no_contact(stepper: Stepper, status: int, closed: str, events: Sequence[Eve
     if status == codes.CHATTER:
         most = stepper.kernel.max_switches
         many = max(stepper.kernel.n_switches, stepper.kernel.n_repeats) > most
-        said = f"more than {most} switches" if many else "the same switches again and again"
+        message = f"more than {most} switches" if many else "the same switches again and again"
         return (
-            f"{said} at one instant: {_last_events(events)}; they "
+            f"{message} at one instant: {_last_events(events)}; they "
             "follow each other without motion; give a contact a release rule, friction or a penalty law, or an event "
             "a reset that leaves zero"
         )
@@ -319,9 +319,9 @@ def _accepted(stepper: Stepper) -> Posture:
 
 def _clashing(stepper: Stepper, status: int) -> str:
     """Which rows depend on each other or conflict."""
-    told = clash(stepper.mechanism.equations.rows, stepper.kernel)
+    clashing = clash(stepper.mechanism.equations.rows, stepper.kernel)
     what = "depend on each other" if status == codes.DEPENDENT else "conflict"
-    return f"rows {what}: {told}" if told else f"rows {what} at {_unknown(stepper)}"
+    return f"rows {what}: {clashing}" if clashing else f"rows {what} at {_unknown(stepper)}"
 
 
 def _worst(stepper: Stepper) -> str:

@@ -134,8 +134,8 @@ def _uncounted(run: RunData, record: Record) -> list[str]:
     if not run.mechanism.equations.wrapped:
         return []
     found = ModelColumns(record, run.mechanism.equations).doubtful_turns()
-    told = ", ".join(f"{name!r} after t = {time:.6g} s" for name, time in found)
-    return [f"whole turns are a guess of {told}: store more rows, take a smaller dt, or do not cut it"] if found else []
+    text = ", ".join(f"{name!r} after t = {time:.6g} s" for name, time in found)
+    return [f"whole turns are a guess of {text}: store more rows, take a smaller dt, or do not cut it"] if found else []
 
 
 def _energy_lost(run: RunData, record: Record) -> list[str]:
@@ -143,8 +143,8 @@ def _energy_lost(run: RunData, record: Record) -> list[str]:
     if not run.energy.share < -TAKEN or run.kernel.adaptive:
         return []
     rate = fastest(run, record, sane_rows(run))
-    told = f": dt = {run.dt:g} s does not resolve its fastest motion of {rate:.3g} rad/s, dt below "
-    return [run.energy.note + (f"{told}{resolving_dt(rate):.2g} s does" if rate * run.dt > 1.0 else "")]
+    text = f": dt = {run.dt:g} s does not resolve its fastest motion of {rate:.3g} rad/s, dt below "
+    return [run.energy.note + (f"{text}{resolving_dt(rate):.2g} s does" if rate * run.dt > 1.0 else "")]
 
 
 def _ignored(run: RunData, number: int, contact: Contact) -> list[str]:
@@ -211,17 +211,17 @@ def _short_touch(run: RunData, record: Record, number: int, contact: Contact) ->
         ], []
     spans = [b.time - a.time for a, b in pairwise(events) if (a.kind, b.kind) == ("closed", "opened")]
     shortest = min(spans, default=np.inf)
-    said = f"closed for {shortest / run.dt:.2g} steps only"
+    text = f"closed for {shortest / run.dt:.2g} steps only"
     if shortest >= RESOLVED * run.dt and events and events[-1].kind == "closed":
         half = _halved(run, contact, events[-1].row)
         shortest = HALVING * half
-        said = f"closed to stay and lost half of its speed within {half / run.dt:.2g} steps"
+        text = f"closed to stay and lost half of its speed within {half / run.dt:.2g} steps"
     if shortest >= RESOLVED * run.dt:
         return [], []
     safe = dt_of_impacts(run, record, number, _closings(record, events)[:LOOKED_AT])
     safe = safe if np.isfinite(safe) else shortest / RESOLVED
     note = (
-        f"{contact.name!r} {said}, too few: its peak force and energy are not resolved; use dt below {safe:.2g} s, "
+        f"{contact.name!r} {text}, too few: its peak force and energy are not resolved; use dt below {safe:.2g} s, "
         "a softer stiffness, or mbd.Unilateral"
     )
     return [note], [note] if shortest < BLIND * run.dt else []

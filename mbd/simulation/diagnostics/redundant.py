@@ -32,11 +32,11 @@ def redundancy(
     """
     if not dependent:
         return ""
-    told = [
+    texts = [
         str(Dependence(rows[row].title, tuple((rows[k].title, 1.0) for k in on), row, on))
         for row, on in sorted(dependent.items())
     ]
-    more = ["…"] if len(told) > MOST_TOLD else []
+    more = ["…"] if len(texts) > MOST_TOLD else []
     what = (
         "how they share a load is not determined, nor is the drag of friction that slides: multipliers of least norm "
         "are taken"
@@ -49,7 +49,7 @@ def redundancy(
         else "their multipliers are not unique; nor is the motion, if this is a singular configuration, where branches "
         "of motions cross: start beside it"
     )
-    return f"redundant constraints: {len(told)} ({'; '.join(told[:MOST_TOLD] + more)}); {what}"
+    return f"redundant constraints: {len(texts)} ({'; '.join(texts[:MOST_TOLD] + more)}); {what}"
 
 
 def clash(rows: Sequence[Row], K: Kernel) -> str:

@@ -121,38 +121,38 @@ def replay(
     -------
     Replay
     """
-    told = load(failure, model, trusted) if isinstance(failure, str | Path) else failure
-    if not isinstance(told, Failure):
+    capsule = load(failure, model, trusted) if isinstance(failure, str | Path) else failure
+    if not isinstance(capsule, Failure):
         came = type(failure).__name__
         raise ModelError(f"replay needs run.failure or the path of a file it was saved to, not {came}")
-    model = told.model if model is None else model
-    scheme = told.integrator if integrator is None else integrator
+    model = capsule.model if model is None else model
+    scheme = capsule.integrator if integrator is None else integrator
     faults = []
     if model is None:
         faults.append("the failure holds no model; give it: replay(…, model=model)")
     if not isinstance(scheme, Integrator):
         faults.append(f"the integrator {scheme!r} is known by its printed form only; give it: replay(…, integrator=…)")
-    step = told.dt if dt is None else dt
+    step = capsule.dt if dt is None else dt
     if not step > 0.0:
         faults.append(f"dt must be a positive number of seconds, not {dt!r}")
     if faults:
         raise ModelError(faults)
-    count = max(1, math.ceil((told.attempted - told.time) / step - 1e-6)) if steps is None else int(steps)
-    run, _ = _prepared(told, told.state, model, scheme, step, count)
+    count = max(1, math.ceil((capsule.attempted - capsule.time) / step - 1e-6)) if steps is None else int(steps)
+    run, _ = _prepared(capsule, capsule.state, model, scheme, step, count)
     trajectory, problem = run.complete()
-    again, seen = _prepared(told, trajectory.final if problem else told.state, model, scheme, step, 1)
+    again, seen = _prepared(capsule, trajectory.final if problem else capsule.state, model, scheme, step, 1)
     if again.stepper.compiled:
         again.stepper.compiled, again.stepper.scheme = False, KernelScheme(again.stepper.own)
     again.march()
-    same = bool(problem) and problem == told.message
-    return Replay(told, not problem, same, trajectory.message, seen.tries(again), trajectory)
+    same = bool(problem) and problem == capsule.message
+    return Replay(capsule, not problem, same, trajectory.message, seen.tries(again), trajectory)
 
 
 def _prepared(
-    told: Failure, start: State, model: Any, scheme: Integrator, dt: float, steps: int
+    capsule: Failure, start: State, model: Any, scheme: Integrator, dt: float, steps: int
 ) -> tuple[Run, _Watched]:
     """A run of so many steps with the settings of the one that failed."""
-    known = told.settings
+    known = capsule.settings
     until = tuple(known["until"]) if isinstance(known["until"], list) else known["until"]
     options = {name: known[name] for name in ("contact", "impact", "locate", "store", "rest_speed", "backend")}
     options |= {name: known[name] for name in ("tol", "allowed", "longest") if known.get(name) is not None}
@@ -163,7 +163,7 @@ def _prepared(
         return watched[0]
 
     run = prepared(model, replace(start), scheme, dt, until, dict(start.parameters), options, watch)
-    run.limit, run.earlier = steps, told.events
+    run.limit, run.earlier = steps, capsule.events
     return run, watched[0]
 
 

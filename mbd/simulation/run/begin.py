@@ -23,13 +23,13 @@ __all__ = ["begin", "check_rank", "guard_values", "notify", "require_consistent"
 
 def notify(run: RunData) -> None:
     """Of which contacts and events Python must hear."""
-    told = run.kernel.notify
+    notify = run.kernel.notify
     ends = {run.stop} | {name for controller in run.boundaries.controllers for name in controller.on}
     for c, contact in enumerate(run.manager.contacts):
-        told[c] = int(contact.name in ends)
+        notify[c] = int(contact.name in ends)
     for e, guard in enumerate(run.manager.guards):
         wanted = guard.terminal or guard.reset is not None or guard.name in ends
-        told[run.kernel.n_contacts + e] = int(wanted)
+        notify[run.kernel.n_contacts + e] = int(wanted)
 
 
 def begin(run: RunData, start: State) -> None:

@@ -69,13 +69,13 @@ def digest(run: RunData) -> str:
     v, mechanism = run.kernel, run.mechanism
     acting = run.manager.penalties(v.closed[: v.n_contacts])
     block = mechanism.block(run.now, v.q[: v.n_q], v.y[: v.n], v.anchors[: v.n_anchors], acting)
-    told = hashlib.sha256()
+    digest = hashlib.sha256()
     for name in ("accelerations", "guards"):
         out = np.zeros(max(mechanism.sizes[name], 1))
         if mechanism.sizes[name]:
             mechanism.common[name](block, v.params, out)
-        told.update(out.tobytes())
-    return told.hexdigest()
+        digest.update(out.tobytes())
+    return digest.hexdigest()
 
 
 def take_up(run: RunData, start: State) -> bool:

@@ -26,9 +26,9 @@ def trajectory_of(run: RunData, problem: str, message: str, final: State) -> Tra
     """The run by name; `problem` is '' if it went as far as it was asked to. Its message tells what is in doubt."""
     record = whole_record(run)
     notes, doubts = notes_of(run, record)
-    told = problem or "; but ".join([message, *doubts])
+    text = problem or "; but ".join([message, *doubts])
     ended = replace(
-        record, success=not problem, message=told, failure=run.failure, final=final, stats=_statistics(run, notes)
+        record, success=not problem, message=text, failure=run.failure, final=final, stats=_statistics(run, notes)
     )
     return Trajectory(ended)
 

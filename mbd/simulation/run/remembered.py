@@ -40,12 +40,12 @@ def sealed(memory: Memory) -> Memory:
 
 def _seal(memory: Memory) -> str:
     """Hash of what the kernel and the clocks of controllers go on from."""
-    told = hashlib.sha256(repr((memory.belongs, memory.digest, memory.time, memory.pending)).encode())
-    told.update(repr(sorted(memory.mode.closed)).encode())
-    told.update(repr((memory.controllers.get("begin"), sorted(dict(memory.controllers["samples"]).items()))).encode())
+    digest = hashlib.sha256(repr((memory.belongs, memory.digest, memory.time, memory.pending)).encode())
+    digest.update(repr(sorted(memory.mode.closed)).encode())
+    digest.update(repr((memory.controllers.get("begin"), sorted(dict(memory.controllers["samples"]).items()))).encode())
     for array in (memory.parameters, memory.reals, memory.integers, memory.place, memory.anchors):
-        told.update(array.tobytes())
-    return told.hexdigest()
+        digest.update(array.tobytes())
+    return digest.hexdigest()
 
 
 def damage(memory: Memory) -> str:
@@ -78,19 +78,19 @@ def _are_pairs(pending: Any) -> bool:
     )
 
 
-def _are_samples(told: Any) -> bool:
+def _are_samples(given: Any) -> bool:
     """Whether this is what `Boundaries.remembered` gives: the instant samples count from, their numbers, states."""
-    if not isinstance(told, Mapping) or not {"begin", "samples", "states"} <= set(told):
+    if not isinstance(given, Mapping) or not {"begin", "samples", "states"} <= set(given):
         return False
-    samples, states = told["samples"], told["states"]
+    samples, states = given["samples"], given["states"]
     counted = isinstance(samples, Mapping) and all(
         isinstance(name, str) and isinstance(count, int) and 0 <= count < UNBOUNDED for name, count in samples.items()
     )
     return (
         counted
         and isinstance(states, Mapping)
-        and isinstance(told["begin"], int | float)
-        and bool(np.isfinite(told["begin"]))
+        and isinstance(given["begin"], int | float)
+        and bool(np.isfinite(given["begin"]))
     )
 
 

@@ -77,8 +77,8 @@ class Room(RoomFindings):
                 f"memory; the whole run needs about {rows:.2g} rows, {memory(rows * self.size)}; {_remedy(run)}"
             )
             return self.problem
-        told = (rows > MANY and run.kernel.adaptive) or rows * self.size > LARGE or rows > self.most
-        if told and not self.note:
+        is_large = (rows > MANY and run.kernel.adaptive) or rows * self.size > LARGE or rows > self.most
+        if is_large and not self.note:
             last = f"; it will be ended at {self.most} rows" if rows > self.most else ""
             self.note = (
                 f"at t = {run.now:.3g} s there are {run.stored} rows: at this rate the run will have about {rows:.2g}, "

@@ -189,10 +189,10 @@ class Run(RunData):
         """Whether the step that failed was taken back, and non-smooth steps follow in the place of located instants."""
         if not may_go_on_unlocated(self, status):
             return False
-        told = self._explained(status)
+        reason = self._explained(status)
         if not rewind(self, failed=True):
             return False
-        self.gave_up = self.now, told
+        self.gave_up = self.now, reason
         go_on_unlocated(self)
         return True
 

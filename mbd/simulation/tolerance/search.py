@@ -146,10 +146,11 @@ class Search:
             began = perf_counter()
             self._gaps[key] = gap(trial.run, finest.run, self.tol, self.names)
             self.comparing += perf_counter() - began
-        told = self._gaps[key]
+        between = self._gaps[key]
         part = 1.0 / (1.0 - self._fall(trial, finest, self.power))
         least = rounding(trial, self.names) * float(trial.run.stats["steps"])
-        return replace(trial, error=max(part * told.size, least) if told.same else np.inf, gap=told, finest=False)
+        error = max(part * between.size, least) if between.same else np.inf
+        return replace(trial, error=error, gap=between, finest=False)
 
     def _fall(self, trial: Trial, finer: Trial, power: float) -> float:
         """E of the finer run over that of the other: by what they allow, or, if more, by the number of their steps."""
