@@ -8,17 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from mbd.assembly.assemble import assemble
-from mbd.bodies import PointMass
-from mbd.constraints import Unilateral, height, measure
+import mbd
+from mbd.constraints import height
 from mbd.hardcases.case import Curve, Figure, Outcome, hard_case
 from mbd.hardcases.convergence import halved
 from mbd.hardcases.impacts import deepest, difference, impact_figures
 from mbd.hardcases.references import accuracy, numbers, published, size
 from mbd.hardcases.stepped import HOW, stepped_figures, within_steps
-from mbd.joints import Prismatic, Translation
-from mbd.model import Model
-from mbd.simulation import simulate
 
 __all__ = ["CASES"]
 
@@ -30,12 +26,12 @@ ROUND_OFF = 1e-12
 
 
 @cache
-def ball(m: float, g: float, e: float) -> Model:
+def ball(m: float, g: float, e: float) -> mbd.Model:
     """A ball over a floor."""
-    model = Model("ball", gravity=(0.0, -g, 0.0))
-    body = PointMass("ball", mass=m)
-    model.connect(Prismatic("fall", model.ground.origin, body.origin, axis=(0, 1, 0)))
-    model.constrain(Unilateral("floor", height(body.origin), restitution=e))
+    model = mbd.Model("ball", gravity=(0.0, -g, 0.0))
+    body = mbd.PointMass("ball", mass=m)
+    model.connect(mbd.Prismatic("fall", model.ground.origin, body.origin, axis=(0, 1, 0)))
+    model.constrain(mbd.Unilateral("floor", height(body.origin), restitution=e))
     return model
 
 
@@ -57,13 +53,13 @@ def rest_figures(run: Any, m: float, g: float, after: float, what: str) -> list[
     ]
 
 
-def bounces(model: Model, h: float, v: float, scheme: Any, dt: float, until: float, **settings: Any) -> Any:
+def bounces(model: mbd.Model, h: float, v: float, scheme: Any, dt: float, until: float, **settings: Any) -> Any:
     """The run of a ball let go at a height."""
-    start = assemble(model, position={"fall.displacement": h}, velocity={"fall.displacement": v})
-    return simulate(model, start, scheme, dt=dt, until=until, **settings)
+    start = mbd.assemble(model, position={"fall.displacement": h}, velocity={"fall.displacement": v})
+    return mbd.simulate(model, start, scheme, dt=dt, until=until, **settings)
 
 
-def stepped_figures_of(model: Model, h: float, v: float, scheme: Any, m: float, g: float, e: float) -> list[Figure]:
+def stepped_figures_of(model: mbd.Model, h: float, v: float, scheme: Any, m: float, g: float, e: float) -> list[Figure]:
     """In non-smooth steps: the first impact within one of them, rest after the Zeno time, with m g."""
     first, last = zeno(h, g, e)
     steps = halved(first / 20.3)
@@ -170,14 +166,14 @@ def counting(id: str, scheme: Any) -> Outcome:
 
 
 @cache
-def corner(m: float, e1: float, e2: float, turned: bool) -> Model:
+def corner(m: float, e1: float, e2: float, turned: bool) -> mbd.Model:
     """A point mass in front of the walls x = 0 and y = 0, without gravity."""
-    model = Model("corner", gravity=(0.0, 0.0, 0.0))
-    body = PointMass("ball", mass=m)
-    model.connect(Translation("flight", model.ground.origin, body.origin))
+    model = mbd.Model("corner", gravity=(0.0, 0.0, 0.0))
+    body = mbd.PointMass("ball", mass=m)
+    model.connect(mbd.Translation("flight", model.ground.origin, body.origin))
     walls = [
-        Unilateral("wall x", measure("flight.x"), restitution=e1),
-        Unilateral("wall y", measure("flight.y"), restitution=e2),
+        mbd.Unilateral("wall x", mbd.measure("flight.x"), restitution=e1),
+        mbd.Unilateral("wall y", mbd.measure("flight.y"), restitution=e2),
     ]
     model.constrain(*(walls[::-1] if turned else walls))
     return model
@@ -191,12 +187,12 @@ def cornered(id: str, scheme: Any) -> Outcome:
     runs = []
     for turned, contact in HOW:
         model = corner(m, e1, e2, turned)
-        start = assemble(
+        start = mbd.assemble(
             model,
             position={"flight.x": -vx * wait, "flight.y": -vy * wait},
             velocity={"flight.x": vx, "flight.y": vy},
         )
-        runs.append(simulate(model, start, scheme, dt=0.03 * wait, until=2.0 * wait, contact=contact))
+        runs.append(mbd.simulate(model, start, scheme, dt=0.03 * wait, until=2.0 * wait, contact=contact))
     run, other, stepped = runs
     wanted = published(id, "velocity after")
     found = [run["flight.x.rate"][-1], run["flight.y.rate"][-1]]

@@ -10,17 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from mbd.assembly.assemble import assemble
-from mbd.bodies import RigidBody
-from mbd.constraints import Unilateral, touchdown
+import mbd
 from mbd.hardcases.case import Curve, Figure, Outcome, hard_case
 from mbd.hardcases.convergence import error_curve, halved, second_order
 from mbd.hardcases.impacts import deepest, difference, impact_figures
 from mbd.hardcases.references import accuracy, numbers, published, size
 from mbd.hardcases.stepped import HOW, stepped_figures, within_steps
-from mbd.joints import Planar
-from mbd.model import Model
-from mbd.simulation import simulate
 
 __all__ = ["CASES"]
 
@@ -55,19 +50,19 @@ class Block:
             "place.angle": angle,
         }
         corner = "left" if side < 0.0 else "right"
-        return assemble(model_of(self, turned), position=place, velocity={"place.angle": rate}, closed=[corner])
+        return mbd.assemble(model_of(self, turned), position=place, velocity={"place.angle": rate}, closed=[corner])
 
 
 @cache
-def model_of(block: Block, turned: bool = False) -> Model:
+def model_of(block: Block, turned: bool = False) -> mbd.Model:
     """'place' is that of the mass center; `turned` names the corners the other way round."""
-    model = Model("block", gravity=(0.0, -block.g, 0.0))
-    body = RigidBody("block", mass=block.m, inertia=block.inertia)
-    model.connect(Planar("place", model.ground.origin, body.origin))
+    model = mbd.Model("block", gravity=(0.0, -block.g, 0.0))
+    body = mbd.RigidBody("block", mass=block.m, inertia=block.inertia)
+    model.connect(mbd.Planar("place", model.ground.origin, body.origin))
     corners = [
-        Unilateral(
+        mbd.Unilateral(
             name,
-            touchdown(body.point(side * block.half_width - block.offset, -block.half_height)),
+            mbd.touchdown(body.point(side * block.half_width - block.offset, -block.half_height)),
             restitution=block.e,
             friction=block.friction,
         )
@@ -95,7 +90,7 @@ def rock(
 ) -> Any:  # fmt: skip
     """The run of a block let go on one corner."""
     start = block.tilted(angle, rate, turned)
-    return simulate(model_of(block, turned), start, scheme, dt=dt, until=until, contact=contact)
+    return mbd.simulate(model_of(block, turned), start, scheme, dt=dt, until=until, contact=contact)
 
 
 def amplitudes(run: Any, instants: Any) -> Any:
@@ -241,12 +236,12 @@ def landing(id: str, scheme: Any) -> Outcome:
     runs = []
     for turned, contact in HOW:
         model = model_of(block, turned)
-        start = assemble(
+        start = mbd.assemble(
             model,
             position={"place.y": block.half_height + speed * wait},
             velocity={"place.x": 0.0, "place.y": -speed, "place.angle": float(given["omega"])},
         )
-        runs.append(simulate(model, start, scheme, dt=0.03 * wait, until=2.0 * wait, contact=contact))
+        runs.append(mbd.simulate(model, start, scheme, dt=0.03 * wait, until=2.0 * wait, contact=contact))
     run, other, stepped = runs
     found = [run[f"place.{name}.rate"][-1] for name in ("x", "y", "angle")]
     wanted, impulses = published(id, "velocity after"), published(id, "corner impulses")

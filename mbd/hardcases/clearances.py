@@ -7,17 +7,12 @@ from typing import Any
 
 import numpy as np
 
+import mbd
 from mbd.arrays import Vector
-from mbd.assembly.assemble import assemble
-from mbd.bodies import RigidBody
-from mbd.constraints import Unilateral, measure
 from mbd.hardcases.case import Curve, Figure, Outcome, hard_case
 from mbd.hardcases.convergence import error_curve, halved, second_order
 from mbd.hardcases.impacts import deepest, difference, impact_figures
 from mbd.hardcases.references import accuracy, numbers, published, size
-from mbd.joints import Revolute
-from mbd.model import Model
-from mbd.simulation import simulate
 
 __all__ = ["CASES"]
 
@@ -36,42 +31,44 @@ LIMITS = {
 
 
 @cache
-def slider_crank(sizes: tuple[float, ...], turned: bool = False) -> Model:
+def slider_crank(sizes: tuple[float, ...], turned: bool = False) -> mbd.Model:
     """Crank, rod and slider in a chain of three hinges; sizes are l1, l2, a, b, c, m1, m2, m3, J1, J2, J3, g, eN."""
     l1, l2, a, b, c, m1, m2, m3, J1, J2, J3, g, e = sizes
-    model = Model("slider-crank", gravity=(0.0, -g, 0.0))
-    crank = RigidBody("crank", mass=m1, inertia=J1, center=(0.5 * l1, 0.0, 0.0))
-    rod = RigidBody("rod", mass=m2, inertia=J2, center=(0.5 * l2, 0.0, 0.0))
-    slider = RigidBody("slider", mass=m3, inertia=J3)
+    model = mbd.Model("slider-crank", gravity=(0.0, -g, 0.0))
+    crank = mbd.RigidBody("crank", mass=m1, inertia=J1, center=(0.5 * l1, 0.0, 0.0))
+    rod = mbd.RigidBody("rod", mass=m2, inertia=J2, center=(0.5 * l2, 0.0, 0.0))
+    slider = mbd.RigidBody("slider", mass=m3, inertia=J3)
     model.connect(
-        Revolute("main", model.ground.origin, crank.origin),
-        Revolute("pin", crank.point(l1, 0.0), rod.origin),
-        Revolute("wrist", rod.point(l2, 0.0), slider.origin),
+        mbd.Revolute("main", model.ground.origin, crank.origin),
+        mbd.Revolute("pin", crank.point(l1, 0.0), rod.origin),
+        mbd.Revolute("wrist", rod.point(l2, 0.0), slider.origin),
     )
     half = b + c
     corners = []
     for name in CORNERS:
         point = slider.point(a if "front" in name else -a, b if "top" in name else -b)
         gap = (lambda p: half - p[1]) if "top" in name else (lambda p: p[1] + half)
-        corners.append(Unilateral(name, measure(gap, point), restitution=e))
+        corners.append(mbd.Unilateral(name, mbd.measure(gap, point), restitution=e))
     model.constrain(*(corners[::-1] if turned else corners))
     return model
 
 
-def turning(id: str, scheme: Any, dt: float, turned: bool = False, beyond: float | None = None) -> tuple[Model, Any]:
+def turning(
+    id: str, scheme: Any, dt: float, turned: bool = False, beyond: float | None = None
+) -> tuple[mbd.Model, Any]:
     """The run until shortly after the last published impact, or until `beyond` times its time."""
     given = numbers(id)
     names = ("l1", "l2", "a", "b", "c", "m1", "m2", "m3", "J1", "J2", "J3", "g", "eN")
     model = slider_crank(tuple(float(given[name]) for name in names), turned)
     (q1, q2, q3), (w1, w2, w3) = given["angles"], given["rates"]
-    start = assemble(
+    start = mbd.assemble(
         model,
         position={"main.angle": q1, "pin.angle": q2 - q1, "wrist.angle": q3 - q2},
         velocity={"main.angle": w1, "pin.angle": w2 - w1, "wrist.angle": w3 - w2},
     )
     times = published(id, "impact times")
     until = times[-1] + 0.1 * (times[-1] - times[-2]) if beyond is None else beyond * times[-1]
-    return model, simulate(model, start, scheme, dt=dt, until=until, on_failure="return")
+    return model, mbd.simulate(model, start, scheme, dt=dt, until=until, on_failure="return")
 
 
 def turning_errors(id: str, run: Any) -> dict[str, Vector]:

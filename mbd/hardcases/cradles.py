@@ -9,15 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from mbd.assembly.assemble import assemble
-from mbd.bodies import PointMass
-from mbd.constraints import Unilateral, measure
+import mbd
 from mbd.hardcases.case import Curve, Figure, Outcome, hard_case
 from mbd.hardcases.impacts import deepest, difference, impact_figures
 from mbd.hardcases.references import accuracy, numbers, published, size
-from mbd.joints import Prismatic
-from mbd.model import Model
-from mbd.simulation import simulate
 from mbd.simulation.arguments import CHOICES
 
 __all__ = ["CASES"]
@@ -31,16 +26,16 @@ LAWS = {
 
 
 @cache
-def row(masses: tuple[float, ...], e: float, turned: bool = False) -> Model:
+def row(masses: tuple[float, ...], e: float, turned: bool = False) -> mbd.Model:
     """Balls on a rail, whose places are measured so that touching ones have the same."""
-    model = Model("cradle", gravity=(0.0, 0.0, 0.0))
+    model = mbd.Model("cradle", gravity=(0.0, 0.0, 0.0))
     for k, m in enumerate(masses):
-        body = PointMass(f"ball {k}", mass=m)
-        model.connect(Prismatic(f"place {k}", model.ground.origin, body.origin))
+        body = mbd.PointMass(f"ball {k}", mass=m)
+        model.connect(mbd.Prismatic(f"place {k}", model.ground.origin, body.origin))
     contacts = [
-        Unilateral(
+        mbd.Unilateral(
             f"touch {k}",
-            measure(lambda a, b: b - a, f"place {k}.displacement", f"place {k + 1}.displacement"),
+            mbd.measure(lambda a, b: b - a, f"place {k}.displacement", f"place {k + 1}.displacement"),
             restitution=e,
         )
         for k in range(len(masses) - 1)
@@ -49,20 +44,20 @@ def row(masses: tuple[float, ...], e: float, turned: bool = False) -> Model:
     return model
 
 
-def collide(model: Model, speeds: Sequence[float], scheme: Any, impact: str, named: bool = True) -> Any:
+def collide(model: mbd.Model, speeds: Sequence[float], scheme: Any, impact: str, named: bool = True) -> Any:
     """Balls that approach each other all meet after 1 s; equally fast neighbours touch, `named` as closed or not."""
     places = [0.0]
     for a, b in pairwise(speeds):
         places.append(places[-1] + max(a - b, 0.0))
     touching = [f"touch {k}" for k, (a, b) in enumerate(pairwise(speeds)) if a == b]
-    start = assemble(
+    start = mbd.assemble(
         model,
         position={f"place {k}.displacement": x for k, x in enumerate(places)},
         velocity={f"place {k}.displacement": v for k, v in enumerate(speeds)},
         closed=touching if named else [],
     )
     words: Any = {"impact": impact}
-    return simulate(model, start, scheme, dt=0.07, until=2.0, **words)
+    return mbd.simulate(model, start, scheme, dt=0.07, until=2.0, **words)
 
 
 def law_figures(id: str, law: str, scheme: Any) -> tuple[list[Figure], Any]:

@@ -8,16 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from mbd.assembly.assemble import assemble
-from mbd.bodies import Link, RigidBody
-from mbd.constraints import Unilateral, touchdown
+import mbd
 from mbd.hardcases.case import Curve, Figure, Outcome, hard_case
 from mbd.hardcases.convergence import halved, second_order
 from mbd.hardcases.references import numbers, published, size
-from mbd.joints import Planar, Revolute
-from mbd.joints.losses import Coulomb, Loss, PinFriction
-from mbd.model import Model
-from mbd.simulation import simulate
+from mbd.joints.losses import Loss
 
 __all__ = ["CASES"]
 
@@ -27,17 +22,17 @@ STEPS = halved(0.01)
 
 # pendulums ----------------------------------------------------------------------------------------------------------
 @cache
-def pendulum(mass: float, length: float, g: float, loss: Loss) -> Model:
+def pendulum(mass: float, length: float, g: float, loss: Loss) -> mbd.Model:
     """A point mass on a massless rod, with friction in its hinge."""
-    model = Model("pendulum", gravity=(0.0, -g, 0.0))
-    rod = Link("rod", mass=mass, length=length, center=length)
-    model.connect(Revolute("hinge", model.ground.origin, rod.start, loss=loss))
+    model = mbd.Model("pendulum", gravity=(0.0, -g, 0.0))
+    rod = mbd.Link("rod", mass=mass, length=length, center=length)
+    model.connect(mbd.Revolute("hinge", model.ground.origin, rod.start, loss=loss))
     return model
 
 
-def swing(model: Model, angle: float, scheme: Any, dt: float, until: float) -> tuple[Any, Any, Any]:
+def swing(model: mbd.Model, angle: float, scheme: Any, dt: float, until: float) -> tuple[Any, Any, Any]:
     """The run of a pendulum let go, and the times and angles at which it turns, with those of its start."""
-    run = simulate(model, assemble(model, position={"hinge.angle": angle}), scheme, dt=dt, until=until)
+    run = mbd.simulate(model, mbd.assemble(model, position={"hinge.angle": angle}), scheme, dt=dt, until=until)
     turns = [event for event in run.events if event.kind in ("slipped", "stuck")]
     times = np.array([run.time[0], *(event.time for event in turns)])
     angles = run["hinge.angle"][[0, *(event.row for event in turns)]]
@@ -45,7 +40,7 @@ def swing(model: Model, angle: float, scheme: Any, dt: float, until: float) -> t
 
 
 def turning_figures(
-    model: Model, angle: float, scheme: Any, wanted: tuple[Any, Any], until: float
+    model: mbd.Model, angle: float, scheme: Any, wanted: tuple[Any, Any], until: float
 ) -> tuple[list[Figure], Any]:
     """Number, times and angles of turning, over halved steps; the run at the finest."""
     times, angles = wanted
@@ -89,7 +84,7 @@ def coulomb(id: str, scheme: Any) -> Outcome:
     """A finite number of swings, then rest away from the vertical, without creep."""
     given = numbers(id)
     inertia, weight, torque = given["J"], given["K_mgd"], given["tau_friction"]
-    model = pendulum(inertia, 1.0, weight / inertia, Coulomb(torque))
+    model = pendulum(inertia, 1.0, weight / inertia, mbd.Coulomb(torque))
     wanted = (published(id, "turning times"), published(id, "turning angles"))
     until = float(wanted[0][-1]) + 3.0
     figures, run = turning_figures(model, given["theta0"], scheme, wanted, until)
@@ -117,7 +112,7 @@ def loaded(id: str, scheme: Any) -> Outcome:
     """Friction μ r N of the whole force N in the pin, which it is itself a part of."""
     given = numbers(id)
     m, L, g, mu, radius = (given[name] for name in ("m", "L", "g", "mu", "pin_radius"))
-    model = pendulum(m, L, g, PinFriction(mu, radius))
+    model = pendulum(m, L, g, mbd.PinFriction(mu, radius))
     wanted = (published(id, "turning times"), published(id, "turning angles"))
     until = float(wanted[0][-1]) + 0.05
     figures, run = turning_figures(model, given["theta0"], scheme, wanted, until)
@@ -132,12 +127,12 @@ def loaded(id: str, scheme: Any) -> Outcome:
 
 # the rod ------------------------------------------------------------------------------------------------------------
 @cache
-def rod(L: float, m: float, g: float, mu: float) -> Model:
+def rod(L: float, m: float, g: float, mu: float) -> mbd.Model:
     """A uniform rod along its own x whose lower end slides on the ground."""
-    model = Model("rod", gravity=(0.0, -g, 0.0))
-    body = RigidBody("rod", mass=m, inertia=m * L * L / 12.0)
-    model.connect(Planar("place", model.ground.origin, body.origin))
-    model.constrain(Unilateral("tip", touchdown(body.point(-0.5 * L, 0.0)), friction=mu))
+    model = mbd.Model("rod", gravity=(0.0, -g, 0.0))
+    body = mbd.RigidBody("rod", mass=m, inertia=m * L * L / 12.0)
+    model.connect(mbd.Planar("place", model.ground.origin, body.origin))
+    model.constrain(mbd.Unilateral("tip", mbd.touchdown(body.point(-0.5 * L, 0.0)), friction=mu))
     return model
 
 
@@ -147,7 +142,7 @@ def slide(id: str, mu: float, speed: float, scheme: Any, *, spin: float = 0.0, u
     L, angle = given["L"], given["theta"]
     model = rod(L, given["m"], given["g"], mu)
     # the tip stays on the ground: its speed is (speed, 0)
-    start = assemble(
+    start = mbd.assemble(
         model,
         position={"place.y": 0.5 * L * math.sin(angle), "place.angle": angle},
         velocity={
@@ -157,7 +152,7 @@ def slide(id: str, mu: float, speed: float, scheme: Any, *, spin: float = 0.0, u
         },
         closed=["tip"],
     )
-    return simulate(model, start, scheme, dt=1e-3, until=until, on_failure="return")
+    return mbd.simulate(model, start, scheme, dt=1e-3, until=until, on_failure="return")
 
 
 def push_of(id: str, mu: float, sign: float) -> float:

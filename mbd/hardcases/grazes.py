@@ -10,16 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from mbd.assembly.assemble import assemble
-from mbd.bodies import PointMass
-from mbd.constraints import Unilateral, measure
+import mbd
 from mbd.hardcases.case import Curve, Figure, Outcome, definition, hard_case
 from mbd.hardcases.convergence import second_order
 from mbd.hardcases.impacts import deepest
 from mbd.hardcases.references import accuracy, numbers, published, size
-from mbd.joints import Prismatic
-from mbd.model import Model
-from mbd.simulation import simulate
 
 __all__ = ["CASES"]
 
@@ -28,13 +23,13 @@ MOST_HALVINGS = 16
 
 
 @cache
-def oscillator(m: float, w: float, place: float | None, e: float) -> Model:
+def oscillator(m: float, w: float, place: float | None, e: float) -> mbd.Model:
     """A mass on a spring; the wall is at x = place, None without it."""
-    model = Model("oscillator", gravity=(0.0, 0.0, 0.0))
-    body = PointMass("mass", mass=m)
-    model.connect(Prismatic("slide", model.ground.origin, body.origin, stiffness=m * w * w))
+    model = mbd.Model("oscillator", gravity=(0.0, 0.0, 0.0))
+    body = mbd.PointMass("mass", mass=m)
+    model.connect(mbd.Prismatic("slide", model.ground.origin, body.origin, stiffness=m * w * w))
     if place is not None:
-        model.constrain(Unilateral("wall", measure(lambda x: place - x, "slide.displacement"), restitution=e))
+        model.constrain(mbd.Unilateral("wall", mbd.measure(lambda x: place - x, "slide.displacement"), restitution=e))
     return model
 
 
@@ -51,10 +46,10 @@ def graze(id: str, scheme: Any, dt: float, offset: float | None) -> Any:
     w, m = float(given["w"]), float(given.get("m", 1.0))
     place = None if offset is None else float(given["d"]) * (1.0 - offset)
     model = oscillator(m, w, place, float(given.get("e", 1.0)))
-    start = assemble(
+    start = mbd.assemble(
         model, position={"slide.displacement": given["x"]}, velocity={"slide.displacement": float(given["v"])}
     )
-    return simulate(model, start, scheme, dt=dt, until=math.pi / w)
+    return mbd.simulate(model, start, scheme, dt=dt, until=math.pi / w)
 
 
 @dataclass(frozen=True)

@@ -8,16 +8,11 @@ from typing import Any
 
 import numpy as np
 
+import mbd
 from mbd.arrays import Vector
-from mbd.assembly.assemble import assemble
-from mbd.bodies import Link
-from mbd.constraints import Event, Penalty, flexion, measure
 from mbd.hardcases.case import Curve, Figure, Outcome, hard_case
 from mbd.hardcases.convergence import error_curve, halved, second_order
 from mbd.hardcases.references import accuracy, numbers, published, size
-from mbd.joints import Revolute
-from mbd.model import Model
-from mbd.simulation import simulate
 
 __all__ = ["CASES"]
 
@@ -35,18 +30,18 @@ LIMITS = {
 
 
 @cache
-def leg(m: tuple[float, float], L: tuple[float, float], g: float, k: float, c: float, release: str) -> Model:
+def leg(m: tuple[float, float], L: tuple[float, float], g: float, k: float, c: float, release: str) -> mbd.Model:
     """Uniform rods that hang from a fixed hip; the knee's angle is the hyperextension d."""
-    model = Model("leg", gravity=(0.0, -g, 0.0))
+    model = mbd.Model("leg", gravity=(0.0, -g, 0.0))
     thigh, shank = (
-        Link(name, mass, length=length, center=0.5 * length, inertia=mass * length**2 / 12.0)
+        mbd.Link(name, mass, length=length, center=0.5 * length, inertia=mass * length**2 / 12.0)
         for name, mass, length in zip(("thigh", "shank"), m, L, strict=True)
     )
-    knee = Revolute("knee", thigh.end, shank.start)
-    model.connect(Revolute("hip", model.ground.origin, thigh.start), knee)
+    knee = mbd.Revolute("knee", thigh.end, shank.start)
+    model.connect(mbd.Revolute("hip", model.ground.origin, thigh.start), knee)
     model.constrain(
-        Penalty("knee stop", flexion(knee), stiffness=k, damping=c, release=release),
-        Event("deepest", measure("knee.rate", unit="rad"), direction=-1),
+        mbd.Penalty("knee stop", mbd.flexion(knee), stiffness=k, damping=c, release=release),
+        mbd.Event("deepest", mbd.measure("knee.rate", unit="rad"), direction=-1),
     )
     return model
 
@@ -57,13 +52,13 @@ def swing(id: str, scheme: Any, dt: float, locate: Any = "root") -> Any:
     m, L = ((float(given[f"{name}1"]), float(given[f"{name}2"])) for name in ("m", "L"))
     release = RELEASES.get(given["law"], "gap")
     model = leg(m, L, float(given["g"]), float(given["k"]), float(given["c"]), release)
-    start = assemble(
+    start = mbd.assemble(
         model,
         position={"hip.angle": given["theta1"], "knee.angle": given["theta2"] - given["theta1"]},
         velocity={"hip.angle": given["w1"], "knee.angle": given["w2"] - given["w1"]},
     )
     times = published(id, "event times")
-    return simulate(model, start, scheme, dt=dt, until=times[-1] + times[1] - times[0], locate=locate)
+    return mbd.simulate(model, start, scheme, dt=dt, until=times[-1] + times[1] - times[0], locate=locate)
 
 
 def errors_of(id: str, run: Any) -> dict[str, Vector]:

@@ -8,15 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from mbd.assembly.assemble import assemble
-from mbd.bodies import PointMass
-from mbd.constraints import Penalty, height
+import mbd
 from mbd.hardcases.case import Curve, Figure, Outcome, hard_case
 from mbd.hardcases.convergence import error_curve, halved, second_order
 from mbd.hardcases.references import accuracy, numbers, published
-from mbd.joints import Prismatic
-from mbd.model import Model
-from mbd.simulation import simulate
 
 __all__ = ["CASES"]
 
@@ -28,12 +23,12 @@ LONGER = (0.15, 0.3, 1.1, 3.0, 10.0, 100.0)
 
 
 @cache
-def mat(m: float, g: float, k: float, c: float) -> Model:
+def mat(m: float, g: float, k: float, c: float) -> mbd.Model:
     """A ball over a mat."""
-    model = Model("ball", gravity=(0.0, -g, 0.0))
-    body = PointMass("ball", mass=m)
-    model.connect(Prismatic("fall", model.ground.origin, body.origin, axis=(0, 1, 0)))
-    model.constrain(Penalty("mat", height(body.origin), stiffness=k, damping=c))
+    model = mbd.Model("ball", gravity=(0.0, -g, 0.0))
+    body = mbd.PointMass("ball", mass=m)
+    model.connect(mbd.Prismatic("fall", model.ground.origin, body.origin, axis=(0, 1, 0)))
+    model.constrain(mbd.Penalty("mat", mbd.height(body.origin), stiffness=k, damping=c))
     return model
 
 
@@ -67,8 +62,8 @@ def dropped(given: dict[str, float], scheme: Any, dt: float) -> Any:
     near = min(given["drop"], (2.3 * dt) * math.sqrt(2.0 * given["g"] * given["drop"]))
     speed = math.sqrt(2.0 * given["g"] * (given["drop"] - near))
     model = mat(given["m"], given["g"], given["k"], given["c"])
-    start = assemble(model, position={"fall.displacement": near}, velocity={"fall.displacement": -speed})
-    return simulate(model, start, scheme, dt=dt, until=6.0 * dt + 1.5 * exact_impact(**given)["contact duration"],
+    start = mbd.assemble(model, position={"fall.displacement": near}, velocity={"fall.displacement": -speed})
+    return mbd.simulate(model, start, scheme, dt=dt, until=6.0 * dt + 1.5 * exact_impact(**given)["contact duration"],
                     on_failure="return")  # fmt: skip
 
 
@@ -158,8 +153,8 @@ def stiff(id: str, scheme: Any) -> Outcome:
         for name in closed_form
     ]  # fmt: skip
     model, fall = mat(*(given[name] for name in "mgkc")), closed_form["contact start"]
-    start = assemble(model, position={"fall.displacement": given["drop"]})
-    run = simulate(model, start, scheme, dt=fall / 20.3, until=("mat", 2.0 * fall))
+    start = mbd.assemble(model, position={"fall.displacement": given["drop"]})
+    run = mbd.simulate(model, start, scheme, dt=fall / 20.3, until=("mat", 2.0 * fall))
     off = abs(run.events[0].time - published(id, "contact start"))
     figures.append(Figure("error of the contact start [s]", off, accuracy(id, "contact start") + 1e-12))
     curves: list[Curve] = []

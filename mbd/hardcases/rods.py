@@ -8,15 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from mbd.assembly.assemble import assemble
-from mbd.bodies import RigidBody
-from mbd.constraints import Unilateral, When, touchdown
+import mbd
 from mbd.hardcases.case import Curve, Figure, Outcome, hard_case
 from mbd.hardcases.impacts import deepest, impact_figures
 from mbd.hardcases.references import accuracy, numbers, published, size
-from mbd.joints import Planar
-from mbd.model import Model
-from mbd.simulation import simulate
 
 __all__ = ["CASES"]
 
@@ -26,35 +21,35 @@ KINDS = ("frictionless", "sticking")
 
 
 @cache
-def rod(L: float, m: float, g: float, e: float, kind: str) -> Model:
+def rod(L: float, m: float, g: float, e: float, kind: str) -> mbd.Model:
     """A uniform rod along its own x; 'place' is that of its middle.
 
     An end that is 'held' sticks, and may pull, until the other end strikes. An end that is 'sticking' may not pull:
     after the impact the spin would pull it off the floor if it stuck, and the rod would fall through if it did not,
     so that no force continues the motion; the impact itself is the same.
     """
-    model = Model("rod", gravity=(0.0, -g, 0.0))
-    body = RigidBody("rod", mass=m, inertia=m * L * L / 12.0)
-    model.connect(Planar("place", model.ground.origin, body.origin))
+    model = mbd.Model("rod", gravity=(0.0, -g, 0.0))
+    body = mbd.RigidBody("rod", mass=m, inertia=m * L * L / 12.0)
+    model.connect(mbd.Planar("place", model.ground.origin, body.origin))
     friction = 0.0 if kind == "frictionless" else None
-    release = When("upper end") if kind == "held" else None
-    lower, upper = (touchdown(body.point(x, 0.0)) for x in (-0.5 * L, 0.5 * L))
+    release = mbd.When("upper end") if kind == "held" else None
+    lower, upper = (mbd.touchdown(body.point(x, 0.0)) for x in (-0.5 * L, 0.5 * L))
     model.constrain(
-        Unilateral("lower end", lower, restitution=e, friction=friction, release=release),
-        Unilateral("upper end", upper, restitution=e, friction=friction),
+        mbd.Unilateral("lower end", lower, restitution=e, friction=friction, release=release),
+        mbd.Unilateral("upper end", upper, restitution=e, friction=friction),
     )
     return model
 
 
-def drop(id: str, kind: str, scheme: Any) -> tuple[Model, Any]:
+def drop(id: str, kind: str, scheme: Any) -> tuple[mbd.Model, Any]:
     """The rod until its lower end has struck."""
     given = numbers(id)
     L, angle, height = given["L"], given["theta_from_horizontal"], given["drop_height_of_lower_end"]
     model = rod(L, given["m"], given["g"], given["e"], kind)
-    start = assemble(model, position={"place.y": height + 0.5 * L * math.sin(angle), "place.angle": angle})
+    start = mbd.assemble(model, position={"place.y": height + 0.5 * L * math.sin(angle), "place.angle": angle})
     time = published(id, "impact time")
     until = ("lower end", 3.0 * time)
-    return model, simulate(model, start, scheme, dt=time / 25.3, until=until, on_failure="return")
+    return model, mbd.simulate(model, start, scheme, dt=time / 25.3, until=until, on_failure="return")
 
 
 def law_figures(id: str, kind: str, scheme: Any) -> list[Figure]:

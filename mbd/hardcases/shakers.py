@@ -9,18 +9,13 @@ from typing import Any
 
 import numpy as np
 
+import mbd
 import mbd.tape.functions as tape
-from mbd.assembly.assemble import assemble
-from mbd.bodies import PointMass
-from mbd.constraints import Unilateral, measure
 from mbd.hardcases.case import Curve, Figure, Outcome, hard_case
 from mbd.hardcases.convergence import error_curve, halved, second_order
 from mbd.hardcases.impacts import deepest, impact_figures
 from mbd.hardcases.references import accuracy, numbers, published, quantity, size
 from mbd.hardcases.stepped import stepped_figures, within_steps
-from mbd.joints import Prismatic
-from mbd.model import Model
-from mbd.simulation import simulate
 
 __all__ = ["CASES"]
 
@@ -32,13 +27,13 @@ LONG = 10
 
 
 @cache
-def table(m: float, g: float, A: float, w: float) -> Model:
+def table(m: float, g: float, A: float, w: float) -> mbd.Model:
     """A mass over a table at the height A sin(ωt)."""
-    model = Model("shaker", gravity=(0.0, -g, 0.0))
-    body = PointMass("mass", mass=m)
-    model.connect(Prismatic("rise", model.ground.origin, body.origin, axis=(0, 1, 0)))
-    gap = measure(lambda y, t: y - A * tape.sin(w * t), "rise.displacement", "t")
-    model.constrain(Unilateral("table", gap))
+    model = mbd.Model("shaker", gravity=(0.0, -g, 0.0))
+    body = mbd.PointMass("mass", mass=m)
+    model.connect(mbd.Prismatic("rise", model.ground.origin, body.origin, axis=(0, 1, 0)))
+    gap = mbd.measure(lambda y, t: y - A * tape.sin(w * t), "rise.displacement", "t")
+    model.constrain(mbd.Unilateral("table", gap))
     return model
 
 
@@ -52,9 +47,9 @@ def shaken(
         raise ValueError("the mass begins on the table, got on_table = false")
     model = table(float(given["m"]), float(given["g"]), A, w)
     velocity = {"rise.displacement": A * w + float(given["relative_velocity"])}
-    start = assemble(model, position={"rise.displacement": 0.0}, velocity=velocity, closed=["table"])
+    start = mbd.assemble(model, position={"rise.displacement": 0.0}, velocity=velocity, closed=["table"])
     until = periods * 2.0 * math.pi / w
-    return simulate(model, start, scheme, dt=dt, until=until, contact=contact)
+    return mbd.simulate(model, start, scheme, dt=dt, until=until, contact=contact)
 
 
 def staying_figures(id: str, scheme: Any, period: float) -> tuple[list[Figure], list[Curve]]:
@@ -161,7 +156,7 @@ def leaving(run: Any, period: float) -> Any:
     return opened[np.append(np.diff(opened) > 0.25 * period, True)]
 
 
-def impact_figures_moving(model: Model, run: Any) -> list[Figure]:
+def impact_figures_moving(model: mbd.Model, run: Any) -> list[Figure]:
     """What holds at impacts on a table that moves: it may give or take energy."""
     return [each for each in impact_figures(model, run) if "energy" not in each.what]
 

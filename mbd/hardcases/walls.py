@@ -8,46 +8,43 @@ from typing import Any
 
 import numpy as np
 
+import mbd
 from mbd.arrays import Vector
-from mbd.assembly.assemble import assemble
-from mbd.bodies import Link
-from mbd.constraints import Plane, Unilateral, touchdown
 from mbd.hardcases.case import Curve, Figure, Outcome, hard_case
 from mbd.hardcases.convergence import error_curve, halved, second_order
 from mbd.hardcases.impacts import deepest, impact_figures
 from mbd.hardcases.references import accuracy, numbers, published, size
-from mbd.joints import Revolute
-from mbd.model import Model
-from mbd.simulation import simulate
 
 __all__ = ["CASES"]
 
 
 @cache
-def double_pendulum(m: tuple[float, float], L: tuple[float, float], g: float, xw: float, e: float, cut: str) -> Model:
+def double_pendulum(
+    m: tuple[float, float], L: tuple[float, float], g: float, xw: float, e: float, cut: str
+) -> mbd.Model:
     """Uniform rods; the tip slides freely on the wall x = xw."""
-    model = Model("double pendulum", gravity=(0.0, -g, 0.0), cut=cut)
+    model = mbd.Model("double pendulum", gravity=(0.0, -g, 0.0), cut=cut)
     upper, lower = (
-        Link(name, mass, length=length, center=0.5 * length, inertia=mass * length**2 / 12.0)
+        mbd.Link(name, mass, length=length, center=0.5 * length, inertia=mass * length**2 / 12.0)
         for name, mass, length in zip(("upper", "lower"), m, L, strict=True)
     )
-    model.connect(Revolute("pin", model.ground.origin, upper.start), Revolute("elbow", upper.end, lower.start))
-    wall = touchdown(lower.end, Plane((-1.0, 0.0, 0.0), -xw))
-    model.constrain(Unilateral("wall", wall, restitution=e, friction=0.0))
+    model.connect(mbd.Revolute("pin", model.ground.origin, upper.start), mbd.Revolute("elbow", upper.end, lower.start))
+    wall = mbd.touchdown(lower.end, mbd.Plane((-1.0, 0.0, 0.0), -xw))
+    model.constrain(mbd.Unilateral("wall", wall, restitution=e, friction=0.0))
     return model
 
 
-def swing(id: str, scheme: Any, dt: float, cut: str) -> tuple[Model, Any]:
+def swing(id: str, scheme: Any, dt: float, cut: str) -> tuple[mbd.Model, Any]:
     """The run a little beyond the last published impact."""
     given = numbers(id)
     m, L = ((float(given[f"{name}1"]), float(given[f"{name}2"])) for name in ("m", "L"))
     model = double_pendulum(m, L, float(given["g"]), float(given["xw"]), float(given["e"]), cut)
-    start = assemble(
+    start = mbd.assemble(
         model,
         position={"pin.angle": given["theta1"], "elbow.angle": given["theta2"] - given["theta1"]},
         velocity={"pin.angle": given["w1"], "elbow.angle": given["w2"] - given["w1"]},
     )
-    return model, simulate(model, start, scheme, dt=dt, until=1.02 * published(id, "tip impact times")[-1])
+    return model, mbd.simulate(model, start, scheme, dt=dt, until=1.02 * published(id, "tip impact times")[-1])
 
 
 def swing_errors(id: str, run: Any) -> dict[str, Vector]:
