@@ -17,7 +17,7 @@ import pytest
 import mbd
 from mbd.hardcases.redundant_rows import bricard
 from mbd.hardcases.schemes import SCHEMES
-from tests.asked import KINDS
+from tests.mechanisms_between_rows import KINDS
 
 UNTIL = 0.4
 PARTS = (0.15, 0.8)

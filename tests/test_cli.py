@@ -13,10 +13,10 @@ import pytest
 import mbd
 from mbd import cli
 from mbd.errors import SimulationError
-from tests.view.stand_ins import walker
+from tests.view.handmade_runs import walker
 
 WALK = '''"""A walk made by hand."""
-from tests.view.stand_ins import walker
+from tests.view.handmade_runs import walker
 
 def main():
     return walker(steps=5)
@@ -86,7 +86,7 @@ def test_run_simulates_what_a_script_defines(script, tmp_path, capsys):
 
 
 def test_a_failed_run_is_told_and_kept(script, tmp_path, capsys):
-    text = "from mbd.errors import SimulationError\nfrom tests.view.stand_ins import ball\ndef main():\n"
+    text = "from mbd.errors import SimulationError\nfrom tests.view.handmade_runs import ball\ndef main():\n"
     text += "    raise SimulationError('t = 1 s: Newton stalled; try a smaller dt', ball())\n"
     assert cli.main(["run", script(text), "--out", "out"]) == 1
     told = capsys.readouterr()

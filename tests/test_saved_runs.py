@@ -12,7 +12,7 @@ from mbd.errors import MbdError, TrajectoryError
 from mbd.hardcases.schemes import SCHEMES
 from mbd.results.expressions import OPERATIONS
 from mbd.testing.mechanisms import random_scene
-from tests.asked import KINDS
+from tests.mechanisms_between_rows import KINDS
 
 TIMES = np.linspace(0.0, 0.2, 23)
 

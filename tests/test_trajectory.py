@@ -15,7 +15,7 @@ from mbd.results.interpolation import Grid
 from mbd.results.record import Record
 from mbd.results.units import unit
 from mbd.trajectory import Trajectory
-from tests.view.stand_ins import ball, oscillation, oscillator, record, walker
+from tests.view.handmade_runs import ball, oscillation, oscillator, record, walker
 
 
 def orders(errors: list[float]) -> list[float]:

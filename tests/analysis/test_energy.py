@@ -13,7 +13,7 @@ from mbd.equations.equations import Row
 from mbd.errors import UnknownNameError
 from mbd.trajectory import Trajectory
 from tests.simulation.mechanisms import kneed_walker, kneed_walker_start, pendulum
-from tests.view.stand_ins import Sheet, ball, oscillator, record, walker
+from tests.view.handmade_runs import Sheet, ball, oscillator, record, walker
 
 
 def test_the_parts_sum_to_the_change_of_energy():

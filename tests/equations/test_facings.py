@@ -11,7 +11,7 @@ from mbd.compile.mechanisms import mechanism_of
 from mbd.results.columns import ModelColumns
 from mbd.results.violation import violation
 from mbd.simulation.run.stored import whole_record
-from tests.forward import misfit, placed, poses, relative
+from tests.forward_kinematics import misfit, placed, poses, relative
 
 KINDS = ["Weld", "Prismatic", "Revolute", "Cylindrical", "Translation", "Screw", "Universal"]
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import mbd
-from tests.forward import misfit, placed, poses, turn
+from tests.forward_kinematics import misfit, placed, poses, turn
 
 TURN = 2.0 * math.pi
 

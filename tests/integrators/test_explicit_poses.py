@@ -9,7 +9,7 @@ import mbd
 from mbd.kernel.schemes import runge_kutta
 from mbd.kernel.schemes.dormand_prince import NODES
 from tests.cases.linkages import four_bars, upright
-from tests.integrators.flat import T, flat, pendulum_like, started, wanted
+from tests.integrators.flat_parallelograms import T, flat, pendulum_like, started, wanted
 
 SCHEME = mbd.RungeKutta853()
 

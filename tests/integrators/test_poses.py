@@ -8,7 +8,7 @@ import pytest
 import mbd
 from mbd.hardcases.singular_poses import equal_slider_crank
 from tests.cases.linkages import four_bars, rod, upright
-from tests.integrators.flat import T, pendulum_like, wanted
+from tests.integrators.flat_parallelograms import T, pendulum_like, wanted
 
 SCHEMES = (mbd.RungeKutta853(), mbd.RadauIIA())
 ALLOWED = {8: 1e-7, 5: 1e-6}

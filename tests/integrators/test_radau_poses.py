@@ -9,7 +9,7 @@ import mbd
 from mbd.kernel.schemes import radau
 from mbd.kernel.schemes.collocation import RADAU
 from tests.cases.linkages import four_bars, upright
-from tests.integrators.flat import T, flat, pendulum_like, started, wanted
+from tests.integrators.flat_parallelograms import T, flat, pendulum_like, started, wanted
 
 SCHEME = mbd.RadauIIA()
 

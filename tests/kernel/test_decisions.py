@@ -15,7 +15,7 @@ import pytest
 import mbd
 from mbd.compile.host import TURNED_OFF, host
 from mbd.equations import programs
-from tests.simulation import singular
+from tests.simulation import singular_linkages
 from tests.simulation.mechanisms import box, kneed_walker, kneed_walker_start
 
 OMEGA = 150.0
@@ -43,7 +43,7 @@ def driven_slider_crank(cut):
 @cache
 def slow_slider_crank():
     """Crank and rod of 0.7 m, flat twice."""
-    return singular.slider_crank(0.7, turn=5.0, until=0.6)
+    return singular_linkages.slider_crank(0.7, turn=5.0, until=0.6)
 
 
 @cache
@@ -52,7 +52,7 @@ def scenes():
     walker, tumbling = kneed_walker(), box(0.3)
     falls = mbd.assemble(tumbling, {"place.y": 0.6, "place.angle": 0.3}, {"place.angle": 0.5, "place.x": 0.2})
     found = {name: (*make.start, until) for name, make, until in (
-        ("equal rods", singular.slider_crank(1.0), 0.5), ("four-bars", singular.four_bars(1), 0.6),
+        ("equal rods", singular_linkages.slider_crank(1.0), 0.5), ("four-bars", singular_linkages.four_bars(1), 0.6),
     )}  # fmt: skip
     found |= {"walker": (walker, kneed_walker_start(walker), 0.7), "box": (tumbling, falls, 0.6)}
     found |= {f"driven, {cut} cut": (*driven_slider_crank(cut), 8e-4) for cut in ("all", ("guide",))}

@@ -23,7 +23,7 @@ from mbd.kernel.ordered import (
 )  # fmt: skip
 from mbd.kernel.records import Kernel
 from mbd.tape.ordering import Order, order
-from tests.simulation.singular import four_bars
+from tests.simulation.singular_linkages import four_bars
 
 
 def saddle(rng, n, m, density=0.2):

@@ -15,7 +15,7 @@ from mbd.equations import programs
 from mbd.equations.derivation import derive
 from mbd.tape import elimination
 from tests.simulation.mechanisms import box, kneed_walker, kneed_walker_start, run
-from tests.simulation.singular import slider_crank
+from tests.simulation.singular_linkages import slider_crank
 from tests.tape.counts import total
 
 SCHEMES = (

@@ -9,7 +9,7 @@ import pytest
 
 import mbd
 from mbd.testing.mechanisms import random_scene
-from tests.asked import loop, tree
+from tests.mechanisms_between_rows import loop, tree
 from tests.simulation.judging import complaints
 
 SCHEMES = (

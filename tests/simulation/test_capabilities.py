@@ -11,7 +11,7 @@ import mbd
 from mbd.compile.mechanisms import mechanism_of
 from mbd.simulation.capabilities import LAWS, SCHEMES, STRATEGIES, as_markdown, as_text, refusals, supports
 from tests.integrators.own import ProjectedMidpoint
-from tests.simulation.abilities import SCENES
+from tests.simulation.capability_scenes import SCENES
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "integration.md"
 

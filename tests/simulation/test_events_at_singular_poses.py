@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import mbd
-from tests.simulation.singular import Passage, four_bars, kite, platform, slider_crank
+from tests.simulation.singular_linkages import Passage, four_bars, kite, platform, slider_crank
 
 SCHEMES = [
     mbd.Newmark(), mbd.HHT(0.05), mbd.HHT(0.1, formulation="index3"), mbd.GeneralizedAlpha(0.7), mbd.RadauIIA(),

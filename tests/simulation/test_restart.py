@@ -12,7 +12,7 @@ from hypothesis import given, settings, strategies as st
 import mbd
 from mbd.testing.mechanisms import random_scene
 from tests.integrators.own import ProjectedMidpoint, SemiImplicitEuler
-from tests.simulation.halves import SCENES, assert_halves_are_the_whole, driven_point, halves, scene
+from tests.simulation.cut_runs import SCENES, assert_halves_are_the_whole, driven_point, halves, scene
 from tests.simulation.mechanisms import ball, falling, kneed_walker, kneed_walker_start, pendulum, run
 
 SCHEMES = {

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import mbd
-from tests.simulation.singular import platform
+from tests.simulation.singular_linkages import platform
 
 SCHEMES = {
     "HHT, index 3": mbd.HHT(0.05, formulation="index3"),

@@ -9,7 +9,7 @@ import pytest
 
 import mbd
 from mbd.kernel.singular.step_pairs import LONGER, SHORTER
-from tests.simulation.singular import Passage, four_bars, kite, platform, slider_crank, stopped
+from tests.simulation.singular_linkages import Passage, four_bars, kite, platform, slider_crank, stopped
 
 MECHANISMS = {
     "one four-bar": lambda: four_bars(1),

@@ -10,8 +10,8 @@ import pytest
 import mbd
 from mbd.errors import ModelError, UnknownNameError
 from mbd.hardcases.redundant_rows import bricard
-from tests.asked import KINDS
 from tests.equations.mechanisms import four_bar
+from tests.mechanisms_between_rows import KINDS
 
 
 def linkage():

@@ -14,7 +14,7 @@ import mbd
 from mbd.integrators import StepReport, StepResult
 from mbd.testing.mechanisms import random_scene
 from tests.integrators.own import ProjectedMidpoint
-from tests.simulation.halves import PARTS, assert_halves_are_the_whole
+from tests.simulation.cut_runs import PARTS, assert_halves_are_the_whole
 from tests.simulation.mechanisms import ball, falling, pendulum, point, run
 
 ROOT = next(path for path in sys.path if path)

@@ -14,7 +14,7 @@ import mbd
 from mbd.trajectory import Trajectory
 from mbd.view.page import packed
 from mbd.view.scene import Instants, scene, upright
-from tests.view.stand_ins import Sheet, ball, oscillator, record, walker
+from tests.view.handmade_runs import Sheet, ball, oscillator, record, walker
 
 CHROMIUM = Path("/usr/bin/chromium")
 

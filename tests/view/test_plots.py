@@ -12,7 +12,7 @@ from mbd.errors import UnknownNameError
 from mbd.view.curves import curves
 from mbd.view.plots import contacts, phase_portrait, stretches
 from mbd.view.style import color
-from tests.view.stand_ins import ball, oscillator, walker
+from tests.view.handmade_runs import ball, oscillator, walker
 
 
 @pytest.fixture(autouse=True)

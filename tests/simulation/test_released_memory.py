@@ -11,7 +11,7 @@ import pytest
 import mbd
 from mbd.compile.mechanisms import mechanism_of
 from tests.equations.mechanisms import four_bar
-from tests.simulation.abilities import SCENES
+from tests.simulation.capability_scenes import SCENES
 
 
 def loop():
