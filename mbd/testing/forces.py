@@ -161,11 +161,11 @@ def _tangent(findings: Findings, scope: FreeScope, effort: list[Node]) -> None:
 
 def _invariance(findings: Findings, action: Action, scope: FreeScope, rng: np.random.Generator) -> None:
     """Power and energy stay when the whole scene, with its motion, is turned and moved."""
-    told: Any = [power(action, scope)] + ([] if action.potential is None else [scope.tape.lift(action.potential)])
-    before = np.array(scope.value(*told))
+    invariants: Any = [power(action, scope)] + ([] if action.potential is None else [scope.tape.lift(action.potential)])
+    before = np.array(scope.value(*invariants))
     saved = dict(scope.numbers)
     scope.turn_scene(turn_of(rng), rng.uniform(-1.0, 1.0, 3))
-    after = scope.value(*told)
+    after = scope.value(*invariants)
     scope.numbers.update(saved)
     hint = "it depends on an absolute place or direction; use differences, or pass internal=False"
     law = "frame invariance: turning and moving the whole scene changes nothing"

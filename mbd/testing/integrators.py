@@ -135,8 +135,8 @@ def _failure(findings: Findings, scheme: Integrator, posed: Problem, dt: float) 
     same = held == _bytes(findings, memory)
     findings.holds(law, same, "the failed step changed the memory it was given", hint)
     if not result.report.converged:
-        told = result.state
-        findings.equal(law, "state returned with the failure", _numbers(told), given, "return the state given", 0.0)
+        returned = result.state
+        findings.equal(law, "state returned with the failure", _numbers(returned), given, "return the state given", 0.0)
 
 
 def _advance(findings: Findings, scheme: Integrator, posed: Problem, dt: float) -> None:

@@ -105,14 +105,14 @@ def scope_of(mentions: Sequence[Mention], joints: Iterable[Joint], frames: Itera
 
 def unsaid(mentions: Sequence[Mention], scope: FreeScope) -> list[str]:
     """The bodies that were asked for although no mention leads to them."""
-    said: list[Frame] = [mention for mention in mentions if isinstance(mention, Frame)]
+    mentioned: list[Frame] = [mention for mention in mentions if isinstance(mention, Frame)]
     joints = [mention for mention in mentions if isinstance(mention, Joint)]
     for name in [mention for mention in mentions if isinstance(mention, str)]:
         owners = [name.rpartition(".")[0], name.removesuffix(".rate").rpartition(".")[0]]
-        said += [scope.frames[owner] for owner in owners if owner in scope.frames]
+        mentioned += [scope.frames[owner] for owner in owners if owner in scope.frames]
         joints += [scope.joints[owner] for owner in owners if owner in scope.joints]
-    said += [frame for joint in joints for frame in (joint.parent, joint.child)]
-    return sorted(scope.asked - {frame.body.name for frame in said})
+    mentioned += [frame for joint in joints for frame in (joint.parent, joint.child)]
+    return sorted(scope.asked - {frame.body.name for frame in mentioned})
 
 
 def measure_laws(

@@ -85,15 +85,15 @@ class Rod(System):
         h, rate = np.array([0.5 * (p @ p - 1.0)]), np.array([p @ v])
         r = point.rate + np.array([0.0, 1.0]) + lam * p
         scale = np.abs(point.rate) + np.array([0.0, 1.0]) + np.abs(lam * p)
-        told = rate if self.stabilized else np.zeros(1)
+        rates = rate if self.stabilized else np.zeros(1)
         sizes: dict[str, Any] = {"scale_r": scale, "scale_h": np.ones(1), "scale_rate": np.ones(1)}
         if tangent is None:
-            return Terms(r, None, h, told, **sizes)
+            return Terms(r, None, h, rates, **sizes)
         c_C, c_K = tangent
         H = p.reshape(1, 2).copy()
         if self.stabilized and c_C != 0.0:
             H = H + (c_K / c_C) * v
-        return Terms(r, (1.0 + c_K * lam) * np.eye(2), h, told, p.reshape(2, 1).copy(), H, **sizes)
+        return Terms(r, (1.0 + c_K * lam) * np.eye(2), h, rates, p.reshape(2, 1).copy(), H, **sizes)
 
     def accelerations(self, t: float, q: Vector, y: Vector, mode: Mode) -> tuple[Vector, Vector]:
         """v̇ and λ from ḧ = p · v̇ + v · v = 0."""
