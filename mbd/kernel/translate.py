@@ -21,12 +21,13 @@ from types import FunctionType, ModuleType
 from typing import Any
 
 from mbd.errors import CapabilityError
-from mbd.kernel import tree
+from mbd.kernel import hints, tree
 from mbd.kernel.records import TABLE
 
-__all__ = ["Source", "functions_of", "source_of", "translate"]
+__all__ = ["Misread", "Source", "functions_of", "source_of", "translate"]
 
 KINDS = {"int": "int", "float": "real", "bool": "bool", "None": "none", "Integers": "ints", "Reals": "reals"}
+FIELDS = (*TABLE.kinds, *TABLE.formulas)
 OPERATORS = {
     ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.FloorDiv: "//", ast.Mod: "%", ast.Pow: "**",
     ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!=",
@@ -36,11 +37,17 @@ ELEMENT = "_element"
 """Name that counts the elements of a slice."""
 
 
-class Source:
-    """A module of the kernel: its title, its functions as trees of Python, and what names mean in it."""
+class Misread(CapabilityError):
+    """Python that the kernel may not use, by file, line and function."""
 
-    def __init__(self, title: str, functions: Mapping[str, ast.FunctionDef], names: Mapping[str, Any]) -> None:
-        self.title, self.functions, self.names = title, functions, names
+
+class Source:
+    """A module of the kernel: its title, its functions as trees of Python, what names mean in it, and its file."""
+
+    def __init__(
+        self, title: str, functions: Mapping[str, ast.FunctionDef], names: Mapping[str, Any], file: str = ""
+    ) -> None:
+        self.title, self.functions, self.names, self.file = title, functions, names, file or title
 
 
 def functions_of(*sources: str) -> dict[str, ast.FunctionDef]:
@@ -53,7 +60,8 @@ def functions_of(*sources: str) -> dict[str, ast.FunctionDef]:
 def source_of(module: str) -> Source:
     """A module by its full name."""
     found = import_module(module)
-    return Source(module.removeprefix("mbd.kernel."), functions_of(inspect.getsource(found)), vars(found))
+    file = hints.shown(str(found.__file__))
+    return Source(module.removeprefix("mbd.kernel."), functions_of(inspect.getsource(found)), vars(found), file)
 
 
 def translate(
@@ -89,16 +97,16 @@ class _Translation:
         if name not in source.functions and isinstance(meant, FunctionType):
             source, name = self.instead.get(meant.__module__) or source_of(meant.__module__), meant.__name__
         if name not in source.functions:
-            raise CapabilityError(f"no function {name!r} in the kernel")
+            raise CapabilityError(hints.no_function(name, source.functions))
         node, title = source.functions[name], f"{source.title}.{name}"
         notes = [ast.unparse(argument.annotation) if argument.annotation else "Any" for argument in node.args.args]
         if len(notes) != len(given):
-            raise CapabilityError(f"{name!r} takes {len(notes)} arguments and is given {len(given)}")
+            raise CapabilityError(hints.called(name, (argument.arg for argument in node.args.args), len(given)))
         kinds = [KINDS.get(note, kind) for note, kind in zip(notes, given, strict=True)]
         symbol = ".".join([title, *kinds])
         if symbol not in self.done:
             if title in self.open:
-                raise CapabilityError(f"{name!r} calls itself")
+                raise CapabilityError(f"{name!r} calls itself; try a loop")
             self.open.append(title)
             arguments = dict(zip((argument.arg for argument in node.args.args), kinds, strict=True))
             result = KINDS.get(ast.unparse(node.returns), "") if node.returns else ""
@@ -114,7 +122,7 @@ class _Translation:
         stated, known = function.result, None
         while known != function.locals:  # until no assignment widens a name any more
             known, function.result = dict(function.locals), stated
-            function.body = _Body(source, function, self).block(node.body)
+            function.body = _Body(source, function, self, node.name).block(node.body)
             function.result = function.result or "none"
         return function
 
@@ -122,8 +130,8 @@ class _Translation:
 class _Body:
     """Statements and expressions of one function; its local names widen as it is read."""
 
-    def __init__(self, source: Source, function: tree.Function, translation: _Translation) -> None:
-        self.source, self.function, self.translation = source, function, translation
+    def __init__(self, source: Source, function: tree.Function, translation: _Translation, name: str) -> None:
+        self.source, self.function, self.translation, self.name = source, function, translation, name
 
     # statements -----------------------------------------------------------------------------------------------------
     def block(self, statements: Sequence[ast.stmt]) -> list[tree.Statement]:
@@ -131,14 +139,15 @@ class _Body:
         for statement in statements:
             try:
                 found += getattr(self, f"_{type(statement).__name__}", self._unknown)(statement)
+            except Misread:
+                raise
             except CapabilityError as error:
-                if "line" in str(error):
-                    raise
-                raise CapabilityError(f"line {statement.lineno}: {error}") from None
+                place = f"{self.source.file}:{statement.lineno}, in {self.name}"
+                raise Misread(f"{place}: {error}") from None
         return found
 
     def _unknown(self, node: ast.stmt) -> list[tree.Statement]:
-        raise CapabilityError(f"{ast.unparse(node)!r} is no statement that the kernel may use")
+        raise CapabilityError(hints.statement(node))
 
     def _Pass(self, node: ast.Pass) -> list[tree.Statement]:
         return []
@@ -160,7 +169,7 @@ class _Body:
         if isinstance(node, ast.Subscript | ast.Attribute):
             return self.element(node)
         if not isinstance(node, ast.Name):
-            raise CapabilityError(f"{ast.unparse(node)!r} cannot be assigned")
+            raise CapabilityError(hints.expected("a name, an element or a field to assign to", node))
         names = self.function.locals
         names[node.id] = tree.joined(names.get(node.id, kind), kind)
         return tree.Local(node.id, names[node.id])
@@ -192,17 +201,17 @@ class _Body:
         call = node.iter
         plain = isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id == "range"
         if not plain or node.orelse:
-            raise CapabilityError(f"a loop over {ast.unparse(node.iter)!r}, not over a range")
+            raise CapabilityError(f"expected a loop over range(…), came one over {ast.unparse(node.iter)!r}")
         assert isinstance(call, ast.Call)
         bounds = [self.value(bound) for bound in call.args]
         first, last = (tree.Number(0, "int"), bounds[0]) if len(bounds) == 1 else (bounds[0], bounds[1])
         try:
             step = int(ast.literal_eval(call.args[2])) if len(bounds) == 3 else 1
         except ValueError:
-            raise CapabilityError(f"{ast.unparse(call)!r}: the step of a range is a number") from None
+            raise CapabilityError(f"expected a number as the step of a range, came {ast.unparse(call)!r}") from None
         target = self.target(node.target, "int")
         if not isinstance(target, tree.Local):
-            raise CapabilityError(f"{ast.unparse(node.target)!r} cannot count a loop")
+            raise CapabilityError(hints.expected("a name that counts the loop", node.target))
         return [tree.Range(target, first, last, step, self.block(node.body))]
 
     def _Continue(self, node: ast.Continue) -> list[tree.Statement]:
@@ -215,7 +224,7 @@ class _Body:
     def value(self, node: ast.expr) -> tree.Expression:
         found = getattr(self, f"_{type(node).__name__}", None)
         if found is None or not isinstance(node, ast.expr):
-            raise CapabilityError(f"{ast.unparse(node)!r} is no expression that the kernel may use")
+            raise CapabilityError(hints.expected("a number, a field or an element of an array", node))
         return found(node)  # type: ignore[no-any-return]
 
     def test(self, node: ast.expr) -> tree.Expression:
@@ -232,7 +241,7 @@ class _Body:
             return tree.Local(node.id, self.function.locals[node.id])
         if node.id.isupper() and isinstance(self.source.names.get(node.id), int | float):
             return _number(self.source.names[node.id])
-        raise CapabilityError(f"{node.id!r} has no value here")
+        raise CapabilityError(hints.no_value(node.id, self.function.locals, self.source.names))
 
     def _Attribute(self, node: ast.Attribute) -> tree.Expression:
         if node.attr in TABLE.places:
@@ -241,21 +250,24 @@ class _Body:
             return self.value(_formula(node.attr, node.value))
         record = self.value(node.value)
         if record.kind != "kernel" or node.attr not in TABLE.kinds:
-            raise CapabilityError(f"{ast.unparse(node)!r} is no field of the kernel")
+            raise CapabilityError(hints.unknown_field(ast.unparse(node), node.attr, record.kind, FIELDS))
         return tree.Field(record, node.attr, TABLE.kinds[node.attr])
 
     def element(self, node: ast.expr) -> tree.Element:
         """An element of an array, or a number that a record names by its place in one."""
         if isinstance(node, ast.Attribute):
             if node.attr not in TABLE.places:
-                raise CapabilityError(f"{ast.unparse(node)!r} cannot be assigned")
+                code, kind = ast.unparse(node), self.value(node.value).kind
+                if node.attr in TABLE.kinds:
+                    raise CapabilityError(f"expected an array or a field in one to write to, came {code!r}, a setting")
+                raise CapabilityError(hints.unknown_field(code, node.attr, kind, FIELDS))
             array, index = TABLE.places[node.attr]
             node = ast.Subscript(ast.Attribute(node.value, array, ast.Load()), ast.Constant(index), ast.Load())
         if not isinstance(node, ast.Subscript):
-            raise CapabilityError(f"{ast.unparse(node)!r} cannot be assigned")
+            raise CapabilityError(hints.expected("an element of an array", node))
         base = self.value(node.value)
         if base.kind not in ("ints", "reals"):
-            raise CapabilityError(f"{ast.unparse(node.value)!r} is no array")
+            raise CapabilityError(f"expected an array, came {ast.unparse(node.value)!r}, {hints.kind_of(base.kind)}")
         own = base.kind[:-1]
         return tree.Element(base, self.value(node.slice), own, base.name if isinstance(base, tree.Field) else own)
 
@@ -272,7 +284,8 @@ class _Body:
             return _power(left, right)
         kind = "real" if sign == "/" else tree.joined(tree.joined(left.kind, right.kind), "int")
         if not sign or (sign == "//" and kind != "int"):
-            raise CapabilityError(f"no operator {type(operator).__name__} for values of kind {kind!r}")
+            came = f"{type(operator).__name__} of {hints.kind_of(kind)}"
+            raise CapabilityError(f"expected + − * / ** of numbers, // and % of ints, came {came}")
         return tree.Operation(sign, left, right, kind)
 
     def _UnaryOp(self, node: ast.UnaryOp) -> tree.Expression:
@@ -280,7 +293,7 @@ class _Body:
             return tree.Unary("not", self.test(node.operand), "bool")
         value = self.value(node.operand)
         if not isinstance(node.op, ast.USub) or value.kind not in ("int", "real"):
-            raise CapabilityError(f"{ast.unparse(node)!r} is no expression that the kernel may use")
+            raise CapabilityError(hints.expected("a number, a field or an element of an array", node))
         return tree.Unary("-", value, value.kind)
 
     def _Compare(self, node: ast.Compare) -> tree.Compare:
@@ -290,7 +303,9 @@ class _Body:
             right, sign = self.value(operand), OPERATORS.get(type(operator), "")
             kind = tree.joined(last.kind, right.kind)
             if not sign or kind not in ("bool", "int", "real"):
-                raise CapabilityError(f"no comparison {type(operator).__name__} for values of kind {kind!r}")
+                raise CapabilityError(
+                    f"expected < <= > >= == != of numbers, came {type(operator).__name__} of {hints.kind_of(kind)}"
+                )
             rest.append((sign, right))
             last = right
         return tree.Compare(first, tuple(rest))
@@ -307,9 +322,13 @@ class _Body:
         if isinstance(function, ast.Attribute) and isinstance(function.value, ast.Name):
             module = self.source.names.get(function.value.id)
             if isinstance(module, ModuleType):
+                if not isinstance(vars(module).get(function.attr), FunctionType):
+                    raise CapabilityError(hints.no_function(function.attr, source.functions))
                 function, source = ast.Name(function.attr, ast.Load()), source_of(module.__name__)
         if not isinstance(function, ast.Name) or node.keywords:
-            raise CapabilityError(f"{ast.unparse(node)!r}: only functions of the kernel, without names of arguments")
+            raise CapabilityError(
+                f"expected a function of a module with its arguments by position, came {ast.unparse(node)!r}"
+            )
         name = function.id
         values = tuple(self.value(argument) for argument in node.args)
         kinds = tuple(value.kind for value in values)
@@ -339,7 +358,7 @@ def _each(node: ast.Assign, target: ast.Subscript, part: ast.Slice) -> ast.For:
     copied = isinstance(value, ast.Subscript) and isinstance(value.slice, ast.Slice)
     overlaps = copied and ast.unparse(value.value) == ast.unparse(target.value)  # type: ignore[attr-defined]
     if part.upper is None or not (copied or isinstance(value, ast.Constant)) or overlaps or len(node.targets) > 1:
-        raise CapabilityError(f"{ast.unparse(node)!r}: a slice is filled with a number or from one of another array")
+        raise CapabilityError(hints.expected("a number or a slice of another array to fill a slice with", node))
     count = part.upper if part.lower is None else ast.BinOp(part.upper, ast.Sub(), part.lower)
     element = ast.Assign([_element(target)], _element(value) if copied else value, lineno=node.lineno)
     counts = ast.Call(ast.Name("range", ast.Load()), [count], [])
@@ -360,23 +379,23 @@ def _converts(kind: str, needed: str) -> None:
     """Whether a value of one kind may stand where another is needed."""
     numbers = ("bool", "int", "real")
     if kind != needed and (kind not in numbers or needed not in numbers):
-        raise CapabilityError(f"a value of kind {kind!r} where one of kind {needed!r} is needed")
+        raise CapabilityError(f"expected {hints.kind_of(needed)}, came {hints.kind_of(kind)}")
 
 
 def _number(value: object) -> tree.Number:
     for kind, name in ((bool, "bool"), (int, "int"), (float, "real")):
         if isinstance(value, kind):
             return tree.Number(value, name)
-    raise CapabilityError(f"{value!r} is no number")
+    raise CapabilityError(f"expected a number, came {value!r}")
 
 
 def _power(left: tree.Expression, right: tree.Expression) -> tree.Operation:
     if left == tree.Number(2, "int") and right.kind == "int":
         return tree.Operation("<<", tree.Number(1, "int"), right, "int")
     if "real" not in (left.kind, right.kind):
-        raise CapabilityError("a power of integers, other than of 2")
+        raise CapabilityError("expected a power of a float, or of 2, came one of ints; try float(…)")
     if right == tree.Number(0.5, "real"):
-        raise CapabilityError("x ** 0.5 is a root or a power by the level of optimization: write sqrt(x)")
+        raise CapabilityError("x ** 0.5 is a root or a power by the level of optimization; try sqrt(x)")
     return tree.Operation("**", left, right, "real")
 
 

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from mbd.errors import CapabilityError
+from mbd.kernel.hints import kind_of
 
 __all__ = [
     "NUMBERS", "Assign", "Break", "Call", "Choice", "Compare", "Continue", "Convert", "Do", "Element", "Evaluate",
@@ -30,7 +31,7 @@ def joined(*kinds: str) -> str:
         return kinds[0]
     if set(kinds) <= set(NUMBERS):
         return max(kinds, key=NUMBERS.index)
-    raise CapabilityError(f"one name for a value of kind {kinds[0]!r} and one of kind {kinds[1]!r}")
+    raise CapabilityError(f"expected one kind of value, came {kind_of(kinds[0])} and {kind_of(kinds[1])}")
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import ctypes
 import inspect
+import math
 from functools import lru_cache
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -163,25 +165,47 @@ def test_the_same_bits_as_python_at_every_level(function, x, k):
 @pytest.mark.parametrize(
     ("source", "message"),
     [
-        ("def f(x):\n    return [1]", r"line 2: '\[1\]' is no expression"),
-        ("def f(x):\n    y = 1\n    return z", "line 3: 'z' has no value here"),
-        ("def f(x):\n    for i in x:\n        pass", "a loop over 'x', not over a range"),
-        ("def f(x):\n    x = 1.0", "one name for a value of kind 'reals' and one of kind 'real'"),
-        ("def f(x):\n    g(x)", "no function 'g'"),
-        ("def f(x):\n    f(x)", "'f' calls itself"),
-        ("def f(x):\n    with x:\n        pass", "no statement that the kernel may use"),
-        ("def f(x):\n    return x.size", "'x.size' is no field of the kernel"),
-        ("def f(x) -> int:\n    return x", "a value of kind 'reals' where one of kind 'int' is needed"),
-        ("def f(x):\n    return 3**int(x[0])", "a power of integers"),
-        ("def f(x):\n    return x[0] ** 0.5", r"write sqrt\(x\)"),
-        ("def f(x):\n    x[1:3] = x[0:2]", "a slice is filled with a number or from one of another array"),
-        ("def f(x):\n    x[:2] = x[2] + 1.0", "a slice is filled with a number or from one of another array"),
-        ("def f(x):\n    x[:] = 0.0", "a slice is filled with a number or from one of another array"),
+        ("    return [1]", r"a.py:2, in f: expected a number, a field or .*, came '\[1\]'; try an array of the kernel"),
+        ("    y = 1\n    return z", "a.py:3, in f: no value named 'z'"),
+        ("    return rho", "expected a number, came 'rho' of the module; try capitals, RHO, for a constant"),
+        ("    for i in x:\n        pass", "expected a loop over range.*, came one over 'x'"),
+        ("    x = 1.0", "expected one kind of value, came an array of floats and a float"),
+        ("    g(x)", "no function named 'g'; .*or import it"),
+        ("    math.sqrt(x[0])", "no function named 'sqrt'.*try from mbd.kernel.roots import sqrt"),
+        ("    np.zeros(3)", "no function named 'zeros'.*whose length the entry gives by memory="),
+        ("    f(x, K)", "'f' calls itself; try a loop"),
+        ("    two(x)", r"expected two\(x, k\), came 1 argument"),
+        ("    with x:\n        pass", r"expected an assignment, .*, came 'with x:'"),
+        ("    y: float = 0.0", "came 'y: float = 0.0'; try x = 0.0 without an annotation"),
+        ("    if x[0] > 0.0:\n        a, b = x[0], x[1]", "a.py:3, in f: .*try one name at a time"),
+        ("    return x[:2]", "try a loop"),
+        ("    x[1:3] = x[0:2]", "a.py:2, in f: expected a number or a slice of another array.*came 'x\\[1:3\\] = x"),
+        ("    x[:2] = x[2] + 1.0", "a slice of another array to fill a slice with, came"),
+        ("    x[:] = 0.0", "a slice of another array to fill a slice with, came"),
+        ("    return x.size", "expected a field of a record, came 'x.size' of an array of floats; lengths are K.n"),
+        ("    return 3**int(x[0])", "expected a power of a float"),
+        ("    return x[0] ** 0.5", r"try sqrt\(x\)"),
+        ("    return K.n_rws", "a.py:2, in f: 'K.n_rws': no field of the kernel named 'n_rws'; did you mean 'n_rows'"),
+        ("    K.n_row = 1", "'K.n_row': no field of the kernel named 'n_row'; did you mean 'n_rows'"),
+        ("    K.n_rows = 1", "expected an array or a field in one to write to, came 'K.n_rows', a setting"),
+        ("    return K.n[0]", "expected an array, came 'K.n', an int"),
+        ("    whole(x)", "a.py:9, in whole: expected an int, came an array of floats"),
     ],
 )
-def test_what_the_kernel_may_not_use_is_named(source, message):
+def test_what_the_kernel_may_not_use_is_named_by_file_line_and_function(source, message):
+    beside = "def two(x, k):\n    pass\ndef whole(x) -> int:\n    return x\n"
+    text = f"def f(x, K):\n{source}\n" + "\n" * (3 - source.count("\n")) + beside
+    names = {"rho": 0.3, "np": np, "math": math}
     with pytest.raises(CapabilityError, match=message):
-        translate(Source("test", functions_of(source), {}), "f", ["reals"])
+        translate(Source("test", functions_of(text), names, "a.py"), "f", ["reals", "kernel"])
+
+
+def test_a_module_is_named_by_its_file_in_the_package():
+    source = source_of("mbd.kernel.schemes.newmark")
+    line = source.functions["newmark_start"].lineno - 1
+    lines = inspect.getsource(import_module("mbd.kernel.schemes.newmark")).splitlines()
+    assert source.file == "mbd/kernel/schemes/newmark.py"
+    assert lines[line].startswith("def newmark_start")
 
 
 def test_a_name_means_what_it_means_in_its_module(tmp_path, monkeypatch):

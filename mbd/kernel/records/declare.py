@@ -8,10 +8,12 @@ address (see `mbd.kernel.build`), interpreted code as an attribute.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, ClassVar, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+
+from mbd.errors import nearest
 
 __all__ = ["Integers", "Place", "Reals", "Record", "Table", "integers", "place", "reals"]
 
@@ -57,15 +59,31 @@ def place(array: str) -> Any:
 
 
 class Record:
-    """Numbers and arrays by name; one put together from others has their fields, in the order of declaration."""
+    """Numbers and arrays by name; one put together from others has their fields, in the order of declaration.
+
+    A name that none of them declares is an error, as it is to the translator.
+    """
 
     declared: ClassVar[list[type[Record]]] = []
+    _names: ClassVar[frozenset[str]] = frozenset()
 
     def __init_subclass__(cls) -> None:
         Record.declared.append(cls)
+        cls._names = frozenset(name for owner in cls.__mro__ for name in vars(owner).get("__annotations__", {}))
 
     def __init__(self, **fields: Any) -> None:
-        self.__dict__.update(fields)
+        for name, value in fields.items():
+            setattr(self, name, value)
+
+    if not TYPE_CHECKING:  # which knows the declared names
+
+        def __getattr__(self, name: str) -> Any:
+            raise AttributeError(nearest(name, self._names, "field of the kernel", "There are"))
+
+        def __setattr__(self, name: str, value: Any) -> None:
+            if name not in self._names:
+                raise AttributeError(nearest(name, self._names, "field of the kernel", "There are"))
+            object.__setattr__(self, name, value)
 
 
 class Table:

@@ -11,16 +11,19 @@ Python.
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from functools import lru_cache
 from importlib import import_module
+from types import FunctionType
 from typing import Any, Literal
 
 import numpy as np
 
 from mbd.arrays import Vector
 from mbd.errors import CapabilityError
+from mbd.kernel.hints import shown
 from mbd.kernel.records import Kernel, Sizes
 
 __all__ = ["MEMORY", "NO_SCHEME", "SCHEMES", "Abilities", "Scheme", "dispatch", "number_of", "scheme_named", "schemes"]
@@ -68,6 +71,16 @@ class Abilities:
     longest_over: float = 16.0
 
 
+HOOKS = {
+    "start": ("K: Kernel", "int"),
+    "step": ("K: Kernel, h: float, t1: float", "int"),
+    "accept": ("K: Kernel, h: float", "None"),
+    "resume": ("K: Kernel, h: float", "int"),
+    "error": ("K: Kernel, h: float", "None"),
+}
+"""Arguments and results of the functions of an entry."""
+
+
 def _nothing(sizes: Sizes) -> dict[str, int]:
     return {}
 
@@ -106,11 +119,33 @@ class Scheme:
     memory: Callable[[Kernel], dict[str, int]] = _nothing
     coefficients: Callable[[], dict[str, Vector]] = dict
 
+    def __post_init__(self) -> None:
+        for hook, (arguments, result) in HOOKS.items() if self.name else ():
+            if getattr(self, hook) is not None:
+                _check_hook(self.name, hook, getattr(self, hook), arguments, result)
+
     def numbers(self) -> dict[str, Any]:
         """Its abilities by the names of the kernel's fields."""
         return {each.name: getattr(self.abilities, each.name) for each in fields(Abilities)} | {
             "n_nodes": len(self.nodes), "scheme": number_of(self.name),
         }  # fmt: skip
+
+
+def _check_hook(scheme: str, hook: str, function: Any, arguments: str, result: str) -> None:
+    """Refuse a function of an entry that the kernel could not call, by its name and place."""
+    wanted = [each.partition(": ")[::2] for each in arguments.split(", ")]
+    call = f"{hook}({', '.join(name for name, _ in wanted)})"
+    who = f"the scheme {scheme!r}: expected a function {call} of a module as its {hook!r}, came "
+    if not isinstance(function, FunctionType) or function.__qualname__ != function.__name__ or "<" in function.__name__:
+        raise CapabilityError(f"{who}{function!r}")
+    place = f"{shown(function.__code__.co_filename)}:{function.__code__.co_firstlineno}"
+    parameters = inspect.signature(function).parameters
+    if [*parameters] != [name for name, _ in wanted]:
+        raise CapabilityError(f"{who}{function.__name__}({', '.join(map(str, parameters.values()))}), {place}")
+    told = {name: getattr(kind, "__name__", str(kind)) for name, kind in function.__annotations__.items()}
+    for name, kind in (*wanted[1:], ("return", result)):
+        if told.get(name, kind) != kind:
+            raise CapabilityError(f"{who}one whose {name!r} is {told[name]!r} in place of {kind!r}, {place}")
 
 
 def _no_step(*given: Any) -> int:
@@ -153,16 +188,6 @@ def scheme_named(name: str) -> Scheme:
 def number_of(name: str) -> int:
     """The place of a scheme among them; 0 for a name that none has."""
     return next((number for number, scheme in enumerate(schemes()) if scheme.name == name), 0)
-
-
-HOOKS = {
-    "start": ("K: Kernel", "int"),
-    "step": ("K: Kernel, h: float, t1: float", "int"),
-    "accept": ("K: Kernel, h: float", "None"),
-    "resume": ("K: Kernel, h: float", "int"),
-    "error": ("K: Kernel, h: float", "None"),
-}
-"""Arguments and results of the functions of an entry."""
 
 
 def dispatch() -> tuple[str, dict[str, Any]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import traceback
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
@@ -11,10 +12,11 @@ import numpy as np
 from mbd.arrays import Matrix, Vector, read_only
 from mbd.compile.mechanism import Mechanism, ModeCode
 from mbd.equations.programs import mass_matrix
-from mbd.errors import SimulationError
+from mbd.errors import CapabilityError, SimulationError
 from mbd.integrators.base import Integrator, Point, StepReport, StepResult, System, Terms
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.kernel.codes import NOT_CONVERGED, NOT_FINITE, TOO_NEAR
+from mbd.kernel.hints import shown
 from mbd.kernel.mass_ratios import LOSS
 from mbd.kernel.records import Kernel
 from mbd.kernel.restart import MOST_LOADS, evaluate, fill_block, refresh_scales
@@ -252,6 +254,11 @@ def _units(names: tuple[str, ...]) -> Any:
     return read_only(np.array([{"m": 0, "rad": 1}.get(name, 2) for name in names], dtype=np.int64))
 
 
+def _nothing(K: Kernel, h: float) -> int:
+    """A hook that an entry does without."""
+    return 0
+
+
 class KernelScheme:
     """Hooks of the interpreted kernel: the functions of a compiled scheme, step by step what machine code does."""
 
@@ -259,11 +266,27 @@ class KernelScheme:
     report = StepReport(True)
 
     def __init__(self, scheme: Scheme) -> None:
-        self.start, self.step, self.accept, self.resume = scheme.start, scheme.step, scheme.accept, scheme.resume
-        self.error = scheme.error or self._has_left_its_error
+        self.scheme = scheme
+        self.start, self.step, self.accept = (self._within(hook) for hook in (scheme.start, scheme.step, scheme.accept))
+        self.resume, self.error = self._within(scheme.resume), self._within(scheme.error)
 
-    def _has_left_its_error(self, K: Kernel, h: float) -> None:
-        pass
+    def _within(self, hook: Any) -> Any:
+        """The hook, in which an index beyond an array or a wrong field is an error by file, line and function."""
+
+        def called(K: Kernel, *more: float) -> Any:
+            try:
+                return hook(K, *more)
+            except (IndexError, AttributeError) as error:
+                last = traceback.extract_tb(error.__traceback__)
+                place = [each for each in last if each.name not in ("__getattr__", "__setattr__")][-1]
+                given = ", ".join(f"{name}: {length}" for name, length in self.scheme.memory(K).items()) or "none"
+                memory = f"; the memory of the scheme {self.scheme.name!r} is {given}"
+                raise CapabilityError(
+                    f"{shown(place.filename)}:{place.lineno}, in {place.name}: {place.line!r}: {error}"
+                    + memory * isinstance(error, IndexError)
+                ) from error
+
+        return called if hook is not None else _nothing
 
 
 class PlainScheme:

@@ -12,7 +12,7 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.compile.mechanism import Mechanism
 from mbd.equations.equations import Equations
-from mbd.errors import CapabilityError
+from mbd.errors import CapabilityError, nearest
 from mbd.integrators.base import CompiledIntegrator, Integrator
 from mbd.integrators.newton import MAX_ITERATIONS
 from mbd.kernel import codes
@@ -136,7 +136,11 @@ class Stepper:
             **self.own.numbers(),
         )  # fmt: skip
         K.event_capacity = max(EVENT_CAPACITY, 2 * room_to_log(K))
-        vars(K).update(self.integrator.numbers())
+        for name, number in self.integrator.numbers().items():
+            if name not in TABLE.kinds:
+                told = nearest(name, TABLE.kinds, "number of the kernel", "There are")
+                raise CapabilityError(f"{self.integrator!r} gives numbers() for {name!r}: {told}")
+            setattr(K, name, number)
         return K
 
     def _arrays(self, parameters: Vector, manager: ActiveSetManager) -> None:
@@ -163,12 +167,19 @@ class Stepper:
         )
         for name, table in tables.items():
             getattr(v, name)[: len(table)] = table
+        for name in MEMORY:
+            setattr(v, name, getattr(v, name)[: own.get(name, 0)])  # interpreted, no number more than it asked for
         v.shift1 = v.block[self.mechanism.layout.shift :]  # read by model code as well
         v.params = np.ascontiguousarray(parameters, dtype=float) if len(parameters) else np.zeros(1)
         v.step = v.dt
         v.sinking[:] = np.inf
         v.was[:] = codes.UNKNOWN
         for name, numbers in (*self.own.coefficients().items(), ("nodes", self.own.nodes)):
+            if len(numbers) > len(getattr(v, name)):
+                raise CapabilityError(
+                    f"the scheme {self.own.name!r} has {len(numbers)} coefficients for {name!r}, to which its memory "
+                    f"gives a length of {len(getattr(v, name))}; try {len(numbers)} or more"
+                )
             getattr(v, name)[: len(numbers)] = numbers
         v.unit = unit_blocks(self.mechanism).copy()
         for number, (joint, _, first) in enumerate(self.mechanism.equations.configuration.charts, 1):
