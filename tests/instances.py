@@ -1,4 +1,4 @@
-"""The lists that the law tests run over: (id, factory). A new idea adds one line here.
+"""The lists that the law tests run over: (id, factory). A new idea adds one line here, `several` where it has settings.
 
 JOINTS    factory(parent, child) → joint, between any two frames
 LOSSES    factory() → loss
@@ -10,7 +10,9 @@ INTEGRATORS  schemes
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
+from typing import Any
 
 import mbd
 from mbd.bodies.base import Frame
@@ -26,27 +28,53 @@ from mbd.tape.node import Scalar
 TILTED = (1.0, 2.0, -2.0)
 """A direction along no axis."""
 
+
+def several(title: str, make: Callable[..., Any], **configurations: dict[str, Any]) -> list[tuple[str, Any]]:
+    """One instance for each configuration of a word: (title and label, factory); '_' in a label is a space.
+
+    ``several("screw", lambda a, b, **how: mbd.Screw("joint", a, b, **how), plain={"pitch": 0.2}, steep={"pitch": 2})``
+    """
+    signature = inspect.signature(make)
+    own = [each for each in signature.parameters.values() if each.kind is not each.VAR_KEYWORD]
+
+    def instance(how: dict[str, Any]) -> Any:
+        def factory(*given: Any) -> Any:
+            return make(*given, **how)
+
+        factory.__signature__ = signature.replace(parameters=own)  # type: ignore[attr-defined]
+        return factory
+
+    return [(f"{title} {label.replace('_', ' ')}", instance(how)) for label, how in configurations.items()]
+
+
 JOINTS: list[tuple[str, Callable[[Frame, Frame], Joint]]] = [
-    ("revolute", lambda a, b: mbd.Revolute("joint", a, b)),
-    ("revolute about -z", lambda a, b: mbd.Revolute("joint", a, b, axis=(0, 0, -1))),
-    ("revolute about x", lambda a, b: mbd.Revolute("joint", a, b, axis=(1, 0, 0))),
-    ("revolute tilted", lambda a, b: mbd.Revolute("joint", a, b, axis=TILTED)),
-    ("revolute with loss and spring", lambda a, b: mbd.Revolute("joint", a, b, loss=mbd.Viscous(0.3), stiffness=4.0)),
-    ("prismatic", lambda a, b: mbd.Prismatic("joint", a, b)),
-    ("prismatic along y", lambda a, b: mbd.Prismatic("joint", a, b, axis=(0, 1, 0))),
-    ("prismatic tilted", lambda a, b: mbd.Prismatic("joint", a, b, axis=TILTED)),
-    ("translation xy", lambda a, b: mbd.Translation("joint", a, b)),
-    ("translation xyz", lambda a, b: mbd.Translation("joint", a, b, axes="xyz")),
-    ("translation z", lambda a, b: mbd.Translation("joint", a, b, axes="z")),
+    *several(
+        "revolute", lambda a, b, **how: mbd.Revolute("joint", a, b, **how),
+        plain={}, about_minus_z={"axis": (0, 0, -1)}, about_x={"axis": (1, 0, 0)}, tilted={"axis": TILTED},
+        with_loss_and_spring={"loss": mbd.Viscous(0.3), "stiffness": 4.0},
+    ),
+    *several(
+        "prismatic", lambda a, b, **how: mbd.Prismatic("joint", a, b, **how),
+        plain={}, along_y={"axis": (0, 1, 0)}, tilted={"axis": TILTED},
+    ),
+    *several(
+        "translation", lambda a, b, **how: mbd.Translation("joint", a, b, **how),
+        xy={}, xyz={"axes": "xyz"}, z={"axes": "z"},
+    ),
     ("planar", lambda a, b: mbd.Planar("joint", a, b)),
-    ("cylindrical", lambda a, b: mbd.Cylindrical("joint", a, b)),
-    ("cylindrical tilted", lambda a, b: mbd.Cylindrical("joint", a, b, axis=TILTED)),
-    ("universal", lambda a, b: mbd.Universal("joint", a, b)),
-    ("universal about y and z", lambda a, b: mbd.Universal("joint", a, b, axis=(0, 1, 0), second_axis=(0, 0, 1))),
-    ("screw", lambda a, b: mbd.Screw("joint", a, b, pitch=0.2)),
-    ("screw tilted", lambda a, b: mbd.Screw("joint", a, b, pitch=-0.7, axis=TILTED)),
+    *several(
+        "cylindrical", lambda a, b, **how: mbd.Cylindrical("joint", a, b, **how), plain={}, tilted={"axis": TILTED}
+    ),
+    *several(
+        "universal", lambda a, b, **how: mbd.Universal("joint", a, b, **how),
+        plain={}, about_y_and_z={"axis": (0, 1, 0), "second_axis": (0, 0, 1)},
+    ),
+    *several(
+        "screw", lambda a, b, **how: mbd.Screw("joint", a, b, **how),
+        plain={"pitch": 0.2}, tilted={"pitch": -0.7, "axis": TILTED},
+    ),
     ("weld", lambda a, b: mbd.Weld("joint", a, b)),
-]
+]  # fmt: skip
 
 LOSSES: list[tuple[str, Callable[[], Loss]]] = [
     ("viscous", lambda: mbd.Viscous(0.7)),

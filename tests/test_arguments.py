@@ -14,7 +14,7 @@ HINGE = mbd.Revolute("hinge", MODEL.ground.origin, ROD.start)
 FRAMES = MODEL.ground.origin, ROD.end
 
 WORDS = {
-    **{scheme: () for scheme in (mbd.HHT, mbd.GeneralizedAlpha, mbd.Newmark, mbd.RadauIIA)},
+    **{scheme: () for scheme in (mbd.HHT, mbd.GeneralizedAlpha, mbd.Newmark, mbd.RadauIIA, mbd.RungeKutta853)},
     **{
         joint: ("joint", *FRAMES)
         for joint in (
@@ -61,11 +61,42 @@ WORDS = {
     mbd.Model: ("model",),
     mbd.on_slope: (0.1,),
 }  # fmt: skip
+"""Each word with arguments that make one, of which every one is exchanged for wrong ones."""
+
+BESIDE = {
+    "made by others, not by users": (
+        mbd.Accuracy, mbd.Criteria, mbd.Effects, mbd.Failure, mbd.Known, mbd.Linearization, mbd.Mobility,
+        mbd.PenaltyParameters, mbd.Replay, mbd.State, mbd.Sweep, mbd.Trajectory,
+    ),
+    "take a model and a run: tests of their own": (
+        mbd.accuracy, mbd.assemble, mbd.criteria, mbd.effects, mbd.linearize, mbd.load, mbd.mobility, mbd.project,
+        mbd.replay, mbd.simulate, mbd.sweep,
+    ),
+    "of numbers and traced values": (
+        mbd.acos, mbd.asin, mbd.atan, mbd.atan2, mbd.cos, mbd.cosh, mbd.exp, mbd.log, mbd.maximum, mbd.minimum,
+        mbd.sign, mbd.sin, mbd.sinh, mbd.sqrt, mbd.tan, mbd.tanh, mbd.where,
+    ),
+    "shapes of mass and domains: tests/bodies": (
+        mbd.Domain, mbd.box, mbd.cylinder, mbd.disk, mbd.rod, mbd.segment, mbd.sphere,
+    ),
+}  # fmt: skip
+"""Public names that are not tried here, by the reason."""
 
 WRONG = [
     "x", "", None, [1], {}, {1: 2}, {"a": 1}, ["a"], (None, None, None), (1, 2, 3, 4), [[1]], object(), -1.0,
     float("nan"), float("inf"), 1j, b"x", True, lambda: 0, mbd.PointMass,
 ]  # fmt: skip
+
+
+def test_every_public_name_is_tried_or_said_why_not():
+    known = {*WORDS, *(each for group in BESIDE.values() for each in group)}
+    for name in mbd.__all__:
+        public = getattr(mbd, name)
+        if callable(public) and not (inspect.isclass(public) and issubclass(public, Exception)):
+            assert public in known, (
+                f"mbd.{name} is new: give it a line in WORDS of tests/test_arguments.py, mbd.{name}: (arguments that "
+                "make one,), so that wrong arguments are tried; or in BESIDE, under the reason why not"
+            )
 
 
 @pytest.mark.parametrize("word", WORDS, ids=lambda word: word.__name__)
