@@ -73,8 +73,8 @@ BESIDE = {
         mbd.replay, mbd.simulate, mbd.sweep,
     ),
     "of numbers and traced values": (
-        mbd.acos, mbd.asin, mbd.atan, mbd.atan2, mbd.clip, mbd.cos, mbd.cosh, mbd.exp, mbd.hypot, mbd.log, mbd.maximum,
-        mbd.minimum, mbd.mod, mbd.sign, mbd.sin, mbd.sinh, mbd.sqrt, mbd.tan, mbd.tanh, mbd.where,
+        mbd.acos, mbd.asin, mbd.atan, mbd.atan2, mbd.clip, mbd.cos, mbd.cosh, mbd.exp, mbd.floor, mbd.hypot, mbd.log,
+        mbd.maximum, mbd.minimum, mbd.mod, mbd.sign, mbd.sin, mbd.sinh, mbd.sqrt, mbd.tan, mbd.tanh, mbd.where,
     ),
     "shapes of mass and domains: tests/bodies": (
         mbd.Domain, mbd.box, mbd.cylinder, mbd.disk, mbd.rod, mbd.segment, mbd.sphere,
