@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from struct import pack
 
@@ -39,8 +40,14 @@ Value = tuple[str, str]
 
 
 def llvm_text(functions: Sequence[tree.Function], entry: str) -> str:
-    """The module of some functions, of which the last is called from outside, by the name `entry`."""
-    whole = "\n".join([HEAD, _tags(), *(_Body(function).text for function in functions)])
+    """The module of some functions, of which the last is called from outside, by the name `entry`.
+
+    What is called in one place only becomes part of its caller at once: LLVM would do the same, but would simplify it
+    again at every level of the calls, which takes a third of its time.
+    """
+    bodies = [_Body(function) for function in functions]
+    calls = Counter(symbol for body in bodies for symbol in body.called)
+    whole = "\n".join([HEAD, _tags(), *(body.text(calls[body.function.symbol] == 1) for body in bodies)])
     return whole.replace(f"internal i64 @{functions[-1].symbol}(", f"i64 @{entry}(")
 
 
@@ -62,7 +69,8 @@ class _Body:
     """One function: its lines as they grow."""
 
     def __init__(self, function: tree.Function) -> None:
-        self.result = function.result
+        self.function, self.result = function, function.result
+        self.called: list[str] = []
         self.lines: list[str] = []
         self.slots: list[str] = []
         self.count = 0
@@ -71,11 +79,15 @@ class _Body:
             self.lines.append(f"store {LLVM[kind]} %in.{name}, ptr %own.{name}")
         self.block(function.body)
         self.lines.append("ret void" if self.result == "none" else "unreachable")
+
+    def text(self, once: bool) -> str:
+        """The function; `once`: it is called in one place."""
+        function = self.function
         given = ", ".join(f"{LLVM[kind]} %in.{name}" for name, kind in function.arguments.items())
-        apart = " noinline" if function.apart else ""
-        head = f"define internal {LLVM[self.result]} @{function.symbol}({given}) nounwind{apart} align 64 {{"
+        inlining = " noinline" if function.apart else " alwaysinline" if once else ""
+        head = f"define internal {LLVM[self.result]} @{function.symbol}({given}) nounwind{inlining} align 64 {{"
         own = [f"%own.{name} = alloca {LLVM[kind]}" for name, kind in function.locals.items()]
-        self.text = "\n".join([head, "entry:", *own, *self.slots, *self.lines, "}"])
+        return "\n".join([head, "entry:", *own, *self.slots, *self.lines, "}"])
 
     # lines ----------------------------------------------------------------------------------------------------------
     def fresh(self) -> str:
@@ -349,6 +361,7 @@ class _Body:
     def _Call(self, node: tree.Call) -> str:
         values, kinds = [self.value(argument) for argument in node.arguments], node.function.arguments.values()
         given = ", ".join(f"{LLVM[kind]} {self.cast(value, kind)}" for value, kind in zip(values, kinds, strict=True))
+        self.called.append(node.function.symbol)
         call = f"call {LLVM[node.kind]} @{node.function.symbol}({given})"
         if node.kind != "none":
             return self.emit(call)

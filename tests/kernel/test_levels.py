@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ctypes
+import re
+from collections import Counter
 
 import numpy as np
 import pytest
@@ -40,3 +42,13 @@ def test_every_level_of_optimization_gives_the_same_bits(name, scheme, plain_ker
     assert count == same > 100
     for part in ("time", "q", "v", "a", "lam"):
         np.testing.assert_array_equal(getattr(optimized, part), getattr(plain, part), err_msg=part)
+
+
+def test_what_is_called_in_one_place_is_part_of_its_caller():
+    text = build.kernel_text()
+    calls = Counter(re.findall(r"call \w+ @([\w.]+)\(", text))
+    heads = re.findall(r"^define internal \w+ @([\w.]+)\(.*\) nounwind(.*) align 64 \{$", text, re.MULTILINE)
+    joined = {name for name, how in heads if how == " alwaysinline"}
+    apart = {name for name, how in heads if how == " noinline"}
+    assert joined == {name for name, _ in heads if calls[name] == 1} - apart
+    assert len(apart) >= len(build.APART) and len(joined) > len(heads) / 3
