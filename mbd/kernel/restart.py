@@ -21,9 +21,9 @@ from mbd.kernel.saddle import solve_rows
 
 __all__ = [
     "active_rows", "add_shares", "capture", "compose", "consistent", "displace", "evaluate", "evaluate_loaded",
-    "fill_block", "holds_rows", "largest_force", "limit_of", "load_accelerations", "lower_scales", "note_scales",
-    "raise_scales", "refresh_scales", "restore_scales", "retain_scales", "row_speed", "share_loads",
-    "minimum_norm_multipliers", "stepping_rows",
+    "fill_block", "holds_rows", "largest_force", "limit_of", "load_accelerations", "lower_scales", "measure_accepted",
+    "minimum_norm_multipliers", "note_scales", "raise_scales", "refresh_scales", "restore_scales", "retain_scales",
+    "row_speed", "share_loads", "stepping_rows",
 ]  # fmt: skip
 
 FAR_ABOVE = 100.0
@@ -106,6 +106,22 @@ def refresh_scales(K: Model) -> None:
         K.scale[K.n + K.n_rows + k] = max(K.scale[K.n + K.n_rows + k], speed)
 
 
+def measure_accepted(K: Mechanism) -> None:
+    """The block and magnitudes at the accepted state.
+
+    Where nothing acts, forces are measured by what a velocity does not notice in a step: they must not be zero, beside
+    which round-off would be large.
+    """
+    fill_block(K, K.time, K.q, K.y)
+    for i in range(K.n_v):
+        unseen = EPS * abs(K.y[i]) / K.dt
+        if abs(K.rate[i]) < unseen:
+            K.block[K.o_a + i] = unseen
+    refresh_scales(K)
+    for i in range(K.n_v):
+        K.block[K.o_a + i] = K.rate[i]
+
+
 def weigh(K: Model) -> None:
     """Residuals are compared with their scale so often that its inverse is kept."""
     for i in range(K.n):
@@ -163,8 +179,7 @@ def lower_scales(K: DependentRows) -> None:
     After a moment of huge forces residuals are judged too mildly otherwise.
     """
     K.work[: K.n] = K.scale[: K.n]
-    fill_block(K, K.time, K.q, K.y)
-    refresh_scales(K)
+    measure_accepted(K)
     K.scales_raised = 0
     for i in range(K.n):
         floor = K.work[i] / FAR_ABOVE

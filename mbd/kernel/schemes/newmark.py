@@ -11,7 +11,7 @@ from mbd.kernel.charts import find_chart_end
 from mbd.kernel.codes import PASSING
 from mbd.kernel.conditioning import is_ill_conditioned, refine_accelerations
 from mbd.kernel.records import Kernel, Steps
-from mbd.kernel.restart import compose, consistent, fill_block, refresh_scales
+from mbd.kernel.restart import compose, consistent, fill_block, measure_accepted
 from mbd.kernel.schemes.contract import Scheme
 from mbd.kernel.schemes.iteration import predict, shift_growth
 from mbd.kernel.schemes.memory import forget_steps, look_a_step_ahead, start_step
@@ -41,8 +41,7 @@ def newmark_start(K: Kernel) -> int:
         K.aux[i] = K.rate[i] + (K.jerk * (K.alpha_m - K.alpha_f) * full) * K.slope[i]
     for k in range(K.n_rows):
         K.lam_slope[k] = (K.impulse[k] - K.lam[k]) / step if status == 0 else 0.0
-    fill_block(K, t, K.q, K.y)
-    refresh_scales(K)
+    measure_accepted(K)
     if unresolved(K):
         for i in range(K.n):
             K.slope[i] = 0.0

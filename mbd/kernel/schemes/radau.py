@@ -16,13 +16,12 @@ from mbd.kernel.restart import (
     compose,
     consistent,
     evaluate,
-    fill_block,
     find_sliding_friction,
     holds_rows,
     load_accelerations,
+    measure_accepted,
     note_scales,
     raise_scales,
-    refresh_scales,
     restore_scales,
     retain_scales,
 )
@@ -86,8 +85,7 @@ def radau_start(K: SingularSteps) -> int:
     forget_steps(K)
     forget_stages(K)
     forget_row_norms(K)
-    fill_block(K, K.time, K.q, K.y)
-    refresh_scales(K)
+    measure_accepted(K)
     look_a_step_ahead(K)
     return 0
 

@@ -17,7 +17,7 @@ from mbd.kernel.linear import solve_definite
 from mbd.kernel.mass_ratios import LOSS, is_uneven, polish_rates, polish_with_rows
 from mbd.kernel.ordered import LOSS_AT_ONCE, solve_kkt
 from mbd.kernel.records import Balance, DependentRows, Kernel, Mechanism, Memory, SingularSteps, Steps
-from mbd.kernel.restart import compose, consistent, displace, evaluate, fill_block, raise_scales, refresh_scales
+from mbd.kernel.restart import compose, consistent, displace, evaluate, measure_accepted, raise_scales
 from mbd.kernel.roots import sqrt
 from mbd.kernel.saddle import factor_saddle
 from mbd.kernel.schemes.contract import Abilities, Scheme
@@ -56,8 +56,7 @@ def note_uneven(K: DependentRows) -> None:
 
 def find_sizes(K: Mechanism) -> None:
     """Sizes at the accepted state; those of a candidate that is refused must not excuse the next one."""
-    fill_block(K, K.time, K.q, K.y)
-    refresh_scales(K)
+    measure_accepted(K)
 
 
 def runge_kutta_step(K: Kernel, h: float, t1: float) -> int:
