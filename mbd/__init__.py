@@ -55,6 +55,7 @@ if TYPE_CHECKING:
         AssemblyError as AssemblyError,
         CapabilityError as CapabilityError,
         MbdError as MbdError,
+        MbdWarning as MbdWarning,
         MemoryLimitError as MemoryLimitError,
         ModelError as ModelError,
         SimulationError as SimulationError,
@@ -143,8 +144,8 @@ _HOMES = {
     "Rolling Unilateral When distance extension flexion height measure penalty_parameters separation touchdown",
     "mbd.equations.energy_description": "Coordinate",
     "mbd.lagrangian": "Lagrangian",
-    "mbd.errors": "AssemblyError CapabilityError MbdError MemoryLimitError ModelError SimulationError TraceError "
-    "TrajectoryError UnknownNameError",
+    "mbd.errors": "AssemblyError CapabilityError MbdError MbdWarning MemoryLimitError ModelError SimulationError "
+    "TraceError TrajectoryError UnknownNameError",
     "mbd.forces": "Applied Damper Motor Potential Samples Spring TorsionSpring",
     "mbd.integrators": "HHT GeneralizedAlpha Newmark RadauIIA RungeKutta853",
     "mbd.joints": "Cylindrical Planar Prismatic Revolute Screw Translation Universal Weld",

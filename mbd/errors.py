@@ -10,6 +10,7 @@ __all__ = [
     "AssemblyError",
     "CapabilityError",
     "MbdError",
+    "MbdWarning",
     "MemoryLimitError",
     "ModelError",
     "SimulationError",
@@ -22,6 +23,10 @@ __all__ = [
 
 class MbdError(Exception):
     """Base of every error that `mbd` raises on purpose."""
+
+
+class MbdWarning(UserWarning):
+    """What is possible but was hardly meant, or costs more than expected; `warnings.filterwarnings` silences it."""
 
 
 class TraceError(MbdError, TypeError):

@@ -120,3 +120,29 @@ def test_a_body_that_turns_about_z_on_a_lift_needs_one_number() -> None:
 def test_a_result_that_is_none_is_told_its_neighbours(asked: str, said: str) -> None:
     with pytest.raises(mbd.UnknownNameError, match=said):
         driven(0.0)[asked]
+
+
+def test_degrees_for_radians_are_doubted() -> None:
+    model, _ = pendulum()
+    with pytest.warns(mbd.MbdWarning, match=r"'pin.angle' is 90 rad, 14.3 turns; .* math.radians\(90\) = 1.571"):
+        mbd.assemble(model, position={"pin.angle": 90})
+
+
+def test_millimetres_for_metres_are_doubted() -> None:
+    model, rod = mbd.Model("leg"), mbd.Link("shank", length=420.0, **mbd.rod(3.0, length=420.0).link)
+    model.connect(mbd.Revolute("knee", model.ground.origin, rod.start))
+    with pytest.warns(mbd.MbdWarning, match="'shank' is 420 m long; lengths are in metres, and 420 mm is 0.42"):
+        mbd.assemble(model)
+
+
+def test_a_hinge_connected_twice_is_doubted() -> None:
+    model, pin = pendulum()
+    model.connect(mbd.Revolute("again", pin.parent, pin.child))
+    with pytest.warns(mbd.MbdWarning, match="'pin' and 'again' hold the same points together"):
+        mbd.assemble(model)
+
+
+def test_several_turns_and_hinges_of_other_axes_are_not_doubted(recwarn: pytest.WarningsRecorder) -> None:
+    model, _ = pendulum()
+    mbd.assemble(model, position={"pin.angle": 6.0 * np.pi})
+    assert not recwarn.list

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.assembly.conditions import Condition, conditions
 from mbd.assembly.contradictions import Attempt, contradictions, infeasible
+from mbd.assembly.doubtful import doubtful
 from mbd.assembly.foreseen import require_inertia
 from mbd.assembly.inertia import undetermined
 from mbd.assembly.infeasibility import Held
@@ -31,7 +33,7 @@ from mbd.bodies.values import named_number_faults
 from mbd.compile.mechanism import Mechanism, rate_names
 from mbd.compile.mechanisms import mechanism_of
 from mbd.equations.equations import Equations
-from mbd.errors import AssemblyError, ModelError, UnknownNameError, nearest
+from mbd.errors import AssemblyError, MbdWarning, ModelError, UnknownNameError, nearest
 from mbd.state import State
 
 __all__ = ["assemble"]
@@ -124,6 +126,8 @@ def assemble(
     if bad:
         raise AssemblyError(bad)
     name_wrapped(work)
+    for sentence in doubtful(model, equations, position or {}):
+        warnings.warn(sentence, MbdWarning, stacklevel=2)
     return State(
         0.0, work.q, work.y[: equations.n_v].copy(), work.y[equations.n_v :].copy(), manager.mode(work.flags),
         _armed(work, set(opened)), work.anchors, tuple(coordinate.name for coordinate in equations.coordinates),

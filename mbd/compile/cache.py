@@ -21,6 +21,8 @@ from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
+from mbd.errors import MbdWarning
+
 __all__ = ["LIMIT", "ObjectCache", "default_cache", "key_of"]
 
 LIMIT = 256 * 2**20
@@ -180,7 +182,7 @@ def _tell(sentence: str) -> None:
     """Warn, once in a process."""
     if sentence not in _TOLD:
         _TOLD.add(sentence)
-        warnings.warn(sentence, UserWarning, stacklevel=2)
+        warnings.warn(sentence, MbdWarning, stacklevel=2)
 
 
 def default_cache() -> ObjectCache:

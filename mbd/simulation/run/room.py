@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import warnings
 
+from mbd.errors import MbdWarning
 from mbd.free_memory import available, size_in_words as memory
 from mbd.simulation.run.data import RoomFindings, RunData
 
@@ -84,7 +85,7 @@ class Room(RoomFindings):
                 f"at t = {run.now:.3g} s there are {run.stored} rows: at this rate the run will have about {rows:.2g}, "
                 f"which take {memory(rows * self.size)}{last}; {_remedy(run)}"
             )
-            warnings.warn(self.note, UserWarning, stacklevel=2)
+            warnings.warn(self.note, MbdWarning, stacklevel=2)
         return ""
 
     def refused(self, rows: float, seconds: float) -> str:
