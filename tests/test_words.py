@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from pathlib import Path
 
@@ -34,3 +35,21 @@ def test_retired_words_do_not_return(retired):
         if pattern.search(line)
     ]
     assert not found, f"say instead: {RETIRED[retired]}\n" + "\n".join(found)
+
+
+VAGUE = {"told", "said", "interior", "ring"}
+"""Names of variables and attributes that do not say what they hold; texts are `text`, what reports is `report`, …"""
+
+
+def test_variables_are_named_for_what_they_hold():
+    files = [file for file in FILES if file.suffix == ".py" and not {"kernel", "fuzz"} & set(file.parts)]
+    found = []
+    for file in files:
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Name | ast.Attribute) and isinstance(node.ctx, ast.Store):
+                name = node.id if isinstance(node, ast.Name) else node.attr
+            else:
+                name = getattr(node, "arg", None) if isinstance(node, ast.arg) else getattr(node, "name", None)
+            if name in VAGUE:
+                found.append(f"{file.relative_to(ROOT)}:{node.lineno}: {name}")
+    assert not found, "\n".join(found)

@@ -138,8 +138,8 @@ class Stepper:
         K.event_capacity = max(EVENT_CAPACITY, 2 * room_to_log(K))
         for name, number in self.integrator.numbers().items():
             if name not in TABLE.kinds:
-                told = nearest(name, TABLE.kinds, "number of the kernel", "There are")
-                raise CapabilityError(f"{self.integrator!r} gives numbers() for {name!r}: {told}")
+                text = nearest(name, TABLE.kinds, "number of the kernel", "There are")
+                raise CapabilityError(f"{self.integrator!r} gives numbers() for {name!r}: {text}")
             setattr(K, name, number)
         return K
 
