@@ -34,6 +34,7 @@ _DIGEST = 32
 _SUFFIX, _DRAFT, _LASTING = ".object", ".draft", "kernel-"
 _OTHERS = stat.S_IWGRP | stat.S_IWOTH
 _TOLD: set[str] = set()
+_AGAIN = "so it is compiled again in every process"
 
 
 def key_of(*parts: str) -> str:
@@ -196,12 +197,12 @@ def default_cache() -> ObjectCache:
         from platformdirs import user_cache_path
 
         directory = user_cache_path("mbd", appauthor=False) / "objects"
+    except ImportError:
+        _tell(f"platformdirs is not installed, {_AGAIN}; try pip install 'mbd[fast]', or name a directory in MBD_CACHE")
+        return ObjectCache()
     except (RuntimeError, KeyError, OSError):  # no HOME, and no entry for this user
         directory = Path()
     if directory.is_absolute():
         return ObjectCache(directory)
-    _tell(
-        "there is no home directory to keep compiled code in: it is compiled again in every process; name a directory "
-        "in MBD_CACHE"
-    )
+    _tell(f"there is no home directory to keep compiled code in, {_AGAIN}; name a directory in MBD_CACHE")
     return ObjectCache()
