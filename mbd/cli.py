@@ -251,7 +251,7 @@ def info_command(arguments: argparse.Namespace) -> int:
     rows = {name: version or "not installed" for name, version in versions().items()}
     rows |= {name: str(value) for name, value in machine().items()}
     rows["backend"] = chosen.name + (f" ({chosen.note})" if chosen.note else "")
-    rows["code cache"] = str(chosen.name == "llvm" and default_cache().directory or "off")
+    rows["code cache"] = str(default_cache().directory or "off") if chosen.name == "llvm" else "off"
     rows["examples"] = f"{len(examples())} in {folder()}"
     for name, value in rows.items():
         print(f"{name:<14}{value}")

@@ -30,7 +30,8 @@ WORDS = {"left": "sound leg", "right": "prosthetic leg: hydraulic knee, elastic 
 STYLE = f"""
   text {{ font: 15px system-ui, sans-serif; fill: #444 }} .ground {{ stroke: #888; stroke-width: 2 }}
   .leg {{ fill: none; stroke-width: 9; stroke-linecap: round; stroke-linejoin: round }}
-  .left {{ stroke: {SIDES["left"]} }} .right {{ stroke: {SIDES["right"]} }} .faint .leg {{ opacity: .2; stroke-width: 3 }}
+  .left {{ stroke: {SIDES["left"]} }} .right {{ stroke: {SIDES["right"]} }}
+  .faint .leg {{ opacity: .2; stroke-width: 3 }}
   .hip {{ fill: #444 }} .joint {{ fill: #fff }}
   @media (prefers-color-scheme: dark) {{
     text {{ fill: #ccc }} .left {{ stroke: #56B4E9 }} .right {{ stroke: #F08A3C }} .hip {{ fill: #ccc }}

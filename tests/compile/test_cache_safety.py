@@ -170,6 +170,13 @@ def test_without_a_home_the_cache_remembers_nothing_and_says_so(monkeypatch):
     assert default_cache() == ObjectCache()
 
 
+def test_without_platformdirs_the_cache_remembers_nothing_and_says_what_to_install(monkeypatch):
+    monkeypatch.delenv("MBD_CACHE", raising=False)
+    monkeypatch.setitem(sys.modules, "platformdirs", None)
+    with pytest.warns(UserWarning, match=r"platformdirs is not installed.*mbd\[fast\].*MBD_CACHE"):
+        assert default_cache() == ObjectCache()
+
+
 FORKS = """
 import os, signal, threading, time
 from mbd.compile.cache import ObjectCache

@@ -61,7 +61,7 @@ def leg() -> mbd.Model:
 
 
 def walker() -> mbd.Model:
-    """The kneed walker of the README."""
+    """The kneed walker of the examples."""
     model = mbd.Model("kneed walker", gravity=mbd.on_slope(0.0504))
     hip = mbd.PointMass("hip", mass=0.5)
     model.connect(mbd.Translation("trunk", model.ground.origin, hip.origin))

@@ -1,0 +1,148 @@
+"""The gallery: every example with a picture, the page that plays its run, and its text."""
+
+from __future__ import annotations
+
+import ast
+from dataclasses import dataclass
+from functools import cached_property
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbd.cli import Script, examples
+from mbd.view.page import html
+from mbd.view.scene import Instants, scene
+
+__all__ = ["Example", "index", "read"]
+
+SIZE, MARGIN = (320.0, 200.0), 14.0
+"""Width and height of a picture, and its margin [points]."""
+
+SHOWN, POSES, CURVE = 1.6, 9, 240
+"""Longest stretch of a run that a picture shows [s], poses of a mechanism, points of a curve."""
+
+
+@dataclass(frozen=True)
+class Example:
+    """An example: its name in ``mbd run NAME`` and its file."""
+
+    name: str
+    path: Path
+
+    @property
+    def title(self) -> str:
+        return self.name.replace("-", " ").capitalize()
+
+    @property
+    def text(self) -> str:
+        return self.path.read_text(encoding="utf-8")
+
+    @property
+    def said(self) -> tuple[str, str]:
+        """First line of its docstring, and the rest."""
+        first, _, rest = (ast.get_docstring(ast.parse(self.text)) or "").partition("\n")
+        return first, rest.strip()
+
+    @cached_property
+    def run(self) -> Any:
+        return Script.load(self.name).run(None, {})
+
+    @property
+    def player(self) -> str:
+        """The page that plays the run."""
+        return html(self.run)
+
+    @property
+    def page(self) -> str:
+        """Its page of the gallery in Markdown."""
+        first, rest = self.said
+        return (
+            f"# {self.title}\n\n{first}\n\n"
+            f'<iframe class="player" src="{self.name}-run.html" title="{escape(self.title)}, animated" '
+            f'loading="lazy"></iframe>\n\n'
+            f"[The animation on a page of its own]({self.name}-run.html), which `run.page(path)` writes.\n\n"
+            f"{rest}\n\n```\nmbd run {self.name}\n```\n\n## The whole script\n\n```python\n{self.text}```\n"
+        )
+
+    @property
+    def picture(self) -> str:
+        """A drawing of the first moments of the run: poses of the mechanism, or curves of its coordinates (SVG)."""
+        run = self.run
+        end = min(float(run.time[-1]), float(run.time[0]) + SHOWN)
+        drawn = _poses(run, end) or _curves(run, end)
+        return (
+            f'<svg class="thumbnail" viewBox="0 0 {SIZE[0]:g} {SIZE[1]:g}" aria-hidden="true" focusable="false">'
+            + "".join(drawn)
+            + "</svg>"
+        )
+
+
+def read() -> list[Example]:
+    """All examples by name."""
+    return [Example(name, path) for name, path in examples().items()]
+
+
+def index(known: list[Example]) -> str:
+    """The page of all examples."""
+    cards = "".join(
+        f'<a class="card" href="{one.name}.html">{one.picture}<strong>{escape(one.title)}</strong>'
+        f"<span>{escape(one.said[0])}</span></a>\n"
+        for one in known
+    )
+    return (
+        "# Gallery\n\nEvery example of `mbd examples`, with its animation and its text. `mbd run NAME` runs it.\n\n"
+        f'<div class="cards">\n{cards}</div>\n'
+    )
+
+
+def _fitted(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Points (…, 2) [m] on the paper, in one scale, y up."""
+    flat = points.reshape(-1, 2)
+    low, high = flat.min(axis=0), flat.max(axis=0)
+    scale = np.min((np.array(SIZE) - 2 * MARGIN) / np.maximum(high - low, 1e-9))
+    return (points - (low + high) / 2) * (scale, -scale) + np.array(SIZE) / 2
+
+
+def _poses(run: Any, end: float) -> list[str]:
+    """The mechanism at equal intervals of time, the last one in full color."""
+    whole = scene(run, 2)
+    lines = [(body, members) for body, members in whole.segments if len(members) > 1]
+    if not lines:
+        return []
+    count = max(2, round((run.time[-1] - run.time[0]) / (end - run.time[0]) * (POSES - 1)))
+    if count > 400:
+        return []
+    every = scene(run, count)
+    shown = np.searchsorted(every.instants.time, np.linspace(run.time[0], end, POSES) - 1e-9)
+    poses = every.positions[shown][:, :, :2]
+    used = sorted({point for _, members in lines for point in members})
+    paper = np.zeros_like(poses)
+    paper[:, used] = _fitted(poses[:, used])
+    drawn = []
+    for number, pose in enumerate(paper):
+        kind = "" if number == len(paper) - 1 else " faint"
+        for body, members in lines:
+            side = next((word for word in ("left", "right") if word in body.split()), "neither")
+            drawn.append(f'<polyline class="{side}{kind}" points="{_points(pose[list(members)])}"/>')
+    return drawn
+
+
+def _curves(run: Any, end: float) -> list[str]:
+    """Coordinates over time, each over its own range."""
+    instants = Instants(np.linspace(run.time[0], end, CURVE), np.ones(CURVE, dtype=bool))
+    names = [name for name, _ in run.facts.coordinates][:3]
+    values = instants.read(run, names)
+    x = np.linspace(MARGIN, SIZE[0] - MARGIN, CURVE)
+    drawn = []
+    for kind, column in zip(("left", "right", "neither"), values.T, strict=False):
+        span = np.ptp(column) or 1.0
+        y = SIZE[1] - MARGIN - (column - column.min()) / span * (SIZE[1] - 2 * MARGIN)
+        drawn.append(f'<polyline class="{kind}" points="{_points(np.column_stack([x, y]))}"/>')
+    return drawn
+
+
+def _points(points: NDArray[np.float64]) -> str:
+    return " ".join(f"{x:.1f},{y:.1f}" for x, y in points)

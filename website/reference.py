@@ -1,0 +1,54 @@
+"""The reference: every public name once, on the page of its subject."""
+
+from __future__ import annotations
+
+import mbd
+
+__all__ = ["GROUPS", "pages"]
+
+GROUPS = {
+    "Models and bodies": "Model Lagrangian Coordinate PointMass Link RigidBody box cylinder disk rod segment sphere "
+    "Domain on_slope",
+    "Joints and losses": "Revolute Prismatic Translation Planar Cylindrical Universal Screw Weld Viscous Quadratic "
+    "Coulomb PinFriction Tabulated Dissipation",
+    "Constraints and measures": "Bilateral Unilateral Penalty PenaltyParameters penalty_parameters KnifeEdge Rolling "
+    "Nonholonomic Event Controller When touchdown Plane height flexion extension distance separation measure",
+    "Forces": "Spring Damper TorsionSpring Motor Applied Potential Samples",
+    "Functions": "sin cos tan asin acos atan atan2 sinh cosh tanh exp log sqrt sign maximum minimum where",
+    "Starts and runs": "assemble project State simulate Trajectory load sweep Sweep",
+    "Integrators": "HHT GeneralizedAlpha Newmark RadauIIA RungeKutta853",
+    "Analysis": "accuracy Accuracy Known effects Effects linearize Linearization mobility Mobility criteria Criteria",
+    "Errors and failures": "MbdError ModelError AssemblyError SimulationError CapabilityError MemoryLimitError "
+    "TraceError TrajectoryError UnknownNameError Failure Replay replay",
+}
+"""Public names by the title of their page."""
+
+BASES = (
+    "mbd.joints.Joint mbd.joints.losses.Loss mbd.forces.Force mbd.constraints.Constraint mbd.constraints.Measure "
+    "mbd.integrators.Integrator mbd.integrators.System"
+)
+"""What words of one's own inherit from."""
+
+OF_INTEREST = ("Models and bodies", "Starts and runs", "Analysis", "Errors and failures")
+"""Pages that show the methods of their classes; what others have is for those who write words of their own."""
+
+
+def pages() -> dict[str, str]:
+    """Markdown of the pages by their place in the site."""
+    found = {}
+    listing = ["# Every name", "", "All public names of `mbd`; each page is made from the docstrings.", ""]
+    for title, names in GROUPS.items():
+        place = title.lower().replace(" ", "-") + ".md"
+        known = [f"mbd.{name}" for name in names.split()]
+        links = ", ".join(f"[`{name}`][mbd.{name}]" for name in names.split())
+        listing += [f"**[{title}]({place})**: {links}", ""]
+        found[f"reference/{place}"] = _page(title, known, members=title in OF_INTEREST)
+    found["reference/words-of-your-own.md"] = _page("Words of your own", BASES.split(), members=True)
+    kit = [f"mbd.testing.{name}" for name in mbd.testing.__all__]
+    found["reference/testing-kit.md"] = _page("The testing kit", kit, members=False)
+    return {"reference/index.md": "\n".join(listing), **found}
+
+
+def _page(title: str, names: list[str], members: bool) -> str:
+    options = "" if members else "    options: {members: false}\n"
+    return f"# {title}\n\n" + "".join(f"::: {name}\n{options}\n" for name in names)
