@@ -45,3 +45,8 @@ def on_post_page(output: str, page: Any, **_: Any) -> str:
     )
     up = "../" * page.file.dest_uri.count("/")
     return output.replace("https://unpkg.com/iframe-worker/shim", f"{up}offline.js")
+
+
+def on_post_build(config: Any, **_: Any) -> None:
+    """The page of a server for what it has not found leads nowhere in a folder of files."""
+    (Path(config.site_dir) / "404.html").unlink()
