@@ -14,7 +14,8 @@ GROUPS = {
     "Constraints and measures": "Bilateral Unilateral Penalty PenaltyParameters penalty_parameters KnifeEdge Rolling "
     "Nonholonomic Event Controller When touchdown Plane height flexion extension distance separation measure",
     "Forces": "Spring Damper TorsionSpring Motor Applied Potential Samples",
-    "Functions": "sin cos tan asin acos atan atan2 sinh cosh tanh exp log sqrt sign maximum minimum where",
+    "Functions": "sin cos tan asin acos atan atan2 sinh cosh tanh exp log sqrt hypot sign "
+    "maximum minimum clip mod floor where pi",
     "Starts and runs": "assemble project State simulate Trajectory load sweep Sweep",
     "Integrators": "HHT GeneralizedAlpha Newmark RadauIIA RungeKutta853",
     "Analysis": "accuracy Accuracy Known effects Effects linearize Linearization mobility Mobility criteria Criteria",
