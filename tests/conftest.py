@@ -35,8 +35,8 @@ settings.register_profile("thorough", parent=settings.get_profile("ci"), derando
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
 
 
-WITHOUT_KERNEL = ("bodies", "equations", "forces", "tape", "topology", "test_layers.py", "test_surface.py")
-"""Parts of the tests that call no compiled kernel, or hardly ever."""
+WITHOUT_KERNEL = ("test_layers.py", "tape", "topology", "bodies", "forces", "equations")
+"""Parts of the tests that call no compiled kernel, or seldom, those last."""
 
 
 def pytest_configure(config):
@@ -62,9 +62,10 @@ def pytest_collection_modifyitems(items):
     if len(items) < 1000:
         return
     tests = Path(__file__).parent
-    parts = {tests / part for part in WITHOUT_KERNEL}
-    free = [item for item in items if parts.intersection((item.path, item.path.parent))]
-    others = [item for item in items if not parts.intersection((item.path, item.path.parent))]
+    parts = {tests / part: place for place, part in enumerate(WITHOUT_KERNEL)}
+    place = {item: min(parts.get(item.path, 99), parts.get(item.path.parent, 99)) for item in items}
+    free = sorted([item for item in items if place[item] < 99], key=place.__getitem__)
+    others = [item for item in items if place[item] == 99]
     half = len(items) // 2
     items[:] = others[:half] + free + others[half:]
 

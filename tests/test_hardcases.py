@@ -34,8 +34,9 @@ from mbd.simulation.arguments import CHOICES
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "hardcases.md"
 
 SLOW = [pytest.mark.slow]
-LONG = {(case, name) for case in ("g3", "j1", "j4", "j5") for name in ("RadauIIA", "RungeKutta853")}
-"""Cases whose steps of high order take seconds: `pytest -m slow` and ``mbd hardcases`` judge them."""
+LONG = {(case, name) for case in ("b2-N10", "g3", "j1", "j4", "j5", "j17") for name in ("RadauIIA", "RungeKutta853")}
+LONG |= {("j4", "HHT-index3"), ("j4", "generalized-alpha-index3")}
+"""Cases that take seconds with schemes that others judge quickly: `pytest -m slow` and ``mbd hardcases`` judge them."""
 
 
 def marks(case: HardCase, name: str) -> list:

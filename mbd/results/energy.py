@@ -13,6 +13,7 @@ onto rows and what non-smooth steps lift out of surfaces stand there too.
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Container
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -236,14 +237,18 @@ def _jumps(columns: ModelColumns, total: Vector, driven: bool) -> list[Part]:
     record, after = columns.record, _after_switch(columns)
     left = np.where(after, _steps(total), 0.0)
     hits = [event for event in record.events if event.kind == "closed" and event.impulse.any() and after[event.row]]
-    struck = np.bincount([event.row for event in hits], minlength=len(left))
-    impacts: dict[str, Vector] = {}
-    for row in sorted({event.row for event in hits}):
-        for name, loss in _losses([event for event in hits if event.row == row]).items():
-            impacts.setdefault(name, np.zeros(len(left)))[row] -= loss
+    together: dict[int, list[EventRecord]] = {}
+    for event in hits:
+        together.setdefault(event.row, []).append(event)
+    impacts: dict[str, Vector] = defaultdict(lambda: np.zeros(len(left)))
+    for row, struck in sorted(together.items()):
+        for name, loss in _losses(struck).items():
+            impacts[name][row] -= loss
             left[row] += loss
     reset = _resets(columns.equations, record, len(left))
-    beyond = np.where((struck > 0) & ~reset, left, 0.0)
+    beyond = np.zeros(len(left))
+    beyond[list(together)] = left[list(together)]
+    beyond[reset] = 0.0
     parts = [Part(f"{name} impact", "impact", np.cumsum(taken)) for name, taken in impacts.items()]
     parts.append(Part("resets", "reset", np.cumsum(np.where(reset, left, 0.0))))
     return [*parts, Part("drives at impacts", "constraint", np.cumsum(beyond))] if driven else parts
