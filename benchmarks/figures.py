@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from statistics import median
+from time import sleep
 
-__all__ = ["NOISY", "Figure", "Samples", "interleaved", "table"]
+__all__ = ["BURST", "NOISY", "Figure", "Samples", "interleaved", "table"]
 
 NOISY = 1.2
 """Median over minimum of the repeats above which a figure is marked as taken on a busy machine."""
@@ -64,15 +65,22 @@ class Samples:
         return median(self.seconds) / self.least if self.least > 0.0 else 1.0
 
 
-def interleaved(tasks: Mapping[str, Callable[[], float]], repeats: int) -> dict[str, Samples]:
+BURST = 5
+"""Rounds between two pauses of `interleaved`."""
+
+
+def interleaved(tasks: Mapping[str, Callable[[], float]], repeats: int, pause: float = 0.0) -> dict[str, Samples]:
     """Every task once, then every task again …, so that a disturbance hits all alike; after one round to warm up.
 
-    A task returns the seconds that count, which need not be all that it takes.
+    A task returns the seconds that count, which need not be all that it takes. Seconds of `pause` after every `BURST`
+    of rounds spread them over longer than others keep a core busy.
     """
     for task in tasks.values():
         task()
     seconds: dict[str, list[float]] = {name: [] for name in tasks}
-    for _ in range(repeats):
+    for turn in range(repeats):
+        if turn and turn % BURST == 0:
+            sleep(pause)
         for name, task in tasks.items():
             seconds[name].append(task())
     return {name: Samples(tuple(values)) for name, values in seconds.items()}

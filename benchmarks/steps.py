@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -11,7 +11,7 @@ import numpy as np
 
 import mbd
 from benchmarks import walkers
-from benchmarks.figures import Figure, Samples, interleaved
+from benchmarks.figures import BURST, Figure, Samples, interleaved
 from benchmarks.handwritten import Program, compiler
 from benchmarks.stopwatch import kernel_watched
 from mbd.integrators.family import NewmarkFamily
@@ -20,6 +20,8 @@ __all__ = ["CASES", "Case", "DT", "measure"]
 
 DT = 1e-3
 AIM_RATIO = 1.0
+PAUSE = 1.0
+"""Between bursts of rounds [s]."""
 SOLVERS = ("C", "C, rows eliminated")
 """What solves in C: LU of the whole matrix with a search for pivots; the elimination that mbd does, by hand."""
 SAME = 1e-9
@@ -66,53 +68,61 @@ CASES = (
 
 
 def measure(repeats: int) -> list[Figure]:
-    """Both walkers, index 3 and stabilized."""
-    return [figure for case in CASES for form in ("index3", "ggl") for figure in _case(case, form, repeats)]
+    """Both walkers, index 3 and stabilized: all of them in every round, rounds spread over seconds."""
+    cases = [_Timed(case, form) for case in CASES for form in ("index3", "ggl")]
+    tasks = {f"{timed.name}: {task}": run for timed in cases for task, run in timed.tasks.items()}
+    samples = interleaved(tasks, BURST * repeats, PAUSE)
+    return [figure for timed in cases for figure in timed.figures(samples)]
 
 
-def _case(case: Case, form: Any, repeats: int) -> list[Figure]:
+class _Timed:
     """One walker in one formulation: time in the kernel, a long run minus a short one, so that starting is excluded."""
-    model, start = case.make()
-    scheme = mbd.GeneralizedAlpha(rho_inf=0.9, formulation=form)
-    short, none = case.steps // 10, 10 * case.steps
 
-    def run(steps: int) -> dict[str, Any]:
-        return dict(mbd.simulate(model, start, scheme, dt=DT, until=steps * DT, store=none).stats)
+    def __init__(self, case: Case, form: Any) -> None:
+        self.case, self.name = case, f"step, {case.name}, {'index 3' if form == 'index3' else 'stabilized'}"
+        self.aim = case.aim if form == "index3" else None
+        self.model, self.start = case.make()
+        self.scheme = mbd.GeneralizedAlpha(rho_inf=0.9, formulation=form)
+        self.short, self.programs = case.steps // 10, {}
+        self.tasks: dict[str, Callable[[], float]] = {
+            "long": partial(self._kernel_seconds, case.steps),
+            "short": partial(self._kernel_seconds, self.short),
+        }
+        for solver in SOLVERS if compiler() is not None else ():
+            sizes, reduced = (len(case.names), case.rows), solver == SOLVERS[1]
+            program = Program(case.source, sizes, case.numbers, case.names, form == "ggl", reduced)
+            _assert_same(case, self.model, self.start, self.scheme, program)
+            self.programs[solver] = program
+            self.tasks[f"{solver} long"] = partial(_seconds, program, self.start, self.scheme, case.steps)
+            self.tasks[f"{solver} short"] = partial(_seconds, program, self.start, self.scheme, self.short)
 
-    def kernel_seconds(steps: int) -> float:
+    def _run(self, steps: int) -> dict[str, Any]:
+        none = 10 * self.case.steps
+        return dict(mbd.simulate(self.model, self.start, self.scheme, dt=DT, until=steps * DT, store=none).stats)
+
+    def _kernel_seconds(self, steps: int) -> float:
         with kernel_watched() as watch:
-            run(steps)
+            self._run(steps)
         return watch.seconds
 
-    tasks: dict[str, Callable[[], float]] = {
-        "long": partial(kernel_seconds, case.steps),
-        "short": partial(kernel_seconds, short),
-    }
-    programs = {}
-    if compiler() is not None:
-        sizes = (len(case.names), case.rows)
-        for solver in SOLVERS:
-            reduced = solver == SOLVERS[1]
-            program = Program(case.source, sizes, case.numbers, case.names, form == "ggl", reduced)
-            _assert_same(case, model, start, scheme, program)
-            programs[solver] = program
-            tasks[f"{solver} long"] = partial(_seconds, program, start, scheme, case.steps)
-            tasks[f"{solver} short"] = partial(_seconds, program, start, scheme, short)
-    samples = interleaved(tasks, 5 * repeats)
-    own, spread = _per_step(samples["long"], samples["short"], case.steps - short)
-    name = f"step, {case.name}, {'index 3' if form == 'index3' else 'stabilized'}"
-    aims = (case.aim, AIM_RATIO) if form == "index3" else (None, AIM_RATIO)
-    counts = run(case.steps)
-    evaluations = (counts["tangents"] + counts["residuals"]) / counts["steps"]
-    figures = [] if programs else [Figure(name, own, "µs", aims[0], spread=spread)]
-    work = None
-    for solver, program in programs.items():
-        reference, _ = _per_step(samples[f"{solver} long"], samples[f"{solver} short"], case.steps - short)
-        work = work or sum(program.run(start, scheme, DT, case.steps, none).counts[:2]) / case.steps
-        title = name if solver == SOLVERS[0] else f"{name}: beside {solver}"
-        figures.append(Figure(title, own, "µs", aims[0], solver, reference, aims[1], spread))
-    work_figure = Figure(f"{name}: evaluations", evaluations, "a step", yardstick="C" if work else "", reference=work)
-    return [*figures, work_figure]
+    def figures(self, samples: Mapping[str, Samples]) -> list[Figure]:
+        """What the samples of its tasks tell."""
+        steps, name = self.case.steps, self.name
+        measured = {task: samples[f"{name}: {task}"] for task in self.tasks}
+        own, spread = _per_step(measured["long"], measured["short"], steps - self.short)
+        counts = self._run(steps)
+        evaluations = (counts["tangents"] + counts["residuals"]) / counts["steps"]
+        figures = [] if self.programs else [Figure(name, own, "µs", self.aim, spread=spread)]
+        work = None
+        for solver, program in self.programs.items():
+            reference, _ = _per_step(measured[f"{solver} long"], measured[f"{solver} short"], steps - self.short)
+            work = work or sum(program.run(self.start, self.scheme, DT, steps, 10 * steps).counts[:2]) / steps
+            title = name if solver == SOLVERS[0] else f"{name}: beside {solver}"
+            figures.append(Figure(title, own, "µs", self.aim, solver, reference, AIM_RATIO, spread))
+        work_figure = Figure(
+            f"{name}: evaluations", evaluations, "a step", yardstick="C" if work else "", reference=work
+        )
+        return [*figures, work_figure]
 
 
 def _seconds(program: Program, start: mbd.State, scheme: NewmarkFamily, steps: int) -> float:
