@@ -31,9 +31,10 @@ ROUND_OFF = [2473, 3433]
 TIED = [4378, 30308]
 """Two steps of a quarter of the run: whether they are half of it must not be decided by the last bit; two runs
 of a flight without any error but round-off, of which that with longer steps is kept."""
-BETWEEN = [4644, 21327, 15227]
+BETWEEN = [4644, 21327, 15227, 6994, 19480]
 """A joint was open, and velocities did not fit it, between long steps of `RadauIIA`; accelerations of index 3 within
-a short last step; joints between coarse steps of index 3, whose velocities do not fit."""
+a short last step; joints between coarse steps of index 3, whose velocities do not fit; velocities as far off as a
+tolerance allows in the time of a step; cubics over a turn of a radian."""
 STIFF = [22904]
 """Forces of a penalty between long steps, known as far as its stiffness times the tolerance."""
 CORRECTED = [26404, 12577]

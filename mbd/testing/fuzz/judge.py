@@ -129,8 +129,8 @@ def between(run: mbd.Trajectory, model: mbd.Model, parameters: Mapping[str, floa
 
     Where the scheme's own interpolation is of low order, loops and constraints are left to its error, and in index 3 to
     where velocities lead that do not fit; forces may miss a fiftieth of what they are made of. Where a tolerance was
-    asked for, it is what coordinates may be off, and so what loops may miss; forces by what rates off by as much in the
-    time of a step change of them.
+    asked for, it is what coordinates may be off, and so what loops may miss; velocities by as much in the time of a
+    step; forces by what such velocities change of them.
     """
     time = run.time
     steps_of = np.flatnonzero(np.diff(time) > 0.0)
@@ -150,7 +150,8 @@ def between(run: mbd.Trajectory, model: mbd.Model, parameters: Mapping[str, floa
             laws.places(found, bodies)
             h = np.diff(time)[np.searchsorted(time, times, side="right") - 1]
             more = _cubics_apart(run, model, given, times) if "index3" in run.settings["integrator"] else None
-            laws.closure(found, bodies, (1e-6 if precise else 1e-3) + 0.3 * tol, rates=precise, more=more)
+            loose = (1e-6 if precise else 1e-3 + _cubic_error(run, bodies, h)) + 0.3 * tol
+            laws.closure(found, bodies, loose, rates=precise, more=more, faster=0.3 * tol / h)
             share = 1e-5 if precise else 0.02 + _unresolved(run, times)
             again = run.settings["between"] == "stages"  # steps are taken again, and end in balance
             stiff = unknown_force(bodies, tol, h, laws.size_of(bodies)) if tol and not again else 0.0
@@ -160,6 +161,17 @@ def between(run: mbd.Trajectory, model: mbd.Model, parameters: Mapping[str, floa
         except NotImplementedError as error:
             return Judgement(tuple(found.found), found.tried, str(error))
     return Judgement(tuple(found.found), found.tried)
+
+
+def _cubic_error(run: mbd.Trajectory, bodies: Bodies, h: Array) -> Array:
+    """How far cubics over steps of h are from the motion, over its size (n,).
+
+    Where bodies turn at ω they are ``(ω h)⁴ / 384`` off their circles; by accelerations that change by Δa, at most
+    ``h² Δa / 64``.
+    """
+    a, k = run.record.a, np.searchsorted(run.time, bodies.told.time, side="right") - 1
+    spin = np.max([np.linalg.norm(bodies.twist(name).angular, axis=1) for name in bodies.placed], axis=0)
+    return np.asarray((spin * h) ** 4 / 384.0 + h**2 * np.max(np.abs(a[k + 1] - a[k]), axis=1) / 64.0)
 
 
 def _cubics_apart(run: mbd.Trajectory, model: mbd.Model, given: dict[str, float], times: Array) -> dict[str, Array]:

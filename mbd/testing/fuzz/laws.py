@@ -50,18 +50,21 @@ def places(found: Faults, bodies: Bodies) -> None:
 def closure(
     found: Faults,
     bodies: Bodies,
-    loose: float = HELD,
+    loose: Any = HELD,
     rates: bool = True,
     told: int = 0,
     more: Mapping[str, Array] | None = None,
+    faster: Any = 0.0,
 ) -> None:
     """Joints that close loops fit: their frames, seen over both branches, differ by the joint's own motion alone.
 
     Parameters
     ----------
-    loose : what places may miss, over the size of the mechanism [-]; rates : whether velocities are held too
+    loose : what places may miss, over the size of the mechanism, a number or (n,) [-]
+    rates : whether velocities are held too
     told : how many instants are next to singular poses, where the run says that they are not
     more : what places may miss besides by joint, (n,) each [m, rad]
+    faster : what velocities may miss besides, over the size of the mechanism, (n,) [1/s]
     """
     size = size_of(bodies)
     for joint in bodies.closing:
@@ -72,7 +75,7 @@ def closure(
         if not rates:
             continue
         motion = np.abs(across.first).max(axis=(1, 2))
-        limit = loose * size * (1.0 + motion)
+        limit = size * (loose * (1.0 + motion) + faster)
         found.small("velocities fit at a joint", joint.name, _parting(gap), limit, told=told)
 
 
