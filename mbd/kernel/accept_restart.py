@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from mbd.kernel.candidate import accept_candidate, revert_candidate
 from mbd.kernel.codes import PULL
-from mbd.kernel.guards import frictions_at, try_step, watch
+from mbd.kernel.guards import try_step, watch
 from mbd.kernel.records import Balance, Guards, Kernel, Reals, Switching
 from mbd.kernel.restart import active_rows, consistent, evaluate, largest_force, stepping_rows
 from mbd.kernel.saddle import correct_velocities, solve_rows
@@ -41,7 +41,7 @@ def put_on_rows(K: Switching, t1: float) -> None:
     if project_velocity(K, t1, K.q1, K.y1, stepping_rows(K), False) == 0:
         watch(K, t1, K.q1, K.y1, K.rate1, K.lam1, K.guards1)
         for f in range(K.n_frictions):
-            K.limit[f] = K.guards1[frictions_at(K) + 2 * K.n_frictions + f]
+            K.limit[f] = K.guards1[K.at_limit + f]
 
 
 def look(K: Kernel, h: float, t1: float) -> int:
@@ -70,14 +70,13 @@ def would_pull(K: Balance) -> bool:
 
 def turns_to_pull(K: Guards) -> bool:
     """Whether a closed penalty contact that pushes with the velocities of the candidate pulls with those in K.y."""
-    place = 2 * K.n_contacts
     looked = False
     for c in range(K.n_contacts):
-        if K.kind[c] == 1 and K.closed[c] == 1 and K.opens[c] == 0 and K.guards0[place + c] >= 0.0:
+        if K.kind[c] == 1 and K.closed[c] == 1 and K.opens[c] == 0 and K.guards0[K.at_force + c] >= 0.0:
             if not looked:
                 watch(K, K.time, K.q, K.y, K.rate, K.lam, K.guards1)
                 looked = True
-            if K.guards1[place + c] < 0.0:
+            if K.guards1[K.at_force + c] < 0.0:
                 return True
     return False
 

@@ -67,7 +67,7 @@ def forget_found(K: Guards) -> None:
     """No guard has been found to be no event yet, but for events that the step passes."""
     K.active[: K.n_contacts + K.n_guards + K.n_frictions] = 0
     for e in range(K.n_guards):
-        K.active[K.n_contacts + e] = 1 if K.crossed[e] >= 0.0 else 0
+        K.active[K.flag_user + e] = 1 if K.crossed[e] >= 0.0 else 0
 
 
 def begin(K: Kernel) -> int:

@@ -98,11 +98,11 @@ def acceleration_of(K: Switching, c: int, h: float) -> float:
         for i in range(K.n):
             K.rate1[i] = K.y1[i] + scale * K.jump[i]
         watch(K, t + h, K.q1, K.rate1, K.rate, K.lam, K.guards1)
-        difference += (1.0 - 2.0 * side) * K.guards1[K.n_contacts + c]
+        difference += (1.0 - 2.0 * side) * K.guards1[K.at_gap_rate + c]
     watch(K, t, K.q, K.y, K.rate, K.lam, K.guards1)
-    rate = abs(K.guards1[K.n_contacts + c])
+    rate = abs(K.guards1[K.at_gap_rate + c])
     watch(K, t + h, K.q1, K.y1, K.rate, K.lam, K.guards1)
-    K.closing_rate[c] = max(rate, abs(K.guards1[K.n_contacts + c]))
+    K.closing_rate[c] = max(rate, abs(K.guards1[K.at_gap_rate + c]))
     return float(difference / scale)
 
 
@@ -110,7 +110,7 @@ def relax_pace(K: Guards) -> None:
     """After a short step: longer ones where the contact rests, or goes on vibrating for long."""
     for c in range(K.n_contacts):
         if K.kind[c] == 1 and K.closed[c] == 1 and 0.0 < K.contact_step[c] < K.dt:
-            K.largest_rate[c] = max(K.largest_rate[c], abs(K.guards0[K.n_contacts + c]))
+            K.largest_rate[c] = max(K.largest_rate[c], abs(K.guards0[K.at_gap_rate + c]))
             K.contact_steps[c] += 1.0
             if K.contact_steps[c] % WINDOW == 0.0:
                 rests = K.largest_rate[c] < RESTS * K.closing_rate[c]

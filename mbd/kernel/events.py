@@ -118,7 +118,7 @@ def handle_event(K: Kernel) -> int:
     if status != 0:
         return status
     for c in range(K.n_contacts):
-        if K.kept_flags[c] == 1 and K.closed[c] == 0 and K.armed[c] != 1 and K.guards0[K.n_contacts + c] < -1e-6:
+        if K.kept_flags[c] == 1 and K.closed[c] == 0 and K.armed[c] != 1 and K.guards0[K.at_gap_rate + c] < -1e-6:
             K.sinking[c] = min(K.sinking[c], K.time)
     return EVENT if is_awaited(K, first) else -1
 

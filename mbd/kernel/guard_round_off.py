@@ -36,28 +36,26 @@ MAGNIFIED = 2.0**20
 
 def guard_round_off(K: Switching, e: int, t: float, q: Reals, y: Reals) -> float:
     """Round-off of user guard e at a state; K.acc and the block are overwritten."""
-    return inherited(K, 4 * K.n_contacts + e, e, t, q, y)
+    return inherited(K, K.at_user + e, e, t, q, y)
 
 
 def condition_round_off(K: Switching, c: int, t: float, q: Reals, y: Reals) -> float:
     """The same of the measure that contact c is watched by."""
-    return inherited(K, 3 * K.n_contacts + c, K.n_guards + c, t, q, y)
+    return inherited(K, K.at_condition + c, K.n_guards + c, t, q, y)
 
 
 def inherited(K: Switching, place: int, term: int, t: float, q: Reals, y: Reals) -> float:
     """Round-off of the guard value at a place, whose terms have another in their program."""
     evaluate(K, t, q, y)
-    o_x = 2 * K.n_watched
-    o_v = o_x + K.n_v
     call(K, TERMS, K.doubt)
     doubt = OWN * EPS * K.doubt[term]
     call(K, GUARDS, K.doubt)
     here = K.doubt[place]
-    doubts_of_state(K, q, y, o_x, o_v)
+    doubts_of_state(K, q, y)
     for i in range(K.n_v):
-        doubt += change_by(K, place, here, K.o_x + i, K.doubt[o_x + i])
+        doubt += change_by(K, place, here, K.o_x + i, K.doubt[K.doubt_x + i])
     for i in range(K.n):
-        doubt += change_by(K, place, here, K.o_v + i, K.doubt[o_v + i])
+        doubt += change_by(K, place, here, K.o_v + i, K.doubt[K.doubt_v + i])
     return float(doubt)
 
 
@@ -70,7 +68,7 @@ def change_by(K: Guards, place: int, here: float, at: int, doubt: float) -> floa
     return float(abs(K.doubt[place] - here) / MAGNIFIED)
 
 
-def doubts_of_state(K: Switching, q: Reals, y: Reals, o_x: int, o_v: int) -> None:
+def doubts_of_state(K: Switching, q: Reals, y: Reals) -> None:
     """Round-off of positions and velocities into K.doubt, with M, B in K.acc."""
     n = K.n
     h = K.step
@@ -82,9 +80,9 @@ def doubts_of_state(K: Switching, q: Reals, y: Reals, o_x: int, o_v: int) -> Non
         mass = abs(K.acc[i * n + i])
         acceleration = K.scale[i] / mass if mass > 0.0 else 0.0
         fastest = max(fastest, acceleration)
-        K.doubt[o_v + i] = OWN * EPS * abs(y[i]) + LASTING * EPS * h * acceleration
+        K.doubt[K.doubt_v + i] = OWN * EPS * abs(y[i]) + LASTING * EPS * h * acceleration
     for i in range(K.n_v):
-        K.doubt[o_x + i] = OWN * EPS * (abs(q[i]) if K.vector == 1 else largest)
+        K.doubt[K.doubt_x + i] = OWN * EPS * (abs(q[i]) if K.vector == 1 else largest)
     o_B = K.acc_B
     loose = K.tolerance / (ROUGH * EPS) * h * h * fastest
     for k in range(K.n_rows):
@@ -95,13 +93,13 @@ def doubts_of_state(K: Switching, q: Reals, y: Reals, o_x: int, o_v: int) -> Non
             size += K.acc[o_B + k * n + j] * K.acc[o_B + k * n + j] * lightness(K, j)
         for i in range(K.n_v):
             share = EPS * ROUGH * abs(K.acc[o_B + k * n + i]) * lightness(K, i) / (size + 1e-300)
-            K.doubt[o_v + i] += share * K.scale[n + K.n_rows + k]
+            K.doubt[K.doubt_v + i] += share * K.scale[n + K.n_rows + k]
             if K.row_level[k] == 0:
-                K.doubt[o_x + i] += share * K.scale[n + k]
+                K.doubt[K.doubt_x + i] += share * K.scale[n + k]
                 if K.stabilized == 0:
-                    K.doubt[o_v + i] += share * (K.scale[n + k] + loose) / h
+                    K.doubt[K.doubt_v + i] += share * (K.scale[n + k] + loose) / h
     for i in range(K.n_v):
-        K.doubt[o_x + i] += h * K.doubt[o_v + i]
+        K.doubt[K.doubt_x + i] += h * K.doubt[K.doubt_v + i]
 
 
 def lightness(K: Model, i: int) -> float:

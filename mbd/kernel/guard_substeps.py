@@ -88,22 +88,20 @@ def needs_multipliers(K: Contacts) -> bool:
 
 def look_at(K: Switching, t: float, h: float, s: float, asked: bool) -> None:
     """Guards (and multipliers) of the interpolant at the part s of the step, in place of those of the candidate."""
-    place = 2 * K.n_watched + 2 * K.n_rows
-    o_y = place + K.n_q
     u = s * s
     fill_block(K, t, K.q, K.y)
     for i in range(K.n):
         y0 = K.y[i]
-        y1 = K.inside[o_y + i]
+        y1 = K.inside[K.inside_y + i]
         d0 = h * K.rate[i]
-        d1 = h * K.inside[o_y + K.n + i]
+        d1 = h * K.inside[K.inside_rate + i]
         gap = 0.0  # of the position at the end, which the integral of the cubic misses
         if i < K.n_v:
             if K.vector == 0:
                 y1 = K.chart_end[K.n_v + i]
                 d1 = h * K.chart_end[2 * K.n_v + i]
             whole = 0.5 * (y0 + y1) + (d0 - d1) / 12.0
-            end = K.inside[place + i] - K.q[i] if K.vector == 1 else K.chart_end[i]
+            end = K.inside[K.inside_q + i] - K.q[i] if K.vector == 1 else K.chart_end[i]
             size = abs(K.q[i]) if K.vector == 1 else 1.0
             gap = end - h * whole
             if abs(gap) <= FINEST * EPS * size:  # round-off over h would be a velocity
@@ -139,5 +137,5 @@ def rearms(K: Switching, t: float) -> bool:
             return True
     back = False
     for e in range(K.n_guards):
-        back = back or goes_back(K, e, K.guards1[4 * K.n_contacts + e], t, K.q1, K.y1)
+        back = back or goes_back(K, e, K.guards1[K.at_user + e], t, K.q1, K.y1)
     return back

@@ -39,7 +39,6 @@ from mbd.kernel.records import (
     Mechanism,
     Model,
     Reals,
-    Sizes,
     Switching,
 )
 from mbd.kernel.restart import (
@@ -54,7 +53,7 @@ from mbd.kernel.restart import (
 )
 
 __all__ = [
-    "frictions_at", "gap_scale", "gap_tolerance", "goes_back", "guard_value", "is_watched", "judge", "try_step",
+    "gap_scale", "gap_tolerance", "goes_back", "guard_value", "is_watched", "judge", "try_step",
     "update_armed", "update_sides", "watch",
 ]  # fmt: skip
 
@@ -111,7 +110,7 @@ def try_step(K: Kernel, h: float, t1: float) -> int:
             K.failure_time = t1
             return NOT_FINITE
         for f in range(K.n_frictions):
-            K.limit[f] = K.guards1[frictions_at(K) + 2 * K.n_frictions + f]
+            K.limit[f] = K.guards1[K.at_limit + f]
             if K.slip[f] != 0.0:
                 K.lam1[K.friction_row[f]] = K.slip[f] * K.limit[f]
     return 0
@@ -168,18 +167,13 @@ def departs(K: DependentRows) -> bool:
     return False
 
 
-def frictions_at(K: Sizes) -> int:
-    """Where the sliding velocities begin among the guard values; their rates and the limits follow."""
-    return int(4 * K.n_contacts + 2 * K.n_guards)
-
-
 def is_watched(K: Contacts, c: int, values: Reals) -> bool:
     """Whether an open contact may close."""
     if K.while_kind[c] == 0:
         return True
     if K.while_kind[c] == 1:
         return bool(K.closed[K.while_target[c]] == 1)
-    return bool(values[3 * K.n_contacts + c] > 0.0)
+    return bool(values[K.at_condition + c] > 0.0)
 
 
 def gap_scale(K: ContactRows, c: int) -> float:
@@ -213,7 +207,7 @@ def update_armed(K: Guards) -> None:
                 K.armed[c] = -1
             elif K.armed[c] == -1:
                 near = 1e-10 * gap_scale(K, c)
-                sinks = K.while_kind[c] == 2 and K.guards0[K.n_contacts + c] < -1e-9
+                sinks = K.while_kind[c] == 2 and K.guards0[K.at_gap_rate + c] < -1e-9
                 K.armed[c] = 1 if K.guards0[c] > near or (K.guards0[c] >= -near and not sinks) else 0
             elif K.armed[c] == 0 and K.guards0[c] > 1e-8 * gap_scale(K, c):
                 K.armed[c] = 1
@@ -225,7 +219,7 @@ def update_sides(K: Switching) -> None:
     One that started at rest on its surface (side 0) is on the side to which it has moved.
     """
     for e in range(K.n_guards):
-        value = K.guards0[4 * K.n_contacts + e]
+        value = K.guards0[K.at_user + e]
         if K.side[e] == 0.0 and value != 0.0 and abs(value) > guard_round_off(K, e, K.time, K.q, K.y):
             K.side[e] = 1.0 if value > 0.0 else -1.0
         if goes_back(K, e, value, K.time, K.q, K.y):
@@ -251,36 +245,34 @@ def is_quiet(K: Guards) -> bool:
     """Whether no guard can have fired: every contact open, armed, always watched and clearly apart."""
     if K.n_guards + K.n_frictions > 0:
         return False
-    nC = K.n_contacts
-    for c in range(nC):
+    for c in range(K.n_contacts):
         if K.closed[c] != 0 or K.armed[c] != 1 or K.while_kind[c] != 0:
             return False
         if not (K.guards0[c] > APART and K.guards1[c] > APART):
             return False
-        if K.guards0[nC + c] < 0.0 < K.guards1[nC + c]:
+        if K.guards0[K.at_gap_rate + c] < 0.0 < K.guards1[K.at_gap_rate + c]:
             return False
     return True
 
 
 def judge(K: Switching, h: float) -> bool:
     """Whether a guard fired between the accepted state and the candidate; the earliest in K.fired, K.pick."""
-    nC = K.n_contacts
     K.event_kind = -1
     K.event_place = 2.0
-    for c in range(nC):
+    for c in range(K.n_contacts):
         if K.active[c] == 1 or (K.strategy == 1 and K.kind[c] == 0):  # found to be no event, or not located
             continue
         g0 = K.guards0[c]
         g1 = K.guards1[c]
-        d0 = K.guards0[nC + c] * h
-        d1 = K.guards1[nC + c] * h
+        d0 = K.guards0[K.at_gap_rate + c] * h
+        d1 = K.guards1[K.at_gap_rate + c] * h
         tiny = gap_tolerance(K, c)
         if K.closed[c] == 0:
             if begins_to_be_watched(K, c, h):
-                consider(K, WATCH, c, crossing(K.guards0[3 * nC + c], K.guards1[3 * nC + c]), 0.0)
+                consider(K, WATCH, c, crossing(K.guards0[K.at_condition + c], K.guards1[K.at_condition + c]), 0.0)
                 continue
-            if K.armed[c] == 2 and g1 < 0.0 and K.guards1[2 * nC + c] > 0.0:
-                consider(K, PRESS, c, crossing(K.guards0[2 * nC + c], K.guards1[2 * nC + c]), 0.0)
+            if K.armed[c] == 2 and g1 < 0.0 and K.guards1[K.at_force + c] > 0.0:
+                consider(K, PRESS, c, crossing(K.guards0[K.at_force + c], K.guards1[K.at_force + c]), 0.0)
             if K.armed[c] != 1 or not is_watched(K, c, K.guards0):
                 continue
             if g1 < -tiny:
@@ -309,8 +301,10 @@ def judge(K: Switching, h: float) -> bool:
             if K.opens[c] == 1:
                 if g1 > tiny:
                     consider(K, OPEN_GAP, c, low + (1.0 - low) * crossing(hermite(g0, g1, d0, d1, low), g1), low)
-            elif K.guards1[2 * nC + c] < 0.0:
-                consider(K, OPEN_FORCE, c, max(low, crossing(K.guards0[2 * nC + c], K.guards1[2 * nC + c])), low)
+            elif K.guards1[K.at_force + c] < 0.0:
+                consider(
+                    K, OPEN_FORCE, c, max(low, crossing(K.guards0[K.at_force + c], K.guards1[K.at_force + c])), low
+                )
     for e in range(K.n_guards):
         judge_user(K, e, h)
     if K.strategy == 0:
@@ -321,7 +315,7 @@ def judge(K: Switching, h: float) -> bool:
 
 def begins_to_be_watched(K: Switching, c: int, h: float) -> bool:
     """Whether the measure that contact c is watched by has risen through zero, by more than its round-off."""
-    place = 3 * K.n_contacts + c
+    place = K.at_condition + c
     if K.while_kind[c] != 2 or not K.guards0[place] <= 0.0 < K.guards1[place]:
         return False
     return bool(K.guards1[place] > condition_round_off(K, c, K.time + h, K.q1, K.y1))
@@ -332,16 +326,15 @@ def judge_user(K: Switching, e: int, h: float) -> None:
 
     A sign that has changed by no more than round-off is no crossing: it is judged again after the next step.
     """
-    place = 4 * K.n_contacts + e
     side = K.side[e]
-    v0 = side * K.guards0[place]
-    v1 = side * K.guards1[place]
-    if K.active[K.n_contacts + e] == 1 or v1 >= 0.0 or K.direction[e] * side > 0.0:
+    v0 = side * K.guards0[K.at_user + e]
+    v1 = side * K.guards1[K.at_user + e]
+    if K.active[K.flag_user + e] == 1 or v1 >= 0.0 or K.direction[e] * side > 0.0:
         return
     if -v1 <= guard_round_off(K, e, K.time + h, K.q1, K.y1):
         return
-    d0 = side * K.guards0[place + K.n_guards] * h
-    d1 = side * K.guards1[place + K.n_guards] * h
+    d0 = side * K.guards0[K.at_user_rate + e] * h
+    d1 = side * K.guards1[K.at_user_rate + e] * h
     top = hermite_turn(v0, v1, d0, d1, True) if d0 > 0.0 else -1.0
     if top > 0.0:
         consider(K, CROSS, e, top + (1.0 - top) * crossing(max(hermite(v0, v1, d0, d1, top), 0.0), v1), top)
@@ -369,26 +362,24 @@ def is_doubtful(K: Model, force: float) -> bool:
 
 def judge_friction(K: Switching, f: int, h: float) -> None:
     """Whether a friction that slides comes to rest, or one that sticks is pulled beyond its limit."""
-    place = frictions_at(K) + f
-    nF = K.n_frictions
-    if K.active[K.n_contacts + K.n_guards + f] == 1:
+    if K.active[K.flag_friction + f] == 1:
         return
     if K.sticks[f] == 1:
         row = K.friction_row[f]
-        m0 = K.guards0[place + 2 * nF] - abs(K.lam[row])
-        m1 = K.guards1[place + 2 * nF] - abs(K.lam1[row])
+        m0 = K.guards0[K.at_limit + f] - abs(K.lam[row])
+        m1 = K.guards1[K.at_limit + f] - abs(K.lam1[row])
         if is_doubtful(K, m1):
             m1 = margin(K, f, K.time + h)
         if m1 < -1e-12 * abs(K.lam1[row]):
             consider(K, SLIP, f, crossing(max(m0, 0.0), m1), 0.0)
         return
     s = K.slip[f]
-    v0 = s * K.guards0[place]
-    v1 = s * K.guards1[place]
+    v0 = s * K.guards0[K.at_slip + f]
+    v1 = s * K.guards1[K.at_slip + f]
     if s == 0.0:
         return
-    d0 = s * K.guards0[place + nF] * h
-    d1 = s * K.guards1[place + nF] * h
+    d0 = s * K.guards0[K.at_slip_rate + f] * h
+    d1 = s * K.guards1[K.at_slip_rate + f] * h
     tiny = REST * max(K.scale[K.n + K.n_rows + K.friction_row[f]], 1e-3)
     if v1 < -tiny:
         top = hermite_turn(v0, v1, d0, d1, True) if d0 > 0.0 else -1.0
@@ -408,7 +399,7 @@ def margin(K: Switching, f: int, t1: float) -> float:
     """What is left of a sticking friction at the candidate, limit − |λ_T| of consistent multipliers."""
     row = K.friction_row[f]
     if consistent(K, t1, K.q1, K.y1) != 0:
-        return float(K.guards1[frictions_at(K) + 2 * K.n_frictions + f] - abs(K.lam1[row]))
+        return float(K.guards1[K.at_limit + f] - abs(K.lam1[row]))
     K.loads[: K.n_rows] = K.impulse[: K.n_rows]
     evaluate_loaded(K, K.loads)
     return float(limit_of(K, f) - abs(K.impulse[row]))
@@ -416,22 +407,21 @@ def margin(K: Switching, f: int, t1: float) -> float:
 
 def guard_value(K: Switching, kind: int, index: int, t1: float) -> float:
     """The fired guard at the candidate, counted so that it is ≥ 0 before and < 0 after its event."""
-    nC = K.n_contacts
     if kind == CLOSE:
         return float(K.guards1[index])
     if kind == OPEN_GAP:
         return float(-K.guards1[index])
     if kind == OPEN_FORCE:
-        return float(K.guards1[2 * nC + index])
+        return float(K.guards1[K.at_force + index])
     if kind == PRESS:
-        return float(-K.guards1[2 * nC + index])
+        return float(-K.guards1[K.at_force + index])
     if kind == WATCH:
-        condition = float(K.guards1[3 * nC + index])
+        condition = float(K.guards1[K.at_condition + index])
         return -condition if condition != 0.0 else 1e-300  # watched only above zero
     if kind == CROSS:
-        return float(K.side[index] * K.guards1[4 * nC + index])
+        return float(K.side[index] * K.guards1[K.at_user + index])
     if kind == STICK:
-        return float(K.slip[index] * K.guards1[frictions_at(K) + index])
+        return float(K.slip[index] * K.guards1[K.at_slip + index])
     if kind == SLIP:
         return margin(K, index, t1)
     if consistent(K, t1, K.q1, K.y1) != 0:

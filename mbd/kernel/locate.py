@@ -16,7 +16,7 @@ from mbd.kernel.codes import (
     STICK_BRIEF,
     WATCH,
 )
-from mbd.kernel.guards import frictions_at, gap_tolerance, guard_value, is_watched, judge, try_step
+from mbd.kernel.guards import gap_tolerance, guard_value, is_watched, judge, try_step
 from mbd.kernel.hermite import first_guess
 from mbd.kernel.records import Events, Guards, Kernel, Switching
 from mbd.kernel.refine import refine
@@ -35,11 +35,10 @@ def dip(K: Kernel, h: float) -> int:
     """Step to the lowest point of a grazing gap; a real dip becomes a closing, else the guard keeps quiet."""
     t = K.time
     c = K.event_index
-    nC = K.n_contacts
     low = 0.0
     high = h
-    rate_low = K.guards0[nC + c]
-    rate_high = K.guards1[nC + c]
+    rate_low = K.guards0[K.at_gap_rate + c]
+    rate_high = K.guards1[K.at_gap_rate + c]
     place = K.event_place * h
     for _ in range(30):
         status = try_step(K, place, t + place)
@@ -50,7 +49,7 @@ def dip(K: Kernel, h: float) -> int:
             K.event_place = place
             K.event_low = 0.0
             return 0
-        rate = K.guards1[nC + c]
+        rate = K.guards1[K.at_gap_rate + c]
         if rate == 0.0 or high - low < 1e-7 * h:
             break
         if rate < 0.0:
@@ -140,9 +139,9 @@ def another_before(K: Switching, kind: int, index: int, found: float) -> bool:
     """Whether another guard fired before this one, which is at round-off and may look fired itself."""
     place = index
     if kind == CROSS:
-        place += K.n_contacts
+        place += K.flag_user
     elif kind == STICK or kind == SLIP:
-        place += K.n_contacts + K.n_guards
+        place += K.flag_friction
     quiet = K.active[place]
     K.active[place] = 1
     other = judge(K, found) and K.event_place < 1.0 - SAME
@@ -184,7 +183,7 @@ def left_alone(K: Guards, c: int) -> bool:
         return True
     if K.while_kind[c] != 2:
         return False
-    place = 3 * K.n_contacts + c
+    place = K.at_condition + c
     change = abs(K.guards0[place] - K.guards1[place])
     fall = abs(K.guards0[c] - K.guards1[c])
     apart = SAME * K.step / K.event_after + gap_tolerance(K, c) / (fall + 1e-300)  # of the way here, at most
@@ -194,13 +193,13 @@ def left_alone(K: Guards, c: int) -> bool:
 def guard_rate(K: Guards, kind: int, index: int) -> float:
     """Rate of `guard_value` at the candidate; 0 where it is not known."""
     if kind == CLOSE:
-        return float(K.guards1[K.n_contacts + index])
+        return float(K.guards1[K.at_gap_rate + index])
     if kind == OPEN_GAP:
-        return float(-K.guards1[K.n_contacts + index])
+        return float(-K.guards1[K.at_gap_rate + index])
     if kind == CROSS:
-        return float(K.side[index] * K.guards1[4 * K.n_contacts + K.n_guards + index])
+        return float(K.side[index] * K.guards1[K.at_user_rate + index])
     if kind == STICK:
-        return float(K.slip[index] * K.guards1[frictions_at(K) + K.n_frictions + index])
+        return float(K.slip[index] * K.guards1[K.at_slip_rate + index])
     return 0.0
 
 
@@ -232,10 +231,10 @@ def bracket(K: Kernel, kind: int, index: int, low: float, high: float) -> int:
             K.active[index] = 1
             K.event_kind = -1
         elif kind == STICK or kind == SLIP:
-            K.active[K.n_contacts + K.n_guards + index] = 1
+            K.active[K.flag_friction + index] = 1
             K.event_kind = -1
         elif kind == CROSS:  # with velocities on the rows it has not crossed yet
-            K.active[K.n_contacts + index] = 1
+            K.active[K.flag_user + index] = 1
             K.event_kind = -1
         K.event_after = high
         return 0
@@ -255,7 +254,7 @@ def bracket(K: Kernel, kind: int, index: int, low: float, high: float) -> int:
             look_at_start(K)
         f_low = guard_value(K, kind, index, t + low)
     if f_low <= 0.0:
-        if (kind == OPEN_GAP or kind == OPEN_FORCE) and K.guards0[K.n_contacts + index] < 0.0:
+        if (kind == OPEN_GAP or kind == OPEN_FORCE) and K.guards0[K.at_gap_rate + index] < 0.0:
             K.event_after = high  # a touch too short to be seen within the step: it is over at its end
             return look(K, high, t + high)
         if low > 0.0 and kind != CROSS:

@@ -100,5 +100,5 @@ def polish_with_rows(K: Balance, m: int) -> None:
 def find_imbalance(K: Balance) -> None:
     """r of the mode at the state in the block, with the rates in K.jump, into K.out."""
     K.block[K.o_a : K.o_a + K.n] = K.jump[: K.n]
-    call(K, K.mode_code[4 * K.mode_id + 1], K.out)
+    call(K, K.residual_program, K.out)
     K.n_residuals += 1

@@ -18,7 +18,7 @@ from mbd.kernel.candidate import accept_candidate, carry
 from mbd.kernel.codes import LOG_OPENED, NO_IMPACT, PULL
 from mbd.kernel.complementarity import complementarity
 from mbd.kernel.contact_modes import NO_IMPULSE, STILL, log_event
-from mbd.kernel.guards import frictions_at, gap_scale, gap_tolerance, is_watched, watch
+from mbd.kernel.guards import gap_scale, gap_tolerance, is_watched, watch
 from mbd.kernel.records import Balance, ContactForces, Guards, Switching
 from mbd.kernel.restart import consistent, displace, evaluate, largest_force
 from mbd.kernel.switching import close_by_impact, mark_touching
@@ -46,7 +46,6 @@ def must_release(K: Switching, t1: float) -> int:
             K.armed[c] = 1
             count += 1
             log_event(K, LOG_OPENED, c, 0.0, NO_IMPULSE)
-    limits = frictions_at(K) + 2 * K.n_frictions
     for f in range(K.n_frictions):
         c = K.friction_contact[f]
         if c >= 0 and K.closed[c] == 0:
@@ -56,7 +55,7 @@ def must_release(K: Switching, t1: float) -> int:
         pull = K.lam1[K.friction_row[f]]
         if K.n_repeats == 0:
             K.let_go[f] = 0
-        if K.sticks[f] == 1 and abs(pull) - K.guards1[limits + f] > PULL * force:
+        if K.sticks[f] == 1 and abs(pull) - K.guards1[K.at_limit + f] > PULL * force:
             K.sticks[f] = 0
             K.slip[f] = 1.0 if pull > 0.0 else -1.0
             K.let_go[f] = 1
@@ -92,7 +91,7 @@ def closes_below_surface(K: Guards) -> bool:
                 found = True
     for f in range(K.n_frictions):
         if K.slip[f] != 0.0:
-            turned = -K.slip[f] * K.guards1[frictions_at(K) + f]
+            turned = -K.slip[f] * K.guards1[K.at_slip + f]
             if turned > STILL:
                 found = True
     return found
@@ -161,8 +160,7 @@ def project_gaps_once(K: Balance) -> int:
 
 def strike(K: Switching, h: float, t1: float) -> int:
     """The candidate becomes the accepted state, lifted out of the surfaces."""
-    nC = K.n_contacts
-    K.before[:nC] = K.guards0[nC : nC + nC]
+    K.before[: K.n_contacts] = K.guards0[K.at_gap_rate : K.at_gap_rate + K.n_contacts]
     accept_candidate(K, t1)
     status = project_gaps(K)
     if status != 0:
@@ -175,9 +173,8 @@ def strike(K: Switching, h: float, t1: float) -> int:
 
 def rebound(K: Switching) -> int:
     """The impact of a step, after `strike`; where all that come down rest, none of the closed contacts leaves."""
-    nC = K.n_contacts
     fastest = 0.0
-    for c in range(nC):
+    for c in range(K.n_contacts):
         if K.kind[c] != 0 or K.closed[c] == 1:
             K.closing[c] = 0
             continue
@@ -186,11 +183,13 @@ def rebound(K: Switching) -> int:
         K.closing[c] = 1 if (near and ready) else 0
         if K.closing[c] == 1:
             approach = max(-K.before[c], 0.0)
-            gained = abs(K.guards0[nC + c] - K.before[c])
+            gained = abs(K.guards0[K.at_gap_rate + c] - K.before[c])
             if approach < RESTING * gained:
                 K.before[c] = 0.0  # it rests
             else:
-                K.before[c] = max(K.before[c], min(K.guards0[nC + c], 0.0))  # the slower one: it gains no energy
+                K.before[c] = max(
+                    K.before[c], min(K.guards0[K.at_gap_rate + c], 0.0)
+                )  # the slower one: it gains no energy
                 fastest = max(fastest, approach)
     status = close_by_impact(K, fastest)
     if status == 0:

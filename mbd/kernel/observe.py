@@ -51,9 +51,9 @@ def is_awaited(K: Switching, first: int) -> bool:
         index = int(K.log[line * K.event_width + 2])
         kind = int(K.log[line * K.event_width + 1])
         if kind == LOG_EVENT:
-            index += K.n_contacts
+            index += K.flag_user
         elif kind == LOG_STUCK or kind == LOG_SLIPPED:
-            index += K.n_contacts + K.n_guards
+            index += K.flag_friction
         if K.notify[index] == 1:
             return True
     return False

@@ -31,16 +31,15 @@ def gather_closing(K: Guards) -> float:
     Contacts that touch and approach close together with the fired one, whatever their order; those that touch and
     rest (2) take part in its impact, where impacts follow each other without end also those that leave.
     """
-    nC = K.n_contacts
     fastest = 0.0
-    for c in range(nC):
+    for c in range(K.n_contacts):
         K.closing[c] = 0
         if K.closed[c] == 1:
             continue
         fired = K.event_kind == CLOSE and K.event_index == c
         near = abs(K.guards0[c]) <= 1e-10 * gap_scale(K, c)
         ready = K.armed[c] == 1 and is_watched(K, c, K.guards0)
-        approach = -K.guards0[nC + c]
+        approach = -K.guards0[K.at_gap_rate + c]
         if fired or (near and ready and K.kind[c] == 0 and approach > STILL):
             K.closing[c] = 1
             if K.kind[c] == 0:

@@ -400,8 +400,19 @@ def _power(left: tree.Expression, right: tree.Expression) -> tree.Operation:
 
 
 def _formula(name: str, record: ast.expr) -> ast.expr:
-    """The expression that a property of the records returns, of the fields of `record`."""
-    parsed = ast.parse(dedent(inspect.getsource(TABLE.formulas[name])))
-    own = next(node for node in ast.walk(parsed) if isinstance(node, ast.Return)).value
-    assert own is not None
-    return ast.parse(re.sub(r"\bself\b", ast.unparse(record), ast.unparse(own)), mode="eval").body
+    """The expression of a formula, of the fields of `record`."""
+    (given,), body = _formulas(TABLE.formulas[name])[name]
+    return ast.parse(re.sub(rf"\b{given}\b", ast.unparse(record), body), mode="eval").body
+
+
+@lru_cache(maxsize=64)
+def _formulas(record: type[Any]) -> dict[str, tuple[list[str], str]]:
+    """Arguments and bodies of the formulas that a record declares, by name."""
+    (owner,) = ast.parse(dedent(inspect.getsource(record))).body
+    assert isinstance(owner, ast.ClassDef)
+    return {
+        ast.unparse(line.target): ([each.arg for each in call.args[0].args.args], ast.unparse(call.args[0].body))
+        for line in owner.body
+        if isinstance(line, ast.AnnAssign) and isinstance(call := line.value, ast.Call)
+        if call.args and isinstance(call.args[0], ast.Lambda)
+    }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mbd.kernel.records.declare import Integers, Reals, integers, place, reals
+from mbd.kernel.records.declare import Integers, Reals, formula, integers, place, reals
 from mbd.kernel.records.settings import SchemeAbilities
 from mbd.kernel.records.state import Model, Motion
 
@@ -88,6 +88,12 @@ class Events(SchemeAbilities):
     fallback: int = place("state")  # 1: non-smooth steps followed as impacts crowded, 2: as locating could not go on
     fallback_time: float = place("clock")  # since when
     restarted_here: int = place("state")  # 1: at the accepted state, as a contact seemed to pull in the step
+
+    inside_q: int = formula(lambda s: 2 * s.n_watched + 2 * s.n_rows)  # where q, (v, z), rates of the candidate begin
+    inside_y: int = formula(lambda s: s.inside_q + s.n_q)
+    inside_rate: int = formula(lambda s: s.inside_y + s.n)
+    doubt_x: int = formula(lambda s: 2 * s.n_watched)  # where round-off of positions begins in `doubt`, of velocities
+    doubt_v: int = formula(lambda s: s.doubt_x + s.n_v)
 
 
 class ContactRows(Frictions, Model):

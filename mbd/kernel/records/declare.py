@@ -1,7 +1,7 @@
 """How the records of the kernel are declared: numbers, flat arrays with their lengths, and places in arrays.
 
 A record is a class with annotated fields: ``n: int`` and ``dt: float`` are numbers, `reals` and `integers` are flat
-arrays, `place` is one number in an array. A property is a formula of other fields. Machine code knows a field by its
+arrays, `place` is one number in an array, `formula` one that follows from others. Machine code knows a field by its
 address (see `mbd.kernel.build`), interpreted code as an attribute.
 """
 
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from mbd.errors import nearest
 
-__all__ = ["Integers", "Place", "Reals", "Record", "Table", "integers", "place", "reals"]
+__all__ = ["Integers", "Place", "Reals", "Record", "Table", "formula", "integers", "place", "reals"]
 
 Reals: TypeAlias = NDArray[np.float64]
 """A flat array of float64."""
@@ -43,6 +43,16 @@ class Place:
         getattr(record, self.array)[self.index] = value
 
 
+class Formula:
+    """A number that follows from other fields of its record."""
+
+    def __init__(self, value: Callable[[Any], int]) -> None:
+        self.value = value
+
+    def __get__(self, record: Any, owner: Any = None) -> Any:
+        return self if record is None else self.value(record)
+
+
 def reals(length: Callable[[Any], int] | None = None, kept: bool = False) -> Any:
     """Declare an array of reals; `kept`: restored before a step, it helps to make the step the same to the bit."""
     return Array(length, kept)
@@ -56,6 +66,11 @@ def integers(length: Callable[[Any], int] | None = None, kept: bool = False) -> 
 def place(array: str) -> Any:
     """Declare a number that lies in an array; places of an array follow each other as they are declared."""
     return Place(array)
+
+
+def formula(value: Callable[[Any], int]) -> Any:
+    """Declare a number that follows from other fields: an offset, or a number read from an array."""
+    return Formula(value)
 
 
 class Record:
@@ -93,7 +108,7 @@ class Table:
     ----------
     integers, reals, real_arrays, integer_arrays : names of the fields with an address; addresses : all of them in order
     kept_reals, kept_integers : names of the arrays that the next step depends on
-    places : array and index of each number that lies in one; formulas : properties
+    places : array and index of each number that lies in one; formulas : records that declare them
     kinds : 'int', 'real', 'ints' or 'reals' of all of these but the formulas
     """
 
@@ -108,15 +123,17 @@ class Table:
             for name, annotation in vars(owner).get("__annotations__", {}).items():
                 if annotation not in kinds:
                     continue
-                self.kinds[name] = kinds[annotation]
                 declared = vars(owner).get(name)
+                if isinstance(declared, Formula):
+                    self.formulas[name] = owner
+                    continue
+                self.kinds[name] = kinds[annotation]
                 if isinstance(declared, Array):
                     self._arrays[name] = declared
                 elif isinstance(declared, Place):
                     declared.index = self.length_of(declared.array)
                     self._counts[declared.array] = declared.index + 1
                     self.places[name] = declared.array, declared.index
-            self.formulas |= {name: found.fget for name, found in vars(owner).items() if isinstance(found, property)}
         own = [name for name in self.kinds if name not in self.places]
         self.integers, self.reals, self.real_arrays, self.integer_arrays = (
             tuple(name for name in own if self.kinds[name] == kind) for kind in ("int", "real", "reals", "ints")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mbd.kernel.records.declare import Reals, Record, reals
+from mbd.kernel.records.declare import Reals, Record, formula, reals
 
 __all__ = ["SchemeAbilities", "Settings", "Sizes"]
 
@@ -32,61 +32,37 @@ class Sizes(Record):
     event_width: int
     event_capacity: int
 
-    @property
-    def n_kkt(self) -> int:
-        """Unknowns of balance and rows together."""
-        return self.n + self.n_rows
-
-    @property
-    def n_lcp(self) -> int:
-        """Unknowns of the linear complementarity problem."""
-        return self.n_contacts + 3 * self.n_frictions
-
-    @property
-    def n_tangent(self) -> int:
-        """Numbers that the programs of a mode write at most."""
-        beside = self.n + 2 * self.n_rows + self.n_rows * self.n
-        return self.n_kkt * self.n_kkt + 3 * beside + 2 * self.n_kkt + 2
-
-    @property
-    def acc_f(self) -> int:
-        """Where f begins in acc, behind M (n, n); R (n, n_rows), B (n_rows, n), h and what is below follow."""
-        return self.n * self.n
-
-    @property
-    def acc_R(self) -> int:
-        """Where R = ∂r/∂λ begins."""
-        return self.n * self.n + self.n
-
-    @property
-    def acc_B(self) -> int:
-        """Where B = ∂ḣ/∂v begins."""
-        return self.n * self.n + self.n + self.n * self.n_rows
-
-    @property
-    def acc_h(self) -> int:
-        """Where h begins."""
-        return self.n * self.n + self.n + 2 * self.n * self.n_rows
-
-    @property
-    def acc_rate(self) -> int:
-        """Where ḣ begins."""
-        return self.n * self.n + self.n + 2 * self.n * self.n_rows + self.n_rows
-
-    @property
-    def acc_bias(self) -> int:
-        """Where γ begins, the part of ḧ without accelerations."""
-        return self.n * self.n + self.n + 2 * self.n * self.n_rows + 2 * self.n_rows
-
-    @property
-    def acc_captured(self) -> int:
-        """Where the anchors begin that contacts would hold."""
-        return self.n * self.n + self.n + 2 * self.n * self.n_rows + 3 * self.n_rows
-
-    @property
-    def acc_limit(self) -> int:
-        """Where the largest frictions begin, behind the kinetic energy."""
-        return self.n * self.n + self.n + 2 * self.n * self.n_rows + 3 * self.n_rows + self.n_anchors + 1
+    n_kkt: int = formula(lambda s: s.n + s.n_rows)  # unknowns of balance and rows together
+    n_lcp: int = formula(lambda s: s.n_contacts + 3 * s.n_frictions)  # unknowns of the linear complementarity problem
+    n_tangent: int = formula(
+        lambda s: s.n_kkt * s.n_kkt + 3 * (s.n + 2 * s.n_rows + s.n_rows * s.n) + 2 * s.n_kkt + 2
+    )  # numbers that the programs of a mode write at most
+    acc_f: int = formula(
+        lambda s: s.n * s.n
+    )  # where f begins in acc, behind M (n, n); R (n, n_rows), B (n_rows, n), h and what is below follow
+    acc_R: int = formula(lambda s: s.n * s.n + s.n)  # where R = ∂r/∂λ begins
+    acc_B: int = formula(lambda s: s.n * s.n + s.n + s.n * s.n_rows)  # where B = ∂ḣ/∂v begins
+    acc_h: int = formula(lambda s: s.n * s.n + s.n + 2 * s.n * s.n_rows)  # where h begins
+    acc_rate: int = formula(lambda s: s.n * s.n + s.n + 2 * s.n * s.n_rows + s.n_rows)  # where ḣ begins
+    acc_bias: int = formula(
+        lambda s: s.n * s.n + s.n + 2 * s.n * s.n_rows + 2 * s.n_rows
+    )  # where γ begins, the part of ḧ without accelerations
+    acc_captured: int = formula(
+        lambda s: s.n * s.n + s.n + 2 * s.n * s.n_rows + 3 * s.n_rows
+    )  # where the anchors begin that contacts would hold
+    acc_limit: int = formula(
+        lambda s: s.n * s.n + s.n + 2 * s.n * s.n_rows + 3 * s.n_rows + s.n_anchors + 1
+    )  # where the largest frictions begin, behind the kinetic energy
+    at_gap_rate: int = formula(lambda s: s.n_contacts)  # where gap rates begin among guard values, behind the gaps
+    at_force: int = formula(lambda s: 2 * s.n_contacts)  # forces of penalty contacts
+    at_condition: int = formula(lambda s: 3 * s.n_contacts)  # measures by which contacts are watched
+    at_user: int = formula(lambda s: 4 * s.n_contacts)  # guards of the user
+    at_user_rate: int = formula(lambda s: s.at_user + s.n_guards)
+    at_slip: int = formula(lambda s: s.at_user + 2 * s.n_guards)  # sliding velocities of frictions
+    at_slip_rate: int = formula(lambda s: s.at_slip + s.n_frictions)
+    at_limit: int = formula(lambda s: s.at_slip + 2 * s.n_frictions)  # largest frictions
+    flag_user: int = formula(lambda s: s.n_contacts)  # where guards of the user begin among flags, behind contacts
+    flag_friction: int = formula(lambda s: s.n_contacts + s.n_guards)  # frictions
 
 
 class Settings(Sizes):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from mbd.kernel.records.declare import Integers, Reals, integers, place, reals
+from mbd.kernel.records.declare import Integers, Reals, formula, integers, place, reals
 from mbd.kernel.records.settings import SchemeAbilities
 
 __all__ = ["Memory", "Model", "Motion", "State"]
@@ -52,6 +52,11 @@ class Model(SchemeAbilities):
     order_start: int = place("state")  # where the order of the factors in kkt begins, 0 if pivots were searched for
     scales_raised: int = place("state")  # 1: magnitudes were raised far above those of the accepted state
     uneven_masses: int = place("state")  # 1: they differ so much that the balance corrects accelerations of stages
+
+    tangent_program: int = formula(lambda s: s.mode_code[4 * s.mode_id])  # its number in `code`, of the present mode
+    residual_program: int = formula(lambda s: s.mode_code[4 * s.mode_id + 1])
+    correction_program: int = formula(lambda s: s.mode_code[4 * s.mode_id + 2])  # the first one, in straight-line code
+    solution_program: int = formula(lambda s: s.mode_code[4 * s.mode_id + 3])  # with the factors of that
 
 
 class State(SchemeAbilities):

@@ -111,7 +111,7 @@ def runs_away(K: Equations, m: int) -> bool:
     Then r would vanish beside its terms whatever the motion, and a step must not be accepted for it.
     """
     size = K.n + m
-    call(K, K.mode_code[4 * K.mode_id], K.spare)
+    call(K, K.tangent_program, K.spare)
     largest = 0.0
     total = 0.0
     for i in range(K.n):

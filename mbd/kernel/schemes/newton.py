@@ -63,7 +63,7 @@ def solve_step(K: Kernel, h: float, t1: float, c_C: float, c_K: float, tangents:
             straight = renew(K, m, tangents)
             tangents += 1
         else:
-            call(K, K.mode_code[4 * K.mode_id + 1], K.out)
+            call(K, K.residual_program, K.out)
             K.n_residuals += 1
         o_r = (K.n + m) * (K.n + m) if tangent and not straight else 0
         error = residual_size(K, o_r, m, c_C, c_K, tolerance, K.stabilized)
@@ -178,7 +178,7 @@ def renew(K: Equations, m: int, tangents: int) -> bool:
     tangent itself is asked for and pivots are searched for.
     """
     K.n_tangents += 1
-    first = K.mode_code[4 * K.mode_id + 2]
+    first = K.correction_program
     if first > 0:
         if tangents < MOST_STRAIGHT:
             call(K, first, K.out)
@@ -186,7 +186,7 @@ def renew(K: Equations, m: int, tangents: int) -> bool:
                 K.n_factorizations += 1
                 return True
         K.n_pivoted += 1
-    call(K, K.mode_code[4 * K.mode_id], K.out)
+    call(K, K.tangent_program, K.out)
     return False
 
 
@@ -287,7 +287,7 @@ def solve_with_factors(K: Equations, m: int, b: Reals, straight: bool) -> None:
     if straight:
         place = soundness_at(K, m) + 2
         K.out[place : place + size] = b[:size]
-        call_on(K, K.mode_code[4 * K.mode_id + 3], K.out, b)
+        call_on(K, K.solution_program, K.out, b)
     else:
         solve_kkt(K, size, b)
 

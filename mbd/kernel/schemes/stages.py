@@ -199,7 +199,7 @@ def evaluate_stages(
             matrices(K, m, h)
             o = (n + m) * (n + m)
         else:
-            call(K, K.mode_code[4 * K.mode_id + 1], K.out)
+            call(K, K.residual_program, K.out)
             K.n_residuals += 1
         size = residual_size(K, o, m, c_C, c_K, tolerance, 1)
         if size < 0.0:  # the stage stays in the block, which tells why
@@ -264,7 +264,7 @@ def matrices(K: SingularSteps, m: int, h: float) -> None:
 
 def tangent_of_stage(K: DependentRows, m: int) -> None:
     """The tangent at the block in K.out, with what dependent rows bear where a friction slides."""
-    call(K, K.mode_code[4 * K.mode_id], K.out)
+    call(K, K.tangent_program, K.out)
     if sharing(K):
         add_shares(K, K.out, m)
 

@@ -52,7 +52,7 @@ def find_passed_events(K: Kernel, h: float) -> int:
     for part in range(1, K.looks + 1):
         show(K, t, h, part / K.looks)
         for e in range(K.n_guards):
-            if K.notify[K.n_contacts + e] == 1 or K.crossed[e] != -1.0:
+            if K.notify[K.flag_user + e] == 1 or K.crossed[e] != -1.0:
                 continue
             K.event_kind = -1
             K.event_place = 2.0
@@ -84,7 +84,7 @@ def show(K: Switching, t: float, h: float, s: float) -> None:
 
 def root_inside(K: Switching, e: int, t: float, h: float, low: float, high: float) -> float:
     """Where the measure of event e vanishes on the interpolant, as a part of the step: by regula falsi."""
-    place = 4 * K.n_contacts + e
+    place = K.at_user + e
     side = K.side[e]
     show(K, t, h, low)
     f_low = side * K.guards1[place]

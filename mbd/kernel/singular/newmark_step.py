@@ -55,7 +55,7 @@ def steps_by_pivot(K: DependentRows, m: int, straight: bool) -> float:
     else:
         for k in range(K.n, size):  # the inverses are on the diagonal
             largest = max(largest, abs(K.kkt[k * size + k]))
-        if K.mode_code[4 * K.mode_id + 2] > 0 or order_at(K, m) > 0:
+        if K.correction_program > 0 or order_at(K, m) > 0:
             K.inverse_pivot = 0.0
             return 0.0
     before = K.inverse_pivot
@@ -232,7 +232,7 @@ def singular_newmark_step(K: Kernel, h: float, t1: float) -> int:
     for iteration in range(K.max_iterations):
         if sharing(K):
             share_loads(K, m)
-        call(K, K.mode_code[4 * K.mode_id], K.out)
+        call(K, K.tangent_program, K.out)
         K.n_tangents += 1
         error = residual_size(K, o_r, m, c_C, c_K, tolerance, 0)
         if error < 0.0:

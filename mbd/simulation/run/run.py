@@ -251,7 +251,7 @@ class Run(RunData):
 
     def _reset(self, e: int) -> None:
         """Apply the reset of a user's guard at zero; one that turns its motion around will cross from the same side."""
-        place = 4 * self.kernel.n_contacts + e
+        place = self.kernel.at_user + e
         before = guard_values(self)
         apply_reset(self, self.manager.guards[e])
         guards, rate = guard_values(self), place + self.kernel.n_guards
