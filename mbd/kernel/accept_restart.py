@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from mbd.kernel.candidate import accept_candidate, revert_candidate
 from mbd.kernel.codes import PULL
-from mbd.kernel.guards import try_step, watch
+from mbd.kernel.guards import watch
 from mbd.kernel.records import Balance, Guards, Kernel, Reals, Switching
 from mbd.kernel.restart import active_rows, consistent, evaluate, largest_force, stepping_rows
 from mbd.kernel.saddle import correct_velocities, solve_rows
+from mbd.kernel.trial_step import try_step
 
 __all__ = ["look", "look_at_start", "put_on_rows", "accept_for_restart"]
 

@@ -11,7 +11,7 @@ from mbd.kernel.contact_step import relax_pace
 from mbd.kernel.crowding import crowds
 from mbd.kernel.events import handle_event, land
 from mbd.kernel.guard_substeps import parts_to_take
-from mbd.kernel.guards import is_quiet, judge, try_step, update_armed, update_sides
+from mbd.kernel.guards import is_quiet, judge, update_armed, update_sides
 from mbd.kernel.hooks import scheme_accept
 from mbd.kernel.locate import locate
 from mbd.kernel.nonsmooth import closes_below_surface, must_release
@@ -23,6 +23,7 @@ from mbd.kernel.singular.leave import leave_singularity
 from mbd.kernel.singular.step_pairs import ALONE, FIRST, SECOND
 from mbd.kernel.starting import find_mode, restart, still_dependent
 from mbd.kernel.step_retry import part_end, step_end, tried_step
+from mbd.kernel.trial_step import try_step
 
 __all__ = ["advance"]
 

@@ -32,8 +32,8 @@ APART = (
     "ordered_complex.factor_pair_ordered", "ordered_complex.solve_pair_ordered",
     "singular.gram_norms.pivoted_gram_norms_of_many", "guard_substeps.parts_to_take", "locate.locate",
     "events.handle_event", "events.land", "resolution.look_closer", "singular.events.find_passed_events",
-    "singular.events.log_passed_events", "singular.events.refuses", "hooks.scheme_accept", "guards.brief_step",
-    "guards.share_multipliers", "singular.newmark_step.singular_newmark_step", "schemes.newton.second_look",
+    "singular.events.log_passed_events", "singular.events.refuses", "hooks.scheme_accept", "trial_step.brief_step",
+    "trial_step.share_multipliers", "singular.newmark_step.singular_newmark_step", "schemes.newton.second_look",
     "schemes.newton.retreat", "schemes.radau.radau_step", "schemes.runge_kutta.runge_kutta_step",
 )  # fmt: skip
 """Their loops keep their shape wherever they are called; where they are not, nobody carries them along.

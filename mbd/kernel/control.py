@@ -25,12 +25,12 @@ from mbd.kernel.codes import (
     TOO_NEAR,
     TOO_SMALL,
 )
-from mbd.kernel.guards import try_step
 from mbd.kernel.hooks import scheme_error
 from mbd.kernel.records import Balance, Kernel, SchemeAbilities, SingularSteps, State
 from mbd.kernel.restart import compose, consistent, fill_block, lower_scales
 from mbd.kernel.roots import sqrt
 from mbd.kernel.singular.step_size import is_too_noisy, noise_share, singular_step_size
+from mbd.kernel.trial_step import try_step
 
 __all__ = ["controlled_step", "first_step", "smallest_step"]
 

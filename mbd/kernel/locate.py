@@ -16,10 +16,11 @@ from mbd.kernel.codes import (
     STICK_BRIEF,
     WATCH,
 )
-from mbd.kernel.guards import gap_tolerance, guard_value, is_watched, judge, try_step
+from mbd.kernel.guards import gap_tolerance, guard_value, is_watched, judge
 from mbd.kernel.hermite import first_guess
 from mbd.kernel.records import Events, Guards, Kernel, Switching
 from mbd.kernel.refine import refine
+from mbd.kernel.trial_step import try_step
 
 __all__ = ["locate"]
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from mbd.kernel.codes import GAINED, LAST, NOT_CONVERGED, NOT_FINITE, SINGULAR, SINGULAR_ROWS_MOVE, STAGNATED, TOO_NEAR
 from mbd.kernel.control import controlled_step
-from mbd.kernel.guards import try_step
 from mbd.kernel.records import Balance, Guards, Kernel, SchemeAbilities, State
 from mbd.kernel.resolution import judge_change
 from mbd.kernel.restart import consistent, lower_scales
 from mbd.kernel.singular.step_pairs import ALONE, FIRST, LONGER, SECOND, SHORTER, WHOLE, may_pair
 from mbd.kernel.singular.step_size import is_resolved, is_too_noisy, singular_step_size
+from mbd.kernel.trial_step import try_step
 
 __all__ = ["part_end", "step_end", "tried_step"]
 

@@ -21,17 +21,8 @@ from mbd.kernel.records import DependentRows, Kernel, Memory, Steps
 from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import compose, evaluate
 from mbd.kernel.saddle import factor_saddle
-from mbd.kernel.schemes.stages import (
-    A2_,
-    CHANGES,
-    PAIR,
-    STAGE_LAM,
-    STAGE_RATES,
-    STAGE_SHIFT,
-    hold_block,
-    load_stage,
-    stage_place,
-)
+from mbd.kernel.schemes.stage_layout import A2_, CHANGES, PAIR, STAGE_LAM, STAGE_RATES, STAGE_SHIFT, stage_place
+from mbd.kernel.schemes.stages import hold_block, load_stage
 
 __all__ = ["BESIDE_NOISY", "spans_singularity", "is_beside_singularity", "solve_singular_stages", "replace_row_rates"]
 

@@ -1,0 +1,119 @@
+"""A step that is tried: its candidate with multipliers of all rows and with its guards."""
+
+from __future__ import annotations
+
+from mbd.kernel.charts import turns_too_far
+from mbd.kernel.codes import (
+    GUARDS,
+    NOT_CONVERGED,
+    NOT_FINITE,
+)
+from mbd.kernel.hooks import call, scheme_step
+from mbd.kernel.records import (
+    Balance,
+    DependentRows,
+    Kernel,
+)
+from mbd.kernel.restart import (
+    compose,
+    consistent,
+    fill_block,
+    holds_rows,
+    minimum_norm_multipliers,
+)
+
+__all__ = ["try_step"]
+
+DEPARTED = 1e-8
+"""Part of its terms that a row which was left out may be off in a step; less restarts the scheme with other rows."""
+
+
+def try_step(K: Kernel, h: float, t1: float) -> int:
+    """A candidate at t1 = t + h with its guards; a step far below dt with rows is one of Heun's method.
+
+    There an implicit step would divide the round-off of positions by h²; an explicit scheme takes it as any other.
+    A scheme leaves velocities, rates and multipliers of the candidate in the block; only its positions are centered.
+    """
+    full = K.step
+    if h >= 1e-3 * full or (K.n_active == 0 and h >= 1e-9 * full) or K.explicit == 1:
+        status = scheme_step(K, h, t1)
+        if status != 0:
+            return status
+        if K.n_dropped > 0:
+            status = share_multipliers(K, t1)
+            if status != 0:
+                return status
+    else:
+        status = brief_step(K, h, t1)
+        if status != 0:
+            return status
+    if K.vector == 0 and turns_too_far(K, h):
+        K.failure_time = t1
+        K.failure_size = 0.0
+        return NOT_CONVERGED
+    if K.n_watched > 0:
+        K.block[K.o_q : K.o_q + K.n_q] = K.q1[: K.n_q]
+        K.block[K.o_x : K.o_x + K.n_v] = 0.0
+        call(K, GUARDS, K.guards1)
+        finite = 0.0
+        for i in range(K.n_watched):
+            finite += abs(K.guards1[i])
+        if not finite < 1e300:
+            K.failure_time = t1
+            return NOT_FINITE
+        for f in range(K.n_frictions):
+            K.limit[f] = K.guards1[K.at_limit + f]
+            if K.slip[f] != 0.0:
+                K.lam1[K.friction_row[f]] = K.slip[f] * K.limit[f]
+    return 0
+
+
+def share_multipliers(K: DependentRows, t1: float) -> int:
+    """Multipliers of dependent rows; a scheme leaves those of the rows that it was solved with."""
+    for k in range(K.n_rows):
+        if K.dropped[k] == 1 and K.explicit == 0:  # the explicit one has shared them out already
+            K.lam1[k] = 0.0
+    minimum_norm_multipliers(K, K.lam1)
+    K.block[K.o_lam : K.o_lam + K.n_rows] = K.lam1[: K.n_rows]
+    if departs(K):
+        K.failure_time = t1
+        K.failure_size = 0.0
+        return NOT_CONVERGED
+    return 0
+
+
+def brief_step(K: Balance, h: float, t1: float) -> int:
+    """A step of Heun's method."""
+    K.rate1[: K.n] = K.rate[: K.n]
+    for _ in range(2):
+        fill_block(K, K.time, K.q, K.y)
+        for i in range(K.n_v):
+            K.block[K.o_x + i] = h * (K.y[i] + h * (K.rate[i] / 3.0 + K.rate1[i] / 6.0))
+        compose(K, K.q1)
+        for i in range(K.n):
+            K.y1[i] = K.y[i] + 0.5 * h * (K.rate[i] + K.rate1[i])
+        status = consistent(K, t1, K.q1, K.y1)
+        if status != 0:
+            return status
+        K.rate1[: K.n] = K.jump[: K.n]
+    if not holds_rows(K, K.n_active):
+        K.failure_time = t1
+        K.failure_size = 0.0
+        return NOT_CONVERGED
+    for i in range(K.n):
+        K.rate1[i] = K.jump[i]
+        K.aux1[i] = K.jump[i]
+        K.block[K.o_a + i] = K.jump[i]
+    for k in range(K.n_rows):
+        K.lam1[k] = K.impulse[k]
+        K.block[K.o_lam + k] = K.impulse[k]
+    return 0
+
+
+def departs(K: DependentRows) -> bool:
+    """Whether a row that was left out is far from holding at the candidate, at which K.acc is: another branch."""
+    o_h = K.acc_h
+    for k in range(K.n_rows):
+        if K.dropped[k] == 1 and K.row_level[k] == 0 and abs(K.acc[o_h + k]) > DEPARTED * max(K.scale[K.n + k], 1e-3):
+            return True
+    return False
