@@ -14,7 +14,7 @@ from mbd.kernel.restart import active_rows, consistent, evaluate, largest_force,
 from mbd.kernel.saddle import correct_velocities, solve_rows
 from mbd.kernel.trial_step import try_step
 
-__all__ = ["look", "look_at_start", "put_on_rows", "accept_for_restart"]
+__all__ = ["event_candidate", "event_at_start", "put_on_rows", "accept_for_restart"]
 
 
 def project_velocity(K: Balance, t: float, q: Reals, y: Reals, m: int, dropping: bool) -> int:
@@ -45,7 +45,7 @@ def put_on_rows(K: Switching, t1: float) -> None:
             K.limit[f] = K.guards1[K.at_limit + f]
 
 
-def look(K: Kernel, h: float, t1: float) -> int:
+def event_candidate(K: Kernel, h: float, t1: float) -> int:
     """A candidate at t1 = t + h as an event there would take it over."""
     status = try_step(K, h, t1)
     if status == 0:
@@ -53,7 +53,7 @@ def look(K: Kernel, h: float, t1: float) -> int:
     return status
 
 
-def look_at_start(K: Kernel) -> None:
+def event_at_start(K: Kernel) -> None:
     """The accepted state as the candidate of an event at the very start of the step."""
     revert_candidate(K)
     put_on_rows(K, K.time)

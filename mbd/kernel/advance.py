@@ -170,25 +170,25 @@ def calm(K: Switching) -> bool:
     return True
 
 
-def look_inside(K: Switching, h: float) -> int:
+def begin_substeps(K: Switching, h: float) -> int:
     """Where a step is long enough to be looked at in parts: after how many it must end (see `parts_to_take`).
 
     A step of such parts begins then; 0 as well where this one is part of it already, or no step is looked at so.
     """
-    if not in_parts(K):
+    if not takes_substeps(K):
         K.in_substeps = 0
         return 0
     forget_found(K)
     parts = parts_to_take(K, h)
     if parts != 0:
         K.in_substeps = 1
-        K.substep = h / K.looks
+        K.substep = h / K.n_substeps
     return parts
 
 
-def in_parts(K: Events) -> bool:
+def takes_substeps(K: Events) -> bool:
     """Whether guards are looked at inside the step that was just tried."""
-    return bool(K.looks > 1 and K.n_watched > 0 and K.in_substeps == 0)
+    return bool(K.n_substeps > 1 and K.n_watched > 0 and K.in_substeps == 0)
 
 
 def passes_events(K: Kernel, h: float) -> bool:
@@ -295,14 +295,14 @@ def judge_step(K: Kernel, h: float, full: float, t1: float, cut: bool, within: b
     Where guards are looked at inside it, only as many of its parts are taken as are free of events.
     """
     holds = K.n_dropped == 0 or still_dependent(K) or K.near_singular > 0  # ranks are round-off there
-    looked = in_parts(K)
+    looked = takes_substeps(K)
     quiet = not looked and is_quiet(K)
     passes = K.n_guards > 0 and passes_events(K, h)
-    parts = look_inside(K, h)
+    parts = begin_substeps(K, h)
     if parts != 0:
         within = True
         cut = False
-        h = abs(parts) * h / K.looks
+        h = abs(parts) * h / K.n_substeps
         t1 = K.time + h
         status = try_step(K, h, t1)
         if status != 0:

@@ -46,8 +46,8 @@ def log_event(K: Switching, kind: int, index: int, loss: float, impulses: int) -
     K.log[o + 4] = float(K.n_stored)
     for k in range(K.n_rows):
         c = K.row_contact[k]
-        told = impulses != NO_IMPULSE and (c == index or (impulses == ALL_IMPULSES and (c < 0 or not strikes(K, c))))
-        K.log[o + 5 + k] = 0.0 - K.impulse[k] if told else 0.0
+        logged = impulses != NO_IMPULSE and (c == index or (impulses == ALL_IMPULSES and (c < 0 or not strikes(K, c))))
+        K.log[o + 5 + k] = 0.0 - K.impulse[k] if logged else 0.0
     K.n_logged += 1
     K.n_events += 1
 
@@ -125,7 +125,7 @@ def find_slips(K: Guards) -> None:
     evaluate(K, K.time, K.q, K.y)
     for f in range(K.n_frictions):
         c = K.friction_contact[f]
-        told = K.loose[f]
+        found = K.loose[f]
         K.loose[f] = 0
         K.lean[f] = K.slip[f] if K.slip[f] != 0.0 else K.lean[f]
         if c >= 0 and K.closed[c] == 0 and K.touched[c] == 0:
@@ -133,12 +133,12 @@ def find_slips(K: Guards) -> None:
             K.slip[f] = 0.0
             continue
         gamma = row_speed(K, K.friction_row[f])
-        if told == 3:  # an event may have been wrong about it; a step that has been tried was not
+        if found == 3:  # an event may have been wrong about it; a step that has been tried was not
             K.loose[f] = 2 if K.strategy == 0 else 0
             continue
         small = max(1.0, 1e-2 * K.scale[K.n + K.n_rows + K.friction_row[f]])
         still = abs(gamma) <= STILL * small
-        if (told == 2 and abs(gamma) <= CLOSE_TO_STILL * small) or (
+        if (found == 2 and abs(gamma) <= CLOSE_TO_STILL * small) or (
             still and (K.slip[f] == 0.0 or K.event_kind != SLIP)
         ):
             K.loose[f] = 1

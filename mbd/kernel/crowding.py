@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from mbd.kernel.records import Guards, Switching
 
-__all__ = ["count_blow", "crowd", "crowds"]
+__all__ = ["count_impact", "crowd", "crowds"]
 
 MOST_CROWDED = 64.0
 """Impacts through several contacts, less one for each dt, from which on steps are non-smooth [-]."""
@@ -26,7 +26,7 @@ def crowd(K: Guards) -> float:
     return float(max(K.crowding - (K.time - K.crowding_time) / K.dt, 0.0))
 
 
-def count_blow(K: Switching) -> None:
+def count_impact(K: Switching) -> None:
     """Count the impact of this instant, whose impulses are in K.impulse, if it goes through several closed contacts."""
     largest = 0.0
     for c in range(K.n_contacts):
@@ -42,7 +42,7 @@ def count_blow(K: Switching) -> None:
 
 
 def crowds(K: Guards) -> bool:
-    """Whether non-smooth steps follow from now on, as impacts have crowded; told once."""
+    """Whether non-smooth steps follow from now on, as impacts have crowded; said once."""
     if K.auto == 0 or K.fallback > 0 or K.crowding <= MOST_CROWDED:
         return False
     K.fallback = 1

@@ -6,7 +6,7 @@ from mbd.kernel.accept_restart import accept_for_restart
 from mbd.kernel.candidate import carry
 from mbd.kernel.codes import CHATTER, CLOSE, CONFLICT, CROSS, EVENT, LOG_EVENT, NO_IMPACT, OPEN_FORCE, OPEN_PULL, WATCH
 from mbd.kernel.contact_modes import NO_IMPULSE, log_event
-from mbd.kernel.crowding import count_blow
+from mbd.kernel.crowding import count_impact
 from mbd.kernel.nonsmooth import keep, put_back, rebound, strike
 from mbd.kernel.observe import is_awaited, store_row
 from mbd.kernel.records import Guards, Kernel
@@ -112,7 +112,7 @@ def handle_event(K: Kernel) -> int:
     if status != 0:
         return status
     if K.auto == 1 and kind == CLOSE:
-        count_blow(K)
+        count_impact(K)
     status = restart(K)
     store_row(K)  # also where no accelerations are consistent: the velocities after the event are known
     if status != 0:

@@ -1,6 +1,6 @@
 """Guards inside a long step, so that what happens and is over again within it is not missed.
 
-A step of a high-order scheme may be as long as the motion takes to turn around. It is looked at in K.looks parts: at
+A step of a high-order scheme may be as long as the motion takes to turn around. It has K.n_substeps parts, and at
 their ends the guards are evaluated on the quintic Hermite interpolant of positions, velocities and accelerations (where
 ⊕ is not +, of the increment in the chart of the step), with consistent multipliers where a closed contact or a friction
 asks for them, and each part is judged like a step of its own.
@@ -19,7 +19,7 @@ from mbd.kernel.guards import gap_scale, gap_tolerance, goes_back, is_watched, j
 from mbd.kernel.records import Contacts, Guards, Switching
 from mbd.kernel.restart import compose, consistent, fill_block
 
-__all__ = ["copy_ends", "look_at", "parts_to_take", "put_candidate_back"]
+__all__ = ["copy_ends", "interpolate_candidate", "parts_to_take", "put_candidate_back"]
 
 FINEST = 16.0
 """Distance over the round-off of a position below which the interpolant need not meet it at the end of a step [-]."""
@@ -34,16 +34,16 @@ def parts_to_take(K: Switching, h: float) -> int:
     t = K.time
     asked = needs_multipliers(K)
     answer = 0
-    for part in range(1, K.looks + 1):
-        if part < K.looks:
-            look_at(K, t, h, part / K.looks, asked)
+    for part in range(1, K.n_substeps + 1):
+        if part < K.n_substeps:
+            interpolate_candidate(K, t, h, part / K.n_substeps, asked)
         else:
             put_candidate_back(K)
-        fired = judge(K, h / K.looks)
+        fired = judge(K, h / K.n_substeps)
         if fired:
             answer = part - 1 if part > 1 else -1
             break
-        if part < K.looks and rearms(K, t + part / K.looks * h):
+        if part < K.n_substeps and rearms(K, t + part / K.n_substeps * h):
             answer = part
             break
         accept_guards(K)
@@ -86,7 +86,7 @@ def needs_multipliers(K: Contacts) -> bool:
     return count > 0
 
 
-def look_at(K: Switching, t: float, h: float, s: float, asked: bool) -> None:
+def interpolate_candidate(K: Switching, t: float, h: float, s: float, asked: bool) -> None:
     """Guards (and multipliers) of the interpolant at the part s of the step, in place of those of the candidate."""
     u = s * s
     fill_block(K, t, K.q, K.y)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mbd.kernel.accept_restart import look, look_at_start, put_on_rows
+from mbd.kernel.accept_restart import event_at_start, event_candidate, put_on_rows
 from mbd.kernel.codes import (
     CLOSE,
     CROSS,
@@ -213,7 +213,7 @@ def find_way(K: Kernel, kind: int, index: int, high: float) -> float:
     low = high
     for _ in range(MOST_LOOKS):
         low *= 0.5
-        status = look(K, low, K.time + low)
+        status = event_candidate(K, low, K.time + low)
         if status != 0:
             return -float(status)
         if guard_value(K, kind, index, K.time + low) > tiny:
@@ -241,26 +241,26 @@ def bracket(K: Kernel, kind: int, index: int, low: float, high: float) -> int:
         return 0
     d_high = guard_rate(K, kind, index)
     if low > 0.0:
-        status = look(K, low, t + low)
+        status = event_candidate(K, low, t + low)
         if status != 0:
             return status
     else:
-        look_at_start(K)
+        event_at_start(K)
     f_low = guard_value(K, kind, index, t + low)
     if f_low <= 0.0 and (kind == STICK or kind == CLOSE):
         low = find_way(K, kind, index, high)
         if low < 0.0:
             return int(-low)
         if low == 0.0:
-            look_at_start(K)
+            event_at_start(K)
         f_low = guard_value(K, kind, index, t + low)
     if f_low <= 0.0:
         if (kind == OPEN_GAP or kind == OPEN_FORCE) and K.guards0[K.at_gap_rate + index] < 0.0:
             K.event_after = high  # a touch too short to be seen within the step: it is over at its end
-            return look(K, high, t + high)
+            return event_candidate(K, high, t + high)
         if low > 0.0 and kind != CROSS:
             low = 0.0
-            look_at_start(K)
+            event_at_start(K)
         K.event_after = low
         return 0
     width = high - low
@@ -268,5 +268,5 @@ def bracket(K: Kernel, kind: int, index: int, low: float, high: float) -> int:
     if K.linear == 1 and kind != WATCH and kind != OPEN_PULL:  # no contact is stored that pulls
         place = low + width * f_low / (f_low - f_high)
         K.event_after = place
-        return look(K, place, t + place)
+        return event_candidate(K, place, t + place)
     return refine(K, kind, index, low, f_low, high, f_high, low + width * guess)

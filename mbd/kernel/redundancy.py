@@ -80,7 +80,7 @@ def length_of(K: Model, row: int) -> float:
 
 
 def find_mix(K: DependentRows, m: int) -> None:
-    """C in K.mix at another place, that of K.acc, with the m rows in K.rows kept and the others told by K.dropped."""
+    """C in K.mix at another place, that of K.acc: the m rows in K.rows are kept, those of K.dropped depend on them."""
     for k in range(m):
         remaining_norm(K, K.rows[k], k)
         keep_row(K, K.rows[k], k)

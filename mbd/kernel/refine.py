@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mbd.kernel.accept_restart import look
+from mbd.kernel.accept_restart import event_candidate
 from mbd.kernel.codes import CLOSE, CROSS, EPS, OPEN_GAP, WATCH
 from mbd.kernel.guards import gap_tolerance, guard_value
 from mbd.kernel.records import ContactRows, Kernel
@@ -57,7 +57,7 @@ def refine(K: Kernel, kind: int, index: int, low: float, f_low: float, high: flo
             b += move
         else:
             b += limit if half > 0.0 else -limit
-        status = look(K, b, t + b)
+        status = event_candidate(K, b, t + b)
         if status != 0:
             return status
         at = b
@@ -66,7 +66,7 @@ def refine(K: Kernel, kind: int, index: int, low: float, f_low: float, high: flo
     if kind == WATCH and fb >= 0.0:  # end where it is watched, or it fires again
         place = c
     K.event_after = place
-    return 0 if at == place else look(K, place, t + place)
+    return 0 if at == place else event_candidate(K, place, t + place)
 
 
 def enough(K: ContactRows, kind: int, index: int, f_low: float, f_high: float) -> float:

@@ -167,7 +167,7 @@ def restore_scales(K: Model) -> None:
 
 
 def retain_scales(K: Model) -> None:
-    """Go on with raised magnitudes, those of a candidate; told where they are far above what was known."""
+    """Go on with raised magnitudes, those of a candidate; K.scales_raised where they are far above what was known."""
     for i in range(K.n):
         if K.scale[i] > FAR_ABOVE * K.known[i]:
             K.scales_raised = 1

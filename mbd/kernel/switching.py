@@ -44,7 +44,7 @@ def gather_closing(K: Guards) -> float:
             K.closing[c] = 1
             if K.kind[c] == 0:
                 # located by interpolation it may part already, which is no rest; located exactly it parts only where
-                # its next contact cannot be told from this instant
+                # its next contact is at this instant as well
                 fastest = max(fastest, abs(approach) if K.linear == 1 else approach)
         elif near and ready and K.kind[c] == 0 and (approach >= -STILL or K.plastic_impact == 1):
             K.closing[c] = 2
@@ -79,15 +79,15 @@ def close_by_impact(K: Switching, fastest: float) -> int:
             count += 1
             own += abs(loss_in(K, c))
     others = loss_elsewhere(K) if count > 0 else 0.0
-    told = ALL_IMPULSES  # in the first line, so that each impulse of this impact is reported once
+    impulses = ALL_IMPULSES  # in the first line, so that each impulse of this impact is reported once
     for c in range(K.n_contacts):
         if K.kind[c] != 0 or (K.closed[c] == 0 and not strikes(K, c)):
             continue
         if K.closing[c] > 0:
             loss = loss_in(K, c)
             part = abs(loss) / own if own > 0.0 else 1.0 / count
-            log_event(K, LOG_CLOSED, c, loss + part * others, told)
-            told = OWN_IMPULSE
+            log_event(K, LOG_CLOSED, c, loss + part * others, impulses)
+            impulses = OWN_IMPULSE
             if K.active[c] == 1:
                 capture(K, c)
                 K.closed[c] = 1

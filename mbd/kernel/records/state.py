@@ -97,7 +97,7 @@ class Memory(SchemeAbilities):
     aux: Reals = reals(lambda s: s.n, kept=True)
     slope: Reals = reals(lambda s: s.n, kept=True)
     lam_slope: Reals = reals(lambda s: s.n_rows, kept=True)
-    shift: Reals = reals(lambda s: s.n, kept=True)
+    shift: Reals = reals(lambda s: s.n, kept=True)  # position correction of the last step
     shift_change: Reals = reals(lambda s: s.n, kept=True)
     aux_step: float = place("clock")  # step size of aux
     turning: Reals = reals(lambda s: s.n_rows * s.n)  # ∂ḣ/∂x of the active rows, stabilized only

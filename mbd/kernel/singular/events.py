@@ -11,7 +11,7 @@ from __future__ import annotations
 from mbd.kernel.candidate import accept_guards
 from mbd.kernel.codes import CROSS, LOG_EVENT
 from mbd.kernel.contact_modes import NO_IMPULSE, log_event
-from mbd.kernel.guard_substeps import copy_ends, look_at, put_candidate_back
+from mbd.kernel.guard_substeps import copy_ends, interpolate_candidate, put_candidate_back
 from mbd.kernel.guards import judge_user
 from mbd.kernel.observe import store_state
 from mbd.kernel.orthogonal import square
@@ -49,25 +49,25 @@ def find_passed_events(K: Kernel, h: float) -> int:
     found = 0
     t = K.time
     copy_ends(K, True)
-    for part in range(1, K.looks + 1):
-        show(K, t, h, part / K.looks)
+    for part in range(1, K.n_substeps + 1):
+        show(K, t, h, part / K.n_substeps)
         for e in range(K.n_guards):
             if K.notify[K.flag_user + e] == 1 or K.crossed[e] != -1.0:
                 continue
             K.event_kind = -1
             K.event_place = 2.0
-            judge_user(K, e, h / K.looks)
+            judge_user(K, e, h / K.n_substeps)
             if K.event_kind != CROSS:
                 continue
             K.crossed[e] = ELSEWHERE
-            place = (part - 1 + K.event_place) / K.looks
-            low = (part - 1 + K.event_low) / K.looks
+            place = (part - 1 + K.event_place) / K.n_substeps
+            low = (part - 1 + K.event_low) / K.n_substeps
             if share_inside(K, t, h, place) > 0.0:
-                place = root_inside(K, e, t, h, low, part / K.looks)
+                place = root_inside(K, e, t, h, low, part / K.n_substeps)
                 if share_inside(K, t, h, place) > NEGLIGIBLE_NOISE:
                     K.crossed[e] = place * h
                     found += 1
-            show(K, t, h, part / K.looks)
+            show(K, t, h, part / K.n_substeps)
         accept_guards(K)
     copy_ends(K, False)
     K.event_kind = -1
@@ -77,7 +77,7 @@ def find_passed_events(K: Kernel, h: float) -> int:
 def show(K: Switching, t: float, h: float, s: float) -> None:
     """The interpolant at the part s of the step in place of the candidate; at its end the candidate itself."""
     if s < 1.0:
-        look_at(K, t, h, s, False)
+        interpolate_candidate(K, t, h, s, False)
     else:
         put_candidate_back(K)
 
@@ -123,7 +123,7 @@ def share_inside(K: Kernel, t: float, h: float, s: float) -> float:
 
     The candidate's place holds the interpolant afterwards.
     """
-    look_at(K, t, h, s, False)
+    interpolate_candidate(K, t, h, s, False)
     if not comes_close(K, t + s * h, DISTANT):
         return 0.0
     m = K.n_active

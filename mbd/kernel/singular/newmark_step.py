@@ -130,8 +130,8 @@ def find_gram_norms(
 def misses(K: DependentRows, away: float, h: float) -> bool:
     """Whether whole steps from the end of this one would end too close to the singularity: then it gets another size.
 
-    While ḣ is held too, steps may do that; those that hold h alone start to ring. It is the last whole one before these
-    that is looked at, or one that was shortened for another reason; those of a pair (`step_pairs`) are not.
+    While ḣ is held too, steps may do that; those that hold h alone begin to oscillate. It is the last whole one before
+    these that is looked at, or one that was shortened for another reason; those of a pair (`step_pairs`) are not.
     """
     if away < 1.0 or away >= WITHIN + 1.0 or is_of_pair(h / K.step):
         return False

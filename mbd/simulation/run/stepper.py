@@ -35,7 +35,7 @@ TAKES_PART = 1e-7
 
 LINE = 64
 """Length of a cache line [bytes]."""
-LOOKS = 4
+SUBSTEPS = 4
 """Parts in which a step of a scheme of order 3 or more is looked at for guards [-]."""
 
 
@@ -132,7 +132,7 @@ class Stepper:
             rest_speed=float(options.get("rest_speed", 1e-6)), dt=dt, until=0.0, end=float(options.get("end", 0.0)),
             alpha_m=0.0, alpha_f=0.0, beta=0.25, gamma=0.5, tolerance=1e-9, jerk=1, exact=0,
             adaptive=int("allowed" in options), allowed=float(options.get("allowed", 0.0)),
-            longest=float(options.get("longest", np.inf)), error_order=self.integrator.error_order(), looks=1,
+            longest=float(options.get("longest", np.inf)), error_order=self.integrator.error_order(), n_substeps=1,
             **self.own.numbers(),
         )  # fmt: skip
         K.event_capacity = max(EVENT_CAPACITY, 2 * room_to_log(K))
@@ -254,7 +254,7 @@ class Stepper:
         v.until = until
         if v.auto:
             v.strategy = int(v.fallback > 0)
-        v.looks = LOOKS if self.integrator.order() > 2 and not v.strategy else 1
+        v.n_substeps = SUBSTEPS if self.integrator.order() > 2 and not v.strategy else 1
         return self._advance_compiled() if self.compiled else self._advance_plain()
 
     def keep_row(self) -> None:
