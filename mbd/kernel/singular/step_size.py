@@ -71,14 +71,22 @@ def may_take_long_step(K: SchemeAbilities) -> bool:
 def forget_row_norms(K: DependentRows) -> None:
     """Nothing is known at the start of the scheme: whether a singularity is near is looked at before the first step."""
     K.singular_time = -NOWHERE
+    K.misfit = 0.0
     for k in range(K.n_rows):
         K.left[k] = -1.0
     K.left[K.n_active] = 1.0
 
 
 def note_row_norms(K: DependentRows) -> None:
-    """|w| of each row at the candidate, at which K.acc is, and √(2 T): accepted with it by `accept_row_norms`."""
+    """|w| of each row at the candidate, at which K.acc is, and √(2 T): accepted with it by `accept_row_norms`.
+
+    What rows that depend on others miss there counts like round-off of these: a leg that does not fit quite.
+    """
     m = K.n_active
+    K.misfit = 0.0
+    for k in range(K.n_rows):
+        if K.dropped[k] == 1 and K.row_level[k] == 0:
+            K.misfit = max(K.misfit, abs(K.acc[K.acc_h + k]))
     if order_at(K, m) > 0:
         row_norms_of_many(K, m)
     else:
@@ -117,13 +125,15 @@ def motion(K: Model, y: Reals) -> float:
 def noise_coefficient(K: Motion, k: int, fall: float, speed: float) -> float:
     """c [s²] of the share c/τ² of the velocities that round-off makes of them where a step ends τ from a singularity.
 
-    Round-off δ of a row leaves positions open by δ/|w|; ḣ = 0 makes velocities δ/(|w| τ) of that, with |w| = fall τ.
+    Round-off δ of a row leaves positions open by δ/|w|; ḣ = 0 makes velocities δ/(|w| τ) of that, with |w| = fall τ. So
+    does what rows miss that depend on it.
     """
     turned = 1.0
     for i in range(K.n_v if K.vector == 1 else 0):  # quaternions do not grow
         if K.unit[i] == 1:
             turned = max(turned, abs(K.q[i]))
-    return float(NOISE_GROWTH * EPS * turned * K.scale[K.n + K.rows[k]] / (fall * speed + 1e-300))
+    noise = NOISE_GROWTH * EPS * turned * K.scale[K.n + K.rows[k]]
+    return float(max(noise, K.misfit) / (fall * speed + 1e-300))
 
 
 def weigh_columns(K: Equations) -> None:

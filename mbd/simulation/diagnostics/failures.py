@@ -228,7 +228,7 @@ def _unresolved(stepper: Stepper, status: int, closed: str) -> str:
 
 def _no_size(stepper: Stepper, status: int, closed: str) -> str:
     """A step for which no size is right: by its estimated error, or at a singular configuration."""
-    _, residual, h = stepper.kernel.detail[:3].tolist()
+    residual, h, misfit = stepper.kernel.failure_size, stepper.kernel.failure_step, stepper.kernel.misfit
     if status == codes.TOO_SMALL:
         return (
             f"steps fell below {h:.2g} s without an error of "
@@ -237,8 +237,9 @@ def _no_size(stepper: Stepper, status: int, closed: str) -> str:
         )
     explicit = stepper.kernel.explicit
     others = "mbd.GeneralizedAlpha, mbd.HHT or mbd.RadauIIA" if explicit else "mbd.GeneralizedAlpha or mbd.HHT"
+    source = f"round-off, or the {misfit:.1g} by which redundant rows do not fit," if misfit > 1e-14 else "round-off"
     return (
-        f"a singular configuration, at {_unknown(stepper)}{closed}: round-off would make "
+        f"a singular configuration, at {_unknown(stepper)}{closed}: {source} would make "
         f"{residual:.1g} of the velocities in a step of {h:.2g} s over it; use {others}, or longer steps (a larger "
         "dt= or tol=)"
     )
