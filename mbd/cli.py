@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import ast
+import difflib
 import inspect
 import os
 import runpy
@@ -17,9 +18,11 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from mbd.bodies.values import printable
 from mbd.errors import MbdError, ModelError, SimulationError, UnknownNameError, nearest
 from mbd.progress import Progress, progress_bar
 from mbd.view import lab_arguments
+from mbd.view.parser import Parser, writable
 
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
@@ -34,6 +37,9 @@ TOLD = (
 
 OPTIONS = ("dt", "tol", "contact", "impact", "locate", "parameters", "store", "observers", "rest_speed", "backend")
 """Names that a script may define to pass them on to `simulate`."""
+
+SETTINGS = ("model", "start", "integrator", "until", *OPTIONS)
+"""All names of a script that mean something to ``mbd run``."""
 
 
 # scripts and examples ---------------------------------------------------------------------------------------------
@@ -88,7 +94,14 @@ class Script:
         missing = [name for name in wanted if name not in self.names]
         if missing:
             has = "model, start, integrator, dt or tol, and until, or a function main() that returns a run"
-            raise ModelError(f"{self.path.name} does not define {', '.join(missing)}; a script defines {has}")
+            meant = "".join(f"; did you mean {name!r} by {wrong!r}?" for wrong, name in self.misspelt().items())
+            raise ModelError(f"{self.path.name} does not define {', '.join(missing)}{meant}; a script defines {has}")
+
+    def misspelt(self) -> dict[str, str]:
+        """Names that look like settings the script does not define: 'untill' for 'until'."""
+        free = [name for name in SETTINGS if name not in self.names]
+        close = {name: difflib.get_close_matches(name, free, n=1, cutoff=0.8) for name in self.names}
+        return {name: found[0] for name, found in close.items() if found and not callable(self.names[name])}
 
     def run(self, progress: Progress | None, changes: dict[str, Any]) -> Trajectory:
         """Simulate what the script describes.
@@ -131,7 +144,12 @@ class Script:
 def run_command(arguments: argparse.Namespace) -> int:
     """``mbd run``: simulate, print a summary, write plots, page, run and record."""
     began = time.perf_counter()
+    out = writable(arguments.out or Path("mbd-runs") / find(arguments.script).stem.replace("_", "-"))
     script = Script.load(arguments.script)
+    for wrong, name in script.misspelt().items():
+        print(
+            f"note: {script.path.name} defines {wrong!r}, which is no setting; did you mean {name!r}?", file=sys.stderr
+        )
     loaded = time.perf_counter()
     changes = {name: value for name in ("dt", "tol", "until") if (value := getattr(arguments, name)) is not None}
     failure: SimulationError | None = None
@@ -142,17 +160,15 @@ def run_command(arguments: argparse.Namespace) -> int:
             if error.run is None:
                 raise
             run, failure = error.run, error
-    simulated = time.perf_counter()
-    name = script.path.stem.replace("_", "-")
-    out = Path(arguments.out) if arguments.out else Path("mbd-runs") / name
-    wall = {"load": loaded - began, "simulate": simulated - loaded, "total": simulated - began}
-    _tell(run, out, wall, arguments.open)
+    wall = {"load": loaded - began, "simulate": time.perf_counter() - loaded}
+    _tell(run, script, out, wall, arguments.open)
+    print(f"total        {time.perf_counter() - began:.3f} s")
     if failure is not None:
         raise failure
     return 0 if run.success else 1
 
 
-def _tell(run: Trajectory, out: Path, wall: dict[str, float], show: bool) -> None:
+def _tell(run: Trajectory, script: Script, out: Path, wall: dict[str, float], show: bool) -> None:
     from mbd.analysis.gait import gait
     from mbd.view.report import write
 
@@ -165,7 +181,7 @@ def _tell(run: Trajectory, out: Path, wall: dict[str, float], show: bool) -> Non
     plots = find_spec("matplotlib") is not None
     if not plots:
         print("no plots: matplotlib is not installed; try pip install 'mbd[plot]'")
-    paths = write(run, out, wall, plots)
+    paths = write(run, out, wall, plots, script.path)
     print("wrote        " + "\n             ".join(str(path) for path in paths))
     if show:
         webbrowser.open((out / "page.html").resolve().as_uri())
@@ -206,6 +222,19 @@ def _refused(names: dict[str, Any]) -> list[str]:
         return []
     options = {name: names[name] for name in OPTIONS if name in names}
     return refusals(mechanism_of(names["model"]).equations, scheme, options)
+
+
+def new_command(arguments: argparse.Namespace) -> int:
+    """``mbd new``: a commented script to begin with."""
+    from mbd.view.starter import STARTER
+
+    path = Path(arguments.name).with_suffix(".py")
+    if path.exists():
+        raise FileExistsError(f"'{path}' exists; give another name")
+    title = printable(path.stem.replace("_", " ").replace("-", " "), "script")
+    path.write_text(STARTER.format(title=title.replace('"', "'"), file=path, stem=path.stem), encoding="utf-8")
+    print(f"wrote {path}; run it with: mbd run {path}")
+    return 0
 
 
 def examples_command(arguments: argparse.Namespace) -> int:
@@ -262,7 +291,7 @@ def info_command(arguments: argparse.Namespace) -> int:
 def _parser() -> argparse.ArgumentParser:
     import mbd
 
-    parser = argparse.ArgumentParser(prog="mbd", description="Simulate multibody mechanisms described in Python.")
+    parser = Parser(prog="mbd", description="Simulate multibody mechanisms described in Python.")
     parser.add_argument("--version", action="version", version=f"mbd {mbd.__version__}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
 
@@ -279,6 +308,8 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--dt", type=float, metavar="SECONDS", help="another step size than the script's")
     run.add_argument("--tol", type=float, metavar="ERROR", help="steps that follow this error, in place of dt")
     run.add_argument("--until", type=float, metavar="SECONDS", help="another end time than the script's")
+    new = command("new", new_command, "write a commented script to begin with")
+    new.add_argument("name", metavar="NAME", help="of the script, such as my-leg")
     check = command("check", check_command, "report faults, degrees of freedom and redundant rows of a script's model")
     check.add_argument("script", metavar="SCRIPT-or-EXAMPLE", help="a Python file that defines model, or an example")
     lab_arguments.accuracy(

@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+from hashlib import sha256
 
 import numpy as np
 import pytest
@@ -71,7 +72,7 @@ def test_the_record_tells_how_the_run_came_about(script, tmp_path, capsys):
     record = json.loads((tmp_path / "here" / "record.json").read_text())
     assert record["versions"]["mbd"] == mbd.__version__ and record["versions"]["numpy"] == np.__version__
     assert record["settings"]["dt"] == 0.01 and record["statistics"]["steps"] > 0 and record["success"] is True
-    assert record["machine"]["architecture"] and set(record["wall_times"]) == {"load", "simulate", "total"}
+    assert record["machine"]["architecture"] and set(record["wall_times"]) == {"load", "simulate"}
     assert [step["foot"] for step in record["steps"]] == ["right foot", "left foot", "right foot", "left foot"]
     assert sum(v for k, v in record["energy"].items() if k != "change") == pytest.approx(record["energy"]["change"])
     capsys.readouterr()
@@ -281,3 +282,56 @@ def test_a_reader_that_stops_reading_ends_a_command_quietly(unbuffered):
     )
     os.close(write)
     assert (ended.returncode, ended.stderr) == (141, b"")
+
+
+# first steps and slips --------------------------------------------------------------------------------------------
+
+
+def test_a_new_script_checks_runs_and_writes_its_page(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["new", "my-leg"]) == 0
+    assert cli.main(["check", "my-leg.py"]) == 0
+    assert cli.main(["run", "my-leg.py", "--until", "0.2"]) == 0
+    assert (tmp_path / "mbd-runs" / "my-leg" / "page.html").is_file()
+    assert cli.main(["new", "my-leg"]) == 1
+    assert "'my-leg.py' exists; give another name" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "answer"),
+    [
+        (["rnu", "kneed-walker"], "did you mean 'run'?"),
+        (["run", "kneed-walker", "--unti", "1"], "unrecognized arguments: --unti"),
+        (["run", "kneed-walker", "--ot", "x"], "unrecognized arguments: --ot"),
+    ],
+)
+def test_misspelt_words_are_no_abbreviations(words, answer, capsys):
+    with pytest.raises(SystemExit):
+        cli.main(words)
+    assert answer in capsys.readouterr().err
+
+
+def test_a_folder_that_cannot_be_made_is_refused_before_the_script_runs(script, tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    assert cli.main(["run", script("1 / 0"), "--out", "file/runs"]) == 1
+    assert "is a file, not a folder; give another folder" in capsys.readouterr().err
+
+
+def test_misspelt_settings_of_a_script_are_named(script, capsys):
+    assert cli.main(["run", script(PENDULUM.replace("dt, until", "dt, untill"))]) == 1
+    assert "does not define until; did you mean 'until' by 'untill'?" in capsys.readouterr().err
+    assert cli.main(["run", script(PENDULUM + "stores = 10\n")]) == 0
+    assert "defines 'stores', which is no setting; did you mean 'store'?" in capsys.readouterr().err
+
+
+def test_the_record_knows_the_script_by_the_hash_of_its_text(script, tmp_path):
+    path = script(PENDULUM)
+    assert cli.main(["run", path]) == 0
+    record = json.loads((tmp_path / "mbd-runs" / "my-walk" / "record.json").read_text())
+    assert record["script"] == "my_walk.py"
+    assert record["script_sha256"] == sha256(PENDULUM.encode()).hexdigest()
+
+
+def test_the_package_is_a_command_too():
+    answer = subprocess.run([sys.executable, "-m", "mbd", "--version"], capture_output=True, text=True, check=True)
+    assert answer.stdout.strip() == f"mbd {mbd.__version__}"

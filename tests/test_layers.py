@@ -36,7 +36,7 @@ RANKS = [
     ("view",),
     ("hardcases",),
     ("testing",),
-    ("cli",),
+    ("cli", "__main__"),
 ]
 """From the lowest layer to the highest; parts of one layer may know each other."""
 

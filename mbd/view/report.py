@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 import os
 import platform
+import subprocess
 from collections.abc import Mapping
 from datetime import UTC, datetime
+from hashlib import sha256
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -63,18 +65,36 @@ def _processor() -> str:
     return platform.processor() or platform.machine()
 
 
-def record(run: Trajectory, wall: Mapping[str, float]) -> dict[str, Any]:
+def provenance(script: Path | None) -> dict[str, Any]:
+    """The script's name, the hash of its text, and the commit of the folder it lies in, if it lies in one."""
+    if script is None:
+        return {}
+    here = ["git", "-C", str(script.resolve().parent)]
+    try:
+        commit, changed = (
+            subprocess.run([*here, *words], capture_output=True, text=True, timeout=5.0, check=True).stdout.strip()
+            for words in (["rev-parse", "HEAD"], ["status", "--porcelain", "--", script.name])
+        )
+    except (OSError, subprocess.SubprocessError):
+        commit, changed = "", ""
+    known = {"script": script.name, "script_sha256": sha256(script.read_bytes()).hexdigest()}
+    return known | ({"commit": commit, "script_changed": bool(changed)} if commit else {})
+
+
+def record(run: Trajectory, wall: Mapping[str, float], script: Path | None = None) -> dict[str, Any]:
     """Everything needed to tell later how a run came about and how it went, for JSON.
 
     Parameters
     ----------
     wall : wall times by stage [s]
+    script : the file that describes the run, whose hash is kept
     """
     return {
         "model": run.name,
         "success": run.success,
         "message": run.message,
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
+        **provenance(script),
         "versions": versions(),
         "machine": machine(),
         "settings": run.settings,
@@ -88,7 +108,9 @@ def record(run: Trajectory, wall: Mapping[str, float]) -> dict[str, Any]:
     }
 
 
-def write(run: Trajectory, folder: str | Path, wall: Mapping[str, float], plots: bool = True) -> list[Path]:
+def write(
+    run: Trajectory, folder: str | Path, wall: Mapping[str, float], plots: bool = True, script: Path | None = None
+) -> list[Path]:
     """Write plots (PNG), page (HTML), the run (npz) and its record (JSON) into a folder; returns the paths."""
     place = Path(folder)
     place.mkdir(parents=True, exist_ok=True)
@@ -107,6 +129,6 @@ def write(run: Trajectory, folder: str | Path, wall: Mapping[str, float], plots:
         if forces:
             run.plot(*forces, path=place / "forces.png")
             paths.append(place / "forces.png")
-    text = json.dumps(record(run, wall), indent=2, default=plain)
+    text = json.dumps(record(run, wall, script), indent=2, default=plain)
     write_whole(place / "record.json", lambda partial: partial.write_text(text + "\n", encoding="utf-8"))
     return [*paths, place / "record.json"]
