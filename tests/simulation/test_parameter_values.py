@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -190,6 +191,14 @@ def simulated(model: mbd.Model, start: mbd.State, **more: Any) -> mbd.Trajectory
     return mbd.simulate(model, start, mbd.HHT(0.05), dt=1e-3, until=3e-3, **PLAIN, **more)
 
 
+@cache
+def written_to(place: Place) -> tuple[mbd.Model, dict[str, Any]]:
+    """The usual model with a controller, and what that writes."""
+    model, values = place.model(place.usual), {}
+    model.apply(mbd.Controller("writer", lambda *_: values, period=1.0, writes=place.name))
+    return model, values
+
+
 def through(door: str, place: Place, model: mbd.Model, start: mbd.State, value: Any) -> Callable[[], Any]:
     """Give a value of a parameter of a described model."""
     given = {place.name: value}
@@ -205,11 +214,9 @@ def through(door: str, place: Place, model: mbd.Model, start: mbd.State, value: 
             raise mbd.ModelError([run.messages[0]])
 
     def written() -> mbd.Trajectory:
-        model.controllers[:] = [mbd.Controller("writer", lambda *_: given, period=1.0, writes=place.name)]
-        try:
-            return simulated(model, start)
-        finally:
-            model.controllers.clear()
+        driven, values = written_to(place)
+        values[place.name] = value
+        return simulated(driven, start)
 
     return {
         "assemble": lambda: assembled(model, given),
