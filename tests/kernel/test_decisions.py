@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import mbd
+from mbd.compile.cache import default_cache
 from mbd.compile.host import TURNED_OFF, host
 from mbd.equations import programs
 from tests.simulation import singular_linkages
@@ -136,8 +137,15 @@ def tell():
 
 @pytest.mark.skipif(not host().fused, reason="this machine, or this build, fuses no products anyway")
 def test_without_fused_products_the_same_is_decided():
-    code = "from tests.kernel.test_decisions import tell; tell()"
+    code = """if True:
+        from functools import partial
+        from mbd.kernel import build
+        from tests.kernel.test_decisions import tell
+        build.object_of = partial(build.object_of, level=0)  # the same bits in a fifth of the time
+        tell()"""
     environment = {**os.environ, TURNED_OFF: ",".join(filter(None, [os.environ.get(TURNED_OFF), "-fma"]))}
+    if (place := default_cache().directory) is not None:  # that kernel is for nobody else
+        environment["MBD_CACHE"] = str(place.with_name("objects for tests"))
     found = subprocess.run(
         [sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=600, check=True
     )

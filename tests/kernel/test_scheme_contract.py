@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 import pytest
@@ -20,8 +21,9 @@ from tests.simulation.mechanisms import G, ball, pendulum
 
 @pytest.fixture(scope="module", autouse=True)
 def listed():
-    """The kernel with two schemes more: an entry each, and a line in the list."""
+    """The kernel with two schemes more, an entry and a line in the list each; without passes, for the same bits."""
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(build, "object_of", partial(build.object_of, level=0))
         patch.setattr(contract, "SCHEMES", (*contract.SCHEMES, "tests.kernel.midpoint", "tests.kernel.bdf2"))
         build.entry.cache_clear()
         yield
