@@ -15,6 +15,7 @@ from mbd.errors import CapabilityError
 from mbd.kernel import build
 from mbd.kernel.records import Kernel
 from mbd.kernel.schemes import contract
+from mbd.simulation.run.plain import KernelScheme
 from mbd.testing import LawBroken, schemes as kit
 from mbd.testing.findings import Findings
 from tests.kernel import midpoint
@@ -63,6 +64,14 @@ def of_order_one(K: Kernel, h: float, t1: float) -> int:
 def misspells(K: Kernel, h: float, t1: float) -> int:
     K.failure_tim = t1
     return 0
+
+
+def begins(K: Kernel) -> int:
+    return 7
+
+
+def resumes(K: Kernel, h: float) -> int:
+    return 8
 
 
 @dataclass(frozen=True)
@@ -164,3 +173,16 @@ def test_a_step_breaks_the_law_that_it_should(listed, step, law, monkeypatch):
     with pytest.raises(LawBroken) as caught:
         findings.verdict()
     assert law in caught.value.laws
+
+
+@pytest.mark.parametrize("own", [False, True])
+def test_a_scheme_without_a_resume_starts_from_the_rates_that_are_there(listed, own):
+    """Beyond a singular configuration, in machine code and in Python."""
+    listed(start=begins, resume=resumes if own else None)
+    text, names = contract.dispatch()
+    exec(text, names := {**names, "Kernel": Kernel})
+    for resume in (names["scheme_resume"], KernelScheme(contract.scheme_named("wrong")).resume):
+        K = Kernel(n=2, n_rows=1, scheme=contract.number_of("wrong"), jump=[3.0, 4.0], impulse=[5.0])
+        K.rate, K.lam = [0.0, 0.0], [0.0]
+        assert resume(K, 0.1) == (8 if own else 7)
+        assert (K.rate, K.lam) == (([0.0, 0.0], [0.0]) if own else ([3.0, 4.0], [5.0]))

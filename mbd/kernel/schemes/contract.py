@@ -25,6 +25,7 @@ from mbd.arrays import Vector
 from mbd.errors import CapabilityError
 from mbd.kernel.hints import shown
 from mbd.kernel.records import Kernel, Sizes
+from mbd.kernel.schemes.memory import take_consistent
 
 __all__ = ["MEMORY", "NO_SCHEME", "SCHEMES", "Abilities", "Scheme", "dispatch", "number_of", "scheme_named", "schemes"]
 
@@ -42,21 +43,31 @@ MEMORY = ("stages", "past_stages", "tableau")
 
 @dataclass(frozen=True)
 class Abilities:
-    """What the rest of the kernel goes by: fields of its record of the same names. Defaults are those of order 2.
+    """What the rest of the kernel goes by: fields of its record of the same names, each with who asks for it.
 
-    explicit : 1: a step solves no equations, so that it may be as short as one likes, and leaves consistent multipliers
-    estimates : 1: steps leave an estimate of their error in K.error; 0: changes of accelerations that the last step did
-        not foretell are judged as the error of a scheme of order 2
-    look_twice : estimated error of a rate, over the rate, above which forces are evaluated for another look [-]
-    error_constant : of the error in positions, over the third power of the step times the rate of accelerations [-]
-    most_growth : factor from one step to the next where steps follow a tolerance [-]
-    singular_size : 1: next to singular configurations the size of steps is chosen so that none has a node there
-        (`mbd.kernel.singular.step_size`), for which the scheme calls `note_row_norms` and its neighbours; 0: it steps
-        over them itself, or does not notice them
-    stretches : 1: the step over one may last longer than others even where guards are watched
-    middle : part of a step at which a singular configuration lies best, amid the widest gap between nodes [-]
-    far_look, longest_over : steps to one below which it is looked for where round-off asks for a longer step over it,
-        and the longest such step, in steps of the grid [-]
+    The defaults are those of an implicit scheme of order 2 without an estimate of its error, which is right, if not the
+    fastest, for any other. All are pure numbers.
+
+    explicit : 1: a step solves no equations. Then it may be as short as one likes (`guards.try_step`, `advance`: short
+        steps of others are taken in another way), one that fails as energy comes from nowhere is not tried shorter
+        (`step_retry`), and multipliers are those of the balance, shared among dependent rows (`guards`)
+    estimates : 1: `step` itself leaves the local error in K.error, which judges whether the step resolves the motion
+        (`resolution`); 0: changes of rates that the last slope did not foretell do, as the error h³/12 of the
+        trapezoidal rule
+    look_twice : local error of a rate, over the rate, above which forces are evaluated again to see whether the step
+        follows them at all (`resolution`); larger for schemes of high order, whose estimates are pessimistic
+    error_constant : C of the local error C h³ d³q/dt³ of positions: `newmark_error` multiplies by it, and `resolution`
+        allows less growth in a step where |C| > 1/12; 0 for schemes of higher order
+    most_growth : factor from one step to the next where steps follow a tolerance (`control`); below the limit of
+        stability of multistep schemes, such as 1 + √2 of BDF2
+    singular_size : 1: where constraint Jacobians lose rank, steps are sized so that none has a node close by
+        (`singular.step_size`, `control`, `step_retry`): the scheme calls `forget_row_norms` in `start`,
+        `note_row_norms` in `step` and `accept_row_norms` in `accept`. 0: `solve_step` steps over them, for which
+        `step` begins with `if K.near_singular == PASSING: return singular_newmark_step(K, h, t1)`; or nobody does
+    stretches : 1: a step over one may last longer than dt even where guards are watched (`singular.step_size`)
+    middle : part of a step at which it lies best, amid the widest gap between `nodes` (`singular.step_size`)
+    far_look, longest_over : in steps of the grid: how far ahead one is looked for where round-off asks for a longer
+        step over it, and the longest such step (`singular.step_size`, `step_retry`)
     """
 
     explicit: int = 0
@@ -89,20 +100,28 @@ def _nothing(sizes: Sizes) -> dict[str, int]:
 class Scheme:
     """An entry.
 
-    name : by which integrators name it
-    start : ``start(K) → status``: memory at the accepted, consistent state
+    A record begins each call as it was accepted: time, q, y = (v, z), rate = (v̇, ż), lam; n_active rows act, whose
+    numbers are in K.rows. Results are 0 or a code of `mbd.kernel.codes`. `mbd.testing.check_scheme` tries all this.
+
+    name : by which integrators name it (`CompiledIntegrator.scheme`)
+    start : ``start(K) → status``: memory at the accepted, consistent state, as the run begins and behind every switch;
+        what steps remember is forgotten (`forget_steps`), sizes of forces are known (`refresh_scales`)
     step : ``step(K, h, t1) → status``: the candidate (q1, y1, rate1, aux1, lam1) at t1 = t + h, the accepted state
-        untouched, with velocities, rates and multipliers in the block
+        untouched, with velocities, rates and multipliers in the block; h is any size, often another than before
     accept : ``accept(K, h)``: the candidate becomes the accepted state, the rates of change K.slope and K.lam_slope and
         K.aux_step = h included
     resume : ``resume(K, h) → status``: a start with the rates in K.jump and the multipliers in K.impulse that keeps
-        what the scheme averages; only of schemes that set K.near_singular to `LEFT`
-    error : ``error(K, h)``: K.error of the candidate; None: steps have left it there
+        what the scheme averages, where K.near_singular was set to `LEFT`, as `solve_step` does; None: `start` from them
+    error : ``error(K, h)``: the local error of the candidate in K.error, of x, then of (v, z), for ``tol=``
+        (`control`); None: steps have left it there, or the integrator refuses a tolerance (`check_tolerance`)
     abilities : see `Abilities`
-    nodes : of a step, in parts of it, but for its end
-    programs : kind of the model code that steps call: 'mode', 'stepping' with factors in straight-line code, 'explicit'
-    stability : largest ω dt at which it is stable, infinite for implicit schemes [-]
-    memory : lengths of "stages", "past_stages" (kept from step to step) and "tableau" by the sizes of the mechanism
+    nodes : parts of a step at which there are stages, in rising order, but for its end (`singular.step_size`); ()
+    programs : the model code that steps call (`Stepper.add_mode`): 'mode': residual and tangent, factored here;
+        'stepping': the same, factored in straight-line code where that pays, as `solve_step` takes it; 'explicit': none
+        but accelerations, rows and their Jacobian
+    stability : largest ω dt at which it is stable, infinite for implicit schemes (a note of a failed run)
+    memory : lengths of "stages" (work), "past_stages" (kept from step to step) and "tableau" by the sizes of the
+        mechanism (`Stepper`); an array that is used without a length is refused as the kernel is built
     coefficients : what these arrays begin with
     """
 
@@ -202,11 +221,12 @@ def dispatch() -> tuple[str, dict[str, Any]]:
         names |= {alias: getattr(schemes()[k], hook) for k, alias in own}
         lines.append(f"def scheme_{hook}({arguments}) -> {result}:")
         answer = "return " if result == "int" else ""
-        last = own.pop(0) if result == "int" or len(own) == len(schemes()) else None  # who has none is never asked
+        general = hook == "resume"  # who has none starts from the rates that are there
+        last = own.pop(0) if not general and (result == "int" or len(own) == len(schemes())) else None
         for turn, (number, function) in enumerate(own):
             lines.append(f"    {'elif' if turn else 'if'} K.scheme == {number}:\n        {answer}{function}({given})")
         if last:
             indent = "    else:\n        " if own else "    "
             lines.append(f"{indent}{answer}{last[1]}({given})")
-        lines.append("")
-    return "\n".join(lines), names
+        lines.append("    take_consistent(K)\n    return scheme_start(K)\n" if general else "")
+    return "\n".join(lines), names | {"take_consistent": take_consistent}

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
-from mbd.kernel.records import SingularSteps, State, Steps
+from mbd.kernel.records import Kernel, SingularSteps, State, Steps
 from mbd.kernel.restart import note_scales, raise_scales, retain_scales
 
-__all__ = ["forget_steps", "look_a_step_ahead", "start_step"]
+__all__ = ["forget_steps", "look_a_step_ahead", "start_step", "take_consistent"]
 
 
 def start_step(K: State) -> float:
     """The step that a start prepares for."""
     return float(K.dt if K.adaptive == 1 else K.step)
+
+
+def take_consistent(K: Kernel) -> None:
+    """The rates in K.jump and the multipliers in K.impulse become those of the accepted state."""
+    for i in range(K.n):
+        K.rate[i] = K.jump[i]
+    for k in range(K.n_rows):
+        K.lam[k] = K.impulse[k]
 
 
 def forget_steps(K: SingularSteps) -> None:

@@ -21,7 +21,7 @@ from mbd.kernel.mass_ratios import LOSS
 from mbd.kernel.records import Kernel
 from mbd.kernel.restart import MOST_LOADS, evaluate, fill_block, refresh_scales
 from mbd.kernel.schemes.contract import Scheme
-from mbd.kernel.schemes.memory import start_step
+from mbd.kernel.schemes.memory import start_step, take_consistent
 from mbd.kernel.singular.step_size import accept_row_norms, forget_row_norms, note_row_norms
 from mbd.simulation.run.shared_loads import shares
 from mbd.simulation.user_calls import asked
@@ -254,11 +254,6 @@ def _units(names: tuple[str, ...]) -> Any:
     return read_only(np.array([{"m": 0, "rad": 1}.get(name, 2) for name in names], dtype=np.int64))
 
 
-def _nothing(K: Kernel, h: float) -> int:
-    """A hook that an entry does without."""
-    return 0
-
-
 class KernelScheme:
     """Hooks of the interpreted kernel: the functions of a compiled scheme, step by step what machine code does."""
 
@@ -268,7 +263,15 @@ class KernelScheme:
     def __init__(self, scheme: Scheme) -> None:
         self.scheme = scheme
         self.start, self.step, self.accept = (self._within(hook) for hook in (scheme.start, scheme.step, scheme.accept))
-        self.resume, self.error = self._within(scheme.resume), self._within(scheme.error)
+        self.resume = self._within(scheme.resume or self._start_there)
+        self.error = self._within(scheme.error or self._has_left_its_error)
+
+    def _start_there(self, K: Kernel, h: float) -> int:
+        take_consistent(K)
+        return self.scheme.start(K)
+
+    def _has_left_its_error(self, K: Kernel, h: float) -> None:
+        pass
 
     def _within(self, hook: Any) -> Any:
         """The hook, in which an index beyond an array or a wrong field is an error by file, line and function."""
@@ -286,7 +289,7 @@ class KernelScheme:
                     + memory * isinstance(error, IndexError)
                 ) from error
 
-        return called if hook is not None else _nothing
+        return called
 
 
 class PlainScheme:
