@@ -20,6 +20,7 @@ from mbd.compile.python import ArrayFunction, array_function
 from mbd.equations import programs
 from mbd.equations.charts import chart_end, chart_motion
 from mbd.equations.equations import Equations
+from mbd.equations.sizes import require_room_for_tangent
 from mbd.errors import UnknownNameError, nearest
 from mbd.tape.node import Node
 
@@ -115,6 +116,7 @@ class Mechanism:
         key = (tuple(rows), tuple(penalties), tuple(sliding), tuple(given_rows), stabilized)
         with self.equations.tape.lock:  # runs in other threads share this mechanism
             if key not in self._modes:
+                require_room_for_tangent(len(self.equations.tape.nodes))
                 started = perf_counter()
                 outputs = programs.newton(self.equations, rows, penalties, stabilized, sliding, given_rows)
                 order = self._order(outputs, key[0])

@@ -10,7 +10,7 @@ from mbd.errors import ModelError
 from mbd.free_memory import available, size_in_words
 from mbd.topology.plan import Plan
 
-__all__ = ["operations", "require_room"]
+__all__ = ["operations", "require_room", "require_room_for_tangent"]
 
 OF_PAIR = {True: 10.0, False: 40.0}
 """Operations for each pair of coordinates on one path, of planar and of spatial models [-]."""
@@ -18,6 +18,8 @@ OF_COORDINATE = {True: 285.0, False: 920.0}
 """Operations for each coordinate beside that [-]."""
 BYTES, SECONDS = 800.0, 25e-6
 """Memory and time of an operation as it is derived and compiled; both measured, on chains of 30 to 1000 links."""
+BYTES_OF_TANGENT = 550.0
+"""Memory for each of these operations beside that as the tangent of implicit steps is derived and compiled."""
 LARGE = 1e6
 """Operations below which the free memory is not asked for [-]."""
 FEW = 12
@@ -58,3 +60,22 @@ def require_room(plan: Plan) -> None:
         f"and {size_in_words(free)} of memory is free; describe fewer bodies, branches in place of one long chain, or "
         "cut='all', whose bodies do not follow each other"
     )
+
+
+def require_room_for_tangent(derived: int) -> None:
+    """Refuse Newton's matrix of `derived` operations where it would not fit into the memory that is free.
+
+    Raises
+    ------
+    ModelError
+        with the memory foretold, and what to try.
+    """
+    if derived < LARGE:
+        return
+    needed, free = BYTES_OF_TANGENT * derived, available()
+    if needed > free:
+        raise ModelError(
+            f"the equations take {derived:.2g} operations: the tangent of implicit steps needs at least "
+            f"{size_in_words(needed)}, and {size_in_words(free)} of memory is free; use mbd.RungeKutta853(), which "
+            "needs none, describe fewer bodies, branches in place of one long chain, or cut='all'"
+        )

@@ -49,3 +49,15 @@ def test_chains_of_usual_length_ask_for_no_memory(monkeypatch):
 
     monkeypatch.setattr(sizes, "available", asked)
     sizes.require_room(plan(chain(200)))
+
+
+def test_implicit_steps_whose_tangent_does_not_fit_are_refused_before_it_is_derived(monkeypatch):
+    model = chain(25)
+    start = mbd.assemble(model)
+    derived = len(mechanism_of(model).equations.tape.nodes)
+    monkeypatch.setattr(sizes, "LARGE", 1e3)
+    monkeypatch.setattr(sizes, "available", lambda: 0.9 * sizes.BYTES_OF_TANGENT * derived)
+    with pytest.raises(mbd.ModelError, match=r"tangent of implicit steps needs at least .* MB.*RungeKutta853"):
+        mbd.simulate(model, start, mbd.HHT(0.05), dt=1e-3, until=0.01)
+    assert len(mechanism_of(model).equations.tape.nodes) == derived
+    assert mbd.simulate(model, start, mbd.RungeKutta853(), dt=1e-3, until=0.01).success
