@@ -190,7 +190,7 @@ def phase_portrait(run: Trajectory, *coordinates: str, path: str | Path | None =
     Without names: every coordinate in radians, or every coordinate if there is none.
     """
     moving = run.facts.coordinates[: run.facts.coordinate_count]
-    known = {name: unit for name, unit in moving if not run.facts.velocities or f"{name}.rate" in run}
+    known = {name: kind for name, kind in moving if not run.facts.velocities or f"{name}.rate" in run}
     angles = tuple(name for name, kind in known.items() if kind == "rad")
     wanted: Sequence[str] = coordinates or angles or tuple(known)
     time, values = curves(run, [part for name in wanted for part in (name, f"{name}.rate")])
