@@ -19,8 +19,8 @@ GROUPS = {
     "Starts and runs": "assemble project State simulate Trajectory load sweep Sweep",
     "Integrators": "HHT GeneralizedAlpha Newmark RadauIIA RungeKutta853",
     "Analysis": "accuracy Accuracy Known effects Effects linearize Linearization mobility Mobility criteria Criteria",
-    "Errors and failures": "MbdError ModelError AssemblyError SimulationError CapabilityError MemoryLimitError "
-    "TraceError TrajectoryError UnknownNameError Failure Replay replay",
+    "Errors and failures": "MbdError MbdWarning ModelError AssemblyError SimulationError CapabilityError "
+    "MemoryLimitError TraceError TrajectoryError UnknownNameError Failure Replay replay",
 }
 """Public names by the title of their page."""
 
