@@ -25,9 +25,8 @@ def project_velocity(K: Balance, t: float, q: Reals, y: Reals, m: int, dropping:
     if m == 0:
         return 0
     evaluate(K, t, q, y)
-    o_rate = K.acc_rate
     K.force[: K.n] = 0.0
-    K.bias[: K.n_rows] = K.acc[o_rate : o_rate + K.n_rows]
+    K.bias[: K.n_rows] = K.acc[K.acc_rate : K.acc_rate + K.n_rows]
     status = correct_velocities(K, y, m, dropping)
     if status == 0:
         for i in range(K.n):

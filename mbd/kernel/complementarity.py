@@ -170,11 +170,10 @@ def measure_free(K: Motion, level: int) -> None:
 def departure(K: ContactForces, row: int, sign: float, tolerance: float) -> float:
     """How far sign (B w + bias) of a row is below zero, beyond a tolerance relative to its terms."""
     n = K.n
-    o_B = K.acc_B
     value = K.bias[row]
     size = abs(K.bias[row])
     for j in range(n):
-        slope = K.acc[o_B + row * n + j]
+        slope = K.acc[K.acc_B + row * n + j]
         value += slope * K.jump[j]
         size = max(size, abs(slope) * max(abs(K.jump[j]), K.typical[j]))
     return float(-sign * value - tolerance * size)

@@ -65,7 +65,6 @@ def known_error(K: Balance, m: int) -> float:
     the forces would give each coordinate alone. K.jump is kept; the worst coordinate is left in K.failure_index.
     """
     n = K.n
-    o_B = K.acc_B
     K.trial_jump[:n] = K.jump[:n]
     for unit in range(3):
         size = 0.0
@@ -87,7 +86,7 @@ def known_error(K: Balance, m: int) -> float:
     for k in range(m):
         K.work[k] = 0.0
         for i in range(n):
-            K.work[k] += K.acc[o_B + K.rows[k] * n + i] * K.jump[i]
+            K.work[k] += K.acc[K.acc_B + K.rows[k] * n + i] * K.jump[i]
     find_imbalance(K)
     for i in range(n):
         K.rhs[i] = K.out[i]

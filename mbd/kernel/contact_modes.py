@@ -158,8 +158,6 @@ def find_painleve_contacts(K: Balance) -> int:
     Eur. J. Mech. A 18:653). K.jump and K.impulse are kept.
     """
     n = K.n
-    o_R = K.acc_R
-    o_B = K.acc_B
     for f in range(K.n_frictions):
         c = K.friction_contact[f]
         if c < 0 or K.sticks[f] == 1 or K.slip[f] == 0.0 or K.loose[f] > 0 or K.closed[c] == 0:
@@ -167,7 +165,7 @@ def find_painleve_contacts(K: Balance) -> int:
         normal = K.normal[c]
         for i in range(n):
             K.trial_jump[i] = K.jump[i]
-            K.force[i] = -K.acc[o_R + i * K.n_rows + normal]
+            K.force[i] = -K.acc[K.acc_R + i * K.n_rows + normal]
         for k in range(K.n_rows):
             K.trial[k] = K.impulse[k]
             K.bias[k] = 0.0
@@ -180,7 +178,7 @@ def find_painleve_contacts(K: Balance) -> int:
         gained = 0.0
         alone = 0.0  # of the same push if no other row held
         for j in range(n):
-            slope = K.acc[o_B + normal * n + j]
+            slope = K.acc[K.acc_B + normal * n + j]
             gained += slope * K.jump[j]
             alone += slope * slope / K.acc[j * n + j] if K.acc[j * n + j] > 0.0 else 0.0
         K.jump[:n] = K.trial_jump[:n]

@@ -165,13 +165,12 @@ def give_back(K: Switching, factor: float) -> int:
 
 def work_given_back(K: ContactForces) -> float:
     """Work of the normal impulses of the second phase, ½ Σ Λ (γ_c + γ⁺)."""
-    o_B = K.acc_B
     work = 0.0
     for k in range(K.n_rows):
         if K.trial_given[k] != 0.0:
             before = row_speed(K, k)
             for j in range(K.n):
-                before += K.acc[o_B + k * K.n + j] * K.trial_jump[j]
+                before += K.acc[K.acc_B + k * K.n + j] * K.trial_jump[j]
             work -= 0.5 * (K.total[k] - K.trial[k]) * (before + speed(K, k))
     return work
 

@@ -70,10 +70,9 @@ def loosen(K: Frictions) -> None:
 
 def speed(K: ContactForces, row: int) -> float:
     """γ of a row after the jumps so far."""
-    o_B = K.acc_B
     value = row_speed(K, row)
     for j in range(K.n):
-        value += K.acc[o_B + row * K.n + j] * K.total_jump[j]
+        value += K.acc[K.acc_B + row * K.n + j] * K.total_jump[j]
     return value
 
 
@@ -110,14 +109,13 @@ def let_rebound(K: ContactForces) -> None:
 def energy_gain(K: ContactForces) -> float:
     """Work of all impulses on the mechanism, ½ Σ λ̂ (γ⁻ + γ⁺), relative to its terms."""
     n = K.n
-    o_B = K.acc_B
     loss = 0.0
     size = 1e-300
     for k in range(K.n_rows):
         if K.impulse[k] != 0.0:
             half = 0.0
             for j in range(n):
-                half += 0.5 * K.acc[o_B + k * n + j] * K.jump[j]
+                half += 0.5 * K.acc[K.acc_B + k * n + j] * K.jump[j]
             before = row_speed(K, k)
             loss += K.impulse[k] * (before + half)
             size += abs(K.impulse[k]) * (abs(before) + abs(half))

@@ -78,17 +78,15 @@ def polish_rates(K: Balance, kept: float) -> None:
 def polish_with_rows(K: Balance, m: int) -> None:
     """The same of K.jump and of K.impulse for the m rows in K.rows, with the factors of `[M R; B 0]` in K.kkt."""
     n = K.n
-    o_B = K.acc_B
-    o_bias = K.acc_bias
     K.block[K.o_lam : K.o_lam + K.n_rows] = K.impulse[: K.n_rows]
     find_imbalance(K)
     for i in range(n):
         K.rhs[i] = -K.out[i]
     for k in range(m):
         row = K.rows[k]
-        off = K.acc[o_bias + row]
+        off = K.acc[K.acc_bias + row]
         for i in range(n):
-            off += K.acc[o_B + row * n + i] * K.jump[i]
+            off += K.acc[K.acc_B + row * n + i] * K.jump[i]
         K.rhs[n + k] = -off
     solve_kkt(K, n + m, K.rhs)
     for i in range(n):

@@ -142,11 +142,10 @@ def project_gaps_once(K: Balance) -> int:
     """One Newton step of `project_gaps`; the size of the correction relative to 1 is left in K.correction_size."""
     n = K.n
     evaluate(K, K.time, K.q, K.y)
-    o_h = K.acc_h
     K.force[:n] = 0.0
     for k in range(K.n_rows):
         K.given[k] = 0.0
-        K.bias[k] = K.acc[o_h + k]
+        K.bias[k] = K.acc[K.acc_h + k]
     status = complementarity(K, 2)
     if status != 0:
         return status

@@ -146,7 +146,6 @@ def hold(K: Balance, level: int, pushes: int, drags: int) -> int:
             held += 1
     n = K.n
     size = n + held
-    o_B = K.acc_B
     together = sharing(K)
     K.kkt[: size * size] = 0.0
     for i in range(n):
@@ -155,22 +154,20 @@ def hold(K: Balance, level: int, pushes: int, drags: int) -> int:
             K.kkt[i * size + n + k] = K.acc[o_R + i * K.n_rows + K.rows[k]]
             if together:
                 K.kkt[i * size + n + k] += shared(K, i, K.rows[k])
-            K.kkt[(n + k) * size + i] = K.acc[o_B + K.rows[k] * n + i]
+            K.kkt[(n + k) * size + i] = K.acc[K.acc_B + K.rows[k] * n + i]
     return held if factor(K.kkt, size, K.pivots) == 0 else -1
 
 
 def fill_problem(K: Balance, held: int, pushes: int, drags: int) -> None:
     """M and q, column by column, of unit pushes and drags."""
     n = K.n
-    o_R = K.acc_R
-    o_B = K.acc_B
     size = pushes + 3 * drags
     K.lcp_matrix[: size * size] = 0.0
     for i in range(pushes + drags):
         row = K.lcp_rows[i]
         value = K.bias[row]
         for j in range(n):
-            value += K.acc[o_B + row * n + j] * K.jump[j]
+            value += K.acc[K.acc_B + row * n + j] * K.jump[j]
         K.lcp_shift[i] = value
         if i >= pushes:
             K.lcp_shift[i + drags] = -value
@@ -180,7 +177,7 @@ def fill_problem(K: Balance, held: int, pushes: int, drags: int) -> None:
             K.lcp_shift[i + 2 * drags] = K.lcp_limit[f] + K.lcp_slope[f] * push
     for j in range(pushes + drags):
         for i in range(n):
-            K.rhs[i] = K.acc[o_R + i * K.n_rows + K.lcp_rows[j]]
+            K.rhs[i] = K.acc[K.acc_R + i * K.n_rows + K.lcp_rows[j]]
         K.rhs[n : n + held] = 0.0
         solve(K.kkt, n + held, K.pivots, K.rhs)
         fill_column(K, j, 1.0, held, pushes, drags)
@@ -202,13 +199,12 @@ def normal_of(K: ContactForces, u: int) -> int:
 def fill_column(K: Balance, column: int, sign: float, held: int, pushes: int, drags: int) -> None:
     """What an unknown does to all γ and limits: ± the solution in K.rhs."""
     n = K.n
-    o_B = K.acc_B
     size = pushes + 3 * drags
     for i in range(pushes + drags):
         row = K.lcp_rows[i]
         value = 0.0
         for j in range(n):
-            value += K.acc[o_B + row * n + j] * K.rhs[j]
+            value += K.acc[K.acc_B + row * n + j] * K.rhs[j]
         K.lcp_matrix[i * size + column] += sign * value
         if i >= pushes:
             K.lcp_matrix[(i + drags) * size + column] -= sign * value

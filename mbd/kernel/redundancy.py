@@ -70,10 +70,9 @@ def longest_row(K: Motion, m: int, unit: int) -> float:
 def length_of(K: Model, row: int) -> float:
     """Length of a row on columns scaled by √M_ii."""
     n = K.n
-    o_B = K.acc_B
     total = 0.0
     for j in range(n):
-        slope = K.acc[o_B + row * n + j]
+        slope = K.acc[K.acc_B + row * n + j]
         weight = K.acc[j * n + j]
         total += slope * slope / weight if weight > 0.0 else slope * slope
     return float(sqrt(total))
@@ -96,11 +95,10 @@ def remaining_norm(K: DependentRows, row: int, kept: int) -> float:
     Its parts along them are left in the next line of K.lower.
     """
     n = K.n
-    o_B = K.acc_B
     base = kept * n
     for j in range(n):
         weight = K.acc[j * n + j]
-        K.basis[base + j] = K.acc[o_B + row * n + j] / (sqrt(weight) if weight > 0.0 else 1.0)
+        K.basis[base + j] = K.acc[K.acc_B + row * n + j] / (sqrt(weight) if weight > 0.0 else 1.0)
     size = square(K.basis, base, n)
     K.lower[kept * K.n_rows : kept * K.n_rows + kept] = 0.0
     for _ in range(2):

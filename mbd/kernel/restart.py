@@ -335,11 +335,10 @@ def add_shares(K: DependentRows, A: Reals, m: int) -> None:
 
 def holds_rows(K: Motion, m: int) -> bool:
     """Whether the rows on positions hold at the candidate, at which K.acc is."""
-    o_h = K.acc_h
     for k in range(m):
         row = K.rows[k]
         size = max(K.scale[K.n + row], 1e-3)
-        if K.row_level[row] == 0 and not abs(K.acc[o_h + row]) <= max(K.tolerance, 1024.0 * EPS) * size:
+        if K.row_level[row] == 0 and not abs(K.acc[K.acc_h + row]) <= max(K.tolerance, 1024.0 * EPS) * size:
             return False
     return True
 
@@ -355,13 +354,11 @@ def find_sliding_friction(K: ContactForces) -> None:
 def load_accelerations(K: ContactForces) -> None:
     """Right-hand sides of the acceleration level."""
     n = K.n
-    o_bias = K.acc_bias
     K.force[:n] = K.acc[K.acc_f : K.acc_f + n]
-    K.bias[: K.n_rows] = K.acc[o_bias : o_bias + K.n_rows]
+    K.bias[: K.n_rows] = K.acc[K.acc_bias : K.acc_bias + K.n_rows]
 
 
 def capture(K: Mechanism, c: int) -> None:
     """Hold the anchors of a contact that closes; K.acc is evaluated at the instant."""
-    o_captured = K.acc_captured
     for k in range(K.anchor_start[c], K.anchor_start[c + 1]):
-        K.anchors[k] = K.acc[o_captured + k]
+        K.anchors[k] = K.acc[K.acc_captured + k]

@@ -148,8 +148,6 @@ def solve_matrix(K: Balance, m: int, together: bool, tolerance: float) -> int:
     """
     n = K.n
     size = n + m
-    o_R = K.acc_R
-    o_B = K.acc_B
     o = 0 if together else order_at(K, m)
     if o > 0 and factor_ordered(K, K.acc, o, OF_ACCELERATIONS, LOSS_AT_ONCE):  # far from any loss of rank
         return solve_in_order(K, m)
@@ -157,13 +155,13 @@ def solve_matrix(K: Balance, m: int, together: bool, tolerance: float) -> int:
     for i in range(n):
         A[i * size : i * size + n] = K.acc[i * n : i * n + n]
         for k in range(m):
-            A[i * size + n + k] = K.acc[o_R + i * K.n_rows + K.rows[k]]
+            A[i * size + n + k] = K.acc[K.acc_R + i * K.n_rows + K.rows[k]]
             if together:
                 A[i * size + n + k] += shared(K, i, K.rows[k])
         K.rhs[i] = -K.force[i]
     for k in range(m):
         row = K.rows[k]
-        A[(n + k) * size : (n + k) * size + n] = K.acc[o_B + row * n : o_B + row * n + n]
+        A[(n + k) * size : (n + k) * size + n] = K.acc[K.acc_B + row * n : K.acc_B + row * n + n]
         A[(n + k) * size + n : (n + k) * size + n + m] = 0.0
         K.rhs[n + k] = -K.bias[row]
     finite = 0.0
@@ -195,7 +193,6 @@ def contradicts(K: Balance, y: Any, m: int, moving: bool) -> bool:
     rows of its unit, those of the velocities y included where they are what is corrected (`moving`).
     """
     n = K.n
-    o_B = K.acc_B
     for unit in range(3):
         worst = 0.0
         size = 0.0
@@ -205,7 +202,7 @@ def contradicts(K: Balance, y: Any, m: int, moving: bool) -> bool:
                 missed = K.bias[row]
                 terms = abs(missed)
                 for j in range(n):
-                    slope = K.acc[o_B + row * n + j]
+                    slope = K.acc[K.acc_B + row * n + j]
                     missed += slope * K.jump[j]
                     terms += abs(slope * K.jump[j])
                     terms += abs(slope * y[j]) if moving else 0.0
@@ -227,16 +224,14 @@ def factor_saddle(K: Equations, m: int, symmetric: bool, loss: float) -> bool:
     if o > 0 and factor_ordered(K, K.acc, o, SYMMETRIC if symmetric else OF_ACCELERATIONS, loss):
         return True
     K.order_start = 0
-    o_R = K.acc_R
-    o_B = K.acc_B
     for i in range(n):
         K.kkt[i * size : i * size + n] = K.acc[i * n : i * n + n]
     for k in range(m):
         row = K.rows[k]
         for i in range(n):
-            entry = K.acc[o_B + row * n + i]
+            entry = K.acc[K.acc_B + row * n + i]
             K.kkt[(n + k) * size + i] = entry
-            K.kkt[i * size + n + k] = entry if symmetric else K.acc[o_R + i * K.n_rows + row]
+            K.kkt[i * size + n + k] = entry if symmetric else K.acc[K.acc_R + i * K.n_rows + row]
         K.kkt[(n + k) * size + n : (n + k) * size + n + m] = 0.0
     return bool(factor(K.kkt, size, K.pivots) == 0)
 

@@ -104,10 +104,9 @@ def close_by_impact(K: Switching, fastest: float) -> int:
 
 def loss_of(K: ContactForces, row: int) -> float:
     """What the impulse of a row took, −½ Λ (γ⁻ + γ⁺): its part of the kinetic energy lost."""
-    o_B = K.acc_B
     rate = row_speed(K, row)
     for j in range(K.n):
-        rate += 0.5 * K.acc[o_B + row * K.n + j] * K.jump[j]
+        rate += 0.5 * K.acc[K.acc_B + row * K.n + j] * K.jump[j]
     return float(K.impulse[row] * rate)
 
 
@@ -133,14 +132,13 @@ def loss_elsewhere(K: ContactForces) -> float:
 def mark_touching(K: Guards) -> None:
     """Contacts at g = 0 and ġ = 0 are left to their acceleration."""
     evaluate(K, K.time, K.q, K.y)
-    o_rate = K.acc_rate
     for c in range(K.n_contacts):
         K.touched[c] = 0
         near = abs(K.guards0[c]) <= 1e-10 * gap_scale(K, c)
         if K.kind[c] == 0 and K.closed[c] == 0 and K.armed[c] == 1 and near and is_watched(K, c, K.guards0):
             still = True
             for k in range(K.n_rows):
-                if K.row_contact[k] == c and K.row_friction[k] < 0 and abs(K.acc[o_rate + k]) > STILL:
+                if K.row_contact[k] == c and K.row_friction[k] < 0 and abs(K.acc[K.acc_rate + k]) > STILL:
                     still = False
             K.touched[c] = 1 if still else 0
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from mbd.kernel.records import Kernel, SingularSteps, State, Steps
 from mbd.kernel.restart import note_scales, raise_scales, retain_scales
 
-__all__ = ["forget_steps", "look_a_step_ahead", "start_step", "take_consistent"]
+__all__ = ["accept_step", "forget_steps", "look_a_step_ahead", "start_step", "take_consistent"]
 
 
 def start_step(K: State) -> float:
@@ -32,6 +32,21 @@ def forget_steps(K: SingularSteps) -> None:
     K.aux_step = start_step(K)
     K.near_singular = 0
     K.inverse_pivot = 0.0
+
+
+def accept_step(K: Steps, h: float) -> None:
+    """The candidate after a step of size h becomes the accepted state, with the slopes of its rates and multipliers."""
+    inverse = 1.0 / h
+    K.q[: K.n_q] = K.q1[: K.n_q]
+    for i in range(K.n):
+        K.y[i] = K.y1[i]
+        K.slope[i] = (K.rate1[i] - K.rate[i]) * inverse
+        K.rate[i] = K.rate1[i]
+        K.aux[i] = K.aux1[i]
+    for k in range(K.n_rows):
+        K.lam_slope[k] = (K.lam1[k] - K.lam[k]) * inverse
+        K.lam[k] = K.lam1[k]
+    K.aux_step = h
 
 
 def look_a_step_ahead(K: Steps) -> None:

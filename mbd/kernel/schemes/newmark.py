@@ -14,7 +14,7 @@ from mbd.kernel.records import Kernel, Steps
 from mbd.kernel.restart import compose, consistent, fill_block, measure_accepted
 from mbd.kernel.schemes.contract import Scheme
 from mbd.kernel.schemes.iteration import predict, shift_growth
-from mbd.kernel.schemes.memory import forget_steps, look_a_step_ahead, start_step
+from mbd.kernel.schemes.memory import accept_step, forget_steps, look_a_step_ahead, start_step
 from mbd.kernel.schemes.newton import SEARCHED, UNSOUND, solve_step
 from mbd.kernel.singular.newmark_step import singular_newmark_step
 
@@ -84,20 +84,10 @@ def newmark_step(K: Kernel, h: float, t1: float) -> int:
 def newmark_accept(K: Steps, h: float) -> None:
     """The candidate becomes the accepted state."""
     part = part_of_change(K, h)
-    K.q[: K.n_q] = K.q1[: K.n_q]
-    inverse = 1.0 / h
-    for i in range(K.n):
-        K.y[i] = K.y1[i]
-        K.slope[i] = (K.rate1[i] - K.rate[i]) * inverse
-        K.rate[i] = K.rate1[i]
-        K.aux[i] = K.aux1[i]
     for i in range(K.n_v):
         K.shift_change[i] = part * (K.shift1[i] - K.shift[i])
         K.shift[i] = K.shift1[i]
-    for k in range(K.n_rows):
-        K.lam_slope[k] = (K.lam1[k] - K.lam[k]) * inverse
-        K.lam[k] = K.lam1[k]
-    K.aux_step = h
+    accept_step(K, h)
 
 
 def part_of_change(K: Steps, h: float) -> float:

@@ -21,7 +21,7 @@ from mbd.kernel.restart import (
 from mbd.kernel.schemes.collocation import RADAU
 from mbd.kernel.schemes.contract import Abilities, Scheme
 from mbd.kernel.schemes.iteration import runs_away
-from mbd.kernel.schemes.memory import forget_steps, look_a_step_ahead
+from mbd.kernel.schemes.memory import accept_step, forget_steps, look_a_step_ahead
 from mbd.kernel.schemes.radau_end import complete
 from mbd.kernel.schemes.stage_layout import (
     BALANCES,
@@ -90,21 +90,11 @@ def forget_stages(K: Steps) -> None:
 
 def radau_accept(K: SingularSteps, h: float) -> None:
     """The candidate becomes the accepted state, its stages those to predict the next from."""
-    inverse = 1.0 / h
-    K.q[: K.n_q] = K.q1[: K.n_q]
-    for i in range(K.n):
-        K.y[i] = K.y1[i]
-        K.slope[i] = (K.rate1[i] - K.rate[i]) * inverse
-        K.rate[i] = K.rate1[i]
-        K.aux[i] = K.rate1[i]
-    for k in range(K.n_rows):
-        K.lam_slope[k] = (K.lam1[k] - K.lam[k]) * inverse
-        K.lam[k] = K.lam1[k]
+    accept_step(K, h)
     o = stage_place(K, STAGE_RATES)
     K.past_stages[: 3 * (K.n + K.n_rows + K.n_v)] = K.stages[o : o + 3 * (K.n + K.n_rows + K.n_v)]
     if K.n_active > 0:
         accept_row_norms(K, h)
-    K.aux_step = h
 
 
 def radau_step(K: Kernel, h: float, t1: float) -> int:

@@ -22,7 +22,7 @@ from mbd.kernel.roots import sqrt
 from mbd.kernel.saddle import factor_saddle
 from mbd.kernel.schemes.contract import Abilities, Scheme
 from mbd.kernel.schemes.dormand_prince import NODES, STAGES, tableau
-from mbd.kernel.schemes.memory import forget_steps
+from mbd.kernel.schemes.memory import accept_step, forget_steps
 from mbd.kernel.singular.newmark_step import CONTINUOUS
 from mbd.kernel.singular.step_size import accept_row_norms, forget_row_norms, note_row_norms
 
@@ -167,13 +167,12 @@ def explicit_rates(K: Balance, t: float) -> int:
         if kept < LOSS:
             polish_rates(K, kept)
         return 0
-    o_bias = K.acc_bias
     if not factor_saddle(K, m, False, LOSS_AT_ONCE):
         return SINGULAR
     for i in range(n):
         K.rhs[i] = -K.acc[K.acc_f + i]
     for k in range(m):
-        K.rhs[n + k] = -K.acc[o_bias + K.rows[k]]
+        K.rhs[n + k] = -K.acc[K.acc_bias + K.rows[k]]
     solve_kkt(K, n + m, K.rhs)
     K.jump[:n] = K.rhs[:n]
     if K.uneven_masses == 1:
@@ -286,7 +285,6 @@ def hold_error(K: Steps) -> bool:
     n = K.n
     n_v = K.n_v
     m = K.n_active
-    o_B = K.acc_B
     if not factor_saddle(K, m, True, LOSS_AT_ONCE):
         return False
     for level in range(2):
@@ -295,7 +293,7 @@ def hold_error(K: Steps) -> bool:
             row = K.rows[k]
             off = 0.0
             for j in range(n if level == 1 else n_v):
-                off += K.acc[o_B + row * n + j] * K.error[level * n_v + j]
+                off += K.acc[K.acc_B + row * n + j] * K.error[level * n_v + j]
             K.rhs[n + k] = 0.0 if level == 0 and K.row_level[row] == 1 else -off
         solve_kkt(K, n + m, K.rhs)
         for i in range(n_v):
@@ -305,17 +303,9 @@ def hold_error(K: Steps) -> bool:
 
 def runge_kutta_accept(K: SingularSteps, h: float) -> None:
     """The candidate becomes the accepted state."""
-    inverse = 1.0 / h
-    K.q[: K.n_q] = K.q1[: K.n_q]
-    for i in range(K.n):
-        K.y[i] = K.y1[i]
-        K.slope[i] = (K.rate1[i] - K.rate[i]) * inverse
-        K.rate[i] = K.rate1[i]
-        K.aux[i] = K.rate1[i]
-    K.lam[: K.n_rows] = K.lam1[: K.n_rows]
+    accept_step(K, h)
     if K.n_active > 0:
         accept_row_norms(K, h)
-    K.aux_step = h
 
 
 SCHEME = Scheme(

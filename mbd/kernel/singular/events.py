@@ -143,13 +143,12 @@ def comes_close(K: DependentRows, t: float, part: float) -> bool:
     m = K.n_active
     evaluate(K, t, K.q1, K.y1)
     row_norms(K, m)
-    o_B = K.acc_B
     longest = 0.0  # a row may vanish by itself there
     least = 1e300
     for k in range(m):
         length = 0.0
         for j in range(K.n):
-            entry = K.acc[o_B + K.rows[k] * K.n + j] * K.spare[j]
+            entry = K.acc[K.acc_B + K.rows[k] * K.n + j] * K.spare[j]
             length += entry * entry
         longest = max(longest, length)
         least = min(least, K.work[k])

@@ -81,14 +81,13 @@ def solve_singular_stage(K: Kernel, i: int, h: float, t1: float, m: int, afresh:
     o_W = stage_place(K, STAGE_RATES) + i * n
     o_L = stage_place(K, STAGE_LAM) + i * K.n_rows
     o_s = stage_place(K, CHANGES) + i * (n + m)
-    o_rate = K.acc_rate
     status = project_stage_positions(K, i, h, t1, m, afresh)
     if status != 0:
         return status
     K.rhs[:n] = 0.0
     for k in range(m):
         row = K.rows[k]
-        rate = K.acc[o_rate + row]
+        rate = K.acc[K.acc_rate + row]
         below = not afresh and abs(rate) <= 16.0 * EPS * K.scale[n + K.n_rows + row]
         K.rhs[n + k] = 0.0 if below else -rate
     solve_kkt(K, n + m, K.rhs)
@@ -110,7 +109,6 @@ def solve_singular_stage(K: Kernel, i: int, h: float, t1: float, m: int, afresh:
 def project_stage_positions(K: Kernel, i: int, h: float, t1: float, m: int, afresh: bool) -> int:
     """U_i, with K.acc at the stage and the factors of [M Bᵀ; B 0] there."""
     n = K.n
-    o_h = K.acc_h
     o_U = stage_place(K, STAGE_SHIFT) + i * K.n_v
     for j in range(K.n_v):
         K.stages[o_U + j] *= 0.0 if afresh else 1.0
@@ -128,7 +126,7 @@ def project_stage_positions(K: Kernel, i: int, h: float, t1: float, m: int, afre
                 return NOT_FINITE
         for k in range(m):
             row = K.rows[k]
-            off = 0.0 if K.row_level[row] == 1 else K.acc[o_h + row]
+            off = 0.0 if K.row_level[row] == 1 else K.acc[K.acc_h + row]
             if not abs(off) < 1e300:
                 return NOT_FINITE
             K.rhs[n + k] = -off
@@ -150,14 +148,13 @@ def project_stage_positions(K: Kernel, i: int, h: float, t1: float, m: int, afre
 def take_back(K: Steps, i: int, m: int) -> None:
     """−B Δx into the right-hand side, with Δx what `keep_moves` kept of stage i."""
     n = K.n
-    o_B = K.acc_B
     o_x = stage_place(K, PAIR) + i * K.n_v
     for k in range(m):
         row = K.rows[k]
         across = 0.0
         if K.row_level[row] == 0:
             for j in range(K.n_v):
-                across += K.acc[o_B + row * n + j] * K.stages[o_x + j]
+                across += K.acc[K.acc_B + row * n + j] * K.stages[o_x + j]
         K.rhs[n + k] = -across
 
 
