@@ -4,25 +4,23 @@ The kernel uses little of Python: numbers, flat arrays, fields of its records, `
 slices that are filled with a number or copied, calls of its own functions by position. A name means what it means in
 its module: two modules may each have a `step`. A scalar argument or result has the kind of its annotation; one
 annotated ``Any`` has the kind it is called with, and a function is translated once for each combination of these.
-Local names hold what all their assignments have in common:
-int and float make float.
+Local names hold what all their assignments have in common: int and float make float.
 """
 
 from __future__ import annotations
 
 import ast
 import inspect
-import re
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from importlib import import_module
-from textwrap import dedent
 from types import FunctionType, ModuleType
 from typing import Any
 
 from mbd.errors import CapabilityError
 from mbd.kernel import hints, tree
 from mbd.kernel.records import TABLE
+from mbd.kernel.shorthand import each, formula_of
 
 __all__ = ["Misread", "Source", "functions_of", "source_of", "translate"]
 
@@ -32,9 +30,6 @@ OPERATORS = {
     ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.FloorDiv: "//", ast.Mod: "%", ast.Pow: "**",
     ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!=",
 }  # fmt: skip
-
-ELEMENT = "_element"
-"""Name that counts the elements of a slice."""
 
 
 class Misread(CapabilityError):
@@ -157,7 +152,7 @@ class _Body:
 
     def _Assign(self, node: ast.Assign) -> list[tree.Statement]:
         if isinstance(node.targets[0], ast.Subscript) and isinstance(node.targets[0].slice, ast.Slice):
-            return self._For(_each(node, node.targets[0], node.targets[0].slice))
+            return self._For(each(node, node.targets[0], node.targets[0].slice))
         value = self.value(node.value)
         targets = tuple(self.target(target, value.kind) for target in node.targets)
         for target in targets:
@@ -247,7 +242,7 @@ class _Body:
         if node.attr in TABLE.places:
             return self.element(node)
         if node.attr in TABLE.formulas:
-            return self.value(_formula(node.attr, node.value))
+            return self.value(formula_of(node.attr, node.value))
         record = self.value(node.value)
         if record.kind != "kernel" or node.attr not in TABLE.kinds:
             raise CapabilityError(hints.unknown_field(ast.unparse(node), node.attr, record.kind, FIELDS))
@@ -352,29 +347,6 @@ class _Body:
         return tree.Call(called, values, called.result)
 
 
-def _each(node: ast.Assign, target: ast.Subscript, part: ast.Slice) -> ast.For:
-    """``a[i:j] = b[k:l]`` or ``a[i:j] = number``, element by element; slices begin at 0 where they do not say."""
-    value = node.value
-    copied = isinstance(value, ast.Subscript) and isinstance(value.slice, ast.Slice)
-    overlaps = copied and ast.unparse(value.value) == ast.unparse(target.value)  # type: ignore[attr-defined]
-    if part.upper is None or not (copied or isinstance(value, ast.Constant)) or overlaps or len(node.targets) > 1:
-        raise CapabilityError(hints.expected("a number or a slice of another array to fill a slice with", node))
-    count = part.upper if part.lower is None else ast.BinOp(part.upper, ast.Sub(), part.lower)
-    element = ast.Assign([_element(target)], _element(value) if copied else value, lineno=node.lineno)
-    counts = ast.Call(ast.Name("range", ast.Load()), [count], [])
-    return ast.For(ast.Name(ELEMENT, ast.Store()), counts, [element], [], lineno=node.lineno)
-
-
-def _element(node: ast.expr) -> ast.Subscript:
-    """The element of a slice whose number is counted by `ELEMENT`."""
-    assert isinstance(node, ast.Subscript)
-    assert isinstance(node.slice, ast.Slice)
-    index: ast.expr = ast.Name(ELEMENT, ast.Load())
-    if node.slice.lower is not None:
-        index = ast.BinOp(node.slice.lower, ast.Add(), index)
-    return ast.Subscript(node.value, index, node.ctx)
-
-
 def _converts(kind: str, needed: str) -> None:
     """Whether a value of one kind may stand where another is needed."""
     numbers = ("bool", "int", "real")
@@ -397,22 +369,3 @@ def _power(left: tree.Expression, right: tree.Expression) -> tree.Operation:
     if right == tree.Number(0.5, "real"):
         raise CapabilityError("x ** 0.5 is a root or a power by the level of optimization; try sqrt(x)")
     return tree.Operation("**", left, right, "real")
-
-
-def _formula(name: str, record: ast.expr) -> ast.expr:
-    """The expression of a formula, of the fields of `record`."""
-    (given,), body = _formulas(TABLE.formulas[name])[name]
-    return ast.parse(re.sub(rf"\b{given}\b", ast.unparse(record), body), mode="eval").body
-
-
-@lru_cache(maxsize=64)
-def _formulas(record: type[Any]) -> dict[str, tuple[list[str], str]]:
-    """Arguments and bodies of the formulas that a record declares, by name."""
-    (owner,) = ast.parse(dedent(inspect.getsource(record))).body
-    assert isinstance(owner, ast.ClassDef)
-    return {
-        ast.unparse(line.target): ([each.arg for each in call.args[0].args.args], ast.unparse(call.args[0].body))
-        for line in owner.body
-        if isinstance(line, ast.AnnAssign) and isinstance(call := line.value, ast.Call)
-        if call.args and isinstance(call.args[0], ast.Lambda)
-    }
