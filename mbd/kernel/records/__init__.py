@@ -5,11 +5,18 @@ one kind take. `K` is the record in every function, and its annotation the least
 it calls read or write: ``K: Events`` is blind to contacts, ``K: Balance`` cannot store a row. At run time there is one
 record, `Kernel`, and in machine code one table of addresses.
 
-    Model  State ── Motion ─┬─ Mechanism ── Guards ────────────────────┐
-    Contacts ── Frictions ──┘      │          └ Events                 ├─ Switching ─┐
-    Complementarity ── ContactForces ┬─ Balance ───────────────────────┘ └ Results   ├─ Kernel
-    LinearAlgebra, Report ── Equations ┬─ Steps ─┬─ SingularSteps ───────────────────┘
-                              Memory ──┘         └ Singular (of Balance too)
+    Motion         State, Model: the model at the accepted state and at the candidate
+    ContactRows    Frictions (with Contacts), Model
+    Mechanism      ContactRows, Motion: all that model code is evaluated at
+    Guards         Events, Mechanism
+    ContactForces  Complementarity, ContactRows
+    Equations      LinearAlgebra, Report, Motion
+    Steps          Memory, Equations: what a scheme steps with
+    DependentRows  Singular, Mechanism, Equations
+    SingularSteps  DependentRows, Steps: beside and over singular configurations
+    Balance        ContactForces, DependentRows: consistent accelerations, impulses
+    Switching      Results, Guards, Balance: all but the memory of the scheme
+    Kernel         Switching, SingularSteps
 
 Lengths follow from `Sizes`: n_q coordinates, n = n_v + n_z rates, rows, contacts, guards of the user, frictions,
 anchors. An index that is itself read from an array stays within these because of who writes it:
