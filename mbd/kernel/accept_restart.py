@@ -40,8 +40,7 @@ def put_on_rows(K: Switching, t1: float) -> None:
         return
     if project_velocity(K, t1, K.q1, K.y1, stepping_rows(K), False) == 0:
         watch(K, t1, K.q1, K.y1, K.rate1, K.lam1, K.guards1)
-        for f in range(K.n_frictions):
-            K.limit[f] = K.guards1[K.at_limit + f]
+        K.limit[: K.n_frictions] = K.guards1[K.at_limit : K.at_limit + K.n_frictions]
 
 
 def event_candidate(K: Kernel, h: float, t1: float) -> int:

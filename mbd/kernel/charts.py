@@ -84,8 +84,7 @@ def find_chart_end(K: Motion) -> None:
 def leave_chart(K: Motion) -> None:
     """Velocities and accelerations in place of the rates of the increment and their changes."""
     n_v = K.n_v
-    for i in range(n_v):
-        K.chart[i] = K.block[K.o_x + i]
+    K.chart[:n_v] = K.block[K.o_x : K.o_x + n_v]
     o = carry(K.y1, K.chart, n_v, n_v, True)
     carry(K.rate1, K.chart, o, n_v, True)
     call_on(K, CHART_MOTION, K.chart, K.chart_motion)

@@ -118,8 +118,7 @@ def measure_accepted(K: Mechanism) -> None:
         if abs(K.rate[i]) < unseen:
             K.block[K.o_a + i] = unseen
     refresh_scales(K)
-    for i in range(K.n_v):
-        K.block[K.o_a + i] = K.rate[i]
+    K.block[K.o_a : K.o_a + K.n_v] = K.rate[: K.n_v]
 
 
 def weigh(K: Model) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mbd.kernel.records import Kernel, SingularSteps, State, Steps
+from mbd.kernel.records import Balance, SingularSteps, State, Steps
 from mbd.kernel.restart import note_scales, raise_scales, retain_scales
 
 __all__ = ["accept_step", "forget_steps", "look_a_step_ahead", "start_step", "take_consistent"]
@@ -13,12 +13,10 @@ def start_step(K: State) -> float:
     return float(K.dt if K.adaptive == 1 else K.step)
 
 
-def take_consistent(K: Kernel) -> None:
+def take_consistent(K: Balance) -> None:
     """The rates in K.jump and the multipliers in K.impulse become those of the accepted state."""
-    for i in range(K.n):
-        K.rate[i] = K.jump[i]
-    for k in range(K.n_rows):
-        K.lam[k] = K.impulse[k]
+    K.rate[: K.n] = K.jump[: K.n]
+    K.lam[: K.n_rows] = K.impulse[: K.n_rows]
 
 
 def forget_steps(K: SingularSteps) -> None:
