@@ -15,6 +15,10 @@ LONG = 50.0
 """Distance between points of a body above which it may be given in millimetres [m]."""
 
 
+WIDE = 10.0
+"""Angle above which a whole number may be one in degrees [rad]."""
+
+
 def doubtful(model: Any, equations: Equations, position: Mapping[str, float]) -> list[str]:
     """Sentences on values of a start and of the model that look like mistakes."""
     return _degrees(equations, position) + _lengths(model) + _twice(model)
@@ -26,7 +30,7 @@ def _degrees(equations: Equations, position: Mapping[str, float]) -> list[str]:
         f"position: {name!r} is {value:g} rad, {value / math.tau:.1f} turns; angles are in radians, and {value:g}° is "
         f"math.radians({value:g}) = {math.radians(value):.4g}"
         for name, value in position.items()
-        if name in angles and abs(value) > math.tau and float(value).is_integer()
+        if name in angles and abs(value) >= WIDE and float(value).is_integer()
     ]
 
 

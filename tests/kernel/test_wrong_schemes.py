@@ -107,7 +107,7 @@ def listed(monkeypatch):
         (lambda K, h, t1: 0, "came <function <lambda>"),
         ("step", "came 'step'"),
     ],
-    ids=str,
+    ids=["no step size", "arguments swapped", "an int for a float", "no status", "a lambda", "a text"],
 )
 def test_a_hook_that_the_kernel_could_not_call_is_refused_as_its_entry_is_made(step, message, monkeypatch):
     monkeypatch.chdir(build.Path(__file__).parents[2])
