@@ -1,10 +1,5 @@
-"""Settings of every test: seeded random examples, no window, interrupts that arrive, and what keeps the suite quick.
+"""Settings of every test: seeded random examples, no window, interrupts that arrive, and what keeps the suite quick."""
 
-Machine code of models is made at level 0, in a third of the time of level 2: models of tests are many, and their runs
-short. `tests/compile`, where all levels are held to give the same bits, and long tests have the levels of users.
-"""
-
-import contextlib
 import gc
 import os
 import re
@@ -38,15 +33,6 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
 
 WITHOUT_KERNEL = ("test_layers.py", "tape", "topology", "bodies", "forces", "equations")
 """Parts of the tests that call no compiled kernel, or seldom, those last."""
-
-
-def pytest_configure(config):
-    if config.option.markexpr == "not slow":
-        with contextlib.suppress(ImportError):
-            from mbd.compile import llvm
-
-            config.levels_of_users = llvm.LEVEL, llvm.HASTY
-            llvm.LEVEL, llvm.HASTY = 0, None
 
 
 @pytest.hookimpl(optionalhook=True)

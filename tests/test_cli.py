@@ -333,5 +333,7 @@ def test_the_record_knows_the_script_by_the_hash_of_its_text(script, tmp_path):
 
 
 def test_the_package_is_a_command_too():
-    answer = subprocess.run([sys.executable, "-m", "mbd", "--version"], capture_output=True, text=True, check=True)
+    answer = subprocess.run(
+        [sys.executable, "-m", "mbd", "--version"], capture_output=True, text=True, check=True, timeout=60
+    )
     assert answer.stdout.strip() == f"mbd {mbd.__version__}"
