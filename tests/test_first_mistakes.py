@@ -1,4 +1,4 @@
-"""What people get wrong in their first hour, and what they are told or given."""
+"""What people get wrong in their first hour: the errors, warnings and functions that answer it."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def test_functions_of_numpy_are_those_of_mbd(of_numpy: Callable[[Any], Any], of_
         (lambda t: np.clip(t, 0.0, None, out=None), "numpy.clip of traced values is not recorded; write mbd.clip"),
     ],
 )
-def test_laws_that_cannot_be_recorded_are_told_what_to_write(law: Any, said: str) -> None:
+def test_an_error_about_a_law_that_cannot_be_recorded_says_what_to_write(law: Any, said: str) -> None:
     with pytest.raises(mbd.TraceError, match=said):
         driven(law)
 
@@ -117,7 +117,7 @@ def test_a_body_that_turns_about_z_on_a_lift_needs_one_number() -> None:
         ("Rod.end.x", r"did you mean 'rod.end.x'\?"),
     ],
 )
-def test_a_result_that_is_none_is_told_its_neighbours(asked: str, said: str) -> None:
+def test_an_error_about_an_unknown_result_lists_its_neighbours(asked: str, said: str) -> None:
     with pytest.raises(mbd.UnknownNameError, match=said):
         driven(0.0)[asked]
 
