@@ -10,6 +10,7 @@ import sympy
 from hypothesis import given, settings, strategies as st
 
 import mbd
+from mbd.assembly.posture import damped_step
 from mbd.compile.mechanisms import mechanism_of
 from tests.simulation.mechanisms import ball, box, falling, kneed_walker, kneed_walker_start, pendulum, point, two_balls
 
@@ -328,3 +329,16 @@ def test_projection_moves_no_named_value_that_need_not_move():
     state = mbd.assemble(LINKAGE, named, {"a.angle": 300.0}, project=True)
     assert state["a.angle"] == 0.3 and state["a.angle.rate"] == 300.0
     np.testing.assert_allclose(state.q, held.q, atol=1e-12)
+
+
+@given(rows=st.integers(1, 5), columns=st.integers(1, 5), seed=st.integers(0, 2**32 - 1), size=st.floats(1e-8, 1e8))
+def test_the_damped_step_takes_rows_of_any_rank_and_size(rows: int, columns: int, seed: int, size: float) -> None:
+    """Where |h + J x|² + d |x|² is least, Jᵀ (h + J x) + d x = 0; J has half the rank that its shape allows."""
+    draw, rank = np.random.default_rng(seed), (min(rows, columns) + 1) // 2
+    J, h = size * draw.normal(size=(rows, rank)) @ draw.normal(size=(rank, columns)), draw.normal(size=rows)
+    for damping in (1e-12, 1e-3, 1e12):
+        x = damped_step(J, h, damping)
+        scale = np.linalg.norm(J, 2)
+        balance = J.T @ (h + J @ x) + damping * x
+        assert np.all(np.isfinite(x))
+        assert np.linalg.norm(balance) <= 1e-13 * scale * (np.linalg.norm(h) + scale * np.linalg.norm(x))

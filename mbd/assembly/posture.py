@@ -13,8 +13,8 @@ from mbd.assembly.pose import Posture
 from mbd.assembly.turns import choose_turns, hold_directions
 
 __all__ = [
-    "Posture", "TOLERANCE", "capture", "close_nearby", "close_positions", "close_velocities", "descend",
-    "descents", "move", "position_rows",
+    "Posture", "TOLERANCE", "capture", "close_nearby", "close_positions", "close_velocities", "damped_step",
+    "descend", "descents", "move", "position_rows",
 ]  # fmt: skip
 
 TOLERANCE = 1e-9
@@ -121,21 +121,27 @@ def descend(work: Posture, rows: Sequence[int], free: Matrix, weights: Vector) -
     damping = 1e-3
     for _ in range(DESCENT):
         J = B[:, moving]
-        slope = J.T @ h
-        if not len(moving) or np.linalg.norm(slope) <= 1e-13 * (1.0 + np.linalg.norm(h)):
+        steep = np.linalg.norm(J.T @ h) > 1e-13 * (1.0 + np.linalg.norm(h))
+        if not len(moving) or not steep:  # nor where the rows have no derivative
             break
         before, x = work.q.copy(), np.zeros(n_v)
-        x[moving] = -np.linalg.solve(J.T @ J + damping * np.eye(len(moving)), slope)
+        x[moving] = damped_step(J, h, damping)
         x *= min(1.0, 0.5 / float(np.max(np.abs(x))))
         move(work, x)
         new_h, new_B = _weighted_rows(work, rows, weights)
-        if np.linalg.norm(new_h) < np.linalg.norm(h):
+        if np.linalg.norm(new_h) < np.linalg.norm(h) and np.all(np.isfinite(new_B)):
             h, B, damping = new_h, new_B, max(damping / 3.0, 1e-12)
         else:
             work.q, damping = before, 4.0 * damping
             if damping > 1e12:
                 break
     return h / weights, B / weights[:, None]
+
+
+def damped_step(J: Matrix, h: Vector, damping: float) -> Vector:
+    """The x that makes |h + J x|² + damping |x|² least, for J = U Σ Vᵀ of any rank: −V Σ (Σ² + damping)⁻¹ Uᵀ h."""
+    U, sizes, V = np.linalg.svd(J, full_matrices=False)
+    return np.asarray(-V.T @ (sizes / (sizes**2 + damping) * (U.T @ h)))
 
 
 def _weighted_rows(work: Posture, rows: Sequence[int], weights: Vector) -> tuple[Vector, Matrix]:
