@@ -3,35 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, Future, as_completed
+from concurrent.futures import Executor
 from contextlib import nullcontext
 from dataclasses import dataclass
-from functools import partial
 from itertools import product
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 
+from mbd.analysis.sweep_runs import SETTINGS, Results, Runs, cell, rows_of
 from mbd.compile.mechanisms import mechanism_of
-from mbd.errors import MbdError, ModelError, SimulationError, UnknownNameError, nearest
+from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.progress import share_bar
 from mbd.results.archive import named_file, write_whole
-from mbd.simulation.simulate import simulate
-from mbd.simulation.user_calls import asked
 from mbd.state import State
-from mbd.trajectory import Trajectory
 
 __all__ = ["Sweep", "sweep"]
 
-SETTINGS = ("integrator", "dt", "tol", "until", "contact", "impact", "locate", "rest_speed")
-"""Arguments of `simulate` that may take several values, beside the model's parameters."""
-
 OUTCOME = ("success", "message")
 """Columns of every table."""
-
-Results: TypeAlias = Sequence[str] | Mapping[str, Callable[[Trajectory], float]]
-"""What is kept of each run: names of quantities, at its end, or functions of the run by title."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +34,7 @@ class Sweep:
     names : what was varied; cases : its values in each run, in the order of `names`, the last varying fastest
     results : by title, one value for each run; NaN where the run failed
     success, messages : of each run
+    complete : False where Ctrl-C ended the sweep; runs that it never came to say so in their message
     """
 
     names: tuple[str, ...]
@@ -50,6 +42,7 @@ class Sweep:
     results: Mapping[str, tuple[float, ...]]
     success: tuple[bool, ...]
     messages: tuple[str, ...]
+    complete: bool = True
 
     def __len__(self) -> int:
         return len(self.cases)
@@ -95,16 +88,12 @@ class Sweep:
     def _lines(self) -> Iterator[str]:
         """A line for each run; messages of those that failed."""
         columns = {title: column for title, column in self.columns.items() if title not in OUTCOME}
-        texts = {title: [_cell(value) for value in column] for title, column in columns.items()}
+        texts = {title: [cell(value) for value in column] for title, column in columns.items()}
         widths = {title: max(map(len, (title, *column))) for title, column in texts.items()}
         yield "  ".join(f"{title:>{widths[title]}}" for title in texts)
         for k in range(len(self)):
             line = "  ".join(f"{column[k]:>{widths[title]}}" for title, column in texts.items())
             yield line if self.success[k] else f"{line}  failed: {self.messages[k]}"
-
-
-def _cell(value: Any) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def sweep(
@@ -129,85 +118,31 @@ def sweep(
     start : a state; or a function of the parameters that differ, by name, that assembles one
     results : what to keep: names of quantities, whose value at the end of the run is kept, or functions by title,
         ``{"top": lambda run: run["hip.angle"].max()}``
-    executor : runs side by side, such as a ``concurrent.futures.ThreadPoolExecutor()`` (machine code runs without
-        Python's lock), or a ``ProcessPoolExecutor()`` where model, start and functions can be pickled; None: in turn
+    executor : any ``concurrent.futures.Executor``, for runs side by side: a ``ThreadPoolExecutor()`` (machine code runs
+        without Python's lock), or a ``ProcessPoolExecutor()`` where model, start and functions can be pickled, whose
+        processes derive a model once at most and take its machine code from the cache; None: in turn
     progress : True for a bar on a terminal
     settings : further arguments of `simulate`, the same in all runs
 
     Returns
     -------
     Sweep
-        A run that fails is a line of the table with its message, and so is one of which a function finds no result.
+        A run that fails is a line of the table with its message, and so is one of which a function finds no result, or
+        whose process died. Ctrl-C ends the sweep and keeps the lines of runs that were over, see ``complete``.
 
     Raises
     ------
     ModelError, UnknownNameError
-        for names that the model does not have, before the first run.
+        for names that the model does not have, and what cannot be sent to processes, before the first run.
     """
     titles = _checked(model, values, start, results, executor, settings)
     cases = tuple(product(*values.values()))
-    one = partial(_one, model, tuple(values), start, results, settings)
+    runs = Runs(model, tuple(values), start, results, settings)
     with share_bar() if progress else nullcontext() as bar:
-        found = _all(one, cases, executor, bar)
-    columns = {title: tuple(row[0][k] for row in found) for k, title in enumerate(titles)}
-    return Sweep(tuple(values), cases, columns, tuple(row[1] for row in found), tuple(row[2] for row in found))
-
-
-def _all(one: Callable[[tuple[Any, ...]], Any], cases: Sequence[tuple[Any, ...]], executor: Any, bar: Any) -> list[Any]:
-    """What came of every case, in their order."""
-    found: list[Any] = []
-    if executor is None:
-        for case in cases:
-            found.append(one(case))
-            if bar is not None:
-                bar(len(found), len(cases))
-        return found
-    futures: list[Future[Any]] = [executor.submit(one, case) for case in cases]
-    try:
-        for done, _ in enumerate(as_completed(futures), start=1):
-            if bar is not None:
-                bar(done, len(cases))
-        return [future.result() for future in futures]
-    finally:
-        for future in futures:
-            future.cancel()
-
-
-def _one(
-    model: Any, names: tuple[str, ...], start: Any, results: Results, settings: Mapping[str, Any], case: tuple[Any, ...]
-) -> tuple[list[float], bool, str]:
-    """(results, success, message) of one run."""
-    given = dict(zip(names, case, strict=True))
-    own = {name: value for name, value in given.items() if name in SETTINGS}
-    parameters = {**(settings.get("parameters") or {}), **{n: v for n, v in given.items() if n not in SETTINGS}}
-    count = len(results)
-    try:
-        begin = asked(_calling(start, given), start, parameters) if callable(start) else start
-        run = simulate(model, begin, **{**settings, **own, "parameters": parameters, "on_failure": "return"})
-    except MbdError as error:
-        return [float("nan")] * count, False, str(error)
-    if not run.success:
-        return [float("nan")] * count, False, run.message
-    if not isinstance(results, Mapping):
-        return [float(run[name][-1]) for name in results], True, run.message
-    found, missing = [], []
-    for title, function in results.items():
-        try:
-            found.append(asked(f"the function for {title!r}", _number, function, run))
-        except SimulationError as error:  # the event that it looks for did not come, say: other runs still count
-            found.append(float("nan"))
-            missing.append(str(error))
-    return found, not missing, "; ".join(missing) or run.message
-
-
-def _calling(start: Any, given: Mapping[str, Any]) -> str:
-    """Which function makes the start, and with which values of the sweep."""
-    values = ", ".join(f"{name} = {_cell(value)}" for name, value in given.items())
-    return f"start={getattr(start, '__qualname__', None) or repr(start)} at {values}"
-
-
-def _number(function: Callable[[Trajectory], float], run: Trajectory) -> float:
-    return float(function(run))
+        rows, complete = rows_of(runs, cases, executor, bar)
+    columns = {title: tuple(row.results[k] for row in rows) for k, title in enumerate(titles)}
+    success, messages = tuple(row.success for row in rows), tuple(row.message for row in rows)
+    return Sweep(tuple(values), cases, columns, success, messages, complete)
 
 
 def _checked(model: Any, values: Any, start: Any, results: Any, executor: Any, settings: Any) -> list[str]:
