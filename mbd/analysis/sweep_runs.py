@@ -64,7 +64,7 @@ class Runs:
     settings: Mapping[str, Any]
 
     def __call__(self, case: tuple[Any, ...]) -> Row:
-        """One run; whatever goes wrong in it is told in its row."""
+        """One run; its row says whatever goes wrong in it."""
         try:
             return self._row(case)
         except MbdError as error:
@@ -214,7 +214,7 @@ def rows_of(
     if executor is None:
         return _in_turn(runs, cases, bar)
     if isinstance(executor, ProcessPoolExecutor):
-        _ = runs.parcel  # what cannot be sent is told before anything is
+        _ = runs.parcel  # what cannot be sent is named before anything runs
     futures: list[Future[Row]] = []
     complete = True
     try:
