@@ -8,9 +8,10 @@ nothing else in such a run), and the state it keeps tells the size of its own la
 
 The error is controlled per unit of time: positions may err by K.allowed per second, and by their round-off in each
 step, ``err = max |e| / (allowed h + round-off)``, where e is also h times the error of velocities and, relative to
-their size, that of first-order states. A step is taken again where ``0.9 err^(−1/p) < 0.8``, p = K.error_order, else
-this factor, between 0.2 and 5 (2 where the scheme remembers the step), gives the next one; schemes with memory or
-factors keep their step between 0.8 and 1.25.
+the largest size that they had so far, that of first-order states: one that passes through zero is as accurate there as
+elsewhere, and one that begins at zero is measured by what longer tries made of it. A step is taken again where
+``0.9 err^(−1/p) < 0.8``, p = K.error_order, else this factor, between 0.2 and 5 (2 where the scheme remembers the
+step), gives the next one; schemes with memory or factors keep their step between 0.8 and 1.25.
 """
 
 from __future__ import annotations
@@ -75,10 +76,23 @@ def error_ratio(K: SingularSteps, h: float) -> float:
         largest = max(largest, error)
     ratio = largest / (K.allowed * h + floor)
     for i in range(n_v, K.n):
-        size = max(max(abs(K.y[i]), abs(K.y1[i])), h * max(abs(K.rate[i]), abs(K.rate1[i])))
+        size = max(largest_state(K, i), h * max(abs(K.rate[i]), abs(K.rate1[i])))
         if size > 0.0:
             ratio = max(ratio, abs(K.error[n_v + i]) / size / (K.allowed * h + CANCELLED * EPS))
     return ratio if ratio < 1e300 else 1e300
+
+
+def largest_state(K: State, i: int) -> float:
+    """The largest size of the first-order state y_i in the run, this candidate among it.
+
+    What an explicit scheme made of it in a step that is not taken tells nothing: it may have been far too long.
+    """
+    z = i - K.n_v
+    K.largest[z] = max(K.largest[z], abs(K.y[i]))
+    size = max(K.largest[z], abs(K.y1[i]))
+    if K.explicit == 0:
+        K.largest[z] = size
+    return float(size)
 
 
 def growth(K: SchemeAbilities, ratio: float) -> float:

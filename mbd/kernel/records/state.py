@@ -69,6 +69,7 @@ class State(SchemeAbilities):
     rate: Reals = reals(lambda s: s.n, kept=True)
     lam: Reals = reals(lambda s: s.n_rows, kept=True)
     anchors: Reals = reals(lambda s: s.n_anchors, kept=True)
+    largest: Reals = reals(lambda s: s.n - s.n_v, kept=True)  # size of each first-order state so far, adaptive only
     q1: Reals = reals(lambda s: s.n_q)  # candidate
     y1: Reals = reals(lambda s: s.n)
     rate1: Reals = reals(lambda s: s.n)
