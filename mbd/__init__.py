@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from mbd.bodies import (
         Domain as Domain,
         Link as Link,
+        Marker as Marker,
         PointMass as PointMass,
         RigidBody as RigidBody,
         box as box,
@@ -139,7 +140,7 @@ _HOMES = {
     "mbd.analysis.numerical": "Criteria criteria",
     "mbd.analysis.sweep": "Sweep sweep",
     "mbd.assembly.assemble": "assemble",
-    "mbd.bodies": "Domain Link PointMass RigidBody box cylinder disk rod segment sphere",
+    "mbd.bodies": "Domain Link Marker PointMass RigidBody box cylinder disk rod segment sphere",
     "mbd.constraints": "Bilateral Controller Event KnifeEdge Nonholonomic Penalty PenaltyParameters Plane "
     "Rolling Unilateral When distance extension flexion height measure penalty_parameters separation touchdown",
     "mbd.equations.energy_description": "Coordinate",

@@ -121,9 +121,17 @@ class Description:
     def frames(self) -> dict[str, Frame]:
         """Every named frame by full name: those of the bodies, and the points that words refer to."""
         result = {frame.full_name: frame for body in self.bodies.values() for frame in body.frames.values()}
-        for frame in self.points():
+        for frame in (*self.points(), *self.markers):
             result.setdefault(frame.full_name, frame)
         return result
+
+    @property
+    def markers(self) -> list[Frame]:
+        """The named points of the bodies, used or not; what is used under a name stands for that name."""
+        used = {frame.full_name: frame for frame in reversed(self.points())}
+        bodies = {id(frame.body): frame.body for frame in self.points()} | {id(self.ground): self.ground}
+        named = {name: frame for body in bodies.values() for name, frame in body.points.items()}
+        return [used.get(name, frame) for name, frame in named.items()]
 
     @property
     def gravity(self) -> Vector3:
@@ -158,7 +166,7 @@ class Description:
     def parameters(self) -> dict[str, float]:
         """Every run-time parameter and its value in this description: {'left thigh.mass': 0.5, …}."""
         result = {f"gravity.{axis}": value for axis, value in zip("xyz", self.gravity, strict=True)}
-        words: list[Body | Frame | Joint] = [*self.bodies.values(), *self.points(), *self.joints]
+        words: list[Body | Frame | Joint] = [*self.bodies.values(), *self.markers, *self.points(), *self.joints]
         for word in words:
             result |= word.parameters()
         taken = {force.name for force in self.forces}  # one may be named like the spring that a joint could have

@@ -7,8 +7,8 @@ import mbd
 __all__ = ["GROUPS", "pages"]
 
 GROUPS = {
-    "Models and bodies": "Model Lagrangian Coordinate PointMass Link RigidBody box cylinder disk rod segment sphere "
-    "Domain on_slope",
+    "Models and bodies": "Model Lagrangian Coordinate PointMass Link RigidBody Marker box cylinder disk rod segment "
+    "sphere Domain on_slope",
     "Joints and losses": "Revolute Prismatic Translation Planar Cylindrical Universal Screw Weld Viscous Quadratic "
     "Coulomb PinFriction Tabulated Dissipation",
     "Constraints and measures": "Bilateral Unilateral Penalty PenaltyParameters penalty_parameters KnifeEdge Rolling "

@@ -90,10 +90,27 @@ class Body(Parameterized, ABC):
         """The frame at the center of mass."""
         return self.frame("center")
 
+    @property
+    def points(self) -> dict[str, Frame]:
+        """The named points that were made on this body, by full name: results of every model that has the body."""
+        return dict(self.__dict__.get("_points", {}))
+
+    def remember(self, frame: Frame) -> Frame:
+        """Keep a named point, so that results have it though nothing else uses it; of two of one name the last.
+
+        One that is there already is given back. It is no part of the body's description: equality, replacement and
+        the equations of motion do not ask for it.
+        """
+        known = self.points
+        if known.get(frame.full_name) != frame:
+            object.__setattr__(self, "_points", {**known, frame.full_name: frame})
+        return self.points[frame.full_name]
+
     def point(self, x: float, y: float, z: float = 0.0, name: str | None = None) -> Frame:
         """A frame at a point of the body, parallel to its axes.
 
-        Its coordinates are run-time parameters 'body.name.x', …; without a name they make the name.
+        Its coordinates are run-time parameters 'body.name.x', …; without a name they make the name. A named one is
+        always among the results, and on the page, though nothing uses it.
 
         Parameters
         ----------
@@ -106,7 +123,7 @@ class Body(Parameterized, ABC):
         elif name in self.frames:
             raise ModelError(f"body '{self.name}' has a frame '{name}' already; give the point another name")
         else:
-            printable(name, f"a point of '{self.name}'")
+            return self.remember(Frame(self, printable(name, f"a point of '{self.name}'"), offset))
         return Frame(self, name, offset)
 
 
@@ -162,7 +179,8 @@ class Frame:
         about = unit_vector(axis, f"axis of a frame turned from '{self.full_name}'")
         turn = number(angle, f"angle of a frame turned from '{self.full_name}'")
         R: Any = product(self.rotation or IDENTITY, constant_rotation(about, turn))
-        return Frame(self.body, name or f"{self.name} turned {turn:.12g}", self.offset, R, self.landmark)
+        frame = Frame(self.body, name or f"{self.name} turned {turn:.12g}", self.offset, R, self.landmark)
+        return self.body.remember(frame) if name and name not in self.body.frames else frame
 
     @property
     def is_planar(self) -> bool:

@@ -23,7 +23,7 @@ free_in_child(_LOCK)
 
 def _description(model: Any) -> Any:
     """What the equations depend on, by identity of the words."""
-    words = [getattr(model, kind, ()) for kind in ("joints", "forces", "constraints", "controllers")]
+    words = [getattr(model, kind, ()) for kind in ("joints", "forces", "constraints", "controllers", "markers")]
     groups = tuple(tuple(group.values() if isinstance(group, Mapping) else group) for group in words)
     return groups, *(getattr(model, key, None) for key in ("gravity", "cut", "tunable"))
 

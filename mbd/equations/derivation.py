@@ -15,7 +15,7 @@ from mbd.equations.derivation_scope import DerivationScope
 from mbd.equations.dynamics import Dynamics, Work
 from mbd.equations.effects import Cause, causes, effect_of, weight_of
 from mbd.equations.equations import Equations, Facing
-from mbd.equations.figure import figure_of
+from mbd.equations.figure import figure_of, shown_markers
 from mbd.equations.laws import Laws
 from mbd.equations.outputs import Outputs
 from mbd.equations.results import offer_results
@@ -101,7 +101,7 @@ def _derived(model: Description, plan: Plan, carried: Sequence[tuple[str, int]] 
         compose=None if vectors else scope.composed, chart=scope.inputs.chart, configuration=scope.configuration,
         idle=tuple(constraints.idle), output=outputs, output_names=outputs.names,
         velocity_names=scope.configuration.velocity_names, notes=plan.notes,
-        figure=figure_of(model),
+        figure=figure_of(model), markers=shown_markers(model),
         geometry=TreeGeometry(scope, dynamics, work, rests, constraints, plan.planar and vectors and not carried),
         frictions=tuple(constraints.frictions), turns=(*scope.turns.values(), *scope.wrapped.values()),
         facings=_facings(scope, constraints),

@@ -292,6 +292,7 @@ class Equations:
     turns : of the cut joints, see `Turn`
     facings : of the cut joints whose rows hold sines, see `Facing`
     idle : (owner, part) of rows of cut joints that hold whatever the motion, and were left out
+    markers : full names of the named points, which pages show
     memory : what follows from the rest, kept once it was found
     """
 
@@ -319,6 +320,7 @@ class Equations:
     turns: tuple[Turn, ...] = ()
     facings: tuple[Facing, ...] = ()
     chart: Chart | None = None
+    markers: tuple[str, ...] = ()
     configuration: Configuration = field(default=None, repr=False)  # type: ignore[assignment]
     memory: dict[str, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 

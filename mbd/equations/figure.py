@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 
 from mbd.bodies.base import Frame
 from mbd.bodies.link import Link
+from mbd.bodies.marker import Marker
 
 if TYPE_CHECKING:
     from mbd.description import Description
 
-__all__ = ["Segments", "figure_of"]
+__all__ = ["Segments", "figure_of", "shown_markers"]
 
 Segments = list[tuple[str, tuple[str, ...]]]
 """(body, its frames in the order of a line); one frame alone is a point. Places are the results 'body.frame.x', …"""
@@ -24,6 +25,11 @@ def figure_of(model: Description) -> Callable[[], Segments]:
     """
     found = _segments(model)
     return lambda: found
+
+
+def shown_markers(model: Description) -> tuple[str, ...]:
+    """Full names of the named points, which are drawn with their names; what only turns a frame is none."""
+    return tuple(frame.full_name for frame in model.markers if frame.landmark is None or isinstance(frame, Marker))
 
 
 def _segments(model: Description) -> Segments:

@@ -6,10 +6,11 @@ from collections.abc import Collection, Iterable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
+from mbd.bodies.base import Frame
 from mbd.equations.derivation_context import DerivationContext
 from mbd.equations.dynamics import Dynamics, Work
 from mbd.equations.equations import Contact, Effect, Equations, Row
-from mbd.equations.outputs import Outputs
+from mbd.equations.outputs import AXES, Outputs
 from mbd.equations.reactions import Wrench, reaction
 from mbd.forces.base import Force
 from mbd.forces.motor import Motor
@@ -44,6 +45,9 @@ def offer_results(
     for name, energy in ("kinetic_energy", equations.kinetic), ("potential_energy", equations.potential):
         outputs.value(name, energy)
     _offer_joints(outputs, scope, dynamics, work, rows, hidden)
+    for frame in model.markers:
+        accelerations = [f"a{axis}" for axis in AXES]
+        outputs.triple(frame.full_name, partial(_frame_acceleration, scope, frame), accelerations)
 
 
 def _offer_joints(
@@ -75,6 +79,11 @@ def _offer_joints(
 
 def _acceleration(scope: DerivationContext, joint: str, place: int) -> Scalar:
     return scope.change(scope.joint(joint).rates[place])
+
+
+def _frame_acceleration(scope: DerivationContext, frame: Frame) -> Triple:
+    x, y, z = (scope.change(rate) for rate in scope.frame(frame).velocity)
+    return x, y, z
 
 
 def offer_rows(outputs: Outputs, tape: Tape, rows: Sequence[Row]) -> None:

@@ -103,6 +103,7 @@ def _facts(facts: Any, heads: Mapping[str, Head]) -> int:
         _list(segment[1], str, "'segments'")
     _pairs(facts.get("frictions", []), "'frictions'")
     _pairs(facts.get("velocities", []), "'velocities'")
+    _list(facts.get("markers", []), str, "'markers'")
     return len(facts["contacts"])
 
 
@@ -165,7 +166,7 @@ def _words(meta: Mapping[str, Any]) -> None:
 def _printable(meta: Mapping[str, Any]) -> None:
     """Names as models have them, without signs that a terminal obeys."""
     facts = meta["facts"]
-    names = [facts["model"], *meta["names"], *(name for name, _ in facts["coordinates"])]
+    names = [facts["model"], *meta["names"], *(name for name, _ in facts["coordinates"]), *facts.get("markers", ())]
     names += [contact["name"] for contact in facts["contacts"]] + [event["name"] for event in meta["events"]]
     for name in names:
         printable(name, "the file")

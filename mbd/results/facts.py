@@ -38,6 +38,7 @@ class Facts:
     segments : (body, (frame, …)) lines of the stick figure, whose points are the results 'body.frame'
     frictions : (name, unit) of the dry frictions of joints, 'N' or 'N m'
     velocities : (name, unit) of velocities that are not the rates of coordinates
+    markers : full names of the named points, 'left shank.toe' or 'heel'
     """
 
     model: str = ""
@@ -47,6 +48,7 @@ class Facts:
     segments: tuple[tuple[str, tuple[str, ...]], ...] = ()
     frictions: tuple[tuple[str, str], ...] = ()
     velocities: tuple[tuple[str, str], ...] = ()
+    markers: tuple[str, ...] = ()
 
     @property
     def rates(self) -> tuple[str, ...]:
@@ -72,6 +74,7 @@ class Facts:
                 if friction.contact < 0
             ),
             _own_velocities(equations),
+            equations.markers,
         )
 
     @classmethod
@@ -85,6 +88,7 @@ class Facts:
             tuple((body, tuple(frames)) for body, frames in data["segments"]),
             tuple((name, unit) for name, unit in data.get("frictions", ())),
             tuple((name, unit) for name, unit in data.get("velocities", ())),
+            tuple(data.get("markers", ())),
         )
 
     def as_json(self) -> dict[str, Any]:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
 from mbd.bodies.algebra import ZERO
 from mbd.bodies.base import Body, Frame
 from mbd.bodies.domains import ParameterCheck, Parameterized
 from mbd.bodies.ground import Ground
+from mbd.bodies.marker import Marker
 from mbd.bodies.point_mass import PointMass
 from mbd.errors import MbdError, ModelError, nearest
 from mbd.forces.base import Force
@@ -131,6 +132,18 @@ def name_faults(model: Description) -> list[str]:
     for frame in model.points():
         if places.setdefault(frame.full_name, frame).parameters() != frame.parameters():
             found.append(f"two different points are named '{frame.full_name}'; give each its own name")
+    return found + _marker_faults(model, kinds)
+
+
+def _marker_faults(model: Description, taken: Collection[str]) -> list[str]:
+    """Markers that share a name, with each other or with another word."""
+    found, bodies = [], {id(body): body for body in _all_bodies(model)}
+    owners: dict[str, str] = {}
+    for name, frame in ((name, frame) for body in bodies.values() for name, frame in body.points.items()):
+        if isinstance(frame, Marker) and name in taken:
+            found.append(f"the marker '{name}' has the name of something else; give each its own name")
+        if owners.setdefault(name, frame.body.name) != frame.body.name:
+            found.append(f"two markers are named '{name}', on '{owners[name]}' and '{frame.body.name}'; rename one")
     return found
 
 

@@ -119,6 +119,7 @@ def _geometry(picture: Scene) -> dict[str, Any]:
             }
             for body, members in picture.segments
         ],
+        "markers": list(picture.markers),
         "grounds": [
             {"normal": [finite(x) for x in ground.normal], "offset": finite(ground.offset)}
             for ground in picture.grounds

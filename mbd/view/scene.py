@@ -83,6 +83,7 @@ class Scene:
 
     points : 'body.frame' names; positions (F, P, 3) [m] at the instants
     segments : (body, numbers of its points); masses : mass of each body that has one [kg]
+    markers : numbers of the points that are shown with their names
     spatial : whether anything moves out of the x–y plane
     """
 
@@ -93,6 +94,7 @@ class Scene:
     masses: dict[str, float]
     grounds: tuple[Ground, ...]
     touches: tuple[Touch, ...]
+    markers: tuple[int, ...]
     spatial: bool
 
 
@@ -100,10 +102,11 @@ def scene(run: Trajectory, count: int) -> Scene:
     """The scene of a run in `count` equal intervals of time and at its events."""
     instants = Instants.of(run, count)
     bodies = [
-        (body, [f"{body}.{frame}" for frame in frames if f"{body}.{frame}.x" in run])
+        (body, [name for frame in frames for name in (f"{body}.{frame}", frame) if f"{name}.x" in run])
         for body, frames in run.facts.segments
     ]
-    points = tuple(dict.fromkeys(point for _, members in bodies for point in members))
+    markers = [name for name in run.facts.markers if f"{name}.x" in run]
+    points = tuple(dict.fromkeys([*(point for _, members in bodies for point in members), *markers]))
     number = {point: k for k, point in enumerate(points)}
     lines = ((body, line) for body, members in bodies if members for line in _lines(members))
     segments = tuple((body, tuple(number[point] for point in line)) for body, line in lines)
@@ -118,7 +121,8 @@ def scene(run: Trajectory, count: int) -> Scene:
         body: run.parameters[f"{body}.mass"] for body, _ in segments if run.parameters.get(f"{body}.mass", 0.0) > 0.0
     }
     grounds = tuple(Ground(turn @ normal, offset) for normal, offset in _grounds(run, instants, raw))
-    return Scene(instants, points, positions, segments, masses, grounds, touches, spatial)
+    named = tuple(number[name] for name in markers)
+    return Scene(instants, points, positions, segments, masses, grounds, touches, named, spatial)
 
 
 def _lines(members: Sequence[str]) -> list[Sequence[str]]:

@@ -68,7 +68,7 @@ function drawFigure(g, v, p, alpha, ghost) {
   const at = run.points.map((_, k) => v.to(pointAt(k, p)));
   const unit = Math.min(Math.max(v.scale * Math.max(path.height, path.width) * 0.017, 3), 8);
   g.globalAlpha = alpha;
-  if (!ghost) at.forEach((q, k) => { if (fixed[k]) drawPivot(g, q, unit); });
+  if (!ghost) at.forEach((q, k) => { if (fixed[k] && inFigure.has(k)) drawPivot(g, q, unit); });
   for (const k of order) {
     const segment = run.segments[k], color = sideColor(segment.side), q = segment.points.map((n) => at[n]);
     g.strokeStyle = color; g.fillStyle = color;
@@ -90,9 +90,26 @@ function drawFigure(g, v, p, alpha, ghost) {
       disc(g, at[n], unit * 0.62, colors.paper, state.hover === n || state.traced.has(n) ? colors.ink : sideColor(run.segments[k].side));
     }
     shown = at;
+    drawMarkers(g, v, p, at, unit);
     if (state.hover >= 0) caption(g, at[state.hover], run.points[state.hover].name);
   }
   g.globalAlpha = 1;
+}
+const inFigure = new Set(run.segments.flatMap((segment) => segment.points));
+function drawMarkers(g, v, p, at, unit) { // small dots with their names, a name only where no other stands
+  const taken = [], width = g.canvas.clientWidth;
+  g.textBaseline = "middle";
+  for (const k of run.markers || []) {
+    const [x, y] = at[k], text = run.points[k].name, size = g.measureText(text).width;
+    if (!inFigure.has(k)) disc(g, at[k], unit * 0.45, colors.ink, colors.paper);
+    if (state.hover === k) continue;
+    const free = (left) => left > 0 && left + size < width && !taken.some((box) => left < box[0] + box[2] && box[0] < left + size && Math.abs(y - box[1]) < 15);
+    const left = [x + 9, x - 9 - size].find(free);
+    if (left === undefined) continue;
+    taken.push([left, y, size]);
+    g.lineWidth = 3.5; g.strokeStyle = colors.paper; g.fillStyle = colors.ink; g.textAlign = "left";
+    g.strokeText(text, left, y); g.fillText(text, left, y);
+  }
 }
 function disc(g, [x, y], r, fill, stroke) {
   g.beginPath(); g.arc(x, y, r, 0, 2 * Math.PI); g.fillStyle = fill; g.fill();
