@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from mbd.bodies.domains import ParameterCheck
 from mbd.description import Description
+from mbd.notes import doubt
 
 if TYPE_CHECKING:
     from mbd.equations.cost import Cost
@@ -38,10 +39,17 @@ class Model(Description):
     """
 
     def check(self) -> list[str]:
-        """Every fault of the description, one sentence each; empty where there is none."""
-        from mbd.topology.check import faults
+        """Every fault of the description, one sentence each; empty where there is none.
 
-        return faults(self)
+        Warns (`mbd.MbdWarning`) once of what is no fault but was hardly meant, such as a hinge connected twice.
+        """
+        from mbd.topology.check import faults
+        from mbd.topology.doubts import doubts
+
+        found = faults(self)
+        if not found:
+            doubt(*doubts(self), of=self)
+        return found
 
     def parameter_check(self) -> ParameterCheck:
         """The same judgement of values that differ from those of the description."""

@@ -6,9 +6,13 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib.util import find_spec
+from time import perf_counter
 from typing import Any, TypeVar
 
-__all__ = ["Progress", "counted", "progress_bar", "share_bar"]
+__all__ = ["Progress", "counted", "progress_bar", "run_bar", "share_bar"]
+
+LATE = 3.0
+"""Seconds after which a slow run that nobody wanted to watch shows a bar all the same."""
 
 Progress = Callable[[float, float], None]
 Item = TypeVar("Item")
@@ -35,6 +39,72 @@ def progress_bar() -> Iterator[Progress | None]:
     finally:
         for bar in bars:
             bar.close()
+
+
+@contextmanager
+def run_bar(wanted: Any, slow: bool, begin: float, end: float) -> Iterator[Progress | None]:
+    """Who is informed how far a run is.
+
+    wanted : a function, which is given the time and the end; True for a bar on a terminal; 'late' for one after `LATE`
+        seconds where the run is `slow`; else nobody
+    begin, end : of the run [s]
+    """
+    if callable(wanted):
+        yield wanted
+        return
+    late = wanted == "late" and slow
+    if not (wanted is True or late) or not sys.stderr.isatty():
+        yield None
+        return
+    bar, began = (_Bar() if find_spec("tqdm") else _Line()), perf_counter()
+
+    def show(t: float, until: float) -> None:
+        if bar.shown or not late or perf_counter() - began > LATE:
+            bar.show(t - begin, end - begin, perf_counter() - began)
+
+    try:
+        yield show
+    finally:
+        bar.close()
+
+
+class _Bar:
+    """A bar of tqdm, made when it is shown first."""
+
+    bar: Any = None
+
+    @property
+    def shown(self) -> bool:
+        return self.bar is not None
+
+    def show(self, done: float, total: float, seconds: float) -> None:
+        if self.bar is None:
+            from tqdm import tqdm
+
+            shape = "{l_bar}{bar}| {n:.2f}/{total:.2f} s [{elapsed}<{remaining}]"
+            self.bar = tqdm(total=total, unit="s", bar_format=shape, file=sys.stderr)
+            self.bar.start_t -= seconds
+        self.bar.update(done - self.bar.n)
+
+    def close(self) -> None:
+        if self.bar is not None:
+            self.bar.close()
+
+
+class _Line:
+    """A line of text that is written again and again, where tqdm is not installed."""
+
+    shown = False
+
+    def show(self, done: float, total: float, seconds: float) -> None:
+        self.shown = True
+        left = f", {seconds * (total / done - 1.0):.0f} s left" if done > 0.0 else ""
+        sys.stderr.write(f"\r{100.0 * done / total if total else 100.0:3.0f} % of {total:g} s{left:<20}")
+        sys.stderr.flush()
+
+    def close(self) -> None:
+        if self.shown:
+            sys.stderr.write("\n")
 
 
 @contextmanager

@@ -14,7 +14,7 @@ import mbd
 PACKAGE = Path(mbd.__file__).parent
 
 RANKS = [
-    ("errors", "arrays", "state", "free_memory", "progress"),
+    ("errors", "arrays", "state", "free_memory", "notes", "progress"),
     ("tape",),
     ("bodies",),
     ("scope",),

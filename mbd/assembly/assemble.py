@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -33,7 +32,8 @@ from mbd.bodies.values import named_number_faults
 from mbd.compile.mechanism import Mechanism, rate_names
 from mbd.compile.mechanisms import mechanism_of
 from mbd.equations.equations import Equations
-from mbd.errors import AssemblyError, MbdWarning, ModelError, UnknownNameError, nearest
+from mbd.errors import AssemblyError, ModelError, UnknownNameError, nearest
+from mbd.notes import doubt
 from mbd.state import State
 
 __all__ = ["assemble"]
@@ -126,8 +126,7 @@ def assemble(
     if bad:
         raise AssemblyError(bad)
     name_wrapped(work)
-    for sentence in doubtful(model, equations, position or {}):
-        warnings.warn(sentence, MbdWarning, stacklevel=2)
+    doubt(*doubtful(model, equations, position or {}), of=model)
     return State(
         0.0, work.q, work.y[: equations.n_v].copy(), work.y[equations.n_v :].copy(), manager.mode(work.flags),
         _armed(work, set(opened)), work.anchors, tuple(coordinate.name for coordinate in equations.coordinates),

@@ -95,12 +95,15 @@ def backend(kind: str = "auto", level: int | None = None, cache: ObjectCache | N
     if find_spec("llvmlite") is None:
         if kind == "llvm":
             raise CapabilityError("backend 'llvm' needs the package llvmlite: pip install llvmlite, or use 'python'")
-        return Backend("python", "llvmlite is not installed: plain Python runs some 200 times slower than machine code")
+        return Backend("python", "plain Python runs some 1000 times slower than machine code: pip install 'mbd[fast]'")
     try:
         from mbd.compile import llvm
     except (ImportError, OSError) as error:
         if kind == "llvm":
             raise CapabilityError(f"llvmlite is installed but does not load ({error}); use backend 'python'") from error
-        return Backend("python", f"llvmlite is installed but does not load ({error}): plain Python runs instead")
+        return Backend(
+            "python",
+            f"llvmlite is installed but does not load ({error}): plain Python runs instead, some 1000 times slower",
+        )
     chosen, hasty = (llvm.LEVEL, llvm.HASTY) if level is None else (level, None)
     return Backend("llvm", "", lambda layout: llvm.Library(layout, chosen, cache, hasty))

@@ -16,12 +16,11 @@ import contextlib
 import os
 import stat
 import time
-import warnings
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
-from mbd.errors import MbdWarning
+from mbd.notes import PROCESS, doubt
 
 __all__ = ["LIMIT", "ObjectCache", "default_cache", "key_of"]
 
@@ -33,7 +32,6 @@ RECENT = 3600.0
 _DIGEST = 32
 _SUFFIX, _DRAFT, _LASTING = ".object", ".draft", "kernel-"
 _OTHERS = stat.S_IWGRP | stat.S_IWOTH
-_TOLD: set[str] = set()
 _AGAIN = "so it is compiled again in every process"
 
 
@@ -114,10 +112,11 @@ class ObjectCache:
         except OSError:
             return True  # nothing can be read there, and `store` makes it or fails
         if problem:
-            _tell(
+            doubt(
                 f"the code cache '{self.directory}' {problem}, and what is in it is executed: it is not used, and code "
                 "is compiled again in every process; name a directory of your own in MBD_CACHE, or take the rights of "
-                "others away (chmod go-w)"
+                "others away (chmod go-w)",
+                of=PROCESS,
             )
         return not problem
 
@@ -179,13 +178,6 @@ def _content_of(path: Path) -> bytes | None:
         return file.read()
 
 
-def _tell(sentence: str) -> None:
-    """Warn, once in a process."""
-    if sentence not in _TOLD:
-        _TOLD.add(sentence)
-        warnings.warn(sentence, MbdWarning, stacklevel=2)
-
-
 def default_cache() -> ObjectCache:
     """The cache that ``MBD_CACHE`` names, or that of the user; one that remembers nothing where there is none."""
     place = os.environ.get("MBD_CACHE", "").strip()
@@ -198,11 +190,14 @@ def default_cache() -> ObjectCache:
 
         directory = user_cache_path("mbd", appauthor=False) / "objects"
     except ImportError:
-        _tell(f"platformdirs is not installed, {_AGAIN}; try pip install 'mbd[fast]', or name a directory in MBD_CACHE")
+        doubt(
+            f"platformdirs is not installed, {_AGAIN}; try pip install 'mbd[fast]', or name a directory in MBD_CACHE",
+            of=PROCESS,
+        )
         return ObjectCache()
     except (RuntimeError, KeyError, OSError):  # no HOME, and no entry for this user
         directory = Path()
     if directory.is_absolute():
         return ObjectCache(directory)
-    _tell(f"there is no home directory to keep compiled code in, {_AGAIN}; name a directory in MBD_CACHE")
+    doubt(f"there is no home directory to keep compiled code in, {_AGAIN}; name a directory in MBD_CACHE", of=PROCESS)
     return ObjectCache()

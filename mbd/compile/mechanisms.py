@@ -12,6 +12,7 @@ from mbd.compile.mechanism import Mechanism
 from mbd.description import Description
 from mbd.equations.derivation import FrontDoor, derive
 from mbd.errors import ModelError
+from mbd.notes import PROCESS, doubt
 from mbd.topology.check import parameter_check
 
 __all__ = ["mechanism_of"]
@@ -77,6 +78,8 @@ def _mechanism(model: Any, backend: str, tunable: frozenset[str]) -> Mechanism:
     if tunable:
         described = model.with_tunable(*sorted(tunable))
     made = Mechanism(derive(described), backend)
+    if made.backend.note:
+        doubt(made.backend.note, of=PROCESS)
     if tunable:
         names = ", ".join(map(repr, sorted(tunable)))
         made.notes.append(

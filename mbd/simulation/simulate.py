@@ -19,6 +19,8 @@ from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import CapabilityError, MemoryLimitError, SimulationError, UnknownNameError
 from mbd.integrators import HHT, Integrator
+from mbd.notes import asked_from_outside, doubt, note
+from mbd.progress import run_bar
 from mbd.simulation.arguments import check_arguments, end_of
 from mbd.simulation.capabilities import refusals
 from mbd.simulation.run.control import reset_faults
@@ -94,7 +96,8 @@ def simulate(
     parameters : values that differ from the model's, by name
     store : keep every store-th step; rows at events and the last row are always kept; 1 with `tol`
     observers : called as ``observer(time, state)`` at intervals of about 0.1 s of wall time and at the end
-    progress : True for a progress bar on a terminal, or ``progress(t, until)``
+    progress : True for a progress bar on a terminal, False for none, or ``progress(t, until)``; None: a bar where plain
+        Python takes more than some seconds
     on_failure : 'raise' a `SimulationError` whose ``run`` has everything computed, or 'return' it with success False
     rest_speed : approach speed below which a contact rests [m/s, rad/s]
     backend : 'auto', 'llvm' or 'python' (the plain twin, slow)
@@ -118,11 +121,25 @@ def simulate(
     }  # fmt: skip
     check_arguments(scheme, start, dt, tol, tol_of, until, parameters, options, on_failure, observers, progress)
     changed = {**start.parameters, **(parameters or {})}
-    motion = _Motion(model, start, scheme, until, changed, options, observers, progress)
+    by_user = asked_from_outside()
+    motion = _Motion(
+        model, start, scheme, until, changed, options, observers, "late" if by_user and progress is None else progress
+    )
     run, trajectory, problem = motion.run(dt) if dt is not None else motion.to_tolerance(float(tol or 0.0), tol_of)
+    if by_user:
+        _tell(trajectory)
     if problem and on_failure == "raise":
         raise _failure(problem, trajectory, run.cause)
     return trajectory
+
+
+def _tell(trajectory: Trajectory) -> None:
+    """Notes of a run to the logger; those that put its results in doubt as warnings."""
+    for sentence in trajectory.stats["notes"]:
+        if trajectory.success and sentence in trajectory.message:
+            doubt(sentence)
+        else:
+            note(f"{trajectory.name or 'model'}: {sentence}")
 
 
 @dataclass(frozen=True)
@@ -145,8 +162,9 @@ class _Motion:
         options = {**self.options, **(more or {})}
         run = prepared(self.model, self.start, self.scheme, float(step), self.until, self.changed, options)
         run.room.patience = most
-        run.observe(self.observers, _bar(self.progress, self.start.time, run.end))
-        return run, *run.complete()
+        with run_bar(self.progress, run.mechanism.backend.name == "python", self.start.time, run.end) as bar:
+            run.observe(self.observers, bar)
+            return run, *run.complete()
 
     def to_tolerance(self, tol: float, tol_of: Sequence[str] | None) -> tuple[Run, Trajectory, str]:
         """The run whose error agrees with a tolerance; where an event ends it, the first guess is that it takes 1 s."""
@@ -227,28 +245,3 @@ def _versions() -> dict[str, str]:
     found = {"python": platform.python_version(), "mbd": mbd.__version__, "numpy": np.__version__}
     llvmlite = import_module("llvmlite") if find_spec("llvmlite") else None
     return {**found, "llvmlite": getattr(llvmlite, "__version__", "not installed")}
-
-
-def _bar(progress: Any, begin: float, end: float) -> Callable[[float, float], None] | None:
-    """A progress callback; True makes a bar that shows only on a terminal."""
-    if progress is None or progress is False:
-        return None
-    if callable(progress):
-        return progress  # type: ignore[no-any-return]
-    if find_spec("tqdm") is None:
-        return None
-    from tqdm import tqdm
-
-    bar = tqdm(
-        total=end - begin,
-        unit="s",
-        disable=None,
-        bar_format="{l_bar}{bar}| {n:.2f}/{total:.2f} s [{elapsed}<{remaining}]",
-    )
-
-    def show(t: float, until: float) -> None:
-        bar.update(t - begin - bar.n)
-        if t >= until:
-            bar.close()
-
-    return show

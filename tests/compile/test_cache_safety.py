@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mbd import notes
 from mbd.compile import cache as caching, llvm
 from mbd.compile.cache import ObjectCache, default_cache
 from tests.compile.chains import chain, compile_functions
@@ -30,7 +31,7 @@ def build(cache, which=1):
 
 @pytest.fixture(autouse=True)
 def told(monkeypatch):
-    monkeypatch.setattr(caching, "_TOLD", set())
+    monkeypatch.setattr(notes, "_TOLD", type(notes._TOLD)())
 
 
 def test_entries_under_each_others_names_are_not_executed(tmp_path):

@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from mbd.assembly.doubtful import doubtful
 from mbd.equations.equations import Contact
 from mbd.results.columns import ModelColumns
 from mbd.results.record import EventRecord, Record
@@ -85,8 +86,9 @@ COUNTED = (
 
 def notes_of(run: RunData, record: Record) -> tuple[list[str], list[str]]:
     """The notes of a run that is over, in sentences, and those of them that put its result in doubt."""
-    notes = [*run.mechanism.notes, *getattr(run.mechanism.common, "notes", ())]
     equations = run.mechanism.equations
+    notes = doubtful(run.model, equations, dict(zip(run.start.names, run.start.q.tolist(), strict=False)))
+    notes += [*run.mechanism.notes, *getattr(run.mechanism.common, "notes", ())]
     loaded = bool(run.kernel.loaded) or any(friction.contact >= 0 for friction in equations.frictions)
     rubs = loaded and any(code.given_rows for code in run.stepper.modes)
     moved = any(np.max(np.abs(part - record.q[:1]), initial=0.0) > MOVED for part in blocks(record.q))

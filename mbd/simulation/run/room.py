@@ -6,10 +6,8 @@ each; where an event may end it sooner only those that it has are counted.
 
 from __future__ import annotations
 
-import warnings
-
-from mbd.errors import MbdWarning
 from mbd.free_memory import available, size_in_words as memory
+from mbd.notes import doubt
 from mbd.simulation.run.data import RoomFindings, RunData
 
 __all__ = ["Room", "available", "memory"]
@@ -85,7 +83,7 @@ class Room(RoomFindings):
                 f"at t = {run.now:.3g} s there are {run.stored} rows: at this rate the run will have about {rows:.2g}, "
                 f"which take {memory(rows * self.size)}{last}; {_remedy(run)}"
             )
-            warnings.warn(self.note, MbdWarning, stacklevel=2)
+            doubt(self.note)
         return ""
 
     def refused(self, rows: float, seconds: float) -> str:

@@ -1,0 +1,42 @@
+"""What is possible in a description but was hardly meant: millimetres for metres, a hinge twice."""
+
+from __future__ import annotations
+
+from itertools import combinations
+from typing import Any
+
+__all__ = ["doubts"]
+
+LONG = 50.0
+"""Length of a body of less than a ton above which it may be given in millimetres [m]."""
+
+
+def doubts(model: Any) -> list[str]:
+    """Sentences on what looks like a mistake."""
+    return _lengths(model) + _twice(model)
+
+
+def _lengths(model: Any) -> list[str]:
+    """Points of bodies of less than a ton that are far apart."""
+    found = []
+    for body in getattr(model, "bodies", {}).values():
+        parameters = body.parameters()
+        length = parameters.get(f"{body.name}.length", 0.0)
+        if abs(length) > LONG and 0.0 < parameters.get(f"{body.name}.mass", 0.0) < 1000.0:
+            found.append(
+                f"'{body.name}' is {length:g} m long; lengths are in metres, and {length:g} mm is {length / 1e3:g}"
+            )
+    return found
+
+
+def _twice(model: Any) -> list[str]:
+    """Joints of one kind and axis between the same points."""
+    joints = [joint for joint in getattr(model, "joints", ()) if hasattr(joint, "parent")]
+    return [
+        f"'{one.name}' and '{other.name}' hold the same points together; leave one out, or their reactions are shared "
+        "in no definite way"
+        for one, other in combinations(joints, 2)
+        if type(one) is type(other)
+        and {one.parent.full_name, one.child.full_name} == {other.parent.full_name, other.child.full_name}
+        and getattr(one, "axis", None) == getattr(other, "axis", None)
+    ]
