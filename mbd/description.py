@@ -10,6 +10,7 @@ from typing import Any, Self, TypeVar, cast
 
 from mbd.bodies.base import Body, Frame
 from mbd.bodies.ground import Ground
+from mbd.bodies.promises import promise_faults
 from mbd.bodies.values import Vector3, names_of, number, printable, triple
 from mbd.constraints.base import Constraint
 from mbd.constraints.controller import Controller
@@ -256,11 +257,14 @@ def _title(name: Any) -> str:
 
 
 def all_are(kind: Any, words: Iterable[Word], sentence: str) -> list[Word]:
-    """Words of a kind, or the sentence of what is expected."""
+    """Words of a kind that keep the promises of their bases, or a `ModelError` of what is expected."""
     given = list(words)
     for word in given:
         if not isinstance(word, kind):
             raise ModelError(f"{sentence}; got {word!r}")
+    broken = [fault for word in given for fault in promise_faults(word)]
+    if broken:
+        raise ModelError(broken)
     return given
 
 

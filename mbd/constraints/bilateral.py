@@ -9,7 +9,7 @@ from mbd.bodies.values import name_of
 from mbd.constraints.base import Constraint
 from mbd.constraints.expressions import is_expression
 from mbd.constraints.law import Equation, Hold, Law
-from mbd.constraints.measure import Measure
+from mbd.constraints.measure import Measure, gap_of
 from mbd.constraints.measures import JointMeasure
 from mbd.constraints.user_measure import measure
 from mbd.errors import ModelError
@@ -79,7 +79,7 @@ class Bilateral(Constraint):
         The angle of a cut joint is read off its frames and jumps by a turn; there
         ``h = atan2(sin(g − value), cos(g − value))``.
         """
-        gap = self.measure.gap(scope)
+        gap = gap_of(self.measure, scope)
         h = gap - scalar(self.value, self.arguments, scope, self.name, "value")
         wraps = isinstance(self.subject, Joint) and isinstance(gap, Node) and any(n.op == "atan2" for n in live([gap]))
         return atan2(sin(h), cos(h)) if wraps else h

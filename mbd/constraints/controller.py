@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from mbd.bodies.promises import function_of
 from mbd.bodies.values import name_of, names_of, number
 from mbd.errors import ModelError
 
@@ -47,6 +48,7 @@ class Controller:
             put(self, names, names_of(getattr(self, names), f"{names} of Controller '{self.name}'"))
         if not callable(self.update):
             raise ModelError(f"Controller '{self.name}' needs update(time, values, state), got {self.update!r}")
+        function_of(self.update, f"Controller '{self.name}'", "time", "values", "state")
         if self.period is not None:
             put(self, "period", number(self.period, f"period of '{self.name}'"))
             if self.period <= 0.0:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from mbd.bodies.promises import function_of
 from mbd.bodies.values import flag, name_of, names_of
 from mbd.constraints.base import Constraint
 from mbd.constraints.expressions import is_expression, plain
@@ -46,6 +47,9 @@ class Event(Constraint):
             named = {str(key) if is_expression(key) else key: plain(value) for key, value in self.reset.items()}
             object.__setattr__(self, "reset", named)
             names_of(self.reset, f"each key of the reset of Event '{self.name}'")
+        for value in self.reset.values() if isinstance(self.reset, Mapping) else (self.reset,):
+            if callable(value) and not is_expression(value):
+                function_of(value, f"reset of Event '{self.name}'", "named")
         object.__setattr__(self, "terminal", flag(self.terminal, f"terminal of Event '{self.name}'"))
         if self.direction not in (-1, 0, 1):
             raise ModelError(f"direction of Event '{self.name}' is -1, 0 or 1, got {self.direction!r}")

@@ -6,11 +6,12 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 
 from mbd.bodies.base import Frame
+from mbd.bodies.promises import scalar
 from mbd.forces.quantities import Mention
 from mbd.scope import Scope
 from mbd.tape.node import Scalar
 
-__all__ = ["Measure", "mentioned_names"]
+__all__ = ["Measure", "gap_of", "mentioned_names"]
 
 
 class Measure(ABC):
@@ -68,6 +69,17 @@ class Measure(ABC):
     def faults(self, owner: str) -> list[str]:
         """What is geometrically impossible about it, one sentence each."""
         return []
+
+
+def gap_of(measure: Measure, scope: Scope) -> Scalar:
+    """g of a measure, which may be of a user's class.
+
+    Raises
+    ------
+    ModelError
+        where its `gap` raises, or gives no number.
+    """
+    return scalar(measure, "gap", "gap(scope)", scope)
 
 
 def mentioned_names(mentions: Sequence[Mention]) -> str:

@@ -11,7 +11,7 @@ from mbd.bodies.domains import Domain, at_least_zero, positive
 from mbd.bodies.values import name_of, number
 from mbd.constraints.base import Constraint
 from mbd.constraints.law import Closing, Hold, Law
-from mbd.constraints.measure import Measure
+from mbd.constraints.measure import Measure, gap_of
 from mbd.constraints.penalty_parameters import largest_dt
 from mbd.constraints.restitution import KELVIN_VOIGT, LEAST_RESTITUTION, chi_for, damping_ratio_for, law_of, wanted
 from mbd.constraints.unilateral import measure_of
@@ -137,7 +137,7 @@ class Penalty(Constraint):
 
     def act(self, scope: Scope, hold: Hold) -> Law:
         """Its force, and the energy of its spring."""
-        gap = self.measure.gap(scope)
+        gap = gap_of(self.measure, scope)
         rate = scope.rate(gap)
         push = self.force(gap, rate, scope, *hold(self.captured(rate)))
         contact = Closing(gap, self.measure.unit, self.opens_on)

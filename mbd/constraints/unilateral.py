@@ -11,7 +11,7 @@ from mbd.bodies.values import name_of, number
 from mbd.constraints.base import Constraint
 from mbd.constraints.expressions import is_expression
 from mbd.constraints.law import Closing, Equation, Hold, Law
-from mbd.constraints.measure import Measure
+from mbd.constraints.measure import Measure, gap_of
 from mbd.constraints.rules import When, condition_of, releases_of
 from mbd.constraints.user_measure import measure
 from mbd.errors import ModelError
@@ -86,7 +86,7 @@ class Unilateral(Constraint):
 
     def act(self, scope: Scope, hold: Hold) -> Law:
         """A normal row, and tangent rows that hold the place of touchdown where and while it sticks."""
-        gap, unit = self.measure.gap(scope), self.measure.unit
+        gap, unit = gap_of(self.measure, scope), self.measure.unit
         rows = [Equation(gap, "normal", unit)]
         if self.sticks or self.slides:
             limit = partial(self._limit, scope) if self.slides else None

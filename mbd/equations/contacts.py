@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 
+from mbd.bodies.promises import called
 from mbd.constraints.base import Constraint
 from mbd.constraints.event import Event
 from mbd.constraints.law import Closing, Equation, Law
-from mbd.constraints.measure import Measure
+from mbd.constraints.measure import Measure, gap_of
 from mbd.equations.derivation_scope import DerivationScope, Generalized
 from mbd.equations.dynamics import Work
 from mbd.equations.effects import drag_effect, penalty_effect
@@ -59,7 +60,7 @@ def laws(
 
 def anchors_held(scope: DerivationScope, contacts: Sequence[Constraint]) -> int:
     """How many values all contacts store as they close."""
-    return sum(word.anchors(scope) for word in contacts)
+    return sum(called(word, "anchors", "act(scope, hold)", scope) for word in contacts)
 
 
 def _always(
@@ -170,7 +171,7 @@ def _by_rows(
     return Contact(
         word.name, word.kind, gap, rate, acting, tuple(holding.captured), holding.anchors, opens_on=at.opens_on,
         when=tuple((rule.other, rule.after_impact) for rule in at.releases),
-        only_while=scope.real(condition.gap(scope)) if isinstance(condition, Measure) else condition,
+        only_while=scope.real(gap_of(condition, scope)) if isinstance(condition, Measure) else condition,
         restitution=at.restitution, unit=at.unit, may_pull=any(rule.may_pull for rule in at.releases),
     )  # fmt: skip
 
@@ -210,7 +211,7 @@ def _by_force(
 
 def _guard(scope: DerivationScope, event: Event) -> Guard:
     """A user's event; its measure may depend on velocities."""
-    value = event.guard.gap(scope)
+    value = gap_of(event.guard, scope)
     return Guard(event.name, scope.real(value), scope.change(value), event.direction, event.terminal, event.reset)
 
 

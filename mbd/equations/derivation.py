@@ -68,6 +68,7 @@ def _derived(model: Description, plan: Plan, carried: Sequence[tuple[str, int]] 
     """
     scope = DerivationContext(model.ground, plan.edges, plan.cut, model.gravity, model.tunable, plan.planar, carried)
     scope.offer_frames(model.frames.values())
+    scope.parameters.expect(model.parameters)
     if plan.planar and plan.cut:
         scope.count_turns(anchors_held(scope, model.contacts))
     elif plan.cut:

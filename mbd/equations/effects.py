@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
+from mbd.bodies.promises import called, title_of
 from mbd.equations.derivation_context import DerivationContext
 from mbd.equations.derivation_scope import DerivationScope, Generalized
 from mbd.equations.dynamics import Dynamics, Work
 from mbd.equations.equations import Effect
+from mbd.errors import ModelError
 from mbd.forces.base import Action, Force
 from mbd.joints.base import Joint
 from mbd.tape.derivatives import jvp
@@ -77,7 +79,7 @@ def _joint_loss(joint: Joint, scope: DerivationScope) -> Cause:
 
 def _force(force: Force, scope: DerivationScope) -> Cause:
     """The action of a force."""
-    action: Action = force.act(scope)
+    action = _action(force, scope)
     cause = Cause(force.name, force.kind, force.column, rates=action.rates)
     _apply(cause, action.pairs, scope)
     if action.potential is not None:
@@ -85,6 +87,23 @@ def _force(force: Force, scope: DerivationScope) -> Cause:
     if action.dissipation is not None:
         _dissipate(cause, scope.tape.lift(action.dissipation), scope)
     return cause
+
+
+def _action(force: Force, scope: DerivationScope) -> Action:
+    """What ``force.act`` returns, or a `ModelError` of what that should be."""
+    title = title_of(force)
+    action = called(force, "act", "act(scope)", scope)
+    if not isinstance(action, Action):
+        raise ModelError(f"{title}: act(scope) must return an mbd.forces.Action, got {action!r}")
+    for field_name, example in (("pairs", "(velocity, force)"), ("rates", "(state, its rate)")):
+        given = getattr(action, field_name)
+        several = isinstance(given, Sequence) and not isinstance(given, str)
+        if not several or not all(isinstance(pair, Sequence) and len(pair) == 2 for pair in given):
+            raise ModelError(
+                f"{title}: act(scope) returns Action({field_name}={given!r}); give pairs {example}, such as "
+                f"{field_name}=({example},)"
+            )
+    return action
 
 
 def _store(cause: Cause, energy: Scalar, scope: DerivationScope) -> None:

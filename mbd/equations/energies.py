@@ -109,6 +109,7 @@ def assembled(system: EnergyDescription, lowering: Lowering) -> Equations:
     Q = [lowering.Q.get(c.name, tape.zero) for c in system.coordinates]
     balance = [p - t + v + d - f for p, t, v, d, f in zip(momentum_rates, dT, dV, dD, Q, strict=True)]
     own = _effects(system, lowering, dV, dD)
+    scope.parameters.expect(system.parameters)
     found = causes(scope, (), system.applied)
     acting = scope.generalized(sum((cause.work for cause in found), Work()))
     balance = [r + f for r, f in zip(balance, acting, strict=True)] + state_balance(scope, found)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
+from mbd.bodies.promises import called, title_of
 from mbd.constraints.base import Constraint
 from mbd.constraints.law import Closing, Law
 from mbd.equations.derivation_scope import DerivationScope
@@ -43,8 +44,8 @@ def law_of(word: Constraint, holding: Holding, contacts: Sequence[Constraint]) -
         where that is not what its kind promises, each fault by name.
     """
     states = len(holding.scope.states)
-    law = word.act(holding.scope, holding)
-    title = f"'{word.name}' ({type(word).__name__}) of kind '{word.kind}'"
+    title = f"{title_of(word)} of kind '{word.kind}'"
+    law = called(word, "act", "act(scope, hold)", holding.scope, holding)
     if not isinstance(law, Law):
         raise ModelError([f"{title}: act(scope, hold) must return an mbd.constraints.Law, got {law!r}"])
     faults = list(_faults(word, law, holding))

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 
+from mbd.bodies.promises import line_of_user
 from mbd.equations.equations import Parameter
 from mbd.errors import ModelError
 from mbd.tape.node import Node, Tape
@@ -23,6 +24,11 @@ class ParameterTable:
         self._nodes: dict[str, Node] = {}
         self._values: dict[str, float] = {}
         self._found: list[Parameter] = []
+        self._declared: Mapping[str, float] | None = None
+
+    def expect(self, declared: Mapping[str, float]) -> None:
+        """From here on, only parameters that words declare are given out, with the values that they declare."""
+        self._declared = declared
 
     def node(self, name: str, value: float) -> Node:
         """The input of a parameter, or a constant where its value is structural."""
@@ -34,6 +40,7 @@ class ParameterTable:
                     f"two things have a parameter {name!r}, {self._values[name]:g} and {value:g}; rename one of them"
                 )
             return known
+        self._judge(name, value)
         self._values[name] = value
         if value in STRUCTURAL and name not in self._tunable:
             node = self._tape.constant(value)
@@ -42,6 +49,25 @@ class ParameterTable:
             self._found.append(Parameter(name, value))
         self._nodes[name] = node
         return node
+
+    def _judge(self, name: str, value: float) -> None:
+        """Raise a `ModelError` for a parameter that no word declares, or declares with another value.
+
+        It would be no parameter of the model: not listed, not judged by domains, and of the value that is asked here.
+        """
+        if self._declared is None or self._declared.get(name) == value:
+            return
+        owner, _, field = name.rpartition(".")
+        asked = f"scope.parameter({owner!r}, {field!r}, {value:g}){line_of_user()} asks for a parameter that"
+        if name in self._declared:
+            raise ModelError(
+                f"{asked} parameters() declares as {self._declared[name]:g}; give one value in both places"
+            )
+        mine = [each for each in self._declared if each.rpartition(".")[0] == owner]
+        raise ModelError(
+            f"{asked} is not declared; let parameters() return {{{name!r}: {value:g}}} too; of {owner!r} it declares "
+            f"{', '.join(map(repr, mine)) or 'none'}"
+        )
 
     @property
     def found(self) -> tuple[Parameter, ...]:

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 from mbd.bodies.base import Frame
 from mbd.bodies.domains import Domain, Parameterized, at_least_zero
+from mbd.bodies.promises import scalar
 from mbd.bodies.values import name_of, number
 from mbd.errors import ModelError, nearest
 from mbd.joints.losses.base import Loss, loss_of
@@ -165,7 +166,8 @@ class Joint(Parameterized, ABC):
         """Generalized force ∂D/∂v of its losses for each velocity, positive on the left-hand side [N m or N]."""
         forces: list[Scalar] = [0.0] * len(self.freedoms)
         for place, owner, loss in self.losses():
-            forces[place] = forces[place] + loss.force(rates[place], scope, owner)
+            call = f"force(rate, scope, {owner!r})"
+            forces[place] = forces[place] + scalar(loss, "force", call, rates[place], scope, owner)
         return forces
 
     def elastic_energy(self, q: Sequence[Scalar], scope: Scope) -> Scalar:

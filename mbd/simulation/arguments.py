@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from mbd.bodies.promises import promise_faults
 from mbd.bodies.values import is_number, named_number_faults, shown
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.integrators import Integrator
@@ -57,6 +58,8 @@ def _numbers(scheme: Any, start: Any, dt: Any, tol: Any, until: Any, store: Any,
     faults = []
     if not isinstance(scheme, Integrator):
         faults.append(f"integrator must be an mbd integrator such as mbd.HHT(alpha=0.05), not {scheme!r}")
+    else:
+        faults += promise_faults(scheme)
     if not isinstance(start, State):
         faults.append(f"start must be a State from mbd.assemble(model, …), not {start!r}")
     else:

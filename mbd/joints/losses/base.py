@@ -9,6 +9,7 @@ from typing import Any
 
 from mbd.bodies.algebra import derivatives_at
 from mbd.bodies.domains import Domain, at_least_zero
+from mbd.bodies.promises import scalar
 from mbd.errors import ModelError
 from mbd.scope import Scope
 from mbd.tape.node import Scalar
@@ -90,7 +91,8 @@ class DissipationFunction(Loss):
 
     def force(self, rate: Scalar, scope: Scope, owner: str) -> Scalar:
         """``F = ∂D/∂v``."""
-        _, (slope,) = derivatives_at(lambda v: self.dissipation(v, scope, owner), [rate], scope.tape)
+        call = f"dissipation(rate, scope, {owner!r})"
+        _, (slope,) = derivatives_at(lambda v: scalar(self, "dissipation", call, v, scope, owner), [rate], scope.tape)
         return slope
 
 
