@@ -11,8 +11,10 @@ from mbd.equations.cost import Cost
 from mbd.equations.energies import Lowering, assembled
 from mbd.equations.energy_description import EnergyDescription
 from mbd.equations.equations import Equations
-from mbd.equations.lagrangian_words import described, word_faults
+from mbd.equations.lagrangian_words import described, parts, word_faults
 from mbd.errors import ModelError, nearest
+from mbd.notebook import Faults, Text
+from mbd.topology.describe import in_html
 
 __all__ = ["Lagrangian"]
 
@@ -60,9 +62,9 @@ class Lagrangian(EnergyDescription):
         """Every fault of the description, one sentence each."""
         faults = _name_faults(self) + self.own_word().faults()
         if faults:
-            return faults
+            return Faults(faults)
         lowering = Lowering(self)
-        return lowering.faults or word_faults(self, lowering.scope)
+        return Faults(lowering.faults or word_faults(self, lowering.scope))
 
     def require_valid(self) -> None:
         """Raise a `ModelError` with every fault, if there is one."""
@@ -80,7 +82,7 @@ class Lagrangian(EnergyDescription):
         return assembled(self, Lowering(self))
 
     def equations(self, *, latex: bool = False) -> str:
-        """M, f, B and h as text, or as LaTeX."""
+        """M, f, B and h as text, or as LaTeX; a notebook shows them as formulas."""
         from mbd.equations.printing import report
 
         return report(self.equations_of_motion(), latex=latex)
@@ -92,13 +94,16 @@ class Lagrangian(EnergyDescription):
             from mbd.assembly.mobility import mobility as of
 
             text += f"\n{of(self)}"
-        return text
+        return Text(text)
 
     def cost(self) -> Cost:
         """Operations of the equations, and of each effect."""
         from mbd.equations.cost import cost
 
         return cost(self)
+
+    def _repr_html_(self) -> str:
+        return in_html(f"Lagrangian({self.name!r})", parts(self, self.check()))
 
 
 def _ambiguous(coordinates: Sequence[str], parameters: Iterable[str]) -> list[str]:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from mbd.bodies.domains import ParameterCheck
 from mbd.description import Description
+from mbd.notebook import Faults, Text
 from mbd.notes import doubt
 
 if TYPE_CHECKING:
@@ -49,7 +50,7 @@ class Model(Description):
         found = faults(self)
         if not found:
             doubt(*doubts(self), of=self)
-        return found
+        return Faults(found)
 
     def parameter_check(self) -> ParameterCheck:
         """The same judgement of values that differ from those of the description."""
@@ -79,10 +80,10 @@ class Model(Description):
             from mbd.assembly.mobility import mobility as of
 
             text += f"\n{of(self)}"
-        return text
+        return Text(text)
 
     def equations(self, latex: bool = False) -> str:
-        """The equations of motion, printed as text or LaTeX."""
+        """The equations of motion, printed as text or LaTeX; a notebook shows them as formulas."""
         from mbd.equations import derive
         from mbd.equations.printing import report
 
@@ -93,3 +94,8 @@ class Model(Description):
         from mbd.equations.cost import cost
 
         return cost(self)
+
+    def _repr_html_(self) -> str:
+        from mbd.topology.describe import in_html, parts
+
+        return in_html(repr(self), parts(self))

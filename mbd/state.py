@@ -10,6 +10,7 @@ import numpy as np
 
 from mbd.arrays import Vector
 from mbd.errors import UnknownNameError, nearest
+from mbd.notebook import table
 
 __all__ = ["Memory", "Mode", "State", "are_names", "malformed"]
 
@@ -126,6 +127,17 @@ class State:
             far = max(self.moved.items(), key=lambda item: abs(item[1]))
             lines.append(f"  assembly moved {len(self.moved)} of these; farthest {far[0]!r} by {far[1]:.3g}")
         return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        from mbd.results.units import unit_of
+
+        title = f"State at t = {self.time:g} s, closed: {', '.join(sorted(self.mode.closed)) or 'none'}"
+        rows = [
+            (name, f"{value:.10g}", unit_of(name))
+            for values, names in ((self.q, self.names), (self.v, self.velocity_names))
+            for name, value in zip(names, values, strict=False)
+        ]
+        return table(title, ("coordinate or rate", "value", "unit"), rows)
 
 
 def malformed(state: State) -> list[str]:

@@ -14,10 +14,11 @@ from numpy.typing import ArrayLike
 from mbd.arrays import Matrix, Vector
 from mbd.bodies.values import shown
 from mbd.errors import TrajectoryError
+from mbd.notebook import Values, folded, table
 from mbd.results.columns import Columns, ModelColumns, gather
 from mbd.results.facts import Facts
 from mbd.results.interpolation import Side
-from mbd.results.record import EventRecord, Record
+from mbd.results.record import EventRecord, Events, Record
 
 if TYPE_CHECKING:
     from mbd.results.failure import Failure
@@ -122,12 +123,12 @@ class Trajectory:
 
     # what happened ----------------------------------------------------------------------------------------------
     @property
-    def events(self) -> list[EventRecord]:
+    def events(self) -> Events:
         """What happened, in order: `time`, `kind`, `name`, `impulse`, `energy_loss`.
 
         kind is 'closed' or 'opened' of a contact, 'stuck' or 'slipped' of dry friction, or 'event'.
         """
-        return list(self.record.events)
+        return Events(self.record.events)
 
     @cached_property
     def energy(self) -> Ledger:
@@ -150,18 +151,18 @@ class Trajectory:
     @property
     def stats(self) -> dict[str, Any]:
         """Counts and wall times."""
-        return self.record.stats
+        return Values("counts and wall times", self.record.stats)
 
     @property
     def settings(self) -> dict[str, Any]:
         """How the run was made."""
-        return self.record.settings
+        return Values("settings", self.record.settings)
 
     @property
     def parameters(self) -> dict[str, float]:
         """Values of the run-time parameters at the start, by name."""
         values = self.record.parameters[: len(self.record.parameter_names)]
-        return dict(zip(self.record.parameter_names, map(float, values), strict=True))
+        return Values("parameters", dict(zip(self.record.parameter_names, map(float, values), strict=True)))
 
     @property
     def success(self) -> bool:
@@ -231,6 +232,15 @@ class Trajectory:
 
         return save(self.record, Archive(self.columns, self.energy, self.violation, self.facts), path, names)
 
+    def animate(self, height: int = 640) -> Any:
+        """The page's animation in the cell of a notebook, `height` pixels high; the notebook holds it when it is saved.
+
+        Shown by Jupyter, VS Code and Colab without an extension; `page` writes the same as a file.
+        """
+        from mbd.view.animation import Animation
+
+        return Animation(self, height)
+
     def __reduce__(self) -> tuple[Any, ...]:
         """To another process it travels as the file that `save` writes."""
         with TemporaryDirectory() as folder:
@@ -254,9 +264,11 @@ class Trajectory:
         return text(self)
 
     def _repr_html_(self) -> str:
-        from mbd.results.summary import html
+        from mbd.results.summary import facts
 
-        return html(self)
+        rows = table(f"Trajectory of {self.name!r}", (), facts(self))
+        count = len(self.record.events)
+        return rows + (folded(f"{count} events", self.events._repr_html_()) if count else "")
 
 
 class Moments(Mapping[str, Any]):

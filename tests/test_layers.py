@@ -14,7 +14,7 @@ import mbd
 PACKAGE = Path(mbd.__file__).parent
 
 RANKS = [
-    ("errors", "arrays", "state", "free_memory", "notes", "progress"),
+    ("errors", "arrays", "state", "free_memory", "notebook", "notes", "progress"),
     ("tape",),
     ("bodies",),
     ("scope",),
@@ -43,6 +43,7 @@ RANKS = [
 RANK = {part: rank for rank, parts in enumerate(RANKS) for part in parts}
 
 DOORS = {
+    "state": ("results.units",),
     "trajectory": ("view",),
     "results.ledger": ("view",),
     "analysis.accuracy.result": ("view",),

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mbd.notebook import table as html_table
 from mbd.results.record import EventRecord
 
 if TYPE_CHECKING:
@@ -59,6 +60,17 @@ class Gait:
 
     def __repr__(self) -> str:
         return self.table()
+
+    def _repr_html_(self) -> str:
+        heads = ("step", "time [s]", "period [s]", "length [m]", "speed [m/s]", "loss [J]", "deviation", "foot")
+        rows = [
+            (
+                str(number), step.time, step.period, step.length, step.speed, step.loss,
+                f"{step.deviation:.2e}" if np.isfinite(step.deviation) else None, step.foot,
+            )
+            for number, step in enumerate(self.steps, start=1)
+        ]  # fmt: skip
+        return html_table("steps", heads, rows)
 
     def table(self, most: int = 24) -> str:
         """The steps as lines of text; of a long walk the first and the last."""

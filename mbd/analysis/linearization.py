@@ -157,6 +157,11 @@ class Linearization:
 
     __repr__ = __str__
 
+    def _repr_html_(self) -> str:
+        from mbd.analysis.tables import linear_html
+
+        return linear_html(self)
+
 
 def linearize(
     model: Any, state: State, parameters: Mapping[str, float] | None = None, backend: str = "auto"

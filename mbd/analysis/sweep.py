@@ -15,6 +15,7 @@ import numpy as np
 from mbd.analysis.sweep_runs import SETTINGS, Results, Runs, cell, rows_of
 from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import ModelError, UnknownNameError, nearest
+from mbd.notebook import table
 from mbd.progress import share_bar
 from mbd.results.archive import named_file, write_whole
 from mbd.state import State
@@ -84,6 +85,14 @@ class Sweep:
 
     def __repr__(self) -> str:
         return "\n".join(self._lines())
+
+    def _repr_html_(self) -> str:
+        shown = {title: column for title, column in self.columns.items() if title not in OUTCOME}
+        rows = [
+            [str(k + 1), *map(cell, values), "" if self.success[k] else f"failed: {self.messages[k]}"]
+            for k, values in enumerate(zip(*shown.values(), strict=True))
+        ]
+        return table(f"{len(self)} runs", ("run", *shown, "outcome"), rows)
 
     def _lines(self) -> Iterator[str]:
         """A line for each run; messages of those that failed."""

@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mbd.notebook import paragraphs, table
+
 if TYPE_CHECKING:
     from mbd.analysis.linearization import Linearization
     from mbd.analysis.numerical import Criteria
 
-__all__ = ["criteria_table", "linear_table"]
+__all__ = ["criteria_table", "linear_html", "linear_table"]
 
 MOVES = 0.1
 """Part of the largest one that a coordinate must move to be named [-]."""
@@ -51,6 +53,21 @@ def linear_table(linear: Linearization) -> str:
     if still:
         lines.append(f"  {still} eigenvalue{'s' * (still != 1)} 0: motions that nothing drives back")
     return "\n".join(lines)
+
+
+def linear_html(linear: Linearization) -> str:
+    """The same as a table of modes for a notebook."""
+    head, *rest = linear_table(linear).split("\n")
+    rows = [
+        (
+            str(k), f"{mode.eigenvalue.real:.6g} {mode.eigenvalue.imag:+.6g}i", f"{mode.frequency:.6g}",
+            f"{mode.hertz:.6g}", "–" if np.isnan(mode.damping_ratio) else _plain(mode.damping_ratio),
+            _movers(mode.shape),
+        )
+        for k, mode in enumerate(linear.modes, start=1)
+    ]  # fmt: skip
+    heads = ("mode", "eigenvalue [1/s]", "ω [rad/s]", "f [Hz]", "damping ζ [-]", "motion")
+    return table(head, heads, rows) + paragraphs(line.strip() for line in rest if line.startswith("  states"))
 
 
 def _plain(ratio: float) -> str:

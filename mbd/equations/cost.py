@@ -8,6 +8,7 @@ from typing import Any
 
 from mbd.equations.equations import Equations
 from mbd.equations.programs import accelerations, guards, newton, residual
+from mbd.notebook import table
 from mbd.tape.derivatives import live
 from mbd.tape.node import Node
 
@@ -56,6 +57,16 @@ class Cost:
             if counts:
                 lines += [title, *(f"  {name:<{width - 2}}{count:>8}" for name, count in counts.items())]
         return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        names = ("newton", "residual", "accelerations", "guards")
+        programs = [(name, getattr(self, name), "program") for name in names]
+        parts = {
+            "of newton, by effect": self.effects, "added while closed": self.contacts,
+            "added while it slides": self.frictions,
+        }  # fmt: skip
+        rows = [(name, count, title) for title, counts in parts.items() for name, count in counts.items()]
+        return table(f"cost of {self.name}", ("what", "operations", "kind"), [*programs, *rows])
 
 
 def cost(model: Any) -> Cost:

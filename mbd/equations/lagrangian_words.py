@@ -9,14 +9,14 @@ from mbd.constraints.expressions import quantities_in
 from mbd.equations.coordinate_scope import CoordinateScope
 from mbd.errors import nearest
 from mbd.topology.check import rule_faults
-from mbd.topology.describe import described_constraint, section
+from mbd.topology.describe import described_constraint, listed
 
 if TYPE_CHECKING:
     from mbd.constraints.base import Constraint
     from mbd.equations.energy_description import EnergyDescription
     from mbd.forces.base import Force
 
-__all__ = ["described", "word_faults"]
+__all__ = ["described", "parts", "word_faults"]
 
 
 def word_faults(system: EnergyDescription, scope: CoordinateScope) -> list[str]:
@@ -50,19 +50,24 @@ def word_faults(system: EnergyDescription, scope: CoordinateScope) -> list[str]:
 
 def described(system: EnergyDescription, faults: Sequence[str]) -> str:
     """Coordinates, energies, parameters, forces, constraints and faults."""
-    lines = [f"{system.name}: given by its energies"]
-    lines += section("coordinates", [f"{c.name} [{c.unit}]" for c in system.coordinates])
+    return listed(f"{system.name}: given by its energies", parts(system, faults))
+
+
+def parts(system: EnergyDescription, faults: Sequence[str]) -> dict[str, list[str]]:
+    """The same by title, an entry a line."""
     energies = {"T": system.kinetic, "V": system.potential, "D": system.dissipation}
-    lines += section("energies", [f"{letter} = {_said(value)}" for letter, value in energies.items()])
-    lines += section("parameters", [f"{name} = {value:.6g}" for name, value in system.own_parameters.items()])
     forces = [f"{name} force: {_said(force)}" for name, force in system.generalized.items()]
     forces += [f"{force.name}: {type(force).__name__}, {force.kind}" for force in system.applied]
-    lines += section("forces", forces)
     rows = [f"{name}: {_said(h)} = 0" for name, h in (*system.rows.items(), *system.nonholonomic.items())]
-    lines += section("constraints", [*rows, *(described_constraint(word) for word in system.words)])
-    lines += section("controllers", [controller.name for controller in system.controllers])
-    lines += section("faults", faults)
-    return "\n".join(lines)
+    return {
+        "coordinates": [f"{c.name} [{c.unit}]" for c in system.coordinates],
+        "energies": [f"{letter} = {_said(value)}" for letter, value in energies.items()],
+        "parameters": [f"{name} = {value:.6g}" for name, value in system.own_parameters.items()],
+        "forces": forces,
+        "constraints": [*rows, *(described_constraint(word) for word in system.words)],
+        "controllers": [controller.name for controller in system.controllers],
+        "faults": list(faults),
+    }
 
 
 def _said(expression: object) -> str:

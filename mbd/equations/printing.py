@@ -10,18 +10,45 @@ from mbd.equations.cost import operations
 from mbd.equations.equations import Equations
 from mbd.equations.inputs import Inputs
 from mbd.equations.programs import constraint_jacobian, mass_matrix
+from mbd.notebook import Text
 from mbd.tape.derivatives import live, substitute
 from mbd.tape.node import Node
 from mbd.tape.printing import listing
 from mbd.tape.sympy import raise_to_sympy
 
-__all__ = ["report"]
+__all__ = ["Report", "report"]
 
 WHOLE = 120
 """Operations up to which LaTeX writes whole formulas; beyond, what is used twice gets a name of its own."""
 
 
-def report(equations: Equations, latex: bool = False) -> str:
+FORMULAS = 300
+"""Lines of formulas that a notebook sets; more of them it shows as text."""
+
+
+class Report(Text):
+    """Equations of motion in print. A notebook sets their formulas, or shows the text where these are too many."""
+
+    equations: Equations
+
+    def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> dict[str, str]:
+        formulas = self._repr_latex_()
+        return super()._repr_mimebundle_() if formulas is None else {"text/plain": str(self), "text/latex": formulas}
+
+    def _repr_latex_(self) -> str | None:
+        """Formulas for a display, with what their symbols mean; None where they are too many."""
+        parts = _parts(self.equations)
+        if operations([node for entries in parts.values() for node in entries.values()]) > 4 * FORMULAS:
+            return None
+        lines, legend = _formulas(self.equations, parts)
+        if len(lines) > FORMULAS:
+            return None
+        names = [f"&\\mathrm{{{_escaped(line)}}}" for line in [self.equations.name, *legend]]
+        body = " \\\\\n".join([*names, *lines]).replace("<", r"\lt ").replace(">", r"\gt ")  # no tags of a page
+        return f"$$\\begin{{aligned}}\n{body}\n\\end{{aligned}}$$"
+
+
+def report(equations: Equations, latex: bool = False) -> Report:
     """M, f, B and h of ``M(q) a + f(t, q, v) + B(q, t)ᵀ λ = 0``, ``h(q, t) = 0``, with operation counts.
 
     Parameters
@@ -30,7 +57,9 @@ def report(equations: Equations, latex: bool = False) -> str:
     latex : LaTeX instead of text
     """
     parts = _parts(equations)
-    return _latex(equations, parts) if latex else _text(equations, parts)
+    found = Report(_latex(equations, parts) if latex else _text(equations, parts))
+    found.equations = equations
+    return found
 
 
 Parts = dict[str, dict[tuple[str, ...], Node]]
@@ -106,7 +135,15 @@ def _text(equations: Equations, parts: Parts) -> str:
 
 # LaTeX --------------------------------------------------------------------------------------------------------------
 def _latex(equations: Equations, parts: Parts) -> str:
-    """An ``align*`` environment; symbols are listed under it."""
+    """An ``align*`` environment; comments above it say what symbols mean."""
+    lines, legend = _formulas(equations, parts)
+    body = " \\\\\n".join(lines)
+    comments = "\n".join(f"% {line}" for line in [equations.name, _counts(parts), *legend])
+    return f"{comments}\n\\begin{{align*}}\n{body}\n\\end{{align*}}"
+
+
+def _formulas(equations: Equations, parts: Parts) -> tuple[list[str], list[str]]:
+    """Lines with & before their equals signs, and what symbols mean."""
     import sympy
 
     symbols, legend = _symbols(equations)
@@ -121,11 +158,24 @@ def _latex(equations: Equations, parts: Parts) -> str:
         lines.append(f"w_{{{k + 1}}} &= {sympy.latex(formula)}")
     for letter, key, node in named:
         (formula,) = raise_to_sympy([node], known)
-        index = "\\,".join(places.get(part, f"\\mathrm{{{part.replace('_', '~')}}}") for part in key)
+        index = "\\,".join(places.get(part, f"\\mathrm{{{_spaced(part)}}}") for part in key)
         lines.append(f"{letter}_{{{index}}} &= {sympy.latex(formula)}")
-    body = " \\\\\n".join(lines)
-    comments = "\n".join(f"% {line}" for line in [equations.name, _counts(parts), *legend])
-    return f"{comments}\n\\begin{{align*}}\n{body}\n\\end{{align*}}"
+    return lines, legend
+
+
+def _escaped(name: str) -> str:
+    """A name as LaTeX prints it, sign by sign.
+
+    >>> print(_escaped("50 $a_b"))
+    50~\\$a\\_b
+    """
+    return "".join(SIGNS.get(sign, sign) for sign in name)
+
+
+SIGNS = {
+    **{sign: f"\\{sign}" for sign in "#$%&_{}"}, " ": "~", "\\": r"\backslash ", "^": r"\wedge ", "~": r"\sim ",
+}  # fmt: skip
+"""Signs that mean something to LaTeX, as its formulas print them."""
 
 
 def _numbered(equations: Equations) -> list[str]:
@@ -168,8 +218,15 @@ def _parameter_symbol(name: str) -> str:
     owner, _, field = name.partition(".")
     if owner == "gravity":
         return f"g_{field}"
-    letter = LETTERS.get(field, f"\\mathrm{{{field.replace('_', ' ')}}}") if field else owner
-    return f"{letter}_{{\\mathrm{{{owner.replace(' ', '~')}}}}}" if field else letter
+    if not field:
+        return owner if owner.isidentifier() else f"\\mathrm{{{_spaced(owner)}}}"
+    letter = LETTERS.get(field, f"\\mathrm{{{_spaced(field)}}}")
+    return f"{letter}_{{\\mathrm{{{_spaced(owner)}}}}}"
+
+
+def _spaced(name: str) -> str:
+    """A name in upright letters, its spaces kept; underscores stand for spaces, see `_plain`."""
+    return "~".join(_escaped(word) for word in re.split(r"[\s_]+", name))
 
 
 def _shared(outputs: Sequence[Node]) -> list[Node]:

@@ -11,6 +11,7 @@ from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.hardcases.case import Figure, HardCase, Outcome
 from mbd.hardcases.known import reason
 from mbd.hardcases.schemes import SCHEMES, scheme
+from mbd.notebook import paragraphs, table
 
 __all__ = ["Judged", "Verdict", "chosen", "judged", "named_schemes", "ratio", "short", "with_schemes"]
 
@@ -45,6 +46,19 @@ class Verdict:
 
     case: HardCase
     parts: Sequence[Judged] = field(default_factory=list)
+
+    def _repr_html_(self) -> str:
+        from mbd.hardcases.table import figure_text
+
+        rows = [
+            (
+                part.scheme, part.error or (figure_text(part.worst) if part.worst is not None else "no figures"),
+                "holds" if part.passed else "does not hold", f"{part.seconds:.2f}",
+            )
+            for part in self.parts
+        ]  # fmt: skip
+        title = f"{self.case.id}: {self.case.must}"
+        return table(title, ("scheme", "nearest to its limit", "verdict", "time [s]"), rows) + paragraphs(self.reasons)
 
     @property
     def passed(self) -> bool:

@@ -10,6 +10,7 @@ import numpy as np
 
 from mbd.arrays import Vector, read_only
 from mbd.errors import ModelError, UnknownNameError, nearest
+from mbd.notebook import table
 
 __all__ = ["KINDS", "SPENT", "Ledger", "Part"]
 
@@ -181,6 +182,18 @@ class Ledger:
             yield f"{part.name!r} is withheld: {part.withheld}"
         if self.stride > 1 and self.parts:
             yield f"works are integrated over rows {self.stride} steps apart, whose error stands under 'numerical'"
+
+    def _repr_html_(self) -> str:
+        columns = {"kinetic": self.kinetic, "potential": self.potential, "total": self.total}
+        rows: list[tuple[str, Any, Any, Any, str]] = [
+            (name, _last(column[:1]), _last(column), _last(column) - _last(column[:1]), "")
+            for name, column in columns.items()
+        ]
+        for part in self.parts:
+            rows.append((part.name, "", "", "withheld" if part.withheld else _last(part.energy), part.kind))
+        rows.append(("numerical", "", "", _last(self.numerical), "the integrator"))
+        notes = "; ".join(f"{part.name!r} is withheld: {part.withheld}" for part in self.parts if part.withheld)
+        return table("energy", ("part", "start [J]", "end [J]", "change [J]", "cause"), rows, notes)
 
     def plot(self, path: Any = None) -> Any:
         """The energies over time, and where they went; returns the matplotlib figure, saved if a path is given."""

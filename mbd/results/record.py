@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector, read_only
+from mbd.notebook import table
 
 if TYPE_CHECKING:
     from mbd.equations.equations import Equations
 
-__all__ = ["EventRecord", "Record", "Rows"]
+__all__ = ["EventRecord", "Events", "Record", "Rows"]
 
 
 def _nothing() -> Vector:
@@ -65,6 +66,30 @@ class EventRecord:
         if self.energy_loss:
             extra += f", energy loss {self.energy_loss:.4g} J"
         return f"<{self.time:.6f} s: {self.name!r} {self.kind}{extra}>"
+
+    def _repr_html_(self) -> str:
+        return Events([self])._repr_html_()
+
+
+SHOWN_EVENTS = 40
+"""Events that a notebook shows; of more, the first and the last."""
+
+
+class Events(list[EventRecord]):
+    """Events in order of time."""
+
+    def _repr_html_(self) -> str:
+        titles = ("time [s]", "name", "kind", "impulse [N s or N m s]", "energy loss [J]")
+        hidden, half = max(len(self) - SHOWN_EVENTS, 0), SHOWN_EVENTS // 2
+        shown = [*self[:half], *self[-half:]] if hidden else self
+        rows = [
+            (
+                f"{event.time:.6f}", event.name, event.kind, "  ".join(f"{value:.4g}" for value in event.impulse),
+                f"{event.energy_loss:.4g}" if event.energy_loss else "",
+            )
+            for event in shown
+        ]  # fmt: skip
+        return table("events", titles, rows, f"{hidden} more between the first {half} and the last" if hidden else "")
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,16 +4,12 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from html import escape
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
 
-__all__ = ["facts", "html", "text"]
-
-SHOWN_EVENTS = 8
-"""Events listed in a notebook before the rest is counted."""
+__all__ = ["facts", "text"]
 
 LABELS = {"derive_and_compile_seconds": "derive and compile seconds (of the model, all its runs so far)"}
 """Words for statistics whose names say too little."""
@@ -80,25 +76,3 @@ def text(run: Trajectory) -> str:
     lines = [f"Trajectory of {run.name!r}"]
     lines += [f"  {title:<12} {value}" for title, value in facts(run)]
     return "\n".join(lines)
-
-
-def html(run: Trajectory) -> str:
-    """The notebook's form of a run."""
-    rows = "".join(
-        f"<tr><th style='text-align:left'>{escape(title)}</th><td style='text-align:left'>{escape(value)}</td></tr>"
-        for title, value in facts(run)
-    )
-    shown = run.events[:SHOWN_EVENTS]
-    events = "".join(
-        f"<tr><td>{event.time:.6f} s</td><td style='text-align:left'>{escape(event.name)}</td><td>{escape(event.kind)}"
-        f"</td><td>{f'{event.energy_loss:.4g} J' if event.energy_loss else ''}</td></tr>"
-        for event in shown
-    )
-    more = f"<p>… and {len(run.events) - len(shown)} more</p>" if len(run.events) > len(shown) else ""
-    table = (
-        f"<details><summary>events</summary><table><tr><th>time</th><th>name</th><th>kind</th><th>energy loss</th></tr>"
-        f"{events}</table>{more}</details>"
-        if shown
-        else ""
-    )
-    return f"<div><b>Trajectory of {escape(repr(run.name))}</b><table>{rows}</table>{table}</div>"

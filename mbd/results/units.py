@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from mbd.results.facts import Facts
 
-__all__ = ["unit"]
+__all__ = ["unit", "unit_of"]
 
 ENDINGS = {
     "angle": "rad", "displacement": "m", "length": "m", "speed": "m/s", "reaction_force": "N", "reaction_torque": "N m",
@@ -40,3 +40,16 @@ def unit(name: str, facts: Facts) -> str:
     if last in ("x", "y", "z") and stem.rpartition(".")[2] in ("reaction_force", "reaction_torque", "force", "torque"):
         return ENDINGS[stem.rpartition(".")[2]]
     return ENDINGS.get(last, "")
+
+
+def unit_of(name: str) -> str:
+    """The unit of a coordinate or its rate by its name alone; '' where that does not tell.
+
+    >>> unit_of("left hip.angle"), unit_of("left hip.angle.rate"), unit_of("theta")
+    ('rad', 'rad/s', '')
+    """
+    stem, _, last = name.rpartition(".")
+    if last != "rate":
+        return ENDINGS.get(last, "")
+    base = unit_of(stem)
+    return f"{base}/s" if base else ""

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import re
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from mbd.errors import ModelError
+from mbd.notebook import folded, paragraphs, table
 from mbd.topology.check import faults
 from mbd.topology.plan import plan
 
@@ -15,7 +17,7 @@ if TYPE_CHECKING:
     from mbd.description import Description
     from mbd.joints.base import Joint
 
-__all__ = ["described_constraint", "description", "section"]
+__all__ = ["described_constraint", "description", "in_html", "listed", "parts"]
 
 UNITS = {"mass": "kg", "length": "m", "center": "m", "inertia": "kg m²"}
 
@@ -23,23 +25,41 @@ UNITS = {"mass": "kg", "length": "m", "center": "m", "inertia": "kg m²"}
 def description(model: Description) -> str:
     """Bodies, joints, forces, constraints, coordinates and faults."""
     g = ", ".join(f"{value:.6g}" for value in model.gravity)
-    lines = [f"{model.name}: gravity ({g}) m/s²"]
-    lines += section("bodies", [_body(body) for body in model.bodies.values() if body is not model.ground])
-    lines += section("joints", [_joint(joint) for joint in model.joints])
-    lines += section("forces", [f"{force.name}: {type(force).__name__}, {force.kind}" for force in model.forces])
-    lines += section("constraints", [described_constraint(word) for word in model.constraints])
-    lines += section("controllers", [controller.name for controller in model.controllers])
+    return listed(f"{model.name}: gravity ({g}) m/s²", parts(model))
+
+
+def parts(model: Description) -> dict[str, list[str]]:
+    """The same by title, an entry a line."""
     found = faults(model)
-    if not found:
-        lines += section("coordinates", _choice(model))
-    lines += section("faults", found)
+    if model.foreign():
+        return {"faults": found}
+    return {
+        "bodies": [_body(body) for body in model.bodies.values() if body is not model.ground],
+        "joints": [_joint(joint) for joint in model.joints],
+        "forces": [f"{force.name}: {type(force).__name__}, {force.kind}" for force in model.forces],
+        "constraints": [described_constraint(word) for word in model.constraints],
+        "controllers": [controller.name for controller in model.controllers],
+        "coordinates": [] if found else _choice(model),
+        "faults": found,
+    }
+
+
+def listed(head: str, parts: Mapping[str, Sequence[str]]) -> str:
+    """A line, then titles with their entries; nothing where there are none."""
+    lines = [head]
+    for title, entries in parts.items():
+        lines += [f"{title}:", *(f"  {entry}" for entry in entries)] if entries else []
     return "\n".join(lines)
 
 
-def section(title: str, entries: Iterable[str]) -> list[str]:
-    """A title and its entries, nothing if there are none."""
-    listed = list(entries)
-    return [f"{title}:", *(f"  {entry}" for entry in listed)] if listed else []
+def in_html(head: str, parts: Mapping[str, Sequence[str]]) -> str:
+    """The same for a notebook, a table for each title."""
+    tables = []
+    for title, entries in parts.items():
+        divided = [re.split(r": | = | (?=\[)", entry, maxsplit=1) for entry in entries]
+        plain = title in ("coordinates", "faults") and not all(len(pair) == 2 for pair in divided)
+        tables += [table(title, (), [[entry] for entry in entries] if plain else divided)] if entries else []
+    return folded(head, "\n".join(tables), is_open=True) if tables else paragraphs([head])
 
 
 def _body(body: Body) -> str:

@@ -42,15 +42,19 @@ QUANTITIES = {
 def drawing(path: str | Path | None, width: float, height: float) -> Iterator[Any]:
     """A figure in the package's style, laid out and saved at the end."""
     matplotlib = library("matplotlib", "plot", "plotting")
-    with matplotlib.rc_context(rules()):
-        if path is None:
-            from matplotlib import pyplot
+    look = rules()
+    size = {"figsize": (width, height), "layout": "constrained", "dpi": look["figure.dpi"]}
+    if path is None:  # made outside the context, in which a notebook would set up pyplot for its length alone
+        from matplotlib import pyplot
 
-            figure: Any = pyplot.figure(figsize=(width, height), layout="constrained")
-        else:
-            from matplotlib.figure import Figure
+        from mbd.view.windows import OnceShown
 
-            figure = Figure(figsize=(width, height), layout="constrained")
+        figure: Any = pyplot.figure(FigureClass=OnceShown, facecolor=look["figure.facecolor"], **size)
+    else:
+        from matplotlib.figure import Figure
+
+        figure = Figure(facecolor=look["figure.facecolor"], **size)
+    with matplotlib.rc_context(look):
         yield figure
         if path is not None:
             named_file(path)

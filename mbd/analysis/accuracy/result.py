@@ -12,6 +12,7 @@ from mbd.analysis.accuracy.advice import advice
 from mbd.analysis.accuracy.points import Point
 from mbd.analysis.accuracy.published import Published
 from mbd.analysis.rows import Rows
+from mbd.notebook import paragraphs, table
 
 if TYPE_CHECKING:
     from mbd.analysis.accuracy.truth import Truth
@@ -95,6 +96,18 @@ class Accuracy(Rows):
                 lines.append(_line(row, widths) + (f"  {remark(point)}" if remark(point) else ""))
         lines += ["", *(f"note: {note}" for note in self.notes), *self.recommendation]
         return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        rows = [[*cells(point), remark(point)] for point in self.points if not point.failure]
+        failed = [f"{each.scheme} with {each.setting} failed: {each.failure}" for each in self.points if each.failure]
+        over = "their published values" if self.is_published else "their ranges"
+        shown = table(
+            f"accuracy of {self.model!r}: largest errors over {over}",
+            (*HEADS, "remark"),
+            rows,
+            f"reference: {self.origin}",
+        )
+        return shown + paragraphs([*failed, *(f"note: {note}" for note in self.notes), *self.recommendation])
 
     # tables ---------------------------------------------------------------------------------------------------------
     def rows(self) -> list[dict[str, Any]]:

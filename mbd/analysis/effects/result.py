@@ -12,6 +12,7 @@ from mbd.analysis.effects.advice import advice
 from mbd.analysis.effects.contribution import Contribution, Together
 from mbd.analysis.rows import Rows
 from mbd.errors import UnknownNameError, nearest
+from mbd.notebook import folded, paragraphs, table
 
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
@@ -82,6 +83,12 @@ class Effects(Rows):
         lines += ["", *changes] if changes else []
         lines += ["", *self.legend, "", *self.recommendation]
         return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        changes = [f"without {each.name!r}: {each.change}" for each in self.contributions if str(each.change)]
+        shown = table(self.span, HEADS, map(cells, self.contributions))
+        legend = folded("what the columns mean", paragraphs([*changes, *self.legend]))
+        return shown + legend + paragraphs(self.recommendation)
 
     @property
     def span(self) -> str:
