@@ -17,7 +17,7 @@ from mbd.errors import TrajectoryError
 from mbd.notebook import Values, folded, table
 from mbd.results.columns import Columns, ModelColumns, gather
 from mbd.results.facts import Facts
-from mbd.results.interpolation import Side
+from mbd.results.interpolation import OneSide, Side
 from mbd.results.record import EventRecord, Events, Record
 
 if TYPE_CHECKING:
@@ -115,7 +115,7 @@ class Trajectory:
         Parameters
         ----------
         times : one time or several [s]
-        side : at a switch, the values after it ('right') or before it ('left')
+        side : at a switch, the values after it ('right' or 'after') or before it ('left' or 'before')
 
         Then ``run.at([0.1, 0.2])["left hip.angle"]``.
         """
@@ -246,17 +246,35 @@ class Trajectory:
         with TemporaryDirectory() as folder:
             return _received, (self.save(Path(folder) / "run").read_bytes(),)
 
-    def to_dataframe(self, names: Sequence[str] | None = None) -> Any:
-        """A pandas table with `time` as index and a column per name (all of `names` by default)."""
+    def to_dataframe(
+        self, names: Sequence[str] | None = None, at: ArrayLike | None = None, side: OneSide | None = None
+    ) -> Any:
+        """A pandas table with `time` as index and a column per name (all of `names` by default).
+
+        Parameters
+        ----------
+        names : of scalars and vectors; a vector gives three columns
+        at : times in order [s], or a distance in time [s] for equal intervals from the start; None for the stored rows
+        side : at an event the values 'after' or 'before' it, once. None gives both, in two rows of equal time, where
+            `at` is None, and those after it else
+
+        Units are in ``attrs["units"]``, words in ``attrs["long_names"]``, by column.
+        """
         from mbd.results.tables import dataframe
 
-        return dataframe(self, names)
+        return dataframe(self, names, at, side)
 
-    def to_xarray(self, names: Sequence[str] | None = None) -> Any:
-        """An xarray dataset over `time`; vectors asked for by name have a further dimension `axis`."""
+    def to_xarray(
+        self, names: Sequence[str] | None = None, at: ArrayLike | None = None, side: OneSide | None = None
+    ) -> Any:
+        """An xarray dataset over `time`; vectors asked for by name have a further dimension `axis`.
+
+        `at` and `side` as for `to_dataframe`: with one of them every time is there once, so that
+        ``sel(time=0.3, method="nearest")`` works. Each variable has its unit and a name in words in ``attrs``.
+        """
         from mbd.results.tables import dataset
 
-        return dataset(self, names)
+        return dataset(self, names, at, side)
 
     def __repr__(self) -> str:
         from mbd.results.summary import text

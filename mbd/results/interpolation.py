@@ -16,9 +16,10 @@ from mbd.results.osculating import osculating
 from mbd.results.polynomials import Index, Places, hermite, hermite_rate, parabola, quintics, theta_and_step
 from mbd.results.record import Rows
 
-__all__ = ["Grid", "Side"]
+__all__ = ["Grid", "OneSide", "Side"]
 
-Side = Literal["left", "right"]
+Side = Literal["left", "right", "before", "after"]
+OneSide = Literal["after", "before"]
 
 TOUCH = 1e-12
 """Times this close to the ends of a run, relative to its largest time, count as the ends [-]."""
@@ -37,9 +38,9 @@ class Grid:
         return np.concatenate([[0], jumps, [len(self.time)]]).astype(np.intp)
 
     def places(self, times: ArrayLike, side: Side = "right") -> Places:
-        """Where times lie; at a switch, the row after it (`side="right"`) or before it (`"left"`)."""
-        if side not in ("left", "right"):
-            raise TrajectoryError(f"side is 'left' (before a switch) or 'right' (after it), got {side!r}")
+        """Where times lie; at a switch, the row after it (side 'right' or 'after') or before it ('left', 'before')."""
+        if side not in ("left", "right", "before", "after"):
+            raise TrajectoryError(f"side is 'left' or 'before', 'right' or 'after' (a switch), got {side!r}")
         wanted = np.atleast_1d(np.asarray(times, dtype=np.float64)).ravel()
         first, last = float(self.time[0]), float(self.time[-1])
         slack = TOUCH * max(abs(first), abs(last))
@@ -48,7 +49,7 @@ class Grid:
             bad = wanted[outside][0]
             raise TrajectoryError(f"t = {bad:g} s is outside the run, which covers {first:g} s to {last:g} s")
         wanted = np.clip(wanted, first, last)
-        if side == "right":
+        if side in ("right", "after"):
             lower = np.searchsorted(self.time, wanted, side="right") - 1
             upper = np.minimum(lower + 1, len(self.time) - 1)
             lower = np.where(upper == lower, upper, lower)

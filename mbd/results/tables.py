@@ -2,13 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mbd.arrays import Vector
+from mbd.bodies.values import is_number, shown
+from mbd.errors import TrajectoryError
+from mbd.results.interpolation import OneSide, Side
+from mbd.results.long_names import long_name
+from mbd.results.units import unit
 
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
 
 __all__ = ["dataframe", "dataset", "library"]
+
+SIDES: dict[str, Side] = {"after": "right", "before": "left"}
+
+MOST = 10_000_000
+"""Most rows of a table that is asked for by a distance in time."""
+
+Reader = Callable[[Sequence[str]], list[Vector]]
+"""Gives named scalars at the times of a table."""
 
 
 def library(name: str, extra: str, purpose: str) -> Any:
@@ -25,27 +43,103 @@ def library(name: str, extra: str, purpose: str) -> Any:
         raise ModuleNotFoundError(text, name=top) from None
 
 
-def dataframe(run: Trajectory, names: Sequence[str] | None = None) -> Any:
-    """A pandas DataFrame: `time` as index, a column per scalar; a vector's name gives three columns."""
+def dataframe(
+    run: Trajectory, names: Sequence[str] | None = None, at: ArrayLike | None = None, side: OneSide | None = None
+) -> Any:
+    """A pandas DataFrame, see `Trajectory.to_dataframe`."""
     pandas = library("pandas", "data", "run.to_dataframe()")
-    wanted = run.names if names is None else names
+    time, read = _axis(run, at, side)
+    wanted = _wanted(run, names)
     scalars = list(dict.fromkeys(part for name in wanted for part in run.columns.components(name)))
-    columns = dict(zip(scalars, run.columns.at_rows(scalars), strict=True))
-    return pandas.DataFrame(columns, index=pandas.Index(run.time, name="time"))
+    columns = dict(zip(scalars, read(scalars), strict=True))
+    frame = pandas.DataFrame(columns, index=pandas.Index(time, name="time"))
+    units = {name: unit(name, run.facts) for name in scalars}
+    frame.attrs["units"] = {"time": "s", **{name: text for name, text in units.items() if text}}
+    frame.attrs["long_names"] = {name: long_name(name) for name in scalars}
+    return frame
 
 
-def dataset(run: Trajectory, names: Sequence[str] | None = None) -> Any:
-    """An xarray Dataset over `time`, units in the attributes where they are known."""
+def dataset(
+    run: Trajectory, names: Sequence[str] | None = None, at: ArrayLike | None = None, side: OneSide | None = None
+) -> Any:
+    """An xarray Dataset, see `Trajectory.to_xarray`."""
     xarray = library("xarray", "data", "run.to_xarray()")
-    wanted = run.names if names is None else names
-    units = dict(run.facts.coordinates)
-    variables = {}
-    scalars = [name for name in wanted if run.columns.knows(name)]
-    found = dict(zip(scalars, run.columns.at_rows(scalars), strict=True))
-    for name in wanted:
-        value = found[name] if name in found else run[name]
-        dimensions = ("time",) if value.ndim == 1 else ("time", "axis")
-        variables[name] = (dimensions, value, {"units": units[name]} if name in units else {})
-    axes = {"axis": ["x", "y", "z"]} if any(value[0] == ("time", "axis") for value in variables.values()) else {}
-    coordinates = {"time": ("time", run.time, {"units": "s"}), **axes}
+    time, read = _axis(run, at, side)
+    wanted = _wanted(run, names)
+    parts = {name: run.columns.components(name) for name in wanted}
+    scalars = list(dict.fromkeys(part for several in parts.values() for part in several))
+    found = dict(zip(scalars, read(scalars), strict=True))
+    variables: dict[str, Any] = {}
+    for name, several in parts.items():
+        about = {"units": unit(several[0], run.facts), "long_name": long_name(name)}
+        about = {key: text for key, text in about.items() if text}
+        values = [found[part] for part in several]
+        one = len(values) == 1
+        variables[name] = (("time",) if one else ("time", "axis"), values[0] if one else np.column_stack(values), about)
+    axes = {"axis": ["x", "y", "z"]} if any(len(several) > 1 for several in parts.values()) else {}
+    coordinates = {"time": ("time", time, {"units": "s", "long_name": "time"}), **axes}
     return xarray.Dataset(variables, coords=coordinates, attrs={"model": run.name, "message": run.message})
+
+
+def _wanted(run: Trajectory, names: Sequence[str] | None) -> Sequence[str]:
+    if isinstance(names, str):
+        raise TrajectoryError(f"names are a list, such as [{names!r}]; got one text")
+    return run.names if names is None else names
+
+
+def _axis(run: Trajectory, at: ArrayLike | None, side: OneSide | None) -> tuple[Vector, Reader]:
+    """The times of a table, and what reads scalars there."""
+    if side is not None and side not in SIDES:
+        raise TrajectoryError(f"side is 'before' or 'after' an event, or None for both where at= is; got {side!r}")
+    columns = run.columns
+    if at is None:
+        rows = _once(run.time, side)
+        return run.time[rows], lambda names: [values[rows] for values in columns.at_rows(names)]
+    times = _times(run.time, at)
+    places = columns.grid.places(times, SIDES[side or "after"])
+    return times, lambda names: [np.asarray(values) for values in columns.at_places(names, places)]
+
+
+def _once(time: Vector, side: OneSide | None) -> Any:
+    """The stored rows: all of them, or of those at one instant the last ('after') or the first ('before')."""
+    if side is None:
+        return slice(None)
+    apart = np.diff(time) > 0.0
+    ends = np.ones(min(1, len(time)), dtype=bool)
+    return np.flatnonzero(np.concatenate([apart, ends] if side == "after" else [ends, apart]))
+
+
+def _times(time: Vector, at: ArrayLike) -> Vector:
+    """The times asked for: those given, in order, or every dt from the start of the run to its end."""
+    if is_number(at):
+        return _every(time, float(at))  # type: ignore[arg-type]
+    try:
+        times = np.asarray(at, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        times = np.zeros((0, 0))
+    if times.ndim != 1:
+        raise TrajectoryError(f"at is a distance in time or times in order [s], not {shown(at)}")
+    wrong = np.flatnonzero(~(np.diff(times) > 0.0))
+    if len(wrong):
+        first = int(wrong[0])
+        raise TrajectoryError(
+            f"times of a table lie in order, each once; {times[first + 1]:g} s comes after {times[first]:g} s"
+        )
+    return times
+
+
+def _every(time: Vector, dt: float) -> Vector:
+    """t₀ + k dt; the end of the run belongs to them where it lies there to round-off."""
+    if not dt > 0.0 or not np.isfinite(dt):
+        raise TrajectoryError(
+            f"at={dt:g}: a distance in time is a number above 0 s; times are a list, as in at=[{dt:g}]"
+        )
+    if not len(time):
+        return np.zeros(0)
+    steps = (time[-1] - time[0]) / dt
+    if steps > MOST:
+        raise TrajectoryError(
+            f"at={dt:g} s would make {steps:.3g} rows of a run of {time[-1] - time[0]:g} s; at most {MOST}"
+        )
+    count = int(np.floor(steps * (1.0 + 1e-12) + 1e-9))
+    return np.asarray(np.minimum(time[0] + dt * np.arange(count + 1), time[-1]))

@@ -9,6 +9,7 @@ __all__ = ["unit", "unit_of"]
 ENDINGS = {
     "angle": "rad", "displacement": "m", "length": "m", "speed": "m/s", "reaction_force": "N", "reaction_torque": "N m",
     "force": "N", "friction": "N", "tension": "N", "torque": "N m", "power": "W", "energy": "J",
+    "kinetic_energy": "J", "potential_energy": "J", "t": "s",
     "x": "m", "y": "m", "z": "m", "vx": "m/s", "vy": "m/s", "vz": "m/s", "ax": "m/s²", "ay": "m/s²", "az": "m/s²",
 }  # fmt: skip
 """Unit by the last word of a name."""
@@ -27,6 +28,10 @@ def unit(name: str, facts: Facts) -> str:
     contact = next((item for item in facts.contacts if item.name == stem), None)
     if contact is not None and last == "gap":
         return contact.unit
+    if contact is not None and last == "gap_rate":
+        return f"{contact.unit}/s"
+    if stem.endswith(".friction") and any(f"{item.name}.friction" == stem for item in facts.contacts):
+        return "N"
     if last == "friction" and stem in dict(facts.frictions):
         return dict(facts.frictions)[stem]
     if contact is not None and last == "force":

@@ -1,0 +1,38 @@
+"""Names of results in words, for the axes of plots and the attributes of tables."""
+
+from __future__ import annotations
+
+__all__ = ["long_name"]
+
+WORDS = {
+    "x": "place of {} along x", "y": "place of {} along y", "z": "place of {} along z",
+    "vx": "velocity of {} along x", "vy": "velocity of {} along y", "vz": "velocity of {} along z",
+    "ax": "acceleration of {} along x", "ay": "acceleration of {} along y", "az": "acceleration of {} along z",
+    "rate": "rate of {}", "acceleration": "acceleration of {}", "angle": "angle of {}",
+    "displacement": "displacement of {}", "gap": "gap of {}", "gap_rate": "rate of the gap of {}",
+    "force": "force of {}", "torque": "torque of {}", "tension": "tension of {}", "length": "length of {}",
+    "friction": "friction of {}", "multiplier": "multiplier of {}", "residual": "residual of {}",
+    "power": "power of {}", "energy": "energy of {}",
+    "reaction_force": "reaction force of {}", "reaction_torque": "reaction torque of {}",
+}  # fmt: skip
+"""Words for the last part of a name."""
+
+VECTORS = ("force", "torque", "reaction_force", "reaction_torque")
+"""Vectors that are no places."""
+
+
+def long_name(name: str) -> str:
+    """A result in words; the name itself where its parts do not tell.
+
+    >>> long_name("left hip.angle.rate"), long_name("shank.end.vx"), long_name("knee.reaction_force.y")
+    ('rate of angle of left hip', 'velocity of shank.end along x', 'reaction force of knee along y')
+    """
+    stem, _, last = name.rpartition(".")
+    if not stem:
+        return "time" if name == "t" else name.replace("_", " ")
+    owner, _, kind = stem.rpartition(".")
+    if last in ("x", "y", "z") and owner and kind in VECTORS:
+        return f"{WORDS[kind].format(owner)} along {last}"
+    if last in ("rate", "acceleration") and owner:
+        return WORDS[last].format(long_name(stem))
+    return WORDS[last].format(stem) if last in WORDS else name

@@ -1,0 +1,113 @@
+"""Runs as tables: what `at` gives is what `run.at` gives, every time once, with units and words."""
+
+from __future__ import annotations
+
+import random
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+
+import mbd
+from mbd.errors import TrajectoryError
+
+xarray = pytest.importorskip("xarray")
+
+
+def bouncing(until: float = 1.2) -> mbd.Trajectory:
+    model = mbd.Model("ball")
+    point = mbd.PointMass("mass", mass=1.0)
+    model.connect(mbd.Translation("flight", model.ground.origin, point.origin, axes="xy"))
+    model.constrain(mbd.Unilateral("floor", mbd.touchdown(point.origin), restitution=0.5))
+    start = mbd.assemble(model, position={"flight.y": 1.0}, velocity={"flight.x.rate": 0.3})
+    return mbd.simulate(model, start, dt=1e-2, until=until, backend="python")
+
+
+@pytest.fixture(scope="module")
+def run() -> mbd.Trajectory:
+    return bouncing()
+
+
+@settings(max_examples=20)
+@given(seed=st.integers(0, 10_000))
+def test_a_table_at_times_is_the_run_at_these_times(run, seed):
+    rng = random.Random(seed)
+    events = [event.time for event in run.events]
+    times = sorted({*(rng.uniform(0.0, run.time[-1]) for _ in range(5)), *rng.sample(events, 2)})
+    names = [*rng.sample(list(run.names), 3), "mass.origin"]
+    for side, word in (("right", "after"), ("left", "before")):
+        there = run.at(times, side=side)
+        table, data = run.to_dataframe(names, at=times, side=word), run.to_xarray(names, at=times, side=word)
+        assert list(table.index) == times
+        for name in names[:3]:
+            np.testing.assert_array_equal(table[name], there[name])
+            np.testing.assert_array_equal(data[name], there[name])
+        np.testing.assert_array_equal(data["mass.origin"], there["mass.origin"])
+        np.testing.assert_array_equal(there["flight.y"], run.at(times, side=word)["flight.y"])
+
+
+def test_each_time_is_there_once_with_the_side_that_was_chosen(run):
+    both = run.to_dataframe(["flight.y.rate"])
+    after, before = (run.to_dataframe(["flight.y.rate"], side=side) for side in ("after", "before"))
+    assert not both.index.is_unique and after.index.is_unique and before.index.is_unique
+    assert list(after.index) == list(before.index) == sorted(set(run.time))
+    bounce = run.events[0].time
+    np.testing.assert_allclose(after["flight.y.rate"][bounce], -0.5 * before["flight.y.rate"][bounce], rtol=1e-6)
+    for side, rates in (("after", after), ("before", before)):
+        data = run.to_xarray(["flight.y.rate"], side=side)
+        near = data.sel(time=bounce + 1e-7, method="nearest")["flight.y.rate"]
+        assert float(near) == rates["flight.y.rate"][bounce]
+
+
+@pytest.mark.parametrize("dt", [0.1, 0.07, 1.2, 5.0])
+def test_equal_intervals_begin_at_the_start_and_end_within_the_run(run, dt):
+    time = run.to_dataframe(["flight.y"], at=dt).index.to_numpy()
+    np.testing.assert_allclose(time, dt * np.arange(len(time)), atol=1e-12)
+    assert time[-1] <= run.time[-1] < time[-1] + dt * (1.0 + 1e-9)
+
+
+def test_units_and_words_go_with_the_columns(run):
+    names = ["flight.y", "flight.y.rate", "floor.force", "floor.gap_rate", "mass.origin", "kinetic_energy", "t"]
+    data, table = run.to_xarray(names, at=0.1), run.to_dataframe(names, at=0.1)
+    assert [data[name].attrs["units"] for name in names] == ["m", "m/s", "N", "m/s", "m", "J", "s"]
+    assert table.attrs["units"]["mass.origin.x"] == "m" and table.attrs["units"]["time"] == "s"
+    assert data["floor.force"].attrs["long_name"] == table.attrs["long_names"]["floor.force"] == "force of floor"
+    assert data["flight.y.rate"].attrs["long_name"] == "rate of place of flight along y"
+
+
+def test_datasets_go_there_and_back(run):
+    data = run.to_xarray(["flight.y", "mass.origin"], at=0.05)
+    again = xarray.Dataset.from_dict(data.to_dict())
+    xarray.testing.assert_identical(data, again)
+    np.testing.assert_array_equal(
+        data["flight.y"].to_dataframe()["flight.y"], run.to_dataframe(["flight.y"], at=0.05)["flight.y"]
+    )
+
+
+def test_runs_from_files_give_the_same_tables(run, tmp_path):
+    again = mbd.load(run.save(tmp_path / "ball"))
+    table = run.to_dataframe(at=0.05, side="before")
+    assert again.to_dataframe(at=0.05, side="before").equals(table)
+    assert again.to_dataframe(at=0.05).attrs["units"] == table.attrs["units"]
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"at": 0.0}, "a number above 0 s"),
+        ({"at": float("nan")}, "a number above 0 s"),
+        ({"at": 1e-12}, "would make 1.2e\\+12 rows"),
+        ({"at": [0.2, 0.1]}, "in order, each once; 0.1 s comes after 0.2 s"),
+        ({"at": [0.1, 0.1]}, "each once"),
+        ({"at": [0.1, float("nan")]}, "each once"),
+        ({"at": "soon"}, "a distance in time or times in order"),
+        ({"at": [0.0, 99.0]}, "outside the run"),
+        ({"side": "left"}, "'before' or 'after'"),
+        ({"names": "flight.y"}, r"names are a list, such as \['flight.y'\]"),
+        ({"names": ["flight.z"]}, "no result named 'flight.z'"),
+    ],
+)
+def test_a_wrong_request_is_named(run, options, words):
+    for table in run.to_dataframe, run.to_xarray:
+        with pytest.raises((TrajectoryError, mbd.UnknownNameError), match=words):
+            table(**options)
