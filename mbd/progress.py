@@ -1,4 +1,4 @@
-"""Bars on a terminal."""
+"""Bars on a terminal or in a notebook."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from importlib.util import find_spec
 from time import perf_counter
 from typing import Any, TypeVar
 
-__all__ = ["Progress", "counted", "progress_bar", "run_bar", "share_bar"]
+__all__ = ["Progress", "counted", "in_notebook", "progress_bar", "run_bar", "share_bar"]
 
 LATE = 3.0
 """Seconds after which a slow run that nobody wanted to watch shows a bar all the same."""
@@ -20,18 +20,16 @@ Item = TypeVar("Item")
 
 @contextmanager
 def progress_bar() -> Iterator[Progress | None]:
-    """Simulated time and time left on a terminal, at most five times a second; nothing elsewhere."""
+    """Simulated time and time left on a terminal or in a notebook, at most five times a second; nothing elsewhere."""
     if not _is_wanted():
         yield None
         return
-    from tqdm import tqdm
-
-    bars: list[tqdm[Any]] = []
+    bars: list[Any] = []
     shape = "{percentage:3.0f}% |{bar:30}| {n:.2f} of {total:.2f} s  [{elapsed} < {remaining}]"
 
     def show(t: float, until: float) -> None:
         if not bars:
-            bars.append(tqdm(total=until, bar_format=shape, mininterval=0.2, leave=False, file=sys.stderr))
+            bars.append(_bar(shape, until))
         bars[0].update(t - bars[0].n)
 
     try:
@@ -45,15 +43,15 @@ def progress_bar() -> Iterator[Progress | None]:
 def run_bar(wanted: Any, slow: bool, begin: float, end: float) -> Iterator[Progress | None]:
     """Who is informed how far a run is.
 
-    wanted : a function, which is given the time and the end; True for a bar on a terminal; 'late' for one after `LATE`
-        seconds where the run is `slow`; else nobody
+    wanted : a function, which is given the time and the end; True for a bar on a terminal or in a notebook; 'late' for
+        one after `LATE` seconds where the run is `slow`; else nobody
     begin, end : of the run [s]
     """
     if callable(wanted):
         yield wanted
         return
     late = wanted == "late" and slow
-    if not (wanted is True or late) or not sys.stderr.isatty():
+    if not (wanted is True or late) or not _is_seen():
         yield None
         return
     bar, began = (_Bar() if find_spec("tqdm") else _Line()), perf_counter()
@@ -79,10 +77,7 @@ class _Bar:
 
     def show(self, done: float, total: float, seconds: float) -> None:
         if self.bar is None:
-            from tqdm import tqdm
-
-            shape = "{l_bar}{bar}| {n:.2f}/{total:.2f} s [{elapsed}<{remaining}]"
-            self.bar = tqdm(total=total, unit="s", bar_format=shape, file=sys.stderr)
+            self.bar = _bar("{l_bar}{bar}| {n:.2f}/{total:.2f} s [{elapsed}<{remaining}]", total, leave=True)
             self.bar.start_t -= seconds
         self.bar.update(done - self.bar.n)
 
@@ -109,30 +104,47 @@ class _Line:
 
 @contextmanager
 def share_bar() -> Iterator[Progress | None]:
-    """Runs done of all runs on a terminal, as a percentage and the time left; nothing elsewhere."""
+    """Runs done of all runs on a terminal or in a notebook, as a percentage and the time left; nothing elsewhere."""
     if not _is_wanted():
         yield None
         return
-    from tqdm import tqdm
-
-    shape = "{percentage:3.0f}% |{bar:30}|  [{elapsed} < {remaining}]"
-    with tqdm(total=1.0, bar_format=shape, mininterval=0.2, leave=False, file=sys.stderr) as bar:
+    with _bar("{percentage:3.0f}% |{bar:30}|  [{elapsed} < {remaining}]", 1.0) as bar:
         yield lambda done, total: (bar.update(max(done / total - bar.n, 0.0)), None)[1]
 
 
 def counted(items: Sequence[Item], name: Callable[[Item], str]) -> Iterator[Item]:
-    """The items one by one, with a bar that names the present one on a terminal; nothing elsewhere."""
+    """The items one by one, with a bar that names the present one, as above; nothing elsewhere."""
     if not _is_wanted():
         yield from items
         return
-    from tqdm import tqdm
-
-    with tqdm(total=len(items), leave=False, file=sys.stderr, bar_format="{n}/{total} |{bar:30}| {desc}") as bar:
+    with _bar("{n}/{total} |{bar:30}| {desc}", len(items)) as bar:
         for item in items:
             bar.set_description_str(name(item))
             yield item
             bar.update()
 
 
+def _bar(shape: str, total: float, leave: bool = False) -> Any:
+    """A bar of tqdm: in a notebook a widget where ipywidgets is installed, else a line of text."""
+    as_widget = in_notebook() and find_spec("ipywidgets") is not None
+    if as_widget:
+        from tqdm.auto import tqdm
+    else:
+        from tqdm import tqdm
+    text = shape.replace("{bar:30}", "{bar}") if as_widget else shape
+    return tqdm(total=total, bar_format=text, mininterval=0.2, leave=leave, file=None if as_widget else sys.stderr)
+
+
+def in_notebook() -> bool:
+    """Whether this runs in a kernel of Jupyter, whose cells show bars."""
+    shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
+    return shell is not None and "IPKernelApp" in shell.config
+
+
+def _is_seen() -> bool:
+    """Whether somebody sees what is written to the terminal or the cell."""
+    return sys.stderr.isatty() or in_notebook()
+
+
 def _is_wanted() -> bool:
-    return sys.stderr.isatty() and find_spec("tqdm") is not None
+    return _is_seen() and find_spec("tqdm") is not None

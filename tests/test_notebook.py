@@ -5,8 +5,10 @@ from __future__ import annotations
 import copy
 import json
 import pickle
+import sys
 from functools import cache
 from html.parser import HTMLParser
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import given, settings, strategies as st
@@ -196,3 +198,34 @@ def test_a_notebook_shows_a_figure_once(monkeypatch):
         assert len(pickle.loads(pickle.dumps(figure)).axes) == len(figure.axes)
     finally:
         pyplot.close("all")
+
+
+@pytest.mark.parametrize("widgets", [False, True])
+def test_a_notebook_shows_bars(widgets, monkeypatch, capsys):
+    pytest.importorskip("tqdm")
+    made = []
+
+    class Bar:
+        n = start_t = 0.0
+
+        def __init__(self, **options):
+            made.append(options)
+
+        def update(self, step):
+            self.n += step
+
+        def close(self):
+            made.append("closed")
+
+    kernel = SimpleNamespace(config={"IPKernelApp": {}})
+    monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=lambda: kernel))
+    monkeypatch.setattr("mbd.progress.find_spec", lambda name: name != "ipywidgets" or widgets)
+    monkeypatch.setattr("tqdm.auto.tqdm" if widgets else "tqdm.tqdm", Bar)
+    model, start, _ = scene()
+    mbd.simulate(model, start, dt=5e-3, until=0.2, progress=True)
+    options, end = made
+    assert end == "closed" and options["total"] == 0.2 and (options["file"] is None) is widgets
+    assert capsys.readouterr().err == ""
+    made.clear()
+    mbd.simulate(model, start, dt=5e-3, until=0.2)
+    assert not made
