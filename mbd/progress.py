@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from importlib import import_module
 from importlib.util import find_spec
 from time import perf_counter
 from typing import Any, TypeVar
@@ -127,10 +128,7 @@ def counted(items: Sequence[Item], name: Callable[[Item], str]) -> Iterator[Item
 def _bar(shape: str, total: float, leave: bool = False) -> Any:
     """A bar of tqdm: in a notebook a widget where ipywidgets is installed, else a line of text."""
     as_widget = in_notebook() and find_spec("ipywidgets") is not None
-    if as_widget:
-        from tqdm.auto import tqdm
-    else:
-        from tqdm import tqdm
+    tqdm = import_module("tqdm.auto" if as_widget else "tqdm").tqdm
     text = shape.replace("{bar:30}", "{bar}") if as_widget else shape
     return tqdm(total=total, bar_format=text, mininterval=0.2, leave=leave, file=None if as_widget else sys.stderr)
 

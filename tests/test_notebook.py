@@ -8,6 +8,7 @@ import pickle
 import sys
 from functools import cache
 from html.parser import HTMLParser
+from importlib import import_module
 from types import SimpleNamespace
 
 import pytest
@@ -219,8 +220,8 @@ def test_a_notebook_shows_bars(widgets, monkeypatch, capsys):
 
     kernel = SimpleNamespace(config={"IPKernelApp": {}})
     monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=lambda: kernel))
-    monkeypatch.setattr("mbd.progress.find_spec", lambda name: name != "ipywidgets" or widgets)
-    monkeypatch.setattr("tqdm.auto.tqdm" if widgets else "tqdm.tqdm", Bar)
+    monkeypatch.setattr("mbd.progress.find_spec", lambda name: None if name == "ipywidgets" and not widgets else name)
+    monkeypatch.setattr(import_module("tqdm.auto" if widgets else "tqdm"), "tqdm", Bar)
     model, start, _ = scene()
     mbd.simulate(model, start, dt=5e-3, until=0.2, progress=True)
     options, end = made
