@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from mbd.analysis.accuracy import Accuracy as Accuracy, Known as Known, accuracy as accuracy
     from mbd.analysis.effects import Effects as Effects, effects as effects
-    from mbd.analysis.linearization import Linearization as Linearization, linearize as linearize
+    from mbd.analysis.linearization import Linearization as Linearization
+    from mbd.analysis.linearize import linearize as linearize
     from mbd.analysis.numerical import Criteria as Criteria, criteria as criteria
+    from mbd.analysis.state_space import StateSpace as StateSpace
     from mbd.analysis.sweep import Sweep as Sweep, sweep as sweep
     from mbd.assembly.assemble import assemble as assemble
     from mbd.assembly.mobility import Mobility as Mobility, mobility as mobility
@@ -133,7 +135,9 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOMES = {
-    "mbd.analysis.linearization": "Linearization linearize",
+    "mbd.analysis.linearization": "Linearization",
+    "mbd.analysis.linearize": "linearize",
+    "mbd.analysis.state_space": "StateSpace",
     "mbd.analysis.accuracy": "Accuracy Known accuracy",
     "mbd.analysis.effects": "Effects effects",
     "mbd.assembly.mobility": "Mobility mobility",

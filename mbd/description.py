@@ -177,6 +177,12 @@ class Description:
             result |= action.parameters()
         return result
 
+    @property
+    def laws(self) -> tuple[str, ...]:
+        """Names of quantities of forces and constraints that are functions, expressions or samples."""
+        words: list[Force | Constraint] = [*self.forces, *self.constraints]
+        return tuple(name for word in words for name in word.laws())
+
     def mentions(self) -> list[Mention]:
         """The frames, joints and named quantities that forces and constraints refer to."""
         words: list[Force | Constraint] = [*self.forces, *self.constraints]

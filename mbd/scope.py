@@ -51,6 +51,9 @@ class Scope(ParameterSource, Protocol):
     def table(self, owner: str, breaks: Sequence[float], coefficients: Sequence[Sequence[float]]) -> Table:
         """A piecewise cubic stored beside the parameters; evaluate it with ``scope.tape.lookup(table, x)``."""
 
+    def increment(self, owner: str, field: str) -> Scalar:
+        """What is added to the law ``owner.field`` where an analysis asks for it as an input; 0 otherwise."""
+
     def frame(self, frame: Frame) -> FrameMotion:
         """Motion of a frame of any body, or of the ground."""
 

@@ -66,7 +66,7 @@ WORDS = {
 BESIDE = {
     "made by others, not by users": (
         mbd.Accuracy, mbd.Criteria, mbd.Effects, mbd.Failure, mbd.Known, mbd.Linearization, mbd.Mobility,
-        mbd.PenaltyParameters, mbd.Replay, mbd.State, mbd.Sweep, mbd.Trajectory,
+        mbd.PenaltyParameters, mbd.Replay, mbd.State, mbd.StateSpace, mbd.Sweep, mbd.Trajectory,
     ),
     "take a model and a run: tests of their own": (
         mbd.accuracy, mbd.assemble, mbd.criteria, mbd.effects, mbd.linearize, mbd.load, mbd.mobility, mbd.project,

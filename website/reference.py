@@ -18,7 +18,8 @@ GROUPS = {
     "maximum minimum clip mod floor where pi",
     "Starts and runs": "assemble project State simulate Trajectory load sweep Sweep",
     "Integrators": "HHT GeneralizedAlpha Newmark RadauIIA RungeKutta853",
-    "Analysis": "accuracy Accuracy Known effects Effects linearize Linearization mobility Mobility criteria Criteria",
+    "Analysis": "accuracy Accuracy Known effects Effects linearize Linearization StateSpace mobility "
+    "Mobility criteria Criteria",
     "Errors and failures": "MbdError MbdWarning ModelError AssemblyError SimulationError CapabilityError "
     "MemoryLimitError TraceError TrajectoryError UnknownNameError Failure Replay replay",
 }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -76,13 +76,17 @@ class Instant:
 
     def terms(self, extra: Vector | None = None) -> LinearTerms:
         """Derivatives of balance and rows here; `extra` (m,) is added to the multipliers of the active rows."""
-        mechanism, state, layout = self.mechanism, self.state, self.mechanism.layout
+        mechanism, layout = self.mechanism, self.mechanism.layout
         mode = self.rows, self.penalties, self.sliding
         key = f"linear {mode}"
         with mechanism.equations.tape.lock:
             if key not in mechanism.named:
                 mechanism.named[key] = scalar_function(linearization(mechanism.equations, *mode), layout, "linear")
-        function = mechanism.named[key]
+        return LinearTerms.of(self.evaluate(mechanism.named[key], extra), layout.n, layout.n_v, len(self.rows))
+
+    def evaluate(self, function: Any, extra: Vector | None = None) -> Vector:
+        """What a program gives here; `extra` as for `terms`."""
+        mechanism, state, layout = self.mechanism, self.state, self.mechanism.layout
         y = np.concatenate([state.v, state.z])
         block = mechanism.block(state.time, state.q, y, self.system.anchors, self.penalties)
         block[layout.a : layout.lam] = self.rate
@@ -92,7 +96,11 @@ class Instant:
         block[layout.slip : layout.shift] = self.system.slip
         out = np.zeros(function.size)
         function(block, self.system.parameters, out)
-        return LinearTerms.of(out, layout.n, layout.n_v, len(self.rows))
+        return out
+
+    def value(self, parameter: Any) -> float:
+        """The value of a parameter, by its input on the tape."""
+        return float(self.system.parameters[parameter.data[1]])
 
     def kept(self, matrix: Matrix) -> Matrix:
         """The lines of a matrix that belong to independent rows."""
@@ -103,9 +111,13 @@ class Instant:
 
         While a friction slides, the rows that depend on them take their shares of a load, as in a run; they are held.
         """
-        R = self.kept(terms.R.T).T
+        R, part = self.kept(terms.R.T).T, self.loads()
+        return R if part is None else np.asarray(R + terms.R[:, np.array(self.dependent, dtype=bool)] @ part)
+
+    def loads(self) -> Matrix | None:
+        """(dependent, kept) what dependent rows carry of the multipliers of the others while a friction slides."""
         if not (self.sliding and any(self.dependent)):
-            return R
+            return None
         state, system = self.state, self.system
         there = self.mechanism.acceleration_terms(
             state.time, state.q, np.concatenate([state.v, state.z]), system.parameters, system.anchors,
@@ -113,19 +125,26 @@ class Instant:
         )  # fmt: skip
         flags = np.array(self.dependent, dtype=bool)
         kept, dependent = np.array(self.rows)[~flags], np.array(self.rows)[flags]
-        part = shares(self.mechanism.equations.rows, there, kept.tolist(), dependent.tolist())
-        return np.asarray(R + terms.R[:, flags] @ part)
+        return np.asarray(shares(self.mechanism.equations.rows, there, kept.tolist(), dependent.tolist()))
 
 
-def instant(model: Any, state: State, parameters: Mapping[str, float] | None = None, backend: str = "auto") -> Instant:
+def instant(
+    model: Any,
+    state: State,
+    parameters: Mapping[str, float] | None = None,
+    backend: str = "auto",
+    inputs: Collection[str] = (),
+) -> Instant:
     """Accelerations and multipliers of the contacts that are closed in a state; frictions at rest stick if they can.
+
+    `inputs` are parameters that are to be run-time inputs whatever their values.
 
     Raises
     ------
     ModelError
         if the state is that of another model, is not consistent, or closes a contact that would pull there.
     """
-    given = given_state(model, state, parameters, backend)
+    given = given_state(model, state, parameters, backend, inputs)
     mechanism, manager, values = given.mechanism, given.manager, given.values
     stepper = Stepper(mechanism, manager, HHT(), values, 1.0, {"capacity": 1})
     K, flags = _kernel(stepper, state), manager.flags(state.mode.closed)

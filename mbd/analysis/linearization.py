@@ -1,7 +1,8 @@
-"""Small motions about a state: M, C, K, the state matrix on independent coordinates, natural modes."""
+"""Small motions about a state: mass, damping, stiffness, first-order equations with inputs and outputs, modes."""
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -9,19 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from mbd.analysis.independent import Independent, independent, row_sizes
-from mbd.analysis.instant import Instant, instant
+from mbd.analysis.instant import Instant
+from mbd.analysis.state_space import StateSpace
 from mbd.arrays import Matrix, Vector
-from mbd.assembly.dependence import NEGLIGIBLE
 from mbd.configuration import Configuration
-from mbd.equations.linearization import LinearTerms
-from mbd.errors import ModelError
-from mbd.state import State
+from mbd.errors import MbdWarning
 
-__all__ = ["Linearization", "NaturalMode", "linearize"]
+__all__ = ["Linearization", "NaturalMode"]
 
-VANISHES = 1e-6
-"""Part of a second derivative along the free motions, relative, below which dependent rows agree nearby too [-]."""
 STEADY = 1e-6
 """Acceleration, relative to what a unit displacement and the present speeds would cause, that counts as none [-]."""
 
@@ -45,20 +41,24 @@ class NaturalMode:
 
 @dataclass(frozen=True, eq=False)
 class Linearization:
-    """The linear motion about a state: ``M δv̇ + C δv + K δq + Bᵀ δλ = 0``, reduced to ``δẋ = A δx``.
+    """The linear motion about a state: ``M δv̇ + C δv + K δq + Bᵀ δλ = 0``, reduced to ``δẋ = A δx + B δu``.
 
     Attributes
     ----------
     model : its name; time : of the state [s]
-    coordinates : n_v names of the coordinates, in the order of M, C, K and the columns of B; those of velocities for
-        joints whose coordinates do not add, with small displacements along these in axes that move with the child
+    coordinates : n_v names of the coordinates, in the order of the matrices below; those of velocities for joints whose
+        coordinates do not add, with small displacements along these in axes that move with the child
     rows : m titles of the active rows
-    M, C, K : (n_v, n_v) derivatives of the balance r by v̇, v and q, with the accelerations and multipliers of the
-        state held: K has the geometric stiffness of multipliers, C gyroscopic terms; unsymmetric where forces are
-    B : (m, n_v) ∂h/∂q of the rows; of rows on velocities ∂ḣ/∂v
-    A : (N, N) state matrix; states : its N names: independent coordinates, independent rates, first-order states
+    mass_matrix, damping_matrix, stiffness_matrix : (n_v, n_v) derivatives M, C, K of the balance r by v̇, v and q, with
+        the accelerations and multipliers of the state held: K has the geometric stiffness of multipliers, C gyroscopic
+        terms; unsymmetric where forces are
+    constraint_jacobian : (m, n_v) ∂h/∂q of the rows; of rows on velocities ∂ḣ/∂v
+    state_space : A, B, C, D with the names and units of states, inputs and outputs; the attributes of these names are
+        those of it. Its states are independent coordinates, independent rates, first-order states, and what inputs
+        prescribe
     basis : (2 n_v + n_z, N) small changes of (q, v, z) for a unit change of each of `states`
     y : (n_q + n_v + n_z,) the state (q, v, z); drift : (2 n_v + n_z,) the rates of displacements, v and z: (v, v̇, ż)
+    output_values : (o,) of the outputs at the state
     eigenvalues : (N,) of A by growing magnitude, conjugate pairs side by side [1/s]
     shapes : (n_v, N) the coordinates' part of each motion, largest part 1; of motions that move no coordinate 0
     """
@@ -67,19 +67,75 @@ class Linearization:
     time: float
     coordinates: tuple[str, ...]
     rows: tuple[str, ...]
-    states: tuple[str, ...]
-    M: Matrix
-    C: Matrix
-    K: Matrix
-    B: Matrix
-    A: Matrix
+    mass_matrix: Matrix
+    damping_matrix: Matrix
+    stiffness_matrix: Matrix
+    constraint_jacobian: Matrix
+    state_space: StateSpace
     basis: Matrix
     y: Vector
     drift: Vector
+    output_values: Vector
     eigenvalues: Any
     shapes: Any
     picked: tuple[int, ...] = field(repr=False)
     instant: Instant = field(repr=False)
+    prescribed: Vector = field(repr=False)
+    has_ports: bool = field(repr=False)
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """N names of the states."""
+        return self.state_space.states
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """k names of the inputs."""
+        return self.state_space.inputs
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """o names of the outputs; the states where none were asked for."""
+        return self.state_space.outputs
+
+    @property
+    def M(self) -> Matrix:
+        """`mass_matrix`."""
+        return self.mass_matrix
+
+    @property
+    def K(self) -> Matrix:
+        """`stiffness_matrix`."""
+        return self.stiffness_matrix
+
+    @property
+    def A(self) -> Matrix:
+        """(N, N) ∂ẋ/∂x."""
+        return self.state_space.A
+
+    @property
+    def B(self) -> Matrix:
+        """(N, k) ∂ẋ/∂u; without inputs= and outputs=, for this release, the constraint Jacobian."""
+        return self.state_space.B if self.has_ports else self._renamed("B", "constraint_jacobian")
+
+    @property
+    def C(self) -> Matrix:
+        """(o, N) ∂y/∂x; without inputs= and outputs=, for this release, the damping matrix."""
+        return self.state_space.C if self.has_ports else self._renamed("C", "damping_matrix")
+
+    @property
+    def D(self) -> Matrix:
+        """(o, k) ∂y/∂u."""
+        return self.state_space.D
+
+    def _renamed(self, letter: str, name: str) -> Matrix:
+        warnings.warn(
+            f"linearize(…).{letter} is now called {name}; B, C and D are the matrices of inputs and outputs, see "
+            "inputs= and outputs=",
+            MbdWarning,
+            stacklevel=3,
+        )
+        return np.asarray(getattr(self, name))
 
     @property
     def frequencies(self) -> Vector:
@@ -111,11 +167,11 @@ class Linearization:
     @property
     def x(self) -> Vector:
         """(N,) values of `states` [m, rad, m/s, rad/s, …]."""
-        configuration = self._configuration
-        if configuration.is_vector:
-            return self.y[list(self.picked)]
-        places = np.append(self.y, 0.0)[configuration.places]  # increments of charts are 0 here
-        return np.append(places, self.y[configuration.n_q :])[list(self.picked)]
+        configuration, y = self._configuration, self.y
+        if not configuration.is_vector:
+            places = np.append(y, 0.0)[configuration.places]  # increments of charts are 0 here
+            y = np.append(places, y[configuration.n_q :])
+        return np.append(y[list(self.picked)], self.prescribed)
 
     @property
     def _configuration(self) -> Configuration:
@@ -125,7 +181,9 @@ class Linearization:
     def is_equilibrium(self) -> bool:
         """Whether no independent rate changes; the rates themselves may be steady, as those of a governor."""
         n_v, rates = len(self.coordinates), [k for k, place in enumerate(self.picked) if place >= len(self.coordinates)]
-        caused = np.abs(self.A[rates]) @ (np.abs(self.x) + [float(place < n_v) for place in self.picked])
+        count = len(self.picked)
+        moved = np.abs(self.x[:count]) + [float(place < n_v) for place in self.picked]
+        caused = np.abs(self.A[rates][:, :count]) @ moved
         return bool(np.all(np.abs(self.drift[list(self.picked)][rates]) <= STEADY * np.maximum(caused, 1e-3)))
 
     def rhs(self, t: float, y: Vector) -> Vector:
@@ -140,9 +198,30 @@ class Linearization:
         return np.concatenate([configuration.rates(q, speeds[:n]), rate])
 
     def linear_rhs(self, t: float, x: Vector) -> Vector:
-        """``ẋ = ẋ₀ + A (x − x₀)`` of the independent states, x₀ = `x`: for `solve_ivp`."""
+        """``ẋ = ẋ₀ + A (x − x₀)`` of the states, x₀ = `x`: for `solve_ivp`."""
         change = np.asarray(x, dtype=float) - self.x
-        return np.asarray(self.drift[list(self.picked)] + self.A @ change)
+        still = np.zeros(len(self.prescribed))
+        return np.asarray(np.append(self.drift[list(self.picked)], still) + self.A @ change)
+
+    def discrete(self, dt: float, method: str = "zoh") -> StateSpace:
+        """`StateSpace.discrete`."""
+        return self.state_space.discrete(dt, method)
+
+    def to_scipy(self) -> Any:
+        """`StateSpace.to_scipy`."""
+        return self.state_space.to_scipy()
+
+    def to_control(self) -> Any:
+        """`StateSpace.to_control`."""
+        return self.state_space.to_control()
+
+    def transfer(self, s: Any) -> Any:
+        """`StateSpace.transfer`."""
+        return self.state_space.transfer(s)
+
+    def frequency_response(self, frequencies: Any) -> Any:
+        """`StateSpace.frequency_response`."""
+        return self.state_space.frequency_response(frequencies)
 
     def plot_modes(self, path: str | Path | None = None, most: int = 6) -> Any:
         """Mode shapes as bars, one panel for each of the `most` slowest motions that move a coordinate; the figure."""
@@ -161,121 +240,3 @@ class Linearization:
         from mbd.analysis.tables import linear_html
 
         return linear_html(self)
-
-
-def linearize(
-    model: Any, state: State, parameters: Mapping[str, float] | None = None, backend: str = "auto"
-) -> Linearization:
-    """The linear motion about a state, with exact derivatives.
-
-    Contacts that are closed in the state stay closed; their frictions slide where they move, and stick where they are
-    at rest and can. Independent coordinates are chosen so that rows determine the others best. A is the exact Jacobian
-    of their first-order equations at any state; at an equilibrium or a steady motion its eigenvalues do not depend on
-    the choice, on the cut or on the order of rows. Time is held: driven motions are frozen at the state's instant.
-
-    Parameters
-    ----------
-    model : a `Model` or `Lagrangian`
-    state : from `assemble`, `run.final` or `run.at`
-    parameters : values that differ from the model's, by name
-    backend : see `mbd.simulate`; for `Linearization.rhs`
-
-    Raises
-    ------
-    ModelError
-        if the state is not consistent, a closed contact would pull, or the constraint Jacobian loses rank at this
-        posture only.
-
-    Examples
-    --------
-    >>> import mbd
-    >>> model = mbd.Model("pendulum")
-    >>> rod = mbd.Link("rod", mass=1.0, length=0.5, center=0.5)
-    >>> model.connect(mbd.Revolute("pin", model.ground.origin, rod.start, loss=mbd.Viscous(0.1)))
-    >>> print(mbd.linearize(model, mbd.assemble(model)))
-    pendulum at t = 0 s, in equilibrium: 1 coordinate, no rows
-      states: pin.angle, pin.angle.rate
-        ω [rad/s]      f [Hz]  damping ζ  motion
-          4.42945    0.704968     0.0452  pin.angle
-    """
-    found = instant(model, state, parameters, backend)
-    equations, terms = found.mechanism.equations, found.terms()
-    n_v = equations.n_v
-    if n_v == 0:
-        raise ModelError(f"{equations.name!r} has no coordinate; connect a body by a joint that lets it move")
-    chosen = independent(terms.M[:n_v, :n_v], terms.B, terms.turning, found.velocity, equations.n_z)
-    singular = _singular(found, terms, chosen)
-    if singular:
-        raise ModelError(singular)
-    picked = (*chosen.places, *(n_v + k for k in chosen.speeds), *range(2 * n_v, 2 * n_v + equations.n_z))
-    A = _motion(found, terms, n_v)[list(picked)] @ chosen.basis
-    eigenvalues, shapes = _modes(A, chosen.basis[:n_v])
-    places = tuple(name for name, _ in equations.configuration.freedoms)
-    names = (*places, *equations.velocity_names, *(each.name for each in equations.states))
-    return Linearization(
-        equations.name, state.time, places, found.titles, tuple(names[k] for k in picked), terms.M[:n_v, :n_v],
-        terms.C[:n_v, :n_v], terms.K[:n_v], terms.B, A, chosen.basis, np.concatenate([state.q, state.v, state.z]),
-        np.concatenate([state.v, found.rate]), eigenvalues, shapes, picked, found,
-    )  # fmt: skip
-
-
-def _motion(found: Instant, terms: LinearTerms, n_v: int) -> Matrix:
-    """Rates of (x, v, z) per change of (x, v, z), (2 n_v + n_z) square, rows held at acceleration level.
-
-    ``[M R; B 0] (δv̇, δλ) = −[K C; ∂ḧ/∂x ∂ḧ/∂v] (δx, δv)``
-    """
-    n, B = len(terms.r), found.kept(terms.B)
-    m = len(B)
-    still = np.zeros((m, n - n_v))
-    matrix = np.block([[terms.M, found.forces(terms)], [B, still, np.zeros((m, m))]]) if m else terms.M
-    place, speed = found.kept(terms.change_place), found.kept(terms.change_speed)
-    right = np.vstack([np.hstack([terms.K, terms.C]), np.hstack([place, speed, still])])
-    full = np.zeros((n_v + n, n_v + n))
-    full[:n_v, n_v : 2 * n_v] = np.eye(n_v)
-    full[:n_v, :n_v] = terms.carried
-    full[n_v:] = -np.linalg.solve(matrix, right)[:n]
-    return full
-
-
-def _singular(found: Instant, terms: LinearTerms, chosen: Independent) -> list[str]:
-    """Rows that depend on others here but not nearby: their second derivatives along the free motions differ.
-
-    For multipliers μ that make no force, ``∂(Bᵀμ)/∂x`` along the free motions vanishes where the rows agree nearby.
-    """
-    from scipy.linalg import null_space
-
-    held = np.flatnonzero(~found.velocity)
-    n_v, free = len(terms.K.T), chosen.basis[: len(terms.K.T), : len(chosen.places)]
-    forces = terms.R[:, held] / row_sizes(terms.R[:, held].T)
-    for idle in null_space(forces, rcond=NEGLIGIBLE).T if len(held) else ():
-        extra = np.zeros(len(found.rows))
-        extra[held] = idle / row_sizes(terms.R[:, held].T) * max(1.0, float(np.max(np.abs(found.lam), initial=0.0)))
-        bent = (found.terms(extra).K - terms.K)[:n_v]
-        if np.max(np.abs(free.T @ bent @ free), initial=0.0) > VANISHES * float(np.max(np.abs(bent), initial=0.0)):
-            lost = [found.titles[k] for k in held[np.abs(idle) > 1e-6]]
-            return [
-                f"the constraint Jacobian loses rank at this posture only ({', '.join(lost)}), where branches of "
-                "motion meet, so that no linear motion exists; move the state off it"
-            ]
-    return []
-
-
-def _modes(A: Matrix, place: Matrix) -> tuple[Any, Any]:
-    """Eigenvalues by magnitude, pairs side by side, and the shapes in the coordinates."""
-    from scipy.linalg import eig
-
-    values, vectors = eig(A)
-    order = np.lexsort((-values.imag, values.real, np.round(np.abs(values), 12 - _digits(values))))
-    values, shapes = values[order], place @ vectors[:, order]
-    for k in range(len(values)):
-        size = np.abs(shapes[:, k])
-        largest = int(np.argmax(size >= (1.0 - 1e-9) * np.max(size, initial=0.0))) if len(size) else 0
-        moves = np.linalg.norm(vectors[:, order[k]])
-        shapes[:, k] = shapes[:, k] / shapes[largest, k] if size[largest] > 1e-10 * moves else 0.0
-    return values, shapes
-
-
-def _digits(values: Any) -> int:
-    """Decimal places before the point of the largest magnitude."""
-    largest = float(np.max(np.abs(values), initial=0.0))
-    return int(np.ceil(np.log10(largest))) if largest > 0.0 else 0

@@ -52,6 +52,8 @@ def linear_table(linear: Linearization) -> str:
             lines.append(f"  {numbers}  {_movers(mode.shape)}{grows}")
     if still:
         lines.append(f"  {still} eigenvalue{'s' * (still != 1)} 0: motions that nothing drives back")
+    if linear.has_ports:
+        lines += [f"  inputs: {', '.join(linear.inputs) or 'none'}", f"  outputs: {', '.join(linear.outputs)}"]
     return "\n".join(lines)
 
 
@@ -67,7 +69,9 @@ def linear_html(linear: Linearization) -> str:
         for k, mode in enumerate(linear.modes, start=1)
     ]  # fmt: skip
     heads = ("mode", "eigenvalue [1/s]", "ω [rad/s]", "f [Hz]", "damping ζ [-]", "motion")
-    return table(head, heads, rows) + paragraphs(line.strip() for line in rest if line.startswith("  states"))
+    return table(head, heads, rows) + paragraphs(
+        line.strip() for line in rest if line.startswith(("  states", "  inputs", "  outputs"))
+    )
 
 
 def _plain(ratio: float) -> str:

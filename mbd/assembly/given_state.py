@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -44,8 +44,10 @@ class GivenState:
     changed: dict[str, float]
 
 
-def given_state(model: Any, state: Any, parameters: Mapping[str, float] | None, backend: str) -> GivenState:
-    """The model with the parameters of the state, and others on top of them.
+def given_state(
+    model: Any, state: Any, parameters: Mapping[str, float] | None, backend: str, inputs: Collection[str] = ()
+) -> GivenState:
+    """The model with the parameters of the state, and others on top of them; `inputs` as for `mechanism_of`.
 
     Raises
     ------
@@ -58,7 +60,7 @@ def given_state(model: Any, state: Any, parameters: Mapping[str, float] | None, 
     if faults:
         raise ModelError(faults)
     changed = {**state.parameters, **(parameters or {})}
-    mechanism = mechanism_of(model, backend, changed)
+    mechanism = mechanism_of(model, backend, changed, inputs)
     values = mechanism.parameters(changed, getattr(model, "parameters", {}))
     manager = manager_of(mechanism, values)
     fits(state, mechanism.equations, manager)

@@ -77,6 +77,10 @@ class Parameterized:
         """Run-time parameters by full name: {'left thigh.mass': 0.5, …}."""
         return {}
 
+    def laws(self) -> tuple[str, ...]:
+        """Full names of quantities that are functions, expressions or samples, and may be inputs of a linearization."""
+        return ()
+
     def domains(self) -> dict[str, Domain]:
         """Domains of its parameters by full name, of those that have one."""
         return {}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -35,7 +35,9 @@ def _same(old: Any, new: Any) -> bool:
     return alike and old[1:] == new[1:]
 
 
-def mechanism_of(model: Any, backend: str = "auto", changed: Mapping[str, float] | None = None) -> Mechanism:
+def mechanism_of(
+    model: Any, backend: str = "auto", changed: Mapping[str, float] | None = None, inputs: Collection[str] = ()
+) -> Mechanism:
     """The mechanism of a model; derived again only if the model has changed since.
 
     Parameters
@@ -43,6 +45,7 @@ def mechanism_of(model: Any, backend: str = "auto", changed: Mapping[str, float]
     backend : 'auto', 'llvm' (machine code) or 'python' (the plain twin)
     changed : parameter values that are wanted; an exact 0 or ±1 of the model among them, which is folded into the
         equations, is made a run-time input (one more derivation, noted in `Mechanism.notes`)
+    inputs : names that are to be run-time inputs whatever their values, those of increments of laws among them
 
     Raises
     ------
@@ -58,13 +61,13 @@ def mechanism_of(model: Any, backend: str = "auto", changed: Mapping[str, float]
     if faults:
         raise ModelError(faults)
     mechanism = _mechanism(model, backend, frozenset())
-    if not changed and not getattr(model, "controllers", ()):
+    if not changed and not inputs and not getattr(model, "controllers", ()):
         return mechanism
-    inputs = {parameter.name for parameter in mechanism.equations.parameters}
+    present = {parameter.name for parameter in mechanism.equations.parameters}
     values = getattr(model, "parameters", {})
     wanted = {name for controller in getattr(model, "controllers", ()) for name in controller.writes}
     wanted |= {name for name, value in (changed or {}).items() if values.get(name) != value}
-    structural = frozenset(name for name in wanted - inputs if name in values)
+    structural = frozenset(name for name in wanted - present if name in values) | (frozenset(inputs) - present)
     return _mechanism(model, backend, structural) if structural else mechanism
 
 

@@ -19,6 +19,7 @@ from mbd.forces.quantities import (
     Mention,
     arguments_of,
     kinks,
+    law_names,
     mentioned,
     quantity_of,
     scalar,
@@ -101,6 +102,10 @@ class Bilateral(Constraint):
     def parameters(self) -> dict[str, float]:
         """`value` where it is a number, and arguments given as numbers."""
         return value_parameters(self.value, self.arguments, self.name, "value")
+
+    def laws(self) -> tuple[str, ...]:
+        """`value` where it is no number."""
+        return law_names(self.value, self.name, "value")
 
     def instants(self) -> Instants:
         """Kinks of its samples."""

@@ -16,6 +16,7 @@ from mbd.forces.quantities import (
     Samples,
     arguments_of,
     kinks,
+    law_names,
     mentioned,
     quantity_of,
     resolved,
@@ -92,6 +93,10 @@ class Nonholonomic(VelocityConstraint):
     def parameters(self) -> dict[str, float]:
         """`bias` where it is a number, and arguments given as numbers."""
         return value_parameters(self.bias, self.arguments, self.name, "bias")
+
+    def laws(self) -> tuple[str, ...]:
+        """`bias` where it is no number."""
+        return law_names(self.bias, self.name, "bias")
 
     def instants(self) -> Instants:
         """Kinks of its samples."""

@@ -39,6 +39,8 @@ class Lowering:
         self.V = self._scalar(system.potential, "the potential")
         self.D = self._scalar(system.dissipation, "the dissipation")
         self.Q = {name: self._scalar(force, f"the force on {name!r}") for name, force in system.generalized.items()}
+        added = {name: self.tape.lift(self.scope.increment(name, "force")) for name in names}
+        self.Q |= {name: self.Q.get(name, self.tape.zero) + more for name, more in added.items() if not more.is_zero}
         self.h = {name: self._scalar(value, f"the constraint {name!r}") for name, value in system.rows.items()}
         self.rates = {name: self._scalar(value, f"the row {name!r}") for name, value in system.nonholonomic.items()}
         self._check(system)

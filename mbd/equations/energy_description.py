@@ -179,6 +179,12 @@ class EnergyDescription:
     def own_word(self) -> _OwnParameters:
         return _OwnParameters(self.name, self.own_parameters, self.domains)
 
+    @property
+    def laws(self) -> tuple[str, ...]:
+        """Names of what inputs of a linearization may be added to: the force on each coordinate, laws of its words."""
+        own = tuple(f"{coordinate.name}.force" for coordinate in self.coordinates)
+        return own + tuple(name for word in (*self.applied, *self.words) for name in word.laws())
+
     def instants(self, begin: float, end: float) -> list[float]:
         """Times at which sampled signals have a kink, in order: steps end there [s]."""
         words: list[Force | Constraint] = [*self.applied, *self.words]

@@ -15,7 +15,7 @@ from mbd.equations.programs import balance_with, constraint_jacobian
 from mbd.tape.derivatives import jvp, jvps
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["LinearTerms", "linearization"]
+__all__ = ["LinearTerms", "across", "along_places", "linearization", "row_changes"]
 
 
 @dataclass(frozen=True)
@@ -83,30 +83,37 @@ def linearization(
     r = balance_with(equations, rows, penalties, sliding)
     B = constraint_jacobian(equations, rows)
     h, rate = [equations.rows[k].value for k in rows], [equations.rows[k].rate for k in rows]
-    seeds: dict[Node, Scalar] = {inputs.t: 1.0, **inputs.clock}
-    known = {} if equations.geometry is None else equations.geometry.rates(rate)
-    change = jvp(rate, {**seeds, **known})
-    for k, line in enumerate(B):
-        for slope, acceleration in zip(line, inputs.a, strict=True):
-            change[k] = change[k] + slope * acceleration
+    change = row_changes(equations, rows)
     rates, speeds = (*inputs.a, *inputs.s), (*inputs.v, *inputs.z)
     matrices = [
-        _across(jvps(r, [{rate: 1.0} for rate in rates]), len(r)),
-        _across(jvps(r, [{speed: 1.0} for speed in speeds]), len(r)),
-        _across(_places(equations, r), len(r)),
-        _across(jvps(r, [{inputs.lam[k]: 1.0} for k in rows]), len(r)),
+        across(jvps(r, [{rate: 1.0} for rate in rates]), len(r)),
+        across(jvps(r, [{speed: 1.0} for speed in speeds]), len(r)),
+        across(along_places(equations, r), len(r)),
+        across(jvps(r, [{inputs.lam[k]: 1.0} for k in rows]), len(r)),
     ]
     of_rows = [
         [entry for line in B for entry in line],
-        _across(_places(equations, rate), len(rows)),
-        _across(jvps(change, [{speed: 1.0} for speed in inputs.v]), len(rows)),
-        _across(_places(equations, change), len(rows)),
-        _across(_carried(inputs), len(inputs.v)),
+        across(along_places(equations, rate), len(rows)),
+        across(jvps(change, [{speed: 1.0} for speed in inputs.v]), len(rows)),
+        across(along_places(equations, change), len(rows)),
+        across(_carried(inputs), len(inputs.v)),
     ]
     return [*r, *chain(*matrices), *h, *rate, *change, *chain(*of_rows)]
 
 
-def _places(equations: Equations, values: Sequence[Node]) -> list[list[Node]]:
+def row_changes(equations: Equations, rows: Sequence[int]) -> list[Node]:
+    """ḧ of rows: the rates of ḣ along the motion, with its accelerations."""
+    inputs, rate = Inputs.of(equations), [equations.rows[k].rate for k in rows]
+    seeds: dict[Node, Scalar] = {inputs.t: 1.0, **inputs.clock}
+    known = {} if equations.geometry is None else equations.geometry.rates(rate)
+    change = jvp(rate, {**seeds, **known})
+    for k, line in enumerate(constraint_jacobian(equations, rows)):
+        for slope, acceleration in zip(line, inputs.a, strict=True):
+            change[k] = change[k] + slope * acceleration
+    return change
+
+
+def along_places(equations: Equations, values: Sequence[Node]) -> list[list[Node]]:
     """Derivatives along each velocity, ∂value/∂x where coordinates add, one list a velocity."""
     along = Inputs.of(equations).along
     known = [{} for _ in along] if equations.geometry is None else equations.geometry.partials(values)
@@ -124,6 +131,6 @@ def _carried(inputs: Inputs) -> list[list[Node]]:
     return [[a - b for a, b in zip(*pair, strict=True)] for pair in zip(moved, turned, strict=True)]
 
 
-def _across(columns: Sequence[Sequence[Node]], height: int) -> list[Node]:
+def across(columns: Sequence[Sequence[Node]], height: int) -> list[Node]:
     """Columns as a matrix, row by row."""
     return [column[i] for i in range(height) for column in columns]

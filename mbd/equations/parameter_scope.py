@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 
 from mbd.equations.inputs import Inputs
 from mbd.equations.parameters import ParameterTable
-from mbd.tape.node import Node, Table, Tape
+from mbd.tape.node import Node, Scalar, Table, Tape
 
 __all__ = ["ParameterScope"]
 
@@ -34,6 +34,10 @@ class ParameterScope:
     def parameter(self, owner: str, field: str, value: float) -> Node:
         """The run-time input named ``owner.field``."""
         return self.parameters.node(f"{owner}.{field}", value)
+
+    def increment(self, owner: str, field: str) -> Scalar:
+        """What a linearization adds to a law; 0 in every other derivation."""
+        return self.parameters.increment(f"{owner}.{field}")
 
     def table(self, owner: str, breaks: Sequence[float], coefficients: Sequence[Sequence[float]]) -> Table:
         """A piecewise cubic, one for each owner."""

@@ -7,7 +7,8 @@ from collections.abc import Collection, Mapping
 from mbd.bodies.promises import line_of_user
 from mbd.equations.equations import Parameter
 from mbd.errors import ModelError
-from mbd.tape.node import Node, Tape
+from mbd.forces.quantities import INCREMENT
+from mbd.tape.node import Node, Scalar, Tape
 
 __all__ = ["ParameterTable"]
 
@@ -55,7 +56,7 @@ class ParameterTable:
 
         It would be no parameter of the model: not listed, not judged by domains, and of the value that is asked here.
         """
-        if self._declared is None or self._declared.get(name) == value:
+        if self._declared is None or self._declared.get(name) == value or name.startswith(INCREMENT):
             return
         owner, _, field = name.rpartition(".")
         asked = f"scope.parameter({owner!r}, {field!r}, {value:g}){line_of_user()} asks for a parameter that"
@@ -68,6 +69,12 @@ class ParameterTable:
             f"{asked} is not declared; let parameters() return {{{name!r}: {value:g}}} too; of {owner!r} it declares "
             f"{', '.join(map(repr, mine)) or 'none'}"
         )
+
+    def increment(self, name: str) -> Scalar:
+        """What is added to the law of that name: a run-time input where it is asked for, 0 otherwise."""
+        if f"{INCREMENT}{name}" not in self._tunable:
+            return 0.0
+        return self.node(f"{INCREMENT}{name}", 0.0)
 
     @property
     def found(self) -> tuple[Parameter, ...]:

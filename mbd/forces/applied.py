@@ -15,6 +15,7 @@ from mbd.forces.quantities import (
     arguments_of,
     is_single,
     kinks,
+    law_names,
     mentioned,
     triple_at,
     triple_of,
@@ -76,6 +77,10 @@ class Applied(Force):
         return value_parameters(self.force, self.arguments, self.name, "force") | value_parameters(
             self.torque, self.arguments, self.name, "torque"
         )
+
+    def laws(self) -> tuple[str, ...]:
+        """Components that are no numbers."""
+        return law_names(self.force, self.name, "force", True) + law_names(self.torque, self.name, "torque", True)
 
     def instants(self) -> Instants:
         """Kinks of its samples."""

@@ -12,6 +12,7 @@ from mbd.forces.quantities import (
     Mention,
     arguments_of,
     kinks,
+    law_names,
     mentioned,
     quantity_of,
     scalar,
@@ -64,6 +65,10 @@ class Motor(Force):
     def parameters(self) -> dict[str, float]:
         """`torque` where it is a number, and arguments given as numbers."""
         return value_parameters(self.torque, self.arguments, self.name, "torque")
+
+    def laws(self) -> tuple[str, ...]:
+        """`torque` where it is no number."""
+        return law_names(self.torque, self.name, "torque")
 
     def instants(self) -> Instants:
         """Kinks of its samples."""

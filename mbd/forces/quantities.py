@@ -19,9 +19,13 @@ from mbd.tape.node import Scalar
 from mbd.tape.tracing import Argument, traced, traced_scalar
 
 __all__ = [
-    "ArgumentSpec", "Instants", "Mention", "Repeated", "Samples", "arguments_of", "instants_of", "is_single", "kinks",
-    "mentioned", "quantity_of", "resolved", "scalar", "triple_at", "triple_of", "value_parameters",
+    "INCREMENT", "ArgumentSpec", "Instants", "Mention", "Repeated", "Samples", "arguments_of", "instants_of",
+    "is_single", "kinks", "law_names", "mentioned", "quantity_of", "resolved", "scalar", "triple_at", "triple_of",
+    "value_parameters",
 ]  # fmt: skip
+
+INCREMENT = "+"
+"""Before the name of a law among the tunable parameters: what is added to it is an input, see `law_names`."""
 
 Mention: TypeAlias = Frame | Joint | str
 """What a word refers to: a frame, a joint, or the name of a quantity."""
@@ -215,8 +219,9 @@ def scalar(value: Any, arguments: ArgumentSpec, scope: Scope, owner: str, field:
     if is_number(value):
         return scope.parameter(owner, field, float(value))
     if isinstance(value, Samples):
-        return value.signal(scope, f"{owner}.{field}")
-    return traced_scalar(value, resolved(arguments, scope, owner), f"{field} of '{owner}'", scope.tape)
+        return value.signal(scope, f"{owner}.{field}") + scope.increment(owner, field)
+    given = resolved(arguments, scope, owner)
+    return traced_scalar(value, given, f"{field} of '{owner}'", scope.tape) + scope.increment(owner, field)
 
 
 def triple_at(value: Any, arguments: ArgumentSpec, scope: Scope, owner: str, field: str) -> tuple[Scalar, ...]:
@@ -225,13 +230,14 @@ def triple_at(value: Any, arguments: ArgumentSpec, scope: Scope, owner: str, fie
         return tuple(
             scalar(part, arguments, scope, owner, f"{field}.{axis}") for part, axis in zip(value, "xyz", strict=True)
         )
-    result = traced(value, resolved(arguments, scope, owner), f"{field} of '{owner}'", scope.tape)
+    result: Any = traced(value, resolved(arguments, scope, owner), f"{field} of '{owner}'", scope.tape)
     if field == "torque" and not isinstance(result, tuple):
-        return (0.0, 0.0, result)
+        result = (0.0, 0.0, result)
     if not isinstance(result, tuple) or len(result) not in (2, 3):
         came = f"{len(result)} numbers" if isinstance(result, tuple) else "one number"
         raise ModelError(f"{field} of '{owner}': three components (or two, x and y) are expected, {came} came")
-    return result if len(result) == 3 else (*result, 0.0)
+    whole: tuple[Scalar, ...] = result if len(result) == 3 else (*result, 0.0)
+    return tuple(part + scope.increment(owner, f"{field}.{axis}") for part, axis in zip(whole, "xyz", strict=True))
 
 
 def kinks(*values: Any) -> Instants:
@@ -252,6 +258,19 @@ def value_parameters(value: Any, arguments: ArgumentSpec, owner: str, field: str
     elif is_number(value):
         result[f"{owner}.{field}"] = float(value)
     return result
+
+
+def law_names(value: Any, owner: str, field: str, components: bool = False) -> tuple[str, ...]:
+    """Names of quantities that are no numbers, and to which a linearization may add an input.
+
+    components : whether three are wanted, of which one function may give all
+    """
+    if value is None or is_number(value):
+        return ()
+    if not components:
+        return (f"{owner}.{field}",)
+    parts = value if isinstance(value, tuple) else (None,) * 3
+    return tuple(f"{owner}.{field}.{axis}" for part, axis in zip(parts, "xyz", strict=True) if not is_number(part))
 
 
 class Timed(Protocol):

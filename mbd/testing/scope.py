@@ -57,6 +57,9 @@ class FreeScope:
             self.numbers[node] = value
         return self._parameters[name]
 
+    def increment(self, owner: str, field: str) -> Scalar:
+        return 0.0
+
     def table(self, owner: str, breaks: Sequence[float], coefficients: Sequence[Sequence[float]]) -> Table:
         return self.tape.table(owner, breaks, coefficients)
 

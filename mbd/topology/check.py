@@ -14,6 +14,7 @@ from mbd.bodies.marker import Marker
 from mbd.bodies.point_mass import PointMass
 from mbd.errors import MbdError, ModelError, nearest
 from mbd.forces.base import Force
+from mbd.forces.quantities import INCREMENT
 from mbd.joints.base import Joint
 from mbd.joints.screw import Screw
 from mbd.topology.graph import disconnected
@@ -250,7 +251,7 @@ def choice_faults(model: Description) -> list[str]:
     found = [
         "tunable: " + nearest(name, parameters, "parameter", "There are")
         for name in model.tunable
-        if name not in parameters
+        if name not in parameters and not name.startswith(INCREMENT)
     ]
     try:
         cut_names(model)

@@ -36,10 +36,10 @@ def test_matrices_are_the_differences_of_the_balance(cut):
         return np.array(columns).T
 
     assert np.max(np.abs(terms().r)) < 1e-10
-    for matrix, what in (found.M, "a"), (found.C, "v"), (found.K, "x"):
+    for matrix, what in (found.M, "a"), (found.damping_matrix, "v"), (found.K, "x"):
         assert matrix == pytest.approx(differences(what, lambda each: each.r), abs=1e-6)
-    assert pytest.approx(differences("x", lambda each: each.h), abs=1e-8) == found.B
-    assert np.max(np.abs(found.C)) > 0.1 and np.max(np.abs(found.K - found.K.T)) > 1e-3  # M v̇ is part of K
+    assert pytest.approx(differences("x", lambda each: each.h), abs=1e-8) == found.constraint_jacobian
+    assert np.max(np.abs(found.damping_matrix)) > 0.1 and np.max(np.abs(found.K - found.K.T)) > 1e-3  # M v̇ is part of K
 
 
 @pytest.mark.parametrize("cut", ["auto", "all", ["b"]])
@@ -72,7 +72,7 @@ def test_dependent_coordinates_follow_the_basis():
     model, state = moving("all")
     found = mbd.linearize(model, state, backend=PLAIN)
     n = len(found.coordinates)
-    assert np.max(np.abs(found.B @ found.basis[:n])) < 1e-12
+    assert np.max(np.abs(found.constraint_jacobian @ found.basis[:n])) < 1e-12
     assert found.basis[list(found.picked)] == pytest.approx(np.eye(len(found.states)))
 
 

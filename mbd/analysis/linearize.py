@@ -1,0 +1,149 @@
+"""From a state to its linear motion: instant, derivatives, independent coordinates, inputs and outputs, modes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from mbd.analysis.independent import independent
+from mbd.analysis.instant import instant
+from mbd.analysis.linear_motion import LinearMotion, Prescribed, linear_motion, singular
+from mbd.analysis.linearization import Linearization
+from mbd.analysis.ports import Input, Output, acting, input_names, output_nodes, port_terms, warn_of_idle
+from mbd.analysis.state_space import StateSpace
+from mbd.arrays import Matrix
+from mbd.equations.equations import Equations
+from mbd.errors import ModelError
+from mbd.state import State
+
+__all__ = ["linearize"]
+
+
+def linearize(
+    model: Any,
+    state: State,
+    parameters: Mapping[str, float] | None = None,
+    backend: str = "auto",
+    *,
+    inputs: str | Iterable[str] | None = None,
+    outputs: str | Iterable[str] | None = None,
+) -> Linearization:
+    """The linear motion about a state, with exact derivatives: ``δẋ = A δx + B δu``, ``δy = C δx + D δu``.
+
+    Contacts that are closed in the state stay closed; their frictions slide where they move, and stick where they are
+    at rest and can. Independent coordinates are chosen so that rows determine the others best. A is the exact Jacobian
+    of their first-order equations at any state; at an equilibrium or a steady motion its eigenvalues do not depend on
+    the choice, on the cut or on the order of rows. Time is held: driven motions are frozen at the state's instant.
+
+    Parameters
+    ----------
+    model : a `Model` or `Lagrangian`
+    state : from `assemble`, `run.final` or `run.at`
+    parameters : values that differ from the model's, by name
+    backend : see `mbd.simulate`; for `Linearization.rhs`
+    inputs : names of run-time parameters ('drive.torque', 'push.force.x', 'gravity.x', whatever a `Controller` may
+        write) and of laws that are functions, expressions or samples, to which u is added ('drive.torque',
+        'theta.force' of a `Lagrangian`). What rows on positions prescribe is an input by its acceleration
+        ('crank drive.value.acceleration'), what rows on velocities do by its rate; value and rate become states
+    outputs : names of results, as `run[…]` takes them, a vector's name for its components; by default the states
+
+    Raises
+    ------
+    ModelError
+        if the state is not consistent, a closed contact would pull, the constraint Jacobian loses rank at this
+        posture only, an input can be none, or an output depends on how redundant rows share a load.
+    UnknownNameError
+        for inputs and outputs that the model does not have, with the nearest.
+
+    Examples
+    --------
+    >>> import mbd
+    >>> model = mbd.Model("pendulum")
+    >>> rod = mbd.Link("rod", mass=1.0, length=0.5, center=0.5)
+    >>> model.connect(mbd.Revolute("pin", model.ground.origin, rod.start, loss=mbd.Viscous(0.1)))
+    >>> model.apply(mbd.Motor("drive", model.joints[0], torque=0.0))
+    >>> linear = mbd.linearize(model, mbd.assemble(model), inputs=["drive.torque"], outputs=["rod.end.x"])
+    >>> print(linear)
+    pendulum at t = 0 s, in equilibrium: 1 coordinate, no rows
+      states: pin.angle, pin.angle.rate
+        ω [rad/s]      f [Hz]  damping ζ  motion
+          4.42945    0.704968     0.0452  pin.angle
+      inputs: drive.torque
+      outputs: rod.end.x
+    >>> linear.B.T, linear.C, linear.D
+    (array([[0., 4.]]), array([[0.5, 0. ]]), array([[0.]]))
+    """
+    wanted = input_names(model, () if inputs is None else inputs)
+    found = instant(model, state, parameters, backend, [each.parameter for each in wanted])
+    equations, terms = found.mechanism.equations, found.terms()
+    n_v = equations.n_v
+    if n_v == 0:
+        raise ModelError(f"{equations.name!r} has no coordinate; connect a body by a joint that lets it move")
+    chosen = independent(terms.M[:n_v, :n_v], terms.B, terms.turning, found.velocity, equations.n_z)
+    faults = singular(found, terms, chosen)
+    if faults:
+        raise ModelError(faults)
+    given = acting(model, equations, [equations.rows[k] for k in found.rows], wanted)
+    seen = output_nodes(equations, () if outputs is None else outputs)
+    local = port_terms(found, given, seen)
+    prescribed = Prescribed.of(given, local, found.velocity)
+    picked = (*chosen.places, *(n_v + k for k in chosen.speeds), *range(2 * n_v, 2 * n_v + equations.n_z))
+    motion = linear_motion(found, terms, chosen, picked, local, prescribed, seen)
+    eigenvalues, shapes = _modes(motion.A, motion.basis[:n_v])
+    space = _space(equations, picked, motion, given, seen)
+    warn_of_idle(_idle(given, space), 3)
+    values = [found.value(given[k].node) if order == 0 else 0.0 for k, order in prescribed.states]
+    return Linearization(
+        equations.name, state.time, tuple(name for name, _ in equations.configuration.freedoms), found.titles,
+        terms.M[:n_v, :n_v], terms.C[:n_v, :n_v], terms.K[:n_v], terms.B, space, motion.basis,
+        np.concatenate([state.q, state.v, state.z]), np.concatenate([state.v, found.rate]), local.y, eigenvalues,
+        shapes, picked, found, np.array(values), not (inputs is None and outputs is None),
+    )  # fmt: skip
+
+
+def _space(
+    equations: Equations, picked: Sequence[int], motion: LinearMotion, given: Sequence[Input], seen: Sequence[Output]
+) -> StateSpace:
+    """A, B, C, D with names and units; the states are the outputs where none are given."""
+    whole = equations.configuration
+    freedoms = (*whole.freedoms, *zip(whole.velocity_names, whole.velocity_units, strict=True))
+    known = (*freedoms, *((each.name, each.unit) for each in equations.states))
+    states = [known[k] for k in picked]
+    states += [(name, each.state_unit(order)) for each in given for order, name in enumerate(each.states)]
+    ends = [(each.name, each.unit) for each in seen]
+    C, D = motion.C, motion.D
+    if not seen:
+        ends, C, D = states, np.eye(len(states)), np.zeros((len(states), len(given)))
+    titled: Any = states, [(each.name, each.unit) for each in given], ends
+    named, measured, seen_as = (tuple(name for name, _ in part) for part in titled)
+    of_states, of_inputs, of_outputs = (tuple(unit for _, unit in part) for part in titled)
+    return StateSpace(motion.A, motion.B, C, D, named, measured, seen_as, of_states, of_inputs, of_outputs)
+
+
+def _idle(given: Sequence[Input], space: StateSpace) -> list[str]:
+    """Names of the inputs whose columns are zero."""
+    moved = np.any(space.B, axis=0) | np.any(space.D, axis=0)
+    return [each.name for each, moves in zip(given, moved, strict=True) if not moves]
+
+
+def _modes(A: Matrix, place: Matrix) -> tuple[Any, Any]:
+    """Eigenvalues by magnitude, pairs side by side, and the shapes in the coordinates."""
+    from scipy.linalg import eig
+
+    values, vectors = eig(A)
+    order = np.lexsort((-values.imag, values.real, np.round(np.abs(values), 12 - _digits(values))))
+    values, shapes = values[order], place @ vectors[:, order]
+    for k in range(len(values)):
+        size = np.abs(shapes[:, k])
+        largest = int(np.argmax(size >= (1.0 - 1e-9) * np.max(size, initial=0.0))) if len(size) else 0
+        moves = np.linalg.norm(vectors[:, order[k]])
+        shapes[:, k] = shapes[:, k] / shapes[largest, k] if size[largest] > 1e-10 * moves else 0.0
+    return values, shapes
+
+
+def _digits(values: Any) -> int:
+    """Decimal places before the point of the largest magnitude."""
+    largest = float(np.max(np.abs(values), initial=0.0))
+    return int(np.ceil(np.log10(largest))) if largest > 0.0 else 0
