@@ -4,12 +4,25 @@ from __future__ import annotations
 
 from mbd.kernel.accept_restart import accept_for_restart
 from mbd.kernel.candidate import carry
-from mbd.kernel.codes import CHATTER, CLOSE, CONFLICT, CROSS, EVENT, LOG_EVENT, NO_IMPACT, OPEN_FORCE, OPEN_PULL, WATCH
+from mbd.kernel.codes import (
+    CHATTER,
+    CLOSE,
+    CONFLICT,
+    CROSS,
+    CROSS_BACK,
+    EVENT,
+    LOG_EVENT,
+    NO_IMPACT,
+    OPEN_FORCE,
+    OPEN_PULL,
+    WATCH,
+)
 from mbd.kernel.contact_modes import NO_IMPULSE, log_event
 from mbd.kernel.crowding import count_impact
+from mbd.kernel.guards import update_sides
 from mbd.kernel.nonsmooth import keep, put_back, rebound, strike
 from mbd.kernel.observe import is_awaited, store_row
-from mbd.kernel.records import Guards, Kernel
+from mbd.kernel.records import Guards, Kernel, Switching
 from mbd.kernel.starting import restart
 from mbd.kernel.switching import switch
 
@@ -82,6 +95,14 @@ def note_state(K: Guards, number: int) -> None:
     carry(K.y, K.seen, o, K.n, True)
 
 
+def update_other_sides(K: Switching, fired: int) -> None:
+    """Users' guards that have gone back before this event may fire again; the one that has fired (≥ 0) is at zero."""
+    side = K.side[fired] if fired >= 0 else 0.0
+    update_sides(K)
+    if fired >= 0:
+        K.side[fired] = side
+
+
 def handle_event(K: Kernel) -> int:
     """Take the located event: rows before and after, impact, restart. Negative: nothing for the caller to do."""
     kind = K.event_kind
@@ -93,14 +114,17 @@ def handle_event(K: Kernel) -> int:
     accept_for_restart(K, K.time + K.event_after)
     if same_instant(K):
         return CHATTER
+    if K.n_guards > 0:
+        update_other_sides(K, index if kind == CROSS or kind == CROSS_BACK else -1)
     if kind == WATCH:
         K.restart_due = 2
         return switch(K) - 1
     if not at_start:
         store_row(K)
-    if kind == CROSS:
+    if kind == CROSS or kind == CROSS_BACK:
         log_event(K, LOG_EVENT, index, 0.0, NO_IMPULSE)
-        K.side[index] = -K.side[index]
+        if kind == CROSS:
+            K.side[index] = -K.side[index]
         K.restart_due = 1
         return EVENT if is_awaited(K, first) else -1
     if kind == CLOSE and K.n_switches > K.max_switches // 2:  # impacts by turns: their limit is plastic, all at once

@@ -10,6 +10,8 @@ from __future__ import annotations
 from mbd.kernel.codes import (
     CLOSE,
     CROSS,
+    CROSS_BACK,
+    CROSS_BRIEF,
     EPS,
     GRAZE,
     GUARDS,
@@ -54,6 +56,8 @@ DOUBTFUL = 0.25
 """Part of the forces below which the sign of a multiplier of index 3 is asked of consistent accelerations [-]."""
 REST = 1e-12
 """Speed along a friction, relative to its terms, that is no turn: other rows may hold it still as it pulls [-]."""
+CLOSE_BY = 1e-3
+"""Part of what a guard changes by in a step, at its first rate, above zero where the turn is looked at itself [-]."""
 APART = 1e-6
 """Gap [m, rad] above which a contact is clearly open."""
 
@@ -185,7 +189,7 @@ def judge(K: Switching, h: float) -> bool:
                         consider(K, CLOSE, c, 0.0, 0.0)
             elif d0 < 0.0 < d1:
                 bottom = hermite_turn(g0, g1, d0, d1, False)
-                limit = -1e-3 * d0 if g0 > tiny else -4.0 * tiny
+                limit = -CLOSE_BY * d0 if g0 > tiny else -4.0 * tiny
                 if bottom > 0.0 and hermite(g0, g1, d0, d1, bottom) < limit:
                     consider(K, GRAZE, c, bottom, 0.0)
         elif K.kind[c] == 0:
@@ -223,12 +227,18 @@ def begins_to_be_watched(K: Switching, c: int, h: float) -> bool:
 def judge_user(K: Switching, e: int, h: float) -> None:
     """Whether a user's guard crosses zero from its side; one that still rises from there does so after its top.
 
-    A sign that has changed by no more than round-off is no crossing: it is judged again after the next step.
+    A sign that has changed by no more than round-off is no crossing: it is judged again after the next step. A guard
+    that is back on its side at the end is looked at where it turns, like a gap that grazes (`locate` steps there).
     """
     side = K.side[e]
     v0 = side * K.guards0[K.at_user + e]
     v1 = side * K.guards1[K.at_user + e]
-    if K.active[K.flag_user + e] == 1 or v1 >= 0.0 or K.direction[e] * side > 0.0:
+    if K.active[K.flag_user + e] == 1:
+        return
+    if v1 >= 0.0:
+        judge_return(K, e, v0, v1, h)
+        return
+    if K.direction[e] * side > 0.0:
         return
     if -v1 <= guard_round_off(K, e, K.time + h, K.q1, K.y1):
         return
@@ -239,6 +249,16 @@ def judge_user(K: Switching, e: int, h: float) -> None:
         consider(K, CROSS, e, top + (1.0 - top) * crossing(max(hermite(v0, v1, d0, d1, top), 0.0), v1), top)
     else:
         consider(K, CROSS, e, crossing(v0, v1) if v0 > 0.0 else 0.0, 0.0)
+
+
+def judge_return(K: Switching, e: int, v0: float, v1: float, h: float) -> None:
+    """Whether a user's guard, above zero at both ends of the step, seems to dip below or to come close between them."""
+    d0 = K.side[e] * K.guards0[K.at_user_rate + e] * h
+    d1 = K.side[e] * K.guards1[K.at_user_rate + e] * h
+    if v0 > 0.0 and d0 < 0.0 < d1:
+        bottom = hermite_turn(v0, v1, d0, d1, False)
+        if bottom > 0.0 and hermite(v0, v1, d0, d1, bottom) < -CLOSE_BY * d0:
+            consider(K, CROSS_BRIEF, e, bottom, 0.0)
 
 
 def pull_of(K: Balance, c: int, h: float) -> float:
@@ -321,6 +341,8 @@ def guard_value(K: Switching, kind: int, index: int, t1: float) -> float:
         return float(K.side[index] * K.guards1[K.at_user + index])
     if kind == STICK:
         return float(K.slip[index] * K.guards1[K.at_slip + index])
+    if kind == CROSS_BACK:
+        return float(-K.side[index] * K.guards1[K.at_user + index])
     if kind == SLIP:
         return margin(K, index, t1)
     if consistent(K, t1, K.q1, K.y1) != 0:

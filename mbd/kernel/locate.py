@@ -6,6 +6,8 @@ from mbd.kernel.accept_restart import event_at_start, event_candidate, put_on_ro
 from mbd.kernel.codes import (
     CLOSE,
     CROSS,
+    CROSS_BACK,
+    CROSS_BRIEF,
     GRAZE,
     NO_LOCATION,
     OPEN_FORCE,
@@ -16,6 +18,7 @@ from mbd.kernel.codes import (
     STICK_BRIEF,
     WATCH,
 )
+from mbd.kernel.guard_round_off import guard_round_off
 from mbd.kernel.guards import gap_tolerance, guard_value, is_watched, judge
 from mbd.kernel.hermite import first_guess
 from mbd.kernel.records import Events, Guards, Kernel, Switching
@@ -33,24 +36,34 @@ EARLIER, LATER = -2, -1
 
 
 def dip(K: Kernel, h: float) -> int:
-    """Step to the lowest point of a grazing gap; a real dip becomes a closing, else the guard keeps quiet."""
+    """Step to the lowest point of a grazing gap or of a user's guard; a real dip is an event, else it keeps quiet.
+
+    It becomes a closing, or the first of two crossings; the second where the guard fires in its direction alone.
+    """
     t = K.time
     c = K.event_index
+    users = K.event_kind == CROSS_BRIEF
+    side = K.side[c] if users else 1.0
+    at = (K.at_user if users else 0) + c
+    at_rate = (K.at_user_rate if users else K.at_gap_rate) + c
     low = 0.0
     high = h
-    rate_low = K.guards0[K.at_gap_rate + c]
-    rate_high = K.guards1[K.at_gap_rate + c]
+    rate_low = side * K.guards0[at_rate]
+    rate_high = side * K.guards1[at_rate]
     place = K.event_place * h
     for _ in range(30):
         status = try_step(K, place, t + place)
         if status != 0:
             return status
-        if K.guards1[c] < -gap_tolerance(K, c):
+        depth = -side * K.guards1[at]
+        if depth > 0.0 and depth > (guard_round_off(K, c, t + place, K.q1, K.y1) if users else gap_tolerance(K, c)):
             K.event_kind = CLOSE
+            if users:
+                K.event_kind = CROSS_BACK if K.direction[c] * side > 0.0 else CROSS
             K.event_place = place
             K.event_low = 0.0
             return 0
-        rate = K.guards1[K.at_gap_rate + c]
+        rate = side * K.guards1[at_rate]
         if rate == 0.0 or high - low < 1e-7 * h:
             break
         if rate < 0.0:
@@ -60,7 +73,7 @@ def dip(K: Kernel, h: float) -> int:
             high = place
             rate_high = rate
         place = low + (high - low) * min(max(rate_low / (rate_low - rate_high), 0.02), 0.98)
-    K.active[c] = 1
+    K.active[(K.flag_user if users else 0) + c] = 1
     K.event_kind = -1
     return try_step(K, h, t + h)
 
@@ -79,11 +92,14 @@ def locate(K: Kernel, h: float) -> int:
         index = K.event_index
         low = K.event_low * end
         status = 0
-        if kind == GRAZE or kind == STICK_BRIEF:
+        if kind == GRAZE or kind == STICK_BRIEF or kind == CROSS_BRIEF:
             low = 0.0
-            status = dip(K, end) if kind == GRAZE else come_to_rest(K, index, end)
+            status = come_to_rest(K, index, end) if kind == STICK_BRIEF else dip(K, end)
             kind = K.event_kind
-            if kind == CLOSE or (kind == STICK and K.event_place < end):
+            if status == 0 and kind == CROSS_BACK:
+                low = K.event_place
+                status = try_step(K, end, K.time + end)
+            elif kind == CLOSE or kind == CROSS or (kind == STICK and K.event_place < end):
                 end = K.event_place
                 found_kind = -1
         if status == 0 and kind >= 0:
@@ -139,7 +155,7 @@ def root_before(K: Kernel, kind: int, index: int, low: float, end: float) -> int
 def another_before(K: Switching, kind: int, index: int, found: float) -> bool:
     """Whether another guard fired before this one, which is at round-off and may look fired itself."""
     place = index
-    if kind == CROSS:
+    if kind == CROSS or kind == CROSS_BACK:
         place += K.flag_user
     elif kind == STICK or kind == SLIP:
         place += K.flag_friction
@@ -199,6 +215,8 @@ def guard_rate(K: Guards, kind: int, index: int) -> float:
         return float(-K.guards1[K.at_gap_rate + index])
     if kind == CROSS:
         return float(K.side[index] * K.guards1[K.at_user_rate + index])
+    if kind == CROSS_BACK:
+        return float(-K.side[index] * K.guards1[K.at_user_rate + index])
     if kind == STICK:
         return float(K.slip[index] * K.guards1[K.at_slip_rate + index])
     return 0.0
@@ -234,7 +252,7 @@ def bracket(K: Kernel, kind: int, index: int, low: float, high: float) -> int:
         elif kind == STICK or kind == SLIP:
             K.active[K.flag_friction + index] = 1
             K.event_kind = -1
-        elif kind == CROSS:  # with velocities on the rows it has not crossed yet
+        elif kind == CROSS or kind == CROSS_BACK:  # with velocities on the rows it has not crossed yet
             K.active[K.flag_user + index] = 1
             K.event_kind = -1
         K.event_after = high
@@ -258,7 +276,7 @@ def bracket(K: Kernel, kind: int, index: int, low: float, high: float) -> int:
         if (kind == OPEN_GAP or kind == OPEN_FORCE) and K.guards0[K.at_gap_rate + index] < 0.0:
             K.event_after = high  # a touch too short to be seen within the step: it is over at its end
             return event_candidate(K, high, t + high)
-        if low > 0.0 and kind != CROSS:
+        if low > 0.0 and kind != CROSS and kind != CROSS_BACK:
             low = 0.0
             event_at_start(K)
         K.event_after = low

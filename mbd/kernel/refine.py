@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from mbd.kernel.accept_restart import event_candidate
-from mbd.kernel.codes import CLOSE, CROSS, EPS, OPEN_GAP, WATCH
+from mbd.kernel.codes import CLOSE, CROSS, CROSS_BACK, EPS, OPEN_GAP, WATCH
 from mbd.kernel.guards import gap_tolerance, guard_value
 from mbd.kernel.records import ContactRows, Kernel
 
@@ -73,7 +73,7 @@ def enough(K: ContactRows, kind: int, index: int, f_low: float, f_high: float) -
     """Size of a guard that is round-off; 0 for a user's, which has a scale of its own: its instant is found instead."""
     if kind == CLOSE or kind == OPEN_GAP:
         return float(0.25 * gap_tolerance(K, index))
-    if kind != WATCH and kind != CROSS:
+    if kind != WATCH and kind != CROSS and kind != CROSS_BACK:
         return 1e-15 * max(f_low, -f_high)
     return 0.0
 

@@ -35,6 +35,7 @@ STEP_FAILURES = frozenset(
 WORDS = {
     codes.CLOSE: "closing of {!r}", codes.OPEN_PULL: "opening of {!r}", codes.OPEN_GAP: "opening of {!r}",
     codes.OPEN_FORCE: "opening of {!r}", codes.PRESS: "closing of {!r}", codes.CROSS: "event {!r}",
+    codes.CROSS_BACK: "event {!r}",
     codes.STICK: "sticking of {!r}",
     codes.SLIP: "sliding of {!r}",
 }  # fmt: skip
@@ -82,7 +83,7 @@ def _sentence(run: RunData, time: float, row: int, cause: str, share: str) -> st
 def _guard(run: RunData, kind: int, index: int) -> str:
     """What a guard of the kernel is, in words."""
     manager = run.manager
-    if kind == codes.CROSS:
+    if kind in (codes.CROSS, codes.CROSS_BACK):
         name = manager.guards[index].name
     elif kind in (codes.STICK, codes.SLIP):
         name = manager.frictions[index].name
