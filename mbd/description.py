@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any, Self, TypeVar, cast
 
@@ -15,6 +15,7 @@ from mbd.bodies.values import Vector3, names_of, number, printable, triple
 from mbd.constraints.base import Constraint
 from mbd.constraints.controller import Controller
 from mbd.constraints.event import Event
+from mbd.constraints.observation import Observation
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.forces.base import Force
 from mbd.forces.quantities import Mention, instants_of
@@ -61,6 +62,7 @@ class Description:
         self.forces: list[Force] = []
         self.constraints: list[Constraint] = []
         self.controllers: list[Controller] = []
+        self.observations: list[Observation] = []
 
     # the three verbs ----------------------------------------------------------------------------------------------
     def connect(self, *joints: Joint) -> None:
@@ -88,6 +90,33 @@ class Description:
         known = all_are((Force, Controller), forces, example)
         self.forces += [word for word in known if isinstance(word, Force)]
         self.controllers += [word for word in known if isinstance(word, Controller)]
+
+    def observe(self, name: str, function: Any, *arguments: Any, unit: str = "") -> None:
+        """Add a result of one's own: a function of the motion and its forces that runs are asked for by `name`.
+
+        ``model.observe("step length", lambda a, b: a[0] - b[0], left.end, right.end, unit="m")``,
+        ``model.observe("load", lambda f: f / 9.81, "left foot.force")``, ``model.observe("lift", mbd.height(toe))``,
+        ``model.observe("rise", lambda scope: scope.rate(scope.frame(toe).position[1]), unit="m/s")``
+
+        It is recorded once, when the equations are derived, and evaluated where results are asked for it: steps cost
+        nothing for it, and the motion is the same. It goes where results go: tables, plots, files, ``run.at(times)``.
+
+        Parameters
+        ----------
+        name : of the result; three components make 'name.x', 'name.y', 'name.z', and the vector 'name'
+        function : as of `mbd.measure`; or a measure; or the name of a result
+        arguments : what it is called with, in order: names of results ('t', 'left hip.angle', 'left foot.force',
+            observations before this one), frames (their positions), joints (their coordinates). Without them a
+            function is called with the `mbd.scope.Scope`, whose ``named`` knows all results
+        unit : for tables and plots
+
+        Raises
+        ------
+        ModelError
+            for what is neither of these; and when the equations are derived for a name that is taken, for what the
+            function asks for in vain, and for a function that gives no numbers (TraceError).
+        """
+        self.observations = [*self.observations, Observation(name, function, arguments, unit)]
 
     def foreign(self) -> list[str]:
         """What was put into `joints`, `forces`, … that does not belong there, one sentence each."""
@@ -122,7 +151,7 @@ class Description:
     def frames(self) -> dict[str, Frame]:
         """Every named frame by full name: those of the bodies, and the points that words refer to."""
         result = {frame.full_name: frame for body in self.bodies.values() for frame in body.frames.values()}
-        for frame in (*self.points(), *self.markers):
+        for frame in (*self.points(), *self.markers, *self.observed):
             result.setdefault(frame.full_name, frame)
         return result
 
@@ -133,6 +162,11 @@ class Description:
         bodies = {id(frame.body): frame.body for frame in self.points()} | {id(self.ground): self.ground}
         named = {name: frame for body in bodies.values() for name, frame in body.points.items()}
         return [used.get(name, frame) for name, frame in named.items()]
+
+    @property
+    def observed(self) -> list[Frame]:
+        """The frames that observations alone refer to."""
+        return [frame for observation in self.observations for frame in observation.frames()]
 
     @property
     def gravity(self) -> Vector3:
@@ -167,7 +201,13 @@ class Description:
     def parameters(self) -> dict[str, float]:
         """Every run-time parameter and its value in this description: {'left thigh.mass': 0.5, …}."""
         result = {f"gravity.{axis}": value for axis, value in zip("xyz", self.gravity, strict=True)}
-        words: list[Body | Frame | Joint] = [*self.bodies.values(), *self.markers, *self.points(), *self.joints]
+        words: list[Body | Frame | Joint] = [
+            *self.bodies.values(),
+            *self.markers,
+            *self.observed,
+            *self.points(),
+            *self.joints,
+        ]
         for word in words:
             result |= word.parameters()
         taken = {force.name for force in self.forces}  # one may be named like the spring that a joint could have
@@ -207,6 +247,7 @@ class Description:
         """
         model = copy.copy(self)
         known = {"gravity"}
+        model.observations = [each for each in self.observations if each.name not in names and not _of_any(each, names)]
         for kind in ("joints", "forces", "constraints", "controllers"):
             words = getattr(self, kind)
             known |= {word.name for word in words}
@@ -225,6 +266,7 @@ class Description:
             model.constraints[place : place + 1] = [each for each in left[-1:] if each is not None]
         if "gravity" in names:
             model.gravity = (0.0, 0.0, 0.0)
+        known |= {observation.name for observation in self.observations}
         for name in names:
             if name not in known:
                 raise UnknownNameError("without: " + nearest(name, known, "joint, loss, force or constraint"))
@@ -244,6 +286,12 @@ class Description:
         counts["constraints"] = len(self.constraints)
         counted = ", ".join(f"{count} {kind}" for kind, count in counts.items())
         return f"{type(self).__name__}({self.name!r}: {counted})"
+
+
+def _of_any(observation: Observation, names: Sequence[str]) -> bool:
+    """Whether an observation asks for a result of something that is left out: it is left out too."""
+    mentions = [mention for mention in observation.mentions() if isinstance(mention, str)]
+    return any(mention.startswith(f"{name}.") for mention in mentions for name in names)
 
 
 def _bare(joint: Joint, tunable: Iterable[str]) -> dict[str, dict[str, Any]]:

@@ -17,6 +17,7 @@ from mbd.errors import TrajectoryError
 from mbd.notebook import Values, folded, table
 from mbd.results.columns import Columns, ModelColumns, gather
 from mbd.results.facts import Facts
+from mbd.results.finite import require_finite
 from mbd.results.interpolation import OneSide, Side
 from mbd.results.record import EventRecord, Events, Record
 
@@ -78,6 +79,7 @@ class Trajectory:
             )
         if name not in self._known:
             value = gather(self.columns, self.columns.at_rows, name)
+            require_finite(name, value, self.time, self.facts)
             value.flags.writeable = False
             self._known[name] = value
         return self._known[name]
@@ -119,7 +121,7 @@ class Trajectory:
 
         Then ``run.at([0.1, 0.2])["left hip.angle"]``.
         """
-        return Moments(self.columns, times, side)
+        return Moments(self.columns, times, side, self.facts)
 
     # what happened ----------------------------------------------------------------------------------------------
     @property
@@ -295,17 +297,19 @@ class Moments(Mapping[str, Any]):
     One time gives a float, or (3,) for a vector; k times give (k,) or (k, 3).
     """
 
-    def __init__(self, columns: Columns, times: ArrayLike, side: Side) -> None:
+    def __init__(self, columns: Columns, times: ArrayLike, side: Side, facts: Facts | None = None) -> None:
         try:
             self.time = np.asarray(times, dtype=np.float64)
         except (TypeError, ValueError, OverflowError):
             raise TrajectoryError(f"times must be one number or several [s], not {shown(times)}") from None
         self.side = side
-        self._columns = columns
+        self._columns, self._facts = columns, facts
         self._places = columns.grid.places(self.time, side)
 
     def __getitem__(self, name: str) -> Any:
         found = gather(self._columns, lambda names: self._columns.at_places(names, self._places), name)
+        if self._facts is not None:
+            require_finite(name, found, self._places.time, self._facts)
         shaped = found.reshape(self.time.shape + found.shape[1:])
         return shaped if shaped.ndim else float(shaped)
 

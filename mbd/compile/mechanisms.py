@@ -24,7 +24,10 @@ free_in_child(_LOCK)
 
 def _description(model: Any) -> Any:
     """What the equations depend on, by identity of the words."""
-    words = [getattr(model, kind, ()) for kind in ("joints", "forces", "constraints", "controllers", "markers")]
+    words = [
+        getattr(model, kind, ())
+        for kind in ("joints", "forces", "constraints", "controllers", "markers", "observations")
+    ]
     groups = tuple(tuple(group.values() if isinstance(group, Mapping) else group) for group in words)
     return groups, *(getattr(model, key, None) for key in ("gravity", "cut", "tunable"))
 

@@ -17,6 +17,7 @@ from mbd.equations.effects import Cause, causes, effect_of, weight_of
 from mbd.equations.equations import Equations, Facing
 from mbd.equations.figure import figure_of, shown_markers
 from mbd.equations.laws import Laws
+from mbd.equations.observations import offer_observations
 from mbd.equations.outputs import Outputs
 from mbd.equations.results import offer_results
 from mbd.equations.row_sizes import row_sizes
@@ -103,6 +104,7 @@ def _derived(model: Description, plan: Plan, carried: Sequence[tuple[str, int]] 
         idle=tuple(constraints.idle), output=outputs, output_names=outputs.names,
         velocity_names=scope.configuration.velocity_names, notes=plan.notes,
         figure=figure_of(model), markers=shown_markers(model),
+        observations=tuple((each.name, each.unit) for each in model.observations),
         geometry=TreeGeometry(scope, dynamics, work, rests, constraints, plan.planar and vectors and not carried),
         frictions=tuple(constraints.frictions), turns=(*scope.turns.values(), *scope.wrapped.values()),
         facings=_facings(scope, constraints),
@@ -112,6 +114,7 @@ def _derived(model: Description, plan: Plan, carried: Sequence[tuple[str, int]] 
         return _derived(model, plan, seen)
     whole = work + _closed(scope, constraints)
     offer_results(outputs, scope, dynamics, whole, equations, model, {joint.name for joint in plan.floating})
+    offer_observations(outputs, scope, model.observations)
     return equations
 
 

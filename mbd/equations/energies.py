@@ -14,6 +14,7 @@ from mbd.equations.dynamics import Work
 from mbd.equations.effects import causes, effect_of
 from mbd.equations.equations import Effect, Equations, Row
 from mbd.equations.laws import Laws
+from mbd.equations.observations import offer_observations
 from mbd.equations.outputs import Outputs
 from mbd.equations.results import offer_contacts, offer_effects, offer_rows
 from mbd.errors import ModelError, TraceError, nearest
@@ -122,6 +123,7 @@ def assembled(system: EnergyDescription, lowering: Lowering) -> Equations:
         potential = potential if effect.potential is None else potential + effect.potential
     kinetic = energy_of_motion(lowering)
     outputs = _outputs(system, lowering, known, effects, kinetic, potential)
+    offer_observations(outputs, scope, system.observations)
     return Equations(
         name=system.name, tape=tape,
         coordinates=tuple(records.Coordinate(c.name, c.unit, c.default) for c in system.coordinates),
@@ -129,6 +131,7 @@ def assembled(system: EnergyDescription, lowering: Lowering) -> Equations:
         balance=tuple(balance), rows=tuple(known.rows), contacts=tuple(known.contacts), guards=tuple(known.guards),
         effects=effects, kinetic=kinetic, potential=potential, compose=None, output=outputs, output_names=outputs.names,
         velocity_names=tuple(f"{c.name}.rate" for c in system.coordinates), frictions=tuple(known.frictions),
+        observations=tuple((each.name, each.unit) for each in system.observations),
     )  # fmt: skip
 
 

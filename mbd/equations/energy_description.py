@@ -11,6 +11,7 @@ from mbd.bodies.values import named_number_faults, names_of, number, printable
 from mbd.constraints.base import Constraint
 from mbd.constraints.controller import Controller
 from mbd.constraints.event import Event
+from mbd.constraints.observation import Observation
 from mbd.description import all_are, served
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.forces.base import Force
@@ -100,6 +101,7 @@ class EnergyDescription:
     nonholonomic: Mapping[str, Expression] = field(default_factory=dict)
     controllers: Sequence[Controller] = ()
     domains: Mapping[Any, Domain] = field(default_factory=dict)
+    observations: Sequence[Observation] = ()
 
     def __post_init__(self) -> None:
         _check_shapes(self)
@@ -130,6 +132,10 @@ class EnergyDescription:
         self._add([word for word in known if isinstance(word, Force)], self.forces)
         controllers = [*self.controllers, *(word for word in known if isinstance(word, Controller))]
         object.__setattr__(self, "controllers", controllers)
+
+    def observe(self, name: str, function: Any, *arguments: Any, unit: str = "") -> None:
+        """Add a result of one's own, as to a `Model`; an expression is of coordinates, rates and parameters."""
+        object.__setattr__(self, "observations", (*self.observations, Observation(name, function, arguments, unit)))
 
     def _add(self, words: Sequence[Any], known: Any) -> None:
         """Put words under their names."""

@@ -293,6 +293,7 @@ class Equations:
     facings : of the cut joints whose rows hold sines, see `Facing`
     idle : (owner, part) of rows of cut joints that hold whatever the motion, and were left out
     markers : full names of the named points, which pages show
+    observations : (name, unit) of the results of users' own
     memory : what follows from the rest, kept once it was found
     """
 
@@ -321,6 +322,7 @@ class Equations:
     facings: tuple[Facing, ...] = ()
     chart: Chart | None = None
     markers: tuple[str, ...] = ()
+    observations: tuple[tuple[str, str], ...] = ()
     configuration: Configuration = field(default=None, repr=False)  # type: ignore[assignment]
     memory: dict[str, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 

@@ -104,6 +104,7 @@ def _facts(facts: Any, heads: Mapping[str, Head]) -> int:
     _pairs(facts.get("frictions", []), "'frictions'")
     _pairs(facts.get("velocities", []), "'velocities'")
     _list(facts.get("markers", []), str, "'markers'")
+    _pairs(facts.get("observations", []), "'observations'")
     return len(facts["contacts"])
 
 

@@ -39,6 +39,7 @@ class Facts:
     frictions : (name, unit) of the dry frictions of joints, 'N' or 'N m'
     velocities : (name, unit) of velocities that are not the rates of coordinates
     markers : full names of the named points, 'left shank.toe' or 'heel'
+    observations : (name, unit) of the results of users' own
     """
 
     model: str = ""
@@ -49,6 +50,7 @@ class Facts:
     frictions: tuple[tuple[str, str], ...] = ()
     velocities: tuple[tuple[str, str], ...] = ()
     markers: tuple[str, ...] = ()
+    observations: tuple[tuple[str, str], ...] = ()
 
     @property
     def rates(self) -> tuple[str, ...]:
@@ -75,6 +77,7 @@ class Facts:
             ),
             _own_velocities(equations),
             equations.markers,
+            equations.observations,
         )
 
     @classmethod
@@ -89,6 +92,7 @@ class Facts:
             tuple((name, unit) for name, unit in data.get("frictions", ())),
             tuple((name, unit) for name, unit in data.get("velocities", ())),
             tuple(data.get("markers", ())),
+            tuple((name, unit) for name, unit in data.get("observations", ())),
         )
 
     def as_json(self) -> dict[str, Any]:

@@ -25,6 +25,9 @@ def unit(name: str, facts: Facts) -> str:
     if name in own:
         return own[name]
     stem, _, last = name.rpartition(".")
+    observed = dict(facts.observations)
+    if name in observed or (stem in observed and last in ("x", "y", "z")):
+        return observed.get(name, observed.get(stem, ""))
     contact = next((item for item in facts.contacts if item.name == stem), None)
     if contact is not None and last == "gap":
         return contact.unit

@@ -101,7 +101,8 @@ def readable(model: Description) -> list[str]:
     """Names that controllers may read: quantities and results; which of these a word has shows when a run begins."""
     words: list[Joint | Force | Constraint] = [*model.joints, *model.forces, *model.constraints]
     owners = [word.name for word in words] + [name for joint in model.joints for name in joint.coordinate_names]
-    return [*quantities(model), *(f"{owner}.{result}" for owner in owners for result in RESULTS)]
+    observed = [name for each in model.observations for name in (each.name, *(f"{each.name}.{axis}" for axis in "xyz"))]
+    return [*quantities(model), *observed, *(f"{owner}.{result}" for owner in owners for result in RESULTS)]
 
 
 # names ----------------------------------------------------------------------------------------------------------
@@ -121,6 +122,7 @@ def name_faults(model: Description) -> list[str]:
     for name, kind in (
         *((name, "body") for name in bodies),
         *((word.name, type(word).__name__) for word in (*words, *model.controllers)),
+        *((observation.name, "observation") for observation in model.observations),
         *((f"{joint.name} loss", "loss of a joint") for joint in model.joints if joint.loss is not None),
         *((f"{joint.name} spring", "spring of a joint") for joint in model.joints if joint.stiffness != 0.0),
     ):
@@ -183,8 +185,8 @@ def _users(model: Description, body: str) -> list[Force | Constraint]:
 
 def mention_faults(model: Description) -> list[str]:
     """Joints that were never connected, names of quantities that do not exist."""
-    found = []
     joints = {joint.name for joint in model.joints}
+    found = [fault for each in model.observations for fault in each.faults(model.bodies, joints)]
     known = set(quantities(model))
     owners = {force.name for force in model.forces}
     words: list[Force | Constraint] = [*model.forces, *model.constraints]

@@ -39,6 +39,7 @@ def parts(model: Description) -> dict[str, list[str]]:
         "forces": [f"{force.name}: {type(force).__name__}, {force.kind}" for force in model.forces],
         "constraints": [described_constraint(word) for word in model.constraints],
         "controllers": [controller.name for controller in model.controllers],
+        "observations": [f"{each.name} [{each.unit or '-'}]" for each in model.observations],
         "coordinates": [] if found else _choice(model),
         "faults": found,
     }
