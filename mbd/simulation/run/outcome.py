@@ -8,7 +8,7 @@ from typing import Any
 
 from mbd.simulation.diagnostics.notes import notes_of
 from mbd.simulation.run.data import RunData
-from mbd.simulation.run.stored import whole_record
+from mbd.simulation.run.stored import ended_record
 from mbd.state import State
 from mbd.trajectory import Trajectory
 
@@ -24,7 +24,7 @@ COUNTS = (
 
 def trajectory_of(run: RunData, problem: str, message: str, final: State) -> Trajectory:
     """The run by name; `problem` is '' if it went as far as it was asked to. Its message tells what is in doubt."""
-    record = whole_record(run)
+    record = ended_record(run)
     notes, doubts = notes_of(run, record)
     text = problem or "; but ".join([message, *doubts])
     ended = replace(

@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix
+from mbd.results.balance import Balance
 from mbd.results.record import EventRecord, Record
+from mbd.results.stored_states import StoredStates
 from mbd.simulation.run.data import RunData
 
-__all__ = ["record_of", "whole_record"]
+__all__ = ["ended_record", "record_of", "whole_record"]
 
 BLOCK = 4096
 """Rows that are read together."""
@@ -51,3 +53,28 @@ def whole_record(run: RunData) -> Record:
     last = run.stored - 1  # a run that failed right at an event has no row after it
     events = [event if event.row <= last else replace(event, row=last) for event in run.events]
     return record_of(run, run.table[: run.stored], events)
+
+
+def ended_record(run: RunData) -> Record:
+    """All rows and events of a run that is over; of one that failed before it had a row its start alone.
+
+    Its accelerations and multipliers are those of the balance of forces; NaN where that determines none, as it may be
+    why the run failed.
+    """
+    if run.stored:
+        return whole_record(run)
+    v, start = run.kernel, run.start
+    closed = run.manager.flags(start.mode.closed)
+    row = np.zeros((1, run.table.shape[1]))
+    known = np.concatenate([[start.time], start.q, start.v, start.z, np.full(v.n + v.n_rows, np.nan), closed])
+    row[0, : len(known)] = known
+    record = record_of(run, row, [replace(event, row=0) for event in run.events])
+    states = StoredStates(record, run.mechanism.equations)
+    if not Balance.serves(states.equations):
+        return record
+    guess = replace(states.rows, lam=np.zeros_like(record.lam))
+    solved = Balance(states).solve(guess)
+    if not solved.sound.all():
+        return record
+    a, s = np.split(solved.rate, [v.n_v], axis=1)
+    return replace(record, a=a, s=s, lam=solved.lam)
