@@ -97,6 +97,9 @@ class _ObservingScope:
             raise ModelError(f"{self._what} asks for the parameter {name!r}, which the model has not; write the number")
         return self._scope.parameters[name]
 
+    def increment(self, owner: str, field: str) -> Scalar:
+        return 0.0
+
     def table(self, owner: str, breaks: Sequence[float], coefficients: Sequence[Sequence[float]]) -> Table:
         raise ModelError(f"{self._what} takes no samples; look them up in the results instead")
 
