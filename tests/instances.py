@@ -153,6 +153,10 @@ FORCES: list[tuple[str, Callable[[Frame, Frame, Joint], Force]]] = [
     ("constant torque", lambda a, b, joint: mbd.Applied("force", a, torque=2.0)),
     ("force by a function", lambda a, b, joint: mbd.Applied("force", a, force=pull, arguments=("t", "hinge.angle"))),
     ("sampled force", lambda a, b, joint: mbd.Applied("force", a, force=(mbd.Samples([0, 1, 3], [0, 2, 1]), 1.5))),
+    (
+        "force in axes of its body",
+        lambda a, b, joint: mbd.Applied("force", a, force=(2.0, 3.0, 4.0), torque=(0.5, -1.0, 2.0), axes=a),
+    ),
     ("motor", lambda a, b, joint: mbd.Motor("force", joint, torque=4.0)),
     ("potential", lambda a, b, joint: mbd.Potential("force", quartic, "hinge.angle")),
 ]

@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from mbd.bodies.algebra import rotate
 from mbd.bodies.base import Frame
+from mbd.bodies.point_mass import PointMass
 from mbd.bodies.values import name_of
 from mbd.errors import ModelError
 from mbd.forces.base import Action, Force, frame_of
@@ -29,7 +31,10 @@ __all__ = ["Applied"]
 
 @dataclass(frozen=True)
 class Applied(Force):
-    """A force at the origin of a frame and a torque on its body, in ground axes: power ``F·v + T·ω``.
+    """A force at the origin of a frame and a torque on its body: power ``F·v + T·ω``.
+
+    Its components are those along the axes of the ground, or of another frame, with which it turns then: ``F = R f``.
+    A thruster is ``Applied("thrust", rocket.point(0, -1), force=(0, 9e3), axes=rocket.origin)``.
 
     Parameters
     ----------
@@ -40,6 +45,7 @@ class Applied(Force):
     torque : the same [N m]; a single quantity acts about z
     arguments : what functions are called with, in order: names of quantities ('t', 'left hip.angle'), frames (their
         positions), joints (their coordinates), or (label, number) for a run-time parameter of the function
+    axes : the frame along whose axes the components lie, of any body; None: along those of the ground
 
     Numbers are the run-time parameters 'name.force.x', 'name.torque.z', …
     """
@@ -49,6 +55,7 @@ class Applied(Force):
     force: Any = None
     torque: Any = None
     arguments: Any = ("t",)
+    axes: Frame | None = None
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -62,6 +69,13 @@ class Applied(Force):
             torque = (0.0, 0.0, self.torque) if is_single(self.torque) else self.torque
             put(self, "torque", triple_of(torque, f"torque of '{self.name}'"))
         put(self, "arguments", arguments_of(self.arguments, f"Applied '{self.name}'"))
+        if self.axes is not None:
+            what = f"axes of Applied '{self.name}'"
+            if isinstance(frame_of(self.axes, what).body, PointMass):
+                raise ModelError(
+                    f"{what}: '{self.axes.body.name}' is a point mass, which has no axes; give a frame of "
+                    "a RigidBody or a Link"
+                )
 
     @property
     def kind(self) -> str:
@@ -69,8 +83,9 @@ class Applied(Force):
         return "applied"
 
     def mentions(self) -> list[Mention]:
-        """Its frame, and what its functions are called with."""
-        return [self.frame, *mentioned(self.arguments)]
+        """Its frames, and what its functions are called with."""
+        own = [self.frame] if self.axes is None else [self.frame, self.axes]
+        return [*own, *mentioned(self.arguments)]
 
     def parameters(self) -> dict[str, float]:
         """Components given as numbers, and arguments given as numbers."""
@@ -95,5 +110,7 @@ class Applied(Force):
             ("torque", self.torque, motion.angular_velocity),
         ):
             if value is not None:
-                pairs += zip(velocity, triple_at(value, self.arguments, scope, self.name, field), strict=True)
+                x, y, z = triple_at(value, self.arguments, scope, self.name, field)
+                along = (x, y, z) if self.axes is None else rotate(scope.frame(self.axes).rotation, (x, y, z))
+                pairs += zip(velocity, along, strict=True)
         return Action(pairs=tuple(pairs))

@@ -231,6 +231,9 @@ def _applied(found: Loads, force: Any) -> None:
     place, nothing = bodies.place(force.frame), np.zeros((len(bodies.told), 3))
     push = nothing if force.force is None else triple(force.force, force.arguments, bodies, force.name, "force")
     twist = nothing if force.torque is None else triple(force.torque, force.arguments, bodies, force.name, "torque")
+    if force.axes is not None:
+        R = bodies.frame(force.axes).H[:, :3, :3]
+        push, twist = (np.einsum("nij,nj->ni", R, part) for part in (push, twist))
     body = force.frame.body.name
     found.force(body, place, push, twist)
     power = np.sum(push * bodies.velocity(body, place), axis=1)

@@ -99,6 +99,7 @@ def add_loads(rng: random.Random, model: mbd.Model, spatial: bool) -> None:
 
     anchor = model.ground.point(3.0, 2.5, 1.1 if spatial else 0.0)
     w, size = rng.uniform(1.0, 6.0), rng.uniform(0.5, 3.0)
+    turning = last.origin if size > 1.5 and not isinstance(last, mbd.PointMass) else None
     single = [joint for joint in model.joints if len(joint.labels) == 1]
     samples = mbd.Samples([0.0, 0.11, 0.2, 0.45], [0.5, -1.0, 2.0, 0.3], kind=rng.choice(["cubic", "linear"]))
     makers: list[Callable[[], Any]] = [
@@ -106,7 +107,7 @@ def add_loads(rng: random.Random, model: mbd.Model, spatial: bool) -> None:
         lambda: mbd.Damper("damper", anchor, point(last), mbd.Viscous(rng.uniform(0.2, 1.5)) + mbd.Quadratic(0.2)),
         lambda: mbd.Applied("push", point(last), force=lambda t, p: (size * np.sin(w * t) * p[0], size, 0.3 * t),
                             torque=(0.0, 0.0, 0.5) if not spatial else (0.3, -0.2, 0.5),
-                            arguments=("t", point(moving[0]))),
+                            arguments=("t", point(moving[0])), axes=turning),
         lambda: mbd.Potential("well", lambda p: 0.5 * size * p[0] * p[0] + 0.1 * p[0] * p[1], arguments=(point(last),)),
     ]  # fmt: skip
     if single:
