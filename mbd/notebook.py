@@ -34,7 +34,7 @@ def table(caption: str, heads: Sequence[str], rows: Iterable[Sequence[Cell]], no
     cells = [[_text(cell) for cell in row] for row in rows]
     columns = max(map(len, [heads, *cells]), default=0)
     numeric = [all(NUMBER.fullmatch(row[k]) for row in cells if k < len(row)) for k in range(columns)]
-    sides = [f' style="text-align:{"right" if number else "left"}"' for number in numeric]
+    sides = [f' style="text-align:{"right;white-space:nowrap" if number else "left"}"' for number in numeric]
     title = '<caption style="caption-side:top;text-align:left;color:inherit;font-weight:bold">'
     lines = [f'<table class="{PLAIN}">', f"{title}{escape(caption)}</caption>" if caption else ""]
     if heads:

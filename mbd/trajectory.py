@@ -210,14 +210,16 @@ class Trajectory:
         return self.facts.model
 
     # pictures and files -----------------------------------------------------------------------------------------
-    def plot(self, *names: str, path: str | Path | None = None) -> Any:
-        """Time histories, one panel per kind of quantity, with the events marked.
+    def plot(self, *names: str, path: str | Path | None = None, degrees: bool = True) -> Any:
+        """Time histories, one panel per kind of quantity, with the events marked and times of contact shaded.
 
-        Without names the model's coordinates. Returns the matplotlib figure, also saved when a path is given.
+        Without names the model's coordinates. Axes of angles are in degrees, or in radians with ``degrees=False``;
+        results are in radians whatever is drawn. Returns the matplotlib figure, also saved when a path is given: SVG
+        follows the reader's light or dark page, others the paper of matplotlib's present style.
         """
         from mbd.view.plots import histories
 
-        return histories(self, *names, path=path)
+        return histories(self, *names, path=path, degrees=degrees)
 
     def page(self, path: str | Path) -> Path:
         """One self-contained HTML file with the animated mechanism, its contacts, energies and events."""

@@ -177,7 +177,10 @@ def test_a_table_gives_back_what_it_was_made_of(rows, caption):
 
 def test_numbers_stand_at_the_right_and_words_at_the_left():
     page = Page(table("", ("name", "value", "kind"), [("a", 1.5, "x"), ("b", None, "2 m"), ("c", -3e-5, "")]))
-    assert [attributes["style"] for attributes in page.tags("td")] == ["text-align:right", "text-align:left"] * 3
+    assert [attributes["style"] for attributes in page.tags("td")] == [
+        "text-align:right;white-space:nowrap",
+        "text-align:left",
+    ] * 3
     assert page.cells[1:] == [["a", "1.5", "x"], ["b", "–", "2 m"], ["c", "-3e-05", ""]]
 
 

@@ -77,7 +77,7 @@ def test_every_page_has_its_place_in_the_site():
     ("[guide](docs/guide.md#a), [far](https://a.b)", "", "[guide](guide.md#a), [far](https://a.b)"),
     ("[a test](../tests/test_docs.py)", "docs", "a test"),
     ("[us](../README.md) [leg](../examples/four_bar.py)", "docs", "[us](index.md) [leg](gallery/four-bar.md)"),
-    ("![drawn](docs/pictures/walk.png) [all](examples)", "", "![drawn](pictures/walk.png) [all](gallery/index.md)"),
+    ("![drawn](docs/pictures/walk.svg) [all](examples)", "", "![drawn](pictures/walk.svg) [all](gallery/index.md)"),
     ("`run[a](b)` stays [here](#there)", "", "`run[a](b)` stays [here](#there)"),
 ])  # fmt: skip
 def test_links_out_of_the_docs_lead_to_pages_of_the_site(text, folder, wanted):

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mbd.view.plots import drawing
-from mbd.view.style import CYCLE, as_label
+from mbd.view.style import CYCLE, FAINT, INK, NEUTRAL, PALE, PAPER, as_label, tone
 
 if TYPE_CHECKING:
     from mbd.analysis.accuracy import Accuracy, Point
@@ -61,7 +61,7 @@ def work_precision(found: Accuracy, path: str | Path | None = None) -> Any:
 
 def _scheme(axes: Any, number: int, scheme: str, points: list[Point]) -> None:
     """Two lines of one color: through its steps, and dashed through its tolerances."""
-    style = {"marker": MARKERS[number % len(MARKERS)], "color": CYCLE[number % len(CYCLE)], "alpha": 0.9}
+    style = {"marker": MARKERS[number % len(MARKERS)], "color": tone(CYCLE[number % len(CYCLE)]), "alpha": 0.9}
     fixed = [point for point in points if point.tol is None]
     to_tolerance = [point for point in points if point.tol is not None]
     for line, dashes, size in ((fixed, "-", 4.5), (to_tolerance, "--", 3.0)):
@@ -73,9 +73,9 @@ def _scheme(axes: Any, number: int, scheme: str, points: list[Point]) -> None:
     for point in points:
         at = 1e3 * point.seconds, height(point)
         if point.error is None:
-            axes.plot(*at, linestyle="", **style | {"markersize": 6, "mfc": "white", "alpha": 1.0})
+            axes.plot(*at, linestyle="", **style | {"markersize": 6, "mfc": tone(PAPER), "alpha": 1.0})
         if not point.same_events:
-            axes.plot(*at, "o", markersize=10, mfc="none", color=CYCLE[1])
+            axes.plot(*at, "o", markersize=10, mfc="none", color=tone(CYCLE[1]))
 
 
 def _steps(axes: Any, shown: list[Point]) -> list[tuple[float, float, str]]:
@@ -85,7 +85,7 @@ def _steps(axes: Any, shown: list[Point]) -> list[tuple[float, float, str]]:
         group = sorted((point for point in shown if point.dt == dt), key=lambda point: point.seconds)
         if len(group) > 2:
             axes.plot(
-                [1e3 * point.seconds for point in group], [height(point) for point in group], ":", color="#8A8A8A",
+                [1e3 * point.seconds for point in group], [height(point) for point in group], ":", color=FAINT,
                 linewidth=0.8, zorder=0.9,
             )  # fmt: skip
         labels.append((1e3 * group[-1].seconds, height(group[-1]), f"{1e3 * dt:.3g} ms"))
@@ -104,7 +104,7 @@ def _labelled(axes: Any, labels: list[tuple[float, float, str]]) -> None:
         placed.append((x, low))
         axes.annotate(
             text, (time, error), xytext=(8, low - y), textcoords="offset points", va="center", fontsize=7.5,
-            color="#555555", bbox={"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none", "alpha": 0.7},
+            color=tone(NEUTRAL), bbox={"boxstyle": "square,pad=0.1", "fc": tone(PAPER), "ec": "none", "alpha": 0.7},
         )  # fmt: skip
 
 
@@ -114,14 +114,14 @@ def _limits(axes: Any, found: Accuracy, shown: list[Point]) -> None:
     low, high = min(errors) / 2.5, max(errors) * 2.5
     if found.target is not None:
         low, high = min(low, found.target / 1.6), max(high, found.target * 1.6)
-        axes.axhline(found.target, color="black", linewidth=0.9, linestyle="--", zorder=0.8)
+        axes.axhline(found.target, color=tone(INK), linewidth=0.9, linestyle="--", zorder=0.8)
         axes.annotate(
             f"wanted {found.target:g}", (0.995, found.target), xycoords=("axes fraction", "data"), ha="right",
             xytext=(0, 3), textcoords="offset points", fontsize=7.5,
         )  # fmt: skip
     bound = found.reference.error if found.reference is not None else 0.0
     if math.isfinite(bound) and bound > low:
-        axes.axhspan(low, bound, color="#EEEEEE", zorder=0.3)
+        axes.axhspan(low, bound, color=tone(PALE), zorder=0.3)
     times = [1e3 * point.seconds for point in shown]
     spread = max(times) / min(times)
     axes.set_ylim(low, high)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mbd.view.plots import drawing
-from mbd.view.style import CYCLE, as_label
+from mbd.view.style import CYCLE, INK, PAPER, as_label, tone
 
 if TYPE_CHECKING:
     from mbd.analysis.effects import Contribution, Effects
@@ -31,7 +31,7 @@ def bars(found: Effects, path: str | Path | None = None) -> Any:
     with drawing(path, 9.4, 1.5 + TALL * len(each)) as figure:
         share, change, cost = figure.subplots(1, 3, sharey=True, width_ratios=[1.0, 1.5, 1.0])
         places = range(len(each))
-        shades = [CYCLE[2] if one.name in found.droppable else CYCLE[0] for one in each]
+        shades = [tone(CYCLE[2]) if one.name in found.droppable else tone(CYCLE[0]) for one in each]
         share.barh(places, [100.0 * one.share for one in each], color=shades, height=0.62)
         _label(share, [100.0 * one.share for one in each], [f"{100.0 * one.share:.2g} %" for one in each])
         share.set_xlabel("share of the energy [%]")
@@ -65,8 +65,8 @@ def _changes(axes: Any, found: Effects, shades: Sequence[str]) -> None:
             text = "cannot be left out" if one.change.failure else "not compared"
         if size > 0.0:
             hatch = None if one.change.comparable else "////"
-            axes.barh(place, size - low, left=low, color=shades[place], height=0.62, hatch=hatch, edgecolor="white",
-                      linewidth=0.0)  # fmt: skip
+            axes.barh(place, size - low, left=low, color=shades[place], height=0.62, hatch=hatch,
+                      edgecolor=tone(PAPER), linewidth=0.0)  # fmt: skip
         axes.annotate(
             text + _why(one),
             (size if size > 0.0 else found.tolerance, place),
@@ -77,7 +77,7 @@ def _changes(axes: Any, found: Effects, shades: Sequence[str]) -> None:
         )
     axes.set_xscale("log")
     axes.set_xlim(low, high)
-    axes.axvline(found.tolerance, color="black", linewidth=0.9, linestyle="--", zorder=3)
+    axes.axvline(found.tolerance, color=tone(INK), linewidth=0.9, linestyle="--", zorder=3)
     axes.annotate(
         f"allowed {found.tolerance:g}", (found.tolerance, 1.0), xycoords=("data", "axes fraction"), xytext=(0, 2),
         textcoords="offset points", ha="center", fontsize=7.5,

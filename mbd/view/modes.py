@@ -9,7 +9,7 @@ import numpy as np
 
 from mbd.errors import ModelError
 from mbd.view.plots import drawing
-from mbd.view.style import CYCLE, NEUTRAL, as_label
+from mbd.view.style import CYCLE, NEUTRAL, as_label, tone
 
 if TYPE_CHECKING:
     from mbd.analysis.linearization import Linearization, NaturalMode
@@ -31,12 +31,12 @@ def modes(linear: Linearization, path: str | Path | None = None, most: int = 6) 
         height, turned = np.arange(len(names)), False
         for number, (axes, mode) in enumerate(zip(panels, chosen, strict=True)):
             shape = np.array([mode.shape[name] for name in names])
-            shade, late = CYCLE[number % len(CYCLE)], bool(np.max(np.abs(shape.imag)) > IN_PHASE)
+            shade, late = tone(CYCLE[number % len(CYCLE)]), bool(np.max(np.abs(shape.imag)) > IN_PHASE)
             turned = turned or late
             axes.barh(height - 0.18 * late, shape.real, 0.66 - 0.32 * late, color=shade)
             if late:
                 axes.barh(height + 0.18, -shape.imag, 0.34, color=shade, alpha=0.4)
-            axes.axvline(0.0, color=NEUTRAL, linewidth=0.7)
+            axes.axvline(0.0, color=tone(NEUTRAL), linewidth=0.7)
             axes.set_xlim(-1.12, 1.12)
             axes.set_title(_title(mode), fontsize=8.5, fontweight="normal")
             axes.grid(False, axis="y")

@@ -5,6 +5,7 @@ Every function returns the figure; with `path` it is saved, and no window manage
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from itertools import pairwise
@@ -18,8 +19,9 @@ from mbd.results.interpolation import Grid
 from mbd.results.ledger import SPENT, Ledger, Part
 from mbd.results.tables import library
 from mbd.results.units import unit
+from mbd.view import vector
 from mbd.view.curves import curves
-from mbd.view.style import CYCLE, NEUTRAL, as_label, color, rules
+from mbd.view.style import CYCLE, INK, NEUTRAL, as_label, color, rules, tone
 
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
@@ -36,6 +38,17 @@ QUANTITIES = {
     "rad": "angle", "m": "length", "rad/s": "angular rate", "m/s": "speed", "rad/s²": "angular acceleration",
     "m/s²": "acceleration", "N": "force", "N m": "torque", "J": "energy", "W": "power",
 }  # fmt: skip
+
+
+def scale(kind: str, degrees: bool) -> tuple[str, float]:
+    """The unit of an axis and how many of it a unit of SI is: angles in degrees, if wanted.
+
+    >>> scale("rad/s", True)[0], scale("rad/s", False), scale("m", True)
+    ('°/s', ('rad/s', 1.0), ('m', 1.0))
+    """
+    if degrees and kind in ("rad", "rad/s", "rad/s²"):
+        return kind.replace("rad", "°"), 180.0 / math.pi
+    return kind, 1.0
 
 
 @contextmanager
@@ -60,13 +73,17 @@ def drawing(path: str | Path | None, width: float, height: float) -> Iterator[An
             named_file(path)
             kind = Path(path).suffix.removeprefix(".") or str(matplotlib.rcParams["savefig.format"])
             target = Path(path) if Path(path).suffix else Path(path).with_name(f"{Path(path).name}.{kind}")
-            write_whole(target, lambda partial: figure.savefig(partial, format=kind))
+            if kind == "svg":
+                write_whole(target, lambda partial: vector.save(figure, partial))
+            else:
+                write_whole(target, lambda partial: figure.savefig(partial, format=kind))
 
 
-def histories(run: Trajectory, *names: str, path: str | Path | None = None) -> Any:
-    """Quantities over time, one panel per unit, events as thin lines, contacts as bars below.
+def histories(run: Trajectory, *names: str, path: str | Path | None = None, degrees: bool = True) -> Any:
+    """Quantities over time, one panel per unit, events as thin lines, contacts as bars below and as shades.
 
-    A vector's name draws its three components. Without names: the coordinates of the model.
+    A vector's name draws its three components. Without names: the coordinates of the model. Angles are drawn in
+    degrees, or in radians; results stay in radians.
     """
     wanted = names or tuple(name for name, _ in run.facts.coordinates)
     scalars = list(dict.fromkeys(part for name in wanted for part in run.columns.components(name)))
@@ -80,10 +97,14 @@ def histories(run: Trajectory, *names: str, path: str | Path | None = None) -> A
     with drawing(path, 7.4, 0.7 + sum(heights)) as figure:
         grid = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
         for axes, (kind, group) in zip(grid, panels.items(), strict=False):
+            text, factor = scale(kind, degrees)
             for number, name in enumerate(group):
                 style = ("-", "--")[number // len(CYCLE) % 2]
-                axes.plot(time, values[name], style, color=CYCLE[number % len(CYCLE)], label=as_label(name))
-            axes.set_ylabel(f"{QUANTITIES.get(kind, 'value')} [{as_label(kind)}]" if kind else "value")
+                axes.plot(
+                    time, factor * values[name], style, color=tone(CYCLE[number % len(CYCLE)]), label=as_label(name)
+                )
+            axes.set_ylabel(f"{QUANTITIES.get(kind, 'value')} [{as_label(text)}]" if kind else "value")
+            _shade(axes, run, wanted)
             _mark(axes, run)
             _legend(axes, len(group))
         if bars:
@@ -111,8 +132,24 @@ def _mark(axes: Any, run: Trajectory) -> None:
 def _lines(axes: Any, marks: Sequence[tuple[float, str]], above: bool = False) -> None:
     """A thin line at each (time, name), in the color of its side; black without a name; above areas or below curves."""
     for time, name in marks if len(marks) <= MANY else ():
-        shade = color(name) if name else "black"
+        shade = color(name) if name else tone(INK)
         axes.axvline(time, color=shade, linewidth=0.7, alpha=0.35, linestyle=":", zorder=2.5 if above else 0.5)
+
+
+def _shade(axes: Any, run: Trajectory, wanted: Sequence[str]) -> None:
+    """The times at which contacts are closed: of those asked for by name, else of feet, else of all; a shade a side."""
+    contacts = [
+        contact for contact in run.facts.contacts if any(name.startswith(f"{contact.name}.") for name in wanted)
+    ]
+    contacts = contacts or [contact for contact in run.facts.contacts if contact.place] or list(run.facts.contacts)
+    closed: dict[str, Any] = {}
+    for contact in contacts:
+        column = run.record.closed[:, run.facts.contacts.index(contact)].astype(bool)
+        closed[color(contact.name)] = closed.get(color(contact.name), False) | column
+    for side, rows in closed.items():
+        spans = stretches(run.time, rows)
+        for begin, end in spans if len(spans) <= MANY else ():
+            axes.axvspan(begin, end, color=side, alpha=0.09, linewidth=0, zorder=0.2)
 
 
 def _bars(axes: Any, run: Trajectory) -> None:
@@ -158,22 +195,22 @@ def energy(ledger: Ledger, path: str | Path | None = None) -> Any:
     ceiling = ledger.total[:1] - floor + sum((part.energy for part in given), np.zeros(len(time)))
     with drawing(path, 7.4, 4.4 + 0.17 * (len(layers) // 3)) as figure:
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[3.0, 1.0])
-        shades = [CYCLE[0], CYCLE[5], CYCLE[1], CYCLE[4], CYCLE[3], CYCLE[2], CYCLE[6], CYCLE[7]]
+        shades = [tone(CYCLE[k]) for k in (0, 5, 1, 4, 3, 2, 6, 7)]
         colors = [*shades, *(f"{shade}80" for shade in shades[2:])]
         upper.stackplot(
             time, *layers, labels=labels, colors=[colors[k % len(colors)] for k in range(len(layers))], alpha=0.8,
             linewidth=0,
         )  # fmt: skip
-        upper.plot(time, ceiling, color="black", linewidth=1.0, label="start + put in" if given else "start")
+        upper.plot(time, ceiling, color=tone(INK), linewidth=1.0, label="start + put in" if given else "start")
         upper.set_ylabel("energy [J]")
         _legend(upper, 3)
-        lower.plot(time, ledger.numerical, color=NEUTRAL)
+        lower.plot(time, ledger.numerical, color=tone(NEUTRAL))
         lower.set_ylabel("numerical [J]")
         lower.set_xlabel("time [s]")
         for panel in (upper, lower):
             _lines(panel, ledger.marks, above=True)
         for instant, _ in ledger.marks if len(ledger.marks) > MANY else ():
-            lower.axvline(instant, ymin=0.93, color="black", linewidth=0.7, alpha=0.6)
+            lower.axvline(instant, ymin=0.93, color=tone(INK), linewidth=0.7, alpha=0.6)
         if len(time) and time[-1] > time[0]:
             lower.set_xlim(time[0], time[-1])
     return figure
@@ -188,8 +225,8 @@ def _spent(ledger: Ledger) -> list[Part]:
     return sorted(parts, key=lambda part: -float(np.max(np.abs(part.energy))))
 
 
-def phase_portrait(run: Trajectory, *coordinates: str, path: str | Path | None = None) -> Any:
-    """Rate against coordinate; jumps at switches are dotted, the start is a dot.
+def phase_portrait(run: Trajectory, *coordinates: str, path: str | Path | None = None, degrees: bool = True) -> Any:
+    """Rate against coordinate, angles in degrees or in radians; jumps at switches are dotted, the start is a dot.
 
     Without names: every coordinate in radians, or every coordinate if there is none.
     """
@@ -202,8 +239,9 @@ def phase_portrait(run: Trajectory, *coordinates: str, path: str | Path | None =
     with drawing(path, 5.6, 4.6) as figure:
         axes = figure.subplots()
         for number, name in enumerate(wanted):
-            place, rate = values[name], values[f"{name}.rate"]
-            shade = CYCLE[number % len(CYCLE)]
+            factor = scale(unit(name, run.facts), degrees)[1]
+            place, rate = factor * values[name], factor * values[f"{name}.rate"]
+            shade = tone(CYCLE[number % len(CYCLE)])
             width = 3.0 if "left" in name.split() else 1.1  # the two sides of a repeating walk lie on each other
             axes.plot([], [], color=shade, linewidth=width, label=as_label(name))
             axes.plot(place[:1], rate[:1], "o", color=shade, markersize=5)
@@ -212,7 +250,8 @@ def phase_portrait(run: Trajectory, *coordinates: str, path: str | Path | None =
                 axes.plot(place[stop - 1 : stop + 1], rate[stop - 1 : stop + 1], ":", color=shade, linewidth=width)
         kinds = {unit(name, run.facts) for name in wanted}
         kind = kinds.pop() if len(kinds) == 1 else ""
-        axes.set_xlabel(f"{QUANTITIES.get(kind, 'coordinate')} [{as_label(kind)}]" if kind else "coordinate")
-        axes.set_ylabel(f"rate [{as_label(kind)}/s]" if kind else "rate")
+        text = as_label(scale(kind, degrees)[0])
+        axes.set_xlabel(f"{QUANTITIES.get(kind, 'coordinate')} [{text}]" if kind else "coordinate")
+        axes.set_ylabel(f"rate [{text}/s]" if kind else "rate")
         _legend(axes, min(len(wanted), 2))
     return figure

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbd.view.plots import drawing
-from mbd.view.style import CYCLE, NEUTRAL
+from mbd.view.style import CYCLE, NEUTRAL, tone
 
 if TYPE_CHECKING:
     from mbd.analysis.numerical import Criteria
@@ -38,13 +38,13 @@ def spectra(found: Sequence[Criteria], path: str | Path | None = None) -> Any:
         upper = figure.add_subplot(grid[0, :])
         middle, lower = figure.add_subplot(grid[1, 0]), figure.add_subplot(grid[1, 1])
         for number, each in enumerate(found):
-            shade, style = CYCLE[number % len(CYCLE)], ("-", "--", "-.")[number // len(CYCLE) % 3]
+            shade, style = tone(CYCLE[number % len(CYCLE)]), ("-", "--", "-.")[number // len(CYCLE) % 3]
             width = 1.4 + 1.6 * (len(found) - 1 - number) / max(len(found) - 1, 1)  # equal curves stay visible
             upper.plot(each.turns, each.radius, style, color=shade, linewidth=width, label=_label(each))
             for axes, values in (middle, each.damping), (lower, each.elongation):
                 axes.plot(each.turns, _above(values), style, color=shade, linewidth=width)
                 axes.plot(each.turns, _above(-values), ":", color=shade, linewidth=width)
-        upper.axhline(1.0, color=NEUTRAL, linewidth=0.7)
+        upper.axhline(1.0, color=tone(NEUTRAL), linewidth=0.7)
         upper.set_ylim(0.0, HIGHEST)
         upper.set_ylabel("spectral radius ρ")
         upper.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.2)

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import re
 import struct
 
 import numpy as np
 import pytest
 from matplotlib import pyplot
+from matplotlib.colors import to_hex, to_rgb
+from matplotlib.text import Text
 
 from mbd.errors import UnknownNameError
 from mbd.view.curves import curves
 from mbd.view.plots import contacts, phase_portrait, stretches
-from mbd.view.style import color
+from mbd.view.style import DARK, INK, PALE, PAPER, color
 from tests.view.handmade_runs import ball, oscillator, walker
 
 
@@ -30,7 +33,7 @@ def is_picture(path) -> bool:
 def test_histories_have_one_panel_per_unit_and_the_contacts_below():
     figure = walker().plot("left hip.angle", "right hip.angle", "left foot.force")
     angles, forces, bars = figure.axes
-    assert angles.get_ylabel() == "angle [rad]" and forces.get_ylabel() == "force [N]"
+    assert angles.get_ylabel() == "angle [°]" and forces.get_ylabel() == "force [N]"
     assert [text.get_text() for text in angles.get_legend().get_texts()] == ["left hip.angle", "right hip.angle"]
     assert [label.get_text() for label in bars.get_yticklabels()] == ["left foot", "right foot"]
     assert bars.get_xlabel() == "time [s]"
@@ -105,3 +108,67 @@ def test_stretches_are_the_times_of_closed_rows():
 
 def test_sides_have_their_colors():
     assert color("left knee lock") == color("left thigh") != color("right thigh") != color("hip")
+
+
+def test_angles_are_drawn_in_degrees_and_results_stay_in_radians():
+    run = walker()
+    radians = run["left hip.angle"]
+    for degrees, factor, label in ((True, 180.0 / np.pi, "angle [°]"), (False, 1.0, "angle [rad]")):
+        axes = run.plot("left hip.angle", degrees=degrees).axes[0]
+        time, values = (np.asarray(column) for column in axes.lines[0].get_data())
+        assert axes.get_ylabel() == label
+        assert np.array_equal(values[np.searchsorted(time, run.time)], factor * radians)
+    assert run["left hip.angle"] is radians
+    portrait = phase_portrait(run, "left hip.angle").axes[0]
+    assert portrait.get_xlabel() == "angle [°]" and portrait.get_ylabel() == "rate [°/s]"
+    start = next(line.get_data() for line in portrait.lines if line.get_marker() == "o")
+    assert np.allclose(np.ravel(start), np.degrees([radians[0], run["left hip.angle.rate"][0]]), rtol=1e-12)
+
+
+def test_times_of_contact_are_shaded_in_the_color_of_their_side():
+    run = walker()
+    axes = run.plot("left hip.angle", "left foot.force").axes[0]
+    closed = run.record.closed[:, [contact.name for contact in run.facts.contacts].index("left foot")]
+    shades = [(patch.get_x(), patch.get_x() + patch.get_width()) for patch in axes.patches]
+    assert np.allclose(shades, stretches(run.time, closed)) and len(shades)
+    assert {to_hex(patch.get_facecolor()).upper() for patch in axes.patches} == {color("left foot")}
+    both = run.plot("left hip.angle").axes[0].patches
+    assert {to_hex(patch.get_facecolor()).upper() for patch in both} == {color("left foot"), color("right foot")}
+
+
+def contrast(one, other) -> float:
+    """Ratio of relative luminances (WCAG 2.2)."""
+
+    def luminance(shade):
+        parts = [part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in to_rgb(shade)]
+        return float(np.dot((0.2126, 0.7152, 0.0722), parts))
+
+    low, high = sorted((luminance(one), luminance(other)))
+    return (high + 0.05) / (low + 0.05)
+
+
+@pytest.mark.parametrize("style", ["default", "dark_background"])
+def test_plots_can_be_read_on_the_paper_of_the_present_style(style):
+    with pyplot.style.context(style):
+        for figure in (walker().plot("left hip.angle", "left foot.force"), ball().energy.plot()):
+            figure.draw_without_rendering()
+            paper = figure.get_facecolor()
+            assert (contrast(paper, "white") < 1.1) is (style == "default")
+            texts = [text for text in figure.findobj(Text) if text.get_text().strip() and text.get_visible()]
+            lines = [line for axes in figure.axes for line in axes.lines if line.get_alpha() is None]
+            assert len(texts) > 10 and lines
+            assert min(contrast(text.get_color(), paper) for text in texts) > 4.5
+            assert min(contrast(line.get_color(), paper) for line in lines) > 3.0
+
+
+def test_a_drawing_in_vectors_has_ink_for_light_and_for_dark_pages(tmp_path):
+    walker().plot("left hip.angle", "left foot.force", path=tmp_path / "plot.svg")
+    picture = (tmp_path / "plot.svg").read_text(encoding="utf-8")
+    rules = dict(re.findall(r'\[style\*="fill: (#\w+)"\]\{fill:(#\w+) !important\}', picture))
+    assert "prefers-color-scheme: dark" in picture and rules
+    inks = set(re.findall(r"(?:fill|stroke): (#\w+)", picture.partition("</style>")[2]))
+    assert INK.lower() in inks and "#000000" not in inks
+    on_dark = {rules.get(ink, ink) for ink in inks} - {PALE.lower(), DARK[PALE].lower()}
+    assert min(contrast(ink, DARK[PAPER]) for ink in on_dark) > 3.0
+    walker().plot("left hip.angle", "left foot.force", path=tmp_path / "again.svg")
+    assert (tmp_path / "again.svg").read_text(encoding="utf-8") == picture

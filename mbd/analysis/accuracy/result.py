@@ -25,6 +25,9 @@ HEADS = (
 )  # fmt: skip
 """Columns of the table."""
 
+LEFT_OUT = ("tangents", "residuals", "factored", "drift")
+"""Columns for which a notebook has no room."""
+
 MAPPINGS = ("errors", "end_errors")
 """Fields of a point that have a value for each quantity."""
 
@@ -98,15 +101,12 @@ class Accuracy(Rows):
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:
-        rows = [[*cells(point), remark(point)] for point in self.points if not point.failure]
+        kept = [k for k, head in enumerate(HEADS) if head not in LEFT_OUT]
+        rows = [[cells(point)[k] for k in kept] for point in self.points if not point.failure]
         failed = [f"{each.scheme} with {each.setting} failed: {each.failure}" for each in self.points if each.failure]
         over = "their published values" if self.is_published else "their ranges"
-        shown = table(
-            f"accuracy of {self.model!r}: largest errors over {over}",
-            (*HEADS, "remark"),
-            rows,
-            f"reference: {self.origin}",
-        )
+        title = f"accuracy of {self.model!r}: largest errors over {over}"
+        shown = table(title, [HEADS[k] for k in kept], rows, f"reference: {self.origin}")
         return shown + paragraphs([*failed, *(f"note: {note}" for note in self.notes), *self.recommendation])
 
     # tables ---------------------------------------------------------------------------------------------------------
