@@ -130,10 +130,14 @@ class NewmarkFamily(Integrator):
         return None
 
     def local_error(self, old: NewmarkMemory, new: NewmarkMemory, dt: float) -> Vector:
-        """``dt² (1/6 − β − (α_m − α_f)/2) (a₁ − a₀)`` of x; of (v, z) ``dt²/12`` times the change of slope."""
+        """``dt² (1/6 − β − (α_m − α_f)/2) (a₁ − a₀)`` of x; of (v, z) ``dt²/12`` times the change of slope.
+
+        Where positions do not add, ``ẋ = v`` leaves ``dt (ẋ₁ − v₁)/3`` of x as well.
+        """
         c, n_v = self.coefficients, len(new.shift)
         a0 = old.rate + dt / old.step * (old.aux - old.rate)
         x = dt * dt * (1.0 / 6.0 - c.beta - 0.5 * (c.alpha_m - c.alpha_f)) * (new.aux - a0)[:n_v]
+        x = x + dt / 3.0 * new.drift
         return np.concatenate([x, dt * dt / 12.0 * ((new.rate - old.rate) / dt - old.slope)])
 
     def start(self, system: System, state: State, mode: Mode, dt: float) -> NewmarkMemory:

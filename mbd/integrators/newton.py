@@ -12,7 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from mbd.arrays import Vector
-from mbd.integrators.base import Point, StepReport, StepResult, System, Terms, composed
+from mbd.integrators.base import Point, StepReport, StepResult, System, Terms, completed, composed
 from mbd.integrators.coefficients import Coefficients
 from mbd.integrators.singular import CONTINUOUS, WHOLE, WITHIN, Distance, distance_to_singularity
 from mbd.kernel.codes import LEFT, PASSING
@@ -36,7 +36,8 @@ class NewmarkMemory:
     rate (n,) true v̇ and ż; aux (n,) the auxiliary a for steps of size `step`; lam (m,) multipliers;
     slope, lam_slope: their last rates of change, which predict the next step; shift (n_v,) the position correction and
     shift_change what it changed by in the last step; near 1 within a few steps of a singular configuration, and 2
-    just beyond it, where the scheme is started again; whole: the dt that steps have unless they must not [s].
+    just beyond it, where the scheme is started again; whole: the dt that steps have unless they must not [s]; drift
+    (n_v,) ẋ − v at the end of the last step, in its chart: zero where positions add.
     """
 
     rate: Vector
@@ -49,6 +50,7 @@ class NewmarkMemory:
     step: float
     near: int = 0
     whole: float = 0.0
+    drift: Vector | float = 0.0
 
 
 class NewmarkScheme(Protocol):
@@ -258,6 +260,11 @@ class Step:
             return 0.0
         return 1.0 if np.any(self.memory.shift_change) else 0.5
 
+    def _drift(self) -> Vector | float:
+        """ẋ − v at the end of the step."""
+        system, v = completed(self.system), self.y[: self.n_v]
+        return 0.0 if system.is_vector else system.increment_rates(self.x, v) - v
+
     def _result(self, t1: float, report: StepReport) -> StepResult:
         if not report.converged:
             return StepResult(self.state, self.memory, report)
@@ -273,6 +280,7 @@ class Step:
             dt,
             self.near,
             memory.whole,
+            self._drift(),
         )
         old = self.state
         state = State(
