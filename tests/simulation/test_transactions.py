@@ -237,6 +237,8 @@ def test_a_replay_shows_every_iteration_by_name():
     replayed = mbd.replay(failure)
     counts = [len(one.iterations) for one in replayed.tries]
     assert len(counts) == 6 and min(counts) == max(counts) > 10, "a full step and five shortened ones"
+    assert sum(counts) == failure.iterations, "an iterate for each correction, whose halves are none of their own"
+    assert any(iterate.halvings for one in replayed.tries for iterate in one.iterations)
     sizes = [(one.time - failure.time) / failure.dt for one in replayed.tries]
     np.testing.assert_allclose(sizes, 0.6180339887498949 ** np.arange(6), rtol=1e-9)
 

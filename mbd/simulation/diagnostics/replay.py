@@ -32,16 +32,23 @@ SHOWN = 10
 
 @dataclass(frozen=True)
 class Iteration:
-    """What is left of the balance and of the rows at an iterate, by name; empty where it was not evaluated."""
+    """What is left of the balance and of the rows at an iterate, by name; empty where it was not evaluated.
+
+    halvings : how often the correction that led here was halved, as the residual had grown
+    """
 
     balance: Mapping[str, float]
     rows: Mapping[str, float]
     rates: Mapping[str, float]
+    halvings: int = 0
 
 
 @dataclass(frozen=True)
 class Try:
-    """Newton's iteration for a step to `time`; a failing step is tried several times, shortened."""
+    """Newton's iteration for a step to `time`; a failing step is tried several times, shortened.
+
+    From each iterate but one that converged a correction was made: those of all tries are `Failure.iterations`.
+    """
 
     time: float
     iterations: tuple[Iteration, ...]
@@ -93,7 +100,8 @@ def _line(iteration: Iteration) -> str:
         if block:
             name, value = max(block.items(), key=lambda item: abs(item[1]) if math.isfinite(item[1]) else math.inf)
             parts.append(f"{title} {value:10.3g} ({name})")
-    return "   ".join(parts)
+    halved = f"   after {iteration.halvings} halvings" if iteration.halvings else ""
+    return "   ".join(parts) + halved
 
 
 def replay(
@@ -141,8 +149,10 @@ def replay(
     run, _ = _prepared(capsule, capsule.state, model, scheme, step, count)
     trajectory, problem = run.complete()
     again, seen = _prepared(capsule, trajectory.final if problem else capsule.state, model, scheme, step, 1)
-    if again.stepper.compiled:
+    if again.stepper.compiled:  # interpreted, with the programs and so the decisions of machine code
         again.stepper.compiled, again.stepper.scheme = False, KernelScheme(again.stepper.own)
+    if isinstance(again.stepper.scheme, KernelScheme):
+        seen.counts = again.kernel
     again.march()
     same = bool(problem) and problem == capsule.message
     return Replay(capsule, not problem, same, trajectory.message, seen.tries(again), trajectory)
@@ -172,7 +182,9 @@ class _Watched:
 
     def __init__(self, mechanism: Mechanism) -> None:
         self._mechanism = mechanism
-        self._seen: list[tuple[float, float, tuple[int, ...], Vector]] = []
+        self.counts: Any = None  # the kernel that counts corrections as they are made
+        self._seen: list[_Noted] = []
+        self._last: Vector | None = None  # the inputs evaluated last
         self._codes: dict[Any, ModeCode] = {}
 
     def __getattr__(self, name: str) -> Any:
@@ -197,32 +209,62 @@ class _Watched:
             code, stabilized = make(*mode), mode[2]
             n, m = self._mechanism.layout.n, len(code.rows)
             kept = n + (2 if stabilized else 1) * m
-            tangent = _Seen(code.tangent, self._seen, code.rows, (n + m) ** 2, kept)
-            residual = _Seen(code.residual, self._seen, code.rows, 0, kept)
-            first = None if code.correction is None else _Seen(code.correction, self._seen, code.rows, 0, kept)
+            tangent = _Seen(code.tangent, self.note, code.rows, (n + m) ** 2, kept)
+            residual = _Seen(code.residual, self.note, code.rows, 0, kept)
+            first = None if code.correction is None else _Seen(code.correction, self.note, code.rows, 0, kept)
             self._codes[key] = replace(code, tangent=tangent, residual=residual, correction=first)
         return self._codes[key]
+
+    def note(self, block: Vector, rows: tuple[int, ...], residual: Vector) -> None:
+        """An evaluation at an iterate, once; where corrections are counted, the last one before the next of them."""
+        before, self._last = self._last, block.copy()
+        if before is not None and np.array_equal(before, block, equal_nan=True):
+            return
+        made = -1 if self.counts is None else int(self.counts.n_iterations)
+        noted = _Noted(float(block[0]), float(block[2]), rows, made, residual)
+        known = self._seen[-1] if self._seen else None
+        if known is not None and made >= 0 and known.step == noted.step and known.corrections == made:
+            noted.halvings = known.halvings + 1
+            self._seen.pop()
+        self._seen.append(noted)
 
     def tries(self, run: Run) -> tuple[Try, ...]:
         """What was seen, step by step."""
         found: list[tuple[tuple[float, float], list[Iteration]]] = []
         n = self._mechanism.layout.n
-        for time, factor, rows, residual in self._seen:
-            names, m = residual_names(run.stepper, rows), len(rows)
+        for one in self._seen:
+            names, m = residual_names(run.stepper, one.rows), len(one.rows)
             parts = (slice(0, n), slice(n, n + m), slice(n + m, n + 2 * m))
-            iteration = Iteration(*(dict(zip(names[part], residual[part].tolist(), strict=False)) for part in parts))
-            if not found or found[-1][0] != (time, factor):
-                found.append(((time, factor), []))
-            found[-1][1].append(iteration)
+            balance, held, rates = (dict(zip(names[part], one.residual[part].tolist(), strict=False)) for part in parts)
+            if not found or found[-1][0] != (one.time, one.factor):
+                found.append(((one.time, one.factor), []))
+            found[-1][1].append(Iteration(balance, held, rates, one.halvings))
         return tuple(Try(key[0], tuple(iterations)) for key, iterations in found)
+
+
+@dataclass
+class _Noted:
+    """An evaluation within a step: to which time, with which ∂q/∂v̇, after how many corrections in all (−1: unknown)."""
+
+    time: float
+    factor: float
+    rows: tuple[int, ...]
+    corrections: int
+    residual: Vector
+    halvings: int = 0
+
+    @property
+    def step(self) -> tuple[float, float, tuple[int, ...]]:
+        """What tells one try from another."""
+        return self.time, self.factor, self.rows
 
 
 class _Seen:
     """A program whose residuals are noted; `factor` (∂q/∂v̇) is positive in the iterations of a step only."""
 
-    def __init__(self, program: Any, seen: list[Any], rows: tuple[int, ...], place: int, kept: int) -> None:
+    def __init__(self, program: Any, note: Any, rows: tuple[int, ...], place: int, kept: int) -> None:
         self.program = program
-        self._seen, self._rows, self._place, self._kept = seen, rows, place, kept
+        self._note, self._rows, self._place, self._kept = note, rows, place, kept
 
     @property
     def address(self) -> int:
@@ -232,8 +274,4 @@ class _Seen:
     def __call__(self, block: Any, parameters: Any, out: Any) -> None:
         self.program(block, parameters, out)
         if block[2] > 0.0:
-            residual = np.array(out[self._place : self._place + self._kept])
-            noted = (float(block[0]), float(block[2]), self._rows, residual)
-            known = self._seen[-1] if self._seen else None
-            if known is None or known[:3] != noted[:3] or not np.array_equal(known[3], residual, equal_nan=True):
-                self._seen.append(noted)  # one iterate may be evaluated twice
+            self._note(block, self._rows, np.array(out[self._place : self._place + self._kept]))

@@ -84,6 +84,7 @@ class Stepper:
     ) -> None:
         self.mechanism, self.manager, self.integrator = mechanism, manager, integrator
         self.compiled = is_compiled(mechanism, integrator)
+        self.straight = self.compiled  # with straight-line code for factors, which machine code alone is worth
         self.own = own_scheme(integrator)
         self.stabilized = integrator.stabilized
         layout = mechanism.layout
@@ -240,8 +241,8 @@ class Stepper:
 
     def _maker(self) -> Any:
         """What makes the code of a mode, no more of it than the scheme calls."""
-        straight = self.own.programs == "stepping"  # code for factors that machine code alone is worth
-        return getattr(self.mechanism, "mode" if straight and not self.compiled else self.own.programs)
+        plain = self.own.programs == "stepping" and not self.straight
+        return getattr(self.mechanism, "mode" if plain else self.own.programs)
 
     @property
     def provisional(self) -> bool:
