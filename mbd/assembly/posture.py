@@ -23,6 +23,8 @@ REFINEMENTS = 3
 """Solutions of the linear equations for velocities: bodies without mass leave an error in the first [-]."""
 ACTS = 1e-14
 """Derivative [m/rad, -] of a row below which a coordinate does not act on it: what cancellation leaves of zero."""
+PATIENCE = 20
+"""Steps of Newton's method in which the largest residual of a start must come down to half [-]."""
 NUDGE, NUDGES = 0.01, 3
 """Step [m, rad] out of a flat spot of the rows, and how often it is tried."""
 AWAY = 0.2
@@ -165,9 +167,13 @@ def move(work: Posture, x: Vector) -> None:
 
 
 def _newton(work: Posture, rows: Sequence[int], free: Matrix, start: Vector) -> Vector:
-    """Newton on the free coordinates, close to `start` at the end; the remaining residual of each row."""
+    """Newton on the free coordinates, close to `start` at the end; the remaining residual of each row.
+
+    What has not come down to half in `PATIENCE` steps goes on without the pull to `start`, and then is given up.
+    """
     n_v = work.equations.n_v
     before, picked = np.inf, list(rows)
+    least, since, astray = np.inf, 0, False
     for iteration in range(200):
         work.iterations += 1
         terms = work.mechanism.acceleration_terms(work.time, work.q, work.y, work.parameters, work.anchors)
@@ -185,8 +191,12 @@ def _newton(work: Posture, rows: Sequence[int], free: Matrix, start: Vector) -> 
             return h
         B = B[:, places]
         M = terms.M[:n_v, :n_v][np.ix_(places, places)]
-        near = size < 1e-3 or iteration > 20
-        near = near and iteration < 100
+        least, since = (size, 0) if size < 0.5 * least else (least, since + 1)
+        if since > PATIENCE and size > TOLERANCE:
+            if astray:
+                return h
+            least, since, astray = np.inf, 0, True
+        near = (size < 1e-3 or iteration > 20) and not astray and iteration < 100
         pull = work.equations.configuration.difference(work.q, start)[places] if near else np.zeros(len(places))
         change = _least_change(M, B, h, pull)
         limit = max(1.0, float(np.max(np.abs(change))) / 0.5)
