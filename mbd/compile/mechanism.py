@@ -20,8 +20,8 @@ from mbd.compile.python import ArrayFunction, array_function
 from mbd.equations import programs
 from mbd.equations.charts import chart_end, chart_motion
 from mbd.equations.equations import Equations
-from mbd.equations.sizes import require_room_for_tangent
-from mbd.errors import UnknownNameError, nearest
+from mbd.equations.sizes import require_room_for_tangent, tangent_refused
+from mbd.errors import MemoryLimitError, UnknownNameError, nearest
 from mbd.tape.node import Node
 
 __all__ = ["AccelerationTerms", "Mechanism", "ModeCode", "rate_names"]
@@ -164,10 +164,11 @@ class Mechanism:
                 started, number, n, m = perf_counter(), len(self._modes), self.layout.n, len(rows)
                 tail = n + (2 if stabilized else 1) * m
                 size = (n + m) ** 2 + tail + (m * self.layout.n_v if stabilized else 0)
-                tangent = self._later(mode, number, size, tangent=programs.newton)
+                tangent = self._later(mode, number, size, tangent=self._newton)
                 residual = self._later(mode, number, tail, residual=programs.residual)
                 order = None
-                if may_pay(self._accelerations, n, self.layout.n_rows, sorted(rows)):  # its pattern is that of both
+                pays = may_pay(self._accelerations, n, self.layout.n_rows, sorted(rows))
+                if pays and not tangent_refused(len(self.equations.tape.nodes)):  # whose pattern is that of both
                     outputs = programs.newton(self.equations, rows, penalties, stabilized, sliding, given_rows)
                     order = self._order(outputs, rows)
                 self._modes[key] = ModeCode(*mode[:3], tangent, residual, given_rows=mode[3], order=order)
@@ -176,6 +177,7 @@ class Mechanism:
 
     def _straight(self, mode: Any) -> ModeCode | None:
         """A mode with factors, None where they do not pay."""
+        require_room_for_tangent(len(self.equations.tape.nodes))
         started, number = perf_counter(), len(self._modes)
         rows, penalties, sliding, _, stabilized = mode
         found = programs.correction(self.equations, rows, penalties, stabilized, sliding)
@@ -187,8 +189,15 @@ class Mechanism:
             mode, number, residual=programs.residual, correction=lambda *_: outputs, solution=lambda *_: solution
         )
         size = (self.layout.n + len(rows)) ** 2 + found.tail
-        tangent = self._later(mode, number, size, tangent=programs.newton)
+        tangent = self._later(mode, number, size, tangent=self._newton)
         return ModeCode(rows, penalties, sliding, tangent, residual, first, again)
+
+    def _newton(self, equations: Equations, *mode: Any) -> Sequence[Node]:
+        """`programs.newton` within a run, which ends in order where it does not fit into the memory that is free."""
+        refused = tangent_refused(len(equations.tape.nodes))
+        if refused:
+            raise MemoryLimitError(f"a step needs the tangent as a matrix: {refused}")
+        return programs.newton(equations, *mode)
 
     def _later(self, mode: Any, number: int, size: int, **maker: Callable[..., Sequence[Node]]) -> Postponed:
         """A program of a mode, of so many outputs, that is compiled when it is called first."""

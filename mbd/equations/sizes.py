@@ -10,7 +10,7 @@ from mbd.errors import ModelError
 from mbd.free_memory import available, size_in_words
 from mbd.topology.plan import Plan
 
-__all__ = ["operations", "require_room", "require_room_for_tangent"]
+__all__ = ["operations", "require_room", "require_room_for_tangent", "tangent_refused"]
 
 OF_PAIR = {True: 10.0, False: 40.0}
 """Operations for each pair of coordinates on one path, of planar and of spatial models [-]."""
@@ -62,6 +62,20 @@ def require_room(plan: Plan) -> None:
     )
 
 
+def tangent_refused(derived: int) -> str:
+    """Why Newton's matrix of `derived` operations is not derived: the free memory, what to try; '' where it fits."""
+    if derived < LARGE:
+        return ""
+    needed, free = BYTES_OF_TANGENT * derived, available()
+    if needed <= free:
+        return ""
+    return (
+        f"the equations take {derived:.2g} operations: the tangent of implicit steps needs at least "
+        f"{size_in_words(needed)}, and {size_in_words(free)} of memory is free; use mbd.RungeKutta853(), which "
+        "needs none, describe fewer bodies, branches in place of one long chain, or cut='all'"
+    )
+
+
 def require_room_for_tangent(derived: int) -> None:
     """Refuse Newton's matrix of `derived` operations where it would not fit into the memory that is free.
 
@@ -70,12 +84,6 @@ def require_room_for_tangent(derived: int) -> None:
     ModelError
         with the memory foretold, and what to try.
     """
-    if derived < LARGE:
-        return
-    needed, free = BYTES_OF_TANGENT * derived, available()
-    if needed > free:
-        raise ModelError(
-            f"the equations take {derived:.2g} operations: the tangent of implicit steps needs at least "
-            f"{size_in_words(needed)}, and {size_in_words(free)} of memory is free; use mbd.RungeKutta853(), which "
-            "needs none, describe fewer bodies, branches in place of one long chain, or cut='all'"
-        )
+    refused = tangent_refused(derived)
+    if refused:
+        raise ModelError(refused)

@@ -8,8 +8,9 @@ import pytest
 import mbd
 from mbd.assembly import foreseen
 from mbd.compile.mechanisms import mechanism_of
-from mbd.equations import sizes
+from mbd.equations import programs, sizes
 from mbd.topology.plan import plan
+from tests.simulation.test_transactions import stiff
 
 
 def chain(count, axis=(0.0, 0.0, 1.0), spread=1, **more):
@@ -51,8 +52,9 @@ def test_chains_of_usual_length_ask_for_no_memory(monkeypatch):
     sizes.require_room(plan(chain(200)))
 
 
-def test_implicit_steps_whose_tangent_does_not_fit_are_refused_before_it_is_derived(monkeypatch):
-    model = chain(25)
+@pytest.mark.parametrize("count", [6, 25], ids=["factors in straight-line code", "factors in loops"])
+def test_implicit_steps_whose_tangent_does_not_fit_are_refused_before_it_is_derived(monkeypatch, count):
+    model = chain(count)
     start = mbd.assemble(model)
     derived = len(mechanism_of(model).equations.tape.nodes)
     monkeypatch.setattr(sizes, "LARGE", 1e3)
@@ -61,3 +63,43 @@ def test_implicit_steps_whose_tangent_does_not_fit_are_refused_before_it_is_deri
         mbd.simulate(model, start, mbd.HHT(0.05), dt=1e-3, until=0.01)
     assert len(mechanism_of(model).equations.tape.nodes) == derived
     assert mbd.simulate(model, start, mbd.RungeKutta853(), dt=1e-3, until=0.01).success
+
+
+def test_explicit_steps_derive_no_tangent_that_does_not_fit(monkeypatch):
+    """Not even for an order of elimination, which would pay for chains beside each other."""
+    model = chain(24, spread=4)
+    start = mbd.assemble(model)
+    monkeypatch.setattr(sizes, "LARGE", 1e3)
+    monkeypatch.setattr(sizes, "available", lambda: 1.0)
+    monkeypatch.setattr(programs, "newton", lambda *_: pytest.fail("it needs none"))
+    assert mbd.simulate(model, start, mbd.RungeKutta853(), dt=1e-3, until=0.005).success
+
+
+@pytest.mark.parametrize("backend", ["llvm", "python"])
+def test_a_tangent_that_a_run_needs_late_ends_it_with_what_it_has(monkeypatch, backend):
+    """Factors in straight-line code suffice until a wall is met; plain Python has none, and is told at once."""
+    model, start = stiff(backend)
+    rooms = iter([1e12])
+    monkeypatch.setattr(sizes, "LARGE", 0.0)
+    monkeypatch.setattr(sizes, "available", lambda: next(rooms, 1.0))
+    if backend == "python":
+        next(rooms)
+        with pytest.raises(mbd.ModelError, match="tangent of implicit steps needs"):
+            mbd.simulate(model, start, mbd.HHT(0.05), dt=0.01, until=1.0, backend=backend)
+        return
+    with pytest.raises(mbd.MemoryLimitError, match="needs the tangent as a matrix.* MB of memory is free") as told:
+        mbd.simulate(model, start, mbd.HHT(0.05), dt=0.01, until=1.0, backend=backend)
+    assert told.value.run.time[-1] == pytest.approx(0.5)
+
+
+def test_a_contact_that_closes_without_room_for_its_tangent_ends_the_run_with_what_it_has(monkeypatch):
+    model, body = mbd.Model("ball"), mbd.PointMass("ball", mass=1.0)
+    model.connect(mbd.Translation("flight", model.ground.origin, body.origin))
+    model.constrain(mbd.Unilateral("floor", mbd.touchdown(body.origin)))
+    start = mbd.assemble(model, {"flight.y": 0.1})
+    rooms = iter([1e12])
+    monkeypatch.setattr(sizes, "LARGE", 0.0)
+    monkeypatch.setattr(sizes, "available", lambda: next(rooms, 1.0))
+    with pytest.raises(mbd.MemoryLimitError, match="tangent of implicit steps needs") as told:
+        mbd.simulate(model, start, mbd.HHT(0.05), dt=0.01, until=1.0)
+    assert 0.13 < told.value.run.time[-1] < 0.15

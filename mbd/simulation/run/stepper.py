@@ -12,7 +12,7 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.compile.mechanism import Mechanism
 from mbd.equations.equations import Equations
-from mbd.errors import CapabilityError, nearest
+from mbd.errors import CapabilityError, MemoryLimitError, ModelError, nearest
 from mbd.integrators.base import CompiledIntegrator, Integrator
 from mbd.integrators.newton import MAX_ITERATIONS
 from mbd.kernel import codes
@@ -217,7 +217,12 @@ class Stepper:
         sliding = tuple(int(f) for f in np.flatnonzero(slip))
         given_rows = tuple(row for row in held if dropped[row]) if sliding else ()
         make = self._maker()
-        code = make(rows, self.manager.penalties(flags), self.stabilized, sliding, given_rows)
+        try:
+            code = make(rows, self.manager.penalties(flags), self.stabilized, sliding, given_rows)
+        except ModelError as refused:
+            if int(v.n_steps) == 0:
+                raise
+            raise MemoryLimitError(f"t = {float(v.time):.9g} s: {refused}") from refused  # what has run is kept
         count, width = int(v.n_modes), v.n_contacts + v.n_rows + v.n_frictions
         phases = np.where(sticks == 1, 2, slip != 0.0)
         if PROGRAMS * (count + 1) > len(v.mode_code):
