@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
+from weakref import ReferenceType, WeakKeyDictionary, ref
 
 import numpy as np
 
 from mbd.arrays import Vector
-from mbd.errors import UnknownNameError, nearest
+from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.notebook import table
 
-__all__ = ["Memory", "Mode", "State", "are_names", "malformed"]
+__all__ = ["Memory", "Mode", "State", "are_names", "malformed", "of_model"]
 
 
 def _empty() -> Vector:
@@ -128,6 +130,35 @@ class State:
             lines.append(f"  assembly moved {len(self.moved)} of these; farthest {far[0]!r} by {far[1]:.3g}")
         return "\n".join(lines)
 
+    def plot(self, path: str | Path | None = None, model: Any = None) -> Any:
+        """The mechanism at this state, drawn as on the page: bodies, joints, named points, the ground of contacts.
+
+        A spatial mechanism is seen from the side and a little from above, with gravity down the page. Needs no
+        display.
+
+        Parameters
+        ----------
+        path : file to save the picture in, such as 'start.png' or 'start.svg'
+        model : of which it is a state; a state that was assembled, projected or the end of a run knows it, one made or
+            changed by hand, copied or read from a file does not
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+
+        Raises
+        ------
+        ModelError
+            without a model, for a state that is none of the model, and for a mechanism without bodies.
+        """
+        from mbd.view.posture import drawn
+
+        known = _MODELS.get(self)
+        of = model if model is not None else known() if known is not None else None
+        if of is None:
+            raise ModelError("this state does not know its model any more: give it, as in state.plot(model=model)")
+        return drawn(of, self, path)
+
     def _repr_html_(self) -> str:
         from mbd.results.units import unit_of
 
@@ -138,6 +169,16 @@ class State:
             for name, value in zip(names, values, strict=False)
         ]
         return table(title, ("coordinate or rate", "value", "unit"), rows)
+
+
+_MODELS: WeakKeyDictionary[State, ReferenceType[Any]] = WeakKeyDictionary()
+"""The models of states, of which neither keeps the other."""
+
+
+def of_model(state: State, model: Any) -> State:
+    """The state, which knows its model from now on as long as the model is there."""
+    _MODELS[state] = ref(model)
+    return state
 
 
 def malformed(state: State) -> list[str]:

@@ -43,7 +43,7 @@ RANKS = [
 RANK = {part: rank for rank, parts in enumerate(RANKS) for part in parts}
 
 DOORS = {
-    "state": ("results.units",),
+    "state": ("results.units", "view"),
     "trajectory": ("view",),
     "results.ledger": ("view",),
     "analysis.accuracy.result": ("view",),

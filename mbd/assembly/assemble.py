@@ -34,7 +34,7 @@ from mbd.compile.mechanisms import mechanism_of
 from mbd.equations.equations import Equations
 from mbd.errors import AssemblyError, ModelError, UnknownNameError, nearest
 from mbd.notes import doubt
-from mbd.state import State
+from mbd.state import State, of_model
 
 __all__ = ["assemble"]
 
@@ -127,11 +127,12 @@ def assemble(
         raise AssemblyError(bad)
     name_wrapped(work)
     doubt(*doubtful(model, equations, position or {}), of=model)
-    return State(
+    assembled = State(
         0.0, work.q, work.y[: equations.n_v].copy(), work.y[equations.n_v :].copy(), manager.mode(work.flags),
         _armed(work, set(opened)), work.anchors, tuple(coordinate.name for coordinate in equations.coordinates),
         equations.velocity_names, _moved(work, q, y, named), changed,
     )  # fmt: skip
+    return of_model(assembled, model)
 
 
 @dataclass(frozen=True)

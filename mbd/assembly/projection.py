@@ -15,7 +15,7 @@ from mbd.assembly.orientation import reversed_joints
 from mbd.assembly.posture import TOLERANCE, Posture, capture, close_nearby, close_velocities, position_rows
 from mbd.assembly.turns import keep_wrapped
 from mbd.errors import AssemblyError
-from mbd.state import State
+from mbd.state import State, of_model
 
 __all__ = ["project"]
 
@@ -71,10 +71,11 @@ def project(model: Any, state: State, parameters: Mapping[str, float] | None = N
     moved = _moved(equations.coordinates, work.q - q) | _moved(
         equations.velocity_names, work.y[: equations.n_v] - y[: equations.n_v]
     )
-    return replace(
+    nearest = replace(
         state, q=work.q, v=work.y[: equations.n_v].copy(), z=work.y[equations.n_v :].copy(), anchors=work.anchors,
         moved=moved, parameters=given.changed, memory=None,
     )  # fmt: skip
+    return of_model(nearest, model)
 
 
 def _close(work: Posture) -> None:

@@ -30,7 +30,7 @@ from mbd.simulation.tolerance.calibrate import calibrated, first_allowed
 from mbd.simulation.tolerance.judged import judged
 from mbd.simulation.tolerance.search import LARGEST
 from mbd.simulation.tolerance.trials import Trial
-from mbd.state import State
+from mbd.state import State, of_model
 from mbd.trajectory import Trajectory
 
 __all__ = ["prepared", "simulate"]
@@ -126,6 +126,7 @@ def simulate(
         model, start, scheme, until, changed, options, observers, "late" if by_user and progress is None else progress
     )
     run, trajectory, problem = motion.run(dt) if dt is not None else motion.to_tolerance(float(tol or 0.0), tol_of)
+    of_model(trajectory.final, model)
     if by_user:
         _tell(trajectory)
     if problem and on_failure == "raise":

@@ -1,0 +1,148 @@
+"""The mechanism at one state, drawn with matplotlib as the page draws it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mbd.arrays import Matrix
+from mbd.bodies.ground import Ground
+from mbd.compile.mechanisms import mechanism_of
+from mbd.errors import ModelError
+from mbd.results.record import Record
+from mbd.state import State, malformed
+from mbd.trajectory import Trajectory
+from mbd.view.plots import drawing
+from mbd.view.scene import Scene, scene, upright
+from mbd.view.style import NEUTRAL, as_label, color
+
+__all__ = ["drawn", "instant"]
+
+YAW, PITCH = -0.6, 0.42
+"""From where a spatial mechanism is seen, as the page shows it first [rad]."""
+
+SOIL = "#B9C0C9"
+
+ROOM = 0.62
+"""Half of the side of the picture, over the larger side of the mechanism [-]."""
+
+
+def instant(model: Any, state: State) -> Trajectory:
+    """A run of one row: the state, without forces.
+
+    Raises
+    ------
+    ModelError
+        for a state that is none of this model.
+    """
+    faults = malformed(state)
+    if faults:
+        raise ModelError(faults)
+    mechanism = mechanism_of(model, changed=state.parameters)
+    equations = mechanism.equations
+    sizes = {"q": (len(state.q), equations.n_q), "v": (len(state.v), equations.n_v), "z": (len(state.z), equations.n_z)}
+    wrong = [
+        f"{name} has {came} numbers, {wanted} are expected" for name, (came, wanted) in sizes.items() if came != wanted
+    ]
+    if wrong:
+        raise ModelError(f"this state is none of '{equations.name}': {'; '.join(wrong)}")
+    values = mechanism.parameters(dict(state.parameters), getattr(model, "parameters", {}))
+    n_v, n_z = equations.n_v, equations.n_z
+    closed = np.array([[contact.name in state.mode.closed for contact in equations.contacts]], dtype=np.uint8)
+    return Trajectory(
+        Record(
+            equations, values, [parameter.name for parameter in equations.parameters], np.array([float(state.time)]),
+            np.array([state.q], dtype=float), np.array([state.v], dtype=float).reshape(1, n_v),
+            np.array([state.z], dtype=float).reshape(1, n_z), np.zeros((1, n_v)), np.zeros((1, n_z)),
+            np.zeros((1, len(equations.rows))), closed.reshape(1, len(equations.contacts)), start=state,
+            phase=np.zeros((1, len(equations.frictions)), dtype=np.int8),
+        )
+    )  # fmt: skip
+
+
+def drawn(model: Any, state: State, path: str | Path | None = None) -> Any:
+    """The picture of a state; see `State.plot`."""
+    run = instant(model, state)
+    picture = scene(run, 1)
+    if not picture.points:
+        raise ModelError(f"'{run.name}' has no bodies to draw")
+    places = picture.positions[0] @ _view(picture).T
+    low, high = places.min(axis=0), places.max(axis=0)
+    size = float(np.max(high - low)) or 1.0
+    left, below = (low + high) / 2.0 - ROOM * size
+    right, above = (low + high) / 2.0 + ROOM * size
+    with drawing(path, 5.6, 5.6) as figure:
+        axes = figure.subplots()
+        _ground(axes, picture, left, right)
+        _pivots(axes, model, run, picture)
+        _bodies(axes, picture, places)
+        _markers(axes, picture, places)
+        axes.set(aspect="equal", xlim=(left, right), ylim=(below, above))
+        axes.set_xlabel("[m]")
+        axes.set_ylabel("[m]")
+        closed = ", ".join(sorted(state.mode.closed))
+        title = f"{run.name}, t = {state.time:g} s" + (f", closed: {closed}" if closed else "")
+        axes.set_title(as_label(title))
+    return axes
+
+
+def _view(picture: Scene) -> Matrix:
+    """From the axes of the scene to the page (2, 3): x and y, or seen from the side and from above."""
+    if not picture.spatial:
+        return np.eye(3)[:2]
+    cy, sy, cp, sp = np.cos(YAW), np.sin(YAW), np.cos(PITCH), np.sin(PITCH)
+    return np.array([[cy, 0.0, sy], [sp * sy, cp, -sp * cy]])
+
+
+def _ground(axes: Any, picture: Scene, left: float, right: float) -> None:
+    """Planes that contacts touch, as lines; of a spatial mechanism none."""
+    for ground in () if picture.spatial else picture.grounds:
+        normal = ground.normal[:2]
+        if abs(normal[1]) > 1e-9:
+            x = np.array([left, right])
+            axes.plot(x, (ground.offset - normal[0] * x) / normal[1], color=SOIL, lw=2.0, zorder=0)
+
+
+def _pivots(axes: Any, model: Any, run: Trajectory, picture: Scene) -> None:
+    """Where joints that only turn hold bodies to the ground."""
+    view, turn = _view(picture), upright(run)
+    for joint in model.joints:
+        frame = next((each for each in (joint.parent, joint.child) if isinstance(each.body, Ground)), None)
+        if frame is not None and joint.labels and all(label.unit == "rad" for label in joint.labels):
+            x, y = view @ turn @ run[frame.full_name][0]
+            axes.plot([x], [y], marker=6, markersize=13, color=SOIL, zorder=1)
+
+
+def _bodies(axes: Any, picture: Scene, places: Matrix) -> None:
+    """Lines through the frames of each body, joints as rings, single points as large as their mass."""
+    heaviest = max(picture.masses.values(), default=1.0)
+    for body, members in picture.segments:
+        shade, points = color(body), places[list(members)]
+        if len(points) == 1:
+            size = 5.0 + 8.0 * (picture.masses.get(body, 0.0) / heaviest) ** (1.0 / 3.0)
+            axes.plot(*points.T, "o", color=shade, markersize=size, zorder=3)
+            continue
+        if len(points) > 2:
+            axes.fill(*points.T, color=shade, alpha=0.18, lw=0.0, zorder=2)
+            points = np.vstack([points, points[:1]])
+        axes.plot(*points.T, color=shade, lw=4.0, zorder=2, solid_joinstyle="round")
+        axes.plot(*points.T, "o", color=shade, markerfacecolor="white", markersize=5.0, zorder=4)
+
+
+def _markers(axes: Any, picture: Scene, places: Matrix) -> None:
+    """Named points with their names."""
+    from matplotlib.patheffects import withStroke
+
+    figure = sorted({number for _, members in picture.segments for number in members} - set(picture.markers))
+    for number in picture.markers:
+        place, name = places[number], as_label(picture.points[number])
+        apart = [place - places[other] for other in figure] or [np.ones(2)]
+        nearest = min(apart, key=lambda d: float(np.hypot(*d)))  # the name stands on the other side
+        shift, side = (7.0, "left") if nearest[0] >= 0.0 else (-7.0, "right")
+        axes.plot(*place, ".", color=NEUTRAL, markersize=6.0, zorder=5)
+        axes.annotate(
+            name, place, (shift, 0.0), textcoords="offset points", va="center", ha=side, zorder=6,
+            path_effects=[withStroke(linewidth=3.0, foreground="white")],
+        )  # fmt: skip

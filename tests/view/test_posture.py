@@ -1,0 +1,87 @@
+"""Pictures of states: what they show lies where forward kinematics puts it, and they need no display."""
+
+from __future__ import annotations
+
+import dataclasses
+import gc
+
+import numpy as np
+import pytest
+
+import mbd
+from mbd.errors import ModelError
+from mbd.view.posture import instant
+from mbd.view.scene import scene
+
+pytest.importorskip("matplotlib")
+
+
+def leg() -> tuple[mbd.Model, mbd.State]:
+    model = mbd.Model("leg")
+    thigh = mbd.Link("thigh", mass=7.0, length=0.5, center=0.2, inertia=0.1)
+    shank = mbd.Link("shank", mass=3.0, length=0.4, center=0.2, inertia=0.05)
+    model.connect(mbd.Revolute("hip", model.ground.origin, thigh.start), mbd.Revolute("knee", thigh.end, shank.start))
+    model.constrain(mbd.Unilateral("foot", mbd.touchdown(shank.end, ground=mbd.Plane(offset=-1.0))))
+    mbd.Marker("heel", shank, (-0.05, -0.4))
+    return model, mbd.assemble(model, position={"hip.angle": 0.3, "knee.angle": -0.5})
+
+
+def test_a_picture_shows_the_bodies_where_they_are(tmp_path):
+    model, start = leg()
+    axes = start.plot(tmp_path / "start.svg")
+    drawn = np.concatenate([line.get_xydata() for line in axes.lines])
+    knee = 0.5 * np.array([np.sin(0.3), -np.cos(0.3)])
+    foot = knee + 0.4 * np.array([np.sin(-0.2), -np.cos(-0.2)])
+    for place in np.zeros(2), knee, foot:
+        assert np.min(np.abs(drawn - place).max(axis=1)) < 1e-12
+    assert [text.get_text() for text in axes.texts] == ["heel"] and "leg, t = 0 s" in axes.get_title(loc="left")
+    assert (tmp_path / "start.svg").stat().st_size > 1000
+    del model
+
+
+def test_the_picture_is_that_of_the_first_row_of_the_page():
+    model, start = leg()
+    run = mbd.simulate(model, start, dt=1e-2, until=0.02, backend="python")
+    page, picture = scene(run, 2), scene(instant(model, start), 1)
+    assert picture.points == page.points and picture.segments == page.segments
+    np.testing.assert_array_equal(picture.positions[0], page.positions[0])
+    np.testing.assert_allclose(scene(instant(model, run.final), 1).positions[0], page.positions[-1], atol=1e-12)
+    assert run.final.plot().get_title(loc="left") == "leg, t = 0.02 s"
+
+
+def test_closed_contacts_and_parameters_of_the_state_count(tmp_path):
+    model, _ = leg()
+    longer = mbd.assemble(model, closed=["foot"], position={"hip.angle": 0.3}, parameters={"shank.length": 0.6})
+    axes = longer.plot(tmp_path / "start.png")
+    assert "closed: foot" in axes.get_title(loc="left")
+    lowest = min(float(line.get_ydata().min()) for line in axes.lines)
+    np.testing.assert_allclose(lowest, -1.0, atol=1e-9)
+
+
+def test_a_spatial_mechanism_is_seen_from_the_side(tmp_path):
+    model = mbd.Model("pendulum")
+    rod = mbd.Link("rod", mass=1.0, length=1.0, center=0.5, inertia=(0.1, 0.01, 0.1))
+    model.connect(mbd.Universal("joint", model.ground.origin, rod.start, second_axis="x"))
+    axes = mbd.assemble(model, position={"joint.first": 0.3, "joint.second": 0.4}).plot(tmp_path / "start.png")
+    assert axes.get_aspect() == 1.0 and len(axes.lines) >= 2
+
+
+def test_a_state_without_its_model_asks_for_it(tmp_path):
+    model, start = leg()
+    moved = dataclasses.replace(start, q=start.q + 0.1)
+    with pytest.raises(ModelError, match=r"give it, as in state.plot\(model=model\)"):
+        moved.plot(tmp_path / "moved.png")
+    assert moved.plot(tmp_path / "moved.png", model=model) is not None
+    other, strange = leg()[0], mbd.State(0.0, np.zeros(3), np.zeros(2))
+    with pytest.raises(ModelError, match="this state is none of 'leg': q has 3 numbers, 2 are expected"):
+        strange.plot(tmp_path / "strange.png", model=other)
+    del model, other
+    gc.collect()
+    with pytest.raises(ModelError, match="does not know its model any more"):
+        start.plot(tmp_path / "start.png")
+
+
+def test_what_has_no_bodies_cannot_be_drawn():
+    ball = mbd.Lagrangian("ball", [mbd.Coordinate("y", unit="m")], lambda y_rate: 0.5 * y_rate * y_rate)
+    with pytest.raises(ModelError, match="'ball' has no bodies to draw"):
+        mbd.assemble(ball).plot()
