@@ -209,6 +209,25 @@ class Trajectory:
         """Name of the model."""
         return self.facts.model
 
+    def summary(self) -> str:
+        """The run in a few lines of text: what ran, how it ended, what it came to, energy, constraints, cost.
+
+        What it came to is said by these rules, and nothing where none holds:
+
+        - came to rest: over the last 5 % of the time the kinetic energy was below 10⁻⁶ of its largest of the run.
+        - fell: of a mechanism with contacts at places of its bodies, and no other point that stays where it is, the
+          height (of the highest point of the figure over the lowest, along gravity) is at the end below half of that
+          at the start.
+        - walks: it did not fall, it has three steps at least (`mbd.analysis.gait`: touchdowns of one foot after the
+          other), and its last touchdown is at least half as far from the first as the way from one to the next.
+        - in motion: none of these.
+
+        Contacts that are closed at the end are named. Of runs that fail the message says why.
+        """
+        from mbd.analysis.ending import summary
+
+        return summary(self)
+
     # pictures and files -----------------------------------------------------------------------------------------
     def plot(self, *names: str, path: str | Path | None = None, degrees: bool = True) -> Any:
         """Time histories, one panel per kind of quantity, with the events marked and times of contact shaded.

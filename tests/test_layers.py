@@ -44,7 +44,7 @@ RANK = {part: rank for rank, parts in enumerate(RANKS) for part in parts}
 
 DOORS = {
     "state": ("results.units", "view"),
-    "trajectory": ("view",),
+    "trajectory": ("analysis.ending", "view"),
     "results.ledger": ("view",),
     "analysis.accuracy.result": ("view",),
     "analysis.effects.result": ("view",),

@@ -1,0 +1,156 @@
+"""What a run came to: at rest, fallen, walking. Each is said by a rule on the rows, never guessed from names."""
+
+from __future__ import annotations
+
+from collections import Counter
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mbd.analysis.gait import gait
+from mbd.arrays import Vector
+from mbd.results.summary import strategy
+
+if TYPE_CHECKING:
+    from mbd.trajectory import Trajectory
+
+__all__ = ["Summary", "ending", "summary"]
+
+REST = 1e-6
+"""Kinetic energy over its largest of the run, below which a mechanism rests [-]."""
+
+STRETCH = 0.05
+"""Part of the run at its end over which it is to rest [-]."""
+
+FALLEN = 0.5
+"""Height over that of the start below which a mechanism has fallen [-]."""
+
+STEPS, PROGRESS = 3, 0.5
+"""Steps that make a walk at least; distance of the last touchdown from the first over the way from each to the next."""
+
+STILL = 1e-9
+"""Motion of a point over the size of the mechanism below which it is fixed [-]."""
+
+
+class Summary(str):
+    """Lines of text that show as such where a value is shown."""
+
+    def __repr__(self) -> str:
+        return str(self)
+
+
+def summary(run: Trajectory) -> Summary:
+    """The lines of `Trajectory.summary`."""
+    lines = [f"{run.name}: {'' if run.success else 'failed: '}{run.message or 'no message'}"]
+    entries = [("run", _made(run)), ("ending", "; ".join(ending(run)))]
+    counts = Counter(f"{event.name} {event.kind}" for event in run.events)
+    listed = ", ".join(f"{count} × {what}" for what, count in counts.most_common(6))
+    more = f", … ({len(counts)} sorts)" if len(counts) > 6 else ""
+    entries.append(("events", f"{len(run.record.events)}: {listed}{more}" if counts else "none"))
+    if len(run):
+        energy = run.energy
+        entries.append(
+            ("energy", f"changed by {energy.change:.4g} J, of which numerical {energy.numerical[-1]:.2g} J, "
+                       f"{energy.drift:.2g} of the swing of kinetic energy")
+        )  # fmt: skip
+        entries.append(("constraints", str(run.violation)))
+    entries.append(("cost", _cost(run)))
+    notes = run.stats.get("notes", ())
+    if notes:
+        entries.append(("notes", f"{len(notes)}, in run.stats['notes']; the first: {notes[0]}"))
+    return Summary("\n".join([*lines, *(f"  {title:<12} {text}" for title, text in entries)]))
+
+
+def ending(run: Trajectory) -> list[str]:
+    """What the motion came to, a sentence for each rule that holds; see `Trajectory.summary`."""
+    if len(run) < 2:
+        return ["no step was taken"]
+    found = [text for text in (_rest(run), _fall(run)) if text]
+    walks = _walk(run)
+    if walks and not any(text.startswith("fell") for text in found):
+        found.append(walks)
+    found = found or ["in motion"]
+    closed = [contact.name for k, contact in enumerate(run.facts.contacts) if run.record.closed[-1, k]]
+    return [*found, f"closed at the end: {', '.join(closed)}"] if closed else found
+
+
+def _made(run: Trajectory) -> str:
+    """Scheme, step or tolerance, rows, strategy of contacts."""
+    settings = run.settings
+    words = [str(settings.get("integrator", "scheme not stored"))]
+    words += [f"{key} = {settings[key]:g}" for key in ("dt", "tol") if settings.get(key) is not None]
+    if len(run):
+        words.append(f"{run.time[0]:g} s to {run.time[-1]:g} s in {len(run)} rows")
+    usual = settings.get("contact") == "events"
+    return ", ".join([*words, *([] if usual or not strategy(run) else [strategy(run)])])
+
+
+def _cost(run: Trajectory) -> str:
+    stats = run.stats
+    words = [f"{stats[key]} {key}" for key in ("steps", "iterations", "rejected", "impacts") if stats.get(key)]
+    words += [f"{stats['wall_seconds']:.3g} s"] if "wall_seconds" in stats else []
+    return ", ".join(words) or "not stored"
+
+
+def _rest(run: Trajectory) -> str:
+    kinetic = run.energy.kinetic
+    span = STRETCH * (run.time[-1] - run.time[0])
+    most, last = float(np.max(kinetic)), float(np.max(kinetic[run.time >= run.time[-1] - span]))
+    if most == 0.0:
+        return "at rest throughout"
+    if not last <= REST * most:
+        return ""
+    return (
+        f"came to rest: kinetic energy below {last:.2g} J, {last / most:.1g} of its largest, for the last {span:.3g} s"
+    )
+
+
+def _fall(run: Trajectory) -> str:
+    """Of what stands on contacts with places and hangs on nothing: that it is less than half as high as at first."""
+    places = {contact.place for contact in run.facts.contacts if contact.place}
+    gravity = np.array([run.parameters.get(f"gravity.{axis}", 0.0) for axis in "xyz"])
+    size = float(np.linalg.norm(gravity))
+    points = _points(run)
+    if not places or size == 0.0 or len(points) < 2:
+        return ""
+    whole = np.stack([run[name] for name in points])
+    extent = float(np.max(np.ptp(whole, axis=1), initial=0.0))
+    fixed = [name for name, place in zip(points, whole, strict=True) if np.max(np.ptp(place, axis=0)) <= STILL * extent]
+    if any(name not in places for name in fixed):
+        return ""
+    height = whole @ (-gravity / size)
+    reach = np.ptp(height, axis=0)
+    if not reach[0] > 0.0 or reach[-1] >= FALLEN * reach[0]:
+        return ""
+    top = points[int(np.argmax(height[:, 0]))]
+    when = float(run.time[np.argmax(reach < FALLEN * reach[0])])
+    return (
+        f"fell: it is {reach[-1]:.3g} m high, {reach[0]:.3g} m at the start with {top!r} on top; below half of that "
+        f"from t = {when:.4g} s"
+    )
+
+
+def _points(run: Trajectory) -> list[str]:
+    """The points of the figure that results know."""
+    names = [name for body, frames in run.facts.segments for frame in frames for name in (f"{body}.{frame}", frame)]
+    return list(dict.fromkeys(name for name in names if f"{name}.x" in run))
+
+
+def _walk(run: Trajectory) -> str:
+    steps = gait(run).steps
+    if len(steps) < STEPS:
+        return ""
+    places = {contact.name: contact.place for contact in run.facts.contacts}
+    touched: list[Vector] = [run.at(step.time)[places[step.foot]] for step in steps]
+    way = sum(float(np.linalg.norm(b - a)) for a, b in pairwise(touched))
+    if not way > 0.0 or float(np.linalg.norm(touched[-1] - touched[0])) < PROGRESS * way:
+        return ""
+    last: Any = steps[-1]
+    mean = sum(step.length for step in steps) / sum(step.period for step in steps)
+    text = (
+        f"walks: {len(steps)} steps at {mean:.4g} m/s; the last {last.length:.4g} m in {last.period:.4g} s, "
+        f"{last.speed:.4g} m/s"
+    )
+    off = f", {last.deviation:.2g} off the one before with sides exchanged"
+    return text + off if np.isfinite(last.deviation) else text
