@@ -205,15 +205,15 @@ class Linearization:
 
     def discrete(self, dt: float, method: str = "zoh") -> StateSpace:
         """`StateSpace.discrete`."""
-        return self.state_space.discrete(dt, method)
+        return self._of_changes().discrete(dt, method)
 
     def to_scipy(self) -> Any:
         """`StateSpace.to_scipy`."""
-        return self.state_space.to_scipy()
+        return self._of_changes().to_scipy()
 
     def to_control(self) -> Any:
         """`StateSpace.to_control`."""
-        return self.state_space.to_control()
+        return self._of_changes().to_control()
 
     def transfer(self, s: Any) -> Any:
         """`StateSpace.transfer`."""
@@ -222,6 +222,17 @@ class Linearization:
     def frequency_response(self, frequencies: Any) -> Any:
         """`StateSpace.frequency_response`."""
         return self.state_space.frequency_response(frequencies)
+
+    def _of_changes(self) -> StateSpace:
+        """`state_space`; a warning where the state does not stay, so that its equations are those of an instant."""
+        if not self.is_equilibrium:
+            warnings.warn(
+                f"{self.model} is not in equilibrium at t = {self.time:g} s: these equations are of changes from a "
+                "motion that goes on, frozen at this instant",
+                MbdWarning,
+                stacklevel=3,
+            )
+        return self.state_space
 
     def plot_modes(self, path: str | Path | None = None, most: int = 6) -> Any:
         """Mode shapes as bars, one panel for each of the `most` slowest motions that move a coordinate; the figure."""

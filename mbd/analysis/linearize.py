@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from mbd.analysis.finite import not_finite
 from mbd.analysis.independent import independent
 from mbd.analysis.instant import instant
 from mbd.analysis.linear_motion import LinearMotion, Prescribed, linear_motion, singular
@@ -53,7 +54,8 @@ def linearize(
     ------
     ModelError
         if the state is not consistent, a closed contact would pull, the constraint Jacobian loses rank at this
-        posture only, an input can be none, or an output depends on how redundant rows share a load.
+        posture only, an input can be none, an output depends on how redundant rows share a load, or a
+        derivative is not finite.
     UnknownNameError
         for inputs and outputs that the model does not have, with the nearest.
 
@@ -81,18 +83,17 @@ def linearize(
     n_v = equations.n_v
     if n_v == 0:
         raise ModelError(f"{equations.name!r} has no coordinate; connect a body by a joint that lets it move")
-    chosen = independent(terms.M[:n_v, :n_v], terms.B, terms.turning, found.velocity, equations.n_z)
-    faults = singular(found, terms, chosen)
-    if faults:
-        raise ModelError(faults)
     given = acting(model, equations, [equations.rows[k] for k in found.rows], wanted)
     seen = output_nodes(equations, () if outputs is None else outputs)
-    local = port_terms(found, given, seen)
+    local, freedoms = port_terms(found, given, seen), _freedoms(equations)
+    _require(not_finite(terms, local, [name for name, _ in freedoms], given, seen))
+    chosen = independent(terms.M[:n_v, :n_v], terms.B, terms.turning, found.velocity, equations.n_z)
+    _require(singular(found, terms, chosen))
     prescribed = Prescribed.of(given, local, found.velocity)
     picked = (*chosen.places, *(n_v + k for k in chosen.speeds), *range(2 * n_v, 2 * n_v + equations.n_z))
     motion = linear_motion(found, terms, chosen, picked, local, prescribed, seen)
     eigenvalues, shapes = _modes(motion.A, motion.basis[:n_v])
-    space = _space(equations, picked, motion, given, seen)
+    space = _space([freedoms[k] for k in picked], motion, given, seen)
     warn_of_idle(_idle(given, space), 3)
     values = [found.value(given[k].node) if order == 0 else 0.0 for k, order in prescribed.states]
     return Linearization(
@@ -103,14 +104,22 @@ def linearize(
     )  # fmt: skip
 
 
+def _require(faults: list[str]) -> None:
+    if faults:
+        raise ModelError(faults)
+
+
+def _freedoms(equations: Equations) -> list[tuple[str, str]]:
+    """(name, unit) of places, velocities and first-order states."""
+    whole = equations.configuration
+    speeds = zip(whole.velocity_names, whole.velocity_units, strict=True)
+    return [*whole.freedoms, *speeds, *((each.name, each.unit) for each in equations.states)]
+
+
 def _space(
-    equations: Equations, picked: Sequence[int], motion: LinearMotion, given: Sequence[Input], seen: Sequence[Output]
+    states: list[tuple[str, str]], motion: LinearMotion, given: Sequence[Input], seen: Sequence[Output]
 ) -> StateSpace:
     """A, B, C, D with names and units; the states are the outputs where none are given."""
-    whole = equations.configuration
-    freedoms = (*whole.freedoms, *zip(whole.velocity_names, whole.velocity_units, strict=True))
-    known = (*freedoms, *((each.name, each.unit) for each in equations.states))
-    states = [known[k] for k in picked]
     states += [(name, each.state_unit(order)) for each in given for order, name in enumerate(each.states)]
     ends = [(each.name, each.unit) for each in seen]
     C, D = motion.C, motion.D

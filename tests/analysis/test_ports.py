@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import random
 from dataclasses import replace
 
@@ -181,6 +182,33 @@ def test_an_input_is_added_to_a_law():
         for name in "ABCD":
             assert getattr(other, name) == pytest.approx(getattr(found[0], name), abs=1e-11)
     assert np.all(np.max(np.abs(found[0].B), axis=0) > 0.01)
+
+
+def test_a_lagrangian_has_forces_on_its_coordinates_and_prescribed_rows():
+    """A pendulum of length r by its angle, and in x and y with a rod whose length is prescribed by its acceleration."""
+    one = mbd.Lagrangian(
+        "pendulum", [mbd.Coordinate("theta", unit="rad")],
+        kinetic=lambda m, r, theta_rate: m * r**2 * theta_rate**2 / 2,
+        potential=lambda m, r, g, theta: -m * g * r * mbd.cos(theta),
+        parameters={"m": 1.5, "r": 0.7, "g": 9.81},
+    )  # fmt: skip
+    one.observe("height", lambda theta: -0.7 * mbd.cos(theta), "theta", unit="m")
+    state = mbd.assemble(one, position={"theta": 0.3}, backend=PLAIN)
+    found = look(one, state, inputs=["theta.force", "g"], outputs=["theta.acceleration", "height"])
+    assert found.B[1] == pytest.approx([1 / (1.5 * 0.49), -math.sin(0.3) / 0.7])
+    assert pytest.approx(np.array([[-9.81 / 0.7 * math.cos(0.3), 0.0], [0.7 * math.sin(0.3), 0.0]])) == found.C
+    assert found.state_space.output_units[1] == "m" and found.state_space.input_units[0] == "N m"
+    two = mbd.Lagrangian(
+        "x and y", ["x", "y"],
+        kinetic=lambda x_rate, y_rate: 0.75 * (x_rate**2 + y_rate**2), potential=lambda y: 1.5 * 9.81 * y,
+        constraints={"rod": lambda x, y, r: (x**2 + y**2 - r**2) / 2}, parameters={"r": 0.7},
+    )  # fmt: skip
+    state = mbd.assemble(two, position={"y": -0.7}, backend=PLAIN)
+    found = look(two, state, inputs=["r.acceleration", "x.force"], outputs=["y.acceleration", "rod.multiplier"])
+    assert found.states == ("x", "x.rate", "r", "r.rate")
+    assert pytest.approx(np.array([[-1.0, 0.0], [-1.5 / 0.7, 0.0]])) == found.D  # ÿ = −r̈; −λ r = m (r̈ − g)
+    with pytest.raises(mbd.ModelError, match="'r' prescribes a motion .* ask for the input 'r.acceleration'"):
+        look(two, state, inputs="r")
 
 
 @pytest.mark.parametrize(("cut", "swing"), [("auto", 0.0), ("auto", 2.0), ("all", 2.0)])

@@ -183,3 +183,51 @@ def test_what_cannot_be_sampled_is_refused():
         driven(None).to_scipy()
     with pytest.raises(mbd.ModelError, match="which is a pole"):
         mbd.StateSpace(*(np.zeros((1, 1)),) * 4, ("x",), ("u",), ("y",)).transfer(0.0)
+
+
+def test_changes_from_a_motion_that_goes_on_are_told():
+    model = pendulums([1.0], [0.5])
+    model.apply(mbd.Motor("drive", model.joints[0], torque=0.0))
+    state = mbd.assemble(model, position={"first pin.angle": 0.4}, backend=PLAIN)
+    linear = mbd.linearize(model, state, backend=PLAIN, inputs="drive.torque")
+    with pytest.warns(mbd.MbdWarning, match="not in equilibrium at t = 0 s: .* changes from a motion that goes on"):
+        linear.discrete(0.1)
+
+
+def test_derivatives_that_are_no_numbers_are_named():
+    model = pendulums([1.0], [0.5])
+    model.observe("root", lambda angle: mbd.sqrt(angle), "first pin.angle")
+    state = mbd.assemble(model, backend=PLAIN)
+    with pytest.raises(mbd.ModelError, match="the output 'root' has no finite value or derivative"):
+        mbd.linearize(model, state, backend=PLAIN, outputs="root")
+    odd = mbd.Motor("odd", model.joints[0], torque=lambda angle: mbd.sqrt(abs(angle)), arguments=["first pin.angle"])
+    model.apply(odd)
+    with pytest.raises(mbd.ModelError, match="no finite derivative by 'first pin.angle'"):
+        mbd.linearize(model, state, backend=PLAIN)
+
+
+@pytest.mark.parametrize("period", [0.02, 0.1])
+def test_a_controller_moves_a_run_as_the_sampled_closed_loop_says(period):
+    """x⁺ = (A − B K) x from sample to sample; what is left is of third order in the disturbance, as forces are odd."""
+    model = pendulums([1.0, 0.6], [0.5, 0.4])
+    model.apply(mbd.Motor("drive", model.joints[0], torque=0.0))
+    state = mbd.assemble(model, backend=PLAIN)
+    linear = mbd.linearize(model, state, backend=PLAIN, inputs="drive.torque")
+    gain = np.array([[0.8, -0.3, 0.4, 0.1]])
+    loop = linear.discrete(period).feedback(gain)
+
+    def update(t, values, memory):
+        return {"drive.torque": -float(gain[0] @ [values[name] for name in linear.states])}
+
+    model.apply(mbd.Controller("loop", update, period=period, reads=linear.states, writes=["drive.torque"]))
+    left, times = [], np.arange(round(0.6 / period) + 1) * period
+    for size in (0.08, 0.04):
+        start = mbd.assemble(model, position={"first pin.angle": size}, backend=PLAIN)
+        run = mbd.simulate(model, start, mbd.RungeKutta853(), tol=1e-9, until=0.6 + period)
+        seen = np.column_stack([run.at(times)[name] for name in linear.states])
+        wanted = [seen[0]]
+        for _ in times[1:]:
+            wanted.append(loop.A @ wanted[-1])
+        left.append(np.max(np.abs(seen - wanted)))
+        assert left[-1] < 0.02 * np.max(np.abs(seen))
+    assert left[0] / left[1] == pytest.approx(8.0, rel=0.2)
