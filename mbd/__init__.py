@@ -182,7 +182,14 @@ if not TYPE_CHECKING:  # type checkers know the names above, and that there are 
         if name == "testing":  # the law kit, a module of its own
             return importlib.import_module("mbd.testing")
         if name in _HOME:
-            value = globals()[name] = getattr(importlib.import_module(_HOME[name]), name)
+            from mbd.arguments import explained
+
+            home = importlib.import_module(_HOME[name])
+            value = getattr(home, name)
+            if home.__name__ != "mbd.tape.functions":  # which laws call in every step
+                value = explained(value)
+                setattr(home, name, value)  # where pickle looks for it
+            globals()[name] = value
             return value
         if name.startswith("__"):
             raise AttributeError(f"module 'mbd' has no attribute {name!r}")

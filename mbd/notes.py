@@ -28,6 +28,7 @@ class _Process:
 PROCESS = _Process()
 
 _PACKAGE = str(Path(__file__).parent)
+_DOOR = str(Path(__file__).with_name("arguments.py"))
 _LOGGER = logging.getLogger("mbd")
 _LOGGER.addHandler(logging.NullHandler())
 _TOLD: WeakKeyDictionary[Any, set[str]] = WeakKeyDictionary()
@@ -49,7 +50,10 @@ def doubt(*sentences: str, of: Any = None) -> None:
 
 def asked_from_outside() -> bool:
     """Whether the function that asks was called by something that is no part of mbd."""
-    return not sys._getframe(2).f_code.co_filename.startswith(_PACKAGE)
+    frame = sys._getframe(2)
+    if frame.f_code.co_filename == _DOOR and frame.f_back is not None:
+        frame = frame.f_back
+    return not frame.f_code.co_filename.startswith(_PACKAGE)
 
 
 def _level() -> int:

@@ -361,6 +361,7 @@ def _received(content: bytes) -> Trajectory:
 
 def load(path: str | Path) -> Trajectory:
     """A run read from a file that `Trajectory.save` wrote; its names, plots and pages need no model."""
+    from mbd.results.archive import file_to_read
     from mbd.results.storage import load as read
 
-    return Trajectory(*read(path))
+    return Trajectory(*read(file_to_read(path)))

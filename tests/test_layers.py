@@ -14,7 +14,7 @@ import mbd
 PACKAGE = Path(mbd.__file__).parent
 
 RANKS = [
-    ("errors", "arrays", "state", "free_memory", "notebook", "notes", "progress"),
+    ("errors", "arguments", "arrays", "state", "free_memory", "notebook", "notes", "progress"),
     ("tape",),
     ("bodies",),
     ("scope",),

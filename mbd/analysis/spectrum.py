@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from mbd.analysis.amplification import amplification_matrix
+from mbd.bodies.values import is_number, shown
 from mbd.errors import ModelError
 from mbd.integrators.base import Integrator
 
@@ -86,8 +87,9 @@ def argument_faults(integrator: Any, turns: Sequence[float], damping: float) -> 
     faults = []
     if not isinstance(integrator, Integrator):
         faults.append(f"an integrator is expected, such as mbd.HHT(0.05), not {integrator!r}")
-    if not all(np.isfinite(turn) and 0.0 < turn <= FARTHEST for turn in turns) or not len(turns):
-        faults.append(f"ω dt must be numbers above 0 and up to {FARTHEST:g}, not {turns!r}")
-    if not 0.0 <= damping < 1.0:
-        faults.append(f"the damping ratio of the oscillator must lie in 0 ≤ ξ < 1, not {damping!r}")
+    several = isinstance(turns, list | tuple | range | np.ndarray) and len(turns) > 0
+    if not several or not all(is_number(turn) and 0.0 < turn <= FARTHEST for turn in turns):
+        faults.append(f"turns (ω dt) must be a list of numbers above 0 and up to {FARTHEST:g}, not {shown(turns)}")
+    if not is_number(damping) or not 0.0 <= damping < 1.0:
+        faults.append(f"damping, the ratio of the oscillator, must lie in 0 ≤ ξ < 1, not {shown(damping)}")
     return faults

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import nullcontext
@@ -13,11 +14,13 @@ from typing import Any
 import numpy as np
 
 from mbd.analysis.sweep_runs import SETTINGS, Results, Runs, cell, rows_of
+from mbd.bodies.values import flag, shown
 from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.notebook import table
 from mbd.progress import share_bar
 from mbd.results.archive import named_file, write_whole
+from mbd.simulation.simulate import simulate
 from mbd.state import State
 
 __all__ = ["Sweep", "sweep"]
@@ -144,10 +147,11 @@ def sweep(
     ModelError, UnknownNameError
         for names that the model does not have, and what cannot be sent to processes, before the first run.
     """
+    bar_wanted = flag(progress, "progress of a sweep")
     titles = _checked(model, values, start, results, executor, settings)
     cases = tuple(product(*values.values()))
     runs = Runs(model, tuple(values), start, results, settings)
-    with share_bar() if progress else nullcontext() as bar:
+    with share_bar() if bar_wanted else nullcontext() as bar:
         rows, complete = rows_of(runs, cases, executor, bar)
     columns = {title: tuple(row.results[k] for row in rows) for k, title in enumerate(titles)}
     success, messages = tuple(row.success for row in rows), tuple(row.message for row in rows)
@@ -178,14 +182,21 @@ def _checked(model: Any, values: Any, start: Any, results: Any, executor: Any, s
         faults.append(f"start must be a State from mbd.assemble, or a function of the parameters, not {start!r}")
     if executor is not None and not hasattr(executor, "submit"):
         faults.append(f"executor must be one of concurrent.futures, such as ThreadPoolExecutor(), not {executor!r}")
-    if isinstance(results, str) or not isinstance(results, Mapping | Sequence):
-        faults.append(f"results must be a list of quantities or functions by title, not {results!r}")
+    names = isinstance(results, Mapping | Sequence) and not isinstance(results, str | bytes)
+    if not names or not all(isinstance(name, str) for name in results):
+        faults.append(f"results must be a list of names of quantities, or functions by title, not {shown(results)}")
         results = ()
+    if isinstance(results, Mapping) and not all(map(callable, results.values())):
+        faults.append(f"results by title must be functions, such as lambda run: run.time[-1], not {shown(results)}")
     titles = [*values, *results, *OUTCOME]
     faults += [
         f"{title!r} would be the title of two columns; choose another name for what is kept"
         for title in dict.fromkeys(results)
         if titles.count(title) > 1
+    ]
+    takes = inspect.signature(simulate).parameters
+    faults += [
+        nearest(name, [*takes][2:], "argument of simulate", "There are") for name in settings if name not in takes
     ]
     if "on_failure" in settings:
         faults.append("a sweep keeps runs that fail as lines of its table; leave out on_failure=")

@@ -28,7 +28,7 @@ from mbd.assembly.posture import (
 )  # fmt: skip
 from mbd.assembly.trivial_rows import manager_of
 from mbd.assembly.turns import choose_turns, name_wrapped, nearest_turns
-from mbd.bodies.values import named_number_faults
+from mbd.bodies.values import flag, named_number_faults, names_given
 from mbd.compile.mechanism import Mechanism, rate_names
 from mbd.compile.mechanisms import mechanism_of
 from mbd.equations.equations import Equations
@@ -44,14 +44,6 @@ ROUNDED = 1e-3
 """Most by which named coordinates, such as those of a quaternion, are taken for rounded values of a placement [-]."""
 LIFTED = 1e-8
 """Height [m, rad] above which an open contact is armed from the start."""
-
-
-def _names(value: Any, what: str) -> tuple[tuple[str, ...], list[str]]:
-    """Names given as one or several."""
-    several = (value,) if isinstance(value, str) else tuple(value) if isinstance(value, Iterable) else (value,)
-    if all(isinstance(name, str) for name in several):
-        return several, []
-    return (), [f"{what} lists names of contacts, such as ['left foot'], not {value!r}"]
 
 
 def assemble(
@@ -100,16 +92,17 @@ def assemble(
     """
     wanted = {"position": position, "velocity": velocity, "parameters": parameters}
     faults = [fault for what, values in wanted.items() for fault in named_number_faults(values, what)]
-    (opened, more), (closed, others) = _names(open, "open"), _names(closed, "closed")
+    (opened, more), (closed, others) = names_given(open, "open"), names_given(closed, "closed")
     if faults + more + others:
         raise ModelError(faults + more + others)
-    changed = dict(parameters or {})
+    changed, project = dict(parameters or {}), flag(project, "project")
     require_inertia(model, position or {}, changed)
     mechanism = mechanism_of(model, backend, changed)
     equations, values = mechanism.equations, mechanism.parameters(changed, getattr(model, "parameters", {}))
     manager = manager_of(mechanism, values)
     named, faults = _named(mechanism, position or {}, velocity or {})
-    faults += [nearest(name, manager.names, "contact") for name in [*closed, *opened] if name not in manager.names]
+    for what, names in (("closed", closed), ("open", opened)):
+        faults += [f"{what}: " + nearest(name, manager.names, "contact") for name in names if name not in manager.names]
     faults += [f"contact {name!r} is named both closed and open" for name in set(closed) & set(opened)]
     if faults:
         raise UnknownNameError(faults)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -23,10 +23,11 @@ from mbd.assembly.posture import (
     position_rows,
 )
 from mbd.assembly.trivial_rows import manager_of
+from mbd.bodies.values import named_number_faults, names_given
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import ModelError, UnknownNameError, nearest
-from mbd.state import State
+from mbd.state import State, malformed
 
 __all__ = ["Mobility", "mobility"]
 
@@ -149,9 +150,13 @@ def mobility(
     """
     if not isinstance(state, State | None):
         raise ModelError(f"state must be a State from mbd.assemble(model, …), or None, not {state!r}")
+    named, faults = names_given(() if closed is None else closed, "closed")
+    faults += named_number_faults(parameters, "parameters") + (malformed(state) if state is not None else [])
+    if faults:
+        raise ModelError(faults)
     changed = {**(state.parameters if state is not None else {}), **(parameters or {})}
     mechanism = mechanism_of(model, backend, changed)
-    work = _posture(model, mechanism, state, closed, changed)
+    work = _posture(model, mechanism, state, None if closed is None else named, changed)
     return _examined(model, work, given=state is not None)
 
 
@@ -181,14 +186,14 @@ def _examined(model: Any, work: Posture, given: bool) -> Mobility:
 
 
 def _posture(
-    model: Any, mechanism: Mechanism, state: State | None, closed: Iterable[str] | None, changed: Mapping[str, float]
+    model: Any, mechanism: Mechanism, state: State | None, closed: Sequence[str] | None, changed: Mapping[str, float]
 ) -> Posture:
     """Where to look: the state, or the defaults."""
     equations = mechanism.equations
     values = mechanism.parameters(changed, getattr(model, "parameters", {}))
     manager = manager_of(mechanism, values)
-    names = (closed,) if isinstance(closed, str) else tuple(closed or ())
-    faults = [nearest(str(name), manager.names, "contact") for name in names if name not in manager.names]
+    wrong = [name for name in closed or () if name not in manager.names]
+    faults = ["closed: " + nearest(name, manager.names, "contact") for name in wrong]
     if faults:
         raise UnknownNameError(faults)
     q = np.array([coordinate.default for coordinate in equations.coordinates], dtype=float)
@@ -199,8 +204,8 @@ def _posture(
             raise ModelError(f"the state has the coordinates {state.names}, not those of {equations.name!r}")
         q, y, time = state.q.copy(), np.concatenate([state.v, state.z]), state.time
         anchors = state.anchors.copy() if len(state.anchors) else anchors
-        names = names if closed is not None else tuple(state.mode.closed)
-    return Posture(mechanism, manager, values, q, y, manager.flags(names), anchors, time=time)
+        closed = closed if closed is not None else tuple(state.mode.closed)
+    return Posture(mechanism, manager, values, q, y, manager.flags(closed or ()), anchors, time=time)
 
 
 def _off(work: Posture, rows: list[int]) -> Any:

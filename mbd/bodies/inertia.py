@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from mbd.bodies.values import Vector3, number, triple
+from mbd.bodies.values import Vector3, among, number, triple
 from mbd.errors import ModelError, nearest
 
 __all__ = ["SEGMENTS", "Solid", "box", "cylinder", "disk", "rod", "segment", "sphere"]
@@ -62,7 +62,7 @@ def sphere(mass: float, radius: float) -> Solid:
 def cylinder(mass: float, radius: float, length: float, axis: str = "z") -> Solid:
     """A uniform cylinder about its center: ``m r²/2`` about its axis, ``m (3 r² + L²)/12`` across."""
     m, r, L = number(mass, "mass of a cylinder"), number(radius, "its radius"), number(length, "its length")
-    if axis not in ("x", "y", "z"):
+    if not among(axis, ("x", "y", "z")):
         raise ModelError(f"the axis of a cylinder is 'x', 'y' or 'z', got {axis!r}")
     along, across = m * r * r / 2.0, m * (3.0 * r * r + L * L) / 12.0
     x, y, z = (along if axis == name else across for name in "xyz")
@@ -106,10 +106,11 @@ def segment(name: str, body_mass: float, length: float) -> Solid:
     body_mass : M of the whole person [kg]
     length : of the segment [m]
     """
-    if name not in SEGMENTS:
+    if not among(name, SEGMENTS):
         raise ModelError(nearest(name, SEGMENTS, "body segment", "The table has"))
-    M, L = number(body_mass, "body mass"), number(length, f"length of '{name}'")
+    M, L = number(body_mass, "body_mass"), number(length, f"length of '{name}'")
     fraction, center, gyration = SEGMENTS[name]
     m = fraction * M
-    across = m * (gyration * L) ** 2
+    reach = gyration * L
+    across = m * (reach * reach)
     return Solid(m, (0.0, -center * L, 0.0), (across, 0.0, across))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import unicodedata
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -12,8 +12,8 @@ import numpy as np
 from mbd.errors import ModelError
 
 __all__ = [
-    "Vector3", "flag", "is_finite_number", "is_number", "name_of", "named_number_faults", "names_of", "number",
-    "numbers", "printable", "shown", "triple", "unit_vector",
+    "Vector3", "among", "flag", "is_finite_number", "is_number", "name_of", "named_number_faults", "names_given",
+    "names_of", "number", "numbers", "printable", "shown", "triple", "unit_vector",
 ]  # fmt: skip
 
 Vector3: TypeAlias = tuple[float, float, float]
@@ -64,6 +64,11 @@ def flag(value: Any, what: str) -> bool:
     if isinstance(value, bool | np.bool_):
         return bool(value)
     raise ModelError(f"{what} must be True or False, got {value!r}")
+
+
+def among(value: Any, known: Collection[Any]) -> bool:
+    """Whether a value is one of some words or numbers; an array is none, and asking it would raise."""
+    return isinstance(value, str | int | float | None) and value in known
 
 
 def is_number(value: Any) -> bool:
@@ -125,6 +130,16 @@ def named_number_faults(values: Any, what: str) -> list[str]:
         elif not is_finite_number(value):
             found.append(f"{what}: the value of {name!r} must be a finite number, not {shown(value)}")
     return found
+
+
+def names_given(
+    value: Any, what: str, of: str = "contacts, such as ['left foot']"
+) -> tuple[tuple[str, ...], list[str]]:
+    """Names given as one or several."""
+    several = (value,) if isinstance(value, str) else tuple(value) if isinstance(value, Iterable) else (value,)
+    if all(isinstance(name, str) for name in several):
+        return several, []
+    return (), [f"{what} lists names of {of}, not {shown(value)}"]
 
 
 def is_finite_number(value: Any) -> bool:

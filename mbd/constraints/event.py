@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from mbd.bodies.promises import function_of
-from mbd.bodies.values import flag, name_of, names_of
+from mbd.bodies.values import among, flag, name_of, names_of
 from mbd.constraints.base import Constraint
 from mbd.constraints.expressions import is_expression, plain
 from mbd.constraints.measure import Measure
@@ -51,7 +51,7 @@ class Event(Constraint):
             if callable(value) and not is_expression(value):
                 function_of(value, f"reset of Event '{self.name}'", "named")
         object.__setattr__(self, "terminal", flag(self.terminal, f"terminal of Event '{self.name}'"))
-        if self.direction not in (-1, 0, 1):
+        if not among(self.direction, (-1, 0, 1)):
             raise ModelError(f"direction of Event '{self.name}' is -1, 0 or 1, got {self.direction!r}")
 
     @property

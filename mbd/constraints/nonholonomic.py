@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from mbd.bodies.values import is_number, name_of
+from mbd.bodies.values import among, is_number, name_of
 from mbd.constraints.base import VelocityConstraint
 from mbd.constraints.expressions import is_expression, plain, quantities_in
 from mbd.errors import ModelError
@@ -62,7 +62,7 @@ class Nonholonomic(VelocityConstraint):
     def __post_init__(self) -> None:
         name_of(self.name, "Nonholonomic")
         put = object.__setattr__
-        if not self.arguments and is_expression(self.row):
+        if is_expression(self.row) and isinstance(self.arguments, tuple | list) and not self.arguments:
             put(self, "row", plain(self.row))
             put(self, "arguments", quantities_in([self.row]))
         put(self, "row", quantity_of(self.row, f"row of '{self.name}'"))
@@ -77,7 +77,7 @@ class Nonholonomic(VelocityConstraint):
                 f"Nonholonomic '{self.name}': say which rates enter the row, such as "
                 "arguments=('body.x.rate', 'body.y.rate', 'body.angle')"
             )
-        if self.unit not in ("m", "rad"):
+        if not among(self.unit, ("m", "rad")):
             raise ModelError(f"unit of Nonholonomic '{self.name}' is 'm' or 'rad', got {self.unit!r}")
 
     def rates(self, scope: Scope) -> Sequence[tuple[str, Scalar]]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from mbd.bodies.domains import Domain, at_least_zero, positive
-from mbd.bodies.values import name_of, number
+from mbd.bodies.values import among, name_of, number
 from mbd.constraints.base import Constraint
 from mbd.constraints.law import Closing, Hold, Law
 from mbd.constraints.measure import Measure, gap_of
@@ -68,7 +68,7 @@ class Penalty(Constraint):
         for field in ("stiffness", "damping", "exponent", "restitution", "effective_mass"):
             if getattr(self, field) is not None or field in ("stiffness", "damping", "exponent"):
                 object.__setattr__(self, field, number(getattr(self, field), f"{field} of '{self.name}'"))
-        if self.release not in ("gap", "pull"):
+        if not among(self.release, ("gap", "pull")):
             raise ModelError(f"release of Penalty '{self.name}' is 'gap' or 'pull', got {self.release!r}")
         law_of(self.law, f"Penalty '{self.name}'")
         contradictions = self._contradictions()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from mbd.bodies.values import number
+from mbd.bodies.values import among, number
 from mbd.constraints.restitution import (
     KELVIN_VOIGT,
     blow_integral,
@@ -92,16 +92,20 @@ def penalty_parameters(
     faults = [f"{title}: {name} {value:g} must be positive" for name, value in values.items() if value <= 0.0]
     if n < 1.0:
         faults.append(f"{title}: exponent {n:g} is below 1, endlessly stiff at touch; give n ≥ 1")
-    if release not in ("gap", "pull"):
+    if not among(release, ("gap", "pull")):
         faults.append(f"{title}: release is 'gap' or 'pull', got {release!r}")
     if law == KELVIN_VOIGT and n != 1.0:
         faults.append(f"{title}: law='{KELVIN_VOIGT}' reaches a restitution for exponent 1 only, got exponent {n:g}")
     if faults:
         raise ModelError(faults)
     depth, mass, speed = values.values()
-    if law == KELVIN_VOIGT:
-        return _kelvin_voigt(depth, mass, speed, damping_ratio_for(e, release), release)
-    return _hysteretic(depth, mass, speed, chi_for(e, law), n)
+    try:
+        if law == KELVIN_VOIGT:
+            return _kelvin_voigt(depth, mass, speed, damping_ratio_for(e, release), release)
+        return _hysteretic(depth, mass, speed, chi_for(e, law), n)
+    except (OverflowError, ZeroDivisionError):
+        text = ", ".join(f"{name} {value:g}" for name, value in {**values, "exponent": n}.items())
+        raise ModelError(f"{title}: no stiffness that a number can hold belongs to {text}; use m, kg and m/s") from None
 
 
 def largest_dt(stiffness: float, exponent: float, damping: float, chi: float, mass: float, speed: float) -> float:

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+from mbd.bodies.values import among
 from mbd.errors import ModelError, nearest
 
 __all__ = [
@@ -40,7 +41,7 @@ TERMS = 18
 
 def law_of(name: str | None, owner: str) -> str:
     """The name of a law, checked; 'exact' where none is given."""
-    if name is not None and name not in (KELVIN_VOIGT, "exact", *CLASSICS):
+    if not among(name, (None, KELVIN_VOIGT, "exact", *CLASSICS)):
         raise ModelError(
             f"{owner}: {nearest(str(name), (KELVIN_VOIGT, 'exact', *CLASSICS), 'penalty law', 'The laws are')}"
         )

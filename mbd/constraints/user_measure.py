@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from mbd.bodies.values import among
 from mbd.constraints.expressions import plain, quantities_in
 from mbd.constraints.measure import Measure
 from mbd.errors import ModelError
@@ -81,7 +82,7 @@ def measure(function: Any, *arguments: Any, unit: str = "m", tangents: Any = Non
     unit : of g, 'm' or 'rad'
     tangents : functions of the same arguments whose values are held while the contact sticks [m]
     """
-    if unit not in ("m", "rad"):
+    if not among(unit, ("m", "rad")):
         raise ModelError(f"unit of a measure is 'm' or 'rad', got {unit!r}")
     given = arguments_of(arguments, "measure")
     numbers = [label for label, value in given if isinstance(value, float)]

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, Protocol, TypeAlias
 import numpy as np
 
 from mbd.bodies.base import Frame
-from mbd.bodies.values import flag, is_number, number, numbers, shown
+from mbd.bodies.values import among, flag, is_number, number, numbers, shown
 from mbd.errors import ModelError
 from mbd.joints.base import Joint
 from mbd.scope import Scope
@@ -77,7 +77,7 @@ class Samples:
                 f"values of Samples must be numbers, one for each time or a row (x, y, z) for each; got {shown(values)}"
             ) from None
         object.__setattr__(self, "time", numbers(time, "times of Samples"))
-        if kind not in ("cubic", "linear"):
+        if not among(kind, ("cubic", "linear")):
             raise ModelError(f"kind of Samples is 'cubic' or 'linear', got {kind!r}")
         if table.ndim not in (1, 2) or len(table) != len(self.time):
             raise ModelError(

@@ -20,7 +20,7 @@ from typing import Any, ClassVar, Literal, TypeAlias
 import numpy as np
 
 from mbd.arrays import Vector
-from mbd.bodies.values import is_number, shown
+from mbd.bodies.values import among, is_number, shown
 from mbd.errors import CapabilityError
 from mbd.integrators.base import Integrator, StepResult, System, composed, consistent_rates
 from mbd.integrators.coefficients import Coefficients
@@ -58,9 +58,9 @@ class NewmarkFamily(Integrator):
     tolerance: float
 
     def __init__(self, formulation: Formulation, start: Starting, tolerance: float, **own: Any) -> None:
-        if formulation not in ("ggl", "index3"):
+        if not among(formulation, ("ggl", "index3")):
             raise CapabilityError(f"formulation is 'ggl' or 'index3', not {formulation!r}")
-        if start not in ("jerk", "consistent"):
+        if not among(start, ("jerk", "consistent")):
             raise CapabilityError(f"start is 'jerk' or 'consistent', not {start!r}")
         if not is_number(tolerance) or not 0.0 < tolerance < 1e-3:
             raise CapabilityError(

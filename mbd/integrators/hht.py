@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
-from mbd.bodies.values import is_number, shown
+from mbd.bodies.values import among, is_number, shown
 from mbd.errors import CapabilityError
 from mbd.integrators.averaged import AveragedStep
 from mbd.integrators.base import Integrator, StepResult, System, completed
@@ -54,7 +54,7 @@ class HHT(NewmarkFamily):
     ) -> None:
         if not is_number(alpha) or not 0.0 <= alpha <= 1.0 / 3.0:
             raise CapabilityError(f"HHT needs alpha between 0 and 1/3, not {shown(alpha)}; 0.05 is common")
-        if form not in ("endpoint", "averaged"):
+        if not among(form, ("endpoint", "averaged")):
             raise CapabilityError(f"form is 'endpoint' or 'averaged', not {form!r}")
         if form == "averaged" and formulation == "ggl":
             raise CapabilityError("HHT(form='averaged') enforces rows at position level; use formulation='index3'")

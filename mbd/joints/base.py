@@ -255,6 +255,6 @@ class Joint(Parameterized, ABC):
             put(self, "rest", number(self.rest, f"rest of '{self.name}'"))
             if len(self.labels) != 1 and (self.stiffness or self.rest):
                 raise ModelError(
-                    f"{kind} '{self.name}': its spring would act on several coordinates "
+                    f"{kind} '{self.name}': its stiffness would act on several coordinates "
                     f"({', '.join(label.name for label in self.labels)}); free one only, or apply an mbd.Spring"
                 )

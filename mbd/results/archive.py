@@ -23,7 +23,18 @@ from numpy.typing import NDArray
 from mbd.errors import MbdError, TrajectoryError
 from mbd.free_memory import available, size_in_words
 
-__all__ = ["Arrays", "Head", "Members", "Unreadable", "named_file", "plain", "read", "write", "write_whole"]
+__all__ = [
+    "Arrays",
+    "Head",
+    "Members",
+    "Unreadable",
+    "file_to_read",
+    "named_file",
+    "plain",
+    "read",
+    "write",
+    "write_whole",
+]
 
 COMPRESSION = 1
 """Level of zlib: higher levels take five times as long for a few percent [-]."""
@@ -67,6 +78,13 @@ def named_file(path: Any, suffix: str = "") -> Path:
         known = ", which is a folder" if target.name and target.is_dir() else ""
         raise TrajectoryError(f"a file to write to is expected, such as 'run{suffix}', not {path!r}{known}")
     return target if target.suffix or not suffix else target.with_name(target.name + suffix)
+
+
+def file_to_read(path: Any) -> Path:
+    """A path; a `TrajectoryError` for what is none."""
+    if isinstance(path, str | os.PathLike):
+        return Path(path)
+    raise TrajectoryError(f"the path of a file to read is expected, such as 'run.mbd.npz', not {path!r}")
 
 
 def write(target: Path, arrays: Arrays, meta: Mapping[str, Any]) -> None:

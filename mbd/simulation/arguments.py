@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from mbd.bodies.promises import promise_faults
-from mbd.bodies.values import is_number, named_number_faults, shown
+from mbd.bodies.values import among, is_number, named_number_faults, shown
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.integrators import Integrator
 from mbd.kernel.active_set import ActiveSetManager
@@ -41,7 +41,7 @@ def check_arguments(
     faults = [
         f"{name}={words[name]!r} is not available; use {' or '.join(map(repr, known))}"
         for name, known in CHOICES.items()
-        if words[name] not in known
+        if not among(words[name], known)
     ]
     faults += _numbers(scheme, start, dt, tol, until, options["store"], options["rest_speed"])
     if tol_of is not None and tol is None:

@@ -12,7 +12,7 @@ import numpy as np
 from mbd.analysis.accuracy.published import Published, published
 from mbd.analysis.accuracy.settings import Setting, is_high, long_steps, steps_of, tolerances
 from mbd.analysis.accuracy.truth import motion, stopped
-from mbd.bodies.values import is_number, shown
+from mbd.bodies.values import is_number, names_given, shown
 from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import ModelError, SimulationError, UnknownNameError, nearest
 from mbd.integrators import HHT, GeneralizedAlpha, Integrator, Newmark, RadauIIA, RungeKutta853
@@ -100,6 +100,7 @@ def plan(
     faults += _wrong_schemes(integrators) + _wrong_schemes(None if also is None else [also])
     faults += _wrong_numbers(dts, "dts", "steps [s]", "a step must be a positive number of seconds")
     faults += _wrong_numbers(tols, "tols", "tolerances [m, rad]", "a tolerance must be a positive error of coordinates")
+    faults += [] if quantities is None else _named(quantities)[1]
     if known is not None and quantities is not None:
         faults.append("either quantities or known values: with these, they are the quantities")
     if faults:
@@ -157,7 +158,7 @@ def _wrong_schemes(integrators: Any) -> list[str]:
     if integrators is None:
         return []
     given = list(integrators.values()) if isinstance(integrators, Mapping) else integrators
-    if not isinstance(given, Sequence) or isinstance(given, str) or not given:
+    if not isinstance(given, Sequence) or isinstance(given, str | bytes) or not given:
         return [f"integrators must be a list of integrators, or a dictionary by label, not {integrators!r}"]
     return [
         f"{each!r} is no integrator; give values such as mbd.HHT(alpha=0.05)"
@@ -168,10 +169,12 @@ def _wrong_schemes(integrators: Any) -> list[str]:
 def _wrong_numbers(given: Any, name: str, what: str, rule: str) -> list[str]:
     if given is None:
         return []
-    if isinstance(given, str) or not isinstance(given, Sequence | np.ndarray) or len(given) == 0:
+    if isinstance(given, str | bytes) or not isinstance(given, Sequence | np.ndarray) or len(given) == 0:
         return [f"{name} must be a list of {what}, not {given!r}"]
     return [
-        f"{rule}, not {shown(each)}" for each in given if not is_number(each) or not math.isfinite(each) or each <= 0.0
+        f"{name}: {rule}, not {shown(each)}"
+        for each in given
+        if not is_number(each) or not math.isfinite(each) or each <= 0.0
     ]
 
 
@@ -226,14 +229,19 @@ def _probe(
     )
 
 
+def _named(wanted: Any) -> tuple[tuple[str, ...], list[str]]:
+    names, faults = names_given(wanted, "quantities", "results, such as ['left hip.angle']")
+    return names, faults or ([] if names else ["quantities is empty; give names such as those in run.names"])
+
+
 def _quantities(probe: Trajectory, wanted: Any) -> tuple[str, ...]:
     """Scalars behind the names; every wrong name with the nearest."""
     if wanted is None:
         return tuple(motion(probe))
-    names = [wanted] if isinstance(wanted, str) else list(wanted)
-    if not names:
-        raise ModelError("quantities is empty; give names such as those in run.names")
-    wrong = [str(name) for name in names if name not in probe]
+    names, faults = _named(wanted)
+    if faults:
+        raise ModelError(faults)
+    wrong = [name for name in names if name not in probe]
     if wrong:
         known = (*probe.names, *probe.columns.vectors)
         raise UnknownNameError([nearest(name, known, "quantity") for name in wrong])

@@ -74,7 +74,10 @@ def accuracy(
         with what was measured until then if it was interrupted (Ctrl-C).
     """
     _check(target, options, known)
-    options["parameters"] = {**getattr(start, "parameters", {}), **(options.get("parameters") or {})}
+    options["parameters"] = {
+        **(start.parameters if isinstance(start, State) else {}),
+        **(options.get("parameters") or {}),
+    }
     chosen = plan(model, start, until, quantities, integrators, dts, options, also, tols, target, known)
     with share_bar() if progress is True else nullcontext(progress or None) as report:
         bench = Bench(model, start, chosen, options, report)

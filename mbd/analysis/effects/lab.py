@@ -17,9 +17,11 @@ from mbd.analysis.effects.contribution import Change, Contribution, Together
 from mbd.analysis.effects.result import Effects
 from mbd.analysis.effects.scenes import Element, Scene, elements, reduced
 from mbd.analysis.effects.timing import Pair, Timing, timed
-from mbd.bodies.values import is_number
+from mbd.bodies.values import is_number, names_given, shown
 from mbd.compile.mechanisms import mechanism_of
+from mbd.description import Description
 from mbd.equations.cost import cost
+from mbd.equations.derivation import FrontDoor
 from mbd.errors import MbdError, ModelError, SimulationError, UnknownNameError, nearest
 from mbd.integrators import Integrator
 from mbd.progress import Progress, share_bar
@@ -81,7 +83,7 @@ def effects(
     SimulationError
         if the whole scene fails.
     """
-    _check(start, tolerance, options)
+    _check(model, start, tolerance, outputs, options)
     with share_bar() if progress is True else nullcontext(progress or None) as report:
         bench = Bench(model, start, until, integrator, dt, options, report)
         bench.begin(outputs)
@@ -228,9 +230,12 @@ def _energies(ledger: Ledger) -> dict[str, float]:
     return {part.name: part.passed for part in (*ledger.parts, *ledger.stored) if not part.withheld}
 
 
-def _check(start: Any, tolerance: Any, options: Mapping[str, Any]) -> None:
+def _check(model: Any, start: Any, tolerance: Any, outputs: Any, options: Mapping[str, Any]) -> None:
     """Faults of the arguments that the runs do not check, all at once."""
     faults = [] if isinstance(start, State) else [f"start must be a State from mbd.assemble(model, …), not {start!r}"]
+    if not isinstance(model, Description | FrontDoor):
+        faults.append(f"model must be an mbd.Model or mbd.Lagrangian, not {shown(model)}")
+    faults += [] if outputs is None else _named(outputs)[1]
     if not is_number(tolerance) or not math.isfinite(tolerance) or tolerance <= 0.0:
         faults.append(f"tolerance must be a positive part of an output's range such as 1e-3, not {tolerance!r}")
     faults += [f"effects() has no option {name!r}; it has {', '.join(OPTIONS)}" for name in options
@@ -239,14 +244,19 @@ def _check(start: Any, tolerance: Any, options: Mapping[str, Any]) -> None:
         raise ModelError(faults)
 
 
+def _named(wanted: Any) -> tuple[tuple[str, ...], list[str]]:
+    names, faults = names_given(wanted, "outputs", "results, such as ['left hip.angle']")
+    return names, faults or ([] if names else ["outputs is empty; give names such as those in run.names"])
+
+
 def _outputs(run: Trajectory, wanted: Any) -> tuple[str, ...]:
     """Scalars behind the names; every wrong name with the nearest."""
     if wanted is None:
         return tuple(name for name, _ in run.facts.coordinates)
-    names = [wanted] if isinstance(wanted, str) else list(wanted)
-    if not names:
-        raise ModelError("outputs is empty; give names such as those in run.names")
-    wrong = [str(name) for name in names if name not in run]
+    names, faults = _named(wanted)
+    if faults:
+        raise ModelError(faults)
+    wrong = [name for name in names if name not in run]
     if wrong:
         known = (*run.names, *run.columns.vectors)
         raise UnknownNameError([nearest(name, known, "output") for name in wrong])

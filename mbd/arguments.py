@@ -1,0 +1,85 @@
+"""What a public word says when it is called with arguments that it does not have.
+
+Python names a wrong keyword but neither what it was to be nor what there is. `explained` adds both, where a name is
+first asked of ``mbd``; a call that succeeds costs no more for it than a function around it.
+"""
+
+from __future__ import annotations
+
+import difflib
+import inspect
+from collections.abc import Callable, Mapping
+from functools import wraps
+from typing import Any, TypeVar
+
+__all__ = ["explained"]
+
+Word = TypeVar("Word")
+
+
+def explained(word: Word) -> Word:
+    """The same word, whose `TypeError` for wrong arguments has the nearest right one and all that it takes."""
+    if isinstance(word, type):
+        begin = getattr(word, "__init__", None)
+        if inspect.isfunction(begin) and not issubclass(word, BaseException):
+            setattr(word, "__init__", _guarded(begin, word.__name__, 1))  # noqa: B010  (mypy lets nobody assign to it)
+        return word
+    if inspect.isfunction(word):
+        made: Word = _guarded(word, word.__name__, 0)
+        return made
+    return word
+
+
+def _guarded(function: Callable[..., Any], name: str, own: int) -> Any:
+    """A function around another, of whose arguments the first `own` are Python's."""
+
+    @wraps(function)
+    def call(*given: Any, **named: Any) -> Any:
+        try:
+            return function(*given, **named)
+        except TypeError as error:
+            if error.__traceback__ is None or error.__traceback__.tb_next is not None:
+                raise  # not of the call, but of something inside
+            own_words = str(error)
+        raise TypeError(_sentence(function, name, own, given, named, own_words))
+
+    return call
+
+
+def _sentence(
+    function: Callable[..., Any], name: str, own: int, given: tuple[Any, ...], named: Mapping[str, Any], own_words: str
+) -> str:
+    """What is wrong with the arguments, and what there is."""
+    parameters = list(inspect.signature(function).parameters.values())[own:]
+    known = {each.name: each for each in parameters if each.kind not in (each.VAR_POSITIONAL, each.VAR_KEYWORD)}
+    placed = [each.name for each in known.values() if each.kind is not each.KEYWORD_ONLY][: len(given) - own]
+    faults = [f"{name} has no argument {wrong!r}{_meant(wrong, known)}" for wrong in named if wrong not in known]
+    faults += [f"{name} got {each!r} twice" for each in placed if each in named]
+    needed = [
+        repr(each.name)
+        for each in known.values()
+        if each.default is each.empty and each.name not in named and each.name not in placed
+    ]
+    if not faults and len(given) - own > len(placed):
+        faults.append(f"{name} takes {len(placed)} arguments without a keyword, {len(given) - own} came")
+    if needed and not faults:
+        faults.append(f"{name} needs {', '.join(needed)}")
+    shown = [_shown(each) for each in parameters]
+    if first := [k for k, each in enumerate(parameters) if each.kind is each.KEYWORD_ONLY][:1]:
+        shown.insert(first[0], "*")
+    listed = ", ".join(shown)
+    return f"{'; '.join(faults) or own_words}; it takes {name}({listed})"
+
+
+def _meant(wrong: str, known: Mapping[str, Any]) -> str:
+    close = difflib.get_close_matches(wrong, known, n=1, cutoff=0.6)
+    return f"; did you mean {close[0]!r}?" if close else ""
+
+
+def _shown(parameter: inspect.Parameter) -> str:
+    """A parameter without its type, defaults that are short."""
+    star = "*" * (parameter.kind is parameter.VAR_POSITIONAL) + "**" * (parameter.kind is parameter.VAR_KEYWORD)
+    if parameter.default is parameter.empty:
+        return f"{star}{parameter.name}"
+    default = repr(parameter.default)
+    return f"{parameter.name}={default if len(default) < 30 and default[0] != '<' else '…'}"

@@ -1,0 +1,190 @@
+"""Every public word, every argument of it, every kind of wrong value: the error names what was expected and what came.
+
+Examples of right arguments are found by the names of parameters, so that a new word is tried without a line here.
+"""
+
+from __future__ import annotations
+
+import inspect
+import math
+import re
+import warnings
+from typing import Any
+
+import numpy as np
+import pytest
+
+import mbd
+
+MODEL = mbd.Model("arm")
+UPPER = mbd.Link("upper", mass=1.0, length=1.0, center=0.5, inertia=0.1)
+HINGE = mbd.Revolute("hinge", MODEL.ground.origin, UPPER.start)
+MODEL.connect(HINGE)
+START = mbd.assemble(MODEL, position={"hinge.angle": 0.3}, backend="python")
+ORIGIN, END, ANGLE = MODEL.ground.origin, UPPER.end, mbd.flexion(HINGE)
+
+EXAMPLES: dict[str, Any] = {
+    "a": ORIGIN, "approach_speed": 1.0, "arguments": ("hinge.angle",), "b": END, "body": UPPER, "body_mass": 70.0,
+    "center": 0.5, "child": END, "coefficient": 1.0, "coordinates": ("theta",), "direction": (1.0, 0.0, 0.0),
+    "effective_mass": 1.0, "failure": "absent.npz", "frame": END, "function": lambda x: x, "guard": ANGLE,
+    "inertia": (1.0, 1.0, 1.0), "integrator": mbd.HHT(), "joint": HINGE, "kinetic": lambda theta_rate: theta_rate**2,
+    "length": 1.0, "loss": 1.0, "mass": 1.0, "measure": ANGLE, "model": MODEL, "mu": 0.1, "name": "new",
+    "other": "foot", "parent": ORIGIN, "path": "absent.npz", "penetration": 1e-3, "pitch": 0.1, "point": END,
+    "radius": 0.1, "rate": (-1.0, 0.0, 1.0), "restitution": 0.5, "row": lambda rate: rate, "sides": (1.0, 1.0, 1.0),
+    "slope": 0.1, "start": START, "state": START, "stiffness": 1.0, "subject": ANGLE, "time": (0.0, 1.0, 2.0),
+    "torque": 1.0, "until": 0.0, "update": lambda time, values, state: None, "values": (0.0, 1.0, 2.0),
+}  # fmt: skip
+"""A right argument by the name of its parameter."""
+
+OWN: dict[tuple[str, str], Any] = {
+    ("Applied", "force"): (1.0, 0.0, 0.0), ("accuracy", "until"): 0.1, ("effects", "until"): 0.1,
+    ("Controller", "period"): 0.1, ("Event", "direction"): 0, ("Marker", "place"): (0.1, 0.2),
+    ("Nonholonomic", "arguments"): ("hinge.rate",), ("Rolling", "center"): END,
+    ("Tabulated", "torque"): (-1.0, 0.0, 1.0),
+    ("effects", "dt"): 0.1, ("segment", "name"): "thigh", ("simulate", "dt"): 0.1, ("sweep", "dt"): 0.1,
+    ("sweep", "values"): {"upper.mass": [1.0]},
+}  # fmt: skip
+"""Where a word means something else by it."""
+
+MEANT_OTHERWISE = {
+    "Samples": ("periodic",),
+    "Translation": ("rest",),
+    "load": ("path",),
+    "replay": ("dt", "integrator", "steps", "model", "trusted"),
+}
+"""Arguments that are right by themselves: the sentence is about the others."""
+
+RESULTS = {
+    "Accuracy", "Criteria", "Domain", "Effects", "Failure", "Known", "Linearization", "Mobility", "PenaltyParameters",
+    "Replay", "State", "Sweep", "Trajectory",
+}  # fmt: skip
+"""Values that are handed to users, who make none."""
+
+STUDIES = {"accuracy", "effects", "criteria"}
+"""Words whose runs take seconds: what is no number at all is tried."""
+
+NOTHING = [None, "", [], {}, object(), b"x", 1j, lambda: 0, mbd.PointMass, MODEL, np.array([1.0, math.nan])]
+NUMBERS = [-1.0, 0.0, 90.0, 420.0, 1e300, 10**400, math.nan, math.inf, True]
+TEXTS = ["1.0", "hinge.angel", "two\nlines", ["hinge.angle", "hinge.angle"], {"hinge.angel": 1.0}, (None, None, None)]
+MANY = [(1.0, 2.0, 3.0, 4.0), [[1.0]], {"a": math.nan}]
+WRONG = [*NOTHING, *NUMBERS, *TEXTS, *MANY]
+
+WORDS = {
+    name: word
+    for name in mbd.__all__
+    if callable(word := getattr(mbd, name))
+    and name not in RESULTS
+    and getattr(word, "__module__", "") != "mbd.tape.functions"
+    and not (inspect.isclass(word) and issubclass(word, Exception))
+}
+
+
+def right(name: str) -> dict[str, Any]:
+    """Arguments with which a word is content."""
+    found = {}
+    for each in inspect.signature(WORDS[name]).parameters.values():
+        if (name, each.name) in OWN:
+            found[each.name] = OWN[name, each.name]
+        elif each.default is each.empty and each.kind not in (each.VAR_POSITIONAL, each.VAR_KEYWORD):
+            assert each.name in EXAMPLES, f"mbd.{name}: give an example of {each.name!r} in EXAMPLES"
+            found[each.name] = EXAMPLES[each.name]
+    if "model" in found and name != "simulate":  # whose runs are longer
+        found["backend"] = "python"
+    return found | ({"dt": 0.1} if (name, "dt") in OWN else {})
+
+
+def shown(value: Any) -> str:
+    try:
+        return repr(value)
+    except ValueError:
+        return type(value).__name__
+
+
+def tells(text: str, name: str, value: Any) -> bool:
+    """Whether a sentence names the argument, or the value that came."""
+    stems = (name[:5].replace("_", " "), name[:5])
+    came = (shown(value)[:20], f"{value:g}" if isinstance(value, float) else shown(value), type(value).__name__)
+    inside = [shown(each) for each in value] if isinstance(value, list | tuple | dict) else []
+    inside += ["nan"] * ("None" in inside)
+    return any(part.lower() in text.lower() for part in (*stems, *came, *inside) if part)
+
+
+@pytest.fixture(autouse=True)
+def without_warnings():
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", mbd.MbdWarning)
+        yield
+
+
+@pytest.mark.parametrize("name", WORDS)
+def test_a_wrong_argument_is_taken_or_named(name):
+    word, fine = WORDS[name], right(name)
+    files = {"load", "replay"} & {name}
+    if name not in STUDIES and not files:
+        assert word(**fine) is not None
+    for parameter in inspect.signature(word).parameters.values():
+        if parameter.kind in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD):
+            continue
+        if name in STUDIES and parameter.name == "progress":
+            continue
+        wrong = [value for value in NOTHING[1:] if value is not MODEL] if name in STUDIES else WRONG
+        for value in wrong:
+            said = ""
+            try:
+                word(**{**fine, parameter.name: value})
+            except mbd.MbdError as error:
+                said = str(error)
+            except FileNotFoundError as error:
+                said = str(error) if files else ""
+                assert files
+            if said and parameter.name not in MEANT_OTHERWISE.get(name, ()):
+                assert tells(said, parameter.name, value), f"{name}({parameter.name}={shown(value)}): {said}"
+
+
+@pytest.mark.parametrize("name", WORDS)
+def test_a_misspelt_argument_gets_the_nearest_and_all_there_are(name):
+    word, fine = WORDS[name], right(name)
+    signature = inspect.signature(word)
+    named = [each.name for each in signature.parameters.values() if each.kind not in (2, 4) and len(each.name) > 3]
+    open_ended = any(each.kind is each.VAR_KEYWORD for each in signature.parameters.values())
+    if not named:
+        return
+    wrong = named[-1][:-1] + ("x" if named[-1][-1] != "x" else "y")
+    if open_ended and name != "sweep":
+        wrong = "untill"
+    kind = mbd.MbdError if open_ended else TypeError
+    given = {key: value for key, value in fine.items() if open_ended or key != named[-1]}
+    with pytest.raises((kind, TypeError), match=re.escape(repr(wrong))) as told:
+        word(**given, **{wrong: 1.0})
+    if not open_ended:
+        assert f"did you mean {named[-1]!r}?" in str(told.value) and f"it takes {name}(" in str(told.value)
+
+
+@pytest.mark.parametrize("name", WORDS)
+def test_a_missing_argument_and_one_too_many_are_named(name):
+    word = WORDS[name]
+    parameters = inspect.signature(word).parameters.values()
+    needed = [each.name for each in parameters if each.default is each.empty and each.kind not in (2, 4)]
+    if needed:
+        with pytest.raises(TypeError, match=f"^{name} needs {needed[0]!r}.*it takes {name}\\("):
+            word()
+    if not any(each.kind is each.VAR_POSITIONAL for each in parameters):
+        with pytest.raises(
+            TypeError, match=rf"^{name} takes \d+ arguments? without a keyword, 40 came; it takes {name}\("
+        ):
+            word(*range(40))
+
+
+def test_a_type_error_from_inside_is_left_alone():
+    class Listed(mbd.HHT):
+        def __init__(self):
+            super().__init__(form=None, alpha=0.05, formulation="ggl"[7])
+
+    with pytest.raises(IndexError):
+        Listed()
+
+    def mine(parameters):
+        raise TypeError("my own fault")
+
+    table = mbd.sweep(MODEL, {"upper.mass": [1.0]}, mine, dt=0.1, until=0.0, backend="python")
+    assert "TypeError: my own fault" in table.messages[0]
