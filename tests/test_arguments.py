@@ -58,6 +58,7 @@ WORDS = {
     mbd.touchdown: (ROD.end,),
     mbd.Coordinate: ("theta",),
     mbd.Lagrangian: ("pendulum", ("theta",), lambda theta_rate: 0.5 * theta_rate**2),
+    mbd.Marker: ("ankle", ROD, (0.1, 0.2)),
     mbd.Model: ("model",),
     mbd.on_slope: (0.1,),
 }  # fmt: skip

@@ -56,7 +56,7 @@ MEANT_OTHERWISE = {
 
 RESULTS = {
     "Accuracy", "Criteria", "Domain", "Effects", "Failure", "Known", "Linearization", "Mobility", "PenaltyParameters",
-    "Replay", "State", "Sweep", "Trajectory",
+    "Replay", "State", "StateSpace", "Sweep", "Trajectory",
 }  # fmt: skip
 """Values that are handed to users, who make none."""
 
@@ -104,6 +104,7 @@ def tells(text: str, name: str, value: Any) -> bool:
     """Whether a sentence names the argument, or the value that came."""
     stems = (name[:5].replace("_", " "), name[:5])
     came = (shown(value)[:20], f"{value:g}" if isinstance(value, float) else shown(value), type(value).__name__)
+    came += (getattr(value, "__name__", ""),)
     inside = [shown(each) for each in value] if isinstance(value, list | tuple | dict) else []
     inside += ["nan"] * ("None" in inside)
     return any(part.lower() in text.lower() for part in (*stems, *came, *inside) if part)

@@ -15,6 +15,7 @@ from mbd.analysis.linearization import Linearization
 from mbd.analysis.ports import Input, Output, acting, input_names, output_nodes, port_terms, warn_of_idle
 from mbd.analysis.state_space import StateSpace
 from mbd.arrays import Matrix
+from mbd.compile.mechanisms import require_model
 from mbd.equations.equations import Equations
 from mbd.errors import ModelError
 from mbd.state import State
@@ -77,6 +78,7 @@ def linearize(
     >>> linear.B.T, linear.C, linear.D
     (array([[0., 4.]]), array([[0.5, 0. ]]), array([[0.]]))
     """
+    require_model(model)
     wanted = input_names(model, () if inputs is None else inputs)
     found = instant(model, state, parameters, backend, [each.parameter for each in wanted])
     equations, terms = found.mechanism.equations, found.terms()

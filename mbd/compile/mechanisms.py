@@ -15,7 +15,7 @@ from mbd.errors import ModelError
 from mbd.notes import PROCESS, doubt
 from mbd.topology.check import parameter_check
 
-__all__ = ["mechanism_of"]
+__all__ = ["mechanism_of", "require_model"]
 
 _KNOWN: WeakKeyDictionary[Any, dict[tuple[str, frozenset[str]], tuple[Any, Mechanism]]] = WeakKeyDictionary()
 _LOCK = threading.Lock()
@@ -38,6 +38,12 @@ def _same(old: Any, new: Any) -> bool:
     return alike and old[1:] == new[1:]
 
 
+def require_model(model: Any) -> None:
+    """Raise a `ModelError` for what is no model."""
+    if not isinstance(model, Description | FrontDoor):
+        raise ModelError(f"model: a Model or a Lagrangian is expected, not {model!r}")
+
+
 def mechanism_of(
     model: Any, backend: str = "auto", changed: Mapping[str, float] | None = None, inputs: Collection[str] = ()
 ) -> Mechanism:
@@ -55,8 +61,7 @@ def mechanism_of(
     ModelError
         for values that the words of the model do not allow, as if it had been described with them.
     """
-    if not isinstance(model, Description | FrontDoor):
-        raise ModelError(f"a Model or a Lagrangian is expected, not {model!r}")
+    require_model(model)
     if not isinstance(backend, str):
         raise ModelError(f"backend must be 'auto', 'llvm' or 'python', not {backend!r}")
     checked = parameter_check(model) if isinstance(model, Description) else model.parameter_check()
