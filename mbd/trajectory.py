@@ -23,6 +23,7 @@ from mbd.results.record import EventRecord, Events, Record
 
 if TYPE_CHECKING:
     from mbd.results.failure import Failure
+    from mbd.results.impulses import Impulses
     from mbd.results.ledger import Ledger
     from mbd.results.storage import Archive
     from mbd.results.violation import Violation
@@ -131,6 +132,17 @@ class Trajectory:
         kind is 'closed' or 'opened' of a contact, 'stuck' or 'slipped' of dry friction, or 'event'.
         """
         return Events(self.record.events)
+
+    @property
+    def impulses(self) -> Impulses:
+        """The impulses of all impacts, a line each: of the contacts that closed, of those closed before, of friction.
+
+        ``run.impulses.to_dataframe()`` has columns time, event, name, part, impulse, unit. Their sum over an impact
+        changes the momentum: ``M (v⁺ − v⁻) = Bᵀ Λ``.
+        """
+        from mbd.results.impulses import impulses_of
+
+        return impulses_of(self.record.events, self.facts, self.names)
 
     @cached_property
     def energy(self) -> Ledger:

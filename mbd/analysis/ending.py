@@ -10,6 +10,7 @@ import numpy as np
 
 from mbd.analysis.gait import gait
 from mbd.arrays import Vector
+from mbd.notebook import Text
 from mbd.results.summary import strategy
 
 if TYPE_CHECKING:
@@ -33,8 +34,8 @@ STILL = 1e-9
 """Motion of a point over the size of the mechanism below which it is fixed [-]."""
 
 
-class Summary(str):
-    """Lines of text that show as such where a value is shown."""
+class Summary(Text):
+    """Lines of text that show as such where a value is shown, in consoles too."""
 
     def __repr__(self) -> str:
         return str(self)

@@ -84,12 +84,21 @@ class Events(list[EventRecord]):
         shown = [*self[:half], *self[-half:]] if hidden else self
         rows = [
             (
-                f"{event.time:.6f}", event.name, event.kind, "  ".join(f"{value:.4g}" for value in event.impulse),
+                f"{event.time:.6f}", event.name, event.kind, _impulses(event),
                 f"{event.energy_loss:.4g}" if event.energy_loss else "",
             )
             for event in shown
         ]  # fmt: skip
         return table("events", titles, rows, f"{hidden} more between the first {half} and the last" if hidden else "")
+
+
+def _impulses(event: EventRecord) -> str:
+    """Its own impulse, and those of others by name."""
+    words = ["  ".join(f"{value:.4g}" for value in event.impulse)]
+    for name, impulse in event.impulses.items():
+        if name != event.name:
+            words.append(f"{name}: {'  '.join(f'{value:.4g}' for value in impulse)}")
+    return "; ".join(word for word in words if word)
 
 
 @dataclass(frozen=True, eq=False)
