@@ -12,7 +12,7 @@ from mbd.view.style import CYCLE, FAINT, INK, NEUTRAL, PALE, PAPER, as_label, to
 if TYPE_CHECKING:
     from mbd.analysis.accuracy import Accuracy, Point
 
-__all__ = ["clear", "height", "work_precision"]
+__all__ = ["clear", "frontier", "height", "work_precision"]
 
 MARKERS = "osD^vP*X"
 """Of the schemes in turn."""
@@ -33,7 +33,10 @@ def height(point: Point) -> float:
 
 
 def work_precision(found: Accuracy, path: str | Path | None = None) -> Any:
-    """Error over wall time, both logarithmic: a line for each scheme, dashed through tolerances, grey through steps."""
+    """Error over processor time, both logarithmic: a line for each scheme, dashed through tolerances.
+
+    Grey lines go through equal steps. The broad pale line is the least time for each error, whichever the scheme.
+    """
     shown = [point for point in found.points if clear(point)]
     with drawing(path, 7.4, 5.2) as figure:
         axes = figure.subplots()
@@ -43,13 +46,14 @@ def work_precision(found: Accuracy, path: str | Path | None = None) -> Any:
             axes.set_xscale("log")
             axes.set_yscale("log")
             labels = _steps(axes, shown)
+            _least(axes, shown)
             _limits(axes, found, shown)
         else:
             axes.text(0.5, 0.5, "no error is known", ha="center", transform=axes.transAxes)
         dashed = any(point.tol is not None for point in shown)
         hollow = any(point.error is None for point in shown)
         marks = [("dashed: tolerances, with their trial runs", dashed), ("hollow: below", hollow)]
-        axes.set_xlabel("; ".join(["wall time [ms]", *(text for text, there in marks if there)]))
+        axes.set_xlabel("; ".join(["processor time [ms]", *(text for text, there in marks if there)]))
         axes.set_ylabel(f"largest error over {'the published value' if found.is_published else 'range'}")
         if shown:
             axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.3)
@@ -90,6 +94,22 @@ def _steps(axes: Any, shown: list[Point]) -> list[tuple[float, float, str]]:
             )  # fmt: skip
         labels.append((1e3 * group[-1].seconds, height(group[-1]), f"{1e3 * dt:.3g} ms"))
     return labels
+
+
+def frontier(points: list[Point]) -> list[Point]:
+    """The points that no other beats in both time and error, by growing time: less and less error."""
+    found: list[Point] = []
+    for point in sorted(points, key=lambda point: (point.seconds, height(point))):
+        if not found or height(point) < height(found[-1]):
+            found.append(point)
+    return found
+
+
+def _least(axes: Any, shown: list[Point]) -> None:
+    """What each error costs at least, as stairs."""
+    best = frontier(shown)
+    times, errors = [1e3 * point.seconds for point in best], [height(point) for point in best]
+    axes.step(times, errors, where="post", color=tone(NEUTRAL), alpha=0.16, linewidth=6.0, zorder=0.7)
 
 
 def _labelled(axes: Any, labels: list[tuple[float, float, str]]) -> None:

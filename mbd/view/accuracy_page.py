@@ -20,7 +20,7 @@ CONTROLS = """\
 <label>quantity <select id="quantity"><option value="">the largest of all</option></select></label>
 <label>error <select id="which"><option value="errors">largest over time</option>
 <option value="end_errors">at the end</option></select></label>
-<label>over <select id="cost"><option value="seconds">wall time</option><option value="dt">step dt</option>
+<label>over <select id="cost"><option value="seconds">processor time</option><option value="dt">step dt</option>
 <option value="steps">steps</option><option value="iterations">Newton iterations</option>
 <option value="residuals">evaluations</option></select></label>"""
 

@@ -17,8 +17,10 @@ from mbd.analysis.accuracy.advice import advice, cheapest
 from mbd.analysis.accuracy.compare import aligned
 from mbd.analysis.accuracy.lab import with_orders
 from mbd.analysis.accuracy.reference import RungeKuttaReference
+from mbd.analysis.accuracy.timing import folds, retimed
 from mbd.integrators import Integrator, StepReport, StepResult
 from mbd.integrators.base import consistent_rates
+from mbd.view.accuracy import clear, frontier
 from tests.simulation.test_energy import chain
 
 G = 9.81
@@ -430,9 +432,43 @@ def test_the_cheapest_point_is_recommended_and_what_ten_times_more_costs():
     text = advice(given, 1e-3, 1e-9)
     assert "take quick with dt = 0.1 s (error 0.001, 2 ms)" in text[0]
     assert "costs 3 times the time: slow with dt = 0.1 s (error 0.0001, 6 ms)" in text[2]
-    assert [line.split(" with")[0] for line in advice(given, None, 1e-9)] == [
-        "For an error of 0.001: quick", "For an error of 0.0001: slow",
-    ]  # fmt: skip
+    choices, limit, more = advice(given, None, 1e-9)
+    assert choices == (
+        "For an error of 0.001 quick with dt = 0.1 s (error 0.001, 2 ms); "
+        "of 0.0001 slow with dt = 0.1 s (error 0.0001, 6 ms)."
+    )
+    assert "a tenth of the least of all would need dt = 0.05 s and 12 ms with slow, by its order" in limit
+    assert more == "Take shorter steps where points failed (1 of 6)."
+    assert "known to 1e-05" in advice(given, None, 1e-5)[1]
+    many = [point("s", 1.0, 0.9 * 10.0**-k, 1.0 + k) for k in range(1, 13)]
+    choices, _, more = advice(many, None, 1e-30)
+    assert (
+        choices.count("s with") == 3 and "0.01 s" in choices and "1e-12 s" in choices and "simulate(…, tol=…)" in more
+    )
+
+
+def test_a_point_with_more_work_in_less_time_is_timed_again():
+    counts = {"steps": 10, "iterations": 10, "tangents": 10, "residuals": 10, "factorizations": 10}
+    more = {name: 2 * count for name, count in counts.items()}
+    calm = [point("a", 0.2, 4e-3, 1.0, **counts), point("a", 0.1, 1e-3, 2.0, **more)]
+    fewer = replace(calm[1], iterations=5, seconds=0.5)  # better predicted: no wonder that it is quicker
+    assert folds(calm) == [] and folds([calm[0], fewer]) == []
+    busy = [replace(calm[0], seconds=9.0), *calm[1:], point("b", 0.1, 1e-3, 1.0, **more)]
+    assert folds(busy) == [(0, 1)]
+    times = {"a": iter([8.0, 1.0] * 20), "b": iter([1.0] * 20)}  # of a machine that is busy now and then
+    timed = retimed(
+        busy, lambda each: next(times[each.scheme]) if each.dt == 0.2 else each.seconds, 60.0, lambda _: None
+    )
+    assert folds(timed) == [] and timed[0].seconds == 1.0 and timed[1] == busy[1]
+
+
+def test_the_least_time_for_an_error_grows_as_errors_shrink():
+    shown = [each for each in GIVEN if clear(each)]
+    best = frontier(shown)
+    assert [each.seconds for each in best] == sorted(each.seconds for each in best)
+    assert [each.error for each in best] == sorted((each.error for each in best), reverse=True)
+    for error in (4e-3, 1e-3, 2.5e-4, 1e-4):
+        assert cheapest(best, error) is cheapest(shown, error)
 
 
 def test_an_error_out_of_reach_is_said_with_the_step_it_would_need():

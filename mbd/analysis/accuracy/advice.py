@@ -11,10 +11,12 @@ __all__ = ["advice", "cheapest", "decades", "milliseconds"]
 
 MORE = 10.0
 """Times more accuracy whose cost is reported."""
+KNOWN = 30.0
+"""Times the bound of the reference below which an error is mostly that of the reference."""
 
 
 def cheapest(points: Sequence[Point], target: float) -> Point | None:
-    """The point of least wall time whose error is certainly no larger than the target."""
+    """The point of least time whose error is certainly no larger than the target."""
     able = [point for point in points if point.reaches(target)]
     return min(able, key=lambda point: point.seconds, default=None)
 
@@ -29,11 +31,11 @@ def decades(points: Sequence[Point]) -> list[float]:
 
 
 def advice(points: Sequence[Point], target: float | None, bound: float) -> list[str]:
-    """Sentences.
+    """Three sentences at most: what to take for which error and what it costs, what limits, what to try.
 
     Parameters
     ----------
-    target : error that is wanted, relative to the range of each quantity [-]; None: every power of ten
+    target : error that is wanted, relative to the range of each quantity [-]; None: small, middle and large ones
     bound : of the reference [-]
     """
     if all(point.failure for point in points):
@@ -41,10 +43,11 @@ def advice(points: Sequence[Point], target: float | None, bound: float) -> list[
     if not any(point.at_most is not None for point in points if not point.failure):
         return ["No error is known, so nothing can be recommended."]
     if target is None:
-        found = [(each, cheapest(points, each)) for each in decades(points)]
-        if not any(best for _, best in found):
+        found = _choices(points)
+        if not found:
             return [f"No point has an error below a tenth; the best is {_described(_best(points))}."]
-        return [f"For an error of {each:g}: {_described(best)}." for each, best in found if best is not None]
+        texts = [f"{error:g} {_described(best)}" for error, best in found]
+        return [f"For an error of {'; of '.join(texts)}.", _limits(points, bound), _to_try(points)]
     best = cheapest(points, target)
     if best is None:
         return _unreached(points, target, bound)
@@ -53,6 +56,45 @@ def advice(points: Sequence[Point], target: float | None, bound: float) -> list[
         _costs(best),
         _more(points, best, target / MORE, bound),
     ]
+
+
+def _choices(points: Sequence[Point]) -> list[tuple[float, Point]]:
+    """(error, cheapest point) for a large, a middle and a small error, of those that have points of their own."""
+    least: dict[int, tuple[float, Point]] = {}
+    for error in decades(points):
+        best = cheapest(points, error)
+        if best is not None:
+            least[id(best)] = (error, best)  # the smallest error that it is the cheapest for
+    found = list(least.values())
+    return [found[k] for k in sorted({0, len(found) // 2, len(found) - 1})] if found else []
+
+
+def _limits(points: Sequence[Point], bound: float) -> str:
+    """Why no smaller error is shown."""
+    best = _best(points)
+    if best.at_most is not None and best.at_most < KNOWN * bound:
+        return f"Smaller errors cannot be told apart: the reference itself is known to {bound:.1g}."
+    guess = _extrapolated(points, (best.at_most or 0.0) / MORE)
+    if guess is None:
+        return f"The least error of all points is {best.at_most:.2g}, and no order tells what a smaller one costs."
+    scheme, dt, seconds = guess
+    return (
+        f"The steps limit the error; a tenth of the least of all would need dt = {dt:.2g} s and "
+        f"{milliseconds(seconds)} with {scheme}, by its order."
+    )
+
+
+def _to_try(points: Sequence[Point]) -> str:
+    """What to do next."""
+    able = [point for point in points if not point.failure]
+    if len(able) < len(points):
+        return f"Take shorter steps where points failed ({len(points) - len(able)} of {len(points)})."
+    others = [point for point in able if not point.same_events]
+    if others:
+        return f"Take shorter steps where events are others than the reference's ({len(others)} points, marked ≠)."
+    if all(point.tol is None for point in able):
+        return "Try simulate(…, tol=…), which finds the step by itself; tols=[…] shows here what it costs."
+    return "Try target=…, which takes steps and tolerances around the error that you want."
 
 
 def _described(point: Point) -> str:
@@ -106,7 +148,7 @@ def _more(points: Sequence[Point], best: Point, target: float, bound: float) -> 
 
 
 def _extrapolated(points: Sequence[Point], target: float) -> tuple[str, float, float] | None:
-    """(scheme, dt, seconds) of the cheapest by the orders at the finest steps, wall time being that of the steps."""
+    """(scheme, dt, seconds) of the cheapest by the orders at the finest steps, time being that of the steps."""
     finest: dict[str, tuple[str, float, float]] = {}
     fixed = [(point.dt, point) for point in points if point.dt is not None]
     for dt, point in sorted(fixed, key=lambda each: each[0], reverse=True):

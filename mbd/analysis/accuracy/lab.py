@@ -9,10 +9,11 @@ from dataclasses import replace
 from typing import Any
 
 from mbd.analysis.accuracy.choices import Plan, plan
-from mbd.analysis.accuracy.points import Point, Subject, measured, retimed
+from mbd.analysis.accuracy.points import Point, Subject, measured
 from mbd.analysis.accuracy.published import Known, Published
 from mbd.analysis.accuracy.result import Accuracy
 from mbd.analysis.accuracy.settings import Setting, is_high, steps_for
+from mbd.analysis.accuracy.timing import retimed
 from mbd.analysis.accuracy.truth import Truth, truth
 from mbd.bodies.values import is_number
 from mbd.errors import ModelError
@@ -44,7 +45,7 @@ def accuracy(
     known: Mapping[str, Known | float] | None = None,
     **options: Any,
 ) -> Accuracy:
-    """Measure what accuracy costs: errors, orders and wall times of schemes, steps and tolerances, across impacts.
+    """Measure what accuracy costs: errors, orders and processor times of schemes, steps and tolerances, across impacts.
 
     The reference is Dormand & Prince's method 8(5,3) with error control on the mechanism's own accelerations; its own
     error is bounded by a second run with another tolerance and other steps, and where it judges `RungeKutta853`, which
@@ -152,8 +153,8 @@ class Bench:
         return measured(self.subject, self.chosen.schemes[name], name, setting, self.known, share)
 
     def again(self, point: Point) -> float:
-        """Wall time of one more run of a point."""
-        return self.subject.run(self.chosen.schemes[point.scheme], point.setting, lambda part: None)[1]
+        """Processor time of one more run of a point [s]."""
+        return self.subject.run(self.chosen.schemes[point.scheme], point.setting, lambda part: None).seconds
 
 
 def _around(chosen: Plan, target: float, point: Callable[[str, Setting], Point]) -> tuple[float, ...]:

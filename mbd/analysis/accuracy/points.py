@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -11,6 +11,7 @@ import numpy as np
 
 from mbd.analysis.accuracy.published import Published
 from mbd.analysis.accuracy.settings import Setting
+from mbd.analysis.accuracy.timing import CLOCK, Timed
 from mbd.analysis.accuracy.truth import CLEAR, Truth, stopped
 from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import MbdError
@@ -21,12 +22,10 @@ from mbd.state import State
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
 
-__all__ = ["CLEAR", "Point", "Setting", "Subject", "measured", "retimed"]
+__all__ = ["CLEAR", "Point", "Setting", "Subject", "measured"]
 
 REPEATS, ENOUGH = 5, 0.2
 """A run is repeated up to this many times, but not once this much wall time [s] is spent on it."""
-ROUNDS, SHORT = 10, 0.3
-"""Rounds over all points, the quickest first, that time each once more until it took this much wall time [s]."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +40,7 @@ class Point:
     at_most : what the error does not exceed: it with the bound of the reference; None where nothing is known
     errors, end_errors : of each quantity: the largest over the instants, and at the end
     order : observed between this step and the next coarser one; None where none can be observed
-    seconds : wall time of the call, the least of some repeats, without derivation and compilation [s]
+    seconds : processor time of the call, the least of some repeats, without derivation and compilation [s]
     steps, iterations, tangents, residuals, factorizations : counts of the run; Newton's are 0 for schemes of one's own
     drift, drift_rate : largest |h| [m or rad] and |ḣ| of the rows that act
     energy : largest energy that the scheme itself gained or lost [J]
@@ -105,8 +104,8 @@ class Subject:
     until: Any
     options: Mapping[str, Any]
 
-    def run(self, scheme: Integrator, setting: Setting, share: Callable[[float], None]) -> tuple[Trajectory, float]:
-        """A run and the wall time of the call, without derivation and compilation [s].
+    def run(self, scheme: Integrator, setting: Setting, share: Callable[[float], None]) -> Timed:
+        """A run and the processor time of the call.
 
         Raises
         ------
@@ -115,14 +114,14 @@ class Subject:
         """
         mechanism = mechanism_of(self.model, self.options.get("backend", "auto"), self.options.get("parameters"))
         last, begin = self.until[1] if isinstance(self.until, tuple) else self.until, self.start.time
-        made, began = mechanism.seconds, perf_counter()
+        made, began, clock = mechanism.seconds, perf_counter(), CLOCK()
         run = simulate(
             self.model, self.start, scheme, **setting.arguments, until=self.until, **self.options, on_failure="return",
             progress=lambda t, _: share((t - begin) / max(last - begin, 1e-300)),
         )  # fmt: skip
         if stopped(run):
             raise KeyboardInterrupt
-        return run, perf_counter() - began - (mechanism.seconds - made)
+        return Timed(run, CLOCK() - clock, perf_counter() - began, mechanism.seconds > made)
 
 
 def measured(
@@ -130,22 +129,22 @@ def measured(
     share: Callable[[float], None],
 ) -> Point:  # fmt: skip
     """Run a scheme, some times over, and judge it; `KeyboardInterrupt` where the user stopped it."""
-    spent, best, run = 0.0, float("inf"), None
+    spent, best = 0.0, None
     point = Point(label, setting.dt, tol=setting.tol)
     for _ in range(REPEATS):
-        began = perf_counter()
         try:
-            latest, seconds = subject.run(scheme, setting, share)
+            latest = subject.run(scheme, setting, share)
         except MbdError as error:
             return replace(point, failure=str(error))
-        if not latest.success and not _is_told(latest, truth, subject):
-            return replace(point, failure=latest.message, **_tolerance(latest, seconds))
-        if seconds < best:
-            run, best = latest, seconds
-        spent += seconds
-        if spent > ENOUGH and perf_counter() - began < 2.0 * seconds:  # else it was compiled on the way
+        if not latest.run.success and not _is_told(latest.run, truth, subject):
+            return replace(point, failure=latest.run.message, **_tolerance(latest))
+        if best is None or latest.seconds < best.seconds:
+            best = latest
+        spent += latest.wall
+        if spent > ENOUGH and not latest.compiled:
             break
-    assert run is not None
+    assert best is not None
+    run = best.run
     violation, stats = run.violation, run.stats
     names = ("steps", "iterations", "tangents", "residuals", "factorizations")
     try:
@@ -155,9 +154,9 @@ def measured(
     if not run.success:
         judged["note"] = "; ".join(filter(None, [judged["note"], run.message.partition(";")[0]]))
     if setting.tol is not None:
-        judged |= _tolerance(run, best) | {"achieved": None if truth is None else truth.achieved(run)}
+        judged |= _tolerance(best) | {"achieved": None if truth is None else truth.achieved(run)}
     return replace(
-        point, seconds=best, **{name: stats[name] for name in names},
+        point, seconds=best.seconds, **{name: stats[name] for name in names},
         drift=max(violation.length, violation.angle), drift_rate=violation.rate,
         energy=float(np.max(np.abs(run.energy.numerical), initial=0.0)), events=len(run.events), **judged,
     )  # fmt: skip
@@ -169,40 +168,16 @@ def _is_told(run: Trajectory, truth: Truth | Published | None, subject: Subject)
     return isinstance(truth, Published) and bool(run.time[-1] >= last)
 
 
-def _tolerance(run: Trajectory, seconds: float) -> dict[str, Any]:
+def _tolerance(timed: Timed) -> dict[str, Any]:
     """What a run to a tolerance says of itself."""
+    run = timed.run
     tolerance = run.stats.get("tolerance")
     if tolerance is None:
         return {}
     return {
         "estimated": tolerance["estimated"], "runs": len(tolerance["runs"]),
-        "trials": max(1.0 - run.stats["wall_seconds"] / seconds, 0.0),
+        "trials": max(1.0 - run.stats["wall_seconds"] / timed.wall, 0.0),
     }  # fmt: skip
-
-
-def retimed(
-    points: Sequence[Point], once: Callable[[Point], float], patience: float, share: Callable[[float], None]
-) -> list[Point]:
-    """The points with the least wall time of some more rounds over all of them.
-
-    Whatever else the machine did during one point's repeats then spoils no comparison.
-
-    Parameters
-    ----------
-    once : wall time of one more run of a point [s]
-    patience : wall time for all rounds [s]
-    """
-    found, began = list(points), perf_counter()
-    places = sorted((k for k, point in enumerate(found) if not point.failure), key=lambda k: found[k].seconds)
-    for turn in range(ROUNDS):
-        for place in places:
-            point, spent = found[place], perf_counter() - began
-            if spent + point.seconds >= patience:
-                return found
-            share(spent / patience)
-            if turn * point.seconds <= SHORT:
-                found[place] = replace(point, seconds=min(point.seconds, once(point)))
-    return found
 
 
 def _judged(run: Trajectory, truth: Truth | Published, scheme: Integrator) -> dict[str, Any]:

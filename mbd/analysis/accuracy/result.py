@@ -124,7 +124,7 @@ class Accuracy(Rows):
 
     # pictures -------------------------------------------------------------------------------------------------------
     def plot(self, path: str | Path | None = None) -> Any:
-        """Work and precision: error over wall time, a line for each scheme, dashed through its tolerances.
+        """Work and precision: error over processor time, a line for each scheme, dashed through its tolerances.
 
         Returns the matplotlib figure, also saved when a path is given.
         """

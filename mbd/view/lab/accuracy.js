@@ -2,7 +2,7 @@
   const { data, chart, legend, short, small, make, show, hide, opens, named, start } = lab;
   const quantity = named("quantity", data.quantities);
   const [which, cost] = ["which", "cost"].map((id) => document.getElementById(id));
-  const units = { seconds: "wall time [ms]", dt: "step dt [ms]", steps: "steps", iterations: "Newton iterations", residuals: "evaluations of the balance" };
+  const units = { seconds: "processor time [ms]", dt: "step dt [ms]", steps: "steps", iterations: "Newton iterations", residuals: "evaluations of the balance" };
   const margin = { left: 66, right: 70, top: 14, bottom: 44 };
 
   const error = (point) => {
