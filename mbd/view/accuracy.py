@@ -53,7 +53,7 @@ def work_precision(found: Accuracy, path: str | Path | None = None) -> Any:
         dashed = any(point.tol is not None for point in shown)
         hollow = any(point.error is None for point in shown)
         marks = [("dashed: tolerances, with their trial runs", dashed), ("hollow: below", hollow)]
-        axes.set_xlabel("; ".join(["processor time [ms]", *(text for text, there in marks if there)]))
+        axes.set_xlabel("; ".join(["processor time [ms]; broad: the least", *(text for text, there in marks if there)]))
         axes.set_ylabel(f"largest error over {'the published value' if found.is_published else 'range'}")
         if shown:
             axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.3)

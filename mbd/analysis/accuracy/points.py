@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from time import perf_counter
+from time import perf_counter, thread_time
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mbd.analysis.accuracy.published import Published
 from mbd.analysis.accuracy.settings import Setting
-from mbd.analysis.accuracy.timing import CLOCK, Timed
 from mbd.analysis.accuracy.truth import CLEAR, Truth, stopped
 from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import MbdError
@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
 
 __all__ = ["CLEAR", "Point", "Setting", "Subject", "measured"]
+
+CLOCK = perf_counter if sys.platform == "win32" else thread_time
+"""Processor time of the thread [s]; wall time where the system counts the other in steps of 16 ms."""
 
 REPEATS, ENOUGH = 5, 0.2
 """A run is repeated up to this many times, but not once this much wall time [s] is spent on it."""
@@ -93,6 +96,16 @@ class Point:
     def reaches(self, target: float) -> bool:
         """Whether the error is certainly no larger than that."""
         return not self.failure and self.at_most is not None and self.at_most <= target
+
+
+@dataclass(frozen=True)
+class Timed:
+    """A run, its processor time and its wall time [s], and whether something was derived or compiled on the way."""
+
+    run: Trajectory
+    seconds: float
+    wall: float
+    compiled: bool
 
 
 @dataclass(frozen=True)

@@ -2,37 +2,20 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
-from time import perf_counter, thread_time
-from typing import TYPE_CHECKING
+from time import perf_counter
 
-if TYPE_CHECKING:
-    from mbd.analysis.accuracy.points import Point
-    from mbd.trajectory import Trajectory
+from mbd.analysis.accuracy.points import Point
 
-__all__ = ["CLOCK", "Timed", "folds", "retimed"]
-
-CLOCK = perf_counter if sys.platform == "win32" else thread_time
-"""Processor time of the thread [s]; wall time where the system counts the other in steps of 16 ms."""
+__all__ = ["folds", "retimed"]
 
 ROUNDS, SHORT = 10, 0.3
 """Rounds over all points, the quickest first, that time each once more until it took this much time [s]."""
 
 COUNTS = ("steps", "iterations", "tangents", "residuals", "factorizations", "events")
 """What a run does: one that does no less of anything takes no less time."""
-
-
-@dataclass(frozen=True)
-class Timed:
-    """A run, its processor time and its wall time [s], and whether something was derived or compiled on the way."""
-
-    run: Trajectory
-    seconds: float
-    wall: float
-    compiled: bool
 
 
 def retimed(
