@@ -8,6 +8,7 @@ import difflib
 import inspect
 import os
 import runpy
+import shlex
 import sys
 import time
 import traceback
@@ -141,10 +142,17 @@ class Script:
 # commands ---------------------------------------------------------------------------------------------------------
 
 
+def _out(arguments: argparse.Namespace) -> Path:
+    """The folder for results of a script, into which can be written."""
+    usual = Path("mbd-runs") / find(arguments.script).stem.replace("_", "-")
+    arguments.out = writable(usual if arguments.out is None else arguments.out)
+    return Path(arguments.out)
+
+
 def run_command(arguments: argparse.Namespace) -> int:
     """``mbd run``: simulate, print a summary, write plots, page, run and record."""
     began = time.perf_counter()
-    out = writable(arguments.out or Path("mbd-runs") / find(arguments.script).stem.replace("_", "-"))
+    out = _out(arguments)
     script = Script.load(arguments.script)
     for wrong, name in script.misspelt().items():
         print(
@@ -160,9 +168,12 @@ def run_command(arguments: argparse.Namespace) -> int:
             if error.run is None:
                 raise
             run, failure = error.run, error
-    wall = {"load": loaded - began, "simulate": time.perf_counter() - loaded}
+    ended = time.perf_counter()
+    wall = {"load": loaded - began, "simulate": ended - loaded}
     _tell(run, script, out, wall, arguments.open)
-    print(f"total        {time.perf_counter() - began:.3f} s")
+    wall = {stage: round(seconds, 3) for stage, seconds in (wall | {"write": time.perf_counter() - ended}).items()}
+    stages = ", ".join(f"{stage} {seconds:.3f} s" for stage, seconds in wall.items())
+    print(f"wall time    {stages}; total {sum(wall.values()):.3f} s")
     if failure is not None:
         raise failure
     return 0 if run.success else 1
@@ -177,7 +188,7 @@ def _tell(run: Trajectory, script: Script, out: Path, wall: dict[str, float], sh
     if len(steps):
         print(f"\n{steps}")
     print(f"\n{run.energy}")
-    print("\nwall time    " + ", ".join(f"{stage} {seconds:.3f} s" for stage, seconds in wall.items()))
+    print()
     plots = find_spec("matplotlib") is not None
     if not plots:
         print("no plots: matplotlib is not installed; try pip install 'mbd[plot]'")
@@ -228,12 +239,16 @@ def new_command(arguments: argparse.Namespace) -> int:
     """``mbd new``: a commented script to begin with."""
     from mbd.view.starter import STARTER
 
+    if not Path(arguments.name).name:
+        raise ModelError(f"a name for the script is expected, such as my-leg, not {arguments.name!r}")
     path = Path(arguments.name).with_suffix(".py")
+    if not path.parent.is_dir():
+        raise FileNotFoundError(f"there is no folder '{path.parent}' for '{path.name}'; make it first")
     if path.exists():
         raise FileExistsError(f"'{path}' exists; give another name")
     title = printable(path.stem.replace("_", " ").replace("-", " "), "script")
     path.write_text(STARTER.format(title=title.replace('"', "'"), file=path, stem=path.stem), encoding="utf-8")
-    print(f"wrote {path}; run it with: mbd run {path}")
+    print(f"wrote {path}; run it with: mbd run {shlex.quote(str(path))}")
     return 0
 
 
@@ -250,6 +265,7 @@ def examples_command(arguments: argparse.Namespace) -> int:
 
 def hardcases_command(arguments: argparse.Namespace) -> int:
     """``mbd hardcases``: judge every hard case."""
+    writable(arguments.out)
     from mbd.hardcases.command import run
 
     return run(arguments.names, arguments.scheme, arguments.slow, arguments.out, arguments.markdown)
@@ -259,6 +275,7 @@ def accuracy_command(arguments: argparse.Namespace) -> int:
     """``mbd accuracy``: errors and wall times of schemes and steps."""
     from mbd.analysis.accuracy.command import run
 
+    _out(arguments)
     return run(Script.load(arguments.script), arguments)
 
 
@@ -266,6 +283,7 @@ def effects_command(arguments: argparse.Namespace) -> int:
     """``mbd effects``: what each effect of a scene costs and changes."""
     from mbd.analysis.effects.command import run
 
+    _out(arguments)
     return run(Script.load(arguments.script), arguments)
 
 

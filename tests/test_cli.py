@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from hashlib import sha256
@@ -337,3 +338,46 @@ def test_the_package_is_a_command_too():
         [sys.executable, "-m", "mbd", "--version"], capture_output=True, text=True, check=True, timeout=60
     )
     assert answer.stdout.strip() == f"mbd {mbd.__version__}"
+
+
+@pytest.mark.parametrize("command", ["run", "accuracy", "effects", "hardcases"])
+@pytest.mark.parametrize(
+    ("folder", "told"),
+    [
+        ("file", "'file' is a file, not a folder; give another folder"),
+        ("file/inside", "is a file, not a folder; give another folder"),
+        ("", "names no folder"),
+        ("x" * 300, "nothing can be written there (File name too long)"),
+        ("nul\0", "nothing can be written there"),
+    ],
+    ids=["file", "inside a file", "empty", "long", "nul"],
+)
+def test_a_folder_that_cannot_be_written_is_told_before_any_work(script, tmp_path, capsys, command, folder, told):
+    path = script("raise SystemExit('work was done')\n")
+    (tmp_path / "file").write_text("")
+    assert cli.main([command, "g1" if command == "hardcases" else path, "--out", folder]) == 1
+    error = capsys.readouterr().err
+    assert error.startswith("error: --out ") and told in error
+    assert {each.name for each in tmp_path.iterdir()} == {"file", "my_walk.py"}
+
+
+@pytest.mark.parametrize("folder", ["a b/ü\"'<x>&", "two\nlines"])
+def test_a_folder_of_any_other_name_is_written_to(script, tmp_path, capsys, folder):
+    assert cli.main(["run", script(WALK), "--out", folder]) == 0
+    assert (tmp_path / folder / "record.json").is_file() and capsys.readouterr().err == ""
+
+
+def test_the_total_is_the_sum_of_the_times_before_it(script, capsys):
+    assert cli.main(["run", script(WALK), "--out", "out"]) == 0
+    [line] = [line for line in capsys.readouterr().out.splitlines() if line.startswith("wall time")]
+    times = [float(word) for word in re.findall(r"[a-z] ([0-9.]+) s", line)]
+    assert line.count("total") == 1 and len(times) == 4 and sum(times[:-1]) == pytest.approx(times[-1], abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "told"), [("", "a name for the script is expected"), ("none/leg", "no folder 'none'")]
+)
+def test_a_new_script_that_has_no_place_is_told(script, capsys, name, told):
+    script("")
+    assert cli.main(["new", name]) == 1
+    assert told in capsys.readouterr().err

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import difflib
-import os
 import re
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import NoReturn
 
 __all__ = ["Parser", "writable"]
@@ -27,11 +28,32 @@ class Parser(argparse.ArgumentParser):
 
 
 def writable(folder: str | Path) -> Path:
-    """A folder for results that can be made and written; an error says so before any work is done."""
-    place = Path(folder)
-    above = next(each for each in (place, *place.absolute().parents) if each.exists())
-    if not above.is_dir():
-        raise NotADirectoryError(f"--out {str(folder)!r}: {str(above)!r} is a file, not a folder; give another folder")
-    if not os.access(above, os.W_OK | os.X_OK):
-        raise PermissionError(f"--out {str(folder)!r}: {str(above)!r} may not be written; give another folder")
+    """A folder for results in which a file was written, and which is gone again if it was not there.
+
+    Raises
+    ------
+    OSError
+        that names the folder and why not, before any work is done.
+    """
+    place, asked = Path(folder), f"--out {str(folder)!r}"
+    if not str(folder):
+        raise FileNotFoundError(f"{asked} names no folder; leave it out, or give the name of one")
+    try:
+        above = next(each for each in (place, *place.absolute().parents) if each.exists())
+        if not above.is_dir():
+            raise NotADirectoryError(f"{asked}: {str(above)!r} is a file, not a folder; give another folder")
+        made = [each for each in (place, *place.absolute().parents) if not each.exists()]
+        try:
+            place.mkdir(parents=True, exist_ok=True)
+            with TemporaryFile(dir=place):
+                pass
+        finally:
+            for each in made:
+                with contextlib.suppress(OSError):
+                    each.rmdir()
+    except NotADirectoryError:
+        raise
+    except (OSError, ValueError) as error:  # no rights, a name that is too long or has a character of no file's name
+        why = getattr(error, "strerror", None) or error
+        raise PermissionError(f"{asked}: nothing can be written there ({why}); give another folder") from error
     return place
