@@ -16,7 +16,7 @@ from mbd.equations.linearization import LinearTerms
 from mbd.equations.ports import PortTerms
 from mbd.errors import ModelError
 
-__all__ = ["LinearMotion", "Prescribed", "linear_motion", "singular"]
+__all__ = ["LinearMotion", "Prescribed", "linear_motion", "multiplier_map", "singular"]
 
 VANISHES = 1e-6
 """Part of a second derivative along the free motions, relative, below which dependent rows agree nearby too [-]."""
@@ -28,7 +28,7 @@ FITS = 1e-8
 class Prescribed:
     """Derivatives of what inputs prescribe: columns for w and ẇ of each, and for the input.
 
-    states : (number among the inputs, order) of each column of w and ẇ
+    states : (number among the inputs, order) of each column of w and ẇ; names : theirs
     place, speed : (m, s) what these add to ``B δx`` and to ``B δv + ∂ḣ/∂x δx``
     force, change : (N, s) and (m, s) to the balance and to ḧ; input_force, input_change : (N, k), (m, k) of the inputs
     rates : (s, s), (s, k) of the states by themselves and by inputs
@@ -36,6 +36,7 @@ class Prescribed:
     """
 
     states: tuple[tuple[int, int], ...]
+    names: tuple[str, ...]
     place: Matrix
     speed: Matrix
     force: Matrix
@@ -78,7 +79,8 @@ class Prescribed:
                     own[j, j + 1] = 1.0
                 else:
                     driven[j, number] = 1.0
-        return cls(states, place, speed, force, change, into, bend, (own, driven), (through, direct))
+        names = tuple(name for each in inputs for name in each.states)
+        return cls(states, names, place, speed, force, change, into, bend, (own, driven), (through, direct))
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,9 +153,13 @@ def _followed(found: Instant, terms: LinearTerms, chosen: Independent, given: Pr
     by_speed = [k for k in range(n_v) if k not in chosen.speeds]
     change[by_place] = _solved(B[held][:, by_place], -place[held])
     change[[n_v + k for k in by_speed]] = _solved(B[:, by_speed], -(speed + turning @ change[:n_v]))
-    left = [B[held] @ change[:n_v] + place[held], B @ change[n_v : 2 * n_v] + turning @ change[:n_v] + speed]
-    if max(float(np.max(np.abs(part), initial=0.0)) for part in left) > FITS:
-        raise ModelError("the rows leave a prescribed motion no freedom: other rows hold what it would move")
+    place = np.where(held[:, None], B @ change[:n_v] + place, 0.0)
+    left = np.abs(np.vstack([place, B @ change[n_v : 2 * n_v] + turning @ change[:n_v] + speed])) > FITS
+    if np.any(left):
+        names = ", ".join(repr(name) for name, bad in zip(given.names, np.any(left, axis=0), strict=True) if bad)
+        lines = np.any(left.reshape(2, len(B), s), axis=(0, 2))
+        titles = ", ".join(title for title, bad in zip(found.titles, lines, strict=True) if bad)
+        raise ModelError(f"the rows leave {names} no freedom: what they prescribe is held besides ({titles})")
     return change
 
 
@@ -171,13 +177,8 @@ def _multipliers(
     Where rows depend on each other, multipliers are open, but what is made of their forces is not.
     """
     flags = np.array(found.dependent, dtype=bool)
-    change = np.zeros((len(flags), kept.shape[1]))
-    change[~flags] = kept
-    if not np.any(flags):
-        return change
-    part = found.loads()
-    if part is not None:
-        change[flags] = part @ kept
+    change = multiplier_map(found) @ kept
+    if not np.any(flags) or found.sliding:
         return change
     from scipy.linalg import null_space
 
@@ -193,6 +194,17 @@ def _multipliers(
             "outputs that do not depend on the share, or leave out what is held twice"
         )
     return change
+
+
+def multiplier_map(found: Instant) -> Matrix:
+    """(m, kept) multipliers of all active rows from those of the independent ones: 0, or shares of sliding ones."""
+    flags = np.array(found.dependent, dtype=bool)
+    whole = np.zeros((len(flags), int(np.count_nonzero(~flags))))
+    whole[~flags] = np.eye(whole.shape[1])
+    part = found.loads()
+    if part is not None:
+        whole[flags] = part
+    return whole
 
 
 def singular(found: Instant, terms: LinearTerms, chosen: Independent) -> list[str]:

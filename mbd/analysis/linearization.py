@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from mbd.analysis.descriptor import DescriptorForm, descriptor_form
 from mbd.analysis.instant import Instant
+from mbd.analysis.linear_motion import Prescribed
+from mbd.analysis.ports import Input, Output, port_terms
 from mbd.analysis.state_space import StateSpace
 from mbd.arrays import Matrix, Vector
 from mbd.configuration import Configuration
@@ -82,6 +85,7 @@ class Linearization:
     instant: Instant = field(repr=False)
     prescribed: Vector = field(repr=False)
     has_ports: bool = field(repr=False)
+    ends: tuple[tuple[Input, ...], tuple[Output, ...]] = field(repr=False)
 
     @property
     def states(self) -> tuple[str, ...]:
@@ -222,6 +226,25 @@ class Linearization:
     def frequency_response(self, frequencies: Any) -> Any:
         """`StateSpace.frequency_response`."""
         return self.state_space.frequency_response(frequencies)
+
+    def descriptor(self) -> DescriptorForm:
+        """The same motion with nothing eliminated, ``E ξ̇ = A ξ + B δu``, for those who treat rows themselves.
+
+        Raises a `ModelError` where rows turn as the state moves.
+        """
+        inputs, outputs = self.ends
+        local = port_terms(self.instant, inputs, outputs)
+        given = Prescribed.of(inputs, local, self.instant.velocity)
+        equations = self.instant.mechanism.equations
+        names = *self.coordinates, *equations.velocity_names, *(each.name for each in equations.states)
+        seen = [each.name for each in outputs]
+        terms = self.instant.terms()
+        form = descriptor_form(self.instant, terms, local, given, names, (self.inputs, seen))
+        if outputs:
+            return form
+        places = [*self.picked, *range(len(form.E) - len(given.names), len(form.E))]
+        direct = np.zeros((len(places), len(inputs)))
+        return replace(form, C=np.eye(len(form.E))[places], D=direct, outputs=self.states)
 
     def _of_changes(self) -> StateSpace:
         """`state_space`; a warning where the state does not stay, so that its equations are those of an instant."""

@@ -102,7 +102,7 @@ def linearize(
         equations.name, state.time, tuple(name for name, _ in equations.configuration.freedoms), found.titles,
         terms.M[:n_v, :n_v], terms.C[:n_v, :n_v], terms.K[:n_v], terms.B, space, motion.basis,
         np.concatenate([state.q, state.v, state.z]), np.concatenate([state.v, found.rate]), local.y, eigenvalues,
-        shapes, picked, found, np.array(values), not (inputs is None and outputs is None),
+        shapes, picked, found, np.array(values), not (inputs is None and outputs is None), (given, seen),
     )  # fmt: skip
 
 

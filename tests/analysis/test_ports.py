@@ -14,6 +14,7 @@ import mbd
 from mbd.assembly.posture import Posture, close_nearby, close_velocities
 from mbd.testing.mechanisms import random_loop, random_tree
 from tests.cases.small_motions import PLAIN, four_bar
+from tests.joints.quaternion_ball import QuaternionBall
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*nothing depends on:mbd.errors.MbdWarning")
 
@@ -241,6 +242,8 @@ def test_a_prescribed_motion_acts_by_its_acceleration(cut, swing):
             ends.append(look(model, there, parameters=given, **ports))
         return [(a - b) / (2 * STEP) for a, b in zip(*(reaction(end, found) for end in ends), strict=True)]
 
+    with pytest.raises(mbd.ModelError, match="rows turn as this state moves .*give an equilibrium"):
+        found.descriptor()
     rate, seen = difference("change", moves=False)
     assert found.B[:count, 0] == pytest.approx(rate, abs=1e-5)
     assert found.D[:, 0] == pytest.approx(seen, abs=1e-5)
@@ -264,6 +267,24 @@ def test_a_prescribed_motion_acts_by_its_acceleration(cut, swing):
         assert found.C[:, column] == pytest.approx(seen, rel=1e-5, abs=1e-4)
 
 
+@pytest.mark.parametrize("cut", ["auto", "all"])
+def test_a_pendulum_on_a_driven_cart_has_its_transfer_function(cut):
+    """A point mass on a rod of length L: θ/ẅ = −(1/L)/(s² + g/L), and the drive feels (M + m) ẅ + m L θ̈."""
+    length, mass, cart = 0.5, 0.7, mbd.PointMass("cart", 2.0)
+    model, bob = mbd.Model("driven", cut=cut), mbd.Link("bob", mass, length, length)
+    rail = mbd.Prismatic("rail", model.ground.origin, cart.origin)
+    model.connect(rail, mbd.Revolute("pin", cart.origin, bob.start))
+    model.constrain(mbd.Bilateral("drive", rail, 0.3))
+    state = mbd.assemble(model, backend=PLAIN)
+    found = look(model, state, inputs="drive.value.acceleration", outputs=["pin.angle", "drive.force"])
+    s = np.array([0.4 + 1.0j, 3.0j + 1.0])
+    swing = -1.0 / (length * s**2 + 9.81)
+    wanted = np.stack([swing, (2.0 + mass) + mass * length * s**2 * swing], axis=-1)[..., None]
+    assert found.transfer(s) == pytest.approx(wanted, rel=1e-9)
+    assert found.descriptor().transfer(s) == pytest.approx(wanted, rel=1e-9)
+    assert found.x[-2:] == pytest.approx([0.3, 0.0]) and found.state_space.state_units[-2:] == ("m", "m/s")
+
+
 def test_a_belt_acts_by_the_rate_of_its_speed():
     """A wheel on a belt of speed w, ẋ + r φ̇ + w = 0: m ẍ = F, I φ̈ = r F, so that ẍ = −I ẇ/(I + m r²)."""
     mass, radius, inertia = 2.0, 0.3, 0.11
@@ -277,6 +298,7 @@ def test_a_belt_acts_by_the_rate_of_its_speed():
     state = mbd.assemble(model, position={"roll.y": radius}, velocity={"roll.angle": 0.5}, backend=PLAIN)
     found = look(model, state, inputs="belt.bias.rate", outputs=["roll.x.rate", "roll.angle.rate", "belt.force"])
     assert found.states[-1] == "belt.bias" and found.x[-1] == 0.0
+    assert found.descriptor().transfer(1.0 + 2.0j) == pytest.approx(found.transfer(1.0 + 2.0j))
     share = inertia / (inertia + mass * radius**2)
     free = found.states.index("roll.x.rate")
     assert found.state_space.input_units == ("m/s²",)
@@ -327,6 +349,8 @@ def test_poles_and_transfer_functions_do_not_depend_on_the_cut(seed, loop):
         found.append(look(model, state, parameters=held, inputs=effort[-3:], outputs=outputs))
     poles, wanted = np.poly(found[0].state_space.poles), found[0].transfer(points)
     for other in found:
+        whole = other.descriptor()
+        assert whole.transfer(points) == pytest.approx(wanted, rel=1e-6, abs=1e-7 * (1 + np.max(np.abs(wanted))))
         assert other.is_equilibrium
         assert np.poly(other.state_space.poles) == pytest.approx(poles, rel=1e-6, abs=1e-6 * np.max(np.abs(poles)))
         assert other.transfer(points) == pytest.approx(wanted, rel=1e-6, abs=1e-8 * (1 + np.max(np.abs(wanted))))
@@ -358,3 +382,24 @@ def test_small_inputs_move_a_run_as_the_linear_equations_say():
         assert np.max(np.abs(wanted), axis=0) == pytest.approx(np.max(np.abs(seen), axis=0), rel=0.1)
         left.append(np.max(np.abs(seen - wanted), axis=0))
     assert np.all(left[0] < 0.02) and left[0] / left[1] == pytest.approx(4.0, rel=0.3)
+
+
+def test_coordinates_that_do_not_add_have_ports_too():
+    """A turning top on a ball joint: B and D by parameters, A and C by small turns in its own axes."""
+    model, body = mbd.Model("top"), mbd.RigidBody("top", 1.2, (0.02, 0.008, 0.02), center=(0.0, 0.3, 0.0))
+    model.connect(QuaternionBall("ball", model.ground.origin, body.origin))
+    tip = body.point(0.1, 0.5, 0.2, name="tip")
+    model.apply(mbd.Applied("push", tip, force=(1.5, 2.0, 0.5), torque=(0.3, 0.1, 0.2), axes=body.origin))
+    state = mbd.assemble(model, velocity={"ball.spin y": 3.0, "ball.spin x": 0.7}, backend=PLAIN)
+    ports = {"inputs": ["push.force.x", "push.torque.z", "gravity.x"]}
+    ports["outputs"] = ["top.tip", "top.tip.vy", "ball.reaction_force"]
+    found = look(model, state, **ports)
+    check_by_parameters(model, state, found, ports, ports["inputs"])
+    configuration = found.instant.mechanism.equations.configuration
+    for k, turn in enumerate(STEP * np.eye(3)):
+        ends = [replace(state, q=configuration.compose(state.q, side * turn)) for side in (1, -1)]
+        a, b = (look(model, end, **ports) for end in ends)
+        assert found.C[:, k] == pytest.approx((a.output_values - b.output_values) / (2 * STEP), abs=1e-6)
+        assert found.A[3:, k] == pytest.approx((a.drift - b.drift)[3:] / (2 * STEP), abs=1e-6)
+    assert found.descriptor().transfer(2.0j + 1.0) == pytest.approx(found.transfer(2.0j + 1.0), abs=1e-9)
+    assert found.descriptor().outputs == found.outputs and "d/dt ball.spin x" in repr(found.descriptor())

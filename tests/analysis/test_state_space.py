@@ -145,7 +145,7 @@ def test_a_motion_that_rows_hold_twice_is_no_input():
     for name in "drive", "lock":
         model.constrain(mbd.Bilateral(name, model.joints[0], 0.3))
     state = mbd.assemble(model, backend=PLAIN)
-    with pytest.raises(mbd.ModelError, match="no freedom"):
+    with pytest.raises(mbd.ModelError, match=r"the rows leave 'drive.value'.* no freedom: .*'(drive|lock)'"):
         mbd.linearize(model, state, backend=PLAIN, inputs="drive.value.acceleration")
 
 
