@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from functools import partialmethod
 from typing import Any
 
 import pytest
@@ -156,6 +157,21 @@ def test_a_method_that_cannot_be_called_or_answers_wrongly_is_refused_as_the_wor
 def test_what_shows_as_equations_are_derived_is_named(kind, method, own, said):
     with pytest.raises(mbd.ModelError, match=said.replace("{0}", HERE)):
         mbd.assemble(KINDS[kind](type(kind.__name__, (kind,), {method: own})()))
+
+
+def test_what_the_base_leaves_open_may_be_left_out_or_made_in_other_ways():
+    """An integrator whose `order` takes no system, a static and a partial method, a field in place of a property."""
+
+    class Own(mbd.HHT):
+        def order(self):
+            return 2
+
+    own = {
+        "act": partialmethod(lambda self, more, scope: Action(), 1.0), "parameters": staticmethod(dict),
+        "mentions": classmethod(lambda cls: []), "kind": "potential",
+    }  # fmt: skip
+    model = with_force(type("Own", (OwnForce,), own)())
+    assert mbd.simulate(model, mbd.assemble(model), Own(), dt=1e-2, until=0.02).success
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)

@@ -167,24 +167,20 @@ def _difference(name: str, promise: Any, own: Any) -> str:
     taken = list(inspect.signature(promise).parameters.values())
     if any(each.kind is each.VAR_POSITIONAL for each in taken):
         return ""
-    given = [each.name for each in taken[1:] if each.kind is not each.KEYWORD_ONLY]
-    named = [each.name for each in taken if each.kind is each.KEYWORD_ONLY]
-    wanted = f"def {name}({', '.join(['self', *given, *named])})"
+    needed = [each for each in taken[1:] if each.default is each.empty]  # the others may be left out by either side
+    given = [each.name for each in needed if each.kind is not each.KEYWORD_ONLY]
+    named = [each.name for each in needed if each.kind is each.KEYWORD_ONLY]
+    call, wanted = f"{name}({', '.join(given)})", f"def {name}({', '.join(['self', *given, *named])})"
     if isinstance(own, property | cached_property):
-        return f"{name} is a property, and is called as {name}({', '.join(given)}); write {wanted} without @property"
-    if not callable(own) and not isinstance(own, staticmethod | classmethod):
-        return f"{name} is {shown(own)}, and is called as {name}({', '.join(given)}); write {wanted}"
+        return f"{name} is a property, and is called as {call}; write {wanted} without @property"
+    if not callable(own) and not hasattr(own, "__get__"):
+        return f"{name} is {shown(own)}, and is called as {call}; write {wanted}"
     static = isinstance(own, staticmethod)
     function = own.__func__ if isinstance(own, staticmethod | classmethod) else own
     if not inspect.isfunction(function):
         return ""
-    shortest = [each.name for each in taken[1:] if each.kind is not each.KEYWORD_ONLY and each.default is each.empty]
-    for call, more in ((given, named), (shortest, ())):  # with all of them, and with those that must be given
-        why = not_callable_with(function, call if static else ["self", *call], more)
-        if why:
-            head = f"{_written(function)} is called as {name}({', '.join(call)})"
-            return f"{head}, which it cannot take ({why}); write {wanted}"
-    return ""
+    why = not_callable_with(function, given if static else ["self", *given], named)
+    return f"{_written(function)} is called as {call}, which it cannot take ({why}); write {wanted}" if why else ""
 
 
 def _answer_faults(word: Any) -> Iterator[str]:
