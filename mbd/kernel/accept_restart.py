@@ -10,7 +10,7 @@ from mbd.kernel.candidate import accept_candidate, revert_candidate
 from mbd.kernel.codes import PULL
 from mbd.kernel.guards import watch
 from mbd.kernel.records import Balance, Guards, Kernel, Reals, Switching
-from mbd.kernel.restart import active_rows, consistent, evaluate, largest_force, stepping_rows
+from mbd.kernel.restart import active_rows, consistent, evaluate, largest_force, stepping_rows, take_consistent
 from mbd.kernel.saddle import correct_velocities, solve_rows
 from mbd.kernel.trial_step import try_step
 
@@ -108,5 +108,4 @@ def accept_for_restart(K: Switching, t1: float) -> None:
         if would_pull(K):
             balance(K)
             return
-        K.rate[: K.n] = K.jump[: K.n]
-        K.lam[: K.n_rows] = K.impulse[: K.n_rows]
+        take_consistent(K)

@@ -17,7 +17,7 @@ from mbd.kernel.locate import locate
 from mbd.kernel.nonsmooth import closes_below_surface, must_release
 from mbd.kernel.observe import is_awaited, store_row
 from mbd.kernel.records import Events, Guards, Kernel, Mechanism, Switching
-from mbd.kernel.restart import consistent, largest_force
+from mbd.kernel.restart import consistent, largest_force, take_consistent
 from mbd.kernel.singular.events import find_passed_events, log_passed_events, may_pass_events, refuses
 from mbd.kernel.singular.leave import leave_singularity
 from mbd.kernel.singular.step_pairs import ALONE, FIRST, SECOND
@@ -163,8 +163,7 @@ def calm(K: Switching) -> bool:
         return False
     if consistent(K, K.time, K.q, K.y) != 0:
         return False
-    K.rate[: K.n] = K.jump[: K.n]
-    K.lam[: K.n_rows] = K.impulse[: K.n_rows]
+    take_consistent(K)
     K.restarted_here = 1
     K.restart_due = 2
     return True

@@ -6,7 +6,7 @@ from mbd.kernel.codes import LOG_CLOSED, LOG_OPENED, LOG_SLIPPED, LOG_STUCK, NO_
 from mbd.kernel.complementarity import complementarity
 from mbd.kernel.impact_solve import strikes
 from mbd.kernel.records import Balance, Frictions, Guards, Sizes, Switching
-from mbd.kernel.restart import active_rows, capture, evaluate, row_speed
+from mbd.kernel.restart import active_rows, capture, evaluate, row_speed, take_consistent
 from mbd.kernel.saddle import solve_rows
 
 __all__ = ["ALL_IMPULSES", "NO_IMPULSE", "OWN_IMPULSE", "STILL", "log_event", "room_to_log", "resolve_contact_modes"]
@@ -74,8 +74,7 @@ def resolve_contact_modes(K: Switching) -> int:
             return NO_FORCE
     if status != 0:
         return status
-    K.rate[: K.n] = K.jump[: K.n]
-    K.lam[: K.n_rows] = K.impulse[: K.n_rows]
+    take_consistent(K)
     for c in range(K.n_contacts):
         K.touched[c] = 0
         if K.kind[c] == 0 and K.active[c] != K.closed[c]:

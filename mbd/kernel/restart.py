@@ -23,7 +23,7 @@ __all__ = [
     "active_rows", "add_shares", "capture", "compose", "consistent", "displace", "evaluate", "evaluate_loaded",
     "fill_block", "holds_rows", "largest_force", "limit_of", "load_accelerations", "lower_scales", "measure_accepted",
     "minimum_norm_multipliers", "note_scales", "raise_scales", "refresh_scales", "restore_scales", "retain_scales",
-    "row_speed", "share_loads", "stepping_rows",
+    "row_speed", "share_loads", "stepping_rows", "take_consistent",
 ]  # fmt: skip
 
 FAR_ABOVE = 100.0
@@ -286,6 +286,12 @@ def consistent(K: Balance, t: float, q: Reals, y: Reals) -> int:
     if status == 0 and K.n_frictions > 0:
         find_sliding_friction(K)
     return status
+
+
+def take_consistent(K: Balance) -> None:
+    """The rates in K.jump and the multipliers in K.impulse become those of the accepted state."""
+    K.rate[: K.n] = K.jump[: K.n]
+    K.lam[: K.n_rows] = K.impulse[: K.n_rows]
 
 
 def find_limits_of_loads(K: ContactRows) -> None:

@@ -11,7 +11,7 @@ from mbd.kernel.guards import update_armed, watch
 from mbd.kernel.hooks import scheme_start
 from mbd.kernel.records import Balance, DependentRows, Kernel
 from mbd.kernel.redundancy import find_dependent, sharing, spread
-from mbd.kernel.restart import active_rows, evaluate, refresh_scales, stepping_rows
+from mbd.kernel.restart import active_rows, evaluate, refresh_scales, stepping_rows, take_consistent
 
 __all__ = ["find_mode", "restart", "still_dependent"]
 
@@ -80,8 +80,7 @@ def correct_start(K: Balance) -> int:
     K.impulse[: K.n_rows] = K.lam[: K.n_rows]
     status = refine_accelerations(K)
     if status == 0:
-        K.rate[: K.n] = K.jump[: K.n]
-        K.lam[: K.n_rows] = K.impulse[: K.n_rows]
+        take_consistent(K)
     return status
 
 

@@ -25,7 +25,7 @@ from mbd.arrays import Vector
 from mbd.errors import CapabilityError
 from mbd.kernel.hints import shown
 from mbd.kernel.records import Kernel, Sizes
-from mbd.kernel.schemes.memory import take_consistent
+from mbd.kernel.restart import take_consistent
 
 __all__ = ["MEMORY", "NO_SCHEME", "SCHEMES", "Abilities", "Scheme", "dispatch", "number_of", "scheme_named", "schemes"]
 

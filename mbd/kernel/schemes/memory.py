@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-from mbd.kernel.records import Balance, SingularSteps, State, Steps
+from mbd.kernel.records import SingularSteps, State, Steps
 from mbd.kernel.restart import note_scales, raise_scales, retain_scales
 
-__all__ = ["accept_step", "forget_steps", "look_a_step_ahead", "start_step", "take_consistent"]
+__all__ = ["accept_step", "forget_steps", "look_a_step_ahead", "start_step"]
 
 
 def start_step(K: State) -> float:
     """The step that a start prepares for."""
     return float(K.dt if K.adaptive == 1 else K.step)
-
-
-def take_consistent(K: Balance) -> None:
-    """The rates in K.jump and the multipliers in K.impulse become those of the accepted state."""
-    K.rate[: K.n] = K.jump[: K.n]
-    K.lam[: K.n_rows] = K.impulse[: K.n_rows]
 
 
 def forget_steps(K: SingularSteps) -> None:

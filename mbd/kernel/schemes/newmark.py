@@ -11,7 +11,7 @@ from mbd.kernel.charts import find_chart_end
 from mbd.kernel.codes import PASSING
 from mbd.kernel.conditioning import is_ill_conditioned, refine_accelerations
 from mbd.kernel.records import Kernel, Steps
-from mbd.kernel.restart import compose, consistent, fill_block, measure_accepted
+from mbd.kernel.restart import compose, consistent, fill_block, measure_accepted, take_consistent
 from mbd.kernel.schemes.contract import Scheme
 from mbd.kernel.schemes.iteration import predict, shift_growth
 from mbd.kernel.schemes.memory import accept_step, forget_steps, look_a_step_ahead, start_step
@@ -117,8 +117,7 @@ def newmark_resume(K: Kernel, h: float) -> int:
     """
     for i in range(K.n):
         K.aux1[i] = (K.aux[i] - K.rate[i]) * (start_step(K) / h)
-        K.rate[i] = K.jump[i]
-    K.lam[: K.n_rows] = K.impulse[: K.n_rows]
+    take_consistent(K)
     status = newmark_start(K)
     for i in range(K.n):
         K.aux[i] = K.rate[i] + K.aux1[i]

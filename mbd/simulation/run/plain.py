@@ -19,9 +19,9 @@ from mbd.kernel.codes import NOT_CONVERGED, NOT_FINITE, TOO_NEAR
 from mbd.kernel.hints import shown
 from mbd.kernel.mass_ratios import LOSS
 from mbd.kernel.records import Kernel
-from mbd.kernel.restart import MOST_LOADS, evaluate, fill_block, refresh_scales
+from mbd.kernel.restart import MOST_LOADS, evaluate, fill_block, refresh_scales, take_consistent
 from mbd.kernel.schemes.contract import Scheme
-from mbd.kernel.schemes.memory import start_step, take_consistent
+from mbd.kernel.schemes.memory import start_step
 from mbd.kernel.singular.step_size import accept_row_norms, forget_row_norms, note_row_norms
 from mbd.simulation.run.shared_loads import shares
 from mbd.simulation.user_calls import asked
@@ -316,7 +316,7 @@ class PlainScheme:
 
     def resume(self, K: Kernel, h: float) -> int:
         """The same after a step that told `LEFT`, from the rates in K.jump and the multipliers in K.impulse."""
-        K.rate[:], K.lam[:] = K.jump[: K.n], K.impulse[: K.n_rows]
+        take_consistent(K)
         state, mode, _ = self._state(K)
         scheme: Any = self.integrator  # one of the family: no other tells that
         return self._begin(K, scheme.resume(self.system, state, mode, start_step(K), self.memory))
