@@ -251,7 +251,7 @@ def judge_user(K: Switching, e: int, h: float) -> None:
         consider(K, CROSS, e, crossing(v0, v1) if v0 > 0.0 else 0.0, 0.0)
 
 
-def judge_return(K: Switching, e: int, v0: float, v1: float, h: float) -> None:
+def judge_return(K: Events, e: int, v0: float, v1: float, h: float) -> None:
     """Whether a user's guard, above zero at both ends of the step, seems to dip below or to come close between them."""
     d0 = K.side[e] * K.guards0[K.at_user_rate + e] * h
     d1 = K.side[e] * K.guards1[K.at_user_rate + e] * h
