@@ -13,7 +13,6 @@ from mbd.equations.equations import Contact, Effect, Equations, Row
 from mbd.equations.outputs import AXES, Outputs
 from mbd.equations.reactions import Wrench, reaction
 from mbd.forces.base import Force
-from mbd.forces.motor import Motor
 from mbd.joints.base import Joint
 from mbd.scope import Triple
 from mbd.tape.node import Scalar, Tape
@@ -41,7 +40,7 @@ def offer_results(
     offer_rows(outputs, tape, rows)
     offer_contacts(outputs, tape, rows, contacts)
     offer_effects(outputs, tape, equations.effects)
-    _offer_motors(outputs, scope, model.forces)
+    _offer_forces(outputs, scope, model.forces)
     for name, energy in ("kinetic_energy", equations.kinetic), ("potential_energy", equations.potential):
         outputs.value(name, energy)
     _offer_joints(outputs, scope, dynamics, work, rows, hidden)
@@ -138,9 +137,12 @@ def offer_effects(outputs: Outputs, tape: Tape, effects: Iterable[Effect]) -> No
             outputs.value(f"{effect.name}.energy", effect.potential)
 
 
-def _offer_motors(outputs: Outputs, scope: DerivationContext, forces: Iterable[Force]) -> None:
-    """Torque (or force) of motors."""
+def _offer_forces(outputs: Outputs, scope: DerivationContext, forces: Iterable[Force]) -> None:
+    """What forces tell of themselves: the torque of a motor, the force of a spring."""
     for force in forces:
-        if isinstance(force, Motor):
-            ((_, torque),) = force.act(scope).pairs
-            outputs.value(f"{force.name}.{'torque' if force.joint.labels[0].unit == 'rad' else 'force'}", torque)
+        for field, result in force.results().items():
+            name, make = f"{force.name}.{field}", partial(result.value, scope)
+            if result.is_vector:
+                outputs.triple(name, make)  # type: ignore[arg-type]
+            else:
+                outputs.add(name, make)  # type: ignore[arg-type]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from mbd.bodies.algebra import rotate
@@ -10,7 +11,7 @@ from mbd.bodies.base import Frame
 from mbd.bodies.point_mass import PointMass
 from mbd.bodies.values import name_of
 from mbd.errors import ModelError
-from mbd.forces.base import Action, Force, frame_of
+from mbd.forces.base import Action, Force, Result, frame_of
 from mbd.forces.quantities import (
     Instants,
     Mention,
@@ -114,3 +115,11 @@ class Applied(Force):
                 along = (x, y, z) if self.axes is None else rotate(scope.frame(self.axes).rotation, (x, y, z))
                 pairs += zip(velocity, along, strict=True)
         return Action(pairs=tuple(pairs))
+
+    def results(self) -> dict[str, Result]:
+        """'force' and 'torque', those that it has."""
+        fields = [field for field in ("force", "torque") if getattr(self, field) is not None]
+        return {field: Result(partial(self._component, field), is_vector=True) for field in fields}
+
+    def _component(self, field: str, scope: Scope) -> tuple[Scalar, ...]:
+        return triple_at(getattr(self, field), self.arguments, scope, self.name, field)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from mbd.bodies.base import Frame
 from mbd.bodies.domains import Parameterized
@@ -13,7 +15,7 @@ from mbd.joints.base import Joint
 from mbd.scope import Scope
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["Action", "Force", "frame_of", "joint_of"]
+__all__ = ["Action", "Force", "Result", "frame_of", "joint_of"]
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,13 @@ class Action:
     potential: Scalar | None = None
     dissipation: Scalar | None = None
     rates: tuple[tuple[Node, Scalar], ...] = ()
+
+
+class Result(NamedTuple):
+    """A result of a force: its value, traced as it is asked for, and whether it is a vector in ground axes."""
+
+    value: Callable[[Scope], Scalar | Sequence[Scalar]]
+    is_vector: bool = False
 
 
 class Force(Parameterized, ABC):
@@ -62,6 +71,10 @@ class Force(Parameterized, ABC):
     @abstractmethod
     def parameters(self) -> dict[str, float]:
         """Run-time parameters by full name."""
+
+    def results(self) -> dict[str, Result]:
+        """What runs know of it besides its power and energy, by field: {'force': Result(…)} is 'name.force'."""
+        return {}
 
     def instants(self) -> Instants:
         """Times at which its sampled signals have a kink [s]."""

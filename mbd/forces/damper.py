@@ -9,7 +9,7 @@ from typing import Any
 from mbd.bodies.algebra import difference, dot, norm
 from mbd.bodies.base import Frame
 from mbd.bodies.values import is_number, name_of
-from mbd.forces.base import Action, Force, frame_of
+from mbd.forces.base import Action, Force, Result, frame_of
 from mbd.forces.quantities import Mention
 from mbd.joints.losses.base import Loss, loss_of
 from mbd.joints.losses.viscous import Viscous
@@ -79,3 +79,7 @@ class Damper(Force):
         arm = difference(b.position, a.position)
         rate = dot(arm, difference(b.velocity, a.velocity)) / norm(arm)
         return Action(pairs=((rate, -self.law.force(rate, scope, self.name)),))
+
+    def results(self) -> dict[str, Result]:
+        """'force': F(ḋ), which pulls its ends together where it is positive [N]."""
+        return {"force": Result(lambda scope: -self.act(scope).pairs[0][1])}

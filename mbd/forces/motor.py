@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from mbd.bodies.values import name_of
-from mbd.forces.base import Action, Force, joint_of
+from mbd.errors import ModelError
+from mbd.forces.base import Action, Force, Result, joint_of
 from mbd.forces.quantities import (
     Instants,
     Mention,
@@ -26,27 +27,49 @@ __all__ = ["Motor"]
 
 @dataclass(frozen=True)
 class Motor(Force):
-    """A torque (or force) on the one coordinate of a joint, on the child and back on the parent: power ``T q̇``.
+    """A torque, or force, on the one coordinate of a joint, on the child and back on the parent: power ``T q̇``.
+
+    ``Motor("drive", hinge, torque=2.0)``, ``Motor("drive", slider, force=50.0)``
 
     Parameters
     ----------
     name : its name
     joint : a Revolute, Screw or Prismatic joint
-    torque : T [N m or N], positive along the coordinate: a number (the parameter 'name.torque'), a function, a sympy
-        expression or `Samples`
+    torque : T [N m], positive along the coordinate: a number (the parameter 'name.torque'), a function, a sympy
+        expression or `Samples`, and so is the result called. Along a slider it is a force [N], and so is the result
     arguments : what a function is called with, as for `Applied`
+    force : the same along a slider [N], under the name that its result has: the parameter 'name.force'
     """
 
     name: str
     joint: Joint
-    torque: Any
+    torque: Any = None
     arguments: Any = ("t",)
+    force: Any = None
 
     def __post_init__(self) -> None:
         name_of(self.name, "Motor")
         joint_of(self.joint, f"joint of Motor '{self.name}'")
-        object.__setattr__(self, "torque", quantity_of(self.torque, f"torque of '{self.name}'"))
+        if (self.torque is None) == (self.force is None):
+            raise ModelError(
+                f"Motor '{self.name}' takes torque=… of an angle, or force=… along a slider, one of the two"
+            )
+        if self.force is not None and self.joint.labels[0].unit == "rad":
+            raise ModelError(
+                f"Motor '{self.name}' turns '{self.joint.name}', so that it has a torque: give torque=… [N m]"
+            )
+        object.__setattr__(self, self.field, quantity_of(self.effort, f"{self.field} of '{self.name}'"))
         object.__setattr__(self, "arguments", arguments_of(self.arguments, f"Motor '{self.name}'"))
+
+    @property
+    def field(self) -> str:
+        """'torque' or 'force': which was given."""
+        return "torque" if self.force is None else "force"
+
+    @property
+    def effort(self) -> Any:
+        """The torque or force."""
+        return self.torque if self.force is None else self.force
 
     @property
     def kind(self) -> str:
@@ -64,17 +87,25 @@ class Motor(Force):
 
     def parameters(self) -> dict[str, float]:
         """`torque` where it is a number, and arguments given as numbers."""
-        return value_parameters(self.torque, self.arguments, self.name, "torque")
+        return value_parameters(self.effort, self.arguments, self.name, self.field)
 
     def laws(self) -> tuple[str, ...]:
         """`torque` where it is no number."""
-        return law_names(self.torque, self.name, "torque")
+        return law_names(self.effort, self.name, self.field)
 
     def instants(self) -> Instants:
         """Kinks of its samples."""
-        return kinks(self.torque)
+        return kinks(self.effort)
 
     def act(self, scope: Scope) -> Action:
         """The torque on the rate."""
         (rate,) = scope.joint(self.joint.name).rates
-        return Action(pairs=((rate, scalar(self.torque, self.arguments, scope, self.name, "torque")),))
+        return Action(pairs=((rate, scalar(self.effort, self.arguments, scope, self.name, self.field)),))
+
+    def results(self) -> dict[str, Result]:
+        """'torque', or 'force' along a slider."""
+        return {
+            "torque" if self.joint.labels[0].unit == "rad" else "force": Result(
+                lambda scope: self.act(scope).pairs[0][1]
+            )
+        }

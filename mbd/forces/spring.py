@@ -8,9 +8,10 @@ from mbd.bodies.algebra import difference, dot, norm
 from mbd.bodies.base import Frame
 from mbd.bodies.domains import Domain, at_least_zero
 from mbd.bodies.values import name_of, number
-from mbd.forces.base import Action, Force, frame_of
+from mbd.forces.base import Action, Force, Result, frame_of
 from mbd.forces.quantities import Mention
 from mbd.scope import Scope
+from mbd.tape.node import Scalar
 
 __all__ = ["Spring"]
 
@@ -80,3 +81,12 @@ class Spring(Force):
             return Action(potential=0.5 * k * dot(arm, arm))
         stretch = norm(arm) - length
         return Action(potential=0.5 * k * stretch * stretch)
+
+    def results(self) -> dict[str, Result]:
+        """'force': k (|p_b − p_a| − length), which pulls its ends together where it is positive [N]."""
+        return {"force": Result(self._tension)}
+
+    def _tension(self, scope: Scope) -> Scalar:
+        arm = difference(scope.frame(self.b).position, scope.frame(self.a).position)
+        k = scope.parameter(self.name, "stiffness", self.stiffness)
+        return k * (norm(arm) - scope.parameter(self.name, "length", self.length))

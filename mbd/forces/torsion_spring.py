@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from mbd.bodies.values import name_of, number
-from mbd.forces.base import Action, Force, joint_of
+from mbd.forces.base import Action, Force, Result, joint_of
 from mbd.forces.quantities import Mention
 from mbd.joints.base import Joint
 from mbd.scope import Scope
+from mbd.tape.node import Scalar
 
 __all__ = ["TorsionSpring"]
 
@@ -54,3 +55,12 @@ class TorsionSpring(Force):
         (q,) = scope.joint(self.joint.name).coordinates
         stretch = q - scope.parameter(self.name, "rest", self.rest)
         return Action(potential=0.5 * scope.parameter(self.name, "stiffness", self.stiffness) * stretch * stretch)
+
+    def results(self) -> dict[str, Result]:
+        """'torque' [N m], or 'force' along a slider [N]: −k (q − rest), positive along the coordinate."""
+        return {"torque" if self.joint.labels[0].unit == "rad" else "force": Result(self._effort)}
+
+    def _effort(self, scope: Scope) -> Scalar:
+        (q,) = scope.joint(self.joint.name).coordinates
+        stretch = q - scope.parameter(self.name, "rest", self.rest)
+        return -scope.parameter(self.name, "stiffness", self.stiffness) * stretch
