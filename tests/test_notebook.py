@@ -5,10 +5,13 @@ from __future__ import annotations
 import copy
 import json
 import pickle
+import re
 import sys
+from contextlib import contextmanager
 from functools import cache
 from html.parser import HTMLParser
 from importlib import import_module
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -233,3 +236,33 @@ def test_a_notebook_shows_bars(widgets, monkeypatch, capsys):
     made.clear()
     mbd.simulate(model, start, dt=5e-3, until=0.2)
     assert not made
+
+
+@pytest.mark.slow
+def test_a_notebook_of_the_docs_shows_what_they_say(tmp_path):
+    """The page's cells in a kernel: each shows one thing, also a figure that is not the value of its cell."""
+    nbclient, nbformat = pytest.importorskip("nbclient"), pytest.importorskip("nbformat")
+    pytest.importorskip("ipykernel")
+    page = (Path(__file__).parents[1] / "docs" / "notebook.md").read_text(encoding="utf-8")
+    codes = [*re.findall(r"^```python\n(.*?)^```$", page, re.MULTILINE | re.DOTALL), "run.plot()\nx = 1", "figure"]
+    cells = [nbformat.v4.new_code_cell(code) for code in codes]
+    notebook = nbformat.v4.new_notebook(cells=cells)
+    client = nbclient.NotebookClient(
+        notebook, timeout=300, kernel_name="python3", resources={"metadata": {"path": str(tmp_path)}}
+    )
+    with patched_path():
+        client.execute()
+    shown = [[*output.get("data", {}), output.get("name", "")] for cell in notebook.cells for output in cell.outputs
+             if "widget" not in "".join(output.get("data", {})) and output.get("name") != "stderr"]  # fmt: skip
+    kinds = ("text/html", "text/latex", "text/html", "stdout", "image/png", "image/png", "text/html", "image/png",
+             "image/png")  # fmt: skip
+    assert len(shown) == len(kinds) and all(kind in each for kind, each in zip(kinds, shown, strict=True)), shown
+
+
+@contextmanager
+def patched_path():
+    """Kernels find this checkout, and draw in cells."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PYTHONPATH", str(Path(__file__).parents[1]))
+        patch.delenv("MPLBACKEND", raising=False)
+        yield
