@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
 __all__ = ["machine", "made_with", "record", "versions", "write"]
 
+FORMAT, VERSION = "mbd record", 1
+"""Of the record, see docs/files.md."""
+
 LIBRARIES = ("numpy", "scipy", "sympy", "networkx", "llvmlite", "matplotlib")
 
 
@@ -90,6 +93,8 @@ def record(run: Trajectory, wall: Mapping[str, float], script: Path | None = Non
     script : the file that describes the run, whose hash is kept
     """
     return {
+        "format": FORMAT,
+        "version": VERSION,
         "model": run.name,
         "success": run.success,
         "message": run.message,
