@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -17,7 +16,7 @@ from mbd.analysis.ports import Input, Output, port_terms
 from mbd.analysis.state_space import StateSpace
 from mbd.arrays import Matrix, Vector
 from mbd.configuration import Configuration
-from mbd.errors import MbdWarning
+from mbd.notes import doubt
 
 __all__ = ["Linearization", "NaturalMode"]
 
@@ -133,11 +132,9 @@ class Linearization:
         return self.state_space.D
 
     def _renamed(self, letter: str, name: str) -> Matrix:
-        warnings.warn(
+        doubt(
             f"linearize(…).{letter} is now called {name}; B, C and D are the matrices of inputs and outputs, see "
-            "inputs= and outputs=",
-            MbdWarning,
-            stacklevel=3,
+            "inputs= and outputs="
         )
         return np.asarray(getattr(self, name))
 
@@ -249,11 +246,9 @@ class Linearization:
     def _of_changes(self) -> StateSpace:
         """`state_space`; a warning where the state does not stay, so that its equations are those of an instant."""
         if not self.is_equilibrium:
-            warnings.warn(
+            doubt(
                 f"{self.model} is not in equilibrium at t = {self.time:g} s: these equations are of changes from a "
-                "motion that goes on, frozen at this instant",
-                MbdWarning,
-                stacklevel=3,
+                "motion that goes on, frozen at this instant"
             )
         return self.state_space
 

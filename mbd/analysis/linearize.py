@@ -12,7 +12,7 @@ from mbd.analysis.independent import independent
 from mbd.analysis.instant import instant
 from mbd.analysis.linear_motion import LinearMotion, Prescribed, linear_motion, singular
 from mbd.analysis.linearization import Linearization
-from mbd.analysis.ports import Input, Output, acting, input_names, output_nodes, port_terms, warn_of_idle
+from mbd.analysis.ports import Input, Output, acting, doubt_of_idle, input_names, output_nodes, port_terms
 from mbd.analysis.state_space import StateSpace
 from mbd.arrays import Matrix
 from mbd.compile.mechanisms import require_model
@@ -96,7 +96,7 @@ def linearize(
     motion = linear_motion(found, terms, chosen, picked, local, prescribed, seen)
     eigenvalues, shapes = _modes(motion.A, motion.basis[:n_v])
     space = _space([freedoms[k] for k in picked], motion, given, seen)
-    warn_of_idle(_idle(given, space), 3)
+    doubt_of_idle(_idle(given, space))
     values = [found.value(given[k].node) if order == 0 else 0.0 for k, order in prescribed.states]
     return Linearization(
         equations.name, state.time, tuple(name for name, _ in equations.configuration.freedoms), found.titles,

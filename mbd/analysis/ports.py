@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,15 +10,16 @@ from mbd.bodies.values import names_of
 from mbd.compile.python import scalar_function
 from mbd.equations.equations import Equations, Row
 from mbd.equations.ports import PortTerms, enters, ports
-from mbd.errors import MbdWarning, ModelError, UnknownNameError, nearest
+from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.forces.motor import Motor
 from mbd.forces.quantities import INCREMENT
+from mbd.notes import doubt
 from mbd.results.facts import Facts
 from mbd.results.names import AXES
 from mbd.results.units import unit
 from mbd.tape.node import Node
 
-__all__ = ["Input", "InputNames", "Output", "acting", "input_names", "output_nodes", "port_terms"]
+__all__ = ["Input", "InputNames", "Output", "acting", "doubt_of_idle", "input_names", "output_nodes", "port_terms"]
 
 ORDERS = {"": 0, ".rate": 1, ".acceleration": 2}
 """Derivatives of a parameter that may be an input, by the ending of its name."""
@@ -242,13 +242,8 @@ def port_terms(found: Any, inputs: Sequence[Input], outputs: Sequence[Output]) -
     return PortTerms.of(out, equations, len(found.rows), len(given), len(outputs))
 
 
-def warn_of_idle(names: Sequence[str], level: int) -> None:
+def doubt_of_idle(names: Sequence[str]) -> None:
     """Tell which inputs do nothing."""
     if names:
-        listed = ", ".join(map(repr, names))
-        warnings.warn(
-            f"{listed}: nothing depends on {'it' if len(names) == 1 else 'them'} at this state; the columns of B and D "
-            "are zero",
-            MbdWarning,
-            stacklevel=level,
-        )
+        listed, them = ", ".join(map(repr, names)), "it" if len(names) == 1 else "them"
+        doubt(f"{listed}: nothing depends on {them} at this state; the columns of B and D are zero")

@@ -167,8 +167,9 @@ def test_an_input_that_does_nothing_is_told():
     model = pendulums([1.0], [0.5])
     model.apply(mbd.Applied("push", model.joints[0].child, force=(1.0, 0.0, 0.0)))
     state = mbd.assemble(model, backend=PLAIN)
-    with pytest.warns(mbd.MbdWarning, match="'push.force.y': nothing depends on it at this state"):
+    with pytest.warns(mbd.MbdWarning, match="'push.force.y': nothing depends on it at this state") as told:
         found = mbd.linearize(model, state, backend=PLAIN, inputs="push.force.y")
+    assert told[0].filename == __file__
     assert not np.any(found.B) and found.inputs == ("push.force.y",)
 
 
