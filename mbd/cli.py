@@ -272,7 +272,7 @@ def hardcases_command(arguments: argparse.Namespace) -> int:
 
 
 def accuracy_command(arguments: argparse.Namespace) -> int:
-    """``mbd accuracy``: errors and wall times of schemes and steps."""
+    """``mbd accuracy``: errors and processor times of schemes and steps."""
     from mbd.analysis.accuracy.command import run
 
     _out(arguments)
