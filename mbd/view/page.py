@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from mbd.results.ledger import SPENT
 from mbd.results.summary import facts
 from mbd.results.units import unit
-from mbd.view.plots import QUANTITIES, stretches
+from mbd.view.plots import QUANTITIES, scale, stretches
 from mbd.view.scene import Instants, Scene, scene
 from mbd.view.style import CYCLE
 from mbd.view.template import filled, written
@@ -55,7 +55,12 @@ def content(run: Trajectory) -> dict[str, Any]:
         "time": [round(float(t), 9) for t in picture.instants.time],
         **_geometry(picture),
         "contacts": [
-            {"name": contact.name, "side": side(contact.name), "closed": stretches(run.time, run.record.closed[:, k])}
+            {
+                "name": contact.name,
+                "side": side(contact.name),
+                "foot": bool(contact.place),
+                "closed": stretches(run.time, run.record.closed[:, k]),
+            }
             for k, contact in enumerate(run.facts.contacts)
         ],
         "events": [
@@ -63,6 +68,7 @@ def content(run: Trajectory) -> dict[str, Any]:
             for event, loss in zip(run.events, losses(run), strict=True)
         ],
         "charts": _charts(run, picture.instants),
+        "spin": _fastest(run),
         "facts": facts(run),
     }
 
@@ -131,6 +137,14 @@ def _geometry(picture: Scene) -> dict[str, Any]:
             }
             for touch in picture.touches
         ],
+        "pushes": [
+            {
+                "name": push.contact,
+                "at": [packed(push.place[:, axis], step) for axis in range(axes)],
+                "force": [packed(push.force[:, axis], _step(push.force)) for axis in range(axes)],
+            }
+            for push in picture.pushes
+        ],
     }  # fmt: skip
 
 
@@ -158,10 +172,33 @@ def _charts(run: Trajectory, instants: Instants) -> list[dict[str, Any]]:
     groups: dict[str, list[str]] = {}
     for name in values:
         groups.setdefault(unit(name, run.facts), []).append(name)
+    acting_names = [name for name in run.names if _is_force(name, run)]
+    forces = dict(zip(acting_names, instants.read(run, acting_names).T, strict=True))
+    for name, force in forces.items():
+        if np.any(force):
+            groups.setdefault(unit(name, run.facts), []).append(name)
+    values |= forces
     for kind, names in groups.items():
-        lines = [(name, CYCLE[k % len(CYCLE)], values[name]) for k, name in enumerate(names)]
-        charts.append(_chart(QUANTITIES.get(kind, "value"), kind, lines))
+        text, factor = scale(kind, degrees=True)
+        lines = [(name, CYCLE[k % len(CYCLE)], factor * values[name]) for k, name in enumerate(names)]
+        charts.append(_chart(QUANTITIES.get(kind, "value"), text, lines))
     return charts
+
+
+def _is_force(name: str, run: Trajectory) -> bool:
+    """Whether a result is a force, moment or power of a contact, drive, spring or loss."""
+    return name.endswith((".force", ".torque", ".power", ".friction.forward")) and bool(unit(name, run.facts))
+
+
+def _fastest(run: Trajectory) -> dict[str, Any] | None:
+    """The angle of a coordinate that turns fastest: name and greatest rate [rad/s]."""
+    rates = {
+        name: float(np.max(np.abs(run[f"{name}.rate"]), initial=0.0))
+        for name, kind in run.facts.coordinates
+        if kind == "rad" and f"{name}.rate" in run
+    }
+    name = max(rates, key=lambda each: rates[each], default="")
+    return {"name": name, "rate": finite(rates[name])} if name else None
 
 
 def _chart(title: str, kind: str, lines: list[tuple[str, str, Any]]) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from mbd.results.names import AXES
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
 
-__all__ = ["Ground", "Instants", "Scene", "Touch", "scene"]
+__all__ = ["Ground", "Instants", "Push", "Scene", "Touch", "scene"]
 
 FIT = 1e-6
 """A plane whose distance reproduces a gap this well is the ground of that contact [m]."""
@@ -78,6 +78,15 @@ class Touch:
 
 
 @dataclass(frozen=True, eq=False)
+class Push:
+    """The force of the ground on a foot over time, in the axes of the scene: place (F, 3) [m], force (F, 3) [N]."""
+
+    contact: str
+    place: Matrix
+    force: Matrix
+
+
+@dataclass(frozen=True, eq=False)
 class Scene:
     """What a picture of a run shows, in axes whose −y is the direction of gravity.
 
@@ -94,6 +103,7 @@ class Scene:
     masses: dict[str, float]
     grounds: tuple[Ground, ...]
     touches: tuple[Touch, ...]
+    pushes: tuple[Push, ...]
     markers: tuple[int, ...]
     spatial: bool
 
@@ -122,7 +132,8 @@ def scene(run: Trajectory, count: int) -> Scene:
     }
     grounds = tuple(Ground(turn @ normal, offset) for normal, offset in _grounds(run, instants, raw))
     named = tuple(number[name] for name in markers)
-    return Scene(instants, points, positions, segments, masses, grounds, touches, named, spatial)
+    pushes = tuple(_pushes(run, instants, turn))
+    return Scene(instants, points, positions, segments, masses, grounds, touches, pushes, named, spatial)
 
 
 def _lines(members: Sequence[str]) -> list[Sequence[str]]:
@@ -160,6 +171,26 @@ def _touches(run: Trajectory, turn: Matrix) -> list[Touch]:
         change = np.flatnonzero(np.diff(closed, prepend=0, append=0))
         for first, stop in zip(change[::2], change[1::2], strict=True):
             found.append(Touch(contact.name, turn @ where[first], float(run.time[first]), float(run.time[stop - 1])))
+    return found
+
+
+def _pushes(run: Trajectory, instants: Instants, turn: Matrix) -> list[Push]:
+    """Forces of contacts with planes: the normal times the contact's force, and its friction along x of the plane."""
+    found = []
+    for contact in run.facts.contacts:
+        wanted = [*(f"{contact.place}{axis}" for axis in AXES), f"{contact.name}.gap", f"{contact.name}.force"]
+        along = f"{contact.name}.friction.forward"
+        if contact.unit != "m" or not contact.place or any(name not in run for name in wanted):
+            continue
+        values = instants.read(run, [*wanted, *([along] if along in run else [])])
+        plane = _plane(values[:, :3], values[:, 3])
+        if plane is None or not np.any(values[:, 4:]):
+            continue
+        normal = plane[0]
+        force = values[:, 4:5] * normal
+        if along in run:
+            force = force + values[:, 5:6] * np.array([normal[1], -normal[0], 0.0])
+        found.append(Push(contact.name, values[:, :3] @ turn.T, np.nan_to_num(force) @ turn.T))
     return found
 
 

@@ -14,6 +14,7 @@ import mbd
 from mbd.trajectory import Trajectory
 from mbd.view.page import packed
 from mbd.view.scene import Instants, scene, upright
+from tests.simulation.mechanisms import kneed_walker, kneed_walker_start
 from tests.view.handmade_runs import Sheet, ball, oscillator, record, walker
 
 CHROMIUM = Path("/usr/bin/chromium")
@@ -96,6 +97,34 @@ def test_footprints_lie_on_the_ground_where_feet_stood(tmp_path):
     normal = np.array(data["grounds"][0]["normal"])[:2]
     for touch in data["touches"]:
         assert abs(normal @ touch["where"]) < 1e-5 and touch["end"] - touch["begin"] == pytest.approx(0.5)
+
+
+def test_the_forces_drawn_are_those_that_move_the_mechanism(tmp_path):
+    """Newton's law for the whole: Σ F = Σ m (a − g), of feet that stick and change over."""
+    model = kneed_walker()
+    run = mbd.simulate(model, kneed_walker_start(model), mbd.HHT(alpha=0.05), dt=1e-3, until=0.7)
+    _, data = page(run, tmp_path)
+    time = np.array(data["time"])
+    assert [push["name"] for push in data["pushes"]] == ["left foot", "right foot"]
+    total = sum(np.array([unpacked(axis, len(time)) for axis in push["force"]]) for push in data["pushes"])
+    switches = [0.0, *(event.time for event in run.events), 0.7]
+    calm = np.min(np.abs(time[:, None] - switches), axis=1) > 0.02
+    late, early = run.at(time[calm] + 2e-3), run.at(time[calm] - 2e-3)
+    g = np.array([run.parameters.get(f"gravity.{axis}", 0.0) for axis in "xyz"])
+    masses = {name.removesuffix(".mass"): mass for name, mass in run.parameters.items() if name.endswith(".mass")}
+    inertial = sum(
+        mass * (np.stack([(late[name] - early[name]) / 4e-3 for name in velocity], axis=1) - g)
+        for body, mass in masses.items()
+        for velocity in [[f"{body}.center.v{axis}" for axis in "xyz"]]
+    )
+    np.testing.assert_allclose(total[:, calm].T, (inertial @ upright(run).T)[:, :2], atol=2e-3 * np.max(total))
+
+
+def test_forces_and_powers_have_curves_and_angles_are_in_degrees(tmp_path):
+    _, data = page(walker(), tmp_path)
+    units = [chart["unit"] for chart in data["charts"]]
+    assert "N" in units and "°" in units and not any("rad" in unit for unit in units)
+    assert data["spin"]["rate"] > 0.0 and [contact["foot"] for contact in data["contacts"]] == [True, True]
 
 
 def test_contacts_events_and_energies_share_the_clock(tmp_path):
@@ -221,6 +250,7 @@ def test_the_page_plays_in_a_browser_without_a_network(tmp_path):
         assert tab.eval_on_selector("#scene", ink) > 2000
         tab.mouse.move(300, 300)
         tab.mouse.wheel(0, -300)
+        assert "0.00 s of" not in tab.get_attribute("#time", "aria-valuetext")
         tab.click("#events li:last-child button")
         tab.select_option("#chart", "1")
         tab.wait_for_timeout(100)

@@ -20,6 +20,7 @@ function draw() {
   markEvents();
   el("time").value = state.t;
   el("clock").textContent = state.t.toFixed(span < 0.5 ? 5 : 3) + " s";
+  el("time").setAttribute("aria-valuetext", `${el("clock").textContent} of ${+last.toPrecision(4)} s`);
   state.dirty = false;
 }
 function seek(t) { state.t = Math.min(Math.max(t, first), last); state.dirty = true; }
@@ -27,6 +28,10 @@ function play(on) {
   if (on && state.t >= last) state.t = first;
   state.playing = on; state.stamp = 0; state.dirty = true;
   el("play").textContent = on ? "\u275A\u275A" : "\u25B6";
+}
+function warnOfAliasing() { // pictures 1/60 s apart, and places stored at most as often
+  const gap = Math.max(state.speed / 60, span / Math.max(time.length - 1, 1)), turn = run.spin ? run.spin.rate * gap : 0;
+  el("alias").textContent = turn > Math.PI ? `${run.spin.name} turns ${(turn / (2 * Math.PI)).toPrecision(2)} times from one picture to the next: it does not turn as it looks.` : "";
 }
 function frame(stamp) {
   if (state.playing) {
@@ -66,6 +71,10 @@ function fill() {
   }
   if (!run.events.length) el("events").textContent = "none";
   run.charts.forEach((chart, k) => el("chart").append(new Option(`${chart.title} [${chart.unit}]`, k)));
+  el("over").append(new Option("over time", -1));
+  run.contacts.forEach((contact, k) => { if (strides[k].length) el("over").append(new Option(`over strides, ${contact.name}`, k)); });
+  el("over").hidden = el("over").options.length < 2;
+  el("forced").hidden = !usual;
   el("trace").append(new Option("\u2026", -1), new Option("clear", -2));
   run.points.forEach((point, k) => el("trace").append(new Option(point.name, k)));
   const natural = span < 1.5 ? roundDown(span / 3) : 1; // a short run is shown in slow motion
@@ -89,12 +98,18 @@ function nearest(event) {
 function listen() {
   el("play").addEventListener("click", () => play(!state.playing));
   el("time").addEventListener("input", () => { play(false); seek(+el("time").value); });
-  el("speed").addEventListener("change", () => { state.speed = +el("speed").value; });
+  el("speed").addEventListener("change", () => { state.speed = +el("speed").value; warnOfAliasing(); });
+  el("over").addEventListener("change", () => { state.over = +el("over").value; state.dirty = true; });
+  el("forces").addEventListener("change", () => { state.dirty = true; });
   el("chart").addEventListener("change", () => chooseChart(+el("chart").value));
   el("trace").addEventListener("change", () => { const k = +el("trace").value; if (k === -2) { state.traced.clear(); state.dirty = true; } else if (k >= 0) toggleTrace(k); el("trace").value = -1; });
   for (const id of ["follow", "ghosts"]) el(id).addEventListener("change", () => { Object.assign(camera, { dx: 0, dy: 0, zoom: 1 }); state.dirty = true; });
   for (const id of ["lines", "bars"]) {
-    const move = (event) => { if (event.buttons) { play(false); seek(toTime(event.offsetX, el(id).clientWidth)); } };
+    const asked = (event) => {
+      const w = el(id).clientWidth, { now } = cycle();
+      return now && id === "lines" ? now[0] + (toTime(event.offsetX, w) - first) / span * (now[1] - now[0]) : toTime(event.offsetX, w);
+    };
+    const move = (event) => { if (event.buttons) { play(false); seek(asked(event)); } };
     el(id).addEventListener("pointerdown", move); el(id).addEventListener("pointermove", move);
   }
   const stage = el("scene");
@@ -133,6 +148,7 @@ choosePoints();
 if (run.points.length) { survey(); el("follow").checked = el("ghosts").checked = path.width > 0 && path.all[2] - path.all[0] > 2.2 * path.width; }
 el("about").open = run.events.length < 6;
 chooseChart(0);
+warnOfAliasing();
 listen();
 const asked = /[#&]t=([-+.\deE]+)/.exec(location.hash); // …/run.html#t=1.2 opens paused at 1.2 s
 if (asked) seek(+asked[1]);

@@ -13,6 +13,7 @@ function unpack({ step, d }) {
   return values;
 }
 for (const point of run.points) point.at = point.at.map(unpack);
+for (const push of run.pushes) { push.at = push.at.map(unpack); push.force = push.force.map(unpack); }
 for (const chart of run.charts) for (const line of chart.series) line.values = unpack(line.values);
 
 const instants = []; // events that happen at one time belong together
@@ -23,7 +24,7 @@ for (const event of run.events) {
 
 for (const group of instants) group.events.sort((a, b) => (a.kind > b.kind) - (a.kind < b.kind)); // closed, event, opened
 
-const state = { t: first, playing: false, speed: 1, chart: 0, traced: new Set(), hover: -1, stamp: 0, dirty: true };
+const state = { t: first, playing: false, speed: 1, chart: 0, over: -1, traced: new Set(), hover: -1, stamp: 0, dirty: true };
 const camera = { yaw: -0.6, pitch: 0.42, zoom: 1, dx: 0, dy: 0 };
 
 function locate(t) { // the interval that holds t: at a switch, the one after it
@@ -38,7 +39,7 @@ const mix = (values, p) => values[p.i] + p.w * (values[p.j] - values[p.i]);
 let colors = {};
 function readColors() {
   const style = getComputedStyle(document.documentElement);
-  for (const name of ["paper", "panel", "ink", "muted", "line", "ground", "left", "right", "body", "soil"])
+  for (const name of ["paper", "panel", "ink", "muted", "line", "ground", "left", "right", "body", "soil", "force"])
     colors[name] = style.getPropertyValue("--" + name).trim();
 }
 const sideColor = (side) => colors[side] || colors.body;

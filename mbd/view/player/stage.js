@@ -59,6 +59,7 @@ function drawScene() {
     for (let k = 9; k >= 1; k--) if (state.t - k * gap >= first) drawFigure(g, v, locate(state.t - k * gap), 0.05 + 0.16 * (1 - k / 10), true);
   }
   drawFigure(g, v, p, 1, false);
+  if (el("forces").checked) drawPushes(g, w, h, v, p);
   drawScale(g, w, h, v);
 }
 const order = run.segments.map((s, k) => [{ left: 0, "": 1, right: 2 }[s.side], k]).sort((a, b) => a[0] - b[0] || a[1] - b[1]).map((x) => x[1]);
@@ -143,7 +144,7 @@ function drawGround(g, w, h, v, ground) {
     const [x, y] = spot(s, 0), [x1, y1] = spot(s, 7 / v.scale), [x2, y2] = spot(s, 12 / v.scale);
     if (x < -60 || x > w + 60) continue;
     g.beginPath(); g.moveTo(x, y); g.lineTo(x1, y1); g.stroke();
-    g.fillText(label(s, tick) + " m", x2, y2);
+    if (x2 > 22 && x2 < w - 22) g.fillText(label(s, tick) + " m", x2, y2);
   }
 }
 function drawPlane(g, v, ground) { // a patch of a plane below the mechanism, as a grid
@@ -173,6 +174,32 @@ function drawTouches(g, v) { // footprints: filled while the contact is closed
     if (active) g.stroke(); else g.fill();
     g.globalAlpha = 1;
   }
+}
+// The usual largest force is as long as a third of the mechanism; short peaks are cut at half of it.
+const usual = (() => {
+  const sizes = run.pushes.flatMap((push) => Array.from(time, (_, i) => Math.hypot(...push.force.map((axis) => axis[i])))).filter((x) => x > 0).sort((a, b) => a - b);
+  return sizes.length ? sizes[Math.floor(0.95 * (sizes.length - 1))] : 0;
+})();
+function drawPushes(g, w, h, v, p) { // forces of the ground on the feet
+  if (!usual) return;
+  const most = Math.max(path.width, path.height, 1e-12) / 3, unit = most / usual;
+  for (const push of run.pushes) {
+    const force = push.force.map((axis) => mix(axis, p)), size = Math.hypot(...force);
+    if (size < 0.005 * usual) continue;
+    const at = push.at.map((axis) => mix(axis, p)), length = unit * Math.min(1, (1.5 * usual) / size);
+    drawArrow(g, v.to(project(at)), v.to(project(at.map((x, k) => x + length * force[k]))));
+  }
+  const round = roundDown(usual), px = round * unit * v.scale, x = w - 16 - px, y = h - 18;
+  drawArrow(g, [x, y], [x + px, y]);
+  g.fillStyle = colors.muted; g.textAlign = "center"; g.textBaseline = "bottom"; g.fillText(label(round, round) + " N", x + px / 2, y - 5);
+}
+function drawArrow(g, [x0, y0], [x1, y1]) {
+  const size = Math.hypot(x1 - x0, y1 - y0), head = Math.min(9, 0.45 * size), ux = (x1 - x0) / size, uy = (y1 - y0) / size;
+  if (size < 2) return;
+  g.strokeStyle = g.fillStyle = colors.force; g.lineWidth = 2.4;
+  g.beginPath(); g.moveTo(x0, y0); g.lineTo(x1 - 0.7 * head * ux, y1 - 0.7 * head * uy); g.stroke();
+  g.beginPath(); g.moveTo(x1, y1); g.lineTo(x1 - head * ux + 0.45 * head * uy, y1 - head * uy - 0.45 * head * ux);
+  g.lineTo(x1 - head * ux - 0.45 * head * uy, y1 - head * uy + 0.45 * head * ux); g.closePath(); g.fill();
 }
 function drawTraces(g, v, p) {
   for (const k of state.traced) {
