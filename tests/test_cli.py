@@ -381,3 +381,13 @@ def test_a_new_script_that_has_no_place_is_told(script, capsys, name, told):
     script("")
     assert cli.main(["new", name]) == 1
     assert told in capsys.readouterr().err
+
+
+def test_the_script_that_new_writes_runs_and_has_nothing_to_note(script, tmp_path, capsys):
+    script("")
+    assert cli.main(["new", "my leg"]) == 0
+    assert "mbd run 'my leg.py'" in capsys.readouterr().out
+    made = cli.Script.load("my leg.py")
+    run = made.run(None, {})
+    assert run.success and run.stats["notes"] == []
+    assert abs(run.energy.numerical[-1]) < 0.05  # of some 20 J that the motor puts in

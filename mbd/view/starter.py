@@ -25,7 +25,7 @@ model.connect(hip, knee)
 
 # Contacts open and close: a stop of rubber that keeps the knee from bending forward, and the ground under the foot.
 model.constrain(
-    mbd.Penalty("knee stop", mbd.flexion(knee), stiffness=1300.0, restitution=0.2),
+    mbd.Penalty("knee stop", mbd.flexion(knee), stiffness=1300.0, damping=10.0),
     mbd.Unilateral("foot", mbd.height(shank.end), restitution=0.0),
 )
 
