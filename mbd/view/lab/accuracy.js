@@ -54,6 +54,7 @@
     chart.replaceChildren();
     hide();
     const { width, height } = chart.getBoundingClientRect();
+    if (width <= margin.left + margin.right) return; // not laid out yet
     const all = data.schemes.flatMap((scheme, number) => scheme.points
       .filter((point) => !point.failure && (error(point) ?? below(point)) !== null && work(point) > 0)
       .map((point) => ({ scheme, number, point, cost: work(point), error: error(point) ?? below(point), hollow: error(point) === null })));

@@ -73,7 +73,7 @@
 
   const panel = (frame, kind, shown, low, high) => {
     const bottom = frame.y + frame.height;
-    make("text", { class: "panel", x: frame.x, y: frame.y - 10 }, kind.title);
+    make("text", { class: "panel", x: frame.names && frame.x + frame.width < 400 ? 0 : frame.x, y: frame.y - 10 }, kind.title);
     if (kind.changes) {
       const every = frame.width < 50 * Math.log10(high / low) ? 100 : 10;
       for (let value = low; value <= high * 1.001; value *= every) {
