@@ -106,7 +106,7 @@
       });
       drawn.push(...points.map((each) => ({ ...each, number })));
     });
-    apart(labels).forEach(({ x, y, text }) => make("text", { class: "step", x, y }, text));
+    apart(labels).forEach(({ x, y, text }) => make("text", { class: "step crowded", x, y }, text));
     drawn.forEach((each) => {
       const { scheme, number } = each;
       const at = { cx: x(each.cost), cy: y(each.error), "data-scheme": number };
