@@ -87,9 +87,12 @@ def test_expressions_and_mechanisms_given_by_energies_are_observed():
     ball = mbd.Lagrangian("ball", [y], m * y.v**2 / 2, m * g * y.q, parameters={m: 0.2, g: 9.81})
     ball.observe("momentum", m * y.v, unit="N s")
     ball.observe("weight", lambda a: -0.2 * a, "y.acceleration")
+    assert ball.check() == [] and "momentum [N s]" in ball.describe()
     run = mbd.simulate(ball, mbd.assemble(ball, position={"y": 1.0}), dt=1e-2, until=0.1, backend="python")
     np.testing.assert_allclose(run["momentum"], 0.2 * run["y.rate"], rtol=1e-14)
     np.testing.assert_allclose(run["weight"], 0.2 * 9.81, rtol=1e-9)
+    ball.observe("weight", "y")
+    assert any("'weight' is used 2 times" in fault for fault in ball.check())
 
 
 def test_a_controller_reads_an_observation():

@@ -23,7 +23,7 @@ def word_faults(system: EnergyDescription, scope: CoordinateScope) -> list[str]:
     """What is wrong with its words, one sentence each."""
     words: list[Force | Constraint] = [*system.applied, *system.words]
     found = [fault for word in words for fault in (*word.faults(), *word.value_faults(word.parameters()))]
-    names = [word.name for word in words] + [controller.name for controller in system.controllers]
+    names = [word.name for word in (*words, *system.controllers, *system.observations)]
     names += [*system.rows, *system.nonholonomic, *(coordinate.name for coordinate in system.coordinates)]
     for name in dict.fromkeys(name for name in names if names.count(name) > 1):
         found.append(f"the name {name!r} is used {names.count(name)} times; give each its own name")
@@ -66,6 +66,7 @@ def parts(system: EnergyDescription, faults: Sequence[str]) -> dict[str, list[st
         "forces": forces,
         "constraints": [*rows, *(described_constraint(word) for word in system.words)],
         "controllers": [controller.name for controller in system.controllers],
+        "observations": [f"{each.name} [{each.unit or '-'}]" for each in system.observations],
         "faults": list(faults),
     }
 
