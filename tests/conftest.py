@@ -8,6 +8,8 @@ import sys
 from pathlib import Path
 
 os.environ.setdefault("MPLBACKEND", "Agg")
+# many mechanisms, short runs: what takes least to compile; all levels give the same bits (kernel/test_levels.py)
+os.environ.setdefault("MBD_OPTIMIZATION_LEVEL", "0")
 
 import pytest
 
@@ -41,6 +43,18 @@ def pytest_xdist_make_scheduler(config, log):
     from xdist.scheduler import WorkStealingScheduling
 
     return WorkStealingScheduling(config, log) if config.option.dist == "load" else None
+
+
+@pytest.hookimpl(tryfirst=True, specname="pytest_collection_modifyitems")
+def pytest_thin_out(items):
+    """Of a test marked `covering`, leave a few that have every value of every parameter among them; the rest is slow."""
+    seen = set()
+    for item in items:
+        if item.get_closest_marker("covering"):
+            values = {(item.nodeid.split("[")[0], *each) for each in item.callspec.indices.items()}
+            if values <= seen:
+                item.add_marker("slow")
+            seen |= values
 
 
 @pytest.hookimpl(trylast=True)

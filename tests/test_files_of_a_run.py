@@ -32,7 +32,7 @@ def test_the_record_keeps_its_schema(make, tmp_path):
     script.write_text("x = 1\n")
     commit = ["-c", "user.name=a", "-c", "user.email=a", "commit", "-qm", "a"]
     for command in (["init", "-q"], ["add", "walk.py"], commit):
-        subprocess.run(["git", "-C", str(tmp_path), *command], check=True, capture_output=True)
+        subprocess.run(["git", "-C", str(tmp_path), *command], check=True, capture_output=True, timeout=60)
     found = json.loads(json.dumps(record(make(), {"load": 0.1, "simulate": 0.2}, script), default=float))
     jsonschema.validate(found, SCHEMA)
     assert set(found) == fields("field")

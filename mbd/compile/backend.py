@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.util import find_spec
@@ -15,7 +16,10 @@ from mbd.compile.python import ScalarFunction
 from mbd.errors import CapabilityError, UnknownNameError, nearest
 from mbd.tape.node import Node
 
-__all__ = ["Backend", "Function", "Functions", "Twins", "backend"]
+__all__ = ["LEVEL", "Backend", "Function", "Functions", "Twins", "backend"]
+
+LEVEL = "MBD_OPTIMIZATION_LEVEL"
+"""Environment variable: optimization level of machine code, '0' where programs are many and runs are short."""
 
 
 class Function(Protocol):
@@ -84,9 +88,14 @@ def backend(kind: str = "auto", level: int | None = None, cache: ObjectCache | N
 
     Parameters
     ----------
-    level : optimization level of the machine code, see `mbd.compile.llvm`; by default 2, for which large programs do
-        not wait
+    level : optimization level of the machine code, see `mbd.compile.llvm`; by default that of the environment variable
+        `LEVEL`, or else 2, for which large programs do not wait
     cache : where object files are kept; that of the user by default
+
+    Raises
+    ------
+    CapabilityError
+        for machine code that this computer cannot make, and a level in the environment that there is not.
     """
     if kind == "python":
         return Backend("python")
@@ -95,7 +104,11 @@ def backend(kind: str = "auto", level: int | None = None, cache: ObjectCache | N
     if find_spec("llvmlite") is None:
         if kind == "llvm":
             raise CapabilityError("backend 'llvm' needs the package llvmlite: pip install llvmlite, or use 'python'")
-        return Backend("python", "plain Python runs some 1000 times slower than machine code: pip install 'mbd[fast]'")
+        return Backend(
+            "python",
+            "llvmlite is not installed: plain Python runs instead, some 1000 times slower than machine code: "
+            "pip install 'mbd[fast]'",
+        )
     try:
         from mbd.compile import llvm
     except (ImportError, OSError) as error:
@@ -105,5 +118,14 @@ def backend(kind: str = "auto", level: int | None = None, cache: ObjectCache | N
             "python",
             f"llvmlite is installed but does not load ({error}): plain Python runs instead, some 1000 times slower",
         )
+    level = _level_of_environment() if level is None else level
     chosen, hasty = (llvm.LEVEL, llvm.HASTY) if level is None else (level, None)
     return Backend("llvm", "", lambda layout: llvm.Library(layout, chosen, cache, hasty))
+
+
+def _level_of_environment() -> int | None:
+    """The optimization level that the environment asks for, if any."""
+    level = os.environ.get(LEVEL, "").strip()
+    if level not in ("", "0", "1", "2", "3"):
+        raise CapabilityError(f"{LEVEL} is the optimization level of machine code, 0, 1, 2 or 3; {level!r} came")
+    return int(level) if level else None

@@ -181,7 +181,8 @@ def jamming(id: str, scheme: Any) -> Outcome:
         figures.append(
             Figure(f"μ = {much:.4g}, a Painlevé contact at the start and not told [-]", float(not is_named), 0.0)
         )
-        figures.append(Figure(f"μ = {much:.4g}, rows with a force all the same [-]", float(len(run.time)), 0.0))
+        figures.append(Figure(f"μ = {much:.4g}, rows with a force all the same [-]",
+                              float(np.isfinite(run["tip.force"]).sum()), 0.0))  # fmt: skip
     shares = 1.0 - np.logspace(0.0, -3.0, 13)
     forces = [float(slide(id, share * critical, -1.0, scheme, until=1e-3)["tip.force"][0]) for share in shares]
     curve = Curve("force as friction nears the jam", 1.0 - shares, forces, "1 − μ/critical μ", "force [N]", True)

@@ -148,6 +148,8 @@ class ModelColumns(StoredStates, Columns):
 
         forces : whether accelerations, ż and multipliers count, which then come from the balance of forces
         """
+        if len(self.rows.time) == 1:  # whose accelerations may be unknown
+            return replace(self.rows.part(places.lower), time=places.time)
         return self._turned(self._between(places, forces), places)
 
     def _between(self, places: Places, forces: bool) -> Rows:

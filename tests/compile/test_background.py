@@ -41,6 +41,7 @@ def hasty(cache=NONE, links=LINKS, name="r"):
 @pytest.fixture
 def jobs(monkeypatch):
     """The jobs that would be done in the background, which are done when the test says so."""
+    monkeypatch.delenv(backend.LEVEL, raising=False)
     waiting = []
     monkeypatch.setattr(llvm, "submit", waiting.append)
     return waiting
@@ -158,6 +159,17 @@ def test_whoever_asks_for_a_level_gets_it_at_once(jobs):
     functions.add({"r": LINKS.outputs})
     functions.add({"energy": [LINKS.energy]})
     assert functions["r"].provisional and not functions["energy"].provisional
+
+
+@pytest.mark.parametrize("level", ["0", "2"])
+def test_the_environment_asks_for_a_level_too(monkeypatch, jobs, level):
+    monkeypatch.setenv(backend.LEVEL, level)
+    functions = backend.backend("llvm", cache=NONE).functions(LINKS.layout)
+    functions.add({"r": LINKS.outputs})
+    assert not functions["r"].provisional and functions.builds[0].level == int(level)
+    monkeypatch.setenv(backend.LEVEL, "fast")
+    with pytest.raises(mbd.CapabilityError, match="0, 1, 2 or 3; 'fast' came"):
+        backend.backend("llvm")
 
 
 # runs -------------------------------------------------------------------------------------------------------------

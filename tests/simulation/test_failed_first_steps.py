@@ -11,7 +11,7 @@ SCHEMES = [mbd.HHT(), mbd.GeneralizedAlpha(0.8), mbd.Newmark(), mbd.RadauIIA(), 
 MANNERS = [{"dt": 1e-3}, {"dt": 1e-3, "contact": "nonsmooth"}, {"tol": 1e-4}]
 
 
-def refusing() -> mbd.Model:
+def refusing(friction: float | None = 0.5) -> mbd.Model:
     """A block on a rough floor, pushed by a controller that raises at its first call."""
 
     def law(t, read, memory):
@@ -20,7 +20,7 @@ def refusing() -> mbd.Model:
     model = mbd.Model("block")
     mass = mbd.PointMass("mass", mass=2.0)
     model.connect(mbd.Translation("place", model.ground.origin, mass.origin, axes="xy"))
-    model.constrain(mbd.Unilateral("floor", mbd.touchdown(mass.origin), friction=0.5))
+    model.constrain(mbd.Unilateral("floor", mbd.touchdown(mass.origin), friction=friction))
     model.apply(mbd.Applied("push", mass.origin, force=(3.0, 0.5)))
     model.apply(mbd.Controller("law", law, period=0.1, writes=["push.force.x"]))
     return model
@@ -41,8 +41,11 @@ def test_the_start_is_the_first_row(scheme, manner, tmp_path):
     assert "failure" in repr(run)
 
 
-def test_its_forces_are_those_of_the_balance_there():
-    model = refusing()
-    start = mbd.assemble(model, closed=["floor"])
-    run = mbd.simulate(model, start, dt=1e-3, until=0.3, on_failure="return", backend="python")
-    np.testing.assert_allclose(run["floor.force"], 2.0 * 9.81 - 0.5, rtol=1e-12)
+def test_its_forces_are_those_of_the_balance_there_and_none_where_it_is_not_known_what_sticks():
+    runs = []
+    for friction in (None, 0.5):
+        model = refusing(friction)
+        start = mbd.assemble(model, closed=["floor"])
+        runs.append(mbd.simulate(model, start, dt=1e-3, until=0.3, on_failure="return", backend="python"))
+    np.testing.assert_allclose(runs[0]["floor.force"], 2.0 * 9.81 - 0.5, rtol=1e-12)
+    assert np.isnan(runs[1]["floor.force"]).all()

@@ -59,7 +59,7 @@ def ended_record(run: RunData) -> Record:
     """All rows and events of a run that is over; of one that failed before it had a row its start alone.
 
     Its accelerations and multipliers are those of the balance of forces; NaN where that determines none, as it may be
-    why the run failed.
+    why the run failed, and with dry friction, of which nobody has found yet what sticks and where the rest slides.
     """
     if run.stored:
         return whole_record(run)
@@ -70,7 +70,7 @@ def ended_record(run: RunData) -> Record:
     row[0, : len(known)] = known
     record = record_of(run, row, [replace(event, row=0) for event in run.events])
     states = StoredStates(record, run.mechanism.equations)
-    if not Balance.serves(states.equations):
+    if states.equations.frictions or not Balance.serves(states.equations):
         return record
     guess = replace(states.rows, lam=np.zeros_like(record.lam))
     solved = Balance(states).solve(guess)
