@@ -5,6 +5,7 @@ import os
 import re
 import signal
 import sys
+from collections import Counter
 from pathlib import Path
 
 os.environ.setdefault("MPLBACKEND", "Agg")
@@ -47,14 +48,19 @@ def pytest_xdist_make_scheduler(config, log):
 
 @pytest.hookimpl(tryfirst=True, specname="pytest_collection_modifyitems")
 def pytest_thin_out(items):
-    """Of a test marked `covering`, leave a few that have every value of every parameter among them; the rest is slow."""
-    seen = set()
+    """Leave some cases of tests marked `covering` or `sampled`; the others are slow."""
+    seen, counts = set(), Counter()
     for item in items:
+        name = item.nodeid.split("[")[0]
         if item.get_closest_marker("covering"):
-            values = {(item.nodeid.split("[")[0], *each) for each in item.callspec.indices.items()}
+            values = {(name, *each) for each in item.callspec.indices.items()}
             if values <= seen:
                 item.add_marker("slow")
             seen |= values
+        elif sampled := item.get_closest_marker("sampled"):
+            if counts[name] % sampled.args[0]:
+                item.add_marker("slow")
+            counts[name] += 1
 
 
 @pytest.hookimpl(trylast=True)
@@ -86,3 +92,11 @@ def pytest_collection():
     finally:
         gc.freeze()
         gc.enable()
+
+
+@pytest.fixture
+def older_objects_left_alone():
+    """Garbage collections do not search what earlier tests left, which takes seconds."""
+    gc.freeze()
+    yield
+    gc.unfreeze()

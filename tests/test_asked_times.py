@@ -82,6 +82,7 @@ def check(kind: str, seed: int, scheme: mbd.Integrator, dt: float) -> None:
         )
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("name", SCHEMES)
 @pytest.mark.parametrize("kind", KINDS)
 def test_between_rows_results_are_as_accurate_as_at_rows(kind, name):
@@ -115,6 +116,7 @@ def test_no_instant_between_long_steps_is_worse_than_the_others(kind):
         assert np.max(found) <= 30.0 * max(row, np.median(found)) + 1e-9 * size, name
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize(("kind", "seed"), [("tree", 0), ("tree", 4), ("loop", 1), ("loop", 4), ("redundant", 0)])
 @pytest.mark.parametrize("tol", [1e-4, 1e-7])
 def test_rates_between_long_implicit_steps_are_as_accurate_as_at_rows(kind, seed, tol):

@@ -90,6 +90,7 @@ def test_an_example_runs_without_faults(name: str) -> None:
     assert max(run.violation.length, run.violation.angle) < 1e-10
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("name", NAMES)
 def test_the_plain_twin_moves_like_the_machine_code(name: str) -> None:
     until = 20 * script(name)["dt"]

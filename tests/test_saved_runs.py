@@ -35,6 +35,7 @@ def same(one: mbd.Trajectory, other: mbd.Trajectory) -> None:
     assert one.violation == other.violation and repr(one.energy) == repr(other.energy)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("name", ["HHT", "RadauIIA", "RungeKutta853"])
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_saved_run_gives_the_same_bits_everywhere(kind, name, tmp_path):

@@ -44,6 +44,7 @@ def ball(dt: float, scheme: mbd.Integrator, **law) -> mbd.Trajectory:
     return mbd.simulate(model, start, scheme, dt=dt, until=1.0, on_failure="return")
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("name", SCHEMES)
 @pytest.mark.parametrize("law", [{}, {"damping": 5.0}, {"damping": 20.0, "release": "pull"}, {"restitution": 0.7},
                                  {"exponent": 1.5}, {"exponent": 2.0, "release": "pull"}])  # fmt: skip
@@ -65,6 +66,7 @@ def test_resolved_blows_take_what_the_ball_has_lost(law):
         np.testing.assert_allclose(run.energy["stop"], -1e4 * np.where(closed, run["stop.gap"], 0.0) ** 2, atol=1e-12)
 
 
+@pytest.mark.sampled(4)
 @pytest.mark.parametrize("seed", range(24))
 def test_no_passive_part_of_a_random_scene_gains(seed):
     """Losses, dry friction, stops, bumpers, feet, at steps from fine to far too long."""

@@ -31,6 +31,7 @@ def first_step(scheme: NewmarkFamily, form: str) -> float:
     return 2e-3 if scheme.formulation == "index3" else 1e-3
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize(("form", "scheme"), PAIRS)
 def test_angles_and_rates_meet_the_reference_to_second_order(form: str, scheme: NewmarkFamily) -> None:
     swing = FORMS[form]()
@@ -71,6 +72,7 @@ def test_energy_is_kept_to_second_order(form: str) -> None:
     assert_second_order(error, 2e-3)
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize(("form", "scheme"), PAIRS)
 def test_unequal_rods_started_with_speed_follow_lagranges_equations(form: str, scheme: NewmarkFamily) -> None:
     sizes = {"m1": 0.8, "m2": 0.5, "L1": 1.3, "L2": 0.9, "g": 3.3}

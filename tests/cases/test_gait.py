@@ -49,6 +49,7 @@ each_gait = pytest.mark.parametrize("name", GAITS)
 each_scheme = pytest.mark.parametrize("scheme", WITH_ROWS, ids=name_of)
 
 
+@pytest.mark.covering
 @each_gait
 @each_scheme
 def test_the_fixed_point_returns_after_one_step(scheme: NewmarkFamily, name: str) -> None:
@@ -59,6 +60,7 @@ def test_the_fixed_point_returns_after_one_step(scheme: NewmarkFamily, name: str
     assert strike.side == "right"
 
 
+@pytest.mark.covering
 @each_gait
 @each_scheme
 def test_period_length_and_states_around_the_strike_are_of_second_order(scheme: NewmarkFamily, name: str) -> None:

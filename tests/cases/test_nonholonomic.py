@@ -93,6 +93,7 @@ def test_the_knife_edge_on_an_incline_meets_its_references(scheme: NewmarkFamily
 SIZES = [D3.definition[name] for name in ("m", "R", "J", "slope", "g")]
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("held", ["row", "contact", "joint"])
 @every_scheme
 def test_a_rolling_wheel_is_exact_at_any_step(scheme: NewmarkFamily, held: str) -> None:

@@ -36,6 +36,7 @@ def test_a_wide_swing_keeps_its_phase_to_second_order(form: str, scheme: Newmark
     assert_second_order(errors, 0.0025)
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("motion", [(-2.6, 0.4), (-1.0, 9.0)], ids=["swinging", "turning over"])
 @pytest.mark.parametrize(("form", "scheme"), PAIRS)
 def test_any_pendulum_follows_its_equation_of_motion(

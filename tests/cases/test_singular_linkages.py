@@ -77,6 +77,7 @@ def test_the_parallelogram_stays_one_or_stops_with_an_error(scheme: NewmarkFamil
 
 
 # b2 -----------------------------------------------------------------------------------------------------------------
+@pytest.mark.covering
 @pytest.mark.parametrize("scheme", WITH_ROWS, ids=name_of)
 @pytest.mark.parametrize("count", [1, 2, 10])
 def test_cranks_stay_parallel_and_keep_their_energy_or_stop_with_an_error(scheme: NewmarkFamily, count: int) -> None:

@@ -44,6 +44,7 @@ def assembled(model: mbd.Model, crank: float, rod: float) -> mbd.State:
     return mbd.assemble(model, position={"main bearing.angle": 0.5 * math.pi, "guide.displacement": crank + rod})
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("cut", ["auto", "all", ("crank pin",), ("guide",)], ids=str)
 @pytest.mark.parametrize("scheme", WITH_ROWS, ids=name_of)
 def test_slider_motion_and_drive_torque_meet_the_reference(scheme: NewmarkFamily, cut: Any) -> None:

@@ -129,6 +129,7 @@ def test_a_thread_does_it_while_functions_are_called():
     assert not any(thread.name == "mbd background" for thread in threading.enumerate())
 
 
+@pytest.mark.usefixtures("older_objects_left_alone")
 def test_nothing_is_made_for_a_library_that_is_gone(jobs, monkeypatch):
     hasty()
     gc.collect()  # library and functions know each other

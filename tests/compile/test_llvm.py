@@ -159,6 +159,7 @@ def test_a_library_takes_further_functions_and_knows_them_by_name():
         library.add({"left foot": [links.energy]})
 
 
+@pytest.mark.usefixtures("older_objects_left_alone")
 def test_a_function_outlives_the_variable_that_held_its_library():
     links = chain(2)
     function = compile_functions({"r": links.outputs}, links.layout, cache=NONE)["r"]

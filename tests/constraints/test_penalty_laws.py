@@ -166,6 +166,7 @@ def test_a_spring_with_a_damper_opens_by_its_rule_for_every_exponent(exponent, r
     assert least < -1.0 if release == "gap" and damping else least > -1e-6
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("scheme", SCHEMES, ids=lambda scheme: type(scheme).__name__)
 @pytest.mark.parametrize("law", [None, *CLASSICS])
 def test_a_bouncing_ball_never_gains_energy_and_comes_to_rest(law, scheme):

@@ -41,6 +41,7 @@ def agree(one: Any, other: Any, size: float = 1.0) -> None:
     np.testing.assert_allclose(one, other, rtol=ROUND_OFF, atol=ROUND_OFF * size)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("how", HOW)
 @pytest.mark.parametrize("scene", SCENES, ids=lambda scene: scene.__name__)
 def test_bodies_and_energies_give_the_same_motion_events_impulses_and_forces(scene: Any, how: str) -> None:

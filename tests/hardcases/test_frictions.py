@@ -15,6 +15,7 @@ SCHEMES = {
 }  # fmt: skip
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("case", frictions.CASES, ids=lambda case: case.id)
 def test_every_case_holds(case, scheme):

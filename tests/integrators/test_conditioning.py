@@ -56,6 +56,7 @@ def drawn(seed):
     return rng.uniform(0.1, 0.5, n), masses, rng.uniform(0.3, 0.7, n), parents, angles
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("scheme", [mbd.HHT(0.05), mbd.RungeKutta853(), mbd.RadauIIA()], ids=["hht", "rk", "radau"])
 @pytest.mark.parametrize("seed", range(8))
 def test_a_tree_of_links_without_inertia_starts_with_the_accelerations_of_its_bodies(seed, scheme):
@@ -67,6 +68,7 @@ def test_a_tree_of_links_without_inertia_starts_with_the_accelerations_of_its_bo
     np.testing.assert_allclose(found, expected, atol=1e-7 * np.max(np.abs(expected)))
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("count", range(10, 40, 3))
 def test_a_chain_whose_masses_sit_near_its_joints_is_right_or_refused_by_name(count):
     words = np.full(count, 0.3), np.ones(count), np.full(count, 1 / 3), list(range(count))

@@ -21,6 +21,7 @@ def error_and_skew(count, **how):
     return away, np.max(np.abs(run["base 0.angle"] - run[f"base {count}.angle"]))
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("count", [1, 3])
 @pytest.mark.parametrize("dt", np.geomspace(4e-4, 5e-2, 10).tolist())
 def test_flat_poses_are_passed_whatever_the_step(count, dt):

@@ -198,6 +198,7 @@ def test_a_class_with_an_evaluate_alone_runs_through_every_scheme(scheme, system
     assert np.abs(end - exact.y[:, -1]).max() < (0.1 if scheme.order(system) == 1 else 2e-3)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("scheme", INTEGRATORS, ids=repr)
 @pytest.mark.parametrize("system", [Top(), ChartedTop()], ids=["centre", "charts"])
 def test_where_positions_turn_a_scheme_has_the_order_that_it_tells(scheme, system):

@@ -108,6 +108,7 @@ def test_the_last_bit_decides_nothing_where_residuals_of_collocation_fall_no_mor
             assert decisions(model, last_bits(start, nudge), mbd.RadauIIA(), dt, case.until) == expected
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("seed", range(12))
 def test_machine_code_and_plain_python_decide_alike(seed):
     model, start, scheme, dt, until = judged(seed)

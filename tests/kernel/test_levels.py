@@ -33,6 +33,7 @@ def steps(name, scheme):
     return run.record, run.stats["steps"]
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("scheme", SCHEMES, ids=repr)
 @pytest.mark.parametrize("name", ["equal rods", "walker", "box", "driven, all cut"])
 def test_every_level_of_optimization_gives_the_same_bits(name, scheme, plain_kernel, monkeypatch):

@@ -160,6 +160,7 @@ def assert_same_run(one, two):
         np.testing.assert_allclose(getattr(a, part), getattr(b, part), rtol=0, atol=bound * scale, err_msg=part)
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("scheme", SCHEMES, ids=repr)
 def test_a_chain_of_loops_moves_as_with_dense_factors(scheme, monkeypatch):
     ordered = fall(scheme)

@@ -154,6 +154,7 @@ def test_contacts_and_friction_obey_their_laws(contacts, frictions, held, seed):
 
 
 # Lemke's method alone -----------------------------------------------------------------------------------------------
+@pytest.mark.covering
 @pytest.mark.parametrize("level", [0, 1])
 @pytest.mark.parametrize("seed", range(15))
 def test_lemke_alone_finds_accelerations_and_impulses(only_lemke, seed, level):
@@ -164,6 +165,7 @@ def test_lemke_alone_finds_accelerations_and_impulses(only_lemke, seed, level):
     problem.check()
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("seed", range(15))
 def test_contacts_twice_at_one_place_are_no_obstacle(only_lemke, seed):
     problem = scene(np.random.default_rng(seed), 2 + seed % 5, 4 + seed % 3, 0, seed % 2, True, coefficient=0.0)

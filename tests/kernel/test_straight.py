@@ -50,6 +50,7 @@ def assert_same(one, two):
         np.testing.assert_allclose(getattr(a, part), getattr(b, part), rtol=0, atol=bound * scale, err_msg=part)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("scheme", SCHEMES, ids=repr)
 @pytest.mark.parametrize("motion", [walk, tumble, turn])
 def test_both_ways_of_factoring_take_the_same_steps(motion, scheme, monkeypatch):

@@ -106,6 +106,7 @@ SCENES = {
 }  # fmt: skip
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("scene", SCENES)
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_both_paths_find_the_same_events_and_rows(scene, scheme):

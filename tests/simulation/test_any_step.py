@@ -55,6 +55,7 @@ def told(seed, kind):
     return [f"{scheme!r} dt={dt!r} steps={steps} {contact}: {text}" for text in found]
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("seed", [*range(4), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(4, 60))])
 def test_no_step_leaves_the_laws_of_mechanics(kind, seed):

@@ -71,6 +71,7 @@ def test_every_scheme_runs_with_every_law_or_is_refused(name):
         check(name, scheme)
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("name", SCENES)
 def test_interpreted_schemes_run_with_every_law(name):
     for _, scheme in INTERPRETED:
@@ -92,6 +93,7 @@ def test_non_smooth_steps_run_with_interpreted_schemes(name):
         check(name, scheme, dt=4e-3, contact="nonsmooth")
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("name", SCENES)
 def test_the_plain_twin_runs_with_every_law(name):
     check(name, mbd.HHT(0.05), dt=5e-3, backend="python")

@@ -64,6 +64,7 @@ SCHEMES = [*((scheme, (50, 100, 200)) for scheme in SECOND), (mbd.RadauIIA(toler
            (mbd.RungeKutta853(), (5, 10, 20))]  # fmt: skip
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize(("scheme", "counts"), SCHEMES, ids=[repr(scheme) for scheme, _ in SCHEMES])
 @pytest.mark.parametrize("backend", ["auto", "python"])
 def test_every_scheme_has_its_order_on_a_heavy_body_that_turns_about_a_point(scheme, counts, backend):

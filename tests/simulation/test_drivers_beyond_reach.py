@@ -30,6 +30,7 @@ def pulled(upper: float, lower: float, from_length: float, speed: float, cut: st
     return model, (upper + lower - from_length) / speed
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("cut", ["auto", "all"])
 @pytest.mark.parametrize("scheme", SCHEMES, ids=repr)
 def test_a_driver_beyond_reach_is_named_and_no_row_leaves_its_constraints(scheme: Any, cut: str) -> None:

@@ -76,6 +76,7 @@ def plain(seed: int, scheme: mbd.Integrator, dt: float) -> mbd.Trajectory:
     return mbd.simulate(*free_linkage(seed)[0].start, scheme, dt=dt, until=float(run.time[-1]))
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("scheme", SCHEMES, ids=repr)
 @pytest.mark.parametrize("seed", range(5))
 def test_an_event_without_effect_next_to_a_singular_configuration_is_logged_and_changes_nothing(seed, scheme):
@@ -99,6 +100,7 @@ def test_an_event_without_effect_next_to_a_singular_configuration_is_logged_and_
             assert abs(run[found.angle][-1] - free[found.angle][-1]) < 1e-12  # RungeKutta853 may take other steps
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("scheme", SCHEMES, ids=repr)
 @pytest.mark.parametrize("what", ["reset", "terminal", "end", "sample", "impact"])
 def test_what_cannot_happen_at_a_singular_configuration_is_named(what, scheme):

@@ -26,6 +26,7 @@ def refusing(friction: float | None = 0.5) -> mbd.Model:
     return model
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("scheme", SCHEMES, ids=lambda scheme: type(scheme).__name__)
 @pytest.mark.parametrize("manner", MANNERS, ids=["events", "nonsmooth", "tol"])
 def test_the_start_is_the_first_row(scheme, manner, tmp_path):

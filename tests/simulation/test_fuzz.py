@@ -26,6 +26,7 @@ def told(verdicts):
     return "\n".join(f"wild_scene({v['seed']}): {v['reasons']} {v['scene']} … {v['message'][:300]}" for v in bad)
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("shape", range(12))
 def test_wild_scenes_end_well_or_say_why_not(shape):
     verdicts = [verdict(seed) for seed in QUICK if seed % SHAPES == shape]

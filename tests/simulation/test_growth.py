@@ -42,6 +42,7 @@ def ends(model, start, scheme, dt, until):
     return np.concatenate([run.final.q, run.final.v]), [(event.kind, event.name) for event in run.events]
 
 
+@pytest.mark.sampled(4)
 @pytest.mark.parametrize("seed", range(36))
 def test_the_last_bits_of_a_start_change_a_run_by_no_more_than_the_motion_magnifies_them(seed):
     model, place, speed, opened = drawn(seed)

@@ -97,6 +97,7 @@ def kane(mu, forward, law):
     return strike(same_rod(mu, 0.9), KANE, {"place.x": forward * FALL}, law)
 
 
+@pytest.mark.covering
 @every_law
 @pytest.mark.parametrize("mu", [None, 0.2, 0.5, 2.0])
 @pytest.mark.parametrize("forward", [-1.5, -0.71, -0.3, 0.0, 0.3, 0.71, 1.5])

@@ -36,6 +36,7 @@ def folded(model, law, contact):
     return mbd.simulate(model, start, mbd.HHT(0.05), dt=2e-3, until=0.3, impact=law, contact=contact)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("law", ["newton", "poisson", "sequential"])
 @pytest.mark.parametrize(
     ("loss", "contact"), [(None, "events"), (None, "nonsmooth"), (mbd.PinFriction(0.4, 0.05), "events")], ids=repr

@@ -50,6 +50,7 @@ def tumbled(seed: int) -> mbd.Trajectory:
     return mbd.simulate(model, start, dt=2e-3, until=1.0, impact=LAWS[seed % 3], on_failure="return")
 
 
+@pytest.mark.sampled(4)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_impulses_of_events_add_up_to_the_change_of_momentum(seed):
     trajectory = tumbled(seed)

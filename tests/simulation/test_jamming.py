@@ -46,6 +46,7 @@ def test_a_point_mass_on_a_pin_that_reaches_its_lever_arm_does_not_move_and_is_n
         assert "pin friction of 'hinge' may jam" in run.message, run.message
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("scheme", [mbd.HHT(0.05), mbd.RadauIIA()], ids=repr)
 @pytest.mark.parametrize("seed", range(6))
 def test_a_pin_is_said_to_jam_where_it_reaches_the_lever_arm_and_not_below(seed, scheme):

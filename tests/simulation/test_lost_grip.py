@@ -42,6 +42,7 @@ def hoop(seed: int, mu: float | None = None) -> tuple[mbd.Model, mbd.State, floa
     return model, start, flight
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("scheme", SCHEMES, ids=repr)
 @pytest.mark.parametrize("seed", range(3))
 def test_rolling_that_needs_grip_without_a_normal_force_is_named(seed, scheme):

@@ -228,6 +228,7 @@ def through(door: str, place: Place, model: mbd.Model, start: mbd.State, value: 
     }[door]
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("place", PLACES, ids=lambda place: place.name)
 def test_a_value_is_refused_or_accepted_alike_wherever_it_is_given(place: Place) -> None:
     model = place.model(place.usual)
@@ -240,6 +241,7 @@ def test_a_value_is_refused_or_accepted_alike_wherever_it_is_given(place: Place)
             assert bool(message) == bool(told), (door, value, told, message)
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("place", PLACES, ids=lambda place: place.name)
 def test_a_value_makes_the_same_motion_wherever_it_is_given(place: Place) -> None:
     """To the round-off of the steps: the words' own form may fold, or cut another joint."""

@@ -52,6 +52,7 @@ def crossing(waves: tuple[float, float], seed: int) -> tuple[dict, float, float,
     return start, speed, true["place.x"][-1], float(np.min(true["foot.force"]))
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("contact", ["events", "nonsmooth"])
 @pytest.mark.parametrize("scheme", SCHEMES, ids=repr)
 def test_a_contact_that_presses_never_opens_and_errs_on_the_whole_no_more_than_a_row_that_may_pull(scheme, contact):

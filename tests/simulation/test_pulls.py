@@ -38,6 +38,7 @@ def ridden(model, scheme, speed, dt=1e-3, until=0.05, **more):
     return mbd.simulate(model, start, scheme, dt=dt, until=until, **more)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("contact", ["events", "nonsmooth"])
 @pytest.mark.parametrize("scheme", SCHEMES, ids=NAMES)
 def test_friction_of_a_foot_that_pulls_takes_no_energy_and_gives_none(scheme, contact):
@@ -90,11 +91,13 @@ def test_one_rule_that_forbids_to_pull_is_enough():
     assert [event.kind for event in ridden(rider(rules), mbd.HHT(), 10.0).events] == ["opened"]
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("seed", WILD)
 def test_no_row_and_no_impulse_of_a_wild_scene_pulls(seed):
     assert complaints(wild_scene(seed, interpreted=()).run()) == []
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("contact", ["events", "nonsmooth"])
 @pytest.mark.parametrize("scheme", SCHEMES, ids=NAMES)
 def test_no_contact_pulls_at_any_step(scheme, contact):
@@ -112,6 +115,7 @@ def test_no_contact_pulls_at_any_step(scheme, contact):
 
 
 # as many switches as there is to switch -----------------------------------------------------------------------------
+@pytest.mark.covering
 @pytest.mark.parametrize("contact", ["events", "nonsmooth"])
 @pytest.mark.parametrize("scheme", [mbd.HHT(), mbd.RadauIIA()], ids=["HHT", "RadauIIA"])
 def test_any_number_of_frictions_may_switch_at_one_instant(scheme, contact):

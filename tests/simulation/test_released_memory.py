@@ -14,6 +14,9 @@ from tests.equations.mechanisms import four_bar
 from tests.simulation.capability_scenes import SCENES
 
 
+pytestmark = pytest.mark.usefixtures("older_objects_left_alone")
+
+
 def loop():
     model = four_bar()
     return model, mbd.assemble(model), 0.05, model.joints[0].name

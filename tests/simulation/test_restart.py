@@ -34,6 +34,7 @@ def cuts(whole, seed, count):
     return sorted({0, last, *events, *short.tolist(), *rng.integers(1, last, count).tolist()})
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("name", SCENES)
 def test_two_halves_are_the_whole_to_the_bit(name, scheme):
@@ -43,6 +44,7 @@ def test_two_halves_are_the_whole_to_the_bit(name, scheme):
         assert_halves_are_the_whole(whole, *halves(model, start, SCHEMES[scheme], whole.time[row], **how))
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("scheme", [mbd.HHT(0.05), mbd.RadauIIA(), ProjectedMidpoint(), SemiImplicitEuler()], ids=repr)
 @pytest.mark.parametrize("name", ["bouncing ball", "redundant cranks", "controller and signal", "ball on rubber"])
 def test_two_halves_in_plain_python_are_the_whole_too(name, scheme):

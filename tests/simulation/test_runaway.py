@@ -87,6 +87,7 @@ def hardening(x: Any) -> Any:
     return mbd.exp(-30.0 * x) - mbd.exp(30.0 * x)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("law", [wall, hardening])
 @pytest.mark.parametrize("scheme", SCHEMES, ids=repr)
 def test_every_row_is_balanced_and_none_is_faster_than_the_forces_allow(law: Any, scheme: Any) -> None:
@@ -144,6 +145,7 @@ def falling(law):
     return model
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("scheme", [mbd.HHT(0.05), mbd.Newmark(), mbd.GeneralizedAlpha(0.8), mbd.RadauIIA()], ids=repr)
 @pytest.mark.parametrize("law", [law for law in PULLS if law != "softened"])
 def test_no_step_leaps_over_the_pole_of_a_force(law, scheme):

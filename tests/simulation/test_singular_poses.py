@@ -57,6 +57,7 @@ def judge(name: str, scheme: mbd.Integrator, steps: tuple[float, ...], floor: fl
         assert any("singular configuration" in note for note in run.stats["notes"])
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("scheme", SCHEMES, ids=repr)
 @pytest.mark.parametrize("name", MECHANISMS)
 def test_singular_poses_are_passed_on_the_branch_with_order_two(name, scheme):
@@ -82,6 +83,7 @@ def test_nothing_is_kicked_next_to_a_singular_pose(dt, scheme):
     assert np.max(bends) < 20.0 * dt**2 + 1e-14 / dt**2  # the second slope of the rate is 8 rad/s³
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("scheme", [mbd.HHT(0.05), mbd.Newmark()], ids=repr)
 @pytest.mark.parametrize("name", ["one four-bar", "slider-crank", "row on velocities", "three cranks, redundant"])
 def test_plain_python_passes_them_like_machine_code(name, scheme):

@@ -123,6 +123,7 @@ def test_a_projected_state_goes_on_and_round_off_is_taken(scene: Callable[..., A
     np.testing.assert_allclose(run(model, wobbly).final.q, run(model, near).final.q, atol=1e-9)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("scheme", SCHEMES, ids=repr)
 @scenes
 def test_the_end_of_a_run_is_a_start_for_every_scheme_and_step(

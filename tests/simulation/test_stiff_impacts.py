@@ -28,6 +28,7 @@ def rod(**law):
     return model
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("law", LAWS, ids=str)
 @pytest.mark.parametrize("scheme", SCHEMES, ids=NAMES)
 def test_nothing_passive_gains_in_blows_whatever_the_step(scheme, law):

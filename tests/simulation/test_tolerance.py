@@ -77,6 +77,7 @@ def achieved(scene, scheme, tol):
 
 
 # what tol promises --------------------------------------------------------------------------------------------------
+@pytest.mark.covering
 @pytest.mark.parametrize("scene", SCENES)
 @pytest.mark.parametrize("scheme", [*SCHEMES[:2], mbd.RadauIIA()], ids=repr)
 def test_the_largest_error_of_a_coordinate_is_what_tol_asks_for(scene, scheme):
@@ -253,6 +254,7 @@ def following(model, start, scheme, until, allowed=1e-6, backend="auto"):
     return prepared(model, start, scheme, 1e-3, until, {}, options)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("scene", SCENES)
 @pytest.mark.parametrize("scheme", SCHEMES[:2], ids=repr)
 def test_the_interpreted_kernel_takes_the_steps_of_the_compiled_one(scene, scheme):

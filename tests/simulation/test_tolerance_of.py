@@ -49,6 +49,7 @@ def scene(name):
     return model, start, mbd.simulate(model, start, mbd.RungeKutta853(), dt=1e-3, until=0.8)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("name", MAKERS)
 @pytest.mark.parametrize(
     ("scheme", "tols"),

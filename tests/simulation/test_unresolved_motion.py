@@ -118,6 +118,7 @@ def coarse_notes(found):
     return [note for note in found.stats["notes"] if "not resolved by dt" in note]
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("integrator", COARSE, ids=lambda scheme: type(scheme).__name__)
 @pytest.mark.parametrize("seed", range(4))
 def test_a_wall_that_is_thinner_than_a_step_is_told_with_a_step_that_resolves_it(seed, integrator):

@@ -176,6 +176,7 @@ def test_what_has_landed_crosses_nothing(seed, scheme):
     assert [event.name for event in found.events if event.kind == "event" and event.time > landed] == []
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("scheme", WATCHED, ids=repr)
 @pytest.mark.parametrize("make", [hanging, resting])
 @pytest.mark.parametrize("seed", range(6))

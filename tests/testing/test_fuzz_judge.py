@@ -110,6 +110,7 @@ def test_impacts_friction_and_loops_of_sound_runs_break_no_law():
     assert between(run, model).faults == ()
 
 
+@pytest.mark.sampled(5)
 @pytest.mark.parametrize(
     "number",
     SOUND

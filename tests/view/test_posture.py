@@ -66,6 +66,7 @@ def test_a_spatial_mechanism_is_seen_from_the_side(tmp_path):
     assert axes.get_aspect() == 1.0 and len(axes.lines) >= 2
 
 
+@pytest.mark.usefixtures("older_objects_left_alone")
 def test_a_state_without_its_model_asks_for_it(tmp_path):
     model, start = leg()
     moved = dataclasses.replace(start, q=start.q + 0.1)
