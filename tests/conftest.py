@@ -98,5 +98,3 @@ def pytest_collection():
 def older_objects_left_alone():
     """Garbage collections do not search what earlier tests left, which takes seconds."""
     gc.freeze()
-    yield
-    gc.unfreeze()

@@ -13,7 +13,6 @@ from mbd.compile.mechanisms import mechanism_of
 from tests.equations.mechanisms import four_bar
 from tests.simulation.capability_scenes import SCENES
 
-
 pytestmark = pytest.mark.usefixtures("older_objects_left_alone")
 
 
