@@ -14,6 +14,7 @@ Inputs on the tape, as (kind, index)
     ('switch', c)  1.0 while penalty contact number c acts, else 0.0
     ('slip', k)    sign of the sliding of friction k, 0.0 while it sticks or its contact is open
     ('p', k)       parameter k
+    ('place', 0), ('place', 1)   x and z of a height function that a picture shows
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, Protocol
 
 from mbd.configuration import Configuration
+from mbd.equations.shapes import Shape
 from mbd.tape.node import Node, Table, Tape
 
 __all__ = [
@@ -294,6 +296,7 @@ class Equations:
     idle : (owner, part) of rows of cut joints that hold whatever the motion, and were left out
     markers : full names of the named points, which pages show
     observations : (name, unit) of the results of users' own
+    shapes : what pictures show beside bodies
     memory : what follows from the rest, kept once it was found
     """
 
@@ -323,6 +326,7 @@ class Equations:
     chart: Chart | None = None
     markers: tuple[str, ...] = ()
     observations: tuple[tuple[str, str], ...] = ()
+    shapes: tuple[Shape, ...] = ()
     configuration: Configuration = field(default=None, repr=False)  # type: ignore[assignment]
     memory: dict[str, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 

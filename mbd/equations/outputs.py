@@ -27,20 +27,25 @@ class Outputs:
         self._makers: dict[str, Callable[[], Scalar]] = {} if base is None else dict(base._makers)
         self._made: dict[str, Node] = {}
         self._spelled: dict[str, str] = {}
+        self._unlisted: set[str] = set() if base is None else set(base._unlisted)
 
     def alias(self, spelled: str, name: str) -> None:
         """Another spelling of a name, which is not listed."""
         self._spelled[spelled] = name
 
-    def add(self, name: str, make: Callable[[], Scalar]) -> None:
-        """Offer a scalar; the first offer of a name stays."""
-        self._makers.setdefault(name, make)
+    def add(self, name: str, make: Callable[[], Scalar], listed: bool = True) -> None:
+        """Offer a scalar, among the names or not; the first offer of a name stays."""
+        if name not in self._makers:
+            self._makers[name] = make
+            self._unlisted.update(() if listed else (name,))
 
     def value(self, name: str, value: Scalar) -> None:
         """Offer a scalar that is already known."""
         self.add(name, lambda: value)
 
-    def triple(self, name: str, make: Callable[[], Sequence[Scalar]], suffixes: Sequence[str] = AXES) -> None:
+    def triple(
+        self, name: str, make: Callable[[], Sequence[Scalar]], suffixes: Sequence[str] = AXES, listed: bool = True
+    ) -> None:
         """Offer the components 'name.x', 'name.y', 'name.z' of a vector that is made once."""
         made: list[Scalar] = []
 
@@ -50,7 +55,7 @@ class Outputs:
             return made[k]
 
         for k, suffix in enumerate(suffixes):
-            self.add(f"{name}.{suffix}", partial(component, k))
+            self.add(f"{name}.{suffix}", partial(component, k), listed)
 
     def __call__(self, name: str) -> Node:
         """The node of a result; an unknown name is answered with the nearest known ones."""
@@ -59,16 +64,16 @@ class Outputs:
         if node is None:
             make = self._makers.get(name)
             if make is None:
-                raise UnknownNameError(nearest(name, self._makers, "result"))
+                raise UnknownNameError(nearest(name, self.names(), "result"))
             node = self._made[name] = self._finish(make())
         return node
 
     def names(self) -> Sequence[str]:
-        """Everything that can be asked for."""
-        return tuple(self._makers)
+        """Everything that users can ask for."""
+        return tuple(name for name in self._makers if name not in self._unlisted)
 
     def __contains__(self, name: str) -> bool:
         return name in self._makers
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._makers)
+        return iter(self.names())

@@ -105,7 +105,20 @@ def _facts(facts: Any, heads: Mapping[str, Head]) -> int:
     _pairs(facts.get("velocities", []), "'velocities'")
     _list(facts.get("markers", []), str, "'markers'")
     _pairs(facts.get("observations", []), "'observations'")
+    for shape in _list(facts.get("shapes", []), dict, "'shapes'"):
+        _shape(shape)
     return len(facts["contacts"])
+
+
+def _shape(shape: Mapping[str, Any]) -> None:
+    """Something that pictures show, of the names that there are."""
+    expect(set(shape) == {"kind", "name", "contacts", "points", "place", "numbers", "across"}, "'shapes'")
+    expect(all(isinstance(shape[word], str) for word in ("kind", "name", "place", "across")), "'shapes'")
+    expect(set(shape["across"]) <= set("xzt"), "'shapes'")
+    contacts, points = (_list(shape[word], str, "'shapes'") for word in ("contacts", "points"))
+    expect(len(contacts) == len(points), "'shapes'")
+    numbers = _list(shape["numbers"], (int, float), "'shapes'")
+    expect(len(numbers) == (4 if shape["kind"] == "plane" else 0), "'shapes'")
 
 
 def _columns(meta: Mapping[str, Any], members: Members, heads: Mapping[str, Head], count: int) -> set[str]:
@@ -168,6 +181,7 @@ def _printable(meta: Mapping[str, Any]) -> None:
     """Names as models have them, without signs that a terminal obeys."""
     facts = meta["facts"]
     names = [facts["model"], *meta["names"], *(name for name, _ in facts["coordinates"]), *facts.get("markers", ())]
+    names += [word for shape in facts.get("shapes", ()) for word in (shape["name"], shape["place"] or "-")]
     names += [contact["name"] for contact in facts["contacts"]] + [event["name"] for event in meta["events"]]
     for name in names:
         printable(name, "the file")

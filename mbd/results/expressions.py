@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from mbd.equations import programs
+from mbd.equations.shapes import PLACE
 from mbd.results.archive import Arrays, Members
 from mbd.results.balance import Balance
 from mbd.results.charts import Charts
@@ -30,7 +31,7 @@ ARITY = {
 }  # fmt: skip
 """Operations and how many arguments they have."""
 OPERATIONS = tuple(sorted(ARITY))
-KINDS = ("t", "q", "x", "v", "z", "a", "s", "lam", "anchor", "switch", "slip", "p")
+KINDS = ("t", "q", "x", "v", "z", "a", "s", "lam", "anchor", "switch", "slip", "p", PLACE)
 """Kinds of inputs."""
 MEMBERS = {"graph": ("i", 6), "graph numbers": ("f", 0), "graph outputs": ("i", 0), "graph terms": ("i", 0)}
 """Arrays, each with its kind and number of columns; those of tables besides."""
@@ -199,7 +200,7 @@ def read_expressions(words: Mapping[str, Any], arrays: Mapping[str, Any], parame
         "t": 1, "q": (1 if words["adds"] else 2) * sizes["q"],
         "x": sizes["v"], "v": sizes["v"], "a": sizes["v"], "z": sizes["z"], "s": sizes["z"],
         "lam": len(rows), "anchor": arrays["anchors"].shape[1], "switch": len(contacts), "slip": len(frictions),
-        "p": parameters,
+        "p": parameters, PLACE: 2,
     }  # fmt: skip
     tape = Tape()
     tables = [_table(tape, arrays[f"table {k}"]) for k in range(words["tables"])]

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
+from mbd.equations.shapes import HEIGHT, Shape, drawn
 from mbd.results.names import AXES
 
 if TYPE_CHECKING:
@@ -40,6 +41,7 @@ class Facts:
     velocities : (name, unit) of velocities that are not the rates of coordinates
     markers : full names of the named points, 'left shank.toe' or 'heel'
     observations : (name, unit) of the results of users' own
+    shapes : grounds, wheels and blades that pictures show
     """
 
     model: str = ""
@@ -51,11 +53,31 @@ class Facts:
     velocities: tuple[tuple[str, str], ...] = ()
     markers: tuple[str, ...] = ()
     observations: tuple[tuple[str, str], ...] = ()
+    shapes: tuple[Shape, ...] = ()
 
     @property
     def rates(self) -> tuple[str, ...]:
         """Names that velocities may have: rates of coordinates, not all of which there are, and `velocities`."""
         return (*(f"{name}.rate" for name, _ in self.coordinates[: self.coordinate_count]), *dict(self.velocities))
+
+    @property
+    def drawn(self) -> tuple[str, ...]:
+        """Results that only pictures ask for, besides heights."""
+        found: list[str] = []
+        for shape in self.shapes:
+            vectors = {
+                "moving plane": ("place", "normal", "forward"), "wheel": ("spoke", "axle"), "blade": ("along",)
+            }.get(shape.kind, ())  # fmt: skip
+            found += [drawn(shape.name, what) for what in vectors]
+            if shape.kind in ("moving plane", "surface"):
+                found += [drawn(contact, what) for contact in shape.contacts for what in ("normal", "forward")]
+        radii = (f"{shape.name}.radius" for shape in self.shapes if shape.kind == "wheel")
+        return (*dict.fromkeys(name + axis for name in found for axis in AXES), *radii)
+
+    @property
+    def heights(self) -> tuple[str, ...]:
+        """Names of the heights of surfaces, which depend on a place."""
+        return tuple(drawn(shape.name, HEIGHT) for shape in self.shapes if shape.kind == "surface")
 
     @classmethod
     def of(cls, equations: Equations) -> Facts:
@@ -78,6 +100,7 @@ class Facts:
             _own_velocities(equations),
             equations.markers,
             equations.observations,
+            equations.shapes,
         )
 
     @classmethod
@@ -93,11 +116,16 @@ class Facts:
             tuple((name, unit) for name, unit in data.get("velocities", ())),
             tuple(data.get("markers", ())),
             tuple((name, unit) for name, unit in data.get("observations", ())),
+            tuple(_shape(shape) for shape in data.get("shapes", ())),
         )
 
     def as_json(self) -> dict[str, Any]:
         """Plain lists and dictionaries."""
         return asdict(self)
+
+
+def _shape(data: Mapping[str, Any]) -> Shape:
+    return Shape(**{**data, **{name: tuple(data[name]) for name in ("contacts", "points", "numbers")}})
 
 
 def _own_velocities(equations: Equations) -> tuple[tuple[str, str], ...]:
@@ -113,10 +141,11 @@ def _places(equations: Equations) -> list[str]:
     frames = [name[:-3] for name in equations.output_names() if name.endswith(".vx") and f"{name[:-3]}.x" in names]
     positions = {frame: [equations.output(frame + axis) for axis in AXES] for frame in frames if equations.contacts}
     found = []
+    known = {c: p for shape in equations.shapes for c, p in zip(shape.contacts, shape.points, strict=True)}
     for contact in equations.contacts:
         captured = {node.index for node in contact.captured}
-        found.append("")
-        for frame, position in positions.items():
+        found.append(known.get(contact.name, ""))
+        for frame, position in ({} if found[-1] else positions).items():
             moving = {node.index for node in position if not node.is_constant}
             if captured == moving if captured else contact.gap is position[1]:
                 found[-1] = frame

@@ -59,8 +59,9 @@ def save(record: Record, run: Archive, path: str | Path, names: Sequence[str] | 
     }  # fmt: skip
     for number, (_, values) in enumerate(record.parameter_changes):
         arrays[f"change {number}"] = values
-    meta["aliases"], meta["values"], meta["names"] = _columns(run.columns, names, arrays)
-    meta["expressions"] = _expressions(run.columns, meta["names"], arrays)
+    shown = [name for name in run.facts.drawn if run.columns.knows(name)]
+    meta["aliases"], meta["values"], meta["names"] = _columns(run.columns, names, shown, arrays)
+    meta["expressions"] = _expressions(run.columns, [*meta["names"], *shown], run.facts.heights, arrays)
     meta["parts"], meta["stored"] = _ledger(run.ledger, arrays)
     meta["withheld"] = [[part.name, part.withheld] for part in run.ledger.parts if part.withheld]
     write(target, arrays, meta)
@@ -82,14 +83,17 @@ def _read_event(event: Mapping[str, Any]) -> EventRecord:
 
 
 def _columns(
-    columns: Columns, names: Sequence[str] | None, arrays: Arrays
+    columns: Columns, names: Sequence[str] | None, shown: Sequence[str], arrays: Arrays
 ) -> tuple[dict[str, Alias], dict[str, int], list[str]]:
-    """Each wanted scalar as a place in the state or as a numbered array; equal expressions are stored once."""
+    """Each wanted scalar as a place in the state or as a numbered array; equal expressions are stored once.
+
+    `shown` are for pictures, and not among the names of the run.
+    """
     wanted = columns.names if names is None else [part for name in names for part in columns.components(name)]
     aliases, values = {}, {}
     keys: dict[Any, int] = {}
     fresh: list[str] = []
-    for name in dict.fromkeys(wanted):
+    for name in dict.fromkeys([*wanted, *shown]):
         alias, key = columns.identity(name)
         if alias is not None:
             aliases[name] = alias
@@ -104,12 +108,15 @@ def _columns(
     return aliases, values, list(dict.fromkeys(wanted))
 
 
-def _expressions(columns: Columns, names: Sequence[str], arrays: Arrays) -> dict[str, Any] | None:
+def _expressions(
+    columns: Columns, names: Sequence[str], heights: Sequence[str], arrays: Arrays
+) -> dict[str, Any] | None:
     """What the columns need between their rows; None for those of an older file."""
     model = columns.between_rows
     if model is None:
         return None
-    return write_expressions(model.equations, {name: model.node(name) for name in names}, arrays)
+    found = [*names, *(name for name in heights if model.knows(name))]
+    return write_expressions(model.equations, {name: model.node(name) for name in found}, arrays)
 
 
 def _ledger(ledger: Ledger, arrays: Arrays) -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:

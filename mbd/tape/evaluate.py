@@ -1,16 +1,20 @@
-"""Plain evaluation of tape expressions, node by node: slow, simple, and never raising on numbers."""
+"""Plain evaluation of tape expressions, node by node: simple, and never raising on numbers."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from mbd.errors import UnknownNameError, nearest
 from mbd.tape.derivatives import live
 from mbd.tape.node import Node
-from mbd.tape.operations import value
+from mbd.tape.operations import CONDITIONS, value
 from mbd.tape.printing import input_name
 
-__all__ = ["evaluate", "values"]
+__all__ = ["evaluate", "evaluate_arrays", "values"]
 
 Key = tuple[str, int]
 
@@ -59,3 +63,40 @@ def _value(node: Node, found: Mapping[int, float], by_key: Mapping[Key, float]) 
         table, order = node.data
         return float(table.value(args[0], order))
     return value(op, *args)
+
+
+def evaluate_arrays(output: Node, inputs: Mapping[Key, ArrayLike]) -> NDArray[np.float64]:
+    """One output for arrays of inputs, which are broadcast together; the numbers are those of `evaluate`."""
+    given = {key: np.asarray(numbers, dtype=np.float64) for key, numbers in inputs.items()}
+    found: dict[int, Any] = {}
+    with np.errstate(all="ignore"):
+        for node in live([output]):
+            args = [found[arg.index] for arg in node.args]
+            if node.op == "const":
+                found[node.index] = float(node.data)
+            elif node.op == "input":
+                found[node.index] = given[node.data]
+            elif node.op == "table":
+                table, order = node.data
+                found[node.index] = np.vectorize(table.value, otypes=[np.float64])(args[0], order)
+            else:
+                found[node.index] = _apply(node.op, args)
+    shape = np.broadcast_shapes(*(numbers.shape for numbers in given.values()))
+    return np.array(np.broadcast_to(found[output.index], shape), dtype=np.float64)
+
+
+_CHOICES: dict[str, Any] = {"where": np.where, "not": np.logical_not, "and": np.logical_and, "or": np.logical_or}
+_NUMPY: dict[str, Any] = {
+    "div": np.divide, "pow": np.power, "min": np.minimum, "max": np.maximum, "lt": np.less, "le": np.less_equal,
+    "add": np.add, "sub": np.subtract, "mul": np.multiply, "neg": np.negative, "atan2": np.arctan2,
+    "asin": np.arcsin, "acos": np.arccos, "atan": np.arctan,
+}  # fmt: skip
+"""Operations that numpy calls by other names than the tape."""
+
+
+def _apply(op: str, args: Sequence[Any]) -> Any:
+    if op in _CHOICES:
+        truths = args if op in CONDITIONS else args[:1]
+        return _CHOICES[op](*(np.asarray(truth, dtype=bool) for truth in truths), *args[len(truths) :])
+    function: Any = _NUMPY[op] if op in _NUMPY else getattr(np, op)
+    return function(*args)

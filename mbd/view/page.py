@@ -7,13 +7,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from mbd.results.ledger import SPENT
 from mbd.results.summary import facts
 from mbd.results.units import unit
+from mbd.view.geometry import geometry
+from mbd.view.instants import Instants
+from mbd.view.packing import finite, packed, side, step_of
 from mbd.view.plots import QUANTITIES, scale, stretches
-from mbd.view.scene import Instants, Scene, scene
+from mbd.view.scene import scene
 from mbd.view.style import CYCLE
 from mbd.view.template import filled, written
 
@@ -28,11 +30,8 @@ RATE = 60.0
 LEAST, MOST = 240, 6000
 """Fewest and most pictures of a page, for very short and very long runs."""
 
-FINE = 5000.0
-"""Steps into which a range of values is divided; finer than a pixel."""
 
-
-SCRIPTS = ("data.js", "stage.js", "charts.js", "controls.js")
+SCRIPTS = ("data.js", "stage.js", "around.js", "charts.js", "controls.js")
 """Parts of the page's script, joined into one function."""
 
 
@@ -53,7 +52,7 @@ def content(run: Trajectory) -> dict[str, Any]:
     return {
         "name": run.name,
         "time": [round(float(t), 9) for t in picture.instants.time],
-        **_geometry(picture),
+        **geometry(picture),
         "contacts": [
             {
                 "name": contact.name,
@@ -76,76 +75,6 @@ def content(run: Trajectory) -> dict[str, Any]:
 def losses(run: Trajectory) -> list[float | None]:
     """The energy loss of each event [J]."""
     return [finite(event.energy_loss) for event in run.events]
-
-
-def side(name: str) -> str:
-    """'left', 'right' or ''."""
-    words = name.replace(".", " ").split()
-    return next((word for word in ("left", "right") if word in words), "")
-
-
-def finite(value: float) -> float | None:
-    """A number JSON can hold, rounded to nine figures."""
-    return float(f"{value:.9g}") if np.isfinite(value) else None
-
-
-def packed(values: ArrayLike, step: float) -> dict[str, Any]:
-    """A series as whole multiples of `step`: the first, then differences; one number if it never changes."""
-    numbers = np.asarray(values, dtype=np.float64)
-    whole = np.rint(np.nan_to_num(numbers / step)).astype(np.int64)
-    constant = len(whole) > 0 and bool(np.all(whole == whole[0]))
-    return {"step": step, "d": [int(whole[0])] if constant else np.diff(whole, prepend=0).tolist()}
-
-
-def _step(*series: ArrayLike) -> float:
-    """A round step that divides the common range of some series finely enough."""
-    both = np.concatenate([np.ravel(np.asarray(values, dtype=np.float64)) for values in series])
-    both = both[np.isfinite(both)]
-    span = float(np.max(np.abs(both), initial=0.0))
-    return float(f"{span / FINE:.1g}") if span > 0.0 else 1.0
-
-
-def _geometry(picture: Scene) -> dict[str, Any]:
-    axes = 3 if picture.spatial else 2
-    used = picture.positions[:, :, :axes]
-    size = float(np.max(np.ptp(used, axis=1))) if used.size else 0.0
-    size = size or float(np.max(np.abs(used), initial=0.0)) or 1.0
-    step = float(f"{size / FINE:.1g}")
-    heaviest = max(picture.masses.values(), default=1.0)
-    return {
-        "spatial": picture.spatial,
-        "points": [
-            {"name": name, "at": [packed(used[:, k, axis], step) for axis in range(axes)]}
-            for k, name in enumerate(picture.points)
-        ],
-        "segments": [
-            {
-                "body": body, "side": side(body), "points": list(members),
-                "mass": finite(picture.masses.get(body, 0.0) / heaviest),
-            }
-            for body, members in picture.segments
-        ],
-        "markers": list(picture.markers),
-        "grounds": [
-            {"normal": [finite(x) for x in ground.normal], "offset": finite(ground.offset)}
-            for ground in picture.grounds
-        ],
-        "touches": [
-            {
-                "side": side(touch.contact), "where": [finite(round(float(x), 6)) for x in touch.where[:axes]],
-                "begin": touch.begin, "end": touch.end,
-            }
-            for touch in picture.touches
-        ],
-        "pushes": [
-            {
-                "name": push.contact,
-                "at": [packed(push.place[:, axis], step) for axis in range(axes)],
-                "force": [packed(push.force[:, axis], _step(push.force)) for axis in range(axes)],
-            }
-            for push in picture.pushes
-        ],
-    }  # fmt: skip
 
 
 def _charts(run: Trajectory, instants: Instants) -> list[dict[str, Any]]:
@@ -202,6 +131,6 @@ def _fastest(run: Trajectory) -> dict[str, Any] | None:
 
 
 def _chart(title: str, kind: str, lines: list[tuple[str, str, Any]]) -> dict[str, Any]:
-    step = _step(*(values for _, _, values in lines))
+    step = step_of(*(values for _, _, values in lines))
     packs = [{"name": name, "color": shade, "values": packed(values, step)} for name, shade, values in lines]
     return {"title": title, "unit": kind, "series": packs}

@@ -16,7 +16,8 @@ from mbd.state import State, malformed
 from mbd.trajectory import Trajectory
 from mbd.view.plots import drawing
 from mbd.view.scene import Scene, scene, upright
-from mbd.view.style import NEUTRAL, as_label, color
+from mbd.view.scenery import Wheel
+from mbd.view.style import INK, NEUTRAL, as_label, color, tone
 
 __all__ = ["drawn", "instant"]
 
@@ -69,13 +70,16 @@ def drawn(model: Any, state: State, path: str | Path | None = None) -> Any:
     if not picture.points:
         raise ModelError(f"'{run.name}' has no bodies to draw")
     places = picture.positions[0] @ _view(picture).T
-    low, high = places.min(axis=0), places.max(axis=0)
+    rims = [_rim(wheel) @ _view(picture).T for wheel in picture.around.wheels]
+    extent = np.vstack([places, *rims])
+    low, high = extent.min(axis=0), extent.max(axis=0)
     size = float(np.max(high - low)) or 1.0
     left, below = (low + high) / 2.0 - ROOM * size
     right, above = (low + high) / 2.0 + ROOM * size
     with drawing(path, 5.6, 5.6) as figure:
         axes = figure.subplots()
         _ground(axes, picture, left, right)
+        _scenery(axes, picture, rims, size)
         _pivots(axes, model, run, picture)
         _bodies(axes, picture, places)
         _markers(axes, picture, places)
@@ -103,6 +107,30 @@ def _ground(axes: Any, picture: Scene, left: float, right: float) -> None:
         if abs(normal[1]) > 1e-9:
             x = np.array([left, right])
             axes.plot(x, (ground.offset - normal[0] * x) / normal[1], color=SOIL, lw=2.0, zorder=0)
+
+
+def _rim(wheel: Wheel) -> Matrix:
+    """The rim of a wheel from its spoke on, (65, 3) [m]."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 65)[:, None]
+    down = np.cross(wheel.spoke[0], wheel.axle[0])
+    return np.asarray(wheel.center[0] + wheel.radius[0] * (np.cos(angle) * wheel.spoke[0] + np.sin(angle) * down))
+
+
+def _scenery(axes: Any, picture: Scene, rims: list[Matrix], size: float) -> None:
+    """Surfaces and planes that move, as lines; wheels with a spoke; blades, dark and a tenth as long as the figure."""
+    around, view = picture.around, _view(picture)
+    for sheet in around.sheets:
+        for line in sheet.lines[0]:
+            axes.plot(*(line @ view.T).T, color=SOIL, lw=1.0 if picture.spatial else 2.0, zorder=0)
+    for deck in () if picture.spatial else around.decks:
+        ends = deck.place[0] + np.array([[-9.0], [9.0]]) * size * deck.forward[0]
+        axes.plot(*(ends @ view.T).T, color=SOIL, lw=2.0, zorder=0)
+    for wheel, rim in zip(around.wheels, rims, strict=True):
+        axes.plot(*rim.T, color=color(wheel.name), lw=2.0, zorder=2)
+        axes.plot(*np.array([view @ wheel.center[0], rim[0]]).T, color=color(wheel.name), lw=1.5, zorder=2)
+    for blade in around.blades:
+        ends = blade.place[0] + np.array([[-0.05], [0.05]]) * size * blade.along[0]
+        axes.plot(*(ends @ view.T).T, color=tone(INK), lw=5.0, zorder=5, solid_capstyle="round")
 
 
 def _pivots(axes: Any, model: Any, run: Trajectory, picture: Scene) -> None:

@@ -11,60 +11,13 @@ from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
 from mbd.results.names import AXES
+from mbd.view.instants import Instants
+from mbd.view.scenery import FIT, Ground, Scenery, plane_of_motion, scenery
 
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
 
-__all__ = ["Ground", "Instants", "Push", "Scene", "Touch", "scene"]
-
-FIT = 1e-6
-"""A plane whose distance reproduces a gap this well is the ground of that contact [m]."""
-
-
-@dataclass(frozen=True, eq=False)
-class Instants:
-    """Times to draw, a switch with both its sides: time (F,) [s], after (F,) True on the right side."""
-
-    time: Vector
-    after: NDArray[np.bool_]
-
-    @classmethod
-    def of(cls, run: Trajectory, count: int) -> Instants:
-        """`count` equal intervals of the run, and both sides of every event."""
-        time = run.time
-        inner = [event.time for event in run.events if time[0] < event.time <= time[-1]]
-        even = np.linspace(time[0], time[-1], count + 1) if time[-1] > time[0] else time[:1]
-        events = np.unique(inner)
-        both = np.concatenate([even[~np.isin(even, events)], events, events])
-        after = np.ones(len(both), dtype=bool)
-        after[len(both) - 2 * len(events) : len(both) - len(events)] = False
-        order = np.lexsort((after, both))
-        return cls(both[order], after[order])
-
-    def read(self, run: Trajectory, names: list[str]) -> Matrix:
-        """Named scalars at the instants, (F, names)."""
-        found = np.empty((len(self.time), len(names)))
-        for side, chosen in (("right", self.after), ("left", ~self.after)):
-            values = run.at(self.time[chosen], side=side).read(*names)  # type: ignore[arg-type]
-            for column, name in enumerate(names):
-                found[chosen, column] = values[name]
-        return found
-
-    def blend(self, run: Trajectory, column: Vector) -> Vector:
-        """A column of the stored rows at the instants."""
-        grid = run.columns.grid
-        slopes, found = grid.slopes(column), np.empty(len(self.time))
-        found[self.after] = grid.places(self.time[self.after], "right").blend(column, slopes)
-        found[~self.after] = grid.places(self.time[~self.after], "left").blend(column, slopes)
-        return found
-
-
-@dataclass(frozen=True, eq=False)
-class Ground:
-    """A plane ``normal · p = offset`` [m], in the axes of the scene."""
-
-    normal: Vector
-    offset: float
+__all__ = ["Instants", "Push", "Scene", "Touch", "scene"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +45,7 @@ class Scene:
 
     points : 'body.frame' names; positions (F, P, 3) [m] at the instants
     segments : (body, numbers of its points); masses : mass of each body that has one [kg]
+    around : grounds that the model has, wheels, blades; grounds : planes at rest, those that only the motion shows too
     markers : numbers of the points that are shown with their names
     spatial : whether anything moves out of the x–y plane
     """
@@ -101,6 +55,7 @@ class Scene:
     positions: NDArray[np.float64]
     segments: tuple[tuple[str, tuple[int, ...]], ...]
     masses: dict[str, float]
+    around: Scenery
     grounds: tuple[Ground, ...]
     touches: tuple[Touch, ...]
     pushes: tuple[Push, ...]
@@ -130,10 +85,12 @@ def scene(run: Trajectory, count: int) -> Scene:
     masses = {
         body: run.parameters[f"{body}.mass"] for body, _ in segments if run.parameters.get(f"{body}.mass", 0.0) > 0.0
     }
-    grounds = tuple(Ground(turn @ normal, offset) for normal, offset in _grounds(run, instants, raw))
+    around = scenery(run, instants, turn, raw if points else np.zeros((1, 1, 3)))
+    shown = (Ground(turn @ normal, offset) for normal, offset in _grounds(run, instants, raw, around))
     named = tuple(number[name] for name in markers)
-    pushes = tuple(_pushes(run, instants, turn))
-    return Scene(instants, points, positions, segments, masses, grounds, touches, pushes, named, spatial)
+    pushes = tuple(_pushes(run, instants, turn, around))
+    grounds = (*around.grounds, *shown)
+    return Scene(instants, points, positions, segments, masses, around, grounds, touches, pushes, named, spatial)
 
 
 def _lines(members: Sequence[str]) -> list[Sequence[str]]:
@@ -161,11 +118,13 @@ def upright(run: Trajectory) -> Matrix:
 
 
 def _touches(run: Trajectory, turn: Matrix) -> list[Touch]:
-    """Where and how long each contact with a place stayed closed."""
+    """Where and how long each contact with a place of ground at rest stayed closed."""
     found = []
+    carried = {name for shape in run.facts.shapes if shape.kind == "moving plane" for name in shape.contacts}
+    wheels = {shape.place for shape in run.facts.shapes if shape.kind == "wheel"}
     for column, contact in enumerate(run.facts.contacts):
         closed = run.record.closed[:, column].astype(np.int8)
-        if not contact.place or not closed.any():
+        if not contact.place or not closed.any() or contact.name in carried or contact.place in wheels:
             continue
         where = run[contact.place]
         change = np.flatnonzero(np.diff(closed, prepend=0, append=0))
@@ -174,55 +133,56 @@ def _touches(run: Trajectory, turn: Matrix) -> list[Touch]:
     return found
 
 
-def _pushes(run: Trajectory, instants: Instants, turn: Matrix) -> list[Push]:
-    """Forces of contacts with planes: the normal times the contact's force, and its friction along x of the plane."""
+def _pushes(run: Trajectory, instants: Instants, turn: Matrix, around: Scenery) -> list[Push]:
+    """Forces of contacts with a ground: the normal times the contact's force, and its friction along the ground."""
     found = []
     for contact in run.facts.contacts:
         wanted = [*(f"{contact.place}{axis}" for axis in AXES), f"{contact.name}.gap", f"{contact.name}.force"]
-        along = f"{contact.name}.friction.forward"
+        along = [name for name in (f"{contact.name}.friction.{way}" for way in ("forward", "sideways")) if name in run]
         if contact.unit != "m" or not contact.place or any(name not in run for name in wanted):
             continue
-        values = instants.read(run, [*wanted, *([along] if along in run else [])])
-        plane = _plane(values[:, :3], values[:, 3])
-        if plane is None or not np.any(values[:, 4:]):
+        values = instants.read(run, [*wanted, *along])
+        directions = around.directions.get(contact.name) or _shown_directions(values, turn)
+        if directions is None or not np.any(values[:, 4:]):
             continue
-        normal = plane[0]
+        normal, forward = directions
+        ways = {"forward": forward, "sideways": np.cross(forward, normal)}
         force = values[:, 4:5] * normal
-        if along in run:
-            force = force + values[:, 5:6] * np.array([normal[1], -normal[0], 0.0])
-        found.append(Push(contact.name, values[:, :3] @ turn.T, np.nan_to_num(force) @ turn.T))
+        for column, name in enumerate(along, start=5):
+            force = force + values[:, column : column + 1] * ways[name.rpartition(".")[2]]
+        place = values[:, :3] @ turn.T + around.tread(contact.place, normal)
+        found.append(Push(contact.name, place, np.nan_to_num(force)))
     return found
 
 
-def _grounds(run: Trajectory, instants: Instants, positions: NDArray[np.float64]) -> list[tuple[Vector, float]]:
-    """(normal, offset) of the planes that gaps measure the distance from, found from the motion itself."""
+def _shown_directions(values: Matrix, turn: Matrix) -> tuple[Matrix, Matrix] | None:
+    """Normal and forward of a plane that only the motion shows."""
+    plane = plane_of_motion(values[:, :3], values[:, 3])
+    if plane is None:
+        return None
+    normal = plane[0]
+    forward = np.array([normal[1], -normal[0], 0.0])
+    return np.tile(turn @ normal, (len(values), 1)), np.tile(turn @ forward, (len(values), 1))
+
+
+def _grounds(
+    run: Trajectory, instants: Instants, positions: NDArray[np.float64], around: Scenery
+) -> list[tuple[Vector, float]]:
+    """(normal, offset) of the planes that gaps without a ground measure the distance from, found from the motion."""
+    grounded = {contact for shape in run.facts.shapes for contact in shape.contacts}
     names = [f"{contact.name}.gap" for contact in run.facts.contacts if contact.unit == "m"]
-    known = [name for name in names if name in run]
+    known = [name for name in names if name in run and name.removesuffix(".gap") not in grounded]
     planes: list[tuple[Vector, float]] = []
     for gap in instants.read(run, known).T:
         for point in np.moveaxis(positions, 1, 0):
-            plane = _plane(point, gap)
+            plane = plane_of_motion(point, gap)
             if plane is not None:
                 if not any(np.allclose(plane[0], n) and abs(plane[1] - d) < FIT for n, d in planes):
                     planes.append(plane)
                 break
-    return planes
-
-
-def _plane(p: Matrix, gap: Vector) -> tuple[Vector, float] | None:
-    """normal, offset with ``normal · p − offset = gap`` and a unit normal; None if the motion shows no such plane."""
-    if np.max(np.abs(p[:, 1] - gap)) < FIT:
-        return np.array([0.0, 1.0, 0.0]), 0.0
-    moving = np.ptp(p, axis=0) > FIT
-    if moving.sum() < 2:
-        return None
-    unknowns = np.column_stack([p[:, moving], -np.ones(len(p))])
-    solution, _, rank, _ = np.linalg.lstsq(unknowns, gap, rcond=1e-9)
-    if rank < unknowns.shape[1] or np.max(np.abs(unknowns @ solution - gap)) > FIT:
-        return None
-    normal = np.zeros(3)
-    normal[moving] = solution[:-1]
-    if abs(float(np.linalg.norm(normal)) - 1.0) > FIT:
-        return None
-    offset = float(solution[-1])
-    return normal, offset
+    turn = upright(run)
+    return [
+        (normal, offset)
+        for normal, offset in planes
+        if not any(np.allclose(turn @ normal, g.normal) and abs(offset - g.offset) < FIT for g in around.grounds)
+    ]

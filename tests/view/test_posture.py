@@ -86,3 +86,19 @@ def test_what_has_no_bodies_cannot_be_drawn():
     ball = mbd.Lagrangian("ball", [mbd.Coordinate("y", unit="m")], lambda y_rate: 0.5 * y_rate * y_rate)
     with pytest.raises(ModelError, match="'ball' has no bodies to draw"):
         mbd.assemble(ball).plot()
+
+
+def test_a_wheel_its_road_and_a_blade_are_drawn():
+    model = mbd.Model("scooter")
+    wheel = mbd.RigidBody("wheel", mass=1.0, inertia=0.01)
+    model.connect(mbd.Planar("free", model.ground.origin, wheel.origin))
+    model.constrain(
+        mbd.Unilateral("road", mbd.touchdown(wheel.origin, lambda x: 0.1 * x * x), friction=0.0),
+        mbd.Rolling("tyre", wheel.origin, 0.2), mbd.KnifeEdge("edge", wheel.point(0.3, 0.0)),
+    )  # fmt: skip
+    axes = mbd.assemble(model, position={"free.y": 0.4, "free.angle": 0.5}).plot()
+    road, rim, spoke, blade = (np.array(line.get_data()) for line in (axes.lines[k] for k in (1, 2, 3, 4)))
+    np.testing.assert_allclose(road[1], 0.1 * road[0] ** 2, atol=1e-9)
+    np.testing.assert_allclose(np.hypot(rim[0], rim[1] - 0.4), 0.2, atol=1e-9)
+    np.testing.assert_allclose(spoke[:, 1] - spoke[:, 0], 0.2 * np.array([np.cos(0.5), np.sin(0.5)]), atol=1e-9)
+    np.testing.assert_allclose(blade.mean(axis=1), [0.3 * np.cos(0.5), 0.4 + 0.3 * np.sin(0.5)], atol=1e-9)

@@ -20,12 +20,17 @@ function survey() {
       const [x, y] = project(point.at.map((axis) => axis[i]));
       box[0] = Math.min(box[0], x); box[1] = Math.min(box[1], y); box[2] = Math.max(box[2], x); box[3] = Math.max(box[3], y);
     }
+    for (const wheel of run.wheels) {
+      const [x, y] = project(wheel.at.map((axis) => axis[i])), r = wheel.radius[i];
+      box[0] = Math.min(box[0], x - r); box[1] = Math.min(box[1], y - r); box[2] = Math.max(box[2], x + r); box[3] = Math.max(box[3], y + r);
+    }
     center[0][i] = (box[0] + box[2]) / 2; center[1][i] = (box[1] + box[3]) / 2;
     width = Math.max(width, box[2] - box[0]); height = Math.max(height, box[3] - box[1]);
     for (const k of [0, 1]) { all[k] = Math.min(all[k], box[k]); all[k + 2] = Math.max(all[k + 2], box[k + 2]); }
   }
   path = { center: center.map(smooth), width, height, all };
 }
+const extent = () => Math.max(path.width, path.height, 0.12 * (path.all[2] - path.all[0]), 0.12 * (path.all[3] - path.all[1]), 1e-12); // of the mechanism [m]
 function smooth(values) { // a straight line with the mean over a window, so that the camera does not rock with each step
   const half = Math.max(1, Math.round(time.length * Math.min(0.25, 0.6 / span))), n = values.length, sums = [0];
   for (let i = 0; i < n; i++) sums.push(sums[i] + values[i]);
@@ -51,14 +56,18 @@ function drawScene() {
   const { g, w, h } = prepare(el("scene"));
   if (!run.points.length) { drawLines(g, w, h, run.charts[1] || run.charts[0], true); return; }
   const p = locate(state.t), v = view(w, h, p);
+  for (const sheet of run.sheets) drawSheet(g, w, h, v, sheet);
   for (const ground of run.grounds) drawGround(g, w, h, v, ground);
+  for (const deck of run.decks) drawDeck(g, w, h, v, p, deck);
   drawTouches(g, v);
   drawTraces(g, v, p);
   if (el("ghosts").checked) {
     const gap = Math.min(0.12, span / 12);
     for (let k = 9; k >= 1; k--) if (state.t - k * gap >= first) drawFigure(g, v, locate(state.t - k * gap), 0.05 + 0.16 * (1 - k / 10), true);
   }
+  for (const wheel of run.wheels) drawWheel(g, v, p, wheel);
   drawFigure(g, v, p, 1, false);
+  for (const blade of run.blades) drawBlade(g, v, p, blade);
   if (el("forces").checked) drawPushes(g, w, h, v, p);
   drawScale(g, w, h, v);
 }
@@ -138,7 +147,7 @@ function drawGround(g, w, h, v, ground) {
   g.beginPath(); g.moveTo(...a); g.lineTo(...b); g.lineTo(...spot(s0 + reach, deep)); g.lineTo(...spot(s0 - reach, deep)); g.closePath(); g.fill();
   g.strokeStyle = colors.ground; g.lineWidth = 1.6;
   g.beginPath(); g.moveTo(...a); g.lineTo(...b); g.stroke();
-  const tick = nice(w / v.scale, 7);
+  const tick = nice(w / v.scale, Math.min(7, w / 95));
   g.lineWidth = 1; g.fillStyle = colors.muted; g.textAlign = "center"; g.textBaseline = "top";
   for (let s = Math.ceil((s0 - reach) / tick) * tick; s <= s0 + reach; s += tick) {
     const [x, y] = spot(s, 0), [x1, y1] = spot(s, 7 / v.scale), [x2, y2] = spot(s, 12 / v.scale);
@@ -182,7 +191,7 @@ const usual = (() => {
 })();
 function drawPushes(g, w, h, v, p) { // forces of the ground on the feet
   if (!usual) return;
-  const most = Math.max(path.width, path.height, 1e-12) / 3, unit = most / usual;
+  const [x0, y0, x1, y1] = path.all, most = Math.max(extent(), el("follow").checked ? 0 : 0.4 * Math.max(x1 - x0, y1 - y0)) / 3, unit = most / usual;
   for (const push of run.pushes) {
     const force = push.force.map((axis) => mix(axis, p)), size = Math.hypot(...force);
     if (size < 0.005 * usual) continue;

@@ -1,0 +1,176 @@
+"""What pictures show beside bodies: grounds that contacts touch, wheels that roll, blades.
+
+Names of bodies and constraints are enough, with numbers where nothing moves; all else are results that are not listed,
+traced when a picture asks for them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING
+
+from mbd.bodies.algebra import cross, rotate, scaled, total
+from mbd.bodies.base import Frame
+from mbd.constraints.base import Constraint
+from mbd.constraints.knife_edge import KnifeEdge
+from mbd.constraints.rolling import Rolling
+from mbd.constraints.surfaces import Plane, Surface
+from mbd.constraints.touchdown import Touchdown
+from mbd.equations.outputs import AXES, Outputs
+from mbd.scope import Scope, Triple
+from mbd.tape.node import Scalar
+
+if TYPE_CHECKING:
+    from mbd.description import Description
+
+__all__ = ["HEIGHT", "PLACE", "Shape", "drawn", "offer_shapes", "shapes_of"]
+
+PLACE = "place"
+"""Kind of the inputs x (number 0) and z (number 1) of a height function that is drawn."""
+
+HEIGHT = "height"
+
+Offer = Callable[[str, str, Callable[[], Triple]], None]
+
+
+def drawn(owner: str, what: str) -> str:
+    """Name of a result that only pictures ask for."""
+    return f"drawn:{owner}.{what}"
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Something that is drawn.
+
+    kind : 'plane' (at rest), 'moving plane', 'surface', 'wheel' or 'blade'
+    name : of the constraint that has it, or the first of them; `drawn(name, …)` are its results: place, normal and
+        forward of a moving plane, height (of PLACE and time) of a surface, spoke and axle of a wheel, along of a blade
+    contacts : the contacts that touch a ground; normal and forward of each where it is no plane at rest
+    points : the frame that touches, of each contact
+    place : frame of a wheel's center, of a blade
+    numbers : normal and offset of a plane at rest
+    across : of a surface, the names of what its height depends on, such as 'xt'
+    """
+
+    kind: str
+    name: str
+    contacts: tuple[str, ...] = ()
+    points: tuple[str, ...] = ()
+    place: str = ""
+    numbers: tuple[float, ...] = ()
+    across: str = ""
+
+
+def shapes_of(model: Description) -> tuple[Shape, ...]:
+    """The shapes of a model. The ground of a wheel is the one it rolls on, not that on which its center moves."""
+    wheels = [word for word in model.constraints if isinstance(word, Rolling)]
+    found: list[tuple[Plane | Surface, dict[str, str], str]] = []
+    for ground, contacts, name in _grounds(model.constraints, wheels):
+        same = next((each for each in found if each[0] == ground), None)
+        if same is None:
+            same = (ground, {}, name)
+            found.append(same)
+        same[1].update(contacts)
+    grounds = [_ground(ground, name, contacts) for ground, contacts, name in found]
+    rolling = [Shape("wheel", wheel.name, place=wheel.center.full_name) for wheel in wheels]
+    edges = [
+        Shape("blade", word.name, place=word.frame.full_name)
+        for word in model.constraints
+        if isinstance(word, KnifeEdge)
+    ]
+    return (*grounds, *rolling, *edges)
+
+
+def _grounds(
+    words: Iterable[Constraint], wheels: list[Rolling]
+) -> Iterable[tuple[Plane | Surface, dict[str, str], str]]:
+    """(ground, the frame that touches it of a contact that opens and closes, name of the constraint)."""
+    for word in words:
+        measure = getattr(word, "measure", None)
+        if isinstance(measure, Touchdown):
+            point, ground = measure.point, measure.ground
+            tread = next((wheel for wheel in wheels if wheel.center == point and _carries(wheel, ground)), None)
+            contacts = {} if word.kind == "bilateral" else {word.name: point.full_name}
+            yield (tread.ground, contacts, tread.name) if tread else (ground, contacts, word.name)
+    for wheel in wheels:
+        yield wheel.ground, {}, wheel.name
+
+
+def _carries(wheel: Rolling, ground: Plane | Surface) -> bool:
+    """Whether the center moves on a ground that is the wheel's own one, a radius higher."""
+    own = wheel.ground
+    if not isinstance(ground, Plane) or ground.frame != own.frame:
+        return False
+    return max(abs(a - b) for a, b in zip(ground.normal, own.normal, strict=True)) < 1e-12
+
+
+def _ground(ground: Plane | Surface, name: str, touching: dict[str, str]) -> Shape:
+    contacts, points = tuple(touching), tuple(touching.values())
+    if isinstance(ground, Surface):
+        return Shape("surface", name, contacts, points, across="".join(ground.arguments))
+    if ground.is_moving:
+        return Shape("moving plane", name, contacts, points)
+    return Shape("plane", name, contacts, points, numbers=(*ground.normal, ground.offset))
+
+
+def offer_shapes(outputs: Outputs, scope: Scope, model: Description) -> None:
+    """What moves of the shapes, as results that are not listed."""
+
+    def offer(owner: str, what: str, make: Callable[[], Triple]) -> None:
+        outputs.triple(drawn(owner, what), make, AXES, listed=False)
+
+    for word in model.constraints:
+        measure = getattr(word, "measure", None)
+        if isinstance(word, Rolling):
+            _offer_plane(offer, scope, word.name, word.ground)
+            offer(word.name, "spoke", partial(_axis, scope, word.center, (1.0, 0.0, 0.0)))
+            offer(word.name, "axle", partial(_axis, scope, word.center, (0.0, 0.0, 1.0)))
+        elif isinstance(word, KnifeEdge):
+            offer(word.name, "along", partial(_axis, scope, word.frame, _along(word.normal)))
+        elif isinstance(measure, Touchdown) and isinstance(measure.ground, Plane):
+            _offer_plane(offer, scope, word.name, measure.ground)
+        elif isinstance(measure, Touchdown) and isinstance(measure.ground, Surface):
+            outputs.add(drawn(word.name, HEIGHT), partial(_height, scope, measure.ground), listed=False)
+            offer(word.name, "normal", partial(_slope, scope, measure, True))
+            offer(word.name, "forward", partial(_slope, scope, measure, False))
+
+
+def _offer_plane(
+    offer: Callable[[str, str, Callable[[], Triple]], None], scope: Scope, name: str, plane: Plane
+) -> None:
+    if plane.is_moving:
+        offer(name, "place", partial(_material, scope, plane))
+        offer(name, "normal", lambda: plane.turned(plane.normal, scope))
+        offer(name, "forward", lambda: plane.turned(plane.directions((0.0, 0.0, 0.0), scope)[0], scope))
+
+
+def _material(scope: Scope, plane: Plane) -> Triple:
+    """The material point of the plane nearest to the frame's origin as time was 0, ``p_F + R_F (d n + u t)``."""
+    place = total(scaled(plane.offset, plane.normal), scaled(scope.time, plane.velocity))
+    return place if plane.frame is None else total(scope.frame(plane.frame).position, plane.turned(place, scope))
+
+
+def _axis(scope: Scope, frame: Frame, direction: Triple) -> Triple:
+    """A direction of a frame in ground axes."""
+    return rotate(scope.frame(frame).rotation, direction)
+
+
+def _along(normal: tuple[float, float, float]) -> Triple:
+    """Along a blade: across its normal, in the x-y plane of the frame where it can be."""
+    x, y, _ = normal
+    size = (x * x + y * y) ** 0.5
+    return (y / size, -x / size, 0.0) if size > 1e-9 else (1.0, 0.0, 0.0)
+
+
+def _height(scope: Scope, surface: Surface) -> Scalar:
+    """y = H at the inputs PLACE."""
+    tape = scope.tape
+    return surface.slopes((tape.input(PLACE, 0), 0.0, tape.input(PLACE, 1)), scope)[0]
+
+
+def _slope(scope: Scope, measure: Touchdown, upwards: bool) -> Triple:
+    """Normal of a surface below a foot, or the direction forward along it."""
+    forward, sideways = measure.ground.directions(scope.frame(measure.point).position, scope)
+    return cross(sideways, forward) if upwards else forward

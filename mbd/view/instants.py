@@ -1,0 +1,55 @@
+"""The times of a picture that moves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbd.arrays import Matrix, Vector
+
+if TYPE_CHECKING:
+    from mbd.trajectory import Trajectory
+
+__all__ = ["Instants"]
+
+
+@dataclass(frozen=True, eq=False)
+class Instants:
+    """Times to draw, a switch with both its sides: time (F,) [s], after (F,) True on the right side."""
+
+    time: Vector
+    after: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, run: Trajectory, count: int) -> Instants:
+        """`count` equal intervals of the run, and both sides of every event."""
+        time = run.time
+        inner = [event.time for event in run.events if time[0] < event.time <= time[-1]]
+        even = np.linspace(time[0], time[-1], count + 1) if time[-1] > time[0] else time[:1]
+        events = np.unique(inner)
+        both = np.concatenate([even[~np.isin(even, events)], events, events])
+        after = np.ones(len(both), dtype=bool)
+        after[len(both) - 2 * len(events) : len(both) - len(events)] = False
+        order = np.lexsort((after, both))
+        return cls(both[order], after[order])
+
+    def read(self, run: Trajectory, names: Sequence[str]) -> Matrix:
+        """Named scalars at the instants, (F, names)."""
+        found = np.empty((len(self.time), len(names)))
+        for side, chosen in (("right", self.after), ("left", ~self.after)):
+            values = run.at(self.time[chosen], side=side).read(*names)  # type: ignore[arg-type]
+            for column, name in enumerate(names):
+                found[chosen, column] = values[name]
+        return found
+
+    def blend(self, run: Trajectory, column: Vector) -> Vector:
+        """A column of the stored rows at the instants."""
+        grid = run.columns.grid
+        slopes, found = grid.slopes(column), np.empty(len(self.time))
+        found[self.after] = grid.places(self.time[self.after], "right").blend(column, slopes)
+        found[~self.after] = grid.places(self.time[~self.after], "left").blend(column, slopes)
+        return found
