@@ -32,6 +32,7 @@ RANKS = [
     ("lagrangian",),
     ("results", "trajectory"),
     ("simulation",),
+    ("sensitivity",),
     ("analysis",),
     ("view",),
     ("hardcases",),

@@ -8,6 +8,7 @@ from functools import cached_property
 from itertools import accumulate, pairwise
 from time import perf_counter
 from typing import Any
+from weakref import ref
 
 import numpy as np
 
@@ -99,6 +100,7 @@ class Mechanism:
         self.postponed: list[Postponed] = []
         self.without_effect: frozenset[str] = frozenset()
         self._modes: dict[tuple[Any, ...], ModeCode] = {}
+        equations.memory["mechanism"] = ref(self)
         self.seconds = perf_counter() - started
 
     def mode(

@@ -36,7 +36,7 @@ from mbd.tape.node import Node
 
 __all__ = [
     "Correction", "accelerations", "balance_with", "compose", "constraint_jacobian", "correction", "guard_terms",
-    "guards", "increment_rates", "is_judged", "mass_matrix", "newton", "residual", "scales",
+    "guards", "increment_rates", "is_judged", "mass_matrix", "newton", "residual", "scales", "switched_balance",
 ]  # fmt: skip
 
 
@@ -184,7 +184,7 @@ def accelerations(equations: Equations) -> list[Node]:
     inputs = Inputs.of(equations)
     tape = equations.tape
     rows = range(len(equations.rows))
-    r = _switched_balance(equations)
+    r = switched_balance(equations)
     rest: dict[Node, float] = {node: 0.0 for node in (*inputs.a, *inputs.s, *inputs.lam)}
     f = substitute(r, rest)
     M = None if equations.geometry is None else equations.geometry.mass_matrix()
@@ -216,7 +216,7 @@ def guards(equations: Equations) -> list[Node]:
 
 def scales(equations: Equations) -> list[Node]:
     """Σ|terms| of r, h and ḣ: how large they are before cancellation, which bounds their round-off."""
-    r = _switched_balance(equations)
+    r = switched_balance(equations)
     h = [row.value for row in equations.rows]
     hv = [row.rate for row in equations.rows]
     return magnitudes(equations.tape, [*r, *h, *hv])
@@ -254,7 +254,7 @@ def balance_with(
     return _balance(equations, rows, [(c, equations.tape.one) for c in penalties], sliding)
 
 
-def _switched_balance(equations: Equations) -> list[Node]:
+def switched_balance(equations: Equations) -> list[Node]:
     """r with every row, every penalty behind its switch and every friction behind its slip."""
     switches = [(c, equations.tape.input("switch", c)) for c in range(len(equations.contacts))]
     return _balance(equations, range(len(equations.rows)), switches, range(len(equations.frictions)))

@@ -1,0 +1,1 @@
+"""Exact first derivatives of runs: a pass over the accepted steps and events after the run."""

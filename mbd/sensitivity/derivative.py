@@ -1,0 +1,53 @@
+"""Derivatives of the state and instant at which a run ended."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from mbd.arrays import Matrix, Vector
+from mbd.sensitivity.programs import Programs
+from mbd.sensitivity.run_data import RunRows
+from mbd.sensitivity.starts import Direction, directions, start_tangent
+from mbd.sensitivity.walk import Passed, Walk
+from mbd.trajectory import Trajectory
+
+__all__ = ["final_state_derivative", "passed"]
+
+
+def final_state_derivative(
+    run: Trajectory, wrt: Sequence[str | tuple[str, Mapping[str, float]]]
+) -> tuple[Matrix, Vector]:
+    """d(q, v) at the end of a run, and d t_end, by coordinates and speeds of its start and by parameters.
+
+    Parameters
+    ----------
+    run : as `mbd.simulate` returned it
+    wrt : D names of coordinates and rates of the start ('hip.angle', 'hip.rate') and of parameters; or pairs of a name
+        and the rates of several parameters by it, ``("slope", {"gravity.x": 9.8, "gravity.y": 0.5})``
+
+    Returns
+    -------
+    (n_q + n_v, D), (D,)
+        total derivatives: those of the state by its own instant are part of the first, where an event ends the run
+
+    Raises
+    ------
+    UnknownNameError
+        for a name that is none of these.
+    CapabilityError
+        where the run has no derivative, or none that the pass knows, by name and time.
+    """
+    found, _ = passed(run, wrt)
+    tangent, n_v = found.motion.tangent, len(found.motion.tangent.q)
+    return np.vstack([tangent.q, tangent.y[:n_v]]), tangent.t
+
+
+def passed(run: Trajectory, wrt: Sequence[str | tuple[str, Mapping[str, float]]]) -> tuple[Passed, list[Direction]]:
+    """The pass over a run, and its directions."""
+    rows = RunRows(run)
+    wanted = directions(rows, wrt)
+    names = dict.fromkeys(name for each in wanted for name in each.parameters or {})
+    programs = Programs(rows.mechanism, rows.places(list(names)), run.record.parameters)
+    return Walk(rows, programs).whole(start_tangent(rows, programs, wanted)), wanted

@@ -1,0 +1,286 @@
+"""Steps of the Newmark family, each differentiated as the implicit function that it is at its converged solution.
+
+    (1−α_m) a₁ + α_m a₀ = (1−α_f) v̇₁ + α_f v̇₀,   v₁ = v₀ + h ((1−γ) a₀ + γ a₁)
+    q₁ = q₀ + h v₀ + h² ((½−β) a₀ + β a₁) + U,   r = 0,   h = 0 (and ḣ = 0 with U, stabilized)
+
+U = W of positions is normal to the rows in the metric of Newton's matrix: ``S W + R ν = 0``, and ``B̃ W = 0`` for rows
+on velocities. Its derivative needs that of S, along W alone: a central difference of compiled first derivatives along
+it, which is exact where r is linear and errs by a part h² of U, itself of order h³, else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mbd.arrays import Matrix, Vector
+from mbd.sensitivity.balance import consistent_rates
+from mbd.sensitivity.motion import Mode, Motion, Rates, Tangent, solved
+from mbd.sensitivity.programs import Columns, Programs
+
+__all__ = ["Memory", "NewmarkSteps"]
+
+FOLLOWED = 1e-9
+"""Distance of a row from the end of its step, over how far the step went, up to which the step is known [-]."""
+MOST = 12
+"""Newton iterations for the end of a step at an event [-]."""
+BRIEF, BRIEFEST = 1e-3, 1e-9
+"""Parts of a full step below which the kernel takes one of Heun's method, with rows and without them [-]."""
+
+
+@dataclass(frozen=True)
+class Memory:
+    """What the scheme remembers at a row: rates, auxiliary accelerations a with their derivatives, the last step."""
+
+    rates: Rates
+    aux: Vector
+    of_aux: Matrix
+    step: float
+
+    def widened(self) -> Memory:
+        """With one more direction, in which nothing changes."""
+        wide = np.hstack([self.of_aux, np.zeros((len(self.aux), 1))])
+        return replace(self, rates=self.rates.widened(), of_aux=wide)
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """The end of a step but for its unknowns: a₀ over the step, x, v with δv̇₁ = 0; changes by unknowns are c_K, c_C."""
+
+    a0: Vector
+    of_a0: Matrix
+    of_aux: Matrix
+    of_x: Matrix
+    of_y: Matrix
+    c_C: float
+    c_K: float
+
+
+class NewmarkSteps:
+    """Derivatives of the steps of a run.
+
+    Parameters
+    ----------
+    numbers : those of the integrator; full : its step [s]
+    """
+
+    def __init__(self, programs: Programs, numbers: Mapping[str, float], stabilized: bool, full: float) -> None:
+        self.programs, self.stabilized, self.full = programs, stabilized, full
+        self.alpha_m, self.alpha_f = float(numbers["alpha_m"]), float(numbers["alpha_f"])
+        self.beta, self.gamma = float(numbers["beta"]), float(numbers["gamma"])
+        self.jerk = float(numbers["jerk"]) * (self.alpha_m - self.alpha_f)
+
+    def start(self, motion: Motion, mode: Mode, rates: Rates, full: float | None = None) -> Memory:
+        """a₀ = v̇₀ + (α_m − α_f) h j₀ with the jerk j₀ from one difference of consistent accelerations."""
+        full = self.full if full is None else full
+        if self.jerk == 0.0:
+            return Memory(rates, rates.rate.copy(), rates.of_rate.copy(), full)
+        c, ahead, tangent = self.programs.columns, full / 16.0, motion.tangent
+        later = Motion(
+            motion.t + ahead, motion.q + ahead * motion.y[: c.n_v], motion.y + ahead * rates.rate, motion.anchors,
+            replace(tangent, q=tangent.q + ahead * tangent.y[: c.n_v], y=tangent.y + ahead * rates.of_rate),
+        )  # fmt: skip
+        then = consistent_rates(self.programs, later, mode, rates)
+        part = self.jerk * full / ahead
+        aux = rates.rate + part * (then.rate - rates.rate)
+        return Memory(rates, aux, rates.of_rate + part * (then.of_rate - rates.of_rate), full)
+
+    # a step -------------------------------------------------------------------------------------------------------
+    def follows(self, motion: Motion, memory: Memory, h: float, y1: Vector, rate1: Vector) -> bool:
+        """Whether a row's velocities are those of a step from here that ends with its rates."""
+        a0, a1 = self._averages(memory, h, rate1)
+        way = h * ((1.0 - self.gamma) * a0 + self.gamma * a1)
+        size = np.max(np.abs(y1), initial=0.0) + h * np.max(np.abs(a0) + np.abs(a1), initial=0.0)
+        return bool(np.max(np.abs(motion.y + way - y1), initial=0.0) <= FOLLOWED * h * size / self.full + 1e-14 * size)
+
+    def _averages(self, memory: Memory, h: float, rate1: Vector) -> tuple[Vector, Vector]:
+        """a₀ and a₁ of a step."""
+        rate0 = memory.rates.rate
+        a0 = rate0 + h / memory.step * (memory.aux - rate0)
+        return a0, ((1.0 - self.alpha_f) * rate1 + self.alpha_f * rate0 - self.alpha_m * a0) / (1.0 - self.alpha_m)
+
+    def step(
+        self, motion: Motion, memory: Memory, mode: Mode, end: tuple[float, Vector, Vector], rates: Rates, dh: Vector
+    ) -> tuple[Motion, Memory]:
+        """The motion after a step to the row (t₁, q₁, y₁) with these rates and multipliers; dh (D,) by its size."""
+        c, h = self.programs.columns, end[0] - motion.t
+        guess = self._predicted(motion, memory, h, rates.rate, dh)
+        a0, a1 = self._averages(memory, h, rates.rate)
+        shift = end[1] - motion.q - h * motion.y[: c.n_v]
+        shift -= h * h * ((0.5 - self.beta) * a0 + self.beta * a1)[: c.n_v]
+        tangent = Tangent(motion.tangent.t + dh, guess.of_x, guess.of_y, motion.tangent.anchors, motion.tangent.p)
+        after = Motion(end[0], end[1], end[2], motion.anchors, tangent)
+        of_rate, of_lam, of_x = self._implicit(after, mode, rates, guess, shift, h, dh)
+        mean = (1.0 - self.alpha_f) / (1.0 - self.alpha_m)
+        moved = after.with_tangent(q=guess.of_x + of_x, y=guess.of_y + guess.c_C * of_rate)
+        found = Rates(rates.rate, rates.lam, of_rate, of_lam)
+        return moved, Memory(found, a1, guess.of_aux + mean * of_rate, h)
+
+    def _predicted(self, motion: Motion, memory: Memory, h: float, rate1: Vector, dh: Vector) -> Prediction:
+        """Derivatives of the end of a step with δv̇₁ = 0, δU = 0."""
+        n_v, mean = self.programs.columns.n_v, 1.0 / (1.0 - self.alpha_m)
+        stretch, of_rate0 = h / memory.step, memory.rates.of_rate
+        a0, a1 = self._averages(memory, h, rate1)
+        by_h = ((memory.aux - memory.rates.rate) / memory.step)[:, np.newaxis] * dh
+        of_a0 = of_rate0 + stretch * (memory.of_aux - of_rate0) + by_h
+        of_a1 = mean * (self.alpha_f * of_rate0 - self.alpha_m * of_a0)
+        speed, place = (1.0 - self.gamma) * a0 + self.gamma * a1, (0.5 - self.beta) * a0 + self.beta * a1
+        of_y = motion.tangent.y + h * ((1.0 - self.gamma) * of_a0 + self.gamma * of_a1) + speed[:, np.newaxis] * dh
+        of_x = motion.tangent.q + h * motion.tangent.y[:n_v]
+        of_x = of_x + h * h * ((0.5 - self.beta) * of_a0 + self.beta * of_a1)[:n_v]
+        of_x = of_x + (motion.y[:n_v] + 2.0 * h * place[:n_v])[:, np.newaxis] * dh
+        c = mean * (1.0 - self.alpha_f)
+        return Prediction(a0, of_a0, of_a1, of_x, of_y, self.gamma * h * c, self.beta * h * h * c)
+
+    def _implicit(
+        self, after: Motion, mode: Mode, rates: Rates, guess: Prediction, shift: Vector, h: float, dh: Vector
+    ) -> tuple[Matrix, Matrix, Matrix]:
+        """Derivatives of v̇₁ and λ, and of x₁ beside the prediction."""
+        c, rows = self.programs.columns, list(mode.rows)
+        n, n_v, m = c.n, c.n_v, len(rows)
+        at = after.at(mode, rates.rate, rates.lam)
+        _, _, _, of_r, of_h, of_rate = self.programs.steps(at)
+        Z = after.tangent.stacked(c)
+        fast = np.array([self.programs.equations.rows[k].is_velocity for k in rows], dtype=bool)
+        S, R = self._by_rates(of_r, guess), of_r[:, c.lam][:, rows]
+        if not (self.stabilized and m):
+            level = np.where(fast[:, np.newaxis], of_rate[rows], of_h[rows])
+            A = np.block([[S, R], [self._by_rates(level, guess), np.zeros((m, m))]])
+            found = -solved(A, np.vstack([of_r, level]) @ Z)
+            return found[:n], self._spread(found[n:], rows), guess.c_K * found[:n_v]
+        turned, by_step = self._turned(after, mode, rates, guess, shift, (S, R, of_r, of_rate[rows]), fast, h)
+        W = np.zeros((n + m, n))
+        W[:, :n_v] = np.vstack([of_r, of_rate[rows]])[:, c.x]
+        levels = np.where(fast[:, np.newaxis], turned[n:], of_h[rows])
+        of_levels = self._by_rates(levels, guess)
+        by_shift = levels[:, c.x].copy()
+        by_shift[fast] += guess_row(of_rate[rows], c, guess)[fast][:, :n_v]
+        A = np.zeros((2 * (n + m), 2 * (n + m)))
+        A[: n + m, :n] = self._by_rates(np.vstack([of_r, of_rate[rows]]), guess)
+        A[:n, n : n + m] = R
+        A[: n + m, n + m : 2 * n + m] = W
+        A[n + m : 2 * n + m, :n] = self._by_rates(turned[:n], guess)
+        A[n + m : 2 * n + m, n : n + m] = turned[:n][:, c.lam][:, rows]
+        A[n + m : 2 * n + m, n + m : 2 * n + m] = S
+        A[n + m : 2 * n + m, n + m : n + m + n_v] += turned[:n, c.x]
+        A[n + m : 2 * n + m, 2 * n + m :] = R
+        A[2 * n + m :, :n] = of_levels
+        A[2 * n + m :, n + m : n + m + n_v] = by_shift
+        right = np.vstack([of_r @ Z, of_rate[rows] @ Z, turned[:n] @ Z, levels @ Z])
+        right[n + m :] += by_step[:, np.newaxis] * dh
+        found = -solved(A, right)
+        of_x = guess.c_K * found[:n_v] + found[n + m : n + m + n_v]
+        return found[:n], self._spread(found[n : n + m], rows), of_x
+
+    def _by_rates(self, level: Matrix, guess: Prediction) -> Matrix:
+        """Derivatives by v̇₁ through the formulas of the scheme: ∂/∂v̇ + c_C ∂/∂v + c_K ∂/∂x."""
+        c = self.programs.columns
+        found = level[:, c.rate] + guess.c_C * level[:, c.y]
+        found[:, : c.n_v] += guess.c_K * level[:, c.x]
+        return found
+
+    def _spread(self, of_rows: Matrix, rows: list[int]) -> Matrix:
+        out = np.zeros((self.programs.columns.rows, of_rows.shape[1]))
+        out[rows] = of_rows
+        return out
+
+    def _turned(
+        self, after: Motion, mode: Mode, rates: Rates, guess: Prediction, shift: Vector,
+        parts: tuple[Matrix, Matrix, Matrix, Matrix], fast: Vector, h: float,
+    ) -> tuple[Matrix, Vector]:  # fmt: skip
+        """Derivatives (n + m, N) of ``S W + R ν`` and of ``B̃ W`` with W, ν held, and those by h."""
+        c, rows = self.programs.columns, list(mode.rows)
+        n, n_v, m = c.n, c.n_v, len(rows)
+        S, R, of_r, of_rate = parts
+        known = -S[:, :n_v] @ shift
+        rest = np.linalg.lstsq(np.hstack([S[:, n_v:], R]), known, rcond=None)[0]
+        W, nu = np.concatenate([shift, rest[: n - n_v]]), np.zeros(c.rows)
+        nu[rows] = rest[n - n_v :]
+        large = float(np.max(np.abs(W), initial=0.0))
+        by_step = np.zeros(n + m)
+        if large == 0.0:
+            return np.zeros((n + m, c.count)), by_step
+        s, found = 1.0 / large, []
+        for sign in (s, -s):
+            place = replace(
+                after, q=after.q + sign * guess.c_K * shift, y=after.y + sign * guess.c_C * W
+            )  # along (c_K, c_C, 1) W, the direction of the columns of S
+            at = place.at(mode, rates.rate + sign * W, rates.lam + sign * nu)
+            _, _, _, of_force, _, of_speed = self.programs.steps(at)
+            found.append(np.vstack([of_force, of_speed[rows] / guess.c_C]))
+        turned = (found[0] - found[1]) / (2.0 * s)
+        turned[n:][np.logical_not(fast)] = 0.0
+        by_step[:n] = (guess.c_C * of_r[:, c.y] @ W + 2.0 * guess.c_K * of_r[:, c.x] @ shift) / h
+        by_step[n:][fast] = (guess.c_K / guess.c_C / h * (of_rate[:, c.x] @ shift))[fast]
+        return turned, by_step
+
+    # the end of a step at an event ----------------------------------------------------------------------------------
+    def ended(self, motion: Motion, memory: Memory, mode: Mode, t1: float, guess: Rates) -> tuple[Motion, Rates]:
+        """The end of a step of any size: solved for, as rows at events hold rates that are consistent in their place.
+
+        Its tangent is that of the motion; only numbers are found.
+        """
+        c, rows, h = self.programs.columns, list(mode.rows), t1 - motion.t
+        n, n_v, m = c.n, c.n_v, len(rows)
+        rate, lam, shift = guess.rate.copy(), guess.lam.copy(), np.zeros(n_v)
+        fast = np.array([self.programs.equations.rows[k].is_velocity for k in rows], dtype=bool)
+        for _ in range(MOST):
+            a0, a1 = self._averages(memory, h, rate)
+            y = motion.y + h * ((1.0 - self.gamma) * a0 + self.gamma * a1)
+            x = h * motion.y[:n_v] + h * h * ((0.5 - self.beta) * a0 + self.beta * a1)[:n_v] + shift
+            end = replace(motion, t=t1, q=motion.q + x, y=y)
+            r, level, speed, of_r, of_h, of_rate = self.programs.steps(end.at(mode, rate, lam))
+            c_h = h * (1.0 - self.alpha_f) / (1.0 - self.alpha_m)
+            near = Prediction(a0, of_r, of_r, of_r, of_r, self.gamma * c_h, self.beta * h * c_h)
+            S, R = self._by_rates(of_r, near), of_r[:, c.lam][:, rows]
+            if self.stabilized and m:
+                A = np.block([[S, R], [guess_row(of_rate[rows], c, near), np.zeros((m, m))]])
+                off = level[rows] - (near.c_K / near.c_C) * speed[rows]
+                off -= guess_row(of_rate[rows], c, near)[:, :n_v] @ shift
+                fresh = solved(A, -np.concatenate([np.zeros(n), np.where(fast, 0.0, off)]))[:n_v]
+                goal = (speed[rows] + of_rate[rows][:, c.x] @ (fresh - shift)) / near.c_C
+                moved, shift = np.abs(fresh - shift), fresh
+            else:
+                held = np.where(fast[:, np.newaxis], of_rate[rows], of_h[rows])
+                A = np.block([[S, R], [self._by_rates(held, near), np.zeros((m, m))]])
+                goal, moved = np.where(fast, speed[rows], level[rows]), np.zeros(1)
+            step = solved(A, -np.concatenate([r, goal]))
+            rate, lam[rows] = rate + step[:n], lam[rows] + step[n:]
+            size = np.max(np.abs(rate), initial=1e-300)
+            if np.max(np.abs(step[:n]), initial=0.0) <= 1e-13 * size and np.max(moved) <= 1e-13 * h * h * size:
+                break
+        a0, a1 = self._averages(memory, h, rate)
+        y = motion.y + h * ((1.0 - self.gamma) * a0 + self.gamma * a1)
+        x = h * motion.y[:n_v] + h * h * ((0.5 - self.beta) * a0 + self.beta * a1)[:n_v] + shift
+        return replace(motion, t=t1, q=motion.q + x, y=y), Rates(rate, lam, guess.of_rate, guess.of_lam)
+
+    def is_brief(self, h: float, mode: Mode) -> bool:
+        """Whether the kernel takes a step of Heun's method in the place of one so short."""
+        return h < BRIEF * self.full and (bool(mode.held) or h < BRIEFEST * self.full)
+
+    def brief(self, motion: Motion, memory: Memory, mode: Mode, t1: float, dh: Vector) -> tuple[Motion, Memory]:
+        """A step of Heun's method with consistent accelerations."""
+        n_v, h = self.programs.columns.n_v, t1 - motion.t
+        first, last = memory.rates, memory.rates
+        for _ in range(2):
+            mean, of_mean = first.rate / 3.0 + last.rate / 6.0, first.of_rate / 3.0 + last.of_rate / 6.0
+            q = motion.q + h * (motion.y + h * mean)[:n_v]
+            of_q = motion.tangent.q + h * (motion.tangent.y + h * of_mean)[:n_v]
+            of_q = of_q + (motion.y + 2.0 * h * mean)[:n_v, np.newaxis] * dh
+            sum_ = first.rate + last.rate
+            y = motion.y + 0.5 * h * sum_
+            of_y = motion.tangent.y + 0.5 * h * (first.of_rate + last.of_rate) + 0.5 * sum_[:, np.newaxis] * dh
+            tangent = replace(motion.tangent, t=motion.tangent.t + dh, q=of_q, y=of_y)
+            end = Motion(t1, q, y, motion.anchors, tangent)
+            last = consistent_rates(self.programs, end, mode, last)
+        return end, Memory(last, last.rate.copy(), last.of_rate.copy(), h)
+
+
+def guess_row(of_rate: Matrix, c: Columns, guess: Prediction) -> Matrix:
+    """``B̃ = ∂ḣ/∂v + (c_K/c_C) ∂ḣ/∂x``."""
+    found = of_rate[:, c.y].copy()
+    x = of_rate[:, c.x]
+    found[:, : x.shape[1]] += guess.c_K / guess.c_C * x
+    return found

@@ -1,0 +1,204 @@
+"""Compiled derivatives of what steps, restarts, guards and contacts are made of.
+
+Each program lists values and, row by row, their derivatives by the columns
+
+    x (n_v) | v, z (n) | v̇, ż (n) | λ (R) | t | anchors | chosen parameters
+
+=============  =============================================================================================
+`steps`        r (n), h (R), ḣ (R): the balance over all rows, penalties behind their switches, frictions behind slips
+`consistent`   r (n), ḧ (R)
+`watched`      gaps (nC), penalty forces (nC), values of users' guards, sliding velocities and limits of frictions
+`captured`     what closing contacts hold
+=============  =============================================================================================
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from mbd.arrays import Matrix, Vector
+from mbd.compile.layout import Layout
+from mbd.compile.mechanism import Mechanism
+from mbd.equations.equations import Equations
+from mbd.equations.inputs import Inputs
+from mbd.equations.linearization import across, along_places, row_changes
+from mbd.equations.programs import switched_balance
+from mbd.tape.derivatives import jvps
+from mbd.tape.node import Node
+
+__all__ = ["Columns", "Programs", "State"]
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Where the columns of the derivatives lie."""
+
+    n_v: int
+    n: int
+    rows: int
+    anchors: int
+    parameters: int
+
+    @classmethod
+    def of(cls, layout: Layout, parameters: int) -> Columns:
+        """Those of a mechanism with so many chosen parameters."""
+        return cls(layout.n_v, layout.n, layout.n_rows, layout.n_anchors, parameters)
+
+    @cached_property
+    def _starts(self) -> list[int]:
+        lengths = [0, self.n_v, self.n, self.n, self.rows, 1, self.anchors, self.parameters]
+        return [int(start) for start in np.cumsum(lengths)]
+
+    def _part(self, number: int) -> slice:
+        return slice(self._starts[number], self._starts[number + 1])
+
+    @cached_property
+    def x(self) -> slice:
+        return self._part(0)
+
+    @cached_property
+    def y(self) -> slice:
+        return self._part(1)
+
+    @cached_property
+    def rate(self) -> slice:
+        return self._part(2)
+
+    @cached_property
+    def lam(self) -> slice:
+        return self._part(3)
+
+    @cached_property
+    def t(self) -> slice:
+        return self._part(4)
+
+    @cached_property
+    def anchor(self) -> slice:
+        return self._part(5)
+
+    @cached_property
+    def p(self) -> slice:
+        return self._part(6)
+
+    @cached_property
+    def count(self) -> int:
+        return self._starts[-1]
+
+
+@dataclass
+class State:
+    """Where derivatives are evaluated: t, q, y = (v, z), rates (v̇, ż), λ, anchors, switches, slips."""
+
+    t: float
+    q: Vector
+    y: Vector
+    rate: Vector
+    lam: Vector
+    anchors: Vector
+    switch: Vector
+    slip: Vector
+
+
+class Programs:
+    """The programs of a mechanism for some of its parameters, made when they are called first.
+
+    Parameters
+    ----------
+    places : numbers of the parameters
+    values : of all parameters, then of the tables, as a run holds them
+    """
+
+    def __init__(self, mechanism: Mechanism, places: Sequence[int], values: Vector) -> None:
+        self.mechanism, self.places = mechanism, tuple(places)
+        self.equations, self.layout = mechanism.equations, mechanism.layout
+        self.columns = Columns.of(self.layout, len(self.places))
+        self.values = np.ascontiguousarray(values, dtype=float) if len(values) else np.zeros(1)
+        self._block = np.zeros(self.layout.size)
+
+    def steps(self, at: State) -> tuple[Vector, Vector, Vector, Matrix, Matrix, Matrix]:
+        """r, h, ḣ and their derivatives."""
+        n, rows = self.layout.n, self.layout.n_rows
+        values, slopes = self._call("steps", at, n + 2 * rows)
+        cuts = [0, n, n + rows, n + 2 * rows]
+        r, h, rate = (values[a:b] for a, b in pairwise(cuts))
+        of_r, of_h, of_rate = (slopes[a:b] for a, b in pairwise(cuts))
+        return r, h, rate, of_r, of_h, of_rate
+
+    def consistent(self, at: State) -> tuple[Vector, Vector, Matrix, Matrix]:
+        """r and ḧ, and their derivatives."""
+        n = self.layout.n
+        values, slopes = self._call("consistent", at, n + self.layout.n_rows)
+        return values[:n], values[n:], slopes[:n], slopes[n:]
+
+    def watched(self, at: State) -> tuple[Vector, Matrix]:
+        """Gaps | penalty forces | users' guards | sliding velocities | limits, and their derivatives."""
+        size = 2 * self.layout.n_contacts + len(self.equations.guards) + 2 * self.layout.n_frictions
+        return self._call("watched", at, size)
+
+    def captured(self, at: State) -> tuple[Vector, Matrix]:
+        """What contacts would hold if they closed here, in the order of contacts, and its derivatives."""
+        size = sum(len(contact.captured) for contact in self.equations.contacts)
+        return self._call("captured", at, size)
+
+    def result(self, name: str, at: State) -> tuple[float, Vector]:
+        """A named result and its derivatives."""
+        values, slopes = self._call(f"result {name}", at, 1)
+        return float(values[0]), slopes[0]
+
+    def _call(self, name: str, at: State, size: int) -> tuple[Vector, Matrix]:
+        key = f"{name} by {self.places}"
+        mechanism, layout, block = self.mechanism, self.layout, self._block
+        known = mechanism.named.get(key)
+        if known is None:
+            symbol = f"derivative_{len(mechanism.common)}"
+            with mechanism.equations.tape.lock:
+                mechanism.common.add({symbol: self._program(name)})
+                known = mechanism.named[key] = mechanism.common[symbol]
+        block[0] = at.t
+        block[layout.q : layout.x] = at.q
+        block[layout.v : layout.a] = at.y
+        block[layout.a : layout.lam] = at.rate
+        block[layout.lam : layout.anchor] = at.lam
+        block[layout.anchor : layout.switch] = at.anchors
+        block[layout.switch : layout.slip] = at.switch
+        block[layout.slip : layout.shift] = at.slip
+        out = np.empty(size * (1 + self.columns.count))
+        if size:
+            known(block, self.values, out)
+        return out[:size], out[size:].reshape(size, self.columns.count)
+
+    def _program(self, name: str) -> list[Node]:
+        """Values of a program and their derivatives."""
+        equations = self.equations
+        if name == "steps":
+            values = switched_balance(equations)
+            values += [row.value for row in equations.rows] + [row.rate for row in equations.rows]
+        elif name == "consistent":
+            values = switched_balance(equations) + row_changes(equations, range(len(equations.rows)))
+        elif name == "watched":
+            zero, contacts, frictions = equations.tape.zero, equations.contacts, equations.frictions
+            values = [contact.gap for contact in contacts]
+            values += [zero if contact.force is None else contact.force for contact in contacts]
+            values += [guard.value for guard in equations.guards]
+            values += [friction.rate for friction in frictions] + [friction.limit for friction in frictions]
+        elif name == "captured":
+            values = [value for contact in equations.contacts for value in contact.captured]
+        else:
+            values = [equations.output(name.removeprefix("result "))]
+        return [*values, *across(derivatives(equations, values, self.places), len(values))]
+
+
+def derivatives(equations: Equations, values: Sequence[Node], places: Sequence[int]) -> list[list[Node]]:
+    """Columns of ∂values by x, (v, z), (v̇, ż), λ, t, anchors and these parameters."""
+    if not values:
+        return [[] for _ in range(Columns.of(Layout.of(equations), len(places)).count)]
+    inputs, tape = Inputs.of(equations), equations.tape
+    anchors = [tape.input("anchor", k) for k in range(equations.n_anchors)]
+    parameters = [tape.input("p", k) for k in places]
+    others = (*inputs.v, *inputs.z, *inputs.a, *inputs.s, *inputs.lam, inputs.t, *anchors, *parameters)
+    return [*along_places(equations, values), *jvps(values, [{node: 1.0} for node in others])]

@@ -1,0 +1,137 @@
+"""A run as the pass reads it: its rows, its scheme, its mechanism; and what of it no pass can differentiate."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from mbd import integrators
+from mbd.arrays import Matrix, Vector
+from mbd.assembly.trivial_rows import manager_of
+from mbd.compile.mechanism import Mechanism
+from mbd.errors import CapabilityError
+from mbd.integrators.base import Integrator
+from mbd.kernel.active_set import ActiveSetManager
+from mbd.results.record import EventRecord, Record
+from mbd.sensitivity.motion import Mode
+from mbd.trajectory import Trajectory
+
+__all__ = ["RunRows", "refused"]
+
+
+def refused(why: str, instead: str = "") -> CapabilityError:
+    """The error for a run whose derivatives are not known."""
+    return CapabilityError(f"no derivatives of this run: {why}" + (f"; {instead}" if instead else ""))
+
+
+@dataclass
+class RunRows:
+    """The rows and events of a run with its equations."""
+
+    run: Trajectory
+
+    def __post_init__(self) -> None:
+        record = self.run.record
+        if record.equations is None:
+            raise refused("it was read from a file, which has no equations", "run the model again")
+        settings = record.settings
+        if not self.run.success:
+            raise refused(f"it failed: {record.message}")
+        if settings.get("contact") == "nonsmooth":
+            raise refused("its contacts were treated by non-smooth steps", "take contact='events'")
+        if settings.get("locate") == "linear":
+            raise refused("its events were located by linear interpolation", "take locate='root'")
+        if settings.get("store", 1) != 1:
+            raise refused(f"it kept one row in {settings['store']}", "take store=1")
+        if record.parameter_changes:
+            raise refused("a controller changed parameters in it, whose feedback is not differentiated yet")
+        memory = getattr(record.final, "memory", None)
+        if memory is not None and memory.controllers.get("samples"):
+            raise refused("its model has sampled controllers, whose feedback is not differentiated yet")
+        if record.equations.compose is not None:
+            raise refused("joints of its model have coordinates that do not add, such as a quaternion")
+
+    @cached_property
+    def record(self) -> Record:
+        return self.run.record
+
+    @cached_property
+    def mechanism(self) -> Mechanism:
+        """Compiled equations: those that the run was made with, where they are still there."""
+        equations: Any = self.record.equations
+        known = equations.memory.get("mechanism")
+        found = None if known is None else known()
+        return Mechanism(equations, str(self.record.settings.get("backend", "auto"))) if found is None else found
+
+    @cached_property
+    def manager(self) -> ActiveSetManager:
+        return manager_of(self.mechanism, self.record.parameters)
+
+    @cached_property
+    def integrator(self) -> Integrator:
+        """The scheme, from how its settings print it."""
+        text = str(self.record.settings["integrator"])
+        call = ast.parse(text, mode="eval").body
+        if not isinstance(call, ast.Call) or not isinstance(call.func, ast.Name):
+            raise refused(f"its integrator {text} is none of mbd's")
+        made = getattr(integrators, call.func.id, None)
+        if made is None:
+            raise refused(f"its integrator {text} is none of mbd's")
+        values = {str(each.arg): ast.literal_eval(each.value) for each in call.keywords}
+        found: Integrator = made(*(ast.literal_eval(each) for each in call.args), **values)
+        return found
+
+    @cached_property
+    def y(self) -> Matrix:
+        return np.hstack([self.record.v, self.record.z])
+
+    @cached_property
+    def rate(self) -> Matrix:
+        return np.hstack([self.record.a, self.record.s])
+
+    @cached_property
+    def events(self) -> dict[int, list[EventRecord]]:
+        """Events by the row just after them."""
+        found: dict[int, list[EventRecord]] = {}
+        for event in self.record.events:
+            found.setdefault(event.row, []).append(event)
+        return found
+
+    @cached_property
+    def full(self) -> float:
+        """The step, or the short time that stands for it where steps follow their error [s]."""
+        settings = self.record.settings
+        if settings.get("dt") is not None:
+            return float(settings["dt"])
+        until, start = settings["until"], float(self.record.time[0])
+        length = 1.0 if isinstance(until, str | tuple | list) else (float(until) - start) or 1.0
+        return 1e-3 * min(length, 1.0)
+
+    @property
+    def is_adaptive(self) -> bool:
+        """Whether steps follow their error."""
+        return self.record.settings.get("dt") is None
+
+    def mode(self, row: int) -> Mode:
+        """What acts from a row on."""
+        flags, phase = self.record.closed[row], self.record.phase[row]
+        held = self.manager.active_rows(np.asarray(flags, dtype=np.int64), (phase == 2).astype(np.int64))
+        slip = np.where(np.abs(phase) == 1, phase, 0).astype(float)
+        return Mode(held, held, np.asarray(flags), np.asarray(flags, dtype=float), slip)
+
+    def start_anchors(self) -> Vector:
+        """What contacts hold at the start."""
+        start, size = self.record.start, self.mechanism.layout.n_anchors
+        if start is not None and len(start.anchors) == size:
+            return np.array(start.anchors, dtype=float)
+        return np.zeros(size)
+
+    def places(self, names: Sequence[str]) -> list[int]:
+        """Numbers of parameters by name."""
+        known = {name: k for k, name in enumerate(self.record.parameter_names)}
+        return [known[name] for name in names]

@@ -1,0 +1,127 @@
+"""What a run is differentiated by: coordinates and speeds of its start, parameters, directions of several parameters.
+
+A start with closed rows is changed as `mbd.project` changes it: positions move least in the metric of the mass matrix
+until the rows on positions and the gaps of closed contacts hold, which then hold where they are; then velocities.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mbd.arrays import Matrix
+from mbd.compile.mechanism import rate_names
+from mbd.errors import UnknownNameError, nearest
+from mbd.sensitivity.motion import Mode, Motion, Tangent
+from mbd.sensitivity.programs import Programs
+from mbd.sensitivity.run_data import RunRows
+from mbd.sensitivity.strikes import captured
+
+__all__ = ["Direction", "directions", "start_tangent"]
+
+
+@dataclass(frozen=True)
+class Direction:
+    """One thing to differentiate by.
+
+    name : as it was asked for
+    q, y : numbers of the coordinate or velocity that it is, −1 if it is none
+    parameters : rates of change of parameters by name
+    """
+
+    name: str
+    q: int = -1
+    y: int = -1
+    parameters: Mapping[str, float] | None = None
+
+
+def directions(rows: RunRows, wrt: Sequence[str | tuple[str, Mapping[str, float]]]) -> list[Direction]:
+    """Names, and pairs of a name and the rates of parameters by it, as directions.
+
+    Raises
+    ------
+    UnknownNameError
+        for a name that is neither a coordinate or rate of the start nor a run-time parameter.
+    """
+    equations = rows.mechanism.equations
+    coordinates = {each.name: k for k, each in enumerate(equations.coordinates)}
+    speeds = {name: k for name, k in rate_names(equations).items() if name not in coordinates}
+    speeds |= {state.name: equations.n_v + k for k, state in enumerate(equations.states)}
+    known = set(rows.record.parameter_names)
+    found = []
+    for each in wrt:
+        name, parameters = (each, None) if isinstance(each, str) else each
+        wanted = [name] if parameters is None else list(parameters)
+        for one in wanted:
+            if one in known or (parameters is None and (one in coordinates or one in speeds)):
+                continue
+            all_names = {*known, *coordinates, *speeds}
+            text = nearest(one, all_names, "coordinate, rate of the start or run-time parameter", "There are")
+            raise UnknownNameError(f"{text}; an exact 0 or ±1 is a run-time input only with tunable=[{one!r}]")
+        if parameters is None and name in coordinates:
+            found.append(Direction(name, q=coordinates[name]))
+        elif parameters is None and name in speeds:
+            found.append(Direction(name, y=speeds[name]))
+        else:
+            found.append(Direction(name, parameters={name: 1.0} if parameters is None else parameters))
+    return found
+
+
+def start_tangent(rows: RunRows, programs: Programs, wanted: Sequence[Direction]) -> Tangent:
+    """Derivatives of the consistent start by these directions."""
+    c, count = programs.columns, len(wanted)
+    q, y, p = np.zeros((c.n_v, count)), np.zeros((c.n, count)), np.zeros((c.parameters, count))
+    names = list(rows.record.parameter_names)
+    for k, each in enumerate(wanted):
+        if each.q >= 0:
+            q[each.q, k] = 1.0
+        elif each.y >= 0:
+            y[each.y, k] = 1.0
+        for name, rate in (each.parameters or {}).items():
+            p[programs.places.index(names.index(name)), k] = rate
+    tangent = Tangent(np.zeros(count), q, y, np.zeros((c.anchors, count)), p)
+    record = rows.record
+    motion = Motion(float(record.time[0]), np.array(record.q[0]), rows.y[0], rows.start_anchors(), tangent)
+    return _projected(rows, programs, motion, rows.mode(0)).tangent
+
+
+def _projected(rows: RunRows, programs: Programs, motion: Motion, mode: Mode) -> Motion:
+    """The motion with positions and velocities on the rows, and contacts that hold where they are."""
+    if not mode.held:
+        return motion
+    c, equations = programs.columns, programs.equations
+    normals = {contact.rows[0] for contact in equations.contacts if contact.rows}
+    zero = np.zeros(c.n), np.zeros(c.rows)
+    _, _, _, of_r, of_h, of_rate = programs.steps(motion.at(mode, *zero))
+    M = of_r[:, c.rate][: c.n_v, : c.n_v]
+    places = [
+        k for k in mode.held
+        if not equations.rows[k].is_velocity and (equations.rows[k].contact < 0 or k in normals)
+    ]  # fmt: skip
+    off = of_h[places] @ motion.tangent.stacked(c)
+    motion = motion.with_tangent(q=motion.tangent.q + _least(M, of_h[places][:, c.x], off))
+    closed = [k for k in range(len(equations.contacts)) if mode.closed[k]]
+    motion = captured(programs, motion, mode, closed)
+    rates = of_rate[list(mode.held)]
+    change = _least(M, rates[:, c.y][:, : c.n_v], rates @ motion.tangent.stacked(c))
+    y = motion.tangent.y.copy()
+    y[: c.n_v] += change
+    return motion.with_tangent(y=y)
+
+
+def _least(M: Matrix, B: Matrix, off: Matrix) -> Matrix:
+    """The change that removes what rows are off, least in the metric of M of the coordinates that these act on.
+
+    B may have dependent rows; ``M`` is made definite as an assembly does.
+    """
+    found = np.zeros((len(M), off.shape[1]))
+    size = float(np.max(np.abs(B), initial=0.0))
+    places = np.flatnonzero(np.max(np.abs(B), axis=0, initial=0.0) > 1e-12 * size)
+    if len(places):
+        part = M[np.ix_(places, places)]
+        part = part + 1e-9 * (float(np.max(np.abs(np.diag(part)))) or 1.0) * np.eye(len(places))
+        flow = np.linalg.solve(part, B[:, places].T)
+        found[places] = -flow @ np.linalg.lstsq(B[:, places] @ flow, off, rcond=1e-12)[0]
+    return found

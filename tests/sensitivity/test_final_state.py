@@ -1,0 +1,61 @@
+"""Derivatives of the end of a run are those of the numbers that it prints: differences of runs with equal steps."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import mbd
+from mbd.sensitivity.derivative import final_state_derivative
+from tests.sensitivity.differences import differences, off
+from tests.simulation.mechanisms import ball, kneed_walker, kneed_walker_start, pendulum
+
+SCHEMES = (
+    mbd.HHT(alpha=0.05), mbd.GeneralizedAlpha(0.7), mbd.Newmark(), mbd.HHT(0.05, start="consistent"),
+    mbd.HHT(alpha=0.05, formulation="index3"),
+)  # fmt: skip
+
+
+def compared(model, start, scheme, names, step=1e-4, **settings):
+    run = mbd.simulate(model, start, scheme, **settings)
+    state, time = final_state_derivative(run, names)
+    wanted, _ = differences(model, start, scheme, names, step, **settings)
+    return off(np.vstack([state, time]), wanted)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES[:4], ids=repr)
+def test_of_a_pendulum(scheme):
+    model = pendulum()
+    start = mbd.assemble(model, {"hinge.angle": 1.0})
+    names = ["hinge.angle", "hinge.angle.rate", "rod.center", "gravity.y"]
+    assert compared(model, start, scheme, names, dt=0.01, until=1.005).max() < 1e-9
+
+
+def test_of_a_ball_that_bounces():
+    model = ball(restitution=0.6)
+    start = mbd.assemble(model, {"fall.displacement": 1.0})
+    names = ["fall.displacement", "fall.displacement.rate", "gravity.y"]
+    assert compared(model, start, mbd.HHT(0.05), names, dt=0.01, until=0.8).max() < 1e-9
+    assert compared(model, start, mbd.HHT(0.05), names, dt=0.01, until="floor").max() < 1e-9
+
+
+def test_of_a_bounce_in_closed_form():
+    """A ball from the height h with the restitution e: the derivative by h has the shift of the impact in it."""
+    model, e, h, t, g = ball(restitution=0.6), 0.6, 1.0, 0.8, 9.81
+    run = mbd.simulate(model, mbd.assemble(model, {"fall.displacement": h}), mbd.Newmark(), dt=1e-3, until=t)
+    state, _ = final_state_derivative(run, ["fall.displacement"])
+    fall, speed = np.sqrt(2.0 * h / g), np.sqrt(2.0 * g * h)
+    by_fall, by_speed = 0.5 * fall / h, 0.5 * speed / h
+    left = t - fall
+    place = e * by_speed * left - e * speed * by_fall + g * left * by_fall
+    assert state[:, 0] == pytest.approx([place, e * by_speed + g * by_fall], rel=1e-9)
+
+
+@pytest.mark.parametrize("scheme", [SCHEMES[0], SCHEMES[1], SCHEMES[4]], ids=repr)
+@pytest.mark.parametrize("until", ["right foot", 0.9])
+def test_of_a_walker_with_locking_knees(scheme, until):
+    model = kneed_walker()
+    start = kneed_walker_start(model)
+    names = ["left hip.angle", "right hip.angle.rate", "right thigh.mass", "gravity.x"]
+    step = 2e-5 if scheme.stabilized else 2e-4  # index 3 leaves more round-off
+    assert compared(model, start, scheme, names, step, dt=0.005, until=until).max() < 1e-7
