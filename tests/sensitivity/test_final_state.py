@@ -14,8 +14,8 @@ SCHEMES = (
     mbd.HHT(alpha=0.05), mbd.GeneralizedAlpha(0.7), mbd.Newmark(), mbd.HHT(0.05, start="consistent"),
 )  # fmt: skip
 CONVERGED = (
-    mbd.HHT(alpha=0.05, tolerance=1e-12), mbd.GeneralizedAlpha(0.7, tolerance=1e-12),
-    mbd.HHT(alpha=0.05, formulation="index3", tolerance=1e-12),
+    mbd.HHT(alpha=0.05, tolerance=1e-10), mbd.GeneralizedAlpha(0.7, tolerance=1e-10),
+    mbd.HHT(alpha=0.05, formulation="index3", tolerance=1e-10),
 )  # fmt: skip
 """Schemes whose steps differ from their converged solutions by round-off: these are what is differentiated."""
 
@@ -61,4 +61,4 @@ def test_of_a_walker_with_locking_knees(scheme, until):
     model = kneed_walker()
     start = kneed_walker_start(model)
     names = ["left hip.angle", "right hip.angle.rate", "right thigh.mass", "gravity.x"]
-    assert compared(model, start, scheme, names, 2e-5, dt=0.005, until=until).max() < 2e-8
+    assert compared(model, start, scheme, names, 1e-4, dt=0.005, until=until).max() < 1e-8
