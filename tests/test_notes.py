@@ -119,3 +119,16 @@ def test_a_bar_that_is_wanted_needs_no_library(monkeypatch):
     model = ball()
     mbd.simulate(model, mbd.assemble(model, {"fall.displacement": 9.0}), dt=1e-2, until=0.5, progress=True)
     assert "100 % of 0.5 s" in terminal.text and terminal.text.endswith("\n")
+
+
+def test_a_contact_that_jumps_below_its_surface_is_told():
+    model = mbd.Model("ledge", gravity=(0, 0, 0))
+    ball = mbd.PointMass("ball", mass=1.0)
+    model.connect(mbd.Translation("root", model.ground.origin, ball.origin))
+    gap = mbd.measure(
+        lambda p: mbd.where(p[0] < 0.5, p[1] + 0.3, p[1] - 0.15), ball.origin
+    )  # a step, which no rate tells
+    model.constrain(mbd.Unilateral("ledge", gap))
+    start = mbd.assemble(model, position={"root.y": 0.05}, velocity={"root.x": 1.0})
+    run = mbd.simulate(model, start, mbd.HHT(), dt=1e-2, until=1.0)
+    assert any("'ledge' closed 0.1 m below its surface at t = 0.5 s" in note for note in run.stats["notes"])

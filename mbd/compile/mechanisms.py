@@ -64,10 +64,10 @@ def mechanism_of(
     require_model(model)
     if not isinstance(backend, str):
         raise ModelError(f"backend must be 'auto', 'llvm' or 'python', not {backend!r}")
-    checked = parameter_check(model) if isinstance(model, Description) else model.parameter_check()
-    faults = checked.faults(changed) if changed else []
-    if faults:
-        raise ModelError(faults)
+    if changed:
+        checked = parameter_check(model) if isinstance(model, Description) else model.parameter_check()
+        if faults := checked.faults(changed):
+            raise ModelError(faults)
     mechanism = _mechanism(model, backend, frozenset())
     if not changed and not inputs and not getattr(model, "controllers", ()):
         return mechanism

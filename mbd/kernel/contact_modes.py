@@ -82,6 +82,7 @@ def resolve_contact_modes(K: Switching) -> int:
             if K.active[c] == 1:
                 capture(K, c)
                 log_event(K, LOG_CLOSED, c, 0.0, NO_IMPULSE)
+                K.closing_gap[c] = -1e300  # guards may be those of other parameters here
             else:
                 K.armed[c] = 1
                 log_event(K, LOG_OPENED, c, 0.0, NO_IMPULSE)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from mbd.kernel.codes import EPS
 from mbd.kernel.records import Integers, Reals
 
-__all__ = ["eliminate", "factor", "round_off", "solve", "solve_again", "solve_definite"]
+__all__ = ["eliminate", "factor", "round_off", "solve", "solve_again", "solve_definite", "sum_of_sizes"]
 
 MOST_ROUND_OFF = 1e-12
 """Part of the entries that a pivot came from which is more than round-off in any size of matrix [-]."""
@@ -183,21 +183,51 @@ def eliminate(A: Reals, n: int, b: Reals, columns: Integers, work: Reals, rank_t
 
 def equilibrate(A: Reals, n: int, b: Reals, work: Reals) -> None:
     """Scale rows (and b), then columns, of A x = b to largest entries of 1; the factors go into work[: 2 n]."""
+    work[n : 2 * n] = 0.0
     for i in range(n):
-        big = 0.0
-        for j in range(n):
-            big = max(big, abs(A[i * n + j]))
+        big = largest_entry(A, i * n, i * n + n)
         work[i] = 1.0 / big if big > 0.0 else 1.0
         for j in range(n):
             A[i * n + j] *= work[i]
+            work[n + j] = max(work[n + j], abs(A[i * n + j]))
         b[i] *= work[i]
     for j in range(n):
-        big = 0.0
-        for i in range(n):
-            big = max(big, abs(A[i * n + j]))
-        work[n + j] = 1.0 / big if big > 0.0 else 1.0
-        for i in range(n):
+        work[n + j] = 1.0 / work[n + j] if work[n + j] > 0.0 else 1.0
+    for i in range(n):
+        for j in range(n):
             A[i * n + j] *= work[n + j]
+
+
+def largest_entry(A: Reals, first: int, last: int) -> float:
+    """The largest |A| at the places from `first` to before `last`."""
+    a0 = a1 = a2 = a3 = 0.0  # four, which do not wait for each other
+    j = first
+    while j + 3 < last:
+        a0 = max(a0, abs(A[j]))
+        a1 = max(a1, abs(A[j + 1]))
+        a2 = max(a2, abs(A[j + 2]))
+        a3 = max(a3, abs(A[j + 3]))
+        j += 4
+    while j < last:
+        a0 = max(a0, abs(A[j]))
+        j += 1
+    return max(a0, a1, a2, a3)
+
+
+def sum_of_sizes(A: Reals, last: int) -> float:
+    """Σ |A| at the first `last` places; not finite where an entry is not."""
+    a0 = a1 = a2 = a3 = 0.0
+    j = 0
+    while j + 3 < last:
+        a0 += abs(A[j])
+        a1 += abs(A[j + 1])
+        a2 += abs(A[j + 2])
+        a3 += abs(A[j + 3])
+        j += 4
+    while j < last:
+        a0 += abs(A[j])
+        j += 1
+    return a0 + a1 + a2 + a3
 
 
 def bring_largest(A: Reals, n: int, k: int, b: Reals, columns: Integers, least: float) -> bool:
@@ -206,16 +236,17 @@ def bring_largest(A: Reals, n: int, k: int, b: Reals, columns: Integers, least: 
     False where none is above `least`: nothing moves then.
     """
     p = k
-    c = k
     big = 0.0
     for i in range(k, n):
-        for j in range(k, n):
-            if abs(A[i * n + j]) > big:
-                big = abs(A[i * n + j])
-                p = i
-                c = j
+        most = largest_entry(A, i * n + k, i * n + n)
+        if most > big:
+            big = most
+            p = i
     if not big > least:
         return False
+    c = k
+    while abs(A[p * n + c]) < big:
+        c += 1
     if p != k:
         swap_rows(A, n, k, p)
         swap = b[k]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from mbd.kernel.linear import factor, solve
 from mbd.kernel.orthogonal import clear_row, square
-from mbd.kernel.records import ContactRows, DependentRows, Frictions, Model, Motion, Reals, Singular
+from mbd.kernel.records import ContactRows, DependentRows, Equations, Frictions, Model, Reals, Singular
 from mbd.kernel.roots import sqrt
 
 __all__ = ["find_dependent", "find_mix", "find_shares", "shared", "sharing", "spread", "take_shares"]
@@ -37,6 +37,8 @@ def find_dependent(K: DependentRows, m: int) -> None:
     K.dropped[: K.n_rows] = 0
     if m == 0:
         return
+    for k in range(m):
+        K.work[k] = length_of(K, K.rows[k])
     lengths = longest_row(K, m, 0)
     angles = longest_row(K, m, 1)
     others = longest_row(K, m, 2)
@@ -45,7 +47,7 @@ def find_dependent(K: DependentRows, m: int) -> None:
             row = K.rows[k]
             unit = K.row_unit[row]
             far = lengths if unit == 0 else (angles if unit == 1 else others)
-            part = length_of(K, row) / far if far > 0.0 else 1.0
+            part = K.work[k] / far if far > 0.0 else 1.0
             if (part < SHORT) != (late == 1):
                 continue
             left = remaining_norm(K, row, kept) * (part if late == 1 else 1.0)
@@ -58,12 +60,12 @@ def find_dependent(K: DependentRows, m: int) -> None:
             combine(K, row, kept)
 
 
-def longest_row(K: Motion, m: int, unit: int) -> float:
-    """The largest length of the m rows in K.rows that have this unit."""
+def longest_row(K: Equations, m: int, unit: int) -> float:
+    """The largest length, in K.work, of the m rows in K.rows that have this unit."""
     longest = 0.0
     for k in range(m):
         if K.row_unit[K.rows[k]] == unit:
-            longest = max(longest, length_of(K, K.rows[k]))
+            longest = max(longest, K.work[k])
     return longest
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from mbd.kernel.codes import CONFLICT, DEPENDENT, NOT_FINITE
-from mbd.kernel.linear import MOST_ROUND_OFF, eliminate, factor, round_off
+from mbd.kernel.linear import MOST_ROUND_OFF, eliminate, factor, round_off, sum_of_sizes
 from mbd.kernel.ordered import LOSS_AT_ONCE, OF_ACCELERATIONS, SYMMETRIC, factor_ordered, order_at, solve_ordered
 from mbd.kernel.records import Balance, DependentRows, Equations
 from mbd.kernel.redundancy import find_dependent, find_shares, shared, sharing, spread, take_shares
@@ -164,12 +164,7 @@ def solve_matrix(K: Balance, m: int, together: bool, tolerance: float) -> int:
         A[(n + k) * size : (n + k) * size + n] = K.acc[K.acc_B + row * n : K.acc_B + row * n + n]
         A[(n + k) * size + n : (n + k) * size + n + m] = 0.0
         K.rhs[n + k] = -K.bias[row]
-    finite = 0.0
-    for k in range(size * size):
-        finite += abs(A[k])
-    for k in range(size):
-        finite += abs(K.rhs[k])
-    if not finite < 1e300:
+    if not sum_of_sizes(A, size * size) + sum_of_sizes(K.rhs, size) < 1e300:
         return -NOT_FINITE
     rank = int(eliminate(A, size, K.rhs, K.columns, K.work, tolerance))
     for k in range(rank):
@@ -242,11 +237,8 @@ def solve_in_order(K: Balance, m: int) -> int:
         K.rhs[i] = -K.force[i]
     for k in range(m):
         K.rhs[K.n + k] = -K.bias[K.rows[k]]
-    finite = 0.0
     solve_ordered(K, K.rhs)
-    for k in range(K.n + m):
-        finite += abs(K.rhs[k])
-    if not finite < 1e300:
+    if not sum_of_sizes(K.rhs, K.n + m) < 1e300:
         return -NOT_FINITE
     take_solution(K, m)
     return int(K.n + m)

@@ -87,6 +87,7 @@ def close_by_impact(K: Switching, fastest: float) -> int:
             loss = loss_in(K, c)
             part = abs(loss) / own if own > 0.0 else 1.0 / count
             log_event(K, LOG_CLOSED, c, loss + part * others, impulses)
+            K.closing_gap[c] = min(K.closing_gap[c], K.guards0[c])
             impulses = OWN_IMPULSE
             if K.active[c] == 1:
                 capture(K, c)

@@ -209,7 +209,8 @@ def prepared(
 ) -> Run:
     """A run ready to be completed; `watch` may put something in the place of the mechanism."""
     mechanism = mechanism_of(model, options["backend"], changed)
-    manager = manager_of(mechanism, mechanism.parameters(changed, getattr(model, "parameters", {})))
+    folded = getattr(model, "parameters", {}) if changed else {}
+    manager = manager_of(mechanism, mechanism.parameters(changed, folded))
     fits(start, mechanism.equations, manager)
     start = directed(mechanism, start)
     end, stop = end_of(until, manager, dt, start.time)

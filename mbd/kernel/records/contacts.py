@@ -29,6 +29,7 @@ class Contacts(SchemeAbilities):
     free: Integers = integers(lambda s: s.n_contacts)
     closing: Integers = integers(lambda s: s.n_contacts)
     parting: Integers = integers(lambda s: s.n_contacts)
+    closing_gap: Reals = reals(lambda s: s.n_contacts)  # the lowest at which each has closed, −1e300 for one not known
     lifting: Integers = integers(lambda s: s.n_rows)  # 1: a row that is left out of the correction of positions
     deepest: Reals = reals(lambda s: s.n_contacts, kept=True)  # lowest gap while ignored
     sinking: Reals = reals(lambda s: s.n_contacts, kept=True)  # time of the first release into the surface

@@ -116,7 +116,10 @@ def notes_of(run: RunData, record: Record) -> tuple[list[str], list[str]]:
     columns = ModelColumns(record, equations)
     for number, contact in enumerate(run.manager.contacts):
         short, blind = _short_touch(run, record, number, contact)
-        notes += _ignored(run, number, contact) + _overshot(run, columns, contact) + short
+        notes += _ignored(run, number, contact)
+        if run.kernel.closing_gap[number] < -0.5 * OVERSHOT:
+            notes += _overshot(run, columns, contact)
+        notes += short
         if run.kernel.row_bounds[1 + number] > 0.0:
             notes += _pulled(record, number, contact)
         doubts += blind

@@ -197,10 +197,10 @@ class Stepper:
         first = -room.ctypes.data % LINE // 8
         shelf = room[first : first + whole]
         base = shelf.ctypes.data
-        for name, place in zip(lengths, places, strict=True):
-            self._places[name] = place
-            self._shelved[name] = shelf[place], base + 8 * place.start
-            setattr(self.kernel, name, shelf[place])
+        arrays = {name: shelf[place] for name, place in zip(lengths, places, strict=True)}
+        self._places |= zip(lengths, places, strict=True)
+        self._shelved |= {name: (array, base + 8 * self._places[name].start) for name, array in arrays.items()}
+        vars(self.kernel).update(arrays)
         return shelf
 
     def place_of(self, name: str) -> slice:
