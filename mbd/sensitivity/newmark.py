@@ -19,8 +19,9 @@ from mbd.arrays import Matrix, Vector
 from mbd.sensitivity.balance import consistent_rates
 from mbd.sensitivity.motion import Mode, Motion, Rates, Tangent, solved
 from mbd.sensitivity.programs import Columns, Programs
+from mbd.sensitivity.schemes import Memory
 
-__all__ = ["Memory", "NewmarkSteps"]
+__all__ = ["NewmarkSteps"]
 
 FOLLOWED = 1e-9
 """Distance of a row from the end of its step, over how far the step went, up to which the step is known [-]."""
@@ -28,21 +29,6 @@ MOST = 12
 """Newton iterations for the end of a step at an event [-]."""
 BRIEF, BRIEFEST = 1e-3, 1e-9
 """Parts of a full step below which the kernel takes one of Heun's method, with rows and without them [-]."""
-
-
-@dataclass(frozen=True)
-class Memory:
-    """What the scheme remembers at a row: rates, auxiliary accelerations a with their derivatives, the last step."""
-
-    rates: Rates
-    aux: Vector
-    of_aux: Matrix
-    step: float
-
-    def widened(self) -> Memory:
-        """With one more direction, in which nothing changes."""
-        wide = np.hstack([self.of_aux, np.zeros((len(self.aux), 1))])
-        return replace(self, rates=self.rates.widened(), of_aux=wide)
 
 
 @dataclass(frozen=True)

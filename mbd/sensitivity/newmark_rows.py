@@ -1,0 +1,93 @@
+"""Rows of a run by the Newmark family: which step each is the end of, and what the scheme remembers there.
+
+Runs store neither auxiliary accelerations nor every start of the scheme. Both are found again and held against the
+velocities of the rows: what does not agree with them to round-off is refused.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mbd.arrays import Vector
+from mbd.integrators.family import NewmarkFamily
+from mbd.sensitivity.balance import consistent_rates, on_rows
+from mbd.sensitivity.motion import Mode, Motion, Rates
+from mbd.sensitivity.newmark import NewmarkSteps
+from mbd.sensitivity.programs import Programs
+from mbd.sensitivity.run_data import RunRows, refused
+from mbd.sensitivity.schemes import Memory, SchemeSteps, is_at
+
+__all__ = ["NewmarkRows"]
+
+
+class NewmarkRows(SchemeSteps):
+    """Derivatives of the steps of a run by the Newmark family."""
+
+    def __init__(self, rows: RunRows, programs: Programs, scheme: NewmarkFamily) -> None:
+        super().__init__(rows, programs)
+        self.stabilized = bool(scheme.stabilized)
+        self.steps = NewmarkSteps(programs, scheme.numbers(), self.stabilized, rows.full)
+
+    def start(self, motion: Motion, mode: Mode, rates: Rates) -> Memory:
+        """With the jerk of a difference of accelerations."""
+        return self.steps.start(motion, mode, rates)
+
+    def along(
+        self, motion: Motion, memory: Memory, mode: Mode, row: int, dh: Vector, fresh: bool
+    ) -> tuple[Motion, Memory]:
+        """A step to a row, from what the scheme remembers or from a start that the run does not store."""
+        record, time = self.rows.record, float(self.rows.record.time[row])
+        h = time - motion.t
+        rate, y = self.rows.rate[row], self.rows.y[row]
+        if not self.steps.follows(motion, memory, h, y, rate):
+            other = self._other_start(motion, memory, mode, h, row, fresh)
+            if other is None:
+                return self._uneven(motion, memory, mode, row, dh)
+            memory = other
+        none = np.zeros((0, 0)), np.zeros((0, 0))
+        rates = Rates(rate, np.array(record.lam[row]), *none)
+        return self.steps.step(motion, memory, mode, (time, np.array(record.q[row]), y), rates, dh)
+
+    def _other_start(
+        self, motion: Motion, memory: Memory, mode: Mode, h: float, row: int, fresh: bool
+    ) -> Memory | None:
+        """The memory of a start that the row is a step from: of another size, or one that was not stored."""
+        rate, y, rates = self.rows.rate[row], self.rows.y[row], memory.rates
+        tries = [self.steps.start(motion, mode, rates, h)] if fresh else []
+        if fresh:
+            tries.append(Memory(rates, rates.rate.copy(), rates.of_rate.copy(), self.steps.full))
+        else:
+            again = consistent_rates(self.programs, motion, mode, rates)
+            tries.append(self.steps.start(motion, mode, again))
+        return next((each for each in tries if self.steps.follows(motion, each, h, y, rate)), None)
+
+    def _uneven(self, motion: Motion, memory: Memory, mode: Mode, row: int, dh: Vector) -> tuple[Motion, Memory]:
+        """A step whose end lost what it had of velocities across the rows, or a brief one; the scheme starts again."""
+        end, rates = self.ended(motion, memory, mode, row, dh)
+        again = consistent_rates(self.programs, end, mode, rates)
+        return end, self.steps.start(end, mode, again)
+
+    def ended(self, motion: Motion, memory: Memory, mode: Mode, row: int, dh: Vector) -> tuple[Motion, Rates]:
+        """The end of a step that the scheme does not go on from as it is: solved for, put on the rows.
+
+        Rates are those of the step itself.
+        """
+        time, steps = float(self.rows.record.time[row]), self.steps
+        brief = steps.is_brief(time - motion.t, mode)
+        for way in (brief, not brief):
+            if way:
+                end, after = steps.brief(motion, memory, mode, time, dh)
+                rates = after.rates
+            else:
+                guess = Rates(self.rows.rate[row].copy(), np.array(self.rows.record.lam[row]), *(np.zeros((0, 0)),) * 2)
+                reached, solved = steps.ended(motion, memory, mode, time, guess)
+                end, after = steps.step(motion, memory, mode, (time, reached.q, reached.y), solved, dh)
+                rates = after.rates
+            if not self.stabilized and mode.rows:
+                end = on_rows(self.programs, end, mode, end.y, end.tangent.y)
+            if is_at(self.rows, end, row):
+                return end, rates
+        raise refused(
+            f"the step to t = {time:.9g} s is not one that the pass knows: it was shortened, or began in a way that "
+            "the run does not store"
+        )

@@ -1,0 +1,75 @@
+"""What the derivatives of a scheme's steps are to the pass."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mbd.arrays import Matrix, Vector
+from mbd.sensitivity.motion import Mode, Motion, Rates
+from mbd.sensitivity.programs import Programs
+from mbd.sensitivity.run_data import RunRows
+
+__all__ = ["Memory", "SchemeSteps", "is_at"]
+
+SAME = 1e-9
+"""Distance of a row from where the pass says that it is, over the size of the state, that is round-off [-]."""
+
+
+@dataclass(frozen=True)
+class Memory:
+    """What a scheme remembers at a row: rates, auxiliary accelerations a with their derivatives, the last step."""
+
+    rates: Rates
+    aux: Vector
+    of_aux: Matrix
+    step: float
+
+    @classmethod
+    def of_rates(cls, rates: Rates, step: float) -> Memory:
+        """That of rates alone."""
+        return cls(rates, rates.rate, rates.of_rate, step)
+
+    def widened(self) -> Memory:
+        """With one more direction, in which nothing changes."""
+        wide = np.hstack([self.of_aux, np.zeros((len(self.aux), 1))])
+        return replace(self, rates=self.rates.widened(), of_aux=wide)
+
+
+class SchemeSteps(ABC):
+    """Derivatives of the steps of a run by one scheme."""
+
+    def __init__(self, rows: RunRows, programs: Programs) -> None:
+        self.rows, self.programs = rows, programs
+
+    @abstractmethod
+    def start(self, motion: Motion, mode: Mode, rates: Rates) -> Memory:
+        """The memory of a start from consistent rates."""
+
+    @abstractmethod
+    def along(
+        self, motion: Motion, memory: Memory, mode: Mode, row: int, dh: Vector, fresh: bool
+    ) -> tuple[Motion, Memory]:
+        """A step to a row from which the scheme goes on.
+
+        dh (D,) : derivatives of its size; fresh : whether it is the first after a start
+
+        Raises
+        ------
+        CapabilityError
+            for a row that is not the end of such a step.
+        """
+
+    @abstractmethod
+    def ended(self, motion: Motion, memory: Memory, mode: Mode, row: int, dh: Vector) -> tuple[Motion, Rates]:
+        """A step to a row at which an event ends it; with the rates of the step itself."""
+
+
+def is_at(rows: RunRows, motion: Motion, row: int) -> bool:
+    """Whether a row is where the pass is."""
+    q, y = rows.record.q[row], rows.y[row]
+    size = np.max(np.abs(np.concatenate([q, y])), initial=1e-3)
+    off = np.max(np.abs(np.concatenate([motion.q - q, motion.y - y])), initial=0.0)
+    return bool(off <= SAME * size)
