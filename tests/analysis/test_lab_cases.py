@@ -211,7 +211,10 @@ def test_f4_a_rimless_wheel() -> None:
     assert speeds == pytest.approx(np.full(3, after.value), abs=10.0 * (truth.event_bound + truth.error) + 1e-10)
 
 
-@pytest.mark.parametrize(("name", "release"), [("h1-knee-stop-gap-law", "gap"), ("h1b-knee-stop-unilateral", "pull")])
+@pytest.mark.parametrize(
+    ("name", "release"),
+    [pytest.param("h1-knee-stop-gap-law", "gap", marks=pytest.mark.slow), ("h1b-knee-stop-unilateral", "pull")],
+)
 def test_h1_a_knee_stop_with_two_laws_of_release(name: str, release: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(choices, "LEAST_ROWS", 1500)  # a contact lasts 13 ms, and runs are polynomials between rows
     monkeypatch.setattr(choices, "MOST_ROWS", 1500)

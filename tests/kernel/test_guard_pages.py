@@ -11,7 +11,7 @@ import pytest
 from mbd.kernel.records import TABLE
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="pages are protected with mprotect")
-QUICK = [shape + 120 * k for k, shape in enumerate(range(0, 120, 8))]
+QUICK = [shape + 120 * k for k, shape in enumerate(range(0, 120, 20))]
 """One scene of fifteen shapes."""
 
 

@@ -194,7 +194,7 @@ def test_a_four_bar_turns_alike_on_both_paths():
         np.testing.assert_allclose(fast.record.lam, plain.record.lam, rtol=0, atol=1e-5)
 
 
-@settings(max_examples=4)
+@settings(max_examples=2)
 @given(
     seed=st.integers(0, 1000),
     kind=st.sampled_from([QuaternionBall, CayleyBall]),
