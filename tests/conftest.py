@@ -9,6 +9,8 @@ from collections import Counter
 from pathlib import Path
 
 os.environ.setdefault("MPLBACKEND", "Agg")
+# one worker a core: threads of BLAS, of each worker on every core, wait for each other in loops that keep cores busy
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # many mechanisms, short runs: what takes least to compile; all levels give the same bits (kernel/test_levels.py)
 os.environ.setdefault("MBD_OPTIMIZATION_LEVEL", "0")
 
@@ -49,18 +51,27 @@ def pytest_xdist_make_scheduler(config, log):
 @pytest.hookimpl(tryfirst=True, specname="pytest_collection_modifyitems")
 def pytest_thin_out(items):
     """Leave some cases of tests marked `covering` or `sampled`; the others are slow."""
-    seen, counts = set(), Counter()
+    covering = [item for item in items if item.get_closest_marker("covering")]
+    named = {item: item.nodeid.split("[")[0] for item in items}
+    values = {item: {(named[item], *each) for each in _parameters(item)} for item in covering}
+    seen, chosen = set(), set()
+    for enough in (set.isdisjoint, lambda these, known: not these <= known):  # diagonals of the table, then the rest
+        for item in covering:
+            if enough(values[item], seen):
+                chosen.add(item)
+                seen |= values[item]
+    counts = Counter()
     for item in items:
-        name = item.nodeid.split("[")[0]
-        if item.get_closest_marker("covering"):
-            values = {(name, *each) for each in item.callspec.indices.items()}
-            if values <= seen:
-                item.add_marker("slow")
-            seen |= values
-        elif sampled := item.get_closest_marker("sampled"):
-            if counts[name] % sampled.args[0]:
-                item.add_marker("slow")
-            counts[name] += 1
+        if sampled := item.get_closest_marker("sampled"):
+            if counts[named[item]] % sampled.args[0] == 0:
+                chosen.add(item)
+            counts[named[item]] += 1
+        if item not in chosen and (sampled or item in values):
+            item.add_marker("slow")
+
+
+def _parameters(item):
+    return [(name, id(value)) for name, value in item.callspec.params.items()]
 
 
 @pytest.hookimpl(trylast=True)
