@@ -57,6 +57,7 @@ if TYPE_CHECKING:
     from mbd.errors import (
         AssemblyError as AssemblyError,
         CapabilityError as CapabilityError,
+        GaitError as GaitError,
         MbdError as MbdError,
         MbdWarning as MbdWarning,
         MemoryLimitError as MemoryLimitError,
@@ -75,6 +76,8 @@ if TYPE_CHECKING:
         Spring as Spring,
         TorsionSpring as TorsionSpring,
     )
+    from mbd.gait.cycle import LimitCycle as LimitCycle
+    from mbd.gait.limit_cycle import limit_cycle as limit_cycle
     from mbd.integrators import (
         HHT as HHT,
         GeneralizedAlpha as GeneralizedAlpha,
@@ -149,9 +152,11 @@ _HOMES = {
     "Rolling Unilateral When distance extension flexion height measure penalty_parameters separation touchdown",
     "mbd.equations.energy_description": "Coordinate",
     "mbd.lagrangian": "Lagrangian",
-    "mbd.errors": "AssemblyError CapabilityError MbdError MbdWarning MemoryLimitError ModelError SimulationError "
-    "TraceError TrajectoryError UnknownNameError",
+    "mbd.errors": "AssemblyError CapabilityError GaitError MbdError MbdWarning MemoryLimitError ModelError "
+    "SimulationError TraceError TrajectoryError UnknownNameError",
     "mbd.forces": "Applied Damper Motor Potential Samples Spring TorsionSpring",
+    "mbd.gait.cycle": "LimitCycle",
+    "mbd.gait.limit_cycle": "limit_cycle",
     "mbd.integrators": "HHT GeneralizedAlpha Newmark RadauIIA RungeKutta853",
     "mbd.joints": "Cylindrical Planar Prismatic Revolute Screw Translation Universal Weld",
     "mbd.joints.losses": "Coulomb Dissipation PinFriction Quadratic Tabulated Viscous",

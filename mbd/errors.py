@@ -9,6 +9,7 @@ from typing import Any
 __all__ = [
     "AssemblyError",
     "CapabilityError",
+    "GaitError",
     "MbdError",
     "MbdWarning",
     "MemoryLimitError",
@@ -68,6 +69,17 @@ class SimulationError(MbdError, RuntimeError):
 
 class MemoryLimitError(SimulationError):
     """A run whose rows would not fit into memory; `run` has those computed until then."""
+
+
+class GaitError(MbdError, RuntimeError):
+    """A walk that does not repeat itself: it falls, scuffs, misses its event, or no search converged.
+
+    `gait` keeps what was computed: the last state, the outcome of every attempt, a run that shows it.
+    """
+
+    def __init__(self, message: str, gait: Any = None) -> None:
+        super().__init__(message)
+        self.gait = gait
 
 
 class TrajectoryError(MbdError, ValueError):

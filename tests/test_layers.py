@@ -34,6 +34,7 @@ RANKS = [
     ("simulation",),
     ("sensitivity",),
     ("analysis",),
+    ("gait",),
     ("view",),
     ("hardcases",),
     ("testing",),
@@ -51,6 +52,7 @@ DOORS = {
     "analysis.effects.result": ("view",),
     "analysis.linearization": ("view",),
     "analysis.numerical": ("view",),
+    "gait.cycle": ("view",),
 }
 """Methods of the objects in users' hands that only call a later stage, and import it when they are called."""
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import inspect
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 __all__ = ["evaluated", "is_expression", "plain", "quantities_in"]
@@ -42,8 +43,14 @@ def quantities_in(functions: Sequence[Any]) -> tuple[str, ...]:
 
 def evaluated(expression: Any, named: Mapping[str, float]) -> float:
     """The value of an expression of named quantities."""
+    names, function = _function_of(expression)
+    return float(function(*[named[name] for name in names]))
+
+
+@lru_cache(maxsize=256)
+def _function_of(expression: Any) -> tuple[tuple[str, ...], Callable[..., Any]]:
+    """The names of the symbols of an expression, and the function of them; making it takes a millisecond."""
     import sympy
 
     symbols = sorted(expression.free_symbols, key=str)
-    function = sympy.lambdify(symbols, expression, "math")
-    return float(function(*[named[str(symbol)] for symbol in symbols]))
+    return tuple(map(str, symbols)), sympy.lambdify(symbols, expression, "math")

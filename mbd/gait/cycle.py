@@ -1,0 +1,249 @@
+"""A gait that repeats itself: its start, its step, its stability, what it costs, and how all that follows parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mbd.arrays import Vector
+from mbd.errors import GaitError
+from mbd.gait.derivatives import Derivatives
+from mbd.gait.energies import cost_of_transport, energy_by_cause
+from mbd.gait.floquet import Multipliers
+from mbd.gait.map_derivative import MapDerivative
+from mbd.gait.outcome import Outcome
+from mbd.gait.return_map import ReturnMap
+from mbd.gait.section import Chart
+from mbd.notebook import table
+from mbd.simulation.simulate import simulate
+from mbd.state import State
+
+if TYPE_CHECKING:
+    from mbd.trajectory import Trajectory
+
+__all__ = ["LimitCycle"]
+
+
+@dataclass(frozen=True, eq=False)
+class LimitCycle:
+    """A gait, from just after an event to the next such state, sides exchanged where it was asked for.
+
+    Attributes
+    ----------
+    name : of the model; section, mirror, strides : as asked
+    state : just after the event, time 0; it repeats itself up to sides and the way that the walker went
+    outcome : 'walks', or why there is none, with its time; attempts : what runs beside it came to
+    period : of one application of the map [s]; distance : that it leads on [m]
+    steps : (foot, time of its touchdown [s], length [m]) in order
+    residual : by unit, what the state just after the next event differs by; residuals : largest of each iteration
+    error : change of that state with half the step dt [m, rad, and per s]
+    stability_of : multipliers, modes, trivial ones; map_derivative : P and how it was found
+    parameters : values that differ from the model's, functions of parameters among them
+    dt : step [s]; runs : how many were made
+    """
+
+    name: str
+    section: str
+    mirror: tuple[str, str] | None
+    strides: int
+    state: State
+    outcome: Outcome
+    attempts: Sequence[Outcome]
+    period: float
+    distance: float
+    steps: tuple[tuple[str, float, float], ...]
+    residual: Mapping[str, float]
+    residuals: Sequence[float]
+    error: float
+    stability_of: Multipliers
+    map_derivative: MapDerivative | None
+    parameters: Mapping[str, float]
+    dt: float
+    runs: int
+    chart: Chart = field(repr=False)
+    map: ReturnMap = field(repr=False)
+    way: Vector = field(repr=False)
+    given: Any = field(repr=False)
+
+    @property
+    def success(self) -> bool:
+        """Whether there is a gait."""
+        return self.outcome.good
+
+    # the walk -----------------------------------------------------------------------------------------------------
+    @property
+    def speed(self) -> float:
+        """distance/period [m/s]."""
+        return self.distance / self.period
+
+    @property
+    def step_lengths(self) -> dict[str, float]:
+        """Mean length of the steps that each foot ends [m]."""
+        return self._by_foot([length for _, _, length in self.steps])
+
+    @property
+    def step_times(self) -> dict[str, float]:
+        """Mean time of the steps that each foot ends, from the touchdown before [s]."""
+        return self._by_foot(list(np.diff([0.0, *(time for _, time, _ in self.steps)])))
+
+    def _by_foot(self, values: Sequence[float]) -> dict[str, float]:
+        feet = dict.fromkeys(foot for foot, _, _ in self.steps)
+        pairs = list(zip(self.steps, values, strict=True))
+        return {foot: float(np.mean([value for step, value in pairs if step[0] == foot])) for foot in feet}
+
+    @cached_property
+    def run(self) -> Trajectory:
+        """The run over one application of the map; of a search that failed, the run from its last state."""
+        return self.walk(1)
+
+    def walk(self, count: int = 1) -> Trajectory:
+        """The run over so many applications of the map, sides as they come."""
+        once = count * self.strides == 1
+        until: Any = (self.section, self.map.longest)
+        if not once and self.success:
+            until = count * self.period * (1.0 + 1e-9)
+        return simulate(
+            self.map.model, self.state, self.map.integrator, dt=self.dt, until=until, contact="events",
+            parameters=self.map.plain(self.parameters), progress=False, on_failure="return", backend=self.map.backend,
+        )  # fmt: skip
+
+    def at(self, parameters: Mapping[str, float]) -> LimitCycle:
+        """The gait near this one with other values of parameters, or of functions of them.
+
+        Raises
+        ------
+        GaitError
+            where the walk is lost.
+        """
+        from mbd.gait.search import on_section, search
+
+        values = {**self.parameters, **parameters}
+        near = on_section(self.chart.section, self.state, self.map.vector(values))
+        if self.given is None or near is None:
+            raise GaitError(f"no gait to go on from: {self.outcome}", self)
+        found = search(self.given, near, values)
+        if not found.success:
+            changed = ", ".join(f"{name} = {value:g}" for name, value in parameters.items())
+            raise GaitError(f"{self.name} with {changed}: {found.outcome}", found)
+        return found
+
+    # stability ----------------------------------------------------------------------------------------------------
+    @property
+    def multipliers(self) -> Any:
+        """Floquet multipliers (k,), complex, by falling modulus; trivial ones stand in `trivial`."""
+        return self.stability_of.values
+
+    @property
+    def largest_multiplier(self) -> float:
+        """The largest modulus: below 1 a small push dies out by this factor each time."""
+        return self.stability_of.largest if self.success else float("nan")
+
+    @property
+    def stability(self) -> str:
+        """'stable', 'unstable', or 'marginal' where the largest modulus is 1 within its error."""
+        return self.stability_of.stability if self.success else "none"
+
+    @property
+    def trivial(self) -> dict[str, Any]:
+        """Multipliers that say nothing about stability, by cause.
+
+        'translation' (1): along the coordinates that the walker moves on along; 'time' (0 on the section): along the
+        motion; 'energy' (1): where nothing takes any; 'forgotten' (0): what impacts and resets leave no trace of.
+        """
+        names = self.chart.section.mechanism.equations.configuration.freedoms
+        found: dict[str, Any] = {f"translation {names[k][0]}": 1.0 for k in self.chart.section.fixed}
+        return {**found, "time": 0.0, **self.stability_of.trivial}
+
+    @property
+    def modes(self) -> list[dict[str, complex]]:
+        """For each multiplier its mode, by coordinate and rate: the push that it multiplies."""
+        whole = self.chart.basis @ self.stability_of.modes
+        return [dict(zip(self._directions, column, strict=False)) for column in whole.T]
+
+    @property
+    def _directions(self) -> list[str]:
+        equations = self.chart.section.mechanism.equations
+        freedoms = [name for name, _ in equations.configuration.freedoms]
+        return [*freedoms, *equations.velocity_names, *(state.name for state in equations.states)]
+
+    # energy and derivatives ---------------------------------------------------------------------------------------
+    @cached_property
+    def energy(self) -> dict[str, float]:
+        """What each cause gave over one application of the map [J]: gravity, losses, impacts, motors, numerical."""
+        return energy_by_cause(self.run)
+
+    @cached_property
+    def cost_of_transport(self) -> float:
+        """Energy that losses and impacts take, which is what gravity and motors give, over weight and distance [-]."""
+        return cost_of_transport(self.energy, self.map.model, self.map.plain(self.parameters), self.distance)
+
+    @property
+    def scalars(self) -> dict[str, float]:
+        """Every number of the gait that has derivatives by parameters, by name."""
+        lengths = {f"step length of {foot}": value for foot, value in self.step_lengths.items()}
+        times = {f"step time of {foot}": value for foot, value in self.step_times.items()}
+        return {
+            "period": self.period, "distance": self.distance, "speed": self.speed, **lengths, **times,
+            "largest multiplier": self.largest_multiplier,
+        }  # fmt: skip
+
+    @cached_property
+    def derivatives(self) -> Derivatives:
+        """``gait.derivatives["speed", "gravity.x"]``: of `scalars` by parameters or functions of them."""
+        return Derivatives(self)
+
+    # shown --------------------------------------------------------------------------------------------------------
+    def facts(self) -> dict[str, str]:
+        """What a line or a table shows."""
+        if not self.success:
+            return {"outcome": f"no gait: {self.outcome}"}
+        found = {"period": f"{self.period:.6g} s"}
+        for foot, length in self.step_lengths.items():
+            if np.isfinite(length):
+                found["step" if len(self.step_lengths) == 1 else f"step of {foot}"] = f"{length:.6g} m"
+        if np.isfinite(self.distance):
+            found["speed"] = f"{self.speed:.5g} m/s"
+        if np.isfinite(self.cost_of_transport):
+            found["cost of transport"] = f"{self.cost_of_transport:.4g}"
+        found["largest multiplier"] = f"{self.largest_multiplier:.6f} ({self.stability})"
+        worst = max(self.residual.values(), default=0.0)
+        found["residual"] = f"{worst:.1g}"
+        return found
+
+    def __repr__(self) -> str:
+        return f"{self.name}: " + ", ".join(
+            text if name == "outcome" else f"{name} {text}" for name, text in self.facts().items()
+        )
+
+    def _repr_html_(self) -> str:
+        rows: list[tuple[str, str]] = list(self.facts().items())
+        rows += [(f"multiplier {k}", _complex(value)) for k, value in enumerate(self.multipliers, start=1)]
+        rows += [(f"energy from {cause}", f"{value:.5g} J") for cause, value in self.energy.items() if self.success]
+        return table(f"gait of {self.name}", ("", "value"), rows)
+
+    def plot(self, path: Any = None) -> Any:
+        """The cycle in the phase plane of each angle, and the multipliers beside the unit circle; the figure."""
+        from mbd.view.gaits import cycle
+
+        return cycle(self, path)
+
+
+def _complex(value: complex) -> str:
+    sign = "+" if value.imag > 0.0 else "−"
+    return f"{value.real:.8g}" + (f" {sign} {abs(value.imag):.8g}i" if value.imag else "")
+
+
+def residual_by_unit(chart: Chart, c: Vector) -> dict[str, float]:
+    """The largest difference of each unit that the coordinates c of a chart stand for."""
+    equations = chart.section.mechanism.equations
+    units = [unit for _, unit in equations.configuration.freedoms] + list(equations.configuration.velocity_units)
+    units += [state.unit or "1" for state in equations.states]
+    units += ["m/s"] * (len(chart.basis) - len(units))
+    found: dict[str, float] = {}
+    for unit, value in zip(units, np.abs(chart.basis @ c), strict=True):
+        found[unit] = max(found.get(unit, 0.0), float(value))
+    return found

@@ -1,0 +1,79 @@
+"""Stability of a gait: eigenvalues of the derivative of its return map, with those that every gait has told apart."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbd.arrays import Matrix
+
+__all__ = ["Multipliers", "multipliers_of"]
+
+FORGOTTEN = 1e-7
+"""Singular value of P relative to its largest below which the map forgets a direction [-]."""
+ENERGY = 1e-6
+"""Misfit of ``∇E P = ∇E`` relative to ∇E up to which energy is kept along the cycle [-]."""
+MARGINAL = 1e-6
+"""Distance of the largest modulus from 1 within which stability is not decided [-]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Multipliers:
+    """Floquet multipliers of a return map, by falling modulus, and their modes in the coordinates of the section.
+
+    values (k,) complex; modes (size, k) complex, of length 1
+    trivial : multipliers that say nothing about stability: 'forgotten' directions (0), 'energy' (1)
+    error : estimate of that of the largest
+    """
+
+    values: NDArray[np.complex128]
+    modes: NDArray[np.complex128]
+    trivial: Mapping[str, tuple[float, ...]]
+    error: float
+
+    @property
+    def largest(self) -> float:
+        """The largest modulus; 0 where the map forgets everything."""
+        return float(np.max(np.abs(self.values), initial=0.0))
+
+    @property
+    def stability(self) -> str:
+        """'stable', 'unstable' or 'marginal'."""
+        doubt = max(MARGINAL, self.error if np.isfinite(self.error) else 0.0)
+        if abs(self.largest - 1.0) <= doubt:
+            return "marginal"
+        return "stable" if self.largest < 1.0 else "unstable"
+
+
+def multipliers_of(P: Matrix, error: Matrix, energy: Matrix | None = None) -> Multipliers:
+    """The multipliers of P (size, size), whose entries have estimated errors.
+
+    Directions that the map forgets, as a reset or an impact does, are multipliers of 0 that are left out: P is
+    restricted to its range, whose eigenvalues are the others. `energy` is ∇E along the section where the cycle loses
+    and gains none; it is then a left eigenvector, of multiplier 1, and is split off.
+    """
+    size = len(P)
+    if not size:
+        return Multipliers(np.zeros(0, complex), np.zeros((0, 0), complex), {}, 0.0)
+    U, sizes, _ = np.linalg.svd(P)
+    doubt = float(np.nanmax(np.where(np.isfinite(error), error, 0.0), initial=0.0))
+    rank = int(np.sum(sizes > max(FORGOTTEN * float(sizes[0]), 10.0 * doubt)))
+    basis = U[:, :rank]
+    values, vectors = np.linalg.eig(basis.T @ P @ basis)
+    modes = basis @ vectors
+    trivial: dict[str, tuple[float, ...]] = {}
+    if rank < size:
+        trivial["forgotten"] = (0.0,) * (size - rank)
+    if energy is not None and np.linalg.norm(energy @ P - energy) <= ENERGY * np.linalg.norm(energy):
+        kept = int(np.argmin(np.abs(values - 1.0)))
+        trivial["energy"] = (float(values[kept].real),)
+        values, modes = np.delete(values, kept), np.delete(modes, kept, axis=1)
+    order = np.argsort(-np.abs(values), kind="stable")
+    spread = float(np.linalg.cond(vectors)) if rank else 1.0
+    return Multipliers(
+        np.asarray(values[order], complex), np.asarray(modes[:, order], complex), trivial,
+        doubt * min(spread, 1e6) * np.sqrt(size),
+    )  # fmt: skip

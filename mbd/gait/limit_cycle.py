@@ -1,0 +1,148 @@
+"""Find a gait that repeats itself."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any, Literal
+
+import numpy as np
+
+from mbd.compile.mechanisms import mechanism_of
+from mbd.errors import GaitError, ModelError
+from mbd.gait.arguments import Functions, check_arguments, increments_named, section_named
+from mbd.gait.cycle import LimitCycle
+from mbd.gait.floquet import Multipliers
+from mbd.gait.mirror import mirror_of, require_alike
+from mbd.gait.return_map import ReturnMap
+from mbd.gait.search import Failed, Search, first_return, search, with_step
+from mbd.gait.section import Chart, section_of
+from mbd.gait.unmoved import moving_on
+from mbd.integrators import Integrator, RungeKutta853
+from mbd.simulation.capabilities import refusals
+from mbd.state import State
+
+__all__ = ["limit_cycle", "map_of"]
+
+FIRST = 1e-2
+"""Step of the first return where none is given [s]; later ones follow from its length."""
+
+
+def limit_cycle(
+    model: Any,
+    start: State,
+    integrator: Integrator | None = None,
+    *,
+    section: str,
+    mirror: tuple[str, str] | None = None,
+    strides: int = 1,
+    dt: float | None = None,
+    tol: float = 1e-10,
+    parameters: Mapping[str, float] | None = None,
+    functions: Functions | None = None,
+    wrt: Iterable[str] = (),
+    modulo: Iterable[str] | None = None,
+    longest: float = 30.0,
+    on_failure: Literal["raise", "return"] = "raise",
+    backend: str = "auto",
+) -> LimitCycle:
+    """The gait near a start: a state just after an event that the walk comes back to.
+
+    The return map P leads from just after one event of the section to just after the next, sides exchanged with
+    `mirror`. Its unknowns are coordinates of the tangent space of all that holds there (see `mbd.gait.section`), without
+    the coordinates that the walker moves on along. Newton's method solves ``P(c) = c``; where no part of its step
+    helps, the walker walks on for some steps and it begins again. The eigenvalues of P's derivative are the Floquet
+    multipliers of the gait, which neither the section nor the coordinates change.
+
+    Parameters
+    ----------
+    model : a `Model` or `Lagrangian`
+    start : near the gait. One that is not just after the event is simulated to it first
+    integrator : default ``RungeKutta853()``; its steps are of equal size, so that the map is smooth
+    section : name of the contact or event at which a return ends, and just after which the next begins
+    mirror : two words in names whose exchange makes the next step the same as the one before, ``("left", "right")``,
+        for a walker of equal sides: the gait then is one step. None: a return takes as many steps as lead to the same
+        event again
+    strides : returns after which the walk repeats itself: 2 for a gait whose period has doubled
+    dt : step [s]; None: halved until state and period after a return change by less than a tenth of `tol`
+    tol : largest difference of the coordinates of the section after one application of the map [m, rad, m/s, rad/s]
+    parameters : values that differ from the model's, and those of `functions`
+    functions : ``{"slope": lambda s: {"gravity.x": 9.81 * sin(s), "gravity.y": -9.81 * cos(s)}}``: functions of one
+        value that give parameters, under names of their own
+    wrt : parameters, or functions of them, by which derivatives are found at once; others when they are asked for
+    modulo : coordinates that need not come back; None: those that nothing but places of touchdown depends on
+    longest : latest time of one return [s]
+    on_failure : 'raise' a `GaitError` where there is no gait, or 'return' it with success False
+    backend : see `mbd.simulate`
+
+    Returns
+    -------
+    LimitCycle
+
+    Raises
+    ------
+    ModelError, UnknownNameError
+        for arguments that cannot be meant, before the first run: a section that the model does not have, a mirror with
+        names without partner or of unlike sides, parameters that are none.
+    GaitError
+        where no gait is found, with the outcome as its sentence ('falls backward at 0.41 s', 'scuffs at 0.30 s') and
+        all that was computed in its ``gait``.
+    """
+    scheme = RungeKutta853() if integrator is None else integrator
+    numbers = {"dt": dt, "tol": tol, "longest": longest}
+    check_arguments(start, scheme, strides, numbers, parameters, functions, wrt, on_failure)
+    map_ = map_of(model, start, scheme, dt or FIRST, (section, mirror, strides), parameters, functions, modulo, longest,
+                  backend)  # fmt: skip
+    gait = _found(map_, start, dt, tol)
+    if not gait.success and on_failure == "raise":
+        raise GaitError(f"{gait.name}: {gait.outcome}", gait)
+    if gait.success:
+        for name in [wrt] if isinstance(wrt, str) else wrt:
+            _ = gait.derivatives["period", name]
+    return gait
+
+
+def map_of(
+    model: Any, start: State, scheme: Integrator, dt: float, cycle: tuple[str, Any, int],
+    parameters: Mapping[str, float] | None, functions: Functions | None, modulo: Any, longest: float, backend: str,
+) -> ReturnMap:  # fmt: skip
+    """The return map, with its arguments checked against the model."""
+    section, mirror, strides = cycle
+    values = {**start.parameters, **(parameters or {})}
+    plain = ReturnMap(model, scheme, dt, section, None, strides, functions or {}, longest, values, backend, start)
+    mechanism = mechanism_of(model, backend, plain.plain(values))
+    section_named(plain.manager, section)
+    options = {"contact": "events", "impact": "newton", "locate": "root", "store": 1, "rest_speed": 1e-6}
+    refused = refusals(mechanism.equations, scheme, options)
+    if refused:
+        raise ModelError(refused)
+    vector = plain.vector(values)
+    if mirror is not None:
+        plain.mirror = mirror_of(mechanism.equations, mirror)
+        require_alike(mechanism, plain.mirror, vector, {**getattr(model, "parameters", {}), **plain.plain(values)})
+    plain.fixed = moving_on(mechanism, vector) if modulo is None else increments_named(mechanism, modulo)
+    return plain
+
+
+def _found(map_: ReturnMap, start: State, dt: float | None, tol: float) -> LimitCycle:
+    """The gait, or what became of the search."""
+    begun = first_return(map_, start, tol)
+    if isinstance(begun, Failed):
+        return _none(map_, begun)
+    section, state = begun
+    given, _ = with_step(Search(map_, section, tol), state, dt)
+    return search(given, state, map_.values)
+
+
+def _none(map_: ReturnMap, failed: Failed) -> LimitCycle:
+    """A search whose first return did not arrive, with its state."""
+    section = section_of(
+        map_.mechanism, map_.manager, map_.section, failed.state, frozenset(), map_.vector(map_.values), map_.fixed
+    )
+    chart, none = Chart(section, failed.state, map_.vector(map_.values)), float("nan")
+    empty = Multipliers(np.zeros(0, complex), np.zeros((chart.size, 0), complex), {}, none)
+    mirror = None if map_.mirror is None else map_.mirror.sides
+    return LimitCycle(
+        getattr(map_.model, "name", ""), map_.section, mirror, map_.strides, failed.state, failed.outcome,
+        (failed.outcome,), none, none, (), {}, (), none, empty, None, dict(map_.values), map_.dt, map_.runs, chart,
+        map_, np.zeros(len(map_.fixed)), None,
+    )  # fmt: skip

@@ -1,0 +1,149 @@
+"""Left and right exchanged: the mirror image of a state, and whether the mechanism is its own mirror image."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbd.arrays import Vector
+from mbd.compile.mechanism import Mechanism
+from mbd.equations.equations import Equations
+from mbd.errors import ModelError
+from mbd.state import Mode, State
+
+__all__ = ["Mirror", "exchange", "mirror_of"]
+
+Numbers = NDArray[np.intp]
+
+POSES = 2
+"""States at which a mechanism is compared with its mirror image [-]."""
+ALIKE = 1e-9
+"""Difference of inertia and forces, relative to the largest of their kind, below which two sides are alike [-]."""
+
+
+def exchange(name: str, sides: tuple[str, str]) -> str:
+    """A name with the words of the two sides exchanged.
+
+    >>> exchange("left hip.angle", ("left", "right"))
+    'right hip.angle'
+    """
+    one, two = sides
+    word = re.compile(rf"(?<![A-Za-z0-9])({re.escape(one)}|{re.escape(two)})(?![A-Za-z0-9])")
+    return word.sub(lambda found: two if found.group() == one else one, name)
+
+
+@dataclass(frozen=True, eq=False)
+class Mirror:
+    """The places from which the mirror image takes its numbers.
+
+    sides : the two words; q, v, z, anchors : places of coordinates, velocities, first-order states, held values
+    """
+
+    sides: tuple[str, str]
+    q: Numbers
+    v: Numbers
+    z: Numbers
+    anchors: Numbers
+
+    def name(self, name: str) -> str:
+        """The mirror image of a name."""
+        return exchange(name, self.sides)
+
+    def names(self, names: frozenset[str]) -> frozenset[str]:
+        """The mirror images of names."""
+        return frozenset(map(self.name, names))
+
+    def state(self, state: State) -> State:
+        """The mirror image of a state."""
+        anchors = state.anchors[self.anchors] if len(state.anchors) == len(self.anchors) else state.anchors
+        armed = None if state.armed is None else self.names(state.armed)
+        return replace(
+            state, q=state.q[self.q], v=state.v[self.v], z=state.z[self.z], anchors=anchors, armed=armed,
+            mode=Mode(self.names(state.mode.closed)), memory=None,
+        )  # fmt: skip
+
+
+def mirror_of(equations: Equations, sides: Any) -> Mirror:
+    """The exchange of two sides of a mechanism.
+
+    Raises
+    ------
+    ModelError
+        if sides are not two words, if no name has them, or if a name has no partner on the other side.
+    """
+    if (
+        not isinstance(sides, tuple | list)
+        or len(sides) != 2
+        or not all(isinstance(word, str) and word for word in sides)
+        or sides[0] == sides[1]
+    ):
+        raise ModelError(f"mirror must be two words in names, such as ('left', 'right'), or None, not {sides!r}")
+    one, two = sides
+    lists = {
+        "coordinate": [c.name for c in equations.coordinates],
+        "velocity": list(equations.velocity_names),
+        "state": [s.name for s in equations.states],
+        "contact": [c.name for c in equations.contacts],
+    }
+    faults, sided = [], 0
+    for kind, names in lists.items():
+        for name in names:
+            other = exchange(name, (one, two))
+            sided += other != name
+            if other not in names:
+                faults.append(f"mirror={(one, two)}: {kind} {name!r} has no partner {other!r}")
+    if not sided:
+        faults.append(f"mirror={(one, two)}: no coordinate or contact has one of these words in its name")
+    if faults:
+        raise ModelError([*faults[:-1], f"{faults[-1]}; name both sides alike, or take mirror=None"])
+    places = [_places(names, (one, two)) for names in (lists["coordinate"], lists["velocity"], lists["state"])]
+    return Mirror((one, two), *places, _anchor_places(equations, lists["contact"], (one, two)))
+
+
+def _places(names: Sequence[str], sides: tuple[str, str]) -> Numbers:
+    return np.array([names.index(exchange(name, sides)) for name in names], dtype=np.intp)
+
+
+def _anchor_places(equations: Equations, names: Sequence[str], sides: tuple[str, str]) -> Numbers:
+    """Where each anchor of the mirror image stands; turns of cut joints stay."""
+    found = np.arange(equations.n_anchors, dtype=np.intp)
+    for contact in equations.contacts:
+        partner = equations.contacts[names.index(exchange(contact.name, sides))]
+        if len(partner.anchors) == len(contact.anchors):
+            found[list(contact.anchors)] = list(partner.anchors)
+    return found
+
+
+def require_alike(mechanism: Mechanism, mirror: Mirror, parameters: Vector, values: dict[str, float]) -> None:
+    """Raise a `ModelError` where the mirror image of the mechanism is another mechanism.
+
+    Inertia and forces of mirrored motions are compared at some states, after them parameters by name.
+    """
+    layout, random = mechanism.layout, np.random.default_rng(3)
+    different = 0.0
+    for _ in range(POSES):
+        q, y = np.array(mechanism.equations.configuration.defaults) + random.uniform(-0.4, 0.4, layout.n_q), random.uniform(-1, 1, layout.n)
+        q = mechanism.equations.configuration.normalise(q)
+        order = np.concatenate([mirror.v, layout.n_v + mirror.z]).astype(np.intp)
+        here = mechanism.acceleration_terms(0.0, q, y, parameters, np.zeros(layout.n_anchors))
+        there = mechanism.acceleration_terms(0.0, q[mirror.q], y[order], parameters, np.zeros(layout.n_anchors))
+        for mine, its in ((here.M[np.ix_(order, order)], there.M), (here.f[order], there.f)):
+            different = max(different, float(np.max(np.abs(mine - its)) / (np.max(np.abs(mine)) or 1.0)))
+    if different <= ALIKE:
+        return
+    pairs = [(name, exchange(name, mirror.sides)) for name in values]
+    unlike = [
+        f"{name!r} is {values[name]:g}, {other!r} {values[other]:g}"
+        for name, other in pairs
+        if other in values and name < other and values[name] != values[other]
+    ]
+    why = f": {'; '.join(unlike[:4])}" if unlike else f"; forces differ by {different:.2g} of the largest"
+    raise ModelError(
+        f"mirror={mirror.sides}: the mechanism with its sides exchanged is another one{why}; "
+        "a step of one side does not repeat on the other: take mirror=None, whose strides have a step of each side"
+    )

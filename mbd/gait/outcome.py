@@ -1,0 +1,78 @@
+"""What became of a walk, as a name: arrives, falls, scuffs, misses the event, ends otherwise, fails."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mbd.analysis.ending import FALLEN
+from mbd.arrays import Vector
+
+if TYPE_CHECKING:
+    from mbd.trajectory import Trajectory
+
+__all__ = ["Outcome", "fall_of"]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a walk went, in a word and in a sentence.
+
+    kind : 'walks', 'arrives' (at the section), 'falls', 'scuffs', 'other event', 'misses' (the section is not reached),
+        'wrong contacts', 'not on the section', 'does not converge', 'numerical error'
+    text : 'falls backward at 0.41 s'
+    time : when [s]
+    """
+
+    kind: str
+    text: str
+    time: float = float("nan")
+
+    def __str__(self) -> str:
+        return self.text
+
+    @property
+    def good(self) -> bool:
+        """Whether the walk went on."""
+        return self.kind in ("walks", "arrives")
+
+
+def fall_of(run: Trajectory, stance: str) -> Outcome | None:
+    """Whether a run is a fall, and to which side: of the highest point at first, beside the place of a stance foot.
+
+    It fell where a terminal event with 'fall' in its name ended it, or where it is less than half as high as at first.
+    Forward is where its highest point went first.
+    """
+    points = [name for body, frames in run.facts.segments for frame in frames for name in (f"{body}.{frame}", frame)]
+    points = [name for name in dict.fromkeys(points) if f"{name}.x" in run]
+    named = next((event for event in run.events if event.kind == "event" and "fall" in event.name.lower()), None)
+    up = -np.array([run.parameters.get(f"gravity.{axis}", 0.0) for axis in "xyz"])
+    size = float(np.linalg.norm(up))
+    if len(points) < 2 or size == 0.0 or len(run) < 3:
+        return None if named is None else Outcome("falls", f"falls at {named.time:.3g} s", named.time)
+    whole = np.stack([run[name] for name in points])
+    height = whole @ (up / size)
+    low = np.flatnonzero(np.ptp(height, axis=0) < FALLEN * float(np.ptp(height[:, 0])))
+    if named is None and not len(low):
+        return None
+    row = named.row if named is not None else int(low[0])
+    when = float(run.time[row])
+    side = _side(run, whole[int(np.argmax(height[:, 0]))], up / size, row, stance)
+    return Outcome("falls", f"falls {side} at {when:.3g} s".replace("  ", " "), when)
+
+
+def _side(run: Trajectory, top: Any, up: Vector, row: int, stance: str) -> str:
+    """'forward' or 'backward'; '' where the place of the stance foot is not known."""
+    place = next((contact.place for contact in run.facts.contacts if contact.name == stance), "")
+    if not place:
+        return ""
+    ahead = _level(top[min(2, len(top) - 1)] - top[0], up)
+    lean = _level(top[row] - run[place][row], up)
+    return "forward" if float(ahead @ lean) > 0.0 else "backward"
+
+
+def _level(vector: Vector, up: Vector) -> Vector:
+    """The part across the vertical."""
+    return np.asarray(vector - (vector @ up) * up)

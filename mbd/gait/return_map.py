@@ -1,0 +1,223 @@
+"""The return map of a walker: from a state just after an event to the next one, sides exchanged if it is symmetric."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from mbd.arrays import Vector
+from mbd.assembly.trivial_rows import manager_of
+from mbd.compile.mechanism import Mechanism
+from mbd.compile.mechanisms import mechanism_of
+from mbd.compile.python import ScalarFunction, scalar_function
+from mbd.errors import MbdError
+from mbd.gait.mirror import Mirror
+from mbd.gait.outcome import Outcome, fall_of
+from mbd.gait.section import Section
+from mbd.integrators import Integrator
+from mbd.results.facts import Facts
+from mbd.results.record import EventRecord
+from mbd.simulation.repeated import End, RepeatedRun
+from mbd.simulation.simulate import simulate
+from mbd.state import State
+
+__all__ = ["Arrival", "ReturnMap", "Values"]
+
+Values = Mapping[str, float]
+"""Parameters and values of functions of parameters, by name."""
+
+AT_ONCE = 1e-9
+"""Share of the latest time before which a section counts as reached at once [-]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Arrival:
+    """Where one or several returns have led.
+
+    state : on the section, sides exchanged where the map does; its time is 0
+    outcome : arrives, or why not
+    period : time that it took [s]; travel : way along the coordinates that the walker moves on along, one each
+    steps : (foot, time since the beginning [s], distance of its place from that of the other foot [m]) of every
+        touchdown, in the names of a walk without exchange of sides; NaN where more feet than two make it unclear
+    before : contacts closed just before the last event; events : of the last return
+    """
+
+    state: State
+    outcome: Outcome
+    period: float
+    travel: Vector
+    steps: tuple[tuple[str, float, float], ...]
+    before: frozenset[str]
+    events: Sequence[EventRecord]
+
+
+@dataclass(eq=False)
+class ReturnMap:
+    """The map of a model, compiled once and laid out once.
+
+    section : name of the event; mirror : None or how sides are exchanged; strides : returns of one application
+    functions : {'slope': f} with f(value) → {parameter: value}, whose names may stand among parameters
+    longest : latest time of one return [s]
+    fixed : numbers of increments along which the walker moves on
+    """
+
+    model: Any
+    integrator: Integrator
+    dt: float
+    section: str
+    mirror: Mirror | None
+    strides: int
+    functions: Mapping[str, Callable[[float], Mapping[str, float]]]
+    longest: float
+    values: dict[str, float]
+    backend: str
+    start: State
+    fixed: tuple[int, ...] = ()
+    runs: int = 0
+
+    def __post_init__(self) -> None:
+        plain = self.plain(self.values)
+        self.mechanism: Mechanism = mechanism_of(self.model, self.backend, plain)
+        self.folded = getattr(self.model, "parameters", {})
+        self.manager = manager_of(self.mechanism, self.vector(self.values))
+        places = {contact.name: contact.place for contact in Facts.of(self.mechanism.equations).contacts}
+        self.feet = {name: place for name, place in places.items() if place}
+        self._where: dict[str, ScalarFunction] = {}
+        self._repeated: dict[float, RepeatedRun] = {}
+
+    # parameters ---------------------------------------------------------------------------------------------------
+    def plain(self, values: Values) -> dict[str, float]:
+        """Parameters of the model by name; what functions give goes before."""
+        found = {name: float(value) for name, value in values.items() if name not in self.functions}
+        for name, function in self.functions.items():
+            if name in values:
+                found |= {key: float(value) for key, value in function(float(values[name])).items()}
+        return found
+
+    def vector(self, values: Values) -> Vector:
+        """The parameter vector."""
+        return self.mechanism.parameters(self.plain(values), self.folded)
+
+    # runs ---------------------------------------------------------------------------------------------------------
+    def finer(self, dt: float) -> ReturnMap:
+        """The same map with another step."""
+        return replace(self, dt=dt)
+
+    def __call__(self, state: State, values: Values | None = None, strides: int | None = None) -> Arrival:
+        """One application of the map; a return that does not arrive ends it."""
+        values = self.values if values is None else values
+        period, travel = 0.0, np.zeros(len(self.fixed))
+        steps: list[tuple[str, float, float]] = []
+        for number in range(self.strides if strides is None else strides):
+            end = self._end(state, values)
+            outcome = self._judged(state, end)
+            after = end.state if end.state is not None else state
+            odd = self.mirror is not None and number % 2 == 1
+            moved = self.mechanism.equations.configuration.difference(state.q, after.q)[list(self.fixed)]
+            steps += [(self._named(name, odd), period + t, length) for name, t, length in self._steps(end, moved)]
+            period, travel = period + after.time, travel + moved
+            state = replace(after, time=0.0, moved={}, parameters={})
+            state = self.mirror.state(state) if self.mirror is not None else state
+            if not outcome.good:
+                break
+        return Arrival(state, outcome, period, travel, tuple(steps), end.before, end.events)
+
+    def _named(self, name: str, odd: bool) -> str:
+        return self.mirror.name(name) if odd and self.mirror is not None else name
+
+    def _end(self, state: State, values: Values) -> End:
+        """The end of one run."""
+        self.runs += 1
+        if self.dt not in self._repeated:
+            self._repeated[self.dt] = RepeatedRun(
+                self.model, self.start, self.integrator, self.dt, (self.section, self.longest), self.plain(values),
+                self.backend,
+            )  # fmt: skip
+        return self._repeated[self.dt](state, self.plain(values))
+
+    def _steps(self, end: End, moved: Vector) -> list[tuple[str, float, float]]:
+        """The feet that touched down, when, and the length of the step that each ended.
+
+        At the end both places are known; of two steps the first is what is left of the way.
+        """
+        strikes = [event for event in end.events if event.kind == "closed" and event.name in self.feet]
+        lengths = [float("nan")] * len(strikes)
+        stance = [name for name in self.feet if name in end.before and name != self.section]
+        last = end.state is not None and self.section in self.feet and end.stopped_by == self.section
+        if last and end.state is not None and strikes and len(stance) == 1 and len(strikes) <= 2:
+            apart = self.place(end.state, self.section) - self.place(end.state, stance[0])
+            lengths[-1] = float(np.linalg.norm(apart))
+            if len(strikes) == 2:
+                lengths[0] = float(np.linalg.norm(moved)) - lengths[-1]
+        return [(event.name, event.time, length) for event, length in zip(strikes, lengths, strict=True)]
+
+    def place(self, state: State, foot: str) -> Vector:
+        """Where the point of a foot is (3,) [m]."""
+        known = self._where.get(foot)
+        if known is None:
+            with self.mechanism.equations.tape.lock:
+                outputs = [self.mechanism.equations.output(f"{self.feet[foot]}.{axis}") for axis in "xyz"]
+                known = self._where[foot] = scalar_function(outputs, self.mechanism.layout, "place")
+        out = np.zeros(3)
+        y = np.concatenate([state.v, state.z])
+        known(self.mechanism.block(0.0, state.q, y, state.anchors), self.vector(self.values), out)
+        return out
+
+    # judgement ----------------------------------------------------------------------------------------------------
+    def _judged(self, start: State, end: End) -> Outcome:
+        """Arrives, or why not, as far as the end alone tells; `explained` tells falls."""
+        if end.state is None:
+            return Outcome("not on the section", end.problem, 0.0)
+        finite = np.all(np.isfinite(end.state.q)) and np.all(np.isfinite(end.state.v))
+        if end.problem or not finite:
+            return Outcome("numerical error", end.problem or "the state is not finite", end.time)
+        if end.stopped_by != self.section:
+            if end.stopped_by:
+                return Outcome("other event", f"ends by {end.stopped_by!r} at {end.time:.3g} s", end.time)
+            return Outcome("misses", f"{self.section!r} does not happen within {self.longest:g} s", end.time)
+        if end.time <= AT_ONCE * self.longest:
+            return Outcome("scuffs", f"scuffs at {end.time:.3g} s: {self.section!r} happens at once", end.time)
+        if self._scuffs(start, end):
+            text = f"scuffs at {end.time:.3g} s: {self.section!r} closes before its foot has passed the other"
+            return Outcome("scuffs", text, end.time)
+        return Outcome("arrives", f"arrives after {end.time:.6g} s", end.time)
+
+    def _scuffs(self, start: State, end: End) -> bool:
+        """Whether the foot of the section came down on the side of the stance foot from which it left."""
+        stance = [name for name in self.feet if name in end.before and name != self.section]
+        if end.state is None or self.section not in self.feet or len(stance) != 1 or self.section in start.mode.closed:
+            return False
+        was, now = (self.place(state, self.section) - self.place(state, stance[0]) for state in (start, end.state))
+        return float(was @ now) > 0.0 and float(np.linalg.norm(was)) > 0.0
+
+    def explained(self, state: State, outcome: Outcome, values: Values | None = None) -> Outcome:
+        """The outcome with falls named; makes the run once more where that needs its rows."""
+        if outcome.kind not in ("other event", "misses", "numerical error"):
+            return outcome
+        values = self.values if values is None else values
+        try:
+            run = simulate(
+                self.model, replace(state, parameters={}), self.integrator, dt=self.dt,
+                until=(self.section, self.longest), contact="events", parameters=self.plain(values), progress=False,
+                on_failure="return", backend=self.backend,
+            )  # fmt: skip
+            stance = next((name for name in self.feet if name in state.mode.closed), "")
+            return fall_of(run, stance) or outcome
+        except MbdError:
+            return outcome
+
+    def against(self, section: Section, arrival: Arrival) -> Outcome:
+        """The outcome, where other contacts are closed than on the section a name for that."""
+        penalties = {contact.name for contact in self.manager.contacts if contact.kind == "penalty"}
+        has, needs = arrival.state.mode.closed - penalties, section.mode.closed - penalties
+        if not arrival.outcome.good or has == needs:
+            return arrival.outcome
+        missing, more = sorted(needs - has), sorted(has - needs)
+        sets = ((missing, "open"), (more, "closed"))
+        what = " and ".join(f"{', '.join(map(repr, names))} {word}" for names, word in sets if names)
+        kind = "scuffs" if missing and self.section in self.feet else "wrong contacts"
+        word = "scuffs" if kind == "scuffs" else "comes to other contacts"
+        return Outcome(kind, f"{word} at {arrival.period:.3g} s: {self.section!r} happens with {what}", arrival.period)

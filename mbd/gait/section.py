@@ -1,0 +1,231 @@
+"""The states just after an event as a manifold: what holds there, its tangent space, coordinates on it.
+
+Just after the event positions satisfy the rows of all contacts that are closed then, of those that it released (a
+configuration does not jump) and the gap of the event itself; velocities satisfy the rows of the contacts that took part
+in its impact and stay closed, or open only after it. With G the derivatives of the former by increments x of q and B
+the Jacobian of the latter, the tangent space is ``null(G) × null(B) × ż``, less the coordinates that a walker moves on
+along. Bases are orthonormal, N are those of the row spaces; a point of the chart around (q₀, v₀) is
+
+    q = q₀ ⊕ (Z_q c_q + N_q μ),  h(q) = 0;   v = v₀ + Z_v c_v + N_v ν,  B(q) v + h_t = 0
+
+so that c_q = Z_qᵀ (q ⊖ q₀), c_v = Z_vᵀ (v − v₀) exactly. Multipliers of a return map depend neither on the bases nor
+on the chart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbd.arrays import Matrix, Vector
+from mbd.assembly.pose import Posture
+from mbd.assembly.posture import position_rows
+from mbd.compile.mechanism import Mechanism
+from mbd.errors import SimulationError
+from mbd.kernel.active_set import ActiveSetManager
+from mbd.state import Mode, State
+
+__all__ = ["Chart", "Section", "section_of"]
+
+CLOSED = 1e-7
+"""Gap of the section's event [m, rad] after a reset up to which it still holds."""
+STILL = 1e-9
+"""Sliding velocity of a foot with friction, relative to 1 or the speed, below which it sticks [m/s]."""
+DEPENDENT = 1e-9
+"""Singular value of rows relative to the largest below which one depends on others [-]."""
+CORRECTIONS, FINE = 12, 1e-14
+"""Newton corrections of positions onto the section, and the residual [m, rad] at which they end."""
+
+
+@dataclass(frozen=True, eq=False)
+class Section:
+    """What holds just after the event.
+
+    mode, armed : closed contacts and those that may close
+    places : numbers of rows whose h holds; gaps : (value, rate) places in the program `guards` of gaps that are zero
+    rates : numbers of rows whose ḣ holds
+    held : numbers of anchors that are part of the state: of penalty contacts that act
+    fixed : numbers of increments of q along which the walker moves on
+    """
+
+    mechanism: Mechanism
+    manager: ActiveSetManager
+    mode: Mode
+    armed: frozenset[str] | None
+    places: tuple[int, ...]
+    gaps: tuple[tuple[int, int], ...]
+    rates: tuple[int, ...]
+    held: tuple[int, ...]
+    fixed: tuple[int, ...]
+
+    @cached_property
+    def flags(self) -> NDArray[np.int64]:
+        """1 for each closed contact."""
+        return self.manager.flags(self.mode.closed)
+
+    def positions(self, q: Vector, parameters: Vector, anchors: Vector) -> tuple[Vector, Matrix]:
+        """h and G = ∂h/∂x of all that holds of positions."""
+        mechanism, n_v = self.mechanism, self.mechanism.layout.n_v
+        terms = mechanism.acceleration_terms(0.0, q, np.zeros(mechanism.layout.n), parameters, anchors)
+        picked = list(self.places)
+        values, slopes = [terms.h[picked]], [terms.B[picked][:, :n_v]]
+        for value, rate in self.gaps:
+            here = self._guards(q, np.zeros(n_v), parameters, anchors)
+            along = [self._guards(q, unit, parameters, anchors)[rate] - here[rate] for unit in np.eye(n_v)]
+            values.append(here[[value]])
+            slopes.append(np.array([along]))
+        return np.concatenate(values), np.vstack(slopes)
+
+    def velocities(self, q: Vector, y: Vector, parameters: Vector, anchors: Vector) -> tuple[Vector, Matrix]:
+        """ḣ and B of all that holds of velocities."""
+        terms = self.mechanism.acceleration_terms(0.0, q, y, parameters, anchors)
+        picked = list(self.rates)
+        return terms.rate[picked], terms.B[picked][:, : self.mechanism.layout.n_v]
+
+    def anchored(self, q: Vector, y: Vector, parameters: Vector, anchors: Vector) -> Vector:
+        """The anchors with what closed unilateral contacts hold at q."""
+        terms = self.mechanism.acceleration_terms(0.0, q, y, parameters, anchors)
+        found = np.array(anchors, dtype=float)
+        for contact, flag in zip(self.manager.contacts, self.flags, strict=True):
+            if flag and contact.kind == "unilateral":
+                found[list(contact.anchors)] = terms.captured[list(contact.anchors)]
+        return found
+
+    def _guards(self, q: Vector, v: Vector, parameters: Vector, anchors: Vector) -> Vector:
+        mechanism = self.mechanism
+        y = np.concatenate([v, np.zeros(mechanism.layout.n - len(v))])
+        out = np.zeros(max(mechanism.sizes["guards"], 1))
+        mechanism.common["guards"](mechanism.block(0.0, q, y, anchors), parameters, out)
+        return out
+
+
+class Chart:
+    """Coordinates c of the section around one of its states; see the head of this file.
+
+    Attributes
+    ----------
+    state : c = 0; size : of c
+    basis : (n_v + n_v + n_z + held, size) tangent vectors (δx, δv, δz, δanchors)
+    """
+
+    def __init__(self, section: Section, state: State, parameters: Vector) -> None:
+        self.section, self.state = section, state
+        layout, q, y = section.mechanism.layout, state.q, np.concatenate([state.v, state.z])
+        _, G = section.positions(q, parameters, state.anchors)
+        _, B = section.velocities(q, y, parameters, state.anchors)
+        G = G.copy()
+        G[:, list(section.fixed)] = 0.0
+        unmoved = np.eye(layout.n_v)[list(section.fixed)]
+        self.off_places, self.off_rates = _row_space(G), _row_space(B)
+        self.places, self.rates = _null_space(np.vstack([G, unmoved])), _null_space(B)
+        self.counts = (self.places.shape[1], self.rates.shape[1], layout.n - layout.n_v, len(section.held))
+        self.size = sum(self.counts)
+        self.basis = _blocks(self.places, self.rates, np.eye(self.counts[2]), np.eye(self.counts[3]))
+
+    def at(self, c: Vector, parameters: Vector) -> State:
+        """The state of the section with these coordinates.
+
+        Raises
+        ------
+        SimulationError
+            where no state of the section is near.
+        """
+        section, base = self.section, self.state
+        compose = section.mechanism.equations.configuration.compose
+        parts = np.split(np.asarray(c, dtype=float), np.cumsum(self.counts)[:-1])
+        anchors = np.array(base.anchors, dtype=float)
+        if section.held:
+            anchors[list(section.held)] += parts[3]
+        move, size = self.places @ parts[0], np.inf
+        for _ in range(CORRECTIONS):
+            q = compose(base.q, move)
+            h, G = section.positions(q, parameters, anchors)
+            before, size = size, float(np.max(np.abs(h), initial=0.0))
+            if size <= FINE or (size >= before and size < 1e-12):
+                break
+            move = move - self.off_places @ np.linalg.lstsq(G @ self.off_places, h, rcond=None)[0]
+        if not size < 1e-9:
+            raise SimulationError(f"no state of the section is near: {size:.2g} m or rad are left of its rows")
+        z = base.z + parts[2]
+        v = base.v + self.rates @ parts[1]
+        for _ in range(2):
+            rate, B = section.velocities(q, np.concatenate([v, z]), parameters, anchors)
+            v = v - self.off_rates @ np.linalg.lstsq(B @ self.off_rates, rate, rcond=None)[0]
+        anchors = section.anchored(q, np.concatenate([v, z]), parameters, anchors)
+        return replace(
+            base, time=0.0, q=q, v=v, z=z, anchors=anchors, mode=section.mode, armed=section.armed, memory=None,
+            moved={}, parameters={},
+        )  # fmt: skip
+
+    def of(self, state: State) -> Vector:
+        """The coordinates of a state."""
+        difference = self.section.mechanism.equations.configuration.difference
+        held = list(self.section.held)
+        parts = (
+            self.places.T @ difference(self.state.q, state.q), self.rates.T @ (state.v - self.state.v),
+            state.z - self.state.z, (state.anchors - self.state.anchors)[held] if held else np.zeros(0),
+        )  # fmt: skip
+        return np.concatenate(parts)
+
+
+def section_of(
+    mechanism: Mechanism, manager: ActiveSetManager, name: str, arrived: State, before: frozenset[str],
+    parameters: Vector, fixed: Sequence[int],
+) -> Section:  # fmt: skip
+    """The section of an event, from the state just after it and the contacts that were closed just before it."""
+    after = arrived.mode.closed
+    q, y = arrived.q, np.concatenate([arrived.v, arrived.z])
+
+    def posture(closed: frozenset[str]) -> Posture:
+        return Posture(mechanism, manager, parameters, q, y, manager.flags(closed), arrived.anchors)
+
+    late = {c.name for c in manager.contacts if c.name in before and any(waits for _, waits in c.when)}
+    rates = [k for k in manager.active_rows(manager.flags(after | (late - after)))]
+    terms = mechanism.acceleration_terms(0.0, q, y, parameters, arrived.anchors)
+    speed = max(1.0, float(np.max(np.abs(y), initial=0.0)))
+    rates += [
+        friction.row for friction in manager.frictions
+        if friction.contact >= 0 and manager.contacts[friction.contact].name in after
+        and abs(terms.rate[friction.row]) <= STILL * speed
+    ]  # fmt: skip
+    places = sorted({*position_rows(posture(after)), *position_rows(posture(before | after))})
+    out = np.zeros(max(mechanism.sizes["guards"], 1))
+    mechanism.common["guards"](mechanism.block(0.0, q, y, arrived.anchors), parameters, out)
+    contacts, guards = len(manager.contacts), len(manager.guards)
+    pairs = [(c, contacts + c) for c, contact in enumerate(manager.contacts)
+             if contact.name == name and contact.kind == "penalty"]  # fmt: skip
+    pairs += [(4 * contacts + e, 4 * contacts + guards + e) for e, guard in enumerate(manager.guards)
+              if guard.name == name]  # fmt: skip
+    gaps = tuple(pair for pair in pairs if abs(out[pair[0]]) <= CLOSED)
+    held = [k for c in manager.contacts if c.kind == "penalty" and c.name in after for k in c.anchors]
+    return Section(
+        mechanism, manager, arrived.mode, arrived.armed, tuple(places), gaps, tuple(sorted(set(rates))), tuple(held),
+        tuple(fixed),
+    )  # fmt: skip
+
+
+def _row_space(rows: Matrix) -> Matrix:
+    """An orthonormal basis (n, r) of the row space."""
+    _, sizes, V = np.linalg.svd(rows, full_matrices=False)
+    return np.asarray(V[sizes > DEPENDENT * max(float(np.max(sizes, initial=0.0)), 1e-300)].T)
+
+
+def _null_space(rows: Matrix) -> Matrix:
+    """An orthonormal basis (n, n − r) of the null space."""
+    _, sizes, V = np.linalg.svd(rows, full_matrices=True)
+    rank = int(np.sum(sizes > DEPENDENT * max(float(np.max(sizes, initial=0.0)), 1e-300)))
+    return np.asarray(V[rank:].T)
+
+
+def _blocks(*parts: Matrix) -> Matrix:
+    """A block diagonal matrix."""
+    whole = np.zeros((sum(part.shape[0] for part in parts), sum(part.shape[1] for part in parts)))
+    row = column = 0
+    for part in parts:
+        whole[row : row + part.shape[0], column : column + part.shape[1]] = part
+        row, column = row + part.shape[0], column + part.shape[1]
+    return whole

@@ -1,0 +1,83 @@
+"""Coordinates that nothing depends on but the places where feet stand: a walker moves on along them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mbd.arrays import Vector
+from mbd.compile.mechanism import Mechanism
+from mbd.equations import programs
+from mbd.tape.derivatives import jvps, live
+
+__all__ = ["depends_on_time", "moving_on"]
+
+SAMPLES = 2
+"""States at which rows with places of touchdown are moved along [-]."""
+SAME = 1e-10
+"""Change of a row along a coordinate that counts as none, its place of touchdown moved along [m, rad]."""
+
+
+def moving_on(mechanism: Mechanism, parameters: Vector) -> tuple[int, ...]:
+    """Numbers of the increments of q that the motion does not depend on, if what stands moves along with them.
+
+    Neither inertia, forces, Jacobian, gaps nor events hold such a coordinate (found on the tape), and rows of contacts
+    take it off against the place of touchdown: ``h(q ⊕ s e, anchor(q₀ ⊕ s e)) = h(q, anchor(q₀))``.
+    """
+    known = mechanism.equations.memory.get("moving on")
+    if known is None:
+        equations = mechanism.equations
+        with equations.tape.lock:
+            known = equations.memory["moving on"] = _without_effect(mechanism)
+    return tuple(k for k in known if _follows(mechanism, parameters, k))
+
+
+def _without_effect(mechanism: Mechanism) -> tuple[int, ...]:
+    """Increments that derivatives on the tape show to be in nothing but h of rows and what contacts capture."""
+    equations, layout = mechanism.equations, mechanism.layout
+    outputs = programs.accelerations(equations)
+    n, rows = layout.n, layout.n_rows
+    first = n * n + n + 2 * n * rows  # h of all rows, and behind ḣ and the biases what contacts capture
+    captured = first + 3 * rows
+    kept = outputs[:first] + outputs[first + rows : captured] + outputs[captured + layout.n_anchors :]
+    kept += programs.guards(equations)
+    places = equations.configuration.places
+    candidates = [k for k in range(layout.n_v) if places[k] >= 0]
+    changes = jvps(kept, [{equations.tape.input("x", k): 1.0} for k in candidates])
+    return tuple(k for k, change in zip(candidates, changes, strict=True) if all(node.is_zero for node in change))
+
+
+def _follows(mechanism: Mechanism, parameters: Vector, k: int) -> bool:
+    """Whether every row stays as it is where the coordinate and the places of touchdown move on together."""
+    layout, random = mechanism.layout, np.random.default_rng(5)
+    if layout.n_rows == 0:
+        return True
+    compose = mechanism.equations.configuration.compose
+    move = np.zeros(layout.n_v)
+    move[k] = 0.7
+    for _ in range(SAMPLES):
+        ends = random.uniform(-0.5, 0.5, (2, layout.n_v))
+        defaults = np.array(mechanism.equations.configuration.defaults)
+        q0, q1 = (compose(defaults, end) for end in ends)
+        h = [_rows(mechanism, parameters, *pair) for pair in ((q0, q1), (compose(q0, move), compose(q1, move)))]
+        if not np.max(np.abs(h[1] - h[0]), initial=0.0) <= SAME:
+            return False
+    return True
+
+
+def _rows(mechanism: Mechanism, parameters: Vector, touched: Vector, q: Vector) -> Vector:
+    """h of all rows at q, with what contacts capture at another position."""
+    layout = mechanism.layout
+    y, none = np.zeros(layout.n), np.zeros(layout.n_anchors)
+    held = mechanism.acceleration_terms(0.0, touched, y, parameters, none).captured
+    anchors = np.concatenate([held, none])[: layout.n_anchors]
+    return np.asarray(mechanism.acceleration_terms(0.0, q, y, parameters, anchors).h)
+
+
+def depends_on_time(mechanism: Mechanism) -> bool:
+    """Whether time itself is in the equations, so that the same state later is another one."""
+    equations = mechanism.equations
+    with equations.tape.lock:
+        nodes: Sequence[object] = live([*programs.accelerations(equations), *programs.guards(equations)])
+    return any(getattr(node, "op", "") == "input" and getattr(node, "data", ("",))[0] == "t" for node in nodes)
