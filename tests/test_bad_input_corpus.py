@@ -23,6 +23,11 @@ MODEL.connect(HINGE)
 START = mbd.assemble(MODEL, position={"hinge.angle": 0.3}, backend="python")
 ORIGIN, END, ANGLE = MODEL.ground.origin, UPPER.end, mbd.flexion(HINGE)
 
+SWING = mbd.Model("swing")
+ROD = mbd.Link("rod", mass=1.0, length=1.0, center=0.5, inertia=0.1)
+SWING.connect(mbd.Revolute("pivot", SWING.ground.origin, ROD.start, loss=mbd.Viscous(0.1)))
+SWING.constrain(mbd.Event("below", mbd.measure(lambda a: a, "pivot.angle", unit="rad"), direction=1))
+
 EXAMPLES: dict[str, Any] = {
     "a": ORIGIN, "approach_speed": 1.0, "arguments": ("hinge.angle",), "b": END, "body": UPPER, "body_mass": 70.0,
     "center": 0.5, "child": END, "coefficient": 1.0, "coordinates": ("theta",), "direction": (1.0, 0.0, 0.0),
@@ -41,6 +46,8 @@ OWN: dict[tuple[str, str], Any] = {
     ("Controller", "period"): 0.1, ("Event", "direction"): 0, ("Marker", "place"): (0.1, 0.2), ("Motor", "torque"): 1.0,
     ("Nonholonomic", "arguments"): ("hinge.rate",), ("Rolling", "center"): END,
     ("Tabulated", "torque"): (-1.0, 0.0, 1.0),
+    ("limit_cycle", "model"): SWING, ("limit_cycle", "start"): mbd.assemble(SWING, position={"pivot.angle": 0.3}),
+    ("limit_cycle", "section"): "below", ("limit_cycle", "on_failure"): "return", ("limit_cycle", "longest"): 3.0,
     ("effects", "dt"): 0.1, ("segment", "name"): "thigh", ("simulate", "dt"): 0.1, ("sweep", "dt"): 0.1,
     ("sweep", "values"): {"upper.mass": [1.0]},
 }  # fmt: skip
@@ -55,13 +62,15 @@ MEANT_OTHERWISE = {
 """Arguments that are right by themselves: the sentence is about the others."""
 
 RESULTS = {
-    "Accuracy", "Criteria", "Domain", "Effects", "Failure", "Known", "Linearization", "Mobility", "PenaltyParameters",
-    "Replay", "State", "StateSpace", "Sweep", "Trajectory",
+    "Accuracy", "Criteria", "Domain", "Effects", "Failure", "Known", "LimitCycle", "Linearization", "Mobility",
+    "PenaltyParameters", "Replay", "State", "StateSpace", "Sweep", "Trajectory",
 }  # fmt: skip
 """Values that are handed to users, who make none."""
 
 STUDIES = {"accuracy", "effects", "criteria"}
 """Words whose runs take seconds: what is no number at all is tried."""
+GAITS = {"limit_cycle"}
+"""Words that make so many runs that they take machine code."""
 
 NOTHING = [None, "", [], {}, object(), b"x", 1j, lambda: 0, mbd.PointMass, MODEL, np.array([1.0, math.nan])]
 NUMBERS = [-1.0, 0.0, 90.0, 420.0, 1e300, 10**400, math.nan, math.inf, True]
@@ -88,7 +97,7 @@ def right(name: str) -> dict[str, Any]:
         elif each.default is each.empty and each.kind not in (each.VAR_POSITIONAL, each.VAR_KEYWORD):
             assert each.name in EXAMPLES, f"mbd.{name}: give an example of {each.name!r} in EXAMPLES"
             found[each.name] = EXAMPLES[each.name]
-    if "model" in found and name != "simulate":  # whose runs are longer
+    if "model" in found and name not in {"simulate", *GAITS}:  # whose runs are longer
         found["backend"] = "python"
     return found | ({"dt": 0.1} if (name, "dt") in OWN else {})
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
-from mbd.bodies.values import is_finite_number, named_number_faults, names_given, shown
+from mbd.bodies.values import among, is_finite_number, named_number_faults, names_given, shown
 from mbd.compile.mechanism import Mechanism
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.integrators import Integrator
@@ -13,6 +13,9 @@ from mbd.kernel.active_set import ActiveSetManager
 from mbd.state import State, malformed
 
 __all__ = ["Functions", "check_arguments", "increments_named", "section_named"]
+
+LEAST, MOST = 1e-15, 1e9
+"""Bounds of steps, times and tolerances that anybody can mean [s, m, rad]."""
 
 Functions = Mapping[str, Callable[[float], Mapping[str, float]]]
 """Functions of one value that give parameters: ``{"slope": lambda s: {"gravity.x": 9.81 * sin(s)}}``."""
@@ -22,7 +25,7 @@ def check_arguments(
     start: Any, integrator: Any, strides: Any, numbers: Mapping[str, Any], parameters: Any, functions: Any,
     wrt: Any, on_failure: Any,
 ) -> None:  # fmt: skip
-    """Raise one `ModelError` with all that is wrong; `numbers` must be positive, None is none."""
+    """Raise one `ModelError` with all that is wrong; `numbers` must be positive; dt may be None."""
     faults = malformed(start) if isinstance(start, State) else [
         f"start must be a State from mbd.assemble(model, …), not {shown(start)}"
     ]  # fmt: skip
@@ -31,12 +34,13 @@ def check_arguments(
     if isinstance(strides, bool) or not isinstance(strides, int) or not 1 <= strides <= 1000:
         faults.append(f"strides must be a whole number from 1 to 1000, not {shown(strides)}")
     for name, value in numbers.items():
-        if value is not None and (not is_finite_number(value) or not value > 0.0):
-            faults.append(f"{name} must be a positive number, not {shown(value)}")
+        if (value is None and name == "dt") or (is_finite_number(value) and LEAST <= value <= MOST):
+            continue
+        faults.append(f"{name} must be a positive number up to {MOST:g}, not {shown(value)}")
     faults += named_number_faults(parameters, "parameters") + _function_faults(functions, parameters)
     faults += names_given(wrt, "wrt", "parameters, such as ['hip.mass']")[1]
-    if on_failure not in ("raise", "return"):
-        faults.append(f"on_failure={on_failure!r} is not available; use 'raise' or 'return'")
+    if not among(on_failure, ("raise", "return")):
+        faults.append(f"on_failure={shown(on_failure)} is not available; use 'raise' or 'return'")
     if faults:
         raise ModelError(faults)
 
@@ -63,10 +67,9 @@ def _answer_faults(name: str, function: Any, value: Any) -> list[str]:
         answer = function(float(value))
     except Exception as error:  # the user's own
         return [f"functions: {name!r} at {value:g} raises {type(error).__name__}: {error}"]
-    wrong = named_number_faults(answer, f"functions: what {name!r} gives") if isinstance(answer, Mapping) else [
+    return named_number_faults(answer, f"functions: what {name!r} gives") if isinstance(answer, Mapping) else [
         f"functions: {name!r} must give parameters by name, such as {{'gravity.x': 0.5}}, not {shown(answer)}"
     ]  # fmt: skip
-    return wrong
 
 
 def section_named(manager: ActiveSetManager, section: Any) -> str:

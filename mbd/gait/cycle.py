@@ -1,4 +1,4 @@
-"""A gait that repeats itself: its start, its step, its stability, what it costs, and how all that follows parameters."""
+"""A gait that repeats itself: its start, step, stability and cost, and how they follow parameters."""
 
 from __future__ import annotations
 

@@ -88,7 +88,7 @@ def motion_of(gait: LimitCycle, name: str) -> tuple[Vector, Vector]:
     if by.missing:
         raise GaitError(f"no derivative by {name!r}: {by.missing[0]}", gait)
     along, P = by.matrix[:, 0], gait.map_derivative.matrix
-    c = np.linalg.lstsq(np.eye(size) - P[:size], along[:size], rcond=1e-9)[0]
+    c = np.asarray(np.linalg.lstsq(np.eye(size) - P[:size], along[:size], rcond=1e-9)[0], dtype=float)
     return c, np.asarray(along + P @ c)
 
 

@@ -24,9 +24,7 @@ def energy_by_cause(run: Trajectory) -> dict[str, float]:
     return {**given, **{kind: float(values[-1]) for kind, values in ledger.by_kind().items() if len(values)}}
 
 
-def cost_of_transport(
-    energy: Mapping[str, float], model: Any, changed: Mapping[str, float], distance: float
-) -> float:
+def cost_of_transport(energy: Mapping[str, float], model: Any, changed: Mapping[str, float], distance: float) -> float:
     """``−Σ (losses, dampers, friction, penalties, impacts) / (m g d)`` [-]; NaN without bodies, gravity or a way."""
     values = {**getattr(model, "parameters", {}), **changed}
     mass = sum(values.get(f"{body}.mass", 0.0) for body in getattr(model, "bodies", {}))

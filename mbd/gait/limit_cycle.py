@@ -48,8 +48,8 @@ def limit_cycle(
     """The gait near a start: a state just after an event that the walk comes back to.
 
     The return map P leads from just after one event of the section to just after the next, sides exchanged with
-    `mirror`. Its unknowns are coordinates of the tangent space of all that holds there (see `mbd.gait.section`), without
-    the coordinates that the walker moves on along. Newton's method solves ``P(c) = c``; where no part of its step
+    `mirror`. Its unknowns are coordinates of the tangent space of all that holds there (see `mbd.gait.section`), but
+    for the coordinates that the walker moves on along. Newton's method solves ``P(c) = c``; where no part of its step
     helps, the walker walks on for some steps and it begins again. The eigenvalues of P's derivative are the Floquet
     multipliers of the gait, which neither the section nor the coordinates change.
 

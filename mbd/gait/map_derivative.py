@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -153,7 +154,7 @@ def _extrapolated(slopes: Sequence[Vector]) -> tuple[Vector, Vector]:
     table = list(slopes)
     for order in range(1, len(slopes)):
         power = 4.0**order
-        table = [(power * fine - coarse) / (power - 1.0) for fine, coarse in zip(table, table[1:], strict=False)]
+        table = [(power * fine - coarse) / (power - 1.0) for fine, coarse in pairwise(table)]
         doubt = np.abs(table[0] - best)
         better = doubt <= error
         best, error = np.where(better, table[0], best), np.where(better, doubt, error)

@@ -101,8 +101,8 @@ def mirror_of(equations: Equations, sides: Any) -> Mirror:
         faults.append(f"mirror={(one, two)}: no coordinate or contact has one of these words in its name")
     if faults:
         raise ModelError([*faults[:-1], f"{faults[-1]}; name both sides alike, or take mirror=None"])
-    places = [_places(names, (one, two)) for names in (lists["coordinate"], lists["velocity"], lists["state"])]
-    return Mirror((one, two), *places, _anchor_places(equations, lists["contact"], (one, two)))
+    q, v, z = (_places(lists[kind], (one, two)) for kind in ("coordinate", "velocity", "state"))
+    return Mirror((one, two), q, v, z, _anchor_places(equations, lists["contact"], (one, two)))
 
 
 def _places(names: Sequence[str], sides: tuple[str, str]) -> Numbers:
@@ -127,7 +127,10 @@ def require_alike(mechanism: Mechanism, mirror: Mirror, parameters: Vector, valu
     layout, random = mechanism.layout, np.random.default_rng(3)
     different = 0.0
     for _ in range(POSES):
-        q, y = np.array(mechanism.equations.configuration.defaults) + random.uniform(-0.4, 0.4, layout.n_q), random.uniform(-1, 1, layout.n)
+        q, y = (
+            np.array(mechanism.equations.configuration.defaults) + random.uniform(-0.4, 0.4, layout.n_q),
+            random.uniform(-1, 1, layout.n),
+        )
         q = mechanism.equations.configuration.normalise(q)
         order = np.concatenate([mirror.v, layout.n_v + mirror.z]).astype(np.intp)
         here = mechanism.acceleration_terms(0.0, q, y, parameters, np.zeros(layout.n_anchors))

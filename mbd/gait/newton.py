@@ -60,10 +60,11 @@ def fixed_point(map_: ReturnMap, section: Section, start: State, values: Values,
     """
     parameters = map_.vector(values)
     point = FixedPoint(Chart(section, start, parameters), Outcome("does not converge", ""), np.inf)
-    found = _measure(map_, point.chart, np.zeros(point.chart.size), values, point)
+    found: Measured | Outcome | None = _measure(map_, point.chart, np.zeros(point.chart.size), values, point)
     walked = False
     for _ in range(MOST):
         if not isinstance(found, Measured):
+            assert found is not None
             point.outcome = map_.explained(point.state, found, values)
             return point
         gap = found.c
@@ -82,7 +83,9 @@ def fixed_point(map_: ReturnMap, section: Section, start: State, values: Values,
             walked = True
             found = _walked(map_, point, values)
     last = f"; beside it the walker {point.attempts[-1]}" if point.attempts else ""
-    text = f"no gait that repeats itself was found: {point.residual:.2g} is left after {len(point.residuals)} iterations"
+    text = (
+        f"no gait that repeats itself was found: {point.residual:.2g} is left after {len(point.residuals)} iterations"
+    )
     point.outcome = Outcome("does not converge", text + last)
     return point
 
@@ -112,9 +115,7 @@ def _step(map_: ReturnMap, point: FixedPoint, gap: Vector, values: Values) -> Ve
     return np.asarray(np.linalg.lstsq(np.eye(len(P)) - P, gap, rcond=FLAT)[0])
 
 
-def _damped(
-    map_: ReturnMap, point: FixedPoint, step: Vector, gap: Vector, values: Values
-) -> Measured | Outcome | None:
+def _damped(map_: ReturnMap, point: FixedPoint, step: Vector, gap: Vector, values: Values) -> Measured | Outcome | None:
     """A part of the step after which the residual is smaller, from where the next begins; None if there is none."""
     before, part = float(np.max(np.abs(gap))), 1.0
     while part >= SHORTEST:

@@ -21,8 +21,9 @@ from mbd.state import State
 
 __all__ = ["Failed", "Search", "first_return", "gait_at", "search"]
 
-FIRST_STEPS, HALVINGS = 48.0, 10
-"""Steps of the first return that is tried, and how often they are halved until their error is below `tol`."""
+FIRST_STEPS, HALVINGS = 47.3, 10
+"""Steps of the first return that is tried, no whole number lest its event fall on the end of a step, where light bodies
+blur its instant; and how often they are halved until their error is below `tol`."""
 NEAR = 1e-2
 """Distance [m, rad] within which the rows of the section hold a start that is taken as one on it."""
 RESOLVED = 0.1
@@ -47,17 +48,14 @@ class Failed:
 
 
 def first_return(map_: ReturnMap, start: State, tol: float) -> tuple[Section, State] | Failed:
-    """The section, from where the first return arrives, and the state on it to begin with: the start, if it is on it.
-    """
+    """The section, from where the first return arrives, and a state on it to begin with: the start, if it is one."""
     arrival = map_(start, strides=1)
     if not arrival.outcome.good:
         return Failed(start, map_.explained(start, arrival.outcome))
     parameters = map_.vector(map_.values)
     name = map_.section if map_.mirror is None else map_.mirror.name(map_.section)
     before = arrival.before if map_.mirror is None else map_.mirror.names(arrival.before)
-    section = section_of(
-        map_.mechanism, map_.manager, name, arrival.state, before, parameters, map_.fixed
-    )
+    section = section_of(map_.mechanism, map_.manager, name, arrival.state, before, parameters, map_.fixed)
     return section, on_section(section, start, parameters) or arrival.state
 
 

@@ -184,7 +184,7 @@ def section_of(
         return Posture(mechanism, manager, parameters, q, y, manager.flags(closed), arrived.anchors)
 
     late = {c.name for c in manager.contacts if c.name in before and any(waits for _, waits in c.when)}
-    rates = [k for k in manager.active_rows(manager.flags(after | (late - after)))]
+    rates = list(manager.active_rows(manager.flags(after | (late - after))))
     terms = mechanism.acceleration_terms(0.0, q, y, parameters, arrived.anchors)
     speed = max(1.0, float(np.max(np.abs(y), initial=0.0)))
     rates += [

@@ -121,4 +121,3 @@ def _before(start: State, events: Sequence[EventRecord], now: float) -> frozense
         elif event.time < now and event.kind == "opened":
             closed.discard(event.name)
     return frozenset(closed)
-

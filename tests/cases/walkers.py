@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 import mbd
 from tests.cases.gaits import FALLEN
 
-__all__ = ["Strike", "compass", "kneed", "standing", "strikes"]
+__all__ = ["SIDES", "Strike", "compass", "end_at_fall", "kneed", "standing", "strikes"]
 
 SIDES = (("left", "right"), ("right", "left"))
 
 
-def _fall(model: mbd.Model, leg: float) -> None:
+def end_at_fall(model: mbd.Model, leg: float) -> None:
     """The run ends as the hip is down at half its height."""
     low = mbd.measure(lambda y: y - FALLEN * leg, "trunk.y")
     model.constrain(mbd.Event("fall", low, terminal=True, direction=-1))
@@ -35,7 +35,7 @@ def compass(sizes: Mapping[str, float]) -> mbd.Model:
         ahead = mbd.measure(lambda mine, its: mine - its, f"{side} hip.angle", f"{other} hip.angle", unit="rad")
         release = mbd.When(f"{other} foot")
         model.constrain(mbd.Unilateral(f"{side} foot", mbd.touchdown(bone.end), release=release, only_while=ahead))
-    _fall(model, leg)
+    end_at_fall(model, leg)
     return model
 
 
@@ -57,7 +57,7 @@ def kneed(sizes: Mapping[str, float], late: bool = False) -> mbd.Model:
             mbd.Unilateral(f"{side} foot", foot, release=mbd.When(f"{other} foot"), only_while=only_while),
             mbd.Unilateral(f"{side} knee lock", mbd.flexion(knee), release=after),
         )
-    _fall(model, thigh_length + shank_length)
+    end_at_fall(model, thigh_length + shank_length)
     return model
 
 

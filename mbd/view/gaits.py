@@ -1,0 +1,66 @@
+"""Pictures of gaits: their cycle in the phase plane, and their multipliers beside the unit circle."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mbd.gait.mirror import exchange
+from mbd.results.interpolation import Grid
+from mbd.view.curves import curves
+from mbd.view.plots import drawing
+from mbd.view.style import CYCLE, INK, NEUTRAL, as_label, tone
+
+if TYPE_CHECKING:
+    from mbd.gait.cycle import LimitCycle
+
+__all__ = ["cycle"]
+
+MOST = 6
+"""Angles that the phase plane shows."""
+
+
+def cycle(gait: LimitCycle, path: str | Path | None = None) -> Any:
+    """Each angle's rate against the angle over one period, in degrees, jumps dotted; the multipliers.
+
+    Of a walk that is mirrored each step, both sides of one step are one side over a stride: they have one color.
+    """
+    run = gait.run
+    angles = [name for name, kind in run.facts.coordinates[: run.facts.coordinate_count] if kind == "rad"]
+    angles = [name for name in angles if f"{name}.rate" in run][:MOST]
+    time, values = curves(run, [part for name in angles for part in (name, f"{name}.rate")])
+    shades: dict[str, str] = {}
+    with drawing(path, 7.4, 3.6) as figure:
+        left, right = figure.subplots(1, 2, width_ratios=[1.5, 1.0])
+        for name in angles:
+            partner = name if gait.mirror is None else exchange(name, gait.mirror)
+            first = partner not in shades
+            shade = shades.setdefault(name, shades.get(partner, CYCLE[len(shades) % len(CYCLE)]))
+            label = as_label(name if partner == name else f"{name}, then {partner}") if first or partner == name else ""
+            place, rate = (180.0 / np.pi * values[each] for each in (name, f"{name}.rate"))
+            for start, stop in pairwise(Grid(time).cuts):
+                left.plot(place[start:stop], rate[start:stop], color=tone(shade), label=label or None)
+                left.plot(place[stop - 1 : stop + 1], rate[stop - 1 : stop + 1], ":", color=tone(shade))
+                label = ""
+            left.plot(place[:1], rate[:1], "o", color=tone(shade), markersize=4)
+        left.set_xlabel("angle [°]")
+        left.set_ylabel("rate [°/s]")
+        left.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=1, borderaxespad=0.2)
+        _multipliers(right, gait)
+    return figure
+
+
+def _multipliers(axes: Any, gait: LimitCycle) -> None:
+    """The multipliers in the complex plane."""
+    turn = np.linspace(0.0, 2.0 * np.pi, 181)
+    axes.plot(np.cos(turn), np.sin(turn), color=tone(NEUTRAL), linewidth=0.8)
+    inside = np.abs(gait.multipliers) < 1.0
+    for part, shade in ((inside, CYCLE[2]), (~inside, CYCLE[1])):
+        axes.plot(gait.multipliers.real[part], gait.multipliers.imag[part], "o", color=tone(shade), markersize=5)
+    axes.set_aspect("equal")
+    axes.set_xlabel("real part")
+    axes.set_ylabel("imaginary part")
+    axes.set_title(f"multipliers: {gait.stability}", color=tone(INK))

@@ -1,0 +1,231 @@
+"""Gaits of the cases f1, f1b, f2, f2b, f3, f3b, k1, k2, k2b: fixed points, periods, multipliers, derivatives.
+
+Bounds are those of the cases where they are above what differences of order 6 leave in multipliers, 1e-8.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+import mbd
+from mbd.compile.mechanisms import mechanism_of
+from mbd.gait.mirror import mirror_of
+from tests.cases.walkers import compass, kneed, standing
+from tests.gait.walkers import simplest, simplest_start, slope_of, two_sided
+from tests.problems import case
+
+MULTIPLIERS = 2e-8
+"""Largest error of multipliers from differences [-]."""
+
+
+def conjugates(values) -> np.ndarray:
+    """Complex numbers of a case, real parts first, in the order of the gait's."""
+    real, imaginary = (np.asarray(part, dtype=float) for part in values)
+    found = real + 1j * imaginary
+    return found[np.argsort(-np.abs(found), kind="stable")]
+
+
+def spread(one, other) -> float:
+    """Largest distance of numbers from their nearest partners."""
+    return max(float(np.min(np.abs(np.asarray(other) - value))) for value in one)
+
+
+@cache
+def symmetric(name: str, **more) -> mbd.LimitCycle:
+    """The one-step gait of a walker of equal sides, from a start of three digits."""
+    reference = case(name)
+    sizes = reference.definition
+    model = compass(sizes) if sizes["ms"] == 0.0 else kneed(sizes, late=name.startswith("f3b"))
+    published = [q for key, q in reference.quantities.items() if key.startswith(("fixed point", "state just after"))]
+    state = np.round(published[0].value, 3)
+    state[1] = -2.0 * sizes["slope"] - state[0]
+    return mbd.limit_cycle(
+        model, standing(model, state, sizes["slope"]), section="right foot", mirror=("left", "right"),
+        parameters={"slope": sizes["slope"]}, functions=slope_of(sizes["g"]), **more,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("name", [
+    "f2-compass-gait-3deg", "f3-kneed-walker-chen", "f2b-compass-gait-3deg-g980665",
+    pytest.param("f3b-kneed-walker-human", marks=pytest.mark.slow),
+])  # fmt: skip
+def test_gaits_of_equal_sides_are_the_published_ones(name):
+    reference, gait = case(name), symmetric(name)
+    stance = ("left hip.angle", "right hip.angle", "left hip.rate", "right hip.rate")
+    found = np.array([gait.state[part] for part in stance])
+    found[:2] -= reference.definition["slope"]
+    assert np.max(np.abs(found - reference["fixed point"].value)) < 1e-9
+    assert abs(gait.period - reference["step period"].value) < 1e-10
+    assert abs(gait.distance - reference["step length"].value) < 1e-10
+    assert abs(gait.step_lengths["right foot"] - gait.distance) < 1e-9
+    assert spread(conjugates(reference["Floquet"].value), gait.multipliers) < MULTIPLIERS
+    assert gait.stability == "stable" and gait.error < 1e-11 and max(gait.residual.values()) < 1e-9
+    assert gait.trivial["translation trunk.x"] == 1.0
+    assert math.isclose(gait.cost_of_transport, math.sin(reference.definition["slope"]), rel_tol=1e-9)
+
+
+def test_derivatives_of_the_compass_gait_are_those_of_the_case():
+    reference, gait = case("k1-compass-gait-derivatives"), symmetric("f2-compass-gait-3deg")
+    names = {"period": "period", "step length along the slope": "distance", "speed along the slope": "speed"}
+    for theirs, ours in names.items():
+        for parameter, word in (("slope angle", "slope"), ("hip mass", "hip.mass")):
+            expected = reference[f"d({theirs}) / d({parameter})"].value
+            assert abs(gait.derivatives[ours, word] - expected) < 1e-9 * max(1.0, abs(expected))
+    expected = reference["d(largest |multiplier|) / d(slope angle)"].value
+    assert abs(gait.derivatives["largest multiplier", "slope"] - expected) < 1e-6
+
+
+@pytest.mark.parametrize("name", ["f1-simplest-walker-long", "f1b-simplest-walker-short"])
+def test_gaits_of_the_simplest_walker_are_the_published_ones(name):
+    reference, (model, _) = case(name), simplest()
+    expected = reference["fixed point"].value
+    start = simplest_start(model, round(expected[0], 3), round(expected[1], 3))
+    gait = mbd.limit_cycle(model, start, section="heel strike")
+    found = [gait.state[part] for part in ("theta", "theta.rate", "phi", "phi.rate")]
+    assert np.max(np.abs(found - expected)) < 5e-9  # feet of 1e-9 of the hip's mass
+    assert abs(gait.period - reference["step period"].value) < 5e-8
+    assert spread(conjugates(reference["Floquet"].value), gait.multipliers) < 1e-7
+    assert gait.stability == ("stable" if name.startswith("f1-") else "unstable")
+    assert gait.trivial["forgotten"] == (0.0,)
+
+
+@cache
+def limping(name: str) -> mbd.LimitCycle:
+    """A walker of unequal legs, A on the left."""
+    reference = case(name)
+    sizes = reference.definition
+    knees = name == "k2b-asymmetric-kneed"
+    legs = {
+        side: {part: float(value) for part, value in sizes[leg].items()}
+        for side, leg in (("left", "leg_A"), ("right", "leg_B"))
+    }
+    model = two_sided(legs, sizes["mh"], sizes["g"], sizes["slope"], knees)
+    stance, rate, swing = next(iter(reference.quantities.values())).value
+    state = np.round([stance, -2.0 * sizes["slope"] - stance, rate, swing], 3)
+    state[1] = -2.0 * sizes["slope"] - state[0]
+    start = standing(model, state, sizes["slope"])
+    return mbd.limit_cycle(
+        model, start, section="left foot", parameters={"slope": sizes["slope"]}, functions=slope_of(sizes["g"])
+    )
+
+
+@pytest.mark.parametrize("name", [
+    "k2-asymmetric-compass", pytest.param("k2b-asymmetric-kneed", marks=pytest.mark.slow),
+])  # fmt: skip
+def test_gaits_of_unequal_sides_are_those_of_the_cases(name):
+    reference, gait = case(name), limping(name)
+    lengths, times = np.split(reference["step lengths"].value, 2)
+    found = [gait.step_lengths[f"{side} foot"] for side in ("right", "left")]
+    assert np.max(np.abs(found - lengths)) < 1e-9
+    found = [gait.step_times[f"{side} foot"] for side in ("right", "left")]
+    assert np.max(np.abs(found - times)) < 1e-9
+    assert spread(conjugates(reference["Floquet"].value), gait.multipliers) < MULTIPLIERS
+    names = "symmetry index of step length, of step time, mean speed, stride period, largest |multiplier|"
+    expected = reference[f"d({names}) / d(slope angle)"].value
+    assert abs(gait.derivatives["speed", "slope"] - expected[2]) < 1e-8
+    assert abs(gait.derivatives["period", "slope"] - expected[3]) < 1e-8
+
+
+def test_one_step_of_an_unequal_walker_is_refused():
+    gait = limping("k2-asymmetric-compass")
+    with pytest.raises(mbd.ModelError, match="is another one: .*'left shank.mass' is 2, 'right shank.mass' 1.5"):
+        mbd.limit_cycle(gait.map.model, gait.state, section="right foot", mirror=("left", "right"))
+
+
+def test_multipliers_of_two_mirrored_steps_are_squares_and_do_not_depend_on_the_section():
+    one = symmetric("f2-compass-gait-3deg")
+    two = symmetric("f2-compass-gait-3deg", strides=2)
+    assert spread(one.multipliers**2, two.multipliers) < MULTIPLIERS
+    for section in ("left foot", "right foot"):
+        stride = mbd.limit_cycle(one.map.model, one.state, section=section, parameters=one.map.plain(one.parameters))
+        assert spread(one.multipliers**2, stride.multipliers) < MULTIPLIERS
+    assert abs(two.period - 2.0 * one.period) < 1e-9
+
+
+def test_multipliers_do_not_depend_on_an_event_within_the_step_at_which_the_section_is():
+    gait = symmetric("f2-compass-gait-3deg")
+    model = compass(case("f2-compass-gait-3deg").definition)
+    upright = mbd.measure(lambda mine, its: mine - its, "left hip.angle", "right hip.angle", unit="rad")
+    model.constrain(mbd.Event("legs pass", upright))
+    stride = mbd.limit_cycle(model, gait.state, section="right foot")
+    between = mbd.limit_cycle(model, gait.state, section="legs pass", mirror=("left", "right"))
+    assert spread(gait.multipliers**2, stride.multipliers) < MULTIPLIERS
+    assert spread(gait.multipliers, between.multipliers) < MULTIPLIERS
+
+
+def test_a_walk_that_begins_further_on_goes_on_further_on():
+    gait = symmetric("f2-compass-gait-3deg")
+    q, anchors = gait.state.q.copy(), gait.state.anchors.copy()
+    q[0] += 0.37
+    anchors[gait.map.manager.contacts[0].anchors[0]] += 0.37
+    here, there = gait.map(gait.state), gait.map(replace(gait.state, q=q, anchors=anchors))
+    move = there.state.q - here.state.q
+    assert abs(move[0] - 0.37) < 1e-14 and np.max(np.abs(move[1:])) < 1e-14
+
+
+def test_a_walk_that_falls_scuffs_or_never_strikes_says_so():
+    gait = symmetric("f2-compass-gait-3deg")
+    model, slope = gait.map.model, gait.parameters["slope"]
+    plain = gait.map.plain(gait.parameters)
+
+    def outcome(*state, **more):
+        start = standing(model, state, slope)
+        with pytest.raises(mbd.GaitError) as caught:
+            mbd.limit_cycle(model, start, section="right foot", mirror=("left", "right"), parameters=plain, **more)
+        found = caught.value.gait
+        assert not found.success and str(found.outcome) in str(caught.value) and "no gait" in repr(found)
+        assert len(found.run) and found.attempts
+        return str(found.outcome)
+
+    assert outcome(0.2187, -0.3234, -0.5, -0.2).startswith("falls backward at ")
+    assert outcome(0.2187, -0.3234, -2.5, -0.3).startswith("falls forward at ")
+    assert "does not happen within 0.1 s" in outcome(0.2187, -0.3234, -1.1, -0.4, longest=0.1)
+
+
+def test_a_scuff_is_named():
+    sizes = case("f3-kneed-walker-chen").definition
+    model = kneed(sizes)
+    start = standing(model, [0.188, -0.289, -1.4, -0.9], sizes["slope"])
+    gait = mbd.limit_cycle(model, start, section="right foot", mirror=("left", "right"), on_failure="return")
+    assert not gait.success and gait.outcome.kind in ("scuffs", "falls")
+
+
+def test_energy_that_nothing_takes_is_a_multiplier_of_its_own():
+    arm = mbd.Model("pendulum")
+    rod = mbd.Link("rod", mass=1.0, length=1.0, center=0.6, inertia=0.05)
+    arm.connect(mbd.Revolute("hinge", arm.ground.origin, rod.start))
+    arm.constrain(mbd.Event("below", mbd.measure(lambda a: a, "hinge.angle", unit="rad"), direction=1))
+    gait = mbd.limit_cycle(arm, mbd.assemble(arm, {"hinge.angle": 0.5}), section="below")
+    assert gait.success and not len(gait.multipliers) and abs(gait.trivial["energy"][0] - 1.0) < 1e-8
+
+
+def test_wrong_arguments_are_named():
+    model, start = simplest()
+    with pytest.raises(mbd.UnknownNameError, match="section: no contact or event named 'heal strike'; did you mean"):
+        mbd.limit_cycle(model, start, section="heal strike")
+    with pytest.raises(mbd.ModelError, match="no coordinate or contact has one of these words"):
+        mbd.limit_cycle(model, start, section="heel strike", mirror=("left", "right"))
+    with pytest.raises(mbd.ModelError, match=r"functions has 'slope'; give its value too"):
+        mbd.limit_cycle(model, start, section="heel strike", functions={"slope": lambda s: {"gamma": s}})
+    with pytest.raises(mbd.UnknownNameError, match="no parameter named 'gama'"):
+        mbd.limit_cycle(model, start, section="heel strike", wrt=["gama"])
+    lame = mbd.Model("lame")
+    hip = mbd.PointMass("hip", 1.0)
+    lame.connect(mbd.Translation("left trunk", lame.ground.origin, hip.origin))
+    with pytest.raises(mbd.ModelError, match="coordinate 'left trunk.x' has no partner 'right trunk.x'"):
+        mirror_of(mechanism_of(lame).equations, ("left", "right"))
+
+
+def test_a_gait_shows_itself(tmp_path):
+    gait = symmetric("f2-compass-gait-3deg")
+    assert repr(gait).startswith("compass gait: period 0.734346 s, step 0.535445 m, speed 0.72915 m/s, cost of tran")
+    assert "multiplier 1" in gait._repr_html_() and "energy from gravity" in gait._repr_html_()
+    gait.plot(tmp_path / "gait.png")
+    assert (tmp_path / "gait.png").stat().st_size > 10_000
+    mode = gait.modes[0]
+    assert set(mode) > {"left hip.angle", "right hip.angle.rate"}
