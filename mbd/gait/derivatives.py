@@ -8,16 +8,13 @@ theirs are differences of gaits found again beside the first, with one Richardso
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
 from mbd.arrays import Vector
 from mbd.errors import GaitError, ModelError, UnknownNameError, nearest
 from mbd.gait.map_derivative import map_derivative
-
-if TYPE_CHECKING:
-    from mbd.gait.cycle import LimitCycle
 
 __all__ = ["Derivatives", "parameter_value"]
 
@@ -26,9 +23,9 @@ BESIDE = 1e-3
 
 
 class Derivatives(Mapping[tuple[str, str], float]):
-    """Derivatives of the scalars of a gait by parameters, found when they are asked for first."""
+    """Derivatives of the scalars of a gait (`mbd.gait.cycle`) by parameters, found when they are asked for first."""
 
-    def __init__(self, gait: LimitCycle) -> None:
+    def __init__(self, gait: Any) -> None:
         self._gait = gait
         self._known: dict[tuple[str, str], float] = {}
 
@@ -55,7 +52,7 @@ class Derivatives(Mapping[tuple[str, str], float]):
         return len(self._known)
 
 
-def parameter_value(gait: LimitCycle, name: str) -> float:
+def parameter_value(gait: Any, name: str) -> float:
     """The value of a parameter or of a function of parameters.
 
     Raises
@@ -79,7 +76,7 @@ def parameter_value(gait: LimitCycle, name: str) -> float:
     raise UnknownNameError(nearest(name, [*known, *map_.functions], "parameter", "There are"))
 
 
-def motion_of(gait: LimitCycle, name: str) -> tuple[Vector, Vector]:
+def motion_of(gait: Any, name: str) -> tuple[Vector, Vector]:
     """(dc/dp, d(numbers)/dp) of the map's numbers along the branch of gaits."""
     assert gait.map_derivative is not None
     values = {**gait.parameters, name: parameter_value(gait, name)}
@@ -92,7 +89,7 @@ def motion_of(gait: LimitCycle, name: str) -> tuple[Vector, Vector]:
     return c, np.asarray(along + P @ c)
 
 
-def _implicit(gait: LimitCycle, name: str) -> dict[str, float]:
+def _implicit(gait: Any, name: str) -> dict[str, float]:
     """The derivatives of period, way and steps."""
     _, numbers = motion_of(gait, name)
     size, ways = gait.chart.size, len(gait.map.fixed)
@@ -110,7 +107,7 @@ def _implicit(gait: LimitCycle, name: str) -> dict[str, float]:
     return found
 
 
-def _beside(gait: LimitCycle, scalar: str, name: str) -> float:
+def _beside(gait: Any, scalar: str, name: str) -> float:
     """The derivative of a scalar by central differences of gaits at parameters beside."""
     value, slopes = parameter_value(gait, name), []
     for factor in (1.0, 2.0):
