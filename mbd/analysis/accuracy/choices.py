@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbd.analysis.accuracy.published import Published, published
+from mbd.analysis.accuracy.published import Published, published, table_of
 from mbd.analysis.accuracy.settings import Setting, is_high, long_steps, steps_of, tolerances
 from mbd.analysis.accuracy.truth import motion, stopped
 from mbd.bodies.values import is_number, names_given, shown
@@ -106,8 +106,9 @@ def plan(
     if faults:
         raise ModelError(faults)
     options = {name: value for name, value in options.items() if name != "store"}
+    given = None if known is None else table_of(known)
     probe, until = _probe(model, start, until, options, quantities, dts if known is not None else None)
-    values = None if known is None else published(known, probe)
+    values = None if given is None else published(given, probe)
     wanted = _quantities(probe, quantities) if values is None else tuple(values.known)
     able = Able(model, options)
     schemes = integrators if integrators is not None else _schemes(able, bool(probe.record.lam.shape[1]), also)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from mbd.integrators import Integrator
     from mbd.trajectory import Trajectory
 
-__all__ = ["Known", "Published", "published"]
+__all__ = ["Known", "Published", "published", "table_of"]
 
 
 @dataclass(frozen=True)
@@ -139,9 +139,9 @@ def _told(name: str, known: Known, run: Trajectory) -> Vector:
     return numbers
 
 
-def published(known: Any, probe: Trajectory) -> Published:
+def published(known: Mapping[str, Any], probe: Trajectory) -> Published:
     """Checked values: numbers or `Known`, by the name of a result or, with a function, by any name."""
-    values = {name: each if isinstance(each, Known) else Known(each) for name, each in _items(known)}
+    values = {name: each if isinstance(each, Known) else Known(each) for name, each in known.items()}
     faults, wrong = [], []
     for name, each in values.items():
         if not is_number(each.value) or not math.isfinite(each.value):
@@ -166,9 +166,16 @@ def _is_scalar(name: str, probe: Trajectory) -> bool:
     return name in probe and len(probe.columns.components(name)) == 1
 
 
-def _items(known: Any) -> list[tuple[str, Any]]:
+def table_of(known: Any) -> Mapping[str, Any]:
+    """What is given as known values, if it is a dictionary by name.
+
+    Raises
+    ------
+    ModelError
+        for anything else.
+    """
     if not isinstance(known, Mapping) or not known or not all(isinstance(name, str) for name in known):
         raise ModelError(
             f"known must be a dictionary such as {{'pin.angle': mbd.Known(1.0, accuracy=1e-9)}}, not {known!r}"
         )
-    return list(known.items())
+    return known
