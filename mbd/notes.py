@@ -18,7 +18,7 @@ from weakref import WeakKeyDictionary
 
 from mbd.errors import MbdWarning
 
-__all__ = ["PROCESS", "asked_from_outside", "doubt", "note"]
+__all__ = ["PROCESS", "called_from_outside", "doubt", "note"]
 
 
 class _Process:
@@ -48,7 +48,7 @@ def doubt(*sentences: str, of: Any = None) -> None:
             warnings.warn(sentence, MbdWarning, stacklevel=_level())
 
 
-def asked_from_outside() -> bool:
+def called_from_outside() -> bool:
     """Whether the function that asks was called by something that is no part of mbd."""
     frame = sys._getframe(2)
     if frame.f_code.co_filename == _DOOR and frame.f_back is not None:

@@ -23,7 +23,7 @@ from mbd.description import Description
 from mbd.equations.derivation import FrontDoor
 from mbd.errors import MbdError, ModelError, SimulationError
 from mbd.simulation.simulate import simulate
-from mbd.simulation.user_calls import asked
+from mbd.simulation.user_calls import call_user
 from mbd.state import State
 from mbd.trajectory import Trajectory
 
@@ -81,7 +81,7 @@ class Runs:
         own = {name: value for name, value in given.items() if name in SETTINGS}
         changed = {name: value for name, value in given.items() if name not in SETTINGS}
         parameters = {**(self.settings.get("parameters") or {}), **changed}
-        start = asked(self._calling(given), self.start, parameters) if callable(self.start) else self.start
+        start = call_user(self._calling(given), self.start, parameters) if callable(self.start) else self.start
         own |= {"parameters": parameters, "on_failure": "return"}
         run = simulate(self.model, start, **{**self.settings, **own})
         if not run.success:
@@ -91,7 +91,7 @@ class Runs:
         found, missing = [], []
         for title, function in self.results.items():
             try:
-                found.append(asked(f"the function for {title!r}", _number, function, run))
+                found.append(call_user(f"the function for {title!r}", _number, function, run))
             except SimulationError as error:  # the event that it looks for did not come, say: other runs still count
                 found.append(float("nan"))
                 missing.append(str(error))

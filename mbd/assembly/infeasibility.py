@@ -61,7 +61,7 @@ def position_conflicts(
         off = {k: abs(value) for k, value in zip(left, missing, strict=True)}
         chosen = _least(work, start, members, off, everywhere)
         involved = [k for k in left if members[k] in chosen]
-        found[involved[0]] = _told(work, start, involved, loops, spent)
+        found[involved[0]] = _conflict(work, start, involved, loops, spent)
         left = [k for k in left if members[k] not in chosen]
     return [found[k] for k in sorted(found)]
 
@@ -80,7 +80,7 @@ def _least(
     return irreducible(every if len(likely) < len(every) and holds(likely) else likely, holds)
 
 
-def _told(work: Posture, start: Vector, rows: Sequence[int], loops: Loops, spent: int) -> Conflict:
+def _conflict(work: Posture, start: Vector, rows: Sequence[int], loops: Loops, spent: int) -> Conflict:
     """The conflict of rows that form an irreducible set: how far the last member misses as the others hold."""
     equations = work.equations
     members = [member_of(equations.rows[k], equations, loops) for k in rows]

@@ -31,7 +31,7 @@ def opening(model: Any, mechanism: Mechanism, parameters: Vector, position: Mapp
         return {}
     known = mechanism.named.get("opening")
     if known is None:
-        known = mechanism.named["opening"] = _asked(model)
+        known = mechanism.named["opening"] = _cut_coordinates(model)
     names, nodes, coordinates, defaults, inputs = known
     if not names:
         return {}
@@ -44,7 +44,7 @@ def opening(model: Any, mechanism: Mechanism, parameters: Vector, position: Mapp
     return dict(zip(names, evaluate(nodes, given), strict=True))
 
 
-def _asked(model: Description) -> tuple[list[str], list[Node], list[str], Sequence[float], Any]:
+def _cut_coordinates(model: Description) -> tuple[list[str], list[Node], list[str], Sequence[float], Any]:
     """(names of coordinates, their values on a tape, names of its coordinates, their defaults, its parameters)."""
     here, whole = plan(model), uncut(model)
     apart = {joint.name for joint in (*here.floating, *whole.cut)}

@@ -203,7 +203,7 @@ class MachineFunction:
             wake()
         return self._provisional
 
-    def settle(self, address: int | None) -> None:
+    def finalize(self, address: int | None) -> None:
         """From now on this is the function, or stays what it is."""
         if address is not None:
             self._run, self.address = call(address), address
@@ -298,7 +298,7 @@ class Library(ByName[MachineFunction]):
         addresses = machine.load(codes[0], [f"mbd.{name}" for name in names], *codes[1:])
         self._later.append(machine)
         for name, address in zip(names, addresses, strict=True):
-            self._functions[name].settle(address)
+            self._functions[name].finalize(address)
 
     def address(self, name: str) -> int:
         """Where the code of a function begins."""
@@ -333,7 +333,7 @@ class _Later:
         if library is not None:
             library.notes.append(f"{', '.join(self.names)} stay at level 0: {error or type(error).__name__}")
             for name in self.names:
-                library[name].settle(None)
+                library[name].finalize(None)
 
 
 def _sizes(outputs: Sequence[Node], layout: Layout) -> tuple[int, int, int]:

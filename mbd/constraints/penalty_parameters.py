@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from mbd.bodies.values import among, number
 from mbd.constraints.restitution import (
     KELVIN_VOIGT,
-    blow_integral,
     chi_for,
     damping_ratio_for,
+    impact_integral,
     law_of,
     over_angle,
     restitution_of_chi,
@@ -116,7 +116,7 @@ def largest_dt(stiffness: float, exponent: float, damping: float, chi: float, ma
     if exponent == 1.0 and chi == 0.0:
         angle = over_angle(0.5 * damping / math.sqrt(stiffness * mass))
         return angle * math.sqrt(mass / stiffness) / STEPS_OF_APPROACH
-    return _pace(stiffness, mass, speed, exponent) * blow_integral(chi, exponent, 0.0) / STEPS_OF_APPROACH
+    return _pace(stiffness, mass, speed, exponent) * impact_integral(chi, exponent, 0.0) / STEPS_OF_APPROACH
 
 
 def _pace(stiffness: float, mass: float, speed: float, n: float) -> float:
@@ -142,5 +142,5 @@ def _hysteretic(depth: float, mass: float, speed: float, chi: float, n: float) -
     stiffness = energy * stored_work(chi) / depth ** (n + 1.0)
     pace = _pace(stiffness, mass, speed, n)
     found = restitution_of_chi(chi)
-    duration, approach = (pace * blow_integral(chi, n, end) for end in (-found, 0.0))
+    duration, approach = (pace * impact_integral(chi, n, end) for end in (-found, 0.0))
     return PenaltyParameters(stiffness, 0.0, chi, found, duration, approach / STEPS_OF_APPROACH)

@@ -17,7 +17,7 @@ from mbd.bodies.values import among
 from mbd.errors import ModelError, nearest
 
 __all__ = [
-    "KELVIN_VOIGT", "LEAST_RESTITUTION", "blow_integral", "chi_for", "damping_ratio_for", "law_of", "over_angle",
+    "KELVIN_VOIGT", "LEAST_RESTITUTION", "impact_integral", "chi_for", "damping_ratio_for", "law_of", "over_angle",
     "restitution_of_chi", "restitution_of_ratio", "stored_work", "wanted",
 ]  # fmt: skip
 
@@ -108,7 +108,7 @@ def stored_work(chi: float) -> float:
     return _work(chi, 0.0)
 
 
-def blow_integral(chi: float, exponent: float, end: float, nodes: int = 200) -> float:
+def impact_integral(chi: float, exponent: float, end: float, nodes: int = 200) -> float:
     """``∫_end¹ dw/(P(w)^{n/(n+1)} (1 + χ w))`` with ``P(w) = ∫_w¹ s/(1 + χ s) ds``: a duration in its own scale.
 
     From touch until the deepest point (end = 0), or until it parts (end = −e, where P is zero again);

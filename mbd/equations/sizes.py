@@ -1,4 +1,4 @@
-"""How large the equations of a model become, foretold from its joints before anything is derived.
+"""How large the equations of a model become, predicted from its joints before anything is derived.
 
 Each pair of coordinates on one path from the ground has an entry in the mass matrix, so that a chain of n joints needs
 some n² operations; bodies beside each other, and joints that are cut, add to each other only.
@@ -44,7 +44,7 @@ def require_room(plan: Plan) -> None:
     Raises
     ------
     ModelError
-        with the numbers of bodies and joints, the memory and the time foretold, and what to try.
+        with the numbers of bodies and joints, the memory and the time predicted, and what to try.
     """
     expected = operations(plan)
     if expected < LARGE:
@@ -82,7 +82,7 @@ def require_room_for_tangent(derived: int) -> None:
     Raises
     ------
     ModelError
-        with the memory foretold, and what to try.
+        with the memory predicted, and what to try.
     """
     refused = tangent_refused(derived)
     if refused:

@@ -86,7 +86,7 @@ def turning_errors(id: str, run: Any) -> dict[str, Vector]:
     return {what: value - published(id, name) for (what, (name, _)), value in zip(LIMITS.items(), values, strict=True)}
 
 
-def settled_figures(run: Any) -> list[Figure]:
+def steady_figures(run: Any) -> list[Figure]:
     """The corners of one side strike by turns without end, ever faster; then both are closed."""
     closed = {contact.name: bool(on) for contact, on in zip(run.facts.contacts, run.record.closed[-1], strict=True)}
     struck = {event.name for event in run.events}
@@ -125,7 +125,7 @@ def rattling(id: str, scheme: Any) -> Outcome:
         Figure("change with the order of the corners, relative [-]", difference(run, other), 1e-9),
         Figure("penetration [m]", deepest(run), 1e-10),
         *impact_figures(model, run),
-        *settled_figures(turning(id, scheme, float(steps[0]), beyond=BEYOND)[1]),
+        *steady_figures(turning(id, scheme, float(steps[0]), beyond=BEYOND)[1]),
     ]
     late = run.time > 0.8 * run.time[-1]
     return Outcome(

@@ -94,7 +94,7 @@ def judge_governor(integrator: Any) -> Outcome:
 
     large = mbd.simulate(model, start, integrator, dt=LARGE, until=float(slider.times[-1]), on_failure="return")
     bounded = is_explicit(integrator)
-    figures = _told(large) if bounded and not large.success else _taken(large)
+    figures = _names_stable_steps(large) if bounded and not large.success else _taken(large)
     found = study(errors, BOUNDED if bounded else FIRST, integrator, 1 if bounded else 3)
     rate, fine = definition(B5)["initial_conditions"]["shaft_rate"], float(found.steps[-1])
     floors = {what: 2.0 * each.accuracy for what, each in zip(found.errors, (slider, rod, turn), strict=True)}
@@ -123,11 +123,11 @@ def _taken(run: Any) -> list[Figure]:
     ]
 
 
-def _told(run: Any) -> list[Figure]:
+def _names_stable_steps(run: Any) -> list[Figure]:
     """Of an explicit scheme that stopped: whether it says below which step it is stable, and that this is smaller."""
     limit = re.search(r"an explicit scheme is stable for dt below ([\d.e+-]+) s", run.message)
-    is_said = limit is not None and float(limit[1]) < LARGE
-    return [Figure(f"dt = {LARGE:g} s refused without saying which steps are stable", float(not is_said), 0)]
+    is_named = limit is not None and float(limit[1]) < LARGE
+    return [Figure(f"dt = {LARGE:g} s refused without saying which steps are stable", float(not is_named), 0)]
 
 
 CASES = (

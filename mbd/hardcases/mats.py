@@ -71,7 +71,7 @@ LIMITS = {"contact duration": 2e-4, "rebound speed": 1e-4, "max penetration": 1e
 """The most that each may be off at the finest step, over its size; the work over m g h."""
 
 
-def blow_errors(given: dict[str, float], wanted: dict[str, float], run: Any) -> dict[str, float]:
+def impact_errors(given: dict[str, float], wanted: dict[str, float], run: Any) -> dict[str, float]:
     """Errors of the first impact of one run, relative."""
     closed, opened = [event for event in run.events if event.name == "mat"][:2]
     fine = run.at(np.linspace(closed.time, opened.time, 4001))["fall.displacement"]
@@ -91,7 +91,7 @@ def resolved(given: dict[str, float], scheme: Any) -> tuple[list[Figure], list[C
     wanted = exact_impact(**given)
     steps = halved(wanted["contact duration"] / 40.0)
     runs = [dropped(given, scheme, float(dt)) for dt in steps]
-    errors = [blow_errors(given, wanted, run) for run in runs]
+    errors = [impact_errors(given, wanted, run) for run in runs]
     title = f"k = {given['k']:g}"
     figures: list[Figure] = []
     for name, limit in LIMITS.items():

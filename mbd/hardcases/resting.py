@@ -92,7 +92,11 @@ def judge_table(integrator: Any) -> Outcome:
         [
             *(Figure(what, worst[what], limit) for what, limit in limits.items()),
             Figure("switches of legs", sum(len(run.events) for run in runs), 0),
-            Figure("runs that do not say that the forces are not unique", sum(not _told(run) for run in runs), 0),
+            Figure(
+                "runs that do not say that the forces are not unique",
+                sum(not _notes_redundancy(run) for run in runs),
+                0,
+            ),
         ],
         [Curve("force of the first leg [N]", runs[0].time, runs[0]["leg 0.force"])],
     )
@@ -114,7 +118,7 @@ def judge_block(integrator: Any) -> Outcome:
             resultant = max(resultant, float(np.max(np.abs(forces.sum(axis=0) - weight))) / floor)
             drift = max(drift, float(np.max(np.abs(run.record.q - run.record.q[0]))))
             events += len(run.events)
-            wrong += _told(run) is not third
+            wrong += _notes_redundancy(run) is not third
             curves.append(Curve(f"force of the first point, {name} [N]", run.time, forces[0]))
     return Outcome(
         [
@@ -133,7 +137,7 @@ def _floor(integrator: Any, dt: float, weight: float, mass: float, length: float
     return 100.0 * EPS * weight + force_floor(integrator, dt, UNTIL / dt, mass, length, weight / mass * dt)
 
 
-def _told(run: Any) -> bool:
+def _notes_redundancy(run: Any) -> bool:
     """Whether a note says that rows are redundant and their multipliers not unique."""
     return any("redundant" in note and "multipliers" in note and "not" in note for note in run.stats["notes"])
 

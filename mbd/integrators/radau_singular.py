@@ -7,7 +7,7 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.integrators.base import StepResult
 from mbd.integrators.radau_step import EPS, MAX_ITERATIONS, RadauStep, infinite_unless_number
-from mbd.kernel.schemes.radau import PATIENT, SLOW, is_settled
+from mbd.kernel.schemes.radau import PATIENT, SLOW, has_converged
 from mbd.kernel.singular.stages import MOST_STAGE_PROJECTIONS
 
 __all__ = ["SingularRadauStep"]
@@ -24,7 +24,7 @@ class SingularRadauStep(RadauStep):
         error = np.inf
         for iteration in range(MAX_ITERATIONS):
             try:
-                quick = np.array([self._settle(i) for i in range(3)])
+                quick = np.array([self._project_stage(i) for i in range(3)])
             except np.linalg.LinAlgError:
                 return self._failed(iteration, error, "the rows depend on each other at a stage")
             terms = [self._terms(i) for i in range(3)]
@@ -32,7 +32,7 @@ class SingularRadauStep(RadauStep):
             if not np.isfinite(error):
                 return self._failed(iteration, error, "a force or a row is not finite")
             matrices = self._matrices(len(terms[0].h))
-            if error <= 1.0 and iteration > 0 and is_settled(moved, last, first):
+            if error <= 1.0 and iteration > 0 and has_converged(moved, last, first):
                 return self._completed(matrices, iteration, error)
             if error > 1.0 and iteration > 2 and error > SLOW * before:
                 if error * self.tolerance <= self.upper:
@@ -50,7 +50,7 @@ class SingularRadauStep(RadauStep):
                 self.tolerance = min(self.upper, max(1e-3 * first**2, self.tolerance))
         return self._failed(MAX_ITERATIONS, error, "Newton did not converge")
 
-    def _settle(self, i: int) -> Vector:
+    def _project_stage(self, i: int) -> Vector:
         """U_i and λ_i at the rates of stage i; the least change of velocities (n,) that does away with ḣ."""
         n, n_v, before = len(self.y0), self.n_v, np.inf
         self.U[i] = 0.0

@@ -20,7 +20,7 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.integrators.base import Point, StepReport, StepResult, System, Terms, completed, consistent_rates
 from mbd.kernel.schemes.collocation import RADAU
-from mbd.kernel.schemes.radau import FAR_OFF, MOST_RETREATS, PATIENT, SLOW, is_settled
+from mbd.kernel.schemes.radau import FAR_OFF, MOST_RETREATS, PATIENT, SLOW, has_converged
 from mbd.kernel.schemes.stages import MOST_BENDS, MOST_STRETCHED
 from mbd.state import Mode, State
 
@@ -121,7 +121,7 @@ class RadauStep:
                 moved = self._correct(terms, matrices, renew)
             except np.linalg.LinAlgError:
                 return self._failed(iteration, error, "the Newton matrix is singular")
-            if passes and is_settled(moved, last, first):
+            if passes and has_converged(moved, last, first):
                 return self._completed(matrices, iteration, error)
             if iteration == 0 and not passes:  # the predictor is of order 3, the step of order 5: stay below its error
                 first = moved

@@ -49,7 +49,7 @@ class Joint(Parameterized, ABC):
     `mbd.configuration`). For all others these have defaults.
 
     A new joint is a frozen dataclass with the fields below; `stiffness` and `rest` are fields only of joints with one
-    coordinate, whose linear spring has the energy ``½ k (q − rest)²``. It calls `settle` when it is made.
+    coordinate, whose linear spring has the energy ``½ k (q − rest)²``. It calls `validate` when it is made.
     """
 
     parent: Frame

@@ -64,7 +64,7 @@ def changes_little(K: Steps, h: float, stretch: float) -> bool:
 
 
 def bends(K: Equations, h: float) -> bool:
-    """Whether accelerations change so much that a pole may lie between, even if so foretold; K.failure_index whose."""
+    """Whether accelerations change so much that a pole may lie between, even if so predicted; K.failure_index whose."""
     most = 0.0
     fastest = 0.0
     who = 0
@@ -170,7 +170,7 @@ def largest_share(K: Kernel, h: float, stretch: float) -> float:
 
 
 def outgrows(K: Kernel, h: float, t1: float, stretch: float, at_y: int, at_D: int) -> bool:
-    """Whether the change that was not foretold feeds itself by more than `GROWTH`; (q₁, y₁) are in K.inside."""
+    """Whether the change that was not predicted feeds itself by more than `GROWTH`; (q₁, y₁) are in K.inside."""
     n = K.n
     if consistent(K, t1, K.q1, K.y1) != 0:
         return False

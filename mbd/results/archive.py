@@ -145,7 +145,7 @@ class Members:
     def head(self, name: str) -> Head:
         """Kind and shape of an array, whose size must be what the file says of it."""
         with self._archive.open(self._info(name)) as member:
-            shape, dtype, _ = self._told(name, member)
+            shape, dtype, _ = self._checked_head(name, member)
         return Head(dtype.kind, shape)
 
     def size(self, name: str) -> int:
@@ -160,7 +160,7 @@ class Members:
     def read(self, name: str) -> NDArray[Any]:
         """The numbers of an array."""
         with self._archive.open(self._info(name)) as member:
-            shape, dtype, fortran = self._told(name, member)
+            shape, dtype, fortran = self._checked_head(name, member)
             array: NDArray[Any] = np.empty(shape, dtype, order="F" if fortran else "C")
             view = array.reshape(-1, order="A").view(np.uint8).data
             place = 0
@@ -178,7 +178,7 @@ class Members:
             raise Unreadable(f"it has no {name!r}")
         return self._known[name]
 
-    def _told(self, name: str, member: Any) -> tuple[tuple[int, ...], np.dtype[Any], bool]:
+    def _checked_head(self, name: str, member: Any) -> tuple[tuple[int, ...], np.dtype[Any], bool]:
         """Shape, kind and order of an array whose head is read from the member."""
         version = np.lib.format.read_magic(member)
         readers = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}

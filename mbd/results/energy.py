@@ -130,7 +130,7 @@ def _works(
         else:
             part = Part(power.name, power.kind, work)
             is_own_law = power.kind == "penalty" and power.lost is None
-            named.append(_told(part, float(np.sum(unsure)), least) if is_own_law else part)
+            named.append(_withheld_if_unsure(part, float(np.sum(unsure)), least) if is_own_law else part)
         gives = power.name not in lending and np.max(value, initial=0.0) > 0.0
         doubt[0 if gives else 1 :, 1:] += unsure
     return named, moved, np.cumsum(doubt, axis=1)
@@ -149,7 +149,7 @@ def never_giving(work: Vector, power: Vector, trapezoid: Vector) -> Vector:
     return np.concatenate([[0.0], np.cumsum(np.where(steps > 0.0, np.minimum(trapezoid, 0.0), steps))])
 
 
-def _told(part: Part, doubt: float, least: float) -> Part:
+def _withheld_if_unsure(part: Part, doubt: float, least: float) -> Part:
     """A penalty contact of a law of the user's, withheld where it seems to give energy that may be an error."""
     gain = float(np.max(part.energy - part.energy[:1], initial=0.0))
     if not least < gain <= UNSURE * doubt:

@@ -19,7 +19,7 @@ from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import CapabilityError, MemoryLimitError, SimulationError, UnknownNameError
 from mbd.integrators import HHT, Integrator
-from mbd.notes import asked_from_outside, doubt, note
+from mbd.notes import called_from_outside, doubt, note
 from mbd.progress import run_bar
 from mbd.simulation.arguments import check_arguments, end_of
 from mbd.simulation.capabilities import refusals
@@ -121,7 +121,7 @@ def simulate(
     }  # fmt: skip
     check_arguments(scheme, start, dt, tol, tol_of, until, parameters, options, on_failure, observers, progress)
     changed = {**start.parameters, **(parameters or {})}
-    by_user = asked_from_outside()
+    by_user = called_from_outside()
     motion = _Motion(
         model, start, scheme, until, changed, options, observers, "late" if by_user and progress is None else progress
     )

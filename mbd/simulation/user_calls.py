@@ -7,10 +7,10 @@ from typing import Any
 
 from mbd.errors import SimulationError
 
-__all__ = ["asked"]
+__all__ = ["call_user"]
 
 
-def asked(what: str, function: Callable[..., Any], *arguments: Any) -> Any:
+def call_user(what: str, function: Callable[..., Any], *arguments: Any) -> Any:
     """What a user's function answers; whatever it raises ends the run, which is kept."""
     try:
         return function(*arguments)

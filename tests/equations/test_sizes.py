@@ -27,7 +27,7 @@ def chain(count, axis=(0.0, 0.0, 1.0), spread=1, **more):
 
 @pytest.mark.parametrize("axis", [(0.0, 0.0, 1.0), (1.0, 1.0, 0.0)], ids=["planar", "spatial"])
 @pytest.mark.parametrize("spread", [1, 4])
-def test_the_size_foretold_is_that_of_the_equations_within_a_factor_of_three(axis, spread):
+def test_the_size_predicted_is_that_of_the_equations_within_a_factor_of_three(axis, spread):
     model = chain(24, axis, spread)
     mbd.assemble(model)
     made = len(mechanism_of(model).equations.tape.nodes)

@@ -20,7 +20,7 @@ from tests.simulation import singular_linkages
 from tests.simulation.mechanisms import box, kneed_walker, kneed_walker_start
 
 OMEGA = 150.0
-DECISIONS = ("steps", "shortened", "careful", "restarts", "events", "impacts", "modes")
+DECISIONS = ("steps", "shortened", "singular_steps", "restarts", "events", "impacts", "modes")
 """Counts of a run that tell which way it went."""
 
 

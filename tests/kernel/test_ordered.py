@@ -152,7 +152,7 @@ def fall(scheme):
 
 
 def assert_same_run(one, two):
-    for name in ("steps", "iterations", "careful", "shortened"):
+    for name in ("steps", "iterations", "singular_steps", "shortened"):
         assert one.stats[name] == two.stats[name], name
     a, b = one.record, two.record
     for part, bound in (("time", 1e-12), ("q", 1e-9), ("v", 1e-8), ("lam", 1e-4)):

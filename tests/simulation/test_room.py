@@ -24,7 +24,7 @@ def stiff():
     return model, mbd.assemble(model, {"fall.displacement": 1.001})
 
 
-def test_a_run_that_fills_the_memory_is_foretold_and_ends_with_its_rows(monkeypatch):
+def test_a_run_that_fills_the_memory_is_predicted_and_ends_with_its_rows(monkeypatch):
     monkeypatch.setattr(room, "available", lambda: 4.0 * 8 * 5 * 150_000)  # 150 000 rows of 5 numbers are a quarter
     model, start = stiff()
     with (

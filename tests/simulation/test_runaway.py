@@ -149,7 +149,7 @@ def falling(law):
 @pytest.mark.parametrize("scheme", [mbd.HHT(0.05), mbd.Newmark(), mbd.GeneralizedAlpha(0.8), mbd.RadauIIA()], ids=repr)
 @pytest.mark.parametrize("law", [law for law in PULLS if law != "softened"])
 def test_no_step_leaps_over_the_pole_of_a_force(law, scheme):
-    """Both ends of such a step may look alike, or go on as the slope of accelerations foretold."""
+    """Both ends of such a step may look alike, or go on as the slope of accelerations predicted."""
     rng = np.random.default_rng(5)
     for _ in range(15):
         start = mbd.assemble(falling(law), {"rail.displacement": rng.uniform(0.05, 0.4)})

@@ -149,7 +149,7 @@ def measured(
             latest = subject.run(scheme, setting, share)
         except MbdError as error:
             return replace(point, failure=str(error))
-        if not latest.run.success and not _is_told(latest.run, truth, subject):
+        if not latest.run.success and not _fails_by_energy_alone(latest.run, truth, subject):
             return replace(point, failure=latest.run.message, **_tolerance(latest))
         if best is None or latest.seconds < best.seconds:
             best = latest
@@ -175,7 +175,7 @@ def measured(
     )  # fmt: skip
 
 
-def _is_told(run: Trajectory, truth: Truth | Published | None, subject: Subject) -> bool:
+def _fails_by_energy_alone(run: Trajectory, truth: Truth | Published | None, subject: Subject) -> bool:
     """Whether published values judge a run that did not succeed: only its energy is wrong, at its end."""
     last = subject.until[1] if isinstance(subject.until, tuple) else subject.until
     return isinstance(truth, Published) and bool(run.time[-1] >= last)

@@ -14,7 +14,7 @@ from mbd.analysis.accuracy.compare import Difference
 from mbd.arrays import Vector
 from mbd.bodies.values import is_number
 from mbd.errors import ModelError, SimulationError, UnknownNameError, nearest
-from mbd.simulation.user_calls import asked
+from mbd.simulation.user_calls import call_user
 
 if TYPE_CHECKING:
     from mbd.integrators import Integrator
@@ -109,7 +109,7 @@ class Published:
         """
         largest, at_end = {}, {}
         for name, each in self.known.items():
-            gaps = np.abs(_told(name, each, run) - each.value) / self.scales[name]
+            gaps = np.abs(_value_in(name, each, run) - each.value) / self.scales[name]
             largest[name], at_end[name] = float(np.max(gaps)), float(gaps[-1])
         return Difference(largest, at_end, 0.0, True, 0.0)
 
@@ -124,10 +124,10 @@ class Published:
         return ", ".join(texts)
 
 
-def _told(name: str, known: Known, run: Trajectory) -> Vector:
+def _value_in(name: str, known: Known, run: Trajectory) -> Vector:
     """What a run tells of a quantity, (k,)."""
     if callable(known.of):
-        values = asked(f"the function that tells {name!r} of a run", known.of, run)
+        values = call_user(f"the function that tells {name!r} of a run", known.of, run)
     else:
         values = run[known.of or name][-1]
     try:

@@ -97,7 +97,7 @@ class Report(SchemeAbilities):
     failure_size: float = place("detail")  # its residual, or whatever is too large
     failure_step: float = place("detail")
     failure_index: int = place("state")  # contact, column or row
-    unforeseen_change: float = place("detail")  # growth of rates that nothing foretold: see `mbd.kernel.resolution`
+    unforeseen_change: float = place("detail")  # growth of rates that nothing predicted: see `mbd.kernel.resolution`
     coarse_start: float = place("detail")  # where the last of the steps `n_coarse` began
     coarsest_end: float = place("detail")  # where the one with the largest change ended
     coarsest_change: float = place("detail")
@@ -114,7 +114,7 @@ class Report(SchemeAbilities):
     n_impacts: int = place("counts")
     n_locations: int = place("counts")
     n_stagnations: int = place("counts")
-    n_careful: int = place("counts")
+    n_singular_steps: int = place("counts")
     n_shortened: int = place("counts")
     n_energetic_impacts: int = place("counts")
     n_endless: int = place("counts")

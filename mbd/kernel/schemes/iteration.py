@@ -160,7 +160,7 @@ def finish(K: Steps, h: float) -> bool:
 
 
 def is_small(K: Settings, h: float, stretch: float, most: float, unforeseen: float, fastest: float) -> bool:
-    """Whether changes of rates in a step (the most, and the most not foretold) are small beside the fastest of them."""
+    """Whether the largest changes of rates in a step, in all and unpredicted, are small beside the fastest of them."""
     cube = stretch * stretch * stretch
     small = h * unforeseen * cube <= 12.0 * LOOK_TWICE * max(K.rest_speed, BYSTANDER * fastest)
     return bool(small and h * most <= BENT * max(K.rest_speed, fastest))

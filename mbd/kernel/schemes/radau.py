@@ -161,7 +161,7 @@ def plain_step(K: Kernel, h: float, t1: float, m: int) -> int:
             last = moved
             moved = correct_stages(K, m, h, renew)
             renew = False
-            if is_settled(moved, last, first):
+            if has_converged(moved, last, first):
                 return complete(K, h, t1, m, False, iteration >= PATIENT)
             continue
         moved = correct_stages(K, m, h, renew)
@@ -174,7 +174,7 @@ def plain_step(K: Kernel, h: float, t1: float, m: int) -> int:
     return status
 
 
-def is_settled(moved: float, last: float, first: float) -> bool:
+def has_converged(moved: float, last: float, first: float) -> bool:
     """Whether a correction of residuals that pass was small, or as small as round-off lets it be.
 
     Masses that differ by 10⁶ make a change of 10⁻³ in the rates of the light one of residuals of 10⁻⁹.
@@ -213,7 +213,7 @@ def singular_stages_step(K: Kernel, h: float, t1: float) -> int:
             if iteration >= PATIENT:
                 return NOT_CONVERGED
             evaluate_stages(K, h, t1, m, tolerance, c, c * c, False)
-        if error <= 1.0 and iteration > 0 and is_settled(moved, last, first):
+        if error <= 1.0 and iteration > 0 and has_converged(moved, last, first):
             return complete(K, h, t1, m, True, False)
         before = error
         replace_row_rates(K, stage_place(K, BALANCES), m)

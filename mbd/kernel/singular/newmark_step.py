@@ -265,7 +265,7 @@ def singular_newmark_step(K: Kernel, h: float, t1: float) -> int:
             if overturns(K, h):
                 K.failure_size = -1.0
                 return NOT_CONVERGED
-            K.n_careful += 1
+            K.n_singular_steps += 1
             K.near_singular = PASSING if away < WITHIN else LEFT
             return 0
         before = error

@@ -1,4 +1,4 @@
-"""Steps of fixed size within which forces changed as nothing before them foretold, and the step that resolves them."""
+"""Steps of fixed size within which forces changed as nothing before them predicted, and the step that resolves them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["coarse_steps"]
 SAMPLES = 64
 """Parts of a step at whose ends forces are evaluated [-]."""
 BLIND = 0.1
-"""Step that is asked for, over the present one, where forces tell nothing [-]."""
+"""Step that is advised, over the present one, where forces do not show one [-]."""
 
 
 def coarse_steps(run: RunData, record: Record) -> list[str]:
@@ -27,16 +27,16 @@ def coarse_steps(run: RunData, record: Record) -> list[str]:
         return []
     worst, when = float(run.kernel.coarsest_change), float(run.kernel.coarsest_end)
     row = int(np.clip(np.searchsorted(record.time, when - 1e-9 * run.dt), 1, len(record.time) - 1))
-    asked = _asked(run, record, row)
+    resolving = _resolving_step(run, record, row)
     steps = "a step was" if count == 1 else f"{count} steps were"
     return [
         f"{steps} not resolved by dt = {run.dt:g} s: forces changed within one so that rates are uncertain by "
         f"{100.0 * worst:.0f} % (the most, at t = {when:.6g} s), and times and places after it as well; try "
-        f"dt <= {asked:.1g} s, or tol="
+        f"dt <= {resolving:.1g} s, or tol="
     ]
 
 
-def _asked(run: RunData, record: Record, row: int) -> float:
+def _resolving_step(run: RunData, record: Record, row: int) -> float:
     """The step that resolves the steepest change of forces between a row and the one before [s].
 
     ``ω² = max |Δa|/|Δq|`` along the cubic through both rows, as far as the kinetic energy reaches against the forces.

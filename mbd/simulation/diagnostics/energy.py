@@ -120,13 +120,13 @@ class EnergyWatch(EnergyFindings):
     def __init__(self) -> None:
         super().__init__()
         self.rows = self.ledgers = 0
-        self._due, self._looks, self._upto = FIRST_LOOK, 0, 0
+        self._due, self._judgements, self._upto = FIRST_LOOK, 0, 0
         self._seen = np.zeros((0, 3))  # T, V and the way of the fastest coordinate, of the rows looked at so far
         self._cleared = 0.0  # a rise of energy that a ledger has explained
 
     def is_due(self, run: RunData) -> bool:
         """Whether a run that goes on is to be looked at now."""
-        return run.stored >= self._due and self._looks < LOOKS
+        return run.stored >= self._due and self._judgements < LOOKS
 
     @np.errstate(all="ignore")
     def judge(self, run: RunData) -> str:
@@ -140,7 +140,7 @@ class EnergyWatch(EnergyFindings):
         if np.isnan(self._seen[:, 1]).any():
             self._undefined(run)
             return self.problem
-        if not self._looks_strange(run):
+        if not self._is_suspicious(run):
             return ""
         columns = ModelColumns(whole_record(run), run.mechanism.equations)
         lending = _lending(run)
@@ -157,7 +157,7 @@ class EnergyWatch(EnergyFindings):
     def _look(self, run: RunData) -> None:
         """Evaluate T and V at some rows that were not looked at yet."""
         last = run.stored - 1
-        first, early = min(self._upto, last), EARLY if self._looks == 0 else ()
+        first, early = min(self._upto, last), EARLY if self._judgements == 0 else ()
         spread = {first + k * (last - first) // (SPREAD - 1) for k in range(SPREAD)}
         chosen = np.array(sorted(spread.union(row for row in early if row <= last)), dtype=np.intp)
         record = record_of(run, run.table[chosen])
@@ -167,7 +167,7 @@ class EnergyWatch(EnergyFindings):
         way = _way(record.q, run.table[0, 1 : 1 + run.kernel.n_q])
         self._seen = np.concatenate([self._seen, np.column_stack([kinetic, potential, way])])
         self.rows += len(chosen)
-        self._upto, self._due, self._looks = run.stored, 4 * max(self._due, run.stored // 4), self._looks + 1
+        self._upto, self._due, self._judgements = run.stored, 4 * max(self._due, run.stored // 4), self._judgements + 1
 
     def _overflow(self, run: RunData) -> None:
         """Energies beyond the largest number: the scheme's own where the run began with less, else not judged."""
@@ -199,7 +199,7 @@ class EnergyWatch(EnergyFindings):
             "smaller dt to see what happens there, or a potential that is defined wherever the motion goes"
         )
 
-    def _looks_strange(self, run: RunData) -> bool:
+    def _is_suspicious(self, run: RunData) -> bool:
         """Whether only the ledger can tell that the energies seen are right."""
         kinetic, potential, way = self._seen.T
         if np.max(way) <= MOVED:

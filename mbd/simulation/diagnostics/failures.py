@@ -209,9 +209,9 @@ def _unresolved(stepper: Stepper, status: int, closed: str) -> str:
     )
     if status == codes.OUTGROWN:
         return (
-            f"{change}, by forces that grow with the motion, {growth:.2g} of what nothing foretold by itself in a step "
-            f"of dt: dt does not resolve the motion, or a force lets it run away; try a smaller dt, such as "
-            f"{0.1 * dt / max(growth, 1.0):.1g} s"
+            f"{change}, by forces that grow with the motion: in a step of dt a change that nothing predicted grows by "
+            f"{growth:.2g} of itself. dt does not resolve the motion, or a force lets it run away; try a smaller dt, "
+            f"such as {0.1 * dt / max(growth, 1.0):.1g} s"
         )
     if status == codes.LEAPT:
         return (

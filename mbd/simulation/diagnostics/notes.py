@@ -67,7 +67,7 @@ COUNTED = (
         "size where one would have come too close to a singular configuration",
     ),
     (
-        "n_careful",
+        "n_singular_steps",
         "singular configurations were passed: {count} steps next to them held positions alone on the rows; their "
         "velocities and multipliers are less accurate",
     ),

@@ -17,7 +17,7 @@ from mbd.errors import ModelError, SimulationError, UnknownNameError, nearest
 from mbd.simulation.parameters import change_parameters, residuals_now, violations_now
 from mbd.simulation.run.boundaries import without_sharing
 from mbd.simulation.run.data import RunData
-from mbd.simulation.user_calls import asked
+from mbd.simulation.user_calls import call_user
 
 __all__ = ["Named", "apply_reset", "arrive", "begin_controllers", "call_controllers", "reset_faults"]
 
@@ -60,7 +60,7 @@ class Named(Mapping[str, float]):
 def apply_reset(run: RunData, guard: Guard) -> None:
     """Set the coordinates and rates that a user's event resets; rows must still hold."""
     what = f"the reset of {guard.name!r} at t = {run.now:.6g} s"
-    wanted = _finite_numbers(f"{what} sets", asked(what, _reset_values, guard.reset, Named(run)))
+    wanted = _finite_numbers(f"{what} sets", call_user(what, _reset_values, guard.reset, Named(run)))
     equations, v = run.mechanism.equations, run.kernel
     usual = residuals_now(run)[:2]
     positions = {coordinate.name: k for k, coordinate in enumerate(equations.coordinates)}
@@ -208,7 +208,7 @@ def _call(run: RunData, controller: Any) -> None:
     what = f"Controller {controller.name!r} at t = {run.now:.6g} s"
     values = Readings(what, {name: named[name] for name in controller.reads})
     state = without_sharing(boundaries.states[controller.name])  # the one before the call stays as it was
-    answer = asked(what, controller.update, run.now, values, state)
+    answer = call_user(what, controller.update, run.now, values, state)
     if isinstance(answer, tuple) and len(answer) == 2:
         answer, state = answer
     written = _written(what, answer, controller.writes)

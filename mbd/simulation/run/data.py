@@ -60,10 +60,10 @@ class EnergyFindings:
 
 @dataclass
 class RoomFindings:
-    """What is foretold of the memory of a run.
+    """What is predicted of the memory of a run.
 
     problem : why the run had to end, in a sentence; '' if it did not
-    note : what was foretold; '' if nothing
+    note : what was predicted; '' if nothing
     """
 
     problem: str = ""

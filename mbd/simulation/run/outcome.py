@@ -16,7 +16,7 @@ __all__ = ["trajectory_of"]
 
 COUNTS = (
     "steps", "iterations", "tangents", "residuals", "factorizations", "events", "restarts", "impacts",
-    "locations", "stagnations", "careful", "shortened", "energetic_impacts",
+    "locations", "stagnations", "singular_steps", "shortened", "energetic_impacts",
     "endless", "pivoted",
 )  # fmt: skip
 """Counts of the kernel that results tell."""

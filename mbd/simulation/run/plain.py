@@ -24,7 +24,7 @@ from mbd.kernel.schemes.contract import Scheme
 from mbd.kernel.schemes.memory import start_step
 from mbd.kernel.singular.step_size import accept_row_norms, forget_row_norms, note_row_norms
 from mbd.simulation.run.shared_loads import shares
-from mbd.simulation.user_calls import asked
+from mbd.simulation.user_calls import call_user
 from mbd.state import Mode, State
 from mbd.tape.derivatives import live
 
@@ -312,7 +312,7 @@ class PlainScheme:
         """Memory at the accepted state, whose rates are consistent; sizes of the residual for the guards."""
         state, mode, _ = self._state(K)
         what = f"the start of {self.integrator!r} at t = {state.time:.6g} s"
-        return self._begin(K, asked(what, self.integrator.start, self.system, state, mode, start_step(K)))
+        return self._begin(K, call_user(what, self.integrator.start, self.system, state, mode, start_step(K)))
 
     def resume(self, K: Kernel, h: float) -> int:
         """The same after a step that told `LEFT`, from the rates in K.jump and the multipliers in K.impulse."""
@@ -334,7 +334,7 @@ class PlainScheme:
         """A candidate from the integrator's own step."""
         state, mode, rows = self._state(K)
         what = f"a step of {self.integrator!r} from t = {state.time:.6g} s"
-        result = asked(what, self.integrator.step, self.system, state, t1 - state.time, mode, self.memory)
+        result = call_user(what, self.integrator.step, self.system, state, t1 - state.time, mode, self.memory)
         if not isinstance(result, StepResult):
             raise SimulationError(f"{what} must return a StepResult(state, memory, report), not {result!r}")
         self.report = result.report
@@ -352,7 +352,7 @@ class PlainScheme:
             return NOT_FINITE
         self.pending = result.memory
         K.near_singular = getattr(result.memory, "near", 0)
-        K.n_careful += int(K.near_singular > 0)
+        K.n_singular_steps += int(K.near_singular > 0)
         rate, lam = getattr(result.memory, "rate", None), getattr(result.memory, "lam", None)
         if rate is None or lam is None:
             rate, lam = self.system.accelerations(t1, result.state.q, y, mode)

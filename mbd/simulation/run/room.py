@@ -15,7 +15,7 @@ __all__ = ["Room", "available", "memory"]
 SHARE = 0.25
 """Part of the memory that is free which the rows of a run may fill: trial runs, and results, need some too."""
 EARLIEST, NOTABLE = 1 << 16, 1 << 25
-"""Rows, and bytes of them, before which nothing is foretold."""
+"""Rows, and bytes of them, before which nothing is expected."""
 MANY = 1 << 22
 """Rows above which a run that follows its error says how many they will be: nobody has chosen their number."""
 LARGE = 1.0e9
@@ -30,15 +30,15 @@ class Room(RoomFindings):
 
     Attributes
     ----------
-    patience : rows above which a run that is foretold to have them is ended
+    patience : rows above which a run that is expected to have them is ended
     is_long : whether it was
-    foretold : rows that were foretold last
+    expected : rows that were expected last
     """
 
     def __init__(self, width: int) -> None:
         self.size = 8 * width
         super().__init__()
-        self.patience, self.foretold, self.is_long = float("inf"), 0.0, False
+        self.patience, self.expected, self.is_long = float("inf"), 0.0, False
         self._most, self._seen = -1, 0
 
     def exhausted(self, run: RunData) -> str:
@@ -66,9 +66,9 @@ class Room(RoomFindings):
             return ""
         if run.stored >= 2 * self._seen:
             self._look(run.stored)
-        rows = self.foretold = _foretold(run)
+        rows = self.expected = _expected_rows(run)
         if rows > self.patience:
-            self.is_long, self.problem = True, f"t = {run.now:.9g} s: about {rows:.2g} rows are foretold"
+            self.is_long, self.problem = True, f"t = {run.now:.9g} s: about {rows:.2g} rows are expected"
             return self.problem
         if run.stored >= self.most:
             self.problem = (
@@ -96,7 +96,7 @@ class Room(RoomFindings):
         )
 
 
-def _foretold(run: RunData) -> float:
+def _expected_rows(run: RunData) -> float:
     """Rows of the whole run."""
     begin, span = run.start.time, run.end - run.start.time
     if run.stop or not run.now > begin:

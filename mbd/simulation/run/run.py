@@ -28,7 +28,7 @@ from mbd.simulation.run.room import Room
 from mbd.simulation.run.savepoints import rewind, save
 from mbd.simulation.run.stored import whole_record
 from mbd.simulation.run.strategy import go_on_unlocated, may_go_on_unlocated
-from mbd.simulation.user_calls import asked
+from mbd.simulation.user_calls import call_user
 from mbd.state import State
 from mbd.trajectory import EventRecord, Trajectory
 
@@ -96,11 +96,11 @@ class Run(RunData):
         if problem:
             settled = rewind(self, failed=problem not in (INTERRUPTED, self.energy.problem, self.room.problem))
         final = close(self, settled)
-        problem, fed = self._told(problem), self._told(self._guarded(self._judge_energy)[0])
+        problem, fed = self._in_words(problem), self._in_words(self._guarded(self._judge_energy)[0])
         if self.stop and not problem and not message.startswith("ended"):
             message = f"{self.stop!r} did not happen before t = {self.end:g} s"
         if not problem:
-            problem = fed or self._reversed() or overturned(self) or self._told(self._guarded(self._last_show)[0])
+            problem = fed or self._reversed() or overturned(self) or self._in_words(self._guarded(self._last_show)[0])
         if problem:
             self.failure = (tried or attempt(self))(problem, final)  # a replay finds its sentence again
         if fed not in ("", problem):
@@ -128,7 +128,7 @@ class Run(RunData):
             self.cause = self.cause or error
             return str(error), ""
 
-    def _told(self, problem: str) -> str:
+    def _in_words(self, problem: str) -> str:
         """A problem in words; an interruption happened at the state that was kept."""
         if problem == INTERRUPTED:
             return f"interrupted at t = {self.now:.6g} s; everything until then is kept"
@@ -208,9 +208,9 @@ class Run(RunData):
 
     def _show(self, finished: bool = False) -> None:
         if self.progress is not None:
-            asked("progress", self.progress, self.now, self.now if finished else self.end)
+            call_user("progress", self.progress, self.now, self.now if finished else self.end)
         for observer in self.observers:
-            asked("an observer", observer, self.now, self.state())
+            call_user("an observer", observer, self.now, self.state())
 
     def _judge_energy(self) -> tuple[str, str]:
         """Whether the scheme itself has put energy in; a replay of a few steps is not asked."""

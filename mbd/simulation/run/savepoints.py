@@ -65,14 +65,14 @@ def rewind(run: RunData, failed: bool) -> bool:
     try:
         for point in reversed(run.history):
             steps = reached - point.steps
-            if _before_failure(run, point, steps) if failed and point.call else _settled(run, point):
+            if _before_failure(run, point, steps) if failed and point.call else _reached(run, point):
                 return True
         return False
     finally:
         run.kernel.counts[:] = counts
 
 
-def _settled(run: RunData, point: Savepoint) -> bool:
+def _reached(run: RunData, point: Savepoint) -> bool:
     """Go to a savepoint; whether it is settled, after a restart if need be, or waits for a reaction to an event."""
     restore(run, point)
     if point.settled or point.pending:

@@ -51,7 +51,7 @@ def calibrated(
 
     Parameters
     ----------
-    run : makes a run with a local error per second, which it ends where more rows than a second argument are foretold
+    run : makes a run with a local error per second, which it ends where more rows than a second argument are predicted
     tol : [m, rad]; allowed : of the first run [m/s, rad/s]
     power : κ; order : of the scheme
     names : of the results that the tolerance holds for; every coordinate without
@@ -66,9 +66,9 @@ def calibrated(
             return _given_up(loose, search, refused)
         first = run(PILOT * allowed)
     if not first.problem and first.run.stats["steps"] == 0:  # it ended where it began
-        return _told([first], replace(first, error=0.0), search, "")
+        return _outcome([first], replace(first, error=0.0), search, "")
     if first.source.interrupted or first.source.room.problem:
-        return _told([first], first, search, first.problem)
+        return _outcome([first], first, search, first.problem)
     trials = [] if first.problem else [first]
     wanted: float | None = first.allowed / (ratio if trials else PILOT)
     for count in range(1, MOST_RUNS + FURTHER_RUNS):
@@ -83,22 +83,22 @@ def calibrated(
         if found.problem and not found.source.interrupted and any(trial.error <= tol for trial in trials):
             break  # a looser run that fails takes nothing away
         if found.problem:
-            return _told([*trials, found], found, search, found.problem)
+            return _outcome([*trials, found], found, search, found.problem)
         trials = search.estimated([*trials, found])
         wanted = search.next(trials)
     best = search.best(trials)
     missed = not best.error <= BEYOND * tol
-    return _told(trials, best, search, _unreached(trials, best, tol) if missed else "")
+    return _outcome(trials, best, search, _unreached(trials, best, tol) if missed else "")
 
 
 def _given_up(trials: Sequence[Trial], search: Search, refused: str) -> Outcome:
     """The best of the runs that show that the next one needs too much, or the last one where a user ended it."""
     if trials[-1].problem:
-        return _told(trials, trials[-1], search, trials[-1].problem)
+        return _outcome(trials, trials[-1], search, trials[-1].problem)
     trials = search.estimated(trials)
     best = search.best(trials)
     best.source.cause = MemoryLimitError(refused)
-    return _told(trials, best, search, f"tol = {search.tol:g} was not reached: {refused}; {ASK}")
+    return _outcome(trials, best, search, f"tol = {search.tol:g} was not reached: {refused}; {ASK}")
 
 
 def _no_room(trials: Sequence[Trial], wanted: float, power: float, order: int) -> str:
@@ -117,7 +117,7 @@ def _coming_nearer(trials: Sequence[Trial], tol: float) -> bool:
     return last.error > tol and last.allowed <= min(t.allowed for t in others) and last.error < NEARER * least
 
 
-def _told(trials: Sequence[Trial], best: Trial, search: Search, problem: str) -> Outcome:
+def _outcome(trials: Sequence[Trial], best: Trial, search: Search, problem: str) -> Outcome:
     """The run that counts, with what the trials have shown among its statistics."""
     stats, tol = best.run.record.stats, search.tol
     stats["tolerance"] = {

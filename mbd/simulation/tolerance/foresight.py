@@ -19,7 +19,7 @@ from mbd.simulation.tolerance.trials import Trial
 __all__ = ["LONG", "foreseen"]
 
 LONG = 500_000
-"""Rows that a pilot run is foretold from which looser runs are made first [-]."""
+"""Rows that a pilot run is predicted from which looser runs are made first [-]."""
 LOOSE = 20_000
 """Steps of the finest of the first three, about [-]."""
 FINER = 10.0
@@ -39,10 +39,10 @@ def foreseen(
 
     Parameters
     ----------
-    pilot : a run that was ended because so many rows were foretold
+    pilot : a run that was ended because so many rows were predicted
     power : κ of the errors; order : of the scheme; names : of the results that the tolerance holds for
     """
-    looser = (pilot.source.room.foretold / LOOSE) ** (order / power)
+    looser = (pilot.source.room.expected / LOOSE) ** (order / power)
     allowed = pilot.allowed * FINER**2 * max(looser, NEAREST)
     trials: list[Trial] = []
     while allowed >= NEAREST * pilot.allowed:

@@ -75,8 +75,8 @@ def _motion(found: Faults, run: mbd.Trajectory, told: Readings, smooth: bool) ->
     if any("not resolved by dt" in str(note) for note in run.stats["notes"]):
         return
     scheme, tied = run.settings["integrator"], bool(run.record.lam.shape[1])
-    careful, share = int(run.stats["careful"]), steps.error_share(scheme)
-    steps.motion(found, told, smooth, "index3" not in scheme, careful, tied, share)
+    uncertain, share = int(run.stats["singular_steps"]), steps.error_share(scheme)
+    steps.motion(found, told, smooth, "index3" not in scheme, uncertain, tied, share)
 
 
 def _unresolved(run: mbd.Trajectory, times: Array) -> Array:
@@ -106,8 +106,8 @@ def _rows(found: Faults, run: mbd.Trajectory, model: mbd.Model, told: Readings, 
     bodies = Bodies(model, told.part(chosen))
     there = found.at(bodies.told.time)
     laws.places(there, bodies)
-    careful = int(run.stats["careful"])
-    laws.closure(there, bodies, rates=smooth and "index3" not in run.settings["integrator"], told=careful)
+    uncertain = int(run.stats["singular_steps"])
+    laws.closure(there, bodies, rates=smooth and "index3" not in run.settings["integrator"], told=uncertain)
     laws.constraints(there, bodies)
     acting = loads(bodies)
     if smooth:

@@ -34,7 +34,7 @@ def motion(
     told: Readings,
     smooth: bool = True,
     rates: bool = True,
-    careful: int = 0,
+    uncertain: int = 0,
     tied: bool = True,
     share: float = 0.0,
 ) -> None:
@@ -47,7 +47,7 @@ def motion(
     ----------
     smooth : whether velocities change by accelerations alone, not by impulses within steps
     rates : whether those of velocities count, which index 3 corrects without
-    careful : how many steps next to singular poses the run says to have less accurate velocities
+    uncertain : how many steps next to singular poses the run says to have less accurate velocities
     tied : whether there are rows, onto which corrections move all velocities by what one of them errs
     share : error of a position in a step over h² times the change of its acceleration [-]
     """
@@ -78,7 +78,7 @@ def motion(
         if smooth and rates:
             off = np.diff(v)[steps] - h * (a[steps] + a[steps + 1]) / 2.0
             limit = 2.0 * h * (change + tied * leaps) + 1e-7 * (1.0 + fast)
-            there.small("a rate is the integral of the acceleration", name, off, limit, told=2 * careful)
+            there.small("a rate is the integral of the acceleration", name, off, limit, told=2 * uncertain)
 
 
 def _around(values: Array) -> Array:
