@@ -20,8 +20,9 @@ GROUPS = {
     "Integrators": "HHT GeneralizedAlpha Newmark RadauIIA RungeKutta853",
     "Analysis": "accuracy Accuracy Known effects Effects linearize Linearization StateSpace mobility "
     "Mobility criteria Criteria",
+    "Gaits": "limit_cycle LimitCycle",
     "Errors and failures": "MbdError MbdWarning ModelError AssemblyError SimulationError CapabilityError "
-    "MemoryLimitError TraceError TrajectoryError UnknownNameError Failure Replay replay",
+    "GaitError MemoryLimitError TraceError TrajectoryError UnknownNameError Failure Replay replay",
 }
 """Public names by the title of their page."""
 
@@ -31,7 +32,7 @@ BASES = (
 )
 """What words of one's own inherit from."""
 
-OF_INTEREST = ("Models and bodies", "Starts and runs", "Analysis", "Errors and failures")
+OF_INTEREST = ("Models and bodies", "Starts and runs", "Analysis", "Gaits", "Errors and failures")
 """Pages that show the methods of their classes; what others have is for those who write words of their own."""
 
 
