@@ -302,6 +302,8 @@ def test_a_new_script_checks_runs_and_writes_its_page(tmp_path, monkeypatch, cap
     ("words", "answer"),
     [
         (["rnu", "kneed-walker"], "did you mean 'run'?"),
+        (["run", "kneed-walker", "--tl", "1e-3"], "did you mean '--tol'?"),
+        (["run", "--outt", "x", "kneed-walker"], "did you mean '--out'?"),
         (["run", "kneed-walker", "--unti", "1"], "unrecognized arguments: --unti"),
         (["run", "kneed-walker", "--ot", "x"], "unrecognized arguments: --ot"),
     ],

@@ -8,7 +8,7 @@ import difflib
 import re
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import NoReturn
+from typing import Any, NoReturn
 
 __all__ = ["Parser", "writable"]
 
@@ -18,6 +18,13 @@ class Parser(argparse.ArgumentParser):
 
     def __init__(self, **how: object) -> None:
         super().__init__(**(how | {"allow_abbrev": False}))  # type: ignore[arg-type]
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """As its parent, but what a command does not know is an error of that command, which knows its options."""
+        found, left = super().parse_known_args(args, namespace)
+        if left:
+            self.error(f"unrecognized arguments: {' '.join(left)}")
+        return found, left
 
     def error(self, message: str) -> NoReturn:
         """Usage, what is wrong, and what was probably meant."""

@@ -209,11 +209,11 @@ def _short_touch(run: RunData, record: Record, number: int, contact: Contact) ->
     least = float(run.kernel.least_contact_step[number])
     if least > 0.0:
         safe = dt_of_impacts(run, record, number, _closings(record, events)[:LOOKED_AT])
-        enough = f"; dt below {safe:.2g} s has" if np.isfinite(safe) else ""
-        return [
-            f"{contact.name!r} took steps of down to {least:.2g} s while it was closed: dt = {run.dt:g} s has too few "
-            f"for its impacts{enough}, and a softer stiffness or mbd.Unilateral needs none of them"
-        ], []
+        took = f"{contact.name!r} took steps of down to {least:.2g} s while it was closed"
+        softer = "a softer stiffness or mbd.Unilateral needs none of them"
+        if not safe < run.dt:
+            return [f"{took}, which resolve its impacts; {softer}"], []
+        return [f"{took}: dt = {run.dt:g} s has too few for its impacts; dt below {safe:.2g} s has, and {softer}"], []
     spans = [b.time - a.time for a, b in pairwise(events) if (a.kind, b.kind) == ("closed", "opened")]
     shortest = min(spans, default=np.inf)
     text = f"closed for {shortest / run.dt:.2g} steps only"
