@@ -6,14 +6,20 @@ import io
 import json
 import warnings
 import zipfile
+from functools import cache
+from html.parser import HTMLParser
 from pathlib import Path
+from unicodedata import category
 
 import numpy as np
 import pytest
+from hypothesis import given, settings, strategies as st
 
 import mbd
 from mbd.bodies.values import printable
 from mbd.results import archive
+from mbd.view.page import html
+from mbd.view.posture import instant
 
 ODD = ("_left", "$m", "$a$ b_c^{", r"50 \frac", "a & b < c", "колено", "膝")
 CONTROL = ("a\x1b[2Jb", "a\nb", "a\rb", "a\x00", "a\u202eb", "a\x9b", "a\u2028b", "\ud800x")
@@ -75,6 +81,80 @@ def test_a_file_whose_names_a_terminal_would_obey_is_refused(tmp_path):
     with pytest.raises(mbd.TrajectoryError, match="control characters") as told:
         mbd.load(path)
     assert "\x1b" not in str(told.value)
+
+
+HARMFUL = (
+    "</script>",
+    "<!--",
+    "-->",
+    "&lt;",
+    "'",
+    '"',
+    "`",
+    "$",
+    "\\",
+    "/",
+    "..",
+    "${x}",
+    "%s",
+    "{0}",
+    "</td>",
+    "]]>",
+    "_",
+)
+NAMES = st.lists(st.sampled_from(HARMFUL) | st.characters(), min_size=1, max_size=8).map("".join)
+
+
+class Elements(HTMLParser):
+    """Tags and texts of a page or table."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.tags: list[str] = []
+        self.texts: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.append(tag)
+        self.texts.append("")
+
+    def handle_data(self, data):
+        self.texts[-1:] = [self.texts[-1] + data] if self.texts else []
+
+
+def posed(name: str) -> mbd.Trajectory:
+    """A mechanism all of whose parts have a name, as a run of one row."""
+    model = mbd.Model(name)
+    body = mbd.PointMass(f"{name} body", mass=1.0)
+    model.connect(mbd.Translation(f"{name} joint", model.ground.origin, body.point(0.0, 0.0, name=name)))
+    model.constrain(mbd.Unilateral(f"{name} foot", mbd.touchdown(body.origin)))
+    return instant(model, mbd.assemble(model))
+
+
+@cache
+def tags_of_a_plain_name() -> tuple[list[str], list[str]]:
+    run = posed("plain")
+    return Elements(html(run)).tags, Elements(run._repr_html_()).tags
+
+
+@settings(max_examples=25, deadline=None)
+@given(name=NAMES)
+def test_any_name_is_refused_or_kept_in_pages_tables_and_files(name, tmp_path_factory):
+    """Markup in a name adds no element, and the name that comes back is the one that was given."""
+    try:
+        run = posed(name)
+    except mbd.ModelError as refused:
+        told = str(refused)
+        assert told.splitlines() == [told] and not any(category(sign) in ("Cc", "Cs") for sign in told)
+        return
+    page, shown = Elements(html(run)), Elements(run._repr_html_())
+    assert (page.tags, shown.tags) == tags_of_a_plain_name()
+    assert page.texts[page.tags.index("title")].startswith(name)
+    data = json.loads(page.texts[page.tags.index("script")])
+    assert data["name"] == name and data["points"][0]["name"] == f"{name} body.{name}"
+    assert any(name in text for text in shown.texts)
+    loaded = mbd.load(run.save(tmp_path_factory.mktemp("named") / "run"))
+    assert (loaded.name, loaded.names) == (run.name, run.names)
 
 
 @pytest.mark.parametrize("kind", ["page", "plot", "save"])
