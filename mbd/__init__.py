@@ -49,6 +49,8 @@ if TYPE_CHECKING:
         height as height,
         measure as measure,
         penalty_parameters as penalty_parameters,
+        profile_touchdown as profile_touchdown,
+        rolling_touchdown as rolling_touchdown,
         separation as separation,
         touchdown as touchdown,
     )
@@ -149,7 +151,8 @@ _HOMES = {
     "mbd.assembly.assemble": "assemble",
     "mbd.bodies": "Domain Link Marker PointMass RigidBody box cylinder disk rod segment sphere",
     "mbd.constraints": "Bilateral Controller Event KnifeEdge Nonholonomic Penalty PenaltyParameters Plane "
-    "Rolling Unilateral When distance extension flexion height measure penalty_parameters separation touchdown",
+    "Rolling Unilateral When distance extension flexion height measure penalty_parameters profile_touchdown "
+    "rolling_touchdown separation touchdown",
     "mbd.equations.energy_description": "Coordinate",
     "mbd.lagrangian": "Lagrangian",
     "mbd.errors": "AssemblyError CapabilityError GaitError MbdError MbdWarning MemoryLimitError ModelError "

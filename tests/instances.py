@@ -143,6 +143,16 @@ def first_of(p: Triple, q: Triple) -> Scalar:
     return p[0]
 
 
+SOLE = [(-0.06, 0.01), (0.0, 0.0), (0.08, 0.006), (0.16, 0.03)]
+"""A sole from heel to toe."""
+
+
+def egg(psi: float) -> float:
+    """The support function of an egg."""
+    depth: float = 0.3 + 0.02 * mbd.sin(psi) + 0.01 * mbd.cos(2.0 * psi)
+    return depth
+
+
 FORCES: list[tuple[str, Callable[[Frame, Frame, Joint], Force]]] = [
     ("spring", lambda a, b, joint: mbd.Spring("force", a, b, stiffness=50.0, length=0.3)),
     ("spring without length", lambda a, b, joint: mbd.Spring("force", a, b, stiffness=50.0)),
@@ -170,6 +180,10 @@ MEASURES: list[tuple[str, Callable[[Frame, Frame, Joint], Measure]]] = [
     ("touchdown on a belt", lambda a, b, joint: mbd.touchdown(a, mbd.Plane(velocity=(0.4, 0.0, 0.1)))),
     ("touchdown on a swell", lambda a, b, joint: mbd.touchdown(a, swell)),
     ("touchdown on waves", lambda a, b, joint: mbd.touchdown(a, waves)),
+    ("arc on the ground", lambda a, b, joint: mbd.rolling_touchdown(a, 0.3)),
+    ("arc on a body", lambda a, b, joint: mbd.rolling_touchdown(a, 0.3, mbd.Plane((0.3, 1.0, 0.0), 0.1, frame=b))),
+    ("sole on the ground", lambda a, b, joint: mbd.profile_touchdown(a, SOLE)),
+    ("sole on a body", lambda a, b, joint: mbd.profile_touchdown(b, egg, mbd.Plane((0.3, 1.0, 0.0), frame=a))),
     ("height", lambda a, b, joint: mbd.height(a)),
     ("flexion", lambda a, b, joint: mbd.flexion(joint)),
     ("extension", lambda a, b, joint: mbd.extension(joint, offset=0.1)),
@@ -188,6 +202,10 @@ CONSTRAINTS: list[tuple[str, Callable[[Frame, Frame, Joint], Constraint]]] = [
     ("foot on a belt", lambda a, b, joint: mbd.Unilateral("law", mbd.touchdown(b, mbd.Plane(velocity=(0.4, 0.0))))),
     ("foot on a swell", lambda a, b, joint: mbd.Unilateral("law", mbd.touchdown(b, swell))),
     ("ball on a swell", lambda a, b, joint: mbd.Unilateral("law", mbd.touchdown(a, swell), 0.7, friction=0.0)),
+    ("round foot", lambda a, b, joint: mbd.Unilateral("law", mbd.rolling_touchdown(a, 0.3))),
+    ("round foot with friction", lambda a, b, joint: mbd.Unilateral("law", mbd.rolling_touchdown(a, 0.3), friction=0.3)),
+    ("sole", lambda a, b, joint: mbd.Unilateral("law", mbd.profile_touchdown(b, SOLE))),
+    ("round mat", lambda a, b, joint: mbd.Penalty("law", mbd.rolling_touchdown(a, 0.3), 1e4, damping=10.0)),
     ("knee lock", lambda a, b, joint: mbd.Unilateral("law", mbd.flexion(joint))),
     ("rubber stop", lambda a, b, joint: mbd.Penalty("law", mbd.flexion(joint), stiffness=1e3, damping=2.0)),
     ("mat", lambda a, b, joint: mbd.Penalty("law", mbd.touchdown(a), 1e4, damping=10.0, release="pull")),

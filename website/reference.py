@@ -12,7 +12,7 @@ GROUPS = {
     "Joints and losses": "Revolute Prismatic Translation Planar Cylindrical Universal Screw Weld Viscous Quadratic "
     "Coulomb PinFriction Tabulated Dissipation",
     "Constraints and measures": "Bilateral Unilateral Penalty PenaltyParameters penalty_parameters KnifeEdge Rolling "
-    "Nonholonomic Event Controller When touchdown Plane height flexion extension distance separation measure",
+    "Nonholonomic Event Controller When touchdown rolling_touchdown profile_touchdown Plane height flexion extension distance separation measure",
     "Forces": "Spring Damper TorsionSpring Motor Applied Potential Samples",
     "Functions": "sin cos tan asin acos atan atan2 sinh cosh tanh exp log sqrt hypot sign "
     "maximum minimum clip mod floor where pi",

@@ -12,6 +12,7 @@ from mbd.constraints.nonholonomic import Nonholonomic
 from mbd.constraints.penalty import Penalty
 from mbd.constraints.penalty_parameters import PenaltyParameters, penalty_parameters
 from mbd.constraints.rolling import Rolling
+from mbd.constraints.rolling_touchdown import profile_touchdown, rolling_touchdown
 from mbd.constraints.rules import When
 from mbd.constraints.surfaces import Plane
 from mbd.constraints.touchdown import touchdown
@@ -21,5 +22,6 @@ from mbd.constraints.user_measure import measure
 __all__ = [
     "Bilateral", "Closing", "Constraint", "Controller", "Drag", "Equation", "Event", "KnifeEdge", "Law", "Measure",
     "Nonholonomic", "Penalty", "PenaltyParameters", "Plane", "Rolling", "Unilateral", "VelocityConstraint", "When",
-    "distance", "extension", "flexion", "height", "measure", "penalty_parameters", "separation", "touchdown",
+    "distance", "extension", "flexion", "height", "measure", "penalty_parameters", "profile_touchdown",
+    "rolling_touchdown", "separation", "touchdown",
 ]  # fmt: skip

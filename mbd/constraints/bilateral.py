@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from mbd.bodies.domains import Domain
 from mbd.bodies.values import name_of
 from mbd.constraints.base import Constraint
 from mbd.constraints.expressions import is_expression
@@ -100,8 +101,12 @@ class Bilateral(Constraint):
         return [*self.measure.mentions(), *mentioned(self.arguments)]
 
     def parameters(self) -> dict[str, float]:
-        """`value` where it is a number, and arguments given as numbers."""
-        return value_parameters(self.value, self.arguments, self.name, "value")
+        """`value` where it is a number, arguments given as numbers, and those of its measure."""
+        return value_parameters(self.value, self.arguments, self.name, "value") | self.measure.parameters()
+
+    def domains(self) -> dict[str, Domain]:
+        """Those of its measure."""
+        return self.measure.domains()
 
     def laws(self) -> tuple[str, ...]:
         """`value` where it is no number."""

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from mbd.bodies.domains import Domain
 from mbd.bodies.promises import function_of
 from mbd.bodies.values import among, flag, name_of, names_of
 from mbd.constraints.base import Constraint
@@ -67,6 +68,14 @@ class Event(Constraint):
     def mentions(self) -> list[Mention]:
         """What its guard depends on, and the names that it resets."""
         return [*self.guard.mentions(), *(self.reset if isinstance(self.reset, Mapping) else ())]
+
+    def parameters(self) -> dict[str, float]:
+        """Those of its guard."""
+        return self.guard.parameters()
+
+    def domains(self) -> dict[str, Domain]:
+        """Those of its guard."""
+        return self.guard.domains()
 
     def faults(self) -> list[str]:
         """Those of its guard."""

@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 
 from mbd.bodies.base import Frame
+from mbd.bodies.domains import Domain
 from mbd.bodies.promises import scalar
 from mbd.forces.quantities import Mention
 from mbd.scope import Scope
@@ -70,6 +71,18 @@ class Measure(ABC):
         """What is geometrically impossible about it, one sentence each."""
         return []
 
+    def parameters(self) -> dict[str, float]:
+        """Its run-time parameters by full name; its constraint declares them."""
+        return {}
+
+    def domains(self) -> dict[str, Domain]:
+        """What they may be."""
+        return {}
+
+    def refuse(self, scope: Scope) -> None:
+        """Raise a `CapabilityError` where it does not serve the motion of its frames; asked as equations are derived."""
+        return
+
 
 def gap_of(measure: Measure, scope: Scope) -> Scalar:
     """g of a measure, which may be of a user's class.
@@ -78,7 +91,10 @@ def gap_of(measure: Measure, scope: Scope) -> Scalar:
     ------
     ModelError
         where its `gap` raises, or gives no number.
+    CapabilityError
+        where it does not serve the motion of its frames.
     """
+    measure.refuse(scope)
     return scalar(measure, "gap", "gap(scope)", scope)
 
 

@@ -206,10 +206,11 @@ class Penalty(Constraint):
         return self.measure.mentions()
 
     def parameters(self) -> dict[str, float]:
-        """`stiffness`, and `damping` or `chi` and `slowest`, the least approach speed."""
+        """`stiffness`, and `damping` or `chi` and `slowest`, the least approach speed; and those of its measure."""
         chi = self.chi
         loss = {"damping": self.damper} if chi is None else {"slowest": SLOWEST, "chi": chi}
-        return {f"{self.name}.{field}": value for field, value in {"stiffness": self.stiffness, **loss}.items()}
+        own = {f"{self.name}.{field}": value for field, value in {"stiffness": self.stiffness, **loss}.items()}
+        return own | self.measure.parameters()
 
     def domains(self) -> dict[str, Domain]:
         """A stiffness > 0, damping ≥ 0; χ from that of no loss to that of the least restitution."""
@@ -220,7 +221,7 @@ class Penalty(Constraint):
             largest = chi_for(LEAST_RESTITUTION, law_of(self.law, self.name))
             problem = f"is not between 0 and {largest:g}, which belong to the restitutions 1 and {LEAST_RESTITUTION:g}"
             domains |= {"chi": Domain(low=0.0, high=largest, problem=problem), "slowest": positive(unit="m/s")}
-        return {f"{self.name}.{field}": domain for field, domain in domains.items()}
+        return {f"{self.name}.{field}": domain for field, domain in domains.items()} | self.measure.domains()
 
     def faults(self) -> list[str]:
         """A law that would not push, or would feed energy in."""

@@ -121,12 +121,13 @@ class Unilateral(Constraint):
         return text + (f", only while {other.details} > 0" if isinstance(other, Measure) else f", only while '{other}'")
 
     def parameters(self) -> dict[str, float]:
-        """'<name>.mu' where it slides with friction."""
-        return {f"{self.name}.mu": self.friction} if self.friction else {}
+        """'<name>.mu' where it slides with friction, and those of its measure."""
+        return ({f"{self.name}.mu": self.friction} if self.friction else {}) | self.measure.parameters()
 
     def domains(self) -> dict[str, Domain]:
         """μ ≥ 0."""
-        return {f"{self.name}.mu": Domain(low=0.0, problem="is negative; give 0, or None to stick", called="friction")}
+        mu = Domain(low=0.0, problem="is negative; give 0, or None to stick", called="friction")
+        return {f"{self.name}.mu": mu} | self.measure.domains()
 
     @property
     def others(self) -> tuple[str, ...]:

@@ -39,6 +39,7 @@ class FreeScope:
         self.recorded: dict[str, float] = {}
         self.numbers: dict[Node, float] = {self.time: 0.0}
         self._parameters: dict[str, Node] = {}
+        self._tables: dict[str, Table] = {}
         self._bodies: dict[str, int] = {}
         self.states: dict[str, Node] = {}
         self.asked: set[str] = set()
@@ -61,7 +62,9 @@ class FreeScope:
         return 0.0
 
     def table(self, owner: str, breaks: Sequence[float], coefficients: Sequence[Sequence[float]]) -> Table:
-        return self.tape.table(owner, breaks, coefficients)
+        if owner not in self._tables:
+            self._tables[owner] = self.tape.table(owner, breaks, coefficients)
+        return self._tables[owner]
 
     def state(self, owner: str, field: str, initial: float) -> Node:
         node = self.states.setdefault(f"{owner}.{field}", self.tape.input("z", len(self.states)))

@@ -7,6 +7,7 @@ from hypothesis import given, settings, strategies as st
 import mbd
 from mbd.constraints.measure import Measure
 from mbd.constraints.measures import Distance, JointMeasure, Separation
+from mbd.constraints.rolling_touchdown import ProfileTouchdown, RollingTouchdown
 from mbd.constraints.touchdown import Touchdown
 from mbd.tape.derivatives import gradient
 from mbd.testing import check_measure
@@ -31,7 +32,8 @@ def scene(factory, pose=(0.1, 0.2, 0.3, 0.4, 0.5, 0.6)) -> tuple[Measure, FreeSc
 def test_every_measure_keeps_the_laws(factory):
     measure, _ = scene(factory)
     verdict = check_measure(factory)
-    between_bodies = isinstance(measure, Touchdown) and measure.carrier is not None
+    stands = isinstance(measure, Touchdown | RollingTouchdown | ProfileTouchdown)
+    between_bodies = stands and isinstance(measure.ground, mbd.Plane) and measure.ground.frame is not None
     assert any(law.startswith("frame invariance") for law in verdict.laws) == (
         between_bodies or isinstance(measure, JointMeasure | Distance | Separation)
     )
