@@ -72,10 +72,12 @@ if TYPE_CHECKING:
     from mbd.forces import (
         Applied as Applied,
         Damper as Damper,
+        DCMotor as DCMotor,
         Motor as Motor,
         Potential as Potential,
         Samples as Samples,
         Spring as Spring,
+        TabulatedSpring as TabulatedSpring,
         TorsionSpring as TorsionSpring,
     )
     from mbd.gait.cycle import LimitCycle as LimitCycle
@@ -98,11 +100,13 @@ if TYPE_CHECKING:
         Weld as Weld,
     )
     from mbd.joints.losses import (
+        AffineFriction as AffineFriction,
         Coulomb as Coulomb,
         Dissipation as Dissipation,
         PinFriction as PinFriction,
         Quadratic as Quadratic,
         Tabulated as Tabulated,
+        Valves as Valves,
         Viscous as Viscous,
     )
     from mbd.lagrangian import Lagrangian as Lagrangian
@@ -157,12 +161,12 @@ _HOMES = {
     "mbd.lagrangian": "Lagrangian",
     "mbd.errors": "AssemblyError CapabilityError GaitError MbdError MbdWarning MemoryLimitError ModelError "
     "SimulationError TraceError TrajectoryError UnknownNameError",
-    "mbd.forces": "Applied Damper Motor Potential Samples Spring TorsionSpring",
+    "mbd.forces": "Applied DCMotor Damper Motor Potential Samples Spring TabulatedSpring TorsionSpring",
     "mbd.gait.cycle": "LimitCycle",
     "mbd.gait.limit_cycle": "limit_cycle",
     "mbd.integrators": "HHT GeneralizedAlpha Newmark RadauIIA RungeKutta853",
     "mbd.joints": "Cylindrical Planar Prismatic Revolute Screw Translation Universal Weld",
-    "mbd.joints.losses": "Coulomb Dissipation PinFriction Quadratic Tabulated Viscous",
+    "mbd.joints.losses": "AffineFriction Coulomb Dissipation PinFriction Quadratic Tabulated Valves Viscous",
     "mbd.description": "on_slope",
     "mbd.model": "Model",
     "mbd.assembly.projection": "project",
@@ -187,8 +191,8 @@ if not TYPE_CHECKING:  # type checkers know the names above, and that there are 
         """A public name, from its module (PEP 562)."""
         import importlib
 
-        if name == "testing":  # the law kit, a module of its own
-            return importlib.import_module("mbd.testing")
+        if name in ("testing", "parts"):  # the law kit and the parts of a leg, modules of their own
+            return importlib.import_module(f"mbd.{name}")
         if name in _HOME:
             from mbd.arguments import explained
 
@@ -210,4 +214,4 @@ if not TYPE_CHECKING:  # type checkers know the names above, and that there are 
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_HOME, "testing"})
+    return sorted({*globals(), *_HOME, "parts", "testing"})

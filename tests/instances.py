@@ -6,6 +6,7 @@ FORCES    factory(a, b, joint) → force, from two frames of different bodies an
 MEASURES  factory(a, b, joint) → measure, from the same
 CONSTRAINTS  factory(a, b, joint) → constraint, from the same, whose first body floats on the joint 'float thigh'
 INTEGRATORS  schemes
+PARTS     parts of a leg with their benches
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from collections.abc import Callable
 from typing import Any
 
 import mbd
+from mbd import parts
 from mbd.bodies.base import Frame
 from mbd.constraints.base import Constraint
 from mbd.constraints.measure import Measure
@@ -24,6 +26,7 @@ from mbd.joints.base import Joint
 from mbd.joints.losses.base import Loss
 from mbd.scope import Triple
 from mbd.tape.node import Scalar
+from tests.parts.benches import Part
 
 TILTED = (1.0, 2.0, -2.0)
 """A direction along no axis."""
@@ -85,6 +88,9 @@ LOSSES: list[tuple[str, Callable[[], Loss]]] = [
     ("dry and viscous", lambda: mbd.Coulomb(2.0) + mbd.Viscous(0.7) + mbd.PinFriction(0.3, 0.02)),
     ("tabulated", lambda: mbd.Tabulated([-4.0, -1.0, 2.0, 5.0], [-9.0, -1.5, 1.0, 8.0])),
     ("dissipation of a function", lambda: mbd.Dissipation(cosh_dissipation)),
+    ("valves", lambda: mbd.Valves(backward=mbd.Quadratic(0.8), forward=mbd.Viscous(0.2) + mbd.Quadratic(0.1))),
+    ("friction that falls with speed", lambda: mbd.AffineFriction(3.0, -0.2, smoothing=0.05)),
+    ("friction that grows with speed", lambda: mbd.AffineFriction(3.0, 0.2, smoothing=0.05)),
     ("viscous and quadratic", lambda: mbd.Viscous(0.7) + mbd.Quadratic(0.4)),
 ]
 
@@ -159,6 +165,8 @@ FORCES: list[tuple[str, Callable[[Frame, Frame, Joint], Force]]] = [
     ("damper", lambda a, b, joint: mbd.Damper("force", a, b, 3.0)),
     ("orifice damper", lambda a, b, joint: mbd.Damper("force", a, b, mbd.Quadratic(2.0))),
     ("torsion spring", lambda a, b, joint: mbd.TorsionSpring("force", joint, stiffness=7.0, rest=0.2)),
+    ("measured spring", lambda a, b, joint: mbd.TabulatedSpring("force", joint, [-0.4, 0.0, 0.3], [-30.0, 0.0, 50.0])),
+    ("electric motor", lambda a, b, joint: mbd.DCMotor("force", joint, 3.0, resistance=2.0, constant=0.1)),
     ("constant force", lambda a, b, joint: mbd.Applied("force", a, force=(2.0, 3.0, 4.0))),
     ("constant torque", lambda a, b, joint: mbd.Applied("force", a, torque=2.0)),
     ("force by a function", lambda a, b, joint: mbd.Applied("force", a, force=pull, arguments=("t", "hinge.angle"))),
@@ -203,7 +211,10 @@ CONSTRAINTS: list[tuple[str, Callable[[Frame, Frame, Joint], Constraint]]] = [
     ("foot on a swell", lambda a, b, joint: mbd.Unilateral("law", mbd.touchdown(b, swell))),
     ("ball on a swell", lambda a, b, joint: mbd.Unilateral("law", mbd.touchdown(a, swell), 0.7, friction=0.0)),
     ("round foot", lambda a, b, joint: mbd.Unilateral("law", mbd.rolling_touchdown(a, 0.3))),
-    ("round foot with friction", lambda a, b, joint: mbd.Unilateral("law", mbd.rolling_touchdown(a, 0.3), friction=0.3)),
+    (
+        "round foot with friction",
+        lambda a, b, joint: mbd.Unilateral("law", mbd.rolling_touchdown(a, 0.3), friction=0.3),
+    ),
     ("sole", lambda a, b, joint: mbd.Unilateral("law", mbd.profile_touchdown(b, SOLE))),
     ("round mat", lambda a, b, joint: mbd.Penalty("law", mbd.rolling_touchdown(a, 0.3), 1e4, damping=10.0)),
     ("knee lock", lambda a, b, joint: mbd.Unilateral("law", mbd.flexion(joint))),
@@ -232,3 +243,67 @@ INTEGRATORS: list[Integrator] = [
     mbd.RadauIIA(),
     mbd.RungeKutta853(),
 ]
+
+BENT = {"part.angle": (-1.5, -0.1, ""), "part.angle.rate": (-5.0, 5.0, "1/s")}
+TURNED = {"part.angle": (-0.2, 0.2, ""), "part.angle.rate": (-5.0, 5.0, "1/s")}
+
+
+def rubber(u: Any) -> dict[str, float]:
+    """A stop in some units."""
+    return {"stiffness": 1300.0 * u.Nm, "restitution": 0.4}
+
+
+PARTS: list[tuple[str, Part]] = [
+    ("point foot", Part("foot", lambda m, a, u: parts.point_foot(
+        m, "part", a.point(0.0, -0.2 * u.m), friction=0.4), {})),
+    ("arc foot", Part("foot", lambda m, a, u: parts.arc_foot(
+        m, "part", a.point(0.0, 0.1 * u.m, name="arc"), 0.3 * u.m), {})),
+    ("profile foot", Part("foot", lambda m, a, u: parts.profile_foot(
+        m, "part", a.point(0.0, -0.2 * u.m), [(x * u.m, y * u.m) for x, y in SOLE], friction=0.5), {})),
+    ("heel and toe", Part("foot", lambda m, a, u: parts.heel_and_toe(
+        m, "part", a.point(-0.06 * u.m, -0.2 * u.m), a.point(0.14 * u.m, -0.2 * u.m), friction=0.6), {})),
+    ("keel foot", Part("foot", lambda m, a, u: parts.keel_foot(
+        m, "part", a.point(-0.06 * u.m, -0.22 * u.m), a.point(0.0, -0.2 * u.m), length=0.2 * u.m,
+        stiffness=4e4 * u.N / u.m, mass=0.2 * u.kg, loss=mbd.Viscous(0.5 * u.Nm * u.s), friction=0.6), {})),
+    ("locking knee", Part("knee", lambda m, a, b, u: parts.locking_knee(m, "part", a.end, b.start), BENT)),
+    ("stop knee", Part("knee", lambda m, a, b, u: parts.stop_knee(m, "part", a.end, b.start, stop=rubber(u)), BENT)),
+    ("friction brake knee", Part("knee", lambda m, a, b, u: parts.friction_brake_knee(
+        m, "part", a.end, b.start, mu=0.4, radius=0.03 * u.m, stop=rubber(u)), BENT)),
+    ("hydraulic knee", Part("knee", lambda m, a, b, u: parts.hydraulic_knee(
+        m, "part", a.end, b.start, flexion=0.8 * u.inertia, extension=0.2 * u.inertia, stop=rubber(u)), BENT)),
+    ("pneumatic knee", Part("knee", lambda m, a, b, u: parts.pneumatic_knee(
+        m, "part", a.end, b.start, volume=6e-5 * u.m**3, swept=1.2e-5 * u.m**3, pressure=101325.0 * u.N / u.m**2,
+        stop=rubber(u)), BENT)),
+    ("magnetorheological knee", Part("knee", lambda m, a, b, u: parts.magnetorheological_knee(
+        m, "part", a.end, b.start, torques=dict(zip(parts.PHASES, [20 * u.Nm, 5 * u.Nm, 2 * u.Nm, u.Nm], strict=True)),
+        viscous=0.3 * u.Nm * u.s, foot=parts.point_foot(m, "foot", b.point(0.0, -0.1 * u.m), ground=mbd.Plane(
+            offset=-0.5 * u.m), friction=0.0).name, threshold=20.0 * u.N, period=2e-3 * u.s, smoothing=0.01 / u.s,
+        stop=rubber(u)), BENT)),
+    ("powered knee, short-circuited", Part("knee", lambda m, a, b, u: parts.powered_knee(
+        m, "part", a.end, b.start, voltage=0.0, resistance=0.3 * u.V, constant=0.03 * u.Nm, inductance=1e-3 * u.V * u.s,
+        gear=50.0, rotor=1e-5 * u.inertia, mass=0.1 * u.kg, stop=rubber(u)), BENT)),
+    ("four-bar knee", Part("knee", lambda m, a, b, u: parts.four_bar_knee(
+        m, "part", a.end, b.start, stop={"stiffness": 2000.0, "damping": 5.0}), {
+            "part front upper.angle": (0.2, 1.2, ""), "part rear lower.angle": (0.0, 0.0, ""),
+            "part front upper.angle.rate": (-2.0, 2.0, "1/s"), "part rear lower.angle.rate": (0.0, 0.0, "1/s")},
+        unscaled=True)),
+    ("tabulated ankle", Part("ankle", lambda m, a, b, u: parts.tabulated_ankle(
+        m, "part", a.end, b.origin, angle=[-0.15, 0.0, 0.1, 0.2], torque=[x * u.Nm for x in (-20.0, 0.0, 30.0, 90.0)]),
+        TURNED)),
+    ("bumper ankle", Part("ankle", lambda m, a, b, u: parts.bumper_ankle(
+        m, "part", a.end, b.origin, heel={"stiffness": 150.0 * u.Nm, "damping": u.Nm * u.s, "release": "pull"},
+        toe={"stiffness": 600.0 * u.Nm, "restitution": 0.5}, clearance=0.02), {
+            "part.angle": (-0.015, 0.015, ""), "part.angle.rate": (-5.0, 5.0, "1/s")})),
+    ("hydraulic ankle", Part("ankle", lambda m, a, b, u: parts.hydraulic_ankle(
+        m, "part", a.end, b.origin, plantarflexion=0.2 * u.Nm * u.s, dorsiflexion=0.5 * u.Nm * u.s,
+        stiffness=50.0 * u.Nm), TURNED)),
+    ("series-elastic ankle, idle", Part("ankle", lambda m, a, b, u: parts.series_elastic_ankle(
+        m, "part", a.end, b.origin, torque=0.0, stiffness=60.0 * u.Nm, inertia=0.02 * u.inertia, mass=0.3 * u.kg,
+        motor_loss=mbd.Viscous(0.05 * u.Nm * u.s)), TURNED)),
+    ("socket", Part("ankle", lambda m, a, b, u: parts.elastic_socket(
+        m, "part", a.end, b.origin, stiffness=(3e3 * u.N / u.m, 6e3 * u.N / u.m, 80.0 * u.Nm),
+        damping=(3.0 * u.N * u.s / u.m, 6.0 * u.N * u.s / u.m, 0.1 * u.Nm * u.s)), {"part.y": (-0.01, 0.01, "m")})),
+    ("ligaments", Part("ankle", lambda m, a, b, u: parts.passive_moment(
+        m, "ligaments", parts.stop_knee(m, "part", a.end, b.origin), of="ankle"), TURNED, unscaled=True)),
+]  # fmt: skip
+"""Each part as a user adds it, in any units: it takes energy, or keeps it."""

@@ -30,14 +30,19 @@ SWING.constrain(mbd.Event("below", mbd.measure(lambda a: a, "pivot.angle", unit=
 
 EXAMPLES: dict[str, Any] = {
     "a": ORIGIN, "approach_speed": 1.0, "arguments": ("hinge.angle",), "b": END, "body": UPPER, "body_mass": 70.0,
-    "center": 0.5, "child": END, "coefficient": 1.0, "coordinates": ("theta",), "direction": (1.0, 0.0, 0.0),
-    "effective_mass": 1.0, "failure": "absent.npz", "frame": END, "function": lambda x: x, "guard": ANGLE,
+    "center": 0.5, "child": END, "angle": (-1.0, 0.0, 1.0), "backward": mbd.Viscous(1.0), "coefficient": 1.0,
+    "constant": 1.0, "coordinates": ("theta",), "direction": (1.0, 0.0, 0.0),
+    "effective_mass": 1.0, "failure": "absent.npz", "forward": mbd.Viscous(1.0), "frame": END,
+    "function": lambda x: x, "guard": ANGLE,
     "inertia": (1.0, 1.0, 1.0), "integrator": mbd.HHT(), "joint": HINGE, "kinetic": lambda theta_rate: theta_rate**2,
     "length": 1.0, "loss": 1.0, "mass": 1.0, "measure": ANGLE, "model": MODEL, "mu": 0.1, "name": "new",
     "other": "foot", "parent": ORIGIN, "path": "absent.npz", "penetration": 1e-3, "pitch": 0.1, "point": END,
-    "radius": 0.1, "rate": (-1.0, 0.0, 1.0), "restitution": 0.5, "row": lambda rate: rate, "sides": (1.0, 1.0, 1.0),
-    "slope": 0.1, "start": START, "state": START, "stiffness": 1.0, "subject": ANGLE, "time": (0.0, 1.0, 2.0),
-    "torque": 1.0, "until": 0.0, "update": lambda time, values, state: None, "values": (0.0, 1.0, 2.0),
+    "radius": 0.1, "rate": (-1.0, 0.0, 1.0), "resistance": 1.0,
+    "restitution": 0.5, "row": lambda rate: rate, "sides": (1.0, 1.0, 1.0),
+    "slope": 0.1, "smoothing": 0.1,
+    "sole": ((-0.1, 0.1), (0.0, 0.0), (0.2, 0.1)), "start": START, "state": START, "stiffness": 1.0, "subject": ANGLE,
+    "time": (0.0, 1.0, 2.0), "torque": 1.0, "until": 0.0, "update": lambda time, values, state: None, "values": (0.0, 1.0, 2.0),
+    "voltage": 1.0,
 }  # fmt: skip
 """A right argument by the name of its parameter."""
 
@@ -45,9 +50,14 @@ OWN: dict[tuple[str, str], Any] = {
     ("Applied", "force"): (1.0, 0.0, 0.0), ("accuracy", "until"): 0.1, ("effects", "until"): 0.1,
     ("Controller", "period"): 0.1, ("Event", "direction"): 0, ("Marker", "place"): (0.1, 0.2), ("Motor", "torque"): 1.0,
     ("Nonholonomic", "arguments"): ("hinge.rate",), ("Rolling", "center"): END,
+<<<<<<< HEAD
     ("Tabulated", "torque"): (-1.0, 0.0, 1.0),
     ("limit_cycle", "model"): SWING, ("limit_cycle", "start"): mbd.assemble(SWING, position={"pivot.angle": 0.3}),
     ("limit_cycle", "section"): "below", ("limit_cycle", "on_failure"): "return", ("limit_cycle", "longest"): 3.0,
+=======
+    ("Tabulated", "torque"): (-1.0, 0.0, 1.0), ("TabulatedSpring", "torque"): (-1.0, 0.0, 1.0),
+    ("rolling_touchdown", "center"): END,
+>>>>>>> a0a3d55 (Parts of a leg: feet, knees, ankles, socket, body; valves, measured springs, electric motors)
     ("effects", "dt"): 0.1, ("segment", "name"): "thigh", ("simulate", "dt"): 0.1, ("sweep", "dt"): 0.1,
     ("sweep", "values"): {"upper.mass": [1.0]},
 }  # fmt: skip

@@ -22,6 +22,7 @@ RANKS = [
     ("forces",),
     ("constraints",),
     ("description",),
+    ("parts",),
     ("configuration", "topology"),
     ("equations",),
     ("compile",),

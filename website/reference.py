@@ -10,10 +10,11 @@ GROUPS = {
     "Models and bodies": "Model Lagrangian Coordinate PointMass Link RigidBody Marker box cylinder disk rod segment "
     "sphere Domain on_slope",
     "Joints and losses": "Revolute Prismatic Translation Planar Cylindrical Universal Screw Weld Viscous Quadratic "
-    "Coulomb PinFriction Tabulated Dissipation",
+    "Coulomb AffineFriction PinFriction Tabulated Valves Dissipation",
     "Constraints and measures": "Bilateral Unilateral Penalty PenaltyParameters penalty_parameters KnifeEdge Rolling "
-    "Nonholonomic Event Controller When touchdown rolling_touchdown profile_touchdown Plane height flexion extension distance separation measure",
-    "Forces": "Spring Damper TorsionSpring Motor Applied Potential Samples",
+    "Nonholonomic Event Controller When touchdown rolling_touchdown profile_touchdown Plane "
+    "height flexion extension distance separation measure",
+    "Forces": "Spring Damper TorsionSpring TabulatedSpring Motor DCMotor Applied Potential Samples",
     "Functions": "sin cos tan asin acos atan atan2 sinh cosh tanh exp log sqrt hypot sign "
     "maximum minimum clip mod floor where pi",
     "Starts and runs": "assemble project State simulate Trajectory load sweep Sweep",

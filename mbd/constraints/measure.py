@@ -80,7 +80,7 @@ class Measure(ABC):
         return {}
 
     def refuse(self, scope: Scope) -> None:
-        """Raise a `CapabilityError` where it does not serve the motion of its frames; asked as equations are derived."""
+        """Raise a `CapabilityError` where it does not serve the motion of its frames; asked by the equations."""
         return
 
 

@@ -148,7 +148,8 @@ def rolling_touchdown(center: Frame, radius: float, ground: Any = None) -> Rolli
     """Height of a round foot over a plane; the foot can roll where it comes down (McGeer's curved foot, or a wheel).
 
     ``g = n · s_C − r`` with the place s_C of the center on the plane. In a `Unilateral` with friction=None it rolls
-    without slip from where it came down, ``t · v_C + r φ̇ = 0``; with μ it rolls, slips and grips again; with 0 it slides.
+    without slip from where it came down, ``t · v_C + r φ̇ = 0``; with μ it rolls, slips and grips again; with 0 it
+    slides.
 
     T. McGeer, Passive dynamic walking, Int. J. Robotics Research 9 (1990) 62.
 
@@ -183,8 +184,7 @@ def profile_touchdown(frame: Frame, sole: Any, ground: Any = None) -> ProfileTou
     neighbours; hollows are bridged, since they do not touch. Heel and toe end in corners over which it tips.
 
     A. H. Hansen, D. S. Childress & E. H. Knox, Roll-over shapes of human locomotor systems, Clinical Biomechanics 19
-    (2004) 407. Support functions: H. Goldstein's rolling of convex bodies; T. Bonnesen & W. Fenchel, Theory of Convex
-    Bodies (1934), § 15.
+    (2004) 407. Support functions: T. Bonnesen & W. Fenchel, Theorie der konvexen Körper (1934), § 15.
 
     Parameters
     ----------

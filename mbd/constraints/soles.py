@@ -11,13 +11,14 @@ from typing import Any
 
 from mbd.bodies.algebra import derivatives_at
 from mbd.errors import ModelError
-from mbd.tape.interpolation import Pieces
-from mbd.tape.node import Node, Tape
+from mbd.tape.interpolation import Pieces, joined
+from mbd.tape.node import Tape
+from mbd.tape.tracing import traced_scalar
 
 __all__ = ["Sole", "sole_of"]
 
 FINENESS = math.radians(3.0)
-"""Largest distance of tangents at which the support function is told [rad]."""
+"""Largest distance of tangents at which the support function is known [rad]."""
 
 ROUND_OFF = 1e-9
 """Share of the sole's size by which its radius of curvature may be negative and counts as 0 [-]."""
@@ -51,8 +52,14 @@ def sole_of(value: Any, what: str) -> Sole:
     if isinstance(value, Sole):
         return value
     if callable(value):
-        return _joined(_of_function(value, what))
-    return _joined(_of_points(_points(value, what), what))
+        return _sole(_of_function(value, what))
+    return _sole(_of_points(_points(value, what), what))
+
+
+def _sole(known: Sequence[Support]) -> Sole:
+    """∫h dψ of a support function known at some tangents."""
+    distinct = [known[0], *(b for a, b in pairwise(known) if b[0] > a[0])]
+    return Sole(*joined(distinct))
 
 
 def _points(value: Any, what: str) -> list[Point]:
@@ -63,14 +70,16 @@ def _points(value: Any, what: str) -> list[Point]:
     except (TypeError, ValueError):
         raise ModelError(f"{what} is {wanted}; got {value!r}") from None
     if len(rows) < 3:
-        raise ModelError(f"{what} is {wanted}; got {len(rows)} points: for one use mbd.touchdown, for two a heel and toe")
+        raise ModelError(
+            f"{what} is {wanted}; got {len(rows)} points: for one use mbd.touchdown, for two a heel and toe"
+        )
     for k, point in enumerate(rows):
         if not all(map(math.isfinite, point)):
             raise ModelError(f"{what}: point number {k} is {point}; remove what is missing")
         if k and point[0] <= rows[k - 1][0]:
             raise ModelError(
-                f"{what}: x must increase from heel to toe, but point number {k - 1} has {rows[k - 1][0]:g} m and number "
-                f"{k} has {point[0]:g} m; sort the points"
+                f"{what}: x must increase from heel to toe, but point number {k - 1} has {rows[k - 1][0]:g} m and "
+                f"number {k} has {point[0]:g} m; sort the points"
             )
     return rows
 
@@ -107,12 +116,12 @@ def _of_points(points: Sequence[Point], what: str) -> list[Support]:
         raise ModelError(
             f"{what} is flat or hollow: only its ends touch level ground; use two mbd.Unilateral contacts, heel and toe"
         )
-    told = [_support(psi, point) for psi, point in zip(_tangents(hull), hull, strict=True)]
+    known = [_support(psi, point) for psi, point in zip(_tangents(hull), hull, strict=True)]
     heel, toe = hull[0], hull[-1]
     chord = math.atan2(heel[1] - toe[1], heel[0] - toe[0]) % (2.0 * math.pi)  # the edge from toe to heel, upside down
-    before = [_support(psi, heel) for psi in _between(chord - 2.0 * math.pi, told[0][0])]
-    after = [_support(psi, toe) for psi in _between(told[-1][0], chord)]
-    return _of_one_turn([*before, *told, *after])
+    before = [_support(psi, heel) for psi in _between(chord - 2.0 * math.pi, known[0][0])]
+    after = [_support(psi, toe) for psi in _between(known[-1][0], chord)]
+    return _of_one_turn([*before, *known, *after])
 
 
 def _between(low: float, high: float) -> list[float]:
@@ -127,10 +136,10 @@ def _support(psi: float, point: Point) -> Support:
     return psi, x * s - y * c, x * c + y * s
 
 
-def _of_one_turn(told: Sequence[Support]) -> list[Support]:
+def _of_one_turn(known: Sequence[Support]) -> list[Support]:
     """The same between −π and π, with equal values at both."""
     turn = 2.0 * math.pi
-    around = sorted(((psi + math.pi) % turn - math.pi, h, slope) for psi, h, slope in told)
+    around = sorted(((psi + math.pi) % turn - math.pi, h, slope) for psi, h, slope in known)
     (a, ha, sa), (b, hb, sb) = around[-1], (around[0][0] + turn, *around[0][1:])
     width = b - a
     t = (math.pi - a) / width
@@ -144,38 +153,26 @@ def _of_one_turn(told: Sequence[Support]) -> list[Support]:
 def _of_function(function: Callable[[Any], Any], what: str) -> list[Support]:
     """The support function and its slope at equal distances over a turn."""
     count = math.ceil(2.0 * math.pi / FINENESS)
-    told: list[Support] = []
+    known: list[Support] = []
     for k in range(count + 1):
         psi = -math.pi + 2.0 * math.pi * k / count
         tape = Tape()
-        value, (slope,) = derivatives_at(function, [psi], tape)
-        numbers = [float(part.data) if isinstance(part, Node) and part.is_constant else part for part in (value, slope)]
-        if not all(isinstance(part, float | int) and math.isfinite(part) for part in numbers):
+        value, (slope,) = derivatives_at(
+            lambda x, tape=tape: traced_scalar(function, [("psi", x)], what, tape), [psi], tape
+        )
+        h, rise = (float(part.data) if part.is_constant else math.nan for part in (value, slope))
+        if not math.isfinite(h + rise):
             raise ModelError(f"{what}: h(ψ) must be a finite number [m], got {value!r} at ψ = {psi:.6g} rad")
-        told.append((psi, float(numbers[0]), float(numbers[1])))
-    size = max(abs(h) for _, h, _ in told) or 1.0
-    if abs(told[0][1] - told[-1][1]) > ROUND_OFF * size:
-        raise ModelError(f"{what}: h(−π) = {told[0][1]:.6g} m and h(π) = {told[-1][1]:.6g} m must be equal, a turn apart")
-    for (a, ha, sa), (b, hb, sb) in pairwise(told):
+        known.append((psi, h, rise))
+    size = max(abs(h) for _, h, _ in known) or 1.0
+    if abs(known[0][1] - known[-1][1]) > ROUND_OFF * size:
+        raise ModelError(
+            f"{what}: h(−π) = {known[0][1]:.6g} m and h(π) = {known[-1][1]:.6g} m must be equal, a turn apart"
+        )
+    for (a, ha, sa), (b, hb, sb) in pairwise(known):
         radius = (sb - sa) / (b - a) + 0.5 * (ha + hb)  # h + h'', to second order
         if radius < -1e-3 * size:
-            raise ModelError(f"{what} is not convex: its radius of curvature h + h'' is {radius:.3g} m at ψ = {a:.3g} rad")
-    return told
-
-
-def _joined(told: Sequence[Support]) -> Sole:
-    """∫h dψ of the quadratics that join values and slopes, two to an interval (Schumaker 1983)."""
-    breaks: list[float] = []
-    rows: list[tuple[float, float, float, float]] = []
-    total = 0.0
-    for (a, ha, sa), (b, hb, sb) in pairwise(told):
-        half = 0.5 * (b - a)
-        if half <= 0.0:
-            continue
-        middle = (hb - ha) / half - 0.5 * (sa + sb)  # slope in the middle, so that both halves meet
-        for start, h, slope, end in ((a, ha, sa, middle), (a + half, ha + 0.5 * half * (sa + middle), middle, sb)):
-            bend = (end - slope) / (2.0 * half)
-            breaks.append(start)
-            rows.append((total, h, 0.5 * slope, bend / 3.0))
-            total += half * (h + half * (0.5 * slope + half * bend / 3.0))
-    return Sole(Pieces(tuple(breaks), tuple(rows)), total)
+            raise ModelError(
+                f"{what} is not convex: its radius of curvature h + h'' is {radius:.3g} m at ψ = {a:.3g} rad"
+            )
+    return known

@@ -3,10 +3,15 @@
 from mbd.forces.applied import Applied
 from mbd.forces.base import Action, Force
 from mbd.forces.damper import Damper
+from mbd.forces.dc_motor import DCMotor
 from mbd.forces.motor import Motor
 from mbd.forces.potential import Potential
 from mbd.forces.quantities import Samples
 from mbd.forces.spring import Spring
+from mbd.forces.tabulated_spring import TabulatedSpring
 from mbd.forces.torsion_spring import TorsionSpring
 
-__all__ = ["Action", "Applied", "Damper", "Force", "Motor", "Potential", "Samples", "Spring", "TorsionSpring"]
+__all__ = [
+    "Action", "Applied", "DCMotor", "Damper", "Force", "Motor", "Potential", "Samples", "Spring", "TabulatedSpring",
+    "TorsionSpring",
+]  # fmt: skip

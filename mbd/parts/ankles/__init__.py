@@ -1,0 +1,1 @@
+"""Ankles: what joins shank and foot."""

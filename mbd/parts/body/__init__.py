@@ -1,0 +1,1 @@
+"""The body: segments, what its joints resist, and what joins it to a prosthesis."""

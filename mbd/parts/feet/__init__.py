@@ -1,0 +1,1 @@
+"""Feet: where a leg meets the ground."""

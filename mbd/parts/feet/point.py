@@ -1,0 +1,48 @@
+"""A foot that is a point."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mbd.bodies.base import Frame
+from mbd.constraints.touchdown import touchdown
+from mbd.constraints.unilateral import Unilateral
+from mbd.description import Description
+from mbd.parts.arguments import check, released
+
+__all__ = ["point_foot"]
+
+
+def point_foot(
+    model: Description,
+    name: str,
+    point: Frame,
+    *,
+    release: Any = None,
+    friction: float | None = None,
+    ground: Any = None,
+) -> Unilateral:
+    """A point that strikes without bouncing and then sticks, or slips with friction: ``0 ≤ g ⟂ p ≥ 0``.
+
+    Passive. The point foot of the simplest walkers: M. Garcia, A. Chatterjee, A. Ruina & M. Coleman, The simplest
+    walking model, J. Biomech. Eng. 120 (1998) 281.
+
+    Parameters
+    ----------
+    model, name : the model, and the name of the contact
+    point : where it meets the ground
+    release : name of the foot that takes over as it strikes (McGeer's rule), or `When`; None: it opens on pull. With
+        ``When(other, may_pull=False)`` it opens by either; friction of a foot that pulls is 0, never negative
+    friction : μ; None: it sticks
+    ground : as of `touchdown`
+
+    >>> import mbd
+    >>> model, shank = mbd.Model("leg"), mbd.Link("shank", mass=3.0, length=0.4, center=0.2)
+    >>> model.connect(mbd.Planar("body", model.ground.origin, shank.start))
+    >>> mbd.parts.point_foot(model, "left foot", shank.end, friction=0.8).slides
+    True
+    """
+    check(model, name, "point_foot")
+    foot = Unilateral(name, touchdown(point, ground), friction=friction, release=released(release))
+    model.constrain(foot)
+    return foot

@@ -1,0 +1,1 @@
+"""Knees: what joins thigh and shank."""
