@@ -41,8 +41,8 @@ EXAMPLES: dict[str, Any] = {
     "restitution": 0.5, "row": lambda rate: rate, "sides": (1.0, 1.0, 1.0),
     "slope": 0.1, "smoothing": 0.1,
     "sole": ((-0.1, 0.1), (0.0, 0.0), (0.2, 0.1)), "start": START, "state": START, "stiffness": 1.0, "subject": ANGLE,
-    "time": (0.0, 1.0, 2.0), "torque": 1.0, "until": 0.0, "update": lambda time, values, state: None, "values": (0.0, 1.0, 2.0),
-    "voltage": 1.0,
+    "time": (0.0, 1.0, 2.0), "torque": 1.0, "until": 0.0, "update": lambda time, values, state: None,
+    "values": (0.0, 1.0, 2.0), "voltage": 1.0,
 }  # fmt: skip
 """A right argument by the name of its parameter."""
 
@@ -50,14 +50,10 @@ OWN: dict[tuple[str, str], Any] = {
     ("Applied", "force"): (1.0, 0.0, 0.0), ("accuracy", "until"): 0.1, ("effects", "until"): 0.1,
     ("Controller", "period"): 0.1, ("Event", "direction"): 0, ("Marker", "place"): (0.1, 0.2), ("Motor", "torque"): 1.0,
     ("Nonholonomic", "arguments"): ("hinge.rate",), ("Rolling", "center"): END,
-<<<<<<< HEAD
-    ("Tabulated", "torque"): (-1.0, 0.0, 1.0),
-    ("limit_cycle", "model"): SWING, ("limit_cycle", "start"): mbd.assemble(SWING, position={"pivot.angle": 0.3}),
-    ("limit_cycle", "section"): "below", ("limit_cycle", "on_failure"): "return", ("limit_cycle", "longest"): 3.0,
-=======
     ("Tabulated", "torque"): (-1.0, 0.0, 1.0), ("TabulatedSpring", "torque"): (-1.0, 0.0, 1.0),
     ("rolling_touchdown", "center"): END,
->>>>>>> a0a3d55 (Parts of a leg: feet, knees, ankles, socket, body; valves, measured springs, electric motors)
+    ("limit_cycle", "model"): SWING, ("limit_cycle", "start"): mbd.assemble(SWING, position={"pivot.angle": 0.3}),
+    ("limit_cycle", "section"): "below", ("limit_cycle", "on_failure"): "return", ("limit_cycle", "longest"): 3.0,
     ("effects", "dt"): 0.1, ("segment", "name"): "thigh", ("simulate", "dt"): 0.1, ("sweep", "dt"): 0.1,
     ("sweep", "values"): {"upper.mass": [1.0]},
 }  # fmt: skip

@@ -50,6 +50,8 @@ def pages() -> dict[str, str]:
     found["reference/words-of-your-own.md"] = _page("Words of your own", BASES.split(), members=True)
     kit = [f"mbd.testing.{name}" for name in mbd.testing.__all__]
     found["reference/testing-kit.md"] = _page("The testing kit", kit, members=False)
+    parts = [f"mbd.parts.{name}" for name in mbd.parts.__all__ if callable(getattr(mbd.parts, name))]
+    found["reference/parts-of-a-leg.md"] = _page("Parts of a leg", parts, members=False)
     return {"reference/index.md": "\n".join(listing), **found}
 
 
