@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from mbd.analysis.accuracy import Accuracy as Accuracy, Known as Known, accuracy as accuracy
+    from mbd.analysis.designs import latin_hypercube as latin_hypercube, sobol as sobol
     from mbd.analysis.effects import Effects as Effects, effects as effects
     from mbd.analysis.linearization import Linearization as Linearization
     from mbd.analysis.linearize import linearize as linearize
@@ -151,6 +152,7 @@ _HOMES = {
     "mbd.analysis.effects": "Effects effects",
     "mbd.assembly.mobility": "Mobility mobility",
     "mbd.analysis.numerical": "Criteria criteria",
+    "mbd.analysis.designs": "latin_hypercube sobol",
     "mbd.analysis.sweep": "Sweep sweep",
     "mbd.assembly.assemble": "assemble",
     "mbd.bodies": "Domain Link Marker PointMass RigidBody box cylinder disk rod segment sphere",

@@ -67,13 +67,15 @@ WORDS = {
     mbd.Marker: ("ankle", ROD, (0.1, 0.2)),
     mbd.Model: ("model",),
     mbd.on_slope: (0.1,),
+    mbd.latin_hypercube: ({"rod.mass": (1.0, 2.0)}, 4),
+    mbd.sobol: ({"rod.mass": (1.0, 2.0)}, 4),
 }  # fmt: skip
 """Each word with arguments that make one, of which every one is exchanged for wrong ones."""
 
 BESIDE = {
     "made by others, not by users": (
-        mbd.Accuracy, mbd.Criteria, mbd.Effects, mbd.Failure, mbd.Known, mbd.LimitCycle, mbd.Linearization, mbd.Mobility,
-        mbd.PenaltyParameters, mbd.Replay, mbd.State, mbd.StateSpace, mbd.Sweep, mbd.Trajectory,
+        mbd.Accuracy, mbd.Criteria, mbd.Effects, mbd.Failure, mbd.Known, mbd.LimitCycle, mbd.Linearization,
+        mbd.Mobility, mbd.PenaltyParameters, mbd.Replay, mbd.State, mbd.StateSpace, mbd.Sweep, mbd.Trajectory,
     ),
     "take a model and a run: tests of their own": (
         mbd.accuracy, mbd.assemble, mbd.criteria, mbd.effects, mbd.limit_cycle, mbd.linearize, mbd.load, mbd.mobility,

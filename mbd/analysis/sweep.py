@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import inspect
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import nullcontext
 from dataclasses import dataclass
-from itertools import product
+from itertools import chain, product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from mbd.analysis.sweep_runs import SETTINGS, Results, Runs, cell, rows_of
+from mbd.analysis.sweep_file import SweepFile
+from mbd.analysis.sweep_runs import SETTINGS, Results, Row, Runs, cell, rows_of
 from mbd.bodies.values import flag, shown
 from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import ModelError, UnknownNameError, nearest
@@ -36,6 +38,7 @@ class Sweep:
     Attributes
     ----------
     names : what was varied; cases : its values in each run, in the order of `names`, the last varying fastest
+    dimensions : names that change together, and how many values they take; the runs are all combinations of these
     results : by title, one value for each run; NaN where the run failed
     success, messages : of each run
     complete : False where Ctrl-C ended the sweep; runs that it never came to say so in their message
@@ -47,6 +50,7 @@ class Sweep:
     success: tuple[bool, ...]
     messages: tuple[str, ...]
     complete: bool = True
+    dimensions: tuple[tuple[tuple[str, ...], int], ...] = ()
 
     def __len__(self) -> int:
         return len(self.cases)
@@ -70,6 +74,25 @@ class Sweep:
         from mbd.results.tables import library
 
         return library("pandas", "data", "Sweep.to_dataframe()").DataFrame(self.columns)
+
+    def to_xarray(self) -> Any:
+        """An xarray Dataset with a dimension for everything that was varied by itself.
+
+        Names that changed together share the dimension 'a, b', along which each is a coordinate. What is no number,
+        such as a scheme, is its text. `success` and `message` are variables beside the results.
+        """
+        from mbd.results.tables import library
+
+        xarray = library("xarray", "data", "Sweep.to_xarray()")
+        sizes = tuple(size for _, size in self.dimensions)
+        axes = tuple(", ".join(names) for names, _ in self.dimensions)
+        columns = {title: _plain(column).reshape(sizes) for title, column in self.columns.items()}
+        coordinates: dict[str, Any] = {}
+        for axis, (names, _) in enumerate(self.dimensions):
+            first = tuple(slice(None) if k == axis else 0 for k in range(len(sizes)))
+            coordinates |= {name: ((axes[axis],), columns[name][first]) for name in names}
+        variables = {title: (axes, column) for title, column in columns.items() if title not in self.names}
+        return xarray.Dataset(variables, coords=coordinates)
 
     def to_csv(self, path: str | Path) -> Path:
         """Write the table with a line for each run."""
@@ -108,13 +131,20 @@ class Sweep:
             yield line if self.success[k] else f"{line}  failed: {self.messages[k]}"
 
 
+def _plain(column: Sequence[Any]) -> Any:
+    """Numbers and flags as they are, all else as text."""
+    array = np.array(column)
+    return array if array.dtype.kind in "fiub" else np.array([str(value) for value in column])
+
+
 def sweep(
     model: Any,
-    values: Mapping[str, Sequence[Any]],
+    values: Mapping[str | tuple[str, ...], Sequence[Any]],
     start: State | Callable[[Mapping[str, float]], State],
     results: Results = (),
     *,
     executor: Executor | None = None,
+    file: str | Path | None = None,
     progress: bool = False,
     **settings: Any,
 ) -> Sweep:
@@ -126,13 +156,17 @@ def sweep(
     ----------
     model : a `Model` or `Lagrangian`
     values : what to vary, ``{"rod.mass": [1.0, 2.0], "dt": [1e-3, 5e-4], "integrator": [mbd.HHT(), mbd.RadauIIA()]}``:
-        names of parameters and of the arguments integrator, dt, tol, until, contact, impact, locate, rest_speed
+        names of parameters and of the arguments integrator, dt, tol, until, contact, impact, locate, rest_speed. Names
+        in a tuple change together: ``{("left leg.mass", "right leg.mass"): [(5.0, 5.0), (5.0, 4.2)]}``, as those of
+        the designs `latin_hypercube` and `sobol` do
     start : a state; or a function of the parameters that differ, by name, that assembles one
     results : what to keep: names of quantities, whose value at the end of the run is kept, or functions by title,
         ``{"top": lambda run: run["hip.angle"].max()}``
     executor : any ``concurrent.futures.Executor``, for runs side by side: a ``ThreadPoolExecutor()`` (machine code runs
         without Python's lock), or a ``ProcessPoolExecutor()`` where model, start and functions can be pickled, whose
         processes derive a model once at most and take its machine code from the cache; None: in turn
+    file : to which every run is added as it ends, and from which runs are taken that it has already: a sweep
+        that was ended or killed goes on where it was
     progress : True for a bar on a terminal
     settings : further arguments of `simulate`, the same in all runs
 
@@ -145,30 +179,74 @@ def sweep(
     Raises
     ------
     ModelError, UnknownNameError
-        for names that the model does not have, and what cannot be sent to processes, before the first run.
+        for names that the model does not have, what cannot be sent to processes, and a file of another sweep, before
+        the first run.
     """
     bar_wanted = flag(progress, "progress of a sweep")
-    titles = _checked(model, values, start, results, executor, settings)
-    cases = tuple(product(*values.values()))
-    runs = Runs(model, tuple(values), start, results, settings)
+    dimensions = _dimensions(values)
+    names = tuple(name for together, _ in dimensions for name in together)
+    titles = _checked(model, names, start, results, executor, settings)
+    cases = tuple(tuple(chain(*parts)) for parts in product(*(rows for _, rows in dimensions)))
+    runs = Runs(model, names, start, results, settings)
+    known = None if file is None else SweepFile(file, runs, getattr(model, "parameters", {}))
     with share_bar() if bar_wanted else nullcontext() as bar:
-        rows, complete = rows_of(runs, cases, executor, bar)
+        rows, complete = _made(runs, cases, executor, known, bar)
     columns = {title: tuple(row.results[k] for row in rows) for k, title in enumerate(titles)}
     success, messages = tuple(row.success for row in rows), tuple(row.message for row in rows)
-    return Sweep(tuple(values), cases, columns, success, messages, complete)
+    sizes = tuple((together, len(several)) for together, several in dimensions)
+    return Sweep(names, cases, columns, success, messages, complete, sizes)
 
 
-def _checked(model: Any, values: Any, start: Any, results: Any, executor: Any, settings: Any) -> list[str]:
+def _made(
+    runs: Runs, cases: Sequence[tuple[Any, ...]], executor: Executor | None, known: SweepFile | None, bar: Any
+) -> tuple[list[Row], bool]:
+    """The rows of all cases: those that the file has, and the others, which are added to it."""
+    rows = [None if known is None else known.row(case) for case in cases]
+    left = [place for place, row in enumerate(rows) if row is None]
+    done = len(cases) - len(left)
+
+    def report(place: int, row: Row) -> None:
+        nonlocal done
+        done += 1
+        if known is not None and not row.stopped:
+            known.keep(cases[left[place]], row)
+        if bar is not None:
+            bar(done, len(cases))
+
+    made, complete = rows_of(runs, [cases[place] for place in left], executor, report)
+    found = iter(made)
+    return [next(found) if row is None else row for row in rows], complete
+
+
+def _dimensions(values: Any) -> list[tuple[tuple[str, ...], list[tuple[Any, ...]]]]:
+    """Names that change together, with their values in turn; every fault of the values at once."""
+    if not isinstance(values, Mapping) or not values:
+        raise ModelError(
+            f"values of a sweep must map names to lists, such as {{'rod.mass': [1.0, 2.0]}}, not {shown(values)}"
+        )
+    faults: list[str] = []
+    found: list[tuple[tuple[str, ...], list[tuple[Any, ...]]]] = []
+    for name, several in values.items():
+        if isinstance(several, str) or not hasattr(several, "__len__") or not len(several):
+            faults.append(f"values of {name!r} must be a list of at least one, not {shown(several)}")
+        elif not isinstance(name, tuple):
+            found.append(((name,), [(value,) for value in several]))
+        elif not all(isinstance(each, list | tuple) and len(each) == len(name) for each in several):
+            faults.append(f"values of {name!r}, which change together, must be tuples of {len(name)}")
+        else:
+            found.append((name, [tuple(each) for each in several]))
+    names = [name for together, _ in found for name in together]
+    faults += [f"{name!r} is given twice among the values" for name, count in Counter(names).items() if count > 1]
+    if faults:
+        raise ModelError(faults)
+    return found
+
+
+def _checked(
+    model: Any, values: Sequence[str], start: Any, results: Any, executor: Any, settings: Mapping[str, Any]
+) -> list[str]:
     """Titles of the results; every fault of the arguments at once."""
     faults = []
-    if not isinstance(values, Mapping) or not values:
-        faults.append(f"values of a sweep must map names to lists, such as {{'rod.mass': [1.0, 2.0]}}, not {values!r}")
-        values = {}
-    faults += [
-        f"values of {name!r} must be a list of at least one, not {several!r}"
-        for name, several in values.items()
-        if isinstance(several, str) or not hasattr(several, "__len__") or not len(several)
-    ]
     faults += [
         f"{name!r} is given among the values and as an argument; give it once" for name in values if name in settings
     ]

@@ -208,40 +208,44 @@ def _keep(store: OrderedDict[str, Any], digest: str, value: Any) -> None:
 
 # all runs ---------------------------------------------------------------------------------------------------------
 def rows_of(
-    runs: Runs, cases: Sequence[tuple[Any, ...]], executor: Executor | None, bar: Any
+    runs: Runs, cases: Sequence[tuple[Any, ...]], executor: Executor | None, report: Callable[[int, Row], None]
 ) -> tuple[list[Row], bool]:
-    """What came of every case, in their order, and whether all were run: the user may stop that."""
+    """What came of every case, in their order, and whether all were run: the user may stop that.
+
+    report : called with the number of a case and its row as soon as that is there
+    """
     if executor is None:
-        return _in_turn(runs, cases, bar)
+        return _in_turn(runs, cases, report)
     if isinstance(executor, ProcessPoolExecutor):
         _ = runs.parcel  # what cannot be sent is named before anything runs
-    futures: list[Future[Row]] = []
+    places: dict[Future[Row], int] = {}
     complete = True
     try:
-        for case in cases:
-            futures.append(executor.submit(runs, case))
-        for done, _ in enumerate(as_completed(futures), start=1):
-            if bar is not None:
-                bar(done, len(cases))
+        for place, case in enumerate(cases):
+            places[executor.submit(runs, case)] = place
+        for future in as_completed(places):
+            if not future.cancelled() and future.exception() is None:
+                report(places[future], future.result())
     except KeyboardInterrupt:
         complete = False
     finally:
-        for future in futures:
+        for future in places:
             future.cancel()
-    rows = [_row_of(future, runs) for future in futures]
+    rows = [_row_of(future, runs) for future in places]
     rows += [runs.failed(NOT_RUN)] * (len(cases) - len(rows))
     return rows, complete and not any(row.stopped for row in rows)
 
 
-def _in_turn(runs: Runs, cases: Sequence[tuple[Any, ...]], bar: Any) -> tuple[list[Row], bool]:
+def _in_turn(
+    runs: Runs, cases: Sequence[tuple[Any, ...]], report: Callable[[int, Row], None]
+) -> tuple[list[Row], bool]:
     rows: list[Row] = []
     try:
-        for case in cases:
+        for place, case in enumerate(cases):
             rows.append(runs(case))
             if rows[-1].stopped:
                 break
-            if bar is not None:
-                bar(len(rows), len(cases))
+            report(place, rows[-1])
     except KeyboardInterrupt:
         pass
     complete = len(rows) == len(cases) and not (rows and rows[-1].stopped)

@@ -59,8 +59,8 @@ def differences(run: Trajectory, reference: Trajectory, scales: Mapping[str, flo
     """Compare a run with a reference at common instants; between its steps a run is what ``run.at`` gives.
 
     Instants between an event of one run and its match in the other are left out, where values differ by the whole jump
-    whatever the scheme; the shift of the event is given by itself. `at_end` compares the last rows, which for runs that end
-    by an event are those of two instants.
+    whatever the scheme; the shift of the event is given by itself. `at_end` compares the last rows, which for runs that
+    end by an event are those of two instants.
     """
     begin, end = float(reference.time[0]), min(float(run.time[-1]), float(reference.time[-1]))
     found = matched(run.events, reference.events, begin, end)
