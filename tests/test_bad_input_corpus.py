@@ -170,7 +170,9 @@ def tells(text: str, name: str, value: Any) -> bool:
 
 
 @pytest.fixture(autouse=True)
-def without_warnings():
+def without_warnings(tmp_path, monkeypatch):
+    """In a folder of its own, where files with odd names may be written."""
+    monkeypatch.chdir(tmp_path)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", mbd.MbdWarning)
         yield
