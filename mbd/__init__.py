@@ -113,6 +113,8 @@ if TYPE_CHECKING:
     from mbd.lagrangian import Lagrangian as Lagrangian
     from mbd.model import Model as Model
     from mbd.results.failure import Failure as Failure
+    from mbd.sensitivity.result import Sensitivities as Sensitivities
+    from mbd.sensitivity.sensitivities import sensitivities as sensitivities
     from mbd.simulation.diagnostics.replay import Replay as Replay, replay as replay
     from mbd.simulation.simulate import simulate as simulate
     from mbd.state import State as State
@@ -173,6 +175,8 @@ _HOMES = {
     "mbd.model": "Model",
     "mbd.assembly.projection": "project",
     "mbd.results.failure": "Failure",
+    "mbd.sensitivity.result": "Sensitivities",
+    "mbd.sensitivity.sensitivities": "sensitivities",
     "mbd.simulation.diagnostics.replay": "Replay replay",
     "mbd.simulation.simulate": "simulate",
     "mbd.state": "State",

@@ -99,7 +99,7 @@ OWN: dict[tuple[str, str], Any] = {
     ("limit_cycle", "model"): SWING, ("limit_cycle", "start"): mbd.assemble(SWING, position={"pivot.angle": 0.3}),
     ("limit_cycle", "section"): "below", ("limit_cycle", "on_failure"): "return", ("limit_cycle", "longest"): 3.0,
     ("effects", "dt"): 0.1, ("segment", "name"): "thigh", ("simulate", "dt"): 0.1, ("sweep", "dt"): 0.1,
-    ("sweep", "values"): {"upper.mass": [1.0]},
+    ("sensitivities", "dt"): 0.1, ("sensitivities", "wrt"): ["hinge.angle"], ("sweep", "values"): {"upper.mass": [1.0]},
 }  # fmt: skip
 """Where a word means something else by it."""
 
@@ -113,7 +113,7 @@ MEANT_OTHERWISE = {
 
 RESULTS = {
     "Accuracy", "Criteria", "Domain", "Effects", "Failure", "Known", "LimitCycle", "Linearization", "Mobility",
-    "PenaltyParameters", "Replay", "State", "StateSpace", "Sweep", "Trajectory",
+    "PenaltyParameters", "Replay", "Sensitivities", "State", "StateSpace", "Sweep", "Trajectory",
 }  # fmt: skip
 """Values that are handed to users, who make none."""
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,11 +14,11 @@ from mbd.sensitivity.starts import Direction, directions, start_tangent
 from mbd.sensitivity.walk import Passed, Walk
 from mbd.trajectory import Trajectory
 
-__all__ = ["final_state_derivative", "passed"]
+__all__ = ["Differentiated", "final_state_derivative", "passed"]
 
 
 def final_state_derivative(
-    run: Trajectory, wrt: Sequence[str | tuple[str, Mapping[str, float]]]
+    run: Trajectory, wrt: Sequence[str | tuple[str, Mapping[str, float]]], held: Collection[str] = ()
 ) -> tuple[Matrix, Vector]:
     """d(q, v) at the end of a run, and d t_end, by coordinates and speeds of its start and by parameters.
 
@@ -26,6 +27,8 @@ def final_state_derivative(
     run : as `mbd.simulate` returned it
     wrt : D names of coordinates and rates of the start ('hip.angle', 'hip.rate') and of parameters; or pairs of a name
         and the rates of several parameters by it, ``("slope", {"gravity.x": 9.8, "gravity.y": 0.5})``
+    held : names of coordinates and rates of the start that stay as they are as others complete it; none: a change of
+        the start is projected onto the rows that hold, and one that lies in them is taken as it is
 
     Returns
     -------
@@ -39,15 +42,27 @@ def final_state_derivative(
     CapabilityError
         where the run has no derivative, or none that the pass knows, by name and time.
     """
-    found, _ = passed(run, wrt)
-    tangent, n_v = found.motion.tangent, len(found.motion.tangent.q)
+    tangent = passed(run, wrt, held)[0].walked.motion.tangent
+    n_v = len(tangent.q)
     return np.vstack([tangent.q, tangent.y[:n_v]]), tangent.t
 
 
-def passed(run: Trajectory, wrt: Sequence[str | tuple[str, Mapping[str, float]]]) -> tuple[Passed, list[Direction]]:
+@dataclass(frozen=True)
+class Differentiated:
+    """The pass over a run with what it was made of."""
+
+    rows: RunRows
+    programs: Programs
+    walked: Passed
+
+
+def passed(
+    run: Trajectory, wrt: Sequence[str | tuple[str, Mapping[str, float]]], held: Collection[str] = ()
+) -> tuple[Differentiated, list[Direction]]:
     """The pass over a run, and its directions."""
     rows = RunRows(run)
     wanted = directions(rows, wrt)
     names = dict.fromkeys(name for each in wanted for name in each.parameters or {})
     programs = Programs(rows.mechanism, rows.places(list(names)), run.record.parameters)
-    return Walk(rows, programs).whole(start_tangent(rows, programs, wanted)), wanted
+    walked = Walk(rows, programs).whole(start_tangent(rows, programs, wanted, held))
+    return Differentiated(rows, programs, walked), wanted

@@ -22,7 +22,7 @@ from mbd.sensitivity.run_data import refused
 
 __all__ = ["Trigger", "shift_of_end", "trigger"]
 
-Kind = Literal["closed", "pull", "gap", "force", "press", "event", "stuck", "slipped"]
+Kind = Literal["closed", "pull", "gap", "force", "press", "event", "stuck", "slipped", "watched"]
 
 STILL = 1e-9
 """Approach speed [m/s, rad/s] below which a contact does not close on its own."""
@@ -113,7 +113,7 @@ def shift_of_end(
     else:
         place = {
             "closed": k, "gap": k, "force": n_c + k, "press": n_c + k, "event": 2 * n_c + k,
-            "stuck": 2 * n_c + n_g + k,
+            "stuck": 2 * n_c + n_g + k, "watched": 2 * n_c + n_g + 2 * n_f + k,
         }[fired.kind]  # fmt: skip
         slopes = programs.watched(motion.at(mode, rates.rate, rates.lam))[1][place]
         Z = motion.tangent.stacked(c, rates.of_rate, rates.of_lam)

@@ -6,6 +6,8 @@ velocities of the rows: what does not agree with them to round-off is refused.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from mbd.arrays import Vector
@@ -14,8 +16,8 @@ from mbd.sensitivity.balance import consistent_rates, on_rows
 from mbd.sensitivity.motion import Mode, Motion, Rates
 from mbd.sensitivity.newmark import NewmarkSteps
 from mbd.sensitivity.programs import Programs
-from mbd.sensitivity.run_data import RunRows, refused
-from mbd.sensitivity.schemes import Memory, SchemeSteps, is_at
+from mbd.sensitivity.run_data import RunRows
+from mbd.sensitivity.schemes import Memory, SchemeSteps
 
 __all__ = ["NewmarkRows"]
 
@@ -67,27 +69,19 @@ class NewmarkRows(SchemeSteps):
         again = consistent_rates(self.programs, end, mode, rates)
         return end, self.steps.start(end, mode, again)
 
-    def ended(self, motion: Motion, memory: Memory, mode: Mode, row: int, dh: Vector) -> tuple[Motion, Rates]:
-        """The end of a step that the scheme does not go on from as it is: solved for, put on the rows.
-
-        Rates are those of the step itself.
-        """
-        time, steps = float(self.rows.record.time[row]), self.steps
+    def reached(
+        self, motion: Motion, memory: Memory, mode: Mode, time: float, dh: Vector, row: int
+    ) -> Iterator[tuple[Motion, Rates]]:
+        """Solved for, as rows at events hold rates that are consistent in the place of those of the step."""
+        steps, record = self.steps, self.rows.record
         brief = steps.is_brief(time - motion.t, mode)
         for way in (brief, not brief):
             if way:
                 end, after = steps.brief(motion, memory, mode, time, dh)
-                rates = after.rates
             else:
-                guess = Rates(self.rows.rate[row].copy(), np.array(self.rows.record.lam[row]), *(np.zeros((0, 0)),) * 2)
-                reached, solved = steps.ended(motion, memory, mode, time, guess)
-                end, after = steps.step(motion, memory, mode, (time, reached.q, reached.y), solved, dh)
-                rates = after.rates
+                guess = Rates(self.rows.rate[row].copy(), np.array(record.lam[row]), *(np.zeros((0, 0)),) * 2)
+                found, solved = steps.ended(motion, memory, mode, time, guess)
+                end, after = steps.step(motion, memory, mode, (time, found.q, found.y), solved, dh)
             if not self.stabilized and mode.rows:
                 end = on_rows(self.programs, end, mode, end.y, end.tangent.y)
-            if is_at(self.rows, end, row):
-                return end, rates
-        raise refused(
-            f"the step to t = {time:.9g} s is not one that the pass knows: it was shortened, or began in a way that "
-            "the run does not store"
-        )
+            yield end, after.rates

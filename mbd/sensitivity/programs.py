@@ -7,7 +7,8 @@ Each program lists values and, row by row, their derivatives by the columns
 =============  =============================================================================================
 `steps`        r (n), h (R), ḣ (R): the balance over all rows, penalties behind their switches, frictions behind slips
 `consistent`   r (n), ḧ (R)
-`watched`      gaps (nC), penalty forces (nC), values of users' guards, sliding velocities and limits of frictions
+`watched`      gaps (nC), penalty forces (nC), values of users' guards, sliding velocities and limits of frictions,
+               measures that must be positive for a contact to be watched (nC)
 `captured`     what closing contacts hold
 =============  =============================================================================================
 """
@@ -136,8 +137,8 @@ class Programs:
         return values[:n], values[n:], slopes[:n], slopes[n:]
 
     def watched(self, at: State) -> tuple[Vector, Matrix]:
-        """Gaps | penalty forces | users' guards | sliding velocities | limits, and their derivatives."""
-        size = 2 * self.layout.n_contacts + len(self.equations.guards) + 2 * self.layout.n_frictions
+        """Gaps | penalty forces | users' guards | sliding velocities | limits | conditions, and their derivatives."""
+        size = 3 * self.layout.n_contacts + len(self.equations.guards) + 2 * self.layout.n_frictions
         return self._call("watched", at, size)
 
     def captured(self, at: State) -> tuple[Vector, Matrix]:
@@ -186,6 +187,7 @@ class Programs:
             values += [zero if contact.force is None else contact.force for contact in contacts]
             values += [guard.value for guard in equations.guards]
             values += [friction.rate for friction in frictions] + [friction.limit for friction in frictions]
+            values += [each.only_while if isinstance(each.only_while, Node) else zero for each in contacts]
         elif name == "captured":
             values = [value for contact in equations.contacts for value in contact.captured]
         else:

@@ -8,6 +8,7 @@ At the end positions and velocities are put on the rows: ``M(q̃) W + R ν = 0``
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -16,8 +17,7 @@ from mbd.arrays import Matrix, Vector
 from mbd.kernel.schemes.dormand_prince import END, NODES, STAGES, WEIGHTS
 from mbd.sensitivity.balance import consistent_rates, on_rows, saddle
 from mbd.sensitivity.motion import Mode, Motion, Rates, solved
-from mbd.sensitivity.run_data import refused
-from mbd.sensitivity.schemes import Memory, SchemeSteps, is_at
+from mbd.sensitivity.schemes import Memory, SchemeSteps
 
 __all__ = ["RungeKuttaSteps"]
 
@@ -39,10 +39,11 @@ class RungeKuttaSteps(SchemeSteps):
         end, rates = self.ended(motion, memory, mode, row, dh)
         return end, Memory.of_rates(rates, 0.0)
 
-    def ended(self, motion: Motion, memory: Memory, mode: Mode, row: int, dh: Vector) -> tuple[Motion, Rates]:
-        """The same: all steps are alike."""
-        record, n_v = self.rows.record, self.programs.columns.n_v
-        time = float(record.time[row])
+    def reached(
+        self, motion: Motion, memory: Memory, mode: Mode, time: float, dh: Vector, row: int
+    ) -> Iterator[tuple[Motion, Rates]]:
+        """All steps are alike."""
+        n_v = self.programs.columns.n_v
         h = time - motion.t
         speeds, rates = [motion.y[:n_v]], [memory.rates.rate]
         of_speeds, of_rates = [motion.tangent.y[:n_v]], [memory.rates.of_rate]
@@ -58,9 +59,7 @@ class RungeKuttaSteps(SchemeSteps):
         end = replace(end, t=time)
         if mode.rows:
             end = self._on_rows(end, mode)
-        if not is_at(self.rows, end, row):
-            raise refused(f"the step to t = {time:.9g} s is not one that the pass knows")
-        return end, consistent_rates(self.programs, end, mode, last)
+        yield end, consistent_rates(self.programs, end, mode, last)
 
     def _moved(
         self, motion: Motion, h: float, dh: Vector, weights: Vector,

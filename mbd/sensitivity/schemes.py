@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.sensitivity.motion import Mode, Motion, Rates
 from mbd.sensitivity.programs import Programs
-from mbd.sensitivity.run_data import RunRows
+from mbd.sensitivity.run_data import RunRows, refused
 
 __all__ = ["Memory", "SchemeSteps", "is_at"]
 
@@ -63,8 +64,30 @@ class SchemeSteps(ABC):
         """
 
     @abstractmethod
+    def reached(
+        self, motion: Motion, memory: Memory, mode: Mode, time: float, dh: Vector, row: int
+    ) -> Iterator[tuple[Motion, Rates]]:
+        """A step to any time, with its own rates, as an event takes it over; first the likeliest way to take it.
+
+        row : one that is near
+        """
+
     def ended(self, motion: Motion, memory: Memory, mode: Mode, row: int, dh: Vector) -> tuple[Motion, Rates]:
-        """A step to a row at which an event ends it; with the rates of the step itself."""
+        """A step to a row at which an event ends it; with the rates of the step itself.
+
+        Raises
+        ------
+        CapabilityError
+            for a row that is not the end of such a step.
+        """
+        time = float(self.rows.record.time[row])
+        for end, rates in self.reached(motion, memory, mode, time, dh, row):
+            if is_at(self.rows, end, row):
+                return end, rates
+        raise refused(
+            f"the step to t = {time:.9g} s is not one that the pass knows: it was shortened, or began in a way that "
+            "the run does not store"
+        )
 
 
 def is_at(rows: RunRows, motion: Motion, row: int) -> bool:

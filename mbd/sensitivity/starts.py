@@ -1,25 +1,29 @@
 """What a run is differentiated by: coordinates and speeds of its start, parameters, directions of several parameters.
 
-A start with closed rows is changed as `mbd.project` changes it: positions move least in the metric of the mass matrix
-until the rows on positions and the gaps of closed contacts hold, which then hold where they are; then velocities.
+A start with closed rows is completed as `mbd.assemble` and `mbd.project` complete it: positions that are not held move
+least in the metric of the mass matrix until the rows on positions and the gaps of closed contacts hold, which stick
+where they are then; then velocities.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mbd.arrays import Matrix
 from mbd.compile.mechanism import rate_names
-from mbd.errors import UnknownNameError, nearest
+from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.sensitivity.motion import Mode, Motion, Tangent
 from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.run_data import RunRows
 from mbd.sensitivity.strikes import captured
 
 __all__ = ["Direction", "directions", "start_tangent"]
+
+Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -69,8 +73,16 @@ def directions(rows: RunRows, wrt: Sequence[str | tuple[str, Mapping[str, float]
     return found
 
 
-def start_tangent(rows: RunRows, programs: Programs, wanted: Sequence[Direction]) -> Tangent:
-    """Derivatives of the consistent start by these directions."""
+def start_tangent(
+    rows: RunRows, programs: Programs, wanted: Sequence[Direction], held: Collection[str] = ()
+) -> Tangent:
+    """Derivatives of the consistent start by these directions; coordinates and rates that are `held` stay.
+
+    Raises
+    ------
+    ModelError
+        where the others cannot make the rows hold.
+    """
     c, count = programs.columns, len(wanted)
     q, y, p = np.zeros((c.n_v, count)), np.zeros((c.n, count)), np.zeros((c.parameters, count))
     names = list(rows.record.parameter_names)
@@ -84,10 +96,14 @@ def start_tangent(rows: RunRows, programs: Programs, wanted: Sequence[Direction]
     tangent = Tangent(np.zeros(count), q, y, np.zeros((c.anchors, count)), p)
     record = rows.record
     motion = Motion(float(record.time[0]), np.array(record.q[0]), rows.y[0], rows.start_anchors(), tangent)
-    return _projected(rows, programs, motion, rows.mode(0)).tangent
+    fixed = directions(rows, list(held))
+    free_q, free_v = np.ones(c.n_v, dtype=bool), np.ones(c.n_v, dtype=bool)
+    free_q[[each.q for each in fixed if each.q >= 0]] = False
+    free_v[[each.y for each in fixed if 0 <= each.y < c.n_v]] = False
+    return _completed(rows, programs, motion, rows.mode(0), (free_q, free_v)).tangent
 
 
-def _projected(rows: RunRows, programs: Programs, motion: Motion, mode: Mode) -> Motion:
+def _completed(rows: RunRows, programs: Programs, motion: Motion, mode: Mode, free: tuple[Flags, Flags]) -> Motion:
     """The motion with positions and velocities on the rows, and contacts that hold where they are."""
     if not mode.held:
         return motion
@@ -101,27 +117,33 @@ def _projected(rows: RunRows, programs: Programs, motion: Motion, mode: Mode) ->
         if not equations.rows[k].is_velocity and (equations.rows[k].contact < 0 or k in normals)
     ]  # fmt: skip
     off = of_h[places] @ motion.tangent.stacked(c)
-    motion = motion.with_tangent(q=motion.tangent.q + _least(M, of_h[places][:, c.x], off))
+    motion = motion.with_tangent(q=motion.tangent.q + _least(M, of_h[places][:, c.x], off, free[0]))
     closed = [k for k in range(len(equations.contacts)) if mode.closed[k]]
     motion = captured(programs, motion, mode, closed)
     rates = of_rate[list(mode.held)]
-    change = _least(M, rates[:, c.y][:, : c.n_v], rates @ motion.tangent.stacked(c))
+    change = _least(M, rates[:, c.y][:, : c.n_v], rates @ motion.tangent.stacked(c), free[1])
     y = motion.tangent.y.copy()
     y[: c.n_v] += change
     return motion.with_tangent(y=y)
 
 
-def _least(M: Matrix, B: Matrix, off: Matrix) -> Matrix:
-    """The change that removes what rows are off, least in the metric of M of the coordinates that these act on.
+def _least(M: Matrix, B: Matrix, off: Matrix, free: Flags) -> Matrix:
+    """The change of free coordinates that removes what rows are off, least in the metric of M of those they act on.
 
-    B may have dependent rows; ``M`` is made definite as an assembly does.
+    B may have dependent rows; M is made definite as an assembly does.
     """
     found = np.zeros((len(M), off.shape[1]))
     size = float(np.max(np.abs(B), initial=0.0))
-    places = np.flatnonzero(np.max(np.abs(B), axis=0, initial=0.0) > 1e-12 * size)
+    places = np.flatnonzero((np.max(np.abs(B), axis=0, initial=0.0) > 1e-12 * size) & free)
     if len(places):
         part = M[np.ix_(places, places)]
         part = part + 1e-9 * (float(np.max(np.abs(np.diag(part)))) or 1.0) * np.eye(len(places))
         flow = np.linalg.solve(part, B[:, places].T)
         found[places] = -flow @ np.linalg.lstsq(B[:, places] @ flow, off, rcond=1e-12)[0]
+    left = float(np.max(np.abs(off + B @ found), initial=0.0))
+    if left > 1e-8 * float(np.max(np.abs(off), initial=0.0)) and left > 1e-12:
+        raise ModelError(
+            "the start cannot be changed so: besides the coordinates and rates that hold= or wrt= keep, none are left "
+            "that make the rows of closed contacts and constraints hold; hold fewer"
+        )
     return found

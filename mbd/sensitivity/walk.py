@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from mbd.arrays import Matrix
 from mbd.integrators import RungeKutta853
 from mbd.integrators.family import NewmarkFamily
+from mbd.results.stored_states import StoredStates
 from mbd.sensitivity.balance import consistent_rates, independent
 from mbd.sensitivity.guards import Trigger, shift_of_end, trigger
 from mbd.sensitivity.motion import Mode, Motion, Rates, Tangent
@@ -18,8 +21,12 @@ from mbd.sensitivity.run_data import RunRows, refused
 from mbd.sensitivity.runge_kutta import RungeKuttaSteps
 from mbd.sensitivity.schemes import Memory, SchemeSteps, is_at
 from mbd.sensitivity.strikes import captured, struck
+from mbd.tape.node import Node
 
 __all__ = ["Instant", "Passed", "Walk"]
+
+MOST = 8
+"""Newton iterations for an instant of which the run stores no row [-]."""
 
 
 @dataclass(frozen=True)
@@ -91,22 +98,29 @@ class Walk:
             float(record.time[0]), np.array(record.q[0]), rows.y[0].copy(), rows.start_anchors(), tangent
         )  # fmt: skip
         mode = self.mode(0, motion)
-        found, row, last = [], 0, len(record.time) - 1
+        found, row, last, looked = list[Instant](), 0, len(record.time) - 1, set[int]()
         rates = self._restarted(motion, mode, 0)
         memory = self.steps.start(motion, mode, rates)
         fresh = True
         while row < last:
-            if record.time[row + 1] == record.time[row]:
-                if row + 1 in rows.events:
-                    fired = rows.events[row + 1][0].name
-                    raise refused(
-                        f"{fired!r} happens at t = {record.time[row]:.9g} s right after another event or the start, "
-                        "with no time between: the run has a derivative on one side only"
-                    )
+            same = record.time[row + 1] == record.time[row]
+            if same and (row + 1 in rows.events or (fresh and row + 2 in rows.events)):
+                fired = rows.events[row + 1 if row + 1 in rows.events else row + 2][0].name
+                raise refused(
+                    f"{fired!r} happens at t = {record.time[row]:.9g} s right after another event or the start, "
+                    "with no time between: the run has a derivative on one side only"
+                )
+            if same and row + 2 not in rows.events:
                 row, fresh = row + 1, True  # a boundary in time, where the scheme starts again
                 rates = self._restarted(motion, mode, row)
                 memory = self.steps.start(motion, mode, rates)
                 continue
+            if row not in looked:
+                looked.add(row)
+                begun = self._begins(motion, memory, mode, row)
+                if begun is not None:
+                    motion, memory, rates = begun
+                    fresh = True
             if row + 2 <= last + 1 and row + 2 in rows.events:
                 instant = self._event(motion, memory, mode, row + 1)
                 found.append(instant)
@@ -135,6 +149,54 @@ class Walk:
                 "dataclasses.replace(start, memory=None)",
             )
         return found
+
+    def _begins(self, motion: Motion, memory: Memory, mode: Mode, row: int) -> tuple[Motion, Memory, Rates] | None:
+        """The start of the scheme where an open contact begins to be watched before the next row; None if none does.
+
+        A step ends at that instant, of which the run stores no row.
+        """
+        crossed = self.watches[row : row + 2]
+        open_now = np.asarray(mode.closed) == 0
+        fired = np.flatnonzero(open_now & (crossed[0] <= 0.0) & (crossed[-1] > 0.0))
+        if not len(fired):
+            return None
+        if len(fired) > 1:
+            raise refused(f"several contacts begin to be watched in the step from t = {motion.t:.9g} s")
+        c = int(fired[0])
+        condition = Trigger("watched", c, f"only_while of {self.programs.equations.contacts[c].name}")
+        place = len(self.programs.equations.guards) + 2 * len(self.programs.equations.frictions) + c
+        place += 2 * len(self.programs.equations.contacts)
+        wide = replace(motion, tangent=motion.tangent.widened())
+        dh = np.zeros(len(wide.tangent.t))
+        dh[-1] = 1.0
+        span = float(self.record.time[row + 1]) - motion.t
+        h = span * float(crossed[0, c] / (crossed[0, c] - crossed[1, c]))
+        for _ in range(MOST):
+            end, rates = next(self.steps.reached(wide, memory.widened(), mode, motion.t + h, dh, row))
+            values, slopes = self.programs.watched(end.at(mode, rates.rate, rates.lam))
+            change = float(slopes[place] @ end.tangent.stacked(self.programs.columns)[:, -1])
+            step = -float(values[place]) / change
+            if abs(step) <= 4e-16 * max(abs(motion.t), span):
+                break
+            h += step
+        along = shift_of_end(self.programs, end, mode, rates, condition, 0.0)
+        moved = replace(end, tangent=end.tangent.combined(along))
+        fresh = consistent_rates(self.programs, moved, mode, Rates(rates.rate, rates.lam, rates.of_rate, rates.of_lam))
+        return moved, self.steps.start(moved, mode, fresh), fresh
+
+    @cached_property
+    def watches(self) -> Matrix:
+        """Of each contact at each row (R, nC), the measure that must be positive for it to be watched; 1 without."""
+        record, contacts = self.record, self.programs.equations.contacts
+        nodes = [each.only_while for each in contacts if isinstance(each.only_while, Node)]
+        out = np.ones((len(record.time), len(contacts)))
+        if nodes:
+            states = StoredStates(record, self.programs.equations)
+            values = iter(states.evaluate(nodes, states.rows))
+            for c, each in enumerate(contacts):
+                if isinstance(each.only_while, Node):
+                    out[:, c] = next(values)
+        return out
 
     def _event(self, motion: Motion, memory: Memory, mode: Mode, row: int) -> Instant:
         """The step to an event at a row, the event, and the state after it."""

@@ -1,0 +1,113 @@
+"""Results at the end of a run, instants of its events, and their derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mbd.arrays import Matrix, Vector
+from mbd.errors import UnknownNameError, nearest
+from mbd.sensitivity.motion import Mode, Motion, Rates
+from mbd.sensitivity.programs import Programs
+from mbd.sensitivity.run_data import RunRows, refused
+from mbd.sensitivity.walk import Passed
+
+__all__ = ["Lines", "lines_of", "usual"]
+
+SAME = 1e-7
+"""Difference of a result from that of the run, over its size, that is round-off [-]."""
+
+
+@dataclass(frozen=True)
+class Lines:
+    """Names, values and derivatives of what was asked for."""
+
+    names: tuple[str, ...]
+    values: Vector
+    matrix: Matrix
+
+
+def usual(rows: RunRows) -> list[str]:
+    """The state at the end and its instant."""
+    equations = rows.mechanism.equations
+    names = [each.name for each in equations.coordinates] + list(equations.velocity_names)
+    return [*names, *(state.name for state in equations.states), "time"]
+
+
+def instant_of(name: str, found: Passed) -> tuple[float, Vector] | None:
+    """Time of 'foot.time', the first event of that name, or 'foot.time.2', the second; None if it is no such name."""
+    stem, _, last = name.rpartition(".")
+    number = 1
+    if last.isdigit() and stem.endswith(".time"):
+        number, stem, last = int(last), *stem.rpartition(".")[::2]
+    if last != "time" or not stem:
+        return None
+    mine = [each for each in found.instants if each.fired.name == stem]
+    if not 0 < number <= len(mine):
+        return None
+    chosen = mine[number - 1]
+    return chosen.before.t, chosen.before.tangent.t
+
+
+def lines_of(rows: RunRows, programs: Programs, found: Passed, of: Sequence[str]) -> Lines:
+    """Values and derivatives of names.
+
+    Raises
+    ------
+    UnknownNameError
+        for a name that is neither a result nor the instant of an event that happened.
+    """
+    values, lines = [], []
+    rates = with_sliding(programs, found.motion, found.mode, found.rates)
+    for name in of:
+        if name == "time":
+            values.append(float(rows.run.time[-1]))
+            lines.append(found.motion.tangent.t)
+            continue
+        instant = instant_of(name, found)
+        if instant is not None:
+            values.append(instant[0])
+            lines.append(instant[1])
+            continue
+        value, line = _result(rows, programs, found, rates, name)
+        values.append(value)
+        lines.append(line)
+    size = len(found.motion.tangent.t)
+    return Lines(tuple(of), np.array(values), np.array(lines).reshape(len(values), size))
+
+
+def _result(rows: RunRows, programs: Programs, found: Passed, rates: Rates, name: str) -> tuple[float, Vector]:
+    """A named result at the end."""
+    if name not in rows.run:
+        times = [f"{each.fired.name}.time" for each in found.instants]
+        raise UnknownNameError("of: " + nearest(name, {*rows.run.names, *times, "time"}, "result", "The run has"))
+    wanted = np.asarray(rows.run[name])
+    if wanted.ndim != 1:
+        raise UnknownNameError(f"of: {name!r} has three components; ask for {name + '.x'!r}, '.y' or '.z'")
+    at = found.motion.at(found.mode, rates.rate, rates.lam)
+    at.lam = rates.lam
+    value, slopes = programs.result(name, at)
+    if not abs(value - wanted[-1]) <= SAME * max(1.0, float(np.max(np.abs(wanted)))):
+        raise refused(f"{name!r} is {wanted[-1]:.9g} at its end, which the pass does not find again ({value:.9g})")
+    return value, slopes @ found.motion.tangent.stacked(programs.columns, rates.of_rate, rates.of_lam)
+
+
+def with_sliding(programs: Programs, motion: Motion, mode: Mode, rates: Rates) -> Rates:
+    """The rates with the multipliers of frictions that slide, which follow those of the contacts."""
+    equations = programs.equations
+    lam, of_lam = rates.lam.copy(), rates.of_lam.copy()
+    active = np.zeros_like(lam)
+    active[list(mode.held)] = lam[list(mode.held)]
+    lam = active
+    if not np.any(mode.slip):
+        return Rates(rates.rate, lam, rates.of_rate, of_lam)
+    values, slopes = programs.watched(motion.at(mode, rates.rate, rates.lam))
+    Z = motion.tangent.stacked(programs.columns, rates.of_rate, rates.of_lam)
+    first = 2 * len(equations.contacts) + len(equations.guards) + len(equations.frictions)
+    for f, friction in enumerate(equations.frictions):
+        if mode.slip[f] != 0.0:
+            lam[friction.row] = mode.slip[f] * values[first + f]
+            of_lam[friction.row] = mode.slip[f] * (slopes[first + f] @ Z)
+    return Rates(rates.rate, lam, rates.of_rate, of_lam)

@@ -1,0 +1,98 @@
+"""Derivatives of a run as a table: what was asked for, line by line, by what it was differentiated by."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from mbd.arrays import Matrix, Vector
+from mbd.errors import UnknownNameError, nearest
+from mbd.notebook import table
+from mbd.trajectory import Trajectory
+
+__all__ = ["Sensitivities"]
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivities:
+    """Total first derivatives of results of a run.
+
+    ``found["foot.time", "hip.mass"]`` is one of them, ``found["foot.time"]`` a line (D,).
+
+    Attributes
+    ----------
+    of, wrt : names of the lines and columns; of_units, wrt_units : '' where nothing tells
+    matrix : (len(of), len(wrt)) derivatives
+    values : (len(of),) what is differentiated
+    run : the run, of whose numbers these are the derivatives
+    """
+
+    of: tuple[str, ...]
+    wrt: tuple[str, ...]
+    matrix: Matrix
+    values: Vector
+    run: Trajectory = field(repr=False)
+    of_units: tuple[str, ...] = ()
+    wrt_units: tuple[str, ...] = ()
+
+    def __getitem__(self, names: str | tuple[str, str]) -> Any:
+        """A derivative by the names of its line and column, or a line by its name alone."""
+        line, column = (names, None) if isinstance(names, str) else names
+        row = _place(line, self.of, "line")
+        return self.matrix[row] if column is None else float(self.matrix[row, _place(column, self.wrt, "column")])
+
+    def __len__(self) -> int:
+        return len(self.of)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.of)
+
+    def along(self, change: dict[str, float]) -> dict[str, float]:
+        """First change of each line as several quantities change together, {name: change} [their units]."""
+        by = np.zeros(len(self.wrt))
+        for name, amount in change.items():
+            by[_place(name, self.wrt, "column")] = amount
+        return {name: float(value) for name, value in zip(self.of, self.matrix @ by, strict=True)}
+
+    def to_dataframe(self) -> Any:
+        """A pandas table with a line for each result and a column for each quantity that it is differentiated by."""
+        from mbd.results.tables import library
+
+        return library("pandas", "data", "Sensitivities.to_dataframe()").DataFrame(
+            self.matrix, index=list(self.of), columns=list(self.wrt)
+        )
+
+    def __repr__(self) -> str:
+        texts = [[f"{value:.6g}" for value in line] for line in self.matrix]
+        first = max(map(len, ("d", *self.of)), default=1)
+        widths = [max(len(name) + 2, *(len(line[k]) for line in texts), 0) for k, name in enumerate(self.wrt)]
+        lines = [
+            " ".join(["d".ljust(first), *(f"/d {name}".rjust(w + 1) for name, w in zip(self.wrt, widths, strict=True))])
+        ]
+        for name, line in zip(self.of, texts, strict=True):
+            lines.append(" ".join([name.ljust(first), *(f"{x:>{w + 1}}" for x, w in zip(line, widths, strict=True))]))
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        named = self._with_units(self.wrt, self.wrt_units)
+        rows: list[Sequence[str | float]] = [
+            (name, float(value), *map(float, line))
+            for name, value, line in zip(
+                self._with_units(self.of, self.of_units), self.values, self.matrix, strict=True
+            )
+        ]
+        return table("derivatives", ("result", "value", *(f"by {name}" for name in named)), rows)
+
+    @staticmethod
+    def _with_units(names: tuple[str, ...], units: tuple[str, ...]) -> list[str]:
+        known = units or ("",) * len(names)
+        return [f"{name} [{unit}]" if unit else name for name, unit in zip(names, known, strict=True)]
+
+
+def _place(name: str, names: tuple[str, ...], kind: str) -> int:
+    if name not in names:
+        raise UnknownNameError(nearest(name, names, kind, "There are"))
+    return names.index(name)

@@ -1,0 +1,176 @@
+"""`mbd.sensitivities`: a run, and its exact derivatives by its start and by parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any, Literal
+
+from mbd.bodies.values import is_number, shown
+from mbd.compile.mechanisms import mechanism_of
+from mbd.errors import ModelError
+from mbd.integrators import Integrator
+from mbd.results.units import unit
+from mbd.sensitivity.derivative import passed
+from mbd.sensitivity.functions import rates_of_parameters
+from mbd.sensitivity.outputs import lines_of, usual
+from mbd.sensitivity.result import Sensitivities
+from mbd.simulation.simulate import REST_SPEED, simulate
+from mbd.state import State
+from mbd.trajectory import Trajectory
+
+__all__ = ["sensitivities"]
+
+Wanted = str | Mapping[str, Mapping[str, Any]]
+
+
+def sensitivities(
+    model: Any,
+    start: State,
+    integrator: Integrator | None = None,
+    dt: float | None = None,
+    tol: float | None = None,
+    *,
+    until: float | str | tuple[str, float],
+    wrt: Sequence[Wanted],
+    of: Sequence[str] | None = None,
+    at: Mapping[str, float] | None = None,
+    hold: Sequence[str] | None = None,
+    parameters: Mapping[str, float] | None = None,
+    impact: Literal["newton", "poisson", "sequential"] = "newton",
+    rest_speed: float = REST_SPEED,
+    backend: str = "auto",
+) -> Sensitivities:
+    """Run a model and differentiate the numbers of the run.
+
+    Every step is differentiated as the implicit function that it is at its converged solution, every event with the
+    shift of its instant, ``δt* = −(g_y δy + g_p δp)/ġ``, every impact with the rows that took part in it (the saltation
+    matrix: Leine & Nijmeijer 2004, Dynamics and Bifurcations of Non-Smooth Mechanical Systems, ch. 7). So these are the
+    derivatives of what the run prints, whatever its steps. Step sizes that follow `tol` are held as they were.
+
+    Parameters
+    ----------
+    model, start, integrator, dt, tol, until, parameters, impact, rest_speed, backend : see `mbd.simulate`; the scheme
+        is of the Newmark family or `mbd.RungeKutta853`
+    wrt : coordinates ('hip.angle') and rates ('hip.rate') of the start, parameters ('left thigh.mass'), and functions
+        of parameters, ``{"slope": {"gravity.x": lambda s: 9.81 * mbd.sin(s), …}}``, or the rates of several parameters,
+        ``{"legs": {"left leg.mass": 1.0, "right leg.mass": 1.0}}``
+    of : results at the end ('hip.angle', 'foot.force'), 'time', the instants of events ('foot.time' of the first one,
+        'foot.time.2' of the second); by default the state at the end, and 'time'
+    at : values of the quantities whose functions are in `wrt`, {"slope": 0.05}
+
+    hold : coordinates and rates of the start that keep their values where closed contacts or constraints bind it, such
+        as those that `mbd.assemble` was given; the others complete it, with the least motion. By default those in `wrt`
+
+    Returns
+    -------
+    Sensitivities
+
+    Raises
+    ------
+    ModelError, UnknownNameError
+        for arguments that cannot be honoured.
+    CapabilityError
+        where the run has no derivative, or on one side only (several events at one instant, a contact that only
+        grazes), and for what is not differentiated: non-smooth steps, controllers, quaternions. It tells name and time.
+
+    Examples
+    --------
+    A ball that falls from 1 m: how the instant of its landing, √(2 h/g), depends on the height.
+
+    >>> import mbd
+    >>> model = mbd.Model("ball")
+    >>> ball = mbd.PointMass("ball", mass=2.0)
+    >>> model.connect(mbd.Prismatic("fall", model.ground.origin, ball.origin, axis="y"))
+    >>> model.constrain(mbd.Unilateral("floor", mbd.height(ball.origin)))
+    >>> start = mbd.assemble(model, {"fall.displacement": 1.0})
+    >>> found = mbd.sensitivities(model, start, dt=0.01, until="floor", wrt=["fall.displacement"], of=["time"])
+    >>> print(f"{found['time', 'fall.displacement']:.6f}")
+    0.225762
+    """
+    single, grouped = _names_in(wrt)
+    _check_of(of)
+    _check_hold(hold)
+    values = _values_of(at)
+    if not isinstance(start, State):
+        raise ModelError(f"start must be a State from mbd.assemble(model, …), not {start!r}")
+    changed = {**start.parameters, **(parameters or {})} if isinstance(parameters, Mapping | None) else {}
+    model = _with_inputs(model, backend, changed, single, grouped)
+    run = simulate(
+        model, replace(start, memory=None), integrator, dt, tol, until=until, contact="events", impact=impact,
+        parameters=parameters, rest_speed=rest_speed, backend=backend,
+    )  # fmt: skip
+    known = dict(zip(run.record.parameter_names, run.record.parameters, strict=False))
+    directions: list[Any] = []
+    for each in wrt:
+        if isinstance(each, str):
+            directions.append(each)
+            continue
+        for name, functions in each.items():
+            directions.append((name, rates_of_parameters(name, functions, values, known)))
+    found, wanted = passed(run, directions, _held(run, single) if hold is None else hold)
+    names = usual(found.rows) if of is None else list(of)
+    lines = lines_of(found.rows, found.programs, found.walked, names)
+    facts, columns = run.facts, tuple(each.name for each in wanted)
+    return Sensitivities(
+        lines.names, columns, lines.matrix, lines.values, run,
+        tuple("s" if name == "time" or ".time" in name else unit(name, facts) for name in lines.names),
+        tuple(unit(name, facts) for name in columns),
+    )  # fmt: skip
+
+
+def _names_in(wrt: Any) -> tuple[list[str], list[str]]:
+    """Names of single quantities, and of the parameters that functions give."""
+    if isinstance(wrt, str | bytes) or not isinstance(wrt, Sequence) or not len(wrt):
+        raise ModelError(f"wrt must be a list of names such as ['hip.angle', 'hip.mass'], not {shown(wrt)}")
+    single, grouped = list[str](), list[str]()
+    for each in wrt:
+        if isinstance(each, str):
+            single.append(each)
+        elif isinstance(each, Mapping) and each and all(isinstance(v, Mapping) and v for v in each.values()):
+            grouped += [name for functions in each.values() for name in functions]
+        else:
+            raise ModelError(
+                f"wrt: expected names, or functions of parameters {{name: {{parameter: function}}}}, not {shown(each)}"
+            )
+    return single, grouped
+
+
+def _held(run: Trajectory, single: Sequence[str]) -> list[str]:
+    """The coordinates and rates of the start among some names."""
+    parameters = set(run.record.parameter_names)
+    return [name for name in single if name not in parameters]
+
+
+def _check_hold(hold: Any) -> None:
+    if hold is not None and (
+        isinstance(hold, str) or not isinstance(hold, Sequence) or not all(isinstance(name, str) for name in hold)
+    ):
+        raise ModelError(f"hold must be a list of names such as ['hip.angle'], or None, not {shown(hold)}")
+
+
+def _check_of(of: Any) -> None:
+    if of is not None and (
+        isinstance(of, str) or not isinstance(of, Sequence) or not all(isinstance(name, str) for name in of)
+    ):
+        raise ModelError(f"of must be a list of names such as ['hip.angle', 'foot.time'], or None, not {shown(of)}")
+
+
+def _values_of(at: Any) -> dict[str, float]:
+    if at is None:
+        return {}
+    if not isinstance(at, Mapping) or not all(isinstance(k, str) and is_number(v) for k, v in at.items()):
+        raise ModelError(f"at maps names of quantities to numbers, such as {{'slope': 0.05}}, not {shown(at)}")
+    return {name: float(value) for name, value in at.items()}
+
+
+def _with_inputs(
+    model: Any, backend: str, changed: Mapping[str, float], single: Sequence[str], grouped: Sequence[str]
+) -> Any:
+    """The model with the parameters among these names as run-time inputs, also where they are 0 or ±1."""
+    mechanism = mechanism_of(model, backend, {k: v for k, v in changed.items() if is_number(v)})
+    inputs = {parameter.name for parameter in mechanism.equations.parameters}
+    folded = getattr(model, "parameters", {})
+    own = {coordinate.name for coordinate in mechanism.equations.coordinates}
+    more = [name for name in (*single, *grouped) if name in folded and name not in inputs and name not in own]
+    return model.with_tunable(*more) if more else model

@@ -1,0 +1,168 @@
+"""`mbd.sensitivities`: what it is asked for, what it refuses, and faults that others have had."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import mbd
+from tests.simulation.mechanisms import ball, kneed_walker, kneed_walker_start, pendulum
+
+SLOPE = 0.0504
+ON_SLOPE = {"slope": {"gravity.x": lambda s: 9.81 * mbd.sin(s), "gravity.y": lambda s: -9.81 * mbd.cos(s)}}
+NAMES = ["left hip.angle", "right hip.angle", "left hip.angle.rate", "right hip.angle.rate"]
+VALUES = [0.2385854603, -0.2385854603, -1.1095873312, -0.0571481063]
+RESULTS = [
+    "time", "right knee lock.time", "left hip.angle", "right hip.angle.rate", "right foot.force",
+    "left hip.reaction_force.x", "right shank.end.x",
+]  # fmt: skip
+WALKER = kneed_walker(SLOPE)
+
+
+def walked(changes, slope=SLOPE):
+    """Results after a step of the walker from a start with changed angles and rates, on a changed slope."""
+    x, y, _ = mbd.on_slope(slope)
+    values = dict(zip(NAMES, VALUES, strict=True))
+    values = {name: value + changes.get(name, 0.0) for name, value in values.items()}
+    start = mbd.assemble(
+        WALKER, {name: values[name] for name in NAMES[:2]},
+        {**{name: values[name] for name in NAMES[2:]}, "right knee.angle": 0.0},
+        closed=["left foot", "left knee lock"], open=["right foot"], parameters={"gravity.x": x, "gravity.y": y},
+    )  # fmt: skip
+    run = mbd.simulate(WALKER, start, mbd.RungeKutta853(), dt=0.01, until="right foot")
+    knee = next(event.time for event in run.events if event.name == "right knee lock" and event.kind == "closed")
+    return np.array([run.final.time, knee, *(run[name][-1] for name in RESULTS[2:])])
+
+
+def quotient(by, size=2e-4):
+    found = [(by(step) - by(-step)) / (2.0 * step) for step in (size, size / 2.0)]
+    return (4.0 * found[1] - found[0]) / 3.0
+
+
+def test_results_and_instants_of_a_walker_by_its_start_and_the_slope():
+    found = mbd.sensitivities(
+        WALKER, kneed_walker_start(WALKER, open=["right foot"]), mbd.RungeKutta853(), dt=0.01, until="right foot",
+        wrt=[NAMES[0], NAMES[3], ON_SLOPE], at={"slope": SLOPE}, of=RESULTS,
+        hold=[*NAMES, "right knee.angle", "right knee.angle.rate"],
+    )  # fmt: skip
+    wanted = [
+        quotient(lambda step: walked({NAMES[0]: step})), quotient(lambda step: walked({NAMES[3]: step})),
+        quotient(lambda step: walked({}, SLOPE + step)),
+    ]  # fmt: skip
+    assert found.of == tuple(RESULTS) and found.wrt == (NAMES[0], NAMES[3], "slope")
+    assert found.values == pytest.approx(walked({}), rel=1e-9)
+    sizes = np.max(np.abs(found.matrix), axis=0)
+    assert np.max(np.abs(found.matrix - np.array(wanted).T) / sizes) < 2e-8
+
+
+def test_a_table_is_read_by_names():
+    model = pendulum()
+    found = mbd.sensitivities(
+        model, mbd.assemble(model, {"hinge.angle": 1.0}), dt=0.01, until=0.5,
+        wrt=["hinge.angle", {"both": {"rod.center": 1.0, "rod.inertia": 2.0}}],
+    )  # fmt: skip
+    assert found.of == ("hinge.angle", "hinge.angle.rate", "time")
+    assert found["hinge.angle"].shape == (2,) and found["time", "both"] == 0.0
+    assert found.along({"hinge.angle": 2.0})["hinge.angle"] == 2.0 * found["hinge.angle", "hinge.angle"]
+    assert list(found.to_dataframe().columns) == ["hinge.angle", "both"]
+    assert "hinge.angle" in repr(found) and "by both" in found._repr_html_()
+    with pytest.raises(mbd.UnknownNameError, match="no line named 'hinge'"):
+        found["hinge"]
+
+
+def test_a_folded_parameter_becomes_an_input():
+    model = pendulum()  # its mass is 1, which the equations fold
+    found = mbd.sensitivities(
+        model, mbd.assemble(model, {"hinge.angle": 1.0}), dt=0.01, until=0.5, wrt=["rod.mass"], of=["hinge.angle"]
+    )
+    assert found.run["rod.mass"][-1] == 1.0 and abs(found["hinge.angle", "rod.mass"]) > 1e-3
+
+
+def test_after_an_event_derivatives_have_its_shift():
+    """Others' derivative of a state behind an event left out that the event comes later (diffrax, issue 729)."""
+    model = ball(restitution=1.0)
+    found = mbd.sensitivities(
+        model, mbd.assemble(model, {"fall.displacement": 1.0}), mbd.Newmark(), dt=1e-3, until=0.8,
+        wrt=["fall.displacement.rate"], of=["fall.displacement"],
+    )  # fmt: skip
+    fall, g = np.sqrt(2.0 / 9.81), 9.81
+    left, down = 0.8 - fall, np.sqrt(2.0 * g)
+    by_instant = 1.0 / g  # a throw up by v lengthens the fall by v/g
+    assert found["fall.displacement", "fall.displacement.rate"] == pytest.approx(
+        -by_instant * down + g * left * by_instant, rel=1e-9
+    )
+
+
+def test_a_row_at_an_event_has_no_other_derivative_than_its_neighbours():
+    """A sample that meets an event was wrong by 7 % elsewhere (SciMLSensitivity, issue 1447)."""
+    model = ball(restitution=0.5)
+    start = mbd.assemble(model, {"fall.displacement": 0.5 * 9.81 * 0.4**2})  # it lands on the grid
+    wrt, of = ["fall.displacement"], ["fall.displacement.rate"]
+    ends = [0.4 - 1e-9, 0.4 + 1e-9, 0.41]
+    before, after, later = (
+        mbd.sensitivities(model, start, mbd.Newmark(), dt=0.1, until=end, wrt=wrt, of=of).matrix[0, 0] for end in ends
+    )
+    fall = 0.4
+    assert before == pytest.approx(0.0, abs=1e-9)
+    by_instant = 1.0 / (9.81 * fall)
+    assert after == pytest.approx(0.5 * 9.81 * by_instant + 9.81 * by_instant, rel=1e-6)
+    assert later == pytest.approx(after, rel=1e-9)
+
+
+def test_two_events_at_one_instant_are_named():
+    box = mbd.Model("two")
+    for name in "ab":
+        body = mbd.PointMass(f"ball {name}", mass=1.0)
+        box.connect(mbd.Prismatic(name, box.ground.origin, body.origin, axis="y"))
+        box.constrain(mbd.Unilateral(f"floor {name}", mbd.height(body.origin)))
+    start = mbd.assemble(box, {"a.displacement": 1.0, "b.displacement": 1.0})
+    with pytest.raises(mbd.CapabilityError, match="'floor a' and 'floor b' happen at one instant, t = 0.4515"):
+        mbd.sensitivities(box, start, dt=0.01, until=0.6, wrt=["a.displacement"])
+
+
+def test_a_graze_is_named():
+    model = mbd.Model("graze")
+    bob = mbd.PointMass("bob", 1.0)
+    model.connect(mbd.Translation("place", model.ground.origin, bob.origin))
+    start_height = 1e-14
+    model.constrain(mbd.Unilateral("roof", mbd.measure(lambda y: 1.0 - start_height - y, "place.y")))
+    speed = np.sqrt(2.0 * 9.81)
+    start = mbd.assemble(model, {"place.y": 0.0}, {"place.y.rate": speed, "place.x.rate": 1.0})
+    with pytest.raises(mbd.CapabilityError, match="'roof' only grazes at t = 0.4515"):
+        mbd.sensitivities(model, start, mbd.RungeKutta853(), dt=0.01, until=0.6, wrt=["place.y.rate"])
+
+
+RESET = mbd.Event("back", mbd.measure(lambda angle: angle, "hinge.angle"), reset={"hinge.rate": 0.0})
+SAMPLED = mbd.Controller("sampled", lambda time, values, state: None, period=0.1, writes=["rod.center"])
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [(lambda model: model.constrain(RESET), "reset"), (lambda model: model.apply(SAMPLED), "controllers")],
+    ids=["reset", "controller"],
+)
+def test_what_is_not_differentiated_is_named(change, words):
+    model = pendulum()
+    change(model)
+    start = mbd.assemble(model, {"hinge.angle": 1.0})
+    with pytest.raises(mbd.CapabilityError, match=words):
+        mbd.sensitivities(model, start, dt=0.01, until=1.0, wrt=["hinge.angle"])
+
+
+def test_wrong_questions_are_answered():
+    model = pendulum()
+    start = mbd.assemble(model, {"hinge.angle": 1.0})
+
+    def asked(wrt=("hinge.angle",), **more):
+        return mbd.sensitivities(model, start, dt=0.01, until=0.1, wrt=list(wrt), **more)
+
+    with pytest.raises(mbd.UnknownNameError, match="'hinge.angel'"):
+        asked(["hinge.angel"])
+    with pytest.raises(mbd.UnknownNameError, match="of: no result named 'hinge.angel'"):
+        asked(of=["hinge.angel"])
+    with pytest.raises(mbd.ModelError, match="give its value too, as at="):
+        asked([ON_SLOPE])
+    with pytest.raises(mbd.ModelError, match="'gravity.x' is 0.979"):
+        asked([ON_SLOPE], at={"slope": 0.1})
+    with pytest.raises(mbd.CapabilityError, match="RadauIIA"):
+        asked(integrator=mbd.RadauIIA())
