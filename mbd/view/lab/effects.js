@@ -75,7 +75,7 @@
     const bottom = frame.y + frame.height;
     make("text", { class: "panel", x: frame.names && frame.x + frame.width < 400 ? 0 : frame.x, y: frame.y - 10 }, kind.title);
     if (kind.changes) {
-      const every = frame.width < 50 * Math.log10(high / low) ? 100 : 10;
+      const every = 10 ** Math.max(1, Math.ceil(44 / (frame.width * kind.size(low * 10)))); // as many pixels as a label needs
       for (let value = low; value <= high * 1.001; value *= every) {
         const at = frame.x + frame.width * kind.size(value * 1.0000001);
         make("line", { class: "grid", x1: at, x2: at, y1: frame.y, y2: bottom });

@@ -69,7 +69,7 @@ function fill() {
     button.addEventListener("click", () => { play(false); seek(group.time); });
     item.append(button); el("events").append(item);
   }
-  if (!run.events.length) el("events").textContent = "none";
+  if (!run.events.length) { const none = document.createElement("li"); none.textContent = "none"; el("events").append(none); }
   run.charts.forEach((chart, k) => el("chart").append(new Option(`${chart.title} [${chart.unit}]`, k)));
   el("over").append(new Option("over time", -1));
   run.contacts.forEach((contact, k) => { if (strides[k].length) el("over").append(new Option(`over strides, ${contact.name}`, k)); });
