@@ -20,6 +20,7 @@ from mbd.results.facts import Facts
 from mbd.results.finite import require_finite
 from mbd.results.interpolation import OneSide, Side
 from mbd.results.record import EventRecord, Events, Record
+from mbd.state import State
 
 if TYPE_CHECKING:
     from mbd.results.failure import Failure
@@ -205,9 +206,10 @@ class Trajectory:
         return int(any(event.kind == "event" or event.name == stop for event in ending))
 
     @property
-    def final(self) -> Any:
+    def final(self) -> State:
         """The state at the end, to go on from; with the same scheme and step as if there had been no end."""
-        return self.record.final
+        final: State = self.record.final
+        return final
 
     @cached_property
     def facts(self) -> Facts:

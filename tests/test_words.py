@@ -22,7 +22,7 @@ RETIRED = {
     r"\b(is|are|was|were) told\b(?! (apart|from|to|otherwise|which|how)\b)": "is reported",
     r"STIRRED|HUSHED|\bstirred\b": "excited, at rest",
     r"\bjammed\b": "Painlevé contact",
-    r"\bforetold\b": "predicted, expected",
+    r"\bforet(old|ell)": "predicted, expected",
     r"\bcareful\b|n_careful": "singular steps",
     r"\b_(told|asked|settle|looks)\b|\basked\(|\bblow_": "what it gives; call_user; impact",
 }

@@ -4,7 +4,7 @@ A step has found *a* solution of its equations, which need not be the motion: be
 Newton iterate was thrown far away, there are others. A cheap look compares the estimated error of each rate with the
 rate. Where that is large, accelerations are asked for again, by two tests that stiff forces pass at any step:
 
-- *growth*: the change D of (v, z) that the previous accelerations did not foretell, and what accelerations a owe to it,
+- *growth*: the change D of (v, z) that the previous accelerations did not predict, and what accelerations a owe to it,
   ``ζ = h D·M (a(y₁) − a(y₁ − D)) / D·M D``. A force that depends on time has ζ = 0, a stiff spring or damper ζ < 0,
   ``v̇ = c v`` has ζ = c h: more than `GROWTH` grows by more than e in a step, which no scheme of order 2 follows;
 - *gain*: along the way from the old to the new state the forces do at most the work W⁺ = Σ_i ∫ max(v_i (M a)_i, 0) dt.

@@ -165,7 +165,9 @@ def test_a_reset_happens_once_where_events_are_located_roughly():
 
 
 def test_the_page_has_the_table():
-    assert as_markdown() in PAGE.read_text(encoding="utf-8")
+    assert as_markdown() in PAGE.read_text(encoding="utf-8"), (
+        "docs/integration.md has another table of what goes with what: put this in its place\n" + as_markdown()
+    )
 
 
 def test_the_table_is_told_by_info(capsys):

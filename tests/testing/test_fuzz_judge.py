@@ -27,7 +27,7 @@ BOUNCING = [4, 8164]
 SLIPPING = [2159]
 """A foot in index 3 with uneven steps, which sticks by the multipliers of the step and slips by consistent ones."""
 ROUND_OFF = [2473, 3433]
-"""Rows of a cut screw whose round-off is a little larger than their terms foretell."""
+"""Rows of a cut screw whose round-off is a little larger than their terms predict."""
 TIED = [4378, 30308]
 """Two steps of a quarter of the run: whether they are half of it must not be decided by the last bit; two runs
 of a flight without any error but round-off, of which that with longer steps is kept."""

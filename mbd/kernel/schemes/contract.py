@@ -52,7 +52,7 @@ class Abilities:
         steps of others are taken in another way), one that fails as energy comes from nowhere is not tried shorter
         (`step_retry`), and multipliers are those of the balance, shared among dependent rows (`guards`)
     estimates : 1: `step` itself leaves the local error in K.error, which judges whether the step resolves the motion
-        (`resolution`); 0: changes of rates that the last slope did not foretell do, as the error h³/12 of the
+        (`resolution`); 0: changes of rates that the last slope did not predict do, as the error h³/12 of the
         trapezoidal rule
     look_twice : local error of a rate, over the rate, above which forces are evaluated again to see whether the step
         follows them at all (`resolution`); larger for schemes of high order, whose estimates are pessimistic
