@@ -164,7 +164,8 @@ def sweep(
         ``{"top": lambda run: run["hip.angle"].max()}``
     executor : any ``concurrent.futures.Executor``, for runs side by side: a ``ThreadPoolExecutor()`` (machine code runs
         without Python's lock), or a ``ProcessPoolExecutor()`` where model, start and functions can be pickled, whose
-        processes derive a model once at most and take its machine code from the cache; None: in turn
+        processes derive a model once at most and take its machine code from the cache; with the extra dask also
+        ``Client(…).get_executor()``; None: in turn
     file : to which every run is added as it ends, and from which runs are taken that it has already: a sweep
         that was ended or killed goes on where it was
     progress : True for a bar on a terminal

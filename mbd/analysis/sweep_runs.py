@@ -222,7 +222,7 @@ def rows_of(
     complete = True
     try:
         for place, case in enumerate(cases):
-            places[executor.submit(runs, case)] = place
+            places[_submitted(executor, runs, case)] = place
         for future in as_completed(places):
             if not future.cancelled() and future.exception() is None:
                 report(places[future], future.result())
@@ -234,6 +234,14 @@ def rows_of(
     rows = [_row_of(future, runs) for future in places]
     rows += [runs.failed(NOT_RUN)] * (len(cases) - len(rows))
     return rows, complete and not any(row.stopped for row in rows)
+
+
+def _submitted(executor: Executor, runs: Runs, case: tuple[Any, ...]) -> Future[Row]:
+    try:
+        return executor.submit(runs, case)
+    except Exception:
+        _ = runs.parcel  # an executor has its own words for what cannot be sent
+        raise
 
 
 def _in_turn(
