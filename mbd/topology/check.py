@@ -130,7 +130,10 @@ def name_faults(model: Description) -> list[str]:
     for name, counts in kinds.items():
         if counts.total() > 1:
             several_kinds = ", ".join(f"{count} × {kind}" for kind, count in counts.items())
-            found.append(f"the name '{name}' is used {counts.total()} times ({several_kinds}); give each its own name")
+            other = "'ground' is the body that does not move; " if name == model.ground.name else ""
+            found.append(
+                f"the name '{name}' is used {counts.total()} times ({several_kinds}); {other}give each its own name"
+            )
     places: dict[str, Frame] = {}
     for frame in model.points():
         if places.setdefault(frame.full_name, frame).parameters() != frame.parameters():

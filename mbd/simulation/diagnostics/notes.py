@@ -84,6 +84,10 @@ COUNTED = (
 """Counts of the kernel, and what to say where they are not zero."""
 
 
+WRONG = 0.5
+"""Share of the energy that a scheme has given or taken above which a run is in doubt [-]."""
+
+
 def notes_of(run: RunData, record: Record) -> tuple[list[str], list[str]]:
     """The notes of a run that is over, in sentences, and those of them that put its result in doubt."""
     equations = run.mechanism.equations
@@ -104,6 +108,7 @@ def notes_of(run: RunData, record: Record) -> tuple[list[str], list[str]]:
     notes += coarse_steps(run, record)
     doubts = _energy_lost(run, record)
     notes += doubts or ([run.energy.note] if run.energy.note else [])
+    doubts += [run.energy.note] if run.energy.note and abs(run.energy.share) > WRONG and not doubts else []
     notes += [run.room.note] if run.room.note else []
     spent = float(run.kernel.error_sum)
     if spent > TELLING and not run.kernel.adaptive:

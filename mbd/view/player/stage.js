@@ -143,8 +143,10 @@ function drawGround(g, w, h, v, ground) {
   const s0 = v.center[0] * tx + v.center[1] * ty, reach = (w + h) / v.scale;
   const spot = (s, depth) => v.to([d * nx + s * tx - depth * nx, d * ny + s * ty - depth * ny]);
   const a = spot(s0 - reach, 0), b = spot(s0 + reach, 0), deep = (w + h) / v.scale;
-  g.fillStyle = colors.soil;
-  g.beginPath(); g.moveTo(...a); g.lineTo(...b); g.lineTo(...spot(s0 + reach, deep)); g.lineTo(...spot(s0 - reach, deep)); g.closePath(); g.fill();
+  if (solid(ground)) {
+    g.fillStyle = colors.soil;
+    g.beginPath(); g.moveTo(...a); g.lineTo(...b); g.lineTo(...spot(s0 + reach, deep)); g.lineTo(...spot(s0 - reach, deep)); g.closePath(); g.fill();
+  }
   g.strokeStyle = colors.ground; g.lineWidth = 1.6;
   g.beginPath(); g.moveTo(...a); g.lineTo(...b); g.stroke();
   const tick = nice(w / v.scale, Math.min(7, w / 95));
@@ -155,6 +157,13 @@ function drawGround(g, w, h, v, ground) {
     g.beginPath(); g.moveTo(x, y); g.lineTo(x1, y1); g.stroke();
     if (x2 > 22 && x2 < w - 22) g.fillText(label(s, tick) + " m", x2, y2);
   }
+}
+function solid(ground) { // whether nothing of the mechanism is ever below it; a step that is walked off is drawn as a line
+  if (ground.solid === undefined) {
+    const [nx, ny] = ground.normal, least = ground.offset - 0.05 * extent();
+    ground.solid = run.points.every((point) => point.at[0].every((x, i) => nx * x + ny * point.at[1][i] > least));
+  }
+  return ground.solid;
 }
 function drawPlane(g, v, ground) { // a patch of a plane below the mechanism, as a grid
   const n = ground.normal, p = locate(state.t);
