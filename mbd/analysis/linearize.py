@@ -94,15 +94,14 @@ def linearize(
     prescribed = Prescribed.of(given, local, found.velocity)
     picked = (*chosen.places, *(n_v + k for k in chosen.speeds), *range(2 * n_v, 2 * n_v + equations.n_z))
     motion = linear_motion(found, terms, chosen, picked, local, prescribed, seen)
-    eigenvalues, shapes = _modes(motion.A, motion.basis[:n_v])
     space = _space([freedoms[k] for k in picked], motion, given, seen)
     doubt_of_idle(_idle(given, space))
     values = [found.value(given[k].node) if order == 0 else 0.0 for k, order in prescribed.states]
     return Linearization(
         equations.name, state.time, tuple(name for name, _ in equations.configuration.freedoms), found.titles,
         terms.M[:n_v, :n_v], terms.C[:n_v, :n_v], terms.K[:n_v], terms.B, space, motion.basis,
-        np.concatenate([state.q, state.v, state.z]), np.concatenate([state.v, found.rate]), local.y, eigenvalues,
-        shapes, picked, found, np.array(values), not (inputs is None and outputs is None), (given, seen),
+        np.concatenate([state.q, state.v, state.z]), np.concatenate([state.v, found.rate]), local.y,
+        *_modes(motion.A, motion.basis[:n_v]), picked, found, np.array(values), not (inputs is None and outputs is None), (given, seen),
     )  # fmt: skip
 
 

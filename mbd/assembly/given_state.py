@@ -89,6 +89,13 @@ def fits(start: State, equations: Equations, manager: ActiveSetManager) -> None:
             f"the start holds {len(start.anchors)} anchors of contacts and turns of cut joints, but the model has "
             f"{anchors}; assemble it from this model, with the same parameters="
         )
+    if bad := _bad_values(start, equations):
+        raise ModelError(bad)
+
+
+def _bad_values(start: State, equations: Equations) -> list[str]:
+    """Numbers of a state that are not finite, or that no posture has."""
+    names = [coordinate.name for coordinate in equations.coordinates]
     parts = ((start.q, names), (start.v, equations.velocity_names), (start.z, [s.name for s in equations.states]))
     values = [(name, value) for part, known in parts for name, value in zip(known, part, strict=True)]
     values += [(f"anchor {k} of its contacts", value) for k, value in enumerate(start.anchors)]
@@ -96,9 +103,7 @@ def fits(start: State, equations: Equations, manager: ActiveSetManager) -> None:
         f"the start has {name!r} = {value}; give a finite number" for name, value in values if not np.isfinite(value)
     ]
     bad += [f"the start has {fault}; take whole turns away" for fault in beyond_angles(equations, start.q)]
-    bad = bad or [f"the start has {fault}" for fault in equations.configuration.misplaced(start.q, ROUND_OFF)]
-    if bad:
-        raise ModelError(bad)
+    return bad or [f"the start has {fault}" for fault in equations.configuration.misplaced(start.q, ROUND_OFF)]
 
 
 def beyond_angles(equations: Equations, q: Vector) -> list[str]:

@@ -8,6 +8,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from mbd.arrays import Matrix
 from mbd.bodies.algebra import IDENTITY, ZERO, Rotation, Triple
 from mbd.bodies.values import number, numbers
 from mbd.errors import ModelError
@@ -106,22 +107,27 @@ def inertia_faults(owner: str, inertia: Inertia, values: Mapping[str, float]) ->
     """
     matrix = np.array(inertia_matrix(inertia, lambda field: values[f"{owner}.{field}"]), dtype=float)
     largest = float(np.abs(matrix).max())
+    faults = _moment_faults(owner, matrix, largest)
+    if values[f"{owner}.mass"] == 0.0 and largest > 0.0:
+        faults.append(f"body '{owner}': an inertia without a mass; give the mass, or inertia 0")
+    return faults
+
+
+def _moment_faults(owner: str, matrix: Matrix, largest: float) -> list[str]:
+    """Those of the principal moments, whose largest entry is given."""
     if matrix[0, 0] == 0.0 and matrix[1, 1] == 0.0 and not matrix[[0, 0, 1], [1, 2, 2]].any():
         moments = np.array([matrix[2, 2]])
     else:
         moments = np.linalg.eigvalsh(matrix)
-    faults = []
     if moments.min() < -1e-12 * largest:
-        faults.append(
+        return [
             f"body '{owner}': its inertia has the negative principal moment {moments.min():.6g} kg m²; "
             "moments about the center of mass are ≥ 0"
-        )
-    elif len(moments) == 3 and moments[2] > (moments[0] + moments[1]) * (1.0 + 1e-9):
+        ]
+    if len(moments) == 3 and moments[2] > (moments[0] + moments[1]) * (1.0 + 1e-9):
         a, b, c = moments
-        faults.append(
+        return [
             f"body '{owner}': principal moments {a:.6g}, {b:.6g}, {c:.6g} kg m² break the triangle inequality "
             f"({c:.6g} > {a:.6g} + {b:.6g}); give moments about the center, or a single number for planar motion"
-        )
-    if values[f"{owner}.mass"] == 0.0 and largest > 0.0:
-        faults.append(f"body '{owner}': an inertia without a mass; give the mass, or inertia 0")
-    return faults
+        ]
+    return []

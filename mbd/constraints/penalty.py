@@ -98,6 +98,11 @@ class Penalty(Constraint):
                     "mass; leave one of them out"
                 )
             return found
+        return found + self._contradictions_of_kelvin_voigt(title)
+
+    def _contradictions_of_kelvin_voigt(self, title: str) -> list[str]:
+        """What that law needs besides a restitution."""
+        found = []
         if self.exponent != 1.0:
             found.append(
                 f"{title}: law='{KELVIN_VOIGT}' reaches a restitution for exponent 1 only, got exponent "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from mbd.equations import derive
 from mbd.equations.equations import Contact, Equations
 from mbd.equations.programs import accelerations, constraint_jacobian, mass_matrix, newton, residual
+from mbd.tape.node import Node
 from mbd.testing.findings import Findings, Verdict
 from mbd.testing.numbers import Numbers, Point, at, block, derivative, inputs
 
@@ -200,10 +202,7 @@ def _tangent(findings: Findings, equations: Equations, point: Point) -> None:
         K, *parts = block(at(newton(equations, rows, penalties, stabilized), point), (n + m, n + m), *sizes)
         out = residual(equations, rows, penalties, stabilized)
         if stabilized:
-            turning = parts.pop()
-            for j in range(n_v if m else 0):
-                change = derivative(out, point, {("x", j): 1.0})[n + m :]
-                findings.equal(law, f"∂ḣ/∂x in column {j}", turning[:, j], change, hint, 10.0 * DIFFERENCE, change)
+            _turning(findings, law, parts.pop(), out, point, hint)
         r = np.concatenate(parts)
         findings.equal(law, "residual beside the matrix", r, at(out, point), hint, 1e-11, r)
         scale = np.abs(r[:n]).max(initial=0.0)
@@ -219,3 +218,11 @@ def _tangent(findings: Findings, equations: Equations, point: Point) -> None:
             findings.equal(law, f"column of λ {k}", K[:n, n + k], change[:n], hint, DIFFERENCE, scale)
         if not m:
             return
+
+
+def _turning(findings: Findings, law: str, turning: Numbers, out: Sequence[Node], point: Point, hint: str) -> None:
+    """∂ḣ/∂x (m, n_v) against differences of ḣ, the last m components of a residual."""
+    m, n_v = turning.shape
+    for j in range(n_v if m else 0):
+        change = derivative(out, point, {("x", j): 1.0})[-m:]
+        findings.equal(law, f"∂ḣ/∂x in column {j}", turning[:, j], change, hint, 10.0 * DIFFERENCE, change)

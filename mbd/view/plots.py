@@ -207,13 +207,18 @@ def energy(ledger: Ledger, path: str | Path | None = None) -> Any:
         lower.plot(time, ledger.numerical, color=tone(NEUTRAL))
         lower.set_ylabel("numerical [J]")
         lower.set_xlabel("time [s]")
-        for panel in (upper, lower):
-            _lines(panel, ledger.marks, above=True)
-        for instant, _ in ledger.marks if len(ledger.marks) > MANY else ():
-            lower.axvline(instant, ymin=0.93, color=tone(INK), linewidth=0.7, alpha=0.6)
+        _mark_events(ledger, upper, lower)
         if len(time) and time[-1] > time[0]:
             lower.set_xlim(time[0], time[-1])
     return figure
+
+
+def _mark_events(ledger: Ledger, upper: Any, lower: Any) -> None:
+    """Lines at events, ticks where there are many."""
+    for panel in (upper, lower):
+        _lines(panel, ledger.marks, above=True)
+    for instant, _ in ledger.marks if len(ledger.marks) > MANY else ():
+        lower.axvline(instant, ymin=0.93, color=tone(INK), linewidth=0.7, alpha=0.6)
 
 
 def _spent(ledger: Ledger) -> list[Part]:

@@ -50,15 +50,20 @@ def spectra(found: Sequence[Criteria], path: str | Path | None = None) -> Any:
         upper.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.2)
         middle.set_ylabel("damping ratio of the scheme")
         lower.set_ylabel("relative period elongation")
-        first = min(each.turns[0] for each in found)
-        for axes, last in (upper, max(each.turns[-1] for each in found)), (middle, HALF), (lower, HALF):
-            axes.set_xscale("log")
-            axes.set_xlabel("ω dt [rad]")
-            if first < last:
-                axes.set_xlim(first, last)
-        for axes in middle, lower:
-            axes.set_yscale("log")
+        _scale(found, upper, middle, lower)
     return figure
+
+
+def _scale(found: Sequence[Criteria], upper: Any, middle: Any, lower: Any) -> None:
+    """Logarithmic axes over ω dt."""
+    first = min(each.turns[0] for each in found)
+    for axes, last in (upper, max(each.turns[-1] for each in found)), (middle, HALF), (lower, HALF):
+        axes.set_xscale("log")
+        axes.set_xlabel("ω dt [rad]")
+        if first < last:
+            axes.set_xlim(first, last)
+    for axes in middle, lower:
+        axes.set_yscale("log")
 
 
 def _above(values: Any) -> Any:

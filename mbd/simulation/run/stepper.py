@@ -137,12 +137,16 @@ class Stepper:
             **self.own.numbers(),
         )  # fmt: skip
         K.event_capacity = max(EVENT_CAPACITY, 2 * room_to_log(K))
+        self._take_numbers(K)
+        return K
+
+    def _take_numbers(self, K: Kernel) -> None:
+        """The parameters of the integrator, under the names of the kernel's fields."""
         for name, number in self.integrator.numbers().items():
             if name not in TABLE.kinds:
                 text = nearest(name, TABLE.kinds, "number of the kernel", "There are")
                 raise CapabilityError(f"{self.integrator!r} gives numbers() for {name!r}: {text}")
             setattr(K, name, number)
-        return K
 
     def _arrays(self, parameters: Vector, manager: ActiveSetManager) -> None:
         v = self.kernel
