@@ -101,7 +101,8 @@ def linearize(
         equations.name, state.time, tuple(name for name, _ in equations.configuration.freedoms), found.titles,
         terms.M[:n_v, :n_v], terms.C[:n_v, :n_v], terms.K[:n_v], terms.B, space, motion.basis,
         np.concatenate([state.q, state.v, state.z]), np.concatenate([state.v, found.rate]), local.y,
-        *_modes(motion.A, motion.basis[:n_v]), picked, found, np.array(values), not (inputs is None and outputs is None), (given, seen),
+        *_modes(motion.A, motion.basis[:n_v]), picked, found, np.array(values),
+        not (inputs is None and outputs is None), (given, seen),
     )  # fmt: skip
 
 
