@@ -15,6 +15,7 @@ Each program lists values and, row by row, their derivatives by the columns
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -23,6 +24,7 @@ from itertools import pairwise
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.compile.backend import Function
 from mbd.compile.layout import Layout
 from mbd.compile.mechanism import Mechanism
 from mbd.equations.equations import Equations
@@ -33,6 +35,9 @@ from mbd.tape.derivatives import jvps
 from mbd.tape.node import Node
 
 __all__ = ["Columns", "Programs", "State"]
+
+PROTOTYPE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
+"""Of compiled functions, for calls with addresses."""
 
 
 @dataclass(frozen=True)
@@ -151,26 +156,48 @@ class Programs:
         values, slopes = self._call(f"result {name}", at, 1)
         return float(values[0]), slopes[0]
 
-    def _call(self, name: str, at: State, size: int) -> tuple[Vector, Matrix]:
+    def many(self, name: str, blocks: Matrix, size: int) -> tuple[Matrix, Matrix]:
+        """Values (N, size) and derivatives (N, size, columns) of a program at many blocks (N, block)."""
+        out = np.empty((len(blocks), size * (1 + self.columns.count)))
+        if size:
+            run_many(self._compiled(name), blocks, self.values, out)
+        return out[:, :size], out[:, size:].reshape(len(blocks), size, self.columns.count)
+
+    def accelerations(self, blocks: Matrix) -> Matrix:
+        """Outputs of the program `accelerations` at many blocks."""
+        out = np.empty((len(blocks), self.mechanism.sizes["accelerations"]))
+        run_many(self.mechanism.common["accelerations"], blocks, self.values, out)
+        return out
+
+    def _compiled(self, name: str) -> Function:
+        """A program, made when it is called first."""
+        mechanism = self.mechanism
         key = f"{name} by {self.places}"
-        mechanism, layout, block = self.mechanism, self.layout, self._block
-        known = mechanism.named.get(key)
+        known: Function | None = mechanism.named.get(key)
         if known is None:
             symbol = f"derivative_{len(mechanism.common)}"
             with mechanism.equations.tape.lock:
                 mechanism.common.add({symbol: self._program(name)})
                 known = mechanism.named[key] = mechanism.common[symbol]
-        block[0] = at.t
-        block[layout.q : layout.x] = at.q
-        block[layout.v : layout.a] = at.y
-        block[layout.a : layout.lam] = at.rate
-        block[layout.lam : layout.anchor] = at.lam
-        block[layout.anchor : layout.switch] = at.anchors
-        block[layout.switch : layout.slip] = at.switch
-        block[layout.slip : layout.shift] = at.slip
+        return known
+
+    def fill(self, block: Matrix, at: State) -> None:
+        """Write a state into a block, or states into blocks (N, block)."""
+        layout = self.layout
+        block[..., 0] = at.t
+        block[..., layout.q : layout.x] = at.q
+        block[..., layout.v : layout.a] = at.y
+        block[..., layout.a : layout.lam] = at.rate
+        block[..., layout.lam : layout.anchor] = at.lam
+        block[..., layout.anchor : layout.switch] = at.anchors
+        block[..., layout.switch : layout.slip] = at.switch
+        block[..., layout.slip : layout.shift] = at.slip
+
+    def _call(self, name: str, at: State, size: int) -> tuple[Vector, Matrix]:
+        self.fill(self._block, at)
         out = np.empty(size * (1 + self.columns.count))
         if size:
-            known(block, self.values, out)
+            self._compiled(name)(self._block, self.values, out)
         return out[:size], out[size:].reshape(size, self.columns.count)
 
     def _program(self, name: str) -> list[Node]:
@@ -204,3 +231,17 @@ def derivatives(equations: Equations, values: Sequence[Node], places: Sequence[i
     parameters = [tape.input("p", k) for k in places]
     others = (*inputs.v, *inputs.z, *inputs.a, *inputs.s, *inputs.lam, inputs.t, *anchors, *parameters)
     return [*along_places(equations, values), *jvps(values, [{node: 1.0} for node in others])]
+
+
+def run_many(function: Function, blocks: Matrix, parameters: Vector, out: Matrix) -> None:
+    """A compiled function at many blocks (N, block), its outputs line by line."""
+    if function.address == 0:
+        for block, line in zip(blocks, out, strict=True):
+            function(block, parameters, line)
+        return
+    function(blocks[0], parameters, out[0])  # which checks sizes
+    run = PROTOTYPE(function.address)
+    block, line, values = blocks.ctypes.data, out.ctypes.data, parameters.ctypes.data
+    width, wide = blocks.strides[0], out.strides[0]
+    for k in range(1, len(blocks)):
+        run(block + k * width, values, line + k * wide)

@@ -117,6 +117,21 @@ class RunRows:
         """Whether steps follow their error."""
         return self.record.settings.get("dt") is None
 
+    def begins_late(self, time: float, row: int) -> bool:
+        """Whether the pass is beyond a row, at an instant that the run does not store."""
+        return time != float(self.record.time[row])
+
+    def segment_end(self, row: int) -> int:
+        """The row with which the steps from a start at a row end: the next one that is stored twice, or the last."""
+        repeats = self._repeats
+        later = repeats[np.searchsorted(repeats, row, side="right") :]
+        return int(later[0]) if len(later) else len(self.record.time) - 1
+
+    @cached_property
+    def _repeats(self) -> Any:
+        """Rows whose instant is that of the row behind them."""
+        return np.flatnonzero(np.diff(self.record.time) == 0.0)
+
     def mode(self, row: int) -> Mode:
         """What acts from a row on."""
         flags, phase = self.record.closed[row], self.record.phase[row]

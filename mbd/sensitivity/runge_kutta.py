@@ -9,15 +9,18 @@ At the end positions and velocities are put on the rows: ``M(q̃) W + R ν = 0``
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.kernel.schemes.dormand_prince import END, NODES, STAGES, WEIGHTS
 from mbd.sensitivity.balance import consistent_rates, on_rows, saddle
-from mbd.sensitivity.motion import Mode, Motion, Rates, solved
-from mbd.sensitivity.schemes import Memory, SchemeSteps
+from mbd.sensitivity.explicit import ExplicitSteps
+from mbd.sensitivity.motion import Mode, Motion, Rates, Tangent, solved
+from mbd.sensitivity.programs import Programs
+from mbd.sensitivity.run_data import RunRows
+from mbd.sensitivity.schemes import SAME, Memory, SchemeSteps
 
 __all__ = ["RungeKuttaSteps"]
 
@@ -25,19 +28,90 @@ MOST = 4
 """Newton corrections of positions onto the rows after a step; one or two [-]."""
 
 
+@dataclass(frozen=True)
+class Known:
+    """A step: derivatives of its end, and of rates and multipliers at its start, by `inputs`; what acts in it."""
+
+    matrix: Matrix
+    rates: Matrix
+    mode: Mode
+
+
+def inputs(tangent: Tangent, dh: Vector) -> Matrix:
+    """Derivatives of x, y, t, anchors, p and h."""
+    t = tangent.t[np.newaxis]
+    return np.vstack([tangent.q, tangent.y, t, tangent.anchors, tangent.p, dh[np.newaxis]])
+
+
 class RungeKuttaSteps(SchemeSteps):
     """Derivatives of explicit steps."""
+
+    def __init__(self, rows: RunRows, programs: Programs) -> None:
+        super().__init__(rows, programs)
+        self.known: dict[int, Known] = {}
 
     def start(self, motion: Motion, mode: Mode, rates: Rates) -> Memory:
         """It remembers nothing but its rates."""
         return Memory.of_rates(rates, 0.0)
 
+    def prepare(self, motion: Motion, mode: Mode, first: int, last: int) -> None:
+        """All steps of a segment at once, where forces do not follow multipliers."""
+        record, rows = self.rows.record, self.rows
+        self.known = {}
+        if last <= first or self.programs.equations.frictions or rows.manager.trivial:
+            return
+        time, here = np.asarray(record.time[first : last + 1]), slice(first, last)
+        steps = ExplicitSteps(
+            self.programs, motion, mode, time[:-1], np.diff(time), np.asarray(record.q[here]), rows.y[here],
+            rows.rate[here], np.asarray(record.lam[here]),
+        )  # fmt: skip
+        try:
+            q, y, matrices, rates = steps.taken()
+        except np.linalg.LinAlgError:
+            return
+        ends = np.hstack([record.q[first + 1 : last + 1], rows.y[first + 1 : last + 1]])
+        off = np.max(np.abs(np.hstack([q, y]) - ends), axis=1)
+        good = off <= SAME * np.max(np.abs(ends), axis=1, initial=1e-3)
+        self.known = {first + k: Known(matrices[k], rates[k], mode) for k in np.flatnonzero(good).tolist()}
+
     def along(
         self, motion: Motion, memory: Memory, mode: Mode, row: int, dh: Vector, fresh: bool
     ) -> tuple[Motion, Memory]:
         """A step to a row."""
-        end, rates = self.ended(motion, memory, mode, row, dh)
-        return end, Memory.of_rates(rates, 0.0)
+        end = self._quick(motion, row, dh)
+        if end is None:
+            end, rates = super().ended(motion, memory, mode, row, dh)
+            return end, Memory.of_rates(rates, 0.0)
+        return end, Memory.of_rates(self._rates(end, mode, row), 0.0)
+
+    def ended(self, motion: Motion, memory: Memory, mode: Mode, row: int, dh: Vector) -> tuple[Motion, Rates]:
+        """The same at an event."""
+        end = self._quick(motion, row, dh)
+        if end is None:
+            return super().ended(motion, memory, mode, row, dh)
+        return end, self._rates(end, mode, row)
+
+    def _quick(self, motion: Motion, row: int, dh: Vector) -> Motion | None:
+        """The step to a row by its matrix; None where it is not known."""
+        known = self.known.get(row - 1)
+        if known is None or self.rows.begins_late(motion.t, row - 1):
+            return None
+        record, n_v, tangent = self.rows.record, self.programs.columns.n_v, motion.tangent
+        found = known.matrix @ inputs(tangent, dh)
+        moved = replace(tangent, t=tangent.t + dh, q=found[:n_v], y=found[n_v:])
+        return Motion(float(record.time[row]), np.array(record.q[row]), self.rows.y[row], motion.anchors, moved)
+
+    def _rates(self, motion: Motion, mode: Mode, row: int) -> Rates:
+        """Rates at a row, consistent in the mode of the step to it."""
+        c, record, known = self.programs.columns, self.rows.record, self.known.get(row)
+        rate, lam = self.rows.rate[row], np.array(record.lam[row])
+        if known is None or known.mode is not mode:
+            none = np.zeros((c.n, len(motion.tangent.t))), np.zeros((c.rows, len(motion.tangent.t)))
+            return consistent_rates(self.programs, motion, mode, Rates(rate, lam, *none))
+        found = known.rates @ inputs(motion.tangent, np.zeros_like(motion.tangent.t))
+        of_lam = np.zeros((c.rows, found.shape[1]))
+        of_lam[list(mode.rows)] = found[c.n :]
+        return Rates(rate, lam, found[: c.n], of_lam)
 
     def reached(
         self, motion: Motion, memory: Memory, mode: Mode, time: float, dh: Vector, row: int

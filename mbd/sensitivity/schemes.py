@@ -49,6 +49,10 @@ class SchemeSteps(ABC):
     def start(self, motion: Motion, mode: Mode, rates: Rates) -> Memory:
         """The memory of a start from consistent rates."""
 
+    def prepare(self, motion: Motion, mode: Mode, first: int, last: int) -> None:
+        """Whatever is found quicker for all steps from a start at the row `first` to the row `last` together."""
+        return  # nothing
+
     @abstractmethod
     def along(
         self, motion: Motion, memory: Memory, mode: Mode, row: int, dh: Vector, fresh: bool

@@ -115,6 +115,8 @@ class Walk:
                 rates = self._restarted(motion, mode, row)
                 memory = self.steps.start(motion, mode, rates)
                 continue
+            if fresh and not rows.begins_late(motion.t, row):
+                self.steps.prepare(motion, mode, row, rows.segment_end(row))
             if row not in looked:
                 looked.add(row)
                 begun = self._begins(motion, memory, mode, row)

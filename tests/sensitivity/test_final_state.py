@@ -21,6 +21,9 @@ CONVERGED = (
 )  # fmt: skip
 """Schemes whose steps differ from their converged solutions by round-off: these are what is differentiated."""
 
+WALKER = kneed_walker()
+START = kneed_walker_start(WALKER)
+
 
 def compared(model, start, scheme, names, step=1e-4, **settings):
     run = mbd.simulate(model, start, scheme, **settings)
@@ -57,10 +60,19 @@ def test_of_a_bounce_in_closed_form():
     assert state[:, 0] == pytest.approx([place, e * by_speed + g * by_fall], rel=1e-9)
 
 
-@pytest.mark.parametrize("scheme", CONVERGED, ids=repr)
-@pytest.mark.parametrize("until", ["right foot", 0.9])
-def test_of_a_walker_with_locking_knees(scheme, until):
-    model = kneed_walker()
-    start = kneed_walker_start(model)
+def walked(scheme, until):
+    model, start = WALKER, START
     names = ["left hip.angle", "right hip.angle.rate", "right thigh.mass", "gravity.x"]
     assert compared(model, start, scheme, names, 1e-4, dt=0.005, until=until).max() < 1e-8
+
+
+@pytest.mark.parametrize(("scheme", "until"), [(CONVERGED[0], 0.9), (CONVERGED[3], "right foot")], ids=repr)
+def test_of_a_walker_with_locking_knees(scheme, until):
+    walked(scheme, until)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scheme", CONVERGED, ids=repr)
+@pytest.mark.parametrize("until", ["right foot", 0.9])
+def test_of_a_walker_by_every_scheme(scheme, until):
+    walked(scheme, until)

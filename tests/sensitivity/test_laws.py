@@ -1,0 +1,70 @@
+"""Laws of derivatives, on random scenes with impacts: equal to differences, linear in directions, a chain over cuts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+
+import mbd
+from mbd.sensitivity.derivative import final_state_derivative
+from mbd.testing.mechanisms import random_scene
+from tests.sensitivity.scenes import judged
+from tests.simulation.mechanisms import kneed_walker, kneed_walker_start
+
+SCHEMES = (
+    mbd.HHT(alpha=0.05, tolerance=1e-10), mbd.GeneralizedAlpha(0.8, tolerance=1e-10), mbd.RungeKutta853(),
+    mbd.HHT(alpha=0.05, formulation="index3", tolerance=1e-11), mbd.Newmark(),
+)  # fmt: skip
+NAMES = ["left hip.angle", "right hip.angle.rate", "right thigh.mass"]
+WALKER = kneed_walker()
+START = kneed_walker_start(WALKER)
+
+
+def assert_as_differences(seed: int, scheme: object) -> None:
+    """To 1e-8 of the largest, or to what two quotients differ by where that is more."""
+    found = judged(random_scene(seed, bodies=2), scheme)
+    if not isinstance(found, str):
+        far, noise = found
+        assert np.all(far <= np.maximum(1e-8, noise)), (far, noise)
+
+
+@given(seed=st.integers(0, 100), place=st.sampled_from(range(3)))
+@settings(max_examples=3, deadline=None)
+def test_derivatives_of_scenes_are_limits_of_differences(seed, place):
+    assert_as_differences(seed, SCHEMES[place])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(200))
+def test_derivatives_of_many_scenes_are_limits_of_differences(seed):
+    assert_as_differences(seed, SCHEMES[seed % len(SCHEMES)])
+
+
+@pytest.mark.parametrize("scheme", [SCHEMES[0], SCHEMES[2]], ids=repr)
+def test_derivatives_are_linear_in_the_direction(scheme):
+    run = mbd.simulate(WALKER, START, scheme, dt=0.01, until="right foot")
+    one, two = {"right thigh.mass": 1.0, "gravity.x": 0.5}, {"left shank.length": 2.0, "gravity.x": -1.0}
+    both = {name: 3.0 * one.get(name, 0.0) - two.get(name, 0.0) for name in {**one, **two}}
+    state, time = final_state_derivative(run, [("one", one), ("two", two), ("both", both)])
+    found = np.vstack([state, time])
+    assert found[:, 2] == pytest.approx(3.0 * found[:, 0] - found[:, 1], rel=1e-11, abs=1e-10)
+
+
+def test_derivatives_of_parts_of_a_run_make_a_chain():
+    """Cut at an event, the derivative of the whole is the product of those of its parts, the end held in time.
+
+    The second part begins as much later as the first ends, which takes ``ẏ δt`` from its end.
+    """
+    scheme, names = mbd.RungeKutta853(), [*START.names, *START.velocity_names]
+    whole = mbd.simulate(WALKER, START, scheme, dt=0.01, until=0.5)
+    first = mbd.simulate(WALKER, START, scheme, dt=0.01, until="right knee lock")
+    second = mbd.simulate(WALKER, replace(first.final, memory=None), scheme, dt=0.01, until=0.5)
+    assert second.final.q == pytest.approx(whole.final.q, abs=1e-12)
+    (a, t), (b, _) = final_state_derivative(first, names), final_state_derivative(second, names)
+    c, _ = final_state_derivative(whole, names)
+    last = second.record
+    found = b @ a - np.outer(np.concatenate([last.v[-1], last.a[-1]]), t)
+    assert found == pytest.approx(c, abs=1e-8 * np.max(np.abs(c)))
