@@ -7,12 +7,14 @@ velocities of the rows: what does not agree with them to round-off is refused.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from mbd.arrays import Vector
 from mbd.integrators.family import NewmarkFamily
 from mbd.sensitivity.balance import consistent_rates, on_rows
+from mbd.sensitivity.implicit import ImplicitSteps
 from mbd.sensitivity.motion import Mode, Motion, Rates
 from mbd.sensitivity.newmark import NewmarkSteps
 from mbd.sensitivity.programs import Programs
@@ -20,6 +22,9 @@ from mbd.sensitivity.run_data import RunRows
 from mbd.sensitivity.schemes import Memory, SchemeSteps
 
 __all__ = ["NewmarkRows"]
+
+FEW = 4
+"""Steps below which one after the other is quicker [-]."""
 
 
 class NewmarkRows(SchemeSteps):
@@ -33,6 +38,42 @@ class NewmarkRows(SchemeSteps):
     def start(self, motion: Motion, mode: Mode, rates: Rates) -> Memory:
         """With the jerk of a difference of accelerations."""
         return self.steps.start(motion, mode, rates)
+
+    def leap(self, motion: Motion, memory: Memory, mode: Mode, first: int, last: int) -> tuple[int, Motion, Memory]:
+        """By one matrix a step."""
+        record, here = self.rows.record, slice(first, last + 1)
+        if last - first < FEW:
+            return first, motion, memory
+
+        def steps(here: slice) -> ImplicitSteps:
+            return ImplicitSteps(
+                self.steps, motion, mode, np.asarray(record.time[here]), np.asarray(record.q[here]), self.rows.y[here],
+                self.rows.rate[here], np.asarray(record.lam[here]), memory.aux, memory.step,
+            )  # fmt: skip
+
+        last = first + steps(here).followed()
+        if last - first < FEW:
+            return first, motion, memory
+        taken = steps(slice(first, last + 1))
+        try:
+            matrices, of_lam = taken.matrices()
+        except np.linalg.LinAlgError:
+            return first, motion, memory
+        c, tangent = self.programs.columns, motion.tangent
+        scheme = memory.rates.of_rate, memory.of_aux
+        X = np.vstack([tangent.q, tangent.y, *scheme, tangent.t[np.newaxis], tangent.anchors, tangent.p])
+        for matrix in matrices[:-1]:
+            X = matrix @ X
+        lam = np.zeros((c.rows, X.shape[1]))
+        lam[list(mode.rows)] = of_lam[-1] @ X
+        X = matrices[-1] @ X
+        q, y, rate, aux = np.split(X[: c.n_v + 3 * c.n], [c.n_v, c.n_v + c.n, c.n_v + 2 * c.n])
+        end = Motion(
+            float(record.time[last]), np.array(record.q[last]), self.rows.y[last], motion.anchors,
+            replace(tangent, q=q, y=y),
+        )  # fmt: skip
+        rates = Rates(self.rows.rate[last], np.array(record.lam[last]), rate, lam)
+        return last, end, Memory(rates, taken.a[-1], aux, float(taken.h[-1]))
 
     def along(
         self, motion: Motion, memory: Memory, mode: Mode, row: int, dh: Vector, fresh: bool

@@ -53,6 +53,11 @@ class SchemeSteps(ABC):
         """Whatever is found quicker for all steps from a start at the row `first` to the row `last` together."""
         return  # nothing
 
+    def leap(self, motion: Motion, memory: Memory, mode: Mode, first: int, last: int) -> tuple[int, Motion, Memory]:
+        """Many steps whose sizes do not change, from a start at the row `first` on: as far as they are known, not
+        beyond the row `last`; the row that was reached."""
+        return first, motion, memory
+
     @abstractmethod
     def along(
         self, motion: Motion, memory: Memory, mode: Mode, row: int, dh: Vector, fresh: bool

@@ -116,7 +116,11 @@ class Walk:
                 memory = self.steps.start(motion, mode, rates)
                 continue
             if fresh and not rows.begins_late(motion.t, row):
-                self.steps.prepare(motion, mode, row, rows.segment_end(row))
+                end = rows.segment_end(row)
+                self.steps.prepare(motion, mode, row, end)
+                before = row
+                row, motion, memory = self.steps.leap(motion, memory, mode, row, self._unwatched(mode, row, end - 1))
+                fresh = row == before
             if row not in looked:
                 looked.add(row)
                 begun = self._begins(motion, memory, mode, row)
@@ -151,6 +155,14 @@ class Walk:
                 "dataclasses.replace(start, memory=None)",
             )
         return found
+
+    def _unwatched(self, mode: Mode, first: int, last: int) -> int:
+        """The last row up to which no open contact begins to be watched between rows."""
+        values, closed = self.watches[first : last + 1], np.asarray(mode.closed) != 0
+        begins = (values[:-1] <= 0.0) & (values[1:] > 0.0)
+        begins[:, closed] = False
+        found = np.flatnonzero(begins.any(axis=1))
+        return first + int(found[0]) if len(found) else last
 
     def _begins(self, motion: Motion, memory: Memory, mode: Mode, row: int) -> tuple[Motion, Memory, Rates] | None:
         """The start of the scheme where an open contact begins to be watched before the next row; None if none does.

@@ -11,10 +11,10 @@ from tests.sensitivity.differences import differences, off
 __all__ = ["judged"]
 
 ROUND_OFF = 2e-12
-"""What iterations of a run to 1e-10 and round-off leave of its end [m, rad, s]."""
+"""What iterations of a run and round-off leave of its end [m, rad, s]."""
 
 
-def judged(model, scheme, dt=5e-3, until=0.8, step=1e-4):
+def judged(model, scheme, dt=5e-3, until=0.8, step=3e-4):
     """How far derivatives of a scene are off, over the largest of each, and how well they are known; or why not.
 
     By two coordinates, a speed and gravity. Differences that are not known well by themselves are left out.

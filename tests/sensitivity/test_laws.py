@@ -15,8 +15,8 @@ from tests.sensitivity.scenes import judged
 from tests.simulation.mechanisms import kneed_walker, kneed_walker_start
 
 SCHEMES = (
-    mbd.HHT(alpha=0.05, tolerance=1e-10), mbd.GeneralizedAlpha(0.8, tolerance=1e-10), mbd.RungeKutta853(),
-    mbd.HHT(alpha=0.05, formulation="index3", tolerance=1e-11), mbd.Newmark(),
+    mbd.HHT(alpha=0.05, tolerance=1e-12), mbd.GeneralizedAlpha(0.8, tolerance=1e-12), mbd.RungeKutta853(),
+    mbd.HHT(alpha=0.05, formulation="index3", tolerance=1e-12), mbd.Newmark(tolerance=1e-12),
 )  # fmt: skip
 NAMES = ["left hip.angle", "right hip.angle.rate", "right thigh.mass"]
 WALKER = kneed_walker()
