@@ -125,6 +125,7 @@ class Programs:
         self.columns = Columns.of(self.layout, len(self.places))
         self.values = np.ascontiguousarray(values, dtype=float) if len(values) else np.zeros(1)
         self._block = np.zeros(self.layout.size)
+        self._given: dict[str, list[Node]] = {}
 
     def steps(self, at: State) -> tuple[Vector, Vector, Vector, Matrix, Matrix, Matrix]:
         """r, h, ḣ and their derivatives."""
@@ -155,6 +156,11 @@ class Programs:
         """A named result and its derivatives."""
         values, slopes = self._call(f"result {name}", at, 1)
         return float(values[0]), slopes[0]
+
+    def derivatives_of(self, name: str, nodes: Sequence[Node], at: State) -> Matrix:
+        """Derivatives (len(nodes), columns) of expressions, compiled under a name."""
+        self._given[name] = list(nodes)
+        return self._call(name, at, len(nodes))[1]
 
     def many(self, name: str, blocks: Matrix, size: int) -> tuple[Matrix, Matrix]:
         """Values (N, size) and derivatives (N, size, columns) of a program at many blocks (N, block)."""
@@ -203,7 +209,9 @@ class Programs:
     def _program(self, name: str) -> list[Node]:
         """Values of a program and their derivatives."""
         equations = self.equations
-        if name == "steps":
+        if name in self._given:
+            values = list(self._given[name])
+        elif name == "steps":
             values = switched_balance(equations)
             values += [row.value for row in equations.rows] + [row.rate for row in equations.rows]
         elif name == "consistent":

@@ -17,6 +17,7 @@ from mbd.sensitivity.guards import Trigger, shift_of_end, trigger
 from mbd.sensitivity.motion import Mode, Motion, Rates, Tangent
 from mbd.sensitivity.newmark_rows import NewmarkRows
 from mbd.sensitivity.programs import Programs
+from mbd.sensitivity.resets import after_reset
 from mbd.sensitivity.run_data import RunRows, refused
 from mbd.sensitivity.runge_kutta import RungeKuttaSteps
 from mbd.sensitivity.schemes import Memory, SchemeSteps, is_at
@@ -229,9 +230,9 @@ class Walk:
         slowest = float(self.record.settings.get("rest_speed", 1e-6))
         along = shift_of_end(self.programs, end, mode, rates, fired, slowest)
         before = replace(end, tangent=end.tangent.combined(along))
-        return Instant(row + 1, fired, before, self._after(before, mode, fired, row + 1))
+        return Instant(row + 1, fired, before, self._after(before, mode, fired, row + 1, rates))
 
-    def _after(self, before: Motion, mode: Mode, fired: Trigger, row: int) -> Motion:
+    def _after(self, before: Motion, mode: Mode, fired: Trigger, row: int, rates: Rates) -> Motion:
         """The state after an event: impact, what contacts hold from now on."""
         equations, events = self.programs.equations, self.rows.events[row]
         later = self.rows.mode(row)
@@ -242,7 +243,9 @@ class Walk:
         if closing:
             motion, _ = struck(self.rows, self.programs, before, mode, events, row)
         elif fired.kind == "event" and equations.guards[fired.number].reset is not None:
-            raise refused(f"the reset of {fired.name!r} is not differentiated yet")
+            row_after = np.array(self.record.q[row]), self.rows.y[row]
+            there = consistent_rates(self.programs, before, mode, rates)
+            motion = after_reset(self.programs, before, mode, there, fired.number, row_after)
         if not is_at(self.rows, motion, row):
             raise refused(f"the state after {fired.name!r} at t = {before.t:.9g} s is not the one that was expected")
         held = captured(self.programs, before, mode, rigid)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
 import mbd
+from tests.sensitivity.differences import differences, off
 from tests.simulation.mechanisms import ball, kneed_walker, kneed_walker_start, pendulum
 
 SLOPE = 0.0504
@@ -109,6 +112,20 @@ def test_a_row_at_an_event_has_no_other_derivative_than_its_neighbours():
     assert later == pytest.approx(after, rel=1e-9)
 
 
+@pytest.mark.parametrize("scheme", [mbd.HHT(0.05, tolerance=1e-12), mbd.RungeKutta853()], ids=repr)
+def test_resets_are_differentiated(scheme):
+    model = pendulum()
+    back = mbd.measure(lambda angle: angle, "hinge.angle")
+    turned = {"hinge.rate": lambda named: -0.5 * named["hinge.rate"] * mbd.cos(named["rod.center"]), "hinge.angle": 0.1}
+    model.constrain(mbd.Event("back", back, reset=turned, direction=-1))
+    start = mbd.assemble(model, {"hinge.angle": 1.0})
+    settings = {"dt": 0.01, "until": 1.0}
+    names = ["hinge.angle", "hinge.angle.rate", "rod.center"]
+    found = mbd.sensitivities(model, start, scheme, wrt=names, **settings)
+    assert [event.name for event in found.run.events] == ["back"]
+    assert off(found.matrix, differences(model, start, scheme, names, **settings)[0]).max() < 1e-8
+
+
 def test_two_events_at_one_instant_are_named():
     box = mbd.Model("two")
     for name in "ab":
@@ -132,7 +149,10 @@ def test_a_graze_is_named():
         mbd.sensitivities(model, start, mbd.RungeKutta853(), dt=0.01, until=0.6, wrt=["place.y.rate"])
 
 
-RESET = mbd.Event("back", mbd.measure(lambda angle: angle, "hinge.angle"), reset={"hinge.rate": 0.0})
+RESET = mbd.Event(
+    "back", mbd.measure(lambda angle: angle, "hinge.angle"),
+    reset=lambda named: {"hinge.rate": -0.5 * math.sin(named["hinge.rate"])},
+)  # fmt: skip
 SAMPLED = mbd.Controller("sampled", lambda time, values, state: None, period=0.1, writes=["rod.center"])
 
 

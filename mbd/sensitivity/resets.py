@@ -1,0 +1,82 @@
+"""Resets of users' events, differentiated: the functions that give the values are traced as those of forces are."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from mbd.arrays import Vector
+from mbd.compile.mechanism import rate_names
+from mbd.constraints.expressions import is_expression
+from mbd.equations.equations import Equations
+from mbd.errors import MbdError
+from mbd.sensitivity.motion import Mode, Motion, Rates
+from mbd.sensitivity.programs import Programs
+from mbd.sensitivity.run_data import refused
+from mbd.tape.node import Node
+
+__all__ = ["after_reset"]
+
+
+class Named(Mapping[str, Node]):
+    """Any named quantity as an expression."""
+
+    def __init__(self, equations: Equations) -> None:
+        self._equations = equations
+        self._places = {parameter.name: k for k, parameter in enumerate(equations.parameters)}
+
+    def __getitem__(self, name: str) -> Node:
+        if name in self._places and name not in self._equations.output_names():
+            return self._equations.tape.input("p", self._places[name])
+        return self._equations.output(name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._equations.output_names())
+
+    def __len__(self) -> int:
+        return len(self._equations.output_names())
+
+
+def after_reset(
+    programs: Programs, motion: Motion, mode: Mode, rates: Rates, e: int, row: tuple[Vector, Vector]
+) -> Motion:
+    """The motion at the row (q, y) after the reset of users' event e.
+
+    Raises
+    ------
+    CapabilityError
+        for a reset that is not a function of traced values.
+    """
+    equations, guard = programs.equations, programs.equations.guards[e]
+    values = _expressions(equations, guard.reset, guard.name)
+    names, nodes = list(values), list(values.values())
+    lines = programs.derivatives_of(f"reset {e}", nodes, motion.at(mode, rates.rate, rates.lam))
+    found = lines @ motion.tangent.stacked(programs.columns, rates.of_rate, rates.of_lam)
+    coordinates = {each.name: k for k, each in enumerate(equations.coordinates)}
+    speeds = {name: k for name, k in rate_names(equations).items() if name not in coordinates}
+    speeds |= {state.name: equations.n_v + k for k, state in enumerate(equations.states)}
+    q, y = motion.tangent.q.copy(), motion.tangent.y.copy()
+    for name, change in zip(names, found, strict=True):
+        if name in coordinates:
+            q[coordinates[name]] = change
+        else:
+            known = name if name in speeds else f"{name.removesuffix('_rate')}.rate"
+            y[speeds[known]] = change
+    return replace(motion, q=row[0], y=row[1]).with_tangent(q=q, y=y)
+
+
+def _expressions(equations: Equations, reset: Any, name: str) -> dict[str, Node]:
+    """What a reset sets, as expressions of the state before it."""
+    named, tape = Named(equations), equations.tape
+    try:
+        with tape.lock:
+            wanted = reset(named) if callable(reset) else reset
+            values: Sequence[tuple[str, Any]] = list(wanted.items())
+            if any(is_expression(value) for _, value in values):
+                raise refused(f"the reset of {name!r} is given by sympy expressions", "give a function of named values")
+            return {each: tape.lift(value(named) if callable(value) else value) for each, value in values}
+    except (TypeError, ValueError, AttributeError, MbdError) as error:
+        raise refused(
+            f"the reset of {name!r} cannot be differentiated: {error}", "write it with mbd.sin, mbd.where and operators"
+        ) from error
