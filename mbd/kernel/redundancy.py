@@ -12,7 +12,7 @@ from mbd.kernel.orthogonal import clear_row, square
 from mbd.kernel.records import ContactRows, DependentRows, Equations, Frictions, Model, Reals, Singular
 from mbd.kernel.roots import sqrt
 
-__all__ = ["find_dependent", "find_mix", "find_shares", "shared", "sharing", "spread", "take_shares"]
+__all__ = ["find_dependent", "find_dependence", "find_shares", "shared", "sharing", "spread", "take_shares"]
 
 DEPENDENCE = 1e-9
 """What is left of a row beside the earlier ones, relative, below which it depends on them [-]."""
@@ -28,7 +28,7 @@ LEAST_SHARE = 1e-4
 
 
 def find_dependent(K: DependentRows, m: int) -> None:
-    """Mark rows among the m in K.rows that depend on earlier ones in K.dropped, with B_d = C B_kept in K.mix.
+    """Mark rows among the m in K.rows that depend on earlier ones in K.dropped, with B_d = C B_kept in K.dependence.
 
     Gram–Schmidt in the order of the rows, short ones last, on columns scaled by √M_ii; B is that of K.acc.
     """
@@ -80,8 +80,8 @@ def length_of(K: Model, row: int) -> float:
     return float(sqrt(total))
 
 
-def find_mix(K: DependentRows, m: int) -> None:
-    """C in K.mix at another place, that of K.acc: the m rows in K.rows are kept, those of K.dropped depend on them."""
+def find_dependence(K: DependentRows, m: int) -> None:
+    """C in K.dependence at the place of K.acc: the m rows in K.rows are kept, those of K.dropped depend on them."""
     for k in range(m):
         remaining_norm(K, K.rows[k], k)
         keep_row(K, K.rows[k], k)
@@ -122,13 +122,13 @@ def keep_row(K: DependentRows, row: int, kept: int) -> None:
 
 def combine(K: DependentRows, row: int, kept: int) -> None:
     """The coefficients of a row in the kept rows from those in the basis, ``c L = `` the next line of K.lower."""
-    K.mix[row * K.n_rows : row * K.n_rows + K.n_rows] = 0.0
+    K.dependence[row * K.n_rows : row * K.n_rows + K.n_rows] = 0.0
     for back in range(kept):
         i = kept - 1 - back
         value = K.lower[kept * K.n_rows + i]
         for j in range(i + 1, kept):
-            value -= K.mix[row * K.n_rows + K.columns[j]] * K.lower[j * K.n_rows + i]
-        K.mix[row * K.n_rows + K.columns[i]] = value / K.lower[i * K.n_rows + i]
+            value -= K.dependence[row * K.n_rows + K.columns[j]] * K.lower[j * K.n_rows + i]
+        K.dependence[row * K.n_rows + K.columns[i]] = value / K.lower[i * K.n_rows + i]
 
 
 def sharing(K: DependentRows) -> bool:
@@ -141,13 +141,13 @@ def sharing(K: DependentRows) -> bool:
 
 
 def find_shares(K: DependentRows) -> None:
-    """W_d C W_kept⁻¹ into K.shares, from K.mix and the limits in K.limit."""
+    """W_d C W_kept⁻¹ into K.shares, from K.dependence and the limits in K.limit."""
     largest = largest_limit(K)
     for d in range(K.n_rows):
         for k in range(K.n_rows):
             part = 0.0
             if K.dropped[d] == 1 and K.dropped[k] == 0:
-                part = K.mix[d * K.n_rows + k]
+                part = K.dependence[d * K.n_rows + k]
                 if part != 0.0:
                     part *= share(K, d, largest) / share(K, k, largest)
             K.shares[d * K.n_rows + k] = part
@@ -203,19 +203,19 @@ def spread(K: DependentRows, lam: Reals) -> None:
     for i in range(K.n_rows):
         if K.dropped[i] == 0:
             for d in range(count):
-                lam[i] += K.mix[K.columns[d] * K.n_rows + i] * lam[K.columns[d]]
+                lam[i] += K.dependence[K.columns[d] * K.n_rows + i] * lam[K.columns[d]]
     for a in range(count):
         K.rhs[a] = 0.0
         for b in range(count):
             K.kkt[a * count + b] = 1.0 / share(K, K.columns[a], largest) if a == b else 0.0
         for i in range(K.n_rows):
-            left = K.mix[K.columns[a] * K.n_rows + i]
+            left = K.dependence[K.columns[a] * K.n_rows + i]
             if K.dropped[i] == 1 or left == 0.0:
                 continue
             left /= share(K, i, largest)
             K.rhs[a] += left * lam[i]
             for b in range(count):
-                K.kkt[a * count + b] += left * K.mix[K.columns[b] * K.n_rows + i]
+                K.kkt[a * count + b] += left * K.dependence[K.columns[b] * K.n_rows + i]
     if factor(K.kkt, count, K.pivots) != 0:
         return
     solve(K.kkt, count, K.pivots, K.rhs)
@@ -223,4 +223,4 @@ def spread(K: DependentRows, lam: Reals) -> None:
         lam[K.columns[d]] = K.rhs[d]
         for i in range(K.n_rows):
             if K.dropped[i] == 0:
-                lam[i] -= K.mix[K.columns[d] * K.n_rows + i] * K.rhs[d]
+                lam[i] -= K.dependence[K.columns[d] * K.n_rows + i] * K.rhs[d]

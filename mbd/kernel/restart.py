@@ -16,7 +16,7 @@ from mbd.kernel.records import (
     Motion,
     Reals,
 )
-from mbd.kernel.redundancy import find_mix, find_shares, shared, sharing, spread, take_shares
+from mbd.kernel.redundancy import find_dependence, find_shares, shared, sharing, spread, take_shares
 from mbd.kernel.saddle import solve_rows
 
 __all__ = [
@@ -260,7 +260,7 @@ def consistent(K: Balance, t: float, q: Reals, y: Reals) -> int:
     m = stepping_rows(K)
     together = sharing(K)
     if together:
-        find_mix(K, m)
+        find_dependence(K, m)
         find_limits_of_loads(K)
         find_shares(K)
     load_accelerations(K)
@@ -308,7 +308,7 @@ def minimum_norm_multipliers(K: DependentRows, lam: Reals) -> None:
     for turn in range(MOST_LOADS):
         change = evaluate_loaded(K, lam)
         if turn == 0:
-            find_mix(K, stepping_rows(K))
+            find_dependence(K, stepping_rows(K))
         find_limits_of_loads(K)
         if sharing(K):
             find_shares(K)
@@ -322,7 +322,7 @@ def minimum_norm_multipliers(K: DependentRows, lam: Reals) -> None:
 def share_loads(K: Balance, m: int) -> None:
     """Multipliers of dependent rows in the block, where they are part of the step's equations, at its iterate."""
     call(K, ACCELERATIONS, K.acc)
-    find_mix(K, m)
+    find_dependence(K, m)
     find_limits_of_loads(K)
     find_shares(K)
     K.loads[: K.n_rows] = K.block[K.o_lam : K.o_lam + K.n_rows]

@@ -93,7 +93,11 @@ def still_dependent(K: DependentRows) -> bool:
             slip = 1e-6 * (size + 1.0)
             if K.stabilized == 0:  # index 3 leaves rates of the size of its error, of which this row has its share
                 for i in range(K.n_rows):
-                    slip += 2.0 * abs(K.mix[k * K.n_rows + i] * K.acc[o_h + K.n_rows + i]) if K.dropped[i] == 0 else 0.0
+                    slip += (
+                        2.0 * abs(K.dependence[k * K.n_rows + i] * K.acc[o_h + K.n_rows + i])
+                        if K.dropped[i] == 0
+                        else 0.0
+                    )
             if abs(K.acc[o_h + k]) > 1e-9 * size or abs(K.acc[o_h + K.n_rows + k]) > slip:
                 return False
     return True

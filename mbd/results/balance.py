@@ -123,8 +123,8 @@ class Balance:
             M, f, R, B, bias, limits = self._terms_at(replace(rows, lam=lam))
             forces, spread = R[:, :, held.kept], None
             if held.depend:
-                mix, weight = _mix(M, B, held), self._shares(held, limits)
-                spread = _shared(mix, weight, held) if slides else _least_norm(mix, weight)
+                dependence, weight = _dependence(M, B, held), self._shares(held, limits)
+                spread = _shared(dependence, weight, held) if slides else _least_norm(dependence, weight)
             if slides and spread is not None:  # how a load is shared moves the mechanism
                 forces = R[:, :, held.every] @ spread
             rate, force, size, sound = _saddle(M, f, forces, B[:, held.kept], bias[:, held.kept])
@@ -188,7 +188,7 @@ def _weights(M: Any) -> Any:
     return np.where(found > 0.0, found, 1.0)[:, None, :]
 
 
-def _mix(M: Any, B: Any, held: _Held) -> Any:
+def _dependence(M: Any, B: Any, held: _Held) -> Any:
     """T (k, every, kept) of ``B = T B_kept``, by least squares on columns divided by √M_ii."""
     scaled = np.nan_to_num(B / _weights(M), posinf=0.0, neginf=0.0)
     basis, _ = np.linalg.qr(np.swapaxes(scaled[:, held.kept], 1, 2))
@@ -198,20 +198,20 @@ def _mix(M: Any, B: Any, held: _Held) -> Any:
     return np.swapaxes(np.linalg.solve(np.swapaxes(kept, 1, 2), np.swapaxes(along, 1, 2)), 1, 2)
 
 
-def _least_norm(mix: Any, weight: Matrix) -> Any:
+def _least_norm(dependence: Any, weight: Matrix) -> Any:
     """S (k, every, kept) of λ = S λ_kept: of all λ with the same forces that with the least λᵀ W⁻¹ λ."""
-    heavy = weight[:, :, None] * mix
-    square = np.swapaxes(mix, 1, 2) @ heavy
+    heavy = weight[:, :, None] * dependence
+    square = np.swapaxes(dependence, 1, 2) @ heavy
     lost = ~np.isfinite(square).all(axis=(1, 2))  # at a singular configuration, where no such λ is used
     square[lost] = 0.0
-    square[lost | (np.linalg.slogdet(square)[0] == 0.0)] = np.eye(mix.shape[2])
+    square[lost | (np.linalg.slogdet(square)[0] == 0.0)] = np.eye(dependence.shape[2])
     return np.swapaxes(np.linalg.solve(square, np.swapaxes(heavy, 1, 2)), 1, 2)
 
 
-def _shared(mix: Any, weight: Matrix, held: _Held) -> Any:
+def _shared(dependence: Any, weight: Matrix, held: _Held) -> Any:
     """S (k, every, kept) of λ = S λ_kept with ``S = W T W_kept⁻¹``, the same λ, where λ_kept is part of it."""
     kept = [held.every.index(k) for k in held.kept]
-    return weight[:, :, None] * mix / weight[:, None, kept]
+    return weight[:, :, None] * dependence / weight[:, None, kept]
 
 
 def _saddle(M: Any, f: Matrix, R: Any, B: Any, bias: Matrix) -> tuple[Matrix, Matrix, Vector, Flags]:

@@ -175,9 +175,9 @@ def test_dry_friction_of_a_pin_in_a_blow_stands_with_the_contact_that_struck():
     wall = mbd.measure(lambda angle: angle + 0.2, "pin.angle")
     model.constrain(mbd.Unilateral("wall", wall, restitution=0.6))
     run = mbd.simulate(model, mbd.assemble(model, position={"pin.angle": 1.0}), dt=1e-3, until=1.5)
-    blow = next(event for event in run.events if event.impulse.any())
-    taken = run.energy["wall impact"][blow.row - 1] - run.energy["wall impact"][blow.row]
-    assert taken == pytest.approx(run.energy.kinetic[blow.row - 1] - run.energy.kinetic[blow.row], rel=1e-9)
+    impact = next(event for event in run.events if event.impulse.any())
+    taken = run.energy["wall impact"][impact.row - 1] - run.energy["wall impact"][impact.row]
+    assert taken == pytest.approx(run.energy.kinetic[impact.row - 1] - run.energy.kinetic[impact.row], rel=1e-9)
     assert abs(run.energy.numerical[-1]) < 1e-6 and run.energy.kinds == ("friction", "impact")
 
 

@@ -356,9 +356,9 @@ def test_contradictions_are_told_with_both_names(given, told):
     ],
 )
 def test_parameters_of_no_blow_are_refused(given, told):
-    blow = {"restitution": 0.5, "penetration": 1e-3, "effective_mass": 2.0, "approach_speed": 1.0}
+    impact = {"restitution": 0.5, "penetration": 1e-3, "effective_mass": 2.0, "approach_speed": 1.0}
     with pytest.raises(ModelError, match=told):
-        mbd.penalty_parameters(**{**blow, **given})
+        mbd.penalty_parameters(**{**impact, **given})
 
 
 def test_a_description_tells_the_loss():

@@ -38,7 +38,7 @@ def scene(M, normals, tangents, mu, velocity, closed=None):
         o_lam=0, o_slip=rows, params=np.zeros(1), block=np.zeros(rows + max(frictions, 1)),
         acc=np.zeros(n * n + n + 2 * n * rows + 3 * rows + 1 + max(frictions, 1)),
         kkt=np.zeros(size * size), rhs=np.zeros(size), columns=np.zeros(size, dtype=int), work=np.zeros(3 * size),
-        basis=np.zeros((rows + 1) * n), lower=np.zeros((rows + 1) * rows), mix=np.zeros(rows * rows),
+        basis=np.zeros((rows + 1) * n), lower=np.zeros((rows + 1) * rows), dependence=np.zeros(rows * rows),
         pivots=np.zeros(size, dtype=int), force=np.zeros(n), bias=B @ velocity, jump=np.zeros(n),
         impulse=np.zeros(rows), given=np.zeros(rows), loads=np.zeros(rows), typical=np.zeros(n), scale=np.ones(size),
         y=np.array(velocity, dtype=float), limit=np.zeros(max(frictions, 1)), base_limit=np.zeros(max(frictions, 1)),

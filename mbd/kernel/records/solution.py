@@ -56,7 +56,7 @@ class Singular(SchemeAbilities):
     n_dropped: int = place("state")
     basis: Reals = reals(lambda s: (s.n_rows + 1) * s.n)  # dependent rows as combinations of others
     lower: Reals = reals(lambda s: (s.n_rows + 1) * s.n_rows)
-    mix: Reals = reals(lambda s: s.n_rows * s.n_rows, kept=True)
+    dependence: Reals = reals(lambda s: s.n_rows * s.n_rows, kept=True)
     shares: Reals = reals(lambda s: s.n_rows * s.n_rows)  # of the loads that they bear
     support: Integers = integers(lambda s: s.n_rows * (s.n + 2))  # of each row of the basis: entries that are not zero
     left: Reals = reals(lambda s: s.n_rows + 1, kept=True)  # of each row beside the earlier ones, at the accepted state

@@ -26,8 +26,8 @@ def shares(rows: Sequence[Row], terms: AccelerationTerms, kept: Sequence[int], d
     kept, dependent : numbers of the rows that are solved with and of those that depend on them
     """
     weights = np.array([_weight(row, terms.limits) for row in rows])
-    mix = np.linalg.lstsq(terms.B[list(kept)].T, terms.B[list(dependent)].T)[0].T
-    return np.asarray(weights[list(dependent)][:, None] * mix / weights[list(kept)])
+    dependence = np.linalg.lstsq(terms.B[list(kept)].T, terms.B[list(dependent)].T)[0].T
+    return np.asarray(weights[list(dependent)][:, None] * dependence / weights[list(kept)])
 
 
 def _weight(row: Row, limits: Vector) -> float:

@@ -242,10 +242,12 @@ class Stepper:
             v.orders = np.concatenate([v.orders, code.order])
         self.functions += known
         self.modes.append(code)
-        mix = v.mix.reshape(v.n_rows, -1) if v.n_rows else v.mix
+        dependence = v.dependence.reshape(v.n_rows, -1) if v.n_rows else v.dependence
         for row in range(v.n_rows):
             if dropped[row]:  # as they were found first
-                self.dependent.setdefault(row, tuple(int(k) for k in np.flatnonzero(np.abs(mix[row]) > TAKES_PART)))
+                self.dependent.setdefault(
+                    row, tuple(int(k) for k in np.flatnonzero(np.abs(dependence[row]) > TAKES_PART))
+                )
         v.n_modes = count + 1  # at last: an interrupt may come between any two lines
 
     def _maker(self) -> Any:
