@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from mbd.analysis.accuracy import Accuracy as Accuracy, Known as Known, accuracy as accuracy
     from mbd.analysis.designs import latin_hypercube as latin_hypercube, sobol as sobol
     from mbd.analysis.effects import Effects as Effects, effects as effects
+    from mbd.analysis.gait_report import GaitReport as GaitReport, gait_report as gait_report
     from mbd.analysis.linearization import Linearization as Linearization
     from mbd.analysis.linearize import linearize as linearize
     from mbd.analysis.numerical import Criteria as Criteria, criteria as criteria
@@ -152,6 +153,7 @@ _HOMES = {
     "mbd.analysis.state_space": "StateSpace",
     "mbd.analysis.accuracy": "Accuracy Known accuracy",
     "mbd.analysis.effects": "Effects effects",
+    "mbd.analysis.gait_report": "GaitReport gait_report",
     "mbd.assembly.mobility": "Mobility mobility",
     "mbd.analysis.numerical": "Criteria criteria",
     "mbd.analysis.designs": "latin_hypercube sobol",

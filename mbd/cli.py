@@ -287,6 +287,21 @@ def effects_command(arguments: argparse.Namespace) -> int:
     return run(Script.load(arguments.script), arguments)
 
 
+def gait_command(arguments: argparse.Namespace) -> int:
+    """``mbd gait``: simulate scripts and report how their walkers walk, one beside the other."""
+    usual = Path("mbd-runs") / find(arguments.scripts[0]).stem.replace("_", "-")
+    out = Path(writable(usual if arguments.out is None else arguments.out))
+    from mbd.analysis.gait_report.command import run
+
+    runs = []
+    changes = {} if arguments.until is None else {"until": arguments.until}
+    with progress_bar() as progress:
+        for name in arguments.scripts:
+            runs.append(Script.load(name).run(progress, changes))
+    names = [find(name).stem.replace("_", "-") for name in arguments.scripts]
+    return run(runs, names, out, arguments)
+
+
 def info_command(arguments: argparse.Namespace) -> int:
     """``mbd info``: versions, machine, backend and cache; what goes with what."""
     from mbd.compile.backend import backend
@@ -336,6 +351,7 @@ def _parser() -> argparse.ArgumentParser:
     lab_arguments.effects(
         command("effects", effects_command, "leave out each effect in turn: its cost, energy and change")
     )
+    lab_arguments.gait(command("gait", gait_command, "report how walkers walk: numbers by side, curves, energy"))
     hard = command(
         "hardcases", hardcases_command, "judge scenes on which multibody systems fail; write a table and a page"
     )

@@ -112,7 +112,8 @@ MEANT_OTHERWISE = {
 """Arguments that are right by themselves: the sentence is about the others."""
 
 RESULTS = {
-    "Accuracy", "Criteria", "Domain", "Effects", "Failure", "Known", "LimitCycle", "Linearization", "Mobility",
+    "Accuracy", "Criteria", "Domain", "Effects", "Failure", "GaitReport", "Known", "LimitCycle",
+    "Linearization", "Mobility",
     "PenaltyParameters", "Replay", "Sensitivities", "State", "StateSpace", "Sweep", "Trajectory",
 }  # fmt: skip
 """Values that are handed to users, who make none."""

@@ -51,6 +51,7 @@ DOORS = {
     "results.ledger": ("view",),
     "analysis.accuracy.result": ("view",),
     "analysis.effects.result": ("view",),
+    "analysis.gait_report.report": ("view",),
     "analysis.linearization": ("view",),
     "analysis.numerical": ("view",),
     "gait.cycle": ("view",),

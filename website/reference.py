@@ -21,7 +21,7 @@ GROUPS = {
     "Integrators": "HHT GeneralizedAlpha Newmark RadauIIA RungeKutta853",
     "Analysis": "accuracy Accuracy Known effects Effects linearize Linearization StateSpace mobility "
     "Mobility criteria Criteria sensitivities Sensitivities",
-    "Gaits": "limit_cycle LimitCycle",
+    "Gaits": "limit_cycle LimitCycle gait_report GaitReport",
     "Errors and failures": "MbdError MbdWarning ModelError AssemblyError SimulationError CapabilityError "
     "GaitError MemoryLimitError TraceError TrajectoryError UnknownNameError Failure Replay replay",
 }

@@ -16,6 +16,7 @@ from mbd.bodies.base import Frame
 from mbd.constraints.base import Constraint
 from mbd.constraints.knife_edge import KnifeEdge
 from mbd.constraints.rolling import Rolling
+from mbd.constraints.rolling_touchdown import ProfileTouchdown, RollingTouchdown
 from mbd.constraints.surfaces import Plane, Surface
 from mbd.constraints.touchdown import Touchdown
 from mbd.equations.outputs import AXES, Outputs
@@ -75,6 +76,7 @@ def shapes_of(model: Description) -> tuple[Shape, ...]:
         same[1].update(contacts)
     grounds = [_ground(ground, name, contacts) for ground, contacts, name in found]
     rolling = [Shape("wheel", wheel.name, place=wheel.center.full_name) for wheel in wheels]
+    rolling += [Shape("wheel", center, place=center) for center in _arcs(model)]
     edges = [
         Shape("blade", word.name, place=word.frame.full_name)
         for word in model.constraints
@@ -89,13 +91,26 @@ def _grounds(
     """(ground, the frame that touches it of a contact that opens and closes, name of the constraint)."""
     for word in words:
         measure = getattr(word, "measure", None)
-        if isinstance(measure, Touchdown):
-            point, ground = measure.point, measure.ground
+        if isinstance(measure, Touchdown | RollingTouchdown | ProfileTouchdown):
+            point, ground = _point(measure), measure.ground
             tread = next((wheel for wheel in wheels if wheel.center == point and _carries(wheel, ground)), None)
             contacts = {} if word.kind == "bilateral" else {word.name: point.full_name}
             yield (tread.ground, contacts, tread.name) if tread else (ground, contacts, word.name)
     for wheel in wheels:
         yield wheel.ground, {}, wheel.name
+
+
+def _point(measure: Touchdown | RollingTouchdown | ProfileTouchdown) -> Frame:
+    """The frame that stands for where it touches: of a round foot its center, of a sole its origin."""
+    if isinstance(measure, Touchdown):
+        return measure.point
+    return measure.center if isinstance(measure, RollingTouchdown) else measure.frame
+
+
+def _arcs(model: Description) -> dict[str, Frame]:
+    """Centers of round feet by full name."""
+    measures = (getattr(word, "measure", None) for word in model.constraints)
+    return {each.center.full_name: each.center for each in measures if isinstance(each, RollingTouchdown)}
 
 
 def _carries(wheel: Rolling, ground: Plane | Surface) -> bool:
@@ -121,6 +136,9 @@ def offer_shapes(outputs: Outputs, scope: Scope, model: Description) -> None:
     def offer(owner: str, what: str, make: Callable[[], Triple]) -> None:
         outputs.triple(drawn(owner, what), make, AXES, listed=False)
 
+    for name, center in _arcs(model).items():
+        offer(name, "spoke", partial(_axis, scope, center, (0.0, -1.0, 0.0)))
+        offer(name, "axle", partial(_axis, scope, center, (0.0, 0.0, 1.0)))
     for word in model.constraints:
         measure = getattr(word, "measure", None)
         if isinstance(word, Rolling):
@@ -129,7 +147,7 @@ def offer_shapes(outputs: Outputs, scope: Scope, model: Description) -> None:
             offer(word.name, "axle", partial(_axis, scope, word.center, (0.0, 0.0, 1.0)))
         elif isinstance(word, KnifeEdge):
             offer(word.name, "along", partial(_axis, scope, word.frame, _along(word.normal)))
-        elif isinstance(measure, Touchdown) and isinstance(measure.ground, Plane):
+        elif isinstance(measure, Touchdown | RollingTouchdown | ProfileTouchdown) and isinstance(measure.ground, Plane):
             _offer_plane(offer, scope, word.name, measure.ground)
         elif isinstance(measure, Touchdown) and isinstance(measure.ground, Surface):
             outputs.add(drawn(word.name, HEIGHT), partial(_height, scope, measure.ground), listed=False)

@@ -1,10 +1,10 @@
-"""Arguments of ``mbd accuracy`` and ``mbd effects``."""
+"""Arguments of ``mbd accuracy``, ``mbd effects`` and ``mbd gait``."""
 
 from __future__ import annotations
 
 from argparse import ArgumentParser
 
-__all__ = ["accuracy", "effects"]
+__all__ = ["accuracy", "effects", "gait"]
 
 
 def accuracy(parser: ArgumentParser) -> None:
@@ -25,6 +25,20 @@ def effects(parser: ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument("--output", action="append", metavar="NAME", help="a result to judge by; may be given again")
     parser.add_argument("--dt", type=float, metavar="SECONDS", help="another step size than the script's")
+
+
+def gait(parser: ArgumentParser) -> None:
+    """Add those of ``mbd gait`` to a parser."""
+    parser.add_argument("scripts", nargs="+", metavar="SCRIPT-or-EXAMPLE", help="walkers to report, side by side")
+    parser.add_argument("--out", metavar="DIR", help="folder for tables, picture and page (default: mbd-runs/NAME)")
+    parser.add_argument("--until", type=float, metavar="SECONDS", help="another end time than the scripts'")
+    parser.add_argument("--strides", type=int, metavar="COUNT", help="strides of each side, the last ones")
+    parser.add_argument("--mass", type=float, metavar="KG", help="of the body, by which loads are divided")
+    parser.add_argument(
+        "--sides", nargs=2, default=("left", "right"), metavar=("SOUND", "OTHER"), help="words of both sides"
+    )
+    parser.add_argument("--symmetry", default="Robinson", metavar="NAME", help="Robinson (default), ratio or STA")
+    parser.add_argument("--open", action="store_true", help="open the page in a browser")
 
 
 def _shared(parser: ArgumentParser, defines: str) -> None:

@@ -1,0 +1,125 @@
+"""Numbers of a gait by side, and where its energy goes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mbd.analysis.gait_report.curves import forces_at
+from mbd.analysis.gait_report.strides import Side, Stride, of_side
+
+if TYPE_CHECKING:
+    from mbd.trajectory import Trajectory
+
+__all__ = ["BOTH", "Measure", "Spent", "energy_of", "measures_of"]
+
+BOTH = "both"
+"""Of what belongs to no side."""
+
+MIDDLE = (0.25, 0.85)
+"""Shares of swing between which clearance is sought: near both ends every foot is close to the ground."""
+
+FINE = 1001
+"""Samples of a stride for impulses and peaks."""
+
+Values = dict[tuple[str, str], float]
+"""By quantity and unit."""
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A number of a gait: quantity, unit, and by side the mean over the strides and its standard deviation."""
+
+    quantity: str
+    unit: str
+    mean: dict[str, float]
+    spread: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Spent:
+    """Energy that a cause gave in a stride, negative where it took it [J]: its side, kind and name."""
+
+    side: str
+    kind: str
+    name: str
+    energy: float
+
+
+def measures_of(run: Trajectory, sides: Sequence[Side], mass: float | None) -> list[Measure]:
+    """Spatio-temporal numbers and loads, each by side."""
+    found: dict[str, list[Values]] = {}
+    for side in sides:
+        others = [each for each in sides if each is not side]
+        found[side.name] = [_of_stride(run, side, others, stride, mass) for stride in side.strides]
+    measures = []
+    for quantity, unit in next(iter(found.values()))[0]:
+        columns = {side: np.array([each[quantity, unit] for each in rows]) for side, rows in found.items()}
+        known = {side: column[np.isfinite(column)] for side, column in columns.items()}
+        mean = {side: float(np.mean(column)) if len(column) else float("nan") for side, column in known.items()}
+        spread = {side: float(np.std(column)) if len(column) else float("nan") for side, column in known.items()}
+        measures.append(Measure(quantity, unit, mean, spread))
+    return measures
+
+
+def _of_stride(run: Trajectory, side: Side, others: Sequence[Side], stride: Stride, mass: float | None) -> Values:
+    period, (step_time, step_length) = stride.duration, stride.step
+    stance = (stride.off - stride.begin) / period * 100.0
+    together = [
+        max(0.0, min(b, d) - max(a, c))
+        for a, b in _within(side, stride)
+        for other in others
+        for c, d in _within(other, stride)
+    ]
+    times = stride.begin + np.linspace(0.0, 1.0 - 1e-9, FINE) * period
+    force = forces_at(run, side, times)["normal force"]
+    known = stride.begin > run.time[0]  # of a foot that stands at the start the strike is not
+    struck = (0.0 if known else float("nan")) + sum(
+        float(np.atleast_1d(event.impulse)[0])  # the first part is normal
+        for event in run.events
+        if event.name in side.contacts and stride.begin <= event.time < stride.end and np.size(event.impulse)
+    )
+    impulse = float(np.mean(force[:-1] + force[1:])) * period / 2.0 + struck
+    per, scale = ("", 1.0) if mass is None else ("/kg", 1.0 / mass)
+    return {
+        ("step length", "m"): step_length, ("step time", "s"): step_time, ("stride length", "m"): stride.length,
+        ("stride time", "s"): period, ("speed", "m/s"): stride.length / period, ("cadence", "1/min"): 120.0 / period,
+        ("stance", "%"): stance, ("swing", "%"): 100.0 - stance, ("double support", "%"): sum(together) / period *
+        100.0, ("clearance", "mm"): 1e3 * _clearance(run, side, stride), ("normal impulse", f"N s{per}"): scale *
+        impulse, ("strike impulse", f"N s{per}"): scale * struck, ("peak normal force", f"N{per}"): scale *
+        float(np.max(force)),
+    }  # fmt: skip
+
+
+def _within(side: Side, stride: Stride) -> list[tuple[float, float]]:
+    """Stances of a side, cut to a stride."""
+    cut = [(max(a, stride.begin), min(b, stride.end)) for a, b in side.stances]
+    return [(a, b) for a, b in cut if b > a]
+
+
+def _clearance(run: Trajectory, side: Side, stride: Stride) -> float:
+    """The smallest gap of the foot in the middle of swing [m]; NaN without a swing."""
+    if not np.isfinite(stride.off):
+        return float("nan")
+    times = stride.off + np.linspace(*MIDDLE, 61) * (stride.end - stride.off)
+    named = run.at(times)
+    return float(min(np.min(named[f"{name}.gap"]) for name in side.contacts))
+
+
+def energy_of(run: Trajectory, sides: Sequence[Side]) -> list[Spent]:
+    """What each cause gave in one stride, the mean over the strides of the first side [J]."""
+    strides = sides[0].strides
+    rows = np.searchsorted(run.time, [strides[0].begin, strides[-1].end], side="right") - 1
+    first, last = (int(row) for row in rows)
+    found = [
+        Spent(
+            next((side.name for side in sides if of_side(part.name, side.name)), BOTH), part.kind, part.name,
+            float(part.energy[last] - part.energy[first]) / len(strides),
+        )
+        for part in run.energy.parts
+    ]  # fmt: skip
+    numerical = float(run.energy.numerical[last] - run.energy.numerical[first]) / len(strides)
+    return [*found, Spent(BOTH, "numerical", "numerical", numerical)]

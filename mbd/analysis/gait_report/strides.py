@@ -1,0 +1,165 @@
+"""Sides, their feet, strikes and strides, read from the events of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mbd.arrays import Matrix
+from mbd.errors import TrajectoryError
+
+if TYPE_CHECKING:
+    from mbd.trajectory import Trajectory
+
+__all__ = ["Side", "Stride", "base_name", "of_side", "sides_of"]
+
+Interval = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Stride:
+    """From a strike of a side to its next.
+
+    begin, end : times of both [s]; off : the foot's leaving between them, NaN where it stays
+    step : time and length of the step that the first strike ends, from the other side's strike before it; NaN: unknown
+    length : between the places of both strikes [m]
+    """
+
+    begin: float
+    end: float
+    off: float
+    step: tuple[float, float]
+    length: float
+
+    @property
+    def duration(self) -> float:
+        """end − begin [s]."""
+        return self.end - self.begin
+
+
+@dataclass(frozen=True)
+class Side:
+    """A side of a walker: its word, the contacts of its foot, when they stand, its strides."""
+
+    name: str
+    contacts: tuple[str, ...]
+    stances: tuple[Interval, ...]
+    strides: tuple[Stride, ...]
+
+
+def of_side(name: str, side: str) -> bool:
+    """Whether a name has the word of a side.
+
+    >>> of_side("left knee.angle", "left"), of_side("lefty", "left")
+    (True, False)
+    """
+    return side in name.replace(".", " ").split()
+
+
+def base_name(name: str, side: str) -> str:
+    """A name without the word of its side.
+
+    >>> base_name("left knee", "left")
+    'knee'
+    """
+    return " ".join(word for word in name.split() if word != side)
+
+
+def sides_of(run: Trajectory, names: Sequence[str], most: int | None = None) -> list[Side]:
+    """The sides of a run with their strides, or the last ones of them.
+
+    A strike is a foot's first touch after one of the other side; where a foot touches more than once between two
+    strikes, it leaves where its longest time in the air begins. A foot that stands alone at the start has just struck.
+
+    Raises
+    ------
+    TrajectoryError
+        where a side has no foot, or makes no whole stride.
+    """
+    feet = [contact.name for contact in run.facts.contacts if contact.place and contact.unit == "m"]
+    contacts = {side: tuple(name for name in feet if of_side(name, side)) for side in names}
+    for side, own in contacts.items():
+        if not own:
+            known = ", ".join(map(repr, feet)) or "none"
+            raise TrajectoryError(
+                f"no foot of the side '{side}': its contacts with the ground have the word in their names, and the run "
+                f"has {known}; give sides=(…, …), the words of both sides"
+            )
+    stances = {side: _stances(run, own) for side, own in contacts.items()}
+    strikes = _strikes(run, contacts, stances)
+    found = [
+        Side(side, own, stances[side], _strides(side, stances[side], strikes)[-most if most else None :])
+        for side, own in contacts.items()
+    ]
+    for each in found:
+        if not each.strides:
+            times = ", ".join(f"{name} {time:.3f} s" for time, name, _ in strikes) or "none"
+            raise TrajectoryError(
+                f"no whole stride of the side '{each.name}' in '{run.name}': a stride is from a strike to the next of "
+                f"the same side; strikes were {times}; simulate longer, or see run.events"
+            )
+    return found
+
+
+def _stances(run: Trajectory, contacts: Sequence[str]) -> tuple[Interval, ...]:
+    """When at least one of some contacts is closed."""
+    columns = [contact.name for contact in run.facts.contacts]
+    closed = {name for name in contacts if len(run) and run.record.closed[0, columns.index(name)]}
+    begin = float(run.time[0]) if closed else None
+    found: list[Interval] = []
+    for event in run.events:
+        if event.name not in contacts or event.kind not in ("closed", "opened"):
+            continue
+        (closed.add if event.kind == "closed" else closed.discard)(event.name)
+        if closed and begin is None:
+            begin = event.time
+        elif not closed and begin is not None:
+            found.append((begin, event.time))
+            begin = None
+    return (*found, (begin, float("inf"))) if begin is not None else tuple(found)
+
+
+def _strikes(
+    run: Trajectory, contacts: dict[str, tuple[str, ...]], stances: dict[str, tuple[Interval, ...]]
+) -> list[tuple[float, str, Matrix]]:
+    """(time, side, place) of the strikes in turn."""
+    start = float(run.time[0])
+    places = {contact.name: contact.place for contact in run.facts.contacts}
+    standing = [side for side, found in stances.items() if found and found[0][0] == start]
+    touches = sorted((begin, side) for side, found in stances.items() for begin, _ in found)
+    strikes: list[tuple[float, str, Matrix]] = []
+    for time, side in touches:
+        if (time == start and len(standing) > 1) or (strikes and strikes[-1][1] == side):
+            continue
+        rows = [event for event in run.events if event.kind == "closed" and event.time == time]
+        own = next((event.name for event in rows if event.name in contacts[side]), contacts[side][0])
+        strikes.append((time, side, np.asarray(run.at([time])[places[own]][0])))
+    return strikes
+
+
+def _strides(
+    side: str, stances: Sequence[Interval], strikes: Sequence[tuple[float, str, Matrix]]
+) -> tuple[Stride, ...]:
+    """From strike to strike of a side."""
+    own = [k for k, (_, name, _) in enumerate(strikes) if name == side]
+    found = []
+    for first, second in pairwise(own):
+        (begin, _, place), (end, _, there) = strikes[first], strikes[second]
+        step = (float("nan"), float("nan"))
+        if first > 0:
+            before, _, other = strikes[first - 1]
+            step = (begin - before, float(np.linalg.norm(place - other)))
+        found.append(Stride(begin, end, _leaving(stances, begin, end), step, float(np.linalg.norm(there - place))))
+    return tuple(found)
+
+
+def _leaving(stances: Sequence[Interval], begin: float, end: float) -> float:
+    """When the longest time in the air between two strikes begins [s]."""
+    inside = [(a, b) for a, b in stances if begin <= a < end and b < end]
+    starts = [*(a for a, _ in stances if begin < a < end), end]
+    gaps = [(min(start for start in starts if start > b) - b, b) for _, b in inside if any(s > b for s in starts)]
+    return max(gaps)[1] if gaps else float("nan")

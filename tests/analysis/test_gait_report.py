@@ -1,0 +1,142 @@
+"""Reports of gaits: figures of a known walk, balances over a stride, symmetry, files, and what is refused."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+import mbd
+from mbd import cli
+from mbd.analysis.gait_report.symmetry import symmetry_of
+from mbd.errors import ModelError, TrajectoryError, UnknownNameError
+from tests.simulation.mechanisms import kneed_walker, kneed_walker_start
+
+
+@cache
+def walk():
+    model = kneed_walker()
+    return mbd.simulate(model, kneed_walker_start(model), mbd.HHT(alpha=0.05), dt=1e-3, until=3.0)
+
+
+@cache
+def report():
+    return mbd.gait_report(walk())
+
+
+def weight():
+    values = walk().parameters
+    bodies = [name.removesuffix(".mass") for name in values if name.endswith(".mass")]
+    return sum(values[f"{body}.mass"] for body in bodies), -values["gravity.y"]
+
+
+def test_a_symmetric_walker_has_equal_sides():
+    first = report().walks[0]
+    for quantity in ("step length", "stride time", "stance", "clearance", "peak normal force"):
+        left, right = first[quantity].values()
+        assert left == pytest.approx(right, rel=1e-3), quantity
+    assert first["step length"]["left"] == pytest.approx(0.4727, abs=2e-4)
+    assert first["stride length"]["left"] == pytest.approx(2.0 * first["step length"]["right"], rel=1e-3)
+    assert first["stance"]["left"] + first["swing"]["left"] == pytest.approx(100.0)
+    assert first["double support"] == {"left": 0.0, "right": 0.0}  # one foot lets go as the other strikes
+
+
+def test_the_ground_carries_the_weight_over_a_stride():
+    """Momentum along the normal repeats itself: the normal impulses of both feet are m g_n T."""
+    mass, normal = weight()
+    both = sum(report()["normal impulse"].values())
+    assert both == pytest.approx(mass * normal * report()["stride time"]["left"], rel=2e-3)
+
+
+def test_energy_by_side_and_cause_is_what_gravity_gives():
+    mass, _ = weight()
+    first = report().walks[0]
+    given = mass * walk().parameters["gravity.x"] * first["stride length"]["left"]
+    assert sum(first.spent().values()) == pytest.approx(-given, rel=2e-3)
+    assert first.spent()["left", "impact"] == pytest.approx(first.spent()["right", "impact"], rel=2e-2)
+
+
+def test_net_moments_are_those_of_inverse_dynamics():
+    """The moment of a locked knee turns the shank against the thigh as Newton and Euler have it: that of its lock."""
+    curves = {(curve.side, curve.title): curve for curve in report().walks[0].curves}
+    moment, angle = (curves["left", f"knee {quantity}"].mean for quantity in ("moment", "angle"))
+    locked = np.abs(angle) < 1e-6
+    locked[[0, -1]] = False
+    stride = mbd.gait_report(walk(), strides=1).walks[0]
+    time = stride.sides[0].strides[0]
+    shares = np.array([0.1, 0.25, 0.4])
+    lock = walk().at(time.begin + shares * time.duration)["left knee lock.force"]
+    here = {(curve.side, curve.title): curve for curve in stride.curves}["left", "knee moment"].mean
+    np.testing.assert_allclose(here[[10, 25, 40]], -lock, rtol=1e-6)
+    assert np.max(np.abs(moment[~locked][1:-1])) <= np.max(np.abs(moment))
+    assert np.all(curves["left", "hip moment"].mean == 0.0)
+
+
+def test_mass_divides_loads():
+    by = mbd.gait_report(walk(), mass=2.0, strides=1)
+    assert by["peak normal force"]["left"] == pytest.approx(report()["peak normal force"]["left"] / 2.0, rel=1e-3)
+    units = {measure.quantity: measure.unit for measure in by.walks[0].measures}
+    assert units["peak normal force"] == "N/kg" and units["step length"] == "m"
+
+
+@pytest.mark.parametrize(("name", "value"), [("Robinson", 40.0), ("ratio", 2.0 / 3.0), ("STA", 0.2)])
+def test_symmetry_is_as_defined(name, value):
+    assert symmetry_of(name)[1](0.6, 0.4) == pytest.approx(value)
+
+
+def test_runs_stand_beside_each_other_and_gaits_for_runs():
+    class Gait:
+        run = walk()
+
+    both = mbd.gait_report(walk(), Gait(), names=("one", "other"), strides=1)
+    assert both.heads == ("quantity", "one: left", "one: right", "one: Robinson [%]",
+                          "other: left", "other: right", "other: Robinson [%]")  # fmt: skip
+    assert both.walks[0]["speed"] == both.walks[1]["speed"]
+    assert "energy of a stride" in repr(both) and "<table" in both._repr_html_()
+    twice = mbd.gait_report(walk(), walk(), strides=1)
+    assert [each.name for each in twice.walks] == ["kneed walker (1)", "kneed walker (2)"]
+
+
+def test_tables_picture_and_page_are_written(tmp_path):
+    pytest.importorskip("matplotlib")
+    pandas = pytest.importorskip("pandas")
+    report().to_csv(tmp_path / "gait.csv")
+    numbers = pandas.read_csv(tmp_path / "gait.csv")
+    assert set(numbers.side) == {"left", "right", "Robinson"}
+    assert pandas.read_csv(tmp_path / "gait-curves.csv").shape[0] == 101
+    assert pandas.read_csv(tmp_path / "gait-energy.csv")["energy [J]"].sum() < 0.0
+    page = report().page(tmp_path / "gait.html").read_text(encoding="utf-8")
+    assert "<svg" in page and "step length [m]" in page and "src=" not in page and "<link" not in page
+
+
+@pytest.mark.slow
+def test_the_command_reports_a_script(tmp_path, capsys):
+    script = tmp_path / "walker.py"
+    script.write_text("from tests.analysis.test_gait_report import walk\n\n\ndef main():\n    return walk()\n")
+    assert cli.main(["gait", str(script), "--out", str(tmp_path / "out"), "--strides", "2", "--symmetry", "STA"]) == 0
+    assert "walker: strides 2 left, 2 right" in capsys.readouterr().out
+    assert {file.name for file in (tmp_path / "out").iterdir()} >= {"gait.csv", "gait.png", "gait.html"}
+
+
+def test_what_has_no_strides_is_named():
+    rod = mbd.Link("rod", mass=1.0, length=1.0, center=0.5)
+    model = mbd.Model("pendulum")
+    model.connect(mbd.Revolute("pivot", model.ground.origin, rod.start))
+    swing = mbd.simulate(model, mbd.assemble(model), mbd.HHT(), dt=0.1, until=0.2, backend="python")
+    with pytest.raises(TrajectoryError, match="no foot of the side 'left'"):
+        mbd.gait_report(swing)
+    walker = kneed_walker()
+    short = mbd.simulate(walker, kneed_walker_start(walker), mbd.HHT(0.05), dt=1e-3, until=0.7)
+    with pytest.raises(TrajectoryError, match=r"no whole stride of the side .* strikes were left"):
+        mbd.gait_report(short)
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ({"symmetry": "robinson"}, "Robinson"), ({"mass": -1.0}, "mass of gait_report"), ({"strides": 0}, "strides"),
+        ({"sides": ("left", "left")}, "sides"), ({"names": ("a", "b")}, "2 names and 1 runs"),
+    ],
+)  # fmt: skip
+def test_wrong_arguments_are_named(given, told):
+    with pytest.raises((ModelError, UnknownNameError), match=told):
+        mbd.gait_report(walk(), **given)
