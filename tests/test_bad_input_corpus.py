@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import mbd
+from tests.view.handmade_runs import walker
 
 MODEL = mbd.Model("arm")
 UPPER = mbd.Link("upper", mass=1.0, length=1.0, center=0.5, inertia=0.1)
@@ -96,6 +97,7 @@ OWN: dict[tuple[str, str], Any] = {
     ("Nonholonomic", "arguments"): ("hinge.rate",), ("Rolling", "center"): END,
     ("Tabulated", "torque"): (-1.0, 0.0, 1.0), ("TabulatedSpring", "torque"): (-1.0, 0.0, 1.0),
     ("rolling_touchdown", "center"): END,
+    ("gait_report", "run"): walker(steps=5),
     ("limit_cycle", "model"): SWING, ("limit_cycle", "start"): mbd.assemble(SWING, position={"pivot.angle": 0.3}),
     ("limit_cycle", "section"): "below", ("limit_cycle", "on_failure"): "return", ("limit_cycle", "longest"): 3.0,
     ("effects", "dt"): 0.1, ("segment", "name"): "thigh", ("simulate", "dt"): 0.1, ("sweep", "dt"): 0.1,

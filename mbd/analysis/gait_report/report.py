@@ -180,7 +180,7 @@ class GaitReport:
 
 
 def gait_report(
-    *runs: Any, names: Sequence[str] | None = None, sides: Sequence[str] = ("left", "right"), symmetry: str =
+    run: Any, *others: Any, names: Sequence[str] | None = None, sides: Sequence[str] = ("left", "right"), symmetry: str =
     "Robinson", mass: float | None = None, strides: int | None = None,
 ) -> GaitReport:  # fmt: skip
     """How a walker walks: numbers by side, symmetry, curves over the stride, energy by side and cause; runs compared.
@@ -197,7 +197,7 @@ def gait_report(
 
     Parameters
     ----------
-    runs : trajectories of `simulate`, or gaits with a `walk` or a `run`, such as of `limit_cycle`
+    run, others : trajectories of `simulate`, or gaits with a `walk` or a `run`, such as of `limit_cycle`
     names : of the runs in tables, by default those of their models
     sides : words of both sides, the sound one first where one is not
     symmetry : 'Robinson' ``2 |x_s − x_p|/(x_s + x_p) · 100 %``, 'ratio' ``x_p/x_s`` or 'STA' ``(x_s − x_p)/(x_s +
@@ -226,13 +226,11 @@ def gait_report(
         raise ModelError(f"mass of gait_report must be positive, got {size:g} kg")
     if strides is not None and (not isinstance(strides, int) or isinstance(strides, bool) or strides < 1):
         raise ModelError(f"strides of gait_report is a number of strides ≥ 1, got {strides!r}")
-    if not runs:
-        raise ModelError("gait_report takes runs of mbd.simulate, or gaits that have a run; got none")
-    walks = [_walked(each) for each in runs]
-    titles = _titles([run.name for run in walks] if names is None else list(names_of(names, "names of gait_report")))
+    walks = [_walked(each) for each in (run, *others)]
+    titles = _titles([each.name for each in walks] if names is None else list(names_of(names, "names of gait_report")))
     if len(titles) != len(walks):
         raise ModelError(f"names of gait_report are one for each run; got {len(titles)} names and {len(walks)} runs")
-    reports = [_walk(run, title, words, size, strides) for run, title in zip(walks, titles, strict=True)]
+    reports = [_walk(each, title, words, size, strides) for each, title in zip(walks, titles, strict=True)]
     return GaitReport(tuple(reports), symmetry, size)
 
 
