@@ -180,8 +180,8 @@ class GaitReport:
 
 
 def gait_report(
-    run: Any, *others: Any, names: Sequence[str] | None = None, sides: Sequence[str] = ("left", "right"), symmetry: str =
-    "Robinson", mass: float | None = None, strides: int | None = None,
+    run: Any, *others: Any, names: Sequence[str] | None = None, sides: Sequence[str] = ("left", "right"),
+    symmetry: str = "Robinson", mass: float | None = None, strides: int | None = None,
 ) -> GaitReport:  # fmt: skip
     """How a walker walks: numbers by side, symmetry, curves over the stride, energy by side and cause; runs compared.
 

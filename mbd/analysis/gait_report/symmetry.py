@@ -27,8 +27,8 @@ Ther. 10 (1987) 172); ratio: ``x_p/x_s``, 1 where they are alike; STA: ``(x_s âˆ
 def symmetry_of(name: str) -> Definition:
     """A definition by its name.
 
-    >>> symmetry_of("Robinson")[1](0.55, 0.45)
-    20.000000000000004
+    >>> symmetry_of("Robinson")[1](3.0, 1.0)
+    100.0
     """
     if not among(name, DEFINITIONS):
         raise UnknownNameError("symmetry: " + nearest(name, DEFINITIONS, "definition", "There are"))
