@@ -51,7 +51,7 @@ def sensitivities(
     Parameters
     ----------
     model, start, integrator, dt, tol, until, parameters, impact, rest_speed, backend : see `mbd.simulate`; the scheme
-        is of the Newmark family or `mbd.RungeKutta853`
+        is of the Newmark family, `mbd.RungeKutta853` or `mbd.RadauIIA`
     wrt : coordinates ('hip.angle') and rates ('hip.rate') of the start, parameters ('left thigh.mass'), and functions
         of parameters, ``{"slope": {"gravity.x": lambda s: 9.81 * mbd.sin(s), …}}``, or the rates of several parameters,
         ``{"legs": {"left leg.mass": 1.0, "right leg.mass": 1.0}}``

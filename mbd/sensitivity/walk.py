@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mbd.arrays import Matrix
-from mbd.integrators import RungeKutta853
+from mbd.integrators import RadauIIA, RungeKutta853
 from mbd.integrators.family import NewmarkFamily
 from mbd.results.stored_states import StoredStates
 from mbd.sensitivity.balance import consistent_rates, independent
@@ -17,6 +17,7 @@ from mbd.sensitivity.guards import Trigger, shift_of_end, trigger
 from mbd.sensitivity.motion import Mode, Motion, Rates, Tangent
 from mbd.sensitivity.newmark_rows import NewmarkRows
 from mbd.sensitivity.programs import Programs
+from mbd.sensitivity.radau import RadauSteps
 from mbd.sensitivity.resets import after_reset
 from mbd.sensitivity.run_data import RunRows, refused
 from mbd.sensitivity.runge_kutta import RungeKuttaSteps
@@ -63,9 +64,9 @@ def steps_of(rows: RunRows, programs: Programs) -> SchemeSteps:
         return NewmarkRows(rows, programs, scheme)
     if isinstance(scheme, RungeKutta853):
         return RungeKuttaSteps(rows, programs)
-    raise refused(
-        f"steps of {scheme!r} are not differentiated", "take RungeKutta853(), HHT, GeneralizedAlpha or Newmark"
-    )
+    if isinstance(scheme, RadauIIA):
+        return RadauSteps(rows, programs)
+    raise refused(f"steps of {scheme!r} are not differentiated", "take RungeKutta853(), RadauIIA() or HHT()")
 
 
 class Walk:

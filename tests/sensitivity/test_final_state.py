@@ -12,12 +12,12 @@ from tests.simulation.mechanisms import ball, kneed_walker, kneed_walker_start, 
 
 SCHEMES = (
     mbd.HHT(alpha=0.05), mbd.GeneralizedAlpha(0.7), mbd.Newmark(), mbd.HHT(0.05, start="consistent"),
-    mbd.RungeKutta853(),
+    mbd.RungeKutta853(), mbd.RadauIIA(tolerance=1e-12),
 )  # fmt: skip
 CONVERGED = (
     mbd.HHT(alpha=0.05, tolerance=1e-10), mbd.GeneralizedAlpha(0.7, tolerance=1e-10),
     mbd.HHT(alpha=0.05, formulation="index3", tolerance=1e-10),
-    mbd.RungeKutta853(),
+    mbd.RungeKutta853(), mbd.RadauIIA(tolerance=1e-12),
 )  # fmt: skip
 """Schemes whose steps differ from their converged solutions by round-off: these are what is differentiated."""
 

