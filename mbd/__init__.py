@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from mbd.analysis.accuracy import Accuracy as Accuracy, Known as Known, accuracy as accuracy
     from mbd.analysis.designs import latin_hypercube as latin_hypercube, sobol as sobol
     from mbd.analysis.effects import Effects as Effects, effects as effects
+    from mbd.analysis.fitting.fit import Fit as Fit, fit as fit
     from mbd.analysis.gait_report import GaitReport as GaitReport, gait_report as gait_report
     from mbd.analysis.linearization import Linearization as Linearization
     from mbd.analysis.linearize import linearize as linearize
@@ -157,6 +158,7 @@ _HOMES = {
     "mbd.assembly.mobility": "Mobility mobility",
     "mbd.analysis.numerical": "Criteria criteria",
     "mbd.analysis.designs": "latin_hypercube sobol",
+    "mbd.analysis.fitting.fit": "Fit fit",
     "mbd.analysis.sweep": "Sweep sweep",
     "mbd.assembly.assemble": "assemble",
     "mbd.bodies": "Domain Link Marker PointMass RigidBody box cylinder disk rod segment sphere",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -83,6 +84,8 @@ class Walk:
         self.record = rows.record
         self._modes: dict[tuple[Any, ...], Mode] = {}
         self.steps = steps_of(rows, programs)
+        self.visit: Callable[[int, Motion, Mode, Rates], None] | None = None
+        """Called with every row that a step starts from, and what the pass knows there."""
 
     def mode(self, row: int, motion: Motion) -> Mode:
         """What acts from a row on, with its rows that do not depend on others."""
@@ -105,6 +108,8 @@ class Walk:
         memory = self.steps.start(motion, mode, rates)
         fresh = True
         while row < last:
+            if self.visit is not None:
+                self.visit(row, motion, mode, rates if fresh else memory.rates)
             same = record.time[row + 1] == record.time[row]
             if same and (row + 1 in rows.events or (fresh and row + 2 in rows.events)):
                 fired = rows.events[row + 1 if row + 1 in rows.events else row + 2][0].name

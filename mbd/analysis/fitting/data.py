@@ -1,0 +1,102 @@
+"""Measured values that a run is compared with: columns over time, and instants of events."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mbd.arrays import Vector
+from mbd.bodies.values import is_number, shown
+from mbd.errors import ModelError
+
+__all__ = ["Data"]
+
+
+@dataclass(frozen=True)
+class Data:
+    """Measured values, each with the scale that its residual is divided by.
+
+    columns : by result, (times, values) without those that are missing; events : instants by name, 'foot.time.2'
+    scales : of columns and events, in their units
+    """
+
+    columns: Mapping[str, tuple[Vector, Vector]]
+    events: Mapping[str, float]
+    scales: Mapping[str, float]
+
+    @property
+    def count(self) -> int:
+        """Number of values."""
+        return len(self.events) + sum(len(values) for _, values in self.columns.values())
+
+    @property
+    def last(self) -> float:
+        """Time of the last value [s]."""
+        return max([*(float(times[-1]) for times, _ in self.columns.values()), *self.events.values()])
+
+    @classmethod
+    def read(cls, table: Any, events: Any, sigma: Any) -> Data:
+        """Checked data.
+
+        Raises
+        ------
+        ModelError
+            for what is no table, no finite times in order, no instants, scales that are not positive: all at once.
+        """
+        faults: list[str] = []
+        columns = _columns(table, faults)
+        instants = _numbers(events, "events", "instants [s], such as {'foot.time': 0.73}", faults)
+        given = _numbers(sigma, "sigma", "standard deviations, such as {'hip.angle': 0.01}", faults)
+        known = {*columns, *instants}
+        faults += [f"sigma names {name!r}, which is not among the data" for name in given if name not in known]
+        faults += [f"sigma of {name!r} must be positive, not {each!r}" for name, each in given.items() if each <= 0.0]
+        if not known and not faults:
+            faults.append("there is nothing to fit to: data and events have no value")
+        if faults:
+            raise ModelError(faults)
+        scales = {name: given.get(name, _spread(values)) for name, (_, values) in columns.items()}
+        lengths = max([float(np.ptp(times)) for times, _ in columns.values()], default=0.0)
+        scales |= {name: given.get(name, 1e-2 * (lengths or abs(each) or 1.0)) for name, each in instants.items()}
+        return cls(columns, instants, scales)
+
+
+def _columns(table: Any, faults: list[str]) -> dict[str, tuple[Vector, Vector]]:
+    if table is None:
+        return {}
+    try:
+        names = [str(name) for name in table]
+        parts = {name: np.asarray(table[name], dtype=float) for name in names}
+    except (TypeError, ValueError, KeyError, IndexError):
+        faults.append(
+            "data must be a table of numbers by name with a column 'time', a dictionary or a pandas DataFrame, "
+            f"not {shown(table)}"
+        )
+        return {}
+    time = parts.pop("time", None)
+    if time is None or time.ndim != 1 or not len(time) or not np.all(np.isfinite(time)) or np.any(np.diff(time) <= 0.0):
+        faults.append("data must have a column 'time' of finite, increasing times [s]")
+        return {}
+    wrong = [name for name, values in parts.items() if values.shape != time.shape or np.any(np.isinf(values))]
+    faults += [f"data: {name!r} must have a number, or NaN where there is none, for every time" for name in wrong]
+    there = {name: ~np.isnan(values) for name, values in parts.items() if name not in wrong}
+    return {name: (time[known], parts[name][known]) for name, known in there.items() if known.any()}
+
+
+def _numbers(given: Any, what: str, example: str, faults: list[str]) -> dict[str, float]:
+    if given is None:
+        return {}
+    if not isinstance(given, Mapping) or not all(
+        isinstance(name, str) and is_number(each) and math.isfinite(each) for name, each in given.items()
+    ):
+        faults.append(f"{what} must map names to {example}, not {shown(given)}")
+        return {}
+    return {name: float(each) for name, each in given.items()}
+
+
+def _spread(values: Vector) -> float:
+    """A hundredth of the range of a column; of its size where it is constant."""
+    return 1e-2 * float(np.ptp(values) or np.max(np.abs(values)) or 1.0)

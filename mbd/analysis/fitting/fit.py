@@ -1,0 +1,310 @@
+"""Least squares over runs, with exact derivatives: which parameters explain measured motion, and how well."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from mbd.analysis.fitting.data import Data
+from mbd.arrays import Matrix, Vector
+from mbd.bodies.values import is_number, shown
+from mbd.compile.mechanisms import mechanism_of
+from mbd.errors import MbdError, ModelError, SimulationError, UnknownNameError, nearest
+from mbd.integrators import Integrator
+from mbd.notebook import table
+from mbd.sensitivity.along import along
+from mbd.simulation.simulate import simulate
+from mbd.state import State
+from mbd.trajectory import Trajectory
+
+__all__ = ["Fit", "fit"]
+
+ALIKE = 1e-8
+"""Singular value of the scaled derivatives, over the largest, below which the data cannot tell directions apart [-]."""
+SHARE = 0.1
+"""Part in such a direction from which on a parameter is named [-]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Parameters that explain measured motion best, and how well the data determine them.
+
+    Attributes
+    ----------
+    values : estimates by name
+    errors : their standard errors, s √((JᵀJ)⁻¹)ᵢᵢ with s² the sum of squares over its degrees of freedom; infinite for
+        those that the data cannot tell apart
+    correlation : of the estimates (P, P)
+    alike : groups of names whose effects on the data cannot be told apart
+    residuals : measured less computed, over the scale of its column, by name
+    noise : s, the size of the residuals [-]; converged, message : of the search; runs : made for it
+    run : the run with the estimates
+    """
+
+    values: Mapping[str, float]
+    errors: Mapping[str, float]
+    correlation: Matrix
+    alike: tuple[tuple[str, ...], ...]
+    residuals: Mapping[str, Vector]
+    noise: float
+    converged: bool
+    message: str
+    runs: int
+    degrees: int
+    run: Trajectory = field(repr=False)
+
+    def interval(self, name: str, level: float = 0.95) -> tuple[float, float]:
+        """Confidence interval of an estimate, by Student's distribution."""
+        from scipy.stats import t
+
+        if name not in self.values:
+            raise UnknownNameError(nearest(name, self.values, "estimate"))
+        half = float(t.ppf(0.5 + 0.5 * level, max(self.degrees, 1))) * self.errors[name]
+        return self.values[name] - half, self.values[name] + half
+
+    def _lines(self) -> list[list[str]]:
+        found = []
+        for name, value in self.values.items():
+            low, high = self.interval(name)
+            found.append([name, f"{value:.8g}", f"{self.errors[name]:.2g}", f"{low:.6g} … {high:.6g}"])
+        return found
+
+    def __repr__(self) -> str:
+        lines = [["parameter", "estimate", "standard error", "95 %"], *self._lines()]
+        widths = [max(len(line[k]) for line in lines) for k in range(4)]
+        text = ["  ".join(f"{cell:>{width}}" for cell, width in zip(line, widths, strict=True)) for line in lines]
+        text += [f"the data cannot tell apart: {', '.join(names)}" for names in self.alike]
+        return "\n".join([*text, self.message])
+
+    def _repr_html_(self) -> str:
+        return table("Fit", ("parameter", "estimate", "standard error", "95 %"), self._lines())
+
+
+def fit(
+    model: Any,
+    start: State,
+    data: Any,
+    parameters: Mapping[str, Any],
+    integrator: Integrator | None = None,
+    dt: float = 1e-3,
+    *,
+    events: Mapping[str, float] | None = None,
+    sigma: Mapping[str, float] | None = None,
+    until: float | None = None,
+    backend: str = "auto",
+) -> Fit:
+    """Find the parameters with which a model moves as it was measured: nonlinear least squares.
+
+    Minimises Σ ((measured − computed)/σ)² over parameters within bounds by a trust-region method
+    (`scipy.optimize.least_squares`; Branch, Coleman & Li, SIAM J. Sci. Comput. 21, 1999) with the exact derivatives of
+    the runs, through impacts and shifts of their instants (see `mbd.sensitivities`).
+
+    Parameters
+    ----------
+    data : a table, a dictionary or a pandas DataFrame, with a column 'time' [s] and columns by names of results; NaN
+        where a value is missing; None where only events were measured
+    parameters : what to find, by name: a guess, ``{"shank.mass": 3.0}``, or (guess, lowest, highest)
+    integrator, dt : see `mbd.simulate`; of the Newmark family or `mbd.RungeKutta853`
+    events : measured instants [s], ``{"right foot.time": 0.71, "right foot.time.2": 1.44}``
+    sigma : standard deviation of the errors of a column or an instant, which weighs it; by default a hundredth of its
+        range. The size of the errors is estimated from the residuals
+    until : end of the runs [s]; by default shortly after the last value
+
+    Returns
+    -------
+    Fit
+
+    Raises
+    ------
+    ModelError, UnknownNameError
+        for data, names and bounds that cannot be, all at once.
+    SimulationError, CapabilityError
+        if the run with the guesses fails, does not reach the data, or cannot be differentiated.
+
+    Examples
+    --------
+    The length of a pendulum from its swing.
+
+    >>> import mbd, numpy as np
+    >>> model = mbd.Model("pendulum")
+    >>> rod = mbd.Link("rod", mass=1.0, length=1.3, center=1.3)
+    >>> model.connect(mbd.Revolute("pin", model.ground.origin, rod.start, loss=mbd.Viscous(0.2)))
+    >>> start = mbd.assemble(model, {"pin.angle": 0.4})
+    >>> times = np.linspace(0.1, 2.0, 20)
+    >>> seen = mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.02, until=2.0).at(times)["pin.angle"]
+    >>> data, guess = {"time": times, "pin.angle": seen}, {"rod.center": 1.0, "pin loss.coefficient": 0.5}
+    >>> found = mbd.fit(model, start, data, guess, mbd.RungeKutta853(), dt=0.02)
+    >>> print({name: round(value, 6) for name, value in found.values.items()})
+    {'rod.center': 1.3, 'pin loss.coefficient': 0.2}
+    """
+    from scipy.optimize import least_squares
+
+    known = Data.read(data, events, sigma)
+    guess, low, high = _bounds(parameters)
+    search = _Search(model, start, known, tuple(parameters), integrator, dt, _end(known, until, dt), backend)
+    search.check()
+    first = search.residuals(guess)
+    if not np.all(np.isfinite(first)):
+        raise SimulationError(f"the run with the guesses does not reach the data: {search.problem}", search.run)
+    found = least_squares(
+        search.residuals, guess, search.slopes, (low, high), x_scale="jac", xtol=1e-9, ftol=1e-12, gtol=1e-12,
+        max_nfev=200,
+    )  # fmt: skip
+    return search.told(found)
+
+
+def _bounds(parameters: Any) -> tuple[Vector, Vector, Vector]:
+    """Guesses and bounds; every fault at once."""
+    if not isinstance(parameters, Mapping) or not parameters:
+        raise ModelError(
+            f"parameters must map names to guesses, such as {{'shank.mass': 3.0}}, not {shown(parameters)}"
+        )
+    faults, rows = [], []
+    for name, each in parameters.items():
+        row = (each, -math.inf, math.inf) if is_number(each) else each
+        numbers = isinstance(row, tuple | list) and len(row) == 3 and all(is_number(x) and x == x for x in row)
+        if not isinstance(name, str) or not numbers or not math.isfinite(row[0]) or not row[1] < row[0] < row[2]:
+            faults.append(
+                f"the guess of {name!r} must be a number, or (guess, lowest, highest) in order, not {shown(each)}"
+            )
+        else:
+            rows.append([float(x) for x in row])
+    if faults:
+        raise ModelError(faults)
+    guess, low, high = np.array(rows).T
+    return guess, low, high
+
+
+def _end(data: Data, until: Any, dt: Any) -> float:
+    if not is_number(dt) or not 0.0 < dt < math.inf:
+        raise ModelError(f"dt must be a positive step [s], not {shown(dt)}")
+    if until is None:
+        return float(data.last + max(2.0 * dt, 0.2 * data.last if data.events else 0.0))
+    if not is_number(until) or not data.last <= until < math.inf:
+        raise ModelError(f"until must be a time [s] not before the last value at {data.last:g} s, not {shown(until)}")
+    return float(until)
+
+
+@dataclass
+class _Search:
+    """Runs for given values, and their differences from the data."""
+
+    model: Any
+    start: State
+    data: Data
+    names: tuple[str, ...]
+    integrator: Integrator | None
+    dt: float
+    until: float
+    backend: str
+    runs: int = 0
+    problem: str = ""
+    run: Trajectory | None = None
+    at: Vector | None = None
+
+    def check(self) -> None:
+        """Names that the model does not have, all at once; parameters that are 0 or ±1 become inputs."""
+        if not isinstance(self.start, State):
+            raise ModelError(f"start must be a State from mbd.assemble(model, …), not {shown(self.start)}")
+        equations = mechanism_of(self.model, self.backend).equations
+        inputs = {parameter.name for parameter in equations.parameters}
+        declared = {*inputs, *getattr(self.model, "parameters", {})}
+        wrong = [nearest(name, declared, "parameter", "There are") for name in self.names if name not in declared]
+        if wrong:
+            raise UnknownNameError(wrong)
+        for name in self.data.columns:
+            equations.output(name)
+        more = [name for name in self.names if name not in inputs]
+        self.model = self.model.with_tunable(*more) if more else self.model
+
+    def made(self, values: Vector) -> Trajectory | None:
+        """The run with these values; None if it fails."""
+        if self.at is not None and np.array_equal(values, self.at):
+            return self.run
+        self.at, self.run = values.copy(), None
+        self.runs += 1
+        try:
+            self.run = simulate(
+                self.model, replace(self.start, memory=None), self.integrator, self.dt, until=self.until,
+                contact="events", parameters=dict(zip(self.names, map(float, values), strict=True)),
+                on_failure="return", backend=self.backend,
+            )  # fmt: skip
+        except MbdError as error:
+            self.problem = str(error)
+        return self.run
+
+    def residuals(self, values: Vector) -> Vector:
+        """Computed less measured, over the scales; infinite where the run does not get there."""
+        run = self.made(values)
+        if run is None or run.time[-1] < max((times[-1] for times, _ in self.data.columns.values()), default=0.0):
+            self.problem = self.problem if run is None else run.message
+            return np.full(self.data.count, np.inf)
+        parts = [
+            (np.asarray(run.at(times)[name]) - seen) / self.data.scales[name]
+            for name, (times, seen) in self.data.columns.items()
+        ]
+        for name, instant in self.data.events.items():
+            found = instants_of(run).get(name, math.inf)
+            if not math.isfinite(found):
+                self.problem = f"there is no {name!r}: " + nearest(name, instants_of(run), "instant", "There are")
+            parts.append(np.array([(found - instant) / self.data.scales[name]]))
+        return np.concatenate(parts)
+
+    def slopes(self, values: Vector) -> Matrix:
+        """Derivatives of the residuals (values, parameters)."""
+        run = self.made(values)
+        assert run is not None  # least_squares asks where residuals were finite
+        names = list(self.data.columns)
+        found = along(run, self.names, names)
+        parts = [found.at(self.data.columns[name][0])[:, k] / self.data.scales[name] for k, name in enumerate(names)]
+        for name in self.data.events:
+            line = found.of_instant(name.split(".time")[0], instants_of(run)[name])
+            parts.append(line[None] / self.data.scales[name])
+        return np.vstack(parts)
+
+    def told(self, found: Any) -> Fit:
+        """What the search has found."""
+        run = self.made(found.x)
+        assert run is not None
+        degrees = len(found.fun) - len(found.x)
+        noise = float(np.sqrt(np.sum(found.fun**2) / max(degrees, 1)))
+        sizes = np.linalg.norm(found.jac, axis=0)
+        scaled = found.jac / np.where(sizes > 0.0, sizes, 1.0)
+        _, strengths, directions = np.linalg.svd(scaled, full_matrices=False)
+        weak = strengths <= ALIKE * max(strengths[0], 1e-300)
+        weak = np.concatenate([weak, np.ones(len(found.x) - len(weak), dtype=bool)])
+        groups, unknown = [], np.zeros(len(found.x), dtype=bool)
+        for line in directions[weak[: len(directions)]]:
+            members = np.abs(line) > SHARE
+            groups.append(tuple(name for name, is_in in zip(self.names, members, strict=True) if is_in))
+            unknown |= members
+        covariance = (directions.T * np.where(weak, 0.0, 1.0 / np.maximum(strengths, 1e-300) ** 2)) @ directions
+        deviation = np.sqrt(np.diag(covariance))
+        errors = np.where(unknown | (sizes == 0.0), np.inf, noise * deviation / np.where(sizes > 0.0, sizes, 1.0))
+        return Fit(
+            dict(zip(self.names, map(float, found.x), strict=True)),
+            dict(zip(self.names, map(float, errors), strict=True)),
+            covariance / np.maximum(np.outer(deviation, deviation), 1e-300), tuple(groups), self._by_name(found.fun),
+            noise, found.status > 0, found.message, self.runs, degrees, run,
+        )  # fmt: skip
+
+    def _by_name(self, residuals: Vector) -> dict[str, Vector]:
+        """Measured less computed, by name."""
+        lengths = [len(seen) for _, seen in self.data.columns.values()] + [1] * len(self.data.events)
+        parts = np.split(-residuals, np.cumsum(lengths)[:-1])
+        return dict(zip([*self.data.columns, *self.data.events], parts, strict=True))
+
+
+def instants_of(run: Trajectory) -> dict[str, float]:
+    """Instants at which contacts closed and events happened, 'foot.time' of the first, 'foot.time.2' of the second."""
+    found: dict[str, float] = {}
+    counts: dict[str, int] = {}
+    for event in (each for each in run.events if each.kind in ("closed", "event")):
+        counts[event.name] = counts.get(event.name, 0) + 1
+        number = counts[event.name]
+        found[f"{event.name}.time" + (f".{number}" if number > 1 else "")] = float(event.time)
+    return found
