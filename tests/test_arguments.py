@@ -74,12 +74,13 @@ WORDS = {
 
 BESIDE = {
     "made by others, not by users": (
-        mbd.Accuracy, mbd.Criteria, mbd.Effects, mbd.Failure, mbd.GaitReport, mbd.Known, mbd.LimitCycle,
+        mbd.Accuracy, mbd.Criteria, mbd.Effects, mbd.Failure, mbd.Fit, mbd.GaitReport, mbd.Known, mbd.LimitCycle,
         mbd.Linearization, mbd.Mobility, mbd.PenaltyParameters, mbd.Replay, mbd.Sensitivities, mbd.State,
         mbd.StateSpace, mbd.Sweep, mbd.Trajectory,
     ),
     "take a model and a run: tests of their own": (
-        mbd.accuracy, mbd.assemble, mbd.criteria, mbd.effects, mbd.gait_report, mbd.limit_cycle, mbd.linearize,
+        mbd.accuracy, mbd.assemble, mbd.criteria, mbd.effects, mbd.fit, mbd.gait_report, mbd.limit_cycle,
+        mbd.linearize,
         mbd.load, mbd.mobility, mbd.project, mbd.replay, mbd.sensitivities, mbd.simulate, mbd.sweep,
     ),
     "of numbers and traced values": (

@@ -100,6 +100,8 @@ OWN: dict[tuple[str, str], Any] = {
     ("gait_report", "run"): walker(steps=5),
     ("limit_cycle", "model"): SWING, ("limit_cycle", "start"): mbd.assemble(SWING, position={"pivot.angle": 0.3}),
     ("limit_cycle", "section"): "below", ("limit_cycle", "on_failure"): "return", ("limit_cycle", "longest"): 3.0,
+    ("fit", "data"): {"time": [0.1, 0.2], "hinge.angle": [0.3, 0.2]}, ("fit", "dt"): 0.1,
+    ("fit", "parameters"): {"upper.length": 1.2},
     ("effects", "dt"): 0.1, ("segment", "name"): "thigh", ("simulate", "dt"): 0.1, ("sweep", "dt"): 0.1,
     ("sensitivities", "dt"): 0.1, ("sensitivities", "wrt"): ["hinge.angle"], ("sweep", "values"): {"upper.mass": [1.0]},
 }  # fmt: skip
@@ -114,13 +116,13 @@ MEANT_OTHERWISE = {
 """Arguments that are right by themselves: the sentence is about the others."""
 
 RESULTS = {
-    "Accuracy", "Criteria", "Domain", "Effects", "Failure", "GaitReport", "Known", "LimitCycle",
+    "Accuracy", "Criteria", "Domain", "Effects", "Failure", "Fit", "GaitReport", "Known", "LimitCycle",
     "Linearization", "Mobility",
     "PenaltyParameters", "Replay", "Sensitivities", "State", "StateSpace", "Sweep", "Trajectory",
 }  # fmt: skip
 """Values that are handed to users, who make none."""
 
-STUDIES = {"accuracy", "effects", "criteria"}
+STUDIES = {"accuracy", "effects", "criteria", "fit"}
 """Words whose runs take seconds: what is no number at all is tried."""
 GAITS = {"limit_cycle"}
 """Words that make so many runs that they take machine code."""

@@ -40,8 +40,8 @@ class Along:
     def at(self, times: Vector) -> NDArray[np.float64]:
         """Derivatives at fixed times (len(times), results, D).
 
-        At a row whose instant moves by δt they are δY − Ẏ δt, with Ẏ of a cubic spline through the rows of a smooth part
-        of the motion; between the rows they lie on cubic splines too.
+        At a row whose instant moves by δt they are δY − Ẏ δt, with Ẏ of a cubic spline through the rows of a smooth
+        part of the motion; between the rows they lie on cubic splines too.
         """
         out = np.zeros((len(times), *self.slopes.shape[1:]))
         piece = np.searchsorted(self.starts, times, side="right")

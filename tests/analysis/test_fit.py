@@ -25,13 +25,13 @@ def pendulum():
 
 def seen(**parameters):
     model, start = pendulum()
-    run = mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.05, until=2.0, parameters=parameters)
+    run = mbd.simulate(model, start, mbd.Newmark(), dt=0.02, until=2.0, parameters=parameters)
     return np.array(run.at(TIMES)["pin.angle"])
 
 
 def found(values, parameters, **more):
     model, start = pendulum()
-    return mbd.fit(model, start, {"time": TIMES, "pin.angle": values}, parameters, mbd.RungeKutta853(), 0.05, **more)
+    return mbd.fit(model, start, {"time": TIMES, "pin.angle": values}, parameters, mbd.Newmark(), 0.02, **more)
 
 
 def test_a_walker_is_found_from_angles_and_instants_of_its_heel_strikes():
