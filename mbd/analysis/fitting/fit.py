@@ -154,7 +154,7 @@ def fit(
         search.residuals, guess, search.slopes, (low, high), x_scale="jac", xtol=1e-9, ftol=1e-12, gtol=1e-12,
         max_nfev=200,
     )  # fmt: skip
-    return search.told(found)
+    return search.concluded(found)
 
 
 def _bounds(parameters: Any) -> tuple[Vector, Vector, Vector]:
@@ -266,7 +266,7 @@ class _Search:
             parts.append(line[None] / self.data.scales[name])
         return np.vstack(parts)
 
-    def told(self, found: Any) -> Fit:
+    def concluded(self, found: Any) -> Fit:
         """What the search has found."""
         run = self.made(found.x)
         assert run is not None
