@@ -125,9 +125,10 @@ class Walk:
             if fresh and not rows.begins_late(motion.t, row):
                 end = rows.segment_end(row)
                 self.steps.prepare(motion, mode, row, end)
-                before = row
-                row, motion, memory = self.steps.leap(motion, memory, mode, row, self._unwatched(mode, row, end - 1))
-                fresh = row == before
+                if self.visit is None:
+                    before, far = row, self._unwatched(mode, row, end - 1)
+                    row, motion, memory = self.steps.leap(motion, memory, mode, row, far)
+                    fresh = row == before
             if row not in looked:
                 looked.add(row)
                 begun = self._begins(motion, memory, mode, row)
