@@ -11,7 +11,7 @@ import numpy as np
 from mbd.analysis.gait import gait
 from mbd.arrays import Vector
 from mbd.notebook import Text
-from mbd.results.summary import strategy
+from mbd.results.summary import of_the_swing, strategy
 
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
@@ -51,10 +51,9 @@ def summary(run: Trajectory) -> Summary:
     entries.append(("events", f"{len(run.record.events)}: {listed}{more}" if counts else "none"))
     if len(run):
         energy = run.energy
-        entries.append(
-            ("energy", f"changed by {energy.change:.4g} J, of which numerical {energy.numerical[-1]:.2g} J, "
-                       f"{energy.drift:.2g} of the swing of kinetic energy")
-        )  # fmt: skip
+        swing = of_the_swing(energy)
+        text = f"changed by {energy.change:.4g} J, of which numerical {energy.numerical[-1]:.2g} J"
+        entries.append(("energy", f"{text}, {swing}" if swing else text))
         entries.append(("constraints", str(run.violation)))
     entries.append(("cost", _cost(run)))
     notes = run.stats.get("notes", ())

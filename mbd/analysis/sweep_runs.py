@@ -18,7 +18,7 @@ from hashlib import sha256
 from typing import Any, NamedTuple, TypeAlias
 from weakref import WeakValueDictionary
 
-from mbd.analysis.accuracy.truth import stopped
+from mbd.analysis.interrupted import stopped
 from mbd.description import Description
 from mbd.equations.derivation import FrontDoor
 from mbd.errors import MbdError, ModelError, SimulationError

@@ -106,7 +106,7 @@ def backend(kind: str = "auto", level: int | None = None, cache: ObjectCache | N
             raise CapabilityError("backend 'llvm' needs the package llvmlite: pip install llvmlite, or use 'python'")
         return Backend(
             "python",
-            "llvmlite is not installed: plain Python runs instead, some 1000 times slower than machine code: "
+            "llvmlite is not installed: plain Python runs instead, 100 to 300 times slower than machine code: "
             "pip install 'mbd[fast]'",
         )
     try:
@@ -116,7 +116,7 @@ def backend(kind: str = "auto", level: int | None = None, cache: ObjectCache | N
             raise CapabilityError(f"llvmlite is installed but does not load ({error}); use backend 'python'") from error
         return Backend(
             "python",
-            f"llvmlite is installed but does not load ({error}): plain Python runs instead, some 1000 times slower",
+            f"llvmlite is installed but does not load ({error}): plain Python runs instead, 100 to 300 times slower",
         )
     level = _level_of_environment() if level is None else level
     chosen, hasty = (llvm.LEVEL, llvm.HASTY) if level is None else (level, None)

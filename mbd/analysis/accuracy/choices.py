@@ -11,7 +11,8 @@ import numpy as np
 
 from mbd.analysis.accuracy.published import Published, published, table_of
 from mbd.analysis.accuracy.settings import Setting, is_high, long_steps, steps_of, tolerances
-from mbd.analysis.accuracy.truth import motion, stopped
+from mbd.analysis.accuracy.truth import motion
+from mbd.analysis.interrupted import stopped
 from mbd.bodies.values import is_number, names_given, shown
 from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import ModelError, SimulationError, UnknownNameError, nearest

@@ -11,6 +11,7 @@ import numpy as np
 
 from mbd.analysis.accuracy.compare import Difference, differences, ranges
 from mbd.analysis.accuracy.reference import Method, RungeKuttaReference
+from mbd.analysis.interrupted import stopped
 from mbd.arrays import Vector
 from mbd.assembly.trivial_rows import manager_of
 from mbd.compile.mechanisms import mechanism_of
@@ -241,11 +242,6 @@ def chosen(times: Vector) -> Vector:
     wanted = np.linspace(times[0], times[-1], INSTANTS + 1)[1:]
     places = np.clip(np.searchsorted(times, wanted - 0.5 * (wanted[1] - wanted[0])), 1, len(times) - 1)
     return np.unique(np.append(times[places], times[-1]))
-
-
-def stopped(run: Trajectory) -> bool:
-    """Whether a run ended because the user wanted it to."""
-    return not run.success and run.message.startswith("interrupted")
 
 
 def motion(run: Trajectory) -> list[str]:

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 
 from mbd.analysis.accuracy.compare import ranges
-from mbd.analysis.accuracy.truth import stopped
 from mbd.analysis.effects.comparison import change
 from mbd.analysis.effects.contribution import Change, Contribution, Together
 from mbd.analysis.effects.result import Effects
 from mbd.analysis.effects.scenes import Element, Scene, elements, reduced
 from mbd.analysis.effects.timing import Pair, Timing, timed
+from mbd.analysis.interrupted import stopped
 from mbd.bodies.values import is_number, names_given, shown
 from mbd.compile.mechanisms import mechanism_of
 from mbd.description import Description
