@@ -247,9 +247,20 @@ def new_command(arguments: argparse.Namespace) -> int:
     if path.exists():
         raise FileExistsError(f"'{path}' exists; give another name")
     title = printable(path.stem.replace("_", " ").replace("-", " "), "script")
-    path.write_text(STARTER.format(title=title.replace('"', "'"), file=path, stem=path.stem), encoding="utf-8")
+    shown = {"title": _Quoted(title), "file": _Quoted(shlex.quote(str(path))), "page": _Quoted(f"{path.stem}.html")}
+    path.write_text(STARTER.format(**shown), encoding="utf-8")
     print(f"wrote {path}; run it with: mbd run {shlex.quote(str(path))}")
     return 0
+
+
+class _Quoted(str):
+    """A text that stands between double quotes where it can, and within a docstring with nothing that would end it."""
+
+    def __repr__(self) -> str:
+        return super().__repr__() if '"' in self or "\\" in self else f'"{self}"'
+
+    def __format__(self, spec: str) -> str:
+        return self.replace("\\", "\\\\").replace('"', '\\"')
 
 
 def examples_command(arguments: argparse.Namespace) -> int:
@@ -265,7 +276,7 @@ def examples_command(arguments: argparse.Namespace) -> int:
 
 def hardcases_command(arguments: argparse.Namespace) -> int:
     """``mbd hardcases``: judge every hard case."""
-    writable(arguments.out)
+    arguments.out = str(writable(arguments.out))
     from mbd.hardcases.command import run
 
     return run(arguments.names, arguments.scheme, arguments.slow, arguments.out, arguments.markdown)

@@ -15,6 +15,7 @@ import pytest
 import mbd
 from mbd import cli
 from mbd.errors import SimulationError
+from mbd.view.parser import writable
 from tests.view.handmade_runs import walker
 
 WALK = '''"""A walk made by hand."""
@@ -350,9 +351,10 @@ def test_the_package_is_a_command_too():
         ("file/inside", "is a file, not a folder; give another folder"),
         ("", "names no folder"),
         ("x" * 300, "nothing can be written there (File name too long)"),
-        ("nul\0", "nothing can be written there"),
+        ("nul\0", "no control characters"),
+        ("two\nlines", "no control characters"),
     ],
-    ids=["file", "inside a file", "empty", "long", "nul"],
+    ids=["file", "inside a file", "empty", "long", "nul", "lines"],
 )
 def test_a_folder_that_cannot_be_written_is_told_before_any_work(script, tmp_path, capsys, command, folder, told):
     path = script("raise SystemExit('work was done')\n")
@@ -363,7 +365,7 @@ def test_a_folder_that_cannot_be_written_is_told_before_any_work(script, tmp_pat
     assert {each.name for each in tmp_path.iterdir()} == {"file", "my_walk.py"}
 
 
-@pytest.mark.parametrize("folder", ["a b/ü\"'<x>&", "two\nlines"])
+@pytest.mark.parametrize("folder", ["a b/ü\"'<x>&", "$a 'b'"])
 def test_a_folder_of_any_other_name_is_written_to(script, tmp_path, capsys, folder):
     assert cli.main(["run", script(WALK), "--out", folder]) == 0
     assert (tmp_path / folder / "record.json").is_file() and capsys.readouterr().err == ""
@@ -383,6 +385,19 @@ def test_a_new_script_that_has_no_place_is_told(script, capsys, name, told):
     script("")
     assert cli.main(["new", name]) == 1
     assert told in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ['x"y<z', "it's", 'all""" of it', "back\\slash", "{curly}", "%s"])
+def test_a_script_of_any_name_can_be_read(script, name):
+    script("")
+    assert cli.main(["new", name]) == 0
+    model = cli.Script.load(f"{name}.py").names["model"]
+    assert model.name == name and model.check() == []
+
+
+def test_home_is_home(tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert writable("~/runs") == tmp_path / "runs"
 
 
 def test_the_script_that_new_writes_runs_and_has_nothing_to_note(script, tmp_path, capsys):

@@ -10,6 +10,8 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any, NoReturn
 
+from mbd.bodies.values import printable
+
 __all__ = ["Parser", "writable"]
 
 
@@ -35,14 +37,17 @@ class Parser(argparse.ArgumentParser):
 
 
 def writable(folder: str | Path) -> Path:
-    """A folder for results in which a file was written, and which is gone again if it was not there.
+    """A folder for results in which a file was written, and which is gone again if it was not there; ~ is the home.
 
     Raises
     ------
+    ModelError
+        for control characters, which a terminal would obey.
     OSError
         that names the folder and why not, before any work is done.
     """
-    place, asked = Path(folder), f"--out {str(folder)!r}"
+    asked = f"--out {str(folder)!r}"
+    place = Path(printable(str(folder), "--out")).expanduser()
     if not str(folder):
         raise FileNotFoundError(f"{asked} names no folder; leave it out, or give the name of one")
     try:

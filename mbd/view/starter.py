@@ -12,7 +12,7 @@ Units: m, kg, s, N, rad. The plane is x (forward) and y (up); gravity points dow
 
 import mbd
 
-model = mbd.Model("{title}")
+model = mbd.Model({title!r})
 
 # Bodies: links run from .start down to .end; center is measured from the start.
 thigh = mbd.Link("thigh", mass=7.0, length=0.43, center=0.19, inertia=0.13)
@@ -42,5 +42,5 @@ if __name__ == "__main__":
     run = mbd.simulate(model, start, integrator, dt=dt, until=until)
     print(run)
     print("largest force under the foot:", run["foot.force"].max(), "N")
-    run.page("{stem}.html")
+    run.page({page!r})
 '''
