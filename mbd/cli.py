@@ -112,19 +112,10 @@ class Script:
         progress : called with the simulated time and the end time [s]
         changes : values that replace the script's own: dt or tol, until
         """
-        from mbd.trajectory import Trajectory
-
         if "main" in self.names:
             if changes:
                 raise ModelError(f"{self.path.name} has a main(), which chooses {', '.join(changes)} itself")
-            function = self.names["main"]
-            takes = "progress" in inspect.signature(function).parameters
-            run = function(progress=progress) if takes else function()
-            if not isinstance(run, Trajectory):
-                raise ModelError(
-                    f"main() of {self.path.name} must return the run of mbd.simulate, got {type(run).__name__}"
-                )
-            return run
+            return self._run_of_main(progress)
         steps = ("tol",) if "tol" in self.names and "dt" not in self.names else ("dt",)
         given = {"dt", "tol"} | set(changes) if {"dt", "tol"} & set(changes) else set(changes)
         self.require("model", "start", "integrator", *(name for name in (*steps, "until") if name not in given))
@@ -137,6 +128,18 @@ class Script:
         names = self.names
         found: Trajectory = simulate(names["model"], names["start"], names["integrator"], progress=progress, **options)
         return found
+
+    def _run_of_main(self, progress: Progress | None) -> Trajectory:
+        from mbd.trajectory import Trajectory
+
+        function = self.names["main"]
+        takes = "progress" in inspect.signature(function).parameters
+        run = function(progress=progress) if takes else function()
+        if not isinstance(run, Trajectory):
+            raise ModelError(
+                f"main() of {self.path.name} must return the run of mbd.simulate, got {type(run).__name__}"
+            )
+        return run
 
 
 # commands ---------------------------------------------------------------------------------------------------------

@@ -108,15 +108,12 @@ def readable(model: Description) -> list[str]:
 # names ----------------------------------------------------------------------------------------------------------
 def name_faults(model: Description) -> list[str]:
     """Two things of one name."""
-    found = []
-    bodies: dict[str, list[Body]] = {}
-    for body in _all_bodies(model):
-        known = bodies.setdefault(body.name, [])
-        if not any(body is other or (isinstance(body, Ground) and isinstance(other, Ground)) for other in known):
-            known.append(body)
-    for name, several in bodies.items():
-        if len(several) > 1:
-            found.append(f"{len(several)} different bodies are named '{name}'; rename them, or use one object")
+    bodies = _bodies_by_name(model)
+    found = [
+        f"{len(several)} different bodies are named '{name}'; rename them, or use one object"
+        for name, several in bodies.items()
+        if len(several) > 1
+    ]
     kinds: dict[str, Counter[str]] = {}
     words: list[Joint | Force | Constraint] = [*model.joints, *model.forces, *model.constraints]
     for name, kind in (
@@ -139,6 +136,16 @@ def name_faults(model: Description) -> list[str]:
         if places.setdefault(frame.full_name, frame).parameters() != frame.parameters():
             found.append(f"two different points are named '{frame.full_name}'; give each its own name")
     return found + _marker_faults(model, kinds)
+
+
+def _bodies_by_name(model: Description) -> dict[str, list[Body]]:
+    """All bodies, each once; every ground is the same."""
+    bodies: dict[str, list[Body]] = {}
+    for body in _all_bodies(model):
+        known = bodies.setdefault(body.name, [])
+        if not any(body is other or (isinstance(body, Ground) and isinstance(other, Ground)) for other in known):
+            known.append(body)
+    return bodies
 
 
 def _marker_faults(model: Description, taken: Collection[str]) -> list[str]:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from mbd.arrays import Matrix
+from mbd.arrays import Matrix, Vector
 from mbd.assembly.given_state import beyond_angles
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.python import array_function
@@ -50,12 +50,7 @@ def unresolved_turns(run: RunData, record: Record) -> list[str]:
         return []
     if run.kernel.row_bounds[0] <= HALF_TURN:  # no coordinate changes so much from row to row
         return []
-    equations = run.mechanism.equations
-    ways = np.zeros(equations.n_q)
-    for part in blocks(record.q):
-        if len(part) > 1:
-            ways = np.maximum(ways, np.max(np.abs(np.diff(part, axis=0)), axis=0))
-    ways /= record.settings.get("store", 1)
+    equations, ways = run.mechanism.equations, _largest_ways(record)
     fast = [k for k, coordinate in enumerate(equations.coordinates) if coordinate.unit == "rad" and ways[k] > HALF_TURN]
     if not fast:
         return []
@@ -69,6 +64,15 @@ def unresolved_turns(run: RunData, record: Record) -> list[str]:
         for k in fast
         if k in known
     ]
+
+
+def _largest_ways(record: Record) -> Vector:
+    """The most by which each coordinate changes in a step."""
+    ways = np.zeros(record.q.shape[1])
+    for part in blocks(record.q):
+        if len(part) > 1:
+            ways = np.maximum(ways, np.max(np.abs(np.diff(part, axis=0)), axis=0))
+    return np.asarray(ways / record.settings.get("store", 1))
 
 
 def _divided_steps(run: RunData, record: Record) -> list[str]:

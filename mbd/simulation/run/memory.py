@@ -104,13 +104,19 @@ def take_up(run: RunData, start: State) -> bool:
     run.pending = tuple(EventRecord(run.now, kind, name) for kind, name in memory.pending)
     v.n_stored = v.n_logged = 0
     v.mode_id, v.order_start = -1, 0
+    _store_first_row(run, start.time)
+    return True
+
+
+def _store_first_row(run: RunData, time: float) -> None:
+    """The state that was taken up as a row, between which and the next the grid of rows goes on."""
+    stepper, v = run.stepper, run.kernel
     phase = int(v.steps_since_row)
     stepper.hold()
     stepper.store_row()
-    v.store[0] = start.time
+    v.store[0] = time
     v.steps_since_row = phase
     stepper.resumed_at = run.now
-    return True
 
 
 def carry_on(run: RunData, start: State) -> bool:
