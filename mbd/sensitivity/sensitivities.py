@@ -15,6 +15,7 @@ from mbd.sensitivity.derivative import passed
 from mbd.sensitivity.functions import rates_of_parameters
 from mbd.sensitivity.outputs import lines_of, usual
 from mbd.sensitivity.result import Sensitivities
+from mbd.sensitivity.run_data import refused
 from mbd.simulation.simulate import REST_SPEED, simulate
 from mbd.state import State
 from mbd.trajectory import Trajectory
@@ -89,6 +90,9 @@ def sensitivities(
     0.225762
     """
     single, grouped = _names_in(wrt)
+    if getattr(model, "controllers", ()):
+        them = ", ".join(repr(each.name) for each in model.controllers)
+        raise refused(f"its controllers ({them}) change parameters as they read results, which is not differentiated")
     _check_of(of)
     _check_hold(hold)
     values = _values_of(at)
