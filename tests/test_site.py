@@ -95,3 +95,10 @@ def test_docstrings_become_markdown():
         "A [`Link`][mbd.Link] of `simulate`.\n\n**Parameters**\n\n- `a`, `b`: two things [m]\n- `c`: 'one'\n\n\n"
         "**Raises**\n\n- [`ModelError`][mbd.ModelError]: always.\n\n\n```pycon\n>>> 1 + 1\n2\n```\n\nThe end."
     )
+
+
+def test_every_page_has_its_place_in_the_navigation():
+    listed = re.findall(r": ([\w/-]+\.md)$", (ROOT / "mkdocs.yml").read_text(encoding="utf-8"), re.MULTILINE)
+    written = [page.name for page in (ROOT / "docs").glob("*.md")]
+    made = [f"reference/{title.lower().replace(' ', '-')}.md" for title in GROUPS]
+    assert {*written, *made} <= set(listed) and len(listed) == len(set(listed))
