@@ -10,18 +10,17 @@ from __future__ import annotations
 import ctypes
 import hashlib
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import fields, is_dataclass
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
 from types import FunctionType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from mbd.errors import CapabilityError
-from mbd.kernel.records import TABLE, Kernel
 from mbd.kernel.schemes import contract
-from mbd.kernel.tree import Call, Field, Function
+
+if TYPE_CHECKING:  # the trees of the kernel's functions are made only where it is built
+    from mbd.kernel.tree import Function
 
 __all__ = ["entry", "kernel_functions", "kernel_object", "kernel_text", "object_of", "source_digest"]
 
@@ -110,50 +109,14 @@ def kernel_text() -> str:
 def kernel_functions() -> list[Function]:
     """The kernel as typed trees."""
     from mbd.kernel.advance import advance
+    from mbd.kernel.memory_check import check_memory
     from mbd.kernel.translate import Source, functions_of, translate
 
     text, names = contract.dispatch()
     hooks = Source("hooks", functions_of(text, ENTRY_FUNCTION), {**names, "advance": advance})
     found = translate(hooks, ENTRY, ["kernel"], APART, {"mbd.kernel.hooks": hooks})
-    _check_memory(found)
+    check_memory(found)
     return found
-
-
-def _check_memory(found: Sequence[Function]) -> None:
-    """Refuse a scheme whose functions use an array of `MEMORY` for which its entry gives no length."""
-    sizes = Kernel(**dict.fromkeys(TABLE.integers, 2))
-    for scheme in contract.schemes():
-        own = scheme.memory(sizes)
-        for hook in (getattr(scheme, name) for name in contract.HOOKS):
-            start = f"{hook.__module__.removeprefix('mbd.kernel.')}.{hook.__name__}." if hook else "no hook"
-            for function in found:
-                if function.symbol.startswith(start):
-                    used = [name for name in _fields(function, set()) if name in contract.MEMORY and name not in own]
-                    if used:
-                        raise CapabilityError(
-                            f"the scheme {scheme.name!r}: its {hook.__name__} uses K.{used[0]}, to which its memory "
-                            f"gives no length; try memory=lambda K: {{{used[0]!r}: …}} in the entry"
-                        )
-
-
-def _fields(part: Any, seen: set[str]) -> Iterator[str]:
-    """Names of the fields that a function and all that it calls use."""
-    if isinstance(part, Field):
-        yield part.name
-    elif isinstance(part, Call):
-        yield from _fields(part.function, seen)
-        yield from _fields(part.arguments, seen)
-        return
-    if isinstance(part, Function):
-        if part.symbol not in seen:
-            seen.add(part.symbol)
-            yield from _fields(part.body, seen)
-    elif isinstance(part, list | tuple):
-        for each in part:
-            yield from _fields(each, seen)
-    elif is_dataclass(part):
-        for each in fields(part):
-            yield from _fields(getattr(part, each.name), seen)
 
 
 @lru_cache(maxsize=1)
