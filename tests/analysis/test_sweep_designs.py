@@ -76,21 +76,21 @@ def test_a_sweep_goes_on_from_its_file_and_makes_no_run_twice(tmp_path):
         made.append(run["fall.rate"][-1])
         return made[-1]
 
-    values, path = {"ball.mass": [1.0, 2.0, 3.0], "until": [0.1, 1e9]}, tmp_path / "a" / "drops"
-    whole = swept(values, {"speed": speed}, dt=None, tol=1e-3)
+    values, path = {"ball.mass": [1.0, 2.0, 3.0], "dt": [5e-2, 1e9]}, tmp_path / "a" / "drops"
+    whole = swept(values, {"speed": speed})
     made.clear()
-    first = swept({**values, "ball.mass": [1.0, 2.0]}, {"speed": speed}, dt=None, tol=1e-3, file=path)
+    first = swept({**values, "ball.mass": [1.0, 2.0]}, {"speed": speed}, file=path)
     count = len(made)
     file = path.with_suffix(".jsonl")
     lines = file.read_bytes().splitlines(keepends=True)
     assert len(lines) == 1 + len(first)
     file.write_bytes(b"".join(lines[:-1]) + lines[-1][:9])  # as a kill leaves it
     with ThreadPoolExecutor(2) as pool:
-        found = swept(values, {"speed": speed}, dt=None, tol=1e-3, file=path, executor=pool)
+        found = swept(values, {"speed": speed}, file=path, executor=pool)
     np.testing.assert_array_equal(found["speed"], whole["speed"])
     assert list(found["message"]) == list(whole["message"])
     assert len(made) - count <= 1 + len(whole) - len(first)
-    assert json.loads(file.read_text().splitlines()[0])["names"] == ["ball.mass", "until"]
+    assert json.loads(file.read_text().splitlines()[0])["names"] == ["ball.mass", "dt"]
 
 
 SCRIPT = """
