@@ -61,7 +61,7 @@ class NewmarkSteps:
     def start(self, motion: Motion, mode: Mode, rates: Rates, full: float | None = None) -> Memory:
         """a₀ = v̇₀ + (α_m − α_f) h j₀ with the jerk j₀ from one difference of consistent accelerations."""
         full = self.full if full is None else full
-        if self.jerk == 0.0:
+        if self.jerk == 0.0 and not (self.stabilized and mode.rows):
             return Memory(rates, rates.rate.copy(), rates.of_rate.copy(), full)
         c, ahead, tangent = self.programs.columns, full / 16.0, motion.tangent
         later = Motion(
@@ -71,7 +71,11 @@ class NewmarkSteps:
         then = consistent_rates(self.programs, later, mode, rates)
         part = self.jerk * full / ahead
         aux = rates.rate + part * (then.rate - rates.rate)
-        return Memory(rates, aux, rates.of_rate + part * (then.of_rate - rates.of_rate), full)
+        of_aux = rates.of_rate + part * (then.of_rate - rates.of_rate)
+        slope, lam_slope, none = (then.rate - rates.rate) / ahead, (then.lam - rates.lam) / ahead, np.zeros(c.n_v)
+        of_lam = (then.of_lam - rates.of_lam) / ahead
+        of_slope, still = (then.of_rate - rates.of_rate) / ahead, np.zeros((c.n_v, of_aux.shape[1]))
+        return Memory(rates, aux, of_aux, full, slope, lam_slope, none, none, of_slope, still, still, of_lam)
 
     # a step -------------------------------------------------------------------------------------------------------
     def follows(self, motion: Motion, memory: Memory, h: float, y1: Vector, rate1: Vector) -> bool:
@@ -98,11 +102,69 @@ class NewmarkSteps:
         shift -= h * h * ((0.5 - self.beta) * a0 + self.beta * a1)[: c.n_v]
         tangent = Tangent(motion.tangent.t + dh, guess.of_x, guess.of_y, motion.tangent.anchors, motion.tangent.p)
         after = Motion(end[0], end[1], end[2], motion.anchors, tangent)
-        of_rate, of_lam, of_x = self._implicit(after, mode, rates, guess, shift, h, dh)
+        ahead = self.predicted(motion, memory, h) if self.stabilized and mode.rows else None
+        if ahead is not None:
+            ahead = self._with_tangent(ahead, motion, memory, guess, h, dh)
+        of_rate, of_lam, of_shift = self._implicit(after, mode, rates, guess, shift, h, dh, ahead)
+        of_x = guess.c_K * of_rate[: c.n_v] + of_shift
         mean = (1.0 - self.alpha_f) / (1.0 - self.alpha_m)
         moved = after.with_tangent(q=guess.of_x + of_x, y=guess.of_y + guess.c_C * of_rate)
         found = Rates(rates.rate, rates.lam, of_rate, of_lam)
-        return moved, Memory(found, a1, guess.of_aux + mean * of_rate, h)
+        last, before = memory.rates, np.zeros(c.n_v) if memory.shift is None else memory.shift
+        slopes = (rates.rate - last.rate) / h, (rates.lam - last.lam) / h
+        of_aux = guess.of_aux + mean * of_rate
+        if ahead is None:
+            return moved, Memory(found, a1, of_aux, h)
+        of_slope = (of_rate - last.of_rate - slopes[0][:, np.newaxis] * dh) / h
+        of_change = of_shift if memory.of_shift is None else of_shift - memory.of_shift
+        return moved, Memory(
+            found, a1, of_aux, h, *slopes, shift, shift - before, of_slope, of_shift, of_change,
+            (of_lam - last.of_lam - slopes[1][:, np.newaxis] * dh) / h,
+        )  # fmt: skip
+
+    def _with_tangent(
+        self, ahead: tuple[Motion, Rates], motion: Motion, memory: Memory, guess: Prediction, h: float, dh: Vector
+    ) -> tuple[Motion, Rates]:
+        """The prediction with the derivatives of its place and velocities."""
+        n_v, rates, tangent = self.programs.columns.n_v, memory.rates, motion.tangent
+        stretch, mean = h / memory.step, 1.0 / (1.0 - self.alpha_m)
+        place, foreseen = ahead
+        if (
+            memory.of_slope is None
+            or memory.of_shift is None
+            or memory.of_change is None
+            or memory.of_lam_slope is None
+        ):
+            return replace(place, tangent=replace(tangent, t=tangent.t + dh, q=guess.of_x, y=guess.of_y)), foreseen
+        lam_slope = ((foreseen.lam - rates.lam) / h)[:, np.newaxis]
+        of_lam = rates.of_lam + h * memory.of_lam_slope + lam_slope * dh
+        slope = (foreseen.rate - rates.rate) / h
+        of_rate = rates.of_rate + h * memory.of_slope + slope[:, np.newaxis] * dh
+        last = self.alpha_f * rates.of_rate - self.alpha_m * guess.of_a0
+        of_a1 = mean * ((1.0 - self.alpha_f) * of_rate + last)
+        a0, a1 = self._averages(memory, h, foreseen.rate)
+        speed, way = (1.0 - self.gamma) * a0 + self.gamma * a1, (0.5 - self.beta) * a0 + self.beta * a1
+        of_y = tangent.y + h * ((1.0 - self.gamma) * guess.of_a0 + self.gamma * of_a1) + speed[:, np.newaxis] * dh
+        of_x = tangent.q + h * tangent.y[:n_v] + h * h * ((0.5 - self.beta) * guess.of_a0 + self.beta * of_a1)[:n_v]
+        of_x = of_x + (motion.y + 2.0 * h * way)[:n_v, np.newaxis] * dh
+        of_x = of_x + stretch**3 * (memory.of_shift + stretch * memory.of_change)
+        moved = replace(tangent, t=tangent.t + dh, q=of_x, y=of_y)
+        return replace(place, tangent=moved), Rates(foreseen.rate, foreseen.lam, of_rate, of_lam)
+
+    def predicted(self, motion: Motion, memory: Memory, h: float) -> tuple[Motion, Rates]:
+        """Where the kernel predicts the end of a step, and makes the tangent whose metric is that of U."""
+        n_v, rates, stretch = self.programs.columns.n_v, memory.rates, h / memory.step
+        slope = np.zeros_like(rates.rate) if memory.slope is None else memory.slope
+        lam_slope = np.zeros_like(rates.lam) if memory.lam_slope is None else memory.lam_slope
+        shift = np.zeros(n_v) if memory.shift is None else memory.shift
+        change = np.zeros(n_v) if memory.shift_change is None else memory.shift_change
+        rate = rates.rate + h * slope
+        a0, a1 = self._averages(memory, h, rate)
+        y = motion.y + h * ((1.0 - self.gamma) * a0 + self.gamma * a1)
+        x = h * motion.y[:n_v] + h * h * ((0.5 - self.beta) * a0 + self.beta * a1)[:n_v]
+        x = x + (shift + stretch * change) * stretch**3
+        ahead = replace(motion, t=motion.t + h, q=motion.q + x, y=y)
+        return ahead, replace(rates, rate=rate, lam=rates.lam + h * lam_slope)
 
     def _predicted(self, motion: Motion, memory: Memory, h: float, rate1: Vector, dh: Vector) -> Prediction:
         """Derivatives of the end of a step with δv̇₁ = 0, δU = 0."""
@@ -121,9 +183,17 @@ class NewmarkSteps:
         return Prediction(a0, of_a0, of_a1, of_x, of_y, self.gamma * h * c, self.beta * h * h * c)
 
     def _implicit(
-        self, after: Motion, mode: Mode, rates: Rates, guess: Prediction, shift: Vector, h: float, dh: Vector
+        self,
+        after: Motion,
+        mode: Mode,
+        rates: Rates,
+        guess: Prediction,
+        shift: Vector,
+        h: float,
+        dh: Vector,
+        ahead: tuple[Motion, Rates] | None,
     ) -> tuple[Matrix, Matrix, Matrix]:
-        """Derivatives of v̇₁ and λ, and of x₁ beside the prediction."""
+        """Derivatives of v̇₁, λ and U."""
         c, rows = self.programs.columns, list(mode.rows)
         n, n_v, m = c.n, c.n_v, len(rows)
         at = after.at(mode, rates.rate, rates.lam)
@@ -131,34 +201,35 @@ class NewmarkSteps:
         Z = after.tangent.stacked(c)
         fast = np.array([self.programs.equations.rows[k].is_velocity for k in rows], dtype=bool)
         S, R = self._by_rates(of_r, guess), of_r[:, c.lam][:, rows]
-        if not (self.stabilized and m):
+        if ahead is None:
             level = np.where(fast[:, np.newaxis], of_rate[rows], of_h[rows])
             A = np.block([[S, R], [self._by_rates(level, guess), np.zeros((m, m))]])
             found = -solved(A, np.vstack([of_r, level]) @ Z)
-            return found[:n], self._spread(found[n:], rows), guess.c_K * found[:n_v]
-        turned, by_step = self._turned(after, mode, rates, guess, shift, (S, R, of_r, of_rate[rows]), fast, h)
+            return found[:n], self._spread(found[n:], rows), np.zeros((n_v, Z.shape[1]))
+        place, foreseen = ahead
+        near = self.programs.steps(place.at(mode, foreseen.rate, foreseen.lam))
+        metric, near_R, near_rate = self._by_rates(near[3], guess), near[3][:, c.lam][:, rows], near[5][rows]
+        parts = metric, near_R, near[3], near_rate
+        turned, by_step = self._turned(place, mode, foreseen, guess, shift, parts, fast, h)
         W = np.zeros((n + m, n))
         W[:, :n_v] = np.vstack([of_r, of_rate[rows]])[:, c.x]
-        levels = np.where(fast[:, np.newaxis], turned[n:], of_h[rows])
-        of_levels = self._by_rates(levels, guess)
-        by_shift = levels[:, c.x].copy()
-        by_shift[fast] += guess_row(of_rate[rows], c, guess)[fast][:, :n_v]
+        column = fast[:, np.newaxis]
+        of_levels = np.where(column, 0.0, self._by_rates(of_h[rows], guess))
+        by_shift = np.where(column, guess_row(near_rate, c, guess)[:, :n_v], of_h[rows][:, c.x])
         A = np.zeros((2 * (n + m), 2 * (n + m)))
         A[: n + m, :n] = self._by_rates(np.vstack([of_r, of_rate[rows]]), guess)
         A[:n, n : n + m] = R
         A[: n + m, n + m : 2 * n + m] = W
-        A[n + m : 2 * n + m, :n] = self._by_rates(turned[:n], guess)
-        A[n + m : 2 * n + m, n : n + m] = turned[:n][:, c.lam][:, rows]
-        A[n + m : 2 * n + m, n + m : 2 * n + m] = S
-        A[n + m : 2 * n + m, n + m : n + m + n_v] += turned[:n, c.x]
-        A[n + m : 2 * n + m, 2 * n + m :] = R
+        A[n + m : 2 * n + m, n + m : 2 * n + m] = metric
+        A[n + m : 2 * n + m, 2 * n + m :] = near_R
         A[2 * n + m :, :n] = of_levels
         A[2 * n + m :, n + m : n + m + n_v] = by_shift
-        right = np.vstack([of_r @ Z, of_rate[rows] @ Z, turned[:n] @ Z, levels @ Z])
+        near_Z = place.tangent.stacked(c, foreseen.of_rate, foreseen.of_lam)
+        levels = np.where(column, turned[n:] @ near_Z, of_h[rows] @ Z)
+        right = np.vstack([of_r @ Z, of_rate[rows] @ Z, turned[:n] @ near_Z, levels])
         right[n + m :] += by_step[:, np.newaxis] * dh
         found = -solved(A, right)
-        of_x = guess.c_K * found[:n_v] + found[n + m : n + m + n_v]
-        return found[:n], self._spread(found[n : n + m], rows), of_x
+        return found[:n], self._spread(found[n : n + m], rows), found[n + m : n + m + n_v]
 
     def _by_rates(self, level: Matrix, guess: Prediction) -> Matrix:
         """Derivatives by v̇₁ through the formulas of the scheme: ∂/∂v̇ + c_C ∂/∂v + c_K ∂/∂x."""
@@ -212,6 +283,7 @@ class NewmarkSteps:
         n, n_v, m = c.n, c.n_v, len(rows)
         rate, lam, shift = guess.rate.copy(), guess.lam.copy(), np.zeros(n_v)
         fast = np.array([self.programs.equations.rows[k].is_velocity for k in rows], dtype=bool)
+        fixed = self._metric(motion, memory, mode, h) if self.stabilized and m else np.zeros((0, 0))
         for _ in range(MOST):
             a0, a1 = self._averages(memory, h, rate)
             y = motion.y + h * ((1.0 - self.gamma) * a0 + self.gamma * a1)
@@ -224,8 +296,7 @@ class NewmarkSteps:
             if self.stabilized and m:
                 A = np.block([[S, R], [guess_row(of_rate[rows], c, near), np.zeros((m, m))]])
                 off = level[rows] - (near.c_K / near.c_C) * speed[rows]
-                off -= guess_row(of_rate[rows], c, near)[:, :n_v] @ shift
-                fresh = solved(A, -np.concatenate([np.zeros(n), np.where(fast, 0.0, off)]))[:n_v]
+                fresh = shift - solved(fixed, np.concatenate([np.zeros(n), np.where(fast, 0.0, off)]))[:n_v]
                 goal = (speed[rows] + of_rate[rows][:, c.x] @ (fresh - shift)) / near.c_C
                 moved, shift = np.abs(fresh - shift), fresh
             else:
@@ -241,6 +312,16 @@ class NewmarkSteps:
         y = motion.y + h * ((1.0 - self.gamma) * a0 + self.gamma * a1)
         x = h * motion.y[:n_v] + h * h * ((0.5 - self.beta) * a0 + self.beta * a1)[:n_v] + shift
         return replace(motion, t=t1, q=motion.q + x, y=y), Rates(rate, lam, guess.of_rate, guess.of_lam)
+
+    def _metric(self, motion: Motion, memory: Memory, mode: Mode, h: float) -> Matrix:
+        """``[S R; B̃ 0]`` where the end of a step is predicted."""
+        c, rows = self.programs.columns, list(mode.rows)
+        place, foreseen = self.predicted(motion, memory, h)
+        _, _, _, of_r, _, of_rate = self.programs.steps(place.at(mode, foreseen.rate, foreseen.lam))
+        c_h = h * (1.0 - self.alpha_f) / (1.0 - self.alpha_m)
+        near = Prediction(foreseen.rate, of_r, of_r, of_r, of_r, self.gamma * c_h, self.beta * h * c_h)
+        S, R = self._by_rates(of_r, near), of_r[:, c.lam][:, rows]
+        return np.block([[S, R], [guess_row(of_rate[rows], c, near), np.zeros((len(rows), len(rows)))]])
 
     def is_brief(self, h: float, mode: Mode) -> bool:
         """Whether the kernel takes a step of Heun's method in the place of one so short."""

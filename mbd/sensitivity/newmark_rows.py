@@ -48,7 +48,7 @@ class NewmarkRows(SchemeSteps):
         def steps(here: slice) -> ImplicitSteps:
             return ImplicitSteps(
                 self.steps, motion, mode, np.asarray(record.time[here]), np.asarray(record.q[here]), self.rows.y[here],
-                self.rows.rate[here], np.asarray(record.lam[here]), memory.aux, memory.step,
+                self.rows.rate[here], np.asarray(record.lam[here]), memory,
             )  # fmt: skip
 
         last = first + steps(here).followed()
@@ -60,7 +60,11 @@ class NewmarkRows(SchemeSteps):
         except np.linalg.LinAlgError:
             return first, motion, memory
         c, tangent = self.programs.columns, motion.tangent
-        scheme = memory.rates.of_rate, memory.of_aux
+        rows, slopes_of = list(mode.rows), memory.of_lam_slope
+        ahead = [memory.of_slope, memory.of_shift, memory.of_change] if self.stabilized and rows else []
+        if ahead and slopes_of is not None:
+            ahead += [memory.rates.of_lam[rows], slopes_of[rows]]
+        scheme = [memory.rates.of_rate, memory.of_aux, *(each for each in ahead if each is not None)]
         X = np.vstack([tangent.q, tangent.y, *scheme, tangent.t[np.newaxis], tangent.anchors, tangent.p])
         for matrix in matrices[:-1]:
             X = matrix @ X
@@ -68,12 +72,19 @@ class NewmarkRows(SchemeSteps):
         lam[list(mode.rows)] = of_lam[-1] @ X
         X = matrices[-1] @ X
         q, y, rate, aux = np.split(X[: c.n_v + 3 * c.n], [c.n_v, c.n_v + c.n, c.n_v + 2 * c.n])
+        known = np.split(X[c.n_v + 3 * c.n :], [c.n, c.n + c.n_v, c.n + 2 * c.n_v])[:3] if ahead else []
+        if ahead:
+            at = c.n_v + 4 * c.n + 2 * c.n_v + len(rows)
+            known.append(np.zeros_like(lam))
+            known[-1][rows] = X[at : at + len(rows)]
         end = Motion(
             float(record.time[last]), np.array(record.q[last]), self.rows.y[last], motion.anchors,
             replace(tangent, q=q, y=y),
         )  # fmt: skip
         rates = Rates(self.rows.rate[last], np.array(record.lam[last]), rate, lam)
-        return last, end, Memory(rates, taken.a[-1], aux, float(taken.h[-1]))
+        shift, step = taken.shifts(), float(taken.h[-1])
+        slopes = (taken.rate[-1] - taken.rate[-2]) / step, (taken.lam[-1] - taken.lam[-2]) / step
+        return last, end, Memory(rates, taken.a[-1], aux, step, *slopes, shift[-1], shift[-1] - shift[-2], *known)
 
     def along(
         self, motion: Motion, memory: Memory, mode: Mode, row: int, dh: Vector, fresh: bool

@@ -21,12 +21,24 @@ SAME = 1e-9
 
 @dataclass(frozen=True)
 class Memory:
-    """What a scheme remembers at a row: rates, auxiliary accelerations a with their derivatives, the last step."""
+    """What a scheme remembers at a row: rates, auxiliary accelerations a with their derivatives, the last step.
+
+    slope, lam_slope, shift, shift_change : of rates, multipliers, position corrections, which predict the next step
+        of the stabilized form, with derivatives of them
+    """
 
     rates: Rates
     aux: Vector
     of_aux: Matrix
     step: float
+    slope: Vector | None = None
+    lam_slope: Vector | None = None
+    shift: Vector | None = None
+    shift_change: Vector | None = None
+    of_slope: Matrix | None = None
+    of_shift: Matrix | None = None
+    of_change: Matrix | None = None
+    of_lam_slope: Matrix | None = None
 
     @classmethod
     def of_rates(cls, rates: Rates, step: float) -> Memory:
@@ -35,8 +47,17 @@ class Memory:
 
     def widened(self) -> Memory:
         """With one more direction, in which nothing changes."""
-        wide = np.hstack([self.of_aux, np.zeros((len(self.aux), 1))])
-        return replace(self, rates=self.rates.widened(), of_aux=wide)
+
+        def wide(part: Matrix) -> Matrix:
+            return np.hstack([part, np.zeros((len(part), 1))])
+
+        def kept(part: Matrix | None) -> Matrix | None:
+            return None if part is None else wide(part)
+
+        return replace(
+            self, rates=self.rates.widened(), of_aux=wide(self.of_aux), of_slope=kept(self.of_slope),
+            of_shift=kept(self.of_shift), of_change=kept(self.of_change), of_lam_slope=kept(self.of_lam_slope),
+        )  # fmt: skip
 
 
 class SchemeSteps(ABC):

@@ -7,6 +7,7 @@ import pytest
 
 import mbd
 from mbd.sensitivity.derivative import final_state_derivative
+from mbd.testing.mechanisms import random_loop
 from tests.sensitivity.differences import differences, off
 from tests.simulation.mechanisms import ball, kneed_walker, kneed_walker_start, pendulum
 
@@ -46,6 +47,14 @@ def test_of_a_ball_that_bounces():
     names = ["fall.displacement", "fall.displacement.rate", "gravity.y"]
     assert compared(model, start, mbd.HHT(0.05), names, dt=0.01, until=0.8).max() < 1e-9
     assert compared(model, start, mbd.HHT(0.05), names, dt=0.01, until="floor").max() < 1e-9
+
+
+@pytest.mark.parametrize("scheme", CONVERGED[:2], ids=repr)
+def test_of_a_closed_loop_in_long_steps(scheme):
+    """Corrections of positions are large there, in the metric of the tangent where each step is predicted."""
+    model, place = random_loop(2)
+    start = mbd.assemble(model, place, project=True)
+    assert compared(model, start, scheme, ["bar 1.mass", "hinge 1.angle"], dt=0.02, until=0.5).max() < 1e-8
 
 
 def test_of_a_bounce_in_closed_form():
