@@ -39,9 +39,10 @@ def draw(comparison: Comparison, group: str, title: str, path: Path) -> None:
         _panel(ax, [r for r in comparison.results if r.scene == name])
         ax.set_title(f"{name}: {SCENES[name].title}", fontsize=8)
     handles = {label: line for ax in axes.flat for line, label in zip(*ax.get_legend_handles_labels(), strict=True)}
-    figure.legend(handles.values(), handles.keys(), loc="lower center", ncols=5, fontsize=8, frameon=False)
+    columns = 5 if width > 1 else 3
+    figure.legend(handles.values(), handles.keys(), loc="lower center", ncols=columns, fontsize=8, frameon=False)
     figure.suptitle(title, fontsize=10)
-    figure.tight_layout(rect=(0.0, 0.06 if len(names) > 3 else 0.12, 1.0, 1.0))
+    figure.tight_layout(rect=(0.0, 0.06 if len(names) > 3 else 0.12 if width > 1 else 0.18, 1.0, 1.0))
     figure.savefig(path, dpi=90, metadata={"Software": None})
     plt.close(figure)
 
