@@ -83,7 +83,9 @@ if TYPE_CHECKING:
         TabulatedSpring as TabulatedSpring,
         TorsionSpring as TorsionSpring,
     )
+    from mbd.gait.branch import Branch as Branch, branch as branch
     from mbd.gait.cycle import LimitCycle as LimitCycle
+    from mbd.gait.find import GaitSearch as GaitSearch, find_gait as find_gait
     from mbd.gait.limit_cycle import limit_cycle as limit_cycle
     from mbd.integrators import (
         HHT as HHT,
@@ -170,7 +172,9 @@ _HOMES = {
     "mbd.errors": "AssemblyError CapabilityError GaitError MbdError MbdWarning MemoryLimitError ModelError "
     "SimulationError TraceError TrajectoryError UnknownNameError",
     "mbd.forces": "Applied DCMotor Damper Motor Potential Samples Spring TabulatedSpring TorsionSpring",
+    "mbd.gait.branch": "Branch branch",
     "mbd.gait.cycle": "LimitCycle",
+    "mbd.gait.find": "GaitSearch find_gait",
     "mbd.gait.limit_cycle": "limit_cycle",
     "mbd.integrators": "HHT GeneralizedAlpha Newmark RadauIIA RungeKutta853",
     "mbd.joints": "Cylindrical Planar Prismatic Revolute Screw Translation Universal Weld",

@@ -24,10 +24,11 @@ MODEL.connect(HINGE)
 START = mbd.assemble(MODEL, position={"hinge.angle": 0.3}, backend="python")
 ORIGIN, END, ANGLE = MODEL.ground.origin, UPPER.end, mbd.flexion(HINGE)
 
+KICK = {"pivot.angle.rate": 2.0}
 SWING = mbd.Model("swing")
 ROD = mbd.Link("rod", mass=1.0, length=1.0, center=0.5, inertia=0.1)
 SWING.connect(mbd.Revolute("pivot", SWING.ground.origin, ROD.start, loss=mbd.Viscous(0.1)))
-SWING.constrain(mbd.Event("below", mbd.measure(lambda a: a, "pivot.angle", unit="rad"), direction=1))
+SWING.constrain(mbd.Event("below", mbd.measure(lambda a: a, "pivot.angle", unit="rad"), direction=1, reset=KICK))
 
 EXAMPLES: dict[str, Any] = {
     "a": ORIGIN,
@@ -98,14 +99,23 @@ OWN: dict[tuple[str, str], Any] = {
     ("Tabulated", "torque"): (-1.0, 0.0, 1.0), ("TabulatedSpring", "torque"): (-1.0, 0.0, 1.0),
     ("rolling_touchdown", "center"): END,
     ("gait_report", "run"): walker(steps=5),
-    ("limit_cycle", "model"): SWING, ("limit_cycle", "start"): mbd.assemble(SWING, position={"pivot.angle": 0.3}),
-    ("limit_cycle", "section"): "below", ("limit_cycle", "on_failure"): "return", ("limit_cycle", "longest"): 3.0,
     ("fit", "data"): {"time": [0.1, 0.2], "hinge.angle": [0.3, 0.2]}, ("fit", "dt"): 0.1,
     ("fit", "parameters"): {"upper.length": 1.2},
     ("effects", "dt"): 0.1, ("segment", "name"): "thigh", ("simulate", "dt"): 0.1, ("sweep", "dt"): 0.1,
     ("sensitivities", "dt"): 0.1, ("sensitivities", "wrt"): ["hinge.angle"], ("sweep", "values"): {"upper.mass": [1.0]},
 }  # fmt: skip
 """Where a word means something else by it."""
+
+SWINGING = {"model": SWING, "section": "below", "longest": 3.0}
+RIGHT_GAITS = {
+    "limit_cycle": {**SWINGING, "start": mbd.assemble(SWING, position={"pivot.angle": 0.3}), "on_failure": "return"},
+    "find_gait": {**SWINGING, "position": {"pivot.angle": (0.2, 0.4)}, "velocity": {}, "closed": (), "tries": 2},
+}
+RIGHT_GAITS["branch"] = {
+    "gait": mbd.limit_cycle(**RIGHT_GAITS["limit_cycle"]), "parameter": "pivot loss.coefficient",
+    "to": 0.11, "steps": 2,
+}  # fmt: skip
+OWN |= {(word, name): value for word, values in RIGHT_GAITS.items() for name, value in values.items()}
 
 MEANT_OTHERWISE = {
     "Samples": ("periodic",),
@@ -121,10 +131,11 @@ RESULTS = {
     "PenaltyParameters", "Replay", "Sensitivities", "State", "StateSpace", "Sweep", "Trajectory",
 }  # fmt: skip
 """Values that are handed to users, who make none."""
+RESULTS |= {"Branch", "GaitSearch"}
 
 STUDIES = {"accuracy", "effects", "criteria", "fit"}
 """Words whose runs take seconds: what is no number at all is tried."""
-GAITS = {"limit_cycle"}
+GAITS = {"find_gait", "limit_cycle"}
 """Words that make so many runs that they take machine code."""
 
 NOTHING = [None, "", [], {}, object(), b"x", 1j, lambda: 0, mbd.PointMass, MODEL, np.array([1.0, math.nan])]

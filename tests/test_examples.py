@@ -24,8 +24,8 @@ from mbd.cli import Script, examples
 
 g = 9.81
 NAMES = (
-    "chapter-walker", "compass-gait", "double-pendulum", "four-bar", "kneed-walker", "lagrangian-double-pendulum",
-    "long-pendulum", "pendulum", "prosthetic-leg", "rimless-wheel", "shaken-block",
+    "chapter-walker", "compass-gait", "double-pendulum", "find-a-gait", "four-bar", "kneed-walker",
+    "lagrangian-double-pendulum", "long-pendulum", "pendulum", "prosthetic-leg", "rimless-wheel", "shaken-block",
     "simplest-walker-lagrangian", "slider-crank", "user-constraint", "user-integrator",
 )  # fmt: skip
 COARSE = ("long-pendulum", "user-integrator")
@@ -550,3 +550,12 @@ def test_the_users_integrator_keeps_its_promise_of_order() -> None:
     angles = [again("user-integrator", dt=dt, until=1.0)["pin.angle"][-1] for dt in (8e-3, 4e-3, 2e-3, 1e-3)]
     steps = np.abs(np.diff(angles))
     assert np.log2(steps[:-1] / steps[1:]) == pytest.approx(script("user-integrator")["integrator"].order(), abs=0.15)
+
+
+def test_the_gait_that_is_found_is_the_published_one_and_walks_on() -> None:
+    found, cycle = script("find-a-gait")["found"], script("find-a-gait")["gait"]
+    assert abs(cycle.period - 0.7343463911587195) < 1e-9
+    assert abs(cycle.largest_multiplier - 0.5799523324659684) < 1e-8 and cycle.stability == "stable"
+    assert len(found.tries) == 8 and abs(cycle.derivatives["period", "slope"] - 0.8153966595545352) < 1e-8
+    lengths = [step.length for step in gait(run_of("find-a-gait")).steps]
+    assert len(lengths) >= 9 and max(abs(length - 0.5354454154300102) for length in lengths) < 1e-9

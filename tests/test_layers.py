@@ -54,6 +54,7 @@ DOORS = {
     "analysis.gait_report.report": ("view",),
     "analysis.linearization": ("view",),
     "analysis.numerical": ("view",),
+    "gait.branch": ("view",),
     "gait.cycle": ("view",),
 }
 """Methods of the objects in users' hands that only call a later stage, and import it when they are called."""

@@ -125,11 +125,11 @@ def map_of(
 
 def _found(map_: ReturnMap, start: State, dt: float | None, tol: float) -> LimitCycle:
     """The gait, or what became of the search."""
-    begun = first_return(map_, start, tol)
+    begun = first_return(map_, start, map_.values)
     if isinstance(begun, Failed):
         return _none(map_, begun)
     section, state = begun
-    given, _ = with_step(Search(map_, section, tol), state, dt)
+    given, _ = with_step(Search(map_, section, tol), state, map_.values, dt)
     return search(given, state, map_.values)
 
 

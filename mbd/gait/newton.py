@@ -22,12 +22,12 @@ SHORTEST = 1.0 / 64.0
 """Least part of a Newton step that is tried [-]."""
 DECREASE = 0.25
 """Share of the decrease that the linear model promises which a step must reach [-]."""
-WALKS = 6
-"""Plain applications of the map where no part of a Newton step helps [-]."""
+WALKS, AGAIN = 6, 3
+"""Plain applications of the map where no part of a Newton step helps, and how often that is done [-]."""
 FLAT = 1e-9
 """Singular value of 1 − P relative to its largest below which a direction is left where it is [-]."""
-GAIN = 0.5
-"""Least factor by which an iteration near round-off must shrink the residual to go on [-]."""
+REST = 1e3
+"""Speed over `tol` below which what repeats itself is rest [-]."""
 
 
 @dataclass
@@ -56,12 +56,12 @@ def fixed_point(map_: ReturnMap, section: Section, start: State, values: Values,
     """The fixed point near a start on the section, ``c'(c) = c`` to `tol` in every coordinate.
 
     Steps d of ``(1 − P) d = c' − c`` are halved until the residual falls as promised; where none does, the walker walks
-    on for some steps, which leads towards an attractive gait, and Newton's method begins again, once.
+    on for some steps, which leads towards an attractive gait, and Newton's method begins again.
     """
     parameters = map_.vector(values)
     point = FixedPoint(Chart(section, start, parameters), Outcome("does not converge", ""), np.inf)
     found: Measured | Outcome | None = _measure(map_, point.chart, np.zeros(point.chart.size), values, point)
-    walked = False
+    walked = 0
     for _ in range(MOST):
         if not isinstance(found, Measured):
             assert found is not None
@@ -71,23 +71,33 @@ def fixed_point(map_: ReturnMap, section: Section, start: State, values: Values,
         point.residual = float(np.max(np.abs(gap), initial=0.0))
         point.residuals.append(point.residual)
         if point.residual <= tol:
-            point.outcome = Outcome("walks", "walks")
+            point.outcome = _rest(map_, point, tol) or Outcome("walks", "walks")
             return point
         step = _step(map_, point, gap, values)
         found = _damped(map_, point, step, gap, values) if step is not None else None
         if found is None and point.residual <= 100.0 * tol:
             break
         if found is None:
-            if walked:
+            walked += 1
+            if walked > AGAIN:
                 break
-            walked = True
             found = _walked(map_, point, values)
+    if resting := _rest(map_, point, tol):
+        point.outcome = resting
+        return point
     last = f"; beside it the walker {point.attempts[-1]}" if point.attempts else ""
     text = (
         f"no gait that repeats itself was found: {point.residual:.2g} is left after {len(point.residuals)} iterations"
     )
     point.outcome = Outcome("does not converge", text + last)
     return point
+
+
+def _rest(map_: ReturnMap, point: FixedPoint, tol: float) -> Outcome | None:
+    """That nothing moves any more, which repeats itself too."""
+    if float(np.max(np.abs(point.state.v), initial=0.0)) > REST * tol:
+        return None
+    return Outcome("rests", f"comes to rest at {map_.section!r}: nothing moves where it repeats itself")
 
 
 def _measure(map_: ReturnMap, chart: Chart, c: Vector, values: Values, point: FixedPoint) -> Measured | Outcome:

@@ -21,7 +21,7 @@ class Outcome:
     """How a walk went, in a word and in a sentence.
 
     kind : 'walks', 'arrives' (at the section), 'falls', 'scuffs', 'other event', 'misses' (the section is not reached),
-        'wrong contacts', 'not on the section', 'does not converge', 'numerical error'
+        'wrong contacts', 'rests', 'not on the section', 'does not converge', 'numerical error'
     text : 'falls backward at 0.41 s'
     time : when [s]
     """
@@ -42,7 +42,8 @@ class Outcome:
 def fall_of(run: Trajectory, stance: str) -> Outcome | None:
     """Whether a run is a fall, and to which side: of the highest point at first, beside the place of a stance foot.
 
-    It fell where a terminal event with 'fall' in its name ended it, or where it is less than half as high as at first.
+    It fell where a terminal event with 'fall' in its name ended it, or where it is less than half as high over that
+    foot as at first.
     Forward is where its highest point went first.
     """
     points = [name for body, frames in run.facts.segments for frame in frames for name in (f"{body}.{frame}", frame)]
@@ -54,18 +55,20 @@ def fall_of(run: Trajectory, stance: str) -> Outcome | None:
         return None if named is None else Outcome("falls", f"falls at {named.time:.3g} s", named.time)
     whole = np.stack([run[name] for name in points])
     height = whole @ (up / size)
-    low = np.flatnonzero(np.ptp(height, axis=0) < FALLEN * float(np.ptp(height[:, 0])))
+    top = int(np.argmax(height[:, 0]))
+    place = next((contact.place for contact in run.facts.contacts if contact.name == stance), "")
+    over = height[top] - run[place] @ (up / size) if place else np.ptp(height, axis=0)
+    low = np.flatnonzero(over < FALLEN * float(over[0]))
     if named is None and not len(low):
         return None
     row = named.row if named is not None else int(low[0])
     when = float(run.time[row])
-    side = _side(run, whole[int(np.argmax(height[:, 0]))], up / size, row, stance)
+    side = _side(run, whole[top], up / size, row, place)
     return Outcome("falls", f"falls {side} at {when:.3g} s".replace("  ", " "), when)
 
 
-def _side(run: Trajectory, top: Any, up: Vector, row: int, stance: str) -> str:
+def _side(run: Trajectory, top: Any, up: Vector, row: int, place: str) -> str:
     """'forward' or 'backward'; '' where the place of the stance foot is not known."""
-    place = next((contact.place for contact in run.facts.contacts if contact.name == stance), "")
     if not place:
         return ""
     ahead = _level(top[min(2, len(top) - 1)] - top[0], up)

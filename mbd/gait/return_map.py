@@ -177,7 +177,7 @@ class ReturnMap:
         if end.stopped_by != self.section:
             if end.stopped_by:
                 return Outcome("other event", f"ends by {end.stopped_by!r} at {end.time:.3g} s", end.time)
-            return Outcome("misses", f"{self.section!r} does not happen within {self.longest:g} s", end.time)
+            return Outcome("misses", f"{self.section!r} does not happen within {self.longest:.3g} s", end.time)
         if end.time <= AT_ONCE * self.longest:
             return Outcome("scuffs", f"scuffs at {end.time:.3g} s: {self.section!r} happens at once", end.time)
         if self._scuffs(start, end):

@@ -21,9 +21,11 @@ from mbd.state import State
 
 __all__ = ["Failed", "Search", "first_return", "gait_at", "search"]
 
-FIRST_STEPS, HALVINGS = 47.3, 10
+FIRST_STEPS, HALVINGS = 47.3, 7
 """Steps of the first return that is tried, no whole number lest its event fall on the end of a step, where light bodies
 blur its instant; and how often they are halved until their error is below `tol`."""
+LATE = 10.0
+"""Latest time of a return, over that of the first, beyond which the walk is over [-]."""
 NEAR = 1e-2
 """Distance [m, rad] within which the rows of the section hold a start that is taken as one on it."""
 RESOLVED = 0.1
@@ -47,25 +49,25 @@ class Failed:
     outcome: Outcome
 
 
-def first_return(map_: ReturnMap, start: State, tol: float) -> tuple[Section, State] | Failed:
+def first_return(map_: ReturnMap, start: State, values: Values) -> tuple[Section, State] | Failed:
     """The section, from where the first return arrives, and a state on it to begin with: the start, if it is one."""
-    arrival = map_(start, strides=1)
+    arrival = map_(start, values, strides=1)
     if not arrival.outcome.good:
-        return Failed(start, map_.explained(start, arrival.outcome))
-    parameters = map_.vector(map_.values)
+        return Failed(start, map_.explained(start, arrival.outcome, values))
+    parameters = map_.vector(values)
     name = map_.section if map_.mirror is None else map_.mirror.name(map_.section)
     before = arrival.before if map_.mirror is None else map_.mirror.names(arrival.before)
     section = section_of(map_.mechanism, map_.manager, name, arrival.state, before, parameters, map_.fixed)
     return section, on_section(section, start, parameters) or arrival.state
 
 
-def on_section(section: Section, start: State, parameters: Vector) -> State | None:
-    """The nearest state of the section, if the start is close to it."""
+def on_section(section: Section, start: State, parameters: Vector, near: float = NEAR) -> State | None:
+    """The nearest state of the section, if the start is as near."""
     same = start.mode.closed == section.mode.closed and len(start.anchors) == section.mechanism.layout.n_anchors
     if not same:
         return None
     h, _ = section.positions(start.q, parameters, start.anchors)
-    if not np.max(np.abs(h), initial=0.0) <= NEAR:
+    if not np.max(np.abs(h), initial=0.0) <= near:
         return None
     try:
         chart = Chart(section, start, parameters)
@@ -74,19 +76,23 @@ def on_section(section: Section, start: State, parameters: Vector) -> State | No
         return None
 
 
-def with_step(search: Search, start: State, dt: float | None) -> tuple[Search, float]:
+def with_step(search: Search, start: State, values: Values, dt: float | None) -> tuple[Search, float]:
     """The search with a step whose error is below `tol`, from the first return; and the error of its state."""
-    map_, parameters = search.map, search.map.vector(search.map.values)
+    map_, parameters = search.map, search.map.vector(values)
     chart = Chart(search.section, start, parameters)
     if dt is not None:
         return search, float("nan")
-    arrival = map_(start, strides=1)
+    arrival = map_(start, values, strides=1)
     step = arrival.period / FIRST_STEPS if arrival.outcome.good else map_.dt
+    if not arrival.outcome.good and arrival.outcome.kind != "numerical error":
+        return search, float("nan")
+    if arrival.outcome.good:
+        map_ = replace(map_, longest=min(map_.longest, LATE * arrival.period))
     before: Vector | None = None
     error = np.inf
     for _ in range(HALVINGS):
         map_ = map_.finer(step)
-        arrival = map_(start, strides=1)
+        arrival = map_(start, values, strides=1)
         now = np.append(chart.of(arrival.state), arrival.period) if arrival.outcome.good else None
         if now is not None and before is not None:
             error = float(np.max(np.abs(now - before)))

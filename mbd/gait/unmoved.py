@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from mbd.arrays import Vector
 from mbd.compile.mechanism import Mechanism
+from mbd.constraints.expressions import is_expression
 from mbd.equations import programs
+from mbd.equations.equations import Equations
 from mbd.tape.derivatives import jvps, live
 
 __all__ = ["depends_on_time", "moving_on"]
@@ -43,9 +45,28 @@ def _without_effect(mechanism: Mechanism) -> tuple[int, ...]:
     kept = outputs[:first] + outputs[first + rows : captured] + outputs[captured + layout.n_anchors :]
     kept += programs.guards(equations)
     places = equations.configuration.places
-    candidates = [k for k in range(layout.n_v) if places[k] >= 0]
+    set_by_events = _reset_names(equations)
+    names = [coordinate.name for coordinate in equations.coordinates]
+    candidates = [] if set_by_events is None else [
+        k for k in range(layout.n_v) if places[k] >= 0 and names[places[k]] not in set_by_events
+    ]  # fmt: skip
     changes = jvps(kept, [{equations.tape.input("x", k): 1.0} for k in candidates])
     return tuple(k for k, change in zip(candidates, changes, strict=True) if all(node.is_zero for node in change))
+
+
+def _reset_names(equations: Equations) -> set[str] | None:
+    """Names that resets of events set or read; None where functions may read any."""
+    found: set[str] = set()
+    for guard in equations.guards:
+        if guard.reset is None:
+            continue
+        if not isinstance(guard.reset, Mapping):
+            return None
+        for name, value in guard.reset.items():
+            if callable(value) and not is_expression(value):
+                return None
+            found |= {name, *(map(str, value.free_symbols) if is_expression(value) else ())}
+    return found
 
 
 def _follows(mechanism: Mechanism, parameters: Vector, k: int) -> bool:

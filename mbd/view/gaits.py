@@ -15,10 +15,19 @@ from mbd.view.plots import drawing
 from mbd.view.style import CYCLE, INK, NEUTRAL, as_label, tone
 
 if TYPE_CHECKING:
+    from mbd.gait.branch import Branch
     from mbd.gait.cycle import LimitCycle
 
-__all__ = ["cycle"]
+__all__ = ["branch", "cycle"]
 
+MARKS = {"fold": "s", "doubling": "o", "torus": "^", "branch point": "D"}
+"""How special points of branches are marked."""
+UNITS = {"period": "s", "distance": "m", "speed": "m/s"}
+AT_POINT = {
+    "period": lambda point: point.period, "distance": lambda point: point.distance, "speed": lambda point: point.speed,
+    "largest multiplier": lambda point: point.multipliers.largest,
+}  # fmt: skip
+"""Quantities of a branch at one of its points."""
 MOST = 6
 """Angles that the phase plane shows."""
 
@@ -64,3 +73,24 @@ def _multipliers(axes: Any, gait: LimitCycle) -> None:
     axes.set_xlabel("real part")
     axes.set_ylabel("imaginary part")
     axes.set_title(f"multipliers: {gait.stability}", color=tone(INK))
+
+
+def branch(found: Branch, quantity: str, path: str | Path | None = None) -> Any:
+    """A quantity over the parameter: stable gaits solid, unstable ones dashed, special points marked by kind."""
+    values, heights, stable = found[found.parameter], found[quantity], found["stable"]
+    with drawing(path, 6.4, 4.0) as figure:
+        axes = figure.subplots()
+        shade = tone(CYCLE[0])
+        for first, last in pairwise(range(len(found))):
+            solid = stable[first] and stable[last]
+            axes.plot(values[[first, last]], heights[[first, last]], "-" if solid else "--", color=shade)
+        for number, kind in enumerate(dict.fromkeys(point.kind for point in found.special), start=1):
+            points = [point for point in found.special if point.kind == kind]
+            place = [point.value for point in points]
+            height = [np.nan if quantity not in AT_POINT else AT_POINT[quantity](point.point) for point in points]
+            axes.plot(place, height, MARKS.get(kind, "o"), color=tone(CYCLE[number]), label=kind, markersize=6)
+        axes.set_xlabel(as_label(found.parameter))
+        axes.set_ylabel(as_label(quantity if quantity not in UNITS else f"{quantity} [{UNITS[quantity]}]"))
+        if found.special:
+            axes.legend()
+    return figure

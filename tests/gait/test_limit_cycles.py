@@ -15,6 +15,7 @@ import pytest
 import mbd
 from mbd.compile.mechanisms import mechanism_of
 from mbd.gait.mirror import mirror_of
+from mbd.sensitivity.derivative import final_state_derivative
 from tests.cases.walkers import compass, kneed, standing
 from tests.gait.walkers import simplest, simplest_start, slope_of, two_sided
 from tests.problems import case
@@ -158,6 +159,15 @@ def test_multipliers_do_not_depend_on_an_event_within_the_step_at_which_the_sect
     assert spread(gait.multipliers, between.multipliers) < MULTIPLIERS
 
 
+def test_differences_of_runs_agree_with_the_exact_derivative_of_one():
+    gait = symmetric("f2-compass-gait-3deg")
+    exact, instant = final_state_derivative(gait.run, [*gait.state.names, *gait.state.velocity_names])
+    mirror, basis = gait.map.mirror, gait.chart.basis
+    P = basis.T @ exact[np.concatenate([mirror.q, len(mirror.q) + mirror.v])] @ basis
+    assert np.max(np.abs(P - gait.map_derivative.matrix[: gait.chart.size])) < 1e-9
+    assert np.max(np.abs(instant @ basis - gait.map_derivative.matrix[gait.chart.size])) < 1e-10
+
+
 def test_a_walk_that_begins_further_on_goes_on_further_on():
     gait = symmetric("f2-compass-gait-3deg")
     q, anchors = gait.state.q.copy(), gait.state.anchors.copy()
@@ -195,6 +205,23 @@ def test_a_scuff_is_named():
     assert not gait.success and gait.outcome.kind in ("scuffs", "falls")
 
 
+def test_a_search_finds_both_gaits_and_says_how_each_try_went():
+    model, _ = simplest()
+    found = mbd.find_gait(
+        model, {"theta": (0.15, 0.25), "phi": (0.3, 0.5)}, {"theta": (-0.25, -0.15), "phi": 0.0}, closed=(),
+        section="heel strike", tries=8, longest=8.0,
+    )  # fmt: skip
+    assert len(found.gaits) == 2 and found.gait.stability == "stable"
+    assert abs(found.gait.period - case("f1-simplest-walker-long")["step period"].value) < 1e-7
+    assert abs(found.gaits[1].period - case("f1b-simplest-walker-short")["step period"].value) < 1e-7
+    assert len(found.tries) == 8 == sum(found.outcomes().values())
+    assert {each.gait for each in found.tries} == {-1, 0, 1}
+    assert "2 gaits in 8 tries" in repr(found) and "theta.rate" in found._repr_html_()
+    none = mbd.find_gait(model, {"theta": 0.3, "phi": 0.1}, {}, closed=(), section="heel strike", tries=1, longest=2.0)
+    with pytest.raises(mbd.GaitError, match="no gait in 1 tries: 1 × 'heel strike' does not happen within 2 s"):
+        _ = none.gait
+
+
 def test_energy_that_nothing_takes_is_a_multiplier_of_its_own():
     arm = mbd.Model("pendulum")
     rod = mbd.Link("rod", mass=1.0, length=1.0, center=0.6, inertia=0.05)
@@ -202,6 +229,15 @@ def test_energy_that_nothing_takes_is_a_multiplier_of_its_own():
     arm.constrain(mbd.Event("below", mbd.measure(lambda a: a, "hinge.angle", unit="rad"), direction=1))
     gait = mbd.limit_cycle(arm, mbd.assemble(arm, {"hinge.angle": 0.5}), section="below")
     assert gait.success and not len(gait.multipliers) and abs(gait.trivial["energy"][0] - 1.0) < 1e-8
+
+
+def test_a_motion_that_dies_out_is_no_gait():
+    arm = mbd.Model("pendulum")
+    rod = mbd.Link("rod", mass=1.0, length=1.0, center=0.6, inertia=0.05)
+    arm.connect(mbd.Revolute("hinge", arm.ground.origin, rod.start, loss=mbd.Viscous(0.1)))
+    arm.constrain(mbd.Event("below", mbd.measure(lambda a: a, "hinge.angle", unit="rad"), direction=1))
+    with pytest.raises(mbd.GaitError, match="pendulum: comes to rest at 'below'"):
+        mbd.limit_cycle(arm, mbd.assemble(arm, {"hinge.angle": 0.5}), section="below")
 
 
 def test_wrong_arguments_are_named():

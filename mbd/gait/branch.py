@@ -1,0 +1,260 @@
+"""Follow a gait as a parameter changes: stability along it, folds, doublings, where it ends and why."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from mbd.arrays import Vector
+from mbd.bodies.values import is_finite_number, shown
+from mbd.errors import MbdError, ModelError, UnknownNameError, nearest
+from mbd.gait.continuation import QUICK, BranchPoint, Continuation, Corrected
+from mbd.gait.cycle import LimitCycle
+from mbd.gait.derivatives import parameter_value
+from mbd.gait.map_derivative import Measured, map_derivative, measured
+from mbd.gait.special_points import KINDS, SpecialPoint, special_points
+from mbd.gait.switching import doubled
+from mbd.notebook import table
+
+__all__ = ["Branch", "branch"]
+
+FIRST, LARGEST, SMALLEST = 0.02, 0.1, 1e-6
+"""First, largest and least distance of two points in (c, p/σ) [-]."""
+GROWTH = 1.5
+"""Factor of the distance where corrections were few [-]."""
+TURN = 0.3
+"""Largest angle between the tangents of two points [rad]."""
+WITHOUT_EFFECT = 1e-13
+"""Derivative of the map by a parameter over its range below which it changes nothing [-]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Branch:
+    """Gaits along a parameter.
+
+    parameter : its name; curve : points in order; special : folds, doublings, tori and branch points, located
+    stopped : why it ends where it does
+    """
+
+    name: str
+    parameter: str
+    curve: tuple[BranchPoint, ...]
+    special: tuple[SpecialPoint, ...]
+    stopped: str
+    start: LimitCycle = field(repr=False)
+    given: Continuation = field(repr=False)
+
+    def __len__(self) -> int:
+        return len(self.curve)
+
+    def __getitem__(self, title: str) -> Vector:
+        """A column of `columns` as an array."""
+        columns = self.columns
+        if title not in columns:
+            raise UnknownNameError(nearest(title, columns, "column", "The branch has"))
+        return np.array(columns[title])
+
+    @property
+    def columns(self) -> dict[str, list[Any]]:
+        """Parameter, period, speed, largest multiplier and stability of every point, by title."""
+        return {
+            self.parameter: [point.value for point in self.curve],
+            "period": [point.period for point in self.curve],
+            "distance": [point.distance for point in self.curve],
+            "speed": [point.speed for point in self.curve],
+            "largest multiplier": [point.multipliers.largest for point in self.curve],
+            "stable": [point.stable for point in self.curve],
+        }
+
+    def points(self, *kinds: str) -> tuple[SpecialPoint, ...]:
+        """The special points of these kinds: 'fold', 'doubling', 'torus', 'branch point'; without names all."""
+        wrong = [nearest(kind, KINDS, "kind of point", "There are") for kind in kinds if kind not in KINDS]
+        if wrong:
+            raise UnknownNameError(wrong)
+        return tuple(point for point in self.special if not kinds or point.kind in kinds)
+
+    def gait(self, value: float) -> LimitCycle:
+        """The gait at a value of the parameter, from the nearest point of the branch.
+
+        Raises
+        ------
+        GaitError
+            where there is none near.
+        """
+        near = min(self.curve, key=lambda point: abs(point.value - value))
+        return self._at(near).at({self.parameter: value})
+
+    def switch(self, point: SpecialPoint) -> LimitCycle:
+        """The gait of twice the period beside a doubling, from which `mbd.branch` goes on.
+
+        Raises
+        ------
+        ModelError
+            for a point of another kind.
+        GaitError
+            where none is found.
+        """
+        if not isinstance(point, SpecialPoint) or point.kind != "doubling":
+            raise ModelError(
+                f"point must be a doubling of this branch, such as branch.points('doubling')[0], not {shown(point)}"
+            )
+        return doubled(self.given, point, self._at(point.point))
+
+    def _at(self, point: BranchPoint) -> LimitCycle:
+        """A gait of the branch to go on from."""
+        values = self.given.with_value(point.value)
+        return replace(self.start, state=point.state, chart=point.chart, parameters=values)
+
+    def to_dataframe(self) -> Any:
+        """A pandas table with a line for each point."""
+        from mbd.results.tables import library
+
+        return library("pandas", "data", "Branch.to_dataframe()").DataFrame(self.columns)
+
+    def __repr__(self) -> str:
+        return "\n".join(self._lines())
+
+    def _lines(self) -> Iterator[str]:
+        first, last = self.curve[0].value, self.curve[-1].value
+        yield f"{self.name}: {len(self)} gaits, {self.parameter} from {first:.6g} to {last:.6g}; {self.stopped}"
+        yield from (f"  {point!r}" for point in self.special)
+
+    def _repr_html_(self) -> str:
+        columns = self.columns
+        rows = [[f"{value:.6g}" if isinstance(value, float) else str(value) for value in line]
+                for line in zip(*columns.values(), strict=True)]  # fmt: skip
+        notes = "; ".join([self.stopped, *map(repr, self.special)])
+        return table(f"gaits of {self.name}", list(columns), rows, notes)
+
+    def plot(self, path: Any = None, quantity: str = "speed") -> Any:
+        """A quantity of `columns` over the parameter: stable gaits solid, others dashed, special points marked."""
+        from mbd.view.gaits import branch as drawn
+
+        return drawn(self, quantity, path)
+
+
+def branch(gait: LimitCycle, parameter: str, to: float, *, steps: int = 200, step: float | None = None) -> Branch:
+    """The gaits that a gait becomes as a parameter changes.
+
+    Pseudo-arclength continuation goes around folds. Where a test function of a fold, a doubling, a torus (Neimark &
+    Sacker) or a branch point changes sign, the point is located. The branch ends at `to`; where the walk falls, scuffs
+    or loses an event, which its `stopped` says; or after so many points.
+
+    Parameters
+    ----------
+    gait : from `mbd.limit_cycle`, `mbd.find_gait` or `Branch.switch`
+    parameter : its name, or that of a function of parameters that the gait was found with
+    to : value at which the branch ends
+    steps : points at most
+    step : first distance of two points, with the parameter over the range to go and coordinates in SI units [-]
+
+    Returns
+    -------
+    Branch
+
+    Raises
+    ------
+    ModelError, UnknownNameError
+        for arguments that cannot be meant: no gait, a parameter that is none or that changes nothing.
+    """
+    given, first = _begun(gait, parameter, to, steps, step)
+    toward = np.sign(to - first.value)
+    if first.tangent[-1] * toward < 0.0:
+        first = _turned(first)
+    curve, special, stopped = [first], list[SpecialPoint](), ""
+    ds = FIRST if step is None else float(step)
+    while len(curve) < steps:
+        last = curve[-1]
+        made = _next(given, last, ds)
+        if isinstance(made, str):
+            stopped = made
+            break
+        new, taken, quick = made
+        beyond = (new.value - to) * toward >= 0.0
+        between = special_points(given, last, new, taken)
+        special += [point for point in between if not (point.value - to) * toward > 0.0]
+        if beyond:
+            curve += _last(given, last, new, taken, to)
+            stopped = f"reached {parameter} = {to:g}"
+            break
+        curve.append(new)
+        ds = min(taken * (GROWTH if quick else 1.0), LARGEST)
+    stopped = stopped or f"ended after {len(curve)} points"
+    return Branch(gait.name, parameter, tuple(curve), tuple(special), stopped, gait, given)
+
+
+def _begun(gait: Any, parameter: Any, to: Any, steps: Any, step: Any) -> tuple[Continuation, BranchPoint]:
+    """What the branch shares, and its first point; every fault of the arguments."""
+    if not isinstance(gait, LimitCycle) or not gait.success:
+        raise ModelError(f"gait must be one that mbd.limit_cycle has found, not {shown(gait)}")
+    faults = [] if isinstance(parameter, str) else [f"parameter must be a name, not {shown(parameter)}"]
+    faults += [] if is_finite_number(to) else [f"to must be a finite number, not {shown(to)}"]
+    if isinstance(steps, bool) or not isinstance(steps, int) or steps < 2:
+        faults.append(f"steps must be a whole number from 2 on, not {shown(steps)}")
+    if step is not None and not (is_finite_number(step) and SMALLEST <= step <= 1.0):
+        faults.append(f"step must be a number from {SMALLEST:g} to 1, not {shown(step)}")
+    if faults:
+        raise ModelError(faults)
+    value = parameter_value(gait, parameter)
+    if to == value:
+        raise ModelError(f"to={to!r} is the value of {parameter!r} at which the gait was found; give another")
+    width = abs(float(to) - value)
+    given = Continuation(gait.map, gait.chart.section, parameter, gait.parameters, width, gait.given.tol)
+    found = measured(gait.map, gait.chart, np.zeros(gait.chart.size), given.with_value(value))
+    assert isinstance(found, Measured)
+    first = given.point(Corrected(gait.state, value, found, 0), None)
+    zero = np.zeros(gait.chart.size)
+    by = map_derivative(gait.map, gait.chart, zero, given.with_value(value), [parameter], fine=False, state=False)
+    if not by.missing and np.nanmax(np.abs(width * by.matrix), initial=0.0) <= WITHOUT_EFFECT:
+        raise ModelError(f"parameter: {parameter!r} changes nothing of this gait")
+    return given, first
+
+
+def _turned(point: BranchPoint) -> BranchPoint:
+    return replace(point, tangent=-point.tangent)
+
+
+def _next(given: Continuation, last: BranchPoint, ds: float) -> tuple[BranchPoint, float, bool] | str:
+    """The next point, its distance, and whether it came quickly; why there is none."""
+    why = ""
+    while ds >= SMALLEST:
+        corrected = given.corrected(last, last.tangent, ds)
+        if isinstance(corrected, Corrected):
+            try:
+                new = given.point(corrected, given.whole(last))
+            except MbdError as error:
+                why = str(error)
+                ds *= 0.5
+                continue
+            cosine = float(given.lifted(given.whole(last), new.chart) @ new.tangent)
+            if cosine >= np.cos(TURN):
+                return new, ds, corrected.corrections <= QUICK
+            why = "it turns too sharply"
+        else:
+            why = str(corrected)
+        ds *= 0.5
+    value = last.value
+    return f"ends at {given.name} = {value:.9g}: beyond it {_beyond(why)}"
+
+
+def _beyond(why: str) -> str:
+    """A reason behind 'beyond it the walker'."""
+    return f"the walker {why}" if why.split(" ")[0] in ("falls", "scuffs", "ends", "comes") else why
+
+
+def _last(given: Continuation, last: BranchPoint, new: BranchPoint, ds: float, to: float) -> Sequence[BranchPoint]:
+    """The point at which the parameter has its last value."""
+    plane = np.zeros(len(last.tangent))
+    plane[-1] = 1.0
+    share = (to - last.value) / given.width
+    guess = ds * last.tangent * (to - last.value) / (new.value - last.value or 1.0)
+    corrected = given.corrected(last, plane, share, guess)
+    if not isinstance(corrected, Corrected):
+        return [new]
+    try:
+        return [given.point(corrected, given.whole(last))]
+    except MbdError:
+        return [new]

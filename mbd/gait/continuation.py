@@ -1,0 +1,181 @@
+"""Pseudo-arclength continuation of fixed points of a return map in one parameter.
+
+With u = (c, p/σ), σ the width of the range of p, a branch solves ``G(u) = F(c, p) − c = 0``. From a point with tangent
+τ, ``[P − 1, σ F_p] τ = 0``, the next one solves G = 0 on the plane ``τᵀ u = ds`` by Newton's method with the matrix of
+the last point, made again where that converges slowly (Keller 1977; Allgower & Georg 1990, ch. 6). Coordinates c are
+those of the chart around the last point.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbd.arrays import Matrix, Vector
+from mbd.errors import GaitError, SimulationError
+from mbd.gait.floquet import Multipliers, multipliers_of
+from mbd.gait.map_derivative import MapDerivative, Measured, map_derivative, measured
+from mbd.gait.outcome import Outcome
+from mbd.gait.return_map import Arrival, ReturnMap
+from mbd.gait.section import Chart, Section
+from mbd.state import State
+
+__all__ = ["QUICK", "BranchPoint", "Continuation", "Corrected"]
+
+CORRECTIONS, QUICK = 10, 4
+"""Newton corrections of a point, and how many count as few."""
+SLOW = 0.2
+"""Factor by which a correction must shrink the residual, else its matrix is made again [-]."""
+
+
+@dataclass(frozen=True, eq=False)
+class BranchPoint:
+    """A gait on a branch.
+
+    value : of the parameter; state, period [s], distance [m], steps : see `LimitCycle`
+    multipliers : see `mbd.gait.floquet`; tangent (size + 1,): of (c, p/σ) in the chart, of length 1
+    matrix (size, size + 1): [P − 1, σ F_p]; events : the sequence of (name, kind) in one application
+    """
+
+    value: float
+    state: State
+    period: float
+    distance: float
+    steps: tuple[tuple[str, float, float], ...]
+    multipliers: Multipliers
+    tangent: Vector
+    matrix: Matrix
+    chart: Chart
+    events: tuple[tuple[str, str], ...]
+
+    @property
+    def speed(self) -> float:
+        """distance/period [m/s]."""
+        return self.distance / self.period
+
+    @property
+    def stable(self) -> bool:
+        """Whether the largest modulus is below 1."""
+        return self.multipliers.stability == "stable"
+
+
+@dataclass(frozen=True, eq=False)
+class Corrected:
+    """A solution near a prediction: the state, the parameter, what the map gave there, corrections that it took."""
+
+    state: State
+    value: float
+    found: Measured
+    corrections: int
+
+
+@dataclass(eq=False)
+class Continuation:
+    """What all points of a branch share. width : σ; tol : of the coordinates"""
+
+    map: ReturnMap
+    section: Section
+    name: str
+    values: Mapping[str, float]
+    width: float
+    tol: float
+
+    def with_value(self, value: float) -> dict[str, float]:
+        """The parameters with another value of the one that varies."""
+        return {**self.values, self.name: float(value)}
+
+    def point(self, corrected: Corrected, before: Vector | None) -> BranchPoint:
+        """The point of a solution; its tangent goes on in the direction of the one `before`.
+
+        Raises
+        ------
+        GaitError
+            where derivatives are missing.
+        """
+        values = self.with_value(corrected.value)
+        chart = Chart(self.section, corrected.state, self.map.vector(values))
+        zero = np.zeros(chart.size)
+        derivative = map_derivative(self.map, chart, zero, values, [self.name])
+        if derivative.missing:
+            why = next(iter(derivative.missing.values()))
+            raise GaitError(f"no derivative at {self.name} = {corrected.value:.9g}: {why}")
+        matrix = self._matrix(derivative, chart.size)
+        tangent = _null_vector(matrix)
+        if before is not None:
+            lifted = self.lifted(before, chart)
+            tangent = tangent if float(tangent @ lifted) >= 0.0 else -tangent
+        size, arrival = chart.size, corrected.found.arrival
+        return BranchPoint(
+            corrected.value, corrected.state, arrival.period, way_of(arrival), arrival.steps,
+            multipliers_of(derivative.matrix[:size, :size], derivative.error[:size, :size]), tangent, matrix, chart,
+            tuple((event.name, event.kind) for event in arrival.events),
+        )  # fmt: skip
+
+    def whole(self, point: BranchPoint) -> Vector:
+        """The tangent in the coordinates of the mechanism, for the chart of another point."""
+        return np.append(point.chart.basis @ point.tangent[:-1], point.tangent[-1])
+
+    def lifted(self, whole: Vector, chart: Chart) -> Vector:
+        """A tangent in the coordinates of the mechanism in those of a chart."""
+        return np.append(chart.basis.T @ whole[:-1], whole[-1])
+
+    def _matrix(self, derivative: MapDerivative, size: int) -> Matrix:
+        P = derivative.matrix[:size]
+        return np.column_stack([P[:, :size] - np.eye(size), self.width * P[:, size]])
+
+    def corrected(
+        self, point: BranchPoint, plane: Vector, ds: float, guess: Vector | None = None
+    ) -> Corrected | Outcome:
+        """The solution with planeᵀ u = ds near `guess`, by default ds plane; why there is none.
+
+        u = (c, (p − p₀)/σ) in the chart of the point.
+        """
+        chart, size = point.chart, point.chart.size
+        u = ds * plane if guess is None else guess.copy()
+        matrix, before = point.matrix, np.inf
+        for number in range(CORRECTIONS):
+            value = point.value + self.width * float(u[-1])
+            values = self.with_value(value)
+            try:
+                found = measured(self.map, chart, u[:size], values)
+            except SimulationError as error:
+                return Outcome("not on the section", str(error))
+            if isinstance(found, Arrival):
+                outcome = self.map.against(self.section, found)
+                return self.map.explained(chart.at(u[:size], self.map.vector(values)), outcome, values)
+            gap = np.append(found.c - u[:size], float(plane @ u) - ds)
+            residual = float(np.max(np.abs(gap)))
+            if residual <= self.tol:
+                return Corrected(chart.at(u[:size], self.map.vector(values)), value, found, number)
+            if residual > SLOW * before:
+                renewed = self.matrix_at(chart, u, values)
+                if renewed is None or residual > 4.0 * before:
+                    break
+                matrix = renewed
+            before = min(residual, before)
+            u = u - np.linalg.lstsq(np.vstack([matrix, plane]), gap, rcond=None)[0]
+        return Outcome("does not converge", "the corrections do not converge")
+
+    def matrix_at(self, chart: Chart, u: Vector, values: Mapping[str, float]) -> Matrix | None:
+        """[P − 1, σ F_p] beside a point; None where derivatives are missing."""
+        try:
+            derivative = map_derivative(self.map, chart, u[:-1], values, [self.name], fine=False)
+        except SimulationError:
+            return None
+        return None if derivative.missing else self._matrix(derivative, chart.size)
+
+
+def way_of(arrival: Arrival) -> float:
+    """The way of one application [m]; the sum of its steps where no coordinate tells it, NaN without steps."""
+    if len(arrival.travel):
+        return float(np.linalg.norm(arrival.travel))
+    lengths = [length for _, _, length in arrival.steps]
+    return float(np.sum(lengths)) if lengths else float("nan")
+
+
+def _null_vector(matrix: Matrix) -> NDArray[np.float64]:
+    """The direction in which the matrix vanishes, of length 1."""
+    return np.asarray(np.linalg.svd(matrix)[2][-1], dtype=float)

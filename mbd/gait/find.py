@@ -1,0 +1,288 @@
+"""Look for gaits from many starts, and say how each went."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+
+from mbd.arrays import Matrix
+from mbd.assembly.assemble import assemble
+from mbd.bodies.values import among, is_finite_number, shown
+from mbd.errors import AssemblyError, GaitError, MbdError, ModelError, UnknownNameError
+from mbd.gait.arguments import Functions, check_arguments
+from mbd.gait.cycle import LimitCycle
+from mbd.gait.limit_cycle import FIRST, map_of
+from mbd.gait.outcome import Outcome
+from mbd.gait.return_map import ReturnMap
+from mbd.gait.search import Failed, Search, first_return, on_section, search, with_step
+from mbd.integrators import Integrator, RungeKutta853
+from mbd.notebook import table
+from mbd.state import State
+
+__all__ = ["GaitSearch", "Try", "find_gait"]
+
+SAME = 1e-6
+"""Difference of states and periods up to which two gaits are one [m, rad, s]."""
+FAR = 1.0
+"""Distance [m, rad] over which a start is moved onto the section."""
+MOST_TRIES = 1_000_000
+"""Tries of one search at most."""
+
+
+@dataclass(frozen=True, eq=False)
+class Try:
+    """One start: the values that were drawn, what became of it, and the number of its gait (−1: none)."""
+
+    values: Mapping[str, float]
+    outcome: Outcome
+    gait: int = -1
+
+
+@dataclass(frozen=True, eq=False)
+class GaitSearch:
+    """What a search found.
+
+    gaits : different ones, stable ones first, then by falling speed; tries : every start with its outcome
+    """
+
+    name: str
+    gaits: tuple[LimitCycle, ...]
+    tries: tuple[Try, ...]
+
+    @property
+    def gait(self) -> LimitCycle:
+        """The first of `gaits`.
+
+        Raises
+        ------
+        GaitError
+            if there is none, with what the tries came to.
+        """
+        if not self.gaits:
+            raise GaitError(f"{self.name}: no gait in {len(self.tries)} tries: {self._counts()}", self)
+        return self.gaits[0]
+
+    def outcomes(self) -> dict[str, int]:
+        """How many tries came to what, the most frequent first."""
+        kinds = Counter(each.outcome.text.partition(" at ")[0].partition(":")[0] for each in self.tries)
+        return dict(kinds.most_common())
+
+    def _counts(self) -> str:
+        return ", ".join(f"{count} × {text}" for text, count in self.outcomes().items())
+
+    def __repr__(self) -> str:
+        return "\n".join(self._lines())
+
+    def _lines(self) -> Iterator[str]:
+        yield f"{self.name}: {len(self.gaits)} gaits in {len(self.tries)} tries: {self._counts()}"
+        for number, gait in enumerate(self.gaits):
+            reached = sum(each.gait == number for each in self.tries)
+            yield f"  {gait!r}, from {reached} tries"
+
+    def _repr_html_(self) -> str:
+        names = list(self.tries[0].values) if self.tries else []
+        rows = [
+            [str(k + 1), *(f"{each.values[name]:.4g}" for name in names), str(each.outcome)]
+            for k, each in enumerate(self.tries)
+        ]
+        return table(f"tries of {self.name}", ("try", *names, "outcome"), rows, self._counts())
+
+
+@dataclass(eq=False)
+class _Hunt:
+    """The state of a search: its map and section as soon as one try has found a gait."""
+
+    map: ReturnMap
+    tol: float
+    dt: float | None
+    found: list[LimitCycle] = field(default_factory=list)
+    given: Search | None = None
+
+    def one(self, start: State, values: Mapping[str, float]) -> tuple[Outcome, int]:
+        """What becomes of a start; the number of its gait."""
+        all_values = {**self.map.values, **values}
+        given, state = self.given, None
+        if given is not None:
+            state = on_section(given.section, start, self.map.vector(all_values), FAR)
+        if state is None:
+            begun = first_return(self.map, start, all_values)
+            if isinstance(begun, Failed):
+                return begun.outcome, -1
+            state = begun[1]
+            if given is None:
+                given, _ = with_step(Search(self.map, begun[0], self.tol), state, all_values, self.dt)
+        assert given is not None
+        gait = search(given, state, all_values)
+        if not gait.success:
+            return gait.outcome, -1
+        self.given = given
+        return gait.outcome, self._known(gait)
+
+    def _known(self, gait: LimitCycle) -> int:
+        """The number of a gait, which is new where no other is the same."""
+        for number, other in enumerate(self.found):
+            ahead = other.chart.of(gait.state)
+            same = abs(other.period - gait.period) <= SAME and np.max(np.abs(ahead), initial=0.0) <= SAME
+            if same and other.parameters == gait.parameters:
+                return number
+        self.found.append(gait)
+        return len(self.found) - 1
+
+
+def find_gait(
+    model: Any,
+    position: Mapping[str, Any],
+    velocity: Mapping[str, Any],
+    integrator: Integrator | None = None,
+    *,
+    closed: Iterable[str],
+    open: Iterable[str] = (),
+    section: str,
+    mirror: tuple[str, str] | None = None,
+    strides: int = 1,
+    tries: int = 64,
+    design: Literal["sobol", "latin hypercube"] = "sobol",
+    seed: int = 0,
+    dt: float | None = None,
+    tol: float = 1e-10,
+    parameters: Mapping[str, Any] | None = None,
+    functions: Functions | None = None,
+    modulo: Iterable[str] | None = None,
+    longest: float = 30.0,
+    backend: str = "auto",
+) -> GaitSearch:
+    """Gaits from a design of starts; how each try went is kept by name.
+
+    Parameters
+    ----------
+    model : a `Model` or `Lagrangian`
+    position, velocity : of the starts, as for `mbd.assemble`; a pair (low, high) in the place of a value is varied
+    integrator, section, mirror, strides, dt, tol, functions, modulo, longest, backend : as for `mbd.limit_cycle`
+    closed, open : contacts that start closed, and open, as for `mbd.assemble`
+    tries : how many starts
+    design : 'sobol' or 'latin hypercube' (`scipy.stats.qmc`), with `seed`
+    parameters : values by name, pairs of which are varied too; then gaits differ in them
+
+    Returns
+    -------
+    GaitSearch
+        whose `gait` is the first stable one; no try is lost, whatever came of it.
+
+    Raises
+    ------
+    ModelError, UnknownNameError
+        for arguments that cannot be meant, before the first run.
+    """
+    scheme = RungeKutta853() if integrator is None else integrator
+    groups = {"position": position, "velocity": velocity, "parameters": {} if parameters is None else parameters}
+    fixed, ranges = _varied(groups, tries, design, seed)
+    points = _points(len(ranges), tries, design, seed)
+    draws = [_drawn(fixed, ranges, point) for point in points]
+    starts = [_assembled(model, draw, closed, open, backend) for draw in draws]
+    first = next((start for start in starts if isinstance(start, State)), None)
+    names = [_title(group, name) for group, name, _ in ranges]
+    if first is None:
+        lost = tuple(Try(_values(draw, names), start) for draw, start in zip(draws, starts, strict=True)
+                     if isinstance(start, Outcome))  # fmt: skip
+        return GaitSearch(getattr(model, "name", ""), (), lost)
+    given = {**draws[0]["parameters"]}
+    check_arguments(first, scheme, strides, {"dt": dt, "tol": tol, "longest": longest}, given, functions, (), "return")
+    map_ = map_of(model, first, scheme, dt or FIRST, (section, mirror, strides), given, functions, modulo, longest,
+                  backend)  # fmt: skip
+    hunt = _Hunt(map_, tol, dt)
+    tried = [_tried(hunt, draw, start, names) for draw, start in zip(draws, starts, strict=True)]
+    order = sorted(range(len(hunt.found)), key=lambda k: _rank(hunt.found[k]))
+    place = {old: new for new, old in enumerate(order)} | {-1: -1}
+    return GaitSearch(
+        getattr(model, "name", ""), tuple(hunt.found[k] for k in order),
+        tuple(Try(each.values, each.outcome, place[each.gait]) for each in tried),
+    )  # fmt: skip
+
+
+def _tried(hunt: _Hunt, draw: Mapping[str, Mapping[str, float]], start: State | Outcome, names: Sequence[str]) -> Try:
+    """One try; what goes wrong in it is its outcome."""
+    values = _values(draw, names)
+    if isinstance(start, Outcome):
+        return Try(values, start)
+    try:
+        outcome, number = hunt.one(start, draw["parameters"])
+    except (MbdError, ArithmeticError, np.linalg.LinAlgError) as error:
+        return Try(values, Outcome("numerical error", f"numerical error: {error}"))
+    return Try(values, outcome, number)
+
+
+def _rank(gait: LimitCycle) -> tuple[bool, float]:
+    """Stable gaits first, fast ones first."""
+    return gait.stability != "stable", -gait.speed if np.isfinite(gait.speed) else gait.period
+
+
+def _varied(groups: Mapping[str, Any], tries: Any, design: Any, seed: Any) -> tuple[dict[str, Any], list[Any]]:
+    """The values that stay, and (group, name, (low, high)) of those that vary; every fault at once."""
+    faults, ranges = [], []
+    fixed: dict[str, dict[str, float]] = {group: {} for group in groups}
+    for group, values in groups.items():
+        if not isinstance(values, Mapping):
+            faults.append(f"{group} must map names to numbers or pairs (low, high), not {shown(values)}")
+            continue
+        for name, value in values.items():
+            pair = isinstance(value, tuple | list) and len(value) == 2
+            if pair and all(map(is_finite_number, value)) and value[0] < value[1]:
+                ranges.append((group, name, (float(value[0]), float(value[1]))))
+            elif is_finite_number(value):
+                fixed[group][name] = float(value)
+            else:
+                faults.append(f"{group}: {name!r} must be a number or a pair (low, high), not {shown(value)}")
+    if isinstance(tries, bool) or not isinstance(tries, int) or not 1 <= tries <= MOST_TRIES:
+        faults.append(f"tries must be a whole number from 1 to {MOST_TRIES}, not {shown(tries)}")
+    if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
+        faults.append(f"seed must be a whole number from 0 on, not {shown(seed)}")
+    if not among(design, ("sobol", "latin hypercube")):
+        faults.append(f"design={shown(design)} is not available; use 'sobol' or 'latin hypercube'")
+    if faults:
+        raise ModelError(faults)
+    return fixed, ranges
+
+
+def _points(size: int, tries: int, design: str, seed: int) -> Matrix:
+    """(tries, size) points of the unit cube."""
+    if size == 0:
+        return np.zeros((1, 0))
+    from scipy.stats import qmc
+
+    if design == "sobol":
+        power = max(int(np.ceil(np.log2(tries))), 0)
+        return np.asarray(qmc.Sobol(size, seed=seed).random_base2(power)[:tries])
+    return np.asarray(qmc.LatinHypercube(size, seed=seed).random(tries))
+
+
+def _drawn(fixed: Mapping[str, Mapping[str, float]], ranges: Sequence[Any], point: Any) -> dict[str, dict[str, float]]:
+    """The values of one try, by group and name."""
+    found = {group: dict(values) for group, values in fixed.items()}
+    for (group, name, (low, high)), share in zip(ranges, point, strict=True):
+        found[group][name] = low + (high - low) * float(share)
+    return found
+
+
+def _values(draw: Mapping[str, Mapping[str, float]], names: Sequence[str]) -> dict[str, float]:
+    """What varied, by name."""
+    whole = {_title(group, name): value for group, values in draw.items() for name, value in values.items()}
+    return {name: whole[name] for name in names}
+
+
+def _title(group: str, name: str) -> str:
+    """A name in tables; a rate may be given by its coordinate's name."""
+    return f"{name}.rate" if group == "velocity" and not name.endswith("rate") else name
+
+
+def _assembled(model: Any, draw: Mapping[str, Any], closed: Any, opened: Any, backend: str) -> State | Outcome:
+    """The start of a try; a posture that no motion has is an outcome."""
+    try:
+        return assemble(model, draw["position"], draw["velocity"], closed, opened, backend=backend)
+    except UnknownNameError:
+        raise
+    except AssemblyError as error:
+        return Outcome("cannot be assembled", f"cannot be assembled: {error}", 0.0)

@@ -1,0 +1,118 @@
+"""Branches of gaits: maps whose folds, doublings and tori are known, and the cascades of the cases k3 and k3b."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+import numpy as np
+import pytest
+
+import mbd
+from tests.cases.walkers import compass, standing
+from tests.gait.walkers import simplest, slope_of
+from tests.problems import case
+
+
+@cache
+def mapped(first: str, second: str) -> mbd.Lagrangian:
+    """Two places that a clock sets anew each second to functions of themselves and of p: any map of the plane."""
+    from sympy import Symbol, sympify
+
+    x, y, clock = (mbd.Coordinate(name) for name in ("x", "y", "clock"))
+    p = Symbol("p")
+    model = mbd.Lagrangian(
+        "map", [x, y, clock], kinetic=(x.v**2 + y.v**2 + clock.v**2) / 2, potential=0 * p, parameters={p: 0.5}
+    )
+    names = {"x": x.q, "y": y.q, "p": p}
+    reset = {x.q: sympify(first, names), y.q: sympify(second, names), clock.q: 0.0, x.v: 0.0, y.v: 0.0, clock.v: 1.0}
+    model.constrain(mbd.Event("tick", clock.q - 1.0, direction=1, reset=reset))
+    return model
+
+
+def cycle_of(first: str, second: str, p: float, x: float, y: float) -> mbd.LimitCycle:
+    """The fixed point of a map."""
+    model = mapped(first, second)
+    start = mbd.assemble(model, {"x": x, "y": y}, {"clock": 1.0})
+    functions = {"scale": lambda value: {"p": value}}
+    return mbd.limit_cycle(model, start, section="tick", parameters={"scale": p}, functions=functions, dt=0.25)
+
+
+def test_a_branch_goes_around_its_fold():
+    gait = cycle_of("p + x - x**2", "0.3*y + 0.2*x", 0.3, 0.55, 0.1)
+    assert np.max(np.abs(np.sort(gait.multipliers.real) - np.sort([0.3, 1.0 - 2.0 * math.sqrt(0.3)]))) < 1e-9
+    found = mbd.branch(gait, "scale", -0.5, steps=40)
+    (fold,) = found.points("fold")
+    assert abs(fold.value) < 1e-9 and found["scale"][-1] > 0.05
+    x = np.array([point.state["x"] for point in found.curve])
+    assert np.max(np.abs(found["scale"] - x**2)) < 1e-9 and x[0] > 0.5 and x[-1] < -0.2
+    assert found["stable"][0] and not found["stable"][-1]
+
+
+def test_a_doubling_is_found_and_left_along_the_other_branch():
+    gait = cycle_of("p + x - x**2", "0.3*y + 0.2*x", 0.7, 0.84, 0.24)
+    found = mbd.branch(gait, "scale", 1.2)
+    (doubling,) = found.points("doubling")
+    assert abs(doubling.value - 1.0) < 1e-9 and not found.points("fold", "torus")
+    twice = found.switch(doubling)
+    assert twice.strides == 2 and abs(twice.period - 2.0) < 1e-12 and twice.stability == "stable"
+    p = twice.parameters["scale"]
+    x = twice.state["x"]
+    assert abs(x * x - 2.0 * x + 2.0 - p) < 1e-8 and p > 1.0  # x + F(x) = 2 on the cycle of two
+    with pytest.raises(mbd.ModelError, match="point must be a doubling of this branch"):
+        found.switch(None)
+
+
+def test_a_torus_is_found_where_a_complex_pair_crosses_the_unit_circle():
+    gait = cycle_of("2*p*x*(1 - y)", "x", 0.9, 0.444, 0.444)
+    found = mbd.branch(gait, "scale", 1.1)
+    (torus,) = found.points()
+    assert torus.kind == "torus" and abs(torus.value - 1.0) < 1e-9
+    assert abs(np.abs(np.angle(torus.point.multipliers.values[0])) - math.pi / 3.0) < 1e-7
+
+
+def test_a_parameter_that_changes_nothing_is_named():
+    model, start = simplest()
+    gait = cycle_of("p + x - x**2", "0.3*y + 0.2*x", 0.3, 0.55, 0.1)
+    with pytest.raises(mbd.UnknownNameError, match="no parameter named 'mass'"):
+        mbd.branch(gait, "mass", 1.0)
+    idle = mbd.limit_cycle(
+        model, start, section="heel strike", parameters={"idle": 1.0}, functions={"idle": lambda s: {}}
+    )
+    with pytest.raises(mbd.ModelError, match="parameter: 'idle' changes nothing of this gait"):
+        mbd.branch(idle, "idle", 2.0)
+
+
+def test_the_first_doubling_of_the_simplest_walker_is_that_of_the_case(tmp_path):
+    reference, (model, start) = case("k3-simplest-walker-cascade"), simplest()
+    gait = mbd.limit_cycle(model, start, section="heel strike", parameters={"gamma": 0.01495})
+    found = mbd.branch(gait, "gamma", 0.0152)
+    (doubling,) = found.points("doubling")
+    assert abs(doubling.value - reference["slope of period doubling 1 -> 2 steps"].value) < 1e-9
+    assert found["stable"][0] and not found["stable"][-1] and "reached gamma = 0.0152" in repr(found)
+    found.plot(tmp_path / "branch.png", "period")
+    assert (tmp_path / "branch.png").stat().st_size > 10_000
+
+
+@pytest.mark.slow
+def test_the_second_doubling_of_the_simplest_walker_is_that_of_the_case():
+    reference, (model, start) = case("k3-simplest-walker-cascade"), simplest()
+    gait = mbd.limit_cycle(model, start, section="heel strike", parameters={"gamma": 0.0145})
+    (first,) = (one := mbd.branch(gait, "gamma", 0.0155)).points("doubling")
+    (second,) = mbd.branch(one.switch(first), "gamma", 0.018).points("doubling")
+    assert abs(second.value - reference["slope of period doubling 2 -> 4 steps"].value) < 1e-9
+
+
+@pytest.mark.slow
+def test_the_doublings_of_the_compass_gait_are_those_of_the_case():
+    sizes, reference = case("f2-compass-gait-3deg").definition, case("k3b-compass-cascade")
+    start = standing(compass(sizes), case("f2-compass-gait-3deg")["fixed point"].value, sizes["slope"])
+    gait = mbd.limit_cycle(
+        compass(sizes), start, section="right foot", mirror=("left", "right"), parameters={"slope": sizes["slope"]},
+        functions=slope_of(sizes["g"]),
+    )  # fmt: skip
+    one = mbd.branch(gait, "slope", 0.08)
+    (first,) = one.points("doubling")
+    assert abs(first.value - reference["slope of period doubling 1 -> 2 steps"].value) < 1e-9
+    (second,) = mbd.branch(one.switch(first), "slope", 0.0875).points("doubling")
+    assert abs(second.value - reference["slope of period doubling 2 -> 4 steps"].value) < 1e-9
