@@ -17,6 +17,8 @@ __all__ = ["depends_on_time", "moving_on"]
 
 SAMPLES = 2
 """States at which rows with places of touchdown are moved along [-]."""
+FAR, FAR_STATES = 20.0, 8
+"""How far along a coordinate [m, rad], and at how many states, nothing may change where the tape cannot decide."""
 SAME = 1e-10
 """Change of a row along a coordinate that counts as none, its place of touchdown moved along [m, rad]."""
 
@@ -24,19 +26,23 @@ SAME = 1e-10
 def moving_on(mechanism: Mechanism, parameters: Vector) -> tuple[int, ...]:
     """Numbers of the increments of q that the motion does not depend on, if what stands moves along with them.
 
-    Neither inertia, forces, Jacobian, gaps nor events hold such a coordinate (found on the tape), and rows of contacts
-    take it off against the place of touchdown: ``h(q ⊕ s e, anchor(q₀ ⊕ s e)) = h(q, anchor(q₀))``.
+    Neither inertia, forces, Jacobian, gaps nor events hold it (found on the tape, else by going far along it), and rows
+    of contacts take it off against the place of touchdown: ``h(q ⊕ s e, anchor(q₀ ⊕ s e)) = h(q, anchor(q₀))``.
     """
     known = mechanism.equations.memory.get("moving on")
     if known is None:
         equations = mechanism.equations
         with equations.tape.lock:
-            known = equations.memory["moving on"] = _without_effect(mechanism)
+            identical, doubtful = _without_effect(mechanism)
+            found = [*identical, *(k for k in doubtful if _changes_nothing(mechanism, parameters, k))]
+            known = equations.memory["moving on"] = tuple(sorted(found))
     return tuple(k for k in known if _follows(mechanism, parameters, k))
 
 
-def _without_effect(mechanism: Mechanism) -> tuple[int, ...]:
-    """Increments that derivatives on the tape show to be in nothing but h of rows and what contacts capture."""
+def _without_effect(mechanism: Mechanism) -> tuple[list[int], list[int]]:
+    """Increments that derivatives on the tape show to be in nothing but h of rows and what contacts capture, and those
+    whose derivatives there do not cancel by themselves, as of the lever arm of a rolling foot.
+    """
     equations, layout = mechanism.equations, mechanism.layout
     outputs = programs.accelerations(equations)
     n, rows = layout.n, layout.n_rows
@@ -51,7 +57,33 @@ def _without_effect(mechanism: Mechanism) -> tuple[int, ...]:
         k for k in range(layout.n_v) if places[k] >= 0 and names[places[k]] not in set_by_events
     ]  # fmt: skip
     changes = jvps(kept, [{equations.tape.input("x", k): 1.0} for k in candidates])
-    return tuple(k for k, change in zip(candidates, changes, strict=True) if all(node.is_zero for node in change))
+    pairs = list(zip(candidates, changes, strict=True))
+    identical = [k for k, change in pairs if all(node.is_zero for node in change)]
+    return identical, [k for k, _ in pairs if k not in identical]
+
+
+def _changes_nothing(mechanism: Mechanism, parameters: Vector, k: int) -> bool:
+    """Whether inertia, forces, Jacobians, gaps and events are the same far away along a coordinate."""
+    layout, random = mechanism.layout, np.random.default_rng(7)
+    compose, size = mechanism.equations.configuration.compose, max(mechanism.sizes["guards"], 1)
+    defaults, none = np.array(mechanism.equations.configuration.defaults), np.zeros(layout.n_anchors)
+
+    def numbers(touched: Vector, q: Vector, y: Vector) -> Vector:
+        anchors = mechanism.acceleration_terms(0.0, touched, y, parameters, none).captured
+        terms, guards = mechanism.acceleration_terms(0.0, q, y, parameters, anchors), np.zeros(size)
+        mechanism.common["guards"](mechanism.block(0.0, q, y, anchors), parameters, guards)
+        parts = (terms.M, terms.f, terms.R, terms.B, terms.rate, terms.bias, guards)
+        return np.concatenate([np.ravel(part) for part in parts])
+
+    for _ in range(FAR_STATES):
+        q0, q = (compose(defaults, end) for end in random.uniform(-0.5, 0.5, (2, layout.n_v)))
+        y = random.uniform(-1.0, 1.0, layout.n)
+        move = np.zeros(layout.n_v)
+        move[k] = random.uniform(-FAR, FAR)
+        here, there = numbers(q0, q, y), numbers(compose(q0, move), compose(q, move), y)
+        if not np.max(np.abs(there - here), initial=0.0) <= SAME * max(1.0, float(np.max(np.abs(here), initial=0.0))):
+            return False
+    return True
 
 
 def _reset_names(equations: Equations) -> set[str] | None:

@@ -231,6 +231,34 @@ def test_energy_that_nothing_takes_is_a_multiplier_of_its_own():
     assert gait.success and not len(gait.multipliers) and abs(gait.trivial["energy"][0] - 1.0) < 1e-8
 
 
+def test_the_gait_of_round_feet_is_the_published_one():
+    reference = case("f5-roundfoot-walker")
+    sizes, expected = reference.definition, reference["fixed point"].value
+    model = mbd.Model("round feet", gravity=mbd.on_slope(sizes["gam"], sizes["g"]))
+    hip = mbd.PointMass("hip", sizes["M"])
+    model.connect(mbd.Translation("trunk", model.ground.origin, hip.origin))
+    legs = {
+        side: mbd.Link(f"{side} leg", sizes["m"], length=sizes["l"], center=sizes["c"], inertia=sizes["I"])
+        for side in ("left", "right")
+    }
+    centers = {side: leg.point(0.0, sizes["r"] - sizes["l"]) for side, leg in legs.items()}
+    for side, other in ("left", "right"), ("right", "left"):
+        ahead = mbd.measure(lambda mine, its: mine[0] - its[0], centers[side], centers[other])
+        foot, release = mbd.rolling_touchdown(centers[side], sizes["r"]), mbd.When(f"{other} foot")
+        model.connect(mbd.Revolute(f"{side} hip", hip.origin, legs[side].start))
+        model.constrain(mbd.Unilateral(f"{side} foot", foot, release=release, only_while=ahead))
+    angle, stance, swing = -np.round(expected, 3)
+    start = mbd.assemble(
+        model, {"left hip.angle": angle, "right hip.angle": -angle},
+        {"left hip.angle": stance, "right hip.angle": swing}, closed="left foot", open="right foot",
+    )  # fmt: skip
+    gait = mbd.limit_cycle(model, start, section="right foot", mirror=("left", "right"))
+    found = [gait.state[name] for name in ("left hip.angle", "left hip.rate", "right hip.rate")]
+    assert np.max(np.abs(found + expected)) < 1e-9 and abs(gait.period - reference["step period"].value) < 1e-9
+    assert spread(conjugates(reference["Floquet"].value), gait.multipliers) < MULTIPLIERS
+    assert gait.trivial["translation trunk.x"] == 1.0
+
+
 def test_a_motion_that_dies_out_is_no_gait():
     arm = mbd.Model("pendulum")
     rod = mbd.Link("rod", mass=1.0, length=1.0, center=0.6, inertia=0.05)
