@@ -84,6 +84,8 @@ def text(run: Trajectory) -> str:
 
 
 def of_the_swing(energy: Ledger) -> str:
-    """What the scheme itself took, over the swing of the kinetic energy; '' where that is round-off."""
+    """What the scheme itself took, over the swing of the kinetic energy; '' where that is round-off, or no number."""
+    if not np.all(np.isfinite(energy.kinetic)):
+        return ""
     swing, most = float(np.ptp(energy.kinetic)), float(np.max(np.abs(energy.kinetic), initial=0.0))
     return f"{energy.drift:.2g} of the swing of kinetic energy" if swing > 1e-9 * most else ""
