@@ -133,7 +133,7 @@ RESULTS = {
 """Values that are handed to users, who make none."""
 RESULTS |= {"Branch", "GaitSearch"}
 
-STUDIES = {"accuracy", "effects", "criteria", "fit"}
+STUDIES = {"accuracy", "criteria", "effects", "fit", "sensitivities"}
 """Words whose runs take seconds: what is no number at all is tried."""
 GAITS = {"find_gait", "limit_cycle"}
 """Words that make so many runs that they take machine code."""

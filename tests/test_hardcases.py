@@ -95,6 +95,7 @@ def judged_with(monkeypatch, case: HardCase, data: dict) -> Outcome:
     return case.judge(scheme("HHT"))
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("name", SPOILED)
 def test_a_reference_that_is_off_by_a_thousandth_is_noticed(name: str, monkeypatch):
     (case,) = chosen(CASES, [name], slow=True)

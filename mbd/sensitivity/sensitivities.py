@@ -104,15 +104,26 @@ def sensitivities(
         model, replace(start, memory=None), integrator, dt, tol, until=until, contact="events", impact=impact,
         parameters=parameters, rest_speed=rest_speed, backend=backend,
     )  # fmt: skip
+    return _differentiated(run, _directions(run, wrt, values), _held(run, single) if hold is None else hold, of)
+
+
+def _directions(run: Trajectory, wrt: Sequence[Wanted], values: Mapping[str, float]) -> list[Any]:
+    """Names, and quantities with the rates of the parameters that they move."""
     known = dict(zip(run.record.parameter_names, run.record.parameters, strict=False))
-    directions: list[Any] = []
+    found: list[Any] = []
     for each in wrt:
         if isinstance(each, str):
-            directions.append(each)
-            continue
-        for name, functions in each.items():
-            directions.append((name, rates_of_parameters(name, functions, values, known)))
-    found, wanted = passed(run, directions, _held(run, single) if hold is None else hold)
+            found.append(each)
+        else:
+            found += [(name, rates_of_parameters(name, given, values, known)) for name, given in each.items()]
+    return found
+
+
+def _differentiated(
+    run: Trajectory, directions: list[Any], held: Sequence[str], of: Sequence[str] | None
+) -> Sensitivities:
+    """The derivatives of a run as a table."""
+    found, wanted = passed(run, directions, held)
     names = usual(found.rows) if of is None else list(of)
     lines = lines_of(found.rows, found.programs, found.walked, names)
     facts, columns = run.facts, tuple(each.name for each in wanted)

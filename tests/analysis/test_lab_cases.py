@@ -276,6 +276,7 @@ def test_i4_the_error_of_fifty_steps_is_that_of_the_discrete_solution(name: str)
     assert told == pytest.approx(abs(discrete - exact), abs=1e-8)
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize(
     "name", ["HHT alpha = 0.05 (chapter text)", "generalized-alpha rho_inf 0.5", "WBZ rho_inf 0.7"]
 )

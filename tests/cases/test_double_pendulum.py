@@ -45,6 +45,7 @@ def test_angles_and_rates_meet_the_reference_to_second_order(form: str, scheme: 
     assert_second_order(errors, first_step(scheme, form))
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize(("form", "scheme"), PAIRS)
 def test_places_and_rod_tensions_meet_the_reference_to_second_order(form: str, scheme: NewmarkFamily) -> None:
     swing = FORMS[form]()

@@ -137,6 +137,7 @@ FALLING = [
 STUMBLING = [(1.0, 0.9, 1.0), (0.9, 1.1, 1.0), (1.1, 0.9, 1.0)]
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize(("name", "shares"), WALKING)
 def test_three_steps_from_another_start_are_those_of_an_explicit_method(
     name: str, shares: tuple[float, float, float]
@@ -168,6 +169,7 @@ def test_a_disturbed_walk_returns_to_the_fixed_point(name: str, shares: tuple[fl
     assert steps[-1].time - steps[-2].time == pytest.approx(gait.period, abs=1e-5)
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize(("name", "shares"), FALLING)
 def test_a_walk_too_far_from_its_gait_ends_with_a_fall_that_has_a_name_and_a_time(
     name: str, shares: tuple[float, float, float]

@@ -137,6 +137,7 @@ def test_a_revolute_angle_counts_its_turns_cut_or_not() -> None:
     assert angles["all joints cut"][-1] == pytest.approx(angles["minimal"][-1], abs=1e-4)
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize(("form", "scheme"), PAIRS)
 def test_ten_seconds_from_the_horizontal_meet_the_published_places(form: str, scheme: NewmarkFamily) -> None:
     swing = FORMS[form](B1.definition["L"], B1.definition["mass"], B1.definition["g"])

@@ -84,6 +84,7 @@ def cuts(seed):
     return ["auto", "all", [rng.choice(names)], rng.sample(names, 2)]
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("seed", range(8))
 def test_a_start_comes_out_as_named_and_every_joint_fits_its_bodies_under_every_cut(seed):
     for cut in cuts(seed):
@@ -120,6 +121,7 @@ def motion(seed, cut, rates):
     return {name: run[name][0] for name in [*asked, "drive.torque", "potential_energy", "kinetic_energy"]}
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("seed", range(6))
 def test_forces_that_see_angles_of_many_turns_move_every_cut_alike(seed):
     rng = random.Random(seed)

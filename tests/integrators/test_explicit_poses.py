@@ -29,6 +29,7 @@ def test_flat_poses_are_passed_whatever_the_step(count, dt):
     assert error < 2e-9 + (5.0 * dt) ** 8 and skew < 1e-10
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("share", [0.0, *NODES[[1, 5, 9, 10]].tolist()])
 def test_a_pose_that_would_fall_on_a_stage_is_passed(share):
     first = flat(2)[0]

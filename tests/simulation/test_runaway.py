@@ -55,6 +55,7 @@ GROWING = {
 }
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("name", GROWING)
 def test_a_motion_that_runs_away_is_followed_or_refused_before_its_rows_are_wrong(name: str) -> None:
     of, family = GROWING[name]

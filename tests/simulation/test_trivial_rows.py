@@ -80,6 +80,7 @@ def axle(cut, axis=ODD):
     return model
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize(("scheme", "settings"), SCHEMES, ids=lambda each: type(each).__name__)
 def test_a_loop_on_one_tilted_axis_turns_as_the_torque_over_the_inertia_says(scheme, settings):
     inertia = float(ODD @ np.diag([0.2, 0.2, 0.3]) @ ODD)
