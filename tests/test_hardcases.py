@@ -39,10 +39,10 @@ LONG |= {("j4", "HHT-index3"), ("j4", "generalized-alpha-index3"), ("b2-N10", "H
 
 
 def quick(place: int, case: HardCase) -> set[str]:
-    """The scheme that judges a case here, by turns so that each scheme has its cases; CI judges all by
+    """The scheme that judges every other case here, by turns so that each scheme has some; CI judges all by
     ``mbd hardcases``, `pytest -m slow` here."""
     names = [name for name in case.schemes if (short(case), name) not in LONG]
-    return set() if case.slow else {names[place % len(names)]}
+    return set() if case.slow or place % 2 else {names[place % len(names)]}
 
 
 def marks(case: HardCase, name: str, chosen: set[str]) -> list:
@@ -59,8 +59,7 @@ EVERY = [
 
 
 def test_every_scheme_judges_cases_by_turns():
-    chosen = [name for place, case in enumerate(CASES) for name in quick(place, case)]
-    assert {name: chosen.count(name) for name in SCHEMES if chosen.count(name) < 3} == {}
+    assert set().union(*(quick(place, case) for place, case in enumerate(CASES))) == set(SCHEMES)
 
 
 @pytest.mark.parametrize(("case", "name"), EVERY)

@@ -107,6 +107,7 @@ def test_a2_a_double_pendulum(which: int) -> None:
     assert_ends_agree(Scene(swing.model, start, until, ends(reference, names, which), 2e-3))
 
 
+@pytest.mark.slow
 def test_a2_places_with_rows() -> None:
     swing, reference = DOUBLE["elbow cut"](), A2["[x1,z1,x2,z2"]
     start = swing.start([A2.start[name] for name in ("theta1", "theta2", "thetadot1", "thetadot2")])
@@ -150,6 +151,7 @@ def assert_instants_agree(
     return found
 
 
+@pytest.mark.slow
 def test_a4_a_pendulum_that_sticks_at_last() -> None:
     J, K, tau = (A4.definition[name] for name in ("J", "K_mgd", "tau_friction"))
     model = mbd.Model("pendulum", gravity=(0.0, -K / J, 0.0))
@@ -193,6 +195,7 @@ def test_f2_f3_a_step_of_a_walker(name: str) -> None:
     assert strike.before == pytest.approx(before.value, abs=room + before.accuracy)
 
 
+@pytest.mark.slow
 def test_f4_a_rimless_wheel() -> None:
     reference = case("f4-rimless-wheel")
     p = reference.definition
