@@ -50,6 +50,7 @@ DOORS = {
     "results.ledger": ("view",),
     "analysis.accuracy.result": ("view",),
     "analysis.effects.result": ("view",),
+    "analysis.fitting.fit": ("view",),
     "analysis.gait_report.report": ("view",),
     "analysis.linearization": ("view",),
     "analysis.numerical": ("view",),

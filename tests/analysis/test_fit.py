@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
+import sympy
 
 import mbd
 from mbd.analysis.fitting.data import Data
@@ -56,7 +59,7 @@ def test_derivatives_are_those_of_the_residuals_through_an_impact():
     run = mbd.simulate(model, start, mbd.HHT(0.05), dt=2e-3, until=0.8)
     data = {"time": times, "left hip.angle": np.zeros(45), "trunk.x": np.arange(45.0), "right hip.rate": np.ones(45)}
     known = Data.read(data, {"right foot.time": instants_of(run)["right foot.time"]}, None)
-    search = _Search(model, start, known, ("hip.mass", "left thigh.mass"), mbd.HHT(0.05), 2e-3, 0.8, "auto")
+    search = _Search(model, start, known, ("hip.mass", "left thigh.mass"), mbd.HHT(0.05), 2e-3, None, 0.8, "auto")
     search.check()
     values, h = np.array([model.parameters[name] for name in search.names]), 1e-5
     exact = search.slopes(values)
@@ -66,6 +69,87 @@ def test_derivatives_are_those_of_the_residuals_through_an_impact():
     away = np.ones(len(exact), dtype=bool)
     away[:-1] = np.tile(np.min(np.abs(times[:, None] - [event.time for event in run.events]), axis=1) > 4e-3, 3)
     np.testing.assert_allclose(exact[away], central[away], rtol=2e-5, atol=2e-5 * np.abs(central).max())
+
+
+@cache
+def swing():
+    """The case of a measured swing: a shank at a fixed knee and a foot at its ankle, absolute angles."""
+    case = json.loads((Path(__file__).parents[1] / "cases/data/n1-prosthesis-identification.json").read_text())
+    known = {sympy.Symbol(name): value for name, value in case["definition"]["known"].items()}
+    m2, l1, c2, J2, rest, g = known
+    J1, S1, d1, k2, d2 = names = sympy.symbols("J1 S1 d1 k2 d2")
+    shank, foot = mbd.Coordinate("shank"), mbd.Coordinate("foot")
+    model = mbd.Lagrangian(
+        "prosthesis",
+        [shank, foot],
+        kinetic=(J1 + m2 * l1**2) * shank.v**2 / 2
+        + J2 * foot.v**2 / 2
+        + m2 * l1 * c2 * shank.v * foot.v * sympy.cos(shank.q - foot.q),
+        potential=-(S1 + m2 * l1) * g * sympy.cos(shank.q)
+        - m2 * c2 * g * sympy.cos(foot.q)
+        + k2 * (foot.q - shank.q - rest) ** 2 / 2,
+        dissipation=d1 * shank.v**2 / 2 + d2 * (foot.v - shank.v) ** 2 / 2,
+        parameters={**dict(zip(names, case["definition"]["start_guess"], strict=True)), **known},
+    )
+    return case, model, mbd.assemble(model, {"shank": 1.0, "foot": 2.3})
+
+
+def identified(data, more=None, **settings):
+    case, model, start = swing()
+    values = np.array(case["definition"][data])
+    table = {"time": case["definition"]["sample_times"], "shank": values[:, 0], "foot": values[:, 1]}
+    guess = dict(zip(("J1", "S1", "d1", "k2", "d2"), case["definition"]["start_guess"], strict=True))
+    sigma = {"shank": 0.005, "foot": 0.005}
+    settings = settings or {"dt": 0.01}
+    return mbd.fit(model, start, table, {**guess, **(more or {})}, mbd.RungeKutta853(), sigma=sigma, **settings)
+
+
+def test_a_measured_swing_gives_the_numbers_of_the_case():
+    case = swing()[0]
+    angles, exact, noisy, deviation, errors, predicted, correlation = case["quantities"]
+    clean, measured = identified("data_noise_free"), identified("data_noisy")
+    seen = np.column_stack([clean.run.at(angles["t"])[name] for name in ("shank", "foot")])
+    np.testing.assert_allclose(seen, angles["value"], atol=angles["accuracy"])
+    np.testing.assert_allclose(list(clean.values.values()), exact["value"], atol=exact["accuracy"])
+    np.testing.assert_allclose(list(measured.values.values()), noisy["value"], atol=noisy["accuracy"])
+    assert measured.noise * 0.005 == pytest.approx(deviation["value"], abs=deviation["accuracy"])
+    np.testing.assert_allclose(list(measured.errors.values()), errors["value"], rtol=errors["accuracy"])
+    np.testing.assert_allclose(list(clean.predicted.values()), predicted["value"], rtol=predicted["accuracy"])
+    np.testing.assert_allclose(clean.correlation, correlation["value"], atol=correlation["accuracy"])
+    assert [pair[:2] for pair in measured.together()] == [("J1", "S1")] and "J1 and S1 go together" in repr(measured)
+    truth = case["definition"]["true_parameters"]
+    assert np.all(np.abs(np.subtract(list(measured.values.values()), truth)) < 4.0 * np.array(errors["value"]))
+
+
+def test_where_a_swing_began_is_found_with_the_parameters():
+    begin = {"shank": 0.9, "foot": 2.4, "shank.rate": 0.1, "foot.rate": 0.1}
+    found = identified("data_noise_free", begin)
+    assert [found.values[name] for name in begin] == pytest.approx([1.0, 2.3, 0.0, 0.0], abs=1e-8)
+    assert found.values["J1"] == pytest.approx(0.19, abs=1e-7) and found.alike == ()
+
+
+def test_steps_that_follow_a_tolerance_come_as_near_as_it_is():
+    found, exact = identified("data_noisy", tol=1e-8), swing()[0]["quantities"][2]["value"]
+    np.testing.assert_allclose(list(found.values.values()), exact, atol=1e-5)
+    assert "tol=1e-08" in found.message
+
+
+def test_the_start_of_a_walker_that_stands_is_found():
+    """Its trunk moves as its hip angle changes, since its foot stands."""
+    model = kneed_walker()
+    start = kneed_walker_start(model)
+    truth = {"right hip.rate": start["right hip.rate"], "left hip.angle": start["left hip.angle"]}
+    times = np.linspace(0.05, 0.55, 12)
+    run = mbd.simulate(model, start, mbd.HHT(0.05), dt=2e-3, until=0.6)
+    data = {"time": times, "right hip.angle": run.at(times)["right hip.angle"], "trunk.x": run.at(times)["trunk.x"]}
+    guess = {"right hip.rate": truth["right hip.rate"] + 0.02, "left hip.angle": truth["left hip.angle"] + 3e-3}
+    found = mbd.fit(model, start, data, guess, mbd.HHT(0.05), 2e-3)
+    assert found.values == pytest.approx(truth, abs=1e-7)
+
+
+def test_a_picture_of_residuals_has_a_panel_for_each_column(tmp_path):
+    figure = identified("data_noisy").plot(tmp_path / "fit.svg")
+    assert len(figure.axes) == 4 and (tmp_path / "fit.svg").stat().st_size > 1000
 
 
 @pytest.mark.slow

@@ -11,6 +11,7 @@ import numpy as np
 
 from mbd.analysis.fitting.data import Data
 from mbd.arrays import Matrix, Vector
+from mbd.assembly.changed_start import changed_start, start_names
 from mbd.bodies.values import is_number, shown
 from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import MbdError, ModelError, SimulationError, UnknownNameError, nearest
@@ -21,7 +22,7 @@ from mbd.simulation.simulate import simulate
 from mbd.state import State
 from mbd.trajectory import Trajectory
 
-__all__ = ["Fit", "fit"]
+__all__ = ["Fit", "bounds", "fit"]
 
 ALIKE = 1e-8
 """Singular value of the scaled derivatives, over the largest, below which the data cannot tell directions apart [-]."""
@@ -38,18 +39,23 @@ class Fit:
     values : estimates by name
     errors : their standard errors, s √((JᵀJ)⁻¹)ᵢᵢ with s² the sum of squares over its degrees of freedom; infinite for
         those that the data cannot tell apart
+    predicted : standard errors √((JᵀJ)⁻¹)ᵢᵢ if the scales `sigma` of the data are their true errors
     correlation : of the estimates (P, P)
     alike : groups of names whose effects on the data cannot be told apart
     residuals : measured less computed, over the scale of its column, by name
     noise : s, the size of the residuals [-]; converged, message : of the search; runs : made for it
+    times : of the residuals, by name [s]; scales : that they are divided by
     run : the run with the estimates
     """
 
     values: Mapping[str, float]
     errors: Mapping[str, float]
+    predicted: Mapping[str, float]
     correlation: Matrix
     alike: tuple[tuple[str, ...], ...]
     residuals: Mapping[str, Vector]
+    times: Mapping[str, Vector]
+    scales: Mapping[str, float]
     noise: float
     converged: bool
     message: str
@@ -66,6 +72,19 @@ class Fit:
         half = float(t.ppf(0.5 + 0.5 * level, max(self.degrees, 1))) * self.errors[name]
         return self.values[name] - half, self.values[name] + half
 
+    def together(self, above: float = 0.99) -> list[tuple[str, str, float]]:
+        """Pairs of estimates whose correlation has a size above a limit: the data tell them apart badly."""
+        names, known = list(self.values), [math.isfinite(each) for each in self.errors.values()]
+        pairs = [(i, j) for i in range(len(names)) for j in range(i + 1, len(names)) if known[i] and known[j]]
+        found = [(names[i], names[j], float(self.correlation[i, j])) for i, j in pairs]
+        return [pair for pair in found if abs(pair[2]) > above]
+
+    def plot(self, path: Any = None) -> Any:
+        """Residuals over time, each in its own panel, beside measured and computed values; the figure."""
+        from mbd.view.fits import fitted
+
+        return fitted(self, path)
+
     def _lines(self) -> list[list[str]]:
         found = []
         for name, value in self.values.items():
@@ -78,6 +97,7 @@ class Fit:
         widths = [max(len(line[k]) for line in lines) for k in range(4)]
         text = ["  ".join(f"{cell:>{width}}" for cell, width in zip(line, widths, strict=True)) for line in lines]
         text += [f"the data cannot tell apart: {', '.join(names)}" for names in self.alike]
+        text += [f"{one} and {other} go together: correlation {value:.5f}" for one, other, value in self.together()]
         return "\n".join([*text, self.message])
 
     def _repr_html_(self) -> str:
@@ -90,7 +110,8 @@ def fit(
     data: Any,
     parameters: Mapping[str, Any],
     integrator: Integrator | None = None,
-    dt: float = 1e-3,
+    dt: float | None = None,
+    tol: float | None = None,
     *,
     events: Mapping[str, float] | None = None,
     sigma: Mapping[str, float] | None = None,
@@ -107,8 +128,12 @@ def fit(
     ----------
     data : a table, a dictionary or a pandas DataFrame, with a column 'time' [s] and columns by names of results; NaN
         where a value is missing; None where only events were measured
-    parameters : what to find, by name: a guess, ``{"shank.mass": 3.0}``, or (guess, lowest, highest)
-    integrator, dt : see `mbd.simulate`; of the Newmark family or `mbd.RungeKutta853`
+    parameters : what to find, by name: a guess, ``{"shank.mass": 3.0}``, or (guess, lowest, highest). Coordinates and
+        rates of the start, ``{"knee.angle": 0.6, "knee.rate": 0.0}``, can be found too; others complete the start as
+        by `mbd.assemble`, with the least motion
+    integrator, dt, tol : see `mbd.simulate`; of the Newmark family, `mbd.RungeKutta853` or `mbd.RadauIIA`. Without
+        either dt is 1 ms. With `tol` each run chooses its steps, which its derivatives hold: residuals are then as
+        exact as `tol` says, and the search cannot come closer than that
     events : measured instants [s], ``{"right foot.time": 0.71, "right foot.time.2": 1.44}``
     sigma : standard deviation of the errors of a column or an instant, which weighs it; by default a hundredth of its
         range. The size of the errors is estimated from the residuals
@@ -144,8 +169,9 @@ def fit(
     from scipy.optimize import least_squares
 
     known = Data.read(data, events, sigma)
-    guess, low, high = _bounds(parameters)
-    search = _Search(model, start, known, tuple(parameters), integrator, dt, _end(known, until, dt), backend)
+    guess, low, high = bounds(parameters)
+    dt = 1e-3 if dt is None and tol is None else dt
+    search = _Search(model, start, known, tuple(parameters), integrator, dt, tol, _end(known, until, dt, tol), backend)
     search.check()
     first = search.residuals(guess)
     if not np.all(np.isfinite(first)):
@@ -157,7 +183,7 @@ def fit(
     return search.concluded(found)
 
 
-def _bounds(parameters: Any) -> tuple[Vector, Vector, Vector]:
+def bounds(parameters: Any) -> tuple[Vector, Vector, Vector]:
     """Guesses and bounds; every fault at once."""
     if not isinstance(parameters, Mapping) or not parameters:
         raise ModelError(
@@ -179,11 +205,12 @@ def _bounds(parameters: Any) -> tuple[Vector, Vector, Vector]:
     return guess, low, high
 
 
-def _end(data: Data, until: Any, dt: Any) -> float:
-    if not is_number(dt) or not 0.0 < dt < math.inf:
-        raise ModelError(f"dt must be a positive step [s], not {shown(dt)}")
+def _end(data: Data, until: Any, dt: Any, tol: Any) -> float:
+    for name, value, what in (("dt", dt, "step [s]"), ("tol", tol, "tolerance")):
+        if value is not None and (not is_number(value) or not 0.0 < value < math.inf):
+            raise ModelError(f"{name} must be a positive {what}, not {shown(value)}")
     if until is None:
-        return float(data.last + max(2.0 * dt, 0.2 * data.last if data.events else 0.0))
+        return float(data.last + max(2.0 * (dt or 0.0), 0.2 * data.last if data.events else 0.01 * data.last))
     if not is_number(until) or not data.last <= until < math.inf:
         raise ModelError(f"until must be a time [s] not before the last value at {data.last:g} s, not {shown(until)}")
     return float(until)
@@ -198,9 +225,11 @@ class _Search:
     data: Data
     names: tuple[str, ...]
     integrator: Integrator | None
-    dt: float
+    dt: float | None
+    tol: float | None
     until: float
     backend: str
+    of_start: tuple[str, ...] = ()
     runs: int = 0
     problem: str = ""
     run: Trajectory | None = None
@@ -210,15 +239,19 @@ class _Search:
         """Names that the model does not have, all at once; parameters that are 0 or ±1 become inputs."""
         if not isinstance(self.start, State):
             raise ModelError(f"start must be a State from mbd.assemble(model, …), not {shown(self.start)}")
-        equations = mechanism_of(self.model, self.backend).equations
+        mechanism = mechanism_of(self.model, self.backend, self.start.parameters)
+        equations = mechanism.equations
         inputs = {parameter.name for parameter in equations.parameters}
         declared = {*inputs, *getattr(self.model, "parameters", {})}
-        wrong = [nearest(name, declared, "parameter", "There are") for name in self.names if name not in declared]
+        begins = start_names(mechanism)
+        self.of_start = tuple(name for name in self.names if name not in declared and name in begins)
+        what, known = "parameter, coordinate or rate of the start", {*declared, *begins}
+        wrong = [nearest(name, known, what, "There are") for name in self.names if name not in known]
         if wrong:
             raise UnknownNameError(wrong)
         for name in self.data.columns:
             equations.output(name)
-        more = [name for name in self.names if name not in inputs]
+        more = [name for name in self.names if name not in {*inputs, *self.of_start}]
         self.model = self.model.with_tunable(*more) if more else self.model
 
     def made(self, values: Vector) -> Trajectory | None:
@@ -228,10 +261,12 @@ class _Search:
         self.at, self.run = values.copy(), None
         self.runs += 1
         try:
+            given = dict(zip(self.names, map(float, values), strict=True))
+            own = {name: given.pop(name) for name in self.of_start}
+            start = changed_start(self.model, self.start, own, given, self.backend) if own else self.start
             self.run = simulate(
-                self.model, replace(self.start, memory=None), self.integrator, self.dt, until=self.until,
-                contact="events", parameters=dict(zip(self.names, map(float, values), strict=True)),
-                on_failure="return", backend=self.backend,
+                self.model, replace(start, memory=None), self.integrator, self.dt, self.tol, until=self.until,
+                contact="events", parameters=given, on_failure="return", backend=self.backend,
             )  # fmt: skip
         except MbdError as error:
             self.problem = str(error)
@@ -259,7 +294,7 @@ class _Search:
         run = self.made(values)
         assert run is not None  # least_squares asks where residuals were finite
         names = list(self.data.columns)
-        found = along(run, self.names, names)
+        found = along(run, self.names, names, self.of_start)
         parts = [found.at(self.data.columns[name][0])[:, k] / self.data.scales[name] for k, name in enumerate(names)]
         for name in self.data.events:
             line = found.of_instant(name.split(".time")[0], instants_of(run)[name])
@@ -284,13 +319,20 @@ class _Search:
             unknown |= members
         covariance = (directions.T * np.where(weak, 0.0, 1.0 / np.maximum(strengths, 1e-300) ** 2)) @ directions
         deviation = np.sqrt(np.diag(covariance))
-        errors = np.where(unknown | (sizes == 0.0), np.inf, noise * deviation / np.where(sizes > 0.0, sizes, 1.0))
+        errors = np.where(unknown | (sizes == 0.0), np.inf, deviation / np.where(sizes > 0.0, sizes, 1.0))
+        times = {name: seen[0] for name, seen in self.data.columns.items()}
+        times |= {name: np.array([instant]) for name, instant in self.data.events.items()}
         return Fit(
             dict(zip(self.names, map(float, found.x), strict=True)),
+            dict(zip(self.names, map(float, np.where(np.isinf(errors), np.inf, noise * errors)), strict=True)),
             dict(zip(self.names, map(float, errors), strict=True)),
             covariance / np.maximum(np.outer(deviation, deviation), 1e-300), tuple(groups), self._by_name(found.fun),
-            noise, found.status > 0, found.message, self.runs, degrees, run,
+            times, self.data.scales, noise, found.status > 0, self._said(found.message), self.runs, degrees, run,
         )  # fmt: skip
+
+    def _said(self, message: str) -> str:
+        """Why the search ended; how exact its runs are where their steps differ."""
+        return message if self.tol is None else f"{message} Steps follow tol={self.tol:g} and are held in derivatives."
 
     def _by_name(self, residuals: Vector) -> dict[str, Vector]:
         """Measured less computed, by name."""
