@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import pi
-from typing import Any
+from typing import Any, ClassVar
 
 from mbd.bodies.algebra import dot, rotate, transpose
 from mbd.bodies.base import Frame
@@ -25,8 +26,54 @@ from mbd.tape.node import Node, Scalar
 __all__ = ["ProfileTouchdown", "RollingTouchdown", "profile_touchdown", "rolling_touchdown"]
 
 
+class RollingSole(Measure):
+    """A sole on a frame of a body that turns about z, over a plane on which it can roll.
+
+    word : what users call it by; foot : the frame, in whose axes the sole is given
+    """
+
+    word: ClassVar[str]
+    ground: Plane
+
+    @property
+    @abstractmethod
+    def foot(self) -> Frame:
+        """Its frame."""
+
+    @property
+    def unit(self) -> str:
+        """'m'."""
+        return "m"
+
+    @property
+    def has_tangents(self) -> bool:
+        """True."""
+        return True
+
+    def mentions(self) -> list[Mention]:
+        """Its frame, and that of the plane."""
+        return [self.foot] if self.ground.frame is None else [self.foot, self.ground.frame]
+
+    def refuse(self, scope: Scope) -> None:
+        """A frame that turns about other axes than z."""
+        spin = scope.frame(self.foot).angular_velocity
+        if any(isinstance(part, Node) and not part.is_zero for part in spin[:2]):
+            raise CapabilityError(
+                f"{self.word} of '{self.foot.full_name}' serves planar mechanisms, whose feet turn about z only; "
+                "a foot that tilts in space touches the ground elsewhere: use mbd.touchdown of its points"
+            )
+
+    def faults(self, owner: str) -> list[str]:
+        """A foot on the ground, or on the body that its plane is on."""
+        if isinstance(self.foot.body, Ground):
+            return [f"'{owner}': its foot '{self.foot.full_name}' is the ground; give a frame of the body that rolls"]
+        if self.ground.frame is not None and self.ground.frame.body is self.foot.body:
+            return [f"'{owner}': its foot and its plane are both on '{self.foot.body.name}' and never move apart"]
+        return []
+
+
 @dataclass(frozen=True)
-class RollingTouchdown(Measure):
+class RollingTouchdown(RollingSole):
     """``g = n · s_C − r`` of a round foot, and the row that lets it roll without slip; see `rolling_touchdown`.
 
     The anchor is ``u = t · s_C / r + φ``, with s_C the place of the center on the plane and φ the angle of its frame
@@ -37,6 +84,12 @@ class RollingTouchdown(Measure):
     center: Frame
     radius: float
     ground: Plane = field(default_factory=Plane)
+    word: ClassVar[str] = "rolling_touchdown"
+
+    @property
+    def foot(self) -> Frame:
+        """Its center."""
+        return self.center
 
     def gap(self, scope: Scope) -> Scalar:
         """n · s_C − r."""
@@ -52,26 +105,8 @@ class RollingTouchdown(Measure):
         (u,) = self.captured(scope)
         return [("forward", self._radius(scope) * sin(u - anchors[0]))]
 
-    def refuse(self, scope: Scope) -> None:
-        """A foot that tilts."""
-        refuse_tilt(self.center, "rolling_touchdown", scope)
-
     def _radius(self, scope: Scope) -> Scalar:
         return scope.parameter(self.center.full_name, "radius", self.radius)
-
-    @property
-    def unit(self) -> str:
-        """'m'."""
-        return "m"
-
-    @property
-    def has_tangents(self) -> bool:
-        """True."""
-        return True
-
-    def mentions(self) -> list[Mention]:
-        """Its center, and the frame of the plane."""
-        return [self.center] if self.ground.frame is None else [self.center, self.ground.frame]
 
     def parameters(self) -> dict[str, float]:
         """The radius, under the name of the center."""
@@ -81,13 +116,9 @@ class RollingTouchdown(Measure):
         """A radius > 0."""
         return {f"{self.center.full_name}.radius": positive(unit="m")}
 
-    def faults(self, owner: str) -> list[str]:
-        """A center that does not move against the plane."""
-        return _faults(self.center, self.ground, owner)
-
 
 @dataclass(frozen=True)
-class ProfileTouchdown(Measure):
+class ProfileTouchdown(RollingSole):
     """``g = n · s_O − h(ψ)`` of a convex sole, and the row that lets it roll without slip; see `profile_touchdown`.
 
     ψ = −φ is the tangent of the sole that lies on the plane, φ the angle of the frame against the direction forward t.
@@ -99,6 +130,12 @@ class ProfileTouchdown(Measure):
     frame: Frame
     sole: Sole
     ground: Plane = field(default_factory=Plane)
+    word: ClassVar[str] = "profile_touchdown"
+
+    @property
+    def foot(self) -> Frame:
+        """Its frame."""
+        return self.frame
 
     def gap(self, scope: Scope) -> Scalar:
         """n · s_O − h(ψ)."""
@@ -117,31 +154,9 @@ class ProfileTouchdown(Measure):
         size = self.sole.circumference / (2.0 * pi)
         return [("forward", size * sin((sigma - anchors[0]) / size))]
 
-    def refuse(self, scope: Scope) -> None:
-        """A sole that tilts."""
-        refuse_tilt(self.frame, "profile_touchdown", scope)
-
     def _table(self, scope: Scope) -> Any:
         """∫h dψ."""
         return scope.table(f"{self.frame.full_name} {self.sole.label}", *self.sole.pieces)
-
-    @property
-    def unit(self) -> str:
-        """'m'."""
-        return "m"
-
-    @property
-    def has_tangents(self) -> bool:
-        """True."""
-        return True
-
-    def mentions(self) -> list[Mention]:
-        """Its frame, and that of the plane."""
-        return [self.frame] if self.ground.frame is None else [self.frame, self.ground.frame]
-
-    def faults(self, owner: str) -> list[str]:
-        """A sole that does not move against the plane."""
-        return _faults(self.frame, self.ground, owner)
 
 
 def rolling_touchdown(center: Frame, radius: float, ground: Any = None) -> RollingTouchdown:
@@ -215,16 +230,6 @@ def rolled(frame: Frame, ground: Plane, scope: Scope) -> tuple[Scalar, Scalar]:
     return dot(forward, place), atan2(dot(ground.normal, x_axis), dot(forward, x_axis))
 
 
-def refuse_tilt(frame: Frame, what: str, scope: Scope) -> None:
-    """Raise a `CapabilityError` where a frame turns about other axes than z."""
-    spin = scope.frame(frame).angular_velocity
-    if any(isinstance(part, Node) and not part.is_zero for part in spin[:2]):
-        raise CapabilityError(
-            f"{what} of '{frame.full_name}' serves planar mechanisms, whose feet turn about z only; a foot that tilts "
-            "in space touches the ground elsewhere: use mbd.touchdown of its points"
-        )
-
-
 def _plane(ground: Any, what: str) -> Plane:
     if ground is None:
         return Plane()
@@ -233,11 +238,3 @@ def _plane(ground: Any, what: str) -> Plane:
     if ground.normal[2] != 0.0 or (ground.frame is not None and not ground.frame.is_planar):
         raise ModelError(f"{what}: the normal of its plane must lie in the x-y plane, in which the foot rolls")
     return ground
-
-
-def _faults(frame: Frame, ground: Plane, owner: str) -> list[str]:
-    if isinstance(frame.body, Ground):
-        return [f"'{owner}': its foot '{frame.full_name}' is the ground; give a frame of the body that rolls"]
-    if ground.frame is not None and ground.frame.body is frame.body:
-        return [f"'{owner}': its foot and its plane are both on '{frame.body.name}' and never move apart"]
-    return []

@@ -22,7 +22,7 @@ from mbd.kernel.hooks import call
 from mbd.kernel.records import Guards, Model, Reals, Switching
 from mbd.kernel.restart import evaluate, is_held
 
-__all__ = ["condition_round_off", "guard_round_off"]
+__all__ = ["STEADY", "condition_round_off", "guard_round_off"]
 
 OWN = 4.0
 """Round-off of a number, in units of its last place [-]."""
@@ -30,6 +30,8 @@ ROUGH = 64.0
 """The same of what rows leave open, in which many terms take part [-]."""
 LASTING = 2.0**14
 """The same of the balance, which may push the same way in many steps: near rest, for part of a period of motion [-]."""
+STEADY = 4.0
+"""Round-offs of a change whose sign is to be trusted [-]."""
 MAGNIFIED = 2.0**20
 """Times round-off by which a coordinate is moved to see what it does to a guard, so that it is seen at all [-]."""
 

@@ -24,7 +24,7 @@ from mbd.kernel.codes import (
     STICK_BRIEF,
     WATCH,
 )
-from mbd.kernel.guard_round_off import condition_round_off, guard_round_off
+from mbd.kernel.guard_round_off import STEADY, condition_round_off, guard_round_off
 from mbd.kernel.hermite import crossing, hermite, hermite_turn
 from mbd.kernel.hooks import call
 from mbd.kernel.records import (
@@ -227,8 +227,9 @@ def begins_to_be_watched(K: Switching, c: int, h: float) -> bool:
 def judge_user(K: Switching, e: int, h: float) -> None:
     """Whether a user's guard crosses zero from its side; one that still rises from there does so after its top.
 
-    A sign that has changed by no more than round-off is no crossing: it is judged again after the next step. A guard
-    that is back on its side at the end is looked at where it turns, like a gap that grazes (`locate` steps there).
+    A sign that has changed by no more than round-off is no crossing, unless the guard comes from beyond round-off and
+    goes on at such a rate; otherwise it is judged again after the next step. A guard that is back on its side at the
+    end is looked at where it turns, like a gap that grazes (`locate` steps there).
     """
     side = K.side[e]
     v0 = side * K.guards0[K.at_user + e]
@@ -240,10 +241,11 @@ def judge_user(K: Switching, e: int, h: float) -> None:
         return
     if K.direction[e] * side > 0.0:
         return
-    if -v1 <= guard_round_off(K, e, K.time + h, K.q1, K.y1):
-        return
     d0 = side * K.guards0[K.at_user_rate + e] * h
     d1 = side * K.guards1[K.at_user_rate + e] * h
+    doubt = guard_round_off(K, e, K.time + h, K.q1, K.y1)
+    if -v1 <= doubt and min(v0, -d1) <= STEADY * doubt:
+        return
     top = hermite_turn(v0, v1, d0, d1, True) if d0 > 0.0 else -1.0
     if top > 0.0:
         consider(K, CROSS, e, top + (1.0 - top) * crossing(max(hermite(v0, v1, d0, d1, top), 0.0), v1), top)
