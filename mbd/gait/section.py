@@ -197,7 +197,7 @@ def section_of(
     mechanism.common["guards"](mechanism.block(0.0, q, y, arrived.anchors), parameters, out)
     contacts, guards = len(manager.contacts), len(manager.guards)
     pairs = [(c, contacts + c) for c, contact in enumerate(manager.contacts)
-             if contact.name == name and contact.kind == "penalty"]  # fmt: skip
+             if contact.name == name and name not in after]  # fmt: skip
     pairs += [(4 * contacts + e, 4 * contacts + guards + e) for e, guard in enumerate(manager.guards)
               if guard.name == name]  # fmt: skip
     gaps = tuple(pair for pair in pairs if abs(out[pair[0]]) <= CLOSED)
