@@ -34,6 +34,7 @@ APART = (
     "singular.events.log_passed_events", "singular.events.refuses", "hooks.scheme_accept", "trial_step.brief_step",
     "trial_step.share_multipliers", "singular.newmark_step.singular_newmark_step", "schemes.newton.second_look",
     "schemes.newton.retreat", "schemes.radau.radau_step", "schemes.runge_kutta.runge_kutta_step",
+    "advance.advance", "begin_run.begin_run",
 )  # fmt: skip
 """Their loops keep their shape wherever they are called; where they are not, nobody carries them along.
 
@@ -43,7 +44,7 @@ in one piece.
 
 ENTRY_FUNCTION = """
 def mbd_kernel(K: Kernel) -> int:
-    return advance(K)
+    return march_many(K) if K.many == 1 else advance(K)
 """
 
 
@@ -109,11 +110,12 @@ def kernel_text() -> str:
 def kernel_functions() -> list[Function]:
     """The kernel as typed trees."""
     from mbd.kernel.advance import advance
+    from mbd.kernel.many_runs import march_many
     from mbd.kernel.memory_check import check_memory
     from mbd.kernel.translate import Source, functions_of, translate
 
     text, names = contract.dispatch()
-    hooks = Source("hooks", functions_of(text, ENTRY_FUNCTION), {**names, "advance": advance})
+    hooks = Source("hooks", functions_of(text, ENTRY_FUNCTION), {**names, "advance": advance, "march_many": march_many})
     found = translate(hooks, ENTRY, ["kernel"], APART, {"mbd.kernel.hooks": hooks})
     check_memory(found)
     return found

@@ -13,6 +13,8 @@ DONE, FULL, NEW_MODE, EVENT, PAUSE, LAST = range(6)
     NO_FORCE, TOO_TIGHT, TOO_NEAR, TOO_SMALL, SINGULAR_ROWS_MOVE, OUTGROWN, GAINED, TOO_BRIEF,
     AT_POSE, LEAPT, ILL_CONDITIONED,
 ) = range(10, 31)  # fmt: skip
+DOUBTFUL_START, NEEDS_PYTHON = 40, 41
+"""How one of many runs ends that Python has to make: its start may be none, or it goes on in another way."""
 (
     CLOSE, OPEN_PULL, OPEN_GAP, OPEN_FORCE, CROSS, WATCH, GRAZE, PRESS, STICK, SLIP, STICK_BRIEF,
     CROSS_BRIEF, CROSS_BACK,

@@ -8,18 +8,26 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
-from mbd.arrays import Matrix
+import numpy as np
+
+from mbd.arrays import Matrix, Vector
 from mbd.errors import ModelError
 from mbd.integrators import Integrator
+from mbd.kernel import codes
 from mbd.results.record import EventRecord
 from mbd.simulation.run.begin import begin
+from mbd.simulation.run.many import Ends, ManyRuns, may_be_many, start_line
 from mbd.simulation.run.run import Run
-from mbd.simulation.simulate import REST_SPEED, prepared
+from mbd.simulation.simulate import REST_SPEED, laid_out, prepared
 from mbd.state import State
 
 __all__ = ["End", "RepeatedRun"]
+
+LINES = 32
+"""Events of a run of many that are kept; one with more is made alone [-]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +73,8 @@ class RepeatedRun:
             "backend": backend,
         }  # fmt: skip
         first = replace(start, time=0.0, memory=None)
-        self.run: Run = prepared(model, first, integrator, dt, until, dict(parameters), options)
+        self._arguments = model, first, integrator, dt, until, dict(parameters), options
+        self.run: Run = prepared(*self._arguments)
         stepper = self.run.stepper
         self._reals, self._integers = stepper.reals.copy(), stepper.integers.copy()
         self._boundaries = self.run.boundaries.kept()
@@ -83,6 +92,47 @@ class RepeatedRun:
         run.collect()
         final = replace(run.state(), moved={})
         return End(final, tuple(run.events), _before(start, run.events, run.now), self._stop(message), problem)
+
+    def many(
+        self, starts: Sequence[State], parameters: Sequence[Mapping[str, float]] | Mapping[str, float] | None = None
+    ) -> list[End]:
+        """The ends of runs from consistent starts, the same as one call for each, to the bit, without Python between.
+
+        Parameters
+        ----------
+        starts : at time 0
+        parameters : of all, or of each; None: those that the run was prepared with
+        """
+        own = self.parameters if parameters is None else parameters
+        each = [dict(own)] * len(starts) if isinstance(own, Mapping) else [dict(one) for one in own]
+        if len(each) != len(starts):
+            raise ModelError(f"there are {len(starts)} starts and {len(each)} sets of parameters; give one for each")
+        if may_be_many(self.run):
+            return [self(start, values) for start, values in zip(starts, each, strict=True)]
+        vectors = np.array([self._vector(values) for values in each]).reshape(len(each), -1)
+        lines = np.array([start_line(self._many.run, start) for start in starts]).reshape(len(each), -1)
+        ends = self._many(lines, vectors, LINES)
+        return [self._end(ends, k, start, each[k]) for k, start in enumerate(starts)]
+
+    @cached_property
+    def _many(self) -> ManyRuns:
+        """Arrays of their own, so that runs of both kinds may follow each other."""
+        return ManyRuns(laid_out(*self._arguments))
+
+    def _vector(self, values: Mapping[str, float]) -> Vector:
+        folded = getattr(self.run.model, "parameters", {}) if values else {}
+        return self.run.mechanism.parameters(values, folded)
+
+    def _end(self, ends: Ends, k: int, start: State, values: dict[str, float]) -> End:
+        """The end of the k-th run; one that Python has to make, or to explain, is made again."""
+        run, status = self._many.run, int(ends.status[k])
+        if status not in (codes.DONE, codes.EVENT) or ends.events[k] > LINES or run.mechanism.equations.facings:
+            return self(start, values)
+        events = run.log.events(ends.lines[k, : ends.n_lines[k]], 0)
+        number = int(ends.stopped_by[k])
+        names = [*run.manager.names, *(guard.name for guard in run.manager.guards)]
+        before = run.manager.mode(ends.before[k]).closed
+        return End(ends.state(run, k, values), tuple(events), before, names[number] if number >= 0 else "", "")
 
     @property
     def table(self) -> Matrix:

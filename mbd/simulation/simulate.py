@@ -33,7 +33,7 @@ from mbd.simulation.tolerance.trials import Trial
 from mbd.state import State, of_model
 from mbd.trajectory import Trajectory
 
-__all__ = ["prepared", "simulate"]
+__all__ = ["REST_SPEED", "laid_out", "prepared", "simulate"]
 
 LONGEST = 0.1
 """Longest step that follows its error in a first run, over the length of the run [-]."""
@@ -208,6 +208,20 @@ def prepared(
     watch: Callable[[Mechanism], Any] | None = None,
 ) -> Run:
     """A run ready to be completed; `watch` may put something in the place of the mechanism."""
+    return laid_out(model, start, scheme, dt, until, changed, options, watch).at_start()
+
+
+def laid_out(
+    model: Any,
+    start: State,
+    scheme: Integrator,
+    dt: float,
+    until: Any,
+    changed: Mapping[str, float],
+    options: Mapping[str, Any],
+    watch: Callable[[Mechanism], Any] | None = None,
+) -> Run:
+    """The same before its start is put into the kernel's arrays."""
     mechanism = mechanism_of(model, options["backend"], changed)
     folded = getattr(model, "parameters", {}) if changed else {}
     manager = manager_of(mechanism, mechanism.parameters(changed, folded))
@@ -236,7 +250,7 @@ def prepared(
     own["auto"] = auto
     own |= {name: value for name, value in adaptive.items() if value is not None}
     watched = mechanism if watch is None else watch(mechanism)
-    return Run(model, watched, manager, scheme, start, dt, end, stop, changed, own, settings).at_start()
+    return Run(model, watched, manager, scheme, start, dt, end, stop, changed, own, settings)
 
 
 @cache

@@ -16,7 +16,7 @@ record, `Kernel`, and in machine code one table of addresses.
     SingularSteps  DependentRows, Steps: beside and over singular configurations
     Balance        ContactForces, DependentRows: consistent accelerations, impulses
     Switching      Results, Guards, Balance: all but the memory of the scheme
-    Kernel         Switching, SingularSteps
+    Kernel         Switching, SingularSteps, Runs: many of them in one call
 
 Lengths follow from `Sizes`: n_q coordinates, n = n_v + n_z rates, rows, contacts, guards of the user, frictions,
 anchors. An index that is itself read from an array stays within these because of who writes it:
@@ -40,6 +40,7 @@ from typing import Any
 
 from mbd.kernel.records.contacts import ContactRows, Contacts, Events, Frictions, Guards, Mechanism
 from mbd.kernel.records.declare import Integers, Reals, Table
+from mbd.kernel.records.runs import Runs
 from mbd.kernel.records.settings import SchemeAbilities, Settings, Sizes
 from mbd.kernel.records.solution import (
     Balance,
@@ -60,12 +61,12 @@ from mbd.kernel.records.state import MODE_CAPACITY, PROGRAMS, Memory, Model, Mot
 __all__ = [
     "MODE_CAPACITY", "PROGRAMS", "TABLE", "Balance", "Complementarity", "ContactForces", "ContactRows", "Contacts",
     "DependentRows", "Equations", "Events", "Frictions", "Guards", "Integers", "Kernel", "LinearAlgebra", "Mechanism",
-    "Memory", "Model", "Motion", "Reals", "Report", "Results", "SchemeAbilities", "Settings", "Singular",
+    "Memory", "Model", "Motion", "Reals", "Report", "Results", "Runs", "SchemeAbilities", "Settings", "Singular",
     "SingularSteps", "Sizes", "State", "Steps", "Switching",
 ]  # fmt: skip
 
 
-class Kernel(Switching, SingularSteps):
+class Kernel(Switching, SingularSteps, Runs):
     """All of them."""
 
     hooks: Any  # the scheme of the interpreted kernel

@@ -76,7 +76,6 @@ class Settings(Sizes):
     max_switches: int
     linear: int  # 1: event instants by one linear interpolation
     stride: int  # steps from one stored row to the next
-    chunk: int  # steps before control returns
     strategy: int  # 0 located events, 1 non-smooth steps
     auto: int  # 1: non-smooth steps follow where located impacts crowd
     impact_law: int  # 0 Newton, 1 Poisson, 2 sequential
@@ -91,8 +90,6 @@ class Settings(Sizes):
     gamma: float
     tolerance: float
     rest_speed: float
-    until: float
-    end: float
     dt: float  # of all steps, or where they follow the error a time that is short beside the motion
     allowed: float  # local error in positions [m, rad] per second
     longest: float  # step

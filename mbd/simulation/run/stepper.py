@@ -92,6 +92,7 @@ class Stepper:
         self._shelved: dict[str, tuple[Any, int]] = {}  # arrays and their addresses
         self.kernel = self._sizes(dt, options)
         self._arrays(parameters, manager)
+        self.kernel.chunk, self.kernel.end = 1, float(options.get("end", 0.0))
         self.system = MechanismSystem(
             mechanism, manager, self.kernel.params, self.kernel.anchors, self.stabilized, self.kernel.dropped,
             self.kernel.sticks, self.kernel.slip,
@@ -129,8 +130,7 @@ class Stepper:
             linear=int(options.get("locate") == "linear"),
             width=1 + layout.n_q + 2 * layout.n + layout.n_rows + n_contacts + layout.n_frictions,
             capacity=int(options["capacity"]), stride=int(options.get("store", 1)), event_width=5 + layout.n_rows,
-            chunk=1,
-            rest_speed=float(options.get("rest_speed", 1e-6)), dt=dt, until=0.0, end=float(options.get("end", 0.0)),
+            rest_speed=float(options.get("rest_speed", 1e-6)), dt=dt,
             alpha_m=0.0, alpha_f=0.0, beta=0.25, gamma=0.5, tolerance=1e-9, jerk=1, exact=0,
             adaptive=int("allowed" in options), allowed=float(options.get("allowed", 0.0)),
             longest=float(options.get("longest", np.inf)), error_order=self.integrator.error_order(), n_substeps=1,
@@ -262,8 +262,19 @@ class Stepper:
 
     def advance(self, until: float) -> int:
         """Run the kernel until it returns; its status."""
+        self.kernel.until = until
+        return self._called()
+
+    def march_many(self) -> int:
+        """Take runs from their lines of starts to their ends until the kernel returns; its status."""
+        self.kernel.many = 1
+        try:
+            return self._called()
+        finally:
+            self.kernel.many = 0
+
+    def _called(self) -> int:
         v = self.kernel
-        v.until = until
         if v.auto:
             v.strategy = int(v.fallback > 0)
         v.n_substeps = SUBSTEPS if self.integrator.order() > 2 and not v.strategy else 1
@@ -298,10 +309,11 @@ class Stepper:
 
     def _advance_plain(self) -> int:
         from mbd.kernel.advance import advance
+        from mbd.kernel.many_runs import march_many
 
         self.kernel.hooks = self.scheme
         with np.errstate(all="ignore"):
-            return int(advance(self.kernel))
+            return int(march_many(self.kernel) if self.kernel.many else advance(self.kernel))
 
     def _advance_compiled(self) -> int:
         from mbd.kernel.build import entry

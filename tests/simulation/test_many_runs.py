@@ -1,0 +1,112 @@
+"""Runs in one call of the kernel are, to the bit, those that are made one by one."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+
+import mbd
+from mbd.kernel import codes
+from mbd.simulation.repeated import RepeatedRun
+from mbd.simulation.run.many import ManyRuns, start_line
+from mbd.simulation.simulate import REST_SPEED, laid_out
+from mbd.testing.mechanisms import random_scene
+from tests.cases.walkers import kneed, standing
+from tests.problems import case
+from tests.simulation.mechanisms import ball
+
+SCHEMES = (mbd.HHT(alpha=0.05), mbd.RungeKutta853(), mbd.RadauIIA())
+OPTIONS = {"impact": "newton", "locate": "root", "store": 1, "rest_speed": REST_SPEED, "backend": "auto"}
+LENGTH = 0.6
+
+
+def same(one: mbd.State, other: mbd.State) -> bool:
+    """Whether two states are one, to the bit."""
+    arrays = all(np.array_equal(getattr(one, name), getattr(other, name)) for name in ("q", "v", "z", "anchors"))
+    return arrays and (one.time, one.mode, one.armed) == (other.time, other.mode, other.armed)
+
+
+def starts_of(model: mbd.Model, rng: np.random.Generator, count: int) -> list[mbd.State]:
+    """States with velocities drawn at random, all contacts open."""
+    base = mbd.assemble(model)
+    return [mbd.assemble(model, velocity={n: rng.uniform(-1, 1) for n in base.velocity_names}) for _ in range(count)]
+
+
+@settings(max_examples=8)
+@given(seed=st.integers(0, 300), scheme=st.sampled_from(SCHEMES), contact=st.sampled_from(["events", "nonsmooth"]))
+def test_many_runs_are_the_same_as_single_ones(seed, scheme, contact):
+    model = random_scene(seed, bodies=2)
+    if contact == "nonsmooth" and not isinstance(scheme, mbd.HHT):
+        contact = "auto"
+    starts = starts_of(model, np.random.default_rng(seed), 3)
+    try:
+        run = laid_out(model, starts[0], scheme, 0.01, LENGTH, {}, {**OPTIONS, "contact": contact})
+    except mbd.CapabilityError:
+        return
+    many = ManyRuns(run)
+    ends = many(np.array([start_line(run, start) for start in starts]))
+    for k, start in enumerate(starts):
+        alone = mbd.simulate(model, start, scheme, dt=0.01, until=LENGTH, contact=contact, on_failure="return")
+        if ends.status[k] >= codes.DOUBTFUL_START:
+            continue
+        assert (ends.status[k] == codes.DONE) == alone.success or "energy" in alone.message
+        if alone.success:
+            assert same(ends.state(run, k, {}), alone.final)
+            assert ends.steps[k] == alone.stats["steps"]
+            assert ends.events[k] == len(alone.events)
+
+
+@cache
+def walker() -> tuple[mbd.Model, mbd.State]:
+    """The kneed walker just after a heel strike."""
+    reference = case("f3-kneed-walker-chen")
+    model = kneed(reference.definition)
+    return model, beginning(-1.1014, -0.0399)
+
+
+def beginning(*rates: float) -> mbd.State:
+    """The walker with both feet on the slope."""
+    sizes = case("f3-kneed-walker-chen").definition
+    angles = (0.1877, -2.0 * sizes["slope"] - 0.1877)
+    return standing(kneed(sizes), [*angles, *rates], sizes["slope"])
+
+
+def test_repeated_runs_of_a_walker_are_the_same_together():
+    model, start = walker()
+    repeated = RepeatedRun(model, start, mbd.RungeKutta853(), 0.02, ("right foot", 2.0), {"gravity.x": 0.5})
+    rng = np.random.default_rng(1)
+    starts = [beginning(*rng.uniform(-1.2, 0.2, 2)) for _ in range(6)]
+    values = [{"gravity.x": float(g)} for g in rng.uniform(0.2, 0.9, 6)]
+    for one, k in zip(repeated.many(starts, values), range(6), strict=True):
+        other = repeated(starts[k], values[k])
+        assert same(one.state, other.state)
+        assert one.state.parameters == values[k]
+        assert (one.stopped_by, one.before, one.problem) == (other.stopped_by, other.before, other.problem)
+        told = [[(e.time, e.kind, e.name, e.energy_loss, dict(e.impulses)) for e in end.events] for end in (one, other)]
+        assert repr(told[0]) == repr(told[1])
+
+
+def test_starts_that_are_none_and_runs_that_fail_stop_no_other():
+    model, start = walker()
+    repeated = RepeatedRun(model, start, mbd.RungeKutta853(), 0.02, ("right foot", 2.0), {})
+    wrong = mbd.State(0.0, start.q + 0.1, start.v, start.z, start.mode, start.armed, start.anchors, start.names,
+                      start.velocity_names)  # fmt: skip
+    ends = repeated.many([start, wrong, start])
+    assert ends[1].state is None and "does not satisfy its constraints" in ends[1].problem
+    assert same(ends[0].state, ends[2].state)
+    with pytest.raises(mbd.ModelError, match="2 starts and 1 sets"):
+        repeated.many([start, start], [{}])
+
+
+def test_the_twin_takes_many_runs_too():
+    model = ball()
+    starts = [mbd.assemble(model, position={"fall.displacement": h}) for h in (0.01, 0.02)]
+    scheme, options = mbd.RungeKutta853(), {**OPTIONS, "contact": "events", "backend": "python"}
+    run = laid_out(model, starts[0], scheme, 0.02, ("floor", 0.2), {}, options)
+    ends = ManyRuns(run)(np.array([start_line(run, start) for start in starts]))
+    for k, start in enumerate(starts):
+        alone = mbd.simulate(model, start, scheme, 0.02, until=("floor", 0.2), contact="events", backend="python")
+        assert same(ends.state(run, k, {}), alone.final)
