@@ -7,24 +7,20 @@ velocities of the rows: what does not agree with them to round-off is refused.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 
 from mbd.arrays import Vector
 from mbd.integrators.family import NewmarkFamily
 from mbd.sensitivity.balance import consistent_rates, on_rows
-from mbd.sensitivity.implicit import ImplicitSteps
 from mbd.sensitivity.motion import Mode, Motion, Rates
 from mbd.sensitivity.newmark import NewmarkSteps
+from mbd.sensitivity.newmark_kernel import Rows, taken
 from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.run_data import RunRows
 from mbd.sensitivity.schemes import Memory, SchemeSteps
 
 __all__ = ["NewmarkRows"]
-
-FEW = 4
-"""Steps below which one after the other is quicker [-]."""
 
 
 class NewmarkRows(SchemeSteps):
@@ -40,51 +36,17 @@ class NewmarkRows(SchemeSteps):
         return self.steps.start(motion, mode, rates)
 
     def leap(self, motion: Motion, memory: Memory, mode: Mode, first: int, last: int) -> tuple[int, Motion, Memory]:
-        """By one matrix a step."""
+        """All of them at once."""
+        if last <= first:
+            return first, motion, memory
+        still = np.zeros_like(motion.tangent.t)
+        done, motion, memory = taken(self.steps, motion, memory, mode, self._rows(first, last), still)
+        return first + done, motion, memory
+
+    def _rows(self, first: int, last: int) -> Rows:
+        """Rows of the run, from the first to the last one."""
         record, here = self.rows.record, slice(first, last + 1)
-        if last - first < FEW:
-            return first, motion, memory
-
-        def steps(here: slice) -> ImplicitSteps:
-            return ImplicitSteps(
-                self.steps, motion, mode, np.asarray(record.time[here]), np.asarray(record.q[here]), self.rows.y[here],
-                self.rows.rate[here], np.asarray(record.lam[here]), memory,
-            )  # fmt: skip
-
-        last = first + steps(here).followed()
-        if last - first < FEW:
-            return first, motion, memory
-        taken = steps(slice(first, last + 1))
-        try:
-            matrices, of_lam = taken.matrices()
-        except np.linalg.LinAlgError:
-            return first, motion, memory
-        c, tangent = self.programs.columns, motion.tangent
-        rows, slopes_of = list(mode.rows), memory.of_lam_slope
-        ahead = [memory.of_slope, memory.of_shift, memory.of_change] if self.stabilized and rows else []
-        if ahead and slopes_of is not None:
-            ahead += [memory.rates.of_lam[rows], slopes_of[rows]]
-        scheme = [memory.rates.of_rate, memory.of_aux, *(each for each in ahead if each is not None)]
-        X = np.vstack([tangent.q, tangent.y, *scheme, tangent.t[np.newaxis], tangent.anchors, tangent.p])
-        for matrix in matrices[:-1]:
-            X = matrix @ X
-        lam = np.zeros((c.rows, X.shape[1]))
-        lam[list(mode.rows)] = of_lam[-1] @ X
-        X = matrices[-1] @ X
-        q, y, rate, aux = np.split(X[: c.n_v + 3 * c.n], [c.n_v, c.n_v + c.n, c.n_v + 2 * c.n])
-        known = np.split(X[c.n_v + 3 * c.n :], [c.n, c.n + c.n_v, c.n + 2 * c.n_v])[:3] if ahead else []
-        if ahead:
-            at = c.n_v + 4 * c.n + 2 * c.n_v + len(rows)
-            known.append(np.zeros_like(lam))
-            known[-1][rows] = X[at : at + len(rows)]
-        end = Motion(
-            float(record.time[last]), np.array(record.q[last]), self.rows.y[last], motion.anchors,
-            replace(tangent, q=q, y=y),
-        )  # fmt: skip
-        rates = Rates(self.rows.rate[last], np.array(record.lam[last]), rate, lam)
-        shift, step = taken.shifts(), float(taken.h[-1])
-        slopes = (taken.rate[-1] - taken.rate[-2]) / step, (taken.lam[-1] - taken.lam[-2]) / step
-        return last, end, Memory(rates, taken.a[-1], aux, step, *slopes, shift[-1], shift[-1] - shift[-2], *known)
+        return record.time[here], record.q[here], self.rows.y[here], self.rows.rate[here], record.lam[here]
 
     def along(
         self, motion: Motion, memory: Memory, mode: Mode, row: int, dh: Vector, fresh: bool

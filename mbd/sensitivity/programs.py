@@ -1,8 +1,10 @@
 """Compiled derivatives of what steps, restarts, guards and contacts are made of.
 
-Each program lists values and, row by row, their derivatives by the columns
+Each program lists values and, row by row, those of their derivatives by the columns
 
     x (n_v) | v, z (n) | v̇, ż (n) | λ (R) | t | anchors | chosen parameters
+
+that are not always zero.
 
 =============  =============================================================================================
 `steps`        r (n), h (R), ḣ (R): the balance over all rows, penalties behind their switches, frictions behind slips
@@ -20,8 +22,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
 from mbd.compile.backend import Function
@@ -29,12 +33,12 @@ from mbd.compile.layout import Layout
 from mbd.compile.mechanism import Mechanism
 from mbd.equations.equations import Equations
 from mbd.equations.inputs import Inputs
-from mbd.equations.linearization import across, along_places, row_changes
+from mbd.equations.linearization import along_places, row_changes
 from mbd.equations.programs import switched_balance
 from mbd.tape.derivatives import jvps
 from mbd.tape.node import Node
 
-__all__ = ["Columns", "Programs", "State"]
+__all__ = ["Columns", "Programs", "Sparse", "State"]
 
 PROTOTYPE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
 """Of compiled functions, for calls with addresses."""
@@ -110,6 +114,15 @@ class State:
     slip: Vector
 
 
+@dataclass(frozen=True)
+class Sparse:
+    """A compiled program: its values, and of their derivatives those that are not always 0, by line and column."""
+
+    function: Function
+    lines: NDArray[np.int64]
+    columns: NDArray[np.int64]
+
+
 class Programs:
     """The programs of a mechanism for some of its parameters, made when they are called first.
 
@@ -126,6 +139,7 @@ class Programs:
         self.values = np.ascontiguousarray(values, dtype=float) if len(values) else np.zeros(1)
         self._block = np.zeros(self.layout.size)
         self._given: dict[str, list[Node]] = {}
+        self.known: dict[Any, Any] = {}
 
     def steps(self, at: State) -> tuple[Vector, Vector, Vector, Matrix, Matrix, Matrix]:
         """r, h, ḣ and their derivatives."""
@@ -164,10 +178,14 @@ class Programs:
 
     def many(self, name: str, blocks: Matrix, size: int) -> tuple[Matrix, Matrix]:
         """Values (N, size) and derivatives (N, size, columns) of a program at many blocks (N, block)."""
-        out = np.empty((len(blocks), size * (1 + self.columns.count)))
-        if size:
-            run_many(self._compiled(name), blocks, self.values, out)
-        return out[:, :size], out[:, size:].reshape(len(blocks), size, self.columns.count)
+        slopes = np.zeros((len(blocks), size, self.columns.count))
+        if not size:
+            return np.zeros((len(blocks), 0)), slopes
+        program = self.sparse(name)
+        out = np.empty((len(blocks), size + len(program.lines)))
+        run_many(program.function, blocks, self.values, out)
+        slopes[:, program.lines, program.columns] = out[:, size:]
+        return out[:, :size], slopes
 
     def accelerations(self, blocks: Matrix) -> Matrix:
         """Outputs of the program `accelerations` at many blocks."""
@@ -175,16 +193,24 @@ class Programs:
         run_many(self.mechanism.common["accelerations"], blocks, self.values, out)
         return out
 
-    def _compiled(self, name: str) -> Function:
+    def sparse(self, name: str) -> Sparse:
         """A program, made when it is called first."""
         mechanism = self.mechanism
         key = f"{name} by {self.places}"
-        known: Function | None = mechanism.named.get(key)
+        known: Sparse | None = mechanism.named.get(key)
         if known is None:
             symbol = f"derivative_{len(mechanism.common)}"
             with mechanism.equations.tape.lock:
-                mechanism.common.add({symbol: self._program(name)})
-                known = mechanism.named[key] = mechanism.common[symbol]
+                values = self._values(name)
+                columns = derivatives(self.equations, values, self.places)
+                found = [
+                    (i, j, column[i]) for i in range(len(values)) for j, column in enumerate(columns)
+                    if not column[i].is_zero
+                ]  # fmt: skip
+                mechanism.common.add({symbol: [*values, *(node for _, _, node in found)]})
+                lines, places = ([each[k] for each in found] for k in (0, 1))
+                known = Sparse(mechanism.common[symbol], np.array(lines, dtype=int), np.array(places, dtype=int))
+                mechanism.named[key] = known
         return known
 
     def fill(self, block: Matrix, at: State) -> None:
@@ -200,34 +226,36 @@ class Programs:
         block[..., layout.slip : layout.shift] = at.slip
 
     def _call(self, name: str, at: State, size: int) -> tuple[Vector, Matrix]:
+        slopes = np.zeros((size, self.columns.count))
+        if not size:
+            return np.zeros(0), slopes
         self.fill(self._block, at)
-        out = np.empty(size * (1 + self.columns.count))
-        if size:
-            self._compiled(name)(self._block, self.values, out)
-        return out[:size], out[size:].reshape(size, self.columns.count)
+        program = self.sparse(name)
+        out = np.empty(size + len(program.lines))
+        program.function(self._block, self.values, out)
+        slopes[program.lines, program.columns] = out[size:]
+        return out[:size], slopes
 
-    def _program(self, name: str) -> list[Node]:
-        """Values of a program and their derivatives."""
+    def _values(self, name: str) -> list[Node]:
+        """What a program lists."""
         equations = self.equations
         if name in self._given:
-            values = list(self._given[name])
-        elif name == "steps":
+            return list(self._given[name])
+        if name == "steps":
             values = switched_balance(equations)
-            values += [row.value for row in equations.rows] + [row.rate for row in equations.rows]
-        elif name == "consistent":
-            values = switched_balance(equations) + row_changes(equations, range(len(equations.rows)))
-        elif name == "watched":
+            return values + [row.value for row in equations.rows] + [row.rate for row in equations.rows]
+        if name == "consistent":
+            return switched_balance(equations) + row_changes(equations, range(len(equations.rows)))
+        if name == "watched":
             zero, contacts, frictions = equations.tape.zero, equations.contacts, equations.frictions
             values = [contact.gap for contact in contacts]
             values += [zero if contact.force is None else contact.force for contact in contacts]
             values += [guard.value for guard in equations.guards]
             values += [friction.rate for friction in frictions] + [friction.limit for friction in frictions]
-            values += [each.only_while if isinstance(each.only_while, Node) else zero for each in contacts]
-        elif name == "captured":
-            values = [value for contact in equations.contacts for value in contact.captured]
-        else:
-            values = [equations.output(name.removeprefix("result "))]
-        return [*values, *across(derivatives(equations, values, self.places), len(values))]
+            return values + [each.only_while if isinstance(each.only_while, Node) else zero for each in contacts]
+        if name == "captured":
+            return [value for contact in equations.contacts for value in contact.captured]
+        return [equations.output(name.removeprefix("result "))]
 
 
 def derivatives(equations: Equations, values: Sequence[Node], places: Sequence[int]) -> list[list[Node]]:
