@@ -207,7 +207,7 @@ def _begun(gait: Any, parameter: Any, to: Any, steps: Any, step: Any) -> tuple[C
     assert isinstance(found, Measured)
     first = given.point(Corrected(gait.state, value, found, 0), None)
     zero = np.zeros(gait.chart.size)
-    by = map_derivative(gait.map, gait.chart, zero, given.with_value(value), [parameter], fine=False, state=False)
+    by = map_derivative(gait.map, gait.chart, zero, given.with_value(value), [parameter], levels=1, state=False)
     if not by.missing and np.nanmax(np.abs(width * by.matrix), initial=0.0) <= WITHOUT_EFFECT:
         raise ModelError(f"parameter: {parameter!r} changes nothing of this gait")
     return given, first

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from mbd.arrays import Matrix, Vector
 from mbd.errors import GaitError, SimulationError
 from mbd.gait.floquet import Multipliers, multipliers_of
-from mbd.gait.map_derivative import MapDerivative, Measured, map_derivative, measured
+from mbd.gait.map_derivative import MapDerivative, Measured, map_derivative, measured, numbers_of
 from mbd.gait.outcome import Outcome
 from mbd.gait.return_map import Arrival, ReturnMap
 from mbd.gait.section import Chart, Section
@@ -87,8 +87,10 @@ class Continuation:
         """The parameters with another value of the one that varies."""
         return {**self.values, self.name: float(value)}
 
-    def point(self, corrected: Corrected, before: Vector | None) -> BranchPoint:
+    def point(self, corrected: Corrected, before: Vector | None, levels: int = 2) -> BranchPoint:
         """The point of a solution; its tangent goes on in the direction of the one `before`.
+
+        levels : see `map_derivative`
 
         Raises
         ------
@@ -98,7 +100,8 @@ class Continuation:
         values = self.with_value(corrected.value)
         chart = Chart(self.section, corrected.state, self.map.vector(values))
         zero = np.zeros(chart.size)
-        derivative = map_derivative(self.map, chart, zero, values, [self.name])
+        base = numbers_of(chart, corrected.found.arrival)
+        derivative = map_derivative(self.map, chart, zero, values, [self.name], levels, base=base)
         if derivative.missing:
             why = next(iter(derivative.missing.values()))
             raise GaitError(f"no derivative at {self.name} = {corrected.value:.9g}: {why}")
@@ -162,7 +165,7 @@ class Continuation:
     def matrix_at(self, chart: Chart, u: Vector, values: Mapping[str, float]) -> Matrix | None:
         """[P − 1, σ F_p] beside a point; None where derivatives are missing."""
         try:
-            derivative = map_derivative(self.map, chart, u[:-1], values, [self.name], fine=False)
+            derivative = map_derivative(self.map, chart, u[:-1], values, [self.name], levels=1)
         except SimulationError:
             return None
         return None if derivative.missing else self._matrix(derivative, chart.size)

@@ -14,7 +14,7 @@ from mbd.errors import GaitError
 from mbd.gait.derivatives import Derivatives
 from mbd.gait.energies import cost_of_transport, energy_by_cause
 from mbd.gait.floquet import Multipliers
-from mbd.gait.map_derivative import MapDerivative
+from mbd.gait.map_derivative import MapDerivative, Measured, measured
 from mbd.gait.outcome import Outcome
 from mbd.gait.return_map import ReturnMap
 from mbd.gait.section import Chart
@@ -40,7 +40,6 @@ class LimitCycle:
     period : of one application of the map [s]; distance : that it leads on [m]
     steps : (foot, time of its touchdown [s], length [m]) in order
     residual : by unit, what the state just after the next event differs by; residuals : largest of each iteration
-    error : change of that state with half the step dt [m, rad, and per s]
     stability_of : multipliers, modes, trivial ones; map_derivative : P and how it was found
     parameters : values that differ from the model's, functions of parameters among them
     dt : step [s]; runs : how many were made
@@ -58,7 +57,6 @@ class LimitCycle:
     steps: tuple[tuple[str, float, float], ...]
     residual: Mapping[str, float]
     residuals: Sequence[float]
-    error: float
     stability_of: Multipliers
     map_derivative: MapDerivative | None
     parameters: Mapping[str, float]
@@ -125,11 +123,25 @@ class LimitCycle:
         near = on_section(self.chart.section, self.state, self.map.vector(values))
         if self.given is None or near is None:
             raise GaitError(f"no gait to go on from: {self.outcome}", self)
-        found = search(self.given, near, values)
+        known = None if self.map_derivative is None else self.map_derivative.matrix[: self.chart.size]
+        found = search(self.given, near, values, None if known is None else (self.chart, known))
         if not found.success:
             changed = ", ".join(f"{name} = {value:g}" for name, value in parameters.items())
             raise GaitError(f"{self.name} with {changed}: {found.outcome}", found)
         return found
+
+    @cached_property
+    def error(self) -> float:
+        """Change of the state after one application, and of its period and steps, with half the step dt [SI units]."""
+        if not self.success:
+            return float("nan")
+        zero = np.zeros(self.chart.size)
+        here, finer = (
+            measured(map_, self.chart, zero, self.parameters) for map_ in (self.map, self.map.with_step(0.5 * self.dt))
+        )
+        if not isinstance(here, Measured) or not isinstance(finer, Measured) or len(finer.numbers) != len(here.numbers):
+            return float("nan")
+        return float(np.nanmax(np.abs(finer.numbers - here.numbers)))
 
     # stability ----------------------------------------------------------------------------------------------------
     @property

@@ -2,7 +2,7 @@
 
 A fixed point ``F(c, p) = c`` of the return map moves by ``dc/dp = (1 − P)⁻¹ ∂F/∂p``, P = ∂F/∂c, and with it period,
 way and steps, which the map gives too: ``dT/dp = ∂T/∂c dc/dp + ∂T/∂p``. Multipliers have derivatives of P in them;
-theirs are differences of gaits found again beside the first, with one Richardson extrapolation.
+theirs are differences of gaits found again beside the first, with two Richardson extrapolations.
 """
 
 from __future__ import annotations
@@ -14,12 +14,13 @@ import numpy as np
 
 from mbd.arrays import Vector
 from mbd.errors import GaitError, ModelError, UnknownNameError, nearest
-from mbd.gait.map_derivative import map_derivative
+from mbd.gait.map_derivative import extrapolated, map_derivative
 
 __all__ = ["Derivatives", "parameter_value"]
 
-BESIDE = 1e-3
-"""Difference of a parameter, over its value or 1, at which gaits are found again; and twice that [-]."""
+BESIDE, LEVELS = 4e-3, 3
+"""Least difference of a parameter, over its value or 1, at which gaits are found again, and how many, each twice the
+one before."""
 
 
 class Derivatives(Mapping[tuple[str, str], float]):
@@ -110,8 +111,8 @@ def _implicit(gait: Any, name: str) -> dict[str, float]:
 def _beside(gait: Any, scalar: str, name: str) -> float:
     """The derivative of a scalar by central differences of gaits at parameters beside."""
     value, slopes = parameter_value(gait, name), []
-    for factor in (1.0, 2.0):
-        h = factor * BESIDE * (abs(value) or 1.0)
+    for level in range(LEVELS):
+        h = 2.0**level * BESIDE * (abs(value) or 1.0)
         ends = [gait.at({name: value + sign * h}).scalars[scalar] for sign in (1.0, -1.0)]
-        slopes.append((ends[0] - ends[1]) / (2.0 * h))
-    return float((4.0 * slopes[0] - slopes[1]) / 3.0)
+        slopes.append(np.array([ends[0] - ends[1]]) / (2.0 * h))
+    return float(extrapolated(slopes)[0][0])

@@ -143,6 +143,6 @@ def _none(map_: ReturnMap, failed: Failed) -> LimitCycle:
     mirror = None if map_.mirror is None else map_.mirror.sides
     return LimitCycle(
         getattr(map_.model, "name", ""), map_.section, mirror, map_.strides, failed.state, failed.outcome,
-        (failed.outcome,), none, none, (), {}, (), none, empty, None, dict(map_.values), map_.dt, map_.runs, chart,
+        (failed.outcome,), none, none, (), {}, (), empty, None, dict(map_.values), map_.dt, map_.runs, chart,
         map_, np.zeros(len(map_.fixed)), None,
     )  # fmt: skip

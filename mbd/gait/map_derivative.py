@@ -17,14 +17,14 @@ from mbd.errors import SimulationError
 from mbd.gait.return_map import Arrival, ReturnMap, Values
 from mbd.gait.section import Chart
 
-__all__ = ["MapDerivative", "Measured", "map_derivative"]
+__all__ = ["MapDerivative", "Measured", "extrapolated", "map_derivative", "measured", "numbers_of"]
 
 STATE_STEP, PARAMETER_STEP = 2e-4, 2e-3
 """Least of the three differences of coordinates of the section [m, rad, 1/s of them], and of parameters over them."""
 COARSE_STEP = 1e-5
 """Difference where two runs a direction must do."""
 LEVELS = 3
-"""Differences of each direction: h, 2h, 4h."""
+"""Differences of each direction at most: h, 2h, 4h."""
 ENOUGH, CLOSER = 1e-9, 0.125
 """Error estimate, relative to 1 or the derivative, above which smaller differences are tried, and how much smaller."""
 SHRINK, TRIES = 0.1, 4
@@ -53,7 +53,7 @@ class MapDerivative:
     """∂(coordinates, period, travel, steps)/∂(directions).
 
     matrix (n_out, n_directions); error : estimate of that of each entry
-    how : 'differences of order 6', 'differences of order 2' or 'exact'
+    how : 'differences of order 6', of 4 or of 2
     missing : why directions have no derivative, by number
     """
 
@@ -69,84 +69,102 @@ def measured(map_: ReturnMap, chart: Chart, c: Vector, values: Values) -> Measur
     arrival = map_(state, values)
     if not arrival.outcome.good or not map_.against(chart.section, arrival).good:
         return arrival
+    return numbers_of(chart, arrival)
+
+
+def numbers_of(chart: Chart, arrival: Arrival) -> Measured:
+    """The numbers of an arrival in the coordinates of a chart."""
     steps = [number for _, time, length in arrival.steps for number in (time, length)]
     numbers = np.concatenate([chart.of(arrival.state), [arrival.period], arrival.travel, steps])
     return Measured(numbers, chart.size, arrival)
 
 
 def map_derivative(
-    map_: ReturnMap, chart: Chart, c: Vector, values: Values, names: Sequence[str] = (), fine: bool = True,
-    state: bool = True,
+    map_: ReturnMap, chart: Chart, c: Vector, values: Values, names: Sequence[str] = (), levels: int = LEVELS,
+    state: bool = True, base: Measured | None = None,
 ) -> MapDerivative:  # fmt: skip
-    """The derivatives at c, by all coordinates of the section (unless `state` is False), then by parameters `names`."""
-    directions: list[tuple[Vector, str, float]] = []
-    if state:
-        directions += [(unit, "", STATE_STEP) for unit in np.eye(chart.size)]
-    directions += [(np.zeros(chart.size), name, PARAMETER_STEP * (abs(values[name]) or 1.0)) for name in names]
-    base = measured(map_, chart, c, values)
-    if isinstance(base, Arrival):
-        raise SimulationError(f"the base of derivatives {base.outcome}")
-    columns, errors, missing = [], [], {}
-    for number, (move, name, step) in enumerate(directions):
-        found = _column(map_, chart, (c, values), (move, name), step if fine else step * COARSE_STEP / STATE_STEP,
-                        LEVELS if fine else 1, len(base.numbers))  # fmt: skip
-        if isinstance(found, str):
-            missing[number] = found
-            found = (np.full(len(base.numbers), np.nan),) * 2
-        columns.append(found[0])
-        errors.append(found[1])
-    shape = (0, len(base.numbers))
-    matrix, error = (np.array(part).T if part else np.zeros(shape).T for part in (columns, errors))
-    return MapDerivative(matrix, error, f"differences of order {2 * LEVELS if fine else 2}", missing)
+    """The derivatives at c, by all coordinates of the section (unless `state` is False), then by parameters `names`.
 
-
-def _column(
-    map_: ReturnMap, chart: Chart, base: tuple[Vector, Values], direction: tuple[Vector, str], step: float,
-    levels: int, size: int,
-) -> tuple[Vector, Vector] | str:  # fmt: skip
-    """The derivative along one direction and its estimated error; why there is none, in a phrase."""
-    reason, best = "", None
+    levels : differences of each direction, 1 to 3: of order 2 for steps of Newton, 4 along branches, 6 of gaits
+    base : what the map gives at c, where that is known
+    """
+    found = measured(map_, chart, c, values) if base is None else base
+    if isinstance(found, Arrival):
+        raise SimulationError(f"the base of derivatives {found.outcome}")
+    scale = 1.0 if levels > 1 else COARSE_STEP / STATE_STEP
+    units = np.eye(chart.size) if state else ()
+    columns = [_Column(unit, "", scale * STATE_STEP) for unit in units]
+    none = np.zeros(chart.size)
+    columns += [_Column(none, name, scale * PARAMETER_STEP * (abs(values[name]) or 1.0)) for name in names]
+    size = len(found.numbers)
     for _ in range(TRIES):
-        slopes: list[Vector] = []
-        for level in range(levels):
-            h = step * 2.0**level
-            pair = [_beside(map_, chart, base, direction, sign * h) for sign in (1.0, -1.0)]
-            bad = next((each for each in pair if isinstance(each, str)), None)
-            if bad is None and any(len(each) != size for each in pair):
-                bad = "has other steps"
-            if bad is not None:
-                reason = f"beside the base it {bad}"
-                break
-            slopes.append((pair[0] - pair[1]) / (2.0 * h))  # type: ignore[operator]
-        if len(slopes) < levels:
-            step *= SHRINK
+        pending = [column for column in columns if not column.done]
+        if not pending:
+            break
+        points = [point for column in pending for point in column.points((c, values), levels)]
+        beside = iter(_beside(map_, chart, points))
+        for column in pending:
+            column.take([next(beside) for _ in range(2 * levels)], size)
+    missing = {number: column.reason for number, column in enumerate(columns) if column.best is None}
+    nothing = np.full(size, np.nan), np.full(size, np.nan)
+    pairs = [nothing if column.best is None else column.best for column in columns]
+    matrix, error = (np.array([pair[k] for pair in pairs]).reshape(-1, size).T for k in (0, 1))
+    return MapDerivative(matrix, error, f"differences of order {2 * levels}", missing)
+
+
+@dataclass(eq=False)
+class _Column:
+    """The search for the derivative along one direction: its differences h, 2h, 4h and what they came to."""
+
+    move: Vector
+    name: str
+    step: float
+    best: tuple[Vector, Vector] | None = None
+    done: bool = False
+    reason: str = ""
+
+    def points(self, base: tuple[Vector, Values], levels: int) -> list[tuple[Vector, Values]]:
+        """Where the map is asked for: ahead and behind at each distance."""
+        c, values = base
+        ends = [sign * self.step * 2.0**level for level in range(levels) for sign in (1.0, -1.0)]
+        if self.name:
+            return [(c, {**values, self.name: values[self.name] + h}) for h in ends]
+        return [(c + h * self.move, values) for h in ends]
+
+    def take(self, beside: Sequence[Vector | str], size: int) -> None:
+        """What the map gave there, of which derivatives follow unless a run did not arrive: then h shrinks."""
+        bad = next((each for each in beside if isinstance(each, str) or len(each) != size), None)
+        if bad is not None:
+            self.reason = f"beside the base it {bad if isinstance(bad, str) else 'has other steps'}"
+            self.done = self.best is not None
+            self.step *= SHRINK
+            return
+        pairs = zip(beside[::2], beside[1::2], strict=True)
+        slopes = [(ahead - behind) / (2.0**level * 2.0 * self.step)  # type: ignore[operator]
+                  for level, (ahead, behind) in enumerate(pairs)]  # fmt: skip
+        found, last = extrapolated(slopes), self.best
+        if last is not None:
+            better = found[1] < last[1]
+            found = np.where(better, found[0], last[0]), np.where(better, found[1], last[1])
+        good = bool(np.all(found[1] <= ENOUGH * np.maximum(1.0, np.abs(found[0]))))
+        self.best, self.done = found, len(slopes) == 1 or last is not None or good
+        self.step *= CLOSER
+
+
+def _beside(map_: ReturnMap, chart: Chart, points: Sequence[tuple[Vector, Values]]) -> list[Vector | str]:
+    """The numbers of the map at points beside its base; why it does not arrive."""
+    found: list[Vector | str] = []
+    for c, values in points:
+        try:
+            each = measured(map_, chart, c, values)
+        except SimulationError as error:
+            found.append(str(error))
             continue
-        found = _extrapolated(slopes)
-        if best is not None:
-            better = found[1] < best[1]
-            found = np.where(better, found[0], best[0]), np.where(better, found[1], best[1])
-        if levels == 1 or best is not None or np.all(found[1] <= ENOUGH * np.maximum(1.0, np.abs(found[0]))):
-            return found
-        best, step = found, step * CLOSER
-    return reason if best is None else best
+        found.append(str(each.outcome) if isinstance(each, Arrival) else each.numbers)
+    return found
 
 
-def _beside(
-    map_: ReturnMap, chart: Chart, base: tuple[Vector, Values], direction: tuple[Vector, str], h: float
-) -> Vector | str:
-    """The numbers of the map beside its base; why it does not arrive."""
-    c, values = base
-    move, name = direction
-    if name:
-        values = {**values, name: values[name] + h}
-    try:
-        found = measured(map_, chart, c + h * move, values)
-    except SimulationError as error:
-        return str(error)
-    return str(found.outcome) if isinstance(found, Arrival) else found.numbers
-
-
-def _extrapolated(slopes: Sequence[Vector]) -> tuple[Vector, Vector]:
+def extrapolated(slopes: Sequence[Vector]) -> tuple[Vector, Vector]:
     """Richardson's table of central differences of h, 2h, 4h: for each number the entry of least error estimate."""
     if len(slopes) == 1:
         return slopes[0], np.full(len(slopes[0]), np.nan)

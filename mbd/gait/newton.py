@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mbd.arrays import Vector
+from mbd.arrays import Matrix, Vector
 from mbd.errors import SimulationError
-from mbd.gait.map_derivative import MapDerivative, Measured, map_derivative, measured
+from mbd.gait.map_derivative import Measured, map_derivative, measured, numbers_of
 from mbd.gait.outcome import Outcome
 from mbd.gait.return_map import Arrival, ReturnMap, Values
 from mbd.gait.section import Chart, Section
@@ -24,6 +24,10 @@ DECREASE = 0.25
 """Share of the decrease that the linear model promises which a step must reach [-]."""
 WALKS, AGAIN = 6, 3
 """Plain applications of the map where no part of a Newton step helps, and how often that is done [-]."""
+FAST = 0.2
+"""Factor by which a step with a derivative of before must shrink the residual, else it is found anew [-]."""
+FINE = 0.01
+"""Residual over `tol` above which one more step is made at the end [-]."""
 FLAT = 1e-9
 """Singular value of 1 − P relative to its largest below which a direction is left where it is [-]."""
 REST = 1e3
@@ -34,9 +38,10 @@ REST = 1e3
 class FixedPoint:
     """What the search came to.
 
-    chart : around the last state; c = 0 is that state; outcome : 'walks', or why there is no fixed point
+    chart : around the last state; c = 0 is that state; found : what the map gives there
+    outcome : 'walks', or why there is no fixed point
     residual : largest |c' − c| there; residuals : of all iterations; attempts : outcomes of what did not arrive
-    derivative : the last one, from the iterations
+    slope : ∂(c − c')/∂c in the chart, as derivatives at some state of it and the steps since tell; None: not known
     """
 
     chart: Chart
@@ -44,7 +49,9 @@ class FixedPoint:
     residual: float
     residuals: list[float] = field(default_factory=list)
     attempts: list[Outcome] = field(default_factory=list)
-    derivative: MapDerivative | None = None
+    found: Measured | None = None
+    slope: Matrix | None = None
+    exact: bool = False
 
     @property
     def state(self) -> State:
@@ -52,14 +59,21 @@ class FixedPoint:
         return self.chart.state
 
 
-def fixed_point(map_: ReturnMap, section: Section, start: State, values: Values, tol: float) -> FixedPoint:
+def fixed_point(
+    map_: ReturnMap, section: Section, start: State, values: Values, tol: float,
+    near: tuple[Chart, Matrix] | None = None,
+) -> FixedPoint:  # fmt: skip
     """The fixed point near a start on the section, ``c'(c) = c`` to `tol` in every coordinate.
 
     Steps d of ``(1 − P) d = c' − c`` are halved until the residual falls as promised; where none does, the walker walks
-    on for some steps, which leads towards an attractive gait, and Newton's method begins again.
+    on for some steps, which leads towards an attractive gait, and Newton's method begins again. While the residual
+    falls quickly the derivative is not found anew but follows the steps (Broyden 1965, Math. Comput. 19:577); `near`
+    has the chart and P of a gait near the start.
     """
-    parameters = map_.vector(values)
-    point = FixedPoint(Chart(section, start, parameters), Outcome("does not converge", ""), np.inf)
+    point = FixedPoint(Chart(section, start, map_.vector(values)), Outcome("does not converge", ""), np.inf)
+    if near is not None and near[0].size == point.chart.size:
+        turn = point.chart.basis.T @ near[0].basis
+        point.slope = turn @ (np.eye(point.chart.size) - near[1]) @ turn.T
     found: Measured | Outcome | None = _measure(map_, point.chart, np.zeros(point.chart.size), values, point)
     walked = 0
     for _ in range(MOST):
@@ -67,14 +81,14 @@ def fixed_point(map_: ReturnMap, section: Section, start: State, values: Values,
             assert found is not None
             point.outcome = map_.explained(point.state, found, values)
             return point
-        gap = found.c
-        point.residual = float(np.max(np.abs(gap), initial=0.0))
+        point.found = found
+        point.residual = float(np.max(np.abs(found.c), initial=0.0))
         point.residuals.append(point.residual)
         if point.residual <= tol:
+            _polish(map_, point, values, tol)
             point.outcome = _rest(map_, point, tol) or Outcome("walks", "walks")
             return point
-        step = _step(map_, point, gap, values)
-        found = _damped(map_, point, step, gap, values) if step is not None else None
+        found = _stepped(map_, point, found, values)
         if found is None and point.residual <= 100.0 * tol:
             break
         if found is None:
@@ -82,15 +96,40 @@ def fixed_point(map_: ReturnMap, section: Section, start: State, values: Values,
             if walked > AGAIN:
                 break
             found = _walked(map_, point, values)
+    _give_up(map_, point, tol)
+    return point
+
+
+def _polish(map_: ReturnMap, point: FixedPoint, values: Values, tol: float) -> None:
+    """One more step where the derivative is known and the residual not much below `tol`."""
+    if point.slope is None or point.found is None or point.residual <= FINE * tol:
+        return
+    found = _damped(map_, point, point.found.c, values, FAST, 1.0)
+    if isinstance(found, Measured):
+        point.found, point.residual = found, float(np.max(np.abs(found.c), initial=0.0))
+        point.residuals.append(point.residual)
+
+
+def _give_up(map_: ReturnMap, point: FixedPoint, tol: float) -> None:
+    """The outcome of a search that came to no fixed point."""
     if resting := _rest(map_, point, tol):
         point.outcome = resting
-        return point
+        return
     last = f"; beside it the walker {point.attempts[-1]}" if point.attempts else ""
     text = (
         f"no gait that repeats itself was found: {point.residual:.2g} is left after {len(point.residuals)} iterations"
     )
     point.outcome = Outcome("does not converge", text + last)
-    return point
+
+
+def _stepped(map_: ReturnMap, point: FixedPoint, found: Measured, values: Values) -> Measured | Outcome | None:
+    """What the map gives after a step of Newton's method; None where no part of it leads nearer."""
+    if point.slope is not None and not point.exact:
+        after = _damped(map_, point, found.c, values, FAST, 1.0)
+        if after is not None:
+            return after
+    point.slope, point.exact = _slope(map_, point, found, values), True
+    return None if point.slope is None else _damped(map_, point, found.c, values)
 
 
 def _rest(map_: ReturnMap, point: FixedPoint, tol: float) -> Outcome | None:
@@ -113,36 +152,50 @@ def _measure(map_: ReturnMap, chart: Chart, c: Vector, values: Values, point: Fi
     return found
 
 
-def _step(map_: ReturnMap, point: FixedPoint, gap: Vector, values: Values) -> Vector | None:
-    """Newton's step; None where derivatives are missing."""
+def _slope(map_: ReturnMap, point: FixedPoint, found: Measured, values: Values) -> Matrix | None:
+    """1 − P at the last state; None where derivatives are missing."""
     try:
-        point.derivative = map_derivative(map_, point.chart, np.zeros(point.chart.size), values, fine=False)
+        zero = np.zeros(point.chart.size)
+        derivative = map_derivative(map_, point.chart, zero, values, levels=1, base=found)
     except SimulationError:
         return None
-    P = point.derivative.matrix[: point.chart.size]
-    if not np.all(np.isfinite(P)):
-        return None
-    return np.asarray(np.linalg.lstsq(np.eye(len(P)) - P, gap, rcond=FLAT)[0])
+    P = derivative.matrix[: point.chart.size]
+    return np.eye(len(P)) - P if np.all(np.isfinite(P)) else None
 
 
-def _damped(map_: ReturnMap, point: FixedPoint, step: Vector, gap: Vector, values: Values) -> Measured | Outcome | None:
-    """A part of the step after which the residual is smaller, from where the next begins; None if there is none."""
+def _damped(
+    map_: ReturnMap, point: FixedPoint, gap: Vector, values: Values, needed: float = 1.0, shortest: float = SHORTEST
+) -> Measured | Outcome | None:
+    """A part of Newton's step after which the residual is smaller, from where the next begins; None if there is none.
+
+    needed : what the residual of a whole step may be at most, over that before
+    """
+    assert point.slope is not None
+    step = np.asarray(np.linalg.lstsq(point.slope, gap, rcond=FLAT)[0])
     before, part = float(np.max(np.abs(gap))), 1.0
-    while part >= SHORTEST:
+    while part >= shortest:
         c = part * step
         found = _measure(map_, point.chart, c, values, point)
         if isinstance(found, Measured):
-            after = float(np.max(np.abs(found.c - c)))
-            if after <= (1.0 - DECREASE * part) * before:
-                return _moved(map_, point, point.chart.at(c, map_.vector(values)), values)
+            left = found.c - c
+            if float(np.max(np.abs(left))) <= min(needed, 1.0 - DECREASE * part) * before:
+                point.slope += np.outer(gap - left - point.slope @ c, c) / float(c @ c)
+                point.exact = False
+                if part < 1.0:
+                    point.slope = None
+                return _moved(map_, point, c, found, values)
         part *= 0.5
     return None
 
 
-def _moved(map_: ReturnMap, point: FixedPoint, state: State, values: Values) -> Measured | Outcome:
-    """Go on from another state, with a chart around it."""
-    point.chart = Chart(point.chart.section, state, map_.vector(values))
-    return _measure(map_, point.chart, np.zeros(point.chart.size), values, point)
+def _moved(map_: ReturnMap, point: FixedPoint, c: Vector, found: Measured, values: Values) -> Measured:
+    """Go on from another state, with a chart around it: the same run, in other coordinates."""
+    old, parameters = point.chart, map_.vector(values)
+    point.chart = Chart(old.section, old.at(c, parameters), parameters)
+    if point.slope is not None:
+        turn = point.chart.basis.T @ old.basis
+        point.slope = turn @ point.slope @ turn.T
+    return numbers_of(point.chart, found.arrival)
 
 
 def _walked(map_: ReturnMap, point: FixedPoint, values: Values) -> Measured | Outcome:
@@ -155,5 +208,7 @@ def _walked(map_: ReturnMap, point: FixedPoint, values: Values) -> Measured | Ou
             point.attempts.append(outcome)
             return map_.explained(state, outcome, values)
         state = arrival.state
-    chart = Chart(point.chart.section, state, map_.vector(values))
-    return _moved(map_, point, chart.at(np.zeros(chart.size), map_.vector(values)), values)
+    parameters = map_.vector(values)
+    chart = Chart(point.chart.section, state, parameters)
+    point.chart, point.slope = Chart(chart.section, chart.at(np.zeros(chart.size), parameters), parameters), None
+    return _measure(map_, point.chart, np.zeros(point.chart.size), values, point)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -86,7 +87,7 @@ class ReturnMap:
         places = {contact.name: contact.place for contact in Facts.of(self.mechanism.equations).contacts}
         self.feet = {name: place for name, place in places.items() if place}
         self._where: dict[str, ScalarFunction] = {}
-        self._repeated: dict[float, RepeatedRun] = {}
+        self._repeated: dict[tuple[float, float] | None, RepeatedRun] = {}
 
     # parameters ---------------------------------------------------------------------------------------------------
     def plain(self, values: Values) -> dict[str, float]:
@@ -102,9 +103,11 @@ class ReturnMap:
         return self.mechanism.parameters(self.plain(values), self.folded)
 
     # runs ---------------------------------------------------------------------------------------------------------
-    def finer(self, dt: float) -> ReturnMap:
-        """The same map with another step."""
-        return replace(self, dt=dt)
+    def with_step(self, dt: float, longest: float | None = None) -> ReturnMap:
+        """The same map, and the same prepared run, with another step and another latest time of one return."""
+        found = copy(self)
+        found.dt, found.longest, found.runs = dt, self.longest if longest is None else longest, 0
+        return found
 
     def __call__(self, state: State, values: Values | None = None, strides: int | None = None) -> Arrival:
         """One application of the map; a return that does not arrive ends it."""
@@ -131,12 +134,16 @@ class ReturnMap:
     def _end(self, state: State, values: Values) -> End:
         """The end of one run."""
         self.runs += 1
-        if self.dt not in self._repeated:
-            self._repeated[self.dt] = RepeatedRun(
+        run = self._repeated.get(None) or self._repeated.get((self.dt, self.longest))
+        if run is None:
+            run = RepeatedRun(
                 self.model, self.start, self.integrator, self.dt, (self.section, self.longest), self.plain(values),
                 self.backend,
             )  # fmt: skip
-        return self._repeated[self.dt](state, self.plain(values))
+            self._repeated[None if run.adjustable else (self.dt, self.longest)] = run
+        if run.adjustable:
+            run.adjust(self.dt, self.longest)
+        return run(state, self.plain(values))
 
     def _steps(self, end: End, moved: Vector) -> list[tuple[str, float, float]]:
         """The feet that touched down, when, and the length of the step that each ended.

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -21,13 +20,15 @@ from mbd.state import State
 
 __all__ = ["Failed", "Search", "first_return", "gait_at", "search"]
 
-FIRST_STEPS, HALVINGS = 47.3, 7
+FIRST_STEPS, HALVINGS = 11.8, 9
 """Steps of the first return that is tried, no whole number lest its event fall on the end of a step, where light bodies
 blur its instant; and how often they are halved until their error is below `tol`."""
 LATE = 10.0
 """Latest time of a return, over that of the first, beyond which the walk is over [-]."""
 NEAR = 1e-2
 """Distance [m, rad] within which the rows of the section hold a start that is taken as one on it."""
+LOSSLESS = 1e-3
+"""Distance of a multiplier from 1 within which it may be that of energy that nothing takes [-]."""
 RESOLVED = 0.1
 """Share of `tol` that the change with half the step may take [-]."""
 
@@ -86,39 +87,37 @@ def with_step(search: Search, start: State, values: Values, dt: float | None) ->
     step = arrival.period / FIRST_STEPS if arrival.outcome.good else map_.dt
     if not arrival.outcome.good and arrival.outcome.kind != "numerical error":
         return search, float("nan")
-    if arrival.outcome.good:
-        map_ = replace(map_, longest=min(map_.longest, LATE * arrival.period))
+    longest = min(map_.longest, LATE * arrival.period) if arrival.outcome.good else map_.longest
     before: Vector | None = None
     error = np.inf
     for _ in range(HALVINGS):
-        map_ = map_.finer(step)
+        coarser, map_ = map_, map_.with_step(step, longest)
         arrival = map_(start, values, strides=1)
         now = np.append(chart.of(arrival.state), arrival.period) if arrival.outcome.good else None
         if now is not None and before is not None:
             error = float(np.max(np.abs(now - before)))
             if error <= RESOLVED * search.tol:
-                break
+                return replace(search, map=coarser), error
         before, step = now, step / 2.0
     return replace(search, map=map_), error
 
 
-def search(given: Search, start: State, values: Values, attempts: Sequence[Outcome] = ()) -> LimitCycle:
-    """The gait near a state of the section."""
+def search(given: Search, start: State, values: Values, near: tuple[Chart, Matrix] | None = None) -> LimitCycle:
+    """The gait near a state of the section; `near`: chart and P of a gait beside it."""
     map_, tol = given.map, given.tol
     map_.runs = 0
-    point = fixed_point(map_, given.section, start, values, tol)
-    return gait_at(given, point, values, attempts)
+    return gait_at(given, fixed_point(map_, given.section, start, values, tol, near), values)
 
 
-def gait_at(given: Search, point: FixedPoint, values: Values, attempts: Sequence[Outcome] = ()) -> LimitCycle:
+def gait_at(given: Search, point: FixedPoint, values: Values) -> LimitCycle:
     """The gait at a fixed point, with its multipliers; without them where there is none."""
     map_, chart, zero = given.map, point.chart, np.zeros(point.chart.size)
     found: Measured | Arrival | None = None
     derivative: MapDerivative | None = None
     try:
-        found = measured(map_, chart, zero, values)
-        if point.outcome.good:
-            derivative = map_derivative(map_, chart, zero, values)
+        found = measured(map_, chart, zero, values) if point.found is None else point.found
+        if point.outcome.good and isinstance(found, Measured):
+            derivative = map_derivative(map_, chart, zero, values, base=found)
     except SimulationError as error:
         point.outcome = point.outcome if not point.outcome.good else Outcome("numerical error", str(error))
     multipliers = _multipliers(map_, chart, derivative, values)
@@ -128,10 +127,9 @@ def gait_at(given: Search, point: FixedPoint, values: Values, attempts: Sequence
     way = arrival.travel if arrival is not None else np.zeros(len(map_.fixed))
     return LimitCycle(
         getattr(map_.model, "name", ""), map_.section, None if map_.mirror is None else map_.mirror.sides, map_.strides,
-        point.state, point.outcome, (*attempts, *point.attempts), arrival.period if arrival and good else float("nan"),
+        point.state, point.outcome, tuple(point.attempts), arrival.period if arrival and good else float("nan"),
         _distance(way, arrival) if good else float("nan"), arrival.steps if arrival and good else (), residual,
-        tuple(point.residuals), _step_error(map_, chart, found, values) if good else float("nan"), multipliers,
-        derivative, dict(values), map_.dt, map_.runs, chart, map_, way, given,
+        tuple(point.residuals), multipliers, derivative, dict(values), map_.dt, map_.runs, chart, map_, way, given,
     )  # fmt: skip
 
 
@@ -143,22 +141,16 @@ def _distance(way: Vector, arrival: Arrival | None) -> float:
     return float(np.sum(lengths)) if lengths else float("nan")
 
 
-def _step_error(map_: ReturnMap, chart: Chart, found: Any, values: Values) -> float:
-    """Change of the state after one application, and of its period, with half the step."""
-    finer = measured(map_.finer(0.5 * map_.dt), chart, np.zeros(chart.size), values)
-    if not isinstance(finer, Measured) or len(finer.numbers) != len(found.numbers):
-        return float("nan")
-    return float(np.nanmax(np.abs(finer.numbers - found.numbers)))
-
-
 def _multipliers(
     map_: ReturnMap, chart: Chart, derivative: MapDerivative | None, values: Mapping[str, float]
 ) -> Multipliers:
     if derivative is None or derivative.missing:
         return Multipliers(np.zeros(0, complex), np.zeros((chart.size, 0), complex), {}, float("nan"))
-    size = chart.size
-    energy = _energy_slope(map_, chart, values)
-    return multipliers_of(derivative.matrix[:size], derivative.error[:size], energy)
+    P, error = derivative.matrix[: chart.size], derivative.error[: chart.size]
+    found = multipliers_of(P, error)
+    if np.min(np.abs(found.values - 1.0), initial=1.0) > LOSSLESS:
+        return found
+    return multipliers_of(P, error, _energy_slope(map_, chart, values))
 
 
 def _energy_slope(map_: ReturnMap, chart: Chart, values: Mapping[str, float]) -> Matrix | None:

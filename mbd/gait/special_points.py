@@ -24,6 +24,8 @@ ITERATIONS = 40
 """Evaluations of a test function between two points at most."""
 LOCATED = 1e-12
 """Width of the parameter, over that of its range, at which a point counts as located [-]."""
+CLOSE, SECANTS = 1e-3, 8
+"""Change of the parameter, over its range, from which on derivatives are found with least errors [-], and how often."""
 COMPLEX = 1e-7
 """Imaginary part from which on a pair of multipliers is complex [-]."""
 
@@ -95,26 +97,58 @@ def _is_one(kind: str, point: BranchPoint) -> bool:
 def _located(
     given: Continuation, one: BranchPoint, other: BranchPoint, ds: float, test: Callable[[BranchPoint], float]
 ) -> tuple[BranchPoint, float] | None:
-    """The point where a test function is zero, by the Illinois form of the rule of false position, and its error."""
+    """The point where a test function is zero, and its error.
+
+    By the Illinois form of the rule of false position, then by secants with derivatives of the least error.
+    """
     (a, fa), (b, fb) = (0.0, test(one)), (ds, test(other))
-    best, side, values = other, 0, (one.value, other.value)
-    whole = given.whole(one)
+    side, value, slope = 0, other.value, (fb - fa) / ds
     for _ in range(ITERATIONS):
         middle = b - fb * (b - a) / (fb - fa)
-        try:
-            corrected = given.corrected(one, one.tangent, middle)
-            if not isinstance(corrected, Corrected):
-                return None
-            point = given.point(corrected, whole)
-        except MbdError:
+        point = _at(given, one, middle, 2)
+        if point is None:
             return None
-        now, change = test(point), abs(point.value - best.value)
-        best = point
-        if now == 0.0 or change <= LOCATED * given.width:
+        now, change, value = test(point), abs(point.value - value), point.value
+        slope = (now - fb) / (middle - b) if middle != b else slope
+        if now == 0.0 or change <= CLOSE * given.width:
             break
         if now * fb > 0.0:
             b, fb, fa, side = middle, now, fa * (0.5 if side == 1 else 1.0), 1
         else:
             a, fa, fb, side = middle, now, fb * (0.5 if side == -1 else 1.0), -1
-    slope = abs((test(other) - test(one)) / (values[1] - values[0] or 1.0)) or 1.0
-    return best, change + best.multipliers.error / slope
+    return _polished(given, one, middle, slope, test)
+
+
+def _polished(
+    given: Continuation, one: BranchPoint, place: float, slope: float, test: Callable[[BranchPoint], float]
+) -> tuple[BranchPoint, float] | None:
+    """The zero of a test function near a place along the tangent, and its error."""
+    along = np.inf
+    best: tuple[BranchPoint, float] | None = None
+    last: tuple[float, float] | None = None
+    for _ in range(SECANTS):
+        point = _at(given, one, place, 3)
+        if point is None:
+            break
+        now = test(point)
+        if last is not None and place != last[0] and now != last[1]:
+            slope = (now - last[1]) / (place - last[0])
+        step = -now / slope if slope else 0.0
+        rate = abs((point.value - one.value) / place) if place else 0.0
+        if abs(step) >= along:  # no more is to be had from these derivatives
+            break
+        along, last = abs(step), (place, now)
+        best = point, rate * abs(along) + abs(rate * point.multipliers.error / (slope or 1.0))
+        if rate * along <= LOCATED * given.width:
+            break
+        place += step
+    return best
+
+
+def _at(given: Continuation, one: BranchPoint, place: float, levels: int) -> BranchPoint | None:
+    """The point at a distance along the tangent of another one; None where there is none."""
+    try:
+        corrected = given.corrected(one, one.tangent, place)
+        return given.point(corrected, given.whole(one), levels) if isinstance(corrected, Corrected) else None
+    except MbdError:
+        return None

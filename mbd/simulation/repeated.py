@@ -135,6 +135,16 @@ class RepeatedRun:
         return End(ends.state(run, k, values), tuple(events), before, names[number] if number >= 0 else "", "")
 
     @property
+    def adjustable(self) -> bool:
+        """Whether `adjust` may be used: no controller and no kink of a signal in time sets instants of its own."""
+        return not self.run.boundaries.controllers and not len(self.run.boundaries.breaks)
+
+    def adjust(self, dt: float, latest: float) -> None:
+        """Another step and another latest time [s] for the next calls."""
+        self.dt, self.run.end = dt, latest
+        self.run.kernel.end = latest
+
+    @property
     def table(self) -> Matrix:
         """The stored rows of the last run (R, width): time, q, v and more."""
         return self.run.table[: self.run.stored]
@@ -143,6 +153,7 @@ class RepeatedRun:
         """The run as it was before its first step, from another start."""
         run = self.run
         run.stepper.reals[:], run.stepper.integers[:] = self._reals, self._integers
+        run.kernel.dt = run.kernel.step = run.dt = self.dt
         run.kernel.counts[:] = 0
         run.boundaries.restore(self._boundaries)
         run.boundaries.states = {c.name: c.state for c in run.boundaries.controllers}

@@ -41,17 +41,17 @@ def cycle_of(first: str, second: str, p: float, x: float, y: float) -> mbd.Limit
 def test_a_branch_goes_around_its_fold():
     gait = cycle_of("p + x - x**2", "0.3*y + 0.2*x", 0.3, 0.55, 0.1)
     assert np.max(np.abs(np.sort(gait.multipliers.real) - np.sort([0.3, 1.0 - 2.0 * math.sqrt(0.3)]))) < 1e-9
-    found = mbd.branch(gait, "scale", -0.5, steps=40)
+    found = mbd.branch(gait, "scale", -0.5, steps=15, step=0.1)
     (fold,) = found.points("fold")
-    assert abs(fold.value) < 1e-9 and found["scale"][-1] > 0.05
+    assert abs(fold.value) < 1e-9 and found["scale"][-1] > 0.02
     x = np.array([point.state["x"] for point in found.curve])
-    assert np.max(np.abs(found["scale"] - x**2)) < 1e-9 and x[0] > 0.5 and x[-1] < -0.2
+    assert np.max(np.abs(found["scale"] - x**2)) < 1e-9 and x[0] > 0.5 and x[-1] < -0.1
     assert found["stable"][0] and not found["stable"][-1]
 
 
 def test_a_doubling_is_found_and_left_along_the_other_branch():
     gait = cycle_of("p + x - x**2", "0.3*y + 0.2*x", 0.7, 0.84, 0.24)
-    found = mbd.branch(gait, "scale", 1.2)
+    found = mbd.branch(gait, "scale", 1.2, step=0.1)
     (doubling,) = found.points("doubling")
     assert abs(doubling.value - 1.0) < 1e-9 and not found.points("fold", "torus")
     twice = found.switch(doubling)
@@ -65,7 +65,7 @@ def test_a_doubling_is_found_and_left_along_the_other_branch():
 
 def test_a_torus_is_found_where_a_complex_pair_crosses_the_unit_circle():
     gait = cycle_of("2*p*x*(1 - y)", "x", 0.9, 0.444, 0.444)
-    found = mbd.branch(gait, "scale", 1.1)
+    found = mbd.branch(gait, "scale", 1.1, step=0.1)
     (torus,) = found.points()
     assert torus.kind == "torus" and abs(torus.value - 1.0) < 1e-9
     assert abs(np.abs(np.angle(torus.point.multipliers.values[0])) - math.pi / 3.0) < 1e-7
@@ -83,29 +83,51 @@ def test_a_parameter_that_changes_nothing_is_named():
         mbd.branch(idle, "idle", 2.0)
 
 
-def test_the_first_doubling_of_the_simplest_walker_is_that_of_the_case(tmp_path):
-    reference, (model, start) = case("k3-simplest-walker-cascade"), simplest()
-    gait = mbd.limit_cycle(model, start, section="heel strike", parameters={"gamma": 0.01495})
-    found = mbd.branch(gait, "gamma", 0.0152)
+def test_gaits_and_the_first_doubling_of_the_simplest_walker_are_those_of_the_cases(tmp_path):
+    reference, table = case("k3-simplest-walker-cascade"), case("f1c-simplest-walker-bifurcations")
+    expected = table["multipliers table"]
+    gait = mbd.limit_cycle(*simplest(), section="heel strike", parameters={"gamma": expected.t[-2]})
+    for slope, multiplier in zip(expected.t[-2:], expected.value[-2:], strict=True):
+        near = gait if slope == expected.t[-2] else gait.at({"gamma": slope})
+        assert abs(np.min(near.multipliers.real) - multiplier) < expected.accuracy
+    found = mbd.branch(gait, "gamma", 0.0152, step=0.1)
     (doubling,) = found.points("doubling")
     assert abs(doubling.value - reference["slope of period doubling 1 -> 2 steps"].value) < 1e-9
+    there = [doubling.point.state[name] for name in ("theta", "theta.rate")]
+    assert np.max(np.abs(there - table["fixed point at the doubling"].value)) < 1e-8
     assert found["stable"][0] and not found["stable"][-1] and "reached gamma = 0.0152" in repr(found)
     found.plot(tmp_path / "branch.png", "period")
     assert (tmp_path / "branch.png").stat().st_size > 10_000
 
 
 @pytest.mark.slow
-def test_the_second_doubling_of_the_simplest_walker_is_that_of_the_case():
-    reference, (model, start) = case("k3-simplest-walker-cascade"), simplest()
-    gait = mbd.limit_cycle(model, start, section="heel strike", parameters={"gamma": 0.0145})
-    (first,) = (one := mbd.branch(gait, "gamma", 0.0155)).points("doubling")
-    (second,) = mbd.branch(one.switch(first), "gamma", 0.018).points("doubling")
-    assert abs(second.value - reference["slope of period doubling 2 -> 4 steps"].value) < 1e-9
+def test_multipliers_of_the_simplest_walker_along_the_slope_are_those_of_the_case():
+    expected = case("f1c-simplest-walker-bifurcations")["multipliers table"]
+    gait = mbd.limit_cycle(*simplest(), section="heel strike", parameters={"gamma": expected.t[0]})
+    for slope, multiplier in zip(expected.t, expected.value, strict=True):
+        gait = gait.at({"gamma": slope})
+        assert abs(np.min(gait.multipliers.real) - multiplier) < expected.accuracy
 
 
 @pytest.mark.slow
-def test_the_doublings_of_the_compass_gait_are_those_of_the_case():
+def test_the_second_doubling_of_the_simplest_walker_is_that_of_the_case():
+    reference, two_steps = case("k3-simplest-walker-cascade"), case("f1c-simplest-walker-bifurcations")
+    gait = mbd.limit_cycle(*simplest(), section="heel strike", parameters={"gamma": 0.0145})
+    (first,) = (one := mbd.branch(gait, "gamma", 0.0155)).points("doubling")
+    other = mbd.branch(one.switch(first), "gamma", 0.018)
+    (second,) = other.points("doubling")
+    assert abs(second.value - reference["slope of period doubling 2 -> 4 steps"].value) < 1e-9
+    limping = other.gait(0.0165)
+    expected = two_steps["period-2 gait"].value
+    states = [limping.state, limping.map(limping.state, limping.parameters, strides=1).state]
+    found = np.array([[state["theta"], state["theta.rate"]] for state in states])
+    assert min(np.max(np.abs(found - expected)), np.max(np.abs(found - expected[::-1]))) < 5e-9  # feet of 1e-9
+
+
+@pytest.mark.slow
+def test_multipliers_and_doublings_of_the_compass_gait_are_those_of_the_cases():
     sizes, reference = case("f2-compass-gait-3deg").definition, case("k3b-compass-cascade")
+    table = case("f2c-compass-gait-bifurcation")
     start = standing(compass(sizes), case("f2-compass-gait-3deg")["fixed point"].value, sizes["slope"])
     gait = mbd.limit_cycle(
         compass(sizes), start, section="right foot", mirror=("left", "right"), parameters={"slope": sizes["slope"]},
@@ -114,5 +136,8 @@ def test_the_doublings_of_the_compass_gait_are_those_of_the_case():
     one = mbd.branch(gait, "slope", 0.08)
     (first,) = one.points("doubling")
     assert abs(first.value - reference["slope of period doubling 1 -> 2 steps"].value) < 1e-9
+    assert abs(math.degrees(first.value) - table["slope of first period doubling"].value) < 1e-6
+    for slope, multiplier in zip((3.0, 3.5, 4.0, 4.2, 4.3), table["most negative multiplier"].value, strict=True):
+        assert abs(np.min(one.gait(math.radians(slope)).multipliers.real) - multiplier) < 1e-6
     (second,) = mbd.branch(one.switch(first), "slope", 0.0875).points("doubling")
     assert abs(second.value - reference["slope of period doubling 2 -> 4 steps"].value) < 1e-9
