@@ -25,7 +25,7 @@ DECREASE = 0.25
 WALKS, AGAIN = 6, 3
 """Plain applications of the map where no part of a Newton step helps, and how often that is done [-]."""
 FAST = 0.2
-"""Factor by which a step with a derivative of before must shrink the residual, else it is found anew [-]."""
+"""Factor by which a step with a derivative of before must shrink the residual, else it is made again [-]."""
 FINE = 0.01
 """Residual over `tol` above which one more step is made at the end [-]."""
 FLAT = 1e-9
@@ -67,7 +67,7 @@ def fixed_point(
 
     Steps d of ``(1 − P) d = c' − c`` are halved until the residual falls as promised; where none does, the walker walks
     on for some steps, which leads towards an attractive gait, and Newton's method begins again. While the residual
-    falls quickly the derivative is not found anew but follows the steps (Broyden 1965, Math. Comput. 19:577); `near`
+    falls quickly the derivative is not made again but follows the steps (Broyden 1965, Math. Comput. 19:577); `near`
     has the chart and P of a gait near the start.
     """
     point = FixedPoint(Chart(section, start, map_.vector(values)), Outcome("does not converge", ""), np.inf)
