@@ -96,10 +96,12 @@ if TYPE_CHECKING:
     )
     from mbd.joints import (
         Cylindrical as Cylindrical,
+        Free as Free,
         Planar as Planar,
         Prismatic as Prismatic,
         Revolute as Revolute,
         Screw as Screw,
+        Spherical as Spherical,
         Translation as Translation,
         Universal as Universal,
         Weld as Weld,
@@ -177,7 +179,7 @@ _HOMES = {
     "mbd.gait.find": "GaitSearch find_gait",
     "mbd.gait.limit_cycle": "limit_cycle",
     "mbd.integrators": "HHT GeneralizedAlpha Newmark RadauIIA RungeKutta853",
-    "mbd.joints": "Cylindrical Planar Prismatic Revolute Screw Translation Universal Weld",
+    "mbd.joints": "Cylindrical Free Planar Prismatic Revolute Screw Spherical Translation Universal Weld",
     "mbd.joints.losses": "AffineFriction Coulomb Dissipation PinFriction Quadratic Tabulated Valves Viscous",
     "mbd.description": "on_slope",
     "mbd.model": "Model",

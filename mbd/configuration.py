@@ -113,8 +113,8 @@ class Configuration:
         while len(found) < self.n_v:
             if len(found) in charts:
                 joint, q = charts[len(found)]
+                found += [*range(q, q + joint.adding), *[-1] * (len(joint.velocity_labels) - joint.adding)]
                 q += len(joint.labels)
-                found += [-1] * len(joint.velocity_labels)
             else:
                 found.append(q)
                 q += 1
@@ -125,8 +125,8 @@ class Configuration:
         """(n_q) numbers of the velocities that move each coordinate."""
         found: dict[int, tuple[int, ...]] = {int(q): (v,) for v, q in enumerate(self.places) if q >= 0}
         for joint, first_q, first_v in self.charts:
-            own = tuple(range(first_v, first_v + len(joint.velocity_labels)))
-            found |= {first_q + k: own for k in range(len(joint.labels))}
+            own = tuple(range(first_v + joint.adding, first_v + len(joint.velocity_labels)))
+            found |= {first_q + k: own for k in range(joint.adding, len(joint.labels))}
         return tuple(found[k] for k in range(self.n_q))
 
     # the operations -----------------------------------------------------------------------------------------------
@@ -181,8 +181,8 @@ class Configuration:
             own = np.asarray(q[first : first + len(joint.labels)], dtype=float)
             near = np.asarray(joint.normalise(own.tolist()), dtype=float)
             if not np.max(np.abs(near - own)) <= tolerance:
-                names, values = ", ".join(map(repr, joint.coordinate_names)), ", ".join(f"{x:.9g}" for x in own)
-                shown = ", ".join(f"{value:.9g}" for value in near)
+                names = ", ".join(map(repr, joint.coordinate_names[joint.adding :]))
+                values, shown = (", ".join(f"{x:.9g}" for x in each[joint.adding :]) for each in (own, near))
                 found.append(f"{names} = {values}, which no placement of {joint.known_as} has; the nearest are {shown}")
         return found
 

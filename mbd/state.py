@@ -106,8 +106,11 @@ class State:
     parameters: Mapping[str, float] = field(default_factory=dict)
     memory: Memory | None = field(default=None, repr=False)
 
-    def __getitem__(self, name: str) -> float:
-        """A coordinate ('left hip.angle') or a rate ('left hip.angle.rate', 'left hip.rate')."""
+    def __getitem__(self, name: str) -> Any:
+        """A coordinate ('left hip.angle') or a rate ('left hip.angle.rate', 'left hip.rate').
+
+        'ball.orientation' is the quaternion (4,), 'ball.angular_velocity' a vector (3,).
+        """
         if name in self.names:
             return float(self.q[self.names.index(name)])
         if name in self.velocity_names:
@@ -117,6 +120,11 @@ class State:
         }
         if name in short:
             return float(self.v[short[name]])
+        for ends in (".w", ".x", ".y", ".z"), (".x", ".y", ".z"):
+            parts = [f"{name}{end}" for end in ends]
+            for names, values in ((self.names, self.q), (self.velocity_names, self.v)):
+                if all(part in names for part in parts):
+                    return np.array([values[names.index(part)] for part in parts])
         raise UnknownNameError(
             nearest(name, [*self.names, *self.velocity_names], "coordinate or rate", "The state has")
         )

@@ -19,6 +19,7 @@ from mbd.results.columns import Columns, ModelColumns, gather
 from mbd.results.facts import Facts
 from mbd.results.finite import require_finite
 from mbd.results.interpolation import OneSide, Side
+from mbd.results.orientations import doubt_singular
 from mbd.results.record import EventRecord, Events, Record
 from mbd.state import State
 
@@ -82,6 +83,7 @@ class Trajectory:
         if name not in self._known:
             value = gather(self.columns, self.columns.at_rows, name)
             require_finite(name, value, self.time, self.facts)
+            doubt_singular(name, value)
             value.flags.writeable = False
             self._known[name] = value
         return self._known[name]
@@ -345,6 +347,7 @@ class Moments(Mapping[str, Any]):
         found = gather(self._columns, lambda names: self._columns.at_places(names, self._places), name)
         if self._facts is not None:
             require_finite(name, found, self._places.time, self._facts)
+        doubt_singular(name, found)
         shaped = found.reshape(self.time.shape + found.shape[1:])
         return shaped if shaped.ndim else float(shaped)
 

@@ -78,6 +78,14 @@ JOINTS: list[tuple[str, Callable[[Frame, Frame], Joint]]] = [
         plain={"pitch": 0.2}, tilted={"pitch": -0.7, "axis": TILTED},
     ),
     ("weld", lambda a, b: mbd.Weld("joint", a, b)),
+    *several(
+        "spherical", lambda a, b, **how: mbd.Spherical("joint", a, b, **how),
+        with_loss_and_spring={"loss": {"angular_velocity.y": mbd.Quadratic(0.2)}, "stiffness": 4.0},
+    ),
+    *several(
+        "free", lambda a, b, **how: mbd.Free("joint", a, b, **how),
+        with_losses={"loss": {"y": mbd.Viscous(0.4), "angular_velocity.z": mbd.Viscous(0.3)}},
+    ),
 ]  # fmt: skip
 
 LOSSES: list[tuple[str, Callable[[], Loss]]] = [

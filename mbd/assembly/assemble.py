@@ -28,11 +28,13 @@ from mbd.assembly.posture import (
 )  # fmt: skip
 from mbd.assembly.trivial_rows import manager_of
 from mbd.assembly.turns import choose_turns, name_wrapped, nearest_turns
+from mbd.assembly.whole_values import spelled_out, three_of_four
 from mbd.bodies.values import flag, named_number_faults, names_given
 from mbd.compile.mechanism import Mechanism, rate_names
 from mbd.compile.mechanisms import mechanism_of
 from mbd.equations.equations import Equations
 from mbd.errors import AssemblyError, ModelError, UnknownNameError, nearest
+from mbd.joints.orientations import ROUNDED
 from mbd.notes import doubt
 from mbd.state import State, of_model
 
@@ -40,16 +42,14 @@ __all__ = ["assemble"]
 
 BELOW = 1e-6
 """Depth [m, rad] below which an open contact is reported to start inside the ground."""
-ROUNDED = 1e-3
-"""Most by which named coordinates, such as those of a quaternion, are taken for rounded values of a placement [-]."""
 LIFTED = 1e-8
 """Height [m, rad] above which an open contact is armed from the start."""
 
 
 def assemble(
     model: Any,
-    position: Mapping[str, float] | None = None,
-    velocity: Mapping[str, float] | None = None,
+    position: Mapping[str, Any] | None = None,
+    velocity: Mapping[str, Any] | None = None,
     closed: Iterable[str] = (),
     open: Iterable[str] = (),
     parameters: Mapping[str, float] | None = None,
@@ -65,8 +65,12 @@ def assemble(
     ----------
     model : a `Model` or `Lagrangian`
     position : {'left hip.angle': 0.2} coordinates [m, rad], first-order states, and any named position
-        ('left shank.end.x', the angle of a cut joint), which then holds like a row
-    velocity : {'left hip.angle': −1.1} or {'left hip.rate': …} rates by coordinate or rate name [m/s, rad/s]
+        ('left shank.end.x', the angle of a cut joint), which then holds like a row. 'ball.orientation' is a unit
+        quaternion (w, x, y, z), whose length is 1 within 1e-6, a scipy ``Rotation``, a rotation matrix (3, 3), an axis
+        with an angle ((0, 0, 1), 0.3), or Euler angles about axes that turn along ('zxy', (0.1, 0.2, 0.3)) [rad]; three
+        numbers behind any other name are its '.x', '.y', '.z'
+    velocity : {'left hip.angle': −1.1} or {'left hip.rate': …} rates by coordinate or rate name [m/s, rad/s], such as
+        {'ball.angular_velocity': (0, 0, 2)} in the child's axes, 'ball.angular_velocity.parent', '… .ground'
     closed : names of contacts that start closed
     open : names of contacts that start open even if they touch or lie below their surface; ignored until risen
     parameters : values that differ from the model's, by name
@@ -90,8 +94,12 @@ def assemble(
     ModelError
         if the model itself has faults.
     """
+    position, wrong, doubts = spelled_out(model, position, "position")
+    velocity, more_wrong, _ = spelled_out(model, velocity, "velocity")
     wanted = {"position": position, "velocity": velocity, "parameters": parameters}
-    faults = [fault for what, values in wanted.items() for fault in named_number_faults(values, what)]
+    faults = [*wrong, *more_wrong] + [
+        fault for what, values in wanted.items() for fault in named_number_faults(values, what)
+    ]
     (opened, more), (closed, others) = names_given(open, "open"), names_given(closed, "closed")
     if faults + more + others:
         raise ModelError(faults + more + others)
@@ -100,7 +108,7 @@ def assemble(
     mechanism = mechanism_of(model, backend, changed)
     equations, values = mechanism.equations, mechanism.parameters(changed, getattr(model, "parameters", {}))
     manager = manager_of(mechanism, values)
-    named, faults = _named(mechanism, position or {}, velocity or {})
+    named, faults = _named(model, mechanism, position or {}, velocity or {})
     for what, names in (("closed", closed), ("open", opened)):
         faults += [f"{what}: " + nearest(name, manager.names, "contact") for name in names if name not in manager.names]
     faults += [f"contact {name!r} is named both closed and open" for name in set(closed) & set(opened)]
@@ -119,7 +127,7 @@ def assemble(
     if bad:
         raise AssemblyError(bad)
     name_wrapped(work)
-    doubt(*doubtful(model, equations, position or {}), of=model)
+    doubt(*doubts, *doubtful(model, equations, position or {}), of=model)
     assembled = State(
         0.0, work.q, work.y[: equations.n_v].copy(), work.y[equations.n_v :].copy(), manager.mode(work.flags),
         _armed(work, set(opened)), work.anchors, tuple(coordinate.name for coordinate in equations.coordinates),
@@ -140,7 +148,7 @@ class _Named:
 
 
 def _named(
-    mechanism: Mechanism, position: Mapping[str, float], velocity: Mapping[str, float]
+    model: Any, mechanism: Mechanism, position: Mapping[str, float], velocity: Mapping[str, float]
 ) -> tuple[_Named, list[str]]:
     """The values by number, and what is wrong with their names."""
     equations = mechanism.equations
@@ -148,7 +156,7 @@ def _named(
     states = {state.name: k for k, state in enumerate(equations.states)}
     rates = rate_names(equations)
     elsewhere = {name: value for name, value in position.items() if name not in states and name not in coordinates}
-    places, unknown = conditions(mechanism, elsewhere, rates=False)
+    places, unknown = conditions(mechanism, three_of_four(model, elsewhere), rates=False)
     speeds, strange = conditions(mechanism, {k: v for k, v in velocity.items() if k not in rates}, rates=True)
     faults = [
         f"position: {name!r} is a rate; give it in velocity={{{name!r}: …}}"
@@ -228,7 +236,11 @@ def _closed_as_named(work: Posture, named: _Named) -> bool:
 def _held(equations: Equations, named: _Named) -> tuple[list[Held], list[Held]]:
     """Coordinates and rates that stay as named."""
     configuration = equations.configuration
-    joints = {first + k: (joint, first) for joint, first, _ in configuration.charts for k in range(len(joint.labels))}
+    joints = {
+        first + k: (joint, first + joint.adding)
+        for joint, first, _ in configuration.charts
+        for k in range(joint.adding, len(joint.labels))
+    }
     places = [
         Held(joints[k][0].name if k in joints else configuration.names[k], value, configuration.velocities_of[k])
         for k, value in named.q.items()
@@ -247,8 +259,8 @@ def _off_manifold(equations: Equations, named: _Named, q: Vector) -> list[str]:
     """Coordinates of joints that must be named together, or that no placement has; what to give."""
     faults = []
     for joint, first, _ in equations.configuration.charts:
-        own = range(first, first + len(joint.labels))
-        given, names = [k for k in own if k in named.q], ", ".join(map(repr, joint.coordinate_names))
+        own = range(first + joint.adding, first + len(joint.labels))
+        given, names = [k for k in own if k in named.q], ", ".join(map(repr, joint.coordinate_names[joint.adding :]))
         if 0 < len(given) < len(own):
             faults.append(f"position: {names} of {joint.known_as} belong together; name all of them or none")
     return faults or [f"position: {fault}" for fault in equations.configuration.misplaced(q, ROUNDED)]
@@ -299,9 +311,10 @@ def _armed(work: Posture, opened: set[str]) -> frozenset[str]:
 def _moved(work: Posture, q: Vector, y: Vector, named: _Named) -> dict[str, float]:
     """How far named values, and unnamed ones from their defaults, were moved."""
     moved = {}
+    rounded = {first + k for j, first, _ in work.equations.configuration.charts for k in range(len(j.labels))}
     for k, coordinate in enumerate(work.equations.coordinates):
         change = float(work.q[k] - q[k])
-        if change != 0.0 and (k in named.q or abs(change) > 1e-15):
+        if change != 0.0 and ((k in named.q and k not in rounded) or abs(change) > 1e-15):
             moved[coordinate.name] = change
     for k, name in enumerate(work.equations.velocity_names):
         change = float(work.y[k] - y[k])

@@ -16,6 +16,7 @@ from mbd.equations.equations import Chart, Coordinate, Turn
 from mbd.equations.headings import Headings, direction, spin
 from mbd.equations.kinematic_proxies import KinematicProxies
 from mbd.equations.kinematics import Edge, Moving, ground_motion, moving_body
+from mbd.equations.orientations import offer_orientations
 from mbd.equations.outputs import AXES, Outputs
 from mbd.equations.parameter_scope import ParameterScope
 from mbd.equations.placement import Placement
@@ -358,6 +359,7 @@ class DerivationContext(ParameterScope):
                     self.quantities.add(name, partial(self._rate, joint.name, k))
             if len(joint.freedoms) == 1:
                 self.quantities.add(f"{joint.name}.rate", partial(self._rate, joint.name, 0))
+        offer_orientations(self.quantities, self, (*self.tree, *self.cuts))
 
     def _coordinate(self, joint: str, place: int) -> Scalar:
         value, turn = self.joint(joint).coordinates[place], self.wrapped.get((joint, place))

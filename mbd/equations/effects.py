@@ -60,9 +60,9 @@ def causes(scope: DerivationScope, joints: Iterable[Joint], forces: Iterable[For
 
 
 def _joint_spring(joint: Joint, scope: DerivationScope) -> Cause:
-    """``½ k (q − rest)²``; nothing for a stiffness that folds."""
+    """``½ k (q − rest)²``, or what else the joint stores; nothing for a stiffness that folds."""
     cause = Cause(f"{joint.name} spring", "potential")
-    if len(joint.labels) == 1 and not scope.parameter(cause.name, "stiffness", joint.stiffness).is_zero:
+    if joint.is_elastic and not scope.parameter(cause.name, "stiffness", joint.stiffness).is_zero:
         _store(cause, joint.elastic_energy(scope.joint(joint.name).coordinates, scope), scope)
     return cause
 

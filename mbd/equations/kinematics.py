@@ -19,7 +19,7 @@ from mbd.bodies.algebra import IDENTITY, ZERO, cross, difference, product, rotat
 from mbd.bodies.base import Body
 from mbd.joints.base import Joint
 from mbd.scope import Rotation, Scope, Triple
-from mbd.tape.derivatives import jvp
+from mbd.tape.derivatives import jvp, live
 from mbd.tape.node import Node, Scalar, Tape
 
 __all__ = ["Column", "Edge", "Moving", "Twist", "ground_motion", "moving_body", "twists"]
@@ -120,7 +120,7 @@ def moving_body(body: Body, parent: Moving, edge: Edge, scope: Scope) -> Moving:
 def _geometry(edge: Edge, scope: Scope) -> tuple[Rotation, Triple, Triple, tuple[Column, ...]]:
     """R, d, the joint in the child, and the columns.
 
-    Where coordinates add, the shift per unit rate is ∂p/∂x, which stays constant for joints that slide along axes of
+    Where a coordinate adds, the shift per unit rate is ∂p/∂x, which stays constant for joints that slide along axes of
     their parent; else it is the joint's own column, turned into parent axes.
     """
     joint = edge.joint
@@ -128,11 +128,18 @@ def _geometry(edge: Edge, scope: Scope) -> tuple[Rotation, Triple, Triple, tuple
     R_child, p_child = joint.child.placement(scope)
     R, p = joint.transform(edge.values, scope)
     columns = []
-    for (angular, linear), x in zip(joint.subspace(edge.values, scope), edge.increments, strict=True):
-        slope = _jvp(p, {x: 1.0}, scope.tape) if joint.is_vector else rotate(R, linear)
+    for k, ((angular, linear), x) in enumerate(zip(joint.subspace(edge.values, scope), edge.increments, strict=True)):
+        slope = _jvp(p, {x: 1.0}, scope.tape) if joint.is_vector or _adds(edge, k) else rotate(R, linear)
         columns.append(Column(rotate(R_child, angular), rotate(R_parent, slope)))
     turn = product(product(R_parent, R), transpose(R_child))
     return turn, total(p_parent, rotate(R_parent, p)), p_child, tuple(columns)
+
+
+def _adds(edge: Edge, k: int) -> bool:
+    """Whether a velocity moves one increment alone, and is its rate."""
+    rate = edge.rates[k]
+    others = [other for j, other in enumerate(edge.increment_rates) if j != k]
+    return edge.increment_rates[k] is rate and not any(node is rate for node in live(others))
 
 
 def _joint_motion(edge: Edge, columns: Sequence[Column], tape: Tape) -> tuple[Triple, Triple, Triple, Triple]:

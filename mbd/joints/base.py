@@ -49,7 +49,8 @@ class Joint(Parameterized, ABC):
     `mbd.configuration`). For all others these have defaults.
 
     A new joint is a frozen dataclass with the fields below; `stiffness` and `rest` are fields only of joints with one
-    coordinate, whose linear spring has the energy ``½ k (q − rest)²``. It calls `validate` when it is made.
+    coordinate, whose linear spring has the energy ``½ k (q − rest)²``, and `stiffness` of those that are elastic in a
+    way of their own (`is_elastic`). It calls `validate` when it is made.
     """
 
     parent: Frame
@@ -92,11 +93,26 @@ class Joint(Parameterized, ABC):
         """Whether it is seen from its child (see `mbd.joints.reversed.Reversed`)."""
         return False
 
+    @property
+    def orientation(self) -> int | None:
+        """Number of the coordinate w of its unit quaternion, turned by its last three velocities; None: no such."""
+        return None
+
+    @property
+    def is_elastic(self) -> bool:
+        """Whether it may have a spring of its own, with the field `stiffness`."""
+        return len(self.labels) == 1
+
     # the chart of its coordinates ---------------------------------------------------------------------------------
     @property
     def is_vector(self) -> bool:
         """Whether ⊕ is + and the velocities are the rates of the coordinates."""
         return True
+
+    @property
+    def adding(self) -> int:
+        """How many of its first coordinates add, each with a velocity of its own; all of them where `is_vector`."""
+        return len(self.labels) if self.is_vector else 0
 
     @property
     def velocity_labels(self) -> tuple[Label, ...]:
@@ -252,8 +268,9 @@ class Joint(Parameterized, ABC):
             )
         if "stiffness" in vars(self):
             put(self, "stiffness", number(self.stiffness, f"stiffness of '{self.name}'"))
-            put(self, "rest", number(self.rest, f"rest of '{self.name}'"))
-            if len(self.labels) != 1 and (self.stiffness or self.rest):
+            if "rest" in vars(self):
+                put(self, "rest", number(self.rest, f"rest of '{self.name}'"))
+            if not self.is_elastic and (self.stiffness or self.rest):
                 raise ModelError(
                     f"{kind} '{self.name}': its stiffness would act on several coordinates "
                     f"({', '.join(label.name for label in self.labels)}); free one only, or apply an mbd.Spring"

@@ -79,6 +79,25 @@ class Reversed(Joint):
         """As the joint."""
         return self.joint.is_vector
 
+    @property
+    def orientation(self) -> int | None:
+        """As the joint."""
+        return self.joint.orientation
+
+    @property
+    def is_elastic(self) -> bool:
+        """As the joint."""
+        return self.joint.is_elastic
+
+    def elastic_energy(self, q: Sequence[Scalar], scope: Scope) -> Scalar:
+        """As the joint."""
+        return self.joint.elastic_energy(q, scope)
+
+    @property
+    def adding(self) -> int:
+        """As the joint."""
+        return self.joint.adding
+
     def compose(self, q: Sequence[Scalar], x: Sequence[Scalar]) -> Sequence[Scalar]:
         """As the joint."""
         return self.joint.compose(q, x)

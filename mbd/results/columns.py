@@ -18,7 +18,8 @@ from mbd.results.dense import Restepping
 from mbd.results.dense_implicit import LedSteps
 from mbd.results.forces import Forces
 from mbd.results.interpolation import Grid
-from mbd.results.names import AXES, rate_name
+from mbd.results.names import AXES, VECTORS, rate_name
+from mbd.results.orientations import ReadOff, read_off
 from mbd.results.polynomials import Places
 from mbd.results.record import Record, Rows
 from mbd.results.stored_states import StoredStates, is_smooth
@@ -81,13 +82,13 @@ class Columns(ABC):
 
     @property
     def vectors(self) -> tuple[str, ...]:
-        """Names that stand for three components: 'left shank.end' for 'left shank.end.x', '.y', '.z'."""
+        """Names that stand for several components: 'left shank.end' for 'left shank.end.x', '.y', '.z'."""
         known = set(self.names)
         stems = [name[:-2] for name in self.names if name.endswith(".x")]
         return tuple(s for s in stems if s not in known and all(s + axis in known for axis in AXES))
 
     def components(self, name: str) -> tuple[str, ...]:
-        """The scalars behind a name: itself, or the three components of a vector.
+        """The scalars behind a name: itself, or the components of a vector, a quaternion or Euler angles.
 
         A vector comes before a parameter of its name: 'left thigh.center' is a place, not a distance along the link.
         """
@@ -95,9 +96,10 @@ class Columns(ABC):
             raise TrajectoryError(f"a quantity is asked for by its name, such as 'hip.angle', not {name!r}")
         if name in self.names:
             return (name,)
-        parts = tuple(name + axis for axis in AXES)
-        if all(self.knows(part) for part in parts):
-            return parts
+        for endings in VECTORS:
+            parts = tuple(name + ending for ending in endings)
+            if all(self.knows(part) for part in parts):
+                return parts
         if self.knows(name):
             return (name,)
         raise UnknownNameError(nearest(name, (*self.names, *self.vectors), "result", "The run has"))
@@ -240,7 +242,14 @@ class StoredColumns(Columns):
         return self._order
 
     def knows(self, name: str) -> bool:
+        return self._holds(name) or self._read_off(name) is not None
+
+    def _holds(self, name: str) -> bool:
         return name in self._aliases or name in self._values
+
+    def _read_off(self, name: str) -> ReadOff | None:
+        found = None if self._holds(name) else read_off(name)
+        return found if found is not None and all(self._holds(part) for part in found[0]) else None
 
     @property
     def anchors(self) -> Matrix:
@@ -251,10 +260,14 @@ class StoredColumns(Columns):
         return self._rates
 
     def identity(self, name: str) -> tuple[Alias | None, Hashable]:
-        return self._aliases.get(name), id(self._values.get(name))
+        return self._aliases.get(name), id(self._values[name]) if name in self._values else name
 
     def at_rows(self, names: Sequence[str]) -> list[Vector]:
-        return [self._read(name, self.record) for name in names]
+        found = {name: self._read_off(name) for name in names}
+        return [
+            self._read(name, self.record) if shown is None else shown[1](self.at_rows(shown[0]))
+            for name, shown in found.items()
+        ]
 
     def _read(self, name: str, state: Any) -> Vector:
         if name in self._aliases:
@@ -267,6 +280,16 @@ class StoredColumns(Columns):
         return self._model
 
     def at_places(self, names: Sequence[str], places: Places) -> list[Vector]:
+        shown = {name: found for name in names if (found := self._read_off(name)) is not None}
+        wanted = dict.fromkeys(part for name in names for part in (shown[name][0] if name in shown else (name,)))
+        values = dict(zip(wanted, self._plainly_at(tuple(wanted), places), strict=True))
+        return [
+            shown[name][1]([values[part] for part in shown[name][0]]) if name in shown else values[name]
+            for name in names
+        ]
+
+    def _plainly_at(self, names: Sequence[str], places: Places) -> list[Vector]:
+        """Values between the rows of what is stored itself."""
         if self._model is not None:
             return self._model.at_places(names, places)
         plain = np.array_equal(self._rates, self.record.v)
@@ -291,6 +314,6 @@ def asks_for_forces(nodes: Sequence[Node]) -> bool:
 
 
 def gather(columns: Columns, read: Callable[[Sequence[str]], list[Vector]], name: str) -> Vector | Matrix:
-    """A scalar as (R,), a vector as (R, 3)."""
+    """A scalar as (R,), a vector as (R, 3), a quaternion as (R, 4)."""
     found = read(columns.components(name))
     return found[0] if len(found) == 1 else np.column_stack(found)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-__all__ = ["AXES", "rate_name"]
+__all__ = ["AXES", "VECTORS", "rate_name"]
 
 AXES = (".x", ".y", ".z")
 """Endings of the components of a vector."""
+
+VECTORS = ((".w", *AXES), AXES, (".1", ".2", ".3"))
+"""Endings of what is one result in several parts: a quaternion, a vector, three Euler angles."""
 
 
 def rate_name(name: str) -> str:

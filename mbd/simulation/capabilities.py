@@ -92,8 +92,6 @@ WITH_TOLERANCE: dict[tuple[str, str], str] = {
 SPACE: dict[str, str] = {
     "friction=μ of a Unilateral": "friction=None (it sticks) or 0",
     "Rolling": "mbd.Nonholonomic rows",
-    "PinFriction": "mbd.Coulomb, whose friction torque is given",
-    "cut='all', or a body held by no joint": "cut='auto', and joints that leave every body a path to the ground",
 }
 """What is solved in planar models only, and what to use in space instead; refused as the equations are derived."""
 

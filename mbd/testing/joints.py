@@ -24,6 +24,8 @@ __all__ = ["check_joint"]
 
 EYE = np.eye(3)
 STEP = 1e-4
+SOMEWHERE = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7)
+"""Coordinates of a joint for questions about its words [m, rad, -]."""
 
 
 @dataclass(frozen=True)
@@ -207,7 +209,7 @@ def _chart_laws(findings: Findings, joint: Joint, values: Numbers, rng: np.rando
 
 def _words(findings: Findings, joint: Joint) -> None:
     """Labels, parameters, faults."""
-    placed = Placed.at(joint, [0.1, 0.2, 0.3, 0.4, 0.5, 0.6][: len(joint.labels)])
+    placed = Placed.at(joint, SOMEWHERE[: len(joint.labels)])
     scope = placed.scope
     rows = [label for label, _ in joint.rows(placed.R, placed.p, scope)]
     joint.subspace(placed.q, scope)
@@ -230,7 +232,7 @@ def _words(findings: Findings, joint: Joint) -> None:
 
 def _planarity(findings: Findings, joint: Joint) -> None:
     """A planar joint leaves z alone exactly, so that a planar model folds to the plane."""
-    placed = Placed.at(joint, [0.1, 0.2, 0.3, 0.4, 0.5, 0.6][: len(joint.labels)])
+    placed = Placed.at(joint, SOMEWHERE[: len(joint.labels)])
     R, p = placed.R, placed.p
     z = [placed.scope.tape.lift(x) for x in (R[0][2], R[1][2], R[2][0], R[2][1], p[2])]
     flat = all(node.is_zero for node in z) and placed.scope.tape.lift(R[2][2]).is_constant

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 from mbd.bodies.base import Body, Frame
 from mbd.bodies.ground import Ground
 from mbd.bodies.point_mass import PointMass
-from mbd.errors import CapabilityError, ModelError, nearest
+from mbd.errors import ModelError, nearest
 from mbd.joints.base import Joint
+from mbd.joints.free import Free
 from mbd.joints.planar import Planar
 from mbd.joints.reversed import Reversed
 from mbd.joints.translation import Translation
@@ -56,8 +57,8 @@ class Plan:
 
     @property
     def dof(self) -> int:
-        """Number of coordinates of the tree."""
-        return len(self.coordinate_names)
+        """Degrees of freedom of the tree: its velocities, fewer than its coordinates where these are quaternions."""
+        return sum(len(joint.freedoms) for joint in self.edges)
 
     def path(self, body: Body | str) -> tuple[Joint, ...]:
         """The joints of the tree from the ground to a body."""
@@ -141,17 +142,7 @@ def floating_joint(model: Description, body: Body, planar: bool) -> Joint:
         return Translation(name, origin, body.origin, axes="xy" if planar else "xyz")
     if planar:
         return Planar(name, origin, body.origin)
-    pins = [j for j in model.joints if needs_reaction(j) and body in (j.parent.body, j.child.body)]
-    if pins:
-        raise CapabilityError(
-            f"PinFriction of {pins[0].name!r} follows the force in the joint, which is cut for that, and '{body.name}' "
-            "would float in space, for which this version has no joint; in space use mbd.Coulomb, whose friction "
-            "torque is given"
-        )
-    raise CapabilityError(
-        f"cut={model.cut!r} lets the body '{body.name}' float in space, which needs a joint with free rotation that "
-        "this version does not have; use cut='auto', or cut joints that leave every body a path to the ground"
-    )
+    return Free(name, origin, body.origin)
 
 
 def _is_turned(model: Description, body: Body) -> bool:

@@ -10,6 +10,8 @@ from mbd.testing import check_joint
 from tests.helpers import FreeScope
 from tests.instances import JOINTS
 
+SOMEWHERE = (0.1, 0.2, 0.3, 0.5, 0.5, -0.5, 0.5)
+
 every_joint = pytest.mark.parametrize("factory", [factory for _, factory in JOINTS], ids=[name for name, _ in JOINTS])
 
 
@@ -40,11 +42,11 @@ def test_rows_of_a_planar_joint_fold_to_those_of_the_plane(factory):
 def test_labels_name_coordinates_and_rows_have_units(factory):
     joint = made(factory)
     assert joint.coordinate_names == tuple(f"joint.{label.name}" for label in joint.labels)
-    assert {label.unit for label in joint.labels} <= {"rad", "m"}
+    assert {label.unit for label in joint.freedoms} <= {"rad", "m"}
     scope = FreeScope()
-    R, p = joint.transform([0.1, 0.2, 0.3][: len(joint.labels)], scope)
+    R, p = joint.transform(SOMEWHERE[: len(joint.labels)], scope)
     labels = [label for label, _ in joint.rows(R, p, scope)]
     assert len(set(labels)) == len(labels)
-    turns = sum(label.unit == "rad" for label in joint.labels) + sum(row_unit(label) == "rad" for label in labels)
+    turns = sum(label.unit == "rad" for label in joint.freedoms) + sum(row_unit(label) == "rad" for label in labels)
     assert turns in (2, 3, 4)
     assert turns == 3 or isinstance(joint, mbd.Screw)

@@ -3,7 +3,7 @@
 import pytest
 
 import mbd
-from mbd.errors import CapabilityError, ModelError
+from mbd.errors import ModelError
 from mbd.model import Model
 from mbd.topology import disconnected, graph_of, mobility, plan
 from tests.topology.mechanisms import bricard, chain, four_bar, kneed_walker
@@ -84,11 +84,13 @@ def test_a_point_mass_welded_to_a_rod_floats_with_its_axes():
     assert isinstance(plan(model).edges[1], mbd.Planar)
 
 
-def test_a_spatial_body_cannot_float_yet():
+def test_a_spatial_body_floats_with_all_six_motions():
     model = bricard()
     model.cut = "all"
-    with pytest.raises(CapabilityError, match="'rod 0' float in space"):
-        plan(model)
+    chosen = plan(model)
+    assert {type(joint) for joint in chosen.floating} == {mbd.Free}
+    assert chosen.dof == 6 * len(chosen.bodies)
+    assert len(chosen.coordinate_names) == 7 * len(chosen.bodies)
 
 
 def test_mobility_by_the_count_of_gruebler():

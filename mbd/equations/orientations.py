@@ -1,0 +1,55 @@
+"""What is read off joints that turn freely: angular velocities in three frames, rotation vector, Euler angles."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+
+from mbd.bodies.algebra import rotate
+from mbd.equations.outputs import Outputs
+from mbd.joints.base import Joint
+from mbd.joints.euler import PLACES, SEQUENCES, euler_angles
+from mbd.joints.quaternions import rotation_of, rotation_vector
+from mbd.joints.reversed import Reversed
+from mbd.scope import Scope
+from mbd.tape.node import Scalar
+
+__all__ = ["offer_orientations"]
+
+
+def offer_orientations(outputs: Outputs, scope: Scope, joints: Sequence[Joint]) -> None:
+    """'ball.angular_velocity.parent' and '.ground', and among the names that are not listed '.rotation_vector' and
+    '.euler.zxy', whose angles are '.euler.zxy.1', '.2', '.3'."""
+    for each in joints:
+        joint = each.joint if isinstance(each, Reversed) else each
+        if joint.orientation is None:
+            continue
+        name = joint.name
+        outputs.triple(f"{name}.angular_velocity.parent", partial(_in_parent, scope, joint))
+        outputs.triple(f"{name}.angular_velocity.ground", partial(_in_ground, scope, joint))
+        outputs.triple(f"{name}.rotation_vector", partial(_vector, scope, joint), listed=False)
+        for sequence in SEQUENCES:
+            outputs.triple(f"{name}.euler.{sequence}", partial(_angles, scope, joint, sequence), PLACES, listed=False)
+
+
+def _quaternion(scope: Scope, joint: Joint) -> Sequence[Scalar]:
+    first = joint.orientation or 0
+    return scope.joint(joint.name).coordinates[first : first + 4]
+
+
+def _in_parent(scope: Scope, joint: Joint) -> Sequence[Scalar]:
+    x, y, z = scope.joint(joint.name).rates[-3:]
+    return rotate(rotation_of(_quaternion(scope, joint)), (x, y, z))
+
+
+def _in_ground(scope: Scope, joint: Joint) -> Sequence[Scalar]:
+    x, y, z = scope.joint(joint.name).rates[-3:]
+    return rotate(scope.frame(joint.child).rotation, (x, y, z))
+
+
+def _vector(scope: Scope, joint: Joint) -> Sequence[Scalar]:
+    return rotation_vector(_quaternion(scope, joint))
+
+
+def _angles(scope: Scope, joint: Joint, sequence: str) -> Sequence[Scalar]:
+    return euler_angles(rotation_of(_quaternion(scope, joint)), sequence)

@@ -1,0 +1,54 @@
+"""Rotation vectors and Euler angles of a run that was read from a file, from the quaternions in it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from mbd.arrays import Vector
+from mbd.joints.euler import PLACES, euler_angles, second_from_singular, sequence_of
+from mbd.joints.quaternions import rotation_of, rotation_vector
+from mbd.notes import doubt
+
+__all__ = ["ReadOff", "doubt_singular", "read_off"]
+
+VECTOR = re.compile(r"(.+)\.rotation_vector\.([xyz])")
+ANGLES = re.compile(r"(.+)\.euler\.([xyz]{3})(?:\.([123]))?")
+NEAR = 1e-4
+"""Distance of the second angle from the singularity within which the other two are in doubt [rad]."""
+
+ReadOff = tuple[tuple[str, ...], Callable[[Sequence[Vector]], Vector]]
+"""Names of the parts of a quaternion, and what gives the result of their values."""
+
+
+def read_off(name: str) -> ReadOff | None:
+    """How a result is read off a quaternion; None for any other."""
+    vector, angles = VECTOR.fullmatch(name), ANGLES.fullmatch(name)
+    found = vector or angles
+    if found is None or (angles and (sequence_of(angles[2]) is None or angles[3] is None)):
+        return None
+    parts = tuple(f"{found[1]}.orientation.{part}" for part in "wxyz")
+    if vector:
+        place = "xyz".index(vector[2])
+        return parts, lambda q: np.asarray(rotation_vector(q)[place])
+    assert angles is not None
+    sequence, place = angles[2], PLACES.index(angles[3])
+    return parts, lambda q: np.asarray(euler_angles(rotation_of(q), sequence)[place])
+
+
+def doubt_singular(name: str, values: Vector) -> None:
+    """Warn where the Euler angles of a result (…, 3) come near the singularity of their sequence."""
+    angles = ANGLES.fullmatch(name)
+    if angles is None or angles[3] is not None or not values.size:
+        return
+    second = np.atleast_2d(values)[:, 1]
+    off = second_from_singular(angles[2], second)
+    worst = int(np.argmin(off))
+    if off[worst] < NEAR:
+        doubt(
+            f"{name!r}: its second angle comes to {second[worst]:.6g} rad, within {NEAR:g} rad of the singularity of "
+            f"{angles[2]!r}, where the first and the third turn about one axis and jump; use another sequence, or the "
+            f"quaternion {angles[1] + '.orientation'!r}"
+        )
