@@ -9,8 +9,8 @@ __all__ = ["GROUPS", "pages"]
 GROUPS = {
     "Models and bodies": "Model Lagrangian Coordinate PointMass Link RigidBody Marker box cylinder disk rod segment "
     "sphere Domain on_slope",
-    "Joints and losses": "Revolute Prismatic Translation Planar Cylindrical Universal Screw Spherical Free Weld Viscous Quadratic "
-    "Coulomb AffineFriction PinFriction Tabulated Valves Dissipation",
+    "Joints and losses": "Revolute Prismatic Translation Planar Cylindrical Universal Screw Spherical Free Weld "
+    "Viscous Quadratic Coulomb AffineFriction PinFriction Tabulated Valves Dissipation",
     "Constraints and measures": "Bilateral Unilateral Penalty PenaltyParameters penalty_parameters KnifeEdge Rolling "
     "Nonholonomic Event Controller When touchdown rolling_touchdown profile_touchdown Plane "
     "height flexion extension distance separation measure",
