@@ -18,7 +18,8 @@ WORDS = {
     **{
         joint: ("joint", *FRAMES)
         for joint in (
-            mbd.Cylindrical, mbd.Planar, mbd.Prismatic, mbd.Revolute, mbd.Translation, mbd.Universal, mbd.Weld,
+            mbd.Cylindrical, mbd.Free, mbd.Planar, mbd.Prismatic, mbd.Revolute, mbd.Spherical, mbd.Translation,
+            mbd.Universal, mbd.Weld,
         )
     },
     mbd.Screw: ("screw", *FRAMES, 0.1),
