@@ -11,28 +11,43 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.sensitivity.entries import stacked, system
+from mbd.sensitivity.kernel import balance as kernel
+from mbd.sensitivity.kernel.balance import MOST, SETTLED
+from mbd.sensitivity.kernel.build import entry
 from mbd.sensitivity.motion import Mode, Motion, Rates, solved
 from mbd.sensitivity.programs import Programs
 
 __all__ = ["Impact", "consistent_rates", "impact", "independent", "on_rows"]
 
-SETTLED = 1e-12
-"""Change of rates and multipliers, over the largest of them, after which they are known [-]."""
-MOST = 8
-"""Newton iterations for rates and multipliers; one or two where forces depend on multipliers linearly [-]."""
 
-
-def consistent_rates(
-    programs: Programs, motion: Motion, mode: Mode, guess: Rates | None = None, size: int | None = None
-) -> Rates:
+def consistent_rates(programs: Programs, motion: Motion, mode: Mode, guess: Rates) -> Rates:
     """Rates and multipliers with ``r = 0`` and ``ḧ = 0``, and their derivatives.
 
-    guess : near them; size : number of directions, by default those of the motion
+    guess : near them
     """
-    c, n = programs.columns, programs.columns.n
-    rate = np.zeros(n) if guess is None else guess.rate.copy()
-    lam = np.zeros(c.rows) if guess is None else guess.lam.copy()
-    rows = list(mode.rows)
+    known = system(programs, "consistent", mode, False)
+    n, m, size = programs.columns.n, len(mode.rows), programs.layout.size
+    block, Z = np.zeros(size), stacked(motion, known)
+    programs.fill(block, motion.at(mode, guess.rate, guess.lam))
+    B = np.empty((n + m, Z.shape[1]))
+    singular = entry(kernel.consistent_rates)(
+        [known.function], programs.values, known.of_width(Z.shape[1]), known.rows, known.entries, block,
+        np.empty(known.outputs), Z, np.empty((n + m) ** 2), B, np.empty(n + m), np.empty(n + m, dtype=np.int64),
+    )  # fmt: skip
+    if singular:
+        return least_rates(programs, motion, mode, guess)
+    lam, of_lam = guess.lam.copy(), np.zeros((programs.columns.rows, len(motion.tangent.t)))
+    first, last = programs.layout.lam, programs.layout.a
+    lam[known.rows] = block[first + known.rows]
+    of_lam[known.rows] = B[n:, : len(motion.tangent.t)]
+    return Rates(block[last : last + n], lam, B[:n, : len(motion.tangent.t)], of_lam)
+
+
+def least_rates(programs: Programs, motion: Motion, mode: Mode, guess: Rates) -> Rates:
+    """The same with least solutions where the matrix is singular."""
+    c, n, rows = programs.columns, programs.columns.n, list(mode.rows)
+    rate, lam = guess.rate.copy(), guess.lam.copy()
     for _ in range(MOST):
         r, change, of_r, of_change = programs.consistent(motion.at(mode, rate, lam))
         A = saddle(of_r, of_change[rows], of_change[rows][:, c.rate], programs, rows)

@@ -22,13 +22,15 @@ Integers = NDArray[np.int64]
 class System:
     """A program in a mode.
 
-    sizes : see `mbd.sensitivity.kernel.sizes`; rows : numbers of the m rows, held : 1 for each that acts
+    sizes : see `mbd.sensitivity.kernel.sizes`; rows : numbers of the m rows, fast : 1 for those on velocities
+    held : 1 for each of all rows that acts
     entries : see there
     """
 
     function: Function
     sizes: Integers
     rows: Integers
+    fast: Integers
     held: Vector
     entries: Integers
     outputs: int
@@ -47,10 +49,10 @@ def padded(width: int) -> int:
 
 def system(programs: Programs, name: str, mode: Mode, stabilized: bool) -> System:
     """The program `name` ('steps' or 'consistent') in a mode."""
-    key = name, mode.rows, mode.held, stabilized
-    found: System | None = programs.known.get(key)
+    known, key = programs.sparse(name).systems, (mode.rows, mode.held, stabilized)
+    found: System | None = known.get(key)
     if found is None:
-        found = programs.known[key] = _made(programs, name, mode, stabilized)
+        found = known[key] = _made(programs, name, mode, stabilized)
     return found
 
 
@@ -77,7 +79,9 @@ def _made(programs: Programs, name: str, mode: Mode, stabilized: bool) -> System
         n, c.n_v, layout.n_q, R, m, 0, len(kept), c.count - R + m, int(stabilized), layout.q, layout.v, layout.a,
         layout.lam,
     ], dtype=np.int64)  # fmt: skip
-    return System(program.function, sizes, rows, held, entries.ravel(), size + len(program.lines))
+    return System(
+        program.function, sizes, rows, _fast(programs, mode), held, entries.ravel(), size + len(program.lines)
+    )
 
 
 def _lines(name: str, n: int, m: int, local: Integers) -> list[Integers]:
@@ -86,10 +90,14 @@ def _lines(name: str, n: int, m: int, local: Integers) -> list[Integers]:
     return [first] if name == "consistent" else [np.where(local >= 0, n + m + local, -1), first]
 
 
+def _fast(programs: Programs, mode: Mode) -> Integers:
+    return np.array([programs.equations.rows[k].is_velocity for k in mode.rows], dtype=np.int64)
+
+
 def _targets(programs: Programs, name: str, mode: Mode, stabilized: bool) -> tuple[Integers, Integers]:
     """Where each equation stands in the system of unknowns, and in that of position corrections."""
     n, m = programs.columns.n, len(mode.rows)
-    fast = np.array([programs.equations.rows[k].is_velocity for k in mode.rows], dtype=bool)
+    fast = _fast(programs, mode) == 1
     place, none = np.arange(m), np.full(m, -1)
     near = np.full(n + 2 * m, -1)
     if name == "consistent":

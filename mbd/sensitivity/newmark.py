@@ -25,8 +25,6 @@ __all__ = ["NewmarkSteps"]
 
 FOLLOWED = 1e-9
 """Distance of a row from the end of its step, over how far the step went, up to which the step is known [-]."""
-MOST = 12
-"""Newton iterations for the end of a step at an event [-]."""
 BRIEF, BRIEFEST = 1e-3, 1e-9
 """Parts of a full step below which the kernel takes one of Heun's method, with rows and without them [-]."""
 
@@ -273,56 +271,7 @@ class NewmarkSteps:
         by_step[n:][fast] = (guess.c_K / guess.c_C / h * (of_rate[:, c.x] @ shift))[fast]
         return turned, by_step
 
-    # the end of a step at an event ----------------------------------------------------------------------------------
-    def ended(self, motion: Motion, memory: Memory, mode: Mode, t1: float, guess: Rates) -> tuple[Motion, Rates]:
-        """The end of a step of any size: solved for, as rows at events hold rates that are consistent in their place.
-
-        Its tangent is that of the motion; only numbers are found.
-        """
-        c, rows, h = self.programs.columns, list(mode.rows), t1 - motion.t
-        n, n_v, m = c.n, c.n_v, len(rows)
-        rate, lam, shift = guess.rate.copy(), guess.lam.copy(), np.zeros(n_v)
-        fast = np.array([self.programs.equations.rows[k].is_velocity for k in rows], dtype=bool)
-        fixed = self._metric(motion, memory, mode, h) if self.stabilized and m else np.zeros((0, 0))
-        for _ in range(MOST):
-            a0, a1 = self._averages(memory, h, rate)
-            y = motion.y + h * ((1.0 - self.gamma) * a0 + self.gamma * a1)
-            x = h * motion.y[:n_v] + h * h * ((0.5 - self.beta) * a0 + self.beta * a1)[:n_v] + shift
-            end = replace(motion, t=t1, q=motion.q + x, y=y)
-            r, level, speed, of_r, of_h, of_rate = self.programs.steps(end.at(mode, rate, lam))
-            c_h = h * (1.0 - self.alpha_f) / (1.0 - self.alpha_m)
-            near = Prediction(a0, of_r, of_r, of_r, of_r, self.gamma * c_h, self.beta * h * c_h)
-            S, R = self._by_rates(of_r, near), of_r[:, c.lam][:, rows]
-            if self.stabilized and m:
-                A = np.block([[S, R], [guess_row(of_rate[rows], c, near), np.zeros((m, m))]])
-                off = level[rows] - (near.c_K / near.c_C) * speed[rows]
-                fresh = shift - solved(fixed, np.concatenate([np.zeros(n), np.where(fast, 0.0, off)]))[:n_v]
-                goal = (speed[rows] + of_rate[rows][:, c.x] @ (fresh - shift)) / near.c_C
-                moved, shift = np.abs(fresh - shift), fresh
-            else:
-                held = np.where(fast[:, np.newaxis], of_rate[rows], of_h[rows])
-                A = np.block([[S, R], [self._by_rates(held, near), np.zeros((m, m))]])
-                goal, moved = np.where(fast, speed[rows], level[rows]), np.zeros(1)
-            step = solved(A, -np.concatenate([r, goal]))
-            rate, lam[rows] = rate + step[:n], lam[rows] + step[n:]
-            size = np.max(np.abs(rate), initial=1e-300)
-            if np.max(np.abs(step[:n]), initial=0.0) <= 1e-13 * size and np.max(moved) <= 1e-13 * h * h * size:
-                break
-        a0, a1 = self._averages(memory, h, rate)
-        y = motion.y + h * ((1.0 - self.gamma) * a0 + self.gamma * a1)
-        x = h * motion.y[:n_v] + h * h * ((0.5 - self.beta) * a0 + self.beta * a1)[:n_v] + shift
-        return replace(motion, t=t1, q=motion.q + x, y=y), Rates(rate, lam, guess.of_rate, guess.of_lam)
-
-    def _metric(self, motion: Motion, memory: Memory, mode: Mode, h: float) -> Matrix:
-        """``[S R; B̃ 0]`` where the end of a step is predicted."""
-        c, rows = self.programs.columns, list(mode.rows)
-        place, foreseen = self.predicted(motion, memory, h)
-        _, _, _, of_r, _, of_rate = self.programs.steps(place.at(mode, foreseen.rate, foreseen.lam))
-        c_h = h * (1.0 - self.alpha_f) / (1.0 - self.alpha_m)
-        near = Prediction(foreseen.rate, of_r, of_r, of_r, of_r, self.gamma * c_h, self.beta * h * c_h)
-        S, R = self._by_rates(of_r, near), of_r[:, c.lam][:, rows]
-        return np.block([[S, R], [guess_row(of_rate[rows], c, near), np.zeros((len(rows), len(rows)))]])
-
+    # short steps ---------------------------------------------------------------------------------------------------
     def is_brief(self, h: float, mode: Mode) -> bool:
         """Whether the kernel takes a step of Heun's method in the place of one so short."""
         return h < BRIEF * self.full and (bool(mode.held) or h < BRIEFEST * self.full)

@@ -10,12 +10,12 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.sensitivity.entries import System, stacked, system
 from mbd.sensitivity.kernel.build import entry
-from mbd.sensitivity.kernel.newmark import newmark_steps
+from mbd.sensitivity.kernel.newmark import newmark_end, newmark_steps
 from mbd.sensitivity.motion import Mode, Motion, Rates
 from mbd.sensitivity.newmark import NewmarkSteps
 from mbd.sensitivity.schemes import Memory
 
-__all__ = ["Rows", "taken"]
+__all__ = ["Rows", "ended", "taken"]
 
 Rows = tuple[Vector, Matrix, Matrix, Matrix, Matrix]
 """Times, q, y, rates and multipliers of rows that follow each other."""
@@ -53,6 +53,30 @@ def taken(
     tangent = replace(motion.tangent, t=Z[n_v + 2 * n + m, :width], q=Z[:n_v, :width], y=Z[n_v : n_v + n, :width])
     end = Motion(float(time[done]), q[done].copy(), y[done].copy(), motion.anchors, tangent)
     return done, end, _memory(rate[done].copy(), np.array(rows[4][done]), memories, X[:, :width], known, twofold)
+
+
+def ended(steps: NewmarkSteps, motion: Motion, memory: Memory, mode: Mode, time: float, guess: Rates) -> Rows | None:
+    """Two rows: this one, and the end of a step of any size from it, solved for from rates and multipliers near those.
+
+    None where its equations are singular.
+    """
+    programs = steps.programs
+    known = system(programs, "steps", mode, steps.stabilized)
+    n, n_v, m = programs.columns.n, programs.columns.n_v, len(mode.rows)
+    rows = (
+        np.array([motion.t, time]), np.array([motion.q, motion.q]), np.array([motion.y, motion.y]),
+        np.array([memory.rates.rate, guess.rate]), np.array([memory.rates.lam, guess.lam]) * known.held,
+    )  # fmt: skip
+    block = np.zeros((2, programs.layout.size))
+    programs.fill(block, motion.at(mode, guess.rate, guess.lam))
+    numbers = np.array([steps.alpha_m, steps.alpha_f, steps.beta, steps.gamma, steps.full])
+    singular = entry(newmark_end)(
+        [known.function], programs.values, known.sizes, numbers, *rows, known.rows, known.fast, known.entries, block[0],
+        block[1], np.empty(known.outputs), _numbers(memory, n_v), np.empty((n + m) ** 2), np.empty((n + m) ** 2),
+        np.empty(n + m), np.empty(2 * n_v), np.empty(n + m, dtype=np.int64), np.empty(n + m, dtype=np.int64),
+        np.empty(4 * n + 2 * m),
+    )  # fmt: skip
+    return None if singular else rows
 
 
 def _numbers(memory: Memory, n_v: int) -> Vector:

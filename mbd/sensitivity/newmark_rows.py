@@ -15,7 +15,7 @@ from mbd.integrators.family import NewmarkFamily
 from mbd.sensitivity.balance import consistent_rates, on_rows
 from mbd.sensitivity.motion import Mode, Motion, Rates
 from mbd.sensitivity.newmark import NewmarkSteps
-from mbd.sensitivity.newmark_kernel import Rows, taken
+from mbd.sensitivity.newmark_kernel import Rows, ended, taken
 from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.run_data import RunRows
 from mbd.sensitivity.schemes import Memory, SchemeSteps
@@ -60,9 +60,19 @@ class NewmarkRows(SchemeSteps):
             if other is None:
                 return self._uneven(motion, memory, mode, row, dh)
             memory = other
+        lam = np.array(record.lam[row])
+        rates = np.array([memory.rates.rate, rate]), np.array([memory.rates.lam, lam])
+        rows = np.array([motion.t, time]), np.array([motion.q, record.q[row]]), np.array([motion.y, y]), *rates
+        return self._step(motion, memory, mode, rows, dh)
+
+    def _step(self, motion: Motion, memory: Memory, mode: Mode, rows: Rows, dh: Vector) -> tuple[Motion, Memory]:
+        """A step between two rows, with least solutions where it is singular."""
+        done, end, after = taken(self.steps, motion, memory, mode, rows, dh)
+        if done:
+            return end, after
+        time, q, y, rate, lam = (each[1] for each in rows)
         none = np.zeros((0, 0)), np.zeros((0, 0))
-        rates = Rates(rate, np.array(record.lam[row]), *none)
-        return self.steps.step(motion, memory, mode, (time, np.array(record.q[row]), y), rates, dh)
+        return self.steps.step(motion, memory, mode, (float(time), q, y), Rates(rate, lam, *none), dh)
 
     def _other_start(
         self, motion: Motion, memory: Memory, mode: Mode, h: float, row: int, fresh: bool
@@ -94,8 +104,10 @@ class NewmarkRows(SchemeSteps):
                 end, after = steps.brief(motion, memory, mode, time, dh)
             else:
                 guess = Rates(self.rows.rate[row].copy(), np.array(record.lam[row]), *(np.zeros((0, 0)),) * 2)
-                found, solved = steps.ended(motion, memory, mode, time, guess)
-                end, after = steps.step(motion, memory, mode, (time, found.q, found.y), solved, dh)
+                rows = ended(steps, motion, memory, mode, time, guess)
+                if rows is None:
+                    continue
+                end, after = self._step(motion, memory, mode, rows, dh)
             if not self.stabilized and mode.rows:
                 end = on_rows(self.programs, end, mode, end.y, end.tangent.y)
             yield end, after.rates

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
@@ -116,11 +116,15 @@ class State:
 
 @dataclass(frozen=True)
 class Sparse:
-    """A compiled program: its values, and of their derivatives those that are not always 0, by line and column."""
+    """A compiled program: its values, and of their derivatives those that are not always 0, by line and column.
+
+    systems : what is known of it in a mode (see `entries`)
+    """
 
     function: Function
     lines: NDArray[np.int64]
     columns: NDArray[np.int64]
+    systems: dict[Any, Any] = field(default_factory=dict)
 
 
 class Programs:
@@ -139,7 +143,6 @@ class Programs:
         self.values = np.ascontiguousarray(values, dtype=float) if len(values) else np.zeros(1)
         self._block = np.zeros(self.layout.size)
         self._given: dict[str, list[Node]] = {}
-        self.known: dict[Any, Any] = {}
 
     def steps(self, at: State) -> tuple[Vector, Vector, Vector, Matrix, Matrix, Matrix]:
         """r, h, ḣ and their derivatives."""

@@ -23,7 +23,7 @@ from mbd.sensitivity.kernel.sizes import (
     WIDTH,
 )
 
-__all__ = ["balance", "metric", "place_row"]
+__all__ = ["balance", "changes", "metric", "place_row", "saddle"]
 
 
 def place_row(
@@ -41,17 +41,15 @@ def place_row(
         block[S[AT_LAM] + i] = lam[k * S[ALL_ROWS] + i]
 
 
-def balance(
-    S: Integers, entries: Integers, out: Reals, c_K: float, c_C: float, size: int, A: Reals, B: Reals, Z: Reals
-) -> None:
-    """A += ∂/∂v̇ + c_C ∂/∂v + c_K ∂/∂x, ∂/∂λ and, beyond n + m, ∂/∂x; B −= the changes by Z of all but rates and λ."""
+def balance(S: Integers, entries: Integers, out: Reals, c_K: float, c_C: float, size: int, A: Reals) -> None:
+    """A += ∂/∂v̇ + c_C ∂/∂v + c_K ∂/∂x, ∂/∂λ and, beyond n + m, ∂/∂x."""
     n = S[RATES]
     n_v = S[PLACES]
     m = S[ROWS]
     for e in range(S[ENTRIES]):
         i = entries[e * PARTS + TARGET]
-        if i >= 0:
-            j = entries[e * PARTS + COLUMN]
+        j = entries[e * PARTS + COLUMN]
+        if i >= 0 and j < n_v + 2 * n + m:
             value = out[entries[e * PARTS + PLACE]]
             if j < n_v:
                 A[i * size + j] += c_K * value
@@ -59,10 +57,19 @@ def balance(
                     A[i * size + n + m + j] += value
             elif j < n_v + n:
                 A[i * size + j - n_v] += c_C * value
-            elif j < n_v + 2 * n + m:
+            else:
                 A[i * size + j - n_v - n] += value
-            if j < n_v + n or j >= n_v + 2 * n + m:
-                add(B, i, -value, Z, j, S[WIDTH])
+
+
+def changes(S: Integers, entries: Integers, out: Reals, B: Reals, Z: Reals) -> None:
+    """B −= the changes by Z of all that is no rate and no multiplier."""
+    n = S[RATES]
+    n_v = S[PLACES]
+    for e in range(S[ENTRIES]):
+        i = entries[e * PARTS + TARGET]
+        j = entries[e * PARTS + COLUMN]
+        if i >= 0 and (j < n_v + n or j >= n_v + 2 * n + S[ROWS]):
+            add(B, i, -out[entries[e * PARTS + PLACE]], Z, j, S[WIDTH])
 
 
 def metric(S: Integers, entries: Integers, out: Reals, c_K: float, c_C: float, M: Reals) -> None:
@@ -82,3 +89,18 @@ def metric(S: Integers, entries: Integers, out: Reals, c_K: float, c_C: float, M
                 M[i * size + j - n_v] += value if i >= n else c_C * value
             elif i < n:
                 M[i * size + j - n_v - n] += value
+
+
+def saddle(S: Integers, entries: Integers, out: Reals, M: Reals) -> None:
+    """M += [M R; B 0]: ``∂r/∂v̇``, ``∂r/∂λ``, ``B = ∂ḣ/∂v``."""
+    n = S[RATES]
+    n_v = S[PLACES]
+    size = n + S[ROWS]
+    for e in range(S[ENTRIES]):
+        i = entries[e * PARTS + EQUATION]
+        j = entries[e * PARTS + COLUMN]
+        if i < n:
+            if n_v + n <= j < n_v + n + size:
+                M[i * size + j - n_v - n] += out[entries[e * PARTS + PLACE]]
+        elif i < size and n_v <= j < n_v + n:
+            M[i * size + j - n_v] += out[entries[e * PARTS + PLACE]]
