@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -65,11 +66,13 @@ class MapDerivative:
 
 def measured(map_: ReturnMap, chart: Chart, c: Vector, values: Values) -> Measured | Arrival:
     """The numbers of one application from the coordinates c; the arrival alone where it does not arrive."""
-    state = chart.at(c, map_.vector(values))
-    arrival = map_(state, values)
-    if not arrival.outcome.good or not map_.against(chart.section, arrival).good:
-        return arrival
-    return numbers_of(chart, arrival)
+    return _of_arrival(map_, chart, map_(chart.at(c, map_.vector(values)), values))
+
+
+def _of_arrival(map_: ReturnMap, chart: Chart, arrival: Arrival) -> Measured | Arrival:
+    """The numbers of an arrival on the section; another one as it is."""
+    good = arrival.outcome.good and map_.against(chart.section, arrival).good
+    return numbers_of(chart, arrival) if good else arrival
 
 
 def numbers_of(chart: Chart, arrival: Arrival) -> Measured:
@@ -153,15 +156,18 @@ class _Column:
 
 def _beside(map_: ReturnMap, chart: Chart, points: Sequence[tuple[Vector, Values]]) -> list[Vector | str]:
     """The numbers of the map at points beside its base; why it does not arrive."""
-    found: list[Vector | str] = []
+    starts: list[Any] = []
     for c, values in points:
         try:
-            each = measured(map_, chart, c, values)
+            starts.append((chart.at(c, map_.vector(values)), values))
         except SimulationError as error:
-            found.append(str(error))
-            continue
-        found.append(str(each.outcome) if isinstance(each, Arrival) else each.numbers)
-    return found
+            starts.append(str(error))
+    arrivals = iter(map_.each([start for start in starts if not isinstance(start, str)]))
+    results = [start if isinstance(start, str) else _of_arrival(map_, chart, next(arrivals)) for start in starts]
+    return [
+        each if isinstance(each, str) else str(each.outcome) if isinstance(each, Arrival) else each.numbers
+        for each in results
+    ]
 
 
 def extrapolated(slopes: Sequence[Vector]) -> tuple[Vector, Vector]:

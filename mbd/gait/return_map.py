@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -53,6 +53,26 @@ class Arrival:
     steps: tuple[tuple[str, float, float], ...]
     before: frozenset[str]
     events: Sequence[EventRecord]
+
+
+@dataclass(eq=False)
+class _Walk:
+    """An application of the map while it is made."""
+
+    state: State
+    values: Values
+    travel: Vector
+    outcome: Outcome = field(default_factory=lambda: Outcome("arrives", ""))
+    period: float = 0.0
+    steps: list[tuple[str, float, float]] = field(default_factory=list)
+    end: End | None = None
+
+    def arrival(self) -> Arrival:
+        """Where it has led."""
+        assert self.end is not None
+        return Arrival(
+            self.state, self.outcome, self.period, self.travel, tuple(self.steps), self.end.before, self.end.events
+        )
 
 
 @dataclass(eq=False)
@@ -111,39 +131,45 @@ class ReturnMap:
 
     def __call__(self, state: State, values: Values | None = None, strides: int | None = None) -> Arrival:
         """One application of the map; a return that does not arrive ends it."""
-        values = self.values if values is None else values
-        period, travel = 0.0, np.zeros(len(self.fixed))
-        steps: list[tuple[str, float, float]] = []
+        return self.each([(state, self.values if values is None else values)], strides)[0]
+
+    def each(self, points: Sequence[tuple[State, Values]], strides: int | None = None) -> list[Arrival]:
+        """The applications of the map from several states with values of parameters, made together."""
+        walks = [_Walk(state, values, np.zeros(len(self.fixed))) for state, values in points]
         for number in range(self.strides if strides is None else strides):
-            end = self._end(state, values)
-            outcome = self._judged(state, end)
-            after = end.state if end.state is not None else state
-            odd = self.mirror is not None and number % 2 == 1
-            moved = self.mechanism.equations.configuration.difference(state.q, after.q)[list(self.fixed)]
-            steps += [(self._named(name, odd), period + t, length) for name, t, length in self._steps(end, moved)]
-            period, travel = period + after.time, travel + moved
-            state = replace(after, time=0.0, moved={}, parameters={})
-            state = self.mirror.state(state) if self.mirror is not None else state
-            if not outcome.good:
-                break
-        return Arrival(state, outcome, period, travel, tuple(steps), end.before, end.events)
+            going = [walk for walk in walks if walk.outcome.good]
+            for walk, end in zip(going, self._ends(going), strict=True):
+                self._arrived(walk, end, odd=self.mirror is not None and number % 2 == 1)
+        return [walk.arrival() for walk in walks]
+
+    def _arrived(self, walk: _Walk, end: End, odd: bool) -> None:
+        """One return more of a walk."""
+        start, walk.end = walk.state, end
+        after = end.state if end.state is not None else start
+        walk.outcome = self._judged(start, end)
+        moved = self.mechanism.equations.configuration.difference(start.q, after.q)[list(self.fixed)]
+        found = self._steps(end, moved)
+        walk.steps += [(self._named(name, odd), walk.period + t, length) for name, t, length in found]
+        walk.period, walk.travel = walk.period + after.time, walk.travel + moved
+        state = replace(after, time=0.0, moved={}, parameters={})
+        walk.state = self.mirror.state(state) if self.mirror is not None else state
 
     def _named(self, name: str, odd: bool) -> str:
         return self.mirror.name(name) if odd and self.mirror is not None else name
 
-    def _end(self, state: State, values: Values) -> End:
-        """The end of one run."""
-        self.runs += 1
+    def _ends(self, walks: Sequence[_Walk]) -> list[End]:
+        """The ends of one run of each."""
+        self.runs += len(walks)
         run = self._repeated.get(None) or self._repeated.get((self.dt, self.longest))
         if run is None:
             run = RepeatedRun(
-                self.model, self.start, self.integrator, self.dt, (self.section, self.longest), self.plain(values),
+                self.model, self.start, self.integrator, self.dt, (self.section, self.longest), self.plain(self.values),
                 self.backend,
             )  # fmt: skip
             self._repeated[None if run.adjustable else (self.dt, self.longest)] = run
         if run.adjustable:
             run.adjust(self.dt, self.longest)
-        return run(state, self.plain(values))
+        return run.many([walk.state for walk in walks], [self.plain(walk.values) for walk in walks])
 
     def _steps(self, end: End, moved: Vector) -> list[tuple[str, float, float]]:
         """The feet that touched down, when, and the length of the step that each ended.

@@ -117,7 +117,10 @@ class RepeatedRun:
     @cached_property
     def _many(self) -> ManyRuns:
         """Arrays of their own, so that runs of both kinds may follow each other."""
-        return ManyRuns(laid_out(*self._arguments))
+        many = ManyRuns(laid_out(*self._arguments))
+        if self.adjustable:
+            many.adjust(self.dt, self.run.end)
+        return many
 
     def _vector(self, values: Mapping[str, float]) -> Vector:
         folded = getattr(self.run.model, "parameters", {}) if values else {}
@@ -134,7 +137,7 @@ class RepeatedRun:
         before = run.manager.mode(ends.before[k]).closed
         return End(ends.state(run, k, values), tuple(events), before, names[number] if number >= 0 else "", "")
 
-    @property
+    @cached_property
     def adjustable(self) -> bool:
         """Whether `adjust` may be used: no controller and no kink of a signal in time sets instants of its own."""
         return not self.run.boundaries.controllers and not len(self.run.boundaries.breaks)
@@ -143,6 +146,8 @@ class RepeatedRun:
         """Another step and another latest time [s] for the next calls."""
         self.dt, self.run.end = dt, latest
         self.run.kernel.end = latest
+        if "_many" in self.__dict__:
+            self._many.adjust(dt, latest)
 
     @property
     def table(self) -> Matrix:

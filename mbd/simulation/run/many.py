@@ -149,6 +149,16 @@ class ManyRuns:
                 between(int(v.run))
         return self._ends(count, lines)
 
+    def adjust(self, dt: float, latest: float) -> None:
+        """Another step and another latest time [s] for the next calls."""
+        v, stepper = self.run.kernel, self.run.stepper
+        if v.dt == dt and v.last_time == latest:
+            return
+        stepper.reals[:] = v.fresh_reals
+        v.dt = v.step = dt
+        v.last_time = latest
+        v.fresh_reals[:] = stepper.reals
+
     def _ends(self, count: int, lines: int) -> Ends:
         v = self.run.kernel
         table = v.ends[: count * v.end_width].reshape(count, v.end_width)
