@@ -100,13 +100,13 @@ class ReturnMap:
     runs: int = 0
 
     def __post_init__(self) -> None:
+        self._last: tuple[Values, Vector] | None = None
         plain = self.plain(self.values)
         self.mechanism: Mechanism = mechanism_of(self.model, self.backend, plain)
         self.folded = getattr(self.model, "parameters", {})
         self.manager = manager_of(self.mechanism, self.vector(self.values))
         places = {contact.name: contact.place for contact in Facts.of(self.mechanism.equations).contacts}
         self.feet = {name: place for name, place in places.items() if place}
-        self._where: dict[str, ScalarFunction] = {}
         self._repeated: dict[tuple[float, float] | None, RepeatedRun] = {}
 
     # parameters ---------------------------------------------------------------------------------------------------
@@ -120,7 +120,10 @@ class ReturnMap:
 
     def vector(self, values: Values) -> Vector:
         """The parameter vector."""
-        return self.mechanism.parameters(self.plain(values), self.folded)
+        last = self._last
+        if last is None or last[0] != values:
+            last = self._last = dict(values), self.mechanism.parameters(self.plain(values), self.folded)
+        return last[1]
 
     # runs ---------------------------------------------------------------------------------------------------------
     def with_step(self, dt: float, longest: float | None = None) -> ReturnMap:
@@ -146,9 +149,10 @@ class ReturnMap:
         """One return more of a walk."""
         start, walk.end = walk.state, end
         after = end.state if end.state is not None else start
-        walk.outcome = self._judged(start, end)
+        places = self._feet_at(start, walk.values), self._feet_at(after, walk.values)
+        walk.outcome = self._judged(start, end, *places)
         moved = self.mechanism.equations.configuration.difference(start.q, after.q)[list(self.fixed)]
-        found = self._steps(end, moved)
+        found = self._steps(end, moved, places[1])
         walk.steps += [(self._named(name, odd), walk.period + t, length) for name, t, length in found]
         walk.period, walk.travel = walk.period + after.time, walk.travel + moved
         state = replace(after, time=0.0, moved={}, parameters={})
@@ -171,7 +175,7 @@ class ReturnMap:
             run.adjust(self.dt, self.longest)
         return run.many([walk.state for walk in walks], [self.plain(walk.values) for walk in walks])
 
-    def _steps(self, end: End, moved: Vector) -> list[tuple[str, float, float]]:
+    def _steps(self, end: End, moved: Vector, places: Mapping[str, Vector]) -> list[tuple[str, float, float]]:
         """The feet that touched down, when, and the length of the step that each ended.
 
         At the end both places are known; of two steps the first is what is left of the way.
@@ -181,26 +185,36 @@ class ReturnMap:
         stance = [name for name in self.feet if name in end.before and name != self.section]
         last = end.state is not None and self.section in self.feet and end.stopped_by == self.section
         if last and end.state is not None and strikes and len(stance) == 1 and len(strikes) <= 2:
-            apart = self.place(end.state, self.section) - self.place(end.state, stance[0])
+            apart = places[self.section] - places[stance[0]]
             lengths[-1] = float(np.linalg.norm(apart))
             if len(strikes) == 2:
                 lengths[0] = float(np.linalg.norm(moved)) - lengths[-1]
         return [(event.name, event.time, length) for event, length in zip(strikes, lengths, strict=True)]
 
-    def place(self, state: State, foot: str) -> Vector:
-        """Where the point of a foot is (3,) [m]."""
-        known = self._where.get(foot)
-        if known is None:
-            with self.mechanism.equations.tape.lock:
-                outputs = [self.mechanism.equations.output(f"{self.feet[foot]}.{axis}") for axis in "xyz"]
-                known = self._where[foot] = scalar_function(outputs, self.mechanism.layout, "place")
-        out = np.zeros(3)
+    def _feet_at(self, state: State, values: Values) -> dict[str, Vector]:
+        """Where the points of all feet are, by name (3,) [m]."""
+        if not self.feet:
+            return {}
+        out = np.zeros(3 * len(self.feet))
         y = np.concatenate([state.v, state.z])
-        known(self.mechanism.block(0.0, state.q, y, state.anchors), self.vector(self.values), out)
-        return out
+        self._where(self.mechanism.block(0.0, state.q, y, state.anchors), self.vector(values), out)
+        return dict(zip(self.feet, out.reshape(-1, 3), strict=True))
+
+    @property
+    def _where(self) -> ScalarFunction:
+        """The program of the places of all feet."""
+        memory = self.mechanism.equations.memory
+        if "places of feet" not in memory:
+            with self.mechanism.equations.tape.lock:
+                outputs = [self.mechanism.equations.output(f"{f}.{axis}") for f in self.feet.values() for axis in "xyz"]
+                memory["places of feet"] = scalar_function(outputs, self.mechanism.layout, "places")
+        found: ScalarFunction = memory["places of feet"]
+        return found
 
     # judgement ----------------------------------------------------------------------------------------------------
-    def _judged(self, start: State, end: End) -> Outcome:
+    def _judged(
+        self, start: State, end: End, was: Mapping[str, Vector], now: Mapping[str, Vector]
+    ) -> Outcome:  # fmt: skip
         """Arrives, or why not, as far as the end alone tells; `explained` tells falls."""
         if end.state is None:
             return Outcome("not on the section", end.problem, 0.0)
@@ -213,18 +227,18 @@ class ReturnMap:
             return Outcome("misses", f"{self.section!r} does not happen within {self.longest:.3g} s", end.time)
         if end.time <= AT_ONCE * self.longest:
             return Outcome("scuffs", f"scuffs at {end.time:.3g} s: {self.section!r} happens at once", end.time)
-        if self._scuffs(start, end):
+        if self._scuffs(start, end, was, now):
             text = f"scuffs at {end.time:.3g} s: {self.section!r} closes before its foot has passed the other"
             return Outcome("scuffs", text, end.time)
         return Outcome("arrives", f"arrives after {end.time:.6g} s", end.time)
 
-    def _scuffs(self, start: State, end: End) -> bool:
+    def _scuffs(self, start: State, end: End, was: Mapping[str, Vector], now: Mapping[str, Vector]) -> bool:
         """Whether the foot of the section came down on the side of the stance foot from which it left."""
         stance = [name for name in self.feet if name in end.before and name != self.section]
         if end.state is None or self.section not in self.feet or len(stance) != 1 or self.section in start.mode.closed:
             return False
-        was, now = (self.place(state, self.section) - self.place(state, stance[0]) for state in (start, end.state))
-        return float(was @ now) > 0.0 and float(np.linalg.norm(was)) > 0.0
+        before, after = (places[self.section] - places[stance[0]] for places in (was, now))
+        return float(before @ after) > 0.0 and float(np.linalg.norm(before)) > 0.0
 
     def explained(self, state: State, outcome: Outcome, values: Values | None = None) -> Outcome:
         """The outcome with falls named; makes the run once more where that needs its rows."""

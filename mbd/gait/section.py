@@ -88,6 +88,8 @@ class Section:
 
     def anchored(self, q: Vector, y: Vector, parameters: Vector, anchors: Vector) -> Vector:
         """The anchors with what closed unilateral contacts hold at q."""
+        if not len(anchors):
+            return np.array(anchors, dtype=float)
         terms = self.mechanism.acceleration_terms(0.0, q, y, parameters, anchors)
         found = np.array(anchors, dtype=float)
         for contact, flag in zip(self.manager.contacts, self.flags, strict=True):
@@ -152,9 +154,10 @@ class Chart:
             raise SimulationError(f"no state of the section is near: {size:.2g} m or rad are left of its rows")
         z = base.z + parts[2]
         v = base.v + self.rates @ parts[1]
-        for _ in range(2):
-            rate, B = section.velocities(q, np.concatenate([v, z]), parameters, anchors)
-            v = v - self.off_rates @ np.linalg.lstsq(B @ self.off_rates, rate, rcond=None)[0]
+        rate, B = section.velocities(q, np.concatenate([v, z]), parameters, anchors)
+        for _ in range(2):  # ḣ is linear in v
+            change = self.off_rates @ np.linalg.lstsq(B @ self.off_rates, rate, rcond=None)[0]
+            v, rate = v - change, rate - B @ change
         anchors = section.anchored(q, np.concatenate([v, z]), parameters, anchors)
         return replace(
             base, time=0.0, q=q, v=v, z=z, anchors=anchors, mode=section.mode, armed=section.armed, memory=None,

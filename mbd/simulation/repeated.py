@@ -74,12 +74,23 @@ class RepeatedRun:
         }  # fmt: skip
         first = replace(start, time=0.0, memory=None)
         self._arguments = model, first, integrator, dt, until, dict(parameters), options
-        self.run: Run = prepared(*self._arguments)
-        stepper = self.run.stepper
-        self._reals, self._integers = stepper.reals.copy(), stepper.integers.copy()
-        self._boundaries = self.run.boundaries.kept()
+        self._laid_out = laid_out(*self._arguments)
+        self.alone = may_be_many(self._laid_out)
+        """Why runs are made one by one; '' if they need not be."""
+        boundaries = self._laid_out.boundaries
+        self.adjustable = not boundaries.controllers and not len(boundaries.breaks)
+        """Whether `adjust` may be used: no controller and no kink of a signal in time sets instants of its own."""
         self.parameters = dict(parameters)
-        self.dt = dt
+        self.dt, self.latest = dt, self._laid_out.end
+        self._folded = getattr(model, "parameters", {})
+
+    @cached_property
+    def run(self) -> Run:
+        """The run that Python drives."""
+        run = prepared(*self._arguments)
+        self._reals, self._integers = run.stepper.reals.copy(), run.stepper.integers.copy()
+        self._boundaries = run.boundaries.kept()
+        return run
 
     def __call__(self, start: State, parameters: Mapping[str, float] | None = None) -> End:
         """The end of the run from a consistent start."""
@@ -107,9 +118,15 @@ class RepeatedRun:
         each = [dict(own)] * len(starts) if isinstance(own, Mapping) else [dict(one) for one in own]
         if len(each) != len(starts):
             raise ModelError(f"there are {len(starts)} starts and {len(each)} sets of parameters; give one for each")
-        if may_be_many(self.run):
+        if self.alone:
             return [self(start, values) for start, values in zip(starts, each, strict=True)]
-        vectors = np.array([self._vector(values) for values in each]).reshape(len(each), -1)
+        known: list[tuple[dict[str, float], Vector]] = []
+        for values in each:
+            if not known or values != known[-1][0]:
+                known.append((values, self._vector(values)))
+            else:
+                known.append(known[-1])
+        vectors = np.array([vector for _, vector in known]).reshape(len(each), -1)
         lines = np.array([start_line(self._many.run, start) for start in starts]).reshape(len(each), -1)
         ends = self._many(lines, vectors, LINES)
         return [self._end(ends, k, start, each[k]) for k, start in enumerate(starts)]
@@ -117,14 +134,13 @@ class RepeatedRun:
     @cached_property
     def _many(self) -> ManyRuns:
         """Arrays of their own, so that runs of both kinds may follow each other."""
-        many = ManyRuns(laid_out(*self._arguments))
+        many = ManyRuns(self._laid_out)
         if self.adjustable:
-            many.adjust(self.dt, self.run.end)
+            many.adjust(self.dt, self.latest)
         return many
 
     def _vector(self, values: Mapping[str, float]) -> Vector:
-        folded = getattr(self.run.model, "parameters", {}) if values else {}
-        return self.run.mechanism.parameters(values, folded)
+        return self._laid_out.mechanism.parameters(values, self._folded if values else {})
 
     def _end(self, ends: Ends, k: int, start: State, values: dict[str, float]) -> End:
         """The end of the k-th run; one that Python has to make, or to explain, is made again."""
@@ -137,15 +153,9 @@ class RepeatedRun:
         before = run.manager.mode(ends.before[k]).closed
         return End(ends.state(run, k, values), tuple(events), before, names[number] if number >= 0 else "", "")
 
-    @cached_property
-    def adjustable(self) -> bool:
-        """Whether `adjust` may be used: no controller and no kink of a signal in time sets instants of its own."""
-        return not self.run.boundaries.controllers and not len(self.run.boundaries.breaks)
-
     def adjust(self, dt: float, latest: float) -> None:
         """Another step and another latest time [s] for the next calls."""
-        self.dt, self.run.end = dt, latest
-        self.run.kernel.end = latest
+        self.dt, self.latest = dt, latest
         if "_many" in self.__dict__:
             self._many.adjust(dt, latest)
 
@@ -159,6 +169,7 @@ class RepeatedRun:
         run = self.run
         run.stepper.reals[:], run.stepper.integers[:] = self._reals, self._integers
         run.kernel.dt = run.kernel.step = run.dt = self.dt
+        run.kernel.end = run.end = self.latest
         run.kernel.counts[:] = 0
         run.boundaries.restore(self._boundaries)
         run.boundaries.states = {c.name: c.state for c in run.boundaries.controllers}

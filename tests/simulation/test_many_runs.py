@@ -110,3 +110,17 @@ def test_the_twin_takes_many_runs_too():
     for k, start in enumerate(starts):
         alone = mbd.simulate(model, start, scheme, 0.02, until=("floor", 0.2), contact="events", backend="python")
         assert same(ends.state(run, k, {}), alone.final)
+
+
+def test_another_step_and_latest_time_are_those_of_a_run_prepared_with_them():
+    sizes = case("f3-kneed-walker-chen").definition
+    model = kneed(sizes)
+    start = standing(model, case("f3-kneed-walker-chen")["fixed point"].value, sizes["slope"])
+    for scheme in SCHEMES:
+        adjusted = RepeatedRun(model, start, scheme, 0.02, ("right foot", 3.0), {})
+        adjusted.many([start])
+        for dt, latest in ((5e-3, 3.0), (0.01, 0.2)):
+            adjusted.adjust(dt, latest)
+            prepared = RepeatedRun(model, start, scheme, dt, ("right foot", latest), {})
+            for ends in ((adjusted(start), prepared(start)), (adjusted.many([start])[0], prepared.many([start])[0])):
+                assert same(ends[0].state, ends[1].state) and ends[0].stopped_by == ends[1].stopped_by
