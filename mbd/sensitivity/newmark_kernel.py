@@ -13,12 +13,10 @@ from mbd.sensitivity.kernel.build import entry
 from mbd.sensitivity.kernel.newmark import newmark_end, newmark_steps
 from mbd.sensitivity.motion import Mode, Motion, Rates
 from mbd.sensitivity.newmark import NewmarkSteps
+from mbd.sensitivity.run_data import Rows
 from mbd.sensitivity.schemes import Memory
 
-__all__ = ["Rows", "ended", "taken"]
-
-Rows = tuple[Vector, Matrix, Matrix, Matrix, Matrix]
-"""Times, q, y, rates and multipliers of rows that follow each other."""
+__all__ = ["ended", "taken"]
 
 
 def taken(

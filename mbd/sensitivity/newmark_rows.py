@@ -15,9 +15,9 @@ from mbd.integrators.family import NewmarkFamily
 from mbd.sensitivity.balance import consistent_rates, on_rows
 from mbd.sensitivity.motion import Mode, Motion, Rates
 from mbd.sensitivity.newmark import NewmarkSteps
-from mbd.sensitivity.newmark_kernel import Rows, ended, taken
+from mbd.sensitivity.newmark_kernel import ended, taken
 from mbd.sensitivity.programs import Programs
-from mbd.sensitivity.run_data import RunRows
+from mbd.sensitivity.run_data import Rows, RunRows
 from mbd.sensitivity.schemes import Memory, SchemeSteps
 
 __all__ = ["NewmarkRows"]
@@ -40,29 +40,21 @@ class NewmarkRows(SchemeSteps):
         if last <= first:
             return first, motion, memory
         still = np.zeros_like(motion.tangent.t)
-        done, motion, memory = taken(self.steps, motion, memory, mode, self._rows(first, last), still)
+        done, motion, memory = taken(self.steps, motion, memory, mode, self.rows.between(first, last), still)
         return first + done, motion, memory
-
-    def _rows(self, first: int, last: int) -> Rows:
-        """Rows of the run, from the first to the last one."""
-        record, here = self.rows.record, slice(first, last + 1)
-        return record.time[here], record.q[here], self.rows.y[here], self.rows.rate[here], record.lam[here]
 
     def along(
         self, motion: Motion, memory: Memory, mode: Mode, row: int, dh: Vector, fresh: bool
     ) -> tuple[Motion, Memory]:
         """A step to a row, from what the scheme remembers or from a start that the run does not store."""
-        record, time = self.rows.record, float(self.rows.record.time[row])
-        h = time - motion.t
+        h = float(self.rows.record.time[row]) - motion.t
         rate, y = self.rows.rate[row], self.rows.y[row]
         if not self.steps.follows(motion, memory, h, y, rate):
             other = self._other_start(motion, memory, mode, h, row, fresh)
             if other is None:
                 return self._uneven(motion, memory, mode, row, dh)
             memory = other
-        lam = np.array(record.lam[row])
-        rates = np.array([memory.rates.rate, rate]), np.array([memory.rates.lam, lam])
-        rows = np.array([motion.t, time]), np.array([motion.q, record.q[row]]), np.array([motion.y, y]), *rates
+        rows = self.rows.step_to(row, motion, memory.rates)
         return self._step(motion, memory, mode, rows, dh)
 
     def _step(self, motion: Motion, memory: Memory, mode: Mode, rows: Rows, dh: Vector) -> tuple[Motion, Memory]:

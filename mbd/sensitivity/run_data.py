@@ -18,10 +18,13 @@ from mbd.errors import CapabilityError
 from mbd.integrators.base import Integrator
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.results.record import EventRecord, Record
-from mbd.sensitivity.motion import Mode
+from mbd.sensitivity.motion import Mode, Motion, Rates
 from mbd.trajectory import Trajectory
 
-__all__ = ["RunRows", "refused"]
+__all__ = ["Rows", "RunRows", "refused"]
+
+Rows = tuple[Vector, Matrix, Matrix, Matrix, Matrix]
+"""Times, q, y, rates and multipliers of rows that follow each other."""
 
 
 def refused(why: str, instead: str = "") -> CapabilityError:
@@ -131,6 +134,20 @@ class RunRows:
     def _repeats(self) -> Any:
         """Rows whose instant is that of the row behind them."""
         return np.flatnonzero(np.diff(self.record.time) == 0.0)
+
+    def between(self, first: int, last: int) -> Rows:
+        """Rows from the first to the last one."""
+        record, here = self.record, slice(first, last + 1)
+        return record.time[here], record.q[here], self.y[here], self.rate[here], record.lam[here]
+
+    def step_to(self, row: int, motion: Motion, rates: Rates) -> Rows:
+        """The state of the pass, and a row of the run."""
+        record = self.record
+        return (
+            np.array([motion.t, record.time[row]]), np.array([motion.q, record.q[row]]),
+            np.array([motion.y, self.y[row]]), np.array([rates.rate, self.rate[row]]),
+            np.array([rates.lam, record.lam[row]]),
+        )  # fmt: skip
 
     def mode(self, row: int) -> Mode:
         """What acts from a row on."""

@@ -9,18 +9,20 @@ At the end positions and velocities are put on the rows: ``M(q̃) W + R ν = 0``
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.kernel.schemes.dormand_prince import END, NODES, STAGES, WEIGHTS
 from mbd.sensitivity.balance import consistent_rates, on_rows, saddle
-from mbd.sensitivity.explicit import ExplicitSteps
-from mbd.sensitivity.motion import Mode, Motion, Rates, Tangent, solved
+from mbd.sensitivity.entries import stacked, system
+from mbd.sensitivity.kernel.build import entry
+from mbd.sensitivity.kernel.runge_kutta import runge_kutta_steps
+from mbd.sensitivity.motion import Mode, Motion, Rates, solved
 from mbd.sensitivity.programs import Programs
-from mbd.sensitivity.run_data import RunRows
-from mbd.sensitivity.schemes import SAME, Memory, SchemeSteps
+from mbd.sensitivity.run_data import Rows
+from mbd.sensitivity.schemes import Memory, SchemeSteps
 
 __all__ = ["RungeKuttaSteps"]
 
@@ -28,95 +30,45 @@ MOST = 4
 """Newton corrections of positions onto the rows after a step; one or two [-]."""
 
 
-@dataclass(frozen=True)
-class Known:
-    """A step: derivatives of its end, and of rates and multipliers at its start, by `inputs`; what acts in it."""
-
-    matrix: Matrix
-    rates: Matrix
-    mode: Mode
-
-
-def inputs(tangent: Tangent, dh: Vector) -> Matrix:
-    """Derivatives of x, y, t, anchors, p and h."""
-    t = tangent.t[np.newaxis]
-    return np.vstack([tangent.q, tangent.y, t, tangent.anchors, tangent.p, dh[np.newaxis]])
-
-
 class RungeKuttaSteps(SchemeSteps):
     """Derivatives of explicit steps."""
-
-    def __init__(self, rows: RunRows, programs: Programs) -> None:
-        super().__init__(rows, programs)
-        self.known: dict[int, Known] = {}
 
     def start(self, motion: Motion, mode: Mode, rates: Rates) -> Memory:
         """It remembers nothing but its rates."""
         return Memory.of_rates(rates, 0.0)
 
-    def prepare(self, motion: Motion, mode: Mode, first: int, last: int) -> None:
-        """All steps of a segment at once, where forces do not follow multipliers."""
-        record, rows = self.rows.record, self.rows
-        self.known = {}
-        if last <= first or self.programs.equations.frictions or rows.manager.trivial:
-            return
-        time, here = np.asarray(record.time[first : last + 1]), slice(first, last)
-        steps = ExplicitSteps(
-            self.programs, motion, mode, time[:-1], np.diff(time), np.asarray(record.q[here]), rows.y[here],
-            rows.rate[here], np.asarray(record.lam[here]),
-        )  # fmt: skip
-        try:
-            q, y, matrices, rates = steps.taken()
-        except np.linalg.LinAlgError:
-            return
-        ends = np.hstack([record.q[first + 1 : last + 1], rows.y[first + 1 : last + 1]])
-        off = np.max(np.abs(np.hstack([q, y]) - ends), axis=1)
-        good = off <= SAME * np.max(np.abs(ends), axis=1, initial=1e-3)
-        self.known = {first + k: Known(matrices[k], rates[k], mode) for k in np.flatnonzero(good).tolist()}
+    def leap(self, motion: Motion, memory: Memory, mode: Mode, first: int, last: int) -> tuple[int, Motion, Memory]:
+        """All of them at once."""
+        if last <= first:
+            return first, motion, memory
+        still, rows = np.zeros_like(motion.tangent.t), self.rows.between(first, last)
+        done, motion, rates = taken(self.programs, motion, memory.rates, mode, rows, still)
+        return first + done, motion, Memory.of_rates(rates, 0.0)
 
     def along(
         self, motion: Motion, memory: Memory, mode: Mode, row: int, dh: Vector, fresh: bool
     ) -> tuple[Motion, Memory]:
         """A step to a row."""
-        end = self._quick(motion, row, dh)
-        if end is None:
-            end, rates = super().ended(motion, memory, mode, row, dh)
-            return end, Memory.of_rates(rates, 0.0)
-        return end, Memory.of_rates(self._rates(end, mode, row), 0.0)
+        end, rates = self.ended(motion, memory, mode, row, dh)
+        return end, Memory.of_rates(rates, 0.0)
 
     def ended(self, motion: Motion, memory: Memory, mode: Mode, row: int, dh: Vector) -> tuple[Motion, Rates]:
         """The same at an event."""
-        end = self._quick(motion, row, dh)
-        if end is None:
-            return super().ended(motion, memory, mode, row, dh)
-        return end, self._rates(end, mode, row)
-
-    def _quick(self, motion: Motion, row: int, dh: Vector) -> Motion | None:
-        """The step to a row by its matrix; None where it is not known."""
-        known = self.known.get(row - 1)
-        if known is None or self.rows.begins_late(motion.t, row - 1):
-            return None
-        record, n_v, tangent = self.rows.record, self.programs.columns.n_v, motion.tangent
-        found = known.matrix @ inputs(tangent, dh)
-        moved = replace(tangent, t=tangent.t + dh, q=found[:n_v], y=found[n_v:])
-        return Motion(float(record.time[row]), np.array(record.q[row]), self.rows.y[row], motion.anchors, moved)
-
-    def _rates(self, motion: Motion, mode: Mode, row: int) -> Rates:
-        """Rates at a row, consistent in the mode of the step to it."""
-        c, record, known = self.programs.columns, self.rows.record, self.known.get(row)
-        rate, lam = self.rows.rate[row], np.array(record.lam[row])
-        if known is None or known.mode is not mode:
-            none = np.zeros((c.n, len(motion.tangent.t))), np.zeros((c.rows, len(motion.tangent.t)))
-            return consistent_rates(self.programs, motion, mode, Rates(rate, lam, *none))
-        found = known.rates @ inputs(motion.tangent, np.zeros_like(motion.tangent.t))
-        of_lam = np.zeros((c.rows, found.shape[1]))
-        of_lam[list(mode.rows)] = found[c.n :]
-        return Rates(rate, lam, found[: c.n], of_lam)
+        rows = self.rows.step_to(row, motion, memory.rates)
+        done, end, rates = taken(self.programs, motion, memory.rates, mode, rows, dh)
+        return (end, rates) if done else super().ended(motion, memory, mode, row, dh)
 
     def reached(
         self, motion: Motion, memory: Memory, mode: Mode, time: float, dh: Vector, row: int
     ) -> Iterator[tuple[Motion, Rates]]:
         """All steps are alike."""
+        rows = self.rows.step_to(row, motion, memory.rates)
+        rows[0][1] = time
+        done, end, found = taken(self.programs, motion, memory.rates, mode, rows, dh, False)
+        yield (end, found) if done else self._least(motion, memory, mode, time, dh)
+
+    def _least(self, motion: Motion, memory: Memory, mode: Mode, time: float, dh: Vector) -> tuple[Motion, Rates]:
+        """A step in numpy, with least solutions of singular systems."""
         n_v = self.programs.columns.n_v
         h = time - motion.t
         speeds, rates = [motion.y[:n_v]], [memory.rates.rate]
@@ -133,7 +85,7 @@ class RungeKuttaSteps(SchemeSteps):
         end = replace(end, t=time)
         if mode.rows:
             end = self._on_rows(end, mode)
-        yield end, consistent_rates(self.programs, end, mode, last)
+        return end, consistent_rates(self.programs, end, mode, last)
 
     def _moved(
         self, motion: Motion, h: float, dh: Vector, weights: Vector,
@@ -181,3 +133,37 @@ class RungeKuttaSteps(SchemeSteps):
         of_W = -solved(matrix, np.vstack([(pushed[3] - bare[3]) @ Z, level @ Z]))[:n_v]
         moved = replace(motion, q=q).with_tangent(q=motion.tangent.q + of_W)
         return on_rows(self.programs, moved, mode, motion.y, motion.tangent.y)
+
+
+def taken(
+    programs: Programs, motion: Motion, rates: Rates, mode: Mode, rows: Rows, dh: Vector, checked: bool = True
+) -> tuple[int, Motion, Rates]:
+    """As many of the steps between these rows as the kernel takes from here; the state and rates after them.
+
+    checked : false for one step whose end q, y is not known; rows then get it
+    """
+    known, level = system(programs, "consistent", mode, False), system(programs, "steps", mode, False)
+    time, q, y, rate, lam = (np.ascontiguousarray(each) for each in rows)
+    active = lam * known.held
+    n, n_v, m, width = programs.columns.n, programs.columns.n_v, len(mode.rows), len(dh)
+    Z = stacked(motion, known)
+    w, size = Z.shape[1], n + m
+    X, by_size, block = np.zeros((size, w)), np.zeros(w), np.zeros((2, programs.layout.size))
+    X[:n, :width], by_size[:width] = rates.of_rate, dh
+    programs.fill(block, motion.at(mode, rate[0], lam[0]))
+    tableau = np.concatenate([END, NODES, np.ravel(WEIGHTS)])
+    slopes, of_slopes = np.empty((2, STAGES * n)), np.empty((2, STAGES * n * w))
+    done = entry(runge_kutta_steps)(
+        [known.function, level.function], programs.values, known.of_width(width), level.of_width(width), tableau,
+        len(time) - 1, int(checked), time, q, y, rate, active, known.rows, known.fast, known.entries,
+        level.entries, block[0], block[1], np.empty(max(known.outputs, level.outputs)), np.empty(level.outputs),
+        slopes[0], slopes[1], of_slopes[0], of_slopes[1], X, Z, Z.copy(), by_size, np.empty(size * size),
+        np.empty(size * size), np.empty(size * w), np.empty(size), np.empty(size), np.empty(size, dtype=np.int64),
+    )  # fmt: skip
+    if done == 0:
+        return 0, motion, rates
+    tangent = replace(motion.tangent, t=Z[n_v + n + size, :width], q=Z[:n_v, :width], y=Z[n_v : n_v + n, :width])
+    of_lam = np.zeros((programs.columns.rows, width))
+    of_lam[known.rows] = X[n:, :width]
+    end = Motion(float(time[done]), q[done].copy(), y[done].copy(), motion.anchors, tangent)
+    return done, end, Rates(rate[done].copy(), lam[done] if checked else active[done], X[:n, :width], of_lam)

@@ -70,10 +70,6 @@ class SchemeSteps(ABC):
     def start(self, motion: Motion, mode: Mode, rates: Rates) -> Memory:
         """The memory of a start from consistent rates."""
 
-    def prepare(self, motion: Motion, mode: Mode, first: int, last: int) -> None:
-        """Whatever is found quicker for all steps from a start at the row `first` to the row `last` together."""
-        return  # nothing
-
     def leap(self, motion: Motion, memory: Memory, mode: Mode, first: int, last: int) -> tuple[int, Motion, Memory]:
         """Many steps whose sizes do not change, from a start at the row `first` on: as far as they are known, not
         beyond the row `last`; the row that was reached."""

@@ -124,7 +124,6 @@ class Walk:
                 continue
             if fresh and not rows.begins_late(motion.t, row):
                 end = rows.segment_end(row)
-                self.steps.prepare(motion, mode, row, end)
                 if self.visit is None:
                     before, far = row, self._unwatched(mode, row, end - 1)
                     row, motion, memory = self.steps.leap(motion, memory, mode, row, far)
