@@ -47,7 +47,7 @@ def test_steps_of_random_scenes(seed, monkeypatch):
 @pytest.mark.parametrize("scheme", SCHEMES, ids=repr)
 def test_steps_of_closed_loops(scheme, monkeypatch):
     model, place = random_loop(2)
-    run = mbd.simulate(model, mbd.assemble(model, place, project=True), scheme, dt=0.01, until=0.3)
+    run = mbd.simulate(model, mbd.assemble(model, place, project=True), scheme, dt=0.01, until=0.2)
     found, wanted = both(monkeypatch, run, ["bar 1.mass", "hinge 1.angle", "bar 2.length"])
     assert found == pytest.approx(wanted, rel=1e-9, abs=1e-11 * np.max(np.abs(wanted)))
 
