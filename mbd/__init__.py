@@ -121,6 +121,8 @@ if TYPE_CHECKING:
     from mbd.results.failure import Failure as Failure
     from mbd.sensitivity.result import Sensitivities as Sensitivities
     from mbd.sensitivity.sensitivities import sensitivities as sensitivities
+    from mbd.simulation.batch.batch import batch as batch
+    from mbd.simulation.batch.result import Batch as Batch
     from mbd.simulation.diagnostics.replay import Replay as Replay, replay as replay
     from mbd.simulation.simulate import simulate as simulate
     from mbd.state import State as State
@@ -188,6 +190,8 @@ _HOMES = {
     "mbd.sensitivity.result": "Sensitivities",
     "mbd.sensitivity.sensitivities": "sensitivities",
     "mbd.simulation.diagnostics.replay": "Replay replay",
+    "mbd.simulation.batch.batch": "batch",
+    "mbd.simulation.batch.result": "Batch",
     "mbd.simulation.simulate": "simulate",
     "mbd.state": "State",
     "mbd.tape.functions": "acos asin atan atan2 clip cos cosh exp floor hypot log maximum minimum mod pi sign sin sinh "

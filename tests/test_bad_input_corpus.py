@@ -81,6 +81,7 @@ EXAMPLES: dict[str, Any] = {
     "sole": ((-0.1, 0.1), (0.0, 0.0), (0.2, 0.1)),
     "start": START,
     "state": START,
+    "starts": [START, START],
     "stiffness": 1.0,
     "subject": ANGLE,
     "time": (0.0, 1.0, 2.0),
@@ -101,7 +102,8 @@ OWN: dict[tuple[str, str], Any] = {
     ("gait_report", "run"): walker(steps=5),
     ("fit", "data"): {"time": [0.1, 0.2], "hinge.angle": [0.3, 0.2]}, ("fit", "dt"): 0.1,
     ("fit", "parameters"): {"upper.length": 1.2},
-    ("effects", "dt"): 0.1, ("segment", "name"): "thigh", ("simulate", "dt"): 0.1, ("sweep", "dt"): 0.1,
+    ("batch", "dt"): 0.1, ("effects", "dt"): 0.1,
+    ("segment", "name"): "thigh", ("simulate", "dt"): 0.1, ("sweep", "dt"): 0.1,
     ("sensitivities", "dt"): 0.1, ("sensitivities", "wrt"): ["hinge.angle"], ("sweep", "values"): {"upper.mass": [1.0]},
 }  # fmt: skip
 """Where a word means something else by it."""
@@ -126,7 +128,7 @@ MEANT_OTHERWISE = {
 """Arguments that are right by themselves: the sentence is about the others."""
 
 RESULTS = {
-    "Accuracy", "Criteria", "Domain", "Effects", "Failure", "Fit", "GaitReport", "Known", "LimitCycle",
+    "Accuracy", "Batch", "Criteria", "Domain", "Effects", "Failure", "Fit", "GaitReport", "Known", "LimitCycle",
     "Linearization", "Mobility",
     "PenaltyParameters", "Replay", "Sensitivities", "State", "StateSpace", "Sweep", "Trajectory",
 }  # fmt: skip

@@ -17,7 +17,7 @@ GROUPS = {
     "Forces": "Spring Damper TorsionSpring TabulatedSpring Motor DCMotor Applied Potential Samples",
     "Functions": "sin cos tan asin acos atan atan2 sinh cosh tanh exp log sqrt hypot sign "
     "maximum minimum clip mod floor where pi",
-    "Starts and runs": "assemble project State simulate Trajectory load sweep Sweep latin_hypercube sobol",
+    "Starts and runs": "assemble project State simulate Trajectory load batch Batch sweep Sweep latin_hypercube sobol",
     "Integrators": "HHT GeneralizedAlpha Newmark RadauIIA RungeKutta853",
     "Analysis": "accuracy Accuracy Known effects Effects linearize Linearization StateSpace mobility "
     "Mobility criteria Criteria sensitivities Sensitivities fit Fit",

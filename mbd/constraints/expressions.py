@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
-__all__ = ["evaluated", "is_expression", "plain", "quantities_in"]
+__all__ = ["evaluated", "function_of_expression", "is_expression", "plain", "quantities_in"]
 
 
 def is_expression(value: Any) -> bool:
@@ -43,12 +43,12 @@ def quantities_in(functions: Sequence[Any]) -> tuple[str, ...]:
 
 def evaluated(expression: Any, named: Mapping[str, float]) -> float:
     """The value of an expression of named quantities."""
-    names, function = _function_of(expression)
+    names, function = function_of_expression(expression)
     return float(function(*[named[name] for name in names]))
 
 
 @lru_cache(maxsize=256)
-def _function_of(expression: Any) -> tuple[tuple[str, ...], Callable[..., Any]]:
+def function_of_expression(expression: Any) -> tuple[tuple[str, ...], Callable[..., Any]]:
     """The names of the symbols of an expression, and the function of them; making it takes a millisecond."""
     import sympy
 

@@ -56,6 +56,8 @@ def march(K: Kernel) -> int:
         if status == DONE or status == NEW_MODE:
             return status
         if status == EVENT and K.stopped_by >= 0:
+            if K.stopped_by >= K.n_contacts and K.resets[K.stopped_by - K.n_contacts] == 1:
+                return EVENT
             return finish(K)
         if status > LAST:
             return NEEDS_PYTHON if K.auto == 1 else status

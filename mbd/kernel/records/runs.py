@@ -49,5 +49,6 @@ class Runs(SchemeAbilities):
     ends: Reals = reals(lambda s: 0)  # see `mbd.kernel.many_runs.note_end`
     given_parameters: Reals = reals(lambda s: 0)  # of each run
     lines: Reals = reals(lambda s: 0)  # of the log, the first ones of each run
+    resets: Integers = integers(lambda s: s.n_guards)  # 1: what resets the state after this event comes after the run
     closed_now: Integers = integers(lambda s: s.n_contacts)  # after the events seen so far
     closed_before: Integers = integers(lambda s: s.n_contacts)  # before those of the last instant among them

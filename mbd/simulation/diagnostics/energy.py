@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 from mbd.simulation.run.data import EnergyFindings, RunData
 
-__all__ = ["EnergyWatch", "Judgement", "judgement"]
+__all__ = ["EnergyWatch", "Judgement", "judgement", "kinds_of"]
 
 FIRST_LOOK = 20000
 """Stored rows after which a run that goes on is looked at; the next looks at four times as many, and at its end."""
@@ -213,7 +213,7 @@ class EnergyWatch(EnergyFindings):
         sunk = rise < -TELLING * owned[-1] - noise
         if not (risen.any() or sunk.any()):
             return False
-        kinds = _kinds(run.mechanism)
+        kinds = kinds_of(run.mechanism)
         if kinds <= UNDRIVEN:
             sudden = bool(run.parameter_changes) or any(event.kind in ("closed", "event") for event in run.events)
             return bool(risen.any()) or not (kinds or sudden)
@@ -232,7 +232,7 @@ def _swing(values: Vector) -> Vector:
     return np.asarray(np.maximum.accumulate(values) - np.minimum.accumulate(values))
 
 
-def _kinds(mechanism: Mechanism) -> frozenset[str]:
+def kinds_of(mechanism: Mechanism) -> frozenset[str]:
     if mechanism not in KINDS:
         KINDS[mechanism] = kinds_of_work(mechanism.equations)
     return KINDS[mechanism]

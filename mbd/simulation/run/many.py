@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from mbd.arrays import Matrix, Vector
 from mbd.kernel import codes
 from mbd.kernel.many_runs import END_NUMBERS
+from mbd.simulation.run.late_resets import may_reset_late
 from mbd.simulation.run.plain import PlainScheme
 from mbd.simulation.run.run import Run
 from mbd.state import State
@@ -21,11 +22,15 @@ STEPS_AT_ONCE = 1_000_000
 """Steps of a call of the kernel, some 0.2 to 2 s, between which somebody may interrupt."""
 
 
-def may_be_many(run: Run) -> str:
-    """Why runs like this one need Python between their steps; '' if they do not."""
-    guards = [guard.name for guard in run.manager.guards if guard.reset is not None]
-    if guards:
-        return f"the event {guards[0]!r} resets the state, which Python does"
+def may_be_many(run: Run, late_resets: bool = False) -> str:
+    """Why runs like this one need Python between their steps; '' if they do not.
+
+    late_resets : whether who asks resets the state himself after an event that ends a run (`reset_ends`)
+    """
+    for guard in run.manager.guards:
+        last = guard.terminal or guard.name == run.stop
+        if guard.reset is not None and not (last and late_resets and may_reset_late(run, guard)):
+            return f"the event {guard.name!r} resets the state, which Python does"
     if run.boundaries.controllers:
         return f"the controller {run.boundaries.controllers[0].name!r} is called in Python"
     if len(run.boundaries.breaks):
@@ -101,6 +106,8 @@ class ManyRuns:
 
         self.run = run
         notify(run)
+        for e, guard in enumerate(run.manager.guards):
+            run.kernel.resets[e] = int(guard.reset is not None)
         v, stepper = run.kernel, run.stepper
         v.whole_reals, v.whole_integers = stepper.reals, stepper.integers
         v.fresh_reals, v.fresh_integers = stepper.reals.copy(), stepper.integers.copy()

@@ -1,0 +1,90 @@
+"""Runs of a batch that Python makes: those whose start, end or energy asks for the judgement of `simulate`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbd.arrays import Matrix, Vector
+from mbd.assembly.given_state import LARGEST_ANGLE
+from mbd.compile.mechanism import Mechanism
+from mbd.compile.python import array_function
+from mbd.errors import MbdError
+from mbd.kernel import codes
+from mbd.simulation.diagnostics.energy import TELLING, UNDRIVEN, kinds_of
+from mbd.simulation.run.many import Ends
+from mbd.simulation.simulate import simulate
+from mbd.state import State
+
+if TYPE_CHECKING:
+    from mbd.trajectory import Trajectory
+
+__all__ = ["NAMES", "Alone", "made_alone", "needs_judgement"]
+
+NAMES = {
+    getattr(codes, name): name.lower().replace("_", " ")
+    for name in (
+        "NOT_FINITE", "NOT_CONVERGED", "SINGULAR", "STAGNATED", "CHATTER", "NO_IMPACT", "DEPENDENT", "CONFLICT",
+        "NO_LOCATION", "ENERGY_GAIN", "NO_FORCE", "TOO_TIGHT", "TOO_NEAR", "TOO_SMALL", "SINGULAR_ROWS_MOVE",
+        "OUTGROWN", "GAINED", "TOO_BRIEF", "AT_POSE", "LEAPT", "ILL_CONDITIONED",
+    )
+}  # fmt: skip
+"""Outcomes of runs that failed, by the kernel's codes."""
+
+
+@dataclass(frozen=True, eq=False)
+class Alone:
+    """A run that was made alone: its outcome, its end (None if its start is none), and its sentence."""
+
+    outcome: str
+    state: State | None
+    stopped_by: str
+    message: str
+    run: Trajectory | None
+
+
+def made_alone(model: Any, start: State, arguments: dict[str, Any], terminal: frozenset[str]) -> Alone:
+    """One run by `simulate`; whatever goes wrong is its outcome.
+
+    terminal : names of the events that end runs
+    """
+    try:
+        run = simulate(model, start, progress=False, on_failure="return", **arguments)
+    except MbdError as error:
+        return Alone("refused", None, "", str(error), None)
+    if not run.success:
+        return Alone("failed", run.final, "", run.message, run)
+    if not run.message.startswith("ended by"):
+        return Alone("end", run.final, "", run.message, run)
+    last = [e.name for e in run.events if e.kind in ("closed", "event") and e.name in terminal]
+    return Alone("event", run.final, last[-1] if last else "", run.message, run)
+
+
+def needs_judgement(
+    mechanism: Mechanism, starts: dict[str, Matrix], ends: dict[str, Matrix], found: Ends, parameters: Vector | Matrix
+) -> NDArray[np.bool_]:
+    """Which runs `simulate` has to judge (N,): angles beyond all, joints the wrong way round, energy from nowhere.
+
+    Of the energy the start and the end are compared, in mechanisms that nothing drives.
+    """
+    doubtful = found.status >= codes.DOUBTFUL_START
+    whole = ~doubtful & (found.status <= codes.LAST)
+    doubtful |= whole & ~(np.max(np.abs(ends["q"]), axis=1, initial=0.0) <= LARGEST_ANGLE)
+    equations = mechanism.equations
+    if equations.facings:
+        with equations.tape.lock:
+            cosines = array_function([facing.cosine for facing in equations.facings])
+        for inputs in (starts, ends):
+            doubtful |= np.min(cosines(inputs, parameters), axis=0) < 0.0
+    if mechanism.layout.n_v and kinds_of(mechanism) <= UNDRIVEN:
+        kinetic, potential = (np.stack(pair) for pair in zip(*[
+            mechanism.energies(inputs, parameters) for inputs in (starts, ends)
+        ], strict=True))  # fmt: skip
+        rise = np.diff(kinetic + potential, axis=0)[0]
+        owned = kinetic[0] + np.maximum(potential[0] - potential[1], 0.0)
+        noise = 1e-9 * np.max(np.abs(kinetic) + np.abs(potential), axis=0)
+        doubtful |= whole & ~(rise <= TELLING * owned + noise)
+    return doubtful

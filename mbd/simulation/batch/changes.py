@@ -1,0 +1,83 @@
+"""Parameters of many runs: numbers that all share, and columns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from mbd.arrays import Matrix, Vector
+from mbd.compile.mechanism import Mechanism
+from mbd.errors import ModelError
+
+__all__ = ["Changes"]
+
+MOST_CHECKED = 2000
+"""Different sets of values that are judged one by one; of more, those with an extreme value [-]."""
+
+
+class Changes:
+    """Values that differ from the model's, as vectors of the kernel.
+
+    Raises
+    ------
+    ModelError, UnknownNameError
+        for names that are no parameters, and values that the model's words do not allow, of whichever run.
+    """
+
+    def __init__(self, model: Any, mechanism: Mechanism, columns: Mapping[str, Vector]) -> None:
+        self.columns = {name: np.asarray(column, dtype=float) for name, column in columns.items()}
+        self.names = tuple(self.columns)
+        folded = getattr(model, "parameters", {})
+        first = {name: float(np.atleast_1d(column)[0]) for name, column in self.columns.items()}
+        self.constant_vector = mechanism.parameters(first, folded)
+        known = [parameter.name for parameter in mechanism.equations.parameters]
+        self._varied = {
+            known.index(name): column for name, column in self.columns.items() if column.ndim and name in known
+        }
+        self.varies = bool(self._varied)
+        self._check(model, mechanism, first, folded)
+
+    def _check(self, model: Any, mechanism: Mechanism, first: dict[str, float], folded: Mapping[str, float]) -> None:
+        lists = {name: column for name, column in self.columns.items() if column.ndim}
+        if not lists:
+            return
+        table = np.column_stack(list(lists.values()))
+        kinds, firsts = np.unique(table, axis=0, return_index=True)
+        if len(kinds) > MOST_CHECKED:
+            firsts = np.unique([pick(column) for column in lists.values() for pick in (np.argmin, np.argmax)])
+        check, faults = model.parameter_check(), list[str]()
+        for k in firsts:
+            values = {**first, **{name: float(column[k]) for name, column in lists.items()}}
+            faults += [f"run {k}: {fault}" for fault in check.faults(values)]
+            mechanism.parameters(values, folded)
+            if len(faults) > 5:
+                break
+        if faults:
+            raise ModelError(faults)
+
+    def at(self, k: int) -> dict[str, float]:
+        """The values of the k-th run by name."""
+        return {name: float(column[k] if column.ndim else column) for name, column in self.columns.items()}
+
+    def vectors(self, first: int, last: int) -> Matrix:
+        """The parameter vectors of some runs, one behind the other."""
+        return self.rows(np.arange(first, last))
+
+    def rows(self, runs: Any) -> Matrix:
+        """The parameter vectors of the runs with these numbers; one for all where none varies."""
+        if not self.varies:
+            return self.constant_vector[np.newaxis]
+        found = np.tile(self.constant_vector, (len(runs), 1))
+        for place, column in self._varied.items():
+            found[:, place] = column[runs]
+        return found
+
+    def constant(self, first: int, last: int) -> Matrix:
+        """The same where none varies."""
+        return np.tile(self.constant_vector, (last - first, 1))
+
+    def all_vectors(self, count: int) -> Vector | Matrix:
+        """For expressions: one vector, or one for each run."""
+        return self.rows(np.arange(count)) if self.varies else self.constant_vector

@@ -1,0 +1,167 @@
+"""Starts and parameters of many runs as columns, checked as those of one run are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from mbd.arrays import Matrix, Vector
+from mbd.assembly.given_state import LARGEST_ANGLE, fits
+from mbd.bodies.values import shown
+from mbd.compile.mechanism import Mechanism, rate_names
+from mbd.errors import ModelError, UnknownNameError, nearest
+from mbd.kernel.active_set import ActiveSetManager
+from mbd.simulation.run.many import start_line
+from mbd.simulation.run.run import Run
+from mbd.state import State
+
+__all__ = ["Columns", "Starts", "columns_of", "given_starts", "starts_of"]
+
+Columns = Mapping[str, Vector]
+"""Numbers of each run by name (N,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Starts:
+    """N starts: the states themselves, or one with columns in the place of some of its numbers."""
+
+    base: State
+    states: Sequence[State]
+    columns: Columns
+    count: int
+
+    def __len__(self) -> int:
+        return self.count
+
+    def state(self, k: int, names: Mapping[str, int]) -> State:
+        """The k-th start, without what an earlier run remembers; `names` as `places_of` gives them."""
+        if self.states:
+            return replace(self.states[k], memory=None, moved={})
+        q, v, z = self.base.q.copy(), self.base.v.copy(), self.base.z.copy()
+        for name, column in self.columns.items():
+            place = names[name]
+            for part in (q, v, z):
+                if place < len(part):
+                    part[place] = column[k]
+                    break
+                place -= len(part)
+        return replace(self.base, q=q, v=v, z=z, memory=None, moved={})
+
+    def lines(self, run: Run, names: Mapping[str, int]) -> Matrix:
+        """What the kernel takes: a line for each."""
+        if self.states:
+            return np.array([start_line(run, start) for start in self.states])
+        lines = np.tile(start_line(run, self.base), (self.count, 1))
+        for name, column in self.columns.items():
+            lines[:, 1 + names[name]] = column
+        return lines
+
+
+def places_of(mechanism: Mechanism) -> dict[str, int]:
+    """Where coordinates, rates and states stand in (q, v, z), by every spelling."""
+    equations = mechanism.equations
+    names = {coordinate.name: k for k, coordinate in enumerate(equations.coordinates)}
+    rates = {name: equations.n_q + k for name, k in rate_names(equations).items() if name not in names}
+    states = {state.name: equations.n_q + equations.n_v + k for k, state in enumerate(equations.states)}
+    return {**rates, **states, **names}
+
+
+def columns_of(values: Any, what: str, count: int | None = None) -> tuple[dict[str, Vector], list[str]]:
+    """Columns by name from numbers and lists of numbers, of one length; and what is wrong with them."""
+    if not isinstance(values, Mapping):
+        return {}, [f"{what} must map names to numbers or lists of numbers, not {shown(values)}"]
+    found, faults = {}, []
+    for name, value in values.items():
+        try:
+            column = np.asarray(value, dtype=float)
+        except (TypeError, ValueError):
+            faults.append(f"{what}: {name!r} must be a number or a list of numbers, not {shown(value)}")
+            continue
+        if not isinstance(name, str) or column.ndim > 1 or (column.ndim == 1 and not len(column)):
+            faults.append(f"{what}: {name!r} must be a name with a number or a list of at least one, of one dimension")
+        elif not np.all(np.isfinite(column)):
+            bad = int(np.flatnonzero(~np.isfinite(np.atleast_1d(column)))[0])
+            faults.append(f"{what}: {name!r} has {np.atleast_1d(column)[bad]} at place {bad}; give finite numbers")
+        else:
+            found[name] = column
+    sizes = {name: len(column) for name, column in found.items() if column.ndim}
+    if len(set(sizes.values()) | ({count} if count is not None else set())) > 1:
+        listed = ", ".join(f"{name!r} has {size}" for name, size in sizes.items())
+        faults.append(f"{what}: lists must have one length{'' if count is None else f', {count}'}; {listed}")
+    return found, faults
+
+
+def given_starts(starts: Any) -> tuple[State, Sequence[State], dict[str, Vector]]:
+    """(base, states, columns) of the argument `starts`.
+
+    Raises
+    ------
+    ModelError
+        for what is neither a state, nor a list of them, nor a state with columns.
+    """
+    if isinstance(starts, State):
+        return starts, (), {}
+    if (
+        isinstance(starts, tuple)
+        and len(starts) == 2
+        and isinstance(starts[0], State)
+        and not isinstance(starts[1], State)
+    ):
+        columns, faults = columns_of(starts[1], "starts")
+        if faults:
+            raise ModelError(faults)
+        return starts[0], (), columns
+    several = isinstance(starts, Sequence) and not isinstance(starts, str | bytes) and len(starts) > 0
+    if not several or not all(isinstance(start, State) for start in starts):
+        raise ModelError(
+            "starts must be a list of at least one State, or a State with columns, such as "
+            f"(state, {{'hip.angle': [0.1, 0.2]}}), not {shown(starts) if not several else 'a list of other things'}"
+        )
+    return starts[0], list(starts), {}
+
+
+def starts_of(
+    base: State, states: Sequence[State], columns: Mapping[str, Vector], count: int,
+    mechanism: Mechanism, manager: ActiveSetManager,
+) -> Starts:  # fmt: skip
+    """The starts of a model.
+
+    Raises
+    ------
+    ModelError, UnknownNameError
+        for states of another model, names that are neither coordinates nor rates, angles that are none.
+    """
+    fits(base, mechanism.equations, manager)
+    alike = (base.names, len(base.q), len(base.v), len(base.z))
+    faults = []
+    for k, start in enumerate(states):
+        if (start.names, len(start.q), len(start.v), len(start.z)) != alike:
+            faults.append(f"start {k} has other coordinates than the first; assemble all from one model")
+        elif start.time != base.time:
+            faults.append(f"start {k} begins at {start.time:g} s, the first at {base.time:g} s; give all one time")
+        elif dict(start.parameters) != dict(base.parameters):
+            faults.append(f"start {k} has other parameters than the first; give them as columns of parameters=")
+        elif not (np.all(np.isfinite(start.q)) and np.all(np.isfinite(start.v)) and np.all(np.isfinite(start.z))):
+            faults.append(f"start {k} has numbers that are not finite")
+        elif not mechanism.vector or start.mode != base.mode or len(start.anchors) != len(base.anchors):
+            fits(start, mechanism.equations, manager)
+        if len(faults) > 5:
+            break
+    if faults:
+        raise ModelError(faults)
+    places = places_of(mechanism)
+    wrong = [nearest(name, places, "coordinate or rate", "There are") for name in columns if name not in places]
+    if wrong:
+        raise UnknownNameError([f"starts: {each}" for each in wrong])
+    if columns and not mechanism.vector:
+        raise ModelError(
+            "starts: coordinates of this model do not add, so columns cannot give them; give a list of states"
+        )
+    for name, column in columns.items():
+        if np.max(np.abs(column), initial=0.0) > LARGEST_ANGLE:
+            raise ModelError(f"starts: {name!r} has values beyond {LARGEST_ANGLE:g}; take whole turns away")
+    whole = {name: np.broadcast_to(column, count) for name, column in columns.items()}
+    return Starts(base, states, whole, count)

@@ -1,0 +1,107 @@
+"""Threads that take runs side by side, each with arrays of the kernel of its own: machine code needs no lock."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import fields
+from threading import Event, Lock
+
+import numpy as np
+
+from mbd.arrays import Matrix
+from mbd.simulation.run.many import Ends, ManyRuns
+from mbd.simulation.run.run import Run
+
+__all__ = ["Workers", "processors"]
+
+AT_ONCE = 4096
+"""Runs that a thread takes together at most."""
+PARTS = 4
+"""Parts of the runs of each thread, so that one with short runs takes over from one with long ones [-]."""
+
+
+def processors() -> int:
+    """How many processors this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+class Stopped(Exception):
+    """The runs of a thread that was told to stop."""
+
+
+class Workers:
+    """Some laid-out runs, as many as threads.
+
+    Parameters
+    ----------
+    lay_out : makes one run, not begun
+    count : how many threads there are at most
+    """
+
+    def __init__(self, lay_out: Callable[[], Run], count: int) -> None:
+        self._lay_out, self.count = lay_out, count
+        self._many = [ManyRuns(lay_out())]
+        self._lock = Lock()
+
+    @property
+    def run(self) -> Run:
+        """The first of the runs, for names and sizes."""
+        return self._many[0].run
+
+    def __call__(
+        self, starts: Matrix, parameters: Callable[[int, int], Matrix] | None = None,
+        report: Callable[[int], None] | None = None,
+    ) -> Ends:  # fmt: skip
+        """The ends of runs from lines of starts, in their order, whichever thread took each.
+
+        Parameters
+        ----------
+        starts : as `ManyRuns` takes them
+        parameters : gives the vectors of the runs from one number to before another; None: those of the run
+        report : called with the number of runs that are over
+        """
+        size = max(min(AT_ONCE, -(-len(starts) // (PARTS * self.count))), 1)
+        parts = [(first, min(first + size, len(starts))) for first in range(0, len(starts), size)] or [(0, 0)]
+        count = min(self.count, len(parts))
+        while len(self._many) < count:
+            self._many.append(ManyRuns(self._lay_out()))
+        found: list[Ends | None] = [None] * len(parts)
+        waiting, halt, over = iter(range(len(parts))), Event(), [0]
+
+        def stop(done: int) -> None:
+            if halt.is_set():
+                raise Stopped
+
+        def work(many: ManyRuns) -> None:
+            while not halt.is_set():
+                with self._lock:
+                    place = next(waiting, None)
+                if place is None:
+                    return
+                first, last = parts[place]
+                own = None if parameters is None else parameters(first, last)
+                found[place] = many(starts[first:last], own, between=stop)
+                with self._lock:
+                    over[0] += last - first
+                if report is not None:
+                    report(over[0])
+
+        if count == 1:
+            work(self._many[0])
+        else:
+            with ThreadPoolExecutor(count) as pool:
+                tasks = [pool.submit(work, many) for many in self._many[:count]]
+                try:
+                    for task in tasks:
+                        task.result()
+                except BaseException:
+                    halt.set()
+                    raise
+        return _joined([ends for ends in found if ends is not None])
+
+
+def _joined(parts: Sequence[Ends]) -> Ends:
+    """Ends one behind the other."""
+    return Ends(*(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Ends)))

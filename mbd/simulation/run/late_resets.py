@@ -1,0 +1,102 @@
+"""Resets of events that end runs, for many ends at once.
+
+A run that an event ends is over but for what the event resets. Where coordinates add, no rows and no contacts bind
+them, and the reset is written in numbers and expressions of coordinates, rates and parameters, the same functions of
+`math` that a run alone calls are called for all ends, one after the other, with the same bits as result.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from mbd.arrays import Matrix, Vector
+from mbd.bodies.values import is_finite_number
+from mbd.compile.mechanism import rate_names
+from mbd.constraints.expressions import function_of_expression, is_expression
+from mbd.equations.equations import Guard
+from mbd.simulation.run.data import RunData
+
+__all__ = ["may_reset_late", "reset_ends"]
+
+
+def may_reset_late(run: RunData, guard: Guard) -> bool:
+    """Whether `reset_ends` can do what a run does after this event."""
+    if not isinstance(guard.reset, Mapping) or not run.mechanism.vector:
+        return False
+    if run.kernel.n_rows or run.kernel.n_contacts:
+        return False
+    places, known = _places(run), _known(run)
+    if not all(_spelled(name) in places for name in guard.reset):
+        return False
+    for value in guard.reset.values():
+        if is_expression(value):
+            names, _ = function_of_expression(value)
+            if not all(_spelled(name) in known for name in names):
+                return False
+        elif not is_finite_number(value):
+            return False
+    return True
+
+
+def reset_ends(run: RunData, guard: Guard, q: Matrix, y: Matrix, parameters: Matrix) -> Any:
+    """Reset the ends (N, n_q) and (N, n) of runs with parameters (N, P) or (1, P), in place.
+
+    Returns
+    -------
+    (N,) whether each was given finite numbers; one that was not stays as it is
+    """
+    n_q, places, known = run.kernel.n_q, _places(run), _known(run)
+    whole = np.hstack([q, y, np.broadcast_to(parameters, (len(q), parameters.shape[1]))])
+    wanted = {}
+    for name, value in guard.reset.items():
+        if is_expression(value):
+            names, function = function_of_expression(value)
+            columns = [whole[:, known[_spelled(each)]] for each in names]
+            wanted[name] = _column(function, columns, len(q))
+        else:
+            wanted[name] = np.full(len(q), float(value))
+    sound = np.all([np.isfinite(column) for column in wanted.values()], axis=0)
+    for name, column in wanted.items():
+        place = places[_spelled(name)]
+        target = q[:, place] if place < n_q else y[:, place - n_q]
+        target[sound] = column[sound]
+    return np.asarray(sound)
+
+
+def _column(function: Any, columns: list[Vector], count: int) -> Vector:
+    """A function of floats at every row; NaN where it has no value."""
+
+    def at(*values: float) -> float:
+        try:
+            return float(function(*values))
+        except (ValueError, ZeroDivisionError, OverflowError, TypeError):
+            return float("nan")
+
+    rows = zip(*[column.tolist() for column in columns], strict=True) if columns else iter([()] * count)
+    return np.array([at(*values) for values in rows], dtype=float)
+
+
+def _places(run: RunData) -> dict[str, int]:
+    """Where coordinates, rates and states stand in (q, v, z), by every spelling that a reset may use."""
+    equations = run.mechanism.equations
+    names = {coordinate.name: k for k, coordinate in enumerate(equations.coordinates)}
+    n_q, n_v = equations.n_q, equations.n_v
+    rates = {name: n_q + k for name, k in rate_names(equations).items()}
+    states = {state.name: n_q + n_v + k for k, state in enumerate(equations.states)}
+    return {**rates, **states, **names}
+
+
+def _known(run: RunData) -> dict[str, int]:
+    """The same with the parameters behind them."""
+    equations = run.mechanism.equations
+    size = equations.n_q + equations.n_v + equations.n_z
+    parameters = {parameter.name: size + k for k, parameter in enumerate(equations.parameters)}
+    return {**parameters, **_places(run)}
+
+
+def _spelled(name: str) -> str:
+    """'theta.rate' for 'theta_rate', as symbols of energies are called."""
+    return f"{name.removesuffix('_rate')}.rate" if name.endswith("_rate") else name
