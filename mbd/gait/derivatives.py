@@ -1,8 +1,8 @@
 """How a gait follows a parameter, by the implicit function theorem.
 
 A fixed point ``F(c, p) = c`` of the return map moves by ``dc/dp = (1 − P)⁻¹ ∂F/∂p``, P = ∂F/∂c, and with it period,
-way and steps, which the map gives too: ``dT/dp = ∂T/∂c dc/dp + ∂T/∂p``. Multipliers have derivatives of P in them;
-theirs are differences of gaits found again beside the first, with two Richardson extrapolations.
+way and steps, which the map gives too: ``dT/dp = ∂T/∂c dc/dp + ∂T/∂p``. Multipliers change with P along the branch, by
+differences of derivatives of the map with two Richardson extrapolations.
 """
 
 from __future__ import annotations
@@ -11,16 +11,17 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
+from scipy.linalg import eig
 
-from mbd.arrays import Vector
+from mbd.arrays import Matrix, Vector
 from mbd.errors import GaitError, ModelError, UnknownNameError, nearest
 from mbd.gait.map_derivative import extrapolated, map_derivative
 
 __all__ = ["Derivatives", "parameter_value"]
 
-BESIDE, LEVELS = 4e-3, 3
-"""Least difference of a parameter, over its value or 1, at which gaits are found again, and how many, each twice the
-one before."""
+BESIDE, LEVELS = 8e-3, 3
+"""Least difference of a parameter, over its value or 1, to where the map is differentiated again, and how many, each
+twice the one before."""
 
 
 class Derivatives(Mapping[tuple[str, str], float]):
@@ -41,7 +42,7 @@ class Derivatives(Mapping[tuple[str, str], float]):
                 raise UnknownNameError(nearest(scalar, self._gait.scalars, "number of the gait", "It has"))
             parameter_value(self._gait, parameter)
             if scalar == "largest multiplier":
-                self._known[key] = _beside(self._gait, scalar, parameter)
+                self._known[key] = _of_largest_multiplier(self._gait, parameter)
             else:
                 self._known |= {(name, parameter): value for name, value in _implicit(self._gait, parameter).items()}
         return self._known[key]
@@ -108,11 +109,33 @@ def _implicit(gait: Any, name: str) -> dict[str, float]:
     return found
 
 
-def _beside(gait: Any, scalar: str, name: str) -> float:
-    """The derivative of a scalar by central differences of gaits at parameters beside."""
-    value, slopes = parameter_value(gait, name), []
+def _of_largest_multiplier(gait: Any, name: str) -> float:
+    """The derivative of the largest modulus |λ|, with wᴴ P = λ wᴴ, P u = λ u: ``dλ/dp = wᴴ (dP/dp) u / wᴴ u``.
+
+    dP/dp along the branch follows from central differences at ``c ± h dc/dp, p ± h``, which are off the branch by h²
+    on both sides alike.
+    """
+    if not len(gait.stability_of.values):
+        return 0.0
+    value, size = parameter_value(gait, name), gait.chart.size
+    move, _ = motion_of(gait, name)
+    P, slopes = gait.map_derivative.matrix[:size], []
     for level in range(LEVELS):
         h = 2.0**level * BESIDE * (abs(value) or 1.0)
-        ends = [gait.at({name: value + sign * h}).scalars[scalar] for sign in (1.0, -1.0)]
-        slopes.append(np.array([ends[0] - ends[1]]) / (2.0 * h))
-    return float(extrapolated(slopes)[0][0])
+        ends = [_slope_beside(gait, sign * h * move, {**gait.parameters, name: value + sign * h}) for sign in (1, -1)]
+        slopes.append((ends[0] - ends[1]) / (2.0 * h))
+    change = extrapolated([slope.ravel() for slope in slopes])[0].reshape(size, size)
+    values, left, right = eig(P, left=True, right=True)
+    k = int(np.argmin(np.abs(values - gait.stability_of.values[0])))
+    w, u = left[:, k], right[:, k]
+    by = (w.conj() @ change @ u) / (w.conj() @ u)
+    return float((values[k].conj() * by).real / abs(values[k]))
+
+
+def _slope_beside(gait: Any, c: Vector, values: Mapping[str, float]) -> Matrix:
+    """P beside the gait."""
+    size = gait.chart.size
+    found = map_derivative(gait.map, gait.chart, c, values)
+    if found.missing:
+        raise GaitError(f"no derivative of the multipliers: beside the gait {next(iter(found.missing.values()))}", gait)
+    return found.matrix[:size]
