@@ -14,7 +14,9 @@ from mbd.errors import MbdError, ModelError, UnknownNameError, nearest
 from mbd.gait.continuation import QUICK, BranchPoint, Continuation, Corrected
 from mbd.gait.cycle import LimitCycle
 from mbd.gait.derivatives import parameter_value
+from mbd.gait.limits import changed_events, limit_between, limit_beyond
 from mbd.gait.map_derivative import Measured, map_derivative, measured
+from mbd.gait.margins import Margin, Margins, least_margins, margin_points, watched_feet
 from mbd.gait.special_points import KINDS, SpecialPoint, special_points
 from mbd.gait.switching import doubled
 from mbd.notebook import table
@@ -70,7 +72,13 @@ class Branch:
         }
 
     def points(self, *kinds: str) -> tuple[SpecialPoint, ...]:
-        """The special points of these kinds: 'fold', 'doubling', 'torus', 'branch point'; without names all."""
+        """The special points of these kinds; without names all.
+
+        'fold', 'doubling', 'torus', 'branch point': of the map. 'scuff' (a foot touches down early), 'graze' (another
+        contact begins to close), 'lost event' (a knee no longer locks), 'new event', 'release' (a foot would have to
+        pull and lets go), 'slip', 'fall': beyond it other things happen. 'pull': a foot that its rule holds begins to
+        pull.
+        """
         wrong = [nearest(kind, KINDS, "kind of point", "There are") for kind in kinds if kind not in KINDS]
         if wrong:
             raise UnknownNameError(wrong)
@@ -136,12 +144,16 @@ class Branch:
         return drawn(self, quantity, path)
 
 
-def branch(gait: LimitCycle, parameter: str, to: float, *, steps: int = 200, step: float | None = None) -> Branch:
+def branch(
+    gait: LimitCycle, parameter: str, to: float, *, steps: int = 200, step: float | None = None,
+    friction: float | None = None,
+) -> Branch:  # fmt: skip
     """The gaits that a gait becomes as a parameter changes.
 
     Pseudo-arclength continuation goes around folds. Where a test function of a fold, a doubling, a torus (Neimark &
-    Sacker) or a branch point changes sign, the point is located. The branch ends at `to`; where the walk falls, scuffs
-    or loses an event, which its `stopped` says; or after so many points.
+    Sacker) or a branch point changes sign, the point is located; so are those from which on other events happen (a foot
+    scuffs, a knee no longer locks) or a foot that a rule holds would have to pull. The branch ends at `to`; where the
+    walk is lost, which its `stopped` says; or after so many points.
 
     Parameters
     ----------
@@ -150,6 +162,7 @@ def branch(gait: LimitCycle, parameter: str, to: float, *, steps: int = 200, ste
     to : value at which the branch ends
     steps : points at most
     step : first distance of two points, with the parameter over the range to go and coordinates in SI units [-]
+    friction : coefficient that the ground has: where a foot that sticks would need more, a 'slip' is marked [-]
 
     Returns
     -------
@@ -160,21 +173,31 @@ def branch(gait: LimitCycle, parameter: str, to: float, *, steps: int = 200, ste
     ModelError, UnknownNameError
         for arguments that cannot be meant: no gait, a parameter that is none or that changes nothing.
     """
-    given, first = _begun(gait, parameter, to, steps, step)
+    given, first = _begun(gait, parameter, to, steps, step, friction)
+    watched = watched_feet(gait.map, friction)
     toward = np.sign(to - first.value)
     if first.tangent[-1] * toward < 0.0:
         first = _turned(first)
     curve, special, stopped = [first], list[SpecialPoint](), ""
+    margins = _margins(given, watched, first)
     ds = FIRST if step is None else float(step)
     while len(curve) < steps:
         last = curve[-1]
         made = _next(given, last, ds)
         if isinstance(made, str):
-            stopped = made
+            limit = limit_beyond(given, last)
+            special += [] if limit is None else [limit]
+            stopped = _ended(given, last, limit, made)
             break
         new, taken, quick = made
         beyond = (new.value - to) * toward >= 0.0
         between = special_points(given, last, new, taken)
+        if changed_events(last.events, new.events):
+            limit = limit_between(given, last, taken)
+            between += [] if limit is None else [limit]
+        before, margins = margins, _margins(given, watched, new)
+        between += margin_points(given, watched, (last, new), (before, margins), taken)
+        between.sort(key=lambda point: abs(point.value - curve[-1].value))
         special += [point for point in between if not (point.value - to) * toward > 0.0]
         if beyond:
             curve += _last(given, last, new, taken, to)
@@ -186,7 +209,13 @@ def branch(gait: LimitCycle, parameter: str, to: float, *, steps: int = 200, ste
     return Branch(gait.name, parameter, tuple(curve), tuple(special), stopped, gait, given)
 
 
-def _begun(gait: Any, parameter: Any, to: Any, steps: Any, step: Any) -> tuple[Continuation, BranchPoint]:
+def _margins(given: Continuation, watched: list[Margin], point: BranchPoint) -> Margins:
+    return least_margins(given.map, watched, point.state, given.with_value(point.value), exact=False)
+
+
+def _begun(
+    gait: Any, parameter: Any, to: Any, steps: Any, step: Any, friction: Any
+) -> tuple[Continuation, BranchPoint]:
     """What the branch shares, and its first point; every fault of the arguments."""
     if not isinstance(gait, LimitCycle) or not gait.success:
         raise ModelError(f"gait must be one that mbd.limit_cycle has found, not {shown(gait)}")
@@ -196,6 +225,8 @@ def _begun(gait: Any, parameter: Any, to: Any, steps: Any, step: Any) -> tuple[C
         faults.append(f"steps must be a whole number from 2 on, not {shown(steps)}")
     if step is not None and not (is_finite_number(step) and SMALLEST <= step <= 1.0):
         faults.append(f"step must be a number from {SMALLEST:g} to 1, not {shown(step)}")
+    if friction is not None and not (is_finite_number(friction) and friction > 0.0):
+        faults.append(f"friction must be a positive coefficient or None, not {shown(friction)}")
     if faults:
         raise ModelError(faults)
     value = parameter_value(gait, parameter)
@@ -236,8 +267,21 @@ def _next(given: Continuation, last: BranchPoint, ds: float) -> tuple[BranchPoin
         else:
             why = str(corrected)
         ds *= 0.5
-    value = last.value
-    return f"ends at {given.name} = {value:.9g}: beyond it {_beyond(why)}"
+    return why
+
+
+def _ended(given: Continuation, last: BranchPoint, limit: SpecialPoint | None, why: str) -> str:
+    """Why a branch ends where it does, in words."""
+    if limit is None:
+        return f"ends at {given.name} = {last.value:.9g}: beyond it {_beyond(why)}"
+    where = f"ends at {given.name} = {limit.value:.12g}"
+    what = repr(limit.what) if limit.what else "the walker"
+    ends = {
+        "scuff": f"beyond it {what} scuffs", "graze": f"beyond it {what} closes", "fall": "beyond it the walker falls",
+        "lost event": f"beyond it {what} does not happen any more", "new event": f"beyond it {what} happens",
+        "release": f"beyond it {what} lets go", "slip": f"beyond it {what} slips",
+    }  # fmt: skip
+    return f"{where}: {ends[limit.kind]}"
 
 
 def _beyond(why: str) -> str:

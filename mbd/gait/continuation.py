@@ -23,7 +23,7 @@ from mbd.gait.return_map import Arrival, ReturnMap
 from mbd.gait.section import Chart, Section
 from mbd.state import State
 
-__all__ = ["QUICK", "BranchPoint", "Continuation", "Corrected"]
+__all__ = ["QUICK", "BranchPoint", "Continuation", "Corrected", "way_of"]
 
 CORRECTIONS, QUICK = 10, 4
 """Newton corrections of a point, and how many count as few."""
@@ -114,7 +114,7 @@ class Continuation:
         return BranchPoint(
             corrected.value, corrected.state, arrival.period, way_of(arrival), arrival.steps,
             multipliers_of(derivative.matrix[:size, :size], derivative.error[:size, :size]), tangent, matrix, chart,
-            tuple((event.name, event.kind) for event in arrival.events),
+            arrival.events,
         )  # fmt: skip
 
     def whole(self, point: BranchPoint) -> Vector:

@@ -165,7 +165,11 @@ def _beside(map_: ReturnMap, chart: Chart, points: Sequence[tuple[Vector, Values
     arrivals = iter(map_.each([start for start in starts if not isinstance(start, str)]))
     results = [start if isinstance(start, str) else _of_arrival(map_, chart, next(arrivals)) for start in starts]
     return [
-        each if isinstance(each, str) else str(each.outcome) if isinstance(each, Arrival) else each.numbers
+        each
+        if isinstance(each, str)
+        else str(map_.against(chart.section, each))
+        if isinstance(each, Arrival)
+        else each.numbers
         for each in results
     ]
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from mbd.arrays import Vector
+from mbd.arrays import Matrix, Vector
 from mbd.assembly.trivial_rows import manager_of
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of
@@ -20,7 +20,6 @@ from mbd.gait.outcome import Outcome, fall_of
 from mbd.gait.section import Section
 from mbd.integrators import Integrator
 from mbd.results.facts import Facts
-from mbd.results.record import EventRecord
 from mbd.simulation.repeated import End, RepeatedRun
 from mbd.simulation.simulate import simulate
 from mbd.state import State
@@ -43,7 +42,9 @@ class Arrival:
     period : time that it took [s]; travel : way along the coordinates that the walker moves on along, one each
     steps : (foot, time since the beginning [s], distance of its place from that of the other foot [m]) of every
         touchdown, in the names of a walk without exchange of sides; NaN where more feet than two make it unclear
-    before : contacts closed just before the last event; events : of the last return
+    before : contacts closed just before the last event
+    events : (name, kind) of all returns in order, in the names of a walk without exchange of sides; penalty contacts,
+        which change nothing abruptly, are none
     """
 
     state: State
@@ -52,7 +53,7 @@ class Arrival:
     travel: Vector
     steps: tuple[tuple[str, float, float], ...]
     before: frozenset[str]
-    events: Sequence[EventRecord]
+    events: tuple[tuple[str, str], ...]
 
 
 @dataclass(eq=False)
@@ -65,13 +66,14 @@ class _Walk:
     outcome: Outcome = field(default_factory=lambda: Outcome("arrives", ""))
     period: float = 0.0
     steps: list[tuple[str, float, float]] = field(default_factory=list)
+    events: list[tuple[str, str]] = field(default_factory=list)
     end: End | None = None
 
     def arrival(self) -> Arrival:
         """Where it has led."""
         assert self.end is not None
         return Arrival(
-            self.state, self.outcome, self.period, self.travel, tuple(self.steps), self.end.before, self.end.events
+            self.state, self.outcome, self.period, self.travel, tuple(self.steps), self.end.before, tuple(self.events)
         )
 
 
@@ -106,6 +108,7 @@ class ReturnMap:
         self.folded = getattr(self.model, "parameters", {})
         self.manager = manager_of(self.mechanism, self.vector(self.values))
         places = {contact.name: contact.place for contact in Facts.of(self.mechanism.equations).contacts}
+        self.penalties = {contact.name for contact in self.manager.contacts if contact.kind == "penalty"}
         self.feet = {name: place for name, place in places.items() if place}
         self._repeated: dict[tuple[float, float] | None, RepeatedRun] = {}
 
@@ -154,6 +157,7 @@ class ReturnMap:
         moved = self.mechanism.equations.configuration.difference(start.q, after.q)[list(self.fixed)]
         found = self._steps(end, moved, places[1])
         walk.steps += [(self._named(name, odd), walk.period + t, length) for name, t, length in found]
+        walk.events += [(self._named(e.name, odd), e.kind) for e in end.events if e.name not in self.penalties]
         walk.period, walk.travel = walk.period + after.time, walk.travel + moved
         state = replace(after, time=0.0, moved={}, parameters={})
         walk.state = self.mirror.state(state) if self.mirror is not None else state
@@ -164,6 +168,17 @@ class ReturnMap:
     def _ends(self, walks: Sequence[_Walk]) -> list[End]:
         """The ends of one run of each."""
         self.runs += len(walks)
+        run = self._run()
+        return run.many([walk.state for walk in walks], [self.plain(walk.values) for walk in walks])
+
+    def rows(self, state: State, values: Values) -> Matrix:
+        """The rows of one return, as the kernel stores them; up to the latest time where it does not arrive before."""
+        run = self._run()
+        run(state, self.plain(values))
+        return run.table.copy()
+
+    def _run(self) -> RepeatedRun:
+        """The prepared run with the step and the latest time of this map."""
         run = self._repeated.get(None) or self._repeated.get((self.dt, self.longest))
         if run is None:
             run = RepeatedRun(
@@ -173,7 +188,7 @@ class ReturnMap:
             self._repeated[None if run.adjustable else (self.dt, self.longest)] = run
         if run.adjustable:
             run.adjust(self.dt, self.longest)
-        return run.many([walk.state for walk in walks], [self.plain(walk.values) for walk in walks])
+        return run
 
     def _steps(self, end: End, moved: Vector, places: Mapping[str, Vector]) -> list[tuple[str, float, float]]:
         """The feet that touched down, when, and the length of the step that each ended.
@@ -258,8 +273,7 @@ class ReturnMap:
 
     def against(self, section: Section, arrival: Arrival) -> Outcome:
         """The outcome, where other contacts are closed than on the section a name for that."""
-        penalties = {contact.name for contact in self.manager.contacts if contact.kind == "penalty"}
-        has, needs = arrival.state.mode.closed - penalties, section.mode.closed - penalties
+        has, needs = (mode.closed - self.penalties for mode in (arrival.state.mode, section.mode))
         if not arrival.outcome.good or has == needs:
             return arrival.outcome
         missing, more = sorted(needs - has), sorted(has - needs)

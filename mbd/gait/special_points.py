@@ -18,7 +18,7 @@ import numpy as np
 from mbd.errors import MbdError
 from mbd.gait.continuation import BranchPoint, Continuation, Corrected
 
-__all__ = ["KINDS", "SpecialPoint", "special_points"]
+__all__ = ["KINDS", "TESTS", "SpecialPoint", "special_points"]
 
 ITERATIONS = 40
 """Evaluations of a test function between two points at most."""
@@ -34,17 +34,20 @@ COMPLEX = 1e-7
 class SpecialPoint:
     """Where a branch turns or its stability changes.
 
-    kind : 'fold', 'doubling', 'torus' or 'branch point'; value : of the parameter; point : the gait there
+    kind : one of `KINDS`; value : of the parameter; point : the gait there
     error : half the width of the bracket in which the parameter lies, and what the error of P makes of it
+    what : the contact or event that it is about; '' of folds, doublings, tori and branch points
     """
 
     kind: str
     value: float
     point: BranchPoint
     error: float
+    what: str = ""
 
     def __repr__(self) -> str:
-        return f"{self.kind} at {self.value:.12g} (± {self.error:.1g})"
+        name = f"{self.kind} of {self.what!r}" if self.what else self.kind
+        return f"{name} at {self.value:.12g} (± {self.error:.1g})"
 
 
 def _fold(point: BranchPoint) -> float:
@@ -65,16 +68,18 @@ def _crossing(point: BranchPoint) -> float:
     return float(np.linalg.det(np.vstack([point.matrix, point.tangent])))
 
 
-KINDS: dict[str, Callable[[BranchPoint], float]] = {
+TESTS: dict[str, Callable[[BranchPoint], float]] = {
     "fold": _fold, "doubling": _doubling, "torus": _torus, "branch point": _crossing,
 }  # fmt: skip
 """Test functions, whose zeros are the points of that kind."""
+KINDS = (*TESTS, "scuff", "graze", "release", "slip", "pull", "new event", "lost event", "fall")
+"""Kinds of special points; the others are found in `mbd.gait.limits` and `mbd.gait.margins`."""
 
 
 def special_points(given: Continuation, one: BranchPoint, other: BranchPoint, ds: float) -> list[SpecialPoint]:
     """The special points between a point and the one that lies ds further along its tangent."""
     found = []
-    for kind, test in KINDS.items():
+    for kind, test in TESTS.items():
         ends = test(one), test(other)
         if kind in ("torus", "doubling") and len(one.multipliers.values) != len(other.multipliers.values):
             continue  # a direction was forgotten on the way

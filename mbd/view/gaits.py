@@ -20,7 +20,10 @@ if TYPE_CHECKING:
 
 __all__ = ["branch", "cycle"]
 
-MARKS = {"fold": "s", "doubling": "o", "torus": "^", "branch point": "D"}
+MARKS = {
+    "fold": "s", "doubling": "o", "torus": "^", "branch point": "D", "scuff": "X", "graze": "X", "release": "v",
+    "slip": ">", "pull": "v", "new event": "P", "lost event": "P", "fall": "*",
+}  # fmt: skip
 """How special points of branches are marked."""
 UNITS = {"period": "s", "distance": "m", "speed": "m/s"}
 AT_POINT = {

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import mbd
-from tests.cases.walkers import compass, standing
+from tests.cases.walkers import compass, kneed, standing
 from tests.gait.walkers import simplest, slope_of
 from tests.problems import case
 
@@ -30,9 +30,9 @@ def mapped(first: str, second: str) -> mbd.Lagrangian:
     return model
 
 
-def cycle_of(first: str, second: str, p: float, x: float, y: float) -> mbd.LimitCycle:
+def cycle_of(first: str, second: str, p: float, x: float, y: float, model=None) -> mbd.LimitCycle:
     """The fixed point of a map."""
-    model = mapped(first, second)
+    model = mapped(first, second) if model is None else model
     start = mbd.assemble(model, {"x": x, "y": y}, {"clock": 1.0})
     functions = {"scale": lambda value: {"p": value}}
     return mbd.limit_cycle(model, start, section="tick", parameters={"scale": p}, functions=functions, dt=0.25)
@@ -69,6 +69,57 @@ def test_a_torus_is_found_where_a_complex_pair_crosses_the_unit_circle():
     (torus,) = found.points()
     assert torus.kind == "torus" and abs(torus.value - 1.0) < 1e-9
     assert abs(np.abs(np.angle(torus.point.multipliers.values[0])) - math.pi / 3.0) < 1e-7
+
+
+def test_an_event_that_no_longer_happens_is_located():
+    """A gate that x opens at half a second if it is above 0.6; the fixed point is x² = p."""
+    model = mapped.__wrapped__("p + x - x**2", "0.3*y + 0.2*x")
+    x, clock = model.coordinates[0], model.coordinates[2]
+    model.constrain(mbd.Event("gate", x.q - 0.6 - (clock.q - 0.5) ** 2, direction=1))
+    gait = cycle_of("", "", 0.5, 0.7, 0.2, model)
+    found = mbd.branch(gait, "scale", 0.3, step=0.1)
+    (lost,) = found.points("lost event")
+    assert lost.what == "gate" and abs(lost.value - 0.36) < 1e-10
+    back = mbd.branch(found.gait(0.3), "scale", 0.5, step=0.1)
+    (new,) = back.points("new event")
+    assert new.what == "gate" and abs(new.value - 0.36) < 1e-10 and "new event of 'gate' at 0.3" in repr(back)
+
+
+def test_the_slope_at_which_a_foot_would_slip_is_that_at_which_friction_is_used_up():
+    sizes = case("f2-compass-gait-3deg").definition
+    model = compass(sizes)
+    start = standing(model, [0.218669, -0.323389, -1.092387, -0.377212], sizes["slope"])
+    gait = mbd.limit_cycle(
+        model, start, section="right foot", mirror=("left", "right"), parameters={"slope": sizes["slope"]},
+        functions=slope_of(sizes["g"]),
+    )  # fmt: skip
+    found = mbd.branch(gait.at({"slope": 0.1}), "slope", 0.106, friction=0.325, step=0.1)
+    (slip,) = found.points("slip")
+    run = found.gait(slip.value).run
+    needed = np.abs(run["left foot.friction.forward"][:-1]) / run["left foot.force"][:-1]
+    assert slip.what == "left foot" and abs(np.max(needed) - 0.325) < 1e-9
+    with pytest.raises(mbd.ModelError, match="friction must be a positive coefficient or None, not -1"):
+        mbd.branch(gait, "slope", 0.106, friction=-1)
+
+
+@pytest.mark.slow
+def test_a_kneed_walker_ends_where_its_bent_leg_grazes_the_slope():
+    sizes = case("f3-kneed-walker-chen").definition
+    model = kneed(sizes)
+    start = standing(model, case("f3-kneed-walker-chen")["fixed point"].value, sizes["slope"])
+    gait = mbd.limit_cycle(
+        model, start, section="right foot", mirror=("left", "right"), parameters={"slope": sizes["slope"]},
+        functions=slope_of(sizes["g"]),
+    )  # fmt: skip
+    found = mbd.branch(gait, "slope", 0.01)
+    (fold,), (scuff,) = found.points("fold"), found.points("scuff")
+    assert 0.031 < fold.value < 0.032 and scuff.what == "right foot" and "'right foot' scuffs" in found.stopped
+    near = mbd.simulate(
+        model, scuff.point.state, mbd.RungeKutta853(), dt=1e-4, until=("right foot", 1.0),
+        parameters=gait.map.plain(found.given.with_value(scuff.value)),
+    )  # fmt: skip
+    middle = (near.time > 0.2 * near.time[-1]) & (near.time < 0.95 * near.time[-1])
+    assert abs(np.min(near["right foot.gap"][middle])) < 1e-8
 
 
 def test_a_parameter_that_changes_nothing_is_named():

@@ -1,0 +1,173 @@
+"""How much a foot still pushes, and grips: the least margins over a cycle, and where along a branch they vanish.
+
+A foot that its rule holds until the other one touches down would have to pull where its normal force p is negative; one
+that sticks would need more friction than μ where ``μ p − |T| < 0``. Neither changes the events of the walk, so that the
+branch goes on; the least value over the cycle is a smooth test function.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from mbd.arrays import Matrix, Vector
+from mbd.errors import MbdError
+from mbd.gait.continuation import BranchPoint, Continuation, Corrected
+from mbd.gait.return_map import ReturnMap, Values
+from mbd.gait.special_points import SpecialPoint
+from mbd.state import State
+
+__all__ = ["Margin", "Margins", "least_margins", "margin_points", "watched_feet"]
+
+NEIGHBOURS = 3
+"""Rows on each side of the smallest one through which a polynomial goes."""
+ITERATIONS = 40
+"""Evaluations of a margin between two points at most."""
+LOCATED = 1e-12
+"""Width of the parameter, over that of its range, at which a point counts as located [-]."""
+
+Margins = Mapping[tuple[str, str], float]
+"""Least values [N] by kind ('pull' or 'slip') and foot, in the names of a walk without exchange of sides."""
+
+
+@dataclass(frozen=True)
+class Margin:
+    """A margin of a foot: p, or μ p − |T| of its rows, while it is closed."""
+
+    kind: str
+    contact: str
+    place: int
+    normal: int
+    tangents: tuple[int, ...]
+    friction: float
+
+    def of(self, lam: Matrix) -> Vector:
+        """The margin at rows of multipliers (R, n_rows) [N]."""
+        push = -lam[:, self.normal]
+        if self.kind == "pull":
+            return push
+        return np.asarray(self.friction * push - np.linalg.norm(lam[:, list(self.tangents)], axis=1))
+
+
+def watched_feet(map_: ReturnMap, friction: float | None) -> list[Margin]:
+    """The margins of the feet that rules hold, and of those that stick if a coefficient of friction is given."""
+    found: list[Margin] = []
+    rows = map_.mechanism.equations.rows
+    for place, contact in enumerate(map_.manager.contacts):
+        if contact.kind != "unilateral" or contact.name not in map_.feet:
+            continue
+        normal, *tangents = contact.rows
+        if contact.opens_on == "when" and not contact.may_pull:
+            found.append(Margin("pull", contact.name, place, normal, (), 0.0))
+        if friction is not None and tangents and all(rows[row].friction < 0 for row in tangents):
+            found.append(Margin("slip", contact.name, place, normal, tuple(tangents), friction))
+    return found
+
+
+def least_margins(map_: ReturnMap, watched: list[Margin], state: State, values: Values, exact: bool) -> Margins:
+    """The least margins over one application of the map.
+
+    exact : from runs to the instants of the least values, in the place of polynomials through rows
+    """
+    found: dict[tuple[str, str], float] = {}
+    for number in range(map_.strides if watched else 0):
+        odd = map_.mirror is not None and number % 2 == 1
+        table = map_.rows(state, values)
+        for margin in watched:
+            for value, when in _minima(map_, margin, table):
+                least = value if when is None or not exact else _exactly(map_, margin, state, values, when)
+                name = map_.mirror.name(margin.contact) if odd and map_.mirror is not None else margin.contact
+                key = margin.kind, name
+                found[key] = min(found.get(key, np.inf), least)
+        if number + 1 < map_.strides:
+            state = map_.each([(state, values)], strides=1)[0].state
+    return found
+
+
+def _minima(map_: ReturnMap, margin: Margin, table: Matrix) -> Iterator[tuple[float, float | None]]:
+    """The least value between two events, with its instant where it lies between rows."""
+    layout = map_.mechanism.layout
+    at = 1 + layout.n_q + 2 * layout.n
+    time, lam = table[:, 0], table[:, at : at + layout.n_rows]
+    closed = table[:, at + layout.n_rows + margin.place] != 0.0
+    values = margin.of(lam)
+    cuts = [0, *(np.flatnonzero((np.diff(time) <= 0.0) | (closed[1:] != closed[:-1])) + 1), len(time)]
+    for start, stop in pairwise(cuts):
+        if closed[start] and stop > start + 1:  # the last row is the first of the next return
+            yield _least(time[start:stop], values[start:stop])
+
+
+def _least(time: Vector, values: Vector) -> tuple[float, float | None]:
+    """The least value of a smooth curve through points, and its instant; None at an end."""
+    k = int(np.argmin(values))
+    if k in (0, len(values) - 1) or len(values) < 2 * NEIGHBOURS + 1:
+        return float(values[k]), None
+    first = min(max(k - NEIGHBOURS, 0), len(values) - 2 * NEIGHBOURS - 1)
+    picked = slice(first, first + 2 * NEIGHBOURS + 1)
+    width = time[k + 1] - time[k - 1]
+    polynomial = np.polynomial.Polynomial.fit((time[picked] - time[k]) / width, values[picked], 2 * NEIGHBOURS)
+    roots = polynomial.deriv().roots()
+    near = roots[np.abs(roots.imag) < 1e-9].real
+    near = near[np.abs(near) <= 1.0]
+    if not len(near):
+        return float(values[k]), None
+    place = float(near[np.argmin(polynomial(near))])
+    return float(polynomial(place)), float(time[k] + width * place)
+
+
+def _exactly(map_: ReturnMap, margin: Margin, state: State, values: Values, when: float) -> float:
+    """The margin at an instant, at which a run ends."""
+    layout = map_.mechanism.layout
+    at = 1 + layout.n_q + 2 * layout.n
+    last = map_.with_step(map_.dt, when).rows(state, values)[-1:]
+    return float(margin.of(last[:, at : at + layout.n_rows])[0])
+
+
+def margin_points(
+    given: Continuation, watched: list[Margin], ends: tuple[BranchPoint, BranchPoint], margins: tuple[Margins, Margins],
+    ds: float,
+) -> list[SpecialPoint]:  # fmt: skip
+    """The points between two gaits of a branch at which a margin vanishes; `margins` are those of the two."""
+    found = []
+    for key in margins[0].keys() & margins[1].keys():
+        before, after = margins[0][key], margins[1][key]
+        if before * after < 0.0:
+            located = _located(given, watched, ends[0], key, (before, after, ds))
+            found += [] if located is None else [located]
+    return found
+
+
+def _located(
+    given: Continuation, watched: list[Margin], one: BranchPoint, key: tuple[str, str],
+    bracket: tuple[float, float, float],
+) -> SpecialPoint | None:  # fmt: skip
+    """The zero of a margin by the Illinois form of the rule of false position."""
+    fa, fb, b = bracket
+    a, side, width = 0.0, 0, b
+    corrected: Any = None
+    for _ in range(ITERATIONS):
+        middle = b - fb * (b - a) / (fb - fa)
+        try:
+            corrected = given.corrected(one, one.tangent, middle)
+        except MbdError:
+            return None
+        if not isinstance(corrected, Corrected):
+            return None
+        values = given.with_value(corrected.value)
+        now = least_margins(given.map, watched, corrected.state, values, exact=True).get(key, np.nan)
+        width = abs(middle - (b if now * fb > 0.0 else a))
+        if now == 0.0 or width <= LOCATED or not np.isfinite(now):
+            break
+        if now * fb > 0.0:
+            b, fb, fa, side = middle, now, fa * (0.5 if side == 1 else 1.0), 1
+        else:
+            a, fa, fb, side = middle, now, fb * (0.5 if side == -1 else 1.0), -1
+    try:
+        point = given.point(corrected, given.whole(one))
+    except MbdError:
+        return None
+    return SpecialPoint(key[0], point.value, point, width * given.width, key[1])
