@@ -308,6 +308,8 @@ class Trajectory:
     ) -> Any:
         """An xarray dataset over `time`; vectors asked for by name have a further dimension `axis`.
 
+        That of a quaternion is `part` (w, x, y, z), that of Euler angles `turn` (1, 2, 3).
+
         `at` and `side` as for `to_dataframe`: with one of them every time is there once, so that
         ``sel(time=0.3, method="nearest")`` works. Each variable has its unit and a name in words in ``attrs``.
         """

@@ -21,6 +21,27 @@ VECTORS = ("force", "torque", "reaction_force", "reaction_torque")
 """Vectors that are no places."""
 
 
+FRAMES = {"": "in axes of the child", "parent": "in axes of the parent", "ground": "in axes of the ground"}
+PLACES = {"1": "first", "2": "second", "3": "third"}
+
+
+def _of_orientation(name: str) -> str:
+    """A part of an orientation or an angular velocity in words; '' for any other result."""
+    joint, _, rest = name.partition(".")
+    kind, *between = rest.split(".")
+    last = between.pop() if between else ""
+    which = between[0] if between else ""
+    if kind == "angular_velocity" and which in FRAMES and last in ("x", "y", "z"):
+        return f"angular velocity of {joint} about {last} {FRAMES[which]}"
+    if kind == "orientation" and not between and last in ("w", "x", "y", "z"):
+        return f"part {last} of the orientation of {joint}"
+    if kind == "rotation_vector" and last in ("x", "y", "z"):
+        return f"rotation vector of {joint} along {last}"
+    if kind == "euler" and last in PLACES:
+        return f"{PLACES[last]} angle of {joint} about {which}"
+    return ""
+
+
 def long_name(name: str) -> str:
     """A result in words; the name itself where its parts do not tell.
 
@@ -33,6 +54,9 @@ def long_name(name: str) -> str:
     owner, _, kind = stem.rpartition(".")
     if last in ("x", "y", "z") and owner and kind in VECTORS:
         return f"{WORDS[kind].format(owner)} along {last}"
+    turning = _of_orientation(name)
+    if turning:
+        return turning
     if last in ("rate", "acceleration") and owner:
         return WORDS[last].format(long_name(stem))
     return WORDS[last].format(stem) if last in WORDS else name

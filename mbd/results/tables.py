@@ -70,13 +70,16 @@ def dataset(
     scalars = list(dict.fromkeys(part for several in parts.values() for part in several))
     found = dict(zip(scalars, read(scalars), strict=True))
     variables: dict[str, Any] = {}
+    axes: dict[str, list[str]] = {}
     for name, several in parts.items():
         about = {"units": unit(several[0], run.facts), "long_name": long_name(name)}
         about = {key: text for key, text in about.items() if text}
         values = [found[part] for part in several]
         one = len(values) == 1
-        variables[name] = (("time",) if one else ("time", "axis"), values[0] if one else np.column_stack(values), about)
-    axes = {"axis": ["x", "y", "z"]} if any(len(several) > 1 for several in parts.values()) else {}
+        endings = [part.rpartition(".")[2] for part in several]
+        along = {"w": "part", "1": "turn"}.get(endings[0], "axis")
+        axes |= {} if one else {along: endings}
+        variables[name] = (("time",) if one else ("time", along), values[0] if one else np.column_stack(values), about)
     coordinates = {"time": ("time", time, {"units": "s", "long_name": "time"}), **axes}
     return xarray.Dataset(variables, coords=coordinates, attrs={"model": run.name, "message": run.message})
 

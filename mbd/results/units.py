@@ -15,6 +15,16 @@ ENDINGS = {
 """Unit by the last word of a name."""
 
 
+PARTS = {"orientation": "", "angular_velocity": "rad/s", "rotation_vector": "rad", "euler": "rad"}
+"""Unit of what a joint that turns freely tells in parts: 'hip.angular_velocity.ground.x', 'hip.euler.zxy.1'."""
+
+
+def _of_part(name: str) -> str | None:
+    """The unit of a part of an orientation or an angular velocity; None for any other name."""
+    owner = name.split(".")[1:-1]
+    return PARTS[owner[0]] if owner and owner[0] in PARTS and len(owner) <= 2 else None
+
+
 def unit(name: str, facts: Facts) -> str:
     """The unit of a result; '' where the name does not tell.
 
@@ -28,6 +38,9 @@ def unit(name: str, facts: Facts) -> str:
     observed = dict(facts.observations)
     if name in observed or (stem in observed and last in ("x", "y", "z")):
         return observed.get(name, observed.get(stem, ""))
+    part = _of_part(name)
+    if part is not None and last != "acceleration":
+        return part
     contact = next((item for item in facts.contacts if item.name == stem), None)
     if contact is not None and last == "gap":
         return contact.unit
@@ -57,6 +70,9 @@ def unit_of(name: str) -> str:
     ('rad', 'rad/s', '')
     """
     stem, _, last = name.rpartition(".")
+    part = _of_part(name)
+    if part is not None:
+        return part
     if last != "rate":
         return ENDINGS.get(last, "")
     base = unit_of(stem)

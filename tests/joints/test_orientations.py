@@ -181,3 +181,31 @@ def test_the_friction_of_a_pin_in_space_is_that_in_the_plane():
         run = mbd.simulate(model, mbd.assemble(model, {"pin.angle": 1.0}), mbd.RadauIIA(), dt=0.02, until=0.5)
         angles.append(run["pin.angle"])
     np.testing.assert_allclose(*angles, atol=1e-10)
+
+
+def test_results_have_units_and_words_and_their_own_axes_in_tables():
+    from mbd.results.long_names import long_name
+    from mbd.results.units import unit
+
+    run = flown()
+    units = {name: unit(f"ball.{name}", run.facts) for name in (
+        "orientation.x", "angular_velocity.x", "angular_velocity.ground.y", "euler.zxy.2", "rotation_vector.z",
+        "angular_velocity.y.acceleration",
+    )}  # fmt: skip
+    assert list(units.values()) == ["", "rad/s", "rad/s", "rad", "rad", "rad/s²"]
+    assert long_name("ball.angular_velocity.parent.x") == "angular velocity of ball about x in axes of the parent"
+    assert long_name("ball.euler.zxy.3") == "third angle of ball about zxy"
+    pytest.importorskip("xarray")
+    table = run.to_xarray(["ball.orientation", "ball.euler.zxy", "arm.center"])
+    assert table["ball.orientation"].dims == ("time", "part")
+    assert [*table["part"].values] == ["w", "x", "y", "z"]
+    assert table["ball.euler.zxy"].dims == ("time", "turn")
+    assert table["arm.center"].dims == ("time", "axis")
+
+
+def test_angles_near_their_singularity_are_in_doubt():
+    run = flown()
+    with pytest.warns(mbd.MbdWarning, match=r"'float.euler.zxz': its second angle comes to .* of 'zxz'"):
+        spun = mbd.simulate(floating(), mbd.assemble(floating()), mbd.RungeKutta853(), dt=0.01, until=0.02)
+        assert spun["float.euler.zxz"].shape == (3, 3)
+    assert run["float.euler.zxy"].shape == (len(run.time), 3)
