@@ -205,7 +205,8 @@ def test_results_have_units_and_words_and_their_own_axes_in_tables():
 
 def test_angles_near_their_singularity_are_in_doubt():
     run = flown()
+    straight = mbd.simulate(floating(), mbd.assemble(floating()), mbd.RungeKutta853(), dt=0.01, until=0.02)
     with pytest.warns(mbd.MbdWarning, match=r"'float.euler.zxz': its second angle comes to .* of 'zxz'"):
-        spun = mbd.simulate(floating(), mbd.assemble(floating()), mbd.RungeKutta853(), dt=0.01, until=0.02)
-        assert spun["float.euler.zxz"].shape == (3, 3)
+        found = straight["float.euler.zxz"]
+    assert found.shape == (3, 3)
     assert run["float.euler.zxy"].shape == (len(run.time), 3)
