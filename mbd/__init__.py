@@ -46,6 +46,7 @@ if TYPE_CHECKING:
         Rolling as Rolling,
         Unilateral as Unilateral,
         When as When,
+        cone as cone,
         distance as distance,
         extension as extension,
         flexion as flexion,
@@ -56,6 +57,7 @@ if TYPE_CHECKING:
         rolling_touchdown as rolling_touchdown,
         separation as separation,
         touchdown as touchdown,
+        twist as twist,
     )
     from mbd.description import on_slope as on_slope
     from mbd.equations.energy_description import Coordinate as Coordinate
@@ -74,6 +76,7 @@ if TYPE_CHECKING:
     )
     from mbd.forces import (
         Applied as Applied,
+        Bushing as Bushing,
         Damper as Damper,
         DCMotor as DCMotor,
         Motor as Motor,
@@ -169,13 +172,13 @@ _HOMES = {
     "mbd.assembly.assemble": "assemble",
     "mbd.bodies": "Domain Link Marker PointMass RigidBody box cylinder disk rod segment sphere",
     "mbd.constraints": "Bilateral Controller Event KnifeEdge Nonholonomic Penalty PenaltyParameters Plane "
-    "Rolling Unilateral When distance extension flexion height measure penalty_parameters profile_touchdown "
-    "rolling_touchdown separation touchdown",
+    "Rolling Unilateral When cone distance extension flexion height measure penalty_parameters profile_touchdown "
+    "rolling_touchdown separation touchdown twist",
     "mbd.equations.energy_description": "Coordinate",
     "mbd.lagrangian": "Lagrangian",
     "mbd.errors": "AssemblyError CapabilityError GaitError MbdError MbdWarning MemoryLimitError ModelError "
     "SimulationError TraceError TrajectoryError UnknownNameError",
-    "mbd.forces": "Applied DCMotor Damper Motor Potential Samples Spring TabulatedSpring TorsionSpring",
+    "mbd.forces": "Applied Bushing DCMotor Damper Motor Potential Samples Spring TabulatedSpring TorsionSpring",
     "mbd.gait.branch": "Branch branch",
     "mbd.gait.cycle": "LimitCycle",
     "mbd.gait.find": "GaitSearch find_gait",

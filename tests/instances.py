@@ -184,6 +184,12 @@ FORCES: list[tuple[str, Callable[[Frame, Frame, Joint], Force]]] = [
         "force in axes of its body",
         lambda a, b, joint: mbd.Applied("force", a, force=(2.0, 3.0, 4.0), torque=(0.5, -1.0, 2.0), axes=a),
     ),
+    (
+        "bushing",
+        lambda a, b, joint: mbd.Bushing(
+            "force", a, b, 40.0, (1.0, 2.0, 3.0), damping=(1.0, 0.5, 0.0), rotational_damping=0.2
+        ),
+    ),
     ("motor", lambda a, b, joint: mbd.Motor("force", joint, torque=4.0)),
     ("potential", lambda a, b, joint: mbd.Potential("force", quartic, "hinge.angle")),
 ]
@@ -204,6 +210,8 @@ MEASURES: list[tuple[str, Callable[[Frame, Frame, Joint], Measure]]] = [
     ("height", lambda a, b, joint: mbd.height(a)),
     ("flexion", lambda a, b, joint: mbd.flexion(joint)),
     ("extension", lambda a, b, joint: mbd.extension(joint, offset=0.1)),
+    ("cone", lambda a, b, joint: mbd.cone(joint, 1.2, (1.0, 2.0, 0.0))),
+    ("twist", lambda a, b, joint: mbd.twist(joint, -0.8, (0.0, 0.0, 1.0))),
     ("distance", lambda a, b, joint: mbd.distance(a, b)),
     ("separation", lambda a, b, joint: mbd.separation(a, b, (1, 1, 0))),
     ("named measure", lambda a, b, joint: mbd.measure("hinge.angle", unit="rad")),

@@ -57,6 +57,7 @@ EXAMPLES: dict[str, Any] = {
     "joint": HINGE,
     "kinetic": lambda theta_rate: theta_rate**2,
     "length": 1.0,
+    "limit": 1.0,
     "loss": 1.0,
     "mass": 1.0,
     "measure": ANGLE,

@@ -16,12 +16,13 @@ from mbd.constraints.rolling_touchdown import profile_touchdown, rolling_touchdo
 from mbd.constraints.rules import When
 from mbd.constraints.surfaces import Plane
 from mbd.constraints.touchdown import touchdown
+from mbd.constraints.turning_measures import cone, twist
 from mbd.constraints.unilateral import Unilateral
 from mbd.constraints.user_measure import measure
 
 __all__ = [
     "Bilateral", "Closing", "Constraint", "Controller", "Drag", "Equation", "Event", "KnifeEdge", "Law", "Measure",
     "Nonholonomic", "Penalty", "PenaltyParameters", "Plane", "Rolling", "Unilateral", "VelocityConstraint", "When",
-    "distance", "extension", "flexion", "height", "measure", "penalty_parameters", "profile_touchdown",
-    "rolling_touchdown", "separation", "touchdown",
+    "cone", "distance", "extension", "flexion", "height", "measure", "penalty_parameters", "profile_touchdown",
+    "rolling_touchdown", "separation", "touchdown", "twist",
 ]  # fmt: skip

@@ -2,6 +2,7 @@
 
 from mbd.forces.applied import Applied
 from mbd.forces.base import Action, Force
+from mbd.forces.bushing import Bushing
 from mbd.forces.damper import Damper
 from mbd.forces.dc_motor import DCMotor
 from mbd.forces.motor import Motor
@@ -12,6 +13,6 @@ from mbd.forces.tabulated_spring import TabulatedSpring
 from mbd.forces.torsion_spring import TorsionSpring
 
 __all__ = [
-    "Action", "Applied", "DCMotor", "Damper", "Force", "Motor", "Potential", "Samples", "Spring", "TabulatedSpring",
-    "TorsionSpring",
+    "Action", "Applied", "Bushing", "DCMotor", "Damper", "Force", "Motor", "Potential", "Samples", "Spring",
+    "TabulatedSpring", "TorsionSpring",
 ]  # fmt: skip

@@ -57,7 +57,10 @@ class Force(Parameterized, ABC):
     @property
     @abstractmethod
     def kind(self) -> str:
-        """'potential', 'loss' or 'applied': whether it stores energy, only takes it, or may give it."""
+        """'potential', 'loss' or 'applied': whether it stores energy, only takes it, or may give it.
+
+        A loss may store energy besides, as springs beside dampers do.
+        """
 
     @property
     def column(self) -> str:

@@ -77,7 +77,10 @@ def doubted_ledger(columns: ModelColumns, lending: Container[str] = ()) -> tuple
         columns.rows,
     )
     pairs = zip(holders, energies, strict=True)
-    stored = tuple(Part(effect.name, effect.column, energy) for (effect, _), energy in pairs)
+    stored = tuple(
+        Part(effect.name, effect.column if effect.power is None else "potential", energy)
+        for (effect, _), energy in pairs
+    )
     least = ROUND_OFF * float(np.max(np.abs(kinetic) + np.abs(potential), initial=0.0))
     named, moved, doubt = _works(columns, found, moving, least, lending)
     driven = any(power.kind == "constraint" for power in found)

@@ -111,14 +111,17 @@ def _effects(findings: Findings, equations: Equations, point: Point) -> None:
         point = point | {("lam", friction.row): 0.7 * float(np.sign(at([friction.rate], point)[0]))}
     for effect in equations.effects:
         force = at(list(effect.generalized()), point)[: equations.n_v]
-        if effect.potential is not None:
+        exact = 1e-9
+        if effect.potential is not None and effect.power is not None:  # springs beside dampers
+            force, exact = force - _gradient(equations, [effect.potential], point)[0], DIFFERENCE
+        elif effect.potential is not None:
             slope = _gradient(equations, [effect.potential], point)[0]
             hint = "the exact derivative differs from the values of the energy: a kink, or a slope that is not its own"
             findings.equal("a force with a potential is its gradient", effect.name, force, slope, hint, DIFFERENCE)
         if effect.power is not None:
             power = at([effect.power], point)[0]
             hint = "the velocities of its pairs must be the rates of the places where it acts"
-            findings.equal("power = −f · v", effect.name, power, -force @ v, hint, 1e-9)
+            findings.equal("power = −f · v", effect.name, power, -force @ v, hint, exact)
             if effect.kind == "loss":
                 sentence = f"'{effect.name}' gives {power:.6g} W to the mechanism; expected ≤ 0"
                 hint = "a loss opposes the motion"

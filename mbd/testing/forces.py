@@ -126,7 +126,8 @@ def _words(findings: Findings, force: Force, scope: FreeScope, action: Action) -
     findings.holds(law, force.kind in kinds, f"kind {force.kind!r}", f"kind is one of {kinds}")
     stores = action.potential is not None
     sentence = f"kind is {force.kind!r}, and act() gives {'a' if stores else 'no'} potential"
-    findings.holds(law, stores == (force.kind == "potential"), sentence, "the energy ledger files it by its kind")
+    agrees = stores if force.kind == "potential" else not stores or force.kind == "loss"  # springs beside dampers
+    findings.holds(law, agrees, sentence, "the energy ledger files it by its kind")
 
 
 def _passivity(findings: Findings, force: Force, action: Action, scope: FreeScope) -> None:

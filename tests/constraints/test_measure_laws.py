@@ -9,6 +9,7 @@ from mbd.constraints.measure import Measure
 from mbd.constraints.measures import Distance, JointMeasure, Separation
 from mbd.constraints.rolling_touchdown import ProfileTouchdown, RollingTouchdown
 from mbd.constraints.touchdown import Touchdown
+from mbd.constraints.turning_measures import Cone, Twist
 from mbd.tape.derivatives import gradient
 from mbd.testing import check_measure
 from tests.helpers import FreeScope
@@ -35,7 +36,7 @@ def test_every_measure_keeps_the_laws(factory):
     stands = isinstance(measure, Touchdown | RollingTouchdown | ProfileTouchdown)
     between_bodies = stands and isinstance(measure.ground, mbd.Plane) and measure.ground.frame is not None
     assert any(law.startswith("frame invariance") for law in verdict.laws) == (
-        between_bodies or isinstance(measure, JointMeasure | Distance | Separation)
+        between_bodies or isinstance(measure, JointMeasure | Distance | Separation | Cone | Twist)
     )
 
 

@@ -1,0 +1,76 @@
+"""Stops of a ball joint: a cone of directions and limits of twist, by rows and by springs; what is refused."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import mbd
+
+LIMITS = (0.9, 0.5, -0.4)
+
+
+@cache
+def shoulder(law: str, cut: str = "auto"):
+    """A heavy arm on a ball joint, whose direction stays in a cone and whose twist between two stops."""
+    model = mbd.Model("shoulder", gravity=(2.0, -9.81, 1.0), cut=cut)
+    arm = mbd.RigidBody("arm", 2.0, (0.05, 0.01, 0.05), center=(0.0, -0.3, 0.02))
+    ball = mbd.Spherical("ball", model.ground.origin, arm.origin, loss=mbd.Viscous(0.02))
+    model.connect(ball)
+    tilt, more, less = LIMITS
+    stops = {"tilt": mbd.cone(ball, tilt), "outward": mbd.twist(ball, more), "inward": mbd.twist(ball, less)}
+    for name, measure in stops.items():
+        model.constrain(
+            mbd.Unilateral(name, measure, restitution=0.3)
+            if law == "rows"
+            else mbd.Penalty(name, measure, stiffness=2e3, damping=1.0, release="pull")
+        )
+    start = {"ball.orientation": ("yzx", (0.1, 0.4, 0.2))}
+    return model, mbd.assemble(model, start, {"ball.angular_velocity": (4.0, 4.0, -3.0)})
+
+
+def turned(run):
+    """(tilt, twist about y) of the arm by scipy's rotations."""
+    q = np.array(run["ball.orientation"])
+    turn = Rotation.from_quat(q[:, [1, 2, 3, 0]])
+    tilt = np.arccos(np.clip(turn.apply([0.0, 1.0, 0.0])[:, 1], -1.0, 1.0))
+    twist = 2.0 * np.arctan2(q[:, 2], q[:, 0])
+    return tilt, (twist + np.pi) % (2.0 * np.pi) - np.pi
+
+
+@pytest.mark.parametrize("law", ["rows", "springs"])
+def test_a_shoulder_stays_within_its_cone_and_its_twist(law):
+    run = mbd.simulate(*shoulder(law), mbd.RadauIIA() if law == "rows" else mbd.HHT(0.05), dt=2e-3, until=1.0)
+    assert {event.name for event in run.events if event.kind == "closed"} >= {"tilt", "outward"}
+    tilt, twist = turned(run)
+    allowed = 1e-8 if law == "rows" else 0.08
+    assert tilt.max() < LIMITS[0] + allowed
+    assert LIMITS[2] - allowed < twist.min() < twist.max() < LIMITS[1] + allowed
+    np.testing.assert_allclose(run["tilt.gap"], LIMITS[0] - tilt, atol=1e-7)
+    np.testing.assert_allclose(run["outward.gap"], LIMITS[1] - twist, atol=1e-12)
+    np.testing.assert_allclose(run["inward.gap"], twist - LIMITS[2], atol=1e-12)
+    assert np.max(np.abs(run.energy.numerical)) < 1e-2
+
+
+@pytest.mark.slow
+def test_stops_of_a_cut_joint_are_those_of_the_tree():
+    runs = [mbd.simulate(*shoulder("rows", cut), mbd.RadauIIA(), dt=2e-3, until=0.5) for cut in ("auto", "all")]
+    assert [event.name for event in runs[0].events] == [event.name for event in runs[1].events]
+    np.testing.assert_allclose(*[run.at(0.45)["arm.center"] for run in runs], atol=1e-6)
+
+
+def test_what_is_no_limit_is_refused():
+    ground, arm = mbd.Model("m").ground, mbd.RigidBody("arm", 1.0, (1.0, 1.0, 1.0))
+    ball = mbd.Spherical("ball", ground.origin, arm.origin)
+    slide = mbd.Prismatic("slide", ground.origin, arm.origin)
+    for make, fault in (
+        (lambda: mbd.cone(ball, 4.0), "'ball' must be above 0 and below π"),
+        (lambda: mbd.cone(arm, 1.0), "such as an mbd.Spherical"),
+        (lambda: mbd.twist(ball, 0.0), "within ±π"), (lambda: mbd.twist(slide, 0.3), "'slide' does not turn"),
+        (lambda: mbd.cone(ball, 1.0, (0, 0, 0)), "axis of the cone of 'ball'"),
+    ):  # fmt: skip
+        with pytest.raises(mbd.ModelError, match=fault):
+            make()
