@@ -121,6 +121,8 @@ if TYPE_CHECKING:
     )
     from mbd.lagrangian import Lagrangian as Lagrangian
     from mbd.model import Model as Model
+    from mbd.optimization.optimize import optimize as optimize
+    from mbd.optimization.optimum import Optimum as Optimum
     from mbd.results.failure import Failure as Failure
     from mbd.sensitivity.result import Sensitivities as Sensitivities
     from mbd.sensitivity.sensitivities import sensitivities as sensitivities
@@ -189,6 +191,8 @@ _HOMES = {
     "mbd.description": "on_slope",
     "mbd.model": "Model",
     "mbd.assembly.projection": "project",
+    "mbd.optimization.optimize": "optimize",
+    "mbd.optimization.optimum": "Optimum",
     "mbd.results.failure": "Failure",
     "mbd.sensitivity.result": "Sensitivities",
     "mbd.sensitivity.sensitivities": "sensitivities",

@@ -10,7 +10,7 @@ from importlib.util import find_spec
 from time import perf_counter
 from typing import Any, TypeVar
 
-__all__ = ["Progress", "counted", "in_notebook", "progress_bar", "run_bar", "share_bar"]
+__all__ = ["Progress", "counted", "in_notebook", "progress_bar", "run_bar", "share_bar", "trial_bar"]
 
 LATE = 3.0
 """Seconds after which a slow run that nobody wanted to watch shows a bar all the same."""
@@ -111,6 +111,21 @@ def share_bar() -> Iterator[Progress | None]:
         return
     with _bar("{percentage:3.0f}% |{bar:30}|  [{elapsed} < {remaining}]", 1.0) as bar:
         yield lambda done, total: (bar.update(max(done / total - bar.n, 0.0)), None)[1]
+
+
+@contextmanager
+def trial_bar(wanted: bool, title: str) -> Iterator[Callable[[int, float], None]]:
+    """Trials so far and the best value of a search on a terminal or in a notebook, if `wanted`; nothing elsewhere."""
+    if not wanted or not _is_wanted():
+        yield lambda count, best: None
+        return
+    with _bar("{n} trials [{elapsed}] {desc}", 0.0) as bar:
+
+        def show(count: int, best: float) -> None:
+            bar.set_description_str(f"{title}: {best:.6g}", refresh=False)
+            bar.update(count - bar.n)
+
+        yield show
 
 
 def counted(items: Sequence[Item], name: Callable[[Item], str]) -> Iterator[Item]:

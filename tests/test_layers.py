@@ -35,6 +35,7 @@ RANKS = [
     ("sensitivity",),
     ("analysis",),
     ("gait",),
+    ("optimization",),
     ("view",),
     ("hardcases",),
     ("testing",),

@@ -20,7 +20,7 @@ GROUPS = {
     "Starts and runs": "assemble project State simulate Trajectory load batch Batch sweep Sweep latin_hypercube sobol",
     "Integrators": "HHT GeneralizedAlpha Newmark RadauIIA RungeKutta853",
     "Analysis": "accuracy Accuracy Known effects Effects linearize Linearization StateSpace mobility "
-    "Mobility criteria Criteria sensitivities Sensitivities fit Fit",
+    "Mobility criteria Criteria sensitivities Sensitivities fit Fit optimize Optimum",
     "Gaits": "limit_cycle LimitCycle gait_report GaitReport find_gait GaitSearch branch Branch",
     "Errors and failures": "MbdError MbdWarning ModelError AssemblyError SimulationError CapabilityError "
     "GaitError MemoryLimitError TraceError TrajectoryError UnknownNameError Failure Replay replay",

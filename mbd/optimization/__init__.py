@@ -1,0 +1,1 @@
+"""Parameters that make runs and gaits better."""

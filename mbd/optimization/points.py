@@ -1,0 +1,207 @@
+"""Numbers and their derivatives at trial values of the unknowns: from gaits, from runs, from a user's function."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from mbd.analysis.interrupted import stopped
+from mbd.arrays import Vector
+from mbd.bodies.values import is_number, shown
+from mbd.errors import GaitError, MbdError, ModelError, SimulationError, UnknownNameError, nearest
+from mbd.gait.cycle import LimitCycle
+from mbd.gait.derivatives import parameter_value
+from mbd.sensitivity.result import Sensitivities
+
+__all__ = ["FunctionSource", "GaitSource", "Point", "Source", "gait_numbers"]
+
+BESIDE = 1e-3
+"""Difference of an unknown, over its value or 1, at which numbers without derivatives are found again [-]."""
+CLOSER = 1e-5
+"""The same for a user's function of numbers alone."""
+HALVINGS = 4
+"""How often the way to a gait is halved where Newton's method does not find it at once."""
+
+
+@dataclass(eq=False)
+class Point:
+    """Numbers at some values of the unknowns.
+
+    values : of the unknowns, by name; numbers : by name; outcome : '' or why there are none
+    slope_of : gives the derivative of a number by all unknowns; made : the run or gait behind them
+    """
+
+    values: Mapping[str, float]
+    numbers: Mapping[str, float] = field(default_factory=dict)
+    outcome: str = ""
+    slope_of: Callable[[str], Vector] = field(repr=False, default=lambda name: np.zeros(0))
+    made: Any = field(repr=False, default=None)
+    error: Exception | None = field(repr=False, default=None)
+
+
+class Source(ABC):
+    """Where numbers come from."""
+
+    kind = "number"
+    """What its numbers are, for errors."""
+
+    @abstractmethod
+    def check(self, name: str) -> None:
+        """Raise `UnknownNameError` for a number that it never has."""
+
+    @abstractmethod
+    def at(self, values: Mapping[str, float], wanted: Sequence[str]) -> Point:
+        """The numbers at these values; a point with an outcome where there are none.
+
+        Raises
+        ------
+        KeyboardInterrupt
+            where the user ended the run.
+        """
+
+
+def failed(values: Mapping[str, float], error: Exception) -> Point:
+    """The point of an error, whose first sentence is its outcome; an interruption goes on."""
+    run, gait = getattr(error, "run", None), getattr(error, "gait", None)
+    text = str(gait.outcome) if gait is not None else str(error)
+    if (run is not None and stopped(run)) or text.startswith("interrupted"):
+        raise KeyboardInterrupt
+    return Point(values, outcome=text, made=run if gait is None else gait, error=error)
+
+
+# gaits --------------------------------------------------------------------------------------------------------------
+def gait_numbers(gait: LimitCycle) -> dict[str, float]:
+    """Numbers of a gait by name: its `scalars`, and the cost of transport."""
+    return {**gait.scalars, "cost of transport": gait.cost_of_transport}
+
+
+class GaitSource(Source):
+    """Gaits near the last one that was found."""
+
+    kind = "number of the gait"
+
+    def __init__(self, gait: LimitCycle, unknowns: Sequence[str]) -> None:
+        if not gait.success:
+            raise GaitError(f"there is no gait to begin with: {gait.outcome}", gait)
+        for name in unknowns:
+            parameter_value(gait, name)
+        self.near, self.unknowns = gait, tuple(unknowns)
+
+    def check(self, name: str) -> None:
+        """Its numbers are those of the gait to begin with."""
+        known = gait_numbers(self.near)
+        if name not in known:
+            raise UnknownNameError(nearest(name, known, self.kind, "It has"))
+
+    def at(self, values: Mapping[str, float], wanted: Sequence[str]) -> Point:
+        """The gait at these values, in shorter stretches where it is not found at once."""
+        try:
+            gait = self._reached(values)
+        except (GaitError, SimulationError) as error:
+            return failed(values, error)
+        self.near = gait
+        return gait_point(gait, values)
+
+    def _reached(self, values: Mapping[str, float]) -> LimitCycle:
+        """The gait, with its way there cut into halves, quarters, … as long as that helps."""
+        begin, gait = {name: parameter_value(self.near, name) for name in values}, self.near
+        done, share = 0.0, 1.0
+        while done < 1.0:
+            target = min(done + share, 1.0)
+            try:
+                gait = gait.at({name: begin[name] + target * (values[name] - begin[name]) for name in values})
+                done = target
+            except GaitError:
+                share /= 2.0
+                if share < 0.5**HALVINGS:
+                    raise
+        return gait
+
+
+def gait_point(gait: LimitCycle, values: Mapping[str, float]) -> Point:
+    """The numbers of a gait; their derivatives are those of the gait, differences where it has none."""
+    names, known = list(values), dict[str, Vector]()
+
+    def slope_of(number: str) -> Vector:
+        if number not in known:
+            own = number in gait.scalars
+            known[number] = np.array([
+                gait.derivatives[number, name] if own else _difference(gait, number, name) for name in names
+            ])  # fmt: skip
+        return known[number]
+
+    return Point(values, gait_numbers(gait), "", slope_of, gait)
+
+
+def _difference(gait: LimitCycle, number: str, name: str) -> float:
+    """Of gaits found again beside this one, to the fourth order."""
+    value, slopes = parameter_value(gait, name), []
+    for factor in (1.0, 2.0):
+        h = factor * BESIDE * (abs(value) or 1.0)
+        ends = [gait_numbers(gait.at({name: value + sign * h}))[number] for sign in (1.0, -1.0)]
+        slopes.append((ends[0] - ends[1]) / (2.0 * h))
+    return float((4.0 * slopes[0] - slopes[1]) / 3.0)
+
+
+# functions ----------------------------------------------------------------------------------------------------------
+class FunctionSource(Source):
+    """A user's function of the unknowns: it gives a gait, a table of derivatives, or numbers by name.
+
+    Gaits and tables have exact derivatives; numbers alone are differentiated by central differences.
+    """
+
+    kind = "number of what the function gives"
+
+    def __init__(self, function: Callable[[dict[str, float]], Any], scales: Mapping[str, float]) -> None:
+        self.function, self.scales = function, scales
+        self.known: set[str] | None = None
+
+    def check(self, name: str) -> None:
+        """Names are known after the first call."""
+        if self.known is not None and name not in self.known:
+            raise UnknownNameError(nearest(name, self.known, self.kind, "There are"))
+
+    def at(self, values: Mapping[str, float], wanted: Sequence[str]) -> Point:
+        """What the function gives, or the error that it raises, if it is one of a model or a run."""
+        try:
+            found = self.function(dict(values))
+        except MbdError as error:
+            return failed(values, error)
+        if isinstance(found, LimitCycle):
+            point = gait_point(found, values) if found.success else failed(values, GaitError("", found))
+        elif isinstance(found, Sensitivities):
+            point = table_point(found, values)
+        elif isinstance(found, Mapping) and all(isinstance(k, str) and is_number(v) for k, v in found.items()):
+            point = Point(values, dict(found), made=found)
+            point.slope_of = lambda name: self._slopes(point, name)
+        else:
+            raise ModelError(
+                "the function must give a LimitCycle, the derivatives of mbd.sensitivities, or numbers by name such as "
+                f"{{'speed': 1.2}}, not {shown(found)}"
+            )
+        self.known = set(point.numbers) or self.known
+        return point
+
+    def _slopes(self, point: Point, name: str) -> Vector:
+        slopes = []
+        for unknown, value in point.values.items():
+            h = CLOSER * (abs(value) or self.scales[unknown])
+            ends = [float(self.function({**point.values, unknown: value + sign * h})[name]) for sign in (1.0, -1.0)]
+            slopes.append((ends[0] - ends[1]) / (2.0 * h))
+        return np.array(slopes)
+
+
+def table_point(found: Sensitivities, values: Mapping[str, float]) -> Point:
+    """The numbers of a table of derivatives, by the unknowns among its columns."""
+    missing = [nearest(name, found.wrt, "column", "The table has") for name in values if name not in found.wrt]
+    if missing:
+        raise UnknownNameError(missing)
+
+    def slope_of(number: str) -> Vector:
+        return np.array([found[number, name] for name in values])
+
+    return Point(values, dict(zip(found.of, map(float, found.values), strict=True)), "", slope_of, found.run)

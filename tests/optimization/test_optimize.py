@@ -1,0 +1,192 @@
+"""Optima of runs: known in closed form, at constraints, beside trials that fail; gradients by differences."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+import numpy as np
+import pytest
+
+import mbd
+from mbd.optimization.formula import formula
+from mbd.optimization.runs import RunSource
+
+
+@cache
+def pendulum():
+    """A rod of radius of gyration 0.5 m, which passes its lowest point."""
+    model = mbd.Model("pendulum")
+    rod = mbd.Link("rod", mass=2.0, length=1.0, center=0.8, inertia=0.5)
+    model.connect(mbd.Revolute("pin", model.ground.origin, rod.start, loss=mbd.Viscous(0.1)))
+    model.constrain(mbd.Event("below", mbd.measure(lambda a: a, "pin.angle"), terminal=True))
+    return model, mbd.assemble(model, {"pin.angle": 0.01})
+
+
+@cache
+def throw():
+    """A ball thrown over level ground, and a wall that ends its flight 11 m ahead."""
+    model = mbd.Model("throw")
+    ball = mbd.PointMass("ball", mass=1.0)
+    model.connect(mbd.Translation("place", model.ground.origin, ball.origin))
+    model.constrain(mbd.Event("lands", mbd.height(ball.origin), direction=-1, terminal=True))
+    model.constrain(mbd.Event("wall", mbd.measure(lambda x: x - 11.0, "place.x"), terminal=True))
+    return model, mbd.assemble(model, {"place.y": 1e-6}, {"place.x": 5.0, "place.y": 5.0})
+
+
+def thrown(guess=(5.0, 5.0), high=20.0, **settings):
+    model, start = throw()
+    speeds = {"place.x.rate": (guess[0], 0.1, high), "place.y.rate": (guess[1], 0.1, 20.0)}
+    return mbd.optimize(model, speeds, start, mbd.RungeKutta853(), 0.05, until="lands", **settings)
+
+
+ENERGY = {"effort": (lambda n: n["place.x.rate"] ** 2 + n["place.y.rate"] ** 2, None, 72.0)}
+
+
+def test_a_pendulum_is_quickest_at_its_radius_of_gyration():
+    model, start = pendulum()
+    found = mbd.optimize(
+        model, {"rod.center": (0.8, 0.1, 1.0)}, start, mbd.RungeKutta853(), 0.02, until="below", minimize="time"
+    )
+    run = mbd.sensitivities(
+        model, start, mbd.RungeKutta853(), 0.02, until="below", wrt=["rod.center"], of=["time"],
+        parameters={"rod.center": found["rod.center"]},
+    )  # fmt: skip
+    assert found.success and abs(run["time", "rod.center"]) < 1e-6 and found.slope < 1e-6
+    free = mbd.optimize(
+        model.without("pin loss"), {"rod.center": (0.8, 0.1, 1.0)}, start, mbd.RungeKutta853(), 0.02, until="below",
+        minimize="time",
+    )  # fmt: skip
+    assert free["rod.center"] == pytest.approx(0.5, abs=1e-6)
+    assert free["time"] == pytest.approx(math.pi / 2.0 * math.sqrt(2.0 * 0.5 / 9.81), rel=1e-4)
+
+
+@pytest.mark.parametrize("method", ["SLSQP", "trust-constr"])
+def test_a_ball_of_given_energy_flies_farthest_at_45_degrees(method):
+    """x = 2 v_x v_y/g; with v² = 72 it is 7.3394 m, and more energy adds dx/d(v²) = 1/g."""
+    found = thrown((5.0, 4.0), maximize="place.x", constraints=ENERGY, method=method)
+    assert found["place.x.rate"] == pytest.approx(6.0, rel=2e-5)
+    assert found.objective == pytest.approx(72.0 / 9.81, rel=1e-6)
+    assert found.violation < 1e-6
+    if method == "SLSQP":
+        (active,) = found.active
+        assert found.success and (active.name, active.side) == ("effort", "highest")
+        assert active.price == pytest.approx(1.0 / 9.81, rel=1e-6) and found.slope < 1e-6
+        assert "price 0.102" in repr(found) and "effort" in found._repr_html_()
+
+
+def test_a_bound_is_active_where_it_holds_the_optimum():
+    found = thrown((2.0, 4.0), high=3.0, maximize="place.x", constraints=ENERGY)
+    assert {each.name for each in found.active} == {"place.x.rate", "effort"}
+    assert found["place.y.rate"] == pytest.approx(math.sqrt(63.0), rel=1e-7)
+
+
+def test_a_trial_that_fails_shortens_the_step_and_is_kept():
+    """Beyond 11 m there is a wall: with twice the energy the optimum lies at it."""
+    more = {"effort": (ENERGY["effort"][0], None, 160.0)}
+    found = thrown((3.0, 3.0), maximize="place.x", constraints=more, most=100)
+    assert found.failed and "ends by 'wall'" in found.failed[0].outcome and "failed" in repr(found)
+    assert not found.success and "fail" in found.message
+    assert 10.8 < found.objective < 11.0 + 1e-9
+    assert found.objective == max(trial.objective for trial in found.trials if not trial.outcome)
+
+
+def test_a_sum_of_squares_is_a_fit_and_passes_by_trials_that_fail():
+    target = [lambda n: n["place.x"] - 8.0, lambda n: n["time"] - 1.0]
+    for method in ("least_squares", "SLSQP"):
+        found = thrown((3.0, 3.0), minimize=target, method=method)
+        assert found["place.x.rate"] == pytest.approx(8.0, rel=1e-5)
+        assert found["place.y.rate"] == pytest.approx(9.81 / 2.0, rel=1e-5)
+        assert found.success
+
+
+def test_a_function_of_the_unknowns_may_give_numbers_derivatives_or_nothing():
+    def valley(x):
+        if x["a"] > 2.0:
+            raise mbd.SimulationError("falls at 0.4 s", None)
+        return {"height": (x["a"] - 1.0) ** 2 + 10.0 * (x["b"] - x["a"] ** 2) ** 2}
+
+    found = mbd.optimize(valley, {"a": (-1.2, -3.0, 3.0), "b": 1.0}, minimize="height", accuracy=1e-9)
+    assert found.success and [found["a"], found["b"]] == pytest.approx([1.0, 1.0], abs=1e-4)
+    model = throw()[0]
+
+    def flight(x):
+        begin = mbd.assemble(model, {"place.y": 1e-6}, {"place.x": x["place.x.rate"], "place.y": 4.0})
+        return mbd.sensitivities(
+            model, begin, mbd.RungeKutta853(), 0.05, until="lands", of=["place.x"],
+            wrt=["place.x.rate"],
+        )  # fmt: skip
+
+    one = mbd.optimize(flight, {"place.x.rate": (4.0, 1.0, 5.0)}, maximize="place.x")
+    assert one["place.x.rate"] == pytest.approx(5.0) and one.active[0].side == "highest"
+
+
+def test_the_gradient_is_that_of_differences_also_of_starts_and_functions():
+    model, start = throw()
+    functions = {"slope": lambda s: {"gravity.x": 9.81 * mbd.sin(s), "gravity.y": -9.81 * mbd.cos(s)}}
+    plain = {"slope": lambda s: {"gravity.x": 9.81 * math.sin(s), "gravity.y": -9.81 * math.cos(s)}}
+    values = {"slope": 0.1, "place.y.rate": 6.0, "place.x": 0.3}
+    own = dict(zip(values, np.eye(3), strict=True))
+    points = []
+    for given in (functions, plain):
+        source = RunSource(model, start, mbd.RungeKutta853(), 0.05, None, "lands", given, tuple(values), "auto")
+        points.append(source.at(values, ["place.x", "time"]))
+        reach = formula(lambda n: n["place.x"] ** 2 / n["time"] + n["slope"], "objective", lambda name: None)
+        assert reach.names == ("place.x", "time", "slope")
+        point = points[-1]
+        slope = reach.slope({**point.numbers, **values}, lambda n, p=point: own[n] if n in own else p.slope_of(n), 3)
+        for k, name in enumerate(values):
+            h = 1e-5
+            ends = [source.at({**values, name: values[name] + s * h}, ["place.x", "time"]) for s in (1.0, -1.0)]
+            numbers = [{**end.numbers, **end.values} for end in ends]
+            difference = (reach.value(numbers[0]) - reach.value(numbers[1])) / (2.0 * h)
+            assert slope[k] == pytest.approx(difference, rel=1e-7)
+    assert points[0].slope_of("place.x") == pytest.approx(points[1].slope_of("place.x"), rel=1e-9)
+
+
+def test_ctrl_c_keeps_the_best_trial():
+    count = 0
+
+    def slow(x):
+        nonlocal count
+        count += 1
+        if count > 12:
+            raise KeyboardInterrupt
+        return {"height": (x["a"] - 3.0) ** 4 + x["b"] ** 2}
+
+    found = mbd.optimize(slow, {"a": 0.0, "b": 1.0}, minimize="height")
+    assert not found.success and found.message.startswith("interrupted")
+    assert found.objective == min(trial.objective for trial in found.trials)
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        ({"minimize": "place.xx"}, "did you mean 'place.x'"),
+        ({"maximize": "time"}, "either minimize= or maximize="),
+        ({"minimize": lambda n: math.sin(n["time"])}, "use mbd.sin"),
+        ({"minimize": lambda n: n["tme"]}, "'tme'"),
+        ({"minimize": 3.0}, "must be the name of a number"),
+        ({"constraints": {"time": "small"}}, "limits of 'time'"),
+        ({"constraints": {"time": (2.0, 1.0)}}, "limits of 'time'"),
+        ({"parameters": {"ball.mas": 1.0}}, "did you mean 'ball.mass'"),
+        ({"parameters": {"place.y.rate": (5.0, 6.0, 7.0)}}, "guess, lowest, highest"),
+        ({"method": "BFGS"}, "'trust-constr'"),
+        ({"method": "least_squares"}, "takes a list"),
+        ({"until": None}, "needs until="),
+        ({"until": 3.0}, "ends by 'lands'"),
+        ({"functions": 3}, "functions must map"),
+        ({"start": 3}, "start must be"),
+        ({"problem": 3}, "problem must be"),
+        ({"problem": lambda x: 3}, "start, dt, until: for the runs of a model"),
+    ],
+    ids=lambda given: given if isinstance(given, str) else next(iter(given)),
+)
+def test_faults_have_names(change, text):
+    model, start = throw()
+    given = {
+        "problem": model, "parameters": {"place.y.rate": 5.0}, "start": start, "dt": 0.05, "until": "lands",
+        "minimize": "time", **change,
+    }  # fmt: skip
+    with pytest.raises(mbd.MbdError, match=text):
+        mbd.optimize(**given)
