@@ -103,6 +103,8 @@ OWN: dict[tuple[str, str], Any] = {
     ("gait_report", "run"): walker(steps=5),
     ("fit", "data"): {"time": [0.1, 0.2], "hinge.angle": [0.3, 0.2]}, ("fit", "dt"): 0.1,
     ("fit", "parameters"): {"upper.length": 1.2},
+    ("optimize", "problem"): MODEL, ("optimize", "dt"): 0.1, ("optimize", "until"): 0.2, ("optimize", "start"): START,
+    ("optimize", "minimize"): "hinge.angle", ("optimize", "parameters"): {"upper.length": 1.2},
     ("batch", "dt"): 0.1, ("effects", "dt"): 0.1,
     ("segment", "name"): "thigh", ("simulate", "dt"): 0.1, ("sweep", "dt"): 0.1,
     ("sensitivities", "dt"): 0.1, ("sensitivities", "wrt"): ["hinge.angle"], ("sweep", "values"): {"upper.mass": [1.0]},
@@ -136,7 +138,7 @@ RESULTS = {
 """Values that are handed to users, who make none."""
 RESULTS |= {"Branch", "GaitSearch"}
 
-STUDIES = {"accuracy", "criteria", "effects", "fit", "sensitivities"}
+STUDIES = {"accuracy", "criteria", "effects", "fit", "optimize", "sensitivities"}
 """Words whose runs take seconds: what is no number at all is tried."""
 GAITS = {"find_gait", "limit_cycle"}
 """Words that make so many runs that they take machine code."""

@@ -29,6 +29,8 @@ __all__ = ["optimize"]
 
 ACTIVE = 1e-6
 """Distance from a limit, over its scale, that is on it [-]."""
+FLAT = 1e-6
+"""Slope that active limits leave over, below which the place is an optimum whatever the method says [-]."""
 
 
 def optimize(
@@ -120,6 +122,7 @@ def optimize(
         if name not in names:
             source.check(name)
 
+    converged: bool | None
     with trial_bar(progress, what) as report:
         task = Problem(
             source, names, guess, low, high, [formula(each, what, check) for each in parts],
@@ -132,7 +135,7 @@ def optimize(
         except KeyboardInterrupt:
             if task.best is None:
                 raise
-            converged, message = False, "interrupted; this is the best trial so far"
+            converged, message = None, "interrupted; this is the best trial so far"
     return _concluded(task, converged, message, method, what)
 
 
@@ -212,29 +215,28 @@ def _source(
         if until is None:
             raise ModelError("a run needs until=: a time [s], or the name of an event; a gait needs none")
         return RunSource(problem, start, integrator, dt, tol, until, functions, names, backend)
-    if isinstance(problem, LimitCycle) or callable(problem):
-        given = dict(zip(("start", "integrator", "dt", "tol", "until"), settings, strict=True)) | {
-            "functions": functions
-        }
-        mine = [name for name, each in given.items() if each is not None and each != {}]
-        if mine:
-            raise ModelError(f"{', '.join(mine)}: for the runs of a model; a gait or a function has its own")
-    if isinstance(problem, LimitCycle):
-        return GaitSource(problem, names)
-    if not callable(problem) or isinstance(problem, type):
+    if not isinstance(problem, LimitCycle) and (not callable(problem) or isinstance(problem, type)):
         raise ModelError(
             "problem must be a model, a gait of mbd.limit_cycle, or a function of the unknowns by name, not "
             f"{shown(problem)}"
         )
+    given = dict(zip(("start", "integrator", "dt", "tol", "until"), settings, strict=True)) | {"functions": functions}
+    mine = [name for name, each in given.items() if each is not None and each != {}]
+    if mine:
+        raise ModelError(f"{', '.join(mine)}: for the runs of a model, which the problem is not, but {shown(problem)}")
+    if isinstance(problem, LimitCycle):
+        return GaitSource(problem, names)
     scales = {name: abs(float(value)) or 1.0 for name, value in zip(names, guess, strict=True)}
     return FunctionSource(problem, scales)
 
 
 # result -------------------------------------------------------------------------------------------------------------
-def _concluded(task: Problem, converged: bool, message: str, method: str, what: str) -> Optimum:
+def _concluded(task: Problem, converged: bool | None, message: str, method: str, what: str) -> Optimum:
     best = task.best
     assert best is not None
-    active, slope = _active(task, best) if best.slopes is not None or converged else ((), math.nan)
+    active, slope = ((), math.nan) if converged is None else _active(task, best)
+    if converged is False and slope <= FLAT:
+        converged, message = True, f"no slope is left; {message}"
     made, violated = best.point.made, best.violation > max(FEASIBLE, ACTIVE)
     gait = made if isinstance(made, LimitCycle) else None
     values = task.values(best.u)
@@ -246,7 +248,7 @@ def _concluded(task: Problem, converged: bool, message: str, method: str, what: 
         what, task.shown(best), dict(best.point.numbers),
         {limit.title: (float(value), limit.low, limit.high)
          for limit, value in zip(task.limits, best.limits, strict=True)},
-        active, slope, best.violation, converged and not violated, message, method, tuple(task.trials), gait,
+        active, slope, best.violation, bool(converged) and not violated, message, method, tuple(task.trials), gait,
         None if isinstance(made, Mapping | LimitCycle) else made,
     )  # fmt: skip
 

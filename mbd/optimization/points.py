@@ -80,20 +80,24 @@ def gait_numbers(gait: LimitCycle) -> dict[str, float]:
 
 
 class GaitSource(Source):
-    """Gaits near the last one that was found."""
+    """Gaits on one branch, each from the nearest one that is known.
+
+    Newton's method may arrive at a gait of another branch, which a fold connects with this one: there the sign of
+    det(1 − P) is another, so that such a gait is not taken and the way to it is cut into shorter pieces.
+    """
 
     kind = "number of the gait"
 
     def __init__(self, gait: LimitCycle, unknowns: Sequence[str]) -> None:
         if not gait.success:
             raise GaitError(f"there is no gait to begin with: {gait.outcome}", gait)
-        for name in unknowns:
-            parameter_value(gait, name)
-        self.near, self.unknowns = gait, tuple(unknowns)
+        first = {name: parameter_value(gait, name) for name in unknowns}
+        self.known = [(first, gait)]
+        self.scales = {name: abs(value) or 1.0 for name, value in first.items()}
 
     def check(self, name: str) -> None:
         """Its numbers are those of the gait to begin with."""
-        known = gait_numbers(self.near)
+        known = gait_numbers(self.known[0][1])
         if name not in known:
             raise UnknownNameError(nearest(name, known, self.kind, "It has"))
 
@@ -103,23 +107,39 @@ class GaitSource(Source):
             gait = self._reached(values)
         except (GaitError, SimulationError) as error:
             return failed(values, error)
-        self.near = gait
+        self.known.append((dict(values), gait))
         return gait_point(gait, values)
 
     def _reached(self, values: Mapping[str, float]) -> LimitCycle:
         """The gait, with its way there cut into halves, quarters, … as long as that helps."""
-        begin, gait = {name: parameter_value(self.near, name) for name in values}, self.near
+        begin, gait = min(self.known, key=lambda pair: self._apart(pair[0], values))
         done, share = 0.0, 1.0
         while done < 1.0:
             target = min(done + share, 1.0)
             try:
-                gait = gait.at({name: begin[name] + target * (values[name] - begin[name]) for name in values})
+                gait = _beside(gait, {name: begin[name] + target * (values[name] - begin[name]) for name in values})
                 done = target
             except GaitError:
                 share /= 2.0
                 if share < 0.5**HALVINGS:
                     raise
         return gait
+
+    def _apart(self, one: Mapping[str, float], other: Mapping[str, float]) -> float:
+        return max(abs(one[name] - other[name]) / scale for name, scale in self.scales.items())
+
+
+def _beside(gait: LimitCycle, values: Mapping[str, float]) -> LimitCycle:
+    """The gait of the same branch at other values."""
+    found = gait.at(values)
+    if _index(found) != _index(gait):
+        raise GaitError("the search leads to a gait of another branch, beyond a fold or a branch point")
+    return found
+
+
+def _index(gait: LimitCycle) -> float:
+    """The sign of det(1 − P)."""
+    return float(np.sign(np.prod(1.0 - np.asarray(gait.multipliers)).real))
 
 
 def gait_point(gait: LimitCycle, values: Mapping[str, float]) -> Point:

@@ -59,7 +59,7 @@ def _round(problem: Problem, method: str, accuracy: float, radius: float) -> tup
 
     minimize: Any = scipy.optimize.minimize
     constraints = _constraints(problem, method)
-    options: dict[str, Any] = {"ftol": accuracy**1.5, "maxiter": problem.most}
+    options: dict[str, Any] = {"ftol": accuracy**1.25, "maxiter": problem.most}
     if method == "trust-constr":
         options = {"xtol": accuracy, "gtol": accuracy**1.5, "barrier_tol": accuracy**1.5, "maxiter": problem.most}
         options["initial_tr_radius"] = 0.1

@@ -172,6 +172,13 @@ def test_what_the_data_cannot_tell_apart_is_named():
     assert both.values["pin loss.coefficient"] / both.values["rod.mass"] == pytest.approx(0.2 / 1.2, rel=1e-6)
 
 
+def test_fewer_values_than_parameters_determine_none():
+    model, start = pendulum()
+    few = {"time": [0.5], "pin.angle": [0.1]}
+    one = mbd.fit(model, start, few, {"rod.center": (1.2, 0.5, 2.0), "pin loss.coefficient": 0.2}, mbd.Newmark(), 0.02)
+    assert set(*one.alike) == {"rod.center", "pin loss.coefficient"} and np.isinf(list(one.errors.values())).all()
+
+
 def test_bounds_hold_and_values_may_be_missing():
     values = seen()
     values[::3] = np.nan

@@ -1,4 +1,4 @@
-"""Optima of runs: known in closed form, at constraints, beside trials that fail; gradients by differences."""
+"""Optima of runs and gaits: in closed form, at constraints, beside trials that fail; gradients by differences."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ import pytest
 
 import mbd
 from mbd.optimization.formula import formula
+from mbd.optimization.points import GaitSource
 from mbd.optimization.runs import RunSource
+from tests.gait.walkers import simplest
 
 
 @cache
@@ -142,6 +144,36 @@ def test_the_gradient_is_that_of_differences_also_of_starts_and_functions():
             difference = (reach.value(numbers[0]) - reach.value(numbers[1])) / (2.0 * h)
             assert slope[k] == pytest.approx(difference, rel=1e-7)
     assert points[0].slope_of("place.x") == pytest.approx(points[1].slope_of("place.x"), rel=1e-9)
+
+
+@cache
+def long_gait():
+    model, start = simplest()
+    return mbd.limit_cycle(model, start, section="heel strike")
+
+
+def test_a_gait_of_a_given_period_is_found_on_its_own_branch():
+    """The short gait of the simplest walker is near at every slope, and of another period."""
+    found = mbd.optimize(long_gait(), {"gamma": (0.009, 0.002, 0.03)}, minimize=[lambda n: n["period"] - 3.85])
+    assert found.success and found["period"] == pytest.approx(3.85, abs=1e-7) and found.gait.stability == "stable"
+    point = GaitSource(long_gait(), ["gamma"]).at({"gamma": 0.008}, ["period"])
+    source = GaitSource(long_gait(), ["gamma"])
+    ends = [source.at({"gamma": 0.008 + h}, ["period"]).numbers["period"] for h in (1e-5, -1e-5)]
+    assert point.slope_of("period") == pytest.approx((ends[0] - ends[1]) / 2e-5, rel=1e-5)
+
+
+@pytest.mark.slow
+def test_the_steepest_slope_at_which_a_push_dies_out_by_a_fifth_each_step():
+    found = mbd.optimize(
+        long_gait(), {"gamma": (0.009, 0.002, 0.03)}, maximize="gamma", constraints={"largest multiplier": (None, 0.8)}
+    )
+    (active,) = found.active
+    assert found.success and active.name == "largest multiplier"
+    there = long_gait().at({"gamma": found["gamma"]})
+    assert there.largest_multiplier == pytest.approx(0.8, abs=1e-7)
+    h = 1e-4
+    ends = [long_gait().at({"gamma": found["gamma"] + s * h}).largest_multiplier for s in (1.0, -1.0)]
+    assert active.price == pytest.approx(2.0 * h / (ends[0] - ends[1]), rel=1e-3)
 
 
 def test_ctrl_c_keeps_the_best_trial():

@@ -309,15 +309,15 @@ class _Search:
         noise = float(np.sqrt(np.sum(found.fun**2) / max(degrees, 1)))
         sizes = np.linalg.norm(found.jac, axis=0)
         scaled = found.jac / np.where(sizes > 0.0, sizes, 1.0)
-        _, strengths, directions = np.linalg.svd(scaled, full_matrices=False)
+        _, strengths, directions = np.linalg.svd(scaled)
+        strengths = np.pad(strengths, (0, len(directions) - len(strengths)))
         weak = strengths <= ALIKE * max(strengths[0], 1e-300)
-        weak = np.concatenate([weak, np.ones(len(found.x) - len(weak), dtype=bool)])
         groups, unknown = [], np.zeros(len(found.x), dtype=bool)
-        for line in directions[weak[: len(directions)]]:
+        for line in directions[weak]:
             members = np.abs(line) > SHARE
             groups.append(tuple(name for name, is_in in zip(self.names, members, strict=True) if is_in))
             unknown |= members
-        covariance = (directions.T * np.where(weak, 0.0, 1.0 / np.maximum(strengths, 1e-300) ** 2)) @ directions
+        covariance = (directions.T * np.where(weak, 0.0, 1.0 / np.where(weak, 1.0, strengths) ** 2)) @ directions
         deviation = np.sqrt(np.diag(covariance))
         errors = np.where(unknown | (sizes == 0.0), np.inf, deviation / np.where(sizes > 0.0, sizes, 1.0))
         times = {name: seen[0] for name, seen in self.data.columns.items()}
