@@ -16,8 +16,12 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.kernel.schemes.collocation import RADAU
 from mbd.sensitivity.balance import consistent_rates
+from mbd.sensitivity.entries import stacked, system
+from mbd.sensitivity.kernel.build import entry
+from mbd.sensitivity.kernel.radau import radau_steps
 from mbd.sensitivity.motion import Mode, Motion, Rates, solved
-from mbd.sensitivity.programs import Columns
+from mbd.sensitivity.programs import Columns, Programs
+from mbd.sensitivity.run_data import Rows
 from mbd.sensitivity.schemes import Memory, SchemeSteps
 
 __all__ = ["RadauSteps"]
@@ -45,6 +49,14 @@ class RadauSteps(SchemeSteps):
         """It remembers nothing but its rates."""
         return Memory.of_rates(rates, 0.0)
 
+    def leap(self, motion: Motion, memory: Memory, mode: Mode, first: int, last: int) -> tuple[int, Motion, Memory]:
+        """All of them at once."""
+        if last <= first:
+            return first, motion, memory
+        still, rows = np.zeros_like(motion.tangent.t), self.rows.between(first, last)
+        done, motion, rates = taken(self.programs, motion, memory.rates, mode, rows, still)
+        return first + done, motion, Memory.of_rates(rates, 0.0)
+
     def along(
         self, motion: Motion, memory: Memory, mode: Mode, row: int, dh: Vector, fresh: bool
     ) -> tuple[Motion, Memory]:
@@ -52,10 +64,25 @@ class RadauSteps(SchemeSteps):
         end, rates = self.ended(motion, memory, mode, row, dh)
         return end, Memory.of_rates(rates, 0.0)
 
+    def ended(self, motion: Motion, memory: Memory, mode: Mode, row: int, dh: Vector) -> tuple[Motion, Rates]:
+        """The same at an event."""
+        rows = self.rows.step_to(row, motion, memory.rates)
+        done, end, rates = taken(self.programs, motion, memory.rates, mode, rows, dh)
+        return (end, rates) if done else super().ended(motion, memory, mode, row, dh)
+
     def reached(
         self, motion: Motion, memory: Memory, mode: Mode, time: float, dh: Vector, row: int
     ) -> Iterator[tuple[Motion, Rates]]:
         """All steps are alike."""
+        rows = self.rows.step_to(row, motion, memory.rates)
+        rows[0][1] = time
+        done, end, found = taken(self.programs, motion, memory.rates, mode, rows, dh, False)
+        yield (end, found) if done else self._least(motion, memory, mode, time, dh, row)
+
+    def _least(
+        self, motion: Motion, memory: Memory, mode: Mode, time: float, dh: Vector, row: int
+    ) -> tuple[Motion, Rates]:
+        """A step in numpy, with least solutions of singular systems."""
         h, n_v = time - motion.t, self.programs.columns.n_v
         first, last = memory.rates, Rates(self.rows.rate[row], np.array(self.rows.record.lam[row]), *_NONE)
         part = RADAU.c[:, np.newaxis]
@@ -83,7 +110,7 @@ class RadauSteps(SchemeSteps):
             of_x = of_x + found[at : at + n_v]
         of_y = of_y + h * np.tensordot(RADAU.A[2], of_W, 1)
         end = Motion(time, q, y, motion.anchors, replace(places[2].tangent, q=of_x, y=of_y))
-        yield end, consistent_rates(self.programs, end, mode, last)
+        return end, consistent_rates(self.programs, end, mode, last)
 
     # parts --------------------------------------------------------------------------------------------------------
     def _size(self, mode: Mode) -> int:
@@ -243,3 +270,37 @@ class RadauSteps(SchemeSteps):
 
 
 _NONE = np.zeros((0, 0)), np.zeros((0, 0))
+
+
+def taken(
+    programs: Programs, motion: Motion, rates: Rates, mode: Mode, rows: Rows, dh: Vector, checked: bool = True
+) -> tuple[int, Motion, Rates]:
+    """As many of the steps between these rows as the kernel takes from here; the state and rates after them.
+
+    checked : false for one step whose end q, y is not known; rows then get it
+    """
+    known, level = system(programs, "consistent", mode, False), system(programs, "steps", mode, False)
+    time, q, y, rate, lam = (np.ascontiguousarray(each) for each in rows)
+    active = lam * known.held
+    n, n_v, m, width = programs.columns.n, programs.columns.n_v, len(mode.rows), len(dh)
+    Z = stacked(motion, known)
+    w, size, unknowns = Z.shape[1], n + m, 3 * (n + m) * (2 if m else 1)
+    X, by_size, block = np.zeros((size, w)), np.zeros(w), np.zeros(programs.layout.size)
+    by_size[:width] = dh
+    programs.fill(block, motion.at(mode, rate[0], lam[0]))
+    numbers = np.concatenate([RADAU.c, np.ravel(RADAU.A), np.ravel(SQUARE), [RADAU.real]])
+    outputs = level.outputs
+    done = entry(radau_steps)(
+        [known.function, level.function], programs.values, level.of_width(width), known.of_width(width), numbers,
+        len(time) - 1, int(checked), outputs, time, q, y, rate, active, known.rows, known.fast, level.entries,
+        known.entries, block, np.empty(max(known.outputs, outputs)), np.empty(3 * outputs), np.empty(outputs),
+        np.empty(6 * size), X, Z, np.empty(3 * Z.size), by_size, np.empty(unknowns**2), np.empty(unknowns * w),
+        np.empty(unknowns), np.empty(size**2), np.empty(unknowns, dtype=np.int64),
+    )  # fmt: skip
+    if done == 0:
+        return 0, motion, rates
+    tangent = replace(motion.tangent, t=Z[n_v + n + size, :width], q=Z[:n_v, :width], y=Z[n_v : n_v + n, :width])
+    of_lam = np.zeros((programs.columns.rows, width))
+    of_lam[known.rows] = X[n:, :width]
+    end = Motion(float(time[done]), q[done].copy(), y[done].copy(), motion.anchors, tangent)
+    return done, end, Rates(rate[done].copy(), lam[done] if checked else active[done], X[:n, :width], of_lam)

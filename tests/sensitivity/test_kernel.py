@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import mbd
-from mbd.sensitivity import newmark_rows, runge_kutta
+from mbd.sensitivity import newmark_rows, radau, runge_kutta
 from mbd.sensitivity.derivative import final_state_derivative
 from mbd.testing.mechanisms import random_loop, random_scene
 from tests.simulation.mechanisms import pendulum
@@ -14,12 +14,13 @@ from tests.simulation.mechanisms import pendulum
 SCHEMES = (
     mbd.HHT(alpha=0.05), mbd.GeneralizedAlpha(0.7), mbd.HHT(0.1, formulation="index3"),
     mbd.Newmark(start="consistent"), mbd.RungeKutta853(),
+    mbd.RadauIIA(tolerance=1e-12),
 )  # fmt: skip
 
 
 def one_by_one(monkeypatch):
     """From now on numpy takes every step."""
-    for steps in (newmark_rows, runge_kutta):
+    for steps in (newmark_rows, radau, runge_kutta):
         monkeypatch.setattr(steps, "taken", lambda owner, motion, memory, *_: (0, motion, memory))
 
 
@@ -30,7 +31,7 @@ def both(monkeypatch, run, names):
     return np.vstack(final_state_derivative(run, names)), wanted
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", range(12))
 def test_steps_of_random_scenes(seed, monkeypatch):
     """With contacts that close, hold and slide; directions of the start and of parameters."""
     model, scheme = random_scene(seed, bodies=2), SCHEMES[seed % len(SCHEMES)]
@@ -52,7 +53,7 @@ def test_steps_of_closed_loops(scheme, monkeypatch):
     assert found == pytest.approx(wanted, rel=1e-9, abs=1e-11 * np.max(np.abs(wanted)))
 
 
-@pytest.mark.parametrize("scheme", [SCHEMES[0], SCHEMES[4]], ids=repr)
+@pytest.mark.parametrize("scheme", [SCHEMES[0], *SCHEMES[4:]], ids=repr)
 def test_interpreted_as_compiled(scheme):
     model = pendulum()
     start = mbd.assemble(model, {"hinge.angle": 1.0})
