@@ -23,6 +23,7 @@ from mbd.equations.results import offer_results
 from mbd.equations.row_sizes import row_sizes
 from mbd.equations.shapes import offer_shapes, shapes_of
 from mbd.equations.sizes import require_room
+from mbd.equations.solids import offer_solids, solids_of
 from mbd.errors import ModelError
 from mbd.tape.derivatives import live
 from mbd.tape.functions import cos
@@ -105,7 +106,8 @@ def _derived(model: Description, plan: Plan, carried: Sequence[tuple[str, int]] 
         idle=tuple(constraints.idle), output=outputs, output_names=outputs.names,
         velocity_names=scope.configuration.velocity_names, notes=plan.notes,
         figure=figure_of(model), markers=shown_markers(model),
-        observations=tuple((each.name, each.unit) for each in model.observations), shapes=shapes_of(model),
+        observations=tuple((each.name, each.unit) for each in model.observations),
+        shapes=(*shapes_of(model), *(() if plan.planar else solids_of(model))),
         geometry=TreeGeometry(scope, dynamics, work, rests, constraints, plan.planar and vectors and not carried),
         frictions=tuple(constraints.frictions), turns=(*scope.turns.values(), *scope.wrapped.values()),
         facings=_facings(scope, constraints),
@@ -117,6 +119,8 @@ def _derived(model: Description, plan: Plan, carried: Sequence[tuple[str, int]] 
     offer_results(outputs, scope, dynamics, whole, equations, model, {joint.name for joint in plan.floating})
     offer_observations(outputs, scope, model.observations)
     offer_shapes(outputs, scope, model)
+    if not plan.planar:
+        offer_solids(outputs, scope, model)
     return equations
 
 

@@ -1,4 +1,4 @@
-"""What pictures show beside bodies: grounds that contacts touch, wheels that roll, blades.
+"""What pictures show beside lines of bodies: grounds that contacts touch, wheels that roll, blades.
 
 Names of bodies and constraints are enough, with numbers where nothing moves; all else are results that are not listed,
 traced when a picture asks for them.
@@ -45,13 +45,14 @@ def drawn(owner: str, what: str) -> str:
 class Shape:
     """Something that is drawn.
 
-    kind : 'plane' (at rest), 'moving plane', 'surface', 'wheel' or 'blade'
-    name : of the constraint that has it, or the first of them; `drawn(name, …)` are its results: place, normal and
-        forward of a moving plane, height (of PLACE and time) of a surface, spoke and axle of a wheel, along of a blade
+    kind : 'plane' (at rest), 'moving plane', 'surface', 'wheel' or 'blade'; of spatial mechanisms 'solid' and 'hinge'
+    name : of the constraint that has it, or the first of them, of the body, of the joint; `drawn(name, …)` are its
+        results: place, normal and forward of a moving plane, height (of PLACE and time) of a surface, spoke and axle of
+        a wheel, along of a blade, first and second axis of a body, axis of a joint
     contacts : the contacts that touch a ground; normal and forward of each where it is no plane at rest
     points : the frame that touches, of each contact
-    place : frame of a wheel's center, of a blade
-    numbers : normal and offset of a plane at rest
+    place : frame of a wheel's center, of a blade, of a body's center, of a joint
+    numbers : normal and offset of a plane at rest; mass and Ixx, Iyy, Izz, Ixy, Ixz, Iyz of a solid, as described
     across : of a surface, the names of what its height depends on, such as 'xt'
     """
 

@@ -118,7 +118,7 @@ def _shape(shape: Mapping[str, Any]) -> None:
     contacts, points = (_list(shape[word], str, "'shapes'") for word in ("contacts", "points"))
     expect(len(contacts) == len(points), "'shapes'")
     numbers = _list(shape["numbers"], (int, float), "'shapes'")
-    expect(len(numbers) == (4 if shape["kind"] == "plane" else 0), "'shapes'")
+    expect(len(numbers) == {"plane": 4, "solid": 7}.get(shape["kind"], 0), "'shapes'")
 
 
 def _columns(meta: Mapping[str, Any], members: Members, heads: Mapping[str, Head], count: int) -> set[str]:

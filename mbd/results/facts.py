@@ -41,7 +41,7 @@ class Facts:
     velocities : (name, unit) of velocities that are not the rates of coordinates
     markers : full names of the named points, 'left shank.toe' or 'heel'
     observations : (name, unit) of the results of users' own
-    shapes : grounds, wheels and blades that pictures show
+    shapes : grounds, wheels, blades, and in space solids and hinges, that pictures show
     """
 
     model: str = ""
@@ -66,7 +66,8 @@ class Facts:
         found: list[str] = []
         for shape in self.shapes:
             vectors = {
-                "moving plane": ("place", "normal", "forward"), "wheel": ("spoke", "axle"), "blade": ("along",)
+                "moving plane": ("place", "normal", "forward"), "wheel": ("spoke", "axle"), "blade": ("along",),
+                "solid": ("first", "second"), "hinge": ("axis",),
             }.get(shape.kind, ())  # fmt: skip
             found += [drawn(shape.name, what) for what in vectors]
             if shape.kind in ("moving plane", "surface"):

@@ -11,11 +11,9 @@ from mbd.arrays import Matrix
 from mbd.view.packing import FINE, finite, packed, side, step_of
 from mbd.view.scene import Scene
 from mbd.view.scenery import Sheet
+from mbd.view.space import TURN, space, surface
 
 __all__ = ["geometry"]
-
-TURN = 1e-4
-"""Steps of directions [-]."""
 
 
 def geometry(picture: Scene) -> dict[str, Any]:
@@ -61,6 +59,7 @@ def geometry(picture: Scene) -> dict[str, Any]:
             for push in picture.pushes
         ],
         **_scenery(picture, axes, step),
+        **(space(picture, step) if picture.spatial else {}),
     }  # fmt: skip
 
 
@@ -76,7 +75,7 @@ def _scenery(picture: Scene, axes: int, step: float) -> dict[str, Any]:
             {"at": series(deck.place, step), "normal": series(deck.normal, TURN), "along": series(deck.forward, TURN)}
             for deck in around.decks
         ],
-        "sheets": [_sheet(sheet, axes, step) for sheet in around.sheets],
+        "sheets": [surface(sheet, step) if picture.spatial else _sheet(sheet, step) for sheet in around.sheets],
         "wheels": [
             {
                 "side": side(wheel.name), "at": series(wheel.center, step), "radius": packed(wheel.radius, step),
@@ -91,17 +90,17 @@ def _scenery(picture: Scene, axes: int, step: float) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _sheet(sheet: Sheet, axes: int, step: float) -> dict[str, Any]:
-    """Lines of a surface, each its points at the times it is known at; a line ends where the ground does."""
+def _sheet(sheet: Sheet, step: float) -> dict[str, Any]:
+    """Lines of a planar surface, each its points at the times it is known at; a line ends where the ground does."""
     lines: list[NDArray[np.float64]] = []
     for line in np.moveaxis(sheet.lines, 1, 0):
         there = np.all(np.isfinite(line), axis=(0, 2))
         edges = np.flatnonzero(np.diff(there.astype(np.int8), prepend=0, append=0))
-        lines += [line[:, first:stop, :axes] for first, stop in zip(edges[::2], edges[1::2], strict=True)]
+        lines += [line[:, first:stop, :2] for first, stop in zip(edges[::2], edges[1::2], strict=True)]
     return {
         "times": [round(float(t), 9) for t in sheet.times],
         "lines": [
-            {"count": line.shape[1], "at": [[packed(at[:, axis], step) for axis in range(axes)] for at in line]}
+            {"count": line.shape[1], "at": [[packed(at[:, axis], step) for axis in range(2)] for at in line]}
             for line in lines
         ],
     }

@@ -17,7 +17,7 @@ from mbd.view.packing import finite, packed, side, step_of
 from mbd.view.plots import QUANTITIES, scale, stretches
 from mbd.view.scene import scene
 from mbd.view.style import CYCLE
-from mbd.view.template import filled, written
+from mbd.view.template import filled, part, written
 
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
@@ -31,8 +31,14 @@ LEAST, MOST = 240, 6000
 """Fewest and most pictures of a page, for very short and very long runs."""
 
 
-SCRIPTS = ("data.js", "stage.js", "around.js", "charts.js", "controls.js")
+PLANAR = ("data.js", "stage.js", "flat.js", "charts.js", "controls.js")
+SPATIAL = (
+    "data.js", "stage.js", "facets.js", "depth.js", "space.js", "floor.js", "camera.js", "charts.js", "controls.js",
+)  # fmt: skip
 """Parts of the page's script, joined into one function."""
+
+LARGEST = 950_000
+"""Characters of a spatial page, beyond which it has fewer pictures per second."""
 
 
 def write(run: Trajectory, path: str | Path) -> Path:
@@ -41,14 +47,32 @@ def write(run: Trajectory, path: str | Path) -> Path:
 
 
 def html(run: Trajectory) -> str:
-    """The page as text."""
-    return filled("player", content(run), {"<!--title-->": escape(run.name)}, SCRIPTS)
+    """The page as text; only that of a spatial mechanism has a camera."""
+    count = pictures(run)
+    text, spatial = _html(run, count)
+    while spatial and len(text) > LARGEST and count > LEAST:
+        count = max(int(0.9 * count * LARGEST / len(text)), LEAST)
+        text, _ = _html(run, count)
+    return text
 
 
-def content(run: Trajectory) -> dict[str, Any]:
+def _html(run: Trajectory, count: int) -> tuple[str, bool]:
+    """The page with so many pictures, and whether it is spatial."""
+    data, title = content(run, count), {"<!--title-->": escape(run.name)}
+    if not data["spatial"]:
+        return filled("player", data, {**title, "<!--camera-->": ""}, PLANAR), False
+    buttons = {"<!--camera-->": part("player", "camera.html")}
+    return filled("player", data, {**title, **buttons}, SPATIAL, ("page.css", "camera.css")), True
+
+
+def pictures(run: Trajectory) -> int:
+    """How many pictures a page has, besides those at events."""
+    return int(np.clip(round(RATE * float(run.time[-1] - run.time[0])), LEAST, MOST))
+
+
+def content(run: Trajectory, count: int) -> dict[str, Any]:
     """Everything the page draws, as plain lists; series are packed by `packed`."""
-    duration = float(run.time[-1] - run.time[0])
-    picture = scene(run, int(np.clip(round(RATE * duration), LEAST, MOST)))
+    picture = scene(run, count)
     return {
         "name": run.name,
         "time": [round(float(t), 9) for t in picture.instants.time],

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +13,7 @@ from mbd.arrays import Matrix, Vector
 from mbd.results.names import AXES
 from mbd.view.instants import Instants
 from mbd.view.scenery import FIT, Ground, Scenery, plane_of_motion, scenery
+from mbd.view.solids import Hinge, Solid, hinges, solids
 
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
@@ -47,7 +48,9 @@ class Scene:
     segments : (body, numbers of its points); masses : mass of each body that has one [kg]
     around : grounds that the model has, wheels, blades; grounds : planes at rest, those that only the motion shows too
     markers : numbers of the points that are shown with their names
-    spatial : whether anything moves out of the x–y plane
+    spatial : whether anything moves out of the x–y plane, or could
+    solids, hinges : bodies and axes of joints of a spatial mechanism
+    turn : from ground axes to those of the scene (3, 3)
     """
 
     instants: Instants
@@ -61,6 +64,9 @@ class Scene:
     pushes: tuple[Push, ...]
     markers: tuple[int, ...]
     spatial: bool
+    solids: tuple[Solid, ...] = ()
+    hinges: tuple[Hinge, ...] = ()
+    turn: Matrix = field(default_factory=lambda: np.eye(3))
 
 
 def scene(run: Trajectory, count: int) -> Scene:
@@ -81,7 +87,8 @@ def scene(run: Trajectory, count: int) -> Scene:
     positions = raw @ turn.T
     touches = tuple(_touches(run, turn))
     depth = positions[:, :, 2]
-    spatial = bool(points) and float(np.ptp(depth)) > 1e-9 * max(1.0, float(np.ptp(positions)))
+    bodies_seen, axes = solids(run, instants, turn), hinges(run, instants, turn)
+    deep = bool(points) and float(np.ptp(depth)) > 1e-9 * max(1.0, float(np.ptp(positions)))
     masses = {
         body: run.parameters[f"{body}.mass"] for body, _ in segments if run.parameters.get(f"{body}.mass", 0.0) > 0.0
     }
@@ -90,7 +97,10 @@ def scene(run: Trajectory, count: int) -> Scene:
     named = tuple(number[name] for name in markers)
     pushes = tuple(_pushes(run, instants, turn, around))
     grounds = (*around.grounds, *shown)
-    return Scene(instants, points, positions, segments, masses, around, grounds, touches, pushes, named, spatial)
+    return Scene(
+        instants, points, positions, segments, masses, around, grounds, touches, pushes, named,
+        deep or bool(bodies_seen or axes), bodies_seen, axes, turn,
+    )  # fmt: skip
 
 
 def _lines(members: Sequence[str]) -> list[Sequence[str]]:

@@ -106,7 +106,7 @@ def scenery(run: Trajectory, instants: Instants, turn: Matrix, points: NDArray[n
     grounds, decks, sheets, wheels, blades = [], [], [], [], []
     directions: dict[str, tuple[Matrix, Matrix]] = {}
     for shape in run.facts.shapes:
-        if not _known(run, shape):
+        if shape.kind in ("solid", "hinge") or not _known(run, shape):
             continue
         if shape.kind == "plane":
             normal = turn @ np.array(shape.numbers[:3])

@@ -11,26 +11,34 @@ from typing import Any
 
 from mbd.results.archive import named_file, write_whole
 
-__all__ = ["filled", "written"]
+__all__ = ["filled", "part", "written"]
 
 
-def filled(folder: str, content: Any, parts: Mapping[str, str], scripts: Sequence[str] = ("page.js",)) -> str:
+def filled(
+    folder: str, content: Any, parts: Mapping[str, str], scripts: Sequence[str] = ("page.js",),
+    styles: Sequence[str] = ("page.css",),
+) -> str:  # fmt: skip
     """The page of a folder of `mbd.view`.
 
-    content : what its script draws, as plain lists; parts : texts by the mark they replace; scripts : joined in order
+    content : what its script draws, as plain lists; parts : texts by the mark they replace; scripts, styles : joined in
+    order
     """
-    place = resources.files("mbd.view") / folder
 
     def text(name: str) -> str:
-        return place.joinpath(name).read_text(encoding="utf-8")
+        return part(folder, name)
 
     known = {
         **parts,
-        "/*style*/": text("page.css"),
+        "/*style*/": "".join(text(name) for name in styles),
         "/*data*/": json.dumps(content, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),
         "/*script*/": "".join(text(name) for name in scripts),
     }
     return re.sub("|".join(map(re.escape, known)), lambda mark: known[mark.group()], text("page.html"))
+
+
+def part(folder: str, name: str) -> str:
+    """A file of a folder of `mbd.view` as text."""
+    return (resources.files("mbd.view") / folder).joinpath(name).read_text(encoding="utf-8")
 
 
 def written(page: str, path: str | Path) -> Path:

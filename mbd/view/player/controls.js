@@ -82,7 +82,7 @@ function fill() {
   for (const s of speeds) el("speed").append(new Option(`${+s.toPrecision(3)}\u00D7`, s, false, s === natural));
   state.speed = natural;
   Object.assign(el("time"), { min: first, max: last });
-  el("hint").textContent = run.points.length ? `space: play \u00B7 \u2190 \u2192: step \u00B7 \u2191 \u2193: events \u00B7 click a joint: trace${run.spatial ? " \u00B7 drag: orbit" : ""}` : "";
+  el("hint").textContent = run.points.length ? `space: play \u00B7 \u2190 \u2192: step \u00B7 \u2191 \u2193: events \u00B7 click a joint: trace${cameraHint}` : "";
 }
 function choosePoints() { // feet of a walker, or the last point of the mechanism
   const moving = run.points.map((_, k) => k).filter((k) => !fixed[k]);
@@ -120,14 +120,13 @@ function listen() {
       const dx = event.clientX - drag.x, dy = event.clientY - drag.y;
       if (!drag.moved && Math.hypot(dx, dy) < 4) return;
       drag = { x: event.clientX, y: event.clientY, moved: true };
-      if (run.spatial && !event.shiftKey) { camera.yaw += dx * 0.008; camera.pitch = Math.min(Math.max(camera.pitch + dy * 0.008, -1.57), 1.57); survey(); }
-      else { camera.dx += dx; camera.dy += dy; }
+      dragged(dx, dy, event);
       state.dirty = true;
     } else { const k = nearest(event); if (k !== state.hover) { state.hover = k; state.dirty = true; } }
   });
   stage.addEventListener("pointerup", (event) => { if (drag && !drag.moved) { const k = nearest(event); if (k >= 0) toggleTrace(k); } drag = null; });
   stage.addEventListener("wheel", (event) => { event.preventDefault(); camera.zoom = Math.min(Math.max(camera.zoom * Math.exp(-event.deltaY * 0.0012), 0.05), 50); state.dirty = true; }, { passive: false });
-  stage.addEventListener("dblclick", () => { Object.assign(camera, { yaw: -0.6, pitch: 0.42, zoom: 1, dx: 0, dy: 0 }); if (run.points.length) survey(); state.dirty = true; });
+  stage.addEventListener("dblclick", resetCamera);
   addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey || event.target.tagName === "SELECT") return;
     const step = event.shiftKey ? span / 20 : span / Math.max(time.length - 1, 1);
@@ -145,7 +144,7 @@ function listen() {
 readColors();
 fill();
 choosePoints();
-if (run.points.length) { survey(); el("follow").checked = el("ghosts").checked = path.width > 0 && path.all[2] - path.all[0] > 2.2 * path.width; }
+if (run.points.length) { survey(); el("follow").checked = el("ghosts").checked = travels(); }
 el("about").open = run.events.length < 6;
 chooseChart(0);
 warnOfAliasing();

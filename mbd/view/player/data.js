@@ -17,7 +17,7 @@ for (const push of run.pushes) { push.at = push.at.map((axis) => unpack(axis)); 
 for (const deck of run.decks) for (const part of ["at", "normal", "along"]) deck[part] = deck[part].map((axis) => unpack(axis));
 for (const wheel of run.wheels) { for (const part of ["at", "spoke", "down"]) wheel[part] = wheel[part].map((axis) => unpack(axis)); wheel.radius = unpack(wheel.radius); }
 for (const blade of run.blades) for (const part of ["at", "along"]) blade[part] = blade[part].map((axis) => unpack(axis));
-for (const sheet of run.sheets) for (const line of sheet.lines) line.at = line.at.map((axes) => axes.map((axis) => unpack(axis, line.count)));
+for (const sheet of run.sheets) for (const line of sheet.lines || []) line.at = line.at.map((axes) => axes.map((axis) => unpack(axis, line.count)));
 for (const chart of run.charts) for (const line of chart.series) line.values = unpack(line.values);
 
 const instants = []; // events that happen at one time belong together
@@ -29,13 +29,13 @@ for (const event of run.events) {
 for (const group of instants) group.events.sort((a, b) => (a.kind > b.kind) - (a.kind < b.kind)); // closed, event, opened
 
 const state = { t: first, playing: false, speed: 1, chart: 0, over: -1, traced: new Set(), hover: -1, stamp: 0, dirty: true };
-const camera = { yaw: -0.6, pitch: 0.42, zoom: 1, dx: 0, dy: 0 };
+const camera = { zoom: 1, dx: 0, dy: 0 };
 
 function locate(t, times = time) { // the interval that holds t: at a switch, the one after it
   let low = 0, high = times.length - 1;
   while (high - low > 1) { const mid = (low + high) >> 1; if (times[mid] <= t) low = mid; else high = mid; }
   const step = times[high] - times[low];
-  return { i: low, j: high, w: step > 0 ? Math.min(Math.max((t - time[low]) / step, 0), 1) : 1 };
+  return { i: low, j: high, w: step > 0 ? Math.min(Math.max((t - times[low]) / step, 0), 1) : 1 };
 }
 const mix = (values, p) => values[p.i] + p.w * (values[p.j] - values[p.i]);
 

@@ -1,0 +1,68 @@
+"""What pictures of spatial mechanisms show of bodies and joints: how bodies are turned, where hinges lie.
+
+A planar mechanism has none of it. The results are not listed, and traced when a picture asks for them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import partial
+from typing import TYPE_CHECKING
+
+from mbd.bodies.algebra import rotate
+from mbd.bodies.base import Body, Frame
+from mbd.bodies.ground import Ground
+from mbd.bodies.link import Link
+from mbd.bodies.mass import inertia_matrix
+from mbd.bodies.values import Vector3
+from mbd.equations.outputs import AXES, Outputs
+from mbd.equations.shapes import Shape, drawn
+from mbd.joints.base import Joint
+from mbd.scope import Scope, Triple
+
+if TYPE_CHECKING:
+    from mbd.description import Description
+
+__all__ = ["offer_solids", "solids_of"]
+
+
+def solids_of(model: Description) -> tuple[Shape, ...]:
+    """Bodies with moments of inertia about all axes that are no links, and the axes about which joints turn."""
+    bodies = [
+        Shape("solid", body.name, place=body.center.full_name, numbers=(mass, *moments))
+        for body, mass, moments in _solids(model)
+    ]
+    return (*bodies, *(Shape("hinge", name, place=frame.full_name) for name, frame, _ in _hinges(model.joints)))
+
+
+def offer_solids(outputs: Outputs, scope: Scope, model: Description) -> None:
+    """The first and second axis of each body, the axis of each hinge, in ground axes."""
+
+    def direction(frame: Frame, axis: Vector3) -> Triple:
+        return rotate(scope.frame(frame).rotation, axis)
+
+    for body, _, _ in _solids(model):
+        for what, axis in (("first", (1.0, 0.0, 0.0)), ("second", (0.0, 1.0, 0.0))):
+            outputs.triple(drawn(body.name, what), partial(direction, body.origin, axis), AXES, listed=False)
+    for name, frame, axis in _hinges(model.joints):
+        outputs.triple(drawn(name, "axis"), partial(direction, frame, axis), AXES, listed=False)
+
+
+def _solids(model: Description) -> Iterable[tuple[Body, float, tuple[float, ...]]]:
+    """Body, mass and (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about its center."""
+    for body in model.bodies.values():
+        fields, inertia = body.fields(), getattr(body, "inertia", 0.0)
+        if isinstance(body, Ground | Link) or isinstance(inertia, float):
+            continue
+        (xx, xy, xz), (_, yy, yz), (_, _, zz) = inertia_matrix(inertia, fields.__getitem__)
+        yield body, fields["mass"], tuple(float(moment) for moment in (xx, yy, zz, xy, xz, yz))
+
+
+def _hinges(joints: Iterable[Joint]) -> Iterable[tuple[str, Frame, Vector3]]:
+    """Name, frame and direction in it of every axis about which a joint turns; of a cross joint both."""
+    for joint in joints:
+        axis, second = getattr(joint, "axis", None), getattr(joint, "second_axis", None)
+        if axis is not None and any(label.unit == "rad" for label in joint.labels):
+            yield (joint.name if second is None else f"{joint.name}.first"), joint.parent, axis
+        if second is not None:
+            yield f"{joint.name}.second", joint.child, second

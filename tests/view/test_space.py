@@ -1,0 +1,225 @@
+"""Spatial pages and pictures: solids, the camera and the points obey the mechanics and the law of projection."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+
+import mbd
+from mbd.view import page as pages
+from mbd.view.camera import FIRST, VIEWS, camera
+from mbd.view.forms import equal_inertia, mesh
+from mbd.view.posture import instant
+from mbd.view.scene import scene
+from mbd.view.solids import quaternions, rotations
+from tests.view.test_page import CHROMIUM, Elements, unpacked
+
+ANGLE = st.floats(-3.2, 3.2)
+PIN, TIP = (0.02, 0.25, -0.03), (0.0, -0.25, 0.0)
+
+
+@cache
+def pendulum() -> mbd.Trajectory:
+    """Two bodies on cross joints, in gravity that is not along an axis."""
+    model = mbd.Model("double pendulum", gravity=(1.0, -2.0, -9.0))
+    upper = mbd.RigidBody("left upper", 2.0, (0.05, 0.02, 0.04, 0.005, 0.0, 0.002), center=(0.01, 0.02, 0.03))
+    lower = mbd.RigidBody("right lower", **mbd.cylinder(1.0, 0.06, 0.6, axis="y").body)
+    model.connect(
+        mbd.Universal("shoulder", model.ground.origin, upper.point(*PIN, name="pin")),
+        mbd.Universal("elbow", upper.point(*TIP, name="tip"), lower.point(0.0, 0.3, 0.0, name="top")),
+    )
+    start = mbd.assemble(model, position={"shoulder.first": 0.9, "elbow.second": -0.4})
+    return mbd.simulate(model, start, dt=5e-3, until=0.25, backend="python")
+
+
+def page(run: mbd.Trajectory, folder: Path) -> tuple[str, dict]:
+    text = run.page(folder / "page.html").read_text(encoding="utf-8")
+    return text, json.loads(Elements(text).scripts[0])
+
+
+@given(ANGLE, ANGLE)
+def test_the_camera_turns_and_changes_no_distance(yaw, pitch):
+    rows = camera(yaw, pitch)
+    np.testing.assert_allclose(rows @ rows.T, np.eye(3), atol=1e-14)
+    assert (
+        np.linalg.det(rows) == pytest.approx(1.0) and rows[0, 1] == 0.0 and rows[1, 1] == pytest.approx(np.cos(pitch))
+    )
+
+
+def test_views_look_along_the_axes_they_name():
+    toward = {name: camera(*angles)[2] for name, angles in VIEWS.items()}
+    np.testing.assert_allclose([toward["front"], toward["side"], toward["top"]], np.eye(3)[[0, 2, 1]], atol=1e-15)
+    np.testing.assert_allclose(camera(*VIEWS["side"]), np.eye(3), atol=0.0)
+
+
+@given(st.floats(0.1, 10.0), st.tuples(*[st.floats(0.05, 2.0)] * 3), st.tuples(ANGLE, ANGLE))
+def test_a_body_is_drawn_as_the_solid_that_has_its_inertia(mass, sides, angles):
+    a, b, c = np.square(sides)
+    turn = camera(*angles)
+    wanted = turn @ np.diag(mass * np.array([b + c, a + c, a + b]) / 12.0) @ turn.T
+    form = equal_inertia(mass, [*np.diag(wanted), wanted[0, 1], wanted[0, 2], wanted[1, 2]])
+    assert form is not None
+    squares, round_ = form.half**2, form.kind != "box"
+    if form.kind == "ball":
+        second = np.full(3, squares[0] / 5.0)
+    else:
+        second = squares / np.array([4.0, 4.0, 3.0] if round_ else [3.0] * 3)
+    found = form.axes @ np.diag(mass * (second.sum() - second)) @ form.axes.T
+    np.testing.assert_allclose(found, wanted, atol=3e-3 * np.max(np.abs(wanted)))
+    assert np.linalg.det(form.axes) == pytest.approx(1.0)
+
+
+def test_solids_of_the_geometry_words_are_drawn_as_they_are():
+    def drawn(solid):
+        form = equal_inertia(solid.mass, [*solid.inertia, 0.0, 0.0, 0.0])
+        return form.kind, np.abs(form.axes) @ form.half
+
+    for solid, kind, half in (
+        (mbd.box(2.0, (1.0, 2.0, 3.0)), "box", [0.5, 1.0, 1.5]),
+        (mbd.cylinder(3.0, 0.5, 2.0, "x"), "cylinder", [1.0, 0.5, 0.5]),
+        (mbd.sphere(1.0, 0.4), "ball", [0.4, 0.4, 0.4]),
+    ):
+        found = drawn(solid)
+        assert found[0] == kind
+        np.testing.assert_allclose(found[1], half, rtol=1e-12)
+    assert drawn(mbd.disk(1.0, 0.3, "y"))[0] == "cylinder"
+    assert equal_inertia(0.0, [1.0] * 6) is None and equal_inertia(1.0, [0.0] * 6) is None
+
+
+@pytest.mark.parametrize(
+    ("kind", "volume"), [("box", 8.0), ("cylinder", 2 * np.pi), ("ball", 4 * np.pi / 3), ("capsule", 10 * np.pi / 3),
+                         ("cone", 2 * np.pi / 3)]
+)  # fmt: skip
+def test_facets_enclose_the_solid_and_look_outward(kind, volume):
+    form = mesh(kind)
+    corners = form.at[form.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    np.testing.assert_allclose(normals.sum(axis=0), 0.0, atol=1e-13)
+    assert np.all(np.sum(normals * form.normal[form.faces].mean(axis=1), axis=1) > 0.0)
+    assert np.sum(corners[:, 0] * normals) / 6.0 == pytest.approx(volume, rel=0.07)
+    np.testing.assert_allclose(np.linalg.norm(form.normal, axis=1), 1.0, atol=1e-12)
+
+
+@given(st.integers(0, 2**32 - 1))
+@settings(max_examples=20)
+def test_quaternions_are_the_rotations_and_do_not_jump(seed):
+    steps = np.random.default_rng(seed).normal(scale=0.3, size=(60, 3))
+    R = [np.eye(3)]
+    for step in steps:
+        R.append(R[-1] @ camera(step[0], step[1]).T)
+    q = quaternions(np.array(R))
+    np.testing.assert_allclose(rotations(q), R, atol=1e-12)
+    assert np.all(np.sum(q[1:] * q[:-1], axis=1) > 0.0)
+
+
+def test_points_and_solids_lie_where_the_run_has_them_in_every_view():
+    run = pendulum()
+    picture = scene(run, 40)
+    time = picture.instants.time
+    places = {"left upper": np.array([PIN, TIP]) - [0.01, 0.02, 0.03], "right lower": np.array([[0.0, 0.3, 0.0]])}
+    names = {"left upper": ["pin", "tip"], "right lower": ["top"]}
+    assert picture.spatial and [solid.form.kind for solid in picture.solids] == ["box", "cylinder"]
+    true = run.at(time)
+    for solid in picture.solids:
+        R = rotations(solid.turn) @ solid.form.axes.T
+        for place, name in zip(places[solid.name], names[solid.name], strict=True):
+            found = solid.center + R @ place
+            ground = true[f"{solid.name}.{name}"]
+            np.testing.assert_allclose(found, ground @ picture.turn.T, atol=1e-11)
+            number = picture.points.index(f"{solid.name}.{name}")
+            for yaw, pitch in (FIRST, *VIEWS.values()):
+                seen = picture.positions[:, number] @ camera(yaw, pitch).T
+                np.testing.assert_allclose(np.linalg.norm(seen, axis=1), np.linalg.norm(ground, axis=1), atol=1e-11)
+    g = np.array([run.parameters.get(f"gravity.{axis}", 0.0) for axis in "xyz"])
+    np.testing.assert_allclose((camera(*FIRST) @ picture.turn @ g)[0], 0.0, atol=1e-12)
+
+
+def test_hinges_lie_along_the_axes_of_their_joints():
+    run = pendulum()
+    picture = scene(run, 10)
+    axes = {hinge.name: hinge.axis for hinge in picture.hinges}
+    assert list(axes) == ["shoulder.first", "shoulder.second", "elbow.first", "elbow.second"]
+    np.testing.assert_allclose(axes["shoulder.first"], np.tile(picture.turn[:, 2], (len(picture.instants.time), 1)))
+    np.testing.assert_allclose(np.sum(axes["elbow.first"] * axes["elbow.second"], axis=1), 0.0, atol=1e-12)
+    upper = picture.solids[0]
+    own = rotations(upper.turn) @ upper.form.axes.T
+    np.testing.assert_allclose(axes["elbow.first"], own[:, :, 2], atol=1e-12)
+    np.testing.assert_allclose(axes["shoulder.second"], own[:, :, 0], atol=1e-12)
+
+
+def test_the_page_holds_poses_and_its_own_small_renderer(tmp_path):
+    text, data = page(pendulum(), tmp_path)
+    count, picture = len(data["time"]), scene(pendulum(), pages.pictures(pendulum()))
+    for held, solid in zip(data["solids"], picture.solids, strict=True):
+        turn = np.array([unpacked(axis, count) for axis in held["turn"]]).T
+        np.testing.assert_allclose(turn, solid.turn, atol=1e-4)
+        place = np.array([unpacked(axis, count) for axis in held["at"]]).T
+        np.testing.assert_allclose(place, solid.center, atol=held["at"][0]["step"])
+    assert [solid["side"] for solid in data["solids"]] == ["left", "right"] and data["views"]["reset"] == list(FIRST)
+    assert set(data["meshes"]) == {"box", "capsule", "cylinder"}
+    assert 'id="camera"' in text and "webgl" in text and len(text) < 300_000
+
+
+def test_a_planar_page_has_none_of_it(tmp_path):
+    model = mbd.Model("planar")
+    block = mbd.RigidBody("block", **mbd.box(1.0, (0.2, 0.3, 0.4)).body)
+    model.connect(mbd.Revolute("pin", model.ground.origin, block.point(0.0, 0.15)))
+    run = instant(model, mbd.assemble(model, position={"pin.angle": 0.4}))
+    text, data = page(run, tmp_path)
+    assert not run.facts.shapes and not data["spatial"] and not {"solids", "meshes", "views"} & set(data)
+    assert not any(word in text for word in ("webgl", 'id="camera"', "#camera", "addShadow", "<!--camera-->"))
+
+
+def test_a_long_run_has_fewer_pictures_instead_of_a_large_page(tmp_path, monkeypatch):
+    full = len(page(pendulum(), tmp_path)[1]["time"])
+    monkeypatch.setattr(pages, "LEAST", 30)
+    monkeypatch.setattr(pages, "LARGEST", 110_000)
+    monkeypatch.setattr(pages, "RATE", 1600.0)
+    text, data = page(pendulum(), tmp_path)
+    assert len(text) <= 110_000 and 30 <= len(data["time"]) < full
+
+
+def test_a_file_keeps_solids_and_hinges(tmp_path):
+    run = pendulum()
+    loaded = mbd.load(run.save(tmp_path / "run"))
+    assert loaded.page(tmp_path / "loaded.html").read_bytes() == run.page(tmp_path / "run.html").read_bytes()
+    few = scene(mbd.load(run.save(tmp_path / "few", names=["shoulder.first"])), 10)
+    assert not few.points and not few.spatial
+
+
+@pytest.mark.slow
+def test_the_camera_turns_in_a_browser(tmp_path):
+    """Needs playwright and Chromium; drags, keys, buttons and the wheel move the camera, nothing is logged."""
+    api = pytest.importorskip("playwright.sync_api")
+    path = pendulum().page(tmp_path / "page.html")
+    with api.sync_playwright() as play:
+        browser = play.chromium.launch(executable_path=str(CHROMIUM), args=["--no-sandbox", "--disable-gpu"])
+        context = browser.new_context(offline=True, reduced_motion="reduce", viewport={"width": 390, "height": 844})
+        tab, complaints = context.new_page(), []
+        tab.on("console", lambda message: complaints.append(message.text))
+        tab.on("pageerror", lambda error: complaints.append(str(error)))
+        tab.goto(path.as_uri() + "#t=0.2")
+        tab.click("#camera [data-move=side]")
+        assert tab.inner_text("#seen") == "seen from the side"
+        tab.focus("#scene")
+        tab.keyboard.press("3")
+        assert tab.inner_text("#seen") == "seen from the top"
+        tab.keyboard.press("0")
+        box = tab.locator("#scene").bounding_box()
+        tab.mouse.move(box["x"] + 20, box["y"] + 200)
+        tab.mouse.down()
+        tab.mouse.move(box["x"] + 120, box["y"] + 200, steps=4)
+        tab.mouse.up()
+        assert tab.inner_text("#seen") == "turned 11°, raised 24°"
+        tab.wait_for_timeout(200)
+        pixels = "c.getContext('2d').getImageData(0, 0, c.width, c.height).data"
+        ink = f"c => {pixels}.filter((x, i) => i % 4 == 3 && x).length"
+        assert tab.eval_on_selector("#scene", ink) > 2000
+        assert tab.evaluate("document.documentElement.scrollWidth") <= 390
+        browser.close()
+    assert complaints == []
