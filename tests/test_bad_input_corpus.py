@@ -168,7 +168,7 @@ def right(name: str) -> dict[str, Any]:
         elif each.default is each.empty and each.kind not in (each.VAR_POSITIONAL, each.VAR_KEYWORD):
             assert each.name in EXAMPLES, f"mbd.{name}: give an example of {each.name!r} in EXAMPLES"
             found[each.name] = EXAMPLES[each.name]
-    if "model" in found and name not in {"simulate", *GAITS}:  # whose runs are longer
+    if "model" in found and name not in {"simulate", "batch", *GAITS}:  # whose runs are longer
         found["backend"] = "python"
     return found | ({"dt": 0.1} if (name, "dt") in OWN else {})
 
