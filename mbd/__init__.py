@@ -89,6 +89,7 @@ if TYPE_CHECKING:
     from mbd.gait.branch import Branch as Branch, branch as branch
     from mbd.gait.cycle import LimitCycle as LimitCycle
     from mbd.gait.find import GaitSearch as GaitSearch, find_gait as find_gait
+    from mbd.gait.follow import PointCurve as PointCurve
     from mbd.gait.limit_cycle import limit_cycle as limit_cycle
     from mbd.integrators import (
         HHT as HHT,
@@ -184,6 +185,7 @@ _HOMES = {
     "mbd.gait.branch": "Branch branch",
     "mbd.gait.cycle": "LimitCycle",
     "mbd.gait.find": "GaitSearch find_gait",
+    "mbd.gait.follow": "PointCurve",
     "mbd.gait.limit_cycle": "limit_cycle",
     "mbd.integrators": "HHT GeneralizedAlpha Newmark RadauIIA RungeKutta853",
     "mbd.joints": "Cylindrical Free Planar Prismatic Revolute Screw Spherical Translation Universal Weld",

@@ -80,7 +80,8 @@ BESIDE = {
     "made by others, not by users": (
         mbd.Accuracy, mbd.Batch, mbd.Criteria, mbd.Effects, mbd.Failure, mbd.Fit, mbd.GaitReport, mbd.Known,
         mbd.LimitCycle, mbd.Linearization, mbd.Mobility, mbd.PenaltyParameters, mbd.Replay, mbd.Sensitivities,
-        mbd.State, mbd.StateSpace, mbd.Sweep, mbd.Trajectory, mbd.Branch, mbd.GaitSearch, mbd.Optimum,
+        mbd.State, mbd.StateSpace, mbd.Sweep, mbd.Trajectory, mbd.Branch, mbd.PointCurve, mbd.GaitSearch,
+        mbd.Optimum,
     ),
     "take a model and a run: tests of their own": (
         mbd.accuracy, mbd.assemble, mbd.batch, mbd.criteria, mbd.effects, mbd.fit, mbd.gait_report, mbd.limit_cycle,

@@ -136,7 +136,7 @@ RESULTS = {
     "PenaltyParameters", "Replay", "Sensitivities", "State", "StateSpace", "Sweep", "Trajectory",
 }  # fmt: skip
 """Values that are handed to users, who make none."""
-RESULTS |= {"Branch", "GaitSearch", "Optimum"}
+RESULTS |= {"Branch", "GaitSearch", "Optimum", "PointCurve"}
 
 STUDIES = {"accuracy", "criteria", "effects", "fit", "optimize", "sensitivities"}
 """Words whose runs take seconds: what is no number at all is tried."""

@@ -14,6 +14,7 @@ from mbd.errors import MbdError, ModelError, UnknownNameError, nearest
 from mbd.gait.continuation import QUICK, BranchPoint, Continuation, Corrected
 from mbd.gait.cycle import LimitCycle
 from mbd.gait.derivatives import parameter_value
+from mbd.gait.follow import PointCurve, follow
 from mbd.gait.limits import changed_events, limit_between, limit_beyond
 from mbd.gait.map_derivative import Measured, map_derivative, measured
 from mbd.gait.margins import Margin, Margins, least_margins, margin_points, watched_feet
@@ -110,6 +111,25 @@ class Branch:
                 f"point must be a doubling of this branch, such as branch.points('doubling')[0], not {shown(point)}"
             )
         return doubled(self.given, point, self._at(point.point))
+
+    def follow(self, point: SpecialPoint, parameter: str, to: float, *, steps: int = 20) -> PointCurve:
+        """The special point over a second parameter, ``slopes.follow(doubling, "hip.mass", to=15.0)``.
+
+        Folds, doublings, tori, branch points, pulls, slips, and limits at which events change, such as scuffs.
+
+        Parameters
+        ----------
+        point : of this branch
+        parameter : another parameter, or function of parameters
+        to : its value at which the curve ends
+        steps : points between; more where the next one is not found
+
+        Raises
+        ------
+        ModelError, UnknownNameError
+            for arguments that cannot be meant.
+        """
+        return follow(self, point, parameter, to, steps)
 
     def _at(self, point: BranchPoint) -> LimitCycle:
         """A gait of the branch to go on from."""
@@ -233,7 +253,7 @@ def _begun(
     if to == value:
         raise ModelError(f"to={to!r} is the value of {parameter!r} at which the gait was found; give another")
     width = abs(float(to) - value)
-    given = Continuation(gait.map, gait.chart.section, parameter, gait.parameters, width, gait.given.tol)
+    given = Continuation(gait.map, gait.chart.section, parameter, gait.parameters, width, gait.given.tol, friction)
     found = measured(gait.map, gait.chart, np.zeros(gait.chart.size), given.with_value(value))
     assert isinstance(found, Measured)
     first = given.point(Corrected(gait.state, value, found, 0), None)

@@ -74,7 +74,7 @@ class Corrected:
 
 @dataclass(eq=False)
 class Continuation:
-    """What all points of a branch share. width : σ; tol : of the coordinates"""
+    """What all points of a branch share. width : σ; tol : of the coordinates; friction : of the ground, or None"""
 
     map: ReturnMap
     section: Section
@@ -82,6 +82,7 @@ class Continuation:
     values: Mapping[str, float]
     width: float
     tol: float
+    friction: float | None = None
 
     def with_value(self, value: float) -> dict[str, float]:
         """The parameters with another value of the one that varies."""

@@ -32,11 +32,12 @@ BY_OUTCOME = {"scuffs": "scuff", "falls": "fall", "misses": "lost event"}
 
 
 def limit_between(
-    given: Continuation, last: BranchPoint, ds: float, beyond: Arrival | None = None
+    given: Continuation, last: BranchPoint, ds: float, beyond: Arrival | None = None, back: float = 0.0
 ) -> SpecialPoint | None:
     """The point between a gait and the place ds along its tangent up to which the events are those of the gait.
 
     beyond : what the walk comes to at ds, where that is known
+    back : distance from the limit at which its `before` lies, at least that of the gait given
     """
     low, high, good = 0.0, ds, None
     for _ in range(HALVINGS):
@@ -55,7 +56,19 @@ def limit_between(
     if not kind:
         return None
     point = _point(given, last, good)
-    return SpecialPoint(kind, point.value, point, (high - low + given.tol) * given.width, what)
+    error = (high - low + given.tol) * given.width
+    return SpecialPoint(kind, point.value, point, error, what, _before(given, last, low - back if back else 0.0))
+
+
+def _before(given: Continuation, last: BranchPoint, place: float) -> BranchPoint:
+    """A gait of the branch at a place along the tangent; the given one where there is none."""
+    corrected = _corrected(given, last, place) if place else None
+    if not isinstance(corrected, Corrected) or changed_events(last.events, corrected.found.arrival.events):
+        return last
+    try:
+        return given.point(corrected, given.whole(last))
+    except MbdError:
+        return last
 
 
 def limit_beyond(given: Continuation, last: BranchPoint) -> SpecialPoint | None:

@@ -11,14 +11,14 @@ branch point : ``det [P − 1, σ F_p; τᵀ]``; another branch crosses, such as
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from mbd.errors import MbdError
 from mbd.gait.continuation import BranchPoint, Continuation, Corrected
 
-__all__ = ["KINDS", "TESTS", "SpecialPoint", "special_points"]
+__all__ = ["KINDS", "TESTS", "SpecialPoint", "polished", "special_points"]
 
 ITERATIONS = 40
 """Evaluations of a test function between two points at most."""
@@ -37,6 +37,7 @@ class SpecialPoint:
     kind : one of `KINDS`; value : of the parameter; point : the gait there
     error : half the width of the bracket in which the parameter lies, and what the error of P makes of it
     what : the contact or event that it is about; '' of folds, doublings, tori and branch points
+    before : where the events of the walk change there, a gait of the branch before it
     """
 
     kind: str
@@ -44,6 +45,7 @@ class SpecialPoint:
     point: BranchPoint
     error: float
     what: str = ""
+    before: BranchPoint | None = field(default=None, repr=False)
 
     def __repr__(self) -> str:
         name = f"{self.kind} of {self.what!r}" if self.what else self.kind
@@ -121,10 +123,10 @@ def _located(
             b, fb, fa, side = middle, now, fa * (0.5 if side == 1 else 1.0), 1
         else:
             a, fa, fb, side = middle, now, fb * (0.5 if side == -1 else 1.0), -1
-    return _polished(given, one, middle, slope, test)
+    return polished(given, one, middle, slope, test)
 
 
-def _polished(
+def polished(
     given: Continuation, one: BranchPoint, place: float, slope: float, test: Callable[[BranchPoint], float]
 ) -> tuple[BranchPoint, float] | None:
     """The zero of a test function near a place along the tangent, and its error."""
@@ -143,7 +145,7 @@ def _polished(
         if abs(step) >= along:  # no more is to be had from these derivatives
             break
         along, last = abs(step), (place, now)
-        best = point, rate * abs(along) + abs(rate * point.multipliers.error / (slope or 1.0))
+        best = point, float(rate * along + abs(rate * point.multipliers.error / (slope or 1.0)))
         if rate * along <= LOCATED * given.width:
             break
         place += step

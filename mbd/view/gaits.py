@@ -17,8 +17,9 @@ from mbd.view.style import CYCLE, INK, NEUTRAL, as_label, tone
 if TYPE_CHECKING:
     from mbd.gait.branch import Branch
     from mbd.gait.cycle import LimitCycle
+    from mbd.gait.follow import PointCurve
 
-__all__ = ["branch", "cycle"]
+__all__ = ["branch", "cycle", "point_curve"]
 
 MARKS = {
     "fold": "s", "doubling": "o", "torus": "^", "branch point": "D", "scuff": "X", "graze": "X", "release": "v",
@@ -96,4 +97,18 @@ def branch(found: Branch, quantity: str, path: str | Path | None = None) -> Any:
         axes.set_ylabel(as_label(quantity if quantity not in UNITS else f"{quantity} [{UNITS[quantity]}]"))
         if found.special:
             axes.legend()
+    return figure
+
+
+def point_curve(found: PointCurve, path: str | Path | None = None) -> Any:
+    """The parameter of the branch at special points over the second parameter."""
+    first, second = found.parameters
+    with drawing(path, 6.4, 4.0) as figure:
+        axes = figure.subplots()
+        axes.plot(found[second], found[first], "-", color=tone(CYCLE[0]))
+        axes.plot(found[second], found[first], MARKS.get(found.kind, "o"), color=tone(CYCLE[1]), markersize=4,
+                  label=f"{found.kind} of {found.what}" if found.what else found.kind)  # fmt: skip
+        axes.set_xlabel(as_label(second))
+        axes.set_ylabel(as_label(first))
+        axes.legend()
     return figure

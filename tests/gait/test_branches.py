@@ -20,11 +20,10 @@ def mapped(first: str, second: str) -> mbd.Lagrangian:
     from sympy import Symbol, sympify
 
     x, y, clock = (mbd.Coordinate(name) for name in ("x", "y", "clock"))
-    p = Symbol("p")
-    model = mbd.Lagrangian(
-        "map", [x, y, clock], kinetic=(x.v**2 + y.v**2 + clock.v**2) / 2, potential=0 * p, parameters={p: 0.5}
-    )
-    names = {"x": x.q, "y": y.q, "p": p}
+    p, k = Symbol("p"), Symbol("k")
+    kinetic = (x.v**2 + y.v**2 + clock.v**2) / 2
+    model = mbd.Lagrangian("map", [x, y, clock], kinetic=kinetic, potential=0 * p * k, parameters={p: 0.5, k: 1.25})
+    names = {"x": x.q, "y": y.q, "p": p, "k": k}
     reset = {x.q: sympify(first, names), y.q: sympify(second, names), clock.q: 0.0, x.v: 0.0, y.v: 0.0, clock.v: 1.0}
     model.constrain(mbd.Event("tick", clock.q - 1.0, direction=1, reset=reset))
     return model
@@ -34,8 +33,9 @@ def cycle_of(first: str, second: str, p: float, x: float, y: float, model=None) 
     """The fixed point of a map."""
     model = mapped(first, second) if model is None else model
     start = mbd.assemble(model, {"x": x, "y": y}, {"clock": 1.0})
-    functions = {"scale": lambda value: {"p": value}}
-    return mbd.limit_cycle(model, start, section="tick", parameters={"scale": p}, functions=functions, dt=0.25)
+    functions = {"scale": lambda value: {"p": value}, "bend": lambda value: {"k": value}}
+    values = {"scale": p, "bend": 1.25}
+    return mbd.limit_cycle(model, start, section="tick", parameters=values, functions=functions, dt=0.25)
 
 
 def test_a_branch_goes_around_its_fold():
@@ -83,6 +83,47 @@ def test_an_event_that_no_longer_happens_is_located():
     back = mbd.branch(found.gait(0.3), "scale", 0.5, step=0.1)
     (new,) = back.points("new event")
     assert new.what == "gate" and abs(new.value - 0.36) < 1e-10 and "new event of 'gate' at 0.3" in repr(back)
+
+
+def test_special_points_are_followed_over_a_second_parameter(tmp_path):
+    """The fixed point k x² = p doubles at p = 1/k, and loses the gate at x = 0.6 where p = 0.36 k."""
+    model = mapped.__wrapped__("p + x - k*x**2", "0.3*y + 0.2*x")
+    x, clock = model.coordinates[0], model.coordinates[2]
+    model.constrain(mbd.Event("gate", x.q - 0.6 - (clock.q - 0.5) ** 2, direction=1))
+    found = mbd.branch(cycle_of("", "", 0.75, 0.775, 0.22, model), "scale", 0.9, step=0.1)
+    (doubling,) = found.points("doubling")
+    curve = found.follow(doubling, "bend", 1.6, steps=2)
+    assert len(curve) == 3 and np.max(np.abs(curve["scale"] - 1.0 / curve["bend"])) < 1e-9
+    curve.plot(tmp_path / "curve.png")
+    assert (tmp_path / "curve.png").stat().st_size > 10_000
+    assert repr(curve).startswith(
+        "map: doubling at scale = 0.8 at bend = 1.25, 0.571428571 at bend = 1.75; 3 points; rea"
+    )
+    down = mbd.branch(found.gait(0.75), "scale", 0.3, step=0.1)
+    (lost,) = down.points("lost event")
+    gates = down.follow(lost, "bend", 1.3, steps=1)
+    assert gates.what == "gate" and np.max(np.abs(gates["scale"] - 0.36 * gates["bend"])) < 1e-10
+    with pytest.raises(
+        mbd.ModelError, match="point must be one of this branch.*parameter 'scale' is that of the branch"
+    ):
+        down.follow(doubling, "scale", 1.3)
+
+
+@pytest.mark.slow
+def test_the_doubling_over_the_mass_of_the_hip_is_that_of_branches_at_other_masses():
+    sizes = case("f2-compass-gait-3deg").definition
+    model = compass(sizes)
+    start = standing(model, case("f2-compass-gait-3deg")["fixed point"].value, sizes["slope"])
+    gait = mbd.limit_cycle(
+        model, start, section="right foot", mirror=("left", "right"), parameters={"slope": sizes["slope"]},
+        functions=slope_of(sizes["g"]),
+    )  # fmt: skip
+    slopes = mbd.branch(gait, "slope", 0.105, friction=0.35)
+    for kind in ("doubling", "slip"):
+        (point,) = slopes.points(kind)
+        curve = slopes.follow(point, "hip.mass", 12.0, steps=4)
+        (there,) = mbd.branch(gait.at({"hip.mass": 12.0}), "slope", 0.105, friction=0.35).points(kind)
+        assert abs(curve["slope"][-1] - there.value) < 1e-9, kind
 
 
 def test_the_slope_at_which_a_foot_would_slip_is_that_at_which_friction_is_used_up():
