@@ -96,9 +96,7 @@ def test_special_points_are_followed_over_a_second_parameter(tmp_path):
     assert len(curve) == 3 and np.max(np.abs(curve["scale"] - 1.0 / curve["bend"])) < 1e-9
     curve.plot(tmp_path / "curve.png")
     assert (tmp_path / "curve.png").stat().st_size > 10_000
-    assert repr(curve).startswith(
-        "map: doubling at scale = 0.8 at bend = 1.25, 0.571428571 at bend = 1.75; 3 points; rea"
-    )
+    assert repr(curve).startswith("map: doubling at scale = 0.8 at bend = 1.25, 0.625 at bend = 1.6; 3 points; reached")
     down = mbd.branch(found.gait(0.75), "scale", 0.3, step=0.1)
     (lost,) = down.points("lost event")
     gates = down.follow(lost, "bend", 1.3, steps=1)
