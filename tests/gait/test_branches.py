@@ -102,7 +102,7 @@ def test_special_points_are_followed_over_a_second_parameter(tmp_path):
     gates = down.follow(lost, "bend", 1.3, steps=1)
     assert gates.what == "gate" and np.max(np.abs(gates["scale"] - 0.36 * gates["bend"])) < 1e-10
     with pytest.raises(
-        mbd.ModelError, match="point must be one of this branch.*parameter 'scale' is that of the branch"
+        mbd.ModelError, match="(?s)point must be one of this branch.*parameter 'scale' is that of the branch"
     ):
         down.follow(doubling, "scale", 1.3)
 
