@@ -57,6 +57,7 @@ DOORS = {
     "analysis.numerical": ("view",),
     "gait.branch": ("view",),
     "gait.cycle": ("view",),
+    "gait.follow": ("view",),
 }
 """Methods of the objects in users' hands that only call a later stage, and import it when they are called."""
 
