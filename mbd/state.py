@@ -138,17 +138,18 @@ class State:
             lines.append(f"  assembly moved {len(self.moved)} of these; farthest {far[0]!r} by {far[1]:.3g}")
         return "\n".join(lines)
 
-    def plot(self, path: str | Path | None = None, model: Any = None) -> Any:
+    def plot(self, path: str | Path | None = None, model: Any = None, view: Any = None) -> Any:
         """The mechanism at this state, drawn as on the page: bodies, joints, named points, the ground of contacts.
 
-        A spatial mechanism is seen from the side and a little from above, with gravity down the page. Needs no
-        display.
+        A spatial mechanism is seen from the side and a little from above, with gravity down the page, by parallel rays;
+        bodies are the solids of their mass and inertia. Needs no display.
 
         Parameters
         ----------
         path : file to save the picture in, such as 'start.png' or 'start.svg'
         model : of which it is a state; a state that was assembled, projected or the end of a run knows it, one made or
             changed by hand, copied or read from a file does not
+        view : of a spatial mechanism: 'front', 'side', 'top', or yaw about the vertical and pitch [rad]
 
         Returns
         -------
@@ -157,7 +158,8 @@ class State:
         Raises
         ------
         ModelError
-            without a model, for a state that is none of the model, and for a mechanism without bodies.
+            without a model, for a state that is none of the model, for a mechanism without bodies, and for a view that
+            is none.
         """
         from mbd.view.posture import drawn
 
@@ -165,7 +167,7 @@ class State:
         of = model if model is not None else known() if known is not None else None
         if of is None:
             raise ModelError("this state does not know its model any more: give it, as in state.plot(model=model)")
-        return drawn(of, self, path)
+        return drawn(of, self, path, view)
 
     def _repr_html_(self) -> str:
         from mbd.results.units import unit_of

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbd.results.ledger import SPENT
+from mbd.results.names import AXES
 from mbd.results.summary import facts
 from mbd.results.units import unit
 from mbd.view.geometry import geometry
@@ -144,8 +145,13 @@ def _is_force(name: str, run: Trajectory) -> bool:
 
 
 def _fastest(run: Trajectory) -> dict[str, Any] | None:
-    """The angle of a coordinate that turns fastest: name and greatest rate [rad/s]."""
+    """What turns fastest, an angle or a body in space: name and greatest rate [rad/s]."""
+    free = [name.removesuffix(".x") for name, _ in run.facts.velocities if name.endswith(".angular_velocity.x")]
     rates = {
+        name: float(np.max(np.linalg.norm([run[name + axis] for axis in AXES], axis=0), initial=0.0))
+        for name in free
+        if f"{name}.x" in run
+    } | {
         name: float(np.max(np.abs(run[f"{name}.rate"]), initial=0.0))
         for name, kind in run.facts.coordinates
         if kind == "rad" and f"{name}.rate" in run

@@ -14,15 +14,14 @@ from mbd.errors import ModelError
 from mbd.results.record import Record
 from mbd.state import State, malformed
 from mbd.trajectory import Trajectory
+from mbd.view.camera import angles_of, camera
 from mbd.view.plots import drawing
+from mbd.view.posture_in_space import draw_in_space
 from mbd.view.scene import Scene, scene, upright
 from mbd.view.scenery import Wheel
 from mbd.view.style import INK, NEUTRAL, as_label, color, tone
 
 __all__ = ["drawn", "instant"]
-
-YAW, PITCH = -0.6, 0.42
-"""From where a spatial mechanism is seen, as the page shows it first [rad]."""
 
 SOIL = "#B9C0C9"
 
@@ -63,27 +62,23 @@ def instant(model: Any, state: State) -> Trajectory:
     )  # fmt: skip
 
 
-def drawn(model: Any, state: State, path: str | Path | None = None) -> Any:
+def drawn(model: Any, state: State, path: str | Path | None = None, view: Any = None) -> Any:
     """The picture of a state; see `State.plot`."""
+    rows = camera(*angles_of(view))
     run = instant(model, state)
     picture = scene(run, 1)
     if not picture.points:
         raise ModelError(f"'{run.name}' has no bodies to draw")
-    places = picture.positions[0] @ _view(picture).T
-    rims = [_rim(wheel) @ _view(picture).T for wheel in picture.around.wheels]
-    extent = np.vstack([places, *rims])
-    low, high = extent.min(axis=0), extent.max(axis=0)
-    size = float(np.max(high - low)) or 1.0
-    left, below = (low + high) / 2.0 - ROOM * size
-    right, above = (low + high) / 2.0 + ROOM * size
+    rows = rows if picture.spatial else np.eye(3)
+    places = picture.positions[0] @ rows[:2].T
     with drawing(path, 5.6, 5.6) as figure:
         axes = figure.subplots()
-        _ground(axes, picture, left, right)
-        _scenery(axes, picture, rims, size)
-        _pivots(axes, model, run, picture)
-        _bodies(axes, picture, places)
+        if picture.spatial:
+            _frame(axes, draw_in_space(axes, picture, rows))
+        else:
+            _draw_in_plane(axes, picture, places)
+        _pivots(axes, model, run, rows)
         _markers(axes, picture, places)
-        axes.set(aspect="equal", xlim=(left, right), ylim=(below, above))
         axes.set_xlabel("[m]")
         axes.set_ylabel("[m]")
         closed = ", ".join(sorted(state.mode.closed))
@@ -92,17 +87,28 @@ def drawn(model: Any, state: State, path: str | Path | None = None) -> Any:
     return axes
 
 
-def _view(picture: Scene) -> Matrix:
-    """From the axes of the scene to the page (2, 3): x and y, or seen from the side and from above."""
-    if not picture.spatial:
-        return np.eye(3)[:2]
-    cy, sy, cp, sp = np.cos(YAW), np.sin(YAW), np.cos(PITCH), np.sin(PITCH)
-    return np.array([[cy, 0.0, sy], [sp * sy, cp, -sp * cy]])
+def _frame(axes: Any, extent: Matrix) -> tuple[float, float, float]:
+    """A square with some room around what is drawn; its left and right edge, and the size of what is drawn [m]."""
+    low, high = extent.min(axis=0), extent.max(axis=0)
+    size = float(np.max(high - low)) or 1.0
+    left, below = (low + high) / 2.0 - ROOM * size
+    right, above = (low + high) / 2.0 + ROOM * size
+    axes.set(aspect="equal", xlim=(left, right), ylim=(below, above))
+    return float(left), float(right), size
+
+
+def _draw_in_plane(axes: Any, picture: Scene, places: Matrix) -> None:
+    """A planar mechanism and what stands around it."""
+    rims = [_rim(wheel)[:, :2] for wheel in picture.around.wheels]
+    left, right, size = _frame(axes, np.vstack([places, *rims]))
+    _ground(axes, picture, left, right)
+    _scenery(axes, picture, rims, size)
+    _bodies(axes, picture, places)
 
 
 def _ground(axes: Any, picture: Scene, left: float, right: float) -> None:
-    """Planes that contacts touch, as lines; of a spatial mechanism none."""
-    for ground in () if picture.spatial else picture.grounds:
+    """Planes that contacts touch, as lines."""
+    for ground in picture.grounds:
         normal = ground.normal[:2]
         if abs(normal[1]) > 1e-9:
             x = np.array([left, right])
@@ -118,28 +124,28 @@ def _rim(wheel: Wheel) -> Matrix:
 
 def _scenery(axes: Any, picture: Scene, rims: list[Matrix], size: float) -> None:
     """Surfaces and planes that move, as lines; wheels with a spoke; blades, dark and a tenth as long as the figure."""
-    around, view = picture.around, _view(picture)
+    around = picture.around
     for sheet in around.sheets:
         for line in sheet.lines[0]:
-            axes.plot(*(line @ view.T).T, color=SOIL, lw=1.0 if picture.spatial else 2.0, zorder=0)
-    for deck in () if picture.spatial else around.decks:
+            axes.plot(*line[:, :2].T, color=SOIL, lw=2.0, zorder=0)
+    for deck in around.decks:
         ends = deck.place[0] + np.array([[-9.0], [9.0]]) * size * deck.forward[0]
-        axes.plot(*(ends @ view.T).T, color=SOIL, lw=2.0, zorder=0)
+        axes.plot(*ends[:, :2].T, color=SOIL, lw=2.0, zorder=0)
     for wheel, rim in zip(around.wheels, rims, strict=True):
         axes.plot(*rim.T, color=color(wheel.name), lw=2.0, zorder=2)
-        axes.plot(*np.array([view @ wheel.center[0], rim[0]]).T, color=color(wheel.name), lw=1.5, zorder=2)
+        axes.plot(*np.array([wheel.center[0, :2], rim[0]]).T, color=color(wheel.name), lw=1.5, zorder=2)
     for blade in around.blades:
         ends = blade.place[0] + np.array([[-0.05], [0.05]]) * size * blade.along[0]
-        axes.plot(*(ends @ view.T).T, color=tone(INK), lw=5.0, zorder=5, solid_capstyle="round")
+        axes.plot(*ends[:, :2].T, color=tone(INK), lw=5.0, zorder=5, solid_capstyle="round")
 
 
-def _pivots(axes: Any, model: Any, run: Trajectory, picture: Scene) -> None:
+def _pivots(axes: Any, model: Any, run: Trajectory, rows: Matrix) -> None:
     """Where joints that only turn hold bodies to the ground."""
-    view, turn = _view(picture), upright(run)
+    turn = upright(run)
     for joint in model.joints:
         frame = next((each for each in (joint.parent, joint.child) if isinstance(each.body, Ground)), None)
         if frame is not None and joint.labels and all(label.unit == "rad" for label in joint.labels):
-            x, y = view @ turn @ run[frame.full_name][0]
+            x, y, _ = rows @ turn @ run[frame.full_name][0]
             axes.plot([x], [y], marker=6, markersize=13, color=SOIL, zorder=1)
 
 

@@ -88,7 +88,7 @@ def scene(run: Trajectory, count: int) -> Scene:
     touches = tuple(_touches(run, turn))
     depth = positions[:, :, 2]
     bodies_seen, axes = solids(run, instants, turn), hinges(run, instants, turn)
-    deep = bool(points) and float(np.ptp(depth)) > 1e-9 * max(1.0, float(np.ptp(positions)))
+    deep = points != () and float(np.ptp(depth)) > 1e-9 * max(1.0, float(np.ptp(positions)))
     masses = {
         body: run.parameters[f"{body}.mass"] for body, _ in segments if run.parameters.get(f"{body}.mass", 0.0) > 0.0
     }
@@ -99,8 +99,15 @@ def scene(run: Trajectory, count: int) -> Scene:
     grounds = (*around.grounds, *shown)
     return Scene(
         instants, points, positions, segments, masses, around, grounds, touches, pushes, named,
-        deep or bool(bodies_seen or axes), bodies_seen, axes, turn,
+        bool(points) and (deep or bool(bodies_seen or axes) or _is_deep(run)), bodies_seen, axes, turn,
     )  # fmt: skip
+
+
+def _is_deep(run: Trajectory) -> bool:
+    """Whether a ground of the model rises or falls across the x–y plane."""
+    return any(
+        "z" in shape.across or (shape.kind == "plane" and abs(shape.numbers[2]) > 1e-12) for shape in run.facts.shapes
+    )
 
 
 def _lines(members: Sequence[str]) -> list[Sequence[str]]:

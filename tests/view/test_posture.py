@@ -10,6 +10,7 @@ import pytest
 
 import mbd
 from mbd.errors import ModelError
+from mbd.view.camera import FIRST, camera
 from mbd.view.posture import instant
 from mbd.view.scene import scene
 
@@ -62,8 +63,21 @@ def test_a_spatial_mechanism_is_seen_from_the_side(tmp_path):
     model = mbd.Model("pendulum")
     rod = mbd.Link("rod", mass=1.0, length=1.0, center=0.5, inertia=(0.1, 0.01, 0.1))
     model.connect(mbd.Universal("joint", model.ground.origin, rod.start, second_axis="x"))
-    axes = mbd.assemble(model, position={"joint.first": 0.3, "joint.second": 0.4}).plot(tmp_path / "start.png")
-    assert axes.get_aspect() == 1.0 and len(axes.lines) >= 2
+    start = mbd.assemble(model, position={"joint.first": 0.3, "joint.second": 0.4})
+    axes = start.plot(tmp_path / "start.png")
+    assert axes.get_aspect() == 1.0
+    solids = axes.collections[-1]
+    corners = np.concatenate([path.vertices for path in solids.get_paths()])
+    end = scene(instant(model, start), 1).positions[0, 1] @ camera(*FIRST)[:2].T
+    apart = np.linalg.norm(corners - end, axis=1)
+    assert np.min(apart) < 0.03 and np.max(np.linalg.norm(corners, axis=1)) < 1.04, "the rod, as thick as it is drawn"
+
+
+@pytest.mark.parametrize("view", ["back", 3.0, (0.1,), (0.1, float("nan")), ("front", 0.0), {"yaw": 1.0}])
+def test_a_view_that_is_none_is_refused(view):
+    model, start = leg()
+    with pytest.raises(ModelError, match="view"):
+        start.plot(model=model, view=view)
 
 
 @pytest.mark.usefixtures("older_objects_left_alone")

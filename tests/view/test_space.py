@@ -12,7 +12,7 @@ from hypothesis import given, settings, strategies as st
 
 import mbd
 from mbd.view import page as pages
-from mbd.view.camera import FIRST, VIEWS, camera
+from mbd.view.camera import FIRST, VIEWS, angles_of, camera
 from mbd.view.forms import equal_inertia, mesh
 from mbd.view.posture import instant
 from mbd.view.scene import scene
@@ -24,7 +24,7 @@ PIN, TIP = (0.02, 0.25, -0.03), (0.0, -0.25, 0.0)
 
 
 @cache
-def pendulum() -> mbd.Trajectory:
+def hanging() -> tuple[mbd.Model, mbd.State]:
     """Two bodies on cross joints, in gravity that is not along an axis."""
     model = mbd.Model("double pendulum", gravity=(1.0, -2.0, -9.0))
     upper = mbd.RigidBody("left upper", 2.0, (0.05, 0.02, 0.04, 0.005, 0.0, 0.002), center=(0.01, 0.02, 0.03))
@@ -33,8 +33,12 @@ def pendulum() -> mbd.Trajectory:
         mbd.Universal("shoulder", model.ground.origin, upper.point(*PIN, name="pin")),
         mbd.Universal("elbow", upper.point(*TIP, name="tip"), lower.point(0.0, 0.3, 0.0, name="top")),
     )
-    start = mbd.assemble(model, position={"shoulder.first": 0.9, "elbow.second": -0.4})
-    return mbd.simulate(model, start, dt=5e-3, until=0.25, backend="python")
+    return model, mbd.assemble(model, position={"shoulder.first": 0.9, "elbow.second": -0.4})
+
+
+@cache
+def pendulum() -> mbd.Trajectory:
+    return mbd.simulate(*hanging(), dt=5e-3, until=0.25, backend="python")
 
 
 def page(run: mbd.Trajectory, folder: Path) -> tuple[str, dict]:
@@ -163,6 +167,28 @@ def test_the_page_holds_poses_and_its_own_small_renderer(tmp_path):
     assert [solid["side"] for solid in data["solids"]] == ["left", "right"] and data["views"]["reset"] == list(FIRST)
     assert set(data["meshes"]) == {"box", "capsule", "cylinder"}
     assert 'id="camera"' in text and "webgl" in text and len(text) < 300_000
+
+
+def test_the_picture_of_a_state_shows_what_the_page_shows(tmp_path):
+    """Facets of solids lie within their size of their centers as the camera sees them; markers are where points are."""
+    pytest.importorskip("matplotlib")
+    view = (0.4, -0.3)
+    model, start = hanging()
+    axes = start.plot(tmp_path / "start.png", view=view)
+    picture = scene(instant(model, start), 1)
+    rows = camera(*angles_of(view))
+    corners = np.concatenate([path.vertices for path in axes.collections[-1].get_paths()])
+    for solid in picture.solids:
+        half, center = solid.form.half, (rows @ solid.center[0])[:2]
+        turned = rows @ rotations(solid.turn[:1])[0]
+        reach = np.sum(np.abs(turned * half), axis=1)[:2]
+        wanted = center + reach * np.array([[1.0, 1.0], [-1.0, -1.0]])
+        if solid.form.kind == "box":
+            assert np.min(np.abs(corners[:, 0] - wanted[0, 0])) < 1e-12 > np.min(np.abs(corners[:, 1] - wanted[1, 1]))
+    dots = np.concatenate([line.get_xydata() for line in axes.lines])
+    for number in picture.markers:
+        place = rows[:2] @ picture.positions[0, number]
+        assert np.min(np.linalg.norm(dots - place, axis=1)) < 1e-12
 
 
 def test_a_planar_page_has_none_of_it(tmp_path):

@@ -85,10 +85,11 @@ function joints(p, r) { // a pin along each axis, else a ball; a block where a p
   for (const hinge of run.hinges) {
     found.push([{ ...pin(1.45 * r), center: here(hinge.at, p), axes: axesAlong(unitOf(here(hinge.axis, p))) }, light, light]);
   }
+  const centers = run.solids.map((solid) => here(solid.at, p));
   for (const n of inFigure) {
     const at = placeOf(n, p);
     if (fixed[n]) found.push([{ ...block(1.5 * r), center: at, axes: [[1, 0, 0], [0, 1, 0], [0, 0, 1]] }, blend(ink, tint(colors.paper), 0.45)]);
-    else found.push([capsule(at, at, 1.3 * r), light, light]);
+    else if (!centers.some((center) => Math.hypot(...plus(center, at, -1)) < 0.1 * r)) found.push([capsule(at, at, 1.3 * r), light, light]);
   }
   return found;
 }
