@@ -86,6 +86,8 @@ if TYPE_CHECKING:
         TabulatedSpring as TabulatedSpring,
         TorsionSpring as TorsionSpring,
     )
+    from mbd.gait.basin.basin import basin as basin
+    from mbd.gait.basin.result import Basin as Basin
     from mbd.gait.branch import Branch as Branch, branch as branch
     from mbd.gait.cycle import LimitCycle as LimitCycle
     from mbd.gait.find import GaitSearch as GaitSearch, find_gait as find_gait
@@ -182,6 +184,8 @@ _HOMES = {
     "mbd.errors": "AssemblyError CapabilityError GaitError MbdError MbdWarning MemoryLimitError ModelError "
     "SimulationError TraceError TrajectoryError UnknownNameError",
     "mbd.forces": "Applied Bushing DCMotor Damper Motor Potential Samples Spring TabulatedSpring TorsionSpring",
+    "mbd.gait.basin.basin": "basin",
+    "mbd.gait.basin.result": "Basin",
     "mbd.gait.branch": "Branch branch",
     "mbd.gait.cycle": "LimitCycle",
     "mbd.gait.find": "GaitSearch find_gait",

@@ -78,14 +78,14 @@ WORDS = {
 
 BESIDE = {
     "made by others, not by users": (
-        mbd.Accuracy, mbd.Batch, mbd.Criteria, mbd.Effects, mbd.Failure, mbd.Fit, mbd.GaitReport, mbd.Known,
+        mbd.Accuracy, mbd.Basin, mbd.Batch, mbd.Criteria, mbd.Effects, mbd.Failure, mbd.Fit, mbd.GaitReport, mbd.Known,
         mbd.LimitCycle, mbd.Linearization, mbd.Mobility, mbd.PenaltyParameters, mbd.Replay, mbd.Sensitivities,
         mbd.State, mbd.StateSpace, mbd.Sweep, mbd.Trajectory, mbd.Branch, mbd.PointCurve, mbd.GaitSearch,
         mbd.Optimum,
     ),
     "take a model and a run: tests of their own": (
-        mbd.accuracy, mbd.assemble, mbd.batch, mbd.criteria, mbd.effects, mbd.fit, mbd.gait_report, mbd.limit_cycle,
-        mbd.linearize,
+        mbd.accuracy, mbd.assemble, mbd.basin, mbd.batch, mbd.criteria, mbd.effects, mbd.fit, mbd.gait_report,
+        mbd.limit_cycle, mbd.linearize,
         mbd.load, mbd.mobility, mbd.project, mbd.replay, mbd.sensitivities, mbd.simulate, mbd.sweep,
         mbd.branch, mbd.find_gait, mbd.optimize,
     ),

@@ -24,7 +24,7 @@ from mbd.cli import Script, examples
 
 g = 9.81
 NAMES = (
-    "chapter-walker", "compass-gait", "double-pendulum", "find-a-gait", "four-bar", "kneed-walker",
+    "basin-picture", "chapter-walker", "compass-gait", "double-pendulum", "find-a-gait", "four-bar", "kneed-walker",
     "lagrangian-double-pendulum", "long-pendulum", "pendulum", "prosthetic-leg", "rimless-wheel", "shaken-block",
     "simplest-walker-lagrangian", "slider-crank", "user-constraint", "user-integrator",
 )  # fmt: skip
@@ -559,3 +559,16 @@ def test_the_gait_that_is_found_is_the_published_one_and_walks_on() -> None:
     assert len(found.tries) == 8 and abs(cycle.derivatives["period", "slope"] - 0.8153966595545352) < 1e-8
     lengths = [step.length for step in gait(run_of("find-a-gait")).steps]
     assert len(lengths) >= 9 and max(abs(length - 0.5354454154300102) for length in lengths) < 1e-9
+
+
+def test_the_walker_survives_small_pushes_falls_back_of_too_slow_ones_and_ahead_of_too_fast_ones() -> None:
+    basin, cycle = script("basin-picture")["basin"], script("basin-picture")["gait"]
+    assert abs(cycle.period - 0.7343463911587195) < 1e-9
+    stance, swing = (basin.axes[f"{side} hip.rate"] for side in ("left", "right"))
+    row, column = (int(np.argmin(np.abs(axis - cycle.state[name]))) for axis, name in (
+        (stance, "left hip.rate"), (swing, "right hip.rate")
+    ))  # fmt: skip
+    assert basin.outcome[row, column] == "walks"
+    assert set(basin.outcome[-1]) == {"falls backward"}
+    assert set(basin.outcome[0, :12]) == {"falls forward"}
+    assert 0.1 < basin.share < 0.2

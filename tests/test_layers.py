@@ -55,6 +55,7 @@ DOORS = {
     "analysis.gait_report.report": ("view",),
     "analysis.linearization": ("view",),
     "analysis.numerical": ("view",),
+    "gait.basin.result": ("view",),
     "gait.branch": ("view",),
     "gait.cycle": ("view",),
     "gait.follow": ("view",),

@@ -21,7 +21,7 @@ GROUPS = {
     "Integrators": "HHT GeneralizedAlpha Newmark RadauIIA RungeKutta853",
     "Analysis": "accuracy Accuracy Known effects Effects linearize Linearization StateSpace mobility "
     "Mobility criteria Criteria sensitivities Sensitivities fit Fit optimize Optimum",
-    "Gaits": "limit_cycle LimitCycle gait_report GaitReport find_gait GaitSearch branch Branch PointCurve",
+    "Gaits": "limit_cycle LimitCycle gait_report GaitReport find_gait GaitSearch branch Branch PointCurve basin Basin",
     "Errors and failures": "MbdError MbdWarning ModelError AssemblyError SimulationError CapabilityError "
     "GaitError MemoryLimitError TraceError TrajectoryError UnknownNameError Failure Replay replay",
 }

@@ -7,13 +7,14 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import chain, product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from mbd.analysis.column_units import units_of
 from mbd.analysis.sweep_file import SweepFile
 from mbd.analysis.sweep_runs import SETTINGS, Results, Row, Runs, cell, rows_of
 from mbd.bodies.values import flag, shown
@@ -42,6 +43,7 @@ class Sweep:
     results : by title, one value for each run; NaN where the run failed
     success, messages : of each run
     complete : False where Ctrl-C ended the sweep; runs that it never came to say so in their message
+    units : of what was varied and of results, by title, where they are known
     """
 
     names: tuple[str, ...]
@@ -51,6 +53,7 @@ class Sweep:
     messages: tuple[str, ...]
     complete: bool = True
     dimensions: tuple[tuple[tuple[str, ...], int], ...] = ()
+    units: Mapping[str, str] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.cases)
@@ -79,7 +82,8 @@ class Sweep:
         """An xarray Dataset with a dimension for everything that was varied by itself.
 
         Names that changed together share the dimension 'a, b', along which each is a coordinate. What is no number,
-        such as a scheme, is its text. `success` and `message` are variables beside the results.
+        such as a scheme, is its text. `success` and `message` are variables beside the results. What has a unit has it
+        as the attribute `units`.
         """
         from mbd.results.tables import library
 
@@ -90,9 +94,17 @@ class Sweep:
         coordinates: dict[str, Any] = {}
         for axis, (names, _) in enumerate(self.dimensions):
             first = tuple(slice(None) if k == axis else 0 for k in range(len(sizes)))
-            coordinates |= {name: ((axes[axis],), columns[name][first]) for name in names}
-        variables = {title: (axes, column) for title, column in columns.items() if title not in self.names}
+            coordinates |= {name: ((axes[axis],), columns[name][first], self._attributes(name)) for name in names}
+        variables = {
+            title: (axes, column, self._attributes(title))
+            for title, column in columns.items()
+            if title not in self.names
+        }
         return xarray.Dataset(variables, coords=coordinates)
+
+    def _attributes(self, title: str) -> dict[str, str]:
+        """What xarray notes of a column."""
+        return {"units": self.units[title]} if self.units.get(title) else {}
 
     def to_csv(self, path: str | Path) -> Path:
         """Write the table with a line for each run."""
@@ -195,7 +207,8 @@ def sweep(
     columns = {title: tuple(row.results[k] for row in rows) for k, title in enumerate(titles)}
     success, messages = tuple(row.success for row in rows), tuple(row.message for row in rows)
     sizes = tuple((together, len(several)) for together, several in dimensions)
-    return Sweep(names, cases, columns, success, messages, complete, sizes)
+    units = units_of(model, (*names, *titles), settings.get("backend", "auto"))
+    return Sweep(names, cases, columns, success, messages, complete, sizes, units)
 
 
 def _made(

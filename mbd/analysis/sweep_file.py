@@ -17,7 +17,7 @@ from mbd.analysis.sweep_runs import Row, Runs
 from mbd.errors import ModelError
 from mbd.results.archive import named_file
 
-__all__ = ["SweepFile"]
+__all__ = ["SweepFile", "whole_lines"]
 
 FORMAT = "mbd sweep 1"
 
@@ -57,7 +57,7 @@ class SweepFile:
             os.fsync(file.fileno())
 
     def _read(self, head: Mapping[str, Any]) -> None:
-        lines = list(_lines(self.path))
+        lines = list(whole_lines(self.path))
         if not lines or lines[0].get("format") != FORMAT:
             raise ModelError(f"file: {str(self.path)!r} is no file of a sweep; give another name")
         differs = [name for name in head if lines[0].get(name) != head[name]]
@@ -69,7 +69,7 @@ class SweepFile:
             self.rows[line["case"]] = Row(list(line["results"]), line["success"], line["message"])
 
 
-def _lines(path: Path) -> Iterator[dict[str, Any]]:
+def whole_lines(path: Path) -> Iterator[dict[str, Any]]:
     """Lines of a file that are whole; one that was cut short is taken out of it."""
     whole = 0
     with path.open("rb") as file:

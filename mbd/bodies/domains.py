@@ -137,6 +137,13 @@ class ParameterCheck:
                 if self._owner.setdefault(name, word) is word:
                     self._names.setdefault(id(word), []).append(name)
 
+    @property
+    def units(self) -> dict[str, str]:
+        """Units of the parameters whose words tell one."""
+        words = {id(word): word for word in self._owner.values()}
+        domains = {name: domain for word in words.values() for name, domain in word.domains().items()}
+        return {name: domain.unit for name, domain in domains.items() if domain.unit}
+
     def faults(self, changed: Mapping[str, float], names: Iterable[str] | None = None) -> list[str]:
         """What is wrong with changed values; with those of some names only, if these are given."""
         names = changed if names is None else tuple(names)

@@ -37,6 +37,7 @@ def test_names_in_a_tuple_change_together_and_others_with_every_pair():
 
 def test_schemes_are_text_in_a_dataset():
     data = swept({"integrator": [mbd.HHT(0.05), mbd.Newmark()], "ball.mass": [1.0, 2.0, 3.0]}).to_xarray()
+    assert data["ball.mass"].attrs == {"units": "kg"}
     assert data["speed"].shape == (2, 3) and "HHT" in str(data["integrator"].values[0])
     assert data["success"].all()
 

@@ -118,3 +118,16 @@ def test_names_of_columns_are_coordinates_and_rates():
         mbd.batch(model, (start, {"fall.place": [1.0]}), dt=0.01, until=0.1)
     with pytest.raises(mbd.ModelError, match="2 starts and 3 values"):
         mbd.batch(model, [start, start], dt=0.01, until=0.1, parameters={"ball.mass": [1.0, 2.0, 3.0]})
+
+
+def test_values_that_the_model_folds_into_its_equations_may_be_columns():
+    model = mbd.Model("swing")
+    rod = mbd.Link("rod", mass=1.0, length=1.0, center=0.5)
+    model.connect(mbd.Revolute("pin", model.ground.origin, rod.start, loss=mbd.Viscous(0.0)))
+    start = mbd.assemble(model, position={"pin.angle": 0.5})
+    values = [0.0, 0.5]
+    found = mbd.batch(model, start, dt=0.01, until=0.3, parameters={"pin loss.coefficient": values}, workers=1)
+    for k, value in enumerate(values):
+        alone = mbd.simulate(model, start, dt=0.01, until=0.3, parameters={"pin loss.coefficient": value})
+        assert abs(found.q[k, 0] - alone.final.q[0]) < 1e-14
+    assert found.q[0, 0] != found.q[1, 0]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -11,10 +12,23 @@ from mbd.arrays import Matrix, Vector
 from mbd.compile.mechanism import Mechanism
 from mbd.errors import ModelError
 
-__all__ = ["Changes"]
+__all__ = ["Changes", "telling_values"]
 
 MOST_CHECKED = 2000
 """Different sets of values that are judged one by one; of more, those with an extreme value [-]."""
+
+
+def telling_values(columns: Mapping[str, Vector], own: Mapping[str, float]) -> dict[str, float]:
+    """A value of each column by which a mechanism is made: one that differs from the model's, where there is one.
+
+    Values that are 0 or ±1 in the model are part of its equations, unless other values are wanted.
+    """
+    found = {}
+    for name, column in columns.items():
+        values = np.atleast_1d(np.asarray(column, dtype=float))
+        other = np.flatnonzero(values != own.get(name))
+        found[name] = float(values[other[0] if len(other) else 0])
+    return found
 
 
 class Changes:
@@ -30,7 +44,7 @@ class Changes:
         self.columns = {name: np.asarray(column, dtype=float) for name, column in columns.items()}
         self.names = tuple(self.columns)
         folded = getattr(model, "parameters", {})
-        first = {name: float(np.atleast_1d(column)[0]) for name, column in self.columns.items()}
+        first = telling_values(columns, folded)
         self.constant_vector = mechanism.parameters(first, folded)
         known = [parameter.name for parameter in mechanism.equations.parameters]
         self._varied = {
@@ -56,6 +70,13 @@ class Changes:
                 break
         if faults:
             raise ModelError(faults)
+
+    def part(self, runs: Any) -> Changes:
+        """Those of the runs with these numbers alone, which are judged already."""
+        found = copy(self)
+        found.columns = {name: column[runs] if column.ndim else column for name, column in self.columns.items()}
+        found._varied = {place: column[runs] for place, column in self._varied.items()}
+        return found
 
     def at(self, k: int) -> dict[str, float]:
         """The values of the k-th run by name."""

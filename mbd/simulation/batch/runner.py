@@ -15,7 +15,7 @@ from mbd.compile.mechanisms import mechanism_of
 from mbd.integrators import Integrator
 from mbd.kernel import codes
 from mbd.simulation.batch.alone import Alone, made_alone, needs_judgement
-from mbd.simulation.batch.changes import Changes
+from mbd.simulation.batch.changes import Changes, telling_values
 from mbd.simulation.batch.workers import Workers
 from mbd.simulation.run.late_resets import reset_ends
 from mbd.simulation.run.many import Ends, may_be_many
@@ -41,9 +41,9 @@ class Runner:
     ) -> None:  # fmt: skip
         self.model, self.scheme, self.dt, self.until = model, scheme, dt, until
         self.options = dict(options)
-        first = {name: float(np.atleast_1d(column)[0]) for name, column in changes.items()}
-        self.mechanism: Mechanism = mechanism_of(model, options["backend"], first)
         self.folded = getattr(model, "parameters", {})
+        first = telling_values(changes, self.folded)
+        self.mechanism: Mechanism = mechanism_of(model, options["backend"], first)
         self.manager = manager_of(self.mechanism, self.mechanism.parameters(first, self.folded))
         base = replace(base, memory=None)
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
+from mbd.errors import MbdError
 from mbd.kernel import codes
 from mbd.kernel.many_runs import END_NUMBERS
 from mbd.simulation.run.late_resets import may_reset_late
@@ -147,11 +148,14 @@ class ManyRuns:
         v.run, v.n_runs, v.begun = 0, count, 0
         while True:
             v.steps_left = STEPS_AT_ONCE
-            status = stepper.march_many()
-            if status == codes.NEW_MODE:
-                stepper.add_mode()
-            elif status == codes.DONE:
-                break
+            try:
+                status = stepper.march_many()
+                if status == codes.NEW_MODE:
+                    stepper.add_mode()
+                elif status == codes.DONE:
+                    break
+            except MbdError:  # no code for a mode: that is an outcome of this run
+                self._leave()
             if between is not None:
                 between(int(v.run))
         return self._ends(count, lines)
@@ -165,6 +169,14 @@ class ManyRuns:
         v.dt = v.step = dt
         v.last_time = latest
         v.fresh_reals[:] = stepper.reals
+
+    def _leave(self) -> None:
+        """Leave the present run to Python, and go on with the next."""
+        v = self.run.kernel
+        place = int(v.run) * v.end_width
+        v.ends[place : place + v.end_width] = 0.0
+        v.ends[place], v.ends[place + 1] = codes.NEEDS_PYTHON, -1.0
+        v.run, v.begun = int(v.run) + 1, 0
 
     def _ends(self, count: int, lines: int) -> Ends:
         v = self.run.kernel

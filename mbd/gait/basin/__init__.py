@@ -1,0 +1,1 @@
+"""Which starts walk, and what becomes of the others."""

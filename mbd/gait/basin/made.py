@@ -1,0 +1,144 @@
+"""The starts of a study, and what makes their walks: states on the section, parameters, balls round the attractors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbd.arrays import Matrix
+from mbd.errors import CapabilityError, GaitError, ModelError
+from mbd.gait.basin.axes import Study, kinds_of_parameters
+from mbd.gait.basin.balls import Ball, ball_of
+from mbd.gait.basin.onto_section import OntoSection
+from mbd.gait.basin.walks import Decided, Walks
+from mbd.gait.cycle import LimitCycle
+from mbd.gait.return_map import ReturnMap
+from mbd.simulation.batch.changes import Changes
+from mbd.simulation.batch.runner import Runner
+from mbd.simulation.simulate import REST_SPEED
+from mbd.state import State
+
+__all__ = ["Made"]
+
+MOST_GAITS = 1000
+"""Sets of parameters at most, at each of which the gait is looked for."""
+
+
+SPREAD = 257
+"""Starts by whose parameters the mechanism is made [-]."""
+
+
+def _spread(count: int) -> Any:
+    """Numbers of some starts from the first to the last."""
+    return np.unique(np.linspace(0, count - 1, min(count, SPREAD)).astype(int))
+
+
+@dataclass(eq=False)
+class Made:
+    """The starts of a study, and what makes their walks.
+
+    map : with the step of the study; gaits : attractors by name; base : parameters, functions of them among these
+    """
+
+    map: ReturnMap
+    gaits: Mapping[str, LimitCycle]
+    study: Study
+    base: Mapping[str, float]
+    threads: int
+
+    def __post_init__(self) -> None:
+        first = next(iter(self.gaits.values()))
+        self.state, self.section = (
+            replace(first.state, time=0.0, memory=None, moved={}, parameters={}),
+            first.chart.section,
+        )
+        columns = self.study.columns(_spread(len(self.study.grid)))
+        kinds, _ = kinds_of_parameters(self.map, self.base, columns[1], SPREAD)
+        plain, names = [self.map.plain(values) for values in kinds], kinds[0]
+        self.plain = {name: np.array([values[name] for values in plain]) for name in plain[0]}
+        options = {"contact": "events", "impact": "newton", "locate": "root", "store": 1, "rest_speed": REST_SPEED,
+                   "backend": self.map.backend}  # fmt: skip
+        until = (self.map.section, self.map.longest)
+        self.runner = Runner(self.map.model, self.state, self.map.integrator, self.map.dt, until, self.plain, options,
+                             self.threads)  # fmt: skip
+        if self.runner.slow:
+            raise CapabilityError(
+                f"basins are walked in machine code, but {self.runner.slow}; write the model without it, or make a "
+                "sweep of runs"
+            )
+        self.walks = Walks(self.map, self.runner)
+        vector = self.map.mechanism.vector
+        if not vector and (self.study.start is not None or columns[0]):
+            raise ModelError("axes: coordinates of this model do not add, so columns cannot give them; vary parameters")
+        self._onto = OntoSection(self.section, columns[0]) if vector else None
+        self._balls: dict[tuple[float, ...], list[tuple[int, Ball]]] = {}
+        self._balls_at(dict(self.base) if not columns[1] else names, must=not columns[1])
+
+    @property
+    def all_balls(self) -> list[list[Ball | None]]:
+        """The balls of each set of parameters that was met, by attractor."""
+        found = []
+        for several in self._balls.values():
+            known = dict(several)
+            found.append([known.get(number) for number in range(len(self.gaits))])
+        return found
+
+    def changes(self, kinds: Sequence[Mapping[str, float]], which: Any) -> Changes:
+        """The parameters of some starts as columns, functions evaluated once for each set."""
+        plain = [self.map.plain(values) for values in kinds]
+        if len(plain) == 1:
+            return Changes(self.map.model, self.map.mechanism, {k: np.asarray(v) for k, v in plain[0].items()})
+        columns = {name: np.array([values[name] for values in plain])[which] for name in plain[0]}
+        return Changes(self.map.model, self.map.mechanism, columns)
+
+    def _balls_at(self, values: Mapping[str, float], must: bool = False) -> list[tuple[int, Ball]]:
+        """The verified balls at some parameters; none for gaits that are lost or unstable there."""
+        key = tuple(values.values())
+        if key in self._balls:
+            return self._balls[key]
+        if len(self._balls) >= MOST_GAITS:
+            raise ModelError(f"axes give more than {MOST_GAITS} sets of parameters, at each of which the gait is "
+                             "looked for; give fewer values, and study them part by part")  # fmt: skip
+        changes, found = self.changes([values], None), []
+        for number, (name, gait) in enumerate(self.gaits.items()):
+            try:
+                here = gait if values == gait.parameters else gait.at(values)
+
+                def walked(states: list[State], strides: int = gait.strides) -> Any:
+                    return self.walks.walked(states, strides, changes)
+
+                found.append((number, ball_of(repr(name), here, walked)))
+            except (ModelError, GaitError):
+                if must:
+                    raise
+        self._balls[key] = found
+        return found
+
+    def lines(self, runs: Any) -> tuple[Matrix, NDArray[np.bool_], Changes, Any, list[list[tuple[int, Ball]]]]:
+        """Starts of these numbers as lines, whether they are on the section, their parameters, sets and balls."""
+        state, columns = self.study.columns(runs)
+        kinds, which = kinds_of_parameters(self.map, self.base, columns, len(runs))
+        changes = self.changes(kinds, which)
+        lines = np.repeat(self.walks.lines([self.state]), len(runs), axis=0)
+        for place, column in state.items():
+            lines[:, 1 + place] = column
+        good = np.ones(len(runs), dtype=bool)
+        if self._onto is not None:
+            good = self._onto(*self.walks.parts(lines), changes.all_vectors(len(runs)))
+        return lines, good, changes, which, [self._balls_at(values) for values in kinds]
+
+    def block(self, runs: Any, steps: int) -> Decided:
+        """What becomes of the starts with these numbers."""
+        lines, good, changes, which, balls = self.lines(runs)
+        return self.walks.decide(lines, good, changes, which, balls, steps)
+
+    def start(self, number: int) -> State:
+        """The start of a number."""
+        lines, good, changes, _, _ = self.lines(np.array([number]))
+        if not good[0]:
+            raise ModelError(f"start {number} is not on the section: no state there has the named numbers")
+        return replace(self.walks.states(lines, self.state)[0], parameters=changes.at(0))

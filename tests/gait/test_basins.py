@@ -1,0 +1,210 @@
+"""Basins: the case k4, and that what becomes of a start depends on nothing but the start."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+import mbd
+from mbd.gait.basin.basin import BLOCK
+from tests.cases.walkers import compass, standing
+from tests.gait.basins import LETTERS, classes, grid, start_of, walker
+from tests.gait.walkers import slope_of
+from tests.problems import case
+
+
+@cache
+def study(part: int = 10, **more) -> mbd.Basin:
+    """Each part-th cell of the case along both axes."""
+    theta, s = grid()
+    model, gait = walker()
+    axes = {"theta": theta[::part], "s": s[::part]}
+    return mbd.basin(model, gait, axes, start=start_of, steps=30, dt=0.2, **more)
+
+
+def agrees(found: mbd.Basin, part: int) -> None:
+    """Every cell that the case decides is decided so."""
+    wanted = classes()[::part, ::part]
+    letters = np.vectorize(lambda word: LETTERS.get(word, "O"))(found.outcome)
+    decided = wanted != "x"
+    assert np.array_equal(letters[decided], wanted[decided])
+
+
+def test_the_basin_of_the_simplest_walker_is_that_of_the_case():
+    found = study()
+    agrees(found, 10)
+    ball = found.balls[0][0]
+    assert ball is not None
+    assert ball.radius >= 1e-3
+    assert ball.contraction < 0.98
+    assert (found.attractor == np.where(found.outcome == "walks", 0, -1)).all()
+
+
+@pytest.mark.slow
+def test_the_whole_grid_of_the_case():
+    found = study(1)
+    agrees(found, 1)
+    counted = classes() != "x"
+    sizes = [int(np.sum(found.outcome[counted] == word)) for word in LETTERS]
+    assert [*sizes, 0] == list(case("k4-simplest-walker-basin").quantities[
+        "cells: walks 20 steps and ends within 1e-2 of the fixed point (W), falls forward (F), falls backward (B), "
+        "other (O); excluded cells not counted"
+    ].value)  # fmt: skip
+
+
+def same(one: mbd.Basin, other: mbd.Basin) -> bool:
+    """Whether everything that was decided is the same, to the bit."""
+    names = ("kind", "attractor", "steps", "time")
+    return all(np.array_equal(getattr(one, name), getattr(other, name)) for name in names)
+
+
+def test_threads_and_the_order_of_starts_change_nothing(monkeypatch):
+    found = study()
+    assert same(study(10, workers=1), found)
+    assert same(study(10, workers=3), found)
+    theta, s = grid()
+    model, gait = walker()
+    monkeypatch.setattr("mbd.gait.basin.basin.BLOCK", 100)
+    turned = mbd.basin(model, gait, {"s": s[::-10], "theta": theta[::-10]}, start=start_of, steps=30, dt=0.2)
+    for name in ("kind", "attractor", "steps", "time"):
+        ours = getattr(turned, name).T[::-1, ::-1]
+        rows = np.isin(turned.axes["theta"][::-1], found.axes["theta"])
+        columns = np.isin(turned.axes["s"][::-1], found.axes["s"])
+        theirs = getattr(found, name)[np.isin(found.axes["theta"], turned.axes["theta"])]
+        assert np.array_equal(ours[rows][:, columns], theirs[:, np.isin(found.axes["s"], turned.axes["s"])])
+
+
+def test_a_study_that_was_killed_goes_on_where_it_was(tmp_path, monkeypatch):
+    monkeypatch.setattr("mbd.gait.basin.basin.BLOCK", 100)
+    path, found = tmp_path / "basin.jsonl", study()
+    assert BLOCK > 100
+    assert same(study(10, file=path), found)
+    lines = path.read_bytes().splitlines(keepends=True)
+    assert len(lines) == 5
+    path.write_bytes(b"".join(lines[:3]) + lines[3][:50])  # in the midst of a line
+    made = []
+    monkeypatch.setattr("mbd.gait.basin.store.Store.keep", _counted(made))
+    study.cache_clear()
+    assert same(study(10, file=path), found)
+    assert made == [200, 300]
+    with pytest.raises(mbd.ModelError, match=r"another basin; its .*steps.* differ"):
+        mbd.basin(*walker(), {"theta": [0.2], "s": [0.0]}, start=start_of, steps=3, dt=0.2, file=path)
+    path.write_text(json.dumps({"format": "something"}) + "\n")
+    with pytest.raises(mbd.ModelError, match="no file of a basin"):
+        study(10, file=path, workers=2)
+
+
+def _counted(made):
+    from mbd.gait.basin.store import Store
+
+    keep = Store.keep
+
+    def counting(self, first, block):
+        made.append(first)
+        keep(self, first, block)
+
+    return counting
+
+
+@cache
+def links() -> tuple[mbd.Model, mbd.LimitCycle]:
+    """The compass gait of links."""
+    reference = case("f2-compass-gait-3deg")
+    sizes = reference.definition
+    model = compass(sizes)
+    start = standing(model, [0.2187, -0.3234, -1.0918, -0.3772], sizes["slope"])
+    gait = mbd.limit_cycle(
+        model, start, section="right foot", mirror=("left", "right"), parameters={"slope": sizes["slope"]},
+        functions=slope_of(sizes["g"]),
+    )  # fmt: skip
+    return model, gait
+
+
+def test_starts_of_links_are_moved_onto_the_section_and_fall_as_runs_do():
+    model, gait = links()
+    axes = {"left hip.rate": np.linspace(-2.2, -0.2, 7), "right hip.rate": np.linspace(-2.0, 1.0, 4)}
+    found = mbd.basin(model, gait, axes, dt=0.02, steps=12)
+    for index in np.ndindex(*found.shape):
+        state = found.start(index)
+        assert state["left hip.rate"] == axes["left hip.rate"][index[0]]
+        arrival, outcome = None, "walks"
+        map_ = replace(gait.map, dt=0.02)
+        for _ in range(12):
+            arrival = map_(replace(state, parameters={}))
+            if not arrival.outcome.good:
+                outcome = str(map_.explained(state, arrival.outcome))
+                break
+            state = arrival.state
+        word = found.outcome[index]
+        assert word in ("walks", "falls forward", "falls backward", "scuffs", "numerical error")
+        assert outcome.startswith(word), (index, word, outcome)
+
+
+def test_parameters_may_be_axes():
+    model, gait = links()
+    found = mbd.basin(model, gait, {"slope": [0.045, 0.0523, 0.3]}, dt=0.02, steps=40)
+    assert list(found.outcome[:2]) == ["walks", "walks"]
+    assert found.outcome[2].startswith("falls")
+    assert len(found.balls) == 3
+    assert found.balls[2] == [None]
+
+
+def test_tables_and_pictures_show_what_was_found(tmp_path):
+    found = study()
+    assert sum(found.counts.values()) == len(found) == 400
+    data = found.to_xarray()
+    assert data.sizes == {"theta": 20, "s": 20}
+    assert data["time"].attrs["units"] == "s"
+    assert data["theta"].attrs["units"] == "rad"
+    assert len(found.to_dataframe()) == 400
+    assert "walks" in repr(found)
+    assert "<table" in found._repr_html_()
+    found.plot(tmp_path / "basin.png")
+    assert (tmp_path / "basin.png").stat().st_size > 1000
+    state = found.start((10, 10))
+    assert state["phi"] == 2.0 * state["theta"]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"axes": {}}, "axes must map"), ({"axes": {"thta": [0.2]}}, "theta"),
+        ({"axes": {"theta": []}}, "at least one"),
+        ({"axes": {"theta": [float("nan")]}}, "not finite"), ({"axes": {"theta": ["a"]}}, "list of numbers"),
+        ({"axes": {("theta", "theta.rate"): [0.2, 0.3]}}, "tuples of 2"), ({"axes": 3}, "axes must map"),
+        ({"axes": {"theta": [0.1], ("theta", "phi"): [(0.1, 0.2)]}}, "given twice"), ({"steps": 0}, "steps"),
+        ({"start": 3}, "start must be"), ({"start": lambda axes: {"theta": [0.1, 0.2, 0.3]}}, "3 numbers"),
+        ({"start": lambda axes: {"tht": axes["theta"]}}, "tht"), ({"dt": -1.0}, "dt"), ({"longest": "a"}, "longest"),
+        ({"gait": None}, "mbd.limit_cycle"), ({"gait": []}, "mbd.limit_cycle"), ({"workers": -1}, "workers"),
+        ({"parameters": {"gama": 0.1}}, "gamma"), ({"parameters": {"gamma": "a"}}, "finite"),
+        ({"model": mbd.Model("other")}, "another model"), ({"progress": 3}, "progress"), ({"file": 3}, "file"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_meant_is_said_before_the_first_run(wrong, words):
+    model, gait = walker()
+    right = {"model": model, "gait": gait, "axes": {"theta": [0.2, 0.3]}, **wrong}
+    with pytest.raises(mbd.MbdError, match=words):
+        mbd.basin(**right)
+
+
+def test_gaits_that_attract_nothing_are_refused():
+    model, gait = walker()
+    with pytest.raises(mbd.ModelError, match="attracts nothing"):
+        mbd.basin(model, mbd.limit_cycle(
+            model, replace(gait.state, q=np.array([0.1939, 0.3878]), v=np.array([-0.2031, -0.015])),
+            section="heel strike", dt=0.1, longest=60.0,
+        ), {"theta": [0.2]})  # fmt: skip
+
+
+def test_a_start_that_no_state_of_the_section_has_is_told():
+    model, gait = walker()
+    found = mbd.basin(model, gait, {"theta": [0.2, 0.3], "phi": [0.4]}, dt=0.2, steps=2)
+    assert found.outcome[1, 0] == "not on the section"
+    with pytest.raises(mbd.ModelError, match="not on the section"):
+        found.start((1, 0))
+    with pytest.raises(mbd.ModelError, match="places"):
+        found.start((5, 0))
