@@ -101,7 +101,9 @@ def _sliding(equations: Equations, friction: int) -> int:
     """Operations of one Newton iteration with one friction sliding, its contact closed."""
     contact = equations.frictions[friction].contact
     rows = [] if contact < 0 else [k for k in equations.contacts[contact].rows if equations.rows[k].friction < 0]
-    return operations(newton(equations, [*equations.bilateral, *rows], (), False, [friction]))
+    partner = equations.frictions[friction].partner
+    sliding = [friction] if partner < 0 else sorted((friction, partner))
+    return operations(newton(equations, [*equations.bilateral, *rows], (), False, sliding))
 
 
 def _newton(equations: Equations, closed: int | None = None) -> int:

@@ -12,7 +12,8 @@ Inputs on the tape, as (kind, index)
     ('anchor', k)  value held since a contact closed (point of touchdown, approach speed); behind those of all contacts,
                    the whole turns of cut joints
     ('switch', c)  1.0 while penalty contact number c acts, else 0.0
-    ('slip', k)    sign of the sliding of friction k, 0.0 while it sticks or its contact is open
+    ('slip', k)    sign of the sliding of friction k, 0.0 while it sticks or its contact is open; of two directions
+                   see `mbd.equations.cones`
     ('p', k)       parameter k
     ('place', 0), ('place', 1)   x and z of a height function that a picture shows
 """
@@ -146,6 +147,8 @@ class Friction:
     contact : the contact whose normal force it follows, −1 if it always acts
     rate : γ on the tape; change : γ̇, with accelerations
     limit : of multipliers and parameters, homogeneous of degree one in the multipliers but for a constant
+    partner : number of the other direction of a contact in space, −1 if this one is alone; both together obey
+        ``‖λ_T‖ ≤ limit``, and ``λ_T = limit γ/‖γ‖`` while they slide (see `mbd.equations.cones`)
     """
 
     name: str
@@ -154,6 +157,7 @@ class Friction:
     rate: Node
     change: Node
     limit: Node
+    partner: int = -1
 
 
 @dataclass(frozen=True)

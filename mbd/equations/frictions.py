@@ -12,7 +12,7 @@ from mbd.equations.equations import Effect, Friction, Row
 from mbd.equations.laws import Laws
 from mbd.errors import CapabilityError
 from mbd.joints.base import Joint
-from mbd.tape.derivatives import substitute
+from mbd.tape.derivatives import live, substitute
 from mbd.tape.functions import sqrt
 from mbd.tape.node import Node, Scalar
 
@@ -28,25 +28,35 @@ def sliding_contact(
     limits: Sequence[tuple[int, Any]],
     captured: dict[int, Node],
 ) -> None:
-    """Friction along the tangent of a contact, ``|λ_T| ≤ limit(p)``; the direction is that at the point of now."""
+    """Friction along the tangents of a contact, ``‖λ_T‖ ≤ limit(p)``; directions are those at the point of now."""
     tangents = [(row, limit) for row, limit in limits if row >= 0]
-    if len(tangents) != 1 or len(numbers) != 2:
+    if len(tangents) not in (1, 2) or len(numbers) != 1 + len(tangents):
         raise CapabilityError(
-            f"'{name}': friction needs one direction of sliding, but its point can slide in {len(numbers) - 1}; "
-            "friction is solved in planar models: in space use friction=None (it sticks) or 0"
+            f"'{name}': friction needs a direction of sliding, or two, but its point can slide in {len(numbers) - 1}; "
+            "use friction=None (it sticks) or 0"
         )
-    ((row, law),) = tangents
     here = {scope.tape.input("anchor", k): value for k, value in captured.items()}
-    view = substitute(scope.rates([found.viewed[row]]), here)[0]
-    limit = scope.tape.lift(law(-scope.tape.input("lam", numbers[0])) if callable(law) else law)
-    _add(found, scope, dynamics, name, row, found.rows[row].contact, view, limit)
+    first = len(found.frictions)
+    for place, (row, law) in enumerate(tangents):
+        anchored = scope.rates([found.viewed[row]])
+        view = substitute(anchored, here)[0]
+        if len(tangents) == 2 and any(node.op == "input" and node.data[0] == "anchor" for node in live(anchored)):
+            raise CapabilityError(
+                f"'{name}': in space friction is solved on planes, and this ground is a height function, whose "
+                "directions turn along it; use mbd.Plane, or friction=None (it sticks) or 0"
+            )
+        limit = scope.tape.lift(law(-scope.tape.input("lam", numbers[0])) if callable(law) else law)
+        partner = -1 if len(tangents) == 1 else first + 1 - place
+        _add(found, scope, name, row, found.rows[row].contact, view, limit, partner)
+    _add_loss(found, scope, dynamics, name, range(first, len(found.frictions)))
 
 
 def dry_friction(
     found: Laws, scope: DerivationScope, dynamics: Generalized, name: str, row: int, contact: int, limit: Node
 ) -> None:
     """Dry friction along a row on velocities, ``|λ| ≤ limit``."""
-    _add(found, scope, dynamics, name, row, contact, found.viewed[row], limit)
+    _add(found, scope, name, row, contact, found.viewed[row], limit)
+    _add_loss(found, scope, dynamics, name, [len(found.frictions) - 1])
 
 
 def dry_joint(found: Laws, scope: DerivationScope, dynamics: Generalized, joint: Joint) -> None:
@@ -63,7 +73,8 @@ def dry_joint(found: Laws, scope: DerivationScope, dynamics: Generalized, joint:
         unit = joint.freedoms[place].unit
         found.rows.append(Row(name, "dry", scope.tape.zero, scope.real(view), unit=unit, kind="velocity"))
         found.viewed.append(view)
-        _add(found, scope, dynamics, name, len(found.rows) - 1, -1, view, scope.tape.lift(limit))
+        _add(found, scope, name, len(found.rows) - 1, -1, view, scope.tape.lift(limit))
+        _add_loss(found, scope, dynamics, name, [len(found.frictions) - 1])
 
 
 def _pin_load(found: Laws, scope: DerivationScope, joint: Joint) -> Node:
@@ -78,26 +89,32 @@ def _pin_load(found: Laws, scope: DerivationScope, joint: Joint) -> Node:
 def _add(
     found: Laws,
     scope: DerivationScope,
-    dynamics: Generalized,
     name: str,
     row: int,
     contact: int,
     view: Node,
     limit: Node,
+    partner: int = -1,
 ) -> None:
-    """A direction of dry friction, its row marked as held by it, and its loss as an effect."""
-    number = len(found.frictions)
+    """A direction of dry friction, and its row marked as held by it."""
     rate = scope.real(view)
-    found.rows[row] = replace(found.rows[row], friction=number)
-    found.frictions.append(Friction(name, row, contact, rate, scope.change(view), limit))
+    found.rows[row] = replace(found.rows[row], friction=len(found.frictions))
+    found.frictions.append(Friction(name, row, contact, rate, scope.change(view), limit, partner))
     found.sliding.append(view)
-    multiplier = scope.tape.input("lam", row)
-    work = Work()
-    work.on_velocity(view, multiplier)
+
+
+def _add_loss(
+    found: Laws, scope: DerivationScope, dynamics: Generalized, name: str, numbers: Sequence[int]
+) -> None:
+    """The loss in some directions of one dry friction, as one effect."""
+    work, power = Work(), scope.tape.zero
+    for number in numbers:
+        multiplier = scope.tape.input("lam", found.frictions[number].row)
+        work.on_velocity(found.sliding[number], multiplier)
+        power = power - multiplier * found.frictions[number].rate
     found.effects.append(
         Effect(
             f"{name} friction", "loss",
-            lambda: (*dynamics.generalized(work), *[scope.tape.zero] * len(scope.states)), -(multiplier * rate),
-            column="friction",
+            lambda: (*dynamics.generalized(work), *[scope.tape.zero] * len(scope.states)), power, column="friction",
         )
     )  # fmt: skip

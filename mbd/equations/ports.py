@@ -9,6 +9,7 @@ from itertools import chain
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.equations.cones import sliding_force
 from mbd.equations.equations import Equations
 from mbd.equations.inputs import Inputs
 from mbd.equations.linearization import across, along_places, row_changes
@@ -88,9 +89,7 @@ def ports(
 def sliding_forces(equations: Equations, sliding: Sequence[int], values: Sequence[Node]) -> list[Node]:
     """Quantities with the multiplier of each friction that slides in terms of what it follows, λ_T = slip · limit."""
     known = {
-        equations.tape.input("lam", equations.frictions[k].row): equations.tape.input("slip", k)
-        * equations.frictions[k].limit
-        for k in sliding
+        equations.tape.input("lam", equations.frictions[k].row): sliding_force(equations, k) for k in sliding
     }
     return substitute(values, known) if known else list(values)
 

@@ -26,6 +26,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from mbd.equations.cones import sliding_force
 from mbd.equations.equations import Equations
 from mbd.equations.inputs import Inputs
 from mbd.equations.magnitudes import magnitudes
@@ -291,7 +292,7 @@ def _forces(
     rates, forces = [equations.rows[k].rate for k in fast], [inputs.lam[k] for k in fast]
     for k in sliding:
         rates.append(equations.frictions[k].rate)
-        forces.append(equations.tape.input("slip", k) * equations.frictions[k].limit)
+        forces.append(sliding_force(equations, k))
     for c, switch in penalties:
         contact = equations.contacts[c]
         if contact.force is not None and not contact.is_velocity:

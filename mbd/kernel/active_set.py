@@ -106,6 +106,7 @@ class ActiveSetManager:
             "row_contact": self._row_contact, "row_level": self._row_level, "row_friction": self._row_friction,
             "friction_row": [friction.row for friction in self.frictions],
             "friction_contact": [friction.contact for friction in self.frictions],
+            "partner": [friction.partner for friction in self.frictions],
             "row_trivial": [int(k in self.trivial) for k in range(len(self._row_contact))],
             "row_normal": [int(k in normals) for k in range(len(self._row_contact))],
             "kind": [int(contact.kind == "penalty") for contact in self.contacts],

@@ -5,7 +5,22 @@ from __future__ import annotations
 from mbd.kernel.accept_restart import accept_for_restart
 from mbd.kernel.candidate import accept_guards
 from mbd.kernel.charts import turned_end, wants_row
-from mbd.kernel.codes import AT_POSE, CHATTER, DONE, EVENT, FULL, LAST, LEFT, NEW_MODE, NOT_CONVERGED, PAUSE, PULL
+from mbd.kernel.codes import (
+    AT_POSE,
+    CHATTER,
+    DONE,
+    EVENT,
+    FULL,
+    LAST,
+    LEFT,
+    NEW_MODE,
+    NOT_CONVERGED,
+    PAUSE,
+    PULL,
+    STICK,
+)
+from mbd.kernel.cone_steps import approached_end, come_to_zero, slides_on
+from mbd.kernel.cones import follow_motion, pull_of_both
 from mbd.kernel.contact_modes import room_to_log
 from mbd.kernel.contact_step import relax_pace
 from mbd.kernel.crowding import crowds
@@ -47,7 +62,7 @@ def has_spurious_reaction(K: Mechanism) -> bool:
                 return True
     if K.strategy == 0:
         for f in range(K.n_frictions):
-            excess = abs(K.lam1[K.friction_row[f]]) - K.limit[f]
+            excess = pull_of_both(K, f, K.lam1) - K.limit[f]
             if K.sticks[f] == 1 and excess > 0.0 and excess > PULL * largest_force(K):
                 return True
     return False
@@ -58,6 +73,8 @@ def accept(K: Kernel, h: float, t1: float, quiet: bool) -> None:
     scheme_accept(K, h)
     K.time = t1
     accept_guards(K)
+    if K.n_cones > 0:
+        follow_motion(K)
     if not quiet:
         update_armed(K)
         if K.n_guards > 0:
@@ -208,6 +225,10 @@ def find_event(K: Kernel, h: float, t1: float) -> int:
     status = locate(K, h)
     if status != 0:
         return status
+    if K.event_kind == STICK and K.partner[K.event_index] >= 0:
+        status = come_to_zero(K, h, t1)
+        if status != 0:
+            return status
     if K.event_kind < 0:
         return 0
     if K.strategy == 1 and closes_below_surface(K):  # the contact comes first
@@ -269,6 +290,12 @@ def take_step(K: Kernel) -> int:
             t1 = near
             within = True
             cut = False
+    if K.n_cones > 0:
+        near = approached_end(K, t1)
+        if near < t1:
+            t1 = near
+            within = True
+            cut = False
     h = t1 - t
     if K.halvings > 0:
         h *= 0.5**K.halvings
@@ -276,6 +303,13 @@ def take_step(K: Kernel) -> int:
         cut = False
     full = h
     status = tried_step(K, h, t1)
+    if status == 0 and K.n_cones > 0 and slides_on(K):
+        h = min(0.5 * h, K.step_taken)
+        full = h
+        t1 = t + h
+        within = True
+        cut = False
+        status = tried_step(K, h, t1)
     if status != 0:
         return status
     if K.step_taken != h:

@@ -11,7 +11,10 @@ Delassus matrix is a P-matrix; then Lemke's method (`pivoting`); at last every c
 
 from __future__ import annotations
 
+from mbd.kernel.branches import is_on, solve_directed
 from mbd.kernel.codes import CONFLICT, NO_IMPACT
+from mbd.kernel.cone_directions import misses, turn_directions
+from mbd.kernel.cones import aim, follows, pull_of_both
 from mbd.kernel.pivoting import pivoted
 from mbd.kernel.records import (
     Balance,
@@ -21,11 +24,8 @@ from mbd.kernel.records import (
     DependentRows,
     Frictions,
     Motion,
-    Reals,
 )
-from mbd.kernel.redundancy import sharing, spread
-from mbd.kernel.restart import MOST_LOADS, active_rows, evaluate_loaded, limit_of, load_accelerations, refresh_scales
-from mbd.kernel.saddle import solve_rows
+from mbd.kernel.restart import active_rows, refresh_scales
 
 __all__ = ["complementarity"]
 
@@ -43,7 +43,7 @@ def complementarity(K: Balance, level: int) -> int:
     """Choose K.active of contacts with K.free = 1 and K.sticks, K.slip of frictions with K.loose = 1 or 2, and solve.
 
     Others keep theirs. With K.free = 2 a contact chooses K.parting: its normal row is off, its tangents stay. With
-    K.loose = 2 a friction slides unless that is clearly wrong.
+    K.loose = 2 a friction slides unless that is clearly wrong. Two that slide together choose as one.
     level 0: accelerations, force and bias are those of K.acc; 1: velocities, bias and impulses K.given are in place.
     """
     choices = 0
@@ -53,7 +53,7 @@ def complementarity(K: Balance, level: int) -> int:
             choices += 1
             sets = min(sets * 2, 2 * MOST_CHOICES)
     for f in range(K.n_frictions):
-        if K.loose[f] > 0:
+        if K.loose[f] > 0 and not follows(K, f):
             choices += 1
             sets = min(sets * 3, 2 * MOST_CHOICES)
     measure_free(K, level)
@@ -84,78 +84,11 @@ def complementarity(K: Balance, level: int) -> int:
 
 
 def solve_branches(K: Balance, level: int) -> int:
-    """Solve with the present branches; the friction that slides is put into K.impulse of its row."""
-    if K.n_frictions == 0:
-        load(K, level)
-        return int(solve_rows(K, active_rows(K, K.active), True))
-    status = 0
-    for _ in range(MOST_LOADS):
-        evaluate_loaded(K, whole(K, level))
-        find_limits(K, level)
-        load(K, level)
-        status = solve_rows(K, active_rows(K, K.active), True)
-        if status != 0:
-            return status
-        change = evaluate_loaded(K, whole(K, level))
-        if change < 1e-13 or (K.loaded == 0 and not sharing(K)):
-            break
-    find_limits(K, level)
-    if K.n_dropped > 0 and not sharing(K):
-        for _ in range(MOST_LOADS):  # frictions that hold together share by their limits, which follow their loads
-            spread(K, K.impulse)
-            change = evaluate_loaded(K, whole(K, level))
-            find_limits(K, level)
-            if change < 1e-13:
-                break
-    for f in range(K.n_frictions):
-        if slides(K, f):
-            row = K.friction_row[f]
-            K.impulse[row] = K.slip[f] * K.limit[f] - (K.past[row] if level == 1 else 0.0)
+    """Solve with the present branches; friction that slides is put into K.impulse of its row, opposite to its way."""
+    status = solve_directed(K, level)
+    if status == 0 and K.n_cones > 0:
+        status = turn_directions(K, level)
     return status
-
-
-def find_limits(K: ContactForces, level: int) -> None:
-    """Largest frictions at the multipliers now in the block, of impulses without those of forces that stay finite."""
-    for f in range(K.n_frictions):
-        K.limit[f] = limit_of(K, f)
-        if level == 1:  # only over the time of a non-smooth step
-            K.limit[f] += (K.past_time - 1.0) * K.base_limit[f]
-
-
-def whole(K: Complementarity, level: int) -> Reals:
-    """The multipliers that friction follows: with the impulses that are given, and those of a smooth step before."""
-    for k in range(K.n_rows):
-        K.loads[k] = K.impulse[k] + (K.given[k] + K.past[k] if level == 1 else 0.0)
-    return K.loads
-
-
-def load(K: ContactForces, level: int) -> None:
-    """Force and bias of the accelerations, or the force of the impulses that are given."""
-    if level == 0:
-        load_accelerations(K)
-        return
-    o_R = K.acc_R
-    for i in range(K.n):
-        K.force[i] = 0.0
-        for k in range(K.n_rows):
-            K.force[i] += K.acc[o_R + i * K.n_rows + k] * K.given[k] if K.given[k] != 0.0 else 0.0
-    if K.strategy == 1 and level == 1:
-        for f in range(K.n_frictions):
-            if slides(K, f):  # what friction lacks of its limit under the forces of the smooth step
-                row = K.friction_row[f]
-                for i in range(K.n):
-                    K.force[i] += K.acc[o_R + i * K.n_rows + row] * (K.slip[f] * K.past_limit[f] - K.past[row])
-
-
-def is_on(K: Frictions, f: int) -> bool:
-    """Whether a friction acts: its contact is closed, or it always does."""
-    c = K.friction_contact[f]
-    return bool(c < 0 or K.active[c] == 1)
-
-
-def slides(K: Frictions, f: int) -> bool:
-    """Whether a friction acts and slides."""
-    return bool(is_on(K, f) and K.sticks[f] == 0)
 
 
 def measure_free(K: Motion, level: int) -> None:
@@ -189,9 +122,20 @@ def contact_fault(K: ContactForces, c: int, largest: float) -> float:
 def friction_fault(K: ContactForces, f: int, largest: float) -> float:
     """How badly friction f breaks its law; ≤ 0 if it does not."""
     row = K.friction_row[f]
+    if K.partner[f] >= 0:
+        return cone_fault(K, f, largest)
     if K.sticks[f] == 1:
         return float(abs(K.impulse[row] + K.past[row]) - K.limit[f] - ROUND_OFF * largest)
     return departure(K, row, K.slip[f], SURE if K.loose[f] == 2 else ROUND_OFF)  # it slides against its own friction
+
+
+def cone_fault(K: ContactForces, f: int, largest: float) -> float:
+    """How badly two frictions that slide together break their law; the second of them never does."""
+    if follows(K, f):
+        return -1.0
+    if K.sticks[f] == 1:
+        return float(pull_of_both(K, f, K.impulse) - K.limit[f] - ROUND_OFF * largest)
+    return misses(K, f, SURE if K.loose[f] == 2 else ROUND_OFF)
 
 
 def give_way(K: DependentRows) -> int:
@@ -205,6 +149,10 @@ def give_way(K: DependentRows) -> int:
         f = K.row_friction[K.rows[k]]
         if f >= 0 and K.loose[f] > 0 and (chosen < 0 or K.n + k == K.failure_index):
             chosen = f
+    if chosen >= 0 and K.partner[chosen] >= 0:
+        K.sticks[chosen] = K.sticks[K.partner[chosen]] = 0
+        aim(K, chosen, -K.lean[chosen], -K.lean[K.partner[chosen]])
+        return 1
     if chosen >= 0:
         K.sticks[chosen] = 0
         K.lean[chosen] = 1.0 if K.lean[chosen] < 0.0 else -1.0
@@ -235,7 +183,13 @@ def toggle(K: Contacts, c: int) -> None:
 
 def turn(K: ContactForces, f: int) -> None:
     """The other branch of a friction: from sticking to sliding as its multiplier pulls, and back."""
-    if K.sticks[f] == 1:
+    p = K.partner[f]
+    if p >= 0:
+        K.sticks[f] = K.sticks[p] = 1 - K.sticks[f]
+        K.slip[f] = K.slip[p] = 0.0
+        if K.sticks[f] == 0:
+            aim(K, f, K.impulse[K.friction_row[f]], K.impulse[K.friction_row[p]])
+    elif K.sticks[f] == 1:
         K.sticks[f] = 0
         row = K.friction_row[f]
         K.slip[f] = 1.0 if K.impulse[row] + K.past[row] > 0.0 else -1.0
@@ -303,8 +257,14 @@ def choose(K: Frictions, number: int) -> None:
             K.parting[c] = number % 2
             number //= 2
     for f in range(K.n_frictions):
-        if K.loose[f] > 0:
+        if K.loose[f] > 0 and not follows(K, f):
             branch = number % 3
             number //= 3
             K.sticks[f] = 1 if branch == 0 else 0
             K.slip[f] = 0.0 if branch == 0 else (1.0 if branch == 1 else -1.0)
+            if K.partner[f] >= 0:
+                K.sticks[K.partner[f]] = K.sticks[f]
+                K.slip[K.partner[f]] = 0.0
+                if branch != 0:
+                    way = K.slip[f]
+                    aim(K, f, way * K.lean[f], way * K.lean[K.partner[f]])

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from mbd.kernel.codes import LOG_CLOSED, LOG_OPENED, LOG_SLIPPED, LOG_STUCK, NO_FORCE, NO_IMPACT, SLIP, UNKNOWN
 from mbd.kernel.complementarity import complementarity
+from mbd.kernel.cones import aim, follows, hold_directions
 from mbd.kernel.impact_solve import strikes
 from mbd.kernel.records import Balance, Frictions, Guards, Sizes, Switching
 from mbd.kernel.restart import active_rows, capture, evaluate, row_speed, take_consistent
+from mbd.kernel.roots import sqrt
 from mbd.kernel.saddle import solve_rows
 
 __all__ = ["ALL_IMPULSES", "NO_IMPULSE", "OWN_IMPULSE", "STILL", "log_event", "room_to_log", "resolve_contact_modes"]
@@ -57,6 +59,8 @@ def resolve_contact_modes(K: Switching) -> int:
 
     Frictions that do not move stick or begin to slide.
     """
+    if K.n_cones > 0:
+        hold_directions(K)
     find_slips(K)
     evaluate(K, K.time, K.q, K.y)
     K.impulse[: K.n_rows] = K.lam[: K.n_rows]
@@ -93,6 +97,8 @@ def resolve_contact_modes(K: Switching) -> int:
         if c >= 0 and K.closed[c] == 0:
             K.sticks[f] = 0
             K.slip[f] = 0.0
+        if follows(K, f):  # the first of two tells of both
+            continue
         now = frictional_state(K, f)
         if now != K.was[f] and K.was[f] != UNKNOWN:
             if now == 2:
@@ -104,9 +110,11 @@ def resolve_contact_modes(K: Switching) -> int:
 
 
 def frictional_state(K: Frictions, f: int) -> int:
-    """0 off, 2 sticking, ±1 sliding."""
+    """0 off, 2 sticking, ±1 sliding; 1 in space."""
     if K.sticks[f] == 1:
         return 2
+    if K.partner[f] >= 0:
+        return 1 if K.slip[f] != 0.0 else 0
     return int(K.slip[f])
 
 
@@ -125,6 +133,10 @@ def find_slips(K: Guards) -> None:
     evaluate(K, K.time, K.q, K.y)
     for f in range(K.n_frictions):
         c = K.friction_contact[f]
+        if K.partner[f] >= 0:
+            if K.partner[f] > f:
+                find_slip_of_both(K, f)
+            continue
         found = K.loose[f]
         K.loose[f] = 0
         K.lean[f] = K.slip[f] if K.slip[f] != 0.0 else K.lean[f]
@@ -149,6 +161,34 @@ def find_slips(K: Guards) -> None:
         else:
             K.sticks[f] = 0
             K.slip[f] = 1.0 if gamma > 0.0 else -1.0
+
+
+def find_slip_of_both(K: Guards, f: int) -> None:
+    """The same of a contact that slides in a plane, friction f and its partner: K.slip is the direction of γ."""
+    p = K.partner[f]
+    c = K.friction_contact[f]
+    found = K.loose[f]
+    K.loose[f] = K.loose[p] = 0
+    if K.closed[c] == 0 and K.touched[c] == 0:
+        K.sticks[f] = K.sticks[p] = 0
+        K.slip[f] = K.slip[p] = 0.0
+        return
+    x = row_speed(K, K.friction_row[f])
+    y = row_speed(K, K.friction_row[p])
+    speed = sqrt(x * x + y * y)
+    if found == 3:  # along its pull
+        K.loose[f] = K.loose[p] = 2 if K.strategy == 0 else 0
+        return
+    o_size = K.n + K.n_rows
+    small = max(1.0, 1e-2 * max(K.scale[o_size + K.friction_row[f]], K.scale[o_size + K.friction_row[p]]))
+    if speed <= (CLOSE_TO_STILL if found == 2 else STILL) * small:
+        K.loose[f] = K.loose[p] = 1
+        if K.slip[f] == 0.0 or K.event_kind != SLIP or found == 2:
+            K.sticks[f] = K.sticks[p] = 1
+            K.slip[f] = K.slip[p] = 0.0
+    else:
+        K.sticks[f] = K.sticks[p] = 0
+        aim(K, f, x, y)
 
 
 def find_painleve_contacts(K: Balance) -> int:

@@ -24,6 +24,7 @@ from mbd.kernel.codes import (
     STICK_BRIEF,
     WATCH,
 )
+from mbd.kernel.cones import HELD, along, follows, pull_of_both
 from mbd.kernel.guard_round_off import STEADY, condition_round_off, guard_round_off
 from mbd.kernel.hermite import crossing, hermite, hermite_turn
 from mbd.kernel.hooks import call
@@ -47,7 +48,7 @@ from mbd.kernel.restart import (
 )
 
 __all__ = [
-    "gap_scale", "gap_tolerance", "goes_back", "guard_value", "is_watched", "judge", "update_armed", "update_sides",
+    "along_slip", "gap_scale", "gap_tolerance", "goes_back", "guard_value", "is_watched", "judge", "update_armed", "update_sides",
     "watch",
 ]  # fmt: skip
 
@@ -283,24 +284,23 @@ def is_doubtful(K: Model, force: float) -> bool:
 
 def judge_friction(K: Switching, f: int, h: float) -> None:
     """Whether a friction that slides comes to rest, or one that sticks is pulled beyond its limit."""
-    if K.active[K.flag_friction + f] == 1:
+    if K.active[K.flag_friction + f] == 1 or follows(K, f):
         return
     if K.sticks[f] == 1:
-        row = K.friction_row[f]
-        m0 = K.guards0[K.at_limit + f] - abs(K.lam[row])
-        m1 = K.guards1[K.at_limit + f] - abs(K.lam1[row])
+        m0 = K.guards0[K.at_limit + f] - pull_of_both(K, f, K.lam)
+        m1 = K.guards1[K.at_limit + f] - pull_of_both(K, f, K.lam1)
         if is_doubtful(K, m1):
             m1 = margin(K, f, K.time + h)
-        if m1 < -1e-12 * abs(K.lam1[row]):
+        if m1 < -1e-12 * pull_of_both(K, f, K.lam1):
             consider(K, SLIP, f, crossing(max(m0, 0.0), m1), 0.0)
         return
     s = K.slip[f]
-    v0 = s * K.guards0[K.at_slip + f]
-    v1 = s * K.guards1[K.at_slip + f]
-    if s == 0.0:
+    if s == 0.0 or (K.partner[f] >= 0 and K.hold[f] != HELD):  # in a plane γ passes zero where its direction is held
         return
-    d0 = s * K.guards0[K.at_slip_rate + f] * h
-    d1 = s * K.guards1[K.at_slip_rate + f] * h
+    v0 = along_slip(K, f, K.guards0, K.at_slip)
+    v1 = along_slip(K, f, K.guards1, K.at_slip)
+    d0 = along_slip(K, f, K.guards0, K.at_slip_rate) * h
+    d1 = along_slip(K, f, K.guards1, K.at_slip_rate) * h
     tiny = REST * max(K.scale[K.n + K.n_rows + K.friction_row[f]], 1e-3)
     if v1 < -tiny:
         top = hermite_turn(v0, v1, d0, d1, True) if d0 > 0.0 else -1.0
@@ -316,14 +316,20 @@ def judge_friction(K: Switching, f: int, h: float) -> None:
             consider(K, STICK_BRIEF, f, bottom, 0.0)
 
 
+def along_slip(K: Guards, f: int, values: Reals, first: int) -> float:
+    """Of values of frictions that begin at `first`, that along the way in which friction f slides."""
+    if K.partner[f] < 0:
+        return float(K.slip[f] * values[first + f])
+    return along(K, f, values[first + f], values[first + K.partner[f]])
+
+
 def margin(K: Switching, f: int, t1: float) -> float:
     """What is left of a sticking friction at the candidate, limit − |λ_T| of consistent multipliers."""
-    row = K.friction_row[f]
     if consistent(K, t1, K.q1, K.y1) != 0:
-        return float(K.guards1[K.at_limit + f] - abs(K.lam1[row]))
+        return float(K.guards1[K.at_limit + f] - pull_of_both(K, f, K.lam1))
     K.loads[: K.n_rows] = K.impulse[: K.n_rows]
     evaluate_loaded(K, K.loads)
-    return float(limit_of(K, f) - abs(K.impulse[row]))
+    return float(limit_of(K, f) - pull_of_both(K, f, K.impulse))
 
 
 def guard_value(K: Switching, kind: int, index: int, t1: float) -> float:
@@ -342,7 +348,7 @@ def guard_value(K: Switching, kind: int, index: int, t1: float) -> float:
     if kind == CROSS:
         return float(K.side[index] * K.guards1[K.at_user + index])
     if kind == STICK:
-        return float(K.slip[index] * K.guards1[K.at_slip + index])
+        return along_slip(K, index, K.guards1, K.at_slip)
     if kind == CROSS_BACK:
         return float(-K.side[index] * K.guards1[K.at_user + index])
     if kind == SLIP:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from mbd.kernel.complementarity import complementarity
+from mbd.kernel.cones import hold_directions
 from mbd.kernel.records import Balance, Complementarity, ContactForces, Contacts, Frictions, Guards
 from mbd.kernel.restart import capture, evaluate, evaluate_loaded, limit_of, row_speed
 
@@ -15,6 +16,8 @@ __all__ = [
 def prepare(K: Balance) -> None:
     """K.acc at the instant, directions of sliding where contacts are now, force zero; all frictions begin stuck."""
     evaluate(K, K.time, K.q, K.y)
+    if K.n_cones > 0:
+        hold_directions(K)
     if K.n_frictions > 0:
         for f in range(K.n_frictions):
             c = K.friction_contact[f]

@@ -19,7 +19,7 @@ from mbd.kernel.codes import (
     WATCH,
 )
 from mbd.kernel.guard_round_off import guard_round_off
-from mbd.kernel.guards import gap_tolerance, guard_value, is_watched, judge
+from mbd.kernel.guards import along_slip, gap_tolerance, guard_value, is_watched, judge
 from mbd.kernel.hermite import first_guess
 from mbd.kernel.records import Events, Guards, Kernel, Switching
 from mbd.kernel.refine import refine
@@ -218,7 +218,7 @@ def guard_rate(K: Guards, kind: int, index: int) -> float:
     if kind == CROSS_BACK:
         return float(-K.side[index] * K.guards1[K.at_user_rate + index])
     if kind == STICK:
-        return float(K.slip[index] * K.guards1[K.at_slip_rate + index])
+        return along_slip(K, index, K.guards1, K.at_slip_rate)
     return 0.0
 
 

@@ -39,7 +39,8 @@ def store_state(K: Switching, q: Reals, y: Reals, rate: Reals, lam: Reals) -> No
         if K.normal[c] >= 0:
             K.row_bounds[1 + c] = max(K.row_bounds[1 + c], lam[K.normal[c]])
     for f in range(K.n_frictions):
-        K.store[o + K.n_contacts + f] = 2.0 if K.sticks[f] == 1 else K.slip[f]
+        way = K.slip[f] if K.partner[f] < 0 or K.slip[f] == 0.0 else 1.0
+        K.store[o + K.n_contacts + f] = 2.0 if K.sticks[f] == 1 else way
     K.n_stored += 1
     K.steps_since_row = 0
     K.turned = 0.0

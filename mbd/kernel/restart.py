@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from mbd.kernel.codes import ACCELERATIONS, COMPOSE, EPS, NOT_CONVERGED, SCALES
+from mbd.kernel.cones import fill_slips, sliding_force
 from mbd.kernel.hooks import call
 from mbd.kernel.records import (
     Balance,
@@ -51,7 +52,7 @@ def fill_block(K: Mechanism, t: float, q: Reals, y: Reals) -> None:
     block[K.o_anchor : K.o_anchor + K.n_anchors] = K.anchors[: K.n_anchors]
     for c in range(K.n_contacts):
         block[K.o_switch + c] = 1.0 if (K.kind[c] == 1 and K.closed[c] == 1) else 0.0
-    block[K.o_slip : K.o_slip + K.n_frictions] = K.slip[: K.n_frictions]
+    fill_slips(K)
 
 
 def compose(K: Motion, q1: Reals) -> None:
@@ -239,7 +240,7 @@ def evaluate_loaded(K: ContactRows, lam: Reals) -> float:
         change = max(change, abs(K.block[K.o_lam + k] - lam[k]))
         size = max(size, abs(lam[k]))
         K.block[K.o_lam + k] = lam[k]
-    K.block[K.o_slip : K.o_slip + K.n_frictions] = K.slip[: K.n_frictions]
+    fill_slips(K)
     call(K, ACCELERATIONS, K.acc)
     return change / size
 
@@ -353,7 +354,9 @@ def find_sliding_friction(K: ContactForces) -> None:
     evaluate_loaded(K, K.impulse)
     for f in range(K.n_frictions):
         if K.slip[f] != 0.0:
-            K.impulse[K.friction_row[f]] = K.slip[f] * limit_of(K, f)
+            own = K.acc_rate + K.friction_row[f]
+            other = K.acc_rate + (K.friction_row[K.partner[f]] if K.partner[f] >= 0 else 0)
+            K.impulse[K.friction_row[f]] = sliding_force(K, f, limit_of(K, f), K.acc, own, other)
 
 
 def load_accelerations(K: ContactForces) -> None:

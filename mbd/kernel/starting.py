@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from mbd.kernel.codes import NEW_MODE
+from mbd.kernel.cones import let_directions_go
 from mbd.kernel.conditioning import is_ill_conditioned, refine_accelerations
 from mbd.kernel.contact_modes import resolve_contact_modes
 from mbd.kernel.contact_step import find_pace
@@ -66,6 +67,8 @@ def restart(K: Kernel) -> int:
     if K.n_watched > 0:
         watch(K, K.time, K.q, K.y, K.rate, K.lam, K.guards0)
         update_armed(K)
+    if K.n_cones > 0:
+        let_directions_go(K)
     return 0
 
 

@@ -15,6 +15,7 @@ from mbd.kernel.codes import (
     STICK,
     WATCH,
 )
+from mbd.kernel.cones import aim
 from mbd.kernel.contact_modes import ALL_IMPULSES, NO_IMPULSE, OWN_IMPULSE, STILL, log_event
 from mbd.kernel.guards import gap_scale, is_watched
 from mbd.kernel.impact import impact
@@ -194,10 +195,17 @@ def switch(K: Switching) -> int:
     elif kind == STICK:
         K.loose[index] = 2
         K.sticks[index] = 0
+        if K.partner[index] >= 0:
+            K.loose[K.partner[index]] = 2
+            K.sticks[K.partner[index]] = 0
     elif kind == SLIP:
         K.loose[index] = 3
         K.sticks[index] = 0
         K.slip[index] = 1.0 if K.lam[K.friction_row[index]] > 0.0 else -1.0
+        if K.partner[index] >= 0:
+            K.loose[K.partner[index]] = 3
+            K.sticks[K.partner[index]] = 0
+            aim(K, index, K.lam[K.friction_row[index]], K.lam[K.friction_row[K.partner[index]]])
     elif kind == OPEN_PULL and bursts(K, index):
         K.failure_index = index
         return NO_FORCE

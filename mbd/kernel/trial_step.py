@@ -8,6 +8,7 @@ from mbd.kernel.codes import (
     NOT_CONVERGED,
     NOT_FINITE,
 )
+from mbd.kernel.cones import sliding_force
 from mbd.kernel.hooks import call, scheme_step
 from mbd.kernel.records import (
     Balance,
@@ -64,7 +65,8 @@ def try_step(K: Kernel, h: float, t1: float) -> int:
         for f in range(K.n_frictions):
             K.limit[f] = K.guards1[K.at_limit + f]
             if K.slip[f] != 0.0:
-                K.lam1[K.friction_row[f]] = K.slip[f] * K.limit[f]
+                other = K.at_slip + (K.partner[f] if K.partner[f] >= 0 else 0)
+                K.lam1[K.friction_row[f]] = sliding_force(K, f, K.limit[f], K.guards1, K.at_slip + f, other)
     return 0
 
 

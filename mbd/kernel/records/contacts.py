@@ -47,11 +47,13 @@ class Frictions(Contacts):
 
     friction_row: Integers = integers()
     friction_contact: Integers = integers()
+    partner: Integers = integers()  # the other direction of a contact in space, −1 for none
     sticks: Integers = integers(lambda s: s.n_frictions, kept=True)
     loose: Integers = integers(lambda s: s.n_frictions, kept=True)
     was: Integers = integers(lambda s: s.n_frictions, kept=True)  # at the last restart: 0 off, 2 sticking, ±1 sliding
     let_go: Integers = integers(lambda s: s.n_frictions)  # 1: a friction that has let go for the step being tried
-    slip: Reals = reals(lambda s: s.n_frictions, kept=True)  # sign of sliding
+    slip: Reals = reals(lambda s: s.n_frictions, kept=True)  # sign of sliding; of two directions its cosines
+    hold: Reals = reals(lambda s: s.n_frictions, kept=True)  # how much of these counts: see `mbd.kernel.cones`
     lean: Reals = reals(lambda s: s.n_frictions, kept=True)  # the direction in which each slid last
     limit: Reals = reals(lambda s: s.n_frictions)  # largest friction
     base_limit: Reals = reals(lambda s: s.n_frictions)  # the same at zero multipliers

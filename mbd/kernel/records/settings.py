@@ -18,6 +18,7 @@ class Sizes(Record):
     n_contacts: int
     n_guards: int  # of the user
     n_frictions: int
+    n_cones: int  # pairs of frictions that slide together, those of contacts in space
     o_q: int  # offsets into the block
     o_x: int
     o_v: int

@@ -47,6 +47,12 @@ class Complementarity(SchemeAbilities):
     lcp_rows: Integers = integers(lambda s: s.n_contacts + s.n_frictions)
     lcp_who: Integers = integers(lambda s: s.n_contacts + s.n_frictions)
     lcp_basis: Integers = integers(lambda s: s.n_lcp)
+    cone_who: Integers = integers(lambda s: s.n_frictions)  # pairs of frictions whose direction is looked for
+    cone_pivots: Integers = integers(lambda s: s.n_frictions)
+    cone_miss: Reals = reals(lambda s: s.n_frictions)  # of each, part of γ across its direction
+    cone_turn: Reals = reals(lambda s: s.n_frictions)  # by which it turns [rad]
+    cone_slope: Reals = reals(lambda s: s.n_frictions * s.n_frictions)
+    cone_kept: Reals = reals(lambda s: s.n_frictions)  # cosines before a turn
 
 
 class Singular(SchemeAbilities):

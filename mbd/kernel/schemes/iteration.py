@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from mbd.kernel.codes import EPS
+from mbd.kernel.cones import fill_slips
 from mbd.kernel.hooks import call
 from mbd.kernel.records import Equations, Motion, Settings, SingularSteps, Steps
 from mbd.kernel.restart import compose
@@ -37,7 +38,7 @@ def predict(K: SingularSteps, h: float, t1: float, c_C: float, c_K: float) -> No
     for k in range(K.n_rows):
         block[K.o_lam + k] = K.lam[k] + h * K.lam_slope[k]
     block[K.o_anchor : K.o_anchor + K.n_anchors] = K.anchors[: K.n_anchors]
-    block[K.o_slip : K.o_slip + K.n_frictions] = K.slip[: K.n_frictions]
+    fill_slips(K)
     for i in range(K.n):
         last = K.rate[i]
         a0 = last + stretch * (K.aux[i] - last)

@@ -15,6 +15,7 @@ held over the step. Newton's matrices are those of `stage_matrices`.
 from __future__ import annotations
 
 from mbd.kernel.codes import EPS, INCREMENT_RATES
+from mbd.kernel.cones import fill_slips
 from mbd.kernel.hooks import call
 from mbd.kernel.ordered import solve_kkt
 from mbd.kernel.records import Kernel, SingularSteps, Steps
@@ -59,7 +60,7 @@ def hold_block(K: SingularSteps) -> None:
     """What all stages of a step share, into the block: the center of the chart, anchors, sliding."""
     K.block[K.o_q : K.o_q + K.n_q] = K.q[: K.n_q]
     K.block[K.o_anchor : K.o_anchor + K.n_anchors] = K.anchors[: K.n_anchors]
-    K.block[K.o_slip : K.o_slip + K.n_frictions] = K.slip[: K.n_frictions]
+    fill_slips(K)
     if K.vector == 0:
         o_E = stage_place(K, STAGE_BEND)
         K.stages[o_E : o_E + 3 * K.n_v] = 0.0

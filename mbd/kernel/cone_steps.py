@@ -1,0 +1,114 @@
+"""Steps near the end of sliding in a plane, where the direction of γ turns fast and then is none.
+
+Far from rest λ_T follows γ within a step. No step can go through ‖γ‖ = 0 like that: beyond it nothing slides on. So
+
+- where γ turns, or falls, by much of itself, steps are shortened, ``h ≤ ½ ‖γ‖/‖γ̇‖``;
+- where it runs straight into zero, ``γ̇ ∥ −γ``, the step holds one direction e, and ``e · γ`` passes zero with a change
+  of sign, which is located as any other. The direction is corrected until γ itself is zero there: it is the mean
+  direction of what is left of the motion.
+
+A motion that only comes close to rest turns around it in shortened steps, and slides on.
+"""
+
+from __future__ import annotations
+
+from mbd.kernel.codes import STICK
+from mbd.kernel.cones import HELD, aim
+from mbd.kernel.guards import judge
+from mbd.kernel.locate import locate
+from mbd.kernel.records import Guards, Kernel
+from mbd.kernel.roots import sqrt
+from mbd.kernel.trial_step import try_step
+
+__all__ = ["approached_end", "come_to_zero", "slides_on"]
+
+PART = 0.5
+"""Part of the time in which γ would reach zero, or turn by a radian, that a step may take [-]."""
+FAR = 2.0
+"""Times of a step in which γ must not reach zero if the step is to be as any other [-]."""
+SURELY = 0.8
+"""Part of a step within which γ reaches zero if a direction is held in it [-]."""
+STRAIGHT = 0.05
+"""Sine of the angle between γ̇ and −γ below which γ runs into zero [-]."""
+SLOW = 1e-6
+"""Speed over that of the start of the approach, ‖γ̇‖ dt, below which it does whatever the angle [-]."""
+SHORTEST = 1e-4
+"""Part of dt below which no step is shortened for this [-]."""
+MOST_CORRECTIONS = 8
+"""Corrections of a direction that is held [-]."""
+AT_REST = 1e-10
+"""Speed across the direction that is held that counts as none, over ‖γ̇‖ dt [-]."""
+
+
+def approached_end(K: Guards, t1: float) -> float:
+    """Where the step that was to end at t1 ends; K.hold tells which directions are held in it."""
+    end = t1
+    for f in range(K.n_frictions):
+        if K.partner[f] > f and K.slip[f] != 0.0 and (K.hold[f] == 0.0 or K.hold[f] == HELD):
+            p = K.partner[f]
+            K.hold[f] = K.hold[p] = 0.0
+            x = K.guards0[K.at_slip + f]
+            y = K.guards0[K.at_slip + p]
+            ax = K.guards0[K.at_slip_rate + f]
+            ay = K.guards0[K.at_slip_rate + p]
+            speed = sqrt(x * x + y * y)
+            change = sqrt(ax * ax + ay * ay)
+            h = t1 - K.time
+            if not change * FAR * h > speed:
+                continue
+            fall = -(x * ax + y * ay)
+            across = abs(x * ay - y * ax)
+            straight = fall > 0.0 and (across <= STRAIGHT * speed * change or speed <= SLOW * change * K.dt)
+            ends = fall > 0.0 and speed * speed < SURELY * h * fall
+            if straight and (ends or h < SHORTEST * K.dt):
+                K.hold[f] = K.hold[p] = HELD
+            elif fall > 0.0 or across * h > PART * speed * speed:
+                end = min(end, K.time + max(PART * speed / change, SHORTEST * K.dt))
+    return end
+
+
+def slides_on(K: Guards) -> bool:
+    """Whether a candidate with a held direction has not come to rest: it is taken again, and the direction let go."""
+    found = False
+    for f in range(K.n_frictions):
+        if K.partner[f] > f and K.slip[f] != 0.0 and K.hold[f] == HELD:
+            p = K.partner[f]
+            if K.slip[f] * K.guards1[K.at_slip + f] + K.slip[p] * K.guards1[K.at_slip + p] > 0.0:
+                K.hold[f] = K.hold[p] = 0.0
+                found = True
+    return found
+
+
+def come_to_zero(K: Kernel, h: float, t1: float) -> int:
+    """After sliding was found to end, at the candidate: correct the direction that is held until γ is zero there."""
+    f = K.event_index
+    p = K.partner[f]
+    last = 0.0
+    turned = 0.0
+    for turn in range(MOST_CORRECTIONS):
+        left = K.slip[f] * K.guards1[K.at_slip + p] - K.slip[p] * K.guards1[K.at_slip + f]
+        x = K.guards0[K.at_slip + f]
+        y = K.guards0[K.at_slip + p]
+        speed = sqrt(x * x + y * y)
+        if abs(left) <= AT_REST * speed + 1e-13:
+            return 0
+        angle = left / speed
+        if turn > 0 and abs(last - left) > 0.0:
+            angle = turned * left / (last - left)
+        if not abs(angle) < 0.5:
+            return 0
+        last = left
+        turned = angle
+        aim(K, f, K.slip[f] - angle * K.slip[p], K.slip[p] + angle * K.slip[f])
+        status = try_step(K, h, t1)
+        if status != 0:
+            return status
+        K.active[: K.n_contacts + K.n_guards + K.n_frictions] = 0
+        if not judge(K, h):
+            return 0
+        status = locate(K, h)
+        if status != 0:
+            return status
+        if K.event_kind != STICK or K.event_index != f:
+            return 0
+    return 0
