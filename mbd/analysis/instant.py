@@ -18,7 +18,10 @@ from mbd.equations.linearization import LinearTerms, linearization
 from mbd.errors import ModelError
 from mbd.integrators.hht import HHT
 from mbd.kernel import codes
+from mbd.kernel.active_set import ActiveSetManager
+from mbd.kernel.cones import let_directions_go
 from mbd.kernel.contact_modes import resolve_contact_modes
+from mbd.kernel.guards import watch
 from mbd.kernel.records import Kernel
 from mbd.kernel.redundancy import find_dependent, sharing, spread
 from mbd.kernel.restart import active_rows
@@ -93,7 +96,7 @@ class Instant:
         block[layout.lam : layout.anchor] = self.lam
         if extra is not None:
             block[[layout.lam + k for k in self.rows]] += extra
-        block[layout.slip : layout.shift] = self.system.slip
+        block[layout.slip : layout.shift] = self.system.slips
         out = np.zeros(function.size)
         function(block, self.system.parameters, out)
         return out
@@ -121,7 +124,7 @@ class Instant:
         state, system = self.state, self.system
         there = self.mechanism.acceleration_terms(
             state.time, state.q, np.concatenate([state.v, state.z]), system.parameters, system.anchors,
-            slips=system.slip, lam=self.lam,
+            slips=system.slips, lam=self.lam,
         )  # fmt: skip
         flags = np.array(self.dependent, dtype=bool)
         kept, dependent = np.array(self.rows)[~flags], np.array(self.rows)[flags]
@@ -159,6 +162,8 @@ def instant(
     find_dependent(K, active_rows(K, K.closed))
     if K.n_dropped > 0 and not sharing(K):
         spread(K, K.lam)
+    if K.n_cones > 0:
+        _let_directions_go(K, manager)
     rows = manager.active_rows(flags, K.sticks)
     layout = mechanism.layout
     found = Instant(
@@ -170,6 +175,19 @@ def instant(
     if faults:
         raise ModelError(faults)
     return found
+
+
+def _let_directions_go(K: Kernel, manager: ActiveSetManager) -> None:
+    """Friction in a plane follows the velocity from here on; where it only begins to slide it has no linear law."""
+    K.guards0[: K.n_watched] = 0.0
+    watch(K, K.time, K.q, K.y, K.rate, K.lam, K.guards0)
+    let_directions_go(K)
+    begins = [manager.frictions[f].name for f in range(K.n_frictions) if K.hold[f] > 0.0]
+    if begins:
+        raise ModelError(
+            f"{begins[0]!r} begins to slide from rest at t = {K.time:.6g} s: in space its friction has no direction "
+            "there that small motions could change smoothly; take a state in which it sticks or slides"
+        )
 
 
 def _kernel(stepper: Stepper, state: State) -> Kernel:

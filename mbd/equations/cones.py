@@ -22,7 +22,7 @@ __all__ = ["sliding_force"]
 
 LEAST_SQUARE = 1e-60
 """‖w‖² that is none [m²/s²]."""
-NO_SLIP = 1e-300
+NO_SLIP = 1e-100
 """‖s‖² that is none [-]."""
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from mbd.kernel.branches import is_on, solve_directed
 from mbd.kernel.cones import aim, follows
 from mbd.kernel.linear import factor, solve
-from mbd.kernel.records import Balance, ContactForces, Frictions
+from mbd.kernel.records import Balance, ContactForces, ContactRows, Frictions
 from mbd.kernel.roots import sqrt
 
 __all__ = ["misses", "turn_directions"]
@@ -70,7 +70,7 @@ def find_misses(K: ContactForces, count: int) -> float:
     return worst
 
 
-def mass_of(K: ContactForces, f: int) -> float:
+def mass_of(K: ContactRows, f: int) -> float:
     """What a force along f and its partner meets if nothing else holds, 1/(B M⁻¹ Bᵀ) of both."""
     ease = 0.0
     for turn in range(2):
@@ -99,7 +99,7 @@ def turn_by(K: Frictions, f: int, angle: float) -> None:
     aim(K, f, K.slip[f] - angle * K.slip[p], K.slip[p] + angle * K.slip[f])
 
 
-def keep_directions(K: Balance, count: int, out: bool) -> None:
+def keep_directions(K: ContactForces, count: int, out: bool) -> None:
     """Directions into K.cone_kept, or back."""
     for i in range(count):
         f = K.cone_who[i]
@@ -132,7 +132,7 @@ def newton_turns(K: Balance, level: int, count: int) -> int:
     return 0
 
 
-def gather(K: Frictions) -> int:
+def gather(K: ContactForces) -> int:
     """Pairs that slide and may choose, into K.cone_who; how many."""
     count = 0
     for f in range(K.n_frictions):

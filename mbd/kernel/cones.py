@@ -12,7 +12,7 @@ from mbd.kernel.roots import sqrt
 
 __all__ = [
     "HELD", "ONSET", "aim", "along", "cosine", "fill_slips", "follow_motion", "follows", "hold_directions", "leads",
-    "let_directions_go", "pull_of_both", "sliding_force", "speed_of_both",
+    "let_directions_go", "phase_of", "pull_of_both", "sliding_force", "speed_of_both",
 ]  # fmt: skip
 
 HELD = 1e20
@@ -81,7 +81,7 @@ def along(K: Frictions, f: int, x: float, y: float) -> float:
     return float(K.slip[f] * x + K.slip[K.partner[f]] * y)
 
 
-def speed_of_both(K: Guards, f: int, values: Reals, first: int) -> float:
+def speed_of_both(K: Frictions, f: int, values: Reals, first: int) -> float:
     """‖γ‖ of friction f and its partner among values that begin at `first`."""
     x = values[first + f]
     y = values[first + K.partner[f]]
@@ -95,6 +95,13 @@ def pull_of_both(K: Frictions, f: int, lam: Reals) -> float:
         return abs(x)
     y = lam[K.friction_row[K.partner[f]]]
     return sqrt(x * x + y * y)
+
+
+def phase_of(K: Frictions, f: int) -> float:
+    """What a friction does, as results tell it: 2 sticks, ±1 slides that way (1 in space), 0 off."""
+    if K.sticks[f] == 1:
+        return 2.0
+    return float(K.slip[f] if K.partner[f] < 0 or K.slip[f] == 0.0 else 1.0)
 
 
 def hold_directions(K: Frictions) -> None:

@@ -33,6 +33,7 @@ from mbd.kernel.records import (
     ContactRows,
     Contacts,
     Events,
+    Frictions,
     Guards,
     Mechanism,
     Model,
@@ -316,7 +317,7 @@ def judge_friction(K: Switching, f: int, h: float) -> None:
             consider(K, STICK_BRIEF, f, bottom, 0.0)
 
 
-def along_slip(K: Guards, f: int, values: Reals, first: int) -> float:
+def along_slip(K: Frictions, f: int, values: Reals, first: int) -> float:
     """Of values of frictions that begin at `first`, that along the way in which friction f slides."""
     if K.partner[f] < 0:
         return float(K.slip[f] * values[first + f])

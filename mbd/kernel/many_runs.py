@@ -12,6 +12,7 @@ from mbd.kernel.advance import advance
 from mbd.kernel.begin_run import begin_run
 from mbd.kernel.candidate import carry
 from mbd.kernel.codes import DONE, EVENT, LAST, LOG_CLOSED, LOG_EVENT, LOG_OPENED, NEEDS_PYTHON, NEW_MODE, PAUSE
+from mbd.kernel.cones import phase_of
 from mbd.kernel.records import Kernel
 
 __all__ = ["END_NUMBERS", "march_many"]
@@ -157,5 +158,5 @@ def note_end(K: Kernel, status: int) -> None:
         held = K.closed_before[c] if K.before_time >= K.time else K.closed_now[c]
         K.ends[o + 2 * K.n_contacts + K.n_frictions + c] = float(held)
     for f in range(K.n_frictions):
-        K.ends[o + K.n_contacts + f] = 2.0 if K.sticks[f] == 1 else K.slip[f]
+        K.ends[o + K.n_contacts + f] = phase_of(K, f)
     carry(K.anchors, K.ends, o + 3 * K.n_contacts + K.n_frictions, K.n_anchors, True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from mbd.kernel.candidate import carry
 from mbd.kernel.codes import LOG_EVENT, LOG_SLIPPED, LOG_STUCK
+from mbd.kernel.cones import phase_of
 from mbd.kernel.records import Reals, Switching
 
 __all__ = ["is_awaited", "store_row", "store_state"]
@@ -39,8 +40,7 @@ def store_state(K: Switching, q: Reals, y: Reals, rate: Reals, lam: Reals) -> No
         if K.normal[c] >= 0:
             K.row_bounds[1 + c] = max(K.row_bounds[1 + c], lam[K.normal[c]])
     for f in range(K.n_frictions):
-        way = K.slip[f] if K.partner[f] < 0 or K.slip[f] == 0.0 else 1.0
-        K.store[o + K.n_contacts + f] = 2.0 if K.sticks[f] == 1 else way
+        K.store[o + K.n_contacts + f] = phase_of(K, f)
     K.n_stored += 1
     K.steps_since_row = 0
     K.turned = 0.0

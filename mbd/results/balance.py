@@ -44,6 +44,8 @@ LEAST_SHARE = 1e-4
 """Part of the largest limit of friction that even one without load counts as, where several hold together [-]."""
 SETTLED = 1e-13
 """Relative change of multipliers at which that ends [-]."""
+AT_REST = 1e-9
+"""Speed of sliding that is none [m/s]."""
 STICKS = 2
 """Phase of a friction that sticks."""
 
@@ -120,7 +122,7 @@ class Balance:
         turns = MOST_LOADS if self.follows or (held.depend and self.equations.frictions) else 1
         lam = rows.lam
         for _ in range(turns):
-            M, f, R, B, bias, limits = self._terms_at(replace(rows, lam=lam))
+            M, f, R, B, _, bias, limits = self._terms_at(replace(rows, lam=lam))
             forces, spread = R[:, :, held.kept], None
             if held.depend:
                 dependence, weight = _dependence(M, B, held), self._shares(held, limits)
@@ -134,14 +136,27 @@ class Balance:
             if np.all((change <= SETTLED * np.max(np.abs(lam), axis=1, initial=0.0)) | ~sound):
                 break
         if slides:
-            limits = self._terms_at(replace(rows, lam=lam))[-1]
+            *_, rates, _, limits = self._terms_at(replace(rows, lam=lam))
             for number, friction in enumerate(self.equations.frictions):
-                way = rows.phase[:, number]
-                sliding = np.abs(way) == 1
+                sliding = np.abs(rows.phase[:, number]) == 1
+                way = self._way(rows, number, rates)
                 lam[sliding, friction.row] = (way * limits[:, number])[sliding]
         sound &= np.isfinite(rate).all(axis=1) & np.isfinite(lam).all(axis=1)
         found.rate[mine], found.lam[mine], found.size[mine], found.sound[mine] = rate, lam, size, sound
         found.inertia[mine], found.load[mine] = M, f
+
+    def _way(self, rows: Rows, number: int, rates: Matrix) -> Vector:
+        """Sign with which a friction slides, or cosine of its direction to that of both, (k,)."""
+        own = self.equations.frictions[number]
+        if own.partner < 0:
+            return np.asarray(rows.phase[:, number], dtype=float)
+        other = self.equations.frictions[own.partner]
+        x, y = rates[:, own.row], rates[:, other.row]
+        pull, beside = rows.lam[:, own.row], rows.lam[:, other.row]
+        resting = np.hypot(x, y) < AT_REST  # γ has no direction yet
+        x, y = np.where(resting, pull, x), np.where(resting, beside, y)
+        size = np.hypot(x, y)
+        return np.divide(x, size, out=np.zeros_like(x), where=size > 0.0)
 
     def _shares(self, held: _Held, limits: Matrix) -> Matrix:
         """W of the rows that hold (k, every): 1, or the limit of the friction that holds one over the largest."""
@@ -155,13 +170,13 @@ class Balance:
         return weight
 
     def _terms_at(self, rows: Rows) -> tuple[Any, ...]:
-        """M (k, n, n), f (k, n), R (k, n, m), B (k, m, n), γ (k, m), limits of frictions (k, n_frictions)."""
+        """M (k, n, n), f (k, n), R (k, n, m), B (k, m, n), ḣ (k, m), γ (k, m), limits of frictions (k, n_frictions)."""
         n, m, count = self.equations.n_v + self.equations.n_z, len(self.equations.rows), len(rows)
-        flat = np.array(self.terms(self.states.inputs(rows), self.states.record.parameters_at(rows.source))).T
+        flat = np.array(self.terms(self.states.all_inputs(rows), self.states.record.parameters_at(rows.source))).T
         cuts = np.cumsum([n * n, n, n * m, m * n, m, m, m])
-        M, f, R, B, _, _, bias, rest = np.split(flat.reshape(count, -1), cuts, axis=1)
+        M, f, R, B, _, rates, bias, rest = np.split(flat.reshape(count, -1), cuts, axis=1)
         limits = rest[:, rest.shape[1] - len(self.equations.frictions) :]
-        return M.reshape(count, n, n), f, R.reshape(count, n, m), B.reshape(count, m, n), bias, limits
+        return M.reshape(count, n, n), f, R.reshape(count, n, m), B.reshape(count, m, n), rates, bias, limits
 
     def _rows_of(self, mode: NDArray[np.int8]) -> _Held:
         """The rows that hold in a mode, judged at stored states."""

@@ -54,6 +54,7 @@ class _Contact:
 class _Friction:
     contact: int
     row: int
+    partner: int = -1
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,6 +139,7 @@ def write_expressions(equations: Any, nodes: Mapping[str, Node], arrays: Arrays)
         "rows": [[row.contact, row.friction] for row in equations.rows],
         "contacts": [list(contact.anchors) for contact in equations.contacts],
         "frictions": [[friction.contact, friction.row] for friction in equations.frictions],
+        "partners": [friction.partner for friction in equations.frictions],
         "adds": equations.compose is None, "charts": [place[node.index] for node in moving],
         "wrapped": [[turn.anchor, place[turn.angle.index], place[turn.rate.index]] for turn in equations.wrapped],
     }  # fmt: skip
@@ -165,6 +167,8 @@ def arrays_of_expressions(words: Any, members: Members) -> set[str]:
     expect(isinstance(words["adds"], bool), what)
     _indices(words["rows"], rows, ((-1, contacts), (-1, frictions)), what)
     _indices(words["frictions"], frictions, ((-1, contacts), (0, rows)), what)
+    partners = of_kind(words.get("partners", []), list, what)  # older files have none
+    expect(len(partners) in (0, frictions) and all(-1 <= of_kind(k, int, what) < frictions for k in partners), what)
     expect(len(of_kind(words["contacts"], list, what)) == contacts, what)
     for held in words["contacts"]:
         for place in of_kind(held, list, what):
@@ -195,6 +199,7 @@ def _indices(value: Any, count: int, bounds: Sequence[tuple[int, int]], what: st
 def read_expressions(words: Mapping[str, Any], arrays: Mapping[str, Any], parameters: int) -> Expressions:
     """What `write_expressions` was given; `parameters` is how many there are, tables included."""
     sizes = dict(zip("qvz", words["sizes"], strict=True))
+    partners = words.get("partners") or [-1] * len(words["frictions"])
     rows, contacts, frictions = (words[name] for name in ("rows", "contacts", "frictions"))
     room = {
         "t": 1, "q": (1 if words["adds"] else 2) * sizes["q"],
@@ -214,7 +219,8 @@ def read_expressions(words: Mapping[str, Any], arrays: Mapping[str, Any], parame
     known = {"charts": Charts.from_nodes(charts, sizes["q"], sizes["v"]) if charts else None}
     return Expressions(
         tape, sizes["q"], sizes["v"], sizes["z"], tuple(_Row(*row) for row in rows),
-        tuple(_Contact(tuple(held)) for held in contacts), tuple(_Friction(*friction) for friction in frictions),
+        tuple(_Contact(tuple(held)) for held in contacts), 
+        tuple(_Friction(*friction, partner) for friction, partner in zip(frictions, partners, strict=True)),
         {name: nodes[k] for name, k in zip(words["names"], outputs, strict=True)}, tuple(nodes[k] for k in terms),
         words["adds"], (),
         tuple(_Wrapped(anchor, nodes[angle], nodes[rate]) for anchor, angle, rate in words.get("wrapped", ())), known,

@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     from mbd.equations.equations import Effect, Equations
     from mbd.tape.node import Node, Scalar
 
+NO_SLIP = 1e-100
+"""Square of slips that is none, as in `mbd.equations.cones` [-]."""
+
 __all__ = ["Lost", "Power", "moving_share", "powers"]
 
 UNKNOWN_RATE = frozenset({"a", "s", "lam"})
@@ -65,7 +68,7 @@ def powers(equations: Equations) -> list[Power]:
         if effect.power is not None:
             switch = tape.one if effect.contact < 0 else tape.input("switch", effect.contact)
             if effect.column == "friction" and effect.name in dry:  # what sticks does no work
-                switch = abs(tape.input("slip", dry[effect.name]))
+                switch = _slides(equations, dry[effect.name])
             add(effect.name, effect.column, switch * effect.power)
             if effect.elastic is not None:
                 elastic[effect.name, effect.column] = switch * _change(equations, effect.elastic), effect
@@ -106,6 +109,16 @@ def moving_share(equations: Equations) -> Node:
     for rate, momentum in zip(v, gradient(equations.kinetic, v), strict=True):
         total = total - rate * momentum
     return total
+
+
+def _slides(equations: Equations, k: int) -> Node:
+    """1 while friction k slides, 0 while it sticks or is off."""
+    own = equations.tape.input("slip", k)
+    if equations.frictions[k].partner < 0:
+        return abs(own)
+    other = equations.tape.input("slip", equations.frictions[k].partner)
+    square = own * own + other * other
+    return square / (square + NO_SLIP)
 
 
 def _change(equations: Equations, value: Node) -> Node:

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from mbd.equations.equations import Equations
     from mbd.tape.node import Node, Scalar
 
+ONSET, LEAST = 1e-7, 1e-200
+"""As in `mbd.kernel.cones`: how much the direction of λ_T counts beside that of γ, and what stands for none of it."""
+
 __all__ = ["StoredStates", "is_smooth"]
 
 
@@ -63,9 +66,23 @@ class StoredStates:
         from mbd.compile.python import array_function
 
         unique = list({node.index: node for node in nodes}.values())
-        values = array_function(unique)(self.inputs(rows), self.record.parameters_at(rows.source))
+        values = array_function(unique)(self.all_inputs(rows), self.record.parameters_at(rows.source))
         found = {node.index: value for node, value in zip(unique, values, strict=True)}
         return [found[node.index] for node in nodes]
+
+    def all_inputs(self, rows: Rows) -> Mapping[str, NDArray[Any]]:
+        """The same, with the way of two directions that slide together: a little along λ_T, as γ is zero at onsets."""
+        inputs = self.inputs(rows)
+        if all(friction.partner < 0 for friction in self.equations.frictions):
+            return inputs
+        slips = inputs["slip"].astype(float)
+        for number, friction in enumerate(self.equations.frictions):
+            if friction.partner >= 0:
+                pull = rows.lam[:, friction.row]
+                size = np.hypot(pull, rows.lam[:, self.equations.frictions[friction.partner].row])
+                cosine = np.divide(pull, size, out=np.ones_like(pull), where=size > 0.0)
+                slips[:, number] *= ONSET * np.where(np.abs(cosine) < LEAST, LEAST, cosine)
+        return {**inputs, "slip": slips}
 
     @staticmethod
     def inputs(rows: Rows) -> Mapping[str, NDArray[Any]]:

@@ -34,7 +34,7 @@ def scene(M, normals, tangents, mu, velocity, closed=None):
         row_friction[friction_row] = np.arange(contacts)
     size = n + rows
     K = Scene(
-        n=n, n_v=n, n_q=n, n_rows=rows, n_contacts=contacts, n_frictions=frictions, n_anchors=0, loaded=0,
+        n=n, n_v=n, n_q=n, n_rows=rows, n_contacts=contacts, n_frictions=frictions, n_cones=0, n_anchors=0, loaded=0,
         o_lam=0, o_slip=rows, params=np.zeros(1), block=np.zeros(rows + max(frictions, 1)),
         acc=np.zeros(n * n + n + 2 * n * rows + 3 * rows + 1 + max(frictions, 1)),
         kkt=np.zeros(size * size), rhs=np.zeros(size), columns=np.zeros(size, dtype=int), work=np.zeros(3 * size),
@@ -49,7 +49,7 @@ def scene(M, normals, tangents, mu, velocity, closed=None):
         friction_row=friction_row, friction_contact=np.arange(max(contacts, 1)), row_contact=row_contact,
         row_normal=is_normal, row_friction=row_friction, rows=np.zeros(rows, dtype=int),
         dropped=np.zeros(rows, dtype=int), state=np.zeros(24, dtype=int), counts=np.zeros(24, dtype=int),
-        detail=np.zeros(16), hooks=None, strategy=0, past=np.zeros(rows), past_limit=np.zeros(max(frictions, 1)),
+        partner=np.full(max(frictions, 1), -1), detail=np.zeros(16), hooks=None, strategy=0, past=np.zeros(rows), past_limit=np.zeros(max(frictions, 1)),
     )  # fmt: skip
 
     for name in TABLE.real_arrays + TABLE.integer_arrays:  # what does not matter here

@@ -54,7 +54,7 @@ class Balance:
         self.loaded = bool(np.any(system.slip))  # friction follows multipliers: their iteration is the system's
         self.matrix = np.zeros((layout.n + len(self.rows),) * 2)
         self.block = mechanism.block(0.0, np.zeros(layout.n_q), np.zeros(layout.n), system.anchors, self.penalties)
-        self.block[layout.slip : layout.shift] = system.slip
+        self.block[layout.slip : layout.shift] = system.slips
         self.out = np.zeros(mechanism.sizes["accelerations"])
         self.configuration = mechanism.equations.configuration
 

@@ -44,14 +44,26 @@ class MechanismSystem(System):
         dropped: Any,
         sticks: Any,
         slip: Any,
+        hold: Any = None,
     ) -> None:
         self.mechanism, self.manager = mechanism, manager
         self.parameters, self.anchors, self.stabilized = parameters, anchors, stabilized
         self.dropped = dropped  # rows that depend on others, 1 each
         self.sticks, self.slip = sticks, slip[: mechanism.layout.n_frictions]  # of frictions
+        self.hold = np.zeros(len(self.slip)) if hold is None else hold
+        self.pairs = np.array([friction.partner >= 0 for friction in manager.frictions], dtype=bool)
         self.evaluated: Vector | None = None  # the inputs evaluated last, to explain a failure with
         layout = mechanism.layout
         self.n_q, self.n_v, self.n_z = layout.n_q, layout.n_v, layout.n_z
+
+    @property
+    def slips(self) -> Any:
+        """What programs are told of sliding: signs, of two directions how they are held (`mbd.kernel.cones`)."""
+        if not self.pairs.any():
+            return self.slip
+        hold = self.hold[: len(self.slip)]
+        held = np.where(hold > 0.0, hold * self.slip, 1.0)
+        return np.where(self.pairs & (self.slip != 0.0), held, self.slip)
 
     @property
     def is_vector(self) -> bool:
@@ -148,7 +160,7 @@ class MechanismSystem(System):
         block[layout.x : layout.v] = point.x
         block[layout.a : layout.lam] = point.rate
         block[[layout.lam + k for k in rows]] = point.lam
-        block[layout.slip : layout.shift] = self.slip
+        block[layout.slip : layout.shift] = self.slips
         return block
 
     def _share_loads(self, block: Vector, rows: tuple[int, ...], given_rows: tuple[int, ...]) -> Matrix:
@@ -170,7 +182,7 @@ class MechanismSystem(System):
         lam = np.zeros(self.mechanism.layout.n_rows)
         for _ in range(MOST_LOADS):  # friction follows multipliers: of degree one, so that this is Newton's method
             terms = self.mechanism.acceleration_terms(
-                t, q, y, self.parameters, self.anchors, penalties, slips=self.slip, lam=lam
+                t, q, y, self.parameters, self.anchors, penalties, slips=self.slips, lam=lam
             )
             R = terms.R[:, picked]
             if given_rows:

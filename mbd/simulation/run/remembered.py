@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from mbd.kernel import codes
+from mbd.kernel.cones import HELD, ONSET
 from mbd.kernel.records import TABLE, Kernel
 from mbd.simulation.run.data import RunData
 from mbd.state import Memory, Mode, are_names
@@ -125,8 +126,15 @@ def _judged(kept: Kernel, memory: Memory, run: RunData) -> str:
     if not np.all((kept.was == codes.UNKNOWN) | ((kept.was >= -1) & (kept.was <= 2))):
         return "'was' is no state of a friction"
     for name in ("slip", "side", "lean"):
-        if not np.all(np.isin(getattr(kept, name), (-1.0, 0.0, 1.0))):
+        signs = getattr(kept, name)
+        if name != "side" and run.kernel.n_cones > 0:  # cosines
+            signs = signs[run.kernel.partner[: run.kernel.n_frictions] < 0]
+            if not np.all(np.abs(getattr(kept, name)) <= 1.0):
+                return f"{name!r} is no direction"
+        if not np.all(np.isin(signs, (-1.0, 0.0, 1.0))):
             return f"{name!r} is no sign"
+    if not np.all(np.isin(kept.hold, (0.0, ONSET, HELD))):
+        return "'hold' is nothing that frictions do"
     for name, (least, most) in _of_state(run.kernel).items():
         value = getattr(kept, name)
         if not least <= value <= most:
