@@ -36,7 +36,7 @@ class Unilateral(Constraint):
     measure : where
     restitution : e of Newton's law, 0 (plastic) to 1
     friction : None: it sticks where the measure has tangents; 0: it slides freely; μ > 0: Coulomb's law,
-        ``|λ_T| ≤ μ p``, it sticks, slips and turns around in the one direction of a planar model
+        ``‖λ_T‖ ≤ μ p``, it sticks, slips and turns around; in space it slides in a plane, opposite to its velocity
     release : `When` another contact closes (or several of them), instead of on pull, or besides (`may_pull=False`);
         while it pulls it has no friction
     only_while : name of a contact that must be closed, or a measure that must be positive, for this one to be watched

@@ -103,9 +103,7 @@ def _add(
     found.sliding.append(view)
 
 
-def _add_loss(
-    found: Laws, scope: DerivationScope, dynamics: Generalized, name: str, numbers: Sequence[int]
-) -> None:
+def _add_loss(found: Laws, scope: DerivationScope, dynamics: Generalized, name: str, numbers: Sequence[int]) -> None:
     """The loss in some directions of one dry friction, as one effect."""
     work, power = Work(), scope.tape.zero
     for number in numbers:

@@ -88,9 +88,7 @@ def ports(
 
 def sliding_forces(equations: Equations, sliding: Sequence[int], values: Sequence[Node]) -> list[Node]:
     """Quantities with the multiplier of each friction that slides in terms of what it follows, λ_T = slip · limit."""
-    known = {
-        equations.tape.input("lam", equations.frictions[k].row): sliding_force(equations, k) for k in sliding
-    }
+    known = {equations.tape.input("lam", equations.frictions[k].row): sliding_force(equations, k) for k in sliding}
     return substitute(values, known) if known else list(values)
 
 

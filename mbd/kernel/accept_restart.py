@@ -14,7 +14,7 @@ from mbd.kernel.restart import active_rows, consistent, evaluate, largest_force,
 from mbd.kernel.saddle import correct_velocities, solve_rows
 from mbd.kernel.trial_step import try_step
 
-__all__ = ["event_candidate", "event_at_start", "put_on_rows", "accept_for_restart"]
+__all__ = ["event_candidate", "event_at_start", "project_velocity", "put_on_rows", "accept_for_restart"]
 
 
 def project_velocity(K: Balance, t: float, q: Reals, y: Reals, m: int, dropping: bool) -> int:

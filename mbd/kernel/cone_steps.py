@@ -13,7 +13,8 @@ A motion that only comes close to rest turns around it in shortened steps, and s
 from __future__ import annotations
 
 from mbd.kernel.codes import STICK
-from mbd.kernel.cones import HELD, aim
+from mbd.kernel.cones import HELD, ONSET, aim
+from mbd.kernel.contact_modes import STILL
 from mbd.kernel.guards import judge
 from mbd.kernel.locate import locate
 from mbd.kernel.records import Guards, Kernel
@@ -30,6 +31,8 @@ SURELY = 0.8
 """Part of a step within which γ reaches zero if a direction is held in it [-]."""
 STRAIGHT = 0.05
 """Sine of the angle between γ̇ and −γ below which γ runs into zero [-]."""
+LINE = 1e-9
+"""The same where γ moves along a line: a direction that is held is that of γ then, however long it slides on [-]."""
 SLOW = 1e-6
 """Speed over that of the start of the approach, ‖γ̇‖ dt, below which it does whatever the angle [-]."""
 SHORTEST = 1e-4
@@ -44,9 +47,8 @@ def approached_end(K: Guards, t1: float) -> float:
     """Where the step that was to end at t1 ends; K.hold tells which directions are held in it."""
     end = t1
     for f in range(K.n_frictions):
-        if K.partner[f] > f and K.slip[f] != 0.0 and (K.hold[f] == 0.0 or K.hold[f] == HELD):
+        if K.partner[f] > f and K.slip[f] != 0.0:
             p = K.partner[f]
-            K.hold[f] = K.hold[p] = 0.0
             x = K.guards0[K.at_slip + f]
             y = K.guards0[K.at_slip + p]
             ax = K.guards0[K.at_slip_rate + f]
@@ -54,13 +56,17 @@ def approached_end(K: Guards, t1: float) -> float:
             speed = sqrt(x * x + y * y)
             change = sqrt(ax * ax + ay * ay)
             h = t1 - K.time
+            if K.hold[f] == ONSET and (speed <= STILL or x * ax + y * ay > 0.0):
+                continue
+            K.hold[f] = K.hold[p] = 0.0
             if not change * FAR * h > speed:
                 continue
             fall = -(x * ax + y * ay)
             across = abs(x * ay - y * ax)
             straight = fall > 0.0 and (across <= STRAIGHT * speed * change or speed <= SLOW * change * K.dt)
             ends = fall > 0.0 and speed * speed < SURELY * h * fall
-            if straight and (ends or h < SHORTEST * K.dt):
+            line = across <= LINE * speed * change
+            if straight and (ends or line or h < SHORTEST * K.dt):
                 K.hold[f] = K.hold[p] = HELD
             elif fall > 0.0 or across * h > PART * speed * speed:
                 end = min(end, K.time + max(PART * speed / change, SHORTEST * K.dt))
@@ -73,7 +79,10 @@ def slides_on(K: Guards) -> bool:
     for f in range(K.n_frictions):
         if K.partner[f] > f and K.slip[f] != 0.0 and K.hold[f] == HELD:
             p = K.partner[f]
-            if K.slip[f] * K.guards1[K.at_slip + f] + K.slip[p] * K.guards1[K.at_slip + p] > 0.0:
+            x = K.guards1[K.at_slip + f]
+            y = K.guards1[K.at_slip + p]
+            forward = K.slip[f] * x + K.slip[p] * y
+            if forward > 0.0 and abs(K.slip[f] * y - K.slip[p] * x) > LINE * forward:
                 K.hold[f] = K.hold[p] = 0.0
                 found = True
     return found

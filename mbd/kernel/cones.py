@@ -38,7 +38,7 @@ def follows(K: Frictions, f: int) -> bool:
 
 
 def fill_slips(K: ContactRows) -> None:
-    """What the programs are told of sliding, into the block: signs, of two directions how they are held."""
+    """What the programs know of sliding, into the block: signs, of two directions how they are held."""
     K.block[K.o_slip : K.o_slip + K.n_frictions] = K.slip[: K.n_frictions]
     if K.n_cones > 0:
         for f in range(K.n_frictions):
@@ -66,11 +66,11 @@ def cosine(K: Frictions, f: int, own: float, other: float) -> float:
     part = hold * (2.0 - hold * hold) * (2.0 - hold * hold) if hold > 0.0 else 0.0
     x = own + part * K.slip[f]
     y = other + part * K.slip[K.partner[f]]
-    return x / sqrt(x * x + y * y + LEAST_SQUARE)
+    return float(x / sqrt(x * x + y * y + LEAST_SQUARE))
 
 
 def sliding_force(K: Frictions, f: int, limit: float, rates: Reals, own: int, other: int) -> float:
-    """λ_T of a friction that slides with this limit; its velocity is at `own` of the rates, its partner's at `other`."""
+    """λ_T of a friction that slides; its velocity is at `own` of the rates, that of its partner at `other`."""
     if K.partner[f] < 0:
         return float(K.slip[f] * limit)
     return float(cosine(K, f, rates[own], rates[other]) * limit)
@@ -92,7 +92,7 @@ def pull_of_both(K: Frictions, f: int, lam: Reals) -> float:
     """|λ_T| of friction f, with its partner where it has one."""
     x = lam[K.friction_row[f]]
     if K.partner[f] < 0:
-        return abs(x)
+        return float(abs(x))
     y = lam[K.friction_row[K.partner[f]]]
     return sqrt(x * x + y * y)
 

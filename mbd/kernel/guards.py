@@ -49,8 +49,8 @@ from mbd.kernel.restart import (
 )
 
 __all__ = [
-    "along_slip", "gap_scale", "gap_tolerance", "goes_back", "guard_value", "is_watched", "judge", "update_armed", "update_sides",
-    "watch",
+    "along_slip", "gap_scale", "gap_tolerance", "goes_back", "guard_value", "is_watched", "judge", "update_armed",
+    "update_sides", "watch",
 ]  # fmt: skip
 
 

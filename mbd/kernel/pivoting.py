@@ -28,8 +28,9 @@ NOTHING = 1e-10
 def pivoted(K: Balance, level: int) -> int:
     """1 if Lemke's method has chosen the branches of all that may choose, 0 if it cannot.
 
-    It cannot where friction follows multipliers as that of a pin does or slides in a plane, where a contact that may open holds tangents
-    without limit, where held rows and masses alone determine no motion, and where its path ends in a ray.
+    It cannot where friction follows multipliers as that of a pin does or slides in a plane, where a contact that may
+    open holds tangents without limit, where held rows and masses alone determine no motion, and where its path ends
+    in a ray.
     """
     if K.loaded == 1 or K.n_cones > 0:
         return 0

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from mbd.kernel.codes import NEW_MODE
-from mbd.kernel.cones import let_directions_go
 from mbd.kernel.conditioning import is_ill_conditioned, refine_accelerations
+from mbd.kernel.cones import let_directions_go
 from mbd.kernel.contact_modes import resolve_contact_modes
 from mbd.kernel.contact_step import find_pace
 from mbd.kernel.control import first_step

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from mbd.kernel.accept_restart import project_velocity
 from mbd.kernel.codes import (
     CLOSE,
     CROSS,
@@ -15,15 +16,18 @@ from mbd.kernel.codes import (
     STICK,
     WATCH,
 )
-from mbd.kernel.cones import aim
+from mbd.kernel.cones import aim, speed_of_both
 from mbd.kernel.contact_modes import ALL_IMPULSES, NO_IMPULSE, OWN_IMPULSE, STILL, log_event
 from mbd.kernel.guards import gap_scale, is_watched
 from mbd.kernel.impact import impact
 from mbd.kernel.impact_solve import strikes
 from mbd.kernel.records import ContactForces, Guards, Mechanism, Switching
-from mbd.kernel.restart import capture, evaluate, row_speed
+from mbd.kernel.restart import active_rows, capture, evaluate, row_speed
 
 __all__ = ["switch"]
+
+TOGETHER = 1e-3
+"""Part of dt within which contacts that come to rest do so together [-]."""
 
 
 def gather_closing(K: Guards) -> float:
@@ -164,6 +168,25 @@ def bursts(K: Mechanism, c: int) -> bool:
     return False
 
 
+def stop_together(K: Switching, index: int) -> None:
+    """Contacts in space come to rest: the one found, and those whose sliding is over within a thousandth of dt.
+
+    A body that slides on several feet stops on all of them at once, but for round-off and errors of the step. The
+    velocities that are left become those at which nothing slides; whether it stays so is for the restart to say.
+    """
+    evaluate(K, K.time, K.q, K.y)
+    for f in range(K.n_frictions):
+        p = K.partner[f]
+        if p > f and K.slip[f] != 0.0 and K.closed[K.friction_contact[f]] == 1:
+            speed = speed_of_both(K, f, K.guards0, K.at_slip)
+            if f == index or speed <= TOGETHER * K.dt * speed_of_both(K, f, K.guards0, K.at_slip_rate):
+                K.loose[f] = K.loose[p] = 2
+                K.sticks[f] = K.sticks[p] = 1
+                K.slip[f] = K.slip[p] = 0.0
+                capture(K, K.friction_contact[f])
+    project_velocity(K, K.time, K.q, K.y, active_rows(K, K.closed), True)
+
+
 def switch(K: Switching) -> int:
     """What the fired guard does to the closed contacts and the velocities; the state is at its instant."""
     kind = K.event_kind
@@ -196,8 +219,7 @@ def switch(K: Switching) -> int:
         K.loose[index] = 2
         K.sticks[index] = 0
         if K.partner[index] >= 0:
-            K.loose[K.partner[index]] = 2
-            K.sticks[K.partner[index]] = 0
+            stop_together(K, index)
     elif kind == SLIP:
         K.loose[index] = 3
         K.sticks[index] = 0

@@ -49,7 +49,8 @@ def scene(M, normals, tangents, mu, velocity, closed=None):
         friction_row=friction_row, friction_contact=np.arange(max(contacts, 1)), row_contact=row_contact,
         row_normal=is_normal, row_friction=row_friction, rows=np.zeros(rows, dtype=int),
         dropped=np.zeros(rows, dtype=int), state=np.zeros(24, dtype=int), counts=np.zeros(24, dtype=int),
-        partner=np.full(max(frictions, 1), -1), detail=np.zeros(16), hooks=None, strategy=0, past=np.zeros(rows), past_limit=np.zeros(max(frictions, 1)),
+        partner=np.full(max(frictions, 1), -1),
+        detail=np.zeros(16), hooks=None, strategy=0, past=np.zeros(rows), past_limit=np.zeros(max(frictions, 1)),
     )  # fmt: skip
 
     for name in TABLE.real_arrays + TABLE.integer_arrays:  # what does not matter here

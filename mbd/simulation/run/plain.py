@@ -58,7 +58,7 @@ class MechanismSystem(System):
 
     @property
     def slips(self) -> Any:
-        """What programs are told of sliding: signs, of two directions how they are held (`mbd.kernel.cones`)."""
+        """What programs know of sliding: signs, of two directions how they are held (`mbd.kernel.cones`)."""
         if not self.pairs.any():
             return self.slip
         hold = self.hold[: len(self.slip)]
