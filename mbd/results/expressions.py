@@ -220,7 +220,7 @@ def read_expressions(words: Mapping[str, Any], arrays: Mapping[str, Any], parame
     return Expressions(
         tape, sizes["q"], sizes["v"], sizes["z"], tuple(_Row(*row) for row in rows),
         tuple(_Contact(tuple(held)) for held in contacts),
-        tuple(_Friction(friction[0], friction[1], partner) for friction, partner in zip(frictions, partners, strict=True)),
+        tuple(_Friction(one[0], one[1], partner) for one, partner in zip(frictions, partners, strict=True)),
         {name: nodes[k] for name, k in zip(words["names"], outputs, strict=True)}, tuple(nodes[k] for k in terms),
         words["adds"], (),
         tuple(_Wrapped(anchor, nodes[angle], nodes[rate]) for anchor, angle, rate in words.get("wrapped", ())), known,
