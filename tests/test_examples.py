@@ -24,10 +24,15 @@ from mbd.cli import Script, examples
 
 g = 9.81
 NAMES = (
-    "basin-picture", "chapter-walker", "compass-gait", "double-pendulum", "find-a-gait", "four-bar", "kneed-walker",
-    "lagrangian-double-pendulum", "long-pendulum", "pendulum", "prosthetic-leg", "rimless-wheel", "shaken-block",
-    "simplest-walker-lagrangian", "slider-crank", "user-constraint", "user-integrator",
+    "basin-picture", "chapter-walker", "compare-two-knees", "compass-gait", "double-pendulum", "find-a-gait",
+    "four-bar",
+    "identify-a-shank", "kneed-walker", "lagrangian-double-pendulum", "long-pendulum", "pendulum", "prosthetic-leg",
+    "rimless-wheel", "shaken-block", "simplest-walker-lagrangian", "slider-crank", "tune-a-knee-damper",
+    "user-constraint", "user-integrator",
 )  # fmt: skip
+STUDIES = ("compare-two-knees", "identify-a-shank", "tune-a-knee-damper")
+"""Which find gaits or fits before their run, for seconds."""
+EACH = [pytest.param(name, marks=pytest.mark.slow) if name in STUDIES else name for name in NAMES]
 COARSE = ("long-pendulum", "user-integrator")
 """Of steps so long, for very many periods, or of order so low that other schemes differ."""
 WALKERS = ("chapter-walker", "compass-gait", "kneed-walker", "prosthetic-leg")
@@ -81,7 +86,7 @@ def test_these_are_all_the_examples() -> None:
     assert tuple(examples()) == NAMES
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", EACH)
 def test_an_example_runs_without_faults(name: str) -> None:
     assert script(name)["model"].check() == []
     run = run_of(name)
@@ -91,7 +96,7 @@ def test_an_example_runs_without_faults(name: str) -> None:
 
 
 @pytest.mark.sampled(2)
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", EACH)
 def test_the_plain_twin_moves_like_the_machine_code(name: str) -> None:
     until = 20 * script(name)["dt"]
     fast, plain = (again(name, until=until, backend=backend) for backend in ("auto", "python"))
@@ -99,7 +104,7 @@ def test_the_plain_twin_moves_like_the_machine_code(name: str) -> None:
     assert fast.final.v == pytest.approx(plain.final.v, rel=1e-9, abs=1e-9)
 
 
-@pytest.mark.parametrize("name", [name for name in NAMES if name not in COARSE])
+@pytest.mark.parametrize("name", [name for name in NAMES if name not in (*COARSE, *STUDIES)])
 @pytest.mark.parametrize("integrator", [mbd.Newmark(), mbd.HHT(0.1), mbd.GeneralizedAlpha(0.8)], ids=repr)
 def test_the_choice_of_integrator_changes_little(name: str, integrator: Any) -> None:
     until = min(0.5, script(name)["until"])
@@ -572,3 +577,38 @@ def test_the_walker_survives_small_pushes_falls_back_of_too_slow_ones_and_ahead_
     assert set(basin.outcome[-1]) == {"falls backward"}
     assert set(basin.outcome[0, :12]) == {"falls forward"}
     assert 0.1 < basin.share < 0.2
+
+
+# studies ----------------------------------------------------------------------------------------------------------
+@pytest.mark.slow
+def test_the_knee_damper_that_was_tuned_makes_both_steps_equal() -> None:
+    names = script("tune-a-knee-damper")
+    untuned, tuned = names["untuned"], names["tuned"]
+    apart = [gait.step_lengths["right foot"] - gait.step_lengths["left foot"] for gait in (untuned, tuned.gait)]
+    assert apart[0] == pytest.approx(6.78e-3, abs=1e-5) and abs(apart[1]) < 1e-7
+    assert tuned.success and tuned["right knee loss.coefficient"] == pytest.approx(0.10051, abs=1e-5)
+    run = run_of("tune-a-knee-damper")
+    lengths = [step.length for step in gait(run)]
+    assert max(lengths) - min(lengths) < 1e-6
+
+
+@pytest.mark.slow
+def test_the_shank_is_identified_within_its_errors() -> None:
+    names = script("identify-a-shank")
+    found, truth = names["found"], names["truth"]
+    assert found.converged and found.alike == ()
+    for name, value in truth.items():
+        assert abs(found.values[name] - value) < 4.0 * found.errors[name] < 0.1 * value
+    assert found.noise == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.slow
+def test_the_orifice_makes_the_gait_less_lame_than_the_viscous_damper() -> None:
+    report = script("compare-two-knees")["report"]
+    viscous, hydraulic = (
+        report.asymmetry(walk, next(m for m in walk.measures if m.quantity == "step length")) for walk in report.walks
+    )
+    assert viscous == pytest.approx(-0.00688, abs=2e-5) and hydraulic == pytest.approx(-0.00449, abs=2e-5)
+    for walk in report.walks:  # what gravity gives is what impacts and dampers take
+        way, fall = walk["stride length"]["left"], math.sin(math.radians(3.0)) * 9.81 * (34.6 + 12.2 + 2.85 + 2.3)
+        assert sum(walk.spent().values()) == pytest.approx(-way * fall, rel=1e-6)

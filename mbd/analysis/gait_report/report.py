@@ -89,9 +89,14 @@ class GaitReport:
             for walk in self.walks:
                 measure = walk.measures[number_]
                 cells += [_text(measure.mean[side.name]) for side in walk.sides]
-                cells.append(_text(self.asymmetry(walk, measure), 3))
+                cells.append(self._asymmetry_text(walk, measure))
             found.append(tuple(cells))
         return found
+
+    def _asymmetry_text(self, walk: Walk, measure: Measure) -> str:
+        """To a hundredth of a percent: what is finer is no asymmetry."""
+        value, digits = self.asymmetry(walk, measure), 2 if symmetry_of(self.symmetry)[0] == "%" else 4
+        return f"{round(value, digits) + 0.0:.{digits}f}" if np.isfinite(value) else "–"
 
     def energy_rows(self) -> list[tuple[str, ...]]:
         """Energy of a stride by side and kind of cause [J] as texts, one column for each run."""
