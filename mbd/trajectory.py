@@ -317,6 +317,29 @@ class Trajectory:
 
         return dataset(self, names, at, side)
 
+    def to_sto(
+        self, path: str | Path, names: Sequence[str] | None = None, at: ArrayLike | None = None,
+        degrees: bool | None = None,
+    ) -> Path:  # fmt: skip
+        """Write columns over time as a storage file of OpenSim, ``run.to_sto("swing.mot", ["hip.angle"])``.
+
+        Parameters
+        ----------
+        path : ending in .sto, or in .mot, a motion
+        names : of scalars and vectors; a vector gives three columns; all of `names` by default. Spaces in them become
+            underscores, 'left_hip.angle'
+        at : as for `to_dataframe`; at an event the values after it
+        degrees : whether angles and their rates are in degrees; None: in a .mot file
+
+        Raises
+        ------
+        TrajectoryError
+            for another ending, unknown names, times outside the run.
+        """
+        from mbd.results.opensim import storage_file
+
+        return storage_file(self, path, names, at, degrees)
+
     def __repr__(self) -> str:
         from mbd.results.summary import text
 

@@ -111,3 +111,43 @@ def test_a_wrong_request_is_named(run, options, words):
     for table in run.to_dataframe, run.to_xarray:
         with pytest.raises((TrajectoryError, mbd.UnknownNameError), match=words):
             table(**options)
+
+
+def stored(path) -> tuple[dict[str, str], list[str], np.ndarray]:
+    """Header, labels and numbers of a storage file, read by its own words."""
+    head, _, rest = path.read_text(encoding="utf-8").partition("endheader\n")
+    words = dict(line.split("=") for line in head.splitlines()[1:] if "=" in line)
+    labels, *lines = rest.splitlines()
+    return words, labels.split("\t"), np.array([[float(cell) for cell in line.split("\t")] for line in lines])
+
+
+def test_a_storage_file_gives_back_the_numbers_of_the_run(run, tmp_path):
+    names = ["flight.y", "mass.origin"]
+    words, labels, numbers = stored(run.to_sto(tmp_path / "ball.sto", names, at=0.1))
+    table = run.to_dataframe(names, at=0.1)
+    assert words == {"version": "1", "nRows": str(len(table)), "nColumns": "5", "inDegrees": "no"}
+    assert labels == ["time", *table.columns]
+    np.testing.assert_array_equal(numbers, np.column_stack([table.index, table]))
+    words, labels, numbers = stored(run.to_sto(tmp_path / "all.sto"))
+    assert len(labels) == int(words["nColumns"]) and np.all(np.diff(numbers[:, 0]) > 0.0)
+
+
+def test_a_motion_has_its_angles_in_degrees(tmp_path):
+    model = mbd.Model("pendulum")
+    rod = mbd.Link("rod", mass=1.0, length=1.0, center=1.0)
+    model.connect(mbd.Revolute("left hip", model.ground.origin, rod.start))
+    swing = mbd.simulate(model, mbd.assemble(model, {"left hip.angle": 0.3}), dt=0.05, until=0.5, backend="python")
+    names = ["left hip.angle", "left hip.rate", "rod.end.x"]
+    for ending, factor, said in ((".mot", 180.0 / np.pi, "yes"), (".sto", 1.0, "no")):
+        words, labels, numbers = stored(swing.to_sto(tmp_path / f"swing{ending}", names))
+        assert words["inDegrees"] == said and labels[1:] == ["left_hip.angle", "left_hip.rate", "rod.end.x"]
+        np.testing.assert_allclose(numbers[:, 1], factor * swing["left hip.angle"], rtol=1e-15)
+        np.testing.assert_allclose(numbers[:, 2], factor * swing["left hip.rate"], rtol=1e-15)
+        np.testing.assert_array_equal(numbers[:, 3], swing["rod.end.x"])
+
+
+def test_other_files_and_names_are_refused(run, tmp_path):
+    for path, names, text in (("ball.txt", None, "end in .sto or .mot"), ("ball.sto", ["flight.z"], "flight.z")):
+        with pytest.raises(mbd.MbdError, match=text):
+            run.to_sto(tmp_path / path, names)
+    assert not list(tmp_path.iterdir())

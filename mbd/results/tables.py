@@ -18,7 +18,7 @@ from mbd.results.units import unit
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
 
-__all__ = ["dataframe", "dataset", "library"]
+__all__ = ["columns_of", "dataframe", "dataset", "library"]
 
 SIDES: dict[str, Side] = {"after": "right", "before": "left"}
 
@@ -48,15 +48,22 @@ def dataframe(
 ) -> Any:
     """A pandas DataFrame, see `Trajectory.to_dataframe`."""
     pandas = library("pandas", "data", "run.to_dataframe()")
+    time, columns = columns_of(run, names, at, side)
+    frame = pandas.DataFrame(columns, index=pandas.Index(time, name="time"))
+    units = {name: unit(name, run.facts) for name in columns}
+    frame.attrs["units"] = {"time": "s", **{name: text for name, text in units.items() if text}}
+    frame.attrs["long_names"] = {name: long_name(name) for name in columns}
+    return frame
+
+
+def columns_of(
+    run: Trajectory, names: Sequence[str] | None, at: ArrayLike | None, side: OneSide | None
+) -> tuple[Vector, dict[str, Vector]]:
+    """The times of a table and its columns, a vector's components each."""
     time, read = _axis(run, at, side)
     wanted = _wanted(run, names)
     scalars = list(dict.fromkeys(part for name in wanted for part in run.columns.components(name)))
-    columns = dict(zip(scalars, read(scalars), strict=True))
-    frame = pandas.DataFrame(columns, index=pandas.Index(time, name="time"))
-    units = {name: unit(name, run.facts) for name in scalars}
-    frame.attrs["units"] = {"time": "s", **{name: text for name, text in units.items() if text}}
-    frame.attrs["long_names"] = {name: long_name(name) for name in scalars}
-    return frame
+    return time, dict(zip(scalars, read(scalars), strict=True))
 
 
 def dataset(

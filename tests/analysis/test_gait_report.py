@@ -145,3 +145,13 @@ def test_what_has_no_strides_is_named():
 def test_wrong_arguments_are_named(given, told):
     with pytest.raises((ModelError, UnknownNameError), match=told):
         mbd.gait_report(walk(), **given)
+
+
+def test_curves_of_a_report_are_read_back_from_a_storage_file(tmp_path):
+    head, _, rest = report().to_sto(tmp_path / "gait.sto").read_text().partition("endheader\n")
+    labels, *lines = rest.splitlines()
+    numbers = np.array([line.split("\t") for line in lines], dtype=float)
+    assert "inDegrees=yes" in head and f"nRows={len(lines)}" in head
+    for curve in report().walks[0].curves:
+        label = f"{report().walks[0].name} {curve.side} {curve.subject} {curve.quantity}".replace(" ", "_")
+        np.testing.assert_array_equal(numbers[:, labels.split("\t").index(label)], curve.mean)

@@ -17,6 +17,7 @@ from mbd.bodies.values import names_of, number
 from mbd.errors import ModelError
 from mbd.notebook import table
 from mbd.results.archive import named_file, write_whole
+from mbd.results.opensim import write_storage
 from mbd.trajectory import Trajectory
 
 __all__ = ["GaitReport", "Walk", "gait_report"]
@@ -170,6 +171,16 @@ class GaitReport:
                 frame.columns = [": ".join(column[:2]) + f" {column[2]} {column[3]} [{column[4]}]" for column in frame]
             write_whole(place, lambda partial, f=frame, w=what: f.to_csv(partial, index=w == "curves"))  # type: ignore[misc]
         return target
+
+    def to_sto(self, path: str | Path) -> Path:
+        """Write the curves as a storage file of OpenSim (.sto or .mot), whose time is the percent of the stride."""
+        columns = {
+            f"{walk.name} {each.side} {each.subject} {each.quantity}": each.mean
+            for walk in self.walks
+            for each in walk.curves
+        }
+        degrees = any(each.unit == "°" for walk in self.walks for each in walk.curves)
+        return write_storage(path, "gait", PERCENT, columns, degrees, ["time is the percent of the stride"])
 
     def plot(self, path: str | Path | None = None) -> Any:
         """Curves of joints and ground over the stride and energies, as gait laboratories draw them."""
