@@ -126,7 +126,7 @@ def links() -> tuple[mbd.Model, mbd.LimitCycle]:
 
 def test_starts_of_links_are_moved_onto_the_section_and_fall_as_runs_do():
     model, gait = links()
-    axes = {"left hip.rate": np.linspace(-2.2, -0.2, 7), "right hip.rate": np.linspace(-2.0, 1.0, 4)}
+    axes = {"left hip.rate": np.linspace(-2.2, -0.2, 5), "right hip.rate": np.linspace(-2.0, 1.0, 3)}
     found = mbd.basin(model, gait, axes, dt=0.02, steps=12)
     for index in np.ndindex(*found.shape):
         state = found.start(index)

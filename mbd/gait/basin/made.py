@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mbd.arrays import Matrix
+from mbd.arrays import Matrix, Vector
 from mbd.errors import CapabilityError, GaitError, ModelError
 from mbd.gait.basin.axes import Study, kinds_of_parameters
 from mbd.gait.basin.balls import Ball, ball_of
@@ -28,6 +28,8 @@ MOST_GAITS = 1000
 """Sets of parameters at most, at each of which the gait is looked for."""
 
 
+AT_ONCE = 1 << 16
+"""Starts whose parameters are looked at together [-]."""
 SPREAD = 257
 """Starts by whose parameters the mechanism is made [-]."""
 
@@ -58,7 +60,7 @@ class Made:
         )
         columns = self.study.columns(_spread(len(self.study.grid)))
         kinds, _ = kinds_of_parameters(self.map, self.base, columns[1], SPREAD)
-        plain, names = [self.map.plain(values) for values in kinds], kinds[0]
+        plain = [self.map.plain(values) for values in kinds]
         self.plain = {name: np.array([values[name] for values in plain]) for name in plain[0]}
         options = {"contact": "events", "impact": "newton", "locate": "root", "store": 1, "rest_speed": REST_SPEED,
                    "backend": self.map.backend}  # fmt: skip
@@ -75,14 +77,14 @@ class Made:
         if not vector and (self.study.start is not None or columns[0]):
             raise ModelError("axes: coordinates of this model do not add, so columns cannot give them; vary parameters")
         self._onto = OntoSection(self.section, columns[0]) if vector else None
-        self._balls: dict[tuple[float, ...], list[tuple[int, Ball]]] = {}
-        self._balls_at(dict(self.base) if not columns[1] else names, must=not columns[1])
+        self.balls: dict[tuple[float, ...], list[tuple[int, Ball]]] = {}
+        self._find_balls()
 
     @property
     def all_balls(self) -> list[list[Ball | None]]:
         """The balls of each set of parameters that was met, by attractor."""
         found = []
-        for several in self._balls.values():
+        for several in self.balls.values():
             known = dict(several)
             found.append([known.get(number) for number in range(len(self.gaits))])
         return found
@@ -95,28 +97,56 @@ class Made:
         columns = {name: np.array([values[name] for values in plain])[which] for name in plain[0]}
         return Changes(self.map.model, self.map.mechanism, columns)
 
-    def _balls_at(self, values: Mapping[str, float], must: bool = False) -> list[tuple[int, Ball]]:
-        """The verified balls at some parameters; none for gaits that are lost or unstable there."""
-        key = tuple(values.values())
-        if key in self._balls:
-            return self._balls[key]
-        if len(self._balls) >= MOST_GAITS:
-            raise ModelError(f"axes give more than {MOST_GAITS} sets of parameters, at each of which the gait is "
-                             "looked for; give fewer values, and study them part by part")  # fmt: skip
-        changes, found = self.changes([values], None), []
-        for number, (name, gait) in enumerate(self.gaits.items()):
-            try:
-                here = gait if values == gait.parameters else gait.at(values)
+    def _find_balls(self) -> None:
+        """The balls at every set of parameters of the study, the gait followed from the nearest one that is known.
 
-                def walked(states: list[State], strides: int = gait.strides) -> Any:
-                    return self.walks.walked(states, strides, changes)
+        Sets are taken by their distance from the parameters of the gaits, so that the order of starts changes nothing.
+        """
+        first, kinds = next(iter(self.gaits.values())), self._all_kinds()
+        table = np.array([[values[name] for name in values] for values in kinds])
+        sizes = np.maximum(np.ptp(table, axis=0), 1e-300)
+        own = {**getattr(self.map.model, "parameters", {}), **first.parameters}
+        home = np.array([own.get(name, value) for name, value in kinds[0].items()])
+        far = np.max(np.abs(table - home) / sizes, axis=1, initial=0.0)
+        known: dict[str, list[tuple[Vector, LimitCycle]]] = {name: [(home, each)] for name, each in self.gaits.items()}
+        for k in np.argsort(far, kind="stable"):
+            values, place, found = kinds[k], table[k], []
+            for number, name in enumerate(self.gaits):
+                near = min(known[name], key=lambda one: float(np.max(np.abs(one[0] - place) / sizes, initial=0.0)))
+                try:
+                    here = near[1] if values == near[1].parameters else near[1].at(values)
+                    known[name].append((place, here))
+                    found.append((number, self._ball(name, here, values)))
+                except (ModelError, GaitError):
+                    if len(kinds) == 1:
+                        raise
+            self.balls[tuple(values.values())] = found
 
-                found.append((number, ball_of(repr(name), here, walked)))
-            except (ModelError, GaitError):
-                if must:
-                    raise
-        self._balls[key] = found
-        return found
+    def _ball(self, name: str, gait: LimitCycle, values: Mapping[str, float]) -> Ball:
+        changes = self.changes([values], None)
+
+        def walked(states: list[State]) -> Any:
+            return self.walks.walked(states, gait.strides, changes)
+
+        return ball_of(repr(name), gait, walked)
+
+    def _all_kinds(self) -> list[dict[str, float]]:
+        """The different sets of parameters of the study."""
+        found: dict[tuple[float, ...], dict[str, float]] = {}
+        total = len(self.study.grid)
+        for first in range(0, total, AT_ONCE):
+            runs = np.arange(first, min(first + AT_ONCE, total))
+            _, columns = self.study.columns(runs)
+            for values in kinds_of_parameters(self.map, self.base, columns, len(runs))[0]:
+                found[tuple(values.values())] = values
+            if len(found) > MOST_GAITS:
+                raise ModelError(
+                    f"axes give more than {MOST_GAITS} sets of parameters, at each of which the gait is looked for; "
+                    "give fewer values, and study them part by part"
+                )
+            if not columns:
+                break
+        return list(found.values())
 
     def lines(self, runs: Any) -> tuple[Matrix, NDArray[np.bool_], Changes, Any, list[list[tuple[int, Ball]]]]:
         """Starts of these numbers as lines, whether they are on the section, their parameters, sets and balls."""
@@ -129,7 +159,7 @@ class Made:
         good = np.ones(len(runs), dtype=bool)
         if self._onto is not None:
             good = self._onto(*self.walks.parts(lines), changes.all_vectors(len(runs)))
-        return lines, good, changes, which, [self._balls_at(values) for values in kinds]
+        return lines, good, changes, which, [self.balls[tuple(values.values())] for values in kinds]
 
     def block(self, runs: Any, steps: int) -> Decided:
         """What becomes of the starts with these numbers."""
