@@ -70,12 +70,15 @@ def _scenery(picture: Scene, axes: int, step: float) -> dict[str, Any]:
     def series(places: Matrix, fine: float) -> list[dict[str, Any]]:
         return [packed(places[:, axis], fine) for axis in range(axes)]
 
+    def sheet_of(sheet: Sheet) -> dict[str, Any]:
+        return surface(sheet, picture.turn[:, 1], step) if picture.spatial else _sheet(sheet, step)
+
     return {
         "decks": [
             {"at": series(deck.place, step), "normal": series(deck.normal, TURN), "along": series(deck.forward, TURN)}
             for deck in around.decks
         ],
-        "sheets": [surface(sheet, step) if picture.spatial else _sheet(sheet, step) for sheet in around.sheets],
+        "sheets": [sheet_of(sheet) for sheet in around.sheets],
         "wheels": [
             {
                 "side": side(wheel.name), "at": series(wheel.center, step), "radius": packed(wheel.radius, step),

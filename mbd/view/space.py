@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mbd.arrays import Vector
 from mbd.view.camera import FIRST, VIEWS
 from mbd.view.forms import mesh
 from mbd.view.packing import finite, packed, side
@@ -17,6 +18,9 @@ __all__ = ["TURN", "space", "surface"]
 
 TURN = 1e-4
 """Steps of directions and quaternions [-]."""
+
+COARSE = 5.0
+"""Steps of heights of a surface that moves, over those of places."""
 
 
 def space(picture: Scene, step: float) -> dict[str, Any]:
@@ -47,14 +51,19 @@ def space(picture: Scene, step: float) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def surface(sheet: Sheet, step: float) -> dict[str, Any]:
-    """A surface by the corners of its lines along x, row after row, at each of its times; and where none is."""
+def surface(sheet: Sheet, upwards: Vector, step: float) -> dict[str, Any]:
+    """A surface by the corners of its lines along x, row after row: places at its first time, then how far each rose.
+
+    upwards : the direction of heights in the scene; holes : numbers of corners without a height
+    """
     rows, count = PATCH, sheet.lines.shape[2]
     corners = sheet.lines[:, :rows].reshape(len(sheet.times), rows * count, 3)
     holes = np.flatnonzero(~np.all(np.isfinite(corners), axis=(0, 2)))
+    risen = (corners - corners[0]) @ upwards
     return {
         "times": [round(float(t), 9) for t in sheet.times], "rows": rows, "count": count, "holes": holes.tolist(),
-        "at": [_series(at, step) for at in corners],
+        "at": _series(corners[0], step), "up": [finite(x) for x in upwards],
+        "risen": [packed(each, COARSE * step) for each in risen[1:]],
     }  # fmt: skip
 
 

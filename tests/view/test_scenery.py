@@ -11,7 +11,9 @@ import mbd
 from mbd.tape.evaluate import evaluate, evaluate_arrays
 from mbd.tape.node import BINARY, UNARY, Tape
 from mbd.view.instants import Instants
+from mbd.view.page import content
 from mbd.view.scene import scene, upright
+from tests.view.test_page import unpacked
 
 RADIUS, COUNT = 0.2, 40
 
@@ -62,6 +64,24 @@ def sleigh() -> mbd.Trajectory:
     model.constrain(mbd.KnifeEdge("blade", body.point(-0.1, 0.2, name="runner").turned(0.3), normal=(0.1, 1.0, 0.0)))
     start = mbd.assemble(model, velocity={"free.angle": 1.0})
     return mbd.simulate(model, start, dt=1e-2, until=1.0)
+
+
+def rippled(x, z, t):
+    return 0.2 * x * x + 0.1 * z + 0.05 * mbd.sin(3.0 * x - 2.0 * t)
+
+
+def test_a_surface_in_space_is_on_the_page_as_it_moves(tmp_path):
+    """Corners p + r u, with p those at first, u upwards and r how far each rose, lie on the surface of the run."""
+    run = tossed(rippled, 0.2)
+    data = content(run, COUNT)
+    (sheet,) = data["sheets"]
+    count = sheet["rows"] * sheet["count"]
+    first = np.array([unpacked(axis, count) for axis in sheet["at"]]).T
+    step = sheet["at"][0]["step"]
+    assert data["spatial"] and len(sheet["risen"]) == len(sheet["times"]) - 1 > 5 and not sheet["holes"]
+    for t, risen in zip(sheet["times"][1:], sheet["risen"], strict=True):
+        x, y, z = in_ground_axes(run, first + unpacked(risen, count)[:, None] * sheet["up"]).T
+        np.testing.assert_allclose(y, 0.2 * x * x + 0.1 * z + 0.05 * np.sin(3.0 * x - 2.0 * t), atol=10.0 * step)
 
 
 def in_ground_axes(run: mbd.Trajectory, places):

@@ -34,9 +34,9 @@ function drawFloor(v, floor, solids) { // a round patch that fades, shadows on i
   }
 }
 function drawSheet(v, sheet) { // ground of a given height, with every second line of its corners
-  const p = locate(state.t, sheet.times), a = sheet.at[p.i], b = sheet.at[p.j], { rows, count } = sheet, holes = new Set(sheet.holes);
+  const p = locate(state.t, sheet.times), a = sheet.risen[p.i], b = sheet.risen[p.j], { rows, count } = sheet, holes = new Set(sheet.holes);
   const places = [], pixels = [], fill = blend(tint(colors.paper), tint(colors.ink), 0.1), color = blend(tint(colors.paper), tint(colors.ink), 0.3), width = 1 / v.scale;
-  for (let k = 0; k < rows * count; k++) { places.push([0, 1, 2].map((n) => a[n][k] + p.w * (b[n][k] - a[n][k]))); pixels.push(seen(places[k])); }
+  for (let k = 0; k < rows * count; k++) { const rise = a[k] + p.w * (b[k] - a[k]); places.push([0, 1, 2].map((n) => sheet.at[n][k] + rise * sheet.up[n])); pixels.push(seen(places[k])); }
   const there = (...corners) => !corners.some((k) => holes.has(k)), nearer = 2e-3 * extent();
   for (let j = 0; j < rows; j++) for (let i = 0; i < count; i++) {
     const k = j * count + i;

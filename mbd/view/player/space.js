@@ -2,7 +2,10 @@
 const sequence = (part) => part.map((axis) => unpack(axis));
 for (const solid of run.solids) { solid.at = sequence(solid.at); solid.turn = sequence(solid.turn); solid.formed = formed(solid.kind, solid.half); }
 for (const hinge of run.hinges) { hinge.at = sequence(hinge.at); hinge.axis = sequence(hinge.axis); }
-for (const sheet of run.sheets) sheet.at = sheet.at.map((axes) => axes.map((axis) => unpack(axis, sheet.rows * sheet.count)));
+for (const sheet of run.sheets) {
+  const size = sheet.rows * sheet.count;
+  sheet.at = sheet.at.map((axis) => unpack(axis, size)); sheet.risen = [new Float64Array(size), ...sheet.risen.map((heights) => unpack(heights, size))];
+}
 const here = (part, p) => part.map((axis) => mix(axis, p));
 
 // ---- camera -------------------------------------------------------------------------------------------------
