@@ -27,7 +27,8 @@ NAMES = (
     "basin-picture", "chapter-walker", "compare-two-knees", "compass-gait", "double-pendulum", "find-a-gait",
     "four-bar",
     "identify-a-shank", "kneed-walker", "lagrangian-double-pendulum", "long-pendulum", "pendulum", "prosthetic-leg",
-    "rimless-wheel", "shaken-block", "simplest-walker-lagrangian", "slider-crank", "tune-a-knee-damper",
+    "rimless-wheel", "shaken-block", "simplest-walker-lagrangian", "slider-crank", "spinning-top",
+    "tennis-racket", "tune-a-knee-damper",
     "user-constraint", "user-integrator",
 )  # fmt: skip
 STUDIES = ("compare-two-knees", "identify-a-shank", "tune-a-knee-damper")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from mbd.bodies.base import Frame
+from mbd.bodies.base import Body, Frame
 from mbd.bodies.link import Link
 from mbd.bodies.marker import Marker
 
@@ -20,6 +20,8 @@ Segments = list[tuple[str, tuple[str, ...]]]
 
 def figure_of(model: Description) -> Callable[[], Segments]:
     """The figure of the model as it is now: a link from start to end, other bodies through the frames in use.
+
+    A body with one frame in use is a star from there to its named points.
 
     It holds names only: equations are kept as long as the model is there, which they must not keep themselves.
     """
@@ -49,7 +51,16 @@ def _segments(model: Description) -> Segments:
             names = [frame.name for frame in frames] or ["origin"]
             bare = len(names) == 1 and any(body.center.offset)
             found.append((body.name, (*names, "center") if bare else tuple(names)))
+            if len(names) == 1:  # a body that floats or turns about a point shows how it is turned by its named points
+                found += [(body.name, (names[0], frame.name)) for frame in model.markers if _is_on(frame, body, frames)]
     return found
+
+
+def _is_on(frame: Frame, body: Body, frames: list[Frame]) -> bool:
+    """Whether a named point belongs to a body and lies elsewhere than its frames in use."""
+    places = [other.offset for other in frames] or [(0.0, 0.0, 0.0)]
+    named = frame.landmark is None or isinstance(frame, Marker)
+    return named and frame.body is body and frame.offset not in places
 
 
 def _distinct(frames: list[Frame]) -> list[Frame]:

@@ -1,0 +1,60 @@
+"""The examples in space, on numbers of Euler's equations and of Lagrange's top."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.special import ellipk
+
+from mbd.joints.quaternions import rotation_of
+from tests.test_examples import g, run_of, zeros
+
+
+def test_a_racket_turns_over_when_euler_says_so() -> None:
+    run = run_of("tennis-racket")
+    A, B, C = 0.0014, 0.0152, 0.0166  # about the handle, across, off the face
+    p, q = 1.0, 18.0
+    twice, square = A * p * p + B * q * q, (A * p) ** 2 + (B * q) ** 2  # 2 T and L²
+    rate = math.sqrt((B - A) * (twice * C - square) / (A * B * C))
+    part = (C - B) * (square - twice * A) / ((B - A) * (twice * C - square))
+    flips = zeros(run, "flight.angular_velocity.x")
+    assert len(flips) == 3
+    assert np.diff(flips) == pytest.approx(2.0 * ellipk(part) / rate, rel=1e-4)
+    name = "flight.orientation"
+    turned = [rotation_of(each) for each in run[name]]
+    spun = np.einsum("kij,kj->ki", np.array(turned), run["flight.angular_velocity"] * [B, A, C])
+    assert np.max(np.abs(spun - spun[0])) < 1e-5 * np.linalg.norm(spun[0])
+    fallen = 1.5 + 5.0 * run.time - 0.5 * g * run.time**2
+    assert run["racket.center.y"] == pytest.approx(fallen, abs=1e-6)
+
+
+def test_a_top_nods_between_the_roots_of_its_cubic_and_goes_round() -> None:
+    run = run_of("spinning-top")
+    A, C, mgl, spin = 1.4e-4 + 0.2 * 0.06**2, 2.5e-4, 0.2 * g * 0.06, 60.0 * math.pi
+    steep = (C * spin / A) ** 2 * A / (2.0 * mgl)  # 1 − u² = steep (cos θ₀ − u)
+    released = math.cos(0.4)
+    lowest = min(np.roots([1.0, -steep, steep * released - 1.0]), key=lambda u: abs(u - released))
+    axis = run.at(np.linspace(0.0, 1.0, 20001))["body.tip"] / 0.12
+    assert axis[:, 1].max() == pytest.approx(released, abs=1e-7)
+    assert axis[:, 1].min() == pytest.approx(lowest, abs=3e-5)
+    middle, half = 0.5 * (released + lowest), 0.5 * (released - lowest)
+
+    def over_a_nod(what: Callable[[float], float]) -> float:
+        """2 ∫ what/√f du between the roots of f = 2 m g l/A (cos θ₀ − u) (1 − u² − steep (cos θ₀ − u))."""
+
+        def part(phase: float) -> float:
+            u = middle + half * math.sin(phase)
+            return what(u) / math.sqrt(2.0 * mgl / A * (steep - lowest - u))  # its third root
+
+        return 2.0 * float(quad(part, -0.5 * math.pi, 0.5 * math.pi)[0])
+
+    nod = over_a_nod(lambda u: 1.0)
+    round_a_nod = over_a_nod(lambda u: C * spin / A * (released - u) / (1.0 - u * u))
+    turned = run.at(np.arange(0.0, 1.0, nod))["body.tip"]
+    assert turned[:, 1] / 0.12 == pytest.approx(released, abs=1e-5)
+    round_ = np.unwrap(np.arctan2(turned[:, 0], turned[:, 2]))
+    assert np.diff(round_) == pytest.approx(round_a_nod, rel=1e-3)
