@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 
-from mbd.errors import ModelError
+from mbd.errors import ModelError, nearest
 from mbd.joints.base import Joint
 from mbd.joints.orientations import is_orientation, orientation_doubt, quaternion_of
 
 __all__ = ["spelled_out", "three_of_four"]
 
 PARTS = "wxyz"
+EULER = re.compile(r"(.+)\.euler\.([xyz]{3})")
 
 
 def oriented(model: Any) -> dict[str, Joint]:
@@ -44,7 +46,17 @@ def spelled_out(model: Any, values: Any, what: str) -> tuple[Any, list[str], lis
             doubts += [] if sentence is None else [sentence]
             parts = {f"{name}.{part}": number for part, number in zip(PARTS, quaternion, strict=True)}
         elif isinstance(name, str) and is_orientation(value) and len(np.atleast_1d(np.asarray(value, object))) == 3:
+            angles = EULER.fullmatch(name)
+            if angles is not None and f"{angles[1]}.orientation" in known:
+                faults.append(
+                    f"{what}: {name!r} is read off the orientation; give {{'{angles[1]}.orientation': "
+                    f"('{angles[2]}', (first, second, third))}}"
+                )
+                continue
             parts = {f"{name}.{axis}": number for axis, number in zip("xyz", value, strict=True)}
+        elif isinstance(name, str) and is_orientation(value) and what == "position" and known:
+            faults.append("position: " + nearest(name, known, "orientation"))
+            continue
         faults += [f"{what}: {part!r} is given twice, by {name!r} too" for part in parts if part in found]
         found |= parts
     return found, faults, doubts

@@ -68,6 +68,15 @@ def test_parts_that_are_given_twice_are_refused():
         mbd.assemble(floating(), {"ball.orientation.w": 1.0, "ball.orientation": (1, 0, 0, 0)})
 
 
+def test_wrong_names_of_orientations_are_answered_with_the_right_ones():
+    with pytest.raises(
+        mbd.ModelError, match=r"no orientation named 'ball.orientaton'; did you mean 'ball.orientation'"
+    ):
+        mbd.assemble(floating(), {"ball.orientaton": (1.0, 0.0, 0.0, 0.0)})
+    with pytest.raises(mbd.ModelError, match=r"'ball.euler.zxy' is read off .* give \{'ball.orientation': \('zxy'"):
+        mbd.assemble(floating(), {"ball.euler.zxy": (0.1, 0.2, 0.3)})
+
+
 def test_a_start_at_the_singularity_of_its_angles_is_right_and_said_to_be_singular():
     angles = (0.3, np.pi / 2, 0.5)
     with pytest.warns(mbd.MbdWarning, match="singularity of that sequence"):
