@@ -84,6 +84,18 @@ def test_a_point_mass_welded_to_a_rod_floats_with_its_axes():
     assert isinstance(plan(model).edges[1], mbd.Planar)
 
 
+@pytest.mark.parametrize("axis", [(0, 0, 1), (1, 0, 0.2)])
+def test_a_point_mass_on_an_arm_turns_with_it_however_it_is_cut(axis):
+    ends = []
+    for cut in ("auto", "all"):
+        model = mbd.Model("arm", cut=cut)
+        bob = mbd.PointMass("bob", 1.0)
+        model.connect(mbd.Revolute("pin", model.ground.origin, bob.point(0.0, 1.0, 0.0), axis=axis))
+        start = mbd.assemble(model, {"pin.angle": 0.5})
+        ends.append(mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.01, until=0.2)["bob.center"][-1])
+    assert ends[0] == pytest.approx(ends[1], abs=1e-10)
+
+
 def test_a_spatial_body_floats_with_all_six_motions():
     model = bricard()
     model.cut = "all"
