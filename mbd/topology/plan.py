@@ -148,7 +148,8 @@ def floating_joint(model: Description, body: Body, planar: bool) -> Joint:
 def _is_turned(model: Description, body: Body) -> bool:
     """Whether a joint without an angle holds the body's axes to those of a moving body or of a turned frame.
 
-    Also where a joint holds it beside its own point, and where it has to give a torque, which its rows must carry, since something else acts beside the body's origin.
+    Also where a joint holds it beside its own point, and where it has to give a torque, which its rows must carry,
+    since something else acts beside the body's origin.
     """
     for joint in model.joints:
         for own, other in (joint.parent, joint.child), (joint.child, joint.parent):
