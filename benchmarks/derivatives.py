@@ -1,4 +1,4 @@
-"""What exact derivatives of a run cost, beside the run and beside differences of runs: a step of the kneed walker."""
+"""What exact derivatives of a run cost beside the run: a step of the kneed walker; seven links that fall."""
 
 from __future__ import annotations
 
@@ -8,14 +8,16 @@ from typing import Any
 import mbd
 from benchmarks.figures import Figure, interleaved
 from benchmarks.stopwatch import processor_seconds
-from benchmarks.walkers import kneed_walker
+from benchmarks.walkers import kneed_walker, seven
 from mbd.sensitivity.derivative import final_state_derivative
 
 __all__ = ["measure"]
 
-SCHEMES: dict[str, tuple[mbd.HHT | mbd.RungeKutta853, dict[str, float]]] = {
+SCHEMES: dict[str, tuple[mbd.HHT | mbd.RungeKutta853 | mbd.RadauIIA, dict[str, float]]] = {
     "HHT, dt = 2 ms": (mbd.HHT(alpha=0.05), {"dt": 2e-3}),
+    "HHT, index 3, dt = 2 ms": (mbd.HHT(alpha=0.05, formulation="index3"), {"dt": 2e-3}),
     "RungeKutta853, dt = 10 ms": (mbd.RungeKutta853(), {"dt": 1e-2}),
+    "RadauIIA, dt = 10 ms": (mbd.RadauIIA(), {"dt": 1e-2}),
 }
 DIRECTIONS = 20
 
@@ -30,30 +32,37 @@ def directions() -> list[str]:
 
 def measure(repeats: int) -> list[Figure]:
     """20 directions by the pass, run included, over the run alone; aim 3. Central differences take 40 runs."""
+    figures = list[Figure]()
     model, start = kneed_walker()
-    names, figures = directions(), list[Figure]()
+    falling, upright = seven()
     for title, (scheme, step) in SCHEMES.items():
-
-        def run(scheme: Any = scheme, step: dict[str, float] = step) -> mbd.Trajectory:
-            return mbd.simulate(model, start, scheme, until="right foot", **step)  # type: ignore[arg-type]
-
-        def differentiated(names: list[str], run: Any = run) -> None:
-            final_state_derivative(run(), names)
-
-        samples = interleaved(
-            {
-                "run": partial(processor_seconds, run),
-                "one": partial(processor_seconds, differentiated, names[:1]),
-                "all": partial(processor_seconds, differentiated, names),
-            },
-            repeats,
-        )
-        alone = samples["run"].least
-        for count, key, aim in ((1, "one", None), (DIRECTIONS, "all", 3.0)):
-            figures.append(
-                Figure(
-                    f"a walker step with derivatives by {count}, {title}", samples[key].least * 1e3, "ms", None,
-                    "the run alone", alone * 1e3, aim, samples[key].spread,
-                )
-            )  # fmt: skip
+        run = partial(mbd.simulate, model, start, scheme, until="right foot", **step)  # type: ignore[arg-type]
+        figures += _measured(f"a walker step, {title}", run, directions(), repeats)
+        run = partial(mbd.simulate, falling, upright, scheme, until=0.4, **step)  # type: ignore[arg-type]
+        names = [*upright.names, *upright.velocity_names, "gravity.y", "trunk.mass"][:DIRECTIONS]
+        figures += _measured(f"7 links for 0.4 s, {title}", run, names, repeats)
     return figures
+
+
+def _measured(title: str, run: Any, names: list[str], repeats: int) -> list[Figure]:
+    """A run with its derivatives by one direction, and by all."""
+
+    def differentiated(count: int) -> None:
+        final_state_derivative(run(), names[:count])
+
+    samples = interleaved(
+        {
+            "run": partial(processor_seconds, run),
+            "one": partial(processor_seconds, differentiated, 1),
+            "all": partial(processor_seconds, differentiated, DIRECTIONS),
+        },
+        5 * repeats,
+    )
+    alone = samples["run"].least
+    return [
+        Figure(
+            f"{title}: with derivatives by {count}", samples[key].least * 1e3, "ms", None, "the run alone", alone * 1e3,
+            aim, samples[key].spread,
+        )
+        for count, key, aim in ((1, "one", None), (DIRECTIONS, "all", 3.0))
+    ]  # fmt: skip

@@ -56,7 +56,14 @@ class AssemblyError(ModelError):
 
 
 class CapabilityError(ModelError):
-    """A combination of integrator, formulation and constraint that cannot be honoured."""
+    """A combination of integrator, formulation and constraint that cannot be honoured.
+
+    Attributes
+    ----------
+    run : the run whose derivatives, asked for by wrt=, are not known; else None
+    """
+
+    run: Any = None
 
 
 class SimulationError(MbdError, RuntimeError):

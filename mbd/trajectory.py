@@ -207,6 +207,16 @@ class Trajectory:
         ending = (event for event in self.record.events if event.time >= self.record.time[-1])
         return int(any(event.kind == "event" or event.name == stop for event in ending))
 
+    @cached_property
+    def sensitivities(self) -> Any:
+        """Derivatives of the final state and its instant, of a run by ``mbd.simulate(…, wrt=[…])``."""
+        from mbd.sensitivity.result import Sensitivities
+
+        words = self.record.stats.get("sensitivities")
+        if words is None:
+            raise TrajectoryError("this run has no derivatives; give what they are by: mbd.simulate(…, wrt=[…])")
+        return Sensitivities.read(words, self)
+
     @property
     def final(self) -> State:
         """The state at the end, to go on from; with the same scheme and step as if there had been no end."""

@@ -47,7 +47,8 @@ RANK = {part: rank for rank, parts in enumerate(RANKS) for part in parts}
 
 DOORS = {
     "state": ("results.units", "view"),
-    "trajectory": ("analysis.ending", "view"),
+    "simulation.simulate": ("sensitivity.sensitivities",),
+    "trajectory": ("analysis.ending", "sensitivity.result", "view"),
     "results.ledger": ("view",),
     "analysis.accuracy.result": ("view",),
     "analysis.effects.result": ("view",),

@@ -14,7 +14,7 @@ from mbd.sensitivity.motion import Mode, Motion, Rates
 from mbd.sensitivity.outputs import with_sliding
 from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.run_data import RunRows, refused
-from mbd.sensitivity.starts import directions, start_tangent
+from mbd.sensitivity.starts import directions, programs_of, restitutions_of, start_tangent
 from mbd.sensitivity.walk import Passed, Walk
 from mbd.trajectory import Trajectory
 
@@ -86,9 +86,13 @@ def along(run: Trajectory, wrt: Sequence[Any], names: Sequence[str], held: Colle
     """
     rows = RunRows(run)
     wanted = directions(rows, wrt)
-    parameters = dict.fromkeys(name for each in wanted for name in each.parameters or {})
-    programs = Programs(rows.mechanism, rows.places(list(parameters)), run.record.parameters)
-    walk, seen, slopes, shifts = Walk(rows, programs), list[int](), list[Matrix](), list[Vector]()
+    programs = programs_of(rows, wanted)
+    walk, seen, slopes, shifts = (
+        Walk(rows, programs, restitutions_of(wanted)),
+        list[int](),
+        list[Matrix](),
+        list[Vector](),
+    )
 
     def visit(row: int, motion: Motion, mode: Mode, rates: Rates) -> None:
         seen.append(row)

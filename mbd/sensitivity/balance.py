@@ -129,8 +129,12 @@ class Impact:
     misfit: float = 0.0
 
 
-def impact(programs: Programs, before: Motion, after: Vector, mode: Mode, what: Impact) -> tuple[Motion, Impact]:
+def impact(
+    programs: Programs, before: Motion, after: Vector, mode: Mode, what: Impact, of_e: Mapping[int, Vector]
+) -> tuple[Motion, Impact]:
     """The motion after an impact with the velocities `after` (n,), and how well its law accounts for these.
+
+    of_e : rates (D,) of the restitutions of rows, by their numbers
 
     ``M (v⁺ − v⁻) + R Λ = 0``, ``ḣ(v⁺) + e ḣ(v⁻) = 0`` of the rows that take part.
     """
@@ -154,5 +158,8 @@ def impact(programs: Programs, before: Motion, after: Vector, mode: Mode, what: 
     still = before.with_tangent(y=np.zeros_like(before.tangent.y)).tangent.stacked(c)
     right = [(loaded - bare) @ still - M @ before.tangent.y]
     right.append(of_speed1[rows] @ still + e[:, np.newaxis] * (of_speed0[rows] @ Z))
+    for k, row in enumerate(rows):
+        if row in of_e and row in what.restitution:
+            right[1][k] += of_e[row] * speed0[row]
     found = -solved(A, np.vstack(right))
     return later.with_tangent(y=found[:n]), replace(what, misfit=float(misfit))

@@ -10,7 +10,7 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.run_data import RunRows
-from mbd.sensitivity.starts import Direction, directions, start_tangent
+from mbd.sensitivity.starts import Direction, directions, programs_of, restitutions_of, start_tangent
 from mbd.sensitivity.walk import Passed, Walk
 from mbd.trajectory import Trajectory
 
@@ -21,6 +21,10 @@ def final_state_derivative(
     run: Trajectory, wrt: Sequence[str | tuple[str, Mapping[str, float]]], held: Collection[str] = ()
 ) -> tuple[Matrix, Vector]:
     """d(q, v) at the end of a run, and d t_end, by coordinates and speeds of its start and by parameters.
+
+    It reads a run that is there already, and runs nothing: a pass takes as long as one to two short runs, hardly more
+    for twenty directions than for one. So a Newton iteration on a map of a run, such as a return map, asks once for all
+    of its unknowns: ``run = mbd.simulate(…, until="right foot")``, ``final_state_derivative(run, names, held=names)``.
 
     Parameters
     ----------
@@ -62,7 +66,6 @@ def passed(
     """The pass over a run, and its directions."""
     rows = RunRows(run)
     wanted = directions(rows, wrt)
-    names = dict.fromkeys(name for each in wanted for name in each.parameters or {})
-    programs = Programs(rows.mechanism, rows.places(list(names)), run.record.parameters)
-    walked = Walk(rows, programs).whole(start_tangent(rows, programs, wanted, held))
+    programs = programs_of(rows, wanted)
+    walked = Walk(rows, programs, restitutions_of(wanted)).whole(start_tangent(rows, programs, wanted, held))
     return Differentiated(rows, programs, walked), wanted

@@ -17,14 +17,13 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.sensitivity.balance import consistent_rates
+from mbd.sensitivity.kernel.newmark_prediction import FOLLOWED
 from mbd.sensitivity.motion import Mode, Motion, Rates, Tangent, solved
 from mbd.sensitivity.programs import Columns, Programs
 from mbd.sensitivity.schemes import Memory
 
 __all__ = ["NewmarkSteps"]
 
-FOLLOWED = 1e-9
-"""Distance of a row from the end of its step, over how far the step went, up to which the step is known [-]."""
 BRIEF, BRIEFEST = 1e-3, 1e-9
 """Parts of a full step below which the kernel takes one of Heun's method, with rows and without them [-]."""
 

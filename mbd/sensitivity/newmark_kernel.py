@@ -10,7 +10,8 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.sensitivity.entries import System, stacked, system
 from mbd.sensitivity.kernel.build import entry
-from mbd.sensitivity.kernel.newmark import newmark_end, newmark_steps
+from mbd.sensitivity.kernel.newmark import newmark_steps
+from mbd.sensitivity.kernel.newmark_end import newmark_end
 from mbd.sensitivity.motion import Mode, Motion, Rates
 from mbd.sensitivity.newmark import NewmarkSteps
 from mbd.sensitivity.run_data import Rows

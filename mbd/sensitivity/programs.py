@@ -139,7 +139,8 @@ class Programs:
     def __init__(self, mechanism: Mechanism, places: Sequence[int], values: Vector) -> None:
         self.mechanism, self.places = mechanism, tuple(places)
         self.equations, self.layout = mechanism.equations, mechanism.layout
-        self.columns = Columns.of(self.layout, len(self.places))
+        key = f"columns of {len(self.places)} parameters"
+        self.columns: Columns = mechanism.named.setdefault(key, Columns.of(self.layout, len(self.places)))
         self.values = np.ascontiguousarray(values, dtype=float) if len(values) else np.zeros(1)
         self._block = np.zeros(self.layout.size)
         self._given: dict[str, list[Node]] = {}

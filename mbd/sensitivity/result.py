@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
-from mbd.errors import UnknownNameError, nearest
+from mbd.errors import TrajectoryError, UnknownNameError, nearest
 from mbd.notebook import table
 from mbd.trajectory import Trajectory
 
@@ -28,6 +28,7 @@ class Sensitivities:
     matrix : (len(of), len(wrt)) derivatives
     values : (len(of),) what is differentiated
     run : the run, of whose numbers these are the derivatives
+    event_changes : which changes of `check_events` make another sequence of events, and the first that is another
     """
 
     of: tuple[str, ...]
@@ -37,6 +38,25 @@ class Sensitivities:
     run: Trajectory = field(repr=False)
     of_units: tuple[str, ...] = ()
     wrt_units: tuple[str, ...] = ()
+    event_changes: tuple[str, ...] = ()
+
+    def as_words(self) -> dict[str, Any]:
+        """All of it but the run, as numbers and words."""
+        return {
+            "of": list(self.of), "wrt": list(self.wrt), "matrix": self.matrix.tolist(), "values": self.values.tolist(),
+            "of_units": list(self.of_units), "wrt_units": list(self.wrt_units),
+        }  # fmt: skip
+
+    @classmethod
+    def read(cls, words: Mapping[str, Any], run: Trajectory) -> Sensitivities:
+        """What `as_words` gave, of this run; a `TrajectoryError` for anything else."""
+        try:
+            of, wrt, *units = (tuple(map(str, words[name])) for name in ("of", "wrt", "of_units", "wrt_units"))
+            matrix = np.array(words["matrix"], dtype=float).reshape(len(of), len(wrt))
+            values = np.array(words["values"], dtype=float).reshape(len(of))
+        except (KeyError, TypeError, ValueError) as error:
+            raise TrajectoryError(f"the derivatives of this run are not as they were written: {error}") from error
+        return cls(of, wrt, matrix, values, run, *units)
 
     def __getitem__(self, names: str | tuple[str, str]) -> Any:
         """A derivative by the names of its line and column, or a line by its name alone."""
@@ -74,7 +94,7 @@ class Sensitivities:
         ]
         for name, line in zip(self.of, texts, strict=True):
             lines.append(" ".join([name.ljust(first), *(f"{x:>{w + 1}}" for x, w in zip(line, widths, strict=True))]))
-        return "\n".join(lines)
+        return "\n".join([*lines, *(f"another sequence of events: {each}" for each in self.event_changes)])
 
     def _repr_html_(self) -> str:
         named = self._with_units(self.wrt, self.wrt_units)

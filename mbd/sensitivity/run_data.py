@@ -151,6 +151,16 @@ class RunRows:
 
     def mode(self, row: int) -> Mode:
         """What acts from a row on."""
+        known = self._modes.get(row)
+        if known is None:
+            known = self._modes[row] = self._mode(row)
+        return known
+
+    @cached_property
+    def _modes(self) -> dict[int, Mode]:
+        return {}
+
+    def _mode(self, row: int) -> Mode:
         flags, phase = self.record.closed[row], self.record.phase[row]
         held = self.manager.active_rows(np.asarray(flags, dtype=np.int64), (phase == 2).astype(np.int64))
         slip = np.where(np.abs(phase) == 1, phase, 0).astype(float)

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 from mbd.bodies.values import is_number, shown
 from mbd.compile.mechanisms import mechanism_of
-from mbd.errors import ModelError
+from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.integrators import Integrator
 from mbd.results.units import unit
 from mbd.sensitivity.derivative import passed
@@ -16,11 +16,13 @@ from mbd.sensitivity.functions import rates_of_parameters
 from mbd.sensitivity.outputs import lines_of, usual
 from mbd.sensitivity.result import Sensitivities
 from mbd.sensitivity.run_data import refused
+from mbd.sensitivity.sequence import amounts_of, changed_sequences
+from mbd.sensitivity.starts import restitution_names, start_names
 from mbd.simulation.simulate import REST_SPEED, simulate
 from mbd.state import State
 from mbd.trajectory import Trajectory
 
-__all__ = ["sensitivities"]
+__all__ = ["derivatives_of", "sensitivities", "with_inputs"]
 
 Wanted = str | Mapping[str, Mapping[str, Any]]
 
@@ -37,6 +39,7 @@ def sensitivities(
     of: Sequence[str] | None = None,
     at: Mapping[str, float] | None = None,
     hold: Sequence[str] | None = None,
+    check_events: Mapping[str, float] | None = None,
     parameters: Mapping[str, float] | None = None,
     impact: Literal["newton", "poisson", "sequential"] = "newton",
     rest_speed: float = REST_SPEED,
@@ -53,15 +56,17 @@ def sensitivities(
     ----------
     model, start, integrator, dt, tol, until, parameters, impact, rest_speed, backend : see `mbd.simulate`; the scheme
         is of the Newmark family, `mbd.RungeKutta853` or `mbd.RadauIIA`
-    wrt : coordinates ('hip.angle') and rates ('hip.rate') of the start, parameters ('left thigh.mass'), and functions
-        of parameters, ``{"slope": {"gravity.x": lambda s: 9.81 * mbd.sin(s), …}}``, or the rates of several parameters,
+    wrt : coordinates ('hip.angle') and rates ('hip.rate') of the start, parameters ('left thigh.mass'), restitutions of
+        contacts ('left foot.restitution'), and functions of parameters,
+        ``{"slope": {"gravity.x": lambda s: 9.81 * mbd.sin(s), …}}``, or the rates of several parameters,
         ``{"legs": {"left leg.mass": 1.0, "right leg.mass": 1.0}}``
     of : results at the end ('hip.angle', 'foot.force'), 'time', the instants of events ('foot.time' of the first one,
         'foot.time.2' of the second); by default the state at the end, and 'time'
     at : values of the quantities whose functions are in `wrt`, {"slope": 0.05}
-
     hold : coordinates and rates of the start that keep their values where closed contacts or constraints bind it, such
         as those that `mbd.assemble` was given; the others complete it, with the least motion. By default those in `wrt`
+    check_events : changes > 0 of names in `wrt`, {"hip.angle": 0.01}: two more runs of each, with the change added and
+        taken away, tell in `Sensitivities.event_changes` which event is then another, where derivatives tell nothing
 
     Returns
     -------
@@ -89,22 +94,41 @@ def sensitivities(
     >>> print(f"{found['time', 'fall.displacement']:.6f}")
     0.225762
     """
-    single, grouped = _names_in(wrt)
-    if getattr(model, "controllers", ()):
-        them = ", ".join(repr(each.name) for each in model.controllers)
-        raise refused(f"its controllers ({them}) change parameters as they read results, which is not differentiated")
+    _names_in(wrt)
     _check_of(of)
     _check_hold(hold)
     values = _values_of(at)
     if not isinstance(start, State):
         raise ModelError(f"start must be a State from mbd.assemble(model, …), not {start!r}")
+    amounts = amounts_of(check_events, [name for each in wrt for name in ([each] if isinstance(each, str) else each)])
     changed = {**start.parameters, **(parameters or {})} if isinstance(parameters, Mapping | None) else {}
-    model = _with_inputs(model, backend, changed, single, grouped)
-    run = simulate(
-        model, replace(start, memory=None), integrator, dt, tol, until=until, contact="events", impact=impact,
-        parameters=parameters, rest_speed=rest_speed, backend=backend,
-    )  # fmt: skip
-    return _differentiated(run, _directions(run, wrt, values), _held(run, single) if hold is None else hold, of)
+    model = with_inputs(model, backend, changed, wrt)
+
+    def made(start: State, more: Mapping[str, float]) -> Trajectory:
+        return simulate(
+            model, replace(start, memory=None), integrator, dt, tol, until=until, contact="events", impact=impact,
+            parameters={**(parameters or {}), **more} if more else parameters, rest_speed=rest_speed, backend=backend,
+        )  # fmt: skip
+
+    run = made(start, {})
+    found = derivatives_of(run, wrt, of, values, hold)
+    if not amounts:
+        return found
+    single, _ = _names_in(wrt)
+    ways, held = _directions(run, wrt, values), _held(run, single) if hold is None else hold
+    return replace(found, event_changes=changed_sequences(model, run, ways, held, amounts, made, backend))
+
+
+def derivatives_of(
+    run: Trajectory,
+    wrt: Sequence[Wanted],
+    of: Sequence[str] | None = None,
+    at: Mapping[str, float] | None = None,
+    hold: Sequence[str] | None = None,
+) -> Sensitivities:
+    """The derivatives of a run of a model that `with_inputs` made; see `sensitivities`."""
+    single, _ = _names_in(wrt)
+    return _differentiated(run, _directions(run, wrt, at or {}), _held(run, single) if hold is None else hold, of)
 
 
 def _directions(run: Trajectory, wrt: Sequence[Wanted], values: Mapping[str, float]) -> list[Any]:
@@ -179,13 +203,21 @@ def _values_of(at: Any) -> dict[str, float]:
     return {name: float(value) for name, value in at.items()}
 
 
-def _with_inputs(
-    model: Any, backend: str, changed: Mapping[str, float], single: Sequence[str], grouped: Sequence[str]
-) -> Any:
-    """The model with the parameters among these names as run-time inputs, also where they are 0 or ±1."""
+def with_inputs(model: Any, backend: str, changed: Mapping[str, float], wrt: Any) -> Any:
+    """The model with the parameters that `wrt` names as run-time inputs, also where they are 0 or ±1."""
+    single, grouped = _names_in(wrt)
+    if getattr(model, "controllers", ()):
+        them = ", ".join(repr(each.name) for each in model.controllers)
+        raise refused(f"its controllers ({them}) change parameters as they read results, which is not differentiated")
     mechanism = mechanism_of(model, backend, {k: v for k, v in changed.items() if is_number(v)})
     inputs = {parameter.name for parameter in mechanism.equations.parameters}
     folded = getattr(model, "parameters", {})
     own = {coordinate.name for coordinate in mechanism.equations.coordinates}
+    known = {*inputs, *folded, *start_names(mechanism.equations), *restitution_names(mechanism.equations)}
+    for name in (*single, *grouped):
+        if name not in known:
+            raise UnknownNameError(
+                "wrt: " + nearest(name, known, "coordinate, rate of the start or parameter", "There are")
+            )
     more = [name for name in (*single, *grouped) if name in folded and name not in inputs and name not in own]
     return model.with_tunable(*more) if more else model

@@ -13,15 +13,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mbd.arrays import Matrix
+from mbd.arrays import Matrix, Vector
 from mbd.compile.mechanism import rate_names
+from mbd.equations.equations import Equations
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.sensitivity.motion import Mode, Motion, Tangent
 from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.run_data import RunRows
 from mbd.sensitivity.strikes import captured
 
-__all__ = ["Direction", "directions", "start_tangent"]
+__all__ = [
+    "Direction", "directions", "programs_of", "restitution_names", "restitutions_of", "start_names", "start_tangent",
+]  # fmt: skip
 
 Flags = NDArray[np.bool_]
 
@@ -32,13 +35,46 @@ class Direction:
 
     name : as it was asked for
     q, y : numbers of the coordinate or velocity that it is, −1 if it is none
-    parameters : rates of change of parameters by name
+    parameters : rates of change of parameters by name; restitutions : of those of contacts, by name
     """
 
     name: str
     q: int = -1
     y: int = -1
     parameters: Mapping[str, float] | None = None
+    restitutions: Mapping[str, float] | None = None
+
+
+RESTITUTION = ".restitution"
+"""Behind the name of a contact, what one may differentiate by although no run takes it as a parameter."""
+
+
+def restitution_names(equations: Equations) -> list[str]:
+    """Restitutions of contacts that close by impact."""
+    return [contact.name + RESTITUTION for contact in equations.contacts if contact.kind != "penalty"]
+
+
+def programs_of(rows: RunRows, wanted: Sequence[Direction]) -> Programs:
+    """The programs for the parameters that some directions change."""
+    names = dict.fromkeys(name for each in wanted for name in each.parameters or {})
+    return Programs(rows.mechanism, rows.places(list(names)), rows.record.parameters)
+
+
+def restitutions_of(wanted: Sequence[Direction]) -> dict[str, Vector]:
+    """Rates (D,) of the restitutions of contacts, by their names."""
+    found: dict[str, Vector] = {}
+    for k, each in enumerate(wanted):
+        for name, rate in (each.restitutions or {}).items():
+            found.setdefault(name, np.zeros(len(wanted)))[k] = rate
+    return found
+
+
+def start_names(equations: Equations) -> dict[str, tuple[int, int]]:
+    """Names of what a start has: the numbers of the coordinate and of the velocity that each is, −1 for none."""
+    coordinates = {each.name: (k, -1) for k, each in enumerate(equations.coordinates)}
+    speeds = {name: (-1, k) for name, k in rate_names(equations).items()}
+    states = {state.name: (-1, equations.n_v + k) for k, state in enumerate(equations.states)}
+    return {**speeds, **states, **coordinates}
 
 
 def directions(rows: RunRows, wrt: Sequence[str | tuple[str, Mapping[str, float]]]) -> list[Direction]:
@@ -49,27 +85,27 @@ def directions(rows: RunRows, wrt: Sequence[str | tuple[str, Mapping[str, float]
     UnknownNameError
         for a name that is neither a coordinate or rate of the start nor a run-time parameter.
     """
-    equations = rows.mechanism.equations
-    coordinates = {each.name: k for k, each in enumerate(equations.coordinates)}
-    speeds = {name: k for name, k in rate_names(equations).items() if name not in coordinates}
-    speeds |= {state.name: equations.n_v + k for k, state in enumerate(equations.states)}
-    known = set(rows.record.parameter_names)
+    start, known = start_names(rows.mechanism.equations), set(rows.record.parameter_names)
+    bounces = set(restitution_names(rows.mechanism.equations)) - known
     found = []
     for each in wrt:
         name, parameters = (each, None) if isinstance(each, str) else each
         wanted = [name] if parameters is None else list(parameters)
         for one in wanted:
-            if one in known or (parameters is None and (one in coordinates or one in speeds)):
+            if one in known or one in bounces or (parameters is None and one in start):
                 continue
-            all_names = {*known, *coordinates, *speeds}
-            text = nearest(one, all_names, "coordinate, rate of the start or run-time parameter", "There are")
+            text = nearest(
+                one, {*known, *start, *bounces}, "coordinate, rate of the start or run-time parameter", "There are"
+            )
             raise UnknownNameError(f"{text}; an exact 0 or ±1 is a run-time input only with tunable=[{one!r}]")
-        if parameters is None and name in coordinates:
-            found.append(Direction(name, q=coordinates[name]))
-        elif parameters is None and name in speeds:
-            found.append(Direction(name, y=speeds[name]))
+        if parameters is None and name in start:
+            found.append(Direction(name, *start[name]))
         else:
-            found.append(Direction(name, parameters={name: 1.0} if parameters is None else parameters))
+            rates = {name: 1.0} if parameters is None else dict(parameters)
+            impacts = {one.removesuffix(RESTITUTION): rate for one, rate in rates.items() if one in bounces}
+            found.append(
+                Direction(name, parameters={k: v for k, v in rates.items() if k not in bounces}, restitutions=impacts)
+            )
     return found
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -22,25 +22,32 @@ ACCOUNTED = 1e-7
 
 
 def struck(
-    rows: RunRows, programs: Programs, before: Motion, mode: Mode, events: Sequence[EventRecord], row: int
-) -> tuple[Motion, Impact]:
+    rows: RunRows, programs: Programs, before: Motion, mode: Mode, events: Sequence[EventRecord], row: int,
+    restitutions: Mapping[str, Vector],
+) -> tuple[Motion, Impact]:  # fmt: skip
     """The motion after the impact of the contacts that close at a row, and the impact.
+
+    restitutions : rates (D,) of those of contacts, by name
 
     Its rows are those of bilateral constraints, of contacts that stay or close and push, and of frictions that stick.
     """
     after = rows.y[row]
     impulses = impulses_by_row(programs, events)
     closing = {event.name for event in events if event.kind == "closed"}
-    tried = []
+    tried, law = [], rows.record.settings.get("impact", "newton")
+    if law != "newton" and closing & set(restitutions):
+        raise refused(f"restitutions are differentiated under impact='newton', not {law!r}")
+    bounces = {
+        each.rows[0]: restitutions[each.name] for each in programs.equations.contacts if each.name in restitutions
+    }
     end = replace(before, y=after).at(rows.mode(row), np.zeros(programs.columns.n), np.zeros(programs.columns.rows))
     for slow in (False, True):
         what = _rows_of(rows, mode, impulses, closing, end, slow, programs)
-        moved, found = impact(programs, before, after, mode, what)
+        moved, found = impact(programs, before, after, mode, what, {} if slow else bounces)
         tried.append(found.misfit)
         if found.misfit <= ACCOUNTED:
             return moved, found
     names = " and ".join(repr(name) for name in sorted(closing))
-    law = rows.record.settings.get("impact", "newton")
     raise refused(
         f"the impact of {names} at t = {before.t:.9g} s (law {law!r}) is not one that reverses gap rates by their "
         f"restitution once; its velocities differ by {min(tried):.2g} of them",

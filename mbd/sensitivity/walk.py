@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from mbd.arrays import Matrix
+from mbd.arrays import Matrix, Vector
 from mbd.integrators import RadauIIA, RungeKutta853
 from mbd.integrators.family import NewmarkFamily
 from mbd.results.stored_states import StoredStates
@@ -77,10 +77,11 @@ class Walk:
     ----------
     rows : the run
     programs : for the parameters that are differentiated by
+    restitutions : rates (D,) of the restitutions of contacts, by name
     """
 
-    def __init__(self, rows: RunRows, programs: Programs) -> None:
-        self.rows, self.programs = rows, programs
+    def __init__(self, rows: RunRows, programs: Programs, restitutions: Mapping[str, Vector] | None = None) -> None:
+        self.rows, self.programs, self.restitutions = rows, programs, restitutions or {}
         self.record = rows.record
         self._modes: dict[tuple[Any, ...], Mode] = {}
         self.steps = steps_of(rows, programs)
@@ -122,12 +123,10 @@ class Walk:
                 rates = self._restarted(motion, mode, row)
                 memory = self.steps.start(motion, mode, rates)
                 continue
-            if fresh and not rows.begins_late(motion.t, row):
-                end = rows.segment_end(row)
-                if self.visit is None:
-                    before, far = row, self._unwatched(mode, row, end - 1)
-                    row, motion, memory = self.steps.leap(motion, memory, mode, row, far)
-                    fresh = row == before
+            if self.visit is None and not rows.begins_late(motion.t, row):
+                before, far = row, self._unwatched(mode, row, rows.segment_end(row) - 1)
+                row, motion, memory = self.steps.leap(motion, memory, mode, row, far)
+                fresh = fresh and row == before
             if row not in looked:
                 looked.add(row)
                 begun = self._begins(motion, memory, mode, row)
@@ -247,7 +246,7 @@ class Walk:
         closing = fired.kind == "closed" and equations.contacts[fired.number].kind != "penalty"
         motion = before
         if closing:
-            motion, _ = struck(self.rows, self.programs, before, mode, events, row)
+            motion, _ = struck(self.rows, self.programs, before, mode, events, row, self.restitutions)
         elif fired.kind == "event" and equations.guards[fired.number].reset is not None:
             row_after = np.array(self.record.q[row]), self.rows.y[row]
             there = consistent_rates(self.programs, before, mode, rates)

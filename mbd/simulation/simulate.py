@@ -17,7 +17,7 @@ from mbd.assembly.trivial_rows import manager_of
 from mbd.assembly.turns import directed
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of
-from mbd.errors import CapabilityError, MemoryLimitError, SimulationError, UnknownNameError
+from mbd.errors import CapabilityError, MemoryLimitError, ModelError, SimulationError, UnknownNameError
 from mbd.integrators import HHT, Integrator
 from mbd.notes import called_from_outside, doubt, note
 from mbd.progress import run_bar
@@ -63,6 +63,7 @@ def simulate(
     progress: Callable[[float, float], None] | bool | None = None,
     on_failure: Literal["raise", "return"] = "raise",
     rest_speed: float = REST_SPEED,
+    wrt: Sequence[str | Mapping[str, Mapping[str, float]]] | None = None,
     backend: str = "auto",
 ) -> Trajectory:
     """Integrate a model from a state.
@@ -100,6 +101,9 @@ def simulate(
         Python takes more than some seconds
     on_failure : 'raise' a `SimulationError` whose ``run`` has everything computed, or 'return' it with success False
     rest_speed : approach speed below which a contact rests [m/s, rad/s]
+    wrt : what the final state and its instant are differentiated by, into `run.sensitivities`: coordinates and rates of
+        the start, parameters, rates of several parameters by one quantity; see `mbd.sensitivities`, which takes
+        functions of parameters and other results too. Contacts are then treated by 'events'
     backend : 'auto', 'llvm' or 'python' (the plain twin, slow)
 
     Returns
@@ -109,7 +113,8 @@ def simulate(
     Raises
     ------
     ModelError, UnknownNameError, CapabilityError
-        for arguments that cannot be honoured, all before the first step.
+        for arguments that cannot be honoured, all before the first step. Where a run has no derivatives by `wrt`, it is
+        in ``error.run`` of the `CapabilityError`.
     SimulationError
         if the run cannot go on, or if the scheme itself has more than doubled the energy of the mechanism; a
         `MemoryLimitError` if its rows fill a quarter of the memory that was free as it grew long.
@@ -122,6 +127,8 @@ def simulate(
     check_arguments(scheme, start, dt, tol, tol_of, until, parameters, options, on_failure, observers, progress)
     changed = {**start.parameters, **(parameters or {})}
     by_user = called_from_outside()
+    if wrt is not None:
+        model, start = _differentiable(model, start, changed, wrt, options)
     motion = _Motion(
         model, start, scheme, until, changed, options, observers, "late" if by_user and progress is None else progress
     )
@@ -131,7 +138,35 @@ def simulate(
         _tell(trajectory)
     if problem and on_failure == "raise":
         raise _failure(problem, trajectory, run.cause)
+    if wrt is not None and not problem:
+        _differentiate(trajectory, wrt)
     return trajectory
+
+
+def _differentiable(
+    model: Any, start: State, changed: Mapping[str, float], wrt: Any, options: dict[str, Any]
+) -> tuple[Any, State]:
+    """The model with what it is differentiated by as inputs, the start without memory; contacts by events."""
+    from mbd.sensitivity.sensitivities import with_inputs
+
+    if options["contact"] == "nonsmooth" or options["store"] != 1 or options["locate"] != "root":
+        raise CapabilityError("wrt= needs contact='events', locate='root' and store=1; leave these out")
+    options["contact"] = "events"
+    model = with_inputs(model, options["backend"], changed, wrt)
+    if any(callable(rate) for each in wrt if not isinstance(each, str) for by in each.values() for rate in by.values()):
+        raise ModelError("wrt takes rates of parameters here, such as 9.8; mbd.sensitivities(…, at=…) takes functions")
+    return model, replace(start, memory=None)
+
+
+def _differentiate(run: Trajectory, wrt: Any) -> None:
+    """Give a run its derivatives."""
+    from mbd.sensitivity.sensitivities import derivatives_of
+
+    try:
+        run.record.stats["sensitivities"] = derivatives_of(run, wrt).as_words()
+    except CapabilityError as error:
+        error.run = run
+        raise
 
 
 def _tell(trajectory: Trajectory) -> None:

@@ -186,3 +186,88 @@ def test_wrong_questions_are_answered():
         asked([ON_SLOPE], at={"slope": 0.1})
     with pytest.raises(mbd.CapabilityError, match="averaged"):
         asked(integrator=mbd.HHT(0.05, form="averaged"))
+
+
+def test_a_run_carries_its_derivatives(tmp_path):
+    model = pendulum()
+    start = mbd.assemble(model, {"hinge.angle": 1.0})
+    wrt = ["hinge.angle", "rod.mass", {"both": {"rod.center": 1.0, "rod.inertia": 2.0}}]
+    run = mbd.simulate(model, start, dt=0.01, until=1.0, wrt=wrt)
+    found = mbd.sensitivities(model, start, dt=0.01, until=1.0, wrt=wrt)
+    assert np.array_equal(run.sensitivities.matrix, found.matrix) and run.sensitivities.run is run
+    again = mbd.load(run.save(tmp_path / "run")).sensitivities
+    assert np.array_equal(again.matrix, found.matrix) and (again.of, again.wrt) == (found.of, found.wrt)
+    with pytest.raises(mbd.TrajectoryError, match="wrt="):
+        assert mbd.simulate(model, start, dt=0.01, until=0.1).sensitivities
+    with pytest.raises(mbd.UnknownNameError, match="wrt: no coordinate.* 'hinge.angel'"):
+        mbd.simulate(model, start, dt=0.01, until=0.1, wrt=["hinge.angel"])
+    with pytest.raises(mbd.CapabilityError, match="store=1"):
+        mbd.simulate(model, start, dt=0.01, until=0.1, wrt=["hinge.angle"], store=2)
+
+
+def test_changes_that_make_other_events_are_named():
+    model = ball(restitution=0.6)
+    start = mbd.assemble(model, {"fall.displacement": 1.0})
+    settings = {"dt": 0.01, "until": 0.46, "wrt": ["fall.displacement", "gravity.y"]}
+    found = mbd.sensitivities(model, start, check_events={"fall.displacement": 0.1, "gravity.y": 0.01}, **settings)
+    sentence = "fall.displacement + 0.1: event 1 is none, in the run 'floor' closed"
+    assert found.event_changes == (sentence,) and sentence in repr(found)
+    assert mbd.sensitivities(model, start, **settings).event_changes == ()
+    for wrong, words in [({"fall": 1.0}, "no name in wrt"), ({"gravity.y": -1.0}, "changes > 0"), ([1], "changes > 0")]:
+        with pytest.raises(mbd.MbdError, match=words):
+            mbd.sensitivities(model, start, check_events=wrong, **settings)
+
+
+def test_a_bounce_does_not_depend_on_the_size_of_steps():
+    """Derivatives of a bounce had no physical meaning elsewhere, as impacts lay on the grid (brax, issue 317)."""
+    model, e, g, t = ball(restitution=0.8), 0.8, 9.81, 0.9
+    start = mbd.assemble(model, {"fall.displacement": 1.0})
+    fall, speed = np.sqrt(2.0 / g), np.sqrt(2.0 * g)
+    later, faster = 0.5 * fall, 0.5 * speed
+    wanted = e * faster * (t - fall) - e * speed * later + g * (t - fall) * later
+    for dt in (0.1, 0.03, 0.01):
+        found = mbd.sensitivities(
+            model, start, mbd.Newmark(), dt=dt, until=t, wrt=["fall.displacement"], of=["fall.displacement"]
+        )
+        assert found.matrix[0, 0] == pytest.approx(wanted, rel=1e-9)
+
+
+def test_derivatives_in_closed_contact_are_numbers():
+    """Closed, resting and just touching contacts had NaN in them elsewhere (mujoco, issues 1517, 2237, 2841)."""
+    model = ball(restitution=0.0)
+    for height, until in ((0.0, 0.2), (1.0, 0.6), (1.0, "floor")):
+        start = mbd.assemble(model, {"fall.displacement": height}, closed=["floor"] if height == 0.0 else [])
+        found = mbd.sensitivities(model, start, dt=0.01, until=until, wrt=["gravity.y", "ball.mass"])
+        assert np.all(np.isfinite(found.matrix))
+        if until != "floor":
+            assert found["fall.displacement"] == pytest.approx([0.0, 0.0], abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("scheme", "tol"),
+    [(mbd.HHT(0.05, tolerance=1e-12), 3e-6), (mbd.RungeKutta853(), 1e-7), (mbd.RadauIIA(1e-12), 1e-7)],
+    ids=repr,
+)  # fmt: skip
+def test_steps_that_follow_a_tolerance_are_held(scheme, tol):
+    """Derivatives are those of the run with its own steps, and tend to those of the motion as the tolerance falls."""
+    model = pendulum()
+    start = mbd.assemble(model, {"hinge.angle": 1.0})
+    names = ["hinge.angle", "hinge.angle.rate", "rod.center", "gravity.y"]
+    exact = mbd.sensitivities(model, start, mbd.RungeKutta853(), dt=1e-2, until=1.0, wrt=names)
+    found = mbd.sensitivities(model, start, scheme, tol=tol, until=1.0, wrt=names)
+    assert found.matrix == pytest.approx(exact.matrix, abs=20.0 * tol)
+
+
+def test_of_the_restitution_of_a_bounce():
+    model, g, t = ball(restitution=0.8), 9.81, 0.9
+    start = mbd.assemble(model, {"fall.displacement": 1.0})
+    speed, left = np.sqrt(2.0 * g), t - np.sqrt(2.0 / g)
+    settings = {"dt": 0.01, "until": t, "of": ["fall.displacement", "fall.displacement.rate"]}
+    wrt = ["floor.restitution", "fall.displacement", {"loss": {"floor.restitution": -2.0, "ball.mass": 1.0}}]
+    found = mbd.sensitivities(model, start, mbd.Newmark(), wrt=wrt, **settings)
+    assert found.matrix[:, 0] == pytest.approx([speed * left, speed], rel=1e-9)
+    assert found.matrix[:, 2] == pytest.approx(-2.0 * found.matrix[:, 0], rel=1e-9)
+    with pytest.raises(mbd.CapabilityError, match="impact='newton'"):
+        mbd.sensitivities(model, start, wrt=wrt, impact="poisson", **settings)
+    with pytest.raises(mbd.CapabilityError, match="floor.restitution"):
+        mbd.sensitivities(model, start, wrt=wrt, check_events={"floor.restitution": 0.1}, **settings)

@@ -46,8 +46,15 @@ class Entry:
         table = np.zeros(len(TABLE.addresses), dtype=np.int64)
         code = np.array([program.address for program in programs], dtype=np.int64)
         table[CODE], table[PARAMS] = code.ctypes.data, parameters.ctypes.data
-        words = [each.ctypes.data if isinstance(each, np.ndarray) else each for each in given]
+        words = [address(each) if isinstance(each, np.ndarray) else each for each in given]
         return int(self._machine(table.ctypes.data, *words))
+
+
+def address(array: Any) -> int:
+    """Where an array begins (faster than ``array.ctypes.data`` where it may be written to)."""
+    if array.size and array.flags.writeable:
+        return ctypes.addressof(ctypes.c_char.from_buffer(array))
+    return int(array.ctypes.data)
 
 
 def machine_code(function: Callable[..., int], kinds: Sequence[str]) -> Any:
