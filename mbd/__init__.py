@@ -47,6 +47,7 @@ if TYPE_CHECKING:
         Unilateral as Unilateral,
         When as When,
         cone as cone,
+        disk_touchdown as disk_touchdown,
         distance as distance,
         extension as extension,
         flexion as flexion,
@@ -126,6 +127,7 @@ if TYPE_CHECKING:
     from mbd.model import Model as Model
     from mbd.optimization.optimize import optimize as optimize
     from mbd.optimization.optimum import Optimum as Optimum
+    from mbd.parts.whole_body.human import Human as Human, human as human
     from mbd.results.failure import Failure as Failure
     from mbd.sensitivity.result import Sensitivities as Sensitivities
     from mbd.sensitivity.sensitivities import sensitivities as sensitivities
@@ -177,8 +179,8 @@ _HOMES = {
     "mbd.assembly.assemble": "assemble",
     "mbd.bodies": "Domain Link Marker PointMass RigidBody box cylinder disk rod segment sphere",
     "mbd.constraints": "Bilateral Controller Event KnifeEdge Nonholonomic Penalty PenaltyParameters Plane "
-    "Rolling Unilateral When cone distance extension flexion height measure penalty_parameters profile_touchdown "
-    "rolling_touchdown separation touchdown twist",
+    "Rolling Unilateral When cone disk_touchdown distance extension flexion height measure penalty_parameters "
+    "profile_touchdown rolling_touchdown separation touchdown twist",
     "mbd.equations.energy_description": "Coordinate",
     "mbd.lagrangian": "Lagrangian",
     "mbd.errors": "AssemblyError CapabilityError GaitError MbdError MbdWarning MemoryLimitError ModelError "
@@ -196,6 +198,7 @@ _HOMES = {
     "mbd.joints.losses": "AffineFriction Coulomb Dissipation PinFriction Quadratic Tabulated Valves Viscous",
     "mbd.description": "on_slope",
     "mbd.model": "Model",
+    "mbd.parts.whole_body.human": "Human human",
     "mbd.assembly.projection": "project",
     "mbd.optimization.optimize": "optimize",
     "mbd.optimization.optimum": "Optimum",

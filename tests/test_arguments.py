@@ -55,6 +55,7 @@ WORDS = {
     mbd.Unilateral: ("foot", mbd.height(ROD.end)),
     mbd.When: ("foot",),
     mbd.cone: (HINGE, 1.0),
+    mbd.disk_touchdown: (ROD.end, 0.1, (0.0, 0.0, 1.0)),
     mbd.distance: FRAMES,
     mbd.twist: (HINGE, 1.0),
     mbd.extension: (HINGE,),
@@ -71,6 +72,7 @@ WORDS = {
     mbd.Marker: ("ankle", ROD, (0.1, 0.2)),
     mbd.Model: ("model",),
     mbd.on_slope: (0.1,),
+    mbd.human: (70.0, 1.75),
     mbd.latin_hypercube: ({"rod.mass": (1.0, 2.0)}, 4),
     mbd.sobol: ({"rod.mass": (1.0, 2.0)}, 4),
 }  # fmt: skip
@@ -93,8 +95,8 @@ BESIDE = {
         mbd.acos, mbd.asin, mbd.atan, mbd.atan2, mbd.clip, mbd.cos, mbd.cosh, mbd.exp, mbd.floor, mbd.hypot, mbd.log,
         mbd.maximum, mbd.minimum, mbd.mod, mbd.sign, mbd.sin, mbd.sinh, mbd.sqrt, mbd.tan, mbd.tanh, mbd.where,
     ),
-    "shapes of mass and domains: tests/bodies": (
-        mbd.Domain, mbd.box, mbd.cylinder, mbd.disk, mbd.rod, mbd.segment, mbd.sphere,
+    "persons, shapes of mass, domains: tests/parts, tests/bodies": (
+        mbd.Human, mbd.Domain, mbd.box, mbd.cylinder, mbd.disk, mbd.rod, mbd.segment, mbd.sphere,
     ),
 }  # fmt: skip
 """Public names that are not tried here, by the reason."""

@@ -52,6 +52,7 @@ EXAMPLES: dict[str, Any] = {
     "frame": END,
     "function": lambda x: x,
     "guard": ANGLE,
+    "height": 1.75,
     "inertia": (1.0, 1.0, 1.0),
     "integrator": mbd.HHT(),
     "joint": HINGE,
@@ -99,7 +100,8 @@ OWN: dict[tuple[str, str], Any] = {
     ("Controller", "period"): 0.1, ("Event", "direction"): 0, ("Marker", "place"): (0.1, 0.2), ("Motor", "torque"): 1.0,
     ("Nonholonomic", "arguments"): ("hinge.rate",), ("Rolling", "center"): END,
     ("Tabulated", "torque"): (-1.0, 0.0, 1.0), ("TabulatedSpring", "torque"): (-1.0, 0.0, 1.0),
-    ("rolling_touchdown", "center"): END,
+    ("rolling_touchdown", "center"): END, ("disk_touchdown", "center"): END,
+    ("disk_touchdown", "axis"): (0.0, 0.0, 1.0),
     ("gait_report", "run"): walker(steps=5),
     ("fit", "data"): {"time": [0.1, 0.2], "hinge.angle": [0.3, 0.2]}, ("fit", "dt"): 0.1,
     ("fit", "parameters"): {"upper.length": 1.2},
@@ -143,6 +145,7 @@ RESULTS |= {"Branch", "GaitSearch", "Optimum", "PointCurve"}
 
 STUDIES = {"accuracy", "criteria", "effects", "fit", "optimize", "sensitivities"}
 """Words whose runs take seconds: what is no number at all is tried."""
+RESULTS |= {"Human"}
 GAITS = {"basin", "find_gait", "limit_cycle"}
 """Words that make so many runs that they take machine code."""
 

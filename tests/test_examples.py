@@ -31,6 +31,9 @@ NAMES = (
     "tennis-racket", "tune-a-knee-damper",
     "user-constraint", "user-integrator",
 )  # fmt: skip
+NAMES = tuple(sorted((*NAMES, "amputee-in-space", "bicycle", "rolling-coin")))
+HEAVY = ("amputee-in-space",)
+"""Whose plain twin takes minutes: see tests/cases/test_space_examples.py."""
 STUDIES = ("compare-two-knees", "identify-a-shank", "tune-a-knee-damper")
 """Which find gaits or fits before their run, for seconds."""
 EACH = [pytest.param(name, marks=pytest.mark.slow) if name in STUDIES else name for name in NAMES]
@@ -97,7 +100,7 @@ def test_an_example_runs_without_faults(name: str) -> None:
 
 
 @pytest.mark.sampled(2)
-@pytest.mark.parametrize("name", EACH)
+@pytest.mark.parametrize("name", [name for name in EACH if name not in HEAVY])
 def test_the_plain_twin_moves_like_the_machine_code(name: str) -> None:
     until = 20 * script(name)["dt"]
     fast, plain = (again(name, until=until, backend=backend) for backend in ("auto", "python"))
@@ -105,7 +108,7 @@ def test_the_plain_twin_moves_like_the_machine_code(name: str) -> None:
     assert fast.final.v == pytest.approx(plain.final.v, rel=1e-9, abs=1e-9)
 
 
-@pytest.mark.parametrize("name", [name for name in NAMES if name not in (*COARSE, *STUDIES)])
+@pytest.mark.parametrize("name", [name for name in NAMES if name not in (*COARSE, *STUDIES, *HEAVY)])
 @pytest.mark.parametrize("integrator", [mbd.Newmark(), mbd.HHT(0.1), mbd.GeneralizedAlpha(0.8)], ids=repr)
 def test_the_choice_of_integrator_changes_little(name: str, integrator: Any) -> None:
     until = min(0.5, script(name)["until"])

@@ -3,6 +3,7 @@
 from mbd.constraints.base import Constraint, VelocityConstraint
 from mbd.constraints.bilateral import Bilateral
 from mbd.constraints.controller import Controller
+from mbd.constraints.disks import disk_touchdown
 from mbd.constraints.event import Event
 from mbd.constraints.knife_edge import KnifeEdge
 from mbd.constraints.law import Closing, Drag, Equation, Law
@@ -23,6 +24,6 @@ from mbd.constraints.user_measure import measure
 __all__ = [
     "Bilateral", "Closing", "Constraint", "Controller", "Drag", "Equation", "Event", "KnifeEdge", "Law", "Measure",
     "Nonholonomic", "Penalty", "PenaltyParameters", "Plane", "Rolling", "Unilateral", "VelocityConstraint", "When",
-    "cone", "distance", "extension", "flexion", "height", "measure", "penalty_parameters", "profile_touchdown",
-    "rolling_touchdown", "separation", "touchdown", "twist",
+    "cone", "disk_touchdown", "distance", "extension", "flexion", "height", "measure", "penalty_parameters",
+    "profile_touchdown", "rolling_touchdown", "separation", "touchdown", "twist",
 ]  # fmt: skip

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from mbd.bodies.algebra import cross, difference, dot, scaled, total
 from mbd.bodies.base import Frame
 from mbd.bodies.domains import Domain, positive
 from mbd.bodies.ground import Ground
-from mbd.bodies.values import name_of, number
+from mbd.bodies.values import name_of, number, unit_vector
 from mbd.constraints.base import VelocityConstraint
+from mbd.constraints.disks import to_edge
 from mbd.constraints.surfaces import Plane
 from mbd.errors import CapabilityError, ModelError
 from mbd.forces.base import frame_of
@@ -39,13 +41,17 @@ class Rolling(VelocityConstraint):
     only_while : name of the `Unilateral` contact that presses the wheel onto the plane: it rolls while that is closed,
         and takes part in its impacts without slip; None: it rolls at all times, also where it has left the plane. Where
         rolling needs grip although nothing presses any more, a run ends with an error; use friction instead
+    axis : a of a thin disk that may lean any way in space, in the axes of `center`. It touches with the point of its
+        edge nearest to the plane, C + r ((n·a) a − n)/|n × a|, which has two rows, 'forward' and 'sideways' along the
+        plane; `Bilateral` or `Unilateral` on `disk_touchdown` keeps it there. None: a wheel that turns about z of a
+        planar mechanism, with the one row along t
 
     'name.force' is the friction on the wheel along t [N], −λ; 'name.residual' the slip [m/s].
 
     Raises
     ------
     CapabilityError
-        where the wheel turns about other axes than z: a disk that tilts touches the ground elsewhere.
+        where the wheel turns about other axes than z and has no axis=: one that tilts touches the ground elsewhere.
     """
 
     name: str
@@ -53,6 +59,7 @@ class Rolling(VelocityConstraint):
     radius: float
     ground: Plane = field(default_factory=Plane)
     only_while: str | None = None
+    axis: Any = None
 
     def __post_init__(self) -> None:
         name_of(self.name, "Rolling")
@@ -62,6 +69,9 @@ class Rolling(VelocityConstraint):
             raise ModelError(f"ground of Rolling '{self.name}' is a mbd.Plane, got {self.ground!r}")
         if self.only_while is not None and not isinstance(self.only_while, str):
             raise ModelError(f"only_while of Rolling '{self.name}' is the name of a contact, got {self.only_while!r}")
+        if self.axis is not None:
+            object.__setattr__(self, "axis", unit_vector(self.axis, f"axis of Rolling '{self.name}'"))
+            return
         if self.ground.normal[2] != 0.0:
             raise ModelError(
                 f"ground of Rolling '{self.name}': its normal must lie in the x-y plane, in which the wheel rolls, "
@@ -90,11 +100,13 @@ class Rolling(VelocityConstraint):
 
     def rates(self, scope: Scope) -> Sequence[tuple[str, Scalar]]:
         """Velocity of the touching point along the plane."""
+        if self.axis is not None:
+            return self._rows_of_disk(scope)
         motion = scope.frame(self.center)
         if any(isinstance(part, Node) and not part.is_zero for part in motion.angular_velocity[:2]):
             raise CapabilityError(
-                f"Rolling '{self.name}' serves wheels of planar mechanisms, which turn about z only; a disk or ball "
-                "that tilts in space is not solved by this version: write its rows with mbd.Nonholonomic"
+                f"Rolling '{self.name}' serves wheels of planar mechanisms, which turn about z only; of a disk that "
+                "tilts in space give its axis=; the rows of other shapes can be written with mbd.Nonholonomic"
             )
         r = scope.parameter(self.name, "radius", self.radius)
         ground = self.ground
@@ -104,6 +116,18 @@ class Rolling(VelocityConstraint):
             slip = difference(slip, ground.velocity_at(total(motion.position, arm), scope))
         forward, _ = ground.directions(motion.position, scope)
         return [("", dot(ground.turned(forward, scope), slip))]
+
+    def _rows_of_disk(self, scope: Scope) -> Sequence[tuple[str, Scalar]]:
+        """Velocity of the lowest point of the edge along the plane."""
+        motion, ground = scope.frame(self.center), self.ground
+        radius = scope.parameter(self.name, "radius", self.radius)
+        arm = to_edge(self.center, self.axis, radius, ground, scope)
+        slip = total(motion.velocity, cross(motion.angular_velocity, arm))
+        if ground.is_moving:
+            slip = difference(slip, ground.velocity_at(total(motion.position, arm), scope))
+        directions = ground.directions(motion.position, scope)
+        named = zip(("forward", "sideways"), directions, strict=True)
+        return [(part, dot(ground.turned(direction, scope), slip)) for part, direction in named]
 
     def mentions(self) -> list[Mention]:
         """Its center, and the frame of the plane."""

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
-from mbd.bodies.algebra import cross, rotate, scaled, total
+from mbd.bodies.algebra import basis, cross, rotate, scaled, total
 from mbd.bodies.base import Frame
+from mbd.bodies.values import Vector3
 from mbd.constraints.base import Constraint
 from mbd.constraints.knife_edge import KnifeEdge
 from mbd.constraints.rolling import Rolling
@@ -144,8 +145,9 @@ def offer_shapes(outputs: Outputs, scope: Scope, model: Description) -> None:
         measure = getattr(word, "measure", None)
         if isinstance(word, Rolling):
             _offer_plane(offer, scope, word.name, word.ground)
-            offer(word.name, "spoke", partial(_axis, scope, word.center, (1.0, 0.0, 0.0)))
-            offer(word.name, "axle", partial(_axis, scope, word.center, (0.0, 0.0, 1.0)))
+            axle: Vector3 = (0.0, 0.0, 1.0) if word.axis is None else word.axis
+            offer(word.name, "spoke", partial(_axis, scope, word.center, basis(axle)[0]))
+            offer(word.name, "axle", partial(_axis, scope, word.center, axle))
         elif isinstance(word, KnifeEdge):
             offer(word.name, "along", partial(_axis, scope, word.frame, _along(word.normal)))
         elif isinstance(measure, Touchdown | RollingTouchdown | ProfileTouchdown) and isinstance(measure.ground, Plane):

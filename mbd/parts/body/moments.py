@@ -12,7 +12,7 @@ from mbd.joints.base import Joint
 from mbd.parts.arguments import check
 from mbd.tape.functions import exp
 
-__all__ = ["PASSIVE_MOMENTS", "passive_moment"]
+__all__ = ["PASSIVE_MOMENTS", "PassiveEnergy", "passive_moment"]
 
 PASSIVE_MOMENTS: dict[str, tuple[float, float, float, float, float, float]] = {
     "hip": (-2.44, 5.05, 1.81, 1.51, -21.88, -0.6981),
@@ -61,13 +61,13 @@ def passive_moment(
         raise ModelError(f"joint of passive_moment '{name}' must be a hinge with one coordinate, got {joint!r}")
     if not among(of, PASSIVE_MOMENTS):
         raise ModelError(f"passive_moment '{name}': " + nearest(of, PASSIVE_MOMENTS, "joint", "The table has"))
-    energy = _Energy(PASSIVE_MOMENTS[of], number(zero, f"zero of passive_moment '{name}'"))
+    energy = PassiveEnergy(PASSIVE_MOMENTS[of], number(zero, f"zero of passive_moment '{name}'"))
     moment = Potential(name, energy, (joint.coordinate_names[0], ("scale", number(scale, f"scale of '{name}'"))))
     model.apply(moment)
     return moment
 
 
-class _Energy:
+class PassiveEnergy:
     """V = −∫ M dq, which a process can receive."""
 
     def __init__(self, numbers: tuple[float, ...], zero: float) -> None:

@@ -1,0 +1,115 @@
+"""A thin disk that may lean any way, and where it touches a plane."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from mbd.bodies.algebra import cross, difference, dot, rotate, scaled
+from mbd.bodies.base import Frame
+from mbd.bodies.domains import Domain, positive
+from mbd.bodies.ground import Ground
+from mbd.bodies.values import Vector3, number, unit_vector
+from mbd.constraints.measure import Measure
+from mbd.constraints.surfaces import Plane
+from mbd.errors import ModelError
+from mbd.forces.base import frame_of
+from mbd.forces.quantities import Mention
+from mbd.scope import Scope, Triple
+from mbd.tape.functions import sqrt
+from mbd.tape.node import Scalar
+
+__all__ = ["DiskTouchdown", "disk_touchdown", "steepness", "to_edge"]
+
+
+def steepness(center: Frame, axis: Vector3, ground: Plane, scope: Scope) -> Scalar:
+    """|n × a|: 1 of an upright disk, 0 of one that lies flat."""
+    a = rotate(scope.frame(center).rotation, axis)
+    across = cross(ground.turned(ground.normal, scope), a)
+    size: Scalar = sqrt(dot(across, across))
+    return size
+
+
+def to_edge(center: Frame, axis: Vector3, radius: Scalar, ground: Plane, scope: Scope) -> Triple:
+    """From the center to the point of the edge nearest to the plane, ``r ((n·a) a − n)/|n × a|``, in ground axes."""
+    a, n = rotate(scope.frame(center).rotation, axis), ground.turned(ground.normal, scope)
+    across = cross(n, a)
+    return scaled(radius / sqrt(dot(across, across)), difference(scaled(dot(n, a), a), n))
+
+
+@dataclass(frozen=True)
+class DiskTouchdown(Measure):
+    """``g = n · s_C − r |n × a|`` of the edge of a thin disk; see `disk_touchdown`."""
+
+    center: Frame
+    radius: float
+    axis: Vector3
+    ground: Plane = field(default_factory=Plane)
+
+    def gap(self, scope: Scope) -> Scalar:
+        """n · s_C − r |n × a|."""
+        radius = scope.parameter(self.center.full_name, "radius", self.radius)
+        lift = self.ground.gap(scope.frame(self.center).position, scope)
+        return lift - radius * steepness(self.center, self.axis, self.ground, scope)
+
+    @property
+    def unit(self) -> str:
+        """'m'."""
+        return "m"
+
+    def mentions(self) -> list[Mention]:
+        """Its center, and the frame of the plane."""
+        return [self.center] if self.ground.frame is None else [self.center, self.ground.frame]
+
+    def parameters(self) -> dict[str, float]:
+        """The radius, under the name of the center."""
+        return {f"{self.center.full_name}.radius": self.radius}
+
+    def domains(self) -> dict[str, Domain]:
+        """A radius > 0."""
+        return {f"{self.center.full_name}.radius": positive(unit="m")}
+
+    def faults(self, owner: str) -> list[str]:
+        """A disk on the ground, or on the body that its plane is on."""
+        if isinstance(self.center.body, Ground):
+            return [f"'{owner}': its disk is on the ground; give the frame of a body that rolls"]
+        if self.ground.frame is not None and self.ground.frame.body is self.center.body:
+            return [f"'{owner}': its disk and its plane are both on '{self.center.body.name}' and never move apart"]
+        return []
+
+
+def disk_touchdown(center: Frame, radius: float, axis: Any, ground: Any = None) -> DiskTouchdown:
+    """Height of the edge of a thin disk over a plane, whichever way it leans: a coin, the wheel of a bicycle.
+
+    ``g = n · s_C − r |n × a|`` with the place s_C of the center on the plane and the disk's axis a. A `Bilateral` keeps
+    the edge on the plane, a `Unilateral` with friction=0 lets it lift off; what keeps it from slipping is a `Rolling`
+    with the same axis. Lying flat, where it touches with all its edge, g has a kink: a run that comes there ends.
+
+    Parameters
+    ----------
+    center : of the disk, a frame of the body
+    radius : r > 0 [m]; the run-time parameter '<center>.radius'
+    axis : a in the axes of that frame, of any length
+    ground : None for y = 0, or a `Plane`, which may lie on another body, or run
+
+    Raises
+    ------
+    ModelError
+        where the center is no frame, the radius not positive, the axis no direction, or the ground no plane.
+
+    >>> import mbd
+    >>> model, coin = mbd.Model("coin"), mbd.RigidBody("coin", 0.01, (1e-6, 1e-6, 2e-6))
+    >>> model.connect(mbd.Free("float", model.ground.origin, coin.origin))
+    >>> axis, edge = (0, 0, 1), mbd.disk_touchdown(coin.origin, 0.012, axis=(0, 0, 1))
+    >>> model.constrain(mbd.Bilateral("edge", edge), mbd.Rolling("grip", coin.origin, 0.012, axis=axis))
+    >>> model.check()
+    []
+    """
+    frame_of(center, "disk_touchdown: its center")
+    size = number(radius, "radius of disk_touchdown")
+    if size <= 0.0:
+        raise ModelError(f"radius of disk_touchdown must be positive, got {size:g} m; for a point use mbd.touchdown")
+    plane = Plane() if ground is None else ground
+    if not isinstance(plane, Plane):
+        raise ModelError(f"disk_touchdown: the ground is a mbd.Plane, got {ground!r}")
+    return DiskTouchdown(center, size, unit_vector(axis, "axis of disk_touchdown"), plane)

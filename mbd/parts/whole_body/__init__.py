@@ -1,0 +1,1 @@
+"""A whole person in space: segments, joints, poses, passive moments."""

@@ -1,0 +1,73 @@
+"""Poses to start from."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from mbd.bodies.base import Body
+from mbd.bodies.values import Vector3
+from mbd.joints.base import Joint
+from mbd.parts.whole_body.segments import SIDES
+
+__all__ = ["center_of_mass", "origins", "standing"]
+
+
+def standing(prefix: str, bodies: Mapping[str, Body], joints: Sequence[Joint], knees: float) -> dict[str, float]:
+    """Positions of joints: upright over level ground at y = 0, knees flexed, ankles under the hips, soles level.
+
+    Of legs that differ the longer one reaches the ground.
+    """
+    made, legs = {joint.name: joint for joint in joints}, []
+    found: dict[str, float] = {}
+    for side in SIDES:
+        own = {name: bodies.get(f"{side} {name}") for name in ("thigh", "shank", "foot")}
+        if any(body is None for body in own.values()):
+            continue
+        a, b, down = (_length(own[name], end) for name, end in (("thigh", "end"), ("shank", "end"), ("foot", "sole")))
+        hip = math.atan2(b * math.sin(knees), a + b * math.cos(knees))
+        legs.append(a * math.cos(hip) + b * math.cos(knees - hip) + down)
+        bent = {"hip": hip, "knee": -knees, "ankle": knees - hip}
+        for name, angle in bent.items():
+            joint = made.get(f"{prefix}{side} {name}")
+            if joint is not None and knees != 0.0:
+                found |= _bent(joint, angle)
+    return {**({f"{prefix}trunk.y": max(legs, default=0.0)} if f"{prefix}trunk" in made else {}), **found}
+
+
+def _bent(joint: Joint, angle: float) -> dict[str, float]:
+    """A turn about z."""
+    if joint.orientation is not None:
+        w, z = math.cos(0.5 * angle), math.sin(0.5 * angle)
+        return dict(zip(joint.coordinate_names, (w, 0.0, 0.0, z), strict=True))
+    return {joint.coordinate_names[0]: angle} if joint.coordinate_names else {}
+
+
+def _length(body: Body | None, end: str) -> float:
+    """How far down a point is."""
+    assert body is not None
+    points = {frame.name: frame for frame in body.points.values()} | body.frames
+    return -points[end].offset[1] if end in points else 0.0
+
+
+def origins(root: str, bodies: Mapping[str, Body], joints: Sequence[Joint]) -> dict[str, Vector3]:
+    """Where the axes of all bodies lie with every joint at zero, against those of the first [m]."""
+    found = {bodies[root].name: (0.0, 0.0, 0.0)}
+    for joint in joints:
+        parent = found.get(joint.parent.body.name)
+        if parent is not None:
+            out, back = joint.parent.offset, joint.child.offset
+            x, y, z = (p + a - b for p, a, b in zip(parent, out, back, strict=True))
+            found[joint.child.body.name] = (x, y, z)
+    return found
+
+
+def center_of_mass(places: Mapping[str, Vector3], bodies: Mapping[str, Body]) -> tuple[float, Vector3]:
+    """Mass [kg] and center of mass [m] with every joint at zero."""
+    mass, moment = 0.0, [0.0, 0.0, 0.0]
+    for body in bodies.values():
+        m, place, center = body.fields()["mass"], places[body.name], body.center.offset
+        mass += m
+        moment = [total + m * (p + c) for total, p, c in zip(moment, place, center, strict=True)]
+    x, y, z = (part / mass for part in moment)
+    return mass, (x, y, z)
