@@ -21,9 +21,10 @@ PASSIVE_MOMENTS: dict[str, tuple[float, float, float, float, float, float]] = {
 }
 """k₁ [N m], k₂ [1/rad], θ₁ [rad] of the upper end of the range, and the same of the lower end.
 
-F. C. Anderson & M. G. Pandy, Dynamic optimization of human walking, J. Biomech. Eng. 123 (2001) 381, after F. C.
-Anderson's thesis (University of Texas at Austin, 1999): flexion of the hip, extension of the knee and dorsiflexion are
-positive.
+F. C. Anderson's thesis (University of Texas at Austin, 1999), eq. 4.4 and table G.2, used in F. C. Anderson & M. G.
+Pandy, Dynamic optimization of human walking, J. Biomech. Eng. 123 (2001) 381: flexion of the hip, extension of the knee
+and dorsiflexion are positive. The thesis is quoted with −0.47 rad for the lower end of the hip; −0.6981 rad, 40° of
+extension, is that of A. Falisse et al., J. R. Soc. Interface 16 (2019) 20190402, with their public code.
 """
 
 

@@ -33,7 +33,7 @@ long axis, over segment length; length over the height of the persons measured.
 
 P. de Leva, Adjustments to Zatsiorsky-Seluyanov's segment inertia parameters, J. Biomechanics 29 (1996) 1223, table 4:
 thigh from hip to knee joint center, shank from there to the lateral malleolus, foot from the heel to the tip of the
-toes.
+toes. To the center of the ankle, some 6 mm below the malleolus, the table has shanks of its own, which are not here.
 """
 
 TABLES = ("Winter", *DE_LEVA)

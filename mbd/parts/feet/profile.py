@@ -19,6 +19,10 @@ def profile_foot(
 ) -> Unilateral:  # fmt: skip
     """A convex sole that strikes without bouncing and rolls along its length: ``g = y_O − h(ψ)``, ``v_O + h φ̇ = 0``.
 
+    Without `friction` it sticks whatever its force may be. A leg that falls over on such a sole comes to where it can
+    neither stay nor leave, and the run ends with the same switches again and again; with friction=0.6 it slips and goes
+    on.
+
     Passive. A. H. Hansen, D. S. Childress & E. H. Knox, Roll-over shapes of human locomotor systems, Clinical
     Biomechanics 19 (2004) 407: shapes of feet and prostheses as points in axes of the shank.
 

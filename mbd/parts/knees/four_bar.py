@@ -37,7 +37,8 @@ They are laid out from the lengths and angles of the links (88.5, 40.25, 14.9, 9
 −112°, −98°, 116°, 122°, −10°) of a public model of an amputee's gait (amputee_gait_simulation, with an M.Sc. thesis at
 TU Delft, 2020), such that the stance spring has its free length, 89.25 mm; that of swing then has 88.95 of 89.6 mm and
 presses the knee straight. The table leaves open on which side of its dead center the rocker stands; here it is the one
-to which the stop of that model leads.
+to which the stop of that model leads. Masses and inertias of the links are those of the same constants; the cylinders,
+143.8 and 89.6 g, are left out.
 """
 
 HEIGHT_3R60 = PIVOTS_3R60["thigh"][1]
@@ -51,8 +52,8 @@ SWING_3R60 = Valves(
 )
 """Of the swing unit, told as ``213.5932/|v| − 4927.5`` in flexion and ``146.3288/|v| − 8808.5`` N s/m in extension.
 
-Both were fitted between 0.33 and 3.3 mm/s. They turn negative above 43.3 and 16.6 mm/s, where a damper would drive:
-from there on this friction is 0.
+Both were fitted between 0.33 and 3.3 mm/s (tests at 20 to 200 mm/min, constants of the same public model). They turn
+negative above 43.3 and 16.6 mm/s, where a damper would drive: from there on this friction is 0.
 """
 
 STANCE_3R60 = Valves(
