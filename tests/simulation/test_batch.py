@@ -11,7 +11,7 @@ from hypothesis import given, settings, strategies as st
 import mbd
 from mbd.testing.mechanisms import random_scene, random_tree
 from tests.gait.walkers import simplest, simplest_start
-from tests.simulation.mechanisms import ball
+from tests.simulation.mechanisms import ball, falling
 from tests.simulation.test_many_runs import SCHEMES, same, starts_of
 
 
@@ -131,3 +131,18 @@ def test_values_that_the_model_folds_into_its_equations_may_be_columns():
         alone = mbd.simulate(model, start, dt=0.01, until=0.3, parameters={"pin loss.coefficient": value})
         assert abs(found.q[k, 0] - alone.final.q[0]) < 1e-14
     assert found.q[0, 0] != found.q[1, 0]
+
+
+def test_a_step_that_fails_names_its_run_and_leaves_the_others_alone():
+    model, body = falling()
+    arguments = ("fall.displacement",)
+    pit = mbd.Applied(
+        "pit", body.origin, force=lambda y: (0.0, mbd.where(y < 0.5, mbd.log(y - 2.0), 0.0)), arguments=arguments
+    )
+    model.apply(pit)
+    start = mbd.assemble(model, position={"fall.displacement": 1.0})
+    found = mbd.batch(model, (start, {"fall.displacement": [0.6, 5.0, 0.55]}), dt=0.01, until=0.3)
+    assert list(found.outcome) == ["not finite", "end", "not finite"]
+    assert "t = " in found.message(0) and found.message(0) == found.run(0).message
+    assert same(found.final(1), mbd.simulate(model, found.start(1), dt=0.01, until=0.3).final)
+    assert found.time[0] < 0.3
