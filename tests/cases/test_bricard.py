@@ -7,6 +7,7 @@ import pytest
 
 import mbd
 from mbd.hardcases.redundant_rows import bricard
+from mbd.integrators import Integrator
 from mbd.integrators.family import NewmarkFamily
 from tests.cases.schemes import WITH_ROWS, name_of
 from tests.problems import case
@@ -60,3 +61,15 @@ def test_it_neither_freezes_nor_leaves_its_constraints_and_tells_the_redundancy_
 def test_energy_is_kept_at_a_small_step() -> None:
     energy = swing(mbd.GeneralizedAlpha(1.0), 2e-4).energy
     assert abs(energy.sums["numerical"]) < 1e-8
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "scheme", [mbd.RungeKutta853(), mbd.RadauIIA(), mbd.GeneralizedAlpha(0.8, formulation="index3")], ids=name_of
+)
+def test_with_every_joint_cut_its_bodies_float_and_move_as_they_must(scheme: Integrator) -> None:
+    model, start = bricard(cut="all")
+    assert len(start.v) == 30 and len(start.q) == 35
+    run = mbd.simulate(model, start, scheme, dt=1e-3, until=1.0)
+    assert np.linalg.norm(run.at(1.0)["rod 2.tip"] - PLACES.value[0]) < (2e-6 if scheme.order() == 2 else 1e-10)
+    assert run.violation.length < 1e-12
