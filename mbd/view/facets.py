@@ -80,8 +80,10 @@ def _bodies(picture: Scene, r: float) -> Iterator[Facets]:
     for body, members in picture.segments:
         at, shade = picture.positions[0][list(members)], _mixed(color(body), tone(PAPER), 0.0)
         if body in solids:
-            for place in at:
-                yield _capsule(solids[body].center[0], place, 0.55 * r, shade)
+            center, form = solids[body].center[0], solids[body].form
+            local = (at - center) @ rotations(solids[body].turn[:1])[0]
+            for place in at[np.any(np.abs(local) > 1.02 * form.half, axis=1)]:
+                yield _capsule(center, place, 0.55 * r, shade)
         elif len(at) == 1:
             share = picture.masses.get(body, 0.0) / heaviest
             yield _capsule(at[0], at[0], r * (1.2 + 1.6 * share ** (1.0 / 3.0)), shade)

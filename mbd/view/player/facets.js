@@ -68,7 +68,8 @@ function addSolid({ mesh, at, normal, center, axes }, color, second = color) {
   }
   const { faces, marked } = mesh;
   for (let f = 0; f < marked.length; f++) {
-    const tone = marked[f] ? second : color;
+    const a = 4 * faces[3 * f], b = 4 * faces[3 * f + 1], d = 4 * faces[3 * f + 2], tone = marked[f] ? second : color;
+    if ((work[b] - work[a]) * (work[d + 1] - work[a + 1]) <= (work[b + 1] - work[a + 1]) * (work[d] - work[a])) continue; // looks away
     for (let k = 0; k < 3; k++) {
       const n = 4 * faces[3 * f + k], l = work[n + 3];
       corner3[0] = work[n]; corner3[1] = work[n + 1]; corner3[2] = work[n + 2];

@@ -73,7 +73,10 @@ function bodies(p, r) { // solids of their inertia, capsules along the lines of 
   for (const segment of run.segments) {
     const color = tint(sideColor(segment.side)), at = segment.points.map((n) => placeOf(n, p)), solid = solidOf.get(segment.body);
     const limb = (a, b, size) => found.push([capsule(a, b, size), color, color]);
-    if (solid) for (const q of at) limb(here(solid.at, p), q, 0.55 * r);
+    if (solid) {
+      const center = here(solid.at, p), axes = axesOf(here(solid.turn, p)), inside = (q) => axes.every((axis, k) => Math.abs(dot(axis, plus(q, center, -1))) < 1.02 * solid.half[k]);
+      for (const q of at) if (!inside(q)) limb(center, q, 0.55 * r);
+    }
     else if (at.length === 1) limb(at[0], at[0], r * (1.2 + 1.6 * Math.cbrt(segment.mass)));
     else {
       const closed = at.length > 2;
