@@ -21,6 +21,7 @@ from mbd.hardcases import (
     redundant_rows,
     resting,
     rods,
+    rotations,
     shakers,
     singular_poses,
     sleighs,
@@ -36,8 +37,8 @@ __all__ = ["CASES"]
 
 MODULES = (
     absent_effects, balls, blocks, clearances, cradles, four_bars, frictions, governor, grazes, knees, long_run,
-    mass_ratios, mats, redundant_rows, resting, rods, shakers, singular_poses, sleighs, starts, tiny_steps, user_force,
-    walls, wheel,
+    mass_ratios, mats, redundant_rows, resting, rods, rotations, shakers, singular_poses, sleighs, starts, tiny_steps,
+    user_force, walls, wheel,
 )  # fmt: skip
 
 
