@@ -104,10 +104,15 @@ def identified(data, more=None, **settings):
     return mbd.fit(model, start, table, {**guess, **(more or {})}, mbd.RungeKutta853(), sigma=sigma, **settings)
 
 
+@cache
+def measured_swing():
+    return identified("data_noisy")
+
+
 def test_a_measured_swing_gives_the_numbers_of_the_case():
     case = swing()[0]
     angles, exact, noisy, deviation, errors, predicted, correlation = case["quantities"]
-    clean, measured = identified("data_noise_free"), identified("data_noisy")
+    clean, measured = identified("data_noise_free"), measured_swing()
     seen = np.column_stack([clean.run.at(angles["t"])[name] for name in ("shank", "foot")])
     np.testing.assert_allclose(seen, angles["value"], atol=angles["accuracy"])
     np.testing.assert_allclose(list(clean.values.values()), exact["value"], atol=exact["accuracy"])
@@ -128,6 +133,7 @@ def test_where_a_swing_began_is_found_with_the_parameters():
     assert found.values["J1"] == pytest.approx(0.19, abs=1e-7) and found.alike == ()
 
 
+@pytest.mark.slow
 def test_steps_that_follow_a_tolerance_come_as_near_as_it_is():
     found, exact = identified("data_noisy", tol=1e-8), swing()[0]["quantities"][2]["value"]
     np.testing.assert_allclose(list(found.values.values()), exact, atol=1e-5)
@@ -148,7 +154,7 @@ def test_the_start_of_a_walker_that_stands_is_found():
 
 
 def test_a_picture_of_residuals_has_a_panel_for_each_column(tmp_path):
-    figure = identified("data_noisy").plot(tmp_path / "fit.svg")
+    figure = measured_swing().plot(tmp_path / "fit.svg")
     assert len(figure.axes) == 4 and (tmp_path / "fit.svg").stat().st_size > 1000
 
 
