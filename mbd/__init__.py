@@ -57,6 +57,7 @@ if TYPE_CHECKING:
         profile_touchdown as profile_touchdown,
         rolling_touchdown as rolling_touchdown,
         separation as separation,
+        sphere_touchdown as sphere_touchdown,
         touchdown as touchdown,
         twist as twist,
     )
@@ -180,7 +181,7 @@ _HOMES = {
     "mbd.bodies": "Domain Link Marker PointMass RigidBody box cylinder disk rod segment sphere",
     "mbd.constraints": "Bilateral Controller Event KnifeEdge Nonholonomic Penalty PenaltyParameters Plane "
     "Rolling Unilateral When cone disk_touchdown distance extension flexion height measure penalty_parameters "
-    "profile_touchdown rolling_touchdown separation touchdown twist",
+    "profile_touchdown rolling_touchdown separation sphere_touchdown touchdown twist",
     "mbd.equations.energy_description": "Coordinate",
     "mbd.lagrangian": "Lagrangian",
     "mbd.errors": "AssemblyError CapabilityError GaitError MbdError MbdWarning MemoryLimitError ModelError "

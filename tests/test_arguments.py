@@ -65,6 +65,7 @@ WORDS = {
     mbd.penalty_parameters: (0.5, 1e-3, 1.0, 1.0),
     mbd.profile_touchdown: (ROD.end, ((-0.1, 0.1), (0.0, 0.0), (0.2, 0.1))),
     mbd.rolling_touchdown: (ROD.end, 0.1),
+    mbd.sphere_touchdown: (ROD.end, 0.1),
     mbd.separation: (*FRAMES, (1.0, 0.0, 0.0)),
     mbd.touchdown: (ROD.end,),
     mbd.Coordinate: ("theta",),

@@ -15,6 +15,7 @@ from mbd.constraints.penalty_parameters import PenaltyParameters, penalty_parame
 from mbd.constraints.rolling import Rolling
 from mbd.constraints.rolling_touchdown import profile_touchdown, rolling_touchdown
 from mbd.constraints.rules import When
+from mbd.constraints.sphere_touchdown import sphere_touchdown
 from mbd.constraints.surfaces import Plane
 from mbd.constraints.touchdown import touchdown
 from mbd.constraints.turning_measures import cone, twist
@@ -25,5 +26,6 @@ __all__ = [
     "Bilateral", "Closing", "Constraint", "Controller", "Drag", "Equation", "Event", "KnifeEdge", "Law", "Measure",
     "Nonholonomic", "Penalty", "PenaltyParameters", "Plane", "Rolling", "Unilateral", "VelocityConstraint", "When",
     "cone", "disk_touchdown", "distance", "extension", "flexion", "height", "measure", "penalty_parameters",
-    "profile_touchdown", "rolling_touchdown", "separation", "touchdown", "twist",
+    "profile_touchdown", "rolling_touchdown", "separation", "sphere_touchdown", "touchdown",
+    "twist",
 ]  # fmt: skip

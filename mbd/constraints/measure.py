@@ -52,6 +52,15 @@ class Measure(ABC):
         """Whether it can stick."""
         return False
 
+    def slip_velocities(self, scope: Scope) -> Sequence[tuple[str, Scalar]]:
+        """(part, velocity [m/s]) along which a contact rubs that no posture tells, as of a ball. None without one."""
+        return ()
+
+    @property
+    def has_slip_velocities(self) -> bool:
+        """Whether `slip_velocities` gives any."""
+        return False
+
     @property
     def title(self) -> str:
         """What it measures, in a word: 'distance'."""

@@ -77,7 +77,7 @@ class Unilateral(Constraint):
     @property
     def sticks(self) -> bool:
         """Whether tangent rows hold it while it is closed."""
-        return self.friction is None and self.measure.has_tangents
+        return self.friction is None and (self.measure.has_tangents or self.measure.has_slip_velocities)
 
     @property
     def slides(self) -> bool:
@@ -92,6 +92,10 @@ class Unilateral(Constraint):
             limit = partial(self._limit, scope) if self.slides else None
             tangents = self.measure.tangents(scope, hold(self.measure.captured(scope)))
             rows += [Equation(slip, part, limit=limit, may_fold=True) for part, slip in tangents]
+            rows += [
+                Equation(slip, part, level="velocity", limit=limit)
+                for part, slip in self.measure.slip_velocities(scope)
+            ]
         contact = Closing(gap, unit, self.opens_on, self.releases, self.only_while, self.restitution)
         return Law(rows, contact)
 
@@ -145,7 +149,7 @@ class Unilateral(Constraint):
         faults = self.measure.faults(self.name) + super().faults()
         if not 0.0 <= self.restitution <= 1.0:
             faults.append(f"'{self.name}': restitution {self.restitution:g} is not between 0 and 1")
-        if self.slides and not self.measure.has_tangents:
+        if self.slides and not (self.measure.has_tangents or self.measure.has_slip_velocities):
             faults.append(
                 f"'{self.name}': friction {self.friction:g} on a {self.measure.title}, which has no direction to slide "
                 "in; use mbd.touchdown, give mbd.measure(…, tangents=…), or friction=0"

@@ -159,7 +159,11 @@ def _by_rows(
     holding: Holding, number: int,
 ) -> Contact:  # fmt: skip
     """A normal row, and tangent rows that hold a place, or resist sliding up to a limit."""
-    numbers = [_row(found, scope, word.name, row, number) for row in law.rows]
+    numbers = [
+        _row(found, scope, word.name, row, number) if row.level == "position"
+        else (len(found.rows) - 1 if _velocity_row(found, scope, word.name, row, number) else -1)
+        for row in law.rows
+    ]  # fmt: skip
     acting = tuple(k for k in numbers if k >= 0)
     limits = [(k, row.limit) for k, row in zip(numbers, law.rows, strict=True) if row.limit is not None]
     if limits:

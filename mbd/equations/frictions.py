@@ -38,7 +38,7 @@ def sliding_contact(
     here = {scope.tape.input("anchor", k): value for k, value in captured.items()}
     first = len(found.frictions)
     for place, (row, law) in enumerate(tangents):
-        anchored = scope.rates([found.viewed[row]])
+        anchored = [found.viewed[row]] if found.rows[row].is_velocity else scope.rates([found.viewed[row]])
         view = substitute(anchored, here)[0]
         if len(tangents) == 2 and any(node.op == "input" and node.data[0] == "anchor" for node in live(anchored)):
             raise CapabilityError(

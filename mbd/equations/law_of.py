@@ -98,8 +98,8 @@ def _closing_faults(law: Law, at: Closing, by_force: bool, scope: DerivationScop
         watched = scope.tape.lift(first.value) is scope.tape.lift(at.gap)
         if not watched or first.part != "normal" or first.limit is not None:
             yield "its first row is Equation(gap, 'normal'), of the gap that Closing watches and without a limit"
-        if any(row.level != "position" for row in law.rows):
-            yield "rows of a contact hold positions"
+        if first.level != "position":
+            yield "the first row of a contact holds positions"
 
 
 def _has_velocity(nodes: Sequence[Node]) -> bool:
