@@ -68,6 +68,10 @@ class Outputs:
             node = self._made[name] = self._finish(make())
         return node
 
+    def offers(self, name: str) -> bool:
+        """Whether there is a result of this name, in any spelling."""
+        return self._spelled.get(name, name) in self._makers
+
     def names(self) -> Sequence[str]:
         """Everything that users can ask for."""
         return tuple(name for name in self._makers if name not in self._unlisted)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.equations.outputs import Outputs
 from mbd.errors import TrajectoryError, UnknownNameError, nearest
 from mbd.results.balance import Balance
 from mbd.results.charts import Charts
@@ -122,7 +123,10 @@ class ModelColumns(StoredStates, Columns):
 
     def knows(self, name: str) -> bool:
         if name not in self._nodes:
+            offered = self.equations.output
             try:
+                if isinstance(offered, Outputs) and not offered.offers(name):
+                    raise KeyError(name)  # without the search for the nearest name
                 with self.equations.tape.lock:
                     self._nodes[name] = self.equations.output(name)
             except (UnknownNameError, KeyError):
