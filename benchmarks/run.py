@@ -11,7 +11,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from benchmarks import basins, compiling, counts, derivatives, gait, people, startup, steps, watching
+from benchmarks import basins, compiling, counts, cycles, derivatives, gait, people, startup, steps, watching
 from benchmarks.figures import Figure
 from benchmarks.handwritten import FLAGS, compiler, compiler_version
 
@@ -19,7 +19,7 @@ __all__ = ["BASELINE", "GROUPS", "RESULTS", "Record", "load", "measure"]
 
 HERE = Path(__file__).parent
 BASELINE, RESULTS = HERE / "baseline.json", HERE / "results.json"
-GROUPS = ("counts", "steps", "watching", "gait", "basins", "derivatives", "compiling", "people", "startup")
+GROUPS = ("counts", "steps", "watching", "gait", "cycles", "basins", "derivatives", "compiling", "people", "startup")
 C_STEP = "step, compass, 4 dof + 2 rows, index 3"
 
 
@@ -56,6 +56,8 @@ def measure(repeats: int, groups: Iterable[str] = GROUPS) -> Record:
         figures += gait.measure(repeats, reference) if "gait" in groups else []
     if "watching" in groups:
         figures += watching.measure(repeats)
+    if "cycles" in groups:
+        figures += cycles.measure(repeats)
     if "basins" in groups:
         figures += basins.measure(repeats)
     if "derivatives" in groups:

@@ -27,7 +27,7 @@ NAMES = (
     "basin-picture", "chapter-walker", "compare-two-knees", "compass-gait", "double-pendulum", "find-a-gait",
     "four-bar",
     "identify-a-shank", "kneed-walker", "lagrangian-double-pendulum", "long-pendulum", "pendulum", "prosthetic-leg",
-    "rimless-wheel", "shaken-block", "simplest-walker-lagrangian", "slider-crank", "spinning-top",
+    "rimless-wheel", "shaken-block", "simplest-walker-lagrangian", "slider-crank", "spinning-top", "steeper-slope",
     "tennis-racket", "tune-a-knee-damper",
     "user-constraint", "user-integrator",
 )  # fmt: skip
@@ -616,3 +616,18 @@ def test_the_orifice_makes_the_gait_less_lame_than_the_viscous_damper() -> None:
     for walk in report.walks:  # what gravity gives is what impacts and dampers take
         way, fall = walk["stride length"]["left"], math.sin(math.radians(3.0)) * 9.81 * (34.6 + 12.2 + 2.85 + 2.3)
         assert sum(walk.spent().values()) == pytest.approx(-way * fall, rel=1e-6)
+
+
+# steeper-slope ----------------------------------------------------------------------------------------------------
+
+
+def test_a_compass_walker_begins_to_limp_at_the_published_slope() -> None:
+    names = script("steeper-slope")
+    slopes, doubling, limping, heavier = (names[name] for name in ("slopes", "doubling", "limping", "heavier"))
+    assert math.degrees(doubling.value) == pytest.approx(4.390898250244, abs=1e-8)
+    assert slopes["stable"][0] and not slopes["stable"][-1]
+    assert limping.stability == "stable" and limping.parameters["slope"] > doubling.value
+    (_, _, first), (_, _, second) = limping.steps
+    assert 0.001 < abs(first - second) < 0.1
+    assert limping.period == pytest.approx(2.0 * doubling.point.period, rel=1e-3)
+    assert np.all(np.diff(heavier["slope"]) < 0.0) and heavier["slope"][-1] == pytest.approx(0.07219446807, abs=1e-9)

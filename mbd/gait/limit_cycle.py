@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import GaitError, ModelError
 from mbd.gait.arguments import Functions, check_arguments, increments_named, section_named
@@ -16,7 +17,7 @@ from mbd.gait.mirror import mirror_of, require_alike
 from mbd.gait.return_map import ReturnMap
 from mbd.gait.search import Failed, Search, first_return, search, with_step
 from mbd.gait.section import Chart, section_of
-from mbd.gait.unmoved import moving_on
+from mbd.gait.unmoved import depends_on_time, moving_on
 from mbd.integrators import Integrator, RungeKutta853
 from mbd.simulation.capabilities import refusals
 from mbd.state import State
@@ -82,7 +83,8 @@ def limit_cycle(
     ------
     ModelError, UnknownNameError
         for arguments that cannot be meant, before the first run: a section that the model does not have, a mirror with
-        names without partner or of unlike sides, parameters that are none.
+        names without partner or of unlike sides, parameters that are none; for a model that depends on time itself or
+        has controllers, whose states do not begin again with each return.
     GaitError
         where no gait is found, with the outcome as its sentence ('falls backward at 0.41 s', 'scuffs at 0.30 s') and
         all that was computed in its ``gait``.
@@ -115,12 +117,32 @@ def map_of(
     refused = refusals(mechanism.equations, scheme, options)
     if refused:
         raise ModelError(refused)
+    _require_the_same_later(mechanism, model)
     vector = plain.vector(values)
     if mirror is not None:
         plain.mirror = mirror_of(mechanism.equations, mirror)
         require_alike(mechanism, plain.mirror, vector, {**getattr(model, "parameters", {}), **plain.plain(values)})
     plain.fixed = moving_on(mechanism, vector) if modulo is None else increments_named(mechanism, modulo)
     return plain
+
+
+def _require_the_same_later(mechanism: Mechanism, model: Any) -> None:
+    """Raise a `ModelError` where the same state later is another one: a return begins at time 0 each time."""
+    faults = []
+    if depends_on_time(mechanism) or (hasattr(model, "instants") and len(model.instants(0.0, 1.0))):
+        faults.append(
+            "something of the model depends on time itself (a prescribed motion, samples, a force of time), so that a "
+            "state that comes back is not the same later; let it depend on coordinates, or put a clock among them that "
+            "an event resets"
+        )
+    faults += [
+        f"the controller {controller.name!r} keeps its state and the parameters that it has written from one step to "
+        "the next, which a return begins without; give the parameters as parameters= without it, or simulate until "
+        "the walk settles"
+        for controller in getattr(model, "controllers", ())
+    ]
+    if faults:
+        raise ModelError(faults)
 
 
 def _found(map_: ReturnMap, start: State, dt: float | None, tol: float) -> LimitCycle:

@@ -131,6 +131,10 @@ def _rows(mechanism: Mechanism, parameters: Vector, touched: Vector, q: Vector) 
 def depends_on_time(mechanism: Mechanism) -> bool:
     """Whether time itself is in the equations, so that the same state later is another one."""
     equations = mechanism.equations
-    with equations.tape.lock:
-        nodes: Sequence[object] = live([*programs.accelerations(equations), *programs.guards(equations)])
-    return any(getattr(node, "op", "") == "input" and getattr(node, "data", ("",))[0] == "t" for node in nodes)
+    known = equations.memory.get("depends on time")
+    if known is None:
+        with equations.tape.lock:
+            nodes: Sequence[object] = live([*programs.accelerations(equations), *programs.guards(equations)])
+        known = any(getattr(node, "op", "") == "input" and getattr(node, "data", ("",))[0] == "t" for node in nodes)
+        equations.memory["depends on time"] = known
+    return bool(known)

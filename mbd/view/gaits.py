@@ -85,9 +85,11 @@ def branch(found: Branch, quantity: str, path: str | Path | None = None) -> Any:
     with drawing(path, 6.4, 4.0) as figure:
         axes = figure.subplots()
         shade = tone(CYCLE[0])
-        for first, last in pairwise(range(len(found))):
-            solid = stable[first] and stable[last]
-            axes.plot(values[[first, last]], heights[[first, last]], "-" if solid else "--", color=shade)
+        solid = stable[:-1] & stable[1:]
+        cuts = [0, *(np.flatnonzero(solid[1:] != solid[:-1]) + 1), len(solid)]
+        for first, last in pairwise(cuts):
+            piece = slice(first, last + 1)
+            axes.plot(values[piece], heights[piece], "-" if solid[first] else "--", color=shade)
         for number, kind in enumerate(dict.fromkeys(point.kind for point in found.special), start=1):
             points = [point for point in found.special if point.kind == kind]
             place = [point.value for point in points]

@@ -161,6 +161,11 @@ def test_a_kneed_walker_ends_where_its_bent_leg_grazes_the_slope():
     assert abs(np.min(near["right foot.gap"][middle])) < 1e-8
 
 
+def test_a_cycle_that_neither_dies_out_nor_grows_is_marginal():
+    gait = cycle_of("x", "0.3*y + 0.2*x + 0*p*k", 0.3, 0.4, 0.1)
+    assert gait.stability == "marginal" and abs(gait.largest_multiplier - 1.0) < 1e-9 and "(marginal)" in repr(gait)
+
+
 def test_a_parameter_that_changes_nothing_is_named():
     model, start = simplest()
     gait = cycle_of("p + x - x**2", "0.3*y + 0.2*x", 0.3, 0.55, 0.1)

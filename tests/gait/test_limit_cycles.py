@@ -286,6 +286,24 @@ def test_a_motion_that_dies_out_is_no_gait():
         mbd.limit_cycle(arm, mbd.assemble(arm, {"hinge.angle": 0.5}), section="below")
 
 
+def test_what_is_not_the_same_at_a_later_time_is_refused_by_name():
+    def arm(word):
+        model = mbd.Model("arm")
+        rod = mbd.Link("rod", mass=1.0, length=1.0, center=0.6, inertia=0.05)
+        model.connect(mbd.Revolute("hinge", model.ground.origin, rod.start))
+        model.constrain(mbd.Event("below", mbd.measure(lambda a: a, "hinge.angle", unit="rad"), direction=1))
+        model.apply(word(rod))
+        return model
+
+    shaken = arm(lambda rod: mbd.Applied("push", rod.end, force=(lambda t: mbd.sin(t), 0.0)))
+    with pytest.raises(mbd.ModelError, match="something of the model depends on time itself"):
+        mbd.limit_cycle(shaken, mbd.assemble(shaken, {"hinge.angle": 0.5}), section="below")
+    brake = mbd.Controller("brake", lambda time, values, state: {}, on=("below",), writes=("rod.mass",))
+    held = arm(lambda rod: brake)
+    with pytest.raises(mbd.ModelError, match="the controller 'brake' keeps its state and the parameters"):
+        mbd.limit_cycle(held, mbd.assemble(held, {"hinge.angle": 0.5}), section="below")
+
+
 def test_wrong_arguments_are_named():
     model, start = simplest()
     with pytest.raises(mbd.UnknownNameError, match="section: no contact or event named 'heal strike'; did you mean"):
