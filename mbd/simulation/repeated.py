@@ -19,6 +19,7 @@ from mbd.integrators import Integrator
 from mbd.kernel import codes
 from mbd.results.record import EventRecord
 from mbd.simulation.run.begin import begin
+from mbd.simulation.run.late_resets import reset_ends
 from mbd.simulation.run.many import Ends, ManyRuns, may_be_many, start_line
 from mbd.simulation.run.run import Run
 from mbd.simulation.simulate import REST_SPEED, laid_out, prepared
@@ -75,7 +76,7 @@ class RepeatedRun:
         first = replace(start, time=0.0, memory=None)
         self._arguments = model, first, integrator, dt, until, dict(parameters), options
         self._laid_out = laid_out(*self._arguments)
-        self.alone = may_be_many(self._laid_out)
+        self.alone = may_be_many(self._laid_out, late_resets=True)
         """Why runs are made one by one; '' if they need not be."""
         boundaries = self._laid_out.boundaries
         self.adjustable = not boundaries.controllers and not len(boundaries.breaks)
@@ -129,6 +130,7 @@ class RepeatedRun:
         vectors = np.array([vector for _, vector in known]).reshape(len(each), -1)
         lines = np.array([start_line(self._many.run, start) for start in starts]).reshape(len(each), -1)
         ends = self._many(lines, vectors, LINES)
+        self._reset_ends(ends, vectors)
         return [self._end(ends, k, start, each[k]) for k, start in enumerate(starts)]
 
     @cached_property
@@ -138,6 +140,19 @@ class RepeatedRun:
         if self.adjustable:
             many.adjust(self.dt, self.latest)
         return many
+
+    def _reset_ends(self, ends: Ends, vectors: Matrix) -> None:
+        """What the event that ended runs resets; where that gives no numbers, a run alone says so."""
+        run = self._many.run
+        v, at_v = run.kernel, 1 + run.kernel.n_q
+        for e, guard in enumerate(run.manager.guards):
+            here = np.flatnonzero((ends.status == codes.EVENT) & (ends.stopped_by == v.n_contacts + e))
+            if guard.reset is None or not len(here):
+                continue
+            q, y = ends.row[here, 1:at_v], ends.row[here, at_v : at_v + v.n]
+            sound = reset_ends(run, guard, q, y, vectors[here])
+            ends.row[here, 1:at_v], ends.row[here, at_v : at_v + v.n] = q, y
+            ends.status[here[~sound]] = codes.NEEDS_PYTHON
 
     def _vector(self, values: Mapping[str, float]) -> Vector:
         return self._laid_out.mechanism.parameters(values, self._folded if values else {})

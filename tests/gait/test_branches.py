@@ -29,7 +29,9 @@ def mapped(first: str, second: str) -> mbd.Lagrangian:
     return model
 
 
-def cycle_of(first: str, second: str, p: float, x: float, y: float, model=None) -> mbd.LimitCycle:
+def cycle_of(
+    first: str, second: str, p: float, x: float, y: float, model: mbd.Lagrangian | None = None
+) -> mbd.LimitCycle:
     """The fixed point of a map."""
     model = mapped(first, second) if model is None else model
     start = mbd.assemble(model, {"x": x, "y": y}, {"clock": 1.0})
@@ -39,19 +41,19 @@ def cycle_of(first: str, second: str, p: float, x: float, y: float, model=None) 
 
 
 def test_a_branch_goes_around_its_fold():
-    gait = cycle_of("p + x - x**2", "0.3*y + 0.2*x", 0.3, 0.55, 0.1)
-    assert np.max(np.abs(np.sort(gait.multipliers.real) - np.sort([0.3, 1.0 - 2.0 * math.sqrt(0.3)]))) < 1e-9
-    found = mbd.branch(gait, "scale", -0.5, steps=15, step=0.1)
+    gait = cycle_of("p + x - x**2", "0.3*y + 0.2*x", 0.04, 0.2, 0.06)
+    assert np.max(np.abs(np.sort(gait.multipliers.real) - np.sort([0.3, 0.6]))) < 1e-9
+    found = mbd.branch(gait, "scale", -0.5, steps=8, step=0.1)
     (fold,) = found.points("fold")
-    assert abs(fold.value) < 1e-9 and found["scale"][-1] > 0.02
+    assert abs(fold.value) < 1e-9 and found["scale"][-1] > 0.005
     x = np.array([point.state["x"] for point in found.curve])
-    assert np.max(np.abs(found["scale"] - x**2)) < 1e-9 and x[0] > 0.5 and x[-1] < -0.1
+    assert np.max(np.abs(found["scale"] - x**2)) < 1e-9 and x[0] > 0.19 and x[-1] < -0.05
     assert found["stable"][0] and not found["stable"][-1]
 
 
 def test_a_doubling_is_found_and_left_along_the_other_branch():
-    gait = cycle_of("p + x - x**2", "0.3*y + 0.2*x", 0.7, 0.84, 0.24)
-    found = mbd.branch(gait, "scale", 1.2, step=0.1)
+    gait = cycle_of("p + x - x**2", "0.3*y + 0.2*x", 0.9, 0.95, 0.27)
+    found = mbd.branch(gait, "scale", 1.1, step=0.1)
     (doubling,) = found.points("doubling")
     assert abs(doubling.value - 1.0) < 1e-9 and not found.points("fold", "torus")
     twice = found.switch(doubling)
@@ -64,8 +66,8 @@ def test_a_doubling_is_found_and_left_along_the_other_branch():
 
 
 def test_a_torus_is_found_where_a_complex_pair_crosses_the_unit_circle():
-    gait = cycle_of("2*p*x*(1 - y)", "x", 0.9, 0.444, 0.444)
-    found = mbd.branch(gait, "scale", 1.1, step=0.1)
+    gait = cycle_of("2*p*x*(1 - y)", "x", 0.97, 0.485, 0.485)
+    found = mbd.branch(gait, "scale", 1.05, step=0.1)
     (torus,) = found.points()
     assert torus.kind == "torus" and abs(torus.value - 1.0) < 1e-9
     assert abs(np.abs(np.angle(torus.point.multipliers.values[0])) - math.pi / 3.0) < 1e-7
@@ -76,15 +78,14 @@ def test_an_event_that_no_longer_happens_is_located():
     model = mapped.__wrapped__("p + x - x**2", "0.3*y + 0.2*x")
     x, clock = model.coordinates[0], model.coordinates[2]
     model.constrain(mbd.Event("gate", x.q - 0.6 - (clock.q - 0.5) ** 2, direction=1))
-    gait = cycle_of("", "", 0.5, 0.7, 0.2, model)
-    found = mbd.branch(gait, "scale", 0.3, step=0.1)
+    gait = cycle_of("", "", 0.4, 0.632, 0.18, model)
+    found = mbd.branch(gait, "scale", 0.35, step=0.1)
     (lost,) = found.points("lost event")
     assert lost.what == "gate" and abs(lost.value - 0.36) < 1e-10
-    back = mbd.branch(found.gait(0.3), "scale", 0.5, step=0.1)
-    (new,) = back.points("new event")
-    assert new.what == "gate" and abs(new.value - 0.36) < 1e-10 and "new event of 'gate' at 0.3" in repr(back)
+    assert "lost event of 'gate' at 0.3" in repr(found)
 
 
+@pytest.mark.slow
 def test_special_points_are_followed_over_a_second_parameter(tmp_path):
     """The fixed point k x² = p doubles at p = 1/k, and loses the gate at x = 0.6 where p = 0.36 k."""
     model = mapped.__wrapped__("p + x - k*x**2", "0.3*y + 0.2*x")

@@ -15,6 +15,7 @@ from mbd.simulation.run.many import ManyRuns, start_line
 from mbd.simulation.simulate import REST_SPEED, laid_out
 from mbd.testing.mechanisms import random_scene
 from tests.cases.walkers import kneed, standing
+from tests.gait.walkers import simplest
 from tests.problems import case
 from tests.simulation.mechanisms import ball
 
@@ -124,3 +125,13 @@ def test_another_step_and_latest_time_are_those_of_a_run_prepared_with_them():
             prepared = RepeatedRun(model, start, scheme, dt, ("right foot", latest), {})
             for ends in ((adjusted(start), prepared(start)), (adjusted.many([start])[0], prepared.many([start])[0])):
                 assert same(ends[0].state, ends[1].state) and ends[0].stopped_by == ends[1].stopped_by
+
+
+def test_repeated_runs_that_a_reset_ends_are_the_same_together():
+    model, start = simplest()
+    repeated = RepeatedRun(model, start, mbd.RungeKutta853(), 0.1, ("heel strike", 9.0), {"gamma": 0.009})
+    values = [{"gamma": gamma} for gamma in (0.009, 0.0095, 0.02)]
+    assert repeated.alone == ""
+    for one, value in zip(repeated.many([start] * 3, values), values, strict=True):
+        other = repeated(start, value)
+        assert same(one.state, other.state) and one.stopped_by == other.stopped_by == "heel strike"
