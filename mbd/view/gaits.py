@@ -81,7 +81,7 @@ def _multipliers(axes: Any, gait: LimitCycle) -> None:
 
 def branch(found: Branch, quantity: str, path: str | Path | None = None) -> Any:
     """A quantity over the parameter: stable gaits solid, unstable ones dashed, special points marked by kind."""
-    values, heights, stable = found[found.parameter], found[quantity], found["stable"]
+    values, heights, stable = found[found.parameter], found[quantity], np.array([each.stable for each in found.curve])
     with drawing(path, 6.4, 4.0) as figure:
         axes = figure.subplots()
         shade = tone(CYCLE[0])
