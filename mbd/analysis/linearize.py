@@ -14,6 +14,7 @@ from mbd.analysis.linear_motion import LinearMotion, Prescribed, linear_motion, 
 from mbd.analysis.linearization import Linearization
 from mbd.analysis.ports import Input, Output, acting, doubt_of_idle, input_names, output_nodes, port_terms
 from mbd.analysis.state_space import StateSpace
+from mbd.analysis.turning_steadily import doubt_of_turning
 from mbd.arrays import Matrix
 from mbd.compile.mechanisms import require_model
 from mbd.equations.equations import Equations
@@ -38,6 +39,8 @@ def linearize(
     at rest and can. Independent coordinates are chosen so that rows determine the others best. A is the exact Jacobian
     of their first-order equations at any state; at an equilibrium or a steady motion its eigenvalues do not depend on
     the choice, on the cut or on the order of rows. Time is held: driven motions are frozen at the state's instant.
+    Displacements of joints with quaternions lie in axes that turn with the child; where a motion without accelerations
+    does not stay the same in these, such as that of a coin that rolls, an MbdWarning says so.
 
     Parameters
     ----------
@@ -97,13 +100,16 @@ def linearize(
     space = _space([freedoms[k] for k in picked], motion, given, seen)
     doubt_of_idle(_idle(given, space))
     values = [found.value(given[k].node) if order == 0 else 0.0 for k, order in prescribed.states]
-    return Linearization(
+    linear = Linearization(
         equations.name, state.time, tuple(name for name, _ in equations.configuration.freedoms), found.titles,
         terms.M[:n_v, :n_v], terms.C[:n_v, :n_v], terms.K[:n_v], terms.B, space, motion.basis,
         np.concatenate([state.q, state.v, state.z]), np.concatenate([state.v, found.rate]), local.y,
         *_modes(motion.A, motion.basis[:n_v]), picked, found, np.array(values),
         not (inputs is None and outputs is None), (given, seen),
     )  # fmt: skip
+    if linear.is_equilibrium:
+        doubt_of_turning(found, terms)
+    return linear
 
 
 def _require(faults: list[str]) -> None:

@@ -1,5 +1,7 @@
 """Case d5 and others in the words of examples: turns of a coin, how fast it must roll to stay up, a kick in space."""
 
+import warnings
+
 import numpy as np
 import pytest
 
@@ -46,3 +48,15 @@ def test_what_an_amputee_does_in_space_is_free_of_outside():
     lost = {part.name: float(part.energy[-1]) for part in run.energy.parts}
     assert lost["left knee loss"] < -0.5 > -1.5
     assert run["trunk.rotation_vector"][-1] == pytest.approx([0.0, -0.179, 0.107], abs=0.02)
+
+
+def test_a_motion_that_changes_in_axes_that_turn_along_is_told_as_eigenvalues_are_asked_for():
+    with pytest.warns(mbd.MbdWarning, match="'float' turns, and the derivatives change along its motion"):
+        mbd.linearize(COIN["model"], COIN["rolling"](0.0, 0.0, -3.0))
+    model = mbd.Model("sleeping top", gravity=(0.0, -9.81, 0.0))
+    body = mbd.RigidBody("body", 1.0, (0.1, 0.05, 0.1), center=(0.0, 0.3, 0.0))
+    model.connect(mbd.Spherical("ball", model.ground.origin, body.origin))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", mbd.MbdWarning)
+        mbd.linearize(model, mbd.assemble(model, velocity={"ball.angular_velocity.y": 60.0}))
+        mbd.linearize(COIN["model"], COIN["rolling"](0.0, 0.0, 0.0))
