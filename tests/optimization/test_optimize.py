@@ -171,7 +171,7 @@ def test_the_steepest_slope_at_which_a_push_dies_out_by_a_fifth_each_step():
     assert found.success and active.name == "largest multiplier"
     there = long_gait().at({"gamma": found["gamma"]})
     assert there.largest_multiplier == pytest.approx(0.8, abs=1e-7)
-    h = 1e-4
+    h = 1e-5
     ends = [long_gait().at({"gamma": found["gamma"] + s * h}).largest_multiplier for s in (1.0, -1.0)]
     assert active.price == pytest.approx(2.0 * h / (ends[0] - ends[1]), rel=1e-3)
 
