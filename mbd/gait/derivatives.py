@@ -15,6 +15,7 @@ from scipy.linalg import eig
 
 from mbd.arrays import Matrix, Vector
 from mbd.errors import GaitError, ModelError, UnknownNameError, nearest
+from mbd.gait.exact_derivative import exact_derivative
 from mbd.gait.map_derivative import extrapolated, map_derivative
 
 __all__ = ["Derivatives", "parameter_value"]
@@ -133,8 +134,10 @@ def _of_largest_multiplier(gait: Any, name: str) -> float:
 
 
 def _slope_beside(gait: Any, c: Vector, values: Mapping[str, float]) -> Matrix:
-    """P beside the gait."""
-    size = gait.chart.size
+    """P beside the gait: exact, or by differences where no pass knows a run's derivative."""
+    exact, size = exact_derivative(gait.map, gait.chart, c, values), gait.chart.size
+    if exact is not None:
+        return exact
     found = map_derivative(gait.map, gait.chart, c, values)
     if found.missing:
         raise GaitError(f"no derivative of the multipliers: beside the gait {next(iter(found.missing.values()))}", gait)

@@ -75,7 +75,7 @@ def test_derivatives_of_the_compass_gait_are_those_of_the_case():
             expected = reference[f"d({theirs}) / d({parameter})"].value
             assert abs(gait.derivatives[ours, word] - expected) < 1e-9 * max(1.0, abs(expected))
     expected = reference["d(largest |multiplier|) / d(slope angle)"].value
-    assert abs(gait.derivatives["largest multiplier", "slope"] - expected) < 1e-6
+    assert abs(gait.derivatives["largest multiplier", "slope"] - expected) < 1e-8
 
 
 @pytest.mark.parametrize("name", ["f1-simplest-walker-long", "f1b-simplest-walker-short"])
@@ -134,10 +134,8 @@ def test_gaits_of_unequal_sides_are_those_of_the_cases(name):
         found = [symmetry(gait, "length", word), symmetry(gait, "time", word),
                  gait.derivatives["speed", word], gait.derivatives["period", word]]  # fmt: skip
         assert np.max(np.abs(found - expected[:4])) < 1e-8
-    if name == "k2-asymmetric-compass":
-        found = gait.derivatives["largest multiplier", "right shank.mass"]
-        expected = reference[f"d({names}) / d(shank mass ms of leg B)"].value
-        assert abs(found - expected[4]) < 1e-7  # differences of multipliers
+        by = gait.derivatives["largest multiplier", word]
+        assert abs(by - expected[4]) < 1e-8 * max(1.0, abs(expected[4]))
 
 
 def symmetry(gait: mbd.LimitCycle, what: str, parameter: str = "") -> float:
