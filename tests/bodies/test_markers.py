@@ -109,7 +109,7 @@ def test_the_page_shows_named_points():
     model, shank = leg()
     shank.point(0.1, -0.4, name="toe")
     mbd.Marker("post", model.ground, (0.5, 0.1))
-    page = content(run_of(model))
+    page = content(run_of(model), 10)
     assert [page["points"][k]["name"] for k in page["markers"]] == ["post", "shank.toe"]
 
 
