@@ -61,10 +61,11 @@ class Differentiated:
 
 
 def passed(
-    run: Trajectory, wrt: Sequence[str | tuple[str, Mapping[str, float]]], held: Collection[str] = ()
-) -> tuple[Differentiated, list[Direction]]:
-    """The pass over a run, and its directions."""
-    rows = RunRows(run)
+    run: Trajectory, wrt: Sequence[str | tuple[str, Mapping[str, float]]], held: Collection[str] = (),
+    periods: Sequence[float] | None = None,
+) -> tuple[Differentiated, list[Direction]]:  # fmt: skip
+    """The pass over a run, and its directions; periods : see `RunRows`."""
+    rows = RunRows(run, periods)
     wanted = directions(rows, wrt)
     programs = programs_of(rows, wanted)
     walked = Walk(rows, programs, restitutions_of(wanted)).whole(start_tangent(rows, programs, wanted, held))

@@ -145,6 +145,9 @@ class NewmarkSteps:
         of_x = tangent.q + h * tangent.y[:n_v] + h * h * ((0.5 - self.beta) * guess.of_a0 + self.beta * of_a1)[:n_v]
         of_x = of_x + (motion.y + 2.0 * h * way)[:n_v, np.newaxis] * dh
         of_x = of_x + stretch**3 * (memory.of_shift + stretch * memory.of_change)
+        if memory.shift is not None and memory.shift_change is not None:
+            growth = 3.0 * memory.shift + 4.0 * stretch * memory.shift_change
+            of_x = of_x + (stretch * stretch / memory.step * growth)[:, np.newaxis] * dh
         moved = replace(tangent, t=tangent.t + dh, q=of_x, y=of_y)
         return replace(place, tangent=moved), Rates(foreseen.rate, foreseen.lam, of_rate, of_lam)
 

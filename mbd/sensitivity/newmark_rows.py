@@ -7,6 +7,7 @@ velocities of the rows: what does not agree with them to round-off is refused.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,10 +18,27 @@ from mbd.sensitivity.motion import Mode, Motion, Rates
 from mbd.sensitivity.newmark import NewmarkSteps
 from mbd.sensitivity.newmark_kernel import ended, taken
 from mbd.sensitivity.programs import Programs
-from mbd.sensitivity.run_data import Rows, RunRows
+from mbd.sensitivity.run_data import Rows, RunRows, refused
 from mbd.sensitivity.schemes import Memory, SchemeSteps
 
 __all__ = ["NewmarkRows"]
+
+GROWTH = 2.0
+"""Size of a step over that of the last one, up to which what it extrapolates from that is known [-]."""
+
+
+def after_size(memory: Memory, h: float, dh: Vector) -> Memory:
+    """What a scheme remembers after a step whose size has the derivatives dh (D,), before one of the size h.
+
+    It begins with ``a₀ = v̇₀ + s (a − v̇₀)`` and predicts ``U = s³ (U₀ + s ΔU₀)``, s = h/step: derivatives of a and ΔU₀
+    take the part of that of the step, which a memory does not have.
+    """
+    part = (memory.aux - memory.rates.rate) / memory.step
+    after = replace(memory, of_aux=memory.of_aux - part[:, np.newaxis] * dh)
+    if memory.of_change is None or memory.shift is None or memory.shift_change is None or h <= 0.0:
+        return after
+    growth = 3.0 * memory.shift / h + 4.0 * memory.shift_change / memory.step
+    return replace(after, of_change=memory.of_change - growth[:, np.newaxis] * dh)
 
 
 class NewmarkRows(SchemeSteps):
@@ -55,7 +73,21 @@ class NewmarkRows(SchemeSteps):
                 return self._uneven(motion, memory, mode, row, dh)
             memory = other
         rows = self.rows.step_to(row, motion, memory.rates)
-        return self._step(motion, memory, mode, rows, dh)
+        end, after = self._step(motion, memory, mode, rows, dh)
+        ahead = self.rows.record.time[row + 1 :]
+        if not (len(ahead) and self.rows.is_fixed(row)):
+            return end, after
+        self._check_growth(end.t, h, float(ahead[0]) - end.t, mode)
+        return end, after_size(after, float(ahead[0]) - end.t, dh)
+
+    def _check_growth(self, time: float, h: float, following: float, mode: Mode) -> None:
+        """Refuse a step much longer than one that a sample cut, from which position corrections are extrapolated."""
+        if self.stabilized and mode.rows and following > GROWTH * h:
+            raise refused(
+                f"the sample at t = {time:.9g} s, at which nothing was written, cut a step to less than half of the "
+                "next one: of position corrections that are extrapolated so far derivatives lose their digits",
+                "take mbd.RungeKutta853() or mbd.RadauIIA(), or mbd.HHT(formulation='index3')",
+            )
 
     def _step(self, motion: Motion, memory: Memory, mode: Mode, rows: Rows, dh: Vector) -> tuple[Motion, Memory]:
         """A step between two rows, with least solutions where it is singular."""

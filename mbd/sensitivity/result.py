@@ -28,6 +28,7 @@ class Sensitivities:
     matrix : (len(of), len(wrt)) derivatives
     values : (len(of),) what is differentiated
     run : the run, of whose numbers these are the derivatives
+    written : parameters that controllers wrote, whose values are held as they were
     event_changes : which changes of `check_events` make another sequence of events, and the first that is another
     """
 
@@ -39,12 +40,13 @@ class Sensitivities:
     of_units: tuple[str, ...] = ()
     wrt_units: tuple[str, ...] = ()
     event_changes: tuple[str, ...] = ()
+    written: tuple[str, ...] = ()
 
     def as_words(self) -> dict[str, Any]:
         """All of it but the run, as numbers and words."""
         return {
             "of": list(self.of), "wrt": list(self.wrt), "matrix": self.matrix.tolist(), "values": self.values.tolist(),
-            "of_units": list(self.of_units), "wrt_units": list(self.wrt_units),
+            "of_units": list(self.of_units), "wrt_units": list(self.wrt_units), "written": list(self.written),
         }  # fmt: skip
 
     @classmethod
@@ -56,7 +58,7 @@ class Sensitivities:
             values = np.array(words["values"], dtype=float).reshape(len(of))
         except (KeyError, TypeError, ValueError) as error:
             raise TrajectoryError(f"the derivatives of this run are not as they were written: {error}") from error
-        return cls(of, wrt, matrix, values, run, *units)
+        return cls(of, wrt, matrix, values, run, units[0], units[1], written=tuple(map(str, words.get("written", ()))))
 
     def __getitem__(self, names: str | tuple[str, str]) -> Any:
         """A derivative by the names of its line and column, or a line by its name alone."""
@@ -94,6 +96,7 @@ class Sensitivities:
         ]
         for name, line in zip(self.of, texts, strict=True):
             lines.append(" ".join([name.ljust(first), *(f"{x:>{w + 1}}" for x, w in zip(line, widths, strict=True))]))
+        lines += [self._held] if self.written else []
         return "\n".join([*lines, *(f"another sequence of events: {each}" for each in self.event_changes)])
 
     def _repr_html_(self) -> str:
@@ -104,7 +107,15 @@ class Sensitivities:
                 self._with_units(self.of, self.of_units), self.values, self.matrix, strict=True
             )
         ]
-        return table("derivatives", ("result", "value", *(f"by {name}" for name in named)), rows)
+        return table(
+            f"derivatives; {self._held}" if self.written else "derivatives",
+            ("result", "value", *(f"by {name}" for name in named)),
+            rows,
+        )
+
+    @property
+    def _held(self) -> str:
+        return f"held as controllers wrote them: {', '.join(self.written)}"
 
     @staticmethod
     def _with_units(names: tuple[str, ...], units: tuple[str, ...]) -> list[str]:

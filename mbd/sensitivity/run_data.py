@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mbd import integrators
 from mbd.arrays import Matrix, Vector
@@ -21,10 +22,12 @@ from mbd.results.record import EventRecord, Record
 from mbd.sensitivity.motion import Mode, Motion, Rates
 from mbd.trajectory import Trajectory
 
-__all__ = ["Rows", "RunRows", "refused"]
+__all__ = ["HELD", "Rows", "RunRows", "refused"]
 
 Rows = tuple[Vector, Matrix, Matrix, Matrix, Matrix]
 """Times, q, y, rates and multipliers of rows that follow each other."""
+HELD = "mbd.sensitivities(…, controllers='held') leaves it out: what controllers wrote is then held as it was"
+"""What may be asked for where controllers are refused."""
 
 
 def refused(why: str, instead: str = "") -> CapabilityError:
@@ -34,9 +37,16 @@ def refused(why: str, instead: str = "") -> CapabilityError:
 
 @dataclass
 class RunRows:
-    """The rows and events of a run with its equations."""
+    """The rows and events of a run with its equations.
+
+    Parameters
+    ----------
+    run : as `mbd.simulate` returned it
+    periods : of its sampled controllers [s], where what controllers wrote is held as it was; None refuses them
+    """
 
     run: Trajectory
+    periods: Sequence[float] | None = None
 
     def __post_init__(self) -> None:
         record = self.run.record
@@ -51,11 +61,10 @@ class RunRows:
             raise refused("its events were located by linear interpolation", "take locate='root'")
         if settings.get("store", 1) != 1:
             raise refused(f"it kept one row in {settings['store']}", "take store=1")
-        if record.parameter_changes:
-            raise refused("a controller changed parameters in it, whose feedback is not differentiated yet")
         memory = getattr(record.final, "memory", None)
-        if memory is not None and memory.controllers.get("samples"):
-            raise refused("its model has sampled controllers, whose feedback is not differentiated yet")
+        sampled = memory is not None and memory.controllers.get("samples")
+        if self.periods is None and (record.parameter_changes or sampled):
+            raise refused("controllers decide in it, whose feedback is not differentiated", HELD)
         if record.equations.compose is not None:
             raise refused("joints of its model have coordinates that do not add, such as a quaternion")
 
@@ -125,15 +134,35 @@ class RunRows:
         return time != float(self.record.time[row])
 
     def segment_end(self, row: int) -> int:
-        """The row with which the steps from a start at a row end: the next one that is stored twice, or the last."""
-        repeats = self._repeats
-        later = repeats[np.searchsorted(repeats, row, side="right") :]
+        """The row with which even steps from a row end: the next one stored twice or at a sample, or the last."""
+        later = self._stops[np.searchsorted(self._stops, row, side="right") :]
         return int(later[0]) if len(later) else len(self.record.time) - 1
 
+    def is_fixed(self, row: int) -> bool:
+        """Whether the instant of a row at which no event ends a step stays where it is."""
+        time = self.record.time
+        return row + 1 == len(time) or bool(time[row + 1] == time[row]) or row in self._samples
+
     @cached_property
-    def _repeats(self) -> Any:
-        """Rows whose instant is that of the row behind them."""
-        return np.flatnonzero(np.diff(self.record.time) == 0.0)
+    def _stops(self) -> NDArray[np.intp]:
+        """Rows whose instant is that of the row behind them, and those at samples."""
+        repeats = np.flatnonzero(np.diff(self.record.time) == 0.0)
+        return np.union1d(repeats, np.array(sorted(self._samples), dtype=np.intp))
+
+    @cached_property
+    def _samples(self) -> frozenset[int]:
+        """Rows at samples of controllers, at which steps end whatever the grid of steps is."""
+        time, found = self.record.time, set[int]()
+        for period in self.periods or ():
+            sample = time[0] + np.round((time - time[0]) / period) * period
+            found.update(map(int, np.flatnonzero(np.abs(sample - time) <= 2e-12 * self.full)))
+        return frozenset(found)
+
+    @cached_property
+    def changes(self) -> dict[int, Vector]:
+        """Values of all parameters, by the row from which on they are those that controllers wrote."""
+        size = len(self.record.parameters)
+        return {row: np.array(values[:size]) for row, values in self.record.parameter_changes}
 
     def between(self, first: int, last: int) -> Rows:
         """Rows from the first to the last one."""

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal
 
-from mbd.bodies.values import is_number, shown
+from mbd.bodies.values import among, is_number, shown
 from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.integrators import Integrator
@@ -43,6 +43,7 @@ def sensitivities(
     parameters: Mapping[str, float] | None = None,
     impact: Literal["newton", "poisson", "sequential"] = "newton",
     rest_speed: float = REST_SPEED,
+    controllers: Literal["held"] | None = None,
     backend: str = "auto",
 ) -> Sensitivities:
     """Run a model and differentiate the numbers of the run.
@@ -67,6 +68,8 @@ def sensitivities(
         as those that `mbd.assemble` was given; the others complete it, with the least motion. By default those in `wrt`
     check_events : changes > 0 of names in `wrt`, {"hip.angle": 0.01}: two more runs of each, with the change added and
         taken away, tell in `Sensitivities.event_changes` which event is then another, where derivatives tell nothing
+    controllers : 'held' differentiates a run whose model has controllers with what they wrote held as it was, at the
+        same samples and events: without their feedback, as if the values were replayed. By default they are refused
 
     Returns
     -------
@@ -78,7 +81,8 @@ def sensitivities(
         for arguments that cannot be honoured.
     CapabilityError
         where the run has no derivative, or on one side only (several events at one instant, a contact that only
-        grazes), and for what is not differentiated: non-smooth steps, controllers, quaternions. It tells name and time.
+        grazes), and for what is not differentiated: non-smooth steps, feedback of controllers, quaternions. It tells
+        name and time.
 
     Examples
     --------
@@ -102,7 +106,10 @@ def sensitivities(
         raise ModelError(f"start must be a State from mbd.assemble(model, …), not {start!r}")
     amounts = amounts_of(check_events, [name for each in wrt for name in ([each] if isinstance(each, str) else each)])
     changed = {**start.parameters, **(parameters or {})} if isinstance(parameters, Mapping | None) else {}
-    model = with_inputs(model, backend, changed, wrt)
+    model = with_inputs(model, backend, changed, wrt, controllers)
+    own: Sequence[Any] = getattr(model, "controllers", ())
+    if own and amounts:
+        raise refused("in the runs of check_events controllers read and write other values", "leave check_events out")
 
     def made(start: State, more: Mapping[str, float]) -> Trajectory:
         return simulate(
@@ -111,7 +118,7 @@ def sensitivities(
         )  # fmt: skip
 
     run = made(start, {})
-    found = derivatives_of(run, wrt, of, values, hold)
+    found = derivatives_of(run, wrt, of, values, hold, own)
     if not amounts:
         return found
     single, _ = _names_in(wrt)
@@ -125,10 +132,12 @@ def derivatives_of(
     of: Sequence[str] | None = None,
     at: Mapping[str, float] | None = None,
     hold: Sequence[str] | None = None,
+    controllers: Sequence[Any] = (),
 ) -> Sensitivities:
-    """The derivatives of a run of a model that `with_inputs` made; see `sensitivities`."""
+    """The derivatives of a run of a model that `with_inputs` made, which has these controllers; see `sensitivities`."""
     single, _ = _names_in(wrt)
-    return _differentiated(run, _directions(run, wrt, at or {}), _held(run, single) if hold is None else hold, of)
+    held = _held(run, single) if hold is None else hold
+    return _differentiated(run, _directions(run, wrt, at or {}), held, of, controllers)
 
 
 def _directions(run: Trajectory, wrt: Sequence[Wanted], values: Mapping[str, float]) -> list[Any]:
@@ -144,10 +153,11 @@ def _directions(run: Trajectory, wrt: Sequence[Wanted], values: Mapping[str, flo
 
 
 def _differentiated(
-    run: Trajectory, directions: list[Any], held: Sequence[str], of: Sequence[str] | None
+    run: Trajectory, directions: list[Any], held: Sequence[str], of: Sequence[str] | None, controllers: Sequence[Any]
 ) -> Sensitivities:
     """The derivatives of a run as a table."""
-    found, wanted = passed(run, directions, held)
+    periods = [each.period for each in controllers if each.period is not None]
+    found, wanted = passed(run, directions, held, periods if controllers else None)
     names = usual(found.rows) if of is None else list(of)
     lines = lines_of(found.rows, found.programs, found.walked, names)
     facts, columns = run.facts, tuple(each.name for each in wanted)
@@ -155,6 +165,7 @@ def _differentiated(
         lines.names, columns, lines.matrix, lines.values, run,
         tuple("s" if name == "time" or ".time" in name else unit(name, facts) for name in lines.names),
         tuple(unit(name, facts) for name in columns),
+        written=tuple(dict.fromkeys(name for each in controllers for name in each.writes)),
     )  # fmt: skip
 
 
@@ -203,12 +214,26 @@ def _values_of(at: Any) -> dict[str, float]:
     return {name: float(value) for name, value in at.items()}
 
 
-def with_inputs(model: Any, backend: str, changed: Mapping[str, float], wrt: Any) -> Any:
+def _check_controllers(own: Sequence[Any], asked: Any, names: Collection[str]) -> None:
+    """Refuse the controllers of a model unless what they write is to be held, and derivatives by what they write."""
+    if not among(asked, (None, "held")):
+        raise ModelError(f"controllers={shown(asked)} is not available; use 'held', or leave it out")
+    if own and asked is None:
+        them = ", ".join(repr(each.name) for each in own)
+        raise refused(
+            f"its controllers ({them}) change parameters as they read results, which is not differentiated",
+            "controllers='held' leaves it out: what they wrote is then held as it was",
+        )
+    for each in own:
+        for name in each.writes:
+            if name in names:
+                raise refused(f"{name!r} is held as {each.name!r} writes it", "leave it out of wrt")
+
+
+def with_inputs(model: Any, backend: str, changed: Mapping[str, float], wrt: Any, controllers: Any = None) -> Any:
     """The model with the parameters that `wrt` names as run-time inputs, also where they are 0 or ±1."""
     single, grouped = _names_in(wrt)
-    if getattr(model, "controllers", ()):
-        them = ", ".join(repr(each.name) for each in model.controllers)
-        raise refused(f"its controllers ({them}) change parameters as they read results, which is not differentiated")
+    _check_controllers(getattr(model, "controllers", ()), controllers, {*single, *grouped})
     mechanism = mechanism_of(model, backend, {k: v for k, v in changed.items() if is_number(v)})
     inputs = {parameter.name for parameter in mechanism.equations.parameters}
     folded = getattr(model, "parameters", {})

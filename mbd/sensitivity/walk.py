@@ -85,6 +85,7 @@ class Walk:
         self.record = rows.record
         self._modes: dict[tuple[Any, ...], Mode] = {}
         self.steps = steps_of(rows, programs)
+        self._written = dict(rows.changes)
         self.visit: Callable[[int, Motion, Mode, Rates], None] | None = None
         """Called with every row that a step starts from, and what the pass knows there."""
 
@@ -103,6 +104,7 @@ class Walk:
         motion = Motion(
             float(record.time[0]), np.array(record.q[0]), rows.y[0].copy(), rows.start_anchors(), tangent
         )  # fmt: skip
+        self._take_written(0)
         mode = self.mode(0, motion)
         found, row, last, looked = list[Instant](), 0, len(record.time) - 1, set[int]()
         rates = self._restarted(motion, mode, 0)
@@ -120,6 +122,7 @@ class Walk:
                 )
             if same and row + 2 not in rows.events:
                 row, fresh = row + 1, True  # a boundary in time, where the scheme starts again
+                self._take_written(row)
                 rates = self._restarted(motion, mode, row)
                 memory = self.steps.start(motion, mode, rates)
                 continue
@@ -137,15 +140,23 @@ class Walk:
                 instant = self._event(motion, memory, mode, row + 1)
                 found.append(instant)
                 row, motion, fresh = row + 2, instant.after, True
+                self._take_written(row)
                 mode = self.mode(row, motion)
                 rates = self._restarted(motion, mode, row)
                 memory = self.steps.start(motion, mode, rates)
                 continue
-            fixed = row + 1 == last or record.time[row + 2] == record.time[row + 1]
-            dh = -motion.tangent.t if fixed else np.zeros_like(motion.tangent.t)
+            dh = -motion.tangent.t if rows.is_fixed(row + 1) else np.zeros_like(motion.tangent.t)
             motion, memory = self.steps.along(motion, memory, mode, row + 1, dh, fresh)
             row, fresh = row + 1, False
+        if self._written:
+            raise refused(f"a controller wrote parameters at t = {record.time[min(self._written)]:.9g} s within a step")
         return Passed(motion, mode, memory.rates if not fresh else rates, found)
+
+    def _take_written(self, row: int) -> None:
+        """From a row on, take the parameters that controllers wrote there, which are held as they are."""
+        values = self._written.pop(row, None)
+        if values is not None:
+            self.programs.values = values
 
     def _restarted(self, motion: Motion, mode: Mode, row: int) -> Rates:
         """Consistent rates at a row, which are those that it holds."""

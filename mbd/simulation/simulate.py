@@ -64,6 +64,7 @@ def simulate(
     on_failure: Literal["raise", "return"] = "raise",
     rest_speed: float = REST_SPEED,
     wrt: Sequence[str | Mapping[str, Mapping[str, float]]] | None = None,
+    controllers: Literal["held"] | None = None,
     backend: str = "auto",
 ) -> Trajectory:
     """Integrate a model from a state.
@@ -104,6 +105,8 @@ def simulate(
     wrt : what the final state and its instant are differentiated by, into `run.sensitivities`: coordinates and rates of
         the start, parameters, rates of several parameters by one quantity; see `mbd.sensitivities`, which takes
         functions of parameters and other results too. Contacts are then treated by 'events'
+    controllers : with `wrt`: 'held' differentiates with what controllers wrote held as it was, without their feedback;
+        by default their models have no derivatives. They act in the run whatever this is
     backend : 'auto', 'llvm' or 'python' (the plain twin, slow)
 
     Returns
@@ -128,7 +131,9 @@ def simulate(
     changed = {**start.parameters, **(parameters or {})}
     by_user = called_from_outside()
     if wrt is not None:
-        model, start = _differentiable(model, start, changed, wrt, options)
+        model, start = _differentiable(model, start, changed, wrt, options, controllers)
+    elif controllers is not None:
+        raise ModelError("controllers= is for derivatives by wrt=; controllers act in every run; leave it out")
     motion = _Motion(
         model, start, scheme, until, changed, options, observers, "late" if by_user and progress is None else progress
     )
@@ -139,12 +144,12 @@ def simulate(
     if problem and on_failure == "raise":
         raise _failure(problem, trajectory, run.cause)
     if wrt is not None and not problem:
-        _differentiate(trajectory, wrt)
+        _differentiate(trajectory, wrt, getattr(model, "controllers", ()))
     return trajectory
 
 
 def _differentiable(
-    model: Any, start: State, changed: Mapping[str, float], wrt: Any, options: dict[str, Any]
+    model: Any, start: State, changed: Mapping[str, float], wrt: Any, options: dict[str, Any], controllers: Any
 ) -> tuple[Any, State]:
     """The model with what it is differentiated by as inputs, the start without memory; contacts by events."""
     from mbd.sensitivity.sensitivities import with_inputs
@@ -152,18 +157,18 @@ def _differentiable(
     if options["contact"] == "nonsmooth" or options["store"] != 1 or options["locate"] != "root":
         raise CapabilityError("wrt= needs contact='events', locate='root' and store=1; leave these out")
     options["contact"] = "events"
-    model = with_inputs(model, options["backend"], changed, wrt)
+    model = with_inputs(model, options["backend"], changed, wrt, controllers)
     if any(callable(rate) for each in wrt if not isinstance(each, str) for by in each.values() for rate in by.values()):
         raise ModelError("wrt takes rates of parameters here, such as 9.8; mbd.sensitivities(…, at=…) takes functions")
     return model, replace(start, memory=None)
 
 
-def _differentiate(run: Trajectory, wrt: Any) -> None:
+def _differentiate(run: Trajectory, wrt: Any, controllers: Sequence[Any]) -> None:
     """Give a run its derivatives."""
     from mbd.sensitivity.sensitivities import derivatives_of
 
     try:
-        run.record.stats["sensitivities"] = derivatives_of(run, wrt).as_words()
+        run.record.stats["sensitivities"] = derivatives_of(run, wrt, controllers=controllers).as_words()
     except CapabilityError as error:
         error.run = run
         raise

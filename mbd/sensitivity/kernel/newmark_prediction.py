@@ -105,7 +105,9 @@ def predict_more(
     n_v = S[PLACES]
     m = S[ROWS]
     w = S[WIDTH]
-    stretch = h / memory[2 * n + S[ALL_ROWS] + 2 * n_v]
+    at = 2 * n + S[ALL_ROWS]
+    last = memory[at + 2 * n_v]
+    stretch = h / last
     cube = stretch * stretch * stretch
     for i in range(n):
         ahead = rate[k * n + i] + h * memory[n + i]
@@ -114,6 +116,8 @@ def predict_more(
         by_h = memory[n + i]
         speed = (1.0 - c[GAMMA]) * work[i] + c[GAMMA] * a1
         way = y[k * n + i] + 2.0 * h * ((0.5 - c[BETA]) * work[i] + c[BETA] * a1)
+        if i < n_v:
+            way += (3.0 * memory[at + i] + 4.0 * stretch * memory[at + n_v + i]) * stretch * stretch / last
         for j in range(w):
             of_rate = X[i * w + j] + h * X[(2 * n + i) * w + j] + by_h * dh[j]
             Z1[(n_v + n + i) * w + j] = of_rate
