@@ -26,7 +26,7 @@ __all__ = ["HELD", "Rows", "RunRows", "refused"]
 
 Rows = tuple[Vector, Matrix, Matrix, Matrix, Matrix]
 """Times, q, y, rates and multipliers of rows that follow each other."""
-HELD = "mbd.sensitivities(…, controllers='held') leaves it out: what controllers wrote is then held as it was"
+HELD = "mbd.sensitivities(…, controllers='held') leaves that out: what they wrote is then held as it was"
 """What may be asked for where controllers are refused."""
 
 

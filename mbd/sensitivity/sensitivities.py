@@ -15,7 +15,7 @@ from mbd.sensitivity.derivative import passed
 from mbd.sensitivity.functions import rates_of_parameters
 from mbd.sensitivity.outputs import lines_of, usual
 from mbd.sensitivity.result import Sensitivities
-from mbd.sensitivity.run_data import refused
+from mbd.sensitivity.run_data import HELD, refused
 from mbd.sensitivity.sequence import amounts_of, changed_sequences
 from mbd.sensitivity.starts import restitution_names, start_names
 from mbd.simulation.simulate import REST_SPEED, simulate
@@ -222,7 +222,7 @@ def _check_controllers(own: Sequence[Any], asked: Any, names: Collection[str]) -
         them = ", ".join(repr(each.name) for each in own)
         raise refused(
             f"its controllers ({them}) change parameters as they read results, which is not differentiated",
-            "controllers='held' leaves it out: what they wrote is then held as it was",
+            HELD,
         )
     for each in own:
         for name in each.writes:

@@ -127,7 +127,7 @@ def test_what_is_not_differentiated_through_controllers_is_named():
     settings = {"dt": 0.02, "until": 0.3}
     held = {"controllers": "held", **settings}
     for run in (mbd.sensitivities, mbd.simulate):
-        with pytest.raises(mbd.CapabilityError, match=r"\('winch'\) .* controllers='held' leaves it out"):
+        with pytest.raises(mbd.CapabilityError, match=r"\('winch'\) .* controllers='held'\) leaves that out"):
             run(model, start, wrt=names, **settings)
         with pytest.raises(mbd.CapabilityError, match="'rod.center' is held as 'winch' writes it"):
             run(model, start, wrt=["rod.center"], **held)
