@@ -18,7 +18,7 @@ from mbd.gait.cycle import LimitCycle
 from mbd.gait.limit_cycle import FIRST, map_of
 from mbd.gait.outcome import Outcome
 from mbd.gait.return_map import ReturnMap
-from mbd.gait.search import Failed, Search, first_return, on_section, search, with_step
+from mbd.gait.search import Failed, Search, fallen_first, first_return, on_section, search, with_step
 from mbd.integrators import Integrator, RungeKutta853
 from mbd.notebook import table
 from mbd.state import State
@@ -116,7 +116,7 @@ class _Hunt:
             if given is None:
                 given, _ = with_step(Search(self.map, begun[0], self.tol), state, all_values, self.dt)
         assert given is not None
-        gait = search(given, state, all_values)
+        gait = fallen_first(search(given, state, all_values), start, all_values)
         if not gait.success:
             return gait.outcome, -1
         self.given = given

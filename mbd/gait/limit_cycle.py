@@ -15,7 +15,7 @@ from mbd.gait.cycle import LimitCycle
 from mbd.gait.floquet import Multipliers
 from mbd.gait.mirror import mirror_of, require_alike
 from mbd.gait.return_map import ReturnMap
-from mbd.gait.search import Failed, Search, first_return, search, with_step
+from mbd.gait.search import Failed, Search, fallen_first, first_return, search, with_step
 from mbd.gait.section import Chart, section_of
 from mbd.gait.unmoved import depends_on_time, moving_on
 from mbd.integrators import Integrator, RungeKutta853
@@ -152,7 +152,7 @@ def _found(map_: ReturnMap, start: State, dt: float | None, tol: float) -> Limit
         return _none(map_, begun)
     section, state = begun
     given, _ = with_step(Search(map_, section, tol), state, map_.values, dt)
-    return search(given, state, map_.values)
+    return fallen_first(search(given, state, map_.values), start, map_.values)
 
 
 def _none(map_: ReturnMap, failed: Failed) -> LimitCycle:

@@ -259,17 +259,21 @@ class ReturnMap:
         """The outcome with falls named; makes the run once more where that needs its rows."""
         if outcome.kind not in ("other event", "misses", "numerical error"):
             return outcome
-        values = self.values if values is None else values
+        return self.fall(state, self.values if values is None else values) or outcome
+
+    def fall(self, state: State, values: Values) -> Outcome | None:
+        """Whether a walker of one or two feet falls on the way of one return; makes the run again."""
+        if len(self.feet) > 2:
+            return None
         try:
             run = simulate(
                 self.model, replace(state, parameters={}), self.integrator, dt=self.dt,
                 until=(self.section, self.longest), contact="events", parameters=self.plain(values), progress=False,
                 on_failure="return", backend=self.backend,
             )  # fmt: skip
-            stance = next((name for name in self.feet if name in state.mode.closed), "")
-            return fall_of(run, stance) or outcome
+            return fall_of(run, next((name for name in self.feet if name in state.mode.closed), ""))
         except MbdError:
-            return outcome
+            return None
 
     def against(self, section: Section, arrival: Arrival) -> Outcome:
         """The outcome, where other contacts are closed than on the section a name for that."""

@@ -18,7 +18,7 @@ from mbd.gait.return_map import Arrival, ReturnMap, Values
 from mbd.gait.section import Chart, Section, section_of
 from mbd.state import State
 
-__all__ = ["Failed", "Search", "first_return", "gait_at", "search"]
+__all__ = ["Failed", "Search", "fallen_first", "first_return", "gait_at", "search"]
 
 FIRST_STEPS, HALVINGS = 11.8, 9
 """Steps of the first return that is tried, no whole number lest its event fall on the end of a step, where light bodies
@@ -107,6 +107,12 @@ def search(given: Search, start: State, values: Values, near: tuple[Chart, Matri
     map_, tol = given.map, given.tol
     map_.runs = 0
     return gait_at(given, fixed_point(map_, given.section, start, values, tol, near), values)
+
+
+def fallen_first(found: LimitCycle, start: State, values: Values) -> LimitCycle:
+    """A search that failed, as a fall if the walker fell from its start before it came to the section otherwise."""
+    fall = None if found.success else found.map.fall(start, values)
+    return found if fall is None else replace(found, outcome=fall, attempts=(fall, *found.attempts))
 
 
 def gait_at(given: Search, point: FixedPoint, values: Values) -> LimitCycle:

@@ -209,6 +209,7 @@ def test_a_walk_that_falls_scuffs_or_never_strikes_says_so():
         return str(found.outcome)
 
     assert outcome(0.2187, -0.3234, -0.5, -0.2).startswith("falls backward at ")
+    assert outcome(0.2187, -0.3234, -0.1, 0.0).startswith("falls backward at ")  # and strikes when it is down
     assert outcome(0.2187, -0.3234, -2.5, -0.3).startswith("falls forward at ")
     assert "does not happen within 0.1 s" in outcome(0.2187, -0.3234, -1.1, -0.4, longest=0.1)
 
