@@ -50,8 +50,9 @@ def sensitivities(
 
     Every step is differentiated as the implicit function that it is at its converged solution, every event with the
     shift of its instant, ``δt* = −(g_y δy + g_p δp)/ġ``, every impact with the rows that took part in it (the saltation
-    matrix: Leine & Nijmeijer 2004, Dynamics and Bifurcations of Non-Smooth Mechanical Systems, ch. 7). So these are the
-    derivatives of what the run prints, whatever its steps. Step sizes that follow `tol` are held as they were.
+    matrix: Leine & Nijmeijer 2004, Dynamics and Bifurcations of Non-Smooth Mechanical Systems, ch. 7), phase by phase
+    where its law has several. So these are the derivatives of what the run prints, whatever its steps. Step sizes that
+    follow `tol` are held as they were.
 
     Parameters
     ----------

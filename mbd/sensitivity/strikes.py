@@ -11,7 +11,9 @@ from mbd.arrays import Vector
 from mbd.equations.equations import Contact
 from mbd.results.record import EventRecord
 from mbd.sensitivity.balance import Impact, impact
+from mbd.sensitivity.impact_laws import Struck, poisson, sequential
 from mbd.sensitivity.motion import Mode, Motion
+from mbd.sensitivity.phases import MOVES, OneSided, Unknown
 from mbd.sensitivity.programs import Programs, State
 from mbd.sensitivity.run_data import RunRows, refused
 
@@ -22,37 +24,74 @@ ACCOUNTED = 1e-7
 
 
 def struck(
-    rows: RunRows, programs: Programs, before: Motion, mode: Mode, events: Sequence[EventRecord], row: int,
+    rows: RunRows, programs: Programs, before: Motion, mode: Mode, events: Sequence[EventRecord], row: int, fired: int,
     restitutions: Mapping[str, Vector],
-) -> tuple[Motion, Impact]:  # fmt: skip
-    """The motion after the impact of the contacts that close at a row, and the impact.
+) -> Motion:  # fmt: skip
+    """The motion after the impact of the contacts that close at a row, one of which, number `fired`, brought it about.
 
     restitutions : rates (D,) of those of contacts, by name
 
-    Its rows are those of bilateral constraints, of contacts that stay or close and push, and of frictions that stick.
+    By Newton's law its rows are those of bilateral constraints, of contacts that stay or close and push, and of
+    frictions that stick; by the other laws the impact is made again phase by phase.
     """
-    after = rows.y[row]
+    after, contacts = rows.y[row], programs.equations.contacts
     impulses = impulses_by_row(programs, events)
     closing = {event.name for event in events if event.kind == "closed"}
-    tried, law = [], rows.record.settings.get("impact", "newton")
-    if law != "newton" and closing & set(restitutions):
-        raise refused(f"restitutions are differentiated under impact='newton', not {law!r}")
-    bounces = {
-        each.rows[0]: restitutions[each.name] for each in programs.equations.contacts if each.name in restitutions
-    }
+    tried, law, why = list[float](), str(rows.record.settings.get("impact", "newton")), ""
+    names = " and ".join(repr(name) for name in sorted(closing))
+    told = f"the impact of {names} at t = {before.t:.9g} s (law {law!r}): "
+    who = _partners(rows, programs, mode, closing, restitutions)
+    if law != "newton" and len(who.touched) > (1 if law == "sequential" else 0):
+        try:
+            _refuse_chance(programs, before, mode, who, fired)
+            moved = (sequential if law == "sequential" else poisson)(programs, before, mode, who)
+            tried.append(float(np.max(np.abs(moved.y - after)) / np.max(np.abs(before.y))))
+            if tried[0] <= ACCOUNTED:
+                return replace(moved, y=after)
+        except Unknown as reason:
+            why = str(reason)
+            if isinstance(reason, OneSided) and not any(contacts[c].restitution for c in who.closing):
+                raise refused(told + why) from None
+    bounces = {contacts[c].rows[0]: rate for c, rate in who.of_e.items()}
     end = replace(before, y=after).at(rows.mode(row), np.zeros(programs.columns.n), np.zeros(programs.columns.rows))
-    for slow in (False, True):
+    for slow in (True,) if tried or why else (False, True):  # what comes to rest does so at once, by every law
         what = _rows_of(rows, mode, impulses, closing, end, slow, programs)
         moved, found = impact(programs, before, after, mode, what, {} if slow else bounces)
         tried.append(found.misfit)
         if found.misfit <= ACCOUNTED:
-            return moved, found
-    names = " and ".join(repr(name) for name in sorted(closing))
-    raise refused(
-        f"the impact of {names} at t = {before.t:.9g} s (law {law!r}) is not one that reverses gap rates by their "
-        f"restitution once; its velocities differ by {min(tried):.2g} of them",
-        "take impact='newton'" if law != "newton" else "",
-    )
+            return moved
+    instead = "" if law == "newton" or why else "take impact='newton'"
+    raise refused(told + (why or f"its velocities differ by {min(tried):.2g} from those of its law"), instead)
+
+
+def _partners(
+    rows: RunRows, programs: Programs, mode: Mode, closing: set[str], restitutions: Mapping[str, Vector]
+) -> Struck:
+    """Who takes part in an impact of Poisson's law or the sequential one."""
+    contacts = [(c, each) for c, each in enumerate(programs.equations.contacts) if each.kind != "penalty"]
+    closed = frozenset(c for c, each in contacts if each.name in closing)
+    touched = closed | {
+        c for c, each in contacts
+        if mode.closed[c] and not any(name in closing and not late for name, late in each.when)
+    }  # fmt: skip
+    of_e = {c: restitutions[each.name] for c, each in contacts if each.name in restitutions}
+    return Struck(touched, closed, of_e, rows.manager.trivial)
+
+
+def _refuse_chance(programs: Programs, before: Motion, mode: Mode, who: Struck, fired: int) -> None:
+    """Contacts that close with the one that fired, and a direction moves them apart."""
+    contacts, zero = programs.equations.contacts, (np.zeros(programs.columns.n), np.zeros(programs.columns.rows))
+    slopes = programs.watched(before.at(mode, *zero))[1][: len(contacts)]
+    Z = before.tangent.stacked(programs.columns)
+    found = []
+    for c in sorted(who.closing - {fired}):
+        terms = np.abs(slopes[c]) @ np.abs(Z)
+        if not mode.closed[c] and np.any(np.abs(slopes[c] @ Z) > MOVES * terms + 1e-12 * np.max(terms)):
+            found.append(repr(contacts[c].name))
+    if found:
+        raise OneSided(
+            f"{' and '.join(found)} may touch in it or not, which a change decides: it has derivatives on one side only"
+        )
 
 
 def impulses_by_row(programs: Programs, events: Sequence[EventRecord]) -> Vector:

@@ -257,7 +257,7 @@ class Walk:
         closing = fired.kind == "closed" and equations.contacts[fired.number].kind != "penalty"
         motion = before
         if closing:
-            motion, _ = struck(self.rows, self.programs, before, mode, events, row, self.restitutions)
+            motion = struck(self.rows, self.programs, before, mode, events, row, fired.number, self.restitutions)
         elif fired.kind == "event" and equations.guards[fired.number].reset is not None:
             row_after = np.array(self.record.q[row]), self.rows.y[row]
             there = consistent_rates(self.programs, before, mode, rates)
