@@ -66,6 +66,8 @@ def poisson(programs: Programs, before: Motion, mode: Mode, who: Struck) -> Moti
             parting.add(c)
         elif np.any(of_given[row]):
             raise OneSided(f"the restitution of {contacts[c].name!r} is 0, and has a derivative on one side only")
+    if not parting:
+        return first.motion
     law = Law(held - parting, free - parting, given=given, of_given=of_given, parting=frozenset(parting))
     return chosen(programs, first.motion, mode, law, who.trivial).motion
 

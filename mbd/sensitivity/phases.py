@@ -110,7 +110,8 @@ def _phase(programs: Programs, before: Motion, mode: Mode, choice: Choice, law: 
     here = replace(mode, rows=picked, held=picked, slip=choice.slip)
     here = independent(programs, before, here, np.zeros(n), none[0])
     rows = list(here.rows)
-    if any(programs.equations.rows[k].contact >= 0 for k in set(picked) - set(rows)):
+    shared = [programs.equations.rows[k] for k in picked if k not in rows]
+    if any(row.contact >= 0 and row.friction < 0 for row in shared):  # frictions share theirs, which moves nothing
         raise Unknown("rows of its contacts depend on each other, which may share their impulses in several ways")
     here = replace(here, held=(*rows, *(int(k) for k in np.flatnonzero(given))))
     _, _, speed0, bare0, _, of_speed0 = programs.steps(before.at(here, np.zeros(n), none[0]))
