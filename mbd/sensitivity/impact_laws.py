@@ -115,8 +115,8 @@ def sequential(programs: Programs, before: Motion, mode: Mode, who: Struck) -> M
 def _refuse_ties(names: Sequence[str], changes: Sequence[Vector], terms: Vector) -> None:
     """Contacts approach equally fast, and a direction tells one of them from another."""
     if any(np.any(np.abs(change - changes[0]) > MOVES * terms) for change in changes[1:]):
-        told = " and ".join(repr(name) for name in names)
+        listed = " and ".join(repr(name) for name in names)
         raise OneSided(
-            f"{told} approach equally fast in its sequence, and a change decides which strikes first: it has "
+            f"{listed} approach equally fast in its sequence, and a change decides which strikes first: it has "
             "derivatives on one side only"
         )

@@ -225,8 +225,10 @@ def _faults(programs: Programs, phase: Phase, mode: Mode, choice: Choice, law: L
 
 def undecided(names: Collection[str]) -> str:
     """That a change however small decides what these do."""
-    told = " and ".join(repr(name) for name in dict.fromkeys(names))
-    return f"{told} may go on in either of two ways in it, which a change decides: it has derivatives on one side only"
+    listed = " and ".join(repr(name) for name in dict.fromkeys(names))
+    return (
+        f"{listed} may go on in either of two ways in it, which a change decides: it has derivatives on one side only"
+    )
 
 
 def _turned(choice: Choice, kind: str, k: int, law: Law, phase: Phase, programs: Programs) -> Choice:

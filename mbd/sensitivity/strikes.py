@@ -39,7 +39,7 @@ def struck(
     closing = {event.name for event in events if event.kind == "closed"}
     tried, law, why = list[float](), str(rows.record.settings.get("impact", "newton")), ""
     names = " and ".join(repr(name) for name in sorted(closing))
-    told = f"the impact of {names} at t = {before.t:.9g} s (law {law!r}): "
+    which = f"the impact of {names} at t = {before.t:.9g} s (law {law!r}): "
     who = _partners(rows, programs, mode, closing, restitutions)
     if law != "newton" and len(who.touched) > (1 if law == "sequential" else 0):
         try:
@@ -51,7 +51,7 @@ def struck(
         except Unknown as reason:
             why = str(reason)
             if isinstance(reason, OneSided) and not any(contacts[c].restitution for c in who.closing):
-                raise refused(told + why) from None
+                raise refused(which + why) from None
     bounces = {contacts[c].rows[0]: rate for c, rate in who.of_e.items()}
     end = replace(before, y=after).at(rows.mode(row), np.zeros(programs.columns.n), np.zeros(programs.columns.rows))
     for slow in (True,) if tried or why else (False, True):  # what comes to rest does so at once, by every law
@@ -61,7 +61,7 @@ def struck(
         if found.misfit <= ACCOUNTED:
             return moved
     instead = "" if law == "newton" or why else "take impact='newton'"
-    raise refused(told + (why or f"its velocities differ by {min(tried):.2g} from those of its law"), instead)
+    raise refused(which + (why or f"its velocities differ by {min(tried):.2g} from those of its law"), instead)
 
 
 def _partners(
