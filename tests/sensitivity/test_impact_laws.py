@@ -162,7 +162,7 @@ def test_restitutions_of_every_contact_are_parameters(law):
     assert found.matrix == pytest.approx(wanted, abs=1e-8 * np.max(np.abs(wanted)))
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", ["newton", *LAWS])
 def test_contacts_that_touch_by_chance_are_named(law):
     model = SCENES["chain"][0]
     with pytest.raises(mbd.CapabilityError, match=r"'c1' may touch .* one side"):
