@@ -19,14 +19,10 @@ def walker(knee_loss):
         shank = mbd.Link(f"{side} shank", mass=shank_mass, length=0.4236, center=0.1834)
         knee = mbd.Revolute(f"{side} knee", thigh.end, shank.start, loss=loss)
         model.connect(mbd.Revolute(f"{side} hip", hip.origin, thigh.start), knee)
-        lock, strike, late = (
-            f"{side} knee lock",
-            mbd.When(f"{other} foot"),
-            mbd.When(f"{other} foot", after_impact=True),
-        )
+        lock, strike = f"{side} knee lock", f"{other} foot"
         model.constrain(
-            mbd.Unilateral(f"{side} foot", mbd.touchdown(shank.end), release=strike, only_while=lock),
-            mbd.Unilateral(lock, mbd.flexion(knee), release=late),
+            mbd.Unilateral(f"{side} foot", mbd.touchdown(shank.end), release=mbd.When(strike), only_while=lock),
+            mbd.Unilateral(lock, mbd.flexion(knee), release=mbd.When(strike, after_impact=True)),
         )
     angles = {"left hip.angle": 0.302, "right hip.angle": -0.302}
     rates = {"left hip.angle": -1.193, "right hip.angle": -0.451}
