@@ -15,9 +15,10 @@ from mbd.errors import ModelError
 from mbd.notes import PROCESS, doubt
 from mbd.topology.check import parameter_check
 
-__all__ = ["mechanism_of", "require_model"]
+__all__ = ["mechanism_of", "require_model", "tunable_model"]
 
 _KNOWN: WeakKeyDictionary[Any, dict[tuple[str, frozenset[str]], tuple[Any, Mechanism]]] = WeakKeyDictionary()
+_TUNABLE: WeakKeyDictionary[Any, dict[frozenset[str], tuple[Any, Any]]] = WeakKeyDictionary()
 _LOCK = threading.Lock()
 free_in_child(_LOCK)
 
@@ -77,6 +78,19 @@ def mechanism_of(
     wanted |= {name for name, value in (changed or {}).items() if values.get(name) != value}
     structural = frozenset(name for name in wanted - present if name in values) | (frozenset(inputs) - present)
     return _mechanism(model, backend, structural) if structural else mechanism
+
+
+def tunable_model(model: Any, names: Collection[str]) -> Any:
+    """The model with more run-time inputs, the same one until the model changes, so that it is derived once."""
+    now, wanted = _description(model), frozenset(names)
+    with _LOCK:
+        known = _TUNABLE.setdefault(model, {}).get(wanted)
+    if known is not None and _same(known[0], now):
+        return known[1]
+    found = model.with_tunable(*sorted(wanted))
+    with _LOCK:
+        _TUNABLE[model][wanted] = (now, found)
+    return found
 
 
 def _mechanism(model: Any, backend: str, tunable: frozenset[str]) -> Mechanism:

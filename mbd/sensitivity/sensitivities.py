@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any, Literal
 
 from mbd.bodies.values import among, is_number, shown
-from mbd.compile.mechanisms import mechanism_of
+from mbd.compile.mechanisms import mechanism_of, tunable_model
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.integrators import Integrator
 from mbd.results.units import unit
@@ -246,4 +246,4 @@ def with_inputs(model: Any, backend: str, changed: Mapping[str, float], wrt: Any
                 "wrt: " + nearest(name, known, "coordinate, rate of the start or parameter", "There are")
             )
     more = [name for name in (*single, *grouped) if name in folded and name not in inputs and name not in own]
-    return model.with_tunable(*more) if more else model
+    return tunable_model(model, more) if more else model

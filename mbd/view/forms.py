@@ -86,7 +86,7 @@ class Mesh:
 def mesh(kind: str) -> Mesh:
     """The facets of a 'box', a 'cylinder' along z, a 'ball', a 'cone' or 'capsule' along z, or a 'wheel' about z.
 
-    A wheel is a ring with a marked spoke along x and another one against it.
+    A wheel is a rim with a marked spoke along x and another one against it.
 
     Of a capsule normals are places on the unit ball, and ``at − normal`` is the end, (0, 0, ±1), that they belong to:
     radius r and half length h give ``r normal + h (at − normal)``.
@@ -106,17 +106,17 @@ def _box() -> Mesh:
     return Mesh(np.concatenate(turns), np.concatenate(normals), np.concatenate(faces), marked)
 
 
-def _rings(heights: Sequence[float], radii: Sequence[float], count: int) -> Matrix:
-    """Rings about z, (rings, count + 1, 3); the last corner of each is the first again."""
+def _circles(heights: Sequence[float], radii: Sequence[float], count: int) -> Matrix:
+    """Circles about z, (circles, count + 1, 3); the last corner of each is the first again."""
     angle = np.linspace(0.0, 2.0 * np.pi, count + 1)
     circle = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     tops = [np.column_stack([r * circle, np.full(count + 1, z)]) for z, r in zip(heights, radii, strict=True)]
     return np.array(tops)
 
 
-def _walls(rings: int, count: int) -> NDArray[np.int64]:
-    """Two faces between each pair of neighbors on two rings that follow each other upwards."""
-    k, n = np.meshgrid(np.arange(rings - 1), np.arange(count), indexing="ij")
+def _walls(circles: int, count: int) -> NDArray[np.int64]:
+    """Two faces between each pair of neighbors on two circles that follow each other upwards."""
+    k, n = np.meshgrid(np.arange(circles - 1), np.arange(count), indexing="ij")
     low, wide = (k * (count + 1) + n).ravel(), count + 1
     return np.concatenate([
         np.column_stack([low, low + 1, low + wide + 1]), np.column_stack([low, low + wide + 1, low + wide])
@@ -124,15 +124,15 @@ def _walls(rings: int, count: int) -> NDArray[np.int64]:
 
 
 def _round(heights: Sequence[float], shifts: Sequence[float], count: int, marks: bool) -> Mesh:
-    """A ball cut at heights of itself, whose rings are shifted along z."""
-    rings = _rings(heights, [np.sqrt(max(1.0 - z * z, 0.0)) for z in heights], count)
-    places = rings + np.array([[[0.0, 0.0, shift]] for shift in shifts])
+    """A ball cut at heights of itself, whose circles are shifted along z."""
+    circles = _circles(heights, [np.sqrt(max(1.0 - z * z, 0.0)) for z in heights], count)
+    places = circles + np.array([[[0.0, 0.0, shift]] for shift in shifts])
     faces = _walls(len(heights), count)
     corners = places.reshape(-1, 3)[faces]
     faces = faces[np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) > 1e-9]
-    middle = rings.reshape(-1, 3)[faces].mean(axis=1)
+    middle = circles.reshape(-1, 3)[faces].mean(axis=1)
     marked = np.prod(np.where(middle > 0.0, 1.0, -1.0), axis=1) < 0.0
-    return Mesh(places.reshape(-1, 3), rings.reshape(-1, 3), faces, marked & marks)
+    return Mesh(places.reshape(-1, 3), circles.reshape(-1, 3), faces, marked & marks)
 
 
 def _ball() -> Mesh:
@@ -147,13 +147,13 @@ def _capsule() -> Mesh:
 
 def _cylinder() -> Mesh:
     count = 32
-    rings = _rings([-1.0, 1.0], [1.0, 1.0], count)
-    side = rings.reshape(-1, 3)
+    circles = _circles([-1.0, 1.0], [1.0, 1.0], count)
+    side = circles.reshape(-1, 3)
     angle = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False) + np.pi / count
     quarter = np.cos(angle) * np.sin(angle) < 0.0
     places, normals = [side], [side * [1.0, 1.0, 0.0]]
     faces, marked = [_walls(2, count)], [np.tile(quarter, 2)]
-    for sign, circle in zip((-1.0, 1.0), rings, strict=True):
+    for sign, circle in zip((-1.0, 1.0), circles, strict=True):
         start, n = sum(map(len, places)), np.arange(count)
         pair = (n, n + 1) if sign > 0.0 else (n + 1, n)
         places.append(np.vstack([circle, [0.0, 0.0, sign]]))
@@ -165,7 +165,7 @@ def _cylinder() -> Mesh:
 
 def _cone() -> Mesh:
     count, slope = 20, np.sqrt(0.2)
-    circle = _rings([-1.0], [1.0], count)[0]
+    circle = _circles([-1.0], [1.0], count)[0]
     flat = circle * [1.0, 1.0, 0.0]
     sides = 2.0 * slope * flat + [0.0, 0.0, slope]
     n, wide = np.arange(count), count + 1
@@ -177,7 +177,7 @@ def _cone() -> Mesh:
 
 def _wheel() -> Mesh:
     count, inner = 40, 0.86
-    circle, parts = _rings([-1.0, 1.0], [1.0, 1.0], count), []
+    circle, parts = _circles([-1.0, 1.0], [1.0, 1.0], count), []
     around = circle * [1.0, 1.0, 0.0]
     walls, turned = _walls(2, count), _walls(2, count)[:, ::-1]
     shrunk = circle * [inner, inner, 1.0]

@@ -81,6 +81,20 @@ def test_a_folded_parameter_becomes_an_input():
     assert found.run["rod.mass"][-1] == 1.0 and abs(found["hinge.angle", "rod.mass"]) > 1e-3
 
 
+def test_a_folded_parameter_is_derived_for_once():
+    model = mbd.Model("swing")
+    rod = mbd.Link("rod", mass=1.0, length=1.0, center=0.5)
+    model.connect(mbd.Revolute("pin", model.ground.origin, rod.start))
+    start = mbd.assemble(model, {"pin.angle": 0.5})
+    ask = {"dt": 0.01, "until": 0.1, "wrt": ["rod.mass"]}
+    one, two = (mbd.sensitivities(model, start, **ask).run.record.equations for _ in range(2))
+    model.constrain(mbd.Event("below", mbd.measure(lambda angle: angle, "pin.angle")))
+    assert (
+        two is one
+        and mbd.sensitivities(model, mbd.assemble(model, {"pin.angle": 0.5}), **ask).run.record.equations is not one
+    )
+
+
 def test_after_an_event_derivatives_have_its_shift():
     """Others' derivative of a state behind an event left out that the event comes later (diffrax, issue 729)."""
     model = ball(restitution=1.0)
