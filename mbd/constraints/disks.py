@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,6 +12,7 @@ from mbd.bodies.domains import Domain, positive
 from mbd.bodies.ground import Ground
 from mbd.bodies.values import Vector3, number, unit_vector
 from mbd.constraints.measure import Measure
+from mbd.constraints.slip import slip_along
 from mbd.constraints.surfaces import Plane
 from mbd.errors import ModelError
 from mbd.forces.base import frame_of
@@ -39,7 +41,10 @@ def to_edge(center: Frame, axis: Vector3, radius: Scalar, ground: Plane, scope: 
 
 @dataclass(frozen=True)
 class DiskTouchdown(Measure):
-    """``g = n · s_C − r |n × a|`` of the edge of a thin disk; see `disk_touchdown`."""
+    """``g = n · s_C − r |n × a|`` of the edge of a thin disk, and the slip ``v_C + ω × e − v_P`` of its lowest point.
+
+    Where that velocity is zero the disk rolls; no posture tells that, so that its rows are rows on velocities.
+    """
 
     center: Frame
     radius: float
@@ -56,6 +61,20 @@ class DiskTouchdown(Measure):
     def unit(self) -> str:
         """'m'."""
         return "m"
+
+    @property
+    def has_slip_velocities(self) -> bool:
+        """True."""
+        return True
+
+    def slip_velocities(self, scope: Scope) -> Sequence[tuple[str, Scalar]]:
+        """Forward and sideways on the plane, without the one in which nothing moves (in a planar model sideways)."""
+        return slip_along(self.ground, self.center, self.edge_arm(scope), scope)
+
+    def edge_arm(self, scope: Scope) -> Triple:
+        """From the center to the lowest point of the edge, in ground axes [m]."""
+        radius = scope.parameter(self.center.full_name, "radius", self.radius)
+        return to_edge(self.center, self.axis, radius, self.ground, scope)
 
     def mentions(self) -> list[Mention]:
         """Its center, and the frame of the plane."""
@@ -82,8 +101,9 @@ def disk_touchdown(center: Frame, radius: float, axis: Any, ground: Any = None) 
     """Height of the edge of a thin disk over a plane, whichever way it leans: a coin, the wheel of a bicycle.
 
     ``g = n · s_C − r |n × a|`` with the place s_C of the center on the plane and the disk's axis a. A `Bilateral` keeps
-    the edge on the plane, a `Unilateral` with friction=0 lets it lift off; what keeps it from slipping is a `Rolling`
-    with the same axis. Lying flat, where it touches with all its edge, g has a kink: a run that comes there ends.
+    the edge on the plane, where a `Rolling` with the same axis makes it roll. A `Unilateral` lets it lift off: with
+    friction=None it rolls while it is closed, with μ its lowest point slides, grips and slips, with 0 it slides freely.
+    Lying flat, where it touches with all its edge, g has a kink: a run that comes there ends.
 
     Parameters
     ----------

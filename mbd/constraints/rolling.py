@@ -13,6 +13,7 @@ from mbd.bodies.ground import Ground
 from mbd.bodies.values import name_of, number, unit_vector
 from mbd.constraints.base import VelocityConstraint
 from mbd.constraints.disks import to_edge
+from mbd.constraints.slip import slip_along
 from mbd.constraints.surfaces import Plane
 from mbd.errors import CapabilityError, ModelError
 from mbd.forces.base import frame_of
@@ -119,15 +120,9 @@ class Rolling(VelocityConstraint):
 
     def _rows_of_disk(self, scope: Scope) -> Sequence[tuple[str, Scalar]]:
         """Velocity of the lowest point of the edge along the plane."""
-        motion, ground = scope.frame(self.center), self.ground
         radius = scope.parameter(self.name, "radius", self.radius)
-        arm = to_edge(self.center, self.axis, radius, ground, scope)
-        slip = total(motion.velocity, cross(motion.angular_velocity, arm))
-        if ground.is_moving:
-            slip = difference(slip, ground.velocity_at(total(motion.position, arm), scope))
-        directions = ground.directions(motion.position, scope)
-        named = zip(("forward", "sideways"), directions, strict=True)
-        return [(part, dot(ground.turned(direction, scope), slip)) for part, direction in named]
+        arm = to_edge(self.center, self.axis, radius, self.ground, scope)
+        return slip_along(self.ground, self.center, arm, scope)
 
     def mentions(self) -> list[Mention]:
         """Its center, and the frame of the plane."""

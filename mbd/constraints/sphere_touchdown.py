@@ -6,18 +6,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from mbd.bodies.algebra import cross, difference, dot, scaled, total
+from mbd.bodies.algebra import scaled
 from mbd.bodies.base import Frame
 from mbd.bodies.domains import Domain, positive
 from mbd.bodies.ground import Ground
 from mbd.bodies.values import number
 from mbd.constraints.measure import Measure
+from mbd.constraints.slip import slip_along
 from mbd.constraints.surfaces import Plane
 from mbd.errors import ModelError
 from mbd.forces.base import frame_of
 from mbd.forces.quantities import Mention
 from mbd.scope import Scope
-from mbd.tape.node import Node, Scalar
+from mbd.tape.node import Scalar
 
 __all__ = ["SphereTouchdown", "sphere_touchdown"]
 
@@ -49,17 +50,8 @@ class SphereTouchdown(Measure):
 
     def slip_velocities(self, scope: Scope) -> Sequence[tuple[str, Scalar]]:
         """Forward and sideways, without the one in which nothing moves (in a planar model sideways)."""
-        motion, up = scope.frame(self.center), self.ground.turned(self.ground.normal, scope)
-        arm = scaled(-1.0 * self._radius(scope), up)
-        lowest = total(motion.position, arm)
-        velocity = total(motion.velocity, cross(motion.angular_velocity, arm))
-        slip = difference(velocity, self.ground.velocity_at(lowest, scope))
-        directions = self.ground.directions(lowest, scope)
-        rows = [
-            (part, dot(self.ground.turned(t, scope), slip))
-            for part, t in zip(("forward", "sideways"), directions, strict=True)
-        ]
-        return [(part, row) for part, row in rows if isinstance(row, Node) and not row.is_constant]
+        arm = scaled(-1.0 * self._radius(scope), self.ground.turned(self.ground.normal, scope))
+        return slip_along(self.ground, self.center, arm, scope)
 
     def mentions(self) -> list[Mention]:
         """Its center, and the frame of the plane."""
