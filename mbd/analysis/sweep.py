@@ -23,6 +23,7 @@ from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.notebook import table
 from mbd.progress import share_bar
 from mbd.results.archive import named_file, write_whole
+from mbd.results.names import scalars
 from mbd.simulation.simulate import simulate
 from mbd.state import State
 
@@ -172,8 +173,8 @@ def sweep(
         in a tuple change together: ``{("left leg.mass", "right leg.mass"): [(5.0, 5.0), (5.0, 4.2)]}``, as those of
         the designs `latin_hypercube` and `sobol` do
     start : a state; or a function of the parameters that differ, by name, that assembles one
-    results : what to keep: names of quantities, whose value at the end of the run is kept, or functions by title,
-        ``{"top": lambda run: run["hip.angle"].max()}``
+    results : what to keep: names of quantities, whose value at the end of the run is kept, of a vector its components;
+        or functions by title, ``{"top": lambda run: run["hip.angle"].max()}``
     executor : any ``concurrent.futures.Executor``, for runs side by side: a ``ThreadPoolExecutor()`` (machine code runs
         without Python's lock), or a ``ProcessPoolExecutor()`` where model, start and functions can be pickled, whose
         processes derive a model once at most and take its machine code from the cache; with the extra dask also
@@ -200,7 +201,7 @@ def sweep(
     names = tuple(name for together, _ in dimensions for name in together)
     titles = _checked(model, names, start, results, executor, settings)
     cases = tuple(tuple(chain(*parts)) for parts in product(*(rows for _, rows in dimensions)))
-    runs = Runs(model, names, start, results, settings)
+    runs = Runs(model, names, start, results if isinstance(results, Mapping) else titles, settings)
     known = None if file is None else SweepFile(file, runs, getattr(model, "parameters", {}))
     with share_bar() if bar_wanted else nullcontext() as bar:
         rows, complete = _made(runs, cases, executor, known, bar)
@@ -299,7 +300,4 @@ def _checked(
     wrong = [nearest(n, [*known, *SETTINGS], "parameter", "There are") for n in values if n not in {*known, *SETTINGS}]
     if wrong:
         raise UnknownNameError(wrong)
-    if not isinstance(results, Mapping):
-        for name in results:
-            equations.output(name)
-    return list(results)
+    return list(results) if isinstance(results, Mapping) else [*scalars(equations, results)]

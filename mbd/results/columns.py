@@ -19,7 +19,7 @@ from mbd.results.dense import Restepping
 from mbd.results.dense_implicit import LedSteps
 from mbd.results.forces import Forces
 from mbd.results.interpolation import Grid
-from mbd.results.names import AXES, VECTORS, rate_name
+from mbd.results.names import AXES, rate_name, scalars_behind
 from mbd.results.orientations import ReadOff, read_off
 from mbd.results.polynomials import Places
 from mbd.results.record import Record, Rows
@@ -97,12 +97,8 @@ class Columns(ABC):
             raise TrajectoryError(f"a quantity is asked for by its name, such as 'hip.angle', not {name!r}")
         if name in self.names:
             return (name,)
-        for endings in VECTORS:
-            parts = tuple(name + ending for ending in endings)
-            if all(self.knows(part) for part in parts):
-                return parts
-        if self.knows(name):
-            return (name,)
+        if parts := scalars_behind(name, self.knows):
+            return parts
         raise UnknownNameError(nearest(name, (*self.names, *self.vectors), "result", "The run has"))
 
 

@@ -13,6 +13,7 @@ from mbd.bodies.values import flag, names_given, shown
 from mbd.errors import ModelError
 from mbd.integrators import HHT, Integrator
 from mbd.progress import share_bar
+from mbd.results.names import scalars
 from mbd.simulation.arguments import check_arguments
 from mbd.simulation.batch.result import Batch
 from mbd.simulation.batch.runner import Runner
@@ -58,7 +59,7 @@ def batch(
     dt : step [s]
     until : as for `simulate`: end time [s], name of an event, or (name, latest time)
     parameters : values that differ from the model's, by name: numbers, or columns with a value for each run
-    results : names of quantities to keep, at the end of each run
+    results : names of quantities to keep, at the end of each run; of a vector its components
     contact, impact, locate, rest_speed, backend : as for `simulate`
     workers : threads; by default as many as there are processors
     progress : True for a bar on a terminal
@@ -116,8 +117,7 @@ def _length(columns: Mapping[str, Vector]) -> int:
 
 def _table(runner: Runner, starts: Starts, results: tuple[str, ...], report: Callable[[int], None] | None) -> Batch:
     """The runs of a batch."""
-    for name in results:
-        runner.mechanism.equations.output(name)
+    results = scalars(runner.mechanism.equations, results)
     places, count, changes = places_of(runner.mechanism), len(starts), runner.changes
     if changes.names and not changes.varies:  # what takes away what determines the motion
         check_rank(runner.run, starts.state(0, places), changes.constant_vector)
