@@ -83,7 +83,7 @@ class Trajectory:
         if name not in self._known:
             value = gather(self.columns, self.columns.at_rows, name)
             require_finite(name, value, self.time, self.facts)
-            doubt_singular(name, value)
+            doubt_singular(name, value, self.facts, lambda other: gather(self.columns, self.columns.at_rows, other))
             value.flags.writeable = False
             self._known[name] = value
         return self._known[name]
@@ -379,12 +379,15 @@ class Moments(Mapping[str, Any]):
         self._places = columns.grid.places(self.time, side)
 
     def __getitem__(self, name: str) -> Any:
-        found = gather(self._columns, lambda names: self._columns.at_places(names, self._places), name)
+        found = self._read(name)
         if self._facts is not None:
             require_finite(name, found, self._places.time, self._facts)
-        doubt_singular(name, found)
+        doubt_singular(name, found, self._facts, self._read)
         shaped = found.reshape(self.time.shape + found.shape[1:])
         return shaped if shaped.ndim else float(shaped)
+
+    def _read(self, name: str) -> Vector:
+        return gather(self._columns, lambda names: self._columns.at_places(names, self._places), name)
 
     def read(self, *names: str) -> dict[str, Vector]:
         """Several scalars at once, each (k,); faster than one after the other."""

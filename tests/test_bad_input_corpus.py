@@ -32,6 +32,7 @@ SWING.constrain(mbd.Event("below", mbd.measure(lambda a: a, "pivot.angle", unit=
 
 EXAMPLES: dict[str, Any] = {
     "a": ORIGIN,
+    "anatomy": "left hip",
     "angle": (-1.0, 0.0, 1.0),
     "approach_speed": 1.0,
     "arguments": ("hinge.angle",),

@@ -107,6 +107,7 @@ def _derived(model: Description, plan: Plan, carried: Sequence[tuple[str, int]] 
         velocity_names=scope.configuration.velocity_names, notes=plan.notes,
         figure=figure_of(model), markers=shown_markers(model),
         observations=tuple((each.name, each.unit) for each in model.observations),
+        anatomy=tuple((each.name, each.anatomy) for each in model.joints if each.anatomy),
         shapes=(*shapes_of(model), *(() if plan.planar else solids_of(model))),
         geometry=TreeGeometry(scope, dynamics, work, rests, constraints, plan.planar and vectors and not carried),
         frictions=tuple(constraints.frictions), turns=(*scope.turns.values(), *scope.wrapped.values()),

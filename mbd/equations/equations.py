@@ -299,7 +299,7 @@ class Equations:
     facings : of the cut joints whose rows hold sines, see `Facing`
     idle : (owner, part) of rows of cut joints that hold whatever the motion, and were left out
     markers : full names of the named points, which pages show
-    observations : (name, unit) of the results of users' own
+    observations : (name, unit) of the results of users' own; anatomy : (joint, joint of the body) of those that are one
     shapes : what pictures show beside bodies
     memory : what follows from the rest, kept once it was found
     """
@@ -330,6 +330,7 @@ class Equations:
     chart: Chart | None = None
     markers: tuple[str, ...] = ()
     observations: tuple[tuple[str, str], ...] = ()
+    anatomy: tuple[tuple[str, str], ...] = ()
     shapes: tuple[Shape, ...] = ()
     configuration: Configuration = field(default=None, repr=False)  # type: ignore[assignment]
     memory: dict[str, Any] = field(default_factory=dict, init=False, repr=False, compare=False)

@@ -7,6 +7,7 @@ from functools import partial
 
 from mbd.bodies.algebra import rotate
 from mbd.equations.outputs import Outputs
+from mbd.joints.anatomy import System, angles_of, measured
 from mbd.joints.base import Joint
 from mbd.joints.euler import PLACES, SEQUENCES, euler_angles
 from mbd.joints.quaternions import rotation_of, rotation_vector
@@ -19,9 +20,12 @@ __all__ = ["offer_orientations"]
 
 def offer_orientations(outputs: Outputs, scope: Scope, joints: Sequence[Joint]) -> None:
     """'ball.angular_velocity.parent' and '.ground', and among the names that are not listed '.rotation_vector' and
-    '.euler.zxy', whose angles are '.euler.zxy.1', '.2', '.3'."""
+    '.euler.zxy', whose angles are '.euler.zxy.1', '.2', '.3'; of joints of the body angles of ISB, 'hip.flexion'."""
     for each in joints:
         joint = each.joint if isinstance(each, Reversed) else each
+        for angles, system in angles_of(joint.anatomy):
+            names = [angle.name for angle in angles]
+            outputs.triple(joint.name, partial(_anatomical, scope, joint, system), names)
         if joint.orientation is None:
             continue
         name = joint.name
@@ -53,3 +57,8 @@ def _vector(scope: Scope, joint: Joint) -> Sequence[Scalar]:
 
 def _angles(scope: Scope, joint: Joint, sequence: str) -> Sequence[Scalar]:
     return euler_angles(rotation_of(_quaternion(scope, joint)), sequence)
+
+
+def _anatomical(scope: Scope, joint: Joint, system: System) -> Sequence[Scalar]:
+    R, _ = joint.transform(scope.joint(joint.name).coordinates, scope)
+    return measured(R, system, joint.anatomy.startswith("left"))

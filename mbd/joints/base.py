@@ -9,8 +9,9 @@ from typing import Any, NamedTuple
 from mbd.bodies.base import Frame
 from mbd.bodies.domains import Domain, Parameterized, at_least_zero
 from mbd.bodies.promises import scalar
-from mbd.bodies.values import name_of, number
+from mbd.bodies.values import among, name_of, number
 from mbd.errors import ModelError, nearest
+from mbd.joints.anatomy import ANATOMY
 from mbd.joints.losses.base import Loss, loss_of
 from mbd.scope import Rotation, Scope, Triple
 from mbd.tape.node import Scalar
@@ -50,7 +51,8 @@ class Joint(Parameterized, ABC):
 
     A new joint is a frozen dataclass with the fields below; `stiffness` and `rest` are fields only of joints with one
     coordinate, whose linear spring has the energy ``½ k (q − rest)²``, and `stiffness` of those that are elastic in a
-    way of their own (`is_elastic`). It calls `validate` when it is made.
+    way of their own (`is_elastic`), `anatomy` of those that may stand for a joint of the body (see
+    `mbd.joints.anatomy`). It calls `validate` when it is made.
     """
 
     parent: Frame
@@ -58,6 +60,7 @@ class Joint(Parameterized, ABC):
     loss: JointLoss
     stiffness: float = 0.0
     rest: float = 0.0
+    anatomy: str = ""
 
     @property
     @abstractmethod
@@ -265,6 +268,10 @@ class Joint(Parameterized, ABC):
             raise ModelError(
                 f"{kind} '{self.name}': one loss cannot serve its coordinates ({labels or 'it has none'}); "
                 "say on which each acts, such as loss={'angle': mbd.Viscous(0.1)}"
+            )
+        if not among(self.anatomy, ("", *ANATOMY)):
+            raise ModelError(
+                f"anatomy of '{self.name}': " + nearest(self.anatomy, ANATOMY, "joint of the body", "There are")
             )
         if "stiffness" in vars(self):
             put(self, "stiffness", number(self.stiffness, f"stiffness of '{self.name}'"))

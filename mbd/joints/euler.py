@@ -13,13 +13,12 @@ from collections.abc import Sequence
 from itertools import product as every
 from typing import Any
 
-from mbd.joints.base import Joint
 from mbd.joints.quaternions import quaternion_product
 from mbd.scope import Rotation
 from mbd.tape.functions import atan2, sqrt, where
 
 __all__ = [
-    "PLACES", "SEQUENCES", "euler_angles", "from_euler", "orientation_names", "second_from_singular", "sequence_of",
+    "PLACES", "SEQUENCES", "euler_angles", "from_euler", "second_from_singular", "sequence_of",
 ]  # fmt: skip
 
 SEQUENCES = tuple("".join(s) for s in every("xyz", repeat=3) if s[0] != s[1] != s[2])
@@ -72,12 +71,3 @@ def second_from_singular(sequence: str, second: Any) -> Any:
     from numpy import abs as size, cos as cosine, sin as sine
 
     return size(sine(second) if sequence[0] == sequence[2] else cosine(second))
-
-
-def orientation_names(joint: Joint) -> list[str]:
-    """The names of what is read off a joint with a quaternion, besides its coordinates and velocities."""
-    if joint.orientation is None:
-        return []
-    vectors = ("angular_velocity.parent", "angular_velocity.ground", "rotation_vector")
-    names = [f"{joint.name}.{vector}.{axis}" for vector in vectors for axis in "xyz"]
-    return names + [f"{joint.name}.euler.{sequence}.{place}" for sequence in SEQUENCES for place in PLACES]

@@ -60,6 +60,11 @@ class Reversed(Joint):
         return self.joint.rest
 
     @property
+    def anatomy(self) -> str:  # type: ignore[override]
+        """As the joint."""
+        return self.joint.anatomy
+
+    @property
     def labels(self) -> tuple[Label, ...]:
         """The joint's coordinates."""
         return self.joint.labels

@@ -26,6 +26,7 @@ class Revolute(Joint):
     axis : direction in the parent frame (and in the child's); a positive angle turns right-handed about it
     loss : friction torque of the rate [N m]
     stiffness, rest : of a torsion spring [N m/rad, rad]
+    anatomy : the joint of the body that it is, such as 'left hip': results tell its angles by ISB, 'left hip.flexion'
 
     Coordinates: `angle` [rad].
     """
@@ -38,6 +39,7 @@ class Revolute(Joint):
     loss: JointLoss = field(default=None, hash=False)
     stiffness: float = 0.0
     rest: float = 0.0
+    anatomy: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "axis", unit_vector(self.axis, f"axis of '{self.name}'"))

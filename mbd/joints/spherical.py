@@ -35,6 +35,7 @@ class Spherical(Joint):
     stiffness : k of an isotropic spring [N m/rad], ``V = ½ k θ²`` with θ the angle of the rotation, 0 ≤ θ ≤ π; give the
         child's frame a rotation for a spring that rests elsewhere, and use `mbd.Potential` of
         '<name>.rotation_vector.x', … for one that is not isotropic
+    anatomy : the joint of the body that it is, such as 'left hip': results tell its angles by ISB, 'left hip.flexion'
 
     Coordinates: `orientation` (w, x, y, z) [-]. Velocities: `angular_velocity` (x, y, z) [rad/s].
     """
@@ -45,6 +46,7 @@ class Spherical(Joint):
     _: KW_ONLY
     loss: JointLoss = field(default=None, hash=False)
     stiffness: float = 0.0
+    anatomy: str = ""
 
     def __post_init__(self) -> None:
         self.validate()

@@ -28,6 +28,7 @@ class Universal(Joint):
     axis : of the first turn, fixed in the parent; z by default
     second_axis : of the second turn, fixed in the child and across the first; x by default
     loss : friction torque of each rate [N m], or by label: {'first': Viscous(0.1)}
+    anatomy : the joint of the body that it is, such as 'left hip': results tell its angles by ISB, 'left hip.flexion'
 
     Coordinates: `first`, `second` [rad].
     """
@@ -39,6 +40,7 @@ class Universal(Joint):
     second_axis: Vector3 = (1.0, 0.0, 0.0)
     _: KW_ONLY
     loss: JointLoss = field(default=None, hash=False)
+    anatomy: str = ""
 
     def __post_init__(self) -> None:
         axis = unit_vector(self.axis, f"axis of '{self.name}'")

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from mbd.bodies.values import printable
+from mbd.bodies.values import among, printable
+from mbd.joints.anatomy import ANATOMY
 from mbd.results.archive import Head, Members, Unreadable
 
 __all__ = ["arrays_of_run", "arrays_within", "expect", "of_kind"]
@@ -105,6 +106,8 @@ def _facts(facts: Any, heads: Mapping[str, Head]) -> int:
     _pairs(facts.get("velocities", []), "'velocities'")
     _list(facts.get("markers", []), str, "'markers'")
     _pairs(facts.get("observations", []), "'observations'")
+    anatomy = _pairs(facts.get("anatomy", []), "'anatomy'")
+    expect(all(among(part, ANATOMY) for _, part in anatomy), "'anatomy'")
     for shape in _list(facts.get("shapes", []), dict, "'shapes'"):
         _shape(shape)
     return len(facts["contacts"])

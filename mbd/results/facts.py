@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from mbd.equations.shapes import HEIGHT, Shape, drawn
+from mbd.joints.anatomy import Angle, angles_of
 from mbd.results.names import AXES
 
 if TYPE_CHECKING:
@@ -42,6 +44,7 @@ class Facts:
     markers : full names of the named points, 'left shank.toe' or 'heel'
     observations : (name, unit) of the results of users' own
     shapes : grounds, wheels, blades, and in space solids and hinges, that pictures show
+    anatomy : (joint, 'left hip') of joints of the body, whose angles are named
     """
 
     model: str = ""
@@ -54,11 +57,22 @@ class Facts:
     markers: tuple[str, ...] = ()
     observations: tuple[tuple[str, str], ...] = ()
     shapes: tuple[Shape, ...] = ()
+    anatomy: tuple[tuple[str, str], ...] = ()
 
     @property
     def rates(self) -> tuple[str, ...]:
         """Names that velocities may have: rates of coordinates, not all of which there are, and `velocities`."""
         return (*(f"{name}.rate" for name, _ in self.coordinates[: self.coordinate_count]), *dict(self.velocities))
+
+    @cached_property
+    def angles(self) -> dict[str, Angle]:
+        """Named angles of joints of the body by full name, 'left hip.flexion'."""
+        return {
+            f"{joint}.{angle.name}": angle
+            for joint, part in self.anatomy
+            for angles, _ in angles_of(part)
+            for angle in angles
+        }
 
     @property
     def drawn(self) -> tuple[str, ...]:
@@ -102,6 +116,7 @@ class Facts:
             equations.markers,
             equations.observations,
             equations.shapes,
+            equations.anatomy,
         )
 
     @classmethod
@@ -118,6 +133,7 @@ class Facts:
             tuple(data.get("markers", ())),
             tuple((name, unit) for name, unit in data.get("observations", ())),
             tuple(_shape(shape) for shape in data.get("shapes", ())),
+            tuple((joint, part) for joint, part in data.get("anatomy", ())),
         )
 
     def as_json(self) -> dict[str, Any]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from mbd.joints.anatomy import ANATOMY, angles_of
+
 __all__ = ["long_name"]
 
 WORDS = {
@@ -16,6 +18,9 @@ WORDS = {
     "reaction_force": "reaction force of {}", "reaction_torque": "reaction torque of {}",
 }  # fmt: skip
 """Words for the last part of a name."""
+
+ANGLES = {angle.name for part in ANATOMY for angles, _ in angles_of(part) for angle in angles}
+"""Angles of joints of the body."""
 
 VECTORS = ("force", "torque", "reaction_force", "reaction_torque")
 """Vectors that are no places."""
@@ -59,4 +64,6 @@ def long_name(name: str) -> str:
         return turning
     if last in ("rate", "acceleration") and owner:
         return WORDS[last].format(long_name(stem))
+    if last in ANGLES:
+        return f"{last.replace('_', ' ')} of {stem}"
     return WORDS[last].format(stem) if last in WORDS else name

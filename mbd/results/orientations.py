@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mbd.arrays import Vector
+from mbd.joints.anatomy import Angle
 from mbd.joints.euler import PLACES, euler_angles, second_from_singular, sequence_of
 from mbd.joints.quaternions import rotation_of, rotation_vector
 from mbd.notes import doubt
+
+if TYPE_CHECKING:
+    from mbd.results.facts import Facts
 
 __all__ = ["ReadOff", "doubt_singular", "read_off"]
 
@@ -38,8 +43,14 @@ def read_off(name: str) -> ReadOff | None:
     return parts, lambda q: np.asarray(euler_angles(rotation_of(q), sequence)[place])
 
 
-def doubt_singular(name: str, values: Vector) -> None:
-    """Warn where the Euler angles of a result (…, 3) come near the singularity of their sequence."""
+def doubt_singular(name: str, values: Vector, facts: Facts | None, read: Callable[[str], Vector]) -> None:
+    """Warn where Euler angles (…, 3), or an angle of a joint of the body, come near the singularity of their sequence.
+
+    read : gives another result at the same times
+    """
+    named = facts.angles.get(name) if facts is not None else None
+    if named is not None:
+        _doubt_named(name, named, values, read)
     angles = ANGLES.fullmatch(name)
     if angles is None or angles[3] is not None or not values.size:
         return
@@ -51,4 +62,20 @@ def doubt_singular(name: str, values: Vector) -> None:
             f"{name!r}: its second angle comes to {second[worst]:.6g} rad, within {NEAR:g} rad of the singularity of "
             f"{angles[2]!r}, where the first and the third turn about one axis and jump; use another sequence, or the "
             f"quaternion {angles[1] + '.orientation'!r}"
+        )
+
+
+def _doubt_named(name: str, angle: Angle, values: Vector, read: Callable[[str], Vector]) -> None:
+    """Warn where an angle of a joint of the body is undetermined; its second one never is."""
+    if not angle.second or not values.size:
+        return
+    other = f"{name.rpartition('.')[0]}.{angle.second}"
+    second = np.atleast_1d(read(other))
+    off = second_from_singular(angle.sequence, second)
+    worst = int(np.argmin(off))
+    if off[worst] < NEAR:
+        doubt(
+            f"{name!r} is undetermined where {other!r} comes to {second[worst]:.6g} rad, within {NEAR:g} rad of the "
+            "singularity of its sequence: the first and the third angle turn about one axis there and jump; "
+            "the orientation of the joint tells more"
         )

@@ -38,6 +38,8 @@ def unit(name: str, facts: Facts) -> str:
     observed = dict(facts.observations)
     if name in observed or (stem in observed and last in ("x", "y", "z")):
         return observed.get(name, observed.get(stem, ""))
+    if name in facts.angles:
+        return "rad"
     part = _of_part(name)
     if part is not None and last != "acceleration":
         return part

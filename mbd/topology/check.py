@@ -16,7 +16,7 @@ from mbd.errors import MbdError, ModelError, nearest
 from mbd.forces.base import Force
 from mbd.forces.quantities import INCREMENT
 from mbd.joints.base import Joint
-from mbd.joints.euler import orientation_names
+from mbd.joints.named_angles import orientation_names
 from mbd.joints.screw import Screw
 from mbd.topology.graph import disconnected
 from mbd.topology.plan import cut_names, is_planar, plan
@@ -75,7 +75,8 @@ def quantities(model: Description) -> list[str]:
         if joint.is_vector:
             names += [name for coordinate in joint.coordinate_names for name in (coordinate, f"{coordinate}.rate")]
         else:
-            names += [*joint.coordinate_names, *joint.velocity_names, *orientation_names(joint)]
+            names += [*joint.coordinate_names, *joint.velocity_names]
+        names += orientation_names(joint)
         if len(joint.freedoms) == 1:
             names.append(f"{joint.name}.rate")
     for frame in model.frames:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -19,6 +19,9 @@ __all__ = ["PERCENT", "Curve", "curves_of"]
 
 PERCENT = np.linspace(0.0, 100.0, 101)
 """Share of the stride [%]."""
+
+SAME = 1e-9
+"""Angles that differ less are one [rad]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,16 +48,17 @@ class Curve:
 def curves_of(run: Trajectory, sides: Sequence[Side], mass: float | None) -> list[Curve]:
     """All curves of all sides; moments, powers and forces over the mass where it is given."""
     angles = {side.name: _angles(run, side.name) for side in sides}
-    joints = [name for own in angles.values() for name in own]
+    joints = [angle.coordinate for own in angles.values() for angle in own if angle.coordinate]
     moments = Moments(run, joints)
     per = "" if mass is None else "/kg"
     scale = 1.0 if mass is None else 1.0 / mass
     found = []
     for side in sides:
-        samples = [_sampled(run, side, stride, list(angles[side.name]), moments) for stride in side.strides]
-        for name, subject in angles[side.name].items():
+        samples = [_sampled(run, side, stride, angles[side.name], moments) for stride in side.strides]
+        for angle in angles[side.name]:
+            name, subject = angle.name, angle.subject
             found.append(_curve(samples, side, subject, "angle", "°", f"{name}", np.rad2deg(1.0)))
-            if name in moments.known:
+            if angle.coordinate in moments.known:
                 found.append(_curve(samples, side, subject, "moment", f"N m{per}", f"{name} moment", scale))
                 found.append(_curve(samples, side, subject, "power", f"W{per}", f"{name} power", scale))
         for quantity in ("normal force", "forward force"):
@@ -62,24 +66,52 @@ def curves_of(run: Trajectory, sides: Sequence[Side], mass: float | None) -> lis
     return found
 
 
-def _angles(run: Trajectory, side: str) -> dict[str, str]:
-    """Angles of the joints of a side, and observed ones, each with what it is the angle of."""
+class _Angle(NamedTuple):
+    """An angle of a side: its name, what it is the angle of, and the coordinate that it is or is the opposite of."""
+
+    name: str
+    subject: str
+    coordinate: str = ""
+    sign: float = 1.0
+
+
+def _angles(run: Trajectory, side: str) -> list[_Angle]:
+    """Angles of the joints of a side, and observed ones; of joints of the body those of ISB that move.
+
+    An angle of ISB that is a coordinate, or its opposite, stands for it. The three of a raised arm are left out: their
+    first and third are undetermined while it hangs.
+    """
     facts = run.facts
     known = [name for name, unit in facts.coordinates[: facts.coordinate_count] if unit == "rad"]
-    known += [name for name, unit in facts.observations if unit == "rad"]
-    return {name: base_name(name.removesuffix(".angle"), side) for name in known if of_side(name, side)}
+    found = {name: _Angle(name, base_name(name.removesuffix(".angle"), side), name) for name in known}
+    for name, angle in facts.angles.items():
+        if angle.sequence != "zxy" or not of_side(name, side) or float(np.ptp(run[name])) < SAME:
+            continue
+        joint, _, last = name.rpartition(".")
+        subject = f"{base_name(joint, side)} {last.replace('_', ' ')}"
+        own = [(each, sign) for each in known if each.rpartition(".")[0] == joint for sign in (1.0, -1.0)]
+        match = next(((c, s) for c, s in own if np.max(np.abs(run[name] - s * run[c])) < SAME), None)
+        if match is not None:
+            found.pop(match[0], None)
+        found[name] = _Angle(name, subject, *(match or ()))
+    observed = [name for name, unit in facts.observations if unit == "rad"]
+    found |= {name: _Angle(name, base_name(name.removesuffix(".angle"), side)) for name in observed}
+    return [angle for angle in found.values() if of_side(angle.name, side)]
 
 
-def _sampled(run: Trajectory, side: Side, stride: Stride, angles: Sequence[str], moments: Moments) -> dict[str, Vector]:
+def _sampled(
+    run: Trajectory, side: Side, stride: Stride, angles: Sequence[_Angle], moments: Moments
+) -> dict[str, Vector]:
     """What the curves of a side are made of, over one stride."""
     times = stride.begin + PERCENT / 100.0 * stride.duration
     times[-1] = stride.end - 1e-9 * stride.duration  # before the strike that ends it
     named = run.at(times)
-    found = {name: np.asarray(named[name]) for name in angles}
-    for name, moment in moments.at(run, times).items():
-        if name in found:
-            found[f"{name} moment"] = moment
-            found[f"{name} power"] = moment * np.asarray(named[f"{name}.rate"])
+    found = {angle.name: np.asarray(named[angle.name]) for angle in angles}
+    known = moments.at(run, times)
+    for angle in angles:
+        if angle.coordinate in known:
+            found[f"{angle.name} moment"] = angle.sign * known[angle.coordinate]
+            found[f"{angle.name} power"] = known[angle.coordinate] * np.asarray(named[f"{angle.coordinate}.rate"])
     return found | forces_at(run, side, times)
 
 

@@ -17,7 +17,7 @@ from mbd.joints.free import Free
 from mbd.parts.arguments import sizes
 from mbd.parts.whole_body.joints import Articulation, articulations
 from mbd.parts.whole_body.moments import passive_moments
-from mbd.parts.whole_body.poses import center_of_mass, origins, standing
+from mbd.parts.whole_body.poses import Position, center_of_mass, hips_over_ground, origins, standing
 from mbd.parts.whole_body.segments import SIDES, Segment, segments_of
 from mbd.parts.whole_body.table import SEXES
 
@@ -80,7 +80,7 @@ class Human:
     def center(self) -> Vector3:
         """Center of mass standing upright, over the place of the pelvis on the ground [m]."""
         x, y, z = self._whole[1]
-        return (x, y + self.standing()[f"{self.prefix}trunk.y"], z)
+        return (x, y + hips_over_ground(self.bodies), z)
 
     @property
     def height(self) -> float:
@@ -90,7 +90,7 @@ class Human:
         head = self.bodies["head"]
         top = next(frame for frame in head.points.values() if frame.name == "top")
         places = origins("pelvis", self.bodies, self.joints)
-        return self.standing()[f"{self.prefix}trunk.y"] + places[head.name][1] + top.offset[1]
+        return hips_over_ground(self.bodies) + places[head.name][1] + top.offset[1]
 
     @property
     def freedoms(self) -> int:
@@ -101,7 +101,7 @@ class Human:
     def _whole(self) -> tuple[float, Vector3]:
         return center_of_mass(origins("pelvis", self.bodies, self.joints), self.bodies)
 
-    def standing(self, knees: float = 0.0) -> dict[str, float]:
+    def standing(self, knees: float = 0.0) -> dict[str, Position]:
         """Positions for `mbd.assemble`: upright on level ground, feet flat; of legs that differ, the longer one.
 
         Parameters

@@ -67,8 +67,8 @@ def articulations() -> list[Articulation]:
     ankle turns the foot about its long axis.
     """
     found = [
-        Articulation("back", "pelvis", "back", "torso", Spherical),
-        Articulation("neck", "torso", "neck", "head", Spherical),
+        Articulation("back", "pelvis", "back", "torso", Spherical, {"anatomy": "back"}),
+        Articulation("neck", "torso", "neck", "head", Spherical, {"anatomy": "neck"}),
     ]
     for side, sign in SIDES.items():
 
@@ -77,7 +77,8 @@ def articulations() -> list[Articulation]:
         ) -> None:
             upper = parent if parent in ("pelvis", "torso") else f"{side} {parent}"
             point = f"{side} {place}" if upper == parent else place
-            found.append(Articulation(f"{side} {name}", upper, point, f"{side} {child}", kind, how))
+            named = {"anatomy": f"{side} {name}", **how}
+            found.append(Articulation(f"{side} {name}", upper, point, f"{side} {child}", kind, named))
 
         own("shoulder", "torso", "shoulder", "upper arm", Spherical)
         own("elbow", "upper arm", "end", "forearm", Revolute)

@@ -10,36 +10,50 @@ from mbd.bodies.values import Vector3
 from mbd.joints.base import Joint
 from mbd.parts.whole_body.segments import SIDES
 
-__all__ = ["center_of_mass", "origins", "standing"]
+__all__ = ["Position", "center_of_mass", "hips_over_ground", "origins", "standing"]
+
+Position = float | tuple[float, ...]
+"""A coordinate, or a quaternion as a whole."""
 
 
-def standing(prefix: str, bodies: Mapping[str, Body], joints: Sequence[Joint], knees: float) -> dict[str, float]:
+def standing(prefix: str, bodies: Mapping[str, Body], joints: Sequence[Joint], knees: float) -> dict[str, Position]:
     """Positions of joints: upright over level ground at y = 0, knees flexed, ankles under the hips, soles level.
 
     Of legs that differ the longer one reaches the ground.
     """
-    made, legs = {joint.name: joint for joint in joints}, []
-    found: dict[str, float] = {}
-    for side in SIDES:
-        own = {name: bodies.get(f"{side} {name}") for name in ("thigh", "shank", "foot")}
-        if any(body is None for body in own.values()):
-            continue
-        a, b, down = (_length(own[name], end) for name, end in (("thigh", "end"), ("shank", "end"), ("foot", "sole")))
+    made, reaches = {joint.name: joint for joint in joints}, []
+    found: dict[str, Position] = {}
+    for side, (a, b, down) in _legs(bodies).items():
         hip = math.atan2(b * math.sin(knees), a + b * math.cos(knees))
-        legs.append(a * math.cos(hip) + b * math.cos(knees - hip) + down)
+        reaches.append(a * math.cos(hip) + b * math.cos(knees - hip) + down)
         bent = {"hip": hip, "knee": -knees, "ankle": knees - hip}
         for name, angle in bent.items():
             joint = made.get(f"{prefix}{side} {name}")
             if joint is not None and knees != 0.0:
                 found |= _bent(joint, angle)
-    return {**({f"{prefix}trunk.y": max(legs, default=0.0)} if f"{prefix}trunk" in made else {}), **found}
+    height: dict[str, Position] = {f"{prefix}trunk.y": max(reaches, default=0.0)} if f"{prefix}trunk" in made else {}
+    return {**height, **found}
 
 
-def _bent(joint: Joint, angle: float) -> dict[str, float]:
+def hips_over_ground(bodies: Mapping[str, Body]) -> float:
+    """Height of the hips of who stands with straight legs; of legs that differ, of the longer one [m]."""
+    return max((sum(lengths) for lengths in _legs(bodies).values()), default=0.0)
+
+
+def _legs(bodies: Mapping[str, Body]) -> dict[str, tuple[float, ...]]:
+    """Lengths of thigh and shank, and how far the sole is below the ankle, of each whole leg [m]."""
+    found, parts = {}, (("thigh", "end"), ("shank", "end"), ("foot", "sole"))
+    for side in SIDES:
+        own = [bodies.get(f"{side} {name}") for name, _ in parts]
+        if all(body is not None for body in own):
+            found[side] = tuple(_length(body, end) for body, (_, end) in zip(own, parts, strict=True))
+    return found
+
+
+def _bent(joint: Joint, angle: float) -> dict[str, Position]:
     """A turn about z."""
     if joint.orientation is not None:
-        w, z = math.cos(0.5 * angle), math.sin(0.5 * angle)
-        return dict(zip(joint.coordinate_names, (w, 0.0, 0.0, z), strict=True))
+        return {f"{joint.name}.orientation": (math.cos(0.5 * angle), 0.0, 0.0, math.sin(0.5 * angle))}
     return {joint.coordinate_names[0]: angle} if joint.coordinate_names else {}
 
 
