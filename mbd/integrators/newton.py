@@ -14,7 +14,14 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.integrators.base import Point, StepReport, StepResult, System, Terms, completed, composed
 from mbd.integrators.coefficients import Coefficients
-from mbd.integrators.singular import CONTINUOUS, WHOLE, WITHIN, Distance, distance_to_singularity
+from mbd.integrators.singular import (
+    CONTINUOUS,
+    WHOLE,
+    WITHIN,
+    Distance,
+    counted_inertia,
+    distance_to_singularity,
+)
 from mbd.kernel.codes import LEFT, PASSING
 from mbd.state import Mode, State
 
@@ -191,7 +198,9 @@ class Step:
         scale = np.ones(len(terms.h)) if terms.scale_h is None else terms.scale_h
         n_v = self.n_v
         B = terms.H[:, :n_v] - self.c_K / self.c_C * terms.turning
-        mass = np.abs(np.diag(terms.S))[:n_v]
+        mass, system = np.abs(np.diag(terms.S))[:n_v], completed(self.system)
+        if not system.is_vector:
+            mass = counted_inertia(mass, system.angles)
         return distance_to_singularity(
             B, terms.turning, mass, self.y[:n_v], scale, self.memory.whole or self.memory.step
         )

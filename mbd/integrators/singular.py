@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.kernel.column_weights import LEAST_INERTIA
 from mbd.kernel.singular.newmark_step import CONTINUOUS, FORESEEN, NEAREST, VANISHING, WITHIN
 from mbd.kernel.singular.step_pairs import WHOLE, is_of_pair
 
-__all__ = ["CONTINUOUS", "WHOLE", "WITHIN", "Distance", "distance_to_singularity"]
+__all__ = ["CONTINUOUS", "WHOLE", "WITHIN", "Distance", "counted_inertia", "distance_to_singularity"]
 
 EPS = float(np.finfo(float).eps)
 
@@ -58,6 +60,13 @@ def distance_to_singularity(B: Matrix, turning: Matrix, mass: Vector, v: Vector,
             return Distance(1e300, 0.0)
     across = 4.0 * EPS * scale[order[k]] / (here[k] * lengths[order[k]] + 1e-300)
     return Distance(float(steps[k]), float(across / (dt * np.sqrt(mass @ v**2) + 1e-300)))
+
+
+def counted_inertia(mass: Vector, angles: Any) -> Vector:
+    """Inertias (n_v,), each at least a share of the largest of its unit: see `mbd.kernel.column_weights`."""
+    turns = np.zeros(len(mass), dtype=bool) if angles is None else np.asarray(angles, dtype=bool)
+    least = [LEAST_INERTIA * np.max(mass[unit], initial=0.0) for unit in (~turns, turns)]
+    return np.asarray(np.maximum(mass, np.where(turns, least[1], least[0])))
 
 
 def _pivoted_gram_norms(rows: Matrix, order: list[int] | None) -> tuple[list[int], Vector]:

@@ -7,6 +7,7 @@ Where one does, its force depends on how a load is shared (other μ, other drag)
 
 from __future__ import annotations
 
+from mbd.kernel.column_weights import counted_inertia, least_inertia
 from mbd.kernel.linear import factor, solve
 from mbd.kernel.orthogonal import clear_row, square
 from mbd.kernel.records import ContactRows, DependentRows, Equations, Frictions, Model, Reals, Singular
@@ -73,9 +74,11 @@ def length_of(K: Model, row: int) -> float:
     """Length of a row on columns scaled by √M_ii."""
     n = K.n
     total = 0.0
+    least_mass = least_inertia(K, K.acc, 0, n + 1, 0)
+    least_turning = least_inertia(K, K.acc, 0, n + 1, 1)
     for j in range(n):
         slope = K.acc[K.acc_B + row * n + j]
-        weight = K.acc[j * n + j]
+        weight = counted_inertia(K, j, K.acc[j * n + j], least_mass, least_turning)
         total += slope * slope / weight if weight > 0.0 else slope * slope
     return float(sqrt(total))
 
@@ -98,8 +101,10 @@ def remaining_norm(K: DependentRows, row: int, kept: int) -> float:
     """
     n = K.n
     base = kept * n
+    least_mass = least_inertia(K, K.acc, 0, n + 1, 0)
+    least_turning = least_inertia(K, K.acc, 0, n + 1, 1)
     for j in range(n):
-        weight = K.acc[j * n + j]
+        weight = counted_inertia(K, j, K.acc[j * n + j], least_mass, least_turning)
         K.basis[base + j] = K.acc[K.acc_B + row * n + j] / (sqrt(weight) if weight > 0.0 else 1.0)
     size = square(K.basis, base, n)
     K.lower[kept * K.n_rows : kept * K.n_rows + kept] = 0.0

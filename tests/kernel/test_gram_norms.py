@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 from hypothesis import given, strategies as st
 
+from mbd.integrators.singular import counted_inertia
 from mbd.kernel.singular.gram_norms import pivoted_gram_norms_of_many
 from mbd.kernel.singular.newmark_step import pivoted_gram_norms
 
@@ -20,6 +21,7 @@ def kernel(rng, n, m, density):
         n_v=n, out=np.concatenate([rng.uniform(0.5, 2.0, n), rows.ravel()]), turning=turning.ravel(),
         basis=np.zeros((m + 1) * n), support=np.zeros(m * (n + 2), dtype=np.int64), spare=np.zeros(5 * m + m * m),
         columns=np.zeros(m, dtype=np.int64), rows=np.arange(m), row_level=np.zeros(m, dtype=np.int64),
+        vector=1, unit=np.arange(n) % 2,
     )  # fmt: skip
 
 
@@ -43,3 +45,18 @@ def test_nothing_is_left_of_a_row_that_depends_on_others():
     rows[3], turning[3] = rows[0] - 2.0 * rows[1], 0.0
     pivoted_gram_norms_of_many(K, 4, 0.0, 0.0, 0.0, 0, 0, 1, 8, 8)
     assert K.spare[3] < 1e-7 < K.spare[2]
+
+
+def test_round_off_of_an_inertia_decides_nothing():
+    """A thin rod has none about its own axis: zero, or what sums leave of it, weigh its columns alike."""
+    found = []
+    for tiny in (0.0, 1e-18, -3e-20):
+        K = kernel(np.random.default_rng(7), 8, 5, 0.6)
+        K.vector, K.out[3] = 0, tiny
+        weighed = 1.0 / np.sqrt(counted_inertia(np.abs(K.out[:8]), K.unit == 1))
+        assert weighed.max() < 2e4
+        for way in (pivoted_gram_norms, pivoted_gram_norms_of_many):
+            way(K, 5, 0.01, 0.005, 0.0, 0, 0, 1, 8, 8)
+            found.append(K.spare[:5].copy())
+    for each in found[1:]:
+        np.testing.assert_allclose(each, found[0], rtol=0, atol=3e-8)

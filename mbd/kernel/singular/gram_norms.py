@@ -7,6 +7,7 @@ they were cleared of, G keeps its zeros: a row that is done makes neighbours of 
 
 from __future__ import annotations
 
+from mbd.kernel.column_weights import counted_inertia, least_inertia
 from mbd.kernel.records import DependentRows, Singular, SingularSteps
 from mbd.kernel.roots import sqrt
 
@@ -56,8 +57,10 @@ def pivoted_gram_norms_of_many(
 def find_support(K: SingularSteps, m: int, o_S: int, stride: int, o_H: int, width: int) -> None:
     """Which entries of each row are not zero, into K.support; weights of columns behind the rows of the basis."""
     n = K.n_v
+    least_mass = least_inertia(K, K.out, o_S, stride, 0)
+    least_turning = least_inertia(K, K.out, o_S, stride, 1)
     for j in range(n):
-        weight = abs(K.out[o_S + stride * j])
+        weight = counted_inertia(K, j, abs(K.out[o_S + stride * j]), least_mass, least_turning)
         K.basis[m * n + j] = 1.0 / sqrt(weight) if weight > 0.0 else 1.0
     for row in range(m):
         K.columns[row] = row

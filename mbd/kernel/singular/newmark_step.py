@@ -7,6 +7,7 @@ onto the rows and the scheme starts again, but for the average that it carries. 
 from __future__ import annotations
 
 from mbd.kernel.codes import EPS, LEFT, NOT_CONVERGED, NOT_FINITE, PASSING, SINGULAR
+from mbd.kernel.column_weights import counted_inertia, least_inertia
 from mbd.kernel.hooks import call
 from mbd.kernel.linear import factor
 from mbd.kernel.ordered import LOSS_OF_STEP, OF_TANGENT, factor_ordered, order_at, solve_kkt, weakest_pivot
@@ -160,6 +161,8 @@ def pivoted_gram_norms(
     """
     n = K.n_v
     Q = K.basis
+    least_mass = least_inertia(K, K.out, o_S, stride, 0)
+    least_turning = least_inertia(K, K.out, o_S, stride, 1)
     for k in range(m):
         row = K.columns[k] if place > 0 else k
         K.columns[k] = row
@@ -167,7 +170,7 @@ def pivoted_gram_norms(
         length = 0.0
         turned = 0.0
         for j in range(n):
-            weight = abs(K.out[o_S + stride * j])
+            weight = counted_inertia(K, j, abs(K.out[o_S + stride * j]), least_mass, least_turning)
             weight = 1.0 / sqrt(weight) if weight > 0.0 else 1.0
             turn = K.turning[row * n + j] * weight
             entry = K.out[o_H + row * width + j] * weight - ratio * turn

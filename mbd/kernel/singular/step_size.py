@@ -12,6 +12,7 @@ columns scaled by √M_ii, passes zero. |w| at the ends of steps tells where it 
 from __future__ import annotations
 
 from mbd.kernel.codes import EPS, PASSING
+from mbd.kernel.column_weights import counted_inertia, least_inertia
 from mbd.kernel.ordered import order_at
 from mbd.kernel.orthogonal import clear_row, square
 from mbd.kernel.records import (
@@ -138,8 +139,10 @@ def noise_coefficient(K: Motion, k: int, fall: float, speed: float) -> float:
 
 def weigh_columns(K: Equations) -> None:
     """1/√M_jj into K.spare, with M in K.acc."""
+    least_mass = least_inertia(K, K.acc, 0, K.n + 1, 0)
+    least_turning = least_inertia(K, K.acc, 0, K.n + 1, 1)
     for j in range(K.n):
-        weight = K.acc[j * K.n + j]
+        weight = counted_inertia(K, j, K.acc[j * K.n + j], least_mass, least_turning)
         K.spare[j] = 1.0 / sqrt(weight) if weight > 0.0 else 1.0
 
 
