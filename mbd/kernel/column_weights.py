@@ -1,8 +1,8 @@
 """How columns of rows are weighed where rows are compared: by 1/√S_jj, S_jj the inertia of each motion.
 
 A thin rod in space has no inertia about its own axis, or what round-off leaves of none. Divided by its root, that
-column would be all that there is of a row, and which rows depend on others be decided by round-off. So no inertia counts
-as less than a share of the largest of its unit. Coordinates of planar models add up and stay as they are.
+column would be all that there is of a row, and which rows depend on others be decided by round-off. So no inertia
+counts as less than a share of the largest of its unit. Planar coordinates, which add up, keep theirs.
 """
 
 from __future__ import annotations
