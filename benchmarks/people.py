@@ -18,6 +18,7 @@ import mbd
 from benchmarks.compiling import python_loop
 from benchmarks.figures import BURST, Figure, Samples, interleaved
 from benchmarks.stopwatch import kernel_watched, processor_seconds
+from mbd.compile.background import finish
 from mbd.compile.mechanism import Mechanism
 from mbd.equations import programs
 from mbd.equations.cost import operations
@@ -147,13 +148,18 @@ def _kinds(pin: Any, joint: Any) -> list[Any]:
     return [pin.JointModelRZ() if joint.axis[2] else pin.JointModelRX()]
 
 
-def _make(folder: str) -> None:
-    """From the words to code that steps, with the cache in a folder; of mechanisms in space without the kernel."""
+def _make(folder: str, wait: bool = False) -> None:
+    """From the words to code that steps, with the cache in a folder; of mechanisms in space without the kernel.
+
+    wait : until it is optimized, as in the background of a run
+    """
     before = os.environ.get("MBD_CACHE")
     os.environ["MBD_CACHE"] = folder
     try:
         mechanism = Mechanism(derive(_flying()))
         mechanism.stepping(ActiveSetManager(mechanism.equations).active_rows(()), (), stabilized=True)
+        if wait:
+            finish()
     finally:
         del os.environ["MBD_CACHE"]
         if before is not None:
@@ -167,6 +173,7 @@ def _cold() -> float:
 
 def _making(repeats: int) -> list[Figure]:
     with TemporaryDirectory() as full:
+        _make(full, wait=True)
         tasks: dict[str, Callable[[], float]] = {
             "Python loop": partial(processor_seconds, python_loop),
             "cold": _cold,

@@ -109,3 +109,9 @@ def pytest_collection():
 def older_objects_left_alone():
     """Garbage collections do not search what earlier tests left, which takes seconds."""
     gc.freeze()
+
+
+@pytest.fixture
+def made_afresh(monkeypatch):
+    """Programs are made from their equations, whatever is remembered: for tests that change how they are made."""
+    monkeypatch.setattr("mbd.compile.remembered.ENABLED", False)

@@ -29,8 +29,9 @@ import re
 import sys
 import time
 import weakref
+import zlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -52,7 +53,7 @@ from mbd.tape.node import Node
 
 __all__ = [
     "HASTY", "LEVEL", "Build", "Library", "Machine", "MachineFunction", "cached_object", "call", "emit_object",
-    "load_object",
+    "load_object", "tag_key",
 ]  # fmt: skip
 
 LEVEL = 2
@@ -114,7 +115,7 @@ def cached_object(
     `lasting` is the last to be removed from a cache that is full.
     """
     store = default_cache() if cache is None else cache
-    key = _key(tag)
+    key = tag_key(tag)
     code = store.load(key, lasting)
     if code is None:
         code = make()
@@ -122,7 +123,8 @@ def cached_object(
     return code
 
 
-def _key(tag: str) -> str:
+def tag_key(tag: str) -> str:
+    """The key of what is made of a tag for this machine, see `cached_object`."""
     this = host()
     return key_of(tag, this.triple, this.cpu, this.features, this.llvm, llvmlite.__version__, repr(PASSES))
 
@@ -219,7 +221,12 @@ class MachineFunction:
 
 @dataclass(frozen=True)
 class Build:
-    """How some functions came to be: from the cache or not, the seconds it took, and at which level they began."""
+    """How some functions came to be: from the cache or not, the seconds it took, and at which level they began.
+
+    sizes : numbers that block, parameters and out of each must hold
+    objects, quick : keys of their object files, and of the one of level 0 that they run with meanwhile ('' for none)
+    final : the level that they end at
+    """
 
     names: tuple[str, ...]
     cached: bool
@@ -227,6 +234,10 @@ class Build:
     code: float
     load: float
     level: int = LEVEL
+    sizes: tuple[tuple[int, int, int], ...] = ()
+    objects: tuple[str, ...] = ()
+    quick: str = ""
+    final: int = LEVEL
 
 
 class Library(ByName[MachineFunction]):
@@ -254,7 +265,7 @@ class Library(ByName[MachineFunction]):
         self.layout, self.level, self.hasty = layout, level, hasty
         self.builds: list[Build] = []
         self.notes: list[str] = []
-        self._cache = default_cache() if cache is None else cache
+        self.cache = default_cache() if cache is None else cache
         self._machine = Machine()
         self._later: list[Machine] = []
 
@@ -271,26 +282,59 @@ class Library(ByName[MachineFunction]):
         written = time.perf_counter()
         large = not rarely and self.hasty is not None and text.count("\n") > self.hasty
         texts = pieces(text) if large else [text]
-        known = [self._cache.load(_key(_tag(text, final))) for text in texts]
+        keys = tuple(tag_key(_tag(text, final)) for text in texts)
+        known = [self.cache.load(key) for key in keys]
         hasty = large and None in known
         level = 0 if hasty else final
-        cached = None not in known
         if hasty:
-            codes = [cached_object(_tag(text, 0), lambda: emit_object(text, 0), self._cache)]
+            codes = [cached_object(_tag(text, 0), lambda: emit_object(text, 0), self.cache)]
         else:
             codes = [code or self._made(text, final) for code, text in zip(known, texts, strict=True)]
         made = time.perf_counter()
-        addresses = self._machine.load(codes[0], [f"mbd.{name}" for name in programs], *codes[1:])
-        for (name, outputs), address in zip(programs.items(), addresses, strict=True):
-            self._functions[name] = MachineFunction(name, address, _sizes(outputs, self.layout), self, hasty)
+        sizes = tuple(_sizes(outputs, self.layout) for outputs in programs.values())
+        self._place(tuple(programs), sizes, codes, hasty)
         times = written - begin, made - written, time.perf_counter() - made
-        self.builds.append(Build(tuple(programs), cached, *times, level))
+        quick = tag_key(_tag(text, 0)) if large else ""
+        self.builds.append(Build(tuple(programs), None not in known, *times, level, sizes, keys, quick, final))
         if hasty:
-            submit(_Later(self, list(programs), texts))
+            packed = zlib.compress("\0".join(texts).encode(), 1)
+            self.cache.store(_texts_key(keys), packed)
+            submit(_Later(self, tuple(programs), packed))
+
+    def fetch(self, build: Build) -> bool:
+        """Load functions that were built like this before, without their texts; False where something is not there.
+
+        Functions of many operations whose final code is not complete run at level 0 again, until it is.
+        """
+        begin = time.perf_counter()
+        codes = [self.cache.load(key) for key in build.objects]
+        hasty = bool(build.quick) and None in codes
+        texts: bytes | None = None
+        if hasty:
+            codes, texts = [self.cache.load(build.quick)], self.cache.load(_texts_key(build.objects))
+        if None in codes or (hasty and texts is None):
+            return False
+        made = time.perf_counter()
+        self._place(build.names, build.sizes, [code for code in codes if code], hasty)
+        times = 0.0, made - begin, time.perf_counter() - made
+        self.builds.append(
+            replace(build, cached=not hasty, code=times[1], load=times[2], level=0 if hasty else build.final)
+        )
+        if texts is not None:
+            submit(_Later(self, build.names, texts))
+        return True
+
+    def _place(
+        self, names: Sequence[str], sizes: Sequence[tuple[int, int, int]], codes: Sequence[bytes], provisional: bool
+    ) -> None:
+        """Load object files, and offer their functions."""
+        addresses = self._machine.load(codes[0], [f"mbd.{name}" for name in names], *codes[1:])
+        for name, address, size in zip(names, addresses, sizes, strict=True):
+            self._functions[name] = MachineFunction(name, address, size, self, provisional)
 
     def _made(self, text: str, level: int) -> bytes:
         """The object file of a text that was not in the cache a moment ago."""
-        return cached_object(_tag(text, level), lambda: emit_object(text, level), self._cache)
+        return cached_object(_tag(text, level), lambda: emit_object(text, level), self.cache)
 
     def replace(self, names: Sequence[str], codes: Sequence[bytes]) -> None:
         """Give provisional functions their final code."""
@@ -309,18 +353,27 @@ def _tag(text: str, level: int) -> str:
     return f"level {level}\n{text}"
 
 
-class _Later:
-    """The final code of some functions of a library, made piece by piece; for nobody if the library is gone."""
+def _texts_key(objects: Sequence[str]) -> str:
+    """Of the texts that these object files are made from, for a process that finds some of them only."""
+    return key_of("texts", *objects)
 
-    def __init__(self, library: Library, names: list[str], texts: list[str]) -> None:
-        self.library, self.names, self.texts = weakref.ref(library), names, texts
-        self.codes: list[bytes] = []
+
+class _Later:
+    """The final code of some functions of a library, made piece by piece; for nobody if the library is gone.
+
+    packed : texts of the pieces, which are kept until all of these are there
+    """
+
+    def __init__(self, library: Library, names: Sequence[str], packed: bytes) -> None:
+        self.library, self.names, self.packed = weakref.ref(library), names, packed
+        self.codes, self.texts = list[bytes](), list[str]()
 
     def step(self) -> bool:
         """Make, or fetch, the next piece; exchange the functions when all are there."""
         library = self.library()
         if library is None:
             return False
+        self.texts = self.texts or zlib.decompress(self.packed).decode().split("\0")
         if len(self.codes) < len(self.texts):
             self.codes.append(library._made(self.texts[len(self.codes)], library.level))
             return True

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate, pairwise
@@ -14,10 +14,12 @@ import numpy as np
 
 from mbd.arrays import Vector
 from mbd.compile.backend import Backend, Function, Functions, backend as choose_backend
+from mbd.compile.cache import key_of
 from mbd.compile.layout import Layout
 from mbd.compile.orders import elimination_order, may_pay
 from mbd.compile.postponed import Postponed
 from mbd.compile.python import ArrayFunction, array_function
+from mbd.compile.remembered import Facts, Remembered
 from mbd.equations import programs
 from mbd.equations.charts import chart_end, chart_motion
 from mbd.equations.equations import Equations
@@ -68,6 +70,10 @@ class AccelerationTerms:
     limits: Vector
 
 
+Made = tuple[Mapping[str, Sequence[Node]], Facts]
+"""Programs by name, and what else was found while they were made."""
+
+
 class Mechanism:
     """The programs of a set of equations in one backend.
 
@@ -79,22 +85,16 @@ class Mechanism:
         started = perf_counter()
         self.equations = equations
         self.backend: Backend = choose_backend(backend)
-        common = {"accelerations": programs.accelerations(equations), "guards": programs.guards(equations)}
-        composed = programs.compose(equations)
-        if composed is not None:
-            common["compose"] = composed
-            common["increment_rates"] = programs.increment_rates(equations)
         self.layout = Layout.of(equations)
-        self._accelerations = common["accelerations"]
         self.common: Functions = self.backend.functions(self.layout)
-        self.common.add(common)
-        if composed is not None:
-            self.common.add({"chart_end": chart_end(equations), "chart_motion": chart_motion(equations)}, rarely=True)
-        self.common.add({"scales": programs.scales(equations)}, rarely=True)  # twice a restart, and nowhere else
-        self.judged = programs.is_judged(equations)
-        if self.judged:
-            self.common.add({"terms": programs.guard_terms(equations)}, rarely=True)
-        self.vector = composed is None
+        self._remembered, self._unmade = Remembered(equations, self.common), list[Callable[[], Made]]()
+        self.vector, self.judged = equations.compose is None, programs.is_judged(equations)
+        self._compiled("common", self._made_at_once)
+        if not self.vector:
+            self._compiled("charts", self._charts, rarely=True)
+        rare = {"scales": programs.scales} | ({"terms": programs.guard_terms} if self.judged else {})
+        for name, make in rare.items():  # twice a restart, and nowhere else
+            self._compiled(name, lambda name=name, make=make: ({name: make(equations)}, {}), rarely=True)  # type: ignore[misc]
         self.named: dict[str, Any] = {}
         self.notes: list[str] = []
         self.postponed: list[Postponed] = []
@@ -102,6 +102,39 @@ class Mechanism:
         self._modes: dict[tuple[Any, ...], ModeCode] = {}
         equations.memory["mechanism"] = ref(self)
         self.seconds = perf_counter() - started
+
+    def _compiled(self, question: Hashable, make: Callable[[], Made], rarely: bool = False) -> Facts:
+        """Offer the functions of the programs that are made, from where they are remembered if they are; the facts.
+
+        What was found before is made first if something else must be: the order of nodes on the tape is that of
+        questions, whatever is remembered, and so is the text of all code.
+        """
+        facts = self._remembered.find(question)
+        if facts is not None:
+            self._unmade.append(make)
+            return facts
+        while self._unmade:
+            self._unmade.pop(0)()
+        made, facts = make()
+        if made:
+            self.common.add(made, rarely)
+        self._remembered.keep(question, facts, bool(made))
+        return facts
+
+    def _made_at_once(self) -> Made:
+        """What steps of every mode need."""
+        made = {"accelerations": self._accelerations, "guards": programs.guards(self.equations)}
+        composed = programs.compose(self.equations)
+        if composed is not None:
+            made |= {"compose": composed, "increment_rates": programs.increment_rates(self.equations)}
+        return made, {}
+
+    def _charts(self) -> Made:
+        return {"chart_end": chart_end(self.equations), "chart_motion": chart_motion(self.equations)}, {}
+
+    @cached_property
+    def _accelerations(self) -> list[Node]:
+        return programs.accelerations(self.equations)
 
     def mode(
         self,
@@ -118,15 +151,17 @@ class Mechanism:
         key = (tuple(rows), tuple(penalties), tuple(sliding), tuple(given_rows), stabilized)
         with self.equations.tape.lock:  # runs in other threads share this mechanism
             if key not in self._modes:
-                require_room_for_tangent(len(self.equations.tape.nodes))
-                started = perf_counter()
-                outputs = programs.newton(self.equations, rows, penalties, stabilized, sliding, given_rows)
-                order = self._order(outputs, key[0])
-                self.seconds += perf_counter() - started
-                tangent, residual = self._add(
-                    key, len(self._modes), tangent=lambda *_: outputs, residual=programs.residual
+
+                def make() -> Made:
+                    require_room_for_tangent(len(self.equations.tape.nodes))
+                    outputs = self._of(key, programs.newton)
+                    order = self._order(outputs, key[0])
+                    return {"tangent": outputs, "residual": self._of(key, programs.residual)}, {"order": order}
+
+                facts, (tangent, residual) = self._add("mode", key, ("tangent", "residual"), make)
+                self._modes[key] = ModeCode(
+                    key[0], key[1], key[2], tangent, residual, given_rows=key[3], order=_numbers(facts["order"])
                 )
-                self._modes[key] = ModeCode(key[0], key[1], key[2], tangent, residual, given_rows=key[3], order=order)
             return self._modes[key]
 
     def stepping(
@@ -163,36 +198,48 @@ class Mechanism:
         key = (*mode, "explicit")
         with self.equations.tape.lock:
             if key not in self._modes:
-                started, number, n, m = perf_counter(), len(self._modes), self.layout.n, len(rows)
+                n, m = self.layout.n, len(rows)
                 tail = n + (2 if stabilized else 1) * m
                 size = (n + m) ** 2 + tail + (m * self.layout.n_v if stabilized else 0)
-                tangent = self._later(mode, number, size, tangent=self._newton)
-                residual = self._later(mode, number, tail, residual=programs.residual)
-                order = None
-                pays = may_pay(self._accelerations, n, self.layout.n_rows, sorted(rows))
-                if pays and not tangent_refused(len(self.equations.tape.nodes)):  # whose pattern is that of both
-                    outputs = programs.newton(self.equations, rows, penalties, stabilized, sliding, given_rows)
-                    order = self._order(outputs, rows)
+                tangent = self._later("tangent", mode, size, self._newton)
+                residual = self._later("residual", mode, tail, programs.residual)
+
+                def make() -> Made:
+                    order = None
+                    pays = may_pay(self._accelerations, n, self.layout.n_rows, sorted(rows))
+                    if pays and not tangent_refused(len(self.equations.tape.nodes)):  # whose pattern is that of both
+                        order = self._order(self._of(mode, programs.newton), rows)
+                    return {}, {"order": order}
+
+                order = _numbers(self._add("explicit", mode, (), make)[0]["order"])
                 self._modes[key] = ModeCode(*mode[:3], tangent, residual, given_rows=mode[3], order=order)
-                self.seconds += perf_counter() - started
             return self._modes[key]
 
     def _straight(self, mode: Any) -> ModeCode | None:
         """A mode with factors, None where they do not pay."""
-        require_room_for_tangent(len(self.equations.tape.nodes))
-        started, number = perf_counter(), len(self._modes)
-        rows, penalties, sliding, _, stabilized = mode
-        found = programs.correction(self.equations, rows, penalties, stabilized, sliding)
-        self.seconds += perf_counter() - started
-        if found is None:
+        names = "residual", "correction", "solution"
+
+        def make() -> Made:
+            require_room_for_tangent(len(self.equations.tape.nodes))
+            rows, penalties, sliding, _, stabilized = mode
+            found = programs.correction(self.equations, rows, penalties, stabilized, sliding)
+            if found is None:
+                return {}, {"tail": None}
+            residual = self._of(mode, programs.residual)
+            return dict(zip(names, (residual, found.outputs, found.solution), strict=True)), {"tail": found.tail}
+
+        facts, functions = self._add("straight", mode, names, make)
+        if facts["tail"] is None:
             return None
-        outputs, solution = found.outputs, found.solution
-        residual, first, again = self._add(
-            mode, number, residual=programs.residual, correction=lambda *_: outputs, solution=lambda *_: solution
-        )
-        size = (self.layout.n + len(rows)) ** 2 + found.tail
-        tangent = self._later(mode, number, size, tangent=self._newton)
-        return ModeCode(rows, penalties, sliding, tangent, residual, first, again)
+        residual, first, again = functions
+        size = (self.layout.n + len(mode[0])) ** 2 + facts["tail"]
+        tangent = self._later("tangent", mode, size, self._newton)
+        return ModeCode(mode[0], mode[1], mode[2], tangent, residual, first, again)
+
+    def _of(self, mode: Any, make: Callable[..., Sequence[Node]]) -> Sequence[Node]:
+        """A program of a mode (rows, penalties, frictions, given rows, form)."""
+        rows, penalties, sliding, given_rows, stabilized = mode
+        return make(self.equations, rows, penalties, stabilized, sliding, given_rows)
 
     def _newton(self, equations: Equations, *mode: Any) -> Sequence[Node]:
         """`programs.newton` within a run, which ends in order where it does not fit into the memory that is free."""
@@ -201,30 +248,40 @@ class Mechanism:
             raise MemoryLimitError(f"a step needs the tangent as a matrix: {refused}")
         return programs.newton(equations, *mode)
 
-    def _later(self, mode: Any, number: int, size: int, **maker: Callable[..., Sequence[Node]]) -> Postponed:
+    def _later(self, name: str, mode: Any, size: int, maker: Callable[..., Sequence[Node]]) -> Postponed:
         """A program of a mode, of so many outputs, that is compiled when it is called first."""
-        later = Postponed(lambda: self._add(mode, number, **maker)[0], size)
+
+        def make() -> Function:
+            return self._add(name, mode, (name,), lambda: ({name: self._of(mode, maker)}, {}))[1][0]
+
+        later = Postponed(make, size)
         self.postponed.append(later)
         return later
 
-    def _order(self, tangent: Sequence[Node], rows: Sequence[int]) -> Any:
+    def _order(self, tangent: Sequence[Node], rows: Sequence[int]) -> list[int] | None:
         """The order in which the matrices of these rows are eliminated, None where it does not pay."""
-        return elimination_order(tangent, self._accelerations, self.layout.n, self.layout.n_rows, sorted(rows))
+        found = elimination_order(tangent, self._accelerations, self.layout.n, self.layout.n_rows, sorted(rows))
+        return None if found is None else list(found.tolist())
 
-    def _add(self, mode: Any, number: int, **makers: Callable[..., Sequence[Node]]) -> list[Function]:
-        """Compile programs of a mode (rows, penalties, frictions, given rows, form), with its number in their names."""
-        rows, penalties, sliding, given_rows, stabilized = mode
+    def _add(
+        self, kind: str, mode: Any, names: Sequence[str], make: Callable[[], Made]
+    ) -> tuple[Facts, list[Function]]:
+        """Compile those programs of a mode that there are not yet, with the mode in their names; facts and functions.
+
+        There are none where `make` makes none.
+        """
+        own = f"_{key_of(repr(mode))[:16]}"
         with self.equations.tape.lock:
             started = perf_counter()
-            names = {f"{name}_{number}": make for name, make in makers.items()}
-            self.common.add(
-                {
-                    name: make(self.equations, rows, penalties, stabilized, sliding, given_rows)
-                    for name, make in names.items()
-                }
-            )
+            wanted = tuple(name for name in names if name + own not in self.common)
+
+            def named() -> Made:
+                made, facts = make()
+                return {name + own: made[name] for name in wanted if name in made}, facts
+
+            facts = self._compiled((kind, mode, wanted), named)
             self.seconds += perf_counter() - started
-            return [self.common[name] for name in names]
+            return facts, [self.common[name + own] for name in names if name + own in self.common]
 
     @cached_property
     def energies(self) -> ArrayFunction:
@@ -324,6 +381,11 @@ class Mechanism:
             "chart_end": 3 * layout.n_v,
             "chart_motion": 2 * layout.n_v,
         }
+
+
+def _numbers(order: Sequence[int] | None) -> Any:
+    """An order of elimination as the kernel reads it."""
+    return None if order is None else np.array(order, dtype=np.int64)
 
 
 def rate_names(equations: Equations) -> dict[str, int]:

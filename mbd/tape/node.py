@@ -7,7 +7,7 @@ found again as ``-(s*x + c*y)``. An effect whose factor is an exact zero therefo
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Collection, Hashable, Sequence
 from threading import RLock
 from typing import Any, NoReturn, TypeAlias
 
@@ -180,6 +180,10 @@ class Tape:
             node = self._known[key] = Node(self, len(self.nodes), op, args, data)
             self.nodes.append(node)
         return node
+
+    def keys(self) -> Collection[Hashable]:
+        """What each node is, in order: its operation, and numbers of nodes, a value or the key of an input."""
+        return self._known.keys()
 
     def constant(self, number: float) -> Node:
         node = self._numbers.get(number) if number.__class__ is float else None

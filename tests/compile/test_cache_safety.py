@@ -120,15 +120,15 @@ def test_whatever_is_usual_for_new_files_the_entries_are_of_this_user_alone(tmp_
 
 
 def test_passes_and_versions_are_part_of_the_key(monkeypatch):
-    keys = {llvm._key("tag")}
+    keys = {llvm.tag_key("tag")}
     for place, name, value in (
         (llvm.PASSES, "speed_level", 2), (llvm.PASSES, "slp_vectorization", False), (llvm.PASSES, "from level", 4),
     ):  # fmt: skip
         with monkeypatch.context() as patch:
             patch.setitem(place, name, value)
-            keys.add(llvm._key("tag"))
+            keys.add(llvm.tag_key("tag"))
     monkeypatch.setattr(llvm.llvmlite, "__version__", "0.0")
-    keys.add(llvm._key("tag"))
+    keys.add(llvm.tag_key("tag"))
     assert len(keys) == 5
 
 

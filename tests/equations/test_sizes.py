@@ -12,6 +12,8 @@ from mbd.equations import programs, sizes
 from mbd.topology.plan import plan
 from tests.simulation.test_transactions import stiff
 
+pytestmark = pytest.mark.usefixtures("made_afresh")  # of programs that are made in other ways
+
 
 def chain(count, axis=(0.0, 0.0, 1.0), spread=1, **more):
     """Links that follow each other, or `spread` such chains beside each other."""

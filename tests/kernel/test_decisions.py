@@ -116,6 +116,7 @@ def test_machine_code_and_plain_python_decide_alike(seed):
     assert decisions(model, start, scheme, dt, until) == decisions(model, start, scheme, dt, until, "python")
 
 
+@pytest.mark.usefixtures("made_afresh")
 @pytest.mark.parametrize("tried", ["as it is", "massless coordinates among the pivots"])
 def test_a_pivot_of_round_off_leads_no_step_astray(tried, monkeypatch):
     """A massless coordinate has a geometric stiffness of round-off: no pivot; and if it were, a search takes over."""

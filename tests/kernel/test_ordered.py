@@ -25,6 +25,8 @@ from mbd.kernel.records import Kernel
 from mbd.tape.ordering import Order, order
 from tests.simulation.singular_linkages import four_bars
 
+pytestmark = pytest.mark.usefixtures("made_afresh")  # of programs that are made in other ways
+
 
 def saddle(rng, n, m, density=0.2):
     """M, R and B with few entries; M definite, rows independent."""
