@@ -74,8 +74,8 @@ class Body(Parameterized, ABC):
         return {name: Frame(self, name, triple(place, name), landmark=name) for name, place in places.items()}
 
     def frame(self, name: str) -> Frame:
-        """One of its own frames: 'origin', 'center', …"""
-        frames = self.frames
+        """One of its own frames, 'origin', 'center', …, or a named point that was made on it: 'toe'."""
+        frames = {point.name: point for point in self.points.values()} | self.frames
         if name not in frames:
             raise ModelError(f"body '{self.name}': " + nearest(name, frames, "frame", "The body has"))
         return frames[name]

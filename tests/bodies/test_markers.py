@@ -148,3 +148,13 @@ def test_markers_that_share_a_name_are_faults():
     faults = "\n".join(model.check())
     assert "the marker 'knee' has the name of something else" in faults
     assert "two markers are named 'post', on 'ground' and 'shank'" in faults or "on 'shank' and 'ground'" in faults
+
+
+def test_a_named_point_is_found_by_its_name_on_the_body():
+    """As its own frames are; the error lists both."""
+    foot = mbd.RigidBody("foot", 1.0, (0.01, 0.01, 0.01))
+    toe = foot.point(0.1, -0.05, 0.0, name="toe")
+    assert foot.frame("toe") == toe
+    assert mbd.human(70.0, 1.7).bodies["left foot"].frame("outer ball").offset[1] < 0.0
+    with pytest.raises(ModelError, match="did you mean 'toe'"):
+        foot.frame("tow")
