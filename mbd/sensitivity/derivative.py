@@ -36,8 +36,10 @@ def final_state_derivative(
 
     Returns
     -------
-    (n_q + n_v, D), (D,)
-        total derivatives: those of the state by its own instant are part of the first, where an event ends the run
+    (n_v + n_v, D), (D,)
+        of the configuration along velocities, which are those of coordinates where these add, and of an orientation a
+        small rotation vector in the child's axes; then of velocities. Total derivatives: those of the state by its own
+        instant are part of the first, where an event ends the run
 
     Raises
     ------

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from mbd.arrays import Vector
 from mbd.compile.backend import Function
-from mbd.sensitivity.kernel.sizes import PARTS, ROWS, WIDTH
+from mbd.sensitivity.kernel.sizes import BASE, COLUMNS, PARTS, ROWS, WIDTH
 from mbd.sensitivity.motion import Mode, Motion
 from mbd.sensitivity.programs import Programs
 
@@ -75,9 +75,11 @@ def _made(programs: Programs, name: str, mode: Mode, stabilized: bool) -> System
         entries[:, k] = part
     held = np.zeros(R)
     held[list(mode.held)] = 1.0
+    charts, bases = programs.charts.groups, c.count - R + m - (c.base.stop - c.base.start)
     sizes = np.array([
         n, c.n_v, layout.n_q, R, m, 0, len(kept), c.count - R + m, int(stabilized), layout.q, layout.v, layout.a,
-        layout.lam,
+        layout.lam, layout.x if charts else layout.q, bases, len(charts),
+        *(number for each in charts for number in (each.first, each.size)),
     ], dtype=np.int64)  # fmt: skip
     return System(
         program.function, sizes, rows, _fast(programs, mode), held, entries.ravel(), size + len(program.lines)
@@ -115,12 +117,11 @@ def stacked(motion: Motion, system: System) -> Vector:
     """Derivatives of a state by the columns of the system, with zeros up to its width."""
     tangent, sizes = motion.tangent, system.sizes
     n, m, n_v = int(sizes[0]), int(sizes[ROWS]), len(tangent.q)
-    first = n_v + 2 * n + m
-    count = first + 1 + len(tangent.anchors) + len(tangent.p)
-    out = np.zeros((count, padded(len(tangent.t))))
+    first, last = n_v + 2 * n + m, int(sizes[BASE])
+    out = np.zeros((int(sizes[COLUMNS]), padded(len(tangent.t))))
     width = len(tangent.t)
     out[:n_v, :width], out[n_v : n_v + n, :width] = tangent.q, tangent.y
     out[first, :width] = tangent.t
     out[first + 1 : first + 1 + len(tangent.anchors), :width] = tangent.anchors
-    out[first + 1 + len(tangent.anchors) :, :width] = tangent.p
+    out[first + 1 + len(tangent.anchors) : last, :width] = tangent.p
     return out

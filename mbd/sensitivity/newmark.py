@@ -20,6 +20,7 @@ from mbd.sensitivity.balance import consistent_rates
 from mbd.sensitivity.kernel.newmark_prediction import FOLLOWED
 from mbd.sensitivity.motion import Mode, Motion, Rates, Tangent, solved
 from mbd.sensitivity.programs import Columns, Programs
+from mbd.sensitivity.run_data import refused
 from mbd.sensitivity.schemes import Memory
 
 __all__ = ["NewmarkSteps"]
@@ -60,10 +61,12 @@ class NewmarkSteps:
         full = self.full if full is None else full
         if self.jerk == 0.0 and not (self.stabilized and mode.rows):
             return Memory(rates, rates.rate.copy(), rates.of_rate.copy(), full)
-        c, ahead, tangent = self.programs.columns, full / 16.0, motion.tangent
+        c, charts, ahead, tangent = self.programs.columns, self.programs.charts, full / 16.0, motion.tangent
+        way = ahead * motion.y[: c.n_v]
+        of_q = charts.carried(motion.q, way, tangent.q, ahead * tangent.y[: c.n_v])
         later = Motion(
-            motion.t + ahead, motion.q + ahead * motion.y[: c.n_v], motion.y + ahead * rates.rate, motion.anchors,
-            replace(tangent, q=tangent.q + ahead * tangent.y[: c.n_v], y=tangent.y + ahead * rates.of_rate),
+            motion.t + ahead, charts.compose(motion.q, way), motion.y + ahead * rates.rate, motion.anchors,
+            replace(tangent, q=of_q, y=tangent.y + ahead * rates.of_rate),
         )  # fmt: skip
         then = consistent_rates(self.programs, later, mode, rates)
         part = self.jerk * full / ahead
@@ -91,7 +94,15 @@ class NewmarkSteps:
     def step(
         self, motion: Motion, memory: Memory, mode: Mode, end: tuple[float, Vector, Vector], rates: Rates, dh: Vector
     ) -> tuple[Motion, Memory]:
-        """The motion after a step to the row (t₁, q₁, y₁) with these rates and multipliers; dh (D,) by its size."""
+        """The motion after a step to the row (t₁, q₁, y₁) with these rates and multipliers; dh (D,) by its size.
+
+        Raises
+        ------
+        CapabilityError
+            where coordinates do not add: least solutions are known only where they do.
+        """
+        if not self.programs.charts.is_vector:
+            raise refused(f"the equations of the step to t = {end[0]:.9g} s are singular")
         c, h = self.programs.columns, end[0] - motion.t
         guess = self._predicted(motion, memory, h, rates.rate, dh)
         a0, a1 = self._averages(memory, h, rates.rate)
@@ -280,13 +291,14 @@ class NewmarkSteps:
 
     def brief(self, motion: Motion, memory: Memory, mode: Mode, t1: float, dh: Vector) -> tuple[Motion, Memory]:
         """A step of Heun's method with consistent accelerations."""
-        n_v, h = self.programs.columns.n_v, t1 - motion.t
+        n_v, charts, h = self.programs.columns.n_v, self.programs.charts, t1 - motion.t
         first, last = memory.rates, memory.rates
         for _ in range(2):
             mean, of_mean = first.rate / 3.0 + last.rate / 6.0, first.of_rate / 3.0 + last.of_rate / 6.0
-            q = motion.q + h * (motion.y + h * mean)[:n_v]
-            of_q = motion.tangent.q + h * (motion.tangent.y + h * of_mean)[:n_v]
-            of_q = of_q + (motion.y + 2.0 * h * mean)[:n_v, np.newaxis] * dh
+            way = h * (motion.y + h * mean)[:n_v]
+            of_way = h * (motion.tangent.y + h * of_mean)[:n_v]
+            of_way = of_way + (motion.y + 2.0 * h * mean)[:n_v, np.newaxis] * dh
+            q, of_q = charts.compose(motion.q, way), charts.carried(motion.q, way, motion.tangent.q, of_way)
             sum_ = first.rate + last.rate
             y = motion.y + 0.5 * h * sum_
             of_y = motion.tangent.y + 0.5 * h * (first.of_rate + last.of_rate) + 0.5 * sum_[:, np.newaxis] * dh

@@ -42,13 +42,17 @@ def taken(
     by_size = np.zeros(w)
     by_size[:width] = dh
     done = entry(newmark_steps)(
-        [known.function], programs.values, sizes, numbers, len(time) - 1, time, q, y, rate, lam * known.held,
+        [known.function, *programs.charts.programs()],
+        programs.values, sizes, numbers, len(time) - 1, time, q, y, rate, lam * known.held,
         known.rows, known.entries, block[0], block[1], np.empty(known.outputs), np.empty(known.outputs), memories, X, Z,
         Z.copy(), by_size, np.empty(size * size), np.empty(size * w), np.empty((n + m) ** 2), np.empty(n + m),
-        np.empty(size, dtype=np.int64), np.empty(4 * n + 2 * m),
+        np.empty(size, dtype=np.int64), np.empty(4 * n + 2 * m), *programs.charts.room(w),
     )  # fmt: skip
-    if done == 0:
+    if done == 0 or done == -1:
         return 0, motion, memory
+    if done < 0:
+        first: Rows = (rows[0][:-done], rows[1][:-done], rows[2][:-done], rows[3][:-done], rows[4][:-done])
+        return taken(steps, motion, memory, mode, first, dh)
     tangent = replace(motion.tangent, t=Z[n_v + 2 * n + m, :width], q=Z[:n_v, :width], y=Z[n_v : n_v + n, :width])
     end = Motion(float(time[done]), q[done].copy(), y[done].copy(), motion.anchors, tangent)
     return done, end, _memory(rate[done].copy(), np.array(rows[4][done]), memories, X[:, :width], known, twofold)
@@ -70,10 +74,11 @@ def ended(steps: NewmarkSteps, motion: Motion, memory: Memory, mode: Mode, time:
     programs.fill(block, motion.at(mode, guess.rate, guess.lam))
     numbers = np.array([steps.alpha_m, steps.alpha_f, steps.beta, steps.gamma, steps.full])
     singular = entry(newmark_end)(
-        [known.function], programs.values, known.sizes, numbers, *rows, known.rows, known.fast, known.entries, block[0],
+        [known.function, *programs.charts.programs()],
+        programs.values, known.sizes, numbers, *rows, known.rows, known.fast, known.entries, block[0],
         block[1], np.empty(known.outputs), _numbers(memory, n_v), np.empty((n + m) ** 2), np.empty((n + m) ** 2),
         np.empty(n + m), np.empty(2 * n_v), np.empty(n + m, dtype=np.int64), np.empty(n + m, dtype=np.int64),
-        np.empty(4 * n + 2 * m),
+        np.empty(4 * n + 2 * m), *programs.charts.room(4)[:2],
     )  # fmt: skip
     return None if singular else rows
 

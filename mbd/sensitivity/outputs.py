@@ -14,7 +14,7 @@ from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.run_data import RunRows, refused
 from mbd.sensitivity.walk import Passed
 
-__all__ = ["Lines", "lines_of", "usual"]
+__all__ = ["Lines", "lines_of", "taken_apart", "usual"]
 
 SAME = 1e-7
 """Difference of a result from that of the run, over its size, that is round-off [-]."""
@@ -34,6 +34,17 @@ def usual(rows: RunRows) -> list[str]:
     equations = rows.mechanism.equations
     names = [each.name for each in equations.coordinates] + list(equations.velocity_names)
     return [*names, *(state.name for state in equations.states), "time"]
+
+
+def taken_apart(rows: RunRows, names: Sequence[str]) -> list[str]:
+    """Names of single results: of 'hip.orientation' and 'hip.euler.zxy' those of their parts."""
+    found = list[str]()
+    for name in names:
+        try:
+            found += rows.run.columns.components(name)
+        except UnknownNameError:  # the instant of an event, or no name at all
+            found.append(name)
+    return found
 
 
 def instant_of(name: str, found: Passed) -> tuple[float, Vector] | None:

@@ -2,9 +2,10 @@
 
 Each program lists values and, row by row, those of their derivatives by the columns
 
-    x (n_v) | v, z (n) | v̇, ż (n) | λ (R) | t | anchors | chosen parameters
+    x (n_v) | v, z (n) | v̇, ż (n) | λ (R) | t | anchors | chosen parameters | bases of charts
 
-that are not always zero.
+that are not always zero. Where coordinates do not add, x is the increment from the q of the block, and only `steps` and
+`consistent` depend on the base (`mbd.sensitivity.charts`).
 
 =============  =============================================================================================
 `steps`        r (n), h (R), ḣ (R): the balance over all rows, penalties behind their switches, frictions behind slips
@@ -35,6 +36,7 @@ from mbd.equations.equations import Equations
 from mbd.equations.inputs import Inputs
 from mbd.equations.linearization import along_places, row_changes
 from mbd.equations.programs import switched_balance
+from mbd.sensitivity.charts import Charts, based, chart_columns
 from mbd.tape.derivatives import jvps
 from mbd.tape.node import Node
 
@@ -53,15 +55,17 @@ class Columns:
     rows: int
     anchors: int
     parameters: int
+    bases: int = 0
 
     @classmethod
-    def of(cls, layout: Layout, parameters: int) -> Columns:
+    def of(cls, equations: Equations, layout: Layout, parameters: int) -> Columns:
         """Those of a mechanism with so many chosen parameters."""
-        return cls(layout.n_v, layout.n, layout.n_rows, layout.n_anchors, parameters)
+        bases = len(based(equations))
+        return cls(layout.n_v, layout.n, layout.n_rows, layout.n_anchors, parameters, bases)
 
     @cached_property
     def _starts(self) -> list[int]:
-        lengths = [0, self.n_v, self.n, self.n, self.rows, 1, self.anchors, self.parameters]
+        lengths = [0, self.n_v, self.n, self.n, self.rows, 1, self.anchors, self.parameters, self.bases]
         return [int(start) for start in np.cumsum(lengths)]
 
     def _part(self, number: int) -> slice:
@@ -94,6 +98,10 @@ class Columns:
     @cached_property
     def p(self) -> slice:
         return self._part(6)
+
+    @cached_property
+    def base(self) -> slice:
+        return self._part(7)
 
     @cached_property
     def count(self) -> int:
@@ -140,8 +148,11 @@ class Programs:
         self.mechanism, self.places = mechanism, tuple(places)
         self.equations, self.layout = mechanism.equations, mechanism.layout
         key = f"columns of {len(self.places)} parameters"
-        self.columns: Columns = mechanism.named.setdefault(key, Columns.of(self.layout, len(self.places)))
+        self.columns: Columns = mechanism.named.setdefault(
+            key, Columns.of(self.equations, self.layout, len(self.places))
+        )
         self.values = np.ascontiguousarray(values, dtype=float) if len(values) else np.zeros(1)
+        self.charts = Charts(mechanism)
         self._block = np.zeros(self.layout.size)
         self._given: dict[str, list[Node]] = {}
 
@@ -206,7 +217,7 @@ class Programs:
             symbol = f"derivative_{len(mechanism.common)}"
             with mechanism.equations.tape.lock:
                 values = self._values(name)
-                columns = derivatives(self.equations, values, self.places)
+                columns = derivatives(self.equations, values, self.places, name in ("steps", "consistent"))
                 found = [
                     (i, j, column[i]) for i in range(len(values)) for j, column in enumerate(columns)
                     if not column[i].is_zero
@@ -262,15 +273,21 @@ class Programs:
         return [equations.output(name.removeprefix("result "))]
 
 
-def derivatives(equations: Equations, values: Sequence[Node], places: Sequence[int]) -> list[list[Node]]:
-    """Columns of ∂values by x, (v, z), (v̇, ż), λ, t, anchors and these parameters."""
+def derivatives(
+    equations: Equations, values: Sequence[Node], places: Sequence[int], bases: bool = False
+) -> list[list[Node]]:
+    """Columns of ∂values by x, (v, z), (v̇, ż), λ, t, anchors, these parameters, and, if asked for, bases of charts."""
     if not values:
-        return [[] for _ in range(Columns.of(Layout.of(equations), len(places)).count)]
+        return [[] for _ in range(Columns.of(equations, Layout.of(equations), len(places)).count)]
     inputs, tape = Inputs.of(equations), equations.tape
     anchors = [tape.input("anchor", k) for k in range(equations.n_anchors)]
     parameters = [tape.input("p", k) for k in places]
     others = (*inputs.v, *inputs.z, *inputs.a, *inputs.s, *inputs.lam, inputs.t, *anchors, *parameters)
-    return [*along_places(equations, values), *jvps(values, [{node: 1.0} for node in others])]
+    by_others = jvps(values, [{node: 1.0} for node in others])
+    if equations.chart is None:
+        return [*along_places(equations, values), *by_others]
+    by_places, by_bases = chart_columns(equations, values, bases)
+    return [*by_places, *by_others, *by_bases]
 
 
 def run_many(function: Function, blocks: Matrix, parameters: Vector, out: Matrix) -> None:

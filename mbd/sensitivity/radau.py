@@ -21,7 +21,7 @@ from mbd.sensitivity.kernel.build import entry
 from mbd.sensitivity.kernel.radau import radau_steps
 from mbd.sensitivity.motion import Mode, Motion, Rates, solved
 from mbd.sensitivity.programs import Columns, Programs
-from mbd.sensitivity.run_data import Rows
+from mbd.sensitivity.run_data import Rows, refused
 from mbd.sensitivity.schemes import Memory, SchemeSteps
 
 __all__ = ["RadauSteps"]
@@ -77,6 +77,8 @@ class RadauSteps(SchemeSteps):
         rows = self.rows.step_to(row, motion, memory.rates)
         rows[0][1] = time
         done, end, found = taken(self.programs, motion, memory.rates, mode, rows, dh, False)
+        if not (done or self.programs.charts.is_vector):
+            raise refused(f"the equations of the step to t = {time:.9g} s are singular")
         yield (end, found) if done else self._least(motion, memory, mode, time, dh, row)
 
     def _least(
@@ -291,11 +293,12 @@ def taken(
     numbers = np.concatenate([RADAU.c, np.ravel(RADAU.A), np.ravel(SQUARE), [RADAU.real]])
     outputs = level.outputs
     done = entry(radau_steps)(
-        [known.function, level.function], programs.values, level.of_width(width), known.of_width(width), numbers,
+        [known.function, level.function, *programs.charts.programs()], programs.values,
+        level.of_width(width), known.of_width(width), numbers,
         len(time) - 1, int(checked), outputs, time, q, y, rate, active, known.rows, known.fast, level.entries,
         known.entries, block, np.empty(max(known.outputs, outputs)), np.empty(3 * outputs), np.empty(outputs),
         np.empty(6 * size), X, Z, np.empty(3 * Z.size), by_size, np.empty(unknowns**2), np.empty(unknowns * w),
-        np.empty(unknowns), np.empty(size**2), np.empty(unknowns, dtype=np.int64),
+        np.empty(unknowns), np.empty(size**2), np.empty(unknowns, dtype=np.int64), *programs.charts.stage_room(w),
     )  # fmt: skip
     if done == 0:
         return 0, motion, rates

@@ -6,11 +6,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from mbd.arrays import Vector
+from mbd.arrays import Matrix, Vector
 from mbd.compile.mechanism import rate_names
 from mbd.constraints.expressions import is_expression
 from mbd.equations.equations import Equations
 from mbd.errors import MbdError
+from mbd.joints.quaternions import quaternion_product
 from mbd.sensitivity.motion import Mode, Motion, Rates
 from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.run_data import refused
@@ -56,14 +57,34 @@ def after_reset(
     coordinates = {each.name: k for k, each in enumerate(equations.coordinates)}
     speeds = {name: k for name, k in rate_names(equations).items() if name not in coordinates}
     speeds |= {state.name: equations.n_v + k for k, state in enumerate(equations.states)}
-    q, y = motion.tangent.q.copy(), motion.tangent.y.copy()
+    places = {int(place): k for k, place in enumerate(equations.configuration.places) if place >= 0}
+    q, y, turned = motion.tangent.q.copy(), motion.tangent.y.copy(), dict[int, Vector]()
     for name, change in zip(names, found, strict=True):
-        if name in coordinates:
-            q[coordinates[name]] = change
+        if name in coordinates and coordinates[name] in places:
+            q[places[coordinates[name]]] = change
+        elif name in coordinates:
+            turned[coordinates[name]] = change
         else:
             known = name if name in speeds else f"{name.removesuffix('_rate')}.rate"
             y[speeds[known]] = change
+    if turned:
+        _turn(equations, turned, row[0], q, guard.name)
     return replace(motion, q=row[0], y=row[1]).with_tangent(q=q, y=y)
+
+
+def _turn(equations: Equations, turned: Mapping[int, Vector], at: Vector, q: Matrix, name: str) -> None:
+    """The tangents (n_v, D) of orientations that a reset sets by the parts of their quaternions: 2 q* ⊗ δq."""
+    for joint, first_q, first_v in equations.configuration.charts:
+        own = range(first_q + joint.adding, first_q + len(joint.labels))
+        given = [turned[k] for k in own if k in turned]
+        if not given:
+            continue
+        if joint.orientation is None or len(given) < len(own):
+            raise refused(f"the reset of {name!r} sets a part of what tells how {joint.name!r} turns", "set all parts")
+        w, x, y, z = at[own.start : own.stop]
+        q[first_v + joint.adding : first_v + joint.adding + 3] = [
+            2.0 * part for part in quaternion_product([w, -x, -y, -z], given)[1:]
+        ]
 
 
 def _expressions(equations: Equations, reset: Any, name: str) -> dict[str, Node]:

@@ -61,10 +61,14 @@ class Sensitivities:
         return cls(of, wrt, matrix, values, run, units[0], units[1], written=tuple(map(str, words.get("written", ()))))
 
     def __getitem__(self, names: str | tuple[str, str]) -> Any:
-        """A derivative by the names of its line and column, or a line by its name alone."""
+        """A derivative by the names of its line and column, or a line by its name alone.
+
+        Several where a name has parts: ``found["hip.angular_velocity", "hip.orientation"]`` is a matrix (3, 3).
+        """
         line, column = (names, None) if isinstance(names, str) else names
-        row = _place(line, self.of, "line")
-        return self.matrix[row] if column is None else float(self.matrix[row, _place(column, self.wrt, "column")])
+        rows, columns = _place(line, self.of, "line"), slice(None) if column is None else _turn(column, self.wrt)
+        found = self.matrix[rows][..., columns]
+        return float(found) if np.ndim(found) == 0 else found
 
     def __len__(self) -> int:
         return len(self.of)
@@ -123,7 +127,17 @@ class Sensitivities:
         return [f"{name} [{unit}]" if unit else name for name, unit in zip(names, known, strict=True)]
 
 
-def _place(name: str, names: tuple[str, ...], kind: str) -> int:
+def _turn(name: str, names: tuple[str, ...]) -> int | list[int]:
+    """The column of a name, those of the three turns of an orientation."""
+    stem = name.removesuffix(".orientation")
+    return _place(f"{stem}.turn" if stem != name and name not in names else name, names, "column")
+
+
+def _place(name: str, names: tuple[str, ...], kind: str) -> int | list[int]:
+    """The place of a name, those of its parts where it has some."""
     if name not in names:
+        parts = [k for k, each in enumerate(names) if each.rpartition(".")[0] == name]
+        if len(parts) > 1:
+            return parts
         raise UnknownNameError(nearest(name, names, kind, "There are"))
     return names.index(name)

@@ -67,8 +67,6 @@ class RunRows:
             raise refused("controllers decide in it, whose feedback is not differentiated", HELD)
         if any(friction.partner >= 0 for friction in record.equations.frictions):
             raise refused("a contact of it slides in a plane in space, where the direction of friction turns with it")
-        if record.equations.compose is not None:
-            raise refused("joints of its model have coordinates that do not add, such as a quaternion")
 
     @cached_property
     def record(self) -> Record:

@@ -21,7 +21,7 @@ from mbd.sensitivity.kernel.build import entry
 from mbd.sensitivity.kernel.runge_kutta import runge_kutta_steps
 from mbd.sensitivity.motion import Mode, Motion, Rates, solved
 from mbd.sensitivity.programs import Programs
-from mbd.sensitivity.run_data import Rows
+from mbd.sensitivity.run_data import Rows, refused
 from mbd.sensitivity.schemes import Memory, SchemeSteps
 
 __all__ = ["RungeKuttaSteps"]
@@ -65,6 +65,8 @@ class RungeKuttaSteps(SchemeSteps):
         rows = self.rows.step_to(row, motion, memory.rates)
         rows[0][1] = time
         done, end, found = taken(self.programs, motion, memory.rates, mode, rows, dh, False)
+        if not (done or self.programs.charts.is_vector):
+            raise refused(f"the equations of the step to t = {time:.9g} s are singular")
         yield (end, found) if done else self._least(motion, memory, mode, time, dh)
 
     def _least(self, motion: Motion, memory: Memory, mode: Mode, time: float, dh: Vector) -> tuple[Motion, Rates]:
@@ -154,11 +156,13 @@ def taken(
     tableau = np.concatenate([END, NODES, np.ravel(WEIGHTS)])
     slopes, of_slopes = np.empty((2, STAGES * n)), np.empty((2, STAGES * n * w))
     done = entry(runge_kutta_steps)(
-        [known.function, level.function], programs.values, known.of_width(width), level.of_width(width), tableau,
+        [known.function, level.function, *programs.charts.programs()], programs.values,
+        known.of_width(width), level.of_width(width), tableau,
         len(time) - 1, int(checked), time, q, y, rate, active, known.rows, known.fast, known.entries,
         level.entries, block[0], block[1], np.empty(max(known.outputs, level.outputs)), np.empty(level.outputs),
         slopes[0], slopes[1], of_slopes[0], of_slopes[1], X, Z, Z.copy(), by_size, np.empty(size * size),
         np.empty(size * size), np.empty(size * w), np.empty(size), np.empty(size), np.empty(size, dtype=np.int64),
+        *programs.charts.room(w),
     )  # fmt: skip
     if done == 0:
         return 0, motion, rates

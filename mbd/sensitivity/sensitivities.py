@@ -13,11 +13,12 @@ from mbd.integrators import Integrator
 from mbd.results.units import unit
 from mbd.sensitivity.derivative import passed
 from mbd.sensitivity.functions import rates_of_parameters
-from mbd.sensitivity.outputs import lines_of, usual
+from mbd.sensitivity.outputs import lines_of, taken_apart, usual
 from mbd.sensitivity.result import Sensitivities
 from mbd.sensitivity.run_data import HELD, refused
 from mbd.sensitivity.sequence import amounts_of, changed_sequences
-from mbd.sensitivity.starts import restitution_names, start_names
+from mbd.sensitivity.starts import restitution_names
+from mbd.sensitivity.tangent_names import expanded, refuse_parts, start_names, whole_names
 from mbd.simulation.simulate import REST_SPEED, simulate
 from mbd.state import State
 from mbd.trajectory import Trajectory
@@ -58,12 +59,15 @@ def sensitivities(
     ----------
     model, start, integrator, dt, tol, until, parameters, impact, rest_speed, backend : see `mbd.simulate`; the scheme
         is of the Newmark family, `mbd.RungeKutta853` or `mbd.RadauIIA`
-    wrt : coordinates ('hip.angle') and rates ('hip.rate') of the start, parameters ('left thigh.mass'), restitutions of
+    wrt : coordinates ('hip.angle') and rates ('hip.rate') of the start; of joints that turn freely 'hip.turn.x', '.y',
+        '.z', small rotations of the child about its own axes [rad], 'hip.orientation' for all three, and
+        'hip.angular_velocity'; parameters ('left thigh.mass'), restitutions of
         contacts ('left foot.restitution'), and functions of parameters,
         ``{"slope": {"gravity.x": lambda s: 9.81 * mbd.sin(s), …}}``, or the rates of several parameters,
         ``{"legs": {"left leg.mass": 1.0, "right leg.mass": 1.0}}``
     of : results at the end ('hip.angle', 'foot.force'), 'time', the instants of events ('foot.time' of the first one,
-        'foot.time.2' of the second); by default the state at the end, and 'time'
+        'foot.time.2' of the second); those of several parts ('hip.euler.zxy') are taken apart; by default the state at
+        the end, and 'time'
     at : values of the quantities whose functions are in `wrt`, {"slope": 0.05}
     hold : coordinates and rates of the start that keep their values where closed contacts or constraints bind it, such
         as those that `mbd.assemble` was given; the others complete it, with the least motion. By default those in `wrt`
@@ -82,8 +86,8 @@ def sensitivities(
         for arguments that cannot be honoured.
     CapabilityError
         where the run has no derivative, or on one side only (several events at one instant, a contact that only
-        grazes), and for what is not differentiated: non-smooth steps, feedback of controllers, quaternions. It tells
-        name and time.
+        grazes), and for what is not differentiated: non-smooth steps, feedback of controllers, friction of contacts in
+        space. It tells name and time.
 
     Examples
     --------
@@ -105,9 +109,10 @@ def sensitivities(
     values = _values_of(at)
     if not isinstance(start, State):
         raise ModelError(f"start must be a State from mbd.assemble(model, …), not {start!r}")
-    amounts = amounts_of(check_events, [name for each in wrt for name in ([each] if isinstance(each, str) else each)])
     changed = {**start.parameters, **(parameters or {})} if isinstance(parameters, Mapping | None) else {}
     model = with_inputs(model, backend, changed, wrt, controllers)
+    ways = expanded(mechanism_of(model, backend).equations, wrt)
+    amounts = amounts_of(check_events, [name for each in ways for name in ([each] if isinstance(each, str) else each)])
     own: Sequence[Any] = getattr(model, "controllers", ())
     if own and amounts:
         raise refused("in the runs of check_events controllers read and write other values", "leave check_events out")
@@ -159,13 +164,13 @@ def _differentiated(
     """The derivatives of a run as a table."""
     periods = [each.period for each in controllers if each.period is not None]
     found, wanted = passed(run, directions, held, periods if controllers else None)
-    names = usual(found.rows) if of is None else list(of)
+    names = usual(found.rows) if of is None else taken_apart(found.rows, of)
     lines = lines_of(found.rows, found.programs, found.walked, names)
     facts, columns = run.facts, tuple(each.name for each in wanted)
     return Sensitivities(
         lines.names, columns, lines.matrix, lines.values, run,
         tuple("s" if name == "time" or ".time" in name else unit(name, facts) for name in lines.names),
-        tuple(unit(name, facts) for name in columns),
+        tuple("rad" if ".turn." in name else unit(name, facts) for name in columns),
         written=tuple(dict.fromkeys(name for each in controllers for name in each.writes)),
     )  # fmt: skip
 
@@ -240,8 +245,10 @@ def with_inputs(model: Any, backend: str, changed: Mapping[str, float], wrt: Any
     folded = getattr(model, "parameters", {})
     own = {coordinate.name for coordinate in mechanism.equations.coordinates}
     known = {*inputs, *folded, *start_names(mechanism.equations), *restitution_names(mechanism.equations)}
+    whole = whole_names(mechanism.equations)
     for name in (*single, *grouped):
-        if name not in known:
+        if name not in known and not (name in whole and name in single):
+            refuse_parts(mechanism.equations, [name], "wrt")
             raise UnknownNameError(
                 "wrt: " + nearest(name, known, "coordinate, rate of the start or parameter", "There are")
             )

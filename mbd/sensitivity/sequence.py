@@ -50,7 +50,7 @@ def changed_sequences(
     again : makes the run from another start, with other parameters
     """
     rows, found = RunRows(run), list[str]()
-    wanted_ways = directions(rows, ways)
+    wanted_ways, compose = directions(rows, ways), rows.mechanism.equations.configuration.compose
     for way in wanted_ways:
         if way.restitutions and way.name in amounts:
             raise refused(
@@ -66,7 +66,7 @@ def changed_sequences(
             changed = {name: values[name] + part * rate for name, rate in (way.parameters or {}).items()}
             n_v = len(start.q)
             moved = replace(
-                state, q=state.q + part * start.q[:, k], v=state.v + part * start.y[:n_v, k],
+                state, q=compose(state.q, part * start.q[:, k]), v=state.v + part * start.y[:n_v, k],
                 z=state.z + part * start.y[n_v:, k], memory=None,
             )  # fmt: skip
             name = f"{way.name} {'+' if part > 0 else '−'} {size:g}"

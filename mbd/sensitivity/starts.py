@@ -14,16 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
-from mbd.compile.mechanism import rate_names
 from mbd.equations.equations import Equations
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.sensitivity.motion import Mode, Motion, Tangent
 from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.run_data import RunRows
 from mbd.sensitivity.strikes import captured
+from mbd.sensitivity.tangent_names import expanded, refuse_parts, start_names
 
 __all__ = [
-    "Direction", "directions", "programs_of", "restitution_names", "restitutions_of", "start_names", "start_tangent",
+    "Direction", "directions", "programs_of", "restitution_names", "restitutions_of", "start_tangent",
 ]  # fmt: skip
 
 Flags = NDArray[np.bool_]
@@ -34,7 +34,7 @@ class Direction:
     """One thing to differentiate by.
 
     name : as it was asked for
-    q, y : numbers of the coordinate or velocity that it is, −1 if it is none
+    q, y : numbers of the direction of the configuration or the velocity that it is, −1 if it is none
     parameters : rates of change of parameters by name; restitutions : of those of contacts, by name
     """
 
@@ -69,31 +69,25 @@ def restitutions_of(wanted: Sequence[Direction]) -> dict[str, Vector]:
     return found
 
 
-def start_names(equations: Equations) -> dict[str, tuple[int, int]]:
-    """Names of what a start has: the numbers of the coordinate and of the velocity that each is, −1 for none."""
-    coordinates = {each.name: (k, -1) for k, each in enumerate(equations.coordinates)}
-    speeds = {name: (-1, k) for name, k in rate_names(equations).items()}
-    states = {state.name: (-1, equations.n_v + k) for k, state in enumerate(equations.states)}
-    return {**speeds, **states, **coordinates}
-
-
 def directions(rows: RunRows, wrt: Sequence[str | tuple[str, Mapping[str, float]]]) -> list[Direction]:
-    """Names, and pairs of a name and the rates of parameters by it, as directions.
+    """Names, and pairs of a name and the rates of parameters by it, as directions; three of 'hip.orientation'.
 
     Raises
     ------
     UnknownNameError
         for a name that is neither a coordinate or rate of the start nor a run-time parameter.
     """
-    start, known = start_names(rows.mechanism.equations), set(rows.record.parameter_names)
-    bounces = set(restitution_names(rows.mechanism.equations)) - known
+    equations = rows.mechanism.equations
+    start, known = start_names(equations), set(rows.record.parameter_names)
+    bounces = set(restitution_names(equations)) - known
     found = []
-    for each in wrt:
+    for each in expanded(equations, wrt):
         name, parameters = (each, None) if isinstance(each, str) else each
         wanted = [name] if parameters is None else list(parameters)
         for one in wanted:
             if one in known or one in bounces or (parameters is None and one in start):
                 continue
+            refuse_parts(equations, [one], "wrt")
             text = nearest(
                 one, {*known, *start, *bounces}, "coordinate, rate of the start or run-time parameter", "There are"
             )

@@ -12,6 +12,8 @@ their derivatives in X, as rows
 Z has the derivatives of the state by the columns of `sizes`: x | y | rates | λ | t | anchors | parameters; rates and λ
 are not used. Z1 has them where the kernel predicts the end of a step. Unknowns are v̇₁ (n), λ (m), and then, of
 the stabilized form, U = W (n), ν (m). `work` has a₀ (n) | a₁ (n) | W (n) | ν (m) | ∂/∂h of their equations (n + m).
+Where coordinates do not add, all of a step is in the chart around its start, U too (`charts`); programs behind `steps`
+are theirs, `turns` and `room` for them, `own` (n_v, D).
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ from __future__ import annotations
 from mbd.kernel.hooks import call_on
 from mbd.kernel.linear import factor
 from mbd.kernel.records import Integers, Model, Reals
+from mbd.sensitivity.kernel.charts import enter, increment, leave, place_in_chart
 from mbd.sensitivity.kernel.directions import clear, solve_all
 from mbd.sensitivity.kernel.entries import balance, changes, place_row
 from mbd.sensitivity.kernel.newmark_corrections import corrections
@@ -35,6 +38,7 @@ from mbd.sensitivity.kernel.newmark_prediction import (
 )
 from mbd.sensitivity.kernel.sizes import (
     ALL_ROWS,
+    GROUPS,
     PLACES,
     RATES,
     ROWS,
@@ -49,8 +53,11 @@ def newmark_steps(
     K: Model, S: Integers, numbers: Reals, steps: int, time: Reals, q: Reals, y: Reals, rate: Reals, lam: Reals,
     rows: Integers, entries: Integers, block: Reals, near: Reals, out: Reals, other: Reals, memory: Reals, X: Reals,
     Z: Reals, Z1: Reals, dh: Reals, A: Reals, B: Reals, M: Reals, b: Reals, pivots: Integers, work: Reals,
+    turns: Reals, room: Reals, own: Reals,
 ) -> int:  # fmt: skip
     """Take Z, X and memory over the steps between rows 0 … `steps`; how many were those of the scheme, and regular.
+
+    −1 − their number where a singular step is behind them, which leaves nothing of what they made.
 
     numbers : α_m, α_f, β, γ, full step; dh (D,) : derivatives of the size of each step
     """
@@ -60,7 +67,10 @@ def newmark_steps(
         h = time[k + 1] - time[k]
         if not averages(S, numbers, k, h, y, rate, memory, work):
             return k
-        correction_of(S, numbers, k, h, q, y, work)
+        if S[GROUPS] > 0:
+            increment(K, 1, S, k, q, room, turns)
+            enter(S, Z, 0)
+        correction_of(S, numbers, k, h, q, y, turns, work)
         c_C = numbers[GAMMA] * h * (1.0 - numbers[ALPHA_F]) / (1.0 - numbers[ALPHA_M])
         c_K = c_C * h * numbers[BETA] / numbers[GAMMA]
         if twofold:
@@ -69,6 +79,7 @@ def newmark_steps(
         if twofold:
             predict_more(S, numbers, k, h, c_K, c_C, y, rate, rows, memory, X, Z, Z1, dh, work)
         place_row(S, block, k + 1, time, q, y, rate, lam)
+        place_in_chart(S, block, k, q, turns)
         clear(A, size * size)
         clear(B, size * S[WIDTH])
         call_on(K, 0, block, out)
@@ -77,11 +88,13 @@ def newmark_steps(
         if twofold and not corrections(
             K, S, rows, entries, block, near, out, other, c_K, c_C, h, A, B, Z1, dh, M, b, pivots, work
         ):
-            return k
+            return -1 - k
         if factor(A, size, pivots) != 0:
-            return k
+            return -1 - k
         solve_all(A, size, pivots, B, S[WIDTH])
         take(S, numbers, k, h, c_K, c_C, rate, lam, rows, memory, X, Z, B, dh, work)
+        place_in_chart(S, block, k, q, turns)
+        leave(K, 1, S, block, turns, Z, 0, own)
     return steps
 
 

@@ -12,6 +12,7 @@ from mbd.sensitivity.kernel.sizes import (
     AT_LAM,
     AT_Q,
     AT_RATE,
+    AT_X,
     AT_Y,
     COLUMN,
     COORDINATES,
@@ -140,7 +141,7 @@ def along(
         block[S[AT_Q] + i] = near[S[AT_Q] + i]
     for i in range(n):
         if i < S[PLACES]:
-            block[S[AT_Q] + i] += part * c_K * work[2 * n + i]
+            block[S[AT_X] + i] = near[S[AT_X] + i] + part * c_K * work[2 * n + i]
         block[S[AT_Y] + i] = near[S[AT_Y] + i] + part * c_C * work[2 * n + i]
         block[S[AT_RATE] + i] = near[S[AT_RATE] + i] + part * work[2 * n + i]
     for i in range(S[ALL_ROWS]):

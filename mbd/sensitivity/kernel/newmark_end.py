@@ -5,6 +5,7 @@ from __future__ import annotations
 from mbd.kernel.hooks import call_on
 from mbd.kernel.linear import factor, solve
 from mbd.kernel.records import Integers, Model, Reals
+from mbd.sensitivity.kernel.charts import place_in_chart
 from mbd.sensitivity.kernel.directions import clear
 from mbd.sensitivity.kernel.entries import balance, metric, place_row
 from mbd.sensitivity.kernel.newmark_prediction import (
@@ -21,6 +22,7 @@ from mbd.sensitivity.kernel.sizes import (
     COORDINATES,
     ENTRIES,
     EQUATION,
+    GROUPS,
     PARTS,
     PLACE,
     PLACES,
@@ -38,11 +40,11 @@ MOST = 12
 def newmark_end(
     K: Model, S: Integers, numbers: Reals, time: Reals, q: Reals, y: Reals, rate: Reals, lam: Reals, rows: Integers,
     fast: Integers, entries: Integers, block: Reals, near: Reals, out: Reals, memory: Reals, A: Reals, M: Reals,
-    b: Reals, U: Reals, pivots: Integers, orders: Integers, work: Reals,
+    b: Reals, U: Reals, pivots: Integers, orders: Integers, work: Reals, x: Reals, out1: Reals,
 ) -> int:  # fmt: skip
     """Solve for row 1, the end of a step from row 0, from its rates and multipliers on; 1 if it cannot be solved for.
 
-    A, M (n + m)²; U (n_v) and U of the iteration before
+    A, M (n + m)²; U (n_v) and U of the iteration before; x (n_v), out1 (n_q): room for steps in charts
     """
     n = S[RATES]
     m = S[ROWS]
@@ -60,8 +62,9 @@ def newmark_end(
         if factor(M, n + m, orders) != 0:
             return 1
     for _ in range(MOST):
-        end_of(S, numbers, h, q, y, U, work)
+        end_of(S, numbers, h, q, y, U, x, work)
         place_row(S, block, 1, time, q, y, rate, lam)
+        place_in_chart(S, block, 0, q, x)
         call_on(K, 0, block, out)
         clear(A, (n + m) * (n + m))
         if twofold:
@@ -78,18 +81,26 @@ def newmark_end(
         solve(A, n + m, pivots, b)
         if renewed(S, numbers, h, rows, y, rate, lam, memory, b, U, work):
             break
-    end_of(S, numbers, h, q, y, U, work)
+    end_of(S, numbers, h, q, y, U, x, work)
+    if S[GROUPS] > 0:
+        place_in_chart(S, block, 0, q, x)
+        call_on(K, 2, block, out1)
+        for i in range(S[COORDINATES]):
+            q[S[COORDINATES] + i] = out1[i]
     return 0
 
 
-def end_of(S: Integers, c: Reals, h: float, q: Reals, y: Reals, U: Reals, work: Reals) -> None:
-    """q and y of row 1 by a₀, a₁ and U."""
+def end_of(S: Integers, c: Reals, h: float, q: Reals, y: Reals, U: Reals, x: Reals, work: Reals) -> None:
+    """q, or x where coordinates do not add, and y of row 1 by a₀, a₁ and U."""
     n = S[RATES]
     for i in range(n):
         y[n + i] = y[i] + h * ((1.0 - c[GAMMA]) * work[i] + c[GAMMA] * work[n + i])
     for i in range(S[PLACES]):
         way = h * y[i] + h * h * ((0.5 - c[BETA]) * work[i] + c[BETA] * work[n + i])
-        q[S[COORDINATES] + i] = q[i] + way + U[i]
+        if S[GROUPS] > 0:
+            x[i] = way + U[i]
+        else:
+            q[S[COORDINATES] + i] = q[i] + way + U[i]
 
 
 def corrected(

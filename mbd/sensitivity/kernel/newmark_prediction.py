@@ -8,8 +8,12 @@ from mbd.sensitivity.kernel.sizes import (
     AT_LAM,
     AT_Q,
     AT_RATE,
+    AT_X,
     AT_Y,
+    BASE,
+    COLUMNS,
     COORDINATES,
+    GROUPS,
     PLACES,
     RATES,
     ROWS,
@@ -52,12 +56,15 @@ def averages(S: Integers, c: Reals, k: int, h: float, y: Reals, rate: Reals, mem
     return bool(off <= FOLLOWED * h * size / c[FULL] + 1e-14 * size)
 
 
-def correction_of(S: Integers, c: Reals, k: int, h: float, q: Reals, y: Reals, work: Reals) -> None:
-    """U of a step into work."""
+def correction_of(S: Integers, c: Reals, k: int, h: float, q: Reals, y: Reals, x: Reals, work: Reals) -> None:
+    """U of a step into work; x: its increment, where coordinates do not add."""
     n = S[RATES]
     for i in range(S[PLACES]):
         way = h * y[k * n + i] + h * h * ((0.5 - c[BETA]) * work[i] + c[BETA] * work[n + i])
-        work[2 * n + i] = q[(k + 1) * S[COORDINATES] + i] - q[k * S[COORDINATES] + i] - way
+        if S[GROUPS] > 0:
+            work[2 * n + i] = x[i] - way
+        else:
+            work[2 * n + i] = q[(k + 1) * S[COORDINATES] + i] - q[k * S[COORDINATES] + i] - way
 
 
 def predict(
@@ -94,6 +101,8 @@ def predict(
     for j in range(w):
         Z[t + j] += dh[j]
         Z1[t + j] = Z[t + j]
+    for i in range(S[BASE] * w, S[COLUMNS] * w):
+        Z1[i] = Z[i]
 
 
 def predict_more(
@@ -152,6 +161,9 @@ def predicted_place(
         if i < n_v:
             U = memory[2 * n + rows + i] + stretch * memory[2 * n + rows + n_v + i]
             x = h * y[k * n + i] + h * h * ((0.5 - c[BETA]) * work[i] + c[BETA] * a1) + U * stretch * stretch * stretch
-            near[S[AT_Q] + i] = q[k * S[COORDINATES] + i] + x
+            near[S[AT_X] + i] = x if S[GROUPS] > 0 else q[k * S[COORDINATES] + i] + x
+    if S[GROUPS] > 0:
+        for i in range(S[COORDINATES]):
+            near[S[AT_Q] + i] = q[k * S[COORDINATES] + i]
     for i in range(rows):
         near[S[AT_LAM] + i] = lam[k * rows + i] + h * memory[2 * n + i]

@@ -11,13 +11,14 @@ from __future__ import annotations
 from mbd.kernel.hooks import call_on
 from mbd.kernel.linear import factor, solve
 from mbd.kernel.records import Integers, Model, Reals
+from mbd.sensitivity.kernel.charts import compose, enter, leave
 from mbd.sensitivity.kernel.directions import add, clear, solve_all
 from mbd.sensitivity.kernel.entries import saddle
 from mbd.sensitivity.kernel.sizes import (
     ALL_ROWS,
     AT_LAM,
-    AT_Q,
     AT_RATE,
+    AT_X,
     AT_Y,
     COLUMN,
     ENTRIES,
@@ -39,10 +40,12 @@ MOST = 4
 def on_rows(
     K: Model, program: int, S: Integers, rows: Integers, fast: Integers, entries: Integers, block: Reals, at: Reals,
     out: Reals, other: Reals, Z: Reals, A: Reals, M: Reals, B: Reals, b: Reals, W: Reals, pivots: Integers,
+    turns: Reals, own: Reals,
 ) -> int:  # fmt: skip
     """q and y in the block, x and y in Z become those on the rows; 1 where a matrix is singular.
 
-    program : the number of `steps` among the programs; at : another block; A, M (n + m)², B (n + m, D), b, W (n + m)
+    program : the number of `steps` among the programs, behind which those of `charts` are; at : another block; A, M
+    (n + m)², B (n + m, D), b, W (n + m); turns, own : room for charts
     """
     for i in range(S[RATES]):
         block[S[AT_RATE] + i] = 0.0
@@ -50,6 +53,7 @@ def on_rows(
         block[S[AT_LAM] + i] = 0.0
     for i in range(S[AT_LAM] + S[ALL_ROWS]):
         at[i] = block[i]
+    enter(S, Z, 0)
     call_on(K, program, block, out)
     clear(M, (S[RATES] + S[ROWS]) * (S[RATES] + S[ROWS]))
     saddle(S, entries, out, M)
@@ -57,6 +61,8 @@ def on_rows(
         return 1
     if not of_positions(K, program, S, rows, fast, entries, at, out, other, Z, A, M, B, W, pivots):
         return 1
+    leave(K, program + 1, S, block, turns, Z, 0, own)
+    compose(K, program + 1, S, block, turns)
     return velocities(K, program, S, rows, entries, block, at, out, other, Z, A, M, B, W, pivots)
 
 
@@ -82,9 +88,9 @@ def positions(
         for i in range(size):
             W[i] += b[i]
         for i in range(S[PLACES]):
-            block[S[AT_Q] + i] += b[i]
+            block[S[AT_X] + i] += b[i]
             moved = max(moved, abs(b[i]))
-            largest = max(largest, abs(block[S[AT_Q] + i]))
+            largest = max(largest, abs(block[S[AT_X] + i]))
         call_on(K, program, block, out)
         if moved <= 1e-15 * largest:
             break

@@ -4,7 +4,8 @@ Unknowns of stage i are rates W_i (n) and multipliers (m), where rows act positi
 to them, ν_i (m): rows hold positions and velocities, ``S P_i + R ν_i = 0`` in the metric of the middle stage. Runs do
 not store stages: they are solved for again. `stages` has W (3, n) | λ (3, m) | P (3, n) | ν (3, m); `outs` (3, outputs)
 what the program `steps` gives at each; out, other (outputs). Z1
-(3, columns, D) has the derivatives of the stages with W, P held. Programs: 0 `consistent`, 1 `steps`.
+(3, columns, D) has the derivatives of the stages with W, P held. Programs: 0 `consistent`, 1 `steps`. Where coordinates
+do not add, stages are in the chart around the start of the step (`radau_charts`: turns … orders).
 """
 
 from __future__ import annotations
@@ -13,8 +14,10 @@ from mbd.kernel.hooks import call_on
 from mbd.kernel.linear import factor, solve
 from mbd.kernel.records import Integers, Model, Reals
 from mbd.sensitivity.kernel.balance import consistent
+from mbd.sensitivity.kernel.charts import compose, enter, leave
 from mbd.sensitivity.kernel.directions import add, clear, solve_all
 from mbd.sensitivity.kernel.entries import place_row
+from mbd.sensitivity.kernel.radau_charts import end_in_chart, is_in_chart, of_chart_stages, place_motion, turn
 from mbd.sensitivity.kernel.radau_equations import (
     REAL,
     SQUARE,
@@ -33,12 +36,14 @@ from mbd.sensitivity.kernel.sizes import (
     AT_LAM,
     AT_Q,
     AT_RATE,
+    AT_X,
     AT_Y,
     COLUMN,
     COLUMNS,
     COORDINATES,
     ENTRIES,
     EQUATION,
+    GROUPS,
     PARTS,
     PLACE,
     PLACES,
@@ -59,7 +64,8 @@ def radau_steps(
     K: Model, S: Integers, S0: Integers, numbers: Reals, steps: int, checked: int, outputs: int, time: Reals, q: Reals,
     y: Reals, rate: Reals, lam: Reals, rows: Integers, fast: Integers, entries: Integers, entries0: Integers,
     block: Reals, out: Reals, outs: Reals, other: Reals, stages: Reals, X: Reals, Z: Reals, Z1: Reals, dh: Reals,
-    A: Reals, B: Reals, b: Reals, M: Reals, pivots: Integers,
+    A: Reals, B: Reals, b: Reals, M: Reals, pivots: Integers, turns: Reals, column: Reals, own: Reals, E: Reals,
+    moved: Reals, ways: Reals, small: Reals, orders: Integers,
 ) -> int:  # fmt: skip
     """Take Z and X (n + m, D) over the steps between rows 0 … `steps`; how many ended at their rows, and were regular.
 
@@ -71,33 +77,41 @@ def radau_steps(
     for k in range(steps):
         h = time[k + 1] - time[k]
         guess(S, numbers, k, rate, lam, rows, stages)
-        for turn in range(MOST):
-            evaluate(K, S, numbers, k, h, outputs, time, q, y, rows, block, out, outs, stages)
+        for number in range(MOST):
+            evaluate(K, S, numbers, k, h, outputs, time, q, y, rows, block, out, outs, stages, E, moved, turns)
             middle(S, numbers, h, outputs, entries, outs, M)
-            if turn < FRESH:
+            if number < FRESH:
+                if not turn(S, numbers, h, moved, ways, small, orders, column):
+                    return k
                 clear(A, 9 * size * size)
-                matrix(S, numbers, h, outputs, entries, fast, outs, M, A)
+                matrix(S, numbers, h, outputs, entries, fast, outs, M, A, ways)
                 if factor(A, 3 * size, pivots) != 0:
                     return k
             residual(S, outputs, rows, fast, outs, M, stages, b)
             solve(A, 3 * size, pivots, b)
             if renewed(S, b, stages):
                 break
-        evaluate(K, S, numbers, k, h, outputs, time, q, y, rows, block, out, outs, stages)
+        evaluate(K, S, numbers, k, h, outputs, time, q, y, rows, block, out, outs, stages, E, moved, turns)
         middle(S, numbers, h, outputs, entries, outs, M)
+        if not turn(S, numbers, h, moved, ways, small, orders, column):
+            return k
         clear(A, 9 * size * size)
-        matrix(S, numbers, h, outputs, entries, fast, outs, M, A)
+        matrix(S, numbers, h, outputs, entries, fast, outs, M, A, ways)
         clear(B, 3 * size * S[WIDTH])
         of_stages(S, numbers, k, h, y, stages, Z, Z1, dh)
+        of_chart_stages(S, numbers, h, moved, ways, Z1, dh, own)
         of_equations(S, outputs, entries, fast, outs, Z1, B)
         if m > 0:
             of_corrections(
-                K, S, numbers, k, h, outputs, time, q, y, rows, entries, block, out, outs, other, stages, Z1, dh, A, B
-            )
+                K, S, numbers, k, h, outputs, time, q, y, rows, entries, block, out, outs, other, stages, Z1, dh, A, B,
+                E, ways,
+            )  # fmt: skip
         if factor(A, 3 * size, pivots) != 0:
             return k
         solve_all(A, 3 * size, pivots, B, S[WIDTH])
-        ended(S, numbers, k, h, q, y, stages, Z1, B, block)
+        ended(S, numbers, k, h, q, y, stages, Z1, B, block, E, ways)
+        leave(K, 2, S, block, turns, Z1, 2 * S[COLUMNS], own)
+        compose(K, 2, S, block, turns)
         if checked == 0:
             for i in range(S[COORDINATES]):
                 q[(k + 1) * S[COORDINATES] + i] = block[S[AT_Q] + i]
@@ -168,6 +182,7 @@ def of_stages(S: Integers, c: Reals, k: int, h: float, y: Reals, stages: Reals, 
         first = s * S[COLUMNS]
         for i in range(S[COLUMNS] * w):
             Z1[first * w + i] = Z[i]
+        enter(S, Z1, first)
         add(Z1, first + n_v + 2 * n + S[ROWS], c[s], dh, 0, w)
         for i in range(n):
             speed = 0.0
@@ -201,7 +216,7 @@ def of_equations(
 def of_corrections(
     K: Model, S: Integers, c: Reals, k: int, h: float, outputs: int, time: Reals, q: Reals, y: Reals, rows: Integers,
     entries: Integers, block: Reals, out: Reals, outs: Reals, other: Reals, stages: Reals, Z1: Reals, dh: Reals,
-    A: Reals, B: Reals,
+    A: Reals, B: Reals, E: Reals, ways: Reals,
 ) -> None:  # fmt: skip
     """How ``S P_i + R ν_i`` follows the middle stage and h: into A and B."""
     n = S[RATES]
@@ -215,8 +230,8 @@ def of_corrections(
         for i in range(n):
             large = max(large, abs(stages[place + i]))
         if large > 0.0:
-            along(K, S, c, k, h, s, 1.0 / large, time, q, y, rows, block, other, stages)
-            along(K, S, c, k, h, s, -1.0 / large, time, q, y, rows, block, out, stages)
+            along(K, S, c, k, h, s, 1.0 / large, time, q, y, rows, block, other, stages, E)
+            along(K, S, c, k, h, s, -1.0 / large, time, q, y, rows, block, out, stages, E)
             for e in range(S[ENTRIES]):
                 i = entries[e * PARTS + EQUATION]
                 j = entries[e * PARTS + COLUMN]
@@ -226,7 +241,7 @@ def of_corrections(
                     change = 0.5 * large * (other[at] - out[at])
                     value = outs[outputs + at]
                     if change != 0.0:
-                        through(S, c, h, 1, j, o, change, A)
+                        through(S, c, h, 1, j, o, change, A, ways)
                         if j < n_v + n or j >= n_v + 2 * n + m:
                             add(B, o, -change, Z1, S[COLUMNS] + j, S[WIDTH])
                     if j < n_v:
@@ -237,17 +252,17 @@ def of_corrections(
 
 def along(
     K: Model, S: Integers, c: Reals, k: int, h: float, s: int, part: float, time: Reals, q: Reals, y: Reals,
-    rows: Integers, block: Reals, out: Reals, stages: Reals,
+    rows: Integers, block: Reals, out: Reals, stages: Reals, E: Reals,
 ) -> None:  # fmt: skip
     """The program at the middle stage, moved by a part of ((μh)², μh, 1) P and of ν of stage s."""
     n = S[RATES]
     m = S[ROWS]
     step = c[REAL] * h
-    place_stage(S, c, k, h, 1, time, q, y, rows, block, stages)
+    place_stage(S, c, k, h, 1, time, q, y, rows, block, stages, E)
     for i in range(n):
         P = part * stages[3 * (n + m) + s * n + i]
         if i < S[PLACES]:
-            block[S[AT_Q] + i] += step * step * P
+            block[S[AT_X] + i] += step * step * P
         block[S[AT_Y] + i] += step * P
         block[S[AT_RATE] + i] += P
     for i in range(m):
@@ -256,9 +271,10 @@ def along(
 
 
 def ended(
-    S: Integers, c: Reals, k: int, h: float, q: Reals, y: Reals, stages: Reals, Z1: Reals, B: Reals, block: Reals
-) -> None:
-    """q, y of the last stage into the block, their derivatives into the last of Z1."""
+    S: Integers, c: Reals, k: int, h: float, q: Reals, y: Reals, stages: Reals, Z1: Reals, B: Reals, block: Reals,
+    E: Reals, ways: Reals,
+) -> None:  # fmt: skip
+    """q or x, y of the last stage into the block, their derivatives into the last of Z1."""
     n = S[RATES]
     n_v = S[PLACES]
     m = S[ROWS]
@@ -271,11 +287,15 @@ def ended(
             speed += c[WEIGHTS + 6 + t] * stages[t * n + i]
             way += c[SQUARE + 6 + t] * stages[t * n + i]
             add(Z1, last + n_v + i, h * c[WEIGHTS + 6 + t], B, t * size + i, S[WIDTH])
-            if i < n_v:
+            if i < n_v and not is_in_chart(S, i):
                 add(Z1, last + i, h * h * c[SQUARE + 6 + t], B, t * size + i, S[WIDTH])
         block[S[AT_Y] + i] = y[k * n + i] + h * speed
         if i < n_v:
             x = h * c[2] * y[k * n + i] + h * h * way + stages[3 * (n + m) + 2 * n + i]
-            block[S[AT_Q] + i] = q[k * S[COORDINATES] + i] + x
-            if m > 0:
+            if S[GROUPS] == 0:
+                block[S[AT_Q] + i] = q[k * S[COORDINATES] + i] + x
+            if m > 0 and not is_in_chart(S, i):
                 add(Z1, last + i, 1.0, B, 2 * size + n + m + i, S[WIDTH])
+    if S[GROUPS] > 0:
+        place_motion(S, c, k, h, 2, q, y, block, stages, E)
+        end_in_chart(S, ways, Z1, B)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from mbd.kernel.hooks import call_on
 from mbd.kernel.records import Integers, Model, Reals
 from mbd.sensitivity.kernel.directions import clear
+from mbd.sensitivity.kernel.radau_charts import bend, place_motion, ways_by
 from mbd.sensitivity.kernel.sizes import (
     ALL_ROWS,
     AT_LAM,
@@ -15,6 +16,7 @@ from mbd.sensitivity.kernel.sizes import (
     COORDINATES,
     ENTRIES,
     EQUATION,
+    GROUPS,
     PARTS,
     PLACE,
     PLACES,
@@ -34,9 +36,11 @@ REAL = 21
 
 def place_stage(
     S: Integers, c: Reals, k: int, h: float, s: int, time: Reals, q: Reals, y: Reals, rows: Integers, block: Reals,
-    stages: Reals,
+    stages: Reals, E: Reals,
 ) -> None:  # fmt: skip
-    """Stage s into the inputs of programs."""
+    """Stage s into the inputs of programs; E: see `radau_charts`."""
+    if S[GROUPS] > 0:
+        place_motion(S, c, k, h, s, q, y, block, stages, E)
     n = S[RATES]
     m = S[ROWS]
     block[0] = time[k] + c[s] * h
@@ -48,7 +52,7 @@ def place_stage(
             way += c[SQUARE + 3 * s + t] * stages[t * n + i]
         block[S[AT_RATE] + i] = stages[s * n + i]
         block[S[AT_Y] + i] = y[k * n + i] + h * speed
-        if i < S[PLACES]:
+        if i < S[PLACES] and S[GROUPS] == 0:
             x = h * c[s] * y[k * n + i] + h * h * way + stages[3 * (n + m) + s * n + i]
             block[S[AT_Q] + i] = q[k * S[COORDINATES] + i] + x
     for i in range(m):
@@ -57,11 +61,12 @@ def place_stage(
 
 def evaluate(
     K: Model, S: Integers, c: Reals, k: int, h: float, outputs: int, time: Reals, q: Reals, y: Reals, rows: Integers,
-    block: Reals, out: Reals, outs: Reals, stages: Reals,
+    block: Reals, out: Reals, outs: Reals, stages: Reals, E: Reals, moved: Reals, turns: Reals,
 ) -> None:  # fmt: skip
     """All equations at the stages, with their derivatives."""
+    bend(K, S, c, k, h, q, y, block, stages, E, moved, turns)
     for s in range(3):
-        place_stage(S, c, k, h, s, time, q, y, rows, block, stages)
+        place_stage(S, c, k, h, s, time, q, y, rows, block, stages, E)
         call_on(K, 1, block, out)
         for i in range(outputs):
             outs[s * outputs + i] = out[i]
@@ -88,8 +93,9 @@ def middle(S: Integers, c: Reals, h: float, outputs: int, entries: Integers, out
 
 
 def matrix(
-    S: Integers, c: Reals, h: float, outputs: int, entries: Integers, fast: Integers, outs: Reals, M: Reals, A: Reals
-) -> None:
+    S: Integers, c: Reals, h: float, outputs: int, entries: Integers, fast: Integers, outs: Reals, M: Reals, A: Reals,
+    ways: Reals,
+) -> None:  # fmt: skip
     """The matrix of all stages."""
     n = S[RATES]
     m = S[ROWS]
@@ -99,7 +105,7 @@ def matrix(
             i = line(S, entries[e * PARTS + EQUATION], fast)
             if i >= 0:
                 value = outs[s * outputs + entries[e * PARTS + PLACE]]
-                through(S, c, h, s, entries[e * PARTS + COLUMN], s * size + i, value, A)
+                through(S, c, h, s, entries[e * PARTS + COLUMN], s * size + i, value, A, ways)
         if m > 0:
             o = s * size + n + m
             for i in range(n + m):
@@ -117,13 +123,15 @@ def line(S: Integers, i: int, fast: Integers) -> int:
     return n + i if fast[i - n - m] == 0 else -1
 
 
-def through(S: Integers, c: Reals, h: float, s: int, j: int, i: int, value: float, A: Reals) -> None:
+def through(S: Integers, c: Reals, h: float, s: int, j: int, i: int, value: float, A: Reals, ways: Reals) -> None:
     """Line i of A plus a derivative by column j at stage s, through the formulas of the method."""
     n = S[RATES]
     n_v = S[PLACES]
     m = S[ROWS]
     size = (n + m) * (2 if m > 0 else 1)
     if j < n_v:
+        if ways_by(S, s, j, i, value, A, ways):
+            return
         for t in range(3):
             A[i * 3 * size + t * size + j] += h * h * c[SQUARE + 3 * s + t] * value
         if m > 0:

@@ -2,17 +2,32 @@
 
 X (n + m, D) has the derivatives of rates and multipliers at a row; Z those of the state, Z1 of a stage. Slopes of the
 stages are kept in V, F (STAGES, n), velocities and rates, and their derivatives in of_V, of_F (STAGES, n, D). Programs:
-0 `consistent`, 1 `steps`, whose sizes are S, S1.
+0 `consistent`, 1 `steps`, whose sizes are S, S1; where coordinates do not add, those of `charts` from 2 on: stages are
+then in the chart around the start of the step.
 """
 
 from __future__ import annotations
 
 from mbd.kernel.records import Integers, Model, Reals
 from mbd.sensitivity.kernel.balance import consistent
+from mbd.sensitivity.kernel.charts import compose, enter, leave, rates_of
 from mbd.sensitivity.kernel.directions import add
 from mbd.sensitivity.kernel.entries import place_row
 from mbd.sensitivity.kernel.projection import on_rows
-from mbd.sensitivity.kernel.sizes import ALL_ROWS, AT_LAM, AT_Q, AT_RATE, AT_Y, COORDINATES, PLACES, RATES, ROWS, WIDTH
+from mbd.sensitivity.kernel.sizes import (
+    ALL_ROWS,
+    AT_LAM,
+    AT_Q,
+    AT_RATE,
+    AT_X,
+    AT_Y,
+    COORDINATES,
+    GROUPS,
+    PLACES,
+    RATES,
+    ROWS,
+    WIDTH,
+)
 
 __all__ = ["SAME", "runge_kutta_steps"]
 
@@ -25,7 +40,8 @@ def runge_kutta_steps(
     K: Model, S: Integers, S1: Integers, tableau: Reals, steps: int, checked: int, time: Reals, q: Reals, y: Reals,
     rate: Reals, lam: Reals, rows: Integers, fast: Integers, entries: Integers, entries1: Integers, block: Reals,
     at: Reals, out: Reals, other: Reals, V: Reals, F: Reals, of_V: Reals, of_F: Reals, X: Reals, Z: Reals, Z1: Reals,
-    dh: Reals, A: Reals, M: Reals, B: Reals, b: Reals, W: Reals, pivots: Integers,
+    dh: Reals, A: Reals, M: Reals, B: Reals, b: Reals, W: Reals, pivots: Integers, turns: Reals, room: Reals,
+    own: Reals,
 ) -> int:  # fmt: skip
     """Take Z and X over the steps between rows 0 … `steps`; how many ended at their rows, and were regular.
 
@@ -50,10 +66,16 @@ def runge_kutta_steps(
                 for j in range(w):
                     of_V[(s * n + i) * w + j] = Z1[(S[PLACES] + i) * w + j]
                     of_F[(s * n + i) * w + j] = B[i * w + j]
+            rates_of(K, 2, S, block, turns, Z1, s, V, of_V)
         moved(S, tableau, 0, STAGES, 1.0, k, h, q, y, V, F, of_V, of_F, Z, Z1, dh, block)
         block[0] = time[k + 1]
+        leave(K, 2, S, block, turns, Z1, 0, own)
+        compose(K, 2, S, block, turns)
         if S[ROWS] > 0:
-            if on_rows(K, 1, S1, rows, fast, entries1, block, at, out, other, Z1, A, M, B, b, W, pivots) != 0:
+            if (
+                on_rows(K, 1, S1, rows, fast, entries1, block, at, out, other, Z1, A, M, B, b, W, pivots, turns, own)
+                != 0
+            ):
                 return k
         if checked == 0:
             for i in range(S[COORDINATES]):
@@ -104,9 +126,12 @@ def moved(
     w = S[WIDTH]
     for i in range((n_v + n) * w):
         Z1[i] = Z[i]
+    enter(S, Z1, 0)
     t = (n_v + 2 * n + S[ROWS]) * w
     for j in range(w):
         Z1[t + j] = Z[t + j] + node * dh[j]
+    for i in range(S[COORDINATES] if S[GROUPS] > 0 else 0):
+        block[S[AT_Q] + i] = q[k * S[COORDINATES] + i]
     for i in range(n):
         speed = 0.0
         rate = 0.0
@@ -121,7 +146,7 @@ def moved(
         block[S[AT_Y] + i] = y[k * n + i] + h * rate
         add(Z1, n_v + i, rate, dh, 0, w)
         if i < n_v:
-            block[S[AT_Q] + i] = q[k * S[COORDINATES] + i] + h * speed
+            block[S[AT_X] + i] = h * speed if S[GROUPS] > 0 else q[k * S[COORDINATES] + i] + h * speed
             add(Z1, i, speed, dh, 0, w)
 
 

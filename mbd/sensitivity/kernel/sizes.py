@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 __all__ = [
-    "ALL_ROWS", "AT_LAM", "AT_Q", "AT_RATE", "AT_Y", "COLUMN", "COLUMNS", "COORDINATES", "ENTRIES", "EQUATION", "NEAR",
-    "PARTS", "PLACE", "PLACES", "RATES", "ROWS", "STABILIZED", "TARGET", "WIDTH",
+    "ALL_ROWS", "AT_LAM", "AT_Q", "AT_RATE", "AT_X", "AT_Y", "BASE", "COLUMN", "COLUMNS", "COORDINATES", "ENTRIES",
+    "EQUATION", "GROUPS", "LISTED", "NEAR", "PARTS", "PLACE", "PLACES", "RATES", "ROWS", "STABILIZED", "TARGET",
+    "WIDTH",
 ]  # fmt: skip
 
 RATES = 0
@@ -22,7 +23,7 @@ WIDTH = 5
 ENTRIES = 6
 """Derivatives of a program that are not always zero, in the present mode."""
 COLUMNS = 7
-"""Of derivatives: x (n_v), y (n), rates (n), λ (m), t, anchors, parameters."""
+"""Of derivatives: x (n_v), y (n), rates (n), λ (m), t, anchors, parameters, bases of charts."""
 STABILIZED = 8
 """1: rows hold velocities as well as positions."""
 AT_Q = 9
@@ -30,6 +31,14 @@ AT_Y = 10
 AT_RATE = 11
 AT_LAM = 12
 """Where the block of a program has coordinates, velocities, rates, multipliers."""
+AT_X = 13
+"""Where it has what steps move: increments in charts; coordinates, where they add."""
+BASE = 14
+"""The first column of the bases of charts."""
+GROUPS = 15
+"""Joints whose coordinates do not add."""
+LISTED = 16
+"""Where the first velocity and the number of velocities of each of these begin."""
 
 EQUATION = 0
 """Of an entry: 0 … n − 1 the balance, then rows: ḣ (m), h (m) of `steps`, ḧ (m) of `consistent`."""
