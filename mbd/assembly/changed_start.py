@@ -19,11 +19,15 @@ __all__ = ["changed_start", "start_names"]
 
 
 def start_names(mechanism: Mechanism) -> dict[str, tuple[str, int]]:
-    """('q' or 'y', number) by name: every coordinate, rate and first-order state of a start."""
+    """('q' or 'y', number) by name: every coordinate that adds, rate and first-order state of a start.
+
+    The parts of a quaternion are none of them, as they do not change alone.
+    """
     equations = mechanism.equations
     found = {name: ("y", number) for name, number in rate_names(equations).items()}
     found |= {state.name: ("y", equations.n_v + k) for k, state in enumerate(equations.states)}
-    return found | {coordinate.name: ("q", k) for k, coordinate in enumerate(equations.coordinates)}
+    adding = set(equations.configuration.places.tolist())
+    return found | {each.name: ("q", k) for k, each in enumerate(equations.coordinates) if k in adding}
 
 
 def changed_start(
@@ -47,8 +51,10 @@ def changed_start(
     for name, value in values.items():
         which, number = names[name]
         (q if which == "q" else y)[number] = value
-        if number < equations.n_v:
-            (free_q if which == "q" else free_v)[number] = False
+        if which == "q":
+            free_q[equations.configuration.places == number] = False
+        elif number < equations.n_v:
+            free_v[number] = False
     anchors = np.array(start.anchors, dtype=float)
     anchors = anchors if len(anchors) == mechanism.layout.n_anchors else np.zeros(mechanism.layout.n_anchors)
     flags = manager.flags(start.mode.closed)

@@ -13,6 +13,7 @@ import sympy
 import mbd
 from mbd.analysis.fitting.data import Data
 from mbd.analysis.fitting.fit import _Search, instants_of
+from mbd.assembly.changed_start import changed_start
 from tests.simulation.mechanisms import kneed_walker, kneed_walker_start
 
 TIMES = np.linspace(0.05, 2.0, 40)
@@ -216,3 +217,36 @@ def test_faults_have_names(change, said):
     given = {"data": {"time": TIMES, "pin.angle": seen()}, "parameters": {"rod.center": 1.0}, "dt": 0.05, **change}
     with pytest.raises(mbd.MbdError, match=said):
         mbd.fit(model, start, **given)
+
+
+def test_the_inertia_of_a_spinning_body_is_found_from_its_angular_velocity():
+    """Of a body that tumbles about a ball joint with a loss; with how fast it began to spin, too."""
+    model = mbd.Model("satellite", gravity=(0.0, 0.0, 0.0))
+    body = mbd.RigidBody("body", 1.0, (1.2, 2.0, 2.7))
+    model.connect(mbd.Spherical("ball", model.ground.origin, body.origin, loss=mbd.Viscous(0.05)))
+    truth = {"body.inertia.yy": 2.1, "body.inertia.zz": 2.5, "ball loss.coefficient": 0.07}
+    start, begun = (mbd.assemble(model, velocity={"ball.angular_velocity": (x, 3.0, -2.0)}) for x in (1.0, 1.2))
+    times, names = np.linspace(0.05, 2.0, 20), [f"ball.angular_velocity.{axis}" for axis in "xyz"]
+    run = mbd.simulate(model, begun, mbd.RungeKutta853(), dt=0.04, until=2.0, parameters=truth).at(times)
+    guess = {"body.inertia.yy": 1.9, "body.inertia.zz": 2.8, "ball loss.coefficient": 0.03, names[0]: 1.0}
+    data = {"time": times, **{name: run[name] for name in names}}
+    fitted = mbd.fit(model, start, data, guess, mbd.RungeKutta853(), 0.04)
+    assert fitted.converged and fitted.alike == ()
+    assert [fitted.values[name] for name in guess] == pytest.approx([*truth.values(), 1.2], rel=1e-9)
+    with pytest.raises(mbd.UnknownNameError, match=r"named 'ball.orientation.w'"):
+        mbd.fit(model, start, data, {"ball.orientation.w": 1.0}, mbd.RungeKutta853(), 0.04)
+
+
+def test_a_coordinate_behind_a_quaternion_is_held_as_it_is_named():
+    """Where coordinates and velocities have other numbers."""
+    model = mbd.Model("held", cut=("grip",))
+    links = [mbd.RigidBody(name, 1.0, (0.1, 0.1, 0.1), center=(0.0, -0.2, 0.0)) for name in ("arm", "forearm", "hand")]
+    model.connect(mbd.Spherical("shoulder", model.ground.origin, links[0].origin))
+    for name, one, other in (("elbow", *links[:2]), ("wrist", *links[1:])):
+        model.connect(mbd.Revolute(name, one.point(0.0, -0.5, 0.0), other.origin))
+    model.connect(mbd.Spherical("grip", model.ground.point(0.4, -0.6, 0.1), links[2].point(0.0, -0.5, 0.0)))
+    start = mbd.assemble(model, {"elbow.angle": 0.9})
+    for name in ("elbow", "wrist"):
+        value = start[f"{name}.angle"] + 0.02
+        moved = changed_start(model, start, {f"{name}.angle": value, f"{name}.rate": 0.1}, {}, "auto")
+        assert moved[f"{name}.angle"] == value and moved[f"{name}.rate"] == 0.1
