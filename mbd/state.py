@@ -139,7 +139,10 @@ class State:
         return "\n".join(lines)
 
     def plot(self, path: str | Path | None = None, model: Any = None, view: Any = None) -> Any:
-        """The mechanism at this state, drawn as on the page: bodies, joints, named points, the ground of contacts.
+        """The mechanism at this state, drawn as on the page: bodies, joints, named points, the ground and its forces.
+
+        The forces are those of the contacts that are closed at this state, of models without controllers; the largest
+        has its size beside it.
 
         A spatial mechanism is seen from the side and a little from above, with gravity down the page, by parallel rays;
         bodies are the solids of their mass and inertia. Needs no display.

@@ -49,6 +49,7 @@ EXAMPLES: dict[str, Any] = {
     "direction": (1.0, 0.0, 0.0),
     "effective_mass": 1.0,
     "failure": "absent.npz",
+    "form": "box",
     "forward": mbd.Viscous(1.0),
     "frame": END,
     "function": lambda x: x,

@@ -6,7 +6,7 @@ Each helper gives a `Solid` (mass, center, inertia), from which bodies are made:
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from mbd.bodies.values import Vector3, among, number, triple
@@ -17,11 +17,15 @@ __all__ = ["SEGMENTS", "Solid", "box", "cylinder", "disk", "rod", "segment", "sp
 
 @dataclass(frozen=True)
 class Solid:
-    """Mass m [kg], center of mass [m], principal moments about the center (Ixx, Iyy, Izz) [kg m²]."""
+    """Mass m [kg], center of mass [m], principal moments about the center (Ixx, Iyy, Izz) [kg m²].
+
+    form : as what pictures in space show it, 'box', 'cylinder' or 'ball'; '': whatever has its inertia
+    """
 
     mass: float
     center: Vector3
     inertia: Vector3
+    form: str = field(default="", compare=False, repr=False)
 
     @property
     def link(self) -> dict[str, Any]:
@@ -30,8 +34,9 @@ class Solid:
 
     @property
     def body(self) -> dict[str, Any]:
-        """Arguments of `RigidBody`: mass, inertia, center."""
-        return {"mass": self.mass, "inertia": self.inertia, "center": self.center}
+        """Arguments of `RigidBody`: mass, inertia, center, and form where there is one."""
+        form = {"form": self.form} if self.form else {}
+        return {"mass": self.mass, "inertia": self.inertia, "center": self.center, **form}
 
 
 def rod(mass: float, length: float) -> Solid:
@@ -49,14 +54,14 @@ def box(mass: float, sides: Any) -> Solid:
     """A uniform box about its center, sides (a, b, c) along x, y, z: ``Ixx = m (b² + c²)/12``, …"""
     m, (a, b, c) = number(mass, "mass of a box"), triple(sides, "sides of a box")
     x, y, z = m * a * a / 12.0, m * b * b / 12.0, m * c * c / 12.0
-    return Solid(m, (0.0, 0.0, 0.0), (y + z, x + z, x + y))
+    return Solid(m, (0.0, 0.0, 0.0), (y + z, x + z, x + y), "box")
 
 
 def sphere(mass: float, radius: float) -> Solid:
     """A uniform ball: ``I = 2 m r²/5``."""
     m, r = number(mass, "mass of a sphere"), number(radius, "radius of a sphere")
     moment = 0.4 * m * r * r
-    return Solid(m, (0.0, 0.0, 0.0), (moment, moment, moment))
+    return Solid(m, (0.0, 0.0, 0.0), (moment, moment, moment), "ball")
 
 
 def cylinder(mass: float, radius: float, length: float, axis: str = "z") -> Solid:
@@ -66,7 +71,7 @@ def cylinder(mass: float, radius: float, length: float, axis: str = "z") -> Soli
         raise ModelError(f"the axis of a cylinder is 'x', 'y' or 'z', got {axis!r}")
     along, across = m * r * r / 2.0, m * (3.0 * r * r + L * L) / 12.0
     x, y, z = (along if axis == name else across for name in "xyz")
-    return Solid(m, (0.0, 0.0, 0.0), (x, y, z))
+    return Solid(m, (0.0, 0.0, 0.0), (x, y, z), "cylinder")
 
 
 def disk(mass: float, radius: float, axis: str = "z") -> Solid:

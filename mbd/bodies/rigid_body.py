@@ -16,9 +16,13 @@ from mbd.bodies.mass import (
     inertia_matrix,
     inertia_of,
 )
-from mbd.bodies.values import Vector3, name_of, number, triple
+from mbd.bodies.values import Vector3, among, name_of, number, triple
+from mbd.errors import ModelError, nearest
 
-__all__ = ["RigidBody"]
+__all__ = ["FORMS", "RigidBody"]
+
+FORMS = ("box", "cylinder", "ball")
+"""As which a body may be drawn."""
 
 
 @dataclass(frozen=True, init=False)
@@ -32,19 +36,25 @@ class RigidBody(Body):
     inertia : I about the center of mass in body axes [kg m²]: a number (about z, for planar motion),
         (Ixx, Iyy, Izz), (Ixx, Iyy, Izz, Ixy, Ixz, Iyz), the elements of the matrix, or the 3 × 3 matrix itself
     center : place of the center of mass in body axes [m]; kept as `center_offset`, since `center` is the frame there
+    form : 'box', 'cylinder' or 'ball', as which pictures in space show it, of its inertia; '': what its contacts tell,
+        else a cylinder where two moments are equal, a box where none or all are
     """
 
     name: str
     mass: float
     inertia: Inertia
     center_offset: Vector3
+    form: str = ""
 
-    def __init__(self, name: str, mass: float, inertia: Any, center: Any = ZERO) -> None:
+    def __init__(self, name: str, mass: float, inertia: Any, center: Any = ZERO, *, form: str = "") -> None:
         put = object.__setattr__
         put(self, "name", name_of(name, "RigidBody"))
         put(self, "mass", number(mass, f"mass of '{name}'"))
         put(self, "inertia", inertia_of(inertia, f"inertia of '{name}'"))
         put(self, "center_offset", triple(center, f"center of '{name}'"))
+        if not among(form, ("", *FORMS)):
+            raise ModelError(f"form of '{name}': " + nearest(form, FORMS, "form", "There are"))
+        put(self, "form", form)
 
     def fields(self) -> dict[str, float]:
         """`mass`, `center.x` …, `inertia` or `inertia.xx` …"""

@@ -9,15 +9,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from mbd.bodies.algebra import basis, cross, rotate, scaled, total
 from mbd.bodies.base import Frame
 from mbd.bodies.values import Vector3
 from mbd.constraints.base import Constraint
+from mbd.constraints.disks import DiskTouchdown
 from mbd.constraints.knife_edge import KnifeEdge
 from mbd.constraints.rolling import Rolling
-from mbd.constraints.rolling_touchdown import ProfileTouchdown, RollingTouchdown
+from mbd.constraints.rolling_touchdown import RollingTouchdown
+from mbd.constraints.sphere_touchdown import SphereTouchdown
 from mbd.constraints.surfaces import Plane, Surface
 from mbd.constraints.touchdown import Touchdown
 from mbd.equations.outputs import AXES, Outputs
@@ -46,15 +48,18 @@ def drawn(owner: str, what: str) -> str:
 class Shape:
     """Something that is drawn.
 
-    kind : 'plane' (at rest), 'moving plane', 'surface', 'wheel' or 'blade'; of spatial mechanisms 'solid' and 'hinge'
+    kind : 'plane' (at rest), 'moving plane', 'surface', 'wheel', 'ball' or 'blade'; of spatial mechanisms 'solid',
+        'limb' (a link with a moment about its long axis) and 'hinge'
     name : of the constraint that has it, or the first of them, of the body, of the joint; `drawn(name, …)` are its
         results: place, normal and forward of a moving plane, height (of PLACE and time) of a surface, spoke and axle of
-        a wheel, along of a blade, first and second axis of a body, axis of a joint
-    contacts : the contacts that touch a ground; normal and forward of each where it is no plane at rest
+        a wheel, along of a blade, first and second axis of a body, axis of a joint, arm of a contact
+    contacts : the contacts that touch a ground; normal and forward of each where it is no plane at rest; of a disk or a
+        ball its contacts, whose arm leads from the center to where they touch
     points : the frame that touches, of each contact
-    place : frame of a wheel's center, of a blade, of a body's center, of a joint
-    numbers : normal and offset of a plane at rest; mass and Ixx, Iyy, Izz, Ixy, Ixz, Iyz of a solid, as described
+    place : frame of the center of a wheel or a ball, of a blade, of a body's center, of a joint
+    numbers : normal and offset of a plane at rest; mass and Ixx, Iyy, Izz, Ixy, Ixz, Iyz of a solid or a limb
     across : of a surface, the names of what its height depends on, such as 'xt'
+    form : of a solid, 'box', 'cylinder' or 'ball' where words of the model tell it
     """
 
     kind: str
@@ -64,6 +69,7 @@ class Shape:
     place: str = ""
     numbers: tuple[float, ...] = ()
     across: str = ""
+    form: str = ""
 
 
 def shapes_of(model: Description) -> tuple[Shape, ...]:
@@ -79,6 +85,7 @@ def shapes_of(model: Description) -> tuple[Shape, ...]:
     grounds = [_ground(ground, name, contacts) for ground, contacts, name in found]
     rolling = [Shape("wheel", wheel.name, place=wheel.center.full_name) for wheel in wheels]
     rolling += [Shape("wheel", center, place=center) for center in _arcs(model)]
+    rolling += _round_feet(model)
     edges = [
         Shape("blade", word.name, place=word.frame.full_name)
         for word in model.constraints
@@ -93,8 +100,9 @@ def _grounds(
     """(ground, the frame that touches it of a contact that opens and closes, name of the constraint)."""
     for word in words:
         measure = getattr(word, "measure", None)
-        if isinstance(measure, Touchdown | RollingTouchdown | ProfileTouchdown):
-            point, ground = _point(measure), measure.ground
+        ground = getattr(measure, "ground", None)
+        if isinstance(ground, Plane | Surface):
+            point = _point(measure)
             tread = next((wheel for wheel in wheels if wheel.center == point and _carries(wheel, ground)), None)
             contacts = {} if word.kind == "bilateral" else {word.name: point.full_name}
             yield (tread.ground, contacts, tread.name) if tread else (ground, contacts, word.name)
@@ -102,11 +110,27 @@ def _grounds(
         yield wheel.ground, {}, wheel.name
 
 
-def _point(measure: Touchdown | RollingTouchdown | ProfileTouchdown) -> Frame:
+def _point(measure: Any) -> Frame:
     """The frame that stands for where it touches: of a round foot its center, of a sole its origin."""
-    if isinstance(measure, Touchdown):
-        return measure.point
-    return measure.center if isinstance(measure, RollingTouchdown) else measure.frame
+    found: Frame = next(getattr(measure, name) for name in ("point", "center", "frame") if hasattr(measure, name))
+    return found
+
+
+def _round_feet(model: Description) -> list[Shape]:
+    """Disks and balls that touch, with their contacts, by the names of their centers; without those that only roll."""
+    found: dict[str, tuple[str, list[str]]] = {}
+    for word in model.constraints:
+        measure = getattr(word, "measure", None)
+        if isinstance(measure, DiskTouchdown | SphereTouchdown):
+            kind = "wheel" if isinstance(measure, DiskTouchdown) else "ball"
+            contacts = found.setdefault(measure.center.full_name, (kind, []))[1]
+            contacts += [] if word.kind == "bilateral" else [word.name]
+    rolling = {word.center.full_name for word in model.constraints if isinstance(word, Rolling)}
+    return [
+        Shape(kind, center, tuple(contacts), (center,) * len(contacts), center)
+        for center, (kind, contacts) in found.items()
+        if center not in rolling or contacts
+    ]
 
 
 def _arcs(model: Description) -> dict[str, Frame]:
@@ -143,14 +167,16 @@ def offer_shapes(outputs: Outputs, scope: Scope, model: Description) -> None:
         offer(name, "axle", partial(_axis, scope, center, (0.0, 0.0, 1.0)))
     for word in model.constraints:
         measure = getattr(word, "measure", None)
+        if isinstance(measure, DiskTouchdown | SphereTouchdown):
+            offer(word.name, "arm", partial(_arm, scope, measure))
+        if isinstance(measure, DiskTouchdown):
+            _offer_wheel(offer, scope, measure.center.full_name, measure.center, measure.axis)
         if isinstance(word, Rolling):
             _offer_plane(offer, scope, word.name, word.ground)
-            axle: Vector3 = (0.0, 0.0, 1.0) if word.axis is None else word.axis
-            offer(word.name, "spoke", partial(_axis, scope, word.center, basis(axle)[0]))
-            offer(word.name, "axle", partial(_axis, scope, word.center, axle))
+            _offer_wheel(offer, scope, word.name, word.center, (0.0, 0.0, 1.0) if word.axis is None else word.axis)
         elif isinstance(word, KnifeEdge):
             offer(word.name, "along", partial(_axis, scope, word.frame, _along(word.normal)))
-        elif isinstance(measure, Touchdown | RollingTouchdown | ProfileTouchdown) and isinstance(measure.ground, Plane):
+        elif measure is not None and isinstance(getattr(measure, "ground", None), Plane):
             _offer_plane(offer, scope, word.name, measure.ground)
         elif isinstance(measure, Touchdown) and isinstance(measure.ground, Surface):
             outputs.add(drawn(word.name, HEIGHT), partial(_height, scope, measure.ground), listed=False)
@@ -171,6 +197,19 @@ def _material(scope: Scope, plane: Plane) -> Triple:
     """The material point of the plane nearest to the frame's origin as time was 0, ``p_F + R_F (d n + u t)``."""
     place = total(scaled(plane.offset, plane.normal), scaled(scope.time, plane.velocity))
     return place if plane.frame is None else total(scope.frame(plane.frame).position, plane.turned(place, scope))
+
+
+def _offer_wheel(offer: Offer, scope: Scope, name: str, center: Frame, axle: Vector3) -> None:
+    offer(name, "spoke", partial(_axis, scope, center, basis(axle)[0]))
+    offer(name, "axle", partial(_axis, scope, center, axle))
+
+
+def _arm(scope: Scope, measure: DiskTouchdown | SphereTouchdown) -> Triple:
+    """From the center to the point nearest to the plane."""
+    if isinstance(measure, DiskTouchdown):
+        return measure.edge_arm(scope)
+    radius = scope.parameter(measure.center.full_name, "radius", measure.radius)
+    return scaled(-1.0 * radius, measure.ground.turned(measure.ground.normal, scope))
 
 
 def _axis(scope: Scope, frame: Frame, direction: Triple) -> Triple:

@@ -15,6 +15,9 @@ from mbd.bodies.ground import Ground
 from mbd.bodies.link import Link
 from mbd.bodies.mass import inertia_matrix
 from mbd.bodies.values import Vector3
+from mbd.constraints.disks import DiskTouchdown
+from mbd.constraints.rolling import Rolling
+from mbd.constraints.sphere_touchdown import SphereTouchdown
 from mbd.equations.outputs import AXES, Outputs
 from mbd.equations.shapes import Shape, drawn
 from mbd.joints.base import Joint
@@ -27,11 +30,13 @@ __all__ = ["offer_solids", "solids_of"]
 
 
 def solids_of(model: Description) -> tuple[Shape, ...]:
-    """Bodies with moments of inertia about all axes that are no links, and the axes about which joints turn."""
+    """Bodies with moments of inertia about all axes, links among them, and the axes about which joints turn."""
+    forms = _forms_by_contacts(model)
     bodies = [
-        Shape("solid", body.name, place=body.center.full_name, numbers=(mass, *moments))
+        Shape("limb" if isinstance(body, Link) else "solid", body.name, place=body.center.full_name,
+              numbers=(mass, *moments), form=getattr(body, "form", "") or forms.get(body.name, ""))
         for body, mass, moments in _solids(model)
-    ]
+    ]  # fmt: skip
     return (*bodies, *(Shape("hinge", name, place=frame.full_name) for name, frame, _ in _hinges(model.joints)))
 
 
@@ -41,7 +46,7 @@ def offer_solids(outputs: Outputs, scope: Scope, model: Description) -> None:
     def direction(frame: Frame, axis: Vector3) -> Triple:
         return rotate(scope.frame(frame).rotation, axis)
 
-    for body, _, _ in _solids(model):
+    for body in (each for each, _, _ in _solids(model) if not isinstance(each, Link)):
         for what, axis in (("first", (1.0, 0.0, 0.0)), ("second", (0.0, 1.0, 0.0))):
             outputs.triple(drawn(body.name, what), partial(direction, body.origin, axis), AXES, listed=False)
     for name, frame, axis in _hinges(model.joints):
@@ -52,10 +57,22 @@ def _solids(model: Description) -> Iterable[tuple[Body, float, tuple[float, ...]
     """Body, mass and (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about its center."""
     for body in model.bodies.values():
         fields, inertia = body.fields(), getattr(body, "inertia", 0.0)
-        if isinstance(body, Ground | Link) or isinstance(inertia, float):
+        if isinstance(body, Ground) or isinstance(inertia, float):
             continue
         (xx, xy, xz), (_, yy, yz), (_, _, zz) = inertia_matrix(inertia, fields.__getitem__)
         yield body, fields["mass"], tuple(float(moment) for moment in (xx, yy, zz, xy, xz, yz))
+
+
+def _forms_by_contacts(model: Description) -> dict[str, str]:
+    """'ball' and 'cylinder' of the bodies whose center touches a ground as a ball or a disk does, or rolls."""
+    found = {}
+    for word in model.constraints:
+        holder = getattr(word, "measure", None) if not isinstance(word, Rolling) else word
+        if isinstance(holder, SphereTouchdown | DiskTouchdown | Rolling):
+            body = holder.center.body
+            if holder.center.offset == body.center.offset:
+                found[body.name] = "ball" if isinstance(holder, SphereTouchdown) else "cylinder"
+    return found
 
 
 def _hinges(joints: Iterable[Joint]) -> Iterable[tuple[str, Frame, Vector3]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from mbd.bodies.rigid_body import FORMS
 from mbd.bodies.values import among, printable
 from mbd.joints.anatomy import ANATOMY
 from mbd.results.archive import Head, Members, Unreadable
@@ -115,13 +116,16 @@ def _facts(facts: Any, heads: Mapping[str, Head]) -> int:
 
 def _shape(shape: Mapping[str, Any]) -> None:
     """Something that pictures show, of the names that there are."""
-    expect(set(shape) == {"kind", "name", "contacts", "points", "place", "numbers", "across"}, "'shapes'")
-    expect(all(isinstance(shape[word], str) for word in ("kind", "name", "place", "across")), "'shapes'")
+    expect(set(shape) - {"form"} == {"kind", "name", "contacts", "points", "place", "numbers", "across"}, "'shapes'")
+    expect(
+        all(isinstance(shape.get(word, ""), str) for word in ("kind", "name", "place", "across", "form")), "'shapes'"
+    )
+    expect(shape.get("form", "") in ("", *FORMS), "'shapes'")
     expect(set(shape["across"]) <= set("xzt"), "'shapes'")
     contacts, points = (_list(shape[word], str, "'shapes'") for word in ("contacts", "points"))
     expect(len(contacts) == len(points), "'shapes'")
     numbers = _list(shape["numbers"], (int, float), "'shapes'")
-    expect(len(numbers) == {"plane": 4, "solid": 7}.get(shape["kind"], 0), "'shapes'")
+    expect(len(numbers) == {"plane": 4, "solid": 7, "limb": 7}.get(shape["kind"], 0), "'shapes'")
 
 
 def _columns(meta: Mapping[str, Any], members: Members, heads: Mapping[str, Head], count: int) -> set[str]:

@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 
 __all__ = ["ContactFacts", "Facts"]
 
+ROUND = ("wheel", "ball")
+"""Kinds of shapes that have a radius."""
+
 
 @dataclass(frozen=True)
 class ContactFacts:
@@ -81,12 +84,14 @@ class Facts:
         for shape in self.shapes:
             vectors = {
                 "moving plane": ("place", "normal", "forward"), "wheel": ("spoke", "axle"), "blade": ("along",),
-                "solid": ("first", "second"), "hinge": ("axis",),
+                "solid": ("first", "second"), "limb": (), "hinge": ("axis",),
             }.get(shape.kind, ())  # fmt: skip
             found += [drawn(shape.name, what) for what in vectors]
             if shape.kind in ("moving plane", "surface"):
                 found += [drawn(contact, what) for contact in shape.contacts for what in ("normal", "forward")]
-        radii = (f"{shape.name}.radius" for shape in self.shapes if shape.kind == "wheel")
+            if shape.kind in ROUND:
+                found += [drawn(contact, "arm") for contact in shape.contacts]
+        radii = (f"{shape.name}.radius" for shape in self.shapes if shape.kind in ROUND)
         return (*dict.fromkeys(name + axis for name in found for axis in AXES), *radii)
 
     @property

@@ -40,7 +40,7 @@ def size_of(picture: Scene) -> float:
     """Twice the farthest distance of anything from the middle [m]."""
     reaches = [(picture.positions[0], 0.0)]
     reaches += [(solid.center[:1], float(np.linalg.norm(solid.form.half))) for solid in picture.solids]
-    reaches += [(wheel.center[:1], float(wheel.radius[0])) for wheel in picture.around.wheels]
+    reaches += [(each.center[:1], float(each.radius[0])) for each in picture.around.rounds]
     low = np.min([np.min(at, axis=0) - reach for at, reach in reaches], axis=0)
     high = np.max([np.max(at, axis=0) + reach for at, reach in reaches], axis=0)
     middle = 0.5 * (low + high)
@@ -88,8 +88,9 @@ def _bodies(picture: Scene, r: float) -> Iterator[Facets]:
             share = picture.masses.get(body, 0.0) / heaviest
             yield _capsule(at[0], at[0], r * (1.2 + 1.6 * share ** (1.0 / 3.0)), shade)
         else:
+            radius = picture.limbs.get(body, 0.0) if len(at) == 2 else 0.0
             for a, b in zip(at if len(at) > 2 else at[:-1], np.roll(at, -1, axis=0), strict=False):
-                yield _capsule(a, b, r, shade)
+                yield _capsule(*_within(a, b, radius), radius or r, shade)
 
 
 def _joints(picture: Scene, r: float) -> Iterator[Facets]:
@@ -107,13 +108,17 @@ def _joints(picture: Scene, r: float) -> Iterator[Facets]:
 
 
 def _around(picture: Scene, r: float) -> Iterator[Facets]:
-    """Wheels and blades."""
+    """Wheels, balls and blades."""
     for wheel in picture.around.wheels:
         radius, spoke, axle = wheel.radius[0], wheel.spoke[0], wheel.axle[0]
         turn = np.column_stack([spoke, np.cross(axle, spoke), axle])
         shade, second = (_mixed(color(wheel.name), tone(PAPER), share) for share in (0.0, 0.5))
         yield _placed(
             "wheel", np.array([radius, radius, max(0.05 * radius, 0.3 * r)]), wheel.center[0], turn, shade, second
+        )
+    for ball in picture.around.balls:
+        yield _capsule(
+            ball.center[0], ball.center[0], float(ball.radius[0]), _mixed(color(ball.name), tone(PAPER), 0.0)
         )
     for blade in picture.around.blades:
         ink = _mixed(tone(INK), tone(PAPER), 0.0)
@@ -124,6 +129,13 @@ def _placed(kind: str, half: Vector, center: Vector, turn: Matrix, first: Vector
     form = mesh(kind)
     places = center + (form.at * half) @ turn.T
     return Facets(places[form.faces], np.where(form.marked[:, None], second, first))
+
+
+def _within(a: Vector, b: Vector, radius: float) -> tuple[Vector, Vector]:
+    """Ends of a capsule that reaches no farther than from a to b."""
+    length = float(np.linalg.norm(b - a))
+    cut = min(radius, 0.45 * length) / length if length > 0.0 else 0.0
+    return a + cut * (b - a), b - cut * (b - a)
 
 
 def _capsule(a: Vector, b: Vector, r: float, shade: Vector) -> Facets:

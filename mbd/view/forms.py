@@ -1,8 +1,8 @@
 """Solids for pictures in space: which one has a body's inertia, and the facets of each kind.
 
-A body is drawn as the uniform solid of equal mass and moments of inertia: a box, a cylinder or disk where two moments
-are equal, a ball where three are. What `mbd.box`, `mbd.cylinder`, `mbd.disk` and `mbd.sphere` describe is drawn as it
-is, and an inertia that was mistaken shows.
+A body is drawn as the uniform solid of equal mass and moments of inertia: the one that words of the model tell
+(`mbd.box`, a disk that touches), else a cylinder where two moments are equal and a box where none or all are. What
+`mbd.box`, `mbd.cylinder`, `mbd.disk` and `mbd.sphere` describe is drawn as it is; an inertia that was mistaken shows.
 """
 
 from __future__ import annotations
@@ -37,11 +37,13 @@ class Form:
     axes: Matrix
 
 
-def equal_inertia(mass: float, moments: Sequence[float]) -> Form | None:
+def equal_inertia(mass: float, moments: Sequence[float], kind: str = "") -> Form | None:
     """The uniform solid of a mass and (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about its center; None without mass or moments.
 
     Box of sides a, b, c: ``a² = 6 (I₂ + I₃ − I₁)/m``. Cylinder: ``r² = 2 I₃/m``, ``L² = 12 I₁/m − 3 r²``. Ball:
-    ``r² = 5 I/(2 m)``.
+    ``r² = 5 I/(2 m)``. Where the moments are not those of a given `kind`, it has their mean.
+
+    kind : 'box', 'cylinder' or 'ball'; '': a cylinder where two moments are equal, else a box
     """
     xx, yy, zz, xy, xz, yz = moments
     matrix = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
@@ -51,13 +53,15 @@ def equal_inertia(mass: float, moments: Sequence[float]) -> Form | None:
     principal, axes = np.linalg.eigh(matrix) if np.any([xy, xz, yz]) else (np.array([xx, yy, zz]), np.eye(3))
     if np.linalg.det(axes) < 0.0:
         axes = -axes
-    equal = [abs(principal[(k + 1) % 3] - principal[(k + 2) % 3]) < EQUAL * largest for k in range(3)]
-    if all(equal):
-        return Form("ball", np.full(3, np.sqrt(2.5 * largest / mass)), axes)
-    if any(equal):
-        k = equal.index(True)
+    apart = [abs(principal[(k + 1) % 3] - principal[(k + 2) % 3]) for k in range(3)]
+    equal = [gap < EQUAL * largest for gap in apart]
+    if kind == "ball":
+        return Form("ball", np.full(3, np.sqrt(2.5 * float(np.mean(principal)) / mass)), axes)
+    if kind == "cylinder" or (kind == "" and any(equal) and not all(equal)):
+        k = int(np.argmin(apart))
         radius = 2.0 * principal[k] / mass
-        length = max(12.0 * principal[(k + 1) % 3] / mass - 3.0 * radius, 0.0)
+        across = 0.5 * (principal[(k + 1) % 3] + principal[(k + 2) % 3])
+        length = max(12.0 * across / mass - 3.0 * radius, 0.0)
         half = np.array([np.sqrt(radius), np.sqrt(radius), 0.5 * np.sqrt(length)])
         return Form("cylinder", _thick(half), axes[:, [(k + 1) % 3, (k + 2) % 3, k]])
     sides = 6.0 * (principal.sum() - 2.0 * principal) / mass

@@ -21,7 +21,7 @@ def geometry(picture: Scene) -> dict[str, Any]:
     axes = 3 if picture.spatial else 2
     used = picture.positions[:, :, :axes]
     size = float(np.max(np.ptp(used, axis=1))) if used.size else 0.0
-    size = max([size, *(float(np.max(wheel.radius)) for wheel in picture.around.wheels)])
+    size = max([size, *(float(np.max(each.radius)) for each in picture.around.rounds)])
     size = size or float(np.max(np.abs(used), initial=0.0)) or 1.0
     step = float(f"{size / FINE:.1g}")
     heaviest = max(picture.masses.values(), default=1.0)
@@ -35,6 +35,7 @@ def geometry(picture: Scene) -> dict[str, Any]:
             {
                 "body": body, "side": side(body), "points": list(members),
                 "mass": finite(picture.masses.get(body, 0.0) / heaviest),
+                **({"radius": finite(picture.limbs[body])} if picture.limbs.get(body) and len(members) == 2 else {}),
             }
             for body, members in picture.segments
         ],
@@ -64,7 +65,7 @@ def geometry(picture: Scene) -> dict[str, Any]:
 
 
 def _scenery(picture: Scene, axes: int, step: float) -> dict[str, Any]:
-    """Grounds that move, height functions, wheels, blades."""
+    """Grounds that move, height functions, wheels, balls, blades."""
     around = picture.around
 
     def series(places: Matrix, fine: float) -> list[dict[str, Any]]:
@@ -85,6 +86,10 @@ def _scenery(picture: Scene, axes: int, step: float) -> dict[str, Any]:
                 "spoke": series(wheel.spoke, TURN), "down": series(np.cross(wheel.spoke, wheel.axle), TURN),
             }
             for wheel in around.wheels
+        ],
+        "balls": [
+            {"side": side(ball.name), "at": series(ball.center, step), "radius": packed(ball.radius, step)}
+            for ball in around.balls
         ],
         "blades": [
             {"side": side(blade.name), "at": series(blade.place, step), "along": series(blade.along, TURN)}

@@ -16,6 +16,7 @@ from mbd.state import State, malformed
 from mbd.trajectory import Trajectory
 from mbd.view.camera import angles_of, camera
 from mbd.view.plots import drawing
+from mbd.view.posture_forces import draw_forces, with_forces
 from mbd.view.posture_in_space import draw_in_space
 from mbd.view.scene import Scene, scene, upright
 from mbd.view.scenery import Wheel
@@ -24,6 +25,9 @@ from mbd.view.style import INK, NEUTRAL, as_label, color, tone
 __all__ = ["drawn", "instant"]
 
 SOIL = "#B9C0C9"
+
+LETTER, LINE = 5.5, 10.0
+"""Width of a letter and height of a line of names [pt]."""
 
 ROOM = 0.62
 """Half of the side of the picture, over the larger side of the mechanism [-]."""
@@ -66,7 +70,7 @@ def drawn(model: Any, state: State, path: str | Path | None = None, view: Any = 
     """The picture of a state; see `State.plot`."""
     rows = camera(*angles_of(view))
     run = instant(model, state)
-    picture = scene(run, 1)
+    picture = scene(with_forces(model, state) or run, 1)
     if not picture.points:
         raise ModelError(f"'{run.name}' has no bodies to draw")
     rows = rows if picture.spatial else np.eye(3)
@@ -74,15 +78,17 @@ def drawn(model: Any, state: State, path: str | Path | None = None, view: Any = 
     with drawing(path, 5.6, 5.6) as figure:
         axes = figure.subplots()
         if picture.spatial:
-            _frame(axes, draw_in_space(axes, picture, rows))
+            _, _, size = _frame(axes, draw_in_space(axes, picture, rows))
         else:
-            _draw_in_plane(axes, picture, places)
+            size = _draw_in_plane(axes, picture, places)
+        draw_forces(axes, picture, rows, size)
         _pivots(axes, model, run, rows)
         _markers(axes, picture, places)
         axes.set_xlabel("[m]")
         axes.set_ylabel("[m]")
-        closed = ", ".join(sorted(state.mode.closed))
-        title = f"{run.name}, t = {state.time:g} s" + (f", closed: {closed}" if closed else "")
+        closed = sorted(state.mode.closed)
+        names = ", ".join(closed) if len(closed) <= 3 else f"{len(closed)} contacts"
+        title = f"{run.name}, t = {state.time:g} s" + (f", closed: {names}" if closed else "")
         axes.set_title(as_label(title))
     return axes
 
@@ -97,13 +103,14 @@ def _frame(axes: Any, extent: Matrix) -> tuple[float, float, float]:
     return float(left), float(right), size
 
 
-def _draw_in_plane(axes: Any, picture: Scene, places: Matrix) -> None:
-    """A planar mechanism and what stands around it."""
+def _draw_in_plane(axes: Any, picture: Scene, places: Matrix) -> float:
+    """A planar mechanism and what stands around it; its size [m]."""
     rims = [_rim(wheel)[:, :2] for wheel in picture.around.wheels]
     left, right, size = _frame(axes, np.vstack([places, *rims]))
     _ground(axes, picture, left, right)
     _scenery(axes, picture, rims, size)
     _bodies(axes, picture, places)
+    return size
 
 
 def _ground(axes: Any, picture: Scene, left: float, right: float) -> None:
@@ -166,17 +173,30 @@ def _bodies(axes: Any, picture: Scene, places: Matrix) -> None:
 
 
 def _markers(axes: Any, picture: Scene, places: Matrix) -> None:
-    """Named points with their names."""
+    """Named points with their names, but for names that would lie on others."""
     from matplotlib.patheffects import withStroke
 
     figure = sorted({number for _, members in picture.segments for number in members} - set(picture.markers))
+    taken: list[tuple[float, float, float]] = []
     for number in picture.markers:
         place, name = places[number], as_label(picture.points[number])
         apart = [place - places[other] for other in figure] or [np.ones(2)]
         nearest = min(apart, key=lambda d: float(np.hypot(*d)))  # the name stands on the other side
         shift, side = (7.0, "left") if nearest[0] >= 0.0 else (-7.0, "right")
         axes.plot(*place, ".", color=NEUTRAL, markersize=6.0, zorder=5)
+        if not _is_free(axes, place, len(name) if side == "left" else -len(name), taken):
+            continue
         axes.annotate(
             name, place, (shift, 0.0), textcoords="offset points", va="center", ha=side, zorder=6,
             path_effects=[withStroke(linewidth=3.0, foreground="white")],
         )  # fmt: skip
+
+
+def _is_free(axes: Any, place: Any, letters: int, taken: list[tuple[float, float, float]]) -> bool:
+    """Whether a text of so many letters to the right of a place (to the left of negative ones) covers no other."""
+    x, y = axes.transData.transform(place) * 72.0 / axes.figure.dpi
+    left, right = sorted((x, x + LETTER * letters))
+    if any(left < b and a < right and abs(y - other) < LINE for a, b, other in taken):
+        return False
+    taken.append((float(left), float(right), float(y)))
+    return True

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
+from mbd.results.facts import ROUND
 from mbd.results.names import AXES
 from mbd.view.instants import Instants
 from mbd.view.scenery import FIT, Ground, Scenery, plane_of_motion, scenery
-from mbd.view.solids import Hinge, Solid, hinges, solids
+from mbd.view.seen_once import once
+from mbd.view.solids import Hinge, Solid, hinges, limbs, solids
 
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
@@ -49,7 +51,7 @@ class Scene:
     around : grounds that the model has, wheels, blades; grounds : planes at rest, those that only the motion shows too
     markers : numbers of the points that are shown with their names
     spatial : whether anything moves out of the x–y plane, or could
-    solids, hinges : bodies and axes of joints of a spatial mechanism
+    solids, hinges : bodies and axes of joints of a spatial mechanism; limbs : radii of links that have one [m]
     turn : from ground axes to those of the scene (3, 3)
     """
 
@@ -66,6 +68,7 @@ class Scene:
     spatial: bool
     solids: tuple[Solid, ...] = ()
     hinges: tuple[Hinge, ...] = ()
+    limbs: Mapping[str, float] = field(default_factory=dict)
     turn: Matrix = field(default_factory=lambda: np.eye(3))
 
 
@@ -93,13 +96,14 @@ def scene(run: Trajectory, count: int) -> Scene:
         body: run.parameters[f"{body}.mass"] for body, _ in segments if run.parameters.get(f"{body}.mass", 0.0) > 0.0
     }
     around = scenery(run, instants, turn, raw if points else np.zeros((1, 1, 3)))
+    around, bodies_seen = once(around, bodies_seen)
     shown = (Ground(turn @ normal, offset) for normal, offset in _grounds(run, instants, raw, around))
     named = tuple(number[name] for name in markers)
     pushes = tuple(_pushes(run, instants, turn, around))
     grounds = (*around.grounds, *shown)
     return Scene(
         instants, points, positions, segments, masses, around, grounds, touches, pushes, named,
-        bool(points) and (deep or bool(bodies_seen or axes) or _is_deep(run)), bodies_seen, axes, turn,
+        bool(points) and (deep or bool(bodies_seen or axes) or _is_deep(run)), bodies_seen, axes, limbs(run), turn,
     )  # fmt: skip
 
 
@@ -138,7 +142,7 @@ def _touches(run: Trajectory, turn: Matrix) -> list[Touch]:
     """Where and how long each contact with a place of ground at rest stayed closed."""
     found = []
     carried = {name for shape in run.facts.shapes if shape.kind == "moving plane" for name in shape.contacts}
-    wheels = {shape.place for shape in run.facts.shapes if shape.kind == "wheel"}
+    wheels = {shape.place for shape in run.facts.shapes if shape.kind in ROUND}
     for column, contact in enumerate(run.facts.contacts):
         closed = run.record.closed[:, column].astype(np.int8)
         if not contact.place or not closed.any() or contact.name in carried or contact.place in wheels:
@@ -167,7 +171,7 @@ def _pushes(run: Trajectory, instants: Instants, turn: Matrix, around: Scenery) 
         force = values[:, 4:5] * normal
         for column, name in enumerate(along, start=5):
             force = force + values[:, column : column + 1] * ways[name.rpartition(".")[2]]
-        place = values[:, :3] @ turn.T + around.tread(contact.place, normal)
+        place = values[:, :3] @ turn.T + around.tread(contact.name, contact.place, normal)
         found.append(Push(contact.name, place, np.nan_to_num(force)))
     return found
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
 from mbd.equations.shapes import HEIGHT, PLACE, Shape, drawn
+from mbd.results.facts import ROUND
 from mbd.results.names import AXES
 from mbd.tape.evaluate import evaluate_arrays
 from mbd.view.instants import Instants
@@ -17,7 +18,7 @@ from mbd.view.instants import Instants
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
 
-__all__ = ["Blade", "Deck", "Ground", "Sheet", "Scenery", "Wheel", "plane_of_motion", "scenery"]
+__all__ = ["Ball", "Blade", "Deck", "Ground", "Sheet", "Scenery", "Wheel", "plane_of_motion", "scenery"]
 
 FIT = 1e-6
 """A plane whose distance reproduces a gap this well is the ground of that contact [m]."""
@@ -72,6 +73,15 @@ class Wheel:
 
 
 @dataclass(frozen=True, eq=False)
+class Ball:
+    """A ball that touches, at the instants, named by its center: that [m] and its radius (F,) [m]."""
+
+    name: str
+    center: Matrix
+    radius: Vector
+
+
+@dataclass(frozen=True, eq=False)
 class Blade:
     """A blade at the instants: its place [m] and the direction along it, (F, 3)."""
 
@@ -82,17 +92,30 @@ class Blade:
 
 @dataclass(frozen=True, eq=False)
 class Scenery:
-    """All of them; normal and forward along it of the ground of each contact with one, (F, 3)."""
+    """All of them.
+
+    directions : normal and forward along it of the ground of each contact with one, (F, 3)
+    arms : from the center of a disk or a ball to where it touches, by contact, (F, 3) [m]
+    """
 
     grounds: tuple[Ground, ...]
     decks: tuple[Deck, ...]
     sheets: tuple[Sheet, ...]
     wheels: tuple[Wheel, ...]
+    balls: tuple[Ball, ...]
     blades: tuple[Blade, ...]
     directions: dict[str, tuple[Matrix, Matrix]]
+    arms: dict[str, Matrix]
 
-    def tread(self, place: str, normal: Matrix) -> Matrix:
+    @property
+    def rounds(self) -> tuple[Wheel | Ball, ...]:
+        """Wheels and balls."""
+        return (*self.wheels, *self.balls)
+
+    def tread(self, contact: str, place: str, normal: Matrix) -> Matrix:
         """From a place to where it touches the ground: from the center of a wheel to its rim; (F, 3) [m]."""
+        if contact in self.arms:
+            return self.arms[contact]
         wheel = next((each for each in self.wheels if each.name == place), None)
         return np.zeros_like(normal) if wheel is None else -wheel.radius[:, None] * normal
 
@@ -103,10 +126,11 @@ def scenery(run: Trajectory, instants: Instants, turn: Matrix, points: NDArray[n
     def read(owner: str, what: str) -> Matrix:
         return instants.read(run, [drawn(owner, what) + axis for axis in AXES]) @ turn.T
 
-    grounds, decks, sheets, wheels, blades = [], [], [], [], []
+    grounds, decks, sheets, wheels, balls, blades = [], [], [], [], [], []
     directions: dict[str, tuple[Matrix, Matrix]] = {}
+    arms: dict[str, Matrix] = {}
     for shape in run.facts.shapes:
-        if shape.kind in ("solid", "hinge") or not _known(run, shape):
+        if shape.kind in ("solid", "limb", "hinge") or not _known(run, shape):
             continue
         if shape.kind == "plane":
             normal = turn @ np.array(shape.numbers[:3])
@@ -121,15 +145,21 @@ def scenery(run: Trajectory, instants: Instants, turn: Matrix, points: NDArray[n
             sheets.append(_sheet(run, shape, instants, turn, points))
         else:
             place = instants.read(run, [shape.place + axis for axis in AXES]) @ turn.T
-            if shape.kind == "wheel":
+            if shape.kind in ROUND:
                 radius = instants.read(run, [f"{shape.name}.radius"])[:, 0]
+                arms |= {contact: read(contact, "arm") for contact in shape.contacts}
+            if shape.kind == "wheel":
                 wheels.append(Wheel(shape.place, place, radius, read(shape.name, "spoke"), read(shape.name, "axle")))
+            elif shape.kind == "ball":
+                balls.append(Ball(shape.place, place, radius))
             else:
                 blades.append(Blade(shape.place, place, read(shape.name, "along")))
         if shape.kind in ("moving plane", "surface"):
             for contact in shape.contacts:
                 directions[contact] = read(contact, "normal"), read(contact, "forward")
-    return Scenery(tuple(grounds), tuple(decks), tuple(sheets), tuple(wheels), tuple(blades), directions)
+    return Scenery(
+        tuple(grounds), tuple(decks), tuple(sheets), tuple(wheels), tuple(balls), tuple(blades), directions, arms
+    )  # fmt: skip
 
 
 def _known(run: Trajectory, shape: Shape) -> bool:
@@ -139,6 +169,8 @@ def _known(run: Trajectory, shape: Shape) -> bool:
         return True
     if shape.kind == "surface":
         return model is not None and model.knows(drawn(shape.name, HEIGHT))
+    if shape.kind == "ball":
+        return all(f"{name}.x" in run for name in (shape.place, *(drawn(each, "arm") for each in shape.contacts)))
     what = {"moving plane": "place", "wheel": "spoke"}.get(shape.kind, "along")
     return f"{drawn(shape.name, what)}.x" in run and (not shape.place or f"{shape.place}.x" in run)
 

@@ -17,7 +17,7 @@ from mbd.view.instants import Instants
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
 
-__all__ = ["Hinge", "Solid", "hinges", "quaternions", "rotations", "solids"]
+__all__ = ["Hinge", "Solid", "hinges", "limbs", "quaternions", "rotations", "solids"]
 
 MOMENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
 
@@ -44,18 +44,32 @@ class Hinge:
     axis: Matrix
 
 
+def limbs(run: Trajectory) -> dict[str, float]:
+    """Radii of the links that have a moment of inertia about their long axis [m]: of a cylinder, ``r² = 2 I_yy/m``."""
+    found = {}
+    for shape in run.facts.shapes:
+        if shape.kind == "limb":
+            mass, (_, along, *_) = _inertia(run, shape)
+            found[shape.name] = float(np.sqrt(2.0 * along / mass)) if mass > 0.0 and along > 0.0 else 0.0
+    return found
+
+
+def _inertia(run: Trajectory, shape: Shape) -> tuple[float, list[float]]:
+    """Mass and moments of a body with the parameters of the run."""
+    moments = [
+        run.parameters.get(f"{shape.name}.inertia.{part}", number)
+        for part, number in zip(MOMENTS, shape.numbers[1:], strict=True)
+    ]
+    return run.parameters.get(f"{shape.name}.mass", shape.numbers[0]), moments
+
+
 def solids(run: Trajectory, instants: Instants, turn: Matrix) -> tuple[Solid, ...]:
     """The bodies whose inertia some solid has; `turn` goes from ground axes to those of the scene."""
     found = []
     for shape in run.facts.shapes:
         if shape.kind != "solid" or not _known(run, shape, "first", "second"):
             continue
-        mass = run.parameters.get(f"{shape.name}.mass", shape.numbers[0])
-        moments = [
-            run.parameters.get(f"{shape.name}.inertia.{part}", number)
-            for part, number in zip(MOMENTS, shape.numbers[1:], strict=True)
-        ]
-        form = equal_inertia(mass, moments)
+        form = equal_inertia(*_inertia(run, shape), shape.form)
         if form is None:
             continue
         first, second = (_vector(run, instants, drawn(shape.name, what), turn) for what in ("first", "second"))

@@ -116,3 +116,23 @@ def test_a_wheel_its_road_and_a_blade_are_drawn():
     np.testing.assert_allclose(np.hypot(rim[0], rim[1] - 0.4), 0.2, atol=1e-9)
     np.testing.assert_allclose(spoke[:, 1] - spoke[:, 0], 0.2 * np.array([np.cos(0.5), np.sin(0.5)]), atol=1e-9)
     np.testing.assert_allclose(blade.mean(axis=1), [0.3 * np.cos(0.5), 0.4 + 0.3 * np.sin(0.5)], atol=1e-9)
+
+
+def test_the_picture_of_a_state_shows_the_forces_of_contacts_that_are_closed(tmp_path):
+    model = mbd.Model("block on a plane")
+    block = mbd.RigidBody("block", 2.0, (0.1, 0.1, 0.1))
+    model.connect(mbd.Planar("slide", model.ground.origin, block.origin))
+    corners = [block.point(x, -0.1, 0.0, name=f"corner {k}") for k, x in enumerate((-0.2, 0.2))]
+    model.constrain(*(mbd.Unilateral(f"foot {k}", mbd.touchdown(each)) for k, each in enumerate(corners)))
+    feet = ["foot 0", "foot 1"]
+    standing = mbd.assemble(model, {"slide.y": 0.1}, closed=feet, backend="python")
+    axes = standing.plot(tmp_path / "standing.png")
+    arrows = [text for text in axes.texts if text.arrow_patch is not None]
+    assert len(arrows) == 2
+    for arrow, x in zip(arrows, (-0.2, 0.2), strict=True):
+        assert arrow.xyann == pytest.approx((x, 0.0), abs=1e-12)
+        assert arrow.xy[0] == pytest.approx(x, abs=1e-9)
+        assert arrow.xy[1] > 0.0
+    assert "9.81 N" in [text.get_text() for text in axes.texts]
+    raised = mbd.assemble(model, {"slide.y": 0.4}, open=feet, backend="python")
+    assert not any(text.arrow_patch is not None for text in raised.plot(tmp_path / "raised.png").texts)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -61,12 +62,14 @@ def test_views_look_along_the_axes_they_name():
     np.testing.assert_allclose(camera(*VIEWS["side"]), np.eye(3), atol=0.0)
 
 
-@given(st.floats(0.1, 10.0), st.tuples(*[st.floats(0.05, 2.0)] * 3), st.tuples(ANGLE, ANGLE))
-def test_a_body_is_drawn_as_the_solid_that_has_its_inertia(mass, sides, angles):
+@given(
+    st.floats(0.1, 10.0), st.tuples(*[st.floats(0.05, 2.0)] * 3), st.tuples(ANGLE, ANGLE), st.sampled_from(["", "box"])
+)
+def test_a_body_is_drawn_as_the_solid_that_has_its_inertia(mass, sides, angles, kind):
     a, b, c = np.square(sides)
     turn = camera(*angles)
     wanted = turn @ np.diag(mass * np.array([b + c, a + c, a + b]) / 12.0) @ turn.T
-    form = equal_inertia(mass, [*np.diag(wanted), wanted[0, 1], wanted[0, 2], wanted[1, 2]])
+    form = equal_inertia(mass, [*np.diag(wanted), wanted[0, 1], wanted[0, 2], wanted[1, 2]], kind)
     assert form is not None
     squares, round_ = form.half**2, form.kind != "box"
     if form.kind == "ball":
@@ -80,19 +83,76 @@ def test_a_body_is_drawn_as_the_solid_that_has_its_inertia(mass, sides, angles):
 
 def test_solids_of_the_geometry_words_are_drawn_as_they_are():
     def drawn(solid):
-        form = equal_inertia(solid.mass, [*solid.inertia, 0.0, 0.0, 0.0])
+        form = equal_inertia(solid.mass, [*solid.inertia, 0.0, 0.0, 0.0], solid.form)
         return form.kind, np.abs(form.axes) @ form.half
 
     for solid, kind, half in (
         (mbd.box(2.0, (1.0, 2.0, 3.0)), "box", [0.5, 1.0, 1.5]),
         (mbd.cylinder(3.0, 0.5, 2.0, "x"), "cylinder", [1.0, 0.5, 0.5]),
         (mbd.sphere(1.0, 0.4), "ball", [0.4, 0.4, 0.4]),
+        (mbd.box(2.0, (0.2, 0.2, 0.2)), "box", [0.1, 0.1, 0.1]),  # whose inertia a ball has too
+        (mbd.box(2.0, (0.2, 0.5, 0.2)), "box", [0.1, 0.25, 0.1]),  # and a cylinder
     ):
         found = drawn(solid)
         assert found[0] == kind
         np.testing.assert_allclose(found[1], half, rtol=1e-12)
     assert drawn(mbd.disk(1.0, 0.3, "y"))[0] == "cylinder"
     assert equal_inertia(0.0, [1.0] * 6) is None and equal_inertia(1.0, [0.0] * 6) is None
+
+
+def shown(name: str, form: str = "", **contact: Any) -> Any:
+    """The scene of a body of three equal moments that touches a plane, at one instant."""
+    model = mbd.Model(name)
+    body = mbd.RigidBody("body", 1.0, (0.004, 0.004, 0.004), form=form)
+    model.connect(mbd.Free("float", model.ground.origin, body.origin))
+    if contact:
+        model.constrain(mbd.Unilateral("touch", contact["of"](body), friction=0.3))
+    return scene(instant(model, mbd.assemble(model, {"float.y": 0.3, "float.x": 0.1}, backend="python")), 1)
+
+
+def test_of_equal_solids_the_one_is_drawn_that_words_of_the_model_tell():
+    def ball(body):
+        return mbd.sphere_touchdown(body.origin, 0.1)
+
+    def foot(body):
+        return mbd.sphere_touchdown(body.point(0.0, -0.2, 0.0), 0.1)
+
+    def edge(body):
+        return mbd.disk_touchdown(body.origin, 0.2, axis=(1, 0, 0))
+
+    assert [shown("plain").solids[0].form.kind, shown("worded", "ball").solids[0].form.kind] == ["box", "ball"]
+    one = shown("ball", of=ball)  # of the inertia of a ball of radius 0.1 m, which it has by its contact too
+    assert [solid.form.kind for solid in one.solids] == ["ball"] and not one.around.balls
+    with_foot = shown("foot", of=foot)
+    assert [solid.form.kind for solid in with_foot.solids] == ["box"] and len(with_foot.around.balls) == 1
+    rim = shown("rim", "cylinder", of=edge)  # of a radius that its inertia has not: what touches is drawn
+    assert not rim.solids and len(rim.around.wheels) == 1
+    with pytest.raises(mbd.ModelError, match="form of 'body': no form named 'bal'; did you mean 'ball'"):
+        shown("wrong", "bal")
+
+
+def test_the_force_of_a_ball_acts_where_it_touches():
+    model = mbd.Model("rolling ball")
+    ball = mbd.RigidBody("ball", **mbd.sphere(0.2, 0.05).body)
+    model.connect(mbd.Free("float", model.ground.origin, ball.origin))
+    model.constrain(mbd.Unilateral("touch", mbd.sphere_touchdown(ball.origin, 0.05), friction=0.3))
+    start = mbd.assemble(model, {"float.y": 0.05}, {"float.x": 1.0}, closed=["touch"])
+    picture = scene(mbd.simulate(model, start, mbd.GeneralizedAlpha(0.9), dt=2e-3, until=0.02), 4)
+    (push,) = picture.pushes
+    np.testing.assert_allclose(push.place[:, 1], 0.0, atol=1e-9)
+    np.testing.assert_allclose(
+        push.force, np.tile([-0.3 * 0.2 * 9.81, 0.2 * 9.81, 0.0], (len(push.force), 1)), atol=1e-6
+    )
+    assert len(picture.grounds) == 1 and not picture.touches
+
+
+def test_links_that_have_a_moment_about_their_long_axis_are_as_thick_as_it_says():
+    person = mbd.human(70.0, 1.75).without("torso", "left leg")
+    model = mbd.Model("leg")
+    model.connect(*person.joints)
+    picture = scene(instant(model, mbd.assemble(model, backend="python")), 1)
+    assert picture.limbs["right thigh"] == pytest.approx(np.sqrt(2.0) * 0.149 * person.bodies["right thigh"].length)
+    assert set(picture.limbs) == {"right thigh", "right shank"}
 
 
 @pytest.mark.parametrize(

@@ -75,6 +75,7 @@ function fill() {
   run.contacts.forEach((contact, k) => { if (strides[k].length) el("over").append(new Option(`over strides, ${contact.name}`, k)); });
   el("over").hidden = el("over").options.length < 2;
   el("forced").hidden = !usual;
+  el("named").hidden = !run.markers.length; el("names").checked = run.markers.length <= 6; // more than that hide what they name
   el("trace").append(new Option("\u2026", -1), new Option("clear", -2));
   run.points.forEach((point, k) => el("trace").append(new Option(point.name, k)));
   const natural = span < 1.5 ? roundDown(span / 3) : 1; // a short run is shown in slow motion
@@ -100,7 +101,7 @@ function listen() {
   el("time").addEventListener("input", () => { play(false); seek(+el("time").value); });
   el("speed").addEventListener("change", () => { state.speed = +el("speed").value; warnOfAliasing(); });
   el("over").addEventListener("change", () => { state.over = +el("over").value; state.dirty = true; });
-  el("forces").addEventListener("change", () => { state.dirty = true; });
+  for (const id of ["forces", "names"]) el(id).addEventListener("change", () => { state.dirty = true; });
   el("chart").addEventListener("change", () => chooseChart(+el("chart").value));
   el("trace").addEventListener("change", () => { const k = +el("trace").value; if (k === -2) { state.traced.clear(); state.dirty = true; } else if (k >= 0) toggleTrace(k); el("trace").value = -1; });
   for (const id of ["follow", "ghosts"]) el(id).addEventListener("change", () => { Object.assign(camera, { dx: 0, dy: 0, zoom: 1 }); state.dirty = true; });
@@ -124,7 +125,7 @@ function listen() {
       state.dirty = true;
     } else { const k = nearest(event); if (k !== state.hover) { state.hover = k; state.dirty = true; } }
   });
-  stage.addEventListener("pointerup", (event) => { if (drag && !drag.moved) { const k = nearest(event); if (k >= 0) toggleTrace(k); } drag = null; });
+  stage.addEventListener("pointerup", (event) => { if (drag && !drag.moved) { const k = nearest(event); if (k >= 0) toggleTrace(k); if (event.pointerType !== "mouse") { state.hover = k; state.dirty = true; } } drag = null; });
   stage.addEventListener("wheel", (event) => { event.preventDefault(); camera.zoom = Math.min(Math.max(camera.zoom * Math.exp(-event.deltaY * 0.0012), 0.05), 50); state.dirty = true; }, { passive: false });
   stage.addEventListener("dblclick", resetCamera);
   addEventListener("keydown", (event) => {

@@ -16,6 +16,7 @@ for (const point of run.points) point.at = point.at.map((axis) => unpack(axis));
 for (const push of run.pushes) { push.at = push.at.map((axis) => unpack(axis)); push.force = push.force.map((axis) => unpack(axis)); }
 for (const deck of run.decks) for (const part of ["at", "normal", "along"]) deck[part] = deck[part].map((axis) => unpack(axis));
 for (const wheel of run.wheels) { for (const part of ["at", "spoke", "down"]) wheel[part] = wheel[part].map((axis) => unpack(axis)); wheel.radius = unpack(wheel.radius); }
+for (const ball of run.balls) { ball.at = ball.at.map((axis) => unpack(axis)); ball.radius = unpack(ball.radius); }
 for (const blade of run.blades) for (const part of ["at", "along"]) blade[part] = blade[part].map((axis) => unpack(axis));
 for (const sheet of run.sheets) for (const line of sheet.lines || []) line.at = line.at.map((axes) => axes.map((axis) => unpack(axis, line.count)));
 for (const chart of run.charts) for (const line of chart.series) line.values = unpack(line.values);

@@ -25,7 +25,7 @@ function openBoard() {
 function drawFacets(g, w, h, v) {
   if (board === null) board = openBoard();
   if (board && board.gl.isContextLost()) board = false;
-  if (board) drawBuffered(g, w, h, v); else { paint(g, v, floorFacets, false); paint(g, v, solidFacets, true); }
+  if (board) drawBuffered(g, w, h, v); else { paint(g, v, floorFacets, false); paint(g, v, solidFacets, true); paint(g, v, hiddenFacets, false); }
 }
 function drawBuffered(g, w, h, v) {
   const { canvas, gl } = board, { width, height } = g.canvas;
@@ -36,8 +36,9 @@ function drawBuffered(g, w, h, v) {
   gl.depthMask(true); gl.clearColor(0, 0, 0, 0); gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
   gl.uniform4f(board.scale, (2 * v.scale) / w, (2 * v.scale) / h, 0.99 / deep, 0);
   gl.uniform2f(board.shift, (2 * camera.dx) / w, (-2 * camera.dy) / h);
-  for (const [{ data, size }, blended] of [[solidFacets, false], [floorFacets, true]]) {
+  for (const [{ data, size }, blended, behind] of [[solidFacets, false, false], [hiddenFacets, true, true], [floorFacets, true, false]]) {
     if (blended) gl.enable(gl.BLEND); else gl.disable(gl.BLEND);
+    gl.depthFunc(behind ? gl.GREATER : gl.LEQUAL);
     gl.depthMask(!blended);
     gl.bufferData(gl.ARRAY_BUFFER, data.subarray(0, size), gl.STREAM_DRAW);
     gl.drawArrays(gl.TRIANGLES, 0, size / EACH);

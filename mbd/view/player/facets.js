@@ -13,6 +13,7 @@ class Facets {
   triangle(a, b, c, color, opacity) { this.corner(a, color, opacity); this.corner(b, color, opacity); this.corner(c, color, opacity); }
 }
 const solidFacets = new Facets(), floorFacets = new Facets(); // drawn with depth; then laid over them where nothing is nearer
+const hiddenFacets = new Facets(); // laid over all where something is nearer: forces shine through
 
 // ---- colors -------------------------------------------------------------------------------------------------
 const tints = new Map(); // of a theme, by their text
@@ -52,7 +53,7 @@ function capsule(a, b, r) { // from a to b, with round ends; a ball where they a
   return { mesh, at, normal: mesh.normal, center: plus(a, along, 0.5), axes: axesAlong(length > 1e-12 ? along.map((x) => x / length) : [0, 1, 0]) };
 }
 let work = new Float64Array(0);
-function addSolid({ mesh, at, normal, center, axes }, color, second = color) {
+function addSolid({ mesh, at, normal, center, axes }, color, second = color, facets = solidFacets, opacity = 1) {
   const count = at.length / 3, m = eye.map((row) => axes.map((axis) => dot(row, axis))), c = eye.map((row, k) => dot(row, center) - origin[k]);
   const up = [eye[0][1], eye[1][1], eye[2][1]];
   if (work.length < 4 * count) work = new Float64Array(4 * count);
@@ -74,7 +75,7 @@ function addSolid({ mesh, at, normal, center, axes }, color, second = color) {
       const n = 4 * faces[3 * f + k], l = work[n + 3];
       corner3[0] = work[n]; corner3[1] = work[n + 1]; corner3[2] = work[n + 2];
       shade3[0] = Math.min(tone[0] * l, 1); shade3[1] = Math.min(tone[1] * l, 1); shade3[2] = Math.min(tone[2] * l, 1);
-      solidFacets.corner(corner3, shade3);
+      facets.corner(corner3, shade3, opacity);
     }
   }
 }

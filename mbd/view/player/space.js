@@ -19,7 +19,7 @@ const project = (p) => [dot(eye[0], p), dot(eye[1], p), dot(eye[2], p)];
 [camera.yaw, camera.pitch] = run.views.reset;
 look();
 function survey() { // the center over time, and how far anything is from it: the same for every direction of the camera
-  const things = [...run.points.map((point) => [point.at, 0]), ...run.solids.map((solid) => [solid.at, Math.hypot(...solid.half)]), ...run.wheels.map((wheel) => [wheel.at, wheel.radius[0]])];
+  const things = [...run.points.map((point) => [point.at, 0]), ...run.solids.map((solid) => [solid.at, Math.hypot(...solid.half)]), ...[...run.wheels, ...run.balls].map((round) => [round.at, round.radius[0]])];
   const n = time.length, raw = [0, 1, 2].map(() => new Float64Array(n)), low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
   for (let i = 0; i < n; i++) for (let a = 0; a < 3; a++) {
     let least = Infinity, most = -Infinity;
@@ -46,10 +46,11 @@ let theme = "";
 function drawScene() {
   const { g, w, h } = prepare(el("scene")), p = locate(state.t), v = view(w, h, p), r = 0.016 * extent();
   if (theme !== colors.paper) { theme = colors.paper; tints.clear(); }
-  solidFacets.clear(); floorFacets.clear();
-  const cast = [...bodies(p, r), ...wheels(p, r)];
+  for (const facets of [solidFacets, floorFacets, hiddenFacets]) facets.clear();
+  const cast = [...bodies(p, r), ...wheels(p, r), ...balls(p)];
   for (const [solid, color, second] of cast) addSolid(solid, color, second);
-  for (const [solid, color, second] of [...joints(p, r), ...blades(p, r), ...(el("forces").checked ? arrows(p, r) : [])]) addSolid(solid, color, second);
+  for (const [solid, color, second] of [...joints(p, r), ...blades(p, r)]) addSolid(solid, color, second);
+  for (const [solid, color] of el("forces").checked ? arrows(p, r) : []) { addSolid(solid, color); addSolid(solid, color, color, hiddenFacets, 0.4); }
   if (el("ghosts").checked) ghosts(v, r);
   traces(v, p);
   for (const sheet of run.sheets) drawSheet(v, sheet);
@@ -80,11 +81,18 @@ function bodies(p, r) { // solids of their inertia, capsules along the lines of 
     else if (at.length === 1) limb(at[0], at[0], r * (1.2 + 1.6 * Math.cbrt(segment.mass)));
     else {
       const closed = at.length > 2;
-      for (let k = closed ? 0 : 1; k < at.length; k++) limb(at[(k + at.length - 1) % at.length], at[k], r);
+      for (let k = closed ? 0 : 1; k < at.length; k++) limb(...within(at[(k + at.length - 1) % at.length], at[k], segment.radius || 0), segment.radius || r);
       if (closed) plate(at, blend(color, tint(colors.paper), 0.5));
     }
   }
   return found;
+}
+function within(a, b, radius) { // ends of a capsule that reaches no farther than from a to b
+  const along = plus(b, a, -1), length = Math.hypot(...along), cut = length > 0 ? Math.min(radius, 0.45 * length) / length : 0;
+  return [plus(a, along, cut), plus(b, along, -cut)];
+}
+function balls(p) {
+  return run.balls.map((ball) => { const color = tint(sideColor(ball.side)), at = here(ball.at, p); return [capsule(at, at, mix(ball.radius, p)), color, color]; });
 }
 function joints(p, r) { // a pin along each axis, else a ball; a block where a point does not move
   const found = [], light = blend(tint(colors.body), tint(colors.paper), 0.55), ink = tint(colors.ink);

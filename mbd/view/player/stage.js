@@ -25,7 +25,7 @@ function drawMarkers(g, v, p, at, unit) { // small dots with their names, a name
   for (const k of run.markers || []) {
     const [x, y] = at[k], text = run.points[k].name, size = g.measureText(text).width;
     if (!inFigure.has(k)) disc(g, at[k], unit * 0.45, colors.ink, colors.paper);
-    if (state.hover === k) continue;
+    if (state.hover === k || !el("names").checked) continue;
     const free = (left) => left > 0 && left + size < width && !taken.some((box) => left < box[0] + box[2] && box[0] < left + size && Math.abs(y - box[1]) < 15);
     const left = [x + 9, x - 9 - size].find(free);
     if (left === undefined) continue;

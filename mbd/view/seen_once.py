@@ -1,0 +1,55 @@
+"""What two words describe is drawn once: a body of some inertia that also rolls as a wheel or touches as a ball."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from mbd.view.scenery import Ball, Scenery, Wheel
+from mbd.view.solids import Solid, rotations
+
+__all__ = ["once"]
+
+SAME = 0.02
+"""Radii that differ less, over the radius, are one [-]."""
+PLACED = 1e-6
+"""Centers that are nearer, over the radius, are one [-]."""
+
+
+def once(around: Scenery, solids: tuple[Solid, ...]) -> tuple[Scenery, tuple[Solid, ...]]:
+    """Without the wheels and balls that solids of equal radius show, and without the solids that others stand for.
+
+    A solid has the inertia of its body, a wheel or a ball the radius with which it touches: where these differ, as of a
+    wheel of a bicycle, whose mass is at its rim, what touches is drawn.
+    """
+    hidden: set[str] = set()
+    wheels = tuple(each for each in around.wheels if not _shown(each, solids, hidden))
+    balls = tuple(each for each in around.balls if not _shown(each, solids, hidden))
+    return replace(around, wheels=wheels, balls=balls), tuple(each for each in solids if each.name not in hidden)
+
+
+def _shown(each: Wheel | Ball, solids: Iterable[Solid], hidden: set[str]) -> bool:
+    """Whether a solid shows it; one of another radius that lies in it is hidden instead."""
+    radius = float(each.radius[0])
+    for solid in solids:
+        if solid.name != each.name.rpartition(".")[0] or solid.form.kind != _form(each) or not _along(each, solid):
+            continue
+        if float(np.max(np.abs(solid.center - each.center))) > PLACED * radius:
+            continue
+        if abs(float(solid.form.half[0]) - radius) < SAME * radius:
+            return True
+        hidden.add(solid.name)
+    return False
+
+
+def _form(each: Wheel | Ball) -> str:
+    return "cylinder" if isinstance(each, Wheel) else "ball"
+
+
+def _along(each: Wheel | Ball, solid: Solid) -> bool:
+    """Whether a wheel's axle is the axis of a cylinder."""
+    if isinstance(each, Ball):
+        return True
+    return bool(abs(float(rotations(solid.turn[:1])[0][:, 2] @ each.axle[0])) > 1.0 - SAME)
