@@ -30,6 +30,7 @@ from mbd.kernel.guards import is_quiet, judge, update_armed, update_sides
 from mbd.kernel.hooks import scheme_accept
 from mbd.kernel.locate import locate
 from mbd.kernel.nonsmooth import closes_below_surface, must_release
+from mbd.kernel.nonsmooth_cones import hold_for_step
 from mbd.kernel.observe import is_awaited, store_row
 from mbd.kernel.records import Events, Guards, Kernel, Mechanism, Switching
 from mbd.kernel.restart import consistent, largest_force, take_consistent
@@ -290,7 +291,7 @@ def take_step(K: Kernel) -> int:
             t1 = near
             within = True
             cut = False
-    if K.n_cones > 0:
+    if K.n_cones > 0 and K.strategy == 0:
         near = approached_end(K, t1)
         if near < t1:
             t1 = near
@@ -302,8 +303,10 @@ def take_step(K: Kernel) -> int:
         t1 = t + h
         cut = False
     full = h
+    if K.n_cones > 0 and K.strategy == 1:
+        hold_for_step(K, h)
     status = tried_step(K, h, t1)
-    if status == 0 and K.n_cones > 0 and slides_on(K):
+    if status == 0 and K.n_cones > 0 and K.strategy == 0 and slides_on(K):
         h = min(0.5 * h, K.step_taken)
         full = h
         t1 = t + h

@@ -6,15 +6,17 @@
 A semismooth Newton method: every contact and friction takes the branch of its law that the last solution asks for, and
 the linear equations of these branches are solved again (Alart & Curnier 1991; Hintermüller, Ito & Kunisch 2002). Where
 a set of branches returns, single changes follow, the worst first and then the first, which cannot cycle where the
-Delassus matrix is a P-matrix; then Lemke's method (`pivoting`); at last every choice is tried while there are few.
+Delassus matrix is a P-matrix; then Lemke's method (`pivoting`), or of friction in a plane a method of cones
+(`cone_contacts`); at last every choice is tried while there are few. Non-smooth steps begin with the cones.
 """
 
 from __future__ import annotations
 
 from mbd.kernel.branches import is_on, solve_directed
 from mbd.kernel.codes import CONFLICT, NO_IMPACT
+from mbd.kernel.cone_contacts import solve_cones
 from mbd.kernel.cone_directions import misses, turn_directions
-from mbd.kernel.cones import aim, follows, pull_of_both
+from mbd.kernel.cones import aim, follows
 from mbd.kernel.pivoting import pivoted
 from mbd.kernel.records import (
     Balance,
@@ -26,6 +28,7 @@ from mbd.kernel.records import (
     Motion,
 )
 from mbd.kernel.restart import active_rows, refresh_scales
+from mbd.kernel.roots import sqrt
 
 __all__ = ["complementarity"]
 
@@ -57,14 +60,16 @@ def complementarity(K: Balance, level: int) -> int:
             choices += 1
             sets = min(sets * 3, 2 * MOST_CHOICES)
     measure_free(K, level)
+    if K.n_cones > 0 and K.strategy == 1 and level < 2 and solve_cones(K, level) == 1:
+        return 0
     nothing = NO_IMPACT
     for attempt in range(4 * choices * min(choices, 16) + MOST_NEWTON + 16):
         if attempt == MOST_NEWTON + 4 * min(choices, 4) + 8:
-            pivoted(K, level)
+            choose_at_once(K, level)
         status = solve_branches(K, level)
         if status == CONFLICT:
             nothing = CONFLICT  # what held rows contradict is said rather than that no forces were found
-        if status == CONFLICT and (give_way(K) == 1 or pivoted(K, level) == 1):
+        if status == CONFLICT and (give_way(K) == 1 or choose_at_once(K, level) == 1):
             continue
         if status != 0:
             return status
@@ -81,6 +86,11 @@ def complementarity(K: Balance, level: int) -> int:
         if status == 0 and worst(K, False) == 0:
             return status
     return nothing
+
+
+def choose_at_once(K: Balance, level: int) -> int:
+    """1 if a method that looks at all laws together has chosen the branches, 0 if it has not found any."""
+    return int(solve_cones(K, level) if K.n_cones > 0 else pivoted(K, level))
 
 
 def solve_branches(K: Balance, level: int) -> int:
@@ -134,7 +144,9 @@ def cone_fault(K: ContactForces, f: int, largest: float) -> float:
     if follows(K, f):
         return -1.0
     if K.sticks[f] == 1:
-        return float(pull_of_both(K, f, K.impulse) - K.limit[f] - ROUND_OFF * largest)
+        x = K.impulse[K.friction_row[f]] + K.past[K.friction_row[f]]
+        y = K.impulse[K.friction_row[K.partner[f]]] + K.past[K.friction_row[K.partner[f]]]
+        return float(sqrt(x * x + y * y) - K.limit[f] - ROUND_OFF * largest)
     return misses(K, f, SURE if K.loose[f] == 2 else ROUND_OFF)
 
 
@@ -188,7 +200,9 @@ def turn(K: ContactForces, f: int) -> None:
         K.sticks[f] = K.sticks[p] = 1 - K.sticks[f]
         K.slip[f] = K.slip[p] = 0.0
         if K.sticks[f] == 0:
-            aim(K, f, K.impulse[K.friction_row[f]], K.impulse[K.friction_row[p]])
+            own = K.friction_row[f]
+            other = K.friction_row[p]
+            aim(K, f, K.impulse[own] + K.past[own], K.impulse[other] + K.past[other])
     elif K.sticks[f] == 1:
         K.sticks[f] = 0
         row = K.friction_row[f]

@@ -49,8 +49,9 @@ def impact(K: Switching, slow: bool) -> int:
     prepare(K)
     status = 0
     if slow or K.impact_law == 0 or K.plastic_impact == 1:
-        status = newton_law(K, slow, True)
-        if slow and K.strategy == 1 and status == 0 and would_hold_back(K):
+        over_step = K.strategy == 1 and K.n_cones > 0  # impulses of the whole step, none of which pulls
+        status = newton_law(K, slow, not over_step)
+        if slow and K.strategy == 1 and status == 0 and not over_step and would_hold_back(K):
             start_over(K)
             status = newton_law(K, slow, False)
     elif K.impact_law == 1:

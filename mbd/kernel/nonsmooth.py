@@ -19,6 +19,7 @@ from mbd.kernel.codes import LOG_OPENED, NO_IMPACT, PULL
 from mbd.kernel.complementarity import complementarity
 from mbd.kernel.contact_modes import NO_IMPULSE, STILL, log_event
 from mbd.kernel.guards import gap_scale, gap_tolerance, is_watched, watch
+from mbd.kernel.nonsmooth_cones import hold_together, release_both, turned_in_plane
 from mbd.kernel.records import Balance, ContactForces, Guards, Switching
 from mbd.kernel.restart import consistent, displace, evaluate, largest_force
 from mbd.kernel.switching import close_by_impact, mark_touching
@@ -40,6 +41,8 @@ def must_release(K: Switching, t1: float) -> int:
     """
     force = largest_force(K)
     count = 0
+    if K.n_cones > 0 and hold_together(K, t1, force):
+        return 0
     for c in range(K.n_contacts):
         if K.kind[c] == 0 and K.closed[c] == 1 and K.opens[c] == 0 and pulls(K, c, PULL * force, t1):
             K.closed[c] = 0
@@ -51,6 +54,9 @@ def must_release(K: Switching, t1: float) -> int:
         if c >= 0 and K.closed[c] == 0:
             K.sticks[f] = 0
             K.slip[f] = 0.0
+            continue
+        if K.partner[f] >= 0:
+            count += release_both(K, f, PULL * force) if K.partner[f] > f else 0
             continue
         pull = K.lam1[K.friction_row[f]]
         if K.n_repeats == 0:
@@ -90,7 +96,9 @@ def closes_below_surface(K: Guards) -> bool:
                 K.closing[c] = 1
                 found = True
     for f in range(K.n_frictions):
-        if K.slip[f] != 0.0:
+        if K.partner[f] >= 0:
+            found = found or (K.slip[f] != 0.0 and K.partner[f] > f and turned_in_plane(K, f))
+        elif K.slip[f] != 0.0:
             turned = -K.slip[f] * K.guards1[K.at_slip + f]
             if turned > STILL:
                 found = True

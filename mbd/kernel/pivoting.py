@@ -19,7 +19,7 @@ from mbd.kernel.redundancy import shared, sharing
 from mbd.kernel.restart import active_rows, evaluate_loaded, limit_of, load_accelerations
 from mbd.kernel.saddle import solve_rows
 
-__all__ = ["pivoted"]
+__all__ = ["factor_held", "pivoted"]
 
 NOTHING = 1e-10
 """Unknowns below this part of the largest of their kind are zero [-]."""
@@ -136,6 +136,15 @@ def hold(K: Balance, level: int, pushes: int, drags: int) -> int:
         row = K.lcp_rows[u]
         for i in range(K.n):
             K.force[i] -= K.acc[o_R + i * K.n_rows + row] * K.past[row]
+    return factor_held(K)
+
+
+def factor_held(K: Balance) -> int:
+    """The KKT matrix of all rows that act, in factors, and K.jump and K.impulse with it; how many rows, −1: none.
+
+    Rows that depend on others are not among them.
+    """
+    o_R = K.acc_R
     m = active_rows(K, K.active)
     K.n_dropped = 0
     if solve_rows(K, m, True) != 0:

@@ -10,6 +10,7 @@ from mbd.kernel.contact_step import find_pace
 from mbd.kernel.control import first_step
 from mbd.kernel.guards import update_armed, watch
 from mbd.kernel.hooks import scheme_start
+from mbd.kernel.nonsmooth_cones import keep_within
 from mbd.kernel.records import Balance, DependentRows, Kernel
 from mbd.kernel.redundancy import find_dependent, sharing, spread
 from mbd.kernel.restart import active_rows, evaluate, refresh_scales, stepping_rows, take_consistent
@@ -44,6 +45,8 @@ def restart(K: Kernel) -> int:
     find_dependent(K, active_rows(K, K.closed))
     if K.n_dropped > 0 and not sharing(K):
         spread(K, K.lam)
+        if K.n_cones > 0 and K.strategy == 1:
+            keep_within(K)
     K.n_active = stepping_rows(K)
     if is_ill_conditioned(K):
         status = correct_start(K)

@@ -111,12 +111,6 @@ def refusals(equations: Equations, scheme: Integrator, options: Mapping[str, Any
         texts.append(scheme.check_tolerance(len(held)))
         found += [text for (argument, value), text in WITH_TOLERANCE.items() if options.get(argument) == value]
     found += [f"{text} (rows on positions: {_listed(held)})" if held else text for text in texts if text]
-    planes = [friction.name for friction in equations.frictions if friction.partner >= 0]
-    if planes and options.get("contact") == "nonsmooth":
-        found.append(
-            f"contact='nonsmooth' solves friction in planar models, and {_listed(planes)} may slide in a plane; use "
-            "contact='events', or friction=None (it sticks) or 0"
-        )
     if equations.compose is not None and not scheme.any_chart:
         found.append(f"{scheme!r} moves coordinates along q + x, which {CHARTS}; use mbd.HHT(0.05)")
     return found

@@ -34,7 +34,10 @@ class Sizes(Record):
     event_capacity: int
 
     n_kkt: int = formula(lambda s: s.n + s.n_rows)  # unknowns of balance and rows together
-    n_lcp: int = formula(lambda s: s.n_contacts + 3 * s.n_frictions)  # unknowns of the linear complementarity problem
+    n_lcp: int = formula(
+        lambda s: (s.n_contacts + 3 * s.n_frictions) * (s.n_cones == 0)
+    )  # unknowns of the linear complementarity problem, of contacts in space those over cones
+    n_unknowns: int = formula(lambda s: s.n_rows * (s.n_cones > 0))
     n_tangent: int = formula(
         lambda s: s.n_kkt * s.n_kkt + 3 * (s.n + 2 * s.n_rows + s.n_rows * s.n) + 2 * s.n_kkt + 2
     )  # numbers that the programs of a mode write at most

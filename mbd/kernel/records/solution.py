@@ -53,6 +53,21 @@ class Complementarity(SchemeAbilities):
     cone_turn: Reals = reals(lambda s: s.n_frictions)  # by which it turns [rad]
     cone_slope: Reals = reals(lambda s: s.n_frictions * s.n_frictions)
     cone_kept: Reals = reals(lambda s: s.n_frictions)  # cosines before a turn
+    cone_residual: float = place("detail")  # the largest of problems over cones, of their largest impulses
+    cone_matrix: Reals = reals(lambda s: s.n_unknowns * s.n_unknowns)  # of problems over cones
+    cone_shift: Reals = reals(lambda s: s.n_unknowns)
+    cone_found: Reals = reals(lambda s: s.n_unknowns)
+    cone_limit: Reals = reals(lambda s: s.n_unknowns)
+    cone_slope: Reals = reals(lambda s: s.n_unknowns)
+    cone_work: Reals = reals(lambda s: s.n_unknowns * (s.n_unknowns + 6) + 1)
+    cone_rows: Integers = integers(lambda s: s.n_unknowns)
+    cone_owner: Integers = integers(lambda s: s.n_unknowns)
+    cone_twin: Integers = integers(lambda s: s.n_unknowns)
+    cone_pivot: Integers = integers(lambda s: s.n_unknowns)
+    cone_normal: Integers = integers(lambda s: s.n_contacts)  # its number among the unknowns, −1 for none
+    cone_flags: Integers = integers(lambda s: 2 * s.n_contacts + s.n_frictions)  # branches before such a problem
+    cone_dropped: Integers = integers(lambda s: s.n_unknowns)  # dependent rows before it
+    cone_slips: Reals = reals(lambda s: s.n_frictions)
 
 
 class Singular(SchemeAbilities):

@@ -39,6 +39,8 @@ def _statistics(run: RunData, notes: list[str]) -> dict[str, Any]:
         numbers["rejected"] = int(run.kernel.n_rejected)
     if run.kernel.adaptive or (run.kernel.explicit and run.kernel.estimates):
         numbers["local_errors"] = float(run.kernel.error_sum)
+    if run.kernel.n_cones > 0 and run.kernel.strategy == 1:
+        numbers["cone_residual"] = float(run.kernel.cone_residual)
     numbers["modes"] = len(run.stepper.modes)
     numbers["compiled"] = run.stepper.compiled
     numbers["optimized"] = run.stepper.compiled and not run.stepper.provisional
