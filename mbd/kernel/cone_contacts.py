@@ -43,7 +43,7 @@ def solve_cones(K: Balance, level: int) -> int:
     if held >= 0:
         fill_cones(K, held, count)
         status = cone_solve(
-            K.cone_matrix, count, K.cone_shift, K.cone_found, K.cone_owner, K.cone_twin, K.cone_limit, K.cone_slope,
+            K.cone_matrix, count, K.cone_shift, K.cone_found, K.cone_owner, K.cone_twin, K.cone_limit, K.cone_mu,
             K.cone_work, K.cone_pivot,
         )  # fmt: skip
         residual = K.cone_work[0]
@@ -96,7 +96,7 @@ def gather_unknowns(K: ContactForces) -> int:
             K.cone_rows[count] = row
             K.cone_owner[count] = K.cone_normal[c] if c >= 0 else STEADY
             K.cone_twin[count] = -1
-            K.cone_slope[count] = 0.0 if chooses else -1.0
+            K.cone_mu[count] = 0.0 if chooses else -1.0
             count += 1
     for u in range(count):
         f = K.row_friction[K.cone_rows[u]]
@@ -107,12 +107,13 @@ def gather_unknowns(K: ContactForces) -> int:
     return count
 
 
-def slides_or_sticks(K: ContactForces, c: int) -> bool:
+def slides_or_sticks(K: Frictions, c: int) -> bool:
     """Whether a friction of contact c may choose."""
+    found = False
     for f in range(K.n_frictions):
         if K.friction_contact[f] == c and K.loose[f] > 0:
-            return True
-    return False
+            found = True
+    return found
 
 
 def hold_others(K: ContactForces) -> None:
@@ -139,15 +140,15 @@ def find_limits_apart(K: ContactForces, level: int, count: int) -> None:
     evaluate_loaded(K, K.loads)
     for u in range(count):
         f = K.row_friction[K.cone_rows[u]]
-        K.cone_limit[u] = limit_of(K, f) if f >= 0 and K.cone_slope[u] >= 0.0 else 0.0
+        K.cone_limit[u] = limit_of(K, f) if f >= 0 and K.cone_mu[u] >= 0.0 else 0.0
     for c in range(K.n_contacts):
         if K.cone_normal[c] >= 0:
             K.loads[K.normal[c]] -= 1.0
     evaluate_loaded(K, K.loads)
     for u in range(count):
         f = K.row_friction[K.cone_rows[u]]
-        if K.cone_owner[u] >= 0 and f >= 0 and K.cone_slope[u] >= 0.0:
-            K.cone_slope[u] = max(limit_of(K, f) - K.cone_limit[u], 0.0)
+        if K.cone_owner[u] >= 0 and f >= 0 and K.cone_mu[u] >= 0.0:
+            K.cone_mu[u] = max(limit_of(K, f) - K.cone_limit[u], 0.0)
         if level == 1 and f >= 0:  # a force that stays finite has an impulse only over the time of the step
             K.cone_limit[u] += (K.past_time - 1.0) * K.base_limit[f]
     for c in range(K.n_contacts):
@@ -207,7 +208,7 @@ def take_impulses(K: Balance, count: int) -> bool:
 def take_cone_branches(K: ContactForces, level: int, count: int) -> None:
     """Who pushes, sticks and slides which way, by the velocities of the solution; and its multipliers."""
     cone_faults(
-        K.cone_matrix, count, K.cone_shift, K.cone_found, K.cone_owner, K.cone_twin, K.cone_limit, K.cone_slope,
+        K.cone_matrix, count, K.cone_shift, K.cone_found, K.cone_owner, K.cone_twin, K.cone_limit, K.cone_mu,
         K.cone_work,
     )  # fmt: skip
     o_w = count * count + count
@@ -245,7 +246,7 @@ def take_friction(K: ContactForces, u: int, f: int, small: float, o_w: int, coun
     slides = on and rho * (abs(own) + abs(other)) > small
     K.sticks[f] = 1 if (on and not slides) else 0
     K.slip[f] = 0.0
-    K.limit[f] = cone_limit(count, K.cone_found, K.cone_owner, K.cone_limit, K.cone_slope, K.cone_work, u)
+    K.limit[f] = cone_limit(count, K.cone_found, K.cone_owner, K.cone_limit, K.cone_mu, K.cone_work, u)
     if p >= 0:
         K.sticks[p] = K.sticks[f]
         K.slip[p] = 0.0

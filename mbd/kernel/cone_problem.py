@@ -13,8 +13,9 @@ correction. In terms of ``y = z − ρ w``, ρ the inverse of the diagonal of G,
 
 which a semismooth Newton method with line search solves; by turns with it, and where F does not fall, go projected
 Gauss–Seidel sweeps. Where this does not lead to a solution, slopes grow from zero to what they are, in parts.
-G may be singular, as where contacts are more than determine the motion: ε on the diagonal keeps each step small along
-what is undetermined, and the solution has impulses close to those of least norm.
+G may be singular, as where there are more contacts than motions. First each is taken as a little soft, so that
+impulses are the same in any order of contacts and close to those of least norm; from there the rigid problem is
+solved, with ε on the diagonal, which keeps steps small along what is undetermined.
 """
 
 from __future__ import annotations
@@ -35,6 +36,8 @@ CONE_ROUNDS = 48
 """Newton steps and blocks of sweeps."""
 CONE_GROWTHS = 4
 """Ways to grow: friction at once, in 8 parts, in 32, in 128."""
+CONE_SOFT = 1e-7
+"""Velocity by which a soft contact gives way to its impulse, of the least that any contact alone does."""
 CONE_SWEEPS = 12
 """Sweeps in a block."""
 CONE_REGULAR = 1e-9
@@ -45,7 +48,7 @@ CONE_RIGID = 1e-12
 
 def cone_places(n: int) -> int:
     """Places that `cone_solve` needs in `work`."""
-    return n * (n + 6) + 1
+    return n * (n + 6) + 3
 
 
 def cone_solve(
@@ -66,6 +69,10 @@ def cone_solve(
     size = cone_metric(G, n, shift, twin, work)
     best = 1e300
     parts = 1
+    least = 1e300
+    for u in range(n):
+        if work[n * n + 2 * n + u] > 0.0:
+            least = min(least, 1.0 / work[n * n + 2 * n + u])
     for growth in range(CONE_GROWTHS):
         if not (size < 1e300 and best > CONE_TOLERANCE):
             break
@@ -74,6 +81,10 @@ def cone_solve(
             parts *= 8 if growth == 1 else 4
         for part in range(parts):
             work[n * (n + 6)] = (part + 1.0) / parts
+            work[n * (n + 6) + 2] = CONE_SOFT * least
+            if part == 0:
+                cone_iterate(G, n, shift, z, owner, twin, limit, slope, work, pivots, size)
+            work[n * (n + 6) + 2] = 0.0
             best = cone_iterate(G, n, shift, z, owner, twin, limit, slope, work, pivots, size)
     work[0] = best
     return 0 if best <= CONE_TOLERANCE else 1
@@ -130,6 +141,7 @@ def cone_metric(G: Reals, n: int, shift: Reals, twin: Integers, work: Reals) -> 
     if not total < 1e300:
         return 1e301
     size = 0.0
+    work[n * (n + 6) + 1] = 1.0 / largest if largest > 0.0 else 1.0
     for u in range(n):
         slack = G[u * n + u]
         if twin[u] >= 0:
@@ -160,7 +172,7 @@ def cone_faults(
     o_w = o_F + n
     o_rho = o_w + n
     for u in range(n):
-        value = shift[u]
+        value = shift[u] + work[n * (n + 6) + 2] * z[u]
         for j in range(n):
             value += G[u * n + j] * z[j]
         work[o_w + u] = value
@@ -169,6 +181,9 @@ def cone_faults(
         step = work[o_rho + u] * work[o_w + u]
         if work[o_rho + u] == 0.0:
             work[o_F + u] = z[u]
+            if owner[u] == PUSH or owner[u] == EQUAL:  # what no impulse changes must hold by itself
+                missed = -work[o_w + u] if owner[u] == PUSH else abs(work[o_w + u])
+                worst = max(worst, missed * work[n * (n + 6) + 1])
         elif owner[u] == PUSH:
             work[o_F + u] = min(z[u], step)
         elif owner[u] == EQUAL:
@@ -232,6 +247,9 @@ def cone_project(
         work[o_w + i] += G[i * n + u] * change
         if v >= 0:
             work[o_w + i] += G[i * n + v] * further
+    work[o_w + u] += work[n * (n + 6) + 2] * change
+    if v >= 0:
+        work[o_w + v] += work[n * (n + 6) + 2] * further
 
 
 def cone_slopes(
@@ -253,9 +271,10 @@ def cone_slopes(
         elif owner[u] != PUSH and owner[u] != EQUAL:
             held = far <= most
         slides = owner[u] != PUSH and owner[u] != EQUAL and slope[u] >= 0.0 and most > 0.0 and not held
+        soft = work[n * (n + 6) + 2]
         for j in range(n):
             work[u * n + j] = rho * G[u * n + j] if held else 0.0
-        work[u * n + u] += CONE_REGULAR
+        work[u * n + u] += CONE_REGULAR + (rho * soft if held else 0.0)
         if not held or rho == 0.0:
             work[u * n + u] += 1.0
         if slides and rho > 0.0:
@@ -267,8 +286,8 @@ def cone_slopes(
                 cross = -(most / far) * cosine * (other / far)
                 for j in range(n):
                     work[u * n + j] += own * rho * G[u * n + j] + cross * work[o_rho + v] * G[v * n + j]
-                work[u * n + u] -= own
-                work[u * n + v] -= cross
+                work[u * n + u] += own * (rho * soft - 1.0)
+                work[u * n + v] += cross * (work[o_rho + v] * soft - 1.0)
 
 
 def cone_newton(

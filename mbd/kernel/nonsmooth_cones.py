@@ -1,7 +1,7 @@
 """Contacts that slide in a plane within non-smooth steps: fixed steps, whatever becomes of the direction of γ.
 
 A step in which γ may turn by much of itself, or reach zero, holds the direction in which it begins. Where it ends in
-another one, or beyond zero, the friction of the whole step is found anew, as an impulse in the cone that is opposite to
+another one, or beyond zero, the friction of the whole step is found again, as an impulse in the cone opposite to
 the velocity at its end: that is Moreau's step, of first order, for all contacts together.
 """
 
@@ -11,7 +11,7 @@ from mbd.kernel.codes import PULL
 from mbd.kernel.cone_contacts import all_hold
 from mbd.kernel.cones import HELD, aim, along, pull_of_both
 from mbd.kernel.contact_modes import STILL
-from mbd.kernel.records import ContactForces, Guards, Reals, Switching
+from mbd.kernel.records import Balance, Frictions, Guards, Reals, Switching
 from mbd.kernel.restart import evaluate, evaluate_loaded, largest_force, limit_of
 from mbd.kernel.roots import sqrt
 
@@ -68,7 +68,7 @@ def hold_together(K: Switching, t1: float, force: float) -> bool:
     return not is_within(K, K.lam1, PULL * force) and all_hold(K, t1)
 
 
-def keep_within(K: Switching) -> None:
+def keep_within(K: Balance) -> None:
     """After a restart: where multipliers of least norm pull or leave a cone, those by which it was decided stay.
 
     They are still in K.impulse.
@@ -83,12 +83,13 @@ def keep_within(K: Switching) -> None:
         K.lam[: K.n_rows] = K.impulse[: K.n_rows]
 
 
-def is_within(K: ContactForces, lam: Reals, least: float) -> bool:
+def is_within(K: Frictions, lam: Reals, least: float) -> bool:
     """Whether no contact that opens on pull pulls, and no friction sticks beyond its limit, by these multipliers."""
+    within = True
     for c in range(K.n_contacts):
         if K.kind[c] == 0 and K.closed[c] == 1 and K.opens[c] == 0 and lam[K.normal[c]] > least:
-            return False
+            within = False
     for f in range(K.n_frictions):
         if K.sticks[f] == 1 and pull_of_both(K, f, lam) - K.limit[f] > least:
-            return False
-    return True
+            within = False
+    return within

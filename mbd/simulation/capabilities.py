@@ -91,7 +91,6 @@ WITH_TOLERANCE: dict[tuple[str, str], str] = {
 
 SPACE: dict[str, str] = {
     "friction=μ of a Unilateral on a height function": "a mbd.Plane, or friction=None (it sticks) or 0",
-    "friction=μ of a Unilateral with contact='nonsmooth'": "contact='events'",
     "Rolling without axis=": "axis= of a disk, or mbd.Nonholonomic rows",
 }
 """What is solved in planar models only, and what to use in space instead; refused as the equations are derived."""

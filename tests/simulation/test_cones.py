@@ -178,10 +178,6 @@ def test_a_block_on_three_feet_stops_sliding_and_turning_at_once(scheme, how, bo
 
 
 def test_what_is_not_solved_in_space_is_refused_by_name():
-    with pytest.raises(
-        mbd.CapabilityError, match=r"contact='nonsmooth' .*'foot' may slide in a plane; use contact='events'"
-    ):
-        slid(on_incline(), (1.0, 2.0), contact="nonsmooth")
     model = mbd.Model("hill")
     mass = mbd.PointMass("block", mass=2.0)
     model.connect(mbd.Translation("slide", model.ground.origin, mass.origin, axes="xyz"))
