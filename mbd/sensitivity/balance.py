@@ -16,9 +16,9 @@ from mbd.sensitivity.kernel import balance as kernel
 from mbd.sensitivity.kernel.balance import MOST, SETTLED
 from mbd.sensitivity.kernel.build import entry
 from mbd.sensitivity.motion import Mode, Motion, Rates, solved
-from mbd.sensitivity.programs import Programs
+from mbd.sensitivity.programs import Programs, paired
 
-__all__ = ["Impact", "consistent_rates", "impact", "independent", "on_rows"]
+__all__ = ["Impact", "consistent_rates", "impact", "independent", "on_rows", "pushed"]
 
 
 def consistent_rates(programs: Programs, motion: Motion, mode: Mode, guess: Rates) -> Rates:
@@ -60,6 +60,14 @@ def least_rates(programs: Programs, motion: Motion, mode: Mode, guess: Rates) ->
     of_lam = np.zeros((c.rows, Z.shape[1]))
     of_lam[rows] = found[n:]
     return Rates(rate, lam, found[:n], of_lam)
+
+
+def pushed(programs: Programs, motion: Motion, mode: Mode, rates: Rates) -> float:
+    """The largest rate that the multipliers alone would make."""
+    c = programs.columns
+    of_r = programs.consistent(motion.at(mode, rates.rate, rates.lam))[2]
+    active = motion.at(mode, rates.rate, rates.lam).lam
+    return float(np.max(np.abs(solved(of_r[:, c.rate], of_r[:, c.lam] @ active)), initial=0.0))
 
 
 def saddle(of_r: Matrix, of_row: Matrix, B: Matrix, programs: Programs, rows: Sequence[int]) -> Matrix:
@@ -107,8 +115,12 @@ def on_rows(programs: Programs, motion: Motion, mode: Mode, y: Vector, of_y: Mat
     moved = replace(motion, y=y + jump)
     Z = moved.with_tangent(y=np.zeros_like(of_y)).tangent.stacked(c)
     loaded = programs.steps(moved.at(mode, jump, kappa))
-    bare = programs.steps(moved.at(mode, *zero))
-    forces = (loaded[3] - bare[3]) @ Z - of_r[:, c.rate] @ of_y
+    if any(mode.slip[f] != 0.0 for f in paired(programs.equations)):  # R is that of y, whose direction forces have
+        here = still.with_tangent(y=of_y).tangent.stacked(c)
+        forces = (programs.steps(still.at(mode, jump, kappa))[3] - of_r) @ here - of_r[:, c.rate] @ of_y
+    else:
+        bare = programs.steps(moved.at(mode, *zero))
+        forces = (loaded[3] - bare[3]) @ Z - of_r[:, c.rate] @ of_y
     after = -solved(A, np.vstack([forces, loaded[5][rows] @ Z]))[:n]
     return moved.with_tangent(y=after)
 
@@ -119,7 +131,7 @@ class Impact:
 
     rows : numbers of the rows with impulses
     restitution : e by the number of each normal row that closes
-    slip : signs of the frictions that slide in it
+    slip : signs of the frictions that slide in it; 1 of those in a plane in space, opposite to the velocity after it
     misfit : by how much the velocities after it, and the sum of impulses, are off, relative to their sizes [-]
     """
 
@@ -145,6 +157,9 @@ def impact(
     _, _, speed0, bare0, _, of_speed0 = programs.steps(before.at(mode, *zero))
     M, R = bare0[:, c.rate], bare0[:, c.lam][:, rows]
     impulse = np.zeros(c.rows)
+    sliding = [f for f in paired(programs.equations) if what.slip[f] != 0.0]
+    if sliding:  # the direction of their forces is that of the velocity after it
+        R = programs.steps(later.at(mode, *zero))[3][:, c.lam][:, rows]
     impulse[rows] = np.linalg.lstsq(R, -M @ jump, rcond=None)[0] if rows else 0.0
     _, _, speed1, loaded, _, of_speed1 = programs.steps(later.at(mode, jump, impulse))
     bare = programs.steps(later.at(mode, *zero))[3]
@@ -154,6 +169,8 @@ def impact(
     left = M @ jump + R @ impulse[rows]
     misfit = max(off, float(np.max(np.abs(left)) / max(float(np.max(np.abs(M) @ np.abs(jump))), 1e-300)))
     A = saddle(loaded, of_speed1[rows], of_speed1[rows][:, c.y], programs, rows)
+    if sliding:
+        A[:n, :n] += (loaded - bare)[:, c.y]
     Z = before.tangent.stacked(c)
     still = before.with_tangent(y=np.zeros_like(before.tangent.y)).tangent.stacked(c)
     right = [(loaded - bare) @ still - M @ before.tangent.y]

@@ -75,7 +75,7 @@ def _made(programs: Programs, name: str, mode: Mode, stabilized: bool) -> System
         entries[:, k] = part
     held = np.zeros(R)
     held[list(mode.held)] = 1.0
-    charts, bases = programs.charts.groups, c.count - R + m - (c.base.stop - c.base.start)
+    charts, bases = programs.charts.groups, c.base.start - R + m
     sizes = np.array([
         n, c.n_v, layout.n_q, R, m, 0, len(kept), c.count - R + m, int(stabilized), layout.q, layout.v, layout.a,
         layout.lam, layout.x if charts else layout.q, bases, len(charts),
@@ -117,11 +117,14 @@ def stacked(motion: Motion, system: System) -> Vector:
     """Derivatives of a state by the columns of the system, with zeros up to its width."""
     tangent, sizes = motion.tangent, system.sizes
     n, m, n_v = int(sizes[0]), int(sizes[ROWS]), len(tangent.q)
-    first, last = n_v + 2 * n + m, int(sizes[BASE])
+    first = n_v + 2 * n + m
+    last = first + 1 + len(tangent.anchors) + len(tangent.p)
     out = np.zeros((int(sizes[COLUMNS]), padded(len(tangent.t))))
     width = len(tangent.t)
     out[:n_v, :width], out[n_v : n_v + n, :width] = tangent.q, tangent.y
     out[first, :width] = tangent.t
     out[first + 1 : first + 1 + len(tangent.anchors), :width] = tangent.anchors
     out[first + 1 + len(tangent.anchors) : last, :width] = tangent.p
+    if tangent.slips is not None:
+        out[last : int(sizes[BASE]), :width] = tangent.slips
     return out

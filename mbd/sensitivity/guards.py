@@ -107,7 +107,11 @@ def shift_of_end(
             row = equations.frictions[k].row
             slopes = programs.watched(motion.at(mode, there.rate, there.lam))[1][2 * n_c + n_g + n_f + k]
             change = slopes @ motion.tangent.stacked(c, there.of_rate, there.of_lam)
-            change = change - np.sign(there.lam[row]) * there.of_lam[row]
+            if equations.frictions[k].partner >= 0:
+                own = [row, equations.frictions[equations.frictions[k].partner].row]
+                change = change - there.lam[own] @ there.of_lam[own] / np.hypot(*there.lam[own])
+            else:
+                change = change - np.sign(there.lam[row]) * there.of_lam[row]
         sizes = np.abs(change[:-1]).max(initial=0.0)
         terms = max(abs(float(change[-1])), 1e-12 * float(sizes))
     else:

@@ -31,7 +31,8 @@ class Mode:
 class Tangent:
     """Derivatives of a state in D directions: t (D,), q (n_v, D), y (n, D), anchors (A, D); of the parameters p (P, D).
 
-    q is along velocities.
+    q is along velocities. slips (S, D) : of the slips of frictions in planes in space (`mbd.equations.cones`), which
+    change where these hold a direction; None: they do not
     """
 
     t: Vector
@@ -39,12 +40,15 @@ class Tangent:
     y: Matrix
     anchors: Matrix
     p: Matrix
+    slips: Matrix | None = None
 
     def stacked(self, columns: Columns, rate: Matrix | None = None, lam: Matrix | None = None) -> Matrix:
         """As the columns of `Programs` stand, with derivatives of rates and multipliers where they are given."""
         out = np.zeros((columns.count, len(self.t)))
         out[columns.x], out[columns.y], out[columns.t] = self.q, self.y, self.t
         out[columns.anchor], out[columns.p] = self.anchors, self.p
+        if self.slips is not None:
+            out[columns.slip] = self.slips
         if rate is not None:
             out[columns.rate] = rate
         if lam is not None:
@@ -57,11 +61,14 @@ class Tangent:
         def wide(part: Matrix) -> Matrix:
             return np.concatenate([part, np.zeros((*part.shape[:-1], 1))], axis=-1)
 
-        return Tangent(wide(self.t), wide(self.q), wide(self.y), wide(self.anchors), wide(self.p))
+        slips = None if self.slips is None else wide(self.slips)
+        return Tangent(wide(self.t), wide(self.q), wide(self.y), wide(self.anchors), wide(self.p), slips)
 
     def combined(self, along: Vector) -> Tangent:
         """Without the last direction, of which each other one takes the part `along` (D,)."""
-        return Tangent(*(taken(part, along) for part in (self.t, self.q, self.y, self.anchors, self.p)))
+        slips = None if self.slips is None else taken(self.slips, along)
+        t, q, y, anchors, p = (taken(part, along) for part in (self.t, self.q, self.y, self.anchors, self.p))
+        return Tangent(t, q, y, anchors, p, slips)
 
 
 def taken(part: Matrix, along: Vector) -> Matrix:
@@ -106,6 +113,10 @@ class Rates:
             self.rate, self.lam, np.hstack([self.of_rate, np.zeros((n, 1))]),
             np.hstack([self.of_lam, np.zeros((rows, 1))]),
         )  # fmt: skip
+
+    def combined(self, along: Vector) -> Rates:
+        """Without the last direction, of which each other one takes the part `along` (D,)."""
+        return Rates(self.rate, self.lam, taken(self.of_rate, along), taken(self.of_lam, along))
 
 
 def solved(A: Matrix, b: Matrix) -> Matrix:

@@ -9,6 +9,7 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.errors import UnknownNameError, nearest
+from mbd.sensitivity.cones import force_in_plane
 from mbd.sensitivity.motion import Mode, Motion, Rates
 from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.run_data import RunRows, refused
@@ -118,7 +119,9 @@ def with_sliding(programs: Programs, motion: Motion, mode: Mode, rates: Rates) -
     Z = motion.tangent.stacked(programs.columns, rates.of_rate, rates.of_lam)
     first = 2 * len(equations.contacts) + len(equations.guards) + len(equations.frictions)
     for f, friction in enumerate(equations.frictions):
-        if mode.slip[f] != 0.0:
+        if mode.slip[f] != 0.0 and friction.partner >= 0:
+            lam[friction.row], of_lam[friction.row] = force_in_plane(programs, f, values, slopes @ Z)
+        elif mode.slip[f] != 0.0:
             lam[friction.row] = mode.slip[f] * values[first + f]
             of_lam[friction.row] = mode.slip[f] * (slopes[first + f] @ Z)
     return Rates(rates.rate, lam, rates.of_rate, of_lam)

@@ -2,7 +2,7 @@
 
 Each program lists values and, row by row, those of their derivatives by the columns
 
-    x (n_v) | v, z (n) | v̇, ż (n) | λ (R) | t | anchors | chosen parameters | bases of charts
+    x (n_v) | v, z (n) | v̇, ż (n) | λ (R) | t | anchors | chosen parameters | slips of cones | bases of charts
 
 that are not always zero. Where coordinates do not add, x is the increment from the q of the block, and only `steps` and
 `consistent` depend on the base (`mbd.sensitivity.charts`).
@@ -55,17 +55,18 @@ class Columns:
     rows: int
     anchors: int
     parameters: int
+    slips: int = 0
     bases: int = 0
 
     @classmethod
     def of(cls, equations: Equations, layout: Layout, parameters: int) -> Columns:
         """Those of a mechanism with so many chosen parameters."""
-        bases = len(based(equations))
-        return cls(layout.n_v, layout.n, layout.n_rows, layout.n_anchors, parameters, bases)
+        sizes = layout.n_v, layout.n, layout.n_rows, layout.n_anchors, parameters
+        return cls(*sizes, len(paired(equations)), len(based(equations)))
 
     @cached_property
     def _starts(self) -> list[int]:
-        lengths = [0, self.n_v, self.n, self.n, self.rows, 1, self.anchors, self.parameters, self.bases]
+        lengths = [0, self.n_v, self.n, self.n, self.rows, 1, self.anchors, self.parameters, self.slips, self.bases]
         return [int(start) for start in np.cumsum(lengths)]
 
     def _part(self, number: int) -> slice:
@@ -100,8 +101,12 @@ class Columns:
         return self._part(6)
 
     @cached_property
-    def base(self) -> slice:
+    def slip(self) -> slice:
         return self._part(7)
+
+    @cached_property
+    def base(self) -> slice:
+        return self._part(8)
 
     @cached_property
     def count(self) -> int:
@@ -273,16 +278,22 @@ class Programs:
         return [equations.output(name.removeprefix("result "))]
 
 
+def paired(equations: Equations) -> list[int]:
+    """Numbers of the frictions that slide two and two, in a plane in space."""
+    return [k for k, friction in enumerate(equations.frictions) if friction.partner >= 0]
+
+
 def derivatives(
     equations: Equations, values: Sequence[Node], places: Sequence[int], bases: bool = False
 ) -> list[list[Node]]:
-    """Columns of ∂values by x, (v, z), (v̇, ż), λ, t, anchors, these parameters, and, if asked for, bases of charts."""
+    """Columns of ∂values by x, (v, z), (v̇, ż), λ, t, anchors, these parameters, slips; of charts if `bases`."""
     if not values:
         return [[] for _ in range(Columns.of(equations, Layout.of(equations), len(places)).count)]
     inputs, tape = Inputs.of(equations), equations.tape
     anchors = [tape.input("anchor", k) for k in range(equations.n_anchors)]
     parameters = [tape.input("p", k) for k in places]
-    others = (*inputs.v, *inputs.z, *inputs.a, *inputs.s, *inputs.lam, inputs.t, *anchors, *parameters)
+    slips = [tape.input("slip", k) for k in paired(equations)]
+    others = (*inputs.v, *inputs.z, *inputs.a, *inputs.s, *inputs.lam, inputs.t, *anchors, *parameters, *slips)
     by_others = jvps(values, [{node: 1.0} for node in others])
     if equations.chart is None:
         return [*along_places(equations, values), *by_others]

@@ -65,8 +65,6 @@ class RunRows:
         sampled = memory is not None and memory.controllers.get("samples")
         if self.periods is None and (record.parameter_changes or sampled):
             raise refused("controllers decide in it, whose feedback is not differentiated", HELD)
-        if any(friction.partner >= 0 for friction in record.equations.frictions):
-            raise refused("a contact of it slides in a plane in space, where the direction of friction turns with it")
 
     @cached_property
     def record(self) -> Record:

@@ -125,8 +125,9 @@ def _rows_of(
         if k in trivial or (each.contact >= 0 and not takes[each.contact]):
             continue
         if each.friction >= 0:
-            if not _sticks(programs, each.friction, impulses[k], after):
-                slip[each.friction] = -np.sign(impulses[k])
+            if not _sticks(programs, each.friction, impulses, after):
+                in_plane = equations.frictions[each.friction].partner >= 0
+                slip[each.friction] = 1.0 if in_plane else -np.sign(impulses[k])
                 continue
         chosen.append(k)
         if each.contact >= 0 and k == equations.contacts[each.contact].rows[0]:
@@ -148,13 +149,15 @@ def _takes_part(contact: Contact, c: int, mode: Mode, impulses: Vector, closing:
     return contact.opens_on != "pull" or bool(np.any(impulses[list(contact.rows)]))
 
 
-def _sticks(programs: Programs, f: int, impulse: float, after: State) -> bool:
-    """Whether a friction sticks in the impact: its row does not move after it, and it bears an impulse."""
-    if impulse == 0.0:
+def _sticks(programs: Programs, f: int, impulses: Vector, after: State) -> bool:
+    """Whether a friction sticks in the impact: its rows do not move after it, and bear an impulse."""
+    equations = programs.equations
+    own = [f] if equations.frictions[f].partner < 0 else [f, equations.frictions[f].partner]
+    if not np.any(impulses[[equations.frictions[k].row for k in own]]):
         return False
-    place = 2 * len(programs.equations.contacts) + len(programs.equations.guards) + f
-    speed = float(programs.watched(after)[0][place])
-    return abs(speed) <= 1e-9 * max(1.0, float(np.max(np.abs(after.y), initial=0.0)))
+    places = [2 * len(equations.contacts) + len(equations.guards) + k for k in own]
+    speed = float(np.max(np.abs(programs.watched(after)[0][places])))
+    return speed <= 1e-9 * max(1.0, float(np.max(np.abs(after.y), initial=0.0)))
 
 
 def captured(programs: Programs, motion: Motion, mode: Mode, contacts: Sequence[int]) -> Motion:

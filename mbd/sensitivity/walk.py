@@ -13,8 +13,10 @@ from mbd.arrays import Matrix, Vector
 from mbd.integrators import RadauIIA, RungeKutta853
 from mbd.integrators.family import NewmarkFamily
 from mbd.results.stored_states import StoredStates
-from mbd.sensitivity.balance import consistent_rates, independent
+from mbd.sensitivity.balance import consistent_rates, independent, pushed
+from mbd.sensitivity.cones import ended_in_rest, refuse_held_directions, rests
 from mbd.sensitivity.guards import Trigger, shift_of_end, trigger
+from mbd.sensitivity.held_directions import HELD, ONSET, Way, along_ways, first_of_pair, pull_of, slow_ways
 from mbd.sensitivity.motion import Mode, Motion, Rates, Tangent
 from mbd.sensitivity.newmark_rows import NewmarkRows
 from mbd.sensitivity.programs import Programs
@@ -86,6 +88,9 @@ class Walk:
         self._modes: dict[tuple[Any, ...], Mode] = {}
         self.steps = steps_of(rows, programs)
         self._written = dict(rows.changes)
+        refuse_held_directions(rows)
+        self._ways: dict[int, Way] = {}
+        self._pulls: dict[int, Way] = {}
         self.visit: Callable[[int, Motion, Mode, Rates], None] | None = None
         """Called with every row that a step starts from, and what the pass knows there."""
 
@@ -107,8 +112,7 @@ class Walk:
         self._take_written(0)
         mode = self.mode(0, motion)
         found, row, last, looked = list[Instant](), 0, len(record.time) - 1, set[int]()
-        rates = self._restarted(motion, mode, 0)
-        memory = self.steps.start(motion, mode, rates)
+        motion, mode, rates, memory = self._started(motion, mode, 0)
         fresh = True
         while row < last:
             if self.visit is not None:
@@ -123,10 +127,9 @@ class Walk:
             if same and row + 2 not in rows.events:
                 row, fresh = row + 1, True  # a boundary in time, where the scheme starts again
                 self._take_written(row)
-                rates = self._restarted(motion, mode, row)
-                memory = self.steps.start(motion, mode, rates)
+                motion, mode, rates, memory = self._started(motion, self.mode(row, motion), row)
                 continue
-            if self.visit is None and not rows.begins_late(motion.t, row):
+            if self.visit is None and not self._ways and not rows.begins_late(motion.t, row):
                 before, far = row, self._unwatched(mode, row, rows.segment_end(row) - 1)
                 row, motion, memory = self.steps.leap(motion, memory, mode, row, far)
                 fresh = fresh and row == before
@@ -141,13 +144,15 @@ class Walk:
                 found.append(instant)
                 row, motion, fresh = row + 2, instant.after, True
                 self._take_written(row)
-                mode = self.mode(row, motion)
-                rates = self._restarted(motion, mode, row)
-                memory = self.steps.start(motion, mode, rates)
+                motion, mode, rates, memory = self._started(motion, self.mode(row, motion), row)
                 continue
             dh = -motion.tangent.t if rows.is_fixed(row + 1) else np.zeros_like(motion.tangent.t)
             motion, memory = self.steps.along(motion, memory, mode, row + 1, dh, fresh)
             row, fresh = row + 1, False
+            if self._ways:
+                plain = self.mode(row, motion)
+                self._ways = slow_ways(self.programs, motion, plain, memory.rates, self._ways)
+                mode, motion = along_ways(self.programs, motion, plain, self._ways, ONSET)
         if self._written:
             raise refused(f"a controller wrote parameters at t = {record.time[min(self._written)]:.9g} s within a step")
         return Passed(motion, mode, memory.rates if not fresh else rates, found)
@@ -158,6 +163,22 @@ class Walk:
         if values is not None:
             self.programs.values = values
 
+    def _started(self, motion: Motion, mode: Mode, row: int) -> tuple[Motion, Mode, Rates, Memory]:
+        """The scheme from a row on, with what acts and which frictions in planes do not follow their velocity yet."""
+        if not (self.programs.columns.slips and np.any(mode.slip)):
+            self._ways = {}
+            rates = self._restarted(motion, mode, row)
+            return motion, mode, rates, self.steps.start(motion, mode, rates)
+        width = len(motion.tangent.t)
+        none = np.zeros((len(self.rows.rate[row]), width)), np.zeros((len(self.record.lam[row]), width))
+        guess = Rates(self.rows.rate[row], np.array(self.record.lam[row]), *none)
+        self._ways = slow_ways(self.programs, motion, mode, guess, self._pulls)
+        held, begun = along_ways(self.programs, motion, mode, self._ways, HELD)
+        rates = self._restarted(begun, held, row)
+        memory = self.steps.start(begun, held, rates)
+        mode, motion = along_ways(self.programs, motion, mode, self._ways, ONSET)
+        return motion, mode, rates, memory
+
     def _restarted(self, motion: Motion, mode: Mode, row: int) -> Rates:
         """Consistent rates at a row, which are those that it holds."""
         c = self.programs.columns
@@ -165,7 +186,8 @@ class Walk:
         guess = Rates(self.rows.rate[row].copy(), np.array(self.record.lam[row]), *none)
         found = consistent_rates(self.programs, motion, mode, guess)
         size = float(np.max(np.abs(guess.rate), initial=1e-300))
-        if not np.max(np.abs(found.rate - guess.rate), initial=0.0) <= 1e-6 * size:
+        off = np.max(np.abs(found.rate - guess.rate), initial=0.0)
+        if not off <= 1e-6 * size and not off <= 1e-6 * pushed(self.programs, motion, mode, found):
             raise refused(
                 f"accelerations at t = {motion.t:.9g} s are not those of the rows that act there",
                 "a start that goes on from another run keeps its memory: give it without, by "
@@ -236,6 +258,11 @@ class Walk:
             self.programs.equations,
             len(self.programs.equations.contacts),
         )
+        resting = rests(equations, events, mode)
+        if resting >= 0:
+            fired = trigger(equations, events, np.zeros(n_c), np.zeros(n_c), mode.slip, motion.t)
+            before, rates = ended_in_rest(self.steps, motion, memory, mode, row, resting)
+            return Instant(row + 1, fired, before, self._after(before, mode, fired, row + 1, rates))
         wide = replace(motion, tangent=motion.tangent.widened())
         dh = np.zeros(len(wide.tangent.t))
         dh[-1] = 1.0
@@ -246,6 +273,11 @@ class Walk:
         slowest = float(self.record.settings.get("rest_speed", 1e-6))
         along = shift_of_end(self.programs, end, mode, rates, fired, slowest)
         before = replace(end, tangent=end.tangent.combined(along))
+        f = first_of_pair(equations, fired.number) if fired.kind == "slipped" else -1
+        self._pulls = {}
+        if f >= 0 and equations.frictions[f].partner >= 0:
+            there = consistent_rates(self.programs, before, mode, rates.combined(along))
+            self._pulls[f] = pull_of(self.programs, there, f)
         return Instant(row + 1, fired, before, self._after(before, mode, fired, row + 1, rates))
 
     def _after(self, before: Motion, mode: Mode, fired: Trigger, row: int, rates: Rates) -> Motion:
@@ -264,7 +296,11 @@ class Walk:
             motion = after_reset(self.programs, before, mode, there, fired.number, row_after)
         if not is_at(self.rows, motion, row):
             raise refused(f"the state after {fired.name!r} at t = {before.t:.9g} s is not the one that was expected")
-        held = captured(self.programs, before, mode, rigid)
+        gripped = {
+            row.contact for k, row in enumerate(equations.rows)
+            if row.friction >= 0 and row.contact >= 0 and k in later.held and k not in mode.held
+        }  # fmt: skip
+        held = captured(self.programs, before, mode, sorted({*rigid, *gripped}))
         motion = replace(motion, anchors=held.anchors).with_tangent(anchors=held.tangent.anchors)
         soft = [c for c in fresh if equations.contacts[c].kind == "penalty"]
         return captured(self.programs, motion, mode, soft)
