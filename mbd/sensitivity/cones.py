@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
 from mbd.equations.equations import Equations
@@ -24,7 +25,7 @@ from mbd.sensitivity.run_data import RunRows, refused
 from mbd.sensitivity.schemes import Memory, SchemeSteps, is_at
 
 __all__ = [
-    "ended_in_rest", "force_in_plane", "refuse_held_directions", "rests",
+    "ended_in_rest", "force_in_plane", "held_rows", "rests",
 ]  # fmt: skip
 
 MOST = 8
@@ -110,29 +111,38 @@ def _held(
     return end, rates, held
 
 
-def refuse_held_directions(rows: RunRows) -> None:
-    """Refuse a run in which a step held the direction of a force and was not ended by rest.
+def held_rows(rows: RunRows) -> NDArray[np.intp]:
+    """Rows at whose end a step held the direction in which it began, without coming to rest.
 
-    Then its force is not that of the velocity at its end.
+    Their force is not that of their velocity.
+
+    Raises
+    ------
+    CapabilityError
+        where it is not that of the row before either.
     """
     record, equations = rows.record, rows.mechanism.equations
     pairs = [f for f in paired(equations) if first_of_pair(equations, f) == f]
+    found = np.zeros(len(record.time), dtype=bool)
     if not pairs:
-        return
-    states = StoredStates(record, equations)
-    ends = np.zeros(len(record.time), dtype=bool)
+        return np.flatnonzero(found)
+    states, ends = StoredStates(record, equations), found.copy()
     ends[[row - 1 for row in rows.events if row > 0]] = True
     for f in pairs:
         both = f, equations.frictions[f].partner
         x, y = states.evaluate([equations.frictions[k].rate for k in both], states.rows)
-        pull = record.lam[:, [equations.frictions[k].row for k in both]]
-        sizes = np.hypot(x, y) * np.hypot(*pull.T)
-        off = np.abs(x * pull[:, 1] - y * pull[:, 0]) > ALONG * sizes
+        a, b = record.lam[:, [equations.frictions[k].row for k in both]].T
+        speed, pull = np.hypot(x, y), np.hypot(a, b)
+        off = np.abs(x * b - y * a) > ALONG * speed * pull
         off[0] = False
-        off[1:] &= np.hypot(x, y)[:-1] >= MOVING  # slower at the start of a step, it does not follow γ yet
-        wrong = np.flatnonzero(off & (np.abs(record.phase[:, f]) == 1) & ~ends)
-        if len(wrong):
+        off[1:] &= speed[:-1] >= MOVING  # slower at the start of a step, it does not follow γ yet
+        own = off & (np.abs(record.phase[:, f]) == 1) & ~ends
+        before = np.zeros(len(x), dtype=bool)
+        before[1:] = np.abs(x[:-1] * b[1:] - y[:-1] * a[1:]) <= ALONG * speed[:-1] * pull[1:]
+        if np.any(own & ~before):
+            time = record.time[np.flatnonzero(own & ~before)[0]]
             raise refused(
-                f"{equations.frictions[f].name!r} comes close to rest in a plane in space at t = "
-                f"{record.time[wrong[0]]:.9g} s, where a step holds the direction of its force"
+                f"which way {equations.frictions[f].name!r} slides at t = {time:.9g} s is not known to the pass"
             )
+        found |= own
+    return np.flatnonzero(found)

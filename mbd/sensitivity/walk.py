@@ -14,9 +14,18 @@ from mbd.integrators import RadauIIA, RungeKutta853
 from mbd.integrators.family import NewmarkFamily
 from mbd.results.stored_states import StoredStates
 from mbd.sensitivity.balance import consistent_rates, independent, pushed
-from mbd.sensitivity.cones import ended_in_rest, refuse_held_directions, rests
+from mbd.sensitivity.cones import ended_in_rest, held_rows, rests
 from mbd.sensitivity.guards import Trigger, shift_of_end, trigger
-from mbd.sensitivity.held_directions import HELD, ONSET, Way, along_ways, first_of_pair, pull_of, slow_ways
+from mbd.sensitivity.held_directions import (
+    HELD,
+    ONSET,
+    Way,
+    along_ways,
+    first_of_pair,
+    pull_of,
+    slow_ways,
+    with_held_directions,
+)
 from mbd.sensitivity.motion import Mode, Motion, Rates, Tangent
 from mbd.sensitivity.newmark_rows import NewmarkRows
 from mbd.sensitivity.programs import Programs
@@ -88,7 +97,7 @@ class Walk:
         self._modes: dict[tuple[Any, ...], Mode] = {}
         self.steps = steps_of(rows, programs)
         self._written = dict(rows.changes)
-        refuse_held_directions(rows)
+        self._held_rows = held_rows(rows)
         self._ways: dict[int, Way] = {}
         self._pulls: dict[int, Way] = {}
         self.visit: Callable[[int, Motion, Mode, Rates], None] | None = None
@@ -131,6 +140,7 @@ class Walk:
                 continue
             if self.visit is None and not self._ways and not rows.begins_late(motion.t, row):
                 before, far = row, self._unwatched(mode, row, rows.segment_end(row) - 1)
+                far = min([far, *(self._held_rows[self._held_rows > row] - 1)])
                 row, motion, memory = self.steps.leap(motion, memory, mode, row, far)
                 fresh = fresh and row == before
             if row not in looked:
@@ -147,7 +157,12 @@ class Walk:
                 motion, mode, rates, memory = self._started(motion, self.mode(row, motion), row)
                 continue
             dh = -motion.tangent.t if rows.is_fixed(row + 1) else np.zeros_like(motion.tangent.t)
-            motion, memory = self.steps.along(motion, memory, mode, row + 1, dh, fresh)
+            if row + 1 in self._held_rows:
+                held, along = with_held_directions(self.programs, motion, mode, memory.rates)
+                motion, memory = self.steps.along(along, memory, held, row + 1, dh, fresh)
+                motion = along_ways(self.programs, motion, mode, {}, HELD)[1]
+            else:
+                motion, memory = self.steps.along(motion, memory, mode, row + 1, dh, fresh)
             row, fresh = row + 1, False
             if self._ways:
                 plain = self.mode(row, motion)

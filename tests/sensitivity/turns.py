@@ -20,7 +20,7 @@ def all_names(model):
     return [*place_names(equations), *equations.velocity_names]
 
 
-def judged(model, start, scheme, ways=2, seed=0, parameters=(), step=2e-4, **settings):
+def judged(model, start, scheme, ways=2, seed=0, parameters=(), step=2e-4, speeds=True, **settings):
     """How far derivatives of (q, v, t) at the end are off differences, over the largest; and how well these are known.
 
     In random directions of the whole start, and by parameters. None where a change makes another sequence of events.
@@ -32,6 +32,8 @@ def judged(model, start, scheme, ways=2, seed=0, parameters=(), step=2e-4, **set
     found = np.vstack([state, time])
     events = [(event.kind, event.name) for event in run.events]
     changes = [(chance.normal(size=2 * n), {}) for _ in range(ways)]
+    if not speeds:
+        changes = [(np.append(change[:n], np.zeros(n)), {}) for change, _ in changes]
     changes += [(np.zeros(2 * n), {name: model.parameters[name]}) for name in parameters]
     off, noise = [], []
     for change, values in changes:

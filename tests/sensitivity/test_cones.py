@@ -1,0 +1,87 @@
+"""Derivatives of friction in planes in space: sliding, coming to rest, letting go, impacts."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+import mbd
+from tests.sensitivity.turns import judged
+from tests.simulation.test_cones import on_incline, thrown
+
+CLOSE = {"tolerance": 1e-12}
+HHT, INDEX3 = mbd.HHT(0.05, **CLOSE), mbd.HHT(0.05, formulation="index3", **CLOSE)
+RUNGE_KUTTA, RADAU = mbd.RungeKutta853(), mbd.RadauIIA(**CLOSE)
+
+
+def assert_as_differences(kinds, model, start, scheme, *given, **settings):
+    """To 1e-8 of the largest, or to what two quotients differ by where that is more; with these kinds of events."""
+    run = {name: value for name, value in settings.items() if name in ("dt", "until")}
+    assert [event.kind for event in mbd.simulate(model, start, scheme, **run).events] == kinds
+    found = judged(model, start, scheme, *given, **settings)
+    assert found is not None
+    assert np.all(found[0] <= np.maximum(1e-8, 2.0 * found[1])), found
+
+
+@pytest.mark.parametrize("scheme", [RUNGE_KUTTA, RADAU, HHT, INDEX3], ids=repr)
+def test_a_block_slides_along_a_curve_and_comes_to_rest(scheme):
+    model = on_incline()
+    start = mbd.assemble(model, velocity={"slide.x": 1.0, "slide.z": 2.0}, closed="foot")
+    settings = {"ways": 1, "parameters": ["gravity.x"], "dt": 5e-3, "until": 2.0}
+    assert_as_differences(["stuck"], model, start, scheme, **settings)
+
+
+@pytest.mark.parametrize("scheme", [RADAU, HHT], ids=repr)
+def test_a_block_in_a_plane_holds_where_it_comes_to_rest(scheme):
+    model = mbd.Model("block", gravity=(2.0, -9.81, 0.0))
+    mass = mbd.PointMass("block", mass=2.0)
+    model.connect(mbd.Translation("slide", model.ground.origin, mass.origin))
+    model.constrain(mbd.Unilateral("foot", mbd.touchdown(mass.origin), friction=0.4))
+    start = mbd.assemble(model, velocity={"slide.x": 1.0}, closed="foot")
+    assert_as_differences(["stuck"], model, start, scheme, ways=1, parameters=["gravity.x"], dt=5e-3, until=0.8)
+
+
+@pytest.mark.parametrize("friction", [0.1, 0.7])
+def test_a_mass_that_strikes_slides_on_or_sticks(friction):
+    model = thrown(friction, 0.6)
+    start = mbd.assemble(model, {"slide.y": 0.01}, {"slide.x": 1.2, "slide.y": -1.0, "slide.z": 0.5})
+    assert_as_differences(["closed"], model, start, RUNGE_KUTTA, ways=2, dt=5e-3, until=0.1)
+    with pytest.raises(mbd.CapabilityError, match=r"friction in space, of 'foot', is not differentiated"):
+        mbd.sensitivities(model, start, dt=5e-3, until=0.1, wrt=["slide.x"], impact="poisson")
+
+
+@cache
+def box(friction):
+    """A floating box above the ground."""
+    model = mbd.Model("box")
+    body = mbd.RigidBody("box", 1.0, (0.02, 0.03, 0.04))
+    model.connect(mbd.Free("free", model.ground.origin, body.origin))
+    for k, place in enumerate([(0.1, 0.1, 0.2), (-0.1, -0.1, 0.2), (0.1, -0.15, -0.2)]):
+        model.constrain(mbd.Unilateral(f"foot {k}", mbd.touchdown(body.point(*place)), friction=friction))
+    position = {"free.y": 0.4, "free.orientation": ("xyz", (0.3, 0.2, 0.1))}
+    return model, mbd.assemble(model, position, {"free.angular_velocity": (1.0, 2.0, 3.0), "free.x": 0.2})
+
+
+@pytest.mark.parametrize("scheme", [RUNGE_KUTTA, RADAU, HHT, INDEX3], ids=repr)
+def test_a_box_strikes_with_a_corner_and_slides_on_it(scheme):
+    assert_as_differences(["closed"], *box(0.3), scheme, ways=1, parameters=["gravity.y"], dt=2.5e-3, until=0.25)
+
+
+def test_a_box_strikes_with_a_corner_and_stands_on_it():
+    assert_as_differences(["closed", "stuck"], *box(2.0), RADAU, ways=1, dt=2.5e-3, until=0.24)
+
+
+@pytest.mark.parametrize(("scheme", "dt"), [(RADAU, 2e-3), (HHT, 4e-3)], ids=repr)
+def test_springs_pull_a_block_off_a_belt(scheme, dt):
+    """It sticks until the springs pull as much as friction bears, and slides the way they pull."""
+    model = mbd.Model("belt", gravity=(0.0, -9.81, 0.0))
+    block = mbd.PointMass("block", mass=2.0)
+    model.connect(mbd.Translation("slide", model.ground.origin, block.origin, axes="xyz"))
+    belt = mbd.Plane(velocity=(0.5, 0.0, 0.2))
+    model.constrain(mbd.Unilateral("foot", mbd.touchdown(block.origin, belt), friction=0.4))
+    model.apply(mbd.Potential("springs", lambda x, z: 30.0 * x * x + 12.5 * z * z, ("slide.x", "slide.z")))
+    start = mbd.assemble(model, velocity={"slide.x": 0.5, "slide.z": 0.2}, closed="foot")
+    settings = {"ways": 1, "speeds": False, "parameters": ["gravity.y"], "dt": dt, "until": 0.32}
+    assert_as_differences(["slipped"], model, start, scheme, **settings)
