@@ -86,8 +86,8 @@ def sensitivities(
         for arguments that cannot be honoured.
     CapabilityError
         where the run has no derivative, or on one side only (several events at one instant, a contact that only
-        grazes), and for what is not differentiated: non-smooth steps, feedback of controllers, friction of contacts in
-        space. It tells name and time.
+        grazes), and for what is not differentiated: non-smooth steps, feedback of controllers. It tells name and
+        time.
 
     Examples
     --------

@@ -183,16 +183,6 @@ def test_what_is_not_differentiated_is_named(change, words):
         mbd.sensitivities(model, start, dt=0.01, until=1.0, wrt=["hinge.angle"])
 
 
-def test_friction_in_a_plane_in_space_is_named():
-    model = mbd.Model("block")
-    mass = mbd.PointMass("block", mass=2.0)
-    model.connect(mbd.Translation("slide", model.ground.origin, mass.origin, axes="xyz"))
-    model.constrain(mbd.Unilateral("foot", mbd.touchdown(mass.origin), friction=0.3))
-    start = mbd.assemble(model, velocity={"slide.x": 1.0, "slide.z": 2.0}, closed="foot")
-    with pytest.raises(mbd.CapabilityError, match="slides in a plane in space"):
-        mbd.sensitivities(model, start, dt=0.01, until=0.1, wrt=["slide.x.rate"])
-
-
 def test_wrong_questions_are_answered():
     model = pendulum()
     start = mbd.assemble(model, {"hinge.angle": 1.0})
