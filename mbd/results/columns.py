@@ -7,6 +7,7 @@ from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -108,6 +109,7 @@ class ModelColumns(StoredStates, Columns):
     def __init__(self, record: Record, equations: Equations) -> None:
         StoredStates.__init__(self, record, equations)
         self._nodes: dict[str, Node] = {}
+        self._placed: WeakKeyDictionary[Places, dict[bool, Rows]] = WeakKeyDictionary()
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -152,7 +154,10 @@ class ModelColumns(StoredStates, Columns):
         """
         if len(self.rows.time) == 1:  # whose accelerations may be unknown
             return replace(self.rows.part(places.lower), time=places.time)
-        return self._turned(self._between(places, forces), places)
+        known = self._placed.setdefault(places, {})
+        if forces not in known:
+            known[forces] = self._turned(self._between(places, forces), places)
+        return known[forces]
 
     def _between(self, places: Places, forces: bool) -> Rows:
         if self._steps is not None:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from mbd.arrays import Matrix, Vector
 
 if TYPE_CHECKING:
-    from mbd.trajectory import Trajectory
+    from mbd.trajectory import Moments, Trajectory
 
 __all__ = ["Instants"]
 
@@ -23,6 +24,7 @@ class Instants:
 
     time: Vector
     after: NDArray[np.bool_]
+    _moments: WeakKeyDictionary[Trajectory, dict[str, Moments]] = field(default_factory=WeakKeyDictionary, repr=False)
 
     @classmethod
     def of(cls, run: Trajectory, count: int) -> Instants:
@@ -40,11 +42,18 @@ class Instants:
     def read(self, run: Trajectory, names: Sequence[str]) -> Matrix:
         """Named scalars at the instants, (F, names)."""
         found = np.empty((len(self.time), len(names)))
+        moments = self._moments.setdefault(run, {})
         for side, chosen in (("right", self.after), ("left", ~self.after)):
-            values = run.at(self.time[chosen], side=side).read(*names)  # type: ignore[arg-type]
+            if side not in moments:
+                moments[side] = run.at(self.time[chosen], side=side)  # type: ignore[arg-type]
+            values = moments[side].read(*names)
             for column, name in enumerate(names):
                 found[chosen, column] = values[name]
         return found
+
+    def part(self, chosen: NDArray[np.int64]) -> Instants:
+        """Some of them."""
+        return Instants(self.time[chosen], self.after[chosen])
 
     def blend(self, run: Trajectory, column: Vector) -> Vector:
         """A column of the stored rows at the instants."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mbd.arrays import Matrix
 from mbd.results.ledger import SPENT
 from mbd.results.names import AXES
 from mbd.results.summary import facts
@@ -16,9 +17,10 @@ from mbd.view.geometry import geometry
 from mbd.view.instants import Instants
 from mbd.view.packing import finite, packed, side, step_of
 from mbd.view.plots import QUANTITIES, scale, stretches
-from mbd.view.scene import scene
+from mbd.view.scene import Scene, scene
 from mbd.view.style import CYCLE
 from mbd.view.template import filled, part, written
+from mbd.view.thinning import kept, motion
 
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
@@ -39,7 +41,13 @@ SPATIAL = (
 """Parts of the page's script, joined into one function."""
 
 LARGEST = 950_000
-"""Characters of a spatial page, beyond which it has fewer pictures per second."""
+"""Characters of a spatial page, beyond which it leaves out pictures that others show by interpolation."""
+
+CURVES = 0.1
+"""What interpolation may miss of places over the size of the mechanism, over what it may of curves over their range."""
+
+FINEST = 1e-4
+"""Least that interpolation between the pictures kept may miss, over the size of the mechanism [-]."""
 
 
 def write(run: Trajectory, path: str | Path) -> Path:
@@ -49,21 +57,43 @@ def write(run: Trajectory, path: str | Path) -> Path:
 
 def html(run: Trajectory) -> str:
     """The page as text; only that of a spatial mechanism has a camera."""
-    count = pictures(run)
-    text, spatial = _html(run, count)
-    while spatial and len(text) > LARGEST and count > LEAST:
-        count = max(int(0.9 * count * LARGEST / len(text)), LEAST)
-        text, _ = _html(run, count)
+    picture = scene(run, pictures(run))
+    text = _html(run, picture)
+    if not picture.spatial or len(text) <= LARGEST:
+        return text
+    whole, tolerance = picture.instants, FINEST
+    moving = np.hstack([motion(picture), CURVES * _curves(run, whole)])
+    while len(text) > LARGEST and len(picture.instants.time) > LEAST:
+        chosen = kept(whole.time, moving, tolerance)
+        if len(chosen) < len(picture.instants.time):
+            picture = scene(run, whole.part(chosen))
+            text = _html(run, picture, ("pictures", _thinned(len(chosen), len(whole.time), tolerance)))
+        tolerance *= 1.5
     return text
 
 
-def _html(run: Trajectory, count: int) -> tuple[str, bool]:
-    """The page with so many pictures, and whether it is spatial."""
-    data, title = content(run, count), {"<!--title-->": escape(run.name)}
+def _thinned(count: int, whole: int, tolerance: float) -> str:
+    """What a page says of pictures that it leaves out."""
+    missed = f"{100.0 * tolerance:.2g} % of the size of the mechanism"
+    return f"{count} of {whole}; between them places are interpolated within {missed}"
+
+
+def _curves(run: Trajectory, instants: Instants) -> Matrix:
+    """Coordinates and their rates over the range of each, (F, k)."""
+    names = [name for name, _ in run.facts.coordinates] + [name for name in run.facts.rates if name in run]
+    values = instants.read(run, names)
+    ranges = np.ptp(values, axis=0)
+    return np.asarray(values / np.where(ranges > 0.0, ranges, 1.0))
+
+
+def _html(run: Trajectory, picture: Scene, *more: tuple[str, str]) -> str:
+    """The page of a scene, and what it says besides of the run."""
+    data, title = content(run, picture), {"<!--title-->": escape(run.name)}
+    data["facts"] = [*data["facts"], *more]
     if not data["spatial"]:
-        return filled("player", data, {**title, "<!--camera-->": ""}, PLANAR), False
+        return filled("player", data, {**title, "<!--camera-->": ""}, PLANAR)
     buttons = {"<!--camera-->": part("player", "camera.html")}
-    return filled("player", data, {**title, **buttons}, SPATIAL, ("page.css", "camera.css")), True
+    return filled("player", data, {**title, **buttons}, SPATIAL, ("page.css", "camera.css"))
 
 
 def pictures(run: Trajectory) -> int:
@@ -71,9 +101,8 @@ def pictures(run: Trajectory) -> int:
     return int(np.clip(round(RATE * float(run.time[-1] - run.time[0])), LEAST, MOST))
 
 
-def content(run: Trajectory, count: int) -> dict[str, Any]:
+def content(run: Trajectory, picture: Scene) -> dict[str, Any]:
     """Everything the page draws, as plain lists; series are packed by `packed`."""
-    picture = scene(run, count)
     return {
         "name": run.name,
         "time": [round(float(t), 9) for t in picture.instants.time],

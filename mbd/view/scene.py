@@ -72,9 +72,9 @@ class Scene:
     turn: Matrix = field(default_factory=lambda: np.eye(3))
 
 
-def scene(run: Trajectory, count: int) -> Scene:
-    """The scene of a run in `count` equal intervals of time and at its events."""
-    instants = Instants.of(run, count)
+def scene(run: Trajectory, count: int | Instants) -> Scene:
+    """The scene of a run in `count` equal intervals of time and at its events, or at instants."""
+    instants = count if isinstance(count, Instants) else Instants.of(run, count)
     bodies = [
         (body, [name for frame in frames for name in (f"{body}.{frame}", frame) if f"{name}.x" in run])
         for body, frames in run.facts.segments

@@ -73,7 +73,7 @@ def rippled(x, z, t):
 def test_a_surface_in_space_is_on_the_page_as_it_moves(tmp_path):
     """Corners p + r u, with p those at first, u upwards and r how far each rose, lie on the surface of the run."""
     run = tossed(rippled, 0.2)
-    data = content(run, COUNT)
+    data = content(run, scene(run, COUNT))
     (sheet,) = data["sheets"]
     count = sheet["rows"] * sheet["count"]
     first = np.array([unpacked(axis, count) for axis in sheet["at"]]).T

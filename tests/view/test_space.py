@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from mbd.view.forms import equal_inertia, mesh
 from mbd.view.posture import instant
 from mbd.view.scene import scene
 from mbd.view.solids import quaternions, rotations
+from mbd.view.thinning import kept
 from tests.view.test_page import CHROMIUM, Elements, unpacked
 
 ANGLE = st.floats(-3.2, 3.2)
@@ -261,13 +263,33 @@ def test_a_planar_page_has_none_of_it(tmp_path):
     assert not any(word in text for word in ("webgl", 'id="camera"', "#camera", "addShadow", "<!--camera-->"))
 
 
-def test_a_long_run_has_fewer_pictures_instead_of_a_large_page(tmp_path, monkeypatch):
-    full = len(page(pendulum(), tmp_path)[1]["time"])
+def test_a_long_run_leaves_out_pictures_that_others_show_and_says_so(tmp_path, monkeypatch):
+    full = 401
     monkeypatch.setattr(pages, "LEAST", 30)
-    monkeypatch.setattr(pages, "LARGEST", 110_000)
     monkeypatch.setattr(pages, "RATE", 1600.0)
+    monkeypatch.setattr(pages, "LARGEST", 100_000)
     text, data = page(pendulum(), tmp_path)
-    assert len(text) <= 110_000 and 30 <= len(data["time"]) < full
+    assert len(text) <= 100_000 and 30 <= len(data["time"]) < full
+    assert data["facts"][-1][0] == "pictures" and data["facts"][-1][1].startswith(f"{len(data['time'])} of {full}; ")
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from([1e-3, 1e-2]))
+@settings(max_examples=20)
+def test_between_the_pictures_that_are_kept_nothing_is_missed_by_more_than_the_tolerance(seed, tolerance):
+    rng = np.random.default_rng(seed)
+    time = np.sort(np.concatenate([np.linspace(0.0, 1.0, 101), [0.37, 0.37]]))  # an event with both its sides
+    moving = np.sin(time[:, None] * rng.uniform(0.0, 20.0, 3)) + np.where(np.arange(103) > 37, 0.5, 0.0)[:, None]
+    moving[38:, 0] += 1.0
+    found = kept(time, moving, tolerance)
+    assert found[0] == 0 and found[-1] == 102 and np.all(np.diff(found) > 0)
+    shown = moving.copy()
+    for a, b in pairwise(found):
+        share = (time[a : b + 1] - time[a]) / (time[b] - time[a] or 1.0)
+        shown[a : b + 1] = moving[a] + share[:, None] * (moving[b] - moving[a])
+    inside = np.setdiff1d(np.arange(103), found)
+    assert np.max(np.abs(shown - moving)[inside], initial=0.0) <= tolerance + 1e-12
+    twice = np.flatnonzero(np.diff(time) == 0.0)
+    assert set(twice) | set(twice + 1) <= set(found)
 
 
 def test_a_file_keeps_solids_and_hinges(tmp_path):

@@ -96,6 +96,21 @@ function addShadow({ mesh, at, center, axes }, { normal: n, offset }, color) { /
     if (turned > 0) for (const k of corners) { corner3[0] = work[k]; corner3[1] = work[k + 1]; corner3[2] = work[k + 2]; floorFacets.corner(corner3, color); }
   }
 }
+function addCurvedShadow({ mesh, at, center, axes }, heightAt, fine, nearer, color) { // straight below, of what looks up
+  const place = (k) => [0, 1, 2].map((a) => center[a] + axes[0][a] * at[3 * k] + axes[1][a] * at[3 * k + 1] + axes[2][a] * at[3 * k + 2]);
+  const lay = (a, b, c, depth) => { // cut into halves until no edge is longer than the lines of the ground are apart
+    const sides = [[a, b, c], [b, c, a], [c, a, b]].sort((p, q) => Math.hypot(q[0][0] - q[1][0], q[0][2] - q[1][2]) - Math.hypot(p[0][0] - p[1][0], p[0][2] - p[1][2]));
+    const [p, q, r] = sides[0];
+    if (depth < 10 && Math.hypot(p[0] - q[0], p[2] - q[2]) > fine) { const m = plus(p, plus(q, p, -1), 0.5); lay(p, m, r, depth + 1); lay(m, q, r, depth + 1); return; }
+    const low = [a, b, c].map((s) => [s[0], heightAt(s), s[2]]);
+    if (low.some((s, k) => !(s[1] < [a, b, c][k][1]))) return; // beside the ground, or below it
+    for (const s of low) { const t = seen(s); t[2] += nearer; floorFacets.corner(t, color); }
+  };
+  for (let f = 0; f < mesh.faces.length; f += 3) {
+    const [a, b, c] = [0, 1, 2].map((k) => place(mesh.faces[f + k]));
+    if ((b[2] - a[2]) * (c[0] - a[0]) > (b[0] - a[0]) * (c[2] - a[2])) lay(a, b, c, 0);
+  }
+}
 // ---- flat things --------------------------------------------------------------------------------------------
 const seen = (p) => { const q = project(p); return [q[0] - origin[0], q[1] - origin[1], q[2] - origin[2]]; };
 function ribbon(facets, a, b, width, color, from = 1, to = from, nearer = 0) { // a line between places in the axes of the picture

@@ -12,12 +12,16 @@ function floors(p) { // planes at rest and moving; without any ground a grid bel
   }
   return found;
 }
+function shadowTint(share) {
+  const paper = tint(colors.paper), ink = tint(colors.ink);
+  return paper[0] < 0.5 ? blend(paper, [0, 0, 0], 0.6) : blend(paper, ink, share);
+}
 function drawFloor(v, floor, solids) { // a round patch that fades, shadows on it, lines of its material
   const { normal, offset, at, along } = floor, across = cross(along, normal), tick = nice(2.4 * extent(), 8), reach = 5.5 * tick;
   const paper = tint(colors.paper), ink = tint(colors.ink), from = plus(v.center, at, -1), a0 = dot(from, along), c0 = dot(from, across);
   const spot = (a, c) => seen([0, 1, 2].map((k) => at[k] + a * along[k] + c * across[k]));
   if (dot(eye[2], normal) > 0.02) {
-    const fill = blend(paper, ink, 0.055), shade = paper[0] < 0.5 ? blend(paper, [0, 0, 0], 0.6) : blend(paper, ink, floor.solid ? 0.2 : 0.15), opacity = floor.solid ? 0.94 : 0.5, rings = [0, 0.55, 1], rim = (k, q) => spot(a0 + rings[k] * reach * Math.cos(q), c0 + rings[k] * reach * Math.sin(q));
+    const fill = blend(paper, ink, 0.055), shade = shadowTint(floor.solid ? 0.2 : 0.15), opacity = floor.solid ? 0.94 : 0.5, rings = [0, 0.55, 1], rim = (k, q) => spot(a0 + rings[k] * reach * Math.cos(q), c0 + rings[k] * reach * Math.sin(q));
     for (let n = 0; n < 48; n++) {
       const q = (n * Math.PI) / 24, s = ((n + 1) * Math.PI) / 24, ends = [opacity, opacity, 0];
       floorFacets.triangle(rim(0, q), rim(1, q), rim(1, s), fill, opacity);
@@ -33,10 +37,21 @@ function drawFloor(v, floor, solids) { // a round patch that fades, shadows on i
     line((nearA + n) * tick, (nearC + k) * tick, (nearA + n + 1) * tick, (nearC + k) * tick);
   }
 }
-function drawSheet(v, sheet) { // ground of a given height, with every second line of its corners
+function heightOf(places, rows, count) { // of a ground of given height, between its corners; NaN beside it
+  const last = rows * count - 1, [x0, , z0] = places[0], [x1, , z1] = places[last], wide = (x1 - x0) / (count - 1), deep = (z1 - z0) / (rows - 1);
+  return ([x, , z]) => {
+    const s = (x - x0) / wide, t = (z - z0) / deep, i = Math.min(Math.floor(s), count - 2), j = Math.min(Math.floor(t), rows - 2);
+    if (!(s >= 0 && t >= 0 && s <= count - 1 && t <= rows - 1)) return NaN;
+    const k = j * count + i, a = s - i, b = t - j;
+    return (1 - b) * ((1 - a) * places[k][1] + a * places[k + 1][1]) + b * ((1 - a) * places[k + count][1] + a * places[k + count + 1][1]);
+  };
+}
+function drawSheet(v, sheet, solids) { // ground of a given height, with every second line of its corners
   const p = locate(state.t, sheet.times), a = sheet.risen[p.i], b = sheet.risen[p.j], { rows, count } = sheet, holes = new Set(sheet.holes);
   const places = [], pixels = [], fill = blend(tint(colors.paper), tint(colors.ink), 0.1), color = blend(tint(colors.paper), tint(colors.ink), 0.3), width = 1 / v.scale;
   for (let k = 0; k < rows * count; k++) { const rise = a[k] + p.w * (b[k] - a[k]); places.push([0, 1, 2].map((n) => sheet.at[n][k] + rise * sheet.up[n])); pixels.push(seen(places[k])); }
+  const heightAt = heightOf(places, rows, count), apart = (places[count - 1][0] - places[0][0]) / (count - 1);
+  if (sheet.up[1] > 1 - 1e-9) for (const solid of solids) addCurvedShadow(solid, heightAt, apart, 3e-3 * extent(), shadowTint(0.32));
   const there = (...corners) => !corners.some((k) => holes.has(k)), nearer = 2e-3 * extent();
   for (let j = 0; j < rows; j++) for (let i = 0; i < count; i++) {
     const k = j * count + i;

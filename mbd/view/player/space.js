@@ -53,7 +53,7 @@ function drawScene() {
   for (const [solid, color] of el("forces").checked ? arrows(p, r) : []) { addSolid(solid, color); addSolid(solid, color, color, hiddenFacets, 0.4); }
   if (el("ghosts").checked) ghosts(v, r);
   traces(v, p);
-  for (const sheet of run.sheets) drawSheet(v, sheet);
+  for (const sheet of run.sheets) drawSheet(v, sheet, cast.map(([solid]) => solid));
   for (const floor of floors(p)) drawFloor(v, floor, cast.map(([solid]) => solid));
   footprints(r);
   drawFacets(g, w, h, v);
