@@ -15,6 +15,7 @@ from mbd.errors import ModelError
 from mbd.tape.derivatives import live
 from mbd.testing.mechanisms import random_body, random_frame, random_joint
 from mbd.view.page import content
+from mbd.view.scene import scene
 from tests.forward_kinematics import poses
 
 
@@ -109,7 +110,8 @@ def test_the_page_shows_named_points():
     model, shank = leg()
     shank.point(0.1, -0.4, name="toe")
     mbd.Marker("post", model.ground, (0.5, 0.1))
-    page = content(run_of(model), 10)
+    run = run_of(model)
+    page = content(run, scene(run, 10))
     assert [page["points"][k]["name"] for k in page["markers"]] == ["post", "shank.toe"]
 
 

@@ -195,3 +195,20 @@ def test_what_a_person_lacks_is_named():
     ):  # fmt: skip
         with pytest.raises(ModelError, match=said):
             act()
+
+
+def test_wrong_words_for_a_person_are_answered_with_right_ones():
+    person = mbd.human(70.0, 1.75)
+    with pytest.raises(ModelError, match=r"'left knee' is a joint; without\('left shank'\) leaves it out"):
+        person.without("left knee")
+    with pytest.raises(ModelError, match="all segments hang on the pelvis"):
+        person.without("pelvis")
+    with pytest.raises(ModelError, match="did you mean 'left arm'"):
+        person.without("left arms")
+    with pytest.raises(ModelError, match="human: no segment named 'left toe'; did you mean 'left foot'"):
+        person.bodies["left toe"]
+    with pytest.warns(mbd.MbdWarning, match="a height of 175 m; heights are in metres"):
+        mbd.human(70.0, 175.0)
+    assert "left hip         orientation" in str(person)
+    held = mbd.human(70.0, 1.75, floating=False)
+    assert (held.height, held.center) == (person.height, person.center)

@@ -10,10 +10,11 @@ from typing import Any
 from mbd.bodies.base import Body
 from mbd.bodies.ground import Ground
 from mbd.bodies.values import Vector3, among, flag, name_of, number
-from mbd.errors import ModelError, nearest
+from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.forces.potential import Potential
 from mbd.joints.base import Joint
 from mbd.joints.free import Free
+from mbd.notes import doubt
 from mbd.parts.arguments import sizes
 from mbd.parts.whole_body.joints import Articulation, articulations
 from mbd.parts.whole_body.moments import passive_moments
@@ -23,6 +24,8 @@ from mbd.parts.whole_body.table import SEXES
 
 __all__ = ["Human", "human"]
 
+SHORTEST, TALLEST = 0.4, 2.8
+"""Heights outside of which a person is in doubt [m]."""
 LIMBS = {"arm": "upper arm", "leg": "thigh"}
 """A limb, by the segment that it begins with."""
 
@@ -50,7 +53,9 @@ class Human:
     def bodies(self) -> dict[str, Body]:
         """Its bodies by the names of its segments, 'pelvis' first."""
         made = {_plain(each, self.prefix): each for each in self.segments}
-        return {name: each.body(self.prefix) if isinstance(each, Segment) else each for name, each in made.items()}
+        return _Bodies(
+            (name, each.body(self.prefix) if isinstance(each, Segment) else each) for name, each in made.items()
+        )
 
     @cached_property
     def joints(self) -> tuple[Joint, ...]:
@@ -119,7 +124,7 @@ class Human:
             side, _, limb = name.partition(" ") if isinstance(name, str) else ("", "", "")
             segment = f"{side} {LIMBS[limb]}" if limb in LIMBS else name
             if segment != "trunk":
-                self._require(segment, [body for body in self.bodies if body != "pelvis"], "without", "segment")
+                self._require_removable(name, segment)
             gone.add(segment)
         for each in self.articulations:
             gone |= {each.child} if each.parent in gone else set()
@@ -173,6 +178,20 @@ class Human:
             self, articulations=tuple(change(each) if each.name == joint else each for each in self.articulations)
         )
 
+    def _require_removable(self, name: Any, segment: Any) -> None:
+        held = next((each.child for each in self.articulations if each.name == name), None)
+        if held is not None:
+            raise ModelError(f"without: {name!r} is a joint; without({held!r}) leaves it out with all beyond it")
+        if name == "pelvis":
+            raise ModelError("without: all segments hang on the pelvis; leave out the others")
+        limbs = [
+            f"{side} {limb}" for side in SIDES for limb, first in LIMBS.items() if f"{side} {first}" in self.bodies
+        ]
+        if not among(segment, [body for body in self.bodies if body != "pelvis"]):
+            self._require(
+                name, [*limbs, "trunk", *(body for body in self.bodies if body != "pelvis")], "without", "segment"
+            )
+
     def _require(self, name: Any, known: list[str], verb: str, kind: str) -> None:
         if not among(name, known):
             raise ModelError(f"{verb}: " + nearest(name, known, kind, "The person has"))
@@ -183,12 +202,24 @@ class Human:
 
     def __str__(self) -> str:
         held = {joint.child.body.name: joint for joint in self.joints}
-        lines = [repr(self), f"{'segment':<16} {'mass [kg]':>9}  {'at':<16} freedoms"]
+        lines = [repr(self), f"{'segment':<16} {'mass [kg]':>9}  {'at':<16} coordinates"]
         for name, body in self.bodies.items():
             joint = held.get(body.name)
-            at, free = ("", "") if joint is None else (joint.name, ", ".join(each.name for each in joint.freedoms))
+            at, free = ("", "") if joint is None else (joint.name, ", ".join(_coordinates(joint)))
             lines.append(f"{name:<16} {body.fields()['mass']:>9.3f}  {at:<16} {free}")
         return "\n".join(lines)
+
+
+class _Bodies(dict[str, Body]):
+    """Bodies by name; a wrong name is answered with the right ones."""
+
+    def __missing__(self, name: Any) -> Body:
+        raise UnknownNameError("human: " + nearest(name, self, "segment", "The person has"))
+
+
+def _coordinates(joint: Joint) -> list[str]:
+    """Names of the coordinates of a joint, a quaternion as one."""
+    return list(dict.fromkeys(label.name.partition(".")[0] for label in joint.labels))
 
 
 def _plain(each: Segment | Body, prefix: str) -> str:
@@ -228,6 +259,8 @@ def human(
     ([], 29, 66.542)
     """
     M, H = sizes("human", mass=mass, height=height)
+    if not SHORTEST <= H <= TALLEST:
+        doubt(f"human: a height of {H:g} m; heights are in metres, masses in kg")
     if not among(sex, SEXES):
         raise ModelError("human: " + nearest(sex, SEXES, "sex", "The table has"))
     prefix = "" if isinstance(name, str) and name == "" else f"{name_of(name, 'human')} "
