@@ -237,6 +237,10 @@ CONSTRAINTS: list[tuple[str, Callable[[Frame, Frame, Joint], Constraint]]] = [
     ("knee lock", lambda a, b, joint: mbd.Unilateral("law", mbd.flexion(joint))),
     ("rubber stop", lambda a, b, joint: mbd.Penalty("law", mbd.flexion(joint), stiffness=1e3, damping=2.0)),
     ("mat", lambda a, b, joint: mbd.Penalty("law", mbd.touchdown(a), 1e4, damping=10.0, release="pull")),
+    (
+        "rubbing mat",
+        lambda a, b, joint: mbd.Penalty("law", mbd.touchdown(a), 1e4, damping=10.0, friction=0.3, creep=0.1),
+    ),
     ("raft", lambda a, b, joint: mbd.Penalty("law", mbd.touchdown(a, swell), 1e4, damping=10.0, release="pull")),
     ("ball", lambda a, b, joint: mbd.Penalty("law", mbd.height(a), 1e5, exponent=1.5, restitution=0.5)),
     ("rod", lambda a, b, joint: mbd.Bilateral("law", mbd.distance(a, b), value=0.6)),

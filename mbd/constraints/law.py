@@ -68,12 +68,14 @@ class Equation:
 class Drag:
     """A force on the mechanism along a velocity while a contact is closed: its power is force · velocity.
 
-    part : its name in results and effects, 'friction'
+    part : its name in results, 'friction', or 'friction.forward'; drags that have it up to the point are one effect
+    may_fold : whether the mechanism may have no motion along it; it is left out then
     """
 
     velocity: Scalar
     force: Scalar
     part: str = "friction"
+    may_fold: bool = False
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from mbd.bodies.domains import Domain, at_least_zero, positive
@@ -14,6 +14,7 @@ from mbd.constraints.law import Closing, Hold, Law
 from mbd.constraints.measure import Measure, gap_of
 from mbd.constraints.penalty_parameters import largest_dt
 from mbd.constraints.restitution import KELVIN_VOIGT, LEAST_RESTITUTION, chi_for, damping_ratio_for, law_of, wanted
+from mbd.constraints.rubbing import rub, slip_velocities
 from mbd.constraints.unilateral import measure_of
 from mbd.errors import ModelError
 from mbd.forces.quantities import Mention
@@ -25,6 +26,12 @@ __all__ = ["Penalty"]
 
 SLOWEST = 1e-6
 """Least approach speed of the χ laws [m/s or rad/s], the default of 'name.slowest': a touch at rest divides by it."""
+
+CREEP = 1e-3
+"""Speed at which friction is 1/√2 of what it becomes, the default of 'name.creep' [m/s]."""
+
+NUMBERS = ("stiffness", "damping", "exponent", "friction", "creep")
+"""Arguments that are always numbers."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +57,9 @@ class Penalty(Constraint):
         attract. The χ laws never pull and end at g = 0
     effective_mass : mass that the contact feels, ``1/(J M⁻¹ Jᵀ)`` with J = ∂g/∂q [kg, or kg m²], for 'kelvin-voigt'
         with a restitution
+    friction : μ ≥ 0, opposite to the velocity γ along the surface, ``f = −μ p γ/√(‖γ‖² + creep²)``: under a load T
+        below μ p it creeps with ``creep T/√((μ p)² − T²)``. What truly sticks is a `Unilateral`
+    creep : speed at which friction is 1/√2 of μ p [m/s]
     """
 
     name: str
@@ -61,12 +71,14 @@ class Penalty(Constraint):
     law: str | None = None
     release: str = "gap"
     effective_mass: float | None = None
+    friction: float = 0.0
+    creep: float = CREEP
 
     def __post_init__(self) -> None:
         name_of(self.name, "Penalty")
         object.__setattr__(self, "measure", measure_of(self.measure, f"Penalty '{self.name}'"))
-        for field in ("stiffness", "damping", "exponent", "restitution", "effective_mass"):
-            if getattr(self, field) is not None or field in ("stiffness", "damping", "exponent"):
+        for field in (*NUMBERS, "restitution", "effective_mass"):
+            if getattr(self, field) is not None or field in NUMBERS:
                 object.__setattr__(self, field, number(getattr(self, field), f"{field} of '{self.name}'"))
         if not among(self.release, ("gap", "pull")):
             raise ModelError(f"release of Penalty '{self.name}' is 'gap' or 'pull', got {self.release!r}")
@@ -146,11 +158,25 @@ class Penalty(Constraint):
         rate = scope.rate(gap)
         push = self.force(gap, rate, scope, *hold(self.captured(rate)))
         contact = Closing(gap, self.measure.unit, self.opens_on)
-        return Law(contact=contact, push=push, elastic=self.elastic_energy(gap, scope))
+        drags = []
+        if self.rubs:
+            coefficient = scope.parameter(self.name, "mu", self.friction)
+            creep = scope.parameter(self.name, "creep", self.creep)
+            drags = rub(slip_velocities(self.measure, scope, hold), coefficient * push, creep)
+        return Law(contact=contact, push=push, drags=drags, elastic=self.elastic_energy(gap, scope))
+
+    @property
+    def rubs(self) -> bool:
+        """Whether friction resists its sliding."""
+        return self.friction != 0.0
 
     def anchors(self, scope: Scope) -> int:
-        """The approach speed, where its loss follows it."""
-        return len(self.captured(0.0))
+        """The approach speed, where its loss follows it, and where it rubs the place of touchdown."""
+        return len(self.captured(0.0)) + (len(self.measure.captured(scope)) if self.rubs else 0)
+
+    def bare(self) -> dict[str, Constraint | None]:
+        """Its friction, beside itself."""
+        return super().bare() | ({f"{self.name} friction": replace(self, friction=0.0)} if self.rubs else {})
 
     def resolving_dt(self, values: Mapping[str, float], mass: float, speed: float) -> float:
         """A fifth of the time until the deepest point, as `mbd.penalty_parameters` has it."""
@@ -161,7 +187,8 @@ class Penalty(Constraint):
     def details(self) -> str:
         """Where, how stiff, and what it loses."""
         loss = f"damping {self.damper:.6g}" if self.chi is None else f"chi {self.chi:.6g}"
-        return f", {self.measure.details}, stiffness {self.stiffness:.6g}, {loss}"
+        rubs = f", friction {self.friction:.6g}" if self.rubs else ""
+        return f", {self.measure.details}, stiffness {self.stiffness:.6g}, {loss}{rubs}"
 
     def captured(self, gap_rate: Scalar) -> tuple[Scalar, ...]:
         """What is held from the instant of closing: the approach speed −ġ, where χ needs it."""
@@ -211,10 +238,11 @@ class Penalty(Constraint):
         return self.measure.mentions()
 
     def parameters(self) -> dict[str, float]:
-        """`stiffness`, and `damping` or `chi` and `slowest`, the least approach speed; and those of its measure."""
+        """`stiffness`, `damping` or `chi` and `slowest`, `mu` and `creep` where it rubs; and those of its measure."""
         chi = self.chi
         loss = {"damping": self.damper} if chi is None else {"slowest": SLOWEST, "chi": chi}
-        own = {f"{self.name}.{field}": value for field, value in {"stiffness": self.stiffness, **loss}.items()}
+        rubs = {"mu": self.friction, "creep": self.creep} if self.rubs else {}
+        own = {f"{self.name}.{field}": value for field, value in {"stiffness": self.stiffness, **loss, **rubs}.items()}
         return own | self.measure.parameters()
 
     def domains(self) -> dict[str, Domain]:
@@ -226,6 +254,9 @@ class Penalty(Constraint):
             largest = chi_for(LEAST_RESTITUTION, law_of(self.law, self.name))
             problem = f"is not between 0 and {largest:g}, which belong to the restitutions 1 and {LEAST_RESTITUTION:g}"
             domains |= {"chi": Domain(low=0.0, high=largest, problem=problem), "slowest": positive(unit="m/s")}
+        if self.rubs:
+            domains["mu"] = Domain(low=0.0, problem="is negative; give 0 for none", called="friction")
+            domains["creep"] = positive(unit="m/s")
         return {f"{self.name}.{field}": domain for field, domain in domains.items()} | self.measure.domains()
 
     def faults(self) -> list[str]:
@@ -233,4 +264,9 @@ class Penalty(Constraint):
         faults = self.measure.faults(self.name) + super().faults()
         if self.exponent < 1.0:
             faults.append(f"'{self.name}': exponent {self.exponent:g} is below 1, endlessly stiff at touch; give n ≥ 1")
+        if self.rubs and not (self.measure.has_tangents or self.measure.has_slip_velocities):
+            faults.append(
+                f"'{self.name}': friction {self.friction:g} on a {self.measure.title}, which has no direction to slide "
+                "in; use mbd.touchdown, give mbd.measure(…, tangents=…), or friction=0"
+            )
         return faults

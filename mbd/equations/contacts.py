@@ -201,11 +201,18 @@ def _by_force(
     drags: list[tuple[str, Node, Node]] = []
     for drag in law.drags:
         velocity, resistance = lift(drag.velocity), lift(drag.force)
+        if drag.may_fold and all(slope.is_zero for slope in gradient(scope.real(velocity), scope.inputs.v)):
+            continue
         found.drags.append((number, velocity, resistance))
-        along = (*dynamics.generalized(Work([], [], [velocity], [-resistance])), *rest)
         speed, size = scope.views.real([velocity, resistance])
-        found.effects.append(drag_effect(f"{word.name} {drag.part}", number, speed, size, along, scope))
         drags.append((drag.part, speed, size))
+    for title in dict.fromkeys(part.partition(".")[0] for part, _, _ in drags):  # of all its directions
+        own = [k for k, (part, _, _) in enumerate(drags) if part.partition(".")[0] == title]
+        views = [found.drags[k - len(drags)] for k in own]
+        work = Work([], [], [velocity for _, velocity, _ in views], [-force for _, _, force in views])
+        moving = [drags[k][1:] for k in own]
+        along = (*dynamics.generalized(work), *rest)
+        found.effects.append(drag_effect(f"{word.name} {title}", number, moving, along, scope))
     return Contact(
         word.name, word.kind, gap, rate, captured=tuple(holding.captured), anchors=holding.anchors, force=force,
         generalized=generalized, opens_on=at.opens_on, unit=f"{at.unit}/s" if fast else at.unit, drags=tuple(drags),

@@ -157,10 +157,12 @@ def penalty_effect(
 
 
 def drag_effect(
-    name: str, contact: int, velocity: Node, force: Node, generalized: Sequence[Node], scope: DerivationScope
+    name: str, contact: int, drags: Sequence[tuple[Node, Node]], generalized: Sequence[Node], scope: DerivationScope
 ) -> Effect:
-    """A force along a velocity while a contact is closed."""
-    power = force * _of_motion(velocity, scope)
+    """Forces along velocities, (velocity, force), while a contact is closed."""
+    power = scope.tape.zero
+    for velocity, force in drags:
+        power = power + force * _of_motion(velocity, scope)
     return Effect(name, "loss", lambda: generalized, power, contact=contact, column="friction")
 
 

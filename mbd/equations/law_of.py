@@ -79,7 +79,7 @@ def _faults(word: Constraint, law: Law, holding: Holding) -> Iterator[str]:
         yield from _closing_faults(law, law.contact, by_force, holding.scope)
     for drag in law.drags:
         slopes = gradient(holding.scope.real(drag.velocity), holding.scope.inputs.v)
-        if all(slope.is_zero for slope in slopes) or _has_velocity(slopes):
+        if (all(slope.is_zero for slope in slopes) and not drag.may_fold) or _has_velocity(slopes):
             yield f"the velocity of its {drag.part} is not linear in velocities; give a sum of rates times functions"
 
 
