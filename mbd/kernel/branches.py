@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from mbd.kernel.cone_loads import keep_in_cones
 from mbd.kernel.records import Balance, Complementarity, ContactForces, Frictions, Reals
 from mbd.kernel.redundancy import sharing, spread
 from mbd.kernel.restart import MOST_LOADS, active_rows, evaluate_loaded, limit_of, load_accelerations
@@ -34,6 +35,10 @@ def solve_directed(K: Balance, level: int) -> int:
             find_limits(K, level)
             if change < 1e-13:
                 break
+    if K.n_dropped > 0 and K.n_cones > 0:
+        keep_in_cones(K, K.impulse)
+        evaluate_loaded(K, whole(K, level))
+        find_limits(K, level)
     for f in range(K.n_frictions):
         if slides(K, f):
             row = K.friction_row[f]

@@ -330,6 +330,8 @@ def margin(K: Switching, f: int, t1: float) -> float:
         return float(K.guards1[K.at_limit + f] - pull_of_both(K, f, K.lam1))
     K.loads[: K.n_rows] = K.impulse[: K.n_rows]
     evaluate_loaded(K, K.loads)
+    if K.n_cones > 0 and K.n_dropped > 0:  # what all feet together have left, though this one may be at its limit
+        return float(limit_of(K, f) - pull_of_both(K, f, K.brink))
     return float(limit_of(K, f) - pull_of_both(K, f, K.impulse))
 
 

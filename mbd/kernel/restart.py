@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from mbd.kernel.codes import ACCELERATIONS, COMPOSE, EPS, NOT_CONVERGED, SCALES
+from mbd.kernel.cone_loads import keep_in_cones
 from mbd.kernel.cones import fill_slips, sliding_force
 from mbd.kernel.hooks import call
+from mbd.kernel.loads import evaluate_loaded, limit_of
 from mbd.kernel.records import (
     Balance,
     ContactForces,
@@ -229,27 +231,6 @@ def evaluate(K: Mechanism, t: float, q: Reals, y: Reals) -> None:
     call(K, ACCELERATIONS, K.acc)
 
 
-def evaluate_loaded(K: ContactRows, lam: Reals) -> float:
-    """K.acc again with other multipliers, at the state already in the block; how far they differ from those before.
-
-    Only R and the limits of frictions follow them.
-    """
-    change = 0.0
-    size = 1e-300
-    for k in range(K.n_rows):
-        change = max(change, abs(K.block[K.o_lam + k] - lam[k]))
-        size = max(size, abs(lam[k]))
-        K.block[K.o_lam + k] = lam[k]
-    fill_slips(K)
-    call(K, ACCELERATIONS, K.acc)
-    return change / size
-
-
-def limit_of(K: Model, f: int) -> float:
-    """Largest friction at the multipliers now in the block."""
-    return float(K.acc[K.acc_limit + f])
-
-
 def row_speed(K: Model, row: int) -> float:
     """ḣ of a row, from K.acc."""
     return float(K.acc[K.acc_rate + row])
@@ -318,6 +299,8 @@ def minimum_norm_multipliers(K: DependentRows, lam: Reals) -> None:
             spread(K, lam)
         if K.n_frictions == 0 or (turn > 0 and change < 1e-13):
             break
+    if K.n_cones > 0:
+        keep_in_cones(K, lam)
 
 
 def share_loads(K: Balance, m: int) -> None:

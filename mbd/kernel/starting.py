@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from mbd.kernel.codes import NEW_MODE
 from mbd.kernel.conditioning import is_ill_conditioned, refine_accelerations
+from mbd.kernel.cone_loads import keep_in_cones
 from mbd.kernel.cones import let_directions_go
 from mbd.kernel.contact_modes import resolve_contact_modes
 from mbd.kernel.contact_step import find_pace
@@ -47,6 +48,8 @@ def restart(K: Kernel) -> int:
         spread(K, K.lam)
         if K.n_cones > 0 and K.strategy == 1:
             keep_within(K)
+        elif K.n_cones > 0:
+            keep_in_cones(K, K.lam)
     K.n_active = stepping_rows(K)
     if is_ill_conditioned(K):
         status = correct_start(K)

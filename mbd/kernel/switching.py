@@ -16,18 +16,20 @@ from mbd.kernel.codes import (
     STICK,
     WATCH,
 )
-from mbd.kernel.cones import aim, speed_of_both
+from mbd.kernel.cones import aim, pull_of_both, speed_of_both
 from mbd.kernel.contact_modes import ALL_IMPULSES, NO_IMPULSE, OWN_IMPULSE, STILL, log_event
 from mbd.kernel.guards import gap_scale, is_watched
 from mbd.kernel.impact import impact
 from mbd.kernel.impact_solve import strikes
 from mbd.kernel.records import ContactForces, Guards, Mechanism, Switching
-from mbd.kernel.restart import active_rows, capture, evaluate, row_speed
+from mbd.kernel.restart import active_rows, capture, consistent, evaluate, evaluate_loaded, limit_of, row_speed
 
 __all__ = ["switch"]
 
 TOGETHER = 1e-3
 """Part of dt within which contacts that come to rest do so together [-]."""
+AT_LIMIT = 1e-9
+"""Part of its limit by which a friction may be below it and begin to slide with others [-]."""
 
 
 def gather_closing(K: Guards) -> float:
@@ -187,6 +189,27 @@ def stop_together(K: Switching, index: int) -> None:
     project_velocity(K, K.time, K.q, K.y, active_rows(K, K.closed), True)
 
 
+def slip_together(K: Switching, index: int) -> None:
+    """Feet that share a load begin to slide together: the one found, and those at their limits at the largest load.
+
+    The others stick on: the body turns about one that does. Who slides goes the way of its pull, which at that load is
+    the only one.
+    """
+    K.sticks[index] = K.sticks[K.partner[index]] = 1
+    status = consistent(K, K.time, K.q, K.y)
+    K.loads[: K.n_rows] = K.impulse[: K.n_rows]
+    evaluate_loaded(K, K.loads)
+    for f in range(K.n_frictions):
+        p = K.partner[f]
+        if status == 0 and p > f and K.sticks[f] == 1 and K.closed[K.friction_contact[f]] == 1:
+            limit = limit_of(K, f)
+            if f == index or (limit > 0.0 and pull_of_both(K, f, K.brink) > (1.0 - AT_LIMIT) * limit):
+                K.loose[f] = K.loose[p] = 3
+                K.sticks[f] = K.sticks[p] = 0
+                aim(K, f, K.brink[K.friction_row[f]], K.brink[K.friction_row[p]])
+    K.sticks[index] = K.sticks[K.partner[index]] = 0
+
+
 def switch(K: Switching) -> int:
     """What the fired guard does to the closed contacts and the velocities; the state is at its instant."""
     kind = K.event_kind
@@ -228,6 +251,8 @@ def switch(K: Switching) -> int:
             K.loose[K.partner[index]] = 3
             K.sticks[K.partner[index]] = 0
             aim(K, index, K.lam[K.friction_row[index]], K.lam[K.friction_row[K.partner[index]]])
+            if K.n_dropped > 0:
+                slip_together(K, index)
     elif kind == OPEN_PULL and bursts(K, index):
         K.failure_index = index
         return NO_FORCE

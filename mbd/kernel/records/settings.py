@@ -38,6 +38,8 @@ class Sizes(Record):
         lambda s: (s.n_contacts + 3 * s.n_frictions) * (s.n_cones == 0)
     )  # unknowns of the linear complementarity problem, of contacts in space those over cones
     n_unknowns: int = formula(lambda s: s.n_rows * (s.n_cones > 0))
+    n_discs: int = formula(lambda s: min(s.n_cones, 1) * (s.n_contacts + s.n_frictions))  # see `mbd.kernel.discs`
+    n_disc_unknowns: int = formula(lambda s: min(s.n_cones, 1) * (s.n_rows + 1))
     n_tangent: int = formula(
         lambda s: s.n_kkt * s.n_kkt + 3 * (s.n + 2 * s.n_rows + s.n_rows * s.n) + 2 * s.n_kkt + 2
     )  # numbers that the programs of a mode write at most

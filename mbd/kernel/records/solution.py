@@ -68,6 +68,25 @@ class Complementarity(SchemeAbilities):
     cone_flags: Integers = integers(lambda s: 2 * s.n_contacts + s.n_frictions)  # branches before such a problem
     cone_dropped: Integers = integers(lambda s: s.n_unknowns)  # dependent rows before it
     cone_slips: Reals = reals(lambda s: s.n_frictions)
+    brink: Reals = reals(lambda s: s.n_rows)  # multipliers at the largest load that sticks: see `mbd.kernel.cone_loads`
+    rise: Reals = reals(lambda s: s.n_frictions)  # what a push of one more adds to each limit
+    freedom: Reals = reals(lambda s: s.n_rows * s.n_disc_unknowns)  # multipliers without forces
+    null_vectors: Reals = reals(lambda s: s.n_rows * s.n_rows)  # all of them, line by line
+    null_way: Reals = reals(lambda s: s.n_rows * s.n_rows)  # combinations of these
+    disc_map: Reals = reals(lambda s: 3 * s.n_discs * s.n_disc_unknowns)  # two t_i and ℓ_i of each disc
+    disc_at: Reals = reals(lambda s: 3 * s.n_discs)
+    disc_weight: Reals = reals(lambda s: s.n_discs)
+    disc_quad: Reals = reals(lambda s: s.n_disc_unknowns * s.n_disc_unknowns)  # Q and c of what is minimized
+    disc_cost: Reals = reals(lambda s: s.n_disc_unknowns)
+    disc_y: Reals = reals(lambda s: s.n_disc_unknowns)
+    disc_kept: Reals = reals(lambda s: s.n_disc_unknowns)  # before a step
+    disc_step: Reals = reals(lambda s: s.n_disc_unknowns)
+    disc_kkt: Reals = reals(lambda s: s.n_disc_unknowns * s.n_disc_unknowns)
+    disc_pivots: Integers = integers(lambda s: s.n_disc_unknowns)
+    disc_slope: Reals = reals(lambda s: s.n_discs * s.n_disc_unknowns)
+    disc_left: Reals = reals(lambda s: s.n_discs)  # −g_i
+    disc_force: Reals = reals(lambda s: s.n_discs)  # κ_i
+    disc_change: Reals = reals(lambda s: s.n_discs)  # of κ_i
 
 
 class Singular(SchemeAbilities):
