@@ -8,7 +8,7 @@ from mbd.kernel.redundancy import sharing, spread
 from mbd.kernel.restart import MOST_LOADS, active_rows, evaluate_loaded, limit_of, load_accelerations
 from mbd.kernel.saddle import solve_rows
 
-__all__ = ["is_on", "slides", "solve_directed"]
+__all__ = ["find_limits", "is_on", "load", "slides", "solve_directed", "whole"]
 
 
 def solve_directed(K: Balance, level: int) -> int:

@@ -29,11 +29,14 @@ from mbd.kernel.records import (
 )
 from mbd.kernel.restart import active_rows, refresh_scales
 from mbd.kernel.roots import sqrt
+from mbd.kernel.slide_guess import guess_slides
 
 __all__ = ["complementarity"]
 
 MOST_NEWTON = 12
 """Changes of all branches at once before single ones follow [-]."""
+GUESSES = 3
+"""Changes of all branches from one look at all cones at once to the next [-]."""
 ROUND_OFF = 1e-11
 """What multipliers and velocities or accelerations may miss of their laws, relative to their terms [-]."""
 SURE = 1e-6
@@ -76,6 +79,8 @@ def complementarity(K: Balance, level: int) -> int:
         if attempt < MOST_NEWTON:
             if change_all(K) == 0:
                 return status
+            if K.n_cones > 1 and K.strategy == 0 and attempt % GUESSES == 0:
+                guess_slides(K, level)
         elif change_one(K, attempt <= MOST_NEWTON + choices + 1) == 0:
             return status
     if sets > MOST_CHOICES:

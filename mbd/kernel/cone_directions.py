@@ -13,7 +13,7 @@ from mbd.kernel.linear import factor, solve
 from mbd.kernel.records import Balance, ContactForces, ContactRows, Frictions
 from mbd.kernel.roots import sqrt
 
-__all__ = ["misses", "turn_directions"]
+__all__ = ["mass_of", "misses", "turn_directions"]
 
 MOST_TURNS = 60
 """Rounds in which directions are looked for [-]."""

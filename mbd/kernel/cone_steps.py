@@ -13,11 +13,13 @@ A motion that only comes close to rest turns around it in shortened steps, and s
 from __future__ import annotations
 
 from mbd.kernel.codes import STICK
-from mbd.kernel.cones import HELD, ONSET, aim
+from mbd.kernel.cone_directions import mass_of
+from mbd.kernel.cones import HELD, ONSET, aim, speed_of_both
 from mbd.kernel.contact_modes import STILL
 from mbd.kernel.guards import judge
 from mbd.kernel.locate import locate
 from mbd.kernel.records import Guards, Kernel
+from mbd.kernel.restart import evaluate
 from mbd.kernel.roots import sqrt
 from mbd.kernel.trial_step import try_step
 
@@ -27,6 +29,8 @@ PART = 0.5
 """Part of the time in which γ would reach zero, or turn by a radian, that a step may take [-]."""
 FAR = 2.0
 """Times of a step in which γ must not reach zero if the step is to be as any other [-]."""
+STABLE = 3.0
+"""Step times the fastest turn of a direction by friction that explicit schemes take [-]."""
 SURELY = 0.8
 """Part of a step within which γ reaches zero if a direction is held in it [-]."""
 STRAIGHT = 0.05
@@ -70,7 +74,29 @@ def approached_end(K: Guards, t1: float) -> float:
                 K.hold[f] = K.hold[p] = HELD
             elif fall > 0.0 or across * h > PART * speed * speed:
                 end = min(end, K.time + max(PART * speed / change, SHORTEST * K.dt))
+    if K.explicit == 1 and K.adaptive == 0:
+        fastest = fastest_turn(K)
+        K.turning_step = STABLE / fastest if fastest > 0.0 else 0.0
+        if fastest * (end - K.time) > STABLE:
+            end = K.time + K.turning_step
     return end
+
+
+def fastest_turn(K: Guards) -> float:
+    """Rate [1/s] at which friction turns γ that it does not point along, Σ limit/(m (‖γ‖ + s)), at most.
+
+    It is large where γ is small, just after sliding has begun: an explicit scheme must follow it.
+    """
+    rate = 0.0
+    for f in range(K.n_frictions):
+        if K.partner[f] > f and K.slip[f] != 0.0 and K.hold[f] != HELD:
+            if rate == 0.0:
+                evaluate(K, K.time, K.q, K.y)
+            speed = speed_of_both(K, f, K.guards0, K.at_slip) + 4.0 * K.hold[f]
+            mass = mass_of(K, f)
+            if speed > 0.0 and mass > 0.0:
+                rate += K.guards0[K.at_limit + f] / (mass * speed)
+    return rate
 
 
 def slides_on(K: Guards) -> bool:

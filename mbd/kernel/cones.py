@@ -21,6 +21,8 @@ ONSET = 1e-7
 """Of K.hold: λ_T keeps its direction while γ is round-off, and follows γ as it grows beyond [-]."""
 MOVING = 1e-3
 """Speed [m/s] from which on the direction of the onset is forgotten."""
+BEGUN = 4e-6
+"""Speed [m/s] up to which it stays as it was, ten times what stands for γ then."""
 LEAST = 1e-200
 """What stands for a cosine that is zero: 0.0 would say that nothing slides [-]."""
 LEAST_SQUARE = 1e-60
@@ -119,10 +121,16 @@ def let_directions_go(K: Guards) -> None:
 
 
 def follow_motion(K: Guards) -> None:
-    """After a step: K.slip is the direction of γ, which K.hold leaves to it."""
+    """After a step: K.slip is the direction of γ, which K.hold leaves to it.
+
+    That of the onset stays while γ is less than what stands for it: the step after this one would follow an error of γ,
+    not γ, and make it larger.
+    """
     for f in range(K.n_frictions):
-        if K.partner[f] > f and K.slip[f] != 0.0 and speed_of_both(K, f, K.guards0, K.at_slip) >= MOVING * ONSET:
-            aim(K, f, K.guards0[K.at_slip + f], K.guards0[K.at_slip + K.partner[f]])
+        if K.partner[f] > f and K.slip[f] != 0.0:
+            least = BEGUN if K.hold[f] == ONSET else MOVING * ONSET
+            if speed_of_both(K, f, K.guards0, K.at_slip) >= least:
+                aim(K, f, K.guards0[K.at_slip + f], K.guards0[K.at_slip + K.partner[f]])
     for f in range(K.n_frictions):
         if K.partner[f] >= 0 and K.slip[f] != 0.0:
             if K.hold[f] == HELD or speed_of_both(K, f, K.guards0, K.at_slip) >= MOVING:

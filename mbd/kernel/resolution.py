@@ -40,7 +40,10 @@ FEWEST = 1.0 / 4096.0
 
 def judge_change(K: Kernel, h: float, t1: float) -> int:
     """0 where the candidate may be a continuation of the motion, OUTGROWN, GAINED or LEAPT where it cannot."""
-    stretch = max(1.0, whole_step(K) / h)
+    whole = whole_step(K)
+    if K.turning_step > 0.0:
+        whole = min(whole, K.turning_step)
+    stretch = max(1.0, whole / h)
     if K.estimates == 0 and changes_little(K, h, stretch):
         return 0
     worst = largest_share(K, h, stretch)

@@ -73,6 +73,9 @@ class Complementarity(SchemeAbilities):
     freedom: Reals = reals(lambda s: s.n_rows * s.n_disc_unknowns)  # multipliers without forces
     null_vectors: Reals = reals(lambda s: s.n_rows * s.n_rows)  # all of them, line by line
     null_way: Reals = reals(lambda s: s.n_rows * s.n_rows)  # combinations of these
+    drag: Reals = reals(lambda s: s.n_frictions)  # frictions that may choose, as `mbd.kernel.slide_guess` finds them
+    free_speed: Reals = reals(lambda s: s.n_frictions)  # their velocities without them
+    response: Reals = reals(lambda s: s.n_frictions * s.n_frictions)  # and what they do to these
     disc_map: Reals = reals(lambda s: 3 * s.n_discs * s.n_disc_unknowns)  # two t_i and ℓ_i of each disc
     disc_at: Reals = reals(lambda s: 3 * s.n_discs)
     disc_weight: Reals = reals(lambda s: s.n_discs)
