@@ -5,9 +5,9 @@ where they alone can share: z is orthogonal to that (in the metric W of `mbd.ker
 
 1. λ itself, of least norm, where it lies in all cones;
 2. else the ones nearest to it that do, ``min ‖z‖`` with ``‖λ_T‖ ≤ limit`` for each foot;
-3. where there are none those which exceed the limits least, ``min σ`` with ``‖λ_T‖ ≤ limit + σ w``, w the limits before.
+3. where there are none those which exceed the limits least, ``min σ`` with ``‖λ_T‖ ≤ limit + σ w``, w the limits of 1.
 
-σ = 0 is the largest load that sticks, found from both sides: K.brink has the multipliers of 3. They tell who slips then,
+σ = 0 is the largest load that sticks, found from both sides: K.brink has the multipliers of 3. They tell who slips then
 and which way: σ rises with the power that the load has beyond that of friction in some motion of sliding feet.
 """
 
@@ -17,7 +17,7 @@ from mbd.kernel.cones import follows
 from mbd.kernel.discs import disc_length, minimize_within_discs
 from mbd.kernel.loads import evaluate_loaded, limit_of
 from mbd.kernel.orthogonal import clear_row, square
-from mbd.kernel.records import Balance, ContactForces, Reals
+from mbd.kernel.records import Balance, Complementarity, ContactForces, ContactRows, Frictions, Reals
 from mbd.kernel.redundancy import largest_limit, share, sharing
 from mbd.kernel.roots import sqrt
 
@@ -59,7 +59,7 @@ def keep_in_cones(K: Balance, lam: Reals) -> None:
         lam[row] += scale * freed(K, row, spans)
 
 
-def exceeds(K: ContactForces, lam: Reals) -> bool:
+def exceeds(K: Frictions, lam: Reals) -> bool:
     """Whether a friction that sticks is beyond its limit."""
     for f in range(K.n_frictions):
         if K.sticks[f] == 1 and not follows(K, f):
@@ -70,7 +70,7 @@ def exceeds(K: ContactForces, lam: Reals) -> bool:
     return False
 
 
-def freed(K: Balance, row: int, spans: int) -> float:
+def freed(K: Complementarity, row: int, spans: int) -> float:
     """What the freedoms with the amounts K.disc_y bring to the multiplier of a row."""
     value = 0.0
     for j in range(spans):
@@ -78,7 +78,7 @@ def freed(K: Balance, row: int, spans: int) -> float:
     return value
 
 
-def limits_row(K: ContactForces, row: int) -> bool:
+def limits_row(K: ContactRows, row: int) -> bool:
     """Whether a friction limits the multiplier of a row."""
     f = K.row_friction[row]
     return bool(f >= 0 and K.sticks[f] == 1)
@@ -150,7 +150,7 @@ def find_null_vectors(K: Balance) -> int:
     return count
 
 
-def is_free(K: Balance, row: int, spans: int) -> bool:
+def is_free(K: Complementarity, row: int, spans: int) -> bool:
     """Whether the freedoms change the multiplier of a row."""
     size = 0.0
     for j in range(spans):
@@ -158,7 +158,7 @@ def is_free(K: Balance, row: int, spans: int) -> bool:
     return size > PART_OF_IT
 
 
-def find_discs(K: Balance, lam: Reals, spans: int, scale: float) -> int:
+def find_discs(K: ContactForces, lam: Reals, spans: int, scale: float) -> int:
     """The cones that the freedoms change, as discs in parts of `scale`; how many."""
     find_rises(K, lam, spans)
     discs = 0
@@ -189,18 +189,16 @@ def find_discs(K: Balance, lam: Reals, spans: int, scale: float) -> int:
     return discs
 
 
-def fill_line(K: Balance, line: int, row: int, sign: float, value: float, spans: int) -> None:
+def fill_line(K: Complementarity, line: int, row: int, sign: float, value: float, spans: int) -> None:
     """One number of a disc: `value` and what the freedoms bring to the multiplier of a row (−1: nothing)."""
     for j in range(K.n_disc_unknowns):
         K.disc_map[line * K.n_disc_unknowns + j] = 0.0
     for j in range(spans):
-        K.disc_map[line * K.n_disc_unknowns + j] = (
-            sign * K.freedom[row * K.n_disc_unknowns + j] if row >= 0 else 0.0
-        )
+        K.disc_map[line * K.n_disc_unknowns + j] = sign * K.freedom[row * K.n_disc_unknowns + j] if row >= 0 else 0.0
     K.disc_at[line] = value
 
 
-def find_rises(K: Balance, lam: Reals, spans: int) -> None:
+def find_rises(K: ContactForces, lam: Reals, spans: int) -> None:
     """What a push of one more adds to each limit, into K.rise, where freedoms change pushes."""
     K.rise[: K.n_frictions] = 0.0
     coupled = False
@@ -221,7 +219,7 @@ def find_rises(K: Balance, lam: Reals, spans: int) -> None:
     evaluate_loaded(K, lam)
 
 
-def find_brink(K: Balance, spans: int, discs: int) -> float:
+def find_brink(K: Complementarity, spans: int, discs: int) -> float:
     """The least σ, with its freedoms in K.disc_y."""
     width = K.n_disc_unknowns
     for j in range(spans + 1):
@@ -240,7 +238,7 @@ def find_brink(K: Balance, spans: int, discs: int) -> float:
     return float(K.disc_y[spans])
 
 
-def find_nearest(K: Balance, spans: int, discs: int) -> None:
+def find_nearest(K: Complementarity, spans: int, discs: int) -> None:
     """The smallest freedoms within all discs, from those in K.disc_y."""
     for j in range(spans):
         K.disc_cost[j] = 0.0

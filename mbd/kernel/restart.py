@@ -282,7 +282,7 @@ def find_limits_of_loads(K: ContactRows) -> None:
         K.limit[f] = limit_of(K, f)
 
 
-def minimum_norm_multipliers(K: DependentRows, lam: Reals) -> None:
+def minimum_norm_multipliers(K: Balance, lam: Reals) -> None:
     """Multipliers of dependent rows beside those of K.rows, which were solved with, at the state now in the block.
 
     Frictions that hold together share by their limits, which follow their loads: they are found by turns.

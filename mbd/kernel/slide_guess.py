@@ -4,8 +4,8 @@ With pushes as they are the friction of all that may choose is the least of a co
 
 ``min ½ λ_Tᵀ G λ_T − γ_0ᵀ λ_T``,  ``‖λ_T‖ ≤ limit``,
 
-γ = γ_0 − G λ_T their velocities (accelerations) under it, G = B K⁻¹ R with what is held (principle of Gauss, with friction
-as a potential of γ). Limits follow their pushes, by turns. What is found are branches and directions only: the caller
+γ = γ_0 − G λ_T their velocities (accelerations) under it, G = B K⁻¹ R with what is held (principle of Gauss, friction
+being a potential of γ). Limits follow their pushes, by turns. What is found are branches and directions only: the caller
 solves their equations again, and judges them.
 """
 
@@ -89,7 +89,7 @@ def find_largest(K: ContactForces, drags: int) -> float:
     return largest
 
 
-def share_drags(K: Balance, drags: int, largest: float) -> int:
+def share_drags(K: ContactForces, drags: int, largest: float) -> int:
     """λ_T of least value at the present limits into K.drag; 1 if there is none."""
     width = K.n_disc_unknowns
     size = 0.0
@@ -141,7 +141,7 @@ def follow_pushes(K: Balance, level: int, drags: int) -> float:
     return change
 
 
-def take_ways(K: Balance, drags: int) -> None:
+def take_ways(K: ContactForces, drags: int) -> None:
     """Who sticks and who slides, and which way: a multiplier at its limit that the limit pushes back slides."""
     disc = 0
     for u in range(drags):

@@ -189,7 +189,7 @@ def stop_together(K: Switching, index: int) -> None:
     project_velocity(K, K.time, K.q, K.y, active_rows(K, K.closed), True)
 
 
-def slip_together(K: Switching, index: int) -> None:
+def slip_together(K: Balance, index: int) -> None:
     """Feet that share a load begin to slide together: the one found, and those at their limits at the largest load.
 
     The others stick on: the body turns about one that does. Who slides goes the way of its pull, which at that load is

@@ -70,7 +70,7 @@ def try_step(K: Kernel, h: float, t1: float) -> int:
     return 0
 
 
-def share_multipliers(K: DependentRows, t1: float) -> int:
+def share_multipliers(K: Balance, t1: float) -> int:
     """Multipliers of dependent rows; a scheme leaves those of the rows that it was solved with."""
     for k in range(K.n_rows):
         if K.dropped[k] == 1 and K.explicit == 0:  # the explicit one has shared them out already

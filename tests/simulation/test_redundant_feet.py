@@ -1,0 +1,143 @@
+"""Bodies on several feet with friction: which loads they bear at rest, which way they slide, and where they stop."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings, strategies as st
+from scipy.optimize import minimize
+
+import mbd
+
+G = 9.81
+FEET = {
+    3: ((0.4, 0.0), (-0.2, 0.35), (-0.2, -0.35)),
+    4: ((0.4, 0.25), (-0.3, 0.35), (-0.35, -0.3), (0.3, -0.4)),
+    5: ((0.5, 0.0), (0.1, 0.45), (-0.4, 0.3), (-0.35, -0.3), (0.2, -0.4)),
+}
+HEIGHT, MASS = 0.5, 12.0
+NAMES = ("fx", "fy", "tx", "ty", "tz")
+THREE_LEGS = {"fx": np.cos(0.3), "fy": np.sin(0.3), "tx": 0.2 * np.sin(0.3), "ty": -0.2 * np.cos(0.3),
+              "tz": -0.1 * np.sin(0.3) - 0.25 * np.cos(0.3)}  # fmt: skip
+"""The unit push of the case of the three-legged table at its mass center."""
+LIMIT, CENTER = 32.30288143783885, (0.25275667263377877, -0.4409898925026128)
+
+
+def size(t, held, rate, bend):
+    """Of the load, as it grows or falls."""
+    return held + rate * t + bend * t * t
+
+
+@lru_cache(maxsize=16)
+def table(feet, order=None, turn=0.0):
+    """A table on these feet, loaded at its mass center by `size` times (fx, fy) and (tx, ty, tz)."""
+    model = mbd.Model("table", gravity=(0.0, 0.0, -G))
+    body = mbd.RigidBody("table", MASS, (1.0, 1.2, 1.5))
+    model.connect(mbd.Free("float", model.ground.origin, body.origin))
+    cosine, sine = np.cos(turn), np.sin(turn)
+    for k in order or range(len(feet)):
+        x, y = feet[k]
+        place = body.point(cosine * x - sine * y, sine * x + cosine * y, -HEIGHT)
+        floor = mbd.touchdown(place, mbd.Plane(normal=(0.0, 0.0, 1.0)))
+        model.constrain(mbd.Unilateral(f"foot {k}", floor, friction=0.3))
+
+    def turned(x, y):
+        return cosine * x - sine * y, sine * x + cosine * y
+
+    def force(t, held, rate, bend, fx, fy):
+        return *(size(t, held, rate, bend) * part for part in turned(fx, fy)), 0.0
+
+    def torque(t, held, rate, bend, tx, ty, tz):
+        return tuple(size(t, held, rate, bend) * part for part in (*turned(tx, ty), tz))
+
+    for name, law, parts in ("push", force, NAMES[:2]), ("twist", torque, NAMES[2:]):
+        inputs = ("t", *((part, 0.0) for part in ("held", "rate", "bend", *parts)))
+        kind = {"force": law} if name == "push" else {"torque": law}
+        model.apply(mbd.Applied(name, body.origin, arguments=inputs, **kind))
+    return model
+
+
+def pushed(model, load, scheme, held=0.0, rate=0.0, bend=0.0, mu=0.3, height=HEIGHT, **how):
+    feet = [each.name for each in model.constraints]
+    values = {f"{name}.{part}": value for name in ("push", "twist") for part, value in
+              (("held", held), ("rate", rate), ("bend", bend))}  # fmt: skip
+    values |= {f"{'push' if part in NAMES[:2] else 'twist'}.{part}": load.get(part, 0.0) for part in NAMES}
+    frictions = dict(zip(sorted(feet), np.broadcast_to(mu, len(feet)), strict=True))
+    values |= {f"{foot}.mu": float(frictions[foot]) for foot in feet}
+    start = mbd.assemble(model, position={"float.z": height}, closed=feet, parameters=values)
+    return mbd.simulate(model, start, scheme, parameters=values, **how)
+
+
+def largest_load(feet, load, mu):
+    """The factor on a load at which it slides, by the motion that is easiest, and that motion (vₓ, v_y, ω)."""
+    x, y = np.transpose(feet)
+    fx, fy, tx, ty, tz = (load.get(name, 0.0) for name in NAMES)
+    share = np.linalg.pinv(np.array([np.ones(len(feet)), x, y]))
+    weight = share @ (MASS * G, 0.0, 0.0)
+    more = share @ (0.0, ty + HEIGHT * fx, HEIGHT * fy - tx)
+
+    def bearable(u):
+        power = fx * u[0] + fy * u[1] + tz * u[2]
+        way = mu * np.hypot(u[0] - u[2] * y, u[1] + u[2] * x)
+        return (way @ weight) / (power - way @ more) if power > max(way @ more, 0.0) else np.inf
+
+    pull = np.array([fx, fy, tz])
+    others = np.linalg.svd(pull[None, :])[2][1:]
+    found = [np.array([yk, -xk, 1.0]) * np.sign(fx * yk - fy * xk + tz) for xk, yk in feet]
+    for first in (0.0, 0.0), (1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0):
+        way = minimize(
+            lambda s: bearable(pull / (pull @ pull) + s @ others), first, method="Nelder-Mead",
+            options={"xatol": 1e-11, "fatol": 1e-14, "maxiter": 2000},
+        )  # fmt: skip
+        found.append(pull / (pull @ pull) + way.x @ others)
+    best = min(found, key=bearable)
+    return bearable(best), best, weight + bearable(best) * more
+
+
+def center(run, row):
+    """Of the velocities in a row."""
+    vx, vy, w = (run[name][row] for name in ("float.x.rate", "float.y.rate", "float.angular_velocity.z"))
+    return np.array([-vy / w, vx / w])
+
+
+def pulls(run, feet):
+    """|λ_T| and p of each foot, over time."""
+    sizes = [np.hypot(run[f"foot {k}.friction.forward"], run[f"foot {k}.friction.sideways"]) for k in range(len(feet))]
+    return np.array(sizes), np.array([run[f"foot {k}.force"] for k in range(len(feet))])
+
+
+@pytest.mark.parametrize("scheme", [mbd.HHT(0.05), mbd.GeneralizedAlpha(0.8), mbd.RadauIIA(), mbd.RungeKutta853()])
+def test_a_three_legged_table_slips_at_its_limit_load_and_turns_about_its_center(scheme):
+    """Both bounds of limit analysis, and the center of rotation at onset."""
+    model = table(FEET[3])
+    run = pushed(model, THREE_LEGS, scheme, rate=20.0, mu=0.35, dt=1e-2, until=1.625)
+    assert [event.kind for event in run.events] == ["slipped"] * 3
+    assert all(event.time * 20.0 == pytest.approx(LIMIT, abs=1e-7) for event in run.events)
+    row = int(np.searchsorted(run.time, run.events[0].time))
+    sizes, forces = pulls(run, FEET[3])
+    assert forces[:, row] == pytest.approx([54.670060670732845, 35.61617860674796, 27.433760722519203], abs=1e-7)
+    assert np.all(sizes[:, run.time <= run.events[0].time] <= 0.35 * forces[:, run.time <= run.events[0].time] + 1e-9)
+    just = pushed(model, THREE_LEGS, scheme, held=LIMIT * (1.0 + 1e-7), mu=0.35, dt=1e-3, until=5e-3)
+    assert center(just, -1) == pytest.approx(CENTER, abs=1e-6)
+    below = pushed(model, THREE_LEGS, scheme, held=LIMIT * (1.0 - 1e-7), mu=0.35, dt=1e-3, until=5e-3)
+    assert not below.events and abs(below["float.angular_velocity.z"][-1]) < 1e-15
+
+
+@settings(max_examples=12)
+@given(data=st.data(), count=st.sampled_from([3, 4, 5]))
+def test_tables_slip_at_the_least_load_of_any_motion(data, count):
+    part = st.floats(-1.0, 1.0)
+    load = {name: scale * data.draw(part, name) for name, scale in zip(NAMES, (1.0, 1.0, 0.2, 0.2, 0.5), strict=True)}
+    assume(np.hypot(load["fx"], load["fy"]) + abs(load["tz"]) > 0.2)
+    mu = np.array([data.draw(st.floats(0.1, 0.6), "mu") for _ in range(count)])
+    limit, way, forces = largest_load(FEET[count], load, mu)
+    assume(np.all(forces > 5.0) and limit < 1e3)
+    run = pushed(table(FEET[count]), load, mbd.HHT(0.05), rate=limit, mu=mu, dt=0.05, until=1.0005)
+    slips = [event for event in run.events if event.kind == "slipped"]
+    assert slips and slips[0].time == pytest.approx(1.0, abs=1e-9)
+    sizes, pushes = pulls(run, FEET[count])
+    assert np.all(sizes <= mu[:, None] * pushes * (1.0 + 1e-9) + 1e-9)
+    moved = np.array([run[name][-1] for name in ("float.x.rate", "float.y.rate", "float.angular_velocity.z")])
+    assert moved @ way / np.linalg.norm(moved) / np.linalg.norm(way) > 0.99
