@@ -3,8 +3,8 @@
 ``min ½ yᵀ Q y + cᵀ y``  with  ``‖t_i‖ ≤ ℓ_i``,  t_i (two numbers) and ℓ_i affine in y
 
 in the smooth form ``g_i = ‖t_i‖²/ℓ_i − ℓ_i ≤ 0``, which is convex; multipliers κ_i ≥ 0. Newton's method on the
-conditions of optimality with κ_i (−g_i) = τ, τ → 0 (Boyd & Vandenberghe 2004, Convex Optimization, ch. 11.7). All numbers are of the
-size of one: whoever asks scales them.
+conditions of optimality with κ_i (−g_i) = τ, τ → 0 (Boyd & Vandenberghe 2004, Convex Optimization,
+ch. 11.7). All numbers are of the size of one: whoever asks scales them.
 """
 
 from __future__ import annotations

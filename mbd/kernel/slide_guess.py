@@ -5,8 +5,8 @@ With pushes as they are the friction of all that may choose is the least of a co
 ``min ½ λ_Tᵀ G λ_T − γ_0ᵀ λ_T``,  ``‖λ_T‖ ≤ limit``,
 
 γ = γ_0 − G λ_T their velocities (accelerations) under it, G = B K⁻¹ R with what is held (principle of Gauss, friction
-being a potential of γ). Limits follow their pushes, by turns. What is found are branches and directions only: the caller
-solves their equations again, and judges them.
+being a potential of γ). Limits follow their pushes, by turns. What is found are branches and directions only: the
+caller solves their equations again, and judges them.
 """
 
 from __future__ import annotations

@@ -21,7 +21,7 @@ from mbd.kernel.contact_modes import ALL_IMPULSES, NO_IMPULSE, OWN_IMPULSE, STIL
 from mbd.kernel.guards import gap_scale, is_watched
 from mbd.kernel.impact import impact
 from mbd.kernel.impact_solve import strikes
-from mbd.kernel.records import ContactForces, Guards, Mechanism, Switching
+from mbd.kernel.records import Balance, ContactForces, Guards, Mechanism, Switching
 from mbd.kernel.restart import active_rows, capture, consistent, evaluate, evaluate_loaded, limit_of, row_speed
 
 __all__ = ["switch"]
