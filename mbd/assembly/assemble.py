@@ -28,7 +28,7 @@ from mbd.assembly.posture import (
 )  # fmt: skip
 from mbd.assembly.trivial_rows import manager_of
 from mbd.assembly.turns import choose_turns, name_wrapped, nearest_turns
-from mbd.assembly.whole_values import spelled_out, three_of_four
+from mbd.assembly.whole_values import as_given, spelled_out, three_of_four
 from mbd.bodies.values import flag, named_number_faults, names_given
 from mbd.compile.mechanism import Mechanism, rate_names
 from mbd.compile.mechanisms import mechanism_of
@@ -162,9 +162,9 @@ def _named(
         f"position: {name!r} is a rate; give it in velocity={{{name!r}: …}}"
         if name in rates
         else "position: " + nearest(name, coordinates, "coordinate")
-        for name in unknown
+        for name in as_given(unknown)
     ]
-    faults += ["velocity: " + nearest(name, rates, "rate") for name in strange]
+    faults += ["velocity: " + nearest(name, rates, "rate") for name in as_given(strange)]
     q, z, v = (
         {numbers[name]: float(value) for name, value in given.items() if name in numbers}
         for numbers, given in ((coordinates, position), (states, position), (rates, velocity))

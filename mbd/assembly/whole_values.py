@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from mbd.bodies.values import shown
 from mbd.errors import ModelError, nearest
 from mbd.joints.base import Joint
 from mbd.joints.orientations import is_orientation, orientation_doubt, quaternion_of
 
-__all__ = ["spelled_out", "three_of_four"]
+__all__ = ["as_given", "spelled_out", "three_of_four"]
 
 PARTS = "wxyz"
 EULER = re.compile(r"(.+)\.euler\.([xyz]{3})")
@@ -54,12 +55,34 @@ def spelled_out(model: Any, values: Any, what: str) -> tuple[Any, list[str], lis
                 )
                 continue
             parts = {f"{name}.{axis}": number for axis, number in zip("xyz", value, strict=True)}
-        elif isinstance(name, str) and is_orientation(value) and what == "position" and known:
-            faults.append("position: " + nearest(name, known, "orientation"))
+        elif isinstance(name, str) and is_orientation(value):
+            faults.append(_no_whole(name, value, what, known))
             continue
         faults += [f"{what}: {part!r} is given twice, by {name!r} too" for part in parts if part in found]
         found |= parts
     return found, faults, doubts
+
+
+def as_given(names: Iterable[str]) -> list[str]:
+    """Names, of the three parts of a vector its own: 'ball.omega' of 'ball.omega.x', '.y', '.z'."""
+    several = list(names)
+    stems = {name[:-2] for name in several if all(f"{name[:-2]}.{axis}" in several for axis in "xyz")}
+    return list(dict.fromkeys(name[:-2] if name[:-2] in stems else name for name in several))
+
+
+def _no_whole(name: str, value: Any, what: str, known: Mapping[str, Joint]) -> str:
+    """Why a name cannot have several numbers that are no vector."""
+    many = int(np.size(np.asarray(value, dtype=object))) if not hasattr(value, "as_quat") else 4
+    joint, _, last = name.rpartition(".")
+    if last == "orientation" and what == "velocity":
+        return f"velocity: {name!r} is a place; its rate is '{joint}.angular_velocity', three numbers [rad/s]"
+    if last == "orientation" or many == 4:
+        if not known:
+            return (
+                f"position: no orientation named {name!r}; the model has no joint that turns freely (Spherical, Free)"
+            )
+        return "position: " + nearest(name, known, "orientation")
+    return f"{what}: {name!r} takes one finite number, or three as a vector, not {many}: {shown(value)}"
 
 
 def three_of_four(model: Any, values: Mapping[str, float]) -> dict[str, float]:

@@ -95,8 +95,21 @@ def _of_matrix(R: Vector, what: str) -> tuple[float, ...]:
     return tuple(map(float, normalised(of_rotation(rows))))
 
 
+def _angles_in(value: Any) -> list[float]:
+    """The angles of an axis with an angle, or of a sequence; none of any other orientation."""
+    if not (isinstance(value, list | tuple) and len(value) == 2):
+        return []
+    return [float(value[1])] if is_number(value[1]) else [float(angle) for angle in value[1]]
+
+
 def orientation_doubt(value: Any, what: str) -> str | None:
-    """A sentence on Euler angles at the singularity of their sequence, where two of them turn about one axis."""
+    """A sentence on Euler angles at the singularity of their sequence, or on angles beyond a turn."""
+    beyond = max(map(abs, _angles_in(value)), default=0.0)
+    if beyond > 2.0 * math.pi:
+        return (
+            f"{what}: an angle of {beyond:g} rad is more than a turn; angles are in radians, such as "
+            "math.radians(30), and an orientation keeps no turns"
+        )
     if not (isinstance(value, list | tuple) and len(value) == 2 and isinstance(value[0], str)):
         return None
     sequence = sequence_of(value[0])

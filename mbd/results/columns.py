@@ -14,6 +14,7 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.equations.outputs import Outputs
 from mbd.errors import TrajectoryError, UnknownNameError, nearest
+from mbd.joints.euler import SEQUENCES
 from mbd.results.balance import Balance
 from mbd.results.charts import Charts
 from mbd.results.dense import Restepping
@@ -100,7 +101,17 @@ class Columns(ABC):
             return (name,)
         if parts := scalars_behind(name, self.knows):
             return parts
-        raise UnknownNameError(nearest(name, (*self.names, *self.vectors), "result", "The run has"))
+        raise UnknownNameError(self._unknown(name))
+
+    def _unknown(self, name: str) -> str:
+        """The sentence that answers a wrong name; of Euler angles it tells their sequences, which are not listed."""
+        joint, euler, sequence = name.partition(".euler")
+        if euler and self.knows(f"{joint}.orientation.w"):
+            wrong = f"{sequence[1:]!r} is no sequence" if sequence else "name their sequence"
+            return (
+                f"no result named {name!r}: {wrong}; there are '{joint}.euler.zxy' and others: {', '.join(SEQUENCES)}"
+            )
+        return nearest(name, (*self.names, *self.vectors), "result", "The run has")
 
 
 class ModelColumns(StoredStates, Columns):

@@ -343,7 +343,8 @@ def _tilts(joint: Joint) -> bool:
     if not (joint.parent.is_planar and joint.child.is_planar):
         return True
     turns = not joint.freedoms or any(label.unit == "rad" for label in joint.freedoms)
-    return turns and not joint.is_planar and abs(getattr(joint, "axis", ZERO)[2]) != 1.0
+    along_z = abs(getattr(joint, "axis", ZERO)[2]) == 1.0 and not hasattr(joint, "second_axis")
+    return turns and not joint.is_planar and not along_z
 
 
 def _constrained(model: Description) -> list[Frame | Joint | str]:

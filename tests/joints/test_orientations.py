@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 import mbd
 from mbd.joints.euler import SEQUENCES, euler_angles, from_euler
 from mbd.joints.quaternions import rotation_of
+from mbd.view.posture import instant
 
 TURN = Rotation.from_rotvec([0.4, -0.7, 0.3])
 W = float(TURN.as_quat()[3])
@@ -219,3 +220,38 @@ def test_angles_near_their_singularity_are_in_doubt():
         found = straight["float.euler.zxz"]
     assert found.shape == (3, 3)
     assert run["float.euler.zxy"].shape == (len(run.time), 3)
+
+
+def test_words_for_rotations_that_are_not_there_are_answered_in_one_sentence():
+    model = mbd.Model("ball")
+    body = mbd.RigidBody("body", 1.0, (0.1, 0.2, 0.25))
+    model.connect(mbd.Free("float", model.ground.origin, body.origin))
+    for position, velocity, said in (
+        ({}, {"float.omega": (1, 2, 3)}, r"^velocity: no rate named 'float.omega'; [^\n]*$"),
+        ({"float.position": (1, 2, 3)}, {}, r"^position: no coordinate named 'float.position'; [^\n]*$"),
+        (
+            {},
+            {"float.angular_velocity": (1, 2)},
+            "'float.angular_velocity' takes one finite number, or three as a vector, not 2",
+        ),
+        ({}, {"float.orientation": (1, 0, 0, 0)}, "its rate is 'float.angular_velocity', three numbers"),
+    ):
+        with pytest.raises(mbd.ModelError, match=said):
+            mbd.assemble(model, position, velocity, backend="python")
+    for form in (("zxy", (30, 20, 10)), ((0, 0, 1), 90)):
+        with pytest.warns(mbd.MbdWarning, match="rad is more than a turn; angles are in radians"):
+            mbd.assemble(model, {"float.orientation": form}, backend="python")
+    run = instant(model, mbd.assemble(model, backend="python"))
+    with pytest.raises(
+        mbd.UnknownNameError, match="'zzx' is no sequence; there are 'float.euler.zxy' and others: xyx, "
+    ):
+        run["float.euler.zzx"]
+    flat = mbd.Model("flat")
+    flat.connect(mbd.Planar("slide", flat.ground.origin, mbd.RigidBody("plate", 1.0, 0.1).origin))
+    with pytest.raises(
+        mbd.ModelError, match="no orientation named 'slide.orientation'; the model has no joint that turns"
+    ):
+        mbd.assemble(flat, {"slide.orientation": (1, 0, 0, 0)}, backend="python")
+    cross = mbd.Model("cross")
+    cross.connect(mbd.Universal("cross", cross.ground.origin, mbd.RigidBody("plate", 1.0, 0.1).origin))
+    assert "'cross' turns it out of the plane x–y" in cross.check()[0]
