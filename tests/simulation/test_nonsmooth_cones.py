@@ -257,6 +257,39 @@ def test_feet_of_all_kinds_and_dry_joints_are_solved_together():
     assert abs(run["rail.rate"][-1]) < 1e-12 and np.hypot(run["float.x.rate"][-1], run["float.y.rate"][-1]) < 1e-12
 
 
+@pytest.mark.slow
+def test_a_person_lands_on_six_points_of_two_feet_by_both_strategies():
+    person = mbd.human(mass=75.0, height=1.8)
+    model = mbd.Model("person")
+    model.connect(*person.joints)
+    feet = [f"{side} {place}" for side in ("left", "right") for place in ("heel", "inner ball", "outer ball")]
+    for name in feet:
+        side, _, place = name.partition(" ")
+        ground = mbd.touchdown(person.bodies[f"{side} foot"].frame(place))
+        model.constrain(mbd.Unilateral(name, ground, friction=0.6))
+    pose = dict(person.standing(knees=0.2))
+    start = mbd.assemble(model, position=pose | {"trunk.y": pose["trunk.y"] + 0.02}, velocity={"trunk.x": 0.5})
+    left = []
+    for contact in ("events", "nonsmooth"):
+        run = mbd.simulate(model, start, mbd.HHT(0.05), dt=2e-3, until=0.4, contact=contact)
+        for name in feet:
+            pull = np.hypot(run[f"{name}.friction.forward"], run[f"{name}.friction.sideways"])
+            assert np.all(pull <= 0.6 * run[f"{name}.force"] + 1e-6)
+            assert run[f"{name}.gap"].min() > -1e-9
+        left.append(run.energy["total"][-1])
+    assert left[1] == pytest.approx(left[0], abs=0.5)
+
+
+def test_the_plain_twin_lands_on_redundant_feet_as_machine_code_does():
+    model, how = on_feet(FOUR), {"dt": 5e-3, "until": 0.1, "contact": "nonsmooth"}
+    velocity = {"float.x.rate": 0.8, "float.z.rate": -0.5, "float.angular_velocity": (0.6, 0.3, -0.9)}
+    start = mbd.assemble(model, position={"float.z": 0.055}, velocity=velocity)
+    one, other = (mbd.simulate(model, start, mbd.HHT(0.05), backend=backend, **how) for backend in ("llvm", "python"))
+    assert [(e.kind, e.name, e.time) for e in one.events] == [(e.kind, e.name, e.time) for e in other.events] != []
+    for name in ("float.x", "float.y", "float.z", "float.x.rate"):
+        assert np.allclose(one[name], other[name], atol=1e-9)
+
+
 def test_the_plain_twin_a_cut_run_and_the_automatic_choice():
     how = {"until": 0.4, "contact": "nonsmooth"}
     whole = cones.slid(cones.on_incline(), (0.2, 0.3), **how)
