@@ -261,9 +261,12 @@ class Description:
                     model.joints[place] = replace(model.joints[place], **changes[effect])  # type: ignore[type-var]
         for place, word in reversed(list(enumerate(model.constraints))):
             parts = word.bare()
+            left: Constraint | None = word
             known |= set(parts)
-            left = [parts[effect] for effect in parts if effect in names] or [word]
-            model.constraints[place : place + 1] = [each for each in left[-1:] if each is not None]
+            for effect in [effect for effect in parts if effect in names]:
+                rest = parts if left is None else left.bare()  # a second friction is left out beside the first
+                left = rest.get(effect, left)
+            model.constraints[place : place + 1] = [] if left is None else [left]
         if "gravity" in names:
             model.gravity = (0.0, 0.0, 0.0)
         known |= {observation.name for observation in self.observations}

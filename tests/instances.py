@@ -222,6 +222,10 @@ CONSTRAINTS: list[tuple[str, Callable[[Frame, Frame, Joint], Constraint]]] = [
     ("foot that sticks", lambda a, b, joint: mbd.Unilateral("law", mbd.touchdown(a))),
     ("foot that bounces", lambda a, b, joint: mbd.Unilateral("law", mbd.touchdown(b), restitution=0.7, friction=0.0)),
     ("foot with friction", lambda a, b, joint: mbd.Unilateral("law", mbd.touchdown(a), friction=0.4)),
+    (
+        "foot with viscous friction",
+        lambda a, b, joint: mbd.Unilateral("law", mbd.touchdown(a), friction=mbd.Coulomb(0.3) + mbd.Viscous(0.2)),
+    ),
     ("foot on a hill", lambda a, b, joint: mbd.Unilateral("law", mbd.touchdown(b, hill))),
     ("foot on a plate", lambda a, b, joint: mbd.Unilateral("law", mbd.touchdown(b, mbd.Plane(frame=a)), friction=0.0)),
     ("foot on a belt", lambda a, b, joint: mbd.Unilateral("law", mbd.touchdown(b, mbd.Plane(velocity=(0.4, 0.0))))),

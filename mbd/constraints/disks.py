@@ -13,7 +13,7 @@ from mbd.bodies.ground import Ground
 from mbd.bodies.values import Vector3, number, unit_vector
 from mbd.constraints.measure import Measure
 from mbd.constraints.slip import slip_along
-from mbd.constraints.surfaces import Plane
+from mbd.constraints.surfaces import Plane, spin_about
 from mbd.errors import ModelError
 from mbd.forces.base import frame_of
 from mbd.forces.quantities import Mention
@@ -75,6 +75,16 @@ class DiskTouchdown(Measure):
         """From the center to the lowest point of the edge, in ground axes [m]."""
         radius = scope.parameter(self.center.full_name, "radius", self.radius)
         return to_edge(self.center, self.axis, radius, self.ground, scope)
+
+    @property
+    def has_spin(self) -> bool:
+        """True."""
+        return True
+
+    def spin(self, scope: Scope) -> Scalar:
+        """n · (ω − ω_plane)."""
+        p = scope.frame(self.center).position
+        return spin_about(self.ground.normal_at(p, scope), self.center, self.ground.frame, scope)
 
     def mentions(self) -> list[Mention]:
         """Its center, and the frame of the plane."""

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from mbd.constraints.measure import Measure
     from mbd.constraints.rules import When
 
-__all__ = ["Closing", "Drag", "Equation", "Hold", "Law"]
+__all__ = ["Closing", "Drag", "Equation", "Hold", "Law", "Rubbing"]
 
 Hold: TypeAlias = "Callable[[Sequence[Scalar]], Sequence[Scalar]]"
 
@@ -79,6 +79,18 @@ class Drag:
 
 
 @dataclass(frozen=True)
+class Rubbing:
+    """Smooth friction of a contact by rows: forces along the velocities of its slips, as functions of those and of p.
+
+    slips : tangents of the contact as rows would have them, on positions (held at the place of now) or on velocities
+    forces : of p, the normal force of the contact, and of the velocities of the slips: one on the mechanism along each
+    """
+
+    slips: Sequence[Equation]
+    forces: Callable[[Scalar, Sequence[Scalar]], Sequence[Scalar]]
+
+
+@dataclass(frozen=True)
 class Closing:
     """When a law acts.
 
@@ -107,6 +119,7 @@ class Law:
     contact : when it acts; None: at all times
     push : p ≥ 0 along ∂g/∂q of a force law [N, N m]; along the velocity, where the gap is one
     drags : its forces along velocities
+    rubbing : smooth friction of a contact by rows
     elastic : energy that the force law can give back [J], which the ledger books apart from losses; None: not told
     while_closed : name of a contact by rows that must be closed for rows on velocities to hold
     """
@@ -115,5 +128,6 @@ class Law:
     contact: Closing | None = None
     push: Scalar | None = None
     drags: Sequence[Drag] = field(default=())
+    rubbing: Rubbing | None = None
     elastic: Scalar | None = None
     while_closed: str | None = None

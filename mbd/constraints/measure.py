@@ -61,6 +61,15 @@ class Measure(ABC):
         """Whether `slip_velocities` gives any."""
         return False
 
+    def spin(self, scope: Scope) -> Scalar:
+        """Angular velocity about the normal of what touches against what it touches [rad/s], where it `has_spin`."""
+        raise NotImplementedError(f"{type(self).__name__} has no spin")
+
+    @property
+    def has_spin(self) -> bool:
+        """Whether `spin` gives any."""
+        return False
+
     @property
     def title(self) -> str:
         """What it measures, in a word: 'distance'."""

@@ -13,7 +13,7 @@ from mbd.bodies.ground import Ground
 from mbd.bodies.values import number
 from mbd.constraints.measure import Measure
 from mbd.constraints.slip import slip_along
-from mbd.constraints.surfaces import Plane
+from mbd.constraints.surfaces import Plane, spin_about
 from mbd.errors import ModelError
 from mbd.forces.base import frame_of
 from mbd.forces.quantities import Mention
@@ -52,6 +52,16 @@ class SphereTouchdown(Measure):
         """Forward and sideways, without the one in which nothing moves (in a planar model sideways)."""
         arm = scaled(-1.0 * self._radius(scope), self.ground.turned(self.ground.normal, scope))
         return slip_along(self.ground, self.center, arm, scope)
+
+    @property
+    def has_spin(self) -> bool:
+        """True."""
+        return True
+
+    def spin(self, scope: Scope) -> Scalar:
+        """n · (ω − ω_plane)."""
+        p = scope.frame(self.center).position
+        return spin_about(self.ground.normal_at(p, scope), self.center, self.ground.frame, scope)
 
     def mentions(self) -> list[Mention]:
         """Its center, and the frame of the plane."""

@@ -16,7 +16,7 @@ from mbd.tape.functions import sqrt
 from mbd.tape.node import Scalar
 from mbd.tape.tracing import Argument, traced_scalar
 
-__all__ = ["Plane", "Surface", "surface_of"]
+__all__ = ["Plane", "Surface", "spin_about", "surface_of"]
 
 STILL: Vector3 = (0.0, 0.0, 0.0)
 
@@ -90,6 +90,10 @@ class Plane:
         """A direction of the plane in ground axes."""
         return direction if self.frame is None else rotate(scope.frame(self.frame).rotation, direction)
 
+    def normal_at(self, p: Triple, scope: Scope) -> Triple:
+        """n in ground axes."""
+        return self.turned(self.normal, scope)
+
     def velocity_at(self, p: Triple, scope: Scope) -> Triple:
         """Velocity of the plane's material at a place, ``v_F + ω_F × (p − p_F) + R_F u`` [m/s]."""
         own = self.turned(self.velocity, scope)
@@ -156,6 +160,19 @@ class Surface:
         forward = scaled(1.0 / sqrt(1.0 + along * along), (1.0, along, 0.0))
         normal = scaled(1.0 / sqrt(1.0 + along * along + across * across), (-along, 1.0, -across))
         return forward, cross(forward, normal)
+
+    def normal_at(self, p: Triple, scope: Scope) -> Triple:
+        """(−H_x, 1, −H_z), of length 1, over a place."""
+        _, along, across = self.slopes(p, scope)
+        return scaled(1.0 / sqrt(1.0 + along * along + across * across), (-along, 1.0, -across))
+
+
+def spin_about(normal: Triple, frame: Frame, carrier: Frame | None, scope: Scope) -> Scalar:
+    """n · (ω − ω_carrier) of a frame; of a carrier None, the ground, n · ω."""
+    turning = scope.frame(frame).angular_velocity
+    if carrier is not None:
+        turning = difference(turning, scope.frame(carrier).angular_velocity)
+    return dot(normal, turning)
 
 
 def surface_of(ground: Any, what: str) -> Plane | Surface:

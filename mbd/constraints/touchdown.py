@@ -9,7 +9,7 @@ from typing import Any
 from mbd.bodies.algebra import dot
 from mbd.bodies.base import Frame
 from mbd.constraints.measure import Measure
-from mbd.constraints.surfaces import Plane, Surface, surface_of
+from mbd.constraints.surfaces import Plane, Surface, spin_about, surface_of
 from mbd.forces.base import frame_of
 from mbd.forces.quantities import Mention
 from mbd.scope import Scope, Triple
@@ -60,6 +60,16 @@ class Touchdown(Measure):
     def has_tangents(self) -> bool:
         """True."""
         return True
+
+    @property
+    def has_spin(self) -> bool:
+        """True, unless its body is a point."""
+        return True
+
+    def spin(self, scope: Scope) -> Scalar:
+        """n · (ω − ω_ground)."""
+        p = scope.frame(self.point).position
+        return spin_about(self.ground.normal_at(p, scope), self.point, self.carrier, scope)
 
     def captured(self, scope: Scope) -> Sequence[Scalar]:
         """The place of touchdown, those components that can change (in a planar model z cannot)."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal
@@ -9,13 +10,15 @@ from typing import Literal
 from mbd.bodies.domains import Domain
 from mbd.bodies.values import name_of, number
 from mbd.constraints.base import Constraint
+from mbd.constraints.contact_friction import friction_of, has_dry_part, resistance
 from mbd.constraints.expressions import is_expression
-from mbd.constraints.law import Closing, Equation, Hold, Law
+from mbd.constraints.law import Closing, Equation, Hold, Law, Rubbing
 from mbd.constraints.measure import Measure, gap_of
 from mbd.constraints.rules import When, condition_of, releases_of
 from mbd.constraints.user_measure import measure
 from mbd.errors import ModelError
 from mbd.forces.quantities import Mention
+from mbd.joints.losses.base import Loss
 from mbd.scope import Scope
 from mbd.tape.functions import maximum
 from mbd.tape.node import Scalar
@@ -36,26 +39,33 @@ class Unilateral(Constraint):
     measure : where
     restitution : e of Newton's law, 0 (plastic) to 1
     friction : None: it sticks where the measure has tangents; 0: it slides freely; μ > 0: Coulomb's law,
-        ``‖λ_T‖ ≤ μ p``, it sticks, slips and turns around; in space it slides in a plane, opposite to its velocity
+        ``‖λ_T‖ ≤ μ p``, it sticks, slips and turns around; in space it slides in a plane, opposite to its velocity.
+        A loss: its force per newton of normal force at the speed of the slip; ``Viscous(μ)``, μ in s/m, is
+        ``λ_T = μ p γ``, ``Coulomb(0.3) + Viscous(0.1)`` sticks, and grows with speed beyond 0.3 p. Parameters are
+        'name.mu', or 'name friction.coefficient', …
     release : `When` another contact closes (or several of them), instead of on pull, or besides (`may_pull=False`);
         while it pulls it has no friction
     only_while : name of a contact that must be closed, or a measure that must be positive, for this one to be watched
+    spin_friction : ρ ≥ 0 of friction against spin about the normal, ``|M| ≤ ρ p`` [m], the parameter 'name.mu_spin'; it
+        sticks and slips by itself, as 'name spin', and 'name.spin.torque' is M on the body [N m]. Of feet of bodies
+        that turn in space: `touchdown` and `sphere_touchdown`. A round patch of radius R has ρ = ⅔ μ R under even load
     """
 
     name: str
     measure: Measure
     restitution: float = 0.0
-    friction: float | None = None
+    friction: float | Loss | None = None
     release: When | tuple[When, ...] | None = None
     only_while: str | Measure | None = None
+    spin_friction: float = 0.0
 
     def __post_init__(self) -> None:
         name_of(self.name, "Unilateral")
         put = object.__setattr__
         put(self, "measure", measure_of(self.measure, f"Unilateral '{self.name}'"))
         put(self, "restitution", number(self.restitution, f"restitution of '{self.name}'"))
-        if self.friction is not None:
-            put(self, "friction", number(self.friction, f"friction of '{self.name}'"))
+        put(self, "friction", friction_of(self.friction, self.name))
+        put(self, "spin_friction", number(self.spin_friction, f"spin_friction of '{self.name}'"))
         put(self, "release", releases_of(self.release, self.name) or None)
         put(self, "only_while", condition_of(self.only_while, self.name))
 
@@ -81,23 +91,35 @@ class Unilateral(Constraint):
 
     @property
     def slides(self) -> bool:
-        """Whether Coulomb friction resists its sliding."""
-        return self.friction is not None and self.friction > 0.0
+        """Whether friction resists its sliding: Coulomb's, which may stick, or a smooth one."""
+        return isinstance(self.friction, Loss) or (self.friction is not None and self.friction > 0.0)
+
+    @property
+    def spins(self) -> bool:
+        """Whether friction resists its spin about the normal."""
+        return self.spin_friction > 0.0
 
     def act(self, scope: Scope, hold: Hold) -> Law:
         """A normal row, and tangent rows that hold the place of touchdown where and while it sticks."""
         gap, unit = gap_of(self.measure, scope), self.measure.unit
-        rows = [Equation(gap, "normal", unit)]
+        rows, rubbing = [Equation(gap, "normal", unit)], None
         if self.sticks or self.slides:
             limit = partial(self._limit, scope) if self.slides else None
             tangents = self.measure.tangents(scope, hold(self.measure.captured(scope)))
-            rows += [Equation(slip, part, limit=limit, may_fold=True) for part, slip in tangents]
-            rows += [
+            slips = [Equation(slip, part, limit=limit, may_fold=True) for part, slip in tangents]
+            slips += [
                 Equation(slip, part, level="velocity", limit=limit)
                 for part, slip in self.measure.slip_velocities(scope)
             ]
+            loss = self.friction
+            rows += slips if not isinstance(loss, Loss) or has_dry_part(loss) else []
+            if isinstance(loss, Loss) and loss.smooth is not None:
+                rubbing = Rubbing(slips, partial(self._resistance, scope, loss))
+        if self.spins:
+            spin = self.measure.spin(scope)
+            rows.append(Equation(spin, "spin", "rad", "velocity", limit=partial(self._spin_limit, scope)))
         contact = Closing(gap, unit, self.opens_on, self.releases, self.only_while, self.restitution)
-        return Law(rows, contact)
+        return Law(rows, contact, rubbing=rubbing)
 
     def anchors(self, scope: Scope) -> int:
         """The place of touchdown, where it holds one."""
@@ -105,12 +127,32 @@ class Unilateral(Constraint):
 
     def _limit(self, scope: Scope, push: Scalar) -> Scalar:
         """μ p, none while a rule lets it pull."""
-        coefficient = scope.parameter(self.name, "mu", self.friction or 0.0)
-        return coefficient * (maximum(push, 0.0) if self.opens_on == "when" else push)
+        if isinstance(self.friction, Loss):
+            coefficient = self.friction.dry(0.0, scope, f"{self.name} friction")
+        else:
+            coefficient = scope.parameter(self.name, "mu", self.friction or 0.0)
+        return coefficient * self._pushing(push)
+
+    def _resistance(self, scope: Scope, loss: Loss, push: Scalar, speeds: Sequence[Scalar]) -> Sequence[Scalar]:
+        """Smooth friction along its slips, none while a rule lets it pull."""
+        return resistance(loss, self._pushing(push), speeds, scope, f"{self.name} friction")
+
+    def _spin_limit(self, scope: Scope, push: Scalar) -> Scalar:
+        """ρ p, none while a rule lets it pull."""
+        return scope.parameter(self.name, "mu_spin", self.spin_friction) * self._pushing(push)
+
+    def _pushing(self, push: Scalar) -> Scalar:
+        pushing: Scalar = maximum(push, 0.0) if self.opens_on == "when" else push
+        return pushing
 
     def bare(self) -> dict[str, Constraint | None]:
-        """Its friction."""
-        return {f"{self.name} friction": replace(self, friction=0.0)} if self.slides else {}
+        """Its friction, and that of its spin."""
+        found: dict[str, Constraint | None] = {}
+        if self.slides:
+            found[f"{self.name} friction"] = replace(self, friction=0.0)
+        if self.spins:
+            found[f"{self.name} spin friction"] = replace(self, spin_friction=0.0)
+        return found
 
     @property
     def details(self) -> str:
@@ -125,13 +167,26 @@ class Unilateral(Constraint):
         return text + (f", only while {other.details} > 0" if isinstance(other, Measure) else f", only while '{other}'")
 
     def parameters(self) -> dict[str, float]:
-        """'<name>.mu' where it slides with friction, and those of its measure."""
-        return ({f"{self.name}.mu": self.friction} if self.friction else {}) | self.measure.parameters()
+        """'name.mu' where it slides with friction, or those of the loss; 'name.mu_spin'; and those of its measure."""
+        own: dict[str, float] = {}
+        if isinstance(self.friction, Loss):
+            own = self.friction.parameters(f"{self.name} friction")
+        elif self.friction:
+            own = {f"{self.name}.mu": self.friction}
+        if self.spin_friction:
+            own |= {f"{self.name}.mu_spin": self.spin_friction}
+        return own | self.measure.parameters()
 
     def domains(self) -> dict[str, Domain]:
-        """μ ≥ 0."""
+        """μ ≥ 0, ρ ≥ 0."""
         mu = Domain(low=0.0, problem="is negative; give 0, or None to stick", called="friction")
-        return {f"{self.name}.mu": mu} | self.measure.domains()
+        rho = Domain(low=0.0, problem="is negative; give 0 for none", unit="m", called="spin_friction")
+        return {f"{self.name}.mu": mu, f"{self.name}.mu_spin": rho} | self.measure.domains()
+
+    def value_faults(self, values: Mapping[str, float]) -> list[str]:
+        """Values that its friction cannot have."""
+        loss = self.friction.value_faults(f"{self.name} friction", values) if isinstance(self.friction, Loss) else []
+        return loss + super().value_faults(values)
 
     @property
     def others(self) -> tuple[str, ...]:
@@ -149,9 +204,17 @@ class Unilateral(Constraint):
         faults = self.measure.faults(self.name) + super().faults()
         if not 0.0 <= self.restitution <= 1.0:
             faults.append(f"'{self.name}': restitution {self.restitution:g} is not between 0 and 1")
-        if self.slides and not (self.measure.has_tangents or self.measure.has_slip_velocities):
+        if isinstance(self.friction, Loss):
+            faults += self.friction.faults(f"{self.name} friction")
+        if self.spins and not self.measure.has_spin:
             faults.append(
-                f"'{self.name}': friction {self.friction:g} on a {self.measure.title}, which has no direction to slide "
+                f"'{self.name}': spin_friction on a {self.measure.title}, which has no spin about a normal; use "
+                "mbd.touchdown or mbd.sphere_touchdown, or leave it out"
+            )
+        if self.slides and not (self.measure.has_tangents or self.measure.has_slip_velocities):
+            size = self.friction if isinstance(self.friction, Loss) else f"{self.friction:g}"
+            faults.append(
+                f"'{self.name}': friction {size} on a {self.measure.title}, which has no direction to slide "
                 "in; use mbd.touchdown, give mbd.measure(…, tangents=…), or friction=0"
             )
         if any(rule.other == self.name for rule in self.releases):

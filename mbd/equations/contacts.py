@@ -16,6 +16,7 @@ from mbd.equations.equations import Contact, Guard, Row
 from mbd.equations.frictions import dry_friction, dry_joint, sliding_contact
 from mbd.equations.law_of import Holding, law_of
 from mbd.equations.laws import Laws
+from mbd.equations.rubbing import rubbing_contact
 from mbd.joints.base import Joint, row_unit
 from mbd.tape.derivatives import gradient, live
 from mbd.tape.evaluate import evaluate
@@ -165,10 +166,15 @@ def _by_rows(
         for row in law.rows
     ]  # fmt: skip
     acting = tuple(k for k in numbers if k >= 0)
-    limits = [(k, row.limit) for k, row in zip(numbers, law.rows, strict=True) if row.limit is not None]
-    if limits:
-        captured = dict(zip(holding.anchors, holding.captured, strict=True))
-        sliding_contact(found, scope, dynamics, word.name, acting, limits, captured)
+    captured = dict(zip(holding.anchors, holding.captured, strict=True))
+    limited = [(k, row) for k, row in zip(numbers, law.rows, strict=True) if row.limit is not None]
+    if limited:
+        sliding_contact(found, scope, dynamics, word.name, acting, limited, captured)
+    drags = (
+        rubbing_contact(found, scope, dynamics, word.name, number, numbers[0], law.rubbing, captured)
+        if law.rubbing is not None and numbers[0] >= 0
+        else ()
+    )
     condition = at.only_while
     gap = scope.tape.lift(at.gap)
     gap, rate = scope.views.real([gap, *scope.rates([gap])])
@@ -176,7 +182,7 @@ def _by_rows(
         word.name, word.kind, gap, rate, acting, tuple(holding.captured), holding.anchors, opens_on=at.opens_on,
         when=tuple((rule.other, rule.after_impact) for rule in at.releases),
         only_while=scope.real(gap_of(condition, scope)) if isinstance(condition, Measure) else condition,
-        restitution=at.restitution, unit=at.unit, may_pull=any(rule.may_pull for rule in at.releases),
+        restitution=at.restitution, unit=at.unit, may_pull=any(rule.may_pull for rule in at.releases), drags=drags,
     )  # fmt: skip
 
 

@@ -187,7 +187,8 @@ def _closed(scope: DerivationContext, constraints: Laws) -> Work:
         act = work.on_velocity if constraints.contacts[number].is_velocity else work.on_value
         act(gap, -(scope.tape.input("switch", number) * force))
     for number, velocity, force in constraints.drags:
-        work.on_velocity(velocity, -(scope.tape.input("switch", number) * force))
+        by_rows = constraints.contacts[number].force is None  # its force follows the multiplier of the normal row
+        work.on_velocity(velocity, -force if by_rows else -(scope.tape.input("switch", number) * force))
     return work
 
 

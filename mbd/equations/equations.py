@@ -113,7 +113,8 @@ class Contact:
     restitution : e of Newton's law
     unit : of the gap
     may_pull : whether its rule says that it may, so that no note tells that it did
-    drags : (part, velocity, force) of a force law's further forces, whose power is force · velocity
+    drags : (part, velocity, force) of a force law's further forces, whose power is force · velocity; of a contact by
+        rows those of smooth friction, which follow the multiplier of its normal row
     is_velocity : whether its gap is a velocity, along which its force acts then
     """
 

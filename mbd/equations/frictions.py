@@ -6,17 +6,21 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+from mbd.constraints.law import Equation
 from mbd.equations.derivation_scope import DerivationScope, Generalized
 from mbd.equations.dynamics import Work
 from mbd.equations.equations import Effect, Friction, Row
 from mbd.equations.laws import Laws
 from mbd.errors import CapabilityError
 from mbd.joints.base import Joint
-from mbd.tape.derivatives import live, substitute
+from mbd.tape.derivatives import substitute
 from mbd.tape.functions import sqrt
 from mbd.tape.node import Node, Scalar
 
 __all__ = ["dry_friction", "dry_joint", "sliding_contact"]
+
+SPIN = ("spin", "rad")
+"""Part and unit of the row that holds the spin of a contact about its normal."""
 
 
 def sliding_contact(
@@ -25,14 +29,37 @@ def sliding_contact(
     dynamics: Generalized,
     name: str,
     numbers: Sequence[int],
-    limits: Sequence[tuple[int, Any]],
+    limited: Sequence[tuple[int, Equation]],
     captured: dict[int, Node],
 ) -> None:
-    """Friction along the tangents of a contact, ``‖λ_T‖ ≤ limit(p)``; directions are those at the point of now."""
-    tangents = [(row, limit) for row, limit in limits if row >= 0]
-    if len(tangents) not in (1, 2) or len(numbers) != 1 + len(tangents):
+    """Friction of a contact: along its tangents, ``‖λ_T‖ ≤ limit(p)``, and of its spin, ``|λ_ω| ≤ limit(p)``.
+
+    Directions are those at the point of now. Spin is friction along one direction, with a switch of its own.
+    """
+    spinning = [(row, word.limit or 0.0) for row, word in limited if row >= 0 and (word.part, word.unit) == SPIN]
+    along = [(row, word.limit) for row, word in limited if (word.part, word.unit) != SPIN]
+    if along:
+        acting = [(row, law) for row, law in along if row >= 0]
+        _slide(found, scope, dynamics, name, len(numbers) - 1 - len(spinning), numbers[0], acting, captured)
+    for row, law in spinning:
+        limit = scope.tape.lift(law(-scope.tape.input("lam", numbers[0])) if callable(law) else law)
+        dry_friction(found, scope, dynamics, f"{name} spin", row, found.rows[row].contact, limit)
+
+
+def _slide(
+    found: Laws,
+    scope: DerivationScope,
+    dynamics: Generalized,
+    name: str,
+    ways: int,
+    normal: int,
+    tangents: Sequence[tuple[int, Any]],
+    captured: dict[int, Node],
+) -> None:
+    """Friction along one tangent, or along two that slide together, of all the `ways` in which the point can slide."""
+    if len(tangents) not in (1, 2) or ways != len(tangents):
         raise CapabilityError(
-            f"'{name}': friction needs a direction of sliding, or two, but its point can slide in {len(numbers) - 1}; "
+            f"'{name}': friction needs a direction of sliding, or two, but its point can slide in {ways}; "
             "use friction=None (it sticks) or 0"
         )
     here = {scope.tape.input("anchor", k): value for k, value in captured.items()}
@@ -40,12 +67,7 @@ def sliding_contact(
     for place, (row, law) in enumerate(tangents):
         anchored = [found.viewed[row]] if found.rows[row].is_velocity else scope.rates([found.viewed[row]])
         view = substitute(anchored, here)[0]
-        if len(tangents) == 2 and any(node.op == "input" and node.data[0] == "anchor" for node in live(anchored)):
-            raise CapabilityError(
-                f"'{name}': in space friction is solved on planes, and this ground is a height function, whose "
-                "directions turn along it; use mbd.Plane, or friction=None (it sticks) or 0"
-            )
-        limit = scope.tape.lift(law(-scope.tape.input("lam", numbers[0])) if callable(law) else law)
+        limit = scope.tape.lift(law(-scope.tape.input("lam", normal)) if callable(law) else law)
         partner = -1 if len(tangents) == 1 else first + 1 - place
         _add(found, scope, name, row, found.rows[row].contact, view, limit, partner)
     _add_loss(found, scope, dynamics, name, range(first, len(found.frictions)))

@@ -71,6 +71,8 @@ def _faults(word: Constraint, law: Law, holding: Holding) -> Iterator[str]:
         yield "it acts by a force: give push=, not rows" if by_force else "it needs Law(rows=[…])"
     if (law.push is None) == by_force or (law.drags and not by_force):
         yield "push= and drags= are the forces of laws of kind 'penalty', which need push="
+    if law.rubbing is not None and (by_force or not closes):
+        yield "rubbing= is the smooth friction of contacts by rows; of laws of kind 'penalty' give drags="
     if holding.captured and not closes:
         yield "it never closes, so that hold() has no instant; only laws with a contact hold values"
     if law.while_closed is not None and (closes or any(row.limit is not None for row in law.rows)):

@@ -27,13 +27,13 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from mbd.equations.cones import sliding_force
-from mbd.equations.equations import Equations
+from mbd.equations.equations import Contact, Equations
 from mbd.equations.inputs import Inputs
 from mbd.equations.magnitudes import magnitudes
 from mbd.equations.tangents import Forces, tangent
 from mbd.tape.derivatives import gradient, jvp, jvps, live, substitute, vjp
 from mbd.tape.elimination import factors
-from mbd.tape.node import Node
+from mbd.tape.node import Node, Scalar
 
 __all__ = [
     "Correction", "accelerations", "balance_with", "compose", "constraint_jacobian", "correction", "guard_terms",
@@ -176,16 +176,17 @@ def _levels(equations: Equations, rows: Sequence[int], stabilized: bool) -> list
     return [row.rate if row.is_velocity else row.value for row in chosen]
 
 
-def accelerations(equations: Equations) -> list[Node]:
+def accelerations(equations: Equations, impacts: bool = True) -> list[Node]:
     """What assembly, impacts and restarts need, over all rows and with penalties behind their switches.
 
     ``r = M a + f + (∂r/∂λ) λ``, ``ḣ = B v + h_t``, ``ḧ = B a + γ``; `captured` are the values that closing contacts
-    store, in the order of contacts and anchors, and the whole turns as they are; T is the kinetic energy.
+    store, in the order of contacts and anchors, and the whole turns as they are; T is the kinetic energy. In `impacts`,
+    where c_C is 1, smooth friction of contacts has no impulse.
     """
     inputs = Inputs.of(equations)
     tape = equations.tape
     rows = range(len(equations.rows))
-    r = switched_balance(equations)
+    r = switched_balance(equations, 1.0 - inputs.c[0] if impacts else 1.0)
     rest: dict[Node, float] = {node: 0.0 for node in (*inputs.a, *inputs.s, *inputs.lam)}
     f = substitute(r, rest)
     M = None if equations.geometry is None else equations.geometry.mass_matrix()
@@ -255,20 +256,21 @@ def balance_with(
     return _balance(equations, rows, [(c, equations.tape.one) for c in penalties], sliding)
 
 
-def switched_balance(equations: Equations) -> list[Node]:
-    """r with every row, every penalty behind its switch and every friction behind its slip."""
+def switched_balance(equations: Equations, rubbed: Scalar = 1.0) -> list[Node]:
+    """r with every row, penalties behind switches, frictions behind slips, and a part of smooth friction."""
     switches = [(c, equations.tape.input("switch", c)) for c in range(len(equations.contacts))]
-    return _balance(equations, range(len(equations.rows)), switches, range(len(equations.frictions)))
+    return _balance(equations, range(len(equations.rows)), switches, range(len(equations.frictions)), rubbed)
 
 
 def _balance(
-    equations: Equations, rows: Iterable[int], penalties: Iterable[tuple[int, Node]], sliding: Iterable[int]
-) -> list[Node]:
+    equations: Equations, rows: Iterable[int], penalties: Iterable[tuple[int, Node]], sliding: Iterable[int],
+    rubbed: Scalar = 1.0,
+) -> list[Node]:  # fmt: skip
     """balance + Σ λ_k ∂h_k/∂x − Σ switch_c F_c ∂g_c/∂x + Σ slip_k limit_k ∂γ_k/∂v.
 
     Of rows on velocities λ_k ∂rate_k/∂v.
     """
-    inputs, forces = Inputs.of(equations), _forces(equations, rows, penalties, sliding)
+    inputs, forces = Inputs.of(equations), _forces(equations, rows, penalties, sliding, rubbed)
     values, multipliers, rates, rubbing = forces
     if not values and not rates:
         return list(equations.balance)
@@ -283,8 +285,9 @@ def _balance(
 
 
 def _forces(
-    equations: Equations, rows: Iterable[int], penalties: Iterable[tuple[int, Node]], sliding: Iterable[int]
-) -> Forces:
+    equations: Equations, rows: Iterable[int], penalties: Iterable[tuple[int, Node]], sliding: Iterable[int],
+    rubbed: Scalar = 1.0,
+) -> Forces:  # fmt: skip
     """What acts besides `balance`."""
     inputs, rows = Inputs.of(equations), list(rows)
     work = [(equations.rows[k].value, inputs.lam[k]) for k in rows if not equations.rows[k].is_velocity]
@@ -293,17 +296,28 @@ def _forces(
     for k in sliding:
         rates.append(equations.frictions[k].rate)
         forces.append(sliding_force(equations, k))
+    for contact in _rubbing(equations, rows):
+        rates += [velocity for _, velocity, _ in contact.drags]
+        forces += [-(rubbed * force) for _, _, force in contact.drags]
     for c, switch in penalties:
         contact = equations.contacts[c]
-        if contact.force is not None and not contact.is_velocity:
+        if contact.force is None:
+            continue
+        if not contact.is_velocity:
             work.append((contact.gap, -(switch * contact.force)))
-        elif contact.force is not None:
+        else:
             rates.append(contact.gap)
             forces.append(-(switch * contact.force))
         for _, velocity, drag in contact.drags:
             rates.append(velocity)
             forces.append(-(switch * drag))
     return [value for value, _ in work], [multiplier for _, multiplier in work], rates, forces
+
+
+def _rubbing(equations: Equations, rows: Iterable[int]) -> list[Contact]:
+    """The contacts by rows, among those whose normal row is here, that have smooth friction."""
+    normal = {contact.rows[0]: contact for contact in equations.contacts if contact.rows and contact.drags}
+    return [normal[k] for k in rows if k in normal]
 
 
 def constraint_jacobian(equations: Equations, rows: Sequence[int]) -> list[list[Node]]:
@@ -339,6 +353,7 @@ def _row_forces(
     """∂r/∂λ, column by column: Bᵀ, and more where forces depend on multipliers."""
     inputs = Inputs.of(equations)
     loaded = any(node.op == "input" and node.data[0] == "slip" for node in live(r))
+    loaded = loaded or bool(_rubbing(equations, rows))
     if loaded or any(node.op == "input" and node.data[0] == "lam" for node in live(equations.balance)):
         return jvps(r, [{inputs.lam[k]: 1.0} for k in rows])
     padding = [equations.tape.zero] * equations.n_z

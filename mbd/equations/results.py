@@ -15,7 +15,7 @@ from mbd.equations.reactions import Wrench, reaction
 from mbd.forces.base import Force
 from mbd.joints.base import Joint
 from mbd.scope import Triple
-from mbd.tape.node import Scalar, Tape
+from mbd.tape.node import Node, Scalar, Tape
 
 if TYPE_CHECKING:
     from mbd.description import Description
@@ -116,15 +116,23 @@ def offer_contacts(outputs: Outputs, tape: Tape, rows: Sequence[Row], contacts: 
         outputs.value(f"{contact.name}.gap_rate", contact.gap_rate)
         if contact.force is not None:
             outputs.value(f"{contact.name}.force", tape.input("switch", number) * contact.force)
-        for part, _, force in contact.drags:
-            outputs.value(f"{contact.name}.{part}", tape.input("switch", number) * force)
+            for part, _, force in contact.drags:
+                outputs.value(f"{contact.name}.{part}", tape.input("switch", number) * force)
+            continue
+        along: dict[str, Node] = {}
         for k in contact.rows:
             push = -tape.input("lam", k)
             if rows[k].part == "normal":
                 outputs.value(f"{contact.name}.force", push)
+            elif (rows[k].part, rows[k].unit) == ("spin", "rad"):
+                outputs.value(f"{contact.name}.spin.torque", push)
             else:
-                outputs.value(f"{contact.name}.friction", push)
-                outputs.value(f"{contact.name}.friction.{rows[k].part}", push)
+                along[rows[k].part] = push
+        for part, _, force in contact.drags:
+            along[part] = along[part] + force if part in along else force
+        for part, push in along.items():
+            outputs.value(f"{contact.name}.friction", push)
+            outputs.value(f"{contact.name}.friction.{part}", push)
 
 
 def offer_effects(outputs: Outputs, tape: Tape, effects: Iterable[Effect]) -> None:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from mbd.kernel.codes import ACCELERATIONS
 from mbd.kernel.complementarity import complementarity
 from mbd.kernel.cones import hold_directions
+from mbd.kernel.hooks import call
 from mbd.kernel.records import Balance, Complementarity, ContactForces, Contacts, Frictions, Guards
 from mbd.kernel.restart import capture, evaluate, evaluate_loaded, limit_of, row_speed
 
@@ -14,7 +16,10 @@ __all__ = [
 
 
 def prepare(K: Balance) -> None:
-    """K.acc at the instant, directions of sliding where contacts are now, force zero; all frictions begin stuck."""
+    """K.acc at the instant, directions of sliding where contacts are now, force zero; all frictions begin stuck.
+
+    Smooth friction of contacts, where K.rubs says that there is any, takes no part.
+    """
     evaluate(K, K.time, K.q, K.y)
     if K.n_cones > 0:
         hold_directions(K)
@@ -25,6 +30,7 @@ def prepare(K: Balance) -> None:
                 capture(K, c)
         K.given[: K.n_rows] = 0.0
         evaluate(K, K.time, K.q, K.y)
+        K.block[1] = float(K.rubs)
         evaluate_loaded(K, K.given)
         for f in range(K.n_frictions):
             K.base_limit[f] = limit_of(K, f)  # no impulse comes from a force that stays finite
@@ -32,6 +38,9 @@ def prepare(K: Balance) -> None:
             evaluate_loaded(K, K.past)
             for f in range(K.n_frictions):
                 K.past_limit[f] = limit_of(K, f) + (K.past_time - 1.0) * K.base_limit[f]
+    elif K.rubs == 1:  # smooth friction follows forces that stay finite
+        K.block[1] = 1.0
+        call(K, ACCELERATIONS, K.acc)
     start_over(K)
 
 

@@ -137,7 +137,12 @@ def combine(K: DependentRows, row: int, kept: int) -> None:
 
 
 def sharing(K: DependentRows) -> bool:
-    """Whether a friction slides while rows depend on others: then the shares are part of the solve."""
+    """Whether a friction slides while rows depend on others: then the shares are part of the solve.
+
+    Smooth friction of contacts does so all the time.
+    """
+    if K.n_dropped > 0 and K.rubs == 1:
+        return True
     if K.n_dropped > 0:
         for f in range(K.n_frictions):
             if K.slip[f] != 0.0:

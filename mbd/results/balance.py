@@ -92,6 +92,7 @@ class Balance:
     def __init__(self, states: StoredStates) -> None:
         self.states, self.equations = states, states.equations
         self.terms, self.follows = _terms(self.equations)
+        self.rubs = any(getattr(contact, "drags", ()) and contact.rows for contact in self.equations.contacts)
         self._held: dict[bytes, _Held] = {}
 
     @staticmethod
@@ -118,7 +119,7 @@ class Balance:
         """The same in one mode; `mine` are the places of the results."""
         key = mode.tobytes()
         held = self._held[key] if key in self._held else self._held.setdefault(key, self._rows_of(mode))
-        slides = bool(np.any(np.abs(rows.phase) == 1))
+        slides = bool(np.any(np.abs(rows.phase) == 1)) or self.rubs
         turns = MOST_LOADS if self.follows or (held.depend and self.equations.frictions) else 1
         lam = rows.lam
         for _ in range(turns):
@@ -275,7 +276,7 @@ def _terms(equations: Equations) -> tuple[ArrayFunction, bool]:
     """
     if equations.tape not in _KNOWN:
         with equations.tape.lock:
-            nodes = list(getattr(equations, "terms", ())) or programs.accelerations(equations)
+            nodes = list(getattr(equations, "terms", ())) or programs.accelerations(equations, impacts=False)
             follows = any(node.op == "input" and node.data[0] == "lam" for node in live(nodes[: _last_of_R(equations)]))
             _KNOWN[equations.tape] = array_function(nodes), follows
     return _KNOWN[equations.tape]

@@ -25,7 +25,7 @@ class Impulse:
     time : instant of the impact [s]
     event : contact that closed (or opened) then, whose record has it
     name : what took it: that contact, or one that was closed already, or a joint with dry friction
-    part : 'normal', 'friction', or the direction of friction where there are several ('forward', 'sideways')
+    part : 'normal', 'friction', or the direction of friction where there are several ('forward', 'sideways'), 'spin'
     impulse : [unit]; a normal one that pushes is ≥ 0
     unit : 'N s' or 'N m s'
     """
@@ -74,18 +74,20 @@ def impulses_of(events: Sequence[EventRecord], facts: Facts, names: Sequence[str
         stem, _, part = name.rpartition(".")
         if stem.endswith(".friction"):
             directions.setdefault(stem.removesuffix(".friction"), []).append(part)
+    spinning = {name.removesuffix(".spin.torque") for name in names if name.endswith(".spin.torque")}
     torques = {name for name, unit in facts.frictions if unit == "N m"}
     found = Impulses()
     for event in events:
         for name, values in (event.impulses or {event.name: event.impulse}).items():
             if not values.any():
                 continue
-            sides = directions.get(name, [])
-            sides = sides if len(sides) > 1 and len(sides) == len(values) - 1 else ["friction"] * (len(values) - 1)
-            parts = ["normal", *sides] if name in units else ["friction"] * len(values)
+            sides, spin = directions.get(name, []), ["spin"] * (name in spinning)
+            along = len(values) - 1 - len(spin)
+            sides = sides if len(sides) > 1 and len(sides) == along else ["friction"] * along
+            parts = ["normal", *sides, *spin] if name in units else ["friction"] * len(values)
             unit = "N m s" if name in torques or units.get(name) == "rad" else "N s"
             found += [
-                Impulse(event.time, event.name, name, part, float(value), unit)
+                Impulse(event.time, event.name, name, part, float(value), "N m s" if part == "spin" else unit)
                 for part, value in zip(parts, values, strict=True)
             ]
     return found

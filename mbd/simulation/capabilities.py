@@ -90,7 +90,6 @@ WITH_TOLERANCE: dict[tuple[str, str], str] = {
 """Arguments that exclude tol=."""
 
 SPACE: dict[str, str] = {
-    "friction=μ of a Unilateral on a height function": "a mbd.Plane, or friction=None (it sticks) or 0",
     "Rolling without axis=": "axis= of a disk, or mbd.Nonholonomic rows",
 }
 """What is solved in planar models only, and what to use in space instead; refused as the equations are derived."""
@@ -110,6 +109,12 @@ def refusals(equations: Equations, scheme: Integrator, options: Mapping[str, Any
         texts.append(scheme.check_tolerance(len(held)))
         found += [text for (argument, value), text in WITH_TOLERANCE.items() if options.get(argument) == value]
     found += [f"{text} (rows on positions: {_listed(held)})" if held else text for text in texts if text]
+    rubbing = [contact.name for contact in equations.contacts if contact.drags and contact.rows]
+    if rubbing and options.get("contact") == "nonsmooth":
+        found.append(
+            f"contact='nonsmooth' solves friction=μ, and that of {_listed(rubbing)} is a loss, smooth in the velocity; "
+            "use contact='events'"
+        )
     if equations.compose is not None and not scheme.any_chart:
         found.append(f"{scheme!r} moves coordinates along q + x, which {CHARTS}; use mbd.HHT(0.05)")
     return found

@@ -109,6 +109,7 @@ def _effects(findings: Findings, equations: Equations, point: Point) -> None:
     v = _speeds(equations, point)
     for friction in equations.frictions:  # its multiplier opposes the motion, as where it slides
         point = point | {("lam", friction.row): 0.7 * float(np.sign(at([friction.rate], point)[0]))}
+    point = point | dict.fromkeys(_rubbing(equations), -1.3)  # pushes
     for effect in equations.effects:
         force = at(list(effect.generalized()), point)[: equations.n_v]
         exact = 1e-9
@@ -128,9 +129,15 @@ def _effects(findings: Findings, equations: Equations, point: Point) -> None:
                 findings.holds("passivity: losses take energy out", power <= 0.0, sentence, hint)
 
 
+def _rubbing(equations: Equations) -> list[tuple[str, int]]:
+    """Multipliers that smooth friction of contacts follows."""
+    return [("lam", contact.rows[0]) for contact in equations.contacts if contact.drags and contact.rows]
+
+
 def _energy(findings: Findings, equations: Equations, point: Point) -> None:
     """``v · (M a + f) = d(T + V)/dt − Σ P``, for any motion."""
     v = _speeds(equations, point)
+    point = point | dict.fromkeys(_rubbing(equations), 0.0)  # forces of rows are no part of the balance here
     moving = _along(equations, point) | {("v", k): point["a", k] for k in range(equations.n_v)}
     moving |= {("z", k): point["s", k] for k in range(equations.n_z)}
     parts = derivative([equations.kinetic, equations.potential], point, moving)

@@ -177,15 +177,6 @@ def test_a_block_on_three_feet_stops_sliding_and_turning_at_once(scheme, how, bo
         assert np.max(np.diff(total)) < 1e-6
 
 
-def test_what_is_not_solved_in_space_is_refused_by_name():
-    model = mbd.Model("hill")
-    mass = mbd.PointMass("block", mass=2.0)
-    model.connect(mbd.Translation("slide", model.ground.origin, mass.origin, axes="xyz"))
-    model.constrain(mbd.Unilateral("foot", mbd.touchdown(mass.origin, lambda x, z: 0.1 * x * x), friction=0.3))
-    with pytest.raises(mbd.CapabilityError, match="'foot': in space friction is solved on planes.*use mbd.Plane"):
-        mbd.assemble(model)
-
-
 def test_the_plain_twin_a_cut_run_and_a_file_tell_the_same(tmp_path):
     whole = slid(on_incline(), (0.2, 0.3), until=0.5)
     plain = slid(on_incline(), (0.2, 0.3), until=0.5, backend="python")

@@ -149,7 +149,7 @@ def explicit_rates(K: Balance, t: float) -> int:
     """Rates at (q1, y1), in K.jump; where friction follows multipliers by the iteration of `consistent`."""
     n = K.n
     m = K.n_active
-    if K.loaded > 0 and K.n_frictions > 0:
+    if K.loaded > 0 and (K.n_frictions > 0 or K.rubs == 1):
         return consistent(K, t, K.q1, K.y1)
     evaluate(K, t, K.q1, K.y1)
     K.n_residuals += 1

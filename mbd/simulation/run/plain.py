@@ -52,6 +52,7 @@ class MechanismSystem(System):
         self.sticks, self.slip = sticks, slip[: mechanism.layout.n_frictions]  # of frictions
         self.hold = np.zeros(len(self.slip)) if hold is None else hold
         self.pairs = np.array([friction.partner >= 0 for friction in manager.frictions], dtype=bool)
+        self.rubs = any(contact.drags and contact.rows for contact in mechanism.equations.contacts)
         self.evaluated: Vector | None = None  # the inputs evaluated last, to explain a failure with
         layout = mechanism.layout
         self.n_q, self.n_v, self.n_z = layout.n_q, layout.n_v, layout.n_z
@@ -95,7 +96,7 @@ class MechanismSystem(System):
 
     def _given_rows(self, mode: Mode) -> tuple[int, ...]:
         """Rows that act and depend on others, where how loads are shared moves the mechanism: a friction slides."""
-        if not self.slip.any() or not any(self.dropped):
+        if not (self.slip.any() or self.rubs) or not any(self.dropped):
             return ()
         held = self.manager.active_rows(self.manager.flags(mode.closed), self.sticks)
         return tuple(row for row in held if self.dropped[row])

@@ -55,6 +55,7 @@ def follows(equations: Equations) -> int:
     if any(node.op == "input" and node.data[0] == "lam" for node in live(limits)):
         return 1
     rubbing = [equations.contacts[friction.contact] for friction in equations.frictions if friction.contact >= 0]
+    rubbing += [contact for contact in equations.contacts if contact.drags and contact.rows]
     return 2 if any(contact.opens_on == "when" for contact in rubbing) else 0
 
 
@@ -123,6 +124,7 @@ class Stepper:
             n_watched=self.mechanism.sizes["guards"],
             n_judged=layout.n_frictions
             + sum(contact.kind != "penalty" and contact.opens_on == "pull" for contact in self.manager.contacts),
+            rubs=int(any(contact.drags and contact.rows for contact in self.mechanism.equations.contacts)),
             loaded=follows(self.mechanism.equations), impact_law=LAWS.index(options.get("impact", "newton")),
             strategy=int(options.get("contact") == "nonsmooth"), auto=int(options.get("auto", False)),
             vector=int(self.mechanism.vector),
@@ -220,7 +222,7 @@ class Stepper:
         held = self.manager.active_rows(flags, sticks)
         rows = tuple(row for row in held if not dropped[row])
         sliding = tuple(int(f) for f in np.flatnonzero(slip))
-        given_rows = tuple(row for row in held if dropped[row]) if sliding else ()
+        given_rows = tuple(row for row in held if dropped[row]) if sliding or v.rubs else ()
         make = self._maker()
         try:
             code = make(rows, self.manager.penalties(flags), self.stabilized, sliding, given_rows)

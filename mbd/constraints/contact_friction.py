@@ -1,0 +1,60 @@
+"""Friction of a contact as users give it: μ, or a loss per newton of normal force."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from mbd.bodies.values import number
+from mbd.errors import ModelError
+from mbd.joints.losses.base import Loss, LossSum
+from mbd.joints.losses.viscous import Viscous
+from mbd.scope import Scope
+from mbd.tape.functions import sqrt
+from mbd.tape.node import Scalar
+
+__all__ = ["friction_of", "has_dry_part", "resistance"]
+
+LEAST_SQUARE = 1e-60
+"""Square of a speed that is none, beside which a direction is defined [m²/s²]."""
+
+
+def friction_of(value: Any, name: str) -> float | Loss | None:
+    """What a contact's friction may be: None, μ, or a loss of the slip's speed, its force per newton of normal force.
+
+    Raises
+    ------
+    ModelError
+        for anything else, and a loss that follows the force in a joint.
+    """
+    if isinstance(value, Loss):
+        if value.needs_reaction:
+            raise ModelError(
+                f"friction of '{name}': {value!r} follows the force in a joint; friction of a contact follows its "
+                "normal force by itself: give μ, or mbd.Viscous(…)"
+            )
+        return value
+    if value is None:
+        return None
+    return number(value, f"friction of '{name}'")
+
+
+def has_dry_part(loss: Loss) -> bool:
+    """Whether a part of it truly sticks."""
+    parts = loss.losses if isinstance(loss, LossSum) else (loss,)
+    return any(part.smooth is not part for part in parts)
+
+
+def resistance(loss: Loss, push: Scalar, speeds: Sequence[Scalar], scope: Scope, owner: str) -> list[Scalar]:
+    """Forces on the mechanism along one slip, or two that are perpendicular: −p F(‖γ‖) γ/‖γ‖, F of the smooth part."""
+    smooth = loss.smooth
+    if smooth is None:
+        return [0.0 for _ in speeds]
+    if len(speeds) == 1 or isinstance(smooth, Viscous):
+        return [-push * smooth.force(speed, scope, owner) for speed in speeds]
+    square: Scalar = LEAST_SQUARE
+    for speed in speeds:
+        square = square + speed * speed
+    size: Scalar = sqrt(square)
+    part = push * smooth.force(size, scope, owner) / size
+    return [-part * speed for speed in speeds]
