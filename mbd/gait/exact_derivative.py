@@ -54,7 +54,7 @@ def _mirrored(map_: ReturnMap, by_start: Matrix) -> Matrix:
     if map_.mirror is None:
         return by_start
     n_q = len(map_.mirror.q)
-    return np.asarray(by_start[np.concatenate([map_.mirror.q, n_q + map_.mirror.v])])
+    return np.concatenate([map_.mirror.of_q(by_start[:n_q].T).T, map_.mirror.of_v(by_start[n_q:].T).T])
 
 
 def _tangent(chart: Chart, state: State, parameters: Vector) -> Matrix:

@@ -120,8 +120,8 @@ def map_of(
     _require_the_same_later(mechanism, model)
     vector = plain.vector(values)
     if mirror is not None:
-        plain.mirror = mirror_of(mechanism.equations, mirror)
-        require_alike(mechanism, plain.mirror, vector, {**getattr(model, "parameters", {}), **plain.plain(values)})
+        own = {**getattr(model, "parameters", {}), **plain.plain(values)}
+        plain.mirror = require_alike(mechanism, mirror_of(mechanism.equations, mirror), vector, own, model)
     plain.fixed = moving_on(mechanism, vector) if modulo is None else increments_named(mechanism, modulo)
     return plain
 

@@ -90,7 +90,7 @@ class Walks:
         at = self._at_y + 2 * run.n + run.n_rows
         closed, anchors = row[:, at : at + run.n_contacts], ends.anchors
         if mirror is not None:
-            q, v, z, anchors = q[:, mirror.q], v[:, mirror.v], z[:, mirror.z], anchors[:, mirror.anchors]
+            q, v, z, anchors = mirror.of_q(q), mirror.of_v(v), z[:, mirror.z], mirror.of_anchors(anchors)
         armed = ends.armed[:, self._contacts]
         return np.hstack([np.zeros((len(row), 1)), q, v, z, anchors, closed[:, self._contacts], armed])
 
