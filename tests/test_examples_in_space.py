@@ -11,7 +11,7 @@ from scipy.integrate import quad
 from scipy.special import ellipk
 
 from mbd.joints.quaternions import rotation_of
-from tests.test_examples import g, run_of, zeros
+from tests.test_examples import g, run_of, script, zeros
 
 
 def test_a_racket_turns_over_when_euler_says_so() -> None:
@@ -58,3 +58,22 @@ def test_a_top_nods_between_the_roots_of_its_cubic_and_goes_round() -> None:
     assert turned[:, 1] / 0.12 == pytest.approx(released, abs=1e-5)
     round_ = np.unwrap(np.arctan2(turned[:, 0], turned[:, 2]))
     assert np.diff(round_) == pytest.approx(round_a_nod, rel=1e-3)
+
+
+def test_a_walker_rocks_stably_forward_and_falls_to_the_side() -> None:
+    gait = script("walker-in-space")["gait"]
+    sizes = np.abs(gait.multipliers)
+    assert np.sum(sizes > 1.0) == 1 and sizes[1:].max() < 0.55  # Kuo 1999: one mode, to the side
+    lateral = gait.modes[0]
+    assert abs(lateral["roll.angle.rate"]) > 3.0 * abs(lateral["left hip.angle.rate"])
+    assert gait.multipliers[0].real == pytest.approx(-9.46593, rel=1e-4)
+    assert (gait.period, gait.distance) == pytest.approx((0.7512633, 0.6320907), rel=1e-5)
+    pendulum = math.sqrt(g * math.cos(0.03) / 1.0)  # to the side, of the leg's length over the edge of the foot
+    tip = 0.1 * math.tanh(0.5 * pendulum * gait.period) * pendulum
+    assert abs(gait.state["roll.angle.rate"]) == pytest.approx(tip, rel=0.1)
+    run = run_of("walker-in-space")
+    strikes = [event.time for event in run.events if event.kind == "closed"]
+    assert np.diff([0.0, *strikes]) == pytest.approx(gait.period, rel=1e-6)
+    lost = gait.energy["impact"]
+    assert -lost == pytest.approx(69.1 * g * math.sin(0.03) * gait.distance, rel=1e-9)  # what the slope gives
+    assert run["roll.angle"].min() < -0.01 < 0.01 < run["roll.angle"].max()

@@ -113,7 +113,7 @@ class Continuation:
             tangent = tangent if float(tangent @ lifted) >= 0.0 else -tangent
         size, arrival = chart.size, corrected.found.arrival
         return BranchPoint(
-            corrected.value, corrected.state, arrival.period, way_of(arrival), arrival.steps,
+            corrected.value, corrected.state, arrival.period, way_of(self.map, arrival), arrival.steps,
             multipliers_of(derivative.matrix[:size, :size], derivative.error[:size, :size]), tangent, matrix, chart,
             arrival.events,
         )  # fmt: skip
@@ -172,10 +172,10 @@ class Continuation:
         return None if derivative.missing else self._matrix(derivative, chart.size)
 
 
-def way_of(arrival: Arrival) -> float:
+def way_of(map_: ReturnMap, arrival: Arrival) -> float:
     """The way of one application [m]; the sum of its steps where no coordinate tells it, NaN without steps."""
     if len(arrival.travel):
-        return float(np.linalg.norm(arrival.travel))
+        return float(np.linalg.norm(map_.forward * arrival.travel))
     lengths = [length for _, _, length in arrival.steps]
     return float(np.sum(lengths)) if lengths else float("nan")
 

@@ -163,11 +163,14 @@ class LimitCycle:
     def trivial(self) -> dict[str, Any]:
         """Multipliers that say nothing about stability, by cause.
 
-        'translation' (1): along the coordinates that the walker moves on along; 'time' (0 on the section): along the
-        motion; 'energy' (1): where nothing takes any; 'forgotten' (0): what impacts and resets leave no trace of.
+        'translation' (1): along the coordinates that the walker moves on along, −1 to the side of a walker that is
+        mirrored in space; 'time' (0 on the section): along the motion; 'energy' (1): where nothing takes any;
+        'forgotten' (0): what impacts and resets leave no trace of.
         """
         names = self.chart.section.mechanism.equations.configuration.freedoms
-        found: dict[str, Any] = {f"translation {names[k][0]}": 1.0 for k in self.chart.section.fixed}
+        turned = self.map.turned**self.strides
+        along = zip(self.chart.section.fixed, turned, strict=True)
+        found: dict[str, Any] = {f"translation {names[k][0]}": float(sign) for k, sign in along}
         return {**found, "time": 0.0, **self.stability_of.trivial}
 
     @property

@@ -98,7 +98,7 @@ def _implicit(gait: Any, name: str) -> dict[str, float]:
     size, ways = gait.chart.size, len(gait.map.fixed)
     period, travel = float(numbers[size]), numbers[size + 1 : size + 1 + ways]
     times, lengths = numbers[size + 1 + ways :: 2], numbers[size + 2 + ways :: 2]
-    way = gait.way
+    way = gait.map.forward * gait.way
     distance = float(way @ travel / np.linalg.norm(way)) if np.any(way) else float("nan")
     found = {"period": period, "distance": distance, "speed": (distance - gait.speed * period) / gait.period}
     feet = [foot for foot, _, _ in gait.steps]

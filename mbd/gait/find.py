@@ -160,7 +160,8 @@ def find_gait(
     Parameters
     ----------
     model : a `Model` or `Lagrangian`
-    position, velocity : of the starts, as for `mbd.assemble`; a pair (low, high) in the place of a value is varied
+    position, velocity : of the starts, as for `mbd.assemble`; a pair (low, high) in the place of a number is varied;
+        orientations and vectors stay as they are, components of angular velocities may vary
     integrator, section, mirror, strides, dt, tol, functions, modulo, longest, backend : as for `mbd.limit_cycle`
     closed, open : contacts that start closed, and open, as for `mbd.assemble`
     tries : how many starts
@@ -234,8 +235,14 @@ def _varied(groups: Mapping[str, Any], tries: Any, design: Any, seed: Any) -> tu
                 ranges.append((group, name, (float(value[0]), float(value[1]))))
             elif is_finite_number(value):
                 fixed[group][name] = float(value)
+            elif group != "parameters" and not pair and _is_whole(value):
+                fixed[group][name] = value
             else:
-                faults.append(f"{group}: {name!r} must be a number or a pair (low, high), not {shown(value)}")
+                faults.append(
+                    f"{group}: {name!r} must be a number or a pair (low, high)"
+                    + ("" if group == "parameters" else ", or an orientation or a vector as a whole")
+                    + f", not {shown(value)}"
+                )
     if isinstance(tries, bool) or not isinstance(tries, int) or not 1 <= tries <= MOST_TRIES:
         faults.append(f"tries must be a whole number from 1 to {MOST_TRIES}, not {shown(tries)}")
     if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
@@ -245,6 +252,13 @@ def _varied(groups: Mapping[str, Any], tries: Any, design: Any, seed: Any) -> tu
     if faults:
         raise ModelError(faults)
     return fixed, ranges
+
+
+def _is_whole(value: Any) -> bool:
+    """Whether it is an orientation or a vector, which `mbd.assemble` judges: three numbers or more, a rotation."""
+    if hasattr(value, "as_quat"):
+        return True
+    return isinstance(value, tuple | list | np.ndarray) and len(value) >= 3
 
 
 def _points(size: int, tries: int, design: str, seed: int) -> Matrix:

@@ -13,7 +13,10 @@ from mbd.arrays import Matrix
 __all__ = ["Multipliers", "multipliers_of"]
 
 FORGOTTEN = 1e-7
-"""Singular value of P relative to its largest below which the map forgets a direction [-]."""
+"""Singular value of P relative to its largest, or to `LARGE`, below which the map forgets a direction [-]."""
+LARGE = 100.0
+"""Largest singular value beyond which the errors of P alone tell what a map forgets: strongly unstable gaits have
+large ones and, with them, small ones that are no zeros [-]."""
 ENERGY = 1e-6
 """Misfit of ``∇E P = ∇E`` relative to ∇E up to which energy is kept along the cycle [-]."""
 MARGINAL = 1e-6
@@ -58,9 +61,10 @@ def multipliers_of(P: Matrix, error: Matrix, energy: Matrix | None = None) -> Mu
     size = len(P)
     if not size:
         return Multipliers(np.zeros(0, complex), np.zeros((0, 0), complex), {}, 0.0)
-    U, sizes, _ = np.linalg.svd(P)
-    doubt = float(np.nanmax(np.where(np.isfinite(error), error, 0.0), initial=0.0))
-    rank = int(np.sum(sizes > max(FORGOTTEN * float(sizes[0]), 10.0 * doubt)))
+    U, sizes, V = np.linalg.svd(P)
+    errors = np.where(np.isfinite(error), error, 0.0)
+    doubt, doubts = float(np.max(errors)), np.einsum("ik,ij,kj->k", np.abs(U), errors, np.abs(V))
+    rank = int(np.sum(sizes > np.maximum(FORGOTTEN * min(float(sizes[0]), LARGE), 10.0 * doubts)))
     basis = U[:, :rank]
     values, vectors = np.linalg.eig(basis.T @ P @ basis)
     modes = basis @ vectors

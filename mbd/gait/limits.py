@@ -141,5 +141,5 @@ def _point(given: Continuation, last: BranchPoint, corrected: Corrected | None) 
         )
         return replace(
             last, value=corrected.value, state=corrected.state, period=arrival.period, steps=arrival.steps,
-            distance=way_of(arrival), multipliers=nothing,
+            distance=way_of(given.map, arrival), multipliers=nothing,
         )  # fmt: skip

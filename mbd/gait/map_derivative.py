@@ -28,6 +28,8 @@ LEVELS = 3
 """Differences of each direction at most: h, 2h, 4h."""
 ENOUGH, CLOSER = 1e-9, 0.125
 """Error estimate, relative to 1 or the derivative, above which smaller differences are tried, and how much smaller."""
+POOR = 1e-8
+"""Error estimate, relative to 1 or the derivative, above which they are tried once more [-]."""
 SHRINK, TRIES = 0.1, 4
 """Factor of h where a run beside the base does not arrive, and how often."""
 
@@ -149,8 +151,12 @@ class _Column:
         if last is not None:
             better = found[1] < last[1]
             found = np.where(better, found[0], last[0]), np.where(better, found[1], last[1])
-        good = bool(np.all(found[1] <= ENOUGH * np.maximum(1.0, np.abs(found[0]))))
-        self.best, self.done = found, len(slopes) == 1 or last is not None or good
+        limits = np.maximum(1.0, np.abs(found[0]))
+        if last is None:
+            good = bool(np.all(found[1] <= ENOUGH * limits))
+        else:
+            good = not bool(np.any(found[1] > POOR * limits))
+        self.best, self.done = found, len(slopes) == 1 or good
         self.step *= CLOSER
 
 

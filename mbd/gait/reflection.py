@@ -2,8 +2,8 @@
 
 A reflection σ across x, y or z takes a placement (R, p) to (σ R σ, σ p), a linear velocity v to σ v and an angular
 velocity ω, an axial vector, to −σ ω. A joint whose partner on the other side moves by the mirrored twist for each of
-its velocities, or by the opposite of it, exchanges coordinates with it up to signs: hinges across the plane keep theirs,
-those along it turn the other way, quaternions (w, x, y, z) follow their angular velocities.
+its velocities, or by the opposite of it, exchanges coordinates with it up to signs: hinges across the plane keep
+theirs, those along it turn the other way, quaternions (w, x, y, z) follow their angular velocities.
 """
 
 from __future__ import annotations

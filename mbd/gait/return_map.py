@@ -109,8 +109,33 @@ class ReturnMap:
         self.manager = manager_of(self.mechanism, self.vector(self.values))
         places = {contact.name: contact.place for contact in Facts.of(self.mechanism.equations).contacts}
         self.penalties = {contact.name for contact in self.manager.contacts if contact.kind == "penalty"}
+        places = {name: place or self._center(name) for name, place in places.items()}
         self.feet = {name: place for name, place in places.items() if place}
         self._repeated: dict[tuple[float, float] | None, RepeatedRun] = {}
+
+    def _center(self, contact: str) -> str:
+        """The middle of the disk or ball of a contact; '' where it has none that is among the results."""
+        words = [word for word in getattr(self.model, "constraints", ()) if word.name == contact]
+        center = getattr(getattr(words[0], "measure", None), "center", None) if words else None
+        name = str(getattr(center, "full_name", ""))
+        return name if f"{name}.x" in self.mechanism.equations.output_names() else ""
+
+    @property
+    def turned(self) -> Vector:
+        """For each coordinate that the walker moves on along, −1 where its mirror image goes the other way."""
+        reflection = None if self.mirror is None else self.mirror.reflection
+        return np.ones(len(self.fixed)) if reflection is None else reflection.v[list(self.fixed)]
+
+    @property
+    def forward(self) -> Vector:
+        """For each of these 0 where an application and the next, mirrored, cancel: to the side; else 1."""
+        return np.where((self.turned < 0.0) & (self.strides % 2 == 1), 0.0, 1.0)
+
+    def ahead(self, way: Vector) -> Vector:
+        """A vector (3,) without its part across the plane in which the walker is mirrored."""
+        if self.mirror is None or self.mirror.reflection is None:
+            return way
+        return np.where(np.array(list("xyz")) == self.mirror.reflection.axis, 0.0, way)
 
     # parameters ---------------------------------------------------------------------------------------------------
     def plain(self, values: Values) -> dict[str, float]:
@@ -158,7 +183,7 @@ class ReturnMap:
         found = self._steps(end, moved, places[1])
         walk.steps += [(self._named(name, odd), walk.period + t, length) for name, t, length in found]
         walk.events += [(self._named(e.name, odd), e.kind) for e in end.events if e.name not in self.penalties]
-        walk.period, walk.travel = walk.period + after.time, walk.travel + moved
+        walk.period, walk.travel = walk.period + after.time, walk.travel + (self.turned * moved if odd else moved)
         state = replace(after, time=0.0, moved={}, parameters={})
         walk.state = self.mirror.state(state) if self.mirror is not None else state
 
@@ -201,9 +226,9 @@ class ReturnMap:
         last = end.state is not None and self.section in self.feet and end.stopped_by == self.section
         if last and end.state is not None and strikes and len(stance) == 1 and len(strikes) <= 2:
             apart = places[self.section] - places[stance[0]]
-            lengths[-1] = float(np.linalg.norm(apart))
+            lengths[-1] = float(np.linalg.norm(self.ahead(apart)))
             if len(strikes) == 2:
-                lengths[0] = float(np.linalg.norm(moved)) - lengths[-1]
+                lengths[0] = float(np.linalg.norm(self.forward * moved)) - lengths[-1]
         return [(event.name, event.time, length) for event, length in zip(strikes, lengths, strict=True)]
 
     def _feet_at(self, state: State, values: Values) -> dict[str, Vector]:

@@ -134,8 +134,9 @@ def gait_at(given: Search, point: FixedPoint, values: Values) -> LimitCycle:
     return LimitCycle(
         getattr(map_.model, "name", ""), map_.section, None if map_.mirror is None else map_.mirror.sides, map_.strides,
         point.state, point.outcome, tuple(point.attempts), arrival.period if arrival and good else float("nan"),
-        _distance(way, arrival) if good else float("nan"), arrival.steps if arrival and good else (), residual,
-        tuple(point.residuals), multipliers, derivative, dict(values), map_.dt, map_.runs, chart, map_, way, given,
+        _distance(map_.forward * way, arrival) if good else float("nan"), arrival.steps if arrival and good else (),
+        residual, tuple(point.residuals), multipliers, derivative, dict(values), map_.dt, map_.runs, chart, map_, way,
+        given,
     )  # fmt: skip
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,7 +18,7 @@ from mbd.simulation.run.many import start_line
 from mbd.simulation.run.run import Run
 from mbd.state import State
 
-__all__ = ["Columns", "Starts", "columns_of", "given_starts", "starts_of"]
+__all__ = ["Columns", "Starts", "columns_of", "given_starts", "places_of", "raise_for_turning", "starts_of"]
 
 Columns = Mapping[str, Vector]
 """Numbers of each run by name (N,)."""
@@ -67,6 +67,17 @@ def places_of(mechanism: Mechanism) -> dict[str, int]:
     rates = {name: equations.n_q + k for name, k in rate_names(equations).items() if name not in names}
     states = {state.name: equations.n_q + equations.n_v + k for k, state in enumerate(equations.states)}
     return {**rates, **states, **names}
+
+
+def raise_for_turning(what: str, names: Collection[str], mechanism: Mechanism, instead: str) -> None:
+    """Raise a `ModelError` for names of parts of a quaternion, which one by one are no orientation."""
+    configuration = mechanism.equations.configuration
+    own = {configuration.names[place] for place in configuration.places if place >= 0}
+    parts = [name for name in names if name in configuration.names and name not in own]
+    if parts:
+        listed = ", ".join(map(repr, parts))
+        raise ModelError(f"{what}: {listed} {'is a part' if len(parts) == 1 else 'are parts'} of a quaternion, and a "
+                         f"column of it alone is no orientation; {instead}")  # fmt: skip
 
 
 def columns_of(values: Any, what: str, count: int | None = None) -> tuple[dict[str, Vector], list[str]]:
@@ -156,10 +167,7 @@ def starts_of(
     wrong = [nearest(name, places, "coordinate or rate", "There are") for name in columns if name not in places]
     if wrong:
         raise UnknownNameError([f"starts: {each}" for each in wrong])
-    if columns and not mechanism.vector:
-        raise ModelError(
-            "starts: coordinates of this model do not add, so columns cannot give them; give a list of states"
-        )
+    raise_for_turning("starts", columns, mechanism, "give a list of states")
     for name, column in columns.items():
         if np.max(np.abs(column), initial=0.0) > LARGEST_ANGLE:
             raise ModelError(f"starts: {name!r} has values beyond {LARGEST_ANGLE:g}; take whole turns away")

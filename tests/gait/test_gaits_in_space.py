@@ -1,0 +1,234 @@
+"""Gaits in space: quaternions on the section, reflections, and walkers of the plane among those of space."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
+
+import mbd
+
+g = 9.81
+SIDES = ("left", "right")
+
+
+# a rimless wheel that may lean and turn -------------------------------------------------------------------------------
+SPOKES, HALF = 8, math.pi / 8
+
+
+@cache
+def rimless_wheel() -> mbd.Model:
+    """Spokes of 1 m and a hub that turns freely, down a slope."""
+    model = mbd.Model("rimless wheel", gravity=mbd.on_slope(0.15, g))
+    wheel = mbd.RigidBody("wheel", 1.0, (0.21, 0.22, 0.41))
+    model.connect(mbd.Free("hub", model.ground.origin, wheel.origin))
+    for k in range(SPOKES):
+        angle = 2.0 * HALF * k
+        tip = wheel.point(math.sin(angle), -math.cos(angle), 0.0, name=f"tip {k}")
+        release = mbd.When(f"spoke {(k + 1) % SPOKES}")
+        model.constrain(mbd.Unilateral(f"spoke {k}", mbd.touchdown(tip), release=release))
+    return model
+
+
+def wheel_step(slope: float, inertia: tuple[float, float, float], mass: float) -> Any:
+    """One step of the wheel, (R, ω) → (R, ω) in body axes, spokes numbered anew: Euler's equations about the tip, and
+    the angular momentum about the next tip kept at its strike (M. J. Coleman, A. Chatterjee & A. Ruina, Dynamics and
+    Stability of Systems 12 (1997) 139).
+    """
+    center, down = np.diag(inertia), g * np.array([math.sin(slope), -math.cos(slope), 0.0])
+    now, then = np.array([0.0, -1.0, 0.0]), np.array([math.sin(2 * HALF), -math.cos(2 * HALF), 0.0])
+    about = {k: center + mass * (np.eye(3) - np.outer(r, r)) for k, r in enumerate((now, then))}
+    renumber = Rotation.from_rotvec([0.0, 0.0, 2 * HALF]).as_matrix()
+
+    def rates(t: float, y: Any) -> Any:
+        R, w = y[:9].reshape(3, 3), y[9:]
+        x = np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
+        moment = np.cross(-now, mass * R.T @ down) - np.cross(w, about[0] @ w)
+        return np.concatenate([(R @ x).ravel(), np.linalg.solve(about[0], moment)])
+
+    def strike(t: float, y: Any) -> Any:
+        return y[3:6] @ (then - now)
+
+    strike.terminal, strike.direction = True, -1  # type: ignore[attr-defined]
+
+    def step(R: Any, w: Any) -> tuple[Any, Any]:
+        begin = np.concatenate([R.ravel(), w])
+        run = solve_ivp(rates, (0.0, 20.0), begin, method="DOP853", rtol=1e-11, atol=1e-12, events=strike)
+        R, w = run.y[:9, -1].reshape(3, 3), run.y[9:, -1]
+        w = np.linalg.solve(about[1], center @ w - mass * np.cross(then, np.cross(w, -now)))
+        return R @ renumber, renumber.T @ w
+
+    return step
+
+
+def wheel_multipliers(slope: float, inertia: tuple[float, float, float], mass: float, rate: float) -> Any:
+    """Of one step, from differences of the step above by lean, heading and ω."""
+    step, base = wheel_step(slope, inertia, mass), Rotation.from_rotvec([0.0, 0.0, HALF]).as_matrix()
+    left = np.array([-math.sin(2 * HALF), 1.0 - math.cos(2 * HALF), 0.0])
+
+    def state(c: Any) -> tuple[Any, Any]:
+        turned = Rotation.from_rotvec([c[0], c[1], 0.0]).as_matrix() @ base
+        roll = brentq(lambda a: (turned @ Rotation.from_rotvec([0, 0, a]).as_matrix() @ left)[1], -0.2, 0.2, xtol=1e-15)
+        return turned @ Rotation.from_rotvec([0.0, 0.0, roll]).as_matrix(), c[2:] + np.array([0.0, 0.0, rate])
+
+    def numbers(R: Any, w: Any) -> Any:
+        axle = R[:, 2]  # exp(c) z = z + c × z at first order, and exactly by the angle
+        size = math.hypot(axle[0], axle[1]) or 1.0
+        part = math.atan2(size, axle[2]) / size
+        return np.concatenate([[-part * axle[1], part * axle[0]], w - [0.0, 0.0, rate]])
+
+    def slope_of(h: float) -> Any:
+        ends = [[numbers(*step(*state(sign * h * unit))) for sign in (1, -1)] for unit in np.eye(5)]
+        return np.array([(ahead - behind) / (2.0 * h) for ahead, behind in ends]).T
+
+    return np.linalg.eigvals((4.0 * slope_of(1e-4) - slope_of(2e-4)) / 3.0)
+
+
+@cache
+def wheel_gait(slope: float, inertia: tuple[float, float, float], mass: float) -> tuple[mbd.LimitCycle, float]:
+    """The wheel's steady roll, and its rate just after a strike."""
+    kept = (inertia[2] + mass * math.cos(2 * HALF)) / (inertia[2] + mass)
+    gained = 4.0 * mass * g * math.sin(HALF) * math.sin(slope) / (inertia[2] + mass)
+    rate = -kept * math.sqrt(gained / (1.0 - kept**2))
+    values = {"gravity.x": g * math.sin(slope), "gravity.y": -g * math.cos(slope), "wheel.mass": mass}
+    values |= {f"wheel.inertia.{axis}{axis}": float(value) for axis, value in zip("xyz", inertia, strict=True)}
+    start = mbd.assemble(
+        rimless_wheel(), closed="spoke 0", parameters=values,
+        position={"hub.y": math.cos(HALF), "hub.orientation": ((0, 0, 1), HALF)},
+        velocity={"hub.angular_velocity.z": 0.97 * rate},
+    )  # fmt: skip
+    return mbd.limit_cycle(rimless_wheel(), start, section="spoke 0", parameters=values), rate
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_rimless_wheel_leans_and_turns_as_euler_says(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    slope, mass = random.uniform(0.2, 0.3), random.uniform(0.8, 1.5)
+    across, along = random.uniform((0.2, 0.3), (0.3, 0.4))
+    inertia = (float(across), float(across), float(along))
+    gait, rate = wheel_gait(slope, inertia, mass)
+    assert gait.state.v[5] == pytest.approx(rate, rel=1e-10)
+    once = wheel_multipliers(slope, inertia, mass, rate)
+    key = lambda value: (-abs(value), value.imag)  # noqa: E731
+    expected = sorted(once**SPOKES, key=key)
+    assert np.array(sorted(gait.multipliers, key=key)) == pytest.approx(np.array(expected), rel=2e-5, abs=1e-6)
+    kept = (inertia[2] + mass * math.cos(2 * HALF)) / (inertia[2] + mass)
+    assert np.min(np.abs(gait.multipliers - kept ** (2 * SPOKES))) < 1e-9  # as it rolls in its plane
+    assert np.min(np.abs(gait.multipliers - 1.0)) < 1e-6  # on a slope it rolls along any heading
+    assert set(gait.trivial) >= {"translation hub.x", "translation hub.z"}
+
+
+# a walker with hips of a width ----------------------------------------------------------------------------------------
+@cache
+def rocking(width: float = 0.2, across: int = 2) -> mbd.Model:
+    """Straight legs with disk feet under a pelvis that rolls, as A. D. Kuo (Int. J. Robotics Res. 18 (1999) 917) has
+    three freedoms in stance. `across` is the axis to the side: z, or y with z down.
+    """
+
+    def way(x: float, y: float, z: float) -> Any:
+        return (x, y, z) if across == 2 else (x, z, -y)
+
+    slope, down = 0.03, way(0.0, -1.0, 0.0)
+    gravity = np.array([g * math.sin(slope), 0.0, 0.0]) + g * math.cos(slope) * np.array(down)
+    model = mbd.Model("rocking walker", gravity=tuple(map(float, gravity)))
+    ground, side = mbd.Plane(normal=way(0, 1, 0)), way(0, 0, 1)
+    hip, pelvis = mbd.PointMass("hip", 0.68), mbd.RigidBody("pelvis", 0.001, (0.002, 0.002, 0.002))
+    model.connect(mbd.Translation("trunk", model.ground.origin, hip.origin, axes="xyz"))
+    model.connect(mbd.Revolute("roll", hip.origin, pelvis.origin, axis=(1, 0, 0)))
+    moments, center = tuple(map(abs, way(0.0064, 0.0005, 0.0064))), way(0.0, -0.355, 0.0)
+    legs = {each: mbd.RigidBody(f"{each} leg", 0.16, moments, center=center) for each in SIDES}
+    feet = {each: legs[each].point(*way(0.0, -0.7, 0.0), name="arch") for each in SIDES}
+    for mine, other, z in ((*SIDES, -1.0), (*SIDES[::-1], 1.0)):
+        ahead = mbd.measure(lambda this, that: this[0] - that[0] - 0.1, feet[mine], feet[other])
+        socket = pelvis.point(*way(0.0, 0.0, z * 0.5 * width), name=f"{mine} socket")
+        model.connect(mbd.Revolute(f"{mine} hip", socket, legs[mine].origin, axis=side))
+        edge = mbd.disk_touchdown(feet[mine], 0.3, side, ground)
+        release = mbd.When(f"{other} foot")
+        model.constrain(mbd.Unilateral(f"{mine} foot", edge, friction=0, release=release, only_while=ahead))
+        model.constrain(mbd.Rolling(f"{mine} grip", feet[mine], 0.3, ground, f"{mine} foot", axis=side))
+    return model
+
+
+@cache
+def rocking_gait(width: float = 0.2, across: int = 2, mirrored: bool = True) -> mbd.LimitCycle:
+    """Its slow walk."""
+    model = rocking(width, across)
+    start = mbd.assemble(
+        model, closed="left foot",
+        position={"left hip.angle": 0.326, "right hip.angle": -0.317, "roll.angle": -0.0099},
+        velocity={"left hip.angle": -1.127, "right hip.angle": -0.560, "roll.angle": -0.2544},
+    )  # fmt: skip
+    if mirrored:
+        return mbd.limit_cycle(model, start, section="right foot", mirror=SIDES)
+    return mbd.limit_cycle(model, rocking_gait(width, across).state, section="left foot")
+
+
+def test_a_walker_rocks_and_one_lateral_mode_grows() -> None:
+    gait = rocking_gait()
+    sizes = np.abs(gait.multipliers)
+    assert np.sum(sizes > 1.0) == 1 and sizes[1] < 0.6
+    assert gait.multipliers[0].imag == 0.0 and gait.multipliers[0].real < -5.0  # it falls to the side, turn about
+    fastest = max(gait.modes[0], key=lambda name: abs(gait.modes[0][name]))
+    assert fastest in ("roll.angle.rate", "trunk.z.rate")
+    assert gait.trivial["translation trunk.z"] == -1.0 and gait.trivial["translation trunk.x"] == 1.0
+    assert gait.cost_of_transport == pytest.approx(math.sin(0.03) / 1.0, rel=1e-9)
+    assert max(gait.residual.values()) < 1e-10
+
+
+def test_a_stride_of_two_sides_is_a_mirrored_step_twice() -> None:
+    step, stride = rocking_gait(), rocking_gait(mirrored=False)
+    assert stride.period == pytest.approx(2.0 * step.period, rel=1e-10)
+    assert stride.distance == pytest.approx(2.0 * step.distance, rel=1e-10)
+    squares = sorted(np.abs(step.multipliers) ** 2)
+    assert sorted(np.abs(stride.multipliers)) == pytest.approx(squares, rel=1e-5, abs=1e-7)
+
+
+def test_a_gait_found_repeats_itself_in_a_run() -> None:
+    gait = rocking_gait()
+    run = gait.walk(1)
+    again, here = gait.map.mirror.state(run.final), gait.state
+    assert np.max(np.abs(again.v - here.v)) < 1e-10
+    moved = [k for k in range(len(here.q)) if k not in gait.chart.section.fixed]
+    assert np.max(np.abs((again.q - here.q)[moved])) < 1e-10
+
+
+def test_the_axis_to_the_side_is_found() -> None:
+    one, other = rocking_gait(), rocking_gait(across=1)
+    assert (one.map.mirror.reflection.axis, other.map.mirror.reflection.axis) == ("z", "y")
+    assert other.period == pytest.approx(one.period, rel=1e-10)
+    assert np.abs(other.multipliers) == pytest.approx(np.abs(one.multipliers), rel=1e-6)
+
+
+# the plane in space ---------------------------------------------------------------------------------------------------
+def compass(spatial: bool) -> mbd.LimitCycle:
+    """A compass gait in the plane, or on the same hinges with a hip that may also lean, turn and move to the side."""
+    model = mbd.Model("compass", gravity=mbd.on_slope(math.radians(3.0)))
+    hip = mbd.PointMass("hip", 10.0)
+    legs = {side: mbd.RigidBody(f"{side} leg", 5.0, (0.02, 0.01, 0.02), center=(0.0, -0.5, 0.0)) for side in SIDES}
+    feet = {side: legs[side].point(0.0, -1.0, 0.0, name="foot") for side in SIDES}
+    model.connect(mbd.Translation("trunk", model.ground.origin, hip.origin, axes="xyz" if spatial else "xy"))
+    model.connect((mbd.Spherical if spatial else mbd.Revolute)("leg", hip.origin, legs["left"].origin))
+    model.connect(mbd.Revolute("hinge", legs["left"].origin, legs["right"].origin))
+    for side, other in (SIDES, SIDES[::-1]):
+        ahead = mbd.measure(lambda this, that: this[0] - that[0] - 0.1, feet[side], feet[other])
+        rule = {"release": mbd.When(f"{other} foot"), "only_while": ahead}
+        model.constrain(mbd.Unilateral(f"{side} foot", mbd.touchdown(feet[side]), **rule))
+    turn = {"leg.orientation": ((0, 0, 1), 0.27)} if spatial else {"leg.angle": 0.27}
+    spin = {"leg.angular_velocity.z": -1.1} if spatial else {"leg.angle": -1.1}
+    start = mbd.assemble(model, {**turn, "hinge.angle": -0.54}, {**spin, "hinge.angle": 0.7}, closed="left foot")
+    return mbd.limit_cycle(model, start, section="left foot")
+
+
+def test_a_walker_of_the_plane_walks_in_space() -> None:
+    flat, free = compass(False), compass(True)
+    assert free.period == pytest.approx(flat.period, rel=1e-8)
+    assert free.distance == pytest.approx(flat.distance, rel=1e-8)
+    for value in flat.multipliers:
+        assert np.min(np.abs(free.multipliers - value)) < 1e-6
+    assert len(free.multipliers) > len(flat.multipliers)
