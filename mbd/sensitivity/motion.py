@@ -13,18 +13,31 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.sensitivity.programs import Columns, State
 
-__all__ = ["Mode", "Motion", "Rates", "Tangent", "solved"]
+__all__ = ["Mode", "Motion", "Rates", "Tangent", "reach", "solved"]
 
 
 @dataclass(frozen=True)
 class Mode:
-    """What acts: numbers of the rows that do not depend on others, of all that act; closed; signs of sliding."""
+    """What acts: numbers of the rows that do not depend on others, of all that act; closed; signs of sliding.
+
+    turns : whether a friction slides in a plane in space, whose force turns with its velocity
+    """
 
     rows: tuple[int, ...]
     held: tuple[int, ...]
     closed: Vector
     switch: Vector
     slip: Vector
+    turns: bool = False
+
+
+NEAR = 1e-6
+"""Largest rate of differences where forces turn with a velocity that may be small [m/s², rad/s²]."""
+
+
+def reach(mode: Mode) -> float:
+    """The largest rate of differences along a position correction; forces are all but linear along it, or near it."""
+    return NEAR if mode.turns else 1.0
 
 
 @dataclass(frozen=True)

@@ -75,9 +75,10 @@ class NewmarkRows(SchemeSteps):
         rows = self.rows.step_to(row, motion, memory.rates)
         end, after = self._step(motion, memory, mode, rows, dh)
         ahead = self.rows.record.time[row + 1 :]
-        if not (len(ahead) and self.rows.is_fixed(row)):
+        if not len(ahead) or not (np.any(dh) or self.rows.is_fixed(row)):
             return end, after
-        self._check_growth(end.t, h, float(ahead[0]) - end.t, mode)
+        if self.rows.is_fixed(row):
+            self._check_growth(end.t, h, float(ahead[0]) - end.t, mode)
         return end, after_size(after, float(ahead[0]) - end.t, dh)
 
     def _check_growth(self, time: float, h: float, following: float, mode: Mode) -> None:

@@ -19,7 +19,7 @@ from mbd.sensitivity.balance import consistent_rates
 from mbd.sensitivity.entries import stacked, system
 from mbd.sensitivity.kernel.build import entry
 from mbd.sensitivity.kernel.radau import radau_steps
-from mbd.sensitivity.motion import Mode, Motion, Rates, solved
+from mbd.sensitivity.motion import Mode, Motion, Rates, reach, solved
 from mbd.sensitivity.programs import Columns, Programs
 from mbd.sensitivity.run_data import Rows, refused
 from mbd.sensitivity.schemes import Memory, SchemeSteps
@@ -290,7 +290,7 @@ def taken(
     X, by_size, block = np.zeros((size, w)), np.zeros(w), np.zeros(programs.layout.size)
     by_size[:width] = dh
     programs.fill(block, motion.at(mode, rate[0], lam[0]))
-    numbers = np.concatenate([RADAU.c, np.ravel(RADAU.A), np.ravel(SQUARE), [RADAU.real]])
+    numbers = np.concatenate([RADAU.c, np.ravel(RADAU.A), np.ravel(SQUARE), [RADAU.real, reach(mode)]])
     outputs = level.outputs
     done = entry(radau_steps)(
         [known.function, level.function, *programs.charts.programs()], programs.values,

@@ -34,6 +34,7 @@ from mbd.sensitivity.resets import after_reset
 from mbd.sensitivity.run_data import RunRows, refused
 from mbd.sensitivity.runge_kutta import RungeKuttaSteps
 from mbd.sensitivity.schemes import Memory, SchemeSteps, is_at
+from mbd.sensitivity.shortened import Shortened
 from mbd.sensitivity.strikes import captured, struck
 from mbd.tape.node import Node
 
@@ -98,6 +99,7 @@ class Walk:
         self.steps = steps_of(rows, programs)
         self._written = dict(rows.changes)
         self._held_rows = held_rows(rows)
+        self._shortened, self._grid = Shortened(rows, programs), np.zeros(0)
         self._ways: dict[int, Way] = {}
         self._pulls: dict[int, Way] = {}
         self.visit: Callable[[int, Motion, Mode, Rates], None] | None = None
@@ -140,7 +142,7 @@ class Walk:
                 continue
             if self.visit is None and not self._ways and not rows.begins_late(motion.t, row):
                 before, far = row, self._unwatched(mode, row, rows.segment_end(row) - 1)
-                far = min([far, *(self._held_rows[self._held_rows > row] - 1)])
+                far = min([self._shortened.next_row(row, far), *(self._held_rows[self._held_rows > row] - 1)])
                 row, motion, memory = self.steps.leap(motion, memory, mode, row, far)
                 fresh = fresh and row == before
             if row not in looked:
@@ -156,7 +158,12 @@ class Walk:
                 self._take_written(row)
                 motion, mode, rates, memory = self._started(motion, self.mode(row, motion), row)
                 continue
-            dh = -motion.tangent.t if rows.is_fixed(row + 1) else np.zeros_like(motion.tangent.t)
+            if rows.is_fixed(row + 1):
+                dh = -motion.tangent.t
+            elif row in self._shortened.pairs:
+                dh = self._shortened.size(row, motion, mode, rates if fresh else memory.rates)
+            else:
+                dh = self._grid - motion.tangent.t if row in self._shortened.rows else np.zeros_like(motion.tangent.t)
             if row + 1 in self._held_rows:
                 held, along = with_held_directions(self.programs, motion, mode, memory.rates)
                 motion, memory = self.steps.along(along, memory, held, row + 1, dh, fresh)
@@ -180,6 +187,7 @@ class Walk:
 
     def _started(self, motion: Motion, mode: Mode, row: int) -> tuple[Motion, Mode, Rates, Memory]:
         """The scheme from a row on, with what acts and which frictions in planes do not follow their velocity yet."""
+        self._grid = motion.tangent.t
         if not (self.programs.columns.slips and np.any(mode.slip)):
             self._ways = {}
             rates = self._restarted(motion, mode, row)

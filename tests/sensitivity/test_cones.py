@@ -85,3 +85,48 @@ def test_springs_pull_a_block_off_a_belt(scheme, dt):
     start = mbd.assemble(model, velocity={"slide.x": 0.5, "slide.z": 0.2}, closed="foot")
     settings = {"ways": 1, "speeds": False, "parameters": ["gravity.y"], "dt": dt, "until": 0.32}
     assert_as_differences(["slipped"], model, start, scheme, **settings)
+
+
+@pytest.mark.parametrize("scheme", [RADAU, HHT], ids=repr)
+def test_an_edge_whose_slip_turns_fast_shortens_steps_which_follow_the_start(scheme):
+    """A disk that falls on its edge as it tumbles: steps are half as long as its slip takes to turn."""
+    model = mbd.Model("disk", gravity=(0.3, -9.81, 0.1))
+    disk = mbd.RigidBody("disk", 1.0, (0.004, 0.005, 0.006), center=(0.005, 0.01, 0.0))
+    model.connect(mbd.Free("free", model.ground.origin, disk.origin))
+    model.constrain(mbd.Unilateral("edge", mbd.disk_touchdown(disk.origin, 0.1, "z"), friction=0.2))
+    position = {"free.y": 0.15, "free.orientation": ("xyz", (0.3, 0.1, 0.2))}
+    start = mbd.assemble(model, position, {"free.x": 1.0, "free.angular_velocity": (1.0, 5.0, -8.0)})
+    steps = np.diff(mbd.simulate(model, start, scheme, dt=2.5e-3, until=0.15).time)
+    assert np.sum((steps > 0.0) & (steps < 1e-3)) > 4
+    assert_as_differences(["closed"], model, start, scheme, ways=1, dt=2.5e-3, until=0.15)
+    found = judged(model, start, scheme, ways=1, dt=2.5e-3, until=0.15)
+    assert found[0] < 1e-8  # with steps held, 1e-6 and 1e-3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(80))
+def test_random_boxes_with_corners_that_strike_slide_and_stand(seed):
+    """By all schemes; where friction begins to slide, corrections of positions are in the metric of a later iterate."""
+    chance = np.random.default_rng(seed)
+    model = mbd.Model("box", gravity=(chance.uniform(-2, 2), -9.81, chance.uniform(-2, 2)))
+    inertia, center = 0.02 * chance.uniform(1.0, 1.9, 3), chance.uniform(-0.05, 0.05, 3)
+    body = mbd.RigidBody("box", 1.0, tuple(inertia), center=tuple(center))
+    model.connect(mbd.Free("free", model.ground.origin, body.origin))
+    corners = [(0.1, -0.1, 0.2), (-0.1, -0.1, 0.2), (0.1, -0.1, -0.2), (-0.1, -0.1, -0.2)]
+    for k, place in enumerate(corners[: chance.integers(1, 5)]):
+        friction = [None, chance.uniform(0.1, 1.0), 0.0][chance.integers(0, 3)]
+        foot, bounce = mbd.touchdown(body.point(*place)), chance.choice([0.0, 0.4])
+        model.constrain(mbd.Unilateral(f"foot {k}", foot, restitution=bounce, friction=friction))
+    q = 0.3 * chance.normal(size=4) + (1.0, 0.0, 0.0, 0.0)
+    velocity = {f"free.angular_velocity.{axis}": chance.uniform(-4, 4) for axis in "xyz"}
+    velocity |= {f"free.{axis}": chance.uniform(-2, 2) for axis in "xyz"}
+    start = mbd.assemble(model, {"free.y": 0.35, "free.orientation": q / np.linalg.norm(q)}, velocity)
+    scheme = (RUNGE_KUTTA, RADAU, HHT, INDEX3)[seed % 4]
+    try:
+        settings = {"parameters": ["gravity.y"], "step": 1e-5, "dt": 2.5e-3, "until": 0.4}
+        found = judged(model, start, scheme, ways=1, seed=seed, **settings)
+        kinds = {event.kind for event in mbd.simulate(model, start, scheme, dt=2.5e-3, until=0.4).events}
+    except (mbd.SimulationError, mbd.CapabilityError):
+        return
+    most = 1e-7 if "slipped" in kinds else 1e-8
+    assert found is None or np.all(found[0] <= np.maximum(most, 2.0 * found[1])), found

@@ -30,6 +30,7 @@ from mbd.sensitivity.kernel.newmark_prediction import (
     ALPHA_M,
     BETA,
     GAMMA,
+    REACH,
     averages,
     correction_of,
     predict,
@@ -59,7 +60,7 @@ def newmark_steps(
 
     −1 − their number where a singular step is behind them, which leaves nothing of what they made.
 
-    numbers : α_m, α_f, β, γ, full step; dh (D,) : derivatives of the size of each step
+    numbers : α_m, α_f, β, γ, full step, largest rate of differences; dh (D,) : derivatives of the size of each step
     """
     twofold = S[STABILIZED] == 1 and S[ROWS] > 0
     size = (2 if twofold else 1) * (S[RATES] + S[ROWS])
@@ -86,7 +87,7 @@ def newmark_steps(
         balance(S, entries, out, c_K, c_C, size, A)
         changes(S, entries, out, B, Z)
         if twofold and not corrections(
-            K, S, rows, entries, block, near, out, other, c_K, c_C, h, A, B, Z1, dh, M, b, pivots, work
+            K, S, rows, entries, block, near, out, other, c_K, c_C, h, numbers[REACH], A, B, Z1, dh, M, b, pivots, work
         ):
             return -1 - k
         if factor(A, size, pivots) != 0:

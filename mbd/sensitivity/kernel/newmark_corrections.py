@@ -31,10 +31,13 @@ __all__ = ["corrections"]
 
 def corrections(
     K: Model, S: Integers, rows: Integers, entries: Integers, block: Reals, near: Reals, out: Reals, other: Reals,
-    c_K: float, c_C: float, h: float, A: Reals, B: Reals, Z1: Reals, dh: Reals, M: Reals, b: Reals, pivots: Integers,
-    work: Reals,
+    c_K: float, c_C: float, h: float, reach: float, A: Reals, B: Reals, Z1: Reals, dh: Reals, M: Reals, b: Reals,
+    pivots: Integers, work: Reals,
 ) -> bool:  # fmt: skip
-    """Equations of U: ``S W + R ν = 0`` in the metric of the predicted place, and ``B̃ W`` of rows on velocities."""
+    """Equations of U: ``S W + R ν = 0`` in the metric of the predicted place, and ``B̃ W`` of rows on velocities.
+
+    reach : largest rate of the differences along W
+    """
     n = S[RATES]
     n_v = S[PLACES]
     m = S[ROWS]
@@ -68,7 +71,7 @@ def corrections(
     for i in range(n + m):
         if work[by_h + i] != 0.0:
             add(B, n + m + i, -work[by_h + i], dh, 0, S[WIDTH])
-    turned(K, S, rows, entries, block, near, out, other, c_K, c_C, B, Z1, work)
+    turned(K, S, rows, entries, block, near, out, other, c_K, c_C, reach, B, Z1, work)
     return True
 
 
@@ -106,7 +109,7 @@ def normal(
 
 def turned(
     K: Model, S: Integers, rows: Integers, entries: Integers, block: Reals, near: Reals, out: Reals, other: Reals,
-    c_K: float, c_C: float, B: Reals, Z1: Reals, work: Reals,
+    c_K: float, c_C: float, reach: float, B: Reals, Z1: Reals, work: Reals,
 ) -> None:  # fmt: skip
     """How ``S W + R ν`` and ``B̃ W`` change by Z1 with W, ν held: by differences along (c_K, c_C, 1) W."""
     n = S[RATES]
@@ -116,6 +119,7 @@ def turned(
         large = max(large, abs(work[2 * n + i]))
     if large == 0.0:
         return
+    large /= reach
     along(S, rows, block, near, c_K, c_C, 1.0 / large, work)
     call_on(K, 0, block, out)
     along(S, rows, block, near, c_K, c_C, -1.0 / large, work)

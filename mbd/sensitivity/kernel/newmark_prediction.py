@@ -21,8 +21,8 @@ from mbd.sensitivity.kernel.sizes import (
 )
 
 __all__ = [
-    "ALPHA_F", "ALPHA_M", "BETA", "FOLLOWED", "FULL", "GAMMA", "averages", "correction_of", "predict", "predict_more",
-    "predicted_place",
+    "ALPHA_F", "ALPHA_M", "BETA", "FOLLOWED", "FULL", "GAMMA", "REACH", "averages", "correction_of", "predict",
+    "predict_more", "predicted_place",
 ]  # fmt: skip
 
 FOLLOWED = 1e-9
@@ -32,7 +32,8 @@ ALPHA_F = 1
 BETA = 2
 GAMMA = 3
 FULL = 4
-"""Places of the numbers of the scheme, the last one its full step."""
+REACH = 5
+"""Places of the numbers of the scheme, the last ones its full step and the largest rate of differences."""
 
 
 def averages(S: Integers, c: Reals, k: int, h: float, y: Reals, rate: Reals, memory: Reals, work: Reals) -> bool:

@@ -19,6 +19,7 @@ from mbd.sensitivity.kernel.directions import add, clear, solve_all
 from mbd.sensitivity.kernel.entries import place_row
 from mbd.sensitivity.kernel.radau_charts import end_in_chart, is_in_chart, of_chart_stages, place_motion, turn
 from mbd.sensitivity.kernel.radau_equations import (
+    REACH,
     REAL,
     SQUARE,
     WEIGHTS,
@@ -230,6 +231,7 @@ def of_corrections(
         for i in range(n):
             large = max(large, abs(stages[place + i]))
         if large > 0.0:
+            large /= c[REACH]
             along(K, S, c, k, h, s, 1.0 / large, time, q, y, rows, block, other, stages, E)
             along(K, S, c, k, h, s, -1.0 / large, time, q, y, rows, block, out, stages, E)
             for e in range(S[ENTRIES]):

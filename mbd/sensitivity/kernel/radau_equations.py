@@ -25,13 +25,14 @@ from mbd.sensitivity.kernel.sizes import (
 )
 
 __all__ = [
-    "REAL", "SQUARE", "WEIGHTS", "evaluate", "line", "matrix", "middle", "place_stage", "residual", "through",
+    "REACH", "REAL", "SQUARE", "WEIGHTS", "evaluate", "line", "matrix", "middle", "place_stage", "residual", "through",
 ]  # fmt: skip
 
 WEIGHTS = 3
 SQUARE = 12
 REAL = 21
-"""Where `numbers` has A, A A and the real eigenvalue, behind c."""
+REACH = 22
+"""Where `numbers` has A, A A, the real eigenvalue and the largest rate of differences, behind c."""
 
 
 def place_stage(
