@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from mbd.arrays import Matrix, Vector
+from mbd.arrays import Vector
 from mbd.integrators import RadauIIA, RungeKutta853
 from mbd.integrators.family import NewmarkFamily
-from mbd.results.stored_states import StoredStates
 from mbd.sensitivity.balance import consistent_rates, independent, pushed
 from mbd.sensitivity.cones import ended_in_rest, held_rows, rests
 from mbd.sensitivity.guards import Trigger, shift_of_end, trigger
@@ -36,12 +34,9 @@ from mbd.sensitivity.runge_kutta import RungeKuttaSteps
 from mbd.sensitivity.schemes import Memory, SchemeSteps, is_at
 from mbd.sensitivity.shortened import Shortened
 from mbd.sensitivity.strikes import captured, struck
-from mbd.tape.node import Node
+from mbd.sensitivity.watching import Watching
 
 __all__ = ["Instant", "Passed", "Walk"]
-
-MOST = 8
-"""Newton iterations for an instant of which the run stores no row [-]."""
 
 
 @dataclass(frozen=True)
@@ -97,6 +92,7 @@ class Walk:
         self.record = rows.record
         self._modes: dict[tuple[Any, ...], Mode] = {}
         self.steps = steps_of(rows, programs)
+        self._watching = Watching(rows, programs, self.steps)
         self._written = dict(rows.changes)
         self._held_rows = held_rows(rows)
         self._shortened, self._grid = Shortened(rows, programs), np.zeros(0)
@@ -141,13 +137,13 @@ class Walk:
                 motion, mode, rates, memory = self._started(motion, self.mode(row, motion), row)
                 continue
             if self.visit is None and not self._ways and not rows.begins_late(motion.t, row):
-                before, far = row, self._unwatched(mode, row, rows.segment_end(row) - 1)
+                before, far = row, self._watching.unwatched(mode, row, rows.segment_end(row) - 1)
                 far = min([self._shortened.next_row(row, far), *(self._held_rows[self._held_rows > row] - 1)])
                 row, motion, memory = self.steps.leap(motion, memory, mode, row, far)
                 fresh = fresh and row == before
             if row not in looked:
                 looked.add(row)
-                begun = self._begins(motion, memory, mode, row)
+                begun = self._watching.begins(motion, memory, mode, row)
                 if begun is not None:
                     motion, memory, rates = begun
                     fresh = True
@@ -217,62 +213,6 @@ class Walk:
                 "dataclasses.replace(start, memory=None)",
             )
         return found
-
-    def _unwatched(self, mode: Mode, first: int, last: int) -> int:
-        """The last row up to which no open contact begins to be watched between rows."""
-        values, closed = self.watches[first : last + 1], np.asarray(mode.closed) != 0
-        begins = (values[:-1] <= 0.0) & (values[1:] > 0.0)
-        begins[:, closed] = False
-        found = np.flatnonzero(begins.any(axis=1))
-        return first + int(found[0]) if len(found) else last
-
-    def _begins(self, motion: Motion, memory: Memory, mode: Mode, row: int) -> tuple[Motion, Memory, Rates] | None:
-        """The start of the scheme where an open contact begins to be watched before the next row; None if none does.
-
-        A step ends at that instant, of which the run stores no row.
-        """
-        crossed = self.watches[row : row + 2]
-        open_now = np.asarray(mode.closed) == 0
-        fired = np.flatnonzero(open_now & (crossed[0] <= 0.0) & (crossed[-1] > 0.0))
-        if not len(fired):
-            return None
-        if len(fired) > 1:
-            raise refused(f"several contacts begin to be watched in the step from t = {motion.t:.9g} s")
-        c = int(fired[0])
-        condition = Trigger("watched", c, f"only_while of {self.programs.equations.contacts[c].name}")
-        place = len(self.programs.equations.guards) + 2 * len(self.programs.equations.frictions) + c
-        place += 2 * len(self.programs.equations.contacts)
-        wide = replace(motion, tangent=motion.tangent.widened())
-        dh = np.zeros(len(wide.tangent.t))
-        dh[-1] = 1.0
-        span = float(self.record.time[row + 1]) - motion.t
-        h = span * float(crossed[0, c] / (crossed[0, c] - crossed[1, c]))
-        for _ in range(MOST):
-            end, rates = next(self.steps.reached(wide, memory.widened(), mode, motion.t + h, dh, row))
-            values, slopes = self.programs.watched(end.at(mode, rates.rate, rates.lam))
-            change = float(slopes[place] @ end.tangent.stacked(self.programs.columns)[:, -1])
-            step = -float(values[place]) / change
-            if abs(step) <= 4e-16 * max(abs(motion.t), span):
-                break
-            h += step
-        along = shift_of_end(self.programs, end, mode, rates, condition, 0.0)
-        moved = replace(end, tangent=end.tangent.combined(along))
-        fresh = consistent_rates(self.programs, moved, mode, Rates(rates.rate, rates.lam, rates.of_rate, rates.of_lam))
-        return moved, self.steps.start(moved, mode, fresh), fresh
-
-    @cached_property
-    def watches(self) -> Matrix:
-        """Of each contact at each row (R, nC), the measure that must be positive for it to be watched; 1 without."""
-        record, contacts = self.record, self.programs.equations.contacts
-        nodes = [each.only_while for each in contacts if isinstance(each.only_while, Node)]
-        out = np.ones((len(record.time), len(contacts)))
-        if nodes:
-            states = StoredStates(record, self.programs.equations)
-            values = iter(states.evaluate(nodes, states.rows))
-            for c, each in enumerate(contacts):
-                if isinstance(each.only_while, Node):
-                    out[:, c] = next(values)
-        return out
 
     def _event(self, motion: Motion, memory: Memory, mode: Mode, row: int) -> Instant:
         """The step to an event at a row, the event, and the state after it."""
