@@ -15,7 +15,8 @@ from mbd.testing.fuzz import batch
 from mbd.testing.fuzz.geometry import Signal, inverse, product, shift, turn, twist
 from mbd.testing.fuzz.judge import between, judge
 from mbd.testing.fuzz.scenes import STRUCTURES, scene
-from mbd.testing.fuzz.verdict import verdict
+from mbd.testing.fuzz.structures import SPACE
+from mbd.testing.fuzz.verdict import run_of, verdict
 from tests.helpers import altered
 
 SOUND = [2, 10, 12, 40, 68, 98, 112, 128, 138]
@@ -316,3 +317,25 @@ def test_the_command_writes_a_summary(tmp_path, capsys):
     batch.main(["--scenes", "2:3", "--out", str(out)])
     assert "1 scenes: 1 ok" in capsys.readouterr().out
     assert json.loads(out.read_text())["number"] == 2
+
+
+# joints that turn freely ---------------------------------------------------------------------------------------------
+QUICK_IN_SPACE = [2, 4, 5, 6]
+"""A redundant loop, a foot, a disk, a rolling disk."""
+
+
+@pytest.mark.parametrize("number", [*QUICK_IN_SPACE, *(pytest.param(k, marks=pytest.mark.slow) for k in range(7, 60))])
+def test_scenes_in_space_are_sound(number):
+    told = verdict(SPACE + number)
+    assert told["kind"] != "bad", told
+
+
+def test_the_judge_sees_what_is_wrong_in_space():
+    made = scene(SPACE + 13)
+    run, model = run_of(made), made.model
+    place = run.names.index("float.orientation.x") - run.names.index("float.x")
+    assert not judge(run, model, made.parameters).faults
+    bent = altered(run, "q", np.s_[3:, place], lambda right: right + 1e-3)
+    assert "a quaternion has length 1" in laws_broken(bent, model, made.parameters)
+    turned = altered(run, "v", np.s_[:, 4], lambda right: right + 0.1)
+    assert "an orientation is the integral of its angular velocity" in laws_broken(turned, model, made.parameters)

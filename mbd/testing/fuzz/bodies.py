@@ -17,6 +17,7 @@ from mbd.testing.fuzz.geometry import (
     Moving,
     Signal,
     Twist,
+    ball,
     cross,
     fixed,
     inverse,
@@ -33,14 +34,21 @@ __all__ = ["Bodies", "Mass", "joint_motion", "mass_of"]
 X, Y, Z = np.eye(3)
 
 
-def joint_motion(joint: Joint, q: list[Signal], parameters: Mapping[str, Any]) -> Moving:
+def joint_motion(joint: Joint, q: list[Signal], told: Readings) -> Moving:
     """The child's frame seen from the parent's.
+
+    q : the coordinates that add; orientations are those of the readings
 
     Raises
     ------
     NotImplementedError
         for a joint that this judge does not know.
     """
+    if isinstance(joint, mbd.Spherical):
+        return ball(told.attitude(joint.name))
+    if isinstance(joint, mbd.Free):
+        place = product(shift(X, q[0]), product(shift(Y, q[1]), shift(Z, q[2])))
+        return product(place, ball(told.attitude(joint.name)))
     if isinstance(joint, mbd.Revolute):
         return turn(joint.axis, q[0])
     if isinstance(joint, mbd.Prismatic):
@@ -57,7 +65,7 @@ def joint_motion(joint: Joint, q: list[Signal], parameters: Mapping[str, Any]) -
     if isinstance(joint, mbd.Universal):
         return product(turn(joint.axis, q[0]), turn(joint.second_axis, q[1]))
     if isinstance(joint, mbd.Screw):
-        lead = parameters[f"{joint.name}.pitch"] / (2.0 * math.pi)
+        lead = told.parameters[f"{joint.name}.pitch"] / (2.0 * math.pi)
         return product(shift(joint.axis, Signal(*(lead * part for part in q[0]))), turn(joint.axis, q[0]))
     raise NotImplementedError(f"joints of kind {type(joint).__name__}")
 
@@ -148,7 +156,7 @@ class Bodies:
         """Bodies that the run moves freely, by coordinates of their own."""
         n = len(self.told)
         for body in self.model.bodies:
-            names = {label: f"{body} floating.{label}" for label in ("x", "y", "z", "angle")}
+            names = {label: f"{body} floating.{label}" for label in ("x", "y", "z", "angle", "orientation.w")}
             given = {label: name for label, name in names.items() if name in self.told.tree}
             if not given:
                 continue
@@ -158,6 +166,8 @@ class Bodies:
                     place = product(place, shift(axis, self.told.coordinate(given[label])))
             if "angle" in given:
                 place = product(place, turn(Z, self.told.coordinate(given["angle"])))
+            if "orientation.w" in given:
+                place = product(place, ball(self.told.attitude(f"{body} floating")))
             self.placed[body] = place
 
     def _place(self, joint: Joint, forward: bool) -> None:
@@ -175,7 +185,7 @@ class Bodies:
         q = coordinates(joint, self.told)
         if q is None:
             raise NotImplementedError(f"coordinates of '{joint.name}' are not reported")
-        return joint_motion(joint, q, self.told.parameters)
+        return joint_motion(joint, q, self.told)
 
     def constant(self, frame: Frame) -> Array:
         """A frame in its body, from the description with the parameters of the run."""

@@ -10,7 +10,10 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Array", "Signal", "Twist", "cross", "fixed", "inverse", "matrix_of", "product", "shift", "turn", "twist"]
+__all__ = [
+    "Array", "Attitude", "Signal", "Twist", "ball", "cross", "fixed", "hat", "inverse", "matrix_of", "of_quaternion",
+    "product", "shift", "turn", "twist",
+]  # fmt: skip
 
 Array: TypeAlias = NDArray[np.float64]
 
@@ -21,6 +24,14 @@ class Signal(NamedTuple):
     value: Array
     rate: Array
     second: Array
+
+
+class Attitude(NamedTuple):
+    """An orientation along a motion: quaternions (w, x, y, z) (n, 4), ω and ω̇ in the axes of what turns (n, 3)."""
+
+    quaternion: Array
+    angular: Array
+    angular_second: Array
 
 
 class Moving(NamedTuple):
@@ -96,6 +107,32 @@ def shift(axis: ArrayLike, q: Signal) -> Moving:
         H[:, :3, 3] = values[:, None] * np.asarray(axis, dtype=float)
         found.append(H)
     return Moving(found[0] + np.eye(4), found[1], found[2])
+
+
+def of_quaternion(quaternion: Array) -> Array:
+    """Rotation matrices (n, 3, 3) of quaternions (w, x, y, z), ``R = 1 + 2 w [u]× + 2 [u]×²`` over their length."""
+    w, u = quaternion[:, :1], quaternion[:, 1:]
+    size = np.linalg.norm(quaternion, axis=1)[:, None, None]
+    across = hat(u)
+    return np.asarray(np.eye(3) + (2.0 * w[:, :, None] * across + 2.0 * across @ across) / size**2)
+
+
+def hat(u: Array) -> Array:
+    """The matrices [u]× with ``[u]× v = u × v``, (n, 3, 3)."""
+    x, y, z = u.T
+    o = np.zeros_like(x)
+    return np.stack([np.stack([o, -z, y], 1), np.stack([z, o, -x], 1), np.stack([-y, x, o], 1)], axis=1)
+
+
+def ball(turning: Attitude) -> Moving:
+    """A rotation: ``Ṙ = R [ω]×``, ``R̈ = R ([ω̇]× + [ω]×²)``, ω in the axes of what turns."""
+    n = len(turning.quaternion)
+    R, spin = of_quaternion(turning.quaternion), hat(turning.angular)
+    H, first, second = np.tile(np.eye(4), (n, 1, 1)), np.zeros((n, 4, 4)), np.zeros((n, 4, 4))
+    H[:, :3, :3] = R
+    first[:, :3, :3] = R @ spin
+    second[:, :3, :3] = R @ (hat(turning.angular_second) + spin @ spin)
+    return Moving(H, first, second)
 
 
 def twist(a: Moving) -> Twist:

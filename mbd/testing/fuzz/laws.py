@@ -14,6 +14,7 @@ from mbd.testing.fuzz.faults import Faults
 from mbd.testing.fuzz.geometry import Array, Moving, cross, inverse, product, twist
 from mbd.testing.fuzz.loads import Loads
 from mbd.testing.fuzz.quantities import gap_of, named, value_of
+from mbd.testing.fuzz.round_bodies import edge_gap
 
 __all__ = ["balance", "closure", "constraints", "contacts", "energies", "places", "size_of", "partings"]
 
@@ -152,6 +153,12 @@ def constraints(found: Faults, bodies: Bodies, loose: float = HELD) -> None:
             bias = value_of(word.bias, (("t", "t"),), bodies, word.name, "bias")
             scale = sum(np.abs(value) for value in values)
             found.small("row on velocities holds", word.name, word.row(*values) + bias, loose * (size + scale))
+        elif isinstance(word, mbd.Rolling) and word.axis is not None:
+            radius = bodies.told.parameters[f"{word.name}.radius"]
+            gap = edge_gap(word.center, radius, word.axis, word.ground, bodies)
+            slip = gap.slip(bodies)
+            off = np.linalg.norm([np.sum(slip * direction, axis=1) for _, direction in gap.tangents], axis=0)
+            found.small("row on velocities holds", word.name, off, loose * size * 100.0)
         elif isinstance(word, mbd.Rolling):
             found.small("row on velocities holds", word.name, _slip(word, bodies), loose * size * 100.0)
 
@@ -209,8 +216,11 @@ def contacts(found: Faults, bodies: Bodies, acting: Loads, run: Any) -> None:
             )
         if word.slides and gap.tangents and f"{word.name}.friction" in told:
             mu = told.parameters[f"{word.name}.mu"]
-            speed = _sliding(gap, bodies)
             limit = np.where(closed, mu * np.maximum(force, 0.0), 0.0)
+            if f"{word.name}.friction.sideways" in told:
+                _cone(found, word, gap, bodies, limit, largest, located)
+                continue
+            speed = _sliding(gap, bodies)
             _dry(found, word.name, told[f"{word.name}.friction"], speed, limit, largest, located)
     for joint in bodies.model.joints:
         _joint_friction(found, joint, bodies, largest, located)
@@ -238,17 +248,30 @@ def _force_law(found: Faults, word: mbd.Penalty, gap: Array, rate: Array, bodies
 
 def _sliding(gap: Any, bodies: Bodies) -> Array:
     """Velocity of the point against the surface along the first tangent."""
-    _, direction = gap.tangents[0]
-    (body, place, _), *carriers = gap.points
-    v = bodies.velocity(body, place)
-    for carrier, _, _ in carriers:
-        v = v - bodies.velocity(carrier, place)
-    return np.asarray(np.sum(v * direction, axis=1))
+    return np.asarray(np.sum(gap.slip(bodies) * gap.tangents[0][1], axis=1))
+
+
+def _cone(found: Faults, word: Any, gap: Any, bodies: Bodies, limit: Any, largest: Array, located: bool) -> None:
+    """|F| ≤ μ p in the plane of contact; where it slides F = −μ p γ/|γ|."""
+    told, slip = bodies.told, gap.slip(bodies)
+    parts = {part: f"{word.name}.friction.{part}" for part, _ in gap.tangents}
+    force = np.stack([told[name] if name in told else 0.0 * limit for name in parts.values()], axis=1)
+    speeds = np.stack([np.sum(slip * direction, axis=1) for _, direction in gap.tangents], axis=1)
+    size, speed = np.linalg.norm(force, axis=1), np.linalg.norm(speeds, axis=1)
+    scale = 1e-5 * (largest + np.max(np.abs(limit), initial=0.0))
+    lag = 0.0 if located else 0.02 * _change(size - limit)
+    found.small("friction within its cone", word.name, np.maximum(size - limit, 0.0), scale + lag)
+    if not located:
+        return
+    wanted = -limit[:, None] * speeds / np.where(speed > 0.0, speed, 1.0)[:, None]
+    off = np.linalg.norm(force - wanted, axis=1)
+    found.small("sliding friction is against the velocity, all of it", word.name, off, scale, speed > 1e-4)
 
 
 def _joint_friction(found: Faults, joint: Any, bodies: Bodies, largest: Array, located: bool) -> None:
     told = bodies.told
-    for k, name in enumerate(joint.coordinate_names):
+    for k, label in enumerate(joint.freedoms):
+        name = f"{joint.name}.{label.name}"
         friction = next((n for n in (f"{name}.friction", f"{joint.name}.friction") if n in told), None)
         if friction is None:
             continue
@@ -257,7 +280,7 @@ def _joint_friction(found: Faults, joint: Any, bodies: Bodies, largest: Array, l
         for place, owner, loss in joint.losses():
             if place == k:
                 limit = limit + _limit(loss, owner, load, told.parameters)
-        _dry(found, friction, told[friction], told[f"{name}.rate"], limit, largest, located)
+        _dry(found, friction, told[friction], told[joint.velocity_names[k]], limit, largest, located)
 
 
 def _limit(loss: Any, owner: str, load: Array, parameters: Any) -> Any:

@@ -15,6 +15,8 @@ from mbd.joints.losses.base import LossSum
 from mbd.testing.fuzz.bodies import Bodies, mass_of
 from mbd.testing.fuzz.geometry import Array, cross
 from mbd.testing.fuzz.quantities import TINY, gap_of, named, triple, user_gap, value_of
+from mbd.testing.fuzz.round_bodies import edge_gap
+from mbd.testing.fuzz.turning import ball_spring, bushing
 
 __all__ = ["Load", "loads"]
 
@@ -85,7 +87,10 @@ class Loads:
     def direction(self, joint: Joint, k: int) -> tuple[Array, bool]:
         """The axis of a coordinate in ground axes (n, 3), and whether it turns."""
         R = self.bodies.frame(joint.parent).H[:, :3, :3]
-        turns = joint.labels[k].unit == "rad"
+        turns = joint.freedoms[k].unit == "rad"
+        if isinstance(joint, mbd.Spherical | mbd.Free):
+            R = self.bodies.frame(joint.child).H[:, :3, :3] if turns else R
+            return R[:, :, k % 3], turns
         if isinstance(joint, mbd.Universal) and k == 1:
             return self.bodies.frame(joint.child).H[:, :3, :3] @ np.asarray(joint.second_axis), True
         if isinstance(joint, mbd.Planar | mbd.Translation):
@@ -137,9 +142,12 @@ def _joint(found: Loads, joint: Joint) -> None:
     """Its reaction, and what acts along its coordinates: spring, losses, dry friction."""
     told = found.bodies.told
     found.pair(joint, told.vector(f"{joint.name}.reaction_force"), told.vector(f"{joint.name}.reaction_torque"))
-    for k, name in enumerate(joint.coordinate_names):
-        q, rate = told[name], told[f"{name}.rate"]
+    if isinstance(joint, mbd.Spherical):
+        ball_spring(found, joint)
+    for k, (label, speed) in enumerate(zip(joint.freedoms, joint.velocity_names, strict=True)):
+        name, rate = f"{joint.name}.{label.name}", told[speed]
         if len(joint.labels) == 1:
+            q = told[name]
             stiffness = told.parameters.get(f"{joint.name} spring.stiffness", 0.0)
             rest = told.parameters.get(f"{joint.name} spring.rest", 0.0)
             found.effort(joint, k, -stiffness * (q - rest))
@@ -209,6 +217,8 @@ def _force(found: Loads, force: Any) -> None:
             found.power[name] = -pull * rate
         found.force(force.b.body.name, b, -pull[:, None] * along)
         found.force(force.a.body.name, a, pull[:, None] * along)
+    elif isinstance(force, mbd.Bushing):
+        bushing(found, force)
     elif isinstance(force, mbd.TorsionSpring):
         stretch = told[force.joint.coordinate_names[0]] - told.parameters[f"{name}.rest"]
         stiffness = told.parameters[f"{name}.stiffness"]
@@ -284,6 +294,13 @@ def _tangential(found: Loads, word: Any, gap: Any) -> None:
 
 def _rolling(found: Loads, word: Any) -> None:
     bodies, plane = found.bodies, word.ground
+    if word.axis is not None:
+        edge = edge_gap(word.center, bodies.told.parameters[f"{word.name}.radius"], word.axis, plane, bodies)
+        for part, direction in edge.tangents:
+            for k, (body, place, _) in enumerate(edge.points):
+                push = (1.0 if k == 0 else -1.0) * bodies.told[f"{word.name}.{part}.force"]
+                found.force(body, place, push[:, None] * direction)
+        return
     n = len(bodies.told)
     R = np.broadcast_to(np.eye(3), (n, 3, 3)) if plane.frame is None else bodies.frame(plane.frame).H[:, :3, :3]
     normal = np.asarray(plane.normal)

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 import mbd
 from mbd.bodies.base import Frame
+from mbd.constraints.disks import DiskTouchdown
 from mbd.constraints.measures import Distance, Height, JointMeasure, Separation
+from mbd.constraints.sphere_touchdown import SphereTouchdown
 from mbd.constraints.touchdown import Touchdown
+from mbd.constraints.turning_measures import Cone, Twist
 from mbd.constraints.user_measure import UserMeasure
 from mbd.joints.base import Joint
 from mbd.testing.fuzz.bodies import Bodies
+from mbd.testing.fuzz.gap import Gap
 from mbd.testing.fuzz.geometry import Array
+from mbd.testing.fuzz.round_bodies import ball_gap, edge_gap, over_plane, turning_gap
 
 __all__ = ["Gap", "gap_of", "named", "triple", "user_gap", "value_of"]
 
@@ -88,34 +92,6 @@ def named(name: str, bodies: Bodies) -> Array:
     raise NotImplementedError(f"the quantity '{name}'")
 
 
-@dataclass
-class Gap:
-    """A measure g along a motion, and the generalized direction ∂g: forces on points, efforts on joints.
-
-    value : g (n,)
-    points : (body, place (n, 3), direction (n, 3)): a force p acts as p · direction at this place of the body
-    efforts : (joint, place of the coordinate, factor (n,))
-    drift : ∂g/∂t (n,), of surfaces that move by themselves
-    tangents : (name of the part, direction (n, 3)) along which a point can stick or rub
-    """
-
-    value: Array
-    points: list[tuple[str, Array, Array]]
-    efforts: list[tuple[str, int, Array]]
-    drift: Array
-    tangents: list[tuple[str, Array]]
-
-    def rate(self, bodies: Bodies) -> Array:
-        """ġ from the motion of the bodies."""
-        found = np.array(self.drift, dtype=float)
-        for body, place, direction in self.points:
-            found = found + np.sum(direction * bodies.velocity(body, place), axis=1)
-        joints = {joint.name: joint for joint in bodies.model.joints}
-        for name, k, factor in self.efforts:
-            found = found + factor * bodies.told[f"{joints[name].coordinate_names[k]}.rate"]
-        return found
-
-
 def gap_of(measure: Any, bodies: Bodies) -> Gap:
     """A measure by its definition.
 
@@ -146,33 +122,19 @@ def gap_of(measure: Any, bodies: Bodies) -> Gap:
         return Gap(value, [(measure.b.body.name, b, along), (measure.a.body.name, b, -along)], [], nothing, [])
     if isinstance(measure, Touchdown):
         plane = measure.ground if isinstance(measure.ground, mbd.Plane) else None
-        return _on_plane(measure, plane, bodies) if plane else _on_surface(measure, bodies)
+        if plane is None:
+            return _on_surface(measure, bodies)
+        return over_plane(measure.point.body.name, bodies.place(measure.point), plane, bodies)
+    if isinstance(measure, SphereTouchdown):
+        return ball_gap(measure, bodies)
+    if isinstance(measure, DiskTouchdown):
+        radius = bodies.told.parameters[f"{measure.center.full_name}.radius"]
+        return edge_gap(measure.center, radius, measure.axis, measure.ground, bodies)
+    if isinstance(measure, Cone | Twist):
+        return turning_gap(measure, bodies)
     if isinstance(measure, UserMeasure):
         return user_gap(measure, bodies)
     raise NotImplementedError(f"measures of kind {type(measure).__name__}")
-
-
-def _on_plane(measure: Touchdown, plane: Any, bodies: Bodies) -> Gap:
-    """n · (p − p_F − u t) − offset, pushing back on the body that carries the plane."""
-    n = len(bodies.told)
-    p = bodies.place(measure.point)
-    R, origin = np.broadcast_to(np.eye(3), (n, 3, 3)), np.zeros((n, 3))
-    points = []
-    if plane.frame is not None:
-        H = bodies.frame(plane.frame).H
-        R, origin = H[:, :3, :3], H[:, :3, 3]
-    normal, u = np.asarray(plane.normal), np.asarray(plane.velocity)
-    up = R @ normal
-    value = np.sum(up * (p - origin), axis=1) - (normal @ u) * bodies.told.time - plane.offset
-    points.append((measure.point.body.name, p, up))
-    if plane.frame is not None:
-        points.append((plane.frame.body.name, p, -up))
-    flat = np.sqrt(1.0 - normal[2] ** 2)
-    tangents = []
-    if flat > 0.05:
-        sideways = np.array([-normal[2] * normal[0], -normal[2] * normal[1], flat**2]) / flat
-        tangents = [("forward", R @ np.cross(normal, sideways)), ("sideways", R @ sideways)]
-    return Gap(value, points, [], np.full(n, -float(normal @ u)), tangents)
 
 
 def _on_surface(measure: Touchdown, bodies: Bodies) -> Gap:

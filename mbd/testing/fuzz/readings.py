@@ -10,7 +10,7 @@ import numpy as np
 
 import mbd
 from mbd.joints.base import Joint
-from mbd.testing.fuzz.geometry import Array, Signal
+from mbd.testing.fuzz.geometry import Array, Attitude, Signal
 from mbd.topology.plan import plan
 
 __all__ = ["Readings", "names_for", "readings"]
@@ -51,6 +51,15 @@ class Readings:
         """A coordinate with its rate and acceleration."""
         return Signal(self.values[name], self.values[f"{name}.rate"], self.values[f"{name}.acceleration"])
 
+    def attitude(self, name: str) -> Attitude:
+        """The orientation of a joint that turns freely."""
+        quaternion = np.stack([self.values[f"{name}.orientation.{part}"] for part in "wxyz"], axis=1)
+        angular, second = (
+            np.stack([self.values[f"{name}.angular_velocity.{axis}{suffix}"] for axis in "xyz"], axis=1)
+            for suffix in ("", ".acceleration")
+        )
+        return Attitude(quaternion, angular, second)
+
     def part(self, chosen: Any) -> Readings:
         """Some of the instants."""
         parameters = {name: value[chosen] if np.ndim(value) else value for name, value in self.parameters.items()}
@@ -68,10 +77,24 @@ def names_for(run: mbd.Trajectory, model: mbd.Model) -> list[str]:
     labels = [name for joint in model.joints for name in joint.coordinate_names]
     labels += [f"{body} floating.{label}" for body in model.bodies for label in ("x", "y", "z", "angle")]
     wanted = [name + suffix for name in labels for suffix in ("", ".rate", ".acceleration")]
+    owners = [*(joint.name for joint in model.joints), *(f"{body} floating" for body in model.bodies)]
+    wanted += [f"{owner}.orientation.{part}" for owner in owners for part in "wxyz"]
+    spins = [f"{owner}.angular_velocity.{axis}" for owner in owners for axis in "xyz"]
+    wanted += [name + suffix for name in spins for suffix in ("", ".acceleration", ".friction")]
     vectors = [f"{joint.name}.reaction_{kind}" for joint in model.joints for kind in ("force", "torque")]
     wanted += [f"{vector}.{axis}" for vector in vectors for axis in "xyz"]
     wanted += [f"{frame}.{axis}" for frame in model.frames for axis in ("x", "y", "z", "vx", "vy", "vz")]
-    reported = ("force", "gap", "gap_rate", "friction", "friction.forward", "friction.sideways", "multiplier")
+    reported = (
+        "force",
+        "forward.force",
+        "sideways.force",
+        "gap",
+        "gap_rate",
+        "friction",
+        "friction.forward",
+        "friction.sideways",
+        "multiplier",
+    )
     wanted += [f"{word.name}.{suffix}" for word in model.constraints for suffix in reported]
     wanted += [f"{name}.friction" for name in (*labels, *(joint.name for joint in model.joints))]
     wanted += ["kinetic_energy", "potential_energy"]
@@ -116,10 +139,10 @@ def _changed(run: mbd.Trajectory, parameters: Mapping[str, float], source: Any) 
 
 
 def coordinates(joint: Joint, told: Readings) -> list[Signal] | None:
-    """The coordinates of a joint, None where the run does not report them."""
+    """The coordinates of a joint that add, None where the run does not report them."""
     if any(name not in told for name in joint.coordinate_names):
         return None
-    return [told.coordinate(name) for name in joint.coordinate_names]
+    return [told.coordinate(name) for name in joint.coordinate_names if ".orientation." not in name]
 
 
 def known(names: Iterable[str], told: Readings) -> bool:

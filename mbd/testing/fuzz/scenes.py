@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import random
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import mbd
-from mbd.testing.fuzz.structures import Structure, structure
+from mbd.testing.fuzz.structures import SPACE, Structure, structure
 
 __all__ = ["STRUCTURES", "Scene", "scene"]
 
@@ -79,7 +80,7 @@ def scene(number: int, structures: int = STRUCTURES) -> Scene:
     ModelError
         where the library refuses the words of its mechanism.
     """
-    form = structure(number % structures)
+    form = structure(number % structures + (SPACE if number >= SPACE else 0))
     rng = random.Random(f"scene {number}")
     cut: Any = rng.choices(["auto", *form.cuts], [3, *(1 for _ in form.cuts)])[0]
     scheme = rng.choice(SCHEMES)
@@ -114,12 +115,36 @@ def _start(rng: random.Random, form: Structure) -> dict[str, Any]:
     tied = form.loops and rng.random() < 0.85
     spread = 0.0 if tied else rng.choice([0.0, 0.0, 0.02, 0.02 if form.model.contacts else 0.3])
     speed = rng.choice([0.0, 1.0, 10.0 ** rng.uniform(-3, 1)])
-    position = {name: value + spread * rng.uniform(-1, 1) for name, value in form.position.items()}
+    position = {name: _moved(rng, value, spread) for name, value in form.position.items()}
     free = [name for name in form.position if not form.held or name not in form.held]
     moving = rng.sample(free, 1) if tied and free else free
+    if form.number >= SPACE and speed:
+        return _in_space(rng, form, position, speed * (1.0 if tied else 2.0))
     velocity = {name: speed * rng.uniform(-1, 1) for name in moving} if speed else {}
     values = _parameters(rng, form)
     return {"position": position, "velocity": velocity, "parameters": values, "project": not tied}
+
+
+def _moved(rng: random.Random, value: Any, spread: float) -> Any:
+    """A coordinate near a value; of a quaternion one near it."""
+    if not isinstance(value, tuple):
+        return value + spread * rng.uniform(-1, 1)
+    parts = [part + 0.5 * spread * rng.uniform(-1, 1) for part in value]
+    size = math.sqrt(sum(part * part for part in parts))
+    return tuple(part / size for part in parts)
+
+
+def _in_space(rng: random.Random, form: Structure, position: Mapping[str, Any], speed: float) -> dict[str, Any]:
+    """Rates of every joint of the pose; those that rows do not allow are projected."""
+    velocity: dict[str, Any] = {}
+    for joint in form.model.joints:
+        for label in joint.freedoms:
+            if label.name.startswith("angular_velocity."):
+                name = f"{joint.name}.angular_velocity"
+                velocity.setdefault(name, tuple(speed * rng.uniform(-1, 1) for _ in range(3)))
+            else:
+                velocity[f"{joint.name}.{label.name}"] = speed * rng.uniform(-1, 1)
+    return {"position": position, "velocity": velocity, "parameters": _parameters(rng, form), "project": True}
 
 
 def _parameters(rng: random.Random, form: Structure) -> dict[str, float]:

@@ -9,9 +9,10 @@ import numpy as np
 import mbd
 from mbd.testing.fuzz.bodies import Bodies
 from mbd.testing.fuzz.faults import Faults
-from mbd.testing.fuzz.geometry import Array
+from mbd.testing.fuzz.geometry import Array, of_quaternion
 from mbd.testing.fuzz.quantities import gap_of
 from mbd.testing.fuzz.readings import Readings
+from mbd.testing.fuzz.turning import rotation_vector
 
 __all__ = ["crossings", "error_share", "impacts", "motion", "passive"]
 
@@ -57,7 +58,8 @@ def motion(
         return
     h = h[steps]
     there = found.at(told.time[steps])
-    rated = [told[name] for name in told.values if name.endswith(".rate")]
+    spins = [name for name in told.values if ".angular_velocity." in name and f"{name}.acceleration" in told]
+    rated = [told[name] for name in told.values if name.endswith(".rate") or name in spins]
     fastest = 3.0 * np.max(np.abs(rated)) if rated else 0.0
     accelerations = [_around(np.abs(np.diff(told[n]))[steps]) for n in told.values if n.endswith(".acceleration")]
     part = max(0.05, share / 3.0)  # corrections onto rows move everything by twice what one position errs
@@ -79,6 +81,33 @@ def motion(
             off = np.diff(v)[steps] - h * (a[steps] + a[steps + 1]) / 2.0
             limit = 2.0 * h * (change + tied * leaps) + 1e-7 * (1.0 + fast)
             there.small("a rate is the integral of the acceleration", name, off, limit, told=2 * uncertain)
+
+    for name in spins if smooth and rates else []:
+        v, a = told[name], told[f"{name}.acceleration"]
+        change = _around(np.abs(np.diff(a))[steps]) + 1e-3 * (np.abs(a[steps]) + np.abs(a[steps + 1]))
+        fast = np.maximum(np.abs(v[steps]), np.abs(v[steps + 1]))
+        off = np.diff(v)[steps] - h * (a[steps] + a[steps + 1]) / 2.0
+        limit = 2.0 * h * (change + tied * leaps) + 1e-7 * (1.0 + fast)
+        there.small("an angular velocity is the integral of its rate", name, off, limit, told=2 * uncertain)
+    for owner in [name.removesuffix(".orientation.w") for name in told.values if name.endswith(".orientation.w")]:
+        turning = told.attitude(owner)
+        q, v, a = turning.quaternion, turning.angular, turning.angular_second
+        there.small("a quaternion has length 1", owner, (np.linalg.norm(q, axis=1) - 1.0)[steps], 1e-12)
+        step = h[:, None] * (v[steps] + v[steps + 1]) / 2.0
+        bend = h**2 * np.linalg.norm(np.cross(v[steps], v[steps + 1]), axis=1)
+        between = of_quaternion(q[steps]).swapaxes(1, 2) @ of_quaternion(q[steps + 1])
+        turned = rotation_vector(between)
+        if smooth:
+            step = step - h[:, None] ** 2 * (a[steps + 1] - a[steps]) / 12.0
+        change = np.linalg.norm(_around(np.abs(np.diff(a, axis=0)).max(axis=1)[steps])[:, None], axis=1)
+        fast = np.maximum(np.linalg.norm(v[steps], axis=1), np.linalg.norm(v[steps + 1], axis=1))
+        limit = 6.0 * h**2 * (change + leaps) + 2.0 * bend + 1e-8 * (1.0 + h * fast)
+        if not smooth:
+            limit = limit + h * 10.0 * _range(np.linalg.norm(v, axis=1))[steps] + h * fastest
+        elif not rates:
+            limit = limit + 0.2 * h * _range(np.linalg.norm(v, axis=1))[steps]
+        off = np.linalg.norm(turned - step, axis=1)
+        there.small("an orientation is the integral of its angular velocity", owner, off, limit, h * fast < 1.5)
 
 
 def _around(values: Array) -> Array:

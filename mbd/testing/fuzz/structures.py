@@ -13,8 +13,6 @@ import numpy as np
 
 import mbd
 from mbd.joints.base import Joint
-from mbd.testing.fuzz.bodies import Bodies
-from mbd.testing.fuzz.geometry import Array
 from mbd.testing.fuzz.parts import (
     add_event,
     add_loads,
@@ -25,16 +23,17 @@ from mbd.testing.fuzz.parts import (
     any_joint,
     smooth_loss,
 )
-from mbd.testing.fuzz.readings import Readings
+from mbd.testing.fuzz.spatial_structures import SPATIAL_KINDS
+from mbd.testing.fuzz.tree_poses import close_loop, pose
 
-__all__ = ["KINDS", "Structure", "structure"]
+__all__ = ["KINDS", "SPACE", "Structure", "structure"]
 
 
 @dataclass
 class Structure:
     """A mechanism and a pose in which its loops are closed and its contacts are open.
 
-    model : as it is; position : coordinates of the pose [m, rad]
+    model : as it is; position : coordinates of the pose [m, rad], orientations as quaternions
     cuts : other choices of joints that become rows
     loops : whether rows tie the coordinates of the pose together
     held : coordinates that are driven
@@ -43,7 +42,7 @@ class Structure:
     number: int
     kind: str
     model: mbd.Model
-    position: dict[str, float]
+    position: dict[str, Any]
     cuts: list[Any] = field(default_factory=list)
     loops: bool = False
     held: tuple[str, ...] = ()
@@ -91,47 +90,6 @@ def _tree(
     return model, position
 
 
-def _pose(model: mbd.Model, position: dict[str, float]) -> Bodies:
-    """The bodies at a pose, at rest."""
-    still = {name + suffix: np.zeros(1) for name in position for suffix in (".rate", ".acceleration")}
-    values = {name: np.array([value]) for name, value in position.items()} | still
-    told = Readings(np.zeros(1), values, {}, model.parameters, frozenset(position))
-    return Bodies(model, told)
-
-
-def _rotation_vector(R: Array) -> tuple[float, tuple[float, float, float]]:
-    from scipy.spatial.transform import Rotation
-
-    vector = Rotation.from_matrix(R).as_rotvec()
-    angle = float(np.linalg.norm(vector))
-    x, y, z = vector / angle if angle > 0.0 else (0.0, 0.0, 1.0)
-    return angle, (float(x), float(y), float(z))
-
-
-def _close(
-    rng: random.Random, model: mbd.Model, position: dict[str, float], name: str, maker: Any, spatial: bool
-) -> None:
-    """Add a joint between the last body and another one, with its frames where the pose has them."""
-    moving = [body for body in model.bodies.values() if body is not model.ground]
-    last, other = moving[-1], rng.choice([model.ground, model.ground, *moving[:-2]])
-    a = any_frame(rng, other, spatial)
-    value = {label.name: rng.uniform(-1.0, 1.0) for label in maker(a, last.origin).labels}
-    probe = maker(a, last.origin)
-    told = {**position, **{f"{name}.{label}": number for label, number in value.items()}}
-    bodies = _pose(model, told)
-    bodies.told.parameters.update(probe.parameters() | a.parameters())  # type: ignore[attr-defined]
-    H = bodies.frame(a).H[0] @ bodies.between(probe).H[0]
-    inside = np.linalg.inv(bodies.placed[last.name].H[0]) @ H
-    angle, axis = _rotation_vector(inside[:3, :3])
-    point = last.point(float(inside[0, 3]), float(inside[1, 3]), float(inside[2, 3]), name=f"{name} end")
-    if abs(angle) > 1e-9:
-        if not spatial:
-            angle, axis = angle * axis[2], (0.0, 0.0, 1.0)
-        point = point.turned(angle, axis)
-    model.connect(maker(a, point))
-    position |= told
-
-
 def _flat_tree(rng: random.Random) -> tuple[mbd.Model, dict[str, float]]:
     model, position = _tree(rng, rng.randint(1, 3), False, 4)
     add_loads(rng, model, False)
@@ -155,7 +113,7 @@ def _flat_loop(rng: random.Random) -> tuple[mbd.Model, dict[str, float]]:
         maker: Any = lambda a, b: mbd.Revolute("closer", a, b, loss=loss)  # noqa: E731
     else:
         maker = lambda a, b: mbd.Prismatic("closer", a, b, axis=axis, loss=loss)  # noqa: E731
-    _close(rng, model, position, "closer", maker, False)
+    close_loop(rng, model, position, "closer", maker, False)
     add_loads(rng, model, False)
     add_event(rng, model, position, resets=False)
     return model, position
@@ -176,7 +134,7 @@ def _spatial_loop(rng: random.Random) -> tuple[mbd.Model, dict[str, float]]:
             lambda a, b: mbd.Screw("closer", a, b, pitch=0.7, axis=axis),
             lambda a, b: mbd.Prismatic("closer", a, b, axis=axis),
         ]
-    _close(rng, model, position, "closer", rng.choice(makers), True)
+    close_loop(rng, model, position, "closer", rng.choice(makers), True)
     add_loads(rng, model, True)
     return model, position
 
@@ -184,7 +142,7 @@ def _spatial_loop(rng: random.Random) -> tuple[mbd.Model, dict[str, float]]:
 def _contacts(rng: random.Random) -> tuple[mbd.Model, dict[str, float]]:
     """A planar tree with feet over a ground and stops at joints, all open."""
     model, position = _tree(rng, rng.randint(1, 3), False, 4)
-    bodies = _pose(model, position)
+    bodies = pose(model, position)
     feet = [
         body.point(rng.uniform(-0.6, 0.6), rng.uniform(-0.6, 0.6))
         for body in model.bodies.values()
@@ -213,7 +171,7 @@ def _dry(rng: random.Random) -> tuple[mbd.Model, dict[str, float]]:
         model, position = _tree(rng, rng.randint(1, 2), False, 3)
     else:
         model, position = _tree(rng, 3, False, 3, chain=True)
-        _close(rng, model, position, "closer", lambda a, b: mbd.Revolute("closer", a, b), False)
+        close_loop(rng, model, position, "closer", lambda a, b: mbd.Revolute("closer", a, b), False)
     for place, joint in enumerate(model.joints):
         if len(joint.labels) == 1 and rng.random() < 0.8:
             losses: list[Any] = [
@@ -272,7 +230,7 @@ def _driven(rng: random.Random) -> tuple[mbd.Model, dict[str, float]]:
     else:
         last = list(model.bodies.values())[-1]
         tip, anchor = last.point(0.3, -0.4), model.ground.point(3.0, 2.0)
-        bodies = _pose(model, position)
+        bodies = pose(model, position)
         bodies.told.parameters.update(tip.parameters())  # type: ignore[attr-defined]
         length = float(np.linalg.norm(bodies.place(tip)[0] - [3.0, 2.0, 0.0]))
         model.constrain(
@@ -363,6 +321,20 @@ KINDS: dict[str, tuple[Callable[[random.Random], tuple[mbd.Model, dict[str, floa
 """By name: what makes it, whether it is spatial, whether rows tie its coordinates together."""
 
 
+SPACE = 1_000_000
+"""From this number on mechanisms are of `SPATIAL_KINDS`, with joints that turn freely."""
+
+
+def _in_space(number: int) -> Structure:
+    """The same of a number from `SPACE` on."""
+    kind = list(SPATIAL_KINDS)[number % len(SPATIAL_KINDS)]
+    make, loops = SPATIAL_KINDS[kind]
+    rng = random.Random(f"structure {number}")
+    model, position = make(rng)
+    names = [joint.name for joint in model.joints]
+    return Structure(number, kind, model, position, ["all", (rng.choice(names),)], loops)
+
+
 @lru_cache(maxsize=16)
 def structure(number: int) -> Structure:
     """The mechanism of a number.
@@ -372,6 +344,8 @@ def structure(number: int) -> Structure:
     ModelError
         where the library refuses its words.
     """
+    if number >= SPACE:
+        return _in_space(number)
     kind = list(KINDS)[number % len(KINDS)]
     make, spatial, loops = KINDS[kind]
     rng = random.Random(f"structure {number}")

@@ -140,7 +140,7 @@ def _step_there(made: Scene, run: mbd.Trajectory) -> list[str]:
     lo, hi = max(k - 4, 0), min(k + 4, len(run))
     precise = run.settings["integrator"].startswith(("Runge", "Radau"))
     for joint in made.model.joints:
-        for name in joint.coordinate_names:
+        for name in joint.coordinate_names if joint.is_vector else ():
             a = run[f"{name}.acceleration"][lo:hi]
             bound = h**2 * (0.05 if precise else 1.0) * (np.ptp(a) + 1e-6 * np.max(np.abs(a))) + 1e-8 * (
                 1.0 + abs(run[name][k])
@@ -161,8 +161,7 @@ def _other_cut(made: Scene, run: mbd.Trajectory) -> list[str]:
         return []
     cut = others[made.number % len(others)]
     names = [name for joint in made.model.joints for name in joint.coordinate_names]
-    place = {name: float(run[name][0]) for name in names}
-    speed = {name: float(run[f"{name}.rate"][0]) for name in names}
+    place, speed = _beginning(made.model, run)
     other_model = made.form.with_cut(cut)
     again = mbd.assemble(other_model, position=place, velocity=speed, parameters=made.parameters, project=True)
     changes: dict[str, Any] = (
@@ -172,8 +171,7 @@ def _other_cut(made: Scene, run: mbd.Trajectory) -> list[str]:
     if not other.success or not finer.success or [e.name for e in finer.events] != [e.name for e in run.events]:
         return []
     faults = [f"other cut: with {cut!r} {fault}" for fault in judge(other, other_model, made.parameters).faults]
-    ends = [np.array([float(each[name][-1]) for name in names]) for each in (run, other, finer)]
-    a, b, c = ends
+    a, b, c = (_ends(names, each, run) for each in (run, other, finer))
     allowed = (
         27.0 * (np.abs(a - c) + np.max(np.abs(a - c))) + 1e-6 * (1.0 + np.abs(a)) + 30.0 * made.options.get("tol", 0.0)
     )
@@ -182,11 +180,35 @@ def _other_cut(made: Scene, run: mbd.Trajectory) -> list[str]:
     near = run_of(made, model=other_model, start=again, **changes)  # its rows may err more than coordinates do
     if not near.success or [e.name for e in near.events] != [e.name for e in run.events]:
         return faults
-    allowed += 27.0 * np.abs(b - [float(near[name][-1]) for name in names])
+    allowed += 27.0 * np.abs(b - _ends(names, near, run))
     for k in np.flatnonzero(~(np.abs(a - b) <= allowed)):
         ends_at = f"{names[k]!r} ends at {b[k]:.9g} instead of {a[k]:.9g}, with 2/3 of the step at {c[k]:.9g}"
         faults.append(f"other cut: with {cut!r} {ends_at}")
     return faults
+
+
+def _beginning(model: mbd.Model, run: mbd.Trajectory) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Positions and velocities of all joints at the start of a run, by name."""
+    place: dict[str, Any] = {}
+    speed: dict[str, Any] = {}
+    for joint in model.joints:
+        for name in joint.coordinate_names:
+            if ".orientation." not in name:
+                place[name], speed[name] = float(run[name][0]), float(run[f"{name}.rate"][0])
+        if not joint.is_vector:
+            place[f"{joint.name}.orientation"] = tuple(map(float, run[f"{joint.name}.orientation"][0]))
+            speed[f"{joint.name}.angular_velocity"] = tuple(map(float, run[f"{joint.name}.angular_velocity"][0]))
+    return place, speed
+
+
+def _ends(names: list[str], run: mbd.Trajectory, like: mbd.Trajectory) -> Any:
+    """Coordinates at the end of a run, quaternions with the sign of those of another one (n,)."""
+    found = np.array([float(run[name][-1]) for name in names])
+    for k, name in enumerate(names):
+        if name.endswith(".orientation.w"):
+            other = [float(like[each][-1]) for each in names[k : k + 4]]
+            found[k : k + 4] *= 1.0 if found[k : k + 4] @ other >= 0.0 else -1.0
+    return found
 
 
 def _twin(made: Scene, run: mbd.Trajectory) -> list[str]:
@@ -265,7 +287,7 @@ def _tolerance(made: Scene, run: mbd.Trajectory) -> list[str]:
     if not fine.success or _story(fine)[1] != _story(run)[1]:
         return []
     names = [name for joint in made.model.joints for name in joint.coordinate_names]
-    off = {name: abs(float(run[name][-1]) - float(fine[name][-1])) for name in names}
+    off = dict(zip(names, np.abs(_ends(names, run, run) - _ends(names, fine, run)), strict=True))
     worst = max(off, key=lambda name: off[name])
     if off[worst] <= 4.0 * tol + 1e-9:
         return []
