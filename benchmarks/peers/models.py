@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -20,9 +21,11 @@ from benchmarks.peers.scenes import (
     WHEEL,
     Chain,
     FourBars,
+    G,
     Scene,
     Wheel,
 )  # fmt: skip
+from benchmarks.peers.space import COIN, TREES, Tree, centers, rotation, tree
 from mbd.arrays import Matrix, Vector
 
 __all__ = ["Posed", "posed"]
@@ -231,13 +234,68 @@ def stop() -> Posed:
     return Posed(model, start, lambda run, times: at(run, times, "hinge.angle"))
 
 
+def in_space(tree: Tree) -> Posed:
+    """A tree on ball joints, hinges and floating bodies."""
+    model, bodies, shown = mbd.Model("tree", gravity=tree.gravity), list[mbd.RigidBody](), list[str]()
+    position, velocity = dict[str, Any](), dict[str, Any]()
+    for part in tree.parts:
+        body = mbd.RigidBody(part.name, part.mass, part.inertia, center=part.center)
+        frames = (bodies[part.parent] if part.parent >= 0 else model.ground).point(*part.at), body.origin
+        bodies.append(body)
+        name, values = f"{part.name} joint", list(part.q)
+        if part.joint == "hinges":
+            single = len(part.axes) == 1
+            model.connect(mbd.Revolute(name, *frames, axis=part.axes[0]) if single else mbd.Universal(name, *frames))
+            own = [f"{name}.angle"] if single else [f"{name}.first", f"{name}.second"]
+            speeds: list[tuple[str, Any]] = list(zip(own, part.v, strict=True))
+        else:
+            model.connect((mbd.Free if part.joint == "free" else mbd.Spherical)(name, *frames))
+            places = [f"{name}.{axis}" for axis in "xyz"] if part.joint == "free" else []
+            own, values = [*places, f"{name}.orientation"], [*values[:-4], tuple(values[-4:])]  # type: ignore[list-item]
+            speeds = [*zip(places, part.v, strict=False), (f"{name}.angular_velocity", part.v[-3:])]
+        position |= dict(zip(own, values, strict=True))
+        velocity |= dict(speeds)
+        shown += [name for each in own for name in _components(each)]
+    start = mbd.assemble(model, position, velocity)
+    return Posed(model, start, lambda run, times: centers(tree, at(run, times, *shown)))
+
+
+def _components(name: str) -> list[str]:
+    return [f"{name}.{part}" for part in "wxyz"] if name.endswith("orientation") else [name]
+
+
+def coin() -> Posed:
+    """A disk whose edge stays on the plane y = 0, where it rolls; ours is the scene's turned by −π/2 about x."""
+    p, turned = COIN, np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+    model, about = mbd.Model("coin", gravity=(0.0, -G, 0.0)), (0.0, 0.0, -1.0)
+    across = p.mass * p.radius**2 / 4.0
+    disk = mbd.RigidBody("disk", p.mass, (across, across, 2.0 * across))
+    model.connect(mbd.Free("float", model.ground.origin, disk.origin))
+    model.constrain(mbd.Bilateral("edge", mbd.disk_touchdown(disk.origin, p.radius, axis=about)))
+    model.constrain(mbd.Rolling("grip", disk.origin, p.radius, axis=about))
+    x, y, z = (float(part) for part in turned @ p.place)
+    place = {"float.orientation": ((1.0, 0.0, 0.0), p.lean), "float.x": x, "float.y": y, "float.z": z}
+    omega = rotation(np.array([np.cos(p.lean / 2.0), np.sin(p.lean / 2.0), 0.0, 0.0])).T @ turned @ p.omega
+    start = mbd.assemble(model, place, {"float.angular_velocity": tuple(omega)})
+
+    def read(run: mbd.Trajectory, times: Vector) -> Matrix:
+        values = at(run, times, "float.x", "float.y", "float.z", *_components("float.orientation"))
+        return np.hstack([values[:, :3] @ turned, -rotation(values[:, 3:])[..., 2] @ turned])
+
+    return Posed(model, start, read)
+
+
 def posed(scene: Scene) -> Posed:
     """The model of a scene."""
     name = scene.name
+    if name in TREES:
+        return in_space(tree(name))
     if name in CHAINS:
         return chain(CHAINS[name])
     if name in FOUR_BARS:
         return four_bars(FOUR_BARS[name])
     if name in WHEEL:
         return wheel(WHEEL[name]) if name == "S4b" else stance(WHEEL[name])
-    return {"S3b": andrews, "S4a": ball, "S4c": leg, "S4d": compass, "S5": elastic, "S5b": stop}[name]()
+    return {"S3b": andrews, "S4a": ball, "S4c": leg, "S4d": compass, "S5": elastic, "S5b": stop, "S7_coin": coin}[
+        name
+    ]()

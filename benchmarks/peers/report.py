@@ -15,6 +15,7 @@ TOLERANCES = (1e-3, 1e-6, 1e-9)
 GROUPS = {
     "S1": "Double pendulum", "S2": "Chains", "S3a": "Four-bars through singular poses", "S3b": "Andrews' mechanism",
     "S4": "Impacts", "S5": "Stiff springs",
+    "S7": "In space",
 }  # fmt: skip
 """Sections and pictures: scenes whose names begin so."""
 LOOP, CALL = "mbd, loop", "mbd, call"

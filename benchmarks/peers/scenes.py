@@ -1,7 +1,7 @@
 """The physics of every scene in numbers, its output times, and how an error is measured.
 
-All scenes are planar. Angles θ are counted from straight down and positive towards +x, y is up, unless a scene says
-otherwise; a rod's direction is then (sin θ, −cos θ). SI units, radians.
+All scenes but S7, whose numbers stand in `space`, are planar. Angles θ are counted from straight down and positive
+towards +x, y is up, unless a scene says otherwise; a rod's direction is then (sin θ, −cos θ). SI units, radians.
 """
 
 from __future__ import annotations
@@ -241,6 +241,11 @@ SCENES = {
         Scene("S4d", "compass gait, 16 s, 22 strikes", 16.0, 0.05, "θ of both legs and their rates", skipped=2e-3),
         Scene("S5", "elastic pendulum, 1e7 N/m, 5 s", 5.0, 0.1, "θ [rad] and stretch [m]"),
         Scene("S5b", "pendulum on a stop of 1e7 N/m, 3 s", 3.0, 0.01, "θ [rad]"),
+        Scene("S7_top", "heavy top with nutation, 1 s", 1.0, 0.05, "direction of its axis [-]"),
+        Scene("S7_double", "double pendulum on ball joints, 3 s", 3.0, 0.1, "centers of mass [m]"),
+        Scene("S7_chain", "chain of 8 bars on ball joints, 0.6 s", 0.6, 0.02, "centers of mass [m]"),
+        Scene("S7_human", "human in flight, 34 degrees of freedom, 0.5 s", 0.5, 0.05, "centers of mass [m]"),
+        Scene("S7_coin", "rolling coin, 4 s", 4.0, 0.1, "center [m] and axis [-]"),
     )
 }  # fmt: skip
 

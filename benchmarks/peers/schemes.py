@@ -107,6 +107,31 @@ TABLE: dict[str, tuple[Scheme, ...]] = {
         Scheme(RK, dts=down(2e-3, 1e-4), tols=TOLS),
         Scheme(RADAU, dts=down(2e-3, 1e-4), tols=TOLS),
     ),
+    "S7_top": (
+        Scheme(*TRAPEZOID, dts=down(2e-3, 1e-5)),
+        Scheme(RK, dts=(0.05 / 6, 0.00625, 0.005, 0.05 / 12, 0.003125, 0.0025, 0.05 / 24, 0.05 / 32), tols=TOLS),
+        Scheme(RADAU, dts=down(0.00625, 4e-4), tols=TOLS),
+    ),
+    "S7_double": (
+        Scheme(*TRAPEZOID, dts=down(0.02, 1e-4)),
+        Scheme(RK, dts=(0.2, 0.15, 0.125, 0.1, 0.05, 0.1 / 3, 0.025, 0.02, 0.1 / 6, 0.0125, 0.01), tols=TOLS),
+        Scheme(RADAU, dts=down(0.05, 3e-3), tols=TOLS),
+    ),
+    "S7_chain": (
+        Scheme(*TRAPEZOID, dts=down(0.01, 1e-4)),
+        Scheme(RK, dts=(0.02, 0.6 / 34, 0.6 / 38, 0.6 / 44, 0.01, 0.02 / 3, 0.005, 0.004, 0.02 / 6, 0.0025), tols=TOLS),
+        Scheme(RADAU, dts=down(0.02, 1e-3), tols=TOLS),
+    ),
+    "S7_human": (
+        Scheme(*TRAPEZOID, dts=down(0.025, 5e-4)),
+        Scheme(RK, dts=(0.25, 0.5 / 3, 0.125, 0.1, 0.5 / 6, 0.0625, 0.05, 0.025, 0.05 / 3, 0.0125), tols=TOLS),
+        Scheme(RADAU, dts=down(0.025, 6e-3), tols=TOLS),
+    ),
+    "S7_coin": (
+        Scheme(*TRAPEZOID, dts=down(0.02, 1e-4)),
+        Scheme(RK, dts=(0.25, 0.2, 0.16, 0.125, 0.1, 0.05, 0.1 / 3, 0.025, 0.02, 0.1 / 6, 0.0125), tols=TOLS),
+        Scheme(RADAU, dts=down(0.1, 6e-3), tols=TOLS),
+    ),
 }  # fmt: skip
 """By scene or family."""
 TABLE["S1d"] = TABLE["S1"]

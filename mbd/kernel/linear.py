@@ -8,7 +8,9 @@ from __future__ import annotations
 from mbd.kernel.codes import EPS
 from mbd.kernel.records import Integers, Reals
 
-__all__ = ["eliminate", "factor", "round_off", "solve", "solve_again", "solve_definite", "sum_of_sizes"]
+__all__ = [
+    "eliminate", "factor", "round_off", "solve", "solve_again", "solve_definite", "solve_from_tips", "sum_of_sizes",
+]  # fmt: skip
 
 MOST_ROUND_OFF = 1e-12
 """Part of the entries that a pivot came from which is more than round-off in any size of matrix [-]."""
@@ -124,6 +126,62 @@ def solve_again(M: Reals, n: int, b: Reals) -> None:
         for i in range(k + 1, n):
             b[i] -= M[k * n + i] * left
     substitute_back(M, n, b)
+
+
+def solve_from_tips(M: Reals, n: int, b: Reals, work: Reals) -> float:
+    """`solve_definite` by M = Lᵀ D L, last unknown first, D L in the lower half of M.
+
+    Of a tree whose coordinates are numbered outwards the zeros of M between branches stay zeros (Featherstone 2005,
+    Int. J. Robotics Research 24:487).
+    """
+    for k in range(n):
+        work[k] = abs(M[k * n + k])
+    kept = 1.0
+    lost = round_off(n)
+    for c in range(n):
+        k = n - 1 - c
+        pivot = M[k * n + k]
+        if not pivot > lost * work[k]:
+            return 0.0
+        if pivot < kept * work[k]:
+            kept = pivot / work[k]
+        inverse = 1.0 / pivot
+        M[k * n + k] = inverse
+        for i in range(k):
+            if M[k * n + i] != 0.0:
+                left = M[k * n + i] * inverse
+                b[i] -= left * b[k]
+                subtract_head(M, n, i, k, left)
+    for k in range(n):
+        left = b[k]
+        even = 0.0
+        j = 0
+        while j + 1 < k:
+            left -= M[k * n + j] * b[j]
+            even -= M[k * n + j + 1] * b[j + 1]
+            j += 2
+        if j < k:
+            left -= M[k * n + j] * b[j]
+        b[k] = (left + even) * M[k * n + k]
+    return kept
+
+
+def subtract_head(A: Reals, n: int, i: int, k: int, part: float) -> None:
+    """Row i less `part` times row k, up to the diagonal."""
+    j = 0
+    while j + 3 <= i:
+        a0 = A[i * n + j] - part * A[k * n + j]
+        a1 = A[i * n + j + 1] - part * A[k * n + j + 1]
+        a2 = A[i * n + j + 2] - part * A[k * n + j + 2]
+        a3 = A[i * n + j + 3] - part * A[k * n + j + 3]
+        A[i * n + j] = a0
+        A[i * n + j + 1] = a1
+        A[i * n + j + 2] = a2
+        A[i * n + j + 3] = a3
+        j += 4
+    while j <= i:
+        A[i * n + j] -= part * A[k * n + j]
+        j += 1
 
 
 def substitute_back(M: Reals, n: int, b: Reals) -> None:

@@ -7,9 +7,12 @@ at a pole they grow at each halving, at a bump that the step does not resolve th
 
 from __future__ import annotations
 
-from mbd.kernel.codes import NOT_FINITE
-from mbd.kernel.records import Guards, Switching
-from mbd.kernel.restart import compose, consistent, fill_block
+from mbd.kernel.codes import ACCELERATIONS, NOT_FINITE
+from mbd.kernel.hooks import call
+from mbd.kernel.linear import solve_from_tips
+from mbd.kernel.mass_ratios import LOSS
+from mbd.kernel.records import Switching
+from mbd.kernel.restart import compose, consistent, evaluate, fill_block
 
 __all__ = ["leaps"]
 
@@ -87,6 +90,10 @@ def pull_at(K: Switching, h: float, part: float, at_y: int) -> float:
                 way = K.inside[i] - K.q[i]
             K.block[K.o_x + i] = part * way  # straight: a curve through both velocities would leave the places between
     compose(K, K.q1)
+    if K.n_rows == 0 and K.n_frictions == 0:
+        quick = pull_without_rows(K, t)
+        if quick != NOT_FOUND:
+            return quick
     status = consistent(K, t, K.q1, K.y1)
     if status == NOT_FINITE:
         return 1e300
@@ -99,8 +106,27 @@ def pull_at(K: Switching, h: float, part: float, at_y: int) -> float:
     return float(total)
 
 
-def motion_at(K: Guards, at_y: int) -> float:
-    """v·M v of the new state, with the masses that were evaluated last."""
+def pull_without_rows(K: Switching, t: float) -> float:
+    """The same at (q1, y1) where nothing is held, ``−v̇·f``; `NOT_FOUND` where M is not clearly positive definite."""
+    n = K.n
+    evaluate(K, t, K.q1, K.y1)
+    finite = 0.0
+    for i in range(n):
+        K.jump[i] = -K.acc[K.acc_f + i]
+        finite += abs(K.jump[i])
+    if not finite < 1e300:
+        return NOT_FOUND
+    if solve_from_tips(K.acc, n, K.jump, K.spare) < LOSS:
+        return NOT_FOUND
+    total = 0.0
+    for i in range(K.n_v):
+        total -= K.jump[i] * K.acc[K.acc_f + i]
+    return float(total)
+
+
+def motion_at(K: Switching, at_y: int) -> float:
+    """v·M v of the new state, with the masses of the place that was looked at last, which is in the block."""
+    call(K, ACCELERATIONS, K.acc)
     total = 0.0
     for i in range(K.n_v):
         for j in range(K.n_v):

@@ -18,6 +18,7 @@ from benchmarks.peers.models import posed
 from benchmarks.peers.race import Attempt, Outcome, Result, measured
 from benchmarks.peers.references import bounces, smooth
 from benchmarks.peers.scenes import BALL, CHAINS, SCENES, G, chosen
+from benchmarks.peers.space import centers, tree, tree_motion
 
 PUBLISHED = np.array([
     15.81077119629904, -15.75637105984298, 0.04082224013073101, -0.5347301163226948, 0.5244099658805304,
@@ -31,7 +32,9 @@ REACHED = {
     "S2_8": (TRAPEZOID, 1e-3, 4e-4), "S3a_1": (DAMPED, 1e-2, 1e-3), "S3b": (DAMPED, 1e-5, 1e-4),
     "S4a": (UNDAMPED, 1e-2, 1e-12), "S4b": (UNDAMPED, 1e-3, 2e-6), "S4b_point": (UNDAMPED, 1e-3, 6e-6),
     "S4c": (UNDAMPED, 1e-3, 2e-5), "S4d": (UNDAMPED, 1e-3, 4e-4), "S5": (TRAPEZOID, 1e-3, 2e-5),
-    "S5b": (UNDAMPED, 1e-5, 2e-4),
+    "S5b": (UNDAMPED, 1e-5, 2e-4), "S7_top": (mbd.RungeKutta853(), 0.005, 1e-7),
+    "S7_double": (mbd.RungeKutta853(), 0.025, 1e-9), "S7_coin": (mbd.RungeKutta853(), 0.05, 5e-8),
+    "S7_human": (TRAPEZOID, 0.0125, 3e-4), "S7_chain": (mbd.RungeKutta853(), 0.005, 5e-7),
 }  # fmt: skip
 """Integrator, dt [s], error that it stays below."""
 REACHED_SLOWLY = {"S2_32": (TRAPEZOID, 1e-3, 1e-2), "S3a_10": (DAMPED, 1e-2, 1e-3), "S3a_40": (DAMPED, 1e-2, 1e-3)}
@@ -65,6 +68,36 @@ def test_every_scene_is_tried():
 # references ---------------------------------------------------------------------------------------------------------
 def test_andrews_mechanism_ends_where_it_is_published():
     assert np.abs(SCENES["S3b"].reference[-1] - PUBLISHED).max() < 2e-9
+
+
+@pytest.mark.parametrize(("name", "at", "values"), [
+    ("S7_top", 0.2, (0.10128031335714367, -0.4696827918805275, 0.8770064840909626)),
+    ("S7_top", 1.0, (0.43922191412407385, -0.22391011356260063, 0.8700277990947002)),
+    ("S7_double", 1.5, (
+        0.267866390766027, -0.12478441512266039, -0.40333168291181615, 0.8589180422424227, -0.26290087942227597,
+        -1.0419792040587887,
+    )),
+    ("S7_double", 3.0, (
+        0.0023062813492374795, -0.19100232947256351, -0.4620744433556053, 0.02177092976891756, -0.34403101340838044,
+        -1.3219724565058188,
+    )),
+    ("S7_coin", 1.5, (5.040577607587456, -3.202021082477463, 0.46929476587072877)),
+    ("S7_coin", 4.0, (1.436826928663725, -11.402125175972271, 0.4669370815330944)),
+])  # fmt: skip
+def test_scenes_in_space_pass_where_two_other_integrations_do(name, at, values):
+    """Cases e2 (Euler angles in Taylor series), e4 (Kane and multipliers) and d4 (O'Reilly 1996), to 1e-11."""
+    scene = SCENES[name]
+    assert np.abs(scene.reference[round(at / scene.every)][: len(values)] - values).max() < 1e-11
+
+
+def test_trees_by_hinges_move_as_those_with_ball_joints():
+    for name in ("S7_top", "S7_human"):
+        own = tree(name)
+        hinges, q = own.by_hinges, own.q + 1e-3 * np.arange(len(own.q))
+        assert np.abs(centers(own, own.q) - centers(hinges, hinges.q)).max() < 1e-15
+        assert np.isfinite(centers(own, q)).all()
+    own, times = tree("S7_double"), np.array([0.0, 0.05])
+    assert np.abs(tree_motion(own, times, 1e-11) - tree_motion(own.by_hinges, times, 1e-11)).max() < 1e-10
 
 
 def test_stored_references_are_those_of_the_equations():

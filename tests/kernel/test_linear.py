@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from mbd.kernel.linear import eliminate, factor, solve, solve_definite
+from mbd.kernel.linear import eliminate, factor, solve, solve_definite, solve_from_tips
 
 sizes = st.integers(1, 9)
 seeds = st.integers(0, 2**32 - 1)
@@ -96,6 +96,25 @@ def test_definite_masses_are_solved_with(n, seed):
     np.testing.assert_allclose(M @ x, b, rtol=0, atol=bound * np.abs(M).max())
 
 
+@given(n=st.integers(1, 12), seed=seeds)
+def test_masses_of_a_tree_are_solved_from_its_tips_without_a_new_entry(n, seed):
+    """Zeros between branches stay zeros; what is solved is what numpy solves."""
+    rng = np.random.default_rng(seed)
+    carriers = [int(rng.integers(-1, k)) for k in range(n)]
+    J = np.zeros((n, n))  # rates of bodies by coordinates: of those on the way down
+    for k in range(n):
+        below = k
+        while below >= 0:
+            J[k, below] = rng.normal()
+            below = carriers[below]
+    M, b = J.T @ J + np.diag(rng.uniform(0.1, 1.0, n)), rng.normal(size=n)
+    flat, x = M.flatten(), b.copy()
+    assert solve_from_tips(flat, n, x, np.zeros(n)) > 0.0
+    bound = 1e-13 * np.linalg.cond(M) * (1.0 + np.abs(b).max())
+    np.testing.assert_allclose(M @ x, b, rtol=0, atol=bound * np.abs(M).max())
+    assert not np.tril(flat.reshape(n, n))[M == 0.0].any()
+
+
 @given(n=st.integers(2, 9), seed=seeds)
 def test_masses_that_are_not_definite_are_refused(n, seed):
     rng = np.random.default_rng(seed)
@@ -105,3 +124,4 @@ def test_masses_that_are_not_definite_are_refused(n, seed):
     signs[rng.integers(n)] = -1.0
     for M in (root @ root.T, np.diag(signs)):
         assert not solve_definite(M.flatten(), n, rng.normal(size=n), np.zeros(n))
+        assert not solve_from_tips(M.flatten(), n, rng.normal(size=n), np.zeros(n))

@@ -11,6 +11,7 @@ import numpy as np
 
 from benchmarks.peers.race import Attempt, Outcome, Sweep, seconds
 from benchmarks.peers.scenes import BALL, CHAINS, ELASTIC, FOUR_BARS, LEG, WHEEL, G, Scene
+from benchmarks.peers.systems import space_dart
 
 __all__ = ["attempts", "first_step", "version"]
 
@@ -185,6 +186,8 @@ MAKERS = {
 
 
 def attempts(scene: Scene) -> list[Sweep]:
+    if scene.family == "S7":
+        return space_dart.attempts(scene)
     if scene.family == "S2":
         base = 0.02 / max(4, CHAINS[scene.name].n // 4)
         make, steps = _chain, (base, base / 8, base / 64)

@@ -27,6 +27,7 @@ from pydrake.examples import CompassGait, RimlessWheel
 
 from benchmarks.peers.race import Attempt, Outcome, Sweep, seconds
 from benchmarks.peers.scenes import ANDREWS, CHAINS, COMPASS, ELASTIC, FOUR_BARS, LEG, WHEEL, G, Scene
+from benchmarks.peers.systems import space_drake
 
 __all__ = ["attempts", "first_step", "version"]
 
@@ -219,6 +220,9 @@ def _gait(scene: Scene, accuracy: float) -> Outcome:
 
 
 def attempts(scene: Scene) -> list[Sweep]:
+    if scene.family == "S7":
+        return space_drake.attempts(scene)
+
     def controlled(make: Any, scheme: str, *accuracies: float) -> Sweep:
         return [
             Attempt(f"{scheme} accuracy={a:g}", partial(make, scene, scheme=scheme, accuracy=a)) for a in accuracies

@@ -39,6 +39,7 @@ from exudyn.itemInterface import (
 
 from benchmarks.peers.race import Attempt, Outcome, Sweep, seconds
 from benchmarks.peers.scenes import ANDREWS, BALL, CHAINS, ELASTIC, FOUR_BARS, LEG, STOP, G, Scene
+from benchmarks.peers.systems import space_exudyn
 
 __all__ = ["attempts", "first_step", "version"]
 
@@ -295,6 +296,8 @@ def _swept(name: str, make: Any, scene: Scene, steps: Sequence[float], **words: 
 
 
 def attempts(scene: Scene) -> list[Sweep]:
+    if scene.family == "S7":
+        return space_exudyn.attempts(scene)
     trapezoid, rk4, rk67 = ({"solver": solver} for solver in (SOLVERS.TrapezoidalIndex2, SOLVERS.RK44, SOLVERS.RK67))
     bodies, tree, alpha = "2D bodies, trapezoidal index 2", "tree, RK44", "generalized-alpha rho=0.9"
     if scene.family in ("S1", "S1d"):

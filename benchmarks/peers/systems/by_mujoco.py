@@ -25,6 +25,7 @@ from benchmarks.peers.scenes import (
     G,
     Scene,
 )  # fmt: skip
+from benchmarks.peers.systems import space_mujoco
 
 __all__ = ["attempts", "first_step", "version"]
 
@@ -234,6 +235,8 @@ MAKERS: dict[str, tuple[Any, Sequence[tuple[Any, ...]]]] = {
 
 
 def attempts(scene: Scene) -> list[Sweep]:
+    if scene.family == "S7":
+        return space_mujoco.attempts(scene)
     if scene.family == "S2":
         base = 0.02 / max(4, CHAINS[scene.name].n // 4)
         make, sweeps = _chain, [("RK4", (base, base / 2, base / 4, base / 16, base / 64))]

@@ -11,6 +11,7 @@ import pinocchio as pin
 
 from benchmarks.peers.race import Attempt, Outcome, Sweep, seconds
 from benchmarks.peers.scenes import ANDREWS, CHAINS, ELASTIC, FOUR_BARS, G, Scene
+from benchmarks.peers.systems import space_pinocchio
 
 __all__ = ["attempts", "first_step", "version"]
 
@@ -165,6 +166,8 @@ def _elastic(scene: Scene, h: float) -> Outcome:
 
 
 def attempts(scene: Scene) -> list[Sweep]:
+    if scene.family == "S7":
+        return space_pinocchio.attempts(scene)
     makers = {"S1": _chain, "S1d": _chain, "S2": _chain, "S3a": _four_bars, "S3b": _andrews, "S5": _elastic}
     make = makers.get(scene.family)
     if make is None:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from mbd.kernel.codes import EPS, INCREMENT_RATES, NOT_CONVERGED, NOT_FINITE, PASSING, SINGULAR
 from mbd.kernel.hooks import call
-from mbd.kernel.linear import solve_definite
+from mbd.kernel.linear import solve_definite, solve_from_tips
 from mbd.kernel.mass_ratios import LOSS, is_uneven, polish_rates, polish_with_rows
 from mbd.kernel.ordered import LOSS_AT_ONCE, solve_kkt
 from mbd.kernel.records import Balance, DependentRows, Kernel, Mechanism, Memory, SingularSteps, Steps
@@ -161,6 +161,12 @@ def explicit_rates(K: Balance, t: float) -> int:
     if m == 0:
         for i in range(n):
             K.jump[i] = -K.acc[K.acc_f + i]
+        if K.vector == 0 and solve_from_tips(K.acc, n, K.jump, K.spare) >= LOSS:
+            return 0
+        if K.vector == 0:
+            evaluate(K, t, K.q1, K.y1)
+            for i in range(n):
+                K.jump[i] = -K.acc[K.acc_f + i]
         kept = solve_definite(K.acc, n, K.jump, K.spare)
         if kept == 0.0:
             return consistent(K, t, K.q1, K.y1)
