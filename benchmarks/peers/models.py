@@ -25,7 +25,7 @@ from benchmarks.peers.scenes import (
     Scene,
     Wheel,
 )  # fmt: skip
-from benchmarks.peers.space import COIN, TREES, Tree, centers, rotation, tree
+from benchmarks.peers.space import COIN, TREES, Part, Tree, centers, rotation, tree
 from mbd.arrays import Matrix, Vector
 
 __all__ = ["Posed", "posed"]
@@ -244,9 +244,7 @@ def in_space(tree: Tree) -> Posed:
         bodies.append(body)
         name, values = f"{part.name} joint", list(part.q)
         if part.joint == "hinges":
-            single = len(part.axes) == 1
-            model.connect(mbd.Revolute(name, *frames, axis=part.axes[0]) if single else mbd.Universal(name, *frames))
-            own = [f"{name}.angle"] if single else [f"{name}.first", f"{name}.second"]
+            own = _hinged(model, part, name, *frames)
             speeds: list[tuple[str, Any]] = list(zip(own, part.v, strict=True))
         else:
             model.connect((mbd.Free if part.joint == "free" else mbd.Spherical)(name, *frames))
@@ -258,6 +256,24 @@ def in_space(tree: Tree) -> Posed:
         shown += [name for each in own for name in _components(each)]
     start = mbd.assemble(model, position, velocity)
     return Posed(model, start, lambda run, times: centers(tree, at(run, times, *shown)))
+
+
+def _hinged(model: mbd.Model, part: Part, name: str, before: Any, body: Any) -> list[str]:
+    """Coordinates of slides and hinges in a row, between them bodies without mass; two hinges are a `Universal`."""
+    if len(part.axes) == 2:
+        model.connect(mbd.Universal(name, before, body))
+        return [f"{name}.first", f"{name}.second"]
+    found = []
+    if part.floats:
+        carrier = mbd.RigidBody(f"{name} carrier", 0.0, 0.0)
+        model.connect(mbd.Translation(f"{name} slides", before, carrier.origin, axes="xyz"))
+        before, found = carrier.origin, [f"{name} slides.{axis}" for axis in "xyz"]
+    for k, axis in enumerate(part.axes):
+        after = body if k == len(part.axes) - 1 else mbd.RigidBody(f"{name} link {k}", 0.0, 0.0).origin
+        model.connect(mbd.Revolute(f"{name} {k}", before, after, axis=axis))
+        before = after
+        found.append(f"{name} {k}.angle")
+    return found
 
 
 def _components(name: str) -> list[str]:

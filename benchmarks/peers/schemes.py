@@ -117,6 +117,9 @@ TABLE: dict[str, tuple[Scheme, ...]] = {
         Scheme(RK, dts=(0.2, 0.15, 0.125, 0.1, 0.05, 0.1 / 3, 0.025, 0.02, 0.1 / 6, 0.0125, 0.01), tols=TOLS),
         Scheme(RADAU, dts=down(0.05, 3e-3), tols=TOLS),
     ),
+    "S7_top, hinges": (Scheme(RK, dts=(0.05, 0.05 / 2, 0.05 / 3, 0.0125, 0.01, 0.05 / 6, 0.00625, 0.005, 0.0025)),),
+    "S7_double, hinges": (Scheme(RK, dts=(0.1, 0.05, 0.1 / 3, 0.025, 0.02, 0.0125, 0.01)),),
+    "S7_chain, hinges": (Scheme(RK, dts=(0.02, 0.01, 0.02 / 3, 0.005, 0.004, 0.0025)),),
     "S7_chain": (
         Scheme(*TRAPEZOID, dts=down(0.01, 1e-4)),
         Scheme(RK, dts=(0.02, 0.6 / 34, 0.6 / 38, 0.6 / 44, 0.01, 0.02 / 3, 0.005, 0.004, 0.02 / 6, 0.0025), tols=TOLS),
@@ -137,10 +140,11 @@ TABLE: dict[str, tuple[Scheme, ...]] = {
 TABLE["S1d"] = TABLE["S1"]
 
 
-def settings(scene: Scene) -> list[list[Setting]]:
-    """The sweeps of a scene, with the schemes that exist."""
+def settings(scene: Scene, by_hinges: bool = False) -> list[list[Setting]]:
+    """The sweeps of a scene, with the schemes that exist; of one in space those of its model `by_hinges`."""
     sweeps = []
-    for scheme in TABLE.get(scene.name, TABLE.get(scene.family, ())):
+    name = f"{scene.name}, hinges" if by_hinges else scene.name
+    for scheme in TABLE.get(name, TABLE.get(scene.family, ())):
         if scheme.exists:
             integrator = getattr(mbd, scheme.name)(*scheme.arguments)
             sweeps.append([Setting(integrator, {"dt": dt}) for dt in scheme.dts])

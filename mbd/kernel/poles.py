@@ -11,7 +11,7 @@ from mbd.kernel.codes import ACCELERATIONS, NOT_FINITE
 from mbd.kernel.hooks import call
 from mbd.kernel.linear import solve_from_tips
 from mbd.kernel.mass_ratios import LOSS
-from mbd.kernel.records import Switching
+from mbd.kernel.records import Balance, Guards, Switching
 from mbd.kernel.restart import compose, consistent, evaluate, fill_block
 
 __all__ = ["leaps"]
@@ -106,7 +106,7 @@ def pull_at(K: Switching, h: float, part: float, at_y: int) -> float:
     return float(total)
 
 
-def pull_without_rows(K: Switching, t: float) -> float:
+def pull_without_rows(K: Balance, t: float) -> float:
     """The same at (q1, y1) where nothing is held, ``−v̇·f``; `NOT_FOUND` where M is not clearly positive definite."""
     n = K.n
     evaluate(K, t, K.q1, K.y1)
@@ -124,7 +124,7 @@ def pull_without_rows(K: Switching, t: float) -> float:
     return float(total)
 
 
-def motion_at(K: Switching, at_y: int) -> float:
+def motion_at(K: Guards, at_y: int) -> float:
     """v·M v of the new state, with the masses of the place that was looked at last, which is in the block."""
     call(K, ACCELERATIONS, K.acc)
     total = 0.0

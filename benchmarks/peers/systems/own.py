@@ -8,15 +8,18 @@ from time import process_time
 
 import mbd
 from benchmarks.peers.equations import problem
-from benchmarks.peers.models import Posed, posed
+from benchmarks.peers.models import Posed, in_space, posed
 from benchmarks.peers.race import Attempt, Outcome, Sweep
 from benchmarks.peers.scenes import Scene
 from benchmarks.peers.schemes import Setting, settings
+from benchmarks.peers.space import tree
 from benchmarks.stopwatch import kernel_watched
 from mbd.compile import background
 
 __all__ = ["attempts", "first_step", "once", "version"]
 
+BY_HINGES = ("S7_top", "S7_double", "S7_chain")
+"""Trees of ball joints that are tried with three hinges for each, too."""
 APART = 1e-5
 """Time between stored rows of motions with impacts, at least: cubic interpolation adds less than 1e-10 to any [s]."""
 
@@ -52,12 +55,17 @@ def once(scene: Scene, case: Posed, setting: Setting) -> Outcome:
 
 def attempts(scene: Scene) -> list[Sweep]:
     """Every scheme of the table; each model is derived, and the code of its modes made, before anything is timed."""
-    case, sweeps = posed(scene), settings(scene)
-    for sweep in sweeps:
-        with suppress(mbd.MbdError):  # a setting that fails says so when it is measured
-            once(scene, case, sweep[0])
-            background.finish()
-    return [[Attempt(one.label, partial(once, scene, case, one)) for one in sweep] for sweep in sweeps]
+    cases = [("", posed(scene))]
+    if scene.name in BY_HINGES:
+        cases.append(("three hinges, ", in_space(tree(scene.name).by_hinges)))
+    found = []
+    for words, case in cases:
+        for sweep in settings(scene, bool(words)):
+            with suppress(mbd.MbdError):  # a setting that fails says so when it is measured
+                once(scene, case, sweep[0])
+                background.finish()
+            found.append([Attempt(words + one.label, partial(once, scene, case, one)) for one in sweep])
+    return found
 
 
 def first_step(scene: Scene) -> None:

@@ -34,10 +34,12 @@ HINGES = (exu.JointType.RevoluteX, exu.JointType.RevoluteY, exu.JointType.Revolu
 SLIDES = (exu.JointType.PrismaticX, exu.JointType.PrismaticY, exu.JointType.PrismaticZ)
 TINY = (np.zeros((3, 3)), np.zeros(3), 0.0)
 STEPS = {
-    "S7_top": (5e-3, 2.5e-3, 1e-3, 5e-4, 2.5e-4, 1e-4), "S7_double": (0.05, 0.025, 0.02, 0.01, 0.005, 0.002, 0.001),
-    "S7_chain": (0.02, 0.01, 0.005, 0.002, 0.001, 5e-4), "S7_human": (0.05, 0.025, 0.0125, 0.01, 0.005, 0.0025, 0.001),
+    "S7_top": (0.025, 0.0125, 0.01, 5e-3, 2.5e-3, 1e-3, 5e-4, 2.5e-4, 1e-4),
+    "S7_double": (0.05, 0.025, 0.02, 0.01, 0.005, 0.002, 0.001),
+    "S7_chain": (0.02, 0.01, 0.005, 0.002, 0.001, 5e-4),
+    "S7_human": (0.05, 0.025, 0.0125, 0.01, 0.005, 0.0025, 0.001),
     "S7_coin": (0.02, 0.01, 0.005, 0.002, 0.001, 5e-4, 2e-4),
-}  # fmt: skip
+}
 
 
 def _solve(

@@ -16,9 +16,11 @@ from benchmarks.peers.space import TREES, Part, Tree, centers, tree
 __all__ = ["attempts"]
 
 STEPS = {
-    "S7_top": (5e-3, 2.5e-3, 1e-3, 5e-4, 2.5e-4), "S7_double": (0.1, 0.05, 0.025, 0.02, 0.01, 0.005, 0.002, 0.001),
-    "S7_chain": (0.02, 0.01, 0.005, 0.002, 0.001, 5e-4), "S7_human": (0.05, 0.025, 0.0125, 0.01, 0.005, 0.0025, 0.001),
-}  # fmt: skip
+    "S7_top": (0.025, 0.0125, 0.01, 5e-3, 2.5e-3, 1e-3, 5e-4, 2.5e-4),
+    "S7_double": (0.1, 0.05, 0.025, 0.02, 0.01, 0.005, 0.002, 0.001),
+    "S7_chain": (0.02, 0.01, 0.005, 0.002, 0.001, 5e-4),
+    "S7_human": (0.05, 0.025, 0.0125, 0.01, 0.005, 0.0025, 0.001),
+}
 A, B = tableau.A[:12, :12].copy(), tableau.B.copy()
 HINGE = {0: pin.JointModelRX, 1: pin.JointModelRY, 2: pin.JointModelRZ}
 SLIDE = (pin.JointModelPX, pin.JointModelPY, pin.JointModelPZ)
