@@ -49,6 +49,8 @@ def judge_change(K: Kernel, h: float, t1: float) -> int:
     worst = largest_share(K, h, stretch)
     if (worst <= LOOK_TWICE and not bends(K, h)) or K.near_singular > 0 or sharing(K):
         return 0
+    if worst > LOOK_TWICE:  # then stages have seen nothing that counts
+        K.stage_pull = 0.0
     return look_closer(K, h, t1, stretch, worst > K.look_twice)
 
 

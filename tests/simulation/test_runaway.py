@@ -168,3 +168,27 @@ def test_a_steep_place_that_steps_resolve_is_passed(scheme):
         x, v = run["rail.displacement"], run["rail.displacement.rate"]
         energy = 0.5 * v**2 - 0.7 / np.sqrt(x**2 + 0.01)
         assert np.ptp(energy) < 0.03 and x.min() < 0.0
+
+
+@cache
+def drifting(power: int) -> mbd.Model:
+    """A body that floats, whose steps have a chart, pulled towards x = 0 by 0.7/|x|^(power + 1)."""
+    model = mbd.Model("drift", gravity=(0.0, 0.0, 0.0))
+    body = mbd.RigidBody("body", 1.0, (0.1, 0.2, 0.3))
+    model.connect(mbd.Free("float", model.ground.origin, body.origin))
+    model.apply(mbd.Potential("well", lambda x: -0.7 / power * mbd.sqrt(x * x) ** -power, "float.x"))
+    return model
+
+
+@pytest.mark.parametrize("power", [1, 2, 3])
+def test_a_floating_body_leaps_over_no_pole_in_silence(power: int) -> None:
+    """However the stages of the steps lie around it."""
+    rng = np.random.default_rng(power)
+    for _ in range(6):
+        dt, speed, away = 10 ** rng.uniform(-2.5, -0.5), 10 ** rng.uniform(-0.5, 0.5), rng.uniform(0.05, 1.0)
+        start = mbd.assemble(
+            drifting(power), {"float.x": -away}, {"float.x": speed, "float.angular_velocity": (0, 1, 2)}
+        )
+        until = 2.0 * away / speed + 2.0 * dt
+        run = mbd.simulate(drifting(power), start, mbd.RungeKutta853(), dt=dt, until=until, on_failure="return")
+        assert not run.success, (dt, speed, away)

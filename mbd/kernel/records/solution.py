@@ -144,6 +144,7 @@ class Report(SchemeAbilities):
     coarse_start: float = place("detail")  # where the last of the steps `n_coarse` began
     coarsest_end: float = place("detail")  # where the one with the largest change ended
     coarsest_change: float = place("detail")
+    stage_pull: float = place("detail")  # largest v̇·M v̇ of the stages of a step, 0 where nobody has looked
     least_pivot: float = place("detail")  # of the equations of accelerations since the last start, scaled
     lost_digits: float = place("detail")  # relative error of accelerations that were known there
     counts: Integers = integers()

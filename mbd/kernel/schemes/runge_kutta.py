@@ -69,6 +69,7 @@ def runge_kutta_step(K: Kernel, h: float, t1: float) -> int:
     K.failure_time = t1
     K.failure_size = 0.0
     K.failure_step = h
+    K.stage_pull = 0.0
     for i in range(n):
         K.stages[n_v + i] = K.rate[i]
         if i < n_v:
@@ -162,8 +163,10 @@ def explicit_rates(K: Balance, t: float) -> int:
         for i in range(n):
             K.jump[i] = -K.acc[K.acc_f + i]
         if K.vector == 0 and solve_from_tips(K.acc, n, K.jump, K.spare) >= LOSS:
+            note_pull(K)
             return 0
         if K.vector == 0:
+            K.stage_pull = 1e300
             evaluate(K, t, K.q1, K.y1)
             for i in range(n):
                 K.jump[i] = -K.acc[K.acc_f + i]
@@ -187,6 +190,14 @@ def explicit_rates(K: Balance, t: float) -> int:
             K.impulse[K.rows[k]] = K.rhs[n + k]
         polish_with_rows(K, m)
     return 0
+
+
+def note_pull(K: Balance) -> None:
+    """``v̇·M v̇ = −v̇·f`` of the rates in K.jump, if it is the largest of the step, for `mbd.kernel.poles`."""
+    pull = 0.0
+    for i in range(K.n_v):
+        pull -= K.jump[i] * K.acc[K.acc_f + i]
+    K.stage_pull = max(K.stage_pull, pull)
 
 
 def return_to_rows(K: DependentRows, t1: float) -> int:
