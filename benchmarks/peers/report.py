@@ -32,6 +32,11 @@ one run of `python -m benchmarks peers`, which writes this page. The scenes, the
 - **Errors** are the largest absolute difference from the reference at any output time [rad, m; rates and strike times
   in S4]. A cell is the fastest setting tried that reaches the error; '-' means that none did, or that the scene cannot
   be built as it is stated. Finer settings than the first that takes longer than 0.4 s are not tried.
+- **In space** (S7) every system is tried with ball joints as it has them and with three hinges in the place of each,
+  `mbd` too; the largest difference of any center of mass counts [m], of the top that of its axis, of the coin that of
+  center and axis. DART and the implicit schemes of others are of order 1 or 2. Pinocchio is a library of equations
+  without a simulator: its loops are Python, whose share is large for small models. Rolling without slip is a joint of
+  Exudyn; the others have contacts with friction only, which is another scene.
 - **By hand** is no framework: equations derived for the one scene and compiled, in loops compiled with them (`numba`),
   or called by `solve_ivp` (`scipy`; of S4 the reference's own code, with events and, in S4c and S4d, a largest step).
   They are the floor.
