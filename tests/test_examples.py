@@ -31,7 +31,7 @@ NAMES = (
     "tennis-racket", "tune-a-knee-damper",
     "user-constraint", "user-integrator",
 )  # fmt: skip
-NAMES = tuple(sorted((*NAMES, "amputee-in-space", "bicycle", "rolling-coin", "walker-in-space")))
+NAMES = tuple(sorted((*NAMES, "amputee-in-space", "bicycle", "billiard-ball", "rolling-coin", "walker-in-space")))
 HEAVY = ("amputee-in-space",)
 """Whose plain twin takes minutes: see tests/cases/test_space_examples.py."""
 STUDIES = ("compare-two-knees", "identify-a-shank", "tune-a-knee-damper")

@@ -77,3 +77,19 @@ def test_a_walker_rocks_stably_forward_and_falls_to_the_side() -> None:
     lost = gait.energy["impact"]
     assert -lost == pytest.approx(69.1 * g * math.sin(0.03) * gait.distance, rel=1e-9)  # what the slope gives
     assert run["roll.angle"].min() < -0.01 < 0.01 < run["roll.angle"].max()
+
+
+def test_a_billiard_ball_slides_on_a_parabola_and_rolls_on() -> None:
+    run = run_of("billiard-ball")
+    R, mu, v = 0.0286, 0.2, np.array([2.0, 0.0, 0.0])
+    slip = v + np.cross([40.0, 30.0, 60.0], [0.0, -R, 0.0])
+    size = float(np.linalg.norm(slip))
+    grips = 2.0 * size / (7.0 * mu * g)
+    assert [(event.kind, event.time) for event in run.events] == [("stuck", pytest.approx(grips, abs=1e-9))]
+    slides = run.at(np.linspace(0.0, grips, 20))
+    path = v * slides.time[:, None] - 0.5 * mu * g / size * slip * slides.time[:, None] ** 2
+    assert slides["cue ball.origin"] - [0.0, R, 0.0] == pytest.approx(path, abs=1e-9)
+    rolls = run.at(np.linspace(grips + 1e-6, 0.7, 20))
+    speed = np.column_stack([rolls[f"roll.{axis}.rate"] for axis in "xyz"])
+    assert speed == pytest.approx(np.tile(v - 2.0 / 7.0 * slip, (20, 1)), abs=1e-9)
+    assert rolls["roll.angular_velocity.ground"][:, 1] == pytest.approx(30.0, abs=1e-9)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mbd.errors import TrajectoryError
 from mbd.results.archive import named_file, write_whole
 from mbd.results.interpolation import Grid
 from mbd.results.ledger import SPENT, Ledger, Part
@@ -86,6 +87,9 @@ def histories(run: Trajectory, *names: str, path: str | Path | None = None, degr
     degrees, or in radians; results stay in radians.
     """
     wanted = names or tuple(name for name, _ in run.facts.coordinates)
+    files = [name for name in wanted if str(name).endswith((".png", ".svg", ".pdf")) and name not in run]
+    if files:
+        raise TrajectoryError(f"plot draws results by name; give a file as path, plot(path={files[0]!r})")
     scalars = list(dict.fromkeys(part for name in wanted for part in run.columns.components(name)))
     time, values = curves(run, scalars)
     panels: dict[str, list[str]] = {}

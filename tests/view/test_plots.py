@@ -11,7 +11,7 @@ from matplotlib import pyplot
 from matplotlib.colors import to_hex, to_rgb
 from matplotlib.text import Text
 
-from mbd.errors import UnknownNameError
+from mbd.errors import TrajectoryError, UnknownNameError
 from mbd.view.curves import curves
 from mbd.view.plots import contacts, phase_portrait, stretches
 from mbd.view.style import DARK, INK, PALE, PAPER, color
@@ -172,3 +172,8 @@ def test_a_drawing_in_vectors_has_ink_for_light_and_for_dark_pages(tmp_path):
     assert min(contrast(ink, DARK[PAPER]) for ink in on_dark) > 3.0
     walker().plot("left hip.angle", "left foot.force", path=tmp_path / "again.svg")
     assert (tmp_path / "again.svg").read_text(encoding="utf-8") == picture
+
+
+def test_a_file_among_the_names_of_a_plot_is_answered_with_its_argument():
+    with pytest.raises(TrajectoryError, match=r"give a file as path, plot\(path='swing.png'\)"):
+        walker().plot("swing.png")
