@@ -21,6 +21,8 @@ SCHEMES = (
     mbd.GeneralizedAlpha(0.7, **CLOSE),
 )  # fmt: skip
 NAMES = ["ball.orientation", "ball.angular_velocity"]
+STEP = 8e-4
+"""Change of starts that are put on rows, which they then miss by much less [m, rad, m/s, rad/s]."""
 
 
 def assert_as_differences(*given, **settings):
@@ -50,7 +52,7 @@ def scene(seed):
 def test_derivatives_of_trees_and_loops_are_limits_of_differences(place):
     for seed in (0, 1):
         model, start = scene(seed)
-        settings = {"parameters": ["body 1.mass"], "dt": 0.01, "until": 0.1}
+        settings = {"parameters": ["body 1.mass"], "step": STEP, "dt": 0.01, "until": 0.1}
         assert_as_differences(model, start, SCHEMES[place], ways=1, **settings)
 
 
@@ -63,7 +65,8 @@ def test_derivatives_of_many_chains_are_limits_of_differences(seed):
         return
     for scheme in SCHEMES:
         try:
-            assert_as_differences(model, start, scheme, seed=seed, parameters=["body 1.mass"], dt=0.01, until=0.2)
+            settings = {"parameters": ["body 1.mass"], "step": STEP, "dt": 0.01, "until": 0.2}
+            assert_as_differences(model, start, scheme, seed=seed, **settings)
         except (mbd.SimulationError, mbd.CapabilityError):
             continue
 
