@@ -119,7 +119,10 @@ def let_rebound(K: ContactForces) -> None:
 
 
 def energy_gain(K: ContactForces) -> float:
-    """Work of all impulses on the mechanism, ½ Σ λ̂ (γ⁻ + γ⁺), relative to its terms."""
+    """Work of all impulses on the mechanism, ½ Σ λ̂ (γ⁻ + γ⁺), relative to its terms.
+
+    Non-smooth steps in space find friction for the whole step: what the smooth one had of it may be given back.
+    """
     n = K.n
     loss = 0.0
     size = 1e-300
@@ -131,6 +134,8 @@ def energy_gain(K: ContactForces) -> float:
             before = row_speed(K, k)
             loss += K.impulse[k] * (before + half)
             size += abs(K.impulse[k]) * (abs(before) + abs(half))
+            if K.strategy == 1 and K.n_cones > 0 and K.row_friction[k] >= 0:
+                loss += abs(K.past[k]) * (abs(before) + abs(half))
     return -loss / size
 
 
