@@ -78,6 +78,17 @@ class LimitCycle:
         """distance/period [m/s]."""
         return self.distance / self.period
 
+    @cached_property
+    def turn(self) -> float:
+        """By which the walker has turned about the vertical after one application, between −π and π [rad].
+
+        0 where the heading has to come back, and where sides are exchanged, so that the next turn is the opposite one.
+        """
+        heading = self.chart.section.heading
+        if heading is None or self.mirror is not None or not self.success:
+            return 0.0
+        return -heading.angle(self.state.q, self.run.final.q, self.chart.turning)
+
     @property
     def step_lengths(self) -> dict[str, float]:
         """Mean length of the steps that each foot ends [m]."""
@@ -163,14 +174,17 @@ class LimitCycle:
     def trivial(self) -> dict[str, Any]:
         """Multipliers that say nothing about stability, by cause.
 
-        'translation' (1): along the coordinates that the walker moves on along, −1 to the side of a walker that is
-        mirrored in space; 'time' (0 on the section): along the motion; 'energy' (1): where nothing takes any;
+        'translation' (1): along the coordinates that the walker moves on along; 'heading' (1): about the vertical, where
+        headings are alike; both −1 where the mirror turns them, as to the side of a walker in space; 'time' (0 on the
+        section): along the motion; 'energy' (1): where nothing takes any;
         'forgotten' (0): what impacts and resets leave no trace of.
         """
         names = self.chart.section.mechanism.equations.configuration.freedoms
         turned = self.map.turned**self.strides
         along = zip(self.chart.section.fixed, turned, strict=True)
         found: dict[str, Any] = {f"translation {names[k][0]}": float(sign) for k, sign in along}
+        if self.chart.section.heading is not None:
+            found["heading"] = -1.0 if np.any(turned < 0.0) else 1.0
         return {**found, "time": 0.0, **self.stability_of.trivial}
 
     @property

@@ -28,7 +28,12 @@ BESIDE = 1e-3
 def exact_derivative(map_: ReturnMap, chart: Chart, c: Vector, values: Values) -> Matrix | None:
     """∂(coordinates)/∂c at c, (size, size); None where a return does not arrive or no pass knows its derivative."""
     section = chart.section
-    if chart.counts[2] or chart.counts[3] or section.mechanism.equations.configuration.charts:
+    if (
+        chart.counts[2]
+        or chart.counts[3]
+        or section.heading is not None
+        or section.mechanism.equations.configuration.charts
+    ):
         return None
     state = chart.at(c, map_.vector(values))
     along = _tangent(chart, state, map_.vector(values))

@@ -13,11 +13,12 @@ from mbd.errors import GaitError, ModelError
 from mbd.gait.arguments import Functions, check_arguments, increments_named, section_named
 from mbd.gait.cycle import LimitCycle
 from mbd.gait.floquet import Multipliers
+from mbd.gait.heading import heading_of
 from mbd.gait.mirror import mirror_of, require_alike
 from mbd.gait.return_map import ReturnMap
 from mbd.gait.search import Failed, Search, fallen_first, first_return, search, with_step
 from mbd.gait.section import Chart, section_of
-from mbd.gait.unmoved import depends_on_time, moving_on
+from mbd.gait.unmoved import depends_on_time, moving_on, reset_names
 from mbd.integrators import Integrator, RungeKutta853
 from mbd.simulation.capabilities import refusals
 from mbd.state import State
@@ -70,7 +71,8 @@ def limit_cycle(
     functions : ``{"slope": lambda s: {"gravity.x": 9.81 * sin(s), "gravity.y": -9.81 * cos(s)}}``: functions of one
         value that give parameters, under names of their own
     wrt : parameters, or functions of them, by which derivatives are found at once; others when they are asked for
-    modulo : coordinates that need not come back; None: those that nothing but places of touchdown depends on
+    modulo : coordinates that need not come back; None: those that nothing but places of touchdown depends on, and on
+        level ground the heading of a walker in space
     longest : latest time of one return [s]
     on_failure : 'raise' a `GaitError` where there is no gait, or 'return' it with success False
     backend : see `mbd.simulate`
@@ -123,6 +125,9 @@ def map_of(
         own = {**getattr(model, "parameters", {}), **plain.plain(values)}
         plain.mirror = require_alike(mechanism, mirror_of(mechanism.equations, mirror), vector, own, model)
     plain.fixed = moving_on(mechanism, vector) if modulo is None else increments_named(mechanism, modulo)
+    if modulo is None:
+        own = {**getattr(model, "parameters", {}), **plain.plain(values)}
+        plain.heading = heading_of(model, mechanism, vector, own, reset_names(mechanism.equations))
     return plain
 
 
@@ -158,7 +163,14 @@ def _found(map_: ReturnMap, start: State, dt: float | None, tol: float) -> Limit
 def _none(map_: ReturnMap, failed: Failed) -> LimitCycle:
     """A search whose first return did not arrive, with its state."""
     section = section_of(
-        map_.mechanism, map_.manager, map_.section, failed.state, frozenset(), map_.vector(map_.values), map_.fixed
+        map_.mechanism,
+        map_.manager,
+        map_.section,
+        failed.state,
+        frozenset(),
+        map_.vector(map_.values),
+        map_.fixed,
+        map_.heading,
     )
     chart, none = Chart(section, failed.state, map_.vector(map_.values)), float("nan")
     empty = Multipliers(np.zeros(0, complex), np.zeros((chart.size, 0), complex), {}, none)

@@ -15,6 +15,7 @@ from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of
 from mbd.compile.python import ScalarFunction, scalar_function
 from mbd.errors import MbdError
+from mbd.gait.heading import Heading
 from mbd.gait.mirror import Mirror
 from mbd.gait.outcome import Outcome, fall_of
 from mbd.gait.section import Section
@@ -85,6 +86,7 @@ class ReturnMap:
     functions : {'slope': f} with f(value) → {parameter: value}, whose names may stand among parameters
     longest : latest time of one return [s]
     fixed : numbers of increments along which the walker moves on
+    heading : turns about the vertical that change nothing; None: there are none
     """
 
     model: Any
@@ -99,6 +101,7 @@ class ReturnMap:
     backend: str
     start: State
     fixed: tuple[int, ...] = ()
+    heading: Heading | None = None
     runs: int = 0
 
     def __post_init__(self) -> None:

@@ -58,7 +58,8 @@ def first_return(map_: ReturnMap, start: State, values: Values) -> tuple[Section
     parameters = map_.vector(values)
     name = map_.section if map_.mirror is None else map_.mirror.name(map_.section)
     before = arrival.before if map_.mirror is None else map_.mirror.names(arrival.before)
-    section = section_of(map_.mechanism, map_.manager, name, arrival.state, before, parameters, map_.fixed)
+    section = section_of(map_.mechanism, map_.manager, name, arrival.state, before, parameters, map_.fixed,
+                         map_.heading)  # fmt: skip
     return section, on_section(section, start, parameters) or arrival.state
 
 

@@ -26,6 +26,7 @@ from mbd.assembly.pose import Posture
 from mbd.assembly.posture import position_rows
 from mbd.compile.mechanism import Mechanism
 from mbd.errors import SimulationError
+from mbd.gait.heading import Heading
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.state import Mode, State
 
@@ -50,6 +51,7 @@ class Section:
     rates : numbers of rows whose ḣ holds
     held : numbers of anchors that are part of the state: of penalty contacts that act
     fixed : numbers of increments of q along which the walker moves on
+    heading : turns about the vertical that change nothing; None: headings differ
     """
 
     mechanism: Mechanism
@@ -61,6 +63,7 @@ class Section:
     rates: tuple[int, ...]
     held: tuple[int, ...]
     fixed: tuple[int, ...]
+    heading: Heading | None = None
 
     @cached_property
     def flags(self) -> NDArray[np.int64]:
@@ -122,6 +125,11 @@ class Chart:
         G = G.copy()
         G[:, list(section.fixed)] = 0.0
         unmoved = np.eye(layout.n_v)[list(section.fixed)]
+        self.turning = np.zeros(layout.n_v)
+        if section.heading is not None:
+            self.turning = section.heading.tangent(q)
+            self.turning[list(section.fixed)] = 0.0
+            unmoved = np.vstack([unmoved, self.turning])
         self.off_places, self.off_rates = _row_space(G), _row_space(B)
         self.places, self.rates = _null_space(np.vstack([G, unmoved])), _null_space(B)
         self.counts = (self.places.shape[1], self.rates.shape[1], layout.n - layout.n_v, len(section.held))
@@ -167,17 +175,24 @@ class Chart:
     def of(self, state: State) -> Vector:
         """The coordinates of a state."""
         difference = self.section.mechanism.equations.configuration.difference
-        held = list(self.section.held)
+        held, (q, v) = list(self.section.held), self.facing(state)
         parts = (
-            self.places.T @ difference(self.state.q, state.q), self.rates.T @ (state.v - self.state.v),
+            self.places.T @ difference(self.state.q, q), self.rates.T @ (v - self.state.v),
             state.z - self.state.z, (state.anchors - self.state.anchors)[held] if held else np.zeros(0),
         )  # fmt: skip
         return np.concatenate(parts)
 
+    def facing(self, state: State) -> tuple[Vector, Vector]:
+        """Coordinates and velocities of a state, turned about the vertical to head as the base does."""
+        heading = self.section.heading
+        if heading is None:
+            return state.q, state.v
+        return heading.turned(state.q, state.v, heading.angle(self.state.q, state.q, self.turning))
+
 
 def section_of(
     mechanism: Mechanism, manager: ActiveSetManager, name: str, arrived: State, before: frozenset[str],
-    parameters: Vector, fixed: Sequence[int],
+    parameters: Vector, fixed: Sequence[int], heading: Heading | None = None,
 ) -> Section:  # fmt: skip
     """The section of an event, from the state just after it and the contacts that were closed just before it."""
     after = arrived.mode.closed
@@ -207,7 +222,7 @@ def section_of(
     held = [k for c in manager.contacts if c.kind == "penalty" and c.name in after for k in c.anchors]
     return Section(
         mechanism, manager, arrived.mode, arrived.armed, tuple(places), gaps, tuple(sorted(set(rates))), tuple(held),
-        tuple(fixed),
+        tuple(fixed), None if held else heading,
     )  # fmt: skip
 
 

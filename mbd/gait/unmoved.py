@@ -13,7 +13,7 @@ from mbd.equations import programs
 from mbd.equations.equations import Equations
 from mbd.tape.derivatives import jvps, live
 
-__all__ = ["depends_on_time", "moving_on"]
+__all__ = ["depends_on_time", "moving_on", "reset_names"]
 
 SAMPLES = 2
 """States at which rows with places of touchdown are moved along [-]."""
@@ -51,7 +51,7 @@ def _without_effect(mechanism: Mechanism) -> tuple[list[int], list[int]]:
     kept = outputs[:first] + outputs[first + rows : captured] + outputs[captured + layout.n_anchors :]
     kept += programs.guards(equations)
     places = equations.configuration.places
-    set_by_events = _reset_names(equations)
+    set_by_events = reset_names(equations)
     names = [coordinate.name for coordinate in equations.coordinates]
     candidates = [] if set_by_events is None else [
         k for k in range(layout.n_v) if places[k] >= 0 and names[places[k]] not in set_by_events
@@ -86,7 +86,7 @@ def _changes_nothing(mechanism: Mechanism, parameters: Vector, k: int) -> bool:
     return True
 
 
-def _reset_names(equations: Equations) -> set[str] | None:
+def reset_names(equations: Equations) -> set[str] | None:
     """Names that resets of events set or read; None where functions may read any."""
     found: set[str] = set()
     for guard in equations.guards:

@@ -58,6 +58,9 @@ class Ball:
         """|c|_W of states (N,)."""
         chart = self.chart
         configuration = chart.section.mechanism.equations.configuration
+        if chart.section.heading is not None:
+            facing = [chart.facing(replace(chart.state, q=one, v=other)) for one, other in zip(q, v, strict=True)]
+            q, v = (np.array([pair[k] for pair in facing]).reshape(len(q), -1) for k in (0, 1))
         if chart.section.mechanism.vector:
             moved = q - chart.state.q
         else:

@@ -1,0 +1,105 @@
+"""Gaits on level ground in space: no heading is another one, and a gait may turn a little with each stride."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import mbd
+
+g = 9.81
+SPOKES, HALF = 8, math.pi / 8
+
+
+@cache
+def driven_wheel(chain: bool = False) -> mbd.Model:
+    """A rimless wheel with a moment about its axle, and one about the vertical; by a quaternion, or by three hinges."""
+    model = mbd.Model("driven wheel", gravity=(0.0, -g, 0.0), tunable=["steer.torque.y"])
+    wheel = mbd.RigidBody("wheel", 1.0, (0.25, 0.25, 0.35))
+    if chain:
+        names = ("carrier", "fork", "axle")
+        carrier, fork, axle = (mbd.RigidBody(name, 0.0, (0.0, 0.0, 0.0)) for name in names)
+        model.connect(mbd.Translation("hub", model.ground.origin, carrier.origin, axes="xyz"))
+        model.connect(mbd.Revolute("yaw", carrier.origin, fork.origin, axis=(0, 1, 0)))
+        model.connect(mbd.Revolute("lean", fork.origin, axle.origin, axis=(1, 0, 0)))
+        model.connect(mbd.Revolute("roll", axle.origin, wheel.origin))
+    else:
+        model.connect(mbd.Free("hub", model.ground.origin, wheel.origin))
+    for k in range(SPOKES):
+        tip = wheel.point(math.sin(2 * k * HALF), -math.cos(2 * k * HALF), 0.0, name=f"tip {k}")
+        release = mbd.When(f"spoke {(k + 1) % SPOKES}")
+        model.constrain(mbd.Unilateral(f"spoke {k}", mbd.touchdown(tip), release=release))
+    model.apply(mbd.Applied("drive", wheel.origin, torque=(0.0, 0.0, -2.5), axes=wheel.origin))
+    model.apply(mbd.Applied("steer", wheel.origin, torque=(0.0, 0.0, 0.0)))
+    return model
+
+
+@cache
+def rolling(heading: float = 0.0, **options: object) -> mbd.LimitCycle:
+    """The wheel's roll along a heading [rad]."""
+    turned = Rotation.from_rotvec([0.0, heading, 0.0]) * Rotation.from_rotvec([0.0, 0.0, HALF])
+    start = mbd.assemble(
+        driven_wheel(), closed="spoke 0", position={"hub.y": math.cos(HALF), "hub.orientation": turned},
+        velocity={"hub.angular_velocity.z": -2.4},
+    )  # fmt: skip
+    return mbd.limit_cycle(driven_wheel(), start, section="spoke 0", **options)
+
+
+def test_no_heading_is_another_one() -> None:
+    ahead, aside = rolling(), rolling(0.8)
+    assert aside.period == pytest.approx(ahead.period, rel=1e-9)
+    assert aside.distance == pytest.approx(ahead.distance, rel=1e-9)
+    assert np.abs(aside.multipliers) == pytest.approx(np.abs(ahead.multipliers), rel=1e-6)
+    assert ahead.trivial["heading"] == 1.0 and len(ahead.multipliers) == 4
+    assert ahead.turn == pytest.approx(0.0, abs=1e-9)
+    along = math.atan2(-aside.way[1], aside.way[0])
+    assert along == pytest.approx(0.8, abs=1e-9)
+
+
+def test_a_heading_that_counts_is_a_multiplier_of_one() -> None:
+    free, held = rolling(), rolling(modulo=("hub.x", "hub.z"))
+    assert "heading" not in held.trivial
+    assert np.min(np.abs(held.multipliers - 1.0)) < 1e-6
+    for value in free.multipliers:
+        assert np.min(np.abs(held.multipliers - value)) < 2e-6 * max(1.0, abs(value))
+
+
+def test_a_turning_gait_repeats_itself_but_for_its_heading() -> None:
+    gait = rolling().at({"steer.torque.y": 0.01})
+    other = rolling().at({"steer.torque.y": -0.01})
+    assert gait.turn == pytest.approx(0.12318511, rel=1e-5) and other.turn == pytest.approx(-gait.turn, rel=1e-8)
+    assert other.distance == pytest.approx(gait.distance, rel=1e-9)
+    final = gait.walk(1).final
+    assert np.max(np.abs(gait.chart.of(final))) < 1e-10
+    turned = Rotation.from_quat(final["hub.orientation"], scalar_first=True)
+    before = Rotation.from_quat(gait.state["hub.orientation"], scalar_first=True)
+    assert (turned * before.inv()).as_rotvec() == pytest.approx([0.0, gait.turn, 0.0], abs=1e-9)
+    assert np.abs(gait.multipliers) == pytest.approx(np.abs(other.multipliers), rel=1e-6)
+
+
+def test_hinges_and_a_quaternion_head_alike() -> None:
+    model, known = driven_wheel(chain=True), rolling()
+    start = mbd.assemble(
+        model, closed="spoke 0", position={"hub.y": math.cos(HALF), "yaw.angle": 0.4, "roll.angle": HALF},
+        velocity={"roll.angle": -2.4},
+    )  # fmt: skip
+    found = mbd.limit_cycle(model, start, section="spoke 7", longest=2.6, on_failure="return")
+    assert found.map.heading is not None  # a roll that counts its turns never comes back itself
+    assert found.map.fixed == (0, 2)
+    q, v = np.array(start.q), np.array(start.v)
+    turned, rates = found.map.heading.turned(q, v, 0.7)
+    assert turned[3] == pytest.approx(1.1) and np.hypot(*rates[[0, 2]]) == pytest.approx(np.hypot(*v[[0, 2]]))
+    assert known.map.heading is not None
+
+
+def test_a_slope_or_a_wind_makes_headings_differ() -> None:
+    tilted = {"gravity.x": 0.5}
+    start = mbd.assemble(driven_wheel(), closed="spoke 0", position={"hub.y": 1.0}, parameters=tilted)
+    found = mbd.limit_cycle(
+        driven_wheel(), start, section="spoke 1", parameters=tilted, longest=0.1, on_failure="return"
+    )
+    assert found.map.heading is None
