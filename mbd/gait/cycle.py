@@ -174,9 +174,9 @@ class LimitCycle:
     def trivial(self) -> dict[str, Any]:
         """Multipliers that say nothing about stability, by cause.
 
-        'translation' (1): along the coordinates that the walker moves on along; 'heading' (1): about the vertical, where
-        headings are alike; both −1 where the mirror turns them, as to the side of a walker in space; 'time' (0 on the
-        section): along the motion; 'energy' (1): where nothing takes any;
+        'translation' (1): along the coordinates that the walker moves on along; 'heading' (1): about the vertical,
+        where headings are alike; both −1 where the mirror turns them, as to the side of a walker in space; 'time' (0 on
+        the section): along the motion; 'energy' (1): where nothing takes any;
         'forgotten' (0): what impacts and resets leave no trace of.
         """
         names = self.chart.section.mechanism.equations.configuration.freedoms

@@ -235,7 +235,7 @@ def _varied(groups: Mapping[str, Any], tries: Any, design: Any, seed: Any) -> tu
                 ranges.append((group, name, (float(value[0]), float(value[1]))))
             elif is_finite_number(value):
                 fixed[group][name] = float(value)
-            elif group != "parameters" and not pair and _is_whole(value):
+            elif group != "parameters" and _is_whole(value):
                 fixed[group][name] = value
             else:
                 faults.append(
@@ -255,10 +255,14 @@ def _varied(groups: Mapping[str, Any], tries: Any, design: Any, seed: Any) -> tu
 
 
 def _is_whole(value: Any) -> bool:
-    """Whether it is an orientation or a vector, which `mbd.assemble` judges: three numbers or more, a rotation."""
+    """Whether it is an orientation or a vector, which `mbd.assemble` judges: a rotation, three numbers or more, an axis
+    with an angle, a sequence with angles.
+    """
     if hasattr(value, "as_quat"):
         return True
-    return isinstance(value, tuple | list | np.ndarray) and len(value) >= 3
+    if not isinstance(value, tuple | list | np.ndarray):
+        return False
+    return len(value) >= 3 or (len(value) == 2 and isinstance(value[0], tuple | list | np.ndarray | str))
 
 
 def _points(size: int, tries: int, design: str, seed: int) -> Matrix:

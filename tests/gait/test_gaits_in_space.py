@@ -232,3 +232,36 @@ def test_a_walker_of_the_plane_walks_in_space() -> None:
     for value in flat.multipliers:
         assert np.min(np.abs(free.multipliers - value)) < 1e-6
     assert len(free.multipliers) > len(flat.multipliers)
+
+
+# many starts ----------------------------------------------------------------------------------------------------------
+def test_a_batch_of_quaternions_is_the_runs_to_the_bit() -> None:
+    random = np.random.default_rng(4)
+    base = mbd.assemble(rimless_wheel(), {"hub.y": 1.05, "hub.orientation": ((1, 2, 3), 0.3)})
+    columns = {f"hub.angular_velocity.{axis}": random.uniform(-2.0, 2.0, 4) for axis in "xyz"}
+    columns["hub.y"] = random.uniform(1.04, 1.1, 4)
+    options = {"dt": 0.02, "until": 0.3, "contact": "events"}
+    found = mbd.batch(rimless_wheel(), (base, columns), mbd.RungeKutta853(), **options)
+    landed = 0
+    for k in range(4):
+        start = found.start(k)
+        assert list(start.v[3:]) == [columns[f"hub.angular_velocity.{axis}"][k] for axis in "xyz"]
+        run = mbd.simulate(rimless_wheel(), start, mbd.RungeKutta853(), **options)
+        assert np.array_equal(found.final(k).q, run.final.q) and np.array_equal(found.final(k).v, run.final.v)
+        landed += bool(run.events)
+    assert landed
+
+
+def test_a_part_of_a_quaternion_alone_is_refused_by_name() -> None:
+    base = wheel_gait(0.2, (0.25, 0.25, 0.35), 1.0)[0].state
+    with pytest.raises(mbd.ModelError, match=r"'hub.orientation.x' is a part of a quaternion"):
+        mbd.batch(rimless_wheel(), (base, {"hub.orientation.x": [0.0, 0.1]}), dt=0.01, until=0.1)
+
+
+def test_a_search_takes_whole_orientations() -> None:
+    position = {"hub.y": math.cos(HALF), "hub.orientation": ((0, 0, 1), HALF)}
+    found = mbd.find_gait(
+        rimless_wheel(), position, {"hub.angular_velocity.z": (-2.6, -2.4)}, closed="spoke 0", section="spoke 0",
+        parameters={"gravity.x": g * math.sin(0.25), "gravity.y": -g * math.cos(0.25)}, tries=2,
+    )  # fmt: skip
+    assert len(found.gaits) == 1 and found.gait.multipliers.size == 5
