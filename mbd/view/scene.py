@@ -14,7 +14,7 @@ from mbd.results.facts import ROUND
 from mbd.results.names import AXES
 from mbd.view.instants import Instants
 from mbd.view.scenery import FIT, Ground, Scenery, plane_of_motion, scenery
-from mbd.view.seen_once import once
+from mbd.view.seen_once import once, solid_ones
 from mbd.view.solids import Hinge, Solid, hinges, limbs, solids
 
 if TYPE_CHECKING:
@@ -96,7 +96,7 @@ def scene(run: Trajectory, count: int | Instants) -> Scene:
         body: run.parameters[f"{body}.mass"] for body, _ in segments if run.parameters.get(f"{body}.mass", 0.0) > 0.0
     }
     around = scenery(run, instants, turn, raw if points else np.zeros((1, 1, 3)))
-    around, bodies_seen = once(around, bodies_seen)
+    around, bodies_seen = once(around, solid_ones(bodies_seen, points, positions[0] if points else np.zeros((0, 3))))
     shown = (Ground(turn @ normal, offset) for normal, offset in _grounds(run, instants, raw, around))
     named = tuple(number[name] for name in markers)
     pushes = tuple(_pushes(run, instants, turn, around))

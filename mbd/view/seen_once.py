@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from mbd.arrays import Matrix
 from mbd.view.scenery import Ball, Scenery, Wheel
 from mbd.view.solids import Solid, rotations
 
-__all__ = ["once"]
+__all__ = ["once", "solid_ones"]
+
+AIR = 1.2
+"""Density below which a solid is none that anyone builds [kg/m³]."""
 
 SAME = 0.02
 """Radii that differ less, over the radius, are one [-]."""
@@ -28,6 +32,21 @@ def once(around: Scenery, solids: tuple[Solid, ...]) -> tuple[Scenery, tuple[Sol
     wheels = tuple(each for each in around.wheels if not _shown(each, solids, hidden))
     balls = tuple(each for each in around.balls if not _shown(each, solids, hidden))
     return replace(around, wheels=wheels, balls=balls), tuple(each for each in solids if each.name not in hidden)
+
+
+def solid_ones(solids: tuple[Solid, ...], points: Sequence[str], places: Matrix) -> tuple[Solid, ...]:
+    """Without those that are lighter than air and larger than all other bodies together, which would hide these: of an
+    inertia that was made up, such as that of a hip without mass.
+
+    points : names of the points of the mechanism; places : theirs at one instant (P, 3) [m]
+    """
+    found = []
+    for solid in solids:
+        others = [k for k, point in enumerate(points) if point.rpartition(".")[0] != solid.name]
+        size = float(np.max(np.ptp(places[others], axis=0), initial=0.0)) if others else 0.0
+        if not (solid.density < AIR and 0.0 < size < 2.0 * float(np.max(solid.form.half))):
+            found.append(solid)
+    return tuple(found)
 
 
 def _shown(each: Wheel | Ball, solids: Iterable[Solid], hidden: set[str]) -> bool:

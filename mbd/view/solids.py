@@ -26,13 +26,14 @@ MOMENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
 class Solid:
     """A body at the instants, in the axes of the scene: its center (F, 3) [m] and quaternion (F, 4) as w, x, y, z.
 
-    The quaternions follow each other without changes of sign.
+    The quaternions follow each other without changes of sign. density : of the box around it [kg/m³]
     """
 
     name: str
     center: Matrix
     turn: Matrix
     form: Form
+    density: float = np.inf
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,13 +70,16 @@ def solids(run: Trajectory, instants: Instants, turn: Matrix) -> tuple[Solid, ..
     for shape in run.facts.shapes:
         if shape.kind != "solid" or not _known(run, shape, "first", "second"):
             continue
-        form = equal_inertia(*_inertia(run, shape), shape.form)
+        mass, moments = _inertia(run, shape)
+        form = equal_inertia(mass, moments, shape.form)
         if form is None:
             continue
         first, second = (_vector(run, instants, drawn(shape.name, what), turn) for what in ("first", "second"))
         axes = np.stack([first, second, np.cross(first, second)], axis=-1)
         center = _vector(run, instants, shape.place, turn)
-        found.append(Solid(shape.name, center, quaternions(axes @ form.axes), form))
+        found.append(
+            Solid(shape.name, center, quaternions(axes @ form.axes), form, mass / float(np.prod(2.0 * form.half)))
+        )
     return tuple(found)
 
 

@@ -133,6 +133,19 @@ def test_of_equal_solids_the_one_is_drawn_that_words_of_the_model_tell():
         shown("wrong", "bal")
 
 
+def test_a_solid_lighter_than_air_that_hides_the_mechanism_is_not_drawn():
+    def drawn(moments, legs):
+        model = mbd.Model("hip")
+        hip, leg = mbd.RigidBody("hip", 0.1, moments), mbd.Link("leg", 5.0, 1.0, 0.5, (0.4, 0.01, 0.4))
+        model.connect(mbd.Free("float", model.ground.origin, hip.origin))
+        if legs:
+            model.connect(mbd.Revolute("joint", hip.origin, leg.start))
+        return [solid.name for solid in scene(instant(model, mbd.assemble(model, backend="python")), 1).solids]
+
+    assert drawn((0.1, 0.1, 0.1), True) == []  # a box of 2.4 m and 7 g/m³
+    assert drawn((1e-4, 1e-4, 1e-4), True) == drawn((0.1, 0.1, 0.1), False) == ["hip"]
+
+
 def test_the_force_of_a_ball_acts_where_it_touches():
     model = mbd.Model("rolling ball")
     ball = mbd.RigidBody("ball", **mbd.sphere(0.2, 0.05).body)
