@@ -16,8 +16,11 @@ SPOKES, HALF = 8, math.pi / 8
 
 
 @cache
-def driven_wheel(chain: bool = False) -> mbd.Model:
-    """A rimless wheel with a moment about its axle, and one about the vertical; by a quaternion, or by three hinges."""
+def driven_wheel(chain: bool = False, keel: float = 0.0) -> mbd.Model:
+    """A rimless wheel with a moment about its axle, and one about the vertical; by a quaternion, or by three hinges.
+
+    What rights it has the energy `keel` sin² of its lean [J].
+    """
     model = mbd.Model("driven wheel", gravity=(0.0, -g, 0.0), tunable=["steer.torque.y"])
     wheel = mbd.RigidBody("wheel", 1.0, (0.25, 0.25, 0.35))
     if chain:
@@ -34,6 +37,10 @@ def driven_wheel(chain: bool = False) -> mbd.Model:
         release = mbd.When(f"spoke {(k + 1) % SPOKES}")
         model.constrain(mbd.Unilateral(f"spoke {k}", mbd.touchdown(tip), release=release))
     model.apply(mbd.Applied("drive", wheel.origin, torque=(0.0, 0.0, -2.5), axes=wheel.origin))
+    if keel:
+        wheel.point(0.0, 0.0, 1.0, name="side")
+        lean = ("wheel.side.y", "hub.y")
+        model.apply(mbd.Potential("keel", lambda side, hub: keel * (side - hub) ** 2, lean))
     model.apply(mbd.Applied("steer", wheel.origin, torque=(0.0, 0.0, 0.0)))
     return model
 
@@ -103,3 +110,20 @@ def test_a_slope_or_a_wind_makes_headings_differ() -> None:
         driven_wheel(), start, section="spoke 1", parameters=tilted, longest=0.1, on_failure="return"
     )
     assert found.map.heading is None
+
+
+@pytest.mark.slow
+def test_starts_of_quaternions_come_to_the_gait_along_any_heading() -> None:
+    model = driven_wheel(keel=10.0)
+    start = mbd.assemble(
+        model, closed="spoke 0", position={"hub.y": math.cos(HALF), "hub.orientation": ((0, 0, 1), HALF)},
+        velocity={"hub.angular_velocity.z": -2.15},
+    )  # fmt: skip
+    gait = mbd.limit_cycle(model, start, section="spoke 0")
+    assert gait.stability == "stable" and gait.largest_multiplier == pytest.approx(0.917358, abs=1e-5)
+    axes = {"hub.angular_velocity.x": [-0.1, 0.0, 0.1], "hub.angular_velocity.z": [-2.15, -1.93, -0.1]}
+    found = mbd.basin(model, gait, axes)
+    assert found.outcome[:, :2].tolist() == [["walks", "walks"]] * 3
+    assert "walks" not in found.outcome[:, 2]
+    with pytest.raises(mbd.ModelError, match=r"'hub.orientation.x' is a part of a quaternion"):
+        mbd.basin(model, gait, {"hub.orientation.x": [0.0, 0.1]})

@@ -19,6 +19,7 @@ from mbd.gait.cycle import LimitCycle
 from mbd.gait.return_map import ReturnMap
 from mbd.simulation.batch.changes import Changes
 from mbd.simulation.batch.runner import Runner
+from mbd.simulation.batch.starts import raise_for_turning
 from mbd.simulation.simulate import REST_SPEED
 from mbd.state import State
 
@@ -73,10 +74,10 @@ class Made:
                 "sweep of runs"
             )
         self.walks = Walks(self.map, self.runner)
-        vector = self.map.mechanism.vector
-        if not vector and (self.study.start is not None or columns[0]):
-            raise ModelError("axes: coordinates of this model do not add, so columns cannot give them; vary parameters")
-        self._onto = OntoSection(self.section, columns[0]) if vector else None
+        names = self.map.mechanism.equations.configuration.names
+        turning = [names[place] for place in columns[0] if place < len(names)]
+        raise_for_turning("axes", turning, self.map.mechanism, "vary angular velocities, or parameters")
+        self._onto = OntoSection(self.section, columns[0])
         self.balls: dict[tuple[float, ...], list[tuple[int, Ball]]] = {}
         self._find_balls()
 
@@ -156,9 +157,7 @@ class Made:
         lines = np.repeat(self.walks.lines([self.state]), len(runs), axis=0)
         for place, column in state.items():
             lines[:, 1 + place] = column
-        good = np.ones(len(runs), dtype=bool)
-        if self._onto is not None:
-            good = self._onto(*self.walks.parts(lines), changes.all_vectors(len(runs)))
+        good = self._onto(*self.walks.parts(lines), changes.all_vectors(len(runs)))
         return lines, good, changes, which, [self.balls[tuple(values.values())] for values in kinds]
 
     def block(self, runs: Any, steps: int) -> Decided:

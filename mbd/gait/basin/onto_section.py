@@ -1,6 +1,6 @@
 """Many states moved onto the section at once, coordinates that were named left where they are.
 
-Positions follow Newton's method on all that holds there, ``x ← x − Gᵀ (G Gᵀ)⁻¹ h`` over the coordinates without a
+Positions follow Newton's method on all that holds there, ``x ← x − Gᵀ (G Gᵀ)⁻¹ h`` over the increments without a
 name; velocities, of which rows are linear, one such step over those without a name. States that do not come there keep
 what is left, and the caller judges it.
 """
@@ -35,15 +35,16 @@ class OntoSection:
 
     Parameters
     ----------
-    section : of a model whose coordinates add
-    named : places in (q, v, z) that stay
+    section : of a model; where coordinates do not add, positions move by increments
+    named : places in (q, v, z) that stay, none of them a part of a quaternion
     """
 
     def __init__(self, section: Section, named: Collection[int]) -> None:
         equations = section.mechanism.equations
         self.section, n_q, n_v = section, equations.n_q, equations.n_v
         self.n_q, self.n_v = n_q, n_v
-        self.free_places = np.array([k for k in range(n_q) if k not in named], dtype=np.intp)
+        self.configuration, places = equations.configuration, equations.configuration.places
+        self.free_places = np.array([k for k in range(n_v) if places[k] < 0 or places[k] not in named], dtype=np.intp)
         self.free_rates = np.array([k for k in range(n_v) if n_q + k not in named], dtype=np.intp)
         with equations.tape.lock:
             x = [equations.tape.input("x", k) for k in range(n_v)]
@@ -72,7 +73,12 @@ class OntoSection:
                 if not moving.any() or not len(self.free_places):
                     break
                 step = _shortest(G[moving][:, :, self.free_places], h[moving])
-                q[np.ix_(moving, self.free_places)] -= step
+                if self.configuration.is_vector:
+                    q[np.ix_(moving, self.free_places)] -= step
+                else:
+                    move = np.zeros((len(step), self.n_v))
+                    move[:, self.free_places] = -step
+                    q[moving] = self.configuration.compose(q[moving], move)
                 if np.max(np.abs(step)) < FINE:
                     break
             h, _ = self._rows(self._positions, self._held[0], inputs, parameters)

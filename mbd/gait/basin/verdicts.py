@@ -205,8 +205,8 @@ class _Points:
         return known & (over[1] < FALLEN * over[0]), side
 
     def _rates(self, inputs: dict[str, Matrix]) -> Matrix:
-        """q̇ where coordinates add, else zero: then nobody says to which side a walker falls."""
-        return inputs["v"] if self.map.mechanism.vector else np.zeros_like(inputs["q"])
+        """q̇."""
+        return self.equations.configuration.rates(inputs["q"], inputs["v"])
 
 
 AHEAD = 1e-4
