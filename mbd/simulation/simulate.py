@@ -226,6 +226,9 @@ class _Motion:
         trajectory = found.trial.run
         if found.problem and trajectory.success:  # no run failed, but none is good enough
             trajectory = Trajectory(replace(trajectory.record, success=False, message=found.problem))
+        elif found.doubt and trajectory.success:
+            trajectory.stats["notes"].append(found.doubt)
+            trajectory = Trajectory(replace(trajectory.record, message=f"{trajectory.message}; {found.doubt}"))
         return found.trial.source, trajectory, found.problem
 
 

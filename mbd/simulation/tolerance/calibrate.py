@@ -10,7 +10,7 @@ import numpy as np
 from mbd.errors import MemoryLimitError
 from mbd.simulation.tolerance.foresight import LONG, foreseen
 from mbd.simulation.tolerance.search import CHECK, PILOT, REGULAR, WELL, Search
-from mbd.simulation.tolerance.trials import Trial, is_rounding
+from mbd.simulation.tolerance.trials import Trial, is_rounding, rounding
 
 __all__ = ["Outcome", "calibrated", "first_allowed"]
 
@@ -26,6 +26,8 @@ NEARER = 0.5
 """Error over that of the most accurate run before up to which a run has come nearer [-]."""
 FAR_FINER = 1.5
 """Order of a scheme over that of its estimate from which runs are much better than their estimates say [-]."""
+HALF_THE_DIGITS = 0.5
+"""Power of a tolerance up to which the error of a run counts that round-off alone keeps from it [-]."""
 GROWING = 1e3
 """Growth of errors above which a run says so [-]."""
 ASK = "ask for less accuracy or a shorter time, or take a scheme of higher order, RungeKutta853 or RadauIIA"
@@ -33,10 +35,11 @@ ASK = "ask for less accuracy or a shorter time, or take a scheme of higher order
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """The run that counts and what went wrong ('' if nothing did)."""
+    """The run that counts, what went wrong and what puts it in doubt ('' if nothing does)."""
 
     trial: Trial
     problem: str
+    doubt: str = ""
 
 
 def first_allowed(tol: float, length: float, power: float) -> float:
@@ -88,7 +91,30 @@ def calibrated(
         wanted = search.next(trials)
     best = search.best(trials)
     missed = not best.error <= BEYOND * tol
+    if missed and _amplifies_round_off(trials, best, tol):
+        outcome = _outcome(trials, best, search, "")
+        return replace(outcome, doubt=_sensitive(best, tol))
     return _outcome(trials, best, search, _unreached(trials, best, tol) if missed else "")
+
+
+def _amplifies_round_off(trials: Sequence[Trial], best: Trial, tol: float) -> bool:
+    """Whether round-off of the states alone, which the motion makes larger, keeps a run from its tolerance.
+
+    Then no run in these numbers is better, and one that has half the digits that were asked for counts, in doubt.
+    """
+    own = rounding(best) * float(best.run.stats["steps"])
+    stuck = any(is_rounding(trial) for trial in trials)
+    return bool(stuck and own <= tol and best.error <= tol**HALF_THE_DIGITS)
+
+
+def _sensitive(best: Trial, tol: float) -> str:
+    """What such a run says."""
+    where = f" (of {best.gap.name!r})" if best.gap is not None and best.gap.name else ""
+    return (
+        f"coordinates have an estimated error of {best.error:.2g}{where}, above tol = {tol:g}: the motion is so "
+        "sensitive that round-off alone makes it, whatever the steps; what the motion keeps, such as energy, is as "
+        "accurate as steps are (tol_of= asks for results by name)"
+    )
 
 
 def _given_up(trials: Sequence[Trial], search: Search, refused: str) -> Outcome:
