@@ -19,7 +19,7 @@ from mbd.kernel.codes import (
     PULL,
     STICK,
 )
-from mbd.kernel.cone_steps import approached_end, come_to_zero, slides_on
+from mbd.kernel.cone_steps import SHORTER, approached_end, come_to_zero, slides_at_first, slides_on
 from mbd.kernel.cones import follow_motion, pull_of_both
 from mbd.kernel.contact_modes import room_to_log
 from mbd.kernel.contact_step import relax_pace
@@ -38,7 +38,7 @@ from mbd.kernel.singular.events import find_passed_events, log_passed_events, ma
 from mbd.kernel.singular.leave import leave_singularity
 from mbd.kernel.singular.step_pairs import ALONE, FIRST, SECOND
 from mbd.kernel.starting import find_mode, restart, still_dependent
-from mbd.kernel.step_retry import part_end, step_end, tried_step
+from mbd.kernel.step_retry import is_shortened, part_end, step_end, tried_step
 from mbd.kernel.trial_step import try_step
 
 __all__ = ["advance"]
@@ -306,6 +306,17 @@ def take_step(K: Kernel) -> int:
     if K.n_cones > 0 and K.strategy == 1:
         hold_for_step(K, h)
     status = tried_step(K, h, t1)
+    if status != 0 and K.n_cones > 0 and K.strategy == 0:
+        for _ in range(4):
+            if not (is_shortened(K, status) and slides_at_first(K, SHORTER * h)):
+                break
+            h *= SHORTER
+            full = h
+            t1 = t + h
+            within = True
+            cut = False
+            K.begun_step = h
+            status = tried_step(K, h, t1)
     if status == 0 and K.n_cones > 0 and K.strategy == 0 and slides_on(K):
         h = min(0.5 * h, K.step_taken)
         full = h
@@ -316,6 +327,9 @@ def take_step(K: Kernel) -> int:
     if status != 0:
         return status
     if K.step_taken != h:
+        if K.n_cones > 0 and K.strategy == 0 and K.step_taken < h and slides_at_first(K, K.step_taken):
+            within = True
+            K.begun_step = K.step_taken
         h = K.step_taken
         t1 = t + h
         cut = cut and h >= full

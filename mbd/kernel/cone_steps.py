@@ -23,12 +23,18 @@ from mbd.kernel.restart import evaluate
 from mbd.kernel.roots import sqrt
 from mbd.kernel.trial_step import try_step
 
-__all__ = ["approached_end", "come_to_zero", "slides_on"]
+__all__ = ["SHORTER", "approached_end", "come_to_zero", "slides_at_first", "slides_on"]
 
 PART = 0.5
 """Part of the time in which γ would reach zero, or turn by a radian, that a step may take [-]."""
 FAR = 2.0
 """Times of a step in which γ must not reach zero if the step is to be as any other [-]."""
+SHORTER = 0.1
+"""Part of a step that is tried where Newton's method does not find its end as sliding begins, four times at most [-]."""
+LONGER = 3.0
+"""Each of the steps that follow over the one before [-]."""
+BRIEFEST = 1e-7
+"""Part of dt below which no such step is tried [-]."""
 STABLE = 3.0
 """Step times the fastest turn of a direction by friction that explicit schemes take [-]."""
 SURELY = 0.8
@@ -74,12 +80,28 @@ def approached_end(K: Guards, t1: float) -> float:
                 K.hold[f] = K.hold[p] = HELD
             elif fall > 0.0 or across * h > PART * speed * speed:
                 end = min(end, K.time + max(PART * speed / change, SHORTEST * K.dt))
+    if K.begun_step > 0.0:
+        K.begun_step *= LONGER
+        if K.begun_step < end - K.time:
+            end = K.time + K.begun_step
+        else:
+            K.begun_step = 0.0
     if K.explicit == 1 and K.adaptive == 0:
         fastest = fastest_turn(K)
         K.turning_step = STABLE / fastest if fastest > 0.0 else 0.0
         if fastest * (end - K.time) > STABLE:
             end = K.time + K.turning_step
     return end
+
+
+def slides_at_first(K: Guards, h: float) -> bool:
+    """Whether something slides whose direction may turn too fast for a step of dt: one of h may follow it."""
+    if K.adaptive == 1 or h < BRIEFEST * K.dt:
+        return False
+    for f in range(K.n_frictions):
+        if K.partner[f] > f and K.slip[f] != 0.0 and K.hold[f] != HELD:
+            return True
+    return False
 
 
 def fastest_turn(K: Guards) -> float:

@@ -11,7 +11,7 @@ from mbd.kernel.singular.step_pairs import ALONE, FIRST, LONGER, SECOND, SHORTER
 from mbd.kernel.singular.step_size import is_resolved, is_too_noisy, singular_step_size
 from mbd.kernel.trial_step import try_step
 
-__all__ = ["part_end", "step_end", "tried_step"]
+__all__ = ["is_shortened", "part_end", "step_end", "tried_step"]
 
 SHORTEST = 0.1
 """Part of a step below which a failing step is not shortened any further [-]."""

@@ -87,6 +87,7 @@ class Events(SchemeAbilities):
     in_substeps: int = place("state")  # 1: within a step that is taken in substeps
     substep: float = place("clock")  # the size of such a step
     turning_step: float = place("clock")  # in which friction turns a motion that has begun to slide; 0: not looked at
+    begun_step: float = place("clock")  # the last of short steps from where sliding began; 0: none
     crowding: float = place("clock")  # how much located impacts crowd
     crowding_time: float = place("clock")  # when that was counted last
     fallback: int = place("state")  # 1: non-smooth steps followed as impacts crowded, 2: as locating could not go on
