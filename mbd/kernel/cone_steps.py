@@ -112,6 +112,11 @@ def fastest_turn(K: Guards) -> float:
     rate = 0.0
     for f in range(K.n_frictions):
         if K.partner[f] > f and K.slip[f] != 0.0 and K.hold[f] != HELD:
+            p = K.partner[f]
+            gain = K.guards0[K.at_slip + f] * K.guards0[K.at_slip_rate + f]
+            gain += K.guards0[K.at_slip + p] * K.guards0[K.at_slip_rate + p]
+            if gain < 0.0:  # it comes to rest: `approached_end` sees to that
+                continue
             if rate == 0.0:
                 evaluate(K, K.time, K.q, K.y)
             speed = speed_of_both(K, f, K.guards0, K.at_slip) + 4.0 * K.hold[f]

@@ -209,9 +209,9 @@ def _dependence(M: Any, B: Any, held: _Held) -> Any:
     scaled = np.nan_to_num(B / _weights(M), posinf=0.0, neginf=0.0)
     basis, _ = np.linalg.qr(np.swapaxes(scaled[:, held.kept], 1, 2))
     along = scaled[:, held.every] @ basis
-    kept = along[:, [held.every.index(k) for k in held.kept]]
-    kept[np.linalg.slogdet(kept)[0] == 0.0] = np.eye(len(held.kept))
-    return np.swapaxes(np.linalg.solve(np.swapaxes(kept, 1, 2), np.swapaxes(along, 1, 2)), 1, 2)
+    kept = np.swapaxes(along[:, [held.every.index(k) for k in held.kept]], 1, 2).copy()
+    kept[np.linalg.slogdet(kept)[0] == 0.0] = np.eye(len(held.kept))  # of the very matrix that is solved with
+    return np.swapaxes(np.linalg.solve(kept, np.swapaxes(along, 1, 2)), 1, 2)
 
 
 def _least_norm(dependence: Any, weight: Matrix) -> Any:
