@@ -18,7 +18,7 @@ from mbd.kernel.cones import HELD, ONSET, aim, speed_of_both
 from mbd.kernel.contact_modes import STILL
 from mbd.kernel.guards import judge
 from mbd.kernel.locate import locate
-from mbd.kernel.records import Guards, Kernel
+from mbd.kernel.records import Frictions, Guards, Kernel
 from mbd.kernel.restart import evaluate
 from mbd.kernel.roots import sqrt
 from mbd.kernel.trial_step import try_step
@@ -30,13 +30,15 @@ PART = 0.5
 FAR = 2.0
 """Times of a step in which γ must not reach zero if the step is to be as any other [-]."""
 SHORTER = 0.1
-"""Part of a step that is tried where Newton's method does not find its end as sliding begins, four times at most [-]."""
+"""Part of a step that is tried where Newton's method fails as sliding begins, four times at most [-]."""
 LONGER = 3.0
 """Each of the steps that follow over the one before [-]."""
 BRIEFEST = 1e-7
 """Part of dt below which no such step is tried [-]."""
 STABLE = 3.0
 """Step times the fastest turn of a direction by friction that explicit schemes take [-]."""
+BRIEFEST_TURN = 1e-5
+"""Part of dt below which no step is shortened for it [-]."""
 SURELY = 0.8
 """Part of a step within which γ reaches zero if a direction is held in it [-]."""
 STRAIGHT = 0.05
@@ -88,20 +90,20 @@ def approached_end(K: Guards, t1: float) -> float:
             K.begun_step = 0.0
     if K.explicit == 1 and K.adaptive == 0:
         fastest = fastest_turn(K)
-        K.turning_step = STABLE / fastest if fastest > 0.0 else 0.0
-        if fastest * (end - K.time) > STABLE:
+        K.turning_step = max(STABLE / fastest, BRIEFEST_TURN * K.dt) if fastest > 0.0 else 0.0
+        if 0.0 < K.turning_step < end - K.time:
             end = K.time + K.turning_step
     return end
 
 
-def slides_at_first(K: Guards, h: float) -> bool:
+def slides_at_first(K: Frictions, h: float) -> bool:
     """Whether something slides whose direction may turn too fast for a step of dt: one of h may follow it."""
     if K.adaptive == 1 or h < BRIEFEST * K.dt:
         return False
+    found = False
     for f in range(K.n_frictions):
-        if K.partner[f] > f and K.slip[f] != 0.0 and K.hold[f] != HELD:
-            return True
-    return False
+        found = found or (K.partner[f] > f and K.slip[f] != 0.0 and K.hold[f] != HELD)
+    return found
 
 
 def fastest_turn(K: Guards) -> float:

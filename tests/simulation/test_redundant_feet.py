@@ -141,3 +141,23 @@ def test_tables_slip_at_the_least_load_of_any_motion(data, count):
     assert np.all(sizes <= mu[:, None] * pushes * (1.0 + 1e-9) + 1e-9)
     moved = np.array([run[name][-1] for name in ("float.x.rate", "float.y.rate", "float.angular_velocity.z")])
     assert moved @ way / np.linalg.norm(moved) / np.linalg.norm(way) > 0.99
+
+
+def test_order_of_feet_and_directions_of_the_plane_do_not_matter_and_friction_takes_energy():
+    count, feet, load = 4, FEET[4], {"fx": 0.1, "tz": 1.0}
+    how = {"rate": 100.0, "bend": -150.0, "dt": 1e-3, "until": 0.355}
+    run = pushed(table(feet), load, mbd.HHT(0.05), **how)
+    assert [event.kind for event in run.events] == ["slipped"] * count
+    sizes, forces = pulls(run, feet)
+    assert np.all(forces > 0.0) and np.all(sizes <= 0.3 * forces * (1.0 + 1e-9))
+    taken = np.array([run.energy[f"foot {k} friction"] for k in range(count)])
+    assert np.all(np.diff(taken, axis=1) <= 1e-9) and taken[:, -1].sum() < 0.0
+    order = tuple(reversed(range(count)))
+    for other, turn in (table(feet, order), 0.0), (table(feet, None, 0.8), 0.8):
+        same = pushed(other, load, mbd.HHT(0.05), **how)
+        back = (same["float.x"] + 1j * same["float.y"]) * np.exp(-1j * turn)
+        there = np.interp(run.time, same.time, back)
+        assert np.max(np.abs(there - run["float.x"] - 1j * run["float.y"])) < 2e-5
+        assert [event.time for event in same.events] == pytest.approx(
+            [event.time for event in run.events], abs=2e-5
+        )  # errors of steps
