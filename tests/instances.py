@@ -288,6 +288,11 @@ PARTS: list[tuple[str, Part]] = [
         m, "part", a.point(0.0, -0.2 * u.m), [(x * u.m, y * u.m) for x, y in SOLE], friction=0.5), {})),
     ("heel and toe", Part("foot", lambda m, a, u: parts.heel_and_toe(
         m, "part", a.point(-0.06 * u.m, -0.2 * u.m), a.point(0.14 * u.m, -0.2 * u.m), friction=0.6), {})),
+    ("polygon foot", Part("foot", lambda m, a, u: parts.polygon_foot(
+        m, "part", [a.point(x * u.m, y * u.m) for x, y in ((-0.06, -0.2), (0.14, -0.2))], friction=0.6), {})),
+    ("capsule foot", Part("foot", lambda m, a, u: parts.capsule_foot(
+        m, "part", a.point(-0.06 * u.m, -0.15 * u.m), a.point(0.14 * u.m, -0.15 * u.m), 0.05 * u.m,
+        friction=0.6), {})),
     ("keel foot", Part("foot", lambda m, a, u: parts.keel_foot(
         m, "part", a.point(-0.06 * u.m, -0.22 * u.m), a.point(0.0, -0.2 * u.m), length=0.2 * u.m,
         stiffness=4e4 * u.N / u.m, mass=0.2 * u.kg, loss=mbd.Viscous(0.5 * u.Nm * u.s), friction=0.6), {})),

@@ -31,13 +31,15 @@ NAMES = (
     "tennis-racket", "tune-a-knee-damper",
     "user-constraint", "user-integrator",
 )  # fmt: skip
-NAMES = tuple(sorted((*NAMES, "amputee-in-space", "bicycle", "billiard-ball", "rolling-coin", "walker-in-space")))
+NAMES = tuple(
+    sorted((*NAMES, "amputee-in-space", "bicycle", "billiard-ball", "rolling-coin", "tippe-top", "walker-in-space"))
+)
 HEAVY = ("amputee-in-space",)
 """Whose plain twin takes minutes: see tests/cases/test_space_examples.py."""
 STUDIES = ("compare-two-knees", "identify-a-shank", "tune-a-knee-damper")
 """Which find gaits or fits before their run, for seconds."""
 EACH = [pytest.param(name, marks=pytest.mark.slow) if name in STUDIES else name for name in NAMES]
-COARSE = ("long-pendulum", "user-integrator")
+COARSE = ("long-pendulum", "tippe-top", "user-integrator")
 """Of steps so long, for very many periods, or of order so low that other schemes differ."""
 WALKERS = ("chapter-walker", "compass-gait", "kneed-walker", "prosthetic-leg")
 

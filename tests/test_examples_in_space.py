@@ -93,3 +93,18 @@ def test_a_billiard_ball_slides_on_a_parabola_and_rolls_on() -> None:
     speed = np.column_stack([rolls[f"roll.{axis}.rate"] for axis in "xyz"])
     assert speed == pytest.approx(np.tile(v - 2.0 / 7.0 * slip, (20, 1)), abs=1e-9)
     assert rolls["roll.angular_velocity.ground"][:, 1] == pytest.approx(30.0, abs=1e-9)
+
+
+def test_a_tippe_top_turns_over_and_jellett_stays() -> None:
+    run = run_of("tippe-top")
+    R, a, A, C = 0.015, 0.0045, 5.052857142857143e-07, 5.4e-07
+    turned = np.array([rotation_of(each) for each in run["float.orientation"]])
+    axis = turned[:, :, 1]
+    tilt = np.arccos(axis[:, 1])
+    assert tilt[0] == pytest.approx(0.1, abs=1e-12)
+    assert tilt[-1] > 3.1  # it stands on its peg
+    momentum = np.einsum("kij,kj->ki", turned, run["float.angular_velocity"] * [A, C, A])
+    jellett = momentum @ [0.0, R, 0.0] - a * np.einsum("ki,ki->k", momentum, axis)
+    assert jellett == pytest.approx(np.full(len(jellett), 8.725777295065614e-07), rel=1e-7)
+    assert run["float.angular_velocity.ground.y"][-1] < 0.6 * 155.0
+    assert run["tip.force"].min() > 0.0

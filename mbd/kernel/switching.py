@@ -210,6 +210,13 @@ def slip_together(K: Balance, index: int) -> None:
     K.sticks[index] = K.sticks[K.partner[index]] = 0
 
 
+def stop_spin(K: Switching, index: int) -> None:
+    """The spin of a contact that came to rest is none, not round-off of what it was: nothing else may move then."""
+    K.sticks[index] = 1
+    project_velocity(K, K.time, K.q, K.y, active_rows(K, K.closed), True)
+    K.sticks[index] = 0
+
+
 def switch(K: Switching) -> int:
     """What the fired guard does to the closed contacts and the velocities; the state is at its instant."""
     kind = K.event_kind
@@ -243,6 +250,8 @@ def switch(K: Switching) -> int:
         K.sticks[index] = 0
         if K.partner[index] >= 0:
             stop_together(K, index)
+        elif K.friction_contact[index] >= 0 and K.row_unit[K.friction_row[index]] == 1:
+            stop_spin(K, index)
     elif kind == SLIP:
         K.loose[index] = 3
         K.sticks[index] = 0

@@ -19,9 +19,11 @@ if TYPE_CHECKING:
     from mbd.parts.body.segments import BodySegment as BodySegment, Person as Person, person as person
     from mbd.parts.body.socket import elastic_socket as elastic_socket
     from mbd.parts.feet.arc import arc_foot as arc_foot
+    from mbd.parts.feet.capsule import capsule_foot as capsule_foot
     from mbd.parts.feet.heel_and_toe import heel_and_toe as heel_and_toe
     from mbd.parts.feet.keel import keel_foot as keel_foot
     from mbd.parts.feet.point import point_foot as point_foot
+    from mbd.parts.feet.polygon import polygon_foot as polygon_foot
     from mbd.parts.feet.profile import profile_foot as profile_foot
     from mbd.parts.knees.four_bar import (
         HEIGHT_3R60 as HEIGHT_3R60,
@@ -51,9 +53,11 @@ _HOMES = {
     "body.segments": "BodySegment Person person",
     "body.socket": "elastic_socket",
     "feet.arc": "arc_foot",
+    "feet.capsule": "capsule_foot",
     "feet.heel_and_toe": "heel_and_toe",
     "feet.keel": "keel_foot",
     "feet.point": "point_foot",
+    "feet.polygon": "polygon_foot",
     "feet.profile": "profile_foot",
     "knees.four_bar": "HEIGHT_3R60 PIVOTS_3R60 STANCE_3R60 SWING_3R60 four_bar_knee",
     "knees.friction_brake": "friction_brake_knee",

@@ -99,3 +99,14 @@ def test_where_nothing_spins_it_is_refused_by_name():
     )
     faults = mbd.Unilateral("foot", mbd.height(body.origin), spin_friction=0.1).faults()
     assert any("has no spin about a normal" in fault for fault in faults)
+
+
+@pytest.mark.parametrize("speed", [20.0, 45.0])
+def test_the_rest_of_a_fast_spin_is_rest_to_the_last_bit(speed):
+    """What is left of it would be as large as all other velocities, beside which steps after it are judged."""
+    model = pivot(0.0)
+    start = mbd.assemble(model, position={"float.y": 0.05}, velocity={"float.angular_velocity.y": speed}, closed="foot")
+    stop = speed * INERTIA / (RHO * MASS * G)
+    run = mbd.simulate(model, start, mbd.RadauIIA(), dt=1e-2, until=stop + 0.1)
+    assert [event.time for event in run.events] == [pytest.approx(stop, abs=1e-9)]
+    assert run["float.angular_velocity.y"][-1] == pytest.approx(0.0, abs=1e-30)

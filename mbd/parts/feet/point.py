@@ -8,6 +8,7 @@ from mbd.bodies.base import Frame
 from mbd.constraints.touchdown import touchdown
 from mbd.constraints.unilateral import Unilateral
 from mbd.description import Description
+from mbd.joints.losses.base import Loss
 from mbd.parts.arguments import check, released
 
 __all__ = ["point_foot"]
@@ -19,7 +20,7 @@ def point_foot(
     point: Frame,
     *,
     release: Any = None,
-    friction: float | None = None,
+    friction: float | Loss | None = None,
     ground: Any = None,
 ) -> Unilateral:
     """A point that strikes without bouncing and then sticks, or slips with friction: ``0 ≤ g ⟂ p ≥ 0``.
@@ -33,7 +34,7 @@ def point_foot(
     point : where it meets the ground
     release : name of the foot that takes over as it strikes (McGeer's rule), or `When`; None: it opens on pull. With
         ``When(other, may_pull=False)`` it opens by either; friction of a foot that pulls is 0, never negative
-    friction : μ; None: it sticks
+    friction : μ; None: it sticks; or a loss of the speed of the slip, as of `Unilateral`
     ground : as of `touchdown`
 
     >>> import mbd
