@@ -15,6 +15,7 @@ from mbd.hardcases import (
     governor,
     grazes,
     knees,
+    light_links,
     long_run,
     mass_ratios,
     mats,
@@ -36,9 +37,9 @@ from mbd.hardcases.case import HardCase
 __all__ = ["CASES"]
 
 MODULES = (
-    absent_effects, balls, blocks, clearances, cradles, four_bars, frictions, governor, grazes, knees, long_run,
-    mass_ratios, mats, redundant_rows, resting, rods, rotations, shakers, singular_poses, sleighs, starts, tiny_steps,
-    user_force, walls, wheel,
+    absent_effects, balls, blocks, clearances, cradles, four_bars, frictions, governor, grazes, knees, light_links,
+    long_run, mass_ratios, mats, redundant_rows, resting, rods, rotations, shakers, singular_poses, sleighs, starts,
+    tiny_steps, user_force, walls, wheel,
 )  # fmt: skip
 
 
