@@ -2,7 +2,18 @@
 
 from __future__ import annotations
 
-from mbd.kernel.codes import GAINED, LAST, NOT_CONVERGED, NOT_FINITE, SINGULAR, SINGULAR_ROWS_MOVE, STAGNATED, TOO_NEAR
+from mbd.kernel.codes import (
+    GAINED,
+    LAST,
+    LEAPT,
+    NOT_CONVERGED,
+    NOT_FINITE,
+    OUTGROWN,
+    SINGULAR,
+    SINGULAR_ROWS_MOVE,
+    STAGNATED,
+    TOO_NEAR,
+)
 from mbd.kernel.control import controlled_step
 from mbd.kernel.records import Balance, Guards, Kernel, SchemeAbilities, State
 from mbd.kernel.resolution import judge_change
@@ -90,9 +101,35 @@ def tried_step(K: Kernel, h: float, t1: float) -> int:
     while h > SHORTEST * full and (is_shortened(K, status) or (status == NOT_FINITE and strays(K, h))):
         h *= SHORTENING
         status = judged_step(K, h, K.time + h)
+    if K.n_cones > 0 and is_rough(status) and K.explicit == 0 and K.strategy == 0:
+        status = step_while_turning(K, h)
+        h = K.step_taken
     if h < full and (K.paired_step == FIRST or K.paired_step == ALONE):
         K.paired_step = 0
     K.step_taken = h
+    return status
+
+
+def is_rough(status: int) -> bool:
+    """Whether a step seems to be too long for what forces do in it."""
+    return status == OUTGROWN or status == LEAPT
+
+
+def step_while_turning(K: Kernel, h: float) -> int:
+    """A candidate after a shorter step, judged by itself, where friction in a plane turns with a slow γ: K.step_taken.
+
+    What it would do in a whole step of dt says nothing: soon γ is another, or nothing slides.
+    """
+    shortest = SHORTEST * h
+    status = OUTGROWN
+    if h > 0.999 * K.step:
+        h *= SHORTENING
+    while is_rough(status) and h > shortest:
+        K.step_taken = h
+        K.turning_step = h
+        status = judged_step(K, h, K.time + h)
+        h *= SHORTENING
+    K.turning_step = 0.0
     return status
 
 
