@@ -43,6 +43,8 @@ from mbd.kernel.trial_step import try_step
 
 __all__ = ["advance"]
 
+MOST_SHORTER = 5
+"""Tries of shorter steps as sliding begins or ends [-]."""
 MOST_SHORTENED = 5
 """Shortened steps, less half the full ones between them, after which a mechanism with rows is stuck.
 
@@ -306,24 +308,24 @@ def take_step(K: Kernel) -> int:
     if K.n_cones > 0 and K.strategy == 1:
         hold_for_step(K, h)
     status = tried_step(K, h, t1)
-    if status != 0 and K.n_cones > 0 and K.strategy == 0:
-        for _ in range(4):
-            if not (is_shortened(K, status) and slides_at_first(K, SHORTER * h)):
+    if K.n_cones > 0 and K.strategy == 0:
+        released = False
+        for _ in range(MOST_SHORTER):
+            if status == 0:
+                if released or not slides_on(K):
+                    break
+                released = True
+                h = min(0.5 * h, K.step_taken)
+            elif is_shortened(K, status) and slides_at_first(K, SHORTER * h):
+                h *= SHORTER
+                K.begun_step = h
+            else:
                 break
-            h *= SHORTER
             full = h
             t1 = t + h
             within = True
             cut = False
-            K.begun_step = h
             status = tried_step(K, h, t1)
-    if status == 0 and K.n_cones > 0 and K.strategy == 0 and slides_on(K):
-        h = min(0.5 * h, K.step_taken)
-        full = h
-        t1 = t + h
-        within = True
-        cut = False
-        status = tried_step(K, h, t1)
     if status != 0:
         return status
     if K.step_taken != h:
