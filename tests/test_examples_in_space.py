@@ -10,6 +10,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.special import ellipk
 
+import mbd
 from mbd.joints.quaternions import rotation_of
 from tests.test_examples import g, run_of, script, zeros
 
@@ -108,3 +109,10 @@ def test_a_tippe_top_turns_over_and_jellett_stays() -> None:
     assert jellett == pytest.approx(np.full(len(jellett), 8.725777295065614e-07), rel=1e-7)
     assert run["float.angular_velocity.ground.y"][-1] < 0.6 * 155.0
     assert run["tip.force"].min() > 0.0
+
+
+def test_a_report_in_space_tells_steps_along_the_way() -> None:
+    gait = script("walker-in-space")["gait"]
+    words = str(mbd.gait_report(gait)).splitlines()
+    steps = next(line for line in words if line.startswith("step length [m]")).split()[3:5]
+    assert [float(step) for step in steps] == pytest.approx([gait.distance] * 2, abs=5e-5)

@@ -152,9 +152,17 @@ def _strides(
         step = (float("nan"), float("nan"))
         if first > 0:
             before, _, other = strikes[first - 1]
-            step = (begin - before, float(np.linalg.norm(place - other)))
+            step = (begin - before, _ahead(place - other, there - place))
         found.append(Stride(begin, end, _leaving(stances, begin, end), step, float(np.linalg.norm(there - place))))
     return tuple(found)
+
+
+def _ahead(step: Matrix, stride: Matrix) -> float:
+    """Length of a step [m]: in the plane its own, in space its part along the stride, without the width of the step."""
+    way = float(np.linalg.norm(stride))
+    if (step[2] == 0.0 and stride[2] == 0.0) or way == 0.0:
+        return float(np.linalg.norm(step))
+    return abs(float(step @ stride)) / way
 
 
 def _leaving(stances: Sequence[Interval], begin: float, end: float) -> float:
