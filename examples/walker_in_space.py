@@ -30,6 +30,6 @@ guess = mbd.assemble(
     velocity={"left hip.angle": -1.127, "right hip.angle": -0.560, "roll.angle": -0.2544},
 )
 gait = mbd.limit_cycle(model, guess, section="right foot", mirror=("left", "right"))
-start, integrator, dt, until = gait.state, mbd.RungeKutta853(), 0.01, 2.0
+start, integrator, dt, until = gait.state, mbd.RungeKutta853(), 0.005, 2.0
 if __name__ == "__main__":
     print(gait, "multipliers", gait.multipliers.round(4), sep="\n")

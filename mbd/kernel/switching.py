@@ -210,7 +210,7 @@ def slip_together(K: Balance, index: int) -> None:
     K.sticks[index] = K.sticks[K.partner[index]] = 0
 
 
-def stop_spin(K: Switching, index: int) -> None:
+def stop_spin(K: Balance, index: int) -> None:
     """The spin of a contact that came to rest is none, not round-off of what it was: nothing else may move then."""
     K.sticks[index] = 1
     project_velocity(K, K.time, K.q, K.y, active_rows(K, K.closed), True)
