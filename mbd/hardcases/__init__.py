@@ -19,6 +19,7 @@ from mbd.hardcases import (
     long_run,
     mass_ratios,
     mats,
+    pushed_tables,
     redundant_rows,
     resting,
     rods,
@@ -38,8 +39,8 @@ __all__ = ["CASES"]
 
 MODULES = (
     absent_effects, balls, blocks, clearances, cradles, four_bars, frictions, governor, grazes, knees, light_links,
-    long_run, mass_ratios, mats, redundant_rows, resting, rods, rotations, shakers, singular_poses, sleighs, starts,
-    tiny_steps, user_force, walls, wheel,
+    long_run, mass_ratios, mats, pushed_tables, redundant_rows, resting, rods, rotations, shakers, singular_poses,
+    sleighs, starts, tiny_steps, user_force, walls, wheel,
 )  # fmt: skip
 
 

@@ -17,6 +17,7 @@ from mbd.kernel.linear import solve_definite, solve_from_tips
 from mbd.kernel.mass_ratios import LOSS, is_uneven, polish_rates, polish_with_rows
 from mbd.kernel.ordered import LOSS_AT_ONCE, solve_kkt
 from mbd.kernel.records import Balance, DependentRows, Kernel, Mechanism, Memory, SingularSteps, Steps
+from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import compose, consistent, displace, evaluate, measure_accepted, raise_scales
 from mbd.kernel.roots import sqrt
 from mbd.kernel.saddle import factor_saddle
@@ -150,7 +151,7 @@ def explicit_rates(K: Balance, t: float) -> int:
     """Rates at (q1, y1), in K.jump; where friction follows multipliers by the iteration of `consistent`."""
     n = K.n
     m = K.n_active
-    if K.loaded > 0 and (K.n_frictions > 0 or K.rubs == 1):
+    if (K.loaded > 0 and (K.n_frictions > 0 or K.rubs == 1)) or sharing(K):
         return consistent(K, t, K.q1, K.y1)
     evaluate(K, t, K.q1, K.y1)
     K.n_residuals += 1
