@@ -8,7 +8,6 @@ U_i is normal to the rows in the metric of Newton's matrix of the middle stage, 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,9 +19,10 @@ from mbd.sensitivity.entries import stacked, system
 from mbd.sensitivity.kernel.build import entry
 from mbd.sensitivity.kernel.radau import radau_steps
 from mbd.sensitivity.motion import Mode, Motion, Rates, reach, solved
+from mbd.sensitivity.one_step import OneStepMethod
 from mbd.sensitivity.programs import Columns, Programs
-from mbd.sensitivity.run_data import Rows, refused
-from mbd.sensitivity.schemes import Memory, SchemeSteps
+from mbd.sensitivity.run_data import Rows
+from mbd.sensitivity.schemes import Memory
 
 __all__ = ["RadauSteps"]
 
@@ -42,46 +42,16 @@ class Stages:
     nu: Matrix
 
 
-class RadauSteps(SchemeSteps):
+class RadauSteps(OneStepMethod):
     """Derivatives of implicit steps of order 5."""
 
-    def start(self, motion: Motion, mode: Mode, rates: Rates) -> Memory:
-        """It remembers nothing but its rates."""
-        return Memory.of_rates(rates, 0.0)
+    def taken(
+        self, motion: Motion, rates: Rates, mode: Mode, rows: Rows, dh: Vector, checked: bool = True
+    ) -> tuple[int, Motion, Rates]:
+        """By the kernel."""
+        return taken(self.programs, motion, rates, mode, rows, dh, checked)
 
-    def leap(self, motion: Motion, memory: Memory, mode: Mode, first: int, last: int) -> tuple[int, Motion, Memory]:
-        """All of them at once."""
-        if last <= first:
-            return first, motion, memory
-        still, rows = np.zeros_like(motion.tangent.t), self.rows.between(first, last)
-        done, motion, rates = taken(self.programs, motion, memory.rates, mode, rows, still)
-        return first + done, motion, Memory.of_rates(rates, 0.0)
-
-    def along(
-        self, motion: Motion, memory: Memory, mode: Mode, row: int, dh: Vector, fresh: bool
-    ) -> tuple[Motion, Memory]:
-        """A step to a row."""
-        end, rates = self.ended(motion, memory, mode, row, dh)
-        return end, Memory.of_rates(rates, 0.0)
-
-    def ended(self, motion: Motion, memory: Memory, mode: Mode, row: int, dh: Vector) -> tuple[Motion, Rates]:
-        """The same at an event."""
-        rows = self.rows.step_to(row, motion, memory.rates)
-        done, end, rates = taken(self.programs, motion, memory.rates, mode, rows, dh)
-        return (end, rates) if done else super().ended(motion, memory, mode, row, dh)
-
-    def reached(
-        self, motion: Motion, memory: Memory, mode: Mode, time: float, dh: Vector, row: int
-    ) -> Iterator[tuple[Motion, Rates]]:
-        """All steps are alike."""
-        rows = self.rows.step_to(row, motion, memory.rates)
-        rows[0][1] = time
-        done, end, found = taken(self.programs, motion, memory.rates, mode, rows, dh, False)
-        if not (done or self.programs.charts.is_vector):
-            raise refused(f"the equations of the step to t = {time:.9g} s are singular")
-        yield (end, found) if done else self._least(motion, memory, mode, time, dh, row)
-
-    def _least(
+    def least(
         self, motion: Motion, memory: Memory, mode: Mode, time: float, dh: Vector, row: int
     ) -> tuple[Motion, Rates]:
         """A step in numpy, with least solutions of singular systems."""

@@ -1,30 +1,21 @@
-"""A file of starts that are decided: a study that was ended, or killed, goes on where it was.
+"""A file of blocks of starts that are decided.
 
-The file is text, a line of JSON each: first what the study is, then a block of starts as soon as it is decided: its
-first number, a letter for the kind of each (`mbd.gait.basin.kinds`), attractors, steps and times. A last line that a
-kill has cut short counts as a block that was not made.
+Each has its first number, a letter for the kind of each start (`mbd.gait.basin.kinds`), attractors, steps and times.
 """
 
 from __future__ import annotations
 
 import hashlib
-import json
-import os
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from mbd.analysis.sweep_file import whole_lines
-from mbd.errors import ModelError
 from mbd.gait.basin.kinds import LETTERS
 from mbd.gait.basin.walks import Decided
-from mbd.results.archive import named_file
+from mbd.results.study_file import StudyFile
 
 __all__ = ["Store", "digest_of"]
-
-FORMAT = "mbd basin 1"
 
 
 def digest_of(*arrays: Any) -> str:
@@ -45,14 +36,8 @@ class Store:
     """
 
     def __init__(self, path: Any, head: Mapping[str, Any]) -> None:
-        self.path = Path(named_file(path, ".jsonl"))
-        self._blocks: dict[int, Mapping[str, Any]] = {}
-        head = {"format": FORMAT, **head}
-        if self.path.exists() and self.path.stat().st_size:
-            self._read(head)
-        else:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._add(head)
+        self.file = StudyFile(path, "basin", head)
+        self._blocks = {line["first"]: line for line in self.file.parts}
 
     def block(self, first: int, count: int) -> Decided | None:
         """A block of starts, if the file has it."""
@@ -65,25 +50,7 @@ class Store:
 
     def keep(self, first: int, block: Decided) -> None:
         """Add a block that is decided."""
-        self._add({
+        self.file.add({
             "first": first, "kinds": "".join(LETTERS[kind] for kind in block.kind.tolist()),
             "attractors": block.attractor.tolist(), "steps": block.steps.tolist(), "times": block.time.tolist(),
         })  # fmt: skip
-
-    def _add(self, line: Mapping[str, Any]) -> None:
-        with self.path.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(line) + "\n")
-            file.flush()
-            os.fsync(file.fileno())
-
-    def _read(self, head: Mapping[str, Any]) -> None:
-        lines = list(whole_lines(self.path))
-        if not lines or lines[0].get("format") != FORMAT:
-            raise ModelError(f"file: {str(self.path)!r} is no file of a basin; give another name")
-        differs = [name for name in head if lines[0].get(name) != json.loads(json.dumps(head[name]))]
-        if differs:
-            raise ModelError(
-                f"file: {str(self.path)!r} belongs to another basin; its {', '.join(differs)} differ: give another name"
-            )
-        for line in lines[1:]:
-            self._blocks[line["first"]] = line
