@@ -1,8 +1,10 @@
 """The derivative of a return map from the exact derivative of one run a return.
 
-With T the tangent vectors (δx, δv) of the section at a state with coordinates c, ``δx = Z_q + N_q μ``,
-``δv = Z_v + N_v ν``, the derivative in coordinates is ``Zᵀ D_k … D_1 T``, D_i that of the end of the i-th return by its
-start (`mbd.sensitivity.derivative`), sides exchanged.
+With T the tangent vectors (δx, δv) of the section at a state with coordinates c, ``δx = D(m) (Z_q + N_q μ)``,
+``δv = Z_v + N_v ν``, m = q ⊖ q₀, the derivative in coordinates is ``C D_k … D_1 T``: D_i is that of the end of the i-th
+return by its start (`mbd.sensitivity.derivative`), sides exchanged, and C = ∂(coordinates)/∂(δx, δv) that of the chart
+where the last one arrives, ``Zᵀ`` where coordinates add. Tangents of orientations are small rotations in axes of the
+child: D and its inverse lead from them to the increments of a chart and back (`mbd.configuration`).
 """
 
 from __future__ import annotations
@@ -12,10 +14,12 @@ from typing import Any
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.configuration import Configuration
 from mbd.errors import CapabilityError
 from mbd.gait.return_map import ReturnMap, Values
 from mbd.gait.section import Chart
 from mbd.sensitivity.derivative import final_state_derivative
+from mbd.sensitivity.tangent_names import place_names
 from mbd.simulation.simulate import simulate
 from mbd.state import State
 
@@ -27,13 +31,8 @@ BESIDE = 1e-3
 
 def exact_derivative(map_: ReturnMap, chart: Chart, c: Vector, values: Values) -> Matrix | None:
     """∂(coordinates)/∂c at c, (size, size); None where a return does not arrive or no pass knows its derivative."""
-    section = chart.section
-    if (
-        chart.counts[2]
-        or chart.counts[3]
-        or section.heading is not None
-        or section.mechanism.equations.configuration.charts
-    ):
+    equations = chart.section.mechanism.equations
+    if chart.counts[2] or chart.counts[3]:
         return None
     state = chart.at(c, map_.vector(values))
     along = _tangent(chart, state, map_.vector(values))
@@ -46,27 +45,65 @@ def exact_derivative(map_: ReturnMap, chart: Chart, c: Vector, values: Values) -
         if not run.success or not arrival.outcome.good:
             return None
         try:
-            by_start, _ = final_state_derivative(run, [*state.names, *state.velocity_names])
+            by_start, _ = final_state_derivative(run, [*place_names(equations), *state.velocity_names])
         except CapabilityError:
             return None
         along, state = _mirrored(map_, by_start) @ along, arrival.state
-    n_v = len(state.v)
-    return np.vstack([chart.places.T @ along[:n_v], chart.rates.T @ along[n_v:]])
+    return _by_tangent(chart, state, along)
 
 
 def _mirrored(map_: ReturnMap, by_start: Matrix) -> Matrix:
     """The rows of a derivative in the order of the mirror image."""
     if map_.mirror is None:
         return by_start
-    n_q = len(map_.mirror.q)
-    return np.concatenate([map_.mirror.of_q(by_start[:n_q].T).T, map_.mirror.of_v(by_start[n_q:].T).T])
+    n_v = len(map_.mirror.v)
+    return np.concatenate([map_.mirror.of_v(part.T).T for part in (by_start[:n_v], by_start[n_v:])])
+
+
+def _by_tangent(chart: Chart, state: State, along: Matrix) -> Matrix:
+    """C · (δx, δv): the change of the coordinates of a state with tangents (n_v + n_v, k) of it."""
+    configuration, heading = chart.section.mechanism.equations.configuration, chart.section.heading
+    n_v = len(state.v)
+    q, v = chart.facing(state)
+    moves, rates = along[:n_v], along[n_v:]
+    if heading is not None:
+        angle = heading.angle(chart.state.q, state.q, chart.turning)
+        moves, rates = (
+            np.array([heading.turned(state.q, column, angle)[1] for column in part.T]).reshape(part.T.shape).T
+            for part in (moves, rates)
+        )
+    away = _increments(configuration, configuration.difference(chart.state.q, q), moves)
+    if heading is not None:
+        # the turn changes too, so that what is left has no part along the heading
+        by_turn = heading.tangent(q)
+        turn = _increments(configuration, configuration.difference(chart.state.q, q), by_turn[:, np.newaxis])[:, 0]
+        change = -(chart.turning @ away) / float(chart.turning @ turn)
+        away = away + np.outer(turn, change)
+        rates = rates + np.outer(heading.rate_tangent(q, v), change)
+    return np.vstack([chart.places.T @ away, chart.rates.T @ rates])
+
+
+def _increments(configuration: Configuration, move: Vector, tangents: Matrix) -> Matrix:
+    """D(m)⁻¹ of tangents (n_v, k) at q ⊕ m: increments of the chart around q."""
+    if configuration.is_vector:
+        return tangents
+    return configuration.increment_rates(np.broadcast_to(move, tangents.T.shape), tangents.T).T
+
+
+def _tangents(configuration: Configuration, move: Vector, increments: Matrix) -> Matrix:
+    """D(m) of increments (n_v, k) of the chart around q: tangents at q ⊕ m."""
+    if configuration.is_vector:
+        return increments
+    return configuration.increment_velocities(np.broadcast_to(move, increments.T.shape), increments.T).T
 
 
 def _tangent(chart: Chart, state: State, parameters: Vector) -> Matrix:
     """T (n_v + n_v, size) at a state of the section."""
-    section, compose = chart.section, chart.section.mechanism.equations.configuration.compose
+    section, configuration = chart.section, chart.section.mechanism.equations.configuration
+    compose, away = configuration.compose, configuration.difference(chart.state.q, state.q)
     _, G = section.positions(state.q, parameters, state.anchors)
-    moves = chart.places - chart.off_places @ np.linalg.lstsq(G @ chart.off_places, G @ chart.places, rcond=None)[0]
+    free, off = (_tangents(configuration, away, part) for part in (chart.places, chart.off_places))
+    moves = free - off @ np.linalg.lstsq(G @ off, G @ free, rcond=None)[0]
 
     def rates(move: Vector) -> Vector:
         return section.velocities(compose(state.q, move), state.v, parameters, state.anchors)[0]

@@ -22,10 +22,8 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.compile.mechanism import Mechanism
-from mbd.joints import Free, Prismatic, Revolute, Spherical, Translation
-from mbd.joints.base import Joint
-from mbd.joints.quaternions import quaternion_product
-from mbd.topology.plan import plan
+from mbd.gait.heading_parts import Part, parts_of
+from mbd.gait.reflection import in_space
 
 __all__ = ["Heading", "heading_of"]
 
@@ -33,21 +31,8 @@ STATES = 4
 """States at which a mechanism is compared with itself after a turn [-]."""
 SAME = 1e-9
 """Difference, relative to 1 or the largest of its kind, up to which it is the same [-]."""
-ALONG = 1e-12
-"""Distance of an axis from the vertical up to which it is along it [-]."""
 ROUNDS, FINE = 12, 1e-15
 """Newton steps by which a state is turned as another, and the last of them [rad]."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Part:
-    """What a turn does to one joint: kind, first coordinate and velocity, axis in its parent's frame, its axes."""
-
-    kind: str
-    q: int
-    v: int
-    axis: Vector
-    places: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,25 +43,13 @@ class Heading:
     """
 
     mechanism: Mechanism
-    parts: tuple[_Part, ...]
+    parts: tuple[Part, ...]
 
     def turned(self, q: Vector, v: Vector, angle: float) -> tuple[Vector, Vector]:
         """Coordinates and velocities after a turn by an angle [rad]."""
         q, v = np.array(q, dtype=float), np.array(v, dtype=float)
         for part in self.parts:
-            if part.kind == "angle":
-                q[part.q] += angle * part.axis[0]
-                continue
-            S = _rotation(part.axis, angle)
-            for values, first in ((q, part.q), (v, part.v)):
-                own = [first + k for k in range(len(part.places))]
-                whole = np.zeros(3)
-                whole[list(part.places)] = values[own]
-                values[own] = (S @ whole)[list(part.places)]
-            if part.kind == "orientation":
-                at = slice(part.q + len(part.places), part.q + len(part.places) + 4)
-                half = np.concatenate([[np.cos(0.5 * angle)], np.sin(0.5 * angle) * part.axis])
-                q[at] = quaternion_product(tuple(half), tuple(q[at]))
+            part.turn(q, v, angle)
         return q, v
 
     def tangent(self, q: Vector) -> Vector:
@@ -85,6 +58,11 @@ class Heading:
         ends = [configuration.difference(q, self.turned(q, np.zeros(configuration.n_v), s * h)[0]) for s in (1, -1)]
         far = [configuration.difference(q, self.turned(q, np.zeros(configuration.n_v), s * h)[0]) for s in (2, -2)]
         return np.asarray((8.0 * (ends[0] - ends[1]) - (far[0] - far[1])) / (12.0 * h))
+
+    def rate_tangent(self, q: Vector, v: Vector) -> Vector:
+        """∂(v turned by ψ)/∂ψ (n_v,) at ψ = 0: those along the ground turn by a quarter."""
+        quarter, half = (self.turned(q, v, angle)[1] for angle in (0.5 * np.pi, np.pi))
+        return np.asarray(quarter - 0.5 * (v + half))
 
     def angle(self, base: Vector, q: Vector, tangent: Vector) -> float:
         """By which q must be turned so that its difference from the base has no part along the tangent [rad]."""
@@ -108,78 +86,24 @@ def heading_of(
     values : of parameters by name, of which gravity tells the vertical
     named : coordinates and rates that resets of events set or read; None: any
     """
-    if not getattr(model, "joints", ()) or named is None or plan(model).planar:
+    if named is None or not in_space(model):
         return None
     gravity = np.array([values.get(f"gravity.{axis}", 0.0) for axis in "xyz"])
     size = float(np.linalg.norm(gravity))
     up = -gravity / size if size > 0.0 else np.array([0.0, 1.0, 0.0])
-    edges = plan(model).edges
-    roots = [joint for joint in edges if joint.parent.body is model.ground]
-    first_q = dict(zip([j.name for j in edges], np.cumsum([0, *(len(j.labels) for j in edges)]), strict=False))
-    first_v = dict(zip([j.name for j in edges], np.cumsum([0, *(len(j.velocity_labels) for j in edges)]), strict=False))
-    if len(roots) != 1:
-        return None
-    parts = _parts(roots[0], edges, np.eye(3), up, (first_q, first_v))
-    if parts is None or all(part.kind == "place" for part in parts):
+    parts = parts_of(model, mechanism.equations.configuration, up)
+    if parts is None:
         return None
     changed = _names(mechanism, parts)
     found = Heading(mechanism, tuple(parts))
     return found if not changed & named and _is_the_same(found, parameters) else None
 
 
-def _names(mechanism: Mechanism, parts: Sequence[_Part]) -> set[str]:
+def _names(mechanism: Mechanism, parts: Sequence[Part]) -> set[str]:
     """Names of the coordinates and velocities that a turn changes."""
     configuration = mechanism.equations.configuration
-    found = set[str]()
-    for part in parts:
-        count = len(part.places) + 4 * (part.kind == "orientation") + (part.kind == "angle")
-        found |= set(configuration.names[part.q : part.q + count])
-        found |= set(configuration.velocity_names[part.v : part.v + len(part.places)])
-    return found
-
-
-def _parts(
-    joint: Joint, edges: Sequence[Joint], turn: Matrix, up: Vector, first: tuple[dict[str, Any], dict[str, Any]]
-) -> list[_Part] | None:
-    """What a turn changes of a joint and, where the joint does not turn itself, of those beyond it; None: no turn."""
-    into = turn @ _axes(joint.parent)
-    axis = into.T @ up
-    q, v = int(first[0][joint.name]), int(first[1][joint.name])
-    if isinstance(joint, Free):
-        return [_Part("orientation", q, v, axis, (0, 1, 2))]
-    if isinstance(joint, Spherical):
-        return [_Part("orientation", q, v, axis)]
-    if isinstance(joint, Revolute) and abs(abs(float(np.array(joint.axis) @ axis)) - 1.0) <= ALONG:
-        return [_Part("angle", q, v, np.array([float(np.array(joint.axis) @ axis)]))]
-    if isinstance(joint, Translation):
-        free = tuple("xyz".index(each) for each in joint.axes)
-        across = [k for k in range(3) if abs(axis[k]) < 1.0 - ALONG]
-        if any(k not in free for k in across):
-            return None
-        found = [_Part("place", q, v, axis, free)]
-    elif isinstance(joint, Prismatic) and abs(abs(float(np.array(joint.axis) @ axis)) - 1.0) <= ALONG:
-        found = []
-    else:
-        return None
-    beyond = into @ _axes(joint.child).T
-    for other in edges:
-        if other.parent.body is joint.child.body:
-            more = _parts(other, edges, beyond, up, first)
-            if more is None:
-                return None
-            found += more
-    return found
-
-
-def _axes(frame: Any) -> Matrix:
-    return np.eye(3) if frame.rotation is None else np.array(frame.rotation, dtype=float)
-
-
-def _rotation(axis: Vector, angle: float) -> Matrix:
-    """exp(angle axis×)."""
-    x, y, z = axis
-    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(np.eye(3) + np.sin(angle) * skew + (1.0 - np.cos(angle)) * skew @ skew)
+    places = {configuration.names[k] for part in parts for k in part.q}
+    return places | {configuration.velocity_names[k] for part in parts if part.kind == "place" for k in part.v}
 
 
 def _is_the_same(heading: Heading, parameters: Vector) -> bool:

@@ -19,7 +19,7 @@ from mbd.compile.mechanism import Mechanism
 from mbd.joints.base import Joint
 from mbd.topology.plan import plan
 
-__all__ = ["Reflection", "reflections"]
+__all__ = ["AsWritten", "Reflection", "in_space", "reflections"]
 
 ALONG = 1e-9
 """Difference of a twist and its partner's [-, m] up to which they are the same."""
@@ -42,12 +42,17 @@ class Reflection:
     anchors: Vector
 
 
-class _Values:
+class AsWritten:
     """A scope on which run-time parameters have the values that the words hold."""
 
     def parameter(self, owner: str, field: str, value: float) -> float:
         """The value."""
         return value
+
+
+def in_space(model: Any) -> bool:
+    """Whether a model has joints that leave the plane."""
+    return bool(getattr(model, "joints", ())) and not plan(model).planar
 
 
 def reflections(model: Any, mechanism: Mechanism, partners: Any, parameters: Vector) -> list[Reflection]:
@@ -58,7 +63,7 @@ def reflections(model: Any, mechanism: Mechanism, partners: Any, parameters: Vec
     model : of joints, else there is none
     partners : `mbd.gait.mirror.Mirror` that exchanges names alone
     """
-    if not getattr(model, "joints", ()) or plan(model).planar:
+    if not in_space(model):
         return []
     joints = {joint.name: joint for joint in plan(model).edges}
     found = []
@@ -101,7 +106,7 @@ def _signs(joint: Joint, partner: Joint | None, sigma: Vector) -> tuple[Vector, 
 
 def _twists(joint: Joint) -> Matrix:
     """(angular, linear) velocity of the child for each velocity (n, 6), in axes of the child body, at rest."""
-    scope: Any = _Values()
+    scope: Any = AsWritten()
     turn = np.eye(3) if joint.child.rotation is None else np.array(joint.child.rotation)
     pairs: Sequence[Any] = joint.subspace(list(joint.defaults), scope)
     found = [np.concatenate([turn @ np.array(part, dtype=float) for part in pair]) for pair in pairs]

@@ -10,10 +10,12 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.errors import SimulationError
 from mbd.gait.cycle import LimitCycle, residual_by_unit
+from mbd.gait.exact_derivative import exact_derivative
 from mbd.gait.floquet import Multipliers, multipliers_of
 from mbd.gait.map_derivative import MapDerivative, Measured, map_derivative, measured
 from mbd.gait.newton import FixedPoint, fixed_point
 from mbd.gait.outcome import Outcome
+from mbd.gait.reflection import in_space
 from mbd.gait.return_map import Arrival, ReturnMap, Values
 from mbd.gait.section import Chart, Section, section_of
 from mbd.state import State
@@ -124,7 +126,7 @@ def gait_at(given: Search, point: FixedPoint, values: Values) -> LimitCycle:
     try:
         found = measured(map_, chart, zero, values) if point.found is None else point.found
         if point.outcome.good and isinstance(found, Measured):
-            derivative = map_derivative(map_, chart, zero, values, base=found)
+            derivative = _refined(map_, chart, map_derivative(map_, chart, zero, values, base=found), values)
     except SimulationError as error:
         point.outcome = point.outcome if not point.outcome.good else Outcome("numerical error", str(error))
     multipliers = _multipliers(map_, chart, derivative, values)
@@ -139,6 +141,19 @@ def gait_at(given: Search, point: FixedPoint, values: Values) -> LimitCycle:
         residual, tuple(point.residuals), multipliers, derivative, dict(values), map_.dt, map_.runs, chart, map_, way,
         given,
     )  # fmt: skip
+
+
+def _refined(map_: ReturnMap, chart: Chart, found: MapDerivative, values: Values) -> MapDerivative:
+    """P of a walker in space by the exact derivative of its run, where a pass knows it; its error is what the
+    differences differ by."""
+    if found.missing or not in_space(map_.model):
+        return found
+    exact, size = exact_derivative(map_, chart, np.zeros(chart.size), values), chart.size
+    if exact is None:
+        return found
+    matrix, error = np.vstack([exact, found.matrix[size:]]), np.array(found.error)
+    error[:size] = np.abs(exact - found.matrix[:size])
+    return MapDerivative(matrix, error, f"exact; times and ways by {found.how}", {})
 
 
 def _distance(way: Vector, arrival: Arrival | None) -> float:

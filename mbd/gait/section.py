@@ -27,6 +27,7 @@ from mbd.assembly.posture import position_rows
 from mbd.compile.mechanism import Mechanism
 from mbd.errors import SimulationError
 from mbd.gait.heading import Heading
+from mbd.gait.whole_turns import unwound
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.state import Mode, State
 
@@ -113,12 +114,12 @@ class Chart:
 
     Attributes
     ----------
-    state : c = 0; size : of c
+    state : c = 0; size : of c; parameters : at which it was made
     basis : (n_v + n_v + n_z + held, size) tangent vectors (δx, δv, δz, δanchors)
     """
 
     def __init__(self, section: Section, state: State, parameters: Vector) -> None:
-        self.section, self.state = section, state
+        self.section, self.state, self.parameters = section, state, parameters
         layout, q, y = section.mechanism.layout, state.q, np.concatenate([state.v, state.z])
         _, G = section.positions(q, parameters, state.anchors)
         _, B = section.velocities(q, y, parameters, state.anchors)
@@ -174,13 +175,18 @@ class Chart:
 
     def of(self, state: State) -> Vector:
         """The coordinates of a state."""
-        difference = self.section.mechanism.equations.configuration.difference
         held, (q, v) = list(self.section.held), self.facing(state)
         parts = (
-            self.places.T @ difference(self.state.q, q), self.rates.T @ (v - self.state.v),
+            self.places.T @ self.away(q), self.rates.T @ (v - self.state.v),
             state.z - self.state.z, (state.anchors - self.state.anchors)[held] if held else np.zeros(0),
         )  # fmt: skip
         return np.concatenate(parts)
+
+    def away(self, q: Matrix) -> Matrix:
+        """Differences (…, n_v) of configurations from the base, without whole turns of angles that change nothing."""
+        mechanism = self.section.mechanism
+        moved = mechanism.equations.configuration.difference(self.state.q, q)
+        return unwound(mechanism, self.parameters, moved)
 
     def facing(self, state: State) -> tuple[Vector, Vector]:
         """Coordinates and velocities of a state, turned about the vertical to head as the base does."""

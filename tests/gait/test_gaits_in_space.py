@@ -13,6 +13,8 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 import mbd
+from mbd.gait.exact_derivative import exact_derivative
+from mbd.gait.map_derivative import map_derivative
 
 g = 9.81
 SIDES = ("left", "right")
@@ -117,11 +119,23 @@ def test_a_rimless_wheel_leans_and_turns_as_euler_says(seed: int) -> None:
     once = wheel_multipliers(slope, inertia, mass, rate)
     key = lambda value: (-abs(value), value.imag)  # noqa: E731
     expected = sorted(once**SPOKES, key=key)
-    assert np.array(sorted(gait.multipliers, key=key)) == pytest.approx(np.array(expected), rel=2e-5, abs=1e-6)
+    assert np.array(sorted(gait.multipliers, key=key)) == pytest.approx(np.array(expected), rel=1e-8, abs=1e-9)
     kept = (inertia[2] + mass * math.cos(2 * HALF)) / (inertia[2] + mass)
-    assert np.min(np.abs(gait.multipliers - kept ** (2 * SPOKES))) < 1e-9  # as it rolls in its plane
-    assert np.min(np.abs(gait.multipliers - 1.0)) < 1e-6  # on a slope it rolls along any heading
+    assert np.min(np.abs(gait.multipliers - kept ** (2 * SPOKES))) < 1e-10  # as it rolls in its plane
+    assert np.min(np.abs(gait.multipliers - 1.0)) < 1e-9  # on a slope it rolls along any heading
     assert set(gait.trivial) >= {"translation hub.x", "translation hub.z"}
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_the_exact_derivative_of_the_map_is_that_of_differences(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    gait, _ = wheel_gait(float(random.uniform(0.2, 0.3)), (0.25, 0.25, 0.35), float(random.uniform(0.8, 1.5)))
+    c = random.uniform(-1e-2, 1e-2, gait.chart.size)  # beside the gait, where a chart's increments are no tangents
+    exact = exact_derivative(gait.map, gait.chart, c, gait.parameters)
+    found = map_derivative(gait.map, gait.chart, c, gait.parameters)
+    assert exact is not None
+    size = len(exact)
+    assert np.all(np.abs(exact - found.matrix[:size]) <= 2.0 * found.error[:size] + 1e-10 * np.max(np.abs(exact)))
 
 
 # a walker with hips of a width ----------------------------------------------------------------------------------------
@@ -230,7 +244,8 @@ def test_a_walker_of_the_plane_walks_in_space() -> None:
     assert free.period == pytest.approx(flat.period, rel=1e-8)
     assert free.distance == pytest.approx(flat.distance, rel=1e-8)
     for value in flat.multipliers:
-        assert np.min(np.abs(free.multipliers - value)) < 1e-6
+        assert np.min(np.abs(free.multipliers - value)) < 2e-8
+    assert "exact" in free.map_derivative.how and "exact" not in flat.map_derivative.how
     assert len(free.multipliers) > len(flat.multipliers)
 
 

@@ -276,6 +276,40 @@ def test_the_gait_of_round_feet_is_the_published_one():
     assert gait.trivial["translation trunk.x"] == 1.0
 
 
+@cache
+def wheel_with_a_pendulum() -> mbd.Model:
+    """A rimless wheel with a pendulum on its hub, past which it turns; its angle on the wheel counts the turns."""
+    model = mbd.Model("wheel with a pendulum", gravity=mbd.on_slope(0.15), tunable=["hinge spring.stiffness"])
+    wheel = mbd.RigidBody("wheel", 1.0, inertia=(0.2, 0.2, 0.4))
+    bob = mbd.RigidBody("bob", 0.3, inertia=(0.01, 0.01, 0.01), center=(0.0, -0.3, 0.0))
+    model.connect(mbd.Planar("roll", model.ground.origin, wheel.origin))
+    model.connect(mbd.Revolute("hinge", wheel.origin, bob.origin, loss=mbd.Viscous(0.2), stiffness=1e-9))
+    for k in range(8):
+        tip = wheel.point(math.sin(k * math.pi / 4), -math.cos(k * math.pi / 4), name=f"tip {k}")
+        model.constrain(mbd.Unilateral(f"spoke {k}", mbd.touchdown(tip), release=mbd.When(f"spoke {(k + 1) % 8}")))
+    return model
+
+
+def pendulum_on_a_wheel(stiffness: float) -> mbd.LimitCycle:
+    model, values = wheel_with_a_pendulum(), {"hinge spring.stiffness": stiffness}
+    start = mbd.assemble(
+        model, closed="spoke 0", position={"roll.angle": math.pi / 8, "hinge.angle": -math.pi / 8},
+        velocity={"roll.angle": -2.0, "hinge.angle": 2.0}, parameters=values,
+    )  # fmt: skip
+    return mbd.limit_cycle(model, start, section="spoke 0", parameters=values)
+
+
+@pytest.mark.parametrize(("stiffness", "turns"), [(0.0, 1.0), (0.1, 0.0)])
+def test_an_angle_that_counts_its_turns_comes_back_after_whole_ones(stiffness, turns):
+    gait = pendulum_on_a_wheel(stiffness)  # a spring that turns wind up is another one after each of them
+    assert gait.stability == "stable"
+    turned = (gait.walk(1).final["hinge.angle"] - gait.state["hinge.angle"]) / (2.0 * math.pi)
+    assert turned == pytest.approx(turns, abs=1e-10)
+    assert gait.walk(2).final["hinge.rate"] == pytest.approx(gait.state["hinge.rate"], abs=1e-8)
+    lost = sum(gait.energy[name] for name in ("joint loss", "impact"))
+    assert lost == pytest.approx(-gait.energy["gravity"], rel=1e-9)
+
+
 def test_a_motion_that_dies_out_is_no_gait():
     arm = mbd.Model("pendulum")
     rod = mbd.Link("rod", mass=1.0, length=1.0, center=0.6, inertia=0.05)

@@ -57,15 +57,10 @@ class Ball:
     def norm(self, q: Matrix, v: Matrix, z: Matrix, anchors: Matrix) -> Vector:
         """|c|_W of states (N,)."""
         chart = self.chart
-        configuration = chart.section.mechanism.equations.configuration
         if chart.section.heading is not None:
             facing = [chart.facing(replace(chart.state, q=one, v=other)) for one, other in zip(q, v, strict=True)]
             q, v = (np.array([pair[k] for pair in facing]).reshape(len(q), -1) for k in (0, 1))
-        if chart.section.mechanism.vector:
-            moved = q - chart.state.q
-        else:
-            moved = np.array([configuration.difference(chart.state.q, place) for place in q]).reshape(len(q), -1)
-        parts = [moved @ chart.places, (v - chart.state.v) @ chart.rates, z - chart.state.z]
+        parts = [chart.away(q) @ chart.places, (v - chart.state.v) @ chart.rates, z - chart.state.z]
         held = list(chart.section.held)
         if held:
             parts.append((anchors - chart.state.anchors)[:, held])
