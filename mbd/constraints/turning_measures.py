@@ -69,10 +69,14 @@ class Twist(_OfRotation):
     """``g = limit − τ`` of a positive limit, ``g = τ − limit`` of a negative one."""
 
     def gap(self, scope: Scope) -> Scalar:
-        """±(limit − τ) with tan τ/2 = axis · u/w of the quaternion (w, u)."""
+        """±(limit − τ) with tan τ/2 = p/w, p = axis · u of the quaternion (w, u): τ = atan2(2 p w, w² − p²).
+
+        Both are entries of R, and neither is small together with w alone, as 1 + tr R = 4 w² is.
+        """
         R = self._rotation(scope)
         along = dot(self.axis, (R[2][1] - R[1][2], R[0][2] - R[2][0], R[1][0] - R[0][1]))
-        tau: Scalar = 2.0 * atan2(along, 1.0 + R[0][0] + R[1][1] + R[2][2])
+        ahead = R[0][0] + R[1][1] + R[2][2] - dot(self.axis, rotate(R, self.axis))
+        tau: Scalar = atan2(along, ahead)
         return self.limit - tau if self.limit > 0.0 else tau - self.limit
 
 

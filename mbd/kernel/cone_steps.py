@@ -45,10 +45,8 @@ STRAIGHT = 0.05
 """Sine of the angle between γ̇ and −γ below which γ runs into zero [-]."""
 LINE = 1e-9
 """The same where γ moves along a line: a direction that is held is that of γ then, however long it slides on [-]."""
-SLOW = 1e-6
-"""Speed over that of the start of the approach, ‖γ̇‖ dt, below which it does whatever the angle [-]."""
-SHORTEST = 1e-4
-"""Part of dt below which no step is shortened for this [-]."""
+SHORTEST = 1e-5
+"""Part of dt below which no step is shortened for this; where γ asks for less it runs into zero, whatever the angle [-]."""
 MOST_CORRECTIONS = 8
 """Corrections of a direction that is held [-]."""
 AT_REST = 1e-10
@@ -75,7 +73,7 @@ def approached_end(K: Guards, t1: float) -> float:
                 continue
             fall = -(x * ax + y * ay)
             across = abs(x * ay - y * ax)
-            straight = fall > 0.0 and (across <= STRAIGHT * speed * change or speed <= SLOW * change * K.dt)
+            straight = fall > 0.0 and (across <= STRAIGHT * speed * change or PART * speed <= SHORTEST * change * K.dt)
             ends = fall > 0.0 and speed * speed < SURELY * h * fall
             line = across <= LINE * speed * change
             if straight and (ends or line or h < SHORTEST * K.dt):

@@ -8,7 +8,7 @@ from mbd.kernel.codes import (
     NOT_CONVERGED,
     NOT_FINITE,
 )
-from mbd.kernel.cones import sliding_force
+from mbd.kernel.cones import HELD, sliding_force
 from mbd.kernel.hooks import call, scheme_step
 from mbd.kernel.records import (
     Balance,
@@ -25,6 +25,12 @@ from mbd.kernel.restart import (
 
 __all__ = ["try_step"]
 
+MOST_PASSES = 60
+"""Times that the end of a brief step is asked for the rates that lead there, where these change its forces much [-]."""
+SETTLED = 1e-9
+"""Change of these rates, over the largest, at which they are what leads there [-]."""
+LEAP = 1e-2
+"""Rate of a row at the end of a brief step, over the sum of its terms, above which it is another row [-]."""
 DEPARTED = 1e-8
 """Part of its terms that a row which was left out may be off in a step; less restarts the scheme with other rows."""
 
@@ -85,9 +91,11 @@ def share_multipliers(K: Balance, t1: float) -> int:
 
 
 def brief_step(K: Balance, h: float, t1: float) -> int:
-    """A step of Heun's method."""
+    """A step of Heun's method; where friction turns with γ, of the trapezoidal rule, its rates the means of two passes."""
     K.rate1[: K.n] = K.rate[: K.n]
-    for _ in range(2):
+    turning = turns(K)
+    unsettled = turning
+    for passed in range(MOST_PASSES if turning else 2):
         fill_block(K, K.time, K.q, K.y)
         for i in range(K.n_v):
             K.block[K.o_x + i] = h * (K.y[i] + h * (K.rate[i] / 3.0 + K.rate1[i] / 6.0))
@@ -97,8 +105,15 @@ def brief_step(K: Balance, h: float, t1: float) -> int:
         status = consistent(K, t1, K.q1, K.y1)
         if status != 0:
             return status
-        K.rate1[: K.n] = K.jump[: K.n]
-    if not holds_rows(K, K.n_active):
+        if turning and passed > 1:
+            if settled(K):
+                unsettled = False
+                break
+            for i in range(K.n):
+                K.rate1[i] = 0.5 * (K.rate1[i] + K.jump[i])
+        else:
+            K.rate1[: K.n] = K.jump[: K.n]
+    if unsettled or not holds_rows(K, K.n_active) or (K.vector == 0 and leaps(K)):
         K.failure_time = t1
         K.failure_size = 0.0
         return NOT_CONVERGED
@@ -110,6 +125,40 @@ def brief_step(K: Balance, h: float, t1: float) -> int:
         K.lam1[k] = K.impulse[k]
         K.block[K.o_lam + k] = K.impulse[k]
     return 0
+
+
+def turns(K: Balance) -> bool:
+    """Whether something slides in a plane whose friction follows γ within the step."""
+    found = False
+    if K.n_cones > 0:
+        for f in range(K.n_frictions):
+            found = found or (K.partner[f] > f and K.slip[f] != 0.0 and K.hold[f] != HELD)
+    return found
+
+
+def settled(K: Balance) -> bool:
+    """Whether the rates in K.jump are those that led to them."""
+    change = 0.0
+    largest = 0.0
+    for i in range(K.n):
+        change = max(change, abs(K.jump[i] - K.rate1[i]))
+        largest = max(largest, abs(K.jump[i]))
+    return change <= SETTLED * largest
+
+
+def leaps(K: Balance) -> bool:
+    """Whether velocities miss the rows by as much as they are: these have another direction at the candidate.
+
+    That of a thin disk's lowest point turns around as the disk comes to lie flat.
+    """
+    found = False
+    for k in range(K.n_active):
+        row = K.rows[k]
+        size = 0.0
+        for j in range(K.n):
+            size += abs(K.acc[K.acc_B + row * K.n + j] * K.y1[j])
+        found = found or abs(K.acc[K.acc_rate + row]) > LEAP * size + K.rest_speed
+    return found
 
 
 def departs(K: DependentRows) -> bool:

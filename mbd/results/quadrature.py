@@ -2,7 +2,7 @@
 
 Over one interval the integrand is the polynomial through its values at rows around, and through its rates where they
 are known. Four rows with rates, or eight without, give an error of order 8; at the ends of a smooth stretch the same
-number of rows is taken from one side, and short stretches give what their rows allow: two rows with rates are
+number of rows is taken from one side, and stretches that are short, or of uneven steps, give what their rows allow: two rows with rates are
 ``∫ P dt = h/2 (P₀ + P₁) + h²/12 (Ṗ₀ − Ṗ₁)``, of order 4 (Davis & Rabinowitz 1984, ch. 2.9).
 """
 
@@ -59,8 +59,8 @@ def cumulative(time: Vector, values: Vector, rates: Vector | None = None) -> Vec
     begin = np.flatnonzero(np.diff(time) > 0.0)
     if not len(begin):
         return steps
-    first, last = stretches(time)
     wanted = ROWS_WITHOUT if rates is None else ROWS_WITH_RATES
+    first, last = _alike(time, begin, *stretches(time), wanted - 2)
     size = np.minimum(wanted, last - first + 1)
     left = np.clip(begin - (size - 2) // 2, first, last + 1 - size)
     for count in np.unique(size):
@@ -69,6 +69,25 @@ def cumulative(time: Vector, values: Vector, rates: Vector | None = None) -> Vec
         columns = values[rows] if rates is None else np.hstack([values[rows], rates[rows]])
         steps[begin[chosen] + 1] = np.sum(_weights(time, begin[chosen], rows, rates is not None) * columns, axis=1)
     return np.cumsum(steps)
+
+
+def _alike(time: Vector, begin: Index, first: Index, last: Index, most: int) -> tuple[Index, Index]:
+    """First and last row of each interval's stretch within which no interval is `EVEN` times as long or as short.
+
+    Steps that become shorter each time, as friction comes to rest, lead out of any that is no longer like them.
+    """
+    length = np.diff(time)
+    nearest, farthest = begin.copy(), begin + 1
+    for bound, step in ((nearest, -1), (farthest, 1)):
+        goes_on = np.ones(len(begin), dtype=bool)
+        for away in range(1, most + 1):
+            other = begin + step * away
+            goes_on &= (other >= first) & (other < last)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                ratio = length[np.clip(other, 0, len(length) - 1)] / length[begin]
+            goes_on &= (ratio < EVEN) & (ratio > 1.0 / EVEN)
+            bound[goes_on] += step
+    return nearest, farthest
 
 
 def _weights(time: Vector, begin: Index, rows: NDArray[np.intp], with_rates: bool) -> Matrix:

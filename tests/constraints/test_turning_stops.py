@@ -74,3 +74,16 @@ def test_what_is_no_limit_is_refused():
     ):  # fmt: skip
         with pytest.raises(mbd.ModelError, match=fault):
             make()
+
+
+def test_a_twist_is_known_next_to_half_a_turn():
+    model, _ = shoulder("rows")
+    for w in (1e-3, 1e-5, 1e-8):
+        for p in (0.3, -1e-2):
+            rest = np.sqrt(1.0 - w * w - p * p)
+            quaternion = (w, 0.6 * rest, p, 0.8 * rest)
+            start = mbd.assemble(model, {"ball.orientation": quaternion}, open=["tilt", "outward", "inward"])
+            run = mbd.simulate(model, start, mbd.RungeKutta853(), dt=1e-9, until=1e-9)
+            twist = 2.0 * np.arctan2(p, w) if p > 0.0 else 2.0 * np.arctan2(-p, -w)
+            twist -= 2.0 * np.pi * np.round(twist / (2.0 * np.pi))
+            assert run["outward.gap"][0] == pytest.approx(LIMITS[1] - twist, abs=1e-15 / (p * p))

@@ -23,6 +23,7 @@ class Gap:
     drift : ∂g/∂t (n,), of surfaces that move by themselves
     tangents : (name of the part, direction (n, 3)) along which a point can stick or rub
     carried : velocity at which a surface runs along by itself (n, 3)
+    blur : 1/r, where round-off of a rotation makes 1/r² times itself of g, and 1/r³ of ġ (n,)
     """
 
     value: Array
@@ -31,6 +32,7 @@ class Gap:
     drift: Array
     tangents: list[tuple[str, Array]]
     carried: Any = 0.0
+    blur: Any = 0.0
 
     def rate(self, bodies: Bodies) -> Array:
         """ġ from the motion of the bodies."""

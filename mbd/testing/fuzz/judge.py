@@ -130,7 +130,8 @@ def between(run: mbd.Trajectory, model: mbd.Model, parameters: Mapping[str, floa
     Where the scheme's own interpolation is of low order, loops and constraints are left to its error, and in index 3 to
     where velocities lead that do not fit; forces may miss a fiftieth of what they are made of. Where a tolerance was
     asked for, it is what coordinates may be off, and so what loops may miss; velocities by as much in the time of a
-    step; forces by what such velocities change of them.
+    step; forces by what such velocities change of them. In a step to rest, which takes the mean direction of a friction
+    in a plane, by what that turns.
     """
     time = run.time
     steps_of = np.flatnonzero(np.diff(time) > 0.0)
@@ -155,12 +156,25 @@ def between(run: mbd.Trajectory, model: mbd.Model, parameters: Mapping[str, floa
             share = 1e-5 if precise else 0.02 + _unresolved(run, times)
             again = run.settings["between"] == "stages"  # steps are taken again, and end in balance
             stiff = unknown_force(bodies, tol, h, laws.size_of(bodies)) if tol and not again else 0.0
-            laws.balance(found, bodies, loads(bodies), share, stiff)
+            laws.balance(found, bodies, loads(bodies), share, stiff + _turned(run, model, times))
             if precise:
                 laws.constraints(found, bodies, 1e-6)
         except NotImplementedError as error:
             return Judgement(tuple(found.found), found.tried, str(error))
     return Judgement(tuple(found.found), found.tried)
+
+
+def _turned(run: mbd.Trajectory, model: mbd.Model, times: Array) -> Array:
+    """Change of the frictions in planes over the steps at whose ends they stick, 0 elsewhere (n,) [N]."""
+    found, k = np.zeros(len(times)), np.searchsorted(run.time, times, side="right") - 1
+    known = set(run.names)
+    ends = {(event.name, event.row - 2) for event in run.events if event.kind == "stuck"}
+    for name in (word.name for word in model.contacts):
+        for part in (f"{name}.friction.forward", f"{name}.friction.sideways"):
+            if part in known:
+                there = np.array([(name, row) in ends for row in k])
+                found += there * np.abs(run[part][k + 1] - run[part][k])
+    return found
 
 
 def _cubic_error(run: mbd.Trajectory, bodies: Bodies, h: Array) -> Array:

@@ -20,6 +20,8 @@ __all__ = ["balance", "closure", "constraints", "contacts", "energies", "places"
 
 HELD = 1e-7
 """What rows may miss, over the size of the mechanism [-]."""
+ROUND_OFF = 1e-15
+"""That of the entries of a rotation matrix, from which orientations are read [-]."""
 EQUAL = 1e-9
 """What two ways to compute one number may differ by, over what it is made of [-]."""
 
@@ -188,11 +190,15 @@ def contacts(found: Faults, bodies: Bodies, acting: Loads, run: Any) -> None:
     for word in contacts:
         gap = gap_of(word.measure, bodies)
         closed, force = told.closed[word.name], told[f"{word.name}.force"]
-        found.small("gap as reported", word.name, gap.value - told[f"{word.name}.gap"], EQUAL * size)
+        off = gap.value - told[f"{word.name}.gap"]
+        found.small("gap as reported", word.name, off, EQUAL * size + ROUND_OFF * gap.blur**2)
         fast = size * (1.0 + sum(np.abs(motion.angular).max(axis=1) for motion in map(bodies.twist, acting.on)))
         rate = gap.rate(bodies)
         found.small(
-            "gap rate as reported", word.name, rate - told[f"{word.name}.gap_rate"], EQUAL * (fast + np.abs(rate))
+            "gap rate as reported",
+            word.name,
+            rate - told[f"{word.name}.gap_rate"],
+            EQUAL * (fast + np.abs(rate)) + ROUND_OFF * fast * gap.blur**3,
         )
         found.small("an open contact is without force", word.name, force, 0.0, ~closed)
         if isinstance(word, mbd.Penalty):

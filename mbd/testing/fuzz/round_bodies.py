@@ -60,6 +60,7 @@ def turning_gap(measure: Any, bodies: Bodies) -> Gap:
     """limit − ∠(R a, d), or ±(limit − τ), and what the angular velocity in the child's axes makes of them."""
     joint, a = measure.joint, np.asarray(measure.axis)
     H = bodies.between(joint).H[:, :3, :3]
+    blur: Any = 0.0
     if isinstance(measure, Cone):
         turned, middle = H @ a, np.asarray(measure.direction)
         across = np.cross(turned, middle)
@@ -74,8 +75,9 @@ def turning_gap(measure: Any, bodies: Bodies) -> Gap:
         value = sign * (measure.limit - tau)
         rates = (w**2)[:, None] * a + w[:, None] * np.cross(a, u) + p[:, None] * u
         slope = -sign * rates / (p**2 + w**2)[:, None]
+        blur = 1.0 / np.sqrt(p**2 + w**2)  # where it swings by half a turn the twist is none
     efforts = [(joint.name, k, slope[:, k]) for k in range(3)]
-    return Gap(value, [], efforts, np.zeros(len(value)), [])
+    return Gap(value, [], efforts, np.zeros(len(value)), [], blur=blur)
 
 
 def _quaternion(R: Array) -> tuple[Array, Array]:
