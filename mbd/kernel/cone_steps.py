@@ -46,7 +46,7 @@ STRAIGHT = 0.05
 LINE = 1e-9
 """The same where γ moves along a line: a direction that is held is that of γ then, however long it slides on [-]."""
 SHORTEST = 1e-5
-"""Part of dt below which no step is shortened for this; where γ asks for less it runs into zero, whatever the angle [-]."""
+"""Part of dt below which no step is shortened for this; where γ asks for less it runs into zero at any angle [-]."""
 MOST_CORRECTIONS = 8
 """Corrections of a direction that is held [-]."""
 AT_REST = 1e-10

@@ -91,7 +91,7 @@ def share_multipliers(K: Balance, t1: float) -> int:
 
 
 def brief_step(K: Balance, h: float, t1: float) -> int:
-    """A step of Heun's method; where friction turns with γ, of the trapezoidal rule, its rates the means of two passes."""
+    """A step of Heun's method; where friction turns with γ, of the trapezoidal rule, by means of two passes."""
     K.rate1[: K.n] = K.rate[: K.n]
     turning = turns(K)
     unsettled = turning

@@ -2,8 +2,8 @@
 
 Over one interval the integrand is the polynomial through its values at rows around, and through its rates where they
 are known. Four rows with rates, or eight without, give an error of order 8; at the ends of a smooth stretch the same
-number of rows is taken from one side, and stretches that are short, or of uneven steps, give what their rows allow: two rows with rates are
-``∫ P dt = h/2 (P₀ + P₁) + h²/12 (Ṗ₀ − Ṗ₁)``, of order 4 (Davis & Rabinowitz 1984, ch. 2.9).
+number of rows is taken from one side, and stretches that are short or uneven give what their rows allow: two rows with
+rates are ``∫ P dt = h/2 (P₀ + P₁) + h²/12 (Ṗ₀ − Ṗ₁)``, of order 4 (Davis & Rabinowitz 1984, ch. 2.9).
 """
 
 from __future__ import annotations

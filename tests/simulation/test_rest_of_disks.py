@@ -1,4 +1,4 @@
-"""A disk that slides to rest while its friction turns and loads it, and one that falls flat: no row that is not true."""
+"""A disk that slides to rest while its friction turns and loads it, and one that falls flat: every row is true."""
 
 from __future__ import annotations
 
