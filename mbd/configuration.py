@@ -176,14 +176,14 @@ class Configuration:
 
     def misplaced(self, q: Vector, tolerance: float) -> list[str]:
         """What is wrong with coordinates (n_q,) that no placement has, one phrase for each joint."""
-        found = []
+        found, values = list[str](), np.asarray(q, dtype=float).tolist()
         for joint, first, _ in self.charts:
-            own = np.asarray(q[first : first + len(joint.labels)], dtype=float)
-            near = np.asarray(joint.normalise(own.tolist()), dtype=float)
-            if not np.max(np.abs(near - own)) <= tolerance:
+            own = values[first : first + len(joint.labels)]
+            near = [float(each) for each in joint.normalise(own)]
+            if not all(abs(a - b) <= tolerance for a, b in zip(near, own, strict=True)):
                 names = ", ".join(map(repr, joint.coordinate_names[joint.adding :]))
-                values, shown = (", ".join(f"{x:.9g}" for x in each[joint.adding :]) for each in (own, near))
-                found.append(f"{names} = {values}, which no placement of {joint.known_as} has; the nearest are {shown}")
+                given, shown = (", ".join(f"{x:.9g}" for x in each[joint.adding :]) for each in (own, near))
+                found.append(f"{names} = {given}, which no placement of {joint.known_as} has; the nearest are {shown}")
         return found
 
     def interpolate(self, q: Any, other: Any, s: Any) -> Vector:

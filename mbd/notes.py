@@ -18,7 +18,7 @@ from weakref import WeakKeyDictionary
 
 from mbd.errors import MbdWarning
 
-__all__ = ["PROCESS", "called_from_outside", "doubt", "note"]
+__all__ = ["PROCESS", "called_from_outside", "doubt", "is_heard", "note"]
 
 
 class _Process:
@@ -32,6 +32,11 @@ _DOOR = str(Path(__file__).with_name("arguments.py"))
 _LOGGER = logging.getLogger("mbd")
 _LOGGER.addHandler(logging.NullHandler())
 _TOLD: WeakKeyDictionary[Any, set[str]] = WeakKeyDictionary()
+
+
+def is_heard() -> bool:
+    """Whether somebody listens to notes."""
+    return _LOGGER.isEnabledFor(logging.INFO)
 
 
 def note(sentence: str) -> None:

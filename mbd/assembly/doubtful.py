@@ -9,7 +9,7 @@ from typing import Any
 from mbd.equations.equations import Equations
 from mbd.topology.doubts import doubts
 
-__all__ = ["doubtful"]
+__all__ = ["WIDE", "degrees", "doubtful"]
 
 WIDE = 10.0
 """Angle above which a whole number may be one in degrees [rad]."""
@@ -17,10 +17,11 @@ WIDE = 10.0
 
 def doubtful(model: Any, equations: Equations, position: Mapping[str, float]) -> list[str]:
     """Sentences on values of a start and of the model that look like mistakes."""
-    return _degrees(equations, position) + doubts(model)
+    return degrees(equations, position) + doubts(model)
 
 
-def _degrees(equations: Equations, position: Mapping[str, float]) -> list[str]:
+def degrees(equations: Equations, position: Mapping[str, float]) -> list[str]:
+    """Sentences on angles of a start that may be in degrees."""
     angles = {each.name for each in equations.coordinates if each.unit == "rad"}
     return [
         f"position: {name!r} is {value:g} rad, {value / math.tau:.1f} turns; angles are in radians, and {value:g}° is "

@@ -95,19 +95,30 @@ def fits(start: State, equations: Equations, manager: ActiveSetManager) -> None:
 
 def _bad_values(start: State, equations: Equations) -> list[str]:
     """Numbers of a state that are not finite, or that no posture has."""
-    names = [coordinate.name for coordinate in equations.coordinates]
-    parts = ((start.q, names), (start.v, equations.velocity_names), (start.z, [s.name for s in equations.states]))
-    values = [(name, value) for part, known in parts for name, value in zip(known, part, strict=True)]
-    values += [(f"anchor {k} of its contacts", value) for k, value in enumerate(start.anchors)]
-    bad = [
-        f"the start has {name!r} = {value}; give a finite number" for name, value in values if not np.isfinite(value)
-    ]
+    bad = (
+        []
+        if all(np.isfinite(part).all() for part in (start.q, start.v, start.z, start.anchors))
+        else _not_finite(start, equations)
+    )
     bad += [f"the start has {fault}; take whole turns away" for fault in beyond_angles(equations, start.q)]
     return bad or [f"the start has {fault}" for fault in equations.configuration.misplaced(start.q, ROUND_OFF)]
 
 
+def _not_finite(start: State, equations: Equations) -> list[str]:
+    """Numbers of a state that are not finite, by name."""
+    names = [coordinate.name for coordinate in equations.coordinates]
+    parts = ((start.q, names), (start.v, equations.velocity_names), (start.z, [s.name for s in equations.states]))
+    values = [(name, value) for part, known in parts for name, value in zip(known, part, strict=True)]
+    values += [(f"anchor {k} of its contacts", value) for k, value in enumerate(start.anchors)]
+    return [
+        f"the start has {name!r} = {value}; give a finite number" for name, value in values if not np.isfinite(value)
+    ]
+
+
 def beyond_angles(equations: Equations, q: Vector) -> list[str]:
     """Which angles of a position (n_q,) are too large, one phrase each."""
+    if not (np.abs(q) > LARGEST_ANGLE).any():
+        return []
     return [
         f"{coordinate.name!r} = {value:.6g} rad, where neighbouring numbers are {np.spacing(abs(value)):.2g} rad apart"
         for coordinate, value in zip(equations.coordinates, q, strict=True)

@@ -15,10 +15,10 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.compile.backend import Backend, Function, Functions, backend as choose_backend
 from mbd.compile.cache import key_of
+from mbd.compile.energies import Energies
 from mbd.compile.layout import Layout
 from mbd.compile.orders import elimination_order, may_pay
 from mbd.compile.postponed import Postponed
-from mbd.compile.python import ArrayFunction, array_function
 from mbd.compile.remembered import Facts, Remembered
 from mbd.equations import programs
 from mbd.equations.charts import chart_end, chart_motion
@@ -284,10 +284,25 @@ class Mechanism:
             return facts, [self.common[name + own] for name in names if name + own in self.common]
 
     @cached_property
-    def energies(self) -> ArrayFunction:
+    def turning(self) -> tuple[tuple[str, list[int]], ...]:
+        """Joints whose coordinates do not add, with the places of their angular velocities."""
+        return tuple(
+            (joint.name, [first + k for k, freedom in enumerate(joint.freedoms) if freedom.unit == "rad"])
+            for joint, _, first in self.equations.configuration.charts
+        )
+
+    @cached_property
+    def energies(self) -> Energies:
         """T and V [J] at many states at once."""
+        return Energies(self)
+
+    def machine_code(self, name: str, outputs: Sequence[Node]) -> Function:
+        """A function of the equations' own nodes, which adds none to the tape, made when it is first asked for."""
         with self.equations.tape.lock:
-            return array_function([self.equations.kinetic, self.equations.potential])
+            if name not in self.common and self._remembered.find(name) is None:
+                self.common.add({name: outputs}, rarely=True)
+                self._remembered.keep(name, {}, True)
+            return self.common[name]
 
     @property
     def modes(self) -> int:

@@ -19,7 +19,7 @@ from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import CapabilityError, MemoryLimitError, ModelError, SimulationError, UnknownNameError
 from mbd.integrators import HHT, Integrator
-from mbd.notes import called_from_outside, doubt, note
+from mbd.notes import called_from_outside, doubt, is_heard, note
 from mbd.progress import run_bar
 from mbd.simulation.arguments import check_arguments, end_of
 from mbd.simulation.capabilities import refusals
@@ -179,7 +179,7 @@ def _tell(trajectory: Trajectory) -> None:
     for sentence in trajectory.stats["notes"]:
         if trajectory.success and sentence in trajectory.message:
             doubt(sentence)
-        else:
+        elif is_heard():
             note(f"{trajectory.name or 'model'}: {sentence}")
 
 

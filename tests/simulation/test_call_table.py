@@ -25,7 +25,7 @@ def words(table):
 
 def test_the_table_holds_numbers_as_bits_and_arrays_as_addresses():
     values = filled()
-    table = words(CallTable([SimpleNamespace(address=77), None], values, {}))
+    table = words(CallTable([SimpleNamespace(address=77), None], values))
     assert table[PLACES["n_q"]] == values.n_q
     assert struct.pack("q", table[PLACES["dt"]]) == struct.pack("d", values.dt)
     assert all(table[PLACES[name]] == vars(values)[name].ctypes.data for name in ARRAYS)
@@ -34,8 +34,9 @@ def test_the_table_holds_numbers_as_bits_and_arrays_as_addresses():
 def test_an_array_that_takes_the_place_of_another_is_found():
     """Also one that took it after its address was noted, before the table was made."""
     values = filled()
-    known = {"q": (values.q, values.q.ctypes.data), "y": (np.zeros(3), 123456)}
-    table = CallTable([], values, known)
+    given = {"q": (values.q, values.q.ctypes.data), "y": (np.zeros(3), 123456)}
+    arrays, addresses = zip(*[given.get(name, (None, 0)) for name in ARRAYS], strict=True)
+    table = CallTable([], values, (arrays, np.array(addresses)))
     assert words(table)[PLACES["y"]] == values.y.ctypes.data
     values.mode_key = np.zeros(9, dtype=np.int64)
     table.fill([], values)
@@ -45,7 +46,7 @@ def test_an_array_that_takes_the_place_of_another_is_found():
 
 def test_functions_that_are_added_are_found():
     values = filled()
-    table = CallTable([SimpleNamespace(address=5)], values, {})
+    table = CallTable([SimpleNamespace(address=5)], values)
     before = table._code
     table.fill([SimpleNamespace(address=5), SimpleNamespace(address=9)], values)
     assert table._code.tolist() == [5, 9]

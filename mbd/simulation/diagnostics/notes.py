@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from mbd.assembly.doubtful import doubtful
+from mbd.assembly.doubtful import WIDE, degrees
 from mbd.equations.equations import Contact
 from mbd.results.columns import ModelColumns
 from mbd.results.record import EventRecord, Record
@@ -21,6 +21,7 @@ from mbd.simulation.diagnostics.singular import singular_start
 from mbd.simulation.diagnostics.turning import blocks, unresolved_turns
 from mbd.simulation.run.data import RunData
 from mbd.simulation.run.stored import record_of
+from mbd.topology.doubts import doubts
 
 __all__ = ["notes_of"]
 
@@ -92,7 +93,9 @@ WRONG = 0.5
 def notes_of(run: RunData, record: Record) -> tuple[list[str], list[str]]:
     """The notes of a run that is over, in sentences, and those of them that put its result in doubt."""
     equations = run.mechanism.equations
-    notes = doubtful(run.model, equations, dict(zip(run.start.names, run.start.q.tolist(), strict=False)))
+    notes = [*_doubts(run)]
+    if np.max(np.abs(run.start.q), initial=0.0) >= WIDE:
+        notes = degrees(equations, dict(zip(run.start.names, run.start.q.tolist(), strict=False))) + notes
     notes += [*run.mechanism.notes, *getattr(run.mechanism.common, "notes", ())]
     loaded = bool(run.kernel.loaded) or any(friction.contact >= 0 for friction in equations.frictions)
     rubs = loaded and any(code.given_rows for code in run.stepper.modes)
@@ -132,6 +135,15 @@ def notes_of(run: RunData, record: Record) -> tuple[list[str], list[str]]:
             notes += _pulled(record, number, contact)
         doubts += blind
     return notes, doubts
+
+
+def _doubts(run: RunData) -> list[str]:
+    """What looks like a mistake in the description, which is looked through once for a mechanism."""
+    named = run.mechanism.named
+    known: list[str] | None = named.get("doubts of the description")
+    if known is None:
+        known = named["doubts of the description"] = doubts(run.model)
+    return known
 
 
 def _left_singular(run: RunData) -> bool:

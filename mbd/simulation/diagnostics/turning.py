@@ -20,6 +20,8 @@ __all__ = ["blocks", "first_reversed", "overturned", "unresolved_turns"]
 
 HALF_TURN = np.pi
 """Turn in a step above which forces that follow the angle are read at too few places of a turn [rad]."""
+SIDEWAYS = 1.7321
+"""Largest length of a vector over its largest component, a little more than √3 [-]."""
 BLOCK = 4096
 """Rows that are looked at together."""
 
@@ -77,13 +79,15 @@ def _largest_ways(record: Record) -> Vector:
 
 def _divided_steps(run: RunData, record: Record) -> list[str]:
     """A note on each joint whose coordinates do not add for which steps were divided (`mbd.kernel.charts`)."""
-    found = []
-    for joint, _, first in run.mechanism.equations.configuration.charts:
-        turning = [first + k for k, label in enumerate(joint.freedoms) if label.unit == "rad"]
-        way = run.dt * float(np.sqrt(np.max(np.sum(record.v[:, turning] ** 2, axis=1))))
+    found = list[str]()
+    if run.dt * SIDEWAYS * float(np.max(np.abs(record.v), initial=0.0)) <= QUARTER_TURN:
+        return found
+    squares = record.v**2
+    for name, turning in run.mechanism.turning:
+        way = run.dt * float(np.sqrt(squares[:, turning].sum(axis=1).max()))
         if way > QUARTER_TURN:
             found.append(
-                f"{joint.name!r} turns by up to {way:.3g} rad in dt = {run.dt:g} s: steps were divided into parts that "
+                f"{name!r} turns by up to {way:.3g} rad in dt = {run.dt:g} s: steps were divided into parts that "
                 f"turn it by a quarter turn at most, within which increments of a rotation are accurate; use dt below "
                 f"{run.dt * QUARTER_TURN / way:.1g} s for steps of one size"
             )

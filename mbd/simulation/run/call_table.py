@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from operator import is_, itemgetter
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mbd.kernel.records import TABLE, Kernel
 
-__all__ = ["CallTable"]
+__all__ = ["ARRAYS", "CallTable"]
 
 PLACES = {name: place for place, name in enumerate(TABLE.addresses)}
 ARRAYS = (*TABLE.real_arrays, *TABLE.integer_arrays)
@@ -18,6 +19,8 @@ ARRAYS = (*TABLE.real_arrays, *TABLE.integer_arrays)
 WHOLE = slice(0, len(TABLE.integers))
 REAL = slice(WHOLE.stop, WHOLE.stop + len(TABLE.reals))
 BOUND = slice(REAL.stop, REAL.stop + len(ARRAYS))
+UNKNOWN: tuple[Sequence[Any], NDArray[np.int64]] = (None,) * len(ARRAYS), np.zeros(len(ARRAYS), dtype=np.int64)
+"""Of arrays that are not known."""
 _whole, _real, _arrays = itemgetter(*TABLE.integers), itemgetter(*TABLE.reals), itemgetter(*ARRAYS)
 
 
@@ -28,14 +31,17 @@ class CallTable:
     ----------
     functions : compiled functions, in the order of the kernel's `code`; more may follow later
     kernel : everything that the kernel reads and writes
-    known : arrays and their addresses, so that numpy, which takes microseconds for each, need not be asked
+    known : arrays in the order of `ARRAYS`, and their addresses, so that numpy, which takes microseconds for each,
+        need not be asked; None in the place of those that are not known
     """
 
-    def __init__(self, functions: Sequence[Any], kernel: Kernel, known: Mapping[str, tuple[Any, int]]) -> None:
+    def __init__(
+        self, functions: Sequence[Any], kernel: Kernel, known: tuple[Sequence[Any], NDArray[np.int64]] = UNKNOWN
+    ) -> None:
         self._words = np.zeros(len(PLACES), dtype=np.int64)
         self._reals = self._words.view(np.float64)
         self._code = np.zeros(0, dtype=np.int64)
-        self._bound, self._words[BOUND] = zip(*[known.get(name, (None, 0)) for name in ARRAYS], strict=True)
+        self._bound, self._words[BOUND] = known
         self.address = self._words.ctypes.data
         self.fill(functions, kernel)
 

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from functools import lru_cache
-from itertools import accumulate
 from typing import Any
 
 import numpy as np
@@ -22,6 +19,7 @@ from mbd.kernel.records import PROGRAMS, TABLE, Kernel
 from mbd.kernel.schemes.contract import MEMORY, NO_SCHEME, Scheme, scheme_named
 from mbd.simulation.run.call_table import CallTable
 from mbd.simulation.run.plain import KernelScheme, MechanismSystem, PlainScheme, row_units, unit_blocks
+from mbd.simulation.run.shelves import Shelves, plan_of
 from mbd.tape.derivatives import live
 
 __all__ = ["Stepper", "is_compiled"]
@@ -32,9 +30,6 @@ LAWS = ("newton", "poisson", "sequential")
 """Impact laws in the order of their numbers in the kernel."""
 TAKES_PART = 1e-7
 """Coefficient of a row below which another does not depend on it [-]."""
-
-LINE = 64
-"""Length of a cache line [bytes]."""
 SUBSTEPS = 4
 """Parts in which a step of a scheme of order 3 or more is looked at for guards [-]."""
 
@@ -59,14 +54,6 @@ def follows(equations: Equations) -> int:
     return 2 if any(contact.opens_on == "when" for contact in rubbing) else 0
 
 
-@lru_cache(maxsize=256)
-def _side_by_side(lengths: Iterable[int]) -> tuple[tuple[slice, ...], int]:
-    """Places of arrays of 8-byte numbers, each at the beginning of a cache line, and their end."""
-    lengths = [max(length, 1) for length in lengths]
-    starts = list(accumulate((-8 * (-length // 8) for length in lengths), initial=0))
-    return tuple(slice(start, start + length) for start, length in zip(starts, lengths, strict=False)), starts[-1]
-
-
 class Stepper:
     """One run's numbers: everything the kernel reads and writes.
 
@@ -89,8 +76,6 @@ class Stepper:
         self.own = own_scheme(integrator)
         self.stabilized = integrator.stabilized
         layout = mechanism.layout
-        self._places: dict[str, slice] = {}  # of arrays on their shelves
-        self._shelved: dict[str, tuple[Any, int]] = {}  # arrays and their addresses
         self.kernel = self._sizes(dt, options)
         self._arrays(parameters, manager)
         self.kernel.chunk, self.kernel.end = 1, float(options.get("end", 0.0))
@@ -163,20 +148,11 @@ class Stepper:
         given = own | {name: len(table) for name, table in tables.items()}
         given |= {"block": block, "out": max(v.n_tangent, block), "acc": self.mechanism.sizes["accelerations"]}
         given["chart"] = 1 if v.vector else max(block, 2 * v.n_q + 2 * v.n_v)
-        lengths = TABLE.lengths(v, given)
-        self.reals, self.integers, *_ = (
-            self._shelve({name: lengths[name] for name in names if name in lengths}, kind)
-            for names, kind in (
-                (TABLE.kept_reals, float),
-                (TABLE.kept_integers, np.int64),
-                ([name for name in TABLE.real_arrays if name not in TABLE.kept_reals], float),
-                ([name for name in TABLE.integer_arrays if name not in TABLE.kept_integers], np.int64),
-            )
-        )
+        self.shelves = Shelves(plan_of(v, given))
+        self.reals, self.integers, *_ = self.shelves.rooms
+        vars(v).update(self.shelves.arrays)
         for name, table in tables.items():
             getattr(v, name)[: len(table)] = table
-        for name in MEMORY:
-            setattr(v, name, getattr(v, name)[: own.get(name, 0)])  # interpreted, no number more than it asked for
         v.shift1 = v.block[self.mechanism.layout.shift :]  # read by model code as well
         v.params = np.ascontiguousarray(parameters, dtype=float) if len(parameters) else np.zeros(1)
         v.step = v.dt
@@ -190,29 +166,15 @@ class Stepper:
                 )
             getattr(v, name)[: len(numbers)] = numbers
         v.unit = unit_blocks(self.mechanism).copy()
-        for number, (joint, _, first) in enumerate(self.mechanism.equations.configuration.charts, 1):
-            turning = [first + k for k, freedom in enumerate(joint.freedoms) if freedom.unit == "rad"]
+        for number, (_, turning) in enumerate(self.mechanism.turning, 1):
             v.turned_by[turning] = number
         v.row_unit = np.array([*row_units(self.mechanism), 2], dtype=np.int64)
         if not v.n_anchors:
             v.anchors = np.zeros(0)
 
-    def _shelve(self, lengths: dict[str, int], kind: Any) -> Any:
-        """Arrays side by side on one shelf, which is copied at once; each begins on a cache line."""
-        places, whole = _side_by_side(tuple(lengths.values()))
-        room = np.zeros(whole + LINE // 8 - 1, dtype=kind)  # numpy begins anywhere
-        first = -room.ctypes.data % LINE // 8
-        shelf = room[first : first + whole]
-        base = shelf.ctypes.data
-        arrays = {name: shelf[place] for name, place in zip(lengths, places, strict=True)}
-        self._places |= zip(lengths, places, strict=True)
-        self._shelved |= {name: (array, base + 8 * self._places[name].start) for name, array in arrays.items()}
-        vars(self.kernel).update(arrays)
-        return shelf
-
     def place_of(self, name: str) -> slice:
         """Where a kept array stands in `reals` or `integers`."""
-        return self._places[name]
+        return self.shelves.place_of(name)
 
     def add_mode(self) -> None:
         """Make code for the contacts closed now."""
@@ -323,7 +285,7 @@ class Stepper:
 
         if self._table is None or self._provisional:
             self._provisional = self.provisional  # before the addresses: whoever settles in between is looked at again
-            self._table = CallTable(self.functions, self.kernel, self._shelved)
+            self._table = CallTable(self.functions, self.kernel, self.shelves.known)
         else:
             self._table.fill(self.functions, self.kernel)
         postponed = [tangent for tangent in self.mechanism.postponed if not tangent.made]

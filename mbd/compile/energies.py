@@ -1,0 +1,57 @@
+"""Kinetic and potential energy at many states: by numpy at first, by machine code where it is asked for often."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mbd.arrays import Matrix, Vector
+from mbd.compile.python import ArrayFunction, array_function
+
+if TYPE_CHECKING:
+    from mbd.compile.mechanism import Mechanism
+
+__all__ = ["Energies"]
+
+OFTEN = 4
+"""Calls after which machine code is made: it takes some milliseconds, and saves one of a large mechanism in each."""
+FEW = 256
+"""States above which numpy is as fast."""
+NAME = "energies"
+
+
+class Energies:
+    """T and V [J] of a mechanism: ``f({'t': (R,), 'q': (R, n_q), …}, parameters) → [T (R,), V (R,)]``.
+
+    Parameters are one vector for all rows, or an (R, n_p) array.
+    """
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self._equations, self._layout = mechanism.equations, mechanism.layout
+        self._machine = mechanism.machine_code if mechanism.common["accelerations"].address else None
+        self.calls = 0
+
+    @cached_property
+    def _arrays(self) -> ArrayFunction:
+        equations = self._equations
+        with equations.tape.lock:
+            return array_function([equations.kinetic, equations.potential])
+
+    def __call__(self, inputs: Mapping[str, Any], parameters: Vector | Matrix) -> list[Vector]:
+        self.calls += 1
+        rows = len(inputs["t"])
+        if self._machine is None or self.calls <= OFTEN or rows > FEW:
+            return self._arrays(inputs, parameters)
+        block, out = np.zeros((rows, self._layout.size)), np.empty((rows, 2))
+        for kind, values in inputs.items():
+            place, values = self._layout.place(kind, 0), np.asarray(values, dtype=float)
+            block[:, place : place + (values.shape[1] if values.ndim == 2 else 1)] = values.reshape(rows, -1)
+        given = np.asarray(parameters, dtype=float)
+        several = np.ascontiguousarray(np.broadcast_to(given, (rows, given.shape[-1])))
+        function = self._machine(NAME, [self._equations.kinetic, self._equations.potential])
+        for k in range(rows):
+            function(block[k], several[k], out[k])
+        return [out[:, 0].copy(), out[:, 1].copy()]
