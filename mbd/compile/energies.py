@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.compile.backend import Function
+from mbd.compile.layout import Layout
 from mbd.compile.python import ArrayFunction, array_function
-
-if TYPE_CHECKING:
-    from mbd.compile.mechanism import Mechanism
+from mbd.equations.equations import Equations
+from mbd.tape.node import Node
 
 __all__ = ["Energies"]
 
@@ -26,12 +27,14 @@ NAME = "energies"
 class Energies:
     """T and V [J] of a mechanism: ``f({'t': (R,), 'q': (R, n_q), …}, parameters) → [T (R,), V (R,)]``.
 
-    Parameters are one vector for all rows, or an (R, n_p) array.
+    Parameters are one vector for all rows, or an (R, n_p) array. `machine` gives functions by name and outputs; None
+    where there is no machine code.
     """
 
-    def __init__(self, mechanism: Mechanism) -> None:
-        self._equations, self._layout = mechanism.equations, mechanism.layout
-        self._machine = mechanism.machine_code if mechanism.common["accelerations"].address else None
+    def __init__(
+        self, equations: Equations, layout: Layout, machine: Callable[[str, Sequence[Node]], Function] | None
+    ) -> None:
+        self._equations, self._layout, self._machine = equations, layout, machine
         self.calls = 0
 
     @cached_property

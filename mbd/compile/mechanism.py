@@ -294,7 +294,8 @@ class Mechanism:
     @cached_property
     def energies(self) -> Energies:
         """T and V [J] at many states at once."""
-        return Energies(self)
+        machine = self.machine_code if self.common["accelerations"].address else None
+        return Energies(self.equations, self.layout, machine)
 
     def machine_code(self, name: str, outputs: Sequence[Node]) -> Function:
         """A function of the equations' own nodes, which adds none to the tape, made when it is first asked for."""
