@@ -17,6 +17,7 @@ from mbd.equations.effects import Cause, causes, effect_of, weight_of
 from mbd.equations.equations import Equations, Facing
 from mbd.equations.figure import figure_of, shown_markers
 from mbd.equations.laws import Laws
+from mbd.equations.magnitudes import of_directions
 from mbd.equations.observations import offer_observations
 from mbd.equations.outputs import Outputs
 from mbd.equations.results import offer_results
@@ -279,6 +280,14 @@ class TreeGeometry:
         moving = laws.rows[row].is_velocity
         inputs = scope.inputs.v if moving else scope.inputs.x
         return row_sizes(scope.placement, scope.views, laws.viewed[row], inputs, moving)
+
+    def amplitudes(self) -> dict[int, float]:
+        """How large elements of rotations can be, where joints turn by quaternions."""
+        bodies = self.scope.bodies.values()
+        if all(body.edge is None or body.edge.joint.is_vector for body in bodies):
+            return {}
+        turns = of_directions(element for body in bodies for row in body.turn for element in row)
+        return turns | of_directions(self.scope.placement.directions())
 
     def rates(self, outputs: Sequence[Node]) -> dict[Node, Node]:
         """d node/dt of the places and rotations inside the outputs."""

@@ -285,6 +285,9 @@ class Geometry(Protocol):
     def row_sizes(self, row: int) -> list[Node]:
         """Σ|parts| of the derivative of a row by each x_j, by v_j of one on velocities, before they cancel."""
 
+    def amplitudes(self) -> dict[int, float]:
+        """How large components of directions can be that are sums of products, by the numbers of their nodes."""
+
 
 @dataclass
 class Equations:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from math import perm
 
 from mbd.tape.derivatives import live
 from mbd.tape.functions import maximum, minimum, sqrt
-from mbd.tape.node import Node, Tape
+from mbd.tape.node import Node, Scalar, Tape
 
-__all__ = ["magnitudes"]
+__all__ = ["magnitudes", "of_directions"]
 
 SPREAD = 16.0
 """How far the sum of the terms of a force may lie above the root of their squares: as far as 256 equal ones do."""
@@ -17,18 +17,44 @@ VANISHED = 0.1
 """Share of its amplitude that a sine has at least: round-off of its argument when it vanishes."""
 
 
-def magnitudes(tape: Tape, outputs: Sequence[Node]) -> list[Node]:
+def of_directions(values: Iterable[Scalar]) -> dict[int, float]:
+    """What is known of components of unit vectors, by the numbers of their nodes: the largest that each can be.
+
+    Where one is a multiple of another node, as ``R₁₂ = 2 (x y − w z)`` is, that is known of the other one too: a factor
+    is drawn into the multiple.
+    """
+    known: dict[int, float] = {}
+    for value in values:
+        if not isinstance(value, Node) or not value.args:
+            continue
+        node = value.args[0] if value.op == "neg" else value
+        known[node.index] = 1.0
+        if node.op == "mul" and node.args[0].is_constant:
+            known[node.args[1].index] = abs(1.0 / node.args[0].data)
+    return known
+
+
+def magnitudes(tape: Tape, outputs: Sequence[Node], known: Mapping[int, float] | None = None) -> list[Node]:
     """Σ|terms| through sums and products, bounded by `SPREAD` times their root of squares.
 
     Where a vector is turned, Σ|terms| of its components is up to √2 times as long as the vector, and in recursions up
     and down a chain of n links this grows like 2ⁿ: beyond some twenty links every residual would pass for round-off.
     The root of the squares of terms is as long as the vector however often it is turned, as round-off is.
+
+    So it is with sines, whose terms are not looked at. Elements of a rotation made from a quaternion are sums of
+    products themselves, by whose terms a vector would grow by a half or more with each turn: 1000 times in a chain of
+    three ball joints.
+
+    Parameters
+    ----------
+    known : the amplitudes of nodes that count as sines do, by their numbers (see `of_directions`)
     """
-    sums, squares = _sums(tape, outputs), _squares(tape, outputs)
+    bounds = known or {}
+    sums, squares = _sums(tape, outputs, bounds), _squares(tape, outputs, bounds)
     return [minimum(s, SPREAD * sqrt(q)) for s, q in zip(sums, squares, strict=True)]
 
 
-def _sums(tape: Tape, outputs: Sequence[Node]) -> list[Node]:
+def _sums(tape: Tape, outputs: Sequence[Node], known: Mapping[int, float]) -> list[Node]:
     """|x| through sums and products: Σ|terms| where terms are added, |x| of everything else.
 
     Sines and tables that happen to vanish keep the round-off of their argument and of their coefficients: they count
@@ -37,7 +63,9 @@ def _sums(tape: Tape, outputs: Sequence[Node]) -> list[Node]:
     size: dict[int, Node] = {}
     for node in live(outputs):
         parts = [size[arg.index] for arg in node.args]
-        if node.op in ("add", "sub"):
+        if node.index in known:
+            size[node.index] = tape.constant(known[node.index])
+        elif node.op in ("add", "sub"):
             size[node.index] = parts[0] + parts[1]
         elif node.op in ("mul", "div"):
             size[node.index] = parts[0] * parts[1] if node.op == "mul" else parts[0] / abs(node.args[1])
@@ -50,12 +78,14 @@ def _sums(tape: Tape, outputs: Sequence[Node]) -> list[Node]:
     return [size[node.index] for node in outputs]
 
 
-def _squares(tape: Tape, outputs: Sequence[Node]) -> list[Node]:
+def _squares(tape: Tape, outputs: Sequence[Node], known: Mapping[int, float]) -> list[Node]:
     """Σ terms² through sums and products, at least x²; sines have at least `VANISHED` of their amplitude."""
     size: dict[int, Node] = {}
     for node in live(outputs):
         parts = [size[arg.index] for arg in node.args]
-        if node.op in ("add", "sub"):
+        if node.index in known:
+            size[node.index] = node * node + (VANISHED * known[node.index]) ** 2
+        elif node.op in ("add", "sub"):
             size[node.index] = maximum(parts[0] + parts[1], node * node)
         elif node.op in ("mul", "div"):
             by = parts[1] if node.op == "mul" else node.args[1] * node.args[1]

@@ -82,6 +82,10 @@ class Placement:
                     self._remember(R[i][k], Mark(known, i, k))
         return known
 
+    def directions(self) -> list[Scalar]:
+        """The elements of all rotations made so far."""
+        return [element for axes in self._axes.values() for row in axes.rotation for element in row]
+
     def point(self, body: Moving, place: Triple) -> Point:
         """A place of a body, given in its axes."""
         key = self._key(body, place)

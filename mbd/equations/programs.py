@@ -221,7 +221,11 @@ def scales(equations: Equations) -> list[Node]:
     r = switched_balance(equations)
     h = [row.value for row in equations.rows]
     hv = [row.rate for row in equations.rows]
-    return magnitudes(equations.tape, [*r, *h, *hv])
+    return magnitudes(equations.tape, [*r, *h, *hv], _amplitudes(equations))
+
+
+def _amplitudes(equations: Equations) -> dict[int, float]:
+    return {} if equations.geometry is None else equations.geometry.amplitudes()
 
 
 def is_judged(equations: Equations) -> bool:
@@ -234,7 +238,7 @@ def guard_terms(equations: Equations) -> list[Node]:
     one = equations.tape.one
     values = [guard.value for guard in equations.guards]
     values += [c.only_while if isinstance(c.only_while, Node) else one for c in equations.contacts]
-    return magnitudes(equations.tape, values)
+    return magnitudes(equations.tape, values, _amplitudes(equations))
 
 
 def compose(equations: Equations) -> list[Node] | None:

@@ -14,7 +14,7 @@ from mbd.kernel.linear import solve_again, solve_definite
 from mbd.kernel.ordered import order_at, solve_kkt
 from mbd.kernel.records import Balance, Equations
 
-__all__ = ["LOSS", "find_imbalance", "is_uneven", "polish_rates", "polish_with_rows"]
+__all__ = ["LOSS", "find_imbalance", "has_settled", "is_uneven", "polish_rates", "polish_with_rows"]
 
 LOSS = 1e-4
 """Part of a diagonal entry that is left as its pivot below which rates are corrected [-]."""
@@ -24,6 +24,23 @@ MOST_CORRECTIONS = 8
 """Corrections of rates at one state [-]."""
 SMALL_CORRECTION = 1e-9
 """Correction over the largest rate, both as they are, after which none follows [-]."""
+
+SETTLED = 1e-8
+"""Part of the largest rate that a correction of residuals that pass may change without another look [-]."""
+
+
+def has_settled(moved: float, last: float, enough: float) -> bool:
+    """Whether a correction of residuals that pass was small, or as small as round-off lets it be.
+
+    Masses that differ by 10⁶ make a change of 10⁻³ in the rates of the light one of residuals of 10⁻⁹.
+
+    Parameters
+    ----------
+    moved, last : the largest change of a rate by the correction and by that before, over the fastest rate; 1e300 and 0
+        where there was none
+    enough : what is small beside the error of the step [-]
+    """
+    return moved <= max(SETTLED, enough) or (last > 0.0 and moved > 0.5 * last)
 
 
 def is_uneven(K: Equations, m: int) -> bool:

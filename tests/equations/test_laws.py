@@ -6,6 +6,7 @@ from hypothesis import given, settings, strategies as st
 
 import mbd
 from mbd.equations import derive
+from mbd.equations.magnitudes import SPREAD
 from mbd.equations.programs import accelerations, scales
 from mbd.testing import check_model, trees
 from tests.equations.mechanisms import four_bar, furnished, leg, random_tree, walker
@@ -75,6 +76,39 @@ def hanging(links):
         model.connect(mbd.Revolute(f"joint {k}", above, rod.start))
         above = rod.end
     return derive(model)
+
+
+def hanging_by_balls(links):
+    """The same of ball joints."""
+    model = mbd.Model("chain of ball joints")
+    above = model.ground.origin
+    for k in range(links):
+        own = 1.0 / (12.0 * links**3)
+        rod = mbd.RigidBody(f"rod {k}", 1.0 / links, (own, 0.1 * own, own), center=(0.0, -0.5 / links, 0.0))
+        model.connect(mbd.Spherical(f"joint {k}", above, rod.origin))
+        above = rod.point(0.0, -1.0 / links, 0.0)
+    return derive(model)
+
+
+@pytest.mark.parametrize("links", [3, 8])
+def test_terms_do_not_grow_with_turns_by_quaternions(links):
+    """What forces are as large as does not hang on the axes in which they are written down.
+
+    With all of 1 kg within 1 m, turning at ω and accelerated by α in every joint, no torque is above that of
+    ``g + n α + (n ω)²`` at 1 m and its own inertia's; at v = a = 0, of the weight.
+    """
+    equations = hanging_by_balls(links)
+    rng = np.random.default_rng(links)
+    point = inputs(equations, 8)
+    for k in range(links):
+        orientation = rng.normal(size=4)
+        for i, part in enumerate(orientation / np.linalg.norm(orientation)):
+            point["q", 4 * k + i] = part
+    for motion in (0.0, 1.0):
+        for k in range(3 * links):
+            point |= {("x", k): 0.1 * motion * rng.normal(), ("v", k): motion, ("a", k): motion}
+        turning = np.sqrt(3.0) * motion * links
+        assert 1.0 < at(scales(equations), point).max() < SPREAD * 2.0 * (9.81 + turning + turning**2)
 
 
 def largest_scale(links):

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import mpmath as mp
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
 import mbd
+from mbd.testing.fuzz.judge import judge
 
 DIGITS = 60
 """Decimal digits of the accelerations that are compared with [-]."""
@@ -82,3 +85,67 @@ def test_a_heavy_mass_below_a_light_one_follows_a_tolerance_with_joint_angles_an
         run = mbd.simulate(model, start, mbd.RungeKutta853(), tol=TOL, until=1.0)
         found.append(run.at(times)[names[0]])
     assert np.max(np.abs(found[0] - found[1])) < 2.0 * TOL
+
+
+SHAPE = (0.05, 0.03, 0.06)
+"""Moments of inertia of a body over its mass [m²]."""
+
+
+# implicit steps in space ---------------------------------------------------------------------------------------------
+def balls_with_a_light_link(mass):
+    """Three bodies on ball joints, that in the middle light."""
+    model = three_balls()
+    inertia = {f"body 1.inertia.{2 * axis}": mass * each for axis, each in zip("xyz", SHAPE, strict=True)}
+    start = mbd.assemble(
+        model,
+        {"joint 0.orientation": ("zxy", (0.9, 0.4, -1.0)), "joint 1.orientation": ("zxy", (-0.7, 0.8, 0.5))},
+        {f"joint {k}.angular_velocity": (0.3, -0.2, 0.5) for k in range(3)},
+        parameters={"body 1.mass": mass, **inertia},
+    )
+    return model, start
+
+
+@lru_cache(maxsize=1)
+def three_balls():
+    """Of 3 kg each."""
+    model = mbd.Model("light link")
+    end = model.ground.origin
+    for k in range(3):
+        body = mbd.RigidBody(f"body {k}", 3.0, [3.0 * each for each in SHAPE], center=(0.0, -0.2, 0.05))
+        model.connect(mbd.Spherical(f"joint {k}", end, body.origin))
+        end = body.point(0.0, -0.4, 0.0)
+    return model
+
+
+@pytest.mark.parametrize("mass", [5e-3, 5e-5, 5e-6])
+@pytest.mark.parametrize("scheme", [mbd.HHT, mbd.GeneralizedAlpha, mbd.RadauIIA], ids=lambda scheme: scheme.__name__)
+def test_what_newtons_method_leaves_does_not_show_in_the_motion_of_a_light_link(scheme, mass):
+    """A residual of 10⁻⁹ of the heavy bodies' forces would be an acceleration of 10⁻³ of the light one's.
+
+    What the tolerance that a scheme has by itself leaves of accelerations is far below what a step half as long
+    changes of them.
+    """
+    model, start = balls_with_a_light_link(mass)
+    tight = scheme(tolerance=1e-12)
+    usual, exact = (mbd.simulate(model, start, each, dt=2e-3, until=0.04) for each in (scheme(), tight))
+    finer = mbd.simulate(model, start, tight, dt=1e-3, until=0.04)
+    step = np.abs(finer.record.a[::2] - exact.record.a).max()
+    left = np.abs(usual.record.a - exact.record.a).max()
+    assert left < 0.05 * step + 1e-8 * np.abs(exact.record.a).max(), (left, step)
+    assert judge(usual, model, start.parameters).faults == ()
+
+
+@pytest.mark.parametrize("mass", [5e-3, 5e-6])
+def test_radau_steps_of_a_light_link_are_of_the_full_order_in_a_few_iterations(mass):
+    """Its direction of little inertia turns within a step, so that no mass matrix serves two stages."""
+    model, start = balls_with_a_light_link(mass)
+    exact = mbd.simulate(model, start, mbd.RungeKutta853(), tol=1e-10, until=0.32).record.q[-1]
+    runs = [mbd.simulate(model, start, mbd.RadauIIA(), dt=dt, until=0.32) for dt in (0.032, 0.016)]
+    coarse, fine = (np.abs(run.record.q[-1] - exact).max() for run in runs)
+    assert coarse > 20.0 * fine, (coarse, fine)
+    assert all(run.stats["iterations"] < 8 * run.stats["steps"] and not run.stats["shortened"] for run in runs)
+    compiled, twin = (
+        mbd.simulate(model, start, mbd.RadauIIA(), dt=4e-3, until=8e-3, backend=backend)
+        for backend in ("llvm", "python")
+    )
+    np.testing.assert_allclose(compiled.record.a, twin.record.a, rtol=0, atol=1e-9)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from mbd.kernel.codes import EPS, NOT_CONVERGED, NOT_FINITE, SINGULAR, STAGNATED, TOO_NEAR, TOO_TIGHT
 from mbd.kernel.hooks import call, call_on
 from mbd.kernel.linear import factor
+from mbd.kernel.mass_ratios import has_settled
 from mbd.kernel.ordered import LOSS_OF_STEP, OF_TANGENT, factor_ordered, order_at, solve_kkt
 from mbd.kernel.records import DependentRows, Equations, Kernel, Reals, Report, Steps
 from mbd.kernel.redundancy import sharing
@@ -55,6 +56,9 @@ def solve_step(K: Kernel, h: float, t1: float, c_C: float, c_K: float, tangents:
     straight = False  # whether the factors at hand are those of straight-line code
     fresh = False
     together = sharing(K)
+    first = 0.0  # what the first correction changed, the last and the one before, of the fastest rate
+    moved = 1e300
+    last = 0.0
     for iteration in range(K.max_iterations):
         tangent = not fresh
         if together:
@@ -82,9 +86,9 @@ def solve_step(K: Kernel, h: float, t1: float, c_C: float, c_K: float, tangents:
             error = second_look(K, o_r, m, c_C, c_K, tolerance, iteration)
             if error < 0.0:
                 return no_candidate(K, h, t1, int(-error))
-        if error <= 1.0:
+        if error <= 1.0 and (K.uneven_masses == 0 or has_settled(moved, last, 1e-4 * first)):
             return conclude_step(K, h, t1)
-        if not tangent and error > 0.3 * before:
+        if not tangent and error > max(1.0, 0.3 * before):
             fresh = False  # the old tangent has done its work: renew it at the same iterate
             before = 1e300
             continue
@@ -105,10 +109,14 @@ def solve_step(K: Kernel, h: float, t1: float, c_C: float, c_K: float, tangents:
         if not ready:
             solve_corrections(K, m, c_C, tangent, shifting, straight)
         fixed = straight or K.order_start > 0
-        biggest = correct(K, m, c_C, c_K, ready, shifting)
-        if iteration == 0 and K.exact == 0:  # the predictor's error measures that of the step: stay far below it
-            tolerance = min(K.tolerance, max(1e-4 * biggest, tolerance))
-        fresh = True
+        last = moved
+        moved = correct(K, m, c_C, c_K, ready, shifting)
+        if iteration == 0:
+            first = moved
+            if K.exact == 0:  # the predictor's error measures that of the step: stay far below it
+                tolerance = min(K.tolerance, max(1e-4 * moved, tolerance))
+        fresh = tangent or error > 1.0 or moved <= 0.3 * last
+        last = last if fresh else 0.0
     return no_candidate(K, h, t1, NOT_CONVERGED)
 
 
