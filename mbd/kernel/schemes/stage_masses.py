@@ -16,7 +16,7 @@ from mbd.kernel.codes import ACCELERATIONS
 from mbd.kernel.hooks import call
 from mbd.kernel.linear import solve_definite
 from mbd.kernel.mass_ratios import is_uneven
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import Kernel, SingularSteps
 from mbd.kernel.restart import evaluate
 from mbd.kernel.schemes.stage_layout import BALANCES, MASS_PART, stage_place
 from mbd.kernel.schemes.stages import correct_stages, load_stage
@@ -24,7 +24,7 @@ from mbd.kernel.schemes.stages import correct_stages, load_stage
 __all__ = ["correct_by_own_masses", "note_uneven"]
 
 
-def note_uneven(K: Kernel) -> None:
+def note_uneven(K: SingularSteps) -> None:
     """Whether masses differ so much, at the accepted state, of bodies that turn freely and are in no loop."""
     K.uneven_masses = 0
     if K.vector == 0 and K.n_active == 0:
