@@ -7,8 +7,7 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.integrators.base import StepResult
 from mbd.integrators.radau_step import EPS, MAX_ITERATIONS, RadauStep, infinite_unless_number
-from mbd.kernel.mass_ratios import has_settled
-from mbd.kernel.schemes.radau import NEGLIGIBLE, PATIENT, SLOW
+from mbd.kernel.schemes.radau import PATIENT, SLOW, has_converged
 from mbd.kernel.singular.stages import MOST_STAGE_PROJECTIONS
 
 __all__ = ["SingularRadauStep"]
@@ -33,7 +32,7 @@ class SingularRadauStep(RadauStep):
             if not np.isfinite(error):
                 return self._failed(iteration, error, "a force or a row is not finite")
             matrices = self._matrices(len(terms[0].h))
-            if error <= 1.0 and iteration > 0 and has_settled(moved, last, NEGLIGIBLE * first**2):
+            if error <= 1.0 and iteration > 0 and has_converged(moved, last, first):
                 return self._completed(matrices, iteration, error)
             if error > 1.0 and iteration > 2 and error > SLOW * before:
                 if error * self.tolerance <= self.upper:

@@ -19,9 +19,8 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.integrators.base import Point, StepReport, StepResult, System, Terms, completed, consistent_rates
-from mbd.kernel.mass_ratios import LOSS, has_settled
 from mbd.kernel.schemes.collocation import RADAU
-from mbd.kernel.schemes.radau import FAR_OFF, MOST_RETREATS, NEGLIGIBLE, PATIENT, SLOW
+from mbd.kernel.schemes.radau import FAR_OFF, MOST_RETREATS, PATIENT, SLOW, has_converged
 from mbd.kernel.schemes.stages import MOST_BENDS, MOST_STRETCHED
 from mbd.state import Mode, State
 
@@ -122,7 +121,7 @@ class RadauStep:
                 moved = self._correct(terms, matrices, renew)
             except np.linalg.LinAlgError:
                 return self._failed(iteration, error, "the Newton matrix is singular")
-            if passes and has_settled(moved, last, NEGLIGIBLE * first**2):
+            if passes and has_converged(moved, last, first):
                 return self._completed(matrices, iteration, error)
             if iteration == 0 and not passes:  # the predictor is of order 3, the step of order 5: stay below its error
                 first = moved
@@ -217,21 +216,10 @@ class RadauStep:
         r, rates = np.array([each.r for each in terms]), np.array([each.rate for each in terms])
         if m:
             self._correct_positions(terms, matrices, r, rates, whole)
-        elif not self.system.is_vector and self._is_uneven(matrices.M):
-            r = np.array([matrices.M @ np.linalg.solve(self._mass(i), each) for i, each in enumerate(r)])
+        elif not self.system.is_vector:  # see `mbd.kernel.schemes.stage_masses`
+            with suppress(np.linalg.LinAlgError):
+                r = np.array([matrices.M @ np.linalg.solve(self._mass(i), each) for i, each in enumerate(r)])
         return self._correct_rates(r, rates, matrices)
-
-    def _is_uneven(self, M: Matrix) -> bool:
-        """Whether a pivot of M is far below the largest entry of its unit: see `mbd.kernel.schemes.stage_masses`."""
-        with suppress(np.linalg.LinAlgError):
-            pivots = np.diag(np.linalg.cholesky(M))[: self.n_v] ** 2
-            return any(np.min(pivots[k]) < LOSS * np.max(np.diag(M)[: self.n_v][k]) for k in self._units())
-        return False
-
-    def _units(self) -> list[Any]:
-        """Which velocities turn, and which do not."""
-        turning = np.asarray(self.system.angles)
-        return [each for each in (turning, ~turning) if np.any(each)]
 
     def _mass(self, i: int) -> Matrix:
         """M of a stage: S at (c, 0) and (2c, 0)."""

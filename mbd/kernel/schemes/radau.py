@@ -9,7 +9,6 @@ acceleration level, which makes them as accurate as positions and velocities.
 from __future__ import annotations
 
 from mbd.kernel.codes import EPS, NOT_CONVERGED, NOT_FINITE, PASSING, SINGULAR, STAGNATED, TOO_TIGHT
-from mbd.kernel.mass_ratios import has_settled
 from mbd.kernel.records import Kernel, Settings, SingularSteps, Steps
 from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import (
@@ -31,7 +30,7 @@ from mbd.kernel.schemes.stage_layout import (
     STAGES_END,
     stage_place,
 )
-from mbd.kernel.schemes.stage_masses import correct_by_own_masses, note_uneven
+from mbd.kernel.schemes.stage_masses import correct_by_own_masses
 from mbd.kernel.schemes.stage_matrices import factor_stages
 from mbd.kernel.schemes.stages import (
     correct_rates,
@@ -64,8 +63,10 @@ PATIENT = 6
 STUCK = 0.9
 """Part of the residual left by a correction above which it falls no more; between both it falls slowly."""
 
+SETTLED = 1e-8
+"""Part of the largest rate that a correction of residuals that pass may change without another look [-]."""
 NEGLIGIBLE = 1e-2
-"""What a correction of residuals that pass may change over the square of the first, which measures the error [-]."""
+"""The same over the square of the first correction, the size of the step's own error [-]."""
 
 
 def radau_start(K: SingularSteps) -> int:
@@ -73,7 +74,6 @@ def radau_start(K: SingularSteps) -> int:
     forget_steps(K)
     forget_stages(K)
     forget_row_norms(K)
-    note_uneven(K)
     measure_accepted(K)
     look_a_step_ahead(K)
     return 0
@@ -161,7 +161,7 @@ def plain_step(K: Kernel, h: float, t1: float, m: int) -> int:
             last = moved
             moved = correct_by_own_masses(K, m, h, t1, renew)
             renew = False
-            if has_settled(moved, last, NEGLIGIBLE * first * first):
+            if has_converged(moved, last, first):
                 return complete(K, h, t1, m, False, iteration >= PATIENT)
             continue
         moved = correct_by_own_masses(K, m, h, t1, renew)
@@ -172,6 +172,14 @@ def plain_step(K: Kernel, h: float, t1: float, m: int) -> int:
     if K.failure_size < 0.0:
         K.failure_size = 1e300
     return status
+
+
+def has_converged(moved: float, last: float, first: float) -> bool:
+    """Whether a correction of residuals that pass was small, or as small as round-off lets it be.
+
+    Masses that differ by 10⁶ make a change of 10⁻³ in the rates of the light one of residuals of 10⁻⁹.
+    """
+    return moved <= max(SETTLED, NEGLIGIBLE * first * first) or (last > 0.0 and moved > 0.5 * last)
 
 
 def singular_stages_step(K: Kernel, h: float, t1: float) -> int:
@@ -205,7 +213,7 @@ def singular_stages_step(K: Kernel, h: float, t1: float) -> int:
             if iteration >= PATIENT:
                 return NOT_CONVERGED
             evaluate_stages(K, h, t1, m, tolerance, c, c * c, False)
-        if error <= 1.0 and iteration > 0 and has_settled(moved, last, NEGLIGIBLE * first * first):
+        if error <= 1.0 and iteration > 0 and has_converged(moved, last, first):
             return complete(K, h, t1, m, True, False)
         before = error
         replace_row_rates(K, stage_place(K, BALANCES), m)
