@@ -15,8 +15,10 @@ stump = person.bodies["left thigh"].end
 shank = mbd.Link("left shank", mass=1.2, length=0.4, center=0.18, inertia=mbd.cylinder(1.2, 0.03, 0.4, "y").inertia)
 blade = mbd.RigidBody("left foot", 0.6, (0.0006, 0.002, 0.002), center=(0.05, -0.05, 0.0))
 rubber = {"stiffness": 1300.0, "restitution": 0.4}
-knee = mbd.parts.hydraulic_knee(model, "left knee", stump, shank.start, flexion=0.8, extension=0.2, stop=rubber)
-ankle = mbd.Revolute("left ankle", shank.end, blade.origin, stiffness=160.0, loss=mbd.Viscous(0.5))
+valves = {"flexion": 0.8, "extension": 0.2, "stop": rubber, "anatomy": "left knee"}  # of the same joint as the other
+knee = mbd.parts.hydraulic_knee(model, "left knee", stump, shank.start, **valves)
+spring = {"stiffness": 160.0, "loss": mbd.Viscous(0.5), "anatomy": "left ankle"}
+ankle = mbd.Revolute("left ankle", shank.end, blade.origin, **spring)
 model.connect(ankle)
 
 rates = {"left knee.angle": -6.0, "right knee.angle": -5.0, "left shoulder.angular_velocity.z": 3.0}

@@ -19,6 +19,7 @@ from mbd.gait.outcome import Outcome
 from mbd.gait.return_map import ReturnMap
 from mbd.gait.section import Chart
 from mbd.notebook import table
+from mbd.sensitivity.tangent_names import place_names
 from mbd.simulation.simulate import simulate
 from mbd.state import State
 
@@ -189,15 +190,17 @@ class LimitCycle:
 
     @property
     def modes(self) -> list[dict[str, complex]]:
-        """For each multiplier its mode, by coordinate and rate: the push that it multiplies."""
+        """For each multiplier its mode, by coordinate and rate: the push that it multiplies.
+
+        Of an orientation small turns about the axes of the child, 'hub.turn.x', as derivatives name them.
+        """
         whole = self.chart.basis @ self.stability_of.modes
         return [dict(zip(self._directions, column, strict=False)) for column in whole.T]
 
     @property
     def _directions(self) -> list[str]:
         equations = self.chart.section.mechanism.equations
-        freedoms = [name for name, _ in equations.configuration.freedoms]
-        return [*freedoms, *equations.velocity_names, *(state.name for state in equations.states)]
+        return [*place_names(equations), *equations.velocity_names, *(state.name for state in equations.states)]
 
     # energy and derivatives ---------------------------------------------------------------------------------------
     @cached_property

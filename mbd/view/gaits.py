@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from mbd.gait.branch import Branch
     from mbd.gait.cycle import LimitCycle
     from mbd.gait.follow import PointCurve
+    from mbd.trajectory import Trajectory
 
 __all__ = ["branch", "cycle", "point_curve"]
 
@@ -34,26 +35,29 @@ AT_POINT = {
 """Quantities of a branch at one of its points."""
 MOST = 6
 """Angles that the phase plane shows."""
+FAR = 3.0
+"""Modulus beyond which a multiplier is drawn at the edge of the picture [-]."""
 
 
 def cycle(gait: LimitCycle, path: str | Path | None = None) -> Any:
     """Each angle's rate against the angle over one period, in degrees, jumps dotted; the multipliers.
 
+    Of orientations the parts of the rotation vector, and of the angular velocity in the same axes of the child.
+
     Of a walk that is mirrored each step, both sides of one step are one side over a stride: they have one color.
     """
     run = gait.run
-    angles = [name for name, kind in run.facts.coordinates[: run.facts.coordinate_count] if kind == "rad"]
-    angles = [name for name in angles if f"{name}.rate" in run][:MOST]
-    time, values = curves(run, [part for name in angles for part in (name, f"{name}.rate")])
+    angles = _angles(run)
+    time, values = curves(run, [part for pair in angles.items() for part in pair])
     shades: dict[str, str] = {}
     with drawing(path, 7.4, 3.6) as figure:
         left, right = figure.subplots(1, 2, width_ratios=[1.5, 1.0])
-        for name in angles:
+        for name, of_name in angles.items():
             partner = name if gait.mirror is None else exchange(name, gait.mirror)
             first = partner not in shades
             shade = shades.setdefault(name, shades.get(partner, CYCLE[len(shades) % len(CYCLE)]))
             label = as_label(name if partner == name else f"{name}, then {partner}") if first or partner == name else ""
-            place, rate = (180.0 / np.pi * values[each] for each in (name, f"{name}.rate"))
+            place, rate = (180.0 / np.pi * values[each] for each in (name, of_name))
             for start, stop in pairwise(Grid(time).cuts):
                 left.plot(place[start:stop], rate[start:stop], color=tone(shade), label=label or None)
                 left.plot(place[stop - 1 : stop + 1], rate[stop - 1 : stop + 1], ":", color=tone(shade))
@@ -61,18 +65,34 @@ def cycle(gait: LimitCycle, path: str | Path | None = None) -> Any:
             left.plot(place[:1], rate[:1], "o", color=tone(shade), markersize=4)
         left.set_xlabel("angle [°]")
         left.set_ylabel("rate [°/s]")
-        left.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=1, borderaxespad=0.2)
+        if angles:
+            left.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=1, borderaxespad=0.2)
         _multipliers(right, gait)
     return figure
+
+
+def _angles(run: Trajectory) -> dict[str, str]:
+    """Angles with their rates; of orientations the parts of the rotation vector, with the angular velocity there."""
+    coordinates = run.facts.coordinates[: run.facts.coordinate_count]
+    found = {name: f"{name}.rate" for name, kind in coordinates if kind == "rad" and f"{name}.rate" in run}
+    joints = [name.removesuffix(".orientation.w") for name, _ in coordinates if name.endswith(".orientation.w")]
+    found |= {f"{j}.rotation_vector.{axis}": f"{j}.angular_velocity.{axis}" for j in joints for axis in "xyz"}
+    return dict(list(found.items())[:MOST])
 
 
 def _multipliers(axes: Any, gait: LimitCycle) -> None:
     """The multipliers in the complex plane."""
     turn = np.linspace(0.0, 2.0 * np.pi, 181)
     axes.plot(np.cos(turn), np.sin(turn), color=tone(NEUTRAL), linewidth=0.8)
-    inside = np.abs(gait.multipliers) < 1.0
-    for part, shade in ((inside, CYCLE[2]), (~inside, CYCLE[1])):
+    sizes = np.abs(gait.multipliers)
+    near = sizes <= FAR
+    for part, shade in ((sizes < 1.0, CYCLE[2]), ((sizes >= 1.0) & near, CYCLE[1])):
         axes.plot(gait.multipliers.real[part], gait.multipliers.imag[part], "o", color=tone(shade), markersize=5)
+    for value in gait.multipliers[~near]:  # at the edge, with what it is
+        place = FAR * value / abs(value)
+        axes.plot(place.real, place.imag, "D", color=tone(CYCLE[1]), markersize=5)
+        text = f"{value.real:.4g}" if value.imag == 0.0 else f"{abs(value):.4g}"
+        axes.annotate(text, (place.real, place.imag), (0, 6), textcoords="offset points", ha="center", color=tone(INK))
     axes.set_aspect("equal")
     axes.set_xlabel("real part")
     axes.set_ylabel("imaginary part")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from functools import cache
 from typing import Any
 
@@ -220,6 +221,7 @@ def test_the_axis_to_the_side_is_found() -> None:
 
 
 # the plane in space ---------------------------------------------------------------------------------------------------
+@cache
 def compass(spatial: bool) -> mbd.LimitCycle:
     """A compass gait in the plane, or on the same hinges with a hip that may also lean, turn and move to the side."""
     model = mbd.Model("compass", gravity=mbd.on_slope(math.radians(3.0)))
@@ -245,8 +247,18 @@ def test_a_walker_of_the_plane_walks_in_space() -> None:
     assert free.distance == pytest.approx(flat.distance, rel=1e-8)
     for value in flat.multipliers:
         assert np.min(np.abs(free.multipliers - value)) < 2e-8
+    assert {"leg.turn.x", "hinge.angle", "leg.angular_velocity.x"} < set(free.modes[0])
     assert "exact" in free.map_derivative.how and "exact" not in flat.map_derivative.how
     assert len(free.multipliers) > len(flat.multipliers)
+
+
+def test_pictures_show_orientations_and_multipliers_far_off(tmp_path: Any) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        figure = compass(True).plot(tmp_path / "gait.png")
+    left, right = figure.axes
+    assert "leg.rotation_vector.z" in [text.get_text() for text in left.get_legend().get_texts()]
+    assert right.get_xlim()[1] < 4.0 and "215.2" in [text.get_text() for text in right.texts]
 
 
 # many starts ----------------------------------------------------------------------------------------------------------

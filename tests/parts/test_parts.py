@@ -30,6 +30,34 @@ def test_one_way_valves_tell_flexion_from_extension():
     assert model.parameters["knee loss.valves.backward.coefficient"] == 0.8
 
 
+HINGES = {
+    "stop_knee": {}, "locking_knee": {}, "hydraulic_knee": {"flexion": 0.8, "extension": 0.2},
+    "friction_brake_knee": {"mu": 0.2, "radius": 0.02}, "pneumatic_knee": {"volume": 5e-4, "swept": 1e-4},
+    "powered_knee": {
+        "voltage": 0.0, "resistance": 1.0, "constant": 0.05, "gear": 50.0, "rotor": 1e-5, "mass": 0.1,
+    },
+    "bumper_ankle": {"heel": {"stiffness": 50.0}, "toe": {"stiffness": 90.0}, "clearance": 1.0},
+    "hydraulic_ankle": {"plantarflexion": 2.0, "dorsiflexion": 3.0},
+    "tabulated_ankle": {"angle": (-0.4, 0.0, 0.4), "torque": (-9.0, 0.0, 20.0)},
+    "series_elastic_ankle": {"torque": 0.0, "stiffness": 300.0, "inertia": 0.1, "mass": 0.2},
+}  # fmt: skip
+"""Parts that are one hinge of a leg, with what they need."""
+
+
+@pytest.mark.parametrize("name", HINGES)
+def test_hinges_of_a_leg_are_joints_of_the_body_when_they_say_so(name):
+    model, *ends = leg()
+    part = name.rpartition("_")[2]
+    joint = getattr(parts, name)(model, part, *ends, **HINGES[name], anatomy=f"left {part}")
+    assert joint.anatomy == f"left {part}" and getattr(parts, name)(leg()[0], part, *ends, **HINGES[name]).anatomy == ""
+    state = mbd.assemble(model, {f"{part}.angle": -0.3}, backend="python")
+    run = mbd.simulate(model, state, mbd.HHT(), dt=1e-3, until=1e-3, backend="python")
+    told = run[f"{part}.{'flexion' if part == 'knee' else 'dorsiflexion'}"][0]
+    assert told == pytest.approx(0.3 if part == "knee" else -0.3)
+    with pytest.raises(ModelError, match="'left knie'"):
+        getattr(parts, name)(leg()[0], part, *ends, **HINGES[name], anatomy="left knie")
+
+
 def test_an_orifice_obeys_bernoulli():
     piston, opening, arm, rate = 3e-4, 2e-6, 0.03, 1.5
     pressure = 0.5 * 870.0 * (piston * arm * rate / (0.61 * opening)) ** 2

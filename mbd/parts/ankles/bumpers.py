@@ -19,7 +19,7 @@ __all__ = ["bumper_ankle"]
 
 def bumper_ankle(
     model: Description, name: str, shank: Frame, foot: Frame, *, heel: Mapping[str, Any], toe: Mapping[str, Any],
-    clearance: float = 0.0, loss: Loss | None = None,
+    clearance: float = 0.0, loss: Loss | None = None, anatomy: str = "",
 ) -> Revolute:  # fmt: skip
     """A hinge with a rubber bumper for either direction, which push only: ``T = k δⁿ + c δ̇`` or Hunt and Crossley's
     law.
@@ -35,6 +35,7 @@ def bumper_ankle(
     heel, toe : arguments of the `Penalty`, such as {'stiffness': 150.0, 'damping': 1.0, 'release': 'pull'}
     clearance : angle to either side before they touch [rad]
     loss : of the hinge
+    anatomy : the joint of the body that it is, 'left ankle', for angles of ISB beside its own (`Revolute`)
 
     >>> import mbd
     >>> shank = mbd.Link("shank", mass=2.0, length=0.4, center=0.2, inertia=0.03)
@@ -47,7 +48,7 @@ def bumper_ankle(
     """  # fmt: skip
     check(model, name, "bumper_ankle")
     between("bumper_ankle", name, shank=shank, foot=foot)
-    ankle = Revolute(name, shank, foot, loss=loss)
+    ankle = Revolute(name, shank, foot, loss=loss, anatomy=anatomy)
     model.connect(ankle)
     for end, how, room in ("heel", heel, extension(ankle, -clearance)), ("toe", toe, flexion(ankle, -clearance)):
         if not isinstance(how, Mapping):

@@ -18,7 +18,7 @@ __all__ = ["hydraulic_ankle"]
 
 def hydraulic_ankle(
     model: Description, name: str, shank: Frame, foot: Frame, *, plantarflexion: Any, dorsiflexion: Any,
-    stiffness: float = 0.0, rest: float = 0.0, loss: Loss | None = None,
+    stiffness: float = 0.0, rest: float = 0.0, loss: Loss | None = None, anatomy: str = "",
 ) -> Revolute:  # fmt: skip
     """A hinge whose cylinder resists plantarflexion and dorsiflexion by valves of their own, beside a spring.
 
@@ -34,6 +34,7 @@ def hydraulic_ankle(
     plantarflexion, dorsiflexion : c [N m s/rad], or any loss that does not stick
     stiffness, rest : of the spring [N m/rad, rad]
     loss : beside them
+    anatomy : the joint of the body that it is, 'left ankle', for angles of ISB beside its own (`Revolute`)
 
     >>> import mbd
     >>> shank = mbd.Link("shank", mass=2.0, length=0.4, center=0.2, inertia=0.03)
@@ -47,6 +48,8 @@ def hydraulic_ankle(
     check(model, name, "hydraulic_ankle")
     between("hydraulic_ankle", name, shank=shank, foot=foot)
     down, up = (Viscous(value) if is_number(value) else value for value in (plantarflexion, dorsiflexion))
-    ankle = Revolute(name, shank, foot, loss=added(name, Valves(down, up), loss), stiffness=stiffness, rest=rest)
+    ankle = Revolute(
+        name, shank, foot, loss=added(name, Valves(down, up), loss), stiffness=stiffness, rest=rest, anatomy=anatomy
+    )
     model.connect(ankle)
     return ankle

@@ -18,7 +18,7 @@ __all__ = ["series_elastic_ankle"]
 
 def series_elastic_ankle(
     model: Description, name: str, shank: Frame, foot: Frame, *, torque: Any, stiffness: float, inertia: float,
-    mass: float, arguments: Any = ("t",), loss: Loss | None = None, motor_loss: Loss | None = None,
+    mass: float, arguments: Any = ("t",), loss: Loss | None = None, motor_loss: Loss | None = None, anatomy: str = "",
 ) -> Revolute:  # fmt: skip
     """A motor turns a drive on the shank, which pulls the foot by a spring: ``J q̈_d = τ − k (q_d − q)``.
 
@@ -36,6 +36,7 @@ def series_elastic_ankle(
     inertia, mass : J of the drive about the ankle, with the gear's N² times that of the rotor [kg m²]; its mass [kg]
     arguments : what a function of the torque is called with
     loss, motor_loss : of the ankle, and of the drive's joint
+    anatomy : the joint of the body that it is, 'left ankle', for angles of ISB beside its own (`Revolute`)
 
     >>> import mbd
     >>> shank = mbd.Link("shank", mass=2.0, length=0.4, center=0.2, inertia=0.03)
@@ -50,7 +51,7 @@ def series_elastic_ankle(
     between("series_elastic_ankle", name, shank=shank, foot=foot)
     J, m = sizes(f"series_elastic_ankle '{name}'", inertia=inertia, mass=mass)
     drive = Revolute(f"{name} drive", shank, RigidBody(f"{name} pulley", m, J).origin, loss=motor_loss)
-    ankle = Revolute(name, shank, foot, loss=loss)
+    ankle = Revolute(name, shank, foot, loss=loss, anatomy=anatomy)
     model.connect(drive, ankle)
     stretch = (f"{name} drive.angle", f"{name}.angle", ("stiffness", stiffness))
     model.apply(Potential(f"{name} spring", _stored, stretch), Motor(f"{name} motor", drive, torque, arguments))

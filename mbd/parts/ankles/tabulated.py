@@ -15,7 +15,15 @@ __all__ = ["tabulated_ankle"]
 
 
 def tabulated_ankle(
-    model: Description, name: str, shank: Frame, foot: Frame, *, angle: Any, torque: Any, loss: Loss | None = None
+    model: Description,
+    name: str,
+    shank: Frame,
+    foot: Frame,
+    *,
+    angle: Any,
+    torque: Any,
+    loss: Loss | None = None,
+    anatomy: str = "",
 ) -> Revolute:
     """A hinge with a measured spring, ``V = ∫ T dq``: toes up (dorsiflexion) where q > 0, and the foot feels −T(q).
 
@@ -29,6 +37,7 @@ def tabulated_ankle(
     shank, foot : the frames that it joins
     angle, torque : the table [rad, N m]; the torque rises with the angle
     loss : hysteresis, such as Viscous(0.5) or Tabulated(…)
+    anatomy : the joint of the body that it is, 'left ankle', for angles of ISB beside its own (`Revolute`)
 
     >>> import mbd
     >>> shank = mbd.Link("shank", mass=2.0, length=0.4, center=0.2, inertia=0.03)
@@ -41,7 +50,7 @@ def tabulated_ankle(
     """
     check(model, name, "tabulated_ankle")
     between("tabulated_ankle", name, shank=shank, foot=foot)
-    ankle = Revolute(name, shank, foot, loss=loss)
+    ankle = Revolute(name, shank, foot, loss=loss, anatomy=anatomy)
     model.connect(ankle)
     model.apply(TabulatedSpring(f"{name} spring", ankle, angle, torque))
     return ankle

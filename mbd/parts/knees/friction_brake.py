@@ -15,7 +15,7 @@ __all__ = ["friction_brake_knee"]
 
 def friction_brake_knee(
     model: Description, name: str, thigh: Frame, shank: Frame, *, mu: float, radius: float, stop: Stop = None,
-    loss: Loss | None = None,
+    loss: Loss | None = None, anatomy: str = "",
 ) -> Revolute:  # fmt: skip
     """A single axis whose load presses a drum against its brake: ``|M| ≤ μ r N``, N the force in the knee.
 
@@ -31,6 +31,7 @@ def friction_brake_knee(
     radius : r of the drum [m]
     stop : as of `stop_knee`
     loss : of swing, such as Viscous(0.3)
+    anatomy : the joint of the body that it is, 'left knee', for angles of ISB beside its own (`Revolute`)
 
     >>> import mbd
     >>> thigh = mbd.Link("thigh", mass=7.0, length=0.4, center=0.2, inertia=0.1)
@@ -41,4 +42,6 @@ def friction_brake_knee(
     ([], True)
     """  # fmt: skip
     check(model, name, "friction_brake_knee")
-    return stop_knee(model, name, thigh, shank, stop=stop, loss=added(name, PinFriction(mu, radius), loss))
+    return stop_knee(
+        model, name, thigh, shank, stop=stop, loss=added(name, PinFriction(mu, radius), loss), anatomy=anatomy
+    )

@@ -14,7 +14,7 @@ __all__ = ["stop_knee"]
 
 def stop_knee(
     model: Description, name: str, thigh: Frame, shank: Frame, *, stop: Stop = None, loss: Loss | None = None,
-    stiffness: float = 0.0, rest: float = 0.0,
+    stiffness: float = 0.0, rest: float = 0.0, anatomy: str = "",
 ) -> Revolute:  # fmt: skip
     """A hinge with a rubber stop at full extension, which pushes only; in stance the weight holds it there.
 
@@ -29,6 +29,7 @@ def stop_knee(
     stop : arguments of the `Penalty`, such as {'stiffness': 1300.0, 'restitution': 0.4}; None: no stop
     loss : of the hinge
     stiffness, rest : of its spring, an extension assist with rest > 0 [N m/rad, rad]
+    anatomy : the joint of the body that it is, 'left knee', for angles of ISB beside its own (`Revolute`)
 
     >>> import mbd
     >>> thigh = mbd.Link("thigh", mass=7.0, length=0.4, center=0.2, inertia=0.1)
@@ -41,7 +42,7 @@ def stop_knee(
     """  # fmt: skip
     check(model, name, "stop_knee")
     between("stop_knee", name, thigh=thigh, shank=shank)
-    knee = Revolute(name, thigh, shank, loss=loss, stiffness=stiffness, rest=rest)
+    knee = Revolute(name, thigh, shank, loss=loss, stiffness=stiffness, rest=rest, anatomy=anatomy)
     model.connect(knee)
     constrain_stop(model, name, flexion(knee), stop)
     return knee

@@ -41,7 +41,7 @@ def orifice(*, piston: float, opening: float, arm: float, density: float = 870.0
 
 def hydraulic_knee(
     model: Description, name: str, thigh: Frame, shank: Frame, *, flexion: Any, extension: Any, stop: Stop = None,
-    loss: Loss | None = None,
+    loss: Loss | None = None, anatomy: str = "",
 ) -> Revolute:  # fmt: skip
     """A single axis with a cylinder whose check valves lead flexion and extension through orifices of their own.
 
@@ -56,6 +56,7 @@ def hydraulic_knee(
     flexion, extension : c [N m s²/rad²], such as of `orifice`, or any loss that does not stick
     stop : as of `stop_knee`
     loss : beside them, such as Viscous(0.3) of seals
+    anatomy : the joint of the body that it is, 'left knee', for angles of ISB beside its own (`Revolute`)
 
     >>> import mbd
     >>> thigh = mbd.Link("thigh", mass=7.0, length=0.4, center=0.2, inertia=0.1)
@@ -67,4 +68,6 @@ def hydraulic_knee(
     """  # fmt: skip
     check(model, name, "hydraulic_knee")
     bend, stretch = (Quadratic(value) if is_number(value) else value for value in (flexion, extension))
-    return stop_knee(model, name, thigh, shank, stop=stop, loss=added(name, Valves(bend, stretch), loss))
+    return stop_knee(
+        model, name, thigh, shank, stop=stop, loss=added(name, Valves(bend, stretch), loss), anatomy=anatomy
+    )

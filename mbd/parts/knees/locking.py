@@ -17,7 +17,7 @@ __all__ = ["locking_knee"]
 
 def locking_knee(
     model: Description, name: str, thigh: Frame, shank: Frame, *, release: Any = None, restitution: float = 0.0,
-    loss: Loss | None = None,
+    loss: Loss | None = None, anatomy: str = "",
 ) -> Revolute:  # fmt: skip
     """A hinge that swings out and locks as it is straight, by an impact, until the other foot has struck: ``0 ≤ −q ⟂
     p``.
@@ -33,6 +33,7 @@ def locking_knee(
         it would pull, like a stop
     restitution : e of the lock
     loss : of the hinge
+    anatomy : the joint of the body that it is, 'left knee', for angles of ISB beside its own (`Revolute`)
 
     >>> import mbd
     >>> thigh = mbd.Link("thigh", mass=0.5, length=0.5, center=0.3)
@@ -44,7 +45,7 @@ def locking_knee(
     """  # fmt: skip
     check(model, name, "locking_knee")
     between("locking_knee", name, thigh=thigh, shank=shank)
-    knee = Revolute(name, thigh, shank, loss=loss)
+    knee = Revolute(name, thigh, shank, loss=loss, anatomy=anatomy)
     model.connect(knee)
     rule = released(release, after_impact=True)
     model.constrain(Unilateral(f"{name} lock", flexion(knee), restitution=restitution, release=rule))

@@ -35,6 +35,7 @@ def phase(load: float, rate: float, threshold: float = 20.0) -> str:
 def magnetorheological_knee(
     model: Description, name: str, thigh: Frame, shank: Frame, *, torques: Mapping[str, float], viscous: float,
     foot: str, threshold: float = 20.0, period: float = 2e-3, smoothing: float | None = 0.01, stop: Stop = None,
+    anatomy: str = "",
 ) -> Revolute:  # fmt: skip
     """A Bingham brake, ``M = τ Sgn ω + c ω``, whose yield torque τ a controller sets by the phase of the gait.
 
@@ -54,6 +55,7 @@ def magnetorheological_knee(
     period : of the controller [s]
     smoothing : rate over which the yield torque sets in [rad/s]; None: it truly sticks
     stop : as of `stop_knee`
+    anatomy : the joint of the body that it is, 'left knee', for angles of ISB beside its own (`Revolute`)
 
     >>> import mbd
     >>> thigh = mbd.Link("thigh", mass=7.0, length=0.4, center=0.2, inertia=0.1)
@@ -72,7 +74,7 @@ def magnetorheological_knee(
         raise ModelError(f"foot of magnetorheological_knee '{name}' is the name of a contact, got {foot!r}")
     limit = number(threshold, f"threshold of magnetorheological_knee '{name}'")
     loss = Coulomb(known["swing flexion"], smoothing) + Viscous(viscous)
-    knee = stop_knee(model, name, thigh, shank, stop=stop, loss=loss)
+    knee = stop_knee(model, name, thigh, shank, stop=stop, loss=loss, anatomy=anatomy)
     control = _Control(known, f"{foot}.force", f"{name}.angle.rate", f"{name} loss.coulomb.torque", limit)
     reads, writes = (f"{foot}.force", f"{name}.angle.rate"), (f"{name} loss.coulomb.torque",)
     model.apply(Controller(f"{name} control", control, period=period, reads=reads, writes=writes))

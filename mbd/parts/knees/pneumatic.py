@@ -31,7 +31,7 @@ def gas_energy(angle: Any, pressure: Any, volume: Any, swept: Any, exponent: Any
 
 def pneumatic_knee(
     model: Description, name: str, thigh: Frame, shank: Frame, *, volume: float, swept: float,
-    pressure: float = 101325.0, exponent: float = 1.3, stop: Stop = None, loss: Loss | None = None,
+    pressure: float = 101325.0, exponent: float = 1.3, stop: Stop = None, loss: Loss | None = None, anatomy: str = "",
 ) -> Revolute:  # fmt: skip
     """A single axis that compresses air as it bends: ``p V^n = p₀ V₀^n``, ``V = V₀ + s q``, ``M = s (p − p₀)``.
 
@@ -55,6 +55,7 @@ def pneumatic_knee(
     ------
     ModelError
         where the cylinder would be empty at 180°, or a number is not positive.
+    anatomy : the joint of the body that it is, 'left knee', for angles of ISB beside its own (`Revolute`)
 
     >>> import mbd
     >>> thigh = mbd.Link("thigh", mass=7.0, length=0.4, center=0.2, inertia=0.1)
@@ -74,7 +75,7 @@ def pneumatic_knee(
         )
     if n <= 1.0:
         raise ModelError(f"exponent of pneumatic_knee '{name}' must be above 1, got {n:g}; use 1.001 for slow motion")
-    knee = stop_knee(model, name, thigh, shank, stop=stop, loss=loss)
+    knee = stop_knee(model, name, thigh, shank, stop=stop, loss=loss, anatomy=anatomy)
     values = zip(given, (p, V, s, n), strict=True)
     model.apply(Potential(f"{name} air", gas_energy, (f"{name}.angle", *values)))
     return knee

@@ -21,7 +21,7 @@ __all__ = ["powered_knee"]
 def powered_knee(
     model: Description, name: str, thigh: Frame, shank: Frame, *, voltage: Any, resistance: float, constant: float,
     gear: float, rotor: float, mass: float, inductance: float = 0.0, arguments: Any = ("t",), stop: Stop = None,
-    loss: Loss | None = None,
+    loss: Loss | None = None, anatomy: str = "",
 ) -> Revolute:  # fmt: skip
     """A direct-current motor on the thigh that turns N times as fast as the knee: ``L di/dt = u − R i − k N q̇``, M = N
     k i.
@@ -41,6 +41,7 @@ def powered_knee(
     rotor, mass : J about its axis [kg m²] and mass [kg] of the rotor, which turns in the axis of the knee
     arguments : what a function of the voltage is called with
     stop, loss : as of `stop_knee`
+    anatomy : the joint of the body that it is, 'left knee', for angles of ISB beside its own (`Revolute`)
 
     >>> import mbd
     >>> thigh = mbd.Link("thigh", mass=7.0, length=0.4, center=0.2, inertia=0.1)
@@ -54,7 +55,7 @@ def powered_knee(
     """  # fmt: skip
     check(model, name, "powered_knee")
     N, J, m = sizes(f"powered_knee '{name}'", gear=gear, rotor=rotor, mass=mass)
-    knee = stop_knee(model, name, thigh, shank, stop=stop, loss=loss)
+    knee = stop_knee(model, name, thigh, shank, stop=stop, loss=loss, anatomy=anatomy)
     shaft = Revolute(f"{name} shaft", thigh, RigidBody(f"{name} rotor", m, J).origin)
     model.connect(shaft)
     ahead = measure(_Gear(N), shaft, knee, unit="rad")
