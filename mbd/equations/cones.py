@@ -18,7 +18,7 @@ from mbd.equations.equations import Equations
 from mbd.tape.functions import sqrt
 from mbd.tape.node import Node
 
-__all__ = ["sliding_force"]
+__all__ = ["cosine", "sliding_force"]
 
 LEAST_SQUARE = 1e-60
 """‖w‖² that is none [m²/s²]."""
@@ -34,8 +34,15 @@ def sliding_force(equations: Equations, k: int) -> Node:
         return own * friction.limit
     other = tape.input("slip", friction.partner)
     square = own * own + other * other
+    return friction.limit * (square / (square + NO_SLIP)) * cosine(equations, k)
+
+
+def cosine(equations: Equations, k: int) -> Node:
+    """w/‖w‖ along friction k, one of two that slide together."""
+    tape, friction = equations.tape, equations.frictions[k]
+    own, other = tape.input("slip", k), tape.input("slip", friction.partner)
+    square = own * own + other * other
     lean = (2.0 - square) * (2.0 - square)
     along = friction.rate + lean * own
     across = equations.frictions[friction.partner].rate + lean * other
-    size = tape.lift(sqrt(along * along + across * across + LEAST_SQUARE))
-    return friction.limit * (square / (square + NO_SLIP)) * (along / size)
+    return along / tape.lift(sqrt(along * along + across * across + LEAST_SQUARE))

@@ -26,7 +26,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from mbd.equations.cones import sliding_force
+from mbd.equations.cones import cosine, sliding_force
 from mbd.equations.equations import Contact, Equations
 from mbd.equations.inputs import Inputs
 from mbd.equations.magnitudes import magnitudes
@@ -221,11 +221,17 @@ def scales(equations: Equations) -> list[Node]:
     r = switched_balance(equations)
     h = [row.value for row in equations.rows]
     hv = [row.rate for row in equations.rows]
-    return magnitudes(equations.tape, [*r, *h, *hv], _amplitudes(equations))
+    return magnitudes(equations.tape, [*r, *h, *hv], _amplitudes(equations) | _cosines(equations))
 
 
 def _amplitudes(equations: Equations) -> dict[int, float]:
     return {} if equations.geometry is None else equations.geometry.amplitudes()
+
+
+def _cosines(equations: Equations) -> dict[int, float]:
+    """Of velocities over their own sizes, 1 however small both are beside the terms that they are made of."""
+    pairs = [k for k, friction in enumerate(equations.frictions) if friction.partner >= 0]
+    return {cosine(equations, k).index: 1.0 for k in pairs}
 
 
 def is_judged(equations: Equations) -> bool:

@@ -54,6 +54,7 @@ class Terms:
         forms; None: no such row
     turning : (m, n_v) ∂ḣ/∂x, the rate of B, zero for rows on velocities, whose H it does not enter then; stabilized
         only; None: singular configurations are not looked for
+    blur : part of scale_r that is round-off, whatever the tolerance
     shared : multipliers of dependent rows follow those of the others at each point, which the tangent takes as linear:
         r may rise in an iteration that converges
     """
@@ -70,6 +71,7 @@ class Terms:
     velocity: Any = None
     turning: Matrix | None = None
     shared: bool = False
+    blur: float = 0.0
 
 
 @runtime_checkable

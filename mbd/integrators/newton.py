@@ -123,7 +123,7 @@ class Step:
             rate = np.maximum(np.abs(self.rate), np.abs(self.memory.rate))
             scale_r = np.full(len(terms.r), np.max(np.abs(np.asarray(terms.S)) @ rate, initial=0.0))
         scale_r = np.maximum(scale_r, self.size_at_start)
-        parts = [np.abs(terms.r) / (tolerance * np.maximum(scale_r, 1e-200))]
+        parts = [np.abs(terms.r) / (max(tolerance, terms.blur) * np.maximum(scale_r, 1e-200))]
         if len(terms.h):
             floor = 16.0 * EPS * (np.ones(len(terms.h)) if terms.scale_h is None else terms.scale_h)
             speed = float(np.max(np.abs(self.y[: self.n_v]), initial=0.0))

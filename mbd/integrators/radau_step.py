@@ -180,7 +180,8 @@ class RadauStep:
             S = np.abs(np.asarray(self._terms(i, (c, c * c)).S))
             largest = S @ np.maximum(np.abs(point.rate), np.abs(self.memory.rate))
             scale = np.full(len(terms.r), np.max(largest, initial=0.0))
-        parts = [np.abs(terms.r) / (tolerance * np.maximum(np.maximum(scale, self.size_at_start), 1e-200))]
+        least = max(tolerance, terms.blur)
+        parts = [np.abs(terms.r) / (least * np.maximum(np.maximum(scale, self.size_at_start), 1e-200))]
         if len(terms.h):
             size = np.ones(len(terms.h)) if terms.scale_h is None else terms.scale_h
             fast = np.ones(len(terms.h)) if terms.scale_rate is None else terms.scale_rate

@@ -19,7 +19,15 @@ from mbd.kernel.codes import (
     PULL,
     STICK,
 )
-from mbd.kernel.cone_steps import SHORTER, approached_end, come_to_zero, slides_at_first, slides_on
+from mbd.kernel.cone_steps import (
+    SHORTER,
+    TURNS_AWAY,
+    approached_end,
+    come_to_zero,
+    shorter_turn,
+    slides_at_first,
+    slides_on,
+)
 from mbd.kernel.cones import follow_motion, pull_of_both
 from mbd.kernel.contact_modes import room_to_log
 from mbd.kernel.contact_step import relax_pace
@@ -221,7 +229,10 @@ def passes_events(K: Kernel, h: float) -> bool:
 
 
 def find_event(K: Kernel, h: float, t1: float) -> int:
-    """−1 with the candidate at the first event of the step, which K.fired tells; 0 without one; else a failure."""
+    """−1 with the candidate at the first event of the step, which K.fired tells; 0 without one; else a failure.
+
+    `TURNS_AWAY`: the step is to be taken again, shorter, with the direction of a friction let go.
+    """
     forget_found(K)
     if not judge(K, h):
         return 0
@@ -229,7 +240,10 @@ def find_event(K: Kernel, h: float, t1: float) -> int:
     if status != 0:
         return status
     if K.event_kind == STICK and K.partner[K.event_index] >= 0:
+        f = K.event_index
         status = come_to_zero(K, h, t1)
+        if status == TURNS_AWAY:
+            K.hold[f] = K.hold[K.partner[f]] = 0.0
         if status != 0:
             return status
     if K.event_kind < 0:
@@ -362,6 +376,18 @@ def judge_step(K: Kernel, h: float, full: float, t1: float, cut: bool, within: b
     event = 0
     if parts != 0 or not (quiet or looked):  # a shorter step is one of its own: what was looked at is interpolated
         event = find_event(K, h, t1)
+        for _ in range(K.n_cones):
+            if event != TURNS_AWAY:
+                break
+            h = shorter_turn(K, h)
+            status = tried_step(K, h, K.time + h)
+            if status != 0:
+                return status
+            h = K.step_taken
+            t1 = K.time + h
+            within = True
+            cut = False
+            event = find_event(K, h, t1)
         if event > 0:
             return event
     pulls = K.n_judged > 0 and event == 0 and not quiet and has_spurious_reaction(K)

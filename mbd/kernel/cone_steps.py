@@ -23,7 +23,9 @@ from mbd.kernel.restart import evaluate
 from mbd.kernel.roots import sqrt
 from mbd.kernel.trial_step import try_step
 
-__all__ = ["SHORTER", "approached_end", "come_to_zero", "slides_at_first", "slides_on"]
+__all__ = [
+    "SHORTER", "TURNS_AWAY", "approached_end", "come_to_zero", "shorter_turn", "slides_at_first", "slides_on",
+]  # fmt: skip
 
 PART = 0.5
 """Part of the time in which γ would reach zero, or turn by a radian, that a step may take [-]."""
@@ -47,6 +49,10 @@ LINE = 1e-9
 """The same where γ moves along a line: a direction that is held is that of γ then, however long it slides on [-]."""
 SHORTEST = 1e-5
 """Part of dt below which no step is shortened for this; where γ asks for less it runs into zero at any angle [-]."""
+FARTHEST = 0.25
+"""Turn of the direction that is held, from γ at the start of the step, beyond which γ turns away before zero [rad]."""
+TURNS_AWAY = -2
+"""Of `come_to_zero`: what seemed to come to rest slides on."""
 MOST_CORRECTIONS = 8
 """Corrections of a direction that is held [-]."""
 AT_REST = 1e-10
@@ -141,24 +147,41 @@ def slides_on(K: Guards) -> bool:
     return found
 
 
+def shorter_turn(K: Guards, h: float) -> float:
+    """A step of at most h in which directions that are not held turn by no more than they may."""
+    least = h
+    for f in range(K.n_frictions):
+        if K.partner[f] > f and K.slip[f] != 0.0 and K.hold[f] != HELD:
+            change = speed_of_both(K, f, K.guards0, K.at_slip_rate)
+            if change > 0.0:
+                least = min(least, PART * speed_of_both(K, f, K.guards0, K.at_slip) / change)
+    return max(least, SHORTEST * K.dt)
+
+
 def come_to_zero(K: Kernel, h: float, t1: float) -> int:
-    """After sliding was found to end, at the candidate: correct the direction that is held until γ is zero there."""
+    """After sliding was found to end, at the candidate: correct the direction that is held until γ is zero there.
+
+    `TURNS_AWAY` where no direction near that of γ leads to zero, and steps can still follow how it turns.
+    """
     f = K.event_index
     p = K.partner[f]
+    x = K.guards0[K.at_slip + f]
+    y = K.guards0[K.at_slip + p]
+    speed = sqrt(x * x + y * y)
+    given_up = TURNS_AWAY if PART * speed > SHORTEST * K.dt * speed_of_both(K, f, K.guards0, K.at_slip_rate) else 0
     last = 0.0
     turned = 0.0
+    whole = 0.0
     for turn in range(MOST_CORRECTIONS):
         left = K.slip[f] * K.guards1[K.at_slip + p] - K.slip[p] * K.guards1[K.at_slip + f]
-        x = K.guards0[K.at_slip + f]
-        y = K.guards0[K.at_slip + p]
-        speed = sqrt(x * x + y * y)
         if abs(left) <= AT_REST * speed + 1e-13:
             return 0
         angle = left / speed
         if turn > 0 and abs(last - left) > 0.0:
             angle = turned * left / (last - left)
-        if not abs(angle) < 0.5:
-            return 0
+        whole += angle
+        if not abs(angle) < 0.5 or (given_up != 0 and not abs(whole) < FARTHEST):
+            return given_up
         last = left
         turned = angle
         aim(K, f, K.slip[f] - angle * K.slip[p], K.slip[p] + angle * K.slip[f])

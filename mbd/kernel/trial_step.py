@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from mbd.kernel.charts import turns_too_far
 from mbd.kernel.codes import (
+    EPS,
     GUARDS,
     NOT_CONVERGED,
     NOT_FINITE,
 )
-from mbd.kernel.cones import HELD, sliding_force
+from mbd.kernel.cones import HELD, sliding_force, speed_of_both
 from mbd.kernel.hooks import call, scheme_step
 from mbd.kernel.records import (
     Balance,
     DependentRows,
+    Guards,
     Kernel,
 )
 from mbd.kernel.restart import (
@@ -29,6 +31,11 @@ MOST_PASSES = 60
 """Times that the end of a brief step is asked for the rates that lead there, where these change its forces much [-]."""
 SETTLED = 1e-9
 """Change of these rates, over the largest, at which they are what leads there [-]."""
+BLURRED = 1e-11
+"""Part of the terms of γ up to which it need not be known: Newton's method with one tangent for all stages goes on
+around a slow γ from there [-]."""
+MOST_BLUR = 1e-6
+"""Part of the forces that a step may miss for it at most [-]."""
 LEAP = 1e-2
 """Rate of a row at the end of a brief step, over the sum of its terms, above which it is another row [-]."""
 DEPARTED = 1e-8
@@ -42,6 +49,8 @@ def try_step(K: Kernel, h: float, t1: float) -> int:
     A scheme leaves velocities, rates and multipliers of the candidate in the block; only its positions are centered.
     """
     full = K.step
+    if K.n_cones > 0:
+        K.blur = blur_of(K)
     if h >= 1e-3 * full or (K.n_active == 0 and h >= 1e-9 * full) or K.explicit == 1:
         status = scheme_step(K, h, t1)
         if status != 0:
@@ -74,6 +83,22 @@ def try_step(K: Kernel, h: float, t1: float) -> int:
                 other = K.at_slip + (K.partner[f] if K.partner[f] >= 0 else 0)
                 K.lam1[K.friction_row[f]] = sliding_force(K, f, K.limit[f], K.guards1, K.at_slip + f, other)
     return 0
+
+
+def blur_of(K: Guards) -> float:
+    """Part of a friction in a plane that is not known: that of γ over γ, or over what stands for it at the onset.
+
+    γ may fall in a step to a part of what it is before it.
+    """
+    largest = 0.0
+    for f in range(K.n_frictions):
+        if K.partner[f] > f and K.slip[f] != 0.0 and K.hold[f] != HELD:
+            row = K.friction_row[f]
+            size = max(K.scale[K.n + K.n_rows + row], K.scale[K.n + K.n_rows + K.friction_row[K.partner[f]]])
+            least = 4.0 * K.hold[f] if K.hold[f] > 0.0 else 0.0
+            speed = speed_of_both(K, f, K.guards0, K.at_slip) + least
+            largest = max(largest, BLURRED * size / (speed + EPS * size))
+    return min(largest, MOST_BLUR)
 
 
 def share_multipliers(K: Balance, t1: float) -> int:

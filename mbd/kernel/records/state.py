@@ -30,6 +30,8 @@ class Model(SchemeAbilities):
     scale: Reals = reals(lambda s: s.n + 2 * s.n_rows, kept=True)  # magnitudes of r, h, ḣ term by term
     known: Reals = reals(lambda s: s.n + 2 * s.n_rows)  # the same before they were raised at an iterate
     weight: Reals = reals(lambda s: s.n, kept=True)  # the inverse of those of r
+    blurs: Reals = reals()
+    blur: float = place("blurs")  # part of the forces up to which friction in a plane is known in a step
     typical: Reals = reals(lambda s: s.n)  # of velocities or accelerations without rows
     row_contact: Integers = integers()  # contact of each row
     row_normal: Integers = integers()  # 1 for the normal row of a contact

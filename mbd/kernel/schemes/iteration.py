@@ -10,7 +10,8 @@ from mbd.kernel.restart import compose
 from mbd.kernel.singular.step_pairs import WHOLE
 
 __all__ = [
-    "BENT", "BYSTANDER", "LOOK_TWICE", "finish", "is_small", "overturns", "predict", "residual_size", "runs_away",
+    "BENT", "BYSTANDER", "LOOK_TWICE", "finish", "is_small", "overturns", "predict", "residual_size", "roughly",
+    "runs_away",
     "shift_growth", "soundness_at",
 ]  # fmt: skip
 
@@ -68,7 +69,10 @@ def soundness_at(K: Settings, m: int) -> int:
 
 
 def residual_size(K: Motion, o_r: int, m: int, c_C: float, c_K: float, tolerance: float, both: int) -> float:
-    """Largest residual over its tolerance: balance, h and, with `both`, ḣ, each block apart; −1 if not finite."""
+    """Largest residual over its tolerance: balance, h and, with `both`, ḣ, each block apart; −1 if not finite.
+
+    That of the balance is K.blur at least.
+    """
     size = 0.0
     finite = 0.0
     fastest = 0.0
@@ -76,7 +80,7 @@ def residual_size(K: Motion, o_r: int, m: int, c_C: float, c_K: float, tolerance
         r = abs(K.out[o_r + i])
         finite += r
         size = max(size, r * K.weight[i])
-    size /= tolerance
+    size /= max(tolerance, K.blur)
     speed = 0.0
     for i in range(K.n_v):
         fastest = max(fastest, abs(K.block[K.o_a + i]))
@@ -104,6 +108,11 @@ def residual_size(K: Motion, o_r: int, m: int, c_C: float, c_K: float, tolerance
     if not finite < 1e300:
         return -1.0
     return size
+
+
+def roughly(K: Motion) -> float:
+    """Residuals over 256 times their round-off that pass for it; over K.blur, where that is more, only what it says."""
+    return 16.0 if K.blur <= 256.0 * EPS else 1.0
 
 
 def runs_away(K: Equations, m: int) -> bool:

@@ -21,7 +21,7 @@ from mbd.kernel.restart import (
     retain_scales,
     share_loads,
 )
-from mbd.kernel.schemes.iteration import finish, overturns, residual_size, runs_away, soundness_at
+from mbd.kernel.schemes.iteration import finish, overturns, residual_size, roughly, runs_away, soundness_at
 from mbd.kernel.singular.newmark_step import WITHIN, misses, singular_newmark_step, steps_by_pivot, steps_to_singularity
 from mbd.kernel.singular.step_pairs import is_whole
 
@@ -149,7 +149,7 @@ def second_look(K: Equations, o_r: int, m: int, c_C: float, c_K: float, toleranc
         return -float(NOT_CONVERGED)
     error = residual_size(K, o_r, m, c_C, c_K, tolerance, K.stabilized)
     if error > 1.0:
-        if residual_size(K, o_r, m, 0.0, 0.0, 256.0 * EPS, K.stabilized) <= 16.0:
+        if residual_size(K, o_r, m, 0.0, 0.0, 256.0 * EPS, K.stabilized) <= roughly(K):
             if residual_size(K, o_r, 0, c_C, c_K, K.tolerance, K.stabilized) > 1.0:  # rows at round-off hold
                 error = -float(TOO_TIGHT)
             else:

@@ -20,7 +20,7 @@ from mbd.kernel.restart import (
 )
 from mbd.kernel.schemes.collocation import RADAU
 from mbd.kernel.schemes.contract import Abilities, Scheme
-from mbd.kernel.schemes.iteration import runs_away
+from mbd.kernel.schemes.iteration import roughly, runs_away
 from mbd.kernel.schemes.memory import accept_step, forget_steps, look_a_step_ahead
 from mbd.kernel.schemes.radau_end import complete
 from mbd.kernel.schemes.stage_layout import (
@@ -252,7 +252,7 @@ def judge_raised(K: Kernel, h: float, t1: float, m: int, tolerance: float, stuck
             K.failure_size = -1.0
             return NOT_CONVERGED
     rough = evaluate_stages(K, h, t1, m, 256.0 * EPS, 0.0, 0.0, False)
-    if rough <= 16.0:
+    if rough <= roughly(K):
         if evaluate_stages(K, h, t1, m, K.tolerance, c, c * c, False) > 1.0:
             return TOO_TIGHT
         K.n_stagnations += 1

@@ -45,12 +45,14 @@ class MechanismSystem(System):
         sticks: Any,
         slip: Any,
         hold: Any = None,
+        blurs: Any = (0.0,),
     ) -> None:
         self.mechanism, self.manager = mechanism, manager
         self.parameters, self.anchors, self.stabilized = parameters, anchors, stabilized
         self.dropped = dropped  # rows that depend on others, 1 each
         self.sticks, self.slip = sticks, slip[: mechanism.layout.n_frictions]  # of frictions
         self.hold = np.zeros(len(self.slip)) if hold is None else hold
+        self.blurs = blurs  # part of the forces that is round-off
         self.pairs = np.array([friction.partner >= 0 for friction in manager.frictions], dtype=bool)
         self.rubs = any(contact.drags and contact.rows for contact in mechanism.equations.contacts)
         self.evaluated: Vector | None = None  # the inputs evaluated last, to explain a failure with
@@ -153,6 +155,7 @@ class MechanismSystem(System):
             velocity if velocity.any() else None,
             turning if turning is None else np.where(velocity[:, None], 0.0, turning),
             bool(given_rows),
+            float(self.blurs[0]),
         )
 
     def _block(self, point: Point, rows: Sequence[int], penalties: Sequence[int]) -> Vector:

@@ -81,7 +81,7 @@ class Stepper:
         self.kernel.chunk, self.kernel.end = 1, float(options.get("end", 0.0))
         self.system = MechanismSystem(
             mechanism, manager, self.kernel.params, self.kernel.anchors, self.stabilized, self.kernel.dropped,
-            self.kernel.sticks, self.kernel.slip, self.kernel.hold,
+            self.kernel.sticks, self.kernel.slip, self.kernel.hold, self.kernel.blurs,
         )  # fmt: skip
         alone = isinstance(integrator, CompiledIntegrator)
         self.scheme: Any = KernelScheme(self.own) if alone else PlainScheme(integrator, self.system, manager)
