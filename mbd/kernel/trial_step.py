@@ -14,8 +14,10 @@ from mbd.kernel.hooks import call, scheme_step
 from mbd.kernel.records import (
     Balance,
     DependentRows,
+    Frictions,
     Guards,
     Kernel,
+    Motion,
 )
 from mbd.kernel.restart import (
     compose,
@@ -152,7 +154,7 @@ def brief_step(K: Balance, h: float, t1: float) -> int:
     return 0
 
 
-def turns(K: Balance) -> bool:
+def turns(K: Frictions) -> bool:
     """Whether something slides in a plane whose friction follows γ within the step."""
     found = False
     if K.n_cones > 0:
@@ -171,7 +173,7 @@ def settled(K: Balance) -> bool:
     return change <= SETTLED * largest
 
 
-def leaps(K: Balance) -> bool:
+def leaps(K: Motion) -> bool:
     """Whether velocities miss the rows by as much as they are: these have another direction at the candidate.
 
     That of a thin disk's lowest point turns around as the disk comes to lie flat.

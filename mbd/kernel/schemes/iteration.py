@@ -5,7 +5,7 @@ from __future__ import annotations
 from mbd.kernel.codes import EPS
 from mbd.kernel.cones import fill_slips
 from mbd.kernel.hooks import call
-from mbd.kernel.records import Equations, Motion, Settings, SingularSteps, Steps
+from mbd.kernel.records import Equations, Model, Motion, Settings, SingularSteps, Steps
 from mbd.kernel.restart import compose
 from mbd.kernel.singular.step_pairs import WHOLE
 
@@ -110,7 +110,7 @@ def residual_size(K: Motion, o_r: int, m: int, c_C: float, c_K: float, tolerance
     return size
 
 
-def roughly(K: Motion) -> float:
+def roughly(K: Model) -> float:
     """Residuals over 256 times their round-off that pass for it; over K.blur, where that is more, only what it says."""
     return 16.0 if K.blur <= 256.0 * EPS else 1.0
 
