@@ -166,11 +166,11 @@ def _facings(scope: DerivationContext, constraints: Laws) -> tuple[Facing, ...]:
             S, _ = joint.transform(joint.recover(R, p, scope), scope)
             trace = sum((dot(a, b) for a, b in zip(S, R, strict=True)), scope.tape.zero)
             found.append(Facing(joint.name, rows, scope.real(0.5 * (trace - 1.0))))
-    for (name, k), number in scope.carried.items():
+    for name, k in scope.carried:
         joint = next(each for each in scope.cuts if each.name == name)
         part = f"turns of {joint.labels[k].name}"
         row = next(i for i, each in enumerate(constraints.rows) if (each.owner, each.part) == (name, part))
-        off = scope.read(joint)[k] - scope.composed[number]
+        off = scope.read(joint)[k] - scope.own_angle(name, k)
         found.append(Facing(f"{name}.{joint.labels[k].name}", (row,), scope.real(cos(off))))
     return tuple(found)
 

@@ -81,7 +81,7 @@ class DerivationContext(ParameterScope):
         self._joints: dict[str, JointMotion] = {}
         self.bodies = self._grown(ground)
         values: list[Scalar] = [node for joint in tree for node in self._tree_motion(joint).coordinates]
-        values += [self._own_angle(*key) for key in self.carried]
+        values += [self.own_angle(*key) for key in self.carried]
         self.composed = tuple(self.tape.lift(value) for value in values)
         self.placement = Placement(self.tape, list(self.bodies.values()), self.composed)
         self.views = KinematicProxies(self.placement, self.composed, planar)
@@ -145,7 +145,7 @@ class DerivationContext(ParameterScope):
         known = self.configuration
         return tuple(Coordinate(*each) for each in zip(known.names, known.units, known.defaults, strict=True))
 
-    def _own_angle(self, joint: str, place: int) -> Node:
+    def own_angle(self, joint: str, place: int) -> Node:
         """An angle of a cut joint that is a coordinate of its own."""
         k = self.carried[joint, place]  # behind the coordinates of the tree
         return self.inputs.q[k - len(self.inputs.v)] + self.inputs.x[k]
@@ -185,7 +185,7 @@ class DerivationContext(ParameterScope):
                 values[place] = self.tape.lift(angle)
             for k in range(len(values)):
                 if (name, k) in self.carried:
-                    values[k] = self._own_angle(name, k)
+                    values[k] = self.own_angle(name, k)
             known = self._joints[name] = JointMotion(tuple(values), tuple(rates))
         return known
 
@@ -227,7 +227,7 @@ class DerivationContext(ParameterScope):
             rows = [(part, self.tape.lift(angle) if self._holds_turn(part, value) else value) for part, value in rows]
         own = [k for k in range(len(joint.labels)) if (joint.name, k) in self.carried]
         shown = self.read(joint) if own else []
-        rows += [(f"turns of {joint.labels[k].name}", sin(shown[k] - self._own_angle(joint.name, k))) for k in own]
+        rows += [(f"turns of {joint.labels[k].name}", sin(shown[k] - self.own_angle(joint.name, k))) for k in own]
         return rows, level
 
     def _holds_turn(self, part: str, value: Node) -> bool:

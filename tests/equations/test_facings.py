@@ -11,7 +11,7 @@ from mbd.compile.mechanisms import mechanism_of
 from mbd.results.columns import ModelColumns
 from mbd.results.violation import violation
 from mbd.simulation.run.stored import whole_record
-from tests.forward_kinematics import misfit, placed, poses, relative
+from tests.forward_kinematics import beyond, misfit, placed, poses, relative
 
 KINDS = ["Weld", "Prismatic", "Revolute", "Cylindrical", "Translation", "Screw", "Universal"]
 
@@ -139,3 +139,24 @@ def test_a_run_that_is_the_wrong_way_round_for_a_while_only_is_refused(monkeypat
     monkeypatch.setattr("mbd.simulation.run.run.whole_record", turned_over)
     with pytest.raises(mbd.SimulationError, match=r"t = 0\.04 s: 'slide' was turned by half a turn"):
         mbd.simulate(model, start, **settings)
+
+
+@pytest.mark.parametrize("cut", [["hinge"], "all"], ids=str)
+@pytest.mark.parametrize("angle", [-2.34, 2.9])
+def test_an_angle_that_is_a_coordinate_of_its_own_is_the_one_that_its_bodies_show(cut, angle):
+    """A loop of two ball joints and a hinge, whose angle its spring knows by a row that holds a sine."""
+    model = mbd.Model("ball, hinge, ball", cut=cut)
+    a, b = (mbd.RigidBody(name, 1.0, (0.2, 0.3, 0.25)) for name in "ab")
+    hinge = mbd.Revolute("hinge", a.point(0.5, 0.1, 0.0), b.point(-0.4, 0.0, 0.1), axis=(0.2, 0.3, 1.0), stiffness=3.0)
+    R, p = beyond(hinge, (np.eye(3), np.zeros(3)), {"angle": angle})
+    model.connect(
+        mbd.Spherical("left", model.ground.origin, a.origin), hinge,
+        mbd.Spherical("right", model.ground.point(*p), b.origin),
+    )  # fmt: skip
+    named = {"left.orientation": (1.0, 0.0, 0.0, 0.0), "right.orientation": R, "hinge.angle": angle}
+    start = mbd.assemble(model, named, {"left.angular_velocity": (0.3, 0.2, 0.1)}, project=True)
+    run = mbd.simulate(model, start, dt=1e-3, until=2e-3)
+    assert run["hinge.angle"][0] == pytest.approx(angle, abs=1e-9)
+    assert run["hinge.angle"] == pytest.approx(angle, abs=0.1)
+    guessed = mbd.assemble(model, {name: named[name] for name in ("left.orientation", "right.orientation")})
+    assert np.cos(guessed["hinge.angle"] - angle) == pytest.approx(1.0)
