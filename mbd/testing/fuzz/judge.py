@@ -20,6 +20,8 @@ __all__ = ["Judgement", "judge"]
 
 MOST = 48
 """Rows at which forces are balanced, at most."""
+BRIEFEST = 3e-7
+"""Duration of steps [s] in which round-off of positions of a metre is a velocity of 10⁻⁹ m/s."""
 SHARE = 1e-6
 """What the balance of a body may miss at a row, where Newton's method ends, over the sum of its terms [-]."""
 
@@ -134,7 +136,7 @@ def between(run: mbd.Trajectory, model: mbd.Model, parameters: Mapping[str, floa
     in a plane, by what that turns.
     """
     time = run.time
-    steps_of = np.flatnonzero(np.diff(time) > 0.0)
+    steps_of = np.flatnonzero(np.diff(time) > BRIEFEST)
     if run.settings["contact"] == "nonsmooth" or len(steps_of) < 4:
         return Judgement((), {})
     some = steps_of[np.unique(np.linspace(0, len(steps_of) - 1, 12).astype(int))]

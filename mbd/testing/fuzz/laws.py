@@ -22,6 +22,8 @@ HELD = 1e-7
 """What rows may miss, over the size of the mechanism [-]."""
 ROUND_OFF = 1e-15
 """That of the entries of a rotation matrix, from which orientations are read [-]."""
+KINK = 1e4
+"""Of `Gap.blur`: g has a kink from there on [-]."""
 EQUAL = 1e-9
 """What two ways to compute one number may differ by, over what it is made of [-]."""
 
@@ -202,7 +204,7 @@ def contacts(found: Faults, bodies: Bodies, acting: Loads, run: Any) -> None:
         )
         found.small("an open contact is without force", word.name, force, 0.0, ~closed)
         if isinstance(word, mbd.Penalty):
-            _force_law(found, word, gap.value, rate, bodies)
+            _force_law(found, word, gap, rate, bodies)
             continue
         mentioned = f"{word.name!r}" in notes
         if word.opens_on == "pull":
@@ -232,9 +234,9 @@ def contacts(found: Faults, bodies: Bodies, acting: Loads, run: Any) -> None:
         _joint_friction(found, joint, bodies, largest, located)
 
 
-def _force_law(found: Faults, word: mbd.Penalty, gap: Array, rate: Array, bodies: Bodies) -> None:
-    """p = k δⁿ + c δ̇ of a penalty without a restitution of its own."""
-    told = bodies.told
+def _force_law(found: Faults, word: mbd.Penalty, measured: Any, rate: Array, bodies: Bodies) -> None:
+    """p = k δⁿ + c δ̇ of a penalty without a restitution of its own, but at kinks of g, where ġ jumps."""
+    told, gap, smooth = bodies.told, measured.value, measured.blur < KINK + np.zeros(len(bodies.told))
     force, closed = told[f"{word.name}.force"], told.closed[word.name]
     if word.opens_on == "pull":
         found.small(
@@ -242,6 +244,7 @@ def _force_law(found: Faults, word: mbd.Penalty, gap: Array, rate: Array, bodies
             word.name,
             np.minimum(force, 0.0),
             1e-6 * np.max(np.abs(force), initial=1.0),
+            smooth,
         )
     if word.chi is not None:
         return
@@ -249,7 +252,7 @@ def _force_law(found: Faults, word: mbd.Penalty, gap: Array, rate: Array, bodies
     pressed = stiffness * np.maximum(-gap, 0.0) ** word.exponent
     off = np.where(closed, pressed - damping * rate, 0.0) - force
     scale = np.abs(pressed) + np.abs(damping * rate) + stiffness * 1e-9
-    found.small("force law of a penalty", word.name, off, 1e-7 * scale, closed & (gap < 0.0))
+    found.small("force law of a penalty", word.name, off, 1e-7 * scale, closed & (gap < 0.0) & smooth)
 
 
 def _sliding(gap: Any, bodies: Bodies) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -48,12 +49,14 @@ def ball_gap(measure: Any, bodies: Bodies) -> Gap:
 
 
 def edge_gap(center: Frame, radius: float, axis: Any, plane: Any, bodies: Bodies) -> Gap:
-    """n · s_C − r |n × a|: the lowest point of the edge, ``C + r ((n·a) a − n)/|n × a|``, over the plane."""
+    """n · s_C − r |n × a|, at the lowest point of the edge ``C + r ((n·a) a − n)/|n × a|``; flat, at any one."""
     H = bodies.frame(center).H
     a, n = H[:, :3, :3] @ np.asarray(axis), _axes(plane, bodies) @ np.asarray(plane.normal)
-    steep = np.linalg.norm(np.cross(n, a), axis=1)[:, None]
-    lowest = H[:, :3, 3] + radius * (np.sum(n * a, axis=1)[:, None] * a - n) / steep
-    return over_plane(center.body.name, lowest, plane, bodies)
+    steep = np.linalg.norm(np.cross(n, a), axis=1)
+    lowest = H[:, :3, 3] + radius * (np.sum(n * a, axis=1)[:, None] * a - n) / steep[:, None]
+    gap = over_plane(center.body.name, lowest, plane, bodies)
+    middle = over_plane(center.body.name, H[:, :3, 3], plane, bodies)
+    return replace(gap, value=middle.value - radius * steep, blur=1.0 / np.sqrt(steep))
 
 
 def turning_gap(measure: Any, bodies: Bodies) -> Gap:

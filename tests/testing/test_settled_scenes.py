@@ -1,0 +1,31 @@
+"""Scenes in space with contacts that a judge once called bad, each for another reason, keep the laws or end by name."""
+
+from __future__ import annotations
+
+import pytest
+
+from mbd.testing.fuzz.verdict import verdict
+
+SETTLED = {
+    2002301: "friction that turns and loads a disk as it comes to rest",
+    2002333: "a ball that grips while friction turns",
+    2002173: "dense output of a step that takes one direction of friction",
+    2002237: "a disk that falls flat",
+    2002243: "a twist next to half a turn",
+    2010461: "friction as sliding begins",
+    2010525: "a disk on springs that passes flat",
+    2010788: "dense output of steps of nanoseconds",
+    2011901: "what nearly rests and turns around",
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", SETTLED)
+def test_settled_scenes_stay_settled(number):
+    told = verdict(number)
+    assert told["kind"] != "bad", told["reasons"]
+
+
+@pytest.mark.slow
+def test_a_part_of_a_step_to_rest_follows_the_direction():
+    assert not [reason for reason in verdict(2011076)["reasons"] if "sliding friction" in reason]
