@@ -371,12 +371,6 @@ def judge_step(K: Kernel, h: float, full: float, t1: float, cut: bool, within: b
         h = abs(parts) * h / K.n_substeps
         t1 = K.time + h
         status = try_step(K, h, t1)
-        if status == 0 and K.n_cones > 0 and K.strategy == 0 and slides_on(K):
-            K.in_substeps = 0  # the part ends before the rest for which a direction is held: it follows γ
-            h = shorter_turn(K, h)
-            status = tried_step(K, h, K.time + h)
-            h = K.step_taken
-            t1 = K.time + h
         if status != 0:
             return status
     event = 0

@@ -252,7 +252,8 @@ def _force_law(found: Faults, word: mbd.Penalty, measured: Any, rate: Array, bod
     pressed = stiffness * np.maximum(-gap, 0.0) ** word.exponent
     off = np.where(closed, pressed - damping * rate, 0.0) - force
     scale = np.abs(pressed) + np.abs(damping * rate) + stiffness * 1e-9
-    found.small("force law of a penalty", word.name, off, 1e-7 * scale, closed & (gap < 0.0) & smooth)
+    turned = ROUND_OFF * (stiffness * measured.blur**2 + damping * (1.0 + np.abs(rate)) * measured.blur**3)
+    found.small("force law of a penalty", word.name, off, 1e-7 * scale + turned, closed & (gap < 0.0) & smooth)
 
 
 def _sliding(gap: Any, bodies: Bodies) -> Array:
