@@ -33,9 +33,8 @@ MOST_PASSES = 60
 """Times that the end of a brief step is asked for the rates that lead there, where these change its forces much [-]."""
 SETTLED = 1e-9
 """Change of these rates, over the largest, at which they are what leads there [-]."""
-BLURRED = 1e-11
-"""Part of the terms of γ up to which it need not be known: Newton's method with one tangent for all stages goes on
-around a slow γ from there [-]."""
+BLURRED = 256.0 * EPS
+"""Part of the terms of γ below which it is round-off [-]."""
 MOST_BLUR = 1e-6
 """Part of the forces that a step may miss for it at most [-]."""
 LEAP = 1e-2
