@@ -23,7 +23,7 @@ from mbd.kernel.active_set import ActiveSetManager
 from mbd.tape.derivatives import gradient, live
 from mbd.tape.node import Node
 
-__all__ = ["manager_of", "trivial_rows"]
+__all__ = ["DOUBTFUL", "NEGLIGIBLE", "manager_of", "parts_of_row", "trivial_rows"]
 
 POSES = 3
 """Positions at which rows are looked at [-]."""
@@ -123,14 +123,14 @@ def _sizes(mechanism: Mechanism, rows: tuple[int, ...]) -> ScalarFunction:
     known = mechanism.named.get(key)
     if known is None:
         with mechanism.equations.tape.lock:
-            nodes = [node for k in rows for node in _parts(mechanism.equations, k)]
+            nodes = [node for k in rows for node in parts_of_row(mechanism.equations, k)]
             known = mechanism.named[key] = scalar_function(nodes, mechanism.layout, "row_sizes")
     function: ScalarFunction = known
     return function
 
 
-def _parts(equations: Equations, k: int) -> list[Node]:
-    """Those of one row; of equations without bodies by the terms of its derivatives."""
+def parts_of_row(equations: Equations, k: int) -> list[Node]:
+    """Σ|parts| of the derivative of a row by each x_j, or v_j; of equations without bodies by the terms of it."""
     if equations.geometry is not None:
         return equations.geometry.row_sizes(k)
     row = equations.rows[k]

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
+from mbd.assembly.trivial_rows import DOUBTFUL, NEGLIGIBLE, parts_of_row
 from mbd.compile.python import ArrayFunction, array_function
 from mbd.equations import programs
 from mbd.equations.equations import Equations
@@ -193,9 +194,27 @@ class Balance:
         same = np.all(record.closed == closed, axis=1) & np.all(record.phase == phase, axis=1)
         places = np.flatnonzero(same)
         chosen = places[np.linspace(0, len(places) - 1, min(len(places), SAMPLES)).astype(np.intp)]
-        M, _, _, B, *_ = self._terms_at(self.states.rows.part(chosen))
+        there = self.states.rows.part(chosen)
+        M, _, _, B, *_ = self._terms_at(there)
+        every = self._acting(every, there, B)
         independent = _independent(B[:, every] / _weights(M))
         return _Held(every, [every[k] for k in independent])
+
+    def _acting(self, every: list[int], rows: Rows, B: Any) -> list[int]:
+        """The rows whose Jacobian is more than round-off of its parts: redundant parts of joints on one axis are not."""
+        largest = np.max(np.abs(B), axis=(0, 2), initial=0.0)
+        bound = DOUBTFUL * max(1.0, float(np.max(largest, initial=0.0)))
+        doubtful = [k for k in every if largest[k] <= bound]
+        if not doubtful:
+            return every
+        with self.equations.tape.lock:
+            parts = [node for k in doubtful for node in parts_of_row(self.equations, k)]
+        sizes = np.array(self.states.evaluate(parts, rows)).reshape(len(doubtful), -1, len(rows))
+        n_v = self.equations.n_v
+        trivial = {
+            k for k, size in zip(doubtful, sizes, strict=True) if np.all(np.abs(B[:, k, :n_v]) <= NEGLIGIBLE * size.T)
+        }
+        return [k for k in every if k not in trivial]
 
 
 def _weights(M: Any) -> Any:
