@@ -231,7 +231,7 @@ def passes_events(K: Kernel, h: float) -> bool:
 def find_event(K: Kernel, h: float, t1: float) -> int:
     """−1 with the candidate at the first event of the step, which K.fired tells; 0 without one; else a failure.
 
-    `TURNS_AWAY`: the step is to be taken again, shorter, with the direction of a friction let go.
+    `TURNS_AWAY`: the step is to be taken again, shorter, with fewer directions that are held.
     """
     forget_found(K)
     if not judge(K, h):
@@ -240,14 +240,11 @@ def find_event(K: Kernel, h: float, t1: float) -> int:
     if status != 0:
         return status
     if K.event_kind == STICK and K.partner[K.event_index] >= 0:
-        f = K.event_index
         status = come_to_zero(K, h, t1)
-        if status == TURNS_AWAY:
-            K.hold[f] = K.hold[K.partner[f]] = 0.0
         if status != 0:
             return status
     if K.event_kind < 0:
-        return 0
+        return TURNS_AWAY if K.strategy == 0 and slides_on(K) else 0
     if K.strategy == 1 and closes_below_surface(K):  # the contact comes first
         return try_step(K, h, t1)
     return AT_POSE if refuses(K, K.event_after) else -1
@@ -375,8 +372,9 @@ def judge_step(K: Kernel, h: float, full: float, t1: float, cut: bool, within: b
             return status
     event = 0
     if parts != 0 or not (quiet or looked):  # a shorter step is one of its own: what was looked at is interpolated
-        event = find_event(K, h, t1)
-        for _ in range(K.n_cones):
+        ahead = parts != 0 and K.strategy == 0 and slides_on(K)  # these parts end before what slides comes to rest
+        event = TURNS_AWAY if ahead else find_event(K, h, t1)
+        for _ in range(K.n_cones):  # each time one more direction is held no longer
             if event != TURNS_AWAY:
                 break
             h = shorter_turn(K, h)
@@ -387,7 +385,7 @@ def judge_step(K: Kernel, h: float, full: float, t1: float, cut: bool, within: b
             t1 = K.time + h
             within = True
             cut = False
-            event = find_event(K, h, t1)
+            event = TURNS_AWAY if slides_on(K) else find_event(K, h, t1)
         if event > 0:
             return event
     pulls = K.n_judged > 0 and event == 0 and not quiet and has_spurious_reaction(K)

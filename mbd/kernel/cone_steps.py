@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from mbd.kernel.codes import STICK
 from mbd.kernel.cone_directions import mass_of
-from mbd.kernel.cones import HELD, ONSET, aim, speed_of_both
+from mbd.kernel.cones import HELD, ONSET, aim, along, speed_of_both
 from mbd.kernel.contact_modes import STILL
 from mbd.kernel.guards import judge
 from mbd.kernel.locate import locate
@@ -55,6 +55,10 @@ TURNS_AWAY = -2
 """Of `come_to_zero`: what seemed to come to rest slides on."""
 MOST_CORRECTIONS = 8
 """Corrections of a direction that is held [-]."""
+TOGETHER = 0.02
+"""Part of its speed before the step at which another pair rests at the same instant [-]."""
+NOTHING = 1e-200
+"""What is added to a speed that may be zero [m/s]."""
 AT_REST = 1e-10
 """Speed across the direction that is held that counts as none, over ‖γ̇‖ dt [-]."""
 
@@ -159,32 +163,41 @@ def shorter_turn(K: Guards, h: float) -> float:
 
 
 def come_to_zero(K: Kernel, h: float, t1: float) -> int:
-    """After sliding was found to end, at the candidate: correct the direction that is held until γ is zero there.
+    """After sliding was found to end, at the candidate: correct directions that are held until γ is zero there.
 
-    `TURNS_AWAY` where no direction near that of γ leads to zero, and steps can still follow how it turns.
+    Feet of one body come to rest together: all directions turn by ω times what is left across them over γ before the
+    step, with ω by Aitken's relaxation, which is the secant method for one (Irons & Tuck 1969). `TURNS_AWAY` where no
+    directions near those of γ lead to zero, and steps can still follow how they turn, and where another pair that is
+    held slides on: it is not held in a shorter step.
     """
-    f = K.event_index
-    p = K.partner[f]
-    x = K.guards0[K.at_slip + f]
-    y = K.guards0[K.at_slip + p]
-    speed = sqrt(x * x + y * y)
-    given_up = TURNS_AWAY if PART * speed > SHORTEST * K.dt * speed_of_both(K, f, K.guards0, K.at_slip_rate) else 0
-    last = 0.0
-    turned = 0.0
+    given_up = TURNS_AWAY if may_follow(K, K.event_index) else 0
+    relaxation = 1.0
     whole = 0.0
     for turn in range(MOST_CORRECTIONS):
-        left = K.slip[f] * K.guards1[K.at_slip + p] - K.slip[p] * K.guards1[K.at_slip + f]
-        if abs(left) <= AT_REST * speed + 1e-13:
-            return 0
-        angle = left / speed
-        if turn > 0 and abs(last - left) > 0.0:
-            angle = turned * left / (last - left)
+        f = K.event_index
+        product = 0.0
+        square = 0.0
+        largest = 0.0
+        for g in range(K.n_frictions):
+            if is_held(K, g):
+                speed = speed_of_both(K, g, K.guards0, K.at_slip)
+                left = across(K, g)
+                largest = max(largest, abs(left) / (AT_REST * speed + 1e-13))
+                change = left / (speed + NOTHING) - K.across[g]
+                product += K.across[g] * change
+                square += change * change
+                K.across[g] = left / (speed + NOTHING)
+        if largest <= 1.0:
+            break
+        if turn > 0 and square > 0.0:
+            relaxation *= -product / square
+        angle = relaxation * K.across[f]
         whole += angle
         if not abs(angle) < 0.5 or (given_up != 0 and not abs(whole) < FARTHEST):
+            if given_up != 0:
+                K.hold[f] = K.hold[K.partner[f]] = 0.0
             return given_up
-        last = left
-        turned = angle
-        aim(K, f, K.slip[f] - angle * K.slip[p], K.slip[p] + angle * K.slip[f])
+        turn_directions(K, relaxation)
         status = try_step(K, h, t1)
         if status != 0:
             return status
@@ -194,6 +207,44 @@ def come_to_zero(K: Kernel, h: float, t1: float) -> int:
         status = locate(K, h)
         if status != 0:
             return status
-        if K.event_kind != STICK or K.event_index != f:
+        if K.event_kind != STICK or not is_held(K, K.event_index):
             return 0
-    return 0
+    return TURNS_AWAY if given_up != 0 and another_slides_on(K, K.event_index) else 0
+
+
+def may_follow(K: Guards, f: int) -> bool:
+    """Whether steps can still be short enough to follow how γ of f and its partner turns."""
+    speed = speed_of_both(K, f, K.guards0, K.at_slip)
+    return bool(PART * speed > SHORTEST * K.dt * speed_of_both(K, f, K.guards0, K.at_slip_rate))
+
+
+def is_held(K: Frictions, f: int) -> bool:
+    """Whether f stands for a pair that slides in a direction that is held."""
+    return bool(K.partner[f] > f and K.slip[f] != 0.0 and K.hold[f] == HELD)
+
+
+def across(K: Guards, f: int) -> float:
+    """γ of the candidate across the direction in which f and its partner slide."""
+    p = K.partner[f]
+    return float(K.slip[f] * K.guards1[K.at_slip + p] - K.slip[p] * K.guards1[K.at_slip + f])
+
+
+def turn_directions(K: Frictions, relaxation: float) -> None:
+    """Turn all that are held towards what is left across them."""
+    for f in range(K.n_frictions):
+        if is_held(K, f):
+            p = K.partner[f]
+            angle = min(max(relaxation * K.across[f], -FARTHEST), FARTHEST)
+            aim(K, f, K.slip[f] - angle * K.slip[p], K.slip[p] + angle * K.slip[f])
+
+
+def another_slides_on(K: Guards, event: int) -> bool:
+    """Whether a pair that is held slides on where another one has come to rest; it is held no longer then."""
+    found = False
+    for f in range(K.n_frictions):
+        if is_held(K, f) and f != event and may_follow(K, f):
+            left = along(K, f, K.guards1[K.at_slip + f], K.guards1[K.at_slip + K.partner[f]])
+            if left > TOGETHER * speed_of_both(K, f, K.guards0, K.at_slip):
+                K.hold[f] = K.hold[K.partner[f]] = 0.0
+                found = True
+    return found

@@ -12,6 +12,7 @@ SETTLED = {
     2002173: "dense output of a step that takes one direction of friction",
     2002237: "a disk that falls flat",
     2002243: "a twist next to half a turn",
+    2003276: "parts of a step that end before a foot comes to rest",
     2010461: "friction as sliding begins",
     2010515: "a spring at a stop of twist next to half a turn",
     2010525: "a disk on springs that passes flat",

@@ -55,6 +55,7 @@ class Frictions(Contacts):
     slip: Reals = reals(lambda s: s.n_frictions, kept=True)  # sign of sliding; of two directions its cosines
     hold: Reals = reals(lambda s: s.n_frictions, kept=True)  # how much of these counts: see `mbd.kernel.cones`
     lean: Reals = reals(lambda s: s.n_frictions, kept=True)  # the direction in which each slid last
+    across: Reals = reals(lambda s: s.n_frictions)  # γ left across directions that are held, over γ before the step
     limit: Reals = reals(lambda s: s.n_frictions)  # largest friction
     base_limit: Reals = reals(lambda s: s.n_frictions)  # the same at zero multipliers
 
