@@ -17,7 +17,7 @@ import pytest
 import mbd
 from mbd.hardcases.redundant_rows import bricard
 from mbd.hardcases.schemes import SCHEMES
-from mbd.testing.fuzz.judge import between
+from mbd.testing.fuzz import judge
 from mbd.testing.fuzz.structures import SPACE, structure
 from tests.mechanisms_between_rows import KINDS
 
@@ -173,7 +173,7 @@ def test_between_explicit_steps_of_a_loop_in_a_tilted_plane_the_laws_hold(number
     start = mbd.assemble(form.model, form.position, project=True)
     for until in 0.15, 0.22:
         run = mbd.simulate(form.model, start, mbd.RungeKutta853(), dt=1e-2, until=until)
-        assert between(run, form.model).faults == ()
+        assert judge.between(run, form.model).faults == ()
 
 
 def test_forces_between_rows_of_a_stiff_mechanism_stay_with_the_rows():

@@ -13,6 +13,7 @@ from mbd.kernel.codes import (
     OPEN_FORCE,
     OPEN_GAP,
     OPEN_PULL,
+    PRESS,
     SLIP,
     STICK,
     STICK_BRIEF,
@@ -223,7 +224,7 @@ def guard_rate(K: Guards, kind: int, index: int) -> float:
 
 
 def find_way(K: Kernel, kind: int, index: int, high: float) -> float:
-    """Distance at which what began just now, sliding or parting, is seen by shorter steps than one that misses it.
+    """Distance at which what began just now (sliding, parting, a pull) is seen by steps shorter than one that does not.
 
     0 if none sees it; − status if a step fails.
     """
@@ -265,7 +266,7 @@ def bracket(K: Kernel, kind: int, index: int, low: float, high: float) -> int:
     else:
         event_at_start(K)
     f_low = guard_value(K, kind, index, t + low)
-    if f_low <= 0.0 and (kind == STICK or kind == CLOSE):
+    if f_low <= 0.0 and (kind == STICK or kind == CLOSE or kind == PRESS):
         low = find_way(K, kind, index, high)
         if low < 0.0:
             return int(-low)

@@ -24,13 +24,15 @@ from mbd.kernel.saddle import solve_rows
 
 __all__ = [
     "active_rows", "add_shares", "capture", "compose", "consistent", "displace", "evaluate", "evaluate_loaded",
-    "fill_block", "holds_rows", "largest_force", "limit_of", "load_accelerations", "lower_scales", "measure_accepted",
-    "minimum_norm_multipliers", "note_scales", "raise_scales", "refresh_scales", "restore_scales", "retain_scales",
-    "row_speed", "share_loads", "stepping_rows", "take_consistent",
+    "fill_block", "holds_rows", "largest_force", "limit_of", "load_accelerations", "lower_scales", "lower_to_step",
+    "measure_accepted", "minimum_norm_multipliers", "note_scales", "raise_scales", "refresh_scales", "restore_scales",
+    "retain_scales", "row_speed", "share_loads", "stepping_rows", "take_consistent",
 ]  # fmt: skip
 
 FAR_ABOVE = 100.0
 """Magnitudes over those of the accepted state above which they are lowered again, and the most in one step [-]."""
+UNCONFIRMED = 1e4
+"""Magnitudes of a start over those of its first step above which they are not confirmed [-]."""
 ROW_GROWTH = 16.0
 """Most by which the terms of a row may grow in a step: beyond that an iterate was thrown far away [-]."""
 SETTLED_LOADS = 1e-6
@@ -109,19 +111,25 @@ def refresh_scales(K: Model) -> None:
         K.scale[K.n + K.n_rows + k] = max(K.scale[K.n + K.n_rows + k], speed)
 
 
-def measure_accepted(K: Mechanism) -> None:
-    """The block and magnitudes at the accepted state.
+def measure_accepted(K: DependentRows) -> None:
+    """The block and magnitudes at the accepted state."""
+    fill_block(K, K.time, K.q, K.y)
+    measure(K)
+
+
+def measure(K: Equations) -> None:
+    """Magnitudes at the state now in the block.
 
     Where nothing acts, forces are measured by what a velocity does not notice in a step: they must not be zero, beside
     which round-off would be large.
     """
-    fill_block(K, K.time, K.q, K.y)
     for i in range(K.n_v):
-        unseen = EPS * abs(K.y[i]) / K.dt
-        if abs(K.rate[i]) < unseen:
+        K.work[i] = K.block[K.o_a + i]
+        unseen = EPS * abs(K.block[K.o_v + i]) / K.dt
+        if abs(K.work[i]) < unseen:
             K.block[K.o_a + i] = unseen
     refresh_scales(K)
-    K.block[K.o_a : K.o_a + K.n_v] = K.rate[: K.n_v]
+    K.block[K.o_a : K.o_a + K.n_v] = K.work[: K.n_v]
 
 
 def weigh(K: Model) -> None:
@@ -175,16 +183,33 @@ def retain_scales(K: Model) -> None:
             K.scales_raised = 1
 
 
+def lower_to_step(K: Equations) -> bool:
+    """Magnitudes of a start down to those of the first candidate, in the block, where they were far above these.
+
+    In a pose in which a force has no limit, such as that of a disk that passes flat, its terms excuse any residual.
+    """
+    K.scales_of_start = 0
+    note_scales(K)
+    measure(K)
+    lowered = False
+    for i in range(K.n + 2 * K.n_rows):
+        bound = UNCONFIRMED * K.scale[i] if i < K.n else K.known[i]
+        lowered = lowered or bound < K.known[i]
+        K.scale[i] = min(bound, K.known[i])
+    weigh(K)
+    return lowered
+
+
 def lower_scales(K: DependentRows) -> None:
     """Magnitudes of forces down towards those of the accepted state, by a hundred at most.
 
     After a moment of huge forces residuals are judged too mildly otherwise.
     """
-    K.work[: K.n] = K.scale[: K.n]
+    note_scales(K)
     measure_accepted(K)
     K.scales_raised = 0
     for i in range(K.n):
-        floor = K.work[i] / FAR_ABOVE
+        floor = K.known[i] / FAR_ABOVE
         if floor > K.scale[i]:
             K.scale[i] = floor
             K.scales_raised = 1

@@ -201,7 +201,7 @@ class Balance:
         return _Held(every, [every[k] for k in independent])
 
     def _acting(self, every: list[int], rows: Rows, B: Any) -> list[int]:
-        """The rows whose Jacobian is more than round-off of its parts: redundant parts of joints on one axis are not."""
+        """The rows whose Jacobian exceeds round-off of its parts; redundant ones of joints on one axis are not."""
         largest = np.max(np.abs(B), axis=(0, 2), initial=0.0)
         bound = DOUBTFUL * max(1.0, float(np.max(largest, initial=0.0)))
         doubtful = [k for k in every if largest[k] <= bound]

@@ -51,6 +51,7 @@ def newmark_start(K: Kernel) -> int:
             K.slope[i] = 0.0
             K.aux[i] = K.rate[i]
     look_a_step_ahead(K)
+    K.scales_of_start = 1
     return 0
 
 

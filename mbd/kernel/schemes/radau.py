@@ -12,6 +12,7 @@ from mbd.kernel.codes import EPS, NOT_CONVERGED, NOT_FINITE, PASSING, SINGULAR, 
 from mbd.kernel.records import Kernel, Settings, SingularSteps, Steps
 from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import (
+    lower_to_step,
     measure_accepted,
     note_scales,
     raise_scales,
@@ -76,6 +77,7 @@ def radau_start(K: SingularSteps) -> int:
     forget_row_norms(K)
     measure_accepted(K)
     look_a_step_ahead(K)
+    K.scales_of_start = 1
     return 0
 
 
@@ -151,6 +153,10 @@ def plain_step(K: Kernel, h: float, t1: float, m: int) -> int:
             renew = True  # the old matrices have done their work: make them again at the same iterate
             before = 1e300
             continue
+        if error <= 1.0 and K.scales_of_start == 1:
+            load_stage(K, 2, h, t1)
+            if lower_to_step(K):
+                error = evaluate_stages(K, h, t1, m, tolerance, c, c * c, renew)
         before = error
         left = error
         retreats = 0

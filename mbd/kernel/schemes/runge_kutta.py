@@ -16,7 +16,7 @@ from mbd.kernel.hooks import call
 from mbd.kernel.linear import solve_definite, solve_from_tips
 from mbd.kernel.mass_ratios import LOSS, is_uneven, polish_rates, polish_with_rows
 from mbd.kernel.ordered import LOSS_AT_ONCE, solve_kkt
-from mbd.kernel.records import Balance, DependentRows, Kernel, Mechanism, Memory, SingularSteps, Steps
+from mbd.kernel.records import Balance, DependentRows, Kernel, Memory, SingularSteps, Steps
 from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import compose, consistent, displace, evaluate, measure_accepted, raise_scales
 from mbd.kernel.roots import sqrt
@@ -55,7 +55,7 @@ def note_uneven(K: DependentRows) -> None:
         K.uneven_masses = 1
 
 
-def find_sizes(K: Mechanism) -> None:
+def find_sizes(K: DependentRows) -> None:
     """Sizes at the accepted state; those of a candidate that is refused must not excuse the next one."""
     measure_accepted(K)
 

@@ -160,7 +160,7 @@ def impacts(found: Faults, bodies: Bodies, run: mbd.Trajectory, T: Array) -> Non
         k = event.row
         there = found.at(told.time[k : k + 1])
         gap = gap_of(word.measure, bodies)
-        moving = driven or bool(np.any(gap.drift))
+        moving = driven or bool(np.any(gap.drift)) or bool(np.any(gap.carried))
         if not moving and not any(e.time == event.time and e.kind == "event" for e in run.events):
             scale = float(np.max(T))
             there.small("an impact makes no energy", event.name, max(T[k] - T[k - 1], 0.0), 1e-8 * scale + 1e-12)
