@@ -17,12 +17,16 @@ SETTLED = {
     2010515: "a spring at a stop of twist next to half a turn",
     2010525: "a disk on springs that passes flat",
     2010788: "dense output of steps of nanoseconds",
+    2020892: "a run that goes on after a row was found to depend on others",
     2011901: "what nearly rests and turns around",
 }
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("number", SETTLED)
+LONG = 2010515
+"""Four seconds, and with `-m slow` only."""
+
+
+@pytest.mark.parametrize("number", [pytest.param(n, marks=[pytest.mark.slow] * (n == LONG)) for n in SETTLED])
 def test_settled_scenes_stay_settled(number):
     told = verdict(number)
     assert told["kind"] != "bad", told["reasons"]

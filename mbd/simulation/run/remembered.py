@@ -144,13 +144,13 @@ def _judged(kept: Kernel, memory: Memory, run: RunData) -> str:
 
 def _of_state(v: Kernel) -> dict[str, tuple[int, int]]:
     """Least and largest value of each number in `state`; those of rows and lines of results are set to 0 anyway."""
-    indices = max(v.n_rows, v.n_contacts, v.n_frictions, v.n)
+    indices = v.n + max(v.n_rows, v.n_contacts, v.n_frictions)  # columns of rows come after those of velocities
     return {
         "n_active": (0, v.n_rows), "grid_steps": (0, UNBOUNDED), "restart_due": (0, 2), "n_switches": (0, UNBOUNDED),
         "steps_since_row": (0, UNBOUNDED), "failure_index": (-1, indices), "n_dropped": (0, v.n_rows),
         "near_singular": (0, 2), "short_steps": (0, UNBOUNDED), "n_repeats": (0, UNBOUNDED), "plastic_impact": (0, 1),
         "halvings": (0, 16), "halves_left": (0, 1 << 17), "paired_step": (0, 3), "in_substeps": (0, 1),
-        "scales_raised": (0, 1), "restarted_here": (0, 1), "fallback": (0, 2),
+        "scales_raised": (0, 1), "scales_of_start": (0, 1), "restarted_here": (0, 1), "fallback": (0, 2),
     }  # fmt: skip
 
 
