@@ -31,8 +31,6 @@ __all__ = [
 
 FAR_ABOVE = 100.0
 """Magnitudes over those of the accepted state above which they are lowered again, and the most in one step [-]."""
-UNCONFIRMED = 1e4
-"""Magnitudes of a start over those of its first step above which they are not confirmed [-]."""
 ROW_GROWTH = 16.0
 """Most by which the terms of a row may grow in a step: beyond that an iterate was thrown far away [-]."""
 SETTLED_LOADS = 1e-6
@@ -193,7 +191,7 @@ def lower_to_step(K: Equations) -> bool:
     measure(K)
     lowered = False
     for i in range(K.n + 2 * K.n_rows):
-        bound = UNCONFIRMED * K.scale[i] if i < K.n else K.known[i]
+        bound = FAR_ABOVE * K.scale[i] if i < K.n else K.known[i]
         lowered = lowered or bound < K.known[i]
         K.scale[i] = min(bound, K.known[i])
     weigh(K)

@@ -113,7 +113,7 @@ def _rows(found: Faults, run: mbd.Trajectory, model: mbd.Model, told: Readings, 
     laws.constraints(there, bodies)
     acting = loads(bodies)
     if smooth:
-        laws.balance(there, bodies, acting, SHARE)
+        laws.balance(there, bodies, acting, SHARE, np.where(laws.kinks(bodies), np.inf, 0.0))
     laws.contacts(there, bodies, acting, run)
     laws.energies(there, bodies, acting)
 

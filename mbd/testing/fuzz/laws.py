@@ -16,7 +16,7 @@ from mbd.testing.fuzz.loads import Loads
 from mbd.testing.fuzz.quantities import gap_of, named, value_of
 from mbd.testing.fuzz.round_bodies import edge_gap
 
-__all__ = ["balance", "closure", "constraints", "contacts", "energies", "places", "size_of", "partings"]
+__all__ = ["balance", "closure", "constraints", "contacts", "energies", "places", "kinks", "partings", "size_of"]
 
 HELD = 1e-7
 """What rows may miss, over the size of the mechanism [-]."""
@@ -24,6 +24,8 @@ ROUND_OFF = 1e-15
 """That of the entries of a rotation matrix, from which orientations are read [-]."""
 KINK = 1e4
 """Of `Gap.blur`: g has a kink from there on [-]."""
+BEGINNING = 1e-6
+"""Speed [m/s] beside which friction keeps some of the direction in which sliding began."""
 EQUAL = 1e-9
 """What two ways to compute one number may differ by, over what it is made of [-]."""
 
@@ -137,6 +139,16 @@ def balance(found: Faults, bodies: Bodies, acting: Loads, share: Any, more: Any 
         limit = share * twisted + 1e-3 * share * reach * whole + 1e-9 + reach * more
         if not (mass.planar and not planar):
             found.small("balance of torques", name, np.linalg.norm(torque, axis=1), limit)
+
+
+def kinks(bodies: Bodies) -> Array:
+    """Where a contact that is closed has a kink, so that its force has no direction of its own (n,)."""
+    found = np.zeros(len(bodies.told), dtype=bool)
+    for word in bodies.model.contacts:
+        if isinstance(word, mbd.Unilateral | mbd.Penalty):
+            gap = gap_of(word.measure, bodies)
+            found |= bodies.told.closed[word.name].astype(bool) & (gap.blur >= KINK)
+    return found
 
 
 def constraints(found: Faults, bodies: Bodies, loose: float = HELD) -> None:
@@ -275,6 +287,7 @@ def _cone(found: Faults, word: Any, gap: Any, bodies: Bodies, limit: Any, larges
         return
     wanted = -limit[:, None] * speeds / np.where(speed > 0.0, speed, 1.0)[:, None]
     off = np.linalg.norm(force - wanted, axis=1)
+    scale = scale + limit * BEGINNING / np.where(speed > 0.0, speed, 1.0)
     found.small("sliding friction is against the velocity, all of it", word.name, off, scale, speed > 1e-4)
 
 
