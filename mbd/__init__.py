@@ -35,6 +35,7 @@ if TYPE_CHECKING:
         sphere as sphere,
     )
     from mbd.constraints import (
+        Ball as Ball,
         Bilateral as Bilateral,
         Controller as Controller,
         Event as Event,
@@ -179,7 +180,7 @@ _HOMES = {
     "mbd.analysis.sweep": "Sweep sweep",
     "mbd.assembly.assemble": "assemble",
     "mbd.bodies": "Domain Link Marker PointMass RigidBody box cylinder disk rod segment sphere",
-    "mbd.constraints": "Bilateral Controller Event KnifeEdge Nonholonomic Penalty PenaltyParameters Plane "
+    "mbd.constraints": "Ball Bilateral Controller Event KnifeEdge Nonholonomic Penalty PenaltyParameters Plane "
     "Rolling Unilateral When cone disk_touchdown distance extension flexion height measure penalty_parameters "
     "profile_touchdown rolling_touchdown separation sphere_touchdown touchdown twist",
     "mbd.equations.energy_description": "Coordinate",

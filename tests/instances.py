@@ -207,6 +207,11 @@ MEASURES: list[tuple[str, Callable[[Frame, Frame, Joint], Measure]]] = [
     ("arc on a body", lambda a, b, joint: mbd.rolling_touchdown(a, 0.3, mbd.Plane((0.3, 1.0, 0.0), 0.1, frame=b))),
     ("sole on the ground", lambda a, b, joint: mbd.profile_touchdown(a, SOLE)),
     ("sole on a body", lambda a, b, joint: mbd.profile_touchdown(b, egg, mbd.Plane((0.3, 1.0, 0.0), frame=a))),
+    ("ball on a plane", lambda a, b, joint: mbd.sphere_touchdown(a, 0.2, mbd.Plane((0.3, 1.0, -0.2), frame=b))),
+    ("ball on dunes", lambda a, b, joint: mbd.sphere_touchdown(a, 0.1, dune)),
+    ("ball on a ball", lambda a, b, joint: mbd.sphere_touchdown(a, 0.2, mbd.Ball(b, 0.1))),
+    ("ball in a hollow one", lambda a, b, joint: mbd.sphere_touchdown(a, 0.2, mbd.Ball(b, 3.0, hollow=True))),
+    ("disk on dunes", lambda a, b, joint: mbd.disk_touchdown(a, 0.1, (0.2, 0.3, 1.0), dune)),
     ("height", lambda a, b, joint: mbd.height(a)),
     ("flexion", lambda a, b, joint: mbd.flexion(joint)),
     ("extension", lambda a, b, joint: mbd.extension(joint, offset=0.1)),
@@ -231,6 +236,16 @@ CONSTRAINTS: list[tuple[str, Callable[[Frame, Frame, Joint], Constraint]]] = [
     ("foot on a belt", lambda a, b, joint: mbd.Unilateral("law", mbd.touchdown(b, mbd.Plane(velocity=(0.4, 0.0))))),
     ("foot on a swell", lambda a, b, joint: mbd.Unilateral("law", mbd.touchdown(b, swell))),
     ("ball on a swell", lambda a, b, joint: mbd.Unilateral("law", mbd.touchdown(a, swell), 0.7, friction=0.0)),
+    ("rolling on waves", lambda a, b, joint: mbd.Unilateral("law", mbd.sphere_touchdown(a, 0.1, waves))),
+    ("slipping on dunes", lambda a, b, joint: mbd.Unilateral("law", mbd.sphere_touchdown(a, 0.1, dune), friction=0.3)),
+    (
+        "ball on a ball",
+        lambda a, b, joint: mbd.Unilateral("law", mbd.sphere_touchdown(a, 0.2, mbd.Ball(b, 0.1)), friction=0.3),
+    ),
+    (
+        "disk on a swell",
+        lambda a, b, joint: mbd.Unilateral("law", mbd.disk_touchdown(b, 0.1, "z", swell), friction=0.3),
+    ),
     ("round foot", lambda a, b, joint: mbd.Unilateral("law", mbd.rolling_touchdown(a, 0.3))),
     (
         "round foot with friction",

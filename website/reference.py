@@ -13,7 +13,7 @@ GROUPS = {
     "Viscous Quadratic Coulomb AffineFriction PinFriction Tabulated Valves Dissipation",
     "Constraints and measures": "Bilateral Unilateral Penalty PenaltyParameters penalty_parameters KnifeEdge Rolling "
     "Nonholonomic Event Controller When touchdown rolling_touchdown profile_touchdown disk_touchdown "
-    "sphere_touchdown Plane height flexion extension cone twist distance separation measure",
+    "sphere_touchdown Plane Ball height flexion extension cone twist distance separation measure",
     "Forces": "Spring Damper Bushing TorsionSpring TabulatedSpring Motor DCMotor Applied Potential Samples",
     "Functions": "sin cos tan asin acos atan atan2 sinh cosh tanh exp log sqrt hypot sign "
     "maximum minimum clip mod floor where pi",

@@ -38,10 +38,10 @@ def first_cause(
             return f"the force of {force} is not finite{when}{moved}; check its roots, logarithms, divisions"
     for row in equations.rows:
         if not _finite([row.value, row.rate], inputs):
-            return f"the constraint {row.title} is not finite{when}"
-    for contact in equations.contacts:
+            return f"the constraint {row.title} is not finite{when}{_hint(equations, row.contact)}"
+    for number, contact in enumerate(equations.contacts):
         if not _finite([contact.gap, contact.gap_rate], inputs):
-            return f"the gap of {contact.name!r} is not finite{when}"
+            return f"the gap of {contact.name!r} is not finite{when}{_hint(equations, number)}"
     for guard in equations.guards:
         if not _finite([guard.value, guard.rate], inputs):
             return f"the guard of the event {guard.name!r} is not finite{when}"
@@ -59,6 +59,12 @@ def tape_inputs(mechanism: Mechanism, block: Vector, parameters: Vector) -> dict
         (kind, k): float(block[layout.place(kind, k)]) for kind, size in sizes.items() for k in range(size)
     }
     return inputs | {("p", k): float(parameters[k]) for k in range(layout.n_parameters)}
+
+
+def _hint(equations: Equations, contact: int) -> str:
+    """What that means of a contact, where its measure says so."""
+    undefined = equations.contacts[contact].undefined if contact >= 0 else ""
+    return f": {undefined}" if undefined else ""
 
 
 def _moved_by(equations: Equations, effect: Effect, inputs: Inputs) -> str:

@@ -1,5 +1,6 @@
 """Constraints: where (measures), what law, and when."""
 
+from mbd.constraints.balls import Ball
 from mbd.constraints.base import Constraint, VelocityConstraint
 from mbd.constraints.bilateral import Bilateral
 from mbd.constraints.controller import Controller
@@ -23,9 +24,9 @@ from mbd.constraints.unilateral import Unilateral
 from mbd.constraints.user_measure import measure
 
 __all__ = [
-    "Bilateral", "Closing", "Constraint", "Controller", "Drag", "Equation", "Event", "KnifeEdge", "Law", "Measure",
-    "Nonholonomic", "Penalty", "PenaltyParameters", "Plane", "Rolling", "Unilateral", "VelocityConstraint", "When",
-    "cone", "disk_touchdown", "distance", "extension", "flexion", "height", "measure", "penalty_parameters",
+    "Ball", "Bilateral", "Closing", "Constraint", "Controller", "Drag", "Equation", "Event", "KnifeEdge", "Law",
+    "Measure", "Nonholonomic", "Penalty", "PenaltyParameters", "Plane", "Rolling", "Unilateral", "VelocityConstraint",
+    "When", "cone", "disk_touchdown", "distance", "extension", "flexion", "height", "measure", "penalty_parameters",
     "profile_touchdown", "rolling_touchdown", "separation", "sphere_touchdown", "touchdown",
     "twist",
 ]  # fmt: skip

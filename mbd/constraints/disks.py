@@ -6,14 +6,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from mbd.bodies.algebra import cross, difference, dot, rotate, scaled
+from mbd.bodies.algebra import cross, difference, dot, rotate, scaled, total
 from mbd.bodies.base import Frame
 from mbd.bodies.domains import Domain, positive
 from mbd.bodies.ground import Ground
 from mbd.bodies.values import Vector3, number, unit_vector
 from mbd.constraints.measure import Measure
+from mbd.constraints.round_on_surface import NO_PLACE, edge_on
 from mbd.constraints.slip import slip_along
-from mbd.constraints.surfaces import Plane, spin_about
+from mbd.constraints.surfaces import Plane, Surface, spin_about, surface_of
 from mbd.errors import ModelError
 from mbd.forces.base import frame_of
 from mbd.forces.quantities import Mention
@@ -49,11 +50,13 @@ class DiskTouchdown(Measure):
     center: Frame
     radius: float
     axis: Vector3
-    ground: Plane = field(default_factory=Plane)
+    ground: Plane | Surface = field(default_factory=Plane)
 
     def gap(self, scope: Scope) -> Scalar:
         """n · s_C − r |n × a|."""
         radius = scope.parameter(self.center.full_name, "radius", self.radius)
+        if isinstance(self.ground, Surface):
+            return self._edge_on(self.ground, scope)[0]
         lift = self.ground.gap(scope.frame(self.center).position, scope)
         return lift - radius * steepness(self.center, self.axis, self.ground, scope)
 
@@ -61,6 +64,11 @@ class DiskTouchdown(Measure):
     def unit(self) -> str:
         """'m'."""
         return "m"
+
+    @property
+    def undefined(self) -> str:
+        """On a height function: no single place of contact."""
+        return NO_PLACE if isinstance(self.ground, Surface) else ""
 
     @property
     def has_slip_velocities(self) -> bool:
@@ -73,8 +81,16 @@ class DiskTouchdown(Measure):
 
     def edge_arm(self, scope: Scope) -> Triple:
         """From the center to the lowest point of the edge, in ground axes [m]."""
+        if isinstance(self.ground, Surface):
+            return self._edge_on(self.ground, scope)[1]
         radius = scope.parameter(self.center.full_name, "radius", self.radius)
         return to_edge(self.center, self.axis, radius, self.ground, scope)
+
+    def _edge_on(self, surface: Surface, scope: Scope) -> tuple[Scalar, Triple]:
+        """Gap over a height function, and the arm to the point of the edge that is lowest over it."""
+        radius = scope.parameter(self.center.full_name, "radius", self.radius)
+        frame = scope.frame(self.center)
+        return edge_on(surface, frame.position, rotate(frame.rotation, self.axis), radius, scope)
 
     @property
     def has_spin(self) -> bool:
@@ -82,8 +98,10 @@ class DiskTouchdown(Measure):
         return True
 
     def spin(self, scope: Scope) -> Scalar:
-        """n · (ω − ω_plane)."""
+        """n · (ω − ω_ground)."""
         p = scope.frame(self.center).position
+        if isinstance(self.ground, Surface):
+            p = total(p, self.edge_arm(scope))
         return spin_about(self.ground.normal_at(p, scope), self.center, self.ground.frame, scope)
 
     def mentions(self) -> list[Mention]:
@@ -108,7 +126,7 @@ class DiskTouchdown(Measure):
 
 
 def disk_touchdown(center: Frame, radius: float, axis: Any, ground: Any = None) -> DiskTouchdown:
-    """Height of the edge of a thin disk over a plane, whichever way it leans: a coin, the wheel of a bicycle.
+    """Height of the edge of a thin disk over the ground, whichever way it leans: a coin, the wheel of a bicycle.
 
     ``g = n · s_C − r |n × a|`` with the place s_C of the center on the plane and the disk's axis a. A `Bilateral` keeps
     the edge on the plane, where a `Rolling` with the same axis makes it roll. A `Unilateral` lets it lift off: with
@@ -120,12 +138,13 @@ def disk_touchdown(center: Frame, radius: float, axis: Any, ground: Any = None) 
     center : of the disk, a frame of the body
     radius : r > 0 [m]; the run-time parameter '<center>.radius'
     axis : a in the axes of that frame, of any length
-    ground : None for y = 0, or a `Plane`, which may lie on another body, or run
+    ground : None for y = 0; a `Plane`, which may lie on another body, or run; or the ground's height y = H, as of
+        `touchdown`. A valley must be wider than the disk: where it is not, the run ends by name
 
     Raises
     ------
     ModelError
-        where the center is no frame, the radius not positive, the axis no direction, or the ground no plane.
+        where the center is no frame, the radius not positive, the axis no direction, or the ground none of these.
 
     >>> import mbd
     >>> model, coin = mbd.Model("coin"), mbd.RigidBody("coin", 0.01, (1e-6, 1e-6, 2e-6))
@@ -139,7 +158,6 @@ def disk_touchdown(center: Frame, radius: float, axis: Any, ground: Any = None) 
     size = number(radius, "radius of disk_touchdown")
     if size <= 0.0:
         raise ModelError(f"radius of disk_touchdown must be positive, got {size:g} m; for a point use mbd.touchdown")
-    plane = Plane() if ground is None else ground
-    if not isinstance(plane, Plane):
-        raise ModelError(f"disk_touchdown: the ground is a mbd.Plane, got {ground!r}")
-    return DiskTouchdown(center, size, unit_vector(axis, "axis of disk_touchdown"), plane)
+    return DiskTouchdown(
+        center, size, unit_vector(axis, "axis of disk_touchdown"), surface_of(ground, "disk_touchdown")
+    )

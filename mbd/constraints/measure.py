@@ -85,6 +85,11 @@ class Measure(ABC):
         """What it measures of what, for a page of text."""
         return f"{self.title} of " + mentioned_names(self.mentions())
 
+    @property
+    def undefined(self) -> str:
+        """What it means where g is no number, for errors; '' where it always is one."""
+        return ""
+
     def faults(self, owner: str) -> list[str]:
         """What is geometrically impossible about it, one sentence each."""
         return []

@@ -1,20 +1,21 @@
-"""The velocity at which what touches a plane slips along it."""
+"""The velocity at which what touches the ground slips along it."""
 
 from __future__ import annotations
 
 from mbd.bodies.algebra import cross, difference, dot, total
 from mbd.bodies.base import Frame
-from mbd.constraints.surfaces import Plane
+from mbd.constraints.balls import Ball
+from mbd.constraints.surfaces import Plane, Surface
 from mbd.scope import Scope, Triple
 from mbd.tape.node import Node, Scalar
 
 __all__ = ["slip_along"]
 
 
-def slip_along(ground: Plane, center: Frame, arm: Triple, scope: Scope) -> list[tuple[str, Scalar]]:
+def slip_along(ground: Plane | Surface | Ball, center: Frame, arm: Triple, scope: Scope) -> list[tuple[str, Scalar]]:
     """``t · (v_C + ω × arm − v_P)`` forward and sideways, of the point of the body that is at C + arm now [m/s].
 
-    v_P is the velocity of the plane there. A direction in which nothing can move, sideways in the plane, has no row.
+    v_P is the velocity of the ground there. A direction in which nothing can move, sideways in the plane, has no row.
     """
     motion = scope.frame(center)
     slip = total(motion.velocity, cross(motion.angular_velocity, arm))

@@ -1,4 +1,4 @@
-"""Where a ball meets a plane, on which it rolls, slips and spins."""
+"""Where a ball meets the ground, on which it rolls, slips and spins."""
 
 from __future__ import annotations
 
@@ -6,18 +6,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from mbd.bodies.algebra import scaled
+from mbd.bodies.algebra import scaled, total
 from mbd.bodies.base import Frame
 from mbd.bodies.domains import Domain, positive
 from mbd.bodies.ground import Ground
 from mbd.bodies.values import number
+from mbd.constraints.balls import Ball
 from mbd.constraints.measure import Measure
+from mbd.constraints.round_on_surface import NO_PLACE, ball_on
 from mbd.constraints.slip import slip_along
-from mbd.constraints.surfaces import Plane, spin_about
-from mbd.errors import ModelError
+from mbd.constraints.surfaces import Plane, Surface, spin_about, surface_of
 from mbd.forces.base import frame_of
 from mbd.forces.quantities import Mention
-from mbd.scope import Scope
+from mbd.scope import Scope, Triple
 from mbd.tape.node import Scalar
 
 __all__ = ["SphereTouchdown", "sphere_touchdown"]
@@ -25,23 +26,32 @@ __all__ = ["SphereTouchdown", "sphere_touchdown"]
 
 @dataclass(frozen=True)
 class SphereTouchdown(Measure):
-    """``g = n · s_C − r`` of a ball, and the velocity ``v_C − ω × r n − v_plane`` of its lowest point on the plane.
+    """``g = n · s_C − r`` of a ball, and the velocity ``v_C − ω × r n − v_P`` of its lowest point against the ground.
 
-    Where that velocity is zero the ball rolls; no posture tells that, so that its rows are rows on velocities.
+    Where that velocity is zero the ball rolls; no posture tells that, so that its rows are rows on velocities. On a
+    height function n and the place of contact are those of `mbd.constraints.round_on_surface`.
     """
 
     center: Frame
     radius: float
-    ground: Plane = field(default_factory=Plane)
+    ground: Plane | Surface | Ball = field(default_factory=Plane)
 
     def gap(self, scope: Scope) -> Scalar:
         """n · s_C − r."""
-        return self.ground.gap(scope.frame(self.center).position, scope) - self._radius(scope)
+        p, radius = scope.frame(self.center).position, self._radius(scope)
+        if isinstance(self.ground, Surface):
+            return ball_on(self.ground, p, radius, scope)[0]
+        return self.ground.gap(p, scope) - radius
 
     @property
     def unit(self) -> str:
         """'m'."""
         return "m"
+
+    @property
+    def undefined(self) -> str:
+        """On a height function: no single place of contact."""
+        return NO_PLACE if isinstance(self.ground, Surface) else ""
 
     @property
     def has_slip_velocities(self) -> bool:
@@ -50,8 +60,14 @@ class SphereTouchdown(Measure):
 
     def slip_velocities(self, scope: Scope) -> Sequence[tuple[str, Scalar]]:
         """Forward and sideways, without the one in which nothing moves (in a planar model sideways)."""
-        arm = scaled(-1.0 * self._radius(scope), self.ground.turned(self.ground.normal, scope))
-        return slip_along(self.ground, self.center, arm, scope)
+        return slip_along(self.ground, self.center, self.arm(scope), scope)
+
+    def arm(self, scope: Scope) -> Triple:
+        """From the center to the point nearest to the ground, −r n, in ground axes [m]."""
+        p, radius = scope.frame(self.center).position, self._radius(scope)
+        if isinstance(self.ground, Surface):
+            return ball_on(self.ground, p, radius, scope)[1]
+        return scaled(-1.0 * radius, self.ground.normal_at(p, scope))
 
     @property
     def has_spin(self) -> bool:
@@ -59,8 +75,10 @@ class SphereTouchdown(Measure):
         return True
 
     def spin(self, scope: Scope) -> Scalar:
-        """n · (ω − ω_plane)."""
+        """n · (ω − ω_ground)."""
         p = scope.frame(self.center).position
+        if isinstance(self.ground, Surface):
+            p = total(p, self.arm(scope))
         return spin_about(self.ground.normal_at(p, scope), self.center, self.ground.frame, scope)
 
     def mentions(self) -> list[Mention]:
@@ -68,27 +86,37 @@ class SphereTouchdown(Measure):
         return [self.center] if self.ground.frame is None else [self.center, self.ground.frame]
 
     def faults(self, owner: str) -> list[str]:
-        """A ball of the ground, or of the body that its plane is on."""
+        """A ball of the ground, or of the body that it touches, or one that does not fit into a hollow one."""
+        found = []
         if isinstance(self.center.body, Ground):
-            return [f"'{owner}': its ball '{self.center.full_name}' is the ground; give a frame of the body that rolls"]
-        if self.ground.frame is not None and self.ground.frame.body is self.center.body:
-            return [f"'{owner}': its ball and its plane are both on '{self.center.body.name}' and never move apart"]
-        return []
+            found = [
+                f"'{owner}': its ball '{self.center.full_name}' is the ground; give a frame of the body that rolls"
+            ]
+        elif self.ground.frame is not None and self.ground.frame.body is self.center.body:
+            what = "what it touches" if isinstance(self.ground, Ball) else "its plane"
+            found = [f"'{owner}': its ball and {what} are both on '{self.center.body.name}' and never move apart"]
+        if isinstance(self.ground, Ball) and self.ground.hollow and self.radius >= self.ground.radius:
+            sizes = f"{self.radius:g} m does not fit into a hollow one of {self.ground.radius:g} m"
+            found.append(f"'{owner}': a ball of radius {sizes}; make it smaller, or the other one larger")
+        return found
 
     def parameters(self) -> dict[str, float]:
-        """The radius, under the name of the center."""
-        return {f"{self.center.full_name}.radius": self.radius}
+        """The radius, under the name of the center; that of a ball that it touches."""
+        found = {f"{self.center.full_name}.radius": self.radius}
+        if isinstance(self.ground, Ball):
+            found[f"{self.ground.center.full_name}.radius"] = self.ground.radius
+        return found
 
     def domains(self) -> dict[str, Domain]:
         """A radius > 0."""
-        return {f"{self.center.full_name}.radius": positive(unit="m")}
+        return {name: positive(unit="m") for name in self.parameters()}
 
     def _radius(self, scope: Scope) -> Scalar:
         return scope.parameter(self.center.full_name, "radius", self.radius)
 
 
 def sphere_touchdown(center: Frame, radius: float, ground: Any = None) -> SphereTouchdown:
-    """Height of a ball over a plane, on which it rolls, slips and spins.
+    """Height of a ball over a plane, a height function or another ball, on which it rolls, slips and spins.
 
     In a `Unilateral` with friction=None it rolls without slip while it is closed, with μ it slides against the velocity
     of its lowest point, grips and slips again, with 0 it slides freely. Nothing resists its spin about the normal.
@@ -97,14 +125,15 @@ def sphere_touchdown(center: Frame, radius: float, ground: Any = None) -> Sphere
     ----------
     center : the middle of the ball, a frame of a body that turns
     radius : r > 0, the run-time parameter '<center>.radius' [m]
-    ground : None for y = 0, or a `Plane`, which may lie on another body, or run
+    ground : None for y = 0; a `Plane`, which may lie on another body, or run; or the ground's height y = H, a function
+        or sympy expression of x, or x and z, and of t where it moves. A valley must be wider than the ball: where it is
+        not, the run ends by name; or a `Ball` of another body, hollow or not
 
     Raises
     ------
     ModelError
-        where the center is no frame, the radius no number, or the ground no plane.
+        where the center is no frame, the radius no number, or the ground none of these.
     """
     frame_of(center, "sphere_touchdown: its center")
-    if ground is not None and not isinstance(ground, Plane):
-        raise ModelError(f"sphere_touchdown: the ground is a mbd.Plane (what is round is the ball), got {ground!r}")
-    return SphereTouchdown(center, number(radius, "radius of sphere_touchdown"), ground or Plane())
+    on = ground if isinstance(ground, Ball) else surface_of(ground, "sphere_touchdown", "a mbd.Ball, ")
+    return SphereTouchdown(center, number(radius, "radius of sphere_touchdown"), on)

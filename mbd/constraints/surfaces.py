@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -124,19 +125,36 @@ class Surface:
         """Whether H depends on time."""
         return "t" in self.arguments
 
+    @property
+    def frame(self) -> None:
+        """None: heights are those of the ground, which no body carries."""
+        return
+
     def slopes(self, p: Triple, scope: Scope) -> tuple[Scalar, Scalar, Scalar]:
         """H, ∂H/∂x, ∂H/∂z."""
-        names = self.arguments
-        across = [name for name in names if name != "t"]
+        across = [name for name in self.arguments if name != "t"]
 
         def height(*places: Scalar) -> Scalar:
-            known = {**dict(zip(across, places, strict=True)), "t": scope.time}
-            arguments: list[Argument] = [(name, known[name]) for name in names]
-            return traced_scalar(self.function, arguments, "height of the ground", scope.tape)
+            return self._height({**dict(zip(across, places, strict=True)), "t": scope.time}, scope)
 
         value, slopes = derivatives_at(height, [p["xyz".index(name)] for name in across], scope.tape)
         slope: dict[str, Scalar] = dict(zip(across, slopes, strict=True))
         return value, slope.get("x", 0.0), slope.get("z", 0.0)
+
+    def _height(self, places: Mapping[str, Scalar], scope: Scope) -> Scalar:
+        """H at values of what it depends on."""
+        arguments: list[Argument] = [(name, places[name]) for name in self.arguments]
+        return traced_scalar(self.function, arguments, "height of the ground", scope.tape)
+
+    def turned(self, direction: Triple, scope: Scope) -> Triple:
+        """A direction of the ground in ground axes."""
+        return direction
+
+    def velocity_at(self, p: Triple, scope: Scope) -> Triple:
+        """Velocity of the ground's material, which moves up and down: (0, ∂H/∂t, 0) [m/s]."""
+        known = {"x": p[0], "z": p[2]}
+        _, (rise,) = derivatives_at(lambda t: self._height({**known, "t": t}, scope), [scope.time], scope.tape)
+        return (0.0, rise, 0.0)
 
     def place(self, p: Triple, scope: Scope) -> Triple:
         """The point, or where H moves (x, y − H, z)."""
@@ -175,8 +193,8 @@ def spin_about(normal: Triple, frame: Frame, carrier: Frame | None, scope: Scope
     return dot(normal, turning)
 
 
-def surface_of(ground: Any, what: str) -> Plane | Surface:
-    """A ground as users may give it, checked at the border."""
+def surface_of(ground: Any, what: str, besides: str = "") -> Plane | Surface:
+    """A ground as users may give it, checked at the border; `besides`: what else it may be, for the error."""
     if ground is None:
         return Plane()
     if isinstance(ground, Plane | Surface):
@@ -185,7 +203,7 @@ def surface_of(ground: Any, what: str) -> Plane | Surface:
         _arguments(ground)
         return Surface(ground)
     raise ModelError(
-        f"{what}: the ground is a mbd.Plane, or a height function y = H(x), H(x, z) or one that moves with t, "
+        f"{what}: the ground is {besides}a mbd.Plane, or a height function y = H(x), H(x, z) or one that moves with t, "
         f"got {ground!r}"
     )
 

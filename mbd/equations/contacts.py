@@ -183,6 +183,7 @@ def _by_rows(
         when=tuple((rule.other, rule.after_impact) for rule in at.releases),
         only_while=scope.real(gap_of(condition, scope)) if isinstance(condition, Measure) else condition,
         restitution=at.restitution, unit=at.unit, may_pull=any(rule.may_pull for rule in at.releases), drags=drags,
+        undefined=_undefined(word),
     )  # fmt: skip
 
 
@@ -222,8 +223,14 @@ def _by_force(
     return Contact(
         word.name, word.kind, gap, rate, captured=tuple(holding.captured), anchors=holding.anchors, force=force,
         generalized=generalized, opens_on=at.opens_on, unit=f"{at.unit}/s" if fast else at.unit, drags=tuple(drags),
-        is_velocity=fast,
+        is_velocity=fast, undefined=_undefined(word),
     )  # fmt: skip
+
+
+def _undefined(word: Constraint) -> str:
+    """What it means where its gap is no number."""
+    measure = getattr(word, "measure", None)
+    return measure.undefined if isinstance(measure, Measure) else ""
 
 
 def _guard(scope: DerivationScope, event: Event) -> Guard:

@@ -116,6 +116,7 @@ class Contact:
     drags : (part, velocity, force) of a force law's further forces, whose power is force · velocity; of a contact by
         rows those of smooth friction, which follow the multiplier of its normal row
     is_velocity : whether its gap is a velocity, along which its force acts then
+    undefined : what it means where the gap is no number, for errors
     """
 
     name: str
@@ -135,6 +136,7 @@ class Contact:
     may_pull: bool = False
     drags: tuple[tuple[str, Node, Node], ...] = ()
     is_velocity: bool = False
+    undefined: str = ""
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from mbd.bodies.algebra import basis, cross, rotate, scaled, total
 from mbd.bodies.base import Frame
 from mbd.bodies.values import Vector3
+from mbd.constraints.balls import Ball
 from mbd.constraints.base import Constraint
 from mbd.constraints.disks import DiskTouchdown
 from mbd.constraints.knife_edge import KnifeEdge
@@ -21,7 +22,6 @@ from mbd.constraints.rolling import Rolling
 from mbd.constraints.rolling_touchdown import RollingTouchdown
 from mbd.constraints.sphere_touchdown import SphereTouchdown
 from mbd.constraints.surfaces import Plane, Surface
-from mbd.constraints.touchdown import Touchdown
 from mbd.equations.outputs import AXES, Outputs
 from mbd.scope import Scope, Triple
 from mbd.tape.node import Scalar
@@ -125,6 +125,8 @@ def _round_feet(model: Description) -> list[Shape]:
             kind = "wheel" if isinstance(measure, DiskTouchdown) else "ball"
             contacts = found.setdefault(measure.center.full_name, (kind, []))[1]
             contacts += [] if word.kind == "bilateral" else [word.name]
+            if isinstance(measure.ground, Ball) and not measure.ground.hollow:
+                found.setdefault(measure.ground.center.full_name, ("ball", []))
     rolling = {word.center.full_name for word in model.constraints if isinstance(word, Rolling)}
     return [
         Shape(kind, center, tuple(contacts), (center,) * len(contacts), center)
@@ -178,7 +180,7 @@ def offer_shapes(outputs: Outputs, scope: Scope, model: Description) -> None:
             offer(word.name, "along", partial(_axis, scope, word.frame, _along(word.normal)))
         elif measure is not None and isinstance(getattr(measure, "ground", None), Plane):
             _offer_plane(offer, scope, word.name, measure.ground)
-        elif isinstance(measure, Touchdown) and isinstance(measure.ground, Surface):
+        elif measure is not None and isinstance(getattr(measure, "ground", None), Surface):
             outputs.add(drawn(word.name, HEIGHT), partial(_height, scope, measure.ground), listed=False)
             offer(word.name, "normal", partial(_slope, scope, measure, True))
             offer(word.name, "forward", partial(_slope, scope, measure, False))
@@ -205,11 +207,8 @@ def _offer_wheel(offer: Offer, scope: Scope, name: str, center: Frame, axle: Vec
 
 
 def _arm(scope: Scope, measure: DiskTouchdown | SphereTouchdown) -> Triple:
-    """From the center to the point nearest to the plane."""
-    if isinstance(measure, DiskTouchdown):
-        return measure.edge_arm(scope)
-    radius = scope.parameter(measure.center.full_name, "radius", measure.radius)
-    return scaled(-1.0 * radius, measure.ground.turned(measure.ground.normal, scope))
+    """From the center to the point nearest to the ground."""
+    return measure.edge_arm(scope) if isinstance(measure, DiskTouchdown) else measure.arm(scope)
 
 
 def _axis(scope: Scope, frame: Frame, direction: Triple) -> Triple:
@@ -230,7 +229,10 @@ def _height(scope: Scope, surface: Surface) -> Scalar:
     return surface.slopes((tape.input(PLACE, 0), 0.0, tape.input(PLACE, 1)), scope)[0]
 
 
-def _slope(scope: Scope, measure: Touchdown, upwards: bool) -> Triple:
+def _slope(scope: Scope, measure: Any, upwards: bool) -> Triple:
     """Normal of a surface below a foot, or the direction forward along it."""
-    forward, sideways = measure.ground.directions(scope.frame(measure.point).position, scope)
+    place = scope.frame(_point(measure)).position
+    if isinstance(measure, DiskTouchdown | SphereTouchdown):
+        place = total(place, _arm(scope, measure))
+    forward, sideways = measure.ground.directions(place, scope)
     return cross(sideways, forward) if upwards else forward

@@ -125,11 +125,12 @@ def fastest_turn(K: Guards) -> float:
             p = K.partner[f]
             gain = K.guards0[K.at_slip + f] * K.guards0[K.at_slip_rate + f]
             gain += K.guards0[K.at_slip + p] * K.guards0[K.at_slip_rate + p]
-            if gain < 0.0:  # it comes to rest: `approached_end` sees to that
+            speed = speed_of_both(K, f, K.guards0, K.at_slip)
+            if gain < 0.0 and speed > STILL:  # it comes to rest: `approached_end` sees to that
                 continue
             if rate == 0.0:
                 evaluate(K, K.time, K.q, K.y)
-            speed = speed_of_both(K, f, K.guards0, K.at_slip) + 4.0 * K.hold[f]
+            speed += 4.0 * K.hold[f]
             mass = mass_of(K, f)
             if speed > 0.0 and mass > 0.0:
                 rate += K.guards0[K.at_limit + f] / (mass * speed)
