@@ -244,7 +244,7 @@ CONSTRAINTS: list[tuple[str, Callable[[Frame, Frame, Joint], Constraint]]] = [
     ),
     (
         "disk on a swell",
-        lambda a, b, joint: mbd.Unilateral("law", mbd.disk_touchdown(b, 0.1, "z", swell), friction=0.3),
+        lambda a, b, joint: mbd.Unilateral("law", mbd.disk_touchdown(b, 0.1, "z", swell)),
     ),
     ("round foot", lambda a, b, joint: mbd.Unilateral("law", mbd.rolling_touchdown(a, 0.3))),
     (

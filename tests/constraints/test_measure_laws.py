@@ -5,9 +5,11 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 import mbd
+from mbd.constraints.disks import DiskTouchdown
 from mbd.constraints.measure import Measure
 from mbd.constraints.measures import Distance, JointMeasure, Separation
 from mbd.constraints.rolling_touchdown import ProfileTouchdown, RollingTouchdown
+from mbd.constraints.sphere_touchdown import SphereTouchdown
 from mbd.constraints.touchdown import Touchdown
 from mbd.constraints.turning_measures import Cone, Twist
 from mbd.tape.derivatives import gradient
@@ -33,8 +35,8 @@ def scene(factory, pose=(0.1, 0.2, 0.3, 0.4, 0.5, 0.6)) -> tuple[Measure, FreeSc
 def test_every_measure_keeps_the_laws(factory):
     measure, _ = scene(factory)
     verdict = check_measure(factory)
-    stands = isinstance(measure, Touchdown | RollingTouchdown | ProfileTouchdown)
-    between_bodies = stands and isinstance(measure.ground, mbd.Plane) and measure.ground.frame is not None
+    stands = isinstance(measure, Touchdown | RollingTouchdown | ProfileTouchdown | SphereTouchdown | DiskTouchdown)
+    between_bodies = stands and measure.ground.frame is not None
     assert any(law.startswith("frame invariance") for law in verdict.laws) == (
         between_bodies or isinstance(measure, JointMeasure | Distance | Separation | Cone | Twist)
     )
