@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 from mbd.bodies.algebra import basis, cross, derivatives_at, difference, dot, rotate, scaled, total, transpose
 from mbd.bodies.base import Frame
@@ -80,12 +80,17 @@ class Plane:
 
     def directions(self, held: Triple, scope: Scope) -> tuple[Triple, Triple]:
         """Forward and sideways in the plane's axes; x and z on level ground."""
-        n = self.normal
-        if abs(n[2]) > 0.999:
-            return basis(n)
-        flat = (1.0 - n[2] * n[2]) ** 0.5
-        sideways = (-n[2] * n[0] / flat, -n[2] * n[1] / flat, flat)
-        return cross(n, sideways), sideways
+        return self.along
+
+    @property
+    def along(self) -> tuple[Vector3, Vector3]:
+        """The same; x and y where the normal is z."""
+        x, y, z = self.normal
+        if abs(z) > 0.999:
+            return basis(self.normal)
+        flat = (1.0 - z * z) ** 0.5
+        sideways = (-z * x / flat, -z * y / flat, flat)
+        return cast(Vector3, cross(self.normal, sideways)), sideways
 
     def turned(self, direction: Triple, scope: Scope) -> Triple:
         """A direction of the plane in ground axes."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from mbd.bodies.algebra import basis, cross, rotate, scaled, total
+from mbd.bodies.algebra import basis, rotate, scaled, total
 from mbd.bodies.base import Frame
 from mbd.bodies.values import Vector3
 from mbd.constraints.balls import Ball
@@ -22,6 +22,7 @@ from mbd.constraints.rolling import Rolling
 from mbd.constraints.rolling_touchdown import RollingTouchdown
 from mbd.constraints.sphere_touchdown import SphereTouchdown
 from mbd.constraints.surfaces import Plane, Surface
+from mbd.equations.held import held_contacts, offer_held
 from mbd.equations.outputs import AXES, Outputs
 from mbd.scope import Scope, Triple
 from mbd.tape.node import Scalar
@@ -48,18 +49,18 @@ def drawn(owner: str, what: str) -> str:
 class Shape:
     """Something that is drawn.
 
-    kind : 'plane' (at rest), 'moving plane', 'surface', 'wheel', 'ball' or 'blade'; of spatial mechanisms 'solid',
-        'limb' (a link with a moment about its long axis) and 'hinge'
+    kind : 'plane' (at rest), 'moving plane', 'surface', 'wheel', 'ball', 'blade' or 'held' (what never opens, or
+        rolls); of spatial mechanisms 'solid', 'limb' (a link with a moment about its long axis) and 'hinge'
     name : of the constraint that has it, or the first of them, of the body, of the joint; `drawn(name, …)` are its
         results: place, normal and forward of a moving plane, height (of PLACE and time) of a surface, spoke and axle of
         a wheel, along of a blade, first and second axis of a body, axis of a joint, arm of a contact
-    contacts : the contacts that touch a ground; normal and forward of each where it is no plane at rest; of a disk or a
+    contacts : the contacts that touch a ground; its directions at each where it is no plane at rest; of a disk or a
         ball its contacts, whose arm leads from the center to where they touch
     points : the frame that touches, of each contact
     place : frame of the center of a wheel or a ball, of a blade, of a body's center, of a joint
     numbers : normal and offset of a plane at rest; mass and Ixx, Iyy, Izz, Ixy, Ixz, Iyz of a solid or a limb
     across : of a surface, the names of what its height depends on, such as 'xt'
-    form : of a solid, 'box', 'cylinder' or 'ball' where words of the model tell it
+    form : of a solid, 'box', 'cylinder' or 'ball' where words of the model tell it; of what is held 'normal' or 'grip'
     """
 
     kind: str
@@ -91,7 +92,8 @@ def shapes_of(model: Description) -> tuple[Shape, ...]:
         for word in model.constraints
         if isinstance(word, KnifeEdge)
     ]
-    return (*grounds, *rolling, *edges)
+    held = [Shape("held", name, place=frame.full_name, form=form) for name, frame, form in held_contacts(model)]
+    return (*grounds, *rolling, *edges, *held)
 
 
 def _grounds(
@@ -164,6 +166,7 @@ def offer_shapes(outputs: Outputs, scope: Scope, model: Description) -> None:
     def offer(owner: str, what: str, make: Callable[[], Triple]) -> None:
         outputs.triple(drawn(owner, what), make, AXES, listed=False)
 
+    offer_held(offer, scope, model)
     for name, center in _arcs(model).items():
         offer(name, "spoke", partial(_axis, scope, center, (0.0, -1.0, 0.0)))
         offer(name, "axle", partial(_axis, scope, center, (0.0, 0.0, 1.0)))
@@ -182,8 +185,8 @@ def offer_shapes(outputs: Outputs, scope: Scope, model: Description) -> None:
             _offer_plane(offer, scope, word.name, measure.ground)
         elif measure is not None and isinstance(getattr(measure, "ground", None), Surface):
             outputs.add(drawn(word.name, HEIGHT), partial(_height, scope, measure.ground), listed=False)
-            offer(word.name, "normal", partial(_slope, scope, measure, True))
-            offer(word.name, "forward", partial(_slope, scope, measure, False))
+            for k, way in enumerate(("normal", "forward", "sideways")):
+                offer(word.name, way, partial(_slope, scope, measure, k))
 
 
 def _offer_plane(
@@ -192,7 +195,8 @@ def _offer_plane(
     if plane.is_moving:
         offer(name, "place", partial(_material, scope, plane))
         offer(name, "normal", lambda: plane.turned(plane.normal, scope))
-        offer(name, "forward", lambda: plane.turned(plane.directions((0.0, 0.0, 0.0), scope)[0], scope))
+        for k, way in enumerate(("forward", "sideways")):
+            offer(name, way, partial(plane.turned, plane.along[k], scope))
 
 
 def _material(scope: Scope, plane: Plane) -> Triple:
@@ -229,10 +233,10 @@ def _height(scope: Scope, surface: Surface) -> Scalar:
     return surface.slopes((tape.input(PLACE, 0), 0.0, tape.input(PLACE, 1)), scope)[0]
 
 
-def _slope(scope: Scope, measure: Any, upwards: bool) -> Triple:
-    """Normal of a surface below a foot, or the direction forward along it."""
+def _slope(scope: Scope, measure: Any, k: int) -> Triple:
+    """Normal of a surface where something touches, or the direction forward or sideways along it."""
     place = scope.frame(_point(measure)).position
     if isinstance(measure, DiskTouchdown | SphereTouchdown):
         place = total(place, _arm(scope, measure))
-    forward, sideways = measure.ground.directions(place, scope)
-    return cross(sideways, forward) if upwards else forward
+    found: Triple = measure.ground.normal_at(place, scope) if k == 0 else measure.ground.directions(place, scope)[k - 1]
+    return found

@@ -7,6 +7,7 @@ from typing import Any
 
 from mbd.bodies.rigid_body import FORMS
 from mbd.bodies.values import among, printable
+from mbd.equations.held import HELD_BY
 from mbd.joints.anatomy import ANATOMY
 from mbd.results.archive import Head, Members, Unreadable
 
@@ -120,7 +121,7 @@ def _shape(shape: Mapping[str, Any]) -> None:
     expect(
         all(isinstance(shape.get(word, ""), str) for word in ("kind", "name", "place", "across", "form")), "'shapes'"
     )
-    expect(shape.get("form", "") in ("", *FORMS), "'shapes'")
+    expect(shape.get("form", "") in ("", *FORMS, *HELD_BY), "'shapes'")
     expect(set(shape["across"]) <= set("xzt"), "'shapes'")
     contacts, points = (_list(shape[word], str, "'shapes'") for word in ("contacts", "points"))
     expect(len(contacts) == len(points), "'shapes'")

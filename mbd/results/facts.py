@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from mbd.equations.held import WAYS
 from mbd.equations.shapes import HEIGHT, Shape, drawn
 from mbd.joints.anatomy import Angle, angles_of
 from mbd.results.names import AXES
@@ -84,11 +85,13 @@ class Facts:
         for shape in self.shapes:
             vectors = {
                 "moving plane": ("place", "normal", "forward"), "wheel": ("spoke", "axle"), "blade": ("along",),
-                "solid": ("first", "second"), "limb": (), "hinge": ("axis",),
+                "solid": ("first", "second"), "limb": (), "hinge": ("axis",), "held": WAYS,
             }.get(shape.kind, ())  # fmt: skip
             found += [drawn(shape.name, what) for what in vectors]
             if shape.kind in ("moving plane", "surface"):
-                found += [drawn(contact, what) for contact in shape.contacts for what in ("normal", "forward")]
+                found += [
+                    drawn(contact, what) for contact in shape.contacts for what in ("normal", "forward", "sideways")
+                ]
             if shape.kind in ROUND:
                 found += [drawn(contact, "arm") for contact in shape.contacts]
         radii = (f"{shape.name}.radius" for shape in self.shapes if shape.kind in ROUND)

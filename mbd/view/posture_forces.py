@@ -10,7 +10,8 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.errors import MbdError
 from mbd.simulation.simulate import simulate
-from mbd.view.scene import Push, Scene
+from mbd.view.pushes import Push
+from mbd.view.scene import Scene
 from mbd.view.style import INK, tone
 
 if TYPE_CHECKING:

@@ -13,6 +13,7 @@ from mbd.arrays import Matrix, Vector
 from mbd.results.facts import ROUND
 from mbd.results.names import AXES
 from mbd.view.instants import Instants
+from mbd.view.pushes import Push, pushes
 from mbd.view.scenery import FIT, Ground, Scenery, plane_of_motion, scenery
 from mbd.view.seen_once import once, solid_ones
 from mbd.view.solids import Hinge, Solid, hinges, limbs, solids
@@ -31,15 +32,6 @@ class Touch:
     where: Vector
     begin: float
     end: float
-
-
-@dataclass(frozen=True, eq=False)
-class Push:
-    """The force of the ground on a foot over time, in the axes of the scene: place (F, 3) [m], force (F, 3) [N]."""
-
-    contact: str
-    place: Matrix
-    force: Matrix
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,10 +91,10 @@ def scene(run: Trajectory, count: int | Instants) -> Scene:
     around, bodies_seen = once(around, solid_ones(bodies_seen, points, positions[0] if points else np.zeros((0, 3))))
     shown = (Ground(turn @ normal, offset) for normal, offset in _grounds(run, instants, raw, around))
     named = tuple(number[name] for name in markers)
-    pushes = tuple(_pushes(run, instants, turn, around))
+    pushed = tuple(pushes(run, instants, turn, around))
     grounds = (*around.grounds, *shown)
     return Scene(
-        instants, points, positions, segments, masses, around, grounds, touches, pushes, named,
+        instants, points, positions, segments, masses, around, grounds, touches, pushed, named,
         bool(points) and (deep or bool(bodies_seen or axes) or _is_deep(run)), bodies_seen, axes, limbs(run), turn,
     )  # fmt: skip
 
@@ -152,38 +144,6 @@ def _touches(run: Trajectory, turn: Matrix) -> list[Touch]:
         for first, stop in zip(change[::2], change[1::2], strict=True):
             found.append(Touch(contact.name, turn @ where[first], float(run.time[first]), float(run.time[stop - 1])))
     return found
-
-
-def _pushes(run: Trajectory, instants: Instants, turn: Matrix, around: Scenery) -> list[Push]:
-    """Forces of contacts with a ground: the normal times the contact's force, and its friction along the ground."""
-    found = []
-    for contact in run.facts.contacts:
-        wanted = [*(f"{contact.place}{axis}" for axis in AXES), f"{contact.name}.gap", f"{contact.name}.force"]
-        along = [name for name in (f"{contact.name}.friction.{way}" for way in ("forward", "sideways")) if name in run]
-        if contact.unit != "m" or not contact.place or any(name not in run for name in wanted):
-            continue
-        values = instants.read(run, [*wanted, *along])
-        directions = around.directions.get(contact.name) or _shown_directions(values, turn)
-        if directions is None or not np.any(values[:, 4:]):
-            continue
-        normal, forward = directions
-        ways = {"forward": forward, "sideways": np.cross(forward, normal)}
-        force = values[:, 4:5] * normal
-        for column, name in enumerate(along, start=5):
-            force = force + values[:, column : column + 1] * ways[name.rpartition(".")[2]]
-        place = values[:, :3] @ turn.T + around.tread(contact.name, contact.place, normal)
-        found.append(Push(contact.name, place, np.nan_to_num(force)))
-    return found
-
-
-def _shown_directions(values: Matrix, turn: Matrix) -> tuple[Matrix, Matrix] | None:
-    """Normal and forward of a plane that only the motion shows."""
-    plane = plane_of_motion(values[:, :3], values[:, 3])
-    if plane is None:
-        return None
-    normal = plane[0]
-    forward = np.array([normal[1], -normal[0], 0.0])
-    return np.tile(turn @ normal, (len(values), 1)), np.tile(turn @ forward, (len(values), 1))
 
 
 def _grounds(

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
+from mbd.constraints.surfaces import Plane
 from mbd.equations.shapes import HEIGHT, PLACE, Shape, drawn
 from mbd.results.facts import ROUND
 from mbd.results.names import AXES
@@ -94,7 +95,7 @@ class Blade:
 class Scenery:
     """All of them.
 
-    directions : normal and forward along it of the ground of each contact with one, (F, 3)
+    directions : normal of the ground of each contact with one, forward and sideways along it, (F, 3)
     arms : from the center of a disk or a ball to where it touches, by contact, (F, 3) [m]
     """
 
@@ -104,7 +105,7 @@ class Scenery:
     wheels: tuple[Wheel, ...]
     balls: tuple[Ball, ...]
     blades: tuple[Blade, ...]
-    directions: dict[str, tuple[Matrix, Matrix]]
+    directions: dict[str, tuple[Matrix, Matrix, Matrix]]
     arms: dict[str, Matrix]
 
     @property
@@ -127,18 +128,19 @@ def scenery(run: Trajectory, instants: Instants, turn: Matrix, points: NDArray[n
         return instants.read(run, [drawn(owner, what) + axis for axis in AXES]) @ turn.T
 
     grounds, decks, sheets, wheels, balls, blades = [], [], [], [], [], []
-    directions: dict[str, tuple[Matrix, Matrix]] = {}
+    directions: dict[str, tuple[Matrix, Matrix, Matrix]] = {}
     arms: dict[str, Matrix] = {}
     for shape in run.facts.shapes:
-        if shape.kind in ("solid", "limb", "hinge") or not _known(run, shape):
+        if shape.kind in ("solid", "limb", "hinge", "held") or not _known(run, shape):
             continue
         if shape.kind == "plane":
             normal = turn @ np.array(shape.numbers[:3])
             grounds.append(Ground(normal, shape.numbers[3]))
-            forward = turn @ _forward(np.array(shape.numbers[:3]))
+            x, y, z = shape.numbers[:3]
+            forward, sideways = (turn @ np.array(way) for way in Plane((x, y, z)).along)
             for contact in shape.contacts:
                 many = (len(instants.time), 1)
-                directions[contact] = np.tile(normal, many), np.tile(forward, many)
+                directions[contact] = np.tile(normal, many), np.tile(forward, many), np.tile(sideways, many)
         elif shape.kind == "moving plane":
             decks.append(Deck(*(read(shape.name, what) for what in ("place", "normal", "forward"))))
         elif shape.kind == "surface":
@@ -156,7 +158,8 @@ def scenery(run: Trajectory, instants: Instants, turn: Matrix, points: NDArray[n
                 blades.append(Blade(shape.place, place, read(shape.name, "along")))
         if shape.kind in ("moving plane", "surface"):
             for contact in shape.contacts:
-                directions[contact] = read(contact, "normal"), read(contact, "forward")
+                normal, forward, sideways = (read(contact, way) for way in ("normal", "forward", "sideways"))
+                directions[contact] = normal, forward, sideways
     return Scenery(
         tuple(grounds), tuple(decks), tuple(sheets), tuple(wheels), tuple(balls), tuple(blades), directions, arms
     )  # fmt: skip
@@ -173,15 +176,6 @@ def _known(run: Trajectory, shape: Shape) -> bool:
         return all(f"{name}.x" in run for name in (shape.place, *(drawn(each, "arm") for each in shape.contacts)))
     what = {"moving plane": "place", "wheel": "spoke"}.get(shape.kind, "along")
     return f"{drawn(shape.name, what)}.x" in run and (not shape.place or f"{shape.place}.x" in run)
-
-
-def _forward(normal: Vector) -> Vector:
-    """Forward along a plane, see `Plane.directions`: x on level ground."""
-    x, y, z = normal
-    flat = float(np.hypot(x, y))
-    if abs(z) > 0.999:
-        return np.asarray(np.array([1.0, 0.0, 0.0]) - x * normal)
-    return np.asarray(np.array([y, -x, 0.0]) / flat)
 
 
 def _sheet(run: Trajectory, shape: Shape, instants: Instants, turn: Matrix, points: NDArray[np.float64]) -> Sheet:
