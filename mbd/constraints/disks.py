@@ -40,6 +40,10 @@ def to_edge(center: Frame, axis: Vector3, radius: Scalar, ground: Plane, scope: 
     return scaled(radius / sqrt(dot(across, across)), difference(scaled(dot(n, a), a), n))
 
 
+FLAT = "a disk that lies flat touches with all its edge (give it feet along the edge by mbd.touchdown to lie on)"
+"""What a row that is no number means."""
+
+
 @dataclass(frozen=True)
 class DiskTouchdown(Measure):
     """``g = n · s_C − r |n × a|`` of the edge of a thin disk, and the slip ``v_C + ω × e − v_P`` of its lowest point.
@@ -67,8 +71,8 @@ class DiskTouchdown(Measure):
 
     @property
     def undefined(self) -> str:
-        """On a height function: no single place of contact."""
-        return NO_PLACE if isinstance(self.ground, Surface) else ""
+        """It lies flat, or a height function has no single place of contact."""
+        return f"{FLAT}, or {NO_PLACE}" if isinstance(self.ground, Surface) else FLAT
 
     @property
     def has_slip_velocities(self) -> bool:
