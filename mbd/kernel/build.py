@@ -34,7 +34,7 @@ APART = (
     "singular.events.log_passed_events", "singular.events.refuses", "hooks.scheme_accept", "trial_step.brief_step",
     "trial_step.share_multipliers", "singular.newmark_step.singular_newmark_step", "schemes.newton.second_look",
     "schemes.newton.retreat", "schemes.radau.radau_step", "schemes.runge_kutta.runge_kutta_step",
-    "advance.advance", "begin_run.begin_run",
+    "restart.lower_to_step", "cone_steps.come_to_zero", "advance.advance", "begin_run.begin_run",
 )  # fmt: skip
 """Their loops keep their shape wherever they are called; where they are not, nobody carries them along.
 

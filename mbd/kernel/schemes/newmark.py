@@ -12,7 +12,7 @@ from mbd.kernel.codes import PASSING
 from mbd.kernel.conditioning import is_ill_conditioned, refine_accelerations
 from mbd.kernel.mass_ratios import is_uneven
 from mbd.kernel.records import Kernel, Steps
-from mbd.kernel.restart import compose, consistent, fill_block, measure_accepted, take_consistent
+from mbd.kernel.restart import compose, consistent, fill_block, lower_to_step, measure_accepted, take_consistent
 from mbd.kernel.schemes.contract import Scheme
 from mbd.kernel.schemes.iteration import predict, shift_growth
 from mbd.kernel.schemes.memory import accept_step, forget_steps, look_a_step_ahead, start_step
@@ -78,12 +78,13 @@ def newmark_step(K: Kernel, h: float, t1: float) -> int:
     c_C = K.gamma * h * c
     c_K = K.beta * h * h * c
     tangents = 0
-    while True:  # at most twice; called from one place, the iteration stays in one piece with the step
+    while True:  # at most three times; called from one place, the iteration stays in one piece with the step
         predict(K, h, t1, c_C, c_K)
         status = solve_step(K, h, t1, c_C, c_K, tangents)
-        if status != UNSOUND:
+        if status == UNSOUND:
+            tangents = SEARCHED  # pivots in a fixed order were round-off: from the prediction again, with a search
+        elif not (status == 0 and K.scales_of_start == 1 and lower_to_step(K)):
             return status
-        tangents = SEARCHED  # pivots in a fixed order were round-off: from the prediction again, with a search for them
 
 
 def newmark_accept(K: Steps, h: float) -> None:

@@ -15,7 +15,6 @@ from mbd.kernel.records import DependentRows, Equations, Kernel, Reals, Report, 
 from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import (
     add_shares,
-    lower_to_step,
     note_scales,
     raise_scales,
     restore_scales,
@@ -87,8 +86,6 @@ def solve_step(K: Kernel, h: float, t1: float, c_C: float, c_K: float, tangents:
             error = second_look(K, o_r, m, c_C, c_K, tolerance, iteration)
             if error < 0.0:
                 return no_candidate(K, h, t1, int(-error))
-        if error <= 1.0 and K.scales_of_start == 1 and lower_to_step(K):
-            error = residual_size(K, o_r, m, c_C, c_K, tolerance, K.stabilized)
         if error <= 1.0 and (K.uneven_masses == 0 or has_settled(moved, last, 1e-4 * first)):
             return conclude_step(K, h, t1)
         if not tangent and error > max(1.0, 0.3 * before):
