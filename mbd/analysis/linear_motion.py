@@ -220,8 +220,9 @@ def singular(found: Instant, terms: LinearTerms, chosen: Independent) -> list[st
     for idle in null_space(forces, rcond=NEGLIGIBLE).T if len(held) else ():
         extra = np.zeros(len(found.rows))
         extra[held] = idle / row_sizes(terms.R[:, held].T) * max(1.0, float(np.max(np.abs(found.lam), initial=0.0)))
-        bent = (found.terms(extra).K - terms.K)[:n_v]
-        if np.max(np.abs(free.T @ bent @ free), initial=0.0) > VANISHES * float(np.max(np.abs(bent), initial=0.0)):
+        bent = [(found.terms(part).K - terms.K)[:n_v] for part in (extra, *np.diag(extra)[held])]
+        size = sum(float(np.max(np.abs(each), initial=0.0)) for each in bent)  # what is left of rows may be round-off
+        if np.max(np.abs(free.T @ bent[0] @ free), initial=0.0) > VANISHES * size:
             lost = [found.titles[k] for k in held[np.abs(idle) > 1e-6]]
             return [
                 f"the constraint Jacobian loses rank at this posture only ({', '.join(lost)}), where branches of "
