@@ -50,6 +50,7 @@ WORDS = {
     mbd.KnifeEdge: ("knife", ROD.end),
     mbd.Nonholonomic: ("row", lambda rate: rate, 0.0, ("hinge.rate",)),
     mbd.Penalty: ("stop", mbd.flexion(HINGE), 1e3),
+    mbd.Ball: (ROD.end, 0.1),
     mbd.Plane: (),
     mbd.Rolling: ("wheel", ROD.end, 0.1),
     mbd.Unilateral: ("foot", mbd.height(ROD.end)),

@@ -87,5 +87,5 @@ def test_on_a_turning_table_it_circles_with_two_sevenths_of_the_speed():
 
 def test_what_is_no_ball_is_refused_by_name():
     body = mbd.RigidBody("ball", 1.0, (1.0, 1.0, 1.0))
-    with pytest.raises(mbd.ModelError, match="the ground is a mbd.Plane"):
-        mbd.sphere_touchdown(body.origin, 0.1, lambda x: x)
+    with pytest.raises(mbd.ModelError, match="the ground is a mbd.Ball, a mbd.Plane"):
+        mbd.sphere_touchdown(body.origin, 0.1, "table")
