@@ -103,7 +103,7 @@ OWN: dict[tuple[str, str], Any] = {
     ("Nonholonomic", "arguments"): ("hinge.rate",), ("Rolling", "center"): END,
     ("Tabulated", "torque"): (-1.0, 0.0, 1.0), ("TabulatedSpring", "torque"): (-1.0, 0.0, 1.0),
     ("rolling_touchdown", "center"): END, ("disk_touchdown", "center"): END,
-    ("sphere_touchdown", "center"): END,
+    ("sphere_touchdown", "center"): END, ("Ball", "center"): END,
     ("disk_touchdown", "axis"): (0.0, 0.0, 1.0),
     ("gait_report", "run"): walker(steps=5),
     ("fit", "data"): {"time": [0.1, 0.2], "hinge.angle": [0.3, 0.2]}, ("fit", "dt"): 0.1,
