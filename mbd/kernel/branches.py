@@ -6,7 +6,7 @@ from mbd.kernel.cone_loads import keep_in_cones
 from mbd.kernel.records import Balance, Complementarity, ContactForces, Frictions, Reals
 from mbd.kernel.redundancy import sharing, spread
 from mbd.kernel.restart import MOST_LOADS, active_rows, evaluate_loaded, limit_of, load_accelerations
-from mbd.kernel.saddle import solve_rows
+from mbd.kernel.saddle import correct_positions, solve_rows
 
 __all__ = ["find_limits", "is_on", "load", "slides", "solve_directed", "whole"]
 
@@ -15,13 +15,13 @@ def solve_directed(K: Balance, level: int) -> int:
     """Solve with the present branches and directions; friction that slides is put into K.impulse of its row."""
     if K.n_frictions == 0:
         load(K, level)
-        return int(solve_rows(K, active_rows(K, K.active), True))
+        return solve_at(K, active_rows(K, K.active), level)
     status = 0
     for _ in range(MOST_LOADS):
         evaluate_loaded(K, whole(K, level))
         find_limits(K, level)
         load(K, level)
-        status = solve_rows(K, active_rows(K, K.active), True)
+        status = solve_at(K, active_rows(K, K.active), level)
         if status != 0:
             return status
         change = evaluate_loaded(K, whole(K, level))
@@ -44,6 +44,11 @@ def solve_directed(K: Balance, level: int) -> int:
             row = K.friction_row[f]
             K.impulse[row] = K.slip[f] * K.limit[f] - (K.past[row] if level == 1 else 0.0)
     return status
+
+
+def solve_at(K: Balance, m: int, level: int) -> int:
+    """w and λ for the m rows in K.rows: accelerations, velocities, or at level 2 positions."""
+    return int(correct_positions(K, m) if level == 2 else solve_rows(K, m, True))
 
 
 def find_limits(K: ContactForces, level: int) -> None:

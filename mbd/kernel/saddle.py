@@ -8,16 +8,24 @@ from __future__ import annotations
 
 from typing import Any
 
-from mbd.kernel.codes import CONFLICT, DEPENDENT, NOT_FINITE
+from mbd.kernel.codes import CONFLICT, DEPENDENT, EPS, NOT_FINITE
 from mbd.kernel.linear import MOST_ROUND_OFF, eliminate, factor, round_off, sum_of_sizes
 from mbd.kernel.ordered import LOSS_AT_ONCE, OF_ACCELERATIONS, SYMMETRIC, factor_ordered, order_at, solve_ordered
 from mbd.kernel.records import Balance, DependentRows, Equations
 from mbd.kernel.redundancy import find_dependent, find_shares, shared, sharing, spread, take_shares
 
-__all__ = ["correct_velocities", "factor_saddle", "solve_rows"]
+__all__ = ["correct_positions", "correct_velocities", "factor_saddle", "solve_rows"]
 
 INCOMPATIBLE = 1e-6
 """Part of the terms of rows that a row which depends on others may be missed by, for errors of positions [-]."""
+ROUND_OFF = 64.0 * EPS
+"""Round-off of a row on positions, relative to its terms [-]."""
+OWN_TERMS = 0
+"""What changes in a solution: accelerations, whose rows are measured by their own terms."""
+VELOCITIES = 1
+"""Velocities."""
+POSITIONS = 2
+"""Positions."""
 
 
 def solve_rows(K: Balance, m: int, dropping: bool) -> int:
@@ -27,20 +35,25 @@ def solve_rows(K: Balance, m: int, dropping: bool) -> int:
     a friction that slides the shares of the limits in K.limit are solved with. K.rows has the dependent ones last then.
     Without `dropping` the rows are those that K.dropped has left, and K.shares are in place.
     """
-    return int(solve_change(K, K.y, m, dropping, False))
+    return int(solve_change(K, K.y, m, dropping, OWN_TERMS))
 
 
 def correct_velocities(K: Balance, y: Any, m: int, dropping: bool) -> int:
     """The same for a change w of the velocities y alone, which contradictions are measured by."""
-    return int(solve_change(K, y, m, dropping, True))
+    return int(solve_change(K, y, m, dropping, VELOCITIES))
 
 
-def solve_change(K: Balance, y: Any, m: int, dropping: bool, moving: bool) -> int:
-    """The same, of the velocities y where `moving`."""
+def correct_positions(K: Balance, m: int) -> int:
+    """The same for a change w of positions, at which rows that depend on others differ by the round-off of gaps."""
+    return int(solve_change(K, K.y, m, True, POSITIONS))
+
+
+def solve_change(K: Balance, y: Any, m: int, dropping: bool, what: int) -> int:
+    """The same, contradictions measured by what changes: the velocities y, positions, or the rows' own terms."""
     size = K.n + m
     rank = solve_matrix(K, m, not dropping and sharing(K), MOST_ROUND_OFF)
     if rank == -CONFLICT and dropping:
-        return solve_kept(K, y, m, moving)
+        return solve_kept(K, y, m, what)
     if rank == -CONFLICT and K.failure_index < K.n:  # forces push along a motion of little inertia
         return solve_to_round_off(K, m, False)
     if rank < 0:
@@ -69,7 +82,7 @@ def solve_change(K: Balance, y: Any, m: int, dropping: bool, moving: bool) -> in
     return 0
 
 
-def solve_kept(K: Balance, y: Any, m: int, moving: bool) -> int:
+def solve_kept(K: Balance, y: Any, m: int, what: int) -> int:
     """w and λ of an independent set of rows, where what is left over of all of them seems to be a contradiction.
 
     Forces along a motion of little inertia seem to be one too.
@@ -80,7 +93,7 @@ def solve_kept(K: Balance, y: Any, m: int, moving: bool) -> int:
     little = blocked < K.n
     if (kept < m or little) and not sharing(K):
         rank = solve_matrix(K, kept, False, round_off(K.n + kept) if little else MOST_ROUND_OFF)
-        if rank == K.n + kept and (kept == m or not contradicts(K, y, m, moving)):
+        if rank == K.n + kept and (kept == m or not contradicts(K, y, m, what)):
             spread(K, K.impulse)
             return 0
     K.failure_index = blocked
@@ -180,17 +193,19 @@ def solve_matrix(K: Balance, m: int, together: bool, tolerance: float) -> int:
     return rank
 
 
-def contradicts(K: Balance, y: Any, m: int, moving: bool) -> bool:
+def contradicts(K: Balance, y: Any, m: int, what: int) -> bool:
     """Whether the rows in K.rows that were left out of a solution contradict it, beyond errors of positions.
 
     Next to a singular configuration a row may be as short as its distance from there: what such errors leave of it is
     much of its own terms, but little of those of the rows beside it. So each row is judged by the largest terms of all
-    rows of its unit, those of the velocities y included where they are what is corrected (`moving`).
+    rows of its unit, those of the velocities y included where they are what is corrected. Where positions are, Newton's
+    iteration ends in round-off, in which dependent rows agree no longer.
     """
     n = K.n
     for unit in range(3):
         worst = 0.0
         size = 0.0
+        round_off = 0.0
         for k in range(m):
             row = K.rows[k]
             if K.row_unit[row] == unit:
@@ -200,10 +215,12 @@ def contradicts(K: Balance, y: Any, m: int, moving: bool) -> bool:
                     slope = K.acc[K.acc_B + row * n + j]
                     missed += slope * K.jump[j]
                     terms += abs(slope * K.jump[j])
-                    terms += abs(slope * y[j]) if moving else 0.0
+                    terms += abs(slope * y[j]) if what == VELOCITIES else 0.0
                 worst = max(worst, abs(missed))
                 size = max(size, terms)
-        if worst > INCOMPATIBLE * size:
+                if what == POSITIONS:
+                    round_off = max(round_off, ROUND_OFF * max(K.scale[n + row], 1e-3))
+        if worst > INCOMPATIBLE * size + round_off:
             return True
     return False
 

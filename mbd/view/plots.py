@@ -27,7 +27,7 @@ from mbd.view.style import CYCLE, INK, NEUTRAL, as_label, color, rules, tone
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
 
-__all__ = ["contacts", "drawing", "energy", "histories", "phase_portrait"]
+__all__ = ["contacts", "drawing", "energy", "histories", "phase_portrait", "portrayed"]
 
 MANY = 60
 """Events beyond this number are left to the contact bars, so that lines do not hide the curves."""
@@ -234,15 +234,19 @@ def _spent(ledger: Ledger) -> list[Part]:
     return sorted(parts, key=lambda part: -float(np.max(np.abs(part.energy))))
 
 
+def portrayed(run: Trajectory) -> tuple[str, ...]:
+    """Every coordinate in radians that has a rate, or every one if there is none; () where orientations alone move."""
+    moving = run.facts.coordinates[: run.facts.coordinate_count]
+    known = {name: kind for name, kind in moving if not run.facts.velocities or f"{name}.rate" in run}
+    return tuple(name for name, kind in known.items() if kind == "rad") or tuple(known)
+
+
 def phase_portrait(run: Trajectory, *coordinates: str, path: str | Path | None = None, degrees: bool = True) -> Any:
     """Rate against coordinate, angles in degrees or in radians; jumps at switches are dotted, the start is a dot.
 
-    Without names: every coordinate in radians, or every coordinate if there is none.
+    Without names: those of `portrayed`.
     """
-    moving = run.facts.coordinates[: run.facts.coordinate_count]
-    known = {name: kind for name, kind in moving if not run.facts.velocities or f"{name}.rate" in run}
-    angles = tuple(name for name, kind in known.items() if kind == "rad")
-    wanted: Sequence[str] = coordinates or angles or tuple(known)
+    wanted: Sequence[str] = coordinates or portrayed(run)
     time, values = curves(run, [part for name in wanted for part in (name, f"{name}.rate")])
     cuts = Grid(time).cuts
     with drawing(path, 5.6, 4.6) as figure:

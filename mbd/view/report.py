@@ -121,12 +121,12 @@ def write(
     place.mkdir(parents=True, exist_ok=True)
     paths = [run.page(place / "page.html"), run.save(place / f"run{SUFFIX}")]
     if plots:
-        from mbd.view.plots import phase_portrait
+        from mbd.view.plots import phase_portrait, portrayed
 
         run.plot(path=place / "coordinates.png")
         run.energy.plot(path=place / "energy.png")
         paths += [place / "coordinates.png", place / "energy.png"]
-        if run.facts.coordinate_count:
+        if portrayed(run):
             phase_portrait(run, path=place / "phase.png")
             paths.append(place / "phase.png")
         kinds = [f"{contact.name}.{what}" for contact in run.facts.contacts for what in ("force", "friction")]

@@ -278,3 +278,31 @@ def test_a_step_whose_end_has_no_impulses_is_tried_down_to_an_eighth(monkeypatch
         assert any("shortened" in note for note in trajectory.stats["notes"])
         assert sum(event.kind == "closed" for event in trajectory.events) == 1
     np.testing.assert_allclose(refused, [0.17, 0.085, 0.0425, 0.02125][:until_works], rtol=1e-12)
+
+
+# feet whose corners depend on each other ------------------------------------------------------------------------------
+def two_feet(random):
+    """A body on two feet of four corners in a plane, on universal ankles, askew over the ground."""
+    model = mbd.Model("two feet")
+    upper = mbd.RigidBody("upper", 2.0, (0.02, 0.03, 0.025))
+    model.connect(mbd.Free("float", model.ground.origin, upper.origin))
+    for side in (-1, 1):
+        foot = mbd.RigidBody(f"foot {side}", 1.0, (0.003, 0.003, 0.001))
+        model.connect(mbd.Universal(f"ankle {side}", upper.point(0.0, -0.3, 0.1 * side), foot.origin))
+        a, b, c, d = random.uniform(0.03, 0.15, 4)
+        corners = [foot.point(x, -0.08, z) for x, z in ((-a, -b), (c, -b), (d, a), (-b, c))]
+        mbd.parts.polygon_foot(model, f"sole {side}", corners, friction=0.8)
+    tilt = ("zxy", tuple(random.uniform(-0.1, 0.1, 3)))
+    height, speed = 0.4 + random.uniform(0.005, 0.03), random.uniform(-0.3, 0.3)
+    return model, mbd.assemble(model, {"float.y": height, "float.orientation": tilt}, {"float.x": speed})
+
+
+@pytest.mark.parametrize("scheme", [mbd.HHT(alpha=0.05), mbd.RadauIIA()], ids=str)
+def test_soles_of_four_corners_come_down_on_all_of_them(scheme):
+    """Four gaps of a rigid sole depend on three: all there is of them at the end of a correction is round-off."""
+    random = np.random.default_rng(8)
+    for _ in range(4):
+        model, start = two_feet(random)
+        run = mbd.simulate(model, start, scheme, dt=2e-3, until=0.3, contact="nonsmooth")
+        lowest = min(run[f"{contact.name}.gap"].min() for contact in model.constraints)
+        assert run.success and lowest > -1e-9

@@ -11,9 +11,11 @@ from matplotlib import pyplot
 from matplotlib.colors import to_hex, to_rgb
 from matplotlib.text import Text
 
+import mbd
 from mbd.errors import TrajectoryError, UnknownNameError
 from mbd.view.curves import curves
 from mbd.view.plots import contacts, phase_portrait, stretches
+from mbd.view.report import write
 from mbd.view.style import DARK, INK, PALE, PAPER, color
 from tests.view.handmade_runs import ball, oscillator, walker
 
@@ -177,3 +179,10 @@ def test_a_drawing_in_vectors_has_ink_for_light_and_for_dark_pages(tmp_path):
 def test_a_file_among_the_names_of_a_plot_is_answered_with_its_argument():
     with pytest.raises(TrajectoryError, match=r"give a file as path, plot\(path='swing.png'\)"):
         walker().plot("swing.png")
+
+
+def test_where_orientations_alone_move_no_phase_portrait_is_written(tmp_path):
+    model = mbd.Model("ball joint")
+    model.connect(mbd.Spherical("ball", model.ground.origin, mbd.RigidBody("body", 1.0, (1.0, 2.0, 2.5)).origin))
+    run = mbd.simulate(model, mbd.assemble(model), dt=0.01, until=0.02)
+    assert not (tmp_path / "phase.png").exists() and tmp_path / "phase.png" not in write(run, tmp_path, {})
