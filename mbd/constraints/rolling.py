@@ -1,4 +1,4 @@
-"""A wheel that rolls without slip."""
+"""A wheel, a disk or a ball that rolls without slip."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from mbd.constraints.surfaces import Plane
 from mbd.errors import CapabilityError, ModelError
 from mbd.forces.base import frame_of
 from mbd.forces.quantities import Mention
-from mbd.scope import Scope
+from mbd.scope import Scope, Triple
 from mbd.tape.node import Node, Scalar
 
 __all__ = ["Rolling"]
@@ -44,8 +44,11 @@ class Rolling(VelocityConstraint):
         rolling needs grip although nothing presses any more, a run ends with an error; use friction instead
     axis : a of a thin disk that may lean any way in space, in the axes of `center`. It touches with the point of its
         edge nearest to the plane, C + r ((n·a) a − n)/|n × a|, which has two rows, 'forward' and 'sideways' along the
-        plane; `Bilateral` or `Unilateral` on `disk_touchdown` keeps it there. None: a wheel that turns about z of a
-        planar mechanism, with the one row along t
+        plane; `Bilateral` or `Unilateral` on `disk_touchdown` keeps it there. None: a ball, or a wheel that turns
+        about z of a planar mechanism, with the one row along t
+    ball : True for a sphere, which touches at C − r n however it has turned, with the rows 'forward' and 'sideways'; it
+        may spin about the normal, and its center of mass lie anywhere. `Bilateral` or `Unilateral` on
+        `sphere_touchdown` keeps it on the plane
 
     'name.force' is the friction on the wheel along t [N], −λ; 'name.residual' the slip [m/s].
 
@@ -53,6 +56,13 @@ class Rolling(VelocityConstraint):
     ------
     CapabilityError
         where the wheel turns about other axes than z and has no axis=: one that tilts touches the ground elsewhere.
+
+    Examples
+    --------
+    >>> model, body = mbd.Model("ball"), mbd.RigidBody("ball", 0.2, (3e-5,) * 3)
+    >>> model.connect(mbd.Free("fly", model.ground.origin, body.origin))
+    >>> height = mbd.sphere_touchdown(body.origin, 0.02)
+    >>> model.constrain(mbd.Bilateral("height", height), mbd.Rolling("grip", body.origin, 0.02, ball=True))
     """
 
     name: str
@@ -61,6 +71,7 @@ class Rolling(VelocityConstraint):
     ground: Plane = field(default_factory=Plane)
     only_while: str | None = None
     axis: Any = None
+    ball: bool = False
 
     def __post_init__(self) -> None:
         name_of(self.name, "Rolling")
@@ -70,9 +81,15 @@ class Rolling(VelocityConstraint):
             raise ModelError(f"ground of Rolling '{self.name}' is a mbd.Plane, got {self.ground!r}")
         if self.only_while is not None and not isinstance(self.only_while, str):
             raise ModelError(f"only_while of Rolling '{self.name}' is the name of a contact, got {self.only_while!r}")
+        if self.ball and self.axis is not None:
+            raise ModelError(f"Rolling '{self.name}' is a ball, which needs no axis=; leave out one of the two")
         if self.axis is not None:
             object.__setattr__(self, "axis", unit_vector(self.axis, f"axis of Rolling '{self.name}'"))
-            return
+        if self.axis is None and not self.ball:
+            self._in_the_plane()
+
+    def _in_the_plane(self) -> None:
+        """The ground of a planar wheel, whose normal and frame lie in the x-y plane."""
         if self.ground.normal[2] != 0.0:
             raise ModelError(
                 f"ground of Rolling '{self.name}': its normal must lie in the x-y plane, in which the wheel rolls, "
@@ -101,28 +118,28 @@ class Rolling(VelocityConstraint):
 
     def rates(self, scope: Scope) -> Sequence[tuple[str, Scalar]]:
         """Velocity of the touching point along the plane."""
-        if self.axis is not None:
-            return self._rows_of_disk(scope)
+        if self.ball or self.axis is not None:
+            return slip_along(self.ground, self.center, self.arm(scope), scope)
         motion = scope.frame(self.center)
         if any(isinstance(part, Node) and not part.is_zero for part in motion.angular_velocity[:2]):
             raise CapabilityError(
                 f"Rolling '{self.name}' serves wheels of planar mechanisms, which turn about z only; of a disk that "
-                "tilts in space give its axis=; the rows of other shapes can be written with mbd.Nonholonomic"
+                "tilts in space give its axis=, of a sphere ball=True; the rows of other shapes can be written with "
+                "mbd.Nonholonomic"
             )
-        r = scope.parameter(self.name, "radius", self.radius)
-        ground = self.ground
-        arm = scaled(-r, ground.turned(ground.normal, scope))
+        ground, arm = self.ground, self.arm(scope)
         slip = total(motion.velocity, cross(motion.angular_velocity, arm))
         if ground.is_moving:
             slip = difference(slip, ground.velocity_at(total(motion.position, arm), scope))
         forward, _ = ground.directions(motion.position, scope)
         return [("", dot(ground.turned(forward, scope), slip))]
 
-    def _rows_of_disk(self, scope: Scope) -> Sequence[tuple[str, Scalar]]:
-        """Velocity of the lowest point of the edge along the plane."""
+    def arm(self, scope: Scope) -> Triple:
+        """From the center to the touching point, in ground axes [m]: −r n, or to the edge of a disk."""
         radius = scope.parameter(self.name, "radius", self.radius)
-        arm = to_edge(self.center, self.axis, radius, self.ground, scope)
-        return slip_along(self.ground, self.center, arm, scope)
+        if self.axis is not None:
+            return to_edge(self.center, self.axis, radius, self.ground, scope)
+        return scaled(-radius, self.ground.turned(self.ground.normal, scope))
 
     def mentions(self) -> list[Mention]:
         """Its center, and the frame of the plane."""

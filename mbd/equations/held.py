@@ -6,10 +6,10 @@ from collections.abc import Iterable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from mbd.bodies.algebra import scaled, total
+from mbd.bodies.algebra import total
 from mbd.bodies.base import Frame
 from mbd.constraints.bilateral import Bilateral
-from mbd.constraints.disks import DiskTouchdown, to_edge
+from mbd.constraints.disks import DiskTouchdown
 from mbd.constraints.rolling import Rolling
 from mbd.constraints.sphere_touchdown import SphereTouchdown
 from mbd.constraints.touchdown import Touchdown
@@ -71,7 +71,5 @@ def _arm(scope: Scope, what: Any) -> Triple:
         return what.arm(scope)
     if isinstance(what, DiskTouchdown):
         return what.edge_arm(scope)
-    radius = scope.parameter(what.name, "radius", what.radius)
-    if what.axis is None:
-        return scaled(-radius, what.ground.turned(what.ground.normal, scope))
-    return to_edge(what.center, what.axis, radius, what.ground, scope)
+    arm: Triple = what.arm(scope)
+    return arm

@@ -84,7 +84,7 @@ def shapes_of(model: Description) -> tuple[Shape, ...]:
             found.append(same)
         same[1].update(contacts)
     grounds = [_ground(ground, name, contacts) for ground, contacts, name in found]
-    rolling = [Shape("wheel", wheel.name, place=wheel.center.full_name) for wheel in wheels]
+    rolling = [Shape("wheel", wheel.name, place=wheel.center.full_name) for wheel in wheels if not wheel.ball]
     rolling += [Shape("wheel", center, place=center) for center in _arcs(model)]
     rolling += _round_feet(model)
     edges = [
@@ -129,7 +129,7 @@ def _round_feet(model: Description) -> list[Shape]:
             contacts += [] if word.kind == "bilateral" else [word.name]
             if isinstance(measure.ground, Ball) and not measure.ground.hollow:
                 found.setdefault(measure.ground.center.full_name, ("ball", []))
-    rolling = {word.center.full_name for word in model.constraints if isinstance(word, Rolling)}
+    rolling = {word.center.full_name for word in model.constraints if isinstance(word, Rolling) and not word.ball}
     return [
         Shape(kind, center, tuple(contacts), (center,) * len(contacts), center)
         for center, (kind, contacts) in found.items()

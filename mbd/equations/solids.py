@@ -71,7 +71,8 @@ def _forms_by_contacts(model: Description) -> dict[str, str]:
         if isinstance(holder, SphereTouchdown | DiskTouchdown | Rolling):
             body = holder.center.body
             if holder.center.offset == body.center.offset:
-                found[body.name] = "ball" if isinstance(holder, SphereTouchdown) else "cylinder"
+                is_ball = isinstance(holder, SphereTouchdown) or (isinstance(holder, Rolling) and holder.ball)
+                found[body.name] = "ball" if is_ball else "cylinder"
     return found
 
 

@@ -90,7 +90,7 @@ WITH_TOLERANCE: dict[tuple[str, str], str] = {
 """Arguments that exclude tol=."""
 
 SPACE: dict[str, str] = {
-    "Rolling without axis=": "axis= of a disk, or mbd.Nonholonomic rows",
+    "Rolling without axis= or ball=": "axis= of a disk, ball=True of a sphere, or mbd.Nonholonomic rows",
 }
 """What is solved in planar models only, and what to use in space instead; refused as the equations are derived."""
 
