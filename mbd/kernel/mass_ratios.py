@@ -12,9 +12,9 @@ from __future__ import annotations
 from mbd.kernel.hooks import call
 from mbd.kernel.linear import solve_again, solve_definite
 from mbd.kernel.ordered import order_at, solve_kkt
-from mbd.kernel.records import Balance, Equations
+from mbd.kernel.records import Balance, Equations, Motion
 
-__all__ = ["LOSS", "find_imbalance", "has_settled", "is_uneven", "polish_rates", "polish_with_rows"]
+__all__ = ["LOSS", "excuses_much", "find_imbalance", "has_settled", "is_uneven", "polish_rates", "polish_with_rows"]
 
 LOSS = 1e-4
 """Part of a diagonal entry that is left as its pivot below which rates are corrected [-]."""
@@ -27,6 +27,8 @@ SMALL_CORRECTION = 1e-9
 
 SETTLED = 1e-8
 """Part of the largest rate that a correction of residuals that pass may change without another look [-]."""
+EXCUSED = 1e6
+"""Terms of forces over inertia forces and multipliers above which corrections are looked at as well [-]."""
 
 
 def has_settled(moved: float, last: float, enough: float) -> bool:
@@ -41,6 +43,24 @@ def has_settled(moved: float, last: float, enough: float) -> bool:
     enough : what is small beside the error of the step [-]
     """
     return moved <= max(SETTLED, enough) or (last > 0.0 and moved > 0.5 * last)
+
+
+def excuses_much(K: Motion) -> bool:
+    """Whether terms of forces are so much larger than what moves that small residuals do not tell small errors.
+
+    Next to half a turn terms of a twist, which cancel, grow as a power of 1/distance. M is in K.acc.
+    """
+    force = 0.0
+    for row in range(K.n_rows):
+        force = max(force, abs(K.lam[row]))
+    largest = 0.0
+    for i in range(K.n_v):
+        inertia = 0.0
+        for j in range(K.n_v):
+            inertia += abs(K.acc[i * K.n + j] * K.rate[j])
+        force = max(force, inertia)
+        largest = max(largest, K.scale[i])
+    return largest > EXCUSED * force
 
 
 def is_uneven(K: Equations, m: int) -> bool:

@@ -18,6 +18,7 @@ SETTLED = {
     2010525: "a disk on springs that passes flat",
     2010788: "dense output of steps of nanoseconds",
     2020892: "a run that goes on after a row was found to depend on others",
+    2031315: "a stop of twist whose terms excused residuals as large as its forces",
     2011901: "what nearly rests and turns around",
 }
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from mbd.kernel.charts import find_chart_end
 from mbd.kernel.codes import PASSING
 from mbd.kernel.conditioning import is_ill_conditioned, refine_accelerations
-from mbd.kernel.mass_ratios import is_uneven
+from mbd.kernel.mass_ratios import excuses_much, is_uneven
 from mbd.kernel.records import Kernel, Steps
 from mbd.kernel.restart import compose, consistent, fill_block, lower_to_step, measure_accepted, take_consistent
 from mbd.kernel.schemes.contract import Scheme
@@ -42,10 +42,10 @@ def newmark_start(K: Kernel) -> int:
         K.aux[i] = K.rate[i] + (K.jerk * (K.alpha_m - K.alpha_f) * full) * K.slope[i]
     for k in range(K.n_rows):
         K.lam_slope[k] = (K.impulse[k] - K.lam[k]) / step if status == 0 else 0.0
-    K.uneven_masses = 0
-    if K.vector == 0 and status == 0 and is_uneven(K, K.n_active):
-        K.uneven_masses = 1
     measure_accepted(K)
+    K.uneven_masses = 0
+    if K.vector == 0 and status == 0 and (excuses_much(K) or is_uneven(K, K.n_active)):
+        K.uneven_masses = 1
     if unresolved(K):
         for i in range(K.n):
             K.slope[i] = 0.0
