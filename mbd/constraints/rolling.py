@@ -59,6 +59,7 @@ class Rolling(VelocityConstraint):
 
     Examples
     --------
+    >>> import mbd
     >>> model, body = mbd.Model("ball"), mbd.RigidBody("ball", 0.2, (3e-5,) * 3)
     >>> model.connect(mbd.Free("fly", model.ground.origin, body.origin))
     >>> height = mbd.sphere_touchdown(body.origin, 0.02)
@@ -81,6 +82,8 @@ class Rolling(VelocityConstraint):
             raise ModelError(f"ground of Rolling '{self.name}' is a mbd.Plane, got {self.ground!r}")
         if self.only_while is not None and not isinstance(self.only_while, str):
             raise ModelError(f"only_while of Rolling '{self.name}' is the name of a contact, got {self.only_while!r}")
+        if not isinstance(self.ball, bool):
+            raise ModelError(f"ball of Rolling '{self.name}' is True or False, got {self.ball!r}")
         if self.ball and self.axis is not None:
             raise ModelError(f"Rolling '{self.name}' is a ball, which needs no axis=; leave out one of the two")
         if self.axis is not None:
