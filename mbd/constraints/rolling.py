@@ -10,7 +10,7 @@ from mbd.bodies.algebra import cross, difference, dot, scaled, total
 from mbd.bodies.base import Frame
 from mbd.bodies.domains import Domain, positive
 from mbd.bodies.ground import Ground
-from mbd.bodies.values import name_of, number, unit_vector
+from mbd.bodies.values import flag, name_of, number, unit_vector
 from mbd.constraints.base import VelocityConstraint
 from mbd.constraints.disks import to_edge
 from mbd.constraints.slip import slip_along
@@ -82,8 +82,7 @@ class Rolling(VelocityConstraint):
             raise ModelError(f"ground of Rolling '{self.name}' is a mbd.Plane, got {self.ground!r}")
         if self.only_while is not None and not isinstance(self.only_while, str):
             raise ModelError(f"only_while of Rolling '{self.name}' is the name of a contact, got {self.only_while!r}")
-        if not isinstance(self.ball, bool):
-            raise ModelError(f"ball of Rolling '{self.name}' is True or False, got {self.ball!r}")
+        object.__setattr__(self, "ball", flag(self.ball, f"ball of Rolling '{self.name}'"))
         if self.ball and self.axis is not None:
             raise ModelError(f"Rolling '{self.name}' is a ball, which needs no axis=; leave out one of the two")
         if self.axis is not None:
