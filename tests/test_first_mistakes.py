@@ -146,3 +146,58 @@ def test_several_turns_and_hinges_of_other_axes_are_not_doubted(recwarn: pytest.
     model, _ = pendulum()
     mbd.assemble(model, position={"pin.angle": 6.0 * np.pi})
     assert not recwarn.list
+
+
+# in space -----------------------------------------------------------------------------------------------------------
+def ball_joint() -> mbd.Model:
+    model = mbd.Model("ball joint")
+    model.connect(mbd.Spherical("hip", model.ground.origin, mbd.RigidBody("leg", 1.0, (1.0, 2.0, 2.5)).origin))
+    return model
+
+
+@pytest.mark.parametrize(
+    ("velocity", "said"),
+    [
+        ({"hip.angular_velocity": 3.0}, "'hip.angular_velocity' is three numbers"),
+        ({"hip.angular_velocity.world": (1, 2, 3)}, "'hip.angular_velocity.ground' of the ground"),
+    ],
+)
+def test_an_angular_velocity_says_its_axes_and_how_many_numbers_it_is(velocity: Any, said: str) -> None:
+    with pytest.raises(mbd.UnknownNameError, match=said):
+        mbd.assemble(ball_joint(), velocity=velocity)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: mbd.box(1.0, (1, -1, 1)),
+        lambda: mbd.sphere(1.0, -0.1),
+        lambda: mbd.sphere(-1.0, 0.1),
+        lambda: mbd.cylinder(1.0, 0.1, -0.2),
+        lambda: mbd.disk(1.0, -0.1),
+        lambda: mbd.rod(1.0, -1.0),
+    ],
+)
+def test_no_solid_has_a_negative_size(make: Callable[[], Any]) -> None:
+    with pytest.raises(mbd.ModelError, match="must not be negative, got -"):
+        make()
+
+
+def test_knees_of_who_stands_bend_forwards_in_radians() -> None:
+    for knees in (20.0, -0.3):
+        with pytest.raises(mbd.ModelError, match="between 0 and π rad"):
+            mbd.human(mass=70.0, height=1.75).standing(knees=knees)
+
+
+def test_grams_of_a_person_and_percents_of_friction_are_doubted() -> None:
+    with pytest.warns(mbd.MbdWarning, match="masses are in kg"):
+        mbd.human(mass=70000.0, height=1.75)
+    model = mbd.Model("disk that falls flat")
+    disk = mbd.RigidBody("disk", **mbd.disk(1.0, 0.1, axis="y").body)
+    model.connect(mbd.Free("float", model.ground.origin, disk.origin))
+    edge = mbd.disk_touchdown(disk.origin, 0.1, axis=(0, 1, 0))
+    model.constrain(mbd.Unilateral("edge", edge, friction=30.0))
+    with pytest.warns(mbd.MbdWarning, match="friction of 'edge' is 30"):
+        start = mbd.assemble(model, {"float.y": 0.2})
+    with pytest.raises(mbd.SimulationError, match="a disk that lies flat touches with all its edge"):
+        mbd.simulate(model, start, dt=0.01, until=0.1)

@@ -159,17 +159,33 @@ def _named(
     places, unknown = conditions(mechanism, three_of_four(model, elsewhere), rates=False)
     speeds, strange = conditions(mechanism, {k: v for k, v in velocity.items() if k not in rates}, rates=True)
     faults = [
-        f"position: {name!r} is a rate; give it in velocity={{{name!r}: …}}"
+        f"position: {name!r} is one number, no vector"
+        if name in coordinates
+        else f"position: {name!r} is a rate; give it in velocity={{{name!r}: …}}"
         if name in rates
         else "position: " + nearest(name, coordinates, "coordinate")
         for name in as_given(unknown)
     ]
-    faults += ["velocity: " + nearest(name, rates, "rate") for name in as_given(strange)]
+    faults += ["velocity: " + _no_rate(name, rates) for name in as_given(strange)]
     q, z, v = (
         {numbers[name]: float(value) for name, value in given.items() if name in numbers}
         for numbers, given in ((coordinates, position), (states, position), (rates, velocity))
     )
     return _Named(q, v, z, places, speeds), faults
+
+
+def _no_rate(name: str, rates: Mapping[str, int]) -> str:
+    """Why a name is no rate: a vector in axes that it has not, one number where three are needed, or none at all."""
+    whole, found, axes = name.partition(".angular_velocity")
+    if not found or f"{whole}.angular_velocity.x" not in rates:
+        return f"{name!r} is one number, no vector" if name in rates else nearest(name, rates, "rate")
+    if axes in ("", ".parent", ".ground"):
+        return f"{name!r} is three numbers [rad/s], such as (0.0, 0.0, 2.0)"
+    whole += ".angular_velocity"
+    return (
+        f"no rate named {name!r}; {whole!r} is in axes of the child, {f'{whole}.parent'!r} of the parent, "
+        f"{f'{whole}.ground'!r} of the ground"
+    )
 
 
 def _values(equations: Equations, named: _Named, guess: Mapping[str, float]) -> tuple[Vector, Vector]:

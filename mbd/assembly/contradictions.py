@@ -81,7 +81,12 @@ def contradictions(work: Posture, attempt: Attempt, model: Any) -> list[str]:
     for k in active:
         row = equations.rows[k]
         position, velocity = float(h.get(k, 0.0)), float(rate[k])
-        if abs(position) > TOLERANCE or abs(velocity) > TOLERANCE * speed or not np.isfinite(position + velocity):
+        if not np.isfinite(position + velocity):
+            found.append(
+                f"{row.title} is not finite at the start: check roots, logarithms and divisions, and "
+                "whether a disk lies flat, which touches with all its edge"
+            )
+        elif abs(position) > TOLERANCE or abs(velocity) > TOLERANCE * speed:
             place = "" if row.is_velocity else f"position residual {position:.6g} {row.unit}, "
             found.append(
                 f"the start contradicts {row.title}: {place}velocity residual {velocity:.6g} {row.unit}/s; "

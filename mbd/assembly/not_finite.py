@@ -21,7 +21,7 @@ Inputs = Mapping[Key, float]
 def first_cause(
     equations: Equations, inputs: Inputs, places: Mapping[str, str] | None = None, when: str = ""
 ) -> str | None:
-    """A sentence on the first that is not finite, forces before constraints; None where all of them are.
+    """A sentence on the first that is not finite: what touches nowhere, forces, constraints; None if all are.
 
     Parameters
     ----------
@@ -29,6 +29,10 @@ def first_cause(
     places : the frame on which a force acts, by the force's name
     when : words behind 'is not finite', such as ' at the start'
     """
+    if all(np.isfinite(value) for key, value in inputs.items() if isinstance(key, tuple) and key[0] == "q"):
+        for number, contact in enumerate(equations.contacts):  # where nothing touches at one place no force has one
+            if contact.undefined and not _finite([contact.gap, contact.gap_rate], inputs):
+                return f"the gap of {contact.name!r} is not finite{when}{_hint(equations, number)}"
     for effect in equations.effects:
         if not _finite(list(effect.generalized()), inputs):
             force = (

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from mbd.bodies.values import Vector3, among, number, triple
+from mbd.bodies.values import Vector3, among, number, size, triple
 from mbd.errors import ModelError, nearest
 
 __all__ = ["SEGMENTS", "Solid", "box", "cylinder", "disk", "rod", "segment", "sphere"]
@@ -45,28 +45,30 @@ def rod(mass: float, length: float) -> Solid:
     >>> rod(3.0, 2.0)
     Solid(mass=3.0, center=(0.0, -1.0, 0.0), inertia=(1.0, 0.0, 1.0))
     """
-    m, L = number(mass, "mass of a rod"), number(length, "length of a rod")
+    m, L = size(mass, "mass of a rod"), size(length, "length of a rod")
     across = m * L * L / 12.0
     return Solid(m, (0.0, -L / 2.0, 0.0), (across, 0.0, across))
 
 
 def box(mass: float, sides: Any) -> Solid:
     """A uniform box about its center, sides (a, b, c) along x, y, z: ``Ixx = m (b² + c²)/12``, …"""
-    m, (a, b, c) = number(mass, "mass of a box"), triple(sides, "sides of a box")
+    m = size(mass, "mass of a box")
+    a, b, c = (size(side, "side of a box") for side in triple(sides, "sides of a box"))
     x, y, z = m * a * a / 12.0, m * b * b / 12.0, m * c * c / 12.0
     return Solid(m, (0.0, 0.0, 0.0), (y + z, x + z, x + y), "box")
 
 
 def sphere(mass: float, radius: float) -> Solid:
     """A uniform ball: ``I = 2 m r²/5``."""
-    m, r = number(mass, "mass of a sphere"), number(radius, "radius of a sphere")
+    m, r = size(mass, "mass of a sphere"), size(radius, "radius of a sphere")
     moment = 0.4 * m * r * r
     return Solid(m, (0.0, 0.0, 0.0), (moment, moment, moment), "ball")
 
 
 def cylinder(mass: float, radius: float, length: float, axis: str = "z") -> Solid:
     """A uniform cylinder about its center: ``m r²/2`` about its axis, ``m (3 r² + L²)/12`` across."""
-    m, r, L = number(mass, "mass of a cylinder"), number(radius, "its radius"), number(length, "its length")
+    m, r = size(mass, "mass of a cylinder"), size(radius, "radius of a cylinder")
+    L = size(length, "length of a cylinder")
     if not among(axis, ("x", "y", "z")):
         raise ModelError(f"the axis of a cylinder is 'x', 'y' or 'z', got {axis!r}")
     along, across = m * r * r / 2.0, m * (3.0 * r * r + L * L) / 12.0

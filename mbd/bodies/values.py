@@ -108,6 +108,18 @@ def number(value: Any, what: str) -> float:
     return result
 
 
+def size(value: Any, what: str) -> float:
+    """A finite float that is not negative: a mass, a length.
+
+    >>> size(2, "radius of a sphere")
+    2.0
+    """
+    result = number(value, what)
+    if result < 0.0:
+        raise ModelError(f"{what} must not be negative, got {shown(value)}")
+    return result
+
+
 def shown(value: Any) -> str:
     """A value for a message; an integer of thousands of digits is not written out."""
     if isinstance(value, int) and value.bit_length() > 1024:

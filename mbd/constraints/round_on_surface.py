@@ -28,8 +28,8 @@ from mbd.tape.node import Node, Scalar
 __all__ = ["NO_PLACE", "ball_on", "edge_on"]
 
 NO_PLACE = (
-    "the ground is narrower or steeper there than what is round can touch at one place; take a smaller radius, a "
-    "smoother height function, or points of its surface with mbd.touchdown"
+    "the ground is narrower or steeper there than what is round can touch at one place, or its height is no "
+    "number; take a smaller radius, a smoother height function, or points of its surface with mbd.touchdown"
 )
 """What a gap that is no number means."""
 

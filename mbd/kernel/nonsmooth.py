@@ -15,13 +15,13 @@ beyond its limit, let go before it, and the step is taken again.
 from __future__ import annotations
 
 from mbd.kernel.candidate import accept_candidate, carry
-from mbd.kernel.codes import LOG_OPENED, NO_IMPACT, PULL
+from mbd.kernel.codes import CONFLICT, EPS, LOG_OPENED, NO_IMPACT, PULL
 from mbd.kernel.complementarity import complementarity
 from mbd.kernel.contact_modes import NO_IMPULSE, STILL, log_event
 from mbd.kernel.guards import gap_scale, gap_tolerance, is_watched, watch
 from mbd.kernel.nonsmooth_cones import hold_together, release_both, turned_in_plane
 from mbd.kernel.records import Balance, ContactForces, Guards, Switching
-from mbd.kernel.restart import consistent, displace, evaluate, largest_force
+from mbd.kernel.restart import consistent, displace, evaluate, is_held, largest_force
 from mbd.kernel.switching import close_by_impact, mark_touching
 
 __all__ = ["keep", "closes_below_surface", "must_release", "put_back", "rebound", "strike"]
@@ -30,6 +30,8 @@ SUNK = 1e4
 """Depth over the round-off of a gap at which a correction of positions has failed [-]."""
 MOST_LIFTS = 20
 """Corrections of positions at one instant [-]."""
+HELD = 1024.0 * EPS
+"""What a row on positions is off by, relative to its terms, where it holds [-]."""
 RESTING = 2.0
 """Approach speed over the change of speed in a step below which a contact rests instead of rebounding [-]."""
 
@@ -155,6 +157,10 @@ def project_gaps_once(K: Balance) -> int:
         K.given[k] = 0.0
         K.bias[k] = K.acc[K.acc_h + k]
     status = complementarity(K, 2)
+    if status == CONFLICT and touches(K):
+        K.impulse[: K.n_rows] = 0.0
+        K.correction_size = 0.0
+        return 0
     if status != 0:
         return status
     moved = 0.0
@@ -163,6 +169,15 @@ def project_gaps_once(K: Balance) -> int:
     K.correction_size = moved
     displace(K, K.q, K.jump)
     return 0
+
+
+def touches(K: Balance) -> bool:
+    """Whether all rows that act hold at K.q but for round-off, in which rows that nearly depend may contradict."""
+    for row in range(K.n_rows):
+        if is_held(K, row, K.active) and K.row_level[row] == 0:
+            if not abs(K.acc[K.acc_h + row]) <= HELD * max(K.scale[K.n + row], 1e-3):
+                return False
+    return True
 
 
 def strike(K: Switching, h: float, t1: float) -> int:

@@ -9,11 +9,13 @@ __all__ = ["doubts"]
 
 LONG = 50.0
 """Length of a body of less than a ton above which it may be given in millimetres [m]."""
+GRIPPING = 10.0
+"""Coefficient of friction above which it may be given in percent [-]."""
 
 
 def doubts(model: Any) -> list[str]:
     """Sentences on what looks like a mistake."""
-    return _lengths(model) + _twice(model)
+    return _lengths(model) + _twice(model) + _grips(model)
 
 
 def _lengths(model: Any) -> list[str]:
@@ -27,6 +29,15 @@ def _lengths(model: Any) -> list[str]:
                 f"'{body.name}' is {length:g} m long; lengths are in metres, and {length:g} mm is {length / 1e3:g}"
             )
     return found
+
+
+def _grips(model: Any) -> list[str]:
+    """Coefficients of friction that no pair of materials has, which were meant in percent or as a force."""
+    return [
+        f"friction of '{contact.name}' is {contact.friction:g}; a coefficient is a ratio of forces, rubber has about 1"
+        for contact in getattr(model, "constraints", ())
+        if isinstance(friction := getattr(contact, "friction", None), float | int) and friction > GRIPPING
+    ]
 
 
 def _twice(model: Any) -> list[str]:

@@ -25,6 +25,7 @@ from mbd.parts.whole_body.table import SEXES
 __all__ = ["Human", "human"]
 
 SHORTEST, TALLEST = 0.4, 2.8
+LIGHTEST, HEAVIEST = 1.0, 700.0
 """Heights outside of which a person is in doubt [m]."""
 LIMBS = {"arm": "upper arm", "leg": "thigh"}
 """A limb, by the segment that it begins with."""
@@ -111,9 +112,17 @@ class Human:
 
         Parameters
         ----------
-        knees : by how much both are flexed, ankles staying under the hips [rad]
+        knees : by how much both are flexed, ankles staying under the hips, below π [rad]
+
+        Raises
+        ------
+        ModelError
+            where knees bend backwards, or by half a turn.
         """
-        return standing(self.prefix, self.bodies, self.joints, number(knees, "knees of standing"))
+        bend = number(knees, "knees of standing")
+        if not 0.0 <= bend < math.pi:
+            raise ModelError(f"knees of standing must lie between 0 and π rad, got {bend:g}; 20° is math.radians(20)")
+        return standing(self.prefix, self.bodies, self.joints, bend)
 
     # others -------------------------------------------------------------------------------------------------------
     def without(self, *names: str) -> Human:
@@ -261,6 +270,8 @@ def human(
     M, H = sizes("human", mass=mass, height=height)
     if not SHORTEST <= H <= TALLEST:
         doubt(f"human: a height of {H:g} m; heights are in metres, masses in kg")
+    if not LIGHTEST <= M <= HEAVIEST:
+        doubt(f"human: a mass of {M:g} kg; masses are in kg, heights in metres")
     if not among(sex, SEXES):
         raise ModelError("human: " + nearest(sex, SEXES, "sex", "The table has"))
     prefix = "" if isinstance(name, str) and name == "" else f"{name_of(name, 'human')} "
