@@ -25,8 +25,9 @@ from mbd.parts.whole_body.table import SEXES
 __all__ = ["Human", "human"]
 
 SHORTEST, TALLEST = 0.4, 2.8
-LIGHTEST, HEAVIEST = 1.0, 700.0
 """Heights outside of which a person is in doubt [m]."""
+LIGHTEST, HEAVIEST = 1.0, 700.0
+"""The same of masses [kg]."""
 LIMBS = {"arm": "upper arm", "leg": "thigh"}
 """A limb, by the segment that it begins with."""
 
