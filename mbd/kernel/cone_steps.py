@@ -180,7 +180,7 @@ def come_to_zero(K: Kernel, h: float, t1: float) -> int:
         square = 0.0
         largest = 0.0
         for g in range(K.n_frictions):
-            if is_held(K, g):
+            if keeps_direction(K, g):
                 speed = speed_of_both(K, g, K.guards0, K.at_slip)
                 left = across(K, g)
                 largest = max(largest, abs(left) / (AT_REST * speed + 1e-13))
@@ -208,7 +208,7 @@ def come_to_zero(K: Kernel, h: float, t1: float) -> int:
         status = locate(K, h)
         if status != 0:
             return status
-        if K.event_kind != STICK or not is_held(K, K.event_index):
+        if K.event_kind != STICK or not keeps_direction(K, K.event_index):
             return 0
     return TURNS_AWAY if given_up != 0 and another_slides_on(K, K.event_index) else 0
 
@@ -219,7 +219,7 @@ def may_follow(K: Guards, f: int) -> bool:
     return bool(PART * speed > SHORTEST * K.dt * speed_of_both(K, f, K.guards0, K.at_slip_rate))
 
 
-def is_held(K: Frictions, f: int) -> bool:
+def keeps_direction(K: Frictions, f: int) -> bool:
     """Whether f stands for a pair that slides in a direction that is held."""
     return bool(K.partner[f] > f and K.slip[f] != 0.0 and K.hold[f] == HELD)
 
@@ -233,7 +233,7 @@ def across(K: Guards, f: int) -> float:
 def turn_directions(K: Frictions, relaxation: float) -> None:
     """Turn all that are held towards what is left across them."""
     for f in range(K.n_frictions):
-        if is_held(K, f):
+        if keeps_direction(K, f):
             p = K.partner[f]
             angle = min(max(relaxation * K.across[f], -FARTHEST), FARTHEST)
             aim(K, f, K.slip[f] - angle * K.slip[p], K.slip[p] + angle * K.slip[f])
@@ -243,7 +243,7 @@ def another_slides_on(K: Guards, event: int) -> bool:
     """Whether a pair that is held slides on where another one has come to rest; it is held no longer then."""
     found = False
     for f in range(K.n_frictions):
-        if is_held(K, f) and f != event and may_follow(K, f):
+        if keeps_direction(K, f) and f != event and may_follow(K, f):
             left = along(K, f, K.guards1[K.at_slip + f], K.guards1[K.at_slip + K.partner[f]])
             if left > TOGETHER * speed_of_both(K, f, K.guards0, K.at_slip):
                 K.hold[f] = K.hold[K.partner[f]] = 0.0

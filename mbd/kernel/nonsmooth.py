@@ -20,7 +20,7 @@ from mbd.kernel.complementarity import complementarity
 from mbd.kernel.contact_modes import NO_IMPULSE, STILL, log_event
 from mbd.kernel.guards import gap_scale, gap_tolerance, is_watched, watch
 from mbd.kernel.nonsmooth_cones import hold_together, release_both, turned_in_plane
-from mbd.kernel.records import Balance, ContactForces, Guards, Switching
+from mbd.kernel.records import Balance, ContactForces, ContactRows, Guards, Switching
 from mbd.kernel.restart import consistent, displace, evaluate, is_held, largest_force
 from mbd.kernel.switching import close_by_impact, mark_touching
 
@@ -171,7 +171,7 @@ def project_gaps_once(K: Balance) -> int:
     return 0
 
 
-def touches(K: Balance) -> bool:
+def touches(K: ContactRows) -> bool:
     """Whether all rows that act hold at K.q but for round-off, in which rows that nearly depend may contradict."""
     for row in range(K.n_rows):
         if is_held(K, row, K.active) and K.row_level[row] == 0:
