@@ -32,7 +32,7 @@ def hanging(seed: int, world: Rotation, cut: Any = "auto", reverse: bool = False
     for k in range(2 + seed % 3):
         own = Rotation.random(random_state=chance)  # of the body's axes, against the frames
         drop, length = chance.uniform(0.1, 0.4), chance.uniform(0.4, 0.7)
-        axes = np.diag(0.01 + 0.02 * chance.uniform(size=3)) + 0.001 * np.ones((3, 3))
+        axes = np.diag(0.016 + 0.01 * chance.uniform(size=3)) + 0.001 * np.ones((3, 3))
         inertia = own.inv().as_matrix() @ axes @ own.as_matrix()
         center = own.inv().apply([0.0, -drop, 0.0])
         full = tuple(map(tuple, 0.5 * (inertia + inertia.T)))
