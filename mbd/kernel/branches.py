@@ -6,7 +6,7 @@ from mbd.kernel.cone_loads import keep_in_cones
 from mbd.kernel.records import Balance, Complementarity, ContactForces, Frictions, Reals
 from mbd.kernel.redundancy import sharing, spread
 from mbd.kernel.restart import MOST_LOADS, active_rows, evaluate_loaded, limit_of, load_accelerations
-from mbd.kernel.saddle import correct_positions, solve_rows
+from mbd.kernel.saddle import solve_at
 
 __all__ = ["find_limits", "is_on", "load", "slides", "solve_directed", "whole"]
 
@@ -44,11 +44,6 @@ def solve_directed(K: Balance, level: int) -> int:
             row = K.friction_row[f]
             K.impulse[row] = K.slip[f] * K.limit[f] - (K.past[row] if level == 1 else 0.0)
     return status
-
-
-def solve_at(K: Balance, m: int, level: int) -> int:
-    """w and λ for the m rows in K.rows: accelerations, velocities, or at level 2 positions."""
-    return int(correct_positions(K, m) if level == 2 else solve_rows(K, m, True))
 
 
 def find_limits(K: ContactForces, level: int) -> None:

@@ -18,7 +18,7 @@ from mbd.kernel.pivoting import factor_held
 from mbd.kernel.records import Balance, ContactForces, Frictions
 from mbd.kernel.redundancy import find_dependence
 from mbd.kernel.restart import active_rows, evaluate, evaluate_loaded, limit_of, load_accelerations, stepping_rows
-from mbd.kernel.saddle import solve_rows
+from mbd.kernel.saddle import solve_at
 
 __all__ = ["all_hold", "solve_cones"]
 
@@ -47,7 +47,7 @@ def solve_cones(K: Balance, level: int) -> int:
             K.cone_work, K.cone_pivot,
         )  # fmt: skip
         residual = K.cone_work[0]
-        if status == 0 and take_impulses(K, count):
+        if status == 0 and take_impulses(K, level, count):
             take_cone_branches(K, level, count)
             K.cone_residual = max(K.cone_residual, residual)
             return 1
@@ -173,7 +173,7 @@ def load_held(K: Balance, level: int, count: int) -> int:
         if level == 1:
             for i in range(K.n):
                 K.force[i] -= K.acc[o_R + i * K.n_rows + row] * K.past[row]
-    return factor_held(K)
+    return factor_held(K, level)
 
 
 def fill_cones(K: Balance, held: int, count: int) -> None:
@@ -197,12 +197,12 @@ def fill_cones(K: Balance, held: int, count: int) -> None:
             K.cone_matrix[i * count + j] = value
 
 
-def take_impulses(K: Balance, count: int) -> bool:
+def take_impulses(K: Balance, level: int, count: int) -> bool:
     """K.jump and the multipliers of held rows under the impulses found."""
     for u in range(count):
         for i in range(K.n):
             K.force[i] -= K.acc[K.acc_R + i * K.n_rows + K.cone_rows[u]] * K.cone_found[u]
-    return bool(solve_rows(K, active_rows(K, K.active), True) == 0)
+    return bool(solve_at(K, active_rows(K, K.active), level) == 0)
 
 
 def take_cone_branches(K: ContactForces, level: int, count: int) -> None:

@@ -17,7 +17,7 @@ from mbd.kernel.linear import factor, solve
 from mbd.kernel.records import Balance, ContactForces
 from mbd.kernel.redundancy import shared, sharing
 from mbd.kernel.restart import active_rows, evaluate_loaded, limit_of, load_accelerations
-from mbd.kernel.saddle import solve_rows
+from mbd.kernel.saddle import solve_at
 
 __all__ = ["factor_held", "pivoted"]
 
@@ -136,10 +136,10 @@ def hold(K: Balance, level: int, pushes: int, drags: int) -> int:
         row = K.lcp_rows[u]
         for i in range(K.n):
             K.force[i] -= K.acc[o_R + i * K.n_rows + row] * K.past[row]
-    return factor_held(K)
+    return factor_held(K, level)
 
 
-def factor_held(K: Balance) -> int:
+def factor_held(K: Balance, level: int) -> int:
     """The KKT matrix of all rows that act, in factors, and K.jump and K.impulse with it; how many rows, −1: none.
 
     Rows that depend on others are not among them.
@@ -147,7 +147,7 @@ def factor_held(K: Balance) -> int:
     o_R = K.acc_R
     m = active_rows(K, K.active)
     K.n_dropped = 0
-    if solve_rows(K, m, True) != 0:
+    if solve_at(K, m, level) != 0:
         return -1
     held = 0
     for k in range(m):

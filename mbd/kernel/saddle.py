@@ -14,7 +14,7 @@ from mbd.kernel.ordered import LOSS_AT_ONCE, OF_ACCELERATIONS, SYMMETRIC, factor
 from mbd.kernel.records import Balance, DependentRows, Equations
 from mbd.kernel.redundancy import find_dependent, find_shares, shared, sharing, spread, take_shares
 
-__all__ = ["correct_positions", "correct_velocities", "factor_saddle", "solve_rows"]
+__all__ = ["correct_positions", "correct_velocities", "factor_saddle", "solve_at", "solve_rows"]
 
 INCOMPATIBLE = 1e-6
 """Part of the terms of rows that a row which depends on others may be missed by, for errors of positions [-]."""
@@ -36,6 +36,13 @@ def solve_rows(K: Balance, m: int, dropping: bool) -> int:
     Without `dropping` the rows are those that K.dropped has left, and K.shares are in place.
     """
     return int(solve_change(K, K.y, m, dropping, OWN_TERMS))
+
+
+def solve_at(K: Balance, m: int, level: int) -> int:
+    """w and λ of the m rows in K.rows, which may depend on each other: of accelerations, velocities, or positions."""
+    if level == 0:
+        return int(solve_rows(K, m, True))
+    return int(correct_velocities(K, K.y, m, True) if level == 1 else correct_positions(K, m))
 
 
 def correct_velocities(K: Balance, y: Any, m: int, dropping: bool) -> int:
@@ -95,6 +102,10 @@ def solve_kept(K: Balance, y: Any, m: int, what: int) -> int:
         rank = solve_matrix(K, kept, False, round_off(K.n + kept) if little else MOST_ROUND_OFF)
         if rank == K.n + kept and (kept == m or not contradicts(K, y, m, what)):
             spread(K, K.impulse)
+            return 0
+    elif kept < m:
+        find_shares(K)
+        if solve_shared(K, kept) == 0 and not contradicts(K, y, m, what):
             return 0
     K.failure_index = blocked
     return CONFLICT

@@ -19,7 +19,7 @@ from mbd.kernel.loads import evaluate_loaded
 from mbd.kernel.pivoting import gather_drags, hold
 from mbd.kernel.records import Balance, ContactForces
 from mbd.kernel.restart import active_rows
-from mbd.kernel.saddle import solve_rows
+from mbd.kernel.saddle import solve_at
 
 __all__ = ["guess_slides"]
 
@@ -131,7 +131,7 @@ def follow_pushes(K: Balance, level: int, drags: int) -> float:
     for u in range(drags):
         for i in range(K.n):
             K.force[i] += K.acc[K.acc_R + i * K.n_rows + K.lcp_rows[u]] * K.drag[u]
-    if solve_rows(K, active_rows(K, K.active), True) != 0:
+    if solve_at(K, active_rows(K, K.active), level) != 0:
         return -1.0
     evaluate_loaded(K, whole(K, level))
     find_limits(K, level)

@@ -134,6 +134,22 @@ def test_contacts_that_are_there_twice_or_hang_together_share_their_load(seed, c
     np.testing.assert_allclose(twice.jump, plain.jump, rtol=0, atol=1e-9)
 
 
+@settings(max_examples=80)
+@given(st.integers(0, 10**6), st.integers(2, 4))
+def test_held_rows_that_hang_together_and_are_met_but_for_round_off_do_not_conflict(seed, contacts):
+    """All that is left of their velocities is round-off of terms of size one, which no motion takes away."""
+    rng = np.random.default_rng(seed)
+    n = contacts + 1
+    M, normals = random_mass(rng, n), rng.normal(size=(contacts, n))
+    more = np.vstack([normals, rng.normal(size=(3, contacts)) @ normals])
+    velocity = np.linalg.svd(normals)[2][-1]
+    K, B = scene(M, more, None, 0.0, velocity)
+    K.free[:] = 0
+    K.bias[:] += rng.uniform(-1.0, 1.0, len(B)) * 1e-16
+    assert complementarity(K, 1) == 0
+    np.testing.assert_allclose(K.jump, 0.0, atol=1e-13)
+
+
 @settings(max_examples=120)
 @given(st.integers(0, 10**6), st.integers(1, 4), st.sampled_from([0.05, 0.3, 0.9]))
 def test_contacts_with_friction_obey_coulombs_law(seed, contacts, mu):
