@@ -24,41 +24,57 @@ SHORT = 1e-2
 It vanishes at a singular configuration nearby: what errors of positions leave of it is no part of its own length.
 """
 
+WAITING = 2
+"""Mark in K.dropped of a row whose turn has not come [-].
+
+Two feet that stick hold the line through them twice. Of the four tangents the one that lies along that line is left
+out, else the coefficients of the one that is are large, and at the limit there are none.
+"""
+
 LEAST_SHARE = 1e-4
 """Part of the largest limit of friction that even one without load counts as, where several hold together [-]."""
 
 
 def find_dependent(K: DependentRows, m: int) -> None:
-    """Mark rows among the m in K.rows that depend on earlier ones in K.dropped, with B_d = C B_kept in K.dependence.
+    """Mark rows among the m in K.rows that depend on others in K.dropped, with B_d = C B_kept in K.dependence.
 
-    Gram–Schmidt in the order of the rows, short ones last, on columns scaled by √M_ii; B is that of K.acc.
+    Gram–Schmidt on columns scaled by √M_ii, by turns: in the order of the rows those come first of which a tenth is
+    left, then those of which a hundredth is, and so on, short ones after the others of the first turns; B is that of
+    K.acc. What is kept is as independent as any choice is, but for a factor of ten.
     """
-    kept = 0
     K.n_dropped = 0
     K.dropped[: K.n_rows] = 0
     if m == 0:
         return
     for k in range(m):
         K.work[k] = length_of(K, K.rows[k])
+        K.dropped[K.rows[k]] = WAITING
     lengths = longest_row(K, m, 0)
     angles = longest_row(K, m, 1)
     others = longest_row(K, m, 2)
-    for late in range(2):
+    kept = 0
+    waiting = m
+    bar = 0.1
+    while waiting > 0:
         for k in range(m):
             row = K.rows[k]
+            if K.dropped[row] != WAITING:
+                continue
             unit = K.row_unit[row]
             far = lengths if unit == 0 else (angles if unit == 1 else others)
             part = K.work[k] / far if far > 0.0 else 1.0
-            if (part < SHORT) != (late == 1):
-                continue
-            left = remaining_norm(K, row, kept) * (part if late == 1 else 1.0)
-            if left > DEPENDENCE:
+            left = remaining_norm(K, row, kept) * (part if part < SHORT else 1.0)
+            if left > bar:
+                K.dropped[row] = 0
                 keep_row(K, row, kept)
                 kept += 1
-                continue
-            K.dropped[row] = 1
-            K.n_dropped += 1
-            combine(K, row, kept)
+                waiting -= 1
+            elif left <= DEPENDENCE:
+                K.dropped[row] = 1
+                K.n_dropped += 1
+                combine(K, row, kept)
+                waiting -= 1
+        bar = max(0.1 * bar, DEPENDENCE)
 
 
 def longest_row(K: Equations, m: int, unit: int) -> float:
