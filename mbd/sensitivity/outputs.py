@@ -9,6 +9,7 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.errors import UnknownNameError, nearest
+from mbd.results.stored_states import StoredStates
 from mbd.sensitivity.cones import force_in_plane
 from mbd.sensitivity.motion import Mode, Motion, Rates
 from mbd.sensitivity.programs import Programs
@@ -99,11 +100,21 @@ def _result(rows: RunRows, programs: Programs, found: Passed, rates: Rates, name
     if wanted.ndim != 1:
         raise UnknownNameError(f"of: {name!r} has three components; ask for {name + '.x'!r}, '.y' or '.z'")
     at = found.motion.at(found.mode, rates.rate, rates.lam)
-    at.lam = rates.lam
+    at.lam, at.anchors = rates.lam, _with_turns(rows, programs, at.anchors)
     value, slopes = programs.result(name, at)
     if not abs(value - wanted[-1]) <= SAME * max(1.0, float(np.max(np.abs(wanted)))):
         raise refused(f"{name!r} is {wanted[-1]:.9g} at its end, which the pass does not find again ({value:.9g})")
     return value, slopes @ found.motion.tangent.stacked(programs.columns, rates.of_rate, rates.of_lam)
+
+
+def _with_turns(rows: RunRows, programs: Programs, anchors: Vector) -> Vector:
+    """Anchors with the whole turns that angles of cut joints have made at the end, which only its rows count."""
+    counts = [turn.anchor for turn in programs.equations.wrapped]
+    if not counts:
+        return anchors
+    found = anchors.copy()
+    found[counts] = StoredStates(rows.record, programs.equations).anchors[-1, counts]
+    return found
 
 
 def with_sliding(programs: Programs, motion: Motion, mode: Mode, rates: Rates) -> Rates:

@@ -249,3 +249,28 @@ def test_interpreted_as_compiled(scheme):
         for backend in ("llvm", "python")
     ]
     assert found[0] == pytest.approx(found[1], rel=1e-12, abs=1e-13)
+
+
+# whole turns ---------------------------------------------------------------------------------------------------------
+def gyroscope(cut):
+    """A wheel that makes many turns in two gimbals, as a tree or of bodies whose joints are all rows."""
+    model = mbd.Model("gyroscope", cut=cut)
+    outer = mbd.RigidBody("outer", 0.4, (2e-3, 3e-3, 2.5e-3))
+    inner = mbd.RigidBody("inner", 0.3, (1e-3, 1.5e-3, 1.2e-3))
+    wheel = mbd.RigidBody("wheel", **mbd.disk(1.2, 0.08, axis="x").body)
+    model.connect(
+        mbd.Revolute("yaw", model.ground.origin, outer.origin, axis="y"),
+        mbd.Revolute("pitch", outer.origin, inner.origin),
+        mbd.Revolute("spin", inner.point(0.1, 0.0, 0.0), wheel.origin, axis="x"),
+    )
+    begin = {"yaw.angle": 0.3, "pitch.angle": 0.0, "spin.angle": 120.0}
+    return model, mbd.assemble(model, {"pitch.angle": 0.2}, begin)
+
+
+def test_angles_of_cut_joints_have_the_derivatives_of_trees_after_whole_turns():
+    angles = ["yaw.angle", "pitch.angle", "spin.angle"]
+    settings = {"dt": 1e-3, "until": 0.2, "wrt": ["wheel.mass", "outer.inertia.yy"], "of": angles}
+    tree, cut = (mbd.sensitivities(*gyroscope(cut), mbd.RungeKutta853(), **settings) for cut in ("auto", "all"))
+    assert tree.values[2] > 3.0 * 2.0 * np.pi
+    np.testing.assert_allclose(cut.values, tree.values, rtol=1e-10)
+    np.testing.assert_allclose(cut.matrix, tree.matrix, rtol=1e-6, atol=0.0)
