@@ -14,11 +14,12 @@ onto rows and what non-smooth steps lift out of surfaces stand there too.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Container
+from collections.abc import Container, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
 from mbd.results.columns import ModelColumns
@@ -119,9 +120,12 @@ def _works(
     rates = iter(columns.evaluate([power.rate for power in found if power.rate is not None], inside))
     named, moved = [], [Part("moving coordinates", "constraint", np.cumsum(np.where(after, 0.0, _steps(moving))))]
     doubt = np.zeros((2, len(record.time)))
-    for power, value in zip(found, values, strict=True):
-        rate = None if power.rate is None else next(rates)
-        work = _refined(columns, power.value, value, rate, cumulative(record.time, value, rate), least)
+    asked = [
+        (power.value, value, None if power.rate is None else next(rates))
+        for power, value in zip(found, values, strict=True)
+    ]
+    works = _refined(columns, asked, least)
+    for power, value, work in zip(found, values, works, strict=True):
         trapezoid = _trapezoid(record.time, value)
         unsure = np.abs(np.diff(work) - trapezoid)
         if power.lost is not None:
@@ -175,7 +179,7 @@ def _of_stop(columns: ModelColumns, lost: Lost, direct: Vector, unsure: Vector, 
     nodes = [node for node in (lost.elastic, lost.value, lost.rate) if node is not None]
     elastic, power, *rest = (np.broadcast_to(one, time.shape) for one in columns.evaluate(nodes, columns.rows))
     rate = rest[0] if rest else None
-    work = _refined(columns, lost.value, power, rate, cumulative(time, power, rate), least)
+    (work,) = _refined(columns, [(lost.value, power, rate)], least)
     work = never_giving(work, power, _trapezoid(time, power))
     held = np.where(closed, elastic, 0.0)
     steps = -np.diff(held)
@@ -197,16 +201,33 @@ def _of_stop(columns: ModelColumns, lost: Lost, direct: Vector, unsure: Vector, 
 
 
 def _refined(
-    columns: ModelColumns, power: Node, value: Vector, rate: Vector | None, work: Vector, least: float
-) -> Vector:  # fmt: skip
-    """A work with its long intervals integrated again from states within them, in runs of high order.
+    columns: ModelColumns, asked: Sequence[tuple[Node, Vector, Vector | None]], least: float
+) -> list[Vector]:  # fmt: skip
+    """Works of powers, of which values and rates at the rows are given: ∫ P dt from the first row to each one.
 
-    These are intervals in which it differs by more than `least` [J] from ``h/2 (P₀ + P₁) + h²/12 (Ṗ₀ − Ṗ₁)``.
+    Long intervals are integrated again from states within them, in runs of high order: those in which a work differs
+    by more than `least` [J] from ``h/2 (P₀ + P₁) + h²/12 (Ṗ₀ − Ṗ₁)``.
     """
+    time = columns.record.time
+    works = [cumulative(time, value, rate) for _, value, rate in asked]
     known = readable(columns)
     if not known.any():
-        return work
-    step, steps = np.diff(columns.record.time), np.diff(work)
+        return works
+    long = [_long(time, value, rate, work, known, least) for (_, value, rate), work in zip(asked, works, strict=True)]
+    again = within(columns, [(power, lower) for (power, *_), lower in zip(asked, long, strict=True)])
+    for k, (lower, better) in enumerate(zip(long, again, strict=True)):
+        if len(lower):
+            steps = np.diff(works[k])
+            steps[lower] = better
+            works[k] = np.concatenate([[0.0], np.cumsum(steps)])
+    return works
+
+
+def _long(
+    time: Vector, value: Vector, rate: Vector | None, work: Vector, known: NDArray[np.bool_], least: float
+) -> NDArray[np.intp]:  # fmt: skip
+    """The rows that begin intervals whose work is integrated again, among those that are `known`."""
+    step, steps = np.diff(time), np.diff(work)
     plain = step * (value[:-1] + value[1:]) / 2.0
     if rate is not None:
         plain += step**2 * (rate[:-1] - rate[1:]) / 12.0
@@ -214,11 +235,7 @@ def _refined(
     if rate is None:
         differ[known & (differ <= ALIKE * np.max(np.abs(work)))] = np.inf  # few rows: both are the trapezoid
     long = np.sort(np.argsort(-differ, kind="stable")[:MOST_AGAIN])
-    long = long[differ[long] > least]
-    if not len(long):
-        return work
-    steps[long] = within(columns, [power], long)[0]
-    return np.concatenate([[0.0], np.cumsum(steps)])
+    return np.asarray(long[differ[long] > least])
 
 
 def _steps(column: Vector) -> Vector:

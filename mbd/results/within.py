@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from mbd.arrays import Matrix, Vector
+from mbd.arrays import Vector
 from mbd.results.charts import Charts
+from mbd.results.columns import asks_for_forces
 from mbd.results.dense import Restepping
 from mbd.results.polynomials import Places
 from mbd.results.stored_states import is_smooth
@@ -42,21 +43,27 @@ def readable(columns: ModelColumns) -> NDArray[np.bool_]:
     return np.asarray((step > 0.0) & (smooth or Restepping.serves(columns)))
 
 
-def within(columns: ModelColumns, values: Sequence[Node], lower: Index) -> Matrix:
-    """∫ P dt over intervals, (number of values, k).
+def within(columns: ModelColumns, asked: Sequence[tuple[Node, Index]]) -> list[Vector]:
+    """∫ P dt of each power over its intervals, (k,).
+
+    States are found once for all powers: where these ask for forces, the balance is solved mode by mode.
 
     Parameters
     ----------
-    values : powers as expressions; lower : (k,) the rows that begin the intervals
+    asked : powers as expressions, with the rows that begin their intervals (k,)
     """
-    found = np.zeros((len(values), len(lower)))
-    for first in range(0, len(lower), AT_ONCE):
-        part = lower[first : first + AT_ONCE]
-        powers = columns.evaluate(values, columns.between(_places(columns.record.time, part)))
-        step = columns.record.time[part + 1] - columns.record.time[part]
-        for number, power in enumerate(powers):
-            there = np.broadcast_to(power, (len(part) * len(POINTS),)).reshape(len(part), len(POINTS))
-            found[number, first : first + len(part)] = step * (there @ WEIGHTS)
+    found = [np.zeros(len(lower)) for _, lower in asked]
+    for forces in False, True:
+        mine = [k for k, (power, lower) in enumerate(asked) if len(lower) and asks_for_forces([power]) is forces]
+        union = np.unique(np.concatenate([asked[k][1] for k in mine])) if mine else np.zeros(0, dtype=np.intp)
+        for first in range(0, len(union), AT_ONCE):
+            part = union[first : first + AT_ONCE]
+            states = columns.between(_places(columns.record.time, part), forces)
+            step = columns.record.time[part + 1] - columns.record.time[part]
+            for k, power in zip(mine, columns.evaluate([asked[k][0] for k in mine], states), strict=True):
+                there = np.broadcast_to(power, (len(part) * len(POINTS),)).reshape(len(part), len(POINTS))
+                _, own, place = np.intersect1d(asked[k][1], part, assume_unique=True, return_indices=True)
+                found[k][own] = (step * (there @ WEIGHTS))[place]
     return found
 
 

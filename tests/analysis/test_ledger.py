@@ -14,6 +14,7 @@ import mbd
 from mbd.errors import ModelError
 from mbd.integrators import Integrator, StepReport, StepResult
 from mbd.integrators.base import consistent_rates
+from mbd.results.forces import Forces
 from mbd.results.ledger import KINDS
 from mbd.results.quadrature import cumulative
 
@@ -287,3 +288,30 @@ def test_a_tiny_step_beside_full_ones_does_no_harm():
 def test_nothing_is_integrated_without_an_interval():
     assert cumulative(np.zeros(0), np.zeros(0)).shape == (0,)
     assert cumulative(np.zeros(2), np.ones(2)).tolist() == [0.0, 0.0]
+
+
+def blocks(count: int, friction: float):
+    """Blocks thrown along a rough floor, or along a smooth one with drag, and where they begin."""
+    model, velocity = mbd.Model("blocks"), {}
+    for k in range(count):
+        body = mbd.RigidBody(f"block {k}", 1.0 + k, (0.1, 0.2, 0.3))
+        loss = {axis: mbd.Viscous(0.3) for axis in "xz"} if friction == 0.0 else None
+        joint = mbd.Translation(f"place {k}", model.ground.origin, body.origin, axes="xyz", loss=loss)
+        model.connect(joint)
+        model.constrain(mbd.Unilateral(f"sole {k}", mbd.touchdown(body.origin), friction=friction))
+        velocity |= {f"place {k}.x.rate": 2.0, f"place {k}.z.rate": 0.5 + k}
+    return model, mbd.assemble(model, velocity=velocity, closed=[f"sole {k}" for k in range(count)])
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_forces_between_rows_are_solved_once_for_all_works_and_only_where_these_follow_them(monkeypatch, friction):
+    counted = []
+    at = Forces.at
+    monkeypatch.setattr(Forces, "at", lambda self, places: counted.append(places) or at(self, places))
+    for count in 1, 3:
+        model, start = blocks(count, friction)
+        run = mbd.simulate(model, start, mbd.RadauIIA(), dt=0.05, until=0.4)
+        counted.clear()
+        energy = run.energy
+        assert abs(energy.numerical).max() < 1e-9 * energy.kinetic[0]
+        assert len(counted) == (friction > 0.0)

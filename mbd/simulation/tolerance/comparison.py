@@ -145,7 +145,7 @@ def _positions(columns: ModelColumns, places: Places, accuracy: float) -> tuple[
     """Coordinates at places (k, n_q), and where they are known well enough (k,)."""
     record, sure = columns.record, np.ones(len(places.time), dtype=bool)
     if columns.equations.compose is not None:
-        return np.asarray(columns.between(places).q), sure
+        return np.asarray(columns.between(places, forces=False).q), sure
     if record.settings.get("between", "hermite") == "hermite":
         return quintic(places, record.q, record.v, record.a), sure
     known = (record.q, record.v, record.a)
@@ -160,7 +160,7 @@ def _positions(columns: ModelColumns, places: Places, accuracy: float) -> tuple[
     sure[again] = False
     if len(again) > ENOUGH * len(sure) and Restepping.serves(columns):
         again = again[np.argsort(-doubt[again], kind="stable")[:DOUBTFUL]]
-        q[again], sure[again] = columns.between(places.part(again)).q, True
+        q[again], sure[again] = columns.between(places.part(again), forces=False).q, True
     elif len(again) > ENOUGH * len(sure):
         sure[again] = True  # the polynomials are what there is
     return q, sure
