@@ -1,12 +1,15 @@
 """Reports of gaits: figures of a known walk, balances over a stride, symmetry, files, and what is refused."""
 
+import runpy
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import mbd
 from mbd import cli
+from mbd.analysis.gait_report.curves import forces_at
 from mbd.analysis.gait_report.symmetry import symmetry_of
 from mbd.errors import ModelError, TrajectoryError, UnknownNameError
 from tests.simulation.mechanisms import kneed_walker, kneed_walker_start
@@ -45,6 +48,43 @@ def test_the_ground_carries_the_weight_over_a_stride():
     mass, normal = weight()
     both = sum(report()["normal impulse"].values())
     assert both == pytest.approx(mass * normal * report()["stride time"]["left"], rel=2e-3)
+
+
+@cache
+def rocking():
+    """A walk in space on disk feet that roll, from its limit cycle."""
+    names = runpy.run_path(str(cli.examples()["walker-in-space"]))
+    return mbd.simulate(names["model"], names["start"], names["integrator"], dt=names["dt"], until=4.0)
+
+
+def test_the_impulses_of_a_walk_that_repeats_itself_are_its_weight_in_equal_parts():
+    """Forces jump where a foot lets go, anywhere between two samples."""
+    run = rocking()
+    mass = sum(value for name, value in run.parameters.items() if name.endswith(".mass"))
+    found = mbd.gait_report(run)
+    half = -0.5 * mass * run.parameters["gravity.y"] * found["stride time"]["left"]
+    assert list(found["normal impulse"].values()) == pytest.approx([half, half], rel=1e-6)
+
+
+def test_forces_of_feet_that_roll_are_what_moves_the_center_of_mass():
+    """The change of momentum between two strikes is the impulse of both feet and of the weight."""
+    run, (begin, end) = rocking(), (0.9, 1.4)
+    nodes, weights = np.polynomial.legendre.leggauss(20)
+    times = begin + (end - begin) * (nodes + 1.0) / 2.0
+    masses = {name: value for name, value in run.parameters.items() if name.endswith(".mass")}
+    for axis, quantity in ("x", "forward force"), ("y", "normal force"):
+        feet = [SimpleNamespace(name=side, contacts=(f"{side} foot",)) for side in ("left", "right")]
+        forces = sum(forces_at(run, foot, times)[quantity] for foot in feet)
+        given = 0.5 * (end - begin) * (weights @ forces) + sum(masses.values()) * run.parameters[f"gravity.{axis}"] * (
+            end - begin
+        )
+        first, last = (
+            sum(m * run.at(t)[f"{name.removesuffix('.mass')}.center.v{axis}"] for name, m in masses.items())
+            for t in (begin, end)
+        )
+        assert last - first == pytest.approx(given, rel=1e-9)
+    curves = [each for each in mbd.gait_report(run).walks[0].curves if each.quantity == "forward force"]
+    assert len(curves) == 2 and all(np.max(np.abs(each.mean)) > 1.0 for each in curves)
 
 
 def test_energy_by_side_and_cause_is_what_gravity_gives():

@@ -15,10 +15,13 @@ from mbd.arrays import Matrix, Vector
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
 
-__all__ = ["PERCENT", "Curve", "curves_of"]
+__all__ = ["PERCENT", "Curve", "curves_of", "forces_at"]
 
 PERCENT = np.linspace(0.0, 100.0, 101)
 """Share of the stride [%]."""
+
+ROLLING = ".forward.force"
+"""How names of forces end by which a disk or a ball rolls forward."""
 
 SAME = 1e-9
 """Angles that differ less are one [rad]."""
@@ -116,13 +119,16 @@ def _sampled(
 
 
 def forces_at(run: Trajectory, side: Side, times: Vector) -> dict[str, Vector]:
-    """Normal and forward force of the ground on a foot [N]."""
+    """Normal and forward force of the ground on a foot, whose grip may be a `Rolling` of its side in space [N]."""
     named = run.at(times)
     normal, forward = np.zeros(len(times)), np.zeros(len(times))
     for name in side.contacts:
         normal = normal + np.nan_to_num(named[f"{name}.force"])
         if f"{name}.friction.forward" in run:
             forward = forward + np.nan_to_num(named[f"{name}.friction.forward"])
+    for name in run.names:
+        if name.endswith(ROLLING) and of_side(name, side.name):
+            forward = forward + np.nan_to_num(named[name])
     return {"normal force": normal, "forward force": forward}
 
 

@@ -23,7 +23,11 @@ MIDDLE = (0.25, 0.85)
 """Shares of swing between which clearance is sought: near both ends every foot is close to the ground."""
 
 FINE = 1001
-"""Samples of a stride for impulses and peaks."""
+"""Samples of a stride for peaks."""
+
+POINTS, WEIGHTS = np.polynomial.legendre.leggauss(4)
+PANELS = 250
+"""Parts of a stride on each of which these points integrate a force, besides those that events make."""
 
 Values = dict[tuple[str, str], float]
 """By quantity and unit."""
@@ -82,7 +86,7 @@ def _of_stride(run: Trajectory, side: Side, others: Sequence[Side], stride: Stri
         for event in run.events
         if event.name in side.contacts and stride.begin <= event.time < stride.end and np.size(event.impulse)
     )
-    impulse = float(np.mean(force[:-1] + force[1:])) * period / 2.0 + struck
+    impulse = _normal_impulse(run, side, stride) + struck
     per, scale = ("", 1.0) if mass is None else ("/kg", 1.0 / mass)
     return {
         ("step length", "m"): step_length, ("step time", "s"): step_time, ("stride length", "m"): stride.length,
@@ -92,6 +96,16 @@ def _of_stride(run: Trajectory, side: Side, others: Sequence[Side], stride: Stri
         impulse, ("strike impulse", f"N s{per}"): scale * struck, ("peak normal force", f"N{per}"): scale *
         float(np.max(force)),
     }  # fmt: skip
+
+
+def _normal_impulse(run: Trajectory, side: Side, stride: Stride) -> float:
+    """∫ of the normal force without impacts [N s], from one event to the next: forces may jump there."""
+    events = [event.time for event in run.events if stride.begin < event.time < stride.end]
+    knots = np.unique([*np.linspace(stride.begin, stride.end, PANELS + 1), *events])
+    half = np.diff(knots)[:, None] / 2.0
+    times = knots[:-1, None] + half * (1.0 + POINTS)
+    force = forces_at(run, side, times.ravel())["normal force"].reshape(times.shape)
+    return float(np.sum(half * WEIGHTS * force))
 
 
 def _within(side: Side, stride: Stride) -> list[tuple[float, float]]:
