@@ -142,6 +142,8 @@ def _three(value: Any, what: str) -> tuple[float, float, float]:
         return (one, one, one)
     if isinstance(value, str) or not hasattr(value, "__len__"):
         raise ModelError(f"{what} must be a number, or three along x, y, z; got {shown(value)}")
+    if len(value) == 2:  # of a place the third would be 0
+        raise ModelError(f"{what} must be a number, or three along x, y, z; got two: {shown(value)}")
     return triple(value, what)
 
 

@@ -59,6 +59,7 @@ def test_in_space_it_keeps_energy_and_is_seen_from_either_side_alike_where_it_is
     ({"stiffness": (1.0, 2.0, -3.0)}, "stiffness.z -3 is negative"),
     ({"damping": "x"}, "damping of 'mount' must be a number"),
     ({"stiffness": (1, 2, 3, 4)}, "three components"),
+    ({"rotational_stiffness": (1.0, 2.0)}, "three along x, y, z; got two"),
 ])  # fmt: skip
 def test_wrong_values_are_refused(given, fault):
     with pytest.raises(mbd.ModelError, match=fault):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import mbd
+from mbd.simulation.diagnostics.coarse import percent
 from tests.simulation.mechanisms import falling, run
 
 STIFF = 1e9
@@ -155,3 +156,8 @@ def test_a_scheme_that_lags_behind_a_steep_brake_says_so(scheme, share):
     exact = speed / np.sqrt(1.0 + 2.0 * c * speed**2 * run.time)
     off = np.max(np.abs(run["pin.rate"] - exact) / exact)
     assert off < 0.5 or any("not resolved by dt" in note for note in run.stats["notes"])
+
+
+@pytest.mark.parametrize(("share", "told"), [(1.7, "170"), (0.23, "23"), (0.0012, "0.1"), (4e-6, "0.0004")])
+def test_uncertain_rates_are_never_told_to_be_certain(share, told):
+    assert percent(share) == told

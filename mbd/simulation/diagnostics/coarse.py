@@ -8,12 +8,17 @@ from mbd.results.record import Record
 from mbd.simulation.diagnostics.fastest import resolving_dt
 from mbd.simulation.run.data import RunData
 
-__all__ = ["coarse_steps"]
+__all__ = ["coarse_steps", "percent"]
 
 SAMPLES = 64
 """Parts of a step at whose ends forces are evaluated [-]."""
 BLIND = 0.1
 """Step that is advised, over the present one, where forces do not show one [-]."""
+
+
+def percent(share: float) -> str:
+    """A share in whole percent, or with one digit below; never as 0 where there is any."""
+    return f"{100.0 * share:.0f}" if share >= 0.01 else f"{100.0 * share:.1g}"
 
 
 def coarse_steps(run: RunData, record: Record) -> list[str]:
@@ -31,7 +36,7 @@ def coarse_steps(run: RunData, record: Record) -> list[str]:
     steps = "a step was" if count == 1 else f"{count} steps were"
     return [
         f"{steps} not resolved by dt = {run.dt:g} s: forces changed within one so that rates are uncertain by "
-        f"{100.0 * worst:.0f} % (the most, at t = {when:.6g} s), and times and places after it as well; try "
+        f"{percent(worst)} % (the most, at t = {when:.6g} s), and times and places after it as well; try "
         f"dt <= {resolving:.1g} s, or tol="
     ]
 
