@@ -101,6 +101,7 @@ if TYPE_CHECKING:
         GeneralizedAlpha as GeneralizedAlpha,
         Newmark as Newmark,
         RadauIIA as RadauIIA,
+        RungeKutta4 as RungeKutta4,
         RungeKutta853 as RungeKutta853,
     )
     from mbd.joints import (
@@ -195,7 +196,7 @@ _HOMES = {
     "mbd.gait.find": "GaitSearch find_gait",
     "mbd.gait.follow": "PointCurve",
     "mbd.gait.limit_cycle": "limit_cycle",
-    "mbd.integrators": "HHT GeneralizedAlpha Newmark RadauIIA RungeKutta853",
+    "mbd.integrators": "HHT GeneralizedAlpha Newmark RadauIIA RungeKutta4 RungeKutta853",
     "mbd.joints": "Cylindrical Free Planar Prismatic Revolute Screw Spherical Translation Universal Weld",
     "mbd.joints.losses": "AffineFriction Coulomb Dissipation PinFriction Quadratic Tabulated Valves Viscous",
     "mbd.description": "on_slope",

@@ -282,6 +282,7 @@ INTEGRATORS: list[Integrator] = [
     mbd.GeneralizedAlpha(rho_inf=0.0),
     mbd.RadauIIA(),
     mbd.RungeKutta853(),
+    mbd.RungeKutta4(),
 ]
 STEPPED = [scheme for scheme in INTEGRATORS if not isinstance(scheme, CompiledIntegrator)]
 

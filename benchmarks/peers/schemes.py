@@ -122,6 +122,7 @@ TABLE: dict[str, tuple[Scheme, ...]] = {
     "S7_chain, hinges": (Scheme(RK, dts=(0.02, 0.01, 0.02 / 3, 0.005, 0.004, 0.0025)),),
     "S7_chain": (
         Scheme(*TRAPEZOID, dts=down(0.01, 1e-4)),
+        Scheme("RungeKutta4", dts=(0.01, 0.6 / 75, 0.6 / 88, 0.02 / 3, 0.005, 0.004, 0.0025)),
         Scheme(RK, dts=(0.02, 0.6 / 34, 0.6 / 38, 0.6 / 44, 0.01, 0.02 / 3, 0.005, 0.004, 0.02 / 6, 0.0025), tols=TOLS),
         Scheme(RADAU, dts=down(0.02, 1e-3), tols=TOLS),
     ),

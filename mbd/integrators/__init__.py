@@ -6,8 +6,9 @@ from mbd.integrators.hht import HHT
 from mbd.integrators.newmark import Newmark
 from mbd.integrators.radau import RadauIIA
 from mbd.integrators.runge_kutta import RungeKutta853
+from mbd.integrators.runge_kutta_4 import RungeKutta4
 
-KINDS: tuple[type[Integrator], ...] = (GeneralizedAlpha, Newmark, HHT, RadauIIA, RungeKutta853)
+KINDS: tuple[type[Integrator], ...] = (GeneralizedAlpha, Newmark, HHT, RadauIIA, RungeKutta853, RungeKutta4)
 """The schemes of the library."""
 
 __all__ = [
@@ -19,6 +20,7 @@ __all__ = [
     "Newmark",
     "Point",
     "RadauIIA",
+    "RungeKutta4",
     "RungeKutta853",
     "StepReport",
     "StepResult",

@@ -209,7 +209,7 @@ class Integrator(ABC):
     """Whether a step moves positions by `System.compose`, in any chart q ⊕ x; False: along q + x only."""
     between: ClassVar[str] = "hermite"
     """How a run is read between its rows: 'hermite', 'quintic' where accelerations are as accurate as positions, or
-    'stages' where steps of `RungeKutta853` are taken again."""
+    'stages' where steps of `RungeKutta853` are taken again, 'stages of order 4' those of `RungeKutta4`."""
     stabilized: bool = True
     """Whether rows on positions are held at velocity level too."""
     scheme: ClassVar[str | None] = None

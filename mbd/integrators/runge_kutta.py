@@ -1,4 +1,4 @@
-"""Dormand & Prince's explicit Runge–Kutta formulas of order 8 (1980, J. Comput. Appl. Math. 6:19)."""
+"""Explicit Runge–Kutta schemes; Dormand & Prince's of order 8 (1980, J. Comput. Appl. Math. 6:19)."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.integrators.base import Integrator, Point, StepReport, StepResult, System, Terms, completed, consistent_rates
-from mbd.kernel.schemes.dormand_prince import END, FIFTH, NODES, STAGES, THIRD, WEIGHTS
+from mbd.kernel.schemes.dormand_prince import EIGHTH_ORDER
+from mbd.kernel.schemes.tableau import Tableau
 from mbd.state import Mode, State
 
-__all__ = ["RungeKutta853", "RungeKuttaMemory", "estimated_error"]
+__all__ = ["ExplicitRungeKutta", "RungeKutta853", "RungeKuttaMemory", "estimated_error"]
 
 EPS = float(np.finfo(float).eps)
 MOST_PROJECTIONS = 8
@@ -31,11 +32,10 @@ class RungeKuttaMemory:
     error: Vector = field(default_factory=lambda: np.zeros(0))
 
 
-@dataclass(frozen=True)
-class RungeKutta853(Integrator):
-    """The explicit Runge–Kutta scheme of order 8 with embedded error estimates of orders 5 and 3.
+class ExplicitRungeKutta(Integrator):
+    """An explicit Runge–Kutta scheme with an embedded error estimate.
 
-    Twelve accelerations a step, ``ẋ = v``, ``(v̇, ż)`` from the balance and the rows at acceleration level::
+    ``ẋ = v``, ``(v̇, ż)`` from the balance and the rows at acceleration level, as often as the formula has stages::
 
         x_i = dt Σ_j a_ij ẋ_j,   y_i = y₀ + dt Σ_j a_ij rate_j,   rate_i = rate(t₀ + c_i dt, q₀ ⊕ x_i, y_i)
         q₁ = q₀ ⊕ dt Σ_i b_i ẋ_i,   y₁ = y₀ + dt Σ_i b_i rate_i
@@ -44,25 +44,24 @@ class RungeKutta853(Integrator):
 
     Where rows are active, positions and velocities are projected onto them after each step, in the metric of M, which
     keeps the order (Hairer, Lubich & Wanner 2006, Geometric Numerical Integration, IV.4); accelerations and multipliers
-    at the end are the consistent ones. It suits smooth motion and tight tolerances. Stiff springs and dampers bound its
-    step: with ω the largest frequency, ω dt < 6.
-
-    It has no parameters: ``mbd.simulate(model, start, mbd.RungeKutta853(), tol=1e-9, until=10.0)``.
+    at the end are the consistent ones.
     """
 
     any_chart: ClassVar[bool] = True
     between: ClassVar[str] = "stages"
     """Between rows its steps are taken again."""
-    scheme: ClassVar[str | None] = "runge-kutta"
+    tableau: ClassVar[Tableau]
+    full_order: ClassVar[int]
+    """Of the formula; its estimated error falls like that of a formula of one order less."""
 
     @classmethod
     def examples(cls) -> dict[str, tuple[Integrator, ...]]:
         """Those of the table of what goes with what."""
-        return {"RungeKutta853": (cls(),)}
+        return {cls.__name__: (cls(),)}
 
     def order(self, system: System | None = None) -> int:
-        """8, with and without rows; 2 where positions do not add and a system does not tell ẋ."""
-        return 8 if system is None or completed(system).follows_charts else 2
+        """That of the formula, with and without rows; 2 where positions do not add and a system does not tell ẋ."""
+        return self.full_order if system is None or completed(system).follows_charts else 2
 
     def start(self, system: System, state: State, mode: Mode, dt: float) -> RungeKuttaMemory:
         """Consistent rates and multipliers; the scheme remembers nothing else."""
@@ -74,16 +73,17 @@ class RungeKutta853(Integrator):
         """One step; the readable twin of the compiled kernel."""
         system, t1, n_v = completed(system), state.time + dt, len(state.v)
         y0 = np.concatenate([state.v, state.z])
-        slopes = np.zeros((STAGES + 1, n_v + len(y0)))
+        formula = self.tableau
+        slopes = np.zeros((formula.stages + 1, n_v + len(y0)))
         slopes[0] = np.concatenate([state.v, memory.rate])
         try:
-            for i in range(1, STAGES):
-                move = dt * (WEIGHTS[i, :i] @ slopes[:i])
+            for i in range(1, formula.stages):
+                move = dt * (formula.weights[i, :i] @ slopes[:i])
                 y = y0 + move[n_v:]
                 q = system.compose(state.q, move[:n_v])
-                rate, _ = consistent_rates(system, state.time + NODES[i] * dt, q, y, mode)
+                rate, _ = consistent_rates(system, state.time + formula.nodes[i] * dt, q, y, mode)
                 slopes[i] = np.concatenate([system.increment_rates(move[:n_v], y[:n_v]), rate])
-            move = dt * (END @ slopes[:STAGES])
+            move = dt * (formula.end @ slopes[:-1])
             q1, y1 = system.compose(state.q, move[:n_v]), y0 + move[n_v:]
             if len(memory.lam):
                 q1, y1 = projected(system, t1, q1, y1, len(memory.lam), mode)
@@ -92,14 +92,15 @@ class RungeKutta853(Integrator):
             return StepResult(state, memory, StepReport(False, 1, np.inf, str(failure)))
         if not np.isfinite(np.concatenate([q1, y1, rate, lam])).all():
             return StepResult(state, memory, StepReport(False, 1, np.inf, "the state is not finite"))
-        slopes[STAGES] = np.concatenate([system.increment_rates(move[:n_v], y1[:n_v]), rate])
+        slopes[-1] = np.concatenate([system.increment_rates(move[:n_v], y1[:n_v]), rate])
         new = State(t1, q1, y1[:n_v], y1[n_v:], state.mode, state.armed, state.anchors, state.names,
                     state.velocity_names, {}, state.parameters)  # fmt: skip
-        return StepResult(new, RungeKuttaMemory(rate, lam, estimated_error(slopes, dt, n_v)), StepReport(True, 1))
+        remembered = RungeKuttaMemory(rate, lam, estimated_error(formula, slopes, dt, n_v))
+        return StepResult(new, remembered, StepReport(True, 1))
 
     def error_order(self) -> int:
-        """7: the estimate falls like that of a formula of order 7, with dt⁸ in a step."""
-        return 7
+        """One less than that of the formula: of order 8 the estimate falls with dt⁸ in a step."""
+        return self.full_order - 1
 
     def check_tolerance(self, rows: int) -> str | None:
         """It follows any tolerance."""
@@ -110,12 +111,27 @@ class RungeKutta853(Integrator):
         return np.asarray(new.error)
 
 
-def estimated_error(slopes: Matrix, dt: float, n_v: int) -> Vector:
+@dataclass(frozen=True)
+class RungeKutta853(ExplicitRungeKutta):
+    """The explicit Runge–Kutta scheme of order 8 with embedded error estimates of orders 5 and 3.
+
+    See `ExplicitRungeKutta`; it takes twelve accelerations a step. It suits smooth motion and tight tolerances. Stiff
+    springs and dampers bound its step: with ω the largest frequency, ω dt < 6.
+
+    It has no parameters: ``mbd.simulate(model, start, mbd.RungeKutta853(), tol=1e-9, until=10.0)``.
+    """
+
+    scheme: ClassVar[str | None] = "runge-kutta"
+    tableau: ClassVar[Tableau] = EIGHTH_ORDER
+    full_order: ClassVar[int] = 8
+
+
+def estimated_error(formula: Tableau, slopes: Matrix, dt: float, n_v: int) -> Vector:
     """Local error of a step by its embedded formulas, ``dt e₅ · |e₅| / √(|e₅|² + |e₃|²/100)`` (Hairer et al., II.10).
 
     The sizes |e| are the largest over positions and dt times velocities; first-order states have sizes of their own.
     """
-    fifth, third = FIFTH @ slopes, THIRD @ slopes
+    fifth, third = formula.error @ slopes, formula.second @ slopes
     n = (slopes.shape[1] - n_v) - n_v
     weights = np.concatenate([np.ones(n_v), np.full(n_v, dt), np.zeros(n)])
     parts = [weights > 0.0, *(np.arange(len(weights)) == k for k in range(2 * n_v, 2 * n_v + n))]

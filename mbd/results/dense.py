@@ -14,7 +14,9 @@ from typing import Any
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
-from mbd.kernel.schemes.dormand_prince import END, NODES, STAGES, WEIGHTS
+from mbd.kernel.schemes.dormand_prince import EIGHTH_ORDER
+from mbd.kernel.schemes.runge_kutta_4 import FOURTH_ORDER
+from mbd.kernel.schemes.tableau import Tableau
 from mbd.results.balance import Balance, Solved, put
 from mbd.results.charts import Charts
 from mbd.results.polynomials import Places
@@ -23,12 +25,14 @@ from mbd.results.stored_states import StoredStates
 
 __all__ = ["Restepping"]
 
+FORMULAS: dict[str, Tableau] = {"stages": EIGHTH_ORDER, "stages of order 4": FOURTH_ORDER}
+"""By how a run is read between its rows (`Integrator.between`); others are led by order 8 (`dense_implicit`)."""
 NEAR_POSE = 0.2
 """Distance of a stage from a singular configuration, over that of the farther row, below which it is not used [-]."""
 
 
 class Restepping:
-    """States between the rows of a run of `RungeKutta853` that stored every step."""
+    """States between the rows of a run of explicit steps that stored every one."""
 
     def __init__(self, states: StoredStates, balance: Balance) -> None:
         self.states, self.equations, self.balance = states, states.equations, balance
@@ -41,7 +45,7 @@ class Restepping:
         Frictions that follow loads would need a search at every stage.
         """
         settings, equations = states.record.settings, states.equations
-        stepped = settings.get("between") == "stages" and settings.get("store") == 1
+        stepped = settings.get("between") in FORMULAS and settings.get("store") == 1
         known = equations.compose is None or Charts.of(equations) is not None
         return stepped and known and not equations.frictions
 
@@ -79,20 +83,21 @@ class Restepping:
 
         Where coordinates do not add, the increment x stands in the place of q.
         """
+        formula = FORMULAS.get(self.states.record.settings["between"], EIGHTH_ORDER)
         still = begin.q if self.charts is None else np.zeros_like(begin.v)  # the increment of a chart
         base = np.hstack([still, begin.v, begin.z])
-        slopes = np.zeros((STAGES, *base.shape))
+        slopes = np.zeros((formula.stages, *base.shape))
         slopes[0] = np.hstack([begin.v, begin.a, begin.s])
         before = self._rates(begin).size
         least = np.zeros(len(begin))
-        for stage in range(1, STAGES):
-            moved = base + h * np.tensordot(WEIGHTS[stage, :stage], slopes[:stage], 1)
+        for stage in range(1, formula.stages):
+            moved = base + h * np.tensordot(formula.weights[stage, :stage], slopes[:stage], 1)
             q, v, z = self._parts(begin, moved)
-            there = self._rates(replace(begin, time=begin.time + NODES[stage] * h[:, 0], q=q, v=v, z=z))
+            there = self._rates(replace(begin, time=begin.time + formula.nodes[stage] * h[:, 0], q=q, v=v, z=z))
             flow = v if self.charts is None else self.charts.increment_rates(moved[:, : v.shape[1]], v)
             slopes[stage] = np.hstack([flow, there.rate])
             least = np.minimum(least, there.size - before)
-        return np.asarray(base + h * np.tensordot(END, slopes, 1)), least
+        return np.asarray(base + h * np.tensordot(formula.end, slopes, 1)), least
 
     def _parts(self, begin: Rows, state: Matrix) -> tuple[Matrix, Matrix, Matrix]:
         n_q, n_v = self.equations.n_q, self.equations.n_v

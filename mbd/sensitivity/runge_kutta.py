@@ -1,4 +1,4 @@
-"""Steps of the Runge–Kutta formulas of order 8, differentiated stage by stage.
+"""Steps of explicit Runge–Kutta formulas, differentiated stage by stage.
 
     x_i = h Σ a_ij v_j,   y_i = y₀ + h Σ a_ij rate_j,   rate_i consistent at (t₀ + c_i h, q₀ + x_i, y_i)
 
@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
-from mbd.kernel.schemes.dormand_prince import END, NODES, STAGES, WEIGHTS
+from mbd.kernel.schemes.tableau import Tableau
 from mbd.sensitivity.balance import consistent_rates, on_rows, saddle
 from mbd.sensitivity.entries import stacked, system
 from mbd.sensitivity.kernel.build import entry
@@ -21,7 +21,7 @@ from mbd.sensitivity.kernel.runge_kutta import runge_kutta_steps
 from mbd.sensitivity.motion import Mode, Motion, Rates, solved
 from mbd.sensitivity.one_step import OneStepMethod
 from mbd.sensitivity.programs import Programs
-from mbd.sensitivity.run_data import Rows
+from mbd.sensitivity.run_data import Rows, RunRows
 from mbd.sensitivity.schemes import Memory
 
 __all__ = ["RungeKuttaSteps"]
@@ -31,13 +31,17 @@ MOST = 4
 
 
 class RungeKuttaSteps(OneStepMethod):
-    """Derivatives of explicit steps."""
+    """Derivatives of explicit steps of a formula."""
+
+    def __init__(self, rows: RunRows, programs: Programs, formula: Tableau) -> None:
+        super().__init__(rows, programs)
+        self.formula = formula
 
     def taken(
         self, motion: Motion, rates: Rates, mode: Mode, rows: Rows, dh: Vector, checked: bool = True
     ) -> tuple[int, Motion, Rates]:
         """By the kernel."""
-        return taken(self.programs, motion, rates, mode, rows, dh, checked)
+        return taken(self.programs, motion, rates, mode, rows, dh, self.formula, checked)
 
     def least(
         self, motion: Motion, memory: Memory, mode: Mode, time: float, dh: Vector, row: int
@@ -47,15 +51,16 @@ class RungeKuttaSteps(OneStepMethod):
         h = time - motion.t
         speeds, rates = [motion.y[:n_v]], [memory.rates.rate]
         of_speeds, of_rates = [motion.tangent.y[:n_v]], [memory.rates.of_rate]
-        last = memory.rates
-        for stage in range(1, STAGES):
-            at = self._moved(motion, h, dh, WEIGHTS[stage], (speeds, rates, of_speeds, of_rates), NODES[stage])
+        last, formula = memory.rates, self.formula
+        for stage in range(1, formula.stages):
+            slopes = speeds, rates, of_speeds, of_rates
+            at = self._moved(motion, h, dh, formula.weights[stage], slopes, formula.nodes[stage])
             last = consistent_rates(self.programs, at, mode, last)
             speeds.append(at.y[:n_v])
             rates.append(last.rate)
             of_speeds.append(at.tangent.y[:n_v])
             of_rates.append(last.of_rate)
-        end = self._moved(motion, h, dh, END, (speeds, rates, of_speeds, of_rates), 1.0)
+        end = self._moved(motion, h, dh, formula.end, (speeds, rates, of_speeds, of_rates), 1.0)
         end = replace(end, t=time)
         if mode.rows:
             end = self._on_rows(end, mode)
@@ -110,8 +115,9 @@ class RungeKuttaSteps(OneStepMethod):
 
 
 def taken(
-    programs: Programs, motion: Motion, rates: Rates, mode: Mode, rows: Rows, dh: Vector, checked: bool = True
-) -> tuple[int, Motion, Rates]:
+    programs: Programs, motion: Motion, rates: Rates, mode: Mode, rows: Rows, dh: Vector,
+    formula: Tableau, checked: bool = True,
+) -> tuple[int, Motion, Rates]:  # fmt: skip
     """As many of the steps between these rows as the kernel takes from here; the state and rates after them.
 
     checked : false for one step whose end q, y is not known; rows then get it
@@ -125,11 +131,11 @@ def taken(
     X, by_size, block = np.zeros((size, w)), np.zeros(w), np.zeros((2, programs.layout.size))
     X[:n, :width], by_size[:width] = rates.of_rate, dh
     programs.fill(block, motion.at(mode, rate[0], lam[0]))
-    tableau = np.concatenate([END, NODES, np.ravel(WEIGHTS)])
-    slopes, of_slopes = np.empty((2, STAGES * n)), np.empty((2, STAGES * n * w))
+    tableau, stages = np.concatenate([formula.end, formula.nodes, np.ravel(formula.weights)]), formula.stages
+    slopes, of_slopes = np.empty((2, stages * n)), np.empty((2, stages * n * w))
     done = entry(runge_kutta_steps)(
         [known.function, level.function, *programs.charts.programs()], programs.values,
-        known.of_width(width), level.of_width(width), tableau,
+        known.of_width(width), level.of_width(width), tableau, stages,
         len(time) - 1, int(checked), time, q, y, rate, active, known.rows, known.fast, known.entries,
         level.entries, block[0], block[1], np.empty(max(known.outputs, level.outputs)), np.empty(level.outputs),
         slopes[0], slopes[1], of_slopes[0], of_slopes[1], X, Z, Z.copy(), by_size, np.empty(size * size),

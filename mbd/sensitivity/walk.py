@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from mbd.arrays import Vector
-from mbd.integrators import RadauIIA, RungeKutta853
+from mbd.integrators import RadauIIA
 from mbd.integrators.family import NewmarkFamily
+from mbd.integrators.runge_kutta import ExplicitRungeKutta
 from mbd.sensitivity.balance import consistent_rates, independent, pushed
 from mbd.sensitivity.cones import ended_in_rest, held_rows, rests
 from mbd.sensitivity.guards import Trigger, shift_of_end, trigger
@@ -70,8 +71,8 @@ def steps_of(rows: RunRows, programs: Programs) -> SchemeSteps:
     scheme = rows.integrator
     if isinstance(scheme, NewmarkFamily) and scheme.form == "endpoint":
         return NewmarkRows(rows, programs, scheme)
-    if isinstance(scheme, RungeKutta853):
-        return RungeKuttaSteps(rows, programs)
+    if isinstance(scheme, ExplicitRungeKutta):
+        return RungeKuttaSteps(rows, programs, scheme.tableau)
     if isinstance(scheme, RadauIIA):
         return RadauSteps(rows, programs)
     raise refused(f"steps of {scheme!r} are not differentiated", "take RungeKutta853(), RadauIIA() or HHT()")

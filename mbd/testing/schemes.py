@@ -30,7 +30,7 @@ FLOOR = 1e-12
 """Errors below are round-off, of the scheme or of the reference."""
 UNTIL = 0.6
 """Length of the runs [s]."""
-STEPS = {1: 0.01, 2: 0.01, 5: 0.06}
+STEPS = {1: 0.01, 2: 0.01, 4: 0.04, 5: 0.06}
 """The largest step by the promised order [s]; `LARGE` for higher ones."""
 LARGE = 0.2
 PLAIN = 0.05

@@ -7,7 +7,7 @@ import pytest
 
 import mbd
 from mbd.kernel.schemes import runge_kutta
-from mbd.kernel.schemes.dormand_prince import NODES
+from mbd.kernel.schemes.dormand_prince import EIGHTH_ORDER
 from tests.cases.linkages import four_bars, upright
 from tests.integrators.flat_parallelograms import T, flat, pendulum_like, started, wanted
 
@@ -30,7 +30,7 @@ def test_flat_poses_are_passed_whatever_the_step(count, dt):
 
 
 @pytest.mark.sampled(2)
-@pytest.mark.parametrize("share", [0.0, *NODES[[1, 5, 9, 10]].tolist()])
+@pytest.mark.parametrize("share", [0.0, *EIGHTH_ORDER.nodes[[1, 5, 9, 10]].tolist()])
 def test_a_pose_that_would_fall_on_a_stage_is_passed(share):
     first = flat(2)[0]
     for steps in (40, 211):  # the pose at that share of a step of the grid

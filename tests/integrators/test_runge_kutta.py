@@ -12,7 +12,8 @@ import mbd
 from mbd.hardcases.governor import governor
 from mbd.hardcases.user_force import pushed_particle
 from mbd.integrators.runge_kutta import RungeKutta853
-from mbd.kernel.schemes.dormand_prince import END, FIFTH, NODES, STAGES, THIRD, WEIGHTS
+from mbd.kernel.schemes.dormand_prince import EIGHTH_ORDER
+from mbd.kernel.schemes.runge_kutta_4 import FOURTH_ORDER
 from mbd.results.interpolation import Grid
 from mbd.results.polynomials import quintic
 from tests.integrators.test_order import double_pendulum
@@ -60,14 +61,15 @@ def fixed(scene, steps):
     return mbd.simulate(model, start, SCHEME, dt=T / steps, until=T)
 
 
-def test_the_formulas_meet_the_conditions_that_are_linear_in_the_nodes():
-    np.testing.assert_allclose(WEIGHTS.sum(axis=1), NODES, rtol=0, atol=1e-13)
-    for power in range(8):  # quadrature of order 8
-        assert END @ NODES**power == pytest.approx(1.0 / (power + 1), abs=1e-14)
-    nodes = np.append(NODES, 1.0)
-    for weights, order in ((FIFTH, 5), (THIRD, 3)):
-        sums = [weights @ nodes**power for power in range(order)]
-        assert np.max(np.abs(sums)) < 1e-13 and len(weights) == STAGES + 1
+@pytest.mark.parametrize(("formula", "order", "estimates"), [(EIGHTH_ORDER, 8, (5, 3)), (FOURTH_ORDER, 4, (3, 9))])
+def test_the_formulas_meet_the_conditions_that_are_linear_in_the_nodes(formula, order, estimates):
+    np.testing.assert_allclose(formula.weights.sum(axis=1), formula.nodes, rtol=0, atol=1e-13)
+    for power in range(order):  # quadrature
+        assert formula.end @ formula.nodes**power == pytest.approx(1.0 / (power + 1), abs=1e-14)
+    nodes = np.append(formula.nodes, 1.0)
+    for weights, least in zip((formula.error, formula.second), estimates, strict=True):
+        sums = [weights @ nodes**power for power in range(least)]
+        assert np.max(np.abs(sums)) < 1e-13 and len(weights) == formula.stages + 1
 
 
 @pytest.mark.parametrize("scene", SCENES)
@@ -83,6 +85,19 @@ def test_the_order_is_8_in_positions_rates_accelerations_and_multipliers(scene):
                 part,
                 errors,
             )
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_the_classical_scheme_has_order_4_and_an_estimate_that_falls_with_the_fourth_power(scene):
+    model, start = started(scene)
+    exact, errors, estimates = fixed(scene, FINEST).record, [], []
+    for steps in (112, 224):
+        record = mbd.simulate(model, start, mbd.RungeKutta4(), dt=T / steps, until=T).record
+        errors.append(np.max(np.abs(record.q - exact.q[:: FINEST // steps])))
+        one = mbd.simulate(model, start, mbd.RungeKutta4(), dt=T / steps, until=T / steps, backend="python")
+        estimates.append(np.max(np.abs(one.final.memory.scheme.error)))
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(4.0, abs=0.1)
+    assert np.log2(estimates[0] / estimates[1]) == pytest.approx(4.0, abs=0.3)
 
 
 def test_rows_hold_to_round_off_on_both_levels():

@@ -14,7 +14,7 @@ from tests.simulation.mechanisms import pendulum
 SCHEMES = (
     mbd.HHT(alpha=0.05), mbd.GeneralizedAlpha(0.7), mbd.HHT(0.1, formulation="index3"),
     mbd.Newmark(start="consistent"), mbd.RungeKutta853(),
-    mbd.RadauIIA(tolerance=1e-12),
+    mbd.RadauIIA(tolerance=1e-12), mbd.RungeKutta4(),
 )  # fmt: skip
 
 

@@ -17,7 +17,7 @@ from tests.simulation.mechanisms import kneed_walker, kneed_walker_start
 SCHEMES = (
     mbd.HHT(alpha=0.05, tolerance=1e-12), mbd.GeneralizedAlpha(0.8, tolerance=1e-12), mbd.RungeKutta853(),
     mbd.HHT(alpha=0.05, formulation="index3", tolerance=1e-12), mbd.Newmark(tolerance=1e-12),
-    mbd.RadauIIA(tolerance=1e-12),
+    mbd.RadauIIA(tolerance=1e-12), mbd.RungeKutta4(),
 )  # fmt: skip
 NAMES = ["left hip.angle", "right hip.angle.rate", "right thigh.mass"]
 WALKER = kneed_walker()

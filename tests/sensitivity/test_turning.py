@@ -18,7 +18,7 @@ from tests.simulation.test_space_laws import chain, pose
 CLOSE = {"tolerance": 1e-12}
 SCHEMES = (
     mbd.HHT(0.05, **CLOSE), mbd.RungeKutta853(), mbd.RadauIIA(**CLOSE), mbd.HHT(0.05, formulation="index3", **CLOSE),
-    mbd.GeneralizedAlpha(0.7, **CLOSE),
+    mbd.GeneralizedAlpha(0.7, **CLOSE), mbd.RungeKutta4(),
 )  # fmt: skip
 NAMES = ["ball.orientation", "ball.angular_velocity"]
 STEP = 8e-4

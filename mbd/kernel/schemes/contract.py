@@ -33,6 +33,7 @@ SCHEMES: tuple[str, ...] = (
     "mbd.kernel.schemes.newmark",
     "mbd.kernel.schemes.runge_kutta",
     "mbd.kernel.schemes.radau",
+    "mbd.kernel.schemes.runge_kutta_4",
 )
 """Modules of the schemes that the kernel is built with; a scheme has its place here as its number."""
 

@@ -8,12 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from mbd.arrays import Matrix, Vector
+from mbd.kernel.schemes.tableau import Tableau, weights_at
 
-__all__ = ["END", "FIFTH", "NODES", "STAGES", "THIRD", "WEIGHTS", "tableau"]
-
-STAGES = 12
-"""Stages of a step, the end not counted [-]."""
+__all__ = ["EIGHTH_ORDER"]
 
 _NODES = (
     0.0, 0.05260015195876773, 0.0789002279381516, 0.1183503419072274, 0.2816496580927726, 0.3333333333333333, 0.25,
@@ -57,22 +54,7 @@ _THIRD = (
 )  # fmt: skip
 """Error estimate of order 3 [-]."""
 
-
-def _matrix(entries: dict[tuple[int, int], float]) -> Matrix:
-    found = np.zeros((STAGES, STAGES))
-    for place, value in entries.items():
-        found[place] = value
-    found.flags.writeable = False
-    return found
-
-
-WEIGHTS: Matrix = _matrix(_WEIGHTS)
-NODES: Vector = np.array(_NODES)
-END: Vector = np.array(_END)
-FIFTH: Vector = np.array(_FIFTH)
-THIRD: Vector = np.array(_THIRD)
-
-
-def tableau() -> Vector:
-    """What the kernel needs, one after the other: a (12, 12), b (12,), c (12,), order 5 (13,), order 3 (13,)."""
-    return np.ascontiguousarray(np.concatenate([WEIGHTS.ravel(), END, NODES, FIFTH, THIRD]))
+EIGHTH_ORDER = Tableau(
+    weights_at(len(_NODES), _WEIGHTS), np.array(_END), np.array(_NODES), np.array(_FIFTH), np.array(_THIRD)
+)
+"""Twelve stages."""

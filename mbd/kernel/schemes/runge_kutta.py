@@ -1,5 +1,5 @@
-"""One explicit Runge–Kutta step of order 8 with its embedded error estimate (Dormand & Prince 1980, in the form of
-Hairer, Nørsett & Wanner 1993, II.5; coefficients in `mbd.kernel.schemes.dormand_prince`).
+"""One step of an explicit Runge–Kutta formula with its embedded error estimate (Hairer, Nørsett & Wanner
+1993, II; coefficients in K.tableau, of `mbd.kernel.schemes.tableau`, of as many stages as the scheme has nodes).
 
     x_i = h Σ_j a_ij ẋ_j,   y_i = y₀ + h Σ_j a_ij rate_j,   rate_i = rate(t₀ + c_i h, q₀ ⊕ x_i, y_i)
 
@@ -22,15 +22,14 @@ from mbd.kernel.restart import compose, consistent, displace, evaluate, measure_
 from mbd.kernel.roots import sqrt
 from mbd.kernel.saddle import factor_saddle
 from mbd.kernel.schemes.contract import Abilities, Scheme
-from mbd.kernel.schemes.dormand_prince import NODES, STAGES, tableau
+from mbd.kernel.schemes.dormand_prince import EIGHTH_ORDER
 from mbd.kernel.schemes.memory import accept_step, forget_steps
+from mbd.kernel.schemes.tableau import Tableau
 from mbd.kernel.singular.newmark_step import CONTINUOUS
 from mbd.kernel.singular.step_size import accept_row_norms, forget_row_norms, note_row_norms
 
-__all__ = ["SCHEME", "runge_kutta_accept", "runge_kutta_start", "runge_kutta_step"]
+__all__ = ["SCHEME", "explicit_scheme", "runge_kutta_accept", "runge_kutta_start", "runge_kutta_step"]
 
-EXPLICIT_STAGES = 12
-"""Stages of a step, the end not counted."""
 STILL = 1e-9
 """Speed [m/s, rad/s] below which nothing moves: what the projection changes of it is round-off."""
 MOST_RETURNS = 8
@@ -65,8 +64,9 @@ def runge_kutta_step(K: Kernel, h: float, t1: float) -> int:
     n = K.n
     n_v = K.n_v
     width = n_v + n
-    at_end = EXPLICIT_STAGES * EXPLICIT_STAGES
-    at_nodes = at_end + EXPLICIT_STAGES
+    stages = K.n_nodes
+    at_end = stages * stages
+    at_nodes = at_end + stages
     K.failure_time = t1
     K.failure_size = 0.0
     K.failure_step = h
@@ -75,8 +75,8 @@ def runge_kutta_step(K: Kernel, h: float, t1: float) -> int:
         K.stages[n_v + i] = K.rate[i]
         if i < n_v:
             K.stages[i] = K.y[i]
-    for s in range(1, EXPLICIT_STAGES):
-        explicit_move(K, h, s * EXPLICIT_STAGES, s)
+    for s in range(1, stages):
+        explicit_move(K, h, s * stages, s)
         status = explicit_rates(K, K.time + K.tableau[at_nodes + s] * h)
         if status != 0:
             return status
@@ -84,7 +84,7 @@ def runge_kutta_step(K: Kernel, h: float, t1: float) -> int:
             K.stages[s * width + n_v + i] = K.jump[i]
             if i < n_v and K.vector == 1:
                 K.stages[s * width + i] = K.y1[i]
-    explicit_move(K, h, at_end, EXPLICIT_STAGES)
+    explicit_move(K, h, at_end, stages)
     if K.n_active > 0:
         status = return_to_rows(K, t1)
         if status != 0:
@@ -104,9 +104,9 @@ def runge_kutta_step(K: Kernel, h: float, t1: float) -> int:
         K.rate1[i] = K.jump[i]
         K.aux1[i] = K.jump[i]
         K.block[K.o_a + i] = K.jump[i]
-        K.stages[EXPLICIT_STAGES * width + n_v + i] = K.jump[i]
+        K.stages[stages * width + n_v + i] = K.jump[i]
         if i < n_v and K.vector == 1:
-            K.stages[EXPLICIT_STAGES * width + i] = K.y1[i]
+            K.stages[stages * width + i] = K.y1[i]
     for k in range(K.n_rows):
         K.lam1[k] = K.impulse[k]
         K.block[K.o_lam + k] = K.impulse[k]
@@ -258,17 +258,19 @@ def explicit_error(K: Memory, h: float) -> None:
     """K.error: local error by the embedded formulas, ``h e₅ · |e₅| / √(|e₅|² + |e₃|²/100)`` (Hairer et al., II.10).
 
     The sizes |e| are the largest over positions and h times velocities; first-order states have sizes of their own.
+    A formula with one estimate has e₃ = 0.
     """
     n_v = K.n_v
     width = n_v + K.n
-    fifth = EXPLICIT_STAGES * EXPLICIT_STAGES + 2 * EXPLICIT_STAGES
-    third = fifth + EXPLICIT_STAGES + 1
+    stages = K.n_nodes
+    fifth = stages * stages + 2 * stages
+    third = fifth + stages + 1
     five = 0.0
     three = 0.0
     for i in range(width):
         e5 = 0.0
         e3 = 0.0
-        for j in range(EXPLICIT_STAGES + 1):
+        for j in range(stages + 1):
             slope = K.stages[j * width + i]
             e5 += K.tableau[fifth + j] * slope
             e3 += K.tableau[third + j] * slope
@@ -326,15 +328,20 @@ def runge_kutta_accept(K: SingularSteps, h: float) -> None:
         accept_row_norms(K, h)
 
 
-SCHEME = Scheme(
-    "runge-kutta", runge_kutta_start, runge_kutta_step, runge_kutta_accept,
-    abilities=Abilities(
-        explicit=1, estimates=1, singular_size=1, look_twice=0.1, most_growth=5.0,
-        middle=0.46666666666666667,  # between the nodes at 1/3 and 3/5
-    ),
-    nodes=tuple(NODES),
-    programs="explicit",
-    stability=6.0,
-    memory=lambda K: {"stages": (STAGES + 1) * (K.n_v + K.n), "tableau": len(tableau())},
-    coefficients=lambda: {"tableau": tableau()},
-)  # fmt: skip
+def explicit_scheme(name: str, tableau: Tableau, middle: float, stability: float) -> Scheme:
+    """The entry of a formula; middle, stability : see `Abilities`, `Scheme`."""
+    return Scheme(
+        name, runge_kutta_start, runge_kutta_step, runge_kutta_accept,
+        abilities=Abilities(
+            explicit=1, estimates=1, singular_size=1, look_twice=0.1, most_growth=5.0, middle=middle
+        ),
+        nodes=tuple(tableau.nodes),
+        programs="explicit",
+        stability=stability,
+        memory=lambda K: {"stages": (tableau.stages + 1) * (K.n_v + K.n), "tableau": len(tableau.flat())},
+        coefficients=lambda: {"tableau": tableau.flat()},
+    )  # fmt: skip
+
+
+SCHEME = explicit_scheme("runge-kutta", EIGHTH_ORDER, 0.46666666666666667, 6.0)
+"""Its middle lies between the nodes at 1/3 and 3/5."""

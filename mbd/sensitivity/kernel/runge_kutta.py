@@ -1,7 +1,7 @@
-"""Many explicit steps of order 8, each differentiated stage by stage (`mbd.sensitivity.runge_kutta`).
+"""Many steps of an explicit formula, each differentiated stage by stage (`mbd.sensitivity.runge_kutta`).
 
 X (n + m, D) has the derivatives of rates and multipliers at a row; Z those of the state, Z1 of a stage. Slopes of the
-stages are kept in V, F (STAGES, n), velocities and rates, and their derivatives in of_V, of_F (STAGES, n, D). Programs:
+stages are kept in V, F (stages, n), velocities and rates, and their derivatives in of_V, of_F (stages, n, D). Programs:
 0 `consistent`, 1 `steps`, whose sizes are S, S1; where coordinates do not add, those of `charts` from 2 on: stages are
 then in the chart around the start of the step.
 """
@@ -31,21 +31,20 @@ from mbd.sensitivity.kernel.sizes import (
 
 __all__ = ["SAME", "runge_kutta_steps"]
 
-STAGES = 12
 SAME = 1e-9
 """Distance of a row from where the pass says that it is, over the size of the state, that is round-off [-]."""
 
 
 def runge_kutta_steps(
-    K: Model, S: Integers, S1: Integers, tableau: Reals, steps: int, checked: int, time: Reals, q: Reals, y: Reals,
-    rate: Reals, lam: Reals, rows: Integers, fast: Integers, entries: Integers, entries1: Integers, block: Reals,
+    K: Model, S: Integers, S1: Integers, tableau: Reals, stages: int, steps: int, checked: int, time: Reals, q: Reals,
+    y: Reals, rate: Reals, lam: Reals, rows: Integers, fast: Integers, entries: Integers, entries1: Integers, block: Reals,
     at: Reals, out: Reals, other: Reals, V: Reals, F: Reals, of_V: Reals, of_F: Reals, X: Reals, Z: Reals, Z1: Reals,
     dh: Reals, A: Reals, M: Reals, B: Reals, b: Reals, W: Reals, pivots: Integers, turns: Reals, room: Reals,
     own: Reals,
 ) -> int:  # fmt: skip
     """Take Z and X over the steps between rows 0 … `steps`; how many ended at their rows, and were regular.
 
-    tableau : weights of the end (STAGES), nodes, weights of the stages; checked : 0 where row 1 is not known and is to
+    tableau : weights of the end (stages,), nodes, weights of the stages; checked : 0 where row 1 is not known and is to
     be found; dh (D,) : derivatives of the size of each step
     """
     n = S[RATES]
@@ -55,9 +54,9 @@ def runge_kutta_steps(
         h = time[k + 1] - time[k]
         first_stage(S, k, y, rate, V, F, of_V, of_F, X, Z)
         place_row(S, block, k, time, q, y, rate, lam)
-        for s in range(1, STAGES):
-            moved(S, tableau, (s + 2) * STAGES, s, tableau[STAGES + s], k, h, q, y, V, F, of_V, of_F, Z, Z1, dh, block)
-            block[0] = time[k] + tableau[STAGES + s] * h
+        for s in range(1, stages):
+            moved(S, tableau, (s + 2) * stages, s, tableau[stages + s], k, h, q, y, V, F, of_V, of_F, Z, Z1, dh, block)
+            block[0] = time[k] + tableau[stages + s] * h
             if consistent(K, 0, S, rows, entries, block, out, Z1, A, B, b, pivots) != 0:
                 return k
             for i in range(n):
@@ -67,7 +66,7 @@ def runge_kutta_steps(
                     of_V[(s * n + i) * w + j] = Z1[(S[PLACES] + i) * w + j]
                     of_F[(s * n + i) * w + j] = B[i * w + j]
             rates_of(K, 2, S, block, turns, Z1, s, V, of_V)
-        moved(S, tableau, 0, STAGES, 1.0, k, h, q, y, V, F, of_V, of_F, Z, Z1, dh, block)
+        moved(S, tableau, 0, stages, 1.0, k, h, q, y, V, F, of_V, of_F, Z, Z1, dh, block)
         block[0] = time[k + 1]
         leave(K, 2, S, block, turns, Z1, 0, own)
         compose(K, 2, S, block, turns)

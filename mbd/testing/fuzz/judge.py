@@ -156,7 +156,7 @@ def between(run: mbd.Trajectory, model: mbd.Model, parameters: Mapping[str, floa
             loose = (1e-6 if precise else 1e-3 + _cubic_error(run, bodies, h)) + 0.3 * tol
             laws.closure(found, bodies, loose, rates=precise, more=more, faster=0.3 * tol / h)
             share = 1e-5 if precise else 0.02 + _unresolved(run, times)
-            again = run.settings["between"] == "stages"  # steps are taken again, and end in balance
+            again = run.settings["between"].startswith("stages")  # steps are taken again, and end in balance
             stiff = unknown_force(bodies, tol, h, laws.size_of(bodies)) if tol and not again else 0.0
             laws.balance(found, bodies, loads(bodies), share, stiff + _turned(run, model, times))
             if precise:

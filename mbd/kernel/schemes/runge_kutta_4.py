@@ -1,0 +1,27 @@
+"""The explicit Runge–Kutta scheme of order 4 (Kutta 1901, Z. Math. Phys. 46:435, p. 443).
+
+Its error is estimated by the slope k₅ at the end of the step: ``dt (k₄ − k₅)/6``. With these five slopes the formulas
+of order 3 at least are ``b + s (0, 0, 0, 1, −1)``: c = (0, ½, ½, 1, 1) and A c = (0, 0, ¼, ½, ½) leave no other direction
+in which Σ b, Σ b c, Σ b c² and Σ b A c stay as they are. s = −1/6 takes k₅ in the place of k₄.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mbd.kernel.schemes.runge_kutta import explicit_scheme
+from mbd.kernel.schemes.tableau import Tableau, weights_at
+
+__all__ = ["FOURTH_ORDER", "SCHEME"]
+
+FOURTH_ORDER = Tableau(
+    weights_at(4, {(1, 0): 0.5, (2, 1): 0.5, (3, 2): 1.0}),
+    np.array([1.0, 2.0, 2.0, 1.0]) / 6.0,
+    np.array([0.0, 0.5, 0.5, 1.0]),
+    np.array([0.0, 0.0, 0.0, 1.0, -1.0]) / 6.0,
+    np.zeros(5),
+)
+"""Four stages."""
+
+SCHEME = explicit_scheme("runge-kutta-4", FOURTH_ORDER, 0.75, 2.7)
+"""Its middle lies between the nodes at 1/2 and 1."""

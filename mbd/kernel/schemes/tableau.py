@@ -1,0 +1,44 @@
+"""Coefficients of explicit Runge–Kutta formulas, with embedded estimates of their errors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from mbd.arrays import Matrix, Vector
+
+__all__ = ["Tableau", "weights_at"]
+
+
+@dataclass(frozen=True, eq=False)
+class Tableau:
+    """An explicit formula of s stages; the slope after the last one is that at the end of the step.
+
+    weights : a (s, s), of slope j in stage i; end : b (s,); nodes : c (s,), where stages lie in the step
+    error : weights of all slopes (s + 1,) in the estimated error; second : of another one that it is weighed with, or 0
+    """
+
+    weights: Matrix
+    end: Vector
+    nodes: Vector
+    error: Vector
+    second: Vector
+
+    @property
+    def stages(self) -> int:
+        """s, the end of the step not counted."""
+        return len(self.nodes)
+
+    def flat(self) -> Vector:
+        """What the kernel needs, one after the other: a, b, c, the error, the second one."""
+        return np.concatenate([self.weights.ravel(), self.end, self.nodes, self.error, self.second])
+
+
+def weights_at(stages: int, entries: Mapping[tuple[int, int], float]) -> Matrix:
+    """a (s, s) of its entries that are other than zero."""
+    found = np.zeros((stages, stages))
+    for place, value in entries.items():
+        found[place] = value
+    return found
