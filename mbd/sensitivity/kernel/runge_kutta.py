@@ -38,8 +38,8 @@ SAME = 1e-9
 def runge_kutta_steps(
     K: Model, S: Integers, S1: Integers, tableau: Reals, stages: int, steps: int, checked: int, time: Reals, q: Reals,
     y: Reals, rate: Reals, lam: Reals, rows: Integers, fast: Integers, entries: Integers, entries1: Integers,
-    block: Reals, at: Reals, out: Reals, other: Reals, V: Reals, F: Reals, of_V: Reals, of_F: Reals, X: Reals, Z: Reals, Z1: Reals,
-    dh: Reals, A: Reals, M: Reals, B: Reals, b: Reals, W: Reals, pivots: Integers, turns: Reals, room: Reals,
+    block: Reals, at: Reals, out: Reals, other: Reals, V: Reals, F: Reals, of_V: Reals, of_F: Reals, X: Reals, Z: Reals,
+    Z1: Reals, dh: Reals, A: Reals, M: Reals, B: Reals, b: Reals, W: Reals, pivots: Integers, turns: Reals, room: Reals,
     own: Reals,
 ) -> int:  # fmt: skip
     """Take Z and X over the steps between rows 0 … `steps`; how many ended at their rows, and were regular.
