@@ -14,7 +14,8 @@ HINGE = mbd.Revolute("hinge", MODEL.ground.origin, ROD.start)
 FRAMES = MODEL.ground.origin, ROD.end
 
 WORDS = {
-    **{scheme: () for scheme in (mbd.HHT, mbd.GeneralizedAlpha, mbd.Newmark, mbd.RadauIIA, mbd.RungeKutta853)},
+    **{scheme: () for scheme in (mbd.HHT, mbd.GeneralizedAlpha, mbd.Newmark)},
+    **{scheme: () for scheme in (mbd.RadauIIA, mbd.RungeKutta4, mbd.RungeKutta853)},
     **{
         joint: ("joint", *FRAMES)
         for joint in (

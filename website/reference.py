@@ -18,7 +18,7 @@ GROUPS = {
     "Functions": "sin cos tan asin acos atan atan2 sinh cosh tanh exp log sqrt hypot sign "
     "maximum minimum clip mod floor where pi",
     "Starts and runs": "assemble project State simulate Trajectory load batch Batch sweep Sweep latin_hypercube sobol",
-    "Integrators": "HHT GeneralizedAlpha Newmark RadauIIA RungeKutta853",
+    "Integrators": "HHT GeneralizedAlpha Newmark RadauIIA RungeKutta4 RungeKutta853",
     "Analysis": "accuracy Accuracy Known effects Effects linearize Linearization StateSpace mobility "
     "Mobility criteria Criteria sensitivities Sensitivities fit Fit optimize Optimum",
     "Gaits": "limit_cycle LimitCycle gait_report GaitReport find_gait GaitSearch branch Branch PointCurve basin Basin",
