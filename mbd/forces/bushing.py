@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from mbd.bodies.algebra import cross, difference, product, rotate, total, transpose
+from mbd.bodies.algebra import cross, difference, product, rotate, scaled, total, transpose
 from mbd.bodies.base import Frame
 from mbd.bodies.domains import Domain, at_least_zero
 from mbd.bodies.values import is_number, name_of, number, shown, triple
 from mbd.errors import ModelError
 from mbd.forces.base import Action, Force, Result, frame_of
 from mbd.forces.quantities import Mention
-from mbd.joints.quaternions import of_rotation, rotation_vector
+from mbd.joints.quaternions import increment_rates, of_rotation, rotation_vector
 from mbd.scope import Rotation, Scope, Triple
 from mbd.tape.functions import atan2
 from mbd.tape.node import Node, Scalar
@@ -38,6 +38,15 @@ class Bushing(Force):
     rotational_stiffness : κ about x, y, z [N m/rad], likewise
     damping : c [N s/m], likewise
     rotational_damping : γ [N m s/rad], likewise
+
+    Results: 'name.force' [N] and 'name.torque' [N m] on b by a, at the origin of b, in ground axes; 'name.force.a' and
+    'name.torque.a', the same in the axes of a, along which it is stiff; 'name.offset', d, and 'name.rotation_vector', φ.
+    Body a feels the opposite of both, at the same place.
+
+    Raises
+    ------
+    ModelError
+        for negative values, all of them at once.
     """
 
     name: str
@@ -54,6 +63,9 @@ class Bushing(Force):
         frame_of(self.b, f"second frame of Bushing '{self.name}'")
         for field in FIELDS:
             object.__setattr__(self, field, _three(getattr(self, field), f"{field} of '{self.name}'"))
+        wrong = self.value_faults(self.parameters())
+        if wrong:
+            raise ModelError(wrong)
 
     @property
     def kind(self) -> str:
@@ -106,12 +118,43 @@ class Bushing(Force):
         )
 
     def results(self) -> dict[str, Result]:
-        """'offset': d [m], and 'rotation_vector': φ [rad], both in the axes of a."""
-        return {"offset": Result(self._offset, is_vector=True), "rotation_vector": Result(self._turn, is_vector=True)}
+        """'force' and 'torque' on b at its origin in ground axes, with '.a' in those of a; there too 'offset' d [m] and
+        'rotation_vector' φ [rad].
+        """
+        parts = {
+            "force": self._force,
+            "torque": self._torque,
+            "force.a": self._own_force,
+            "torque.a": self._own_torque,
+            "offset": self._offset,
+            "rotation_vector": self._turn,
+        }
+        return {field: Result(value, is_vector=True) for field, value in parts.items()}
 
     def _values(self, scope: Scope, field: str) -> list[Node]:
         given = getattr(self, field)
         return [scope.parameter(f"{self.name}.{field}", axis, value) for axis, value in zip("xyz", given, strict=True)]
+
+    def _force(self, scope: Scope) -> Triple:
+        return rotate(scope.frame(self.a).rotation, self._own_force(scope))
+
+    def _torque(self, scope: Scope) -> Triple:
+        return rotate(scope.frame(self.a).rotation, self._own_torque(scope))
+
+    def _own_force(self, scope: Scope) -> Triple:
+        """−K d − C ḋ."""
+        pull = _products(self._values(scope, "stiffness"), self._offset(scope))
+        return scaled(-1.0, total(pull, _products(self._values(scope, "damping"), self._offset_rate(scope))))
+
+    def _own_torque(self, scope: Scope) -> Triple:
+        """−T⁻¹(φ) K φ − Γ ω: with φ̇ = T⁻ᵀ(φ) ω, ω in the axes of a, the first does the work of −K φ on φ̇."""
+        turn = self._turn(scope)
+        moment = _products(self._values(scope, "rotational_stiffness"), turn)
+        if not (_is_zero(turn[0]) and _is_zero(turn[1])):
+            x, y, z = increment_rates(turn, moment)
+            moment = (x, y, z)
+        slowing = _products(self._values(scope, "rotational_damping"), self._turn_rate(scope))
+        return scaled(-1.0, total(moment, slowing))
 
     def _offset(self, scope: Scope) -> Triple:
         a, b = scope.frame(self.a), scope.frame(self.b)
@@ -155,8 +198,16 @@ def _quadratic(factors: list[Node], parts: Triple) -> Scalar:
     return found
 
 
+def _products(factors: list[Node], parts: Triple) -> Triple:
+    """factor part, each."""
+    x, y, z = (factor * part for factor, part in zip(factors, parts, strict=True))
+    return (x, y, z)
+
+
+def _is_zero(part: Scalar) -> bool:
+    return part == 0.0 if isinstance(part, float) else part.is_zero
+
+
 def _is_flat(R: Rotation) -> bool:
     """Whether a rotation is about z for certain."""
-    return all(
-        part == 0.0 if isinstance(part, float) else part.is_zero for part in (R[0][2], R[1][2], R[2][0], R[2][1])
-    )
+    return all(map(_is_zero, (R[0][2], R[1][2], R[2][0], R[2][1])))

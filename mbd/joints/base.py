@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from mbd.bodies.base import Frame
-from mbd.bodies.domains import Domain, Parameterized, at_least_zero
+from mbd.bodies.domains import Domain, Parameterized
 from mbd.bodies.promises import scalar
 from mbd.bodies.values import among, name_of, number
 from mbd.errors import ModelError, nearest
@@ -20,6 +20,9 @@ __all__ = ["Joint", "JointLoss", "Label", "row_unit"]
 
 JointLoss = Loss | Mapping[str, Loss] | None
 """A loss on every coordinate of a joint, or by label of its coordinates."""
+
+DRIVES_AWAY = "is negative; give a value ≥ 0, or an mbd.TorsionSpring where it shall drive away from its rest"
+"""What is wrong with the stiffness of a joint."""
 
 
 class Label(NamedTuple):
@@ -208,7 +211,8 @@ class Joint(Parameterized, ABC):
 
     def domains(self) -> dict[str, Domain]:
         """The stiffness of its spring ≥ 0."""
-        return {f"{self.name} spring.stiffness": at_least_zero()} if len(self.labels) == 1 else {}
+        domain = Domain(low=0.0, problem=DRIVES_AWAY, called="stiffness")
+        return {f"{self.name} spring.stiffness": domain} if len(self.labels) == 1 else {}
 
     @property
     def known_as(self) -> str:
@@ -282,3 +286,5 @@ class Joint(Parameterized, ABC):
                     f"{kind} '{self.name}': its stiffness would act on several coordinates "
                     f"({', '.join(label.name for label in self.labels)}); free one only, or apply an mbd.Spring"
                 )
+            if super().value_faults(self.parameters()):
+                raise ModelError(self.value_faults(self.parameters()))

@@ -7,7 +7,7 @@ from dataclasses import KW_ONLY, dataclass, field
 
 from mbd.bodies.algebra import IDENTITY, ZERO, dot
 from mbd.bodies.base import Frame
-from mbd.bodies.domains import Domain, at_least_zero
+from mbd.bodies.domains import Domain
 from mbd.joints import quaternions
 from mbd.joints.base import Joint, JointLoss, Label
 from mbd.joints.parts import place_rows
@@ -114,7 +114,8 @@ class Spherical(Joint):
 
     def domains(self) -> dict[str, Domain]:
         """A stiffness ≥ 0."""
-        return {f"{self.name} spring.stiffness": at_least_zero()}
+        problem = "is negative; give a value ≥ 0, or an mbd.Potential where it shall drive away from its rest"
+        return {f"{self.name} spring.stiffness": Domain(low=0.0, problem=problem, called="stiffness")}
 
     # the chart ----------------------------------------------------------------------------------------------------
     def compose(self, q: Sequence[Scalar], x: Sequence[Scalar]) -> Sequence[Scalar]:

@@ -60,8 +60,9 @@ def unit(name: str, facts: Facts) -> str:
         power = "/s" if last == "rate" else "/s²"
         base = own.get(stem) or next((value for key, value in own.items() if key.rpartition(".")[0] == stem), "")
         return base + power if base else ""
-    if last in ("x", "y", "z") and stem.rpartition(".")[2] in ("reaction_force", "reaction_torque", "force", "torque"):
-        return ENDINGS[stem.rpartition(".")[2]]
+    effort = stem.removesuffix(".a").rpartition(".")[2]  # 'mount.force.a.x': in the axes of a frame a
+    if last in ("x", "y", "z") and effort in ("reaction_force", "reaction_torque", "force", "torque"):
+        return ENDINGS[effort]
     return ENDINGS.get(last, "")
 
 

@@ -60,7 +60,61 @@ def test_in_space_it_keeps_energy_and_is_seen_from_either_side_alike_where_it_is
     ({"damping": "x"}, "damping of 'mount' must be a number"),
     ({"stiffness": (1, 2, 3, 4)}, "three components"),
     ({"rotational_stiffness": (1.0, 2.0)}, "three along x, y, z; got two"),
+    ({"stiffness": -1.0, "rotational_damping": (0, -2, 0)}, "(?s)4 faults.*stiffness.x -1.*damping.y -2"),
 ])  # fmt: skip
-def test_wrong_values_are_refused(given, fault):
+def test_wrong_values_are_refused_when_it_is_made(given, fault):
+    one, two = (mbd.RigidBody(name, 1.0, (1.0, 1.0, 1.0)) for name in ("one", "two"))
     with pytest.raises(mbd.ModelError, match=fault):
-        mbd.assemble(held(False, **given))
+        mbd.Bushing("mount", one.origin, two.origin, **given)
+
+
+def test_its_force_and_torque_move_both_bodies_by_newton_and_euler():
+    """What b gets at its origin a gives there: seen from each body alone, for any stiffness and damping."""
+    model = mbd.Model("two in flight", gravity=(0.0, 0.0, 0.0))
+    moments = {"one": np.array([0.3, 0.4, 0.5]), "two": np.array([0.2, 0.1, 0.25])}
+    bodies = {name: mbd.RigidBody(name, 2.0, tuple(each)) for name, each in moments.items()}
+    for name, body in bodies.items():
+        model.connect(mbd.Free(f"float {name}", model.ground.origin, body.origin))
+    a = bodies["one"].point(0.1, -0.3, 0.2).turned(0.7, axis=(1, 0, 0))
+    b = bodies["two"].point(-0.2, 0.1, 0.3, name="b").turned(-0.4, axis=(1, 1, 0))
+    springs = {"stiffness": (30.0, 50.0, 80.0), "rotational_stiffness": (1.0, 4.0, 9.0)}
+    model.apply(mbd.Bushing("mount", a, b, damping=(1.0, 2.0, 0.5), rotational_damping=(0.1, 0.4, 0.2), **springs))
+    start = mbd.assemble(
+        model,
+        {"float one.orientation": ((1, 2, 3), 0.7), "float two.orientation": ((-1, 1, 0), 1.3), "float two.x": 0.3},
+        {"float one.angular_velocity": (1.0, 2.0, -1.0), "float two.angular_velocity": (0.5, 0.0, 3.0)},
+    )
+    run = mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.02, until=0.1, backend="python")
+    force, torque = run["mount.force"], run["mount.torque"]
+    for sign, name in (-1.0, "one"), (1.0, "two"):
+        joint = f"float {name}"
+        a_c = np.column_stack([run[f"{joint}.{axis}.acceleration"] for axis in "xyz"])
+        np.testing.assert_allclose(2.0 * a_c, sign * force, rtol=1e-9, atol=1e-9)
+        omega = run[f"{joint}.angular_velocity"]
+        alpha = np.column_stack([run[f"{joint}.angular_velocity.{axis}.acceleration"] for axis in "xyz"])
+        rate = moments[name] * alpha + np.cross(omega, moments[name] * omega)  # in the axes of the body
+        arm = run["two.b"] - run[f"{name}.center"]
+        w, *u = run[f"{joint}.orientation"].T
+        turned = [_turned(np.array([w[k], u[0][k], u[1][k], u[2][k]]), rate[k]) for k in range(len(rate))]
+        np.testing.assert_allclose(turned, sign * (torque + np.cross(arm, force)), rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(np.linalg.norm(run["mount.force.a"], axis=1), np.linalg.norm(force, axis=1), rtol=1e-12)
+    units = run.to_dataframe(["mount.force", "mount.torque.a"]).attrs["units"]
+    assert (units["mount.force.x"], units["mount.torque.a.z"]) == ("N", "N m")
+
+
+def _turned(q, vector):
+    """R(q) vector."""
+    w, u = q[0], q[1:]
+    return vector + 2.0 * np.cross(u, np.cross(u, vector) + w * vector)
+
+
+def test_at_rest_it_carries_the_weight_along_its_own_axes():
+    model = mbd.Model("shelf")
+    board = mbd.RigidBody("board", 2.0, (0.3, 0.4, 0.5), center=(0.5, 0.0, 0.0))
+    model.connect(mbd.Planar("float", model.ground.origin, board.origin))
+    wall, clamp = (body.origin.turned(0.5 * np.pi) for body in (model.ground, board))
+    model.apply(mbd.Bushing("mount", wall, clamp, 1e6, 1e6, 1e3, 1e3))
+    run = mbd.simulate(model, mbd.assemble(model), mbd.RadauIIA(), dt=0.05, until=1.0)
+    np.testing.assert_allclose(run["mount.force"][-1], [0.0, 2.0 * 9.81, 0.0], atol=1e-6)
+    np.testing.assert_allclose(run["mount.force.a"][-1], [2.0 * 9.81, 0.0, 0.0], atol=1e-6)
+    np.testing.assert_allclose(run["mount.torque"][-1], [0.0, 0.0, 9.81], rtol=1e-4)

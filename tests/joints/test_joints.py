@@ -112,8 +112,21 @@ def test_joints_are_values():
 
 
 def test_a_joint_tells_what_is_impossible_about_it():
-    joint = mbd.Revolute("knee", ROD.end, ROD.start, loss=mbd.Viscous(-1.0), stiffness=-2.0)
+    joint = mbd.Revolute("knee", ROD.end, ROD.start, loss=mbd.Viscous(-1.0))
     text = " ".join(joint.faults())
     assert "feed energy in" in text
-    assert "stiffness -2 is negative" in text
     assert "connects 'rod' to itself" in text
+
+
+@pytest.mark.parametrize(
+    ("kind", "instead"),
+    [(mbd.Revolute, "TorsionSpring"), (mbd.Prismatic, "TorsionSpring"), (mbd.Spherical, "Potential")],
+)
+def test_a_spring_of_negative_stiffness_is_refused_when_its_joint_is_made(kind, instead):
+    with pytest.raises(ModelError) as refused:
+        kind("knee", GROUND, ROD.start, loss=mbd.Viscous(-1.0), stiffness=-2.0)
+    drive_in, stiffness = refused.value.faults
+    assert "'knee loss'" in drive_in
+    assert "feed energy in" in drive_in
+    assert "joint 'knee': stiffness -2 is negative" in stiffness
+    assert f"mbd.{instead}" in stiffness
