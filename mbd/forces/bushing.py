@@ -40,7 +40,7 @@ class Bushing(Force):
     rotational_damping : γ [N m s/rad], likewise
 
     Results: 'name.force' [N] and 'name.torque' [N m] on b by a, at the origin of b, in ground axes; 'name.force.a' and
-    'name.torque.a', the same in the axes of a, along which it is stiff; 'name.offset', d, and 'name.rotation_vector', φ.
+    'name.torque.a', the same in the axes of a, in which it is stiff; 'name.offset', d; 'name.rotation_vector', φ.
     Body a feels the opposite of both, at the same place.
 
     Raises

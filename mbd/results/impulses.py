@@ -12,6 +12,9 @@ from mbd.results.record import EventRecord
 
 __all__ = ["Impulse", "Impulses", "impulses_of"]
 
+WAYS = ("forward", "sideways")
+"""Directions in which a disk or a ball rolls."""
+
 SHOWN = 40
 """Impulses that are shown; of more, the first and the last."""
 
@@ -24,7 +27,8 @@ class Impulse:
     ----------
     time : instant of the impact [s]
     event : contact that closed (or opened) then, whose record has it
-    name : what took it: that contact, or one that was closed already, or a joint with dry friction
+    name : what took it: that contact, or one that was closed already, a wheel that rolls while one is, a joint with
+        dry friction
     part : 'normal', 'friction', or the direction of friction where there are several ('forward', 'sideways'), 'spin'
     impulse : [unit]; a normal one that pushes is ≥ 0
     unit : 'N s' or 'N m s'
@@ -70,8 +74,11 @@ def impulses_of(events: Sequence[EventRecord], facts: Facts, names: Sequence[str
     """
     units = {contact.name: contact.unit for contact in facts.contacts}
     directions: dict[str, list[str]] = {}
+    rolling: dict[str, list[str]] = {}
     for name in names:
         stem, _, part = name.rpartition(".")
+        if part == "force" and stem.rpartition(".")[2] in WAYS:
+            rolling.setdefault(stem.rpartition(".")[0], []).append(stem.rpartition(".")[2])
         if stem.endswith(".friction"):
             directions.setdefault(stem.removesuffix(".friction"), []).append(part)
     spinning = {name.removesuffix(".spin.torque") for name in names if name.endswith(".spin.torque")}
@@ -84,7 +91,9 @@ def impulses_of(events: Sequence[EventRecord], facts: Facts, names: Sequence[str
             sides, spin = directions.get(name, []), ["spin"] * (name in spinning)
             along = len(values) - 1 - len(spin)
             sides = sides if len(sides) > 1 and len(sides) == along else ["friction"] * along
-            parts = ["normal", *sides, *spin] if name in units else ["friction"] * len(values)
+            own = rolling.get(name, [])
+            own = own if len(own) == len(values) else ["friction"] * len(values)
+            parts = ["normal", *sides, *spin] if name in units else own
             unit = "N m s" if name in torques or units.get(name) == "rad" else "N s"
             found += [
                 Impulse(event.time, event.name, name, part, float(value), "N m s" if part == "spin" else unit)

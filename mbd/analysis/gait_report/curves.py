@@ -15,13 +15,10 @@ from mbd.arrays import Matrix, Vector
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
 
-__all__ = ["PERCENT", "Curve", "curves_of", "forces_at"]
+__all__ = ["PERCENT", "Curve", "curves_of", "forces_at", "grips_of"]
 
 PERCENT = np.linspace(0.0, 100.0, 101)
 """Share of the stride [%]."""
-
-ROLLING = ".forward.force"
-"""How names of forces end by which a disk or a ball rolls forward."""
 
 SAME = 1e-9
 """Angles that differ less are one [rad]."""
@@ -118,17 +115,22 @@ def _sampled(
     return found | forces_at(run, side, times)
 
 
+def grips_of(run: Trajectory, side: Side) -> list[str]:
+    """Names of the `Rolling` by which the feet of a side grip."""
+    grips = [shape.name for shape in run.facts.shapes if (shape.kind, shape.form) == ("held", "grip")]
+    return [name for name in grips if of_side(name, side.name)]
+
+
 def forces_at(run: Trajectory, side: Side, times: Vector) -> dict[str, Vector]:
-    """Normal and forward force of the ground on a foot, whose grip may be a `Rolling` of its side in space [N]."""
+    """Normal and forward force of the ground on a foot, whose grip may be a `Rolling` of its side [N]."""
     named = run.at(times)
     normal, forward = np.zeros(len(times)), np.zeros(len(times))
     for name in side.contacts:
         normal = normal + np.nan_to_num(named[f"{name}.force"])
         if f"{name}.friction.forward" in run:
             forward = forward + np.nan_to_num(named[f"{name}.friction.forward"])
-    for name in run.names:
-        if name.endswith(ROLLING) and of_side(name, side.name):
-            forward = forward + np.nan_to_num(named[name])
+    for grip in grips_of(run, side):
+        forward = forward + np.nan_to_num(named[f"{grip}{'.forward' * (f'{grip}.forward.force' in run)}.force"])
     return {"normal force": normal, "forward force": forward}
 
 

@@ -7,11 +7,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
-from mbd.analysis.gait_report.curves import forces_at
+from mbd.analysis.gait_report.curves import forces_at, grips_of
 from mbd.analysis.gait_report.strides import Side, Stride, of_side
 
 if TYPE_CHECKING:
+    from mbd.results.impulses import Impulse
     from mbd.trajectory import Trajectory
 
 __all__ = ["BOTH", "Measure", "Spent", "energy_of", "measures_of"]
@@ -28,6 +30,9 @@ FINE = 1001
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(4)
 PANELS = 250
 """Parts of a stride on each of which these points integrate a force, besides those that events make."""
+
+FORWARD = ("forward", "friction")
+"""Parts of impulses along the way: in space, and in the plane."""
 
 Values = dict[tuple[str, str], float]
 """By quantity and unit."""
@@ -56,9 +61,10 @@ class Spent:
 def measures_of(run: Trajectory, sides: Sequence[Side], mass: float | None) -> list[Measure]:
     """Spatio-temporal numbers and loads, each by side."""
     found: dict[str, list[Values]] = {}
+    impulses = run.impulses
     for side in sides:
         others = [each for each in sides if each is not side]
-        found[side.name] = [_of_stride(run, side, others, stride, mass) for stride in side.strides]
+        found[side.name] = [_of_stride(run, side, others, stride, mass, impulses) for stride in side.strides]
     measures = []
     for quantity, unit in next(iter(found.values()))[0]:
         columns = {side: np.array([each[quantity, unit] for each in rows]) for side, rows in found.items()}
@@ -69,7 +75,9 @@ def measures_of(run: Trajectory, sides: Sequence[Side], mass: float | None) -> l
     return measures
 
 
-def _of_stride(run: Trajectory, side: Side, others: Sequence[Side], stride: Stride, mass: float | None) -> Values:
+def _of_stride(
+    run: Trajectory, side: Side, others: Sequence[Side], stride: Stride, mass: float | None, impulses: Sequence[Impulse]
+) -> Values:
     period, (step_time, step_length) = stride.duration, stride.step
     stance = (stride.off - stride.begin) / period * 100.0
     together = [
@@ -80,32 +88,46 @@ def _of_stride(run: Trajectory, side: Side, others: Sequence[Side], stride: Stri
     ]
     times = stride.begin + np.linspace(0.0, 1.0 - 1e-9, FINE) * period
     force = forces_at(run, side, times)["normal force"]
-    known = stride.begin > run.time[0]  # of a foot that stands at the start the strike is not
-    struck = (0.0 if known else float("nan")) + sum(
-        float(np.atleast_1d(event.impulse)[0])  # the first part is normal
-        for event in run.events
-        if event.name in side.contacts and stride.begin <= event.time < stride.end and np.size(event.impulse)
-    )
-    impulse = _normal_impulse(run, side, stride) + struck
+    if stride.begin > run.time[0]:
+        struck, impacts = _impacts(run, side, stride, impulses)
+    else:  # of a foot that stands at the start the strike is not known
+        struck, impacts = float("nan"), np.full(2, np.nan)
+    normal, forward = _impulse(run, side, stride) + impacts
     per, scale = ("", 1.0) if mass is None else ("/kg", 1.0 / mass)
     return {
         ("step length", "m"): step_length, ("step time", "s"): step_time, ("stride length", "m"): stride.length,
         ("stride time", "s"): period, ("speed", "m/s"): stride.length / period, ("cadence", "1/min"): 120.0 / period,
         ("stance", "%"): stance, ("swing", "%"): 100.0 - stance, ("double support", "%"): sum(together) / period *
         100.0, ("clearance", "mm"): 1e3 * _clearance(run, side, stride), ("normal impulse", f"N s{per}"): scale *
-        impulse, ("strike impulse", f"N s{per}"): scale * struck, ("peak normal force", f"N{per}"): scale *
+        normal, ("forward impulse", f"N s{per}"): scale * forward, ("strike impulse", f"N s{per}"): scale * struck, ("peak normal force", f"N{per}"): scale *
         float(np.max(force)),
     }  # fmt: skip
 
 
-def _normal_impulse(run: Trajectory, side: Side, stride: Stride) -> float:
-    """∫ of the normal force without impacts [N s], from one event to the next: forces may jump there."""
+def _impacts(
+    run: Trajectory, side: Side, stride: Stride, impulses: Sequence[Impulse]
+) -> tuple[float, NDArray[np.float64]]:
+    """Normal impulse of the strikes of a foot; normal and forward impulse of all impacts in which it stands, as of a
+    knee that locks (2,) [N s].
+    """
+    strikes = {event.time for event in run.events if event.kind == "closed" and event.name in side.contacts}
+    bearers = {*side.contacts, *grips_of(run, side)}
+    taken = [one for one in impulses if one.name in bearers and stride.begin <= one.time < stride.end]
+    normal = [one for one in taken if one.part == "normal"]
+    struck = sum(one.impulse for one in normal if one.time in strikes)
+    forward = sum(one.impulse for one in taken if one.part in FORWARD)
+    return struck, np.array([sum(one.impulse for one in normal), forward])
+
+
+def _impulse(run: Trajectory, side: Side, stride: Stride) -> NDArray[np.float64]:
+    """∫ of the normal and the forward force without impacts (2,) [N s], from one event to the next: these may jump."""
     events = [event.time for event in run.events if stride.begin < event.time < stride.end]
     knots = np.unique([*np.linspace(stride.begin, stride.end, PANELS + 1), *events])
     half = np.diff(knots)[:, None] / 2.0
     times = knots[:-1, None] + half * (1.0 + POINTS)
-    force = forces_at(run, side, times.ravel())["normal force"].reshape(times.shape)
-    return float(np.sum(half * WEIGHTS * force))
+    forces = forces_at(run, side, times.ravel())
+    columns = [forces[name].reshape(times.shape) for name in ("normal force", "forward force")]
+    return np.array([float(np.sum(half * WEIGHTS * force)) for force in columns])
 
 
 def _within(side: Side, stride: Stride) -> list[tuple[float, float]]:

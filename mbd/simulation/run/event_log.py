@@ -35,6 +35,7 @@ class EventLog:
         self._bearers: list[Bearer] = [(contact.name, _place(contact.rows)) for contact in manager.contacts]
         joints = [friction for friction in manager.frictions if friction.contact < 0]
         self._bearers += [(friction.name, _place((friction.row,))) for friction in joints]
+        self._bearers += [(name, _place(rows)) for name, rows in manager.rolling.items()]
 
     def events(self, lines: Matrix, stored: int) -> list[EventRecord]:
         """The events of some lines (L, width), in rows counted from the `stored` ones on."""
