@@ -11,6 +11,7 @@ from scipy.integrate import quad
 from scipy.special import ellipk
 
 import mbd
+from mbd.analysis.gait import gait as steps_of
 from mbd.joints.quaternions import rotation_of
 from tests.test_examples import g, run_of, script, zeros
 
@@ -78,6 +79,8 @@ def test_a_walker_rocks_stably_forward_and_falls_to_the_side() -> None:
     lost = gait.energy["impact"]
     assert -lost == pytest.approx(69.1 * g * math.sin(0.03) * gait.distance, rel=1e-9)  # what the slope gives
     assert run["roll.angle"].min() < -0.01 < 0.01 < run["roll.angle"].max()
+    for step in steps_of(run):  # the mirror image of a roll is its opposite, a step has no width
+        assert step.deviation < 1e-9 and step.length == pytest.approx(gait.distance, rel=1e-9)
 
 
 def test_a_billiard_ball_slides_on_a_parabola_and_rolls_on() -> None:

@@ -7,13 +7,14 @@ has left the ground.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mbd.arrays import Matrix
 from mbd.notebook import table as html_table
 from mbd.results.record import EventRecord
 
@@ -22,15 +23,20 @@ if TYPE_CHECKING:
 
 __all__ = ["Gait", "Step", "gait", "mirrored"]
 
+SPATIAL = ("solid", "limb", "hinge")
+"""Kinds of shapes that runs in space have alone."""
+
 
 @dataclass(frozen=True)
 class Step:
     """From one touchdown to the next.
 
     time : of the touchdown that ends it [s]; foot : that touches down; period [s]; length : between the two places on
-    the ground [m]; loss : energy taken by all impacts of the step, its own touchdown included [J]
-    deviation : largest difference of the state just after this touchdown from the one before, sides exchanged
-    [rad, rad/s, m/s]: zero for a walk that repeats itself; NaN where there is nothing to compare with
+    the ground, in space along the stride [m]; loss : energy taken by all impacts of the step, its
+    own touchdown included [J]
+    deviation : largest difference of the state just after this touchdown from the one before, sides exchanged and in
+    space reflected too [rad, rad/s, m/s]: zero for a walk that repeats itself; NaN where there is nothing to compare
+    with. Where a walker is, and how what turns freely is turned, do not count
     """
 
     time: float
@@ -112,18 +118,41 @@ def gait(run: Trajectory) -> Gait:
     strikes = _strikes(run, list(feet))
     if len(strikes) < 2:
         return Gait(())
-    places = {event.row: run[feet[event.name].place][event.row] for event in strikes}
+    places = np.array([run[feet[event.name].place][event.row] for event in strikes])
     states = _states(run, [event.row for event in strikes])
-    pairs = mirrored(states.keys())
+    pairs = _compared(run, states.keys())
     impacts = run.energy.by_kind().get("impact", np.zeros(len(run)))
     steps = []
     for number, (before, after) in enumerate(pairwise(strikes)):
         lost = float(impacts[before.row] - impacts[after.row])
-        change = [float(abs(states[mine][number + 1] - states[other][number])) for mine, other in pairs]
-        length = float(np.linalg.norm(places[after.row] - places[before.row]))
+        change = [float(abs(states[mine][number + 1] - sign * states[other][number])) for mine, other, sign in pairs]
+        length = _length(places, number)
         deviation = max(change, default=float("nan"))
         steps.append(Step(after.time, after.name, after.time - before.time, length, lost, deviation))
     return Gait(tuple(steps))
+
+
+def _length(places: Matrix, number: int) -> float:
+    """Length of a step [m]: in the plane its own, in space its part along the stride, which has no width."""
+    step = places[number + 1] - places[number]
+    first = number - 1 if number > 0 else number
+    stride = places[min(first + 2, len(places) - 1)] - places[first]
+    way = float(np.linalg.norm(stride))
+    if (step[2] == 0.0 and stride[2] == 0.0) or way == 0.0:
+        return float(np.linalg.norm(step))
+    return abs(float(step @ stride)) / way
+
+
+def _compared(run: Trajectory, names: Iterable[str]) -> list[tuple[str, str, float]]:
+    """(name, its mirror image, sign of that); none of a walker in space with sides, of which no mirror is known."""
+    pairs, signs = mirrored(names), dict(run.facts.mirror)
+    if (
+        not signs
+        and any(mine != other for mine, other in pairs)
+        and any(shape.kind in SPATIAL for shape in run.facts.shapes)
+    ):
+        return []
+    return [(mine, other, signs.get(mine, 1.0)) for mine, other in pairs]
 
 
 def _strikes(run: Trajectory, feet: Sequence[str]) -> list[EventRecord]:

@@ -26,6 +26,7 @@ from mbd.equations.shapes import offer_shapes, shapes_of
 from mbd.equations.sizes import require_room
 from mbd.equations.solids import offer_solids, solids_of
 from mbd.errors import ModelError
+from mbd.joints.reflected import signs_in_a_mirror
 from mbd.tape.derivatives import live
 from mbd.tape.functions import cos
 from mbd.tape.node import Node
@@ -110,6 +111,7 @@ def _derived(model: Description, plan: Plan, carried: Sequence[tuple[str, int]] 
         observations=tuple((each.name, each.unit) for each in model.observations),
         anatomy=tuple((each.name, each.anatomy) for each in model.joints if each.anatomy),
         shapes=(*shapes_of(model), *(() if plan.planar else solids_of(model))),
+        mirror=() if plan.planar else tuple(signs_in_a_mirror(plan.edges, model.gravity).items()),
         geometry=TreeGeometry(scope, dynamics, work, rests, constraints, plan.planar and vectors and not carried),
         frictions=tuple(constraints.frictions), turns=(*scope.turns.values(), *scope.wrapped.values()),
         facings=_facings(scope, constraints),

@@ -307,6 +307,7 @@ class Equations:
     markers : full names of the named points, which pages show
     observations : (name, unit) of the results of users' own; anatomy : (joint, joint of the body) of those that are one
     shapes : what pictures show beside bodies
+    mirror : (name, sign) of coordinates and velocities in space, where the sides 'left' and 'right' are exchanged
     memory : what follows from the rest, kept once it was found
     """
 
@@ -338,6 +339,7 @@ class Equations:
     observations: tuple[tuple[str, str], ...] = ()
     anatomy: tuple[tuple[str, str], ...] = ()
     shapes: tuple[Shape, ...] = ()
+    mirror: tuple[tuple[str, float], ...] = ()
     configuration: Configuration = field(default=None, repr=False)  # type: ignore[assignment]
     memory: dict[str, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 

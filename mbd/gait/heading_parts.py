@@ -17,10 +17,10 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.bodies.base import Frame
 from mbd.configuration import Configuration
-from mbd.gait.reflection import AsWritten
 from mbd.joints import Cylindrical, Free, Prismatic, Revolute, Spherical, Translation, Universal
 from mbd.joints.base import Joint
 from mbd.joints.quaternions import quaternion_product
+from mbd.joints.reflected import AsWritten
 from mbd.topology.plan import plan
 
 __all__ = ["Part", "parts_of", "rotation"]

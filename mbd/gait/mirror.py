@@ -6,7 +6,6 @@ z, y and x under which the mechanism is its own mirror image.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -19,9 +18,10 @@ from mbd.compile.mechanism import Mechanism
 from mbd.equations.equations import Equations
 from mbd.errors import ModelError
 from mbd.gait.reflection import Reflection, reflections
+from mbd.joints.reflected import exchanged
 from mbd.state import Mode, State
 
-__all__ = ["Mirror", "exchange", "mirror_of"]
+__all__ = ["Mirror", "mirror_of"]
 
 Numbers = NDArray[np.intp]
 
@@ -29,17 +29,6 @@ POSES = 2
 """States at which a mechanism is compared with its mirror image [-]."""
 ALIKE = 1e-9
 """Difference of inertia and forces, relative to the largest of their kind, below which two sides are alike [-]."""
-
-
-def exchange(name: str, sides: tuple[str, str]) -> str:
-    """A name with the words of the two sides exchanged.
-
-    >>> exchange("left hip.angle", ("left", "right"))
-    'right hip.angle'
-    """
-    one, two = sides
-    word = re.compile(rf"(?<![A-Za-z0-9])({re.escape(one)}|{re.escape(two)})(?![A-Za-z0-9])")
-    return word.sub(lambda found: two if found.group() == one else one, name)
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +48,7 @@ class Mirror:
 
     def name(self, name: str) -> str:
         """The mirror image of a name."""
-        return exchange(name, self.sides)
+        return exchanged(name, self.sides)
 
     def names(self, names: frozenset[str]) -> frozenset[str]:
         """The mirror images of names."""
@@ -113,7 +102,7 @@ def mirror_of(equations: Equations, sides: Any) -> Mirror:
     faults, sided = [], 0
     for kind, names in lists.items():
         for name in names:
-            other = exchange(name, (one, two))
+            other = exchanged(name, (one, two))
             sided += other != name
             if other not in names:
                 faults.append(f"mirror={(one, two)}: {kind} {name!r} has no partner {other!r}")
@@ -126,14 +115,14 @@ def mirror_of(equations: Equations, sides: Any) -> Mirror:
 
 
 def _places(names: Sequence[str], sides: tuple[str, str]) -> Numbers:
-    return np.array([names.index(exchange(name, sides)) for name in names], dtype=np.intp)
+    return np.array([names.index(exchanged(name, sides)) for name in names], dtype=np.intp)
 
 
 def _anchor_places(equations: Equations, names: Sequence[str], sides: tuple[str, str]) -> Numbers:
     """Where each anchor of the mirror image stands; turns of cut joints stay."""
     found = np.arange(equations.n_anchors, dtype=np.intp)
     for contact in equations.contacts:
-        partner = equations.contacts[names.index(exchange(contact.name, sides))]
+        partner = equations.contacts[names.index(exchanged(contact.name, sides))]
         if len(partner.anchors) == len(contact.anchors):
             found[list(contact.anchors)] = list(partner.anchors)
     return found
@@ -158,7 +147,7 @@ def require_alike(
         if found <= ALIKE:
             return choice
         different = min(different, found)
-    pairs = [(name, exchange(name, mirror.sides)) for name in values]
+    pairs = [(name, exchanged(name, mirror.sides)) for name in values]
     unlike = [
         f"{name!r} is {values[name]:g}, {other!r} {values[other]:g}"
         for name, other in pairs

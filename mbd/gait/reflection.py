@@ -8,25 +8,22 @@ theirs, those along it turn the other way, quaternions (w, x, y, z) follow their
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from mbd.arrays import Matrix, Vector
+from mbd.arrays import Vector
 from mbd.compile.mechanism import Mechanism
-from mbd.joints.base import Joint
+from mbd.joints.reflected import ACROSS, mirrored_signs
 from mbd.topology.plan import plan
 
-__all__ = ["AsWritten", "Reflection", "in_space", "reflections"]
+__all__ = ["Reflection", "in_space", "reflections"]
 
 ALONG = 1e-9
-"""Difference of a twist and its partner's [-, m] up to which they are the same."""
+"""Difference of places of touchdown and those of their mirror images, relative, up to which they are the same [-]."""
 POSES = 3
 """Postures at which places of touchdown are compared with their mirror images [-]."""
-AXES = {2: "z", 1: "y", 0: "x"}
-"""Numbers of axes in the order in which reflections across them are tried: to the side first."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,14 +37,6 @@ class Reflection:
     q: Vector
     v: Vector
     anchors: Vector
-
-
-class AsWritten:
-    """A scope on which run-time parameters have the values that the words hold."""
-
-    def parameter(self, owner: str, field: str, value: float) -> float:
-        """The value."""
-        return value
 
 
 def in_space(model: Any) -> bool:
@@ -67,10 +56,8 @@ def reflections(model: Any, mechanism: Mechanism, partners: Any, parameters: Vec
         return []
     joints = {joint.name: joint for joint in plan(model).edges}
     found = []
-    for axis, name in AXES.items():
-        sigma = np.ones(3)
-        sigma[axis] = -1.0
-        signs = [_signs(joint, joints.get(partners.name(joint.name)), sigma) for joint in joints.values()]
+    for name, sigma in ACROSS.items():
+        signs = [mirrored_signs(joint, joints.get(partners.name(joint.name)), sigma) for joint in joints.values()]
         if any(each is None for each in signs):
             continue
         q = np.concatenate([own[0] for own in signs if own is not None])
@@ -81,36 +68,6 @@ def reflections(model: Any, mechanism: Mechanism, partners: Any, parameters: Vec
         if anchors is not None:
             found.append(Reflection(name, q[partners.q], v[partners.v], anchors))
     return found
-
-
-def _signs(joint: Joint, partner: Joint | None, sigma: Vector) -> tuple[Vector, Vector] | None:
-    """Signs of a joint's coordinates and velocities in its partner; None where its motion is not mirrored there."""
-    if partner is None or len(partner.labels) != len(joint.labels):
-        return None
-    mine, its = _twists(joint), _twists(partner)
-    mirrored = np.hstack([-sigma * mine[:, :3], sigma * mine[:, 3:]])
-    v = np.zeros(len(mine))
-    for sign in (1.0, -1.0):
-        v[np.all(np.abs(sign * its - mirrored) <= ALONG, axis=1)] = sign
-    if not np.all(v):
-        return None
-    if joint.is_vector:
-        return v, v
-    first = joint.orientation
-    if first is None:
-        return None
-    q = np.ones(len(joint.labels))
-    q[: joint.adding], q[first + 1 : first + 4] = v[: joint.adding], v[-3:]
-    return q, v
-
-
-def _twists(joint: Joint) -> Matrix:
-    """(angular, linear) velocity of the child for each velocity (n, 6), in axes of the child body, at rest."""
-    scope: Any = AsWritten()
-    turn = np.eye(3) if joint.child.rotation is None else np.array(joint.child.rotation)
-    pairs: Sequence[Any] = joint.subspace(list(joint.defaults), scope)
-    found = [np.concatenate([turn @ np.array(part, dtype=float) for part in pair]) for pair in pairs]
-    return np.array(found).reshape(len(found), 6)
 
 
 def _of_anchors(mechanism: Mechanism, partners: Any, signs: Vector, parameters: Vector) -> Vector | None:

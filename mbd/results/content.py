@@ -110,6 +110,8 @@ def _facts(facts: Any, heads: Mapping[str, Head]) -> int:
     _pairs(facts.get("observations", []), "'observations'")
     anatomy = _pairs(facts.get("anatomy", []), "'anatomy'")
     expect(all(among(part, ANATOMY) for _, part in anatomy), "'anatomy'")
+    for pair in _list(facts.get("mirror", []), list, "'mirror'"):
+        expect(len(pair) == 2 and isinstance(pair[0], str) and pair[1] in (1.0, -1.0), "'mirror'")
     for shape in _list(facts.get("shapes", []), dict, "'shapes'"):
         _shape(shape)
     return len(facts["contacts"])

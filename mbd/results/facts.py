@@ -49,6 +49,7 @@ class Facts:
     observations : (name, unit) of the results of users' own
     shapes : grounds, wheels, blades, and in space solids and hinges, that pictures show
     anatomy : (joint, 'left hip') of joints of the body, whose angles are named
+    mirror : (name, sign) of coordinates and velocities in space in its mirror image, that exchanges left and right
     """
 
     model: str = ""
@@ -62,6 +63,7 @@ class Facts:
     observations: tuple[tuple[str, str], ...] = ()
     shapes: tuple[Shape, ...] = ()
     anatomy: tuple[tuple[str, str], ...] = ()
+    mirror: tuple[tuple[str, float], ...] = ()
 
     @property
     def rates(self) -> tuple[str, ...]:
@@ -125,6 +127,7 @@ class Facts:
             equations.observations,
             equations.shapes,
             equations.anatomy,
+            equations.mirror,
         )
 
     @classmethod
@@ -142,6 +145,7 @@ class Facts:
             tuple((name, unit) for name, unit in data.get("observations", ())),
             tuple(_shape(shape) for shape in data.get("shapes", ())),
             tuple((joint, part) for joint, part in data.get("anatomy", ())),
+            tuple((name, float(sign)) for name, sign in data.get("mirror", ())),
         )
 
     def as_json(self) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbd.gait.mirror import exchange
+from mbd.joints.reflected import exchanged
 from mbd.results.interpolation import Grid
 from mbd.view.curves import curves
 from mbd.view.plots import drawing
@@ -53,7 +53,7 @@ def cycle(gait: LimitCycle, path: str | Path | None = None) -> Any:
     with drawing(path, 7.4, 3.6) as figure:
         left, right = figure.subplots(1, 2, width_ratios=[1.5, 1.0])
         for name, of_name in angles.items():
-            partner = name if gait.mirror is None else exchange(name, gait.mirror)
+            partner = name if gait.mirror is None else exchanged(name, gait.mirror)
             first = partner not in shades
             shade = shades.setdefault(name, shades.get(partner, CYCLE[len(shades) % len(CYCLE)]))
             label = as_label(name if partner == name else f"{name}, then {partner}") if first or partner == name else ""

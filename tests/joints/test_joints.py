@@ -10,6 +10,7 @@ from hypothesis import given, strategies as st
 import mbd
 from mbd.bodies import Ground
 from mbd.errors import ModelError
+from mbd.joints.reflected import signs_in_a_mirror
 from tests.helpers import FreeScope
 
 GROUND = Ground().origin
@@ -130,3 +131,18 @@ def test_a_spring_of_negative_stiffness_is_refused_when_its_joint_is_made(kind, 
     assert "feed energy in" in drive_in
     assert "joint 'knee': stiffness -2 is negative" in stiffness
     assert f"mbd.{instead}" in stiffness
+
+
+def test_signs_in_a_mirror_are_those_of_angular_velocities_and_places():
+    """Across the plane that gravity lies in; of a model without sides, or one that no mirror leaves as it is, none."""
+    trunk, legs = mbd.RigidBody("trunk", 1.0, (1.0, 1.0, 1.0)), {}
+    joints = [mbd.Free("float", GROUND, trunk.origin)]
+    for side in ("left", "right"):
+        legs[side] = mbd.RigidBody(f"{side} leg", 1.0, (1.0, 1.0, 1.0))
+        joints.append(mbd.Universal(f"{side} hip", trunk.origin, legs[side].origin, axis=(0, 0, 1)))
+    signs = signs_in_a_mirror(joints, (0.3, -9.81, 0.0))
+    assert [signs[f"float.{axis}"] for axis in "xyz"] == [1.0, 1.0, -1.0]
+    assert [signs[f"float.orientation.{part}"] for part in "wxyz"] == [1.0, -1.0, -1.0, 1.0]
+    assert (signs["left hip.first"], signs["right hip.second.rate"]) == (1.0, -1.0)
+    assert signs_in_a_mirror(joints, (0.3, 0.0, -9.81))["left hip.first"] == -1.0
+    assert signs_in_a_mirror(joints[:1], (0.0, -9.81, 0.0)) == {} == signs_in_a_mirror(joints, (1.0, 1.0, 1.0))

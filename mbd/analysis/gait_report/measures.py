@@ -95,13 +95,21 @@ def _of_stride(
     normal, forward = _impulse(run, side, stride) + impacts
     per, scale = ("", 1.0) if mass is None else ("/kg", 1.0 / mass)
     return {
-        ("step length", "m"): step_length, ("step time", "s"): step_time, ("stride length", "m"): stride.length,
-        ("stride time", "s"): period, ("speed", "m/s"): stride.length / period, ("cadence", "1/min"): 120.0 / period,
-        ("stance", "%"): stance, ("swing", "%"): 100.0 - stance, ("double support", "%"): sum(together) / period *
-        100.0, ("clearance", "mm"): 1e3 * _clearance(run, side, stride), ("normal impulse", f"N s{per}"): scale *
-        normal, ("forward impulse", f"N s{per}"): scale * forward, ("strike impulse", f"N s{per}"): scale * struck, ("peak normal force", f"N{per}"): scale *
-        float(np.max(force)),
-    }  # fmt: skip
+        ("step length", "m"): step_length,
+        ("step time", "s"): step_time,
+        ("stride length", "m"): stride.length,
+        ("stride time", "s"): period,
+        ("speed", "m/s"): stride.length / period,
+        ("cadence", "1/min"): 120.0 / period,
+        ("stance", "%"): stance,
+        ("swing", "%"): 100.0 - stance,
+        ("double support", "%"): sum(together) / period * 100.0,
+        ("clearance", "mm"): 1e3 * _clearance(run, side, stride),
+        ("normal impulse", f"N s{per}"): scale * normal,
+        ("forward impulse", f"N s{per}"): scale * forward,
+        ("strike impulse", f"N s{per}"): scale * struck,
+        ("peak normal force", f"N{per}"): scale * float(np.max(force)),
+    }
 
 
 def _impacts(
