@@ -5,6 +5,8 @@ A planar mechanism has none of it. The results are not listed, and traced when a
 
 from __future__ import annotations
 
+import math
+from collections import Counter
 from collections.abc import Iterable
 from functools import partial
 from typing import TYPE_CHECKING
@@ -27,6 +29,11 @@ if TYPE_CHECKING:
     from mbd.description import Description
 
 __all__ = ["offer_solids", "solids_of"]
+
+LIKE = (0.5, 1.3)
+"""Radius of the uniform ball of a body's mean moment of inertia, over that with which it touches, if it is a ball: from
+one whose mass lies deep inside to a shell, √(5/3) [-].
+"""
 
 
 def solids_of(model: Description) -> tuple[Shape, ...]:
@@ -64,8 +71,21 @@ def _solids(model: Description) -> Iterable[tuple[Body, float, tuple[float, ...]
 
 
 def _forms_by_contacts(model: Description) -> dict[str, str]:
-    """'ball' and 'cylinder' of the bodies whose center touches a ground as a ball or a disk does, or rolls."""
+    """'ball' and 'cylinder' of the bodies whose center touches a ground as a ball or a disk does, or rolls.
+
+    So is a ball whose center of mass lies anywhere in it, as that of a tippe-top, if it has the inertia of a ball of
+    `LIKE` its radius, and touches as no other.
+    """
     found = {}
+    masses = {body.name: (mass, moments) for body, mass, moments in _solids(model)}
+    balls = Counter(center.body.name for center in {each.center for each in _balls(model)})
+    for each in _balls(model):
+        (mass, moments), body = masses.get(each.center.body.name, (0.0, ())), each.center.body
+        away = math.dist(each.center.offset, body.center.offset)
+        if mass > 0.0 and balls[body.name] == 1 and away < each.radius:
+            size = math.sqrt(max(5.0 * sum(moments[:3]) / 6.0 / mass, 0.0)) / each.radius
+            if LIKE[0] <= size <= LIKE[1]:
+                found[body.name] = "ball"
     for word in model.constraints:
         holder = getattr(word, "measure", None) if not isinstance(word, Rolling) else word
         if isinstance(holder, SphereTouchdown | DiskTouchdown | Rolling):
@@ -74,6 +94,12 @@ def _forms_by_contacts(model: Description) -> dict[str, str]:
                 is_ball = isinstance(holder, SphereTouchdown) or (isinstance(holder, Rolling) and holder.ball)
                 found[body.name] = "ball" if is_ball else "cylinder"
     return found
+
+
+def _balls(model: Description) -> list[SphereTouchdown]:
+    """How balls touch."""
+    measures = (getattr(word, "measure", None) for word in model.constraints)
+    return [each for each in measures if isinstance(each, SphereTouchdown)]
 
 
 def _hinges(joints: Iterable[Joint]) -> Iterable[tuple[str, Frame, Vector3]]:

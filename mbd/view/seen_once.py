@@ -26,12 +26,30 @@ def once(around: Scenery, solids: tuple[Solid, ...]) -> tuple[Scenery, tuple[Sol
     """Without the wheels and balls that solids of equal radius show, and without the solids that others stand for.
 
     A solid has the inertia of its body, a wheel or a ball the radius with which it touches: where these differ, as of a
-    wheel of a bicycle, whose mass is at its rim, what touches is drawn.
+    wheel of a bicycle, whose mass is at its rim, or a ball that is heavier on one side, what touches is drawn, a ball
+    with the tones of its body, by which turning shows.
     """
     hidden: set[str] = set()
     wheels = tuple(each for each in around.wheels if not _shown(each, solids, hidden))
-    balls = tuple(each for each in around.balls if not _shown(each, solids, hidden))
-    return replace(around, wheels=wheels, balls=balls), tuple(each for each in solids if each.name not in hidden)
+    touching = {ball.name: own for ball in around.balls if (own := _body_of(ball, solids)) is not None}
+    balls = tuple(ball for ball in around.balls if ball.name not in touching)
+    whole = {own.name: own for own in touching.values()}
+    return replace(around, wheels=wheels, balls=balls), tuple(
+        whole.get(each.name, each) for each in solids if each.name not in hidden
+    )
+
+
+def _body_of(ball: Ball, solids: Iterable[Solid]) -> Solid | None:
+    """The solid of a body that is a ball, in which its center of mass lies anywhere, with the radius that touches."""
+    radius = float(ball.radius[0])
+    for solid in solids:
+        if solid.form.kind == "ball" and ball.name.startswith(f"{solid.name}.") and not np.any(ball.radius != radius):
+            away = float(np.max(np.linalg.norm(solid.center - ball.center, axis=1)))
+            if away <= PLACED * radius and abs(float(solid.form.half[0]) - radius) < SAME * radius:
+                return solid
+            if away < radius:
+                return replace(solid, center=ball.center, form=replace(solid.form, half=np.full(3, radius)))
+    return None
 
 
 def solid_ones(solids: tuple[Solid, ...], points: Sequence[str], places: Matrix) -> tuple[Solid, ...]:
@@ -49,13 +67,14 @@ def solid_ones(solids: tuple[Solid, ...], points: Sequence[str], places: Matrix)
     return tuple(found)
 
 
-def _shown(each: Wheel | Ball, solids: Iterable[Solid], hidden: set[str]) -> bool:
+def _shown(wheel: Wheel, solids: Iterable[Solid], hidden: set[str]) -> bool:
     """Whether a solid shows it; one of another radius that lies in it is hidden instead."""
-    radius = float(each.radius[0])
+    radius = float(wheel.radius[0])
     for solid in solids:
-        if solid.name != each.name.rpartition(".")[0] or solid.form.kind != _form(each) or not _along(each, solid):
+        own = wheel.name.startswith(f"{solid.name}.")
+        if not own or solid.form.kind != "cylinder" or not _along(wheel, solid):
             continue
-        if float(np.max(np.abs(solid.center - each.center))) > PLACED * radius:
+        if float(np.max(np.abs(solid.center - wheel.center))) > PLACED * radius:
             continue
         if abs(float(solid.form.half[0]) - radius) < SAME * radius:
             return True
@@ -63,12 +82,6 @@ def _shown(each: Wheel | Ball, solids: Iterable[Solid], hidden: set[str]) -> boo
     return False
 
 
-def _form(each: Wheel | Ball) -> str:
-    return "cylinder" if isinstance(each, Wheel) else "ball"
-
-
-def _along(each: Wheel | Ball, solid: Solid) -> bool:
+def _along(wheel: Wheel, solid: Solid) -> bool:
     """Whether a wheel's axle is the axis of a cylinder."""
-    if isinstance(each, Ball):
-        return True
-    return bool(abs(float(rotations(solid.turn[:1])[0][:, 2] @ each.axle[0])) > 1.0 - SAME)
+    return bool(abs(float(rotations(solid.turn[:1])[0][:, 2] @ wheel.axle[0])) > 1.0 - SAME)

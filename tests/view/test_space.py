@@ -127,6 +127,14 @@ def test_of_equal_solids_the_one_is_drawn_that_words_of_the_model_tell():
     assert [solid.form.kind for solid in one.solids] == ["ball"] and not one.around.balls
     with_foot = shown("foot", of=foot)
     assert [solid.form.kind for solid in with_foot.solids] == ["box"] and len(with_foot.around.balls) == 1
+    heavy_below = shown("heavy below", of=lambda body: mbd.sphere_touchdown(body.point(0.0, 0.05, 0.0), 0.12))
+    (whole,) = heavy_below.solids  # one ball, where it touches, which turns
+    assert not heavy_below.around.balls and whole.form.half == pytest.approx([0.12] * 3)
+    assert whole.center[0] == pytest.approx([0.1, 0.35, 0.0])
+    in_a_large_one = shown("in a large one", of=lambda body: mbd.sphere_touchdown(body.point(0.0, 0.4, 0.0), 0.6))
+    assert [solid.form.kind for solid in in_a_large_one.solids] == ["box"] and len(in_a_large_one.around.balls) == 1
+    told = shown("told", "box", of=lambda body: mbd.sphere_touchdown(body.point(0.0, 0.05, 0.0), 0.12))
+    assert [solid.form.kind for solid in told.solids] == ["box"]
     rim = shown("rim", "cylinder", of=edge)  # of a radius that its inertia has not: what touches is drawn
     assert not rim.solids and len(rim.around.wheels) == 1
     with pytest.raises(mbd.ModelError, match="form of 'body': no form named 'bal'; did you mean 'ball'"):
