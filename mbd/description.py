@@ -25,6 +25,9 @@ __all__ = ["Description", "all_are", "on_slope", "served"]
 
 Word = TypeVar("Word")
 
+SHOWN = 120
+"""Letters of a wrong argument that an error shows."""
+
 
 def on_slope(slope: float, g: float = 9.81) -> Vector3:
     """Gravity in axes that lie on a slope: ``(g sin γ, −g cos γ, 0)``, so that +x walks downhill.
@@ -318,11 +321,34 @@ def all_are(kind: Any, words: Iterable[Word], sentence: str) -> list[Word]:
     given = list(words)
     for word in given:
         if not isinstance(word, kind):
-            raise ModelError(f"{sentence}; got {word!r}")
+            raise ModelError(f"{sentence}; got {_shown(word)}{_instead(kind, word)}")
     broken = [fault for word in given for fault in promise_faults(word)]
     if broken:
         raise ModelError(broken)
     return given
+
+
+def _shown(word: Any) -> str:
+    """The beginning of what was given."""
+    text = repr(word)
+    return text if len(text) <= SHOWN else f"{text[:SHOWN]} …"
+
+
+def _instead(kind: Any, word: Any) -> str:
+    """What to write where something was given that has, or is a list of, what is expected."""
+    if isinstance(word, Sequence) and word and all(isinstance(each, kind) for each in word):
+        return "; put a * before the list: (*joints)" if kind is Joint else "; put a * before the list"
+    if isinstance(word, Body) and kind is Joint:
+        return "; bodies come with the joints that connect them"
+    joints, moments = getattr(word, "joints", ()), getattr(word, "moments", ())
+    if isinstance(word, Description) or not isinstance(joints, tuple):
+        return ""
+    if kind is Joint and joints:
+        passive = " and apply(*person.moments)" if moments else ""
+        return f"; of a person take connect(*person.joints){passive}"
+    if kind is not Joint and joints:
+        return "; of a person take connect(*person.joints), and apply(*person.moments) where it is passive"
+    return ""
 
 
 def served(words: list[Constraint]) -> list[Constraint]:

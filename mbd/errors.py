@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -93,26 +94,79 @@ class TrajectoryError(MbdError, ValueError):
     """A question that a run cannot answer: a time outside it, a file that is none."""
 
 
-def nearest(name: str, valid: Iterable[str], kind: str = "name", known: str = "The model has") -> str:
+MEANT = {
+    "position place location": ("", "x", "origin", "displacement", "angle"),
+    "velocity speed": ("vx", "x.rate", "rate", "displacement.rate", "origin.vx", "angular_velocity"),
+    "acceleration": ("ax", "x.acceleration", "angle.acceleration", "displacement.acceleration"),
+    "rotation quaternion attitude pose": ("orientation", "orientation.w", "rotation_vector", "angle"),
+    "omega spin rate": ("angular_velocity", "angular_velocity.x"),
+    "angle angles euler": ("flexion", "dorsiflexion", "first", "orientation", "orientation.w"),
+    "abduction": ("adduction",),
+    "com cog cm mass_center": ("center",),
+    "moment torque": ("torque", "reaction_torque"),
+    "force load": ("reaction_force", "tension", "torque"),
+    "reaction": ("reaction_force",),
+    "world global": ("ground", "ground.x"),
+    "x": ("origin.x", "displacement"), "y": ("origin.y", "displacement"), "z": ("origin.z", "displacement"),
+}  # fmt: skip
+"""What is meant by the last word of a name that there is not: last words of names that there may be."""
+
+COMPONENT = re.compile(r"(.*)\.[wxyz123](\..*)?")
+"""The components of what may be one name too, and what they have."""
+
+SHOWN = 12
+"""Names that are listed of many."""
+
+
+def nearest(
+    name: str, valid: Iterable[str], kind: str = "name", known: str = "The model has", beside: Iterable[str] = ()
+) -> str:
     """The sentence that offers valid names for a wrong one; `known` introduces the list of them.
+
+    beside : names that are offered where they are near, and not listed
 
     >>> nearest("left hop", ["left hip", "left knee"], "joint")
     "no joint named 'left hop'; did you mean 'left hip'? The model has 'left hip', 'left knee'"
+    >>> nearest("hip.angle", ["left hip.angle", "right hip.angle"], "result", "The run has").split("; ")[1]
+    "did you mean 'left hip.angle' or 'right hip.angle'? The run has 'left hip.angle', 'right hip.angle'"
     """
     names, text = sorted(set(valid)), str(name)
     parts = [each for each in names if each.startswith(f"{text}.")]
     if parts:
         return f"no {kind} named {name!r}; it has {_listed(parts)}"
-    close = [each for each in names if each.casefold() == text.casefold()]
-    close = close or difflib.get_close_matches(text, names, n=1, cutoff=0.6)
-    owner = f"{text.rpartition('.')[0]}."
-    names = [each for each in names if each.startswith(owner)] or names
-    guess = f"; did you mean {close[0]!r}?" if close else ";"
+    close = _guesses(text, sorted({*names, *beside}))
+    owners = {f"{each.rpartition('.')[0]}." for each in (text, *close)} - {"."}
+    names = [each for each in names if each.startswith(tuple(owners))] or names
+    guess = f"; did you mean {' or '.join(map(repr, close))}?" if close else ";"
     known = known if close else known[0].lower() + known[1:]
     has = f" {known} {_listed(names)}" if names else f" {known} none"
     return f"no {kind} named {name!r}{guess}{has}"
 
 
+def _guesses(text: str, names: Sequence[str]) -> list[str]:
+    """What a wrong name may stand for: another spelling, a side left out, another word for it, a slip."""
+    plain = text.casefold().replace("_", " ")
+    found = [each for each in names if each.casefold().replace("_", " ") == plain]
+    found = found or [each for each in names if each.endswith(f" {text}")][:4]
+    owner, _, last = text.rpartition(".")
+    if not found and owner:
+        for words, others in MEANT.items():
+            if last.casefold() in words.split():
+                found += [each for each in (f"{owner}.{other}".rstrip(".") for other in others) if each in names][:1]
+    own = [each for each in names if each.startswith(f"{owner}.")] if owner else []
+    return (
+        found
+        or difflib.get_close_matches(text, own, n=1, cutoff=0.8)
+        or difflib.get_close_matches(text, names, n=1, cutoff=0.6)
+    )
+
+
 def _listed(names: Sequence[str]) -> str:
-    """The first names of a list, and how many there are."""
-    return ", ".join(repr(each) for each in names[:12]) + (f", … ({len(names)} in all)" if len(names) > 12 else "")
+    """The first names of a list, vectors for their components, and how many there are; of many those before dots."""
+    known = set(names)
+    short = [each for each in names if not ((part := COMPONENT.fullmatch(each)) and part[1] in known)]
+    owners = list(dict.fromkeys(each.partition(".")[0] + "." * ("." in each) for each in short))
+    if len(short) > 8 * SHOWN and 1 < len(owners) < len(short) // 4:
+        few = [repr(each.replace(".", ".…")) for each in owners[: 2 * SHOWN]]
+        return f"{', '.join(few)}{', …' * (len(owners) > 2 * SHOWN)} ({len(names)} names in all)"
+    return ", ".join(map(repr, short[:SHOWN])) + (f", … ({len(names)} in all)" if len(short) > SHOWN else "")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -109,7 +109,9 @@ class State:
     def __getitem__(self, name: str) -> Any:
         """A coordinate ('left hip.angle') or a rate ('left hip.angle.rate', 'left hip.rate').
 
-        'ball.orientation' is the quaternion (4,), 'ball.angular_velocity' a vector (3,).
+        'ball.orientation' is the quaternion (4,), 'ball.angular_velocity' a vector (3,). A state that knows its model
+        (see `plot`) has all results of runs that do not follow from forces: 'left hip.flexion', 'left shank.end',
+        angles of joints that are cut.
         """
         if name in self.names:
             return float(self.q[self.names.index(name)])
@@ -125,9 +127,27 @@ class State:
             for names, values in ((self.names, self.q), (self.velocity_names, self.v)):
                 if all(part in names for part in parts):
                     return np.array([values[names.index(part)] for part in parts])
-        raise UnknownNameError(
-            nearest(name, [*self.names, *self.velocity_names], "coordinate or rate", "The state has")
-        )
+        found, beside = self._result(name)
+        if found is not None:
+            return found
+        own = [*self.names, *self.velocity_names]
+        wholes = {each[:-2] for each in own if each.endswith(".x") and f"{each[:-2]}.y" in own}
+        wholes = {each for each in wholes if "." in each}
+        raise UnknownNameError(nearest(name, [*own, *wholes], "coordinate or rate", "The state has", beside))
+
+    def _result(self, name: str) -> tuple[Any, Sequence[str]]:
+        """What a run would tell of it, and names of results; nothing of a state that knows no model."""
+        from mbd.results.at_state import instant, quantity
+
+        known = _MODELS.get(self)
+        model = known() if known is not None else None
+        if model is None or not isinstance(name, str):
+            return None, ()
+        try:
+            run = instant(model, self)
+        except ModelError:  # the model was changed since
+            return None, ()
+        return quantity(run, name), run.names
 
     def __repr__(self) -> str:
         lines = [f"State at t = {self.time:g} s, closed: {', '.join(sorted(self.mode.closed)) or 'none'}"]

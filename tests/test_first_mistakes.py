@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -201,3 +203,74 @@ def test_grams_of_a_person_and_percents_of_friction_are_doubted() -> None:
         start = mbd.assemble(model, {"float.y": 0.2})
     with pytest.raises(mbd.SimulationError, match="a disk that lies flat touches with all its edge"):
         mbd.simulate(model, start, dt=0.01, until=0.1)
+
+
+PERSON = mbd.human(mass=70.0, height=1.75, passive=True)
+
+
+@pytest.mark.parametrize(
+    ("act", "answer"),
+    [
+        (lambda model: model.connect(PERSON), r"connect\(\*person\.joints\) and apply\(\*person\.moments\)"),
+        (lambda model: model.connect(PERSON.joints), r"put a \* before the list: \(\*joints\)"),
+        (lambda model: model.connect(PERSON.bodies["pelvis"]), "bodies come with the joints"),
+        (lambda model: model.apply(PERSON), r"apply\(\*person\.moments\) where it is passive"),
+        (lambda model: mbd.assemble(PERSON), r"model\.connect\(\*person\.joints\)"),
+    ],
+)
+def test_a_person_is_no_joint_and_the_answer_tells_what_is(act, answer):
+    with pytest.raises(mbd.ModelError, match=answer):
+        act(mbd.Model("person"))
+
+
+@cache
+def person():
+    """A leg and a trunk: a state and a run of two rows."""
+    leg = mbd.human(mass=70.0, height=1.75).without("left arm", "right arm", "torso")
+    model = mbd.Model("legs")
+    model.connect(*leg.joints)
+    start = mbd.assemble(model, {**leg.standing(), "left hip.orientation": ("zxy", (0.4, 0.1, 0.0))}, backend="python")
+    return model, start, mbd.simulate(model, start, dt=0.01, until=0.01, backend="python")
+
+
+@pytest.mark.parametrize(
+    ("wrong", "right"),
+    [
+        ("hip.flexion", "did you mean 'left hip.flexion' or 'right hip.flexion'"),
+        ("left_hip.flexion", "did you mean 'left hip.flexion'"),
+        ("left hip.angle", "did you mean 'left hip.flexion'"),
+        ("left hip.abduction", "did you mean 'left hip.adduction'"),
+        ("left hip.rotation", "did you mean 'left hip.orientation'"),
+        ("left hip.angular_velocity.world", "did you mean 'left hip.angular_velocity.ground'"),
+        ("trunk.position", r"did you mean 'trunk'\?"),
+        ("pelvis.position", "did you mean 'pelvis.origin'"),
+        ("pelvis.x", "did you mean 'pelvis.origin.x'"),
+        ("left thigh.com", "did you mean 'left thigh.center'"),
+        ("fre.position", "the run has 'gravity.…'.*'left thigh.…'"),
+    ],
+)
+def test_wrong_names_in_space_are_answered_with_what_is_meant(wrong, right):
+    _, _, run = person()
+    with pytest.raises(mbd.UnknownNameError, match=right) as told:
+        run[wrong]
+    assert len(str(told.value)) < 600
+
+
+def test_a_state_knows_what_follows_from_places_and_velocities():
+    model, start, run = person()
+    for name in "left hip.flexion", "left foot.toe", "right knee.angle.rate", "trunk", "left hip.euler.zxy":
+        np.testing.assert_array_equal(start[name], run[name][0])
+    with pytest.raises(mbd.UnknownNameError, match="'left hip.reaction_force' follows from forces.*ask the run"):
+        start["left hip.reaction_force"]
+    with pytest.raises(mbd.UnknownNameError, match="did you mean 'left hip.flexion' or 'right hip.flexion'"):
+        start["hip.flexion"]
+    made = replace(start)  # by hand, so that it knows no model
+    with pytest.raises(mbd.UnknownNameError, match="no coordinate or rate named 'left hip.flexion'"):
+        made["left hip.flexion"]
+
+
+def test_a_state_of_cut_joints_has_their_angles():
+    model = mbd.Model("pendulum", cut="all")
+    model.connect(mbd.Revolute("hip", model.ground.origin, mbd.Link("leg", 1.0, 1.0, 0.5, 0.1).start))
+    start = mbd.assemble(model, {"hip.angle": 0.3}, {"hip.rate": 2.0}, backend="python")
+    assert (start["hip.angle"], start["hip.rate"]) == (pytest.approx(0.3), pytest.approx(2.0))

@@ -46,7 +46,7 @@ RANKS = [
 RANK = {part: rank for rank, parts in enumerate(RANKS) for part in parts}
 
 DOORS = {
-    "state": ("results.units", "view"),
+    "state": ("results.at_state", "results.units", "view"),
     "simulation.simulate": ("sensitivity.sensitivities",),
     "trajectory": ("analysis.ending", "sensitivity.result", "view"),
     "results.ledger": ("view",),

@@ -42,7 +42,8 @@ def _same(old: Any, new: Any) -> bool:
 def require_model(model: Any) -> None:
     """Raise a `ModelError` for what is no model."""
     if not isinstance(model, Description | FrontDoor):
-        raise ModelError(f"model: a Model or a Lagrangian is expected, not {model!r}")
+        person = "; put a person into one: model.connect(*person.joints)" if hasattr(model, "joints") else ""
+        raise ModelError(f"model: a Model or a Lagrangian is expected, not {model!r}{person}")
 
 
 def mechanism_of(

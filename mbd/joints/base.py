@@ -16,13 +16,16 @@ from mbd.joints.losses.base import Loss, loss_of
 from mbd.scope import Rotation, Scope, Triple
 from mbd.tape.node import Scalar
 
-__all__ = ["Joint", "JointLoss", "Label", "row_unit"]
+__all__ = ["AWAITED", "Joint", "JointLoss", "Label", "row_unit"]
 
 JointLoss = Loss | Mapping[str, Loss] | None
 """A loss on every coordinate of a joint, or by label of its coordinates."""
 
 DRIVES_AWAY = "is negative; give a value ≥ 0, or an mbd.TorsionSpring where it shall drive away from its rest"
 """What is wrong with the stiffness of a joint."""
+
+AWAITED = "_awaited"
+"""Where a joint remembers the names of forces of which at least one is to come with it."""
 
 
 class Label(NamedTuple):
@@ -286,5 +289,5 @@ class Joint(Parameterized, ABC):
                     f"{kind} '{self.name}': its stiffness would act on several coordinates "
                     f"({', '.join(label.name for label in self.labels)}); free one only, or apply an mbd.Spring"
                 )
-            if super().value_faults(self.parameters()):
+            if self.stiffness < 0.0:
                 raise ModelError(self.value_faults(self.parameters()))

@@ -5,6 +5,8 @@ from __future__ import annotations
 from itertools import combinations
 from typing import Any
 
+from mbd.joints.base import AWAITED, Joint
+
 __all__ = ["doubts"]
 
 LONG = 50.0
@@ -15,7 +17,7 @@ GRIPPING = 10.0
 
 def doubts(model: Any) -> list[str]:
     """Sentences on what looks like a mistake."""
-    return _lengths(model) + _twice(model) + _grips(model)
+    return _lengths(model) + _twice(model) + _grips(model) + _awaited(model)
 
 
 def _lengths(model: Any) -> list[str]:
@@ -37,6 +39,18 @@ def _grips(model: Any) -> list[str]:
         f"friction of '{contact.name}' is {contact.friction:g}; a coefficient is a ratio of forces, rubber has about 1"
         for contact in getattr(model, "constraints", ())
         if isinstance(friction := getattr(contact, "friction", None), float | int) and friction > GRIPPING
+    ]
+
+
+def _awaited(model: Any) -> list[str]:
+    """Passive moments of a person that were asked for, and of which the model has none."""
+    forces = {getattr(force, "name", "") for force in getattr(model, "forces", ())}
+    wanted = {vars(joint).get(AWAITED, ()) for joint in getattr(model, "joints", ()) if isinstance(joint, Joint)}
+    return [
+        f"human(passive=True): the model has none of the passive moments of its joints, such as {names[0]!r}; "
+        "model.apply(*person.moments) brings them, passive=False leaves them out"
+        for names in sorted(wanted)
+        if names and forces.isdisjoint(names)
     ]
 
 

@@ -9,10 +9,9 @@ import numpy as np
 
 from mbd.arrays import Matrix
 from mbd.bodies.ground import Ground
-from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import ModelError
-from mbd.results.record import Record
-from mbd.state import State, malformed
+from mbd.results.at_state import instant
+from mbd.state import State
 from mbd.trajectory import Trajectory
 from mbd.view.camera import angles_of, camera
 from mbd.view.plots import drawing
@@ -31,39 +30,6 @@ LETTER, LINE = 5.5, 10.0
 
 ROOM = 0.62
 """Half of the side of the picture, over the larger side of the mechanism [-]."""
-
-
-def instant(model: Any, state: State) -> Trajectory:
-    """A run of one row: the state, without forces.
-
-    Raises
-    ------
-    ModelError
-        for a state that is none of this model.
-    """
-    faults = malformed(state)
-    if faults:
-        raise ModelError(faults)
-    mechanism = mechanism_of(model, changed=state.parameters)
-    equations = mechanism.equations
-    sizes = {"q": (len(state.q), equations.n_q), "v": (len(state.v), equations.n_v), "z": (len(state.z), equations.n_z)}
-    wrong = [
-        f"{name} has {came} numbers, {wanted} are expected" for name, (came, wanted) in sizes.items() if came != wanted
-    ]
-    if wrong:
-        raise ModelError(f"this state is none of '{equations.name}': {'; '.join(wrong)}")
-    values = mechanism.parameters(dict(state.parameters), getattr(model, "parameters", {}))
-    n_v, n_z = equations.n_v, equations.n_z
-    closed = np.array([[contact.name in state.mode.closed for contact in equations.contacts]], dtype=np.uint8)
-    return Trajectory(
-        Record(
-            equations, values, [parameter.name for parameter in equations.parameters], np.array([float(state.time)]),
-            np.array([state.q], dtype=float), np.array([state.v], dtype=float).reshape(1, n_v),
-            np.array([state.z], dtype=float).reshape(1, n_z), np.zeros((1, n_v)), np.zeros((1, n_z)),
-            np.zeros((1, len(equations.rows))), closed.reshape(1, len(equations.contacts)), start=state,
-            phase=np.zeros((1, len(equations.frictions)), dtype=np.int8),
-        )
-    )  # fmt: skip
 
 
 def drawn(model: Any, state: State, path: str | Path | None = None, view: Any = None) -> Any:

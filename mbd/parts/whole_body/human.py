@@ -17,7 +17,7 @@ from mbd.joints.free import Free
 from mbd.notes import doubt
 from mbd.parts.arguments import sizes
 from mbd.parts.whole_body.joints import Articulation, articulations
-from mbd.parts.whole_body.moments import passive_moments
+from mbd.parts.whole_body.moments import await_passive_moments, passive_moments
 from mbd.parts.whole_body.poses import Position, center_of_mass, hips_over_ground, origins, standing
 from mbd.parts.whole_body.segments import SIDES, Segment, segments_of
 from mbd.parts.whole_body.table import SEXES
@@ -63,11 +63,17 @@ class Human:
     def joints(self) -> tuple[Joint, ...]:
         """Its joints: 'trunk' first, a floating pelvis, then from there outwards."""
         trunk = [Free(f"{self.prefix}trunk", Ground().origin, self.bodies["pelvis"].origin)] if self.floating else []
-        return (*trunk, *(each.joint(self.prefix, self.bodies) for each in self.articulations))
+        found = (*trunk, *(each.joint(self.prefix, self.bodies) for each in self.articulations))
+        if self.passive:
+            await_passive_moments(found)
+        return found
 
     @cached_property
     def moments(self) -> tuple[Potential, ...]:
-        """Passive moments of hips, knees and ankles, for ``model.apply(*person.moments)``; none unless asked for."""
+        """Passive moments of hips, knees and ankles, for ``model.apply(*person.moments)``; none unless asked for.
+
+        A model that has joints of a person who is passive, and none of these, is in doubt.
+        """
         return tuple(passive_moments(self.joints)) if self.passive else ()
 
     def joint(self, name: str) -> Joint:
@@ -254,7 +260,8 @@ def human(
     sex : 'male' or 'female'
     name : put before all names, for several persons in one model
     floating : whether the pelvis floats against the ground; False: connect a body of it yourself
-    passive : whether hips, knees and ankles resist at the ends of their range (see `mbd.parts.passive_moment`)
+    passive : whether hips, knees and ankles resist at the ends of their range (see `mbd.parts.passive_moment`): they do
+        with ``model.apply(*person.moments)`` beside ``model.connect(*person.joints)``; without it the model is in doubt
 
     Raises
     ------
