@@ -257,7 +257,7 @@ def test_wrong_names_in_space_are_answered_with_what_is_meant(wrong, right):
 
 
 def test_a_state_knows_what_follows_from_places_and_velocities():
-    model, start, run = person()
+    _, start, run = person()
     for name in "left hip.flexion", "left foot.toe", "right knee.angle.rate", "trunk", "left hip.euler.zxy":
         np.testing.assert_array_equal(start[name], run[name][0])
     with pytest.raises(mbd.UnknownNameError, match="'left hip.reaction_force' follows from forces.*ask the run"):
