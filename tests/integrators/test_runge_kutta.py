@@ -187,3 +187,33 @@ def test_a_flat_pose_does_not_hold_a_linkage():
     """Cranks that come to lie in a line within a step: they go on, or the run says why it ends."""
     wild = replace(wild_scene(14), integrator=SCHEME).run()
     assert not wild.success or abs(wild["pin 0.angle.rate"][-1]) > 1e-3
+
+
+def servo(stiffness, damping):
+    """A link that follows a slow sine by a servo."""
+    model = mbd.Model("servo")
+    link = mbd.Link("link", 1.0, 1.0, 0.5, 0.1)
+    hip = mbd.Revolute("hip", model.ground.origin, link.start)
+    model.connect(hip)
+
+    def law(t, angle, rate):
+        return stiffness * (0.5 * mbd.sin(t) - angle) - damping * rate
+
+    model.apply(mbd.Motor("servo", hip, torque=law, arguments=("t", "hip.angle", "hip.rate")))
+    return model, mbd.assemble(model)
+
+
+def stiff_notes(run):
+    return [note for note in run.stats["notes"] if "stability bounds the steps" in note]
+
+
+def test_steps_that_stability_bounds_are_told_with_the_rate_of_the_motion_and_a_scheme_for_it():
+    """A servo with |s| = c/J, and as many steps as a motion that is followed takes."""
+    stiff = mbd.simulate(*servo(1e4, 2e3), SCHEME, tol=1e-6, until=2.0)
+    (note,) = stiff_notes(stiff)
+    rate = 2e3 / (0.1 + 0.25)
+    assert f"for a motion of {rate:.1e} 1/s" in note and "mbd.RadauIIA()" in note
+    assert stiff.stats["steps"] > 1000
+    followed = mbd.simulate(*servo(4e3, 0.0), SCHEME, tol=1e-6, until=30.0)
+    assert followed.stats["steps"] > 1000 and not stiff_notes(followed)
+    assert not stiff_notes(mbd.simulate(*servo(1e4, 2e3), mbd.RadauIIA(), tol=1e-6, until=2.0))

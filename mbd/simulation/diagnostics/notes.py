@@ -18,6 +18,7 @@ from mbd.simulation.diagnostics.half_turns import half_turns
 from mbd.simulation.diagnostics.impact_step import dt_of_impacts
 from mbd.simulation.diagnostics.redundant import redundancy
 from mbd.simulation.diagnostics.singular import singular_start
+from mbd.simulation.diagnostics.stiff import bounded_by_stability
 from mbd.simulation.diagnostics.turning import blocks, unresolved_turns
 from mbd.simulation.run.data import RunData
 from mbd.simulation.run.stored import record_of
@@ -120,6 +121,7 @@ def notes_of(run: RunData, record: Record) -> tuple[list[str], list[str]]:
             f"estimated errors of velocities add up to {spent:.2g} m/s or rad/s over all steps: dt is large for the "
             "motion; use a smaller dt, or tol="
         )
+    notes += bounded_by_stability(run, record)
     notes += unresolved_turns(run, record)
     notes += _uncounted(run, record)
     columns = ModelColumns(record, equations)
