@@ -134,6 +134,7 @@ def conclude(
     paired = K.paired_step > 0
     if h < full and not within:
         K.n_shortened += 1
+        K.n_sized += K.too_near
         K.short_steps += 2
         patience = 2 * MOST_SHORTENED if K.n_active > 0 else 20 * MOST_SHORTENED
         if K.short_steps > patience:
@@ -146,8 +147,10 @@ def conclude(
         if K.paired_step == FIRST:
             K.paired_step = SECOND
             K.n_shortened += 1
+            K.n_sized += 1
         else:
             K.n_shortened += 1 if K.paired_step == ALONE else 0
+            K.n_sized += 1 if K.paired_step == ALONE else 0
             K.paired_step = 0
     uneven = K.stabilized == 0 and K.n_active > 0 and h < (1.0 - 1e-6) * K.step
     uneven = uneven or pulls

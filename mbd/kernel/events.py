@@ -167,6 +167,7 @@ def land(K: Kernel, h: float, t1: float) -> int:
         K.halvings += 1
         K.halves_left = 2 ** (K.halvings + 1)
         K.n_shortened += 1
+        K.n_halved += 1
         K.n_logged = first
         K.n_stored = stored
         K.n_events = events

@@ -98,6 +98,7 @@ def tried_step(K: Kernel, h: float, t1: float) -> int:
             status = judged_step(K, h, K.time + h)
         elif K.until >= K.end:
             return LAST
+    K.too_near = 1 if status == TOO_NEAR else 0
     while h > SHORTEST * full and (is_shortened(K, status) or (status == NOT_FINITE and strays(K, h))):
         h *= SHORTENING
         status = judged_step(K, h, K.time + h)

@@ -10,6 +10,7 @@ from mbd.kernel.schemes import radau
 from mbd.kernel.schemes.collocation import RADAU
 from tests.cases.linkages import four_bars, upright
 from tests.integrators.flat_parallelograms import T, flat, pendulum_like, started, wanted
+from tests.simulation.wild import wild_scene
 
 SCHEME = mbd.RadauIIA()
 
@@ -52,6 +53,21 @@ def test_no_step_ends_next_to_a_pose():
         away = np.min(np.abs(run.time[:, None] - flat(2)), axis=0)
         assert np.all(away > 0.9 * radau.SCHEME.abilities.middle * dt)
         assert run.stats["shortened"] >= len(flat(2))
+        assert told_sizes(run) == [f"{run.stats['shortened']} steps got another size, as one would have come too close"]
+
+
+def told_sizes(run):
+    """The notes on steps of another size than dt, without where that was."""
+    said = ("steps got another size", "steps were shortened", "steps were halved")
+    return [note.partition(" to a singular")[0] for note in run.stats["notes"] if any(each in note for each in said)]
+
+
+def test_steps_at_which_newtons_method_failed_are_told_apart():
+    run = wild_scene(49).run()
+    assert told_sizes(run) == [
+        f"{run.stats['shortened']} steps were shortened where Newton's method failed, or forces changed too much, "
+        "at the full dt"
+    ]
 
 
 @pytest.mark.parametrize("tol", [1e-5, 1e-7, 1e-9])

@@ -159,7 +159,10 @@ class Report(SchemeAbilities):
     n_locations: int = place("counts")
     n_stagnations: int = place("counts")
     n_singular_steps: int = place("counts")
-    n_shortened: int = place("counts")
+    n_shortened: int = place("counts")  # steps of another size than dt, whatever for
+    n_sized: int = place("counts")  # of these, those that would have come too close to a singular configuration
+    n_halved: int = place("counts")  # and those at whose end no impulses obeyed all laws
+    too_near: int = place("counts")  # whether the step that is tried would have come too close
     n_energetic_impacts: int = place("counts")
     n_endless: int = place("counts")
     n_pivoted: int = place("counts")  # factorizations by the pivoted LU where a fixed order was not sound

@@ -63,12 +63,12 @@ DAMAGED = (
 
 MOVED = 0.05
 """Way [m, rad] beyond which rows that still depend on each other do so anywhere."""
+STALLED = "n_stalled"
+"""Steps of another size than dt for no reason that is counted alone."""
 COUNTED = (
-    (
-        "n_shortened",
-        "{count} steps were shortened where Newton's method or the impact law failed at the full dt, or got another "
-        "size where one would have come too close to a singular configuration",
-    ),
+    (STALLED, "{count} steps were shortened where Newton's method failed, or forces changed too much, at the full dt"),
+    ("n_halved", "{count} steps were halved where no impulses at the end of one obeyed all laws"),
+    ("n_sized", "{count} steps got another size, as one would have come too close to a singular configuration"),
     (
         "n_singular_steps",
         "singular configurations were passed: {count} steps next to them held positions alone on the rows; their "
@@ -106,7 +106,8 @@ def notes_of(run: RunData, record: Record) -> tuple[list[str], list[str]]:
     notes += [DAMAGED.format(run.damage)] if run.damage else []
     if run.start.memory is not None and not run.carried and run.boundaries.controllers:
         notes.append(RESTARTED)
-    counts = [(int(getattr(run.kernel, name)), text) for name, text in COUNTED]
+    stalled = int(run.kernel.n_shortened - run.kernel.n_sized - run.kernel.n_halved)
+    counts = [(stalled if name == STALLED else int(getattr(run.kernel, name)), text) for name, text in COUNTED]
     notes += [text.format(count=count, impact=run.settings["impact"]) for count, text in counts if count]
     if "nonsmooth_since" in run.settings:
         notes.append(f"{run.settings['contact_reason']}; since then errors of impacts are of the size of dt")
