@@ -49,10 +49,10 @@ def spelled_out(model: Any, values: Any, what: str) -> tuple[Any, list[str], lis
         elif isinstance(name, str) and is_orientation(value) and len(np.atleast_1d(np.asarray(value, object))) == 3:
             angles = EULER.fullmatch(name)
             if angles is not None and f"{angles[1]}.orientation" in known:
-                faults.append(
-                    f"{what}: {name!r} is read off the orientation; give {{'{angles[1]}.orientation': "
-                    f"('{angles[2]}', (first, second, third))}}"
-                )
+                instead = f"{{'{angles[1]}.orientation': ('{angles[2]}', (first, second, third))}}"
+                if what == "velocity":
+                    instead = f"{{'{angles[1]}.angular_velocity': (x, y, z)}}, or the rate of one angle, '{name}.1'"
+                faults.append(f"{what}: {name!r} is read off the orientation; give {instead}")
                 continue
             parts = {f"{name}.{axis}": number for axis, number in zip("xyz", value, strict=True)}
         elif isinstance(name, str) and is_orientation(value):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 
 from mbd.bodies.algebra import rotate
@@ -20,12 +20,16 @@ __all__ = ["offer_orientations"]
 
 def offer_orientations(outputs: Outputs, scope: Scope, joints: Sequence[Joint]) -> None:
     """'ball.angular_velocity.parent' and '.ground', and among the names that are not listed '.rotation_vector' and
-    '.euler.zxy', whose angles are '.euler.zxy.1', '.2', '.3'; of joints of the body angles of ISB, 'hip.flexion'."""
+    '.euler.zxy', whose angles are '.euler.zxy.1', '.2', '.3'; of joints of the body angles of ISB, 'hip.flexion'. Rates
+    of angles, 'hip.flexion.rate', are not listed either: next to singularities they have no bound.
+    """
     for each in joints:
         joint = each.joint if isinstance(each, Reversed) else each
-        for angles, system in angles_of(joint.anatomy):
-            names = [angle.name for angle in angles]
-            outputs.triple(joint.name, partial(_anatomical, scope, joint, system), names)
+        for named, system in angles_of(joint.anatomy):
+            names = [angle.name for angle in named]
+            angles = partial(_anatomical, scope, joint, system)
+            outputs.triple(joint.name, angles, names)
+            outputs.triple(joint.name, partial(_rates, scope, angles), [f"{each}.rate" for each in names], listed=False)
         if joint.orientation is None:
             continue
         name = joint.name
@@ -33,7 +37,14 @@ def offer_orientations(outputs: Outputs, scope: Scope, joints: Sequence[Joint]) 
         outputs.triple(f"{name}.angular_velocity.ground", partial(_in_ground, scope, joint))
         outputs.triple(f"{name}.rotation_vector", partial(_vector, scope, joint), listed=False)
         for sequence in SEQUENCES:
-            outputs.triple(f"{name}.euler.{sequence}", partial(_angles, scope, joint, sequence), PLACES, listed=False)
+            euler = partial(_angles, scope, joint, sequence)
+            outputs.triple(f"{name}.euler.{sequence}", euler, PLACES, listed=False)
+            rates = [f"{place}.rate" for place in PLACES]
+            outputs.triple(f"{name}.euler.{sequence}", partial(_rates, scope, euler), rates, listed=False)
+
+
+def _rates(scope: Scope, angles: Callable[[], Sequence[Scalar]]) -> Sequence[Scalar]:
+    return [scope.rate(angle) for angle in angles()]
 
 
 def _quaternion(scope: Scope, joint: Joint) -> Sequence[Scalar]:

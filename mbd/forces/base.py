@@ -97,5 +97,13 @@ def joint_of(value: object, what: str) -> Joint:
         raise ModelError(f"{what} must be a joint such as the Revolute it acts on, got {value!r}")
     if len(value.labels) != 1:
         names = ", ".join(repr(name) for name in value.coordinate_names) or "none"
-        raise ModelError(f"{what} must have one coordinate; '{value.name}' has {names}")
+        instead = (
+            ""
+            if value.orientation is None
+            else (
+                "; of a joint that turns freely take mbd.Applied with torque= and axes=, or a mbd.Potential, "
+                f"mbd.Bilateral or mbd.Unilateral of an angle such as '{value.name}.euler.zxy.1'"
+            )
+        )
+        raise ModelError(f"{what} must have one coordinate; '{value.name}' has {names}{instead}")
     return value

@@ -12,8 +12,10 @@ __all__ = ["orientation_names"]
 def orientation_names(joint: Joint) -> list[str]:
     """The names of what is read off a joint with a quaternion or of the body, besides coordinates and velocities."""
     named = [f"{joint.name}.{angle.name}" for angles, _ in angles_of(joint.anatomy) for angle in angles]
+    named += [f"{name}.rate" for name in named]
     if joint.orientation is None:
         return named
     vectors = ("angular_velocity.parent", "angular_velocity.ground", "rotation_vector")
     names = [f"{joint.name}.{vector}.{axis}" for vector in vectors for axis in "xyz"]
-    return names + named + [f"{joint.name}.euler.{sequence}.{place}" for sequence in SEQUENCES for place in PLACES]
+    euler = [f"{joint.name}.euler.{sequence}.{place}" for sequence in SEQUENCES for place in PLACES]
+    return names + named + euler + [f"{name}.rate" for name in euler]

@@ -58,7 +58,11 @@ def unit(name: str, facts: Facts) -> str:
         if last == "acceleration" and stem in dict(facts.velocities):  # of a velocity that is no rate
             return own[stem].removesuffix("/s") + "/s²"
         power = "/s" if last == "rate" else "/s²"
-        base = own.get(stem) or next((value for key, value in own.items() if key.rpartition(".")[0] == stem), "")
+        base = (
+            own.get(stem)
+            or ("rad" if stem in facts.angles else "")
+            or next((value for key, value in own.items() if key.rpartition(".")[0] == stem), "")
+        )
         return base + power if base else ""
     effort = stem.removesuffix(".a").rpartition(".")[2]  # 'mount.force.a.x': in the axes of a frame a
     if last in ("x", "y", "z") and effort in ("reaction_force", "reaction_torque", "force", "torque"):

@@ -189,3 +189,24 @@ def test_a_report_of_a_gait_takes_the_angles_that_move_with_moments_of_their_sen
     assert "knee angle" not in curves
     assert "knee adduction angle" not in curves
     assert curves["knee flexion angle"].mean[0] == pytest.approx(np.degrees(0.4))
+
+
+def test_rates_of_angles_are_their_derivatives_and_may_be_started_with():
+    model = mbd.Model("arm")
+    arm = mbd.Link("arm", 2.0, 0.3, 0.13, (0.012, 0.002, 0.012))
+    model.connect(mbd.Spherical("shoulder", model.ground.origin, arm.start, anatomy="left shoulder"))
+    start = mbd.assemble(
+        model, {"shoulder.flexion": 0.4, "shoulder.adduction": -0.5},
+        {"shoulder.flexion": 1.0, "shoulder.euler.yxy.2.rate": -0.3},
+    )  # fmt: skip
+    assert start["shoulder.flexion.rate"] == pytest.approx(1.0, abs=1e-12)
+    assert start["shoulder.euler.yxy.2.rate"] == pytest.approx(-0.3, abs=1e-12)
+    run = mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.01, until=0.2, backend="python")
+    h, at = 1e-4, np.array([0.055, 0.125])
+    for name in "shoulder.flexion", "shoulder.elevation", "shoulder.plane_of_elevation", "shoulder.euler.zxy.3":
+        before, after = run.at(at - h)[name], run.at(at + h)[name]
+        np.testing.assert_allclose(run.at(at)[f"{name}.rate"], (after - before) / (2.0 * h), rtol=1e-6, atol=1e-7)
+    assert not any(name.endswith("flexion.rate") for name in run.names)
+    assert run.to_dataframe(["shoulder.flexion.rate"]).attrs["units"]["shoulder.flexion.rate"] == "rad/s"
+    with pytest.raises(mbd.ModelError, match=r"turns freely take mbd\.Applied .*'shoulder\.euler\.zxy\.1'"):
+        mbd.Motor("drive", model.joints[0], torque=1.0)
