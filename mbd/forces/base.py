@@ -97,13 +97,16 @@ def joint_of(value: object, what: str) -> Joint:
         raise ModelError(f"{what} must be a joint such as the Revolute it acts on, got {value!r}")
     if len(value.labels) != 1:
         names = ", ".join(repr(name) for name in value.coordinate_names) or "none"
-        instead = (
-            ""
-            if value.orientation is None
-            else (
+        instead = ""
+        if value.orientation is not None:
+            instead = (
                 "; of a joint that turns freely take mbd.Applied with torque= and axes=, or a mbd.Potential, "
                 f"mbd.Bilateral or mbd.Unilateral of an angle such as '{value.name}.euler.zxy.1'"
             )
-        )
+        elif value.labels:
+            instead = (
+                "; of one among several take a mbd.Potential, mbd.Bilateral or mbd.Unilateral of it, such as "
+                f"{value.coordinate_names[0]!r}, or one joint after another"
+            )
         raise ModelError(f"{what} must have one coordinate; '{value.name}' has {names}{instead}")
     return value

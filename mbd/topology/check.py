@@ -95,6 +95,7 @@ def _floating(model: Description) -> Sequence[Joint]:
 RESULTS = (
     "acceleration", "energy", "force", "friction", "gap", "gap_rate", "multiplier", "power", "tension", "torque",
     *(f"reaction_{what}.{axis}" for what in ("force", "torque") for axis in "xyz"),
+    "friction.forward", "friction.sideways", "forward.force", "sideways.force", "spin.torque",
 )  # fmt: skip
 """What a run knows of joints, forces and constraints besides places and rates."""
 
@@ -104,7 +105,23 @@ def readable(model: Description) -> list[str]:
     words: list[Joint | Force | Constraint] = [*model.joints, *model.forces, *model.constraints]
     owners = [word.name for word in words] + [name for joint in model.joints for name in joint.coordinate_names]
     observed = [name for each in model.observations for name in (each.name, *(f"{each.name}.{axis}" for axis in "xyz"))]
-    return [*quantities(model), *observed, *(f"{owner}.{result}" for owner in owners for result in RESULTS)]
+    told = [
+        name
+        for force in model.forces
+        for field, result in force.results().items()
+        for name in (f"{force.name}.{field}", *(f"{force.name}.{field}.{axis}" for axis in "xyz" * result.is_vector))
+    ]
+    return [*quantities(model), *observed, *told, *(f"{owner}.{result}" for owner in owners for result in RESULTS)]
+
+
+def _unknown(model: Description, name: str, known: Iterable[str]) -> str:
+    """What is wrong with the name of a quantity that a law of the motion refers to."""
+    if name in readable(model) and not name.endswith((".gap", ".gap_rate")):
+        return (
+            f"{name!r} is a result of the motion, on which its laws cannot depend; let a mbd.Controller read it, or a "
+            "mbd.Penalty give a force that follows places and rates"
+        )
+    return nearest(name, known, "quantity")
 
 
 # names ----------------------------------------------------------------------------------------------------------
@@ -211,7 +228,7 @@ def mention_faults(model: Description) -> list[str]:
                 )
             state = isinstance(mention, str) and mention.rpartition(".")[0] in owners  # a first-order state of a force
             if isinstance(mention, str) and mention not in known and not state:
-                found.append(f"'{word.name}': " + nearest(mention, known, "quantity"))
+                found.append(f"'{word.name}': {_unknown(model, mention, known)}")
     if any(controller.reads for controller in model.controllers):
         known = set(readable(model))
     for controller in model.controllers:

@@ -118,3 +118,21 @@ def test_at_rest_it_carries_the_weight_along_its_own_axes():
     np.testing.assert_allclose(run["mount.force"][-1], [0.0, 2.0 * 9.81, 0.0], atol=1e-6)
     np.testing.assert_allclose(run["mount.force.a"][-1], [2.0 * 9.81, 0.0, 0.0], atol=1e-6)
     np.testing.assert_allclose(run["mount.torque"][-1], [0.0, 0.0, 9.81], rtol=1e-4)
+
+
+def test_a_controller_reads_its_force_and_a_law_of_the_motion_cannot():
+    model, read = held(True, stiffness=200.0, rotational_stiffness=10.0), []
+
+    def update(time, values, state):
+        read.append(values["mount.force.a.x"])
+        return {"push.force.x": 0.5 * values["mount.force.x"]}
+
+    body = model.joints[0].child
+    model.apply(mbd.Applied("push", body, force=(0.0, 0.0, 0.0)))
+    reads = ["mount.force.x", "mount.force.a.x", "push.force.x"]
+    model.apply(mbd.Controller("half", update, period=0.01, reads=reads, writes=["push.force.x"]))
+    run = mbd.simulate(model, mbd.assemble(model, {"float.x": 0.1}), dt=0.01, until=0.02, backend="python")
+    assert read[0] == pytest.approx(-20.0) and run["push.force.x"][-1] == pytest.approx(0.5 * read[-1])
+    model.apply(mbd.Applied("echo", body, force=lambda x: (x, 0.0), arguments=("mount.force.x",)))
+    with pytest.raises(mbd.ModelError, match="'mount.force.x' is a result of the motion.*let a mbd.Controller read it"):
+        mbd.assemble(model)
