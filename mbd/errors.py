@@ -103,13 +103,13 @@ MEANT = {
     "angle angles euler": ("flexion", "dorsiflexion", "first", "orientation", "orientation.w"),
     "abduction": ("adduction",),
     "com cog cm mass_center": ("center",),
-    "moment torque": ("torque", "reaction_torque"),
-    "force load": ("reaction_force", "tension", "torque"),
+    "moment torque damping": ("torque", " loss.torque", " spring.torque", "reaction_torque"),
+    "force load": (" loss.force", " spring.force", "reaction_force", "tension", "torque"),
     "reaction": ("reaction_force",),
     "world global": ("ground", "ground.x"),
     "x": ("origin.x", "displacement"), "y": ("origin.y", "displacement"), "z": ("origin.z", "displacement"),
 }  # fmt: skip
-"""What is meant by the last word of a name that there is not: last words of names that there may be."""
+"""What is meant by the last word of a name that there is not: last words of names that there may be, or their ends."""
 
 COMPONENT = re.compile(r"(.*)\.[wxyz123](\..*)?")
 """The components of what may be one name too, and what they have."""
@@ -152,7 +152,8 @@ def _guesses(text: str, names: Sequence[str]) -> list[str]:
     if not found and owner:
         for words, others in MEANT.items():
             if last.casefold() in words.split():
-                found += [each for each in (f"{owner}.{other}".rstrip(".") for other in others) if each in names][:1]
+                meant = (f"{owner}{'' if other[:1] in ('', ' ') else '.'}{other}" for other in others)
+                found += [each for each in meant if each in names][:2]
     own = [each for each in names if each.startswith(f"{owner}.")] if owner else []
     return (
         found

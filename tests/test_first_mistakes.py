@@ -242,7 +242,7 @@ def person():
         ("left hip.abduction", "did you mean 'left hip.adduction'"),
         ("left hip.rotation", "did you mean 'left hip.orientation'"),
         ("left hip.angular_velocity.world", "did you mean 'left hip.angular_velocity.ground'"),
-        ("trunk.position", r"did you mean 'trunk'\?"),
+        ("trunk.position", "did you mean 'trunk' or 'trunk.x'"),
         ("pelvis.position", "did you mean 'pelvis.origin'"),
         ("pelvis.x", "did you mean 'pelvis.origin.x'"),
         ("left thigh.com", "did you mean 'left thigh.center'"),

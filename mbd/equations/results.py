@@ -13,7 +13,7 @@ from mbd.equations.equations import Contact, Effect, Equations, Row
 from mbd.equations.outputs import AXES, Outputs
 from mbd.equations.reactions import Wrench, reaction
 from mbd.forces.base import Force
-from mbd.joints.base import Joint
+from mbd.joints.base import Joint, Label
 from mbd.scope import Triple
 from mbd.tape.node import Node, Scalar, Tape
 
@@ -41,6 +41,8 @@ def offer_results(
     offer_contacts(outputs, tape, rows, contacts)
     offer_effects(outputs, tape, equations.effects)
     _offer_forces(outputs, scope, model.forces)
+    acting = {effect.name for effect in equations.effects} - {force.name for force in model.forces}
+    _offer_losses_and_springs(outputs, scope, acting)
     for name, energy in ("kinetic_energy", equations.kinetic), ("potential_energy", equations.potential):
         outputs.value(name, energy)
     _offer_joints(outputs, scope, dynamics, work, rows, hidden)
@@ -143,6 +145,35 @@ def offer_effects(outputs: Outputs, tape: Tape, effects: Iterable[Effect]) -> No
             outputs.value(f"{effect.name}.power", switch * effect.power)
         if effect.potential is not None:
             outputs.value(f"{effect.name}.energy", effect.potential)
+
+
+def _offer_losses_and_springs(outputs: Outputs, scope: DerivationContext, acting: Collection[str]) -> None:
+    """Torque or force of the losses of joints and of their linear springs, positive along the coordinate."""
+    for joint in (*scope.tree, *scope.cuts):
+        alone = len(joint.freedoms) == 1
+        if f"{joint.name} loss" in acting:
+            for place in sorted({place for place, _, _ in joint.losses()}):
+                label = joint.freedoms[place]
+                name = f"{joint.name} loss" if alone else f"{joint.name} loss.{label.name}"
+                outputs.add(f"{name}.{_effort(label)}", partial(_resistance, scope, joint, place))
+        if alone and len(joint.labels) == 1 and f"{joint.name} spring" in acting:
+            outputs.add(f"{joint.name} spring.{_effort(joint.labels[0])}", partial(_pull, scope, joint))
+
+
+def _effort(label: Label) -> str:
+    return "torque" if label.unit == "rad" else "force"
+
+
+def _resistance(scope: DerivationContext, joint: Joint, place: int) -> Scalar:
+    return -joint.resistance(scope.joint(joint.name).rates, scope)[place]
+
+
+def _pull(scope: DerivationContext, joint: Joint) -> Scalar:
+    """−k (q − rest)."""
+    (q,) = scope.joint(joint.name).coordinates
+    owner = f"{joint.name} spring"
+    stretch = q - scope.parameter(owner, "rest", joint.rest)
+    return -scope.parameter(owner, "stiffness", joint.stiffness) * stretch
 
 
 def _offer_forces(outputs: Outputs, scope: DerivationContext, forces: Iterable[Force]) -> None:

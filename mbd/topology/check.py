@@ -104,14 +104,16 @@ def readable(model: Description) -> list[str]:
     """Names that controllers may read: quantities and results; which of these a word has shows when a run begins."""
     words: list[Joint | Force | Constraint] = [*model.joints, *model.forces, *model.constraints]
     owners = [word.name for word in words] + [name for joint in model.joints for name in joint.coordinate_names]
+    owners += [f"{joint.name} {part}" for joint in model.joints for part in ("loss", "spring")]
+    owners += [owner for joint in model.joints for _, owner, _ in joint.losses()]
     observed = [name for each in model.observations for name in (each.name, *(f"{each.name}.{axis}" for axis in "xyz"))]
-    told = [
+    of_forces = [
         name
         for force in model.forces
         for field, result in force.results().items()
         for name in (f"{force.name}.{field}", *(f"{force.name}.{field}.{axis}" for axis in "xyz" * result.is_vector))
     ]
-    return [*quantities(model), *observed, *told, *(f"{owner}.{result}" for owner in owners for result in RESULTS)]
+    return [*quantities(model), *observed, *of_forces, *(f"{owner}.{result}" for owner in owners for result in RESULTS)]
 
 
 def _unknown(model: Description, name: str, known: Iterable[str]) -> str:

@@ -92,3 +92,31 @@ def test_a_motor_with_the_wrong_effort_is_refused(given, words):
     pin = mbd.Revolute("pin", mbd.Model("m").ground.origin, mbd.Link("rod", 1.0, 1.0, 0.5).start)
     with pytest.raises(ModelError, match=words):
         mbd.Motor("m", pin, **given)
+
+
+@pytest.mark.parametrize("cut", [(), "all"])
+def test_losses_and_springs_of_joints_give_their_power_and_energy(cut):
+    """Dry friction that sticks is a row of its own, and none of the loss."""
+    model = mbd.Model("arm", cut=cut)
+    one, two = (mbd.Link(name, 1.0, 1.0, 0.5, 0.1) for name in ("one", "two"))
+    loss = mbd.Viscous(0.3) + mbd.Coulomb(0.2)
+    model.connect(mbd.Revolute("shoulder", model.ground.origin, one.start, loss=loss, stiffness=4.0, rest=0.2))
+    model.connect(mbd.Cylindrical("wrist", one.end, two.start, loss={"angle": mbd.Quadratic(0.5)}))
+    model.connect(mbd.Prismatic("rail", two.end, mbd.PointMass("bob", 0.1).origin, axis="z", stiffness=5.0))
+    start = mbd.assemble(
+        model, {"shoulder.angle": 0.5, "wrist.angle": 0.3, "rail.displacement": 0.1}, {"wrist.angle": 2.0}
+    )
+    run = mbd.simulate(model, start, dt=0.01, until=0.05, backend="python")
+    for name, rate in ("shoulder loss", "shoulder.rate"), ("wrist loss.angle", "wrist.angle.rate"):
+        power = run[f"{name.partition(' loss')[0]} loss.power"]
+        np.testing.assert_allclose(run[f"{name}.torque"] * run[rate], power, rtol=1e-12, atol=1e-15)
+    stretch = run["shoulder.angle"] - 0.2
+    np.testing.assert_allclose(run["shoulder spring.torque"], -4.0 * stretch, rtol=1e-12)
+    np.testing.assert_allclose(
+        -0.5 * run["shoulder spring.torque"] * stretch, run["shoulder spring.energy"], rtol=1e-12
+    )
+    np.testing.assert_allclose(run["rail spring.force"], -5.0 * run["rail.displacement"], rtol=1e-12)
+    units = run.to_dataframe(["wrist loss.angle.torque", "rail spring.force"]).attrs["units"]
+    assert list(units.values())[-2:] == ["N m", "N"]
+    with pytest.raises(mbd.UnknownNameError, match="did you mean 'shoulder loss.torque' or 'shoulder spring.torque'"):
+        run["shoulder.torque"]
