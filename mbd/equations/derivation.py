@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from mbd.bodies.algebra import dot
@@ -111,7 +112,7 @@ def _derived(model: Description, plan: Plan, carried: Sequence[tuple[str, int]] 
         observations=tuple((each.name, each.unit) for each in model.observations),
         anatomy=tuple((each.name, each.anatomy) for each in model.joints if each.anatomy),
         shapes=(*shapes_of(model), *(() if plan.planar else solids_of(model))),
-        mirror=() if plan.planar else tuple(signs_in_a_mirror(plan.edges, model.gravity).items()),
+        mirror=None if plan.planar else partial(signs_in_a_mirror, plan.edges, model.gravity),
         geometry=TreeGeometry(scope, dynamics, work, rests, constraints, plan.planar and vectors and not carried),
         frictions=tuple(constraints.frictions), turns=(*scope.turns.values(), *scope.wrapped.values()),
         facings=_facings(scope, constraints),

@@ -20,7 +20,7 @@ Inputs on the tape, as (kind, index)
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, Protocol
 
@@ -307,7 +307,7 @@ class Equations:
     markers : full names of the named points, which pages show
     observations : (name, unit) of the results of users' own; anatomy : (joint, joint of the body) of those that are one
     shapes : what pictures show beside bodies
-    mirror : (name, sign) of coordinates and velocities in space, where the sides 'left' and 'right' are exchanged
+    mirror : gives signs of coordinates and velocities in space, where the sides 'left' and 'right' are exchanged
     memory : what follows from the rest, kept once it was found
     """
 
@@ -339,7 +339,7 @@ class Equations:
     observations: tuple[tuple[str, str], ...] = ()
     anatomy: tuple[tuple[str, str], ...] = ()
     shapes: tuple[Shape, ...] = ()
-    mirror: tuple[tuple[str, float], ...] = ()
+    mirror: Callable[[], Mapping[str, float]] | None = field(default=None, repr=False)
     configuration: Configuration = field(default=None, repr=False)  # type: ignore[assignment]
     memory: dict[str, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 

@@ -127,7 +127,7 @@ class Facts:
             equations.observations,
             equations.shapes,
             equations.anatomy,
-            equations.mirror,
+            tuple(equations.mirror().items()) if equations.mirror is not None else (),
         )
 
     @classmethod
