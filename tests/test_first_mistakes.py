@@ -256,6 +256,19 @@ def test_wrong_names_in_space_are_answered_with_what_is_meant(wrong, right):
     assert len(str(told.value)) < 600
 
 
+def test_the_force_of_a_row_that_always_holds_is_its_multiplier():
+    model, _ = pendulum()
+    model.constrain(mbd.Bilateral("rail", mbd.measure(lambda angle: angle, "pin.angle")))
+    run = mbd.simulate(model, mbd.assemble(model), dt=0.01, until=0.01, backend="python")
+    for wrong, right in (
+        ("rail.force", "rail.multiplier"),
+        ("rail.gap", "rail.residual"),
+        ("pin.force", "reaction_force"),
+    ):
+        with pytest.raises(mbd.UnknownNameError, match=f"did you mean '[a-z.]*{right}'"):
+            run[wrong]
+
+
 def test_a_state_knows_what_follows_from_places_and_velocities():
     _, start, run = person()
     for name in "left hip.flexion", "left foot.toe", "right knee.angle.rate", "trunk", "left hip.euler.zxy":
