@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
@@ -17,15 +18,18 @@ from tests.mechanisms_between_rows import KINDS
 TIMES = np.linspace(0.0, 0.2, 23)
 
 
-def same(one: mbd.Trajectory, other: mbd.Trajectory) -> None:
-    """Every named result at rows and between, events, energies and violation, to the bit."""
+def same(one: mbd.Trajectory, other: mbd.Trajectory, singly: Sequence[str] | None = None) -> None:
+    """Every named result at rows and between, events, energies and violation, to the bit.
+
+    singly : those that are asked for one by one, each by a function of its own; by default all
+    """
     assert one.names == other.names
     np.testing.assert_array_equal(one.time, other.time)
     for side in ("left", "right"):
         ours, theirs = one.at(TIMES, side=side).read(*one.names), other.at(TIMES, side=side).read(*one.names)
         for name in one.names:
             np.testing.assert_array_equal(ours[name], theirs[name], err_msg=name)
-    for name in one.names:
+    for name in one.names if singly is None else singly:
         np.testing.assert_array_equal(one[name], other[name], err_msg=name)
     for part, again in zip(one.energy.parts, other.energy.parts, strict=True):
         assert (part.name, part.kind) == (again.name, again.kind)
