@@ -1,4 +1,4 @@
-"""Random mechanisms to ask for results between rows: trees, loops, redundant rows, contacts that stay closed."""
+"""Random mechanisms to ask for results between rows: trees, loops, redundant rows, closed contacts, free turns."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from mbd.errors import AssemblyError
 from mbd.hardcases.redundant_rows import bricard, parallel_cranks
 from mbd.testing.mechanisms import random_loop, random_tree
 from tests.equations.mechanisms import furnished
+from tests.space_scenes import JOINTS, scene
 
 __all__ = ["KINDS"]
 
@@ -63,6 +64,13 @@ def standing(seed: int) -> tuple[mbd.Model, mbd.State]:
     return model, start
 
 
+def turning(seed: int) -> tuple[mbd.Model, mbd.State]:
+    """Bodies that turn freely in space, with every joint in turn, in a tree or, where the seed is odd, in a loop."""
+    kind, joints = ("loop" if seed % 2 else "tree"), [joint for joint in JOINTS if joint != "free"]
+    made = scene(kind, joints[seed // 2 % len(joints)], seed)
+    return made.model, made.start
+
+
 KINDS: dict[str, Callable[[int], tuple[mbd.Model, mbd.State]]] = {
-    "tree": tree, "loop": loop, "redundant": redundant, "standing": standing,
+    "tree": tree, "loop": loop, "redundant": redundant, "standing": standing, "turning": turning,
 }  # fmt: skip
