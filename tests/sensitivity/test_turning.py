@@ -11,9 +11,11 @@ import pytest
 import mbd
 from mbd.joints.quaternions import rotation_of
 from mbd.sensitivity.derivative import final_state_derivative
+from tests import space_scenes
 from tests.joints.quaternion_ball import QuaternionBall
 from tests.sensitivity.turns import all_names, judged
 from tests.simulation.test_space_laws import chain, pose
+from tests.space_scenes import JOINTS
 
 CLOSE = {"tolerance": 1e-12}
 SCHEMES = (
@@ -69,6 +71,16 @@ def test_derivatives_of_many_chains_are_limits_of_differences(seed):
             assert_as_differences(model, start, scheme, seed=seed, **settings)
         except (mbd.SimulationError, mbd.CapabilityError):
             continue
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("joint", JOINTS)
+def test_derivatives_of_moving_trees_with_every_joint_are_limits_of_differences(joint):
+    for seed in range(2):
+        made = space_scenes.scene("tree", joint, seed)
+        for scheme in SCHEMES:
+            settings = {"parameters": ["body 1.mass"], "step": STEP, "dt": 0.01, "until": 0.12}
+            assert_as_differences(made.model, made.start, scheme, ways=1, **settings)
 
 
 # contacts and events ------------------------------------------------------------------------------------------------

@@ -19,6 +19,9 @@ __all__ = ["Difference", "Matches", "aligned", "apart", "differences", "gaps", "
 BESIDE = 1e-9
 """Instants this close to an event are left out too, relative to the length of the run [-]."""
 
+HELD = 1e-12
+"""Coordinate or rate over the largest one of the run below which it is round-off [-]."""
+
 
 @dataclass(frozen=True)
 class Difference:
@@ -46,12 +49,19 @@ class Difference:
 
 
 def ranges(run: Trajectory, names: Sequence[str], instants: Vector) -> dict[str, float]:
-    """Largest less least value of each quantity, by which its error is divided; its size, or 1, where it rests."""
-    found = {}
+    """Largest less least value of each quantity, by which its error is divided; its size, or 1, where it rests.
+
+    A coordinate or rate that rows hold at zero is round-off of the others: it rests, with their size.
+    """
+    facts, record, found = run.facts, run.record, {}
+    whole = dict.fromkeys(facts.rates, float(np.max(np.abs(record.v), initial=0.0)))
+    coordinates = [name for name, _ in facts.coordinates[: facts.coordinate_count]]
+    whole |= dict.fromkeys(coordinates, float(np.max(np.abs(record.q), initial=0.0)))
     for name, values in run.at(instants).read(*names).items():
-        known = values[np.isfinite(values)]
+        known, largest = values[np.isfinite(values)], whole.get(name, 0.0)
         swing, size = float(np.ptp(known)) if known.size else 0.0, float(np.max(np.abs(known), initial=0.0))
-        found[name] = swing if swing > 1e-9 * size else size or 1.0
+        rests = not swing > max(1e-9 * size, HELD * largest)
+        found[name] = (size if size > HELD * largest else largest) or 1.0 if rests else swing
     return found
 
 
