@@ -1,9 +1,13 @@
 """A projected start is nearest to what was named, whichever joints are cut and however many turns the names ask for."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import mbd
+from mbd.compile.mechanisms import mechanism_of
+from tests.space_scenes import scene
 
 ANGLES = ("crank.angle", "pin.angle", "rocker.angle", "joint.angle")
 
@@ -71,3 +75,21 @@ def test_angles_named_a_turn_away_from_a_pose_are_projected_to_that_pose_next_to
     start = mbd.assemble(four_bar(0, ["rocker"], lengths), named, project=True)
     for name, value in named.items():
         assert abs(start[name] - value) <= np.pi + 1e-9, name
+
+
+@pytest.mark.parametrize("joint", ["cylindrical", "screw", "universal"])
+def test_a_projection_is_linear_in_small_changes_and_leaves_a_base_that_carries_the_loop(joint):
+    """Rows that are off turn with such a base: that is no action on them, however far they are off."""
+    made = scene("loop", joint, 0)
+    configuration = mechanism_of(made.model).equations.configuration
+    change = np.random.default_rng(0).normal(size=configuration.n_v)
+    found = []
+    for size in (1e-4, 1e-5, 1e-6):
+        ends = [
+            mbd.project(made.model, replace(made.start, q=configuration.compose(made.start.q, step), memory=None)).q
+            for step in (-size * change, size * change)
+        ]
+        found.append(configuration.difference(*ends) / (2.0 * size))
+    np.testing.assert_allclose(found[1:], found[:1] * 2, rtol=0, atol=1e-5)
+    if joint != "universal":
+        np.testing.assert_allclose(found[0][:3], change[:3], rtol=0, atol=1e-5)

@@ -23,6 +23,8 @@ REFINEMENTS = 3
 """Solutions of the linear equations for velocities: bodies without mass leave an error in the first [-]."""
 ACTS = 1e-14
 """Derivative [m/rad, -] of a row below which a coordinate does not act on it: what cancellation leaves of zero."""
+LEVER = 2.0
+"""Derivative of a row over what rows are off, up to which it may come from that alone; √3 at most [1/rad]."""
 PATIENCE = 20
 """Steps of Newton's method in which the largest residual of a start must come down to half [-]."""
 NUDGE, NUDGES = 0.01, 3
@@ -47,10 +49,14 @@ def position_rows(work: Posture) -> list[int]:
     return [k for k in active if not rows[k].is_velocity and (rows[k].contact < 0 or k in normals)]
 
 
-def _involved(B: Matrix, free: Matrix) -> Any:
-    """The free coordinates that the rows act on; the others stay where they are."""
+def _involved(B: Matrix, free: Matrix, missing: float = 0.0) -> Any:
+    """The free coordinates that the rows act on; the others stay where they are.
+
+    missing : what the rows are off: a base that carries all they compare turns that along, and changes it by no more
+    """
     size = float(np.max(np.abs(B), initial=0.0))
-    return np.flatnonzero(free & (np.max(np.abs(B), axis=0, initial=0.0) > max(1e-12 * size, ACTS)))
+    least = max(1e-12 * size, ACTS, LEVER * missing)
+    return np.flatnonzero(free & (np.max(np.abs(B), axis=0, initial=0.0) > least))
 
 
 def _weighted(M: Matrix) -> Matrix:
@@ -189,25 +195,26 @@ def _newton(work: Posture, rows: Sequence[int], free: Matrix, start: Vector) -> 
             continue
         if not np.isfinite(size) or not len(places):
             return h
-        B = B[:, places]
-        M = terms.M[:n_v, :n_v][np.ix_(places, places)]
         least, since = (size, 0) if size < 0.5 * least else (least, since + 1)
         if since > PATIENCE and size > TOLERANCE:
             if astray:
                 return h
             least, since, astray = np.inf, 0, True
         near = (size < 1e-3 or iteration > 20) and not astray and iteration < 100
-        pull = work.equations.configuration.difference(work.q, start)[places] if near else np.zeros(len(places))
-        change = _least_change(M, B, h, pull)
+        change = np.zeros(n_v)
+        if near:
+            acting = _involved(B, free, size)
+            places = acting if len(acting) else places
+            change = np.where(free, work.equations.configuration.difference(work.q, start), 0.0)
+        M = terms.M[:n_v, :n_v][np.ix_(places, places)]
+        change[places] = _least_change(M, B[:, places], h, change[places])
         limit = max(1.0, float(np.max(np.abs(change))) / 0.5)
         if size < 1e-13 and float(np.max(np.abs(change))) < 1e-12:
             return h
         if iteration > 60 and size > 0.5 * before and size < 1e-12:
             return h
         before = size
-        x = np.zeros(n_v)
-        x[places] = change / limit
-        move(work, x)
+        move(work, change / limit)
     terms = work.mechanism.acceleration_terms(work.time, work.q, work.y, work.parameters, work.anchors)
     return faced(work, picked, *work.with_conditions(terms.h[picked], terms.B[picked][:, :n_v], work.places))[0]
 
