@@ -20,7 +20,7 @@ from mbd.kernel.redundancy import find_dependence
 from mbd.kernel.restart import active_rows, evaluate, evaluate_loaded, limit_of, load_accelerations, stepping_rows
 from mbd.kernel.saddle import solve_at
 
-__all__ = ["all_hold", "solve_cones"]
+__all__ = ["all_hold", "keep_branches", "solve_cones"]
 
 STANDS = 1e-9
 """Velocity, as the impulse that would stop it over the largest impulse, below which nothing slides or parts [-]."""

@@ -187,11 +187,11 @@ def judge(K: Switching, h: float) -> bool:
                     top = hermite_turn(g0, g1, d0, d1, True)
                     if top > 0.0 and hermite(g0, g1, d0, d1, top) > tiny:
                         consider(K, CLOSE, c, top + (1.0 - top) * crossing(hermite(g0, g1, d0, d1, top), g1), top)
-                    else:
+                    elif g1 < g0 - tiny:  # what has opened a little below its surface, and rises, does not close again
                         consider(K, CLOSE, c, 0.0, 0.0)
-            elif d0 < 0.0 < d1:
+            elif d0 < 0.0 < d1 and (g0 > tiny or d0 < -tiny):
                 bottom = hermite_turn(g0, g1, d0, d1, False)
-                limit = -CLOSE_BY * d0 if g0 > tiny else -4.0 * tiny
+                limit = -CLOSE_BY * d0 if g0 > tiny else min(g0, 0.0) - 4.0 * tiny
                 if bottom > 0.0 and hermite(g0, g1, d0, d1, bottom) < limit:
                     consider(K, GRAZE, c, bottom, 0.0)
         elif K.kind[c] == 0:

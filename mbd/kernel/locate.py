@@ -56,7 +56,7 @@ def dip(K: Kernel, h: float) -> int:
         status = try_step(K, place, t + place)
         if status != 0:
             return status
-        depth = -side * K.guards1[at]
+        depth = -side * K.guards1[at] - (0.0 if users else max(-K.guards0[at], 0.0))  # below where it was
         if depth > 0.0 and depth > (guard_round_off(K, c, t + place, K.q1, K.y1) if users else gap_tolerance(K, c)):
             K.event_kind = CLOSE
             if users:

@@ -12,6 +12,7 @@ caller solves their equations again, and judges them.
 from __future__ import annotations
 
 from mbd.kernel.branches import find_limits, load, whole
+from mbd.kernel.cone_contacts import keep_branches
 from mbd.kernel.cones import aim, follows
 from mbd.kernel.discs import minimize_within_discs
 from mbd.kernel.linear import solve
@@ -32,20 +33,25 @@ NO_LIMIT = 1e-9
 
 
 def guess_slides(K: Balance, level: int) -> int:
-    """1 if frictions that may choose have been given branches and directions, 0 if there are too few of them."""
+    """1 if frictions that may choose have been given branches and directions; 0, and all as it was, if they have not.
+
+    There may be too few of them, or one of them that an event has found out.
+    """
     drags = gather_drags(K, 0)
     if drags < 3:
         return 0
     for u in range(drags):
-        f = K.lcp_who[u]
-        if K.loose[f] == 2:  # an event has found it out
+        if K.loose[K.lcp_who[u]] == 2:
             return 0
-        K.sticks[f] = 0
-        K.slip[f] = 0.0
+    keep_branches(K, True)
+    for u in range(drags):
+        K.sticks[K.lcp_who[u]] = 0
+        K.slip[K.lcp_who[u]] = 0.0
     evaluate_loaded(K, whole(K, level))
     find_limits(K, level)
     held = hold(K, level, 0, drags)
     if held < 0:
+        keep_branches(K, False)
         return 0
     fill_responses(K, held, drags)
     for j in range(drags):
