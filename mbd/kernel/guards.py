@@ -47,6 +47,7 @@ from mbd.kernel.restart import (
     largest_force,
     limit_of,
 )
+from mbd.kernel.roots import sqrt
 
 __all__ = [
     "along_slip", "gap_scale", "gap_tolerance", "goes_back", "guard_value", "is_watched", "judge", "update_armed",
@@ -60,6 +61,8 @@ REST = 1e-12
 """Speed along a friction, relative to its terms, that is no turn: other rows may hold it still as it pulls [-]."""
 CLOSE_BY = 1e-3
 """Part of what a guard changes by in a step, at its first rate, above zero where the turn is looked at itself [-]."""
+LOST = 1e-10
+"""Part of its terms by which a gap may fall though its rate is none or positive at both ends of a step [-]."""
 APART = 1e-6
 """Gap [m, rad] above which a contact is clearly open."""
 
@@ -181,6 +184,8 @@ def judge(K: Switching, h: float) -> bool:
             if K.armed[c] != 1 or not is_watched(K, c, K.guards0):
                 continue
             if g1 < -tiny:
+                if min(d0, d1) >= -tiny and rises(g0, g1, d1, LOST * gap_scale(K, c)):
+                    continue
                 if g0 > tiny:
                     consider(K, CLOSE, c, crossing(g0, g1), 0.0)
                 else:
@@ -188,8 +193,8 @@ def judge(K: Switching, h: float) -> bool:
                     if top > 0.0 and hermite(g0, g1, d0, d1, top) > tiny:
                         consider(K, CLOSE, c, top + (1.0 - top) * crossing(hermite(g0, g1, d0, d1, top), g1), top)
                     elif g1 < g0 - tiny:  # what has opened a little below its surface, and rises, does not close again
-                        consider(K, CLOSE, c, 0.0, 0.0)
-            elif d0 < 0.0 < d1 and (g0 > tiny or d0 < -tiny):
+                        consider(K, CLOSE, c, sqrt(tiny / (g0 - g1)) if d0 >= -tiny else 0.0, 0.0)
+            elif d0 < -tiny and d1 > 0.0:
                 bottom = hermite_turn(g0, g1, d0, d1, False)
                 limit = -CLOSE_BY * d0 if g0 > tiny else min(g0, 0.0) - 4.0 * tiny
                 if bottom > 0.0 and hermite(g0, g1, d0, d1, bottom) < limit:
@@ -216,6 +221,15 @@ def judge(K: Switching, h: float) -> bool:
         for f in range(K.n_frictions):
             judge_friction(K, f, h)
     return bool(K.event_kind >= 0)
+
+
+def rises(g0: float, g1: float, d1: float, lost: float) -> bool:
+    """Whether a gap whose rate is none or positive at both ends of a step is below zero by an error of the step alone.
+
+    By what Newton's method leaves open, `lost`; or where it was at rest on its surface, by less than it rises in a step:
+    as a force passes zero, the gap rises with the cube of time, which is what a scheme of order 2 errs by.
+    """
+    return g1 >= -lost or (g0 <= lost and g0 - g1 <= d1)
 
 
 def begins_to_be_watched(K: Switching, c: int, h: float) -> bool:
