@@ -226,8 +226,8 @@ def judge(K: Switching, h: float) -> bool:
 def rises(g0: float, g1: float, d1: float, lost: float) -> bool:
     """Whether a gap whose rate is none or positive at both ends of a step is below zero by an error of the step alone.
 
-    By what Newton's method leaves open, `lost`; or where it was at rest on its surface, by less than it rises in a step:
-    as a force passes zero, the gap rises with the cube of time, which is what a scheme of order 2 errs by.
+    By what Newton's method leaves open, `lost`; or where it was at rest on its surface, by less than it rises in a
+    step: as a force passes zero, the gap rises with the cube of time, which is what a scheme of order 2 errs by.
     """
     return g1 >= -lost or (g0 <= lost and g0 - g1 <= d1)
 

@@ -195,8 +195,14 @@ def slip_together(K: Balance, index: int) -> None:
     The others stick on: the body turns about one that does. Who slides goes the way of its pull, which at that load is
     the only one.
     """
-    K.sticks[index] = K.sticks[K.partner[index]] = 1
+    other = K.partner[index]
+    own_way = K.slip[index]
+    other_way = K.slip[other]
+    K.sticks[index] = K.sticks[other] = 1
+    K.slip[index] = K.slip[other] = 0.0
     status = consistent(K, K.time, K.q, K.y)
+    K.slip[index] = own_way
+    K.slip[other] = other_way
     K.loads[: K.n_rows] = K.impulse[: K.n_rows]
     evaluate_loaded(K, K.loads)
     for f in range(K.n_frictions):
@@ -207,7 +213,7 @@ def slip_together(K: Balance, index: int) -> None:
                 K.loose[f] = K.loose[p] = 3
                 K.sticks[f] = K.sticks[p] = 0
                 aim(K, f, K.brink[K.friction_row[f]], K.brink[K.friction_row[p]])
-    K.sticks[index] = K.sticks[K.partner[index]] = 0
+    K.sticks[index] = K.sticks[other] = 0
 
 
 def stop_spin(K: Balance, index: int) -> None:
