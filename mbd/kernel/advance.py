@@ -371,6 +371,10 @@ def judge_step(K: Kernel, h: float, full: float, t1: float, cut: bool, within: b
         h = abs(parts) * h / K.n_substeps
         t1 = K.time + h
         status = try_step(K, h, t1)
+        if is_shortened(K, status):
+            status = tried_step(K, SHORTER * h, K.time + SHORTER * h)
+            h = K.step_taken
+            t1 = K.time + h
         if status != 0:
             return status
     event = 0
@@ -389,6 +393,18 @@ def judge_step(K: Kernel, h: float, full: float, t1: float, cut: bool, within: b
             within = True
             cut = False
             event = TURNS_AWAY if slides_on(K) else find_event(K, h, t1)
+        for _ in range(MOST_SHORTER):  # no step ends where an event was looked for: it is nearer than it seems
+            if not is_shortened(K, event):
+                break
+            h *= SHORTER
+            status = tried_step(K, h, K.time + h)
+            if status != 0:
+                return status
+            h = K.step_taken
+            t1 = K.time + h
+            within = True
+            cut = False
+            event = find_event(K, h, t1)
         if event > 0:
             return event
     pulls = K.n_judged > 0 and event == 0 and not quiet and has_spurious_reaction(K)
