@@ -137,7 +137,8 @@ def nearest(
         return f"no {kind} named {name!r}; it has {_listed(parts)}"
     close = _guesses(text, sorted({*names, *beside}))
     owners = {f"{each.rpartition('.')[0]}." for each in (text, *close)} - {"."}
-    names = [each for each in names if each.startswith(tuple(owners))] or names
+    if len(names) > SHOWN:
+        names = [each for each in names if each.startswith(tuple(owners))] or names
     guess = f"; did you mean {' or '.join(map(repr, close))}?" if close else ";"
     known = known if close else known[0].lower() + known[1:]
     has = f" {known} {_listed(names)}" if names else f" {known} none"

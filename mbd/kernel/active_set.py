@@ -39,9 +39,10 @@ class ActiveSetManager:
         self._row_level = [int(row.is_velocity) for row in equations.rows]
         self._row_friction = [row.friction for row in equations.rows]
         self.frictions = equations.frictions
-        self.rolling: dict[str, tuple[int, ...]] = {}  # rows on velocities of contacts, by the name of their owner
+        self.rolling: dict[str, tuple[int, ...]] = {}  # rows of wheels that roll while a contact is closed, by name
+        own = {contact.name for contact in equations.contacts}
         for k, row in enumerate(equations.rows):
-            if row.is_velocity and row.contact >= 0:
+            if row.is_velocity and row.contact >= 0 and row.owner not in own:
                 self.rolling[row.owner] = (*self.rolling.get(row.owner, ()), k)
         for contact in equations.contacts:
             self.register(contact)

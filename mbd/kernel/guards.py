@@ -186,14 +186,15 @@ def judge(K: Switching, h: float) -> bool:
             if g1 < -tiny:
                 if min(d0, d1) >= -tiny and rises(g0, g1, d1, LOST * gap_scale(K, c)):
                     continue
+                slow = d0 >= -tiny and g0 - g1 > tiny  # what comes before it is looked at first
                 if g0 > tiny:
                     consider(K, CLOSE, c, crossing(g0, g1), 0.0)
                 else:
                     top = hermite_turn(g0, g1, d0, d1, True)
                     if top > 0.0 and hermite(g0, g1, d0, d1, top) > tiny:
                         consider(K, CLOSE, c, top + (1.0 - top) * crossing(hermite(g0, g1, d0, d1, top), g1), top)
-                    elif g1 < g0 - tiny:  # what has opened a little below its surface, and rises, does not close again
-                        consider(K, CLOSE, c, sqrt(tiny / (g0 - g1)) if d0 >= -tiny else 0.0, 0.0)
+                    else:
+                        consider(K, CLOSE, c, sqrt(tiny / (g0 - g1)) if slow else 0.0, 0.0)
             elif d0 < -tiny and d1 > 0.0:
                 bottom = hermite_turn(g0, g1, d0, d1, False)
                 limit = -CLOSE_BY * d0 if g0 > tiny else min(g0, 0.0) - 4.0 * tiny
@@ -227,9 +228,10 @@ def rises(g0: float, g1: float, d1: float, lost: float) -> bool:
     """Whether a gap whose rate is none or positive at both ends of a step is below zero by an error of the step alone.
 
     By what Newton's method leaves open, `lost`; or where it was at rest on its surface, by less than it rises in a
-    step: as a force passes zero, the gap rises with the cube of time, which is what a scheme of order 2 errs by.
+    step: as a force passes zero, the gap rises with the cube of time, which is what a scheme of order 2 errs by. From
+    there it comes up again; what is farther below has jumped there.
     """
-    return g1 >= -lost or (g0 <= lost and g0 - g1 <= d1)
+    return g1 >= -lost or (abs(g0) <= lost and g0 - g1 <= d1) or (g0 < g1 and -d1 <= g0 < 0.0)
 
 
 def begins_to_be_watched(K: Switching, c: int, h: float) -> bool:

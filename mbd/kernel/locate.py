@@ -20,7 +20,7 @@ from mbd.kernel.codes import (
     WATCH,
 )
 from mbd.kernel.guard_round_off import guard_round_off
-from mbd.kernel.guards import along_slip, gap_tolerance, guard_value, is_watched, judge
+from mbd.kernel.guards import along_slip, gap_scale, gap_tolerance, guard_value, is_watched, judge
 from mbd.kernel.hermite import first_guess
 from mbd.kernel.records import Events, Guards, Kernel, Switching
 from mbd.kernel.refine import refine
@@ -30,6 +30,8 @@ __all__ = ["locate"]
 
 MOST_LOOKS = 12
 """How often a step is halved to see a friction slide, or a contact part, that has just begun to [-]."""
+JUMP = 1e-6
+"""Part of its terms by which a gap may be off zero at the instant at which a contact closes [-]."""
 SAME = 1e-9
 """Events closer than this part of the way to the first are one event."""
 EARLIER, LATER = -2, -1
@@ -145,6 +147,10 @@ def root_before(K: Kernel, kind: int, index: int, low: float, end: float) -> int
     status = bracket(K, kind, index, low, end)
     if status != 0:
         return status
+    if K.event_kind == CLOSE and K.event_after > 0.0 and K.kind[index] == 0 and K.linear == 0:
+        if abs(K.guards1[index]) > JUMP * gap_scale(K, index):  # it is nowhere zero, as that of a twist at half a turn
+            K.failure_index = index
+            return NO_LOCATION
     if (
         K.event_kind >= 0 and K.event_after > 0.0 and kind == CLOSE and left_alone(K, index)
     ):  # not watched any more there

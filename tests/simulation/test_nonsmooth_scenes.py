@@ -275,7 +275,7 @@ def test_a_step_whose_end_has_no_impulses_is_tried_down_to_an_eighth(monkeypatch
         assert not trajectory.success and "no forces or impulses" in trajectory.message
     else:
         assert trajectory.success and trajectory.stats["shortened"] == until_works
-        assert any("shortened" in note for note in trajectory.stats["notes"])
+        assert any("halved where no impulses" in note for note in trajectory.stats["notes"])
         assert sum(event.kind == "closed" for event in trajectory.events) == 1
     np.testing.assert_allclose(refused, [0.17, 0.085, 0.0425, 0.02125][:until_works], rtol=1e-12)
 
