@@ -31,7 +31,7 @@ __all__ = ["locate"]
 MOST_LOOKS = 12
 """How often a step is halved to see a friction slide, or a contact part, that has just begun to [-]."""
 JUMP = 1e-6
-"""Part of its terms by which a gap may be off zero at the instant at which a contact closes [-]."""
+"""Part of its terms by which an angle may be off zero at the instant at which a contact closes [-]."""
 SAME = 1e-9
 """Events closer than this part of the way to the first are one event."""
 EARLIER, LATER = -2, -1
@@ -148,9 +148,8 @@ def root_before(K: Kernel, kind: int, index: int, low: float, end: float) -> int
     if status != 0:
         return status
     if K.event_kind == CLOSE and K.event_after > 0.0 and K.kind[index] == 0 and K.linear == 0:
-        if abs(K.guards1[index]) > JUMP * gap_scale(K, index):  # it is nowhere zero, as that of a twist at half a turn
-            K.failure_index = index
-            return NO_LOCATION
+        if K.row_unit[K.normal[index]] == 1 and abs(K.guards1[index]) > JUMP * gap_scale(K, index):
+            return NO_LOCATION  # an angle that is nowhere zero, as a twist at half a turn
     if (
         K.event_kind >= 0 and K.event_after > 0.0 and kind == CLOSE and left_alone(K, index)
     ):  # not watched any more there
