@@ -381,10 +381,13 @@ def judge_step(K: Kernel, h: float, full: float, t1: float, cut: bool, within: b
     if parts != 0 or not (quiet or looked):  # a shorter step is one of its own: what was looked at is interpolated
         ahead = parts != 0 and K.strategy == 0 and slides_on(K)  # these parts end before what slides comes to rest
         event = TURNS_AWAY if ahead else find_event(K, h, t1)
-        for _ in range(K.n_cones):  # each time one more direction is held no longer
-            if event != TURNS_AWAY:
+        for _ in range(K.n_cones + MOST_SHORTER):
+            if event == TURNS_AWAY:  # each time one more direction is held no longer
+                h = shorter_turn(K, h)
+            elif is_shortened(K, event):  # no step ends where an event was looked for: it is nearer than it seems
+                h *= SHORTER
+            else:
                 break
-            h = shorter_turn(K, h)
             status = tried_step(K, h, K.time + h)
             if status != 0:
                 return status
@@ -392,19 +395,7 @@ def judge_step(K: Kernel, h: float, full: float, t1: float, cut: bool, within: b
             t1 = K.time + h
             within = True
             cut = False
-            event = TURNS_AWAY if slides_on(K) else find_event(K, h, t1)
-        for _ in range(MOST_SHORTER):  # no step ends where an event was looked for: it is nearer than it seems
-            if not is_shortened(K, event):
-                break
-            h *= SHORTER
-            status = tried_step(K, h, K.time + h)
-            if status != 0:
-                return status
-            h = K.step_taken
-            t1 = K.time + h
-            within = True
-            cut = False
-            event = find_event(K, h, t1)
+            event = TURNS_AWAY if K.strategy == 0 and slides_on(K) else find_event(K, h, t1)
         if event > 0:
             return event
     pulls = K.n_judged > 0 and event == 0 and not quiet and has_spurious_reaction(K)
