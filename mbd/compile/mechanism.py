@@ -100,6 +100,7 @@ class Mechanism:
         self.postponed: list[Postponed] = []
         self.without_effect: frozenset[str] = frozenset()
         self._modes: dict[tuple[Any, ...], ModeCode] = {}
+        self._has_free_rates: bool | None = None
         equations.memory["mechanism"] = ref(self)
         self.seconds = perf_counter() - started
 
@@ -135,6 +136,21 @@ class Mechanism:
     @cached_property
     def _accelerations(self) -> list[Node]:
         return programs.accelerations(self.equations)
+
+    def free_rates(self) -> Function | None:
+        """Accelerations of a tree on which no row acts, without M; made on first use, None where only M leads to them.
+
+        See `programs.free_rates`.
+        """
+        with self.equations.tape.lock:
+            if self._has_free_rates is None:
+                self._has_free_rates = bool(self._compiled("free rates", self._made_without_rows)["found"])
+            return self.common["free_rates"] if self._has_free_rates else None
+
+    def _made_without_rows(self) -> Made:
+        n = self.layout.n
+        found = programs.free_rates(self.equations, self._accelerations[n * n : n * (n + 1)])
+        return {} if found is None else {"free_rates": found}, {"found": found is not None}
 
     def mode(
         self,
@@ -394,6 +410,7 @@ class Mechanism:
             "scales": n + 2 * rows,
             "compose": layout.n_q,
             "increment_rates": layout.n_v,
+            "free_rates": 2 * layout.n_v + 2,
             "chart_end": 3 * layout.n_v,
             "chart_motion": 2 * layout.n_v,
         }

@@ -273,6 +273,10 @@ class TreeGeometry:
             return None
         return self.dynamics.mass_matrix()
 
+    def accelerations(self, forces: Sequence[Node]) -> tuple[list[Node], Node] | None:
+        """v̇ with M v̇ = forces from the tips of the tree, where M is that of `mass_matrix`."""
+        return None if self.mass_matrix() is None else self.dynamics.accelerations(forces)
+
     def partials(self, outputs: Sequence[Node]) -> list[dict[Node, Node]]:
         """∂node/∂x_j of the places and rotations inside the outputs."""
         return [*partials(self.scope.placement, outputs), *({} for _ in self.scope.carried)]

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 
 from mbd.bodies.algebra import cross, dot, rotate, scaled, total
 from mbd.bodies.mass import MassProperties
+from mbd.equations.articulated_bodies import articulated_accelerations
 from mbd.equations.composite_mass import composite_mass_matrix
 from mbd.equations.composite_tangent import Branches, turns_by_numbers
 from mbd.equations.inputs import Inputs
@@ -125,6 +126,10 @@ class Dynamics:
     def mass_matrix(self) -> list[list[Node]]:
         """M of the bodies, line by line (n_v × n_v)."""
         return composite_mass_matrix(self._bodies, self._masses, len(self._inputs.v), self._tape)
+
+    def accelerations(self, forces: Sequence[Node]) -> tuple[list[Node], Node] | None:
+        """v̇ with M v̇ = forces, see `articulated_accelerations`."""
+        return articulated_accelerations(self._bodies, self._masses, forces, self._tape)
 
     def joint_wrench(self, body: Moving, work: Work) -> tuple[Triple, Triple]:
         """Force and torque that a body needs at its joint, in body axes: the residual conjugate to a virtual motion.

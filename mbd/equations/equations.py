@@ -269,6 +269,12 @@ class Geometry(Protocol):
     def mass_matrix(self) -> list[list[Node]] | None:
         """M = ∂r/∂a, line by line; None where more than inertia depends on accelerations."""
 
+    def accelerations(self, forces: Sequence[Node]) -> tuple[list[Node], Node] | None:
+        """v̇ with M v̇ = forces by a shorter way than by M, and the least part of an inertia that its pivots keep.
+
+        None where it knows none.
+        """
+
     def tangent(
         self,
         values: Sequence[Node],

@@ -14,6 +14,7 @@ With N = n_v + n_z rates, m active rows in ascending number, R rows and nC conta
 `scales`           magnitudes of r (N) | of h (R) | of ḣ (R), term by term before cancellation
 `compose`          q ⊕ x, or None where it is q + x
 `increment_rates`  ẋ = D(x)⁻¹ v (n_v)
+`free_rates`       ẋ (n_v) | v̇ (n_v) with M v̇ = −f | least part of an inertia that a pivot keeps | −v̇·f
 =================  ==================================================================================
 
 Of a row on velocities h is zero; index 3 has its rate in the place of h.
@@ -36,8 +37,9 @@ from mbd.tape.elimination import factors
 from mbd.tape.node import Node, Scalar
 
 __all__ = [
-    "Correction", "accelerations", "balance_with", "compose", "constraint_jacobian", "correction", "guard_terms",
-    "guards", "increment_rates", "is_judged", "mass_matrix", "newton", "residual", "scales", "switched_balance",
+    "Correction", "accelerations", "balance_with", "compose", "constraint_jacobian", "correction", "free_rates",
+    "guard_terms", "guards", "increment_rates", "is_judged", "mass_matrix", "newton", "residual", "scales",
+    "switched_balance",
 ]  # fmt: skip
 
 
@@ -256,6 +258,18 @@ def increment_rates(equations: Equations) -> list[Node]:
     """ẋ = D(x)⁻¹ v, v itself where coordinates add."""
     inputs = Inputs.of(equations)
     return list(inputs.v if inputs.chart is None else inputs.chart.rates)
+
+
+def free_rates(equations: Equations, f: Sequence[Node]) -> list[Node] | None:
+    """Rates of a tree on which no row acts, without M; None where only M leads to them.
+
+    f : of `accelerations`
+    """
+    found = None if equations.geometry is None else equations.geometry.accelerations([-force for force in f])
+    if found is None:
+        return None
+    rates, kept = found
+    return [*increment_rates(equations), *rates, kept, -_dot(rates, f)]
 
 
 # parts --------------------------------------------------------------------------------------------------------------

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 PASSING, LEFT = 1, 2
 """Values of `near_singular`: within a few steps of a singular configuration, and just beyond it."""
-ACCELERATIONS, GUARDS, SCALES, COMPOSE, TERMS, INCREMENT_RATES, CHART_END, CHART_MOTION = range(8)
+ACCELERATIONS, GUARDS, SCALES, COMPOSE, TERMS, INCREMENT_RATES, CHART_END, CHART_MOTION, FREE_RATES = range(9)
 """Functions in `code`; modes follow: tangent, residual and, where straight-line code pays, correction and solution."""
 DONE, FULL, NEW_MODE, EVENT, PAUSE, LAST = range(6)
 """What `advance` returns; or one of the failures below."""

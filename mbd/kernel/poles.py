@@ -11,6 +11,7 @@ step from any other at most; next to an end it has not. In space, without rows, 
 from __future__ import annotations
 
 from mbd.kernel.codes import ACCELERATIONS, NOT_FINITE
+from mbd.kernel.free_rates import NOT_CLEAR, rates_in_block
 from mbd.kernel.hooks import call
 from mbd.kernel.linear import solve_from_tips
 from mbd.kernel.mass_ratios import LOSS
@@ -94,8 +95,14 @@ def pull_at(K: Switching, h: float, part: float, at_y: int) -> float:
             if K.vector == 1:
                 way = K.inside[i] - K.q[i]
             K.block[K.o_x + i] = part * way  # straight: a curve through both velocities would leave the places between
+        K.block[K.o_v + i] = K.y1[i]
+    free = K.n_rows == 0 and K.n_frictions == 0
+    if free:
+        pull = rates_in_block(K)
+        if pull != NOT_CLEAR:
+            return pull
     compose(K, K.q1)
-    if K.n_rows == 0 and K.n_frictions == 0:
+    if free:
         quick = pull_without_rows(K, t)
         if quick != NOT_FOUND:
             return quick

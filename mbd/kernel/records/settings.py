@@ -75,6 +75,7 @@ class Settings(Sizes):
     """What does not change while the kernel runs."""
 
     vector: int  # 1: q ⊕ x is q + x
+    treelike: int  # 1: without rows accelerations come from `FREE_RATES`
     stabilized: int  # 1: velocity level with position correction, 0: index 3
     jerk: int  # 1: a₀ starts from the jerk, 0: a₀ = v̇₀
     exact: int  # 1: iterate until round-off

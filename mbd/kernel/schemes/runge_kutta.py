@@ -12,13 +12,14 @@ that the formula needs (Munthe-Kaas 1999, Appl. Numer. Math. 29:115).
 from __future__ import annotations
 
 from mbd.kernel.codes import EPS, INCREMENT_RATES, NOT_CONVERGED, NOT_FINITE, PASSING, SINGULAR
+from mbd.kernel.free_rates import NOT_CLEAR, free_rates, rates_in_block
 from mbd.kernel.hooks import call
 from mbd.kernel.linear import solve_definite, solve_from_tips
 from mbd.kernel.mass_ratios import LOSS, is_uneven, polish_rates, polish_with_rows
 from mbd.kernel.ordered import LOSS_AT_ONCE, solve_kkt
 from mbd.kernel.records import Balance, DependentRows, Kernel, Memory, SingularSteps, Steps
 from mbd.kernel.redundancy import sharing
-from mbd.kernel.restart import compose, consistent, displace, evaluate, measure_accepted, raise_scales
+from mbd.kernel.restart import compose, consistent, displace, evaluate, fill_block, measure_accepted, raise_scales
 from mbd.kernel.roots import sqrt
 from mbd.kernel.saddle import factor_saddle
 from mbd.kernel.schemes.contract import Abilities, Scheme
@@ -75,16 +76,23 @@ def runge_kutta_step(K: Kernel, h: float, t1: float) -> int:
         K.stages[n_v + i] = K.rate[i]
         if i < n_v:
             K.stages[i] = K.y[i]
+    free = K.treelike == 1 and K.n_active == 0 and K.n_frictions == 0
+    if free:
+        fill_block(K, K.time, K.q, K.y)
     for s in range(1, stages):
+        t = K.time + K.tableau[at_nodes + s] * h
         explicit_move(K, h, s * stages, s)
-        status = explicit_rates(K, K.time + K.tableau[at_nodes + s] * h)
-        if status != 0:
-            return status
+        if not (free and stage_in_chart(K, t, s)):
+            place_in_chart(K, s)
+            status = explicit_rates(K, t)
+            if status != 0:
+                return status
         for i in range(n):
             K.stages[s * width + n_v + i] = K.jump[i]
             if i < n_v and K.vector == 1:
                 K.stages[s * width + i] = K.y1[i]
     explicit_move(K, h, at_end, stages)
+    place_in_chart(K, stages)
     if K.n_active > 0:
         status = return_to_rows(K, t1)
         if status != 0:
@@ -124,7 +132,7 @@ def runge_kutta_step(K: Kernel, h: float, t1: float) -> int:
 
 
 def explicit_move(K: Steps, h: float, weights: int, count: int) -> None:
-    """(q1, y1) moved from the accepted state by h times the weighted slopes of the first stages; ẋ there as a slope."""
+    """h times the weighted slopes of the first stages: y1, and x in K.spare."""
     n_v = K.n_v
     width = n_v + K.n
     K.spare[:width] = 0.0
@@ -135,16 +143,47 @@ def explicit_move(K: Steps, h: float, weights: int, count: int) -> None:
                 K.spare[i] += weight * K.stages[j * width + i]
     for i in range(K.n):
         K.y1[i] = K.y[i] + K.spare[n_v + i]
+
+
+def place_in_chart(K: Steps, stage: int) -> None:
+    """q1 = q ⊕ x with x in K.spare; ẋ there as the slope of a stage."""
+    n_v = K.n_v
     if K.vector == 1:
         for i in range(n_v):
             K.q1[i] = K.q[i] + K.spare[i]
         return
-    for i in range(n_v):
-        K.block[K.o_x + i] = K.spare[i]
-        K.block[K.o_v + i] = K.y1[i]
+    move_in_block(K)
     compose(K, K.q1)
     call(K, INCREMENT_RATES, K.spare)
-    K.stages[count * width : count * width + n_v] = K.spare[:n_v]
+    begin = stage * (n_v + K.n)
+    K.stages[begin : begin + n_v] = K.spare[:n_v]
+
+
+def move_in_block(K: Steps) -> None:
+    """x in K.spare and y1 into the block."""
+    for i in range(K.n_v):
+        K.block[K.o_x + i] = K.spare[i]
+        K.block[K.o_v + i] = K.y1[i]
+
+
+def stage_in_chart(K: Kernel, t: float, stage: int) -> bool:
+    """Both slopes of a stage in the chart of the step, as `place_in_chart` and `explicit_rates` find them; or false.
+
+    The block is that of the accepted state but for what changes within the step; x is in K.spare, which false leaves.
+    """
+    n_v = K.n_v
+    K.block[0] = t
+    K.block[K.o_q : K.o_q + K.n_q] = K.q[: K.n_q]
+    move_in_block(K)
+    pull = rates_in_block(K)
+    if pull == NOT_CLEAR:
+        K.spare[:n_v] = K.block[K.o_x : K.o_x + n_v]
+        return False
+    begin = stage * (n_v + K.n)
+    K.stages[begin : begin + n_v] = K.spare[:n_v]
+    K.stage_pull = max(K.stage_pull, pull)
+    K.n_residuals += 1
+    return True
 
 
 def explicit_rates(K: Balance, t: float) -> int:
@@ -153,8 +192,13 @@ def explicit_rates(K: Balance, t: float) -> int:
     m = K.n_active
     if (K.loaded > 0 and (K.n_frictions > 0 or K.rubs == 1)) or sharing(K):
         return consistent(K, t, K.q1, K.y1)
-    evaluate(K, t, K.q1, K.y1)
     K.n_residuals += 1
+    if m == 0:
+        pull = free_rates(K, t)
+        if pull != NOT_CLEAR:
+            K.stage_pull = max(K.stage_pull, pull)
+            return 0
+    evaluate(K, t, K.q1, K.y1)
     finite = 0.0
     for i in range(n):
         finite += abs(K.acc[K.acc_f + i])

@@ -90,6 +90,9 @@ class Stepper:
         self.functions.append(mechanism.common["terms"] if mechanism.judged else None)
         for name in ("increment_rates", "chart_end", "chart_motion"):
             self.functions.append(None if mechanism.vector else mechanism.common[name])
+        without_mass_matrix = self.own.abilities.explicit == 1 and not mechanism.vector
+        self.functions.append(mechanism.free_rates() if without_mass_matrix else None)
+        self.kernel.treelike = int(self.functions[-1] is not None)
         self.kernel.code = self.functions
         self.modes: list[Any] = []
         self.dependent: dict[int, tuple[int, ...]] = {}
@@ -112,7 +115,7 @@ class Stepper:
             rubs=int(any(contact.drags and contact.rows for contact in self.mechanism.equations.contacts)),
             loaded=follows(self.mechanism.equations), impact_law=LAWS.index(options.get("impact", "newton")),
             strategy=int(options.get("contact") == "nonsmooth"), auto=int(options.get("auto", False)),
-            vector=int(self.mechanism.vector),
+            vector=int(self.mechanism.vector), treelike=0,
             stabilized=int(self.stabilized), max_iterations=MAX_ITERATIONS,
             max_switches=20 + 4 * (n_contacts + n_guards + layout.n_frictions),
             linear=int(options.get("locate") == "linear"),
