@@ -17,7 +17,7 @@ from mbd.kernel.hooks import call
 from mbd.kernel.linear import solve_definite, solve_from_tips
 from mbd.kernel.mass_ratios import LOSS, is_uneven, polish_rates, polish_with_rows
 from mbd.kernel.ordered import LOSS_AT_ONCE, solve_kkt
-from mbd.kernel.records import Balance, DependentRows, Kernel, Memory, SingularSteps, Steps
+from mbd.kernel.records import Balance, DependentRows, Equations, Kernel, Memory, SingularSteps, Steps
 from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import compose, consistent, displace, evaluate, fill_block, measure_accepted, raise_scales
 from mbd.kernel.roots import sqrt
@@ -159,7 +159,7 @@ def place_in_chart(K: Steps, stage: int) -> None:
     K.stages[begin : begin + n_v] = K.spare[:n_v]
 
 
-def move_in_block(K: Steps) -> None:
+def move_in_block(K: Equations) -> None:
     """x in K.spare and y1 into the block."""
     for i in range(K.n_v):
         K.block[K.o_x + i] = K.spare[i]
