@@ -100,6 +100,8 @@ LOSSES: list[tuple[str, Callable[[], Loss]]] = [
     ("valves", lambda: mbd.Valves(backward=mbd.Quadratic(0.8), forward=mbd.Viscous(0.2) + mbd.Quadratic(0.1))),
     ("friction that falls with speed", lambda: mbd.AffineFriction(3.0, -0.2, smoothing=0.05)),
     ("friction that grows with speed", lambda: mbd.AffineFriction(3.0, 0.2, smoothing=0.05)),
+    ("stribeck", lambda: mbd.Stribeck(3.0, 2.0, 0.05)),
+    ("stribeck and viscous", lambda: mbd.Stribeck(3.0, 2.0, 0.05) + mbd.Viscous(0.7)),
     ("viscous and quadratic", lambda: mbd.Viscous(0.7) + mbd.Quadratic(0.4)),
 ]
 

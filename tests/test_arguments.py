@@ -32,6 +32,7 @@ WORDS = {
     mbd.Dissipation: (lambda rate: rate * rate,),
     mbd.PinFriction: (0.1, 0.1),
     mbd.Quadratic: (1.0,),
+    mbd.Stribeck: (0.6, 0.4, 0.1),
     mbd.Tabulated: ((-1.0, 0.0, 1.0), (-1.0, 0.0, 1.0)),
     mbd.Valves: (mbd.Viscous(1.0), mbd.Viscous(1.0)),
     mbd.Viscous: (1.0,),

@@ -10,7 +10,7 @@ GROUPS = {
     "Models and bodies": "Model Lagrangian Coordinate PointMass Link RigidBody Marker box cylinder disk rod segment "
     "sphere Domain on_slope human Human",
     "Joints and losses": "Revolute Prismatic Translation Planar Cylindrical Universal Screw Spherical Free Weld "
-    "Viscous Quadratic Coulomb AffineFriction PinFriction Tabulated Valves Dissipation",
+    "Viscous Quadratic Coulomb Stribeck AffineFriction PinFriction Tabulated Valves Dissipation",
     "Constraints and measures": "Bilateral Unilateral Penalty PenaltyParameters penalty_parameters KnifeEdge Rolling "
     "Nonholonomic Event Controller When touchdown rolling_touchdown profile_touchdown disk_touchdown "
     "sphere_touchdown Plane Ball height flexion extension cone twist distance separation measure",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -96,9 +97,10 @@ def _declared(findings: Findings, loss: Loss) -> None:
 
 def _power(findings: Findings, loss: Loss, rate: float, fastest: float) -> None:
     force = force_at(loss, rate)
-    sentence = f"power taken out F(v) v: expected ≥ 0 W, found {force * rate:.6g} W (F = {force:.6g})"
+    whole = force + math.copysign(dry_at(loss, 0.0), rate)
+    sentence = f"power taken out F(v) v: expected ≥ 0 W, found {whole * rate:.6g} W (F = {whole:.6g})"
     hint = "F opposes the motion and has the sign of the rate: it stands on the left-hand side of M a + f = 0"
-    findings.holds("passivity: it never feeds energy in", force * rate >= 0.0, sentence, hint)
+    findings.holds("passivity: it never feeds energy in", whole * rate >= 0.0, sentence, hint)
     findings.equal(
         "determinism", "F(v) asked again", force_at(loss, rate), force, "F may depend on its rate alone", 0.0
     )

@@ -6,11 +6,12 @@ from mbd.joints.losses.coulomb import Coulomb
 from mbd.joints.losses.dissipation import Dissipation
 from mbd.joints.losses.pin_friction import PinFriction
 from mbd.joints.losses.quadratic import Quadratic
+from mbd.joints.losses.stribeck import Stribeck
 from mbd.joints.losses.tabulated import Tabulated
 from mbd.joints.losses.valves import Valves
 from mbd.joints.losses.viscous import Viscous
 
 __all__ = [
     "AffineFriction", "Coulomb", "Dissipation", "DissipationFunction", "Loss", "LossSum", "PinFriction", "Quadratic",
-    "Tabulated", "Valves", "Viscous",
+    "Stribeck", "Tabulated", "Valves", "Viscous",
 ]  # fmt: skip

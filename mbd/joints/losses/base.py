@@ -36,6 +36,11 @@ class Loss(ABC):
         """Its physical quantities by field; each is a run-time parameter 'owner.field'."""
 
     @property
+    def kind(self) -> str:
+        """What names its parameters in a sum of losses."""
+        return type(self).__name__.lower()
+
+    @property
     def needs_reaction(self) -> bool:
         """Whether its friction follows the force in the joint, which is cut then, so that rows carry that force."""
         return False
@@ -107,7 +112,7 @@ class LossSum(Loss):
 
     def named(self, owner: str) -> list[tuple[str, Loss]]:
         """Each part with the owner of its parameters."""
-        kinds = [type(loss).__name__.lower() for loss in self.losses]
+        kinds = [loss.kind for loss in self.losses]
         counts = [kinds[: k + 1].count(kind) for k, kind in enumerate(kinds)]
         names = [kind if count == 1 else f"{kind} {count}" for kind, count in zip(kinds, counts, strict=True)]
         return [(f"{owner}.{name}", loss) for name, loss in zip(names, self.losses, strict=True)]

@@ -1,0 +1,84 @@
+"""Dry friction that falls from its static to its kinetic size as sliding sets in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from mbd.bodies.domains import Domain, positive
+from mbd.bodies.values import number
+from mbd.errors import ModelError
+from mbd.joints.losses.base import Loss
+from mbd.scope import Scope
+from mbd.tape.functions import exp, sqrt
+from mbd.tape.node import Scalar
+
+__all__ = ["Stribeck"]
+
+SPEED = positive("is not positive; give the speed over which friction falls, or mbd.Coulomb for a constant one")
+LEAST_SQUARE = 1e-60
+"""Square of a rate that is none, beside which a direction is defined [m²/s², rad²/s²]."""
+
+
+@dataclass(frozen=True)
+class _Fall(Loss):
+    """``F = (T_k − T_s) (1 − e^{−(v/v_s)²}) v/|v|``: what sliding takes off the static friction."""
+
+    static: float
+    kinetic: float
+    speed: float
+
+    def __post_init__(self) -> None:
+        for field in ("static", "kinetic", "speed"):
+            object.__setattr__(self, field, number(getattr(self, field), f"{field} of Stribeck"))
+        faults = SPEED.faults("Stribeck", "speed", self.speed)
+        if faults:
+            raise ModelError(faults)
+
+    @property
+    def kind(self) -> str:
+        """The same for the whole of it and its smooth part."""
+        return "stribeck"
+
+    def fields(self) -> dict[str, float]:
+        """`static`, `kinetic`, `speed`."""
+        return {"static": self.static, "kinetic": self.kinetic, "speed": self.speed}
+
+    def domains(self) -> dict[str, Domain]:
+        """T_s ≥ 0, T_k ≥ 0, v_s > 0."""
+        return super().domains() | {"speed": SPEED}
+
+    def force(self, rate: Scalar, scope: Scope, owner: str) -> Scalar:
+        """(T_k − T_s) (1 − e^{−(v/v_s)²}) v/|v|."""
+        static, kinetic, speed = (scope.parameter(owner, field, value) for field, value in self.fields().items())
+        square = rate * rate
+        fall: Scalar = 1.0 - exp(-square / (speed * speed))
+        size: Scalar = sqrt(square + LEAST_SQUARE)
+        return (kinetic - static) * fall * rate / size
+
+
+@dataclass(frozen=True)
+class Stribeck(_Fall):
+    """Dry friction that sticks up to its static size and falls to its kinetic one as sliding sets in.
+
+    ``|F| ≤ T_s`` at rest and ``F = (T_k + (T_s − T_k) e^{−(v/v_s)²}) v/|v|`` in motion (Armstrong-Hélouvry, Dupont &
+    Canudas de Wit 1994, Automatica 30:1083, with the exponent 2). Where it falls steeply a drive through a soft spring
+    sticks and slips. ``+ mbd.Viscous(c)`` lets it grow again.
+
+    As ``friction=`` of a contact it is isotropic: T_s and T_k are coefficients per newton of normal force [-], v is the
+    speed of the slip [m/s]; impacts, whose slips pass all speeds, have the static one.
+
+    Parameters
+    ----------
+    static : T_s ≥ 0, the largest friction at rest [N m or N; -]
+    kinetic : T_k ≥ 0, that of fast sliding [N m or N; -]
+    speed : v_s > 0, over which one becomes the other [rad/s or m/s]
+    """
+
+    @property
+    def smooth(self) -> Loss:
+        """What sliding takes off."""
+        return _Fall(self.static, self.kinetic, self.speed)
+
+    def dry(self, load: Scalar, scope: Scope, owner: str) -> Scalar:
+        """T_s."""
+        return scope.parameter(owner, "static", self.static)
