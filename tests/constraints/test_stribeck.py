@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import mbd
+from mbd.joints.losses import LossSum
 
 FRICTION = mbd.Stribeck(0.6, 0.4, 0.05)
 G, BELT, STIFFNESS = 9.81, 0.1, 20.0
@@ -71,6 +72,14 @@ def test_a_hinge_comes_to_rest_where_the_larger_friction_holds_it():
     assert run.events[-1].kind == "stuck"
     assert abs(run["hinge.friction"][-1]) <= 1.0 + 1e-9
     assert abs(run.energy.numerical[-1]) < 1e-6
+
+
+def test_a_scene_without_the_friction_has_nothing_of_it():
+    model = mbd.Model("hinge")
+    bar = mbd.Link("bar", mass=1.0, length=1.0, center=0.5, inertia=0.1)
+    loss = mbd.Viscous(0.1) + mbd.Stribeck(1.0, 0.5, 0.2)
+    hinge = mbd.Revolute("hinge", model.ground.origin, bar.start, loss=loss)
+    assert hinge.frictions() == {"hinge friction": LossSum((mbd.Viscous(0.1),))}
 
 
 def test_words_that_make_no_friction_are_refused():

@@ -59,6 +59,11 @@ class Loss(ABC):
         """What is left of it without friction that truly sticks; None where that is all of it."""
         return self if type(self).dry is Loss.dry else None
 
+    @property
+    def without_sticking(self) -> Loss | None:
+        """The loss of a scene that leaves friction that truly sticks out: `smooth`, unless that is a part of it."""
+        return self.smooth
+
     def domains(self) -> dict[str, Domain]:
         """Domains of its fields: all of them ≥ 0, unless a loss says otherwise."""
         return dict.fromkeys(self.fields(), DISSIPATES)
@@ -140,6 +145,12 @@ class LossSum(Loss):
     def smooth(self) -> Loss | None:
         """Those of its parts that are smooth, with the names of their parameters."""
         parts = tuple(part for loss in self.losses if (part := loss.smooth) is not None)
+        return LossSum(parts) if parts else None
+
+    @property
+    def without_sticking(self) -> Loss | None:
+        """Those of its parts that do not stick."""
+        parts = tuple(part for loss in self.losses if (part := loss.without_sticking) is not None)
         return LossSum(parts) if parts else None
 
     def fields(self) -> dict[str, float]:

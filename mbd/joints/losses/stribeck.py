@@ -79,6 +79,11 @@ class Stribeck(_Fall):
         """What sliding takes off."""
         return _Fall(self.static, self.kinetic, self.speed)
 
+    @property
+    def without_sticking(self) -> None:
+        """Nothing: what sliding takes off is a part of what sticks."""
+        return None
+
     def dry(self, load: Scalar, scope: Scope, owner: str) -> Scalar:
         """T_s."""
         return scope.parameter(owner, "static", self.static)
