@@ -8,16 +8,11 @@ from typing import Any
 from mbd.bodies.values import number
 from mbd.errors import ModelError
 from mbd.joints.losses.base import Loss, LossSum
-from mbd.joints.losses.viscous import Viscous
+from mbd.joints.losses.isotropic import isotropic
 from mbd.scope import Scope
-from mbd.tape.functions import sqrt
 from mbd.tape.node import Scalar
 
 __all__ = ["friction_of", "has_dry_part", "resistance"]
-
-LEAST_SQUARE = 1e-60
-"""Square of a speed that is none, beside which a direction is defined [m²/s²]."""
-
 
 def friction_of(value: Any, name: str) -> float | Loss | None:
     """What a contact's friction may be: None, μ, or a loss of the slip's speed, its force per newton of normal force.
@@ -50,11 +45,4 @@ def resistance(loss: Loss, push: Scalar, speeds: Sequence[Scalar], scope: Scope,
     smooth = loss.smooth
     if smooth is None:
         return [0.0 for _ in speeds]
-    if len(speeds) == 1 or isinstance(smooth, Viscous):
-        return [-push * smooth.force(speed, scope, owner) for speed in speeds]
-    square: Scalar = LEAST_SQUARE
-    for speed in speeds:
-        square = square + speed * speed
-    size: Scalar = sqrt(square)
-    part = push * smooth.force(size, scope, owner) / size
-    return [-part * speed for speed in speeds]
+    return [-push * part for part in isotropic(smooth, speeds, scope, owner)]

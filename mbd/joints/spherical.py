@@ -10,6 +10,8 @@ from mbd.bodies.base import Frame
 from mbd.bodies.domains import Domain
 from mbd.joints import quaternions
 from mbd.joints.base import Joint, JointLoss, Label
+from mbd.joints.losses.base import Loss
+from mbd.joints.losses.isotropic import isotropic
 from mbd.joints.parts import place_rows
 from mbd.scope import Rotation, Scope, Triple
 from mbd.tape.node import Scalar
@@ -30,8 +32,8 @@ class Spherical(Joint):
     Parameters
     ----------
     name, parent, child : its name and its two frames
-    loss : friction torque about each axis of the child [N m], or by label: {'angular_velocity.x': Viscous(0.1)}; the
-        same Viscous about all three is isotropic, ``−c ω``
+    loss : friction torque against the angular velocity, ``F(‖ω‖) ω/‖ω‖``, whose dry part sticks about each axis of the
+        child by itself [N m]; or by label, about one axis of the child: {'angular_velocity.x': Viscous(0.1)}
     stiffness : k of an isotropic spring [N m/rad], ``V = ½ k θ²`` with θ the angle of the rotation, 0 ≤ θ ≤ π; give the
         child's frame a rotation for a spring that rests elsewhere, and use `mbd.Potential` of
         '<name>.rotation_vector.x', … for one that is not isotropic
@@ -55,6 +57,12 @@ class Spherical(Joint):
     def labels(self) -> tuple[Label, ...]:
         """`orientation.w`, `.x`, `.y`, `.z`."""
         return ORIENTATION
+
+    def resistance(self, rates: Sequence[Scalar], scope: Scope) -> list[Scalar]:
+        """One loss acts against ω, losses by label about their axes."""
+        if isinstance(self.loss, Loss):
+            return isotropic(self.loss, rates, scope, f"{self.name} loss")
+        return super().resistance(rates, scope)
 
     @property
     def velocity_labels(self) -> tuple[Label, ...]:

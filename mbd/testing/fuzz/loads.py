@@ -11,7 +11,7 @@ import mbd
 from mbd.bodies.base import Frame
 from mbd.constraints.user_measure import UserMeasure
 from mbd.joints.base import Joint
-from mbd.joints.losses.base import LossSum
+from mbd.joints.losses.base import Loss, LossSum
 from mbd.testing.fuzz.bodies import Bodies, mass_of
 from mbd.testing.fuzz.geometry import Array, cross
 from mbd.testing.fuzz.quantities import TINY, gap_of, named, triple, user_gap, value_of
@@ -155,12 +155,20 @@ def _joint(found: Loads, joint: Joint) -> None:
         for place, owner, loss in joint.losses():
             if place == k:
                 size = loss_force(loss, rate, owner, told.parameters)
+                if isinstance(joint, mbd.Spherical) and isinstance(joint.loss, Loss):
+                    size = _against(loss, rate, [told[each] for each in joint.velocity_names], owner, told.parameters)
                 found.effort(joint, k, -size)
                 found.power[owner] = found.power.get(owner, 0.0) - size * rate
         for friction in dict.fromkeys((f"{name}.friction", f"{joint.name}.friction")):
             if friction in told and (friction == f"{name}.friction" or len(joint.labels) == 1):
                 found.effort(joint, k, told[friction])
                 found.power[friction] = told[friction] * rate
+
+
+def _against(loss: Any, rate: Array, velocity: list[Array], owner: str, parameters: Any) -> Any:
+    """The part along one of the components of a velocity of a loss that acts against all of it."""
+    speed = np.linalg.norm(velocity, axis=0)
+    return loss_force(loss, speed, owner, parameters) * rate / np.where(speed > 0.0, speed, 1.0)
 
 
 def loss_force(loss: Any, rate: Array, owner: str, parameters: Any) -> Any:

@@ -1,0 +1,35 @@
+"""A loss of a velocity in a plane or in space, against it whatever its direction."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from mbd.joints.losses.base import Loss, LossSum
+from mbd.joints.losses.viscous import Viscous
+from mbd.scope import Scope
+from mbd.tape.functions import sqrt
+from mbd.tape.node import Scalar
+
+__all__ = ["isotropic"]
+
+LEAST_SQUARE = 1e-60
+"""Square of a speed that is none, beside which a direction is defined [m²/s², rad²/s²]."""
+
+
+def isotropic(loss: Loss, velocity: Sequence[Scalar], scope: Scope, owner: str) -> list[Scalar]:
+    """``F(‖v‖) v/‖v‖`` of the smooth part of a loss, for the components v along perpendicular axes."""
+    if isinstance(loss, LossSum):
+        parts = [isotropic(part, velocity, scope, name) for name, part in loss.named(owner)]
+        return [_sum(forces) for forces in zip(*parts, strict=True)]
+    if len(velocity) == 1 or isinstance(loss, Viscous):
+        return [loss.force(rate, scope, owner) for rate in velocity]
+    size: Scalar = sqrt(_sum([LEAST_SQUARE, *(rate * rate for rate in velocity)]))
+    share = loss.force(size, scope, owner) / size
+    return [share * rate for rate in velocity]
+
+
+def _sum(values: Sequence[Scalar]) -> Scalar:
+    result: Scalar = 0.0
+    for value in values:
+        result = result + value
+    return result

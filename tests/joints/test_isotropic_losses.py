@@ -1,0 +1,58 @@
+"""A loss of a ball joint acts against its angular velocity, whatever the axes of its frames."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import mbd
+
+LOSSES = {
+    "quadratic": mbd.Quadratic(0.3),
+    "coulomb smoothed": mbd.Coulomb(0.4, smoothing=0.05),
+    "tabulated": mbd.Tabulated([-4.0, 0.0, 4.0], [-2.0, 0.0, 2.0]),
+    "sum": mbd.Quadratic(0.2) + mbd.Viscous(0.1) + mbd.AffineFriction(0.4, -0.05, smoothing=0.1),
+}
+
+
+def ball(loss, turn):
+    """A body on a ball joint whose child frame is turned, in motion."""
+    model = mbd.Model("ball", gravity=(0.0, -9.81, 0.0))
+    body = mbd.RigidBody("body", 1.0, (0.1, 0.2, 0.15), center=(0.3, 0.1, -0.2))
+    frame = replace(body.point(0.0, 0.1, 0.0), rotation=tuple(map(tuple, turn.as_matrix().tolist())))
+    model.connect(mbd.Spherical("hip", model.ground.origin, frame, loss=loss))
+    speed = turn.inv().apply([1.0, 2.0, -3.0])
+    velocity = {f"hip.angular_velocity.{axis}": part for axis, part in zip("xyz", speed.tolist(), strict=True)}
+    return model, mbd.assemble(model, {"hip.orientation": turn}, velocity)
+
+
+@pytest.mark.parametrize("name", LOSSES)
+def test_the_axes_of_the_joint_change_nothing(name):
+    ends = []
+    for turn in (Rotation.identity(), Rotation.from_rotvec([0.4, -1.1, 0.7])):
+        model, start = ball(LOSSES[name], turn)
+        run = mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.01, until=0.5)
+        ends.append([run.final[f"body.origin.{axis}"] for axis in "xyz"])
+    np.testing.assert_allclose(ends[1], ends[0], rtol=0.0, atol=1e-9)
+
+
+def test_the_torque_is_that_of_the_whole_speed():
+    model, start = ball(mbd.Quadratic(0.3), Rotation.identity())
+    run = mbd.simulate(model, start, mbd.RadauIIA(), dt=0.01, until=0.2)
+    omega = np.array([run[f"hip.angular_velocity.{axis}"] for axis in "xyz"])
+    torque = np.array([run[f"hip loss.angular_velocity.{axis}.torque"] for axis in "xyz"])
+    np.testing.assert_allclose(torque, -0.3 * np.linalg.norm(omega, axis=0) * omega, rtol=1e-12)
+    assert math.isclose(run.energy.total[-1] - run.energy.total[0], run.energy.parts[0].energy[-1], abs_tol=1e-6)
+
+
+def test_at_rest_it_is_none_and_losses_by_label_keep_their_axis():
+    model, start = ball(mbd.Quadratic(0.3), Rotation.identity())
+    still = mbd.assemble(model, {"hip.orientation": (1.0, 0.0, 0.0, 0.0)})
+    run = mbd.simulate(model, still, mbd.HHT(), dt=1e-3, until=0.1)
+    assert np.isfinite(run.final.q).all()
+    model, start = ball({"angular_velocity.y": mbd.Quadratic(0.3)}, Rotation.identity())
+    run = mbd.simulate(model, start, mbd.HHT(), dt=1e-3, until=0.05)
+    rate = run["hip.angular_velocity.y"]
+    np.testing.assert_allclose(run["hip loss.angular_velocity.y.torque"], -0.3 * np.abs(rate) * rate, rtol=1e-12)
