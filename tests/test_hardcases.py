@@ -34,7 +34,8 @@ from mbd.simulation.arguments import CHOICES
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "hardcases.md"
 
 LONG = {(case, name) for case in ("b2-N10", "g3", "j1", "j4", "j5", "j17") for name in ("RadauIIA", "RungeKutta853")}
-LONG |= {("j4", "HHT-index3"), ("j4", "generalized-alpha-index3"), ("b2-N10", "HHT-index3")}
+LONG |= {("j4", "HHT"), ("j4", "HHT-index3"), ("j4", "generalized-alpha-index3"), ("b2-N10", "HHT-index3")}
+LONG |= {("j6", "RadauIIA")}
 """Cases that take seconds with schemes that others judge quickly."""
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -66,8 +67,10 @@ DOORS = {
 FILES = sorted(file for file in PACKAGE.rglob("*.py") if file != PACKAGE / "__init__.py")
 
 
-def imports(tree: ast.AST) -> set[tuple[str, bool]]:
+@cache
+def imports(file: Path) -> set[tuple[str, bool]]:
     """(module, whether inside a function) of every import of ours, those for type checkers only among them."""
+    tree = ast.parse(file.read_text())
     inside = {id(node) for owner in ast.walk(tree) if isinstance(owner, ast.FunctionDef) for node in ast.walk(owner)}
     found: set[tuple[str, bool]] = set()
     for node in ast.walk(tree):
@@ -88,7 +91,7 @@ def test_imports_go_down():
         doors = DOORS.get(module, ())
         above = {
             name
-            for name, inside in imports(ast.parse(file.read_text()))
+            for name, inside in imports(file)
             if RANK.get(name.split(".")[0], 0) > RANK[part]
             and not (inside and f"{name}.".startswith(tuple(f"{door}." for door in doors)))
         }
@@ -102,7 +105,7 @@ def test_no_modules_import_each_other():
     }
     graph: Any = nx.DiGraph()
     for module, file in names.items():
-        for name, inside in imports(ast.parse(file.read_text())):
+        for name, inside in imports(file):
             owner = name if name in names else name.rpartition(".")[0]
             if owner in names and not inside:
                 graph.add_edge(module, owner)

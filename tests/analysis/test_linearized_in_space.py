@@ -67,7 +67,7 @@ def apart(first: Any, second: Any) -> float:
     return float(max(gaps.min(axis=0).max(), gaps.min(axis=1).max()) / np.abs(first).max())
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2, *(pytest.param(k, marks=pytest.mark.slow) for k in range(3, 60))])
+@pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 60))])
 def test_modes_at_rest_are_the_same_in_every_description(seed):
     here, away = Rotation.identity(), Rotation.random(random_state=seed)
     found = eigenvalues(hanging(seed, here))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -50,9 +51,9 @@ def amplification_in_closed_form(k: Coefficients, turn: float, damping: float = 
     return np.asarray(np.linalg.solve(left, right))
 
 
-@pytest.fixture(scope="module")
-def measured():
-    return {name: criteria(scheme, turns=FEW) for name, scheme in SCHEMES.items()}
+@cache
+def measured(name):
+    return criteria(SCHEMES[name], turns=FEW)
 
 
 # the published values ---------------------------------------------------------------------------------------------
@@ -73,13 +74,13 @@ def test_damping_and_elongation_are_those_of_the_exact_matrix(name):
 
 
 @pytest.mark.parametrize("name", SCHEMES)
-def test_the_radius_at_infinity_is_reached_though_roots_are_multiple_there(name, measured):
-    assert measured[name].rho_inf == pytest.approx(I1[f"rho_infinity | {name}"].value, abs=2e-5)
+def test_the_radius_at_infinity_is_reached_though_roots_are_multiple_there(name):
+    assert measured(name).rho_inf == pytest.approx(I1[f"rho_infinity | {name}"].value, abs=2e-5)
 
 
 @pytest.mark.parametrize("name", SCHEMES)
-def test_leading_coefficients_are_those_of_the_series(name, measured):
-    found, power = measured[name], 1 if "damped" in name else 3
+def test_leading_coefficients_are_those_of_the_series(name):
+    found, power = measured(name), 1 if "damped" in name else 3
     longer = I2[f"lim of (T_bar/T - 1)/Omega^2 | {name}"]
     damping = I2[f"lim of damping ratio/Omega{f'^{power}' if power > 1 else ''} | {name}"]
     assert (found.elongation_order, found.damping_order) == (2, power if damping.value else 0)
@@ -88,13 +89,13 @@ def test_leading_coefficients_are_those_of_the_series(name, measured):
 
 
 @pytest.mark.parametrize("name", SCHEMES)
-def test_the_order_observed_is_the_one_promised(name, measured):
-    assert measured[name].order == pytest.approx(measured[name].promised, abs=0.15)
+def test_the_order_observed_is_the_one_promised(name):
+    assert measured(name).order == pytest.approx(measured(name).promised, abs=0.15)
 
 
 @pytest.mark.parametrize("name", SCHEMES)
-def test_closed_forms_agree_with_what_is_measured(name, measured):
-    found, exact = measured[name], measured[name].exact
+def test_closed_forms_agree_with_what_is_measured(name):
+    found, exact = measured(name), measured(name).exact
     assert exact.order == found.promised
     assert exact.rho_inf == pytest.approx(found.rho_inf, abs=2e-5)
     assert (exact.damping_order, exact.elongation_order) == (found.damping_order, found.elongation_order)
@@ -103,10 +104,10 @@ def test_closed_forms_agree_with_what_is_measured(name, measured):
     assert exact.stability_limit is None or exact.stability_limit == pytest.approx(found.stability_limit, rel=1e-6)
 
 
-def test_linear_acceleration_is_stable_up_to_its_critical_step(measured):
+def test_linear_acceleration_is_stable_up_to_its_critical_step():
     limit = I2["linear acceleration: critical Omega"].value
-    assert measured["Newmark linear acceleration (1/6, 1/2)"].stability_limit == pytest.approx(limit, rel=1e-8)
-    assert measured["HHT alpha = 0.05 (chapter text)"].stability_limit == np.inf
+    assert measured("Newmark linear acceleration (1/6, 1/2)").stability_limit == pytest.approx(limit, rel=1e-8)
+    assert measured("HHT alpha = 0.05 (chapter text)").stability_limit == np.inf
 
 
 def test_hht_without_the_square_in_beta_is_unstable():
@@ -302,14 +303,14 @@ def test_bad_arguments_are_named(arguments, says):
 
 
 # table and plot ---------------------------------------------------------------------------------------------------
-def test_the_table_shows_the_closed_form_beside_the_measurement(measured):
-    table = str(measured["Newmark linear acceleration (1/6, 1/2)"])
+def test_the_table_shows_the_closed_form_beside_the_measurement():
+    table = str(measured("Newmark linear acceleration (1/6, 1/2)"))
     assert "closed form" in table and table.count("3.4641") == 2 and table.count("0.04167 (ω dt)²") == 2
     assert "closed form" not in str(criteria(KUTTA, turns=FEW))
 
 
-def test_the_plot_draws_every_integrator_in_every_panel(measured, tmp_path):
-    chosen = [measured[name] for name in list(SCHEMES)[:4]]
+def test_the_plot_draws_every_integrator_in_every_panel(tmp_path):
+    chosen = [measured(name) for name in list(SCHEMES)[:4]]
     figure = plot(*chosen, path=tmp_path / "spectra.png")
     assert (tmp_path / "spectra.png").stat().st_size > 10000
     radius, damping, elongation = figure.axes

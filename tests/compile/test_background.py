@@ -244,7 +244,7 @@ def process(script):
     )  # fmt: skip
 
 
-@pytest.mark.sampled(2)
+@pytest.mark.sampled(4)
 @pytest.mark.parametrize("end", ENDS)
 def test_a_process_may_end_while_code_is_made(end):
     script, code = ENDS[end]

@@ -108,8 +108,8 @@ def compared(model, route, seed, tolerance=1e-9):
     np.testing.assert_allclose(at(list(equations.balance), point), expected, rtol=tolerance, atol=tolerance)
 
 
-@pytest.mark.sampled(2)
-@pytest.mark.parametrize(("seed", "spatial"), [(3, False), (6, False), (1, True), (3, True)])
+@pytest.mark.sampled(4)
+@pytest.mark.parametrize(("seed", "spatial"), [(1, True), (3, False), (6, False), (3, True)])
 def test_equations_equal_those_of_sympy(seed, spatial):
     compared(random_tree(seed, 2, spatial, most=2, turned=0.0), by_sympy, seed)
 

@@ -134,6 +134,7 @@ def test_newmark_with_gamma_above_one_half_is_of_first_order():
         assert observed(table[part][:, 1])[-1] == pytest.approx(1.0, abs=0.15)
 
 
+@pytest.mark.slow
 def test_the_averaged_form_is_of_first_order_because_it_does_not_average_the_mass():
     scheme = mbd.HHT(0.3, form="averaged")
     table = errors("double pendulum", scheme)

@@ -46,6 +46,7 @@ def test_a_driver_beyond_reach_is_named_and_no_row_leaves_its_constraints(scheme
         assert "constraints cannot be satisfied" in run.message and "'winch'" in run.message, run.message
 
 
+@pytest.mark.slow
 def test_long_steps_of_collocation_store_no_row_beyond_the_reach() -> None:
     """Newton's method ends with small corrections there, some microns off the constraints; the rows are asked again."""
     rng = np.random.default_rng(4)

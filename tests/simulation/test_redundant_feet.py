@@ -108,6 +108,7 @@ def pulls(run, feet):
     return np.array(sizes), np.array([run[f"foot {k}.force"] for k in range(len(feet))])
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("scheme", [mbd.HHT(0.05), mbd.GeneralizedAlpha(0.8), mbd.RadauIIA(), mbd.RungeKutta853()])
 def test_a_three_legged_table_slips_at_its_limit_load_and_turns_about_its_center(scheme):
     """Both bounds of limit analysis, and the center of rotation at onset."""
