@@ -90,8 +90,7 @@ class Stepper:
         self.functions.append(mechanism.common["terms"] if mechanism.judged else None)
         for name in ("increment_rates", "chart_end", "chart_motion"):
             self.functions.append(None if mechanism.vector else mechanism.common[name])
-        without_mass_matrix = self.own.abilities.explicit == 1 and not mechanism.vector
-        self.functions.append(mechanism.free_rates() if without_mass_matrix else None)
+        self.functions.append(mechanism.free_rates() if self.own.abilities.explicit == 1 else None)
         self.kernel.treelike = int(self.functions[-1] is not None)
         self.kernel.code = self.functions
         self.modes: list[Any] = []
