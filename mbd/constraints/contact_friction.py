@@ -14,6 +14,7 @@ from mbd.tape.node import Scalar
 
 __all__ = ["friction_of", "has_dry_part", "resistance"]
 
+
 def friction_of(value: Any, name: str) -> float | Loss | None:
     """What a contact's friction may be: None, μ, or a loss of the slip's speed, its force per newton of normal force.
 

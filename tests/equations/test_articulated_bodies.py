@@ -50,7 +50,9 @@ def runs(model, start, dt=0.01, until=0.2):
         return by_bodies, mbd.simulate(model, start, mbd.RungeKutta853(), dt=dt, until=until)
 
 
-@pytest.mark.parametrize(("joint", "seed", "adds"), [("spherical", 3, False), ("free", 3, False), ("revolute", 0, True)])
+@pytest.mark.parametrize(
+    ("joint", "seed", "adds"), [("spherical", 3, False), ("free", 3, False), ("revolute", 0, True)]
+)
 def test_runs_are_those_with_the_mass_matrix(joint, seed, adds):
     case = scene("tree", joint, seed)
     assert mechanism_of(case.model).vector is adds
