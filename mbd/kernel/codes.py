@@ -11,8 +11,8 @@ DONE, FULL, NEW_MODE, EVENT, PAUSE, LAST = range(6)
 (
     NOT_FINITE, NOT_CONVERGED, SINGULAR, STAGNATED, CHATTER, NO_IMPACT, DEPENDENT, CONFLICT, NO_LOCATION, ENERGY_GAIN,
     NO_FORCE, TOO_TIGHT, TOO_NEAR, TOO_SMALL, SINGULAR_ROWS_MOVE, OUTGROWN, GAINED, TOO_BRIEF,
-    AT_POSE, LEAPT, ILL_CONDITIONED,
-) = range(10, 31)  # fmt: skip
+    AT_POSE, LEAPT, ILL_CONDITIONED, JUMPED,
+) = range(10, 32)  # fmt: skip
 DOUBTFUL_START, NEEDS_PYTHON = 40, 41
 """How one of many runs ends that Python has to make: its start may be none, or it goes on in another way."""
 (

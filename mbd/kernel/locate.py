@@ -9,6 +9,7 @@ from mbd.kernel.codes import (
     CROSS_BACK,
     CROSS_BRIEF,
     GRAZE,
+    JUMPED,
     NO_LOCATION,
     OPEN_FORCE,
     OPEN_GAP,
@@ -149,7 +150,8 @@ def root_before(K: Kernel, kind: int, index: int, low: float, end: float) -> int
         return status
     if K.event_kind == CLOSE and K.event_after > 0.0 and K.kind[index] == 0 and K.linear == 0:
         if K.row_unit[K.normal[index]] == 1 and abs(K.guards1[index]) > JUMP * gap_scale(K, index):
-            return NO_LOCATION  # an angle that is nowhere zero, as a twist at half a turn
+            K.failure_index = index
+            return JUMPED  # an angle that is nowhere zero, as a twist at half a turn
     if (
         K.event_kind >= 0 and K.event_after > 0.0 and kind == CLOSE and left_alone(K, index)
     ):  # not watched any more there

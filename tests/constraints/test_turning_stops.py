@@ -87,3 +87,16 @@ def test_a_twist_is_known_next_to_half_a_turn():
             twist = 2.0 * np.arctan2(p, w) if p > 0.0 else 2.0 * np.arctan2(-p, -w)
             twist -= 2.0 * np.pi * np.round(twist / (2.0 * np.pi))
             assert run["outward.gap"][0] == pytest.approx(LIMITS[1] - twist, abs=1e-15 / (p * p))
+
+
+def test_a_twist_that_jumps_past_its_stop_at_half_a_turn_ends_the_run_by_name():
+    model = mbd.Model("twisting", gravity=(0.0, 0.0, 0.0))
+    top = mbd.RigidBody("top", 1.0, (0.1, 0.1, 0.05))
+    hip = mbd.Spherical("hip", model.ground.origin, top.origin)
+    model.connect(hip)
+    model.constrain(mbd.Unilateral("stop", mbd.twist(hip, -2.0)))
+    start = mbd.assemble(model, {}, {"hip.angular_velocity.y": 3.0})
+    for scheme in (mbd.HHT(), mbd.RadauIIA(), mbd.RungeKutta853()):
+        run = mbd.simulate(model, start, scheme, dt=0.01, until=2.0, on_failure="return")
+        assert run.stats["steps"] > 90
+        assert "the angle of 'stop' jumps past zero, as a twist does at half a turn" in run.message

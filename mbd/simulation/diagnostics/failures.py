@@ -134,6 +134,12 @@ def _what(
         )
     if status in (codes.TOO_SMALL, codes.SINGULAR_ROWS_MOVE):
         return _no_size(stepper, status, closed)
+    if status == codes.JUMPED:
+        name = stepper.manager.names[int(stepper.kernel.failure_index)]
+        return (
+            f"the angle of {name!r} jumps past zero{closed}, as a twist does at half a turn: there is no instant at which "
+            "it closes; keep the motion away from there, stop it before, or measure an angle that does not jump"
+        )
     if status == codes.ILL_CONDITIONED:
         error, who = float(stepper.kernel.lost_digits), _unknown(stepper).removeprefix("the motion of ")
         return (
