@@ -137,8 +137,8 @@ def _what(
     if status == codes.JUMPED:
         name = stepper.manager.names[int(stepper.kernel.failure_index)]
         return (
-            f"the angle of {name!r} jumps past zero{closed}, as a twist does at half a turn: there is no instant at which "
-            "it closes; keep the motion away from there, stop it before, or measure an angle that does not jump"
+            f"the angle of {name!r} jumps past zero{closed}, as a twist does at half a turn: there is no instant at "
+            "which it closes; keep the motion away from there, stop it before, or measure an angle that does not jump"
         )
     if status == codes.ILL_CONDITIONED:
         error, who = float(stepper.kernel.lost_digits), _unknown(stepper).removeprefix("the motion of ")
