@@ -86,6 +86,8 @@ EXAMPLES: dict[str, Any] = {
     "start": START,
     "state": START,
     "starts": [START, START],
+    "speed": 0.1,
+    "static": 0.6,
     "stiffness": 1.0,
     "subject": ANGLE,
     "time": (0.0, 1.0, 2.0),
@@ -98,6 +100,7 @@ EXAMPLES: dict[str, Any] = {
 """A right argument by the name of its parameter."""
 
 OWN: dict[tuple[str, str], Any] = {
+    ("Stribeck", "kinetic"): 0.4,
     ("Applied", "force"): (1.0, 0.0, 0.0), ("accuracy", "until"): 0.1, ("effects", "until"): 0.1,
     ("Controller", "period"): 0.1, ("Event", "direction"): 0, ("Marker", "place"): (0.1, 0.2), ("Motor", "torque"): 1.0,
     ("Nonholonomic", "arguments"): ("hinge.rate",), ("Rolling", "center"): END,
