@@ -211,7 +211,7 @@ def without_warnings(tmp_path, monkeypatch):
         yield
 
 
-@pytest.mark.parametrize("name", WORDS)
+@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow) if n == "basin" else n for n in WORDS])
 def test_a_wrong_argument_is_taken_or_named(name):
     word, fine = WORDS[name], right(name)
     files = {"load", "replay"} & {name}

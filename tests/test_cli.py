@@ -365,6 +365,7 @@ def test_a_folder_that_cannot_be_written_is_told_before_any_work(script, tmp_pat
     assert {each.name for each in tmp_path.iterdir()} == {"file", "my_walk.py"}
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("folder", ["a b/ü\"'<x>&", "$a 'b'"])
 def test_a_folder_of_any_other_name_is_written_to(script, tmp_path, capsys, folder):
     assert cli.main(["run", script(WALK), "--out", folder]) == 0

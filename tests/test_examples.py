@@ -38,7 +38,9 @@ HEAVY = ("amputee-in-space",)
 """Whose plain twin takes minutes: see tests/cases/test_space_examples.py."""
 STUDIES = ("compare-two-knees", "identify-a-shank", "tune-a-knee-damper")
 """Which find gaits or fits before their run, for seconds."""
-EACH = [pytest.param(name, marks=pytest.mark.slow) if name in STUDIES else name for name in NAMES]
+LONG = ("steeper-slope", "long-pendulum", "basin-picture")
+"""Which run for seconds, and are run again where the site is made."""
+EACH = [pytest.param(name, marks=pytest.mark.slow) if name in (*STUDIES, *LONG) else name for name in NAMES]
 COARSE = ("long-pendulum", "tippe-top", "user-integrator")
 """Of steps so long, for very many periods, or of order so low that other schemes differ."""
 WALKERS = ("chapter-walker", "compass-gait", "kneed-walker", "prosthetic-leg")

@@ -38,6 +38,7 @@ def found(values, parameters, **more):
     return mbd.fit(model, start, {"time": TIMES, "pin.angle": values}, parameters, mbd.Newmark(), 0.02, **more)
 
 
+@pytest.mark.slow
 def test_a_walker_is_found_from_angles_and_instants_of_its_heel_strikes():
     model = kneed_walker()
     start = kneed_walker_start(model)

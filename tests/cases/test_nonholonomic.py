@@ -37,6 +37,7 @@ def is_averaged(scheme: NewmarkFamily) -> bool:
     return getattr(scheme, "form", "endpoint") == "averaged"
 
 
+@pytest.mark.sampled(2)
 @every_scheme
 def test_a_pulled_sleigh_of_other_sizes_follows_its_reduced_equations(scheme: NewmarkFamily) -> None:
     """All along, with the side force; by rows of a blade and by hand."""

@@ -74,6 +74,7 @@ def test_steps_too_fine_to_pass_say_so():
         assert word in run.message
 
 
+@pytest.mark.slow
 def test_the_plain_twin_takes_the_same_steps():
     model, start = started(1)
     until = flat(1)[0] + 0.05

@@ -2,12 +2,16 @@
 
 import pytest
 
+import mbd
 from mbd.testing import check_integrator
 from tests.instances import STEPPED
 from tests.integrators.own import ProjectedMidpoint, SemiImplicitEuler
 
+MORE = mbd.Newmark(beta=0.31, gamma=0.6), mbd.GeneralizedAlpha(rho_inf=0.0), mbd.HHT(alpha=0.05, formulation="index3")
+EACH = [pytest.param(scheme, marks=pytest.mark.slow) if scheme in MORE else scheme for scheme in STEPPED]
 
-@pytest.mark.parametrize("scheme", [*STEPPED, SemiImplicitEuler(), ProjectedMidpoint()], ids=repr)
+
+@pytest.mark.parametrize("scheme", [*EACH, SemiImplicitEuler(), ProjectedMidpoint()], ids=repr)
 def test_every_integrator_keeps_the_laws(scheme):
     verdict = check_integrator(scheme)
     refused = scheme.check(1)
