@@ -32,7 +32,8 @@ __all__ = ["articulated_accelerations"]
 class Resistance:
     """What a joint moves, at the joint: inertia A, H, M and force and torque p = (torque, force) against it.
 
-    turning, sliding : inertias about each axis, and the mass, had no joint beyond given way: round-off is one of these
+    turning, sliding, spread : what inertias about each axis, the mass, and Σ of the inertias are made from before
+        joints give way, but for what these cannot pass on: what round-off is relative to
     """
 
     A: Rotation
@@ -42,11 +43,13 @@ class Resistance:
     force: Triple = ZERO
     turning: Triple = ZERO
     sliding: Scalar = 0.0
+    spread: Scalar = 0.0
 
     def __add__(self, other: Resistance) -> Resistance:
         return Resistance(
             _sum(self.A, other.A), _sum(self.H, other.H), _sum(self.M, other.M), total(self.torque, other.torque),
             total(self.force, other.force), total(self.turning, other.turning), self.sliding + other.sliding,
+            self.spread + other.spread,
         )  # fmt: skip
 
 
@@ -81,7 +84,7 @@ def articulated_accelerations(
                 return None
             kept = minimum(kept, part)
         if parent.parent is not None:
-            on[parent.body.name] = on[parent.body.name] + _seen_from(parent, body, left)
+            on[parent.body.name] = on[parent.body.name] + _seen_from(parent, body, left, tape)
     rates = [tape.zero] * len(forces)
     motion: dict[str, tuple[Triple, Triple]] = {}
     for body in moving:
@@ -103,7 +106,8 @@ def _alone(body: Moving, found: MassProperties) -> Resistance:
     (x, y, z), A = alone.moment, alone.inertia
     H = ((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0))
     M = ((found.mass, 0.0, 0.0), (0.0, found.mass, 0.0), (0.0, 0.0, found.mass))
-    return Resistance(A, H, M, turning=(A[0][0], A[1][1], A[2][2]), sliding=found.mass)
+    turning = A[0][0], A[1][1], A[2][2]
+    return Resistance(A, H, M, turning=turning, sliding=found.mass, spread=turning[0] + turning[1] + turning[2])
 
 
 def _give_way(
@@ -140,11 +144,13 @@ def _give_way(
             p[alone], before[alone] = tau, 0.0 if alone < 3 else before[alone]
         given.append(one)
     A, H, M = (_block(inertia, *corner) for corner in ((0, 0), (0, 3), (3, 3)))
-    turning = _triple([0.0 if all(_is_zero(part, tape) for part in inertia[i]) else before[i] for i in range(3)])
-    return Resistance(A, H, M, _triple(p[:3]), _triple(p[3:]), turning, whole.sliding), given, kept
+    passes = [not all(_is_zero(part, tape) for part in inertia[i]) for i in range(3)]
+    turning = _triple([before[i] if passes[i] else 0.0 for i in range(3)])
+    spread = whole.spread if any(passes) else 0.0
+    return Resistance(A, H, M, _triple(p[:3]), _triple(p[3:]), turning, whole.sliding, spread), given, kept
 
 
-def _seen_from(parent: Moving, body: Moving, left: Resistance) -> Resistance:
+def _seen_from(parent: Moving, body: Moving, left: Resistance, tape: Tape) -> Resistance:
     """What a joint passes on to its parent, at the joint and in the axes of the parent."""
     place, R = _place(parent, body), body.turn
     (x, y, z), M = place, left.M
@@ -154,11 +160,15 @@ def _seen_from(parent: Moving, body: Moving, left: Resistance) -> Resistance:
     before, after = product(turned, skew), product(skew, transpose(H))
     A = _turned(R, left.A)
     upper = [[A[i][j] - before[i][j] + after[i][j] if i <= j else 0.0 for j in range(3)] for i in range(3)]
-    passed = left.turning[0] + left.turning[1] + left.turning[2]
-    turning = tuple(passed + left.sliding * across for across in (y * y + z * z, x * x + z * z, x * x + y * y))
+    alone = [_only(line, tape) for line in R]
+    passed = [left.spread if k is None else left.turning[k] for k in alone]
+    across = y * y + z * z, x * x + z * z, x * x + y * y
+    turning = [own + left.sliding * square for own, square in zip(passed, across, strict=True)]
+    spread = left.spread + 2.0 * (left.sliding * (x * x + y * y + z * z))
     return Resistance(
         _block([[upper[min(i, j)][max(i, j)] for j in range(3)] for i in range(3)], 0, 0), H, M,
         total(rotate(R, left.torque), cross(place, left.force)), left.force, _triple(turning), left.sliding,
+        spread,
     )  # fmt: skip
 
 

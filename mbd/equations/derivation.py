@@ -274,8 +274,8 @@ class TreeGeometry:
         return self.dynamics.mass_matrix()
 
     def accelerations(self, forces: Sequence[Node]) -> tuple[list[Node], Node] | None:
-        """v̇ with M v̇ = forces from the tips of a tree in space, where M is that of `mass_matrix`."""
-        return None if self.planar or self.mass_matrix() is None else self.dynamics.accelerations(forces)
+        """v̇ with M v̇ = forces from the tips of the tree, where M is that of `mass_matrix`."""
+        return None if self.mass_matrix() is None else self.dynamics.accelerations(forces)
 
     def partials(self, outputs: Sequence[Node]) -> list[dict[Node, Node]]:
         """∂node/∂x_j of the places and rotations inside the outputs."""

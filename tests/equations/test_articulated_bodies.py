@@ -11,6 +11,7 @@ import mbd
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of
 from mbd.kernel.mass_ratios import LOSS
+from tests.equations.mechanisms import random_tree
 from tests.equations.test_states import model as pulled
 from tests.space_scenes import JOINTS, scene
 
@@ -41,6 +42,29 @@ def test_rates_of_random_trees_are_those_of_the_mass_matrix(joint, seed):
     configuration, v = mechanism.equations.configuration, block[mechanism.layout.v : mechanism.layout.a][:n]
     np.testing.assert_allclose(found[:n], configuration.increment_rates(x, v), rtol=1e-12, atol=1e-12)
     assert 0.0 < found[2 * n] <= 1.0 + 1e-12
+
+
+@given(st.integers(0, 10**6), st.integers(1, 5))
+@settings(max_examples=8, deadline=None)
+def test_so_are_those_of_planar_trees(seed, bodies):
+    model = random_tree(seed, bodies, spatial=False, most=9)
+    start = mbd.assemble(model)
+    _, _, _, found, rates, pull, condition = both(model, start, seed)
+    n = len(rates)
+    np.testing.assert_allclose(found[n : 2 * n], rates, rtol=0.0, atol=1e-13 * condition * np.abs(rates).max())
+    np.testing.assert_allclose(found[2 * n + 1], pull, rtol=1e-12 * condition)
+
+
+@pytest.mark.parametrize("axes", [((0, 0, 1),), ((0, 0, 1), (0, 1, 0)), ((0, 0, 1), (0, 1, 0), (1, 0, 0))])
+def test_what_pivots_keep_does_not_fall_with_the_number_of_joints(axes):
+    model, before = mbd.Model("long chain"), None
+    for k in range(24):
+        bar = mbd.RigidBody(f"bar {k}", 1.0, (0.02, 0.1, 0.1), center=(0.5, 0.0, 0.0))
+        end = model.ground.origin if before is None else before.point(1.0, 0.0, 0.0)
+        model.connect(mbd.Revolute(f"joint {k}", end, bar.origin, axis=axes[k % len(axes)]))
+        before = bar
+    start = mbd.assemble(model, {f"joint {k}.angle": 0.1 for k in range(24)})
+    assert both(model, start, 0)[3][-2] > LOSS
 
 
 def runs(model, start, dt=0.01, until=0.2):

@@ -181,7 +181,8 @@ def stage_in_chart(K: Kernel, t: float, stage: int) -> bool:
         return False
     begin = stage * (n_v + K.n)
     K.stages[begin : begin + n_v] = K.spare[:n_v]
-    K.stage_pull = max(K.stage_pull, pull)
+    if K.vector == 0:
+        K.stage_pull = max(K.stage_pull, pull)
     K.n_residuals += 1
     return True
 
@@ -196,7 +197,8 @@ def explicit_rates(K: Balance, t: float) -> int:
     if m == 0:
         pull = free_rates(K, t)
         if pull != NOT_CLEAR:
-            K.stage_pull = max(K.stage_pull, pull)
+            if K.vector == 0:
+                K.stage_pull = max(K.stage_pull, pull)
             return 0
     evaluate(K, t, K.q1, K.y1)
     finite = 0.0

@@ -44,6 +44,11 @@ def is_compiled(mechanism: Mechanism, integrator: Integrator) -> bool:
     return own_scheme(integrator) is not NO_SCHEME and mechanism.common["accelerations"].address != 0
 
 
+def may_be_free(equations: Equations) -> bool:
+    """Whether there may be steps in which no row acts: all of them belong to contacts, or to friction in joints."""
+    return all(row.contact >= 0 or row.friction >= 0 for row in equations.rows)
+
+
 def follows(equations: Equations) -> int:
     """How frictions follow multipliers: 0 linearly, 1 as that of a pin does, 2 those of contacts that may pull."""
     limits = [friction.limit for friction in equations.frictions if friction.contact < 0]
@@ -90,7 +95,8 @@ class Stepper:
         self.functions.append(mechanism.common["terms"] if mechanism.judged else None)
         for name in ("increment_rates", "chart_end", "chart_motion"):
             self.functions.append(None if mechanism.vector else mechanism.common[name])
-        self.functions.append(mechanism.free_rates() if self.own.abilities.explicit == 1 else None)
+        without_rows = self.own.abilities.explicit == 1 and may_be_free(mechanism.equations)
+        self.functions.append(mechanism.free_rates() if without_rows else None)
         self.kernel.treelike = int(self.functions[-1] is not None)
         self.kernel.code = self.functions
         self.modes: list[Any] = []
