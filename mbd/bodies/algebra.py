@@ -13,7 +13,7 @@ from mbd.tape.node import Node, Scalar, Tape
 
 __all__ = [
     "IDENTITY", "ZERO", "Rotation", "Triple", "axis_rotation", "basis", "constant_rotation", "cross", "derivatives_at",
-    "difference", "dot", "norm", "product", "rotate", "scaled", "total", "transpose",
+    "difference", "dot", "norm", "product", "rotate", "scaled", "sum_of", "total", "transpose",
 ]  # fmt: skip
 
 Triple: TypeAlias = tuple[Scalar, Scalar, Scalar]
@@ -68,6 +68,11 @@ def product(A: Rotation, B: Rotation) -> Rotation:
     """A B."""
     columns = transpose(B)
     return (rotate(columns, A[0]), rotate(columns, A[1]), rotate(columns, A[2]))
+
+
+def sum_of(A: Rotation, B: Rotation) -> Rotation:
+    """A + B."""
+    return (total(A[0], B[0]), total(A[1], B[1]), total(A[2], B[2]))
 
 
 def axis_rotation(axis: Vector3, angle: Scalar) -> Rotation:

@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from mbd.bodies.algebra import ZERO, cross, difference, dot, product, rotate, total, transpose
+from mbd.bodies.algebra import ZERO, cross, difference, dot, product, rotate, sum_of, total, transpose
 from mbd.bodies.mass import MassProperties
 from mbd.equations.composite_mass import Composite
 from mbd.equations.kinematics import Moving
@@ -29,8 +29,8 @@ __all__ = ["articulated_accelerations"]
 
 
 @dataclass(frozen=True)
-class Resistance:
-    """What a joint moves, at the joint: inertia A, H, M and force and torque p = (torque, force) against it.
+class ArticulatedBody:
+    """What a joint moves, at the joint: its articulated inertia A, H, M and bias force p = (torque, force).
 
     turning, sliding, spread : what inertias about each axis, the mass, and Σ of the inertias are made from before
         joints give way, but for what these cannot pass on: what round-off is relative to
@@ -45,16 +45,16 @@ class Resistance:
     sliding: Scalar = 0.0
     spread: Scalar = 0.0
 
-    def __add__(self, other: Resistance) -> Resistance:
-        return Resistance(
-            _sum(self.A, other.A), _sum(self.H, other.H), _sum(self.M, other.M), total(self.torque, other.torque),
+    def __add__(self, other: ArticulatedBody) -> ArticulatedBody:
+        return ArticulatedBody(
+            sum_of(self.A, other.A), sum_of(self.H, other.H), sum_of(self.M, other.M), total(self.torque, other.torque),
             total(self.force, other.force), total(self.turning, other.turning), self.sliding + other.sliding,
             self.spread + other.spread,
         )  # fmt: skip
 
 
 @dataclass
-class Given:
+class Freedom:
     """How one velocity gives way: s, U, 1/d and u."""
 
     place: int
@@ -73,7 +73,7 @@ def articulated_accelerations(
     """
     moving = [body for body in bodies if body.parent is not None]
     on = {body.body.name: _alone(body, masses[body.body.name]) for body in moving}
-    given: dict[str, list[Given]] = {}
+    given: dict[str, list[Freedom]] = {}
     kept = tape.one
     for body in reversed(moving):
         assert body.parent is not None
@@ -100,19 +100,19 @@ def articulated_accelerations(
     return rates, tape.lift(kept)
 
 
-def _alone(body: Moving, found: MassProperties) -> Resistance:
+def _alone(body: Moving, found: MassProperties) -> ArticulatedBody:
     """A body by itself, at its joint, in its own axes."""
     alone = Composite.of(MassProperties(found.mass, difference(found.center, body.shift), found.inertia))
     (x, y, z), A = alone.moment, alone.inertia
     H = ((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0))
     M = ((found.mass, 0.0, 0.0), (0.0, found.mass, 0.0), (0.0, 0.0, found.mass))
     turning = A[0][0], A[1][1], A[2][2]
-    return Resistance(A, H, M, turning=turning, sliding=found.mass, spread=turning[0] + turning[1] + turning[2])
+    return ArticulatedBody(A, H, M, turning=turning, sliding=found.mass, spread=turning[0] + turning[1] + turning[2])
 
 
 def _give_way(
-    body: Moving, whole: Resistance, forces: Sequence[Node], tape: Tape
-) -> tuple[Resistance, list[Given], list[Scalar | None]]:
+    body: Moving, whole: ArticulatedBody, forces: Sequence[Node], tape: Tape
+) -> tuple[ArticulatedBody, list[Freedom], list[Scalar | None]]:
     """What the joint of a body passes on, angular parts in the body's axes, linear ones in its parent's."""
     R, mass = body.turn, whole.M[0][0]
     alike = all(whole.M[i][j] is mass if i == j else _is_zero(whole.M[i][j], tape) for i in range(3) for j in range(3))
@@ -122,11 +122,11 @@ def _give_way(
     inertia += [[H[0][i], H[1][i], H[2][i], *M[i]] for i in range(3)]
     p: list[Scalar] = [*whole.torque, *rotate(R, whole.force)]
     before = [*whole.turning, *([whole.sliding] * 3)]
-    given, kept = list[Given](), list[Scalar | None]()
+    given, kept = list[Freedom](), list[Scalar | None]()
     for k in reversed(range(len(body.columns))):
         assert body.edge is not None
         column, tau = body.columns[k], forces[body.edge.first + k]
-        one = Given(body.edge.first + k, (*column.angular, *column.linear))
+        one = Freedom(body.edge.first + k, (*column.angular, *column.linear))
         one.U = [_dot(line, one.motion) for line in inertia]
         pivot, size = tape.lift(_dot(one.U, one.motion)), tape.lift(_dot(before, [s * s for s in one.motion]))
         if pivot.is_zero or size.is_zero:
@@ -147,16 +147,16 @@ def _give_way(
     passes = [not all(_is_zero(part, tape) for part in inertia[i]) for i in range(3)]
     turning = _triple([before[i] if passes[i] else 0.0 for i in range(3)])
     spread = whole.spread if any(passes) else 0.0
-    return Resistance(A, H, M, _triple(p[:3]), _triple(p[3:]), turning, whole.sliding, spread), given, kept
+    return ArticulatedBody(A, H, M, _triple(p[:3]), _triple(p[3:]), turning, whole.sliding, spread), given, kept
 
 
-def _seen_from(parent: Moving, body: Moving, left: Resistance, tape: Tape) -> Resistance:
+def _seen_from(parent: Moving, body: Moving, left: ArticulatedBody, tape: Tape) -> ArticulatedBody:
     """What a joint passes on to its parent, at the joint and in the axes of the parent."""
     place, R = _place(parent, body), body.turn
     (x, y, z), M = place, left.M
     skew = ((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0))
     turned = product(R, left.H)
-    H = _sum(turned, product(skew, M))
+    H = sum_of(turned, product(skew, M))
     before, after = product(turned, skew), product(skew, transpose(H))
     A = _turned(R, left.A)
     upper = [[A[i][j] - before[i][j] + after[i][j] if i <= j else 0.0 for j in range(3)] for i in range(3)]
@@ -165,7 +165,7 @@ def _seen_from(parent: Moving, body: Moving, left: Resistance, tape: Tape) -> Re
     across = y * y + z * z, x * x + z * z, x * x + y * y
     turning = [own + left.sliding * square for own, square in zip(passed, across, strict=True)]
     spread = left.spread + 2.0 * (left.sliding * (x * x + y * y + z * z))
-    return Resistance(
+    return ArticulatedBody(
         _block([[upper[min(i, j)][max(i, j)] for j in range(3)] for i in range(3)], 0, 0), H, M,
         total(rotate(R, left.torque), cross(place, left.force)), left.force, _triple(turning), left.sliding,
         spread,
@@ -208,8 +208,3 @@ def _triple(values: Sequence[Scalar]) -> Triple:
 def _block(whole: Sequence[Sequence[Scalar]], i: int, j: int) -> Rotation:
     """The three by three entries from (i, j) on."""
     return (_triple(whole[i][j : j + 3]), _triple(whole[i + 1][j : j + 3]), _triple(whole[i + 2][j : j + 3]))
-
-
-def _sum(A: Rotation, B: Rotation) -> Rotation:
-    """A + B."""
-    return (total(A[0], B[0]), total(A[1], B[1]), total(A[2], B[2]))

@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from mbd.bodies.algebra import cross, difference, dot, product, rotate, scaled, total, transpose
+from mbd.bodies.algebra import cross, difference, dot, product, rotate, scaled, sum_of, total, transpose
 from mbd.bodies.mass import MassProperties
 from mbd.equations.kinematics import Moving
 from mbd.scope import Rotation, Triple
@@ -36,18 +36,20 @@ class Composite:
     def of(cls, found: MassProperties) -> Composite:
         """One body."""
         moment = scaled(found.mass, found.center)
-        return cls(found.mass, moment, _sum(found.inertia, _spread(moment, found.center, 0.5)))
+        return cls(found.mass, moment, sum_of(found.inertia, _spread(moment, found.center, 0.5)))
 
     def seen_from(self, turn: Rotation, place: Triple) -> Composite:
         """The same against the parent, in whose axes the origin lies at `place` and the axes are turned."""
         moment = rotate(turn, self.moment)
         turned = product(product(turn, self.inertia), transpose(turn))
         offset = total(moment, scaled(0.5, scaled(self.mass, place)))
-        return Composite(self.mass, total(moment, scaled(self.mass, place)), _sum(turned, _spread(offset, place, 1.0)))
+        return Composite(
+            self.mass, total(moment, scaled(self.mass, place)), sum_of(turned, _spread(offset, place, 1.0))
+        )
 
     def __add__(self, other: Composite) -> Composite:
         return Composite(
-            self.mass + other.mass, total(self.moment, other.moment), _sum(self.inertia, other.inertia)
+            self.mass + other.mass, total(self.moment, other.moment), sum_of(self.inertia, other.inertia)
         )  # fmt: skip
 
 
@@ -105,9 +107,3 @@ def _spread(moment: Triple, place: Triple, share: float) -> Rotation:
         (-xz, -yz, 2.0 * (ax + by)),
     )
     return tuple(scaled(share, row) for row in rows)  # type: ignore[return-value]
-
-
-def _sum(A: Rotation, B: Rotation) -> Rotation:
-    """A + B."""
-    a, b, c = (total(one, other) for one, other in zip(A, B, strict=True))
-    return (a, b, c)

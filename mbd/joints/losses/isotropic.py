@@ -10,7 +10,7 @@ from mbd.scope import Scope
 from mbd.tape.functions import sqrt
 from mbd.tape.node import Scalar
 
-__all__ = ["isotropic"]
+__all__ = ["LEAST_SQUARE", "isotropic"]
 
 LEAST_SQUARE = 1e-60
 """Square of a speed that is none, beside which a direction is defined [m²/s², rad²/s²]."""

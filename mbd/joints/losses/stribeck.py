@@ -8,6 +8,7 @@ from mbd.bodies.domains import Domain, positive
 from mbd.bodies.values import number
 from mbd.errors import ModelError
 from mbd.joints.losses.base import Loss
+from mbd.joints.losses.isotropic import LEAST_SQUARE
 from mbd.scope import Scope
 from mbd.tape.functions import exp, sqrt
 from mbd.tape.node import Scalar
@@ -15,8 +16,6 @@ from mbd.tape.node import Scalar
 __all__ = ["Stribeck"]
 
 SPEED = positive("is not positive; give the speed over which friction falls, or mbd.Coulomb for a constant one")
-LEAST_SQUARE = 1e-60
-"""Square of a rate that is none, beside which a direction is defined [m²/s², rad²/s²]."""
 
 
 @dataclass(frozen=True)
