@@ -14,6 +14,7 @@ from mbd.hardcases import (
     frictions,
     governor,
     grazes,
+    hills,
     knees,
     light_links,
     long_run,
@@ -38,9 +39,9 @@ from mbd.hardcases.case import HardCase
 __all__ = ["CASES"]
 
 MODULES = (
-    absent_effects, balls, blocks, clearances, cradles, four_bars, frictions, governor, grazes, knees, light_links,
-    long_run, mass_ratios, mats, pushed_tables, redundant_rows, resting, rods, rotations, shakers, singular_poses,
-    sleighs, starts, tiny_steps, user_force, walls, wheel,
+    absent_effects, balls, blocks, clearances, cradles, four_bars, frictions, governor, grazes, hills, knees,
+    light_links, long_run, mass_ratios, mats, pushed_tables, redundant_rows, resting, rods, rotations, shakers,
+    singular_poses, sleighs, starts, tiny_steps, user_force, walls, wheel,
 )  # fmt: skip
 
 

@@ -62,9 +62,14 @@ def _defect(mechanism: Any, run: Any, row: int, events: list[EventRecord]) -> De
     """The impact between two stored rows; contacts closed before take part with impulses that are not told."""
     record, equations = run.record, mechanism.equations
     before, after = record.v[row - 1], record.v[row]
-    terms = mechanism.acceleration_terms(
-        record.time[row], record.q[row], before, mechanism.parameters(), run.columns.anchors[row]
-    )
+    place = (record.time[row], record.q[row], before, mechanism.parameters())
+    anchors = np.array(run.columns.anchors[row])
+    struck = {event.name for event in events}
+    for contact in equations.contacts:  # those that rebound hold no place, but had one as they struck
+        if contact.name in struck:
+            here = list(contact.anchors)
+            anchors[here] = mechanism.acceleration_terms(*place, anchors).captured[here]
+    terms = mechanism.acceleration_terms(*place, anchors)
     rates = terms.B @ after + (terms.rate - terms.B @ before)
     speeds = np.abs(terms.B) @ np.maximum(np.abs(before), np.abs(after)) + np.abs(terms.rate - terms.B @ before)
     change = terms.M @ (after - before)

@@ -16,20 +16,17 @@ __all__ = [
 
 
 def prepare(K: Balance) -> None:
-    """K.acc at the instant, directions of sliding where contacts are now, force zero; all frictions begin stuck.
+    """K.acc at the instant, directions of sliding and of sticking where contacts are now; all frictions begin stuck.
 
-    Smooth friction of contacts, where K.rubs says that there is any, takes no part.
+    A contact that closes holds the place that it strikes from here on: its tangents are those of the ground there, also
+    where it rebounds. Smooth friction of contacts, where K.rubs says that there is any, takes no part.
     """
     evaluate(K, K.time, K.q, K.y)
     if K.n_cones > 0:
         hold_directions(K)
+    hold_places(K)
     if K.n_frictions > 0:
-        for f in range(K.n_frictions):
-            c = K.friction_contact[f]
-            if c >= 0 and (K.closing[c] > 0 or (K.closed[c] == 1 and K.sticks[f] == 0)):
-                capture(K, c)
         K.given[: K.n_rows] = 0.0
-        evaluate(K, K.time, K.q, K.y)
         K.block[1] = float(K.rubs)
         evaluate_loaded(K, K.given)
         for f in range(K.n_frictions):
@@ -42,6 +39,22 @@ def prepare(K: Balance) -> None:
         K.block[1] = 1.0
         call(K, ACCELERATIONS, K.acc)
     start_over(K)
+
+
+def hold_places(K: Guards) -> None:
+    """Anchors of contacts that close, and of those that slide, at the present state; K.acc with them."""
+    moved = False
+    for c in range(K.n_contacts):
+        if K.kind[c] == 0 and K.closing[c] > 0 and K.anchor_start[c] < K.anchor_start[c + 1]:
+            capture(K, c)
+            moved = True
+    for f in range(K.n_frictions):
+        c = K.friction_contact[f]
+        if c >= 0 and K.closed[c] == 1 and K.sticks[f] == 0 and K.anchor_start[c] < K.anchor_start[c + 1]:
+            capture(K, c)
+            moved = True
+    if moved:
+        evaluate(K, K.time, K.q, K.y)
 
 
 def start_over(K: Complementarity) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -12,6 +12,7 @@ from mbd.arrays import Vector
 from mbd.integrators import RadauIIA
 from mbd.integrators.family import NewmarkFamily
 from mbd.integrators.runge_kutta import ExplicitRungeKutta
+from mbd.results.record import EventRecord
 from mbd.sensitivity.balance import consistent_rates, independent, pushed
 from mbd.sensitivity.cones import ended_in_rest, held_rows, rests
 from mbd.sensitivity.guards import Trigger, shift_of_end, trigger
@@ -253,7 +254,8 @@ class Walk:
         closing = fired.kind == "closed" and equations.contacts[fired.number].kind != "penalty"
         motion = before
         if closing:
-            motion = struck(self.rows, self.programs, before, mode, events, row, fired.number, self.restitutions)
+            striking = captured(self.programs, before, mode, self._held_in_impact(events, mode))
+            motion = struck(self.rows, self.programs, striking, mode, events, row, fired.number, self.restitutions)
         elif fired.kind == "event" and equations.guards[fired.number].reset is not None:
             row_after = np.array(self.record.q[row]), self.rows.y[row]
             there = consistent_rates(self.programs, before, mode, rates)
@@ -268,3 +270,13 @@ class Walk:
         motion = replace(motion, anchors=held.anchors).with_tangent(anchors=held.tangent.anchors)
         soft = [c for c in fresh if equations.contacts[c].kind == "penalty"]
         return captured(self.programs, motion, mode, soft)
+
+    def _held_in_impact(self, events: Sequence[EventRecord], mode: Mode) -> list[int]:
+        """Contacts whose tangents an impact takes where they are: those that close, and those that slide."""
+        equations = self.programs.equations
+        closing = {event.name for event in events if event.kind == "closed"}
+        sliding = {each.contact for f, each in enumerate(equations.frictions) if mode.slip[f] != 0.0}
+        return [
+            c for c, contact in enumerate(equations.contacts)
+            if contact.kind != "penalty" and (contact.name in closing or (c in sliding and mode.closed[c]))
+        ]  # fmt: skip
